@@ -1,0 +1,30 @@
+// What is constant over a frame; `gpu::layout::Frame` documents the fields.
+struct Frame {
+    screen_from_voxel: array<vec4f, 3>,
+    pixels_from_footprint: mat2x2f,
+    footprint_from_pixels: mat2x2f,
+    light: vec4f,
+    half_vector: vec4f,
+    shading: vec4f,
+    background: vec4f,
+    dims: vec4u,
+    ramps: vec4u,
+    size: vec2u,
+    amplitude: f32,
+    radius: f32,
+    support: f32,
+    falloff: f32,
+    slab_width: f32,
+    compositing: u32,
+    order: u32,
+    padding_0: u32,
+    padding_1: u32,
+    padding_2: u32,
+}
+
+const LINEAR = 0u;
+const EXPONENTIAL = 1u;
+const XRAY = 2u;
+
+const FRONT_TO_BACK = 0u;
+const BACK_TO_FRONT = 1u;

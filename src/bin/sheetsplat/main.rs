@@ -1,0 +1,48 @@
+//! The command line program.
+
+mod render;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Volume rendering by image-aligned sheet-buffer splatting.
+#[derive(Parser)]
+#[command(version, about)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Render a scene file, a volume file, or a builtin volume to an image.
+    Render(render::Arguments),
+}
+
+/// What went wrong, by whose fault.
+enum Failure {
+    /// Bad usage or bad input: exit code 2.
+    Input(String),
+    /// Anything else: exit code 1.
+    Other(String),
+}
+
+fn main() -> ExitCode {
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("error")).init();
+    // Clap itself exits with 2 on bad usage, with 0 on --help.
+    let result = match Arguments::parse().command {
+        Command::Render(arguments) => render::run(&arguments),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Failure::Input(message)) => {
+            eprintln!("sheetsplat: {message}");
+            ExitCode::from(2)
+        }
+        Err(Failure::Other(message)) => {
+            eprintln!("sheetsplat: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! `sheetsplat render`.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::ValueEnum;
+use sheetsplat::error::{Error, RenderError};
+use sheetsplat::headless::{Headless, HeadlessOptions, Rendering};
+use sheetsplat::image::{Image, ImageError, PngDepth, write_aside};
+use sheetsplat::reference;
+use sheetsplat::scene::{Scene, SceneError, VolumeSource};
+use sheetsplat::stats::Stats;
+
+use crate::Failure;
+
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// A scene file (.toml), a volume file (.nrrd, .nhdr), or builtin:NAME[:N].
+    input: String,
+    /// The image: .png, .exr or .npy.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Set a scene value, as in --set splatting.slab_width=2.0. Can be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Bits per channel of a PNG.
+    #[arg(long, value_enum, default_value = "8")]
+    depth: Depth,
+    /// Write counts and times as JSON.
+    #[arg(long, value_name = "FILE")]
+    stats: Option<PathBuf>,
+    /// The GPU, or the slow f64 evaluation on the CPU that it is tested against.
+    #[arg(long, value_enum, default_value = "gpu")]
+    backend: Backend,
+    /// Part of the name of the adapter to use.
+    #[arg(long, value_name = "NAME", env = "WGPU_ADAPTER_NAME")]
+    adapter: Option<String>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Depth {
+    #[value(name = "8")]
+    Eight,
+    #[value(name = "16")]
+    Sixteen,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Backend {
+    Gpu,
+    Reference,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    Image::check_format(&arguments.output)?;
+    let scene = open_scene(&arguments.input, &arguments.set)?;
+    let Rendering { image, stats } = match arguments.backend {
+        Backend::Gpu => {
+            let options = HeadlessOptions { adapter: arguments.adapter.clone(), ..HeadlessOptions::default() };
+            let headless = Headless::new(&options).map_err(Error::from)?;
+            headless.render(&scene)?
+        }
+        Backend::Reference => render_reference(&scene)?,
+    };
+    let depth = match arguments.depth {
+        Depth::Eight => PngDepth::Eight,
+        Depth::Sixteen => PngDepth::Sixteen,
+    };
+    image.save(&arguments.output, depth)?;
+    if let Some(path) = &arguments.stats {
+        let json = serde_json::to_string_pretty(&stats).map_err(|error| Failure::Other(error.to_string()))?;
+        write_aside(path, (json + "\n").as_bytes())
+            .map_err(|error| Failure::Other(format!("{}: {error}", path.display())))?;
+    }
+    Ok(())
+}
+
+/// A scene file by its extension; anything else is a volume.
+fn open_scene(input: &str, sets: &[String]) -> Result<Scene, SceneError> {
+    match input.strip_prefix("builtin:") {
+        Some(name) => Scene::from_volume(VolumeSource::Builtin(name.to_owned()), sets),
+        None if input.ends_with(".toml") => Scene::open(input.as_ref(), sets),
+        None => Scene::from_volume(VolumeSource::File(input.into()), sets),
+    }
+}
+
+fn render_reference(scene: &Scene) -> Result<Rendering, Error> {
+    let start = Instant::now();
+    let volume = scene.load_volume()?;
+    let load_ms = start.elapsed().as_secs_f64() * 1e3;
+    let start = Instant::now();
+    let image = reference::render(&volume, &scene.transfer.resolve(&volume), scene)?;
+    let stats = Stats {
+        adapter: "CPU".to_owned(),
+        driver: "f64".to_owned(),
+        backend: "reference".to_owned(),
+        width: image.width,
+        height: image.height,
+        load_ms,
+        frame_ms: start.elapsed().as_secs_f64() * 1e3,
+        ..Stats::default()
+    };
+    Ok(Rendering { image, stats })
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Scene(_)
+            | Error::Volume(_)
+            | Error::Render(RenderError::Unsupported { .. } | RenderError::Limit { .. }) => {
+                Self::Input(error.to_string())
+            }
+            _ => Self::Other(error.to_string()),
+        }
+    }
+}
+
+impl From<SceneError> for Failure {
+    fn from(error: SceneError) -> Self {
+        Self::Input(error.to_string())
+    }
+}
+
+impl From<ImageError> for Failure {
+    fn from(error: ImageError) -> Self {
+        match error {
+            ImageError::Format { .. } => Self::Input(error.to_string()),
+            _ => Self::Other(error.to_string()),
+        }
+    }
+}

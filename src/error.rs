@@ -1,0 +1,63 @@
+//! Errors of the renderer. Loading errors live with the volume and the scene.
+
+use crate::gpu::device::DeviceError;
+use crate::scene::SceneError;
+use crate::volume::VolumeError;
+
+/// Why a frame could not be prepared or read back.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RenderError {
+    /// The scene asks for something that is specified but not implemented yet.
+    #[error("{key}: found {found}, allowed: {allowed} (the only one implemented so far)")]
+    Unsupported {
+        /// The scene key.
+        key: &'static str,
+        /// What the scene says.
+        found: &'static str,
+        /// What is implemented.
+        allowed: &'static str,
+    },
+    /// The frame needs more than a limit of the device allows.
+    #[error("{what}: the device's {limit} is {actual}, required: {required}")]
+    Limit {
+        /// What needs it (`image.width`, `image.height`, …).
+        what: &'static str,
+        /// The wgpu limit's name.
+        limit: &'static str,
+        /// What the frame needs.
+        required: u64,
+        /// What the device allows.
+        actual: u64,
+    },
+    /// The device reported an error: out of memory, or a bug that its validation found.
+    #[error("device error: {0}")]
+    Device(String),
+    /// The GPU stopped working, or refused to hand the image back.
+    #[error("read-back failed: {0}")]
+    Readback(String),
+}
+
+impl RenderError {
+    pub(crate) fn unsupported(key: &'static str, found: &'static str, allowed: &'static str) -> Self {
+        Self::Unsupported { key, found, allowed }
+    }
+}
+
+/// Anything that can go wrong between a scene file and its image.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The volume.
+    #[error(transparent)]
+    Volume(#[from] VolumeError),
+    /// The device.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+    /// The frame.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+}

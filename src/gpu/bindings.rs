@@ -1,0 +1,58 @@
+//! Bind group layouts and bind groups in few words.
+
+use wgpu::{
+    BindGroup, BindGroupLayout, BindGroupLayoutEntry, BindingResource, BindingType, BufferBindingType, Device,
+    SamplerBindingType, ShaderStages, TextureSampleType, TextureViewDimension,
+};
+
+/// What a shader declares at one binding.
+pub type Slot = (ShaderStages, BindingType);
+
+/// A uniform buffer that holds one `T`, at a dynamic offset if `dynamic`.
+pub fn uniform<T>(stages: ShaderStages, dynamic: bool) -> Slot {
+    let min_binding_size = wgpu::BufferSize::new(size_of::<T>() as u64);
+    (stages, BindingType::Buffer { ty: BufferBindingType::Uniform, has_dynamic_offset: dynamic, min_binding_size })
+}
+
+/// A storage buffer that holds `T`s.
+pub fn storage<T>(stages: ShaderStages, read_only: bool) -> Slot {
+    let min_binding_size = wgpu::BufferSize::new(size_of::<T>() as u64);
+    let ty = BufferBindingType::Storage { read_only };
+    (stages, BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size })
+}
+
+/// A sampled float texture.
+pub fn texture(stages: ShaderStages, view_dimension: TextureViewDimension, filterable: bool) -> Slot {
+    let sample_type = TextureSampleType::Float { filterable };
+    (stages, BindingType::Texture { sample_type, view_dimension, multisampled: false })
+}
+
+/// A filtering sampler.
+pub fn sampler(stages: ShaderStages) -> Slot {
+    (stages, BindingType::Sampler(SamplerBindingType::Filtering))
+}
+
+/// The layout of group 0 with the given bindings in order, and the pipeline layout of that group alone.
+pub fn layout(device: &Device, label: &str, slots: &[Slot]) -> (BindGroupLayout, wgpu::PipelineLayout) {
+    let entries: Vec<BindGroupLayoutEntry> = (0..)
+        .zip(slots)
+        .map(|(binding, &(visibility, ty))| BindGroupLayoutEntry { binding, visibility, ty, count: None })
+        .collect();
+    let group =
+        device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries });
+    let pipeline = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(label),
+        bind_group_layouts: &[Some(&group)],
+        immediate_size: 0,
+    });
+    (group, pipeline)
+}
+
+/// A bind group with the given resources in order.
+pub fn bind(device: &Device, label: &str, layout: &BindGroupLayout, resources: &[BindingResource<'_>]) -> BindGroup {
+    let entries: Vec<_> = (0..)
+        .zip(resources)
+        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource: resource.clone() })
+        .collect();
+    device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
+}

@@ -1,0 +1,108 @@
+//! What the renderer needs of a device, and what it makes of one that has more.
+
+use wgpu::{Adapter, Device, Features, Limits, TextureFormat};
+
+/// Why no device could be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DeviceError {
+    /// There is no adapter, or none with the requested name.
+    #[error("no GPU adapter: required {required}, actual: {actual}")]
+    NoAdapter {
+        /// What was asked for.
+        required: String,
+        /// What there is.
+        actual: String,
+    },
+    /// The adapter refused to make a device.
+    #[error("adapter \"{adapter}\" gave no device: {source}")]
+    RequestDevice {
+        /// The adapter's name.
+        adapter: String,
+        /// What wgpu said.
+        source: wgpu::RequestDeviceError,
+    },
+    /// A feature is missing that the options ask for.
+    #[error("device feature: required {required:?}, actual: {actual:?}")]
+    MissingFeatures {
+        /// What is needed.
+        required: Features,
+        /// What the device has.
+        actual: Features,
+    },
+    /// A limit is below what every frame needs.
+    #[error("device limit {limit}: required {required}, actual: {actual}")]
+    Limit {
+        /// wgpu's name of the limit.
+        limit: &'static str,
+        /// What is needed.
+        required: u64,
+        /// What the device has.
+        actual: u64,
+    },
+}
+
+/// Features that the renderer uses where a device has them. None is required.
+pub const WANTED_FEATURES: Features = Features::FLOAT32_BLENDABLE;
+
+/// Features and limits for a device that renders as well as the adapter can: to be merged into a device descriptor.
+#[derive(Clone, Debug)]
+pub struct DeviceRequirements {
+    /// Features to request.
+    pub features: Features,
+    /// Limits to request.
+    pub limits: Limits,
+}
+
+impl DeviceRequirements {
+    /// What to request from this adapter: WebGPU's default limits, raised where the adapter allows larger images and
+    /// volumes.
+    pub fn for_adapter(adapter: &Adapter) -> Self {
+        let available = adapter.limits();
+        let limits = Limits {
+            max_texture_dimension_2d: available.max_texture_dimension_2d,
+            max_buffer_size: available.max_buffer_size,
+            max_storage_buffer_binding_size: available.max_storage_buffer_binding_size,
+            ..Limits::default()
+        };
+        Self { features: adapter.features() & WANTED_FEATURES, limits }
+    }
+}
+
+/// Checks that a device can run every pass.
+///
+/// # Errors
+/// If a limit is too small; the error says required and actual.
+pub fn check(device: &Device) -> Result<(), DeviceError> {
+    let limits = device.limits();
+    let needs: [(&'static str, u64, u64); 8] = [
+        ("max_texture_array_layers", 128, limits.max_texture_array_layers.into()),
+        ("max_storage_buffers_per_shader_stage", 4, limits.max_storage_buffers_per_shader_stage.into()),
+        ("max_uniform_buffers_per_shader_stage", 2, limits.max_uniform_buffers_per_shader_stage.into()),
+        ("max_dynamic_uniform_buffers_per_pipeline_layout", 1, limits.max_dynamic_uniform_buffers_per_pipeline_layout.into()),
+        ("max_compute_invocations_per_workgroup", 256, limits.max_compute_invocations_per_workgroup.into()),
+        ("max_compute_workgroup_size_x", 256, limits.max_compute_workgroup_size_x.into()),
+        ("max_compute_workgroups_per_dimension", 1024, limits.max_compute_workgroups_per_dimension.into()),
+        ("max_color_attachment_bytes_per_sample", 16, limits.max_color_attachment_bytes_per_sample.into()),
+    ];
+    match needs.into_iter().find(|(_, required, actual)| actual < required) {
+        Some((limit, required, actual)) => Err(DeviceError::Limit { limit, required, actual }),
+        None => Ok(()),
+    }
+}
+
+/// The format of sheet buffers: `wanted` if given, else `Rgba32Float` where that can be blended, else `Rgba16Float`.
+///
+/// # Errors
+/// If `wanted` is `Rgba32Float` and the device cannot blend it.
+pub fn sheet_format(device: &Device, wanted: Option<TextureFormat>) -> Result<TextureFormat, DeviceError> {
+    let blends_f32 = device.features().contains(Features::FLOAT32_BLENDABLE);
+    match wanted {
+        Some(TextureFormat::Rgba32Float) if !blends_f32 => {
+            Err(DeviceError::MissingFeatures { required: Features::FLOAT32_BLENDABLE, actual: device.features() })
+        }
+        Some(format) => Ok(format),
+        None if blends_f32 => Ok(TextureFormat::Rgba32Float),
+        None => Ok(TextureFormat::Rgba16Float),
+    }
+}

@@ -1,0 +1,10 @@
+//! What the passes share: the device's capabilities, memory layouts, shader sources, targets, read-back.
+
+pub mod bindings;
+pub mod device;
+pub mod footprint_texture;
+pub mod layout;
+pub mod readback;
+pub mod shaders;
+pub mod targets;
+pub mod voxel_list;

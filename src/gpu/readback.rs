@@ -1,0 +1,83 @@
+//! Reading buffers and textures back. Blocks: only `headless` and tests call it.
+
+use wgpu::{Buffer, BufferUsages, Device, Queue, Texture};
+
+use crate::error::RenderError;
+
+/// The bytes of a buffer made with `COPY_SRC`.
+///
+/// # Errors
+/// If the device is lost.
+pub fn buffer(device: &Device, queue: &Queue, source: &Buffer) -> Result<Vec<u8>, RenderError> {
+    let staging = staging(device, source.size());
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.readback") });
+    encoder.copy_buffer_to_buffer(source, 0, &staging, 0, source.size());
+    queue.submit([encoder.finish()]);
+    let mut bytes = Vec::with_capacity(source.size() as usize);
+    read(device, &staging, |mapped| bytes.extend_from_slice(mapped))?;
+    Ok(bytes)
+}
+
+/// The texels of a 2D texture made with `COPY_SRC`, row by row without padding, in as many copies as the device's largest
+/// buffer asks for.
+///
+/// # Errors
+/// If the device is lost.
+pub fn texture(device: &Device, queue: &Queue, source: &Texture) -> Result<Vec<u8>, RenderError> {
+    let texel = source.format().block_copy_size(None).unwrap_or(0);
+    let row = source.width() * texel;
+    let padded_row = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+    let rows_per_copy = (device.limits().max_buffer_size / u64::from(padded_row)).clamp(1, source.height().into()) as u32;
+    let staging = staging(device, u64::from(padded_row) * u64::from(rows_per_copy));
+    let mut bytes = Vec::with_capacity(row as usize * source.height() as usize);
+    for first_row in (0..source.height()).step_by(rows_per_copy as usize) {
+        let rows = rows_per_copy.min(source.height() - first_row);
+        let mut encoder =
+            device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.readback") });
+        encoder.copy_texture_to_buffer(
+            wgpu::TexelCopyTextureInfo {
+                texture: source,
+                mip_level: 0,
+                origin: wgpu::Origin3d { x: 0, y: first_row, z: 0 },
+                aspect: wgpu::TextureAspect::All,
+            },
+            wgpu::TexelCopyBufferInfo {
+                buffer: &staging,
+                layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded_row), rows_per_image: None },
+            },
+            wgpu::Extent3d { width: source.width(), height: rows, depth_or_array_layers: 1 },
+        );
+        queue.submit([encoder.finish()]);
+        read(device, &staging, |mapped| {
+            for padded in mapped.chunks(padded_row as usize).take(rows as usize) {
+                bytes.extend_from_slice(&padded[..row as usize]);
+            }
+        })?;
+    }
+    Ok(bytes)
+}
+
+fn staging(device: &Device, size: u64) -> Buffer {
+    device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("sheetsplat.readback"),
+        size,
+        usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    })
+}
+
+/// Waits for the GPU, lends the buffer's bytes to `use_bytes`, and unmaps it.
+fn read(device: &Device, staging: &Buffer, use_bytes: impl FnOnce(&[u8])) -> Result<(), RenderError> {
+    let failed = |reason: String| RenderError::Readback(reason);
+    let (sender, receiver) = std::sync::mpsc::channel();
+    staging.map_async(wgpu::MapMode::Read, .., move |result| {
+        // The receiver is gone only if polling failed, which is the error that counts.
+        let _ = sender.send(result);
+    });
+    device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| failed(error.to_string()))?;
+    let mapped = receiver.recv().map_err(|error| failed(error.to_string()))?;
+    mapped.map_err(|error| failed(error.to_string()))?;
+    use_bytes(&staging.get_mapped_range(..).map_err(|error| failed(error.to_string()))?);
+    staging.unmap();
+    Ok(())
+}

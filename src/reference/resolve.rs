@@ -1,0 +1,17 @@
+//! The compositing buffer over the background, SPEC §5; the twin of `shaders/resolve.wgsl`.
+
+use glam::{DVec3, DVec4};
+
+use super::Buffer;
+use crate::splatting::Compositing;
+
+/// Premultiplied in, premultiplied out; the background has straight alpha.
+pub fn resolve(acc: &Buffer, compositing: Compositing, background: [f64; 4]) -> Buffer {
+    let [r, g, b, a] = background;
+    let background = (DVec3::new(r, g, b) * a).extend(a);
+    let over = |acc: &DVec4| {
+        let image = if compositing == Compositing::Xray { acc.min(DVec4::ONE) } else { *acc };
+        image + (1.0 - image.w) * background
+    };
+    Buffer { width: acc.width, pixels: acc.pixels.iter().map(over).collect() }
+}

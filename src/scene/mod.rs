@@ -1,0 +1,228 @@
+//! Scenes: what to show and how, from a scene file, from `--set` overrides, or from a volume alone (SPEC §7).
+
+mod reader;
+mod tables;
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use toml::Table;
+
+use crate::camera::Camera;
+use crate::shading::Shading;
+use crate::splatting::Splatting;
+use crate::transfer_function::{Ramp, TransferFunction};
+use crate::volume::{Volume, VolumeError, builtin};
+use reader::{OVERRIDE, Origins, Section, apply_override};
+
+/// Why a scene could not be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// The scene file could not be opened or read.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The scene file.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// The scene file is not TOML.
+    #[error("{origin}: {message}")]
+    Syntax {
+        /// The scene file.
+        origin: String,
+        /// What is wrong, with line and column.
+        message: String,
+    },
+    /// A key is unknown or missing, or its value is of the wrong type or out of range.
+    #[error("{origin}: {key}: found {found}, allowed: {allowed}")]
+    Invalid {
+        /// The scene file, or `--set` where the value came from an override.
+        origin: String,
+        /// The full key, elements counted from 0: `camera.up`, `transfer.opacity[2]`.
+        key: String,
+        /// What was found there.
+        found: String,
+        /// What would have been accepted.
+        allowed: String,
+    },
+}
+
+/// Where a scene's volume comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum VolumeSource {
+    /// A volume file.
+    File(PathBuf),
+    /// A procedural volume, `NAME` or `NAME:N` (see [`builtin::volume`]).
+    Builtin(String),
+}
+
+/// The image's size and what shows through it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImageSettings {
+    /// Pixels, at least 1; the device's texture limit is the renderer's to check.
+    pub width: u32,
+    /// Pixels, at least 1; the device's texture limit is the renderer's to check.
+    pub height: u32,
+    /// Straight-alpha, display-referred RGBA in [0, 1].
+    pub background: [f64; 4],
+}
+
+impl Default for ImageSettings {
+    fn default() -> Self {
+        Self { width: 512, height: 512, background: [0.0, 0.0, 0.0, 1.0] }
+    }
+}
+
+/// The transfer function as far as a scene gives it; what is missing is chosen once the volume is known.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TransferSettings {
+    /// Red, green and blue in [0, 1] over voxel values; `None` is chosen from the value histogram.
+    pub color: Option<Ramp<DVec3>>,
+    /// Opacity per unit length in [0, 1] over voxel values; `None` is chosen from the value histogram.
+    pub opacity: Option<Ramp<f64>>,
+    /// A factor in [0, 1] over gradient magnitudes (value per world unit); `None` is 1 everywhere.
+    pub gradient_opacity: Option<Ramp<f64>>,
+    /// Closed intervals `[lo, hi]` of the values that take part; `None` is all of them.
+    pub iso_ranges: Option<Vec<[f64; 2]>>,
+}
+
+impl TransferSettings {
+    /// The whole transfer function for a volume. Colour and opacity that are not given are those of
+    /// [`TransferFunction::from_histogram`], each for itself.
+    pub fn resolve(&self, volume: &Volume) -> TransferFunction {
+        let (color, opacity) = match (self.color.clone(), self.opacity.clone()) {
+            (Some(color), Some(opacity)) => (color, opacity),
+            (color, opacity) => {
+                let chosen = TransferFunction::from_histogram(volume);
+                (color.unwrap_or(chosen.color), opacity.unwrap_or(chosen.opacity))
+            }
+        };
+        TransferFunction {
+            color,
+            opacity,
+            gradient_opacity: self.gradient_opacity.clone(),
+            iso_ranges: self.iso_ranges.clone(),
+        }
+    }
+}
+
+/// Everything that decides an image but the device it is computed on.
+///
+/// The readers below take `--set` overrides, each `table.key=value` (or `table={…}` for a whole table). They apply in
+/// turn, over the file's values. The value is TOML, or a string if it does not parse as TOML. An override of
+/// `volume.path` also removes `volume.builtin`, and the other way round.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// Where the volume comes from.
+    pub volume: VolumeSource,
+    /// World units from voxel to voxel, each above 0, in place of the volume's own.
+    pub spacing: Option<DVec3>,
+    /// The camera.
+    pub camera: Camera,
+    /// Image size and background.
+    pub image: ImageSettings,
+    /// Colour and opacity.
+    pub transfer: TransferSettings,
+    /// Light and material.
+    pub shading: Shading,
+    /// Kernel, slabs, compositing, culling.
+    pub splatting: Splatting,
+}
+
+impl Scene {
+    /// A scene that shows a volume with every setting at its default.
+    pub fn new(volume: VolumeSource) -> Self {
+        Self {
+            volume,
+            spacing: None,
+            camera: Camera::default(),
+            image: ImageSettings::default(),
+            transfer: TransferSettings::default(),
+            shading: Shading::default(),
+            splatting: Splatting::default(),
+        }
+    }
+
+    /// Reads a scene file and applies `--set` overrides. A relative `volume.path`, overridden or not, is relative to
+    /// the scene file's folder.
+    ///
+    /// # Errors
+    /// If the file cannot be read or is not TOML, if a key is unknown, or if a value is not allowed.
+    pub fn open(path: &Path, sets: &[String]) -> Result<Self, SceneError> {
+        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Io { path: path.to_owned(), source })?;
+        Self::parse(&text, &path.display().to_string(), path.parent().unwrap_or(Path::new("")), sets)
+    }
+
+    /// Reads a scene from text, as [`Self::open`] does from a file. `origin` names the text in errors; a relative
+    /// `volume.path` is relative to `folder`.
+    ///
+    /// # Errors
+    /// If the text is not TOML, if a key is unknown, or if a value is not allowed.
+    pub fn parse(text: &str, origin: &str, folder: &Path, sets: &[String]) -> Result<Self, SceneError> {
+        let root = text.parse::<Table>().map_err(|error| SceneError::Syntax {
+            origin: origin.to_owned(),
+            message: error.to_string().trim_end().to_owned(),
+        })?;
+        Self::build(root, origin, folder, None, sets)
+    }
+
+    /// A scene that shows a volume with every setting at its default but for the `--set` overrides. A `volume.path`
+    /// among those is relative to the current directory.
+    ///
+    /// # Errors
+    /// If an override's key is unknown or its value is not allowed.
+    pub fn from_volume(source: VolumeSource, sets: &[String]) -> Result<Self, SceneError> {
+        Self::build(Table::new(), OVERRIDE, Path::new(""), Some(source), sets)
+    }
+
+    /// Loads or computes the volume, at the scene's spacing if it gives one.
+    ///
+    /// # Errors
+    /// If the volume file cannot be read, is of no known format or does not hold what its header promises, or if there
+    /// is no such builtin volume.
+    pub fn load_volume(&self) -> Result<Volume, VolumeError> {
+        let (volume, origin) = match &self.volume {
+            VolumeSource::File(path) => (Volume::open(path)?, path.display().to_string()),
+            VolumeSource::Builtin(name) => (builtin::volume(name)?, format!("builtin:{name}")),
+        };
+        match self.spacing {
+            Some(spacing) => volume.with_spacing(&origin, spacing),
+            None => Ok(volume),
+        }
+    }
+
+    /// `source` is for scenes whose tables name no volume.
+    fn build(
+        mut root: Table,
+        origin: &str,
+        folder: &Path,
+        source: Option<VolumeSource>,
+        sets: &[String],
+    ) -> Result<Self, SceneError> {
+        let overridden = sets.iter().map(|set| apply_override(&mut root, set)).collect::<Result<_, _>>()?;
+        let origins = Origins { file: origin, overridden };
+        let mut root = Section::root(&origins, root);
+        let [volume, camera, image, transfer, shading, splatting] = [
+            root.section("volume")?,
+            root.section("camera")?,
+            root.section("image")?,
+            root.section("transfer")?,
+            root.section("shading")?,
+            root.section("splatting")?,
+        ];
+        // Before any table is read: a misspelt table explains best why keys seem to be missing.
+        root.finish()?;
+        let (volume, spacing) = tables::volume(volume, folder, source)?;
+        Ok(Self {
+            volume,
+            spacing,
+            camera: tables::camera(camera)?,
+            image: tables::image(image)?,
+            transfer: tables::transfer(transfer)?,
+            shading: tables::shading(shading)?,
+            splatting: tables::splatting(splatting)?,
+        })
+    }
+}

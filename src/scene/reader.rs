@@ -1,0 +1,264 @@
+//! Typed access to a scene's TOML tables. Every error names origin, full key, what was found and what is allowed.
+
+use std::ops::{Add, Mul};
+
+use toml::{Table, Value};
+
+use super::SceneError;
+use crate::transfer_function::{Ramp, RampError};
+
+/// The origin of what was set on the command line.
+pub(super) const OVERRIDE: &str = "--set";
+
+/// Applies one `--set` argument, `table.key=value` or `table=value`, and returns its key.
+pub(super) fn apply_override(root: &mut Table, argument: &str) -> Result<String, SceneError> {
+    let misused = |key: &str, found: &str, allowed: &str| SceneError::Invalid {
+        origin: OVERRIDE.to_owned(),
+        key: key.to_owned(),
+        found: found.to_owned(),
+        allowed: allowed.to_owned(),
+    };
+    let usage = "table.key=value, as in splatting.slab_width=2.0";
+    let Some((key, text)) = argument.split_once('=') else { return Err(misused(argument, "no \"=\"", usage)) };
+    let (key, text) = (key.trim(), text.trim());
+    let value = text.parse().unwrap_or_else(|_| Value::String(text.to_owned()));
+    match *key.split('.').collect::<Vec<_>>() {
+        ref names if names.contains(&"") => return Err(misused(argument, "an empty key", usage)),
+        [name] => _ = root.insert(name.to_owned(), value),
+        [table, name] => match root.entry(table).or_insert_with(|| Value::Table(Table::new())) {
+            Value::Table(section) => {
+                // They are two names of one thing: the last one given counts.
+                match key {
+                    "volume.path" => _ = section.remove("builtin"),
+                    "volume.builtin" => _ = section.remove("path"),
+                    _ => {}
+                }
+                section.insert(name.to_owned(), value);
+            }
+            other => {
+                return Err(misused(key, &format!("{table} = {}", typed(other)), &format!("{table} to be a table")));
+            }
+        },
+        // The file format nests no deeper, so there is no table to put it in.
+        _ => return Err(misused(key, "a key of more than two parts", usage)),
+    }
+    Ok(key.to_owned())
+}
+
+/// Tells where a key's value came from.
+pub(super) struct Origins<'a> {
+    /// The scene file.
+    pub(super) file: &'a str,
+    /// The keys given by `--set`.
+    pub(super) overridden: Vec<String>,
+}
+
+impl Origins<'_> {
+    /// An error about the value of `key`. It came from the command line if that key did, or one of the `related` keys
+    /// that it must fit together with.
+    pub(super) fn invalid(
+        &self,
+        key: &str,
+        related: &[&str],
+        found: impl Into<String>,
+        allowed: impl Into<String>,
+    ) -> SceneError {
+        let is_overridden = |key: &str| self.overridden.iter().any(|set| is_within(key, set));
+        let any_overridden = is_overridden(key) || related.iter().any(|key| is_overridden(key));
+        SceneError::Invalid {
+            origin: if any_overridden { OVERRIDE } else { self.file }.to_owned(),
+            key: key.to_owned(),
+            found: found.into(),
+            allowed: allowed.into(),
+        }
+    }
+}
+
+/// Whether `key` is `ancestor` or one of its elements: `camera.up[1]` is within `camera.up` and `camera`.
+fn is_within(key: &str, ancestor: &str) -> bool {
+    key.strip_prefix(ancestor).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+}
+
+/// A table whose keys are taken out one by one; what is left at the end nobody knows.
+pub(super) struct Section<'a> {
+    pub(super) origins: &'a Origins<'a>,
+    /// Empty for the root.
+    name: &'static str,
+    table: Table,
+    /// The keys asked for so far.
+    known: Vec<&'static str>,
+}
+
+impl<'a> Section<'a> {
+    /// The whole file.
+    pub(super) fn root(origins: &'a Origins<'a>, table: Table) -> Self {
+        Self { origins, name: "", table, known: Vec::new() }
+    }
+
+    /// The table under a key of the root; empty if missing.
+    pub(super) fn section(&mut self, name: &'static str) -> Result<Self, SceneError> {
+        let mut table = Table::new();
+        self.read(name, &mut table, |entry| match entry.value {
+            Value::Table(ref table) => Ok(table.clone()),
+            _ => Err(entry.mistyped("a table")),
+        })?;
+        Ok(Self { origins: self.origins, name, table, known: Vec::new() })
+    }
+
+    /// Replaces `into` by the value of a key, if it is there.
+    pub(super) fn read<T>(
+        &mut self,
+        name: &'static str,
+        into: &mut T,
+        read: impl FnOnce(&Entry<'a>) -> Result<T, SceneError>,
+    ) -> Result<(), SceneError> {
+        self.known.push(name);
+        if let Some(value) = self.table.remove(name) {
+            *into = read(&Entry { origins: self.origins, key: self.key(name), value })?;
+        }
+        Ok(())
+    }
+
+    /// Refuses the keys that nobody asked for.
+    pub(super) fn finish(self) -> Result<(), SceneError> {
+        let Some(name) = self.table.keys().next() else { return Ok(()) };
+        let key = self.key(&name.escape_debug().to_string());
+        // An override of `colour.red` adds a table `colour`.
+        let related: Vec<_> =
+            self.origins.overridden.iter().filter(|set| is_within(set, &key)).map(String::as_str).collect();
+        Err(self.origins.invalid(&key, &related, "an unknown key", self.known.join(", ")))
+    }
+
+    /// The full name of a key.
+    fn key(&self, name: &str) -> String {
+        if self.name.is_empty() { name.to_owned() } else { format!("{}.{name}", self.name) }
+    }
+}
+
+/// Which numbers are allowed, beyond being finite.
+#[derive(Clone, Copy)]
+pub(super) struct Bounds {
+    /// For error messages, after "allowed: ".
+    pub(super) text: &'static str,
+    pub(super) contain: fn(f64) -> bool,
+}
+
+/// Any finite number.
+pub(super) const FINITE: Bounds = Bounds { text: "a finite number", contain: |_| true };
+
+/// A value with its full key.
+pub(super) struct Entry<'a> {
+    origins: &'a Origins<'a>,
+    key: String,
+    pub(super) value: Value,
+}
+
+impl Entry<'_> {
+    /// The error for a value that is not allowed.
+    pub(super) fn refused(&self, allowed: impl Into<String>) -> SceneError {
+        self.origins.invalid(&self.key, &[], concise(&self.value), allowed)
+    }
+
+    /// The error for a value of the wrong type.
+    pub(super) fn mistyped(&self, allowed: impl Into<String>) -> SceneError {
+        self.origins.invalid(&self.key, &[], typed(&self.value), allowed)
+    }
+
+    pub(super) fn boolean(&self) -> Result<bool, SceneError> {
+        self.value.as_bool().ok_or_else(|| self.mistyped("true or false"))
+    }
+
+    pub(super) fn text(&self, allowed: &str) -> Result<String, SceneError> {
+        self.value.as_str().map(str::to_owned).ok_or_else(|| self.mistyped(allowed))
+    }
+
+    /// One of several names.
+    pub(super) fn choice<T: Copy>(&self, choices: &[(&str, T)]) -> Result<T, SceneError> {
+        let allowed = || choices.iter().map(|(name, _)| format!("{name:?}")).collect::<Vec<_>>().join(" or ");
+        let text = self.value.as_str().ok_or_else(|| self.mistyped(allowed()))?;
+        let chosen = choices.iter().find(|(name, _)| *name == text);
+        chosen.map(|&(_, choice)| choice).ok_or_else(|| self.refused(allowed()))
+    }
+
+    /// A number of pixels.
+    pub(super) fn pixels(&self) -> Result<u32, SceneError> {
+        let allowed = "an integer from 1 to the device's texture limit";
+        let integer = self.value.as_integer().ok_or_else(|| self.mistyped(allowed))?;
+        u32::try_from(integer).ok().filter(|&pixels| pixels > 0).ok_or_else(|| self.refused(allowed))
+    }
+
+    /// A number, written as a float or as an integer.
+    pub(super) fn number(&self, bounds: Bounds) -> Result<f64, SceneError> {
+        let number = match self.value {
+            Value::Integer(integer) => integer as f64,
+            Value::Float(float) => float,
+            _ => return Err(self.mistyped(bounds.text)),
+        };
+        let is_allowed = number.is_finite() && (bounds.contain)(number);
+        if is_allowed { Ok(number) } else { Err(self.refused(bounds.text)) }
+    }
+
+    /// N numbers.
+    pub(super) fn numbers<const N: usize>(&self, bounds: Bounds) -> Result<[f64; N], SceneError> {
+        let mut numbers = [0.0; N];
+        let items: [Entry; N] = self.array(&format!("{N} numbers, each {}", bounds.text))?;
+        for (number, item) in numbers.iter_mut().zip(items) {
+            *number = item.number(bounds)?;
+        }
+        Ok(numbers)
+    }
+
+    /// An array of a fixed length.
+    pub(super) fn array<const N: usize>(&self, allowed: &str) -> Result<[Self; N], SceneError> {
+        self.items(allowed)?.try_into().map_err(|_| self.refused(allowed))
+    }
+
+    /// An array of any length.
+    pub(super) fn items(&self, allowed: &str) -> Result<Vec<Self>, SceneError> {
+        let values = self.value.as_array().ok_or_else(|| self.mistyped(allowed))?;
+        let item = |(index, value): (usize, &Value)| Entry {
+            origins: self.origins,
+            key: format!("{}[{index}]", self.key),
+            value: value.clone(),
+        };
+        Ok(values.iter().enumerate().map(item).collect())
+    }
+
+    /// Control points `[position, value]`; `point` shows one.
+    pub(super) fn ramp<T>(
+        &self,
+        point: &str,
+        read: impl Fn(&Entry) -> Result<T, SceneError>,
+    ) -> Result<Ramp<T>, SceneError>
+    where
+        T: Copy + Add<Output = T> + Mul<f64, Output = T>,
+    {
+        let allowed = format!("an array of one or more {point}");
+        let items = self.items(&allowed)?;
+        let points = items.iter().map(|item| {
+            let [at, value] = item.array(point)?;
+            Ok((at.number(FINITE)?, read(&value)?))
+        });
+        Ramp::new(points.collect::<Result<_, _>>()?).map_err(|error| match error {
+            RampError::Empty => self.refused(allowed),
+            RampError::NotFinite { index } | RampError::NotIncreasing { index } => {
+                items[index].refused("points whose first number is above that of the point before")
+            }
+        })
+    }
+}
+
+/// A value as TOML, and its type.
+fn typed(value: &Value) -> String {
+    format!("{} ({})", concise(value), value.type_str())
+}
+
+/// A value as TOML, on one line of bounded length.
+fn concise(value: &Value) -> String {
+    const LONGEST: usize = 80;
+    let text = value.to_string().replace(['\n', '\r'], " ");
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text,
+    }
+}

@@ -1,0 +1,171 @@
+//! The tables of a scene file: their keys, types and ranges (SPEC §7).
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::reader::{Bounds, Entry, FINITE, Section};
+use super::{ImageSettings, SceneError, TransferSettings, VolumeSource};
+use crate::camera::{Camera, Projection};
+use crate::shading::{Light, Shading};
+use crate::splatting::{Compositing, FootprintForm, Method, Order, Splatting};
+
+const POSITIVE: Bounds = Bounds { text: "a finite number > 0", contain: |x| x > 0.0 };
+const NOT_NEGATIVE: Bounds = Bounds { text: "a finite number >= 0", contain: |x| x >= 0.0 };
+const SHARE: Bounds = Bounds { text: "a number in [0, 1]", contain: |x| (0.0..=1.0).contains(&x) };
+const THRESHOLD: Bounds = Bounds { text: "a number in (0, 1]", contain: |x| x > 0.0 && x <= 1.0 };
+const FOV: Bounds = Bounds { text: "degrees in (0, 180)", contain: |x| x > 0.0 && x < 180.0 };
+const RADIUS: Bounds = Bounds { text: "a number in [1, 4]", contain: |x| (1.0..=4.0).contains(&x) };
+const FALLOFF: Bounds = Bounds { text: "a number in (0, 16]", contain: |x| x > 0.0 && x <= 16.0 };
+const SLAB_WIDTH: Bounds = Bounds { text: "a number in [0.05, 8]", contain: |x| (0.05..=8.0).contains(&x) };
+
+/// `[volume]`: the source, or `given` if the table names none, and the spacing.
+pub(super) fn volume(
+    mut section: Section,
+    folder: &Path,
+    given: Option<VolumeSource>,
+) -> Result<(VolumeSource, Option<DVec3>), SceneError> {
+    let (mut path, mut builtin, mut spacing) = (None, None, None);
+    section.read("path", &mut path, |entry| entry.text("a volume file's path").map(Some))?;
+    section.read("builtin", &mut builtin, |entry| entry.text("a builtin volume's name").map(Some))?;
+    section.read("spacing", &mut spacing, |entry| entry.numbers(POSITIVE).map(|s| Some(DVec3::from_array(s))))?;
+    let origins = section.origins;
+    section.finish()?;
+    let refused = |found| origins.invalid("volume", &[], found, "either volume.path or volume.builtin");
+    let source = match (path, builtin) {
+        (Some(path), None) => VolumeSource::File(folder.join(path)),
+        (None, Some(name)) => VolumeSource::Builtin(name),
+        (None, None) => given.ok_or_else(|| refused("neither path nor builtin"))?,
+        (Some(_), Some(_)) => return Err(refused("both path and builtin")),
+    };
+    Ok((source, spacing))
+}
+
+/// `[camera]`. Keys of the projection that is not in use are checked and have no effect, so that overriding
+/// `projection` alone works.
+pub(super) fn camera(mut section: Section) -> Result<Camera, SceneError> {
+    let mut camera = Camera::default();
+    let mut is_perspective = false;
+    let (mut height, mut fov_y, mut distance, mut near) = (None, 30.0, None, None);
+    let projections = [("orthographic", false), ("perspective", true)];
+    section.read("projection", &mut is_perspective, |entry| entry.choice(&projections))?;
+    section.read("direction", &mut camera.direction, direction)?;
+    section.read("up", &mut camera.up, direction)?;
+    section.read("center", &mut camera.center, |entry| entry.numbers(FINITE).map(DVec3::from_array))?;
+    section.read("height", &mut height, |entry| entry.number(POSITIVE).map(Some))?;
+    section.read("fov_y", &mut fov_y, |entry| entry.number(FOV))?;
+    section.read("distance", &mut distance, |entry| entry.number(POSITIVE).map(Some))?;
+    section.read("near", &mut near, |entry| entry.number(POSITIVE).map(Some))?;
+    let origins = section.origins;
+    section.finish()?;
+    camera.projection = if is_perspective {
+        Projection::Perspective { fov_y, distance, near }
+    } else {
+        Projection::Orthographic { height }
+    };
+    let sine = camera.direction.normalize().cross(camera.up.normalize()).length();
+    if sine < 1e-9 {
+        return Err(origins.invalid(
+            "camera.up",
+            &["camera.direction"],
+            format!("{} with direction {}", camera.up, camera.direction),
+            "a vector not parallel to camera.direction",
+        ));
+    }
+    Ok(camera)
+}
+
+/// `[image]`.
+pub(super) fn image(mut section: Section) -> Result<ImageSettings, SceneError> {
+    let mut image = ImageSettings::default();
+    section.read("width", &mut image.width, Entry::pixels)?;
+    section.read("height", &mut image.height, Entry::pixels)?;
+    section.read("background", &mut image.background, |entry| entry.numbers(SHARE))?;
+    section.finish()?;
+    Ok(image)
+}
+
+/// `[transfer]`.
+pub(super) fn transfer(mut section: Section) -> Result<TransferSettings, SceneError> {
+    let mut transfer = TransferSettings::default();
+    let color = |entry: &Entry| entry.numbers(SHARE).map(DVec3::from_array);
+    let opacity = |entry: &Entry| entry.number(SHARE);
+    section.read("color", &mut transfer.color, |entry| entry.ramp("[value, [r, g, b]]", color).map(Some))?;
+    section.read("opacity", &mut transfer.opacity, |entry| entry.ramp("[value, opacity]", opacity).map(Some))?;
+    section.read("gradient_opacity", &mut transfer.gradient_opacity, |entry| {
+        entry.ramp("[gradient magnitude, factor]", opacity).map(Some)
+    })?;
+    section.read("iso_ranges", &mut transfer.iso_ranges, |entry| iso_ranges(entry).map(Some))?;
+    section.finish()?;
+    Ok(transfer)
+}
+
+/// `[shading]`.
+pub(super) fn shading(mut section: Section) -> Result<Shading, SceneError> {
+    let mut shading = Shading::default();
+    section.read("enabled", &mut shading.enabled, Entry::boolean)?;
+    section.read("light", &mut shading.light, light)?;
+    section.read("ambient", &mut shading.ambient, |entry| entry.number(NOT_NEGATIVE))?;
+    section.read("diffuse", &mut shading.diffuse, |entry| entry.number(NOT_NEGATIVE))?;
+    section.read("specular", &mut shading.specular, |entry| entry.number(NOT_NEGATIVE))?;
+    section.read("shininess", &mut shading.shininess, |entry| entry.number(POSITIVE))?;
+    section.finish()?;
+    Ok(shading)
+}
+
+/// `[splatting]`.
+pub(super) fn splatting(mut section: Section) -> Result<Splatting, SceneError> {
+    let methods = [("image-aligned", Method::ImageAligned), ("axis-aligned", Method::AxisAligned)];
+    let forms = [("summed-area", FootprintForm::SummedArea), ("sections", FootprintForm::Sections)];
+    let compositings =
+        [("linear", Compositing::Linear), ("exponential", Compositing::Exponential), ("xray", Compositing::Xray)];
+    let orders = [("front-to-back", Order::FrontToBack), ("back-to-front", Order::BackToFront)];
+    let mut splatting = Splatting::default();
+    section.read("method", &mut splatting.method, |entry| entry.choice(&methods))?;
+    section.read("radius", &mut splatting.radius, |entry| entry.number(RADIUS))?;
+    section.read("falloff", &mut splatting.falloff, |entry| entry.number(FALLOFF))?;
+    section.read("slab_width", &mut splatting.slab_width, |entry| entry.number(SLAB_WIDTH))?;
+    section.read("footprint", &mut splatting.footprint, |entry| entry.choice(&forms))?;
+    section.read("compositing", &mut splatting.compositing, |entry| entry.choice(&compositings))?;
+    section.read("order", &mut splatting.order, |entry| entry.choice(&orders))?;
+    section.read("opacity_threshold", &mut splatting.opacity_threshold, |entry| entry.number(THRESHOLD))?;
+    section.read("culling", &mut splatting.culling, Entry::boolean)?;
+    section.read("tiles", &mut splatting.tiles, Entry::boolean)?;
+    section.finish()?;
+    Ok(splatting)
+}
+
+/// A vector of which only the direction counts. Its length is kept, unless the length's square, or that of a product of
+/// two such vectors, would leave the range of `f64`.
+fn direction(entry: &Entry) -> Result<DVec3, SceneError> {
+    let vector = DVec3::from_array(entry.numbers(FINITE)?);
+    let largest = vector.abs().max_element();
+    if largest == 0.0 {
+        return Err(entry.refused("a vector other than [0, 0, 0]"));
+    }
+    Ok(if (1e-60..1e60).contains(&largest) { vector } else { vector / largest })
+}
+
+/// `"headlight"` or a direction.
+fn light(entry: &Entry) -> Result<Light, SceneError> {
+    let allowed = "\"headlight\" or [x, y, z]";
+    match entry.value.as_str() {
+        Some("headlight") => Ok(Light::Headlight),
+        Some(_) => Err(entry.refused(allowed)),
+        None if entry.value.is_array() => direction(entry).map(Light::Direction),
+        None => Err(entry.mistyped(allowed)),
+    }
+}
+
+/// One or more closed intervals.
+fn iso_ranges(entry: &Entry) -> Result<Vec<[f64; 2]>, SceneError> {
+    let items = entry.items("an array of one or more [lo, hi]")?;
+    if items.is_empty() {
+        return Err(entry.refused("an array of one or more [lo, hi]"));
+    }
+    let range = |item: &Entry| {
+        let range = item.numbers(FINITE)?;
+        if range[0] <= range[1] { Ok(range) } else { Err(item.refused("[lo, hi] with lo <= hi")) }
+    };
+    items.iter().map(range).collect()
+}

@@ -1,0 +1,35 @@
+//! Shading settings (SPEC §3). The arithmetic itself is `shaders/shade.wgsl`, its twin `reference::shading`.
+
+use glam::DVec3;
+
+/// Where the light comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Light {
+    /// From the eye.
+    Headlight,
+    /// From a fixed world direction, pointing to the light; any length but 0.
+    Direction(DVec3),
+}
+
+/// Two-sided Phong shading with white highlights, computed in the unwarped space (§4.2).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shading {
+    /// Without shading a voxel keeps its transfer function colour.
+    pub enabled: bool,
+    /// Share of the colour that needs no light, at least 0.
+    pub ambient: f64,
+    /// Weight of the diffuse term, at least 0.
+    pub diffuse: f64,
+    /// Weight of the highlight, at least 0.
+    pub specular: f64,
+    /// Exponent of the highlight, above 0.
+    pub shininess: f64,
+    /// Where the light comes from.
+    pub light: Light,
+}
+
+impl Default for Shading {
+    fn default() -> Self {
+        Self { enabled: true, ambient: 0.2, diffuse: 0.7, specular: 0.2, shininess: 20.0, light: Light::Headlight }
+    }
+}

@@ -1,0 +1,81 @@
+//! Splatting settings (SPEC §§4–6): kernel, slabs, compositing, early splat elimination.
+
+/// Which voxels share a sheet buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Kernel sections between planes parallel to the image (§3.2).
+    ImageAligned,
+    /// Whole kernels, the volume slices most parallel to the image (§3.1).
+    AxisAligned,
+}
+
+/// How kernel sections are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FootprintForm {
+    /// 128 pre-integrated sections, the nearest one picked (§3.2).
+    Sections,
+    /// The cumulative kernel integral of eq. 3, two entries subtracted: any slab width (§3.3.1).
+    SummedArea,
+}
+
+/// How a sheet's accumulated amount becomes colour and opacity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Compositing {
+    /// The paper's: opacities add up within a sheet, at most to 1.
+    Linear,
+    /// Amounts are optical depths: a sheet's opacity is `1 - exp(-amount)`, whatever the slab width.
+    Exponential,
+    /// Summed projection, clamped to 1 at the end.
+    Xray,
+}
+
+/// The order in which sheets meet the compositing buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// Nearest sheet first.
+    FrontToBack,
+    /// Farthest sheet first; the same image.
+    BackToFront,
+}
+
+/// All splatting settings of a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Splatting {
+    /// Image-aligned or axis-aligned sheets.
+    pub method: Method,
+    /// Kernel radius in grid units, 1 to 4.
+    pub radius: f64,
+    /// Gaussian exponent of the kernel, above 0, at most 16.
+    pub falloff: f64,
+    /// Slab width Δ in `unit`s of world length along a ray, 0.05 to 8.
+    pub slab_width: f64,
+    /// How kernel sections are stored.
+    pub footprint: FootprintForm,
+    /// How sheets are composited.
+    pub compositing: Compositing,
+    /// In which order sheets are composited.
+    pub order: Order,
+    /// Opacity from which a pixel counts as opaque, above 0, at most 1 (§6). Without effect so far.
+    pub opacity_threshold: f64,
+    /// Early splat elimination (§6). Without effect so far.
+    pub culling: bool,
+    /// Work on tiles that received splats only (§6). Without effect so far.
+    pub tiles: bool,
+}
+
+impl Default for Splatting {
+    fn default() -> Self {
+        Self {
+            method: Method::ImageAligned,
+            radius: 2.0,
+            falloff: 2.0,
+            slab_width: 1.0,
+            footprint: FootprintForm::SummedArea,
+            compositing: Compositing::Linear,
+            order: Order::FrontToBack,
+            opacity_threshold: 0.95,
+            culling: true,
+            tiles: true,
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! Procedural volumes: test objects that need no files.
+
+mod head;
+mod nerve;
+mod sdf;
+mod tomato;
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use glam::{DVec3, UVec3};
+use rayon::prelude::*;
+
+use super::{Volume, VolumeError};
+use sdf::Grid;
+
+/// The volumes that [`volume`] knows.
+pub const NAMES: &[&str] = &["cube", "head", "nerve", "tomato", "marschner-lobb"];
+
+/// The sizes that `NAME:N` accepts for the largest dimension.
+const SIZES: std::ops::RangeInclusive<u32> = 2..=1024;
+
+/// A procedural volume by name (SPEC §8): `NAME` in the paper's size, `NAME:N` with N voxels along the largest
+/// dimension and the same extent in world units.
+///
+/// The values are those of an 8-bit scanner, whole numbers from 0 to 255 — but for `marschner-lobb`, whose values are
+/// not rounded — and the same in every run.
+///
+/// # Errors
+/// If the name is unknown or N is not a whole number from 2 to 1024.
+pub fn volume(name: &str) -> Result<Volume, VolumeError> {
+    let origin = format!("builtin:{name}");
+    let invalid = |field: &str, found: &str, allowed: String| VolumeError::Invalid {
+        origin: origin.clone(),
+        field: field.to_owned(),
+        found: format!("\"{found}\""),
+        allowed,
+    };
+    let (kind, size) = name.split_once(':').map_or((name, None), |(kind, size)| (kind, Some(size)));
+    let (dims, spacing, values): (_, _, fn(&Grid) -> Vec<f32>) = match kind {
+        "cube" => ([48, 48, 48], DVec3::ONE, cube),
+        "head" => ([256, 256, 163], DVec3::ONE, head::values),
+        "nerve" => ([512, 512, 76], DVec3::new(1.0, 1.0, 5.0), nerve::values),
+        "tomato" => ([256, 256, 64], DVec3::new(1.0, 1.0, 3.0), tomato::values),
+        "marschner-lobb" => ([64, 64, 64], DVec3::ONE, marschner_lobb),
+        _ => return Err(invalid("name", kind, format!("{}, each alone or as NAME:N", NAMES.join(", ")))),
+    };
+    let full = UVec3::from(dims);
+    let longest = full.max_element();
+    let n = match size {
+        None => longest,
+        Some(size) => size.parse().ok().filter(|n| SIZES.contains(n)).ok_or_else(|| {
+            invalid("size", size, format!("a whole number from {} to {}", SIZES.start(), SIZES.end()))
+        })?,
+    };
+    let dims = UVec3::from(dims.map(|side| ((side * n + longest / 2) / longest).max(1)));
+    let grid = Grid { dims, spacing: spacing * (f64::from(longest) / f64::from(n)) };
+    Volume::new(&origin, grid.dims, grid.spacing, values(&grid))
+}
+
+/// A solid cube of 32³ world units: 255 inside, 0 outside, nothing in between.
+fn cube(grid: &Grid) -> Vec<f32> {
+    sample(grid, |p| if p.abs().max_element() < 16.0 { 255.0 } else { 0.0 })
+}
+
+/// The test signal of Marschner and Lobb (1994) over [-1, 1]³, with f_M = 6 and α = 0.25, times 255.
+fn marschner_lobb(grid: &Grid) -> Vec<f32> {
+    const FREQUENCY: f64 = 6.0;
+    const ALPHA: f64 = 0.25;
+    let half = (grid.dims.as_dvec3() - 1.0) / 2.0 * grid.spacing;
+    sample(grid, |p| {
+        let p = p / half;
+        let ripple = libm::cos(TAU * FREQUENCY * libm::cos(FRAC_PI_2 * (p.x * p.x + p.y * p.y).sqrt()));
+        255.0 * (1.0 - libm::sin(FRAC_PI_2 * p.z) + ALPHA * (1.0 + ripple)) / (2.0 * (1.0 + ALPHA))
+    })
+}
+
+/// A function of the world position at every voxel.
+fn sample(grid: &Grid, value: impl Fn(DVec3) -> f64 + Sync) -> Vec<f32> {
+    let UVec3 { x: nx, y: ny, z: nz } = grid.dims;
+    let mut values = vec![0.0; nx as usize * ny as usize * nz as usize];
+    values.par_chunks_mut(nx as usize).enumerate().for_each(|(row, values)| {
+        let (y, z) = (row as u32 % ny, row as u32 / ny);
+        for (x, out) in (0..nx).zip(values) {
+            *out = value(grid.position(UVec3::new(x, y, z).as_dvec3())) as f32;
+        }
+    });
+    values
+}

@@ -1,0 +1,177 @@
+//! Signed distances (negative inside) and how a solid becomes voxel values.
+
+use glam::{DVec3, UVec3};
+use rayon::prelude::*;
+
+/// Edge of the blocks that are decided at once, in voxels.
+const BLOCK: u32 = 16;
+
+/// Half the width of the smooth step from outside to inside a tissue, in units of the finest spacing.
+const SOFTNESS: f64 = 1.25;
+
+/// How much faster than the true distance the estimates below may change. Blocks farther from a surface than this
+/// times their radius are taken to be on one side of it.
+const SLACK: f64 = 1.5;
+
+/// Distance to an ellipsoid, to first order: exact at the surface, the right sign elsewhere.
+pub(super) fn ellipsoid(p: DVec3, center: DVec3, radii: DVec3) -> f64 {
+    let q = (p - center) / radii;
+    let (level, slope) = (q.length(), (q / radii).length());
+    if slope > 0.0 { level * (level - 1.0) / slope } else { -radii.min_element() }
+}
+
+/// Distance to a tube from `a` to `b` with rounded ends, its radius going from `radii.0` to `radii.1`.
+pub(super) fn tube(p: DVec3, a: DVec3, b: DVec3, radii: (f64, f64)) -> f64 {
+    let axis = b - a;
+    let t = ((p - a).dot(axis) / axis.length_squared()).clamp(0.0, 1.0);
+    (p - a - t * axis).length() - radii.0 - t * (radii.1 - radii.0)
+}
+
+/// Both solids, the crease between them filled over a width of about `k`.
+pub(super) fn union(a: f64, b: f64, k: f64) -> f64 {
+    let overlap = (k - (a - b).abs()).max(0.0);
+    a.min(b) - overlap * overlap / (4.0 * k)
+}
+
+/// What is in both solids, the edge rounded over a width of about `k`.
+pub(super) fn intersection(a: f64, b: f64, k: f64) -> f64 {
+    -union(-a, -b, k)
+}
+
+/// A wave of period 1 and amplitude 1 that looks like a sine, from arcs of parabolas: the same on every machine.
+pub(super) fn wave(t: f64) -> f64 {
+    let t = t - (t + 0.5).floor();
+    16.0 * t * (0.5 - t.abs())
+}
+
+/// A cubic step from 0 at `low` to 1 at `high`.
+pub(super) fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
+    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// One part of a sculpture: a shape, how it joins what is there, and over which width.
+pub(super) enum Part {
+    /// Adds an ellipsoid: centre, radii, width.
+    Add([f64; 3], [f64; 3], f64),
+    /// Adds a tube: from, to, the radii there, width.
+    AddTube([f64; 3], [f64; 3], (f64, f64), f64),
+    /// Takes an ellipsoid away: centre, radii, width.
+    Cut([f64; 3], [f64; 3], f64),
+    /// Takes a tube away: from, to, the radii there, width.
+    CutTube([f64; 3], [f64; 3], (f64, f64), f64),
+}
+
+/// Distance to what the parts make of a solid at distance `start`, in order.
+pub(super) fn sculpt(p: DVec3, start: f64, parts: &[Part]) -> f64 {
+    parts.iter().fold(start, |d, part| match *part {
+        Part::Add(center, radii, k) => union(d, ellipsoid(p, center.into(), radii.into()), k),
+        Part::AddTube(from, to, radii, k) => union(d, tube(p, from.into(), to.into(), radii), k),
+        Part::Cut(center, radii, k) => intersection(d, -ellipsoid(p, center.into(), radii.into()), k),
+        Part::CutTube(from, to, radii, k) => intersection(d, -tube(p, from.into(), to.into(), radii), k),
+    })
+}
+
+/// A tissue: its value, and the distance to it at a world position.
+pub(super) struct Layer<'a> {
+    pub(super) value: f64,
+    pub(super) distance: Box<dyn Fn(DVec3) -> f64 + Sync + 'a>,
+}
+
+impl<'a> Layer<'a> {
+    pub(super) fn new(value: f64, distance: impl Fn(DVec3) -> f64 + Sync + 'a) -> Self {
+        Self { value, distance: Box::new(distance) }
+    }
+}
+
+/// Where the voxels of a volume lie.
+#[derive(Clone, Copy)]
+pub(super) struct Grid {
+    pub(super) dims: UVec3,
+    pub(super) spacing: DVec3,
+}
+
+impl Grid {
+    /// World position of a (fractional) voxel.
+    pub(super) fn position(&self, voxel: DVec3) -> DVec3 {
+        (voxel - (self.dims.as_dvec3() - 1.0) / 2.0) * self.spacing
+    }
+
+    /// Values of layers painted over each other onto 0, in order, with edges as soft as a scanner's. A voxel longer
+    /// than it is wide is a mean along its length that reaches to the next ones, as a thick slice is.
+    pub(super) fn paint(&self, layers: &[Layer]) -> Vec<f32> {
+        let slice = self.dims.x as usize * self.dims.y as usize;
+        let mut values = vec![0.0; slice * self.dims.z as usize];
+        let everything: Vec<_> = layers.iter().collect();
+        values.par_chunks_mut(slice * BLOCK as usize).enumerate().for_each(|(slab, values)| {
+            let z = slab as u32 * BLOCK;
+            for y in (0..self.dims.y).step_by(BLOCK as usize) {
+                for x in (0..self.dims.x).step_by(BLOCK as usize) {
+                    self.paint_block(values, z, UVec3::new(x, y, z), BLOCK, &everything);
+                }
+            }
+        });
+        values
+    }
+
+    /// Paints the block of `size`³ voxels at `low` into `values`, which start at slice `z`. Only the layers that can
+    /// change within the block are handed down to its eighths.
+    fn paint_block(&self, values: &mut [f32], z: u32, low: UVec3, size: u32, layers: &[&Layer]) {
+        let high = (low + size).min(self.dims);
+        if low.cmpge(high).any() {
+            return;
+        }
+        let center = self.position((low + high - 1).as_dvec3() / 2.0);
+        let reach = (((high - low).as_dvec3() + DVec3::Z) * self.spacing).length() / 2.0 * SLACK + SOFTNESS * self.unit();
+        let mut kept: Vec<&Layer> = Vec::with_capacity(layers.len());
+        let mut varies = false;
+        for &layer in layers {
+            let distance = (layer.distance)(center);
+            if distance < -reach {
+                kept.clear();
+                varies = false;
+            }
+            if distance <= reach {
+                varies |= distance >= -reach;
+                kept.push(layer);
+            }
+        }
+        let row = |y: u32, k: u32| (self.dims.x as usize) * (y as usize + self.dims.y as usize * (k - z) as usize);
+        if !varies {
+            let value = kept.last().map_or(0.0, |layer| layer.value as f32);
+            for (k, y) in (low.z..high.z).flat_map(|k| (low.y..high.y).map(move |y| (k, y))) {
+                values[row(y, k) + low.x as usize..row(y, k) + high.x as usize].fill(value);
+            }
+        } else if size > 2 {
+            for corner in 0..8 {
+                let offset = UVec3::new(corner & 1, corner >> 1 & 1, corner >> 2) * (size / 2);
+                self.paint_block(values, z, low + offset, size / 2, &kept);
+            }
+        } else {
+            for (k, y) in (low.z..high.z).flat_map(|k| (low.y..high.y).map(move |y| (k, y))) {
+                for x in low.x..high.x {
+                    values[row(y, k) + x as usize] = self.voxel(UVec3::new(x, y, k), &kept);
+                }
+            }
+        }
+    }
+
+    fn voxel(&self, voxel: UVec3, layers: &[&Layer]) -> f32 {
+        let soft = SOFTNESS * self.unit();
+        let value = |p: DVec3| {
+            layers.iter().fold(0.0, |value, layer| {
+                value + (layer.value - value) * smoothstep(soft, -soft, (layer.distance)(p))
+            })
+        };
+        // Weights of a tent from slice to slice.
+        let n = (self.spacing.z / self.unit()).round().max(1.0) as i32;
+        let sum: f64 = (1 - n..n)
+            .map(|k| f64::from(n - k.abs()) * value(self.position(voxel.as_dvec3() + DVec3::Z * f64::from(k) / f64::from(n))))
+            .sum();
+        (sum / f64::from(n * n)).round() as f32
+    }
+
+    fn unit(&self) -> f64 {
+        self.spacing.min_element()
+    }
+}

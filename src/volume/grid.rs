@@ -1,0 +1,46 @@
+//! Rectilinear grids: extent and spacing, without values.
+
+use glam::{DVec3, UVec3};
+
+/// A rectilinear grid (SPEC §2), its centre at the world's origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid {
+    /// Voxels along x, y and z.
+    pub dims: UVec3,
+    /// World units from voxel to voxel along x, y and z.
+    pub spacing: DVec3,
+}
+
+impl Grid {
+    /// The voxel at a position in memory (x fastest).
+    pub fn voxel_at(&self, index: u32) -> UVec3 {
+        let (x, rest) = (index % self.dims.x, index / self.dims.x);
+        UVec3::new(x, rest % self.dims.y, rest / self.dims.y)
+    }
+
+    /// `min(sx, sy, sz)`: the length, in world units, that opacities and slab widths are given in (SPEC §2).
+    pub fn unit(&self) -> f64 {
+        self.spacing.min_element()
+    }
+
+    /// Grid aspect `ar = s / unit` (§4.2), each component at least 1.
+    pub fn aspect(&self) -> DVec3 {
+        self.spacing / self.unit()
+    }
+
+    /// Voxel coordinates of the grid's centre.
+    pub fn center(&self) -> DVec3 {
+        (self.dims.as_dvec3() - 1.0) / 2.0
+    }
+
+    /// World position of a voxel.
+    pub fn world_position(&self, voxel: UVec3) -> DVec3 {
+        (voxel.as_dvec3() - self.center()) * self.spacing
+    }
+
+    /// Radius of the sphere that the default camera shows whole: half the diagonal over voxel centres, and a kernel of
+    /// `kernel_radius` grid units beyond it. World units.
+    pub fn bounding_radius(&self, kernel_radius: f64) -> f64 {
+        (self.center() * self.spacing).length() + kernel_radius * self.spacing.max_element()
+    }
+}

@@ -1,0 +1,156 @@
+//! Scalar volumes: extent, spacing and values, without any appearance.
+
+pub mod builtin;
+mod grid;
+mod nrrd;
+
+use std::path::{Path, PathBuf};
+
+use glam::{DVec3, UVec3};
+
+pub use grid::Grid;
+
+/// Why a volume could not be loaded. Every message names the file (or builtin), the field, what was found and what is
+/// allowed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum VolumeError {
+    /// The file could not be opened or read.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// A header field, or the data it promises, is wrong.
+    #[error("{origin}: {field}: found {found}, allowed: {allowed}")]
+    Invalid {
+        /// The file, or `builtin:NAME`.
+        origin: String,
+        /// The header field or part of the file (`sizes`, `space directions`, `data`).
+        field: String,
+        /// What was found there.
+        found: String,
+        /// What would have been accepted.
+        allowed: String,
+    },
+}
+
+/// A scalar volume on a rectilinear grid (SPEC §2): `dims` voxels, x fastest in memory, `spacing` world units apart.
+///
+/// World axes are the volume's axes and the origin is the volume's centre. Values are finite `f32`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Volume {
+    grid: Grid,
+    values: Vec<f32>,
+}
+
+impl Volume {
+    /// A volume from its values, x fastest. `origin` names it in errors.
+    ///
+    /// # Errors
+    /// If a dimension is 0, there are more than `u32::MAX` voxels, the number of values differs from the product of the
+    /// dimensions, a spacing is not positive and finite, or a value is not finite (the error names the voxel).
+    pub fn new(origin: &str, dims: UVec3, spacing: DVec3, values: Vec<f32>) -> Result<Self, VolumeError> {
+        let invalid = |field: &str, found: String, allowed: &str| VolumeError::Invalid {
+            origin: origin.to_owned(),
+            field: field.to_owned(),
+            found,
+            allowed: allowed.to_owned(),
+        };
+        let count = dims.to_array().iter().try_fold(1_u32, |product, &n| product.checked_mul(n));
+        let Some(count) = count.filter(|&count| count > 0) else {
+            return Err(invalid("sizes", format!("{dims}"), "three sizes of at least 1, at most 4294967295 voxels"));
+        };
+        if values.len() != count as usize {
+            return Err(invalid("data", format!("{} values", values.len()), &format!("{count} values")));
+        }
+        if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+            let voxel = Grid { dims, spacing }.voxel_at(at as u32);
+            return Err(invalid("data", format!("{} at voxel {voxel}", values[at]), "finite values"));
+        }
+        Self { grid: Grid { dims, spacing: DVec3::ONE }, values }.with_spacing(origin, spacing)
+    }
+
+    /// The same values at another spacing (world units per voxel step).
+    ///
+    /// # Errors
+    /// If a spacing is not positive and finite.
+    pub fn with_spacing(mut self, origin: &str, spacing: DVec3) -> Result<Self, VolumeError> {
+        if !(spacing.is_finite() && spacing.min_element() > 0.0) {
+            return Err(VolumeError::Invalid {
+                origin: origin.to_owned(),
+                field: "spacing".to_owned(),
+                found: format!("{spacing}"),
+                allowed: "three positive finite numbers".to_owned(),
+            });
+        }
+        self.grid.spacing = spacing;
+        Ok(self)
+    }
+
+    /// Reads a volume file; the format is told by the extension (`.nrrd`, `.nhdr`).
+    ///
+    /// # Errors
+    /// If the file cannot be read, is of no known format, or does not hold what its header promises.
+    pub fn open(path: &Path) -> Result<Self, VolumeError> {
+        match path.extension().and_then(|extension| extension.to_str()) {
+            Some("nrrd" | "nhdr") => nrrd::read(path),
+            extension => Err(VolumeError::Invalid {
+                origin: path.display().to_string(),
+                field: "extension".to_owned(),
+                found: extension.map_or("none".to_owned(), |extension| format!("\".{extension}\"")),
+                allowed: ".nrrd or .nhdr".to_owned(),
+            }),
+        }
+    }
+
+    /// Where the voxels are.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// Voxels along x, y and z.
+    pub fn dims(&self) -> UVec3 {
+        self.grid.dims
+    }
+
+    /// World units from voxel to voxel along x, y and z.
+    pub fn spacing(&self) -> DVec3 {
+        self.grid.spacing
+    }
+
+    /// All values, x fastest, then y, then z.
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+
+    /// The value of one voxel.
+    ///
+    /// # Panics
+    /// If the voxel lies outside the volume.
+    pub fn value(&self, voxel: UVec3) -> f32 {
+        let dims = self.dims();
+        assert!(voxel.cmplt(dims).all(), "voxel {voxel} outside {dims}");
+        self.values[(voxel.x + dims.x * (voxel.y + dims.y * voxel.z)) as usize]
+    }
+
+    /// Gradient in value per world unit, estimated in the unwarped space (§4.2): central differences, one-sided at the
+    /// border, 0 along an axis with one sample.
+    pub fn gradient(&self, voxel: UVec3) -> DVec3 {
+        let Grid { dims, spacing } = self.grid;
+        let strides = [1, dims.x as usize, dims.x as usize * dims.y as usize];
+        let at: usize = (0..3).map(|axis| voxel[axis] as usize * strides[axis]).sum();
+        let difference = |axis: usize| {
+            let (before, after) = (voxel[axis].min(1), (dims[axis] - 1 - voxel[axis]).min(1));
+            if before + after == 0 {
+                return 0.0;
+            }
+            let low = self.values[at - before as usize * strides[axis]];
+            let high = self.values[at + after as usize * strides[axis]];
+            (f64::from(high) - f64::from(low)) / (f64::from(before + after) * spacing[axis])
+        };
+        DVec3::new(difference(0), difference(1), difference(2))
+    }
+}

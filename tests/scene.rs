@@ -1,0 +1,562 @@
+//! Scene files, `--set` overrides and their errors; transfer functions, given and chosen.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+use std::path::{Path, PathBuf};
+
+use glam::{DVec3, UVec3};
+use sheetsplat::camera::{Camera, Projection};
+use sheetsplat::scene::{ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
+use sheetsplat::shading::{Light, Shading};
+use sheetsplat::splatting::{Compositing, FootprintForm, Method, Order, Splatting};
+use sheetsplat::transfer_function::{Ramp, RampError, TransferFunction};
+use sheetsplat::volume::Volume;
+
+const MINIMAL: &str = "[volume]\npath = 'a.nrrd'\n";
+
+fn parse(text: &str, sets: &[&str]) -> Result<Scene, SceneError> {
+    let sets: Vec<_> = sets.iter().map(|&set| set.to_owned()).collect();
+    Scene::parse(text, "scene.toml", Path::new("folder"), &sets)
+}
+
+fn file(path: &str) -> VolumeSource {
+    VolumeSource::File(PathBuf::from(path))
+}
+
+#[test]
+fn defaults() {
+    let scene = parse(MINIMAL, &[]).unwrap();
+    assert_eq!(scene, Scene::new(file("folder/a.nrrd")));
+    assert_eq!(scene.spacing, None);
+    assert_eq!(scene.camera, Camera::default());
+    assert_eq!(scene.image, ImageSettings { width: 512, height: 512, background: [0.0, 0.0, 0.0, 1.0] });
+    assert_eq!(scene.transfer, TransferSettings::default());
+    assert_eq!(scene.shading, Shading::default());
+    assert_eq!(scene.splatting, Splatting::default());
+    assert_eq!(parse("[volume]\nbuiltin = 'cube'", &[]).unwrap().volume, VolumeSource::Builtin("cube".to_owned()));
+    assert_eq!(
+        parse(MINIMAL, &["camera.projection=perspective"]).unwrap().camera.projection,
+        Projection::Perspective { fov_y: 30.0, distance: None, near: None }
+    );
+}
+
+#[test]
+fn every_key() {
+    let text = r#"
+        [volume]
+        path = "../b.nrrd"
+        spacing = [1, 1.5, 3.0]
+        [camera]
+        projection = "perspective"
+        direction = [1, 0.5, 0]
+        up = [0, 0, -2]
+        center = [1, -2, 3.5]
+        height = 7
+        fov_y = 45
+        distance = 400.0
+        near = 2
+        [image]
+        width = 1
+        height = 300
+        background = [1, 0.5, 0, 0.25]
+        [transfer]
+        color = [[-1, [0, 0, 0]], [80.5, [0.9, 0.7, 1]]]
+        opacity = [[40, 0], [60, 0.8]]
+        gradient_opacity = [[0, 0.5]]
+        iso_ranges = [[40, 255], [300, 300]]
+        [shading]
+        enabled = false
+        light = [0, 0, 2]
+        ambient = 0
+        diffuse = 0.5
+        specular = 3
+        shininess = 0.5
+        [splatting]
+        method = "axis-aligned"
+        radius = 1
+        falloff = 16
+        slab_width = 0.05
+        footprint = "sections"
+        compositing = "exponential"
+        order = "back-to-front"
+        opacity_threshold = 1
+        culling = false
+        tiles = false
+    "#;
+    let scene = parse(text, &[]).unwrap();
+    let expected = Scene {
+        volume: file("folder/../b.nrrd"),
+        spacing: Some(DVec3::new(1.0, 1.5, 3.0)),
+        camera: Camera {
+            projection: Projection::Perspective { fov_y: 45.0, distance: Some(400.0), near: Some(2.0) },
+            direction: DVec3::new(1.0, 0.5, 0.0),
+            up: DVec3::new(0.0, 0.0, -2.0),
+            center: DVec3::new(1.0, -2.0, 3.5),
+        },
+        image: ImageSettings { width: 1, height: 300, background: [1.0, 0.5, 0.0, 0.25] },
+        transfer: TransferSettings {
+            color: Some(Ramp::new(vec![(-1.0, DVec3::ZERO), (80.5, DVec3::new(0.9, 0.7, 1.0))]).unwrap()),
+            opacity: Some(Ramp::new(vec![(40.0, 0.0), (60.0, 0.8)]).unwrap()),
+            gradient_opacity: Some(Ramp::new(vec![(0.0, 0.5)]).unwrap()),
+            iso_ranges: Some(vec![[40.0, 255.0], [300.0, 300.0]]),
+        },
+        shading: Shading {
+            enabled: false,
+            ambient: 0.0,
+            diffuse: 0.5,
+            specular: 3.0,
+            shininess: 0.5,
+            light: Light::Direction(DVec3::new(0.0, 0.0, 2.0)),
+        },
+        splatting: Splatting {
+            method: Method::AxisAligned,
+            radius: 1.0,
+            falloff: 16.0,
+            slab_width: 0.05,
+            footprint: FootprintForm::Sections,
+            compositing: Compositing::Exponential,
+            order: Order::BackToFront,
+            opacity_threshold: 1.0,
+            culling: false,
+            tiles: false,
+        },
+    };
+    assert_eq!(scene, expected);
+
+    let scene = parse(text, &["camera.projection=orthographic", "splatting.compositing=xray"]).unwrap();
+    assert_eq!(scene.camera.projection, Projection::Orthographic { height: Some(7.0) });
+    assert_eq!(scene.splatting.compositing, Compositing::Xray);
+    assert_eq!(parse(MINIMAL, &["shading.light=headlight"]).unwrap().shading.light, Light::Headlight);
+}
+
+/// A key, a value that is not allowed, and what the error must contain: key, found, allowed.
+const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
+    ("volume.path", "5", "volume.path", "5 (integer)", "a volume file's path"),
+    ("volume.builtin", "true", "volume.builtin", "true (boolean)", "a builtin volume's name"),
+    ("volume.spacing", "[1, 1]", "volume.spacing", "[1, 1]", "3 numbers, each a finite number > 0"),
+    ("volume.spacing", "2.0", "volume.spacing", "2.0 (float)", "3 numbers, each a finite number > 0"),
+    ("volume.spacing", "[1, 0, 1]", "volume.spacing[1]", "0", "a finite number > 0"),
+    ("volume.spacing", "[1, 1, inf]", "volume.spacing[2]", "inf", "a finite number > 0"),
+    ("volume.file", "'a'", "volume.file", "an unknown key", "path, builtin, spacing"),
+    ("camera.projection", "'ortho'", "camera.projection", "\"ortho\"", "\"orthographic\" or \"perspective\""),
+    ("camera.projection", "1", "camera.projection", "1 (integer)", "\"orthographic\" or \"perspective\""),
+    ("camera.direction", "[0, 0, 0.0]", "camera.direction", "[0, 0, 0.0]", "a vector other than [0, 0, 0]"),
+    ("camera.direction", "[0, nan, 1]", "camera.direction[1]", "nan", "a finite number"),
+    ("camera.direction", "[0, 1, '1']", "camera.direction[2]", "\"1\" (string)", "a finite number"),
+    ("camera.direction", "'x'", "camera.direction", "\"x\" (string)", "3 numbers, each a finite number"),
+    ("camera.direction", "[0, 0, -3]", "camera.up", "[0, 0, 1] with direction [0, 0, -3]", "not parallel to"),
+    ("camera.up", "[0, 0, 0]", "camera.up", "[0, 0, 0]", "a vector other than [0, 0, 0]"),
+    ("camera.up", "[0, 1e-200, 0]", "camera.up", "with direction [0, 1, 0]", "not parallel to camera.direction"),
+    ("camera.up", "[1e-10, -5, 0]", "camera.up", "with direction [0, 1, 0]", "not parallel to camera.direction"),
+    ("camera.up", "[0, 0, 1, 0]", "camera.up", "[0, 0, 1, 0]", "3 numbers, each a finite number"),
+    ("camera.center", "[0, -inf, 0]", "camera.center[1]", "-inf", "a finite number"),
+    ("camera.center", "[true, 0, 0]", "camera.center[0]", "true (boolean)", "a finite number"),
+    ("camera.height", "0", "camera.height", "0", "a finite number > 0"),
+    ("camera.height", "-1.5", "camera.height", "-1.5", "a finite number > 0"),
+    ("camera.height", "'tall'", "camera.height", "\"tall\" (string)", "a finite number > 0"),
+    ("camera.fov_y", "0", "camera.fov_y", "0", "degrees in (0, 180)"),
+    ("camera.fov_y", "180.0", "camera.fov_y", "180.0", "degrees in (0, 180)"),
+    ("camera.distance", "0.0", "camera.distance", "0.0", "a finite number > 0"),
+    ("camera.near", "-1", "camera.near", "-1", "a finite number > 0"),
+    ("camera.near", "nan", "camera.near", "nan", "a finite number > 0"),
+    (
+        "camera.hight",
+        "1",
+        "camera.hight",
+        "an unknown key",
+        "projection, direction, up, center, height, fov_y, distance",
+    ),
+    ("image.width", "0", "image.width", "0", "an integer from 1 to the device's texture limit"),
+    ("image.width", "-5", "image.width", "-5", "an integer from 1"),
+    ("image.width", "512.0", "image.width", "512.0 (float)", "an integer from 1"),
+    ("image.height", "4294967296", "image.height", "4294967296", "an integer from 1"),
+    ("image.height", "'512'", "image.height", "\"512\" (string)", "an integer from 1"),
+    ("image.background", "[0, 0, 0]", "image.background", "[0, 0, 0]", "4 numbers, each a number in [0, 1]"),
+    ("image.background", "[0, 0, 1.1, 1]", "image.background[2]", "1.1", "a number in [0, 1]"),
+    ("image.background", "'black'", "image.background", "\"black\" (string)", "4 numbers"),
+    ("image.size", "1", "image.size", "an unknown key", "width, height, background"),
+    ("transfer.color", "[]", "transfer.color", "[]", "one or more [value, [r, g, b]]"),
+    ("transfer.color", "[0, [0, 0, 0]]", "transfer.color[0]", "0 (integer)", "[value, [r, g, b]]"),
+    ("transfer.color", "[[0, 0, 0, 0]]", "transfer.color[0]", "[0, 0, 0, 0]", "[value, [r, g, b]]"),
+    ("transfer.color", "[[0, 0.5]]", "transfer.color[0][1]", "0.5 (float)", "3 numbers, each a number in [0, 1]"),
+    ("transfer.color", "[[0, [0, 0, 2]]]", "transfer.color[0][1][2]", "2", "a number in [0, 1]"),
+    ("transfer.color", "'red'", "transfer.color", "\"red\" (string)", "an array of one or more [value, [r, g, b]]"),
+    (
+        "transfer.color",
+        "[[1, [0,0,0]], [1, [0,0,0]]]",
+        "transfer.color[1]",
+        "[1, [0, 0, 0]]",
+        "above that of the point",
+    ),
+    ("transfer.opacity", "[]", "transfer.opacity", "[]", "one or more [value, opacity]"),
+    ("transfer.opacity", "[[0, -0.1]]", "transfer.opacity[0][1]", "-0.1", "a number in [0, 1]"),
+    ("transfer.opacity", "[[0, 0], [1, 1.5]]", "transfer.opacity[1][1]", "1.5", "a number in [0, 1]"),
+    ("transfer.opacity", "[[0, 0], [nan, 1]]", "transfer.opacity[1][0]", "nan", "a finite number"),
+    ("transfer.opacity", "[[0, 0], [60, 0.5], [40, 1]]", "transfer.opacity[2]", "[40, 1]", "above that of the point"),
+    ("transfer.opacity", "[['a', 0]]", "transfer.opacity[0][0]", "\"a\" (string)", "a finite number"),
+    ("transfer.opacity", "0.5", "transfer.opacity", "0.5 (float)", "an array of one or more [value, opacity]"),
+    ("transfer.gradient_opacity", "[]", "transfer.gradient_opacity", "[]", "one or more [gradient magnitude, factor]"),
+    ("transfer.gradient_opacity", "[[0, 2]]", "transfer.gradient_opacity[0][1]", "2", "a number in [0, 1]"),
+    ("transfer.iso_ranges", "[]", "transfer.iso_ranges", "[]", "an array of one or more [lo, hi]"),
+    ("transfer.iso_ranges", "[40, 255]", "transfer.iso_ranges[0]", "40 (integer)", "2 numbers, each a finite number"),
+    ("transfer.iso_ranges", "[[0, 1], [5, 4.5]]", "transfer.iso_ranges[1]", "[5, 4.5]", "[lo, hi] with lo <= hi"),
+    ("transfer.iso_ranges", "[[0, inf]]", "transfer.iso_ranges[0][1]", "inf", "a finite number"),
+    ("transfer.colour", "[]", "transfer.colour", "an unknown key", "color, opacity, gradient_opacity, iso_ranges"),
+    ("shading.enabled", "1", "shading.enabled", "1 (integer)", "true or false"),
+    ("shading.light", "'sun'", "shading.light", "\"sun\"", "\"headlight\" or [x, y, z]"),
+    ("shading.light", "3", "shading.light", "3 (integer)", "\"headlight\" or [x, y, z]"),
+    ("shading.light", "[0, 0, 0]", "shading.light", "[0, 0, 0]", "a vector other than [0, 0, 0]"),
+    ("shading.light", "[0, 1]", "shading.light", "[0, 1]", "3 numbers"),
+    ("shading.ambient", "-0.1", "shading.ambient", "-0.1", "a finite number >= 0"),
+    ("shading.diffuse", "inf", "shading.diffuse", "inf", "a finite number >= 0"),
+    ("shading.specular", "'a'", "shading.specular", "\"a\" (string)", "a finite number >= 0"),
+    ("shading.shininess", "0", "shading.shininess", "0", "a finite number > 0"),
+    (
+        "shading.glossy",
+        "0",
+        "shading.glossy",
+        "an unknown key",
+        "enabled, light, ambient, diffuse, specular, shininess",
+    ),
+    ("splatting.method", "'image'", "splatting.method", "\"image\"", "\"image-aligned\" or \"axis-aligned\""),
+    ("splatting.radius", "0.99", "splatting.radius", "0.99", "a number in [1, 4]"),
+    ("splatting.radius", "4.01", "splatting.radius", "4.01", "a number in [1, 4]"),
+    ("splatting.falloff", "0", "splatting.falloff", "0", "a number in (0, 16]"),
+    ("splatting.falloff", "16.5", "splatting.falloff", "16.5", "a number in (0, 16]"),
+    ("splatting.slab_width", "0.04", "splatting.slab_width", "0.04", "a number in [0.05, 8]"),
+    ("splatting.slab_width", "9", "splatting.slab_width", "9", "a number in [0.05, 8]"),
+    ("splatting.footprint", "'gauss'", "splatting.footprint", "\"gauss\"", "\"summed-area\" or \"sections\""),
+    (
+        "splatting.compositing",
+        "'over'",
+        "splatting.compositing",
+        "\"over\"",
+        "\"linear\" or \"exponential\" or \"xray\"",
+    ),
+    ("splatting.order", "''", "splatting.order", "\"\"", "\"front-to-back\" or \"back-to-front\""),
+    ("splatting.order", "1979-05-27", "splatting.order", "1979-05-27 (datetime)", "\"front-to-back\""),
+    ("splatting.opacity_threshold", "0", "splatting.opacity_threshold", "0", "a number in (0, 1]"),
+    ("splatting.opacity_threshold", "1.01", "splatting.opacity_threshold", "1.01", "a number in (0, 1]"),
+    ("splatting.culling", "'yes'", "splatting.culling", "\"yes\" (string)", "true or false"),
+    ("splatting.tiles", "0", "splatting.tiles", "0 (integer)", "true or false"),
+    ("splatting.tile", "true", "splatting.tile", "an unknown key", "method, radius, falloff, slab_width, footprint"),
+];
+
+#[test]
+fn refused_values_are_named_with_their_origin() {
+    for &(key, value, at, found, allowed) in REFUSED {
+        let check = |result: Result<Scene, SceneError>, origin: &str| {
+            let message = result.unwrap_err().to_string();
+            assert!(message.starts_with(&format!("{origin}: {at}: found ")), "{key} = {value}: {message}");
+            let (left, right) = message.split_once(", allowed: ").unwrap();
+            assert!(left.contains(found), "{key} = {value}: {message}");
+            assert!(right.contains(allowed), "{key} = {value}: {message}");
+        };
+        // As a file of its own, where a volume is missing unless the key is about one.
+        let volume = if key.starts_with("volume") { "" } else { "volume.path = 'a.nrrd'\n" };
+        check(parse(&format!("{volume}{key} = {value}"), &[]), "scene.toml");
+        check(parse(MINIMAL, &[&format!("{key}={value}")]), "--set");
+        check(Scene::from_volume(file("a.nrrd"), &[format!("{key}={value}")]), "--set");
+    }
+}
+
+#[test]
+fn refused_files() {
+    let cases = [
+        ("", "volume: found neither path nor builtin, allowed: either volume.path or volume.builtin"),
+        ("[volume]", "volume: found neither path nor builtin, allowed: either volume.path or volume.builtin"),
+        ("[volume]\npath = 'a'\nbuiltin = 'b'", "volume: found both path and builtin, allowed: either volume.path"),
+        ("volume = 'a.nrrd'", "volume: found \"a.nrrd\" (string), allowed: a table"),
+        ("[[volume]]\npath = 'a'", "volume: found [{ path = \"a\" }] (array), allowed: a table"),
+        ("[volumes]\npath = 'a'", "volumes: found an unknown key, allowed: volume, camera, image, transfer, shading"),
+        ("[volume]\npath = 'a'\n[a.b]", "a: found an unknown key, allowed: volume, camera"),
+        ("\"a\\nb\" = 1", "a\\nb: found an unknown key, allowed: volume, camera"),
+        ("[volume]\npath = ", "TOML parse error at line 2, column 8"),
+        ("[volume]\npath = 'a'\npath = 'b'", "TOML parse error at line 3, column 1"),
+    ];
+    for (text, expected) in cases {
+        let message = parse(text, &[]).unwrap_err().to_string();
+        assert!(message.starts_with(&format!("scene.toml: {expected}")), "{text:?}: {message}");
+    }
+    assert!(matches!(parse("=", &[]), Err(SceneError::Syntax { .. })));
+}
+
+#[test]
+fn long_values_are_cut() {
+    let text = format!("{MINIMAL}[camera]\nprojection = \"\"\"\n{}\n\"\"\"", "ä\n".repeat(1000));
+    let SceneError::Invalid { found, .. } = parse(&text, &[]).unwrap_err() else { panic!("another error") };
+    assert_eq!((found.chars().count(), found.lines().count()), (81, 1));
+}
+
+#[test]
+fn overrides() {
+    let text = "[volume]\nbuiltin = 'head'\n[splatting]\nslab_width = 0.5\nradius = 3";
+    let scene = parse(text, &["splatting.slab_width=2.0", "splatting.slab_width = 4", "image.width=64"]).unwrap();
+    assert_eq!((scene.splatting.slab_width, scene.splatting.radius, scene.image.width), (4.0, 3.0, 64));
+
+    // An override repairs a bad value, and has the last word on the volume.
+    assert!(parse(text, &["splatting.radius=9"]).is_err());
+    assert!(parse(&text.replace('3', "9"), &["splatting.radius=2"]).is_ok());
+    assert_eq!(parse(text, &["volume.path=x y.nrrd"]).unwrap().volume, file("folder/x y.nrrd"));
+    assert_eq!(parse(text, &["volume.path=\"/x.nrrd\""]).unwrap().volume, file("/x.nrrd"));
+    assert_eq!(
+        parse(MINIMAL, &["volume.builtin=head:64"]).unwrap().volume,
+        VolumeSource::Builtin("head:64".to_owned())
+    );
+    assert_eq!(parse(text, &["volume.path=x.nrrd", "volume.builtin=cube"]).unwrap().volume, {
+        VolumeSource::Builtin("cube".to_owned())
+    });
+
+    // A whole table replaces the file's.
+    let scene = parse(text, &["splatting={ tiles = false }"]).unwrap();
+    assert_eq!(scene.splatting, Splatting { tiles: false, ..Splatting::default() });
+
+    // A value may hold `=`, and arrays are TOML.
+    assert_eq!(parse(text, &["volume.path=a=b.nrrd"]).unwrap().volume, file("folder/a=b.nrrd"));
+    assert_eq!(parse(text, &["camera.direction=[1, 0, 0]"]).unwrap().camera.direction, DVec3::X);
+}
+
+#[test]
+fn refused_overrides() {
+    let usage = "allowed: table.key=value, as in splatting.slab_width=2.0";
+    let cases = [
+        ("splatting.radius", format!("splatting.radius: found no \"=\", {usage}")),
+        ("", format!(": found no \"=\", {usage}")),
+        ("=1", format!("=1: found an empty key, {usage}")),
+        (".radius=1", format!(".radius=1: found an empty key, {usage}")),
+        ("splatting.=1", format!("splatting.=1: found an empty key, {usage}")),
+        ("camera.up.x=1", format!("camera.up.x: found a key of more than two parts, {usage}")),
+        ("camera=1", "camera: found 1 (integer), allowed: a table".to_owned()),
+        ("camera={ up = [1, 1] }", "camera.up: found [1, 1], allowed: 3 numbers, each a finite number".to_owned()),
+        ("zoom=1", "zoom: found an unknown key, allowed: volume, camera".to_owned()),
+        ("zoom.x=1", "zoom: found an unknown key, allowed: volume, camera".to_owned()),
+        ("camera.up=[0,0", "camera.up: found \"[0,0\" (string), allowed: 3 numbers".to_owned()),
+        ("image.width=", "image.width: found \"\" (string), allowed: an integer from 1".to_owned()),
+        ("transfer.opacity[0]=1", "transfer.opacity[0]: found an unknown key, allowed: color, opacity".to_owned()),
+        ("volume={}", "volume: found neither path nor builtin".to_owned()),
+    ];
+    for (set, expected) in &cases {
+        let message = parse(MINIMAL, &[set]).unwrap_err().to_string();
+        assert!(message.starts_with(&format!("--set: {expected}")), "{set}: {message}");
+    }
+    let message = parse("volume.path = 'a'\ncamera = 5", &["camera.up=[0, 0, 1]"]).unwrap_err().to_string();
+    assert_eq!(message, "--set: camera.up: found camera = 5 (integer), allowed: camera to be a table");
+
+    // An override elsewhere in the table does not take the blame.
+    let message = parse("[volume]\nspacing = [0, 1, 1]\npath = 'a'", &["volume.path=b"]).unwrap_err().to_string();
+    assert!(message.starts_with("scene.toml: volume.spacing[0]: found 0"), "{message}");
+    let message = parse("", &["volume.spacing=[1, 1, 1]"]).unwrap_err().to_string();
+    assert!(message.starts_with("scene.toml: volume: found neither"), "{message}");
+}
+
+#[test]
+fn volume_alone() {
+    let sets = ["image.width=99".to_owned()];
+    let scene = Scene::from_volume(VolumeSource::Builtin("cube".to_owned()), &sets).unwrap();
+    assert_eq!((scene.volume, scene.image.width), (VolumeSource::Builtin("cube".to_owned()), 99));
+    let sets = ["volume.path=b.nrrd".to_owned()];
+    assert_eq!(Scene::from_volume(file("a.nrrd"), &sets).unwrap().volume, file("b.nrrd"));
+    assert_eq!(Scene::from_volume(file("a.nrrd"), &[]).unwrap(), Scene::new(file("a.nrrd")));
+}
+
+#[test]
+fn directions_of_any_length() {
+    for (length, text) in [("1e-300", "[0, 1e-300, 0]"), ("1e300", "[0, 1e300, 0]"), ("5e-324", "[0, 5e-324, 0]")] {
+        let set = format!("camera.direction={text}");
+        let basis = parse(MINIMAL, &[&set, "camera.up=[0, 0, 1e-200]"]).unwrap().camera.basis();
+        assert_eq!((basis.u, basis.v, basis.w), (DVec3::X, DVec3::Z, DVec3::Y), "{length}");
+    }
+}
+
+#[test]
+fn scene_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, MINIMAL).unwrap();
+    let scene = Scene::open(&path, &["image.height=7".to_owned()]).unwrap();
+    assert_eq!(scene.volume, VolumeSource::File(folder.path().join("a.nrrd")));
+    assert_eq!(scene.image.height, 7);
+    assert!(scene.load_volume().is_err());
+
+    std::fs::write(&path, "[volume]\nbuiltin = 'cube'\nspacing = [1, 2, 3]\n[image]\nwidth = 0").unwrap();
+    let message = Scene::open(&path, &[]).unwrap_err().to_string();
+    assert!(
+        message.starts_with(&format!("{}: image.width: found 0, allowed: an integer", path.display())),
+        "{message}"
+    );
+    let scene = Scene::open(&path, &["image.width=1".to_owned()]).unwrap();
+    assert_eq!(scene.load_volume().unwrap().spacing(), DVec3::new(1.0, 2.0, 3.0));
+
+    let missing = folder.path().join("missing.toml");
+    let error = Scene::open(&missing, &[]).unwrap_err();
+    assert!(matches!(error, SceneError::Io { .. }));
+    assert!(error.to_string().starts_with(&format!("{}: ", missing.display())), "{error}");
+    std::fs::write(&path, [0xff, 0xfe]).unwrap();
+    assert!(matches!(Scene::open(&path, &[]), Err(SceneError::Io { .. })));
+}
+
+#[test]
+fn shared_scenes() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
+    let Ok(entries) = folder.read_dir() else { return };
+    for path in entries.map(|entry| entry.unwrap().path()).filter(|path| path.extension().is_some_and(|e| e == "toml"))
+    {
+        let scene = Scene::open(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let VolumeSource::File(volume) = scene.volume else { panic!("{} has no file", path.display()) };
+        assert!(volume.is_file(), "{}", volume.display());
+    }
+}
+
+#[test]
+fn ramp_evaluation() {
+    let ramp = Ramp::new(vec![(0.1, 0.3), (0.2, 0.7), (1.0, 0.1)]).unwrap();
+    for &(position, value) in ramp.points() {
+        assert_eq!(ramp.at(position), value);
+    }
+    assert_eq!((ramp.at(-1e300), ramp.at(f64::NEG_INFINITY)), (0.3, 0.3));
+    assert_eq!((ramp.at(1.1), ramp.at(f64::INFINITY)), (0.1, 0.1));
+    assert!((ramp.at(0.15) - 0.5).abs() < 1e-15);
+    assert!((ramp.at(0.4) - 0.55).abs() < 1e-15);
+
+    let color = Ramp::new(vec![(0.0, DVec3::ZERO), (2.0, DVec3::new(1.0, 0.5, 0.0))]).unwrap();
+    assert_eq!(color.at(1.0), DVec3::new(0.5, 0.25, 0.0));
+    assert_eq!(Ramp::new(vec![(5.0, 0.5)]).unwrap().at(3.0), 0.5);
+    assert_eq!(Ramp::new(vec![(f64::MIN, 0.0), (f64::MAX, 1.0)]).unwrap().at(0.0), 0.5);
+    assert_eq!(Ramp::new(vec![(0.0, 0.25), (5e-324, 1.0)]).unwrap().at(0.0), 0.25);
+
+    assert_eq!(Ramp::<f64>::new(vec![]), Err(RampError::Empty));
+    assert_eq!(Ramp::new(vec![(0.0, 0.0), (f64::NAN, 1.0)]), Err(RampError::NotFinite { index: 1 }));
+    assert_eq!(Ramp::new(vec![(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]), Err(RampError::NotIncreasing { index: 2 }));
+}
+
+#[test]
+fn alpha() {
+    let mut transfer = TransferFunction {
+        color: Ramp::new(vec![(0.0, DVec3::ONE)]).unwrap(),
+        opacity: Ramp::new(vec![(0.0, 0.0), (10.0, 1.0)]).unwrap(),
+        gradient_opacity: None,
+        iso_ranges: None,
+    };
+    assert_eq!((transfer.alpha(5.0, 0.0), transfer.alpha(20.0, 0.0)), (0.5, 1.0));
+    transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.0), (4.0, 1.0)]).unwrap());
+    assert_eq!((transfer.alpha(5.0, 1.0), transfer.alpha(5.0, 9.0)), (0.125, 0.5));
+    transfer.iso_ranges = Some(vec![[2.0, 4.0], [6.0, 6.0]]);
+    let taking_part = [1.9, 2.0, 4.0, 4.1, 6.0, 7.0].map(|value| transfer.alpha(value, 9.0) > 0.0);
+    assert_eq!(taking_part, [false, true, true, false, true, false]);
+    assert_eq!(taking_part, [1.9, 2.0, 4.0, 4.1, 6.0, 7.0].map(|value| transfer.in_iso_range(value)));
+}
+
+fn volume(values: Vec<f32>) -> Volume {
+    Volume::new("test", UVec3::new(values.len() as u32, 1, 1), DVec3::ONE, values).unwrap()
+}
+
+/// The chosen transfer function, after checks that hold for every volume.
+fn chosen(values: Vec<f32>) -> TransferFunction {
+    let volume = volume(values);
+    let transfer = TransferFunction::from_histogram(&volume);
+    assert_eq!(Ramp::new(transfer.color.points().to_vec()).as_ref(), Ok(&transfer.color));
+    assert_eq!(Ramp::new(transfer.opacity.points().to_vec()).as_ref(), Ok(&transfer.opacity));
+    let alphas = || volume.values().iter().map(|&value| transfer.alpha(f64::from(value), 0.0));
+    assert!(alphas().all(|alpha| (0.0..=1.0).contains(&alpha)));
+    assert!(alphas().any(|alpha| alpha >= 0.5), "nothing shows");
+    for &value in volume.values() {
+        let color = transfer.color.at(f64::from(value));
+        assert!(color.is_finite() && color.min_element() >= 0.0 && color.max_element() <= 1.0);
+    }
+    transfer
+}
+
+/// Where the chosen opacity is half its greatest.
+fn surface(transfer: &TransferFunction) -> f64 {
+    let points = transfer.opacity.points();
+    (points[0].0 + points[1].0) / 2.0
+}
+
+/// Volumes with an object: of `count` values, one in `period` lies at `object`, the others at `background`.
+fn two_valued(background: f32, object: f32, count: usize, period: usize) -> Vec<f32> {
+    (0..count).map(|at| if at % period == 0 { object } else { background }).collect()
+}
+
+#[test]
+fn chosen_for_two_values() {
+    // Including one step of f32, the smallest and the greatest range, and sparse objects.
+    let next = f32::from_bits(1.0_f32.to_bits() + 1);
+    let pairs =
+        [(0.0, 1.0), (1.0, next), (1e-12, 2e-12), (0.0, f32::from_bits(1)), (-1e30, 1e30), (f32::MIN, f32::MAX)];
+    for (background, object) in pairs {
+        for period in [2, 10, 150, 5000] {
+            let transfer = chosen(two_valued(background, object, 10_000, period));
+            assert_eq!(transfer.alpha(f64::from(background), 0.0), 0.0, "{background} {object} {period}");
+            assert_eq!(transfer.alpha(f64::from(object), 0.0), 0.9, "{background} {object} {period}");
+        }
+        chosen(two_valued(object, background, 10_000, 2));
+        chosen(two_valued(object, background, 10_000, 5000));
+    }
+}
+
+#[test]
+fn chosen_for_a_constant() {
+    for value in [0.0, -3.0, 1e30, 1e-40, f32::MAX] {
+        assert_eq!(chosen(vec![value; 27]).alpha(f64::from(value), 0.0), 0.5);
+    }
+    assert_eq!(chosen(vec![7.0]).alpha(7.0, 0.0), 0.5);
+}
+
+#[test]
+fn chosen_for_noisy_data() {
+    // Background 0 to 19, a faint fifth of the object from 80, the rest from 130; and the same far from the origin.
+    let noisy = |at: usize| {
+        let noise = (at * 7919 % 20) as f32;
+        noise
+            + match at % 20 {
+                0 => 80.0,
+                4 | 8 | 12 | 16 => 130.0,
+                _ => 0.0,
+            }
+    };
+    let threshold = surface(&chosen((0..20_000).map(noisy).collect()));
+    assert!((40.0..55.0).contains(&threshold), "{threshold}");
+    let threshold = surface(&chosen((0..20_000).map(|at| noisy(at) * 1e27 - 1e30).collect()));
+    assert!((-0.96e30..-0.945e30).contains(&threshold), "{threshold}");
+
+    // A cleared background, 99.5 % of the voxels, around values from 20 to 255: even the faintest of them show.
+    let sparse = |at: usize| if at.is_multiple_of(200) { (20 + at / 200 * 37 % 236) as f32 } else { 0.0 };
+    let transfer = chosen((0..100_000).map(sparse).collect());
+    assert!(transfer.alpha(0.0, 0.0) == 0.0 && transfer.alpha(35.0, 0.0) == 0.9);
+    let [(_, dark), (_, bright)] = transfer.color.points()[..] else { panic!("two colours") };
+    assert!(bright.cmpge(dark).all());
+}
+
+#[test]
+fn chosen_for_measured_volumes() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    let surfaces = [
+        ("quarter-head", 400.0..700.0),
+        ("ct-head", 400.0..700.0),
+        ("mr-head", 20.0..60.0),
+        ("beads-confocal", 8.0..20.0),
+    ];
+    for (name, expected) in surfaces {
+        let path = folder.join(name).with_extension("nrrd");
+        if !path.is_file() {
+            continue;
+        }
+        let threshold = surface(&TransferFunction::from_histogram(&Volume::open(&path).unwrap()));
+        assert!(expected.contains(&threshold), "{name}: {threshold}");
+    }
+}
+
+#[test]
+fn what_is_missing_is_chosen() {
+    let volume = volume(two_valued(0.0, 100.0, 100, 3));
+    let chosen = TransferFunction::from_histogram(&volume);
+    assert_eq!(TransferSettings::default().resolve(&volume), chosen);
+
+    let transfer = parse(MINIMAL, &["transfer.opacity=[[1, 0.5]]", "transfer.iso_ranges=[[0, 2]]"]).unwrap().transfer;
+    let resolved = transfer.resolve(&volume);
+    assert_eq!((resolved.color, resolved.opacity.at(0.0)), (chosen.color, 0.5));
+    assert_eq!(resolved.iso_ranges, Some(vec![[0.0, 2.0]]));
+
+    let transfer = parse(MINIMAL, &["transfer.color=[[1, [1, 1, 1]]]"]).unwrap().transfer;
+    let resolved = transfer.resolve(&volume);
+    assert_eq!((resolved.color.at(0.0), resolved.opacity), (DVec3::ONE, chosen.opacity));
+}
