@@ -8,7 +8,6 @@ struct Slab {
 @group(0) @binding(1) var<uniform> slab: Slab;
 @group(0) @binding(2) var<storage, read> splats: array<Splat>;
 @group(0) @binding(3) var footprints: texture_2d_array<f32>;
-@group(0) @binding(4) var bilinear: sampler;
 
 // True for the 128 pre-integrated sections (§3.2), false for the summed-area form (§3.3.1, eq. 3).
 override SECTIONS: bool = false;
@@ -59,35 +58,44 @@ fn vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) instance:
     return Section(position, center_px, vec4f(unpack2x16float(splat.rg), unpack2x16float(splat.ba)), section);
 }
 
-// H(a, b, z) of eq. 3 for z ≥ 0: the nearest layer, expanded to second order in z with its derivative h and
-// ∂h/∂z = -2·falloff·z·h.
-fn cumulative(texture_coordinate: vec2f, z: f32) -> f32 {
-    let last = f32(textureNumLayers(footprints) - 1u);
-    let layer = min(round(z / frame.support * last), last);
-    let at = layer / last * frame.support;
-    let dz = z - at;
-    let entry = textureSampleLevel(footprints, bilinear, texture_coordinate, u32(layer), 0.0);
-    return entry.x + entry.y + entry.z * dz * (1.0 - frame.falloff * at * dz);
+// H(a, b, z) of eq. 3 for z ≥ 0 and the Gaussian without its truncation, from the nearest entry of the table. In the
+// plane H falls off with exp(-falloff·(a² + b²)), along z its derivative is h: the steps to (a, b, z) follow from both,
+// so a coarse table is accurate.
+fn cumulative(footprint: vec2f, z: f32) -> f32 {
+    let last = vec3f(vec3u(textureDimensions(footprints), textureNumLayers(footprints)) - 1u);
+    let texel = min(round(vec3f(abs(footprint), z) / frame.support * last), last);
+    let at = texel / last * frame.support;
+    let entry = textureLoad(footprints, vec2u(texel.xy), u32(texel.z), 0).xy;
+
+    let dz = z - at.z;
+    let along_z = entry.x + entry.y * dz * (1.0 - frame.falloff * at.z * dz);
+    let u = frame.falloff * (dot(at.xy, at.xy) - dot(footprint, footprint));
+    return along_z * (1.0 + u * (1.0 + u * (0.5 + u / 6.0)));
 }
 
-// Texel centres lie on the quadrant's border, half a texel inside the texture.
-fn texture_coordinate(footprint: vec2f, extent: f32) -> vec2f {
-    let texels = vec2f(textureDimensions(footprints));
-    return (abs(footprint) / extent * (texels - 1.0) + 0.5) / texels;
-}
-
+// eq. 3's two entries, subtracted.
 fn section_summed_area(footprint: vec2f, t0: f32, t1: f32) -> f32 {
     // The ball's truncation: t within the chord.
     let chord = sqrt(max(frame.support * frame.support - dot(footprint, footprint), 0.0));
     let near = clamp(t0, -chord, chord);
     let far = clamp(t1, -chord, chord);
-    let uv = texture_coordinate(footprint, frame.support);
-    return sign(far) * cumulative(uv, abs(far)) - sign(near) * cumulative(uv, abs(near));
+    return sign(far) * cumulative(footprint, abs(far)) - sign(near) * cumulative(footprint, abs(near));
 }
 
+// A stored section, bilinear between the four nearest texels of its quadrant.
 fn section_pre_integrated(footprint: vec2f, layer: f32, extent: f32) -> f32 {
-    let inside = dot(footprint, footprint) < extent * extent;
-    return select(0.0, textureSampleLevel(footprints, bilinear, texture_coordinate(footprint, extent), u32(layer), 0.0).x, inside);
+    if dot(footprint, footprint) >= extent * extent {
+        return 0.0;
+    }
+    let last = vec2f(textureDimensions(footprints) - 1u);
+    let at = min(abs(footprint) / extent, vec2f(1.0)) * last;
+    let low = min(floor(at), last - 1.0);
+    let t = at - low;
+    let p = vec2u(low);
+    let l = u32(layer);
+    let top = mix(textureLoad(footprints, p, l, 0).x, textureLoad(footprints, p + vec2u(1, 0), l, 0).x, t.x);
+    let bottom = mix(textureLoad(footprints, p + vec2u(0, 1), l, 0).x, textureLoad(footprints, p + vec2u(1, 1), l, 0).x, t.x);
+    return mix(top, bottom, t.y);
 }
 
 @fragment

@@ -1,10 +1,8 @@
 //! The two stored forms of kernel footprints, as texture arrays (§§3.2, 3.3.1; SPEC §4).
 //!
-//! Footprints are symmetric in a and b, so a layer holds one quadrant; texel centres lie on the quadrant's border, which
-//! makes the mirrored footprint continuous. The ball's truncation is not baked into the summed-area table: the splat shader
-//! clamps z to the chord, so the table stays smooth up to the rim and a coarse one is accurate.
-
-use half::f16;
+//! Footprints are symmetric in a and b, so a layer holds one quadrant, its first texel at the centre and its last at the
+//! extent. The ball's truncation is not baked into the summed-area table: the splat shader clamps z to the chord, so the
+//! table stays smooth up to the rim.
 
 use crate::kernel::Kernel;
 use crate::splatting::FootprintForm;
@@ -16,7 +14,7 @@ pub const SECTION_SIZE: u32 = 64;
 /// Layers of the summed-area table, from the centre plane to the kernel's support.
 pub const SUMMED_AREA_LAYERS: u32 = 32;
 /// Texels along a side of the summed-area table's quadrant.
-pub const SUMMED_AREA_SIZE: u32 = 96;
+pub const SUMMED_AREA_SIZE: u32 = 64;
 
 /// A footprint texture array on the CPU.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,8 +25,8 @@ pub struct FootprintTable {
     pub size: u32,
     /// Number of layers.
     pub layers: u32,
-    /// `channels` numbers per texel, x fastest, then y, then layer.
-    pub texels: Vec<f16>,
+    /// One number per texel for sections, two for the summed-area form, x fastest, then y, then layer.
+    pub texels: Vec<f32>,
 }
 
 impl FootprintTable {
@@ -37,14 +35,6 @@ impl FootprintTable {
         match form {
             FootprintForm::Sections => sections(kernel, width),
             FootprintForm::SummedArea => summed_area(kernel),
-        }
-    }
-
-    /// f16 numbers per texel: 1 for sections, 4 for the summed-area form.
-    pub fn channels(&self) -> u32 {
-        match self.form {
-            FootprintForm::Sections => 1,
-            FootprintForm::SummedArea => 4,
         }
     }
 }
@@ -68,7 +58,7 @@ fn sections(kernel: &Kernel, width: f64) -> FootprintTable {
         let middle = f64::from(layer) * spacing;
         let (t0, t1) = (middle - width / 2.0, middle + width / 2.0);
         let texel = section_extent(kernel, t0, t1) / f64::from(SECTION_SIZE - 1);
-        quadrant(SECTION_SIZE, texel).map(move |(a, b)| f16::from_f64(kernel.section(a * a + b * b, t0, t1)))
+        quadrant(SECTION_SIZE, texel).map(move |(a, b)| kernel.section(a * a + b * b, t0, t1) as f32)
     });
     FootprintTable {
         form: FootprintForm::Sections,
@@ -78,17 +68,14 @@ fn sections(kernel: &Kernel, width: f64) -> FootprintTable {
     }
 }
 
-/// Layer i: `H(a, b, z)` of eq. 3 at z = i / (layers - 1) of the support, as an f16 and its remainder (two f16 filter like
-/// one number of 22 bits), and its derivative h, from which the shader expands H between layers to second order.
+/// Layer i: `H(a, b, z)` of eq. 3 at z = i / (layers - 1) of the support, and its derivative in z, which is h.
 fn summed_area(kernel: &Kernel) -> FootprintTable {
     let texel = kernel.support() / f64::from(SUMMED_AREA_SIZE - 1);
     let texels = (0..SUMMED_AREA_LAYERS).flat_map(|layer| {
         let z = kernel.support() * f64::from(layer) / f64::from(SUMMED_AREA_LAYERS - 1);
         quadrant(SUMMED_AREA_SIZE, texel).flat_map(move |(a, b)| {
-            let integral = kernel.cumulative(a * a + b * b, z);
-            let high = f16::from_f64(integral);
             let derivative = kernel.value(0.0) * (-kernel.falloff() * (a * a + b * b + z * z)).exp();
-            [high, f16::from_f64(integral - high.to_f64()), f16::from_f64(derivative), f16::ZERO]
+            [kernel.cumulative(a * a + b * b, z) as f32, derivative as f32]
         })
     });
     FootprintTable {

@@ -1,8 +1,7 @@
 //! Bind group layouts and bind groups in few words.
 
 use wgpu::{
-    BindGroup, BindGroupLayout, BindGroupLayoutEntry, BindingResource, BindingType, BufferBindingType, Device,
-    SamplerBindingType, ShaderStages, TextureSampleType, TextureViewDimension,
+    BindGroup, BindGroupLayout, BindGroupLayoutEntry, BindingResource, BindingType, BufferBindingType, Device, ShaderStages, TextureSampleType, TextureViewDimension,
 };
 
 /// What a shader declares at one binding.
@@ -21,15 +20,10 @@ pub fn storage<T>(stages: ShaderStages, read_only: bool) -> Slot {
     (stages, BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size })
 }
 
-/// A sampled float texture.
-pub fn texture(stages: ShaderStages, view_dimension: TextureViewDimension, filterable: bool) -> Slot {
-    let sample_type = TextureSampleType::Float { filterable };
+/// A float texture that is read texel by texel, so that its format need not be filterable.
+pub fn texture(stages: ShaderStages, view_dimension: TextureViewDimension) -> Slot {
+    let sample_type = TextureSampleType::Float { filterable: false };
     (stages, BindingType::Texture { sample_type, view_dimension, multisampled: false })
-}
-
-/// A filtering sampler.
-pub fn sampler(stages: ShaderStages) -> Slot {
-    (stages, BindingType::Sampler(SamplerBindingType::Filtering))
 }
 
 /// The layout of group 0 with the given bindings in order, and the pipeline layout of that group alone.

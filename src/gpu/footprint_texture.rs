@@ -18,11 +18,11 @@ pub struct FootprintTexture {
 }
 
 impl FootprintTexture {
-    /// Uploads a table. Its formats are half-precision because those filter on every device.
+    /// Uploads a table.
     pub fn upload(device: &Device, queue: &Queue, table: &FootprintTable) -> Self {
         let format = match table.form {
-            FootprintForm::Sections => TextureFormat::R16Float,
-            FootprintForm::SummedArea => TextureFormat::Rgba16Float,
+            FootprintForm::Sections => TextureFormat::R32Float,
+            FootprintForm::SummedArea => TextureFormat::Rg32Float,
         };
         let descriptor = wgpu::TextureDescriptor {
             label: Some("sheetsplat.footprints"),

@@ -29,7 +29,7 @@ impl Composite {
             &[
                 uniform::<Frame>(stage, false),
                 uniform::<Band>(stage, false),
-                texture(stage, TextureViewDimension::D2, false),
+                texture(stage, TextureViewDimension::D2),
                 storage::<[f32; 4]>(stage, false),
             ],
         );

@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 use wgpu::{
-    BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, RenderPipeline, Sampler, ShaderStages, TextureFormat,
+    BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, RenderPipeline, ShaderStages, TextureFormat,
     TextureView, TextureViewDimension,
 };
 
-use crate::gpu::bindings::{bind, layout, sampler, storage, texture, uniform};
+use crate::gpu::bindings::{bind, layout, storage, texture, uniform};
 use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::layout::{Frame, Slab, Splat as SplatRecord};
 use crate::gpu::shaders;
@@ -19,7 +19,6 @@ pub struct Splat {
     layout: BindGroupLayout,
     sections: RenderPipeline,
     summed_area: RenderPipeline,
-    bilinear: Sampler,
 }
 
 /// The part of one list that touches a slab.
@@ -42,8 +41,7 @@ impl Splat {
                 uniform::<Frame>(both, false),
                 uniform::<Slab>(ShaderStages::VERTEX, true),
                 storage::<SplatRecord>(ShaderStages::VERTEX, true),
-                texture(both, TextureViewDimension::D2Array, true),
-                sampler(ShaderStages::FRAGMENT),
+                texture(both, TextureViewDimension::D2Array),
             ],
         );
         let module = shaders::SPLAT.module(device);
@@ -87,17 +85,10 @@ impl Splat {
                 cache: None,
             })
         };
-        let bilinear = device.create_sampler(&wgpu::SamplerDescriptor {
-            label: Some("sheetsplat.bilinear"),
-            mag_filter: wgpu::FilterMode::Linear,
-            min_filter: wgpu::FilterMode::Linear,
-            ..wgpu::SamplerDescriptor::default()
-        });
         Self {
             layout,
             sections: pipeline(FootprintForm::Sections),
             summed_area: pipeline(FootprintForm::SummedArea),
-            bilinear,
         }
     }
 
@@ -120,7 +111,6 @@ impl Splat {
             wgpu::BindingResource::Buffer(slab),
             splats.as_entire_binding(),
             wgpu::BindingResource::TextureView(&footprints.view),
-            wgpu::BindingResource::Sampler(&self.bilinear),
         ];
         bind(device, "sheetsplat.splat", &self.layout, &resources)
     }

@@ -5,11 +5,11 @@ use rayon::prelude::*;
 
 use super::sdf::{Grid, ellipsoid, smoothstep, wave};
 
-/// The microscope's point spread: along z it blurs farther than within a slice.
-const BLUR: DVec3 = dvec3(1.0, 1.0, 2.0);
+/// World units that a tube appears thicker along z: that is how much farther the microscope blurs there.
+const BLUR: f64 = 2.2;
 
-/// Half the width of an edge, world units.
-const SOFTNESS: f64 = 1.8;
+/// Half the width of an edge, within a slice and along z. World units.
+const SOFTNESS: (f64, f64) = (1.8, 4.5);
 
 /// Length of one straight piece of a dendrite.
 const STEP: f64 = 4.0;
@@ -20,7 +20,7 @@ const THINNEST: f64 = 2.0;
 /// Half the box that the cell stays in.
 const BOX: DVec3 = dvec3(246.0, 246.0, 178.0);
 
-const SOMA: DVec3 = dvec3(40.0, 34.0, 37.0);
+const SOMA: DVec3 = dvec3(46.0, 39.0, 41.0);
 
 /// A piece of a dendrite: a straight tube that tapers and darkens from `from` to `to`.
 struct Segment {
@@ -52,7 +52,7 @@ pub(super) fn values(grid: &Grid) -> Vec<f32> {
         };
         put(-1.5 * SOMA, 1.5 * SOMA, &soma);
         for segment in &segments {
-            let reach = (segment.radii.0.max(segment.radii.1) + SOFTNESS) * BLUR;
+            let reach = (segment.radii.0.max(segment.radii.1) + SOFTNESS.1) * segment.blur();
             put(segment.from.min(segment.to) - reach, segment.from.max(segment.to) + reach, &|p| segment.value(p));
         }
     });
@@ -65,19 +65,29 @@ fn soma(p: DVec3) -> f64 {
     let nucleus = ellipsoid(p, dvec3(6.0, -4.0, 3.0), dvec3(17.0, 16.0, 16.0));
     let nucleolus = (p - dvec3(9.0, -1.0, 5.0)).length() - 5.0;
     let inside = 250.0 - 75.0 * smoothstep(2.0, -2.0, nucleus) + 80.0 * smoothstep(2.0, -2.0, nucleolus);
-    inside.min(255.0) * coverage(ellipsoid(p, DVec3::ZERO, SOMA) - 1.6 * bumps)
+    inside.min(255.0) * coverage(ellipsoid(p, DVec3::ZERO, SOMA) - 1.6 * bumps, p / SOMA)
 }
 
-fn coverage(distance: f64) -> f64 {
-    smoothstep(SOFTNESS, -SOFTNESS, distance)
+/// How much of a voxel is inside, from the distance and the surface's normal there (of any length).
+fn coverage(distance: f64, normal: DVec3) -> f64 {
+    let along_z = normal.z * normal.z / normal.length_squared().max(1e-12);
+    let soft = SOFTNESS.0 + (SOFTNESS.1 - SOFTNESS.0) * along_z;
+    smoothstep(soft, -soft, distance)
 }
 
 impl Segment {
+    /// How much longer the tube's cross section is along each axis.
+    fn blur(&self) -> DVec3 {
+        dvec3(1.0, 1.0, 1.0 + BLUR / self.radii.0)
+    }
+
     fn value(&self, p: DVec3) -> f64 {
-        let (axis, q) = ((self.to - self.from) / BLUR, (p - self.from) / BLUR);
+        let blur = self.blur();
+        let (axis, q) = ((self.to - self.from) / blur, (p - self.from) / blur);
         let t = (q.dot(axis) / axis.length_squared()).clamp(0.0, 1.0);
         let between = |(from, to): (f64, f64)| from + t * (to - from);
-        between(self.values) * coverage((q - t * axis).length() - between(self.radii))
+        let away = q - t * axis;
+        between(self.values) * coverage(away.length() - between(self.radii), away)
     }
 }
 
@@ -116,6 +126,8 @@ struct Tip {
     /// Rate at which the direction turns: changes slowly, so that dendrites are curved and not jagged.
     turn: DVec3,
     radius: f64,
+    /// What the radius tends to.
+    goal: f64,
     /// World units from the cell body.
     path: f64,
     /// World units until it branches.
@@ -126,14 +138,14 @@ struct Tip {
 fn grow() -> Vec<Segment> {
     /// Where the primary dendrites leave, and how thick they are.
     const PRIMARY: [([f64; 3], f64); 8] = [
-        ([1.0, 0.15, 0.25], 11.0),
-        ([0.35, 0.9, -0.2], 9.5),
-        ([-0.7, 0.75, 0.35], 9.0),
-        ([-1.0, -0.1, -0.3], 11.5),
-        ([-0.45, -0.85, 0.45], 9.0),
-        ([0.5, -0.9, -0.25], 10.0),
-        ([0.3, 0.1, 1.0], 8.5),
-        ([-0.2, 0.25, -1.0], 8.0),
+        ([1.0, 0.15, 0.25], 13.0),
+        ([0.35, 0.9, -0.2], 10.0),
+        ([-0.7, 0.75, 0.35], 10.0),
+        ([-1.0, -0.1, -0.3], 13.5),
+        ([-0.45, -0.85, 0.45], 10.0),
+        ([0.5, -0.9, -0.25], 12.0),
+        ([0.3, 0.1, 1.0], 9.5),
+        ([-0.2, 0.25, -1.0], 9.5),
     ];
     let random = &mut Random(11);
     let mut segments = Vec::new();
@@ -142,11 +154,11 @@ fn grow() -> Vec<Segment> {
         .map(|&(direction, radius)| {
             let direction = DVec3::from(direction).normalize();
             let branch = random.between(35.0, 75.0);
-            Tip { at: direction * SOMA * 0.7, direction, turn: DVec3::ZERO, radius, path: 0.0, branch }
+            Tip { at: direction * SOMA * 0.6, direction, turn: DVec3::ZERO, radius, goal: radius, path: 0.0, branch }
         })
         .collect();
     while let Some(mut tip) = tips.pop() {
-        let steps = tip.path + random.between(150.0, 340.0) + 14.0 * tip.radius;
+        let steps = tip.path + random.between(60.0, 180.0) + 18.0 * tip.radius;
         while tip.path < steps && (tip.at.abs() + tip.radius).cmplt(BOX).all() {
             let before = (tip.at, tip.radius, tip.value());
             tip.advance(random);
@@ -156,13 +168,14 @@ fn grow() -> Vec<Segment> {
                 radii: (before.1, tip.radius),
                 values: (before.2, tip.value()),
             });
-            if tip.radius < 3.0 && random.uniform() < 0.10 {
+            if tip.radius < 3.0 && random.uniform() < 0.08 {
                 segments.push(tip.spine(random));
             }
             if tip.branch < 0.0 && tip.radius > 1.15 * THINNEST {
                 tips.push(tip.fork(random));
             }
         }
+        segments.push(tip.end());
     }
     segments
 }
@@ -174,17 +187,24 @@ impl Tip {
     }
 
     fn advance(&mut self, random: &mut Random) {
-        self.turn = 0.86 * self.turn + 0.075 * random.in_ball();
+        self.turn = 0.85 * self.turn + 0.06 * random.in_ball();
         // Outwards, but along the walls of the box rather than through them.
         let wall = self.at / BOX * (self.at / BOX).abs() * (self.at / BOX).abs();
-        let outwards = 0.012 * self.at.normalize_or_zero() - 0.11 * wall;
+        let outwards = 0.03 * self.at.normalize_or_zero() - 0.12 * wall;
         self.direction = (self.direction + self.turn + outwards).normalize();
         self.at += STEP * self.direction;
         self.path += STEP;
         self.branch -= STEP;
         // The trunk's base flares into the cell body.
         let taper = if self.path < 40.0 { 0.965 } else { 0.9945 };
-        self.radius = (self.radius * taper).max(THINNEST);
+        self.goal = (self.goal * taper).max(THINNEST);
+        self.radius += 0.3 * (self.goal - self.radius);
+    }
+
+    /// Where it peters out.
+    fn end(&self) -> Segment {
+        let to = self.at + 2.5 * STEP * self.direction;
+        Segment { from: self.at, to, radii: (self.radius, 0.4), values: (self.value(), self.value()) }
     }
 
     /// A thin bump on the side of a twig.
@@ -200,7 +220,7 @@ impl Tip {
         let share = random.between(0.25, 0.5);
         let aside = random.in_ball() * dvec3(1.0, 1.0, 0.8);
         let aside = (aside - aside.dot(self.direction) * self.direction).normalize_or(DVec3::X);
-        let radius = |share: f64| (self.radius * libm::cbrt(share * share)).max(THINNEST);
+        let radius = |share: f64| (self.goal * libm::cbrt(share * share)).max(THINNEST);
         let (thin, thick) = (radius(share), radius(1.0 - share));
         let (away, little) = (random.between(0.7, 1.1), random.between(0.2, 0.45));
         let other = Self {
@@ -208,11 +228,12 @@ impl Tip {
             direction: (self.direction + away * aside).normalize(),
             turn: DVec3::ZERO,
             radius: thin,
+            goal: thin,
             path: self.path,
             branch: random.between(30.0, 90.0),
         };
         self.direction = (self.direction - little * aside).normalize();
-        self.radius = thick;
+        self.goal = thick;
         self.branch = random.between(30.0, 90.0);
         other
     }

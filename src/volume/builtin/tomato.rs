@@ -1,13 +1,14 @@
 //! A tomato as magnetic resonance shows it: wall, gel, placenta, core and seeds; the stem is at +z.
 
 use std::f64::consts::TAU;
+use std::sync::LazyLock;
 
 use glam::{DVec2, DVec3, dvec2, dvec3};
 
 use super::sdf::{Grid, Layer, ellipsoid, intersection, smoothstep, tube, union, wave};
 
 /// Chambers around the core.
-const CHAMBERS: usize = 5;
+const COUNT: usize = 5;
 
 /// Half the thickness of the walls between chambers, and the thickness of the outer wall.
 const SEPTUM: f64 = 4.5;
@@ -23,19 +24,29 @@ pub(super) fn values(grid: &Grid) -> Vec<f32> {
         Layer::new(140.0, placenta),
         Layer::new(170.0, core),
     ];
-    layers.extend((0..CHAMBERS as u32 * SEEDS).map(|index| {
+    layers.extend((0..COUNT as u32 * SEEDS).map(|index| {
         let seed = Seed::new(index);
         Layer::new(230.0, move |p| seed.distance(p))
     }));
     grid.paint(&layers)
 }
 
-/// The axis of a chamber, outwards. Chambers are not all the same width.
-fn chamber_axis(chamber: usize) -> DVec2 {
-    const TURNS: [f64; CHAMBERS] = [0.03, 0.235, 0.42, 0.63, 0.825];
-    let angle = TAU * TURNS[chamber];
-    dvec2(libm::cos(angle), libm::sin(angle))
+/// A chamber's directions from the core.
+struct Chamber {
+    /// Outwards.
+    axis: DVec2,
+    /// Out through the septa to its neighbours.
+    sides: [DVec2; 2],
 }
+
+/// The chambers, not all of the same width.
+static CHAMBERS: LazyLock<[Chamber; COUNT]> = LazyLock::new(|| {
+    let axes = [0.03, 0.235, 0.42, 0.63, 0.825].map(|turn| dvec2(libm::cos(TAU * turn), libm::sin(TAU * turn)));
+    std::array::from_fn(|i| Chamber {
+        axis: axes[i],
+        sides: [1, COUNT - 1].map(|step| (axes[(i + step) % COUNT] - axes[i]).normalize()),
+    })
+});
 
 /// The skin: a flattened ball with a shallow furrow over every septum, a dimple at the stem, and a stub of the stem.
 fn outside(p: DVec3) -> f64 {
@@ -43,8 +54,8 @@ fn outside(p: DVec3) -> f64 {
     let across = sector(xy);
     let shoulder = smoothstep(-70.0, 60.0, p.z);
     // Deep near the stem, shallow elsewhere; as wide as the fruit is far from its axis.
-    let width = 0.5 * xy.length() + 1.0;
-    let furrow = (2.0 + 6.0 * shoulder) * smoothstep(8.0, 60.0, xy.length()) * (1.0 + across / width).clamp(0.0, 1.0).powi(2);
+    let width = 0.55 * xy.length() + 1.0;
+    let furrow = (4.0 + 8.0 * shoulder) * smoothstep(8.0, 60.0, xy.length()) * smoothstep(-width, 0.0, across);
     let body = union(
         ellipsoid(p, dvec3(0.0, 0.0, 4.0), dvec3(114.0, 114.0, 74.0)),
         ellipsoid(p, dvec3(0.0, 0.0, -16.0), dvec3(98.0, 98.0, 68.0)),
@@ -57,15 +68,8 @@ fn outside(p: DVec3) -> f64 {
 
 /// Distance to the nearest chamber's wedge, negative inside: the planes between it and its neighbours, halfway.
 fn sector(xy: DVec2) -> f64 {
-    let beyond = |chamber: usize, other: usize| {
-        (chamber_axis(other) - chamber_axis(chamber)).normalize().dot(xy)
-    };
-    (0..CHAMBERS)
-        .map(|chamber| {
-            let (before, after) = ((chamber + CHAMBERS - 1) % CHAMBERS, (chamber + 1) % CHAMBERS);
-            intersection(beyond(chamber, after), beyond(chamber, before), 14.0)
-        })
-        .fold(f64::INFINITY, f64::min)
+    let wedges = CHAMBERS.iter().map(|chamber| chamber.sides.map(|side| side.dot(xy)));
+    wedges.map(|[a, b]| intersection(a, b, 14.0)).fold(f64::INFINITY, f64::min)
 }
 
 /// The gel: within the outer wall, around the core, between the septa.
@@ -76,12 +80,11 @@ fn chambers(p: DVec3) -> f64 {
 
 /// The tissue that carries the seeds: from the core into every chamber.
 fn placenta(p: DVec3) -> f64 {
-    let lobes = (0..CHAMBERS)
-        .map(|chamber| {
-            let center = (chamber_axis(chamber) * 44.0).extend(-4.0);
-            ellipsoid(p, center, dvec3(20.0, 20.0, 36.0))
-        })
-        .fold(f64::INFINITY, f64::min);
+    let lobes = CHAMBERS.iter().map(|chamber| {
+        let center = (chamber.axis * 42.0).extend(-4.0);
+        ellipsoid(p, center, dvec3(21.0, 21.0, 38.0))
+    });
+    let lobes = lobes.fold(f64::INFINITY, f64::min);
     let bumps = wave(p.x / 23.0) * wave(p.y / 19.0 + 0.2) + wave(p.z / 21.0);
     intersection(lobes - 1.5 * bumps, chambers(p), 4.0)
 }
@@ -105,10 +108,11 @@ struct Seed {
 impl Seed {
     fn new(index: u32) -> Self {
         let (chamber, index) = ((index / SEEDS) as usize, index % SEEDS);
-        let out = chamber_axis(chamber);
+        let out = CHAMBERS[chamber].axis;
         let side = out.perp();
         // Points of a golden spiral over the outer half of the placenta, a little off so that rows do not show.
-        let jitter = |k: u32| wave(f64::from(index * (2 * k + 3) + chamber as u32 * 7) * 0.618_034 + 0.1 * f64::from(k));
+        let jitter =
+            |k: u32| wave(f64::from(index * (2 * k + 3) + chamber as u32 * 7) * 0.618_034 + 0.1 * f64::from(k));
         let z = 1.0 - 2.0 * (f64::from(index) + 0.5) / f64::from(SEEDS);
         let angle = (f64::from(index) * 0.381_966).fract() - 0.5;
         let r = (1.0 - z * z).sqrt();
