@@ -58,9 +58,14 @@ mod tests {
         let buckets = Buckets::sort(&firsts, 2);
         assert_eq!(buckets.order, [2, 5, 4, 6, 0, 3]);
         for k in -5..8 {
-            let touching: Vec<u32> = buckets.order[buckets.touching(k).start as usize..buckets.touching(k).end as usize].to_vec();
-            let expected: Vec<u32> =
-                buckets.order.iter().copied().filter(|&v| firsts[v as usize].is_some_and(|f| (k - 1..=k).contains(&f))).collect();
+            let touching: Vec<u32> =
+                buckets.order[buckets.touching(k).start as usize..buckets.touching(k).end as usize].to_vec();
+            let expected: Vec<u32> = buckets
+                .order
+                .iter()
+                .copied()
+                .filter(|&v| firsts[v as usize].is_some_and(|f| (k - 1..=k).contains(&f)))
+                .collect();
             assert_eq!(touching, expected, "slab {k}");
         }
     }

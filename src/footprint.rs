@@ -60,12 +60,7 @@ fn sections(kernel: &Kernel, width: f64) -> FootprintTable {
         let texel = section_extent(kernel, t0, t1) / f64::from(SECTION_SIZE - 1);
         quadrant(SECTION_SIZE, texel).map(move |(a, b)| kernel.section(a * a + b * b, t0, t1) as f32)
     });
-    FootprintTable {
-        form: FootprintForm::Sections,
-        size: SECTION_SIZE,
-        layers: SECTIONS,
-        texels: texels.collect(),
-    }
+    FootprintTable { form: FootprintForm::Sections, size: SECTION_SIZE, layers: SECTIONS, texels: texels.collect() }
 }
 
 /// Layer i: `H(a, b, z)` of eq. 3 at z = i / (layers - 1) of the support, and its derivative in z, which is h.

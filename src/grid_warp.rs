@@ -91,7 +91,10 @@ impl FootprintMap {
         let gram = pixels_from_footprint.transpose() * pixels_from_footprint;
         let (a, b, c) = (gram.x_axis.x, gram.x_axis.y, gram.y_axis.y);
         let right = DMat2::from_angle(0.5 * (2.0 * b).atan2(a - c));
-        let singular = DVec2::new((pixels_from_footprint * right.x_axis).length(), (pixels_from_footprint * right.y_axis).length());
+        let singular = DVec2::new(
+            (pixels_from_footprint * right.x_axis).length(),
+            (pixels_from_footprint * right.y_axis).length(),
+        );
         let raised = singular.max(DVec2::ONE);
         let map = pixels_from_footprint * right * DMat2::from_diagonal(raised / singular) * right.transpose();
         let amplitude = (singular / raised).element_product();

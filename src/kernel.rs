@@ -88,10 +88,8 @@ mod tests {
             let kernel = Kernel::new(radius, falloff);
             let steps = 20_000;
             let dr = radius / f64::from(steps);
-            let integral: f64 = (0..steps)
-                .map(|i| (f64::from(i) + 0.5) * dr)
-                .map(|r| 4.0 * PI * r * r * kernel.value(r) * dr)
-                .sum();
+            let integral: f64 =
+                (0..steps).map(|i| (f64::from(i) + 0.5) * dr).map(|r| 4.0 * PI * r * r * kernel.value(r) * dr).sum();
             assert!((integral - 1.0).abs() < 1e-7, "radius {radius} falloff {falloff}: {integral}");
         }
     }
@@ -109,7 +107,10 @@ mod tests {
                         .map(|t| kernel.value((rho * rho + t * t).sqrt()) * dt)
                         .sum();
                     let section = kernel.section(rho * rho, t0, t1);
-                    assert!((section - sum).abs() < 1e-3 * kernel.value(0.0), "{radius} {rho} {t0}..{t1}: {section} {sum}");
+                    assert!(
+                        (section - sum).abs() < 1e-3 * kernel.value(0.0),
+                        "{radius} {rho} {t0}..{t1}: {section} {sum}"
+                    );
                 }
             }
         }

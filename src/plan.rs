@@ -1,5 +1,7 @@
 //! The frame plan: everything a frame's passes need, as plain data made without a GPU.
 
+use std::ops::Range;
+
 use glam::{DVec2, DVec3, DVec4, UVec3};
 use rayon::prelude::*;
 
@@ -9,8 +11,12 @@ use crate::error::RenderError;
 use crate::grid_warp::{self, FootprintMap};
 use crate::kernel::Kernel;
 use crate::slab::SlabGrid;
-use crate::splatting::{Method, Splatting};
+use crate::splatting::{Method, Order, Splatting};
+use crate::stats::Counts;
 use crate::volume::Grid;
+
+/// Side of a tile, pixels (§6).
+pub const TILE: u32 = 32;
 
 /// An orthographic view of a volume in the terms of SPEC §5: where voxels fall on the screen, how footprints lie there,
 /// and how slabs cut the warped grid.
@@ -77,45 +83,105 @@ impl View {
     }
 }
 
-/// One list's share of a frame: its buckets and counts.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ListPlan {
+/// A frame: which splats every slab draws, front to back.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FramePlan {
+    /// The view.
+    pub view: View,
+    /// For every voxel list the order its splats are stored in: indices into the list, sorted by first slab.
+    pub orders: Vec<Vec<u32>>,
+    /// The slabs that any splat touches, in the order they are composited.
+    pub slabs: Vec<SlabPlan>,
+    /// What the frame is made of.
+    pub counts: Counts,
+}
+
+/// One slab of a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SlabPlan {
+    /// Warped depth of the slab's near plane, `k·Δ·λw`.
+    pub near: f64,
+    /// For every list the range of splats that can touch the slab.
+    pub splats: Vec<Range<u32>>,
+}
+
+impl FramePlan {
+    /// Projects and buckets the voxels (§5.1). `lists` holds voxels as indices into the volume.
+    pub fn new<'a>(
+        grid: &Grid,
+        lists: impl IntoIterator<Item = &'a [u32]>,
+        view: View,
+        kernel: &Kernel,
+        order: Order,
+    ) -> Self {
+        let lists: Vec<ListPlan> = lists.into_iter().map(|list| ListPlan::new(grid, list, &view, kernel)).collect();
+        let first = lists.iter().map(|list| list.slabs.start).min().unwrap_or(0);
+        let end = lists.iter().map(|list| list.slabs.end).max().unwrap_or(0);
+        let mut slabs: Vec<SlabPlan> = (first..end)
+            .map(|k| SlabPlan {
+                near: f64::from(k) * view.slabs.width,
+                splats: lists.iter().map(|list| list.buckets.touching(k)).collect(),
+            })
+            .filter(|slab| slab.splats.iter().any(|range| !range.is_empty()))
+            .collect();
+        if order == Order::BackToFront {
+            slabs.reverse();
+        }
+
+        let tiles = u64::from(view.size[0].div_ceil(TILE)) * u64::from(view.size[1].div_ceil(TILE));
+        let sheets = (end - first) as u64;
+        let counts = Counts {
+            voxels_total: grid.dims.as_u64vec3().element_product(),
+            voxels_in_range: lists.iter().map(|list| list.voxels).sum(),
+            voxels_shaded: lists.iter().map(|list| list.buckets.order.len() as u64).sum(),
+            sections_total: lists.iter().map(|list| list.sections).sum(),
+            sections_rasterized: lists.iter().map(|list| list.sections_on_screen).sum(),
+            sheets,
+            tiles_total: tiles * sheets,
+            tiles_composited: tiles * slabs.len() as u64,
+        };
+        Self { view, orders: lists.into_iter().map(|list| list.buckets.order).collect(), slabs, counts }
+    }
+}
+
+/// One list's share of a frame.
+struct ListPlan {
     /// The voxels on the screen, by slab.
-    pub buckets: Buckets,
-    /// The slabs that any kernel of the list touches, `first..end`.
-    pub slabs: (i32, i32),
-    /// Voxel–slab overlaps of positive length, wherever they fall on the screen.
-    pub sections_total: u64,
-    /// Those of voxels whose footprint's box meets the image.
-    pub sections_on_screen: u64,
+    buckets: Buckets,
+    /// The slabs that any kernel of the list touches, on the screen or off it.
+    slabs: Range<i32>,
+    voxels: u64,
+    sections: u64,
+    sections_on_screen: u64,
 }
 
 impl ListPlan {
-    /// Projects and buckets the voxels of one list (§5.1).
-    pub fn new(grid: &Grid, indices: &[u32], view: &View, kernel: &Kernel) -> Self {
+    fn new(grid: &Grid, list: &[u32], view: &View, kernel: &Kernel) -> Self {
         let half_box = view.footprint.half_box(kernel.support());
         let image = DVec2::new(f64::from(view.size[0]), f64::from(view.size[1]));
-        let placed: Vec<(i32, i32, bool)> = indices
+        let placed: Vec<(Range<i32>, bool)> = list
             .par_iter()
             .map(|&index| {
                 let p = view.project(grid.voxel_at(index));
-                let touched = view.slabs.touched(p.z);
                 // Pixel centres at half-integers: a box that holds none of the image's draws nothing.
                 let (low, high) = (p.truncate() - half_box, p.truncate() + half_box);
-                let on_screen = low.cmplt(image - 0.5).all() && high.cmpgt(DVec2::splat(0.5)).all();
-                (*touched.start(), *touched.end() + 1, on_screen)
+                let on_screen = low.cmple(image - 0.5).all() && high.cmpge(DVec2::splat(0.5)).all();
+                (view.slabs.touched(p.z), on_screen)
             })
             .collect();
         let sections = |on_screen_only: bool| -> u64 {
-            placed.iter().filter(|p| p.2 || !on_screen_only).map(|(first, end, _)| (end - first) as u64).sum()
+            placed.iter().filter(|placed| placed.1 || !on_screen_only).map(|(slabs, _)| slabs.len() as u64).sum()
         };
-        let reach = placed.iter().map(|(first, end, _)| end - first).max().unwrap_or(0);
-        let slabs = placed.iter().fold((i32::MAX, i32::MIN), |slabs, p| (slabs.0.min(p.0), slabs.1.max(p.1)));
-        let firsts: Vec<Option<i32>> = placed.iter().map(|&(first, _, on_screen)| on_screen.then_some(first)).collect();
+        let reach = placed.iter().map(|(slabs, _)| slabs.len()).max().unwrap_or(0);
+        let first = placed.iter().map(|(slabs, _)| slabs.start).min().unwrap_or(0);
+        let end = placed.iter().map(|(slabs, _)| slabs.end).max().unwrap_or(0);
+        let firsts: Vec<Option<i32>> =
+            placed.iter().map(|(slabs, on_screen)| on_screen.then_some(slabs.start)).collect();
         Self {
-            buckets: Buckets::sort(&firsts, reach),
-            slabs,
-            sections_total: sections(false),
+            buckets: Buckets::sort(&firsts, reach as i32),
+            slabs: first..end,
+            voxels: list.len() as u64,
+            sections: sections(false),
             sections_on_screen: sections(true),
         }
     }

@@ -17,7 +17,7 @@ fn fraction(volume: &Volume, low: f32, high: f32) -> f64 {
 }
 
 fn at(volume: &Volume, world: [f64; 3]) -> f32 {
-    let voxel = DVec3::from(world) / volume.spacing() + volume.grid_center();
+    let voxel = DVec3::from(world) / volume.spacing() + volume.grid().center();
     volume.value(voxel.round().as_uvec3())
 }
 
@@ -126,7 +126,7 @@ fn head_has_its_tissues() {
 fn head_is_symmetric() {
     let head = volume("head:64");
     let UVec3 { x: nx, y: ny, z: nz } = head.dims();
-    for voxel in (0..nx * ny * nz).map(|index| head.voxel_at(index)) {
+    for voxel in (0..nx * ny * nz).map(|index| head.grid().voxel_at(index)) {
         assert_eq!(head.value(voxel), head.value(UVec3::new(nx - 1 - voxel.x, voxel.y, voxel.z)), "{voxel}");
     }
 }
@@ -142,7 +142,7 @@ fn nerve_is_sparse() {
     let dims = nerve.dims();
     let mut brightest = [0.0_f32; 8];
     for index in 0..dims.element_product() {
-        let p = nerve.world_position(nerve.voxel_at(index));
+        let p = nerve.grid().world_position(nerve.grid().voxel_at(index));
         if p.truncate().length() > 150.0 {
             let octant = usize::from(p.x > 0.0) + 2 * usize::from(p.y > 0.0) + 4 * usize::from(p.z > 0.0);
             brightest[octant] = brightest[octant].max(nerve.values()[index as usize]);

@@ -1,7 +1,8 @@
 //! Bind group layouts and bind groups in few words.
 
 use wgpu::{
-    BindGroup, BindGroupLayout, BindGroupLayoutEntry, BindingResource, BindingType, BufferBindingType, Device, ShaderStages, TextureSampleType, TextureViewDimension,
+    BindGroup, BindGroupLayout, BindGroupLayoutEntry, BindingResource, BindingType, BufferBindingType, Device,
+    ShaderStages, TextureSampleType, TextureViewDimension,
 };
 
 /// What a shader declares at one binding.

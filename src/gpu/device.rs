@@ -79,7 +79,11 @@ pub fn check(device: &Device) -> Result<(), DeviceError> {
         ("max_texture_array_layers", 128, limits.max_texture_array_layers.into()),
         ("max_storage_buffers_per_shader_stage", 4, limits.max_storage_buffers_per_shader_stage.into()),
         ("max_uniform_buffers_per_shader_stage", 2, limits.max_uniform_buffers_per_shader_stage.into()),
-        ("max_dynamic_uniform_buffers_per_pipeline_layout", 1, limits.max_dynamic_uniform_buffers_per_pipeline_layout.into()),
+        (
+            "max_dynamic_uniform_buffers_per_pipeline_layout",
+            1,
+            limits.max_dynamic_uniform_buffers_per_pipeline_layout.into(),
+        ),
         ("max_compute_invocations_per_workgroup", 256, limits.max_compute_invocations_per_workgroup.into()),
         ("max_compute_workgroup_size_x", 256, limits.max_compute_workgroup_size_x.into()),
         ("max_compute_workgroups_per_dimension", 1024, limits.max_compute_workgroups_per_dimension.into()),

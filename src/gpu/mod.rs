@@ -7,4 +7,5 @@ pub mod layout;
 pub mod readback;
 pub mod shaders;
 pub mod targets;
+pub mod uniforms;
 pub mod voxel_list;

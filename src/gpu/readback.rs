@@ -10,7 +10,8 @@ use crate::error::RenderError;
 /// If the device is lost.
 pub fn buffer(device: &Device, queue: &Queue, source: &Buffer) -> Result<Vec<u8>, RenderError> {
     let staging = staging(device, source.size());
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.readback") });
+    let mut encoder =
+        device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.readback") });
     encoder.copy_buffer_to_buffer(source, 0, &staging, 0, source.size());
     queue.submit([encoder.finish()]);
     let mut bytes = Vec::with_capacity(source.size() as usize);
@@ -27,7 +28,8 @@ pub fn texture(device: &Device, queue: &Queue, source: &Texture) -> Result<Vec<u
     let texel = source.format().block_copy_size(None).unwrap_or(0);
     let row = source.width() * texel;
     let padded_row = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-    let rows_per_copy = (device.limits().max_buffer_size / u64::from(padded_row)).clamp(1, source.height().into()) as u32;
+    let rows_per_copy =
+        (device.limits().max_buffer_size / u64::from(padded_row)).clamp(1, source.height().into()) as u32;
     let staging = staging(device, u64::from(padded_row) * u64::from(rows_per_copy));
     let mut bytes = Vec::with_capacity(row as usize * source.height() as usize);
     for first_row in (0..source.height()).step_by(rows_per_copy as usize) {
@@ -43,7 +45,11 @@ pub fn texture(device: &Device, queue: &Queue, source: &Texture) -> Result<Vec<u
             },
             wgpu::TexelCopyBufferInfo {
                 buffer: &staging,
-                layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded_row), rows_per_image: None },
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(padded_row),
+                    rows_per_image: None,
+                },
             },
             wgpu::Extent3d { width: source.width(), height: rows, depth_or_array_layers: 1 },
         );

@@ -1,7 +1,8 @@
 //! Lays the compositing buffer over the background, into the target.
 
 use wgpu::{
-    BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, RenderPipeline, ShaderStages, TextureFormat, TextureView,
+    BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, RenderPipeline, ShaderStages, TextureFormat,
+    TextureView,
 };
 
 use crate::gpu::bindings::{bind, layout, storage, uniform};
@@ -70,7 +71,10 @@ impl Resolve {
                 view: target,
                 depth_slice: None,
                 resolve_target: None,
-                ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store },
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                    store: wgpu::StoreOp::Store,
+                },
             })],
             ..wgpu::RenderPassDescriptor::default()
         });

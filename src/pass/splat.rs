@@ -85,11 +85,7 @@ impl Splat {
                 cache: None,
             })
         };
-        Self {
-            layout,
-            sections: pipeline(FootprintForm::Sections),
-            summed_area: pipeline(FootprintForm::SummedArea),
-        }
+        Self { layout, sections: pipeline(FootprintForm::Sections), summed_area: pipeline(FootprintForm::SummedArea) }
     }
 
     /// Binds one list's splats. `slabs` holds a [`Slab`] at every dynamic offset that will be drawn.
@@ -101,11 +97,8 @@ impl Splat {
         splats: &Buffer,
         footprints: &FootprintTexture,
     ) -> BindGroup {
-        let slab = wgpu::BufferBinding {
-            buffer: slabs,
-            offset: 0,
-            size: wgpu::BufferSize::new(size_of::<Slab>() as u64),
-        };
+        let slab =
+            wgpu::BufferBinding { buffer: slabs, offset: 0, size: wgpu::BufferSize::new(size_of::<Slab>() as u64) };
         let resources = [
             frame.as_entire_binding(),
             wgpu::BindingResource::Buffer(slab),
@@ -130,7 +123,10 @@ impl Splat {
                 view: sheet,
                 depth_slice: None,
                 resolve_target: None,
-                ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store },
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                    store: wgpu::StoreOp::Store,
+                },
             })],
             ..wgpu::RenderPassDescriptor::default()
         });

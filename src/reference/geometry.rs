@@ -75,7 +75,10 @@ impl Geometry {
     /// Pixel coordinates of a voxel.
     pub fn pixel(&self, voxel: UVec3) -> DVec2 {
         let p = self.grid.world_position(voxel) / self.grid.unit() - self.center;
-        DVec2::new(self.size.x / 2.0 + self.basis.u.dot(p) / self.pix, self.size.y / 2.0 - self.basis.v.dot(p) / self.pix)
+        DVec2::new(
+            self.size.x / 2.0 + self.basis.u.dot(p) / self.pix,
+            self.size.y / 2.0 - self.basis.v.dot(p) / self.pix,
+        )
     }
 
     /// Warped depth of a voxel.

@@ -305,7 +305,8 @@ impl Layout {
             return Err(self.mismatch(&file.path, held));
         }
         file.reader.seek_relative(skip as i64).map_err(io_error(&file.path))?;
-        self.read_samples(&file.path, &mut file.reader)
+        // The file holds them all, so memory for them may be asked for at once.
+        self.read_samples(&file.path, &mut file.reader, self.count as usize)
     }
 
     fn read_gzip(&self, mut file: Source) -> Result<Vec<f32>, VolumeError> {
@@ -316,7 +317,8 @@ impl Layout {
         }
         let mut stream = MultiGzDecoder::new(file.reader);
         io::copy(&mut stream.by_ref().take(skip), &mut io::sink()).map_err(gzip_error(&file.path))?;
-        let values = self.read_samples(&file.path, &mut stream)?;
+        // What the stream holds is not known yet: memory grows with what comes out of it.
+        let values = self.read_samples(&file.path, &mut stream, 0)?;
         // Reading on to the end is also what checks the last checksum.
         match io::copy(&mut stream.take(1), &mut io::sink()).map_err(gzip_error(&file.path))? {
             0 => Ok(values),
@@ -324,10 +326,10 @@ impl Layout {
         }
     }
 
-    fn read_samples(&self, path: &Path, stream: &mut impl Read) -> Result<Vec<f32>, VolumeError> {
+    fn read_samples(&self, path: &Path, stream: &mut impl Read, expected: usize) -> Result<Vec<f32>, VolumeError> {
+        let too_many = |error| invalid(path, "data", format!("{} samples: {error}", self.count), "fewer");
         let (mut values, mut chunk) = (Vec::new(), Vec::with_capacity(CHUNK as usize));
-        let reserved = values.try_reserve_exact(self.count as usize);
-        reserved.map_err(|error| invalid(path, "data", format!("{} samples: {error}", self.count), "fewer"))?;
+        values.try_reserve_exact(expected).map_err(too_many)?;
         let mut left = self.bytes();
         while left > 0 {
             chunk.clear();
@@ -336,9 +338,11 @@ impl Layout {
             if read < wanted {
                 return Err(self.mismatch(path, self.bytes() - left + read));
             }
+            values.try_reserve(chunk.len() / self.sample.bytes as usize).map_err(too_many)?;
             (self.sample.convert)(self.big_endian, &chunk, &mut values);
             left -= read;
         }
+        values.shrink_to_fit();
         Ok(values)
     }
 

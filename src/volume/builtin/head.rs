@@ -2,8 +2,9 @@
 
 use glam::{DVec3, dvec2, dvec3};
 
+use super::Grid;
 use super::sdf::Part::{Add, AddTube, Cut, CutTube};
-use super::sdf::{Grid, Layer, Part, ellipsoid, intersection, sculpt, smoothstep, tube, union, wave};
+use super::sdf::{Layer, Part, ellipsoid, intersection, sculpt, smoothstep, tube, union, wave};
 
 /// World units per millimetre: the head from the crown to below the chin fills the volume's height.
 const SCALE: f64 = 0.635;
@@ -42,6 +43,7 @@ fn mirrored(p: DVec3) -> DVec3 {
     dvec3((p.x * p.x + 1.0).sqrt() - 0.5, p.y, p.z)
 }
 
+/// The skin over the vault of the skull.
 fn vault(p: DVec3) -> f64 {
     sculpt(p, f64::INFINITY, &VAULT)
 }
@@ -72,7 +74,7 @@ const FACE: [Part; 21] = [
     AddTube([60.0, 26.0, -30.0], [24.0, -20.0, -140.0], (10.0, 10.0), 18.0),
     Add([0.0, -23.0, -116.0], [8.0, 8.0, 10.0], 14.0),
     // Temple hollow.
-    Cut([112.0, -58.0, 30.0], [48.0, 46.0, 44.0], 26.0),
+    Cut([113.0, -56.0, 32.0], [48.0, 46.0, 46.0], 30.0),
     // Middle of the face, jaw, chin.
     Add([0.0, -40.0, -22.0], [54.0, 50.0, 60.0], 24.0),
     AddTube([49.0, -4.0, -20.0], [42.0, -12.0, -58.0], (17.0, 13.0), 24.0),
@@ -86,7 +88,7 @@ const FACE: [Part; 21] = [
     Add([34.0, -64.0, -46.0], [22.0, 24.0, 26.0], 20.0),
     // Brow ridge.
     AddTube([8.0, -86.0, 21.0], [32.0, -81.0, 26.0], (8.5, 8.0), 16.0),
-    AddTube([32.0, -81.0, 26.0], [50.0, -64.0, 20.0], (8.0, 6.5), 18.0),
+    AddTube([32.0, -81.0, 26.0], [47.0, -66.0, 19.0], (8.0, 6.0), 24.0),
     // Eye socket.
     Cut([32.0, -97.0, 7.0], [17.0, 14.0, 10.5], 14.0),
     Cut([16.5, -97.0, 7.0], [6.0, 10.0, 10.0], 10.0),
@@ -109,7 +111,7 @@ fn eyelids(p: DVec3, d: f64) -> f64 {
 }
 
 const NOSE_AND_MOUTH: [Part; 18] = [
-    // Sides, bridge, back, tip, wings, column.
+    // Sides, bridge, back, tip, wing, column of the nose.
     AddTube([0.0, -80.0, 10.0], [0.0, -92.0, -30.0], (11.0, 16.0), 14.0),
     AddTube([0.0, -87.0, 18.0], [0.0, -97.0, 2.0], (7.0, 6.0), 14.0),
     AddTube([0.0, -96.0, 4.0], [0.0, -111.0, -26.0], (6.0, 8.5), 10.0),
@@ -145,7 +147,7 @@ fn ear(p: DVec3) -> f64 {
     }
     let flap = ellipsoid(q, dvec3(0.0, 0.0, 3.0), dvec3(3.5, 17.5, 28.0));
     // The outline is an ellipse that narrows towards the lobe.
-    let outline = dvec3(0.0, q.y / (1.0 + 0.010 * (q.z - 5.0)), (q.z - 3.0) * 0.62);
+    let outline = dvec2(q.y / (1.0 + 0.01 * (q.z - 5.0)), (q.z - 3.0) * 0.62);
     let rim = dvec2(outline.length() - 16.5, q.x - 1.5).length() - 3.0;
     let d = union(flap, rim, 4.0);
     sculpt(

@@ -10,8 +10,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use glam::{DVec3, UVec3};
 use rayon::prelude::*;
 
-use super::{Volume, VolumeError};
-use sdf::Grid;
+use super::{Grid, Volume, VolumeError};
 
 /// The volumes that [`volume`] knows.
 pub const NAMES: &[&str] = &["cube", "head", "nerve", "tomato", "marschner-lobb"];
@@ -66,7 +65,7 @@ fn cube(grid: &Grid) -> Vec<f32> {
 fn marschner_lobb(grid: &Grid) -> Vec<f32> {
     const FREQUENCY: f64 = 6.0;
     const ALPHA: f64 = 0.25;
-    let half = (grid.dims.as_dvec3() - 1.0) / 2.0 * grid.spacing;
+    let half = grid.center() * grid.spacing;
     sample(grid, |p| {
         let p = p / half;
         let ripple = libm::cos(TAU * FREQUENCY * libm::cos(FRAC_PI_2 * (p.x * p.x + p.y * p.y).sqrt()));
@@ -81,7 +80,7 @@ fn sample(grid: &Grid, value: impl Fn(DVec3) -> f64 + Sync) -> Vec<f32> {
     values.par_chunks_mut(nx as usize).enumerate().for_each(|(row, values)| {
         let (y, z) = (row as u32 % ny, row as u32 / ny);
         for (x, out) in (0..nx).zip(values) {
-            *out = value(grid.position(UVec3::new(x, y, z).as_dvec3())) as f32;
+            *out = value(grid.world_position(UVec3::new(x, y, z))) as f32;
         }
     });
     values

@@ -1,9 +1,10 @@
 //! A ganglion nerve cell as a confocal microscope sees it: a cell body, dendrites that branch, and nothing around.
 
-use glam::{DVec3, dvec3};
+use glam::{DVec3, UVec3, dvec3};
 use rayon::prelude::*;
 
-use super::sdf::{Grid, ellipsoid, smoothstep, wave};
+use super::Grid;
+use super::sdf::{ellipsoid, smoothstep, wave};
 
 /// World units that a tube appears thicker along z: that is how much farther the microscope blurs there.
 const BLUR: f64 = 2.2;
@@ -36,7 +37,7 @@ pub(super) fn values(grid: &Grid) -> Vec<f32> {
     let mut values = vec![0.0_f32; slice * grid.dims.z as usize];
     values.par_chunks_mut(slice).enumerate().for_each(|(z, values)| {
         let mut put = |low: DVec3, high: DVec3, value: &dyn Fn(DVec3) -> f64| {
-            let voxel = |p: DVec3| p / grid.spacing + (grid.dims.as_dvec3() - 1.0) / 2.0;
+            let voxel = |p: DVec3| p / grid.spacing + grid.center();
             let (low, high) = (voxel(low), voxel(high));
             if (z as f64) < low.z || z as f64 > high.z {
                 return;
@@ -44,7 +45,7 @@ pub(super) fn values(grid: &Grid) -> Vec<f32> {
             // Negative bounds become 0 in the conversion.
             for y in low.y.ceil() as u32..((high.y + 1.0).floor() as u32).min(grid.dims.y) {
                 for x in low.x.ceil() as u32..((high.x + 1.0).floor() as u32).min(grid.dims.x) {
-                    let p = grid.position(dvec3(f64::from(x), f64::from(y), z as f64));
+                    let p = grid.world_position(UVec3::new(x, y, z as u32));
                     let out = &mut values[x as usize + grid.dims.x as usize * y as usize];
                     *out = out.max(value(p).round() as f32);
                 }
@@ -158,8 +159,8 @@ fn grow() -> Vec<Segment> {
         })
         .collect();
     while let Some(mut tip) = tips.pop() {
-        let steps = tip.path + random.between(60.0, 180.0) + 18.0 * tip.radius;
-        while tip.path < steps && (tip.at.abs() + tip.radius).cmplt(BOX).all() {
+        let end = tip.path + random.between(60.0, 180.0) + 18.0 * tip.radius;
+        while tip.path < end && (tip.at.abs() + tip.radius).cmplt(BOX).all() {
             let before = (tip.at, tip.radius, tip.value());
             tip.advance(random);
             segments.push(Segment {

@@ -3,6 +3,8 @@
 use glam::{DVec3, UVec3};
 use rayon::prelude::*;
 
+use super::Grid;
+
 /// Edge of the blocks that are decided at once, in voxels.
 const BLOCK: u32 = 8;
 
@@ -93,17 +95,10 @@ impl<'a> Layer<'a> {
     }
 }
 
-/// Where the voxels of a volume lie.
-#[derive(Clone, Copy)]
-pub(super) struct Grid {
-    pub(super) dims: UVec3,
-    pub(super) spacing: DVec3,
-}
-
 impl Grid {
     /// World position of a (fractional) voxel.
     pub(super) fn position(&self, voxel: DVec3) -> DVec3 {
-        (voxel - (self.dims.as_dvec3() - 1.0) / 2.0) * self.spacing
+        (voxel - self.center()) * self.spacing
     }
 
     /// Values of layers painted over each other onto 0, in order, with edges as soft as a scanner's. A voxel longer
@@ -202,9 +197,5 @@ impl Grid {
     /// Samples along z that a voxel's value is made of, per slice.
     fn samples(&self) -> i32 {
         (self.spacing.z / self.unit()).round().max(1.0) as i32
-    }
-
-    fn unit(&self) -> f64 {
-        self.spacing.min_element()
     }
 }

@@ -5,7 +5,8 @@ use std::sync::LazyLock;
 
 use glam::{DVec2, DVec3, dvec2, dvec3};
 
-use super::sdf::{Grid, Layer, ellipsoid, intersection, smoothstep, tube, union, wave};
+use super::Grid;
+use super::sdf::{Layer, ellipsoid, intersection, smoothstep, tube, union, wave};
 
 /// Chambers around the core.
 const COUNT: usize = 5;
@@ -89,7 +90,7 @@ fn placenta(p: DVec3) -> f64 {
     intersection(lobes - 1.5 * bumps, chambers(p), 4.0)
 }
 
-/// The column in the middle, from the stem down, with a strand into every septum.
+/// The column in the middle, widest under the stem.
 fn core(p: DVec3) -> f64 {
     union(
         tube(p, dvec3(0.0, 0.0, 46.0), dvec3(0.0, 0.0, -44.0), (19.0, 15.0)),

@@ -1,0 +1,96 @@
+//! A frame's plain data in the GPU's layout.
+
+use glam::{DMat2, DVec3, DVec4};
+
+use super::layout::{Frame, Slab};
+use crate::kernel::Kernel;
+use crate::plan::{SlabPlan, View};
+use crate::scene::Scene;
+use crate::shading::{Light, Shading};
+use crate::splatting::{Compositing, Order};
+use crate::transfer_function::TransferFunction;
+use crate::volume::Grid;
+
+/// What is constant over a frame.
+pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &Scene) -> Frame {
+    let to_eye = -view.basis.w;
+    let to_light = match scene.shading.light {
+        Light::Headlight => to_eye,
+        Light::Direction(direction) => direction.normalize(),
+    };
+    let Shading { enabled, ambient, diffuse, specular, shininess, .. } = scene.shading;
+    let [r, g, b, a] = scene.image.background;
+    let matrix = |m: &DMat2| m.to_cols_array().map(|x| x as f32);
+    let [color_end, opacity_end, gradient_opacity_end] = ramps.ends;
+    Frame {
+        screen_from_voxel: view.screen_from_voxel.map(|row| row.as_vec4().to_array()),
+        pixels_from_footprint: matrix(&view.footprint.pixels_from_footprint),
+        footprint_from_pixels: matrix(&view.footprint.footprint_from_pixels),
+        light: to_light.extend(f64::from(u8::from(enabled))).as_vec4().to_array(),
+        half_vector: half_vector(to_light, to_eye).extend(0.0).as_vec4().to_array(),
+        shading: DVec4::new(ambient, diffuse, specular, shininess).as_vec4().to_array(),
+        background: DVec4::new(r * a, g * a, b * a, a).as_vec4().to_array(),
+        dims: grid.dims.extend(0).to_array(),
+        ramps: [color_end, opacity_end, gradient_opacity_end, 0],
+        size: view.size,
+        amplitude: (view.footprint.amplitude / view.lambda) as f32,
+        radius: kernel.radius() as f32,
+        support: kernel.support() as f32,
+        falloff: kernel.falloff() as f32,
+        slab_width: view.slabs.width as f32,
+        compositing: match scene.splatting.compositing {
+            Compositing::Linear => 0,
+            Compositing::Exponential => 1,
+            Compositing::Xray => 2,
+        },
+        order: match scene.splatting.order {
+            Order::FrontToBack => 0,
+            Order::BackToFront => 1,
+        },
+        padding_0: 0,
+        padding_1: 0,
+        padding_2: 0,
+    }
+}
+
+/// One [`Slab`] every `stride` bytes.
+pub fn slabs(slabs: &[SlabPlan], stride: usize) -> Vec<u8> {
+    let mut bytes = vec![0; stride * slabs.len().max(1)];
+    for (slot, slab) in bytes.chunks_exact_mut(stride).zip(slabs) {
+        slot[..size_of::<Slab>()].copy_from_slice(bytemuck::bytes_of(&Slab { near: slab.near as f32 }));
+    }
+    bytes
+}
+
+/// `hv = normalize(l + c)`, 0 where they cancel (SPEC §3).
+fn half_vector(to_light: DVec3, to_eye: DVec3) -> DVec3 {
+    let sum = to_light + to_eye;
+    // Opposite unit vectors add up to rounding noise, not to 0.
+    if sum.length() < 1e-12 { DVec3::ZERO } else { sum.normalize() }
+}
+
+/// A transfer function's control points for `shade.wgsl`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ramps {
+    /// Value, then rgb or (ordinate, 0, 0); colour, opacity, gradient opacity, one after the other.
+    pub points: Vec<[f32; 4]>,
+    /// Where each ramp ends.
+    pub ends: [u32; 3],
+}
+
+impl Ramps {
+    /// All ramps of a transfer function; without a gradient opacity that one is 1 everywhere.
+    pub fn new(transfer: &TransferFunction) -> Self {
+        let scalar = |&(at, y): &(f64, f64)| DVec4::new(at, y, 0.0, 0.0);
+        let always = [(0.0, 1.0)];
+        let gradient_opacity = transfer.gradient_opacity.as_ref().map_or(&always[..], |ramp| ramp.points());
+        let mut points: Vec<DVec4> =
+            transfer.color.points().iter().map(|&(at, rgb)| DVec4::new(at, rgb.x, rgb.y, rgb.z)).collect();
+        let color_end = points.len() as u32;
+        points.extend(transfer.opacity.points().iter().map(scalar));
+        let opacity_end = points.len() as u32;
+        points.extend(gradient_opacity.iter().map(scalar));
+        let ends = [color_end, opacity_end, points.len() as u32];
+        Self { points: points.iter().map(|point| point.as_vec4().to_array()).collect(), ends }
+    }
+}
