@@ -14,10 +14,12 @@ pub struct SlabGrid {
 }
 
 impl SlabGrid {
-    /// The slabs that a kernel at warped depth `z` overlaps with positive length.
+    /// The slabs that a kernel at warped depth `z` overlaps with positive length: with more than rounding errors, so that
+    /// a kernel that ends at a plane does not reach the slab behind it.
     pub fn touched(&self, z: f64) -> Range<i32> {
-        let first = ((z - self.radius) / self.width).floor();
-        let end = ((z + self.radius) / self.width).ceil();
+        const ROUNDING: f64 = 1e-9;
+        let first = ((z - self.radius) / self.width + ROUNDING).floor();
+        let end = ((z + self.radius) / self.width - ROUNDING).ceil();
         first as i32..end as i32
     }
 }
@@ -33,5 +35,8 @@ mod tests {
         assert_eq!(grid.touched(0.25), -2..3);
         assert_eq!(grid.touched(-7.0), -9..-5);
         assert_eq!(SlabGrid { width: 8.0, radius: 2.0 }.touched(4.0), 0..1);
+        // Not quite 3 in f64.
+        assert_eq!(grid.touched(3.0 * 0.8 + 0.6), 1..5);
+        assert_eq!(grid.touched(0.1 + 0.2 + 2.7), 1..5);
     }
 }
