@@ -26,7 +26,8 @@ fn ramp(first: u32, end: u32, value: f32) -> vec3f {
     }
     let a = control_points[max(upper, first + 1u) - 1u];
     let b = control_points[min(upper, end - 1u)];
-    let t = select(0.0, (value - a.x) / (b.x - a.x), a.x < b.x);
+    // Halves, as points may be more than the largest f32 apart.
+    let t = select(0.0, (0.5 * value - 0.5 * a.x) / (0.5 * b.x - 0.5 * a.x), a.x < b.x);
     return mix(a.yzw, b.yzw, t);
 }
 
@@ -60,7 +61,7 @@ fn shade(color: vec3f, voxel: Voxel) -> vec3f {
     }
     let n = decode_normal(voxel.normal);
     let diffuse = frame.shading.y * abs(dot(n, frame.light.xyz));
-    let highlight = frame.shading.z * pow(abs(dot(n, frame.half_vector.xyz)), frame.shading.w);
+    let highlight = frame.shading.z * pow(min(abs(dot(n, frame.half_vector.xyz)), 1.0), frame.shading.w);
     return clamp(color * (ambient + diffuse) + highlight, vec3f(0.0), vec3f(1.0));
 }
 
@@ -82,7 +83,7 @@ fn main(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) group
     let color = ramp(0u, frame.ramps.x, voxel.value);
     let opacity = ramp(frame.ramps.x, frame.ramps.y, voxel.value).x;
     let gradient_opacity = ramp(frame.ramps.y, frame.ramps.z, voxel.gradient_magnitude).x;
-    let m = amount(opacity * gradient_opacity) * frame.amplitude;
+    let m = amount(opacity * gradient_opacity);
     let c = shade(color, voxel) * m;
     splats[slot] = Splat(
         dot(frame.screen_from_voxel[0], p),

@@ -12,6 +12,9 @@ struct Slab {
 // True for the 128 pre-integrated sections (§3.2), false for the summed-area form (§3.3.1, eq. 3).
 override SECTIONS: bool = false;
 
+// Beyond this many pixels from the image's corner a footprint's own corners are not drawn at.
+const FAR_PX = 65536.0;
+
 struct Section {
     @builtin(position) position: vec4f,
     @location(0) @interpolate(flat) center_px: vec2f,
@@ -20,6 +23,10 @@ struct Section {
     // Sections: the layer and its trimmed extent.
     @location(2) @interpolate(flat) section: vec2f,
 }
+
+// What a quad reaches beyond its section, grid units. A grid unit is at least a pixel, and the rasteriser snaps corners to
+// 1/256 of one: without a margin it would lose pixels just inside the rim, where a wide kernel is not yet 0.
+const MARGIN = 1.0 / 64.0;
 
 // Depth interval of a stored section, folded to non-negative middles.
 fn section_spacing() -> f32 {
@@ -52,34 +59,57 @@ fn vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) instance:
 
     let center_px = vec2f(splat.x_px, splat.y_px);
     let side = vec2f(select(-1.0, 1.0, (corner & 1u) != 0u), select(-1.0, 1.0, (corner & 2u) != 0u));
-    let p = (center_px + frame.pixels_from_footprint * (side * extent)) / vec2f(frame.size);
+    let reach = extent + MARGIN;
+    let size = vec2f(frame.size);
+    var corner_px = center_px + frame.pixels_from_footprint * (side * reach);
+    // Corners far off the screen cost the rasteriser its precision: such a footprint's box is cut off near the screen.
+    let half_box = (abs(frame.pixels_from_footprint[0]) + abs(frame.pixels_from_footprint[1])) * reach;
+    let farthest = abs(center_px) + half_box;
+    if max(farthest.x, farthest.y) > FAR_PX {
+        corner_px = clamp(center_px + side * half_box, vec2f(-1.0), size + 1.0);
+    }
+    let p = corner_px / size;
     // A kernel that does not reach this slab becomes a quad without area, off the screen.
     let position = select(vec4f(2.0, 2.0, 0.0, 1.0), vec4f(2.0 * p.x - 1.0, 1.0 - 2.0 * p.y, 0.0, 1.0), extent > 0.0);
-    return Section(position, center_px, vec4f(unpack2x16float(splat.rg), unpack2x16float(splat.ba)), section);
+    // The amplitude only here: under a strong minification it leaves the range of f16.
+    let amount = vec4f(unpack2x16float(splat.rg), unpack2x16float(splat.ba)) * frame.amplitude;
+    return Section(position, center_px, amount, section);
 }
 
-// H(a, b, z) of eq. 3 for z ≥ 0 and the Gaussian without its truncation, from the nearest entry of the table. In the
-// plane H falls off with exp(-falloff·(a² + b²)), along z its derivative is h: the steps to (a, b, z) follow from both,
-// so a coarse table is accurate.
-fn cumulative(footprint: vec2f, z: f32) -> f32 {
-    let last = vec3f(vec3u(textureDimensions(footprints), textureNumLayers(footprints)) - 1u);
-    let texel = min(round(vec3f(abs(footprint), z) / frame.support * last), last);
-    let at = texel / last * frame.support;
-    let entry = textureLoad(footprints, vec2u(texel.xy), u32(texel.z), 0).xy;
-
-    let dz = z - at.z;
-    let along_z = entry.x + entry.y * dz * (1.0 - frame.falloff * at.z * dz);
-    let u = frame.falloff * (dot(at.xy, at.xy) - dot(footprint, footprint));
-    return along_z * (1.0 + u * (1.0 + u * (0.5 + u / 6.0)));
+// What of eq. 3's H(a, b, z) is left beyond a z ≥ 0, over the texel's place in the plane: from the nearest layer, along
+// which the derivative is h and falls off with exp(-falloff·z²). The series of its integral makes a coarse table accurate.
+fn beyond(texel: vec2u, z: f32) -> f32 {
+    let last = f32(textureNumLayers(footprints) - 1u);
+    let layer = min(round(z / frame.support * last), last);
+    let at = layer / last * frame.support;
+    let entry = textureLoad(footprints, texel, u32(layer), 0).xy;
+    let d = z - at;
+    let f = frame.falloff;
+    let a = f * at;
+    return entry.x - entry.y * d * (1.0 - d * (a - d * ((2.0 * a * a - f) / 3.0 + d * a * (0.5 * f - a * a / 3.0))));
 }
 
-// eq. 3's two entries, subtracted.
+// eq. 3's two entries, subtracted; each counted from the rim on its side of the centre.
 fn section_summed_area(footprint: vec2f, t0: f32, t1: f32) -> f32 {
     // The ball's truncation: t within the chord.
-    let chord = sqrt(max(frame.support * frame.support - dot(footprint, footprint), 0.0));
+    let rho_squared = dot(footprint, footprint);
+    let chord = sqrt(max(frame.support * frame.support - rho_squared, 0.0));
     let near = clamp(t0, -chord, chord);
     let far = clamp(t1, -chord, chord);
-    return sign(far) * cumulative(footprint, abs(far)) - sign(near) * cumulative(footprint, abs(near));
+
+    // The nearest entry in the plane, where H falls off with exp(-falloff·(a² + b²)): so does the step from there.
+    let last = vec2f(textureDimensions(footprints) - 1u);
+    let texel = min(round(abs(footprint) / frame.support * last), last);
+    let at = texel / last * frame.support;
+    let u = frame.falloff * (dot(at, at) - rho_squared);
+    let step = 1.0 + u * (1.0 + u * (0.5 + u / 6.0));
+
+    let place = vec2u(texel);
+    let beyond_near = beyond(place, abs(near));
+    let beyond_far = beyond(place, abs(far));
+    let half = textureLoad(footprints, place, 0, 0).x;
+    let across = near < 0.0 && far > 0.0;
+    return step * select(abs(beyond_near - beyond_far), 2.0 * half - beyond_near - beyond_far, across);
 }
 
 // A stored section, bilinear between the four nearest texels of its quadrant.

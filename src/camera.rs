@@ -2,7 +2,11 @@
 
 use glam::{DMat3, DVec3};
 
+use crate::error::RenderError;
 use crate::volume::Grid;
+
+/// The least and the largest pixel, in the volume's smallest spacings.
+const PIXELS: std::ops::RangeInclusive<f64> = 1e-25..=1e25;
 
 /// How the volume is projected.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,6 +57,23 @@ impl Camera {
         let w = self.direction.normalize();
         let u = w.cross(self.up).normalize();
         ViewBasis { u, v: u.cross(w), w }
+    }
+
+    /// Size of a pixel in `unit`s (SPEC §2) for an image `height_world` world units and `height` pixels high.
+    ///
+    /// # Errors
+    /// If coordinates in pixels of that size leave the range of `f32`.
+    pub fn pixel_size(height_world: f64, grid: &Grid, height: u32) -> Result<f64, RenderError> {
+        let image_units = f64::from(height) * grid.unit();
+        let pix = height_world / image_units;
+        if PIXELS.contains(&pix) {
+            return Ok(pix);
+        }
+        Err(RenderError::OutOfRange {
+            key: "camera.height",
+            found: format!("{height_world:e}"),
+            allowed: format!("{:.1e} to {:.1e}", PIXELS.start() * image_units, PIXELS.end() * image_units),
+        })
     }
 
     /// World units over the image's height for an orthographic camera: as given, or so that the volume's sphere

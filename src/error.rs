@@ -18,6 +18,16 @@ pub enum RenderError {
         /// What is implemented.
         allowed: &'static str,
     },
+    /// A scene value that is fine by itself asks of this volume what no renderer can do.
+    #[error("{key}: found {found}, allowed: {allowed}")]
+    OutOfRange {
+        /// The scene key.
+        key: &'static str,
+        /// What the scene says or leads to.
+        found: String,
+        /// What would do.
+        allowed: String,
+    },
     /// The frame needs more than a limit of the device allows.
     #[error("{what}: the device's {limit} is {actual}, required: {required}")]
     Limit {

@@ -12,9 +12,9 @@ pub const SECTIONS: u32 = 128;
 /// Texels along a side of a section's quadrant.
 pub const SECTION_SIZE: u32 = 64;
 /// Layers of the summed-area table, from the centre plane to the kernel's support.
-pub const SUMMED_AREA_LAYERS: u32 = 32;
+pub const SUMMED_AREA_LAYERS: u32 = 64;
 /// Texels along a side of the summed-area table's quadrant.
-pub const SUMMED_AREA_SIZE: u32 = 64;
+pub const SUMMED_AREA_SIZE: u32 = 32;
 
 /// A footprint texture array on the CPU.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,14 +63,16 @@ fn sections(kernel: &Kernel, width: f64) -> FootprintTable {
     FootprintTable { form: FootprintForm::Sections, size: SECTION_SIZE, layers: SECTIONS, texels: texels.collect() }
 }
 
-/// Layer i: `H(a, b, z)` of eq. 3 at z = i / (layers - 1) of the support, and its derivative in z, which is h.
+/// Layer i: `H(a, b, support) - H(a, b, z)` of eq. 3 at z = i / (layers - 1) of the support, and H's derivative in z, which
+/// is h. Counted from the rim, because a slab that just reaches into a kernel sees little of it: two entries counted from
+/// the centre would cancel.
 fn summed_area(kernel: &Kernel) -> FootprintTable {
     let texel = kernel.support() / f64::from(SUMMED_AREA_SIZE - 1);
     let texels = (0..SUMMED_AREA_LAYERS).flat_map(|layer| {
         let z = kernel.support() * f64::from(layer) / f64::from(SUMMED_AREA_LAYERS - 1);
         quadrant(SUMMED_AREA_SIZE, texel).flat_map(move |(a, b)| {
             let derivative = kernel.value(0.0) * (-kernel.falloff() * (a * a + b * b + z * z)).exp();
-            [kernel.cumulative(a * a + b * b, z) as f32, derivative as f32]
+            [kernel.cumulative_beyond(a * a + b * b, z) as f32, derivative as f32]
         })
     });
     FootprintTable {

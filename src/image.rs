@@ -162,6 +162,18 @@ mod codecs {
     /// # Errors
     /// What the operating system says.
     pub fn write_aside(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+        aside(path, bytes)?.persist(path)?;
+        Ok(())
+    }
+
+    /// The first half of [`write_aside`]: the temporary file, which is gone unless it is persisted.
+    ///
+    /// # Errors
+    /// What the operating system says.
+    pub fn aside(path: &Path, bytes: &[u8]) -> std::io::Result<tempfile::NamedTempFile> {
+        if path.is_dir() {
+            return Err(std::io::ErrorKind::IsADirectory.into());
+        }
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let mut builder = tempfile::Builder::new();
         // Temporary files are private by default; an image is as readable as any file the user makes.
@@ -169,11 +181,10 @@ mod codecs {
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let mut file = builder.prefix(".sheetsplat-").tempfile_in(folder)?;
         file.write_all(bytes)?;
-        file.persist(path)?;
-        Ok(())
+        Ok(file)
     }
 }
 
 #[cfg(feature = "codecs")]
 #[doc(hidden)]
-pub use codecs::write_aside;
+pub use codecs::{aside, write_aside};

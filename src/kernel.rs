@@ -45,6 +45,14 @@ impl Kernel {
         self.kappa * (-self.falloff * rho_squared).exp() * (PI.sqrt() / 2.0) * libm::erf(root * z) / root
     }
 
+    /// What of `H(x, y, z)` is missing to the kernel's support: `H(x, y, support) - H(x, y, z)`, to full relative precision
+    /// however little that is. For `0 ≤ z ≤ support`.
+    pub fn cumulative_beyond(&self, rho_squared: f64, z: f64) -> f64 {
+        let root = self.falloff.sqrt();
+        let beyond = libm::erfc(root * z) - libm::erfc(root * self.support());
+        self.kappa * (-self.falloff * rho_squared).exp() * (PI.sqrt() / 2.0) * beyond / root
+    }
+
     /// Half the length of the chord that the kernel's ball cuts from a ray at distance √`rho_squared`.
     pub fn half_chord(&self, rho_squared: f64) -> f64 {
         (self.radius * self.radius - rho_squared).max(0.0).sqrt()

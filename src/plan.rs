@@ -38,7 +38,8 @@ pub struct View {
 
 impl View {
     /// # Errors
-    /// If the projection or method is one that is not implemented yet.
+    /// If the projection or method is one that is not implemented yet, pixels are too small or too large for `f32`, or there
+    /// are more than [`MAX_SLABS`](crate::slab::MAX_SLABS).
     pub fn new(grid: &Grid, camera: &Camera, splatting: &Splatting, size: [u32; 2]) -> Result<Self, RenderError> {
         let [width, height] = size;
         let Some(height_world) = camera.orthographic_height(grid, splatting.radius, width, height) else {
@@ -49,11 +50,12 @@ impl View {
             return Err(RenderError::unsupported("splatting.method", "\"axis-aligned\"", "\"image-aligned\""));
         }
         let basis = camera.basis();
-        let unit = grid.unit();
-        let pix = height_world / (f64::from(height) * unit);
+        let pix = Camera::pixel_size(height_world, grid, height)?;
         let warped = grid_warp::m_view_warped(&basis, grid.aspect());
         let m_vol = grid_warp::m_vol(&warped);
-        let (_, lambda) = grid_warp::w_wo(&warped);
+        let (w_wo, lambda) = grid_warp::w_wo(&warped);
+        let slabs = SlabGrid { width: splatting.slab_width * lambda, radius: splatting.radius };
+        slabs.check(w_wo.abs().dot(grid.center()), splatting.slab_width)?;
 
         // In units of voxels the warped grid is the voxel index grid, so eq. 11 applies to (i, j, k) - centre directly.
         let row = |axis: usize, scale: f64, at_center: f64| {
@@ -61,7 +63,7 @@ impl View {
             row.extend(at_center - row.dot(grid.center()))
         };
         let middle = DVec2::new(f64::from(width), f64::from(height)) / 2.0;
-        let center = camera.center / unit;
+        let center = camera.center / grid.unit();
         Ok(Self {
             basis,
             size,
@@ -71,7 +73,7 @@ impl View {
                 row(2, 1.0, 0.0),
             ],
             footprint: FootprintMap::new(&warped, pix),
-            slabs: SlabGrid { width: splatting.slab_width * lambda, radius: splatting.radius },
+            slabs,
             lambda,
         })
     }

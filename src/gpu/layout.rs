@@ -27,9 +27,9 @@ pub struct Splat {
     pub y_px: f32,
     /// Depth in the warped grid.
     pub depth: f32,
-    /// `C.rg·m·amplitude/λ`, two f16.
+    /// `C.rg·m`, two f16.
     pub rg: u32,
-    /// `C.b·m·amplitude/λ` and `m·amplitude/λ`, two f16.
+    /// `C.b·m` and `m`, two f16.
     pub ba: u32,
 }
 
@@ -57,7 +57,7 @@ pub struct Frame {
     pub ramps: [u32; 4],
     /// Image width and height, pixels.
     pub size: [u32; 2],
-    /// The low-pass amplitude over λ: what amounts per unit length are multiplied by.
+    /// The low-pass amplitude over λ: what a splat's amounts are multiplied by.
     pub amplitude: f32,
     /// Kernel radius, grid units.
     pub radius: f32,

@@ -1,5 +1,7 @@
 //! A frame's plain data in the GPU's layout.
 
+use std::ops::{Add, Mul};
+
 use glam::{DMat2, DVec3, DVec4};
 
 use super::layout::{Frame, Slab};
@@ -8,8 +10,11 @@ use crate::plan::{SlabPlan, View};
 use crate::scene::Scene;
 use crate::shading::{Light, Shading};
 use crate::splatting::{Compositing, Order};
-use crate::transfer_function::TransferFunction;
+use crate::transfer_function::{Ramp, TransferFunction};
 use crate::volume::Grid;
+
+/// What ambient, diffuse, specular and shininess are clamped to: beyond it no image changes any more, and `f32` ends.
+const MAX_SHADING: f64 = 1e30;
 
 /// What is constant over a frame.
 pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &Scene) -> Frame {
@@ -28,7 +33,7 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
         footprint_from_pixels: matrix(&view.footprint.footprint_from_pixels),
         light: to_light.extend(f64::from(u8::from(enabled))).as_vec4().to_array(),
         half_vector: half_vector(to_light, to_eye).extend(0.0).as_vec4().to_array(),
-        shading: DVec4::new(ambient, diffuse, specular, shininess).as_vec4().to_array(),
+        shading: [ambient, diffuse, specular, shininess].map(|x| x.clamp(0.0, MAX_SHADING) as f32),
         background: DVec4::new(r * a, g * a, b * a, a).as_vec4().to_array(),
         dims: grid.dims.extend(0).to_array(),
         ramps: [color_end, opacity_end, gradient_opacity_end, 0],
@@ -81,16 +86,29 @@ pub struct Ramps {
 impl Ramps {
     /// All ramps of a transfer function; without a gradient opacity that one is 1 everywhere.
     pub fn new(transfer: &TransferFunction) -> Self {
-        let scalar = |&(at, y): &(f64, f64)| DVec4::new(at, y, 0.0, 0.0);
-        let always = [(0.0, 1.0)];
-        let gradient_opacity = transfer.gradient_opacity.as_ref().map_or(&always[..], |ramp| ramp.points());
+        let scalar = |(at, y): (f64, f64)| DVec4::new(at, y, 0.0, 0.0);
+        let gradient_opacity = transfer.gradient_opacity.as_ref().map_or(vec![(0.0, 1.0)], in_f32);
         let mut points: Vec<DVec4> =
-            transfer.color.points().iter().map(|&(at, rgb)| DVec4::new(at, rgb.x, rgb.y, rgb.z)).collect();
+            in_f32(&transfer.color).into_iter().map(|(at, rgb)| DVec4::new(at, rgb.x, rgb.y, rgb.z)).collect();
         let color_end = points.len() as u32;
-        points.extend(transfer.opacity.points().iter().map(scalar));
+        points.extend(in_f32(&transfer.opacity).into_iter().map(scalar));
         let opacity_end = points.len() as u32;
-        points.extend(gradient_opacity.iter().map(scalar));
+        points.extend(gradient_opacity.into_iter().map(scalar));
         let ends = [color_end, opacity_end, points.len() as u32];
         Self { points: points.iter().map(|point| point.as_vec4().to_array()).collect(), ends }
     }
+}
+
+/// A ramp's control points, cut off where `f32` ends, as values do.
+fn in_f32<T>(ramp: &Ramp<T>) -> Vec<(f64, T)>
+where
+    T: Copy + Add<Output = T> + Mul<f64, Output = T>,
+{
+    let limit = f64::from(f32::MAX);
+    let given = ramp.points();
+    let cut = |at: f64| Some((at, ramp.at(at)));
+    let before = cut(-limit).filter(|_| given.iter().any(|point| point.0 <= -limit));
+    let after = cut(limit).filter(|_| given.iter().any(|point| point.0 >= limit));
+    let between = given.iter().copied().filter(|point| point.0.abs() < limit);
+    before.into_iter().chain(between).chain(after).collect()
 }

@@ -2,11 +2,15 @@
 
 use glam::{DMat2, DVec2, DVec3, UVec3};
 
-use crate::camera::ViewBasis;
+use crate::camera::{Camera, ViewBasis};
 use crate::error::RenderError;
 use crate::scene::Scene;
+use crate::slab::SlabGrid;
 use crate::splatting::Method;
 use crate::volume::Grid;
+
+/// The largest image, pixels along a side: what the largest GPUs allow.
+const MAX_SIZE: u32 = 32768;
 
 /// An orthographic view of a grid.
 #[derive(Clone, Copy, Debug)]
@@ -35,9 +39,16 @@ pub struct Geometry {
 
 impl Geometry {
     /// # Errors
-    /// If the scene asks for something that is not implemented yet.
+    /// If the scene asks for something that is not implemented yet, or for more than can be computed.
     pub fn new(grid: &Grid, scene: &Scene) -> Result<Self, RenderError> {
         let (width, height) = (scene.image.width, scene.image.height);
+        for (key, found) in [("image.width", width), ("image.height", height)] {
+            if found > MAX_SIZE {
+                let (found, allowed) = (found.to_string(), format!("at most {MAX_SIZE}"));
+                return Err(RenderError::OutOfRange { key, found, allowed });
+            }
+        }
+        let splatting = &scene.splatting;
         let Some(height_world) = scene.camera.orthographic_height(grid, scene.splatting.radius, width, height) else {
             return Err(RenderError::unsupported("camera.projection", "\"perspective\"", "\"orthographic\""));
         };
@@ -45,9 +56,11 @@ impl Geometry {
             return Err(RenderError::unsupported("splatting.method", "\"axis-aligned\"", "\"image-aligned\""));
         }
         let basis = scene.camera.basis();
-        let pix = height_world / (f64::from(height) * grid.unit());
+        let pix = Camera::pixel_size(height_world, grid, height)?;
         let rw = basis.w / grid.aspect();
         let (ro, lambda) = (rw.normalize(), rw.length());
+        SlabGrid { width: splatting.slab_width * lambda, radius: splatting.radius }
+            .check(ro.abs().dot(grid.center()), splatting.slab_width)?;
 
         // Any orthonormal basis of the plane ⟂ ro will do: the kernel is symmetric.
         let a = ro.any_orthonormal_vector();

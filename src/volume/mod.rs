@@ -10,6 +10,9 @@ use glam::{DVec3, UVec3};
 
 pub use grid::Grid;
 
+/// The largest ratio of two spacings.
+const MAX_ASPECT: f64 = 1e4;
+
 /// Why a volume could not be loaded. Every message names the file (or builtin), the field, what was found and what is
 /// allowed.
 #[derive(Debug, thiserror::Error)]
@@ -51,7 +54,7 @@ impl Volume {
     ///
     /// # Errors
     /// If a dimension is 0, there are more than `u32::MAX` voxels, the number of values differs from the product of the
-    /// dimensions, a spacing is not positive and finite, or a value is not finite (the error names the voxel).
+    /// dimensions, a spacing is not within [1e-100, 1e100] or 10⁴ times another, or a value is not finite (the error names the voxel).
     pub fn new(origin: &str, dims: UVec3, spacing: DVec3, values: Vec<f32>) -> Result<Self, VolumeError> {
         let invalid = |field: &str, found: String, allowed: &str| VolumeError::Invalid {
             origin: origin.to_owned(),
@@ -76,14 +79,16 @@ impl Volume {
     /// The same values at another spacing (world units per voxel step).
     ///
     /// # Errors
-    /// If a spacing is not positive and finite.
+    /// If a spacing is not within [1e-100, 1e100] or is more than 10⁴ times another.
     pub fn with_spacing(mut self, origin: &str, spacing: DVec3) -> Result<Self, VolumeError> {
-        if !(spacing.is_finite() && spacing.min_element() > 0.0) {
+        let (least, largest) = (spacing.min_element(), spacing.max_element());
+        // Squares and products of such lengths stay within `f64`, and warped voxels within `f32`.
+        if !(spacing.is_finite() && least >= 1e-100 && largest <= 1e100 && largest / least <= MAX_ASPECT) {
             return Err(VolumeError::Invalid {
                 origin: origin.to_owned(),
                 field: "spacing".to_owned(),
-                found: format!("{spacing}"),
-                allowed: "three positive finite numbers".to_owned(),
+                found: format!("{:?}", spacing.to_array()),
+                allowed: format!("three numbers from 1e-100 to 1e100, none above {MAX_ASPECT} times another"),
             });
         }
         self.grid.spacing = spacing;

@@ -2,6 +2,7 @@
 
 mod render;
 
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -34,15 +35,12 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Render(arguments) => render::run(&arguments),
     };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(Failure::Input(message)) => {
-            eprintln!("sheetsplat: {message}");
-            ExitCode::from(2)
-        }
-        Err(Failure::Other(message)) => {
-            eprintln!("sheetsplat: {message}");
-            ExitCode::FAILURE
-        }
-    }
+    let (message, code) = match result {
+        Ok(()) => return ExitCode::SUCCESS,
+        Err(Failure::Input(message)) => (message, ExitCode::from(2)),
+        Err(Failure::Other(message)) => (message, ExitCode::FAILURE),
+    };
+    // `eprintln` would panic where nobody can be told.
+    let _ = writeln!(std::io::stderr(), "sheetsplat: {message}");
+    code
 }

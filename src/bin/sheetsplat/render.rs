@@ -1,12 +1,12 @@
 //! `sheetsplat render`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::ValueEnum;
 use sheetsplat::error::{Error, RenderError};
 use sheetsplat::headless::{Headless, HeadlessOptions, Rendering};
-use sheetsplat::image::{Image, ImageError, PngDepth, write_aside};
+use sheetsplat::image::{Image, ImageError, PngDepth, aside};
 use sheetsplat::reference;
 use sheetsplat::scene::{Scene, SceneError, VolumeSource};
 use sheetsplat::stats::Stats;
@@ -53,24 +53,36 @@ enum Backend {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     Image::check_format(&arguments.output)?;
+    if arguments.stats.as_ref() == Some(&arguments.output) {
+        let path = arguments.output.display();
+        return Err(Failure::Input(format!("--stats: found {path}, allowed: another file than --output")));
+    }
     let scene = open_scene(&arguments.input, &arguments.set)?;
     let Rendering { image, stats } = match arguments.backend {
         Backend::Gpu => {
             let options = HeadlessOptions { adapter: arguments.adapter.clone(), ..HeadlessOptions::default() };
-            let headless = Headless::new(&options).map_err(Error::from)?;
-            headless.render(&scene)?
+            let headless = Headless::new(&options).map_err(|error| Failure::Other(error.to_string()))?;
+            headless.render(&scene)
         }
-        Backend::Reference => render_reference(&scene)?,
-    };
+        Backend::Reference => render_reference(&scene),
+    }
+    .map_err(|error| Failure::of(error, &arguments.input))?;
     let depth = match arguments.depth {
         Depth::Eight => PngDepth::Eight,
         Depth::Sixteen => PngDepth::Sixteen,
     };
+    // Aside before the image is saved: either both files are there in the end or neither.
+    let failed = |path: &Path, error: std::io::Error| Failure::Other(format!("{}: {error}", path.display()));
+    let stats_file = match &arguments.stats {
+        Some(path) => {
+            let json = serde_json::to_string_pretty(&stats).map_err(|error| Failure::Other(error.to_string()))?;
+            Some((path, aside(path, (json + "\n").as_bytes()).map_err(|error| failed(path, error))?))
+        }
+        None => None,
+    };
     image.save(&arguments.output, depth)?;
-    if let Some(path) = &arguments.stats {
-        let json = serde_json::to_string_pretty(&stats).map_err(|error| Failure::Other(error.to_string()))?;
-        write_aside(path, (json + "\n").as_bytes())
-            .map_err(|error| Failure::Other(format!("{}: {error}", path.display())))?;
+    if let Some((path, file)) = stats_file {
+        file.persist(path).map_err(|error| failed(path, error.error))?;
     }
     Ok(())
 }
@@ -103,14 +115,14 @@ fn render_reference(scene: &Scene) -> Result<Rendering, Error> {
     Ok(Rendering { image, stats })
 }
 
-impl From<Error> for Failure {
-    fn from(error: Error) -> Self {
+impl Failure {
+    /// What is wrong with rendering `input`; scene and volume errors name their file themselves.
+    fn of(error: Error, input: &str) -> Self {
         match error {
-            Error::Scene(_)
-            | Error::Volume(_)
-            | Error::Render(RenderError::Unsupported { .. } | RenderError::Limit { .. }) => {
-                Self::Input(error.to_string())
-            }
+            Error::Scene(_) | Error::Volume(_) => Self::Input(error.to_string()),
+            Error::Render(
+                RenderError::Unsupported { .. } | RenderError::OutOfRange { .. } | RenderError::Limit { .. },
+            ) => Self::Input(format!("{input}: {error}")),
             _ => Self::Other(error.to_string()),
         }
     }
