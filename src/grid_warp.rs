@@ -66,7 +66,7 @@ pub fn m_vol(warped: &DMat3) -> DMat3 {
     m_scale(warped) * m_shear(warped) * m_view_wo(warped)
 }
 
-/// How a footprint lies on the screen: the shear and scale of eqs. 9 and 10 in pixels, with [17]'s low-pass rule.
+/// How a footprint lies on the screen: the shear and scale of eqs. 9 and 10 in pixels, with \[17\]'s low-pass rule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FootprintMap {
     /// Footprint coordinates (grid units along u^wo, v^wo) to a pixel offset (x right, y down).

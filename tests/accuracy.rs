@@ -1,0 +1,123 @@
+//! Whole frames against the f64 twin: PSNR and the largest single error, over slab widths, radii, spacings, directions and
+//! compositings. `cargo test --release --test accuracy -- --nocapture` prints what was measured as a table.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+#[expect(dead_code, reason = "not every file needs all of it")]
+mod common;
+
+use std::fmt::Write;
+
+use glam::DVec3;
+use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::image::Image;
+use sheetsplat::reference;
+use sheetsplat::splatting::{Compositing, FootprintForm};
+use sheetsplat::volume::builtin;
+use sheetsplat::wgpu::TextureFormat;
+
+use common::{camera, scene, transfer};
+
+/// What a sheet is made of and drawn into, and the PSNR that the issue asks for, dB.
+const VARIANTS: [(&str, FootprintForm, TextureFormat, f64); 3] = [
+    ("summed-area, Rgba32Float", FootprintForm::SummedArea, TextureFormat::Rgba32Float, 60.0),
+    ("sections, Rgba32Float", FootprintForm::Sections, TextureFormat::Rgba32Float, 45.0),
+    ("summed-area, Rgba16Float", FootprintForm::SummedArea, TextureFormat::Rgba16Float, 45.0),
+];
+const COMPOSITINGS: [Compositing; 2] = [Compositing::Linear, Compositing::Exponential];
+const SPACINGS: [[f64; 3]; 4] = [[1.0, 1.0, 1.0], [1.0, 1.0, 2.0], [3.2, 3.2, 1.5], [1.0, 1.0, 5.0]];
+const DIRECTIONS: [[f64; 3]; 3] = [[0.0, 1.0, 0.0], [0.3, 0.8, -0.5], [-0.7, 0.2, -0.9]];
+const RADII: [f64; 2] = [1.4, 2.0];
+const SLAB_WIDTHS: [f64; 4] = [0.5, 1.0, 2.0, 3.0];
+
+/// The worst of some images.
+#[derive(Clone, Copy, Debug)]
+struct Worst {
+    psnr: f64,
+    error: f64,
+}
+
+impl Worst {
+    const NONE: Self = Self { psnr: f64::INFINITY, error: 0.0 };
+
+    fn and(self, other: Self) -> Self {
+        Self { psnr: self.psnr.min(other.psnr), error: self.error.max(other.error) }
+    }
+
+    /// PSNR of premultiplied RGBA, peak 1, over the pixels where either image differs from the background.
+    fn of(actual: &Image, expected: &Image, background: [f32; 4]) -> Self {
+        assert_eq!(actual.pixels.len(), expected.pixels.len());
+        let shown: Vec<[f64; 4]> = (actual.pixels.iter().zip(&expected.pixels))
+            .filter(|(actual, expected)| **actual != background || **expected != background)
+            .map(|(actual, expected)| std::array::from_fn(|i| f64::from(actual[i]) - f64::from(expected[i])))
+            .collect();
+        assert!(shown.len() > 500, "the volume covers {} pixels", shown.len());
+        let errors = shown.as_flattened();
+        let mean_square = errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64;
+        Self {
+            psnr: -10.0 * mean_square.log10(),
+            error: errors.iter().fold(0.0, |worst: f64, error| worst.max(error.abs())),
+        }
+    }
+}
+
+#[test]
+fn psnr_against_the_twin() {
+    let devices = VARIANTS.map(|(_, _, format, _)| {
+        Headless::new(&HeadlessOptions { sheet_format: Some(format), ..HeadlessOptions::default() }).unwrap()
+    });
+    let head = builtin::volume("head:24").unwrap();
+    // A translucent skin and a denser skull, shaded: gradients of many lengths and sums of many sheets.
+    let mut scene = scene(96, 80);
+    scene.transfer = transfer(
+        &[(40.0, [0.9, 0.6, 0.4]), (120.0, [0.8, 0.3, 0.2]), (220.0, [1.0, 1.0, 0.9])],
+        &[(30.0, 0.0), (80.0, 0.15), (130.0, 0.1), (200.0, 0.9)],
+    );
+    let mut worst = [[[Worst::NONE; SPACINGS.len()]; COMPOSITINGS.len()]; VARIANTS.len()];
+    let mut failures = String::new();
+    for (s, spacing) in SPACINGS.into_iter().enumerate() {
+        let volume = head.clone().with_spacing("head", DVec3::from(spacing)).unwrap();
+        let transfer = scene.transfer.resolve(&volume);
+        for (c, compositing) in COMPOSITINGS.into_iter().enumerate() {
+            for (direction, radius, slab_width) in DIRECTIONS.into_iter().flat_map(|direction| {
+                RADII.into_iter().flat_map(move |radius| SLAB_WIDTHS.map(|width| (direction, radius, width)))
+            }) {
+                let half_diagonal = (volume.grid().center() * volume.spacing()).length();
+                scene.camera = camera(direction, 1.7 * half_diagonal);
+                (scene.splatting.radius, scene.splatting.slab_width) = (radius, slab_width);
+                scene.splatting.compositing = compositing;
+                scene.splatting.footprint = FootprintForm::SummedArea;
+                let expected = reference::render(&volume, &transfer, &scene).unwrap();
+                let background = scene.image.background.map(|channel| channel as f32);
+                for (v, (name, footprint, _, required)) in VARIANTS.into_iter().enumerate() {
+                    scene.splatting.footprint = footprint;
+                    let actual = devices[v].render_volume(&volume, &scene).unwrap().image;
+                    let this = Worst::of(&actual, &expected, background);
+                    worst[v][c][s] = worst[v][c][s].and(this);
+                    if this.psnr < required {
+                        let _ = writeln!(
+                            failures,
+                            "{name} {compositing:?} {spacing:?} {direction:?} {radius} {slab_width}: {this:?}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+    println!("{}", table(&worst));
+    assert!(failures.is_empty(), "below the required PSNR:\n{failures}");
+}
+
+/// Lowest PSNR and largest error of any channel, by variant, compositing and spacing.
+fn table(worst: &[[[Worst; SPACINGS.len()]; COMPOSITINGS.len()]; VARIANTS.len()]) -> String {
+    let mut table = "| footprint, sheet | compositing |".to_owned();
+    SPACINGS.iter().for_each(|[x, y, z]| table += &format!(" {x}:{y}:{z} |"));
+    table += "\n|---|---|---|---|---|---|\n";
+    for (v, (name, _, _, _)) in VARIANTS.into_iter().enumerate() {
+        for (c, compositing) in COMPOSITINGS.into_iter().enumerate() {
+            table += &format!("| {name} | {} |", format!("{compositing:?}").to_lowercase());
+            worst[v][c].iter().for_each(|worst| table += &format!(" {:.1} dB, {:.1e} |", worst.psnr, worst.error));
+            table += "\n";
+        }
+    }
+    table
+}

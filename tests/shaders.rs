@@ -1,0 +1,216 @@
+//! The shaders parse, validate as WebGPU core, and need no more than WebGPU's default limits. Needs no GPU.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use naga::{AddressSpace, Module, ShaderStage, TypeInner};
+use sheetsplat::gpu::shaders::{self, Shader};
+
+/// What WebGPU core has beyond naga's least: `pack2x16float` and its inverse, which WGSL always has.
+const WEBGPU_CORE: Capabilities = Capabilities::SHADER_FLOAT16_IN_FLOAT32;
+
+fn validated(shader: &Shader) -> Result<(Module, ModuleInfo), String> {
+    let failed = |message: String| format!("{}: {message}", shader.stage);
+    let module = naga::front::wgsl::parse_str(shader.source)
+        .map_err(|error| failed(error.emit_to_string_with_path(shader.source, shader.stage)))?;
+    let info = Validator::new(ValidationFlags::all(), WEBGPU_CORE)
+        .validate(&module)
+        .map_err(|error| failed(error.emit_to_string_with_path(shader.source, shader.stage)))?;
+    Ok((module, info))
+}
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The files with an extension in a folder and the folders below it.
+fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(files(&path, extension));
+        } else if path.extension().is_some_and(|found| found == extension) {
+            found.push(path);
+        }
+    }
+    found
+}
+
+/// All that went wrong, not only the first.
+fn assert_none(failures: &[String]) {
+    assert!(failures.is_empty(), "{} failures:\n{}", failures.len(), failures.join("\n"));
+}
+
+#[test]
+fn every_shader_validates() {
+    let failures: Vec<_> = shaders::ALL.iter().filter_map(|shader| validated(shader).err()).collect();
+    assert_none(&failures);
+}
+
+#[test]
+fn every_file_is_used() {
+    let files = files(&root().join("shaders"), "wgsl");
+    assert!(files.len() >= shaders::ALL.len());
+    let is_used = |file: &PathBuf| {
+        let text = std::fs::read_to_string(file).unwrap();
+        shaders::ALL.iter().any(|shader| shader.source.contains(&text))
+    };
+    let unused: Vec<_> = files.iter().filter(|file| !is_used(file)).map(|file| file.display().to_string()).collect();
+    assert_none(&unused);
+    let stages: BTreeSet<_> = shaders::ALL.iter().map(|shader| shader.stage).collect();
+    assert_eq!(stages.len(), shaders::ALL.len(), "every stage has a name of its own");
+}
+
+/// A stage's pass is `src/pass/STAGE.rs`; it names entry points and overrides in words that only the shader can check.
+#[test]
+fn entry_points_and_overrides_are_those_of_the_passes() {
+    let mut failures = Vec::new();
+    for shader in &shaders::ALL {
+        let (module, _) = validated(shader).unwrap();
+        let pass = std::fs::read_to_string(root().join("src/pass").join(shader.stage).with_extension("rs")).unwrap();
+        let quoted_after = |marker: &str| -> BTreeSet<String> {
+            pass.split(marker).skip(1).filter_map(|rest| rest.split('"').next()).map(str::to_owned).collect()
+        };
+        let used = quoted_after("entry_point: Some(\"");
+        let declared: BTreeSet<_> = module.entry_points.iter().map(|entry| entry.name.clone()).collect();
+        if used != declared {
+            failures.push(format!("{}: the pass uses {used:?}, the shader has {declared:?}", shader.stage));
+        }
+        for (_, constant) in module.overrides.iter() {
+            let name = constant.name.as_deref().unwrap_or("without a name");
+            if !pass.contains(&format!("(\"{name}\", ")) {
+                failures.push(format!("{}: the pass does not set {name}", shader.stage));
+            }
+        }
+    }
+    assert_none(&failures);
+}
+
+#[test]
+fn bindings_stay_within_default_limits() {
+    let limits = wgpu::Limits::default();
+    assert_eq!(limits.max_storage_buffers_per_shader_stage, 8, "WebGPU's default");
+    let mut failures = Vec::new();
+    for shader in &shaders::ALL {
+        let (module, _) = validated(shader).unwrap();
+        let globals = || module.global_variables.iter().map(|(_, global)| global);
+        // A layout may show every binding to every stage, so all of them count for each.
+        let count =
+            |counts: &dyn Fn(&naga::GlobalVariable) -> bool| globals().filter(|global| counts(global)).count() as u32;
+        let inner = |global: &naga::GlobalVariable| module.types[global.ty].inner.clone();
+        let group = |global: &naga::GlobalVariable| global.binding.map(|binding| binding.group);
+        let used = [
+            ("groups", globals().filter_map(group).max().map_or(0, |group| group + 1), limits.max_bind_groups),
+            (
+                "bindings in a group",
+                globals().filter_map(|global| global.binding).map(|binding| binding.binding + 1).max().unwrap_or(0),
+                limits.max_bindings_per_bind_group,
+            ),
+            (
+                "storage buffers",
+                count(&|global| matches!(global.space, AddressSpace::Storage { .. })),
+                limits.max_storage_buffers_per_shader_stage,
+            ),
+            (
+                "uniform buffers",
+                count(&|global| global.space == AddressSpace::Uniform),
+                limits.max_uniform_buffers_per_shader_stage,
+            ),
+            (
+                "textures",
+                count(&|global| matches!(inner(global), TypeInner::Image { .. })),
+                limits.max_sampled_textures_per_shader_stage,
+            ),
+            (
+                "samplers",
+                count(&|global| matches!(inner(global), TypeInner::Sampler { .. })),
+                limits.max_samplers_per_shader_stage,
+            ),
+            (
+                "bytes of a uniform buffer",
+                globals()
+                    .filter(|global| global.space == AddressSpace::Uniform)
+                    .map(|global| inner(global).size(module.to_ctx()))
+                    .max()
+                    .unwrap_or(0),
+                u32::try_from(limits.max_uniform_buffer_binding_size).unwrap(),
+            ),
+            (
+                "bytes of workgroup memory",
+                globals()
+                    .filter(|global| global.space == AddressSpace::WorkGroup)
+                    .map(|global| inner(global).size(module.to_ctx()))
+                    .sum(),
+                limits.max_compute_workgroup_storage_size,
+            ),
+        ];
+        for (what, used, allowed) in used {
+            if used > allowed {
+                failures.push(format!("{}: {used} {what}, allowed: {allowed}", shader.stage));
+            }
+        }
+    }
+    assert_none(&failures);
+}
+
+#[test]
+fn entry_points_stay_within_default_limits() {
+    let limits = wgpu::Limits::default();
+    let mut failures = Vec::new();
+    for shader in &shaders::ALL {
+        let (module, _) = validated(shader).unwrap();
+        for entry in &module.entry_points {
+            let [x, y, z] = workgroup_size(&module, entry);
+            let locations = entry.function.result.iter().map(|result| location_count(&module, result.ty)).sum::<u32>();
+            let mut allow = |what: &str, used: u32, allowed: u32| {
+                if used > allowed {
+                    failures.push(format!("{} {}: {used} {what}, allowed: {allowed}", shader.stage, entry.name));
+                }
+            };
+            match entry.stage {
+                ShaderStage::Compute => {
+                    allow("invocations", x * y * z, limits.max_compute_invocations_per_workgroup);
+                    allow("invocations in x", x, limits.max_compute_workgroup_size_x);
+                    allow("invocations in y", y, limits.max_compute_workgroup_size_y);
+                    allow("invocations in z", z, limits.max_compute_workgroup_size_z);
+                }
+                ShaderStage::Vertex => {
+                    allow("inter-stage variables", locations, limits.max_inter_stage_shader_variables);
+                }
+                _ => {}
+            }
+        }
+    }
+    assert_none(&failures);
+}
+
+/// An entry point's workgroup size with the values the shader itself gives its overrides; the passes set the same.
+fn workgroup_size(module: &Module, entry: &naga::EntryPoint) -> [u32; 3] {
+    let mut size = entry.workgroup_size;
+    for (side, overridden) in size.iter_mut().zip(entry.workgroup_size_overrides.into_iter().flatten()) {
+        let Some(expression) = overridden else { continue };
+        let naga::Expression::Override(constant) = module.global_expressions[expression] else {
+            panic!("{}: a workgroup size that is no plain override", entry.name);
+        };
+        let default = module.overrides[constant].init.map(|init| &module.global_expressions[init]);
+        let Some(&naga::Expression::Literal(naga::Literal::U32(default))) = default else {
+            panic!("{}: a workgroup size without a plain default", entry.name);
+        };
+        *side = default;
+    }
+    size
+}
+
+/// The `@location`s of an entry point's result.
+fn location_count(module: &Module, ty: naga::Handle<naga::Type>) -> u32 {
+    match &module.types[ty].inner {
+        TypeInner::Struct { members, .. } => {
+            members.iter().filter(|member| matches!(member.binding, Some(naga::Binding::Location { .. }))).count()
+                as u32
+        }
+        _ => 1,
+    }
+}

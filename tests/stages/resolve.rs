@@ -1,0 +1,88 @@
+//! `shaders/resolve.wgsl` against `reference::resolve`: a random compositing buffer over backgrounds.
+
+use glam::{DVec3, DVec4};
+use sheetsplat::gpu::{layout, readback, targets::Targets};
+use sheetsplat::headless::Headless;
+use sheetsplat::pass::resolve::Resolve;
+use sheetsplat::reference::Buffer;
+use sheetsplat::reference::resolve::resolve;
+use sheetsplat::splatting::Compositing;
+use sheetsplat::wgpu::{self, TextureFormat, TextureUsages};
+
+use crate::common::{F32, Random, gpu, gpu_with_small_bindings, pixels};
+use crate::frame_buffer;
+
+const BACKGROUNDS: [[f64; 4]; 5] =
+    [[0.0, 0.0, 0.0, 1.0], [0.2, 0.9, 0.4, 1.0], [0.7, 0.5, 0.3, 0.0], [0.1, 1.0, 0.6, 0.5], [1.0, 1.0, 1.0, 1.0]];
+
+fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
+    let (device, queue) = (gpu.device(), gpu.queue());
+    let stage = Resolve::new(device, TextureFormat::Rgba32Float);
+    let mut random = Random(9);
+    let targets = Targets::new(device, size, TextureFormat::Rgba32Float).unwrap();
+    assert_eq!(targets.bands.len(), bands);
+    let target = device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("target"),
+        size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: TextureFormat::Rgba32Float,
+        usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC,
+        view_formats: &[],
+    });
+    let view = target.create_view(&wgpu::TextureViewDescriptor::default());
+    for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray] {
+        for background in BACKGROUNDS {
+            // Summed projections pass 1; the others cannot. Some pixels are empty, some opaque.
+            let most = if compositing == Compositing::Xray { 3.0 } else { 1.0 };
+            let acc: Vec<[f32; 4]> = (0..size[0] * size[1])
+                .map(|_| {
+                    let alpha = random.uniform(-0.2 * most, 1.2 * most).clamp(0.0, most);
+                    let rgb = DVec3::from([(); 3].map(|()| random.uniform(0.0, 1.0))) * alpha;
+                    rgb.extend(alpha).as_vec4().to_array()
+                })
+                .collect();
+            let rows: Vec<layout::Band> = targets.bands.iter().map(|band| band.band).collect();
+            for (band, rows) in targets.bands.iter().zip(&rows) {
+                let first = (rows.first_row * size[0]) as usize;
+                let acc = &acc[first..first + (rows.rows * size[0]) as usize];
+                queue.write_buffer(&band.acc, 0, bytemuck::cast_slice(acc));
+            }
+            let frame = frame_buffer(device, |scene| {
+                (scene.image.width, scene.image.height) = (size[0], size[1]);
+                scene.image.background = background;
+                scene.splatting.compositing = compositing;
+            });
+            let groups: Vec<_> = targets.bands.iter().map(|band| stage.bind(device, &frame, band)).collect();
+            let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            stage.record(&mut encoder, &view, size[0], groups.iter().zip(rows));
+            queue.submit([encoder.finish()]);
+            let actual = pixels(&readback::texture(device, queue, &target).unwrap());
+
+            let acc = acc.iter().map(|pixel| DVec4::from(pixel.map(f64::from))).collect();
+            let acc = Buffer { width: size[0] as usize, pixels: acc };
+            let expected = resolve(&acc, compositing, background);
+            assert_eq!(actual.len(), expected.pixels.len());
+            for (i, (actual, expected)) in actual.iter().zip(&expected.pixels).enumerate() {
+                // The background's product, one minus alpha, a product and a sum of numbers up to 1: a rounding each.
+                assert!(
+                    (*actual - *expected).abs().max_element() <= 4.0 * F32,
+                    "{compositing:?} {background:?} pixel {i}: acc {}: {actual}, not {expected}",
+                    acc.pixels[i]
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn over_every_kind_of_background() {
+    check(&gpu(), [61, 37], 1);
+}
+
+#[test]
+fn several_bands() {
+    // Rows of 61 pixels: 8 of them fit a binding.
+    check(&gpu_with_small_bindings(8192), [61, 37], 5);
+}

@@ -1,0 +1,258 @@
+//! `shaders/shade.wgsl` against `reference::shading`: the splat records of a frame, decoded.
+
+use glam::{DVec3, DVec4, UVec3};
+use sheetsplat::classify::classify;
+use sheetsplat::gpu::{layout, readback};
+use sheetsplat::kernel::Kernel;
+use sheetsplat::plan::{FramePlan, View};
+use sheetsplat::reference::{Geometry, shading};
+use sheetsplat::renderer::ClassifiedVolume;
+use sheetsplat::scene::{Scene, TransferSettings};
+use sheetsplat::shading::{Light, Shading};
+use sheetsplat::splatting::Compositing;
+use sheetsplat::transfer_function::{Ramp, TransferFunction};
+use sheetsplat::volume::Volume;
+use sheetsplat::wgpu;
+
+use crate::common::{F16, F32, Random, camera, gpu, scene, transfer};
+
+/// Values of a volume with noise everywhere, so that gradients point anywhere.
+fn noise(dims: UVec3, spacing: DVec3) -> Volume {
+    let mut random = Random(1);
+    let values = (0..dims.element_product()).map(|_| random.uniform(0.0, 255.0) as f32).collect();
+    Volume::new("noise", dims, spacing, values).unwrap()
+}
+
+fn skin() -> TransferSettings {
+    transfer(
+        &[(20.0, [0.1, 0.3, 0.9]), (120.0, [0.9, 0.7, 0.6]), (250.0, [1.0, 1.0, 1.0])],
+        &[(10.0, 0.0), (100.0, 0.3), (200.0, 1.0)],
+    )
+}
+
+fn oblique() -> Scene {
+    Scene { camera: camera([0.3, 0.9, -0.2], 40.0), transfer: skin(), ..scene(64, 48) }
+}
+
+/// What f32 arithmetic may change in a ramp's value: the control points and the position are rounded, and subtracted, in
+/// the segment's own units; ordinates, share and mix are a handful of roundings of numbers up to 1.
+fn ramp_error<T: Copy>(points: &[(f64, T)], difference: impl Fn(T, T) -> f64, at: f64) -> f64 {
+    let steepest = points.windows(2).map(|pair| difference(pair[1].1, pair[0].1) / (pair[1].0 - pair[0].0));
+    let positions = points.iter().fold(at.abs(), |most, point| most.max(point.0.abs()));
+    F32 * (8.0 + 4.0 * positions * steepest.fold(0.0, f64::max))
+}
+
+/// What the GPU's record of a voxel may differ by, from the precisions of its number formats and functions alone.
+fn tolerance(volume: &Volume, index: u32, transfer: &TransferFunction, scene: &Scene, amount: DVec4) -> DVec4 {
+    let value = f64::from(volume.values()[index as usize]);
+    let magnitude = volume.gradient(volume.grid().voxel_at(index)).length();
+    let alpha = transfer.alpha(value, magnitude);
+    let scalar = |a: f64, b: f64| (a - b).abs();
+    let factor_error =
+        transfer.gradient_opacity.as_ref().map_or(0.0, |ramp| ramp_error(ramp.points(), scalar, magnitude));
+    let alpha_error = ramp_error(transfer.opacity.points(), scalar, value) + factor_error + F32;
+
+    // -ln(1 - α): WGSL's log is good to 2⁻²¹ for arguments in [0.5, 2] and to 3 ULP beyond.
+    let m = shading::amount(scene.splatting.compositing, alpha);
+    let m_error = match scene.splatting.compositing {
+        Compositing::Exponential => alpha_error / (1.0 - alpha.min(0.9999)) + 2.0_f64.powi(-21) + 8.0 * F32 * m,
+        Compositing::Linear | Compositing::Xray => alpha_error,
+    };
+
+    // Half a step of 1/32767 in each of two octahedron coordinates moves the third by up to their sum (√6 in all); the
+    // octahedron lies up to √3 below the sphere. The rest is f32.
+    let normal_error = 18.0_f64.sqrt() * 0.5 / 32767.0 + 16.0 * F32;
+    let Shading { ambient, diffuse, specular, shininess, .. } = scene.shading;
+    let color_error = ramp_error(transfer.color.points(), |a: DVec3, b| (a - b).abs().max_element(), value);
+    // pow is exp2(y·log2(x)): log2 to 2⁻²¹, times y; exp2 to 3 ULP and more where its result is small. A cosine's power
+    // is steep at 0 where the exponent is below 1, at 1 where it is above.
+    let cosine = highlight_cosine(volume, index, scene);
+    let steepest = [cosine - normal_error, cosine + normal_error]
+        .map(|off| (off.clamp(0.0, 1.0).powf(shininess) - cosine.powf(shininess)).abs());
+    let highlight_error = specular * (steepest[0].max(steepest[1]) + (shininess + 2.0) * 2.0_f64.powi(-21));
+    let shaded_error = color_error * (ambient + diffuse) + diffuse * normal_error + highlight_error + 8.0 * F32;
+    let c_error = if scene.shading.enabled { shaded_error } else { color_error };
+
+    let color = amount.truncate() / amount.w;
+    let before_f16 = (color * m_error + m * c_error).extend(m_error) + 4.0 * F32 * amount;
+    before_f16 + amount * F16 + 2.0_f64.powi(-25)
+}
+
+/// `|n·hv|` of SPEC §3.
+fn highlight_cosine(volume: &Volume, index: u32, scene: &Scene) -> f64 {
+    let to_eye = -scene.camera.basis().w;
+    let to_light = match scene.shading.light {
+        Light::Headlight => to_eye,
+        Light::Direction(direction) => direction.normalize(),
+    };
+    let normal = volume.gradient(volume.grid().voxel_at(index)).normalize_or_zero();
+    normal.dot((to_light + to_eye).normalize_or_zero()).abs()
+}
+
+/// Renders a frame and compares every splat record with the twin's.
+fn check(name: &str, volume: &Volume, scene: &Scene) {
+    let gpu = gpu();
+    let transfer = scene.transfer.resolve(volume);
+    let classified = ClassifiedVolume::new(gpu.device(), volume, &transfer);
+    let frame = gpu.renderer().prepare(gpu.device(), gpu.queue(), &classified, scene).unwrap();
+    let target = gpu.device().create_texture(&wgpu::TextureDescriptor {
+        label: Some("target"),
+        size: wgpu::Extent3d { width: scene.image.width, height: scene.image.height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba32Float,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
+        view_formats: &[],
+    });
+    let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    gpu.renderer().record(&mut encoder, &frame, &target.create_view(&wgpu::TextureViewDescriptor::default()));
+    gpu.queue().submit([encoder.finish()]);
+    let buffers: Vec<_> = frame.splats().collect();
+    assert_eq!(buffers.len(), 1, "{name}: a small volume is one list");
+    let bytes = readback::buffer(gpu.device(), gpu.queue(), buffers[0]).unwrap();
+    let records: Vec<layout::Splat> = bytemuck::pod_collect_to_vec(&bytes);
+
+    let geometry = Geometry::new(volume.grid(), scene).unwrap();
+    let expected = shading::shade(volume, &transfer, scene, &geometry);
+    let indices: Vec<u32> = classify(volume, &transfer).iter().map(|voxel| voxel.index).collect();
+    assert_eq!(indices.len(), expected.len(), "{name}: which voxels take part");
+    let size = [scene.image.width, scene.image.height];
+    let view = View::new(volume.grid(), &scene.camera, &scene.splatting, size).unwrap();
+    let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
+    let plan = FramePlan::new(volume.grid(), [indices.as_slice()], view, &kernel, scene.splatting.order);
+    let order = &plan.orders[0];
+    assert_eq!(records.len(), order.len(), "{name}: which voxels are on the screen");
+    assert!(records.len() > 50, "{name}: {} voxels", records.len());
+
+    for (record, &at) in records.iter().zip(order) {
+        let (index, twin) = (indices[at as usize], &expected[at as usize]);
+        let voxel = volume.grid().voxel_at(index);
+        let (actual, expected) =
+            (DVec3::new(record.x_px.into(), record.y_px.into(), record.depth.into()), twin.center.extend(twin.depth));
+        // A dot product of four: every term has a rounded coefficient and product and passes up to three sums; one more
+        // for the twin's own way to the same number.
+        let p = voxel.as_dvec3().extend(1.0);
+        let terms = DVec3::from(view.screen_from_voxel.map(|row| (row * p).abs().element_sum()));
+        assert!(
+            (actual - expected).abs().cmple(6.0 * F32 * terms).all(),
+            "{name}: {voxel} at {actual}, not {expected}"
+        );
+
+        let actual = decode(record);
+        // The records leave the amplitude over λ to the splat stage.
+        let expected = twin.amount / (geometry.amplitude / geometry.lambda);
+        let tolerance = tolerance(volume, index, &transfer, scene, expected);
+        assert!(
+            (actual - expected).abs().cmple(tolerance).all(),
+            "{name}: {voxel} is {actual}, not {expected} ± {tolerance}"
+        );
+    }
+}
+
+fn decode(record: &layout::Splat) -> DVec4 {
+    DVec4::from_array([record.rg, record.rg >> 16, record.ba, record.ba >> 16].map(|bits| f16(bits as u16)))
+}
+
+fn f16(bits: u16) -> f64 {
+    let (exponent, mantissa) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023));
+    assert!(bits < 0x7c00, "{bits:#06x} is negative or not finite");
+    if exponent == 0 { mantissa * 2.0_f64.powi(-24) } else { (1024.0 + mantissa) * 2.0_f64.powi(exponent - 25) }
+}
+
+#[test]
+fn f16_is_decoded() {
+    assert_eq!(
+        [0x3c00, 0x3555, 0x0001, 0x0400, 0x7bff].map(f16),
+        [1.0, 0.333251953125, 2.0_f64.powi(-24), 2.0_f64.powi(-14), 65504.0]
+    );
+}
+
+const DIMS: UVec3 = UVec3::new(11, 9, 8);
+
+#[test]
+fn compositing_and_light() {
+    let volume = noise(DIMS, DVec3::ONE);
+    for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray] {
+        for light in [Light::Headlight, Light::Direction(DVec3::new(2.0, -1.0, 3.0))] {
+            let mut scene = oblique();
+            scene.splatting.compositing = compositing;
+            scene.shading.light = light;
+            check(&format!("{compositing:?} {light:?}"), &volume, &scene);
+        }
+    }
+}
+
+#[test]
+fn light_from_behind_has_no_half_vector() {
+    let mut scene = oblique();
+    scene.shading.light = Light::Direction(scene.camera.direction);
+    check("opposite light", &noise(DIMS, DVec3::ONE), &scene);
+}
+
+#[test]
+fn strong_and_sharp_highlights() {
+    for (specular, shininess) in [(3.0, 0.5), (1.0, 1.0), (0.7, 200.0)] {
+        let mut scene = oblique();
+        scene.shading = Shading { ambient: 0.0, diffuse: 0.4, specular, shininess, ..Shading::default() };
+        check(&format!("highlight {specular} {shininess}"), &noise(DIMS, DVec3::ONE), &scene);
+    }
+}
+
+#[test]
+fn shading_off() {
+    let mut scene = oblique();
+    scene.shading.enabled = false;
+    check("unshaded", &noise(DIMS, DVec3::ONE), &scene);
+}
+
+#[test]
+fn anisotropic_and_minified() {
+    for spacing in [[1.0, 1.0, 5.0], [3.2, 3.2, 1.5], [0.2, 0.7, 0.4]].map(DVec3::from) {
+        for height in [20.0, 150.0] {
+            let mut scene = oblique();
+            scene.camera = camera([-0.5, 0.4, 0.8], height * spacing.min_element());
+            scene.splatting.compositing = Compositing::Exponential;
+            check(&format!("spacing {spacing} height {height}"), &noise(DIMS, spacing), &scene);
+        }
+    }
+}
+
+#[test]
+fn gradient_opacity_and_iso_ranges() {
+    let mut scene = oblique();
+    scene.transfer.gradient_opacity = Some(Ramp::new(vec![(5.0, 0.0), (30.0, 0.25), (90.0, 1.0)]).unwrap());
+    scene.transfer.iso_ranges = Some(vec![[30.0, 90.0], [120.0, 240.0]]);
+    check("gradient opacity", &noise(DIMS, DVec3::new(1.0, 2.0, 1.5)), &scene);
+}
+
+#[test]
+fn no_gradient_is_ambient_light_only() {
+    let values = vec![180.0; DIMS.element_product() as usize];
+    let volume = Volume::new("constant", DIMS, DVec3::ONE, values).unwrap();
+    check("constant", &volume, &oblique());
+    let mut scene = oblique();
+    scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.5), (30.0, 1.0)]).unwrap());
+    check("constant, gradient opacity", &volume, &scene);
+}
+
+#[test]
+fn many_control_points_and_values_exactly_on_them() {
+    let mut random = Random(7);
+    let mut points: Vec<f64> = (0..300).map(|_| random.uniform(0.0, 255.0).round() + 0.25).collect();
+    points.sort_by(f64::total_cmp);
+    points.dedup();
+    let rgb = |random: &mut Random| [(); 3].map(|()| random.uniform(0.0, 1.0));
+    let color: Vec<_> = points.iter().map(|&at| (at, rgb(&mut random))).collect();
+    let opacity: Vec<_> = points.iter().rev().step_by(3).rev().map(|&at| (at, random.uniform(0.1, 1.0))).collect();
+    let transfer = transfer(&color, &opacity);
+    let mut scene = Scene { transfer, ..oblique() };
+    scene.splatting.compositing = Compositing::Exponential;
+    check("many control points", &noise(DIMS, DVec3::ONE), &scene);
+
+    let on_points = (0..DIMS.element_product() as usize).map(|i| points[i * 7 % points.len()] as f32).collect();
+    let volume = Volume::new("on points", DIMS, DVec3::ONE, on_points).unwrap();
+    check("values at control points", &volume, &scene);
+    scene.transfer = crate::common::transfer(&[(3.0, [0.2, 0.4, 0.8])], &[(100.25, 0.75)]);
+    check("one control point", &volume, &scene);
+}

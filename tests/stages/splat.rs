@@ -1,0 +1,413 @@
+//! `shaders/splat.wgsl` against `reference::splat`: hand-made splat records drawn into an f32 sheet buffer.
+
+use std::ops::Range;
+
+use glam::{DVec2, DVec3, DVec4, UVec3};
+use sheetsplat::footprint::{FootprintTable, SECTION_SIZE, SECTIONS, section_extent, section_spacing};
+use sheetsplat::gpu::footprint_texture::FootprintTexture;
+use sheetsplat::gpu::uniforms;
+use sheetsplat::gpu::{layout, readback};
+use sheetsplat::headless::Headless;
+use sheetsplat::kernel::Kernel;
+use sheetsplat::pass::splat::{Draw, Splat as Stage};
+use sheetsplat::plan::{SlabPlan, View};
+use sheetsplat::reference::{self, Geometry};
+use sheetsplat::scene::Scene;
+use sheetsplat::splatting::FootprintForm;
+use sheetsplat::volume::Grid;
+use sheetsplat::wgpu::util::DeviceExt;
+use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
+
+use crate::common::{F32, Random, camera, gpu, pixels, scene};
+use crate::uniform_buffer;
+
+/// One view of one kernel, on the GPU and in the twin.
+struct Fixture<'a> {
+    gpu: &'a Headless,
+    stage: &'a Stage,
+    scene: Scene,
+    kernel: Kernel,
+    view: View,
+    geometry: Geometry,
+    frame: wgpu::Buffer,
+    footprints: FootprintTexture,
+}
+
+/// An f32 sheet buffer, read back.
+type Sheet = Vec<DVec4>;
+
+impl<'a> Fixture<'a> {
+    fn new(gpu: &'a Headless, stage: &'a Stage, scene: Scene, spacing: [f64; 3]) -> Self {
+        let grid = Grid { dims: UVec3::splat(9), spacing: DVec3::from(spacing) };
+        let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
+        let size = [scene.image.width, scene.image.height];
+        let view = View::new(&grid, &scene.camera, &scene.splatting, size).unwrap();
+        let table = FootprintTable::new(scene.splatting.footprint, &kernel, view.slabs.width);
+        Self {
+            gpu,
+            stage,
+            kernel,
+            view,
+            geometry: Geometry::new(&grid, &scene).unwrap(),
+            frame: uniform_buffer(gpu.device(), &grid, &scene),
+            footprints: FootprintTexture::upload(gpu.device(), gpu.queue(), &table),
+            scene,
+        }
+    }
+
+    /// The sheet buffers of some slabs, each with a range of the splats.
+    fn draw(&self, splats: &[layout::Splat], range: Range<u32>, slabs: &[i32]) -> Vec<Sheet> {
+        let device = self.gpu.device();
+        let init = |contents: &[u8], usage| {
+            device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some("test"), contents, usage })
+        };
+        let stride = device.limits().min_uniform_buffer_offset_alignment;
+        let plans: Vec<SlabPlan> = slabs
+            .iter()
+            .map(|&k| SlabPlan { near: f64::from(k) * self.view.slabs.width, splats: Vec::new() })
+            .collect();
+        let slabs = init(&uniforms::slabs(&plans, stride as usize), BufferUsages::UNIFORM);
+        let records = init(bytemuck::cast_slice(splats), BufferUsages::STORAGE);
+        let group = self.stage.bind(device, &self.frame, &slabs, &records, &self.footprints);
+        let sheet = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("sheet"),
+            size: wgpu::Extent3d {
+                width: self.scene.image.width,
+                height: self.scene.image.height,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: TextureFormat::Rgba32Float,
+            usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        let view = sheet.create_view(&wgpu::TextureViewDescriptor::default());
+        (0..plans.len() as u32)
+            .map(|slab| {
+                let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                let draws = [Draw { group: &group, splats: range.clone() }];
+                self.stage.record(&mut encoder, self.scene.splatting.footprint, &view, slab * stride, draws);
+                self.gpu.queue().submit([encoder.finish()]);
+                let bytes = readback::texture(device, self.gpu.queue(), &sheet).unwrap();
+                pixels(&bytes)
+            })
+            .collect()
+    }
+
+    /// The twin's sheet buffer of one slab.
+    fn twin(&self, splats: &[reference::Splat], slab: i32) -> Vec<DVec4> {
+        reference::splat::sheet(splats, slab, &self.geometry, &self.kernel).pixels
+    }
+
+    /// A splat for the twin: the record's f32 coordinates are taken as they are, so only the stage's own errors count.
+    fn twin_of(&self, splat: &layout::Splat) -> reference::Splat {
+        let layout::Splat { x_px, y_px, depth, rg, ba } = *splat;
+        assert_eq!((rg, ba), (AMOUNT_RG, AMOUNT_BA));
+        let center = DVec2::new(x_px.into(), y_px.into());
+        reference::Splat { center, depth: depth.into(), amount: AMOUNT * self.amplitude() }
+    }
+
+    /// The low-pass rule's amplitude over λ.
+    fn amplitude(&self) -> f64 {
+        self.geometry.amplitude / self.geometry.lambda
+    }
+
+    /// Depths of a slab's planes, seen from a splat.
+    fn planes(&self, splat: &reference::Splat, slab: i32) -> (f64, f64) {
+        let t0 = f64::from(slab) * self.view.slabs.width - splat.depth;
+        (t0, t0 + self.view.slabs.width)
+    }
+
+    /// A random splat whose footprint is at least partly on the screen.
+    fn random_splat(&self, random: &mut Random) -> layout::Splat {
+        let coordinate = |random: &mut Random, size: u32| random.uniform(-2.0, f64::from(size) + 2.0) as f32;
+        layout::Splat {
+            x_px: coordinate(random, self.scene.image.width),
+            y_px: coordinate(random, self.scene.image.height),
+            depth: random.uniform(-60.0, 60.0) as f32,
+            rg: AMOUNT_RG,
+            ba: AMOUNT_BA,
+        }
+    }
+}
+
+/// 1, 0.5, 0.25 and 1 as f16: what a record holds, which the stage multiplies by the amplitude over λ.
+const AMOUNT_RG: u32 = 0x3800_3c00;
+const AMOUNT_BA: u32 = 0x3c00_3400;
+const AMOUNT: DVec4 = DVec4::new(1.0, 0.5, 0.25, 1.0);
+
+fn stage(gpu: &Headless) -> Stage {
+    Stage::new(gpu.device(), TextureFormat::Rgba32Float)
+}
+
+/// Radius and falloff.
+const KERNELS: [(f64, f64); 9] =
+    [(2.0, 2.0), (1.4, 2.0), (1.0, 2.0), (4.0, 2.0), (1.0, 0.1), (4.0, 0.1), (3.0, 0.5), (2.0, 16.0), (4.0, 16.0)];
+
+/// Direction, spacing, and `unit`s per pixel: head-on and oblique, sheared footprints, magnified and minified, and one
+/// that is minified along one singular direction only.
+const VIEWS: [([f64; 3], [f64; 3], f64); 8] = [
+    ([0.0, 1.0, 0.0], [1.0, 1.0, 1.0], 0.25),
+    ([0.3, 0.9, -0.2], [1.0, 1.0, 1.0], 0.6),
+    ([0.6, 0.5, 0.6], [1.0, 1.0, 5.0], 0.4),
+    ([0.6, 0.5, 0.6], [3.2, 3.2, 1.5], 0.1),
+    ([-0.7, 0.2, 0.4], [1.0, 1.0, 2.0], 0.03),
+    ([0.6, 0.5, 0.6], [1.0, 1.0, 5.0], 2.0),
+    ([0.0, 1.0, 0.1], [1.0, 1.0, 1.0], 7.0),
+    ([0.2, 0.1, 0.9], [1.0, 3.0, 1.0], 30.0),
+];
+
+/// The view with slabs `width` wide in the warped grid, where the footprint tables live.
+fn view_scene(view: ([f64; 3], [f64; 3], f64), kernel: (f64, f64), width: f64, form: FootprintForm) -> Scene {
+    let (direction, spacing, units_per_pixel) = view;
+    let mut scene = scene(70, 45);
+    let unit = spacing.into_iter().fold(f64::INFINITY, f64::min);
+    scene.camera = camera(direction, units_per_pixel * unit * 45.0);
+    (scene.splatting.radius, scene.splatting.falloff) = kernel;
+    scene.splatting.footprint = form;
+    let warped = scene.camera.basis().w / (DVec3::from(spacing) / unit);
+    scene.splatting.slab_width = width / warped.length();
+    scene
+}
+
+/// Calls `check` with random splats of every kernel and view, one at a time, and each slab that they touch:
+/// fixture, splat, slab, sheet buffer.
+fn for_random_sections(
+    form: FootprintForm,
+    widths: &[f64],
+    mut check: impl FnMut(&Fixture<'_>, &reference::Splat, i32, &[DVec4]),
+) {
+    let gpu = gpu();
+    let stage = stage(&gpu);
+    let mut random = Random(3);
+    for (kernel, view) in KERNELS.into_iter().flat_map(|kernel| VIEWS.map(|view| (kernel, view))) {
+        for &width in widths {
+            let fixture = Fixture::new(&gpu, &stage, view_scene(view, kernel, width, form), view.1);
+            for _ in 0..2 {
+                let splat = fixture.random_splat(&mut random);
+                let twin = fixture.twin_of(&splat);
+                let slabs: Vec<i32> = fixture.view.slabs.touched(twin.depth).collect();
+                for (sheet, &k) in fixture.draw(&[splat], 0..1, &slabs).iter().zip(&slabs) {
+                    check(&fixture, &twin, k, sheet);
+                }
+            }
+        }
+    }
+}
+
+impl Fixture<'_> {
+    /// The whole footprint's peak, per unit of a splat's amount.
+    fn whole(&self) -> f64 {
+        self.kernel.section(0.0, -self.kernel.radius(), self.kernel.radius())
+    }
+
+    /// What the summed-area form may err by in a section (SPEC §4): a thousandth of its peak. Nothing can hold it better
+    /// than an f32 that also holds whole footprints. And the slab's planes come in f32, seen from a depth in f32: four
+    /// roundings, each worth its share of the kernel's value there.
+    fn summed_area_tolerance(&self, splat: &reference::Splat, k: i32) -> f64 {
+        let (t0, t1) = self.planes(splat, k);
+        let plane_error = 4.0 * F32 * ((t0 + splat.depth).abs() + self.view.slabs.width);
+        let nearest = if t0 * t1 < 0.0 { 0.0 } else { t0.abs().min(t1.abs()) };
+        1e-3 * self.kernel.section(0.0, t0, t1) + F32 * self.whole() + plane_error * self.kernel.value(nearest)
+    }
+
+    /// Distance of a pixel's centre from a splat, in footprint coordinates.
+    fn rho(&self, splat: &reference::Splat, pixel: usize) -> f64 {
+        let width = self.scene.image.width as usize;
+        let center = DVec2::new((pixel % width) as f64, (pixel / width) as f64) + 0.5;
+        (self.geometry.footprint_from_pixels * (center - splat.center)).length()
+    }
+
+    /// `tolerance` is that of a kernel of amount 1, before the amplitude.
+    fn assert_close(&self, sheet: &[DVec4], expected: &[DVec4], tolerance: impl Fn(usize) -> f64, what: &str) {
+        assert_eq!(sheet.len(), expected.len());
+        for (pixel, (actual, expected)) in sheet.iter().zip(expected).enumerate() {
+            let error = (*actual - *expected).abs().max_element() / self.amplitude();
+            assert!(
+                error <= tolerance(pixel),
+                "{what}, {:?}, {:?}, pixel {pixel}: {actual}, not {expected} ± {}",
+                self.kernel,
+                self.view,
+                tolerance(pixel)
+            );
+        }
+    }
+}
+
+#[test]
+fn summed_area_sections() {
+    let mut lit = 0;
+    for_random_sections(FootprintForm::SummedArea, &[0.25, 1.0, 3.7], |fixture, splat, k, sheet| {
+        let expected = fixture.twin(&[*splat], k);
+        let tolerance = fixture.summed_area_tolerance(splat, k);
+        fixture.assert_close(sheet, &expected, |_| tolerance, &format!("{splat:?} in slab {k}"));
+        lit += expected.iter().filter(|pixel| pixel.w > 0.0).count();
+    });
+    assert!(lit > 100_000, "only {lit} pixels were compared");
+}
+
+/// The nearest of the 128 stored sections is that of a splat moved by up to half their spacing: against that one only the
+/// bilinear interpolation between the texels of its quadrant counts.
+#[test]
+fn stored_sections() {
+    let mut lit = 0;
+    for_random_sections(FootprintForm::Sections, &[0.25, 1.0, 3.7], |fixture, splat, k, sheet| {
+        let Fixture { kernel, view, .. } = fixture;
+        let (t0, t1) = fixture.planes(splat, k);
+        let middle = (t0 + t1) / 2.0;
+        let spacing = section_spacing(kernel, view.slabs.width);
+        let layer = (middle.abs() / spacing).round();
+        if (middle.abs() / spacing - layer).abs() > 0.499 {
+            // Half way between two sections either one is the nearest, and f32 decides.
+            return;
+        }
+        let stored =
+            reference::Splat { depth: splat.depth + middle.signum() * (middle.abs() - layer * spacing), ..*splat };
+        let expected =
+            if layer < f64::from(SECTIONS) { fixture.twin(&[stored], k) } else { vec![DVec4::ZERO; sheet.len()] };
+
+        let (t0, t1) = fixture.planes(&stored, k);
+        let texel = section_extent(kernel, t0, t1) / f64::from(SECTION_SIZE - 1);
+        let diagonal = 2.0_f64.sqrt() * texel;
+        let section = |rho: f64| kernel.section(rho.max(0.0).powi(2), t0, t1);
+        let tolerance = |pixel: usize| {
+            // A section falls off from its centre, so the cell's corners are between its values a diagonal away.
+            let rho = fixture.rho(splat, pixel);
+            let monotone = (section(rho - diagonal) - section(rho)).max(section(rho) - section(rho + diagonal));
+            // Where the slab's planes and not the ball end the section, it is a Gaussian in both directions: its second
+            // derivatives are at most 2·falloff of the peak, bilinear interpolation errs by texel²/8 of their sum.
+            let chord = kernel.half_chord((rho + diagonal).powi(2));
+            let smooth = t0.abs().max(t1.abs()) < chord;
+            let interpolation =
+                if smooth { monotone.min(kernel.falloff() * texel * texel / 2.0 * section(0.0)) } else { monotone };
+            // The kernel's support leaves out 2⁻²⁴; the rest is f32.
+            interpolation + 8.0 * F32 * fixture.whole()
+        };
+        fixture.assert_close(sheet, &expected, tolerance, &format!("{splat:?} in slab {k}"));
+        lit += expected.iter().filter(|pixel| pixel.w > 0.0).count();
+    });
+    assert!(lit > 100_000, "only {lit} pixels were compared");
+}
+
+/// Pixel centres just inside the rim, where it touches the quad's sides, of a kernel that is not small there: the
+/// rasteriser, which snaps corners to 1/256 pixel, must not lose them.
+#[test]
+fn pixels_just_inside_the_rim_are_drawn() {
+    let gpu = gpu();
+    let stage = stage(&gpu);
+    for form in [FootprintForm::SummedArea, FootprintForm::Sections] {
+        let view = VIEWS[0];
+        let fixture = Fixture::new(&gpu, &stage, view_scene(view, (1.0, 0.1), 8.0, form), view.1);
+        assert_eq!(fixture.view.footprint.pixels_from_footprint.row(0).length(), 4.0, "pixels per grid unit");
+        for inside in [0.0005, 0.001, 0.0015, 0.0019] {
+            for side in [DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y] {
+                let center = DVec2::new(30.5, 20.5) - side * (4.0 - inside);
+                let (x_px, y_px) = (center.x as f32, center.y as f32);
+                let splat = layout::Splat { x_px, y_px, depth: 4.0, rg: AMOUNT_RG, ba: AMOUNT_BA };
+                let sheet = &fixture.draw(&[splat], 0..1, &[0])[0];
+                let pixel = 20 * 70 + 30;
+                let actual = sheet[pixel].w;
+                // The chord is √(1 - ρ²) to each side, the kernel's value there κ·exp(-0.1).
+                let expected = fixture.twin(&[fixture.twin_of(&splat)], 0)[pixel].w;
+                assert!(expected > 0.01 * fixture.whole(), "{expected} is not worth testing");
+                match form {
+                    FootprintForm::SummedArea => assert!((actual - expected).abs() < 1e-3 * fixture.whole()),
+                    // Bilinear between the last texel inside and 0 on the rim.
+                    FootprintForm::Sections => assert!(actual > 0.0 && actual < expected, "{actual} {expected}"),
+                }
+            }
+        }
+    }
+}
+
+/// `ρ`-wise: all slabs' sheet buffers added up are the kernel's whole footprint. Pixel-wise: that footprint adds up to
+/// the kernel's integral, 1.
+#[test]
+fn sections_sum_to_the_footprint_and_the_footprint_to_one() {
+    let gpu = gpu();
+    let stage = stage(&gpu);
+    let mut random = Random(11);
+    let views = [
+        ([0.0, 1.0, 0.0], [1.0, 1.0, 1.0], 0.16),
+        ([0.3, 0.9, -0.2], [1.0, 1.0, 1.0], 0.15),
+        ([0.6, 0.5, 0.6], [1.0, 1.0, 2.0], 0.21),
+    ];
+    // None that is far from 0 at its rim: there the sum over pixels is no longer close to the integral.
+    let kernels = [(2.0, 2.0), (1.4, 2.0), (4.0, 2.0), (3.0, 0.8)];
+    for (kernel, view) in kernels.into_iter().flat_map(|kernel| views.map(|view| (kernel, view))) {
+        for (form, width) in [FootprintForm::SummedArea, FootprintForm::Sections]
+            .into_iter()
+            .flat_map(|form| [0.3, 1.0, 1.7].map(|width| (form, width)))
+        {
+            let fixture = Fixture::new(&gpu, &stage, view_scene(view, kernel, width, form), view.1);
+            let splat = layout::Splat {
+                x_px: random.uniform(34.0, 36.0) as f32,
+                y_px: random.uniform(22.0, 23.0) as f32,
+                ..fixture.random_splat(&mut random)
+            };
+            let twin = fixture.twin_of(&splat);
+            let slabs: Vec<i32> = fixture.view.slabs.touched(twin.depth).collect();
+            let sheets = fixture.draw(&[splat], 0..1, &slabs);
+            let sum: Vec<DVec4> = (0..sheets[0].len()).map(|i| sheets.iter().map(|sheet| sheet[i]).sum()).collect();
+
+            let tolerance = match form {
+                // The planes between slabs cancel but for rounding, of them and of the table entries; what is left is
+                // the step to the nearest texel in the plane, u⁴/24 of the peak, at most 3e-5 for any kernel.
+                FootprintForm::SummedArea => {
+                    let plane_error = 4.0 * F32 * (twin.depth.abs() + kernel.0);
+                    let per_plane = 4.0 * F32 * fixture.whole() + plane_error * fixture.kernel.value(0.0);
+                    3e-5 * fixture.whole() + slabs.len() as f64 * per_plane
+                }
+                // Each section is taken up to half a spacing beside its place. The sum of what that changes is the
+                // kernel's variation, up and down again, over half a spacing; bilinear interpolation as above.
+                FootprintForm::Sections => {
+                    let spacing = section_spacing(&fixture.kernel, fixture.view.slabs.width);
+                    let texel = fixture.kernel.support() / f64::from(SECTION_SIZE - 1);
+                    spacing * fixture.kernel.value(0.0)
+                        + fixture.kernel.falloff() * texel * texel / 2.0 * fixture.whole()
+                }
+            };
+            let whole: Vec<DVec4> = (0..sum.len())
+                .map(|pixel| fixture.kernel.section(fixture.rho(&twin, pixel).powi(2), -9.0, 9.0) * twin.amount)
+                .collect();
+            fixture.assert_close(&sum, &whole, |_| tolerance, &format!("{form:?} {splat:?}"));
+
+            let pixel_area = fixture.geometry.footprint_from_pixels.determinant().abs() / fixture.amplitude();
+            let sampled = whole.iter().sum::<DVec4>() * pixel_area;
+            // The kernel's own: at 4 and more pixels per grid unit a Gaussian's sum over pixels is its integral, and the
+            // jump of at most h(radius) = 0.02·h(0) at the rim adds little.
+            assert!((sampled - AMOUNT).abs().max_element() < 1e-3, "{kernel:?} {view:?}: {sampled}");
+            let total = sum.iter().sum::<DVec4>() * pixel_area;
+            // Over the footprint the GPU errs by less than the tolerance times its effective area, π/falloff.
+            let error = tolerance * std::f64::consts::PI / fixture.kernel.falloff();
+            assert!((total - sampled).abs().max_element() < error, "{form:?} {kernel:?} {view:?}: {total}");
+        }
+    }
+}
+
+/// Splats that overlap add up, and only those of the range that is drawn.
+#[test]
+fn a_range_of_splats_adds_up() {
+    let gpu = gpu();
+    let stage = stage(&gpu);
+    let mut random = Random(5);
+    let scene = view_scene(VIEWS[0], (2.0, 2.0), 1.0, FootprintForm::SummedArea);
+    let fixture = Fixture::new(&gpu, &stage, scene, VIEWS[0].1);
+    let splats: Vec<_> = (0..300)
+        .map(|_| layout::Splat { depth: random.uniform(-2.0, 3.0) as f32, ..fixture.random_splat(&mut random) })
+        .collect();
+    let range = 20..280;
+    let twins: Vec<_> = splats[range.clone()].iter().map(|splat| fixture.twin_of(splat)).collect();
+    let sheet = &fixture.draw(&splats, 20..280, &[0])[0];
+    let expected = fixture.twin(&twins, 0);
+    let most = expected.iter().map(|pixel| pixel.w).fold(0.0, f64::max);
+    assert!(most > fixture.whole(), "{most}: splats overlap");
+    let tolerance = |pixel: usize| {
+        let here = twins.iter().filter(|twin| fixture.rho(twin, pixel) <= 2.0);
+        // Each has its own error, and the sum so far is rounded when it is added.
+        here.map(|twin| fixture.summed_area_tolerance(twin, 0) + F32 * most).sum()
+    };
+    fixture.assert_close(sheet, &expected, tolerance, "many splats");
+}
