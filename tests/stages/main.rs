@@ -2,9 +2,9 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[path = "../common/mod.rs"]
-#[expect(dead_code, reason = "not every file needs all of it")]
 mod common;
 mod composite;
+mod plan;
 mod resolve;
 mod shade;
 mod splat;
