@@ -1,11 +1,23 @@
-// Composites one sheet buffer into the compositing buffer (eq. 2, front to back by default; SPEC §5).
+// Composites a group of sheet buffers into the compositing buffer (eq. 2, front to back by default; SPEC §5), in the tiles
+// that received splats, and notes which pixels are opaque (§6). One workgroup per tile.
+
+struct TileList {
+    args: Indirect,
+    tiles: array<u32>,
+}
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> band: Band;
-@group(0) @binding(2) var sheet: texture_2d<f32>;
+@group(0) @binding(2) var sheets: texture_2d_array<f32>;
 @group(0) @binding(3) var<storage, read_write> acc: array<vec4f>;
+@group(0) @binding(4) var<storage, read> composited: TileList;
+// The opacity buffer, cut off at the threshold: one bit per pixel, set from `opacity_threshold` on.
+@group(0) @binding(5) var<storage, read_write> opaque: array<u32>;
+@group(0) @binding(6) var<storage, read_write> opaque_tiles: array<u32>;
 
-override TILE: u32 = 16u;
+const ROWS = 8u;
+
+var<workgroup> opaque_rows: array<atomic<u32>, TILE>;
 
 // (1 - exp(-a)) / a, 1 at 0. The difference loses a small a's digits in f32; there the series is exact.
 fn absorbed(a: f32) -> f32 {
@@ -15,32 +27,72 @@ fn absorbed(a: f32) -> f32 {
     return (1.0 - exp(-a)) / a;
 }
 
-@compute @workgroup_size(TILE, TILE)
-fn main(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= frame.size.x || id.y >= band.rows {
-        return;
-    }
-    var s = textureLoad(sheet, vec2u(id.x, id.y + band.first_row), 0);
-    if s.a <= 0.0 {
-        return;
-    }
-    let at = id.y * frame.size.x + id.x;
-    let behind = acc[at];
+// One sheet over or under what is there.
+fn composite(behind: vec4f, sheet: vec4f) -> vec4f {
+    var s = sheet;
     switch frame.compositing {
         case EXPONENTIAL: {
             s *= absorbed(s.a);
         }
         case XRAY: {
-            acc[at] = behind + s;
-            return;
+            return behind + s;
         }
         default: {
             s /= max(s.a, 1.0);
         }
     }
     if frame.order == FRONT_TO_BACK {
-        acc[at] = behind + (1.0 - behind.a) * s;
-    } else {
-        acc[at] = s + (1.0 - s.a) * behind;
+        return behind + (1.0 - behind.a) * s;
+    }
+    return s + (1.0 - s.a) * behind;
+}
+
+@compute @workgroup_size(32, 8)
+fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workgroup: vec3u) {
+    let at = unfold(workgroup);
+    if at >= composited.args.count {
+        return;
+    }
+    let tile = composited.tiles[at];
+    let words = tile_grid(frame.size).x;
+    let corner = vec2u(tile % words, tile / words) * TILE;
+    if corner.y < band.first_row || corner.y >= band.first_row + band.rows {
+        return;
+    }
+    let layers = textureNumLayers(sheets);
+    for (var row = local.y; row < TILE; row += ROWS) {
+        let pixel = corner + vec2u(local.x, row);
+        // Pixels off the image count as opaque.
+        var is_opaque = true;
+        if all(pixel < frame.size) {
+            let slot = (pixel.y - band.first_row) * frame.size.x + pixel.x;
+            var image = acc[slot];
+            for (var i = 0u; i < layers; i += 1u) {
+                let layer = select(layers - 1u - i, i, frame.order == FRONT_TO_BACK);
+                let sheet = textureLoad(sheets, pixel, layer, 0);
+                if sheet.a > 0.0 {
+                    image = composite(image, sheet);
+                }
+            }
+            acc[slot] = image;
+            is_opaque = image.a >= frame.opacity_threshold;
+        }
+        if is_opaque {
+            atomicOr(&opaque_rows[row], 1u << local.x);
+        }
+    }
+    workgroupBarrier();
+    if local.y == 0u {
+        let y = corner.y + local.x;
+        if y < frame.size.y {
+            opaque[y * words + corner.x / TILE] = atomicLoad(&opaque_rows[local.x]);
+        }
+        if local.x == 0u {
+            var all_opaque = 0xffffffffu;
+            for (var row = 0u; row < TILE; row += 1u) {
+                all_opaque &= atomicLoad(&opaque_rows[row]);
+            }
+            opaque_tiles[tile] = select(0u, 1u, all_opaque == 0xffffffffu);
+        }
     }
 }

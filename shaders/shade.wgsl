@@ -1,22 +1,14 @@
-// Projects and shades voxels, once each, in bucket order (§5.1: the last, view-dependent step of the list's preparation).
-// SPEC §3 for classification and shading; gradients are those of the unwarped space (§4.2).
-
-struct Voxel {
-    index: u32,
-    value: f32,
-    normal: u32,
-    gradient_magnitude: f32,
-}
+// Projects and shades the voxels that are drawn for the first time, so once each (Fig. 12). SPEC §3 for classification and
+// shading; gradients are those of the unwarped space (§4.2).
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> voxels: array<Voxel>;
-// The buckets: indices into `voxels`, sorted by first slab.
-@group(0) @binding(2) var<storage, read> order: array<u32>;
-@group(0) @binding(3) var<storage, read_write> splats: array<Splat>;
 // The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0).
-@group(0) @binding(4) var<storage, read> control_points: array<vec4f>;
-
-override WORKGROUP_SIZE: u32 = 256u;
+@group(0) @binding(2) var<storage, read> control_points: array<vec4f>;
+// Indices into `voxels`.
+@group(0) @binding(3) var<storage, read> fresh: array<u32>;
+@group(0) @binding(4) var<storage, read> args: Indirect;
+@group(0) @binding(5) var<storage, read_write> splats: array<Splat>;
 
 // Piecewise linear between the control points first..end, clamped outside.
 fn ramp(first: u32, end: u32, value: f32) -> vec3f {
@@ -65,31 +57,19 @@ fn shade(color: vec3f, voxel: Voxel) -> vec3f {
     return clamp(color * (ambient + diffuse) + highlight, vec3f(0.0), vec3f(1.0));
 }
 
-@compute @workgroup_size(WORKGROUP_SIZE)
-fn main(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let slot = id.x + id.y * groups.x * WORKGROUP_SIZE;
-    if slot >= arrayLength(&order) {
+@compute @workgroup_size(64)
+fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
+    let at = unfold(workgroup) * SHADE_WORKGROUP + thread;
+    if at >= args.count {
         return;
     }
-    let voxel = voxels[order[slot]];
-    let row = frame.dims.x;
-    let slice = row * frame.dims.y;
-    let p = vec4f(
-        f32(voxel.index % row),
-        f32(voxel.index % slice / row),
-        f32(voxel.index / slice),
-        1.0,
-    );
+    let id = fresh[at];
+    let voxel = voxels[id];
     let color = ramp(0u, frame.ramps.x, voxel.value);
     let opacity = ramp(frame.ramps.x, frame.ramps.y, voxel.value).x;
     let gradient_opacity = ramp(frame.ramps.y, frame.ramps.z, voxel.gradient_magnitude).x;
     let m = amount(opacity * gradient_opacity);
     let c = shade(color, voxel) * m;
-    splats[slot] = Splat(
-        dot(frame.screen_from_voxel[0], p),
-        dot(frame.screen_from_voxel[1], p),
-        dot(frame.screen_from_voxel[2], p),
-        pack2x16float(c.rg),
-        pack2x16float(vec2f(c.b, m)),
-    );
+    let p = project(voxel.index);
+    splats[id] = Splat(p.x, p.y, p.z, pack2x16float(c.rg), pack2x16float(vec2f(c.b, m)));
 }

@@ -1,47 +1,52 @@
-//! Buckets (§5.1): which voxels touch which slab, without storing a voxel twice.
+//! Buckets (§5.1): which things touch which slab, without storing a thing twice.
 //!
-//! Voxels are sorted by the first slab they touch. No kernel touches more than `reach` slabs, so those that touch slab k
-//! lie between the first voxel whose first slab is k - reach + 1 and the last whose first slab is k: one contiguous range.
+//! Things (bricks of voxels) are sorted by the first slab (sheet group) they touch. None touches more than `reach` slabs, so
+//! those that touch slab k lie between the first whose first slab is k - reach + 1 and the last whose first slab is k: one
+//! contiguous range.
 
 use std::ops::Range;
 
-/// The buckets of one voxel list.
+/// The buckets of one list.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Buckets {
-    /// Indices into the voxel list, sorted by first slab; within one slab in list order.
+    /// Indices into the list, sorted by first slab; within one slab in list order.
     pub order: Vec<u32>,
-    /// `starts[i]..starts[i + 1]` of `order` are the voxels whose first slab is `base + i`.
+    /// `starts[i]..starts[i + 1]` of `order` are the things whose first slab is `base + i`.
     starts: Vec<u32>,
     base: i32,
     reach: i32,
 }
 
 impl Buckets {
-    /// Counting sort of voxels by their first slab. `None` leaves a voxel out. `reach` is the largest number of slabs that
-    /// one kernel touches.
-    pub fn sort(first_slabs: &[Option<i32>], reach: i32) -> Self {
-        let base = first_slabs.iter().flatten().copied().min().unwrap_or(0);
-        let end = first_slabs.iter().flatten().copied().max().map_or(base, |last| last + 1);
+    /// Counting sort of things by the first of the slabs they touch.
+    pub fn sort(touched: &[Range<i32>]) -> Self {
+        let base = touched.iter().map(|slabs| slabs.start).min().unwrap_or(0);
+        let end = touched.iter().map(|slabs| slabs.start + 1).max().unwrap_or(base);
         let mut starts = vec![0_u32; (end - base) as usize + 1];
-        for first in first_slabs.iter().flatten() {
-            starts[(first - base) as usize + 1] += 1;
+        for slabs in touched {
+            starts[(slabs.start - base) as usize + 1] += 1;
         }
         for i in 1..starts.len() {
             starts[i] += starts[i - 1];
         }
         let mut next = starts.clone();
-        let mut order = vec![0; starts.last().copied().unwrap_or(0) as usize];
-        for (voxel, first) in first_slabs.iter().enumerate() {
-            if let Some(first) = first {
-                let slot = &mut next[(first - base) as usize];
-                order[*slot as usize] = voxel as u32;
-                *slot += 1;
-            }
+        let mut order = vec![0; touched.len()];
+        for (thing, slabs) in touched.iter().enumerate() {
+            let slot = &mut next[(slabs.start - base) as usize];
+            order[*slot as usize] = thing as u32;
+            *slot += 1;
         }
+        let reach = touched.iter().map(|slabs| slabs.end - slabs.start).max().unwrap_or(0);
         Self { order, starts, base, reach }
     }
 
-    /// The range of `order` that holds every voxel that touches slab `k`.
+    /// The slabs that anything can touch.
+    pub fn range(&self) -> Option<Range<i32>> {
+        let last = self.base + self.starts.len() as i32 - 2;
+        (!self.order.is_empty()).then(|| self.base..last + self.reach)
+    }
+
+    /// The range of `order` that holds everything that touches slab `k`.
     pub fn touching(&self, k: i32) -> Range<u32> {
         let start = |slab: i32| self.starts[(slab - self.base).clamp(0, self.starts.len() as i32 - 1) as usize];
         start(k - self.reach + 1)..start(k + 1)
@@ -53,27 +58,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranges_hold_every_voxel_that_touches_a_slab() {
-        let firsts = [Some(3), None, Some(-2), Some(3), Some(0), Some(-2), Some(1)];
-        let buckets = Buckets::sort(&firsts, 2);
-        assert_eq!(buckets.order, [2, 5, 4, 6, 0, 3]);
+    fn ranges_hold_everything_that_touches_a_slab() {
+        let touched = [3..5, -2..0, 3..4, 0..2, -2..-1, 1..2];
+        let buckets = Buckets::sort(&touched);
+        assert_eq!(buckets.order, [1, 4, 3, 5, 0, 2]);
+        assert_eq!(buckets.range(), Some(-2..5));
         for k in -5..8 {
-            let touching: Vec<u32> =
-                buckets.order[buckets.touching(k).start as usize..buckets.touching(k).end as usize].to_vec();
-            let expected: Vec<u32> = buckets
-                .order
-                .iter()
-                .copied()
-                .filter(|&v| firsts[v as usize].is_some_and(|f| (k - 1..=k).contains(&f)))
-                .collect();
-            assert_eq!(touching, expected, "slab {k}");
+            let range = buckets.touching(k);
+            let held = &buckets.order[range.start as usize..range.end as usize];
+            let expected: Vec<u32> =
+                buckets.order.iter().copied().filter(|&t| (k - 1..=k).contains(&touched[t as usize].start)).collect();
+            assert_eq!(held, expected, "slab {k}");
+            assert!((0..6).all(|t| !touched[t as usize].contains(&k) || held.contains(&t)), "slab {k}");
         }
     }
 
     #[test]
-    fn no_voxels_no_ranges() {
-        let buckets = Buckets::sort(&[None, None], 5);
+    fn nothing_no_ranges() {
+        let buckets = Buckets::sort(&[]);
         assert!(buckets.order.is_empty());
         assert!(buckets.touching(0).is_empty());
+        assert_eq!(buckets.range(), None);
     }
 }

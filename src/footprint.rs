@@ -64,14 +64,15 @@ fn sections(kernel: &Kernel, width: f64) -> FootprintTable {
 }
 
 /// Layer i: `H(a, b, support) - H(a, b, z)` of eq. 3 at z = i / (layers - 1) of the support, and H's derivative in z, which
-/// is h. Counted from the rim, because a slab that just reaches into a kernel sees little of it: two entries counted from
+/// is h, per layer. Counted from the rim, because a slab that just reaches into a kernel sees little of it: two entries counted from
 /// the centre would cancel.
 fn summed_area(kernel: &Kernel) -> FootprintTable {
     let texel = kernel.support() / f64::from(SUMMED_AREA_SIZE - 1);
+    let spacing = kernel.support() / f64::from(SUMMED_AREA_LAYERS - 1);
     let texels = (0..SUMMED_AREA_LAYERS).flat_map(|layer| {
-        let z = kernel.support() * f64::from(layer) / f64::from(SUMMED_AREA_LAYERS - 1);
+        let z = spacing * f64::from(layer);
         quadrant(SUMMED_AREA_SIZE, texel).flat_map(move |(a, b)| {
-            let derivative = kernel.value(0.0) * (-kernel.falloff() * (a * a + b * b + z * z)).exp();
+            let derivative = spacing * kernel.value(0.0) * (-kernel.falloff() * (a * a + b * b + z * z)).exp();
             [kernel.cumulative_beyond(a * a + b * b, z) as f32, derivative as f32]
         })
     });

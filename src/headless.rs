@@ -6,11 +6,12 @@ use wgpu::{Adapter, Backends, Device, DeviceType, Instance, InstanceDescriptor, 
 
 use crate::error::{Error, RenderError};
 use crate::gpu::device::{DeviceError, DeviceRequirements};
+use crate::gpu::layout::Tally;
 use crate::gpu::readback;
 use crate::image::Image;
-use crate::renderer::{ClassifiedVolume, Renderer, RendererOptions};
+use crate::renderer::{ClassifiedVolume, PreparedFrame, Renderer, RendererOptions};
 use crate::scene::Scene;
-use crate::stats::Stats;
+use crate::stats::{Counts, Stats};
 use crate::volume::Volume;
 
 /// How to choose and open a device.
@@ -22,6 +23,8 @@ pub struct HeadlessOptions {
     pub requirements: Option<DeviceRequirements>,
     /// Format of the sheet buffer; see [`RendererOptions`].
     pub sheet_format: Option<TextureFormat>,
+    /// Sheets drawn by one quad; see [`RendererOptions`].
+    pub sheets_per_group: Option<u32>,
 }
 
 /// A device of its own and a renderer on it.
@@ -57,8 +60,15 @@ impl Headless {
             ..wgpu::DeviceDescriptor::default()
         }))
         .map_err(|source| DeviceError::RequestDevice { adapter: adapter.get_info().name, source })?;
-        let renderer_options = RendererOptions { sheet_format: options.sheet_format, ..RendererOptions::default() };
-        let renderer = Renderer::new(&device, &renderer_options)?;
+        let renderer_options = RendererOptions {
+            sheet_format: options.sheet_format,
+            sheets_per_group: options.sheets_per_group,
+            ..RendererOptions::default()
+        };
+        let renderer = match scoped(&device, || Renderer::new(&device, &renderer_options)) {
+            (renderer, None) => renderer?,
+            (_, Some(error)) => return Err(DeviceError::Pipelines { adapter: adapter.get_info().name, error }),
+        };
         Ok(Self { adapter, device, queue, renderer })
     }
 
@@ -95,22 +105,41 @@ impl Headless {
     /// # Errors
     /// If the scene asks for what the device or the renderer cannot do, or the device fails.
     pub fn render_volume(&self, volume: &Volume, scene: &Scene) -> Result<Rendering, RenderError> {
-        let scopes = [wgpu::ErrorFilter::Validation, wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Internal]
-            .map(|filter| self.device.push_error_scope(filter));
-        let rendering = self.render_unscoped(volume, scene);
-        // Scopes are a stack: the last pushed is the first popped. All must be popped even after an error.
-        let errors = scopes.into_iter().rev().filter_map(|scope| pollster::block_on(scope.pop())).collect::<Vec<_>>();
-        match errors.into_iter().next() {
-            Some(error) => Err(RenderError::Device(error.to_string())),
-            None => rendering,
+        let start = Instant::now();
+        let classified = self.classify(volume, scene)?;
+        let classify_ms = milliseconds_since(start);
+        let mut rendering = self.draw(&classified, scene)?;
+        rendering.stats.prepare_ms += classify_ms;
+        Ok(rendering)
+    }
+
+    /// Classifies a volume under the scene's transfer function, for any number of frames.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn classify(&self, volume: &Volume, scene: &Scene) -> Result<ClassifiedVolume, RenderError> {
+        self.scoped(|| Ok(ClassifiedVolume::new(&self.device, volume, &scene.transfer.resolve(volume))))
+    }
+
+    /// Draws one frame of a classified volume and reads it back. The scene's volume and transfer function are not looked at.
+    ///
+    /// # Errors
+    /// If the scene asks for what the device or the renderer cannot do, or the device fails.
+    pub fn draw(&self, volume: &ClassifiedVolume, scene: &Scene) -> Result<Rendering, RenderError> {
+        self.scoped(|| self.draw_unscoped(volume, scene))
+    }
+
+    /// What the device reports while `work` runs becomes an error.
+    fn scoped<T>(&self, work: impl FnOnce() -> Result<T, RenderError>) -> Result<T, RenderError> {
+        match scoped(&self.device, work) {
+            (result, None) => result,
+            (_, Some(error)) => Err(RenderError::Device(error)),
         }
     }
 
-    fn render_unscoped(&self, volume: &Volume, scene: &Scene) -> Result<Rendering, RenderError> {
+    fn draw_unscoped(&self, volume: &ClassifiedVolume, scene: &Scene) -> Result<Rendering, RenderError> {
         let start = Instant::now();
-        let transfer = scene.transfer.resolve(volume);
-        let classified = ClassifiedVolume::new(&self.device, volume, &transfer);
-        let frame = self.renderer.prepare(&self.device, &self.queue, &classified, scene)?;
+        let frame = self.renderer.prepare(&self.device, &self.queue, volume, scene)?;
         let prepare_ms = milliseconds_since(start);
 
         let start = Instant::now();
@@ -134,6 +163,7 @@ impl Headless {
         let frame_ms = milliseconds_since(start);
 
         let info = self.adapter.get_info();
+        let counts = self.count(volume, &frame)?;
         Ok(Rendering {
             image: Image { width, height, pixels: bytemuck::pod_collect_to_vec(&bytes) },
             stats: Stats {
@@ -142,13 +172,23 @@ impl Headless {
                 backend: info.backend.to_str().to_owned(),
                 width,
                 height,
-                counts: frame.counts,
-                gpu_bytes: frame.gpu_bytes + target.width() as u64 * u64::from(height) * 16,
+                counts,
+                gpu_bytes: frame.gpu_bytes() + target.width() as u64 * u64::from(height) * 16,
                 load_ms: 0.0,
                 prepare_ms,
                 frame_ms,
             },
         })
+    }
+}
+
+impl Headless {
+    /// The counts of a frame that was drawn.
+    fn count(&self, volume: &ClassifiedVolume, frame: &PreparedFrame) -> Result<Counts, RenderError> {
+        let bytes = readback::buffer(&self.device, &self.queue, frame.tally())?;
+        let tally: Tally = bytemuck::pod_read_unaligned(&bytes[..size_of::<Tally>()]);
+        let tiles = readback::buffer(&self.device, &self.queue, frame.tile_counts())?;
+        Ok(volume.count(&frame.plan, &tally, &bytemuck::pod_collect_to_vec(&tiles)))
     }
 }
 
@@ -159,9 +199,21 @@ impl Drop for Headless {
     }
 }
 
+/// The result of `work`, and the first error that the device reported meanwhile, if any.
+fn scoped<T>(device: &Device, work: impl FnOnce() -> T) -> (T, Option<String>) {
+    let scopes = [wgpu::ErrorFilter::Validation, wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Internal]
+        .map(|filter| device.push_error_scope(filter));
+    let result = work();
+    // Scopes are a stack: the last pushed is the first popped. All must be popped even after an error.
+    let errors: Vec<_> = scopes.into_iter().rev().filter_map(|scope| pollster::block_on(scope.pop())).collect();
+    (result, errors.first().map(ToString::to_string))
+}
+
 /// The adapter with `name` in its name, or the most capable one: a GPU before a software driver.
 fn choose_adapter(name: Option<&str>) -> Result<Adapter, DeviceError> {
     let mut descriptor = InstanceDescriptor::new_without_display_handle_from_env();
+    // Our own arguments need no validating dispatch before every indirect call.
+    descriptor.flags -= wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL;
     descriptor.backends &= Backends::PRIMARY;
     let instance = Instance::new(descriptor);
     let adapters = pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY));

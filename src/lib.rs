@@ -1,5 +1,40 @@
 //! Volume rendering by image-aligned sheet-buffer splatting on the GPU, through wgpu.
+//!
+//! The method is that of Mueller, Shareef, Huang and Crawfis, *High-Quality Splatting on Rectilinear Grids with Efficient
+//! Culling of Occluded Voxels* (IEEE TVCG 5(2), 1999). Sections (§), equations, tables and figures in these docs are those of
+//! that paper; "SPEC" is this project's specification of what an image must be, \[17\] is the paper's reference on
+//! antialiasing.
+//!
+//! # From a file to a picture
+//!
+//! ```text
+//! volume file → Volume ─ classify → voxels that take part, in bricks → VoxelLists on the GPU
+//! scene file  → Scene  ─ View, FramePlan: which bricks every group of sheets looks at (plain data)
+//!
+//! per group of sheets, on the GPU:
+//!   cull     which bricks, then which of their voxels are not hidden; those are shaded, once each
+//!   tiles    where the group's splats fall
+//!   splat    one quad per voxel adds its kernel sections to the group's sheet buffers
+//!   composite  the sheets into the compositing buffer, and which pixels are opaque now
+//!   occlude  the occlusion buffer: where a whole footprint is behind opaque pixels
+//! at the end:
+//!   resolve  the result over the background, into the host's target
+//! ```
+//!
+//! [`headless`] does all of it with a device of its own. A host with a device uses [`renderer`]. Settings are those of
+//! [`scene`]. Every stage has a plain f64 twin in
+//! [`reference`](mod@reference).
+//!
+//! # Glossary
+//!
+//! *voxel* a grid sample · *kernel* a radially symmetric function around each voxel of the warped grid ([`kernel`]) · *slab* the
+//! space between two slicing planes ([`slab`]) · *kernel section* the part of a kernel in one slab · *footprint* a section
+//! integrated along the view ray ([`footprint`]) · *sheet buffer* the image of one slab · *sheet group* consecutive sheets drawn
+//! together · *compositing buffer* the accumulated image · *opacity buffer* its alpha · *occlusion buffer* the box-filtered
+//! opacity buffer · *bucket* what touches one slab or group ([`bucket`]) · *brick* up to 4×4×4 neighbouring voxels ([`brick`]) ·
+//! *tile* a 32×32 pixel square.
 
+pub mod brick;
 pub mod bucket;
 pub mod camera;
 pub mod classify;
@@ -23,3 +58,8 @@ pub mod transfer_function;
 pub mod volume;
 
 pub use wgpu;
+
+/// The README's code, run as a doc test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

@@ -8,11 +8,10 @@ use rayon::prelude::*;
 use crate::bucket::Buckets;
 use crate::camera::{Camera, Projection, ViewBasis};
 use crate::error::RenderError;
+use crate::gpu::layout::Brick;
 use crate::grid_warp::{self, FootprintMap};
-use crate::kernel::Kernel;
 use crate::slab::SlabGrid;
 use crate::splatting::{Method, Order, Splatting};
-use crate::stats::Counts;
 use crate::volume::Grid;
 
 /// Side of a tile, pixels (§6).
@@ -85,106 +84,89 @@ impl View {
     }
 }
 
-/// A frame: which splats every slab draws, front to back.
+/// Tiles across and down an image.
+pub fn tile_grid(size: [u32; 2]) -> [u32; 2] {
+    size.map(|pixels| pixels.div_ceil(TILE))
+}
+
+/// A frame: which bricks every sheet group looks at, in the order the groups are composited.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FramePlan {
     /// The view.
     pub view: View,
-    /// For every voxel list the order its splats are stored in: indices into the list, sorted by first slab.
+    /// Sheets of a group.
+    pub sheets: u32,
+    /// For every voxel list its bricks, sorted by first group.
     pub orders: Vec<Vec<u32>>,
-    /// The slabs that any splat touches, in the order they are composited.
-    pub slabs: Vec<SlabPlan>,
-    /// What the frame is made of.
-    pub counts: Counts,
+    /// The groups that any brick may reach into.
+    pub groups: Vec<GroupPlan>,
 }
 
-/// One slab of a frame.
+/// One sheet group.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SlabPlan {
-    /// Warped depth of the slab's near plane, `k·Δ·λw`.
+pub struct GroupPlan {
+    /// Its first slab.
+    pub first_slab: i32,
+    /// Warped depth of that slab's near plane, `k·Δ·λw`.
     pub near: f64,
-    /// For every list the range of splats that can touch the slab.
-    pub splats: Vec<Range<u32>>,
+    /// For every list the range of its bricks that can reach into the group.
+    pub bricks: Vec<Range<u32>>,
 }
 
 impl FramePlan {
-    /// Projects and buckets the voxels (§5.1). `lists` holds voxels as indices into the volume.
-    pub fn new<'a>(
-        grid: &Grid,
-        lists: impl IntoIterator<Item = &'a [u32]>,
-        view: View,
-        kernel: &Kernel,
-        order: Order,
-    ) -> Self {
-        let lists: Vec<ListPlan> = lists.into_iter().map(|list| ListPlan::new(grid, list, &view, kernel)).collect();
-        let first = lists.iter().map(|list| list.slabs.start).min().unwrap_or(0);
-        let end = lists.iter().map(|list| list.slabs.end).max().unwrap_or(0);
-        let mut slabs: Vec<SlabPlan> = (first..end)
-            .map(|k| SlabPlan {
-                near: f64::from(k) * view.slabs.width,
-                splats: lists.iter().map(|list| list.buckets.touching(k)).collect(),
+    /// Buckets the bricks of every list (§5.1), in groups of `sheets` sheets.
+    pub fn new<'a>(lists: impl IntoIterator<Item = &'a [Brick]>, view: View, sheets: u32, order: Order) -> Self {
+        // A group is a thick slab.
+        let groups = SlabGrid { width: view.slabs.width * f64::from(sheets), ..view.slabs };
+        let row = view.screen_from_voxel[2];
+        let buckets: Vec<Buckets> = lists
+            .into_iter()
+            .map(|bricks| {
+                let touched: Vec<Range<i32>> = bricks
+                    .iter()
+                    .map(|brick| {
+                        let low = UVec3::new(brick.x, brick.y, brick.z).as_dvec3();
+                        let half = UVec3::new(brick.extent & 0xff, brick.extent >> 8 & 0xff, brick.extent >> 16)
+                            .as_dvec3()
+                            / 2.0;
+                        let z = row.dot((low + half).extend(1.0));
+                        let spread = row.truncate().abs().dot(half);
+                        groups.touched(z - spread).start..groups.touched(z + spread).end
+                    })
+                    .collect();
+                Buckets::sort(&touched)
             })
-            .filter(|slab| slab.splats.iter().any(|range| !range.is_empty()))
+            .collect();
+        let first = buckets.iter().filter_map(|b| b.range().map(|range| range.start)).min().unwrap_or(0);
+        let end = buckets.iter().filter_map(|b| b.range().map(|range| range.end)).max().unwrap_or(0);
+        let mut plans: Vec<GroupPlan> = (first..end)
+            .map(|group| GroupPlan {
+                first_slab: group * sheets as i32,
+                near: f64::from(group) * groups.width,
+                bricks: buckets.iter().map(|buckets| buckets.touching(group)).collect(),
+            })
+            .filter(|group| group.bricks.iter().any(|range| !range.is_empty()))
             .collect();
         if order == Order::BackToFront {
-            slabs.reverse();
+            plans.reverse();
         }
-
-        let tiles = u64::from(view.size[0].div_ceil(TILE)) * u64::from(view.size[1].div_ceil(TILE));
-        let sheets = (end - first) as u64;
-        let counts = Counts {
-            voxels_total: grid.dims.as_u64vec3().element_product(),
-            voxels_in_range: lists.iter().map(|list| list.voxels).sum(),
-            voxels_shaded: lists.iter().map(|list| list.buckets.order.len() as u64).sum(),
-            sections_total: lists.iter().map(|list| list.sections).sum(),
-            sections_rasterized: lists.iter().map(|list| list.sections_on_screen).sum(),
-            sheets,
-            tiles_total: tiles * sheets,
-            tiles_composited: tiles * slabs.len() as u64,
-        };
-        Self { view, orders: lists.into_iter().map(|list| list.buckets.order).collect(), slabs, counts }
+        Self { view, sheets, orders: buckets.into_iter().map(|buckets| buckets.order).collect(), groups: plans }
     }
 }
 
-/// One list's share of a frame.
-struct ListPlan {
-    /// The voxels on the screen, by slab.
-    buckets: Buckets,
-    /// The slabs that any kernel of the list touches, on the screen or off it.
-    slabs: Range<i32>,
-    voxels: u64,
-    sections: u64,
-    sections_on_screen: u64,
+/// Voxel–slab overlaps of positive length, wherever they fall on the screen, and the slabs from the first to the last that
+/// any kernel touches; `None` without voxels.
+pub fn count_sections(grid: &Grid, voxels: &[u32], view: &View) -> Option<(u64, Range<i32>)> {
+    voxels
+        .par_iter()
+        .map(|&index| {
+            let slabs = view.slabs.touched(view.project(grid.voxel_at(index)).z);
+            (slabs.len() as u64, slabs)
+        })
+        .reduce_with(add_sections)
 }
 
-impl ListPlan {
-    fn new(grid: &Grid, list: &[u32], view: &View, kernel: &Kernel) -> Self {
-        let half_box = view.footprint.half_box(kernel.support());
-        let image = DVec2::new(f64::from(view.size[0]), f64::from(view.size[1]));
-        let placed: Vec<(Range<i32>, bool)> = list
-            .par_iter()
-            .map(|&index| {
-                let p = view.project(grid.voxel_at(index));
-                // Pixel centres at half-integers: a box that holds none of the image's draws nothing.
-                let (low, high) = (p.truncate() - half_box, p.truncate() + half_box);
-                let on_screen = low.cmple(image - 0.5).all() && high.cmpge(DVec2::splat(0.5)).all();
-                (view.slabs.touched(p.z), on_screen)
-            })
-            .collect();
-        let sections = |on_screen_only: bool| -> u64 {
-            placed.iter().filter(|placed| placed.1 || !on_screen_only).map(|(slabs, _)| slabs.len() as u64).sum()
-        };
-        let reach = placed.iter().map(|(slabs, _)| slabs.len()).max().unwrap_or(0);
-        let first = placed.iter().map(|(slabs, _)| slabs.start).min().unwrap_or(0);
-        let end = placed.iter().map(|(slabs, _)| slabs.end).max().unwrap_or(0);
-        let firsts: Vec<Option<i32>> =
-            placed.iter().map(|(slabs, on_screen)| on_screen.then_some(slabs.start)).collect();
-        Self {
-            buckets: Buckets::sort(&firsts, reach as i32),
-            slabs: first..end,
-            voxels: list.len() as u64,
-            sections: sections(false),
-            sections_on_screen: sections(true),
-        }
-    }
+/// The sum of two results of [`count_sections`].
+pub fn add_sections(a: (u64, Range<i32>), b: (u64, Range<i32>)) -> (u64, Range<i32>) {
+    (a.0 + b.0, a.1.start.min(b.1.start)..a.1.end.max(b.1.end))
 }

@@ -55,11 +55,13 @@ pub struct Splatting {
     pub compositing: Compositing,
     /// In which order sheets are composited.
     pub order: Order,
-    /// Opacity from which a pixel counts as opaque, above 0, at most 1 (§6). Without effect so far.
+    /// Opacity from which a pixel counts as opaque, above 0, at most 1 (§6): with culling no channel differs by more than
+    /// 1 minus this from the image without.
     pub opacity_threshold: f64,
-    /// Early splat elimination (§6). Without effect so far.
+    /// Early splat elimination (§6): splats behind opaque pixels alone are not drawn. Without effect back to front and for
+    /// `Xray`.
     pub culling: bool,
-    /// Work on tiles that received splats only (§6). Without effect so far.
+    /// Composite only tiles that received splats (§6). Never changes the image.
     pub tiles: bool,
 }
 

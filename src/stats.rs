@@ -47,4 +47,10 @@ pub struct Counts {
     pub tiles_total: u64,
     /// Those of them that were composited.
     pub tiles_composited: u64,
+    /// Quads drawn, each for one voxel and a group of sheets.
+    pub quads: u64,
+    /// Tests of a brick against a sheet group.
+    pub bricks_tested: u64,
+    /// Those of them whose voxels were looked at.
+    pub bricks_visited: u64,
 }

@@ -63,6 +63,7 @@ impl Folder {
 
     fn run_in(&self, folder: &str, arguments: &str) -> Run {
         let output = Command::new(env!("CARGO_BIN_EXE_sheetsplat"))
+            .env("WGPU_ADAPTER_NAME", "llvmpipe")
             .args(arguments.split(' '))
             .current_dir(self.path(folder))
             .output()
@@ -134,6 +135,9 @@ const BLACK: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
 /// A small picture with everything between transparent and opaque in it.
 const SMALL: &str = "builtin:marschner-lobb:12 --set image.width=27 --set image.height=20 \
                      --set transfer.opacity=[[60,0],[200,0.6]] --set camera.direction=[0.3,0.9,-0.2]";
+
+/// The reference backend culls nothing.
+const UNCULLED: &str = "--set splatting.culling=false";
 
 const TRANSPARENT: &str = "--set image.background=[0.2,0.4,0.6,0.25]";
 
@@ -278,16 +282,19 @@ fn paths_are_relative_to_the_scene_file() {
     assert_eq!(folder.read("elsewhere/here.npy"), folder.read("elsewhere/file.npy"));
 }
 
-/// The keys of SPEC §8, no more and no less.
-const STATS_KEYS: [&str; 17] = [
+/// The keys of SPEC §8, and what the program counts besides; no more and no less.
+const STATS_KEYS: [&str; 20] = [
     "adapter",
     "backend",
+    "bricks_tested",
+    "bricks_visited",
     "driver",
     "frame_ms",
     "gpu_bytes",
     "height",
     "load_ms",
     "prepare_ms",
+    "quads",
     "sections_rasterized",
     "sections_total",
     "sheets",
@@ -415,7 +422,7 @@ fn stats_count_the_sections_of_the_specification() {
         let stats = folder.stats(&format!(
             "small.nrrd --set image.width=8 --set image.height=8 --set transfer.opacity=[[0,0.5]] \
              --set camera.direction={} --set volume.spacing={} --set splatting.radius={radius} \
-             --set splatting.slab_width={slab_width} --set camera.up=[0.1,0.2,1]",
+             --set splatting.slab_width={slab_width} --set camera.up=[0.1,0.2,1] {UNCULLED}",
             format!("{direction:?}").replace(' ', ""),
             format!("{spacing:?}").replace(' ', ""),
         ));
@@ -438,7 +445,7 @@ fn the_reference_backend_agrees_with_the_gpu() {
         "--set splatting.compositing=linear --set splatting.order=back-to-front",
         "--set splatting.compositing=xray --set splatting.slab_width=0.5",
     ] {
-        let (.., gpu) = folder.pixels(&format!("{SMALL} {sets}"));
+        let (.., gpu) = folder.pixels(&format!("{SMALL} {sets} {UNCULLED}"));
         let (.., reference) = folder.pixels(&format!("{SMALL} {sets} --backend reference"));
         let decibels = psnr(&gpu, &reference, BLACK);
         assert!(decibels >= 60.0, "{sets}: {decibels:.1} dB");
@@ -611,7 +618,7 @@ fn extremes_agree_with_the_reference() {
         "huge.nrrd",
         "huge.nrrd --set transfer.opacity=[[-3e38,0],[3e38,0.9]]",
     ] {
-        let (.., gpu) = folder.pixels(&format!("{case} {view}"));
+        let (.., gpu) = folder.pixels(&format!("{case} {view} {UNCULLED}"));
         let (.., reference) = folder.pixels(&format!("{case} {view} --backend reference"));
         assert!(gpu.iter().flatten().all(|channel| channel.is_finite()), "{case}");
         let decibels = psnr(&gpu, &reference, BLACK);
@@ -643,7 +650,7 @@ fn the_smallest_and_the_narrowest() {
         [("one", 1, 1), ("ball", 1, 1), ("ball", 1, 200), ("ball", 8192, 1), ("ball", 1, 8192), ("one", 3, 5)]
     {
         let render = format!("{volume}.nrrd --set image={{width={width},height={height}}}");
-        let (found_width, found_height, gpu) = folder.pixels(&render);
+        let (found_width, found_height, gpu) = folder.pixels(&format!("{render} {UNCULLED}"));
         assert_eq!((found_width, found_height), (width, height));
         let (.., reference) = folder.pixels(&format!("{render} --backend reference"));
         assert!(reference.iter().any(|pixel| pixel[0] > 0.0), "{render} is black");
@@ -658,12 +665,103 @@ fn the_smallest_and_the_narrowest() {
     }
 }
 
+/// What `bench` prints besides the last frame's stats.
+const BENCH_KEYS: [&str; 5] = ["first_frame_ms", "max_frame_ms", "median_frame_ms", "min_frame_ms", "peak_rss_mib"];
+
+impl Folder {
+    /// Runs what must print exactly one line of JSON.
+    fn bench(&self, arguments: &str) -> Value {
+        let run = self.run(&format!("bench {arguments}"));
+        assert_eq!(run.code, Some(0), "{arguments}\n{}", run.stderr);
+        let line = run.stdout.strip_suffix('\n').unwrap();
+        assert!(!line.contains('\n'), "one line: {}", run.stdout);
+        serde_json::from_str(line).unwrap()
+    }
+}
+
+#[test]
+fn bench_prints_one_line_of_json() {
+    let folder = Folder::new();
+    let before = folder.names();
+    for frames in ["--frames 1", "--frames 4 --rotate 30", "--frames 3 --rotate -7.5", "--rotate 0"] {
+        let report = folder.bench(&format!("{SMALL} {frames}"));
+        let mut expected: Vec<&str> = STATS_KEYS.into_iter().chain(BENCH_KEYS).collect();
+        expected.sort_unstable();
+        assert_eq!(keys(&report), expected);
+        let ms = |key: &str| {
+            let milliseconds = report[key].as_f64().unwrap();
+            assert!((0.0..600_000.0).contains(&milliseconds), "{key}: {milliseconds}");
+            milliseconds
+        };
+        let [min, median, max] = ["min_frame_ms", "median_frame_ms", "max_frame_ms"].map(ms);
+        assert!(0.0 < min && min <= median && median <= max, "{report:#}");
+        if frames == "--frames 1" {
+            assert_eq!([min, max], [median; 2], "{report:#}");
+        }
+        // A device, the pipelines and a frame take their time; this program and a driver take their memory.
+        assert!(ms("first_frame_ms") > 0.0 && ms("load_ms") >= 0.0, "{report:#}");
+        #[cfg(target_os = "linux")]
+        assert!(report["peak_rss_mib"].as_f64().unwrap() > 5.0, "{report:#}");
+        assert_eq!((count(&report, "width"), count(&report, "height")), (27, 20));
+        for key in ["adapter", "driver", "backend"] {
+            assert!(!report[key].as_str().unwrap().is_empty(), "{key}");
+        }
+    }
+    assert_eq!(folder.names(), before, "nothing is left");
+}
+
+/// Every frame is turned further, by the right hand about the camera's up, the first one not at all.
+#[test]
+fn bench_turns_the_camera() {
+    let folder = Folder::new();
+    folder.write_nrrd("box.nrrd", [7, 5, 3], [1.0, 1.0, 1.0], &[1.0; 105]);
+    let sets = "--set image.width=33 --set image.height=40 --set transfer.opacity=[[0,0.4]]";
+    let counts = |stats: &Value| {
+        let keys = ["sections_total", "sections_rasterized", "sheets", "quads", "voxels_shaded", "bricks_visited"];
+        keys.map(|key| count(stats, key))
+    };
+    // About (0, 0, 1) from (0, 1, 0), and about (0, 1, 0) from (1, 0, 0).
+    for (arguments, direction, up) in [
+        ("--frames 1 --rotate 90", "[-1,0,0]", "[0,0,1]"),
+        ("--frames 3 --rotate 30", "[-1,0,0]", "[0,0,1]"),
+        ("--frames 3 --rotate -30", "[1,0,0]", "[0,0,1]"),
+        ("--frames 2 --rotate 0", "[0,1,0]", "[0,0,1]"),
+        ("--frames 1 --rotate 26.56505117707799 --set camera.direction=[1,0,0]", "[2,0,-1]", "[0,1,0]"),
+    ] {
+        let report = folder.bench(&format!("box.nrrd {sets} --set camera.up={up} {arguments}"));
+        let stats = folder.stats(&format!("box.nrrd {sets} --set camera.up={up} --set camera.direction={direction}"));
+        assert_eq!(counts(&report), counts(&stats), "{arguments}: {report:#} {stats:#}");
+    }
+}
+
+#[test]
+fn bench_of_bad_input_is_2() {
+    assert_fails(2, "bench", &["INPUT"]);
+    assert_fails(2, "bench good.nrrd --frames 0", &["--frames", "0"]);
+    assert_fails(2, "bench good.nrrd --frames -1", &["-1"]);
+    assert_fails(2, "bench good.nrrd --frames many", &["--frames", "many"]);
+    assert_fails(2, "bench good.nrrd --rotate round", &["--rotate", "round"]);
+    assert_fails(2, "bench good.nrrd -o out.png", &["-o"]);
+    assert_fails(2, "bench gone.nrrd", &["gone.nrrd", "No such file"]);
+    assert_fails(2, "bench missing.toml", &["missing.toml", "No such file"]);
+    assert_fails(2, "bench short.nrrd", &["short.nrrd", "data", "32 bytes"]);
+    assert_fails(2, "bench unknown.toml", &["unknown.toml", "camera.zoom", "unknown key"]);
+    assert_fails(2, "bench builtin:brain", &["builtin:brain", "brain"]);
+    assert_fails(2, "bench good.nrrd --set splatting.slab_width=9", &["--set", "splatting.slab_width", "9"]);
+    assert_fails(2, "bench good.nrrd --set camera.projection=perspective", &["good.nrrd", "camera.projection"]);
+    assert_fails(1, "bench good.nrrd --adapter Voodoo", &["Voodoo"]);
+}
+
 #[test]
 fn help_and_version_are_results() {
     let folder = Folder::new();
-    for (arguments, words) in
-        [("--help", "render"), ("render --help", "--set"), ("--version", env!("CARGO_PKG_VERSION"))]
-    {
+    for (arguments, words) in [
+        ("--help", "render"),
+        ("--help", "bench"),
+        ("render --help", "--set"),
+        ("bench --help", "--frames"),
+        ("--version", env!("CARGO_PKG_VERSION")),
+    ] {
         let run = folder.run(arguments);
         assert_eq!(run.code, Some(0), "{arguments}: {}", run.stderr);
         assert!(run.stdout.contains(words), "{arguments}: {}", run.stdout);
@@ -681,7 +779,7 @@ fn the_quarter_head_agrees_with_the_reference() {
     let folder = Folder::new();
     let render =
         format!("{} --set camera.projection=orthographic --set image.width=96 --set image.height=96", scene.display());
-    let (.., gpu) = folder.pixels(&render);
+    let (.., gpu) = folder.pixels(&format!("{render} {UNCULLED}"));
     let (.., reference) = folder.pixels(&format!("{render} --backend reference"));
     let decibels = psnr(&gpu, &reference, BLACK);
     println!("{decibels:.1} dB");

@@ -5,7 +5,7 @@ use std::mem::offset_of;
 
 use naga::proc::Layouter;
 use naga::{AddressSpace, Handle, Module, Type, TypeInner};
-use sheetsplat::gpu::layout::{Band, Frame, Slab, Splat, Voxel};
+use sheetsplat::gpu::layout::{Band, Brick, BrickState, Frame, Group, Indirect, Splat, Tally, TileList, Visit, Voxel};
 use sheetsplat::gpu::shaders;
 
 /// A `repr(C)` struct as Rust lays it out: name, size, and members with name, offset and size.
@@ -13,6 +13,22 @@ struct Layout {
     name: &'static str,
     size: usize,
     members: Vec<(&'static str, usize, usize)>,
+    /// The member that goes on to the end of its buffer, an array of `u32`.
+    tail: Option<&'static str>,
+}
+
+impl Layout {
+    /// A struct that goes on with an array: `bytes` is the smallest binding that the passes allow.
+    fn with_tail(mut self, name: &'static str, bytes: usize) -> Self {
+        if self.members.last().is_none_or(|last| last.0 != name) {
+            self.members.push((name, self.size, 0));
+        }
+        if let Some(last) = self.members.last_mut() {
+            // Of an array without an end WGSL counts one.
+            last.2 = size_of::<u32>();
+        }
+        Self { size: bytes, tail: Some(name), ..self }
+    }
 }
 
 /// The size of the member that a function picks.
@@ -33,11 +49,12 @@ macro_rules! layout {
                 offset_of!($name, $member),
                 size_of_member(|it: &$name| &it.$member),
             )),*],
+            tail: None,
         }
     }};
 }
 
-fn shared() -> [Layout; 5] {
+fn shared() -> [Layout; 11] {
     [
         layout!(Voxel { index, value, normal, gradient_magnitude }),
         layout!(Splat { x_px, y_px, depth, rg, ba }),
@@ -57,13 +74,31 @@ fn shared() -> [Layout; 5] {
             support,
             falloff,
             slab_width,
+            opacity_threshold,
+            half_box,
+            reach,
             compositing,
             order,
+            culling,
+            tiles,
+        }),
+        layout!(Group { near, first_brick, brick_count, index }),
+        layout!(Brick { first, count, x, y, z, extent }),
+        layout!(BrickState { hidden, shaded }),
+        layout!(Visit { drawn, fresh, brick, first, count, padding }),
+        layout!(Indirect { draw, dispatch, count }),
+        layout!(TileList { args, tiles }).with_tail("tiles", size_of::<TileList>()),
+        layout!(Tally {
+            voxels_shaded,
+            sections_rasterized,
+            quads,
+            bricks_tested,
+            bricks_visited,
             padding_0,
             padding_1,
             padding_2,
-        }),
-        layout!(Slab { near }),
+        })
+        .with_tail("tiles", size_of::<(Tally, u32)>()),
         layout!(Band { first_row, rows }),
     ]
 }
@@ -74,6 +109,19 @@ fn modules() -> impl Iterator<Item = (&'static str, Module)> {
 
 fn find<'a>(module: &'a Module, name: &str) -> Option<(Handle<Type>, &'a Type)> {
     module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name))
+}
+
+/// Whether a type is an array that goes on to the end of its buffer, of `u32` without gaps.
+fn is_endless(module: &Module, ty: Handle<Type>) -> bool {
+    match module.types[ty].inner {
+        TypeInner::Array { base, size: naga::ArraySize::Dynamic, stride } => {
+            let element = &module.types[base].inner;
+            assert!(matches!(element, TypeInner::Scalar(naga::Scalar::U32) | TypeInner::Atomic(naga::Scalar::U32)));
+            assert_eq!(stride, 4);
+            true
+        }
+        _ => false,
+    }
 }
 
 #[test]
@@ -99,6 +147,11 @@ fn members_and_sizes_agree() {
                 .collect();
             if wgsl != layout.members {
                 failures.push(format!("{stage}: {}:\n  WGSL {wgsl:?}\n  Rust {:?}", layout.name, layout.members));
+            }
+            let tail =
+                members.iter().find(|member| is_endless(&module, member.ty)).and_then(|member| member.name.as_deref());
+            if tail != layout.tail {
+                failures.push(format!("{stage}: {}: goes on with {tail:?}, Rust: {:?}", layout.name, layout.tail));
             }
             // The size WGSL rounds a struct up to is also the smallest binding that holds one, and, as it is a multiple of
             // the alignment, the stride of an array of them.

@@ -5,24 +5,26 @@
 mod common;
 
 use glam::DVec3;
+use sheetsplat::brick;
 use sheetsplat::classify::classify;
 use sheetsplat::error::RenderError;
 use sheetsplat::gpu::device::{self, DeviceError, DeviceRequirements};
-use sheetsplat::gpu::layout::Voxel;
+use sheetsplat::gpu::layout::{Band, Brick, Voxel};
 use sheetsplat::gpu::targets::Targets;
 use sheetsplat::gpu::voxel_list::VoxelLists;
 use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
 use sheetsplat::splatting::{Compositing, FootprintForm};
+use sheetsplat::stats::Counts;
 use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::{Features, Limits, TextureFormat};
 
-use common::{F32, gpu, scene, transfer};
+use common::{F16, F32, gpu, scene, transfer};
 
 fn open(limits: Limits, features: Features, sheet_format: Option<TextureFormat>) -> Result<Headless, DeviceError> {
     let requirements = Some(DeviceRequirements { features, limits });
-    Headless::new(&HeadlessOptions { requirements, sheet_format, ..HeadlessOptions::default() })
+    Headless::new(&HeadlessOptions { requirements, sheet_format, ..common::lavapipe() })
 }
 
 /// A small head, translucent, so that every sheet counts.
@@ -56,11 +58,20 @@ fn webgpu_default_limits_and_no_features() {
     for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray] {
         for footprint in [FootprintForm::SummedArea, FootprintForm::Sections] {
             (scene.splatting.compositing, scene.splatting.footprint) = (compositing, footprint);
+            // Which pixels are opaque depends on the last bit of a sum: f16 and f32 cull differently.
+            scene.splatting.culling = false;
             let images = [&least, &full].map(|gpu| gpu.render_volume(&volume, &scene).unwrap().image);
             let (rms, _) = difference(&images[0], &images[1]);
             // f16 sheets are asked for 45 dB against the twin, f32 ones for far more.
             let decibels = -20.0 * rms.log10();
             assert!(decibels > 45.0, "{compositing:?} {footprint:?}: {decibels} dB");
+            // Culling's guarantee holds for f16 sheets, too: what is drawn is drawn as without culling. A colour may pass
+            // its alpha by an f16 rounding.
+            scene.splatting.culling = true;
+            let culled = least.render_volume(&volume, &scene).unwrap().image;
+            let (_, largest) = difference(&culled, &images[0]);
+            let allowed = (1.0 - scene.splatting.opacity_threshold) * (1.0 + 2.0 * F16) + 64.0 * F32;
+            assert!(largest <= allowed, "{compositing:?} {footprint:?}: culling changes a pixel by {largest}");
         }
     }
 }
@@ -69,31 +80,76 @@ fn webgpu_default_limits_and_no_features() {
 fn rgba32float_sheets_take_the_default_limits_too() {
     let gpu = open(Limits::default(), Features::FLOAT32_BLENDABLE, None).unwrap();
     assert_eq!(gpu.renderer().sheet_format(), TextureFormat::Rgba32Float);
+    // The 32 bytes of colour attachments that every device allows are two of them.
+    let pairs = Headless::new(&HeadlessOptions { sheets_per_group: Some(2), ..common::lavapipe() }).unwrap();
     let (volume, scene) = head();
-    let images = [gpu, self::gpu()].map(|gpu| gpu.render_volume(&volume, &scene).unwrap().image);
-    assert!(images[0].pixels == images[1].pixels, "the same device, the same work, the same bytes");
+    let renderings = [gpu, pairs].map(|gpu| gpu.render_volume(&volume, &scene).unwrap());
+    assert_eq!(renderings[0].stats.counts, renderings[1].stats.counts);
+    assert!(renderings[0].image == renderings[1].image, "the same device, the same work, the same bytes");
+}
+
+/// As many sheets per quad as the device's colour attachments hold: of both formats, four, two or one.
+#[test]
+fn attachments_limit_the_sheets_of_a_group() {
+    let (volume, mut scene) = head();
+    scene.splatting.culling = false;
+    let quads = |bytes: u32, attachments: u32, format: TextureFormat| {
+        let limits = Limits {
+            max_color_attachment_bytes_per_sample: bytes,
+            max_color_attachments: attachments,
+            ..Limits::default()
+        };
+        let gpu = open(limits, Features::FLOAT32_BLENDABLE, Some(format)).unwrap();
+        gpu.render_volume(&volume, &scene).unwrap().stats.counts
+    };
+    let fixed = |sheets: u32| {
+        let options = HeadlessOptions { sheets_per_group: Some(sheets), ..common::lavapipe() };
+        Headless::new(&options).unwrap().render_volume(&volume, &scene).unwrap().stats.counts
+    };
+    let of = [1, 2, 4].map(fixed);
+    assert!(of[0].quads > of[1].quads && of[1].quads > of[2].quads, "{of:?}");
+    let (half, single) = (TextureFormat::Rgba16Float, TextureFormat::Rgba32Float);
+    for (bytes, attachments, format, at) in [
+        (32, 8, half, 2),
+        (16, 8, half, 1),
+        (32, 3, half, 1),
+        (32, 1, half, 0),
+        (64, 4, single, 2),
+        (32, 8, single, 1),
+        (16, 8, single, 0),
+    ] {
+        assert_eq!(quads(bytes, attachments, format), of[at], "{bytes} bytes, {attachments} attachments, {format:?}");
+    }
 }
 
 #[test]
 fn small_bindings_split_voxels_and_image() {
     let (_, mut scene) = head();
     let volume = builtin::volume("head:64").unwrap();
-    let classified: Vec<Voxel> = classify(&volume, &scene.transfer.resolve(&volume));
-    let full = gpu();
-    for bytes in [16 << 10, 64 << 10] {
-        let limits = Limits { max_storage_buffer_binding_size: bytes, max_buffer_size: bytes, ..Limits::default() };
+    let (voxels, bricks) = brick::group(volume.grid(), &classify(&volume, &scene.transfer.resolve(&volume)));
+    let full = open(Limits::default(), Features::FLOAT32_BLENDABLE, None).unwrap();
+    // 32 rows of 150 pixels are 75 KiB: one tile's rows, and two.
+    for (bytes, bands) in [(76 << 10, 4), (150 << 10, 2)] {
+        let limits = Limits { max_storage_buffer_binding_size: bytes, ..Limits::default() };
         let small = open(limits, Features::FLOAT32_BLENDABLE, None).unwrap();
-        assert_eq!(small.device().limits().max_buffer_size, bytes, "wgpu gave what was asked for");
-        let lists = VoxelLists::upload(small.device(), &classified);
-        assert!(lists.lists.len() > 3, "{} lists", lists.lists.len());
-        assert_eq!(lists.len(), classified.len() as u64);
-        let targets = Targets::new(small.device(), [150, 110], TextureFormat::Rgba32Float).unwrap();
-        assert!(targets.bands.len() > 3, "{} bands", targets.bands.len());
+        assert_eq!(small.device().limits().max_storage_buffer_binding_size, bytes, "wgpu gave what was asked for");
+        let lists = VoxelLists::upload(small.device(), &voxels, &bricks);
+        assert!(lists.lists.len() > 2, "{} lists", lists.lists.len());
+        assert_eq!(lists.len(), voxels.len() as u64);
+        assert_lists_are_bricks(&lists, &voxels, &bricks);
+        let targets = Targets::new(small.device(), [150, 110], TextureFormat::Rgba32Float, 2).unwrap();
+        assert_eq!(targets.bands.len(), bands);
+        for (at, band) in targets.bands.iter().enumerate() {
+            let Band { first_row, rows } = band.band;
+            assert_eq!((first_row % 32, first_row + rows), (0, if at + 1 == bands { 110 } else { first_row + rows }));
+            assert!(band.acc.size() <= bytes && band.acc.size() == u64::from(rows) * 150 * 16);
+        }
+        scene.splatting.culling = false;
         for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray] {
             for background in [[0.0, 0.0, 0.0, 1.0], [0.2, 0.9, 0.5, 0.5]] {
                 (scene.splatting.compositing, scene.image.background) = (compositing, background);
                 let renderings = [&small, &full].map(|gpu| gpu.render_volume(&volume, &scene).unwrap());
-                assert_eq!(renderings[0].stats.counts, renderings[1].stats.counts);
+                assert_same_work(&renderings[0].stats.counts, &renderings[1].stats.counts);
                 let (_, largest) = difference(&renderings[0].image, &renderings[1].image);
                 // The lists change the order in which a sheet's footprints are added: no more than 64 of them meet in a
                 // pixel of a sheet. What that changes in a sheet's amount changes the image no more.
@@ -101,7 +157,43 @@ fn small_bindings_split_voxels_and_image() {
                 assert!(largest < 64.0 * F32 * sheets, "{bytes} bytes {compositing:?}: {largest}");
             }
         }
+        // With culling every list's bricks are culled by what all lists drew: the guarantee holds.
+        for compositing in [Compositing::Linear, Compositing::Exponential] {
+            (scene.splatting.compositing, scene.splatting.culling) = (compositing, false);
+            let without = small.render_volume(&volume, &scene).unwrap();
+            scene.splatting.culling = true;
+            let with = small.render_volume(&volume, &scene).unwrap();
+            let (_, largest) = difference(&with.image, &without.image);
+            let allowed = 1.0 - scene.splatting.opacity_threshold + 64.0 * F32;
+            assert!(largest <= allowed, "{bytes} bytes {compositing:?}: culling changes a pixel by {largest}");
+            let [with, without] = [with, without].map(|rendering| rendering.stats.counts.quads);
+            assert!(with < without, "{bytes} bytes {compositing:?}: nothing is culled");
+        }
     }
+}
+
+/// Every list is a run of whole bricks, numbered from its own start, and together they are all there is.
+fn assert_lists_are_bricks(lists: &VoxelLists, voxels: &[Voxel], bricks: &[Brick]) {
+    let (mut first, mut rest) = (0, bricks);
+    for list in &lists.lists {
+        let (these, later) = rest.split_at(list.bricks.len());
+        for (brick, all) in list.bricks.iter().zip(these) {
+            assert_eq!(Brick { first: brick.first + first, ..*brick }, *all);
+        }
+        let end = first as usize + list.indices.len();
+        let indices: Vec<u32> = voxels[first as usize..end].iter().map(|voxel| voxel.index).collect();
+        assert_eq!(list.indices, indices);
+        let last = list.bricks.last().unwrap();
+        assert_eq!((last.first + last.count) as usize, list.indices.len());
+        (first, rest) = (end as u32, later);
+    }
+    assert!(rest.is_empty());
+}
+
+/// Several lists do what one does; but every list is bucketed by itself, and shorter ranges of bricks are tested.
+fn assert_same_work(lists: &Counts, one: &Counts) {
+    assert!(lists.bricks_tested <= one.bricks_tested, "{} {}", lists.bricks_tested, one.bricks_tested);
+    assert_eq!(*lists, Counts { bricks_tested: lists.bricks_tested, ..*one });
 }
 
 #[test]
@@ -142,18 +234,20 @@ fn images_larger_than_a_texture_are_an_error() {
 }
 
 #[test]
-fn a_row_larger_than_a_binding_is_an_error() {
-    let limits = Limits { max_storage_buffer_binding_size: 1024, ..Limits::default() };
+fn a_row_of_tiles_larger_than_a_binding_is_an_error() {
+    let limits = Limits { max_storage_buffer_binding_size: 32 << 10, ..Limits::default() };
     let gpu = open(limits, Features::empty(), None).unwrap();
     let (volume, mut scene) = head();
     (scene.image.width, scene.image.height) = (65, 16);
     match gpu.render_volume(&volume, &scene) {
         Err(RenderError::Limit { what, limit, required, actual }) => {
             assert!(what.contains("image.width"), "{what}");
-            assert_eq!((limit, required, actual), ("max_storage_buffer_binding_size", 65 * 16, 1024));
+            assert_eq!((limit, required, actual), ("max_storage_buffer_binding_size", 65 * 32 * 16, 32 << 10));
         }
         other => panic!("{other:?}"),
     }
+    (scene.image.width, scene.image.height) = (64, 100);
+    gpu.render_volume(&volume, &scene).unwrap();
 }
 
 #[test]
@@ -178,9 +272,9 @@ fn a_limit_that_is_too_small_is_named() {
         ("max_texture_array_layers", 128, 64, Limits { max_texture_array_layers: 64, ..Limits::default() }),
         (
             "max_storage_buffers_per_shader_stage",
-            4,
-            3,
-            Limits { max_storage_buffers_per_shader_stage: 3, ..Limits::default() },
+            8,
+            7,
+            Limits { max_storage_buffers_per_shader_stage: 7, ..Limits::default() },
         ),
         (
             "max_compute_invocations_per_workgroup",

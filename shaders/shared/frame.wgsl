@@ -15,11 +15,13 @@ struct Frame {
     support: f32,
     falloff: f32,
     slab_width: f32,
+    opacity_threshold: f32,
+    half_box: vec2f,
+    reach: vec2u,
     compositing: u32,
     order: u32,
-    padding_0: u32,
-    padding_1: u32,
-    padding_2: u32,
+    culling: u32,
+    tiles: u32,
 }
 
 const LINEAR = 0u;
@@ -28,3 +30,10 @@ const XRAY = 2u;
 
 const FRONT_TO_BACK = 0u;
 const BACK_TO_FRONT = 1u;
+
+// Side of a tile in pixels: one word of an opacity mask per row of a tile (§6).
+const TILE = 32u;
+
+fn tile_grid(size: vec2u) -> vec2u {
+    return (size + TILE - 1u) / TILE;
+}

@@ -1,9 +1,12 @@
 //! Bind group layouts and bind groups in few words.
 
 use wgpu::{
-    BindGroup, BindGroupLayout, BindGroupLayoutEntry, BindingResource, BindingType, BufferBindingType, Device,
-    ShaderStages, TextureSampleType, TextureViewDimension,
+    BindGroup, BindGroupLayout, BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
+    ComputePass, ComputePipeline, Device, ShaderStages, TextureSampleType, TextureViewDimension,
 };
+
+use super::layout::Indirect;
+use super::shaders::Shader;
 
 /// What a shader declares at one binding.
 pub type Slot = (ShaderStages, BindingType);
@@ -19,6 +22,12 @@ pub fn storage<T>(stages: ShaderStages, read_only: bool) -> Slot {
     let min_binding_size = wgpu::BufferSize::new(size_of::<T>() as u64);
     let ty = BufferBindingType::Storage { read_only };
     (stages, BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size })
+}
+
+/// The first `T` of a buffer that holds one at every dynamic offset.
+pub fn at_offset<T>(buffer: &Buffer) -> BindingResource<'_> {
+    let size = wgpu::BufferSize::new(size_of::<T>() as u64);
+    BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size })
 }
 
 /// A float texture that is read texel by texel, so that its format need not be filterable.
@@ -50,4 +59,51 @@ pub fn bind(device: &Device, label: &str, layout: &BindGroupLayout, resources: &
         .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource: resource.clone() })
         .collect();
     device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
+}
+
+/// A compute shader with its one bind group's layout.
+#[derive(Debug)]
+pub struct ComputeStage {
+    label: String,
+    layout: BindGroupLayout,
+    pipeline: ComputePipeline,
+}
+
+impl ComputeStage {
+    /// Compiles an entry point of a shader, with the given bindings in order and pipeline constants.
+    pub fn new(device: &Device, shader: Shader, entry: &str, slots: &[Slot], constants: &[(&str, f64)]) -> Self {
+        let label = format!("sheetsplat.{}", shader.stage);
+        let (layout, pipeline_layout) = layout(device, &label, slots);
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(&label),
+            layout: Some(&pipeline_layout),
+            module: &shader.module(device),
+            entry_point: Some(entry),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants,
+                ..wgpu::PipelineCompilationOptions::default()
+            },
+            cache: None,
+        });
+        Self { label, layout, pipeline }
+    }
+
+    /// Binds resources in order.
+    pub fn bind(&self, device: &Device, resources: &[BindingResource<'_>]) -> BindGroup {
+        bind(device, &self.label, &self.layout, resources)
+    }
+
+    /// Dispatches a fixed number of workgroups.
+    pub fn dispatch(&self, pass: &mut ComputePass<'_>, group: &BindGroup, offsets: &[u32], workgroups: u32) {
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, group, offsets);
+        pass.dispatch_workgroups(workgroups, 1, 1);
+    }
+
+    /// Dispatches as many workgroups as an [`Indirect`] says.
+    pub fn dispatch_indirect(&self, pass: &mut ComputePass<'_>, group: &BindGroup, offsets: &[u32], args: &Buffer) {
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, group, offsets);
+        pass.dispatch_workgroups_indirect(args, std::mem::offset_of!(Indirect, dispatch) as u64);
+    }
 }

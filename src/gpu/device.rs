@@ -22,6 +22,14 @@ pub enum DeviceError {
         /// What wgpu said.
         source: wgpu::RequestDeviceError,
     },
+    /// The device could not compile the renderer.
+    #[error("adapter \"{adapter}\" cannot run the renderer: {error}")]
+    Pipelines {
+        /// The adapter's name.
+        adapter: String,
+        /// What wgpu said.
+        error: String,
+    },
     /// A feature is missing that the options ask for.
     #[error("device feature: required {required:?}, actual: {actual:?}")]
     MissingFeatures {
@@ -63,6 +71,8 @@ impl DeviceRequirements {
             max_texture_dimension_2d: available.max_texture_dimension_2d,
             max_buffer_size: available.max_buffer_size,
             max_storage_buffer_binding_size: available.max_storage_buffer_binding_size,
+            // Four sheets of RGBA32F.
+            max_color_attachment_bytes_per_sample: available.max_color_attachment_bytes_per_sample.min(64),
             ..Limits::default()
         };
         Self { features: adapter.features() & WANTED_FEATURES, limits }
@@ -77,7 +87,7 @@ pub fn check(device: &Device) -> Result<(), DeviceError> {
     let limits = device.limits();
     let needs: [(&'static str, u64, u64); 8] = [
         ("max_texture_array_layers", 128, limits.max_texture_array_layers.into()),
-        ("max_storage_buffers_per_shader_stage", 4, limits.max_storage_buffers_per_shader_stage.into()),
+        ("max_storage_buffers_per_shader_stage", 8, limits.max_storage_buffers_per_shader_stage.into()),
         ("max_uniform_buffers_per_shader_stage", 2, limits.max_uniform_buffers_per_shader_stage.into()),
         (
             "max_dynamic_uniform_buffers_per_pipeline_layout",
@@ -86,12 +96,23 @@ pub fn check(device: &Device) -> Result<(), DeviceError> {
         ),
         ("max_compute_invocations_per_workgroup", 256, limits.max_compute_invocations_per_workgroup.into()),
         ("max_compute_workgroup_size_x", 256, limits.max_compute_workgroup_size_x.into()),
-        ("max_compute_workgroups_per_dimension", 1024, limits.max_compute_workgroups_per_dimension.into()),
+        ("max_compute_workgroups_per_dimension", 32768, limits.max_compute_workgroups_per_dimension.into()),
         ("max_color_attachment_bytes_per_sample", 16, limits.max_color_attachment_bytes_per_sample.into()),
     ];
     match needs.into_iter().find(|(_, required, actual)| actual < required) {
         Some((limit, required, actual)) => Err(DeviceError::Limit { limit, required, actual }),
         None => Ok(()),
+    }
+}
+
+/// How many sheets one quad can draw into: as many colour attachments as the device allows, up to 4.
+pub fn sheets_per_group(device: &Device, format: TextureFormat) -> u32 {
+    let limits = device.limits();
+    let bytes = format.target_pixel_byte_cost().unwrap_or(16);
+    match limits.max_color_attachments.min(limits.max_color_attachment_bytes_per_sample / bytes) {
+        0 | 1 => 1,
+        2 | 3 => 2,
+        _ => 4,
     }
 }
 

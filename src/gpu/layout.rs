@@ -67,24 +67,128 @@ pub struct Frame {
     pub falloff: f32,
     /// Slab width in the warped grid.
     pub slab_width: f32,
+    /// Opacity from which a pixel counts as opaque.
+    pub opacity_threshold: f32,
+    /// Half the footprint's screen box, pixels.
+    pub half_box: [f32; 2],
+    /// Half the occlusion buffer's box filter, whole pixels on either side of a pixel.
+    pub reach: [u32; 2],
     /// 0 linear, 1 exponential, 2 xray.
     pub compositing: u32,
     /// 0 front to back, 1 back to front.
     pub order: u32,
+    /// 1 with early splat elimination, 0 without.
+    pub culling: u32,
+    /// 1 to composite only tiles that received splats, 0 to composite all.
+    pub tiles: u32,
+}
+
+/// One sheet group and one list's bricks that may reach into it.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Group {
+    /// Warped depth of the group's near plane.
+    pub near: f32,
+    /// First of its bricks in the bucket order.
+    pub first_brick: u32,
+    /// Number of its bricks.
+    pub brick_count: u32,
+    /// The group's number in the frame.
+    pub index: u32,
+}
+
+/// At most 64 neighbouring voxels of a list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Brick {
+    /// First of its voxels in the list.
+    pub first: u32,
+    /// Number of its voxels.
+    pub count: u32,
+    /// Least x of its voxels.
+    pub x: u32,
+    /// Least y.
+    pub y: u32,
+    /// Least z.
+    pub z: u32,
+    /// Greatest minus least x, y and z, in bytes 0, 1 and 2.
+    pub extent: u32,
+}
+
+/// What a frame has found out about a brick: one bit per voxel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct BrickState {
+    /// Hidden once, hidden for good.
+    pub hidden: [u32; 2],
+    /// Shaded already.
+    pub shaded: [u32; 2],
+}
+
+/// A brick that the current sheet group visits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Visit {
+    /// The voxels that are drawn.
+    pub drawn: [u32; 2],
+    /// Those of them that are drawn for the first time.
+    pub fresh: [u32; 2],
+    /// The brick.
+    pub brick: u32,
+    /// First of its voxels in the list.
+    pub first: u32,
+    /// Number of its voxels.
+    pub count: u32,
+    /// Unused.
+    pub padding: u32,
+}
+
+/// Arguments of an indirect draw and an indirect dispatch of the same number of things.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Indirect {
+    /// Indices per instance, instances, first index, base vertex, first instance: one quad per thing, [`QUADS`] quads per
+    /// instance.
+    pub draw: [u32; 5],
+    /// Workgroups along x, y and z.
+    pub dispatch: [u32; 3],
+    /// The number of things.
+    pub count: u32,
+}
+
+/// Quads drawn by one instance.
+pub const QUADS: u16 = 16;
+
+/// The start of a list of tiles, which goes on to its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct TileList {
+    /// How many there are.
+    pub args: Indirect,
+    /// The first of them.
+    pub tiles: [u32; 1],
+}
+
+/// Counts of a frame; the flags of the tiles follow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Tally {
+    /// Voxels shaded.
+    pub voxels_shaded: u32,
+    /// Voxel–sheet pairs drawn.
+    pub sections_rasterized: u32,
+    /// Quads drawn.
+    pub quads: u32,
+    /// Bricks tested.
+    pub bricks_tested: u32,
+    /// Bricks whose voxels were looked at.
+    pub bricks_visited: u32,
     /// Unused.
     pub padding_0: u32,
     /// Unused.
     pub padding_1: u32,
     /// Unused.
     pub padding_2: u32,
-}
-
-/// One slab.
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct Slab {
-    /// Warped depth of the slab's near plane, `k·Δ·λw`.
-    pub near: f32,
 }
 
 /// Rows of the image whose compositing buffer is one binding.

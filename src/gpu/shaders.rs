@@ -21,17 +21,30 @@ macro_rules! shader {
     };
 }
 
-/// Projects and shades voxels.
-pub const SHADE: Shader = shader!("shade", "frame", "splat");
-/// Draws footprints into the sheet buffer.
-pub const SPLAT: Shader = shader!("splat", "frame", "splat");
-/// Composites a sheet buffer.
-pub const COMPOSITE: Shader = shader!("composite", "frame", "band");
+/// Which bricks a sheet group visits.
+pub const CULL_BRICKS: Shader = shader!("cull_bricks", "frame", "brick", "tally");
+/// Which voxels it draws.
+pub const CULL_VOXELS: Shader = shader!("cull_voxels", "frame", "brick", "tally", "voxel");
+/// Those voxels in a row.
+pub const COMPACT: Shader = shader!("compact", "brick", "tally");
+/// Shades those that were not shaded before.
+pub const SHADE: Shader = shader!("shade", "frame", "brick", "voxel", "splat");
+/// The tiles they touch.
+pub const TILES: Shader = shader!("tiles", "frame", "brick", "tally");
+/// Zeroes the sheet buffers there.
+pub const CLEAR: Shader = shader!("clear", "frame", "brick");
+/// Draws footprints into the sheet buffers.
+pub const SPLAT: Shader = shader!("splat", "frame", "brick", "splat");
+/// Composites the sheet buffers.
+pub const COMPOSITE: Shader = shader!("composite", "frame", "brick", "band");
+/// Computes the occlusion buffer.
+pub const OCCLUDE: Shader = shader!("occlude", "frame", "brick");
 /// Lays the result over the background.
 pub const RESOLVE: Shader = shader!("resolve", "frame", "band");
 
 /// Every shader, in the order of the data flow.
-pub const ALL: [Shader; 4] = [SHADE, SPLAT, COMPOSITE, RESOLVE];
+pub const ALL: [Shader; 10] =
+    [CULL_BRICKS, CULL_VOXELS, COMPACT, SHADE, TILES, CLEAR, SPLAT, COMPOSITE, OCCLUDE, RESOLVE];
 
 impl Shader {
     /// Compiles the shader.

@@ -1,20 +1,29 @@
-//! What depends on the image's size alone: sheet buffer and compositing buffer.
+//! What depends on the image's size alone: sheet buffers, compositing buffer, opacity and occlusion buffers.
 
 use wgpu::util::DeviceExt;
 use wgpu::{Buffer, BufferUsages, Device, Texture, TextureFormat, TextureUsages};
 
 use super::layout::Band;
 use crate::error::RenderError;
+use crate::plan::{TILE, tile_grid};
 
 /// Buffers of one image size.
 #[derive(Debug)]
 pub struct Targets {
     /// Width and height, pixels.
     pub size: [u32; 2],
-    /// The sheet buffer.
-    pub sheet: Texture,
+    /// The sheet buffers of a group, one per layer.
+    pub sheets: Texture,
     /// The compositing buffer, in bands of rows that each fit one storage binding.
     pub bands: Vec<BandBuffer>,
+    /// The opacity buffer cut off at the threshold: a bit per pixel, 32 pixels of a row per word.
+    pub opaque: Buffer,
+    /// The opacity buffer eroded down the columns, half way to the occlusion buffer.
+    pub opaque_columns: Buffer,
+    /// The occlusion buffer (§6).
+    pub occluded: Buffer,
+    /// A word per tile: 1 where all its pixels are opaque.
+    pub opaque_tiles: Buffer,
 }
 
 /// One band of the compositing buffer.
@@ -34,7 +43,7 @@ const ACC_BYTES: u64 = 16;
 impl Targets {
     /// # Errors
     /// If the image is larger than the device's textures may be, or a row of it than a binding.
-    pub fn new(device: &Device, size: [u32; 2], sheet_format: TextureFormat) -> Result<Self, RenderError> {
+    pub fn new(device: &Device, size: [u32; 2], sheet_format: TextureFormat, sheets: u32) -> Result<Self, RenderError> {
         let limits = device.limits();
         let limit = |what, limit, required: u64, actual: u64| {
             if required > actual { Err(RenderError::Limit { what, limit, required, actual }) } else { Ok(()) }
@@ -45,16 +54,17 @@ impl Targets {
         let texture = limits.max_texture_dimension_2d.into();
         limit("image.width", "max_texture_dimension_2d", width.into(), texture)?;
         limit("image.height", "max_texture_dimension_2d", height.into(), texture)?;
-        limit("a row of image.width", "max_storage_buffer_binding_size", row_bytes, binding)?;
+        // Bands end where tiles end.
+        limit("32 rows of image.width", "max_storage_buffer_binding_size", row_bytes * u64::from(TILE), binding)?;
 
-        let rows_per_band = (binding / row_bytes).min(height.into()) as u32;
+        let rows_per_band = (binding / row_bytes / u64::from(TILE)).min(height.div_ceil(TILE).into()) as u32 * TILE;
         let bands = (0..height)
             .step_by(rows_per_band as usize)
             .map(|first_row| BandBuffer::new(device, width, first_row, rows_per_band.min(height - first_row)))
             .collect();
-        let sheet = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("sheetsplat.sheet"),
-            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        let sheets = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("sheetsplat.sheets"),
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: sheets },
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
@@ -65,14 +75,34 @@ impl Targets {
                 | TextureUsages::COPY_DST,
             view_formats: &[],
         });
-        Ok(Self { size, sheet, bands })
+        let mask = |label, words: u32| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: u64::from(words) * 4,
+                usage: BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC,
+                mapped_at_creation: false,
+            })
+        };
+        let [columns, rows] = tile_grid(size);
+        Ok(Self {
+            size,
+            sheets,
+            bands,
+            opaque: mask("sheetsplat.opaque", columns * height),
+            opaque_columns: mask("sheetsplat.opaque_columns", columns * height),
+            occluded: mask("sheetsplat.occluded", columns * height),
+            opaque_tiles: mask("sheetsplat.opaque_tiles", columns * rows),
+        })
     }
 
     /// Bytes of GPU memory.
     pub fn gpu_bytes(&self) -> u64 {
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
-        let sheet = pixels * u64::from(self.sheet.format().block_copy_size(None).unwrap_or(0));
-        sheet + self.bands.iter().map(|band| band.acc.size() + band.uniform.size()).sum::<u64>()
+        let texel = u64::from(self.sheets.format().block_copy_size(None).unwrap_or(0));
+        let sheets = pixels * texel * u64::from(self.sheets.depth_or_array_layers());
+        let masks = [&self.opaque, &self.opaque_columns, &self.occluded, &self.opaque_tiles];
+        let masks: u64 = masks.map(Buffer::size).iter().sum();
+        sheets + masks + self.bands.iter().map(|band| band.acc.size() + band.uniform.size()).sum::<u64>()
     }
 }
 

@@ -2,14 +2,14 @@
 
 use std::ops::{Add, Mul};
 
-use glam::{DMat2, DVec3, DVec4};
+use glam::{DMat2, DVec2, DVec3, DVec4};
 
-use super::layout::{Frame, Slab};
+use super::layout::{Frame, Group};
 use crate::kernel::Kernel;
-use crate::plan::{SlabPlan, View};
+use crate::plan::{FramePlan, View};
 use crate::scene::Scene;
 use crate::shading::{Light, Shading};
-use crate::splatting::{Compositing, Order};
+use crate::splatting::{Compositing, Order, Splatting};
 use crate::transfer_function::{Ramp, TransferFunction};
 use crate::volume::Grid;
 
@@ -27,6 +27,7 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
     let [r, g, b, a] = scene.image.background;
     let matrix = |m: &DMat2| m.to_cols_array().map(|x| x as f32);
     let [color_end, opacity_end, gradient_opacity_end] = ramps.ends;
+    let half_box = view.footprint.half_box(kernel.support());
     Frame {
         screen_from_voxel: view.screen_from_voxel.map(|row| row.as_vec4().to_array()),
         pixels_from_footprint: matrix(&view.footprint.pixels_from_footprint),
@@ -43,6 +44,10 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
         support: kernel.support() as f32,
         falloff: kernel.falloff() as f32,
         slab_width: view.slabs.width as f32,
+        opacity_threshold: scene.splatting.opacity_threshold as f32,
+        half_box: half_box.as_vec2().to_array(),
+        // A centre lies up to half a pixel from its pixel's; the slack covers f32 coordinates.
+        reach: (half_box + 0.5 + 0.01).floor().min(DVec2::splat(MAX_REACH)).as_uvec2().to_array(),
         compositing: match scene.splatting.compositing {
             Compositing::Linear => 0,
             Compositing::Exponential => 1,
@@ -52,19 +57,39 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
             Order::FrontToBack => 0,
             Order::BackToFront => 1,
         },
-        padding_0: 0,
-        padding_1: 0,
-        padding_2: 0,
+        culling: u32::from(culls(&scene.splatting, half_box)),
+        tiles: u32::from(scene.splatting.tiles),
     }
 }
 
-/// One [`Slab`] every `stride` bytes.
-pub fn slabs(slabs: &[SlabPlan], stride: usize) -> Vec<u8> {
-    let mut bytes = vec![0; stride * slabs.len().max(1)];
-    for (slot, slab) in bytes.chunks_exact_mut(stride).zip(slabs) {
-        slot[..size_of::<Slab>()].copy_from_slice(bytemuck::bytes_of(&Slab { near: slab.near as f32 }));
+/// One [`Group`] every `stride` bytes: group after group, and of every group list after list.
+pub fn groups(plan: &FramePlan, stride: usize) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for (index, group) in (0..).zip(&plan.groups) {
+        for bricks in &group.bricks {
+            let uniform = Group {
+                near: group.near as f32,
+                first_brick: bricks.start,
+                brick_count: bricks.end - bricks.start,
+                index,
+            };
+            bytes.extend_from_slice(bytemuck::bytes_of(&uniform));
+            bytes.resize(bytes.len().next_multiple_of(stride), 0);
+        }
     }
+    bytes.resize(bytes.len().max(stride), 0);
     bytes
+}
+
+/// Half the largest box filter, pixels. Few footprints larger than that fit the screen, and hardly one is ever hidden.
+const MAX_REACH: f64 = 256.0;
+
+/// Early splat elimination needs the front first, something that hides (SPEC §5), and footprints smaller than the screen.
+fn culls(splatting: &Splatting, half_box: DVec2) -> bool {
+    splatting.culling
+        && splatting.order == Order::FrontToBack
+        && splatting.compositing != Compositing::Xray
+        && half_box.max_element() <= MAX_REACH
 }
 
 /// `hv = normalize(l + c)`, 0 where they cancel (SPEC §3).

@@ -3,7 +3,7 @@
 use wgpu::util::DeviceExt;
 use wgpu::{Buffer, BufferUsages, Device};
 
-use super::layout::{Splat, Voxel};
+use super::layout::{Brick, BrickState, Splat, Visit, Voxel};
 
 /// All voxels that take part, in lists that each fit one storage binding.
 #[derive(Debug)]
@@ -15,26 +15,29 @@ pub struct VoxelLists {
 /// One list.
 #[derive(Debug)]
 pub struct VoxelList {
-    /// Where each voxel is, for bucketing.
+    /// Where each voxel is, for counting sections.
     pub indices: Vec<u32>,
-    /// `[Voxel]`, in the order of `indices`.
-    pub voxels: Buffer,
+    /// Its bricks; their voxels follow one another.
+    pub bricks: Vec<Brick>,
+    /// `[Voxel]`.
+    pub voxel_buffer: Buffer,
+    /// `[Brick]`.
+    pub brick_buffer: Buffer,
 }
 
 impl VoxelLists {
-    /// Uploads classified voxels.
-    pub fn upload(device: &Device, voxels: &[Voxel]) -> Self {
-        let lists = voxels
-            .chunks(max_list_length(&device.limits()))
-            .map(|voxels| VoxelList {
-                indices: voxels.iter().map(|voxel| voxel.index).collect(),
-                voxels: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                    label: Some("sheetsplat.voxels"),
-                    contents: bytemuck::cast_slice(voxels),
-                    usage: BufferUsages::STORAGE,
-                }),
-            })
-            .collect();
+    /// Uploads classified voxels, sorted by brick.
+    pub fn upload(device: &Device, voxels: &[Voxel], bricks: &[Brick]) -> Self {
+        let longest = max_list_length(&device.limits());
+        let mut lists = Vec::new();
+        let mut rest = bricks;
+        while let Some(first) = rest.first().map(|brick| brick.first) {
+            let (these, later) =
+                rest.split_at(rest.partition_point(|brick| brick.first + brick.count - first <= longest));
+            let end = these.last().map_or(first, |brick| brick.first + brick.count);
+            lists.push(VoxelList::upload(device, &voxels[first as usize..end as usize], these, first));
+            rest = later;
+        }
         Self { lists }
     }
 
@@ -50,13 +53,32 @@ impl VoxelLists {
 
     /// Bytes of GPU memory.
     pub fn gpu_bytes(&self) -> u64 {
-        self.lists.iter().map(|list| list.voxels.size()).sum()
+        self.lists.iter().map(|list| list.voxel_buffer.size() + list.brick_buffer.size()).sum()
     }
 }
 
-/// The splats of a list are its largest buffer: they must fit one binding, one buffer, and one dispatch.
-fn max_list_length(limits: &wgpu::Limits) -> usize {
+impl VoxelList {
+    fn upload(device: &Device, voxels: &[Voxel], bricks: &[Brick], first: u32) -> Self {
+        let bricks: Vec<Brick> = bricks.iter().map(|brick| Brick { first: brick.first - first, ..*brick }).collect();
+        let buffer = |label, contents: &[u8]| {
+            let descriptor =
+                wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage: BufferUsages::STORAGE };
+            device.create_buffer_init(&descriptor)
+        };
+        Self {
+            indices: voxels.iter().map(|voxel| voxel.index).collect(),
+            voxel_buffer: buffer("sheetsplat.voxels", bytemuck::cast_slice(voxels)),
+            brick_buffer: buffer("sheetsplat.bricks", bytemuck::cast_slice(&bricks)),
+            bricks,
+        }
+    }
+}
+
+/// Where every brick holds one voxel, a list has as many bricks as voxels: then all records of either must fit one binding.
+fn max_list_length(limits: &wgpu::Limits) -> u32 {
     let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    let dispatch = u64::from(limits.max_compute_workgroups_per_dimension).pow(2) * 256;
-    (bytes / size_of::<Splat>() as u64).min(dispatch).max(1) as usize
+    let records =
+        [size_of::<Brick>(), size_of::<Visit>(), size_of::<BrickState>(), size_of::<Splat>(), size_of::<Voxel>()];
+    let record = records.into_iter().max().unwrap_or(1);
+    (bytes / record as u64).clamp(64, u64::from(u32::MAX)) as u32
 }

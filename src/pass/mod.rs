@@ -1,8 +1,11 @@
-//! The GPU's stages, one per file, in the order of the data flow: shade → per sheet (splat → composite) → resolve.
+//! The GPU's stages, one per file, in the order of the data flow: per group of sheets
+//! cull bricks → cull voxels → compact → tiles → splat → composite → occlude, at the end resolve (Fig. 12).
 //!
 //! Each holds its pipeline, makes its bind group, and records itself; none allocates, submits or waits while recording.
 
 pub mod composite;
+pub mod cull;
+pub mod occlude;
 pub mod resolve;
-pub mod shade;
 pub mod splat;
+pub mod tiles;

@@ -1,142 +1,192 @@
-//! Draws a slab's kernel sections as instanced footprint quads, added up in the sheet buffer (§3.2).
+//! Draws a group's kernel sections as instanced footprint quads, added up in the sheet buffers (§3.2): one quad per voxel,
+//! one colour target per sheet.
 
-use std::ops::Range;
-
+use wgpu::util::DeviceExt;
 use wgpu::{
     BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, RenderPipeline, ShaderStages, TextureFormat,
     TextureView, TextureViewDimension,
 };
 
-use crate::gpu::bindings::{bind, layout, storage, texture, uniform};
+use crate::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
+use crate::gpu::bindings::{at_offset, bind, layout, storage, texture, uniform};
 use crate::gpu::footprint_texture::FootprintTexture;
-use crate::gpu::layout::{Frame, Slab, Splat as SplatRecord};
-use crate::gpu::shaders;
+use crate::gpu::layout::{Frame, Group, Indirect, QUADS, Splat as SplatRecord, TileList};
+use crate::gpu::shaders::{self, Shader};
+use crate::pass::cull::CullList;
 use crate::splatting::FootprintForm;
 
-/// The stage's pipelines, one per footprint form.
+/// The stage's pipelines: zeroing tiles, and one per footprint form.
 #[derive(Debug)]
 pub struct Splat {
+    clear_layout: BindGroupLayout,
+    clear: RenderPipeline,
     layout: BindGroupLayout,
     sections: RenderPipeline,
     summed_area: RenderPipeline,
-}
-
-/// The part of one list that touches a slab.
-#[derive(Clone, Debug)]
-pub struct Draw<'a> {
-    /// The list's bind group.
-    pub group: &'a BindGroup,
-    /// Instances: a range of the list's splats.
-    pub splats: Range<u32>,
+    /// Two triangles for each of an instance's quads.
+    indices: Buffer,
 }
 
 impl Splat {
-    /// Compiles the stage for sheet buffers of the given format.
-    pub fn new(device: &Device, sheet_format: TextureFormat) -> Self {
+    /// Compiles the stage for groups of `sheets` sheets, 1, 2 or 4, in the given format.
+    pub fn new(device: &Device, format: TextureFormat, sheets: u32) -> Self {
+        let (clear_layout, clear_pipeline_layout) = layout(
+            device,
+            "sheetsplat.clear",
+            &[uniform::<Frame>(ShaderStages::VERTEX, false), storage::<TileList>(ShaderStages::VERTEX, true)],
+        );
         let both = ShaderStages::VERTEX_FRAGMENT;
-        let (layout, pipeline_layout) = layout(
+        let (splat_layout, splat_pipeline_layout) = layout(
             device,
             "sheetsplat.splat",
             &[
                 uniform::<Frame>(both, false),
-                uniform::<Slab>(ShaderStages::VERTEX, true),
+                uniform::<Group>(ShaderStages::VERTEX, true),
                 storage::<SplatRecord>(ShaderStages::VERTEX, true),
+                storage::<u32>(ShaderStages::VERTEX, true),
+                storage::<Indirect>(ShaderStages::VERTEX, true),
                 texture(both, TextureViewDimension::D2Array),
             ],
         );
-        let module = shaders::SPLAT.module(device);
         let add = wgpu::BlendComponent {
             src_factor: wgpu::BlendFactor::One,
             dst_factor: wgpu::BlendFactor::One,
             operation: wgpu::BlendOperation::Add,
         };
-        let pipeline = |form: FootprintForm| {
-            let constants = [("SECTIONS", f64::from(u8::from(form == FootprintForm::Sections)))];
-            let compilation_options = wgpu::PipelineCompilationOptions {
-                constants: &constants,
-                ..wgpu::PipelineCompilationOptions::default()
-            };
-            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some("sheetsplat.splat"),
-                layout: Some(&pipeline_layout),
-                vertex: wgpu::VertexState {
-                    module: &module,
-                    entry_point: Some("vertex"),
-                    compilation_options: compilation_options.clone(),
-                    buffers: &[],
-                },
-                primitive: wgpu::PrimitiveState {
-                    topology: wgpu::PrimitiveTopology::TriangleStrip,
-                    ..wgpu::PrimitiveState::default()
-                },
-                depth_stencil: None,
-                multisample: wgpu::MultisampleState::default(),
-                fragment: Some(wgpu::FragmentState {
-                    module: &module,
-                    entry_point: Some("fragment"),
-                    compilation_options,
-                    targets: &[Some(wgpu::ColorTargetState {
-                        format: sheet_format,
-                        blend: Some(wgpu::BlendState { color: add, alpha: add }),
-                        write_mask: wgpu::ColorWrites::ALL,
-                    })],
-                }),
-                multiview_mask: None,
-                cache: None,
-            })
+        let additive = Some(wgpu::BlendState { color: add, alpha: add });
+        let splat = |form: FootprintForm| {
+            let sections = f64::from(u8::from(form == FootprintForm::Sections));
+            let constants = [
+                ("SECTIONS", sections),
+                ("SHEETS", f64::from(sheets)),
+                ("PLANE_TEXELS", f64::from(SUMMED_AREA_SIZE)),
+                ("LAYERS", f64::from(SUMMED_AREA_LAYERS)),
+            ];
+            pipeline(device, shaders::SPLAT, &splat_pipeline_layout, format, sheets, additive, &constants)
         };
-        Self { layout, sections: pipeline(FootprintForm::Sections), summed_area: pipeline(FootprintForm::SummedArea) }
+        Self {
+            clear: pipeline(device, shaders::CLEAR, &clear_pipeline_layout, format, sheets, None, &[]),
+            clear_layout,
+            sections: splat(FootprintForm::Sections),
+            summed_area: splat(FootprintForm::SummedArea),
+            layout: splat_layout,
+            indices: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("sheetsplat.quad_indices"),
+                contents: bytemuck::cast_slice(&quad_indices()),
+                usage: wgpu::BufferUsages::INDEX,
+            }),
+        }
     }
 
-    /// Binds one list's splats. `slabs` holds a [`Slab`] at every dynamic offset that will be drawn.
+    /// Binds the list of tiles to zero.
+    pub fn bind_clear(&self, device: &Device, frame: &Buffer, tiles: &Buffer) -> BindGroup {
+        bind(device, "sheetsplat.clear", &self.clear_layout, &[frame, tiles].map(Buffer::as_entire_binding))
+    }
+
+    /// Binds one list's splats. `groups` holds a [`Group`] at every dynamic offset that will be drawn.
     pub fn bind(
         &self,
         device: &Device,
         frame: &Buffer,
-        slabs: &Buffer,
-        splats: &Buffer,
+        groups: &Buffer,
+        list: &CullList,
         footprints: &FootprintTexture,
     ) -> BindGroup {
-        let slab =
-            wgpu::BufferBinding { buffer: slabs, offset: 0, size: wgpu::BufferSize::new(size_of::<Slab>() as u64) };
         let resources = [
             frame.as_entire_binding(),
-            wgpu::BindingResource::Buffer(slab),
-            splats.as_entire_binding(),
+            at_offset::<Group>(groups),
+            list.splats.as_entire_binding(),
+            list.instances.as_entire_binding(),
+            list.draw_args.as_entire_binding(),
             wgpu::BindingResource::TextureView(&footprints.view),
         ];
         bind(device, "sheetsplat.splat", &self.layout, &resources)
     }
 
-    /// Clears the sheet buffer and adds the given splats' sections of the slab at `slab_offset`.
+    /// Zeroes the listed tiles of the sheet buffers, then adds the given lists' sections of a group: of every list its bind
+    /// group, the group's offset, and the arguments of its draw.
     pub fn record<'a>(
         &self,
         encoder: &mut CommandEncoder,
         form: FootprintForm,
-        sheet: &TextureView,
-        slab_offset: u32,
-        draws: impl IntoIterator<Item = Draw<'a>>,
+        sheets: &[TextureView],
+        clear: (&BindGroup, &Buffer),
+        lists: impl IntoIterator<Item = (&'a BindGroup, u32, &'a Buffer)>,
     ) {
+        let targets: Vec<_> = sheets
+            .iter()
+            .map(|view| {
+                Some(wgpu::RenderPassColorAttachment {
+                    view,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
+                })
+            })
+            .collect();
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("sheetsplat.splat"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: sheet,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
+            color_attachments: &targets,
             ..wgpu::RenderPassDescriptor::default()
         });
+        let draw = std::mem::offset_of!(Indirect, draw) as u64;
+        pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint16);
+        pass.set_pipeline(&self.clear);
+        pass.set_bind_group(0, clear.0, &[]);
+        pass.draw_indexed_indirect(clear.1, draw);
         pass.set_pipeline(match form {
             FootprintForm::Sections => &self.sections,
             FootprintForm::SummedArea => &self.summed_area,
         });
-        for Draw { group, splats } in draws {
-            pass.set_bind_group(0, group, &[slab_offset]);
-            pass.draw(0..4, splats);
+        for (group, offset, args) in lists {
+            pass.set_bind_group(0, group, &[offset]);
+            pass.draw_indexed_indirect(args, draw);
         }
     }
+}
+
+/// The vertices 4q to 4q + 3 of quad q as two triangles.
+fn quad_indices() -> Vec<u16> {
+    (0..QUADS).flat_map(|quad| [0, 1, 2, 2, 1, 3].map(|corner| 4 * quad + corner)).collect()
+}
+
+/// A pipeline that draws quads into all sheets of a group.
+fn pipeline(
+    device: &Device,
+    shader: Shader,
+    layout: &wgpu::PipelineLayout,
+    format: TextureFormat,
+    sheets: u32,
+    blend: Option<wgpu::BlendState>,
+    constants: &[(&str, f64)],
+) -> RenderPipeline {
+    let label = format!("sheetsplat.{}", shader.stage);
+    let module = shader.module(device);
+    let target = Some(wgpu::ColorTargetState { format, blend, write_mask: wgpu::ColorWrites::ALL });
+    let compilation_options =
+        wgpu::PipelineCompilationOptions { constants, ..wgpu::PipelineCompilationOptions::default() };
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(&label),
+        layout: Some(layout),
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: Some("vertex"),
+            compilation_options: compilation_options.clone(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState {
+            topology: wgpu::PrimitiveTopology::TriangleList,
+            ..wgpu::PrimitiveState::default()
+        },
+        depth_stencil: None,
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: &module,
+            entry_point: Some(&format!("fragment_{sheets}")),
+            compilation_options,
+            targets: &vec![target; sheets as usize],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
 }

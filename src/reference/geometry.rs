@@ -85,6 +85,12 @@ impl Geometry {
         })
     }
 
+    /// Half the width and height, in pixels, of the screen box around a footprint of the given radius (grid units).
+    pub fn half_box(&self, radius: f64) -> DVec2 {
+        let pixels_from_footprint = self.footprint_from_pixels.inverse();
+        radius * DVec2::new(pixels_from_footprint.row(0).length(), pixels_from_footprint.row(1).length())
+    }
+
     /// Pixel coordinates of a voxel.
     pub fn pixel(&self, voxel: UVec3) -> DVec2 {
         let p = self.grid.world_position(voxel) / self.grid.unit() - self.center;

@@ -6,14 +6,17 @@ pub mod geometry;
 pub mod resolve;
 pub mod shading;
 pub mod splat;
+pub mod visibility;
 
 use glam::DVec4;
 
 use crate::error::RenderError;
 use crate::image::Image;
 use crate::kernel::Kernel;
+use crate::plan::tile_grid;
 use crate::scene::Scene;
 use crate::splatting::Order;
+use crate::stats::Counts;
 use crate::transfer_function::TransferFunction;
 use crate::volume::Volume;
 
@@ -41,6 +44,45 @@ impl Buffer {
 /// # Errors
 /// If the scene asks for something that is not implemented yet.
 pub fn render(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Image, RenderError> {
+    render_culled(volume, transfer, scene, None).map(|(image, _)| image)
+}
+
+/// What [`render`] draws: all there is.
+///
+/// # Errors
+/// If the scene asks for something that is not implemented yet.
+pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Counts, RenderError> {
+    let geometry = Geometry::new(volume.grid(), scene)?;
+    let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
+    let splats = shading::shade(volume, transfer, scene, &geometry);
+    let buckets = splat::buckets(&splats, &geometry, &kernel);
+    let sections = buckets.values().map(|bucket| bucket.len() as u64).sum();
+    let sheets =
+        buckets.first_key_value().zip(buckets.last_key_value()).map_or(0, |((first, _), (last, _))| last - first + 1);
+    let [columns, rows] = tile_grid([scene.image.width, scene.image.height]).map(u64::from);
+    Ok(Counts {
+        voxels_total: volume.values().len() as u64,
+        voxels_in_range: splats.len() as u64,
+        voxels_shaded: splats.len() as u64,
+        sections_total: sections,
+        sections_rasterized: sections,
+        sheets: sheets as u64,
+        tiles_total: columns * rows * sheets as u64,
+        tiles_composited: columns * rows * buckets.len() as u64,
+        ..Counts::default()
+    })
+}
+
+/// Renders with early splat elimination by one of the paper's tests, sheet by sheet; also counts the sections drawn.
+///
+/// # Errors
+/// If the scene asks for something that is not implemented yet.
+pub fn render_culled(
+    volume: &Volume,
+    transfer: &TransferFunction,
+    scene: &Scene,
+    test: Option<visibility::Test>,
+) -> Result<(Image, u64), RenderError> {
     let geometry = Geometry::new(volume.grid(), scene)?;
     let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
     let splats = shading::shade(volume, transfer, scene, &geometry);
@@ -50,14 +92,21 @@ pub fn render(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Re
         sheets.reverse();
     }
     let mut acc = Buffer::new(scene.image.width, scene.image.height);
-    for (k, bucket) in &sheets {
-        let sheet = splat::sheet(bucket, *k, &geometry, &kernel);
+    let mut sections = 0;
+    for (k, mut bucket) in sheets {
+        if let Some(test) = test {
+            let mask = visibility::OpaqueMask::new(&acc, scene.splatting.opacity_threshold);
+            bucket = mask.visible(&bucket, test, &geometry, kernel.support());
+        }
+        sections += bucket.len() as u64;
+        let sheet = splat::sheet(&bucket, k, &geometry, &kernel);
         composite::composite(&mut acc, &sheet, scene.splatting.compositing, scene.splatting.order);
     }
     let image = resolve::resolve(&acc, scene.splatting.compositing, scene.image.background);
-    Ok(Image {
+    let image = Image {
         width: scene.image.width,
         height: scene.image.height,
         pixels: image.pixels.iter().map(|pixel| pixel.as_vec4().to_array()).collect(),
-    })
+    };
+    Ok((image, sections))
 }

@@ -26,9 +26,7 @@ pub fn sheet(bucket: &[Splat], k: i32, geometry: &Geometry, kernel: &Kernel) -> 
     const ROWS: usize = 16;
     let (width, height) = (geometry.size.x as usize, geometry.size.y as usize);
     let mut sheet = Buffer::new(width as u32, height as u32);
-    let pixels_from_footprint = geometry.footprint_from_pixels.inverse();
-    let half_box =
-        kernel.radius() * DVec2::new(pixels_from_footprint.row(0).length(), pixels_from_footprint.row(1).length());
+    let half_box = geometry.half_box(kernel.radius());
 
     sheet.pixels.par_chunks_mut(width * ROWS).enumerate().for_each(|(band, pixels)| {
         let first_row = (band * ROWS) as f64;

@@ -13,11 +13,15 @@ pub(crate) const F32: f64 = 1.0 / (1 << 24) as f64;
 /// What rounding to the nearest f16 changes at most, relative; below 2⁻¹⁴ half a step of 2⁻²⁴ instead.
 pub(crate) const F16: f64 = 1.0 / (1 << 11) as f64;
 
+/// Mesa's software driver: the tests compare images on it, so that they mean the same on every machine.
+pub(crate) fn lavapipe() -> HeadlessOptions {
+    HeadlessOptions { adapter: Some("llvmpipe".to_owned()), ..HeadlessOptions::default() }
+}
+
 /// A device as the program opens it, with f32 sheets. Without any GPU or software driver the test fails.
 pub(crate) fn gpu() -> Headless {
-    let options = HeadlessOptions { sheet_format: Some(TextureFormat::Rgba32Float), ..HeadlessOptions::default() };
-    Headless::new(&options)
-        .unwrap_or_else(|error| panic!("these tests need a device (Mesa's lavapipe will do): {error}"))
+    let options = HeadlessOptions { sheet_format: Some(TextureFormat::Rgba32Float), ..lavapipe() };
+    Headless::new(&options).unwrap_or_else(|error| panic!("these tests need Mesa's lavapipe: {error}"))
 }
 
 /// A device with WebGPU's default limits, but for storage bindings of at most so many bytes.
@@ -26,9 +30,9 @@ pub(crate) fn gpu_with_small_bindings(bytes: u64) -> Headless {
     let options = HeadlessOptions {
         requirements: Some(DeviceRequirements { features: Features::FLOAT32_BLENDABLE, limits }),
         sheet_format: Some(TextureFormat::Rgba32Float),
-        ..HeadlessOptions::default()
+        ..lavapipe()
     };
-    Headless::new(&options).unwrap_or_else(|error| panic!("these tests need a device: {error}"))
+    Headless::new(&options).unwrap_or_else(|error| panic!("these tests need Mesa's lavapipe: {error}"))
 }
 
 /// Four f32 per pixel, as read back.

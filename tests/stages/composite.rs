@@ -1,17 +1,18 @@
-//! `shaders/composite.wgsl` against `reference::composite`: random sheets over random compositing buffers.
+//! `shaders/composite.wgsl` against `reference::composite`: random sheets over random compositing buffers, in some tiles.
 
 use glam::{DVec3, DVec4};
+use sheetsplat::gpu::readback;
 use sheetsplat::gpu::targets::Targets;
-use sheetsplat::gpu::{layout, readback};
 use sheetsplat::headless::Headless;
 use sheetsplat::pass::composite::Composite;
+use sheetsplat::plan::{TILE, tile_grid};
 use sheetsplat::reference::Buffer;
 use sheetsplat::reference::composite::composite;
 use sheetsplat::splatting::{Compositing, Order};
-use sheetsplat::wgpu;
+use sheetsplat::wgpu::{self, BufferUsages};
 
-use crate::common::{F32, Random, gpu, gpu_with_small_bindings, pixels};
-use crate::frame_buffer;
+use crate::common::{F32, Random, gpu, gpu_with_small_bindings};
+use crate::{compute, contents, frame, init, tile_list};
 
 /// Premultiplied colours, in f32: a share of the pixels with no alpha at all, tiny ones, and, if asked for, some above 1.
 fn random_pixels(random: &mut Random, size: [u32; 2], above_one: bool) -> Vec<[f32; 4]> {
@@ -37,9 +38,9 @@ fn to_f64(width: u32, pixels: &[[f32; 4]]) -> Buffer {
     Buffer { width: width as usize, pixels: pixels.iter().map(|pixel| DVec4::from(pixel.map(f64::from))).collect() }
 }
 
-/// What f32 may change in a pixel. A sum and a product of numbers up to `most` is worth a few roundings; WGSL's division
-/// is good to 2.5 ULP, its exp to (3 + 2|x|) ULP, of which 1 - exp(-a) keeps all in absolute terms; the shader's series
-/// below 1/16 errs by a⁵/720.
+/// What f32 may change in a pixel by one sheet. A sum and a product of numbers up to `most` is worth a few roundings; WGSL's
+/// division is good to 2.5 ULP, its exp to (3 + 2|x|) ULP, of which 1 - exp(-a) keeps all in absolute terms; the shader's
+/// series below 1/16 errs by a⁵/720.
 fn tolerance(compositing: Compositing, alpha: f64, most: f64) -> f64 {
     let exp_error = match compositing {
         Compositing::Exponential if alpha >= 0.06 => (3.0 + 2.0 * alpha) * 2.0 * F32 * (-alpha).exp(),
@@ -49,73 +50,194 @@ fn tolerance(compositing: Compositing, alpha: f64, most: f64) -> f64 {
     exp_error + 10.0 * F32 * most
 }
 
-fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
-    let (device, queue) = (gpu.device(), gpu.queue());
-    let stage = Composite::new(device);
-    let mut random = Random(u64::from(size[0]));
-    for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray] {
-        for order in [Order::FrontToBack, Order::BackToFront] {
-            let targets = Targets::new(device, size, wgpu::TextureFormat::Rgba32Float).unwrap();
-            assert_eq!(targets.bands.len(), bands);
-            let sheet = random_pixels(&mut random, size, true);
-            let acc = random_pixels(&mut random, size, compositing == Compositing::Xray);
-            let layout =
-                wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(size[0] * 16), rows_per_image: None };
-            queue.write_texture(
-                targets.sheet.as_image_copy(),
-                bytemuck::cast_slice(&sheet),
-                layout,
-                targets.sheet.size(),
-            );
-            let frame = frame_buffer(device, |scene| {
-                (scene.image.width, scene.image.height) = (size[0], size[1]);
-                (scene.splatting.compositing, scene.splatting.order) = (compositing, order);
-            });
-            let view = targets.sheet.create_view(&wgpu::TextureViewDescriptor::default());
-            let rows: Vec<layout::Band> = targets.bands.iter().map(|band| band.band).collect();
-            for (band, rows) in targets.bands.iter().zip(&rows) {
-                let first = (rows.first_row * size[0]) as usize;
-                let acc = &acc[first..first + (rows.rows * size[0]) as usize];
-                queue.write_buffer(&band.acc, 0, bytemuck::cast_slice(acc));
-            }
-            let groups: Vec<_> = targets.bands.iter().map(|band| stage.bind(device, &frame, band, &view)).collect();
-            let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            stage.record(&mut encoder, size[0], groups.iter().zip(rows));
-            queue.submit([encoder.finish()]);
-            let actual: Vec<DVec4> = (targets.bands.iter())
-                .flat_map(|band| pixels(&readback::buffer(device, queue, &band.acc).unwrap()))
-                .collect();
+/// One case: sheets over a compositing buffer.
+struct Case {
+    size: [u32; 2],
+    compositing: Compositing,
+    order: Order,
+    threshold: f64,
+    /// Premultiplied pixels of every sheet, the nearest first.
+    sheets: Vec<Vec<[f32; 4]>>,
+    acc: Vec<[f32; 4]>,
+    /// Tiles to composite.
+    tiles: Vec<u32>,
+    /// What the masks hold before.
+    stale: u32,
+}
 
-            let sheet = to_f64(size[0], &sheet);
-            let mut expected = to_f64(size[0], &acc);
-            composite(&mut expected, &sheet, compositing, order);
-            assert_eq!(actual.len(), expected.pixels.len());
-            for (i, (actual, expected)) in actual.iter().zip(&expected.pixels).enumerate() {
-                let alpha = sheet.pixels[i].w;
-                let tolerance = tolerance(compositing, alpha, expected.max_element().max(1.0));
-                assert!(
-                    (*actual - *expected).abs().max_element() <= tolerance,
-                    "{compositing:?} {order:?} {size:?}, pixel {i}: sheet {}, acc {:?}: {actual}, not {expected} ± {tolerance}",
-                    sheet.pixels[i],
-                    acc[i],
-                );
-                // What nothing was drawn on stays what it is, to the last bit.
-                assert!(alpha > 0.0 || *actual == DVec4::from(acc[i].map(f64::from)), "pixel {i}");
+/// What the stage left behind: pixels, mask of opaque pixels, flags of opaque tiles.
+struct Outcome {
+    acc: Vec<[f32; 4]>,
+    opaque: Vec<u32>,
+    opaque_tiles: Vec<u32>,
+}
+
+impl Case {
+    fn run(&self, gpu: &Headless, stage: &Composite, bands: usize) -> Outcome {
+        let (device, queue) = (gpu.device(), gpu.queue());
+        let Self { size, compositing, order, threshold, .. } = *self;
+        let layers = self.sheets.len() as u32;
+        let targets = Targets::new(device, size, wgpu::TextureFormat::Rgba32Float, layers).unwrap();
+        assert_eq!(targets.bands.len(), bands);
+        let layout =
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(size[0] * 16), rows_per_image: Some(size[1]) };
+        let texels = self.sheets.concat();
+        let bytes = bytemuck::cast_slice(&texels);
+        queue.write_texture(targets.sheets.as_image_copy(), bytes, layout, targets.sheets.size());
+        for band in &targets.bands {
+            let first = (band.band.first_row * size[0]) as usize;
+            let acc = &self.acc[first..first + (band.band.rows * size[0]) as usize];
+            queue.write_buffer(&band.acc, 0, bytemuck::cast_slice(acc));
+        }
+        for mask in [&targets.opaque, &targets.opaque_tiles] {
+            queue.write_buffer(mask, 0, bytemuck::cast_slice(&vec![self.stale; mask.size() as usize / 4]));
+        }
+        let frame = frame(|scene| {
+            (scene.image.width, scene.image.height) = (size[0], size[1]);
+            (scene.splatting.compositing, scene.splatting.order) = (compositing, order);
+            scene.splatting.opacity_threshold = threshold;
+        });
+        let frame = init(device, &[frame], BufferUsages::UNIFORM);
+        let view = targets.sheets.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2Array),
+            ..wgpu::TextureViewDescriptor::default()
+        });
+        let tiles = tile_list(device, &self.tiles);
+        let bind = |band| stage.bind(device, &frame, band, &view, &tiles, &targets);
+        let groups: Vec<_> = targets.bands.iter().map(bind).collect();
+        compute(gpu, |pass| stage.record(pass, &groups, &tiles));
+        let acc = |band: &sheetsplat::gpu::targets::BandBuffer| readback::buffer(device, queue, &band.acc).unwrap();
+        Outcome {
+            acc: targets.bands.iter().flat_map(|band| bytemuck::pod_collect_to_vec(&acc(band))).collect(),
+            opaque: contents(gpu, &targets.opaque),
+            opaque_tiles: contents(gpu, &targets.opaque_tiles),
+        }
+    }
+
+    fn check(&self, outcome: &Outcome) {
+        let Self { size, compositing, order, threshold, .. } = *self;
+        let name = format!("{compositing:?} {order:?} {size:?} {} sheets", self.sheets.len());
+        let [columns, rows] = tile_grid(size);
+        let sheets: Vec<Buffer> = self.sheets.iter().map(|sheet| to_f64(size[0], sheet)).collect();
+        let mut expected = to_f64(size[0], &self.acc);
+        match order {
+            Order::FrontToBack => {
+                sheets.iter().for_each(|sheet| composite(&mut expected, sheet, compositing, order));
+            }
+            Order::BackToFront => {
+                sheets.iter().rev().for_each(|sheet| composite(&mut expected, sheet, compositing, order));
+            }
+        }
+        let actual = to_f64(size[0], &outcome.acc);
+        assert_eq!(actual.pixels.len(), expected.pixels.len());
+        for (i, (actual, expected)) in actual.pixels.iter().zip(&expected.pixels).enumerate() {
+            let [x, y] = [i as u32 % size[0], i as u32 / size[0]];
+            let is_listed = self.tiles.contains(&(y / TILE * columns + x / TILE));
+            let alphas = || sheets.iter().map(|sheet| sheet.pixels[i].w);
+            // What nothing was drawn on stays what it is, to the last bit, and so does what is not listed.
+            if !is_listed || alphas().all(|alpha| alpha == 0.0) {
+                assert_eq!(outcome.acc[i], self.acc[i], "{name}, pixel {x} {y}, listed: {is_listed}");
+                continue;
+            }
+            let most = expected.max_element().max(1.0);
+            // The errors of sheets add up: none makes those before it larger.
+            let tolerance: f64 = alphas().map(|alpha| tolerance(compositing, alpha, most)).sum();
+            assert!(
+                (*actual - *expected).abs().max_element() <= tolerance,
+                "{name}, pixel {x} {y}: sheets {:?}, acc {:?}: {actual}, not {expected} ± {tolerance}",
+                alphas().collect::<Vec<_>>(),
+                self.acc[i],
+            );
+        }
+        // The masks say exactly what the compositing buffer holds; off the image all is opaque.
+        let is_opaque = |x: u32, y: u32| {
+            x >= size[0] || y >= size[1] || outcome.acc[(y * size[0] + x) as usize][3] >= threshold as f32
+        };
+        for tile in 0..columns * rows {
+            let (left, top) = (tile % columns * TILE, tile / columns * TILE);
+            let is_listed = self.tiles.contains(&tile);
+            let words: Vec<u32> = (top..top + TILE)
+                .map(|y| (0..TILE).filter(|bit| is_opaque(left + bit, y)).fold(0, |word, bit| word | 1 << bit))
+                .collect();
+            let flag = u32::from(words.iter().all(|&word| word == u32::MAX));
+            let flag = if is_listed { flag } else { self.stale };
+            assert_eq!(outcome.opaque_tiles[tile as usize], flag, "{name}, tile {tile}, listed: {is_listed}");
+            for (y, word) in (top..size[1].min(top + TILE)).zip(words) {
+                let word = if is_listed { word } else { self.stale };
+                let actual = outcome.opaque[(y * columns + left / TILE) as usize];
+                assert_eq!(actual, word, "{name}, row {y} of tile {tile}, listed: {is_listed}: {actual:#x} {word:#x}");
             }
         }
     }
 }
 
+fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
+    let stage = Composite::new(gpu.device());
+    let mut random = Random(u64::from(size[0]));
+    let [columns, rows] = tile_grid(size);
+    let (mut opaque, mut listed) = (0, 0);
+    for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray] {
+        for (order, layers) in [Order::FrontToBack, Order::BackToFront]
+            .into_iter()
+            .flat_map(|order| [1, 2, 4].map(|layers| (order, layers)))
+        {
+            let mut acc = random_pixels(&mut random, size, compositing == Compositing::Xray);
+            // Every other tile starts with nothing but high opacities.
+            for (i, pixel) in (0..).zip(&mut acc) {
+                let tile = i / size[0] / TILE * columns + i % size[0] / TILE;
+                if tile % 2 == 1 {
+                    *pixel = [0.25, 0.5, 0.125, random.uniform(0.9, 1.0) as f32];
+                }
+            }
+            let case = Case {
+                size,
+                compositing,
+                order,
+                threshold: [0.5, 0.9, 1.0][random.bits() as usize % 3],
+                sheets: (0..layers).map(|_| random_pixels(&mut random, size, true)).collect(),
+                acc,
+                // In any order: tiles do not overlap.
+                tiles: (0..columns * rows).rev().filter(|_| !random.bits().is_multiple_of(4)).collect(),
+                stale: random.bits() as u32,
+            };
+            let outcome = case.run(gpu, &stage, bands);
+            case.check(&outcome);
+            listed += case.tiles.len();
+            opaque += case.tiles.iter().filter(|&&tile| outcome.opaque_tiles[tile as usize] == 1).count();
+        }
+    }
+    assert!(listed > 5, "{listed} tiles were composited");
+    assert!(columns * rows == 1 || opaque > 0 && opaque < listed, "{opaque} of {listed} tiles became opaque");
+}
+
 #[test]
 fn every_compositing_and_order() {
     let gpu = gpu();
-    for size in [[1, 1], [16, 16], [61, 37], [130, 5], [7, 100]] {
+    for size in [[1, 1], [16, 16], [61, 37], [130, 5], [7, 100], [64, 64]] {
         check(&gpu, size, 1);
     }
 }
 
 #[test]
 fn several_bands() {
-    // Rows of 61 pixels: 8 of them fit a binding.
-    check(&gpu_with_small_bindings(8192), [61, 37], 5);
+    // Rows of 61 pixels: 33 of them fit a binding, and a band is whole tiles.
+    check(&gpu_with_small_bindings(32768), [61, 137], 5);
+}
+
+#[test]
+fn no_tile_listed() {
+    let gpu = gpu();
+    let size = [40, 70];
+    let mut random = Random(8);
+    let case = Case {
+        size,
+        compositing: Compositing::Linear,
+        order: Order::FrontToBack,
+        threshold: 0.95,
+        sheets: vec![random_pixels(&mut random, size, true); 4],
+        acc: random_pixels(&mut random, size, false),
+        tiles: Vec::new(),
+        stale: 0xdead_beef,
+    };
+    case.check(&case.run(&gpu, &Composite::new(gpu.device()), 1));
 }

@@ -4,40 +4,130 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod composite;
+mod cull;
+mod occlude;
 mod plan;
 mod resolve;
 mod shade;
 mod splat;
+mod tiles;
 
 use glam::{DVec3, UVec3};
+use sheetsplat::gpu::layout::{Frame, Indirect, QUADS, TileList};
+use sheetsplat::gpu::readback;
 use sheetsplat::gpu::uniforms::{self, Ramps};
+use sheetsplat::headless::Headless;
 use sheetsplat::kernel::Kernel;
 use sheetsplat::plan::View;
 use sheetsplat::scene::Scene;
 use sheetsplat::transfer_function::TransferFunction;
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::util::DeviceExt;
-use sheetsplat::wgpu::{self, BufferUsages};
+use sheetsplat::wgpu::{self, Buffer, BufferUsages, Device};
 
-/// The uniform buffer of a frame, for stages that see nothing of the volume but it.
-fn frame_buffer(device: &wgpu::Device, adjust: impl FnOnce(&mut Scene)) -> wgpu::Buffer {
+/// A frame, for stages that see nothing of the volume but it.
+fn frame(adjust: impl FnOnce(&mut Scene)) -> Frame {
     let mut scene = common::scene(64, 64);
     adjust(&mut scene);
-    uniform_buffer(device, &Grid { dims: UVec3::splat(9), spacing: DVec3::ONE }, &scene)
+    frame_over(&Grid { dims: UVec3::splat(9), spacing: DVec3::ONE }, &scene)
 }
 
-/// The uniform buffer of a frame over a grid, with ramps that are 1 everywhere.
-fn uniform_buffer(device: &wgpu::Device, grid: &Grid, scene: &Scene) -> wgpu::Buffer {
+/// A frame over a grid, with ramps that are 1 everywhere.
+fn frame_over(grid: &Grid, scene: &Scene) -> Frame {
     let size = [scene.image.width, scene.image.height];
     let view = View::new(grid, &scene.camera, &scene.splatting, size).unwrap();
     let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
     let transfer = common::transfer(&[(0.0, [1.0; 3])], &[(0.0, 1.0)]);
     let (color, opacity) = (transfer.color.unwrap(), transfer.opacity.unwrap());
     let ramps = Ramps::new(&TransferFunction { color, opacity, gradient_opacity: None, iso_ranges: None });
-    let frame = uniforms::frame(&view, &kernel, grid, &ramps, scene);
+    uniforms::frame(&view, &kernel, grid, &ramps, scene)
+}
+
+/// A buffer with contents.
+fn init<T: bytemuck::NoUninit>(device: &Device, contents: &[T], usage: BufferUsages) -> Buffer {
     device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some("frame"),
-        contents: bytemuck::bytes_of(&frame),
-        usage: BufferUsages::UNIFORM,
+        label: Some("test"),
+        contents: bytemuck::cast_slice(contents),
+        usage,
     })
+}
+
+/// Uniforms at dynamic offsets: the buffer and the distance between two of them.
+fn at_offsets<T: bytemuck::NoUninit>(device: &Device, uniforms: &[T]) -> (Buffer, u32) {
+    let stride = size_of::<T>().next_multiple_of(device.limits().min_uniform_buffer_offset_alignment as usize);
+    let mut bytes = Vec::new();
+    for uniform in uniforms {
+        bytes.extend_from_slice(bytemuck::bytes_of(uniform));
+        bytes.resize(bytes.len().next_multiple_of(stride), 0);
+    }
+    (init(device, &bytes, BufferUsages::UNIFORM), stride as u32)
+}
+
+/// What the shaders' `indirect` says of so many things: a quad each, 16 to an instance, and a workgroup each, at most 32768
+/// in a row.
+fn indirect(count: u32) -> Indirect {
+    Indirect {
+        draw: [6 * u32::from(QUADS), count.div_ceil(u32::from(QUADS)), 0, 0, 0],
+        dispatch: [count.min(32768), count.div_ceil(32768), 1],
+        count,
+    }
+}
+
+/// A [`TileList`] of these tiles.
+fn tile_list(device: &Device, tiles: &[u32]) -> Buffer {
+    let mut bytes = bytemuck::bytes_of(&indirect(tiles.len() as u32)).to_vec();
+    bytes.extend_from_slice(bytemuck::cast_slice(tiles));
+    bytes.resize(bytes.len().max(size_of::<TileList>()), 0xff);
+    init(device, &bytes, BufferUsages::STORAGE | BufferUsages::INDIRECT)
+}
+
+/// The contents of a buffer that need not be made for copying: a shader copies it.
+fn contents<T: bytemuck::Pod>(gpu: &Headless, buffer: &Buffer) -> Vec<T> {
+    const COPY: &str = "
+        @group(0) @binding(0) var<storage, read> source: array<u32>;
+        @group(0) @binding(1) var<storage, read_write> result: array<u32>;
+        @compute @workgroup_size(64)
+        fn main(@builtin(global_invocation_id) id: vec3u) {
+            if id.x < arrayLength(&source) { result[id.x] = source[id.x]; }
+        }";
+    let device = gpu.device();
+    let copy = device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("copy"),
+        size: buffer.size(),
+        usage: BufferUsages::STORAGE | BufferUsages::COPY_SRC,
+        mapped_at_creation: false,
+    });
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some("copy"),
+        source: wgpu::ShaderSource::Wgsl(COPY.into()),
+    });
+    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some("copy"),
+        layout: None,
+        module: &module,
+        entry_point: Some("main"),
+        compilation_options: wgpu::PipelineCompilationOptions::default(),
+        cache: None,
+    });
+    let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("copy"),
+        layout: &pipeline.get_bind_group_layout(0),
+        entries: &[
+            wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() },
+            wgpu::BindGroupEntry { binding: 1, resource: copy.as_entire_binding() },
+        ],
+    });
+    compute(gpu, |pass| {
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups((buffer.size() as u32 / 4).div_ceil(64), 1, 1);
+    });
+    bytemuck::pod_collect_to_vec::<u8, T>(&readback::buffer(device, gpu.queue(), &copy).unwrap())
+}
+
+/// Submits a compute pass.
+fn compute(gpu: &Headless, record: impl FnOnce(&mut wgpu::ComputePass<'_>)) {
+    let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    record(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
+    gpu.queue().submit([encoder.finish()]);
 }

@@ -7,10 +7,10 @@ use sheetsplat::pass::resolve::Resolve;
 use sheetsplat::reference::Buffer;
 use sheetsplat::reference::resolve::resolve;
 use sheetsplat::splatting::Compositing;
-use sheetsplat::wgpu::{self, TextureFormat, TextureUsages};
+use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
 
 use crate::common::{F32, Random, gpu, gpu_with_small_bindings, pixels};
-use crate::frame_buffer;
+use crate::{frame, init};
 
 const BACKGROUNDS: [[f64; 4]; 5] =
     [[0.0, 0.0, 0.0, 1.0], [0.2, 0.9, 0.4, 1.0], [0.7, 0.5, 0.3, 0.0], [0.1, 1.0, 0.6, 0.5], [1.0, 1.0, 1.0, 1.0]];
@@ -19,7 +19,7 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
     let (device, queue) = (gpu.device(), gpu.queue());
     let stage = Resolve::new(device, TextureFormat::Rgba32Float);
     let mut random = Random(9);
-    let targets = Targets::new(device, size, TextureFormat::Rgba32Float).unwrap();
+    let targets = Targets::new(device, size, TextureFormat::Rgba32Float, 1).unwrap();
     assert_eq!(targets.bands.len(), bands);
     let target = device.create_texture(&wgpu::TextureDescriptor {
         label: Some("target"),
@@ -49,11 +49,12 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
                 let acc = &acc[first..first + (rows.rows * size[0]) as usize];
                 queue.write_buffer(&band.acc, 0, bytemuck::cast_slice(acc));
             }
-            let frame = frame_buffer(device, |scene| {
+            let frame = frame(|scene| {
                 (scene.image.width, scene.image.height) = (size[0], size[1]);
                 scene.image.background = background;
                 scene.splatting.compositing = compositing;
             });
+            let frame = init(device, &[frame], BufferUsages::UNIFORM);
             let groups: Vec<_> = targets.bands.iter().map(|band| stage.bind(device, &frame, band)).collect();
             let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             stage.record(&mut encoder, &view, size[0], groups.iter().zip(rows));
@@ -83,6 +84,6 @@ fn over_every_kind_of_background() {
 
 #[test]
 fn several_bands() {
-    // Rows of 61 pixels: 8 of them fit a binding.
-    check(&gpu_with_small_bindings(8192), [61, 37], 5);
+    // Rows of 61 pixels: 33 of them fit a binding, and a band is whole tiles.
+    check(&gpu_with_small_bindings(32768), [61, 137], 5);
 }

@@ -1,20 +1,22 @@
-//! `shaders/shade.wgsl` against `reference::shading`: the splat records of a frame, decoded.
+//! The records that `shaders/cull_voxels.wgsl` writes, projection and shading, against `reference::shading`: those of a whole
+//! frame, decoded. Which voxels it draws is `cull.rs`'s.
+
+use std::collections::BTreeMap;
 
 use glam::{DVec3, DVec4, UVec3};
 use sheetsplat::classify::classify;
-use sheetsplat::gpu::{layout, readback};
+use sheetsplat::gpu::layout;
 use sheetsplat::kernel::Kernel;
-use sheetsplat::plan::{FramePlan, View};
+use sheetsplat::pass::cull::Cull;
 use sheetsplat::reference::{Geometry, shading};
-use sheetsplat::renderer::ClassifiedVolume;
 use sheetsplat::scene::{Scene, TransferSettings};
 use sheetsplat::shading::{Light, Shading};
 use sheetsplat::splatting::Compositing;
 use sheetsplat::transfer_function::{Ramp, TransferFunction};
 use sheetsplat::volume::Volume;
-use sheetsplat::wgpu;
 
 use crate::common::{F16, F32, Random, camera, gpu, scene, transfer};
+use crate::cull::Culling;
 
 /// Values of a volume with noise everywhere, so that gradients point anywhere.
 fn noise(dims: UVec3, spacing: DVec3) -> Volume {
@@ -89,44 +91,50 @@ fn highlight_cosine(volume: &Volume, index: u32, scene: &Scene) -> f64 {
     normal.dot((to_light + to_eye).normalize_or_zero()).abs()
 }
 
-/// Renders a frame and compares every splat record with the twin's.
+/// Culls a frame, group by group, and compares the splat record of every voxel on the screen with the twin's.
 fn check(name: &str, volume: &Volume, scene: &Scene) {
     let gpu = gpu();
     let transfer = scene.transfer.resolve(volume);
-    let classified = ClassifiedVolume::new(gpu.device(), volume, &transfer);
-    let frame = gpu.renderer().prepare(gpu.device(), gpu.queue(), &classified, scene).unwrap();
-    let target = gpu.device().create_texture(&wgpu::TextureDescriptor {
-        label: Some("target"),
-        size: wgpu::Extent3d { width: scene.image.width, height: scene.image.height, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Rgba32Float,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
-        view_formats: &[],
-    });
-    let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    gpu.renderer().record(&mut encoder, &frame, &target.create_view(&wgpu::TextureViewDescriptor::default()));
-    gpu.queue().submit([encoder.finish()]);
-    let buffers: Vec<_> = frame.splats().collect();
-    assert_eq!(buffers.len(), 1, "{name}: a small volume is one list");
-    let bytes = readback::buffer(gpu.device(), gpu.queue(), buffers[0]).unwrap();
-    let records: Vec<layout::Splat> = bytemuck::pod_collect_to_vec(&bytes);
+    let mut scene = scene.clone();
+    scene.splatting.culling = false;
+    let scene = &scene;
+    let sheets = 2;
+    let stage = Cull::new(gpu.device(), sheets);
+    let voxels = classify(volume, &transfer);
+    let culling = Culling::new(&gpu, (&stage, sheets), volume.grid(), &voxels, &transfer, scene);
+    assert!(culling.plan.groups.len() > 1, "{name}: one group");
+    (0..culling.plan.groups.len()).for_each(|group| culling.cull(group));
+    let (records, states, view) = (culling.splats(), culling.states(), culling.view);
 
     let geometry = Geometry::new(volume.grid(), scene).unwrap();
     let expected = shading::shade(volume, &transfer, scene, &geometry);
-    let indices: Vec<u32> = classify(volume, &transfer).iter().map(|voxel| voxel.index).collect();
-    assert_eq!(indices.len(), expected.len(), "{name}: which voxels take part");
-    let size = [scene.image.width, scene.image.height];
-    let view = View::new(volume.grid(), &scene.camera, &scene.splatting, size).unwrap();
+    assert_eq!(voxels.len(), expected.len(), "{name}: which voxels take part");
+    let twins: BTreeMap<u32, &shading::Splat> = voxels.iter().map(|voxel| voxel.index).zip(&expected).collect();
+    assert_eq!(culling.indices.len(), twins.len(), "{name}: bricks hold every voxel");
+    // Whose footprint's box holds a pixel's centre is on the screen; f32 may differ about those that barely do.
     let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
-    let plan = FramePlan::new(volume.grid(), [indices.as_slice()], view, &kernel, scene.splatting.order);
-    let order = &plan.orders[0];
-    assert_eq!(records.len(), order.len(), "{name}: which voxels are on the screen");
-    assert!(records.len() > 50, "{name}: {} voxels", records.len());
+    let half_box = geometry.half_box(kernel.support());
+    let inside = |twin: &shading::Splat| {
+        let (low, high) = (twin.center - half_box, twin.center + half_box);
+        (high - 0.5).min(geometry.size - 0.5 - low).min_element()
+    };
+    let mut shaded = Vec::new();
+    for (brick, (hidden, of_brick)) in culling.bricks.iter().zip(states) {
+        for slot in 0..brick.count {
+            let id = (brick.first + slot) as usize;
+            let (inside, is_shaded) = (inside(twins[&culling.indices[id]]), of_brick >> slot & 1 == 1);
+            assert!(inside.abs() < 1e-3 || is_shaded == (inside > 0.0), "{name}: {id} is {inside} px on the screen");
+            assert!(is_shaded != (hidden >> slot & 1 == 1), "{name}: {id} is shaded or hidden");
+            if is_shaded {
+                shaded.push(id);
+            }
+        }
+    }
+    assert!(shaded.len() > 50, "{name}: {} voxels", shaded.len());
 
-    for (record, &at) in records.iter().zip(order) {
-        let (index, twin) = (indices[at as usize], &expected[at as usize]);
+    for id in shaded {
+        let (record, index) = (&records[id], culling.indices[id]);
+        let twin = twins[&index];
         let voxel = volume.grid().voxel_at(index);
         let (actual, expected) =
             (DVec3::new(record.x_px.into(), record.y_px.into(), record.depth.into()), twin.center.extend(twin.depth));

@@ -1,99 +1,156 @@
-//! `shaders/splat.wgsl` against `reference::splat`: hand-made splat records drawn into an f32 sheet buffer.
+//! `shaders/splat.wgsl` and `shaders/clear.wgsl` against `reference::splat`: hand-made splat records drawn into f32 sheet
+//! buffers, in groups of 1, 2 and 4 sheets.
 
-use std::ops::Range;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3, DVec4, UVec3};
 use sheetsplat::footprint::{FootprintTable, SECTION_SIZE, SECTIONS, section_extent, section_spacing};
 use sheetsplat::gpu::footprint_texture::FootprintTexture;
-use sheetsplat::gpu::uniforms;
+use sheetsplat::gpu::voxel_list::VoxelLists;
 use sheetsplat::gpu::{layout, readback};
 use sheetsplat::headless::Headless;
 use sheetsplat::kernel::Kernel;
-use sheetsplat::pass::splat::{Draw, Splat as Stage};
-use sheetsplat::plan::{SlabPlan, View};
+use sheetsplat::pass::cull::{Cull, CullBuffers, CullList};
+use sheetsplat::pass::splat::Splat as Stage;
+use sheetsplat::plan::{TILE, View, tile_grid};
 use sheetsplat::reference::{self, Geometry};
 use sheetsplat::scene::Scene;
 use sheetsplat::splatting::FootprintForm;
 use sheetsplat::volume::Grid;
-use sheetsplat::wgpu::util::DeviceExt;
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
 
 use crate::common::{F32, Random, camera, gpu, pixels, scene};
-use crate::uniform_buffer;
+use crate::{at_offsets, frame_over, indirect, init, tile_list};
+
+/// The stage for groups of so many sheets, and a list to draw, of which it takes what the culling stages wrote.
+struct Stages<'a> {
+    gpu: &'a Headless,
+    sheets: u32,
+    splat: Stage,
+    list: RefCell<CullList>,
+}
+
+impl<'a> Stages<'a> {
+    fn new(gpu: &'a Headless, sheets: u32) -> Self {
+        let device = gpu.device();
+        let any = |usage| init(device, &[0_u8; 1024], usage);
+        let storage = any(BufferUsages::STORAGE);
+        let uniform = any(BufferUsages::UNIFORM);
+        let shared = CullBuffers {
+            frame: &uniform,
+            groups: &uniform,
+            control_points: &storage,
+            occluded: &storage,
+            tally: &storage,
+        };
+        let voxel = layout::Voxel { index: 0, value: 0.0, normal: 0, gradient_magnitude: 0.0 };
+        let brick = layout::Brick { first: 0, count: 1, x: 0, y: 0, z: 0, extent: 0 };
+        let lists = VoxelLists::upload(device, &[voxel], &[brick]);
+        let list = Cull::new(device, sheets).prepare(device, shared, &lists.lists[0], &storage, 1, 1);
+        let splat = Stage::new(device, TextureFormat::Rgba32Float, sheets);
+        Self { gpu, sheets, splat, list: RefCell::new(list) }
+    }
+}
 
 /// One view of one kernel, on the GPU and in the twin.
 struct Fixture<'a> {
     gpu: &'a Headless,
-    stage: &'a Stage,
+    stage: &'a Stages<'a>,
     scene: Scene,
     kernel: Kernel,
     view: View,
     geometry: Geometry,
     frame: wgpu::Buffer,
     footprints: FootprintTexture,
+    /// The sheet buffers of a group.
+    sheets: Vec<wgpu::Texture>,
+    /// All tiles of the image.
+    tiles: Vec<u32>,
 }
 
 /// An f32 sheet buffer, read back.
 type Sheet = Vec<DVec4>;
 
 impl<'a> Fixture<'a> {
-    fn new(gpu: &'a Headless, stage: &'a Stage, scene: Scene, spacing: [f64; 3]) -> Self {
+    fn new(stage: &'a Stages<'a>, scene: Scene, spacing: [f64; 3]) -> Self {
+        let gpu = stage.gpu;
         let grid = Grid { dims: UVec3::splat(9), spacing: DVec3::from(spacing) };
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
         let size = [scene.image.width, scene.image.height];
         let view = View::new(&grid, &scene.camera, &scene.splatting, size).unwrap();
         let table = FootprintTable::new(scene.splatting.footprint, &kernel, view.slabs.width);
+        let sheet = |_| {
+            gpu.device().create_texture(&wgpu::TextureDescriptor {
+                label: Some("sheet"),
+                size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: TextureFormat::Rgba32Float,
+                usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC | TextureUsages::COPY_DST,
+                view_formats: &[],
+            })
+        };
+        let [columns, rows] = tile_grid(size);
         Self {
             gpu,
             stage,
             kernel,
             view,
             geometry: Geometry::new(&grid, &scene).unwrap(),
-            frame: uniform_buffer(gpu.device(), &grid, &scene),
+            frame: init(gpu.device(), &[frame_over(&grid, &scene)], BufferUsages::UNIFORM),
             footprints: FootprintTexture::upload(gpu.device(), gpu.queue(), &table),
+            sheets: (0..stage.sheets).map(sheet).collect(),
+            tiles: (0..columns * rows).collect(),
             scene,
         }
     }
 
-    /// The sheet buffers of some slabs, each with a range of the splats.
-    fn draw(&self, splats: &[layout::Splat], range: Range<u32>, slabs: &[i32]) -> Vec<Sheet> {
+    /// The sheet buffers of the groups that hold some slabs, by slab, with some of the splats, in whatever order. Whatever
+    /// the sheet buffers held before is gone.
+    fn draw(&self, splats: &[layout::Splat], instances: &[u32], slabs: &[i32]) -> BTreeMap<i32, Sheet> {
+        let mut sheets = BTreeMap::new();
+        for &k in slabs {
+            if !sheets.contains_key(&k) {
+                let first = self.first_of_group(k);
+                sheets.extend((first..).zip(self.draw_group(splats, instances, first, &self.tiles)));
+            }
+        }
+        sheets
+    }
+
+    /// The first slab of a slab's group.
+    fn first_of_group(&self, k: i32) -> i32 {
+        k - k.rem_euclid(self.stage.sheets as i32)
+    }
+
+    fn draw_group(&self, splats: &[layout::Splat], instances: &[u32], first_slab: i32, tiles: &[u32]) -> Vec<Sheet> {
         let device = self.gpu.device();
-        let init = |contents: &[u8], usage| {
-            device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some("test"), contents, usage })
+        let near = (f64::from(first_slab) * self.view.slabs.width) as f32;
+        // Not at the first offset.
+        let of = |near| layout::Group { near, first_brick: 0, brick_count: 0, index: 0 };
+        let (groups, offset) = at_offsets(device, &[of(1e9), of(near)]);
+        let args = init(device, &[indirect(instances.len() as u32)], BufferUsages::INDIRECT | BufferUsages::STORAGE);
+        let tiles = tile_list(device, tiles);
+        let clear = self.stage.splat.bind_clear(device, &self.frame, &tiles);
+        let group = {
+            let mut list = self.stage.list.borrow_mut();
+            list.splats = init(device, splats, BufferUsages::STORAGE);
+            // One more than is drawn.
+            let instances: Vec<u32> = instances.iter().copied().chain([0]).collect();
+            list.instances = init(device, &instances, BufferUsages::STORAGE);
+            list.draw_args = args.clone();
+            self.stage.splat.bind(device, &self.frame, &groups, &list, &self.footprints)
         };
-        let stride = device.limits().min_uniform_buffer_offset_alignment;
-        let plans: Vec<SlabPlan> = slabs
-            .iter()
-            .map(|&k| SlabPlan { near: f64::from(k) * self.view.slabs.width, splats: Vec::new() })
-            .collect();
-        let slabs = init(&uniforms::slabs(&plans, stride as usize), BufferUsages::UNIFORM);
-        let records = init(bytemuck::cast_slice(splats), BufferUsages::STORAGE);
-        let group = self.stage.bind(device, &self.frame, &slabs, &records, &self.footprints);
-        let sheet = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("sheet"),
-            size: wgpu::Extent3d {
-                width: self.scene.image.width,
-                height: self.scene.image.height,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: TextureFormat::Rgba32Float,
-            usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
-        let view = sheet.create_view(&wgpu::TextureViewDescriptor::default());
-        (0..plans.len() as u32)
-            .map(|slab| {
-                let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-                let draws = [Draw { group: &group, splats: range.clone() }];
-                self.stage.record(&mut encoder, self.scene.splatting.footprint, &view, slab * stride, draws);
-                self.gpu.queue().submit([encoder.finish()]);
-                let bytes = readback::texture(device, self.gpu.queue(), &sheet).unwrap();
-                pixels(&bytes)
-            })
-            .collect()
+        let views: Vec<_> =
+            self.sheets.iter().map(|sheet| sheet.create_view(&wgpu::TextureViewDescriptor::default())).collect();
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let form = self.scene.splatting.footprint;
+        self.stage.splat.record(&mut encoder, form, &views, (&clear, &tiles), [(&group, offset, &args)]);
+        self.gpu.queue().submit([encoder.finish()]);
+        let read = |sheet| pixels(&readback::texture(device, self.gpu.queue(), sheet).unwrap());
+        self.sheets.iter().map(read).collect()
     }
 
     /// The twin's sheet buffer of one slab.
@@ -138,9 +195,8 @@ const AMOUNT_RG: u32 = 0x3800_3c00;
 const AMOUNT_BA: u32 = 0x3c00_3400;
 const AMOUNT: DVec4 = DVec4::new(1.0, 0.5, 0.25, 1.0);
 
-fn stage(gpu: &Headless) -> Stage {
-    Stage::new(gpu.device(), TextureFormat::Rgba32Float)
-}
+/// Sheets of a group.
+const GROUPS: [u32; 3] = [1, 2, 4];
 
 /// Radius and falloff.
 const KERNELS: [(f64, f64); 9] =
@@ -172,25 +228,24 @@ fn view_scene(view: ([f64; 3], [f64; 3], f64), kernel: (f64, f64), width: f64, f
     scene
 }
 
-/// Calls `check` with random splats of every kernel and view, one at a time, and each slab that they touch:
-/// fixture, splat, slab, sheet buffer.
+/// Calls `check` with random splats of every kernel and view, one at a time, and each slab that they touch or that shares a
+/// group with one: fixture, splat, slab, sheet buffer.
 fn for_random_sections(
     form: FootprintForm,
     widths: &[f64],
     mut check: impl FnMut(&Fixture<'_>, &reference::Splat, i32, &[DVec4]),
 ) {
     let gpu = gpu();
-    let stage = stage(&gpu);
     let mut random = Random(3);
-    for (kernel, view) in KERNELS.into_iter().flat_map(|kernel| VIEWS.map(|view| (kernel, view))) {
-        for &width in widths {
-            let fixture = Fixture::new(&gpu, &stage, view_scene(view, kernel, width, form), view.1);
-            for _ in 0..2 {
+    for stage in GROUPS.map(|sheets| Stages::new(&gpu, sheets)) {
+        for (kernel, view) in KERNELS.into_iter().flat_map(|kernel| VIEWS.map(|view| (kernel, view))) {
+            for &width in widths {
+                let fixture = Fixture::new(&stage, view_scene(view, kernel, width, form), view.1);
                 let splat = fixture.random_splat(&mut random);
                 let twin = fixture.twin_of(&splat);
                 let slabs: Vec<i32> = fixture.view.slabs.touched(twin.depth).collect();
-                for (sheet, &k) in fixture.draw(&[splat], 0..1, &slabs).iter().zip(&slabs) {
-                    check(&fixture, &twin, k, sheet);
+                for (k, sheet) in fixture.draw(&[splat], &[0], &slabs) {
+                    check(&fixture, &twin, k, &sheet);
                 }
             }
         }
@@ -204,13 +259,21 @@ impl Fixture<'_> {
     }
 
     /// What the summed-area form may err by in a section (SPEC §4): a thousandth of its peak. Nothing can hold it better
-    /// than an f32 that also holds whole footprints. And the slab's planes come in f32, seen from a depth in f32: four
-    /// roundings, each worth its share of the kernel's value there.
+    /// than an f32 that also holds whole footprints. And the slab's planes come in f32, seen from a depth in f32: worth their
+    /// share of the kernel's value there.
     fn summed_area_tolerance(&self, splat: &reference::Splat, k: i32) -> f64 {
         let (t0, t1) = self.planes(splat, k);
-        let plane_error = 4.0 * F32 * ((t0 + splat.depth).abs() + self.view.slabs.width);
-        let nearest = if t0 * t1 < 0.0 { 0.0 } else { t0.abs().min(t1.abs()) };
-        1e-3 * self.kernel.section(0.0, t0, t1) + F32 * self.whole() + plane_error * self.kernel.value(nearest)
+        let plane_error = self.plane_error(splat, k);
+        let nearest = if t0 * t1 < 0.0 { 0.0 } else { t0.abs().min(t1.abs()) - plane_error };
+        1e-3 * self.kernel.section(0.0, t0, t1) + F32 * self.whole() + plane_error * self.kernel.value(nearest.max(0.0))
+    }
+
+    /// What f32 may move a slab's planes by, seen from a splat: the group's plane, the slab's width and its multiple are
+    /// rounded, and so are their differences from the depth and sums, which no number before them exceeds.
+    fn plane_error(&self, splat: &reference::Splat, k: i32) -> f64 {
+        let (first, width) = (self.first_of_group(k), self.view.slabs.width);
+        let plane = f64::from(first).abs() * width;
+        4.0 * F32 * (plane.max((f64::from(first) * width - splat.depth).abs()) + f64::from(k - first + 1) * width)
     }
 
     /// Distance of a pixel's centre from a splat, in footprint coordinates.
@@ -296,17 +359,20 @@ fn stored_sections() {
 #[test]
 fn pixels_just_inside_the_rim_are_drawn() {
     let gpu = gpu();
-    let stage = stage(&gpu);
-    for form in [FootprintForm::SummedArea, FootprintForm::Sections] {
+    let stages = GROUPS.map(|sheets| Stages::new(&gpu, sheets));
+    for (form, stage) in [FootprintForm::SummedArea, FootprintForm::Sections]
+        .into_iter()
+        .flat_map(|form| stages.iter().map(move |stage| (form, stage)))
+    {
         let view = VIEWS[0];
-        let fixture = Fixture::new(&gpu, &stage, view_scene(view, (1.0, 0.1), 8.0, form), view.1);
+        let fixture = Fixture::new(stage, view_scene(view, (1.0, 0.1), 8.0, form), view.1);
         assert_eq!(fixture.view.footprint.pixels_from_footprint.row(0).length(), 4.0, "pixels per grid unit");
         for inside in [0.0005, 0.001, 0.0015, 0.0019] {
             for side in [DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y] {
                 let center = DVec2::new(30.5, 20.5) - side * (4.0 - inside);
                 let (x_px, y_px) = (center.x as f32, center.y as f32);
                 let splat = layout::Splat { x_px, y_px, depth: 4.0, rg: AMOUNT_RG, ba: AMOUNT_BA };
-                let sheet = &fixture.draw(&[splat], 0..1, &[0])[0];
+                let sheet = &fixture.draw(&[splat], &[0], &[0])[&0];
                 let pixel = 20 * 70 + 30;
                 let actual = sheet[pixel].w;
                 // The chord is √(1 - ρ²) to each side, the kernel's value there κ·exp(-0.1).
@@ -327,7 +393,7 @@ fn pixels_just_inside_the_rim_are_drawn() {
 #[test]
 fn sections_sum_to_the_footprint_and_the_footprint_to_one() {
     let gpu = gpu();
-    let stage = stage(&gpu);
+    let stages = GROUPS.map(|sheets| Stages::new(&gpu, sheets));
     let mut random = Random(11);
     let views = [
         ([0.0, 1.0, 0.0], [1.0, 1.0, 1.0], 0.16),
@@ -337,11 +403,11 @@ fn sections_sum_to_the_footprint_and_the_footprint_to_one() {
     // None that is far from 0 at its rim: there the sum over pixels is no longer close to the integral.
     let kernels = [(2.0, 2.0), (1.4, 2.0), (4.0, 2.0), (3.0, 0.8)];
     for (kernel, view) in kernels.into_iter().flat_map(|kernel| views.map(|view| (kernel, view))) {
-        for (form, width) in [FootprintForm::SummedArea, FootprintForm::Sections]
+        for (form, (width, stage)) in [FootprintForm::SummedArea, FootprintForm::Sections]
             .into_iter()
-            .flat_map(|form| [0.3, 1.0, 1.7].map(|width| (form, width)))
+            .flat_map(|form| [0.3, 1.0, 1.7].into_iter().zip(&stages).map(move |of| (form, of)))
         {
-            let fixture = Fixture::new(&gpu, &stage, view_scene(view, kernel, width, form), view.1);
+            let fixture = Fixture::new(stage, view_scene(view, kernel, width, form), view.1);
             let splat = layout::Splat {
                 x_px: random.uniform(34.0, 36.0) as f32,
                 y_px: random.uniform(22.0, 23.0) as f32,
@@ -349,8 +415,9 @@ fn sections_sum_to_the_footprint_and_the_footprint_to_one() {
             };
             let twin = fixture.twin_of(&splat);
             let slabs: Vec<i32> = fixture.view.slabs.touched(twin.depth).collect();
-            let sheets = fixture.draw(&[splat], 0..1, &slabs);
-            let sum: Vec<DVec4> = (0..sheets[0].len()).map(|i| sheets.iter().map(|sheet| sheet[i]).sum()).collect();
+            let sheets = fixture.draw(&[splat], &[0], &slabs);
+            let sum: Vec<DVec4> =
+                (0..sheets[&slabs[0]].len()).map(|i| sheets.values().map(|sheet| sheet[i]).sum()).collect();
 
             let tolerance = match form {
                 // The planes between slabs cancel but for rounding, of them and of the table entries; what is left is
@@ -387,27 +454,87 @@ fn sections_sum_to_the_footprint_and_the_footprint_to_one() {
     }
 }
 
-/// Splats that overlap add up, and only those of the range that is drawn.
+/// Splats that overlap add up, and only the instances that are drawn.
 #[test]
-fn a_range_of_splats_adds_up() {
+fn instances_add_up() {
     let gpu = gpu();
-    let stage = stage(&gpu);
     let mut random = Random(5);
-    let scene = view_scene(VIEWS[0], (2.0, 2.0), 1.0, FootprintForm::SummedArea);
-    let fixture = Fixture::new(&gpu, &stage, scene, VIEWS[0].1);
-    let splats: Vec<_> = (0..300)
-        .map(|_| layout::Splat { depth: random.uniform(-2.0, 3.0) as f32, ..fixture.random_splat(&mut random) })
-        .collect();
-    let range = 20..280;
-    let twins: Vec<_> = splats[range.clone()].iter().map(|splat| fixture.twin_of(splat)).collect();
-    let sheet = &fixture.draw(&splats, 20..280, &[0])[0];
-    let expected = fixture.twin(&twins, 0);
-    let most = expected.iter().map(|pixel| pixel.w).fold(0.0, f64::max);
-    assert!(most > fixture.whole(), "{most}: splats overlap");
-    let tolerance = |pixel: usize| {
-        let here = twins.iter().filter(|twin| fixture.rho(twin, pixel) <= 2.0);
-        // Each has its own error, and the sum so far is rounded when it is added.
-        here.map(|twin| fixture.summed_area_tolerance(twin, 0) + F32 * most).sum()
-    };
-    fixture.assert_close(sheet, &expected, tolerance, "many splats");
+    for stage in GROUPS.map(|sheets| Stages::new(&gpu, sheets)) {
+        let scene = view_scene(VIEWS[0], (2.0, 2.0), 1.0, FootprintForm::SummedArea);
+        let fixture = Fixture::new(&stage, scene, VIEWS[0].1);
+        let splats: Vec<_> = (0..300)
+            .map(|_| layout::Splat { depth: random.uniform(-2.0, 5.0) as f32, ..fixture.random_splat(&mut random) })
+            .collect();
+        let instances: Vec<u32> = (0..300).rev().filter(|_| !random.bits().is_multiple_of(8)).collect();
+        let twins: Vec<_> = instances.iter().map(|&at| fixture.twin_of(&splats[at as usize])).collect();
+        let sheets = fixture.draw(&splats, &instances, &[0]);
+        assert_eq!(sheets.len(), stage.sheets as usize);
+        for (k, sheet) in sheets {
+            let expected = fixture.twin(&twins, k);
+            let most = expected.iter().map(|pixel| pixel.w).fold(0.0, f64::max);
+            assert!(most > fixture.whole(), "{most}: splats overlap");
+            let tolerance = |pixel: usize| {
+                let here = twins.iter().filter(|twin| fixture.rho(twin, pixel) <= 2.0);
+                // Each has its own error, and the sum so far is rounded when it is added.
+                here.map(|twin| fixture.summed_area_tolerance(twin, k) + F32 * most).sum()
+            };
+            fixture.assert_close(&sheet, &expected, tolerance, "many splats");
+        }
+    }
+}
+
+/// Listed tiles are zeroed before anything is drawn; what others hold is not touched, but added to by footprints that reach
+/// there: the tiles stage lists those.
+#[test]
+fn listed_tiles_are_zeroed_and_no_others() {
+    let gpu = gpu();
+    let mut random = Random(6);
+    for (stage, form) in GROUPS.map(|sheets| Stages::new(&gpu, sheets)).iter().zip([
+        FootprintForm::SummedArea,
+        FootprintForm::Sections,
+        FootprintForm::SummedArea,
+    ]) {
+        let mut scene = view_scene(VIEWS[0], (2.0, 2.0), 1.0, form);
+        // Neither a multiple of 32.
+        (scene.image.width, scene.image.height) = (150, 77);
+        let fixture = Fixture::new(stage, scene, VIEWS[0].1);
+        let splats: Vec<_> = (0..40)
+            .map(|_| layout::Splat { depth: random.uniform(-1.0, 4.0) as f32, ..fixture.random_splat(&mut random) })
+            .collect();
+        let all: Vec<u32> = (0..40).collect();
+        let columns = tile_grid(fixture.view.size)[0] as usize;
+        let tile_of = |pixel: usize| (pixel / 150 / TILE as usize * columns + pixel % 150 / TILE as usize) as u32;
+        let clean = fixture.draw_group(&splats, &all, 0, &fixture.tiles);
+        assert!(clean.iter().all(|sheet| sheet.iter().any(|pixel| pixel.w > 0.0)));
+        // Each sheet holds something else; a power of two, so that sums with it say what was added.
+        let stale = |sheet: usize| (sheet as f32 - 2.5) * 16384.0;
+        for listed in [vec![], vec![7], vec![0, 4, 9, 10, 14, 11], (0..15).rev().collect::<Vec<u32>>()] {
+            for instances in [&all[..0], &all[..]] {
+                for (at, sheet) in fixture.sheets.iter().enumerate() {
+                    let layout =
+                        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(150 * 16), rows_per_image: None };
+                    let texels = vec![stale(at); 150 * 77 * 4];
+                    let bytes = bytemuck::cast_slice(&texels);
+                    gpu.queue().write_texture(sheet.as_image_copy(), bytes, layout, sheet.size());
+                }
+                let drawn = fixture.draw_group(&splats, instances, 0, &listed);
+                for (at, (sheet, clean)) in drawn.iter().zip(&clean).enumerate() {
+                    for (pixel, (actual, &clean)) in sheet.iter().zip(clean).enumerate() {
+                        let clean = if instances.is_empty() { DVec4::ZERO } else { clean };
+                        let is_listed = listed.contains(&tile_of(pixel));
+                        let name = format!("sheet {at}, pixel {pixel}, {listed:?}, {} splats", instances.len());
+                        if is_listed {
+                            assert_eq!(*actual, clean, "{name}");
+                        } else if clean == DVec4::ZERO {
+                            assert_eq!(*actual, DVec4::splat(stale(at).into()), "{name}");
+                        } else {
+                            // Every addition is rounded to what an f32 of that size can hold.
+                            let error = (*actual - clean - f64::from(stale(at))).abs().max_element();
+                            assert!(error < 40.0 * 65536.0 * F32, "{name}: {actual}");
+                        }
+                    }
+                }
+            }
+        }
+    }
 }

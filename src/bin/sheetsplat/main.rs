@@ -1,5 +1,6 @@
 //! The command line program.
 
+mod bench;
 mod render;
 
 use std::io::Write;
@@ -19,6 +20,8 @@ struct Arguments {
 enum Command {
     /// Render a scene file, a volume file, or a builtin volume to an image.
     Render(render::Arguments),
+    /// Time a first frame and turning frames; prints one line of JSON.
+    Bench(bench::Arguments),
 }
 
 /// What went wrong, by whose fault.
@@ -34,6 +37,7 @@ fn main() -> ExitCode {
     // Clap itself exits with 2 on bad usage, with 0 on --help.
     let result = match Arguments::parse().command {
         Command::Render(arguments) => render::run(&arguments),
+        Command::Bench(arguments) => bench::run(&arguments),
     };
     let (message, code) = match result {
         Ok(()) => return ExitCode::SUCCESS,

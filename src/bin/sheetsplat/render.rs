@@ -88,7 +88,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 /// A scene file by its extension; anything else is a volume.
-fn open_scene(input: &str, sets: &[String]) -> Result<Scene, SceneError> {
+pub(crate) fn open_scene(input: &str, sets: &[String]) -> Result<Scene, SceneError> {
     match input.strip_prefix("builtin:") {
         Some(name) => Scene::from_volume(VolumeSource::Builtin(name.to_owned()), sets),
         None if input.ends_with(".toml") => Scene::open(input.as_ref(), sets),
@@ -101,7 +101,8 @@ fn render_reference(scene: &Scene) -> Result<Rendering, Error> {
     let volume = scene.load_volume()?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
     let start = Instant::now();
-    let image = reference::render(&volume, &scene.transfer.resolve(&volume), scene)?;
+    let transfer = scene.transfer.resolve(&volume);
+    let image = reference::render(&volume, &transfer, scene)?;
     let stats = Stats {
         adapter: "CPU".to_owned(),
         driver: "f64".to_owned(),
@@ -110,6 +111,7 @@ fn render_reference(scene: &Scene) -> Result<Rendering, Error> {
         height: image.height,
         load_ms,
         frame_ms: start.elapsed().as_secs_f64() * 1e3,
+        counts: reference::count(&volume, &transfer, scene)?,
         ..Stats::default()
     };
     Ok(Rendering { image, stats })
@@ -117,7 +119,7 @@ fn render_reference(scene: &Scene) -> Result<Rendering, Error> {
 
 impl Failure {
     /// What is wrong with rendering `input`; scene and volume errors name their file themselves.
-    fn of(error: Error, input: &str) -> Self {
+    pub(crate) fn of(error: Error, input: &str) -> Self {
         match error {
             Error::Scene(_) | Error::Volume(_) => Self::Input(error.to_string()),
             Error::Render(

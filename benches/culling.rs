@@ -1,0 +1,90 @@
+//! What early splat elimination and tiles save (§6, Table 2): the same frame with and without, in interleaved pairs.
+//!
+//! `cargo bench --bench culling -- [PAIRS] [SCENE]…` takes scene files or builtin volumes; without any, builtin ones, and
+//! the scenes beside the checkout where they are. Scenes in perspective are left out.
+
+#![expect(clippy::unwrap_used, reason = "a bench")]
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use sheetsplat::camera::Projection;
+use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::renderer::ClassifiedVolume;
+use sheetsplat::scene::{Scene, VolumeSource};
+use sheetsplat::stats::Stats;
+
+fn main() {
+    // Cargo passes --bench.
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
+    let (pairs, scenes) = match arguments.split_first().map(|(first, rest)| (first.parse::<usize>(), rest)) {
+        Some((Ok(pairs), rest)) => (pairs, rest.to_vec()),
+        _ => (7, arguments),
+    };
+    let scenes = if scenes.is_empty() { default_scenes() } else { scenes };
+    let headless = Headless::new(&HeadlessOptions::default()).unwrap();
+    println!("| scene | without, ms | µs per section | with, ms | ratio | sections drawn | quads |");
+    println!("|---|---|---|---|---|---|---|");
+    let mut last = None;
+    for name in &scenes {
+        let mut scene = open(name);
+        if matches!(scene.camera.projection, Projection::Perspective { .. }) {
+            continue;
+        }
+        let volume = headless.classify(&scene.load_volume().unwrap(), &scene).unwrap();
+        let mut frame = |on: bool| {
+            (scene.splatting.culling, scene.splatting.tiles) = (on, on);
+            timed(&headless, &volume, &scene)
+        };
+        // The first frame compiles shaders.
+        frame(true);
+        let (mut without, mut with) = (Vec::new(), Vec::new());
+        for _ in 0..pairs {
+            without.push(frame(false));
+            with.push(frame(true));
+        }
+        let (all, drawn) = (without[0].1.counts, with[0].1.counts);
+        let (slow, fast) = (median(&without), median(&with));
+        println!(
+            "| {} | {slow:.0} | {:.2} | {fast:.0} | {:.1} | {:.1} % | {} |",
+            Path::new(name).file_stem().unwrap().display(),
+            slow * 1e3 / all.sections_rasterized as f64,
+            slow / fast,
+            100.0 * drawn.sections_rasterized as f64 / drawn.sections_total as f64,
+            drawn.quads,
+        );
+        last = with.pop();
+    }
+    if let Some((_, stats)) = last {
+        println!("\n{pairs} pairs; {} ({})", stats.adapter, stats.driver);
+    }
+}
+
+fn timed(headless: &Headless, volume: &ClassifiedVolume, scene: &Scene) -> (f64, Stats) {
+    let start = Instant::now();
+    let stats = headless.draw(volume, scene).unwrap().stats;
+    (start.elapsed().as_secs_f64() * 1e3, stats)
+}
+
+fn median(frames: &[(f64, Stats)]) -> f64 {
+    let mut times: Vec<f64> = frames.iter().map(|frame| frame.0).collect();
+    times.sort_by(f64::total_cmp);
+    times[times.len() / 2]
+}
+
+fn open(name: &str) -> Scene {
+    match name.strip_prefix("builtin:") {
+        Some(builtin) => Scene::new(VolumeSource::Builtin(builtin.to_owned())),
+        None => Scene::open(Path::new(name), &[]).unwrap(),
+    }
+}
+
+fn default_scenes() -> Vec<String> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
+    let entries = std::fs::read_dir(folder);
+    let mut scenes: Vec<PathBuf> =
+        entries.map(|entries| entries.map(|entry| entry.unwrap().path()).collect()).unwrap_or_default();
+    scenes.sort();
+    let builtin = ["builtin:head", "builtin:nerve", "builtin:tomato"].map(str::to_owned);
+    builtin.into_iter().chain(scenes.iter().map(|scene| scene.display().to_string())).collect()
+}

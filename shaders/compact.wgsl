@@ -1,0 +1,67 @@
+// The voxels that a sheet group draws, and those of them that are drawn for the first time, each in the order of the visits.
+// One workgroup: every thread writes a run of visits.
+
+@group(0) @binding(0) var<storage, read> visits: array<Visit>;
+@group(0) @binding(1) var<storage, read> visit_args: Indirect;
+@group(0) @binding(2) var<storage, read_write> instances: array<u32>;
+@group(0) @binding(3) var<storage, read_write> draw_args: Indirect;
+@group(0) @binding(4) var<storage, read_write> fresh: array<u32>;
+@group(0) @binding(5) var<storage, read_write> fresh_args: Indirect;
+@group(0) @binding(6) var<storage, read_write> tally: Tally;
+
+const WORKGROUP_SIZE = 256u;
+
+// Drawn and fresh voxels up to and with a thread's run.
+var<workgroup> ends: array<vec2u, 256>;
+
+fn count_bits(bits: vec2u) -> u32 {
+    let count = countOneBits(bits);
+    return count.x + count.y;
+}
+
+@compute @workgroup_size(256)
+fn main(@builtin(local_invocation_index) thread: u32) {
+    let count = visit_args.count;
+    let run = (count + WORKGROUP_SIZE - 1u) / WORKGROUP_SIZE;
+    let first = min(thread * run, count);
+    let end = min(first + run, count);
+    var own = vec2u(0u);
+    for (var i = first; i < end; i += 1u) {
+        own += vec2u(count_bits(visits[i].drawn), count_bits(visits[i].fresh));
+    }
+    ends[thread] = own;
+    workgroupBarrier();
+    for (var step = 1u; step < WORKGROUP_SIZE; step *= 2u) {
+        var sum = ends[thread];
+        if thread >= step {
+            sum += ends[thread - step];
+        }
+        workgroupBarrier();
+        ends[thread] = sum;
+        workgroupBarrier();
+    }
+    var slot = ends[thread] - own;
+    for (var i = first; i < end; i += 1u) {
+        for (var word = 0u; word < 2u; word += 1u) {
+            var drawn = visits[i].drawn[word];
+            let new_ones = visits[i].fresh[word];
+            while drawn != 0u {
+                let bit = firstTrailingBit(drawn);
+                let id = visits[i].first + word * 32u + bit;
+                instances[slot.x] = id;
+                slot.x += 1u;
+                if (new_ones & (1u << bit)) != 0u {
+                    fresh[slot.y] = id;
+                    slot.y += 1u;
+                }
+                drawn &= drawn - 1u;
+            }
+        }
+    }
+    if thread == 0u {
+        let total = ends[WORKGROUP_SIZE - 1u];
+        draw_args = indirect(total.x);
+        fresh_args = indirect_workgroups(total.y, SHADE_WORKGROUP);
+        atomicAdd(&tally.quads, total.x);
+    }
+}

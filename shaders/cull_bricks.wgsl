@@ -1,0 +1,115 @@
+// Which bricks a sheet group visits (§6): those that reach into the group and are not behind opaque pixels alone. One
+// workgroup, so that the visits keep the order of the bricks: the same frame gives the same bytes.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<uniform> group: Group;
+@group(0) @binding(2) var<storage, read> bricks: array<Brick>;
+// Bricks by their first sheet group.
+@group(0) @binding(3) var<storage, read> order: array<u32>;
+@group(0) @binding(4) var<storage, read> states: array<BrickState>;
+// The occlusion buffer: a bit is set where the whole footprint box around a pixel is opaque.
+@group(0) @binding(5) var<storage, read> occluded: array<u32>;
+@group(0) @binding(6) var<storage, read_write> visits: array<Visit>;
+@group(0) @binding(7) var<storage, read_write> args: Indirect;
+@group(0) @binding(8) var<storage, read_write> tally: Tally;
+
+const WORKGROUP_SIZE = 256u;
+// The sheets of a group.
+override SHEETS: u32 = 4u;
+
+var<workgroup> ends: array<u32, 256>;
+
+// All bits of a brick's voxels.
+fn all_voxels(count: u32) -> vec2u {
+    let bits = (1u << (count & 31u)) - 1u;
+    return select(select(vec2u(bits, 0u), vec2u(0xffffffffu, bits), count >= 32u), vec2u(0xffffffffu), count == 64u);
+}
+
+// Whether the occlusion buffer is set at all pixels that centres of the brick's voxels can fall on.
+fn is_behind(low: vec2f, high: vec2f) -> bool {
+    let last = vec2f(frame.size - 1u);
+    let first_pixel = vec2u(clamp(floor(low), vec2f(0.0), last));
+    let last_pixel = vec2u(clamp(floor(high), vec2f(0.0), last));
+    let words = tile_grid(frame.size).x;
+    for (var word = first_pixel.x / TILE; word <= last_pixel.x / TILE; word += 1u) {
+        let from_bit = max(first_pixel.x, word * TILE) - word * TILE;
+        let to_bit = min(last_pixel.x, word * TILE + TILE - 1u) - word * TILE;
+        let needed = (0xffffffffu >> (31u - to_bit)) & (0xffffffffu << from_bit);
+        for (var y = first_pixel.y; y <= last_pixel.y; y += 1u) {
+            if (occluded[y * words + word] & needed) != needed {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+fn is_visited(at: u32) -> bool {
+    let brick = bricks[at];
+    if all(states[at].hidden == all_voxels(brick.count)) {
+        return false;
+    }
+    let half_extent = 0.5 * vec3f(vec3u(brick.extent & 0xffu, (brick.extent >> 8u) & 0xffu, brick.extent >> 16u));
+    let center = vec4f(vec3f(vec3u(brick.x, brick.y, brick.z)) + half_extent, 1.0);
+    let rows = frame.screen_from_voxel;
+    let p = vec3f(dot(rows[0], center), dot(rows[1], center), dot(rows[2], center));
+    let spread =
+        vec3f(dot(abs(rows[0].xyz), half_extent), dot(abs(rows[1].xyz), half_extent), dot(abs(rows[2].xyz), half_extent));
+    // Rounding must not lose a voxel that touches by a hair.
+    let slack = 1e-3;
+    let depth_reach = spread.z + frame.radius + slack;
+    let far = group.near + f32(SHEETS) * frame.slab_width;
+    if p.z + depth_reach <= group.near || p.z - depth_reach >= far {
+        return false;
+    }
+    let low = p.xy - spread.xy - slack;
+    let high = p.xy + spread.xy + slack;
+    if any(high + frame.half_box < vec2f(0.5)) || any(low - frame.half_box > vec2f(frame.size) - 0.5) {
+        return false;
+    }
+    return frame.culling == 0u || !is_behind(low, high);
+}
+
+@compute @workgroup_size(256)
+fn main(@builtin(local_invocation_index) thread: u32) {
+    // Every thread takes a run of bricks, at most 32 at a time: their answers fit a word.
+    var total = 0u;
+    for (var base = 0u; base < group.brick_count; base += WORKGROUP_SIZE * 32u) {
+        let rest = min(group.brick_count - base, WORKGROUP_SIZE * 32u);
+        let run = (rest + WORKGROUP_SIZE - 1u) / WORKGROUP_SIZE;
+        let first = min(thread * run, rest);
+        let end = min(first + run, rest);
+        var visited = 0u;
+        for (var i = first; i < end; i += 1u) {
+            if is_visited(order[group.first_brick + base + i]) {
+                visited |= 1u << (i - first);
+            }
+        }
+        ends[thread] = countOneBits(visited);
+        workgroupBarrier();
+        for (var step = 1u; step < WORKGROUP_SIZE; step *= 2u) {
+            var sum = ends[thread];
+            if thread >= step {
+                sum += ends[thread - step];
+            }
+            workgroupBarrier();
+            ends[thread] = sum;
+            workgroupBarrier();
+        }
+        var slot = total + ends[thread] - countOneBits(visited);
+        for (var i = first; i < end; i += 1u) {
+            if (visited & (1u << (i - first))) != 0u {
+                let at = order[group.first_brick + base + i];
+                visits[slot] = Visit(vec2u(0u), vec2u(0u), at, bricks[at].first, bricks[at].count, 0u);
+                slot += 1u;
+            }
+        }
+        total += ends[WORKGROUP_SIZE - 1u];
+        workgroupBarrier();
+    }
+    if thread == 0u {
+        args = indirect(total);
+        atomicAdd(&tally.bricks_tested, group.brick_count);
+        atomicAdd(&tally.bricks_visited, total);
+    }
+}

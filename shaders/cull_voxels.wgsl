@@ -1,0 +1,83 @@
+// Which voxels of the visited bricks a sheet group draws (§6). One workgroup per visited brick, one thread per voxel.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<uniform> group: Group;
+@group(0) @binding(2) var<storage, read> voxels: array<Voxel>;
+@group(0) @binding(3) var<storage, read> occluded: array<u32>;
+@group(0) @binding(4) var<storage, read_write> visits: array<Visit>;
+@group(0) @binding(5) var<storage, read_write> states: array<BrickState>;
+@group(0) @binding(6) var<storage, read_write> tally: Tally;
+@group(0) @binding(7) var<storage, read> visit_args: Indirect;
+
+override SHEETS: u32 = 4u;
+
+var<workgroup> hidden_now: array<atomic<u32>, 2>;
+var<workgroup> drawn_now: array<atomic<u32>, 2>;
+var<workgroup> sections_now: atomic<u32>;
+
+// Whether every pixel of the footprint's box is opaque. A centre off the image is tested at the nearest pixel on it, whose
+// box holds all of its own that is on the image.
+fn is_hidden(center_px: vec2f) -> bool {
+    let pixel = vec2u(clamp(floor(center_px), vec2f(0.0), vec2f(frame.size - 1u)));
+    let word = occluded[pixel.y * tile_grid(frame.size).x + pixel.x / TILE];
+    return (word & (1u << (pixel.x % TILE))) != 0u;
+}
+
+// Marks the tiles that the footprint's box overlaps.
+fn mark_tiles(center_px: vec2f) {
+    let last = vec2f(frame.size - 1u);
+    let first_tile = vec2u(clamp(center_px - frame.half_box - 0.5, vec2f(0.0), last)) / TILE;
+    let last_tile = vec2u(clamp(center_px + frame.half_box, vec2f(0.0), last)) / TILE;
+    let columns = tile_grid(frame.size).x;
+    for (var y = first_tile.y; y <= last_tile.y; y += 1u) {
+        for (var x = first_tile.x; x <= last_tile.x; x += 1u) {
+            let tile = y * columns + x;
+            if atomicLoad(&tally.tiles[tile]) == 0u {
+                atomicStore(&tally.tiles[tile], 1u);
+            }
+        }
+    }
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(local_invocation_index) slot: u32, @builtin(workgroup_id) workgroup: vec3u) {
+    let at = unfold(workgroup);
+    if at >= visit_args.count {
+        return;
+    }
+    let visit = visits[at];
+    let state = states[visit.brick];
+    let word = slot / 32u;
+    let bit = 1u << (slot % 32u);
+    if slot < visit.count && (state.hidden[word] & bit) == 0u {
+        let id = visit.first + slot;
+        let p = project(voxels[id].index);
+        let center_px = p.xy;
+        let depth = p.z;
+        let on_screen = all(center_px + frame.half_box >= vec2f(0.5))
+            && all(center_px - frame.half_box <= vec2f(frame.size) - 0.5);
+        // The sheets of this group that the kernel overlaps, with more than the depths' rounding errors: what ends at a plane
+        // does not reach the sheet behind it. The first voxel is about as deep as any.
+        let reach = frame.radius - 2e-7 * (frame.radius + abs(frame.screen_from_voxel[2].w) + abs(group.near));
+        let first_sheet = max(floor((depth - reach - group.near) / frame.slab_width), 0.0);
+        let end_sheet = min(ceil((depth + reach - group.near) / frame.slab_width), f32(SHEETS));
+        if !on_screen || frame.culling != 0u && is_hidden(center_px) {
+            atomicOr(&hidden_now[word], bit);
+        } else if first_sheet < end_sheet {
+            atomicOr(&drawn_now[word], bit);
+            atomicAdd(&sections_now, u32(end_sheet - first_sheet));
+            mark_tiles(center_px);
+        }
+    }
+    workgroupBarrier();
+    if slot == 0u {
+        let drawn = vec2u(atomicLoad(&drawn_now[0]), atomicLoad(&drawn_now[1]));
+        let hidden = vec2u(atomicLoad(&hidden_now[0]), atomicLoad(&hidden_now[1]));
+        let fresh = countOneBits(drawn & ~state.shaded);
+        visits[at].drawn = drawn;
+        visits[at].fresh = drawn & ~state.shaded;
+        states[visit.brick] = BrickState(state.hidden | hidden, state.shaded | drawn);
+        atomicAdd(&tally.voxels_shaded, fresh.x + fresh.y);
+        atomicAdd(&tally.sections_rasterized, atomicLoad(&sections_now));
+    }
+}

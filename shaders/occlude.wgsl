@@ -1,0 +1,78 @@
+// The occlusion buffer (§6): the opacity buffer convolved with a box of the footprint's size, separably. The paper averages
+// opacities cut off at the threshold and compares with it; whether all pixels of a box are opaque is the same decision
+// without rounding, and on bits. One workgroup per tile, one thread per row of 32 pixels.
+
+struct TileList {
+    args: Indirect,
+    tiles: array<u32>,
+}
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> occluding: TileList;
+@group(0) @binding(2) var<storage, read> source: array<u32>;
+@group(0) @binding(3) var<storage, read_write> result: array<u32>;
+
+struct Word {
+    x: u32,
+    y: u32,
+    inside: bool,
+}
+
+fn word_of(workgroup: vec3u, thread: u32) -> Word {
+    let at = unfold(workgroup);
+    if at >= occluding.args.count {
+        return Word(0u, 0u, false);
+    }
+    let tile = occluding.tiles[at];
+    let words = tile_grid(frame.size).x;
+    let y = tile / words * TILE + thread;
+    return Word(tile % words, y, y < frame.size.y);
+}
+
+// Down the columns; rows off the image count as opaque.
+@compute @workgroup_size(32)
+fn columns(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
+    let word = word_of(workgroup, thread);
+    if !word.inside {
+        return;
+    }
+    let words = tile_grid(frame.size).x;
+    var all = 0xffffffffu;
+    let last = min(word.y + frame.reach.y, frame.size.y - 1u);
+    for (var y = word.y - min(word.y, frame.reach.y); y <= last; y += 1u) {
+        all &= source[y * words + word.x];
+    }
+    result[word.y * words + word.x] = all;
+}
+
+// A row's word, all opaque off the image.
+fn row_word(y: u32, x: i32) -> u32 {
+    let words = tile_grid(frame.size).x;
+    if x < 0 || x >= i32(words) {
+        return 0xffffffffu;
+    }
+    return source[y * words + u32(x)];
+}
+
+// Along the rows.
+@compute @workgroup_size(32)
+fn rows(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
+    let word = word_of(workgroup, thread);
+    if !word.inside {
+        return;
+    }
+    let x = i32(word.x);
+    var all = row_word(word.y, x);
+    for (var step = 1u; step <= frame.reach.x; step += 1u) {
+        let whole = i32(step / 32u);
+        let part = step % 32u;
+        var from_right = row_word(word.y, x + whole) >> part;
+        var from_left = row_word(word.y, x - whole) << part;
+        if part != 0u {
+            from_right |= row_word(word.y, x + whole + 1) << (32u - part);
+            from_left |= row_word(word.y, x - whole - 1) >> (32u - part);
+        }
+        all &= from_right & from_left;
+    }
+    result[word.y * tile_grid(frame.size).x + word.x] = all;
+}

@@ -1,0 +1,68 @@
+// Bricks of at most 64 voxels, and what the passes of a sheet group say to each other about them.
+// `gpu::layout` documents the fields.
+struct Brick {
+    first: u32,
+    count: u32,
+    x: u32,
+    y: u32,
+    z: u32,
+    extent: u32,
+}
+
+// One bit per voxel of a brick.
+struct BrickState {
+    hidden: vec2u,
+    shaded: vec2u,
+}
+
+// A brick that a sheet group visits, which of its voxels are drawn, and which of those for the first time.
+struct Visit {
+    drawn: vec2u,
+    fresh: vec2u,
+    brick: u32,
+    first: u32,
+    count: u32,
+    padding: u32,
+}
+
+struct Group {
+    near: f32,
+    first_brick: u32,
+    brick_count: u32,
+    index: u32,
+}
+
+// What the GPU decides about the size of a draw or dispatch.
+struct Indirect {
+    draw: array<u32, 5>,
+    dispatch: array<u32, 3>,
+    count: u32,
+}
+
+// Dispatches of more than this many workgroups are folded into two dimensions.
+const FOLD = 32768u;
+
+// Quads drawn by one instance: vertices are worked on an instance at a time, and four of them would leave a software
+// rasteriser's vectors half empty.
+const QUADS = 16u;
+
+// Voxels shaded by one workgroup.
+const SHADE_WORKGROUP = 64u;
+
+// Arguments for `count` things, of which a workgroup takes `each`.
+fn indirect_workgroups(count: u32, each: u32) -> Indirect {
+    let workgroups = (count + each - 1u) / each;
+    return Indirect(
+        array(6u * QUADS, (count + QUADS - 1u) / QUADS, 0u, 0u, 0u),
+        array(min(workgroups, FOLD), (workgroups + FOLD - 1u) / FOLD, 1u),
+        count,
+    );
+}
+
+fn indirect(count: u32) -> Indirect {
+    return indirect_workgroups(count, 1u);
+}
+
+fn unfold(workgroup: vec3u) -> u32 {
+    return workgroup.x + workgroup.y * FOLD;
+}

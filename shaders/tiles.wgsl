@@ -1,0 +1,70 @@
+// Which tiles a sheet group composites, and around which the occlusion buffer changes (§6). One workgroup.
+
+struct TileList {
+    args: Indirect,
+    tiles: array<u32>,
+}
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<uniform> group: Group;
+@group(0) @binding(2) var<storage, read_write> tally: Tally;
+// 1 for tiles whose pixels are all opaque: no splat changes them any more.
+@group(0) @binding(3) var<storage, read> opaque_tiles: array<u32>;
+@group(0) @binding(4) var<storage, read_write> composited: TileList;
+@group(0) @binding(5) var<storage, read_write> occluding: TileList;
+// Tiles composited by every group.
+@group(0) @binding(6) var<storage, read_write> counts: array<u32>;
+
+const WORKGROUP_SIZE = 256u;
+
+var<workgroup> composited_count: atomic<u32>;
+var<workgroup> occluding_count: atomic<u32>;
+
+fn is_composited(tile: u32) -> bool {
+    let touched = frame.tiles == 0u || atomicLoad(&tally.tiles[tile]) != 0u;
+    return touched && (frame.culling == 0u || opaque_tiles[tile] == 0u);
+}
+
+// Whether the box filter at some pixel of a tile reaches into a composited tile.
+fn is_near_composited(at: vec2u, grid: vec2u) -> bool {
+    let margin = (frame.reach + TILE - 1u) / TILE;
+    let low = at - min(at, margin);
+    let high = min(at + margin, grid - 1u);
+    for (var y = low.y; y <= high.y; y += 1u) {
+        for (var x = low.x; x <= high.x; x += 1u) {
+            if is_composited(y * grid.x + x) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+@compute @workgroup_size(256)
+fn main(@builtin(local_invocation_index) thread: u32) {
+    let grid = tile_grid(frame.size);
+    let count = grid.x * grid.y;
+    // The lists' order does not matter: tiles do not overlap.
+    for (var tile = thread; tile < count; tile += WORKGROUP_SIZE) {
+        if is_composited(tile) {
+            composited.tiles[atomicAdd(&composited_count, 1u)] = tile;
+        }
+    }
+    if frame.culling != 0u {
+        for (var tile = thread; tile < count; tile += WORKGROUP_SIZE) {
+            if is_near_composited(vec2u(tile % grid.x, tile / grid.x), grid) {
+                occluding.tiles[atomicAdd(&occluding_count, 1u)] = tile;
+            }
+        }
+    }
+    workgroupBarrier();
+    storageBarrier();
+    for (var tile = thread; tile < count; tile += WORKGROUP_SIZE) {
+        atomicStore(&tally.tiles[tile], 0u);
+    }
+    if thread == 0u {
+        composited.args = indirect(atomicLoad(&composited_count));
+        occluding.args = indirect(atomicLoad(&occluding_count));
+        counts[group.index] = atomicLoad(&composited_count);
+    }
+}

@@ -1,0 +1,94 @@
+//! `sheetsplat bench`.
+
+use std::time::Instant;
+
+use glam::{DMat3, DVec3};
+use serde::Serialize;
+use sheetsplat::error::Error;
+use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::stats::Stats;
+
+use crate::Failure;
+use crate::render::open_scene;
+
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// A scene file (.toml), a volume file (.nrrd, .nhdr), or builtin:NAME[:N].
+    input: String,
+    /// Frames to time after the first one.
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
+    frames: u32,
+    /// Degrees to turn about the camera's up before each of them.
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    rotate: f64,
+    /// Set a scene value, as in --set splatting.slab_width=2.0. Can be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Part of the name of the adapter to use.
+    #[arg(long, value_name = "NAME", env = "WGPU_ADAPTER_NAME")]
+    adapter: Option<String>,
+}
+
+/// What is printed: times in milliseconds, and the last frame's stats.
+#[derive(Serialize)]
+struct Report {
+    first_frame_ms: f64,
+    median_frame_ms: f64,
+    min_frame_ms: f64,
+    max_frame_ms: f64,
+    peak_rss_mib: Option<f64>,
+    #[serde(flatten)]
+    last: Stats,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let mut scene = open_scene(&arguments.input, &arguments.set)?;
+    let failed = |error: Error| Failure::of(error, &arguments.input);
+    let start = Instant::now();
+    let volume = scene.load_volume().map_err(|error| failed(error.into()))?;
+    let load_ms = milliseconds_since(start);
+
+    let start = Instant::now();
+    let options = HeadlessOptions { adapter: arguments.adapter.clone(), ..HeadlessOptions::default() };
+    let headless = Headless::new(&options).map_err(|error| Failure::Other(error.to_string()))?;
+    let classified = headless.classify(&volume, &scene).map_err(|error| failed(error.into()))?;
+    let mut last = headless.draw(&classified, &scene).map_err(|error| failed(error.into()))?.stats;
+    let first_frame_ms = milliseconds_since(start);
+
+    let mut times = Vec::new();
+    for _ in 0..arguments.frames {
+        scene.camera.direction = turned(scene.camera.direction, scene.camera.up, arguments.rotate);
+        let start = Instant::now();
+        last = headless.draw(&classified, &scene).map_err(|error| failed(error.into()))?.stats;
+        times.push(milliseconds_since(start));
+    }
+    times.sort_by(f64::total_cmp);
+    last.load_ms = load_ms;
+    let report = Report {
+        first_frame_ms,
+        median_frame_ms: (times[(times.len() - 1) / 2] + times[times.len() / 2]) / 2.0,
+        min_frame_ms: times[0],
+        max_frame_ms: times[times.len() - 1],
+        peak_rss_mib: peak_rss_mib(),
+        last,
+    };
+    println!("{}", serde_json::to_string(&report).map_err(|error| Failure::Other(error.to_string()))?);
+    Ok(())
+}
+
+/// `direction` turned about `up` by the right hand.
+fn turned(direction: DVec3, up: DVec3, degrees: f64) -> DVec3 {
+    DMat3::from_axis_angle(up.normalize(), degrees.to_radians()) * direction
+}
+
+/// The process's largest resident set so far, where the system tells it.
+fn peak_rss_mib() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kib: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib / 1024.0)
+}
+
+fn milliseconds_since(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}

@@ -1,0 +1,193 @@
+//! Early splat elimination (§6): which bricks a sheet group visits, which of their voxels it draws, those voxels in a row,
+//! and the shading of those that were not shaded before.
+
+use wgpu::{BindGroup, Buffer, BufferUsages, ComputePass, Device, ShaderStages};
+
+use crate::gpu::bindings::{ComputeStage, at_offset, storage, uniform};
+use crate::gpu::layout::{Brick, BrickState, Frame, Group, Indirect, Splat, Tally, Visit, Voxel};
+use crate::gpu::shaders;
+use crate::gpu::voxel_list::VoxelList;
+
+/// The four stages' pipelines.
+#[derive(Debug)]
+pub struct Cull {
+    bricks: ComputeStage,
+    voxels: ComputeStage,
+    compact: ComputeStage,
+    shade: ComputeStage,
+}
+
+/// One list's buffers and bind groups.
+#[derive(Debug)]
+pub struct CullList {
+    /// `[BrickState]`, zero at the start of a frame.
+    pub states: Buffer,
+    /// `[Splat]`, one per voxel of the list, written when it is first drawn.
+    pub splats: Buffer,
+    /// `[u32]`: the splats that the current group draws.
+    pub instances: Buffer,
+    /// [`Indirect`]: how many they are.
+    pub draw_args: Buffer,
+    visits: Buffer,
+    visit_args: Buffer,
+    fresh: Buffer,
+    fresh_args: Buffer,
+    groups: [BindGroup; 4],
+}
+
+/// What all lists share.
+#[derive(Clone, Copy, Debug)]
+pub struct CullBuffers<'a> {
+    /// One [`Frame`].
+    pub frame: &'a Buffer,
+    /// One [`Group`] at every dynamic offset.
+    pub groups: &'a Buffer,
+    /// Control points of the ramps.
+    pub control_points: &'a Buffer,
+    /// The occlusion buffer.
+    pub occluded: &'a Buffer,
+    /// [`Tally`] and the tiles' flags.
+    pub tally: &'a Buffer,
+}
+
+impl Cull {
+    /// Compiles the stages for groups of `sheets` sheets.
+    pub fn new(device: &Device, sheets: u32) -> Self {
+        let stage = ShaderStages::COMPUTE;
+        let sheets = [("SHEETS", f64::from(sheets))];
+        let bricks = [
+            uniform::<Frame>(stage, false),
+            uniform::<Group>(stage, true),
+            storage::<Brick>(stage, true),
+            storage::<u32>(stage, true),
+            storage::<BrickState>(stage, true),
+            storage::<u32>(stage, true),
+            storage::<Visit>(stage, false),
+            storage::<Indirect>(stage, false),
+            storage::<(Tally, u32)>(stage, false),
+        ];
+        let voxels = [
+            uniform::<Frame>(stage, false),
+            uniform::<Group>(stage, true),
+            storage::<Voxel>(stage, true),
+            storage::<u32>(stage, true),
+            storage::<Visit>(stage, false),
+            storage::<BrickState>(stage, false),
+            storage::<(Tally, u32)>(stage, false),
+            storage::<Indirect>(stage, true),
+        ];
+        let compact = [
+            storage::<Visit>(stage, true),
+            storage::<Indirect>(stage, true),
+            storage::<u32>(stage, false),
+            storage::<Indirect>(stage, false),
+            storage::<u32>(stage, false),
+            storage::<Indirect>(stage, false),
+            storage::<(Tally, u32)>(stage, false),
+        ];
+        let shade = [
+            uniform::<Frame>(stage, false),
+            storage::<Voxel>(stage, true),
+            storage::<[f32; 4]>(stage, true),
+            storage::<u32>(stage, true),
+            storage::<Indirect>(stage, true),
+            storage::<Splat>(stage, false),
+        ];
+        Self {
+            bricks: ComputeStage::new(device, shaders::CULL_BRICKS, "main", &bricks, &sheets),
+            voxels: ComputeStage::new(device, shaders::CULL_VOXELS, "main", &voxels, &sheets),
+            compact: ComputeStage::new(device, shaders::COMPACT, "main", &compact, &[]),
+            shade: ComputeStage::new(device, shaders::SHADE, "main", &shade, &[]),
+        }
+    }
+
+    /// Allocates a list's buffers. `order` is the list's bricks by first group; no group looks at more than `most_bricks` of
+    /// them, with at most `most_voxels` voxels.
+    pub fn prepare(
+        &self,
+        device: &Device,
+        shared: CullBuffers<'_>,
+        list: &VoxelList,
+        order: &Buffer,
+        most_bricks: u32,
+        most_voxels: u32,
+    ) -> CullList {
+        let buffer = |label, count: usize, record: usize, usage| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: (count.max(1) * record) as u64,
+                usage: BufferUsages::STORAGE | usage,
+                mapped_at_creation: false,
+            })
+        };
+        let (none, state_usage) = (BufferUsages::empty(), BufferUsages::COPY_DST);
+        let states = buffer("sheetsplat.states", list.bricks.len(), size_of::<BrickState>(), state_usage);
+        let splats = buffer("sheetsplat.splats", list.indices.len(), size_of::<Splat>(), BufferUsages::COPY_SRC);
+        let visits = buffer("sheetsplat.visits", most_bricks as usize, size_of::<Visit>(), none);
+        let instances = buffer("sheetsplat.instances", most_voxels as usize, size_of::<u32>(), none);
+        let fresh = buffer("sheetsplat.fresh", most_voxels as usize, size_of::<u32>(), none);
+        let fresh_args = buffer("sheetsplat.fresh_args", 1, size_of::<Indirect>(), BufferUsages::INDIRECT);
+        let visit_args = buffer("sheetsplat.visit_args", 1, size_of::<Indirect>(), BufferUsages::INDIRECT);
+        let draw_args = buffer("sheetsplat.draw_args", 1, size_of::<Indirect>(), BufferUsages::INDIRECT);
+
+        let CullBuffers { frame, groups, control_points, occluded, tally } = shared;
+        let (frame, group) = (frame.as_entire_binding(), at_offset::<Group>(groups));
+        let whole = Buffer::as_entire_binding;
+        let bricks = [
+            frame.clone(),
+            group.clone(),
+            whole(&list.brick_buffer),
+            whole(order),
+            whole(&states),
+            whole(occluded),
+            whole(&visits),
+            whole(&visit_args),
+            whole(tally),
+        ];
+        let voxels = [
+            frame.clone(),
+            group,
+            whole(&list.voxel_buffer),
+            whole(occluded),
+            whole(&visits),
+            whole(&states),
+            whole(tally),
+            whole(&visit_args),
+        ];
+        let lists = [&visits, &visit_args, &instances, &draw_args, &fresh, &fresh_args, tally];
+        let compact = lists.map(whole);
+        let shade = [
+            frame,
+            whole(&list.voxel_buffer),
+            whole(control_points),
+            whole(&fresh),
+            whole(&fresh_args),
+            whole(&splats),
+        ];
+        let groups = [
+            self.bricks.bind(device, &bricks),
+            self.voxels.bind(device, &voxels),
+            self.compact.bind(device, &compact),
+            self.shade.bind(device, &shade),
+        ];
+        CullList { states, splats, instances, draw_args, visits, visit_args, fresh, fresh_args, groups }
+    }
+
+    /// Decides what the group at `offset` draws of a list.
+    pub fn record(&self, pass: &mut ComputePass<'_>, list: &CullList, offset: u32) {
+        let [bricks, voxels, compact, shade] = &list.groups;
+        self.bricks.dispatch(pass, bricks, &[offset], 1);
+        self.voxels.dispatch_indirect(pass, voxels, &[offset], &list.visit_args);
+        self.compact.dispatch(pass, compact, &[], 1);
+        self.shade.dispatch_indirect(pass, shade, &[], &list.fresh_args);
+    }
+}
+
+impl CullList {
+    /// Bytes of GPU memory.
+    pub fn gpu_bytes(&self) -> u64 {
+        let args = [&self.draw_args, &self.visit_args, &self.fresh_args];
+        let lists = [&self.states, &self.splats, &self.instances, &self.visits, &self.fresh];
+        args.into_iter().chain(lists).map(Buffer::size).sum()
+    }
+}

@@ -1,0 +1,79 @@
+//! Tiles (§6): where a sheet group composites, and around which tiles the occlusion buffer changes.
+
+use wgpu::{BindGroup, Buffer, BufferUsages, ComputePass, Device, ShaderStages};
+
+use crate::gpu::bindings::{ComputeStage, at_offset, storage, uniform};
+use crate::gpu::layout::{Frame, Group, Tally, TileList};
+use crate::gpu::shaders;
+use crate::gpu::targets::Targets;
+
+/// The stage's pipeline.
+#[derive(Debug)]
+pub struct Tiles {
+    stage: ComputeStage,
+}
+
+/// The lists of the current sheet group, and its bind group. A list is a [`TileList`].
+#[derive(Debug)]
+pub struct TileLists {
+    /// Tiles to composite.
+    pub composited: Buffer,
+    /// Tiles of the occlusion buffer to compute anew.
+    pub occluding: Buffer,
+    /// `[u32]`: tiles composited by every group.
+    pub counts: Buffer,
+    group: BindGroup,
+}
+
+impl Tiles {
+    /// Compiles the stage.
+    pub fn new(device: &Device) -> Self {
+        let stage = ShaderStages::COMPUTE;
+        let slots = [
+            uniform::<Frame>(stage, false),
+            uniform::<Group>(stage, true),
+            storage::<(Tally, u32)>(stage, false),
+            storage::<u32>(stage, true),
+            storage::<TileList>(stage, false),
+            storage::<TileList>(stage, false),
+            storage::<u32>(stage, false),
+        ];
+        Self { stage: ComputeStage::new(device, shaders::TILES, "main", &slots, &[]) }
+    }
+
+    /// Allocates the lists for a frame of `group_count` groups.
+    pub fn prepare(
+        &self,
+        device: &Device,
+        frame: &Buffer,
+        groups: &Buffer,
+        tally: &Buffer,
+        targets: &Targets,
+        group_count: usize,
+    ) -> TileLists {
+        let buffer = |label, size, usage| {
+            let usage = BufferUsages::STORAGE | usage;
+            device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
+        };
+        let list_bytes = size_of::<TileList>() as u64 + targets.opaque_tiles.size();
+        let composited = buffer("sheetsplat.composited_tiles", list_bytes, BufferUsages::INDIRECT);
+        let occluding = buffer("sheetsplat.occluding_tiles", list_bytes, BufferUsages::INDIRECT);
+        let counts = buffer("sheetsplat.tile_counts", group_count.max(1) as u64 * 4, BufferUsages::COPY_SRC);
+        let resources = [
+            frame.as_entire_binding(),
+            at_offset::<Group>(groups),
+            tally.as_entire_binding(),
+            targets.opaque_tiles.as_entire_binding(),
+            composited.as_entire_binding(),
+            occluding.as_entire_binding(),
+            counts.as_entire_binding(),
+        ];
+        let group = self.stage.bind(device, &resources);
+        TileLists { composited, occluding, counts, group }
+    }
+
+    /// Lists the tiles of the group at `offset`.
+    pub fn record(&self, pass: &mut ComputePass<'_>, lists: &TileLists, offset: u32) {
+        self.stage.dispatch(pass, &lists.group, &[offset], 1);
+    }
+}

@@ -1,0 +1,556 @@
+//! `shaders/cull_bricks.wgsl`, `shaders/cull_voxels.wgsl` and `shaders/compact.wgsl` against a plain evaluation of their rules
+//! (§6): what a sheet group draws, in which order, and what is known of every brick afterwards. What the drawn voxels look
+//! like is `shade.rs`'s.
+
+use std::collections::BTreeSet;
+
+use glam::{DVec2, DVec3, DVec4, UVec3};
+use sheetsplat::brick;
+use sheetsplat::gpu::layout::{self, Brick, BrickState, Frame, Group, Indirect, Tally, Voxel};
+use sheetsplat::gpu::targets::Targets;
+use sheetsplat::gpu::uniforms::{self, Ramps};
+use sheetsplat::gpu::voxel_list::VoxelLists;
+use sheetsplat::headless::Headless;
+use sheetsplat::kernel::Kernel;
+use sheetsplat::pass::cull::{Cull, CullBuffers, CullList};
+use sheetsplat::plan::{FramePlan, TILE, View, tile_grid};
+use sheetsplat::scene::Scene;
+use sheetsplat::transfer_function::{Ramp, TransferFunction};
+use sheetsplat::volume::Grid;
+use sheetsplat::wgpu::{self, BufferUsages, TextureFormat};
+
+use crate::common::{Random, camera, gpu, scene};
+use crate::{at_offsets, compute, contents, indirect, init};
+
+/// The stages with one list of voxels and what they read and write.
+pub(crate) struct Culling<'a> {
+    gpu: &'a Headless,
+    stage: &'a Cull,
+    pub(crate) view: View,
+    pub(crate) frame: Frame,
+    pub(crate) plan: FramePlan,
+    pub(crate) indices: Vec<u32>,
+    pub(crate) bricks: Vec<Brick>,
+    pub(crate) list: CullList,
+    targets: Targets,
+    tally: wgpu::Buffer,
+    stride: u32,
+}
+
+impl<'a> Culling<'a> {
+    /// Of voxels in memory order.
+    pub(crate) fn new(
+        gpu: &'a Headless,
+        (stage, sheets): (&'a Cull, u32),
+        grid: &Grid,
+        voxels: &[Voxel],
+        transfer: &TransferFunction,
+        scene: &Scene,
+    ) -> Self {
+        let device = gpu.device();
+        let size = [scene.image.width, scene.image.height];
+        let view = View::new(grid, &scene.camera, &scene.splatting, size).unwrap();
+        let (voxels, bricks) = brick::group(grid, voxels);
+        let plan = FramePlan::new([bricks.as_slice()], view, sheets, scene.splatting.order);
+        let lists = VoxelLists::upload(device, &voxels, &bricks);
+        let [list] = &lists.lists[..] else { panic!("{} lists", lists.lists.len()) };
+        let ramps = Ramps::new(transfer);
+        let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
+        let frame = uniforms::frame(&view, &kernel, grid, &ramps, scene);
+        let targets = Targets::new(device, size, TextureFormat::Rgba32Float, sheets).unwrap();
+        let groups: Vec<Group> = (0..)
+            .zip(&plan.groups)
+            .map(|(index, group)| {
+                let [bricks] = &group.bricks[..] else { panic!("one list") };
+                let (first_brick, brick_count) = (bricks.start, bricks.end - bricks.start);
+                Group { near: group.near as f32, first_brick, brick_count, index }
+            })
+            .collect();
+        let (groups, stride) = at_offsets(device, &groups);
+        let bytes = vec![0_u8; size_of::<Tally>() + targets.opaque_tiles.size() as usize];
+        let tally = init(device, &bytes, BufferUsages::STORAGE);
+        let shared = CullBuffers {
+            frame: &init(device, &[frame], BufferUsages::UNIFORM),
+            groups: &groups,
+            control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
+            occluded: &targets.occluded,
+            tally: &tally,
+        };
+        let order = init(device, &plan.orders[0], BufferUsages::STORAGE);
+        let counts = |group: &sheetsplat::plan::GroupPlan| {
+            let range = group.bricks[0].start as usize..group.bricks[0].end as usize;
+            plan.orders[0][range].iter().map(|&at| bricks[at as usize].count).collect::<Vec<_>>()
+        };
+        let most_bricks = plan.groups.iter().map(|group| counts(group).len()).max().unwrap();
+        let most_voxels = plan.groups.iter().map(|group| counts(group).iter().sum()).max().unwrap();
+        Self {
+            list: stage.prepare(device, shared, list, &order, most_bricks as u32, most_voxels),
+            indices: list.indices.clone(),
+            gpu,
+            stage,
+            view,
+            frame,
+            plan,
+            bricks,
+            targets,
+            tally,
+            stride,
+        }
+    }
+
+    /// Runs the stages for a group of the plan.
+    pub(crate) fn cull(&self, group: usize) {
+        compute(self.gpu, |pass| self.stage.record(pass, &self.list, group as u32 * self.stride));
+    }
+
+    /// What is known of a brick's voxels, bit by bit: hidden, shaded.
+    pub(crate) fn states(&self) -> Vec<(u64, u64)> {
+        let bits = |words: [u32; 2]| u64::from(words[0]) | u64::from(words[1]) << 32;
+        let states: Vec<BrickState> = contents(self.gpu, &self.list.states);
+        states.iter().map(|state| (bits(state.hidden), bits(state.shaded))).collect()
+    }
+
+    pub(crate) fn splats(&self) -> Vec<layout::Splat> {
+        contents(self.gpu, &self.list.splats)
+    }
+}
+
+/// Beyond what f32 arithmetic moves pixel coordinates and depths of these tests by: sums of numbers below 600.
+const EPSILON: f64 = 5e-4;
+
+/// Decisions that f32 arithmetic cannot make otherwise; those that it can are noted.
+#[derive(Default)]
+struct Decisions {
+    unsure: bool,
+}
+
+impl Decisions {
+    fn at_least(&mut self, a: f64, b: f64) -> bool {
+        self.unsure |= (a - b).abs() < EPSILON;
+        a >= b
+    }
+
+    /// `x` between 0 and `last`, rounded down.
+    fn floor(&mut self, x: f64, last: f64, epsilon: f64) -> u32 {
+        let [low, floor, high] = [x - epsilon, x, x + epsilon].map(|x| x.clamp(0.0, last).floor());
+        self.unsure |= low != high;
+        floor as u32
+    }
+
+    fn pixel(&mut self, center: DVec2, size: [u32; 2]) -> [u32; 2] {
+        [self.floor(center.x, f64::from(size[0] - 1), EPSILON), self.floor(center.y, f64::from(size[1] - 1), EPSILON)]
+    }
+}
+
+/// Hidden boxes: an image's occlusion buffer.
+#[derive(Clone)]
+struct Occluded {
+    size: [u32; 2],
+    bits: Vec<bool>,
+}
+
+impl Occluded {
+    fn at(&self, [x, y]: [u32; 2]) -> bool {
+        self.bits[(y * self.size[0] + x) as usize]
+    }
+
+    fn words(&self) -> Vec<u32> {
+        let columns = tile_grid(self.size)[0];
+        (0..self.size[1])
+            .flat_map(|y| (0..columns).map(move |column| (column * TILE, y)))
+            .map(|(left, y)| {
+                let is_set = |i: &u32| left + i < self.size[0] && self.at([left + i, y]);
+                (0..TILE).filter(is_set).fold(0, |word, i| word | 1 << i)
+            })
+            .collect()
+    }
+
+    fn new(size: [u32; 2], value: bool) -> Self {
+        Self { size, bits: vec![value; (size[0] * size[1]) as usize] }
+    }
+
+    /// Rectangles of random sides.
+    fn random(random: &mut Random, size: [u32; 2]) -> Self {
+        let mut mask = Self::new(size, false);
+        for _ in 0..3 {
+            let low = size.map(|side| random.uniform(-10.0, f64::from(side)).max(0.0) as u32);
+            let sides = size.map(|side| random.uniform(1.0, f64::from(side)) as u32);
+            for y in low[1]..size[1].min(low[1] + sides[1]) {
+                for x in low[0]..size[0].min(low[0] + sides[0]) {
+                    mask.bits[(y * size[0] + x) as usize] = true;
+                }
+            }
+        }
+        mask
+    }
+}
+
+/// What the rules say, from the start of a frame on.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Expected {
+    /// The list's voxels that the last group draws, in order.
+    drawn: Vec<u32>,
+    /// Hidden and shaded voxels by brick.
+    states: Vec<(u64, u64)>,
+    /// Voxels shaded, sections, quads, bricks tested and visited.
+    counts: [u32; 5],
+    tiles: BTreeSet<u32>,
+}
+
+/// A frame's rules: §6 as the shaders' comments put it.
+struct Rules<'a> {
+    grid: &'a Grid,
+    frame: &'a Frame,
+    sheets: u32,
+    bricks: &'a [Brick],
+    indices: &'a [u32],
+    plan: &'a FramePlan,
+    /// Voxels, by index into the volume, that f32 arithmetic may treat otherwise.
+    unsure: BTreeSet<u32>,
+}
+
+impl Rules<'_> {
+    fn project(&self, p: DVec3) -> DVec3 {
+        DVec3::from(self.frame.screen_from_voxel.map(|row| DVec4::from(row.map(f64::from)).dot(p.extend(1.0))))
+    }
+
+    fn half_box(&self) -> DVec2 {
+        DVec2::from(self.frame.half_box.map(f64::from))
+    }
+
+    /// Whether any pixel of the image lies in the box around `low..high` widened by the footprint.
+    fn is_on_screen(&self, decisions: &mut Decisions, low: DVec2, high: DVec2) -> bool {
+        let (low, high) = (low - self.half_box(), high + self.half_box());
+        let size = self.frame.size.map(f64::from);
+        // All four, so that every unsure one is noted.
+        let sides = [
+            decisions.at_least(high.x, 0.5),
+            decisions.at_least(high.y, 0.5),
+            decisions.at_least(size[0] - 0.5, low.x),
+            decisions.at_least(size[1] - 0.5, low.y),
+        ];
+        sides.into_iter().all(|side| side)
+    }
+
+    fn visits(&self, decisions: &mut Decisions, brick: &Brick, hidden: u64, near: f64, occluded: &Occluded) -> bool {
+        if hidden.count_ones() == brick.count {
+            return false;
+        }
+        let low = UVec3::new(brick.x, brick.y, brick.z).as_dvec3();
+        let extent = UVec3::new(brick.extent & 0xff, brick.extent >> 8 & 0xff, brick.extent >> 16).as_dvec3();
+        // The corners' projections, and the shader's slack.
+        let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for corner in 0..8 {
+            let side = UVec3::new(corner & 1, corner >> 1 & 1, corner >> 2).as_dvec3();
+            let p = self.project(low + side * extent);
+            (least, most) = (least.min(p), most.max(p));
+        }
+        let (least, most) = (least - 1e-3, most + 1e-3);
+        let radius = f64::from(self.frame.radius);
+        let far = near + f64::from(self.sheets) * f64::from(self.frame.slab_width);
+        let is_before = decisions.at_least(near, most.z + radius);
+        let is_behind = decisions.at_least(least.z - radius, far);
+        if is_before || is_behind || !self.is_on_screen(decisions, least.truncate(), most.truncate()) {
+            return false;
+        }
+        if self.frame.culling == 0 {
+            return true;
+        }
+        let all_occluded = |margin: f64| {
+            let mut ignored = Decisions::default();
+            let first = ignored.pixel(least.truncate() - margin, self.frame.size);
+            let last = ignored.pixel(most.truncate() + margin, self.frame.size);
+            (first[1]..=last[1]).all(|y| (first[0]..=last[0]).all(|x| occluded.at([x, y])))
+        };
+        decisions.unsure |= all_occluded(EPSILON) != all_occluded(-EPSILON);
+        !all_occluded(0.0)
+    }
+
+    /// What a group draws after what was expected so far.
+    fn cull(&mut self, group: usize, occluded: &Occluded, so_far: &mut Expected) {
+        so_far.drawn.clear();
+        let group = &self.plan.groups[group];
+        let near = f64::from(group.near as f32);
+        let range = group.bricks[0].start as usize..group.bricks[0].end as usize;
+        for &at in &self.plan.orders[0][range] {
+            let brick = self.bricks[at as usize];
+            so_far.counts[3] += 1;
+            let mut decisions = Decisions::default();
+            let visits = self.visits(&mut decisions, &brick, so_far.states[at as usize].0, near, occluded);
+            if decisions.unsure {
+                // Not by a hair: a box, which has its slack, without any of its voxels.
+                let voxels = brick.first as usize..(brick.first + brick.count) as usize;
+                self.unsure.extend(&self.indices[voxels]);
+            }
+            if !visits {
+                continue;
+            }
+            so_far.counts[4] += 1;
+            for slot in
+                (0..brick.count).filter(|slot| so_far.states[at as usize].0 >> slot & 1 == 0).collect::<Vec<_>>()
+            {
+                let id = brick.first + slot;
+                let p = self.project(self.grid.voxel_at(self.indices[id as usize]).as_dvec3());
+                let mut decisions = Decisions::default();
+                self.cull_voxel(&mut decisions, (at, slot, id), p, near, occluded, so_far);
+                if decisions.unsure {
+                    self.unsure.insert(self.indices[id as usize]);
+                }
+            }
+        }
+        so_far.counts[2] += so_far.drawn.len() as u32;
+    }
+
+    fn cull_voxel(
+        &self,
+        decisions: &mut Decisions,
+        (brick, slot, id): (u32, u32, u32),
+        p: DVec3,
+        near: f64,
+        occluded: &Occluded,
+        so_far: &mut Expected,
+    ) {
+        let size = self.frame.size;
+        let center = p.truncate();
+        let is_on_screen = self.is_on_screen(decisions, center, center);
+        let is_hidden = self.frame.culling == 1 && occluded.at(decisions.pixel(center, size));
+        let state = &mut so_far.states[brick as usize];
+        if !is_on_screen || is_hidden {
+            state.0 |= 1 << slot;
+            return;
+        }
+        // The sheets of the group that the kernel's depths overlap.
+        let (radius, width) = (f64::from(self.frame.radius), f64::from(self.frame.slab_width));
+        let (first, end) = ((p.z - radius - near) / width, (p.z + radius - near) / width);
+        let sheets = f64::from(self.sheets);
+        let first = decisions.floor(first, sheets, EPSILON / width);
+        let end = self.sheets - decisions.floor(sheets - end, sheets, EPSILON / width);
+        if first >= end {
+            return;
+        }
+        so_far.drawn.push(id);
+        so_far.counts[1] += end - first;
+        so_far.counts[0] += u32::from(state.1 >> slot & 1 == 0);
+        state.1 |= 1 << slot;
+        // Every tile with a pixel whose centre is in the footprint's box, and at most one row or column of tiles more.
+        let low = decisions.pixel(center - self.half_box() - 0.5, size).map(|pixel| pixel / TILE);
+        let high = decisions.pixel(center + self.half_box(), size).map(|pixel| pixel / TILE);
+        let columns = tile_grid(size)[0];
+        so_far.tiles.extend((low[1]..=high[1]).flat_map(|y| (low[0]..=high[0]).map(move |x| y * columns + x)));
+    }
+}
+
+/// A grid, its voxels in memory order, and a view of them.
+struct Case {
+    grid: Grid,
+    voxels: Vec<Voxel>,
+    scene: Scene,
+    sheets: u32,
+}
+
+/// How often something happened in a run, so that a test can ask for it.
+#[derive(Debug, Default)]
+struct Seen {
+    most_bricks: u32,
+    drawn: usize,
+    /// Groups that visit nothing, and groups that visit some bricks of those they test.
+    without_visits: usize,
+    with_some: usize,
+    /// Voxels that an earlier occlusion buffer hid and a later one would not.
+    hidden_for_good: u32,
+}
+
+impl Case {
+    fn transfer() -> TransferFunction {
+        TransferFunction {
+            color: Ramp::new(vec![(0.0, DVec3::ONE)]).unwrap(),
+            opacity: Ramp::new(vec![(0.0, 0.5)]).unwrap(),
+            gradient_opacity: None,
+            iso_ranges: None,
+        }
+    }
+
+    /// Draws the groups of the plan in order, under the given occlusion buffers by turns, and checks all that is left behind.
+    fn check(mut self, gpu: &Headless, stage: &Cull, masks: &[Occluded]) -> Seen {
+        let transfer = Self::transfer();
+        // Voxels that f32 arithmetic may decide otherwise about are left out, which changes their bricks.
+        for _ in 0..30 {
+            let culling = Culling::new(gpu, (stage, self.sheets), &self.grid, &self.voxels, &transfer, &self.scene);
+            let (_, unsure) = self.expected(&culling, masks);
+            if unsure.is_empty() {
+                return self.compare(&culling, masks);
+            }
+            self.voxels.retain(|voxel| !unsure.contains(&voxel.index));
+        }
+        panic!("no voxels are left that f32 arithmetic is sure about");
+    }
+
+    fn expected(&self, culling: &Culling<'_>, masks: &[Occluded]) -> (Vec<Expected>, BTreeSet<u32>) {
+        let mut rules = Rules {
+            grid: &self.grid,
+            frame: &culling.frame,
+            sheets: self.sheets,
+            bricks: &culling.bricks,
+            indices: &culling.indices,
+            plan: &culling.plan,
+            unsure: BTreeSet::new(),
+        };
+        let mut so_far = Expected { states: vec![(0, 0); culling.bricks.len()], ..Expected::default() };
+        let steps = (0..culling.plan.groups.len())
+            .map(|group| {
+                rules.cull(group, &masks[group % masks.len()], &mut so_far);
+                so_far.clone()
+            })
+            .collect();
+        (steps, rules.unsure)
+    }
+
+    fn compare(&self, culling: &Culling<'_>, masks: &[Occluded]) -> Seen {
+        let Culling { gpu, list, tally, targets, .. } = culling;
+        let (steps, _) = self.expected(culling, masks);
+        let mut seen = Seen::default();
+        let mut visited_before = 0;
+        for (group, expected) in steps.iter().enumerate() {
+            let mask = &masks[group % masks.len()];
+            let name = format!("group {group} of {}, {} sheets", steps.len(), self.sheets);
+            gpu.queue().write_buffer(&targets.occluded, 0, bytemuck::cast_slice(&mask.words()));
+            culling.cull(group);
+
+            let args: Vec<Indirect> = contents(gpu, &list.draw_args);
+            assert_eq!(args, [indirect(expected.drawn.len() as u32)], "{name}");
+            let instances: Vec<u32> = contents(gpu, &list.instances);
+            assert!(
+                instances[..expected.drawn.len()] == expected.drawn,
+                "{name}: which voxels are drawn, in which order"
+            );
+            let states = culling.states();
+            assert!(states[..expected.states.len()] == expected.states, "{name}: what is known of the bricks");
+            let tally: Vec<u32> = contents(gpu, tally);
+            let (counts, tiles) = tally.split_at(size_of::<Tally>() / 4);
+            assert_eq!(counts[..5], expected.counts, "{name}: shaded, sections, quads, tested, visited");
+            assert_eq!(counts[5..], [0; 3], "{name}: padding");
+            let flags: Vec<u32> = (0..tiles.len() as u32).map(|tile| expected.tiles.contains(&tile).into()).collect();
+            assert_eq!(tiles, flags, "{name}: tiles");
+            let splats = culling.splats();
+            for &id in &expected.drawn {
+                let voxel = self.grid.voxel_at(culling.indices[id as usize]);
+                let record = splats[id as usize];
+                let found = DVec3::new(record.x_px.into(), record.y_px.into(), record.depth.into());
+                let wanted = culling.view.project(voxel);
+                assert!((found - wanted).abs().max_element() < EPSILON, "{name}: {voxel} at {found}, not {wanted}");
+            }
+
+            let tested = culling.plan.groups[group].bricks[0].len() as u32;
+            let visited = expected.counts[4] - visited_before;
+            visited_before = expected.counts[4];
+            seen.most_bricks = seen.most_bricks.max(tested);
+            seen.drawn += expected.drawn.len();
+            seen.without_visits += usize::from(visited == 0);
+            seen.with_some += usize::from(visited > 0 && visited < tested);
+            if mask.bits.iter().all(|bit| !bit) {
+                seen.hidden_for_good += expected.states.iter().map(|state| state.0.count_ones()).sum::<u32>();
+            }
+        }
+        seen
+    }
+}
+
+fn voxel(index: u32) -> Voxel {
+    Voxel { index, value: 1.0, normal: 0, gradient_magnitude: 0.0 }
+}
+
+/// Occlusion buffers that hide something, nothing (what was hidden stays so), something else, everything, and nothing again.
+fn masks(random: &mut Random, size: [u32; 2]) -> Vec<Occluded> {
+    let [some, others] = [(); 2].map(|()| Occluded::random(random, size));
+    vec![
+        some,
+        Occluded::new(size, false),
+        others.clone(),
+        others,
+        Occluded::new(size, true),
+        Occluded::new(size, false),
+    ]
+}
+
+/// A dense volume with holes, of bricks of up to 64 voxels.
+fn dense(random: &mut Random, sheets: u32, culling: bool) -> Case {
+    let grid = Grid { dims: UVec3::new(14, 11, 17), spacing: DVec3::new(1.0, 1.0, 1.3) };
+    let holes = random.uniform(0.0, 0.6);
+    let count = grid.dims.element_product();
+    // The first bricks are full.
+    let voxels = (0..count).filter(|&i| i % 14 < 8 || random.uniform(0.0, 1.0) > holes).map(voxel).collect();
+    let mut scene = scene(75, 45);
+    scene.camera = camera(random.direction().to_array(), random.uniform(9.0, 30.0));
+    scene.splatting.slab_width = [0.3, 1.0, 2.6][random.bits() as usize % 3];
+    scene.splatting.radius = random.uniform(1.0, 3.0);
+    scene.splatting.culling = culling;
+    Case { grid, voxels, scene, sheets }
+}
+
+const SHEETS: [u32; 3] = [1, 2, 4];
+
+#[test]
+fn dense_bricks() {
+    let gpu = gpu();
+    let mut random = Random(31);
+    let mut all = Seen::default();
+    for sheets in SHEETS {
+        let stage = Cull::new(gpu.device(), sheets);
+        for _ in 0..6 {
+            let case = dense(&mut random, sheets, true);
+            let masks = masks(&mut random, [case.scene.image.width, case.scene.image.height]);
+            let seen = case.check(&gpu, &stage, &masks);
+            all.drawn += seen.drawn;
+            all.without_visits += seen.without_visits;
+            all.with_some += seen.with_some;
+            all.hidden_for_good += seen.hidden_for_good;
+        }
+    }
+    assert!(all.drawn > 10_000 && all.hidden_for_good > 1000, "{all:?}");
+    assert!(all.without_visits > 10 && all.with_some > 30, "{all:?}");
+}
+
+/// Without culling nobody looks at the occlusion buffer: only what is off the screen is left out.
+#[test]
+fn culling_off() {
+    let gpu = gpu();
+    let mut random = Random(32);
+    for sheets in SHEETS {
+        let stage = Cull::new(gpu.device(), sheets);
+        let case = dense(&mut random, sheets, false);
+        let size = [case.scene.image.width, case.scene.image.height];
+        let seen = case.check(&gpu, &stage, &[Occluded::new(size, true)]);
+        assert!(seen.drawn > 1000, "{seen:?}");
+    }
+}
+
+/// More bricks than threads, and more than threads and bits of a word: every thread's run is long, and there are several.
+#[test]
+fn many_bricks() {
+    let gpu = gpu();
+    let mut random = Random(33);
+    for (sheets, side, height, least) in [(4, 370, 170.0, 256 * 32), (1, 370, 260.0, 256), (2, 150, 170.0, 256)] {
+        let stage = Cull::new(gpu.device(), sheets);
+        // Bricks beside each other, a voxel or two in each.
+        let grid = Grid { dims: UVec3::new(side, 6, side), spacing: DVec3::ONE };
+        let mut chosen = BTreeSet::new();
+        for z in (0..side).step_by(4) {
+            for y in [0, 4] {
+                for x in (0..side).step_by(4) {
+                    for _ in 0..1 + random.bits() % 2 {
+                        let within = [(); 3].map(|()| (random.bits() % 4) as u32);
+                        let at = (UVec3::new(x, y, z) + UVec3::from(within)).min(grid.dims - 1);
+                        chosen.insert(at.x + side * (at.y + 6 * at.z));
+                    }
+                }
+            }
+        }
+        let mut scene = scene(150, 77);
+        scene.camera = camera([0.04, 0.9, -0.03], height);
+        scene.splatting.slab_width = 8.0;
+        let masks = masks(&mut random, [150, 77]);
+        let case = Case { grid, voxels: chosen.into_iter().map(voxel).collect(), scene, sheets };
+        let seen = case.check(&gpu, &stage, &masks);
+        assert!(seen.most_bricks > least && seen.drawn > 1000, "{seen:?}");
+    }
+}

@@ -1,0 +1,184 @@
+//! `shaders/occlude.wgsl` against a plain evaluation: a pixel is occluded where all pixels of its box that are on the image are
+//! opaque. On bits, so exact.
+
+use std::collections::BTreeSet;
+
+use sheetsplat::gpu::targets::Targets;
+use sheetsplat::headless::Headless;
+use sheetsplat::pass::occlude::Occlude;
+use sheetsplat::plan::{TILE, tile_grid};
+use sheetsplat::wgpu::{BufferUsages, TextureFormat};
+
+use crate::common::{Random, gpu};
+use crate::{compute, contents, frame, init, tile_list};
+
+/// A bit per pixel of an image.
+#[derive(Clone, PartialEq)]
+struct Mask {
+    size: [u32; 2],
+    bits: Vec<bool>,
+}
+
+impl Mask {
+    fn at(&self, x: u32, y: u32) -> bool {
+        self.bits[(y * self.size[0] + x) as usize]
+    }
+
+    /// Words of 32 pixels of a row; bits off the image are `off`.
+    fn words(&self, off: bool) -> Vec<u32> {
+        let [width, height] = self.size;
+        let columns = tile_grid(self.size)[0];
+        (0..height)
+            .flat_map(|y| (0..columns).map(move |column| (column * TILE, y)))
+            .map(|(left, y)| {
+                let bit = |x: u32| if x < width { self.at(x, y) } else { off };
+                (0..TILE).filter(|i| bit(left + i)).fold(0, |word, i| word | 1 << i)
+            })
+            .collect()
+    }
+
+    fn from_words(size: [u32; 2], words: &[u32]) -> Self {
+        let columns = tile_grid(size)[0];
+        let bit = |x: u32, y: u32| words[(y * columns + x / TILE) as usize] >> (x % TILE) & 1 == 1;
+        Self { size, bits: (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| bit(x, y))).collect() }
+    }
+
+    /// The pixels whose whole box, cut off at the image's borders, is set.
+    fn eroded(&self, reach: [u32; 2]) -> Self {
+        let [width, height] = self.size;
+        // Sums over rectangles, so that a box is four look-ups.
+        let stride = width as usize + 1;
+        let mut sums = vec![0; stride * (height as usize + 1)];
+        for y in 0..height as usize {
+            for x in 0..width as usize {
+                let clear = u32::from(!self.at(x as u32, y as u32));
+                sums[(y + 1) * stride + x + 1] =
+                    clear + sums[y * stride + x + 1] + sums[(y + 1) * stride + x] - sums[y * stride + x];
+            }
+        }
+        let is_set = |x: u32, y: u32| {
+            let (left, top) = (x.saturating_sub(reach[0]) as usize, y.saturating_sub(reach[1]) as usize);
+            let (right, bottom) = (width.min(x + reach[0] + 1) as usize, height.min(y + reach[1] + 1) as usize);
+            let sum = |x: usize, y: usize| sums[y * stride + x];
+            sum(right, bottom) + sum(left, top) == sum(left, bottom) + sum(right, top)
+        };
+        Self { size: self.size, bits: (0..height).flat_map(|y| (0..width).map(move |x| is_set(x, y))).collect() }
+    }
+
+    /// Mostly set, with clear rectangles and single clear pixels.
+    fn random(random: &mut Random, size: [u32; 2]) -> Self {
+        let mut mask = Self { size, bits: vec![true; (size[0] * size[1]) as usize] };
+        for _ in 0..random.bits() % 5 {
+            let side = if random.bits().is_multiple_of(2) { 1.0 } else { 20.0 };
+            mask.fill(random, side, false);
+        }
+        mask
+    }
+
+    /// Sets or clears a rectangle of sides up to `most`, anywhere.
+    fn fill(&mut self, random: &mut Random, most: f64, value: bool) {
+        let corner = self.size.map(|side| random.uniform(0.0, f64::from(side)) as u32);
+        let sides = [(); 2].map(|()| random.uniform(1.0, most + 1.0) as u32);
+        for y in corner[1]..self.size[1].min(corner[1] + sides[1]) {
+            for x in corner[0]..self.size[0].min(corner[0] + sides[0]) {
+                self.bits[(y * self.size[0] + x) as usize] = value;
+            }
+        }
+    }
+
+    /// The tiles in which two masks differ, and those within a margin of them.
+    fn changed_tiles(&self, other: &Self, reach: [u32; 2]) -> Vec<u32> {
+        let [columns, rows] = tile_grid(self.size);
+        let margin = reach.map(|pixels| pixels.div_ceil(TILE));
+        let mut tiles = BTreeSet::new();
+        for y in 0..self.size[1] {
+            for x in 0..self.size[0] {
+                if self.at(x, y) != other.at(x, y) {
+                    let (column, row) = (x / TILE, y / TILE);
+                    for row in row.saturating_sub(margin[1])..rows.min(row + margin[1] + 1) {
+                        for column in column.saturating_sub(margin[0])..columns.min(column + margin[0] + 1) {
+                            tiles.insert(row * columns + column);
+                        }
+                    }
+                }
+            }
+        }
+        tiles.into_iter().collect()
+    }
+}
+
+struct Fixture<'a> {
+    gpu: &'a Headless,
+    stage: &'a Occlude,
+    reach: [u32; 2],
+    targets: Targets,
+}
+
+impl Fixture<'_> {
+    /// Computes the listed tiles from a mask; what the occlusion buffer then holds.
+    fn run(&self, mask: &Mask, tiles: &[u32]) -> Vec<u32> {
+        let device = self.gpu.device();
+        let mut frame = frame(|scene| (scene.image.width, scene.image.height) = mask.size.into());
+        frame.reach = self.reach;
+        let frame = init(device, &[frame], BufferUsages::UNIFORM);
+        // As the composite stage leaves it: off the image all is opaque.
+        self.gpu.queue().write_buffer(&self.targets.opaque, 0, bytemuck::cast_slice(&mask.words(true)));
+        let tiles = tile_list(device, tiles);
+        let groups = self.stage.bind(device, &frame, &tiles, &self.targets);
+        compute(self.gpu, |pass| self.stage.record(pass, &groups, &tiles));
+        contents(self.gpu, &self.targets.occluded)
+    }
+}
+
+#[test]
+fn occluded_where_the_whole_box_is_opaque() {
+    let gpu = gpu();
+    let stage = Occlude::new(gpu.device());
+    let mut random = Random(12);
+    let (mut occluded, mut pixels) = (0, 0);
+    let sizes = [[1, 1], [33, 31], [70, 45], [32, 64], [157, 90], [200, 3], [5, 150]];
+    for size in sizes.into_iter().cycle().take(90) {
+        let most = [0.0, 4.0, 34.0, 70.0][random.bits() as usize % 4];
+        // A box is never wider than the image: `reach` is at most its size.
+        let reach = size.map(|side: u32| side.min(random.uniform(0.0, most + 1.0) as u32));
+        let targets = Targets::new(gpu.device(), size, TextureFormat::Rgba32Float, 1).unwrap();
+        let fixture = Fixture { gpu: &gpu, stage: &stage, reach, targets };
+        let [columns, rows] = tile_grid(size);
+        let mut mask = Mask::random(&mut random, size);
+        let words = fixture.run(&mask, &(0..columns * rows).rev().collect::<Vec<_>>());
+        let expected = mask.eroded(reach);
+        assert!(Mask::from_words(size, &words) == expected, "{size:?}, reach {reach:?}: all tiles");
+
+        // A few pixels more, and only the tiles that they can change.
+        let before = mask.clone();
+        mask.fill(&mut random, 30.0, true);
+        let tiles = mask.changed_tiles(&before, reach);
+        let words = fixture.run(&mask, &tiles);
+        let expected = mask.eroded(reach);
+        assert!(Mask::from_words(size, &words) == expected, "{size:?}, reach {reach:?}: {} tiles", tiles.len());
+        occluded += expected.bits.iter().filter(|&&bit| bit).count();
+        pixels += expected.bits.len();
+    }
+    assert!(occluded > pixels / 10 && occluded < pixels * 9 / 10, "{occluded} of {pixels} pixels are occluded");
+}
+
+#[test]
+fn tiles_that_are_not_listed_stay() {
+    let gpu = gpu();
+    let stage = Occlude::new(gpu.device());
+    let size = [150, 75];
+    let targets = Targets::new(gpu.device(), size, TextureFormat::Rgba32Float, 1).unwrap();
+    for stale in [&targets.opaque_columns, &targets.occluded] {
+        gpu.queue().write_buffer(stale, 0, bytemuck::cast_slice(&vec![0x0f0f_0f0f_u32; stale.size() as usize / 4]));
+    }
+    let fixture = Fixture { gpu: &gpu, stage: &stage, reach: [0, 5], targets };
+    let mask = Mask { size, bits: vec![true; 150 * 75] };
+    let listed = [3, 6, 14];
+    let words = fixture.run(&mask, &listed);
+    for (at, word) in (0..).zip(words) {
+        let tile = at / 5 / TILE * 5 + at % 5;
+        let expected = if listed.contains(&tile) { u32::MAX } else { 0x0f0f_0f0f };
+        assert_eq!(word, expected, "row {} of tile {tile}", at / 5);
+    }
+    assert!(fixture.run(&mask, &[]).contains(&0x0f0f_0f0f), "nothing listed, nothing done");
+}

@@ -1,0 +1,161 @@
+//! `shaders/tiles.wgsl` against a plain evaluation of its rules: exact lists, arguments and counts.
+
+use sheetsplat::gpu::layout::{Frame, Group, Indirect, Tally};
+use sheetsplat::gpu::targets::Targets;
+use sheetsplat::headless::Headless;
+use sheetsplat::pass::tiles::Tiles;
+use sheetsplat::plan::{TILE, tile_grid};
+use sheetsplat::wgpu::{BufferUsages, TextureFormat};
+
+use crate::common::{Random, gpu};
+use crate::{at_offsets, compute, contents, frame, indirect, init};
+
+/// What the stage reads.
+#[derive(Debug)]
+struct Case {
+    size: [u32; 2],
+    reach: [u32; 2],
+    culling: bool,
+    tiles: bool,
+    /// By tile: whether it received splats.
+    touched: Vec<bool>,
+    /// By tile: whether all its pixels are opaque.
+    opaque: Vec<bool>,
+}
+
+impl Case {
+    fn random(random: &mut Random, size: [u32; 2], reach: [u32; 2]) -> Self {
+        let [columns, rows] = tile_grid(size);
+        // Few, many or all of them.
+        let mut flags = || {
+            let share = [0.0, 0.02, 0.5, 0.95, 1.0][random.bits() as usize % 5];
+            (0..columns * rows).map(|_| random.uniform(0.0, 1.0) < share).collect()
+        };
+        let (touched, opaque) = (flags(), flags());
+        Self {
+            size,
+            reach,
+            culling: !random.bits().is_multiple_of(4),
+            tiles: !random.bits().is_multiple_of(4),
+            touched,
+            opaque,
+        }
+    }
+
+    fn composited(&self) -> Vec<u32> {
+        let is_composited = |tile: &u32| {
+            let at = *tile as usize;
+            (!self.tiles || self.touched[at]) && !(self.culling && self.opaque[at])
+        };
+        (0..self.touched.len() as u32).filter(is_composited).collect()
+    }
+
+    /// The tiles with a pixel whose box reaches into a composited tile.
+    fn occluding(&self) -> Vec<u32> {
+        if !self.culling {
+            return Vec::new();
+        }
+        let columns = tile_grid(self.size)[0];
+        let composited = self.composited();
+        let reaches = |a: u32, b: u32, reach: u32| {
+            // Of the nearest pixels of two tiles along an axis, one beside the other.
+            a == b || (a.abs_diff(b) - 1) * TILE < reach
+        };
+        (0..self.touched.len() as u32)
+            .filter(|tile| {
+                composited.iter().any(|other| {
+                    reaches(tile % columns, other % columns, self.reach[0])
+                        && reaches(tile / columns, other / columns, self.reach[1])
+                })
+            })
+            .collect()
+    }
+
+    fn check(&self, gpu: &Headless, stage: &Tiles, group: u32) {
+        const GROUPS: u32 = 5;
+        let device = gpu.device();
+        let targets = Targets::new(device, self.size, TextureFormat::Rgba32Float, 1).unwrap();
+        let opaque: Vec<u32> = self.opaque.iter().map(|&opaque| opaque.into()).collect();
+        gpu.queue().write_buffer(&targets.opaque_tiles, 0, bytemuck::cast_slice(&opaque));
+        let counts: [u32; 8] = [3, 1, 4, 1, 5, 9, 2, 6];
+        assert_eq!(size_of_val(&counts), size_of::<Tally>());
+        let tally: Vec<u32> = counts.into_iter().chain(self.touched.iter().map(|&touched| touched.into())).collect();
+        let tally = init(device, &tally, BufferUsages::STORAGE);
+        let frame = Frame {
+            reach: self.reach,
+            culling: self.culling.into(),
+            tiles: self.tiles.into(),
+            ..frame(|scene| (scene.image.width, scene.image.height) = self.size.into())
+        };
+        let frame = init(device, &[frame], BufferUsages::UNIFORM);
+        let uniforms: Vec<Group> =
+            (0..GROUPS).map(|index| Group { near: 0.0, first_brick: 0, brick_count: 0, index }).collect();
+        let (groups, stride) = at_offsets(device, &uniforms);
+        let lists = stage.prepare(device, &frame, &groups, &tally, &targets, GROUPS as usize);
+        compute(gpu, |pass| stage.record(pass, &lists, group * stride));
+
+        for (name, buffer, expected) in
+            [("composited", &lists.composited, self.composited()), ("occluding", &lists.occluding, self.occluding())]
+        {
+            let words: Vec<u32> = contents(gpu, buffer);
+            let (args, tiles) = words.split_at(size_of::<Indirect>() / 4);
+            let args: Indirect = bytemuck::cast(<[u32; 9]>::try_from(args).unwrap());
+            assert_eq!(args, indirect(expected.len() as u32), "{name}: {self:?}");
+            // The order does not matter.
+            let mut tiles = tiles[..expected.len()].to_vec();
+            tiles.sort_unstable();
+            assert_eq!(tiles, expected, "{name}: {self:?}");
+        }
+        let tally: Vec<u32> = contents(gpu, &tally);
+        assert_eq!(tally[..8], counts, "the tally's counts are other stages'");
+        assert!(tally[8..].iter().all(|&flag| flag == 0), "the flags are ready for the next group: {self:?}");
+        let mut of_groups = [0; GROUPS as usize];
+        of_groups[group as usize] = self.composited().len() as u32;
+        assert_eq!(contents::<u32>(gpu, &lists.counts), of_groups);
+    }
+}
+
+#[test]
+fn lists_are_those_of_the_rules() {
+    let gpu = gpu();
+    let stage = Tiles::new(gpu.device());
+    let mut random = Random(4);
+    // From one tile to more than a workgroup's threads.
+    let sizes = [[1, 1], [32, 32], [33, 64], [700, 500], [2000, 20], [9, 1000], [1024, 1024]];
+    let reaches = [[0, 0], [1, 0], [32, 31], [33, 64], [5, 70], [200, 1]];
+    let mut lengths = [0; 2];
+    for case in 0..60 {
+        let size: [u32; 2] = sizes[case % sizes.len()];
+        let reach: [u32; 2] = reaches[case / sizes.len() % reaches.len()];
+        let reach = [reach[0].min(size[0]), reach[1].min(size[1])];
+        let case = Case::random(&mut random, size, reach);
+        case.check(&gpu, &stage, random.bits() as u32 % 5);
+        if case.culling {
+            lengths[0] += case.composited().len();
+            lengths[1] += case.occluding().len();
+        }
+    }
+    assert!(lengths[0] > 1000 && lengths[1] > lengths[0], "{lengths:?}");
+}
+
+/// One tile in the middle: the occlusion buffer changes as far around it as the box reaches, counted in tiles.
+#[test]
+fn margins_are_the_reach_in_whole_tiles() {
+    let gpu = gpu();
+    let stage = Tiles::new(gpu.device());
+    let (columns, rows) = (11, 9);
+    for (reach, margin) in
+        [([0, 0], [0, 0]), ([1, 32], [1, 1]), ([33, 31], [2, 1]), ([64, 65], [2, 3]), ([500, 0], [11, 0])]
+    {
+        let mut touched = vec![false; columns * rows];
+        touched[4 * columns + 5] = true;
+        let size = [columns as u32 * TILE - 7, rows as u32 * TILE - 1];
+        let opaque = vec![false; columns * rows];
+        let case = Case { size, reach, culling: true, tiles: true, touched, opaque };
+        let expected: Vec<u32> = (0..(columns * rows) as u32)
+            .filter(|tile| (tile % 11).abs_diff(5) <= margin[0] && (tile / 11).abs_diff(4) <= margin[1])
+            .collect();
+        assert_eq!(case.occluding(), expected, "{reach:?}");
+        case.check(&gpu, &stage, 0);
+    }
+}
