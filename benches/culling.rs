@@ -10,8 +10,8 @@ use std::time::Instant;
 
 use sheetsplat::camera::Projection;
 use sheetsplat::headless::{Headless, HeadlessOptions};
-use sheetsplat::renderer::ClassifiedVolume;
 use sheetsplat::scene::{Scene, VolumeSource};
+use sheetsplat::scene_view::SceneView;
 use sheetsplat::stats::Stats;
 
 fn main() {
@@ -31,10 +31,11 @@ fn main() {
         if matches!(scene.camera.projection, Projection::Perspective { .. }) {
             continue;
         }
-        let volume = headless.classify(&scene.load_volume().unwrap(), &scene).unwrap();
+        let mut view = headless.view(scene.load_volume().unwrap(), &scene).unwrap();
         let mut frame = |on: bool| {
             (scene.splatting.culling, scene.splatting.tiles) = (on, on);
-            timed(&headless, &volume, &scene)
+            view.set_splatting(scene.splatting);
+            timed(&headless, &mut view)
         };
         // The first frame compiles shaders.
         frame(true);
@@ -60,9 +61,9 @@ fn main() {
     }
 }
 
-fn timed(headless: &Headless, volume: &ClassifiedVolume, scene: &Scene) -> (f64, Stats) {
+fn timed(headless: &Headless, view: &mut SceneView) -> (f64, Stats) {
     let start = Instant::now();
-    let stats = headless.draw(volume, scene).unwrap().stats;
+    let stats = headless.draw(view).unwrap().stats;
     (start.elapsed().as_secs_f64() * 1e3, stats)
 }
 

@@ -47,7 +47,7 @@ fn main(@builtin(local_invocation_index) thread: u32) {
             let new_ones = visits[i].fresh[word];
             while drawn != 0u {
                 let bit = firstTrailingBit(drawn);
-                let id = visits[i].first + word * 32u + bit;
+                let id = visits[i].brick * BRICK_VOXELS + word * 32u + bit;
                 instances[slot.x] = id;
                 slot.x += 1u;
                 if (new_ones & (1u << bit)) != 0u {

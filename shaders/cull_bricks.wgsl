@@ -19,12 +19,6 @@ override SHEETS: u32 = 4u;
 
 var<workgroup> ends: array<u32, 256>;
 
-// All bits of a brick's voxels.
-fn all_voxels(count: u32) -> vec2u {
-    let bits = (1u << (count & 31u)) - 1u;
-    return select(select(vec2u(bits, 0u), vec2u(0xffffffffu, bits), count >= 32u), vec2u(0xffffffffu), count == 64u);
-}
-
 // Whether the occlusion buffer is set at all pixels that centres of the brick's voxels can fall on.
 fn is_behind(low: vec2f, high: vec2f) -> bool {
     let last = vec2f(frame.size - 1u);
@@ -46,7 +40,7 @@ fn is_behind(low: vec2f, high: vec2f) -> bool {
 
 fn is_visited(at: u32) -> bool {
     let brick = bricks[at];
-    if all(states[at].hidden == all_voxels(brick.count)) {
+    if all((brick.present & ~states[at].hidden) == vec2u(0u)) {
         return false;
     }
     let half_extent = 0.5 * vec3f(vec3u(brick.extent & 0xffu, (brick.extent >> 8u) & 0xffu, brick.extent >> 16u));
@@ -100,7 +94,7 @@ fn main(@builtin(local_invocation_index) thread: u32) {
         for (var i = first; i < end; i += 1u) {
             if (visited & (1u << (i - first))) != 0u {
                 let at = order[group.first_brick + base + i];
-                visits[slot] = Visit(vec2u(0u), vec2u(0u), at, bricks[at].first, bricks[at].count, 0u);
+                visits[slot] = Visit(vec2u(0u), vec2u(0u), at, 0u);
                 slot += 1u;
             }
         }

@@ -1,4 +1,4 @@
-// Which voxels of the visited bricks a sheet group draws (§6). One workgroup per visited brick, one thread per voxel.
+// Which voxels of the visited bricks a sheet group draws (§6). One workgroup per visited brick, one thread per place for a voxel.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> group: Group;
@@ -8,6 +8,7 @@
 @group(0) @binding(5) var<storage, read_write> states: array<BrickState>;
 @group(0) @binding(6) var<storage, read_write> tally: Tally;
 @group(0) @binding(7) var<storage, read> visit_args: Indirect;
+@group(0) @binding(8) var<storage, read> bricks: array<Brick>;
 
 override SHEETS: u32 = 4u;
 
@@ -49,9 +50,8 @@ fn main(@builtin(local_invocation_index) slot: u32, @builtin(workgroup_id) workg
     let state = states[visit.brick];
     let word = slot / 32u;
     let bit = 1u << (slot % 32u);
-    if slot < visit.count && (state.hidden[word] & bit) == 0u {
-        let id = visit.first + slot;
-        let p = project(voxels[id].index);
+    if (bricks[visit.brick].present[word] & ~state.hidden[word] & bit) != 0u {
+        let p = project(voxels[visit.brick * BRICK_VOXELS + slot].index);
         let center_px = p.xy;
         let depth = p.z;
         let on_screen = all(center_px + frame.half_box >= vec2f(0.5))

@@ -1,58 +1,148 @@
-//! Bricks: neighbouring voxels that are tested for visibility together (§6).
+//! Bricks: 4×4×4 neighbouring voxels that are tested for visibility together (§6). Each voxel has its place in its brick, so that
+//! voxels enter and leave without moving others.
 
 use glam::UVec3;
 
-use crate::gpu::layout::{Brick, Voxel};
+use crate::gpu::layout::Brick;
 use crate::volume::Grid;
 
 /// Side of a brick, voxels.
 const SIDE: u32 = 4;
 
-/// Sorts voxels by brick and describes the bricks. Voxels come in memory order and keep it within a brick.
-pub fn group(grid: &Grid, voxels: &[Voxel]) -> (Vec<Voxel>, Vec<Brick>) {
-    let bricks_per_axis = grid.dims.map(|n| n.div_ceil(SIDE));
-    let brick_of = |voxel: &Voxel| {
-        let at = grid.voxel_at(voxel.index) / SIDE;
-        (at.x + bricks_per_axis.x * (at.y + bricks_per_axis.y * at.z)) as usize
-    };
-    // Counting sort: ends[b] is first the number of voxels of brick b - 1, then where brick b starts, at last where it ends.
-    let mut ends = vec![0_u32; bricks_per_axis.element_product() as usize + 1];
-    for voxel in voxels {
-        ends[brick_of(voxel) + 1] += 1;
-    }
-    for b in 1..ends.len() {
-        ends[b] += ends[b - 1];
-    }
-    let mut sorted = vec![bytemuck::Zeroable::zeroed(); voxels.len()];
-    for voxel in voxels {
-        let slot = &mut ends[brick_of(voxel)];
-        sorted[*slot as usize] = *voxel;
-        *slot += 1;
-    }
-    let mut first = 0;
-    let mut bricks = Vec::new();
-    for &end in &ends[..ends.len() - 1] {
-        if end > first {
-            bricks.push(describe(grid, first, &sorted[first as usize..end as usize]));
-        }
-        first = end;
-    }
-    (sorted, bricks)
+/// Places for voxels in a brick.
+pub const BRICK_VOXELS: u32 = SIDE * SIDE * SIDE;
+
+/// The bricks of a volume that hold voxels, or held some.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BrickList {
+    grid: Grid,
+    /// Number in `bricks` of every brick of the grid, or `NONE`.
+    numbers: Vec<u32>,
+    bricks: Vec<Brick>,
 }
 
-/// The brick of some voxels, with the tight box around them.
-fn describe(grid: &Grid, first: u32, voxels: &[Voxel]) -> Brick {
-    let (low, high) = voxels
-        .iter()
-        .map(|voxel| grid.voxel_at(voxel.index))
-        .fold((UVec3::MAX, UVec3::ZERO), |(low, high), at| (low.min(at), high.max(at)));
-    let extent = high - low;
-    Brick {
-        first,
-        count: voxels.len() as u32,
-        x: low.x,
-        y: low.y,
-        z: low.z,
-        extent: extent.x | extent.y << 8 | extent.z << 16,
+const NONE: u32 = u32::MAX;
+
+impl BrickList {
+    /// The bricks of some voxels, given as indices into the volume. Bricks come in memory order.
+    pub fn new(grid: &Grid, voxels: impl Iterator<Item = u32> + Clone) -> Self {
+        let count = bricks_per_axis(grid).element_product();
+        let mut list = Self { grid: *grid, numbers: vec![NONE; count as usize], bricks: Vec::new() };
+        voxels.clone().for_each(|voxel| list.numbers[brick_of(grid, voxel) as usize] = 0);
+        for brick in 0..count {
+            if list.numbers[brick as usize] != NONE {
+                list.add(brick);
+            }
+        }
+        for voxel in voxels {
+            let (number, slot) = (list.numbers[brick_of(grid, voxel) as usize], slot_of(grid, voxel));
+            list.bricks[number as usize].present[slot as usize / 32] |= 1 << (slot % 32);
+        }
+        list.bricks.iter_mut().for_each(fit);
+        list
     }
+
+    /// The bricks.
+    pub fn bricks(&self) -> &[Brick] {
+        &self.bricks
+    }
+
+    /// A voxel's place: the number of its brick times [`BRICK_VOXELS`], and where in the brick. `None` without a brick.
+    pub fn place(&self, voxel: u32) -> Option<u32> {
+        let number = self.numbers[brick_of(&self.grid, voxel) as usize];
+        (number != NONE).then(|| number * BRICK_VOXELS + slot_of(&self.grid, voxel))
+    }
+
+    /// Whether a voxel is in the list.
+    pub fn contains(&self, voxel: u32) -> bool {
+        self.place(voxel)
+            .is_some_and(|place| present(&self.bricks[(place / BRICK_VOXELS) as usize]) >> (place % 64) & 1 == 1)
+    }
+
+    /// Puts a voxel in, in a new brick if need be; where.
+    pub fn enter(&mut self, voxel: u32) -> u32 {
+        let brick = brick_of(&self.grid, voxel);
+        if self.numbers[brick as usize] == NONE {
+            self.add(brick);
+        }
+        let (number, slot) = (self.numbers[brick as usize], slot_of(&self.grid, voxel));
+        self.set(number, slot, true);
+        number * BRICK_VOXELS + slot
+    }
+
+    /// Takes a voxel out. Its brick stays, though it may be empty.
+    pub fn leave(&mut self, voxel: u32) {
+        let number = self.numbers[brick_of(&self.grid, voxel) as usize];
+        self.set(number, slot_of(&self.grid, voxel), false);
+    }
+
+    fn set(&mut self, number: u32, slot: u32, to: bool) {
+        let brick = &mut self.bricks[number as usize];
+        let (word, bit) = (&mut brick.present[slot as usize / 32], 1 << (slot % 32));
+        *word = if to { *word | bit } else { *word & !bit };
+        fit(brick);
+    }
+
+    /// Adds a brick of the grid, without voxels.
+    fn add(&mut self, brick: u32) {
+        let across = bricks_per_axis(&self.grid);
+        let at = SIDE * UVec3::new(brick % across.x, brick / across.x % across.y, brick / (across.x * across.y));
+        self.numbers[brick as usize] = self.bricks.len() as u32;
+        self.bricks.push(Brick { present: [0; 2], x: at.x, y: at.y, z: at.z, extent: 0 });
+    }
+}
+
+/// Which places of a brick hold a voxel.
+pub fn present(brick: &Brick) -> u64 {
+    u64::from(brick.present[0]) | u64::from(brick.present[1]) << 32
+}
+
+/// The voxels of a brick: place in the brick, and where in the volume.
+pub fn voxels(brick: &Brick) -> impl Iterator<Item = (u32, UVec3)> {
+    let (bits, origin) = (present(brick), UVec3::new(brick.x, brick.y, brick.z) / SIDE * SIDE);
+    (0..BRICK_VOXELS).filter(move |slot| bits >> slot & 1 == 1).map(move |slot| (slot, origin + in_brick(slot)))
+}
+
+/// Memory order of bricks, whatever the order in which they were added.
+pub fn position(brick: &Brick) -> [u32; 3] {
+    [brick.z / SIDE, brick.y / SIDE, brick.x / SIDE]
+}
+
+fn in_brick(slot: u32) -> UVec3 {
+    UVec3::new(slot % SIDE, slot / SIDE % SIDE, slot / (SIDE * SIDE))
+}
+
+fn bricks_per_axis(grid: &Grid) -> UVec3 {
+    grid.dims.map(|n| n.div_ceil(SIDE))
+}
+
+/// Number of a voxel's brick in the grid of bricks.
+fn brick_of(grid: &Grid, voxel: u32) -> u32 {
+    let (at, across) = (grid.voxel_at(voxel) / SIDE, bricks_per_axis(grid));
+    at.x + across.x * (at.y + across.y * at.z)
+}
+
+/// A voxel's place in its brick.
+fn slot_of(grid: &Grid, voxel: u32) -> u32 {
+    let at = grid.voxel_at(voxel) % SIDE;
+    at.x + SIDE * (at.y + SIDE * at.z)
+}
+
+/// Fits a brick's box tightly around its voxels.
+fn fit(brick: &mut Brick) {
+    // The places of the first layer across x, y and z; the others follow bit by bit, row by row, slice by slice.
+    const LAYERS: [(u64, u32); 3] = [(0x1111_1111_1111_1111, 1), (0x000f_000f_000f_000f, SIDE), (0xffff, SIDE * SIDE)];
+    let bits = present(brick);
+    if bits == 0 {
+        return;
+    }
+    let bounds = LAYERS.map(|(layer, step)| {
+        let holds = |at: &u32| bits & layer << (at * step) != 0;
+        let (low, high) = ((0..SIDE).find(holds), (0..SIDE).rev().find(holds));
+        (low.unwrap_or(0), high.unwrap_or(0))
+    });
+    let origin = |at: u32, low: u32| at / SIDE * SIDE + low;
+    let [(x, to_x), (y, to_y), (z, to_z)] = bounds;
+    (brick.x, brick.y, brick.z) = (origin(brick.x, x), origin(brick.y, y), origin(brick.z, z));
+    brick.extent = (to_x - x) | (to_y - y) << 8 | (to_z - z) << 16;
 }

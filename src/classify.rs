@@ -19,13 +19,14 @@ pub fn classify(volume: &Volume, transfer: &TransferFunction) -> Vec<Voxel> {
         .enumerate()
         .map(|(y, values)| {
             let first = y as u32 * row;
-            (first..).zip(values).filter_map(|(index, &value)| relevant(volume, transfer, index, value)).collect()
+            (first..).zip(values).filter_map(|(index, &value)| classify_voxel(volume, transfer, index, value)).collect()
         })
         .collect();
     rows.concat()
 }
 
-fn relevant(volume: &Volume, transfer: &TransferFunction, index: u32, value: f32) -> Option<Voxel> {
+/// What of a voxel the GPU needs, if it takes part.
+pub fn classify_voxel(volume: &Volume, transfer: &TransferFunction, index: u32, value: f32) -> Option<Voxel> {
     let opacity = |magnitude| transfer.alpha(f64::from(value), magnitude);
     // Most voxels are ruled out by their value: spare them the gradient.
     if transfer.opacity.at(f64::from(value)) <= 0.0 || !transfer.in_iso_range(f64::from(value)) {

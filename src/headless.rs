@@ -1,17 +1,18 @@
 //! Rendering without a host: an own device, and images in memory. The only part that creates devices, submits and waits.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use wgpu::{Adapter, Backends, Device, DeviceType, Instance, InstanceDescriptor, Queue, TextureFormat};
 
 use crate::error::{Error, RenderError};
 use crate::gpu::device::{DeviceError, DeviceRequirements};
-use crate::gpu::layout::Tally;
 use crate::gpu::readback;
 use crate::image::Image;
-use crate::renderer::{ClassifiedVolume, PreparedFrame, Renderer, RendererOptions};
-use crate::scene::Scene;
-use crate::stats::{Counts, Stats};
+use crate::renderer::{Renderer, RendererOptions};
+use crate::scene::{ImageSettings, Scene};
+use crate::scene_view::SceneView;
+use crate::stats::Stats;
 use crate::volume::Volume;
 
 /// How to choose and open a device.
@@ -95,7 +96,7 @@ impl Headless {
         let start = Instant::now();
         let volume = scene.load_volume()?;
         let load_ms = milliseconds_since(start);
-        let mut rendering = self.render_volume(&volume, scene)?;
+        let mut rendering = self.render_volume(volume, scene)?;
         rendering.stats.load_ms = load_ms;
         Ok(rendering)
     }
@@ -104,29 +105,29 @@ impl Headless {
     ///
     /// # Errors
     /// If the scene asks for what the device or the renderer cannot do, or the device fails.
-    pub fn render_volume(&self, volume: &Volume, scene: &Scene) -> Result<Rendering, RenderError> {
+    pub fn render_volume(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Rendering, RenderError> {
         let start = Instant::now();
-        let classified = self.classify(volume, scene)?;
+        let mut view = self.view(volume, scene)?;
         let classify_ms = milliseconds_since(start);
-        let mut rendering = self.draw(&classified, scene)?;
+        let mut rendering = self.draw(&mut view)?;
         rendering.stats.prepare_ms += classify_ms;
         Ok(rendering)
     }
 
-    /// Classifies a volume under the scene's transfer function, for any number of frames.
+    /// A view of a volume as a scene sets it up, for any number of frames and changes. The scene's own volume is not looked at.
     ///
     /// # Errors
     /// If the device fails.
-    pub fn classify(&self, volume: &Volume, scene: &Scene) -> Result<ClassifiedVolume, RenderError> {
-        self.scoped(|| Ok(ClassifiedVolume::new(&self.device, volume, &scene.transfer.resolve(volume))))
+    pub fn view(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<SceneView, RenderError> {
+        self.scoped(|| Ok(SceneView::new(&self.device, volume.into(), scene)))
     }
 
-    /// Draws one frame of a classified volume and reads it back. The scene's volume and transfer function are not looked at.
+    /// Draws one frame of a view and reads it back.
     ///
     /// # Errors
     /// If the scene asks for what the device or the renderer cannot do, or the device fails.
-    pub fn draw(&self, volume: &ClassifiedVolume, scene: &Scene) -> Result<Rendering, RenderError> {
-        self.scoped(|| self.draw_unscoped(volume, scene))
+    pub fn draw(&self, view: &mut SceneView) -> Result<Rendering, RenderError> {
+        self.scoped(|| self.draw_unscoped(view))
     }
 
     /// What the device reports while `work` runs becomes an error.
@@ -137,13 +138,13 @@ impl Headless {
         }
     }
 
-    fn draw_unscoped(&self, volume: &ClassifiedVolume, scene: &Scene) -> Result<Rendering, RenderError> {
+    fn draw_unscoped(&self, scene_view: &mut SceneView) -> Result<Rendering, RenderError> {
         let start = Instant::now();
-        let frame = self.renderer.prepare(&self.device, &self.queue, volume, scene)?;
+        self.renderer.prepare(&self.device, &self.queue, scene_view)?;
         let prepare_ms = milliseconds_since(start);
 
         let start = Instant::now();
-        let (width, height) = (scene.image.width, scene.image.height);
+        let ImageSettings { width, height, .. } = scene_view.scene().image;
         let target = self.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("sheetsplat.target"),
             size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
@@ -157,13 +158,16 @@ impl Headless {
         let view = target.create_view(&wgpu::TextureViewDescriptor::default());
         let mut encoder =
             self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.frame") });
-        self.renderer.record(&mut encoder, &frame, &view);
+        self.renderer.record(&mut encoder, scene_view, &view);
         self.queue.submit([encoder.finish()]);
+        let counts = scene_view.counts();
         let bytes = readback::texture(&self.device, &self.queue, &target)?;
         let frame_ms = milliseconds_since(start);
 
         let info = self.adapter.get_info();
-        let counts = self.count(volume, &frame)?;
+        // The image came later than the counts.
+        let missing = || Err(RenderError::Readback("the frame's counts did not arrive".to_owned()));
+        let counts = counts.and_then(|counts| counts.try_get()).unwrap_or_else(missing)?;
         Ok(Rendering {
             image: Image { width, height, pixels: bytemuck::pod_collect_to_vec(&bytes) },
             stats: Stats {
@@ -173,22 +177,12 @@ impl Headless {
                 width,
                 height,
                 counts,
-                gpu_bytes: frame.gpu_bytes() + target.width() as u64 * u64::from(height) * 16,
+                gpu_bytes: scene_view.gpu_bytes() + target.width() as u64 * u64::from(height) * 16,
                 load_ms: 0.0,
                 prepare_ms,
                 frame_ms,
             },
         })
-    }
-}
-
-impl Headless {
-    /// The counts of a frame that was drawn.
-    fn count(&self, volume: &ClassifiedVolume, frame: &PreparedFrame) -> Result<Counts, RenderError> {
-        let bytes = readback::buffer(&self.device, &self.queue, frame.tally())?;
-        let tally: Tally = bytemuck::pod_read_unaligned(&bytes[..size_of::<Tally>()]);
-        let tiles = readback::buffer(&self.device, &self.queue, frame.tile_counts())?;
-        Ok(volume.count(&frame.plan, &tally, &bytemuck::pod_collect_to_vec(&tiles)))
     }
 }
 

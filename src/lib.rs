@@ -8,10 +8,13 @@
 //! # From a file to a picture
 //!
 //! ```text
-//! volume file → Volume ─ classify → voxels that take part, in bricks → VoxelLists on the GPU
+//! volume file → Volume ─ classify → ClassifiedVolume: voxels that take part, in bricks, in VoxelLists on the GPU
 //! scene file  → Scene  ─ View, FramePlan: which bricks every group of sheets looks at (plain data)
+//! SceneView: both, and what the next frame can keep of the last one
 //!
-//! per group of sheets, on the GPU:
+//! on the GPU, if iso-ranges changed:
+//!   enter    voxels take their places in the list
+//! per group of sheets:
 //!   cull     which bricks, then which of their voxels are not hidden; those are shaded, once each
 //!   tiles    where the group's splats fall
 //!   splat    one quad per voxel adds its kernel sections to the group's sheet buffers
@@ -21,7 +24,7 @@
 //!   resolve  the result over the background, into the host's target
 //! ```
 //!
-//! [`headless`] does all of it with a device of its own. A host with a device uses [`renderer`]. Settings are those of
+//! [`headless`] does all of it with a device of its own. A host with a device uses [`renderer`] and [`scene_view`]. Settings are those of
 //! [`scene`]. Every stage has a plain f64 twin in
 //! [`reference`](mod@reference).
 //!
@@ -31,12 +34,14 @@
 //! space between two slicing planes ([`slab`]) · *kernel section* the part of a kernel in one slab · *footprint* a section
 //! integrated along the view ray ([`footprint`]) · *sheet buffer* the image of one slab · *sheet group* consecutive sheets drawn
 //! together · *compositing buffer* the accumulated image · *opacity buffer* its alpha · *occlusion buffer* the box-filtered
-//! opacity buffer · *bucket* what touches one slab or group ([`bucket`]) · *brick* up to 4×4×4 neighbouring voxels ([`brick`]) ·
+//! opacity buffer · *bucket* what touches one slab or group ([`bucket`]) · *iso-range* a closed interval of values that take
+//! part ([`iso_range`]) · *brick* 4×4×4 neighbouring voxels ([`brick`]) ·
 //! *tile* a 32×32 pixel square.
 
 pub mod brick;
 pub mod bucket;
 pub mod camera;
+pub mod classified_volume;
 pub mod classify;
 pub mod error;
 pub mod footprint;
@@ -44,17 +49,20 @@ pub mod gpu;
 pub mod grid_warp;
 pub mod headless;
 pub mod image;
+pub mod iso_range;
 pub mod kernel;
 pub mod pass;
 pub mod plan;
 pub mod reference;
 pub mod renderer;
 pub mod scene;
+pub mod scene_view;
 pub mod shading;
 pub mod slab;
 pub mod splatting;
 pub mod stats;
 pub mod transfer_function;
+pub mod value_list;
 pub mod volume;
 
 pub use wgpu;

@@ -5,6 +5,7 @@ use std::ops::Range;
 use glam::{DVec2, DVec3, DVec4, UVec3};
 use rayon::prelude::*;
 
+use crate::brick;
 use crate::bucket::Buckets;
 use crate::camera::{Camera, Projection, ViewBasis};
 use crate::error::RenderError;
@@ -122,9 +123,16 @@ impl FramePlan {
         let buckets: Vec<Buckets> = lists
             .into_iter()
             .map(|bricks| {
-                let touched: Vec<Range<i32>> = bricks
+                // In memory order, whatever changes of iso-range came before: equal scenes add up in equal order.
+                let mut in_memory: Vec<u32> = (0..bricks.len() as u32).collect();
+                let position = |&at: &u32| brick::position(&bricks[at as usize]);
+                if !in_memory.is_sorted_by_key(position) {
+                    in_memory.sort_unstable_by_key(position);
+                }
+                let touched: Vec<Range<i32>> = in_memory
                     .iter()
-                    .map(|brick| {
+                    .map(|&at| {
+                        let brick = &bricks[at as usize];
                         let low = UVec3::new(brick.x, brick.y, brick.z).as_dvec3();
                         let half = UVec3::new(brick.extent & 0xff, brick.extent >> 8 & 0xff, brick.extent >> 16)
                             .as_dvec3()
@@ -134,7 +142,9 @@ impl FramePlan {
                         groups.touched(z - spread).start..groups.touched(z + spread).end
                     })
                     .collect();
-                Buckets::sort(&touched)
+                let mut buckets = Buckets::sort(&touched);
+                buckets.order.iter_mut().for_each(|at| *at = in_memory[*at as usize]);
+                buckets
             })
             .collect();
         let first = buckets.iter().filter_map(|b| b.range().map(|range| range.start)).min().unwrap_or(0);
@@ -155,12 +165,13 @@ impl FramePlan {
 }
 
 /// Voxel–slab overlaps of positive length, wherever they fall on the screen, and the slabs from the first to the last that
-/// any kernel touches; `None` without voxels.
-pub fn count_sections(grid: &Grid, voxels: &[u32], view: &View) -> Option<(u64, Range<i32>)> {
-    voxels
+/// any kernel of some bricks touches; `None` without voxels.
+pub fn count_sections(bricks: &[Brick], view: &View) -> Option<(u64, Range<i32>)> {
+    bricks
         .par_iter()
-        .map(|&index| {
-            let slabs = view.slabs.touched(view.project(grid.voxel_at(index)).z);
+        .flat_map_iter(brick::voxels)
+        .map(|(_, voxel)| {
+            let slabs = view.slabs.touched(view.project(voxel).z);
             (slabs.len() as u64, slabs)
         })
         .reduce_with(add_sections)

@@ -4,28 +4,27 @@ use wgpu::util::DeviceExt;
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Queue, TextureFormat, TextureView};
 
 use crate::brick;
-use crate::classify::classify;
+use crate::classified_volume::ClassifiedVolume;
 use crate::error::RenderError;
 use crate::footprint::FootprintTable;
+use crate::gpu::bindings::grown;
 use crate::gpu::device::{self, DeviceError};
 use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::layout::{Group, Tally};
 use crate::gpu::targets::Targets;
 use crate::gpu::uniforms::{self, Ramps};
-use crate::gpu::voxel_list::VoxelLists;
 use crate::kernel::Kernel;
 use crate::pass::composite::Composite;
 use crate::pass::cull::{Cull, CullBuffers, CullList};
+use crate::pass::enter::{Enter, Entering};
 use crate::pass::occlude::Occlude;
 use crate::pass::resolve::Resolve;
 use crate::pass::splat::Splat;
 use crate::pass::tiles::{TileLists, Tiles};
-use crate::plan::{FramePlan, View, add_sections, count_sections, tile_grid};
-use crate::scene::Scene;
-use crate::splatting::FootprintForm;
-use crate::stats::Counts;
-use crate::transfer_function::TransferFunction;
-use crate::volume::{Grid, Volume};
+use crate::plan::{FramePlan, View};
+use crate::scene_view::{Prepared, SceneView};
+use crate::splatting::{FootprintForm, Order};
+use crate::stats::Totals;
 
 /// What a renderer is made for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +48,7 @@ impl Default for RendererOptions {
 pub struct Renderer {
     sheet_format: TextureFormat,
     sheets: u32,
+    enter: Enter,
     cull: Cull,
     tiles: Tiles,
     splat: Splat,
@@ -57,75 +57,44 @@ pub struct Renderer {
     resolve: Resolve,
 }
 
-/// A volume under a transfer function, on the GPU: the voxels that take part.
+/// A frame whose buffers are all allocated and filled: recording it cannot fail.
 #[derive(Debug)]
-pub struct ClassifiedVolume {
-    grid: Grid,
-    lists: VoxelLists,
-    ramps: Ramps,
-    control_points: Buffer,
-}
-
-impl ClassifiedVolume {
-    /// Classifies a volume (SPEC §3) and uploads the voxels that take part. The volume itself is no longer needed.
-    pub fn new(device: &Device, volume: &Volume, transfer: &TransferFunction) -> Self {
-        let (voxels, bricks) = brick::group(volume.grid(), &classify(volume, transfer));
-        let ramps = Ramps::new(transfer);
-        let points = bytemuck::cast_slice(&ramps.points);
-        Self {
-            grid: *volume.grid(),
-            lists: VoxelLists::upload(device, &voxels, &bricks),
-            control_points: init(device, "sheetsplat.control_points", points, BufferUsages::STORAGE),
-            ramps,
-        }
-    }
-
-    /// What a frame is made of (Table 4), from what it left on the GPU: its tally, and the tiles composited by every group.
-    pub fn count(&self, plan: &FramePlan, tally: &Tally, tiles: &[u32]) -> Counts {
-        let lists = self.lists.lists.iter();
-        let sections = lists.filter_map(|list| count_sections(&self.grid, &list.indices, &plan.view));
-        let (sections_total, slabs) = sections.reduce(add_sections).unwrap_or((0, 0..0));
-        let sheets = slabs.len() as u64;
-        // A group's first or last sheets can lie outside of what any kernel touches.
-        let sheets_of = |first: i32| {
-            (first + plan.sheets as i32).min(slabs.end).saturating_sub(first.max(slabs.start)).max(0) as u64
-        };
-        let [columns, rows] = tile_grid(plan.view.size).map(u64::from);
-        Counts {
-            voxels_total: self.grid.dims.as_u64vec3().element_product(),
-            voxels_in_range: self.lists.len(),
-            voxels_shaded: tally.voxels_shaded.into(),
-            sections_total,
-            sections_rasterized: tally.sections_rasterized.into(),
-            sheets,
-            tiles_total: columns * rows * sheets,
-            tiles_composited: (plan.groups.iter().zip(tiles))
-                .map(|(group, &tiles)| u64::from(tiles) * sheets_of(group.first_slab))
-                .sum(),
-            quads: tally.quads.into(),
-            bricks_tested: tally.bricks_tested.into(),
-            bricks_visited: tally.bricks_visited.into(),
-        }
-    }
-}
-
-/// A frame whose buffers are all allocated and filled: recording it cannot fail, and can be repeated.
-#[derive(Debug)]
-pub struct PreparedFrame {
-    /// What the frame draws.
-    pub plan: FramePlan,
-    form: FootprintForm,
+pub(crate) struct PreparedFrame {
+    pub(crate) planned: Planned,
     targets: Targets,
-    sheet_views: Vec<TextureView>,
+    /// And the kernel and slab width they are for.
+    footprints: (FootprintTexture, (Kernel, Option<f64>)),
+    uniform: Buffer,
+    groups: Buffer,
+    group_stride: u32,
+    control_points: Buffer,
     tally: Buffer,
     tile_lists: TileLists,
     lists: Vec<PreparedList>,
-    group_stride: u32,
+    /// The voxels that enter the list with this frame.
+    entering: Option<Entering>,
+    sheet_views: Vec<TextureView>,
     clear_group: BindGroup,
     composite_groups: Vec<BindGroup>,
     occlude_groups: [BindGroup; 2],
     resolve_groups: Vec<BindGroup>,
     gpu_bytes: u64,
+    /// Where a recorded frame leaves its counts; gone when somebody waits for them.
+    pub(crate) staging: Option<Buffer>,
+}
+
+/// What only changes with the view, or with the bricks: the buckets.
+#[derive(Debug)]
+pub(crate) struct Planned {
+    pub(crate) plan: FramePlan,
+    pub(crate) totals: Option<Totals>,
+    order: Order,
+    /// [`ClassifiedVolume::revision`].
+    revision: u64,
+    /// For every list its bricks in bucket order, `[u32]`.
+    orders: Vec<Buffer>,
+    /// For every list the most bricks and voxels that any group can visit.
+    most: Vec<(u32, u32)>,
 }
 
 #[derive(Debug)]
@@ -146,6 +115,7 @@ impl Renderer {
         Ok(Self {
             sheet_format,
             sheets,
+            enter: Enter::new(device),
             cull: Cull::new(device, sheets),
             tiles: Tiles::new(device),
             splat: Splat::new(device, sheet_format, sheets),
@@ -160,103 +130,143 @@ impl Renderer {
         self.sheet_format
     }
 
-    /// Plans a frame and allocates all it needs. Of the scene it reads camera, image, shading and splatting.
+    /// Does what the view's changes since its last frame ask for, and no more: buckets if the camera, the slabs or the bricks
+    /// changed (§5.1), buffers if they are too small. A change of colours, opacities or light writes a few hundred bytes.
     ///
     /// # Errors
     /// If the scene asks for something not implemented, or for more than the device's limits allow.
-    pub fn prepare(
-        &self,
-        device: &Device,
-        queue: &Queue,
-        volume: &ClassifiedVolume,
-        scene: &Scene,
-    ) -> Result<PreparedFrame, RenderError> {
+    pub fn prepare(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
+        let SceneView { volume, scene, frame } = view;
         let splatting = &scene.splatting;
         let size = [scene.image.width, scene.image.height];
-        let targets = Targets::new(device, size, self.sheet_format, self.sheets)?;
+        let seen = View::new(volume.grid(), &scene.camera, splatting, size)?;
         let kernel = Kernel::new(splatting.radius, splatting.falloff);
-        let view = View::new(&volume.grid, &scene.camera, splatting, size)?;
-        let lists = volume.lists.lists.iter().map(|list| list.bricks.as_slice());
-        let plan = FramePlan::new(lists, view, self.sheets, splatting.order);
+        let Previous { planned, targets, footprints, uniform, groups, control_points, tally, tile_lists, lists } =
+            Previous::of(frame.take());
 
-        let table = FootprintTable::new(splatting.footprint, &kernel, view.slabs.width);
-        let footprints = FootprintTexture::upload(device, queue, &table);
-        let frame = uniforms::frame(&view, &kernel, &volume.grid, &volume.ramps, scene);
-        let frame = init(device, "sheetsplat.frame", bytemuck::bytes_of(&frame), BufferUsages::UNIFORM);
+        let targets = match targets.filter(|old| old.size == size && self.draws_into(&old.sheets)) {
+            Some(targets) => targets,
+            None => Targets::new(device, size, self.sheet_format, self.sheets)?,
+        };
+        volume.renew(device);
+        let entries = volume.lists.flush(device, queue);
+        let current = |old: &Planned| {
+            old.plan.view == seen
+                && old.plan.sheets == self.sheets
+                && (old.order, old.revision) == (splatting.order, volume.revision)
+        };
+        let mut prepared = Prepared::default();
+        let planned = planned.filter(current).unwrap_or_else(|| {
+            prepared.bucketed = true;
+            Planned::new(device, volume, seen, self.sheets, splatting.order)
+        });
+        let plan = &planned.plan;
+
+        let width = seen.slabs.width;
+        // The summed-area form serves every width (§3.3.1).
+        let of = (kernel, (splatting.footprint == FootprintForm::Sections).then_some(width));
+        let footprints = footprints.filter(|old| (old.0.form, old.1) == (splatting.footprint, of));
+        let footprints = footprints.unwrap_or_else(|| {
+            let table = FootprintTable::new(splatting.footprint, &kernel, width);
+            (FootprintTexture::upload(device, queue, &table), of)
+        });
+        let filled = |old: Option<Buffer>, label, bytes: &[u8], usage| {
+            let buffer = grown(device, old, label, bytes.len() as u64, usage | BufferUsages::COPY_DST);
+            queue.write_buffer(&buffer, 0, bytes);
+            buffer
+        };
+        let ramps = Ramps::new(volume.transfer());
+        let points = bytemuck::cast_slice(&ramps.points);
+        let control_points = filled(control_points, "sheetsplat.control_points", points, BufferUsages::STORAGE);
+        let frame_uniform = uniforms::frame(&seen, &kernel, volume.grid(), &ramps, scene);
+        let bytes = bytemuck::bytes_of(&frame_uniform);
+        let uniform = filled(uniform, "sheetsplat.frame", bytes, BufferUsages::UNIFORM);
         let alignment = device.limits().min_uniform_buffer_offset_alignment as usize;
         let group_stride = size_of::<Group>().next_multiple_of(alignment);
-        let groups = init(device, "sheetsplat.groups", &uniforms::groups(&plan, group_stride), BufferUsages::UNIFORM);
-        let tally = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("sheetsplat.tally"),
-            size: size_of::<Tally>() as u64 + targets.opaque_tiles.size(),
-            usage: BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC,
-            mapped_at_creation: false,
-        });
+        let groups = filled(groups, "sheetsplat.groups", &uniforms::groups(plan, group_stride), BufferUsages::UNIFORM);
+        let tally_bytes = size_of::<Tally>() as u64 + targets.opaque_tiles.size();
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
+        let tally = grown(device, tally, "sheetsplat.tally", tally_bytes, usage);
+
         let shared = CullBuffers {
-            frame: &frame,
+            frame: &uniform,
             groups: &groups,
-            control_points: &volume.control_points,
+            control_points: &control_points,
             occluded: &targets.occluded,
             tally: &tally,
         };
-        let lists: Vec<PreparedList> = (volume.lists.lists.iter().zip(&plan.orders).enumerate())
-            .map(|(at, (list, order))| {
-                let (most_bricks, most_voxels) = most(plan.groups.iter().map(|group| {
-                    let bricks = group.bricks[at].clone();
-                    order[bricks.start as usize..bricks.end as usize]
-                        .iter()
-                        .map(|&brick| list.bricks[brick as usize].count)
-                }));
-                let order = init(device, "sheetsplat.order", bytemuck::cast_slice(order), BufferUsages::STORAGE);
-                let cull = self.cull.prepare(device, shared, list, &order, most_bricks, most_voxels);
-                let splat_group = self.splat.bind(device, &frame, &groups, &cull, &footprints);
+        let mut old_lists = lists.into_iter();
+        let lists: Vec<PreparedList> = (volume.lists.lists.iter().zip(&planned.orders).zip(&planned.most))
+            .map(|((list, order), &most)| {
+                let previous = old_lists.next().map(|old| old.cull);
+                let cull = self.cull.prepare(device, shared, list, order, most, previous);
+                let splat_group = self.splat.bind(device, &uniform, &groups, &cull, &footprints.0);
                 PreparedList { cull, splat_group }
             })
             .collect();
-        let tile_lists = self.tiles.prepare(device, &frame, &groups, &tally, &targets, plan.groups.len());
-        let sheets = targets.sheets.create_view(&wgpu::TextureViewDescriptor {
-            dimension: Some(wgpu::TextureViewDimension::D2Array),
-            ..wgpu::TextureViewDescriptor::default()
+        let entering = entries
+            .zip(volume.lists.lists.first())
+            .map(|(entries, list)| self.enter.bind(device, &entries, &list.voxel_buffer));
+        let tile_lists =
+            self.tiles.prepare(device, [&uniform, &groups, &tally], &targets, plan.groups.len(), tile_lists);
+        let staging = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("sheetsplat.counts"),
+            size: size_of::<Tally>() as u64 + plan.groups.len() as u64 * 4,
+            usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+            mapped_at_creation: false,
         });
-        let sheet_view = |layer| {
-            targets.sheets.create_view(&wgpu::TextureViewDescriptor {
-                dimension: Some(wgpu::TextureViewDimension::D2),
-                base_array_layer: layer,
-                array_layer_count: Some(1),
-                ..wgpu::TextureViewDescriptor::default()
-            })
-        };
-        let list_bytes: u64 = lists.iter().map(|list| list.cull.gpu_bytes()).sum();
-        let other_bytes = frame.size() + groups.size() + volume.control_points.size() + tally.size();
         let tiles = &tile_lists.composited;
-        let composite = |band| self.composite.bind(device, &frame, band, &sheets, tiles, &targets);
-        Ok(PreparedFrame {
-            form: splatting.footprint,
-            gpu_bytes: volume.lists.gpu_bytes() + targets.gpu_bytes() + footprints.gpu_bytes + list_bytes + other_bytes,
-            clear_group: self.splat.bind_clear(device, &frame, tiles),
+        let sheets = targets.sheets_view();
+        let composite = |band| self.composite.bind(device, &uniform, band, &sheets, tiles, &targets);
+        let list_bytes: u64 = lists.iter().map(|list| list.cull.gpu_bytes()).sum();
+        let other_bytes = uniform.size() + groups.size() + control_points.size() + tally.size();
+        *frame = Some(PreparedFrame {
+            gpu_bytes: volume.lists.gpu_bytes()
+                + targets.gpu_bytes()
+                + footprints.0.gpu_bytes
+                + list_bytes
+                + other_bytes,
+            clear_group: self.splat.bind_clear(device, &uniform, tiles),
             composite_groups: targets.bands.iter().map(composite).collect(),
-            occlude_groups: self.occlude.bind(device, &frame, &tile_lists.occluding, &targets),
-            resolve_groups: targets.bands.iter().map(|band| self.resolve.bind(device, &frame, band)).collect(),
-            sheet_views: (0..self.sheets).map(sheet_view).collect(),
+            occlude_groups: self.occlude.bind(device, &uniform, &tile_lists.occluding, &targets),
+            resolve_groups: targets.bands.iter().map(|band| self.resolve.bind(device, &uniform, band)).collect(),
+            sheet_views: (0..self.sheets).map(|layer| targets.sheet_view(layer)).collect(),
             group_stride: group_stride as u32,
-            plan,
+            planned,
             targets,
+            footprints,
+            uniform,
+            groups,
+            control_points,
             tally,
             tile_lists,
             lists,
-        })
+            entering,
+            staging: Some(staging),
+        });
+        Ok(prepared)
     }
 
-    /// Records a whole frame. The target must have the renderer's target format and the scene's image size.
-    pub fn record(&self, encoder: &mut CommandEncoder, frame: &PreparedFrame, target: &TextureView) {
-        let PreparedFrame { targets, tile_lists, .. } = frame;
+    /// Whether these sheet buffers are the ones that the renderer's pipelines draw into.
+    fn draws_into(&self, sheets: &wgpu::Texture) -> bool {
+        sheets.format() == self.sheet_format && sheets.depth_or_array_layers() == self.sheets
+    }
+
+    /// Records the view's prepared frame; nothing, if there is none. The target must have the renderer's target format and the
+    /// scene's image size. What is recorded must be submitted: voxels that enter the iso-ranges reach the GPU with it.
+    pub fn record(&self, encoder: &mut CommandEncoder, view: &mut SceneView, target: &TextureView) {
+        let Some(frame) = &mut view.frame else { return };
+        if let Some(entering) = frame.entering.take() {
+            self.enter.record(&mut encoder.begin_compute_pass(&compute("sheetsplat.enter")), &entering);
+        }
+        let PreparedFrame { planned: Planned { plan, .. }, targets, tile_lists, .. } = frame;
         let masks = [&targets.opaque, &targets.opaque_columns, &targets.occluded, &targets.opaque_tiles, &frame.tally];
         let accs = targets.bands.iter().map(|band| &band.acc);
         for buffer in accs.chain(masks).chain(frame.lists.iter().map(|list| &list.cull.states)) {
             encoder.clear_buffer(buffer, 0, None);
         }
         let mut offsets = (0..).step_by(frame.group_stride as usize);
-        for group in &frame.plan.groups {
+        for group in &plan.groups {
             // (list, offset of its group uniform) for the lists that reach into the group.
             let lists: Vec<(&PreparedList, u32)> = (frame.lists.iter().zip(&mut offsets).zip(&group.bricks))
                 .filter(|(_, bricks)| !bricks.is_empty())
@@ -273,7 +283,7 @@ impl Renderer {
 
             let clear = (&frame.clear_group, &tile_lists.composited);
             let draws = lists.iter().map(|(list, offset)| (&list.splat_group, *offset, &list.cull.draw_args));
-            self.splat.record(encoder, frame.form, &frame.sheet_views, clear, draws);
+            self.splat.record(encoder, frame.footprints.0.form, &frame.sheet_views, clear, draws);
 
             let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.composite"));
             self.composite.record(&mut pass, &frame.composite_groups, &tile_lists.composited);
@@ -281,23 +291,80 @@ impl Renderer {
         }
         let bands = targets.bands.iter().map(|band| band.band);
         self.resolve.record(encoder, target, targets.size[0], frame.resolve_groups.iter().zip(bands));
+
+        if let Some(staging) = &frame.staging {
+            let tally = size_of::<Tally>() as u64;
+            encoder.copy_buffer_to_buffer(&frame.tally, 0, staging, 0, tally);
+            encoder.copy_buffer_to_buffer(&tile_lists.counts, 0, staging, tally, staging.size() - tally);
+        }
     }
 }
 
 impl PreparedFrame {
-    /// The counts that a drawn frame left on the GPU: a [`Tally`].
-    pub fn tally(&self) -> &Buffer {
-        &self.tally
-    }
-
-    /// Tiles composited by every group, `[u32]`.
-    pub fn tile_counts(&self) -> &Buffer {
-        &self.tile_lists.counts
-    }
-
     /// Bytes of GPU memory that the frame and its volume hold.
-    pub fn gpu_bytes(&self) -> u64 {
+    pub(crate) fn gpu_bytes(&self) -> u64 {
         self.gpu_bytes
+    }
+}
+
+impl Planned {
+    fn new(device: &Device, volume: &ClassifiedVolume, view: View, sheets: u32, order: Order) -> Self {
+        let plan = FramePlan::new(volume.lists.bricks(), view, sheets, order);
+        let most = (volume.lists.bricks().zip(&plan.orders).enumerate())
+            .map(|(at, (bricks, order))| {
+                let voxels = |&brick: &u32| brick::present(&bricks[brick as usize]).count_ones();
+                most(plan.groups.iter().map(|group| {
+                    let bricks = group.bricks[at].clone();
+                    order[bricks.start as usize..bricks.end as usize].iter().map(voxels)
+                }))
+            })
+            .collect();
+        let upload = |order: &Vec<u32>| {
+            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("sheetsplat.order"),
+                contents: bytemuck::cast_slice(order),
+                usage: BufferUsages::STORAGE,
+            })
+        };
+        Self {
+            order,
+            revision: volume.revision,
+            orders: plan.orders.iter().map(upload).collect(),
+            most,
+            plan,
+            totals: None,
+        }
+    }
+}
+
+/// What a new frame can take from the one before it.
+#[derive(Default)]
+struct Previous {
+    planned: Option<Planned>,
+    targets: Option<Targets>,
+    footprints: Option<(FootprintTexture, (Kernel, Option<f64>))>,
+    uniform: Option<Buffer>,
+    groups: Option<Buffer>,
+    control_points: Option<Buffer>,
+    tally: Option<Buffer>,
+    tile_lists: Option<TileLists>,
+    lists: Vec<PreparedList>,
+}
+
+impl Previous {
+    fn of(frame: Option<PreparedFrame>) -> Self {
+        let Some(frame) = frame else { return Self::default() };
+        Self {
+            planned: Some(frame.planned),
+            targets: Some(frame.targets),
+            footprints: Some(frame.footprints),
+            uniform: Some(frame.uniform),
+            groups: Some(frame.groups),
+            control_points: Some(frame.control_points),
+            tally: Some(frame.tally),
+            tile_lists: Some(frame.tile_lists),
+            lists: frame.lists,
+        }
     }
 }
 
@@ -308,8 +375,4 @@ fn most<C: ExactSizeIterator<Item = u32>>(groups: impl Iterator<Item = C>) -> (u
 
 fn compute(label: &str) -> wgpu::ComputePassDescriptor<'_> {
     wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes: None }
-}
-
-fn init(device: &Device, label: &str, contents: &[u8], usage: BufferUsages) -> Buffer {
-    device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
 }

@@ -1,6 +1,12 @@
 //! What a frame cost, counted as in Table 4.
 
+use std::sync::mpsc::{Receiver, channel};
+
 use serde::Serialize;
+use wgpu::{Buffer, BufferAsyncError};
+
+use crate::error::RenderError;
+use crate::gpu::layout::Tally;
 
 /// Counts and times of one frame (SPEC §8). As JSON: the field names as keys.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -53,4 +59,68 @@ pub struct Counts {
     pub bricks_tested: u64,
     /// Those of them whose voxels were looked at.
     pub bricks_visited: u64,
+}
+
+/// What of a frame's counts is known before it is drawn.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Totals {
+    /// The totals; 0 for what only the GPU knows.
+    pub counts: Counts,
+    /// Of every sheet group how many of its sheets any kernel touches.
+    pub group_sheets: Vec<u64>,
+}
+
+impl Totals {
+    /// A drawn frame's counts, from what it left on the GPU: its tally, and the tiles composited by every group.
+    pub fn count(&self, tally: &Tally, tiles: &[u32]) -> Counts {
+        Counts {
+            voxels_shaded: tally.voxels_shaded.into(),
+            sections_rasterized: tally.sections_rasterized.into(),
+            tiles_composited: self
+                .group_sheets
+                .iter()
+                .zip(tiles)
+                .map(|(sheets, &tiles)| sheets * u64::from(tiles))
+                .sum(),
+            quads: tally.quads.into(),
+            bricks_tested: tally.bricks_tested.into(),
+            bricks_visited: tally.bricks_visited.into(),
+            ..self.counts
+        }
+    }
+}
+
+/// A frame's counts on their way from the GPU.
+#[derive(Debug)]
+pub struct PendingCounts {
+    totals: Totals,
+    /// A [`Tally`], then `[u32]`: the tiles composited by every group.
+    staging: Buffer,
+    arrival: Receiver<Result<(), BufferAsyncError>>,
+}
+
+impl PendingCounts {
+    /// Asks for the contents of `staging`, once what was submitted is done.
+    pub(crate) fn new(totals: Totals, staging: Buffer) -> Self {
+        let (sender, arrival) = channel();
+        staging.map_async(wgpu::MapMode::Read, .., move |result| {
+            // Whoever gave up asking does not care.
+            let _ = sender.send(result);
+        });
+        Self { totals, staging, arrival }
+    }
+
+    /// The counts, if the device was polled after the frame was done. Never waits.
+    ///
+    /// # Errors
+    /// If the device was lost meanwhile.
+    pub fn try_get(&self) -> Option<Result<Counts, RenderError>> {
+        let failed = |reason: String| RenderError::Readback(reason);
+        let result = self.arrival.try_recv().ok()?;
+        Some(result.map_err(|error| failed(error.to_string())).and_then(|()| {
+            let bytes = self.staging.get_mapped_range(..).map_err(|error| failed(error.to_string()))?;
+            let (tally, tiles) = bytes.split_at(size_of::<Tally>());
+            Ok(self.totals.count(&bytemuck::pod_read_unaligned(tally), &bytemuck::pod_collect_to_vec(tiles)))
+        }))
+    }
 }

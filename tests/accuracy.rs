@@ -92,7 +92,7 @@ fn psnr_against_the_twin() {
                 let background = scene.image.background.map(|channel| channel as f32);
                 for (v, (name, footprint, _, required)) in VARIANTS.into_iter().enumerate() {
                     scene.splatting.footprint = footprint;
-                    let actual = devices[v].render_volume(&volume, &scene).unwrap().image;
+                    let actual = devices[v].render_volume(volume.clone(), &scene).unwrap().image;
                     let this = Worst::of(&actual, &expected, background);
                     worst[v][c][s] = worst[v][c][s].and(this);
                     if this.psnr < required {

@@ -84,7 +84,7 @@ fn largest_difference(a: &Image, b: &Image) -> f32 {
 }
 
 fn render(headless: &Headless, volume: &Volume, scene: &Scene) -> Rendering {
-    headless.render_volume(volume, scene).unwrap()
+    headless.render_volume(volume.clone(), scene).unwrap()
 }
 
 #[test]

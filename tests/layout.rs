@@ -5,7 +5,9 @@ use std::mem::offset_of;
 
 use naga::proc::Layouter;
 use naga::{AddressSpace, Handle, Module, Type, TypeInner};
-use sheetsplat::gpu::layout::{Band, Brick, BrickState, Frame, Group, Indirect, Splat, Tally, TileList, Visit, Voxel};
+use sheetsplat::gpu::layout::{
+    Band, Brick, BrickState, Entry, Frame, Group, Indirect, Splat, Tally, TileList, Visit, Voxel,
+};
 use sheetsplat::gpu::shaders;
 
 /// A `repr(C)` struct as Rust lays it out: name, size, and members with name, offset and size.
@@ -54,7 +56,7 @@ macro_rules! layout {
     }};
 }
 
-fn shared() -> [Layout; 11] {
+fn shared() -> [Layout; 12] {
     [
         layout!(Voxel { index, value, normal, gradient_magnitude }),
         layout!(Splat { x_px, y_px, depth, rg, ba }),
@@ -83,9 +85,10 @@ fn shared() -> [Layout; 11] {
             tiles,
         }),
         layout!(Group { near, first_brick, brick_count, index }),
-        layout!(Brick { first, count, x, y, z, extent }),
+        layout!(Brick { present, x, y, z, extent }),
+        layout!(Entry { at, voxel }),
         layout!(BrickState { hidden, shaded }),
-        layout!(Visit { drawn, fresh, brick, first, count, padding }),
+        layout!(Visit { drawn, fresh, brick, padding }),
         layout!(Indirect { draw, dispatch, count }),
         layout!(TileList { args, tiles }).with_tail("tiles", size_of::<TileList>()),
         layout!(Tally {

@@ -5,11 +5,11 @@
 mod common;
 
 use glam::DVec3;
-use sheetsplat::brick;
+use sheetsplat::brick::BrickList;
 use sheetsplat::classify::classify;
 use sheetsplat::error::RenderError;
 use sheetsplat::gpu::device::{self, DeviceError, DeviceRequirements};
-use sheetsplat::gpu::layout::{Band, Brick, Voxel};
+use sheetsplat::gpu::layout::{Band, Brick};
 use sheetsplat::gpu::targets::Targets;
 use sheetsplat::gpu::voxel_list::VoxelLists;
 use sheetsplat::headless::{Headless, HeadlessOptions};
@@ -60,7 +60,7 @@ fn webgpu_default_limits_and_no_features() {
             (scene.splatting.compositing, scene.splatting.footprint) = (compositing, footprint);
             // Which pixels are opaque depends on the last bit of a sum: f16 and f32 cull differently.
             scene.splatting.culling = false;
-            let images = [&least, &full].map(|gpu| gpu.render_volume(&volume, &scene).unwrap().image);
+            let images = [&least, &full].map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap().image);
             let (rms, _) = difference(&images[0], &images[1]);
             // f16 sheets are asked for 45 dB against the twin, f32 ones for far more.
             let decibels = -20.0 * rms.log10();
@@ -68,7 +68,7 @@ fn webgpu_default_limits_and_no_features() {
             // Culling's guarantee holds for f16 sheets, too: what is drawn is drawn as without culling. A colour may pass
             // its alpha by an f16 rounding.
             scene.splatting.culling = true;
-            let culled = least.render_volume(&volume, &scene).unwrap().image;
+            let culled = least.render_volume(volume.clone(), &scene).unwrap().image;
             let (_, largest) = difference(&culled, &images[0]);
             let allowed = (1.0 - scene.splatting.opacity_threshold) * (1.0 + 2.0 * F16) + 64.0 * F32;
             assert!(largest <= allowed, "{compositing:?} {footprint:?}: culling changes a pixel by {largest}");
@@ -83,7 +83,7 @@ fn rgba32float_sheets_take_the_default_limits_too() {
     // The 32 bytes of colour attachments that every device allows are two of them.
     let pairs = Headless::new(&HeadlessOptions { sheets_per_group: Some(2), ..common::lavapipe() }).unwrap();
     let (volume, scene) = head();
-    let renderings = [gpu, pairs].map(|gpu| gpu.render_volume(&volume, &scene).unwrap());
+    let renderings = [gpu, pairs].map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap());
     assert_eq!(renderings[0].stats.counts, renderings[1].stats.counts);
     assert!(renderings[0].image == renderings[1].image, "the same device, the same work, the same bytes");
 }
@@ -100,11 +100,11 @@ fn attachments_limit_the_sheets_of_a_group() {
             ..Limits::default()
         };
         let gpu = open(limits, Features::FLOAT32_BLENDABLE, Some(format)).unwrap();
-        gpu.render_volume(&volume, &scene).unwrap().stats.counts
+        gpu.render_volume(volume.clone(), &scene).unwrap().stats.counts
     };
     let fixed = |sheets: u32| {
         let options = HeadlessOptions { sheets_per_group: Some(sheets), ..common::lavapipe() };
-        Headless::new(&options).unwrap().render_volume(&volume, &scene).unwrap().stats.counts
+        Headless::new(&options).unwrap().render_volume(volume.clone(), &scene).unwrap().stats.counts
     };
     let of = [1, 2, 4].map(fixed);
     assert!(of[0].quads > of[1].quads && of[1].quads > of[2].quads, "{of:?}");
@@ -126,17 +126,20 @@ fn attachments_limit_the_sheets_of_a_group() {
 fn small_bindings_split_voxels_and_image() {
     let (_, mut scene) = head();
     let volume = builtin::volume("head:64").unwrap();
-    let (voxels, bricks) = brick::group(volume.grid(), &classify(&volume, &scene.transfer.resolve(&volume)));
+    let voxels = classify(&volume, &scene.transfer.resolve(&volume));
+    let bricks = BrickList::new(volume.grid(), voxels.iter().map(|voxel| voxel.index));
     let full = open(Limits::default(), Features::FLOAT32_BLENDABLE, None).unwrap();
     // 32 rows of 150 pixels are 75 KiB: one tile's rows, and two.
     for (bytes, bands) in [(76 << 10, 4), (150 << 10, 2)] {
         let limits = Limits { max_storage_buffer_binding_size: bytes, ..Limits::default() };
         let small = open(limits, Features::FLOAT32_BLENDABLE, None).unwrap();
         assert_eq!(small.device().limits().max_storage_buffer_binding_size, bytes, "wgpu gave what was asked for");
-        let lists = VoxelLists::upload(small.device(), &voxels, &bricks);
+        let lists = VoxelLists::upload(small.device(), volume.grid(), &voxels);
         assert!(lists.lists.len() > 2, "{} lists", lists.lists.len());
         assert_eq!(lists.len(), voxels.len() as u64);
-        assert_lists_are_bricks(&lists, &voxels, &bricks);
+        let of_lists: Vec<Brick> = lists.bricks().flatten().copied().collect();
+        assert_eq!(of_lists, bricks.bricks(), "together they are all there is");
+        assert!(lists.lists.iter().all(|list| list.voxel_buffer.size() <= bytes && list.brick_buffer.size() <= bytes));
         let targets = Targets::new(small.device(), [150, 110], TextureFormat::Rgba32Float, 2).unwrap();
         assert_eq!(targets.bands.len(), bands);
         for (at, band) in targets.bands.iter().enumerate() {
@@ -148,7 +151,7 @@ fn small_bindings_split_voxels_and_image() {
         for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray] {
             for background in [[0.0, 0.0, 0.0, 1.0], [0.2, 0.9, 0.5, 0.5]] {
                 (scene.splatting.compositing, scene.image.background) = (compositing, background);
-                let renderings = [&small, &full].map(|gpu| gpu.render_volume(&volume, &scene).unwrap());
+                let renderings = [&small, &full].map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap());
                 assert_same_work(&renderings[0].stats.counts, &renderings[1].stats.counts);
                 let (_, largest) = difference(&renderings[0].image, &renderings[1].image);
                 // The lists change the order in which a sheet's footprints are added: no more than 64 of them meet in a
@@ -160,9 +163,9 @@ fn small_bindings_split_voxels_and_image() {
         // With culling every list's bricks are culled by what all lists drew: the guarantee holds.
         for compositing in [Compositing::Linear, Compositing::Exponential] {
             (scene.splatting.compositing, scene.splatting.culling) = (compositing, false);
-            let without = small.render_volume(&volume, &scene).unwrap();
+            let without = small.render_volume(volume.clone(), &scene).unwrap();
             scene.splatting.culling = true;
-            let with = small.render_volume(&volume, &scene).unwrap();
+            let with = small.render_volume(volume.clone(), &scene).unwrap();
             let (_, largest) = difference(&with.image, &without.image);
             let allowed = 1.0 - scene.splatting.opacity_threshold + 64.0 * F32;
             assert!(largest <= allowed, "{bytes} bytes {compositing:?}: culling changes a pixel by {largest}");
@@ -170,24 +173,6 @@ fn small_bindings_split_voxels_and_image() {
             assert!(with < without, "{bytes} bytes {compositing:?}: nothing is culled");
         }
     }
-}
-
-/// Every list is a run of whole bricks, numbered from its own start, and together they are all there is.
-fn assert_lists_are_bricks(lists: &VoxelLists, voxels: &[Voxel], bricks: &[Brick]) {
-    let (mut first, mut rest) = (0, bricks);
-    for list in &lists.lists {
-        let (these, later) = rest.split_at(list.bricks.len());
-        for (brick, all) in list.bricks.iter().zip(these) {
-            assert_eq!(Brick { first: brick.first + first, ..*brick }, *all);
-        }
-        let end = first as usize + list.indices.len();
-        let indices: Vec<u32> = voxels[first as usize..end].iter().map(|voxel| voxel.index).collect();
-        assert_eq!(list.indices, indices);
-        let last = list.bricks.last().unwrap();
-        assert_eq!((last.first + last.count) as usize, list.indices.len());
-        (first, rest) = (end as u32, later);
-    }
-    assert!(rest.is_empty());
 }
 
 /// Several lists do what one does; but every list is bucketed by itself, and shorter ranges of bricks are tested.
@@ -217,7 +202,7 @@ fn images_larger_than_a_texture_are_an_error() {
     let (volume, mut scene) = head();
     for (size, key) in [((257, 16), "image.width"), ((16, 300), "image.height")] {
         (scene.image.width, scene.image.height) = size;
-        match gpu.render_volume(&volume, &scene) {
+        match gpu.render_volume(volume.clone(), &scene) {
             Err(error @ RenderError::Limit { what, limit, required, actual }) => {
                 let expected = (key, "max_texture_dimension_2d", u64::from(size.0.max(size.1)), 256);
                 assert_eq!((what, limit, required, actual), expected);
@@ -230,7 +215,7 @@ fn images_larger_than_a_texture_are_an_error() {
         }
     }
     (scene.image.width, scene.image.height) = (256, 16);
-    gpu.render_volume(&volume, &scene).unwrap();
+    gpu.render_volume(volume.clone(), &scene).unwrap();
 }
 
 #[test]
@@ -239,7 +224,7 @@ fn a_row_of_tiles_larger_than_a_binding_is_an_error() {
     let gpu = open(limits, Features::empty(), None).unwrap();
     let (volume, mut scene) = head();
     (scene.image.width, scene.image.height) = (65, 16);
-    match gpu.render_volume(&volume, &scene) {
+    match gpu.render_volume(volume.clone(), &scene) {
         Err(RenderError::Limit { what, limit, required, actual }) => {
             assert!(what.contains("image.width"), "{what}");
             assert_eq!((limit, required, actual), ("max_storage_buffer_binding_size", 65 * 32 * 16, 32 << 10));
@@ -247,13 +232,13 @@ fn a_row_of_tiles_larger_than_a_binding_is_an_error() {
         other => panic!("{other:?}"),
     }
     (scene.image.width, scene.image.height) = (64, 100);
-    gpu.render_volume(&volume, &scene).unwrap();
+    gpu.render_volume(volume.clone(), &scene).unwrap();
 }
 
 #[test]
 fn an_unknown_adapter_is_an_error_that_names_those_there_are() {
     let there = Headless::new(&HeadlessOptions::default()).unwrap();
-    let name = there.render_volume(&head().0, &head().1).unwrap().stats.adapter;
+    let name = there.render_volume(head().0, &head().1).unwrap().stats.adapter;
     match Headless::new(&HeadlessOptions { adapter: Some("no such GPU".to_owned()), ..HeadlessOptions::default() }) {
         Err(error @ DeviceError::NoAdapter { .. }) => {
             let message = error.to_string();

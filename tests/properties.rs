@@ -19,7 +19,7 @@ use common::{F16, F32, Random, camera, gpu, scene, transfer};
 const COMPOSITINGS: [Compositing; 3] = [Compositing::Linear, Compositing::Exponential, Compositing::Xray];
 
 fn render(gpu: &Headless, volume: &Volume, scene: &Scene) -> (Image, u64) {
-    let rendering = gpu.render_volume(volume, scene).unwrap();
+    let rendering = gpu.render_volume(volume.clone(), scene).unwrap();
     (rendering.image, rendering.stats.counts.sheets)
 }
 

@@ -1,8 +1,7 @@
-// Bricks of at most 64 voxels, and what the passes of a sheet group say to each other about them.
+// Bricks of 64 places for voxels, and what the passes of a sheet group say to each other about them.
 // `gpu::layout` documents the fields.
 struct Brick {
-    first: u32,
-    count: u32,
+    present: vec2u,
     x: u32,
     y: u32,
     z: u32,
@@ -20,8 +19,6 @@ struct Visit {
     drawn: vec2u,
     fresh: vec2u,
     brick: u32,
-    first: u32,
-    count: u32,
     padding: u32,
 }
 
@@ -41,6 +38,9 @@ struct Indirect {
 
 // Dispatches of more than this many workgroups are folded into two dimensions.
 const FOLD = 32768u;
+
+// Places for voxels in a brick.
+const BRICK_VOXELS = 64u;
 
 // Quads drawn by one instance: vertices are worked on an instance at a time, and four of them would leave a software
 // rasteriser's vectors half empty.

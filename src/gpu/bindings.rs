@@ -2,10 +2,10 @@
 
 use wgpu::{
     BindGroup, BindGroupLayout, BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
-    ComputePass, ComputePipeline, Device, ShaderStages, TextureSampleType, TextureViewDimension,
+    BufferUsages, ComputePass, ComputePipeline, Device, ShaderStages, TextureSampleType, TextureViewDimension,
 };
 
-use super::layout::Indirect;
+use super::layout::{FOLD, Indirect};
 use super::shaders::Shader;
 
 /// What a shader declares at one binding.
@@ -34,6 +34,15 @@ pub fn at_offset<T>(buffer: &Buffer) -> BindingResource<'_> {
 pub fn texture(stages: ShaderStages, view_dimension: TextureViewDimension) -> Slot {
     let sample_type = TextureSampleType::Float { filterable: false };
     (stages, BindingType::Texture { sample_type, view_dimension, multisampled: false })
+}
+
+/// A buffer of at least `size` bytes: the previous one if it is large enough, and not much too large.
+pub fn grown(device: &Device, previous: Option<Buffer>, label: &str, size: u64, usage: BufferUsages) -> Buffer {
+    let fits = |buffer: &Buffer| (size..=4 * size).contains(&buffer.size()) && buffer.usage().contains(usage);
+    previous.filter(fits).unwrap_or_else(|| {
+        let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
+        device.create_buffer(&descriptor)
+    })
 }
 
 /// The layout of group 0 with the given bindings in order, and the pipeline layout of that group alone.
@@ -93,11 +102,11 @@ impl ComputeStage {
         bind(device, &self.label, &self.layout, resources)
     }
 
-    /// Dispatches a fixed number of workgroups.
+    /// Dispatches a fixed number of workgroups, folded as [`Indirect`] says.
     pub fn dispatch(&self, pass: &mut ComputePass<'_>, group: &BindGroup, offsets: &[u32], workgroups: u32) {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, group, offsets);
-        pass.dispatch_workgroups(workgroups, 1, 1);
+        pass.dispatch_workgroups(workgroups.min(FOLD), workgroups.div_ceil(FOLD), 1);
     }
 
     /// Dispatches as many workgroups as an [`Indirect`] says.

@@ -33,6 +33,16 @@ pub struct Splat {
     pub ba: u32,
 }
 
+/// A voxel that enters a list, and where.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Entry {
+    /// Its place in the list.
+    pub at: u32,
+    /// The voxel.
+    pub voxel: Voxel,
+}
+
 /// What is constant over a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -97,14 +107,12 @@ pub struct Group {
     pub index: u32,
 }
 
-/// At most 64 neighbouring voxels of a list.
+/// 4×4×4 places for voxels, which a list holds one after the other, x fastest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Brick {
-    /// First of its voxels in the list.
-    pub first: u32,
-    /// Number of its voxels.
-    pub count: u32,
+    /// Which of the places hold a voxel that takes part, one bit each.
+    pub present: [u32; 2],
     /// Least x of its voxels.
     pub x: u32,
     /// Least y.
@@ -135,10 +143,6 @@ pub struct Visit {
     pub fresh: [u32; 2],
     /// The brick.
     pub brick: u32,
-    /// First of its voxels in the list.
-    pub first: u32,
-    /// Number of its voxels.
-    pub count: u32,
     /// Unused.
     pub padding: u32,
 }
@@ -155,6 +159,9 @@ pub struct Indirect {
     /// The number of things.
     pub count: u32,
 }
+
+/// Dispatches of more than this many workgroups are folded into two dimensions.
+pub const FOLD: u32 = 32768;
 
 /// Quads drawn by one instance.
 pub const QUADS: u16 = 16;

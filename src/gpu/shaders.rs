@@ -21,14 +21,16 @@ macro_rules! shader {
     };
 }
 
+/// Puts voxels that enter the iso-ranges into their list.
+pub const ENTER: Shader = shader!("enter", "brick", "voxel");
 /// Which bricks a sheet group visits.
 pub const CULL_BRICKS: Shader = shader!("cull_bricks", "frame", "brick", "tally");
 /// Which voxels it draws.
-pub const CULL_VOXELS: Shader = shader!("cull_voxels", "frame", "brick", "tally", "voxel");
+pub const CULL_VOXELS: Shader = shader!("cull_voxels", "frame", "brick", "tally", "voxel", "project");
 /// Those voxels in a row.
 pub const COMPACT: Shader = shader!("compact", "brick", "tally");
 /// Shades those that were not shaded before.
-pub const SHADE: Shader = shader!("shade", "frame", "brick", "voxel", "splat");
+pub const SHADE: Shader = shader!("shade", "frame", "brick", "voxel", "project", "splat");
 /// The tiles they touch.
 pub const TILES: Shader = shader!("tiles", "frame", "brick", "tally");
 /// Zeroes the sheet buffers there.
@@ -43,8 +45,8 @@ pub const OCCLUDE: Shader = shader!("occlude", "frame", "brick");
 pub const RESOLVE: Shader = shader!("resolve", "frame", "band");
 
 /// Every shader, in the order of the data flow.
-pub const ALL: [Shader; 10] =
-    [CULL_BRICKS, CULL_VOXELS, COMPACT, SHADE, TILES, CLEAR, SPLAT, COMPOSITE, OCCLUDE, RESOLVE];
+pub const ALL: [Shader; 11] =
+    [ENTER, CULL_BRICKS, CULL_VOXELS, COMPACT, SHADE, TILES, CLEAR, SPLAT, COMPOSITE, OCCLUDE, RESOLVE];
 
 impl Shader {
     /// Compiles the shader.

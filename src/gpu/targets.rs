@@ -1,7 +1,10 @@
 //! What depends on the image's size alone: sheet buffers, compositing buffer, opacity and occlusion buffers.
 
 use wgpu::util::DeviceExt;
-use wgpu::{Buffer, BufferUsages, Device, Texture, TextureFormat, TextureUsages};
+use wgpu::{
+    Buffer, BufferUsages, Device, Texture, TextureFormat, TextureUsages, TextureView, TextureViewDescriptor,
+    TextureViewDimension,
+};
 
 use super::layout::Band;
 use crate::error::RenderError;
@@ -92,6 +95,24 @@ impl Targets {
             opaque_columns: mask("sheetsplat.opaque_columns", columns * height),
             occluded: mask("sheetsplat.occluded", columns * height),
             opaque_tiles: mask("sheetsplat.opaque_tiles", columns * rows),
+        })
+    }
+
+    /// All sheet buffers, for compositing.
+    pub fn sheets_view(&self) -> TextureView {
+        self.sheets.create_view(&TextureViewDescriptor {
+            dimension: Some(TextureViewDimension::D2Array),
+            ..TextureViewDescriptor::default()
+        })
+    }
+
+    /// One sheet buffer, to draw into.
+    pub fn sheet_view(&self, layer: u32) -> TextureView {
+        self.sheets.create_view(&TextureViewDescriptor {
+            dimension: Some(TextureViewDimension::D2),
+            base_array_layer: layer,
+            array_layer_count: Some(1),
+            ..TextureViewDescriptor::default()
         })
     }
 

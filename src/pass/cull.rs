@@ -3,7 +3,7 @@
 
 use wgpu::{BindGroup, Buffer, BufferUsages, ComputePass, Device, ShaderStages};
 
-use crate::gpu::bindings::{ComputeStage, at_offset, storage, uniform};
+use crate::gpu::bindings::{ComputeStage, at_offset, grown, storage, uniform};
 use crate::gpu::layout::{Brick, BrickState, Frame, Group, Indirect, Splat, Tally, Visit, Voxel};
 use crate::gpu::shaders;
 use crate::gpu::voxel_list::VoxelList;
@@ -22,7 +22,7 @@ pub struct Cull {
 pub struct CullList {
     /// `[BrickState]`, zero at the start of a frame.
     pub states: Buffer,
-    /// `[Splat]`, one per voxel of the list, written when it is first drawn.
+    /// `[Splat]`, one per place of the list, written when its voxel is first drawn.
     pub splats: Buffer,
     /// `[u32]`: the splats that the current group draws.
     pub instances: Buffer,
@@ -75,6 +75,7 @@ impl Cull {
             storage::<BrickState>(stage, false),
             storage::<(Tally, u32)>(stage, false),
             storage::<Indirect>(stage, true),
+            storage::<Brick>(stage, true),
         ];
         let compact = [
             storage::<Visit>(stage, true),
@@ -101,7 +102,7 @@ impl Cull {
         }
     }
 
-    /// Allocates a list's buffers. `order` is the list's bricks by first group; no group looks at more than `most_bricks` of
+    /// Allocates a list's buffers, or takes those of the `previous` frame. `order` is the list's bricks by first group; no group looks at more than `most_bricks` of
     /// them, with at most `most_voxels` voxels.
     pub fn prepare(
         &self,
@@ -109,26 +110,25 @@ impl Cull {
         shared: CullBuffers<'_>,
         list: &VoxelList,
         order: &Buffer,
-        most_bricks: u32,
-        most_voxels: u32,
+        (most_bricks, most_voxels): (u32, u32),
+        previous: Option<CullList>,
     ) -> CullList {
-        let buffer = |label, count: usize, record: usize, usage| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size: (count.max(1) * record) as u64,
-                usage: BufferUsages::STORAGE | usage,
-                mapped_at_creation: false,
-            })
+        let buffer = |previous: Option<Buffer>, label, count: usize, record: usize, usage| {
+            let usage = BufferUsages::STORAGE | usage;
+            grown(device, previous, label, (count.max(1) * record) as u64, usage)
         };
-        let (none, state_usage) = (BufferUsages::empty(), BufferUsages::COPY_DST);
-        let states = buffer("sheetsplat.states", list.bricks.len(), size_of::<BrickState>(), state_usage);
-        let splats = buffer("sheetsplat.splats", list.indices.len(), size_of::<Splat>(), BufferUsages::COPY_SRC);
-        let visits = buffer("sheetsplat.visits", most_bricks as usize, size_of::<Visit>(), none);
-        let instances = buffer("sheetsplat.instances", most_voxels as usize, size_of::<u32>(), none);
-        let fresh = buffer("sheetsplat.fresh", most_voxels as usize, size_of::<u32>(), none);
-        let fresh_args = buffer("sheetsplat.fresh_args", 1, size_of::<Indirect>(), BufferUsages::INDIRECT);
-        let visit_args = buffer("sheetsplat.visit_args", 1, size_of::<Indirect>(), BufferUsages::INDIRECT);
-        let draw_args = buffer("sheetsplat.draw_args", 1, size_of::<Indirect>(), BufferUsages::INDIRECT);
+        let (none, indirect) = (BufferUsages::empty(), BufferUsages::INDIRECT);
+        let (places, bricks) = (list.places(), list.brick_count());
+        let old = previous.map(CullList::buffers).unwrap_or_default();
+        let [states, splats, instances, draw_args, visits, visit_args, fresh, fresh_args] = old;
+        let states = buffer(states, "sheetsplat.states", bricks, size_of::<BrickState>(), BufferUsages::COPY_DST);
+        let splats = buffer(splats, "sheetsplat.splats", places, size_of::<Splat>(), BufferUsages::COPY_SRC);
+        let instances = buffer(instances, "sheetsplat.instances", most_voxels as usize, size_of::<u32>(), none);
+        let draw_args = buffer(draw_args, "sheetsplat.draw_args", 1, size_of::<Indirect>(), indirect);
+        let visits = buffer(visits, "sheetsplat.visits", most_bricks as usize, size_of::<Visit>(), none);
+        let visit_args = buffer(visit_args, "sheetsplat.visit_args", 1, size_of::<Indirect>(), indirect);
+        let fresh = buffer(fresh, "sheetsplat.fresh", most_voxels as usize, size_of::<u32>(), none);
+        let fresh_args = buffer(fresh_args, "sheetsplat.fresh_args", 1, size_of::<Indirect>(), indirect);
 
         let CullBuffers { frame, groups, control_points, occluded, tally } = shared;
         let (frame, group) = (frame.as_entire_binding(), at_offset::<Group>(groups));
@@ -153,6 +153,7 @@ impl Cull {
             whole(&states),
             whole(tally),
             whole(&visit_args),
+            whole(&list.brick_buffer),
         ];
         let lists = [&visits, &visit_args, &instances, &draw_args, &fresh, &fresh_args, tally];
         let compact = lists.map(whole);
@@ -184,6 +185,11 @@ impl Cull {
 }
 
 impl CullList {
+    fn buffers(self) -> [Option<Buffer>; 8] {
+        let Self { states, splats, instances, draw_args, visits, visit_args, fresh, fresh_args, .. } = self;
+        [states, splats, instances, draw_args, visits, visit_args, fresh, fresh_args].map(Some)
+    }
+
     /// Bytes of GPU memory.
     pub fn gpu_bytes(&self) -> u64 {
         let args = [&self.draw_args, &self.visit_args, &self.fresh_args];

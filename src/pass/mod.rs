@@ -5,6 +5,7 @@
 
 pub mod composite;
 pub mod cull;
+pub mod enter;
 pub mod occlude;
 pub mod resolve;
 pub mod splat;

@@ -2,7 +2,7 @@
 
 use wgpu::{BindGroup, Buffer, BufferUsages, ComputePass, Device, ShaderStages};
 
-use crate::gpu::bindings::{ComputeStage, at_offset, storage, uniform};
+use crate::gpu::bindings::{ComputeStage, at_offset, grown, storage, uniform};
 use crate::gpu::layout::{Frame, Group, Tally, TileList};
 use crate::gpu::shaders;
 use crate::gpu::targets::Targets;
@@ -41,24 +41,23 @@ impl Tiles {
         Self { stage: ComputeStage::new(device, shaders::TILES, "main", &slots, &[]) }
     }
 
-    /// Allocates the lists for a frame of `group_count` groups.
+    /// Allocates the lists for a frame of `group_count` groups, or takes those of the `previous` frame.
     pub fn prepare(
         &self,
         device: &Device,
-        frame: &Buffer,
-        groups: &Buffer,
-        tally: &Buffer,
+        [frame, groups, tally]: [&Buffer; 3],
         targets: &Targets,
         group_count: usize,
+        previous: Option<TileLists>,
     ) -> TileLists {
-        let buffer = |label, size, usage| {
-            let usage = BufferUsages::STORAGE | usage;
-            device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
-        };
+        let buffer = |previous, label, size, usage| grown(device, previous, label, size, BufferUsages::STORAGE | usage);
+        let [old_composited, old_occluding, old_counts] =
+            previous.map_or([None, None, None], |old| [old.composited, old.occluding, old.counts].map(Some));
         let list_bytes = size_of::<TileList>() as u64 + targets.opaque_tiles.size();
-        let composited = buffer("sheetsplat.composited_tiles", list_bytes, BufferUsages::INDIRECT);
-        let occluding = buffer("sheetsplat.occluding_tiles", list_bytes, BufferUsages::INDIRECT);
-        let counts = buffer("sheetsplat.tile_counts", group_count.max(1) as u64 * 4, BufferUsages::COPY_SRC);
+        let composited = buffer(old_composited, "sheetsplat.composited_tiles", list_bytes, BufferUsages::INDIRECT);
+        let occluding = buffer(old_occluding, "sheetsplat.occluding_tiles", list_bytes, BufferUsages::INDIRECT);
+        let counts =
+            buffer(old_counts, "sheetsplat.tile_counts", group_count.max(1) as u64 * 4, BufferUsages::COPY_SRC);
         let resources = [
             frame.as_entire_binding(),
             at_offset::<Group>(groups),

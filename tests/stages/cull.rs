@@ -5,7 +5,7 @@
 use std::collections::BTreeSet;
 
 use glam::{DVec2, DVec3, DVec4, UVec3};
-use sheetsplat::brick;
+use sheetsplat::brick::{self, BRICK_VOXELS};
 use sheetsplat::gpu::layout::{self, Brick, BrickState, Frame, Group, Indirect, Tally, Voxel};
 use sheetsplat::gpu::targets::Targets;
 use sheetsplat::gpu::uniforms::{self, Ramps};
@@ -29,6 +29,7 @@ pub(crate) struct Culling<'a> {
     pub(crate) view: View,
     pub(crate) frame: Frame,
     pub(crate) plan: FramePlan,
+    /// Of every place of every brick the index into the volume, [`ABSENT`] without a voxel.
     pub(crate) indices: Vec<u32>,
     pub(crate) bricks: Vec<Brick>,
     pub(crate) list: CullList,
@@ -50,9 +51,9 @@ impl<'a> Culling<'a> {
         let device = gpu.device();
         let size = [scene.image.width, scene.image.height];
         let view = View::new(grid, &scene.camera, &scene.splatting, size).unwrap();
-        let (voxels, bricks) = brick::group(grid, voxels);
+        let lists = VoxelLists::upload(device, grid, voxels);
+        let bricks = lists.bricks().next().unwrap().to_vec();
         let plan = FramePlan::new([bricks.as_slice()], view, sheets, scene.splatting.order);
-        let lists = VoxelLists::upload(device, &voxels, &bricks);
         let [list] = &lists.lists[..] else { panic!("{} lists", lists.lists.len()) };
         let ramps = Ramps::new(transfer);
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
@@ -79,13 +80,16 @@ impl<'a> Culling<'a> {
         let order = init(device, &plan.orders[0], BufferUsages::STORAGE);
         let counts = |group: &sheetsplat::plan::GroupPlan| {
             let range = group.bricks[0].start as usize..group.bricks[0].end as usize;
-            plan.orders[0][range].iter().map(|&at| bricks[at as usize].count).collect::<Vec<_>>()
+            plan.orders[0][range]
+                .iter()
+                .map(|&at| brick::present(&bricks[at as usize]).count_ones())
+                .collect::<Vec<_>>()
         };
         let most_bricks = plan.groups.iter().map(|group| counts(group).len()).max().unwrap();
         let most_voxels = plan.groups.iter().map(|group| counts(group).iter().sum()).max().unwrap();
         Self {
-            list: stage.prepare(device, shared, list, &order, most_bricks as u32, most_voxels),
-            indices: list.indices.clone(),
+            list: stage.prepare(device, shared, list, &order, (most_bricks as u32, most_voxels), None),
+            indices: bricks.iter().flat_map(|brick| indices(grid, brick)).collect(),
             gpu,
             stage,
             view,
@@ -113,6 +117,17 @@ impl<'a> Culling<'a> {
     pub(crate) fn splats(&self) -> Vec<layout::Splat> {
         contents(self.gpu, &self.list.splats)
     }
+}
+
+/// A place without a voxel.
+const ABSENT: u32 = u32::MAX;
+
+fn indices(grid: &Grid, brick: &Brick) -> [u32; BRICK_VOXELS as usize] {
+    let mut indices = [ABSENT; BRICK_VOXELS as usize];
+    for (slot, at) in brick::voxels(brick) {
+        indices[slot as usize] = at.x + grid.dims.x * (at.y + grid.dims.y * at.z);
+    }
+    indices
 }
 
 /// Beyond what f32 arithmetic moves pixel coordinates and depths of these tests by: sums of numbers below 600.
@@ -233,7 +248,7 @@ impl Rules<'_> {
     }
 
     fn visits(&self, decisions: &mut Decisions, brick: &Brick, hidden: u64, near: f64, occluded: &Occluded) -> bool {
-        if hidden.count_ones() == brick.count {
+        if brick::present(brick) & !hidden == 0 {
             return false;
         }
         let low = UVec3::new(brick.x, brick.y, brick.z).as_dvec3();
@@ -279,17 +294,15 @@ impl Rules<'_> {
             let visits = self.visits(&mut decisions, &brick, so_far.states[at as usize].0, near, occluded);
             if decisions.unsure {
                 // Not by a hair: a box, which has its slack, without any of its voxels.
-                let voxels = brick.first as usize..(brick.first + brick.count) as usize;
-                self.unsure.extend(&self.indices[voxels]);
+                self.unsure.extend(indices(self.grid, &brick).into_iter().filter(|&index| index != ABSENT));
             }
             if !visits {
                 continue;
             }
             so_far.counts[4] += 1;
-            for slot in
-                (0..brick.count).filter(|slot| so_far.states[at as usize].0 >> slot & 1 == 0).collect::<Vec<_>>()
-            {
-                let id = brick.first + slot;
+            let left = brick::present(&brick) & !so_far.states[at as usize].0;
+            for slot in (0..BRICK_VOXELS).filter(|slot| left >> slot & 1 == 1) {
+                let id = at * BRICK_VOXELS + slot;
                 let p = self.project(self.grid.voxel_at(self.indices[id as usize]).as_dvec3());
                 let mut decisions = Decisions::default();
                 self.cull_voxel(&mut decisions, (at, slot, id), p, near, occluded, so_far);

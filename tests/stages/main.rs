@@ -88,7 +88,8 @@ fn contents<T: bytemuck::Pod>(gpu: &Headless, buffer: &Buffer) -> Vec<T> {
         @group(0) @binding(1) var<storage, read_write> result: array<u32>;
         @compute @workgroup_size(64)
         fn main(@builtin(global_invocation_id) id: vec3u) {
-            if id.x < arrayLength(&source) { result[id.x] = source[id.x]; }
+            let at = id.x + id.y * 64u * 32768u;
+            if at < arrayLength(&source) { result[at] = source[at]; }
         }";
     let device = gpu.device();
     let copy = device.create_buffer(&wgpu::BufferDescriptor {
@@ -120,7 +121,8 @@ fn contents<T: bytemuck::Pod>(gpu: &Headless, buffer: &Buffer) -> Vec<T> {
     compute(gpu, |pass| {
         pass.set_pipeline(&pipeline);
         pass.set_bind_group(0, &group, &[]);
-        pass.dispatch_workgroups((buffer.size() as u32 / 4).div_ceil(64), 1, 1);
+        let workgroups = (buffer.size() as u32 / 4).div_ceil(64);
+        pass.dispatch_workgroups(workgroups.min(32768), workgroups.div_ceil(32768), 1);
     });
     bytemuck::pod_collect_to_vec::<u8, T>(&readback::buffer(device, gpu.queue(), &copy).unwrap())
 }

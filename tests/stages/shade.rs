@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 
 use glam::{DVec3, DVec4, UVec3};
+use sheetsplat::brick;
 use sheetsplat::classify::classify;
 use sheetsplat::gpu::layout;
 use sheetsplat::kernel::Kernel;
@@ -110,7 +111,8 @@ fn check(name: &str, volume: &Volume, scene: &Scene) {
     let expected = shading::shade(volume, &transfer, scene, &geometry);
     assert_eq!(voxels.len(), expected.len(), "{name}: which voxels take part");
     let twins: BTreeMap<u32, &shading::Splat> = voxels.iter().map(|voxel| voxel.index).zip(&expected).collect();
-    assert_eq!(culling.indices.len(), twins.len(), "{name}: bricks hold every voxel");
+    let held: usize = culling.bricks.iter().map(|brick| brick::voxels(brick).count()).sum();
+    assert_eq!(held, twins.len(), "{name}: bricks hold every voxel");
     // Whose footprint's box holds a pixel's centre is on the screen; f32 may differ about those that barely do.
     let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
     let half_box = geometry.half_box(kernel.support());
@@ -119,9 +121,9 @@ fn check(name: &str, volume: &Volume, scene: &Scene) {
         (high - 0.5).min(geometry.size - 0.5 - low).min_element()
     };
     let mut shaded = Vec::new();
-    for (brick, (hidden, of_brick)) in culling.bricks.iter().zip(states) {
-        for slot in 0..brick.count {
-            let id = (brick.first + slot) as usize;
+    for (at, (brick, (hidden, of_brick))) in culling.bricks.iter().zip(states).enumerate() {
+        for (slot, _) in brick::voxels(brick) {
+            let id = (at as u32 * brick::BRICK_VOXELS + slot) as usize;
             let (inside, is_shaded) = (inside(twins[&culling.indices[id]]), of_brick >> slot & 1 == 1);
             assert!(inside.abs() < 1e-3 || is_shaded == (inside > 0.0), "{name}: {id} is {inside} px on the screen");
             assert!(is_shaded != (hidden >> slot & 1 == 1), "{name}: {id} is shaded or hidden");

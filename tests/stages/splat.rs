@@ -45,9 +45,9 @@ impl<'a> Stages<'a> {
             tally: &storage,
         };
         let voxel = layout::Voxel { index: 0, value: 0.0, normal: 0, gradient_magnitude: 0.0 };
-        let brick = layout::Brick { first: 0, count: 1, x: 0, y: 0, z: 0, extent: 0 };
-        let lists = VoxelLists::upload(device, &[voxel], &[brick]);
-        let list = Cull::new(device, sheets).prepare(device, shared, &lists.lists[0], &storage, 1, 1);
+        let grid = Grid { dims: UVec3::ONE, spacing: DVec3::ONE };
+        let lists = VoxelLists::upload(device, &grid, &[voxel]);
+        let list = Cull::new(device, sheets).prepare(device, shared, &lists.lists[0], &storage, (1, 1), None);
         let splat = Stage::new(device, TextureFormat::Rgba32Float, sheets);
         Self { gpu, sheets, splat, list: RefCell::new(list) }
     }

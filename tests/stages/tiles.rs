@@ -91,7 +91,7 @@ impl Case {
         let uniforms: Vec<Group> =
             (0..GROUPS).map(|index| Group { near: 0.0, first_brick: 0, brick_count: 0, index }).collect();
         let (groups, stride) = at_offsets(device, &uniforms);
-        let lists = stage.prepare(device, &frame, &groups, &tally, &targets, GROUPS as usize);
+        let lists = stage.prepare(device, [&frame, &groups, &tally], &targets, GROUPS as usize, None);
         compute(gpu, |pass| stage.record(pass, &lists, group * stride));
 
         for (name, buffer, expected) in

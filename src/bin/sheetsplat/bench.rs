@@ -2,7 +2,6 @@
 
 use std::time::Instant;
 
-use glam::{DMat3, DVec3};
 use serde::Serialize;
 use sheetsplat::error::Error;
 use sheetsplat::headless::{Headless, HeadlessOptions};
@@ -42,7 +41,7 @@ struct Report {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let mut scene = open_scene(&arguments.input, &arguments.set)?;
+    let scene = open_scene(&arguments.input, &arguments.set)?;
     let failed = |error: Error| Failure::of(error, &arguments.input);
     let start = Instant::now();
     let volume = scene.load_volume().map_err(|error| failed(error.into()))?;
@@ -51,15 +50,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
     let options = HeadlessOptions { adapter: arguments.adapter.clone(), ..HeadlessOptions::default() };
     let headless = Headless::new(&options).map_err(|error| Failure::Other(error.to_string()))?;
-    let classified = headless.classify(&volume, &scene).map_err(|error| failed(error.into()))?;
-    let mut last = headless.draw(&classified, &scene).map_err(|error| failed(error.into()))?.stats;
+    let mut view = headless.view(volume, &scene).map_err(|error| failed(error.into()))?;
+    let mut last = headless.draw(&mut view).map_err(|error| failed(error.into()))?.stats;
     let first_frame_ms = milliseconds_since(start);
 
     let mut times = Vec::new();
     for _ in 0..arguments.frames {
-        scene.camera.direction = turned(scene.camera.direction, scene.camera.up, arguments.rotate);
+        view.turn(arguments.rotate);
         let start = Instant::now();
-        last = headless.draw(&classified, &scene).map_err(|error| failed(error.into()))?.stats;
+        last = headless.draw(&mut view).map_err(|error| failed(error.into()))?.stats;
         times.push(milliseconds_since(start));
     }
     times.sort_by(f64::total_cmp);
@@ -74,11 +73,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     println!("{}", serde_json::to_string(&report).map_err(|error| Failure::Other(error.to_string()))?);
     Ok(())
-}
-
-/// `direction` turned about `up` by the right hand.
-fn turned(direction: DVec3, up: DVec3, degrees: f64) -> DVec3 {
-    DMat3::from_axis_angle(up.normalize(), degrees.to_radians()) * direction
 }
 
 /// The process's largest resident set so far, where the system tells it.

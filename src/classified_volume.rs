@@ -1,0 +1,143 @@
+//! A volume under a transfer function, on the GPU: the voxels that take part (§5.1), and how they change.
+
+use std::sync::{Arc, OnceLock};
+
+use rayon::prelude::*;
+use wgpu::Device;
+
+use crate::classify::{classify, classify_voxel};
+use crate::gpu::layout::Voxel;
+use crate::gpu::voxel_list::VoxelLists;
+use crate::iso_range::ValueSet;
+use crate::plan::{FramePlan, add_sections, count_sections, tile_grid};
+use crate::stats::{Counts, Totals};
+use crate::transfer_function::{Ramp, TransferFunction};
+use crate::value_list::ValueList;
+use crate::volume::{Grid, Volume};
+
+/// The voxels of a volume that take part under a transfer function.
+#[derive(Debug)]
+pub struct ClassifiedVolume {
+    volume: Arc<Volume>,
+    transfer: TransferFunction,
+    values: ValueSet,
+    list: OnceLock<ValueList>,
+    pub(crate) lists: VoxelLists,
+    /// The lists hold what was let in by a transfer function that is no longer the current one.
+    pub(crate) is_stale: bool,
+    /// Counts changes of the lists.
+    pub(crate) revision: u64,
+}
+
+/// What a change of transfer function or iso-ranges touched.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Touched {
+    /// Voxels that take part now and did not before.
+    pub entered: u64,
+    /// Voxels that took part before and do not now.
+    pub left: u64,
+    /// Whether all voxels must be uploaded again, as the lists have no room for those that entered.
+    pub rebuilt: bool,
+}
+
+impl ClassifiedVolume {
+    /// Classifies a volume (SPEC §3) and uploads the voxels that take part.
+    pub fn new(device: &Device, volume: Arc<Volume>, transfer: TransferFunction) -> Self {
+        let lists = VoxelLists::upload(device, volume.grid(), &classify(&volume, &transfer));
+        let values = ValueSet::of(&transfer);
+        Self { volume, transfer, values, list: OnceLock::new(), lists, is_stale: false, revision: 0 }
+    }
+
+    /// The volume.
+    pub fn volume(&self) -> &Arc<Volume> {
+        &self.volume
+    }
+
+    /// Where the voxels are.
+    pub fn grid(&self) -> &Grid {
+        self.volume.grid()
+    }
+
+    /// The transfer function.
+    pub fn transfer(&self) -> &TransferFunction {
+        &self.transfer
+    }
+
+    /// The voxels sorted by value (Table 1), for every later change. Sorted when first asked for, so that a single frame need not
+    /// wait for it; a program with iso-ranges to move asks when it has loaded the volume.
+    pub fn value_list(&self) -> &ValueList {
+        self.list.get_or_init(|| ValueList::new(self.volume.values()))
+    }
+
+    /// Changes colours, opacities, gradient opacity or iso-ranges (§5.1). Only voxels that enter or leave are touched: those
+    /// whose values gain or lose their opacity, found by binary search. Where the gradient opacity changes, all that are in range
+    /// must be looked at.
+    pub fn set_transfer_function(&mut self, transfer: TransferFunction) -> Touched {
+        let values = ValueSet::of(&transfer);
+        let is_everywhere = |ramp: &Option<Ramp<f64>>| {
+            ramp.as_ref().is_none_or(|ramp| ramp.points().iter().all(|&(_, opacity)| opacity > 0.0))
+        };
+        let gradients = [&transfer.gradient_opacity, &self.transfer.gradient_opacity];
+        let same_gradients = gradients[0] == gradients[1] || gradients.into_iter().all(is_everywhere);
+        let candidates = if same_gradients && values == self.values {
+            Vec::new()
+        } else {
+            let set = values.either(&self.values, !same_gradients);
+            let mut candidates = self.value_list().within(self.volume.values(), &set);
+            // In memory order, where neighbours share cache lines.
+            candidates.par_sort_unstable();
+            candidates
+        };
+        (self.transfer, self.values) = (transfer, values);
+
+        let (volume, transfer, lists) = (&*self.volume, &self.transfer, &self.lists);
+        // Entering voxels and leaving ones.
+        let changes: Vec<(u32, Option<Voxel>)> = (candidates.into_par_iter())
+            .filter_map(|index| {
+                let voxel = classify_voxel(volume, transfer, index, volume.values()[index as usize]);
+                (voxel.is_some() != lists.contains(index)).then_some((index, voxel))
+            })
+            .collect();
+        let entering: Vec<Voxel> = changes.iter().filter_map(|change| change.1).collect();
+        let leaving: Vec<u32> = changes.iter().filter(|change| change.1.is_none()).map(|change| change.0).collect();
+        if !entering.is_empty() || !leaving.is_empty() {
+            self.is_stale |= !self.lists.change(&entering, &leaving);
+            self.revision += 1;
+        }
+        Touched { entered: entering.len() as u64, left: leaving.len() as u64, rebuilt: self.is_stale }
+    }
+
+    /// Changes the iso-ranges alone: closed intervals `[lo, hi]` of the values that take part, `None` for all. Touches what
+    /// [`Self::set_transfer_function`] does.
+    pub fn set_iso_ranges(&mut self, iso_ranges: Option<Vec<[f64; 2]>>) -> Touched {
+        self.set_transfer_function(TransferFunction { iso_ranges, ..self.transfer.clone() })
+    }
+
+    /// Uploads all voxels again, if the lists had no room for a change.
+    pub(crate) fn renew(&mut self, device: &Device) {
+        if std::mem::take(&mut self.is_stale) {
+            let voxels = classify(&self.volume, &self.transfer);
+            self.lists = VoxelLists::upload(device, self.volume.grid(), &voxels);
+        }
+    }
+
+    /// What of a frame's counts (Table 4) is known before it is drawn.
+    pub fn totals(&self, plan: &FramePlan) -> Totals {
+        let sections = self.lists.bricks().filter_map(|bricks| count_sections(bricks, &plan.view));
+        let (sections_total, slabs) = sections.reduce(add_sections).unwrap_or((0, 0..0));
+        // A group's first or last sheets can lie outside of what any kernel touches.
+        let sheets_of = |first: i32| {
+            (first + plan.sheets as i32).min(slabs.end).saturating_sub(first.max(slabs.start)).max(0) as u64
+        };
+        let [columns, rows] = tile_grid(plan.view.size).map(u64::from);
+        let counts = Counts {
+            voxels_total: self.grid().dims.as_u64vec3().element_product(),
+            voxels_in_range: self.lists.len(),
+            sections_total,
+            sheets: slabs.len() as u64,
+            tiles_total: columns * rows * slabs.len() as u64,
+            ..Counts::default()
+        };
+        Totals { counts, group_sheets: plan.groups.iter().map(|group| sheets_of(group.first_slab)).collect() }
+    }
+}

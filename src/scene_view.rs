@@ -1,0 +1,109 @@
+//! What is shown and how, and what the next frame can keep of the last one: every setter says what it costs (§5.1).
+
+use std::sync::Arc;
+
+use wgpu::Device;
+
+use crate::camera::Camera;
+use crate::classified_volume::{ClassifiedVolume, Touched};
+use crate::renderer::PreparedFrame;
+use crate::scene::{ImageSettings, Scene};
+use crate::shading::{Light, Shading};
+use crate::splatting::Splatting;
+use crate::stats::PendingCounts;
+use crate::transfer_function::TransferFunction;
+use crate::volume::Volume;
+
+/// A view of a volume: camera, image, transfer function, shading and splatting settings, and the last frame's buffers. Setters
+/// take effect with the next [`Renderer::prepare`](crate::renderer::Renderer::prepare).
+#[derive(Debug)]
+pub struct SceneView {
+    pub(crate) volume: ClassifiedVolume,
+    pub(crate) scene: Scene,
+    pub(crate) frame: Option<PreparedFrame>,
+}
+
+/// What [`Renderer::prepare`](crate::renderer::Renderer::prepare) had to do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Prepared {
+    /// Whether bricks were sorted into buckets.
+    pub bucketed: bool,
+}
+
+impl SceneView {
+    /// Classifies a volume under a scene's transfer function and uploads the voxels that take part. The scene's own volume is
+    /// not looked at.
+    pub fn new(device: &Device, volume: Arc<Volume>, scene: &Scene) -> Self {
+        let transfer = scene.transfer.resolve(&volume);
+        Self { volume: ClassifiedVolume::new(device, volume, transfer), scene: scene.clone(), frame: None }
+    }
+
+    /// The settings. Its `volume` and `transfer` are those that the view was made with.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The volume under the current transfer function.
+    pub fn volume(&self) -> &ClassifiedVolume {
+        &self.volume
+    }
+
+    /// Changes colours, opacities, gradient opacity or iso-ranges. What keeps its opacity above 0 is shaded anew and nothing more;
+    /// see [`ClassifiedVolume::set_transfer_function`].
+    pub fn set_transfer_function(&mut self, transfer: TransferFunction) -> Touched {
+        self.volume.set_transfer_function(transfer)
+    }
+
+    /// Changes the iso-ranges alone; touches only voxels that enter or leave.
+    pub fn set_iso_ranges(&mut self, iso_ranges: Option<Vec<[f64; 2]>>) -> Touched {
+        self.volume.set_iso_ranges(iso_ranges)
+    }
+
+    /// Changes the camera: bricks are sorted into buckets again.
+    pub fn set_camera(&mut self, camera: Camera) {
+        self.scene.camera = camera;
+    }
+
+    /// Moves the light: voxels are shaded anew. A direction has any length but 0 and points to the light.
+    pub fn set_light(&mut self, light: Light) {
+        self.scene.shading.light = light;
+    }
+
+    /// Changes the material: voxels are shaded anew.
+    pub fn set_shading(&mut self, shading: Shading) {
+        self.scene.shading = shading;
+    }
+
+    /// Changes the splatting settings. Another slab width or kernel sorts bricks into buckets again, another kernel also makes
+    /// another footprint table.
+    pub fn set_splatting(&mut self, splatting: Splatting) {
+        self.scene.splatting = splatting;
+    }
+
+    /// Changes the image's size, for which all buffers of that size are allocated again, or its background, which costs nothing.
+    pub fn set_image(&mut self, image: ImageSettings) {
+        self.scene.image = image;
+    }
+
+    /// Turns the camera about its `up` by an angle in degrees, by the right hand.
+    pub fn turn(&mut self, degrees: f64) {
+        let Camera { direction, up, .. } = self.scene.camera;
+        let rotation = glam::DMat3::from_axis_angle(up.normalize(), degrees.to_radians());
+        self.scene.camera.direction = rotation * direction;
+    }
+
+    /// Bytes of GPU memory that the view holds.
+    pub fn gpu_bytes(&self) -> u64 {
+        self.frame.as_ref().map_or(self.volume.lists.gpu_bytes(), PreparedFrame::gpu_bytes)
+    }
+
+    /// Asks for the counts of the frame that was last recorded and submitted; `None` without one. They arrive when the device is
+    /// polled after the frame is done; nothing waits. Once per frame.
+    pub fn counts(&mut self) -> Option<PendingCounts> {
+        let (volume, frame) = (&self.volume, self.frame.as_mut()?);
+        let staging = frame.staging.take()?;
+        let planned = &mut frame.planned;
+        let totals = planned.totals.get_or_insert_with(|| volume.totals(&planned.plan)).clone();
+        Some(PendingCounts::new(totals, staging))
+    }
+}

@@ -1,0 +1,188 @@
+//! Lists (§5.1): a view that was changed shows what a fresh one shows, bit for bit, and a change touches what it must alone.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+#[expect(dead_code, reason = "not every file needs all of it")]
+mod common;
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use sheetsplat::headless::Headless;
+use sheetsplat::iso_range::ValueSet;
+use sheetsplat::renderer::Renderer;
+use sheetsplat::scene::{Scene, TransferSettings};
+use sheetsplat::scene_view::SceneView;
+use sheetsplat::shading::Light;
+use sheetsplat::splatting::{Compositing, FootprintForm};
+use sheetsplat::transfer_function::{Ramp, TransferFunction};
+use sheetsplat::volume::{Volume, builtin};
+
+use common::{Random, camera, gpu, scene, transfer};
+
+fn skin() -> TransferSettings {
+    transfer(&[(20.0, [0.2, 0.4, 0.9]), (200.0, [1.0, 0.8, 0.6])], &[(60.0, 0.0), (120.0, 0.6), (255.0, 1.0)])
+}
+
+fn head() -> (Arc<Volume>, Scene) {
+    let scene = Scene { camera: camera([0.5, 0.8, -0.2], 170.0), transfer: skin(), ..scene(90, 75) };
+    (Arc::new(builtin::volume("head:48").unwrap()), scene)
+}
+
+/// The transfer function as settings, so that a fresh view can be made with it.
+fn settings(transfer: &TransferFunction) -> TransferSettings {
+    let TransferFunction { color, opacity, gradient_opacity, iso_ranges } = transfer.clone();
+    TransferSettings { color: Some(color), opacity: Some(opacity), gradient_opacity, iso_ranges }
+}
+
+/// The voxels that take part, by a scan.
+fn taking_part(volume: &Volume, transfer: &TransferFunction) -> Vec<bool> {
+    (0..)
+        .zip(volume.values())
+        .map(|(index, &value)| {
+            let gradient = volume.gradient(volume.grid().voxel_at(index));
+            transfer.alpha(value.into(), gradient.length()) > 0.0
+        })
+        .collect()
+}
+
+fn assert_fresh(gpu: &Headless, view: &mut SceneView, name: &str) {
+    let drawn = gpu.draw(view).unwrap();
+    let scene = Scene { transfer: settings(view.volume().transfer()), ..view.scene().clone() };
+    let fresh = gpu.render_volume(view.volume().volume().clone(), &scene).unwrap();
+    assert!(drawn.image == fresh.image, "{name}: the image is not that of a fresh view");
+    let counts = |rendering: &sheetsplat::headless::Rendering| {
+        let counts = rendering.stats.counts;
+        // Bricks that became empty are tested in vain.
+        sheetsplat::stats::Counts { bricks_tested: 0, ..counts }
+    };
+    assert_eq!(counts(&drawn), counts(&fresh), "{name}");
+    // And the same again.
+    assert!(gpu.draw(view).unwrap().image == drawn.image, "{name}: the next frame differs");
+}
+
+#[test]
+fn a_changed_view_is_a_fresh_one() {
+    let gpu = gpu();
+    let (volume, mut scene) = head();
+    // Few voxels at first, so that room is made later.
+    scene.transfer.iso_ranges = Some(vec![[200.0, 255.0]]);
+    let mut view = gpu.view(volume.clone(), &scene).unwrap();
+    assert_fresh(&gpu, &mut view, "first");
+    let mut random = Random(8);
+    let (mut entered, mut left, mut rebuilt) = (0, 0, 0);
+    for step in 0..40 {
+        let before = taking_part(&volume, view.volume().transfer());
+        let old = view.volume().transfer().clone();
+        let touched = match random.bits() % 4 {
+            0 => {
+                let lo = random.uniform(-20.0, 200.0);
+                let ranges = vec![[lo, lo + random.uniform(0.0, 60.0)], [random.uniform(0.0, 255.0), 300.0]];
+                view.set_iso_ranges(Some(ranges))
+            }
+            1 => view.set_iso_ranges(None),
+            2 => {
+                let start = random.uniform(0.0, 150.0);
+                let opacity = Ramp::new(vec![(start, 0.0), (start + 20.0, 0.7), (255.0, random.uniform(0.0, 1.0))]);
+                view.set_transfer_function(TransferFunction { opacity: opacity.unwrap(), ..old })
+            }
+            _ => {
+                let start = random.uniform(0.0, 8.0);
+                let ramp = Ramp::new(vec![(start, 0.0), (start + 3.0, 1.0)]).unwrap();
+                let gradient_opacity = (random.uniform(0.0, 1.0) < 0.7).then_some(ramp);
+                view.set_transfer_function(TransferFunction { gradient_opacity, ..old })
+            }
+        };
+        let after = taking_part(&volume, view.volume().transfer());
+        let count = |was: bool, is: bool| {
+            before.iter().zip(&after).filter(|&(&before, &after)| (before, after) == (was, is)).count() as u64
+        };
+        assert_eq!((touched.entered, touched.left), (count(false, true), count(true, false)), "step {step}");
+        entered += touched.entered;
+        left += touched.left;
+        rebuilt += u64::from(touched.rebuilt);
+        // Not every change is drawn.
+        if random.uniform(0.0, 1.0) < 0.75 || touched.rebuilt {
+            assert_fresh(&gpu, &mut view, &format!("step {step}"));
+        }
+    }
+    assert!(entered > 10_000 && left > 10_000, "{entered} entered, {left} left");
+    assert!((1..20).contains(&rebuilt), "{rebuilt} of 40 changes needed more room");
+}
+
+/// What each setter costs: buckets only for cameras, slabs and bricks; voxels only for those that enter and leave.
+#[test]
+fn a_change_costs_what_it_must() {
+    let gpu = gpu();
+    let renderer: &Renderer = gpu.renderer();
+    let (volume, scene) = head();
+    let mut view = gpu.view(volume, &scene).unwrap();
+    let prepare = |view: &mut SceneView| renderer.prepare(gpu.device(), gpu.queue(), view).unwrap().bucketed;
+    assert!(prepare(&mut view), "the first frame has no buckets yet");
+    assert!(!prepare(&mut view), "nothing changed");
+
+    view.set_light(Light::Direction(DVec3::new(1.0, 0.3, 2.0)));
+    assert!(!prepare(&mut view), "light");
+    assert_fresh(&gpu, &mut view, "light");
+    view.set_shading(sheetsplat::shading::Shading { ambient: 0.5, shininess: 3.0, ..scene.shading });
+    assert!(!prepare(&mut view), "shading");
+    assert_fresh(&gpu, &mut view, "shading");
+    let old = view.volume().transfer().clone();
+    let color = Ramp::new(vec![(0.0, DVec3::new(1.0, 0.2, 0.1)), (200.0, DVec3::ONE)]).unwrap();
+    // More control points than before, and other opacities above 0 for the same values.
+    let opacity = Ramp::new(vec![(60.0, 0.0), (70.0, 0.1), (80.0, 0.4), (100.0, 0.2), (140.0, 0.9)]).unwrap();
+    let touched = view.set_transfer_function(TransferFunction { color, opacity, ..old });
+    assert_eq!((touched.entered, touched.left), (0, 0));
+    assert!(!prepare(&mut view), "colours and opacities");
+    assert_fresh(&gpu, &mut view, "colours and opacities");
+    let mut splatting = scene.splatting;
+    splatting.compositing = Compositing::Exponential;
+    splatting.opacity_threshold = 0.8;
+    view.set_splatting(splatting);
+    assert!(!prepare(&mut view), "compositing");
+    assert_fresh(&gpu, &mut view, "compositing");
+    view.set_splatting(sheetsplat::splatting::Splatting { footprint: FootprintForm::Sections, ..splatting });
+    assert_fresh(&gpu, &mut view, "footprint");
+    view.set_splatting(sheetsplat::splatting::Splatting { radius: 1.4, ..splatting });
+    assert!(prepare(&mut view), "radius");
+    assert_fresh(&gpu, &mut view, "radius");
+
+    view.turn(20.0);
+    assert!(prepare(&mut view), "camera");
+    assert_fresh(&gpu, &mut view, "camera");
+    view.set_image(sheetsplat::scene::ImageSettings { width: 130, height: 40, background: [0.1, 0.2, 0.3, 0.5] });
+    assert_fresh(&gpu, &mut view, "image");
+    let touched = view.set_iso_ranges(Some(vec![[100.0, 255.0]]));
+    assert!(touched.left > 0 && touched.entered == 0);
+    assert!(prepare(&mut view), "bricks changed");
+    assert_fresh(&gpu, &mut view, "iso-range");
+}
+
+/// A view that starts with nothing to show.
+#[test]
+fn from_nothing() {
+    let gpu = gpu();
+    let (volume, mut scene) = head();
+    scene.transfer.iso_ranges = Some(vec![[1e6, 2e6]]);
+    let mut view = gpu.view(volume, &scene).unwrap();
+    assert_fresh(&gpu, &mut view, "nothing");
+    assert!(view.set_iso_ranges(None).entered > 1000);
+    assert_fresh(&gpu, &mut view, "everything");
+    view.set_iso_ranges(Some(Vec::new()));
+    assert_fresh(&gpu, &mut view, "nothing again");
+}
+
+/// The least value takes part only where the transfer function says so: those voxels are not in the sorted list.
+#[test]
+fn the_value_list_leaves_out_the_background() {
+    let gpu = gpu();
+    let (volume, scene) = head();
+    let view = gpu.view(volume.clone(), &scene).unwrap();
+    let least = volume.values().iter().copied().fold(f32::INFINITY, f32::min);
+    let background = volume.values().iter().filter(|&&value| value == least).count();
+    assert!(background > 1000);
+    let list = view.volume().value_list();
+    assert_eq!(list.bytes(), 4 * (volume.values().len() - background) as u64);
+    let all = TransferFunction { opacity: Ramp::new(vec![(0.0, 1.0)]).unwrap(), ..view.volume().transfer().clone() };
+    assert_eq!(list.within(volume.values(), &ValueSet::of(&all)).len(), volume.values().len());
+}
