@@ -26,6 +26,8 @@ pub struct HeadlessOptions {
     pub sheet_format: Option<TextureFormat>,
     /// Sheets drawn by one quad; see [`RendererOptions`].
     pub sheets_per_group: Option<u32>,
+    /// Times every stage; see [`RendererOptions`].
+    pub profile: bool,
 }
 
 /// A device of its own and a renderer on it.
@@ -64,6 +66,7 @@ impl Headless {
         let renderer_options = RendererOptions {
             sheet_format: options.sheet_format,
             sheets_per_group: options.sheets_per_group,
+            profile: options.profile,
             ..RendererOptions::default()
         };
         let renderer = match scoped(&device, || Renderer::new(&device, &renderer_options)) {
@@ -167,7 +170,7 @@ impl Headless {
         let info = self.adapter.get_info();
         // The image came later than the counts.
         let missing = || Err(RenderError::Readback("the frame's counts did not arrive".to_owned()));
-        let counts = counts.and_then(|counts| counts.try_get()).unwrap_or_else(missing)?;
+        let (counts, stages_ms) = counts.and_then(|counts| counts.try_get()).unwrap_or_else(missing)?;
         Ok(Rendering {
             image: Image { width, height, pixels: bytemuck::pod_collect_to_vec(&bytes) },
             stats: Stats {
@@ -177,6 +180,7 @@ impl Headless {
                 width,
                 height,
                 counts,
+                stages_ms,
                 gpu_bytes: scene_view.gpu_bytes() + target.width() as u64 * u64::from(height) * 16,
                 load_ms: 0.0,
                 prepare_ms,

@@ -12,6 +12,7 @@ use crate::gpu::device::{self, DeviceError};
 use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::layout::{Group, Tally};
 use crate::gpu::targets::Targets;
+use crate::gpu::timer::{PASS_BYTES, Timer};
 use crate::gpu::uniforms::{self, Ramps};
 use crate::kernel::Kernel;
 use crate::pass::composite::Composite;
@@ -33,13 +34,15 @@ pub struct RendererOptions {
     pub sheet_format: Option<TextureFormat>,
     /// Sheets drawn by one quad: 1, 2 or 4; `None` takes as many as the device's colour attachments allow.
     pub sheets_per_group: Option<u32>,
+    /// Times every stage, where the device has timestamp queries.
+    pub profile: bool,
     /// Format of the views that frames are drawn into; any renderable float or normalised format.
     pub target_format: TextureFormat,
 }
 
 impl Default for RendererOptions {
     fn default() -> Self {
-        Self { sheet_format: None, sheets_per_group: None, target_format: TextureFormat::Rgba32Float }
+        Self { sheet_format: None, sheets_per_group: None, profile: false, target_format: TextureFormat::Rgba32Float }
     }
 }
 
@@ -48,6 +51,7 @@ impl Default for RendererOptions {
 pub struct Renderer {
     sheet_format: TextureFormat,
     sheets: u32,
+    profile: bool,
     enter: Enter,
     cull: Cull,
     tiles: Tiles,
@@ -72,7 +76,8 @@ pub(crate) struct PreparedFrame {
     tile_lists: TileLists,
     lists: Vec<PreparedList>,
     /// The voxels that enter the list with this frame.
-    entering: Option<Entering>,
+    entering: Vec<Entering>,
+    timer: Option<Timer>,
     sheet_views: Vec<TextureView>,
     clear_group: BindGroup,
     composite_groups: Vec<BindGroup>,
@@ -80,7 +85,7 @@ pub(crate) struct PreparedFrame {
     resolve_groups: Vec<BindGroup>,
     gpu_bytes: u64,
     /// Where a recorded frame leaves its counts; gone when somebody waits for them.
-    pub(crate) staging: Option<Buffer>,
+    pub(crate) staging: Option<Staging>,
 }
 
 /// What only changes with the view, or with the bricks: the buckets.
@@ -95,6 +100,17 @@ pub(crate) struct Planned {
     orders: Vec<Buffer>,
     /// For every list the most bricks and voxels that any group can visit.
     most: Vec<(u32, u32)>,
+}
+
+/// A frame's counts: a [`Tally`], for every group the tiles it composited, `[u32]`, and timestamps from `timestamps` on.
+#[derive(Debug)]
+pub(crate) struct Staging {
+    pub(crate) buffer: Buffer,
+    pub(crate) timestamps: u64,
+    /// The stage of every pass that was timed.
+    pub(crate) stages: Vec<&'static str>,
+    /// Nanoseconds of a timestamp's tick.
+    pub(crate) period: f32,
 }
 
 #[derive(Debug)]
@@ -115,6 +131,7 @@ impl Renderer {
         Ok(Self {
             sheet_format,
             sheets,
+            profile: options.profile,
             enter: Enter::new(device),
             cull: Cull::new(device, sheets),
             tiles: Tiles::new(device),
@@ -141,8 +158,18 @@ impl Renderer {
         let size = [scene.image.width, scene.image.height];
         let seen = View::new(volume.grid(), &scene.camera, splatting, size)?;
         let kernel = Kernel::new(splatting.radius, splatting.falloff);
-        let Previous { planned, targets, footprints, uniform, groups, control_points, tally, tile_lists, lists } =
-            Previous::of(frame.take());
+        let Previous {
+            planned,
+            targets,
+            footprints,
+            uniform,
+            groups,
+            control_points,
+            tally,
+            tile_lists,
+            lists,
+            mut entering,
+        } = Previous::of(frame.take());
 
         let targets = match targets.filter(|old| old.size == size && self.draws_into(&old.sheets)) {
             Some(targets) => targets,
@@ -204,17 +231,21 @@ impl Renderer {
                 PreparedList { cull, splat_group }
             })
             .collect();
-        let entering = entries
-            .zip(volume.lists.lists.first())
-            .map(|(entries, list)| self.enter.bind(device, &entries, &list.voxel_buffer));
+        let newly = entries.zip(volume.lists.lists.first());
+        entering.extend(newly.map(|(entries, list)| self.enter.bind(device, &entries, &list.voxel_buffer)));
         let tile_lists =
             self.tiles.prepare(device, [&uniform, &groups, &tally], &targets, plan.groups.len(), tile_lists);
+        // Every group has three passes.
+        let passes = entering.len() + 3 * plan.groups.len() + 1;
+        let timer = if self.profile { Timer::new(device, passes) } else { None };
+        let timestamps = (size_of::<Tally>() as u64 + plan.groups.len() as u64 * 4).next_multiple_of(8);
         let staging = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("sheetsplat.counts"),
-            size: size_of::<Tally>() as u64 + plan.groups.len() as u64 * 4,
+            size: timestamps + timer.as_ref().map_or(0, |_| passes as u64 * PASS_BYTES),
             usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
             mapped_at_creation: false,
         });
+        let period = queue.get_timestamp_period();
         let tiles = &tile_lists.composited;
         let sheets = targets.sheets_view();
         let composite = |band| self.composite.bind(device, &uniform, band, &sheets, tiles, &targets);
@@ -242,7 +273,8 @@ impl Renderer {
             tile_lists,
             lists,
             entering,
-            staging: Some(staging),
+            timer,
+            staging: Some(Staging { buffer: staging, timestamps, stages: Vec::new(), period }),
         });
         Ok(prepared)
     }
@@ -256,10 +288,11 @@ impl Renderer {
     /// scene's image size. What is recorded must be submitted: voxels that enter the iso-ranges reach the GPU with it.
     pub fn record(&self, encoder: &mut CommandEncoder, view: &mut SceneView, target: &TextureView) {
         let Some(frame) = &mut view.frame else { return };
-        if let Some(entering) = frame.entering.take() {
-            self.enter.record(&mut encoder.begin_compute_pass(&compute("sheetsplat.enter")), &entering);
+        let PreparedFrame { planned: Planned { plan, .. }, targets, tile_lists, timer, .. } = frame;
+        for entering in std::mem::take(&mut frame.entering) {
+            let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.enter", timer, "enter"));
+            self.enter.record(&mut pass, &entering);
         }
-        let PreparedFrame { planned: Planned { plan, .. }, targets, tile_lists, .. } = frame;
         let masks = [&targets.opaque, &targets.opaque_columns, &targets.occluded, &targets.opaque_tiles, &frame.tally];
         let accs = targets.bands.iter().map(|band| &band.acc);
         for buffer in accs.chain(masks).chain(frame.lists.iter().map(|list| &list.cull.states)) {
@@ -274,7 +307,7 @@ impl Renderer {
                 .collect();
             let Some(&(_, any_offset)) = lists.first() else { continue };
 
-            let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.cull"));
+            let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.cull", timer, "cull"));
             for &(list, offset) in &lists {
                 self.cull.record(&mut pass, &list.cull, offset);
             }
@@ -283,19 +316,24 @@ impl Renderer {
 
             let clear = (&frame.clear_group, &tile_lists.composited);
             let draws = lists.iter().map(|(list, offset)| (&list.splat_group, *offset, &list.cull.draw_args));
-            self.splat.record(encoder, frame.footprints.0.form, &frame.sheet_views, clear, draws);
+            let times = timer.as_mut().map(|timer| timer.render("splat"));
+            self.splat.record(encoder, times, frame.footprints.0.form, &frame.sheet_views, clear, draws);
 
-            let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.composite"));
+            let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.composite", timer, "composite"));
             self.composite.record(&mut pass, &frame.composite_groups, &tile_lists.composited);
             self.occlude.record(&mut pass, &frame.occlude_groups, &tile_lists.occluding);
         }
         let bands = targets.bands.iter().map(|band| band.band);
-        self.resolve.record(encoder, target, targets.size[0], frame.resolve_groups.iter().zip(bands));
+        let times = timer.as_mut().map(|timer| timer.render("resolve"));
+        self.resolve.record(encoder, times, target, targets.size[0], frame.resolve_groups.iter().zip(bands));
 
-        if let Some(staging) = &frame.staging {
-            let tally = size_of::<Tally>() as u64;
-            encoder.copy_buffer_to_buffer(&frame.tally, 0, staging, 0, tally);
-            encoder.copy_buffer_to_buffer(&tile_lists.counts, 0, staging, tally, staging.size() - tally);
+        if let Some(staging) = &mut frame.staging {
+            let (tally, tiles) = (size_of::<Tally>() as u64, plan.groups.len() as u64 * 4);
+            encoder.copy_buffer_to_buffer(&frame.tally, 0, &staging.buffer, 0, tally);
+            encoder.copy_buffer_to_buffer(&tile_lists.counts, 0, &staging.buffer, tally, tiles);
+            if let Some(timer) = timer {
+                staging.stages = timer.finish(encoder, &staging.buffer, staging.timestamps);
+            }
         }
     }
 }
@@ -349,6 +387,8 @@ struct Previous {
     tally: Option<Buffer>,
     tile_lists: Option<TileLists>,
     lists: Vec<PreparedList>,
+    /// Prepared but never recorded.
+    entering: Vec<Entering>,
 }
 
 impl Previous {
@@ -364,6 +404,7 @@ impl Previous {
             tally: Some(frame.tally),
             tile_lists: Some(frame.tile_lists),
             lists: frame.lists,
+            entering: frame.entering,
         }
     }
 }
@@ -373,6 +414,7 @@ fn most<C: ExactSizeIterator<Item = u32>>(groups: impl Iterator<Item = C>) -> (u
     groups.fold((0, 0), |(bricks, voxels), counts| (bricks.max(counts.len() as u32), voxels.max(counts.sum())))
 }
 
-fn compute(label: &str) -> wgpu::ComputePassDescriptor<'_> {
-    wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes: None }
+fn compute<'a>(label: &'a str, timer: &'a mut Option<Timer>, stage: &'static str) -> wgpu::ComputePassDescriptor<'a> {
+    let timestamp_writes = timer.as_mut().map(|timer| timer.compute(stage));
+    wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes }
 }

@@ -1,12 +1,18 @@
 //! What a frame cost, counted as in Table 4.
 
+use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, channel};
 
 use serde::Serialize;
-use wgpu::{Buffer, BufferAsyncError};
+use wgpu::BufferAsyncError;
 
 use crate::error::RenderError;
 use crate::gpu::layout::Tally;
+use crate::gpu::timer::stage_ms;
+use crate::renderer::Staging;
+
+/// Milliseconds by stage.
+pub type StageTimes = BTreeMap<&'static str, f64>;
 
 /// Counts and times of one frame (SPEC §8). As JSON: the field names as keys.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -24,6 +30,9 @@ pub struct Stats {
     /// The frame's counts.
     #[serde(flatten)]
     pub counts: Counts,
+    /// Of a renderer that profiles, on a device with timestamp queries: the GPU's milliseconds by stage.
+    #[serde(skip_serializing_if = "StageTimes::is_empty")]
+    pub stages_ms: StageTimes,
     /// Bytes of GPU memory that the frame holds.
     pub gpu_bytes: u64,
     /// Milliseconds to load or make the volume.
@@ -94,33 +103,37 @@ impl Totals {
 #[derive(Debug)]
 pub struct PendingCounts {
     totals: Totals,
-    /// A [`Tally`], then `[u32]`: the tiles composited by every group.
-    staging: Buffer,
+    staging: Staging,
     arrival: Receiver<Result<(), BufferAsyncError>>,
 }
 
 impl PendingCounts {
     /// Asks for the contents of `staging`, once what was submitted is done.
-    pub(crate) fn new(totals: Totals, staging: Buffer) -> Self {
+    pub(crate) fn new(totals: Totals, staging: Staging) -> Self {
         let (sender, arrival) = channel();
-        staging.map_async(wgpu::MapMode::Read, .., move |result| {
+        staging.buffer.map_async(wgpu::MapMode::Read, .., move |result| {
             // Whoever gave up asking does not care.
             let _ = sender.send(result);
         });
         Self { totals, staging, arrival }
     }
 
-    /// The counts, if the device was polled after the frame was done. Never waits.
+    /// The counts, if the device was polled after the frame was done, and of a renderer that profiles also the GPU's milliseconds
+    /// by stage. Never waits.
     ///
     /// # Errors
     /// If the device was lost meanwhile.
-    pub fn try_get(&self) -> Option<Result<Counts, RenderError>> {
+    pub fn try_get(&self) -> Option<Result<(Counts, StageTimes), RenderError>> {
         let failed = |reason: String| RenderError::Readback(reason);
         let result = self.arrival.try_recv().ok()?;
         Some(result.map_err(|error| failed(error.to_string())).and_then(|()| {
-            let bytes = self.staging.get_mapped_range(..).map_err(|error| failed(error.to_string()))?;
-            let (tally, tiles) = bytes.split_at(size_of::<Tally>());
-            Ok(self.totals.count(&bytemuck::pod_read_unaligned(tally), &bytemuck::pod_collect_to_vec(tiles)))
+            let Staging { buffer, timestamps, stages, period } = &self.staging;
+            let bytes = buffer.get_mapped_range(..).map_err(|error| failed(error.to_string()))?;
+            let (counts, times) = bytes.split_at(*timestamps as usize);
+            let (tally, tiles) = counts.split_at(size_of::<Tally>());
+            let tally = bytemuck::pod_read_unaligned(tally);
+            let counts = self.totals.count(&tally, &bytemuck::pod_collect_to_vec(tiles));
+            Ok((counts, stage_ms(stages, &bytemuck::pod_collect_to_vec(times), *period)))
         }))
     }
 }

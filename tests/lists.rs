@@ -156,6 +156,12 @@ fn a_change_costs_what_it_must() {
     assert!(touched.left > 0 && touched.entered == 0);
     assert!(prepare(&mut view), "bricks changed");
     assert_fresh(&gpu, &mut view, "iso-range");
+    // Prepared twice before it is drawn.
+    assert!(view.set_iso_ranges(Some(vec![[80.0, 255.0]])).entered > 0);
+    assert!(prepare(&mut view));
+    assert!(view.set_iso_ranges(Some(vec![[70.0, 255.0]])).entered > 0);
+    assert!(prepare(&mut view));
+    assert_fresh(&gpu, &mut view, "two iso-ranges");
 }
 
 /// A view that starts with nothing to show.

@@ -51,7 +51,7 @@ pub enum DeviceError {
 }
 
 /// Features that the renderer uses where a device has them. None is required.
-pub const WANTED_FEATURES: Features = Features::FLOAT32_BLENDABLE;
+pub const WANTED_FEATURES: Features = Features::FLOAT32_BLENDABLE.union(Features::TIMESTAMP_QUERY);
 
 /// Features and limits for a device that renders as well as the adapter can: to be merged into a device descriptor.
 #[derive(Clone, Debug)]

@@ -7,5 +7,6 @@ pub mod layout;
 pub mod readback;
 pub mod shaders;
 pub mod targets;
+pub mod timer;
 pub mod uniforms;
 pub mod voxel_list;

@@ -1,8 +1,8 @@
 //! Lays the compositing buffer over the background, into the target.
 
 use wgpu::{
-    BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, RenderPipeline, ShaderStages, TextureFormat,
-    TextureView,
+    BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, RenderPassTimestampWrites, RenderPipeline,
+    ShaderStages, TextureFormat, TextureView,
 };
 
 use crate::gpu::bindings::{bind, layout, storage, uniform};
@@ -61,6 +61,7 @@ impl Resolve {
     pub fn record<'a>(
         &self,
         encoder: &mut CommandEncoder,
+        timestamp_writes: Option<RenderPassTimestampWrites<'_>>,
         target: &TextureView,
         width: u32,
         bands: impl IntoIterator<Item = (&'a BindGroup, Band)>,
@@ -76,6 +77,7 @@ impl Resolve {
                     store: wgpu::StoreOp::Store,
                 },
             })],
+            timestamp_writes,
             ..wgpu::RenderPassDescriptor::default()
         });
         pass.set_pipeline(&self.pipeline);

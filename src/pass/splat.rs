@@ -3,8 +3,8 @@
 
 use wgpu::util::DeviceExt;
 use wgpu::{
-    BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, RenderPipeline, ShaderStages, TextureFormat,
-    TextureView, TextureViewDimension,
+    BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, RenderPassTimestampWrites, RenderPipeline,
+    ShaderStages, TextureFormat, TextureView, TextureViewDimension,
 };
 
 use crate::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
@@ -108,6 +108,7 @@ impl Splat {
     pub fn record<'a>(
         &self,
         encoder: &mut CommandEncoder,
+        timestamp_writes: Option<RenderPassTimestampWrites<'_>>,
         form: FootprintForm,
         sheets: &[TextureView],
         clear: (&BindGroup, &Buffer),
@@ -127,6 +128,7 @@ impl Splat {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("sheetsplat.splat"),
             color_attachments: &targets,
+            timestamp_writes,
             ..wgpu::RenderPassDescriptor::default()
         });
         let draw = std::mem::offset_of!(Indirect, draw) as u64;

@@ -57,7 +57,7 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
             let frame = init(device, &[frame], BufferUsages::UNIFORM);
             let groups: Vec<_> = targets.bands.iter().map(|band| stage.bind(device, &frame, band)).collect();
             let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            stage.record(&mut encoder, &view, size[0], groups.iter().zip(rows));
+            stage.record(&mut encoder, None, &view, size[0], groups.iter().zip(rows));
             queue.submit([encoder.finish()]);
             let actual = pixels(&readback::texture(device, queue, &target).unwrap());
 

@@ -147,7 +147,7 @@ impl<'a> Fixture<'a> {
             self.sheets.iter().map(|sheet| sheet.create_view(&wgpu::TextureViewDescriptor::default())).collect();
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let form = self.scene.splatting.footprint;
-        self.stage.splat.record(&mut encoder, form, &views, (&clear, &tiles), [(&group, offset, &args)]);
+        self.stage.splat.record(&mut encoder, None, form, &views, (&clear, &tiles), [(&group, offset, &args)]);
         self.gpu.queue().submit([encoder.finish()]);
         let read = |sheet| pixels(&readback::texture(device, self.gpu.queue(), sheet).unwrap());
         self.sheets.iter().map(read).collect()

@@ -23,6 +23,9 @@ pub(crate) struct Arguments {
     /// Set a scene value, as in --set splatting.slab_width=2.0. Can be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Time every stage on the GPU, where the adapter has timestamp queries: stages_ms in the statistics.
+    #[arg(long)]
+    profile: bool,
     /// Part of the name of the adapter to use.
     #[arg(long, value_name = "NAME", env = "WGPU_ADAPTER_NAME")]
     adapter: Option<String>,
@@ -48,7 +51,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let load_ms = milliseconds_since(start);
 
     let start = Instant::now();
-    let options = HeadlessOptions { adapter: arguments.adapter.clone(), ..HeadlessOptions::default() };
+    let (adapter, profile) = (arguments.adapter.clone(), arguments.profile);
+    let options = HeadlessOptions { adapter, profile, ..HeadlessOptions::default() };
     let headless = Headless::new(&options).map_err(|error| Failure::Other(error.to_string()))?;
     let mut view = headless.view(volume, &scene).map_err(|error| failed(error.into()))?;
     let mut last = headless.draw(&mut view).map_err(|error| failed(error.into()))?.stats;

@@ -32,6 +32,9 @@ pub(crate) struct Arguments {
     /// The GPU, or the slow f64 evaluation on the CPU that it is tested against.
     #[arg(long, value_enum, default_value = "gpu")]
     backend: Backend,
+    /// Time every stage on the GPU, where the adapter has timestamp queries: stages_ms in the statistics, and printed.
+    #[arg(long)]
+    profile: bool,
     /// Part of the name of the adapter to use.
     #[arg(long, value_name = "NAME", env = "WGPU_ADAPTER_NAME")]
     adapter: Option<String>,
@@ -60,7 +63,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let scene = open_scene(&arguments.input, &arguments.set)?;
     let Rendering { image, stats } = match arguments.backend {
         Backend::Gpu => {
-            let options = HeadlessOptions { adapter: arguments.adapter.clone(), ..HeadlessOptions::default() };
+            let (adapter, profile) = (arguments.adapter.clone(), arguments.profile);
+            let options = HeadlessOptions { adapter, profile, ..HeadlessOptions::default() };
             let headless = Headless::new(&options).map_err(|error| Failure::Other(error.to_string()))?;
             headless.render(&scene)
         }
@@ -81,6 +85,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         None => None,
     };
     image.save(&arguments.output, depth)?;
+    if arguments.profile && stats.stages_ms.is_empty() {
+        eprintln!("sheetsplat: --profile: found no timestamp queries on {}", stats.adapter);
+    }
+    for (stage, ms) in &stats.stages_ms {
+        println!("{stage:10} {ms:10.3} ms");
+    }
     if let Some((path, file)) = stats_file {
         file.persist(path).map_err(|error| failed(path, error.error))?;
     }

@@ -1,0 +1,103 @@
+//! GPU time per stage, from timestamp queries at the ends of every pass.
+
+use std::collections::BTreeMap;
+
+use wgpu::{
+    Buffer, BufferUsages, CommandEncoder, ComputePassTimestampWrites, Device, Features, QuerySet,
+    RenderPassTimestampWrites,
+};
+
+/// Passes timed by one query set.
+const PASSES_PER_SET: usize = wgpu::QUERY_SET_MAX_QUERIES as usize / 2;
+
+/// Bytes of a pass's two timestamps.
+pub const PASS_BYTES: u64 = 2 * wgpu::QUERY_SIZE as u64;
+
+/// The timestamps of a frame.
+#[derive(Debug)]
+pub struct Timer {
+    sets: Vec<QuerySet>,
+    results: Buffer,
+    stages: Vec<&'static str>,
+}
+
+impl Timer {
+    /// A timer for frames of at most `passes` passes; `None` if the device has no timestamp queries.
+    pub fn new(device: &Device, passes: usize) -> Option<Self> {
+        let set = |_| {
+            device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("sheetsplat.timer"),
+                ty: wgpu::QueryType::Timestamp,
+                count: 2 * PASSES_PER_SET as u32,
+            })
+        };
+        let sets = passes.div_ceil(PASSES_PER_SET);
+        device.features().contains(Features::TIMESTAMP_QUERY).then(|| Self {
+            sets: (0..sets).map(set).collect(),
+            results: device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("sheetsplat.timestamps"),
+                size: (sets * PASSES_PER_SET) as u64 * PASS_BYTES,
+                usage: BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC,
+                mapped_at_creation: false,
+            }),
+            stages: Vec::new(),
+        })
+    }
+
+    fn next(&mut self, stage: &'static str) -> (&QuerySet, u32) {
+        let at = self.stages.len();
+        self.stages.push(stage);
+        (&self.sets[at / PASSES_PER_SET], 2 * (at % PASSES_PER_SET) as u32)
+    }
+
+    /// Times the next compute pass.
+    pub fn compute(&mut self, stage: &'static str) -> ComputePassTimestampWrites<'_> {
+        let (query_set, at) = self.next(stage);
+        ComputePassTimestampWrites {
+            query_set,
+            beginning_of_pass_write_index: Some(at),
+            end_of_pass_write_index: Some(at + 1),
+        }
+    }
+
+    /// Times the next render pass.
+    pub fn render(&mut self, stage: &'static str) -> RenderPassTimestampWrites<'_> {
+        let (query_set, at) = self.next(stage);
+        RenderPassTimestampWrites {
+            query_set,
+            beginning_of_pass_write_index: Some(at),
+            end_of_pass_write_index: Some(at + 1),
+        }
+    }
+
+    /// Ends a frame: copies its timestamps to `staging` from `offset` on, and starts anew. The stages, pass by pass.
+    pub fn finish(&mut self, encoder: &mut CommandEncoder, staging: &Buffer, offset: u64) -> Vec<&'static str> {
+        let stages = std::mem::take(&mut self.stages);
+        for (at, (set, passes)) in self.sets.iter().zip(stages.chunks(PASSES_PER_SET)).enumerate() {
+            let bytes = (at * PASSES_PER_SET) as u64 * PASS_BYTES;
+            encoder.resolve_query_set(set, 0..2 * passes.len() as u32, &self.results, bytes);
+        }
+        encoder.copy_buffer_to_buffer(&self.results, 0, staging, offset, stages.len() as u64 * PASS_BYTES);
+        stages
+    }
+}
+
+/// Milliseconds by stage, from the timestamps of its passes; `period` is a tick's nanoseconds.
+pub fn stage_ms(stages: &[&'static str], timestamps: &[[u64; 2]], period: f32) -> BTreeMap<&'static str, f64> {
+    let mut sums = BTreeMap::new();
+    for (&stage, &[begin, end]) in stages.iter().zip(timestamps) {
+        *sums.entry(stage).or_insert(0.0) += end.saturating_sub(begin) as f64 * f64::from(period) * 1e-6;
+    }
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn passes_of_a_stage_add_up() {
+        let sums = stage_ms(&["cull", "splat", "cull"], &[[0, 1_000_000], [5, 5], [7, 500_007]], 2.0);
+        assert_eq!(sums, BTreeMap::from([("cull", 3.0), ("splat", 0.0)]));
+    }
+}
