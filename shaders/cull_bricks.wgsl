@@ -7,7 +7,7 @@
 // Bricks by their first sheet group.
 @group(0) @binding(3) var<storage, read> order: array<u32>;
 @group(0) @binding(4) var<storage, read> states: array<BrickState>;
-// The occlusion buffer: a bit is set where the whole footprint box around a pixel is opaque.
+// The occlusion buffer: a bit is set where the box filter that starts at a pixel finds opaque pixels alone.
 @group(0) @binding(5) var<storage, read> occluded: array<u32>;
 @group(0) @binding(6) var<storage, read_write> visits: array<Visit>;
 @group(0) @binding(7) var<storage, read_write> args: Indirect;
@@ -19,11 +19,13 @@ override SHEETS: u32 = 4u;
 
 var<workgroup> ends: array<u32, 256>;
 
-// Whether the occlusion buffer is set at all pixels that centres of the brick's voxels can fall on.
+// Whether all pixels are opaque in the footprints' boxes around centres from low to high.
 fn is_behind(low: vec2f, high: vec2f) -> bool {
     let last = vec2f(frame.size - 1u);
-    let first_pixel = vec2u(clamp(floor(low), vec2f(0.0), last));
-    let last_pixel = vec2u(clamp(floor(high), vec2f(0.0), last));
+    let margin = frame.half_box + BOX_SLACK;
+    let first_pixel = vec2u(clamp(ceil(low - margin - 0.5), vec2f(0.0), last));
+    let end = vec2u(clamp(floor(high + margin - 0.5) - vec2f(frame.reach), vec2f(0.0), last));
+    let last_pixel = max(first_pixel, end);
     let words = tile_grid(frame.size).x;
     for (var word = first_pixel.x / TILE; word <= last_pixel.x / TILE; word += 1u) {
         let from_bit = max(first_pixel.x, word * TILE) - word * TILE;

@@ -16,12 +16,22 @@ var<workgroup> hidden_now: array<atomic<u32>, 2>;
 var<workgroup> drawn_now: array<atomic<u32>, 2>;
 var<workgroup> sections_now: atomic<u32>;
 
-// Whether every pixel of the footprint's box is opaque. A centre off the image is tested at the nearest pixel on it, whose
-// box holds all of its own that is on the image.
+// Whether the box filter that starts at a pixel finds opaque pixels alone.
+fn is_occluded(x: u32, y: u32) -> bool {
+    let word = occluded[y * tile_grid(frame.size).x + x / TILE];
+    return (word & (1u << (x % TILE))) != 0u;
+}
+
+// Whether every pixel of the footprint's box is opaque: depending on where the centre lies in its pixel, the box is as large as
+// the filter or a pixel larger, which the filter then covers from its corners. Off the image the nearest filter on it is as
+// good: it holds all of the box that is on the image.
 fn is_hidden(center_px: vec2f) -> bool {
-    let pixel = vec2u(clamp(floor(center_px), vec2f(0.0), vec2f(frame.size - 1u)));
-    let word = occluded[pixel.y * tile_grid(frame.size).x + pixel.x / TILE];
-    return (word & (1u << (pixel.x % TILE))) != 0u;
+    let last = vec2f(frame.size - 1u);
+    let margin = frame.half_box + BOX_SLACK;
+    let first = vec2u(clamp(ceil(center_px - margin - 0.5), vec2f(0.0), last));
+    let end = max(first, vec2u(clamp(floor(center_px + margin - 0.5) - vec2f(frame.reach), vec2f(0.0), last)));
+    return is_occluded(first.x, first.y) && is_occluded(end.x, first.y)
+        && is_occluded(first.x, end.y) && is_occluded(end.x, end.y);
 }
 
 // Marks the tiles that the footprint's box overlaps.

@@ -29,7 +29,7 @@ fn word_of(workgroup: vec3u, thread: u32) -> Word {
     return Word(tile % words, y, y < frame.size.y);
 }
 
-// Down the columns; rows off the image count as opaque.
+// Down the columns, from every pixel on; rows off the image count as opaque.
 @compute @workgroup_size(32)
 fn columns(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
     let word = word_of(workgroup, thread);
@@ -39,40 +39,37 @@ fn columns(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) 
     let words = tile_grid(frame.size).x;
     var all = 0xffffffffu;
     let last = min(word.y + frame.reach.y, frame.size.y - 1u);
-    for (var y = word.y - min(word.y, frame.reach.y); y <= last; y += 1u) {
+    for (var y = word.y; y <= last; y += 1u) {
         all &= source[y * words + word.x];
     }
     result[word.y * words + word.x] = all;
 }
 
 // A row's word, all opaque off the image.
-fn row_word(y: u32, x: i32) -> u32 {
+fn row_word(y: u32, x: u32) -> u32 {
     let words = tile_grid(frame.size).x;
-    if x < 0 || x >= i32(words) {
+    if x >= words {
         return 0xffffffffu;
     }
-    return source[y * words + u32(x)];
+    return source[y * words + x];
 }
 
-// Along the rows.
+// Along the rows, from every pixel on.
 @compute @workgroup_size(32)
 fn rows(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
     let word = word_of(workgroup, thread);
     if !word.inside {
         return;
     }
-    let x = i32(word.x);
-    var all = row_word(word.y, x);
+    var all = row_word(word.y, word.x);
     for (var step = 1u; step <= frame.reach.x; step += 1u) {
-        let whole = i32(step / 32u);
+        let x = word.x + step / 32u;
         let part = step % 32u;
-        var from_right = row_word(word.y, x + whole) >> part;
-        var from_left = row_word(word.y, x - whole) << part;
+        var from_right = row_word(word.y, x) >> part;
         if part != 0u {
-            from_right |= row_word(word.y, x + whole + 1) << (32u - part);
-            from_left |= row_word(word.y, x - whole - 1) >> (32u - part);
+            from_right |= row_word(word.y, x + 1u) << (32u - part);
         }
-        all &= from_right & from_left;
+        all &= from_right;
     }
     result[word.y * tile_grid(frame.size).x + word.x] = all;
 }

@@ -25,13 +25,12 @@ fn is_composited(tile: u32) -> bool {
     return touched && (frame.culling == 0u || opaque_tiles[tile] == 0u);
 }
 
-// Whether the box filter at some pixel of a tile reaches into a composited tile.
+// Whether the box filter that starts at some pixel of a tile, to the right and down, reaches into a composited tile.
 fn is_near_composited(at: vec2u, grid: vec2u) -> bool {
     let margin = (frame.reach + TILE - 1u) / TILE;
-    let low = at - min(at, margin);
     let high = min(at + margin, grid - 1u);
-    for (var y = low.y; y <= high.y; y += 1u) {
-        for (var x = low.x; x <= high.x; x += 1u) {
+    for (var y = at.y; y <= high.y; y += 1u) {
+        for (var x = at.x; x <= high.x; x += 1u) {
             if is_composited(y * grid.x + x) {
                 return true;
             }

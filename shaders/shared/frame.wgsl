@@ -31,6 +31,9 @@ const XRAY = 2u;
 const FRONT_TO_BACK = 0u;
 const BACK_TO_FRONT = 1u;
 
+// The slack with which footprints' boxes are rounded to pixels, for the rounding errors of f32 coordinates.
+const BOX_SLACK = 0.01;
+
 // Side of a tile in pixels: one word of an opacity mask per row of a tile (§6).
 const TILE = 32u;
 

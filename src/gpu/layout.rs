@@ -81,7 +81,7 @@ pub struct Frame {
     pub opacity_threshold: f32,
     /// Half the footprint's screen box, pixels.
     pub half_box: [f32; 2],
-    /// Half the occlusion buffer's box filter, whole pixels on either side of a pixel.
+    /// The occlusion buffer's box filter reads a pixel and so many to the right of it and below.
     pub reach: [u32; 2],
     /// 0 linear, 1 exponential, 2 xray.
     pub compositing: u32,

@@ -46,8 +46,8 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
         slab_width: view.slabs.width as f32,
         opacity_threshold: scene.splatting.opacity_threshold as f32,
         half_box: half_box.as_vec2().to_array(),
-        // A centre lies up to half a pixel from its pixel's; the slack covers f32 coordinates.
-        reach: (half_box + 0.5 + 0.01).floor().min(DVec2::splat(MAX_REACH)).as_uvec2().to_array(),
+        // A footprint's box holds that many pixel centres and one more, or one less.
+        reach: ((2.0 * half_box.min(DVec2::splat(MAX_HALF_BOX))).floor() - 1.0).as_uvec2().to_array(),
         compositing: match scene.splatting.compositing {
             Compositing::Linear => 0,
             Compositing::Exponential => 1,
@@ -81,15 +81,15 @@ pub fn groups(plan: &FramePlan, stride: usize) -> Vec<u8> {
     bytes
 }
 
-/// Half the largest box filter, pixels. Few footprints larger than that fit the screen, and hardly one is ever hidden.
-const MAX_REACH: f64 = 256.0;
+/// Half the largest box that is tested, pixels. Few footprints larger than that fit the screen, and hardly one is ever hidden.
+const MAX_HALF_BOX: f64 = 256.0;
 
 /// Early splat elimination needs the front first, something that hides (SPEC §5), and footprints smaller than the screen.
 fn culls(splatting: &Splatting, half_box: DVec2) -> bool {
     splatting.culling
         && splatting.order == Order::FrontToBack
         && splatting.compositing != Compositing::Xray
-        && half_box.max_element() <= MAX_REACH
+        && half_box.max_element() <= MAX_HALF_BOX
 }
 
 /// `hv = normalize(l + c)`, 0 where they cancel (SPEC §3).

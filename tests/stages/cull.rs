@@ -152,6 +152,24 @@ impl Decisions {
         floor as u32
     }
 
+    /// `x` between 0 and `last`, rounded up.
+    fn ceil(&mut self, x: f64, last: f64) -> u32 {
+        last as u32 - self.floor(last - x, last, EPSILON)
+    }
+
+    /// The first and the last pixel from which the box filter covers the footprints' boxes around centres from `low` to `high`.
+    fn filter(&mut self, frame: &Frame, low: DVec2, high: DVec2) -> [[u32; 2]; 2] {
+        // Pixel centres are at half-integers; the shader's slack.
+        let margin = DVec2::from(frame.half_box.map(f64::from)) + 0.01;
+        let (low, high) = ((low - margin - 0.5).to_array(), (high + margin - 0.5).to_array());
+        let axes = [0, 1].map(|axis| {
+            let last = f64::from(frame.size[axis] - 1);
+            let first = self.ceil(low[axis], last);
+            [first, self.floor(high[axis] - f64::from(frame.reach[axis]), last, EPSILON).max(first)]
+        });
+        [[axes[0][0], axes[1][0]], [axes[0][1], axes[1][1]]]
+    }
+
     fn pixel(&mut self, center: DVec2, size: [u32; 2]) -> [u32; 2] {
         [self.floor(center.x, f64::from(size[0] - 1), EPSILON), self.floor(center.y, f64::from(size[1] - 1), EPSILON)]
     }
@@ -273,8 +291,7 @@ impl Rules<'_> {
         }
         let all_occluded = |margin: f64| {
             let mut ignored = Decisions::default();
-            let first = ignored.pixel(least.truncate() - margin, self.frame.size);
-            let last = ignored.pixel(most.truncate() + margin, self.frame.size);
+            let [first, last] = ignored.filter(self.frame, least.truncate() - margin, most.truncate() + margin);
             (first[1]..=last[1]).all(|y| (first[0]..=last[0]).all(|x| occluded.at([x, y])))
         };
         decisions.unsure |= all_occluded(EPSILON) != all_occluded(-EPSILON);
@@ -326,7 +343,9 @@ impl Rules<'_> {
         let size = self.frame.size;
         let center = p.truncate();
         let is_on_screen = self.is_on_screen(decisions, center, center);
-        let is_hidden = self.frame.culling == 1 && occluded.at(decisions.pixel(center, size));
+        let [first, last] = decisions.filter(self.frame, center, center);
+        let corners = [first, [last[0], first[1]], [first[0], last[1]], last];
+        let is_hidden = self.frame.culling == 1 && corners.into_iter().all(|corner| occluded.at(corner));
         let state = &mut so_far.states[brick as usize];
         if !is_on_screen || is_hidden {
             state.0 |= 1 << slot;

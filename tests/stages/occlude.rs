@@ -1,4 +1,4 @@
-//! `shaders/occlude.wgsl` against a plain evaluation: a pixel is occluded where all pixels of its box that are on the image are
+//! `shaders/occlude.wgsl` against a plain evaluation: a pixel is occluded where all pixels on the image of the box that starts there are
 //! opaque. On bits, so exact.
 
 use std::collections::BTreeSet;
@@ -43,7 +43,7 @@ impl Mask {
         Self { size, bits: (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| bit(x, y))).collect() }
     }
 
-    /// The pixels whose whole box, cut off at the image's borders, is set.
+    /// The pixels that the whole box to the right and down, cut off at the image's borders, is set from.
     fn eroded(&self, reach: [u32; 2]) -> Self {
         let [width, height] = self.size;
         // Sums over rectangles, so that a box is four look-ups.
@@ -57,7 +57,7 @@ impl Mask {
             }
         }
         let is_set = |x: u32, y: u32| {
-            let (left, top) = (x.saturating_sub(reach[0]) as usize, y.saturating_sub(reach[1]) as usize);
+            let (left, top) = (x as usize, y as usize);
             let (right, bottom) = (width.min(x + reach[0] + 1) as usize, height.min(y + reach[1] + 1) as usize);
             let sum = |x: usize, y: usize| sums[y * stride + x];
             sum(right, bottom) + sum(left, top) == sum(left, bottom) + sum(right, top)
@@ -86,17 +86,17 @@ impl Mask {
         }
     }
 
-    /// The tiles in which two masks differ, and those within a margin of them.
+    /// The tiles in which two masks differ, and those whose boxes reach into them.
     fn changed_tiles(&self, other: &Self, reach: [u32; 2]) -> Vec<u32> {
-        let [columns, rows] = tile_grid(self.size);
+        let [columns, _] = tile_grid(self.size);
         let margin = reach.map(|pixels| pixels.div_ceil(TILE));
         let mut tiles = BTreeSet::new();
         for y in 0..self.size[1] {
             for x in 0..self.size[0] {
                 if self.at(x, y) != other.at(x, y) {
                     let (column, row) = (x / TILE, y / TILE);
-                    for row in row.saturating_sub(margin[1])..rows.min(row + margin[1] + 1) {
-                        for column in column.saturating_sub(margin[0])..columns.min(column + margin[0] + 1) {
+                    for row in row.saturating_sub(margin[1])..=row {
+                        for column in column.saturating_sub(margin[0])..=column {
                             tiles.insert(row * columns + column);
                         }
                     }
@@ -138,7 +138,7 @@ fn occluded_where_the_whole_box_is_opaque() {
     let (mut occluded, mut pixels) = (0, 0);
     let sizes = [[1, 1], [33, 31], [70, 45], [32, 64], [157, 90], [200, 3], [5, 150]];
     for size in sizes.into_iter().cycle().take(90) {
-        let most = [0.0, 4.0, 34.0, 70.0][random.bits() as usize % 4];
+        let most = [0.0, 8.0, 68.0, 140.0][random.bits() as usize % 4];
         // A box is never wider than the image: `reach` is at most its size.
         let reach = size.map(|side: u32| side.min(random.uniform(0.0, most + 1.0) as u32));
         let targets = Targets::new(gpu.device(), size, TextureFormat::Rgba32Float, 1).unwrap();

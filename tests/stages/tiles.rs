@@ -59,7 +59,7 @@ impl Case {
         let composited = self.composited();
         let reaches = |a: u32, b: u32, reach: u32| {
             // Of the nearest pixels of two tiles along an axis, one beside the other.
-            a == b || (a.abs_diff(b) - 1) * TILE < reach
+            a == b || b > a && (b - a - 1) * TILE < reach
         };
         (0..self.touched.len() as u32)
             .filter(|tile| {
@@ -153,7 +153,10 @@ fn margins_are_the_reach_in_whole_tiles() {
         let opaque = vec![false; columns * rows];
         let case = Case { size, reach, culling: true, tiles: true, touched, opaque };
         let expected: Vec<u32> = (0..(columns * rows) as u32)
-            .filter(|tile| (tile % 11).abs_diff(5) <= margin[0] && (tile / 11).abs_diff(4) <= margin[1])
+            .filter(|tile| {
+                let reaches = |at: u32, other: u32, margin: u32| (other.saturating_sub(margin)..=other).contains(&at);
+                reaches(tile % 11, 5, margin[0]) && reaches(tile / 11, 4, margin[1])
+            })
             .collect();
         assert_eq!(case.occluding(), expected, "{reach:?}");
         case.check(&gpu, &stage, 0);
