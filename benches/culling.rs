@@ -1,7 +1,8 @@
 //! What early splat elimination and tiles save (§6, Table 2): the same frame with and without, in interleaved pairs.
 //!
-//! `cargo bench --bench culling -- [PAIRS] [SCENE]…` takes scene files or builtin volumes; without any, builtin ones, and
-//! the scenes beside the checkout where they are. Scenes in perspective are left out.
+//! `cargo bench --bench culling -- [PAIRS] [SCENE]…` takes scene files, volume files or builtin volumes; without any, builtin
+//! ones, the nerve side-on (Table 2's worst case), and the scenes and the neuron beside the checkout where they are. Scenes in
+//! perspective are left out.
 
 #![expect(clippy::unwrap_used, reason = "a bench")]
 
@@ -13,6 +14,8 @@ use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::scene::{Scene, VolumeSource};
 use sheetsplat::scene_view::SceneView;
 use sheetsplat::stats::Stats;
+
+const SIDE_ON: &str = "builtin:nerve, side-on";
 
 fn main() {
     // Cargo passes --bench.
@@ -74,18 +77,25 @@ fn median(frames: &[(f64, Stats)]) -> f64 {
 }
 
 fn open(name: &str) -> Scene {
+    if name == SIDE_ON {
+        let mut scene = open("builtin:nerve");
+        scene.camera.direction = glam::DVec3::X;
+        return scene;
+    }
     match name.strip_prefix("builtin:") {
         Some(builtin) => Scene::new(VolumeSource::Builtin(builtin.to_owned())),
-        None => Scene::open(Path::new(name), &[]).unwrap(),
+        None if name.ends_with(".toml") => Scene::open(Path::new(name), &[]).unwrap(),
+        None => Scene::new(VolumeSource::File(name.into())),
     }
 }
 
 fn default_scenes() -> Vec<String> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
-    let entries = std::fs::read_dir(folder);
-    let mut scenes: Vec<PathBuf> =
+    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared");
+    let entries = std::fs::read_dir(shared.join("scenes"));
+    let mut files: Vec<PathBuf> =
         entries.map(|entries| entries.map(|entry| entry.unwrap().path()).collect()).unwrap_or_default();
-    scenes.sort();
-    let builtin = ["builtin:head", "builtin:nerve", "builtin:tomato"].map(str::to_owned);
-    builtin.into_iter().chain(scenes.iter().map(|scene| scene.display().to_string())).collect()
+    files.sort();
+    files.extend(Some(shared.join("data/neuron.nrrd")).filter(|file| file.exists()));
+    let builtin = ["builtin:head", "builtin:nerve", SIDE_ON, "builtin:tomato"].map(str::to_owned);
+    builtin.into_iter().chain(files.iter().map(|file| file.display().to_string())).collect()
 }

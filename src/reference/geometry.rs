@@ -91,6 +91,13 @@ impl Geometry {
         radius * DVec2::new(pixels_from_footprint.row(0).length(), pixels_from_footprint.row(1).length())
     }
 
+    /// Pixel offset → footprint coordinates whose first axis is the screen's (eqs. 9, 10): the square around a footprint in these
+    /// coordinates is a parallelogram on the screen, with two sides along the pixel rows (Fig. 13).
+    pub fn sheared_footprint_from_pixels(&self) -> DMat2 {
+        let along_rows = self.footprint_from_pixels.x_axis;
+        DMat2::from_angle(-along_rows.to_angle()) * self.footprint_from_pixels
+    }
+
     /// Pixel coordinates of a voxel.
     pub fn pixel(&self, voxel: UVec3) -> DVec2 {
         let p = self.grid.world_position(voxel) / self.grid.unit() - self.center;

@@ -22,6 +22,7 @@ use crate::volume::Volume;
 
 pub use geometry::Geometry;
 pub use shading::Splat;
+pub use visibility::Areas;
 
 /// An f64 image of premultiplied RGBA, row 0 at the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,7 +45,7 @@ impl Buffer {
 /// # Errors
 /// If the scene asks for something that is not implemented yet.
 pub fn render(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Image, RenderError> {
-    render_culled(volume, transfer, scene, None).map(|(image, _)| image)
+    render_culled(volume, transfer, scene, None).map(|culled| culled.image)
 }
 
 /// What [`render`] draws: all there is.
@@ -73,7 +74,18 @@ pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Res
     })
 }
 
-/// Renders with early splat elimination by one of the paper's tests, sheet by sheet; also counts the sections drawn.
+/// An image with early splat elimination, and what was drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Culled {
+    /// The image.
+    pub image: Image,
+    /// Voxel–sheet pairs that passed the test.
+    pub sections: u64,
+    /// Where they fell.
+    pub areas: Areas,
+}
+
+/// Renders with early splat elimination by one of the paper's tests, sheet by sheet, and counts what is drawn.
 ///
 /// # Errors
 /// If the scene asks for something that is not implemented yet.
@@ -82,7 +94,7 @@ pub fn render_culled(
     transfer: &TransferFunction,
     scene: &Scene,
     test: Option<visibility::Test>,
-) -> Result<(Image, u64), RenderError> {
+) -> Result<Culled, RenderError> {
     let geometry = Geometry::new(volume.grid(), scene)?;
     let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
     let splats = shading::shade(volume, transfer, scene, &geometry);
@@ -92,13 +104,14 @@ pub fn render_culled(
         sheets.reverse();
     }
     let mut acc = Buffer::new(scene.image.width, scene.image.height);
-    let mut sections = 0;
+    let (mut sections, mut areas) = (0, Areas::default());
     for (k, mut bucket) in sheets {
         if let Some(test) = test {
             let mask = visibility::OpaqueMask::new(&acc, scene.splatting.opacity_threshold);
             bucket = mask.visible(&bucket, test, &geometry, kernel.support());
         }
         sections += bucket.len() as u64;
+        areas.add(&bucket, &geometry, kernel.support());
         let sheet = splat::sheet(&bucket, k, &geometry, &kernel);
         composite::composite(&mut acc, &sheet, scene.splatting.compositing, scene.splatting.order);
     }
@@ -108,5 +121,5 @@ pub fn render_culled(
         height: scene.image.height,
         pixels: image.pixels.iter().map(|pixel| pixel.as_vec4().to_array()).collect(),
     };
-    Ok((image, sections))
+    Ok(Culled { image, sections, areas })
 }

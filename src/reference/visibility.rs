@@ -1,8 +1,9 @@
 //! Early splat elimination as the paper's simpler tests put it (§6), sheet by sheet: what the GPU's culling is held against.
 
-use glam::DVec2;
+use glam::{DMat2, DVec2};
 
 use super::{Buffer, Geometry, Splat};
+use crate::plan::TILE;
 
 /// When a voxel is culled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,6 +12,9 @@ pub enum Test {
     Center,
     /// When all pixels of its footprint's box are opaque (Fig. 10). Exact.
     Box,
+    /// When all pixels of the parallelogram around its footprint are opaque (Fig. 13). Exact, and never tests more pixels than the
+    /// box; for spacing 1:1:1 the same.
+    Parallelogram,
 }
 
 /// Which pixels are opaque, as sums over rectangles (a summed-area table of the mask). Pixels off the image are opaque.
@@ -47,17 +51,86 @@ impl OpaqueMask {
         x0 >= x1 || y0 >= y1 || sum(x1, y1) + sum(x0, y0) == sum(x0, y1) + sum(x1, y0)
     }
 
+    /// Whether every pixel is opaque whose centre lies in the parallelogram that `sheared` maps to a square of this half side.
+    pub fn covers_parallelogram(&self, center: DVec2, sheared: DMat2, half_side: f64) -> bool {
+        // Row by row: between the slanted sides. `sheared` maps the rows to its first axis.
+        let half_height = half_side / sheared.y_axis.y.abs();
+        let rows = (center.y - half_height - 0.5).ceil() as i64..=(center.y + half_height - 0.5).floor() as i64;
+        rows.into_iter().all(|y| {
+            let middle = center.x - (y as f64 + 0.5 - center.y) * sheared.y_axis.x / sheared.x_axis.x;
+            self.covers(DVec2::new(middle, y as f64 + 0.5), DVec2::new(half_side / sheared.x_axis.x, 0.25))
+        })
+    }
+
     /// The splats of a bucket that pass a test.
     pub fn visible(&self, bucket: &[Splat], test: Test, geometry: &Geometry, support: f64) -> Vec<Splat> {
-        let half_box = match test {
+        let half_box = geometry.half_box(support);
+        let sheared = geometry.sheared_footprint_from_pixels();
+        let is_hidden = |splat: &Splat| match test {
             // The one pixel that the centre falls on.
-            Test::Center => DVec2::splat(0.5),
-            Test::Box => geometry.half_box(support),
+            Test::Center => self.covers(splat.center.floor() + 0.5, DVec2::splat(0.5)),
+            Test::Box => self.covers(splat.center, half_box),
+            Test::Parallelogram => self.covers_parallelogram(splat.center, sheared, support),
         };
-        let center = |splat: &Splat| match test {
-            Test::Center => splat.center.floor() + 0.5,
-            Test::Box => splat.center,
+        bucket.iter().filter(|splat| !is_hidden(splat)).copied().collect()
+    }
+}
+
+/// Where sheets are composited and convolved, by the paper's ways to tell (§6), in pixels summed over the sheets.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Areas {
+    /// The bounding box of the voxels' centres, as much larger as footprints reach.
+    pub bounding_box: u64,
+    /// The tiles that footprints' boxes overlap.
+    pub tiles: u64,
+    /// Those of them that have seen as many splats by then as a tile needs to become opaque: the counters' threshold, below
+    /// which nothing need be convolved.
+    pub counted_tiles: u64,
+    /// Splats of every tile so far.
+    counters: Vec<u32>,
+}
+
+impl Areas {
+    /// Adds the areas of a sheet of these splats.
+    pub fn add(&mut self, sheet: &[Splat], geometry: &Geometry, support: f64) {
+        let half_box = geometry.half_box(support);
+        let size = geometry.size;
+        let tile = f64::from(TILE);
+        let columns = (size.x / tile).ceil() as usize;
+        self.counters.resize(columns * (size.y / tile).ceil() as usize, 0);
+        // The pixels whose centres lie between two points, first and end.
+        let pixels = |low: DVec2, high: DVec2| {
+            let first = (low - 0.5).ceil().clamp(DVec2::ZERO, size);
+            (first, ((high - 0.5).floor() + 1.0).clamp(first, size))
         };
-        bucket.iter().filter(|splat| !self.covers(center(splat), half_box)).copied().collect()
+        let centers = sheet.iter().map(|splat| (splat.center, splat.center));
+        if let Some((low, high)) = centers.reduce(|(low, high), (at, _)| (low.min(at), high.max(at))) {
+            let (first, end) = pixels(low - half_box, high + half_box);
+            self.bounding_box += (end - first).element_product() as u64;
+        }
+        let mut touched = vec![false; self.counters.len()];
+        for splat in sheet {
+            let (first, end) = pixels(splat.center - half_box, splat.center + half_box);
+            if (end - first).min_element() < 1.0 {
+                continue;
+            }
+            let (first, last) = ((first / tile).floor(), ((end - 1.0) / tile).floor());
+            for y in first.y as usize..=last.y as usize {
+                for x in first.x as usize..=last.x as usize {
+                    touched[y * columns + x] = true;
+                    self.counters[y * columns + x] += 1;
+                }
+            }
+        }
+        // No splat makes more pixels opaque than its box has.
+        let least = (tile * tile / (2.0 * half_box.x + 1.0) / (2.0 * half_box.y + 1.0)).ceil();
+        for (at, _) in touched.iter().enumerate().filter(|(_, touched)| **touched) {
+            let corner = DVec2::new((at % columns) as f64, (at / columns) as f64) * tile;
+            let area = (corner + tile).min(size) - corner;
+            self.tiles += area.element_product() as u64;
+            if f64::from(self.counters[at]) >= least {
+                self.counted_tiles += area.element_product() as u64;
+            }
+        }
     }
 }

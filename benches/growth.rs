@@ -1,0 +1,54 @@
+//! How frame time grows with the volume (§6): the builtin head at 64, 128, 256 and 512 voxels, opaque, in the same image.
+//!
+//! `cargo bench --bench growth -- [ROUNDS]`; every round draws each of them once.
+
+#![expect(clippy::unwrap_used, reason = "a bench")]
+
+use std::time::Instant;
+
+use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::scene::{Scene, VolumeSource};
+
+fn main() {
+    // Cargo passes --bench.
+    let rounds = std::env::args().skip(1).find_map(|argument| argument.parse().ok()).unwrap_or(7);
+    let headless = Headless::new(&HeadlessOptions::default()).unwrap();
+    let names = [64, 128, 256, 512].map(|side| format!("head:{side}"));
+    let mut views = names.each_ref().map(|name| {
+        let scene = Scene::new(VolumeSource::Builtin(name.clone()));
+        headless.view(scene.load_volume().unwrap(), &scene).unwrap()
+    });
+    let mut times = [(); 4].map(|()| Vec::new());
+    let mut last = None;
+    for round in 0..=rounds {
+        for (view, times) in views.iter_mut().zip(&mut times) {
+            // Another camera each time, so that buckets are part of the frame.
+            view.turn(1.0);
+            let start = Instant::now();
+            let stats = headless.draw(view).unwrap().stats;
+            // The first round compiles shaders and allocates.
+            if round > 0 {
+                times.push((start.elapsed().as_secs_f64() * 1e3, stats.counts));
+            }
+            last = Some(stats);
+        }
+    }
+    println!("| volume | voxels in range | sections drawn | quads | ms per frame | of the one before |");
+    println!("|---|---|---|---|---|---|");
+    let mut before: Option<f64> = None;
+    for (name, times) in names.iter().zip(&mut times) {
+        times.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (ms, counts) = times[times.len() / 2];
+        let ratio = before.map_or(String::new(), |before| format!("{:.2}", ms / before));
+        println!(
+            "| {name} | {} | {:.1} % | {} | {ms:.0} | {ratio} |",
+            counts.voxels_in_range,
+            100.0 * counts.sections_rasterized as f64 / counts.sections_total as f64,
+            counts.quads,
+        );
+        before = Some(ms);
+    }
+    if let Some(stats) = last {
+        println!("\n{rounds} rounds; {} ({})", stats.adapter, stats.driver);
+    }
+}
