@@ -53,6 +53,7 @@ pub mod iso_range;
 pub mod kernel;
 pub mod pass;
 pub mod plan;
+mod prepared_frame;
 pub mod reference;
 pub mod renderer;
 pub mod scene;

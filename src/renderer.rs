@@ -1,10 +1,7 @@
 //! The renderer a host embeds: it owns pipelines, never a device, and neither submits nor waits.
 
-use wgpu::util::DeviceExt;
-use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Queue, TextureFormat, TextureView};
+use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Queue, TextureFormat, TextureView};
 
-use crate::brick;
-use crate::classified_volume::ClassifiedVolume;
 use crate::error::RenderError;
 use crate::footprint::FootprintTable;
 use crate::gpu::bindings::grown;
@@ -16,16 +13,16 @@ use crate::gpu::timer::{PASS_BYTES, Timer};
 use crate::gpu::uniforms::{self, Ramps};
 use crate::kernel::Kernel;
 use crate::pass::composite::Composite;
-use crate::pass::cull::{Cull, CullBuffers, CullList};
-use crate::pass::enter::{Enter, Entering};
+use crate::pass::cull::{Cull, CullBuffers};
+use crate::pass::enter::Enter;
 use crate::pass::occlude::Occlude;
 use crate::pass::resolve::Resolve;
 use crate::pass::splat::Splat;
-use crate::pass::tiles::{TileLists, Tiles};
-use crate::plan::{FramePlan, View};
+use crate::pass::tiles::Tiles;
+use crate::plan::View;
+use crate::prepared_frame::{Planned, PreparedFrame, PreparedList, Previous, Staging};
 use crate::scene_view::{Prepared, SceneView};
-use crate::splatting::{FootprintForm, Order};
-use crate::stats::Totals;
+use crate::splatting::FootprintForm;
 
 /// What a renderer is made for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,64 +56,6 @@ pub struct Renderer {
     composite: Composite,
     occlude: Occlude,
     resolve: Resolve,
-}
-
-/// A frame whose buffers are all allocated and filled: recording it cannot fail.
-#[derive(Debug)]
-pub(crate) struct PreparedFrame {
-    pub(crate) planned: Planned,
-    targets: Targets,
-    /// And the kernel and slab width they are for.
-    footprints: (FootprintTexture, (Kernel, Option<f64>)),
-    uniform: Buffer,
-    groups: Buffer,
-    group_stride: u32,
-    control_points: Buffer,
-    tally: Buffer,
-    tile_lists: TileLists,
-    lists: Vec<PreparedList>,
-    /// The voxels that enter the list with this frame.
-    entering: Vec<Entering>,
-    timer: Option<Timer>,
-    sheet_views: Vec<TextureView>,
-    clear_group: BindGroup,
-    composite_groups: Vec<BindGroup>,
-    occlude_groups: [BindGroup; 2],
-    resolve_groups: Vec<BindGroup>,
-    gpu_bytes: u64,
-    /// Where a recorded frame leaves its counts; gone when somebody waits for them.
-    pub(crate) staging: Option<Staging>,
-}
-
-/// What only changes with the view, or with the bricks: the buckets.
-#[derive(Debug)]
-pub(crate) struct Planned {
-    pub(crate) plan: FramePlan,
-    pub(crate) totals: Option<Totals>,
-    order: Order,
-    /// [`ClassifiedVolume::revision`].
-    revision: u64,
-    /// For every list its bricks in bucket order, `[u32]`.
-    orders: Vec<Buffer>,
-    /// For every list the most bricks and voxels that any group can visit.
-    most: Vec<(u32, u32)>,
-}
-
-/// A frame's counts: a [`Tally`], for every group the tiles it composited, `[u32]`, and timestamps from `timestamps` on.
-#[derive(Debug)]
-pub(crate) struct Staging {
-    pub(crate) buffer: Buffer,
-    pub(crate) timestamps: u64,
-    /// The stage of every pass that was timed.
-    pub(crate) stages: Vec<&'static str>,
-    /// Nanoseconds of a timestamp's tick.
-    pub(crate) period: f32,
-}
-
-#[derive(Debug)]
-struct PreparedList {
-    cull: CullList,
-    splat_group: BindGroup,
 }
 
 impl Renderer {
@@ -158,9 +97,14 @@ impl Renderer {
         let size = [scene.image.width, scene.image.height];
         let seen = View::new(volume.grid(), &scene.camera, splatting, size)?;
         let kernel = Kernel::new(splatting.radius, splatting.falloff);
+        // What can fail comes before anything is taken from the last frame.
+        let targets = match frame {
+            Some(old) if old.targets.size == size && self.draws_into(&old.targets.sheets) => None,
+            _ => Some(Targets::new(device, size, self.sheet_format, self.sheets)?),
+        };
         let Previous {
             planned,
-            targets,
+            targets: old_targets,
             footprints,
             uniform,
             groups,
@@ -171,10 +115,7 @@ impl Renderer {
             mut entering,
         } = Previous::of(frame.take());
 
-        let targets = match targets.filter(|old| old.size == size && self.draws_into(&old.sheets)) {
-            Some(targets) => targets,
-            None => Targets::new(device, size, self.sheet_format, self.sheets)?,
-        };
+        let Some(targets) = targets.or(old_targets) else { unreachable!("made anew where there were none") };
         volume.renew(device);
         let entries = volume.lists.flush(device, queue);
         let current = |old: &Planned| {
@@ -336,82 +277,6 @@ impl Renderer {
             }
         }
     }
-}
-
-impl PreparedFrame {
-    /// Bytes of GPU memory that the frame and its volume hold.
-    pub(crate) fn gpu_bytes(&self) -> u64 {
-        self.gpu_bytes
-    }
-}
-
-impl Planned {
-    fn new(device: &Device, volume: &ClassifiedVolume, view: View, sheets: u32, order: Order) -> Self {
-        let plan = FramePlan::new(volume.lists.bricks(), view, sheets, order);
-        let most = (volume.lists.bricks().zip(&plan.orders).enumerate())
-            .map(|(at, (bricks, order))| {
-                let voxels = |&brick: &u32| brick::present(&bricks[brick as usize]).count_ones();
-                most(plan.groups.iter().map(|group| {
-                    let bricks = group.bricks[at].clone();
-                    order[bricks.start as usize..bricks.end as usize].iter().map(voxels)
-                }))
-            })
-            .collect();
-        let upload = |order: &Vec<u32>| {
-            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("sheetsplat.order"),
-                contents: bytemuck::cast_slice(order),
-                usage: BufferUsages::STORAGE,
-            })
-        };
-        Self {
-            order,
-            revision: volume.revision,
-            orders: plan.orders.iter().map(upload).collect(),
-            most,
-            plan,
-            totals: None,
-        }
-    }
-}
-
-/// What a new frame can take from the one before it.
-#[derive(Default)]
-struct Previous {
-    planned: Option<Planned>,
-    targets: Option<Targets>,
-    footprints: Option<(FootprintTexture, (Kernel, Option<f64>))>,
-    uniform: Option<Buffer>,
-    groups: Option<Buffer>,
-    control_points: Option<Buffer>,
-    tally: Option<Buffer>,
-    tile_lists: Option<TileLists>,
-    lists: Vec<PreparedList>,
-    /// Prepared but never recorded.
-    entering: Vec<Entering>,
-}
-
-impl Previous {
-    fn of(frame: Option<PreparedFrame>) -> Self {
-        let Some(frame) = frame else { return Self::default() };
-        Self {
-            planned: Some(frame.planned),
-            targets: Some(frame.targets),
-            footprints: Some(frame.footprints),
-            uniform: Some(frame.uniform),
-            groups: Some(frame.groups),
-            control_points: Some(frame.control_points),
-            tally: Some(frame.tally),
-            tile_lists: Some(frame.tile_lists),
-            lists: frame.lists,
-            entering: frame.entering,
-        }
-    }
-}
-
-/// The most bricks and voxels that any group can visit, from the voxel counts of every group's bricks.
-fn most<C: ExactSizeIterator<Item = u32>>(groups: impl Iterator<Item = C>) -> (u32, u32) {
-    groups.fold((0, 0), |(bricks, voxels), counts| (bricks.max(counts.len() as u32), voxels.max(counts.sum())))
 }
 
 fn compute<'a>(label: &'a str, timer: &'a mut Option<Timer>, stage: &'static str) -> wgpu::ComputePassDescriptor<'a> {

@@ -6,7 +6,7 @@ use wgpu::Device;
 
 use crate::camera::Camera;
 use crate::classified_volume::{ClassifiedVolume, Touched};
-use crate::renderer::PreparedFrame;
+use crate::prepared_frame::PreparedFrame;
 use crate::scene::{ImageSettings, Scene};
 use crate::shading::{Light, Shading};
 use crate::splatting::Splatting;

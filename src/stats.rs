@@ -9,7 +9,7 @@ use wgpu::BufferAsyncError;
 use crate::error::RenderError;
 use crate::gpu::layout::Tally;
 use crate::gpu::timer::stage_ms;
-use crate::renderer::Staging;
+use crate::prepared_frame::Staging;
 
 /// Milliseconds by stage.
 pub type StageTimes = BTreeMap<&'static str, f64>;

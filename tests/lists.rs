@@ -162,6 +162,14 @@ fn a_change_costs_what_it_must() {
     assert!(view.set_iso_ranges(Some(vec![[70.0, 255.0]])).entered > 0);
     assert!(prepare(&mut view));
     assert_fresh(&gpu, &mut view, "two iso-ranges");
+    // Prepared, and then asked for more than the device allows.
+    assert!(view.set_iso_ranges(None).entered > 0);
+    assert!(prepare(&mut view));
+    let image = view.scene().image;
+    view.set_image(sheetsplat::scene::ImageSettings { width: 1 << 20, ..image });
+    assert!(renderer.prepare(gpu.device(), gpu.queue(), &mut view).is_err());
+    view.set_image(image);
+    assert_fresh(&gpu, &mut view, "after an error");
 }
 
 /// A view that starts with nothing to show.
