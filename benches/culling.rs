@@ -6,24 +6,21 @@
 
 #![expect(clippy::unwrap_used, reason = "a bench")]
 
+mod common;
+
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use sheetsplat::camera::Projection;
 use sheetsplat::headless::{Headless, HeadlessOptions};
-use sheetsplat::scene::{Scene, VolumeSource};
+use sheetsplat::scene::Scene;
 use sheetsplat::scene_view::SceneView;
 use sheetsplat::stats::Stats;
 
 const SIDE_ON: &str = "builtin:nerve, side-on";
 
 fn main() {
-    // Cargo passes --bench.
-    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
-    let (pairs, scenes) = match arguments.split_first().map(|(first, rest)| (first.parse::<usize>(), rest)) {
-        Some((Ok(pairs), rest)) => (pairs, rest.to_vec()),
-        _ => (7, arguments),
-    };
+    let (pairs, scenes) = common::arguments(7);
     let scenes = if scenes.is_empty() { default_scenes() } else { scenes };
     let headless = Headless::new(&HeadlessOptions::default()).unwrap();
     println!("| scene | without, ms | µs per section | with, ms | ratio | sections drawn | quads |");
@@ -51,7 +48,7 @@ fn main() {
         let (slow, fast) = (median(&without), median(&with));
         println!(
             "| {} | {slow:.0} | {:.2} | {fast:.0} | {:.1} | {:.1} % | {} |",
-            Path::new(name).file_stem().unwrap().display(),
+            common::label(name),
             slow * 1e3 / all.sections_rasterized as f64,
             slow / fast,
             100.0 * drawn.sections_rasterized as f64 / drawn.sections_total as f64,
@@ -78,15 +75,11 @@ fn median(frames: &[(f64, Stats)]) -> f64 {
 
 fn open(name: &str) -> Scene {
     if name == SIDE_ON {
-        let mut scene = open("builtin:nerve");
+        let mut scene = common::open("builtin:nerve");
         scene.camera.direction = glam::DVec3::X;
         return scene;
     }
-    match name.strip_prefix("builtin:") {
-        Some(builtin) => Scene::new(VolumeSource::Builtin(builtin.to_owned())),
-        None if name.ends_with(".toml") => Scene::open(Path::new(name), &[]).unwrap(),
-        None => Scene::new(VolumeSource::File(name.into())),
-    }
+    common::open(name)
 }
 
 fn default_scenes() -> Vec<String> {

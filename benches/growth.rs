@@ -4,18 +4,19 @@
 
 #![expect(clippy::unwrap_used, reason = "a bench")]
 
+#[expect(dead_code, reason = "not every bench needs all of it")]
+mod common;
+
 use std::time::Instant;
 
 use sheetsplat::headless::{Headless, HeadlessOptions};
-use sheetsplat::scene::{Scene, VolumeSource};
 
 fn main() {
-    // Cargo passes --bench.
-    let rounds = std::env::args().skip(1).find_map(|argument| argument.parse().ok()).unwrap_or(7);
+    let (rounds, _) = common::arguments(7);
     let headless = Headless::new(&HeadlessOptions::default()).unwrap();
-    let names = [64, 128, 256, 512].map(|side| format!("head:{side}"));
+    let names = [64, 128, 256, 512].map(|side| format!("builtin:head:{side}"));
     let mut views = names.each_ref().map(|name| {
-        let scene = Scene::new(VolumeSource::Builtin(name.clone()));
+        let scene = common::open(name);
         headless.view(scene.load_volume().unwrap(), &scene).unwrap()
     });
     let mut times = [(); 4].map(|()| Vec::new());

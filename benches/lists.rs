@@ -6,6 +6,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a bench")]
 
+mod common;
+
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -14,7 +16,7 @@ use glam::DVec3;
 use sheetsplat::classified_volume::Touched;
 use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::iso_range::ValueSet;
-use sheetsplat::scene::{Scene, VolumeSource};
+use sheetsplat::scene::Scene;
 use sheetsplat::scene_view::SceneView;
 use sheetsplat::shading::Light;
 use sheetsplat::transfer_function::{Ramp, TransferFunction};
@@ -52,24 +54,15 @@ const CHANGES: [Change; 7] = [
 ];
 
 fn main() {
-    // Cargo passes --bench.
-    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
-    let (pairs, scenes) = match arguments.split_first().map(|(first, rest)| (first.parse::<usize>(), rest)) {
-        Some((Ok(pairs), rest)) => (pairs, rest.to_vec()),
-        _ => (7, arguments),
-    };
+    let (pairs, scenes) = common::arguments(7);
     let scenes = if scenes.is_empty() { default_scenes() } else { scenes };
     let headless = Headless::new(&HeadlessOptions::default()).unwrap();
     for name in &scenes {
-        let scene = match name.strip_prefix("builtin:") {
-            Some(builtin) => Scene::new(VolumeSource::Builtin(builtin.to_owned())),
-            None => Scene::open(Path::new(name), &[]).unwrap(),
-        };
-        bench(&headless, &scene, Path::new(name).file_stem().unwrap().display(), pairs);
+        bench(&headless, &common::open(name), &common::label(name), pairs);
     }
 }
 
-fn bench(headless: &Headless, scene: &Scene, name: impl std::fmt::Display, pairs: usize) {
+fn bench(headless: &Headless, scene: &Scene, name: &str, pairs: usize) {
     let volume = Arc::new(scene.load_volume().unwrap());
     let start = Instant::now();
     let list = ValueList::new(volume.values());

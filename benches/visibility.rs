@@ -6,28 +6,20 @@
 
 #![expect(clippy::unwrap_used, reason = "a bench")]
 
-use std::path::Path;
+mod common;
 
 use sheetsplat::reference;
 use sheetsplat::reference::visibility::Test;
-use sheetsplat::scene::{Scene, VolumeSource};
 
 fn main() {
-    // Cargo passes --bench.
-    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
-    let (side, scenes) = match arguments.split_first().map(|(first, rest)| (first.parse(), rest)) {
-        Some((Ok(side), rest)) => (side, rest.to_vec()),
-        _ => (256, arguments),
-    };
+    let (side, scenes) = common::arguments(256);
+    let side = u32::try_from(side).unwrap();
     let builtin = ["builtin:head:96", "builtin:nerve:128", "builtin:tomato:96"].map(str::to_owned);
     let scenes = if scenes.is_empty() { builtin.to_vec() } else { scenes };
     println!("| scene | sections | centre | parallelogram | rectangle | bounding box | tiles | counted tiles |");
     println!("|---|---|---|---|---|---|---|---|");
     for name in &scenes {
-        let mut scene = match name.strip_prefix("builtin:") {
-            Some(builtin) => Scene::new(VolumeSource::Builtin(builtin.to_owned())),
-            None => Scene::open(Path::new(name), &[]).unwrap(),
-        };
+        let mut scene = common::open(name);
         (scene.image.width, scene.image.height) = (side, side);
         let volume = scene.load_volume().unwrap();
         let transfer = scene.transfer.resolve(&volume);
@@ -39,7 +31,7 @@ fn main() {
         let area = |pixels_within: u64| 100.0 * pixels_within as f64 / pixels;
         println!(
             "| {} | {} | {:.2} % | {:.2} % | {:.2} % | {:.1} % | {:.1} % | {:.1} % |",
-            Path::new(name).file_stem().unwrap().display(),
+            common::label(name),
             all.sections_total,
             share(Test::Center),
             share(Test::Parallelogram),

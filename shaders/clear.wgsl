@@ -1,10 +1,5 @@
 // Zeroes the sheet buffers in the tiles that are about to receive splats.
 
-struct TileList {
-    args: Indirect,
-    tiles: array<u32>,
-}
-
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> composited: TileList;
 
@@ -20,22 +15,6 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
     let at = vec2u(tile % columns, tile / columns) + vec2u(corner & 1u, corner >> 1u);
     let p = vec2f(min(at * TILE, frame.size)) / vec2f(frame.size);
     return vec4f(2.0 * p.x - 1.0, 1.0 - 2.0 * p.y, 0.0, 1.0);
-}
-
-struct One {
-    @location(0) sheet_0: vec4f,
-}
-
-struct Two {
-    @location(0) sheet_0: vec4f,
-    @location(1) sheet_1: vec4f,
-}
-
-struct Four {
-    @location(0) sheet_0: vec4f,
-    @location(1) sheet_1: vec4f,
-    @location(2) sheet_2: vec4f,
-    @location(3) sheet_3: vec4f,
 }
 
 @fragment

@@ -9,11 +9,6 @@
 @group(0) @binding(5) var<storage, read_write> fresh_args: Indirect;
 @group(0) @binding(6) var<storage, read_write> tally: Tally;
 
-const WORKGROUP_SIZE = 256u;
-
-// Drawn and fresh voxels up to and with a thread's run.
-var<workgroup> ends: array<vec2u, 256>;
-
 fn count_bits(bits: vec2u) -> u32 {
     let count = countOneBits(bits);
     return count.x + count.y;
@@ -29,18 +24,8 @@ fn main(@builtin(local_invocation_index) thread: u32) {
     for (var i = first; i < end; i += 1u) {
         own += vec2u(count_bits(visits[i].drawn), count_bits(visits[i].fresh));
     }
-    ends[thread] = own;
-    workgroupBarrier();
-    for (var step = 1u; step < WORKGROUP_SIZE; step *= 2u) {
-        var sum = ends[thread];
-        if thread >= step {
-            sum += ends[thread - step];
-        }
-        workgroupBarrier();
-        ends[thread] = sum;
-        workgroupBarrier();
-    }
-    var slot = ends[thread] - own;
+    // Drawn and fresh voxels before the thread's run.
+    var slot = sum_up_to(thread, own) - own;
     for (var i = first; i < end; i += 1u) {
         for (var word = 0u; word < 2u; word += 1u) {
             var drawn = visits[i].drawn[word];

@@ -1,11 +1,6 @@
 // Composites a group of sheet buffers into the compositing buffer (eq. 2, front to back by default; SPEC §5), in the tiles
 // that received splats, and notes which pixels are opaque (§6). One workgroup per tile.
 
-struct TileList {
-    args: Indirect,
-    tiles: array<u32>,
-}
-
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> band: Band;
 @group(0) @binding(2) var sheets: texture_2d_array<f32>;

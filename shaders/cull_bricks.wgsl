@@ -13,11 +13,8 @@
 @group(0) @binding(7) var<storage, read_write> args: Indirect;
 @group(0) @binding(8) var<storage, read_write> tally: Tally;
 
-const WORKGROUP_SIZE = 256u;
 // The sheets of a group.
 override SHEETS: u32 = 4u;
-
-var<workgroup> ends: array<u32, 256>;
 
 // Whether all pixels are opaque in the footprints' boxes around centres from low to high.
 fn is_behind(low: vec2f, high: vec2f) -> bool {
@@ -81,18 +78,8 @@ fn main(@builtin(local_invocation_index) thread: u32) {
                 visited |= 1u << (i - first);
             }
         }
-        ends[thread] = countOneBits(visited);
-        workgroupBarrier();
-        for (var step = 1u; step < WORKGROUP_SIZE; step *= 2u) {
-            var sum = ends[thread];
-            if thread >= step {
-                sum += ends[thread - step];
-            }
-            workgroupBarrier();
-            ends[thread] = sum;
-            workgroupBarrier();
-        }
-        var slot = total + ends[thread] - countOneBits(visited);
+        let own = countOneBits(visited);
+        var slot = total + sum_up_to(thread, vec2u(own, 0u)).x - own;
         for (var i = first; i < end; i += 1u) {
             if (visited & (1u << (i - first))) != 0u {
                 let at = order[group.first_brick + base + i];
@@ -100,7 +87,7 @@ fn main(@builtin(local_invocation_index) thread: u32) {
                 slot += 1u;
             }
         }
-        total += ends[WORKGROUP_SIZE - 1u];
+        total += ends[WORKGROUP_SIZE - 1u].x;
         workgroupBarrier();
     }
     if thread == 0u {

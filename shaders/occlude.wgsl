@@ -2,11 +2,6 @@
 // opacities cut off at the threshold and compares with it; whether all pixels of a box are opaque is the same decision
 // without rounding, and on bits. One workgroup per tile, one thread per row of 32 pixels.
 
-struct TileList {
-    args: Indirect,
-    tiles: array<u32>,
-}
-
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> occluding: TileList;
 @group(0) @binding(2) var<storage, read> source: array<u32>;

@@ -183,22 +183,6 @@ fn sections(quad: Quad) -> vec4f {
     return sections;
 }
 
-struct One {
-    @location(0) sheet_0: vec4f,
-}
-
-struct Two {
-    @location(0) sheet_0: vec4f,
-    @location(1) sheet_1: vec4f,
-}
-
-struct Four {
-    @location(0) sheet_0: vec4f,
-    @location(1) sheet_1: vec4f,
-    @location(2) sheet_2: vec4f,
-    @location(3) sheet_3: vec4f,
-}
-
 @fragment
 fn fragment_1(quad: Quad) -> One {
     return One(quad.amount * sections(quad).x);

@@ -1,10 +1,5 @@
 // Which tiles a sheet group composites, and around which the occlusion buffer changes (§6). One workgroup.
 
-struct TileList {
-    args: Indirect,
-    tiles: array<u32>,
-}
-
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> group: Group;
 @group(0) @binding(2) var<storage, read_write> tally: Tally;

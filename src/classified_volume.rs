@@ -82,7 +82,10 @@ impl ClassifiedVolume {
         let candidates = if same_gradients && values == self.values {
             Vec::new()
         } else {
-            let set = values.either(&self.values, !same_gradients);
+            let set = match same_gradients {
+                true => values.symmetric_difference(&self.values),
+                false => values.union(&self.values),
+            };
             let mut candidates = self.value_list().within(self.volume.values(), &set);
             // In memory order, where neighbours share cache lines.
             candidates.par_sort_unstable();

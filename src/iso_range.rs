@@ -38,7 +38,7 @@ impl ValueSet {
         match &transfer.iso_ranges {
             None => opaque,
             Some(ranges) => {
-                opaque.intersection(&Self::union(ranges.iter().map(|&[lo, hi]| at_least(lo)..above(hi)).collect()))
+                opaque.intersection(&Self::of_ranges(ranges.iter().map(|&[lo, hi]| at_least(lo)..above(hi)).collect()))
             }
         }
     }
@@ -60,10 +60,10 @@ impl ValueSet {
                 }
             }
         }
-        Self::union(ranges)
+        Self::of_ranges(ranges)
     }
 
-    fn union(mut ranges: Vec<Range<u32>>) -> Self {
+    fn of_ranges(mut ranges: Vec<Range<u32>>) -> Self {
         ranges.retain(|range| range.start < range.end);
         ranges.sort_unstable_by_key(|range| range.start);
         let mut merged: Vec<Range<u32>> = Vec::new();
@@ -78,21 +78,22 @@ impl ValueSet {
 
     fn intersection(&self, other: &Self) -> Self {
         let pairs = self.ranges.iter().flat_map(|a| other.ranges.iter().map(move |b| (a, b)));
-        Self::union(pairs.map(|(a, b)| a.start.max(b.start)..a.end.min(b.end)).collect())
+        Self::of_ranges(pairs.map(|(a, b)| a.start.max(b.start)..a.end.min(b.end)).collect())
     }
 
-    /// The values in one of the two sets, or in either where `both` is set.
-    pub fn either(&self, other: &Self, both: bool) -> Self {
-        let all = Self::union([self.ranges.clone(), other.ranges.clone()].concat());
-        if both {
-            return all;
-        }
-        // What is left of all between the common parts.
+    /// The values in either set.
+    pub fn union(&self, other: &Self) -> Self {
+        Self::of_ranges([self.ranges.clone(), other.ranges.clone()].concat())
+    }
+
+    /// The values in one of the two sets alone.
+    pub fn symmetric_difference(&self, other: &Self) -> Self {
+        // What is left of both between the common parts.
         let common = self.intersection(other);
         let starts = common.ranges.iter().map(|range| range.end);
         let ends = common.ranges.iter().map(|range| range.start);
         let gaps = std::iter::once(0).chain(starts).zip(ends.chain(std::iter::once(u32::MAX)));
-        all.intersection(&Self::union(gaps.map(|(start, end)| start..end).collect()))
+        self.union(other).intersection(&Self::of_ranges(gaps.map(|(start, end)| start..end).collect()))
     }
 
     /// The ranges of ordinals.
@@ -150,8 +151,8 @@ mod tests {
             assert_eq!(sets.each_ref().map(|set| set.contains(value)), expected, "{value:?}");
             for (a, in_a) in sets.iter().zip(expected) {
                 for (b, in_b) in sets.iter().zip(expected) {
-                    assert_eq!(a.either(b, false).contains(value), in_a != in_b, "{value:?}");
-                    assert_eq!(a.either(b, true).contains(value), in_a || in_b, "{value:?}");
+                    assert_eq!(a.symmetric_difference(b).contains(value), in_a != in_b, "{value:?}");
+                    assert_eq!(a.union(b).contains(value), in_a || in_b, "{value:?}");
                 }
             }
         }

@@ -119,7 +119,7 @@ impl PendingCounts {
     }
 
     /// The counts, if the device was polled after the frame was done, and of a renderer that profiles also the GPU's milliseconds
-    /// by stage. Never waits.
+    /// by stage. Never waits, and gives them once.
     ///
     /// # Errors
     /// If the device was lost meanwhile.

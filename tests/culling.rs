@@ -252,3 +252,26 @@ fn tiles_and_the_bounding_box() {
     let few = areas(&block[..4]);
     assert_eq!((few.tiles, few.counted_tiles), (4 * 32 * 32, 32 * 32));
 }
+
+/// Timing changes no image, and there are times for every stage, also where a frame has more passes than a query set has queries.
+#[test]
+fn profiled_frames() {
+    let volume = builtin::volume("head:64").unwrap();
+    let mut scene = Scene::new(VolumeSource::Builtin("head:64".to_owned()));
+    (scene.image.width, scene.image.height) = (40, 40);
+    scene.splatting.slab_width = 0.05;
+    let open = |profile| {
+        let (adapter, sheets_per_group) = (Some("llvmpipe".to_owned()), Some(1));
+        Headless::new(&HeadlessOptions { adapter, sheets_per_group, profile, ..HeadlessOptions::default() }).unwrap()
+    };
+    let [plain, profiled] = [false, true].map(|profile| render(&open(profile), &volume, &scene));
+    assert_eq!(plain.image, profiled.image);
+    assert_eq!(plain.stats.counts, profiled.stats.counts);
+    assert!(plain.stats.stages_ms.is_empty());
+    assert!(profiled.stats.counts.sheets * 3 > 2048, "{} sheets", profiled.stats.counts.sheets);
+    let times = &profiled.stats.stages_ms;
+    assert_eq!(times.keys().copied().collect::<Vec<_>>(), ["composite", "cull", "resolve", "splat"]);
+    assert!(times.values().all(|&ms| ms > 0.0), "{times:?}");
+    let sum: f64 = times.values().sum();
+    assert!(sum <= profiled.stats.frame_ms, "{times:?} in {} ms", profiled.stats.frame_ms);
+}

@@ -24,23 +24,23 @@ macro_rules! shader {
 /// Puts voxels that enter the iso-ranges into their list.
 pub const ENTER: Shader = shader!("enter", "brick", "voxel");
 /// Which bricks a sheet group visits.
-pub const CULL_BRICKS: Shader = shader!("cull_bricks", "frame", "brick", "tally");
+pub const CULL_BRICKS: Shader = shader!("cull_bricks", "frame", "brick", "tally", "scan");
 /// Which voxels it draws.
 pub const CULL_VOXELS: Shader = shader!("cull_voxels", "frame", "brick", "tally", "voxel", "project");
 /// Those voxels in a row.
-pub const COMPACT: Shader = shader!("compact", "brick", "tally");
+pub const COMPACT: Shader = shader!("compact", "brick", "tally", "scan");
 /// Shades those that were not shaded before.
 pub const SHADE: Shader = shader!("shade", "frame", "brick", "voxel", "project", "splat");
 /// The tiles they touch.
-pub const TILES: Shader = shader!("tiles", "frame", "brick", "tally");
+pub const TILES: Shader = shader!("tiles", "frame", "brick", "tally", "tile_list");
 /// Zeroes the sheet buffers there.
-pub const CLEAR: Shader = shader!("clear", "frame", "brick");
+pub const CLEAR: Shader = shader!("clear", "frame", "brick", "tile_list", "sheets");
 /// Draws footprints into the sheet buffers.
-pub const SPLAT: Shader = shader!("splat", "frame", "brick", "splat");
+pub const SPLAT: Shader = shader!("splat", "frame", "brick", "splat", "sheets");
 /// Composites the sheet buffers.
-pub const COMPOSITE: Shader = shader!("composite", "frame", "brick", "band");
+pub const COMPOSITE: Shader = shader!("composite", "frame", "brick", "band", "tile_list");
 /// Computes the occlusion buffer.
-pub const OCCLUDE: Shader = shader!("occlude", "frame", "brick");
+pub const OCCLUDE: Shader = shader!("occlude", "frame", "brick", "tile_list");
 /// Lays the result over the background.
 pub const RESOLVE: Shader = shader!("resolve", "frame", "band");
 

@@ -63,15 +63,15 @@ impl VoxelLists {
         self.bricks.contains(voxel)
     }
 
-    /// Lets voxels enter and leave; nothing reaches the GPU before [`Self::flush`]. Not so, and `false`, where they do not fit
-    /// one list: then all must be uploaded again.
+    /// Lets voxels enter and leave; nothing reaches the GPU before [`Self::flush`]. `false` where they do not fit one list: then
+    /// all must be uploaded again before that.
     pub fn change(&mut self, entering: &[Voxel], leaving: &[u32]) -> bool {
-        let [list] = &mut self.lists[..] else { return false };
         for voxel in entering {
             let at = self.bricks.enter(voxel.index);
             self.entering.push(Entry { at, voxel: *voxel });
         }
         leaving.iter().for_each(|&voxel| self.bricks.leave(voxel));
+        let [list] = &mut self.lists[..] else { return false };
         list.range.end = self.bricks.bricks().len();
         self.changed = true;
         list.range.end <= self.capacity && self.entering.len() <= self.capacity * BRICK_VOXELS as usize

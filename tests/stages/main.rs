@@ -5,6 +5,7 @@
 mod common;
 mod composite;
 mod cull;
+mod enter;
 mod occlude;
 mod plan;
 mod resolve;

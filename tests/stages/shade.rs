@@ -1,4 +1,4 @@
-//! The records that `shaders/cull_voxels.wgsl` writes, projection and shading, against `reference::shading`: those of a whole
+//! The records that `shaders/shade.wgsl` writes, projection and shading, against `reference::shading`: those of a whole
 //! frame, decoded. Which voxels it draws is `cull.rs`'s.
 
 use std::collections::BTreeMap;

@@ -1,0 +1,133 @@
+//! What goes wrong, by whose fault: messages and exit codes.
+
+use crate::*;
+
+/// Runs what must fail, in a folder with a volume and some scenes, with an output file that must not change.
+pub(crate) fn assert_fails(code: i32, arguments: &str, words: &[&str]) {
+    let folder = Folder::new();
+    folder.write_nrrd("good.nrrd", [2, 2, 2], [1.0, 1.0, 1.0], &[1.0; 8]);
+    folder.write("unknown.toml", "[volume]\npath = \"good.nrrd\"\n[camera]\nzoom = 3\n");
+    folder.write("gone.toml", "[volume]\npath = \"gone.nrrd\"\n");
+    folder.write("syntax.toml", "[volume\npath = 3\n");
+    folder.write("latin.toml", b"[volume]\npath = \"caf\xe9.nrrd\"\n");
+    folder.write("empty.toml", "");
+    folder.write("empty.nrrd", "");
+    folder.write("short.nrrd", &folder.read("good.nrrd")[..120]);
+    folder.write("picture.jpg", "not a volume");
+    fs::create_dir(folder.path("folder.toml")).unwrap();
+    fs::create_dir(folder.path("folder.nrrd")).unwrap();
+    fs::create_dir(folder.path("folder.png")).unwrap();
+    folder.write("out.png", "precious");
+    let before = folder.names();
+    folder.run(arguments).assert_failure(code, words);
+    assert_eq!(folder.names(), before, "{arguments}: files");
+    assert_eq!(folder.read("out.png"), b"precious", "{arguments}");
+}
+
+#[test]
+fn bad_usage_is_2() {
+    assert_fails(2, "render", &["INPUT", "--output"]);
+    assert_fails(2, "render good.nrrd", &["--output"]);
+    assert_fails(2, "render -o out.png", &["required"]);
+    assert_fails(2, "paint good.nrrd -o out.png", &["paint", "--help"]);
+    assert_fails(2, "render good.nrrd -o out.png --depth 12", &["--depth", "12", "8", "16"]);
+    assert_fails(2, "render good.nrrd -o out.png --backend cuda", &["--backend", "cuda", "gpu", "reference"]);
+    assert_fails(2, "render good.nrrd -o out.png --frames 3", &["--frames"]);
+    assert_fails(2, "render good.nrrd -o out.gif", &["out.gif", "\".gif\"", ".png", ".exr", ".npy"]);
+    assert_fails(2, "render good.nrrd -o out", &["out: ", "none", ".png"]);
+    assert_fails(2, "render good.nrrd -o .", &[".png"]);
+    assert_fails(2, "render good.nrrd -o new.png --stats new.png", &["--stats", "new.png", "--output"]);
+}
+
+#[test]
+fn bad_input_is_2() {
+    assert_fails(2, "render gone.nrrd -o out.png", &["gone.nrrd", "No such file"]);
+    assert_fails(2, "render missing.toml -o out.png", &["missing.toml", "No such file"]);
+    assert_fails(2, "render gone.toml -o out.png", &["gone.nrrd", "No such file"]);
+    assert_fails(2, "render unknown.toml -o out.png", &["unknown.toml", "camera.zoom", "unknown key", "direction"]);
+    assert_fails(2, "render syntax.toml -o out.png", &["syntax.toml", "line 1"]);
+    assert_fails(2, "render latin.toml -o out.png", &["latin.toml", "UTF-8"]);
+    assert_fails(2, "render empty.toml -o out.png", &["empty.toml", "volume.path", "volume.builtin"]);
+    assert_fails(2, "render folder.toml -o out.png", &["folder.toml", "directory"]);
+    assert_fails(2, "render folder.nrrd -o out.png", &["folder.nrrd", "folder", "regular file"]);
+    assert_fails(2, "render empty.nrrd -o out.png", &["empty.nrrd", "magic", "NRRD0001"]);
+    assert_fails(2, "render short.nrrd -o out.png", &["short.nrrd", "data", "32 bytes"]);
+    assert_fails(2, "render picture.jpg -o out.png", &["picture.jpg", "\".jpg\"", ".nrrd"]);
+    assert_fails(2, "render builtin:brain -o out.png", &["builtin:brain", "brain", "marschner-lobb"]);
+    assert_fails(2, "render builtin:head:1 -o out.png", &["builtin:head:1", "size", "1024"]);
+    assert_fails(2, "render builtin: -o out.png", &["builtin:", "head"]);
+}
+
+#[test]
+fn a_bad_set_is_2() {
+    let render = |set: &str, words: &[&str]| {
+        assert_fails(2, &format!("render good.nrrd -o out.png --set {set}"), &[&["--set"], words].concat());
+    };
+    render("splatting.slab_width=9", &["splatting.slab_width", "9", "[0.05, 8]"]);
+    render("splatting.slab_width=wide", &["splatting.slab_width", "wide", "[0.05, 8]"]);
+    render("splatting.slabwidth=1", &["splatting.slabwidth", "unknown key", "slab_width"]);
+    render("image.width=0", &["image.width", "0", "texture limit"]);
+    render("image.width=-3", &["image.width", "-3"]);
+    render("image.width=64.5", &["image.width", "64.5"]);
+    render("camera.up=[0,1,0]", &["camera.up", "parallel"]);
+    render("camera.direction=[0,0,0]", &["camera.direction"]);
+    render("camera.height=inf", &["camera.height", "inf"]);
+    render("camera.height=nan", &["camera.height", "nan"]);
+    render("transfer.opacity=[[1,0],[0,1]]", &["transfer.opacity[1]"]);
+    render("transfer.opacity=[]", &["transfer.opacity"]);
+    render("nothing", &["nothing", "table.key=value"]);
+    render("=3", &["table.key=value"]);
+}
+
+#[test]
+fn what_is_not_implemented_is_2() {
+    for backend in ["gpu", "reference"] {
+        let render = |set: &str, words: &[&str]| {
+            assert_fails(2, &format!("render good.nrrd -o out.png --backend {backend} --set {set}"), words);
+        };
+        render("camera.projection=perspective", &["good.nrrd", "camera.projection", "perspective", "orthographic"]);
+        render("splatting.method=axis-aligned", &["good.nrrd", "splatting.method", "axis-aligned", "image-aligned"]);
+    }
+}
+
+#[test]
+fn an_image_beyond_the_texture_limit_is_2() {
+    let render = |set: &str, words: &[&str]| {
+        assert_fails(2, &format!("render good.nrrd -o out.png {set}"), words);
+    };
+    render("--set image.width=100000", &["good.nrrd", "image.width", "100000", "max_texture_dimension_2d"]);
+    render("--set image.height=4294967295", &["image.height", "4294967295", "max_texture_dimension_2d"]);
+    render("--set image.height=4294967296", &["image.height", "4294967296"]);
+    render("--set image.width=4294967295 --backend reference", &["good.nrrd", "image.width", "4294967295"]);
+}
+
+#[test]
+fn what_is_nobodys_input_is_1() {
+    assert_fails(1, "render good.nrrd -o out.png --adapter Voodoo", &["Voodoo", "required", "actual"]);
+    let small = "render good.nrrd --set image={width=8,height=8}";
+    assert_fails(1, &format!("{small} -o no/such/folder/out.png"), &["no/such/folder/out.png", "No such file"]);
+    assert_fails(1, &format!("{small} -o folder.png"), &["folder.png", "directory"]);
+    assert_fails(1, &format!("{small} -o good.nrrd/out.png"), &["good.nrrd/out.png"]);
+    // Both files or neither.
+    assert_fails(1, &format!("{small} -o new.png --stats no/stats.json"), &["no/stats.json", "No such file"]);
+    assert_fails(1, &format!("{small} -o new.png --stats folder.png"), &["folder.png", "directory"]);
+    assert_fails(1, &format!("{small} -o no/new.png --stats stats.json"), &["no/new.png", "No such file"]);
+}
+
+/// Each is allowed by itself, together they leave what floats and memory hold.
+#[test]
+fn what_no_renderer_can_do_is_2() {
+    for backend in ["gpu", "reference"] {
+        let render = |sets: &str, words: &[&str]| {
+            let arguments = format!("render good.nrrd -o out.png --backend {backend} {sets}");
+            assert_fails(2, &arguments, &[&["good.nrrd"], words].concat());
+        };
+        render("--set volume.spacing=[1e-300,1e-300,1e-300]", &["spacing", "1e-300", "1e-100"]);
+        render("--set volume.spacing=[1e300,1e300,1e300]", &["spacing", "1e300", "1e100"]);
+        render("--set volume.spacing=[1,1,1e6]", &["spacing", "1000000.0", "10000 times"]);
+        render("--set camera.height=1e-300", &["camera.height", "1e-300", "5.1e-23"]);
+        render("--set camera.height=1e300", &["camera.height", "1e300", "5.1e27"]);
+        let deep = "--set volume.spacing=[1,1e4,1] --set splatting.slab_width=0.05";
+        render(deep, &["splatting.slab_width", "0.05", "65536 slabs"]);
+    }
+}

@@ -1,0 +1,164 @@
+//! The program as a user runs it: outputs, statistics, messages and exit codes. Needs a GPU or lavapipe.
+#![cfg(feature = "cli")]
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+mod bench;
+mod errors;
+mod extremes;
+mod outputs;
+mod statistics;
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use glam::DVec3;
+use serde_json::Value;
+
+/// A temporary folder, which is also the program's current directory.
+struct Folder(tempfile::TempDir);
+
+/// What a run of the program left behind.
+struct Run {
+    arguments: String,
+    code: Option<i32>,
+    stdout: String,
+    stderr: String,
+}
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) {
+        fs::write(self.path(name), bytes).unwrap();
+    }
+
+    fn read(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path(name)).unwrap()
+    }
+
+    /// The names of the files and folders in it.
+    fn names(&self) -> BTreeSet<String> {
+        fs::read_dir(self.0.path()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+    }
+
+    /// An NRRD file of floats.
+    fn write_nrrd(&self, name: &str, dims: [usize; 3], spacing: [f64; 3], values: &[f32]) {
+        assert_eq!(values.len(), dims.iter().product::<usize>());
+        let [nx, ny, nz] = dims;
+        let [sx, sy, sz] = spacing;
+        let header = format!(
+            "NRRD0004\ntype: float\ndimension: 3\nsizes: {nx} {ny} {nz}\nspacings: {sx:e} {sy:e} {sz:e}\n\
+             encoding: raw\nendian: little\n\n"
+        );
+        let bytes = values.iter().flat_map(|value| value.to_le_bytes());
+        self.write(name, header.into_bytes().into_iter().chain(bytes).collect::<Vec<u8>>());
+    }
+
+    /// Runs the program with arguments separated by spaces.
+    fn run(&self, arguments: &str) -> Run {
+        self.run_in("", arguments)
+    }
+
+    fn run_in(&self, folder: &str, arguments: &str) -> Run {
+        let output = Command::new(env!("CARGO_BIN_EXE_sheetsplat"))
+            .env("WGPU_ADAPTER_NAME", "llvmpipe")
+            .args(arguments.split(' '))
+            .current_dir(self.path(folder))
+            .output()
+            .unwrap();
+        Run {
+            arguments: arguments.to_owned(),
+            code: output.status.code(),
+            stdout: String::from_utf8(output.stdout).unwrap(),
+            stderr: String::from_utf8(output.stderr).unwrap(),
+        }
+    }
+
+    /// Renders what must succeed.
+    fn render(&self, arguments: &str) {
+        self.run(&format!("render {arguments}")).assert_success();
+    }
+
+    /// Renders into an NPY file and reads it: width, height, pixels.
+    fn pixels(&self, arguments: &str) -> (usize, usize, Vec<[f32; 4]>) {
+        self.render(&format!("{arguments} -o pixels.npy"));
+        self.read_npy("pixels.npy")
+    }
+
+    fn read_npy(&self, name: &str) -> (usize, usize, Vec<[f32; 4]>) {
+        let bytes = self.read(name);
+        let file = npyz::NpyFile::new(bytes.as_slice()).unwrap();
+        let [height, width, 4] = *file.shape() else { panic!("shape {:?}", file.shape()) };
+        assert_eq!(file.order(), npyz::Order::C);
+        let channels: Vec<f32> = file.into_vec().unwrap();
+        (width as usize, height as usize, channels.as_chunks().0.to_vec())
+    }
+
+    fn stats(&self, arguments: &str) -> Value {
+        self.render(&format!("{arguments} -o stats.npy --stats stats.json"));
+        serde_json::from_slice(&self.read("stats.json")).unwrap()
+    }
+}
+
+impl Run {
+    fn assert_success(&self) {
+        assert_eq!(self.code, Some(0), "{}\n{}", self.arguments, self.stderr);
+        assert_eq!(self.stdout, "", "{}", self.arguments);
+    }
+
+    /// A failure that says all of `words`, in any place, and only on stderr.
+    fn assert_failure(&self, code: i32, words: &[&str]) {
+        let Self { arguments, stderr, .. } = self;
+        assert!(!stderr.contains("panicked"), "{arguments}\n{stderr}");
+        assert_eq!(self.code, Some(code), "{arguments}\n{stderr}");
+        assert_eq!(self.stdout, "", "{arguments}");
+        for word in words {
+            assert!(stderr.contains(word), "{arguments}: no {word:?} in\n{stderr}");
+        }
+    }
+}
+
+/// Decibels over the pixels where either image differs from the background (premultiplied).
+fn psnr(a: &[[f32; 4]], b: &[[f32; 4]], background: [f32; 4]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let pixels: Vec<_> = a.iter().zip(b).filter(|&(a, b)| *a != background || *b != background).collect();
+    assert!(pixels.len() > 50, "only {} pixels show anything", pixels.len());
+    let squares: f64 =
+        pixels.iter().flat_map(|(a, b)| a.iter().zip(*b)).map(|(&a, &b)| (f64::from(a) - f64::from(b)).powi(2)).sum();
+    -10.0 * (squares / (pixels.len() * 4) as f64).log10()
+}
+
+const BLACK: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
+
+/// A small picture with everything between transparent and opaque in it.
+const SMALL: &str = "builtin:marschner-lobb:12 --set image.width=27 --set image.height=20 \
+                     --set transfer.opacity=[[60,0],[200,0.6]] --set camera.direction=[0.3,0.9,-0.2]";
+
+/// The reference backend culls nothing.
+const UNCULLED: &str = "--set splatting.culling=false";
+
+const TRANSPARENT: &str = "--set image.background=[0.2,0.4,0.6,0.25]";
+
+#[test]
+fn help_and_version_are_results() {
+    let folder = Folder::new();
+    for (arguments, words) in [
+        ("--help", "render"),
+        ("--help", "bench"),
+        ("render --help", "--set"),
+        ("bench --help", "--frames"),
+        ("--version", env!("CARGO_PKG_VERSION")),
+    ] {
+        let run = folder.run(arguments);
+        assert_eq!(run.code, Some(0), "{arguments}: {}", run.stderr);
+        assert!(run.stdout.contains(words), "{arguments}: {}", run.stdout);
+    }
+}
