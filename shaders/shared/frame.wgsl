@@ -7,6 +7,7 @@ struct Frame {
     half_vector: vec4f,
     shading: vec4f,
     background: vec4f,
+    gradient: vec4f,
     dims: vec4u,
     ramps: vec4u,
     size: vec2u,
@@ -22,6 +23,10 @@ struct Frame {
     order: u32,
     culling: u32,
     tiles: u32,
+    per_unit: f32,
+    padding_0: f32,
+    padding_1: f32,
+    padding_2: f32,
 }
 
 const LINEAR = 0u;

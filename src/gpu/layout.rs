@@ -61,6 +61,9 @@ pub struct Frame {
     pub shading: [f32; 4],
     /// Premultiplied background.
     pub background: [f32; 4],
+    /// `½/ar`: what half the difference of two neighbours but one is multiplied by; and the least |g| with a direction, value per
+    /// `unit`.
+    pub gradient: [f32; 4],
     /// Volume dimensions; w unused.
     pub dims: [u32; 4],
     /// Ends of the colour, opacity and gradient opacity ramps in the control points; w unused.
@@ -91,6 +94,14 @@ pub struct Frame {
     pub culling: u32,
     /// 1 to composite only tiles that received splats, 0 to composite all.
     pub tiles: u32,
+    /// One over `unit`, at most the largest `f32`: what turns value per `unit` into value per world unit.
+    pub per_unit: f32,
+    /// Unused.
+    pub padding_0: f32,
+    /// Unused.
+    pub padding_1: f32,
+    /// Unused.
+    pub padding_2: f32,
 }
 
 /// One sheet group and one list's bricks that may reach into it.

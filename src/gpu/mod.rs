@@ -9,4 +9,5 @@ pub mod shaders;
 pub mod targets;
 pub mod timer;
 pub mod uniforms;
+pub mod volume_texture;
 pub mod voxel_list;

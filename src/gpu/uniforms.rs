@@ -5,6 +5,7 @@ use std::ops::{Add, Mul};
 use glam::{DMat2, DVec2, DVec3, DVec4};
 
 use super::layout::{Frame, Group};
+use crate::classify::MIN_GRADIENT;
 use crate::kernel::Kernel;
 use crate::plan::{FramePlan, View};
 use crate::scene::Scene;
@@ -36,6 +37,7 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
         half_vector: half_vector(to_light, to_eye).extend(0.0).as_vec4().to_array(),
         shading: [ambient, diffuse, specular, shininess].map(|x| x.clamp(0.0, MAX_SHADING) as f32),
         background: DVec4::new(r * a, g * a, b * a, a).as_vec4().to_array(),
+        gradient: (0.5 / grid.aspect()).extend(MIN_GRADIENT * grid.unit()).as_vec4().to_array(),
         dims: grid.dims.extend(0).to_array(),
         ramps: [color_end, opacity_end, gradient_opacity_end, 0],
         size: view.size,
@@ -59,6 +61,10 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
         },
         culling: u32::from(culls(&scene.splatting, half_box)),
         tiles: u32::from(scene.splatting.tiles),
+        per_unit: grid.unit().recip().min(f32::MAX.into()) as f32,
+        padding_0: 0.0,
+        padding_1: 0.0,
+        padding_2: 0.0,
     }
 }
 
