@@ -38,8 +38,10 @@ fn gradient_at(voxel: vec3u) -> Gradient {
     let largest = max(max(abs(g.x), abs(g.y)), abs(g.z));
     let direction = g / select(1.0, largest, largest > 0.0);
     let size = length(direction);
-    if largest * size <= 0.5 * frame.gradient.w || largest == 0.0 {
+    // In this order the product leaves the range of f32 where the magnitude does, and nowhere else.
+    let magnitude = (largest * frame.per_unit) * (2.0 * size * frame.per_unit);
+    if magnitude < frame.gradient.w {
         return Gradient(vec3f(0.0), 0.0);
     }
-    return Gradient(-direction / size, 2.0 * largest * size * frame.per_unit);
+    return Gradient(-direction / size, magnitude);
 }

@@ -62,7 +62,7 @@ pub struct Frame {
     /// Premultiplied background.
     pub background: [f32; 4],
     /// `½/ar`: what half the difference of two neighbours but one is multiplied by; and the least |g| with a direction, value per
-    /// `unit`.
+    /// world unit.
     pub gradient: [f32; 4],
     /// Volume dimensions; w unused.
     pub dims: [u32; 4],
@@ -94,7 +94,8 @@ pub struct Frame {
     pub culling: u32,
     /// 1 to composite only tiles that received splats, 0 to composite all.
     pub tiles: u32,
-    /// One over `unit`, at most the largest `f32`: what turns value per `unit` into value per world unit.
+    /// Applied twice it turns value per `unit` into value per world unit: the root of one over `unit`, which itself may leave the
+    /// range of `f32`.
     pub per_unit: f32,
     /// Unused.
     pub padding_0: f32,
