@@ -2,13 +2,12 @@
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> group: Group;
-@group(0) @binding(2) var<storage, read> voxels: array<Voxel>;
+@group(0) @binding(2) var<storage, read> bricks: array<Brick>;
 @group(0) @binding(3) var<storage, read> occluded: array<u32>;
 @group(0) @binding(4) var<storage, read_write> visits: array<Visit>;
 @group(0) @binding(5) var<storage, read_write> states: array<BrickState>;
 @group(0) @binding(6) var<storage, read_write> tally: Tally;
 @group(0) @binding(7) var<storage, read> visit_args: Indirect;
-@group(0) @binding(8) var<storage, read> bricks: array<Brick>;
 
 override SHEETS: u32 = 4u;
 
@@ -60,8 +59,9 @@ fn main(@builtin(local_invocation_index) slot: u32, @builtin(workgroup_id) workg
     let state = states[visit.brick];
     let word = slot / 32u;
     let bit = 1u << (slot % 32u);
-    if (bricks[visit.brick].present[word] & ~state.hidden[word] & bit) != 0u {
-        let p = project(voxels[visit.brick * BRICK_VOXELS + slot].index);
+    let brick = bricks[visit.brick];
+    if (brick.present[word] & ~state.hidden[word] & bit) != 0u {
+        let p = project(voxel_of(brick, slot));
         let center_px = p.xy;
         let depth = p.z;
         let on_screen = all(center_px + frame.half_box >= vec2f(0.5))

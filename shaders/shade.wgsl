@@ -1,14 +1,15 @@
 // Projects and shades the voxels that are drawn for the first time, so once each (Fig. 12). SPEC §3 for classification and
-// shading; gradients are those of the unwarped space (§4.2).
+// shading. Only here does a voxel need its gradient: hidden ones never do (§6).
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<storage, read> voxels: array<Voxel>;
+@group(0) @binding(1) var<storage, read> bricks: array<Brick>;
+@group(0) @binding(2) var values: texture_2d_array<f32>;
 // The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0).
-@group(0) @binding(2) var<storage, read> control_points: array<vec4f>;
-// Indices into `voxels`.
-@group(0) @binding(3) var<storage, read> fresh: array<u32>;
-@group(0) @binding(4) var<storage, read> args: Indirect;
-@group(0) @binding(5) var<storage, read_write> splats: array<Splat>;
+@group(0) @binding(3) var<storage, read> control_points: array<vec4f>;
+// Places: 64 times the brick's number, and the place in the brick.
+@group(0) @binding(4) var<storage, read> fresh: array<u32>;
+@group(0) @binding(5) var<storage, read> args: Indirect;
+@group(0) @binding(6) var<storage, read_write> splats: array<Splat>;
 
 // Piecewise linear between the control points first..end, clamped outside.
 fn ramp(first: u32, end: u32, value: f32) -> vec3f {
@@ -35,23 +36,15 @@ fn amount(alpha: f32) -> f32 {
     return -log(1.0 - min(alpha, 0.9999));
 }
 
-// Unfolds the octahedron.
-fn decode_normal(encoded: u32) -> vec3f {
-    let e = unpack2x16snorm(encoded);
-    let z = 1.0 - abs(e.x) - abs(e.y);
-    let folded = (1.0 - abs(e.yx)) * select(vec2f(-1.0), vec2f(1.0), e >= vec2f(0.0));
-    return normalize(vec3f(select(folded, e, z >= 0.0), z));
-}
-
-fn shade(color: vec3f, voxel: Voxel) -> vec3f {
+fn shade(color: vec3f, gradient: Gradient) -> vec3f {
     if frame.light.w == 0.0 {
         return color;
     }
     let ambient = frame.shading.x;
-    if voxel.gradient_magnitude == 0.0 {
+    if gradient.magnitude == 0.0 {
         return clamp(color * ambient, vec3f(0.0), vec3f(1.0));
     }
-    let n = decode_normal(voxel.normal);
+    let n = gradient.normal;
     let diffuse = frame.shading.y * abs(dot(n, frame.light.xyz));
     let highlight = frame.shading.z * pow(min(abs(dot(n, frame.half_vector.xyz)), 1.0), frame.shading.w);
     return clamp(color * (ambient + diffuse) + highlight, vec3f(0.0), vec3f(1.0));
@@ -64,12 +57,14 @@ fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) wor
         return;
     }
     let id = fresh[at];
-    let voxel = voxels[id];
-    let color = ramp(0u, frame.ramps.x, voxel.value);
-    let opacity = ramp(frame.ramps.x, frame.ramps.y, voxel.value).x;
-    let gradient_opacity = ramp(frame.ramps.y, frame.ramps.z, voxel.gradient_magnitude).x;
+    let voxel = voxel_of(bricks[id / BRICK_VOXELS], id % BRICK_VOXELS);
+    let value = value_at(index_of(voxel));
+    let gradient = gradient_at(voxel);
+    let color = ramp(0u, frame.ramps.x, value);
+    let opacity = ramp(frame.ramps.x, frame.ramps.y, value).x;
+    let gradient_opacity = ramp(frame.ramps.y, frame.ramps.z, gradient.magnitude).x;
     let m = amount(opacity * gradient_opacity);
-    let c = shade(color, voxel) * m;
-    let p = project(voxel.index);
+    let c = shade(color, gradient) * m;
+    let p = project(voxel);
     splats[id] = Splat(p.x, p.y, p.z, pack2x16float(c.rg), pack2x16float(vec2f(c.b, m)));
 }

@@ -25,21 +25,11 @@ const NONE: u32 = u32::MAX;
 
 impl BrickList {
     /// The bricks of some voxels, given as indices into the volume. Bricks come in memory order.
-    pub fn new(grid: &Grid, voxels: impl Iterator<Item = u32> + Clone) -> Self {
-        let count = bricks_per_axis(grid).element_product();
-        let mut list = Self { grid: *grid, numbers: vec![NONE; count as usize], bricks: Vec::new() };
-        voxels.clone().for_each(|voxel| list.numbers[brick_of(grid, voxel) as usize] = 0);
-        for brick in 0..count {
-            if list.numbers[brick as usize] != NONE {
-                list.add(brick);
-            }
-        }
-        for voxel in voxels {
-            let (number, slot) = (list.numbers[brick_of(grid, voxel) as usize], slot_of(grid, voxel));
-            list.bricks[number as usize].present[slot as usize / 32] |= 1 << (slot % 32);
-        }
-        list.bricks.iter_mut().for_each(fit);
-        list
+    pub fn new(grid: &Grid, voxels: &[u32]) -> Self {
+        let count = bricks_per_axis(grid).element_product() as usize;
+        let mut list = Self { grid: *grid, numbers: vec![NONE; count], bricks: Vec::new() };
+        list.change(voxels, &[]);
+        list.compacted()
     }
 
     /// The bricks.
@@ -59,28 +49,40 @@ impl BrickList {
             .is_some_and(|place| present(&self.bricks[(place / BRICK_VOXELS) as usize]) >> (place % 64) & 1 == 1)
     }
 
-    /// Puts a voxel in, in a new brick if need be; where.
-    pub fn enter(&mut self, voxel: u32) -> u32 {
-        let brick = brick_of(&self.grid, voxel);
-        if self.numbers[brick as usize] == NONE {
-            self.add(brick);
+    /// Puts voxels in, in new bricks if need be, and takes others out. Bricks stay, though they may be empty.
+    pub fn change(&mut self, entering: &[u32], leaving: &[u32]) {
+        for &voxel in entering {
+            let brick = brick_of(&self.grid, voxel);
+            if self.numbers[brick as usize] == NONE {
+                self.add(brick);
+            }
+            let (word, bit) = self.bit(voxel);
+            *word |= bit;
         }
-        let (number, slot) = (self.numbers[brick as usize], slot_of(&self.grid, voxel));
-        self.set(number, slot, true);
-        number * BRICK_VOXELS + slot
+        for &voxel in leaving {
+            let (word, bit) = self.bit(voxel);
+            *word &= !bit;
+        }
+        // Once each: many voxels of a brick may have changed.
+        self.bricks.iter_mut().for_each(fit);
     }
 
-    /// Takes a voxel out. Its brick stays, though it may be empty.
-    pub fn leave(&mut self, voxel: u32) {
-        let number = self.numbers[brick_of(&self.grid, voxel) as usize];
-        self.set(number, slot_of(&self.grid, voxel), false);
+    /// The same without empty bricks, in memory order: what [`Self::new`] makes of the voxels.
+    pub fn compacted(&self) -> Self {
+        let mut list = Self { grid: self.grid, numbers: vec![NONE; self.numbers.len()], bricks: Vec::new() };
+        for (new, &old) in list.numbers.iter_mut().zip(&self.numbers) {
+            if old != NONE && present(&self.bricks[old as usize]) != 0 {
+                *new = list.bricks.len() as u32;
+                list.bricks.push(self.bricks[old as usize]);
+            }
+        }
+        list
     }
 
-    fn set(&mut self, number: u32, slot: u32, to: bool) {
-        let brick = &mut self.bricks[number as usize];
-        let (word, bit) = (&mut brick.present[slot as usize / 32], 1 << (slot % 32));
-        *word = if to { *word | bit } else { *word & !bit };
-        fit(brick);
+    /// A voxel's bit in its brick, which there must be.
+    fn bit(&mut self, voxel: u32) -> (&mut u32, u32) {
+        let (number, slot) = (self.numbers[brick_of(&self.grid, voxel) as usize], slot_of(&self.grid, voxel));
+        (&mut self.bricks[number as usize].present[slot as usize / 32], 1 << (slot % 32))
     }
 
     /// Adds a brick of the grid, without voxels.

@@ -1,13 +1,14 @@
-//! A volume under a transfer function, on the GPU: the voxels that take part (§5.1), and how they change.
+//! A volume under a transfer function, on the GPU: its values, the voxels that take part (§5.1), and how those change.
 
 use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
-use wgpu::Device;
+use wgpu::{Device, Queue};
 
-use crate::classify::{classify, classify_voxel};
-use crate::gpu::layout::Voxel;
-use crate::gpu::voxel_list::VoxelLists;
+use crate::classify::{classify, takes_part};
+use crate::error::RenderError;
+use crate::gpu::brick_lists::BrickLists;
+use crate::gpu::volume_texture::VolumeTexture;
 use crate::iso_range::ValueSet;
 use crate::plan::{FramePlan, add_sections, count_sections, tile_grid};
 use crate::stats::{Counts, Totals};
@@ -22,9 +23,8 @@ pub struct ClassifiedVolume {
     transfer: TransferFunction,
     values: ValueSet,
     list: OnceLock<ValueList>,
-    pub(crate) lists: VoxelLists,
-    /// The lists hold what was let in by a transfer function that is no longer the current one.
-    pub(crate) is_stale: bool,
+    pub(crate) texture: VolumeTexture,
+    pub(crate) lists: BrickLists,
     /// Counts changes of the lists.
     pub(crate) revision: u64,
 }
@@ -36,16 +36,25 @@ pub struct Touched {
     pub entered: u64,
     /// Voxels that took part before and do not now.
     pub left: u64,
-    /// Whether all voxels must be uploaded again, as the lists have no room for those that entered.
+    /// Whether all bricks must be uploaded again, as there is no room for those that came.
     pub rebuilt: bool,
 }
 
 impl ClassifiedVolume {
-    /// Classifies a volume (SPEC §3) and uploads the voxels that take part.
-    pub fn new(device: &Device, volume: Arc<Volume>, transfer: TransferFunction) -> Self {
-        let lists = VoxelLists::upload(device, volume.grid(), &classify(&volume, &transfer));
+    /// Uploads a volume's values, and the bricks of the voxels that take part (SPEC §3).
+    ///
+    /// # Errors
+    /// If the volume is larger than the device's textures.
+    pub fn new(
+        device: &Device,
+        queue: &Queue,
+        volume: Arc<Volume>,
+        transfer: TransferFunction,
+    ) -> Result<Self, RenderError> {
+        let texture = VolumeTexture::upload(device, queue, volume.values())?;
+        let lists = BrickLists::upload(device, volume.grid(), &classify(&volume, &transfer));
         let values = ValueSet::of(&transfer);
-        Self { volume, transfer, values, list: OnceLock::new(), lists, is_stale: false, revision: 0 }
+        Ok(Self { volume, transfer, values, list: OnceLock::new(), texture, lists, revision: 0 })
     }
 
     /// The volume.
@@ -94,20 +103,14 @@ impl ClassifiedVolume {
         (self.transfer, self.values) = (transfer, values);
 
         let (volume, transfer, lists) = (&*self.volume, &self.transfer, &self.lists);
-        // Entering voxels and leaving ones.
-        let changes: Vec<(u32, Option<Voxel>)> = (candidates.into_par_iter())
-            .filter_map(|index| {
-                let voxel = classify_voxel(volume, transfer, index, volume.values()[index as usize]);
-                (voxel.is_some() != lists.contains(index)).then_some((index, voxel))
-            })
-            .collect();
-        let entering: Vec<Voxel> = changes.iter().filter_map(|change| change.1).collect();
-        let leaving: Vec<u32> = changes.iter().filter(|change| change.1.is_none()).map(|change| change.0).collect();
+        let (entering, leaving): (Vec<u32>, Vec<u32>) = (candidates.into_par_iter())
+            .filter(|&index| takes_part(volume, transfer, index) != lists.contains(index))
+            .partition(|&index| !lists.contains(index));
         if !entering.is_empty() || !leaving.is_empty() {
-            self.is_stale |= !self.lists.change(&entering, &leaving);
+            self.lists.change(&entering, &leaving);
             self.revision += 1;
         }
-        Touched { entered: entering.len() as u64, left: leaving.len() as u64, rebuilt: self.is_stale }
+        Touched { entered: entering.len() as u64, left: leaving.len() as u64, rebuilt: !self.lists.has_room() }
     }
 
     /// Changes the iso-ranges alone: closed intervals `[lo, hi]` of the values that take part, `None` for all. Touches what
@@ -116,12 +119,9 @@ impl ClassifiedVolume {
         self.set_transfer_function(TransferFunction { iso_ranges, ..self.transfer.clone() })
     }
 
-    /// Uploads all voxels again, if the lists had no room for a change.
-    pub(crate) fn renew(&mut self, device: &Device) {
-        if std::mem::take(&mut self.is_stale) {
-            let voxels = classify(&self.volume, &self.transfer);
-            self.lists = VoxelLists::upload(device, self.volume.grid(), &voxels);
-        }
+    /// Bytes of GPU memory.
+    pub fn gpu_bytes(&self) -> u64 {
+        self.texture.gpu_bytes + self.lists.gpu_bytes()
     }
 
     /// What of a frame's counts (Table 4) is known before it is drawn.

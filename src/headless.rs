@@ -120,9 +120,9 @@ impl Headless {
     /// A view of a volume as a scene sets it up, for any number of frames and changes. The scene's own volume is not looked at.
     ///
     /// # Errors
-    /// If the device fails.
+    /// If the volume is larger than the device's textures, or the device fails.
     pub fn view(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<SceneView, RenderError> {
-        self.scoped(|| Ok(SceneView::new(&self.device, volume.into(), scene)))
+        self.scoped(|| SceneView::new(&self.device, &self.queue, volume.into(), scene))
     }
 
     /// Draws one frame of a view and reads it back.

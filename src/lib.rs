@@ -8,14 +8,12 @@
 //! # From a file to a picture
 //!
 //! ```text
-//! volume file → Volume ─ classify → ClassifiedVolume: voxels that take part, in bricks, in VoxelLists on the GPU
+//! volume file → Volume ─ classify → ClassifiedVolume: its values, and which voxels of which bricks take part, on the GPU
 //! scene file  → Scene  ─ View, FramePlan: which bricks every group of sheets looks at (plain data)
 //! SceneView: both, and what the next frame can keep of the last one
 //!
-//! on the GPU, if iso-ranges changed:
-//!   enter    voxels take their places in the list
-//! per group of sheets:
-//!   cull     which bricks, then which of their voxels are not hidden; those are shaded, once each
+//! on the GPU, per group of sheets:
+//!   cull     which bricks, then which of their voxels are not hidden; those are shaded, once each, and only they need gradients
 //!   tiles    where the group's splats fall
 //!   splat    one quad per voxel adds its kernel sections to the group's sheet buffers
 //!   composite  the sheets into the compositing buffer, and which pixels are opaque now

@@ -97,7 +97,7 @@ pub struct FramePlan {
     pub view: View,
     /// Sheets of a group.
     pub sheets: u32,
-    /// For every voxel list its bricks, sorted by first group.
+    /// For every list its bricks, sorted by first group.
     pub orders: Vec<Vec<u32>>,
     /// The groups that any brick may reach into.
     pub groups: Vec<GroupPlan>,

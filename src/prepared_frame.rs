@@ -10,7 +10,6 @@ use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
 use crate::kernel::Kernel;
 use crate::pass::cull::CullList;
-use crate::pass::enter::Entering;
 use crate::pass::tiles::TileLists;
 use crate::plan::{FramePlan, View};
 use crate::splatting::Order;
@@ -30,8 +29,6 @@ pub(crate) struct PreparedFrame {
     pub(crate) tally: Buffer,
     pub(crate) tile_lists: TileLists,
     pub(crate) lists: Vec<PreparedList>,
-    /// The voxels that enter the list with this frame.
-    pub(crate) entering: Vec<Entering>,
     pub(crate) timer: Option<Timer>,
     pub(crate) sheet_views: Vec<TextureView>,
     pub(crate) clear_group: BindGroup,
@@ -123,8 +120,6 @@ pub(crate) struct Previous {
     pub(crate) tally: Option<Buffer>,
     pub(crate) tile_lists: Option<TileLists>,
     pub(crate) lists: Vec<PreparedList>,
-    /// Prepared but never recorded.
-    pub(crate) entering: Vec<Entering>,
 }
 
 impl Previous {
@@ -140,7 +135,6 @@ impl Previous {
             tally: Some(frame.tally),
             tile_lists: Some(frame.tile_lists),
             lists: frame.lists,
-            entering: frame.entering,
         }
     }
 }

@@ -14,7 +14,6 @@ use crate::gpu::uniforms::{self, Ramps};
 use crate::kernel::Kernel;
 use crate::pass::composite::Composite;
 use crate::pass::cull::{Cull, CullBuffers};
-use crate::pass::enter::Enter;
 use crate::pass::occlude::Occlude;
 use crate::pass::resolve::Resolve;
 use crate::pass::splat::Splat;
@@ -49,7 +48,6 @@ pub struct Renderer {
     sheet_format: TextureFormat,
     sheets: u32,
     profile: bool,
-    enter: Enter,
     cull: Cull,
     tiles: Tiles,
     splat: Splat,
@@ -71,7 +69,6 @@ impl Renderer {
             sheet_format,
             sheets,
             profile: options.profile,
-            enter: Enter::new(device),
             cull: Cull::new(device, sheets),
             tiles: Tiles::new(device),
             splat: Splat::new(device, sheet_format, sheets),
@@ -112,12 +109,10 @@ impl Renderer {
             tally,
             tile_lists,
             lists,
-            mut entering,
         } = Previous::of(frame.take());
 
         let Some(targets) = targets.or(old_targets) else { unreachable!("made anew where there were none") };
-        volume.renew(device);
-        let entries = volume.lists.flush(device, queue);
+        volume.lists.flush(device, queue);
         let current = |old: &Planned| {
             old.plan.view == seen
                 && old.plan.sheets == self.sheets
@@ -159,6 +154,7 @@ impl Renderer {
         let shared = CullBuffers {
             frame: &uniform,
             groups: &groups,
+            values: &volume.texture.view,
             control_points: &control_points,
             occluded: &targets.occluded,
             tally: &tally,
@@ -172,12 +168,10 @@ impl Renderer {
                 PreparedList { cull, splat_group }
             })
             .collect();
-        let newly = entries.zip(volume.lists.lists.first());
-        entering.extend(newly.map(|(entries, list)| self.enter.bind(device, &entries, &list.voxel_buffer)));
         let tile_lists =
             self.tiles.prepare(device, [&uniform, &groups, &tally], &targets, plan.groups.len(), tile_lists);
         // Every group has three passes.
-        let passes = entering.len() + 3 * plan.groups.len() + 1;
+        let passes = 3 * plan.groups.len() + 1;
         let timer = if self.profile { Timer::new(device, passes) } else { None };
         let timestamps = (size_of::<Tally>() as u64 + plan.groups.len() as u64 * 4).next_multiple_of(8);
         let staging = device.create_buffer(&wgpu::BufferDescriptor {
@@ -193,11 +187,7 @@ impl Renderer {
         let list_bytes: u64 = lists.iter().map(|list| list.cull.gpu_bytes()).sum();
         let other_bytes = uniform.size() + groups.size() + control_points.size() + tally.size();
         *frame = Some(PreparedFrame {
-            gpu_bytes: volume.lists.gpu_bytes()
-                + targets.gpu_bytes()
-                + footprints.0.gpu_bytes
-                + list_bytes
-                + other_bytes,
+            gpu_bytes: volume.gpu_bytes() + targets.gpu_bytes() + footprints.0.gpu_bytes + list_bytes + other_bytes,
             clear_group: self.splat.bind_clear(device, &uniform, tiles),
             composite_groups: targets.bands.iter().map(composite).collect(),
             occlude_groups: self.occlude.bind(device, &uniform, &tile_lists.occluding, &targets),
@@ -213,7 +203,6 @@ impl Renderer {
             tally,
             tile_lists,
             lists,
-            entering,
             timer,
             staging: Some(Staging { buffer: staging, timestamps, stages: Vec::new(), period }),
         });
@@ -226,14 +215,10 @@ impl Renderer {
     }
 
     /// Records the view's prepared frame; nothing, if there is none. The target must have the renderer's target format and the
-    /// scene's image size. What is recorded must be submitted: voxels that enter the iso-ranges reach the GPU with it.
+    /// scene's image size.
     pub fn record(&self, encoder: &mut CommandEncoder, view: &mut SceneView, target: &TextureView) {
         let Some(frame) = &mut view.frame else { return };
         let PreparedFrame { planned: Planned { plan, .. }, targets, tile_lists, timer, .. } = frame;
-        for entering in std::mem::take(&mut frame.entering) {
-            let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.enter", timer, "enter"));
-            self.enter.record(&mut pass, &entering);
-        }
         let masks = [&targets.opaque, &targets.opaque_columns, &targets.occluded, &targets.opaque_tiles, &frame.tally];
         let accs = targets.bands.iter().map(|band| &band.acc);
         for buffer in accs.chain(masks).chain(frame.lists.iter().map(|list| &list.cull.states)) {

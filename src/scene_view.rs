@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use wgpu::Device;
+use wgpu::{Device, Queue};
 
 use crate::camera::Camera;
 use crate::classified_volume::{ClassifiedVolume, Touched};
+use crate::error::RenderError;
 use crate::prepared_frame::PreparedFrame;
 use crate::scene::{ImageSettings, Scene};
 use crate::shading::{Light, Shading};
@@ -31,11 +32,15 @@ pub struct Prepared {
 }
 
 impl SceneView {
-    /// Classifies a volume under a scene's transfer function and uploads the voxels that take part. The scene's own volume is
+    /// Uploads a volume, and the bricks of the voxels that take part under a scene's transfer function. The scene's own volume is
     /// not looked at.
-    pub fn new(device: &Device, volume: Arc<Volume>, scene: &Scene) -> Self {
+    ///
+    /// # Errors
+    /// If the volume is larger than the device's textures.
+    pub fn new(device: &Device, queue: &Queue, volume: Arc<Volume>, scene: &Scene) -> Result<Self, RenderError> {
         let transfer = scene.transfer.resolve(&volume);
-        Self { volume: ClassifiedVolume::new(device, volume, transfer), scene: scene.clone(), frame: None }
+        let volume = ClassifiedVolume::new(device, queue, volume, transfer)?;
+        Ok(Self { volume, scene: scene.clone(), frame: None })
     }
 
     /// The settings. Its `volume` and `transfer` are those that the view was made with.
@@ -94,7 +99,7 @@ impl SceneView {
 
     /// Bytes of GPU memory that the view holds.
     pub fn gpu_bytes(&self) -> u64 {
-        self.frame.as_ref().map_or(self.volume.lists.gpu_bytes(), PreparedFrame::gpu_bytes)
+        self.frame.as_ref().map_or(self.volume.gpu_bytes(), PreparedFrame::gpu_bytes)
     }
 
     /// Asks for the counts of the frame that was last recorded and submitted; `None` without one. They arrive when the device is

@@ -2,6 +2,9 @@
 
 use glam::DVec3;
 
+/// Below this length (value per world unit) a gradient has no direction (SPEC §3).
+pub const MIN_GRADIENT: f64 = 1e-12;
+
 /// Where the light comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Light {

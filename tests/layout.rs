@@ -5,9 +5,7 @@ use std::mem::offset_of;
 
 use naga::proc::Layouter;
 use naga::{AddressSpace, Handle, Module, Type, TypeInner};
-use sheetsplat::gpu::layout::{
-    Band, Brick, BrickState, Entry, Frame, Group, Indirect, Splat, Tally, TileList, Visit, Voxel,
-};
+use sheetsplat::gpu::layout::{Band, Brick, BrickState, Frame, Group, Indirect, Splat, Tally, TileList, Visit};
 use sheetsplat::gpu::shaders;
 
 /// A `repr(C)` struct as Rust lays it out: name, size, and members with name, offset and size.
@@ -56,9 +54,8 @@ macro_rules! layout {
     }};
 }
 
-fn shared() -> [Layout; 12] {
+fn shared() -> [Layout; 10] {
     [
-        layout!(Voxel { index, value, normal, gradient_magnitude }),
         layout!(Splat { x_px, y_px, depth, rg, ba }),
         layout!(Frame {
             screen_from_voxel,
@@ -91,7 +88,6 @@ fn shared() -> [Layout; 12] {
         }),
         layout!(Group { near, first_brick, brick_count, index }),
         layout!(Brick { present, x, y, z, extent }),
-        layout!(Entry { at, voxel }),
         layout!(BrickState { hidden, shaded }),
         layout!(Visit { drawn, fresh, brick, padding }),
         layout!(Indirect { draw, dispatch, count }),

@@ -8,10 +8,11 @@ use glam::DVec3;
 use sheetsplat::brick::BrickList;
 use sheetsplat::classify::classify;
 use sheetsplat::error::RenderError;
+use sheetsplat::gpu::brick_lists::BrickLists;
 use sheetsplat::gpu::device::{self, DeviceError, DeviceRequirements};
 use sheetsplat::gpu::layout::{Band, Brick};
 use sheetsplat::gpu::targets::Targets;
-use sheetsplat::gpu::voxel_list::VoxelLists;
+use sheetsplat::gpu::volume_texture::VolumeTexture;
 use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
@@ -127,19 +128,19 @@ fn small_bindings_split_voxels_and_image() {
     let (_, mut scene) = head();
     let volume = builtin::volume("head:64").unwrap();
     let voxels = classify(&volume, &scene.transfer.resolve(&volume));
-    let bricks = BrickList::new(volume.grid(), voxels.iter().map(|voxel| voxel.index));
+    let bricks = BrickList::new(volume.grid(), &voxels);
     let full = open(Limits::default(), Features::FLOAT32_BLENDABLE, None).unwrap();
     // 32 rows of 150 pixels are 75 KiB: one tile's rows, and two.
     for (bytes, bands) in [(76 << 10, 4), (150 << 10, 2)] {
         let limits = Limits { max_storage_buffer_binding_size: bytes, ..Limits::default() };
         let small = open(limits, Features::FLOAT32_BLENDABLE, None).unwrap();
         assert_eq!(small.device().limits().max_storage_buffer_binding_size, bytes, "wgpu gave what was asked for");
-        let lists = VoxelLists::upload(small.device(), volume.grid(), &voxels);
+        let lists = BrickLists::upload(small.device(), volume.grid(), &voxels);
         assert!(lists.lists.len() > 2, "{} lists", lists.lists.len());
         assert_eq!(lists.len(), voxels.len() as u64);
         let of_lists: Vec<Brick> = lists.bricks().flatten().copied().collect();
         assert_eq!(of_lists, bricks.bricks(), "together they are all there is");
-        assert!(lists.lists.iter().all(|list| list.voxel_buffer.size() <= bytes && list.brick_buffer.size() <= bytes));
+        assert!(lists.lists.iter().all(|list| list.buffer.size() <= bytes));
         let targets = Targets::new(small.device(), [150, 110], TextureFormat::Rgba32Float, 2).unwrap();
         assert_eq!(targets.bands.len(), bands);
         for (at, band) in targets.bands.iter().enumerate() {
@@ -197,25 +198,40 @@ fn rgba32float_sheets_need_blending() {
 
 #[test]
 fn images_larger_than_a_texture_are_an_error() {
-    let limits = Limits { max_texture_dimension_2d: 256, ..Limits::default() };
+    let limits = Limits { max_texture_dimension_2d: 2048, ..Limits::default() };
     let gpu = open(limits, Features::empty(), None).unwrap();
     let (volume, mut scene) = head();
-    for (size, key) in [((257, 16), "image.width"), ((16, 300), "image.height")] {
+    for (size, key) in [((2049, 16), "image.width"), ((16, 3000), "image.height")] {
         (scene.image.width, scene.image.height) = size;
         match gpu.render_volume(volume.clone(), &scene) {
             Err(error @ RenderError::Limit { what, limit, required, actual }) => {
-                let expected = (key, "max_texture_dimension_2d", u64::from(size.0.max(size.1)), 256);
+                let expected = (key, "max_texture_dimension_2d", u64::from(size.0.max(size.1)), 2048);
                 assert_eq!((what, limit, required, actual), expected);
                 let message = error.to_string();
-                for part in [key, "max_texture_dimension_2d", &required.to_string(), "256"] {
+                for part in [key, "max_texture_dimension_2d", &required.to_string(), "2048"] {
                     assert!(message.contains(part), "{message}");
                 }
             }
             other => panic!("{size:?}: {other:?}"),
         }
     }
-    (scene.image.width, scene.image.height) = (256, 16);
+    (scene.image.width, scene.image.height) = (2048, 16);
     gpu.render_volume(volume.clone(), &scene).unwrap();
+}
+
+/// 128 layers of 2048² values each, and one value more.
+#[test]
+fn volumes_larger_than_a_texture_are_an_error() {
+    let gpu = open(Limits { max_texture_array_layers: 128, ..Limits::default() }, Features::empty(), None).unwrap();
+    // Zeros that nobody looks at take no memory.
+    let values = vec![0.0; (128 << 22) + 1];
+    match VolumeTexture::upload(gpu.device(), gpu.queue(), &values) {
+        Err(error @ RenderError::Limit { limit, required, actual, .. }) => {
+            assert_eq!((limit, required, actual), ("max_texture_array_layers", 129, 128));
+            assert!(error.to_string().contains("the volume's values"), "{error}");
+        }
+        other => panic!("{other:?}"),
+    }
 }
 
 #[test]
@@ -253,7 +269,8 @@ fn an_unknown_adapter_is_an_error_that_names_those_there_are() {
 
 #[test]
 fn a_limit_that_is_too_small_is_named() {
-    let small: [(&str, u64, u64, Limits); 5] = [
+    let small: [(&str, u64, u64, Limits); 6] = [
+        ("max_texture_dimension_2d", 2048, 1024, Limits { max_texture_dimension_2d: 1024, ..Limits::default() }),
         ("max_texture_array_layers", 128, 64, Limits { max_texture_array_layers: 64, ..Limits::default() }),
         (
             "max_storage_buffers_per_shader_stage",

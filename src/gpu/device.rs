@@ -2,6 +2,8 @@
 
 use wgpu::{Adapter, Device, Features, Limits, TextureFormat};
 
+use super::volume_texture;
+
 /// Why no device could be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -69,6 +71,7 @@ impl DeviceRequirements {
         let available = adapter.limits();
         let limits = Limits {
             max_texture_dimension_2d: available.max_texture_dimension_2d,
+            max_texture_array_layers: available.max_texture_array_layers,
             max_buffer_size: available.max_buffer_size,
             max_storage_buffer_binding_size: available.max_storage_buffer_binding_size,
             // Four sheets of RGBA32F.
@@ -85,7 +88,8 @@ impl DeviceRequirements {
 /// If a limit is too small; the error says required and actual.
 pub fn check(device: &Device) -> Result<(), DeviceError> {
     let limits = device.limits();
-    let needs: [(&'static str, u64, u64); 8] = [
+    let needs: [(&'static str, u64, u64); 9] = [
+        ("max_texture_dimension_2d", volume_texture::SIDE.into(), limits.max_texture_dimension_2d.into()),
         ("max_texture_array_layers", 128, limits.max_texture_array_layers.into()),
         ("max_storage_buffers_per_shader_stage", 8, limits.max_storage_buffers_per_shader_stage.into()),
         ("max_uniform_buffers_per_shader_stage", 2, limits.max_uniform_buffers_per_shader_stage.into()),

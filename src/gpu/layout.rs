@@ -3,20 +3,6 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// A relevant voxel: what a view does not change (Table 1).
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct Voxel {
-    /// Index into the volume's values.
-    pub index: u32,
-    /// The volume's value there.
-    pub value: f32,
-    /// Unit normal, octahedral, two 16-bit signed normalised numbers.
-    pub normal: u32,
-    /// |g|, value per world unit; 0 where there is no normal.
-    pub gradient_magnitude: f32,
-}
-
 /// A projected and shaded voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -31,16 +17,6 @@ pub struct Splat {
     pub rg: u32,
     /// `C.b·m` and `m`, two f16.
     pub ba: u32,
-}
-
-/// A voxel that enters a list, and where.
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct Entry {
-    /// Its place in the list.
-    pub at: u32,
-    /// The voxel.
-    pub voxel: Voxel,
 }
 
 /// What is constant over a frame.
@@ -119,7 +95,7 @@ pub struct Group {
     pub index: u32,
 }
 
-/// 4×4×4 places for voxels, which a list holds one after the other, x fastest.
+/// 4×4×4 places for voxels, x fastest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Brick {

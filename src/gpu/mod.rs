@@ -1,6 +1,7 @@
 //! What the passes share: the device's capabilities, memory layouts, shader sources, targets, read-back.
 
 pub mod bindings;
+pub mod brick_lists;
 pub mod device;
 pub mod footprint_texture;
 pub mod layout;
@@ -10,4 +11,3 @@ pub mod targets;
 pub mod timer;
 pub mod uniforms;
 pub mod volume_texture;
-pub mod voxel_list;

@@ -21,16 +21,14 @@ macro_rules! shader {
     };
 }
 
-/// Puts voxels that enter the iso-ranges into their list.
-pub const ENTER: Shader = shader!("enter", "brick", "voxel");
 /// Which bricks a sheet group visits.
 pub const CULL_BRICKS: Shader = shader!("cull_bricks", "frame", "brick", "tally", "scan");
 /// Which voxels it draws.
-pub const CULL_VOXELS: Shader = shader!("cull_voxels", "frame", "brick", "tally", "voxel", "project");
+pub const CULL_VOXELS: Shader = shader!("cull_voxels", "frame", "brick", "tally", "project");
 /// Those voxels in a row.
 pub const COMPACT: Shader = shader!("compact", "brick", "tally", "scan");
 /// Shades those that were not shaded before.
-pub const SHADE: Shader = shader!("shade", "frame", "brick", "voxel", "project", "splat");
+pub const SHADE: Shader = shader!("shade", "frame", "brick", "volume", "project", "splat");
 /// The tiles they touch.
 pub const TILES: Shader = shader!("tiles", "frame", "brick", "tally", "tile_list");
 /// Zeroes the sheet buffers there.
@@ -45,8 +43,8 @@ pub const OCCLUDE: Shader = shader!("occlude", "frame", "brick", "tile_list");
 pub const RESOLVE: Shader = shader!("resolve", "frame", "band");
 
 /// Every shader, in the order of the data flow.
-pub const ALL: [Shader; 11] =
-    [ENTER, CULL_BRICKS, CULL_VOXELS, COMPACT, SHADE, TILES, CLEAR, SPLAT, COMPOSITE, OCCLUDE, RESOLVE];
+pub const ALL: [Shader; 10] =
+    [CULL_BRICKS, CULL_VOXELS, COMPACT, SHADE, TILES, CLEAR, SPLAT, COMPOSITE, OCCLUDE, RESOLVE];
 
 impl Shader {
     /// Compiles the shader.

@@ -5,11 +5,10 @@ use std::ops::{Add, Mul};
 use glam::{DMat2, DVec2, DVec3, DVec4};
 
 use super::layout::{Frame, Group};
-use crate::classify::MIN_GRADIENT;
 use crate::kernel::Kernel;
 use crate::plan::{FramePlan, View};
 use crate::scene::Scene;
-use crate::shading::{Light, Shading};
+use crate::shading::{Light, MIN_GRADIENT, Shading};
 use crate::splatting::{Compositing, Order, Splatting};
 use crate::transfer_function::{Ramp, TransferFunction};
 use crate::volume::Grid;

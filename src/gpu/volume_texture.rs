@@ -5,7 +5,7 @@ use wgpu::{Device, Extent3d, Queue, TextureDescriptor, TextureDimension, Texture
 use crate::error::RenderError;
 
 /// Texels along both sides of a layer, as `shaders/shared/volume.wgsl` folds indices.
-const SIDE: u32 = 2048;
+pub const SIDE: u32 = 2048;
 
 /// A volume's values, x fastest, folded into rows and layers of a power of two: value i is texel i mod 2048 of row ⌊i/2048⌋.
 #[derive(Debug)]

@@ -1,12 +1,16 @@
 //! Early splat elimination (§6): which bricks a sheet group visits, which of their voxels it draws, those voxels in a row,
 //! and the shading of those that were not shaded before.
 
-use wgpu::{BindGroup, Buffer, BufferUsages, ComputePass, Device, ShaderStages};
+use wgpu::{
+    BindGroup, BindingResource, Buffer, BufferUsages, ComputePass, Device, ShaderStages, TextureView,
+    TextureViewDimension,
+};
 
-use crate::gpu::bindings::{ComputeStage, at_offset, grown, storage, uniform};
-use crate::gpu::layout::{Brick, BrickState, Frame, Group, Indirect, Splat, Tally, Visit, Voxel};
+use crate::brick::BRICK_VOXELS;
+use crate::gpu::bindings::{ComputeStage, at_offset, grown, storage, texture, uniform};
+use crate::gpu::brick_lists::BrickBuffer;
+use crate::gpu::layout::{Brick, BrickState, Frame, Group, Indirect, Splat, Tally, Visit};
 use crate::gpu::shaders;
-use crate::gpu::voxel_list::VoxelList;
 
 /// The four stages' pipelines.
 #[derive(Debug)]
@@ -42,6 +46,8 @@ pub struct CullBuffers<'a> {
     pub frame: &'a Buffer,
     /// One [`Group`] at every dynamic offset.
     pub groups: &'a Buffer,
+    /// The volume's values.
+    pub values: &'a TextureView,
     /// Control points of the ramps.
     pub control_points: &'a Buffer,
     /// The occlusion buffer.
@@ -69,13 +75,12 @@ impl Cull {
         let voxels = [
             uniform::<Frame>(stage, false),
             uniform::<Group>(stage, true),
-            storage::<Voxel>(stage, true),
+            storage::<Brick>(stage, true),
             storage::<u32>(stage, true),
             storage::<Visit>(stage, false),
             storage::<BrickState>(stage, false),
             storage::<(Tally, u32)>(stage, false),
             storage::<Indirect>(stage, true),
-            storage::<Brick>(stage, true),
         ];
         let compact = [
             storage::<Visit>(stage, true),
@@ -88,7 +93,8 @@ impl Cull {
         ];
         let shade = [
             uniform::<Frame>(stage, false),
-            storage::<Voxel>(stage, true),
+            storage::<Brick>(stage, true),
+            texture(stage, TextureViewDimension::D2Array),
             storage::<[f32; 4]>(stage, true),
             storage::<u32>(stage, true),
             storage::<Indirect>(stage, true),
@@ -108,7 +114,7 @@ impl Cull {
         &self,
         device: &Device,
         shared: CullBuffers<'_>,
-        list: &VoxelList,
+        list: &BrickBuffer,
         order: &Buffer,
         (most_bricks, most_voxels): (u32, u32),
         previous: Option<CullList>,
@@ -118,7 +124,8 @@ impl Cull {
             grown(device, previous, label, (count.max(1) * record) as u64, usage)
         };
         let (none, indirect) = (BufferUsages::empty(), BufferUsages::INDIRECT);
-        let (places, bricks) = (list.places(), list.brick_count());
+        let bricks = list.brick_count();
+        let places = bricks * BRICK_VOXELS as usize;
         let old = previous.map(CullList::buffers).unwrap_or_default();
         let [states, splats, instances, draw_args, visits, visit_args, fresh, fresh_args] = old;
         let states = buffer(states, "sheetsplat.states", bricks, size_of::<BrickState>(), BufferUsages::COPY_DST);
@@ -130,13 +137,13 @@ impl Cull {
         let fresh = buffer(fresh, "sheetsplat.fresh", most_voxels as usize, size_of::<u32>(), none);
         let fresh_args = buffer(fresh_args, "sheetsplat.fresh_args", 1, size_of::<Indirect>(), indirect);
 
-        let CullBuffers { frame, groups, control_points, occluded, tally } = shared;
+        let CullBuffers { frame, groups, values, control_points, occluded, tally } = shared;
         let (frame, group) = (frame.as_entire_binding(), at_offset::<Group>(groups));
         let whole = Buffer::as_entire_binding;
         let bricks = [
             frame.clone(),
             group.clone(),
-            whole(&list.brick_buffer),
+            whole(&list.buffer),
             whole(order),
             whole(&states),
             whole(occluded),
@@ -147,19 +154,19 @@ impl Cull {
         let voxels = [
             frame.clone(),
             group,
-            whole(&list.voxel_buffer),
+            whole(&list.buffer),
             whole(occluded),
             whole(&visits),
             whole(&states),
             whole(tally),
             whole(&visit_args),
-            whole(&list.brick_buffer),
         ];
         let lists = [&visits, &visit_args, &instances, &draw_args, &fresh, &fresh_args, tally];
         let compact = lists.map(whole);
         let shade = [
             frame,
-            whole(&list.voxel_buffer),
+            whole(&list.buffer),
+            BindingResource::TextureView(values),
             whole(control_points),
             whole(&fresh),
             whole(&fresh_args),

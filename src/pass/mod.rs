@@ -5,7 +5,6 @@
 
 pub mod composite;
 pub mod cull;
-pub mod enter;
 pub mod occlude;
 pub mod resolve;
 pub mod splat;

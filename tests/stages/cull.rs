@@ -6,10 +6,11 @@ use std::collections::BTreeSet;
 
 use glam::{DVec2, DVec3, DVec4, UVec3};
 use sheetsplat::brick::{self, BRICK_VOXELS};
-use sheetsplat::gpu::layout::{self, Brick, BrickState, Frame, Group, Indirect, Tally, Voxel};
+use sheetsplat::gpu::brick_lists::BrickLists;
+use sheetsplat::gpu::layout::{self, Brick, BrickState, Frame, Group, Indirect, Tally};
 use sheetsplat::gpu::targets::Targets;
 use sheetsplat::gpu::uniforms::{self, Ramps};
-use sheetsplat::gpu::voxel_list::VoxelLists;
+use sheetsplat::gpu::volume_texture::VolumeTexture;
 use sheetsplat::headless::Headless;
 use sheetsplat::kernel::Kernel;
 use sheetsplat::pass::cull::{Cull, CullBuffers, CullList};
@@ -22,7 +23,7 @@ use sheetsplat::wgpu::{self, BufferUsages, TextureFormat};
 use crate::common::{Random, camera, gpu, scene};
 use crate::{at_offsets, compute, contents, indirect, init};
 
-/// The stages with one list of voxels and what they read and write.
+/// The stages with one list of bricks and what they read and write.
 pub(crate) struct Culling<'a> {
     gpu: &'a Headless,
     stage: &'a Cull,
@@ -39,19 +40,19 @@ pub(crate) struct Culling<'a> {
 }
 
 impl<'a> Culling<'a> {
-    /// Of voxels in memory order.
+    /// Of voxels in memory order, of a grid with these values.
     pub(crate) fn new(
         gpu: &'a Headless,
         (stage, sheets): (&'a Cull, u32),
-        grid: &Grid,
-        voxels: &[Voxel],
+        (grid, values): (&Grid, &[f32]),
+        voxels: &[u32],
         transfer: &TransferFunction,
         scene: &Scene,
     ) -> Self {
         let device = gpu.device();
         let size = [scene.image.width, scene.image.height];
         let view = View::new(grid, &scene.camera, &scene.splatting, size).unwrap();
-        let lists = VoxelLists::upload(device, grid, voxels);
+        let lists = BrickLists::upload(device, grid, voxels);
         let bricks = lists.bricks().next().unwrap().to_vec();
         let plan = FramePlan::new([bricks.as_slice()], view, sheets, scene.splatting.order);
         let [list] = &lists.lists[..] else { panic!("{} lists", lists.lists.len()) };
@@ -73,6 +74,7 @@ impl<'a> Culling<'a> {
         let shared = CullBuffers {
             frame: &init(device, &[frame], BufferUsages::UNIFORM),
             groups: &groups,
+            values: &VolumeTexture::upload(device, gpu.queue(), values).unwrap().view,
             control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
             occluded: &targets.occluded,
             tally: &tally,
@@ -375,7 +377,7 @@ impl Rules<'_> {
 /// A grid, its voxels in memory order, and a view of them.
 struct Case {
     grid: Grid,
-    voxels: Vec<Voxel>,
+    voxels: Vec<u32>,
     scene: Scene,
     sheets: u32,
 }
@@ -405,14 +407,16 @@ impl Case {
     /// Draws the groups of the plan in order, under the given occlusion buffers by turns, and checks all that is left behind.
     fn check(mut self, gpu: &Headless, stage: &Cull, masks: &[Occluded]) -> Seen {
         let transfer = Self::transfer();
+        let values = vec![1.0; self.grid.dims.element_product() as usize];
         // Voxels that f32 arithmetic may decide otherwise about are left out, which changes their bricks.
         for _ in 0..30 {
-            let culling = Culling::new(gpu, (stage, self.sheets), &self.grid, &self.voxels, &transfer, &self.scene);
+            let volume = (&self.grid, &values[..]);
+            let culling = Culling::new(gpu, (stage, self.sheets), volume, &self.voxels, &transfer, &self.scene);
             let (_, unsure) = self.expected(&culling, masks);
             if unsure.is_empty() {
                 return self.compare(&culling, masks);
             }
-            self.voxels.retain(|voxel| !unsure.contains(&voxel.index));
+            self.voxels.retain(|voxel| !unsure.contains(voxel));
         }
         panic!("no voxels are left that f32 arithmetic is sure about");
     }
@@ -487,10 +491,6 @@ impl Case {
     }
 }
 
-fn voxel(index: u32) -> Voxel {
-    Voxel { index, value: 1.0, normal: 0, gradient_magnitude: 0.0 }
-}
-
 /// Occlusion buffers that hide something, nothing (what was hidden stays so), something else, everything, and nothing again.
 fn masks(random: &mut Random, size: [u32; 2]) -> Vec<Occluded> {
     let [some, others] = [(); 2].map(|()| Occluded::random(random, size));
@@ -510,7 +510,7 @@ fn dense(random: &mut Random, sheets: u32, culling: bool) -> Case {
     let holes = random.uniform(0.0, 0.6);
     let count = grid.dims.element_product();
     // The first bricks are full.
-    let voxels = (0..count).filter(|&i| i % 14 < 8 || random.uniform(0.0, 1.0) > holes).map(voxel).collect();
+    let voxels = (0..count).filter(|&i| i % 14 < 8 || random.uniform(0.0, 1.0) > holes).collect();
     let mut scene = scene(75, 45);
     scene.camera = camera(random.direction().to_array(), random.uniform(9.0, 30.0));
     scene.splatting.slab_width = [0.3, 1.0, 2.6][random.bits() as usize % 3];
@@ -581,7 +581,7 @@ fn many_bricks() {
         scene.camera = camera([0.04, 0.9, -0.03], height);
         scene.splatting.slab_width = 8.0;
         let masks = masks(&mut random, [150, 77]);
-        let case = Case { grid, voxels: chosen.into_iter().map(voxel).collect(), scene, sheets };
+        let case = Case { grid, voxels: chosen.into_iter().collect(), scene, sheets };
         let seen = case.check(&gpu, &stage, &masks);
         assert!(seen.most_bricks > least && seen.drawn > 1000, "{seen:?}");
     }

@@ -5,7 +5,6 @@
 mod common;
 mod composite;
 mod cull;
-mod enter;
 mod occlude;
 mod plan;
 mod resolve;

@@ -3,7 +3,6 @@
 
 use glam::{DVec3, UVec3};
 use sheetsplat::brick::{self, BrickList};
-use sheetsplat::gpu::layout::Voxel;
 use sheetsplat::plan::{FramePlan, View, add_sections, count_sections};
 use sheetsplat::reference::Geometry;
 use sheetsplat::splatting::Order;
@@ -18,10 +17,8 @@ fn every_kernel_is_looked_at_by_every_group_that_it_reaches_into() {
         let grid = Grid { dims: UVec3::new(19, 18, 17), spacing: DVec3::from(spacing) };
         // Two lists, and voxels that take no part.
         let taking_part = (0..grid.dims.element_product()).filter(|_| random.uniform(0.0, 1.0) < 0.7);
-        let voxels: Vec<Voxel> =
-            taking_part.map(|index| Voxel { index, value: 1.0, normal: 0, gradient_magnitude: 0.0 }).collect();
-        let lists =
-            [&voxels[..1000], &voxels[1000..]].map(|list| BrickList::new(&grid, list.iter().map(|voxel| voxel.index)));
+        let voxels: Vec<u32> = taking_part.collect();
+        let lists = [&voxels[..1000], &voxels[1000..]].map(|list| BrickList::new(&grid, list));
         for (radius, slab_width, sheets) in [(2.0, 1.0, 4), (1.4, 0.3, 2), (4.0, 2.7, 4), (1.0, 8.0, 1)] {
             for order in [Order::FrontToBack, Order::BackToFront] {
                 let mut scene = scene(64, 48);
@@ -70,23 +67,26 @@ fn bricks_hold_every_voxel_once_within_their_box() {
     let grid = Grid { dims: UVec3::new(11, 6, 9), spacing: DVec3::ONE };
     let count = grid.dims.element_product();
     let voxels: Vec<u32> = (0..count).filter(|_| random.uniform(0.0, 1.0) < 0.4).collect();
-    let mut list = BrickList::new(&grid, voxels.iter().copied());
+    let mut list = BrickList::new(&grid, &voxels);
     assert_holds(&list, &voxels);
     assert!(list.bricks().is_sorted_by_key(brick::position));
 
     // Others in their place, some of them in bricks that held none.
-    let mut others: Vec<u32> = (0..count).filter(|_| random.uniform(0.0, 1.0) < 0.1).collect();
-    let few = BrickList::new(&grid, others.iter().copied());
+    let others: Vec<u32> = (0..count).filter(|_| random.uniform(0.0, 1.0) < 0.1).collect();
+    let few = BrickList::new(&grid, &others);
     let mut few_then_all = few.clone();
-    (0..count).filter(|&voxel| !few.contains(voxel)).for_each(|voxel| {
-        let place = few_then_all.enter(voxel);
-        assert_eq!(few_then_all.place(voxel), Some(place));
-    });
+    let all: Vec<u32> = (0..count).collect();
+    few_then_all.change(&all.iter().copied().filter(|&voxel| !few.contains(voxel)).collect::<Vec<_>>(), &[]);
     assert!(!few_then_all.bricks().is_sorted_by_key(brick::position), "some bricks are new");
-    assert_holds(&few_then_all, &(0..count).collect::<Vec<_>>());
-    voxels.iter().filter(|voxel| !others.contains(voxel)).for_each(|&voxel| list.leave(voxel));
-    others.retain(|voxel| voxels.contains(voxel));
+    assert_holds(&few_then_all, &all);
+    assert_eq!(few_then_all.compacted(), BrickList::new(&grid, &all));
+    list.change(
+        &others.iter().copied().filter(|voxel| !voxels.contains(voxel)).collect::<Vec<_>>(),
+        &voxels.iter().copied().filter(|voxel| !others.contains(voxel)).collect::<Vec<_>>(),
+    );
     assert_holds(&list, &others);
+    assert!(list.bricks().iter().any(|brick| brick::present(brick) == 0), "some bricks are empty");
+    assert_eq!(list.compacted(), BrickList::new(&grid, &others));
 }
 
 fn assert_holds(list: &BrickList, voxels: &[u32]) {

@@ -62,9 +62,9 @@ fn tolerance(volume: &Volume, index: u32, transfer: &TransferFunction, scene: &S
         Compositing::Linear | Compositing::Xray => alpha_error,
     };
 
-    // Half a step of 1/32767 in each of two octahedron coordinates moves the third by up to their sum (√6 in all); the
-    // octahedron lies up to √3 below the sphere. The rest is f32.
-    let normal_error = 18.0_f64.sqrt() * 0.5 / 32767.0 + 16.0 * F32;
+    // A gradient's components are rounded three times and divided twice; of the square root's sum of squares half the error
+    // counts.
+    let normal_error = 16.0 * F32;
     let Shading { ambient, diffuse, specular, shininess, .. } = scene.shading;
     let color_error = ramp_error(transfer.color.points(), |a: DVec3, b| (a - b).abs().max_element(), value);
     // pow is exp2(y·log2(x)): log2 to 2⁻²¹, times y; exp2 to 3 ULP and more where its result is small. A cosine's power
@@ -102,7 +102,7 @@ fn check(name: &str, volume: &Volume, scene: &Scene) {
     let sheets = 2;
     let stage = Cull::new(gpu.device(), sheets);
     let voxels = classify(volume, &transfer);
-    let culling = Culling::new(&gpu, (&stage, sheets), volume.grid(), &voxels, &transfer, scene);
+    let culling = Culling::new(&gpu, (&stage, sheets), (volume.grid(), volume.values()), &voxels, &transfer, scene);
     assert!(culling.plan.groups.len() > 1, "{name}: one group");
     (0..culling.plan.groups.len()).for_each(|group| culling.cull(group));
     let (records, states, view) = (culling.splats(), culling.states(), culling.view);
@@ -110,7 +110,7 @@ fn check(name: &str, volume: &Volume, scene: &Scene) {
     let geometry = Geometry::new(volume.grid(), scene).unwrap();
     let expected = shading::shade(volume, &transfer, scene, &geometry);
     assert_eq!(voxels.len(), expected.len(), "{name}: which voxels take part");
-    let twins: BTreeMap<u32, &shading::Splat> = voxels.iter().map(|voxel| voxel.index).zip(&expected).collect();
+    let twins: BTreeMap<u32, &shading::Splat> = voxels.iter().copied().zip(&expected).collect();
     let held: usize = culling.bricks.iter().map(|brick| brick::voxels(brick).count()).sum();
     assert_eq!(held, twins.len(), "{name}: bricks hold every voxel");
     // Whose footprint's box holds a pixel's centre is on the screen; f32 may differ about those that barely do.
@@ -225,6 +225,75 @@ fn anisotropic_and_minified() {
             scene.splatting.compositing = Compositing::Exponential;
             check(&format!("spacing {spacing} height {height}"), &noise(DIMS, spacing), &scene);
         }
+    }
+}
+
+/// Borders on all sides, and axes along which there is no neighbour.
+#[test]
+fn flat_and_narrow() {
+    for (dims, direction) in
+        [([40, 9, 1], [0.9, 0.1, -0.3]), ([1, 13, 12], [0.1, 0.9, 0.3]), ([2, 1, 70], [0.3, 0.2, 0.9])]
+    {
+        let mut scene = oblique();
+        scene.camera = camera(direction, 90.0);
+        check(&format!("{dims:?}"), &noise(UVec3::from(dims), DVec3::new(1.0, 2.0, 1.5)), &scene);
+    }
+}
+
+/// Values whose differences, and gradients whose squares, `f32` cannot hold; spacings that it cannot hold.
+#[test]
+fn extreme_values_and_spacings() {
+    let extremes =
+        [(1.0, 1.0), (1e36, 1.0), (1e-30, 1.0), (1e36, 1e40), (1e36, 1e50), (1e36, 1e51), (1.0, 6e99), (1.0, 1e-100)];
+    for (value, spacing) in extremes {
+        let spacing = spacing * DVec3::new(1.0, 1.5, 1.2);
+        let mut random = Random(3);
+        // Of both signs: differences of twice as much.
+        let values = (0..DIMS.element_product()).map(|_| (value * random.uniform(-300.0, 300.0)) as f32).collect();
+        let volume = Volume::new("extreme", DIMS, spacing, values).unwrap();
+        let mut scene = Scene {
+            camera: camera([0.3, 0.9, -0.2], 40.0 * spacing.min_element()),
+            transfer: transfer(
+                &[(-200.0 * value, [0.1, 0.3, 0.9]), (250.0 * value, [1.0, 0.8, 0.6])],
+                &[(-300.0 * value, 0.1), (100.0 * value, 0.3), (200.0 * value, 1.0)],
+            ),
+            ..scene(64, 48)
+        };
+        let name = format!("values {value:e}, spacing {spacing:?}");
+        check(&name, &volume, &scene);
+        // Where f32 can hold the gradients, their opacity, too.
+        let gradient = 300.0 * value / spacing.min_element();
+        if (1e-11..1e37).contains(&gradient) {
+            let points = vec![(0.1 * gradient, 0.2), (0.5 * gradient, 0.9), (0.8 * gradient, 0.4)];
+            scene.transfer.gradient_opacity = Some(Ramp::new(points).unwrap());
+            check(&format!("{name}, gradient opacity"), &volume, &scene);
+        }
+    }
+}
+
+/// More values than a layer of their texture holds: neighbours along every axis are in different layers, and the last row is not
+/// full.
+#[test]
+fn values_in_several_layers() {
+    let dims = UVec3::new(2049, 1100, 2);
+    // Around value 2048², which is at (1, 947, 1), and around the last one: who takes part there, and with which values.
+    let places = [(0..32, 940..956, [20.0, 120.0]), (2021..2049, 1086..1100, [140.0, 255.0])];
+    let mut random = Random(12);
+    let values = (0..dims.element_product())
+        .map(|index| {
+            let (x, y) = (index % dims.x, index / dims.x % dims.y);
+            let place = places.iter().find(|(xs, ys, _)| xs.contains(&x) && ys.contains(&y));
+            let [low, high] = place.map_or([0.0, 10.0], |place| place.2);
+            random.uniform(low, high) as f32
+        })
+        .collect();
+    let volume = Volume::new("layers", dims, DVec3::new(1.0, 1.0, 1.5), values).unwrap();
+    for (xs, ys, range) in places {
+        let mut scene = oblique();
+        scene.camera = camera([0.02, 0.5, -0.9], 30.0);
+        scene.camera.center = volume.grid().world_position(UVec3::new(xs.start + 14, ys.start + 7, 1));
+        scene.transfer.iso_ranges = Some(vec![range]);
+        check(&format!("layers, from {xs:?} {ys:?}"), &volume, &scene);
     }
 }
 

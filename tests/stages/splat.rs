@@ -6,8 +6,9 @@ use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3, DVec4, UVec3};
 use sheetsplat::footprint::{FootprintTable, SECTION_SIZE, SECTIONS, section_extent, section_spacing};
+use sheetsplat::gpu::brick_lists::BrickLists;
 use sheetsplat::gpu::footprint_texture::FootprintTexture;
-use sheetsplat::gpu::voxel_list::VoxelLists;
+use sheetsplat::gpu::volume_texture::VolumeTexture;
 use sheetsplat::gpu::{layout, readback};
 use sheetsplat::headless::Headless;
 use sheetsplat::kernel::Kernel;
@@ -40,13 +41,13 @@ impl<'a> Stages<'a> {
         let shared = CullBuffers {
             frame: &uniform,
             groups: &uniform,
+            values: &VolumeTexture::upload(device, gpu.queue(), &[0.0]).unwrap().view,
             control_points: &storage,
             occluded: &storage,
             tally: &storage,
         };
-        let voxel = layout::Voxel { index: 0, value: 0.0, normal: 0, gradient_magnitude: 0.0 };
         let grid = Grid { dims: UVec3::ONE, spacing: DVec3::ONE };
-        let lists = VoxelLists::upload(device, &grid, &[voxel]);
+        let lists = BrickLists::upload(device, &grid, &[0]);
         let list = Cull::new(device, sheets).prepare(device, shared, &lists.lists[0], &storage, (1, 1), None);
         let splat = Stage::new(device, TextureFormat::Rgba32Float, sheets);
         Self { gpu, sheets, splat, list: RefCell::new(list) }

@@ -1,0 +1,151 @@
+//! The bricks on the GPU (Table 1's iso-voxel arrays), split where what is kept of each would pass the device's limit.
+
+use std::ops::Range;
+
+use wgpu::{Buffer, BufferDescriptor, BufferUsages, Device, Queue};
+
+use super::layout::{Brick, BrickState, Splat, Visit};
+use crate::brick::{self, BRICK_VOXELS, BrickList};
+use crate::volume::Grid;
+
+/// The bricks of all voxels that take part, in lists whose records each fit one storage binding.
+#[derive(Debug)]
+pub struct BrickLists {
+    /// The lists; their order does not matter, sheets add up.
+    pub lists: Vec<BrickBuffer>,
+    /// The bricks of all lists.
+    bricks: BrickList,
+    state: State,
+}
+
+/// How the buffers differ from the bricks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    Current,
+    /// Bricks have changed or come.
+    Changed,
+    /// More bricks have come than there is room for.
+    Full,
+}
+
+/// One list's bricks on the GPU.
+#[derive(Debug)]
+pub struct BrickBuffer {
+    /// Which of [`BrickLists::bricks`] they are.
+    range: Range<usize>,
+    /// `[Brick]`, with room for more.
+    pub buffer: Buffer,
+}
+
+impl BrickLists {
+    /// Uploads the bricks of voxels, given as indices into the volume.
+    pub fn upload(device: &Device, grid: &Grid, voxels: &[u32]) -> Self {
+        Self::of(device, BrickList::new(grid, voxels))
+    }
+
+    fn of(device: &Device, bricks: BrickList) -> Self {
+        let count = bricks.bricks().len();
+        // Room for bricks that come later.
+        let capacity = max_list_length(&device.limits()).min(count + count / 8 + 16);
+        let lists = (0..count)
+            .step_by(capacity)
+            .map(|first| BrickBuffer::upload(device, first..count.min(first + capacity), capacity, &bricks))
+            .collect();
+        Self { lists, bricks, state: State::Current }
+    }
+
+    /// Bricks of every list.
+    pub fn bricks(&self) -> impl Iterator<Item = &[Brick]> {
+        self.lists.iter().map(|list| &self.bricks.bricks()[list.range.clone()])
+    }
+
+    /// Whether a voxel is in a list.
+    pub fn contains(&self, voxel: u32) -> bool {
+        self.bricks.contains(voxel)
+    }
+
+    /// Lets voxels enter and leave; nothing reaches the GPU before [`Self::flush`].
+    pub fn change(&mut self, entering: &[u32], leaving: &[u32]) {
+        self.bricks.change(entering, leaving);
+        let count = self.bricks.bricks().len();
+        self.state = match &mut self.lists[..] {
+            [list] if self.state != State::Full && count <= list.capacity() => {
+                list.range.end = count;
+                State::Changed
+            }
+            _ => State::Full,
+        };
+    }
+
+    /// Whether there is room for the bricks that came; else all will be uploaded again.
+    pub fn has_room(&self) -> bool {
+        self.state != State::Full
+    }
+
+    /// Brings the GPU up to date.
+    pub fn flush(&mut self, device: &Device, queue: &Queue) {
+        match self.state {
+            State::Current => {}
+            State::Changed => {
+                for list in &self.lists {
+                    let bricks = &self.bricks.bricks()[list.range.clone()];
+                    queue.write_buffer(&list.buffer, 0, bytemuck::cast_slice(bricks));
+                }
+            }
+            State::Full => *self = Self::of(device, self.bricks.compacted()),
+        }
+        self.state = State::Current;
+    }
+
+    /// Number of voxels in all lists.
+    pub fn len(&self) -> u64 {
+        self.bricks.bricks().iter().map(|brick| u64::from(brick::present(brick).count_ones())).sum()
+    }
+
+    /// Whether no voxel takes part.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Bytes of GPU memory.
+    pub fn gpu_bytes(&self) -> u64 {
+        self.lists.iter().map(|list| list.buffer.size()).sum()
+    }
+}
+
+impl BrickBuffer {
+    fn upload(device: &Device, range: Range<usize>, capacity: usize, bricks: &BrickList) -> Self {
+        let buffer = device.create_buffer(&BufferDescriptor {
+            label: Some("sheetsplat.bricks"),
+            size: (capacity * size_of::<Brick>()) as u64,
+            usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
+            mapped_at_creation: true,
+        });
+        let bytes: &[u8] = bytemuck::cast_slice(&bricks.bricks()[range.clone()]);
+        if let Ok(mut mapped) = buffer.get_mapped_range_mut(..bytes.len() as u64) {
+            mapped.copy_from_slice(bytes);
+        }
+        buffer.unmap();
+        Self { range, buffer }
+    }
+
+    /// Bricks that it has room for.
+    fn capacity(&self) -> usize {
+        self.buffer.size() as usize / size_of::<Brick>()
+    }
+
+    /// Number of its bricks.
+    pub fn brick_count(&self) -> usize {
+        self.range.len()
+    }
+}
+
+/// The most bricks of a list: all records of its bricks, and of their places for voxels, must fit one binding.
+fn max_list_length(limits: &wgpu::Limits) -> usize {
+    let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    let records =
+        [size_of::<Brick>(), size_of::<Visit>(), size_of::<BrickState>(), size_of::<Splat>() * BRICK_VOXELS as usize];
+    let record = records.into_iter().max().unwrap_or(1);
+    // Places are counted in 32 bits.
+    (bytes / record as u64).clamp(1, u64::from(u32::MAX / BRICK_VOXELS)) as usize
+}
