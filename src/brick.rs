@@ -23,6 +23,9 @@ pub struct BrickList {
 
 const NONE: u32 = u32::MAX;
 
+/// The extent of a brick whose box is to be fitted again.
+const UNKNOWN: u32 = u32::MAX;
+
 impl BrickList {
     /// The bricks of some voxels, given as indices into the volume. Bricks come in memory order.
     pub fn new(grid: &Grid, voxels: &[u32]) -> Self {
@@ -56,15 +59,17 @@ impl BrickList {
             if self.numbers[brick as usize] == NONE {
                 self.add(brick);
             }
-            let (word, bit) = self.bit(voxel);
-            *word |= bit;
+            let (brick, word, bit) = self.bit(voxel);
+            brick.present[word] |= bit;
+            brick.extent = UNKNOWN;
         }
         for &voxel in leaving {
-            let (word, bit) = self.bit(voxel);
-            *word &= !bit;
+            let (brick, word, bit) = self.bit(voxel);
+            brick.present[word] &= !bit;
+            brick.extent = UNKNOWN;
         }
         // Once each: many voxels of a brick may have changed.
-        self.bricks.iter_mut().for_each(fit);
+        self.bricks.iter_mut().filter(|brick| brick.extent == UNKNOWN).for_each(fit);
     }
 
     /// The same without empty bricks, in memory order: what [`Self::new`] makes of the voxels.
@@ -79,10 +84,10 @@ impl BrickList {
         list
     }
 
-    /// A voxel's bit in its brick, which there must be.
-    fn bit(&mut self, voxel: u32) -> (&mut u32, u32) {
+    /// A voxel's brick, which there must be, and its bit there.
+    fn bit(&mut self, voxel: u32) -> (&mut Brick, usize, u32) {
         let (number, slot) = (self.numbers[brick_of(&self.grid, voxel) as usize], slot_of(&self.grid, voxel));
-        (&mut self.bricks[number as usize].present[slot as usize / 32], 1 << (slot % 32))
+        (&mut self.bricks[number as usize], slot as usize / 32, 1 << (slot % 32))
     }
 
     /// Adds a brick of the grid, without voxels.
@@ -136,6 +141,7 @@ fn fit(brick: &mut Brick) {
     const LAYERS: [(u64, u32); 3] = [(0x1111_1111_1111_1111, 1), (0x000f_000f_000f_000f, SIDE), (0xffff, SIDE * SIDE)];
     let bits = present(brick);
     if bits == 0 {
+        brick.extent = 0;
         return;
     }
     let bounds = LAYERS.map(|(layer, step)| {
