@@ -14,34 +14,6 @@ const ROWS = 8u;
 
 var<workgroup> opaque_rows: array<atomic<u32>, TILE>;
 
-// (1 - exp(-a)) / a, 1 at 0. The difference loses a small a's digits in f32; there the series is exact.
-fn absorbed(a: f32) -> f32 {
-    if a < 0.0625 {
-        return 1.0 - a * (0.5 - a * (1.0 / 6.0 - a * (1.0 / 24.0 - a / 120.0)));
-    }
-    return (1.0 - exp(-a)) / a;
-}
-
-// One sheet over or under what is there.
-fn composite(behind: vec4f, sheet: vec4f) -> vec4f {
-    var s = sheet;
-    switch frame.compositing {
-        case EXPONENTIAL: {
-            s *= absorbed(s.a);
-        }
-        case XRAY: {
-            return behind + s;
-        }
-        default: {
-            s /= max(s.a, 1.0);
-        }
-    }
-    if frame.order == FRONT_TO_BACK {
-        return behind + (1.0 - behind.a) * s;
-    }
-    return s + (1.0 - s.a) * behind;
-}
-
 @compute @workgroup_size(32, 8)
 fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workgroup: vec3u) {
     let at = unfold(workgroup);
@@ -66,7 +38,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
                 let layer = select(layers - 1u - i, i, frame.order == FRONT_TO_BACK);
                 let sheet = textureLoad(sheets, pixel, layer, 0);
                 if sheet.a > 0.0 {
-                    image = composite(image, sheet);
+                    image = composite(image, sheet, frame.compositing, frame.order);
                 }
             }
             acc[slot] = image;

@@ -1,7 +1,7 @@
 //! Bricks: 4×4×4 neighbouring voxels that are tested for visibility together (§6). Each voxel has its place in its brick, so that
 //! voxels enter and leave without moving others.
 
-use glam::UVec3;
+use glam::{DVec3, UVec3};
 
 use crate::gpu::layout::Brick;
 use crate::volume::Grid;
@@ -108,6 +108,12 @@ pub fn present(brick: &Brick) -> u64 {
 pub fn voxels(brick: &Brick) -> impl Iterator<Item = (u32, UVec3)> {
     let (bits, origin) = (present(brick), UVec3::new(brick.x, brick.y, brick.z) / SIDE * SIDE);
     (0..BRICK_VOXELS).filter(move |slot| bits >> slot & 1 == 1).map(move |slot| (slot, origin + in_brick(slot)))
+}
+
+/// The box of a brick's voxels: its middle and half its extent, voxels.
+pub fn bounds(brick: &Brick) -> (DVec3, DVec3) {
+    let half = UVec3::new(brick.extent & 0xff, brick.extent >> 8 & 0xff, brick.extent >> 16).as_dvec3() / 2.0;
+    (UVec3::new(brick.x, brick.y, brick.z).as_dvec3() + half, half)
 }
 
 /// Memory order of bricks, whatever the order in which they were added.

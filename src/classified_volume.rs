@@ -10,8 +10,8 @@ use crate::error::RenderError;
 use crate::gpu::brick_lists::BrickLists;
 use crate::gpu::volume_texture::VolumeTexture;
 use crate::iso_range::ValueSet;
-use crate::plan::{FramePlan, add_sections, count_sections, tile_grid};
-use crate::stats::{Counts, Totals};
+use crate::plan::{View, add_sections, count_sections, tile_grid};
+use crate::stats::{Counts, GroupSlabs, Totals};
 use crate::transfer_function::{Ramp, TransferFunction};
 use crate::value_list::ValueList;
 use crate::volume::{Grid, Volume};
@@ -125,14 +125,14 @@ impl ClassifiedVolume {
     }
 
     /// What of a frame's counts (Table 4) is known before it is drawn.
-    pub fn totals(&self, plan: &FramePlan) -> Totals {
-        let sections = self.lists.bricks().filter_map(|bricks| count_sections(bricks, &plan.view));
+    pub fn totals(&self, view: &View, groups: &GroupSlabs) -> Totals {
+        let sections = self.lists.bricks().filter_map(|bricks| count_sections(bricks, view));
         let (sections_total, slabs) = sections.reduce(add_sections).unwrap_or((0, 0..0));
         // A group's first or last sheets can lie outside of what any kernel touches.
         let sheets_of = |first: i32| {
-            (first + plan.sheets as i32).min(slabs.end).saturating_sub(first.max(slabs.start)).max(0) as u64
+            (first + groups.sheets as i32).min(slabs.end).saturating_sub(first.max(slabs.start)).max(0) as u64
         };
-        let [columns, rows] = tile_grid(plan.view.size).map(u64::from);
+        let [columns, rows] = tile_grid(view.size).map(u64::from);
         let counts = Counts {
             voxels_total: self.grid().dims.as_u64vec3().element_product(),
             voxels_in_range: self.lists.len(),
@@ -141,6 +141,6 @@ impl ClassifiedVolume {
             tiles_total: columns * rows * slabs.len() as u64,
             ..Counts::default()
         };
-        Totals { counts, group_sheets: plan.groups.iter().map(|group| sheets_of(group.first_slab)).collect() }
+        Totals { counts, group_sheets: groups.firsts.iter().map(|&first| sheets_of(first)).collect() }
     }
 }

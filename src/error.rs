@@ -2,6 +2,7 @@
 
 use crate::gpu::device::DeviceError;
 use crate::scene::SceneError;
+use crate::tile_bins::Unfit;
 use crate::volume::VolumeError;
 
 /// Why a frame could not be prepared or read back.
@@ -46,6 +47,16 @@ pub enum RenderError {
     /// The GPU stopped working, or refused to hand the image back.
     #[error("read-back failed: {0}")]
     Readback(String),
+}
+
+impl From<Unfit> for RenderError {
+    fn from(Unfit { what, required, actual }: Unfit) -> Self {
+        Self::OutOfRange {
+            key: "splatting.rasterizer",
+            found: format!("\"tiles\" with {required} {what}"),
+            allowed: format!("at most {actual}, or \"quads\""),
+        }
+    }
 }
 
 impl RenderError {

@@ -180,6 +180,7 @@ impl Headless {
                 width,
                 height,
                 counts,
+                rasterizer: scene_view.rasterizer().unwrap_or_default().to_owned(),
                 stages_ms,
                 gpu_bytes: scene_view.gpu_bytes() + target.width() as u64 * u64::from(height) * 16,
                 load_ms: 0.0,

@@ -53,6 +53,32 @@ impl Kernel {
         self.kappa * (-self.falloff * rho_squared).exp() * (PI.sqrt() / 2.0) * beyond / root
     }
 
+    /// Coefficients of a polynomial in z, the z⁰ one first, that is `H(0, 0, t) / t` for t² from `(1 - span)·support²`, where z is
+    /// -1, to `support²`, where it is 1.
+    pub fn cumulative_polynomial<const N: usize>(&self, span: f64) -> [f64; N] {
+        let count = N as f64;
+        let nodes: [f64; N] = std::array::from_fn(|i| (PI * (i as f64 + 0.5) / count).cos());
+        let at_nodes = nodes.map(|z| {
+            let t = self.support() * (1.0 - span * (1.0 - z) / 2.0).sqrt();
+            self.cumulative(0.0, t) / t
+        });
+        // Chebyshev polynomials: the current one and the one before, as coefficients of powers of z.
+        let (mut before, mut current) = ([0.0; N], [0.0; N]);
+        current[0] = 1.0;
+        let mut sum = [0.0; N];
+        for n in 0..N {
+            let weight = if n == 0 { 1.0 } else { 2.0 } / count;
+            let chebyshev = |z: f64| (n as f64 * z.acos()).cos();
+            let coefficient: f64 = nodes.iter().zip(at_nodes).map(|(&z, f)| f * chebyshev(z)).sum::<f64>() * weight;
+            sum.iter_mut().zip(current).for_each(|(sum, power)| *sum += coefficient * power);
+            // T₁ = z, then Tₙ₊₁ = 2z·Tₙ - Tₙ₋₁.
+            let factor = if n == 0 { 1.0 } else { 2.0 };
+            let next = std::array::from_fn(|i| if i == 0 { 0.0 } else { factor * current[i - 1] } - before[i]);
+            (before, current) = (current, next);
+        }
+        sum
+    }
+
     /// Half the length of the chord that the kernel's ball cuts from a ray at distance √`rho_squared`.
     pub fn half_chord(&self, rho_squared: f64) -> f64 {
         (self.radius * self.radius - rho_squared).max(0.0).sqrt()

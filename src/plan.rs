@@ -133,11 +133,8 @@ impl FramePlan {
                     .iter()
                     .map(|&at| {
                         let brick = &bricks[at as usize];
-                        let low = UVec3::new(brick.x, brick.y, brick.z).as_dvec3();
-                        let half = UVec3::new(brick.extent & 0xff, brick.extent >> 8 & 0xff, brick.extent >> 16)
-                            .as_dvec3()
-                            / 2.0;
-                        let z = row.dot((low + half).extend(1.0));
+                        let (middle, half) = brick::bounds(brick);
+                        let z = row.dot(middle.extend(1.0));
                         let spread = row.truncate().abs().dot(half);
                         groups.touched(z - spread).start..groups.touched(z + spread).end
                     })

@@ -1,57 +1,36 @@
 //! A prepared frame: the buffers that recording needs, and what of them the next frame can take over.
 
-use wgpu::util::DeviceExt;
-use wgpu::{BindGroup, Buffer, BufferUsages, Device, TextureView};
+use wgpu::{BindGroup, Buffer, CommandEncoder};
 
-use crate::brick;
-use crate::classified_volume::ClassifiedVolume;
-use crate::gpu::footprint_texture::FootprintTexture;
-use crate::gpu::targets::Targets;
+use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
-use crate::kernel::Kernel;
-use crate::pass::cull::CullList;
-use crate::pass::tiles::TileLists;
-use crate::plan::{FramePlan, View};
-use crate::splatting::Order;
-use crate::stats::Totals;
+use crate::plan::View;
+use crate::rasterizer::quads::QuadFrame;
+use crate::rasterizer::tiles::TileFrame;
+use crate::stats::{GroupSlabs, Totals};
 
 /// A frame whose buffers are all allocated and filled: recording it cannot fail.
 #[derive(Debug)]
 pub(crate) struct PreparedFrame {
-    pub(crate) planned: Planned,
-    pub(crate) targets: Targets,
-    /// And the kernel and slab width they are for.
-    pub(crate) footprints: (FootprintTexture, (Kernel, Option<f64>)),
+    pub(crate) view: View,
+    pub(crate) drawing: Drawing,
+    pub(crate) compositing: CompositingBuffer,
     pub(crate) uniform: Buffer,
-    pub(crate) groups: Buffer,
-    pub(crate) group_stride: u32,
     pub(crate) control_points: Buffer,
-    pub(crate) tally: Buffer,
-    pub(crate) tile_lists: TileLists,
-    pub(crate) lists: Vec<PreparedList>,
-    pub(crate) timer: Option<Timer>,
-    pub(crate) sheet_views: Vec<TextureView>,
-    pub(crate) clear_group: BindGroup,
-    pub(crate) composite_groups: Vec<BindGroup>,
-    pub(crate) occlude_groups: [BindGroup; 2],
     pub(crate) resolve_groups: Vec<BindGroup>,
-    pub(crate) gpu_bytes: u64,
+    pub(crate) timer: Option<Timer>,
+    /// Counted when first asked for.
+    pub(crate) totals: Option<Totals>,
     /// Where a recorded frame leaves its counts; gone when somebody waits for them.
     pub(crate) staging: Option<Staging>,
+    pub(crate) gpu_bytes: u64,
 }
 
-/// What only changes with the view, or with the bricks: the buckets.
+/// A rasterizer's part of a frame.
 #[derive(Debug)]
-pub(crate) struct Planned {
-    pub(crate) plan: FramePlan,
-    pub(crate) totals: Option<Totals>,
-    pub(crate) order: Order,
-    /// [`ClassifiedVolume::revision`].
-    pub(crate) revision: u64,
-    /// For every list its bricks in bucket order, `[u32]`.
-    pub(crate) orders: Vec<Buffer>,
-    /// For every list the most bricks and voxels that any group can visit.
-    pub(crate) most: Vec<(u32, u32)>,
+pub(crate) enum Drawing {
+    Quads(Box<QuadFrame>),
+    Tiles(Box<TileFrame>),
 }
 
 /// A frame's counts: a [`Tally`](crate::gpu::layout::Tally), for every group the tiles it composited, `[u32]`, and timestamps from `timestamps` on.
@@ -65,12 +44,6 @@ pub(crate) struct Staging {
     pub(crate) period: f32,
 }
 
-#[derive(Debug)]
-pub(crate) struct PreparedList {
-    pub(crate) cull: CullList,
-    pub(crate) splat_group: BindGroup,
-}
-
 impl PreparedFrame {
     /// Bytes of GPU memory that the frame and its volume hold.
     pub(crate) fn gpu_bytes(&self) -> u64 {
@@ -78,68 +51,44 @@ impl PreparedFrame {
     }
 }
 
-impl Planned {
-    pub(crate) fn new(device: &Device, volume: &ClassifiedVolume, view: View, sheets: u32, order: Order) -> Self {
-        let plan = FramePlan::new(volume.lists.bricks(), view, sheets, order);
-        let most = (volume.lists.bricks().zip(&plan.orders).enumerate())
-            .map(|(at, (bricks, order))| {
-                let voxels = |&brick: &u32| brick::present(&bricks[brick as usize]).count_ones();
-                most(plan.groups.iter().map(|group| {
-                    let bricks = group.bricks[at].clone();
-                    order[bricks.start as usize..bricks.end as usize].iter().map(voxels)
-                }))
-            })
-            .collect();
-        let upload = |order: &Vec<u32>| {
-            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("sheetsplat.order"),
-                contents: bytemuck::cast_slice(order),
-                usage: BufferUsages::STORAGE,
-            })
-        };
-        Self {
-            order,
-            revision: volume.revision,
-            orders: plan.orders.iter().map(upload).collect(),
-            most,
-            plan,
-            totals: None,
+impl Drawing {
+    /// Passes that are timed.
+    pub(crate) fn passes(&self) -> usize {
+        match self {
+            Self::Quads(frame) => frame.passes(),
+            Self::Tiles(_) => TileFrame::PASSES,
         }
     }
-}
 
-/// What a new frame can take from the one before it.
-#[derive(Default)]
-pub(crate) struct Previous {
-    pub(crate) planned: Option<Planned>,
-    pub(crate) targets: Option<Targets>,
-    pub(crate) footprints: Option<(FootprintTexture, (Kernel, Option<f64>))>,
-    pub(crate) uniform: Option<Buffer>,
-    pub(crate) groups: Option<Buffer>,
-    pub(crate) control_points: Option<Buffer>,
-    pub(crate) tally: Option<Buffer>,
-    pub(crate) tile_lists: Option<TileLists>,
-    pub(crate) lists: Vec<PreparedList>,
-}
-
-impl Previous {
-    pub(crate) fn of(frame: Option<PreparedFrame>) -> Self {
-        let Some(frame) = frame else { return Self::default() };
-        Self {
-            planned: Some(frame.planned),
-            targets: Some(frame.targets),
-            footprints: Some(frame.footprints),
-            uniform: Some(frame.uniform),
-            groups: Some(frame.groups),
-            control_points: Some(frame.control_points),
-            tally: Some(frame.tally),
-            tile_lists: Some(frame.tile_lists),
-            lists: frame.lists,
+    /// The slabs of the sheet groups, in the order they are composited in.
+    pub(crate) fn group_slabs(&self) -> GroupSlabs {
+        match self {
+            Self::Quads(frame) => frame.group_slabs(),
+            Self::Tiles(frame) => frame.group_slabs(),
         }
     }
-}
 
-/// The most bricks and voxels that any group can visit, from the voxel counts of every group's bricks.
-fn most<C: ExactSizeIterator<Item = u32>>(groups: impl Iterator<Item = C>) -> (u32, u32) {
-    groups.fold((0, 0), |(bricks, voxels), counts| (bricks.max(counts.len() as u32), voxels.max(counts.sum())))
+    /// Copies the frame's counts to the start of `staging`.
+    pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer) {
+        match self {
+            Self::Quads(frame) => frame.copy_counts(encoder, staging),
+            Self::Tiles(frame) => frame.copy_counts(encoder, staging),
+        }
+    }
+
+    /// Bytes of GPU memory.
+    pub(crate) fn gpu_bytes(&self) -> u64 {
+        match self {
+            Self::Quads(frame) => frame.gpu_bytes(),
+            Self::Tiles(frame) => frame.gpu_bytes(),
+        }
+    }
+
+    /// `"quads"` or `"tiles"`.
+    pub(crate) fn rasterizer(&self) -> &'static str {
+        match self {
+            Self::Quads(_) => "quads",
+            Self::Tiles(_) => "tiles",
+        }
+    }
 }

@@ -1,27 +1,24 @@
 //! The renderer a host embeds: it owns pipelines, never a device, and neither submits nor waits.
 
-use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Queue, TextureFormat, TextureView};
+use std::sync::OnceLock;
+
+use wgpu::{BufferUsages, CommandEncoder, Device, Queue, TextureFormat, TextureView};
 
 use crate::error::RenderError;
-use crate::footprint::FootprintTable;
-use crate::gpu::bindings::grown;
 use crate::gpu::device::{self, DeviceError};
-use crate::gpu::footprint_texture::FootprintTexture;
-use crate::gpu::layout::{Group, Tally};
-use crate::gpu::targets::Targets;
+use crate::gpu::layout::Tally;
+use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::{PASS_BYTES, Timer};
 use crate::gpu::uniforms::{self, Ramps};
 use crate::kernel::Kernel;
-use crate::pass::composite::Composite;
-use crate::pass::cull::{Cull, CullBuffers};
-use crate::pass::occlude::Occlude;
 use crate::pass::resolve::Resolve;
-use crate::pass::splat::Splat;
-use crate::pass::tiles::Tiles;
 use crate::plan::View;
-use crate::prepared_frame::{Planned, PreparedFrame, PreparedList, Previous, Staging};
+use crate::prepared_frame::{Drawing, PreparedFrame, Staging};
+use crate::rasterizer::quads::QuadRasterizer;
+use crate::rasterizer::tiles::TileRasterizer;
+use crate::rasterizer::{Given, filled};
 use crate::scene_view::{Prepared, SceneView};
-use crate::splatting::FootprintForm;
+use crate::splatting::Rasterizer;
 
 /// What a renderer is made for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,16 +45,14 @@ pub struct Renderer {
     sheet_format: TextureFormat,
     sheets: u32,
     profile: bool,
-    cull: Cull,
-    tiles: Tiles,
-    splat: Splat,
-    composite: Composite,
-    occlude: Occlude,
+    /// Compiled when first needed.
+    quads: OnceLock<QuadRasterizer>,
+    tiles: TileRasterizer,
     resolve: Resolve,
 }
 
 impl Renderer {
-    /// Compiles every stage.
+    /// Compiles what every frame needs; a rasterizer's stages are compiled with the first frame that it draws.
     ///
     /// # Errors
     /// If a limit of the device is too small or it cannot blend the sheet format asked for.
@@ -69,11 +64,8 @@ impl Renderer {
             sheet_format,
             sheets,
             profile: options.profile,
-            cull: Cull::new(device, sheets),
-            tiles: Tiles::new(device),
-            splat: Splat::new(device, sheet_format, sheets),
-            composite: Composite::new(device),
-            occlude: Occlude::new(device),
+            quads: OnceLock::new(),
+            tiles: TileRasterizer::default(),
             resolve: Resolve::new(device, options.target_format),
         })
     }
@@ -95,85 +87,52 @@ impl Renderer {
         let seen = View::new(volume.grid(), &scene.camera, splatting, size)?;
         let kernel = Kernel::new(splatting.radius, splatting.falloff);
         // What can fail comes before anything is taken from the last frame.
-        let targets = match frame {
-            Some(old) if old.targets.size == size && self.draws_into(&old.targets.sheets) => None,
-            _ => Some(Targets::new(device, size, self.sheet_format, self.sheets)?),
+        let compositing = match frame {
+            Some(old) if old.compositing.size == size => None,
+            _ => Some(CompositingBuffer::new(device, size)?),
         };
-        let Previous {
-            planned,
-            targets: old_targets,
-            footprints,
-            uniform,
-            groups,
-            control_points,
-            tally,
-            tile_lists,
-            lists,
-        } = Previous::of(frame.take());
-
-        let Some(targets) = targets.or(old_targets) else { unreachable!("made anew where there were none") };
+        let obstacle = TileRasterizer::obstacle(device, splatting);
+        let by_tiles = match (splatting.rasterizer, obstacle) {
+            (Rasterizer::Quads, _) | (Rasterizer::Auto, Some(_)) => false,
+            (Rasterizer::Tiles, Some(obstacle)) => return Err(obstacle),
+            (_, None) => true,
+        };
         volume.lists.flush(device, queue);
-        let current = |old: &Planned| {
-            old.plan.view == seen
-                && old.plan.sheets == self.sheets
-                && (old.order, old.revision) == (splatting.order, volume.revision)
-        };
-        let mut prepared = Prepared::default();
-        let planned = planned.filter(current).unwrap_or_else(|| {
-            prepared.bucketed = true;
-            Planned::new(device, volume, seen, self.sheets, splatting.order)
+        let old = frame.take();
+        let (old_compositing, uniform, control_points, drawing, totals) = old.map_or_else(Default::default, |old| {
+            let PreparedFrame { compositing, uniform, control_points, drawing, totals, .. } = old;
+            (Some(compositing), Some(uniform), Some(control_points), Some(drawing), totals)
         });
-        let plan = &planned.plan;
-
-        let width = seen.slabs.width;
-        // The summed-area form serves every width (§3.3.1).
-        let of = (kernel, (splatting.footprint == FootprintForm::Sections).then_some(width));
-        let footprints = footprints.filter(|old| (old.0.form, old.1) == (splatting.footprint, of));
-        let footprints = footprints.unwrap_or_else(|| {
-            let table = FootprintTable::new(splatting.footprint, &kernel, width);
-            (FootprintTexture::upload(device, queue, &table), of)
-        });
-        let filled = |old: Option<Buffer>, label, bytes: &[u8], usage| {
-            let buffer = grown(device, old, label, bytes.len() as u64, usage | BufferUsages::COPY_DST);
-            queue.write_buffer(&buffer, 0, bytes);
-            buffer
-        };
+        let Some(compositing) = compositing.or(old_compositing) else { unreachable!("made where there was none") };
         let ramps = Ramps::new(volume.transfer());
+        let filled = |old, label, bytes: &[u8], usage| filled(device, queue, old, label, bytes, usage);
         let points = bytemuck::cast_slice(&ramps.points);
         let control_points = filled(control_points, "sheetsplat.control_points", points, BufferUsages::STORAGE);
         let frame_uniform = uniforms::frame(&seen, &kernel, volume.grid(), &ramps, scene);
         let bytes = bytemuck::bytes_of(&frame_uniform);
         let uniform = filled(uniform, "sheetsplat.frame", bytes, BufferUsages::UNIFORM);
-        let alignment = device.limits().min_uniform_buffer_offset_alignment as usize;
-        let group_stride = size_of::<Group>().next_multiple_of(alignment);
-        let groups = filled(groups, "sheetsplat.groups", &uniforms::groups(plan, group_stride), BufferUsages::UNIFORM);
-        let tally_bytes = size_of::<Tally>() as u64 + targets.opaque_tiles.size();
-        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-        let tally = grown(device, tally, "sheetsplat.tally", tally_bytes, usage);
 
-        let shared = CullBuffers {
+        let given = Given {
+            device,
+            queue,
+            volume,
+            view: &seen,
+            kernel: &kernel,
+            splatting,
             frame: &uniform,
-            groups: &groups,
-            values: &volume.texture.view,
             control_points: &control_points,
-            occluded: &targets.occluded,
-            tally: &tally,
+            ramp_lengths: ramps.lengths(),
+            compositing: &compositing,
         };
-        let mut old_lists = lists.into_iter();
-        let lists: Vec<PreparedList> = (volume.lists.lists.iter().zip(&planned.orders).zip(&planned.most))
-            .map(|((list, order), &most)| {
-                let previous = old_lists.next().map(|old| old.cull);
-                let cull = self.cull.prepare(device, shared, list, order, most, previous);
-                let splat_group = self.splat.bind(device, &uniform, &groups, &cull, &footprints.0);
-                PreparedList { cull, splat_group }
-            })
-            .collect();
-        let tile_lists =
-            self.tiles.prepare(device, [&uniform, &groups, &tally], &targets, plan.groups.len(), tile_lists);
-        // Every group has three passes.
-        let passes = 3 * plan.groups.len() + 1;
+        let was = drawing.as_ref().map(Drawing::rasterizer);
+        let (drawing, bucketed) = self.draw_with(given, by_tiles, drawing)?;
+        let totals = totals.filter(|_| !bucketed && was == Some(drawing.rasterizer()));
+
+        // The rasterizer's passes, and resolve.
+        let passes = drawing.passes() + 1;
         let timer = if self.profile { Timer::new(device, passes) } else { None };
-        let timestamps = (size_of::<Tally>() as u64 + plan.groups.len() as u64 * 4).next_multiple_of(8);
+        let timestamps =
+            (size_of::<Tally>() as u64 + drawing.group_slabs().firsts.len() as u64 * 4).next_multiple_of(8);
         let staging = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("sheetsplat.counts"),
             size: timestamps + timer.as_ref().map_or(0, |_| passes as u64 * PASS_BYTES),
@@ -181,90 +140,74 @@ impl Renderer {
             mapped_at_creation: false,
         });
         let period = queue.get_timestamp_period();
-        let tiles = &tile_lists.composited;
-        let sheets = targets.sheets_view();
-        let composite = |band| self.composite.bind(device, &uniform, band, &sheets, tiles, &targets);
-        let list_bytes: u64 = lists.iter().map(|list| list.cull.gpu_bytes()).sum();
-        let other_bytes = uniform.size() + groups.size() + control_points.size() + tally.size();
+        let shared_bytes = compositing.gpu_bytes() + uniform.size() + control_points.size();
         *frame = Some(PreparedFrame {
-            gpu_bytes: volume.gpu_bytes() + targets.gpu_bytes() + footprints.0.gpu_bytes + list_bytes + other_bytes,
-            clear_group: self.splat.bind_clear(device, &uniform, tiles),
-            composite_groups: targets.bands.iter().map(composite).collect(),
-            occlude_groups: self.occlude.bind(device, &uniform, &tile_lists.occluding, &targets),
-            resolve_groups: targets.bands.iter().map(|band| self.resolve.bind(device, &uniform, band)).collect(),
-            sheet_views: (0..self.sheets).map(|layer| targets.sheet_view(layer)).collect(),
-            group_stride: group_stride as u32,
-            planned,
-            targets,
-            footprints,
+            gpu_bytes: volume.gpu_bytes() + drawing.gpu_bytes() + shared_bytes,
+            resolve_groups: compositing.bands.iter().map(|band| self.resolve.bind(device, &uniform, band)).collect(),
+            view: seen,
+            drawing,
+            compositing,
             uniform,
-            groups,
             control_points,
-            tally,
-            tile_lists,
-            lists,
             timer,
+            totals,
             staging: Some(Staging { buffer: staging, timestamps, stages: Vec::new(), period }),
         });
-        Ok(prepared)
+        Ok(Prepared { bucketed })
     }
 
-    /// Whether these sheet buffers are the ones that the renderer's pipelines draw into.
-    fn draws_into(&self, sheets: &wgpu::Texture) -> bool {
-        sheets.format() == self.sheet_format && sheets.depth_or_array_layers() == self.sheets
+    /// Prepares a rasterizer's part: by tiles, unless the view does not fit them and the scene does not insist.
+    fn draw_with(
+        &self,
+        given: Given<'_>,
+        by_tiles: bool,
+        previous: Option<Drawing>,
+    ) -> Result<(Drawing, bool), RenderError> {
+        let (old_quads, old_tiles) = match previous {
+            Some(Drawing::Quads(frame)) => (Some(*frame), None),
+            Some(Drawing::Tiles(frame)) => (None, Some(*frame)),
+            None => (None, None),
+        };
+        if by_tiles {
+            match self.tiles.prepare(given, old_tiles) {
+                Ok((frame, bucketed)) => return Ok((Drawing::Tiles(Box::new(frame)), bucketed)),
+                Err(error) if given.splatting.rasterizer == Rasterizer::Tiles => return Err(error),
+                Err(_) => {}
+            }
+        }
+        let (frame, bucketed) = self.quads(given.device).prepare(given, old_quads);
+        Ok((Drawing::Quads(Box::new(frame)), bucketed))
+    }
+
+    fn quads(&self, device: &Device) -> &QuadRasterizer {
+        self.quads.get_or_init(|| QuadRasterizer::new(device, self.sheet_format, self.sheets))
     }
 
     /// Records the view's prepared frame; nothing, if there is none. The target must have the renderer's target format and the
     /// scene's image size.
     pub fn record(&self, encoder: &mut CommandEncoder, view: &mut SceneView, target: &TextureView) {
         let Some(frame) = &mut view.frame else { return };
-        let PreparedFrame { planned: Planned { plan, .. }, targets, tile_lists, timer, .. } = frame;
-        let masks = [&targets.opaque, &targets.opaque_columns, &targets.occluded, &targets.opaque_tiles, &frame.tally];
-        let accs = targets.bands.iter().map(|band| &band.acc);
-        for buffer in accs.chain(masks).chain(frame.lists.iter().map(|list| &list.cull.states)) {
-            encoder.clear_buffer(buffer, 0, None);
+        let PreparedFrame { drawing, compositing, timer, .. } = frame;
+        for band in &compositing.bands {
+            encoder.clear_buffer(&band.acc, 0, None);
         }
-        let mut offsets = (0..).step_by(frame.group_stride as usize);
-        for group in &plan.groups {
-            // (list, offset of its group uniform) for the lists that reach into the group.
-            let lists: Vec<(&PreparedList, u32)> = (frame.lists.iter().zip(&mut offsets).zip(&group.bricks))
-                .filter(|(_, bricks)| !bricks.is_empty())
-                .map(|(list, _)| list)
-                .collect();
-            let Some(&(_, any_offset)) = lists.first() else { continue };
-
-            let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.cull", timer, "cull"));
-            for &(list, offset) in &lists {
-                self.cull.record(&mut pass, &list.cull, offset);
+        match drawing {
+            Drawing::Tiles(tiles) => self.tiles.record(encoder, timer, tiles),
+            Drawing::Quads(quads) => {
+                if let Some(rasterizer) = self.quads.get() {
+                    rasterizer.record(encoder, timer, quads);
+                }
             }
-            self.tiles.record(&mut pass, tile_lists, any_offset);
-            drop(pass);
-
-            let clear = (&frame.clear_group, &tile_lists.composited);
-            let draws = lists.iter().map(|(list, offset)| (&list.splat_group, *offset, &list.cull.draw_args));
-            let times = timer.as_mut().map(|timer| timer.render("splat"));
-            self.splat.record(encoder, times, frame.footprints.0.form, &frame.sheet_views, clear, draws);
-
-            let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.composite", timer, "composite"));
-            self.composite.record(&mut pass, &frame.composite_groups, &tile_lists.composited);
-            self.occlude.record(&mut pass, &frame.occlude_groups, &tile_lists.occluding);
         }
-        let bands = targets.bands.iter().map(|band| band.band);
+        let bands = compositing.bands.iter().map(|band| band.band);
         let times = timer.as_mut().map(|timer| timer.render("resolve"));
-        self.resolve.record(encoder, times, target, targets.size[0], frame.resolve_groups.iter().zip(bands));
+        self.resolve.record(encoder, times, target, compositing.size[0], frame.resolve_groups.iter().zip(bands));
 
         if let Some(staging) = &mut frame.staging {
-            let (tally, tiles) = (size_of::<Tally>() as u64, plan.groups.len() as u64 * 4);
-            encoder.copy_buffer_to_buffer(&frame.tally, 0, &staging.buffer, 0, tally);
-            encoder.copy_buffer_to_buffer(&tile_lists.counts, 0, &staging.buffer, tally, tiles);
+            drawing.copy_counts(encoder, &staging.buffer);
             if let Some(timer) = timer {
                 staging.stages = timer.finish(encoder, &staging.buffer, staging.timestamps);
             }
         }
     }
-}
-
-fn compute<'a>(label: &'a str, timer: &'a mut Option<Timer>, stage: &'static str) -> wgpu::ComputePassDescriptor<'a> {
-    let timestamp_writes = timer.as_mut().map(|timer| timer.compute(stage));
-    wgpu::ComputePassDescriptor { label: Some(label), timestamp_writes }
 }

@@ -97,6 +97,11 @@ impl SceneView {
         self.scene.camera.direction = rotation * direction;
     }
 
+    /// How the prepared frame is drawn: `"quads"` or `"tiles"`.
+    pub fn rasterizer(&self) -> Option<&'static str> {
+        self.frame.as_ref().map(|frame| frame.drawing.rasterizer())
+    }
+
     /// Bytes of GPU memory that the view holds.
     pub fn gpu_bytes(&self) -> u64 {
         self.frame.as_ref().map_or(self.volume.gpu_bytes(), PreparedFrame::gpu_bytes)
@@ -107,8 +112,8 @@ impl SceneView {
     pub fn counts(&mut self) -> Option<PendingCounts> {
         let (volume, frame) = (&self.volume, self.frame.as_mut()?);
         let staging = frame.staging.take()?;
-        let planned = &mut frame.planned;
-        let totals = planned.totals.get_or_insert_with(|| volume.totals(&planned.plan)).clone();
+        let PreparedFrame { drawing, totals, view, .. } = frame;
+        let totals = totals.get_or_insert_with(|| volume.totals(view, &drawing.group_slabs())).clone();
         Some(PendingCounts::new(totals, staging))
     }
 }

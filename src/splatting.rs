@@ -18,7 +18,7 @@ pub enum FootprintForm {
     SummedArea,
 }
 
-/// How a sheet's accumulated amount becomes colour and opacity.
+/// How a sheet's accumulated amount becomes colour and opacity; numbered as in the shaders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Compositing {
     /// The paper's: opacities add up within a sheet, at most to 1.
@@ -29,13 +29,25 @@ pub enum Compositing {
     Xray,
 }
 
-/// The order in which sheets meet the compositing buffer.
+/// The order in which sheets meet the compositing buffer; numbered as in the shaders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
     /// Nearest sheet first.
     FrontToBack,
     /// Farthest sheet first; the same image.
     BackToFront,
+}
+
+/// How kernel sections get to the pixels. The same image to rounding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rasterizer {
+    /// By tiles where device, view and footprint form allow it, else by quads.
+    Auto,
+    /// Footprint quads, drawn into sheet buffers (§3.2).
+    Quads,
+    /// Compute: every tile gathers its sections front to back. Needs [`wgpu::Features::SUBGROUP`] with 8 to 32 threads and the
+    /// summed-area form.
+    Tiles,
 }
 
 /// All splatting settings of a scene.
@@ -63,6 +75,8 @@ pub struct Splatting {
     pub culling: bool,
     /// Composite only tiles that received splats (§6). Never changes the image.
     pub tiles: bool,
+    /// How kernel sections get to the pixels.
+    pub rasterizer: Rasterizer,
 }
 
 impl Default for Splatting {
@@ -78,6 +92,7 @@ impl Default for Splatting {
             opacity_threshold: 0.95,
             culling: true,
             tiles: true,
+            rasterizer: Rasterizer::Auto,
         }
     }
 }

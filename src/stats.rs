@@ -30,6 +30,8 @@ pub struct Stats {
     /// The frame's counts.
     #[serde(flatten)]
     pub counts: Counts,
+    /// `quads` or `tiles`; `reference` for the reference backend.
+    pub rasterizer: String,
     /// Of a renderer that profiles, on a device with timestamp queries: the GPU's milliseconds by stage.
     #[serde(skip_serializing_if = "StageTimes::is_empty")]
     pub stages_ms: StageTimes,
@@ -68,6 +70,15 @@ pub struct Counts {
     pub bricks_tested: u64,
     /// Those of them whose voxels were looked at.
     pub bricks_visited: u64,
+}
+
+/// The slabs that a frame's sheet groups consist of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GroupSlabs {
+    /// Every group's first slab, in the order groups are composited in.
+    pub firsts: Vec<i32>,
+    /// Sheets of a group.
+    pub sheets: u32,
 }
 
 /// What of a frame's counts is known before it is drawn.

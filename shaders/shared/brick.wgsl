@@ -70,5 +70,9 @@ fn unfold(workgroup: vec3u) -> u32 {
 // Where in the volume a place of a brick is: places run over the aligned 4×4×4 voxels that a brick's least voxel lies in.
 fn voxel_of(brick: Brick, slot: u32) -> vec3u {
     let origin = vec3u(brick.x, brick.y, brick.z) & vec3u(~3u);
-    return origin + vec3u(slot & 3u, (slot >> 2u) & 3u, slot >> 4u);
+    return origin + in_brick(slot);
+}
+
+fn in_brick(slot: u32) -> vec3u {
+    return vec3u(slot & 3u, (slot >> 2u) & 3u, slot >> 4u);
 }

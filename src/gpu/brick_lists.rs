@@ -59,6 +59,11 @@ impl BrickLists {
         self.lists.iter().map(|list| &self.bricks.bricks()[list.range.clone()])
     }
 
+    /// The bricks of all lists together.
+    pub fn all(&self) -> &[Brick] {
+        self.bricks.bricks()
+    }
+
     /// Whether a voxel is in a list.
     pub fn contains(&self, voxel: u32) -> bool {
         self.bricks.contains(voxel)

@@ -53,7 +53,8 @@ pub enum DeviceError {
 }
 
 /// Features that the renderer uses where a device has them. None is required.
-pub const WANTED_FEATURES: Features = Features::FLOAT32_BLENDABLE.union(Features::TIMESTAMP_QUERY);
+pub const WANTED_FEATURES: Features =
+    Features::FLOAT32_BLENDABLE.union(Features::TIMESTAMP_QUERY).union(Features::SUBGROUP);
 
 /// Features and limits for a device that renders as well as the adapter can: to be merged into a device descriptor.
 #[derive(Clone, Debug)]

@@ -195,3 +195,64 @@ pub struct Band {
     /// Number of rows.
     pub rows: u32,
 }
+
+/// What the tile rasterizer's threads share.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Gather {
+    /// Coefficients of the polynomial in z that `H(0, 0, t) / t` of eq. 3 is.
+    pub along: [[f32; 4]; 4],
+    /// The same for t half a chord of the kernel's ball; accurate where the footprint is large.
+    pub chord: [[f32; 4]; 2],
+    /// `ρ² = x·dx² + y·dx·dy + z·dy²` of a pixel offset, and the exponent of the kernel per ρ², to base 2.
+    pub metric: [f32; 4],
+    /// z of `chord` is x times the half chord's square, plus y.
+    pub chord_scale: [f32; 2],
+    /// z of `along` is this times t², minus 1.
+    pub along_scale: f32,
+    /// Warped depth of the nearest group's near plane.
+    pub near: f32,
+    /// Bound of the depths' rounding errors.
+    pub depth_error: f32,
+    /// Sheet groups.
+    pub groups: u32,
+    /// Bricks of the volume.
+    pub bricks: u32,
+    /// Where in [`Gathered`]'s words the bits of drawn voxels start: for every group of those that a kernel reaches into a bit per
+    /// place.
+    pub drawn: u32,
+    /// Where the bits of composited tiles start: for every group a bit per 32×32 tile.
+    pub composited: u32,
+    /// Unused.
+    pub padding_0: u32,
+    /// Unused.
+    pub padding_1: u32,
+    /// Unused.
+    pub padding_2: u32,
+}
+
+/// The tiles and groups that one dispatch draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Part {
+    /// First row of pixels of the compositing buffer that is bound.
+    pub first_row: u32,
+    /// The first tile.
+    pub first_tile: u32,
+    /// The tile after the last.
+    pub end_tile: u32,
+    /// The first group.
+    pub first_group: u32,
+    /// The group after the last.
+    pub end_group: u32,
+}
+
+/// What the tile rasterizer counts. Then, in words: how many 32×32 tiles every group composited, and bits as [`Gather`] says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Gathered {
+    /// Counts of the frame.
+    pub tally: Tally,
+    /// The first of the words.
+    pub words: [u32; 1],
+}

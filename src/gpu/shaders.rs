@@ -28,7 +28,7 @@ pub const CULL_VOXELS: Shader = shader!("cull_voxels", "frame", "brick", "tally"
 /// Those voxels in a row.
 pub const COMPACT: Shader = shader!("compact", "brick", "tally", "scan");
 /// Shades those that were not shaded before.
-pub const SHADE: Shader = shader!("shade", "frame", "brick", "volume", "project", "splat");
+pub const SHADE: Shader = shader!("shade", "frame", "brick", "volume", "project", "splat", "shading");
 /// The tiles they touch.
 pub const TILES: Shader = shader!("tiles", "frame", "brick", "tally", "tile_list");
 /// Zeroes the sheet buffers there.
@@ -36,15 +36,17 @@ pub const CLEAR: Shader = shader!("clear", "frame", "brick", "tile_list", "sheet
 /// Draws footprints into the sheet buffers.
 pub const SPLAT: Shader = shader!("splat", "frame", "brick", "splat", "sheets");
 /// Composites the sheet buffers.
-pub const COMPOSITE: Shader = shader!("composite", "frame", "brick", "band", "tile_list");
+pub const COMPOSITE: Shader = shader!("composite", "frame", "brick", "band", "tile_list", "compositing");
 /// Computes the occlusion buffer.
 pub const OCCLUDE: Shader = shader!("occlude", "frame", "brick", "tile_list");
+/// Draws whole tiles from front to back.
+pub const GATHER: Shader = shader!("gather", "frame", "brick", "gather", "volume", "project", "shading", "compositing");
 /// Lays the result over the background.
 pub const RESOLVE: Shader = shader!("resolve", "frame", "band");
 
 /// Every shader, in the order of the data flow.
-pub const ALL: [Shader; 10] =
-    [CULL_BRICKS, CULL_VOXELS, COMPACT, SHADE, TILES, CLEAR, SPLAT, COMPOSITE, OCCLUDE, RESOLVE];
+pub const ALL: [Shader; 11] =
+    [CULL_BRICKS, CULL_VOXELS, COMPACT, SHADE, TILES, CLEAR, SPLAT, COMPOSITE, OCCLUDE, GATHER, RESOLVE];
 
 impl Shader {
     /// Compiles the shader.

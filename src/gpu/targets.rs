@@ -1,4 +1,4 @@
-//! What depends on the image's size alone: sheet buffers, compositing buffer, opacity and occlusion buffers.
+//! What depends on the image's size alone: compositing buffer, sheet buffers, opacity and occlusion buffers.
 
 use wgpu::util::DeviceExt;
 use wgpu::{
@@ -10,15 +10,22 @@ use super::layout::Band;
 use crate::error::RenderError;
 use crate::plan::{TILE, tile_grid};
 
-/// Buffers of one image size.
+/// The compositing buffer.
+#[derive(Debug)]
+pub struct CompositingBuffer {
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// Bands of rows that each fit one storage binding.
+    pub bands: Vec<BandBuffer>,
+}
+
+/// What quads are drawn into and tested against.
 #[derive(Debug)]
 pub struct Targets {
     /// Width and height, pixels.
     pub size: [u32; 2],
     /// The sheet buffers of a group, one per layer.
     pub sheets: Texture,
-    /// The compositing buffer, in bands of rows that each fit one storage binding.
-    pub bands: Vec<BandBuffer>,
     /// The opacity buffer cut off at the threshold: a bit per pixel, 32 pixels of a row per word.
     pub opaque: Buffer,
     /// The opacity buffer eroded down the columns, half way to the occlusion buffer.
@@ -43,10 +50,10 @@ pub struct BandBuffer {
 /// Bytes of a pixel in the compositing buffer.
 const ACC_BYTES: u64 = 16;
 
-impl Targets {
+impl CompositingBuffer {
     /// # Errors
-    /// If the image is larger than the device's textures may be, or a row of it than a binding.
-    pub fn new(device: &Device, size: [u32; 2], sheet_format: TextureFormat, sheets: u32) -> Result<Self, RenderError> {
+    /// If the image is larger than the device's textures may be, or 32 rows of it than a binding.
+    pub fn new(device: &Device, size: [u32; 2]) -> Result<Self, RenderError> {
         let limits = device.limits();
         let limit = |what, limit, required: u64, actual: u64| {
             if required > actual { Err(RenderError::Limit { what, limit, required, actual }) } else { Ok(()) }
@@ -65,6 +72,19 @@ impl Targets {
             .step_by(rows_per_band as usize)
             .map(|first_row| BandBuffer::new(device, width, first_row, rows_per_band.min(height - first_row)))
             .collect();
+        Ok(Self { size, bands })
+    }
+
+    /// Bytes of GPU memory.
+    pub fn gpu_bytes(&self) -> u64 {
+        self.bands.iter().map(|band| band.acc.size() + band.uniform.size()).sum()
+    }
+}
+
+impl Targets {
+    /// Targets for groups of `sheets` sheets. A compositing buffer of that size must have been possible.
+    pub fn new(device: &Device, size: [u32; 2], sheet_format: TextureFormat, sheets: u32) -> Self {
+        let [width, height] = size;
         let sheets = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("sheetsplat.sheets"),
             size: wgpu::Extent3d { width, height, depth_or_array_layers: sheets },
@@ -87,15 +107,14 @@ impl Targets {
             })
         };
         let [columns, rows] = tile_grid(size);
-        Ok(Self {
+        Self {
             size,
             sheets,
-            bands,
             opaque: mask("sheetsplat.opaque", columns * height),
             opaque_columns: mask("sheetsplat.opaque_columns", columns * height),
             occluded: mask("sheetsplat.occluded", columns * height),
             opaque_tiles: mask("sheetsplat.opaque_tiles", columns * rows),
-        })
+        }
     }
 
     /// All sheet buffers, for compositing.
@@ -123,7 +142,7 @@ impl Targets {
         let sheets = pixels * texel * u64::from(self.sheets.depth_or_array_layers());
         let masks = [&self.opaque, &self.opaque_columns, &self.occluded, &self.opaque_tiles];
         let masks: u64 = masks.map(Buffer::size).iter().sum();
-        sheets + masks + self.bands.iter().map(|band| band.acc.size() + band.uniform.size()).sum::<u64>()
+        sheets + masks
     }
 }
 

@@ -4,12 +4,14 @@ use std::ops::{Add, Mul};
 
 use glam::{DMat2, DVec2, DVec3, DVec4};
 
-use super::layout::{Frame, Group};
+use super::layout::{Frame, Gather, Group};
+use crate::grid_warp::FootprintMap;
 use crate::kernel::Kernel;
 use crate::plan::{FramePlan, View};
 use crate::scene::Scene;
 use crate::shading::{Light, MIN_GRADIENT, Shading};
 use crate::splatting::{Compositing, Order, Splatting};
+use crate::tile_bins::{self, TileBins};
 use crate::transfer_function::{Ramp, TransferFunction};
 use crate::volume::Grid;
 
@@ -49,15 +51,8 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
         half_box: half_box.as_vec2().to_array(),
         // A footprint's box holds that many pixel centres and one more, or one less.
         reach: ((2.0 * half_box.min(DVec2::splat(MAX_HALF_BOX))).floor() - 1.0).as_uvec2().to_array(),
-        compositing: match scene.splatting.compositing {
-            Compositing::Linear => 0,
-            Compositing::Exponential => 1,
-            Compositing::Xray => 2,
-        },
-        order: match scene.splatting.order {
-            Order::FrontToBack => 0,
-            Order::BackToFront => 1,
-        },
+        compositing: scene.splatting.compositing as u32,
+        order: scene.splatting.order as u32,
         culling: u32::from(culls(&scene.splatting, half_box)),
         tiles: u32::from(scene.splatting.tiles),
         per_unit: grid.unit().recip().sqrt().min(f32::MAX.into()) as f32,
@@ -65,6 +60,40 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
         padding_1: 0.0,
         padding_2: 0.0,
     }
+}
+
+/// What the tile rasterizer's threads share, over a volume of so many `bricks`.
+pub fn gather(view: &View, kernel: &Kernel, bins: &TileBins, bricks: u32) -> Gather {
+    let support_squared = kernel.support().powi(2);
+    let in_f32 = |numbers: [f64; 4]| numbers.map(|x| x as f32);
+    let FootprintMap { footprint_from_pixels, .. } = view.footprint;
+    let (x, y) = (footprint_from_pixels.x_axis, footprint_from_pixels.y_axis);
+    Gather {
+        along: bytemuck::cast(kernel.cumulative_polynomial::<16>(1.0).map(|x| x as f32)),
+        chord: bytemuck::cast(kernel.cumulative_polynomial::<8>(CHORD_SPAN).map(|x| x as f32)),
+        metric: in_f32([x.dot(x), 2.0 * x.dot(y), y.dot(y), -kernel.falloff() * std::f64::consts::LOG2_E]),
+        chord_scale: [(2.0 / (CHORD_SPAN * support_squared)) as f32, (1.0 - 2.0 / CHORD_SPAN) as f32],
+        along_scale: (2.0 / support_squared) as f32,
+        near: (f64::from(bins.first_slab) * view.slabs.width) as f32,
+        // Relative to the depths of the volume's corners, of which the first voxel is one.
+        depth_error: (2e-7 * (kernel.radius() + 2.0 * view.screen_from_voxel[2].w.abs())) as f32,
+        groups: bins.groups,
+        bricks,
+        drawn: bins.groups,
+        composited: bins.groups + 2 * bricks * groups_per_kernel(view),
+        padding_0: 0,
+        padding_1: 0,
+        padding_2: 0,
+    }
+}
+
+/// How much of the kernel's ball, from the middle out, the polynomial for chords is fitted to. Farther out the Gaussian is so small
+/// that its errors do not show: they stay below 3e-6 of the kernel's peak.
+const CHORD_SPAN: f64 = 0.6;
+
+/// The most groups of the tile rasterizer that a kernel reaches into.
+fn groups_per_kernel(view: &View) -> u32 {
+    (2.0 * view.slabs.radius / (f64::from(tile_bins::SHEETS) * view.slabs.width)).ceil() as u32 + 1
 }
 
 /// One [`Group`] every `stride` bytes: group after group, and of every group list after list.
@@ -126,6 +155,12 @@ impl Ramps {
         points.extend(gradient_opacity.into_iter().map(scalar));
         let ends = [color_end, opacity_end, points.len() as u32];
         Self { points: points.iter().map(|point| point.as_vec4().to_array()).collect(), ends }
+    }
+
+    /// Control points of each ramp.
+    pub fn lengths(&self) -> [u32; 3] {
+        let [color, opacity, gradient_opacity] = self.ends;
+        [color, opacity - color, gradient_opacity - opacity]
     }
 }
 

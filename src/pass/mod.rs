@@ -5,6 +5,7 @@
 
 pub mod composite;
 pub mod cull;
+pub mod gather;
 pub mod occlude;
 pub mod resolve;
 pub mod splat;

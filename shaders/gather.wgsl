@@ -1,0 +1,480 @@
+// The tile rasteriser: draws tiles front to back without sheet buffers in memory. A subgroup keeps the sheets of a group for its
+// pixels in registers, gathers the kernel sections that fall on them (§3.2), composites them (eq. 2), and skips what lies behind
+// its opaque pixels (§6). Subgroups share nothing, so there are no barriers, and sums have one order whatever else runs.
+//
+// A tile's 64 threads hold four pixels each, one below the other, in units of 8×4 pixels; a subgroup of 8 to 32 threads holds
+// the rectangle of its units. Software drivers execute what an `if` leaves out but not a loop without iterations, hence some
+// loops that run at most once.
+
+@group(0) @binding(0) var<uniform> frame_uniform: Frame;
+@group(0) @binding(1) var<uniform> gather_uniform: Gather;
+@group(0) @binding(2) var<uniform> part: Part;
+@group(0) @binding(3) var<storage, read> bricks: array<Brick>;
+// Where every sheet group of every tile starts in `entries`.
+@group(0) @binding(4) var<storage, read> starts: array<u32>;
+// A brick's number and, in the last byte, the units of the tile that it may touch.
+@group(0) @binding(5) var<storage, read> entries: array<u32>;
+// The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0).
+@group(0) @binding(6) var<storage, read> control_points: array<vec4f>;
+@group(0) @binding(7) var values: texture_2d_array<f32>;
+@group(0) @binding(8) var<storage, read_write> acc: array<vec4f>;
+@group(0) @binding(9) var<storage, read_write> gathered: Gathered;
+
+// `frame.compositing` and `frame.order`.
+override COMPOSITING: u32 = 0u;
+override ORDER: u32 = 0u;
+
+// Read once: a uniform read in a loop costs a software driver a gather.
+var<private> frame: Frame;
+var<private> gather: Gather;
+
+// The subgroup.
+var<private> lane: u32;
+var<private> lanes: u32;
+
+// Sheets of a group.
+const SHEETS = 4u;
+
+// Pixels across a tile, and across the widest region.
+const TILE_SIDE = 16u;
+
+// The four sheets of a group at a thread's four pixels: red, green, blue and alpha columns.
+struct Sheets {
+    first: mat4x4f,
+    second: mat4x4f,
+    third: mat4x4f,
+    fourth: mat4x4f,
+}
+
+// The pixels of a subgroup.
+struct Region {
+    // Bounds of its pixel centres.
+    low: vec2f,
+    high: vec2f,
+    // Bounds of those that are not opaque.
+    open_low: vec2f,
+    open_high: vec2f,
+    // For each of the units' rows the lanes whose pixel there is not opaque.
+    open: vec4u,
+}
+
+// A voxel's kernel as the pixels see it.
+struct Splat {
+    center_px: vec2f,
+    // `(C·m, m)` times the low-pass amplitude over λ; 0 without a voxel.
+    amount: vec4f,
+    // H(0, 0, t) of eq. 3 at the group's first plane and at the four after it.
+    first_plane: f32,
+    planes: vec4f,
+}
+
+// One of the ramps: where its control points are, and the one of the first of them that this lane holds.
+struct Ramp {
+    first: u32,
+    end: u32,
+    own: vec4f,
+}
+
+// Where the n-th set bit is.
+fn nth_set_bit(bits: vec2u, n: u32) -> u32 {
+    let low = countOneBits(bits.x);
+    var found = vec3u(bits.x, n, 0u);
+    if n >= low {
+        found = vec3u(bits.y, n - low, 32u);
+    }
+    return half(half(half(half(half(found, 16u), 8u), 4u), 2u), 1u).z;
+}
+
+// One step of a binary search in (word, bits to skip, position): goes on in the upper bits if the lower ones have too few.
+fn half(found: vec3u, width: u32) -> vec3u {
+    let count = countOneBits(found.x & ((1u << width) - 1u));
+    return select(found, vec3u(found.x >> width, found.y - count, found.z + width), found.y >= count);
+}
+
+// Piecewise linear between the control points, clamped outside.
+fn ramp_at(ramp: Ramp, value: f32) -> vec3f {
+    let count = ramp.end - ramp.first;
+    // How many points are at or below the value; every lane holds one of the first of them.
+    var below = 0u;
+    below += select(0u, 16u, lanes >= 32u && is_below(ramp, below + 15u, value));
+    below += select(0u, 8u, lanes >= 16u && is_below(ramp, below + 7u, value));
+    below += select(0u, 4u, is_below(ramp, below + 3u, value));
+    below += select(0u, 2u, is_below(ramp, below + 1u, value));
+    below += select(0u, 1u, is_below(ramp, below, value));
+    below += select(0u, 1u, is_below(ramp, below, value));
+    var a = subgroupShuffle(ramp.own, max(below, 1u) - 1u);
+    var b = subgroupShuffle(ramp.own, min(below, min(count, lanes) - 1u));
+    // More points than lanes are searched in memory.
+    for (var once = count > lanes; once; once = false) {
+        below = 0u;
+        var above = count;
+        while below < above {
+            let middle = (below + above) / 2u;
+            let is_at_or_below = control_points[ramp.first + middle].x <= value;
+            below = select(below, middle + 1u, is_at_or_below);
+            above = select(middle, above, is_at_or_below);
+        }
+        a = control_points[ramp.first + max(below, 1u) - 1u];
+        b = control_points[ramp.first + min(below, count - 1u)];
+    }
+    return between(a, b, value);
+}
+
+// Whether one of the first control points is at or below a value.
+fn is_below(ramp: Ramp, at: u32, value: f32) -> bool {
+    return at < min(ramp.end - ramp.first, lanes) && subgroupShuffle(ramp.own.x, at % lanes) <= value;
+}
+
+fn ramp_of(first: u32, end: u32) -> Ramp {
+    return Ramp(first, end, control_points[min(first + lane, end - 1u)]);
+}
+
+// H(0, 0, t) of eq. 3: the kernel's integral along the ray through its centre, from the centre to t.
+fn along(t: f32) -> f32 {
+    let x = clamp(t, -frame.support, frame.support);
+    let z = x * x * gather.along_scale - 1.0;
+    return x * polynomial(gather.along, z);
+}
+
+fn polynomial(c: array<vec4f, 4>, z: f32) -> f32 {
+    let powers = vec4f(1.0, z, z * z, z * z * z);
+    let fourth = z * z * z * z;
+    return dot(powers, c[0]) + fourth * (dot(powers, c[1]) + fourth * (dot(powers, c[2]) + fourth * dot(powers, c[3])));
+}
+
+// The sections of a kernel in the group's four sheets at a column's four pixels: two entries of eq. 3 subtracted, where
+// H(a, b, t) is H(0, 0, t) times the Gaussian of ρ² = a² + b², and t ends at the chord of the kernel's ball.
+fn sections(splat: Splat, column: f32, rows: vec4f) -> mat4x4f {
+    let dx = column - splat.center_px.x;
+    let dy = rows - splat.center_px.y;
+    let rho_squared = dy * (gather.metric.z * dy + gather.metric.y * dx) + gather.metric.x * dx * dx;
+    let chord_squared = max(frame.support * frame.support - rho_squared, vec4f(0.0));
+    let z = chord_squared * gather.chord_scale.x + gather.chord_scale.y;
+    let c = gather.chord;
+    let low = c[0].x + z * (c[0].y + z * (c[0].z + z * c[0].w));
+    let high = c[1].x + z * (c[1].y + z * (c[1].z + z * c[1].w));
+    let z_squared = z * z;
+    let rim = sqrt(chord_squared) * (low + z_squared * z_squared * high);
+    let in_plane = exp2(rho_squared * gather.metric.w);
+    let plane_0 = clamp(vec4f(splat.first_plane), -rim, rim);
+    let plane_1 = clamp(vec4f(splat.planes.x), -rim, rim);
+    let plane_2 = clamp(vec4f(splat.planes.y), -rim, rim);
+    let plane_3 = clamp(vec4f(splat.planes.z), -rim, rim);
+    let plane_4 = clamp(vec4f(splat.planes.w), -rim, rim);
+    return mat4x4f(
+        (plane_1 - plane_0) * in_plane,
+        (plane_2 - plane_1) * in_plane,
+        (plane_3 - plane_2) * in_plane,
+        (plane_4 - plane_3) * in_plane,
+    );
+}
+
+// What a voxel adds to a sheet at four pixels.
+fn added(section: vec4f, amount: vec4f) -> mat4x4f {
+    return mat4x4f(section * amount.x, section * amount.y, section * amount.z, section * amount.w);
+}
+
+// What another lane holds.
+fn splat_of(own: Splat, other: u32) -> Splat {
+    return Splat(
+        subgroupShuffle(own.center_px, other),
+        subgroupShuffle(own.amount, other),
+        subgroupShuffle(own.first_plane, other),
+        subgroupShuffle(own.planes, other),
+    );
+}
+
+// A sheet over or under what is there, at four pixels.
+fn composite_sheet(image: mat4x4f, sheet: mat4x4f) -> mat4x4f {
+    let pixels = transpose(sheet);
+    return mat4x4f(
+        composite(image[0], pixels[0], COMPOSITING, ORDER),
+        composite(image[1], pixels[1], COMPOSITING, ORDER),
+        composite(image[2], pixels[2], COMPOSITING, ORDER),
+        composite(image[3], pixels[3], COMPOSITING, ORDER),
+    );
+}
+
+// How far a step inside a brick goes on the screen and in depth.
+fn projected_step(step: vec3u) -> vec3f {
+    let rows = frame.screen_from_voxel;
+    let p = vec3f(step);
+    return vec3f(dot(rows[0].xyz, p), dot(rows[1].xyz, p), dot(rows[2].xyz, p));
+}
+
+// The frame's sheets from the first that a kernel overlaps to the one after the last, with more than the depths' rounding
+// errors: what ends at a plane does not reach the sheet behind it.
+fn overlapped_sheets(depth: f32) -> vec2f {
+    let reach = frame.radius - gather.depth_error;
+    return vec2f(floor((depth - reach - gather.near) / frame.slab_width), ceil((depth + reach - gather.near) / frame.slab_width));
+}
+
+// Bounds of what is not opaque.
+fn opened(region: Region, is_open: vec4<bool>, column: f32, rows: vec4f) -> Region {
+    var result = region;
+    result.open = vec4u(
+        subgroupBallot(is_open.x).x,
+        subgroupBallot(is_open.y).x,
+        subgroupBallot(is_open.z).x,
+        subgroupBallot(is_open.w).x,
+    );
+    let from_top = select(vec4f(1e9), rows, is_open);
+    let from_bottom = select(vec4f(-1e9), rows, is_open);
+    let top = min(min(from_top.x, from_top.y), min(from_top.z, from_top.w));
+    let bottom = max(max(from_bottom.x, from_bottom.y), max(from_bottom.z, from_bottom.w));
+    result.open_low = subgroupMin(vec2f(select(1e9, column, any(is_open)), top));
+    result.open_high = subgroupMax(vec2f(select(-1e9, column, any(is_open)), bottom));
+    return result;
+}
+
+// Whether the box around a voxel's footprint holds a pixel that is not opaque. Lanes 0 to 15 hold the pixels across the upper
+// units of a region, 16 to 31 those across the lower.
+fn is_visible(center_px: vec2f, region: Region) -> bool {
+    let margin = frame.half_box + BOX_SLACK;
+    let first = vec2i(clamp(ceil(center_px - margin - region.low), vec2f(0.0), vec2f(16.0)));
+    let end = vec2i(clamp(floor(center_px + margin - region.low), vec2f(-1.0), region.high - region.low)) + 1;
+    let across = (1u << u32(end.x)) - (1u << u32(first.x));
+    let down = (1u << u32(end.y)) - (1u << u32(first.y));
+    let upper = -(vec4i(i32(down)) >> vec4u(0u, 1u, 2u, 3u) & vec4i(1));
+    let lower = -(vec4i(i32(down)) >> vec4u(4u, 5u, 6u, 7u) & vec4i(1));
+    let box = (vec4u(upper) & vec4u(across)) | (vec4u(lower) & vec4u(across << 16u));
+    return all(end > first) && any((box & region.open) != vec4u(0u));
+}
+
+fn draw(tile: u32, thread: u32) {
+    frame = frame_uniform;
+    gather = gather_uniform;
+    let color_ramp = ramp_of(0u, frame.ramps.x);
+    let opacity_ramp = ramp_of(frame.ramps.x, frame.ramps.y);
+    let gradient_opacity_ramp = ramp_of(frame.ramps.y, frame.ramps.z);
+
+    let columns = (frame.size.x + TILE_SIDE - 1u) / TILE_SIDE;
+    let unit = thread / 8u;
+    let pixel = vec2u(tile % columns, tile / columns) * TILE_SIDE + vec2u((unit & 1u) * 8u + thread % 8u, (unit >> 1u) * 4u);
+    let column = f32(pixel.x) + 0.5;
+    let rows = f32(pixel.y) + vec4f(0.5, 1.5, 2.5, 3.5);
+    let units = subgroupOr(1u << unit);
+    var region: Region;
+    region.low = subgroupMin(vec2f(column, rows.x));
+    region.high = subgroupMax(vec2f(column, rows.w));
+
+    let slot = (pixel.y - part.first_row) * frame.size.x + pixel.x;
+    let is_inside = vec4<bool>(pixel.x < frame.size.x) & (vec4u(pixel.y) + vec4u(0u, 1u, 2u, 3u) < vec4u(frame.size.y));
+    var image = mat4x4f();
+    if is_inside.x {
+        image[0] = acc[slot];
+    }
+    if is_inside.y {
+        image[1] = acc[slot + frame.size.x];
+    }
+    if is_inside.z {
+        image[2] = acc[slot + 2u * frame.size.x];
+    }
+    if is_inside.w {
+        image[3] = acc[slot + 3u * frame.size.x];
+    }
+    // Pixels off the image count as opaque.
+    let opaque_from = select(3e38, frame.opacity_threshold, frame.culling != 0u);
+    region = opened(region, is_inside & (transpose(image)[3] < vec4f(opaque_from)), column, rows);
+
+    var voxels_shaded = 0u;
+    var sections_rasterized = 0u;
+    var bricks_visited = 0u;
+    let first_bin = tile * gather.groups;
+    var end = starts[first_bin + part.first_group];
+    for (var at = part.first_group; at < part.end_group && any(region.open != vec4u(0u)); at += 1u) {
+        var cursor = end;
+        end = starts[first_bin + at + 1u];
+        if cursor == end {
+            continue;
+        }
+        let group = select(gather.groups - 1u - at, at, ORDER == FRONT_TO_BACK);
+        let first_sheet = f32(group * SHEETS);
+        let near = gather.near + first_sheet * frame.slab_width;
+        let far = near + f32(SHEETS) * frame.slab_width;
+        // Where voxels are whose kernels reach this group and whose boxes reach pixels that are not opaque.
+        let reach = frame.radius - gather.depth_error;
+        let margin = frame.half_box + BOX_SLACK;
+        let reaching_low = vec3f(region.open_low - margin, near - reach);
+        let reaching_high = vec3f(region.open_high + margin, far + reach);
+        var sheets = Sheets();
+        var has_drawn = false;
+
+        // Entries are fetched one per lane: the brick's number, corner and voxels.
+        var to_visit = 0u;
+        var fetched = 0u;
+        var fetched_corner = vec3u(0u);
+        var fetched_present = vec2u(0u);
+        // The brick that is visited: the voxels to draw, and how many of them have been queued.
+        var brick = 0u;
+        var corner = vec3u(0u);
+        var visible = vec2u(0u);
+        var visible_count = 0u;
+        var queued_count = 0u;
+        loop {
+            // The queue, filled with voxels of as many bricks as it takes: one per lane.
+            var count = 0u;
+            var queued_place = vec2u(0u);
+            var queued = vec3u(0u);
+            while count < lanes {
+                while queued_count == visible_count && (to_visit != 0u || cursor < end) {
+                    while to_visit == 0u && cursor < end {
+                        let entry = entries[min(cursor + lane, end - 1u)];
+                        to_visit = subgroupBallot(cursor + lane < end && ((entry >> 24u) & units) != 0u).x;
+                        fetched = entry & 0xffffffu;
+                        let record = bricks[fetched];
+                        fetched_corner = vec3u(record.x, record.y, record.z) & vec3u(~3u);
+                        fetched_present = record.present;
+                        cursor += lanes;
+                    }
+                    if to_visit == 0u {
+                        break;
+                    }
+                    let next = firstTrailingBit(to_visit);
+                    to_visit &= to_visit - 1u;
+                    brick = subgroupShuffle(fetched, next);
+                    corner = subgroupShuffle(fetched_corner, next);
+                    let present = subgroupShuffle(fetched_present, next);
+                    bricks_visited += 1u;
+
+                    // Every lane tests a run of the brick's places.
+                    let run = BRICK_VOXELS / lanes;
+                    let corner_px = project(corner);
+                    var reaching = 0u;
+                    for (var i = 0u; i < run; i += 1u) {
+                        let p = corner_px + projected_step(in_brick(lane * run + i));
+                        if all(p >= reaching_low) && all(p <= reaching_high) && p.z > reaching_low.z && p.z < reaching_high.z {
+                            reaching |= 1u << i;
+                        }
+                    }
+                    let shift = lane * run;
+                    let shifted = reaching << (shift % 32u);
+                    visible = present & subgroupOr(select(vec2u(0u, shifted), vec2u(shifted, 0u), shift < 32u));
+                    let ones = countOneBits(visible);
+                    visible_count = ones.x + ones.y;
+                    queued_count = 0u;
+                }
+                if queued_count == visible_count {
+                    break;
+                }
+                let nth = lane - count;
+                let slot = nth_set_bit(visible, (nth + queued_count) % BRICK_VOXELS);
+                if lane >= count && nth < visible_count - queued_count {
+                    queued_place = vec2u(brick, slot);
+                    queued = corner + in_brick(slot);
+                }
+                let taken = min(visible_count - queued_count, lanes - count);
+                count += taken;
+                queued_count += taken;
+            }
+            if count == 0u {
+                break;
+            }
+            has_drawn = true;
+
+            // Every lane shades its voxel.
+            let p = project(queued);
+            let is_drawn = lane < count && is_visible(p.xy, region);
+            let value = value_at(index_of(queued));
+            let gradient = gradient_at(queued);
+            let alpha = ramp_at(opacity_ramp, value).x * ramp_at(gradient_opacity_ramp, gradient.magnitude).x;
+            let m = amount(alpha);
+            let color = shade(ramp_at(color_ramp, value), gradient);
+            let t = near - p.z;
+            let own = Splat(
+                p.xy,
+                select(vec4f(0.0), vec4f(color * m, m) * frame.amplitude, is_drawn),
+                along(t),
+                vec4f(
+                    along(t + frame.slab_width),
+                    along(t + 2.0 * frame.slab_width),
+                    along(t + 3.0 * frame.slab_width),
+                    along(t + 4.0 * frame.slab_width),
+                ),
+            );
+            if is_drawn {
+                let overlapped = overlapped_sheets(p.z);
+                let here = clamp(overlapped, vec2f(first_sheet), vec2f(first_sheet + f32(SHEETS)));
+                // Of the groups that the kernel reaches into, counted from the nearest.
+                let nth = group - u32(max(overlapped.x, 0.0)) / SHEETS;
+                let word = (nth * gather.bricks + queued_place.x) * 2u + queued_place.y / 32u;
+                let bit = 1u << (queued_place.y % 32u);
+                if (atomicOr(&gathered.words[gather.drawn + word], bit) & bit) == 0u {
+                    sections_rasterized += u32(here.y - here.x);
+                    voxels_shaded += select(0u, 1u, nth == 0u);
+                }
+            }
+
+            // Every lane adds all voxels' sections at its own pixels, two voxels at a time.
+            for (var i = 0u; i < count; i += 2u) {
+                let a = splat_of(own, i);
+                let b = splat_of(own, i + 1u);
+                let s = sections(a, column, rows);
+                let t = sections(b, column, rows);
+                sheets.first += added(s[0], a.amount) + added(t[0], b.amount);
+                sheets.second += added(s[1], a.amount) + added(t[1], b.amount);
+                sheets.third += added(s[2], a.amount) + added(t[2], b.amount);
+                sheets.fourth += added(s[3], a.amount) + added(t[3], b.amount);
+            }
+        }
+
+        for (; has_drawn; has_drawn = false) {
+            if ORDER == FRONT_TO_BACK {
+                image = composite_sheet(image, sheets.first);
+                image = composite_sheet(image, sheets.second);
+                image = composite_sheet(image, sheets.third);
+                image = composite_sheet(image, sheets.fourth);
+            } else {
+                image = composite_sheet(image, sheets.fourth);
+                image = composite_sheet(image, sheets.third);
+                image = composite_sheet(image, sheets.second);
+                image = composite_sheet(image, sheets.first);
+            }
+            region = opened(region, is_inside & (transpose(image)[3] < vec4f(opaque_from)), column, rows);
+            if lane == 0u {
+                let tiles = tile_grid(frame.size);
+                let number = (at * tiles.y + pixel.y / TILE) * tiles.x + pixel.x / TILE;
+                let bit = 1u << (number % 32u);
+                if (atomicOr(&gathered.words[gather.composited + number / 32u], bit) & bit) == 0u {
+                    atomicAdd(&gathered.words[at], 1u);
+                }
+            }
+        }
+    }
+
+    if is_inside.x {
+        acc[slot] = image[0];
+    }
+    if is_inside.y {
+        acc[slot + frame.size.x] = image[1];
+    }
+    if is_inside.z {
+        acc[slot + 2u * frame.size.x] = image[2];
+    }
+    if is_inside.w {
+        acc[slot + 3u * frame.size.x] = image[3];
+    }
+    let counts = subgroupAdd(vec2u(voxels_shaded, sections_rasterized));
+    if lane == 0u {
+        atomicAdd(&gathered.tally.voxels_shaded, counts.x);
+        atomicAdd(&gathered.tally.sections_rasterized, counts.y);
+        atomicAdd(&gathered.tally.bricks_visited, bricks_visited);
+    }
+}
+
+@compute @workgroup_size(64)
+fn main(
+    @builtin(local_invocation_index) thread: u32,
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(subgroup_size) subgroup_size: u32,
+    @builtin(subgroup_invocation_id) subgroup_invocation_id: u32,
+) {
+    lanes = subgroup_size;
+    lane = subgroup_invocation_id;
+    let tile = part.first_tile + unfold(workgroup);
+    let first_bin = tile * gather_uniform.groups;
+    let has_entries = tile < part.end_tile && starts[first_bin + part.first_group] < starts[first_bin + part.end_group];
+    for (var once = has_entries; once; once = false) {
+        draw(tile, thread);
+    }
+}

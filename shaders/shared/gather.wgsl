@@ -1,0 +1,42 @@
+// What the tile rasteriser is given and what it counts; `gpu::layout` documents the fields.
+struct Gather {
+    along: array<vec4f, 4>,
+    chord: array<vec4f, 2>,
+    metric: vec4f,
+    chord_scale: vec2f,
+    along_scale: f32,
+    near: f32,
+    depth_error: f32,
+    groups: u32,
+    bricks: u32,
+    drawn: u32,
+    composited: u32,
+    padding_0: u32,
+    padding_1: u32,
+    padding_2: u32,
+}
+
+struct Part {
+    first_row: u32,
+    first_tile: u32,
+    end_tile: u32,
+    first_group: u32,
+    end_group: u32,
+}
+
+struct Gathered {
+    tally: GatherTally,
+    words: array<atomic<u32>>,
+}
+
+// `Tally` without the tiles.
+struct GatherTally {
+    voxels_shaded: atomic<u32>,
+    sections_rasterized: atomic<u32>,
+    quads: atomic<u32>,
+    bricks_tested: atomic<u32>,
+    bricks_visited: atomic<u32>,
+    padding_0: u32,
+    padding_1: u32,
+    padding_2: u32,
+}

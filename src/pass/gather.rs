@@ -1,0 +1,100 @@
+//! Draws whole tiles front to back: the tile rasterizer's one stage, which culls, splats and composites (§6).
+
+use std::sync::OnceLock;
+
+use wgpu::{BindGroup, Buffer, ComputePass, Device, ShaderStages, TextureView, TextureViewDimension};
+
+use crate::gpu::bindings::{ComputeStage, at_offset, storage, texture, uniform};
+use crate::gpu::layout::{Brick, Frame, Gather as GatherUniform, Gathered, Part};
+use crate::gpu::shaders;
+use crate::splatting::{Compositing, Order};
+
+/// The stage's pipelines, by compositing and order; each is compiled when it is first asked for.
+#[derive(Debug, Default)]
+pub struct Gather {
+    stages: [[OnceLock<ComputeStage>; 2]; 3],
+}
+
+/// Buffers of the stage.
+#[derive(Clone, Copy, Debug)]
+pub struct GatherBuffers<'a> {
+    /// One [`Frame`].
+    pub frame: &'a Buffer,
+    /// One [`GatherUniform`].
+    pub gather: &'a Buffer,
+    /// One [`Part`] at every dynamic offset.
+    pub parts: &'a Buffer,
+    /// `[Brick]`.
+    pub bricks: &'a Buffer,
+    /// [`TileBins::starts`](crate::tile_bins::TileBins::starts).
+    pub starts: &'a Buffer,
+    /// [`TileBins::entries`](crate::tile_bins::TileBins::entries).
+    pub entries: &'a Buffer,
+    /// Control points of the ramps.
+    pub control_points: &'a Buffer,
+    /// The volume's values.
+    pub values: &'a TextureView,
+    /// [`Gathered`].
+    pub gathered: &'a Buffer,
+}
+
+impl Gather {
+    fn stage(&self, device: &Device, compositing: Compositing, order: Order) -> &ComputeStage {
+        self.stages[compositing as usize][order as usize].get_or_init(|| {
+            let stage = ShaderStages::COMPUTE;
+            let slots = [
+                uniform::<Frame>(stage, false),
+                uniform::<GatherUniform>(stage, false),
+                uniform::<Part>(stage, true),
+                storage::<Brick>(stage, true),
+                storage::<u32>(stage, true),
+                storage::<u32>(stage, true),
+                storage::<[f32; 4]>(stage, true),
+                texture(stage, TextureViewDimension::D2Array),
+                storage::<[f32; 4]>(stage, false),
+                storage::<Gathered>(stage, false),
+            ];
+            let constants = [("COMPOSITING", f64::from(compositing as u32)), ("ORDER", f64::from(order as u32))];
+            ComputeStage::new(device, shaders::GATHER, "main", &slots, &constants)
+        })
+    }
+
+    /// Binds a band of the compositing buffer, `[vec4f]`, for one way of compositing.
+    pub fn bind(
+        &self,
+        device: &Device,
+        (compositing, order): (Compositing, Order),
+        buffers: GatherBuffers<'_>,
+        acc: &Buffer,
+    ) -> BindGroup {
+        let GatherBuffers { frame, gather, parts, bricks, starts, entries, control_points, values, gathered } = buffers;
+        let whole = Buffer::as_entire_binding;
+        let resources = [
+            whole(frame),
+            whole(gather),
+            at_offset::<Part>(parts),
+            whole(bricks),
+            whole(starts),
+            whole(entries),
+            whole(control_points),
+            wgpu::BindingResource::TextureView(values),
+            whole(acc),
+            whole(gathered),
+        ];
+        self.stage(device, compositing, order).bind(device, &resources)
+    }
+
+    /// Draws so many tiles of the part at `offset`, the way the group was bound for.
+    pub fn record(
+        &self,
+        pass: &mut ComputePass<'_>,
+        (compositing, order): (Compositing, Order),
+        group: &BindGroup,
+        offset: u32,
+        tiles: u32,
+    ) {
+        if let Some(stage) = self.stages[compositing as usize][order as usize].get() {
+            stage.dispatch(pass, group, &[offset], tiles);
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! The two ways from bricks to the compositing buffer. Each holds its stages' pipelines, prepares its part of a frame, and
+//! records it.
+
+pub(crate) mod quads;
+pub(crate) mod tiles;
+
+use wgpu::{Buffer, BufferUsages, ComputePassDescriptor, Device, Queue};
+
+use crate::classified_volume::ClassifiedVolume;
+use crate::gpu::bindings::grown;
+use crate::gpu::targets::CompositingBuffer;
+use crate::gpu::timer::Timer;
+use crate::kernel::Kernel;
+use crate::plan::View;
+use crate::splatting::Splatting;
+
+/// What a rasterizer prepares a frame from.
+#[derive(Clone, Copy)]
+pub(crate) struct Given<'a> {
+    pub(crate) device: &'a Device,
+    pub(crate) queue: &'a Queue,
+    pub(crate) volume: &'a ClassifiedVolume,
+    pub(crate) view: &'a View,
+    pub(crate) kernel: &'a Kernel,
+    pub(crate) splatting: &'a Splatting,
+    /// One [`Frame`](crate::gpu::layout::Frame).
+    pub(crate) frame: &'a Buffer,
+    /// Control points of the ramps.
+    pub(crate) control_points: &'a Buffer,
+    /// How many the ramps have.
+    pub(crate) ramp_lengths: [u32; 3],
+    pub(crate) compositing: &'a CompositingBuffer,
+}
+
+impl Given<'_> {
+    /// A buffer with these contents, the old one if it has the right size.
+    fn filled(&self, old: Option<Buffer>, label: &str, bytes: &[u8], usage: BufferUsages) -> Buffer {
+        filled(self.device, self.queue, old, label, bytes, usage)
+    }
+}
+
+/// A buffer with these contents, the old one if it has the right size.
+pub(crate) fn filled(
+    device: &Device,
+    queue: &Queue,
+    old: Option<Buffer>,
+    label: &str,
+    bytes: &[u8],
+    usage: BufferUsages,
+) -> Buffer {
+    // Of one word at least: bindings may not be empty.
+    let buffer = grown(device, old, label, (bytes.len() as u64).max(4), usage | BufferUsages::COPY_DST);
+    queue.write_buffer(&buffer, 0, bytes);
+    buffer
+}
+
+/// A compute pass that is timed if anything is.
+pub(crate) fn compute<'a>(
+    label: &'a str,
+    timer: &'a mut Option<Timer>,
+    stage: &'static str,
+) -> ComputePassDescriptor<'a> {
+    let timestamp_writes = timer.as_mut().map(|timer| timer.compute(stage));
+    ComputePassDescriptor { label: Some(label), timestamp_writes }
+}

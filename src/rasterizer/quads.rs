@@ -1,0 +1,293 @@
+//! The quad rasterizer (Fig. 12): for every group of sheets the stages cull, tiles, splat, composite and occlude.
+
+use wgpu::util::DeviceExt;
+use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, TextureFormat, TextureView};
+
+use super::{Given, compute};
+use crate::brick;
+use crate::classified_volume::ClassifiedVolume;
+use crate::footprint::FootprintTable;
+use crate::gpu::bindings::grown;
+use crate::gpu::footprint_texture::FootprintTexture;
+use crate::gpu::layout::{Group, Tally};
+use crate::gpu::targets::Targets;
+use crate::gpu::timer::Timer;
+use crate::gpu::uniforms;
+use crate::kernel::Kernel;
+use crate::pass::composite::Composite;
+use crate::pass::cull::{Cull, CullBuffers, CullList};
+use crate::pass::occlude::Occlude;
+use crate::pass::splat::Splat;
+use crate::pass::tiles::{TileLists, Tiles};
+use crate::plan::{FramePlan, View};
+use crate::splatting::{FootprintForm, Order};
+use crate::stats::GroupSlabs;
+
+/// The stages.
+#[derive(Debug)]
+pub(crate) struct QuadRasterizer {
+    sheet_format: TextureFormat,
+    sheets: u32,
+    cull: Cull,
+    tiles: Tiles,
+    splat: Splat,
+    composite: Composite,
+    occlude: Occlude,
+}
+
+/// A frame's part that is the quad rasterizer's.
+#[derive(Debug)]
+pub(crate) struct QuadFrame {
+    planned: Planned,
+    targets: Targets,
+    footprints: Footprints,
+    groups: Buffer,
+    group_stride: u32,
+    tally: Buffer,
+    tile_lists: TileLists,
+    lists: Vec<PreparedList>,
+    sheet_views: Vec<TextureView>,
+    clear_group: BindGroup,
+    composite_groups: Vec<BindGroup>,
+    occlude_groups: [BindGroup; 2],
+}
+
+/// What only changes with the view, or with the bricks: the buckets.
+#[derive(Debug)]
+struct Planned {
+    plan: FramePlan,
+    order: Order,
+    /// [`ClassifiedVolume::revision`].
+    revision: u64,
+    /// For every list its bricks in bucket order, `[u32]`.
+    orders: Vec<Buffer>,
+    /// For every list the most bricks and voxels that any group can visit.
+    most: Vec<(u32, u32)>,
+}
+
+/// A table, and what it is for: the kernel, and the slab width that the sections form depends on.
+#[derive(Debug)]
+struct Footprints {
+    texture: FootprintTexture,
+    kernel: Kernel,
+    width: Option<f64>,
+}
+
+#[derive(Debug)]
+struct PreparedList {
+    cull: CullList,
+    splat_group: BindGroup,
+}
+
+impl QuadRasterizer {
+    /// Compiles the stages for groups of `sheets` sheets of the given format.
+    pub(crate) fn new(device: &Device, sheet_format: TextureFormat, sheets: u32) -> Self {
+        Self {
+            sheet_format,
+            sheets,
+            cull: Cull::new(device, sheets),
+            tiles: Tiles::new(device),
+            splat: Splat::new(device, sheet_format, sheets),
+            composite: Composite::new(device),
+            occlude: Occlude::new(device),
+        }
+    }
+
+    /// Buckets bricks if need be, and allocates what does not fit any more. Also whether it had to bucket.
+    pub(crate) fn prepare(&self, given: Given<'_>, previous: Option<QuadFrame>) -> (QuadFrame, bool) {
+        let Given { device, volume, view, splatting, frame, control_points, compositing, .. } = given;
+        let old = Old::of(previous);
+        let targets = old.targets.filter(|old| old.size == view.size);
+        let targets = targets.unwrap_or_else(|| Targets::new(device, view.size, self.sheet_format, self.sheets));
+        let is_current =
+            |old: &Planned| old.plan.view == *view && (old.order, old.revision) == (splatting.order, volume.revision);
+        let (planned, is_new) = match old.planned.filter(is_current) {
+            Some(planned) => (planned, false),
+            None => (Planned::new(device, volume, *view, self.sheets, splatting.order), true),
+        };
+        let plan = &planned.plan;
+        let footprints = Footprints::renewed(old.footprints, given);
+        let alignment = device.limits().min_uniform_buffer_offset_alignment as usize;
+        let group_stride = size_of::<Group>().next_multiple_of(alignment);
+        let group_bytes = uniforms::groups(plan, group_stride);
+        let groups = given.filled(old.groups, "sheetsplat.groups", &group_bytes, BufferUsages::UNIFORM);
+        let tally_bytes = size_of::<Tally>() as u64 + targets.opaque_tiles.size();
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
+        let tally = grown(device, old.tally, "sheetsplat.tally", tally_bytes, usage);
+
+        let shared = CullBuffers {
+            frame,
+            groups: &groups,
+            values: &volume.texture.view,
+            control_points,
+            occluded: &targets.occluded,
+            tally: &tally,
+        };
+        let mut old_lists = old.lists.into_iter();
+        let lists: Vec<PreparedList> = (volume.lists.lists.iter().zip(&planned.orders).zip(&planned.most))
+            .map(|((list, order), &most)| {
+                let previous = old_lists.next().map(|old| old.cull);
+                let cull = self.cull.prepare(device, shared, list, order, most, previous);
+                let splat_group = self.splat.bind(device, frame, &groups, &cull, &footprints.texture);
+                PreparedList { cull, splat_group }
+            })
+            .collect();
+        let buffers = [frame, &groups, &tally];
+        let tile_lists = self.tiles.prepare(device, buffers, &targets, plan.groups.len(), old.tile_lists);
+        let tiles = &tile_lists.composited;
+        let sheets = targets.sheets_view();
+        let composite = |band| self.composite.bind(device, frame, band, &sheets, tiles, &targets);
+        let frame = QuadFrame {
+            clear_group: self.splat.bind_clear(device, frame, tiles),
+            composite_groups: compositing.bands.iter().map(composite).collect(),
+            occlude_groups: self.occlude.bind(device, frame, &tile_lists.occluding, &targets),
+            sheet_views: (0..self.sheets).map(|layer| targets.sheet_view(layer)).collect(),
+            group_stride: group_stride as u32,
+            planned,
+            targets,
+            footprints,
+            groups,
+            tally,
+            tile_lists,
+            lists,
+        };
+        (frame, is_new)
+    }
+
+    /// Draws the frame.
+    pub(crate) fn record(&self, encoder: &mut CommandEncoder, timer: &mut Option<Timer>, frame: &QuadFrame) {
+        let QuadFrame { planned: Planned { plan, .. }, targets, tile_lists, .. } = frame;
+        let masks = [&targets.opaque, &targets.opaque_columns, &targets.occluded, &targets.opaque_tiles, &frame.tally];
+        for buffer in masks.into_iter().chain(frame.lists.iter().map(|list| &list.cull.states)) {
+            encoder.clear_buffer(buffer, 0, None);
+        }
+        let mut offsets = (0..).step_by(frame.group_stride as usize);
+        for group in &plan.groups {
+            // (list, offset of its group uniform) for the lists that reach into the group.
+            let lists: Vec<(&PreparedList, u32)> = (frame.lists.iter().zip(&mut offsets).zip(&group.bricks))
+                .filter(|(_, bricks)| !bricks.is_empty())
+                .map(|(list, _)| list)
+                .collect();
+            let Some(&(_, any_offset)) = lists.first() else { continue };
+
+            let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.cull", timer, "cull"));
+            for &(list, offset) in &lists {
+                self.cull.record(&mut pass, &list.cull, offset);
+            }
+            self.tiles.record(&mut pass, tile_lists, any_offset);
+            drop(pass);
+
+            let clear = (&frame.clear_group, &tile_lists.composited);
+            let draws = lists.iter().map(|(list, offset)| (&list.splat_group, *offset, &list.cull.draw_args));
+            let times = timer.as_mut().map(|timer| timer.render("splat"));
+            self.splat.record(encoder, times, frame.footprints.texture.form, &frame.sheet_views, clear, draws);
+
+            let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.composite", timer, "composite"));
+            self.composite.record(&mut pass, &frame.composite_groups, &tile_lists.composited);
+            self.occlude.record(&mut pass, &frame.occlude_groups, &tile_lists.occluding);
+        }
+    }
+}
+
+impl QuadFrame {
+    /// Passes of the frame: every group has three.
+    pub(crate) fn passes(&self) -> usize {
+        3 * self.planned.plan.groups.len()
+    }
+
+    /// Its groups' slabs.
+    pub(crate) fn group_slabs(&self) -> GroupSlabs {
+        let FramePlan { groups, sheets, .. } = &self.planned.plan;
+        GroupSlabs { firsts: groups.iter().map(|group| group.first_slab).collect(), sheets: *sheets }
+    }
+
+    /// Copies the frame's counts to the start of `staging`.
+    pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer) {
+        let (tally, tiles) = (size_of::<Tally>() as u64, self.planned.plan.groups.len() as u64 * 4);
+        encoder.copy_buffer_to_buffer(&self.tally, 0, staging, 0, tally);
+        encoder.copy_buffer_to_buffer(&self.tile_lists.counts, 0, staging, tally, tiles);
+    }
+
+    /// Bytes of GPU memory.
+    pub(crate) fn gpu_bytes(&self) -> u64 {
+        let lists: u64 = self.lists.iter().map(|list| list.cull.gpu_bytes()).sum();
+        let TileLists { composited, occluding, counts, .. } = &self.tile_lists;
+        let orders = self.planned.orders.iter();
+        let buffers: u64 = [&self.groups, &self.tally, composited, occluding, counts]
+            .into_iter()
+            .chain(orders)
+            .map(Buffer::size)
+            .sum();
+        self.targets.gpu_bytes() + self.footprints.texture.gpu_bytes + lists + buffers
+    }
+}
+
+impl Planned {
+    fn new(device: &Device, volume: &ClassifiedVolume, view: View, sheets: u32, order: Order) -> Self {
+        let plan = FramePlan::new(volume.lists.bricks(), view, sheets, order);
+        let most = (volume.lists.bricks().zip(&plan.orders).enumerate())
+            .map(|(at, (bricks, order))| {
+                let voxels = |&brick: &u32| brick::present(&bricks[brick as usize]).count_ones();
+                most(plan.groups.iter().map(|group| {
+                    let bricks = group.bricks[at].clone();
+                    order[bricks.start as usize..bricks.end as usize].iter().map(voxels)
+                }))
+            })
+            .collect();
+        let upload = |order: &Vec<u32>| {
+            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("sheetsplat.order"),
+                contents: bytemuck::cast_slice(order),
+                usage: BufferUsages::STORAGE,
+            })
+        };
+        Self { order, revision: volume.revision, orders: plan.orders.iter().map(upload).collect(), most, plan }
+    }
+}
+
+impl Footprints {
+    /// The old table if it will do.
+    fn renewed(old: Option<Self>, given: Given<'_>) -> Self {
+        let (form, kernel) = (given.splatting.footprint, *given.kernel);
+        // The summed-area form serves every width (§3.3.1).
+        let width = given.view.slabs.width;
+        let of = (form == FootprintForm::Sections).then_some(width);
+        let fits = |old: &Self| (old.texture.form, old.kernel, old.width) == (form, kernel, of);
+        old.filter(fits).unwrap_or_else(|| {
+            let table = FootprintTable::new(form, &kernel, width);
+            Self { texture: FootprintTexture::upload(given.device, given.queue, &table), kernel, width: of }
+        })
+    }
+}
+
+/// What of the previous frame may be taken over.
+#[derive(Default)]
+struct Old {
+    planned: Option<Planned>,
+    targets: Option<Targets>,
+    footprints: Option<Footprints>,
+    groups: Option<Buffer>,
+    tally: Option<Buffer>,
+    tile_lists: Option<TileLists>,
+    lists: Vec<PreparedList>,
+}
+
+impl Old {
+    fn of(frame: Option<QuadFrame>) -> Self {
+        let Some(frame) = frame else { return Self::default() };
+        Self {
+            planned: Some(frame.planned),
+            targets: Some(frame.targets),
+            footprints: Some(frame.footprints),
+            groups: Some(frame.groups),
+            tally: Some(frame.tally),
+            tile_lists: Some(frame.tile_lists),
+            lists: frame.lists,
+        }
+    }
+}
+
+/// The most bricks and voxels that any group can visit, from the voxel counts of every group's bricks.
+fn most<C: ExactSizeIterator<Item = u32>>(groups: impl Iterator<Item = C>) -> (u32, u32) {
+    groups.fold((0, 0), |(bricks, voxels), counts| (bricks.max(counts.len() as u32), voxels.max(counts.sum())))
+}

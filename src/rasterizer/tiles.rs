@@ -1,0 +1,262 @@
+//! The tile rasterizer: one compute stage draws every tile front to back, its sheets in registers.
+
+use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Features};
+
+use super::Given;
+use crate::error::RenderError;
+use crate::gpu::bindings::grown;
+use crate::gpu::layout::{Brick, Gathered, Part, Tally};
+use crate::gpu::timer::Timer;
+use crate::gpu::uniforms;
+use crate::pass::gather::{Gather, GatherBuffers};
+use crate::plan::{View, tile_grid};
+use crate::splatting::{Compositing, FootprintForm, Order, Splatting};
+use crate::stats::GroupSlabs;
+use crate::tile_bins::{SHEETS, SIDE, TileBins};
+
+/// Threads that a subgroup may have.
+const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;
+
+/// The stage.
+#[derive(Debug, Default)]
+pub(crate) struct TileRasterizer {
+    gather: Gather,
+}
+
+/// A frame's part that is the tile rasterizer's.
+#[derive(Debug)]
+pub(crate) struct TileFrame {
+    binned: Binned,
+    mode: (Compositing, Order),
+    uniform: Buffer,
+    parts: Buffer,
+    /// All bricks in one buffer, where the volume's own are in several.
+    bricks: Option<Buffer>,
+    starts: Buffer,
+    entries: Buffer,
+    gathered: Buffer,
+    /// For every band of the compositing buffer and run of groups: the band's number, and the dispatch's offset and workgroups.
+    dispatches: Vec<(usize, u32, u32)>,
+    bands: Vec<BindGroup>,
+}
+
+/// What only changes with the view or the bricks.
+#[derive(Debug)]
+struct Binned {
+    bins: TileBins,
+    view: View,
+    order: Order,
+    /// Of the kernel; it changes the footprints' boxes.
+    support: f64,
+    search_steps: u32,
+    revision: u64,
+}
+
+impl TileRasterizer {
+    /// Why a device or some settings cannot be drawn by tiles; `None` if they can.
+    pub(crate) fn obstacle(device: &Device, splatting: &Splatting) -> Option<RenderError> {
+        let refused = |found: String, allowed: &'static str| {
+            let key = "splatting.rasterizer";
+            Some(RenderError::OutOfRange { key, found: format!("\"tiles\" with {found}"), allowed: allowed.to_owned() })
+        };
+        if splatting.footprint != FootprintForm::SummedArea {
+            return refused("splatting.footprint = \"sections\"".to_owned(), "\"summed-area\" with it, or \"quads\"");
+        }
+        if !device.features().contains(Features::SUBGROUP) {
+            return refused("a device without subgroups".to_owned(), "\"quads\"");
+        }
+        let info = device.adapter_info();
+        let sizes = [info.subgroup_min_size, info.subgroup_max_size];
+        if sizes.iter().any(|size| !SUBGROUP_SIZES.contains(size)) {
+            let found = format!("subgroups of {} to {} threads", sizes[0], sizes[1]);
+            return refused(found, "subgroups of 8 to 32 threads, or \"quads\"");
+        }
+        None
+    }
+
+    /// Bins bricks if need be, and allocates what does not fit any more. Also whether it had to bin.
+    ///
+    /// # Errors
+    /// If there is too much behind a tile, or more bricks than a binding holds.
+    pub(crate) fn prepare(
+        &self,
+        given: Given<'_>,
+        previous: Option<TileFrame>,
+    ) -> Result<(TileFrame, bool), RenderError> {
+        let Given { device, volume, view, kernel, splatting, .. } = given;
+        let limits = device.limits();
+        let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let mut old = Old::of(previous);
+        let search_steps = given.ramp_lengths.iter().map(|&points| search_steps(points)).sum();
+        let is_current = |old: &Binned| {
+            old.view == *view
+                && (old.order, old.revision, old.search_steps) == (splatting.order, volume.revision, search_steps)
+                && old.support == kernel.support()
+        };
+        let (current, stale) = match old.binned.take() {
+            Some(binned) if is_current(&binned) => (Some(binned), false),
+            _ => (None, true),
+        };
+        let bricks = volume.lists.all();
+        let binned = match current {
+            Some(binned) => binned,
+            None => {
+                let half_box = view.footprint.half_box(kernel.support());
+                let bins = TileBins::new(bricks, view, splatting.order, half_box, search_steps, binding / 4)?;
+                let support = kernel.support();
+                Binned { bins, view: *view, order: splatting.order, support, search_steps, revision: volume.revision }
+            }
+        };
+        let bins = &binned.bins;
+        let storage = BufferUsages::STORAGE;
+        let (starts, entries) = match (old.starts.take(), old.entries.take()) {
+            (Some(starts), Some(entries)) if !stale => (starts, entries),
+            (starts, entries) => (
+                given.filled(starts, "sheetsplat.bin_starts", bytemuck::cast_slice(&bins.starts), storage),
+                given.filled(entries, "sheetsplat.bin_entries", bytemuck::cast_slice(&bins.entries), storage),
+            ),
+        };
+        let own_bricks = match (&volume.lists.lists[..], old.bricks.take()) {
+            ([_], _) => None,
+            (_, Some(bricks)) if !stale => Some(bricks),
+            (_, old) => {
+                // Bindings may not be empty.
+                let none = [bytemuck::Zeroable::zeroed()];
+                let bytes: &[u8] = bytemuck::cast_slice::<Brick, _>(if bricks.is_empty() { &none } else { bricks });
+                if bytes.len() as u64 > binding {
+                    let (what, limit) = ("the bricks of the tile rasterizer", "max_storage_buffer_binding_size");
+                    return Err(RenderError::Limit { what, limit, required: bytes.len() as u64, actual: binding });
+                }
+                Some(given.filled(old, "sheetsplat.all_bricks", bytes, storage))
+            }
+        };
+
+        let uniform = uniforms::gather(view, kernel, bins, bricks.len() as u32);
+        let [columns, rows] = tile_grid(view.size);
+        let words = uniform.composited + (columns * rows * bins.groups).div_ceil(32);
+        let bytes = size_of::<Gathered>() as u64 + u64::from(words) * 4;
+        let usage = storage | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
+        let gathered = grown(device, old.gathered.take(), "sheetsplat.gathered", bytes, usage);
+        let uniform_bytes = bytemuck::bytes_of(&uniform);
+        let uniform = given.filled(old.uniform.take(), "sheetsplat.gather", uniform_bytes, BufferUsages::UNIFORM);
+
+        let stride = size_of::<Part>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize);
+        let (mut part_bytes, mut dispatches) = (Vec::new(), Vec::new());
+        let columns = view.size[0].div_ceil(SIDE);
+        for (at, band) in given.compositing.bands.iter().enumerate() {
+            let band = band.band;
+            let first_tile = band.first_row / SIDE * columns;
+            let tiles = band.rows.div_ceil(SIDE) * columns;
+            for run in &bins.runs {
+                dispatches.push((at, part_bytes.len() as u32, tiles));
+                part_bytes.extend_from_slice(bytemuck::bytes_of(&Part {
+                    first_row: band.first_row,
+                    first_tile,
+                    end_tile: first_tile + tiles,
+                    first_group: run.start,
+                    end_group: run.end,
+                }));
+                part_bytes.resize(part_bytes.len().next_multiple_of(stride), 0);
+            }
+        }
+        part_bytes.resize(part_bytes.len().max(stride), 0);
+        let parts = given.filled(old.parts.take(), "sheetsplat.parts", &part_bytes, BufferUsages::UNIFORM);
+
+        let mode = (splatting.compositing, splatting.order);
+        let buffers = GatherBuffers {
+            frame: given.frame,
+            gather: &uniform,
+            parts: &parts,
+            bricks: own_bricks.as_ref().unwrap_or_else(|| &volume.lists.lists[0].buffer),
+            starts: &starts,
+            entries: &entries,
+            control_points: given.control_points,
+            values: &volume.texture.view,
+            gathered: &gathered,
+        };
+        let bands = given.compositing.bands.iter().map(|band| self.gather.bind(device, mode, buffers, &band.acc));
+        let bands = bands.collect();
+        let frame = TileFrame {
+            binned,
+            mode,
+            uniform,
+            parts,
+            bricks: own_bricks,
+            starts,
+            entries,
+            gathered,
+            dispatches,
+            bands,
+        };
+        Ok((frame, stale))
+    }
+
+    /// Draws the frame.
+    pub(crate) fn record(&self, encoder: &mut CommandEncoder, timer: &mut Option<Timer>, frame: &TileFrame) {
+        encoder.clear_buffer(&frame.gathered, 0, None);
+        let mut pass = encoder.begin_compute_pass(&super::compute("sheetsplat.gather", timer, "gather"));
+        for &(band, offset, tiles) in &frame.dispatches {
+            self.gather.record(&mut pass, frame.mode, &frame.bands[band], offset, tiles);
+        }
+    }
+}
+
+impl TileFrame {
+    /// Passes of a frame.
+    pub(crate) const PASSES: usize = 1;
+
+    /// Its groups' slabs.
+    pub(crate) fn group_slabs(&self) -> GroupSlabs {
+        let bins = &self.binned.bins;
+        let firsts = (0..bins.groups as i32).map(|group| bins.first_slab + group * SHEETS as i32);
+        let firsts = match self.binned.order {
+            Order::FrontToBack => firsts.collect(),
+            Order::BackToFront => firsts.rev().collect(),
+        };
+        GroupSlabs { firsts, sheets: SHEETS }
+    }
+
+    /// Copies the frame's counts to the start of `staging`.
+    pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer) {
+        let bytes = size_of::<Tally>() as u64 + u64::from(self.binned.bins.groups) * 4;
+        encoder.copy_buffer_to_buffer(&self.gathered, 0, staging, 0, bytes);
+    }
+
+    /// Bytes of GPU memory.
+    pub(crate) fn gpu_bytes(&self) -> u64 {
+        let Self { uniform, parts, starts, entries, gathered, bricks, .. } = self;
+        [uniform, parts, starts, entries, gathered].into_iter().chain(bricks).map(Buffer::size).sum()
+    }
+}
+
+/// Loop iterations that a lookup among so many control points takes: none if every thread of a subgroup can hold one.
+fn search_steps(points: u32) -> u32 {
+    if points <= *SUBGROUP_SIZES.start() { 0 } else { 2 + points.ilog2() + 1 }
+}
+
+/// What of the previous frame may be taken over.
+#[derive(Default)]
+struct Old {
+    binned: Option<Binned>,
+    uniform: Option<Buffer>,
+    parts: Option<Buffer>,
+    bricks: Option<Buffer>,
+    starts: Option<Buffer>,
+    entries: Option<Buffer>,
+    gathered: Option<Buffer>,
+}
+
+impl Old {
+    fn of(frame: Option<TileFrame>) -> Self {
+        let Some(frame) = frame else { return Self::default() };
+        Self {
+            binned: Some(frame.binned),
+            uniform: Some(frame.uniform),
+            parts: Some(frame.parts),
+            bricks: frame.bricks,
+            starts: Some(frame.starts),
+            entries: Some(frame.entries),
+            gathered: Some(frame.gathered),
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! Which bricks every sheet group of every tile looks at: the buckets (§5.1) of the tile rasteriser, which walks a tile's
+//! groups front to back.
+
+use std::ops::Range;
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use crate::brick;
+use crate::gpu::layout::Brick;
+use crate::plan::View;
+use crate::slab::SlabGrid;
+use crate::splatting::Order;
+
+/// Side of the rasteriser's tiles, pixels.
+pub const SIDE: u32 = 16;
+
+/// Width and height of the units that a tile consists of, two across and four down, pixels.
+const UNIT: [u32; 2] = [8, 4];
+
+/// Sheets of a group.
+pub const SHEETS: u32 = 4;
+
+/// The most bricks: their numbers share a word with the units.
+const MAX_BRICKS: usize = 1 << 24;
+
+/// Iterations of all its loops that a thread may take in one dispatch: llvmpipe ends loops after 65535.
+const MAX_ITERATIONS: u32 = 65000;
+
+/// Iterations that a brick takes at most: one each to fetch and to visit it, 8 to test its places, 9 to queue them, and 5 for each
+/// of its 8 queues: that one, and 4 for its voxels, two by two.
+const ITERATIONS_PER_BRICK: u32 = 59;
+
+/// Bricks by tile and sheet group.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TileBins {
+    /// The first slab of the nearest group.
+    pub first_slab: i32,
+    /// Sheet groups of every tile.
+    pub groups: u32,
+    /// Where every tile's groups start in `entries`, in the order they are composited in, tile after tile; at last the end.
+    pub starts: Vec<u32>,
+    /// Number of a brick, and in the last byte the units of the tile that it may touch, row by row.
+    pub entries: Vec<u32>,
+    /// The groups in runs that one dispatch can take.
+    pub runs: Vec<Range<u32>>,
+}
+
+/// Why a view cannot be drawn by tiles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unfit {
+    /// What there is too much of.
+    pub what: &'static str,
+    /// How much there is.
+    pub required: u64,
+    /// How much there may be.
+    pub actual: u64,
+}
+
+/// Where a brick may be seen: pixels, both ends inclusive, and groups.
+struct Placed {
+    number: u32,
+    first: [u32; 2],
+    last: [u32; 2],
+    groups: Range<i32>,
+}
+
+impl TileBins {
+    /// Sorts bricks by the tiles and groups they may touch, with footprints that reach `half_box` pixels around voxels. Control
+    /// points are searched in at most `search_steps` steps. Neither list may have more than `most_words` words.
+    ///
+    /// # Errors
+    /// If there are more bricks, or more of them behind a tile, than the rasteriser can take.
+    pub fn new(
+        bricks: &[Brick],
+        view: &View,
+        order: Order,
+        half_box: DVec2,
+        search_steps: u32,
+        most_words: u64,
+    ) -> Result<Self, Unfit> {
+        let check = |what, required: u64, actual: u64| {
+            if required <= actual { Ok(()) } else { Err(Unfit { what, required, actual }) }
+        };
+        check("bricks", bricks.len() as u64, MAX_BRICKS as u64)?;
+        let placed = place(bricks, view, half_box);
+        let first_group = placed.iter().map(|brick| brick.groups.start).min().unwrap_or(0);
+        let end_group = placed.iter().map(|brick| brick.groups.end).max().unwrap_or(0);
+        let groups = (end_group - first_group) as u32;
+        let [columns, rows] = view.size.map(|pixels| pixels.div_ceil(SIDE));
+        let bins = u64::from(columns) * u64::from(rows) * u64::from(groups);
+        check("tiles times sheet groups", bins, most_words - 1)?;
+
+        // A counting sort: bins' sizes, where they start, and their entries.
+        let bins_of = |brick: &Placed, visit: &mut dyn FnMut(usize, u32)| {
+            for y in brick.first[1] / SIDE..=brick.last[1] / SIDE {
+                for x in brick.first[0] / SIDE..=brick.last[0] / SIDE {
+                    let units = units_touched(brick, [x * SIDE, y * SIDE]);
+                    for group in brick.groups.clone() {
+                        let at = match order {
+                            Order::FrontToBack => group - first_group,
+                            Order::BackToFront => end_group - 1 - group,
+                        };
+                        visit(((y * columns + x) * groups) as usize + at as usize, units);
+                    }
+                }
+            }
+        };
+        let mut starts = vec![0_u32; bins as usize + 1];
+        let mut total = 0_u64;
+        for brick in &placed {
+            bins_of(brick, &mut |bin, _| {
+                starts[bin + 1] += 1;
+                total += 1;
+            });
+        }
+        check("bricks' parts in tiles and sheet groups", total, most_words)?;
+        for bin in 1..starts.len() {
+            starts[bin] += starts[bin - 1];
+        }
+        let mut next = starts.clone();
+        let mut entries = vec![0; total as usize];
+        for brick in &placed {
+            bins_of(brick, &mut |bin, units| {
+                entries[next[bin] as usize] = brick.number | units << 24;
+                next[bin] += 1;
+            });
+        }
+        let runs = runs(&starts, groups as usize, MAX_ITERATIONS / (ITERATIONS_PER_BRICK + 8 * search_steps))?;
+        Ok(Self { first_slab: first_group * SHEETS as i32, groups, starts, entries, runs })
+    }
+}
+
+/// The bricks that are on the screen, in memory order whatever changes of iso-range came before: equal scenes add up in equal order.
+fn place(bricks: &[Brick], view: &View, half_box: DVec2) -> Vec<Placed> {
+    let groups = SlabGrid { width: view.slabs.width * f64::from(SHEETS), ..view.slabs };
+    let rows = view.screen_from_voxel;
+    let last_pixel = DVec2::from(view.size.map(f64::from)) - 1.0;
+    let mut placed: Vec<(usize, Placed)> = bricks
+        .par_iter()
+        .enumerate()
+        .filter(|(_, brick)| brick.present != [0; 2])
+        .filter_map(|(number, brick)| {
+            let (middle, half) = brick::bounds(brick);
+            let at = DVec3::from(rows.map(|row| row.dot(middle.extend(1.0))));
+            let spread = DVec3::from(rows.map(|row| row.truncate().abs().dot(half)));
+            // With more slack than the shader rounds with.
+            let reach = spread.truncate() + half_box + 0.02;
+            let first = (at.truncate() - reach - 0.5).ceil().max(DVec2::ZERO);
+            let last = (at.truncate() + reach - 0.5).floor().min(last_pixel);
+            let placed = Placed {
+                number: number as u32,
+                first: first.as_uvec2().to_array(),
+                last: last.as_uvec2().to_array(),
+                groups: groups.touched(at.z - spread.z).start..groups.touched(at.z + spread.z).end,
+            };
+            first.cmple(last).all().then_some((number, placed))
+        })
+        .collect();
+    let position = |(number, _): &(usize, Placed)| brick::position(&bricks[*number]);
+    if !placed.is_sorted_by_key(position) {
+        placed.par_sort_unstable_by_key(position);
+    }
+    placed.into_iter().map(|(_, brick)| brick).collect()
+}
+
+/// Which units of the tile at `corner` a brick may touch, one bit each.
+fn units_touched(brick: &Placed, corner: [u32; 2]) -> u32 {
+    let touches = |axis: usize, unit: u32| {
+        let low = corner[axis] + unit * UNIT[axis];
+        brick.first[axis] < low + UNIT[axis] && brick.last[axis] >= low
+    };
+    let bit = |unit: u32| u32::from(touches(0, unit % 2) && touches(1, unit / 2)) << unit;
+    (0..SIDE * SIDE / (UNIT[0] * UNIT[1])).map(bit).sum()
+}
+
+/// Runs of groups with at most `most` entries in any tile.
+fn runs(starts: &[u32], groups: usize, most: u32) -> Result<Vec<Range<u32>>, Unfit> {
+    let mut runs = Vec::new();
+    let mut first = 0;
+    // Entries of every tile in the current run.
+    let tiles = (starts.len() - 1).checked_div(groups).unwrap_or(0);
+    let size = |tile: usize, from: usize, to: usize| starts[tile * groups + to] - starts[tile * groups + from];
+    let largest = |from: usize, to: usize| (0..tiles).map(|tile| size(tile, from, to)).max().unwrap_or(0);
+    while first < groups {
+        if largest(first, first + 1) > most {
+            let required = largest(first, first + 1).into();
+            return Err(Unfit { what: "bricks behind a tile in one sheet group", required, actual: most.into() });
+        }
+        // The largest run that fits, by bisection: sizes grow with the run.
+        let (mut fits, mut too_long) = (first + 1, groups + 1);
+        while too_long - fits > 1 {
+            let middle = fits.midpoint(too_long);
+            *(if largest(first, middle) <= most { &mut fits } else { &mut too_long }) = middle;
+        }
+        runs.push(first as u32..fits as u32);
+        first = fits;
+    }
+    Ok(runs)
+}
