@@ -23,6 +23,8 @@
 // `frame.compositing` and `frame.order`.
 override COMPOSITING: u32 = 0u;
 override ORDER: u32 = 0u;
+// Whether a footprint's box is the parallelogram of Fig. 13, else its bounding rectangle.
+override PARALLELOGRAM: bool = false;
 
 // Read once: a uniform read in a loop costs a software driver a gather.
 var<private> frame: Frame;
@@ -231,14 +233,31 @@ fn opened(region: Region, is_open: vec4<bool>, column: f32, rows: vec4f) -> Regi
 // units of a region, 16 to 31 those across the lower.
 fn is_visible(center_px: vec2f, region: Region) -> bool {
     let margin = frame.half_box + BOX_SLACK;
-    let first = vec2i(clamp(ceil(center_px - margin - region.low), vec2f(0.0), vec2f(16.0)));
-    let end = vec2i(clamp(floor(center_px + margin - region.low), vec2f(-1.0), region.high - region.low)) + 1;
-    let across = (1u << u32(end.x)) - (1u << u32(first.x));
-    let down = (1u << u32(end.y)) - (1u << u32(first.y));
-    let upper = -(vec4i(i32(down)) >> vec4u(0u, 1u, 2u, 3u) & vec4i(1));
-    let lower = -(vec4i(i32(down)) >> vec4u(4u, 5u, 6u, 7u) & vec4i(1));
-    let box = (vec4u(upper) & vec4u(across)) | (vec4u(lower) & vec4u(across << 16u));
-    return all(end > first) && any((box & region.open) != vec4u(0u));
+    let center = center_px - region.low;
+    let size = region.high - region.low;
+    let first_row = i32(clamp(ceil(center.y - margin.y), 0.0, 16.0));
+    let end_row = i32(clamp(floor(center.y + margin.y), -1.0, size.y)) + 1;
+    let down = i32((1u << u32(end_row)) - (1u << u32(first_row)));
+    let upper = vec4u(-(vec4i(down) >> vec4u(0u, 1u, 2u, 3u) & vec4i(1)));
+    let lower = vec4u(-(vec4i(down) >> vec4u(4u, 5u, 6u, 7u) & vec4i(1)));
+    var across_upper = across(vec4f(center.x), margin.x, size.x);
+    var across_lower = across_upper;
+    if PARALLELOGRAM {
+        // The sides follow the shear of eq. 9.
+        let rows = vec4f(0.0, 1.0, 2.0, 3.0) - center.y;
+        let half_width = gather.half_width + BOX_SLACK;
+        across_upper = across(center.x + gather.shear * rows, half_width, size.x);
+        across_lower = across(center.x + gather.shear * (rows + 4.0), half_width, size.x);
+    }
+    let box = (upper & across_upper) | (lower & (across_lower << vec4u(16u)));
+    return end_row > first_row && any((box & region.open) != vec4u(0u));
+}
+
+// The pixels of a row within a distance of a point, one bit each.
+fn across(center: vec4f, half_width: f32, last: f32) -> vec4u {
+    let first = vec4i(clamp(ceil(center - half_width), vec4f(0.0), vec4f(16.0)));
+    let end = vec4i(clamp(floor(center + half_width), vec4f(-1.0), vec4f(last))) + 1;
+    return select(vec4u(0u), (vec4u(1u) << vec4u(end)) - (vec4u(1u) << vec4u(first)), end > first);
 }
 
 fn draw(tile: u32, thread: u32) {

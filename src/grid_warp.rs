@@ -101,6 +101,14 @@ impl FootprintMap {
         Self { pixels_from_footprint: map, footprint_from_pixels: map.inverse(), amplitude }
     }
 
+    /// The parallelogram around a footprint of the given radius (grid units) whose upper and lower sides are pixel rows (Fig. 13), as high
+    /// as the box: how many pixels its other sides move right on every row down, and half its width, pixels.
+    pub fn parallelogram(&self, radius: f64) -> (f64, f64) {
+        // In footprint coordinates turned so that pixel rows follow the first axis, the second is the same all along a row.
+        let DMat2 { x_axis: along_rows, y_axis } = self.footprint_from_pixels;
+        (-along_rows.dot(y_axis) / along_rows.length_squared(), radius / along_rows.length())
+    }
+
     /// Half the width and height, in pixels, of the screen box around a footprint of the given radius (grid units).
     pub fn half_box(&self, radius: f64) -> DVec2 {
         radius * DVec2::new(self.pixels_from_footprint.row(0).length(), self.pixels_from_footprint.row(1).length())
@@ -171,6 +179,21 @@ mod tests {
                     ((map.footprint_from_pixels * offset).length_squared(), direct_form(&basis, ar, pix, offset));
                 assert!((ours - direct).abs() < 1e-12 * (1.0 + direct), "{ours} {direct}");
             }
+        }
+    }
+
+    #[test]
+    fn a_parallelogram_holds_its_footprint_and_touches_it() {
+        for (basis, ar) in views() {
+            let map = FootprintMap::new(&m_view_warped(&basis, ar), 0.05);
+            let (shear, half_width) = map.parallelogram(1.5);
+            let reach = |angle: f64| {
+                let rim = map.pixels_from_footprint * DVec2::from_angle(angle) * 1.5;
+                ((rim.x - shear * rim.y).abs() / half_width, rim.y.abs() / map.half_box(1.5).y)
+            };
+            let reached = (0..3600).map(|step| reach(f64::from(step) * std::f64::consts::TAU / 3600.0));
+            let (x, y) = reached.fold((0.0_f64, 0.0_f64), |most, reach| (most.0.max(reach.0), most.1.max(reach.1)));
+            assert!((x - 1.0).abs() < 1e-5 && (y - 1.0).abs() < 1e-5, "{x} {y}");
         }
     }
 

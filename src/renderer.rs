@@ -18,7 +18,7 @@ use crate::rasterizer::quads::QuadRasterizer;
 use crate::rasterizer::tiles::TileRasterizer;
 use crate::rasterizer::{Given, filled};
 use crate::scene_view::{Prepared, SceneView};
-use crate::splatting::Rasterizer;
+use crate::splatting::{FootprintBox, Rasterizer, Splatting};
 
 /// What a renderer is made for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,12 +91,7 @@ impl Renderer {
             Some(old) if old.compositing.size == size => None,
             _ => Some(CompositingBuffer::new(device, size)?),
         };
-        let obstacle = TileRasterizer::obstacle(device, splatting);
-        let by_tiles = match (splatting.rasterizer, obstacle) {
-            (Rasterizer::Quads, _) | (Rasterizer::Auto, Some(_)) => false,
-            (Rasterizer::Tiles, Some(obstacle)) => return Err(obstacle),
-            (_, None) => true,
-        };
+        let by_tiles = by_tiles(device, splatting)?;
         volume.lists.flush(device, queue);
         let old = frame.take();
         let (old_compositing, uniform, control_points, drawing, totals) = old.map_or_else(Default::default, |old| {
@@ -171,7 +166,7 @@ impl Renderer {
         if by_tiles {
             match self.tiles.prepare(given, old_tiles) {
                 Ok((frame, bucketed)) => return Ok((Drawing::Tiles(Box::new(frame)), bucketed)),
-                Err(error) if given.splatting.rasterizer == Rasterizer::Tiles => return Err(error),
+                Err(error) if insists_on_tiles(given.splatting) => return Err(error),
                 Err(_) => {}
             }
         }
@@ -210,4 +205,27 @@ impl Renderer {
             }
         }
     }
+}
+
+/// Whether to draw by tiles, or to try it.
+///
+/// # Errors
+/// If the settings insist on what the device or the other settings do not allow.
+fn by_tiles(device: &Device, splatting: &Splatting) -> Result<bool, RenderError> {
+    let insists = insists_on_tiles(splatting);
+    match (splatting.rasterizer, TileRasterizer::obstacle(device, splatting)) {
+        (Rasterizer::Quads, _) if insists => Err(RenderError::OutOfRange {
+            key: "splatting.footprint_box",
+            found: "\"parallelogram\" with splatting.rasterizer = \"quads\"".to_owned(),
+            allowed: "\"rectangle\" with it, or the rasterizer \"tiles\"".to_owned(),
+        }),
+        (Rasterizer::Quads, _) => Ok(false),
+        (_, Some(obstacle)) if insists => Err(obstacle),
+        (_, obstacle) => Ok(obstacle.is_none()),
+    }
+}
+
+/// Whether quads will not do.
+fn insists_on_tiles(splatting: &Splatting) -> bool {
+    splatting.rasterizer == Rasterizer::Tiles || splatting.footprint_box == FootprintBox::Parallelogram
 }

@@ -50,6 +50,16 @@ pub enum Rasterizer {
     Tiles,
 }
 
+/// What is tested for being opaque around a footprint (§6, Fig. 13).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FootprintBox {
+    /// The bounding rectangle.
+    Rectangle,
+    /// The parallelogram that the shear of eq. 9 makes of a square: less, where the grid is anisotropic and seen obliquely. By
+    /// tiles only, as its filter is not separable.
+    Parallelogram,
+}
+
 /// All splatting settings of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Splatting {
@@ -77,6 +87,8 @@ pub struct Splatting {
     pub tiles: bool,
     /// How kernel sections get to the pixels.
     pub rasterizer: Rasterizer,
+    /// What early splat elimination tests.
+    pub footprint_box: FootprintBox,
 }
 
 impl Default for Splatting {
@@ -93,6 +105,7 @@ impl Default for Splatting {
             culling: true,
             tiles: true,
             rasterizer: Rasterizer::Auto,
+            footprint_box: FootprintBox::Rectangle,
         }
     }
 }

@@ -11,9 +11,9 @@ struct Gather {
     bricks: u32,
     drawn: u32,
     composited: u32,
-    padding_0: u32,
-    padding_1: u32,
-    padding_2: u32,
+    shear: f32,
+    half_width: f32,
+    padding: u32,
 }
 
 struct Part {

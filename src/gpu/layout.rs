@@ -223,12 +223,12 @@ pub struct Gather {
     pub drawn: u32,
     /// Where the bits of composited tiles start: for every group a bit per 32×32 tile.
     pub composited: u32,
+    /// Of the parallelogram of Fig. 13: pixels that its sides move right on every row down.
+    pub shear: f32,
+    /// Half its width, pixels.
+    pub half_width: f32,
     /// Unused.
-    pub padding_0: u32,
-    /// Unused.
-    pub padding_1: u32,
-    /// Unused.
-    pub padding_2: u32,
+    pub padding: u32,
 }
 
 /// The tiles and groups that one dispatch draws.

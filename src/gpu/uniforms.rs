@@ -68,6 +68,7 @@ pub fn gather(view: &View, kernel: &Kernel, bins: &TileBins, bricks: u32) -> Gat
     let in_f32 = |numbers: [f64; 4]| numbers.map(|x| x as f32);
     let FootprintMap { footprint_from_pixels, .. } = view.footprint;
     let (x, y) = (footprint_from_pixels.x_axis, footprint_from_pixels.y_axis);
+    let (shear, half_width) = view.footprint.parallelogram(kernel.support());
     Gather {
         along: bytemuck::cast(kernel.cumulative_polynomial::<16>(1.0).map(|x| x as f32)),
         chord: bytemuck::cast(kernel.cumulative_polynomial::<8>(CHORD_SPAN).map(|x| x as f32)),
@@ -81,9 +82,9 @@ pub fn gather(view: &View, kernel: &Kernel, bins: &TileBins, bricks: u32) -> Gat
         bricks,
         drawn: bins.groups,
         composited: bins.groups + 2 * bricks * groups_per_kernel(view),
-        padding_0: 0,
-        padding_1: 0,
-        padding_2: 0,
+        shear: shear as f32,
+        half_width: half_width as f32,
+        padding: 0,
     }
 }
 

@@ -7,12 +7,28 @@ use wgpu::{BindGroup, Buffer, ComputePass, Device, ShaderStages, TextureView, Te
 use crate::gpu::bindings::{ComputeStage, at_offset, storage, texture, uniform};
 use crate::gpu::layout::{Brick, Frame, Gather as GatherUniform, Gathered, Part};
 use crate::gpu::shaders;
-use crate::splatting::{Compositing, Order};
+use crate::splatting::{Compositing, FootprintBox, Order, Splatting};
 
-/// The stage's pipelines, by compositing and order; each is compiled when it is first asked for.
+/// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug, Default)]
 pub struct Gather {
-    stages: [[OnceLock<ComputeStage>; 2]; 3],
+    stages: [[[OnceLock<ComputeStage>; 2]; 2]; 3],
+}
+
+/// What a pipeline is compiled for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GatherMode {
+    compositing: Compositing,
+    order: Order,
+    footprint_box: FootprintBox,
+}
+
+impl GatherMode {
+    /// The mode that splatting settings ask for.
+    pub fn of(splatting: &Splatting) -> Self {
+        let Splatting { compositing, order, footprint_box, .. } = *splatting;
+        Self { compositing, order, footprint_box }
+    }
 }
 
 /// Buffers of the stage.
@@ -39,8 +55,12 @@ pub struct GatherBuffers<'a> {
 }
 
 impl Gather {
-    fn stage(&self, device: &Device, compositing: Compositing, order: Order) -> &ComputeStage {
-        self.stages[compositing as usize][order as usize].get_or_init(|| {
+    fn stage(&self, mode: GatherMode) -> &OnceLock<ComputeStage> {
+        &self.stages[mode.compositing as usize][mode.order as usize][mode.footprint_box as usize]
+    }
+
+    fn compiled(&self, device: &Device, mode: GatherMode) -> &ComputeStage {
+        self.stage(mode).get_or_init(|| {
             let stage = ShaderStages::COMPUTE;
             let slots = [
                 uniform::<Frame>(stage, false),
@@ -54,19 +74,17 @@ impl Gather {
                 storage::<[f32; 4]>(stage, false),
                 storage::<Gathered>(stage, false),
             ];
-            let constants = [("COMPOSITING", f64::from(compositing as u32)), ("ORDER", f64::from(order as u32))];
+            let constants = [
+                ("COMPOSITING", f64::from(mode.compositing as u32)),
+                ("ORDER", f64::from(mode.order as u32)),
+                ("PARALLELOGRAM", f64::from(mode.footprint_box as u32)),
+            ];
             ComputeStage::new(device, shaders::GATHER, "main", &slots, &constants)
         })
     }
 
-    /// Binds a band of the compositing buffer, `[vec4f]`, for one way of compositing.
-    pub fn bind(
-        &self,
-        device: &Device,
-        (compositing, order): (Compositing, Order),
-        buffers: GatherBuffers<'_>,
-        acc: &Buffer,
-    ) -> BindGroup {
+    /// Binds a band of the compositing buffer, `[vec4f]`, for one mode.
+    pub fn bind(&self, device: &Device, mode: GatherMode, buffers: GatherBuffers<'_>, acc: &Buffer) -> BindGroup {
         let GatherBuffers { frame, gather, parts, bricks, starts, entries, control_points, values, gathered } = buffers;
         let whole = Buffer::as_entire_binding;
         let resources = [
@@ -81,19 +99,12 @@ impl Gather {
             whole(acc),
             whole(gathered),
         ];
-        self.stage(device, compositing, order).bind(device, &resources)
+        self.compiled(device, mode).bind(device, &resources)
     }
 
-    /// Draws so many tiles of the part at `offset`, the way the group was bound for.
-    pub fn record(
-        &self,
-        pass: &mut ComputePass<'_>,
-        (compositing, order): (Compositing, Order),
-        group: &BindGroup,
-        offset: u32,
-        tiles: u32,
-    ) {
-        if let Some(stage) = self.stages[compositing as usize][order as usize].get() {
+    /// Draws so many tiles of the part at `offset`, in the mode that the group was bound for.
+    pub fn record(&self, pass: &mut ComputePass<'_>, mode: GatherMode, group: &BindGroup, offset: u32, tiles: u32) {
+        if let Some(stage) = self.stage(mode).get() {
             stage.dispatch(pass, group, &[offset], tiles);
         }
     }

@@ -8,9 +8,9 @@ use crate::gpu::bindings::grown;
 use crate::gpu::layout::{Brick, Gathered, Part, Tally};
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
-use crate::pass::gather::{Gather, GatherBuffers};
+use crate::pass::gather::{Gather, GatherBuffers, GatherMode};
 use crate::plan::{View, tile_grid};
-use crate::splatting::{Compositing, FootprintForm, Order, Splatting};
+use crate::splatting::{FootprintForm, Order, Splatting};
 use crate::stats::GroupSlabs;
 use crate::tile_bins::{SHEETS, SIDE, TileBins};
 
@@ -27,7 +27,7 @@ pub(crate) struct TileRasterizer {
 #[derive(Debug)]
 pub(crate) struct TileFrame {
     binned: Binned,
-    mode: (Compositing, Order),
+    mode: GatherMode,
     uniform: Buffer,
     parts: Buffer,
     /// All bricks in one buffer, where the volume's own are in several.
@@ -162,7 +162,7 @@ impl TileRasterizer {
         part_bytes.resize(part_bytes.len().max(stride), 0);
         let parts = given.filled(old.parts.take(), "sheetsplat.parts", &part_bytes, BufferUsages::UNIFORM);
 
-        let mode = (splatting.compositing, splatting.order);
+        let mode = GatherMode::of(splatting);
         let buffers = GatherBuffers {
             frame: given.frame,
             gather: &uniform,

@@ -8,7 +8,7 @@ use super::reader::{Bounds, Entry, FINITE, Section};
 use super::{ImageSettings, SceneError, TransferSettings, VolumeSource};
 use crate::camera::{Camera, Projection};
 use crate::shading::{Light, Shading};
-use crate::splatting::{Compositing, FootprintForm, Method, Order, Rasterizer, Splatting};
+use crate::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
 
 const POSITIVE: Bounds = Bounds { text: "a finite number > 0", contain: |x| x > 0.0 };
 const NOT_NEGATIVE: Bounds = Bounds { text: "a finite number >= 0", contain: |x| x >= 0.0 };
@@ -121,6 +121,7 @@ pub(super) fn splatting(mut section: Section) -> Result<Splatting, SceneError> {
         [("linear", Compositing::Linear), ("exponential", Compositing::Exponential), ("xray", Compositing::Xray)];
     let orders = [("front-to-back", Order::FrontToBack), ("back-to-front", Order::BackToFront)];
     let rasterizers = [("auto", Rasterizer::Auto), ("quads", Rasterizer::Quads), ("tiles", Rasterizer::Tiles)];
+    let boxes = [("rectangle", FootprintBox::Rectangle), ("parallelogram", FootprintBox::Parallelogram)];
     let mut splatting = Splatting::default();
     section.read("method", &mut splatting.method, |entry| entry.choice(&methods))?;
     section.read("radius", &mut splatting.radius, |entry| entry.number(RADIUS))?;
@@ -133,6 +134,7 @@ pub(super) fn splatting(mut section: Section) -> Result<Splatting, SceneError> {
     section.read("culling", &mut splatting.culling, Entry::boolean)?;
     section.read("tiles", &mut splatting.tiles, Entry::boolean)?;
     section.read("rasterizer", &mut splatting.rasterizer, |entry| entry.choice(&rasterizers))?;
+    section.read("footprint_box", &mut splatting.footprint_box, |entry| entry.choice(&boxes))?;
     section.finish()?;
     Ok(splatting)
 }
