@@ -5,7 +5,9 @@ use std::mem::offset_of;
 
 use naga::proc::Layouter;
 use naga::{AddressSpace, Handle, Module, Type, TypeInner};
-use sheetsplat::gpu::layout::{Band, Brick, BrickState, Frame, Group, Indirect, Splat, Tally, TileList, Visit};
+use sheetsplat::gpu::layout::{
+    Band, Brick, BrickState, Frame, Gather, Gathered, Group, Indirect, Part, Splat, Tally, TileList, Visit,
+};
 use sheetsplat::gpu::shaders;
 
 /// A `repr(C)` struct as Rust lays it out: name, size, and members with name, offset and size.

@@ -11,7 +11,7 @@ use sheetsplat::error::RenderError;
 use sheetsplat::gpu::brick_lists::BrickLists;
 use sheetsplat::gpu::device::{self, DeviceError, DeviceRequirements};
 use sheetsplat::gpu::layout::{Band, Brick};
-use sheetsplat::gpu::targets::Targets;
+use sheetsplat::gpu::targets::CompositingBuffer;
 use sheetsplat::gpu::volume_texture::VolumeTexture;
 use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::image::Image;
@@ -141,9 +141,9 @@ fn small_bindings_split_voxels_and_image() {
         let of_lists: Vec<Brick> = lists.bricks().flatten().copied().collect();
         assert_eq!(of_lists, bricks.bricks(), "together they are all there is");
         assert!(lists.lists.iter().all(|list| list.buffer.size() <= bytes));
-        let targets = Targets::new(small.device(), [150, 110], TextureFormat::Rgba32Float, 2).unwrap();
-        assert_eq!(targets.bands.len(), bands);
-        for (at, band) in targets.bands.iter().enumerate() {
+        let compositing_buffer = CompositingBuffer::new(small.device(), [150, 110]).unwrap();
+        assert_eq!(compositing_buffer.bands.len(), bands);
+        for (at, band) in compositing_buffer.bands.iter().enumerate() {
             let Band { first_row, rows } = band.band;
             assert_eq!((first_row % 32, first_row + rows), (0, if at + 1 == bands { 110 } else { first_row + rows }));
             assert!(band.acc.size() <= bytes && band.acc.size() == u64::from(rows) * 150 * 16);

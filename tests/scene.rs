@@ -7,7 +7,7 @@ use glam::{DVec3, UVec3};
 use sheetsplat::camera::{Camera, Projection};
 use sheetsplat::scene::{ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use sheetsplat::shading::{Light, Shading};
-use sheetsplat::splatting::{Compositing, FootprintForm, Method, Order, Splatting};
+use sheetsplat::splatting::{Compositing, FootprintForm, Method, Order, Rasterizer, Splatting};
 use sheetsplat::transfer_function::{Ramp, RampError, TransferFunction};
 use sheetsplat::volume::Volume;
 
@@ -81,6 +81,7 @@ fn every_key() {
         opacity_threshold = 1
         culling = false
         tiles = false
+        rasterizer = "tiles"
     "#;
     let scene = parse(text, &[]).unwrap();
     let expected = Scene {
@@ -118,6 +119,7 @@ fn every_key() {
             opacity_threshold: 1.0,
             culling: false,
             tiles: false,
+            rasterizer: Rasterizer::Tiles,
         },
     };
     assert_eq!(scene, expected);
@@ -125,6 +127,10 @@ fn every_key() {
     let scene = parse(text, &["camera.projection=orthographic", "splatting.compositing=xray"]).unwrap();
     assert_eq!(scene.camera.projection, Projection::Orthographic { height: Some(7.0) });
     assert_eq!(scene.splatting.compositing, Compositing::Xray);
+    for (name, rasterizer) in [("auto", Rasterizer::Auto), ("quads", Rasterizer::Quads), ("tiles", Rasterizer::Tiles)] {
+        let scene = parse(MINIMAL, &[&format!("splatting.rasterizer={name}")]).unwrap();
+        assert_eq!(scene.splatting.rasterizer, rasterizer);
+    }
     assert_eq!(parse(MINIMAL, &["shading.light=headlight"]).unwrap().shading.light, Light::Headlight);
 }
 
@@ -238,6 +244,7 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
     ("splatting.opacity_threshold", "1.01", "splatting.opacity_threshold", "1.01", "a number in (0, 1]"),
     ("splatting.culling", "'yes'", "splatting.culling", "\"yes\" (string)", "true or false"),
     ("splatting.tiles", "0", "splatting.tiles", "0 (integer)", "true or false"),
+    ("splatting.rasterizer", "'gpu'", "splatting.rasterizer", "\"gpu\"", "\"auto\", \"quads\" or \"tiles\""),
     ("splatting.tile", "true", "splatting.tile", "an unknown key", "method, radius, falloff, slab_width, footprint"),
 ];
 

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, DVec4};
 use sheetsplat::gpu::readback;
-use sheetsplat::gpu::targets::Targets;
+use sheetsplat::gpu::targets::{BandBuffer, CompositingBuffer, Targets};
 use sheetsplat::headless::Headless;
 use sheetsplat::pass::composite::Composite;
 use sheetsplat::plan::{TILE, tile_grid};
@@ -77,14 +77,15 @@ impl Case {
         let (device, queue) = (gpu.device(), gpu.queue());
         let Self { size, compositing, order, threshold, .. } = *self;
         let layers = self.sheets.len() as u32;
-        let targets = Targets::new(device, size, wgpu::TextureFormat::Rgba32Float, layers).unwrap();
-        assert_eq!(targets.bands.len(), bands);
+        let targets = Targets::new(device, size, wgpu::TextureFormat::Rgba32Float, layers);
+        let compositing_buffer = CompositingBuffer::new(device, size).unwrap();
+        assert_eq!(compositing_buffer.bands.len(), bands);
         let layout =
             wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(size[0] * 16), rows_per_image: Some(size[1]) };
         let texels = self.sheets.concat();
         let bytes = bytemuck::cast_slice(&texels);
         queue.write_texture(targets.sheets.as_image_copy(), bytes, layout, targets.sheets.size());
-        for band in &targets.bands {
+        for band in &compositing_buffer.bands {
             let first = (band.band.first_row * size[0]) as usize;
             let acc = &self.acc[first..first + (band.band.rows * size[0]) as usize];
             queue.write_buffer(&band.acc, 0, bytemuck::cast_slice(acc));
@@ -104,11 +105,11 @@ impl Case {
         });
         let tiles = tile_list(device, &self.tiles);
         let bind = |band| stage.bind(device, &frame, band, &view, &tiles, &targets);
-        let groups: Vec<_> = targets.bands.iter().map(bind).collect();
+        let groups: Vec<_> = compositing_buffer.bands.iter().map(bind).collect();
         compute(gpu, |pass| stage.record(pass, &groups, &tiles));
-        let acc = |band: &sheetsplat::gpu::targets::BandBuffer| readback::buffer(device, queue, &band.acc).unwrap();
+        let acc = |band: &BandBuffer| readback::buffer(device, queue, &band.acc).unwrap();
         Outcome {
-            acc: targets.bands.iter().flat_map(|band| bytemuck::pod_collect_to_vec(&acc(band))).collect(),
+            acc: compositing_buffer.bands.iter().flat_map(|band| bytemuck::pod_collect_to_vec(&acc(band))).collect(),
             opaque: contents(gpu, &targets.opaque),
             opaque_tiles: contents(gpu, &targets.opaque_tiles),
         }

@@ -59,7 +59,7 @@ impl<'a> Culling<'a> {
         let ramps = Ramps::new(transfer);
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
         let frame = uniforms::frame(&view, &kernel, grid, &ramps, scene);
-        let targets = Targets::new(device, size, TextureFormat::Rgba32Float, sheets).unwrap();
+        let targets = Targets::new(device, size, TextureFormat::Rgba32Float, sheets);
         let groups: Vec<Group> = (0..)
             .zip(&plan.groups)
             .map(|(index, group)| {

@@ -1,7 +1,7 @@
 //! `shaders/resolve.wgsl` against `reference::resolve`: a random compositing buffer over backgrounds.
 
 use glam::{DVec3, DVec4};
-use sheetsplat::gpu::{layout, readback, targets::Targets};
+use sheetsplat::gpu::{layout, readback, targets::CompositingBuffer};
 use sheetsplat::headless::Headless;
 use sheetsplat::pass::resolve::Resolve;
 use sheetsplat::reference::Buffer;
@@ -19,8 +19,8 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
     let (device, queue) = (gpu.device(), gpu.queue());
     let stage = Resolve::new(device, TextureFormat::Rgba32Float);
     let mut random = Random(9);
-    let targets = Targets::new(device, size, TextureFormat::Rgba32Float, 1).unwrap();
-    assert_eq!(targets.bands.len(), bands);
+    let compositing_buffer = CompositingBuffer::new(device, size).unwrap();
+    assert_eq!(compositing_buffer.bands.len(), bands);
     let target = device.create_texture(&wgpu::TextureDescriptor {
         label: Some("target"),
         size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
@@ -43,8 +43,8 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
                     rgb.extend(alpha).as_vec4().to_array()
                 })
                 .collect();
-            let rows: Vec<layout::Band> = targets.bands.iter().map(|band| band.band).collect();
-            for (band, rows) in targets.bands.iter().zip(&rows) {
+            let rows: Vec<layout::Band> = compositing_buffer.bands.iter().map(|band| band.band).collect();
+            for (band, rows) in compositing_buffer.bands.iter().zip(&rows) {
                 let first = (rows.first_row * size[0]) as usize;
                 let acc = &acc[first..first + (rows.rows * size[0]) as usize];
                 queue.write_buffer(&band.acc, 0, bytemuck::cast_slice(acc));
@@ -55,7 +55,7 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
                 scene.splatting.compositing = compositing;
             });
             let frame = init(device, &[frame], BufferUsages::UNIFORM);
-            let groups: Vec<_> = targets.bands.iter().map(|band| stage.bind(device, &frame, band)).collect();
+            let groups: Vec<_> = compositing_buffer.bands.iter().map(|band| stage.bind(device, &frame, band)).collect();
             let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             stage.record(&mut encoder, None, &view, size[0], groups.iter().zip(rows));
             queue.submit([encoder.finish()]);

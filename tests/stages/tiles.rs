@@ -74,7 +74,7 @@ impl Case {
     fn check(&self, gpu: &Headless, stage: &Tiles, group: u32) {
         const GROUPS: u32 = 5;
         let device = gpu.device();
-        let targets = Targets::new(device, self.size, TextureFormat::Rgba32Float, 1).unwrap();
+        let targets = Targets::new(device, self.size, TextureFormat::Rgba32Float, 1);
         let opaque: Vec<u32> = self.opaque.iter().map(|&opaque| opaque.into()).collect();
         gpu.queue().write_buffer(&targets.opaque_tiles, 0, bytemuck::cast_slice(&opaque));
         let counts: [u32; 8] = [3, 1, 4, 1, 5, 9, 2, 6];
