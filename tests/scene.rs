@@ -7,7 +7,7 @@ use glam::{DVec3, UVec3};
 use sheetsplat::camera::{Camera, Projection};
 use sheetsplat::scene::{ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use sheetsplat::shading::{Light, Shading};
-use sheetsplat::splatting::{Compositing, FootprintForm, Method, Order, Rasterizer, Splatting};
+use sheetsplat::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
 use sheetsplat::transfer_function::{Ramp, RampError, TransferFunction};
 use sheetsplat::volume::Volume;
 
@@ -82,6 +82,7 @@ fn every_key() {
         culling = false
         tiles = false
         rasterizer = "tiles"
+        footprint_box = "parallelogram"
     "#;
     let scene = parse(text, &[]).unwrap();
     let expected = Scene {
@@ -120,6 +121,7 @@ fn every_key() {
             culling: false,
             tiles: false,
             rasterizer: Rasterizer::Tiles,
+            footprint_box: FootprintBox::Parallelogram,
         },
     };
     assert_eq!(scene, expected);
@@ -245,6 +247,13 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
     ("splatting.culling", "'yes'", "splatting.culling", "\"yes\" (string)", "true or false"),
     ("splatting.tiles", "0", "splatting.tiles", "0 (integer)", "true or false"),
     ("splatting.rasterizer", "'gpu'", "splatting.rasterizer", "\"gpu\"", "\"auto\", \"quads\" or \"tiles\""),
+    (
+        "splatting.footprint_box",
+        "'square'",
+        "splatting.footprint_box",
+        "\"square\"",
+        "\"rectangle\" or \"parallelogram\"",
+    ),
     ("splatting.tile", "true", "splatting.tile", "an unknown key", "method, radius, falloff, slab_width, footprint"),
 ];
 
