@@ -24,7 +24,7 @@ struct Frame {
     culling: u32,
     tiles: u32,
     per_unit: f32,
-    padding_0: f32,
+    last_label: u32,
     padding_1: f32,
     padding_2: f32,
 }

@@ -42,7 +42,7 @@ pub struct Frame {
     pub gradient: [f32; 4],
     /// Volume dimensions; w unused.
     pub dims: [u32; 4],
-    /// Ends of the colour, opacity and gradient opacity ramps in the control points; w unused.
+    /// Ends of the colour, opacity and gradient opacity ramps in the control points, and where there the table of labels starts.
     pub ramps: [u32; 4],
     /// Image width and height, pixels.
     pub size: [u32; 2],
@@ -73,8 +73,8 @@ pub struct Frame {
     /// Applied twice it turns value per `unit` into value per world unit: the root of one over `unit`, which itself may leave the
     /// range of `f32`.
     pub per_unit: f32,
-    /// Unused.
-    pub padding_0: f32,
+    /// Last entry of the table of labels, which is that of all greater labels, too.
+    pub last_label: u32,
     /// Unused.
     pub padding_1: f32,
     /// Unused.

@@ -28,7 +28,7 @@ pub const CULL_VOXELS: Shader = shader!("cull_voxels", "frame", "brick", "tally"
 /// Those voxels in a row.
 pub const COMPACT: Shader = shader!("compact", "brick", "tally", "scan");
 /// Shades those that were not shaded before.
-pub const SHADE: Shader = shader!("shade", "frame", "brick", "volume", "project", "splat", "shading");
+pub const SHADE: Shader = shader!("shade", "frame", "brick", "volume", "project", "splat", "shading", "ramps");
 /// The tiles they touch.
 pub const TILES: Shader = shader!("tiles", "frame", "brick", "tally", "tile_list");
 /// Zeroes the sheet buffers there.
@@ -40,7 +40,8 @@ pub const COMPOSITE: Shader = shader!("composite", "frame", "brick", "band", "ti
 /// Computes the occlusion buffer.
 pub const OCCLUDE: Shader = shader!("occlude", "frame", "brick", "tile_list");
 /// Draws whole tiles from front to back.
-pub const GATHER: Shader = shader!("gather", "frame", "brick", "gather", "volume", "project", "shading", "compositing");
+pub const GATHER: Shader =
+    shader!("gather", "frame", "brick", "gather", "volume", "project", "shading", "ramps", "compositing");
 /// Lays the result over the background.
 pub const RESOLVE: Shader = shader!("resolve", "frame", "band");
 

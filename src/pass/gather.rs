@@ -4,15 +4,17 @@ use std::sync::OnceLock;
 
 use wgpu::{BindGroup, Buffer, ComputePass, Device, ShaderStages, TextureView, TextureViewDimension};
 
-use crate::gpu::bindings::{ComputeStage, at_offset, storage, texture, uniform};
+use crate::gpu::bindings::{ComputeStage, at_offset, storage, texture, texture_of_integers, uniform};
 use crate::gpu::layout::{Brick, Frame, Gather as GatherUniform, Gathered, Part};
 use crate::gpu::shaders;
+use crate::gpu::volume_texture::VolumeTexture;
 use crate::splatting::{Compositing, FootprintBox, Order, Splatting};
 
 /// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug, Default)]
 pub struct Gather {
-    stages: [[[OnceLock<ComputeStage>; 2]; 2]; 3],
+    stages: [[[[OnceLock<ComputeStage>; 2]; 2]; 2]; 3],
+    no_labels: OnceLock<VolumeTexture>,
 }
 
 /// What a pipeline is compiled for.
@@ -21,13 +23,14 @@ pub struct GatherMode {
     compositing: Compositing,
     order: Order,
     footprint_box: FootprintBox,
+    labels: bool,
 }
 
 impl GatherMode {
-    /// The mode that splatting settings ask for.
-    pub fn of(splatting: &Splatting) -> Self {
+    /// The mode that splatting settings ask for, and `labels` that have ramps of their own.
+    pub fn of(splatting: &Splatting, labels: bool) -> Self {
         let Splatting { compositing, order, footprint_box, .. } = *splatting;
-        Self { compositing, order, footprint_box }
+        Self { compositing, order, footprint_box, labels }
     }
 }
 
@@ -50,13 +53,16 @@ pub struct GatherBuffers<'a> {
     pub control_points: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
+    /// Its labels, for a mode that asks for them.
+    pub labels: Option<&'a TextureView>,
     /// [`Gathered`].
     pub gathered: &'a Buffer,
 }
 
 impl Gather {
     fn stage(&self, mode: GatherMode) -> &OnceLock<ComputeStage> {
-        &self.stages[mode.compositing as usize][mode.order as usize][mode.footprint_box as usize]
+        let GatherMode { compositing, order, footprint_box, labels } = mode;
+        &self.stages[compositing as usize][order as usize][footprint_box as usize][usize::from(labels)]
     }
 
     fn compiled(&self, device: &Device, mode: GatherMode) -> &ComputeStage {
@@ -73,11 +79,13 @@ impl Gather {
                 texture(stage, TextureViewDimension::D2Array),
                 storage::<[f32; 4]>(stage, false),
                 storage::<Gathered>(stage, false),
+                texture_of_integers(stage, TextureViewDimension::D2Array),
             ];
             let constants = [
                 ("COMPOSITING", f64::from(mode.compositing as u32)),
                 ("ORDER", f64::from(mode.order as u32)),
                 ("PARALLELOGRAM", f64::from(mode.footprint_box as u32)),
+                ("LABELS", f64::from(u8::from(mode.labels))),
             ];
             ComputeStage::new(device, shaders::GATHER, "main", &slots, &constants)
         })
@@ -85,7 +93,9 @@ impl Gather {
 
     /// Binds a band of the compositing buffer, `[vec4f]`, for one mode.
     pub fn bind(&self, device: &Device, mode: GatherMode, buffers: GatherBuffers<'_>, acc: &Buffer) -> BindGroup {
-        let GatherBuffers { frame, gather, parts, bricks, starts, entries, control_points, values, gathered } = buffers;
+        let GatherBuffers { frame, gather, parts, bricks, starts, entries, control_points, values, labels, gathered } =
+            buffers;
+        let labels = labels.unwrap_or_else(|| &self.no_labels.get_or_init(|| VolumeTexture::no_labels(device)).view);
         let whole = Buffer::as_entire_binding;
         let resources = [
             whole(frame),
@@ -98,6 +108,7 @@ impl Gather {
             wgpu::BindingResource::TextureView(values),
             whole(acc),
             whole(gathered),
+            wgpu::BindingResource::TextureView(labels),
         ];
         self.compiled(device, mode).bind(device, &resources)
     }

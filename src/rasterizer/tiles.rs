@@ -87,7 +87,8 @@ impl TileRasterizer {
         let limits = device.limits();
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let mut old = Old::of(previous);
-        let search_steps = given.ramp_lengths.iter().map(|&points| search_steps(points)).sum();
+        let in_memory = volume.labels().is_some();
+        let search_steps = given.ramp_lengths.iter().map(|&points| search_steps(points, in_memory)).sum();
         let is_current = |old: &Binned| {
             old.view == *view
                 && (old.order, old.revision, old.search_steps) == (splatting.order, volume.revision, search_steps)
@@ -162,7 +163,7 @@ impl TileRasterizer {
         part_bytes.resize(part_bytes.len().max(stride), 0);
         let parts = given.filled(old.parts.take(), "sheetsplat.parts", &part_bytes, BufferUsages::UNIFORM);
 
-        let mode = GatherMode::of(splatting);
+        let mode = GatherMode::of(splatting, volume.labels().is_some());
         let buffers = GatherBuffers {
             frame: given.frame,
             gather: &uniform,
@@ -172,6 +173,7 @@ impl TileRasterizer {
             entries: &entries,
             control_points: given.control_points,
             values: &volume.texture.view,
+            labels: volume.labels(),
             gathered: &gathered,
         };
         let bands = given.compositing.bands.iter().map(|band| self.gather.bind(device, mode, buffers, &band.acc));
@@ -229,9 +231,10 @@ impl TileFrame {
     }
 }
 
-/// Loop iterations that a lookup among so many control points takes: none if every thread of a subgroup can hold one.
-fn search_steps(points: u32) -> u32 {
-    if points <= *SUBGROUP_SIZES.start() { 0 } else { 2 + points.ilog2() + 1 }
+/// Loop iterations that a lookup among so many control points takes: none if every thread of a subgroup can hold one, unless they
+/// are searched `in_memory` anyway.
+fn search_steps(points: u32, in_memory: bool) -> u32 {
+    if points <= *SUBGROUP_SIZES.start() && !in_memory { 0 } else { 2 + points.ilog2() + 1 }
 }
 
 /// What of the previous frame may be taken over.

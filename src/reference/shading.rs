@@ -30,10 +30,11 @@ pub fn shade(volume: &Volume, transfer: &TransferFunction, scene: &Scene, geomet
             let voxel = volume.grid().voxel_at(index);
             let value = f64::from(volume.values()[index as usize]);
             let gradient = volume.gradient(voxel);
-            let alpha = transfer.alpha(value, gradient.length());
+            let tables = transfer.tables(volume.label(index));
+            let alpha = tables.alpha(value, gradient.length());
             (alpha > 0.0).then(|| {
                 let m = amount(scene.splatting.compositing, alpha);
-                let color = color(&scene.shading, transfer.color.at(value), gradient, to_eye);
+                let color = color(&scene.shading, tables.color.at(value), gradient, to_eye);
                 Splat {
                     center: geometry.pixel(voxel),
                     depth: geometry.depth(voxel),
