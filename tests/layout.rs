@@ -84,7 +84,7 @@ fn shared() -> [Layout; 10] {
             culling,
             tiles,
             per_unit,
-            padding_0,
+            last_label,
             padding_1,
             padding_2,
         }),
