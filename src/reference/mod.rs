@@ -4,6 +4,7 @@
 pub mod composite;
 pub mod footprint;
 pub mod geometry;
+pub mod ray_march;
 pub mod resolve;
 pub mod shading;
 pub mod sheets;
