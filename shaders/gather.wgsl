@@ -19,10 +19,14 @@
 @group(0) @binding(7) var values: texture_2d_array<f32>;
 @group(0) @binding(8) var<storage, read_write> acc: array<vec4f>;
 @group(0) @binding(9) var<storage, read_write> gathered: Gathered;
+// Of every group, nearest first, half the screen box around its footprints, pixels.
+@group(0) @binding(10) var<storage, read> half_boxes: array<vec2f>;
 
 // `frame.compositing` and `frame.order`.
 override COMPOSITING: u32 = 0u;
 override ORDER: u32 = 0u;
+// Whether voxels have rays of their own.
+override PERSPECTIVE: bool = false;
 // Whether a footprint's box is the parallelogram of Fig. 13, else its bounding rectangle.
 override PARALLELOGRAM: bool = false;
 
@@ -68,6 +72,9 @@ struct Splat {
     // H(0, 0, t) of eq. 3 at the group's first plane and at the four after it.
     first_plane: f32,
     planes: vec4f,
+    // In perspective, how its sections' footprints lie on the screen.
+    axis: vec2f,
+    footprints: Footprints,
 }
 
 // One of the ramps: where its control points are, and the one of the first of them that this lane holds.
@@ -149,14 +156,21 @@ fn polynomial(c: array<vec4f, 4>, z: f32) -> f32 {
 fn sections(splat: Splat, column: f32, rows: vec4f) -> mat4x4f {
     let dx = column - splat.center_px.x;
     let dy = rows - splat.center_px.y;
+    if PERSPECTIVE {
+        let along = splat.axis.x * dx + splat.axis.y * dy;
+        let across = splat.axis.x * dy - splat.axis.y * dx;
+        let a = along * along;
+        let b = across * across;
+        let f = splat.footprints;
+        return mat4x4f(
+            section(a * f.along.x + b * f.across.x, splat.first_plane, splat.planes.x) * f.amplitude.x,
+            section(a * f.along.y + b * f.across.y, splat.planes.x, splat.planes.y) * f.amplitude.y,
+            section(a * f.along.z + b * f.across.z, splat.planes.y, splat.planes.z) * f.amplitude.z,
+            section(a * f.along.w + b * f.across.w, splat.planes.z, splat.planes.w) * f.amplitude.w,
+        );
+    }
     let rho_squared = dy * (gather.metric.z * dy + gather.metric.y * dx) + gather.metric.x * dx * dx;
-    let chord_squared = max(frame.support * frame.support - rho_squared, vec4f(0.0));
-    let z = chord_squared * gather.chord_scale.x + gather.chord_scale.y;
-    let c = gather.chord;
-    let low = c[0].x + z * (c[0].y + z * (c[0].z + z * c[0].w));
-    let high = c[1].x + z * (c[1].y + z * (c[1].z + z * c[1].w));
-    let z_squared = z * z;
-    let rim = sqrt(chord_squared) * (low + z_squared * z_squared * high);
+    let rim = rim_at(rho_squared);
     let in_plane = exp2(rho_squared * gather.metric.w);
     let plane_0 = clamp(vec4f(splat.first_plane), -rim, rim);
     let plane_1 = clamp(vec4f(splat.planes.x), -rim, rim);
@@ -171,6 +185,24 @@ fn sections(splat: Splat, column: f32, rows: vec4f) -> mat4x4f {
     );
 }
 
+// One section, between two planes.
+fn section(rho_squared: vec4f, near: f32, far: f32) -> vec4f {
+    let rim = rim_at(rho_squared);
+    let thickness = clamp(vec4f(far), -rim, rim) - clamp(vec4f(near), -rim, rim);
+    return thickness * exp2(rho_squared * gather.metric.w);
+}
+
+// H(0, 0, t) where the chord of the kernel's ball ends.
+fn rim_at(rho_squared: vec4f) -> vec4f {
+    let chord_squared = max(frame.support * frame.support - rho_squared, vec4f(0.0));
+    let z = chord_squared * gather.chord_scale.x + gather.chord_scale.y;
+    let c = gather.chord;
+    let low = c[0].x + z * (c[0].y + z * (c[0].z + z * c[0].w));
+    let high = c[1].x + z * (c[1].y + z * (c[1].z + z * c[1].w));
+    let z_squared = z * z;
+    return sqrt(chord_squared) * (low + z_squared * z_squared * high);
+}
+
 // What a voxel adds to a sheet at four pixels.
 fn added(section: vec4f, amount: vec4f) -> mat4x4f {
     return mat4x4f(section * amount.x, section * amount.y, section * amount.z, section * amount.w);
@@ -178,12 +210,18 @@ fn added(section: vec4f, amount: vec4f) -> mat4x4f {
 
 // What another lane holds.
 fn splat_of(own: Splat, other: u32) -> Splat {
-    return Splat(
-        subgroupShuffle(own.center_px, other),
-        subgroupShuffle(own.amount, other),
-        subgroupShuffle(own.first_plane, other),
-        subgroupShuffle(own.planes, other),
-    );
+    var splat: Splat;
+    splat.center_px = subgroupShuffle(own.center_px, other);
+    splat.amount = subgroupShuffle(own.amount, other);
+    splat.first_plane = subgroupShuffle(own.first_plane, other);
+    splat.planes = subgroupShuffle(own.planes, other);
+    if PERSPECTIVE {
+        splat.axis = subgroupShuffle(own.axis, other);
+        splat.footprints.along = subgroupShuffle(own.footprints.along, other);
+        splat.footprints.across = subgroupShuffle(own.footprints.across, other);
+        splat.footprints.amplitude = subgroupShuffle(own.footprints.amplitude, other);
+    }
+    return splat;
 }
 
 // A sheet over or under what is there, at four pixels.
@@ -197,18 +235,35 @@ fn composite_sheet(image: mat4x4f, sheet: mat4x4f) -> mat4x4f {
     );
 }
 
-// How far a step inside a brick goes on the screen and in depth.
-fn projected_step(step: vec3u) -> vec3f {
-    let rows = frame.screen_from_voxel;
-    let p = vec3f(step);
-    return vec3f(dot(rows[0].xyz, p), dot(rows[1].xyz, p), dot(rows[2].xyz, p));
+// The frame's sheets from the first that a kernel overlaps to the one after the last.
+fn overlapped_sheets(p: vec4f) -> vec2f {
+    let sheets = (overlapped(p, gather.depth_error, PERSPECTIVE) - gather.near) / frame.slab_width;
+    return vec2f(floor(sheets.x), ceil(sheets.y));
 }
 
-// The frame's sheets from the first that a kernel overlaps to the one after the last, with more than the depths' rounding
-// errors: what ends at a plane does not reach the sheet behind it.
-fn overlapped_sheets(depth: f32) -> vec2f {
-    let reach = frame.radius - gather.depth_error;
-    return vec2f(floor((depth - reach - gather.near) / frame.slab_width), ceil((depth + reach - gather.near) / frame.slab_width));
+// What a voxel at p adds to the group whose first sheet starts at `near`.
+fn splat_at(p: vec4f, near: f32, amount: vec4f) -> Splat {
+    var splat: Splat;
+    splat.center_px = p.xy;
+    let steps = near - p.z + vec4f(1.0, 2.0, 3.0, 4.0) * frame.slab_width;
+    if PERSPECTIVE {
+        let ray = local_ray(p.xy);
+        let per_depth = select(frame.kernel_per_depth, ray.kernel_per_depth, frame.kernel_per_depth == 0.0);
+        let cut = near_cut(ray, p.w);
+        let first = max((near - p.z) * per_depth, cut);
+        let planes = max(steps * per_depth, vec4f(cut));
+        splat.amount = amount * ray.per_lambda;
+        splat.first_plane = along(first);
+        splat.planes = vec4f(along(planes.x), along(planes.y), along(planes.z), along(planes.w));
+        splat.axis = ray.axis;
+        splat.footprints = footprints_of(ray, p.w, vec4f(first, planes.xyz), planes);
+    } else {
+        let planes = steps * frame.kernel_per_depth;
+        splat.amount = amount * frame.amplitude;
+        splat.first_plane = along((near - p.z) * frame.kernel_per_depth);
+        splat.planes = vec4f(along(planes.x), along(planes.y), along(planes.z), along(planes.w));
+    }
+    return splat;
 }
 
 // Bounds of what is not opaque.
@@ -231,8 +286,7 @@ fn opened(region: Region, is_open: vec4<bool>, column: f32, rows: vec4f) -> Regi
 
 // Whether the box around a voxel's footprint holds a pixel that is not opaque. Lanes 0 to 15 hold the pixels across the upper
 // units of a region, 16 to 31 those across the lower.
-fn is_visible(center_px: vec2f, region: Region) -> bool {
-    let margin = frame.half_box + BOX_SLACK;
+fn is_visible(center_px: vec2f, margin: vec2f, region: Region) -> bool {
     let center = center_px - region.low;
     let size = region.high - region.low;
     let first_row = i32(clamp(ceil(center.y - margin.y), 0.0, 16.0));
@@ -312,10 +366,11 @@ fn draw(tile: u32, thread: u32) {
         let near = gather.near + first_sheet * frame.slab_width;
         let far = near + f32(SHEETS) * frame.slab_width;
         // Where voxels are whose kernels reach this group and whose boxes reach pixels that are not opaque.
-        let reach = frame.radius - gather.depth_error;
-        let margin = frame.half_box + BOX_SLACK;
-        let reaching_low = vec3f(region.open_low - margin, near - reach);
-        let reaching_high = vec3f(region.open_high + margin, far + reach);
+        let reach = frame.reach - gather.depth_error;
+        let margin = half_boxes[group] + BOX_SLACK;
+        let middle = 0.5 * vec2f(frame.size);
+        let reaching_low = vec3f(region.open_low - margin - middle, near - reach);
+        let reaching_high = vec3f(region.open_high + margin - middle, far + reach);
         var sheets = Sheets();
         var has_drawn = false;
 
@@ -358,11 +413,13 @@ fn draw(tile: u32, thread: u32) {
 
                     // Every lane tests a run of the brick's places.
                     let run = BRICK_VOXELS / lanes;
-                    let corner_px = project(corner);
+                    let at_corner = homogeneous(vec4f(vec3f(corner), 1.0));
                     var reaching = 0u;
                     for (var i = 0u; i < run; i += 1u) {
-                        let p = corner_px + projected_step(in_brick(lane * run + i));
-                        if all(p >= reaching_low) && all(p <= reaching_high) && p.z > reaching_low.z && p.z < reaching_high.z {
+                        let p = at_corner + homogeneous(vec4f(vec3f(in_brick(lane * run + i)), 0.0));
+                        let scale = select(1.0, p.w, PERSPECTIVE);
+                        let on_screen = all(p.xy >= reaching_low.xy * scale) && all(p.xy <= reaching_high.xy * scale);
+                        if on_screen && p.z > reaching_low.z && p.z < reaching_high.z && p.w > frame.near {
                             reaching |= 1u << i;
                         }
                     }
@@ -393,29 +450,18 @@ fn draw(tile: u32, thread: u32) {
 
             // Every lane shades its voxel.
             let p = project(queued);
-            let is_drawn = lane < count && is_visible(p.xy, region);
+            let sheets_overlapped = overlapped_sheets(p);
+            let here = clamp(sheets_overlapped, vec2f(first_sheet), vec2f(first_sheet + f32(SHEETS)));
+            let is_drawn = lane < count && here.x < here.y && is_visible(p.xy, margin, region);
             let value = value_at(index_of(queued));
             let gradient = gradient_at(queued);
             let alpha = ramp_at(opacity_ramp, value).x * ramp_at(gradient_opacity_ramp, gradient.magnitude).x;
             let m = amount(alpha);
-            let color = shade(ramp_at(color_ramp, value), gradient);
-            let t = near - p.z;
-            let own = Splat(
-                p.xy,
-                select(vec4f(0.0), vec4f(color * m, m) * frame.amplitude, is_drawn),
-                along(t),
-                vec4f(
-                    along(t + frame.slab_width),
-                    along(t + 2.0 * frame.slab_width),
-                    along(t + 3.0 * frame.slab_width),
-                    along(t + 4.0 * frame.slab_width),
-                ),
-            );
+            let color = shade(ramp_at(color_ramp, value), gradient, lighting(p.xy, PERSPECTIVE));
+            let own = splat_at(p, near, select(vec4f(0.0), vec4f(color * m, m), is_drawn));
             if is_drawn {
-                let overlapped = overlapped_sheets(p.z);
-                let here = clamp(overlapped, vec2f(first_sheet), vec2f(first_sheet + f32(SHEETS)));
                 // Of the groups that the kernel reaches into, counted from the nearest.
-                let nth = group - u32(max(overlapped.x, 0.0)) / SHEETS;
+                let nth = group - u32(max(sheets_overlapped.x, 0.0)) / SHEETS;
                 let word = (nth * gather.bricks + queued_place.x) * 2u + queued_place.y / 32u;
                 let bit = 1u << (queued_place.y % 32u);
                 if (atomicOr(&gathered.words[gather.drawn + word], bit) & bit) == 0u {

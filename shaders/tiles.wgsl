@@ -22,7 +22,7 @@ fn is_composited(tile: u32) -> bool {
 
 // Whether the box filter that starts at some pixel of a tile, to the right and down, reaches into a composited tile.
 fn is_near_composited(at: vec2u, grid: vec2u) -> bool {
-    let margin = (frame.reach + TILE - 1u) / TILE;
+    let margin = (group.box_filter + TILE - 1u) / TILE;
     let high = min(at + margin, grid - 1u);
     for (var y = at.y; y <= high.y; y += 1u) {
         for (var x = at.x; x <= high.x; x += 1u) {

@@ -128,6 +128,23 @@ impl Eye {
     pub fn pix(&self, depth: f64) -> f64 {
         depth * self.pixel_per_depth
     }
+
+    /// Checks that slabs have numbers: slab 0 begins at the eye.
+    ///
+    /// # Errors
+    /// If there are too many before the volume.
+    pub fn check_slabs(&self, grid: &Grid, slab_width: f64) -> Result<(), RenderError> {
+        let last = self.position.length() / slab_width;
+        // The factor leaves room for the volume itself.
+        if last <= f64::from(i32::MAX) * 0.99 {
+            return Ok(());
+        }
+        Err(RenderError::OutOfRange {
+            key: "camera.distance",
+            found: format!("{:e}, so {last:e} slabs before the volume", self.distance * grid.unit()),
+            allowed: format!("eyes and slab widths with at most {} slabs between eye and volume", i32::MAX),
+        })
+    }
 }
 
 /// The orthonormal vectors of the viewing coordinate system, in world space.

@@ -22,7 +22,7 @@ macro_rules! shader {
 }
 
 /// Which bricks a sheet group visits.
-pub const CULL_BRICKS: Shader = shader!("cull_bricks", "frame", "brick", "tally", "scan");
+pub const CULL_BRICKS: Shader = shader!("cull_bricks", "frame", "brick", "tally", "scan", "project");
 /// Which voxels it draws.
 pub const CULL_VOXELS: Shader = shader!("cull_voxels", "frame", "brick", "tally", "project");
 /// Those voxels in a row.
@@ -40,7 +40,8 @@ pub const COMPOSITE: Shader = shader!("composite", "frame", "brick", "band", "ti
 /// Computes the occlusion buffer.
 pub const OCCLUDE: Shader = shader!("occlude", "frame", "brick", "tile_list");
 /// Draws whole tiles from front to back.
-pub const GATHER: Shader = shader!("gather", "frame", "brick", "gather", "volume", "project", "shading", "compositing");
+pub const GATHER: Shader =
+    shader!("gather", "frame", "brick", "gather", "volume", "project", "local_ray", "shading", "compositing");
 /// Lays the result over the background.
 pub const RESOLVE: Shader = shader!("resolve", "frame", "band");
 

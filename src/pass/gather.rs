@@ -12,7 +12,7 @@ use crate::splatting::{Compositing, FootprintBox, Order, Splatting};
 /// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug, Default)]
 pub struct Gather {
-    stages: [[[OnceLock<ComputeStage>; 2]; 2]; 3],
+    stages: [[[[OnceLock<ComputeStage>; 2]; 2]; 2]; 3],
 }
 
 /// What a pipeline is compiled for.
@@ -21,13 +21,14 @@ pub struct GatherMode {
     compositing: Compositing,
     order: Order,
     footprint_box: FootprintBox,
+    perspective: bool,
 }
 
 impl GatherMode {
-    /// The mode that splatting settings ask for.
-    pub fn of(splatting: &Splatting) -> Self {
+    /// The mode that splatting settings ask for, with or without an eye.
+    pub fn of(splatting: &Splatting, perspective: bool) -> Self {
         let Splatting { compositing, order, footprint_box, .. } = *splatting;
-        Self { compositing, order, footprint_box }
+        Self { compositing, order, footprint_box, perspective }
     }
 }
 
@@ -52,11 +53,14 @@ pub struct GatherBuffers<'a> {
     pub values: &'a TextureView,
     /// [`Gathered`].
     pub gathered: &'a Buffer,
+    /// [`TileBins::half_boxes`](crate::tile_bins::TileBins::half_boxes), `[[f32; 2]]`.
+    pub half_boxes: &'a Buffer,
 }
 
 impl Gather {
     fn stage(&self, mode: GatherMode) -> &OnceLock<ComputeStage> {
-        &self.stages[mode.compositing as usize][mode.order as usize][mode.footprint_box as usize]
+        let GatherMode { compositing, order, footprint_box, perspective } = mode;
+        &self.stages[compositing as usize][order as usize][footprint_box as usize][usize::from(perspective)]
     }
 
     fn compiled(&self, device: &Device, mode: GatherMode) -> &ComputeStage {
@@ -73,10 +77,12 @@ impl Gather {
                 texture(stage, TextureViewDimension::D2Array),
                 storage::<[f32; 4]>(stage, false),
                 storage::<Gathered>(stage, false),
+                storage::<[f32; 2]>(stage, true),
             ];
             let constants = [
                 ("COMPOSITING", f64::from(mode.compositing as u32)),
                 ("ORDER", f64::from(mode.order as u32)),
+                ("PERSPECTIVE", f64::from(u8::from(mode.perspective))),
                 ("PARALLELOGRAM", f64::from(mode.footprint_box as u32)),
             ];
             ComputeStage::new(device, shaders::GATHER, "main", &slots, &constants)
@@ -85,7 +91,7 @@ impl Gather {
 
     /// Binds a band of the compositing buffer, `[vec4f]`, for one mode.
     pub fn bind(&self, device: &Device, mode: GatherMode, buffers: GatherBuffers<'_>, acc: &Buffer) -> BindGroup {
-        let GatherBuffers { frame, gather, parts, bricks, starts, entries, control_points, values, gathered } = buffers;
+        let GatherBuffers { frame, gather, parts, bricks, starts, entries, control_points, values, .. } = buffers;
         let whole = Buffer::as_entire_binding;
         let resources = [
             whole(frame),
@@ -97,7 +103,8 @@ impl Gather {
             whole(control_points),
             wgpu::BindingResource::TextureView(values),
             whole(acc),
-            whole(gathered),
+            whole(buffers.gathered),
+            whole(buffers.half_boxes),
         ];
         self.compiled(device, mode).bind(device, &resources)
     }

@@ -19,9 +19,10 @@ use crate::pass::cull::{Cull, CullBuffers, CullList};
 use crate::pass::occlude::Occlude;
 use crate::pass::splat::Splat;
 use crate::pass::tiles::{TileLists, Tiles};
-use crate::plan::{FramePlan, View};
+use crate::plan::FramePlan;
 use crate::splatting::{FootprintForm, Order};
 use crate::stats::GroupSlabs;
+use crate::view::View;
 
 /// The stages.
 #[derive(Debug)]
@@ -109,7 +110,7 @@ impl QuadRasterizer {
         let footprints = Footprints::renewed(old.footprints, given);
         let alignment = device.limits().min_uniform_buffer_offset_alignment as usize;
         let group_stride = size_of::<Group>().next_multiple_of(alignment);
-        let group_bytes = uniforms::groups(plan, group_stride);
+        let group_bytes = uniforms::groups(plan, given.kernel, splatting, group_stride);
         let groups = given.filled(old.groups, "sheetsplat.groups", &group_bytes, BufferUsages::UNIFORM);
         let tally_bytes = size_of::<Tally>() as u64 + targets.opaque_tiles.size();
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
@@ -140,7 +141,7 @@ impl QuadRasterizer {
         let frame = QuadFrame {
             clear_group: self.splat.bind_clear(device, frame, tiles),
             composite_groups: compositing.bands.iter().map(composite).collect(),
-            occlude_groups: self.occlude.bind(device, frame, &tile_lists.occluding, &targets),
+            occlude_groups: self.occlude.bind(device, [frame, &groups], &tile_lists.occluding, &targets),
             sheet_views: (0..self.sheets).map(|layer| targets.sheet_view(layer)).collect(),
             group_stride: group_stride as u32,
             planned,
@@ -184,7 +185,7 @@ impl QuadRasterizer {
 
             let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.composite", timer, "composite"));
             self.composite.record(&mut pass, &frame.composite_groups, &tile_lists.composited);
-            self.occlude.record(&mut pass, &frame.occlude_groups, &tile_lists.occluding);
+            self.occlude.record(&mut pass, &frame.occlude_groups, any_offset, &tile_lists.occluding);
         }
     }
 }
@@ -250,7 +251,7 @@ impl Footprints {
     fn renewed(old: Option<Self>, given: Given<'_>) -> Self {
         let (form, kernel) = (given.splatting.footprint, *given.kernel);
         // The summed-area form serves every width (§3.3.1).
-        let width = given.view.slabs.width;
+        let width = given.view.section_width();
         let of = (form == FootprintForm::Sections).then_some(width);
         let fits = |old: &Self| (old.texture.form, old.kernel, old.width) == (form, kernel, of);
         old.filter(fits).unwrap_or_else(|| {

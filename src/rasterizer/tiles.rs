@@ -9,10 +9,11 @@ use crate::gpu::layout::{Brick, Gathered, Part, Tally};
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
 use crate::pass::gather::{Gather, GatherBuffers, GatherMode};
-use crate::plan::{View, tile_grid};
+use crate::plan::tile_grid;
 use crate::splatting::{FootprintForm, Order, Splatting};
 use crate::stats::GroupSlabs;
 use crate::tile_bins::{SHEETS, SIDE, TileBins};
+use crate::view::View;
 
 /// Threads that a subgroup may have.
 const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;
@@ -35,6 +36,7 @@ pub(crate) struct TileFrame {
     starts: Buffer,
     entries: Buffer,
     gathered: Buffer,
+    half_boxes: Buffer,
     /// For every band of the compositing buffer and run of groups: the band's number, and the dispatch's offset and workgroups.
     dispatches: Vec<(usize, u32, u32)>,
     bands: Vec<BindGroup>,
@@ -101,9 +103,8 @@ impl TileRasterizer {
         let binned = match current {
             Some(binned) => binned,
             None => {
-                let half_box = view.footprint.half_box(kernel.support());
-                let bins = TileBins::new(bricks, view, splatting.order, half_box, search_steps, binding / 4)?;
                 let support = kernel.support();
+                let bins = TileBins::new(bricks, view, splatting.order, support, search_steps, binding / 4)?;
                 Binned { bins, view: *view, order: splatting.order, support, search_steps, revision: volume.revision }
             }
         };
@@ -116,6 +117,9 @@ impl TileRasterizer {
                 given.filled(entries, "sheetsplat.bin_entries", bytemuck::cast_slice(&bins.entries), storage),
             ),
         };
+        let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|&pixels| uniforms::in_f32_pixels(pixels)).collect();
+        let half_boxes = bytemuck::cast_slice(&half_boxes);
+        let half_boxes = given.filled(old.half_boxes.take(), "sheetsplat.half_boxes", half_boxes, storage);
         let own_bricks = match (&volume.lists.lists[..], old.bricks.take()) {
             ([_], _) => None,
             (_, Some(bricks)) if !stale => Some(bricks),
@@ -162,7 +166,7 @@ impl TileRasterizer {
         part_bytes.resize(part_bytes.len().max(stride), 0);
         let parts = given.filled(old.parts.take(), "sheetsplat.parts", &part_bytes, BufferUsages::UNIFORM);
 
-        let mode = GatherMode::of(splatting);
+        let mode = GatherMode::of(splatting, view.perspective.is_some());
         let buffers = GatherBuffers {
             frame: given.frame,
             gather: &uniform,
@@ -173,6 +177,7 @@ impl TileRasterizer {
             control_points: given.control_points,
             values: &volume.texture.view,
             gathered: &gathered,
+            half_boxes: &half_boxes,
         };
         let bands = given.compositing.bands.iter().map(|band| self.gather.bind(device, mode, buffers, &band.acc));
         let bands = bands.collect();
@@ -185,6 +190,7 @@ impl TileRasterizer {
             starts,
             entries,
             gathered,
+            half_boxes,
             dispatches,
             bands,
         };
@@ -224,8 +230,8 @@ impl TileFrame {
 
     /// Bytes of GPU memory.
     pub(crate) fn gpu_bytes(&self) -> u64 {
-        let Self { uniform, parts, starts, entries, gathered, bricks, .. } = self;
-        [uniform, parts, starts, entries, gathered].into_iter().chain(bricks).map(Buffer::size).sum()
+        let Self { uniform, parts, starts, entries, gathered, half_boxes, bricks, .. } = self;
+        [uniform, parts, starts, entries, gathered, half_boxes].into_iter().chain(bricks).map(Buffer::size).sum()
     }
 }
 
@@ -244,6 +250,7 @@ struct Old {
     starts: Option<Buffer>,
     entries: Option<Buffer>,
     gathered: Option<Buffer>,
+    half_boxes: Option<Buffer>,
 }
 
 impl Old {
@@ -257,6 +264,7 @@ impl Old {
             starts: Some(frame.starts),
             entries: Some(frame.entries),
             gathered: Some(frame.gathered),
+            half_boxes: Some(frame.half_boxes),
         }
     }
 }

@@ -91,24 +91,16 @@ impl Geometry {
 
     /// That slabs are few enough and have numbers.
     fn check_slabs(&self, radius: f64, slab_width: f64) -> Result<(), RenderError> {
+        let origin = 0.0;
         let Some(eye) = self.eye else {
-            let slabs = SlabGrid { width: self.slab_width, radius };
-            return slabs.check(self.ro.abs().dot(self.grid.center()), slab_width);
+            let slabs = SlabGrid { origin, width: self.slab_width };
+            return slabs.check(self.ro.abs().dot(self.grid.center()) + radius, slab_width);
         };
         let half_extents = self.grid.center() * self.grid.aspect();
         // A kernel reaches `radius·(r·w)/λ` units of depth from its voxel, at most this.
-        let slabs = SlabGrid { width: slab_width, radius: radius * self.grid.aspect().max_element() };
-        slabs.check(self.basis.w.abs().dot(half_extents), slab_width)?;
-        // Slab 0 begins at the eye. The factor leaves room for the volume itself.
-        let last = eye.position.length() / slab_width;
-        if last <= f64::from(i32::MAX) * 0.99 {
-            return Ok(());
-        }
-        Err(RenderError::OutOfRange {
-            key: "camera.distance",
-            found: format!("{:e}, so {last:e} slabs before the volume", eye.distance * self.grid.unit()),
-            allowed: format!("eyes and slab widths with at most {} slabs between eye and volume", i32::MAX),
-        })
+        let reach = radius * (self.basis.w * self.grid.aspect()).length();
+        SlabGrid { origin, width: slab_width }.check(self.basis.w.abs().dot(half_extents) + reach, slab_width)?;
+        eye.check_slabs(&self.grid, slab_width)
     }
 
     /// Position relative to the eye (orthographic: to the world point at the image's centre), `unit`s.
