@@ -34,7 +34,10 @@ pub const TILES: Shader = shader!("tiles", "frame", "brick", "tally", "tile_list
 /// Zeroes the sheet buffers there.
 pub const CLEAR: Shader = shader!("clear", "frame", "brick", "tile_list", "sheets");
 /// Draws footprints into the sheet buffers.
-pub const SPLAT: Shader = shader!("splat", "frame", "brick", "splat", "sheets");
+pub const SPLAT: Shader = shader!("splat", "frame", "brick", "splat", "sheets", "footprints");
+/// The same in perspective.
+pub const SPLAT_PERSPECTIVE: Shader =
+    shader!("splat_perspective", "frame", "brick", "splat", "sheets", "footprints", "project", "local_ray");
 /// Composites the sheet buffers.
 pub const COMPOSITE: Shader = shader!("composite", "frame", "brick", "band", "tile_list", "compositing");
 /// Computes the occlusion buffer.
@@ -46,8 +49,20 @@ pub const GATHER: Shader =
 pub const RESOLVE: Shader = shader!("resolve", "frame", "band");
 
 /// Every shader, in the order of the data flow.
-pub const ALL: [Shader; 11] =
-    [CULL_BRICKS, CULL_VOXELS, COMPACT, SHADE, TILES, CLEAR, SPLAT, COMPOSITE, OCCLUDE, GATHER, RESOLVE];
+pub const ALL: [Shader; 12] = [
+    CULL_BRICKS,
+    CULL_VOXELS,
+    COMPACT,
+    SHADE,
+    TILES,
+    CLEAR,
+    SPLAT,
+    SPLAT_PERSPECTIVE,
+    COMPOSITE,
+    OCCLUDE,
+    GATHER,
+    RESOLVE,
+];
 
 impl Shader {
     /// Compiles the shader.

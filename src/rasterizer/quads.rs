@@ -17,7 +17,7 @@ use crate::kernel::Kernel;
 use crate::pass::composite::Composite;
 use crate::pass::cull::{Cull, CullBuffers, CullList};
 use crate::pass::occlude::Occlude;
-use crate::pass::splat::Splat;
+use crate::pass::splat::{Splat, SplatMode};
 use crate::pass::tiles::{TileLists, Tiles};
 use crate::plan::FramePlan;
 use crate::splatting::{FootprintForm, Order};
@@ -48,6 +48,7 @@ pub(crate) struct QuadFrame {
     tile_lists: TileLists,
     lists: Vec<PreparedList>,
     sheet_views: Vec<TextureView>,
+    splat_mode: SplatMode,
     clear_group: BindGroup,
     composite_groups: Vec<BindGroup>,
     occlude_groups: [BindGroup; 2],
@@ -138,7 +139,10 @@ impl QuadRasterizer {
         let tiles = &tile_lists.composited;
         let sheets = targets.sheets_view();
         let composite = |band| self.composite.bind(device, frame, band, &sheets, tiles, &targets);
+        let splat_mode = SplatMode { form: splatting.footprint, perspective: view.perspective.is_some() };
+        self.splat.prepare(device, splat_mode);
         let frame = QuadFrame {
+            splat_mode,
             clear_group: self.splat.bind_clear(device, frame, tiles),
             composite_groups: compositing.bands.iter().map(composite).collect(),
             occlude_groups: self.occlude.bind(device, [frame, &groups], &tile_lists.occluding, &targets),
@@ -181,7 +185,7 @@ impl QuadRasterizer {
             let clear = (&frame.clear_group, &tile_lists.composited);
             let draws = lists.iter().map(|(list, offset)| (&list.splat_group, *offset, &list.cull.draw_args));
             let times = timer.as_mut().map(|timer| timer.render("splat"));
-            self.splat.record(encoder, times, frame.footprints.texture.form, &frame.sheet_views, clear, draws);
+            self.splat.record(encoder, times, frame.splat_mode, &frame.sheet_views, clear, draws);
 
             let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.composite", timer, "composite"));
             self.composite.record(&mut pass, &frame.composite_groups, &tile_lists.composited);
