@@ -61,7 +61,7 @@ struct Region {
 }
 
 // A voxel's kernel as the pixels see it.
-struct Splat {
+struct Footprint {
     center_px: vec2f,
     // `(C·m, m)` times the low-pass amplitude over λ; 0 without a voxel.
     amount: vec4f,
@@ -146,9 +146,9 @@ fn polynomial(c: array<vec4f, 4>, z: f32) -> f32 {
 
 // The sections of a kernel in the group's four sheets at a column's four pixels: two entries of eq. 3 subtracted, where
 // H(a, b, t) is H(0, 0, t) times the Gaussian of ρ² = a² + b², and t ends at the chord of the kernel's ball.
-fn sections(splat: Splat, column: f32, rows: vec4f) -> mat4x4f {
-    let dx = column - splat.center_px.x;
-    let dy = rows - splat.center_px.y;
+fn sections(footprint: Footprint, column: f32, rows: vec4f) -> mat4x4f {
+    let dx = column - footprint.center_px.x;
+    let dy = rows - footprint.center_px.y;
     let rho_squared = dy * (gather.metric.z * dy + gather.metric.y * dx) + gather.metric.x * dx * dx;
     let chord_squared = max(frame.support * frame.support - rho_squared, vec4f(0.0));
     let z = chord_squared * gather.chord_scale.x + gather.chord_scale.y;
@@ -158,11 +158,11 @@ fn sections(splat: Splat, column: f32, rows: vec4f) -> mat4x4f {
     let z_squared = z * z;
     let rim = sqrt(chord_squared) * (low + z_squared * z_squared * high);
     let in_plane = exp2(rho_squared * gather.metric.w);
-    let plane_0 = clamp(vec4f(splat.first_plane), -rim, rim);
-    let plane_1 = clamp(vec4f(splat.planes.x), -rim, rim);
-    let plane_2 = clamp(vec4f(splat.planes.y), -rim, rim);
-    let plane_3 = clamp(vec4f(splat.planes.z), -rim, rim);
-    let plane_4 = clamp(vec4f(splat.planes.w), -rim, rim);
+    let plane_0 = clamp(vec4f(footprint.first_plane), -rim, rim);
+    let plane_1 = clamp(vec4f(footprint.planes.x), -rim, rim);
+    let plane_2 = clamp(vec4f(footprint.planes.y), -rim, rim);
+    let plane_3 = clamp(vec4f(footprint.planes.z), -rim, rim);
+    let plane_4 = clamp(vec4f(footprint.planes.w), -rim, rim);
     return mat4x4f(
         (plane_1 - plane_0) * in_plane,
         (plane_2 - plane_1) * in_plane,
@@ -177,8 +177,8 @@ fn added(section: vec4f, amount: vec4f) -> mat4x4f {
 }
 
 // What another lane holds.
-fn splat_of(own: Splat, other: u32) -> Splat {
-    return Splat(
+fn footprint_of(own: Footprint, other: u32) -> Footprint {
+    return Footprint(
         subgroupShuffle(own.center_px, other),
         subgroupShuffle(own.amount, other),
         subgroupShuffle(own.first_plane, other),
@@ -400,7 +400,7 @@ fn draw(tile: u32, thread: u32) {
             let m = amount(alpha);
             let color = shade(ramp_at(color_ramp, value), gradient);
             let t = near - p.z;
-            let own = Splat(
+            let own = Footprint(
                 p.xy,
                 select(vec4f(0.0), vec4f(color * m, m) * frame.amplitude, is_drawn),
                 along(t),
@@ -426,8 +426,8 @@ fn draw(tile: u32, thread: u32) {
 
             // Every lane adds all voxels' sections at its own pixels, two voxels at a time.
             for (var i = 0u; i < count; i += 2u) {
-                let a = splat_of(own, i);
-                let b = splat_of(own, i + 1u);
+                let a = footprint_of(own, i);
+                let b = footprint_of(own, i + 1u);
                 let s = sections(a, column, rows);
                 let t = sections(b, column, rows);
                 sheets.first += added(s[0], a.amount) + added(t[0], b.amount);
