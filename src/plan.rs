@@ -46,8 +46,13 @@ impl View {
             let Projection::Perspective { .. } = camera.projection else { unreachable!() };
             return Err(RenderError::unsupported("camera.projection", "\"perspective\"", "\"orthographic\""));
         };
-        if splatting.method == Method::AxisAligned {
-            return Err(RenderError::unsupported("splatting.method", "\"axis-aligned\"", "\"image-aligned\""));
+        let method = match splatting.method {
+            Method::ImageAligned => None,
+            Method::AxisAligned => Some("\"axis-aligned\""),
+            Method::CompositeEverySample => Some("\"composite-every-sample\""),
+        };
+        if let Some(found) = method {
+            return Err(RenderError::unsupported("splatting.method", found, "\"image-aligned\""));
         }
         let basis = camera.basis();
         let pix = Camera::pixel_size(height_world, grid, height)?;
