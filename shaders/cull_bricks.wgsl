@@ -11,7 +11,7 @@
 @group(0) @binding(5) var<storage, read> occluded: array<u32>;
 @group(0) @binding(6) var<storage, read_write> visits: array<Visit>;
 @group(0) @binding(7) var<storage, read_write> args: Indirect;
-@group(0) @binding(8) var<storage, read_write> tally: Tally;
+@group(0) @binding(8) var<storage, read_write> culled: Culled;
 
 // The sheets of a group.
 override SHEETS: u32 = 4u;
@@ -103,7 +103,7 @@ fn main(@builtin(local_invocation_index) thread: u32) {
     }
     if thread == 0u {
         args = indirect(total);
-        atomicAdd(&tally.bricks_tested, group.brick_count);
-        atomicAdd(&tally.bricks_visited, total);
+        atomicAdd(&culled.tally.bricks_tested, group.brick_count);
+        atomicAdd(&culled.tally.bricks_visited, total);
     }
 }

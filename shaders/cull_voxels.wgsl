@@ -6,7 +6,7 @@
 @group(0) @binding(3) var<storage, read> occluded: array<u32>;
 @group(0) @binding(4) var<storage, read_write> visits: array<Visit>;
 @group(0) @binding(5) var<storage, read_write> states: array<BrickState>;
-@group(0) @binding(6) var<storage, read_write> tally: Tally;
+@group(0) @binding(6) var<storage, read_write> culled: Culled;
 @group(0) @binding(7) var<storage, read> visit_args: Indirect;
 
 override SHEETS: u32 = 4u;
@@ -42,8 +42,8 @@ fn mark_tiles(center_px: vec2f) {
     for (var y = first_tile.y; y <= last_tile.y; y += 1u) {
         for (var x = first_tile.x; x <= last_tile.x; x += 1u) {
             let tile = y * columns + x;
-            if atomicLoad(&tally.tiles[tile]) == 0u {
-                atomicStore(&tally.tiles[tile], 1u);
+            if atomicLoad(&culled.tiles[tile]) == 0u {
+                atomicStore(&culled.tiles[tile], 1u);
             }
         }
     }
@@ -87,7 +87,7 @@ fn main(@builtin(local_invocation_index) slot: u32, @builtin(workgroup_id) workg
         visits[at].drawn = drawn;
         visits[at].fresh = drawn & ~state.shaded;
         states[visit.brick] = BrickState(state.hidden | hidden, state.shaded | drawn);
-        atomicAdd(&tally.voxels_shaded, fresh.x + fresh.y);
-        atomicAdd(&tally.sections_rasterized, atomicLoad(&sections_now));
+        atomicAdd(&culled.tally.voxels_shaded, fresh.x + fresh.y);
+        atomicAdd(&culled.tally.sections_rasterized, atomicLoad(&sections_now));
     }
 }

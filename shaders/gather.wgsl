@@ -65,7 +65,7 @@ struct Region {
 }
 
 // A voxel's kernel as the pixels see it.
-struct Splat {
+struct Footprint {
     center_px: vec2f,
     // `(C·m, m)` times the low-pass amplitude over λ; 0 without a voxel.
     amount: vec4f,
@@ -74,7 +74,7 @@ struct Splat {
     planes: vec4f,
     // In perspective, how its sections' footprints lie on the screen.
     axis: vec2f,
-    footprints: Footprints,
+    maps: SectionMaps,
 }
 
 // One of the ramps: where its control points are, and the one of the first of them that this lane holds.
@@ -153,30 +153,30 @@ fn polynomial(c: array<vec4f, 4>, z: f32) -> f32 {
 
 // The sections of a kernel in the group's four sheets at a column's four pixels: two entries of eq. 3 subtracted, where
 // H(a, b, t) is H(0, 0, t) times the Gaussian of ρ² = a² + b², and t ends at the chord of the kernel's ball.
-fn sections(splat: Splat, column: f32, rows: vec4f) -> mat4x4f {
-    let dx = column - splat.center_px.x;
-    let dy = rows - splat.center_px.y;
+fn sections(footprint: Footprint, column: f32, rows: vec4f) -> mat4x4f {
+    let dx = column - footprint.center_px.x;
+    let dy = rows - footprint.center_px.y;
     if PERSPECTIVE {
-        let along = splat.axis.x * dx + splat.axis.y * dy;
-        let across = splat.axis.x * dy - splat.axis.y * dx;
+        let along = footprint.axis.x * dx + footprint.axis.y * dy;
+        let across = footprint.axis.x * dy - footprint.axis.y * dx;
         let a = along * along;
         let b = across * across;
-        let f = splat.footprints;
+        let maps = footprint.maps;
         return mat4x4f(
-            section(a * f.along.x + b * f.across.x, splat.first_plane, splat.planes.x) * f.amplitude.x,
-            section(a * f.along.y + b * f.across.y, splat.planes.x, splat.planes.y) * f.amplitude.y,
-            section(a * f.along.z + b * f.across.z, splat.planes.y, splat.planes.z) * f.amplitude.z,
-            section(a * f.along.w + b * f.across.w, splat.planes.z, splat.planes.w) * f.amplitude.w,
+            section(a * maps.along.x + b * maps.across.x, footprint.first_plane, footprint.planes.x) * maps.amplitude.x,
+            section(a * maps.along.y + b * maps.across.y, footprint.planes.x, footprint.planes.y) * maps.amplitude.y,
+            section(a * maps.along.z + b * maps.across.z, footprint.planes.y, footprint.planes.z) * maps.amplitude.z,
+            section(a * maps.along.w + b * maps.across.w, footprint.planes.z, footprint.planes.w) * maps.amplitude.w,
         );
     }
     let rho_squared = dy * (gather.metric.z * dy + gather.metric.y * dx) + gather.metric.x * dx * dx;
     let rim = rim_at(rho_squared);
     let in_plane = exp2(rho_squared * gather.metric.w);
-    let plane_0 = clamp(vec4f(splat.first_plane), -rim, rim);
-    let plane_1 = clamp(vec4f(splat.planes.x), -rim, rim);
-    let plane_2 = clamp(vec4f(splat.planes.y), -rim, rim);
-    let plane_3 = clamp(vec4f(splat.planes.z), -rim, rim);
-    let plane_4 = clamp(vec4f(splat.planes.w), -rim, rim);
+    let plane_0 = clamp(vec4f(footprint.first_plane), -rim, rim);
+    let plane_1 = clamp(vec4f(footprint.planes.x), -rim, rim);
+    let plane_2 = clamp(vec4f(footprint.planes.y), -rim, rim);
+    let plane_3 = clamp(vec4f(footprint.planes.z), -rim, rim);
+    let plane_4 = clamp(vec4f(footprint.planes.w), -rim, rim);
     return mat4x4f(
         (plane_1 - plane_0) * in_plane,
         (plane_2 - plane_1) * in_plane,
@@ -209,19 +209,19 @@ fn added(section: vec4f, amount: vec4f) -> mat4x4f {
 }
 
 // What another lane holds.
-fn splat_of(own: Splat, other: u32) -> Splat {
-    var splat: Splat;
-    splat.center_px = subgroupShuffle(own.center_px, other);
-    splat.amount = subgroupShuffle(own.amount, other);
-    splat.first_plane = subgroupShuffle(own.first_plane, other);
-    splat.planes = subgroupShuffle(own.planes, other);
+fn footprint_of(own: Footprint, other: u32) -> Footprint {
+    var footprint: Footprint;
+    footprint.center_px = subgroupShuffle(own.center_px, other);
+    footprint.amount = subgroupShuffle(own.amount, other);
+    footprint.first_plane = subgroupShuffle(own.first_plane, other);
+    footprint.planes = subgroupShuffle(own.planes, other);
     if PERSPECTIVE {
-        splat.axis = subgroupShuffle(own.axis, other);
-        splat.footprints.along = subgroupShuffle(own.footprints.along, other);
-        splat.footprints.across = subgroupShuffle(own.footprints.across, other);
-        splat.footprints.amplitude = subgroupShuffle(own.footprints.amplitude, other);
+        footprint.axis = subgroupShuffle(own.axis, other);
+        footprint.maps.along = subgroupShuffle(own.maps.along, other);
+        footprint.maps.across = subgroupShuffle(own.maps.across, other);
+        footprint.maps.amplitude = subgroupShuffle(own.maps.amplitude, other);
     }
-    return splat;
+    return footprint;
 }
 
 // A sheet over or under what is there, at four pixels.
@@ -242,9 +242,9 @@ fn overlapped_sheets(p: vec4f) -> vec2f {
 }
 
 // What a voxel at p adds to the group whose first sheet starts at `near`.
-fn splat_at(p: vec4f, near: f32, amount: vec4f) -> Splat {
-    var splat: Splat;
-    splat.center_px = p.xy;
+fn footprint_at(p: vec4f, near: f32, amount: vec4f) -> Footprint {
+    var footprint: Footprint;
+    footprint.center_px = p.xy;
     let steps = near - p.z + vec4f(1.0, 2.0, 3.0, 4.0) * frame.slab_width;
     if PERSPECTIVE {
         let ray = local_ray(p.xy);
@@ -252,18 +252,18 @@ fn splat_at(p: vec4f, near: f32, amount: vec4f) -> Splat {
         let cut = near_cut(ray, p.w);
         let first = max((near - p.z) * per_depth, cut);
         let planes = max(steps * per_depth, vec4f(cut));
-        splat.amount = amount * ray.per_lambda;
-        splat.first_plane = along(first);
-        splat.planes = vec4f(along(planes.x), along(planes.y), along(planes.z), along(planes.w));
-        splat.axis = ray.axis;
-        splat.footprints = footprints_of(ray, p.w, vec4f(first, planes.xyz), planes);
+        footprint.amount = amount * ray.per_lambda;
+        footprint.first_plane = along(first);
+        footprint.planes = vec4f(along(planes.x), along(planes.y), along(planes.z), along(planes.w));
+        footprint.axis = ray.axis;
+        footprint.maps = section_maps(ray, p.w, vec4f(first, planes.xyz), planes);
     } else {
         let planes = steps * frame.kernel_per_depth;
-        splat.amount = amount * frame.amplitude;
-        splat.first_plane = along((near - p.z) * frame.kernel_per_depth);
-        splat.planes = vec4f(along(planes.x), along(planes.y), along(planes.z), along(planes.w));
+        footprint.amount = amount * frame.amplitude;
+        footprint.first_plane = along((near - p.z) * frame.kernel_per_depth);
+        footprint.planes = vec4f(along(planes.x), along(planes.y), along(planes.z), along(planes.w));
     }
-    return splat;
+    return footprint;
 }
 
 // Bounds of what is not opaque.
@@ -458,7 +458,7 @@ fn draw(tile: u32, thread: u32) {
             let alpha = ramp_at(opacity_ramp, value).x * ramp_at(gradient_opacity_ramp, gradient.magnitude).x;
             let m = amount(alpha);
             let color = shade(ramp_at(color_ramp, value), gradient, lighting(p.xy, PERSPECTIVE));
-            let own = splat_at(p, near, select(vec4f(0.0), vec4f(color * m, m), is_drawn));
+            let own = footprint_at(p, near, select(vec4f(0.0), vec4f(color * m, m), is_drawn));
             if is_drawn {
                 // Of the groups that the kernel reaches into, counted from the nearest.
                 let nth = group - u32(max(sheets_overlapped.x, 0.0)) / SHEETS;
@@ -472,8 +472,8 @@ fn draw(tile: u32, thread: u32) {
 
             // Every lane adds all voxels' sections at its own pixels, two voxels at a time.
             for (var i = 0u; i < count; i += 2u) {
-                let a = splat_of(own, i);
-                let b = splat_of(own, i + 1u);
+                let a = footprint_of(own, i);
+                let b = footprint_of(own, i + 1u);
                 let s = sections(a, column, rows);
                 let t = sections(b, column, rows);
                 sheets.first += added(s[0], a.amount) + added(t[0], b.amount);

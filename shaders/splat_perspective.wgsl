@@ -36,9 +36,9 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
     let depths = group.near - splat.depth + vec4f(0.0, 1.0, 2.0, 3.0) * frame.slab_width;
     let near = max(depths * per_depth, vec4f(cut));
     let far = max((depths + frame.slab_width) * per_depth, vec4f(cut));
-    let footprint = footprints_of(ray, splat.from_eye, near, far);
-    let along = sqrt(footprint.along);
-    let across = sqrt(footprint.across);
+    let maps = section_maps(ray, splat.from_eye, near, far);
+    let along = sqrt(maps.along);
+    let across = sqrt(maps.across);
 
     let extent = quad_extent(near.x, far[SHEETS - 1u]);
     let reach = (extent + MARGIN) / vec2f(min_of(along), min_of(across));
@@ -51,7 +51,7 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
     if SECTIONS {
         // Stored sections are whole: the near plane leaves out those before it.
         let middle = select(vec4f(1e9), (depths + 0.5 * frame.slab_width) * per_depth, far > vec4f(cut));
-        return Quad(position, center_px, ray.axis, along, across, amount, footprint.amplitude, middle, vec4f(0.0), vec4f(0.0), 0.0);
+        return Quad(position, center_px, ray.axis, along, across, amount, maps.amplitude, middle, vec4f(0.0), vec4f(0.0), 0.0);
     }
     let falloff = layer_falloff();
     let center = textureLoad(footprints, vec2u(0u), 0, 0).xy;
@@ -63,7 +63,7 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
         along * texels,
         across * texels,
         amount / center.y,
-        footprint.amplitude,
+        maps.amplitude,
         beyond_planes(near, falloff),
         beyond_planes(far, falloff),
         select(vec4f(0.0), vec4f(2.0 * center.x), (near < vec4f(0.0)) & (far >= vec4f(0.0))),

@@ -23,12 +23,19 @@ pub const SHEETS: u32 = 4;
 /// The most bricks: their numbers share a word with the units.
 const MAX_BRICKS: usize = 1 << 24;
 
-/// Iterations of all its loops that a thread may take in one dispatch: llvmpipe ends loops after 65535.
-const MAX_ITERATIONS: u32 = 65000;
+/// Passes through all its loops that a thread may take in one dispatch: llvmpipe ends loops after 65535. The pass that finds a loop
+/// at its end counts, and in that pass one through every loop inside.
+const MAX_PASSES: u32 = 65000;
 
-/// Iterations that a brick takes at most: one each to fetch and to visit it, 8 to test its places, 9 to queue them, and 5 for each
-/// of its 8 queues: that one, and 4 for its voxels, two by two.
-const ITERATIONS_PER_BRICK: u32 = 59;
+/// Queues that a brick's voxels fill at most: one voxel for each of the 8 threads.
+const QUEUES_PER_BRICK: u32 = 8;
+
+/// Passes that a brick takes at most: 12 to fetch and visit it and to test its places, 20 for each of its queues (that one, 8 to
+/// fill it, 6 that do not search for control points, and 5 for its voxels, two by two), and 4 to share a queue with another brick.
+const PASSES_PER_BRICK: u32 = 12 + QUEUES_PER_BRICK * 20 + 4;
+
+/// Passes that a group takes at most besides: that one, 12 that find no more voxels, and 2 to composite; without bricks 14.
+const PASSES_PER_GROUP: u32 = 16;
 
 /// Bricks by tile and sheet group.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,8 +80,8 @@ struct Pixels {
 }
 
 impl TileBins {
-    /// Sorts bricks by the tiles and groups they may touch, with kernels of the radius `support`. Control
-    /// points are searched in at most `search_steps` steps. Neither list may have more than `most_words` words.
+    /// Sorts bricks by the tiles and groups they may touch, with kernels of the radius `support`. A thread passes through loops at most
+    /// `search_passes` times to look up a voxel's control points in memory. Neither list may have more than `most_words` words.
     ///
     /// # Errors
     /// If there are more bricks, or more of them behind a tile, than the rasteriser can take.
@@ -83,7 +90,7 @@ impl TileBins {
         view: &View,
         order: Order,
         support: f64,
-        search_steps: u32,
+        search_passes: u32,
         most_words: u64,
     ) -> Result<Self, Unfit> {
         let check = |what, required: u64, actual: u64| {
@@ -140,7 +147,7 @@ impl TileBins {
                 next[bin] += 1;
             });
         }
-        let runs = runs(&starts, groups as usize, MAX_ITERATIONS / (ITERATIONS_PER_BRICK + 8 * search_steps))?;
+        let runs = runs(&starts, groups as usize, PASSES_PER_BRICK + QUEUES_PER_BRICK * search_passes)?;
         Ok(Self { first_slab: first_group * SHEETS as i32, groups, starts, entries, half_boxes, runs })
     }
 }
@@ -190,27 +197,29 @@ fn units_touched(pixels: &Pixels, corner: [u32; 2]) -> u32 {
     (0..SIDE * SIDE / (UNIT[0] * UNIT[1])).map(bit).sum()
 }
 
-/// Runs of groups with at most `most` entries in any tile.
-fn runs(starts: &[u32], groups: usize, most: u32) -> Result<Vec<Range<u32>>, Unfit> {
+/// Runs of groups that in no tile take more than the most passes.
+fn runs(starts: &[u32], groups: usize, passes_per_brick: u32) -> Result<Vec<Range<u32>>, Unfit> {
     let mut runs = Vec::new();
     let mut first = 0;
     // Entries of every tile in the current run.
     let tiles = (starts.len() - 1).checked_div(groups).unwrap_or(0);
     let size = |tile: usize, from: usize, to: usize| starts[tile * groups + to] - starts[tile * groups + from];
     let largest = |from: usize, to: usize| (0..tiles).map(|tile| size(tile, from, to)).max().unwrap_or(0);
+    let most = |groups: usize| MAX_PASSES.saturating_sub(groups as u32 * PASSES_PER_GROUP) / passes_per_brick;
+    let fits = |from: usize, to: usize| largest(from, to) <= most(to - from);
     while first < groups {
-        if largest(first, first + 1) > most {
-            let required = largest(first, first + 1).into();
-            return Err(Unfit { what: "bricks behind a tile in one sheet group", required, actual: most.into() });
+        if !fits(first, first + 1) {
+            let (required, actual) = (largest(first, first + 1).into(), most(1).into());
+            return Err(Unfit { what: "bricks behind a tile in one sheet group", required, actual });
         }
         // The largest run that fits, by bisection: sizes grow with the run.
-        let (mut fits, mut too_long) = (first + 1, groups + 1);
-        while too_long - fits > 1 {
-            let middle = fits.midpoint(too_long);
-            *(if largest(first, middle) <= most { &mut fits } else { &mut too_long }) = middle;
+        let (mut end, mut too_far) = (first + 1, groups + 1);
+        while too_far - end > 1 {
+            let middle = end.midpoint(too_far);
+            *(if fits(first, middle) { &mut end } else { &mut too_far }) = middle;
         }
-        runs.push(first as u32..fits as u32);
-        first = fits;
+        runs.push(first as u32..end as u32);
+        first = end;
     }
     Ok(runs)
 }

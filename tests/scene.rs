@@ -254,7 +254,7 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
     ("splatting.opacity_threshold", "1.01", "splatting.opacity_threshold", "1.01", "a number in (0, 1]"),
     ("splatting.culling", "'yes'", "splatting.culling", "\"yes\" (string)", "true or false"),
     ("splatting.tiles", "0", "splatting.tiles", "0 (integer)", "true or false"),
-    ("splatting.rasterizer", "'gpu'", "splatting.rasterizer", "\"gpu\"", "\"auto\", \"quads\" or \"tiles\""),
+    ("splatting.rasterizer", "'gpu'", "splatting.rasterizer", "\"gpu\"", "\"auto\" or \"quads\" or \"tiles\""),
     (
         "splatting.footprint_box",
         "'square'",

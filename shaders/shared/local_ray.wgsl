@@ -29,9 +29,9 @@ fn local_ray(px: vec2f) -> LocalRay {
     return LocalRay(size, per_lambda, axis, vec2f(dot(along, along), dot(across, across)));
 }
 
-// Footprints of a kernel's sections in up to four sheets: ρ² of a pixel along the axis and across it, and the low-pass rule's
+// How the footprints of a kernel's sections in up to four sheets lie on the screen: ρ² of a pixel along the axis and across it, and the low-pass rule's
 // amplitude.
-struct Footprints {
+struct SectionMaps {
     along: vec4f,
     across: vec4f,
     amplitude: vec4f,
@@ -39,7 +39,7 @@ struct Footprints {
 
 // The sections between planes at `near` and `far`, seen from the kernel's centre at the depth `from_eye`. Pixels have the size that
 // they have at the section's middle; where sheets are slices, at the kernel's centre.
-fn footprints_of(ray: LocalRay, from_eye: f32, near: vec4f, far: vec4f) -> Footprints {
+fn section_maps(ray: LocalRay, from_eye: f32, near: vec4f, far: vec4f) -> SectionMaps {
     let first = max(near, vec4f(-frame.radius));
     let last = max(min(far, vec4f(frame.radius)), first);
     let middle = select(vec4f(0.0), 0.5 * (first + last), frame.kernel_per_depth == 0.0);
@@ -48,7 +48,7 @@ fn footprints_of(ray: LocalRay, from_eye: f32, near: vec4f, far: vec4f) -> Footp
     let across = ray.metric.y * pix * pix;
     // The low-pass rule: at least a pixel for a grid unit.
     let amplitude = inverseSqrt(max(along, vec4f(1.0)) * max(across, vec4f(1.0)));
-    return Footprints(min(along, vec4f(1.0)), min(across, vec4f(1.0)), amplitude);
+    return SectionMaps(min(along, vec4f(1.0)), min(across, vec4f(1.0)), amplitude);
 }
 
 // Where the near plane cuts a kernel, seen from its centre.

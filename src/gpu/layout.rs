@@ -187,7 +187,7 @@ pub struct TileList {
     pub tiles: [u32; 1],
 }
 
-/// Counts of a frame; the flags of the tiles follow.
+/// Counts of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Tally {
@@ -207,6 +207,16 @@ pub struct Tally {
     pub padding_1: u32,
     /// Unused.
     pub padding_2: u32,
+}
+
+/// What the quad rasterizer's culling finds out. Tiles go on to the buffer's end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Culled {
+    /// Counts of the frame.
+    pub tally: Tally,
+    /// The first of the tiles: 1 where the current sheet group draws.
+    pub tiles: [u32; 1],
 }
 
 /// Rows of the image whose compositing buffer is one binding.

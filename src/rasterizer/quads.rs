@@ -44,7 +44,7 @@ pub(crate) struct QuadFrame {
     footprints: Footprints,
     groups: Buffer,
     group_stride: u32,
-    tally: Buffer,
+    culled: Buffer,
     tile_lists: TileLists,
     lists: Vec<PreparedList>,
     sheet_views: Vec<TextureView>,
@@ -113,9 +113,9 @@ impl QuadRasterizer {
         let group_stride = size_of::<Group>().next_multiple_of(alignment);
         let group_bytes = uniforms::groups(plan, given.kernel, splatting, group_stride);
         let groups = given.filled(old.groups, "sheetsplat.groups", &group_bytes, BufferUsages::UNIFORM);
-        let tally_bytes = size_of::<Tally>() as u64 + targets.opaque_tiles.size();
+        let culled_bytes = size_of::<Tally>() as u64 + targets.opaque_tiles.size();
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-        let tally = grown(device, old.tally, "sheetsplat.tally", tally_bytes, usage);
+        let culled = grown(device, old.culled, "sheetsplat.culled", culled_bytes, usage);
 
         let shared = CullBuffers {
             frame,
@@ -123,7 +123,7 @@ impl QuadRasterizer {
             values: &volume.texture.view,
             control_points,
             occluded: &targets.occluded,
-            tally: &tally,
+            culled: &culled,
         };
         let mut old_lists = old.lists.into_iter();
         let lists: Vec<PreparedList> = (volume.lists.lists.iter().zip(&planned.orders).zip(&planned.most))
@@ -134,7 +134,7 @@ impl QuadRasterizer {
                 PreparedList { cull, splat_group }
             })
             .collect();
-        let buffers = [frame, &groups, &tally];
+        let buffers = [frame, &groups, &culled];
         let tile_lists = self.tiles.prepare(device, buffers, &targets, plan.groups.len(), old.tile_lists);
         let tiles = &tile_lists.composited;
         let sheets = targets.sheets_view();
@@ -152,7 +152,7 @@ impl QuadRasterizer {
             targets,
             footprints,
             groups,
-            tally,
+            culled,
             tile_lists,
             lists,
         };
@@ -162,7 +162,7 @@ impl QuadRasterizer {
     /// Draws the frame.
     pub(crate) fn record(&self, encoder: &mut CommandEncoder, timer: &mut Option<Timer>, frame: &QuadFrame) {
         let QuadFrame { planned: Planned { plan, .. }, targets, tile_lists, .. } = frame;
-        let masks = [&targets.opaque, &targets.opaque_columns, &targets.occluded, &targets.opaque_tiles, &frame.tally];
+        let masks = [&targets.opaque, &targets.opaque_columns, &targets.occluded, &targets.opaque_tiles, &frame.culled];
         for buffer in masks.into_iter().chain(frame.lists.iter().map(|list| &list.cull.states)) {
             encoder.clear_buffer(buffer, 0, None);
         }
@@ -209,7 +209,7 @@ impl QuadFrame {
     /// Copies the frame's counts to the start of `staging`.
     pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer) {
         let (tally, tiles) = (size_of::<Tally>() as u64, self.planned.plan.groups.len() as u64 * 4);
-        encoder.copy_buffer_to_buffer(&self.tally, 0, staging, 0, tally);
+        encoder.copy_buffer_to_buffer(&self.culled, 0, staging, 0, tally);
         encoder.copy_buffer_to_buffer(&self.tile_lists.counts, 0, staging, tally, tiles);
     }
 
@@ -218,7 +218,7 @@ impl QuadFrame {
         let lists: u64 = self.lists.iter().map(|list| list.cull.gpu_bytes()).sum();
         let TileLists { composited, occluding, counts, .. } = &self.tile_lists;
         let orders = self.planned.orders.iter();
-        let buffers: u64 = [&self.groups, &self.tally, composited, occluding, counts]
+        let buffers: u64 = [&self.groups, &self.culled, composited, occluding, counts]
             .into_iter()
             .chain(orders)
             .map(Buffer::size)
@@ -272,7 +272,7 @@ struct Old {
     targets: Option<Targets>,
     footprints: Option<Footprints>,
     groups: Option<Buffer>,
-    tally: Option<Buffer>,
+    culled: Option<Buffer>,
     tile_lists: Option<TileLists>,
     lists: Vec<PreparedList>,
 }
@@ -285,7 +285,7 @@ impl Old {
             targets: Some(frame.targets),
             footprints: Some(frame.footprints),
             groups: Some(frame.groups),
-            tally: Some(frame.tally),
+            culled: Some(frame.culled),
             tile_lists: Some(frame.tile_lists),
             lists: frame.lists,
         }

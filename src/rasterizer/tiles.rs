@@ -50,7 +50,7 @@ struct Binned {
     order: Order,
     /// Of the kernel; it changes the footprints' boxes.
     support: f64,
-    search_steps: u32,
+    search_passes: u32,
     revision: u64,
 }
 
@@ -89,10 +89,10 @@ impl TileRasterizer {
         let limits = device.limits();
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let mut old = Old::of(previous);
-        let search_steps = given.ramp_lengths.iter().map(|&points| search_steps(points)).sum();
+        let search_passes = given.ramp_lengths.iter().map(|&points| search_passes(points)).sum();
         let is_current = |old: &Binned| {
             old.view == *view
-                && (old.order, old.revision, old.search_steps) == (splatting.order, volume.revision, search_steps)
+                && (old.order, old.revision, old.search_passes) == (splatting.order, volume.revision, search_passes)
                 && old.support == kernel.support()
         };
         let (current, stale) = match old.binned.take() {
@@ -104,8 +104,8 @@ impl TileRasterizer {
             Some(binned) => binned,
             None => {
                 let support = kernel.support();
-                let bins = TileBins::new(bricks, view, splatting.order, support, search_steps, binding / 4)?;
-                Binned { bins, view: *view, order: splatting.order, support, search_steps, revision: volume.revision }
+                let bins = TileBins::new(bricks, view, splatting.order, support, search_passes, binding / 4)?;
+                Binned { bins, view: *view, order: splatting.order, support, search_passes, revision: volume.revision }
             }
         };
         let bins = &binned.bins;
@@ -235,8 +235,9 @@ impl TileFrame {
     }
 }
 
-/// Loop iterations that a lookup among so many control points takes: none if every thread of a subgroup can hold one.
-fn search_steps(points: u32) -> u32 {
+/// Passes through loops that a lookup among so many control points takes: none if every thread of a subgroup can hold one, else those
+/// of a binary search and 2 around it.
+fn search_passes(points: u32) -> u32 {
     if points <= *SUBGROUP_SIZES.start() { 0 } else { 2 + points.ilog2() + 1 }
 }
 

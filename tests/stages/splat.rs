@@ -44,7 +44,7 @@ impl<'a> Stages<'a> {
             values: &VolumeTexture::upload(device, gpu.queue(), &[0.0]).unwrap().view,
             control_points: &storage,
             occluded: &storage,
-            tally: &storage,
+            culled: &storage,
         };
         let grid = Grid { dims: UVec3::ONE, spacing: DVec3::ONE };
         let lists = BrickLists::upload(device, &grid, &[0]);
