@@ -7,7 +7,7 @@
 @group(0) @binding(3) var<storage, read_write> draw_args: Indirect;
 @group(0) @binding(4) var<storage, read_write> fresh: array<u32>;
 @group(0) @binding(5) var<storage, read_write> fresh_args: Indirect;
-@group(0) @binding(6) var<storage, read_write> tally: Tally;
+@group(0) @binding(6) var<storage, read_write> culled: Culled;
 
 fn count_bits(bits: vec2u) -> u32 {
     let count = countOneBits(bits);
@@ -47,6 +47,6 @@ fn main(@builtin(local_invocation_index) thread: u32) {
         let total = ends[WORKGROUP_SIZE - 1u];
         draw_args = indirect(total.x);
         fresh_args = indirect_workgroups(total.y, SHADE_WORKGROUP);
-        atomicAdd(&tally.quads, total.x);
+        atomicAdd(&culled.tally.quads, total.x);
     }
 }

@@ -11,7 +11,7 @@
 @group(0) @binding(5) var<storage, read> occluded: array<u32>;
 @group(0) @binding(6) var<storage, read_write> visits: array<Visit>;
 @group(0) @binding(7) var<storage, read_write> args: Indirect;
-@group(0) @binding(8) var<storage, read_write> tally: Tally;
+@group(0) @binding(8) var<storage, read_write> culled: Culled;
 
 // The sheets of a group.
 override SHEETS: u32 = 4u;
@@ -19,9 +19,9 @@ override SHEETS: u32 = 4u;
 // Whether all pixels are opaque in the footprints' boxes around centres from low to high.
 fn is_behind(low: vec2f, high: vec2f) -> bool {
     let last = vec2f(frame.size - 1u);
-    let margin = frame.half_box + BOX_SLACK;
+    let margin = group.half_box + BOX_SLACK;
     let first_pixel = vec2u(clamp(ceil(low - margin - 0.5), vec2f(0.0), last));
-    let end = vec2u(clamp(floor(high + margin - 0.5) - vec2f(frame.reach), vec2f(0.0), last));
+    let end = vec2u(clamp(floor(high + margin - 0.5) - vec2f(group.box_filter), vec2f(0.0), last));
     let last_pixel = max(first_pixel, end);
     let words = tile_grid(frame.size).x;
     for (var word = first_pixel.x / TILE; word <= last_pixel.x / TILE; word += 1u) {
@@ -45,22 +45,33 @@ fn is_visited(at: u32) -> bool {
     let half_extent = 0.5 * vec3f(vec3u(brick.extent & 0xffu, (brick.extent >> 8u) & 0xffu, brick.extent >> 16u));
     let center = vec4f(vec3f(vec3u(brick.x, brick.y, brick.z)) + half_extent, 1.0);
     let rows = frame.screen_from_voxel;
-    let p = vec3f(dot(rows[0], center), dot(rows[1], center), dot(rows[2], center));
-    let spread =
-        vec3f(dot(abs(rows[0].xyz), half_extent), dot(abs(rows[1].xyz), half_extent), dot(abs(rows[2].xyz), half_extent));
+    let p = homogeneous(center);
+    let spread = vec4f(
+        dot(abs(rows[0].xyz), half_extent),
+        dot(abs(rows[1].xyz), half_extent),
+        dot(abs(rows[2].xyz), half_extent),
+        dot(abs(rows[3].xyz), half_extent),
+    );
     // Rounding must not lose a voxel that touches by a hair.
     let slack = 1e-3;
-    let depth_reach = spread.z + frame.radius + slack;
+    let depth_reach = spread.z + frame.reach + slack;
     let far = group.near + f32(SHEETS) * frame.slab_width;
     if p.z + depth_reach <= group.near || p.z - depth_reach >= far {
         return false;
     }
-    let low = p.xy - spread.xy - slack;
-    let high = p.xy + spread.xy + slack;
-    if any(high + frame.half_box < vec2f(0.5)) || any(low - frame.half_box > vec2f(frame.size) - 0.5) {
+    let farthest = p.w + spread.w;
+    if farthest <= frame.near {
         return false;
     }
-    return frame.culling == 0u || !is_behind(low, high);
+    let nearest = max(p.w - spread.w, select(1.0, frame.near, frame.near > 0.0));
+    let low_h = p.xy - spread.xy;
+    let high_h = p.xy + spread.xy;
+    let low = min(low_h / nearest, low_h / farthest) + 0.5 * vec2f(frame.size) - slack;
+    let high = max(high_h / nearest, high_h / farthest) + 0.5 * vec2f(frame.size) + slack;
+    if any(high + group.half_box < vec2f(0.5)) || any(low - group.half_box > vec2f(frame.size) - 0.5) {
+        return false;
+    }
+    return group.culling == 0u || !is_behind(low, high);
 }
 
 @compute @workgroup_size(256)
@@ -92,7 +103,7 @@ fn main(@builtin(local_invocation_index) thread: u32) {
     }
     if thread == 0u {
         args = indirect(total);
-        atomicAdd(&tally.bricks_tested, group.brick_count);
-        atomicAdd(&tally.bricks_visited, total);
+        atomicAdd(&culled.tally.bricks_tested, group.brick_count);
+        atomicAdd(&culled.tally.bricks_visited, total);
     }
 }

@@ -6,7 +6,7 @@
 @group(0) @binding(3) var<storage, read> occluded: array<u32>;
 @group(0) @binding(4) var<storage, read_write> visits: array<Visit>;
 @group(0) @binding(5) var<storage, read_write> states: array<BrickState>;
-@group(0) @binding(6) var<storage, read_write> tally: Tally;
+@group(0) @binding(6) var<storage, read_write> culled: Culled;
 @group(0) @binding(7) var<storage, read> visit_args: Indirect;
 
 override SHEETS: u32 = 4u;
@@ -26,9 +26,9 @@ fn is_occluded(x: u32, y: u32) -> bool {
 // good: it holds all of the box that is on the image.
 fn is_hidden(center_px: vec2f) -> bool {
     let last = vec2f(frame.size - 1u);
-    let margin = frame.half_box + BOX_SLACK;
+    let margin = group.half_box + BOX_SLACK;
     let first = vec2u(clamp(ceil(center_px - margin - 0.5), vec2f(0.0), last));
-    let end = max(first, vec2u(clamp(floor(center_px + margin - 0.5) - vec2f(frame.reach), vec2f(0.0), last)));
+    let end = max(first, vec2u(clamp(floor(center_px + margin - 0.5) - vec2f(group.box_filter), vec2f(0.0), last)));
     return is_occluded(first.x, first.y) && is_occluded(end.x, first.y)
         && is_occluded(first.x, end.y) && is_occluded(end.x, end.y);
 }
@@ -36,14 +36,14 @@ fn is_hidden(center_px: vec2f) -> bool {
 // Marks the tiles that the footprint's box overlaps.
 fn mark_tiles(center_px: vec2f) {
     let last = vec2f(frame.size - 1u);
-    let first_tile = vec2u(clamp(center_px - frame.half_box - 0.5, vec2f(0.0), last)) / TILE;
-    let last_tile = vec2u(clamp(center_px + frame.half_box, vec2f(0.0), last)) / TILE;
+    let first_tile = vec2u(clamp(center_px - group.half_box - 0.5, vec2f(0.0), last)) / TILE;
+    let last_tile = vec2u(clamp(center_px + group.half_box, vec2f(0.0), last)) / TILE;
     let columns = tile_grid(frame.size).x;
     for (var y = first_tile.y; y <= last_tile.y; y += 1u) {
         for (var x = first_tile.x; x <= last_tile.x; x += 1u) {
             let tile = y * columns + x;
-            if atomicLoad(&tally.tiles[tile]) == 0u {
-                atomicStore(&tally.tiles[tile], 1u);
+            if atomicLoad(&culled.tiles[tile]) == 0u {
+                atomicStore(&culled.tiles[tile], 1u);
             }
         }
     }
@@ -63,15 +63,15 @@ fn main(@builtin(local_invocation_index) slot: u32, @builtin(workgroup_id) workg
     if (brick.present[word] & ~state.hidden[word] & bit) != 0u {
         let p = project(voxel_of(brick, slot));
         let center_px = p.xy;
-        let depth = p.z;
-        let on_screen = all(center_px + frame.half_box >= vec2f(0.5))
-            && all(center_px - frame.half_box <= vec2f(frame.size) - 0.5);
+        let on_screen = all(center_px + group.half_box >= vec2f(0.5))
+            && all(center_px - group.half_box <= vec2f(frame.size) - 0.5);
         // The sheets of this group that the kernel overlaps, with more than the depths' rounding errors: what ends at a plane
         // does not reach the sheet behind it. The first voxel is about as deep as any.
-        let reach = frame.radius - 2e-7 * (frame.radius + abs(frame.screen_from_voxel[2].w) + abs(group.near));
-        let first_sheet = max(floor((depth - reach - group.near) / frame.slab_width), 0.0);
-        let end_sheet = min(ceil((depth + reach - group.near) / frame.slab_width), f32(SHEETS));
-        if !on_screen || frame.culling != 0u && is_hidden(center_px) {
+        let error = 2e-7 * (frame.radius + abs(frame.screen_from_voxel[2].w) + abs(group.near));
+        let depths = (overlapped(p, error, frame.near > 0.0) - group.near) / frame.slab_width;
+        let first_sheet = max(floor(depths.x), 0.0);
+        let end_sheet = min(ceil(depths.y), f32(SHEETS));
+        if !on_screen || group.culling != 0u && is_hidden(center_px) {
             atomicOr(&hidden_now[word], bit);
         } else if first_sheet < end_sheet {
             atomicOr(&drawn_now[word], bit);
@@ -87,7 +87,7 @@ fn main(@builtin(local_invocation_index) slot: u32, @builtin(workgroup_id) workg
         visits[at].drawn = drawn;
         visits[at].fresh = drawn & ~state.shaded;
         states[visit.brick] = BrickState(state.hidden | hidden, state.shaded | drawn);
-        atomicAdd(&tally.voxels_shaded, fresh.x + fresh.y);
-        atomicAdd(&tally.sections_rasterized, atomicLoad(&sections_now));
+        atomicAdd(&culled.tally.voxels_shaded, fresh.x + fresh.y);
+        atomicAdd(&culled.tally.sections_rasterized, atomicLoad(&sections_now));
     }
 }

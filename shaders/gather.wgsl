@@ -19,11 +19,15 @@
 @group(0) @binding(7) var values: texture_2d_array<f32>;
 @group(0) @binding(8) var<storage, read_write> acc: array<vec4f>;
 @group(0) @binding(9) var<storage, read_write> gathered: Gathered;
-@group(0) @binding(10) var labels: texture_2d_array<u32>;
+// Of every group, nearest first, half the screen box around its footprints, pixels.
+@group(0) @binding(10) var<storage, read> half_boxes: array<vec2f>;
+@group(0) @binding(11) var labels: texture_2d_array<u32>;
 
 // `frame.compositing` and `frame.order`.
 override COMPOSITING: u32 = 0u;
 override ORDER: u32 = 0u;
+// Whether voxels have rays of their own.
+override PERSPECTIVE: bool = false;
 // Whether a footprint's box is the parallelogram of Fig. 13, else its bounding rectangle.
 override PARALLELOGRAM: bool = false;
 
@@ -62,13 +66,16 @@ struct Region {
 }
 
 // A voxel's kernel as the pixels see it.
-struct Splat {
+struct Footprint {
     center_px: vec2f,
     // `(C·m, m)` times the low-pass amplitude over λ; 0 without a voxel.
     amount: vec4f,
     // H(0, 0, t) of eq. 3 at the group's first plane and at the four after it.
     first_plane: f32,
     planes: vec4f,
+    // In perspective, how its sections' footprints lie on the screen.
+    axis: vec2f,
+    maps: SectionMaps,
 }
 
 // One of the ramps: where its control points are, and the one of the first of them that this lane holds.
@@ -139,23 +146,30 @@ fn polynomial(c: array<vec4f, 4>, z: f32) -> f32 {
 
 // The sections of a kernel in the group's four sheets at a column's four pixels: two entries of eq. 3 subtracted, where
 // H(a, b, t) is H(0, 0, t) times the Gaussian of ρ² = a² + b², and t ends at the chord of the kernel's ball.
-fn sections(splat: Splat, column: f32, rows: vec4f) -> mat4x4f {
-    let dx = column - splat.center_px.x;
-    let dy = rows - splat.center_px.y;
+fn sections(footprint: Footprint, column: f32, rows: vec4f) -> mat4x4f {
+    let dx = column - footprint.center_px.x;
+    let dy = rows - footprint.center_px.y;
+    if PERSPECTIVE {
+        let along = footprint.axis.x * dx + footprint.axis.y * dy;
+        let across = footprint.axis.x * dy - footprint.axis.y * dx;
+        let a = along * along;
+        let b = across * across;
+        let maps = footprint.maps;
+        return mat4x4f(
+            section(a * maps.along.x + b * maps.across.x, footprint.first_plane, footprint.planes.x) * maps.amplitude.x,
+            section(a * maps.along.y + b * maps.across.y, footprint.planes.x, footprint.planes.y) * maps.amplitude.y,
+            section(a * maps.along.z + b * maps.across.z, footprint.planes.y, footprint.planes.z) * maps.amplitude.z,
+            section(a * maps.along.w + b * maps.across.w, footprint.planes.z, footprint.planes.w) * maps.amplitude.w,
+        );
+    }
     let rho_squared = dy * (gather.metric.z * dy + gather.metric.y * dx) + gather.metric.x * dx * dx;
-    let chord_squared = max(frame.support * frame.support - rho_squared, vec4f(0.0));
-    let z = chord_squared * gather.chord_scale.x + gather.chord_scale.y;
-    let c = gather.chord;
-    let low = c[0].x + z * (c[0].y + z * (c[0].z + z * c[0].w));
-    let high = c[1].x + z * (c[1].y + z * (c[1].z + z * c[1].w));
-    let z_squared = z * z;
-    let rim = sqrt(chord_squared) * (low + z_squared * z_squared * high);
+    let rim = rim_at(rho_squared);
     let in_plane = exp2(rho_squared * gather.metric.w);
-    let plane_0 = clamp(vec4f(splat.first_plane), -rim, rim);
-    let plane_1 = clamp(vec4f(splat.planes.x), -rim, rim);
-    let plane_2 = clamp(vec4f(splat.planes.y), -rim, rim);
-    let plane_3 = clamp(vec4f(splat.planes.z), -rim, rim);
-    let plane_4 = clamp(vec4f(splat.planes.w), -rim, rim);
+    let plane_0 = clamp(vec4f(footprint.first_plane), -rim, rim);
+    let plane_1 = clamp(vec4f(footprint.planes.x), -rim, rim);
+    let plane_2 = clamp(vec4f(footprint.planes.y), -rim, rim);
+    let plane_3 = clamp(vec4f(footprint.planes.z), -rim, rim);
+    let plane_4 = clamp(vec4f(footprint.planes.w), -rim, rim);
     return mat4x4f(
         (plane_1 - plane_0) * in_plane,
         (plane_2 - plane_1) * in_plane,
@@ -164,19 +178,43 @@ fn sections(splat: Splat, column: f32, rows: vec4f) -> mat4x4f {
     );
 }
 
+// One section, between two planes.
+fn section(rho_squared: vec4f, near: f32, far: f32) -> vec4f {
+    let rim = rim_at(rho_squared);
+    let thickness = clamp(vec4f(far), -rim, rim) - clamp(vec4f(near), -rim, rim);
+    return thickness * exp2(rho_squared * gather.metric.w);
+}
+
+// H(0, 0, t) where the chord of the kernel's ball ends.
+fn rim_at(rho_squared: vec4f) -> vec4f {
+    let chord_squared = max(frame.support * frame.support - rho_squared, vec4f(0.0));
+    let z = chord_squared * gather.chord_scale.x + gather.chord_scale.y;
+    let c = gather.chord;
+    let low = c[0].x + z * (c[0].y + z * (c[0].z + z * c[0].w));
+    let high = c[1].x + z * (c[1].y + z * (c[1].z + z * c[1].w));
+    let z_squared = z * z;
+    return sqrt(chord_squared) * (low + z_squared * z_squared * high);
+}
+
 // What a voxel adds to a sheet at four pixels.
 fn added(section: vec4f, amount: vec4f) -> mat4x4f {
     return mat4x4f(section * amount.x, section * amount.y, section * amount.z, section * amount.w);
 }
 
 // What another lane holds.
-fn splat_of(own: Splat, other: u32) -> Splat {
-    return Splat(
-        subgroupShuffle(own.center_px, other),
-        subgroupShuffle(own.amount, other),
-        subgroupShuffle(own.first_plane, other),
-        subgroupShuffle(own.planes, other),
-    );
+fn footprint_of(own: Footprint, other: u32) -> Footprint {
+    var footprint: Footprint;
+    footprint.center_px = subgroupShuffle(own.center_px, other);
+    footprint.amount = subgroupShuffle(own.amount, other);
+    footprint.first_plane = subgroupShuffle(own.first_plane, other);
+    footprint.planes = subgroupShuffle(own.planes, other);
+    if PERSPECTIVE {
+        footprint.axis = subgroupShuffle(own.axis, other);
+        footprint.maps.along = subgroupShuffle(own.maps.along, other);
+        footprint.maps.across = subgroupShuffle(own.maps.across, other);
+        footprint.maps.amplitude = subgroupShuffle(own.maps.amplitude, other);
+    }
+    return footprint;
 }
 
 // A sheet over or under what is there, at four pixels.
@@ -190,18 +228,35 @@ fn composite_sheet(image: mat4x4f, sheet: mat4x4f) -> mat4x4f {
     );
 }
 
-// How far a step inside a brick goes on the screen and in depth.
-fn projected_step(step: vec3u) -> vec3f {
-    let rows = frame.screen_from_voxel;
-    let p = vec3f(step);
-    return vec3f(dot(rows[0].xyz, p), dot(rows[1].xyz, p), dot(rows[2].xyz, p));
+// The frame's sheets from the first that a kernel overlaps to the one after the last.
+fn overlapped_sheets(p: vec4f) -> vec2f {
+    let sheets = (overlapped(p, gather.depth_error, PERSPECTIVE) - gather.near) / frame.slab_width;
+    return vec2f(floor(sheets.x), ceil(sheets.y));
 }
 
-// The frame's sheets from the first that a kernel overlaps to the one after the last, with more than the depths' rounding
-// errors: what ends at a plane does not reach the sheet behind it.
-fn overlapped_sheets(depth: f32) -> vec2f {
-    let reach = frame.radius - gather.depth_error;
-    return vec2f(floor((depth - reach - gather.near) / frame.slab_width), ceil((depth + reach - gather.near) / frame.slab_width));
+// What a voxel at p adds to the group whose first sheet starts at `near`.
+fn footprint_at(p: vec4f, near: f32, amount: vec4f) -> Footprint {
+    var footprint: Footprint;
+    footprint.center_px = p.xy;
+    let steps = near - p.z + vec4f(1.0, 2.0, 3.0, 4.0) * frame.slab_width;
+    if PERSPECTIVE {
+        let ray = local_ray(p.xy);
+        let per_depth = select(frame.kernel_per_depth, ray.kernel_per_depth, frame.kernel_per_depth == 0.0);
+        let cut = near_cut(ray, p.w);
+        let first = max((near - p.z) * per_depth, cut);
+        let planes = max(steps * per_depth, vec4f(cut));
+        footprint.amount = amount * ray.per_lambda;
+        footprint.first_plane = along(first);
+        footprint.planes = vec4f(along(planes.x), along(planes.y), along(planes.z), along(planes.w));
+        footprint.axis = ray.axis;
+        footprint.maps = section_maps(ray, p.w, vec4f(first, planes.xyz), planes);
+    } else {
+        let planes = steps * frame.kernel_per_depth;
+        footprint.amount = amount * frame.amplitude;
+        footprint.first_plane = along((near - p.z) * frame.kernel_per_depth);
+        footprint.planes = vec4f(along(planes.x), along(planes.y), along(planes.z), along(planes.w));
+    }
+    return footprint;
 }
 
 // Bounds of what is not opaque.
@@ -224,8 +279,7 @@ fn opened(region: Region, is_open: vec4<bool>, column: f32, rows: vec4f) -> Regi
 
 // Whether the box around a voxel's footprint holds a pixel that is not opaque. Lanes 0 to 15 hold the pixels across the upper
 // units of a region, 16 to 31 those across the lower.
-fn is_visible(center_px: vec2f, region: Region) -> bool {
-    let margin = frame.half_box + BOX_SLACK;
+fn is_visible(center_px: vec2f, margin: vec2f, region: Region) -> bool {
     let center = center_px - region.low;
     let size = region.high - region.low;
     let first_row = i32(clamp(ceil(center.y - margin.y), 0.0, 16.0));
@@ -305,10 +359,11 @@ fn draw(tile: u32, thread: u32) {
         let near = gather.near + first_sheet * frame.slab_width;
         let far = near + f32(SHEETS) * frame.slab_width;
         // Where voxels are whose kernels reach this group and whose boxes reach pixels that are not opaque.
-        let reach = frame.radius - gather.depth_error;
-        let margin = frame.half_box + BOX_SLACK;
-        let reaching_low = vec3f(region.open_low - margin, near - reach);
-        let reaching_high = vec3f(region.open_high + margin, far + reach);
+        let reach = frame.reach - gather.depth_error;
+        let margin = half_boxes[group] + BOX_SLACK;
+        let middle = 0.5 * vec2f(frame.size);
+        let reaching_low = vec3f(region.open_low - margin - middle, near - reach);
+        let reaching_high = vec3f(region.open_high + margin - middle, far + reach);
         var sheets = Sheets();
         var has_drawn = false;
 
@@ -351,11 +406,13 @@ fn draw(tile: u32, thread: u32) {
 
                     // Every lane tests a run of the brick's places.
                     let run = BRICK_VOXELS / lanes;
-                    let corner_px = project(corner);
+                    let at_corner = homogeneous(vec4f(vec3f(corner), 1.0));
                     var reaching = 0u;
                     for (var i = 0u; i < run; i += 1u) {
-                        let p = corner_px + projected_step(in_brick(lane * run + i));
-                        if all(p >= reaching_low) && all(p <= reaching_high) && p.z > reaching_low.z && p.z < reaching_high.z {
+                        let p = at_corner + homogeneous(vec4f(vec3f(in_brick(lane * run + i)), 0.0));
+                        let scale = select(1.0, p.w, PERSPECTIVE);
+                        let on_screen = all(p.xy >= reaching_low.xy * scale) && all(p.xy <= reaching_high.xy * scale);
+                        if on_screen && p.z > reaching_low.z && p.z < reaching_high.z && p.w > frame.near {
                             reaching |= 1u << i;
                         }
                     }
@@ -386,7 +443,9 @@ fn draw(tile: u32, thread: u32) {
 
             // Every lane shades its voxel.
             let p = project(queued);
-            let is_drawn = lane < count && is_visible(p.xy, region);
+            let sheets_overlapped = overlapped_sheets(p);
+            let here = clamp(sheets_overlapped, vec2f(first_sheet), vec2f(first_sheet + f32(SHEETS)));
+            let is_drawn = lane < count && here.x < here.y && is_visible(p.xy, margin, region);
             let index = index_of(queued);
             let value = value_at(index);
             let gradient = gradient_at(queued);
@@ -401,24 +460,11 @@ fn draw(tile: u32, thread: u32) {
                 alpha = ramp_at(opacity_ramp, value).x * ramp_at(gradient_opacity_ramp, gradient.magnitude).x;
             }
             let m = amount(alpha);
-            color = shade(color, gradient);
-            let t = near - p.z;
-            let own = Splat(
-                p.xy,
-                select(vec4f(0.0), vec4f(color * m, m) * frame.amplitude, is_drawn),
-                along(t),
-                vec4f(
-                    along(t + frame.slab_width),
-                    along(t + 2.0 * frame.slab_width),
-                    along(t + 3.0 * frame.slab_width),
-                    along(t + 4.0 * frame.slab_width),
-                ),
-            );
+            color = shade(color, gradient, lighting(p.xy, PERSPECTIVE));
+            let own = footprint_at(p, near, select(vec4f(0.0), vec4f(color * m, m), is_drawn));
             if is_drawn {
-                let overlapped = overlapped_sheets(p.z);
-                let here = clamp(overlapped, vec2f(first_sheet), vec2f(first_sheet + f32(SHEETS)));
                 // Of the groups that the kernel reaches into, counted from the nearest.
-                let nth = group - u32(max(overlapped.x, 0.0)) / SHEETS;
+                let nth = group - u32(max(sheets_overlapped.x, 0.0)) / SHEETS;
                 let word = (nth * gather.bricks + queued_place.x) * 2u + queued_place.y / 32u;
                 let bit = 1u << (queued_place.y % 32u);
                 if (atomicOr(&gathered.words[gather.drawn + word], bit) & bit) == 0u {
@@ -429,8 +475,8 @@ fn draw(tile: u32, thread: u32) {
 
             // Every lane adds all voxels' sections at its own pixels, two voxels at a time.
             for (var i = 0u; i < count; i += 2u) {
-                let a = splat_of(own, i);
-                let b = splat_of(own, i + 1u);
+                let a = footprint_of(own, i);
+                let b = footprint_of(own, i + 1u);
                 let s = sections(a, column, rows);
                 let t = sections(b, column, rows);
                 sheets.first += added(s[0], a.amount) + added(t[0], b.amount);

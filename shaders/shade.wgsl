@@ -28,7 +28,7 @@ fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) wor
     let opacity = ramp(ramps.y, ramps.z, value).x;
     let gradient_opacity = ramp(ramps.z, ramps.w, gradient.magnitude).x;
     let m = amount(opacity * gradient_opacity);
-    let c = shade(color, gradient) * m;
     let p = project(voxel);
-    splats[id] = Splat(p.x, p.y, p.z, pack2x16float(c.rg), pack2x16float(vec2f(c.b, m)));
+    let c = shade(color, gradient, lighting(p.xy, frame.near > 0.0)) * m;
+    splats[id] = Splat(p.x, p.y, p.z, p.w, pack2x16float(c.rg), pack2x16float(vec2f(c.b, m)));
 }

@@ -2,7 +2,7 @@
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> group: Group;
-@group(0) @binding(2) var<storage, read_write> tally: Tally;
+@group(0) @binding(2) var<storage, read_write> culled: Culled;
 // 1 for tiles whose pixels are all opaque: no splat changes them any more.
 @group(0) @binding(3) var<storage, read> opaque_tiles: array<u32>;
 @group(0) @binding(4) var<storage, read_write> composited: TileList;
@@ -16,13 +16,13 @@ var<workgroup> composited_count: atomic<u32>;
 var<workgroup> occluding_count: atomic<u32>;
 
 fn is_composited(tile: u32) -> bool {
-    let touched = frame.tiles == 0u || atomicLoad(&tally.tiles[tile]) != 0u;
+    let touched = frame.tiles == 0u || atomicLoad(&culled.tiles[tile]) != 0u;
     return touched && (frame.culling == 0u || opaque_tiles[tile] == 0u);
 }
 
 // Whether the box filter that starts at some pixel of a tile, to the right and down, reaches into a composited tile.
 fn is_near_composited(at: vec2u, grid: vec2u) -> bool {
-    let margin = (frame.reach + TILE - 1u) / TILE;
+    let margin = (group.box_filter + TILE - 1u) / TILE;
     let high = min(at + margin, grid - 1u);
     for (var y = at.y; y <= high.y; y += 1u) {
         for (var x = at.x; x <= high.x; x += 1u) {
@@ -54,7 +54,7 @@ fn main(@builtin(local_invocation_index) thread: u32) {
     workgroupBarrier();
     storageBarrier();
     for (var tile = thread; tile < count; tile += WORKGROUP_SIZE) {
-        atomicStore(&tally.tiles[tile], 0u);
+        atomicStore(&culled.tiles[tile], 0u);
     }
     if thread == 0u {
         composited.args = indirect(atomicLoad(&composited_count));

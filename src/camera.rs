@@ -83,6 +83,68 @@ impl Camera {
         let whole = 2.0 * grid.bounding_radius(kernel_radius);
         Some(given.unwrap_or(whole * (f64::from(height) / f64::from(width)).max(1.0)))
     }
+
+    /// The eye of a perspective camera over an image `height` pixels high; `None` for an orthographic one. The default distance
+    /// shows the volume's sphere ([`Grid::bounding_radius`]) between the image's upper and lower edge, whatever its width.
+    ///
+    /// # Errors
+    /// If pixels at the near plane or at the far end of the volume are too small or too large for `f32`.
+    pub fn eye(&self, grid: &Grid, kernel_radius: f64, height: u32) -> Result<Option<Eye>, RenderError> {
+        let Projection::Perspective { fov_y, distance, near } = self.projection else { return Ok(None) };
+        let half_angle = fov_y.to_radians() / 2.0;
+        let (unit, sphere) = (grid.unit(), grid.bounding_radius(kernel_radius));
+        let distance = distance.unwrap_or(sphere / half_angle.sin()) / unit;
+        let position = self.center / unit - distance * self.basis().w;
+        let pixel_per_depth = 2.0 * half_angle.tan() / f64::from(height);
+        let eye = Eye { position, distance, near: near.unwrap_or(unit) / unit, pixel_per_depth };
+        let (least, largest) = (PIXELS.start() / pixel_per_depth, PIXELS.end() / pixel_per_depth);
+        let farthest = position.length() + sphere / unit;
+        let (key, found, allowed) = if !(least..=largest).contains(&eye.near) {
+            ("camera.near", eye.near * unit, format!("{:.1e} to {:.1e}", least * unit, largest * unit))
+        } else if farthest.is_nan() || farthest > largest {
+            ("camera.distance", distance * unit, format!("an eye at most {:.1e} from the volume's end", largest * unit))
+        } else {
+            return Ok(Some(eye));
+        };
+        Err(RenderError::OutOfRange { key, found: format!("{found:e}"), allowed })
+    }
+}
+
+/// A perspective camera's eye (SPEC §2). Lengths are `unit`s, depths are along w.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Eye {
+    /// Where it stands.
+    pub position: DVec3,
+    /// Depth of [`Camera::center`].
+    pub distance: f64,
+    /// Depth of the near plane.
+    pub near: f64,
+    /// Size of a pixel at depth 1: `2·tan(fov_y/2)/H`.
+    pub pixel_per_depth: f64,
+}
+
+impl Eye {
+    /// `pix(d)`, the size of a pixel at a depth.
+    pub fn pix(&self, depth: f64) -> f64 {
+        depth * self.pixel_per_depth
+    }
+
+    /// Checks that slabs have numbers: slab 0 begins at the eye.
+    ///
+    /// # Errors
+    /// If there are too many before the volume.
+    pub fn check_slabs(&self, grid: &Grid, slab_width: f64) -> Result<(), RenderError> {
+        let last = self.position.length() / slab_width;
+        // The factor leaves room for the volume itself.
+        if last <= f64::from(i32::MAX) * 0.99 {
+            return Ok(());
+        }
+        Err(RenderError::OutOfRange {
+            key: "camera.distance",
+            found: format!("{:e}, so {last:e} slabs before the volume", self.distance * grid.unit()),
+            allowed: format!("eyes and slab widths with at most {} slabs between eye and volume", i32::MAX),
+        })
+    }
 }
 
 /// The orthonormal vectors of the viewing coordinate system, in world space.

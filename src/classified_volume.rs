@@ -10,10 +10,11 @@ use crate::error::RenderError;
 use crate::gpu::brick_lists::BrickLists;
 use crate::gpu::volume_texture::VolumeTexture;
 use crate::iso_range::ValueSet;
-use crate::plan::{View, add_sections, count_sections, tile_grid};
+use crate::plan::{Overlaps, tile_grid};
 use crate::stats::{Counts, GroupSlabs, Totals};
 use crate::transfer_function::{LabelTables, Ramp, Tables, TransferFunction};
 use crate::value_list::ValueList;
+use crate::view::View;
 use crate::volume::{Grid, Volume};
 
 /// The voxels of a volume that take part under a transfer function.
@@ -163,8 +164,8 @@ impl ClassifiedVolume {
 
     /// What of a frame's counts (Table 4) is known before it is drawn.
     pub fn totals(&self, view: &View, groups: &GroupSlabs) -> Totals {
-        let sections = self.lists.bricks().filter_map(|bricks| count_sections(bricks, view));
-        let (sections_total, slabs) = sections.reduce(add_sections).unwrap_or((0, 0..0));
+        let overlaps = self.lists.bricks().map(|bricks| Overlaps::count(bricks, view));
+        let Overlaps { voxels, sections, slabs } = overlaps.fold(Overlaps::default(), Overlaps::and);
         // A group's first or last sheets can lie outside of what any kernel touches.
         let sheets_of = |first: i32| {
             (first + groups.sheets as i32).min(slabs.end).saturating_sub(first.max(slabs.start)).max(0) as u64
@@ -172,8 +173,8 @@ impl ClassifiedVolume {
         let [columns, rows] = tile_grid(view.size).map(u64::from);
         let counts = Counts {
             voxels_total: self.grid().dims.as_u64vec3().element_product(),
-            voxels_in_range: self.lists.len(),
-            sections_total,
+            voxels_in_range: voxels,
+            sections_total: sections,
             sheets: slabs.len() as u64,
             tiles_total: columns * rows * slabs.len() as u64,
             ..Counts::default()

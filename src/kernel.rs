@@ -89,6 +89,9 @@ impl Kernel {
     pub fn section(&self, rho_squared: f64, t0: f64, t1: f64) -> f64 {
         let chord = self.half_chord(rho_squared);
         let (near, far) = (t0.clamp(-chord, chord), t1.clamp(-chord, chord));
+        if near == far {
+            return 0.0;
+        }
         self.cumulative(rho_squared, far) - self.cumulative(rho_squared, near)
     }
 }

@@ -9,7 +9,7 @@
 //!
 //! ```text
 //! volume file → Volume ─ classify → ClassifiedVolume: its values, and which voxels of which bricks take part, on the GPU
-//! scene file  → Scene  ─ View, FramePlan: which bricks every group of sheets looks at (plain data)
+//! scene file  → Scene  ─ View, FramePlan or TileBins: which bricks every group of sheets looks at (plain data)
 //! SceneView: both, and what the next frame can keep of the last one
 //!
 //! on the GPU, per group of sheets:
@@ -64,6 +64,7 @@ pub mod stats;
 pub mod tile_bins;
 pub mod transfer_function;
 pub mod value_list;
+pub mod view;
 pub mod volume;
 
 pub use wgpu;

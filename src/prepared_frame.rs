@@ -4,10 +4,10 @@ use wgpu::{BindGroup, Buffer, CommandEncoder};
 
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
-use crate::plan::View;
 use crate::rasterizer::quads::QuadFrame;
 use crate::rasterizer::tiles::TileFrame;
 use crate::stats::{GroupSlabs, Totals};
+use crate::view::View;
 
 /// A frame whose buffers are all allocated and filled: recording it cannot fail.
 #[derive(Debug)]

@@ -12,13 +12,13 @@ use crate::gpu::timer::{PASS_BYTES, Timer};
 use crate::gpu::uniforms::{self, Ramps};
 use crate::kernel::Kernel;
 use crate::pass::resolve::Resolve;
-use crate::plan::View;
 use crate::prepared_frame::{Drawing, PreparedFrame, Staging};
 use crate::rasterizer::quads::QuadRasterizer;
 use crate::rasterizer::tiles::TileRasterizer;
 use crate::rasterizer::{Given, filled};
 use crate::scene_view::{Prepared, SceneView};
 use crate::splatting::{FootprintBox, Rasterizer, Splatting};
+use crate::view::View;
 
 /// What a renderer is made for.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,33 +7,41 @@ use crate::error::RenderError;
 /// The most slabs that a volume may be cut into. 0.05 `unit`s wide, 1800³ voxels need fewer.
 pub const MAX_SLABS: u32 = 1 << 16;
 
-/// Slabs of an orthographic view: planes perpendicular to w^wo at `k·width` in the warped grid, k = 0 through the volume's
-/// centre. Slab k lies between the planes k and k + 1.
+/// Parallel planes `width` apart in terms of a view's sheet depth. Slab k lies between the planes k and k + 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlabGrid {
-    /// `Δ·λw`: the slab width in the warped grid, corrected so that steps along a ray are Δ `unit`s of world length for
-    /// every orientation and aspect ratio (end of §4.2).
+    /// Sheet depth of plane 0.
+    pub origin: f64,
+    /// Slab width.
     pub width: f64,
-    /// The kernel's radius, grid units.
-    pub radius: f64,
 }
 
 impl SlabGrid {
-    /// The slabs that a kernel at warped depth `z` overlaps with positive length: with more than rounding errors, so that
-    /// a kernel that ends at a plane does not reach the slab behind it.
-    pub fn touched(&self, z: f64) -> Range<i32> {
+    /// Sheet depth of plane k.
+    pub fn plane(&self, k: i32) -> f64 {
+        self.origin + f64::from(k) * self.width
+    }
+
+    /// The grid of groups of so many slabs, group 0 from slab 0 on.
+    pub fn groups(&self, sheets: u32) -> Self {
+        Self { width: self.width * f64::from(sheets), ..*self }
+    }
+
+    /// The slabs that the depths between two overlap with positive length: with more than rounding errors, so that a kernel that
+    /// ends at a plane does not reach the slab behind it.
+    pub fn touched(&self, first: f64, end: f64) -> Range<i32> {
         const ROUNDING: f64 = 1e-9;
-        let first = ((z - self.radius) / self.width + ROUNDING).floor();
-        let end = ((z + self.radius) / self.width - ROUNDING).ceil();
+        let first = ((first - self.origin) / self.width + ROUNDING).floor();
+        let end = ((end - self.origin) / self.width - ROUNDING).ceil();
         first as i32..end as i32
     }
 
-    /// Checks that a volume which reaches `depth` from its centre, kernels not counted, is cut into at most [`MAX_SLABS`].
+    /// Checks that a volume which reaches `depth` from its centre, kernels included, is cut into at most [`MAX_SLABS`].
     ///
     /// # Errors
     /// If it is not.
     pub fn check(&self, depth: f64, slab_width: f64) -> Result<(), RenderError> {
-        let slabs = (2.0 * (depth + self.radius) / self.width).ceil();
+        let slabs = (2.0 * depth / self.width).ceil();
         // Not `>`: the number may be none.
         if slabs <= f64::from(MAX_SLABS) {
             return Ok(());
@@ -52,13 +60,15 @@ mod tests {
 
     #[test]
     fn touching_a_plane_is_not_overlapping() {
-        let grid = SlabGrid { width: 1.0, radius: 2.0 };
-        assert_eq!(grid.touched(0.0), -2..2);
-        assert_eq!(grid.touched(0.25), -2..3);
-        assert_eq!(grid.touched(-7.0), -9..-5);
-        assert_eq!(SlabGrid { width: 8.0, radius: 2.0 }.touched(4.0), 0..1);
+        let grid = SlabGrid { origin: 0.0, width: 1.0 };
+        let touched = |z: f64| grid.touched(z - 2.0, z + 2.0);
+        assert_eq!(touched(0.0), -2..2);
+        assert_eq!(touched(0.25), -2..3);
+        assert_eq!(touched(-7.0), -9..-5);
+        assert_eq!(SlabGrid { origin: 0.0, width: 8.0 }.touched(2.0, 6.0), 0..1);
+        assert_eq!(SlabGrid { origin: -0.5, width: 1.0 }.touched(2.75, 3.25), 3..4);
         // Not quite 3 in f64.
-        assert_eq!(grid.touched(3.0 * 0.8 + 0.6), 1..5);
-        assert_eq!(grid.touched(0.1 + 0.2 + 2.7), 1..5);
+        assert_eq!(touched(3.0 * 0.8 + 0.6), 1..5);
+        assert_eq!(touched(0.1 + 0.2 + 2.7), 1..5);
     }
 }

@@ -7,6 +7,8 @@ pub enum Method {
     ImageAligned,
     /// Whole kernels, the volume slices most parallel to the image (§3.1).
     AxisAligned,
+    /// None: every voxel is composited by itself, back to front (§3, Westover's first form).
+    CompositeEverySample,
 }
 
 /// How kernel sections are stored.
@@ -63,7 +65,7 @@ pub enum FootprintBox {
 /// All splatting settings of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Splatting {
-    /// Image-aligned or axis-aligned sheets.
+    /// Image-aligned or axis-aligned sheets, or none.
     pub method: Method,
     /// Kernel radius in grid units, 1 to 4.
     pub radius: f64,

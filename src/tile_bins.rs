@@ -3,14 +3,13 @@
 
 use std::ops::Range;
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use rayon::prelude::*;
 
 use crate::brick;
 use crate::gpu::layout::Brick;
-use crate::plan::View;
-use crate::slab::SlabGrid;
 use crate::splatting::Order;
+use crate::view::View;
 
 /// Side of the rasteriser's tiles, pixels.
 pub const SIDE: u32 = 16;
@@ -24,15 +23,22 @@ pub const SHEETS: u32 = 4;
 /// The most bricks: their numbers share a word with the units.
 const MAX_BRICKS: usize = 1 << 24;
 
-/// Iterations of all its loops that a thread may take in one dispatch: llvmpipe ends loops after 65535.
-const MAX_ITERATIONS: u32 = 65000;
+/// Passes through all its loops that a thread may take in one dispatch: llvmpipe ends loops after 65535. The pass that finds a loop
+/// at its end counts, and in that pass one through every loop inside.
+const MAX_PASSES: u32 = 65000;
 
-/// Iterations that a brick takes at most: one each to fetch and to visit it, 8 to test its places, 9 to queue them, and 5 for each
-/// of its 8 queues: that one, and 4 for its voxels, two by two.
-const ITERATIONS_PER_BRICK: u32 = 59;
+/// Queues that a brick's voxels fill at most: one voxel for each of the 8 threads.
+const QUEUES_PER_BRICK: u32 = 8;
+
+/// Passes that a brick takes at most: 12 to fetch and visit it and to test its places, 20 for each of its queues (that one, 8 to
+/// fill it, 6 that do not search for control points, and 5 for its voxels, two by two), and 4 to share a queue with another brick.
+const PASSES_PER_BRICK: u32 = 12 + QUEUES_PER_BRICK * 20 + 4;
+
+/// Passes that a group takes at most besides: that one, 12 that find no more voxels, and 2 to composite; without bricks 14.
+const PASSES_PER_GROUP: u32 = 16;
 
 /// Bricks by tile and sheet group.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TileBins {
     /// The first slab of the nearest group.
     pub first_slab: i32,
@@ -42,6 +48,8 @@ pub struct TileBins {
     pub starts: Vec<u32>,
     /// Number of a brick, and in the last byte the units of the tile that it may touch, row by row.
     pub entries: Vec<u32>,
+    /// For every group, nearest first, half the screen box around its footprints, pixels.
+    pub half_boxes: Vec<DVec2>,
     /// The groups in runs that one dispatch can take.
     pub runs: Vec<Range<u32>>,
 }
@@ -57,17 +65,23 @@ pub struct Unfit {
     pub actual: u64,
 }
 
-/// Where a brick may be seen: pixels, both ends inclusive, and groups.
+/// Where a brick's voxels are: bounds of their pixel coordinates, and the groups that their kernels may reach.
 struct Placed {
     number: u32,
-    first: [u32; 2],
-    last: [u32; 2],
+    low: DVec2,
+    high: DVec2,
     groups: Range<i32>,
 }
 
+/// Pixels that footprints may touch, both ends inclusive.
+struct Pixels {
+    first: [u32; 2],
+    last: [u32; 2],
+}
+
 impl TileBins {
-    /// Sorts bricks by the tiles and groups they may touch, with footprints that reach `half_box` pixels around voxels. Control
-    /// points are searched in at most `search_steps` steps. Neither list may have more than `most_words` words.
+    /// Sorts bricks by the tiles and groups they may touch, with kernels of the radius `support`. A thread passes through loops at most
+    /// `search_passes` times to look up a voxel's control points in memory. Neither list may have more than `most_words` words.
     ///
     /// # Errors
     /// If there are more bricks, or more of them behind a tile, than the rasteriser can take.
@@ -75,15 +89,15 @@ impl TileBins {
         bricks: &[Brick],
         view: &View,
         order: Order,
-        half_box: DVec2,
-        search_steps: u32,
+        support: f64,
+        search_passes: u32,
         most_words: u64,
     ) -> Result<Self, Unfit> {
         let check = |what, required: u64, actual: u64| {
             if required <= actual { Ok(()) } else { Err(Unfit { what, required, actual }) }
         };
         check("bricks", bricks.len() as u64, MAX_BRICKS as u64)?;
-        let placed = place(bricks, view, half_box);
+        let placed = place(bricks, view);
         let first_group = placed.iter().map(|brick| brick.groups.start).min().unwrap_or(0);
         let end_group = placed.iter().map(|brick| brick.groups.end).max().unwrap_or(0);
         let groups = (end_group - first_group) as u32;
@@ -91,16 +105,23 @@ impl TileBins {
         let bins = u64::from(columns) * u64::from(rows) * u64::from(groups);
         check("tiles times sheet groups", bins, most_words - 1)?;
 
+        let planes = view.slabs.groups(SHEETS);
+        let half_boxes: Vec<DVec2> = (first_group..end_group)
+            .map(|group| view.half_box(support, planes.plane(group)..planes.plane(group + 1)))
+            .collect();
+
         // A counting sort: bins' sizes, where they start, and their entries.
         let bins_of = |brick: &Placed, visit: &mut dyn FnMut(usize, u32)| {
-            for y in brick.first[1] / SIDE..=brick.last[1] / SIDE {
-                for x in brick.first[0] / SIDE..=brick.last[0] / SIDE {
-                    let units = units_touched(brick, [x * SIDE, y * SIDE]);
-                    for group in brick.groups.clone() {
-                        let at = match order {
-                            Order::FrontToBack => group - first_group,
-                            Order::BackToFront => end_group - 1 - group,
-                        };
+            for group in brick.groups.clone() {
+                let at = match order {
+                    Order::FrontToBack => group - first_group,
+                    Order::BackToFront => end_group - 1 - group,
+                };
+                let half_box = half_boxes[(group - first_group) as usize];
+                let Some(pixels) = brick.pixels(half_box, view.size) else { continue };
+                for y in pixels.first[1] / SIDE..=pixels.last[1] / SIDE {
+                    for x in pixels.first[0] / SIDE..=pixels.last[0] / SIDE {
+                        let units = units_touched(&pixels, [x * SIDE, y * SIDE]);
                         visit(((y * columns + x) * groups) as usize + at as usize, units);
                     }
                 }
@@ -126,75 +147,79 @@ impl TileBins {
                 next[bin] += 1;
             });
         }
-        let runs = runs(&starts, groups as usize, MAX_ITERATIONS / (ITERATIONS_PER_BRICK + 8 * search_steps))?;
-        Ok(Self { first_slab: first_group * SHEETS as i32, groups, starts, entries, runs })
+        let runs = runs(&starts, groups as usize, PASSES_PER_BRICK + QUEUES_PER_BRICK * search_passes)?;
+        Ok(Self { first_slab: first_group * SHEETS as i32, groups, starts, entries, half_boxes, runs })
     }
 }
 
-/// The bricks that are on the screen, in memory order whatever changes of iso-range came before: equal scenes add up in equal order.
-fn place(bricks: &[Brick], view: &View, half_box: DVec2) -> Vec<Placed> {
-    let groups = SlabGrid { width: view.slabs.width * f64::from(SHEETS), ..view.slabs };
-    let rows = view.screen_from_voxel;
-    let last_pixel = DVec2::from(view.size.map(f64::from)) - 1.0;
-    let mut placed: Vec<(usize, Placed)> = bricks
-        .par_iter()
-        .enumerate()
+impl Placed {
+    /// Pixels that footprints may touch which reach so far around voxels.
+    fn pixels(&self, half_box: DVec2, size: [u32; 2]) -> Option<Pixels> {
+        // More slack than the shader rounds with.
+        let reach = half_box + 0.02;
+        let first = (self.low - reach - 0.5).ceil().max(DVec2::ZERO);
+        let last = (self.high + reach - 0.5).floor().min(DVec2::from(size.map(f64::from)) - 1.0);
+        let pixels = Pixels { first: first.as_uvec2().to_array(), last: last.as_uvec2().to_array() };
+        first.cmple(last).all().then_some(pixels)
+    }
+}
+
+/// The bricks that are before the eye, in memory order whatever changes of iso-range came before: equal scenes add up in equal order.
+fn place(bricks: &[Brick], view: &View) -> Vec<Placed> {
+    let groups = view.slabs.groups(SHEETS);
+    let mut placed: Vec<Placed> = (bricks.par_iter().enumerate())
         .filter(|(_, brick)| brick.present != [0; 2])
         .filter_map(|(number, brick)| {
             let (middle, half) = brick::bounds(brick);
-            let at = DVec3::from(rows.map(|row| row.dot(middle.extend(1.0))));
-            let spread = DVec3::from(rows.map(|row| row.truncate().abs().dot(half)));
-            // With more slack than the shader rounds with.
-            let reach = spread.truncate() + half_box + 0.02;
-            let first = (at.truncate() - reach - 0.5).ceil().max(DVec2::ZERO);
-            let last = (at.truncate() + reach - 0.5).floor().min(last_pixel);
-            let placed = Placed {
+            let bounds = view.bounds(middle, half)?;
+            Some(Placed {
                 number: number as u32,
-                first: first.as_uvec2().to_array(),
-                last: last.as_uvec2().to_array(),
-                groups: groups.touched(at.z - spread.z).start..groups.touched(at.z + spread.z).end,
-            };
-            first.cmple(last).all().then_some((number, placed))
+                low: bounds.low,
+                high: bounds.high,
+                groups: groups.touched(bounds.depths.start, bounds.depths.end),
+            })
         })
         .collect();
-    let position = |(number, _): &(usize, Placed)| brick::position(&bricks[*number]);
+    let position = |placed: &Placed| brick::position(&bricks[placed.number as usize]);
     if !placed.is_sorted_by_key(position) {
         placed.par_sort_unstable_by_key(position);
     }
-    placed.into_iter().map(|(_, brick)| brick).collect()
+    placed
 }
 
-/// Which units of the tile at `corner` a brick may touch, one bit each.
-fn units_touched(brick: &Placed, corner: [u32; 2]) -> u32 {
+/// Which units of the tile at `corner` some pixels touch, one bit each.
+fn units_touched(pixels: &Pixels, corner: [u32; 2]) -> u32 {
     let touches = |axis: usize, unit: u32| {
         let low = corner[axis] + unit * UNIT[axis];
-        brick.first[axis] < low + UNIT[axis] && brick.last[axis] >= low
+        pixels.first[axis] < low + UNIT[axis] && pixels.last[axis] >= low
     };
     let bit = |unit: u32| u32::from(touches(0, unit % 2) && touches(1, unit / 2)) << unit;
     (0..SIDE * SIDE / (UNIT[0] * UNIT[1])).map(bit).sum()
 }
 
-/// Runs of groups with at most `most` entries in any tile.
-fn runs(starts: &[u32], groups: usize, most: u32) -> Result<Vec<Range<u32>>, Unfit> {
+/// Runs of groups that in no tile take more than the most passes.
+fn runs(starts: &[u32], groups: usize, passes_per_brick: u32) -> Result<Vec<Range<u32>>, Unfit> {
     let mut runs = Vec::new();
     let mut first = 0;
     // Entries of every tile in the current run.
     let tiles = (starts.len() - 1).checked_div(groups).unwrap_or(0);
     let size = |tile: usize, from: usize, to: usize| starts[tile * groups + to] - starts[tile * groups + from];
     let largest = |from: usize, to: usize| (0..tiles).map(|tile| size(tile, from, to)).max().unwrap_or(0);
+    let most = |groups: usize| MAX_PASSES.saturating_sub(groups as u32 * PASSES_PER_GROUP) / passes_per_brick;
+    let fits = |from: usize, to: usize| largest(from, to) <= most(to - from);
     while first < groups {
-        if largest(first, first + 1) > most {
-            let required = largest(first, first + 1).into();
-            return Err(Unfit { what: "bricks behind a tile in one sheet group", required, actual: most.into() });
+        if !fits(first, first + 1) {
+            let (required, actual) = (largest(first, first + 1).into(), most(1).into());
+            return Err(Unfit { what: "bricks behind a tile in one sheet group", required, actual });
         }
         // The largest run that fits, by bisection: sizes grow with the run.
-        let (mut fits, mut too_long) = (first + 1, groups + 1);
-        while too_long - fits > 1 {
-            let middle = fits.midpoint(too_long);
-            *(if largest(first, middle) <= most { &mut fits } else { &mut too_long }) = middle;
+        let (mut end, mut too_far) = (first + 1, groups + 1);
+        while too_far - end > 1 {
+            let middle = end.midpoint(too_far);
+            *(if fits(first, middle) { &mut end } else { &mut too_far }) = middle;
         }
-        runs.push(first as u32..fits as u32);
-        first = fits;
+        runs.push(first as u32..end as u32);
+        first = end;
     }
     Ok(runs)
 }

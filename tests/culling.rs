@@ -8,7 +8,7 @@ use sheetsplat::image::Image;
 use sheetsplat::reference;
 use sheetsplat::reference::visibility::Test;
 use sheetsplat::scene::{Scene, VolumeSource};
-use sheetsplat::splatting::{Compositing, FootprintForm};
+use sheetsplat::splatting::{Compositing, FootprintForm, Rasterizer};
 use sheetsplat::transfer_function::Ramp;
 use sheetsplat::volume::{Volume, builtin};
 
@@ -132,6 +132,7 @@ fn groups_change_nothing_but_rounding() {
         let volume = random_volume(&mut random);
         let mut scene = random_scene(&mut random);
         scene.splatting.culling = false;
+        scene.splatting.rasterizer = Rasterizer::Quads;
         let [one, two, four] = [0, 1, 2].map(|at| render(&renderers[at], &volume, &scene));
         for other in [&two, &four] {
             let difference = largest_difference(&one.image, &other.image);
@@ -260,18 +261,24 @@ fn profiled_frames() {
     let mut scene = Scene::new(VolumeSource::Builtin("head:64".to_owned()));
     (scene.image.width, scene.image.height) = (40, 40);
     scene.splatting.slab_width = 0.05;
-    let open = |profile| {
+    let devices = [false, true].map(|profile| {
         let (adapter, sheets_per_group) = (Some("llvmpipe".to_owned()), Some(1));
         Headless::new(&HeadlessOptions { adapter, sheets_per_group, profile, ..HeadlessOptions::default() }).unwrap()
-    };
-    let [plain, profiled] = [false, true].map(|profile| render(&open(profile), &volume, &scene));
-    assert_eq!(plain.image, profiled.image);
-    assert_eq!(plain.stats.counts, profiled.stats.counts);
-    assert!(plain.stats.stages_ms.is_empty());
-    assert!(profiled.stats.counts.sheets * 3 > 2048, "{} sheets", profiled.stats.counts.sheets);
-    let times = &profiled.stats.stages_ms;
-    assert_eq!(times.keys().copied().collect::<Vec<_>>(), ["composite", "cull", "resolve", "splat"]);
-    assert!(times.values().all(|&ms| ms > 0.0), "{times:?}");
-    let sum: f64 = times.values().sum();
-    assert!(sum <= profiled.stats.frame_ms, "{times:?} in {} ms", profiled.stats.frame_ms);
+    });
+    for (rasterizer, stages) in [
+        (Rasterizer::Quads, &["composite", "cull", "resolve", "splat"][..]),
+        (Rasterizer::Tiles, &["gather", "resolve"]),
+    ] {
+        scene.splatting.rasterizer = rasterizer;
+        let [plain, profiled] = [0, 1].map(|at| render(&devices[at], &volume, &scene));
+        assert_eq!(plain.image, profiled.image);
+        assert_eq!(plain.stats.counts, profiled.stats.counts);
+        assert!(plain.stats.stages_ms.is_empty());
+        assert!(profiled.stats.counts.sheets * 3 > 2048, "{} sheets", profiled.stats.counts.sheets);
+        let times = &profiled.stats.stages_ms;
+        assert_eq!(times.keys().copied().collect::<Vec<_>>(), stages);
+        assert!(times.values().all(|&ms| ms > 0.0), "{times:?}");
+        let sum: f64 = times.values().sum();
+        assert!(sum <= profiled.stats.frame_ms, "{times:?} in {} ms", profiled.stats.frame_ms);
+    }
 }

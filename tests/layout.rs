@@ -6,7 +6,7 @@ use std::mem::offset_of;
 use naga::proc::Layouter;
 use naga::{AddressSpace, Handle, Module, Type, TypeInner};
 use sheetsplat::gpu::layout::{
-    Band, Brick, BrickState, Frame, Gather, Gathered, Group, Indirect, Part, Splat, Tally, TileList, Visit,
+    Band, Brick, BrickState, Culled, Frame, Gather, Gathered, Group, Indirect, Part, Splat, Tally, TileList, Visit,
 };
 use sheetsplat::gpu::shaders;
 
@@ -20,16 +20,9 @@ struct Layout {
 }
 
 impl Layout {
-    /// A struct that goes on with an array: `bytes` is the smallest binding that the passes allow.
-    fn with_tail(mut self, name: &'static str, bytes: usize) -> Self {
-        if self.members.last().is_none_or(|last| last.0 != name) {
-            self.members.push((name, self.size, 0));
-        }
-        if let Some(last) = self.members.last_mut() {
-            // Of an array without an end WGSL counts one.
-            last.2 = size_of::<u32>();
-        }
-        Self { size: bytes, tail: Some(name), ..self }
+    /// A struct whose last member is the first of an array that goes on; WGSL, too, counts one of them.
+    fn goes_on(self) -> Self {
+        Self { tail: self.members.last().map(|last| last.0), ..self }
     }
 }
 
@@ -56,7 +49,7 @@ macro_rules! layout {
     }};
 }
 
-fn shared() -> [Layout; 10] {
+fn shared() -> [Layout; 14] {
     [
         layout!(Splat { x_px, y_px, depth, rg, ba }),
         layout!(Frame {
@@ -84,7 +77,7 @@ fn shared() -> [Layout; 10] {
             culling,
             tiles,
             per_unit,
-            last_label,
+            padding_0,
             padding_1,
             padding_2,
         }),
@@ -93,7 +86,7 @@ fn shared() -> [Layout; 10] {
         layout!(BrickState { hidden, shaded }),
         layout!(Visit { drawn, fresh, brick, padding }),
         layout!(Indirect { draw, dispatch, count }),
-        layout!(TileList { args, tiles }).with_tail("tiles", size_of::<TileList>()),
+        layout!(TileList { args, tiles }).goes_on(),
         layout!(Tally {
             voxels_shaded,
             sections_rasterized,
@@ -103,9 +96,27 @@ fn shared() -> [Layout; 10] {
             padding_0,
             padding_1,
             padding_2,
-        })
-        .with_tail("tiles", size_of::<(Tally, u32)>()),
+        }),
+        layout!(Culled { tally, tiles }).goes_on(),
         layout!(Band { first_row, rows }),
+        layout!(Gather {
+            along,
+            chord,
+            metric,
+            chord_scale,
+            along_scale,
+            near,
+            depth_error,
+            groups,
+            bricks,
+            drawn,
+            composited,
+            shear,
+            half_width,
+            padding,
+        }),
+        layout!(Part { first_row, first_tile, end_tile, first_group, end_group }),
+        layout!(Gathered { tally, words }).goes_on(),
     ]
 }
 

@@ -16,7 +16,7 @@ use sheetsplat::gpu::volume_texture::VolumeTexture;
 use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::{Compositing, FootprintForm};
+use sheetsplat::splatting::{Compositing, FootprintForm, Rasterizer};
 use sheetsplat::stats::Counts;
 use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::{Features, Limits, TextureFormat};
@@ -83,7 +83,8 @@ fn rgba32float_sheets_take_the_default_limits_too() {
     assert_eq!(gpu.renderer().sheet_format(), TextureFormat::Rgba32Float);
     // The 32 bytes of colour attachments that every device allows are two of them.
     let pairs = Headless::new(&HeadlessOptions { sheets_per_group: Some(2), ..common::lavapipe() }).unwrap();
-    let (volume, scene) = head();
+    let (volume, mut scene) = head();
+    scene.splatting.rasterizer = Rasterizer::Quads;
     let renderings = [gpu, pairs].map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap());
     assert_eq!(renderings[0].stats.counts, renderings[1].stats.counts);
     assert!(renderings[0].image == renderings[1].image, "the same device, the same work, the same bytes");
@@ -94,6 +95,7 @@ fn rgba32float_sheets_take_the_default_limits_too() {
 fn attachments_limit_the_sheets_of_a_group() {
     let (volume, mut scene) = head();
     scene.splatting.culling = false;
+    scene.splatting.rasterizer = Rasterizer::Quads;
     let quads = |bytes: u32, attachments: u32, format: TextureFormat| {
         let limits = Limits {
             max_color_attachment_bytes_per_sample: bytes,

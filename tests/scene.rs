@@ -158,6 +158,8 @@ fn every_key() {
         let scene = parse(MINIMAL, &[&format!("splatting.rasterizer={name}")]).unwrap();
         assert_eq!(scene.splatting.rasterizer, rasterizer);
     }
+    let scene = parse(text, &["splatting.method=composite-every-sample"]).unwrap();
+    assert_eq!(scene.splatting.method, Method::CompositeEverySample);
     assert_eq!(parse(MINIMAL, &["shading.light=headlight"]).unwrap().shading.light, Light::Headlight);
 }
 
@@ -282,7 +284,13 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
         "an unknown key",
         "enabled, light, ambient, diffuse, specular, shininess",
     ),
-    ("splatting.method", "'image'", "splatting.method", "\"image\"", "\"image-aligned\" or \"axis-aligned\""),
+    (
+        "splatting.method",
+        "'image'",
+        "splatting.method",
+        "\"image\"",
+        "\"image-aligned\" or \"axis-aligned\" or \"composite-every-sample\"",
+    ),
     ("splatting.radius", "0.99", "splatting.radius", "0.99", "a number in [1, 4]"),
     ("splatting.radius", "4.01", "splatting.radius", "4.01", "a number in [1, 4]"),
     ("splatting.falloff", "0", "splatting.falloff", "0", "a number in (0, 16]"),
@@ -303,7 +311,7 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
     ("splatting.opacity_threshold", "1.01", "splatting.opacity_threshold", "1.01", "a number in (0, 1]"),
     ("splatting.culling", "'yes'", "splatting.culling", "\"yes\" (string)", "true or false"),
     ("splatting.tiles", "0", "splatting.tiles", "0 (integer)", "true or false"),
-    ("splatting.rasterizer", "'gpu'", "splatting.rasterizer", "\"gpu\"", "\"auto\", \"quads\" or \"tiles\""),
+    ("splatting.rasterizer", "'gpu'", "splatting.rasterizer", "\"gpu\"", "\"auto\" or \"quads\" or \"tiles\""),
     (
         "splatting.footprint_box",
         "'square'",

@@ -23,10 +23,14 @@ struct Visit {
 }
 
 struct Group {
+    half_box: vec2f,
+    box_filter: vec2u,
+    culling: u32,
     near: f32,
     first_brick: u32,
     brick_count: u32,
     index: u32,
+    padding: u32,
 }
 
 // What the GPU decides about the size of a draw or dispatch.

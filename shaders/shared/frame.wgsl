@@ -1,6 +1,10 @@
 // What is constant over a frame; `gpu::layout::Frame` documents the fields.
 struct Frame {
-    screen_from_voxel: array<vec4f, 3>,
+    screen_from_voxel: array<vec4f, 4>,
+    right: vec4f,
+    down: vec4f,
+    ahead: vec4f,
+    aspect: vec4f,
     pixels_from_footprint: mat2x2f,
     footprint_from_pixels: mat2x2f,
     light: vec4f,
@@ -16,17 +20,19 @@ struct Frame {
     support: f32,
     falloff: f32,
     slab_width: f32,
+    reach: f32,
+    kernel_per_depth: f32,
+    section_width: f32,
+    near: f32,
+    pixel_per_depth: f32,
     opacity_threshold: f32,
-    half_box: vec2f,
-    reach: vec2u,
     compositing: u32,
     order: u32,
     culling: u32,
     tiles: u32,
     per_unit: f32,
+    headlight: u32,
     last_label: u32,
-    padding_1: f32,
-    padding_2: f32,
 }
 
 const LINEAR = 0u;

@@ -25,18 +25,6 @@ struct Part {
 }
 
 struct Gathered {
-    tally: GatherTally,
+    tally: Tally,
     words: array<atomic<u32>>,
-}
-
-// `Tally` without the tiles.
-struct GatherTally {
-    voxels_shaded: atomic<u32>,
-    sections_rasterized: atomic<u32>,
-    quads: atomic<u32>,
-    bricks_tested: atomic<u32>,
-    bricks_visited: atomic<u32>,
-    padding_0: u32,
-    padding_1: u32,
-    padding_2: u32,
 }

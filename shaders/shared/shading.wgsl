@@ -19,7 +19,26 @@ fn amount(alpha: f32) -> f32 {
     return -log(1.0 - min(alpha, 0.9999));
 }
 
-fn shade(color: vec3f, gradient: Gradient) -> vec3f {
+// Unit vectors to the light, and between it and the eye; 0 where those cancel.
+struct Lighting {
+    light: vec3f,
+    half_vector: vec3f,
+}
+
+// In perspective the eye, and a light that is at it, is elsewhere for every voxel.
+fn lighting(px: vec2f, in_perspective: bool) -> Lighting {
+    if !in_perspective {
+        return Lighting(frame.light.xyz, frame.half_vector.xyz);
+    }
+    let to_eye = -normalize(warped_ray(px) * frame.aspect.xyz);
+    let light = select(frame.light.xyz, to_eye, frame.headlight != 0u);
+    let sum = light + to_eye;
+    // Opposite unit vectors add up to rounding noise, not to 0.
+    let size = length(sum);
+    return Lighting(light, select(sum / max(size, 1e-6), vec3f(0.0), size < 1e-6));
+}
+
+fn shade(color: vec3f, gradient: Gradient, lighting: Lighting) -> vec3f {
     if frame.light.w == 0.0 {
         return color;
     }
@@ -28,7 +47,7 @@ fn shade(color: vec3f, gradient: Gradient) -> vec3f {
         return clamp(color * ambient, vec3f(0.0), vec3f(1.0));
     }
     let n = gradient.normal;
-    let diffuse = frame.shading.y * abs(dot(n, frame.light.xyz));
-    let highlight = frame.shading.z * pow(min(abs(dot(n, frame.half_vector.xyz)), 1.0), frame.shading.w);
+    let diffuse = frame.shading.y * abs(dot(n, lighting.light));
+    let highlight = frame.shading.z * pow(min(abs(dot(n, lighting.half_vector)), 1.0), frame.shading.w);
     return clamp(color * (ambient + diffuse) + highlight, vec3f(0.0), vec3f(1.0));
 }

@@ -1,4 +1,4 @@
-// Counts of a frame, and the tiles that the current sheet group draws into; `gpu::layout::Tally` documents the fields.
+// Counts of a frame; `gpu::layout::Tally` documents the fields.
 struct Tally {
     voxels_shaded: atomic<u32>,
     sections_rasterized: atomic<u32>,
@@ -8,5 +8,4 @@ struct Tally {
     padding_0: u32,
     padding_1: u32,
     padding_2: u32,
-    tiles: array<atomic<u32>>,
 }

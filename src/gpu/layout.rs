@@ -11,8 +11,10 @@ pub struct Splat {
     pub x_px: f32,
     /// Pixel coordinate, down.
     pub y_px: f32,
-    /// Depth in the warped grid.
+    /// Sheet depth.
     pub depth: f32,
+    /// Depth from the eye; 1 without one.
+    pub from_eye: f32,
     /// `C.rg·m`, two f16.
     pub rg: u32,
     /// `C.b·m` and `m`, two f16.
@@ -23,8 +25,17 @@ pub struct Splat {
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Frame {
-    /// Rows that map (i, j, k, 1) to x in pixels, y in pixels, warped depth.
-    pub screen_from_voxel: [[f32; 4]; 3],
+    /// Rows that map (i, j, k, 1) to pixels right of the image's middle and below it, both times the fourth; to sheet depth; and to
+    /// the depth from the eye, 1 without one.
+    pub screen_from_voxel: [[f32; 4]; 4],
+    /// With an eye, the warped grid's directions right (`u/ar`), down (`-v/ar`) and ahead (`w/ar`) of it; w unused.
+    pub right: [f32; 4],
+    /// See `right`.
+    pub down: [f32; 4],
+    /// See `right`.
+    pub ahead: [f32; 4],
+    /// Grid aspect; w unused.
+    pub aspect: [f32; 4],
     /// Columns of the 2×2 map footprint → pixels.
     pub pixels_from_footprint: [f32; 4],
     /// Columns of its inverse.
@@ -54,14 +65,20 @@ pub struct Frame {
     pub support: f32,
     /// Exponent of the kernel.
     pub falloff: f32,
-    /// Slab width in the warped grid.
+    /// Slab width in sheet depth.
     pub slab_width: f32,
+    /// How far a kernel reaches at most, in sheet depth.
+    pub reach: f32,
+    /// Grid units of a kernel to one of sheet depth; 0 where every voxel has its own.
+    pub kernel_per_depth: f32,
+    /// Width of the stored sections, grid units.
+    pub section_width: f32,
+    /// Depth of the near plane; 0 without an eye.
+    pub near: f32,
+    /// Size of a pixel at depth 1 from the eye, `unit`s; 0 without one.
+    pub pixel_per_depth: f32,
     /// Opacity from which a pixel counts as opaque.
     pub opacity_threshold: f32,
-    /// Half the footprint's screen box, pixels.
-    pub half_box: [f32; 2],
-    /// The occlusion buffer's box filter reads a pixel and so many to the right of it and below.
-    pub reach: [u32; 2],
     /// 0 linear, 1 exponential, 2 xray.
     pub compositing: u32,
     /// 0 front to back, 1 back to front.
@@ -73,19 +90,23 @@ pub struct Frame {
     /// Applied twice it turns value per `unit` into value per world unit: the root of one over `unit`, which itself may leave the
     /// range of `f32`.
     pub per_unit: f32,
+    /// 1 if the light is at the eye, 0 if it is elsewhere.
+    pub headlight: u32,
     /// Last entry of the table of labels, which is that of all greater labels, too.
     pub last_label: u32,
-    /// Unused.
-    pub padding_1: f32,
-    /// Unused.
-    pub padding_2: f32,
 }
 
 /// One sheet group and one list's bricks that may reach into it.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Group {
-    /// Warped depth of the group's near plane.
+    /// Half the screen box around its footprints, pixels.
+    pub half_box: [f32; 2],
+    /// The occlusion buffer's box filter reads a pixel and so many to the right of it and below.
+    pub box_filter: [u32; 2],
+    /// 1 with early splat elimination, 0 without.
+    pub culling: u32,
+    /// Sheet depth of the group's near plane.
     pub near: f32,
     /// First of its bricks in the bucket order.
     pub first_brick: u32,
@@ -93,6 +114,8 @@ pub struct Group {
     pub brick_count: u32,
     /// The group's number in the frame.
     pub index: u32,
+    /// Unused.
+    pub padding: u32,
 }
 
 /// 4×4×4 places for voxels, x fastest.
@@ -164,7 +187,7 @@ pub struct TileList {
     pub tiles: [u32; 1],
 }
 
-/// Counts of a frame; the flags of the tiles follow.
+/// Counts of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Tally {
@@ -184,6 +207,16 @@ pub struct Tally {
     pub padding_1: u32,
     /// Unused.
     pub padding_2: u32,
+}
+
+/// What the quad rasterizer's culling finds out. Tiles go on to the buffer's end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Culled {
+    /// Counts of the frame.
+    pub tally: Tally,
+    /// The first of the tiles: 1 where the current sheet group draws.
+    pub tiles: [u32; 1],
 }
 
 /// Rows of the image whose compositing buffer is one binding.
@@ -210,7 +243,7 @@ pub struct Gather {
     pub chord_scale: [f32; 2],
     /// z of `along` is this times t², minus 1.
     pub along_scale: f32,
-    /// Warped depth of the nearest group's near plane.
+    /// Sheet depth of the nearest group's near plane.
     pub near: f32,
     /// Bound of the depths' rounding errors.
     pub depth_error: f32,

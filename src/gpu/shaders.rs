@@ -22,32 +22,58 @@ macro_rules! shader {
 }
 
 /// Which bricks a sheet group visits.
-pub const CULL_BRICKS: Shader = shader!("cull_bricks", "frame", "brick", "tally", "scan");
+pub const CULL_BRICKS: Shader = shader!("cull_bricks", "frame", "brick", "tally", "culled", "scan", "project");
 /// Which voxels it draws.
-pub const CULL_VOXELS: Shader = shader!("cull_voxels", "frame", "brick", "tally", "project");
+pub const CULL_VOXELS: Shader = shader!("cull_voxels", "frame", "brick", "tally", "culled", "project");
 /// Those voxels in a row.
-pub const COMPACT: Shader = shader!("compact", "brick", "tally", "scan");
+pub const COMPACT: Shader = shader!("compact", "brick", "tally", "culled", "scan");
 /// Shades those that were not shaded before.
 pub const SHADE: Shader = shader!("shade", "frame", "brick", "volume", "project", "splat", "shading", "ramps");
 /// The tiles they touch.
-pub const TILES: Shader = shader!("tiles", "frame", "brick", "tally", "tile_list");
+pub const TILES: Shader = shader!("tiles", "frame", "brick", "tally", "culled", "tile_list");
 /// Zeroes the sheet buffers there.
 pub const CLEAR: Shader = shader!("clear", "frame", "brick", "tile_list", "sheets");
 /// Draws footprints into the sheet buffers.
-pub const SPLAT: Shader = shader!("splat", "frame", "brick", "splat", "sheets");
+pub const SPLAT: Shader = shader!("splat", "frame", "brick", "splat", "sheets", "footprints");
+/// The same in perspective.
+pub const SPLAT_PERSPECTIVE: Shader =
+    shader!("splat_perspective", "frame", "brick", "splat", "sheets", "footprints", "project", "local_ray");
 /// Composites the sheet buffers.
 pub const COMPOSITE: Shader = shader!("composite", "frame", "brick", "band", "tile_list", "compositing");
 /// Computes the occlusion buffer.
 pub const OCCLUDE: Shader = shader!("occlude", "frame", "brick", "tile_list");
 /// Draws whole tiles from front to back.
-pub const GATHER: Shader =
-    shader!("gather", "frame", "brick", "gather", "volume", "project", "shading", "ramps", "compositing");
+pub const GATHER: Shader = shader!(
+    "gather",
+    "frame",
+    "brick",
+    "tally",
+    "gather",
+    "volume",
+    "project",
+    "local_ray",
+    "shading",
+    "ramps",
+    "compositing"
+);
 /// Lays the result over the background.
 pub const RESOLVE: Shader = shader!("resolve", "frame", "band");
 
 /// Every shader, in the order of the data flow.
-pub const ALL: [Shader; 11] =
-    [CULL_BRICKS, CULL_VOXELS, COMPACT, SHADE, TILES, CLEAR, SPLAT, COMPOSITE, OCCLUDE, GATHER, RESOLVE];
+pub const ALL: [Shader; 12] = [
+    CULL_BRICKS,
+    CULL_VOXELS,
+    COMPACT,
+    SHADE,
+    TILES,
+    CLEAR,
+    SPLAT,
+    SPLAT_PERSPECTIVE,
+    COMPOSITE,
+    OCCLUDE,
+    GATHER,
+    RESOLVE,
+];
 
 impl Shader {
     /// Compiles the shader.

@@ -5,14 +5,15 @@ use std::ops::{Add, Mul, Range};
 use glam::{DMat2, DVec2, DVec3, DVec4};
 
 use super::layout::{Frame, Gather, Group};
-use crate::grid_warp::FootprintMap;
+use crate::grid_warp::{self, FootprintMap};
 use crate::kernel::Kernel;
-use crate::plan::{FramePlan, View};
+use crate::plan::FramePlan;
 use crate::scene::Scene;
 use crate::shading::{Light, MIN_GRADIENT, Shading};
 use crate::splatting::{Compositing, Order, Splatting};
 use crate::tile_bins::{self, TileBins};
 use crate::transfer_function::{Ramp, Tables, TransferFunction};
+use crate::view::View;
 use crate::volume::Grid;
 
 /// What ambient, diffuse, specular and shininess are clamped to: beyond it no image changes any more, and `f32` ends.
@@ -29,9 +30,16 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
     let [r, g, b, a] = scene.image.background;
     let matrix = |m: &DMat2| m.to_cols_array().map(|x| x as f32);
     let [color_end, opacity_end, gradient_opacity_end] = ramps.ends;
-    let half_box = view.footprint.half_box(kernel.support());
+    let warped = grid_warp::m_view_warped(&view.basis, grid.aspect());
+    let direction = |row: usize, sign: f64| (warped.row(row) * sign).extend(0.0).as_vec4().to_array();
+    let eye = view.perspective.as_ref().map(|perspective| perspective.eye);
+    let own_depths = view.perspective.is_some_and(|perspective| perspective.is_image_aligned);
     Frame {
         screen_from_voxel: view.screen_from_voxel.map(|row| row.as_vec4().to_array()),
+        right: direction(0, 1.0),
+        down: direction(1, -1.0),
+        ahead: direction(2, 1.0),
+        aspect: grid.aspect().extend(0.0).as_vec4().to_array(),
         pixels_from_footprint: matrix(&view.footprint.pixels_from_footprint),
         footprint_from_pixels: matrix(&view.footprint.footprint_from_pixels),
         light: to_light.extend(f64::from(u8::from(enabled))).as_vec4().to_array(),
@@ -47,18 +55,19 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
         support: kernel.support() as f32,
         falloff: kernel.falloff() as f32,
         slab_width: view.slabs.width as f32,
+        reach: view.reach as f32,
+        kernel_per_depth: if own_depths { 0.0 } else { view.kernel_per_depth as f32 },
+        section_width: view.section_width() as f32,
+        near: eye.map_or(0.0, |eye| eye.near) as f32,
+        pixel_per_depth: eye.map_or(0.0, |eye| eye.pixel_per_depth) as f32,
         opacity_threshold: scene.splatting.opacity_threshold as f32,
-        half_box: half_box.as_vec2().to_array(),
-        // A footprint's box holds that many pixel centres and one more, or one less.
-        reach: ((2.0 * half_box.min(DVec2::splat(MAX_HALF_BOX))).floor() - 1.0).as_uvec2().to_array(),
         compositing: scene.splatting.compositing as u32,
         order: scene.splatting.order as u32,
-        culling: u32::from(culls(&scene.splatting, half_box)),
+        culling: u32::from(culls(&scene.splatting)),
         tiles: u32::from(scene.splatting.tiles),
         per_unit: grid.unit().recip().sqrt().min(f32::MAX.into()) as f32,
+        headlight: u32::from(scene.shading.light == Light::Headlight),
         last_label: ramps.label_table.len().saturating_sub(1) as u32,
-        padding_1: 0.0,
-        padding_2: 0.0,
     }
 }
 
@@ -75,7 +84,7 @@ pub fn gather(view: &View, kernel: &Kernel, bins: &TileBins, bricks: u32) -> Gat
         metric: in_f32([x.dot(x), 2.0 * x.dot(y), y.dot(y), -kernel.falloff() * std::f64::consts::LOG2_E]),
         chord_scale: [(2.0 / (CHORD_SPAN * support_squared)) as f32, (1.0 - 2.0 / CHORD_SPAN) as f32],
         along_scale: (2.0 / support_squared) as f32,
-        near: (f64::from(bins.first_slab) * view.slabs.width) as f32,
+        near: view.slabs.plane(bins.first_slab) as f32,
         // Relative to the depths of the volume's corners, of which the first voxel is one.
         depth_error: (2e-7 * (kernel.radius() + 2.0 * view.screen_from_voxel[2].w.abs())) as f32,
         groups: bins.groups,
@@ -94,19 +103,25 @@ const CHORD_SPAN: f64 = 0.6;
 
 /// The most groups of the tile rasterizer that a kernel reaches into.
 fn groups_per_kernel(view: &View) -> u32 {
-    (2.0 * view.slabs.radius / (f64::from(tile_bins::SHEETS) * view.slabs.width)).ceil() as u32 + 1
+    (2.0 * view.reach / (f64::from(tile_bins::SHEETS) * view.slabs.width)).ceil() as u32 + 1
 }
 
 /// One [`Group`] every `stride` bytes: group after group, and of every group list after list.
-pub fn groups(plan: &FramePlan, stride: usize) -> Vec<u8> {
+pub fn groups(plan: &FramePlan, kernel: &Kernel, splatting: &Splatting, stride: usize) -> Vec<u8> {
     let mut bytes = Vec::new();
     for (index, group) in (0..).zip(&plan.groups) {
+        let half_box = plan.view.half_box(kernel.support(), group.planes.clone());
         for bricks in &group.bricks {
             let uniform = Group {
-                near: group.near as f32,
+                half_box: in_f32_pixels(half_box),
+                // A footprint's box holds that many pixel centres and one more, or one less.
+                box_filter: ((2.0 * half_box.min(DVec2::splat(MAX_HALF_BOX))).floor() - 1.0).as_uvec2().to_array(),
+                culling: u32::from(culls(splatting) && half_box.max_element() <= MAX_HALF_BOX),
+                near: group.planes.start as f32,
                 first_brick: bricks.start,
                 brick_count: bricks.end - bricks.start,
                 index,
+                padding: 0,
             };
             bytes.extend_from_slice(bytemuck::bytes_of(&uniform));
             bytes.resize(bytes.len().next_multiple_of(stride), 0);
@@ -116,15 +131,17 @@ pub fn groups(plan: &FramePlan, stride: usize) -> Vec<u8> {
     bytes
 }
 
+/// Half a box, pixels, in f32; far beyond any image there are numbers, not infinities.
+pub fn in_f32_pixels(half_box: DVec2) -> [f32; 2] {
+    half_box.min(DVec2::splat(1e9)).as_vec2().to_array()
+}
+
 /// Half the largest box that is tested, pixels. Few footprints larger than that fit the screen, and hardly one is ever hidden.
 const MAX_HALF_BOX: f64 = 256.0;
 
-/// Early splat elimination needs the front first, something that hides (SPEC §5), and footprints smaller than the screen.
-fn culls(splatting: &Splatting, half_box: DVec2) -> bool {
-    splatting.culling
-        && splatting.order == Order::FrontToBack
-        && splatting.compositing != Compositing::Xray
-        && half_box.max_element() <= MAX_HALF_BOX
+/// Early splat elimination needs the front first, and something that hides (SPEC §5).
+fn culls(splatting: &Splatting) -> bool {
+    splatting.culling && splatting.order == Order::FrontToBack && splatting.compositing != Compositing::Xray
 }
 
 /// `hv = normalize(l + c)`, 0 where they cancel (SPEC §3).

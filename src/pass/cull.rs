@@ -11,7 +11,7 @@ use wgpu::{
 use crate::brick::BRICK_VOXELS;
 use crate::gpu::bindings::{ComputeStage, at_offset, grown, storage, texture, texture_of_integers, uniform};
 use crate::gpu::brick_lists::BrickBuffer;
-use crate::gpu::layout::{Brick, BrickState, Frame, Group, Indirect, Splat, Tally, Visit};
+use crate::gpu::layout::{Brick, BrickState, Culled, Frame, Group, Indirect, Splat, Visit};
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
 
@@ -61,8 +61,8 @@ pub struct CullBuffers<'a> {
     pub control_points: &'a Buffer,
     /// The occlusion buffer.
     pub occluded: &'a Buffer,
-    /// [`Tally`] and the tiles' flags.
-    pub tally: &'a Buffer,
+    /// One [`Culled`].
+    pub culled: &'a Buffer,
 }
 
 impl Cull {
@@ -79,7 +79,7 @@ impl Cull {
             storage::<u32>(stage, true),
             storage::<Visit>(stage, false),
             storage::<Indirect>(stage, false),
-            storage::<(Tally, u32)>(stage, false),
+            storage::<Culled>(stage, false),
         ];
         let voxels = [
             uniform::<Frame>(stage, false),
@@ -88,7 +88,7 @@ impl Cull {
             storage::<u32>(stage, true),
             storage::<Visit>(stage, false),
             storage::<BrickState>(stage, false),
-            storage::<(Tally, u32)>(stage, false),
+            storage::<Culled>(stage, false),
             storage::<Indirect>(stage, true),
         ];
         let compact = [
@@ -98,7 +98,7 @@ impl Cull {
             storage::<Indirect>(stage, false),
             storage::<u32>(stage, false),
             storage::<Indirect>(stage, false),
-            storage::<(Tally, u32)>(stage, false),
+            storage::<Culled>(stage, false),
         ];
         Self {
             bricks: ComputeStage::new(device, shaders::CULL_BRICKS, "main", &bricks, &sheets),
@@ -155,7 +155,7 @@ impl Cull {
         let fresh = buffer(fresh, "sheetsplat.fresh", most_voxels as usize, size_of::<u32>(), none);
         let fresh_args = buffer(fresh_args, "sheetsplat.fresh_args", 1, size_of::<Indirect>(), indirect);
 
-        let CullBuffers { frame, groups, values, labels, control_points, occluded, tally } = shared;
+        let CullBuffers { frame, groups, values, labels, control_points, occluded, culled } = shared;
         let (frame, group) = (frame.as_entire_binding(), at_offset::<Group>(groups));
         let whole = Buffer::as_entire_binding;
         let bricks = [
@@ -167,7 +167,7 @@ impl Cull {
             whole(occluded),
             whole(&visits),
             whole(&visit_args),
-            whole(tally),
+            whole(culled),
         ];
         let voxels = [
             frame.clone(),
@@ -176,10 +176,10 @@ impl Cull {
             whole(occluded),
             whole(&visits),
             whole(&states),
-            whole(tally),
+            whole(culled),
             whole(&visit_args),
         ];
-        let lists = [&visits, &visit_args, &instances, &draw_args, &fresh, &fresh_args, tally];
+        let lists = [&visits, &visit_args, &instances, &draw_args, &fresh, &fresh_args, culled];
         let compact = lists.map(whole);
         let shade = [
             frame,

@@ -13,7 +13,8 @@ use crate::splatting::{Compositing, FootprintBox, Order, Splatting};
 /// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug, Default)]
 pub struct Gather {
-    stages: [[[[OnceLock<ComputeStage>; 2]; 2]; 2]; 3],
+    /// By compositing, and by the other parts of a mode, one bit each.
+    stages: [[OnceLock<ComputeStage>; 16]; 3],
     no_labels: OnceLock<VolumeTexture>,
 }
 
@@ -23,14 +24,15 @@ pub struct GatherMode {
     compositing: Compositing,
     order: Order,
     footprint_box: FootprintBox,
+    perspective: bool,
     labels: bool,
 }
 
 impl GatherMode {
-    /// The mode that splatting settings ask for, and `labels` that have ramps of their own.
-    pub fn of(splatting: &Splatting, labels: bool) -> Self {
+    /// The mode that splatting settings ask for, with or without an eye, and with or without `labels` that have ramps of their own.
+    pub fn of(splatting: &Splatting, perspective: bool, labels: bool) -> Self {
         let Splatting { compositing, order, footprint_box, .. } = *splatting;
-        Self { compositing, order, footprint_box, labels }
+        Self { compositing, order, footprint_box, perspective, labels }
     }
 }
 
@@ -57,12 +59,15 @@ pub struct GatherBuffers<'a> {
     pub labels: Option<&'a TextureView>,
     /// [`Gathered`].
     pub gathered: &'a Buffer,
+    /// [`TileBins::half_boxes`](crate::tile_bins::TileBins::half_boxes), `[[f32; 2]]`.
+    pub half_boxes: &'a Buffer,
 }
 
 impl Gather {
     fn stage(&self, mode: GatherMode) -> &OnceLock<ComputeStage> {
-        let GatherMode { compositing, order, footprint_box, labels } = mode;
-        &self.stages[compositing as usize][order as usize][footprint_box as usize][usize::from(labels)]
+        let GatherMode { compositing, order, footprint_box, perspective, labels } = mode;
+        let bits = [order as usize, footprint_box as usize, usize::from(perspective), usize::from(labels)];
+        &self.stages[compositing as usize][bits.iter().fold(0, |number, bit| 2 * number + bit)]
     }
 
     fn compiled(&self, device: &Device, mode: GatherMode) -> &ComputeStage {
@@ -79,11 +84,13 @@ impl Gather {
                 texture(stage, TextureViewDimension::D2Array),
                 storage::<[f32; 4]>(stage, false),
                 storage::<Gathered>(stage, false),
+                storage::<[f32; 2]>(stage, true),
                 texture_of_integers(stage, TextureViewDimension::D2Array),
             ];
             let constants = [
                 ("COMPOSITING", f64::from(mode.compositing as u32)),
                 ("ORDER", f64::from(mode.order as u32)),
+                ("PERSPECTIVE", f64::from(u8::from(mode.perspective))),
                 ("PARALLELOGRAM", f64::from(mode.footprint_box as u32)),
                 ("LABELS", f64::from(u8::from(mode.labels))),
             ];
@@ -93,7 +100,7 @@ impl Gather {
 
     /// Binds a band of the compositing buffer, `[vec4f]`, for one mode.
     pub fn bind(&self, device: &Device, mode: GatherMode, buffers: GatherBuffers<'_>, acc: &Buffer) -> BindGroup {
-        let GatherBuffers { frame, gather, parts, bricks, starts, entries, control_points, values, labels, gathered } =
+        let GatherBuffers { frame, gather, parts, bricks, starts, entries, control_points, values, labels, .. } =
             buffers;
         let labels = labels.unwrap_or_else(|| &self.no_labels.get_or_init(|| VolumeTexture::no_labels(device)).view);
         let whole = Buffer::as_entire_binding;
@@ -107,7 +114,8 @@ impl Gather {
             whole(control_points),
             wgpu::BindingResource::TextureView(values),
             whole(acc),
-            whole(gathered),
+            whole(buffers.gathered),
+            whole(buffers.half_boxes),
             wgpu::BindingResource::TextureView(labels),
         ];
         self.compiled(device, mode).bind(device, &resources)

@@ -2,8 +2,8 @@
 
 use wgpu::{BindGroup, Buffer, ComputePass, Device, ShaderStages};
 
-use crate::gpu::bindings::{ComputeStage, storage, uniform};
-use crate::gpu::layout::{Frame, TileList};
+use crate::gpu::bindings::{ComputeStage, at_offset, storage, uniform};
+use crate::gpu::layout::{Frame, Group, TileList};
 use crate::gpu::shaders;
 use crate::gpu::targets::Targets;
 
@@ -20,6 +20,7 @@ impl Occlude {
         let stage = ShaderStages::COMPUTE;
         let slots = [
             uniform::<Frame>(stage, false),
+            uniform::<Group>(stage, true),
             storage::<TileList>(stage, true),
             storage::<u32>(stage, true),
             storage::<u32>(stage, false),
@@ -28,10 +29,18 @@ impl Occlude {
         Self { columns: compile("columns"), rows: compile("rows") }
     }
 
-    /// Binds the opacity buffer and its two convolutions; `tiles` is the list of tiles to compute anew.
-    pub fn bind(&self, device: &Device, frame: &Buffer, tiles: &Buffer, targets: &Targets) -> [BindGroup; 2] {
+    /// Binds the opacity buffer and its two convolutions, with a frame and `[Group]`; `tiles` is the list of tiles to compute anew.
+    pub fn bind(
+        &self,
+        device: &Device,
+        [frame, groups]: [&Buffer; 2],
+        tiles: &Buffer,
+        targets: &Targets,
+    ) -> [BindGroup; 2] {
         let bind = |stage: &ComputeStage, source: &Buffer, result: &Buffer| {
-            stage.bind(device, &[frame, tiles, source, result].map(Buffer::as_entire_binding))
+            let whole = Buffer::as_entire_binding;
+            let resources = [whole(frame), at_offset::<Group>(groups), whole(tiles), whole(source), whole(result)];
+            stage.bind(device, &resources)
         };
         [
             bind(&self.columns, &targets.opaque, &targets.opaque_columns),
@@ -39,9 +48,9 @@ impl Occlude {
         ]
     }
 
-    /// Convolves in the listed tiles.
-    pub fn record(&self, pass: &mut ComputePass<'_>, [columns, rows]: &[BindGroup; 2], tiles: &Buffer) {
-        self.columns.dispatch_indirect(pass, columns, &[], tiles);
-        self.rows.dispatch_indirect(pass, rows, &[], tiles);
+    /// Convolves in the listed tiles with the box of the group at `offset`.
+    pub fn record(&self, pass: &mut ComputePass<'_>, [columns, rows]: &[BindGroup; 2], offset: u32, tiles: &Buffer) {
+        self.columns.dispatch_indirect(pass, columns, &[offset], tiles);
+        self.rows.dispatch_indirect(pass, rows, &[offset], tiles);
     }
 }

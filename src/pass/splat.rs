@@ -1,10 +1,12 @@
 //! Draws a group's kernel sections as instanced footprint quads, added up in the sheet buffers (§3.2): one quad per voxel,
 //! one colour target per sheet.
 
+use std::sync::OnceLock;
+
 use wgpu::util::DeviceExt;
 use wgpu::{
-    BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, RenderPassTimestampWrites, RenderPipeline,
-    ShaderStages, TextureFormat, TextureView, TextureViewDimension,
+    BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, PipelineLayout, RenderPassTimestampWrites,
+    RenderPipeline, ShaderStages, TextureFormat, TextureView, TextureViewDimension,
 };
 
 use crate::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
@@ -15,16 +17,28 @@ use crate::gpu::shaders::{self, Shader};
 use crate::pass::cull::CullList;
 use crate::splatting::FootprintForm;
 
-/// The stage's pipelines: zeroing tiles, and one per footprint form.
+/// The stage's pipelines: zeroing tiles, and those that draw.
 #[derive(Debug)]
 pub struct Splat {
     clear_layout: BindGroupLayout,
     clear: RenderPipeline,
     layout: BindGroupLayout,
-    sections: RenderPipeline,
-    summed_area: RenderPipeline,
+    pipeline_layout: PipelineLayout,
+    format: TextureFormat,
+    sheets: u32,
+    /// By footprint form, without and with an eye; each is compiled when it is first asked for.
+    splat: [[OnceLock<RenderPipeline>; 2]; 2],
     /// Two triangles for each of an instance's quads.
     indices: Buffer,
+}
+
+/// What a pipeline is compiled for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SplatMode {
+    /// How sections are stored.
+    pub form: FootprintForm,
+    /// Whether voxels have rays of their own.
+    pub perspective: bool,
 }
 
 impl Splat {
@@ -48,28 +62,14 @@ impl Splat {
                 texture(both, TextureViewDimension::D2Array),
             ],
         );
-        let add = wgpu::BlendComponent {
-            src_factor: wgpu::BlendFactor::One,
-            dst_factor: wgpu::BlendFactor::One,
-            operation: wgpu::BlendOperation::Add,
-        };
-        let additive = Some(wgpu::BlendState { color: add, alpha: add });
-        let splat = |form: FootprintForm| {
-            let sections = f64::from(u8::from(form == FootprintForm::Sections));
-            let constants = [
-                ("SECTIONS", sections),
-                ("SHEETS", f64::from(sheets)),
-                ("PLANE_TEXELS", f64::from(SUMMED_AREA_SIZE)),
-                ("LAYERS", f64::from(SUMMED_AREA_LAYERS)),
-            ];
-            pipeline(device, shaders::SPLAT, &splat_pipeline_layout, format, sheets, additive, &constants)
-        };
         Self {
             clear: pipeline(device, shaders::CLEAR, &clear_pipeline_layout, format, sheets, None, &[]),
             clear_layout,
-            sections: splat(FootprintForm::Sections),
-            summed_area: splat(FootprintForm::SummedArea),
             layout: splat_layout,
+            pipeline_layout: splat_pipeline_layout,
+            format,
+            sheets,
+            splat: Default::default(),
             indices: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
                 label: Some("sheetsplat.quad_indices"),
                 contents: bytemuck::cast_slice(&quad_indices()),
@@ -78,9 +78,38 @@ impl Splat {
         }
     }
 
+    /// The pipeline for a footprint form, without or with an eye.
+    fn pipeline(&self, device: &Device, mode: SplatMode) -> &RenderPipeline {
+        self.cell(mode).get_or_init(|| {
+            let add = wgpu::BlendComponent {
+                src_factor: wgpu::BlendFactor::One,
+                dst_factor: wgpu::BlendFactor::One,
+                operation: wgpu::BlendOperation::Add,
+            };
+            let additive = Some(wgpu::BlendState { color: add, alpha: add });
+            let constants = [
+                ("SECTIONS", f64::from(u8::from(mode.form == FootprintForm::Sections))),
+                ("SHEETS", f64::from(self.sheets)),
+                ("PLANE_TEXELS", f64::from(SUMMED_AREA_SIZE)),
+                ("LAYERS", f64::from(SUMMED_AREA_LAYERS)),
+            ];
+            let shader = if mode.perspective { shaders::SPLAT_PERSPECTIVE } else { shaders::SPLAT };
+            pipeline(device, shader, &self.pipeline_layout, self.format, self.sheets, additive, &constants)
+        })
+    }
+
+    fn cell(&self, mode: SplatMode) -> &OnceLock<RenderPipeline> {
+        &self.splat[mode.form as usize][usize::from(mode.perspective)]
+    }
+
     /// Binds the list of tiles to zero.
     pub fn bind_clear(&self, device: &Device, frame: &Buffer, tiles: &Buffer) -> BindGroup {
         bind(device, "sheetsplat.clear", &self.clear_layout, &[frame, tiles].map(Buffer::as_entire_binding))
+    }
+
+    /// Compiles what a mode needs.
+    pub fn prepare(&self, device: &Device, mode: SplatMode) {
+        self.pipeline(device, mode);
     }
 
     /// Binds one list's splats. `groups` holds a [`Group`] at every dynamic offset that will be drawn.
@@ -109,7 +138,7 @@ impl Splat {
         &self,
         encoder: &mut CommandEncoder,
         timestamp_writes: Option<RenderPassTimestampWrites<'_>>,
-        form: FootprintForm,
+        mode: SplatMode,
         sheets: &[TextureView],
         clear: (&BindGroup, &Buffer),
         lists: impl IntoIterator<Item = (&'a BindGroup, u32, &'a Buffer)>,
@@ -136,10 +165,8 @@ impl Splat {
         pass.set_pipeline(&self.clear);
         pass.set_bind_group(0, clear.0, &[]);
         pass.draw_indexed_indirect(clear.1, draw);
-        pass.set_pipeline(match form {
-            FootprintForm::Sections => &self.sections,
-            FootprintForm::SummedArea => &self.summed_area,
-        });
+        let Some(splat) = self.cell(mode).get() else { return };
+        pass.set_pipeline(splat);
         for (group, offset, args) in lists {
             pass.set_bind_group(0, group, &[offset]);
             pass.draw_indexed_indirect(args, draw);

@@ -3,7 +3,7 @@
 use wgpu::{BindGroup, Buffer, BufferUsages, ComputePass, Device, ShaderStages};
 
 use crate::gpu::bindings::{ComputeStage, at_offset, grown, storage, uniform};
-use crate::gpu::layout::{Frame, Group, Tally, TileList};
+use crate::gpu::layout::{Culled, Frame, Group, TileList};
 use crate::gpu::shaders;
 use crate::gpu::targets::Targets;
 
@@ -32,7 +32,7 @@ impl Tiles {
         let slots = [
             uniform::<Frame>(stage, false),
             uniform::<Group>(stage, true),
-            storage::<(Tally, u32)>(stage, false),
+            storage::<Culled>(stage, false),
             storage::<u32>(stage, true),
             storage::<TileList>(stage, false),
             storage::<TileList>(stage, false),
@@ -45,7 +45,7 @@ impl Tiles {
     pub fn prepare(
         &self,
         device: &Device,
-        [frame, groups, tally]: [&Buffer; 3],
+        [frame, groups, culled]: [&Buffer; 3],
         targets: &Targets,
         group_count: usize,
         previous: Option<TileLists>,
@@ -61,7 +61,7 @@ impl Tiles {
         let resources = [
             frame.as_entire_binding(),
             at_offset::<Group>(groups),
-            tally.as_entire_binding(),
+            culled.as_entire_binding(),
             targets.opaque_tiles.as_entire_binding(),
             composited.as_entire_binding(),
             occluding.as_entire_binding(),

@@ -11,8 +11,8 @@ use crate::gpu::bindings::grown;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
 use crate::kernel::Kernel;
-use crate::plan::View;
 use crate::splatting::Splatting;
+use crate::view::View;
 
 /// What a rasterizer prepares a frame from.
 #[derive(Clone, Copy)]
@@ -48,8 +48,8 @@ pub(crate) fn filled(
     bytes: &[u8],
     usage: BufferUsages,
 ) -> Buffer {
-    // Of one word at least: bindings may not be empty.
-    let buffer = grown(device, old, label, (bytes.len() as u64).max(4), usage | BufferUsages::COPY_DST);
+    // Of one element at least: bindings may not be empty.
+    let buffer = grown(device, old, label, (bytes.len() as u64).max(8), usage | BufferUsages::COPY_DST);
     queue.write_buffer(&buffer, 0, bytes);
     buffer
 }

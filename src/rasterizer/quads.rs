@@ -17,11 +17,12 @@ use crate::kernel::Kernel;
 use crate::pass::composite::Composite;
 use crate::pass::cull::{Cull, CullBuffers, CullList};
 use crate::pass::occlude::Occlude;
-use crate::pass::splat::Splat;
+use crate::pass::splat::{Splat, SplatMode};
 use crate::pass::tiles::{TileLists, Tiles};
-use crate::plan::{FramePlan, View};
+use crate::plan::FramePlan;
 use crate::splatting::{FootprintForm, Order};
 use crate::stats::GroupSlabs;
+use crate::view::View;
 
 /// The stages.
 #[derive(Debug)]
@@ -43,10 +44,11 @@ pub(crate) struct QuadFrame {
     footprints: Footprints,
     groups: Buffer,
     group_stride: u32,
-    tally: Buffer,
+    culled: Buffer,
     tile_lists: TileLists,
     lists: Vec<PreparedList>,
     sheet_views: Vec<TextureView>,
+    splat_mode: SplatMode,
     clear_group: BindGroup,
     composite_groups: Vec<BindGroup>,
     occlude_groups: [BindGroup; 2],
@@ -109,11 +111,11 @@ impl QuadRasterizer {
         let footprints = Footprints::renewed(old.footprints, given);
         let alignment = device.limits().min_uniform_buffer_offset_alignment as usize;
         let group_stride = size_of::<Group>().next_multiple_of(alignment);
-        let group_bytes = uniforms::groups(plan, group_stride);
+        let group_bytes = uniforms::groups(plan, given.kernel, splatting, group_stride);
         let groups = given.filled(old.groups, "sheetsplat.groups", &group_bytes, BufferUsages::UNIFORM);
-        let tally_bytes = size_of::<Tally>() as u64 + targets.opaque_tiles.size();
+        let culled_bytes = size_of::<Tally>() as u64 + targets.opaque_tiles.size();
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-        let tally = grown(device, old.tally, "sheetsplat.tally", tally_bytes, usage);
+        let culled = grown(device, old.culled, "sheetsplat.culled", culled_bytes, usage);
 
         let shared = CullBuffers {
             frame,
@@ -122,7 +124,7 @@ impl QuadRasterizer {
             labels: volume.labels(),
             control_points,
             occluded: &targets.occluded,
-            tally: &tally,
+            culled: &culled,
         };
         let mut old_lists = old.lists.into_iter();
         let lists: Vec<PreparedList> = (volume.lists.lists.iter().zip(&planned.orders).zip(&planned.most))
@@ -133,22 +135,25 @@ impl QuadRasterizer {
                 PreparedList { cull, splat_group }
             })
             .collect();
-        let buffers = [frame, &groups, &tally];
+        let buffers = [frame, &groups, &culled];
         let tile_lists = self.tiles.prepare(device, buffers, &targets, plan.groups.len(), old.tile_lists);
         let tiles = &tile_lists.composited;
         let sheets = targets.sheets_view();
         let composite = |band| self.composite.bind(device, frame, band, &sheets, tiles, &targets);
+        let splat_mode = SplatMode { form: splatting.footprint, perspective: view.perspective.is_some() };
+        self.splat.prepare(device, splat_mode);
         let frame = QuadFrame {
+            splat_mode,
             clear_group: self.splat.bind_clear(device, frame, tiles),
             composite_groups: compositing.bands.iter().map(composite).collect(),
-            occlude_groups: self.occlude.bind(device, frame, &tile_lists.occluding, &targets),
+            occlude_groups: self.occlude.bind(device, [frame, &groups], &tile_lists.occluding, &targets),
             sheet_views: (0..self.sheets).map(|layer| targets.sheet_view(layer)).collect(),
             group_stride: group_stride as u32,
             planned,
             targets,
             footprints,
             groups,
-            tally,
+            culled,
             tile_lists,
             lists,
         };
@@ -158,7 +163,7 @@ impl QuadRasterizer {
     /// Draws the frame.
     pub(crate) fn record(&self, encoder: &mut CommandEncoder, timer: &mut Option<Timer>, frame: &QuadFrame) {
         let QuadFrame { planned: Planned { plan, .. }, targets, tile_lists, .. } = frame;
-        let masks = [&targets.opaque, &targets.opaque_columns, &targets.occluded, &targets.opaque_tiles, &frame.tally];
+        let masks = [&targets.opaque, &targets.opaque_columns, &targets.occluded, &targets.opaque_tiles, &frame.culled];
         for buffer in masks.into_iter().chain(frame.lists.iter().map(|list| &list.cull.states)) {
             encoder.clear_buffer(buffer, 0, None);
         }
@@ -181,11 +186,11 @@ impl QuadRasterizer {
             let clear = (&frame.clear_group, &tile_lists.composited);
             let draws = lists.iter().map(|(list, offset)| (&list.splat_group, *offset, &list.cull.draw_args));
             let times = timer.as_mut().map(|timer| timer.render("splat"));
-            self.splat.record(encoder, times, frame.footprints.texture.form, &frame.sheet_views, clear, draws);
+            self.splat.record(encoder, times, frame.splat_mode, &frame.sheet_views, clear, draws);
 
             let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.composite", timer, "composite"));
             self.composite.record(&mut pass, &frame.composite_groups, &tile_lists.composited);
-            self.occlude.record(&mut pass, &frame.occlude_groups, &tile_lists.occluding);
+            self.occlude.record(&mut pass, &frame.occlude_groups, any_offset, &tile_lists.occluding);
         }
     }
 }
@@ -205,7 +210,7 @@ impl QuadFrame {
     /// Copies the frame's counts to the start of `staging`.
     pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer) {
         let (tally, tiles) = (size_of::<Tally>() as u64, self.planned.plan.groups.len() as u64 * 4);
-        encoder.copy_buffer_to_buffer(&self.tally, 0, staging, 0, tally);
+        encoder.copy_buffer_to_buffer(&self.culled, 0, staging, 0, tally);
         encoder.copy_buffer_to_buffer(&self.tile_lists.counts, 0, staging, tally, tiles);
     }
 
@@ -214,7 +219,7 @@ impl QuadFrame {
         let lists: u64 = self.lists.iter().map(|list| list.cull.gpu_bytes()).sum();
         let TileLists { composited, occluding, counts, .. } = &self.tile_lists;
         let orders = self.planned.orders.iter();
-        let buffers: u64 = [&self.groups, &self.tally, composited, occluding, counts]
+        let buffers: u64 = [&self.groups, &self.culled, composited, occluding, counts]
             .into_iter()
             .chain(orders)
             .map(Buffer::size)
@@ -251,7 +256,7 @@ impl Footprints {
     fn renewed(old: Option<Self>, given: Given<'_>) -> Self {
         let (form, kernel) = (given.splatting.footprint, *given.kernel);
         // The summed-area form serves every width (§3.3.1).
-        let width = given.view.slabs.width;
+        let width = given.view.section_width();
         let of = (form == FootprintForm::Sections).then_some(width);
         let fits = |old: &Self| (old.texture.form, old.kernel, old.width) == (form, kernel, of);
         old.filter(fits).unwrap_or_else(|| {
@@ -268,7 +273,7 @@ struct Old {
     targets: Option<Targets>,
     footprints: Option<Footprints>,
     groups: Option<Buffer>,
-    tally: Option<Buffer>,
+    culled: Option<Buffer>,
     tile_lists: Option<TileLists>,
     lists: Vec<PreparedList>,
 }
@@ -281,7 +286,7 @@ impl Old {
             targets: Some(frame.targets),
             footprints: Some(frame.footprints),
             groups: Some(frame.groups),
-            tally: Some(frame.tally),
+            culled: Some(frame.culled),
             tile_lists: Some(frame.tile_lists),
             lists: frame.lists,
         }

@@ -9,10 +9,11 @@ use crate::gpu::layout::{Brick, Gathered, Part, Tally};
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
 use crate::pass::gather::{Gather, GatherBuffers, GatherMode};
-use crate::plan::{View, tile_grid};
+use crate::plan::tile_grid;
 use crate::splatting::{FootprintForm, Order, Splatting};
 use crate::stats::GroupSlabs;
 use crate::tile_bins::{SHEETS, SIDE, TileBins};
+use crate::view::View;
 
 /// Threads that a subgroup may have.
 const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;
@@ -35,6 +36,7 @@ pub(crate) struct TileFrame {
     starts: Buffer,
     entries: Buffer,
     gathered: Buffer,
+    half_boxes: Buffer,
     /// For every band of the compositing buffer and run of groups: the band's number, and the dispatch's offset and workgroups.
     dispatches: Vec<(usize, u32, u32)>,
     bands: Vec<BindGroup>,
@@ -48,7 +50,7 @@ struct Binned {
     order: Order,
     /// Of the kernel; it changes the footprints' boxes.
     support: f64,
-    search_steps: u32,
+    search_passes: u32,
     revision: u64,
 }
 
@@ -88,10 +90,10 @@ impl TileRasterizer {
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let mut old = Old::of(previous);
         let in_memory = volume.labels().is_some();
-        let search_steps = given.ramp_lengths.iter().map(|&points| search_steps(points, in_memory)).sum();
+        let search_passes = given.ramp_lengths.iter().map(|&points| search_passes(points, in_memory)).sum();
         let is_current = |old: &Binned| {
             old.view == *view
-                && (old.order, old.revision, old.search_steps) == (splatting.order, volume.revision, search_steps)
+                && (old.order, old.revision, old.search_passes) == (splatting.order, volume.revision, search_passes)
                 && old.support == kernel.support()
         };
         let (current, stale) = match old.binned.take() {
@@ -102,10 +104,9 @@ impl TileRasterizer {
         let binned = match current {
             Some(binned) => binned,
             None => {
-                let half_box = view.footprint.half_box(kernel.support());
-                let bins = TileBins::new(bricks, view, splatting.order, half_box, search_steps, binding / 4)?;
                 let support = kernel.support();
-                Binned { bins, view: *view, order: splatting.order, support, search_steps, revision: volume.revision }
+                let bins = TileBins::new(bricks, view, splatting.order, support, search_passes, binding / 4)?;
+                Binned { bins, view: *view, order: splatting.order, support, search_passes, revision: volume.revision }
             }
         };
         let bins = &binned.bins;
@@ -117,6 +118,9 @@ impl TileRasterizer {
                 given.filled(entries, "sheetsplat.bin_entries", bytemuck::cast_slice(&bins.entries), storage),
             ),
         };
+        let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|&pixels| uniforms::in_f32_pixels(pixels)).collect();
+        let half_boxes = bytemuck::cast_slice(&half_boxes);
+        let half_boxes = given.filled(old.half_boxes.take(), "sheetsplat.half_boxes", half_boxes, storage);
         let own_bricks = match (&volume.lists.lists[..], old.bricks.take()) {
             ([_], _) => None,
             (_, Some(bricks)) if !stale => Some(bricks),
@@ -163,7 +167,7 @@ impl TileRasterizer {
         part_bytes.resize(part_bytes.len().max(stride), 0);
         let parts = given.filled(old.parts.take(), "sheetsplat.parts", &part_bytes, BufferUsages::UNIFORM);
 
-        let mode = GatherMode::of(splatting, volume.labels().is_some());
+        let mode = GatherMode::of(splatting, view.perspective.is_some(), volume.labels().is_some());
         let buffers = GatherBuffers {
             frame: given.frame,
             gather: &uniform,
@@ -175,6 +179,7 @@ impl TileRasterizer {
             values: &volume.texture.view,
             labels: volume.labels(),
             gathered: &gathered,
+            half_boxes: &half_boxes,
         };
         let bands = given.compositing.bands.iter().map(|band| self.gather.bind(device, mode, buffers, &band.acc));
         let bands = bands.collect();
@@ -187,6 +192,7 @@ impl TileRasterizer {
             starts,
             entries,
             gathered,
+            half_boxes,
             dispatches,
             bands,
         };
@@ -226,14 +232,14 @@ impl TileFrame {
 
     /// Bytes of GPU memory.
     pub(crate) fn gpu_bytes(&self) -> u64 {
-        let Self { uniform, parts, starts, entries, gathered, bricks, .. } = self;
-        [uniform, parts, starts, entries, gathered].into_iter().chain(bricks).map(Buffer::size).sum()
+        let Self { uniform, parts, starts, entries, gathered, half_boxes, bricks, .. } = self;
+        [uniform, parts, starts, entries, gathered, half_boxes].into_iter().chain(bricks).map(Buffer::size).sum()
     }
 }
 
-/// Loop iterations that a lookup among so many control points takes: none if every thread of a subgroup can hold one, unless they
-/// are searched `in_memory` anyway.
-fn search_steps(points: u32, in_memory: bool) -> u32 {
+/// Passes through loops that a lookup among so many control points takes: none if every thread of a subgroup can hold one, unless they
+/// are searched `in_memory` anyway, else those of a binary search and 2 around it.
+fn search_passes(points: u32, in_memory: bool) -> u32 {
     if points <= *SUBGROUP_SIZES.start() && !in_memory { 0 } else { 2 + points.ilog2() + 1 }
 }
 
@@ -247,6 +253,7 @@ struct Old {
     starts: Option<Buffer>,
     entries: Option<Buffer>,
     gathered: Option<Buffer>,
+    half_boxes: Option<Buffer>,
 }
 
 impl Old {
@@ -260,6 +267,7 @@ impl Old {
             starts: Some(frame.starts),
             entries: Some(frame.entries),
             gathered: Some(frame.gathered),
+            half_boxes: Some(frame.half_boxes),
         }
     }
 }

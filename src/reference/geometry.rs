@@ -1,9 +1,14 @@
-//! SPEC §§2 and 5 as written: pixel coordinates, slabs, and the footprint coordinates of a pixel offset.
+//! SPEC §§2 and 5 as written: pixel coordinates, depths, slabs and slices, and where a voxel's kernel sections fall.
+
+use std::ops::Range;
 
 use glam::{DMat2, DVec2, DVec3, UVec3};
 
-use crate::camera::{Camera, ViewBasis};
+use super::footprint::{Footprint, Ray};
+use super::{Section, Splat};
+use crate::camera::{Camera, Eye, ViewBasis};
 use crate::error::RenderError;
+use crate::kernel::Kernel;
 use crate::scene::Scene;
 use crate::slab::SlabGrid;
 use crate::splatting::Method;
@@ -12,7 +17,10 @@ use crate::volume::Grid;
 /// The largest image, pixels along a side: what the largest GPUs allow.
 const MAX_SIZE: u32 = 32768;
 
-/// An orthographic view of a grid.
+/// A view of a grid.
+///
+/// Orthographic rays are all alike. In perspective `pix`, `ro`, `lambda`, `footprint_from_pixels` and `amplitude` are those of the
+/// central ray at the camera's `center`, and every voxel and section has its own: [`Geometry::section`].
 #[derive(Clone, Copy, Debug)]
 pub struct Geometry {
     /// The viewing coordinate system.
@@ -23,13 +31,17 @@ pub struct Geometry {
     pub grid: Grid,
     /// World point at the image's centre, `unit`s.
     pub center: DVec3,
+    /// The eye; `None` for an orthographic view.
+    pub eye: Option<Eye>,
+    /// Which part of a kernel goes into which sheet.
+    pub method: Method,
     /// `unit`s per pixel.
     pub pix: f64,
-    /// `ro = rw/λ`, also the slab normal `wo`.
+    /// `ro = rw/λ`, orthographic also the slab normal `wo`.
     pub ro: DVec3,
     /// `λ = |rw|`.
     pub lambda: f64,
-    /// Slab width in the warped space, `Δ·λw`.
+    /// Slab width in terms of [`Geometry::depth`]: orthographic `Δ·λw`, perspective Δ.
     pub slab_width: f64,
     /// Pixel offset → footprint coordinates, after the low-pass rule.
     pub footprint_from_pixels: DMat2,
@@ -39,7 +51,7 @@ pub struct Geometry {
 
 impl Geometry {
     /// # Errors
-    /// If the scene asks for something that is not implemented yet, or for more than can be computed.
+    /// If the scene asks for more than can be computed.
     pub fn new(grid: &Grid, scene: &Scene) -> Result<Self, RenderError> {
         let (width, height) = (scene.image.width, scene.image.height);
         for (key, found) in [("image.width", width), ("image.height", height)] {
@@ -48,98 +60,180 @@ impl Geometry {
                 return Err(RenderError::OutOfRange { key, found, allowed });
             }
         }
-        let splatting = &scene.splatting;
-        let Some(height_world) = scene.camera.orthographic_height(grid, scene.splatting.radius, width, height) else {
-            return Err(RenderError::unsupported("camera.projection", "\"perspective\"", "\"orthographic\""));
+        let (camera, splatting) = (&scene.camera, &scene.splatting);
+        let (basis, aspect) = (camera.basis(), grid.aspect());
+        let eye = camera.eye(grid, splatting.radius, height)?;
+        let pix = match (&eye, camera.orthographic_height(grid, splatting.radius, width, height)) {
+            (None, Some(height_world)) => Camera::pixel_size(height_world, grid, height)?,
+            (eye, _) => eye.map_or(1.0, |eye| eye.pix(eye.distance)),
         };
-        if scene.splatting.method == Method::AxisAligned {
-            return Err(RenderError::unsupported("splatting.method", "\"axis-aligned\"", "\"image-aligned\""));
-        }
-        let basis = scene.camera.basis();
-        let pix = Camera::pixel_size(height_world, grid, height)?;
-        let rw = basis.w / grid.aspect();
-        let (ro, lambda) = (rw.normalize(), rw.length());
-        SlabGrid { width: splatting.slab_width * lambda, radius: splatting.radius }
-            .check(ro.abs().dot(grid.center()), splatting.slab_width)?;
-
-        // Any orthonormal basis of the plane ⟂ ro will do: the kernel is symmetric.
-        let a = ro.any_orthonormal_vector();
-        let b = ro.cross(a);
-        let column = |q: DVec3| {
-            let warped = q * pix / grid.aspect();
-            DVec2::new(warped.dot(a), warped.dot(b))
-        };
-        let footprint_from_pixels = DMat2::from_cols(column(basis.u), column(-basis.v));
-        let (pixels_from_footprint, amplitude) = low_pass(footprint_from_pixels.inverse());
-        Ok(Self {
+        let ray = Ray::new(basis.w, &basis, aspect);
+        let footprint = ray.footprint(pix);
+        let geometry = Self {
             basis,
             size: DVec2::new(f64::from(width), f64::from(height)),
             grid: *grid,
-            center: scene.camera.center / grid.unit(),
+            center: camera.center / grid.unit(),
+            eye,
+            method: splatting.method,
             pix,
-            ro,
-            lambda,
-            slab_width: scene.splatting.slab_width * lambda,
-            footprint_from_pixels: pixels_from_footprint.inverse(),
-            amplitude,
-        })
+            ro: ray.ro,
+            lambda: ray.lambda,
+            slab_width: if eye.is_some() { splatting.slab_width } else { splatting.slab_width * ray.lambda },
+            footprint_from_pixels: footprint.from_pixels,
+            amplitude: footprint.amplitude,
+        };
+        if splatting.method == Method::ImageAligned {
+            geometry.check_slabs(splatting.radius, splatting.slab_width)?;
+        }
+        Ok(geometry)
+    }
+
+    /// That slabs are few enough and have numbers.
+    fn check_slabs(&self, radius: f64, slab_width: f64) -> Result<(), RenderError> {
+        let origin = 0.0;
+        let Some(eye) = self.eye else {
+            let slabs = SlabGrid { origin, width: self.slab_width };
+            return slabs.check(self.ro.abs().dot(self.grid.center()) + radius, slab_width);
+        };
+        let half_extents = self.grid.center() * self.grid.aspect();
+        // A kernel reaches `radius·(r·w)/λ` units of depth from its voxel, at most this.
+        let reach = radius * (self.basis.w * self.grid.aspect()).length();
+        SlabGrid { origin, width: slab_width }.check(self.basis.w.abs().dot(half_extents) + reach, slab_width)?;
+        eye.check_slabs(&self.grid, slab_width)
+    }
+
+    /// Position relative to the eye (orthographic: to the world point at the image's centre), `unit`s.
+    fn position(&self, voxel: UVec3) -> DVec3 {
+        self.grid.world_position(voxel) / self.grid.unit() - self.eye.map_or(self.center, |eye| eye.position)
+    }
+
+    /// Whether a voxel is beyond the near plane: its depth, not its distance (SPEC §2). With that every voxel that takes part
+    /// lies before the eye, `r·w > 0`, also those beside it.
+    pub fn is_beyond_near(&self, voxel: UVec3) -> bool {
+        self.eye.is_none_or(|eye| self.position(voxel).dot(self.basis.w) > eye.near)
+    }
+
+    /// The local ray at a voxel, a unit vector: `w`, in perspective `normalize(p - e)`.
+    pub fn ray(&self, voxel: UVec3) -> DVec3 {
+        if self.eye.is_some() { self.position(voxel).normalize() } else { self.basis.w }
     }
 
     /// Half the width and height, in pixels, of the screen box around a footprint of the given radius (grid units).
     pub fn half_box(&self, radius: f64) -> DVec2 {
-        let pixels_from_footprint = self.footprint_from_pixels.inverse();
-        radius * DVec2::new(pixels_from_footprint.row(0).length(), pixels_from_footprint.row(1).length())
+        self.footprint().half_box(radius)
     }
 
-    /// Pixel offset → footprint coordinates whose first axis is the screen's (eqs. 9, 10): the square around a footprint in these
-    /// coordinates is a parallelogram on the screen, with two sides along the pixel rows (Fig. 13).
-    pub fn sheared_footprint_from_pixels(&self) -> DMat2 {
-        let along_rows = self.footprint_from_pixels.x_axis;
-        DMat2::from_angle(-along_rows.to_angle()) * self.footprint_from_pixels
+    fn footprint(&self) -> Footprint {
+        Footprint { from_pixels: self.footprint_from_pixels, amplitude: self.amplitude }
     }
 
-    /// Pixel coordinates of a voxel.
+    /// Pixel coordinates of a voxel beyond the near plane.
     pub fn pixel(&self, voxel: UVec3) -> DVec2 {
-        let p = self.grid.world_position(voxel) / self.grid.unit() - self.center;
-        DVec2::new(
-            self.size.x / 2.0 + self.basis.u.dot(p) / self.pix,
-            self.size.y / 2.0 - self.basis.v.dot(p) / self.pix,
-        )
+        let p = self.position(voxel);
+        let pix = self.eye.map_or(self.pix, |eye| eye.pix(p.dot(self.basis.w)));
+        DVec2::new(self.size.x / 2.0 + self.basis.u.dot(p) / pix, self.size.y / 2.0 - self.basis.v.dot(p) / pix)
     }
 
-    /// Warped depth of a voxel.
+    /// Depth of a voxel, in the terms that slabs are in: orthographic in the warped grid, from the volume's centre; perspective in
+    /// `unit`s along w, from the eye.
     pub fn depth(&self, voxel: UVec3) -> f64 {
+        if self.eye.is_some() {
+            return self.position(voxel).dot(self.basis.w);
+        }
         (self.grid.world_position(voxel) / self.grid.unit() / self.grid.aspect()).dot(self.ro)
     }
-}
 
-/// Raises singular values below 1 to 1; also the product of old/new. By the decomposition of a 2×2 matrix into rotation,
-/// `diag(q + r, q - r)` and rotation.
-fn low_pass(m: DMat2) -> (DMat2, f64) {
-    let [[a, c], [b, d]] = m.to_cols_array_2d();
-    let (e, f, g, h) = ((a + d) / 2.0, (a - d) / 2.0, (c + b) / 2.0, (c - b) / 2.0);
-    let (q, r) = (e.hypot(h), f.hypot(g));
-    let (sum, difference) = (g.atan2(f), h.atan2(e));
-    let (left, right) = ((difference + sum) / 2.0, (difference - sum) / 2.0);
-    let raise = |singular: f64| singular.abs().max(1.0).copysign(singular);
-    let (old, new) = (DVec2::new(q + r, q - r), DVec2::new(raise(q + r), raise(q - r)));
-    let raised = DMat2::from_angle(left) * DMat2::from_diagonal(new) * DMat2::from_angle(right);
-    (raised, (old / new).element_product())
-}
+    /// Depth of a voxel along w in the unwarped space, `unit`s: what voxels composited one by one are sorted by.
+    pub fn depth_along_w(&self, voxel: UVec3) -> f64 {
+        self.position(voxel).dot(self.basis.w)
+    }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+    /// The slice that a voxel is in, of those along the axis with the largest |w| component (§3.1; ties: x, then y, then z), counted
+    /// along w.
+    ///
+    /// Perspective keeps this one order for the whole image. Where a ray runs against w along that axis it is the wrong one: only
+    /// rays at more than asin |w_axis|, so at least 35.3°, from the image's centre can do so.
+    pub fn slice(&self, voxel: UVec3) -> i32 {
+        let w = self.basis.w.abs();
+        let axis = if w.x >= w.y && w.x >= w.z {
+            0
+        } else if w.y >= w.z {
+            1
+        } else {
+            2
+        };
+        let index = voxel[axis] as i32;
+        if self.basis.w[axis] < 0.0 { -index } else { index }
+    }
 
-    #[test]
-    fn low_pass_leaves_large_maps_alone_and_raises_small_ones() {
-        for m in [DMat2::from_cols_array(&[3.0, 0.5, -1.0, 2.0]), DMat2::from_cols_array(&[-2.0, 0.0, 0.4, 5.0])] {
-            let (same, amplitude) = low_pass(m);
-            assert!(same.abs_diff_eq(m, 1e-12));
-            assert!((amplitude - 1.0).abs() < 1e-12);
+    /// What a voxel's `(C·m, m)` is multiplied by: `1/λ`, and the low-pass amplitude where it is the same for all sections.
+    pub fn scale(&self, voxel: UVec3) -> f64 {
+        if self.eye.is_some() {
+            (self.ray(voxel) / self.grid.aspect()).length().recip()
+        } else {
+            self.amplitude / self.lambda
         }
-        let (raised, amplitude) = low_pass(DMat2::from_cols_array(&[0.0, 0.25, -4.0, 0.0]));
-        assert!(raised.abs_diff_eq(DMat2::from_cols_array(&[0.0, 1.0, -4.0, 0.0]), 1e-12));
-        assert!((amplitude - 0.25).abs() < 1e-12);
+    }
+
+    /// The local ray of a splat in perspective, from where it stands on the screen.
+    fn local(&self, splat: &Splat, eye: &Eye) -> Ray {
+        let offset = (splat.center - self.size / 2.0) * eye.pix(splat.depth);
+        let p = offset.x * self.basis.u - offset.y * self.basis.v + splat.depth * self.basis.w;
+        Ray::new(p.normalize(), &self.basis, self.grid.aspect())
+    }
+
+    /// The slabs that a kernel overlaps by more than rounding errors, nearer than the near plane not counted.
+    pub fn slabs(&self, splat: &Splat, radius: f64) -> Range<i32> {
+        const ROUNDING: f64 = 1e-9;
+        let (first, end) = match &self.eye {
+            None => (splat.depth - radius, splat.depth + radius),
+            Some(eye) => {
+                let reach = radius * self.local(splat, eye).depth_per_warped;
+                ((splat.depth - reach).max(eye.near), splat.depth + reach)
+            }
+        };
+        let first = (first / self.slab_width + ROUNDING).floor() as i32;
+        first..(end / self.slab_width - ROUNDING).ceil() as i32
+    }
+
+    /// What of a splat falls into a sheet: between the planes of slab `sheet`, or the whole kernel where sheets are slices, and
+    /// nothing nearer than the near plane. `None` if that is nothing.
+    ///
+    /// In perspective (§3.3.2, end of §4.2):
+    ///
+    /// - The near plane cuts first, then the middle of what is left is taken. So a section's mid depth is never nearer than `near`, and
+    ///   `pix` there neither 0 nor negative, however far off the axis the voxel or however wide the view.
+    /// - Planes are cut across the kernel perpendicular to its own ray, where that ray meets them: `t` grows by `λ/(r·w)` per `unit`
+    ///   of depth. For a voxel far off the axis a slab is thick, and the whole kernel lies in one or two.
+    /// - All of a kernel is projected along its voxel's ray. That holds while the kernel is small against its distance to the eye. For
+    ///   voxels beside the eye, nearer in depth than the kernel reaches in the plane of the image, it does not: their footprints reach
+    ///   over the whole screen, whatever lies between. A near plane of a kernel's radius keeps such voxels out.
+    /// - Axis-aligned sheets take the kernel whole, `pix` at the voxel's depth; the near plane cuts those, too.
+    pub fn section(&self, splat: &Splat, sheet: i32, kernel: &Kernel) -> Option<Section> {
+        let (near, far) = match self.method {
+            Method::ImageAligned => (f64::from(sheet) * self.slab_width, (f64::from(sheet) + 1.0) * self.slab_width),
+            Method::AxisAligned | Method::CompositeEverySample => (f64::NEG_INFINITY, f64::INFINITY),
+        };
+        let section = |footprint: Footprint, t0: f64, t1: f64, amplitude: f64| {
+            let amount = splat.amount * amplitude;
+            Some(Section { center: splat.center, footprint, t0, t1, amount })
+        };
+        let Some(eye) = &self.eye else {
+            return section(self.footprint(), near - splat.depth, far - splat.depth, 1.0);
+        };
+        let ray = self.local(splat, eye);
+        let at = |depth: f64| (depth - splat.depth) / ray.depth_per_warped;
+        let (t0, t1) = (at(near.max(eye.near)), at(far));
+        let (first, last) = (t0.max(-kernel.radius()), t1.min(kernel.radius()));
+        if first >= last {
+            return None;
+        }
+        let middle = match self.method {
+            Method::ImageAligned => (first + last) / 2.0,
+            Method::AxisAligned | Method::CompositeEverySample => 0.0,
+        };
+        let footprint = ray.footprint(eye.pix(splat.depth + middle * ray.depth_per_warped));
+        section(footprint, t0, t1, footprint.amplitude)
     }
 }

@@ -2,26 +2,33 @@
 //! matrices of eqs. 4–11, and slow. Tests compare every stage with it; `sheetsplat render --backend reference` shows it.
 
 pub mod composite;
+pub mod footprint;
 pub mod geometry;
+pub mod ray_march;
 pub mod resolve;
 pub mod shading;
+pub mod sheets;
 pub mod splat;
 pub mod visibility;
 
+use std::collections::BTreeMap;
+
 use glam::DVec4;
+use rayon::prelude::*;
 
 use crate::error::RenderError;
 use crate::image::Image;
 use crate::kernel::Kernel;
 use crate::plan::tile_grid;
 use crate::scene::Scene;
-use crate::splatting::Order;
+use crate::splatting::{Compositing, Method, Order};
 use crate::stats::Counts;
 use crate::transfer_function::TransferFunction;
 use crate::volume::Volume;
 
 pub use geometry::Geometry;
 pub use shading::Splat;
+pub use splat::Section;
 pub use visibility::Areas;
 
 /// An f64 image of premultiplied RGBA, row 0 at the top.
@@ -38,33 +45,72 @@ impl Buffer {
     pub fn new(width: u32, height: u32) -> Self {
         Self { width: width as usize, pixels: vec![DVec4::ZERO; width as usize * height as usize] }
     }
+
+    /// As an image of f32.
+    pub fn into_image(self) -> Image {
+        Image {
+            width: self.width as u32,
+            height: (self.pixels.len() / self.width) as u32,
+            pixels: self.pixels.iter().map(|pixel| pixel.as_vec4().to_array()).collect(),
+        }
+    }
+}
+
+/// A scene's voxels, ready to be drawn.
+struct Frame {
+    geometry: Geometry,
+    kernel: Kernel,
+    /// The voxels that take part, their positions in memory.
+    voxels: Vec<u32>,
+    splats: Vec<Splat>,
+}
+
+impl Frame {
+    fn new(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Self, RenderError> {
+        let geometry = Geometry::new(volume.grid(), scene)?;
+        let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
+        let voxels = shading::taking_part(volume, transfer, &geometry);
+        let splats = shading::splats(&voxels, volume, transfer, scene, &geometry);
+        Ok(Self { geometry, kernel, voxels, splats })
+    }
+
+    fn buckets(&self) -> BTreeMap<i32, Vec<u32>> {
+        sheets::buckets(&self.voxels, &self.splats, &self.geometry, &self.kernel)
+    }
+
+    /// What of some splats, by index, falls into a sheet.
+    fn sections(&self, indices: &[u32], sheet: i32) -> Vec<Section> {
+        let section = |&index: &u32| self.geometry.section(&self.splats[index as usize], sheet, &self.kernel);
+        indices.par_iter().filter_map(section).collect()
+    }
 }
 
 /// Renders the scene's camera, image, shading and splatting settings over a volume, with nothing culled.
 ///
 /// # Errors
-/// If the scene asks for something that is not implemented yet.
+/// If the scene asks for more than can be computed.
 pub fn render(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Image, RenderError> {
     render_culled(volume, transfer, scene, None).map(|culled| culled.image)
 }
 
-/// What [`render`] draws: all there is.
+/// What [`render`] draws: all there is. Voxels composited one by one make a section each, and neither sheets nor tiles.
 ///
 /// # Errors
-/// If the scene asks for something that is not implemented yet.
+/// If the scene asks for more than can be computed.
 pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Counts, RenderError> {
-    let geometry = Geometry::new(volume.grid(), scene)?;
-    let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
-    let splats = shading::shade(volume, transfer, scene, &geometry);
-    let buckets = splat::buckets(&splats, &geometry, &kernel);
-    let sections = buckets.values().map(|bucket| bucket.len() as u64).sum();
+    let frame = Frame::new(volume, transfer, scene)?;
+    let buckets = frame.buckets();
+    let sections = match scene.splatting.method {
+        Method::CompositeEverySample => frame.splats.len() as u64,
+        Method::ImageAligned | Method::AxisAligned => buckets.values().map(|bucket| bucket.len() as u64).sum(),
+    };
     let sheets =
         buckets.first_key_value().zip(buckets.last_key_value()).map_or(0, |((first, _), (last, _))| last - first + 1);
     let [columns, rows] = tile_grid([scene.image.width, scene.image.height]).map(u64::from);
     Ok(Counts {
         voxels_total: volume.values().len() as u64,
-        voxels_in_range: splats.len() as u64,
-        voxels_shaded: splats.len() as u64,
+        voxels_in_range: frame.splats.len() as u64,
+        voxels_shaded: frame.splats.len() as u64,
         sections_total: sections,
         sections_rasterized: sections,
         sheets: sheets as u64,
@@ -85,41 +131,50 @@ pub struct Culled {
     pub areas: Areas,
 }
 
-/// Renders with early splat elimination by one of the paper's tests, sheet by sheet, and counts what is drawn.
+/// Renders with early splat elimination by one of the paper's tests, sheet by sheet, and counts what is drawn. Nothing is culled back to
+/// front, for `xray`, and where voxels are composited one by one.
 ///
 /// # Errors
-/// If the scene asks for something that is not implemented yet.
+/// If the scene asks for more than can be computed.
 pub fn render_culled(
     volume: &Volume,
     transfer: &TransferFunction,
     scene: &Scene,
     test: Option<visibility::Test>,
 ) -> Result<Culled, RenderError> {
-    let geometry = Geometry::new(volume.grid(), scene)?;
-    let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
-    let splats = shading::shade(volume, transfer, scene, &geometry);
+    let frame = Frame::new(volume, transfer, scene)?;
+    let (compositing, order) = (scene.splatting.compositing, scene.splatting.order);
+    let test = test.filter(|_| order == Order::FrontToBack && compositing != Compositing::Xray);
+    let support = frame.kernel.support();
 
-    let mut sheets: Vec<(i32, Vec<Splat>)> = splat::buckets(&splats, &geometry, &kernel).into_iter().collect();
-    if scene.splatting.order == Order::BackToFront {
-        sheets.reverse();
-    }
     let mut acc = Buffer::new(scene.image.width, scene.image.height);
     let (mut sections, mut areas) = (0, Areas::default());
-    for (k, mut bucket) in sheets {
+    if scene.splatting.method == Method::CompositeEverySample {
+        let mut indices = sheets::by_depth(&frame.voxels, &frame.geometry);
+        if order == Order::BackToFront {
+            indices.reverse();
+        }
+        let kernels = frame.sections(&indices, 0);
+        sections += kernels.len() as u64;
+        let over = |acc: &mut DVec4, amount| composite::composite_pixel(acc, amount, compositing, order);
+        splat::draw(&kernels, &frame.kernel, &mut acc, over);
+    }
+    let mut buckets: Vec<(i32, Vec<u32>)> = frame.buckets().into_iter().collect();
+    if order == Order::BackToFront {
+        buckets.reverse();
+    }
+    for (k, bucket) in buckets {
+        let mut in_sheet = frame.sections(&bucket, k);
         if let Some(test) = test {
             let mask = visibility::OpaqueMask::new(&acc, scene.splatting.opacity_threshold);
-            bucket = mask.visible(&bucket, test, &geometry, kernel.support());
+            in_sheet = mask.visible(&in_sheet, test, support);
         }
-        sections += bucket.len() as u64;
-        areas.add(&bucket, &geometry, kernel.support());
-        let sheet = splat::sheet(&bucket, k, &geometry, &kernel);
-        composite::composite(&mut acc, &sheet, scene.splatting.compositing, scene.splatting.order);
+        sections += in_sheet.len() as u64;
+        areas.add(&in_sheet, frame.geometry.size, support);
+        let mut sheet = Buffer::new(scene.image.width, scene.image.height);
+        splat::draw(&in_sheet, &frame.kernel, &mut sheet, |pixel, amount| *pixel += amount);
+        composite::composite(&mut acc, &sheet, compositing, order);
     }
-    let image = resolve::resolve(&acc, scene.splatting.compositing, scene.image.background);
-    let image = Image {
-        width: scene.image.width,
-        height: scene.image.height,
-        pixels: image.pixels.iter().map(|pixel| pixel.as_vec4().to_array()).collect(),
-    };
+    let image = resolve::resolve(&acc, compositing, scene.image.background).into_image();
     Ok(Culled { image, sections, areas })
 }

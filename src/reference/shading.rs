@@ -15,34 +15,58 @@ use crate::volume::Volume;
 pub struct Splat {
     /// Pixel coordinates.
     pub center: DVec2,
-    /// Warped depth.
+    /// [`Geometry::depth`].
     pub depth: f64,
-    /// `(C·m, m)` times the low-pass amplitude over λ.
+    /// `(C·m, m)` over λ, times the low-pass amplitude where that is the same for all sections ([`Geometry::scale`]).
     pub amount: DVec4,
 }
 
-/// The voxels that take part, in memory order.
+/// The voxels that take part, in memory order: their positions in memory.
+pub fn taking_part(volume: &Volume, transfer: &TransferFunction, geometry: &Geometry) -> Vec<u32> {
+    let alpha = |&index: &u32| alpha(volume, transfer, index);
+    let is_beyond_near = |&index: &u32| geometry.is_beyond_near(volume.grid().voxel_at(index));
+    let voxels = (0..volume.values().len() as u32).into_par_iter();
+    voxels.filter(|index| alpha(index) > 0.0 && is_beyond_near(index)).collect()
+}
+
+/// Projects and shades the voxels that take part, in memory order.
 pub fn shade(volume: &Volume, transfer: &TransferFunction, scene: &Scene, geometry: &Geometry) -> Vec<Splat> {
-    let to_eye = -geometry.basis.w;
-    (0..volume.values().len() as u32)
-        .into_par_iter()
-        .filter_map(|index| {
-            let voxel = volume.grid().voxel_at(index);
-            let value = f64::from(volume.values()[index as usize]);
-            let gradient = volume.gradient(voxel);
-            let tables = transfer.tables(volume.label(index));
-            let alpha = tables.alpha(value, gradient.length());
-            (alpha > 0.0).then(|| {
-                let m = amount(scene.splatting.compositing, alpha);
-                let color = color(&scene.shading, tables.color.at(value), gradient, to_eye);
-                Splat {
-                    center: geometry.pixel(voxel),
-                    depth: geometry.depth(voxel),
-                    amount: color.extend(1.0) * m * geometry.amplitude / geometry.lambda,
-                }
-            })
-        })
-        .collect()
+    splats(&taking_part(volume, transfer, geometry), volume, transfer, scene, geometry)
+}
+
+/// Projects and shades voxels, given by their positions in memory.
+pub fn splats(
+    voxels: &[u32],
+    volume: &Volume,
+    transfer: &TransferFunction,
+    scene: &Scene,
+    geometry: &Geometry,
+) -> Vec<Splat> {
+    let splat = |&index: &u32| {
+        let voxel = volume.grid().voxel_at(index);
+        let amount = emission(volume, transfer, scene, geometry, index) * geometry.scale(voxel);
+        Splat { center: geometry.pixel(voxel), depth: geometry.depth(voxel), amount }
+    };
+    voxels.par_iter().map(splat).collect()
+}
+
+/// `(C·m, m)` of a voxel.
+pub fn emission(volume: &Volume, transfer: &TransferFunction, scene: &Scene, geometry: &Geometry, index: u32) -> DVec4 {
+    let voxel = volume.grid().voxel_at(index);
+    let base = transfer.tables(volume.label(index)).color.at(f64::from(volume.values()[index as usize]));
+    let color = color(&scene.shading, base, volume.gradient(voxel), -geometry.ray(voxel));
+    color.extend(1.0) * amount(scene.splatting.compositing, alpha(volume, transfer, index))
+}
+
+/// α of a voxel.
+fn alpha(volume: &Volume, transfer: &TransferFunction, index: u32) -> f64 {
+    let value = f64::from(volume.values()[index as usize]);
+    let tables = transfer.tables(volume.label(index));
+    // Most voxels are ruled out by their value: spare them the gradient.
+    if tables.opacity.at(value) <= 0.0 {
+        return 0.0;
+    }
+    tables.alpha(value, volume.gradient(volume.grid().voxel_at(index)).length())
 }
 
 /// `m`: the amount per unit length (SPEC §5).

@@ -1,52 +1,73 @@
-//! Buckets and sheet buffers, SPEC §5; the twin of `bucket.rs` and `shaders/splat.wgsl`.
-
-use std::collections::BTreeMap;
+//! Sheet buffers, SPEC §5; the twin of `shaders/splat.wgsl`.
 
 use glam::{DVec2, DVec4};
 use rayon::prelude::*;
 
+use super::footprint::Footprint;
 use super::{Buffer, Geometry, Splat};
 use crate::kernel::Kernel;
 
-/// The bucket of every slab that a kernel touches, front to back.
-pub fn buckets(splats: &[Splat], geometry: &Geometry, kernel: &Kernel) -> BTreeMap<i32, Vec<Splat>> {
-    let mut buckets = BTreeMap::<i32, Vec<Splat>>::new();
-    for splat in splats {
-        let mut k = ((splat.depth - kernel.radius()) / geometry.slab_width).floor() as i32;
-        while f64::from(k) * geometry.slab_width < splat.depth + kernel.radius() {
-            buckets.entry(k).or_default().push(*splat);
-            k += 1;
-        }
-    }
-    buckets
+/// A kernel section, or a whole kernel, on the screen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Section {
+    /// Pixel coordinates of the voxel.
+    pub center: DVec2,
+    /// How its footprint lies there.
+    pub footprint: Footprint,
+    /// Where it begins along the warped ray, from the voxel.
+    pub t0: f64,
+    /// Where it ends.
+    pub t1: f64,
+    /// `(C·m, m)` times the low-pass amplitude over λ.
+    pub amount: DVec4,
 }
 
-/// The sheet buffer of slab `k`: every pixel centre within every footprint, closed form.
-pub fn sheet(bucket: &[Splat], k: i32, geometry: &Geometry, kernel: &Kernel) -> Buffer {
-    const ROWS: usize = 16;
-    let (width, height) = (geometry.size.x as usize, geometry.size.y as usize);
-    let mut sheet = Buffer::new(width as u32, height as u32);
-    let half_box = geometry.half_box(kernel.radius());
+impl Section {
+    /// The pixels whose centres lie within the box around a footprint of the given radius: the first and the last. Pixel centres are
+    /// at half-integers.
+    pub fn pixels(&self, radius: f64) -> (DVec2, DVec2) {
+        let half_box = self.footprint.half_box(radius);
+        ((self.center - half_box - 0.5).ceil(), (self.center + half_box - 0.5).floor())
+    }
+}
 
-    sheet.pixels.par_chunks_mut(width * ROWS).enumerate().for_each(|(band, pixels)| {
-        let first_row = (band * ROWS) as f64;
-        let end_row = (first_row + ROWS as f64).min(height as f64);
-        for splat in bucket {
-            let t0 = f64::from(k) * geometry.slab_width - splat.depth;
-            // Pixel centres are at half-integers.
-            let low = (splat.center - half_box - 0.5).ceil().max(DVec2::new(0.0, first_row));
-            let high = (splat.center + half_box - 0.5).floor().min(DVec2::new(width as f64, end_row) - 1.0);
-            for y in low.y as i64..=high.y as i64 {
-                for x in low.x as i64..=high.x as i64 {
-                    let offset = DVec2::new(x as f64, y as f64) + 0.5 - splat.center;
-                    let footprint = geometry.footprint_from_pixels * offset;
-                    let section = kernel.section(footprint.length_squared(), t0, t0 + geometry.slab_width);
-                    pixels[(y as usize - band * ROWS) * width + x as usize] += splat.amount * section;
-                }
+/// The sheet buffer of sheet `k`: every pixel centre within every footprint, closed form.
+pub fn sheet(splats: &[Splat], k: i32, geometry: &Geometry, kernel: &Kernel) -> Buffer {
+    let sections: Vec<Section> = splats.iter().filter_map(|splat| geometry.section(splat, k, kernel)).collect();
+    let mut sheet = Buffer::new(geometry.size.x as u32, geometry.size.y as u32);
+    draw(&sections, kernel, &mut sheet, |pixel, amount| *pixel += amount);
+    sheet
+}
+
+/// Hands the amount of every section at every pixel to `blend`, section by section.
+pub fn draw(sections: &[Section], kernel: &Kernel, buffer: &mut Buffer, blend: impl Fn(&mut DVec4, DVec4) + Sync) {
+    const ROWS: usize = 16;
+    let width = buffer.width;
+    let last = DVec2::new(width as f64, (buffer.pixels.len() / width) as f64) - 1.0;
+    // Which sections reach into which rows.
+    let mut bands = vec![Vec::new(); buffer.pixels.len().div_ceil(width * ROWS)];
+    for (section, index) in sections.iter().zip(0_u32..) {
+        let (low, high) = section.pixels(kernel.radius());
+        let (low, high) = (low.max(DVec2::ZERO), high.min(last));
+        if low.cmple(high).all() {
+            (low.y as usize / ROWS..=high.y as usize / ROWS).for_each(|band| bands[band].push(index));
+        }
+    }
+    buffer.pixels.par_chunks_mut(width * ROWS).zip(&bands).enumerate().for_each(|(band, (pixels, indices))| {
+        let first_row = band * ROWS;
+        let last_row = first_row + pixels.len() / width - 1;
+        for section in indices.iter().map(|&index| &sections[index as usize]) {
+            let (low, high) = section.pixels(kernel.radius());
+            let (low_x, high_x) = (low.x.max(0.0) as usize, high.x.min(last.x) as usize);
+            let (low_y, high_y) = (first_row.max(low.y.max(0.0) as usize), last_row.min(high.y.min(last.y) as usize));
+            for (y, x) in (low_y..=high_y).flat_map(|y| (low_x..=high_x).map(move |x| (y, x))) {
+                let offset = DVec2::new(x as f64, y as f64) + 0.5 - section.center;
+                let rho_squared = (section.footprint.from_pixels * offset).length_squared();
+                let amount = kernel.section(rho_squared, section.t0, section.t1);
+                blend(&mut pixels[(y - first_row) * width + x], section.amount * amount);
             }
         }
     });
-    sheet
 }
 
 /// The sum over a sheet buffer's pixels.

@@ -2,7 +2,7 @@
 
 use glam::{DMat2, DVec2};
 
-use super::{Buffer, Geometry, Splat};
+use super::{Buffer, Section};
 use crate::plan::TILE;
 
 /// When a voxel is culled.
@@ -62,24 +62,25 @@ impl OpaqueMask {
         })
     }
 
-    /// The splats of a bucket that pass a test.
-    pub fn visible(&self, bucket: &[Splat], test: Test, geometry: &Geometry, support: f64) -> Vec<Splat> {
-        let half_box = geometry.half_box(support);
-        let sheared = geometry.sheared_footprint_from_pixels();
-        let is_hidden = |splat: &Splat| match test {
+    /// The sections of a sheet that pass a test. In perspective every section is tested with its own box: what a box per slab may
+    /// not go beyond.
+    pub fn visible(&self, sections: &[Section], test: Test, support: f64) -> Vec<Section> {
+        let is_hidden = |section: &Section| match test {
             // The one pixel that the centre falls on.
-            Test::Center => self.covers(splat.center.floor() + 0.5, DVec2::splat(0.5)),
-            Test::Box => self.covers(splat.center, half_box),
-            Test::Parallelogram => self.covers_parallelogram(splat.center, sheared, support),
+            Test::Center => self.covers(section.center.floor() + 0.5, DVec2::splat(0.5)),
+            Test::Box => self.covers(section.center, section.footprint.half_box(support)),
+            Test::Parallelogram => {
+                self.covers_parallelogram(section.center, section.footprint.sheared_from_pixels(), support)
+            }
         };
-        bucket.iter().filter(|splat| !is_hidden(splat)).copied().collect()
+        sections.iter().filter(|section| !is_hidden(section)).copied().collect()
     }
 }
 
 /// Where sheets are composited and convolved, by the paper's ways to tell (§6), in pixels summed over the sheets.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Areas {
-    /// The bounding box of the voxels' centres, as much larger as footprints reach.
+    /// The bounding box of the voxels' centres, as much larger as the largest footprint reaches.
     pub bounding_box: u64,
     /// The tiles that footprints' boxes overlap.
     pub tiles: u64,
@@ -88,29 +89,31 @@ pub struct Areas {
     pub counted_tiles: u64,
     /// Splats of every tile so far.
     counters: Vec<u32>,
+    /// The most pixels that a footprint's box had so far.
+    largest_box: f64,
 }
 
 impl Areas {
-    /// Adds the areas of a sheet of these splats.
-    pub fn add(&mut self, sheet: &[Splat], geometry: &Geometry, support: f64) {
-        let half_box = geometry.half_box(support);
-        let size = geometry.size;
+    /// Adds the areas of a sheet of these sections, in an image of this size.
+    pub fn add(&mut self, sections: &[Section], size: DVec2, support: f64) {
         let tile = f64::from(TILE);
         let columns = (size.x / tile).ceil() as usize;
         self.counters.resize(columns * (size.y / tile).ceil() as usize, 0);
+        let half_box = |section: &Section| section.footprint.half_box(support);
+        let largest = sections.iter().map(half_box).reduce(DVec2::max).unwrap_or(DVec2::ZERO);
         // The pixels whose centres lie between two points, first and end.
         let pixels = |low: DVec2, high: DVec2| {
             let first = (low - 0.5).ceil().clamp(DVec2::ZERO, size);
             (first, ((high - 0.5).floor() + 1.0).clamp(first, size))
         };
-        let centers = sheet.iter().map(|splat| (splat.center, splat.center));
+        let centers = sections.iter().map(|section| (section.center, section.center));
         if let Some((low, high)) = centers.reduce(|(low, high), (at, _)| (low.min(at), high.max(at))) {
-            let (first, end) = pixels(low - half_box, high + half_box);
+            let (first, end) = pixels(low - largest, high + largest);
             self.bounding_box += (end - first).element_product() as u64;
         }
         let mut touched = vec![false; self.counters.len()];
-        for splat in sheet {
-            let (first, end) = pixels(splat.center - half_box, splat.center + half_box);
+        for section in sections {
+            let (first, end) = pixels(section.center - half_box(section), section.center + half_box(section));
             if (end - first).min_element() < 1.0 {
                 continue;
             }
@@ -123,7 +126,8 @@ impl Areas {
             }
         }
         // No splat makes more pixels opaque than its box has.
-        let least = (tile * tile / (2.0 * half_box.x + 1.0) / (2.0 * half_box.y + 1.0)).ceil();
+        self.largest_box = self.largest_box.max((2.0 * largest.x + 1.0) * (2.0 * largest.y + 1.0));
+        let least = (tile * tile / self.largest_box).ceil();
         for (at, _) in touched.iter().enumerate().filter(|(_, touched)| **touched) {
             let corner = DVec2::new((at % columns) as f64, (at / columns) as f64) * tile;
             let area = (corner + tile).min(size) - corner;

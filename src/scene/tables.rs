@@ -155,7 +155,11 @@ pub(super) fn shading(mut section: Section) -> Result<Shading, SceneError> {
 
 /// `[splatting]`.
 pub(super) fn splatting(mut section: Section) -> Result<Splatting, SceneError> {
-    let methods = [("image-aligned", Method::ImageAligned), ("axis-aligned", Method::AxisAligned)];
+    let methods = [
+        ("image-aligned", Method::ImageAligned),
+        ("axis-aligned", Method::AxisAligned),
+        ("composite-every-sample", Method::CompositeEverySample),
+    ];
     let forms = [("summed-area", FootprintForm::SummedArea), ("sections", FootprintForm::Sections)];
     let compositings =
         [("linear", Compositing::Linear), ("exponential", Compositing::Exponential), ("xray", Compositing::Xray)];

@@ -91,24 +91,26 @@ fn bench_of_bad_input_is_2() {
     assert_fails(1, "bench good.nrrd --adapter Voodoo", &["Voodoo"]);
 }
 
-const STAGES: [&str; 4] = ["composite", "cull", "resolve", "splat"];
-
 #[test]
 fn profiles_say_where_the_time_goes() {
-    let folder = Folder::new();
-    let report = folder.bench(&format!("{SMALL} --frames 1 --profile"));
-    assert_eq!(keys(&report["stages_ms"]), STAGES);
-    let run = folder.run(&format!("render {SMALL} -o image.png --stats stats.json --profile"));
-    assert_eq!(run.code, Some(0), "{}", run.stderr);
-    let stats: Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
-    assert_eq!(keys(&stats["stages_ms"]), STAGES);
-    // A line for each: the stage, milliseconds.
-    let lines: Vec<Vec<&str>> = run.stdout.lines().map(|line| line.split_whitespace().collect()).collect();
-    assert_eq!(lines.iter().map(|line| line[0]).collect::<Vec<_>>(), STAGES, "{}", run.stdout);
-    for line in lines {
-        let printed: f64 = line[1].parse().unwrap();
-        assert!((printed - stats["stages_ms"][line[0]].as_f64().unwrap()).abs() < 6e-4, "{line:?} {stats:#}");
-        assert_eq!(line[2], "ms");
+    for (rasterizer, stages) in
+        [(QUADS, &["composite", "cull", "resolve", "splat"][..]), (TILES, &["gather", "resolve"])]
+    {
+        let folder = Folder::new();
+        let report = folder.bench(&format!("{SMALL} {rasterizer} --frames 1 --profile"));
+        assert_eq!(keys(&report["stages_ms"]), stages);
+        let run = folder.run(&format!("render {SMALL} {rasterizer} -o image.png --stats stats.json --profile"));
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        let stats: Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
+        assert_eq!(keys(&stats["stages_ms"]), stages);
+        // A line for each: the stage, milliseconds.
+        let lines: Vec<Vec<&str>> = run.stdout.lines().map(|line| line.split_whitespace().collect()).collect();
+        assert_eq!(lines.iter().map(|line| line[0]).collect::<Vec<_>>(), stages, "{}", run.stdout);
+        for line in lines {
+            let printed: f64 = line[1].parse().unwrap();
+            assert!((printed - stats["stages_ms"][line[0]].as_f64().unwrap()).abs() < 6e-4, "{line:?} {stats:#}");
+            assert_eq!(line[2], "ms");
+        }
     }
 }
 

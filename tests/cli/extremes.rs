@@ -34,11 +34,13 @@ fn extremes_agree_with_the_reference() {
         "huge.nrrd",
         "huge.nrrd --set transfer.opacity=[[-3e38,0],[3e38,0.9]]",
     ] {
-        let (.., gpu) = folder.pixels(&format!("{case} {view} {UNCULLED}"));
         let (.., reference) = folder.pixels(&format!("{case} {view} --backend reference"));
-        assert!(gpu.iter().flatten().all(|channel| channel.is_finite()), "{case}");
-        let decibels = psnr(&gpu, &reference, BLACK);
-        assert!(decibels >= 60.0, "{case}: {decibels:.1} dB");
+        for rasterizer in RASTERIZERS {
+            let (.., gpu) = folder.pixels(&format!("{case} {view} {UNCULLED} {rasterizer}"));
+            assert!(gpu.iter().flatten().all(|channel| channel.is_finite()), "{case} {rasterizer}");
+            let decibels = psnr(&gpu, &reference, BLACK);
+            assert!(decibels >= 60.0, "{case} {rasterizer}: {decibels:.1} dB");
+        }
     }
 }
 
@@ -49,10 +51,54 @@ fn minified_volumes_keep_their_opacity() {
     folder.write_nrrd("haze.nrrd", [24; 3], [1.0; 3], &[1.0; 24 * 24 * 24]);
     for opacity in [0.01, 0.0001] {
         let render = format!("haze.nrrd --set image={{width=2,height=2}} --set transfer.opacity=[[0,{opacity}]]");
-        let (.., gpu) = folder.pixels(&render);
         let (.., reference) = folder.pixels(&format!("{render} --backend reference"));
+        for rasterizer in RASTERIZERS {
+            let (.., gpu) = folder.pixels(&format!("{render} {rasterizer}"));
+            for (gpu, reference) in gpu.iter().flatten().zip(reference.iter().flatten()) {
+                assert!((gpu - reference).abs() <= 1e-3 * reference, "{opacity} {rasterizer}: {gpu}, not {reference}");
+            }
+        }
+    }
+}
+
+/// Drivers end loops that run long: what is behind a pixel is drawn in as many dispatches as it takes.
+#[test]
+fn deep_volumes_are_drawn_to_their_end() {
+    let folder = Folder::new();
+    let zeros = |dims: [usize; 3]| vec![0.0_f32; dims.iter().product()];
+    // A voxel at either end, and thousands of sheet groups of nothing between them.
+    let mut ends = zeros([1, 12, 1]);
+    (ends[0], ends[11]) = (1.0, 1.0);
+    folder.write_nrrd("ends.nrrd", [1, 12, 1], [1.0, 1000.0, 1.0], &ends);
+    // Few voxels in many bricks, many voxels in few; all of them behind a pixel or two.
+    let mut sparse = zeros([28; 3]);
+    (0..343).for_each(|i| sparse[4 * (i % 7 + 28 * (i / 7 % 7 + 28 * (i / 49)))] = 1.0);
+    folder.write_nrrd("sparse.nrrd", [28; 3], [1.0; 3], &sparse);
+    folder.write_nrrd("dense.nrrd", [24; 3], [1.0; 3], &[1.0; 24 * 24 * 24]);
+    // More control points than a subgroup has threads.
+    let many: Vec<String> = (0..40).map(|i| format!("[{},{}]", f64::from(i) / 39.0, f64::from(i) * 1e-6)).collect();
+    let many = format!("[{}]", many.join(","));
+    for (volume, opacity, slab_width) in [
+        ("ends", "[[0,0],[1,0.001]]", 0.25),
+        ("sparse", "[[0,0],[1,0.001]]", 0.3),
+        ("sparse", "[[0,0],[1,0.001]]", 8.0),
+        ("dense", "[[0,0.0001]]", 0.3),
+        ("dense", &many, 0.3),
+        ("dense", &many, 8.0),
+    ] {
+        let render = format!(
+            "{volume}.nrrd --set image={{width=2,height=2}} --set splatting.slab_width={slab_width} \
+             --set transfer.opacity={opacity} --set splatting.compositing=exponential"
+        );
+        let (.., reference) = folder.pixels(&format!("{render} --backend reference"));
+        let stats = folder.stats(&format!("{render} {TILES}"));
+        assert_eq!(stats["sections_rasterized"], stats["sections_total"], "{render}");
+        let (.., gpu) = folder.read_npy("stats.npy");
         for (gpu, reference) in gpu.iter().flatten().zip(reference.iter().flatten()) {
-            assert!((gpu - reference).abs() <= 1e-3 * reference, "{opacity}: {gpu}, not {reference}");
+            assert!(
+                *reference > 0.0 && (gpu - reference).abs() <= 1e-3 * reference,
+                "{render}: {gpu}, not {reference}"
+            );
         }
     }
 }
@@ -66,17 +112,21 @@ fn the_smallest_and_the_narrowest() {
         [("one", 1, 1), ("ball", 1, 1), ("ball", 1, 200), ("ball", 8192, 1), ("ball", 1, 8192), ("one", 3, 5)]
     {
         let render = format!("{volume}.nrrd --set image={{width={width},height={height}}}");
-        let (found_width, found_height, gpu) = folder.pixels(&format!("{render} {UNCULLED}"));
-        assert_eq!((found_width, found_height), (width, height));
         let (.., reference) = folder.pixels(&format!("{render} --backend reference"));
         assert!(reference.iter().any(|pixel| pixel[0] > 0.0), "{render} is black");
-        for (gpu, reference) in gpu.iter().flatten().zip(reference.iter().flatten()) {
-            assert!((gpu - reference).abs() <= 2e-3, "{render}: {gpu}, not {reference}");
+        for rasterizer in RASTERIZERS {
+            let (found_width, found_height, gpu) = folder.pixels(&format!("{render} {UNCULLED} {rasterizer}"));
+            assert_eq!((found_width, found_height), (width, height));
+            for (gpu, reference) in gpu.iter().flatten().zip(reference.iter().flatten()) {
+                assert!((gpu - reference).abs() <= 2e-3, "{render} {rasterizer}: {gpu}, not {reference}");
+            }
         }
     }
     // Nothing but background.
     for sets in ["camera.center=[1e300,1e300,1e300]", "transfer.iso_ranges=[[1e30,2e30]]", "transfer.opacity=[[0,0]]"] {
-        let (.., pixels) = folder.pixels(&format!("ball.nrrd --set image={{width=9,height=7}} --set {sets}"));
-        assert_eq!(pixels, [BLACK; 63], "{sets}");
+        for rasterizer in RASTERIZERS {
+            let render = format!("ball.nrrd --set image={{width=9,height=7}} --set {sets} {rasterizer}");
+            assert_eq!(folder.pixels(&render).2, [BLACK; 63], "{render}");
+        }
     }
 }

@@ -142,6 +142,11 @@ const BLACK: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
 const SMALL: &str = "builtin:marschner-lobb:12 --set image.width=27 --set image.height=20 \
                      --set transfer.opacity=[[60,0],[200,0.6]] --set camera.direction=[0.3,0.9,-0.2]";
 
+/// Each of the rasterizers, whatever `auto` would choose.
+const QUADS: &str = "--set splatting.rasterizer=quads";
+const TILES: &str = "--set splatting.rasterizer=tiles";
+const RASTERIZERS: [&str; 2] = [QUADS, TILES];
+
 /// The reference backend culls nothing.
 const UNCULLED: &str = "--set splatting.culling=false";
 

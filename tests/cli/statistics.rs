@@ -3,7 +3,7 @@
 use crate::*;
 
 /// The keys of SPEC §8, and what the program counts besides; no more and no less.
-pub(crate) const STATS_KEYS: [&str; 20] = [
+pub(crate) const STATS_KEYS: [&str; 21] = [
     "adapter",
     "backend",
     "bricks_tested",
@@ -15,6 +15,7 @@ pub(crate) const STATS_KEYS: [&str; 20] = [
     "load_ms",
     "prepare_ms",
     "quads",
+    "rasterizer",
     "sections_rasterized",
     "sections_total",
     "sheets",
@@ -45,9 +46,16 @@ fn assert_counts(what: &str, stats: &Value, expected: &[(&str, u64)]) {
 
 #[test]
 fn stats_of_a_single_voxel() {
-    let folder = Folder::new();
+    // At the least the compositing buffer and the target, 16 bytes a pixel each; and quads' sheets.
+    for (rasterizer, name, least_bytes) in [(QUADS, "quads", 8 + 16 + 16), (TILES, "tiles", 16 + 16)] {
+        let folder = Folder::new();
+        assert_stats_of_a_single_voxel(&folder, rasterizer, name, least_bytes);
+    }
+}
+
+fn assert_stats_of_a_single_voxel(folder: &Folder, rasterizer: &str, name: &str, least_bytes: u64) {
     folder.write_nrrd("one.nrrd", [1, 1, 1], [1.0, 1.0, 1.0], &[1.0]);
-    let haze = "--set transfer.opacity=[[0,0.5]] --set image.width=40 --set image.height=70";
+    let haze = format!("--set transfer.opacity=[[0,0.5]] --set image.width=40 --set image.height=70 {rasterizer}");
     // In the middle of plane 0: two slabs before it, two behind.
     let stats = folder.stats(&format!("one.nrrd {haze}"));
     assert_eq!(keys(&stats), STATS_KEYS);
@@ -69,8 +77,8 @@ fn stats_of_a_single_voxel() {
         let milliseconds = stats[key].as_f64().unwrap();
         assert!((0.0..600_000.0).contains(&milliseconds), "{key}: {milliseconds}");
     }
-    // At the least the sheet, the compositing buffer and the target, 16 bytes a pixel in the last two.
-    assert!(count(&stats, "gpu_bytes") > 40 * 70 * (8 + 16 + 16), "{stats:#}");
+    assert!(count(&stats, "gpu_bytes") > 40 * 70 * least_bytes, "{stats:#}");
+    assert_eq!(stats["rasterizer"], name);
     for key in ["adapter", "driver", "backend"] {
         assert!(!stats[key].as_str().unwrap().is_empty(), "{key}");
     }
@@ -82,7 +90,7 @@ fn stats_of_a_single_voxel() {
     assert_counts("half a spacing", &stats, &expected);
 
     // None takes part.
-    let stats = folder.stats("one.nrrd --set transfer.opacity=[[0,0]]");
+    let stats = folder.stats(&format!("one.nrrd --set transfer.opacity=[[0,0]] {rasterizer}"));
     let none = ["voxels_in_range", "voxels_shaded", "sections_total", "sections_rasterized", "sheets", "tiles_total"];
     assert_counts("none takes part", &stats, &none.map(|key| (key, 0)));
 
@@ -139,19 +147,24 @@ fn stats_count_the_sections_of_the_specification() {
         ([1.0, 1.0, 1.0], [1.0, 1.0, 2.0], 4.0, 8.0),
         ([1.0, 2.0, 2.0], [1.0, 1.0, 1.0], 1.0, 0.05),
     ] {
-        let stats = folder.stats(&format!(
-            "small.nrrd --set image.width=8 --set image.height=8 --set transfer.opacity=[[0,0.5]] \
-             --set camera.direction={} --set volume.spacing={} --set splatting.radius={radius} \
-             --set splatting.slab_width={slab_width} --set camera.up=[0.1,0.2,1] {UNCULLED}",
-            format!("{direction:?}").replace(' ', ""),
-            format!("{spacing:?}").replace(' ', ""),
-        ));
-        let counted =
-            ["sections_total", "sections_rasterized", "sheets", "voxels_shaded"].map(|key| count(&stats, key));
         let (sections, sheets) = count_sections(dims, DVec3::from(spacing), DVec3::from(direction), radius, slab_width);
         let expected = [sections, sections, sheets, 60];
-        if counted != expected {
-            failures.push(format!("{direction:?} {spacing:?} {radius} {slab_width}: {counted:?}, not {expected:?}"));
+        for rasterizer in RASTERIZERS {
+            let sets = format!(
+                "--set camera.direction={} --set volume.spacing={} --set splatting.radius={radius} \
+                 --set splatting.slab_width={slab_width} {rasterizer}",
+                format!("{direction:?}").replace(' ', ""),
+                format!("{spacing:?}").replace(' ', ""),
+            );
+            let stats = folder.stats(&format!(
+                "small.nrrd --set image.width=8 --set image.height=8 --set transfer.opacity=[[0,0.5]] \
+                 --set camera.up=[0.1,0.2,1] {sets} {UNCULLED}"
+            ));
+            let counted =
+                ["sections_total", "sections_rasterized", "sheets", "voxels_shaded"].map(|key| count(&stats, key));
+            if counted != expected {
+                failures.push(format!("{sets}: {counted:?}, not {expected:?}"));
+            }
         }
     }
     assert!(failures.is_empty(), "sections, on screen, sheets, shaded:\n{}", failures.join("\n"));

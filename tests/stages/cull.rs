@@ -35,7 +35,7 @@ pub(crate) struct Culling<'a> {
     pub(crate) bricks: Vec<Brick>,
     pub(crate) list: CullList,
     targets: Targets,
-    tally: wgpu::Buffer,
+    culled: wgpu::Buffer,
     stride: u32,
 }
 
@@ -70,7 +70,7 @@ impl<'a> Culling<'a> {
             .collect();
         let (groups, stride) = at_offsets(device, &groups);
         let bytes = vec![0_u8; size_of::<Tally>() + targets.opaque_tiles.size() as usize];
-        let tally = init(device, &bytes, BufferUsages::STORAGE);
+        let culled = init(device, &bytes, BufferUsages::STORAGE);
         let labels = labels.map(|labels| VolumeTexture::upload_labels(device, gpu.queue(), labels).unwrap());
         let shared = CullBuffers {
             frame: &init(device, &[frame], BufferUsages::UNIFORM),
@@ -79,7 +79,7 @@ impl<'a> Culling<'a> {
             labels: labels.as_ref().map(|labels| &labels.view),
             control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
             occluded: &targets.occluded,
-            tally: &tally,
+            culled: &culled,
         };
         let order = init(device, &plan.orders[0], BufferUsages::STORAGE);
         let counts = |group: &sheetsplat::plan::GroupPlan| {
@@ -101,7 +101,7 @@ impl<'a> Culling<'a> {
             plan,
             bricks,
             targets,
-            tally,
+            culled,
             stride,
         }
     }
@@ -445,7 +445,7 @@ impl Case {
     }
 
     fn compare(&self, culling: &Culling<'_>, masks: &[Occluded]) -> Seen {
-        let Culling { gpu, list, tally, targets, .. } = culling;
+        let Culling { gpu, list, culled, targets, .. } = culling;
         let (steps, _) = self.expected(culling, masks);
         let mut seen = Seen::default();
         let mut visited_before = 0;
@@ -464,8 +464,8 @@ impl Case {
             );
             let states = culling.states();
             assert!(states[..expected.states.len()] == expected.states, "{name}: what is known of the bricks");
-            let tally: Vec<u32> = contents(gpu, tally);
-            let (counts, tiles) = tally.split_at(size_of::<Tally>() / 4);
+            let culled: Vec<u32> = contents(gpu, culled);
+            let (counts, tiles) = culled.split_at(size_of::<Tally>() / 4);
             assert_eq!(counts[..5], expected.counts, "{name}: shaded, sections, quads, tested, visited");
             assert_eq!(counts[5..], [0; 3], "{name}: padding");
             let flags: Vec<u32> = (0..tiles.len() as u32).map(|tile| expected.tiles.contains(&tile).into()).collect();

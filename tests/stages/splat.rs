@@ -45,7 +45,7 @@ impl<'a> Stages<'a> {
             labels: None,
             control_points: &storage,
             occluded: &storage,
-            tally: &storage,
+            culled: &storage,
         };
         let grid = Grid { dims: UVec3::ONE, spacing: DVec3::ONE };
         let lists = BrickLists::upload(device, &grid, &[0]);

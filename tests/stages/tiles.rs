@@ -79,8 +79,8 @@ impl Case {
         gpu.queue().write_buffer(&targets.opaque_tiles, 0, bytemuck::cast_slice(&opaque));
         let counts: [u32; 8] = [3, 1, 4, 1, 5, 9, 2, 6];
         assert_eq!(size_of_val(&counts), size_of::<Tally>());
-        let tally: Vec<u32> = counts.into_iter().chain(self.touched.iter().map(|&touched| touched.into())).collect();
-        let tally = init(device, &tally, BufferUsages::STORAGE);
+        let culled: Vec<u32> = counts.into_iter().chain(self.touched.iter().map(|&touched| touched.into())).collect();
+        let culled = init(device, &culled, BufferUsages::STORAGE);
         let frame = Frame {
             reach: self.reach,
             culling: self.culling.into(),
@@ -91,7 +91,7 @@ impl Case {
         let uniforms: Vec<Group> =
             (0..GROUPS).map(|index| Group { near: 0.0, first_brick: 0, brick_count: 0, index }).collect();
         let (groups, stride) = at_offsets(device, &uniforms);
-        let lists = stage.prepare(device, [&frame, &groups, &tally], &targets, GROUPS as usize, None);
+        let lists = stage.prepare(device, [&frame, &groups, &culled], &targets, GROUPS as usize, None);
         compute(gpu, |pass| stage.record(pass, &lists, group * stride));
 
         for (name, buffer, expected) in
@@ -106,9 +106,9 @@ impl Case {
             tiles.sort_unstable();
             assert_eq!(tiles, expected, "{name}: {self:?}");
         }
-        let tally: Vec<u32> = contents(gpu, &tally);
-        assert_eq!(tally[..8], counts, "the tally's counts are other stages'");
-        assert!(tally[8..].iter().all(|&flag| flag == 0), "the flags are ready for the next group: {self:?}");
+        let culled: Vec<u32> = contents(gpu, &culled);
+        assert_eq!(culled[..8], counts, "the tally's counts are other stages'");
+        assert!(culled[8..].iter().all(|&flag| flag == 0), "the flags are ready for the next group: {self:?}");
         let mut of_groups = [0; GROUPS as usize];
         of_groups[group as usize] = self.composited().len() as u32;
         assert_eq!(contents::<u32>(gpu, &lists.counts), of_groups);

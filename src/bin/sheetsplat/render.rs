@@ -117,6 +117,7 @@ fn render_reference(scene: &Scene) -> Result<Rendering, Error> {
         adapter: "CPU".to_owned(),
         driver: "f64".to_owned(),
         backend: "reference".to_owned(),
+        rasterizer: "reference".to_owned(),
         width: image.width,
         height: image.height,
         load_ms,

@@ -1,0 +1,139 @@
+// Kernel footprints from their stored forms (§§3.2, 3.3.1), and the quads that they are drawn with: what `splat` and
+// `splat_perspective` share.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<uniform> group: Group;
+@group(0) @binding(2) var<storage, read> splats: array<Splat>;
+@group(0) @binding(3) var<storage, read> instances: array<u32>;
+@group(0) @binding(4) var<storage, read> args: Indirect;
+@group(0) @binding(5) var footprints: texture_2d_array<f32>;
+
+// True for the 128 pre-integrated sections (§3.2), false for the summed-area form (§3.3.1, eq. 3).
+override SECTIONS: bool = false;
+// Sheets of a group: 1, 2 or 4.
+override SHEETS: u32 = 4u;
+
+// Beyond this many pixels from the image's corner a footprint's own corners are not drawn at.
+const FAR_PX = 65536.0;
+
+// What a quad reaches beyond its sections, grid units. A grid unit is at least a pixel, and the rasteriser snaps corners to
+// 1/256 of one: without a margin it would lose pixels just inside the rim, where a wide kernel is not yet 0.
+const MARGIN = 1.0 / 64.0;
+
+// The summed-area table: texels along a side of its quadrant, and layers, from the centre to the support.
+override PLANE_TEXELS: f32 = 32.0;
+override LAYERS: f32 = 64.0;
+
+// Distance between the middles of neighbouring stored sections.
+fn section_spacing() -> f32 {
+    return (frame.radius + 0.5 * frame.section_width) / f32(textureNumLayers(footprints));
+}
+
+// Where the section between t0 and t1 ends, seen from the ray through the kernel's centre.
+fn section_extent(t0: f32, t1: f32) -> f32 {
+    let nearest = select(min(abs(t0), abs(t1)), 0.0, t0 * t1 <= 0.0);
+    return sqrt(max(frame.support * frame.support - nearest * nearest, 0.0));
+}
+
+// What of eq. 3's H(0, 0, z) is left beyond a depth z ≥ 0 counted in layers: from the nearest layer, along which the derivative
+// h falls off with exp(-falloff·z²). The series of its integral makes a coarse table accurate.
+fn beyond(z: f32, falloff: f32) -> f32 {
+    let layer = round(z);
+    let entry = textureLoad(footprints, vec2u(0u), u32(layer), 0).xy;
+    let d = z - layer;
+    let a = falloff * layer;
+    let h = 1.0 - d * (a - d * ((2.0 * a * a - falloff) / 3.0 + d * a * (0.5 * falloff - a * a / 3.0)));
+    return entry.x - entry.y * d * h;
+}
+
+// The same beyond a plane on either side of the centre, with the plane's sign; never 0, which has none.
+fn beyond_plane(t: f32, falloff: f32) -> f32 {
+    let left = beyond(min(abs(t) / frame.support, 1.0) * (LAYERS - 1.0), falloff);
+    return select(max(left, 1e-30), -max(left, 1e-30), t < 0.0);
+}
+
+// The extent of a quad's sections, between t0 and t1.
+fn quad_extent(t0: f32, t1: f32) -> f32 {
+    // A stored section may be half a spacing nearer than the one asked for.
+    let slack = select(0.0, 0.5 * section_spacing(), SECTIONS);
+    return section_extent(t0 - slack, t1 + slack);
+}
+
+// Which of a quad's corners a vertex is.
+fn side_of(vertex: u32) -> vec2f {
+    return vec2f(select(-1.0, 1.0, (vertex & 1u) != 0u), select(-1.0, 1.0, (vertex & 2u) != 0u));
+}
+
+// Where a quad's corner is drawn, in clip coordinates: so far from its centre, of a footprint whose box has this half.
+fn clip_corner(center_px: vec2f, offset: vec2f, side: vec2f, half_box: vec2f) -> vec4f {
+    let size = vec2f(frame.size);
+    var corner_px = center_px + offset;
+    // Corners far off the screen cost the rasteriser its precision: such a footprint's box is cut off near the screen.
+    let farthest = abs(center_px) + half_box;
+    if max(farthest.x, farthest.y) > FAR_PX {
+        corner_px = clamp(center_px + side * half_box, vec2f(-1.0), size + 1.0);
+    }
+    let p = corner_px / size;
+    return vec4f(2.0 * p.x - 1.0, 1.0 - 2.0 * p.y, 0.0, 1.0);
+}
+
+// Without area, off the screen.
+const NOWHERE = vec4f(2.0, 2.0, 0.0, 1.0);
+
+// The nearest of the stored sections, given its slab's middle seen from the kernel's centre; bilinear between the four nearest texels
+// of its quadrant.
+fn section_pre_integrated(footprint: vec2f, slab_middle: f32) -> f32 {
+    let layer = round(abs(slab_middle) / section_spacing());
+    let middle = layer * section_spacing();
+    let extent = section_extent(middle - 0.5 * frame.section_width, middle + 0.5 * frame.section_width);
+    if layer >= f32(textureNumLayers(footprints)) || dot(footprint, footprint) >= extent * extent {
+        return 0.0;
+    }
+    let last = vec2f(textureDimensions(footprints) - 1u);
+    let at = min(abs(footprint) / extent, vec2f(1.0)) * last;
+    let low = min(floor(at), last - 1.0);
+    let t = at - low;
+    let p = vec2u(low);
+    let l = u32(layer);
+    let top = mix(textureLoad(footprints, p, l, 0).x, textureLoad(footprints, p + vec2u(1, 0), l, 0).x, t.x);
+    let bottom = mix(textureLoad(footprints, p + vec2u(0, 1), l, 0).x, textureLoad(footprints, p + vec2u(1, 1), l, 0).x, t.x);
+    return mix(top, bottom, t.y);
+}
+
+// What H(0, 0, z) of eq. 3 is multiplied by at a footprint coordinate counted in texels. In the plane h falls off with
+// exp(-falloff·(a² + b²)): the nearest texel, and the step from there.
+fn in_plane(footprint: vec2f, falloff: f32) -> f32 {
+    let last = PLANE_TEXELS - 1.0;
+    let texel = min(round(abs(footprint)), vec2f(last));
+    let plane = (LAYERS - 1.0) / last;
+    let u = falloff * plane * plane * (dot(texel, texel) - dot(footprint, footprint));
+    return textureLoad(footprints, vec2u(texel), 0, 0).y * (1.0 + u * (1.0 + u * (0.5 + u / 6.0)));
+}
+
+// What of H(0, 0, z) is left beyond the ball, where z ends at the chord.
+fn beyond_chord(footprint: vec2f, falloff: f32) -> f32 {
+    let last = PLANE_TEXELS - 1.0;
+    let chord = sqrt(max(last * last - dot(footprint, footprint), 0.0)) * ((LAYERS - 1.0) / last);
+    return beyond(chord, falloff);
+}
+
+// What is left beyond planes, with their signs, if that is at least `least`: what is left falls with the planes' distance.
+fn cut_by_ball(beyond: vec4f, least: f32) -> vec4f {
+    return select(-max(-beyond, vec4f(least)), max(beyond, vec4f(least)), beyond > vec4f(0.0));
+}
+
+// The falloff for depths counted in layers.
+fn layer_falloff() -> f32 {
+    let layer = frame.support / (LAYERS - 1.0);
+    return frame.falloff * layer * layer;
+}
+
+// The same as `beyond_plane` for four planes.
+fn beyond_planes(t: vec4f, falloff: f32) -> vec4f {
+    return vec4f(
+        beyond_plane(t.x, falloff),
+        beyond_plane(t.y, falloff),
+        beyond_plane(t.z, falloff),
+        beyond_plane(t.w, falloff),
+    );
+}
