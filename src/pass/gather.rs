@@ -7,12 +7,12 @@ use wgpu::{BindGroup, Buffer, ComputePass, Device, ShaderStages, TextureView, Te
 use crate::gpu::bindings::{ComputeStage, at_offset, storage, texture, uniform};
 use crate::gpu::layout::{Brick, Frame, Gather as GatherUniform, Gathered, Part};
 use crate::gpu::shaders;
-use crate::splatting::{Compositing, FootprintBox, Order, Splatting};
+use crate::splatting::{Compositing, Economies, FootprintBox, Order, Splatting};
 
 /// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug, Default)]
 pub struct Gather {
-    stages: [[[[OnceLock<ComputeStage>; 2]; 2]; 2]; 3],
+    stages: [[[[[OnceLock<ComputeStage>; 2]; 2]; 2]; 2]; 3],
 }
 
 /// What a pipeline is compiled for.
@@ -22,13 +22,15 @@ pub struct GatherMode {
     order: Order,
     footprint_box: FootprintBox,
     perspective: bool,
+    economies: bool,
 }
 
 impl GatherMode {
     /// The mode that splatting settings ask for, with or without an eye.
     pub fn of(splatting: &Splatting, perspective: bool) -> Self {
-        let Splatting { compositing, order, footprint_box, .. } = *splatting;
-        Self { compositing, order, footprint_box, perspective }
+        let Splatting { compositing, order, footprint_box, economies, .. } = *splatting;
+        let economies = economies != Economies::default();
+        Self { compositing, order, footprint_box, perspective, economies }
     }
 }
 
@@ -59,8 +61,9 @@ pub struct GatherBuffers<'a> {
 
 impl Gather {
     fn stage(&self, mode: GatherMode) -> &OnceLock<ComputeStage> {
-        let GatherMode { compositing, order, footprint_box, perspective } = mode;
-        &self.stages[compositing as usize][order as usize][footprint_box as usize][usize::from(perspective)]
+        let GatherMode { compositing, order, footprint_box, perspective, economies } = mode;
+        let of_splatting = &self.stages[compositing as usize][order as usize][footprint_box as usize];
+        &of_splatting[usize::from(perspective)][usize::from(economies)]
     }
 
     fn compiled(&self, device: &Device, mode: GatherMode) -> &ComputeStage {
@@ -83,6 +86,7 @@ impl Gather {
                 ("COMPOSITING", f64::from(mode.compositing as u32)),
                 ("ORDER", f64::from(mode.order as u32)),
                 ("PERSPECTIVE", f64::from(u8::from(mode.perspective))),
+                ("ECONOMIES", f64::from(u8::from(mode.economies))),
                 ("PARALLELOGRAM", f64::from(mode.footprint_box as u32)),
             ];
             ComputeStage::new(device, shaders::GATHER, "main", &slots, &constants)
