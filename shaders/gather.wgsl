@@ -14,13 +14,14 @@
 @group(0) @binding(4) var<storage, read> starts: array<u32>;
 // A brick's number and, in the last byte, the units of the tile that it may touch.
 @group(0) @binding(5) var<storage, read> entries: array<u32>;
-// The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0).
+// The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0); then the table of labels.
 @group(0) @binding(6) var<storage, read> control_points: array<vec4f>;
 @group(0) @binding(7) var values: texture_2d_array<f32>;
 @group(0) @binding(8) var<storage, read_write> acc: array<vec4f>;
 @group(0) @binding(9) var<storage, read_write> gathered: Gathered;
 // Of every group, nearest first, half the screen box around its footprints, pixels.
 @group(0) @binding(10) var<storage, read> half_boxes: array<vec2f>;
+@group(0) @binding(11) var labels: texture_2d_array<u32>;
 
 // `frame.compositing` and `frame.order`.
 override COMPOSITING: u32 = 0u;
@@ -107,37 +108,29 @@ fn half(found: vec3u, width: u32) -> vec3u {
 }
 
 // Piecewise linear between the control points, clamped outside.
-fn ramp_at(ramp: Ramp, value: f32) -> vec3f {
-    let count = ramp.end - ramp.first;
+fn ramp_at(held: Ramp, value: f32) -> vec3f {
+    let count = held.end - held.first;
     // How many points are at or below the value; every lane holds one of the first of them.
     var below = 0u;
-    below += select(0u, 16u, lanes >= 32u && is_below(ramp, below + 15u, value));
-    below += select(0u, 8u, lanes >= 16u && is_below(ramp, below + 7u, value));
-    below += select(0u, 4u, is_below(ramp, below + 3u, value));
-    below += select(0u, 2u, is_below(ramp, below + 1u, value));
-    below += select(0u, 1u, is_below(ramp, below, value));
-    below += select(0u, 1u, is_below(ramp, below, value));
-    var a = subgroupShuffle(ramp.own, max(below, 1u) - 1u);
-    var b = subgroupShuffle(ramp.own, min(below, min(count, lanes) - 1u));
+    below += select(0u, 16u, lanes >= 32u && is_below(held, below + 15u, value));
+    below += select(0u, 8u, lanes >= 16u && is_below(held, below + 7u, value));
+    below += select(0u, 4u, is_below(held, below + 3u, value));
+    below += select(0u, 2u, is_below(held, below + 1u, value));
+    below += select(0u, 1u, is_below(held, below, value));
+    below += select(0u, 1u, is_below(held, below, value));
+    let a = subgroupShuffle(held.own, max(below, 1u) - 1u);
+    let b = subgroupShuffle(held.own, min(below, min(count, lanes) - 1u));
+    var result = between(a, b, value);
     // More points than lanes are searched in memory.
     for (var once = count > lanes; once; once = false) {
-        below = 0u;
-        var above = count;
-        while below < above {
-            let middle = (below + above) / 2u;
-            let is_at_or_below = control_points[ramp.first + middle].x <= value;
-            below = select(below, middle + 1u, is_at_or_below);
-            above = select(middle, above, is_at_or_below);
-        }
-        a = control_points[ramp.first + max(below, 1u) - 1u];
-        b = control_points[ramp.first + min(below, count - 1u)];
+        result = ramp(held.first, held.end, value);
     }
-    return between(a, b, value);
+    return result;
 }
 
 // Whether one of the first control points is at or below a value.
-fn is_below(ramp: Ramp, at: u32, value: f32) -> bool {
-    return at < min(ramp.end - ramp.first, lanes) && subgroupShuffle(ramp.own.x, at % lanes) <= value;
+fn is_below(held: Ramp, at: u32, value: f32) -> bool {
+    return at < min(held.end - held.first, lanes) && subgroupShuffle(held.own.x, at % lanes) <= value;
 }
 
 fn ramp_of(first: u32, end: u32) -> Ramp {
@@ -494,11 +487,21 @@ fn draw(tile: u32, thread: u32) {
             let sheets_overlapped = overlapped_sheets(p);
             let here = clamp(sheets_overlapped, vec2f(first_sheet), vec2f(first_sheet + f32(SHEETS)));
             var is_drawn = lane < count && here.x < here.y && is_visible(p.xy, margin, region, region.open);
-            let value = value_at(index_of(queued));
+            let index = index_of(queued);
+            let value = value_at(index);
             let gradient = gradient_at(queued);
-            let alpha = ramp_at(opacity_ramp, value).x * ramp_at(gradient_opacity_ramp, gradient.magnitude).x;
+            var color: vec3f;
+            var alpha: f32;
+            if LABELS {
+                let ramps = ramps_of(index);
+                color = ramp(ramps.x, ramps.y, value);
+                alpha = ramp(ramps.y, ramps.z, value).x * ramp(ramps.z, ramps.w, gradient.magnitude).x;
+            } else {
+                color = ramp_at(color_ramp, value);
+                alpha = ramp_at(opacity_ramp, value).x * ramp_at(gradient_opacity_ramp, gradient.magnitude).x;
+            }
             let m = amount(alpha);
-            let color = shade(ramp_at(color_ramp, value), gradient, lighting(p.xy, PERSPECTIVE));
+            color = shade(color, gradient, lighting(p.xy, PERSPECTIVE));
             // The sheet of the group that takes the kernel as a whole; before the first if none does.
             var whole = -1.0;
             if ECONOMIES {

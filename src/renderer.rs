@@ -92,7 +92,7 @@ impl Renderer {
             _ => Some(CompositingBuffer::new(device, size)?),
         };
         let by_tiles = by_tiles(device, splatting)?;
-        volume.lists.flush(device, queue);
+        volume.flush(device, queue)?;
         let old = frame.take();
         let (old_compositing, uniform, control_points, drawing, totals) = old.map_or_else(Default::default, |old| {
             let PreparedFrame { compositing, uniform, control_points, drawing, totals, .. } = old;

@@ -53,7 +53,7 @@ pub struct Frame {
     pub gradient: [f32; 4],
     /// Volume dimensions; w unused.
     pub dims: [u32; 4],
-    /// Ends of the colour, opacity and gradient opacity ramps in the control points; w unused.
+    /// Ends of the colour, opacity and gradient opacity ramps in the control points, and where there the table of labels starts.
     pub ramps: [u32; 4],
     /// Image width and height, pixels.
     pub size: [u32; 2],
@@ -92,8 +92,8 @@ pub struct Frame {
     pub per_unit: f32,
     /// 1 if the light is at the eye, 0 if it is elsewhere.
     pub headlight: u32,
-    /// Unused.
-    pub padding: u32,
+    /// Last entry of the table of labels, which is that of all greater labels, too.
+    pub last_label: u32,
 }
 
 /// One sheet group and one list's bricks that may reach into it.

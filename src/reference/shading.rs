@@ -56,7 +56,7 @@ pub fn splats(
 /// `(C·m, m)` of a voxel.
 pub fn emission(volume: &Volume, transfer: &TransferFunction, scene: &Scene, geometry: &Geometry, index: u32) -> DVec4 {
     let voxel = volume.grid().voxel_at(index);
-    let base = transfer.color.at(f64::from(volume.values()[index as usize]));
+    let base = transfer.tables(volume.label(index)).color.at(f64::from(volume.values()[index as usize]));
     let color = color(&scene.shading, base, volume.gradient(voxel), -geometry.ray(voxel));
     color.extend(1.0) * amount(scene.splatting.compositing, alpha(volume, transfer, index))
 }
@@ -64,11 +64,12 @@ pub fn emission(volume: &Volume, transfer: &TransferFunction, scene: &Scene, geo
 /// α of a voxel.
 fn alpha(volume: &Volume, transfer: &TransferFunction, index: u32) -> f64 {
     let value = f64::from(volume.values()[index as usize]);
+    let tables = transfer.tables(volume.label(index));
     // Most voxels are ruled out by their value: spare them the gradient.
-    if transfer.opacity.at(value) <= 0.0 {
+    if tables.opacity.at(value) <= 0.0 {
         return 0.0;
     }
-    transfer.alpha(value, volume.gradient(volume.grid().voxel_at(index)).length())
+    tables.alpha(value, volume.gradient(volume.grid().voxel_at(index)).length())
 }
 
 /// `m`: the amount per unit length (SPEC §5).

@@ -42,6 +42,7 @@ impl<'a> Stages<'a> {
             frame: &uniform,
             groups: &uniform,
             values: &VolumeTexture::upload(device, gpu.queue(), &[0.0]).unwrap().view,
+            labels: None,
             control_points: &storage,
             occluded: &storage,
             culled: &storage,
