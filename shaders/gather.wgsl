@@ -30,6 +30,8 @@ override ORDER: u32 = 0u;
 override PERSPECTIVE: bool = false;
 // Whether a footprint's box is the parallelogram of Fig. 13, else its bounding rectangle.
 override PARALLELOGRAM: bool = false;
+// Whether any of §8's economies is asked for.
+override ECONOMIES: bool = false;
 
 // Read once: a uniform read in a loop costs a software driver a gather.
 var<private> frame: Frame;
@@ -63,6 +65,8 @@ struct Region {
     open_high: vec2f,
     // For each of the units' rows the lanes whose pixel there is not opaque.
     open: vec4u,
+    // The same for pixels that have not reached β.
+    shallow: vec4u,
 }
 
 // A voxel's kernel as the pixels see it.
@@ -76,6 +80,8 @@ struct Footprint {
     // In perspective, how its sections' footprints lie on the screen.
     axis: vec2f,
     maps: SectionMaps,
+    // Among the economies: ρ² from which a footprint adds too little, by sheet.
+    rim: vec4f,
 }
 
 // One of the ramps: where its control points are, and the one of the first of them that this lane holds.
@@ -155,16 +161,17 @@ fn sections(footprint: Footprint, column: f32, rows: vec4f) -> mat4x4f {
         let a = along * along;
         let b = across * across;
         let maps = footprint.maps;
+        let planes = footprint.planes;
         return mat4x4f(
-            section(a * maps.along.x + b * maps.across.x, footprint.first_plane, footprint.planes.x) * maps.amplitude.x,
-            section(a * maps.along.y + b * maps.across.y, footprint.planes.x, footprint.planes.y) * maps.amplitude.y,
-            section(a * maps.along.z + b * maps.across.z, footprint.planes.y, footprint.planes.z) * maps.amplitude.z,
-            section(a * maps.along.w + b * maps.across.w, footprint.planes.z, footprint.planes.w) * maps.amplitude.w,
+            section(a * maps.along.x + b * maps.across.x, footprint.first_plane, planes.x, footprint.rim.x) * maps.amplitude.x,
+            section(a * maps.along.y + b * maps.across.y, planes.x, planes.y, footprint.rim.y) * maps.amplitude.y,
+            section(a * maps.along.z + b * maps.across.z, planes.y, planes.z, footprint.rim.z) * maps.amplitude.z,
+            section(a * maps.along.w + b * maps.across.w, planes.z, planes.w, footprint.rim.w) * maps.amplitude.w,
         );
     }
     let rho_squared = dy * (gather.metric.z * dy + gather.metric.y * dx) + gather.metric.x * dx * dx;
     let rim = rim_at(rho_squared);
-    let in_plane = exp2(rho_squared * gather.metric.w);
+    let in_plane = in_plane_at(rho_squared, footprint.rim.x);
     let plane_0 = clamp(vec4f(footprint.first_plane), -rim, rim);
     let plane_1 = clamp(vec4f(footprint.planes.x), -rim, rim);
     let plane_2 = clamp(vec4f(footprint.planes.y), -rim, rim);
@@ -179,10 +186,19 @@ fn sections(footprint: Footprint, column: f32, rows: vec4f) -> mat4x4f {
 }
 
 // One section, between two planes.
-fn section(rho_squared: vec4f, near: f32, far: f32) -> vec4f {
+fn section(rho_squared: vec4f, near: f32, far: f32, footprint_rim: f32) -> vec4f {
     let rim = rim_at(rho_squared);
     let thickness = clamp(vec4f(far), -rim, rim) - clamp(vec4f(near), -rim, rim);
-    return thickness * exp2(rho_squared * gather.metric.w);
+    return thickness * in_plane_at(rho_squared, footprint_rim);
+}
+
+// The Gaussian of ρ², up to the footprint's rim.
+fn in_plane_at(rho_squared: vec4f, footprint_rim: f32) -> vec4f {
+    let in_plane = exp2(rho_squared * gather.metric.w);
+    if ECONOMIES {
+        return select(vec4f(0.0), in_plane, rho_squared < vec4f(footprint_rim));
+    }
+    return in_plane;
 }
 
 // H(0, 0, t) where the chord of the kernel's ball ends.
@@ -214,6 +230,9 @@ fn footprint_of(own: Footprint, other: u32) -> Footprint {
         footprint.maps.across = subgroupShuffle(own.maps.across, other);
         footprint.maps.amplitude = subgroupShuffle(own.maps.amplitude, other);
     }
+    if ECONOMIES {
+        footprint.rim = subgroupShuffle(own.rim, other);
+    }
     return footprint;
 }
 
@@ -234,16 +253,22 @@ fn overlapped_sheets(p: vec4f) -> vec2f {
     return vec2f(floor(sheets.x), ceil(sheets.y));
 }
 
-// What a voxel at p adds to the group whose first sheet starts at `near`.
-fn footprint_at(p: vec4f, near: f32, amount: vec4f) -> Footprint {
+// What a voxel at p adds to the group whose first sheet starts at `near`, in sections or, into the sheet `whole` of them, as a whole.
+fn footprint_at(p: vec4f, near: f32, whole: f32, amount: vec4f) -> Footprint {
     var footprint: Footprint;
     footprint.center_px = p.xy;
-    let steps = near - p.z + vec4f(1.0, 2.0, 3.0, 4.0) * frame.slab_width;
+    var first_step = near - p.z;
+    var steps = near - p.z + vec4f(1.0, 2.0, 3.0, 4.0) * frame.slab_width;
+    if ECONOMIES && whole >= 0.0 {
+        // As far as a kernel reaches, on either side of the sheet.
+        first_step = -WHOLE;
+        steps = select(vec4f(-WHOLE), vec4f(WHOLE), vec4f(1.0, 2.0, 3.0, 4.0) > vec4f(whole));
+    }
     if PERSPECTIVE {
         let ray = local_ray(p.xy);
         let per_depth = select(frame.kernel_per_depth, ray.kernel_per_depth, frame.kernel_per_depth == 0.0);
         let cut = near_cut(ray, p.w);
-        let first = max((near - p.z) * per_depth, cut);
+        let first = max(first_step * per_depth, cut);
         let planes = max(steps * per_depth, vec4f(cut));
         footprint.amount = amount * ray.per_lambda;
         footprint.first_plane = along(first);
@@ -253,15 +278,33 @@ fn footprint_at(p: vec4f, near: f32, amount: vec4f) -> Footprint {
     } else {
         let planes = steps * frame.kernel_per_depth;
         footprint.amount = amount * frame.amplitude;
-        footprint.first_plane = along((near - p.z) * frame.kernel_per_depth);
+        footprint.first_plane = along(first_step * frame.kernel_per_depth);
         footprint.planes = vec4f(along(planes.x), along(planes.y), along(planes.z), along(planes.w));
+    }
+    if ECONOMIES {
+        let amplitude = select(vec4f(1.0), footprint.maps.amplitude, PERSPECTIVE);
+        footprint.rim = log(footprint.amount.a * amplitude * gather.peak) / frame.falloff;
     }
     return footprint;
 }
 
-// Bounds of what is not opaque.
-fn opened(region: Region, is_open: vec4<bool>, column: f32, rows: vec4f) -> Region {
+// Sheet depths beyond every kernel's reach.
+const WHOLE = 1e6;
+
+// Which pixels are not opaque, and their bounds.
+fn opened(region: Region, is_inside: vec4<bool>, opacity: vec4f, column: f32, rows: vec4f) -> Region {
+    // Pixels off the image count as opaque.
+    let is_open = is_inside & (opacity < vec4f(select(3e38, frame.opacity_threshold, frame.culling != 0u)));
     var result = region;
+    if ECONOMIES {
+        let is_shallow = is_inside & (opacity < vec4f(gather.beta));
+        result.shallow = vec4u(
+            subgroupBallot(is_shallow.x).x,
+            subgroupBallot(is_shallow.y).x,
+            subgroupBallot(is_shallow.z).x,
+            subgroupBallot(is_shallow.w).x,
+        );
+    }
     result.open = vec4u(
         subgroupBallot(is_open.x).x,
         subgroupBallot(is_open.y).x,
@@ -277,9 +320,9 @@ fn opened(region: Region, is_open: vec4<bool>, column: f32, rows: vec4f) -> Regi
     return result;
 }
 
-// Whether the box around a voxel's footprint holds a pixel that is not opaque. Lanes 0 to 15 hold the pixels across the upper
+// Whether the box around a voxel's footprint holds a pixel of those in `open`. Lanes 0 to 15 hold the pixels across the upper
 // units of a region, 16 to 31 those across the lower.
-fn is_visible(center_px: vec2f, margin: vec2f, region: Region) -> bool {
+fn is_visible(center_px: vec2f, margin: vec2f, region: Region, open: vec4u) -> bool {
     let center = center_px - region.low;
     let size = region.high - region.low;
     let first_row = i32(clamp(ceil(center.y - margin.y), 0.0, 16.0));
@@ -297,7 +340,7 @@ fn is_visible(center_px: vec2f, margin: vec2f, region: Region) -> bool {
         across_lower = across(center.x + gather.shear * (rows + 4.0), half_width, size.x);
     }
     let box = (upper & across_upper) | (lower & (across_lower << vec4u(16u)));
-    return end_row > first_row && any((box & region.open) != vec4u(0u));
+    return end_row > first_row && any((box & open) != vec4u(0u));
 }
 
 // The pixels of a row within a distance of a point, one bit each.
@@ -339,9 +382,7 @@ fn draw(tile: u32, thread: u32) {
     if is_inside.w {
         image[3] = acc[slot + 3u * frame.size.x];
     }
-    // Pixels off the image count as opaque.
-    let opaque_from = select(3e38, frame.opacity_threshold, frame.culling != 0u);
-    region = opened(region, is_inside & (transpose(image)[3] < vec4f(opaque_from)), column, rows);
+    region = opened(region, is_inside, transpose(image)[3], column, rows);
 
     var voxels_shaded = 0u;
     var sections_rasterized = 0u;
@@ -445,7 +486,7 @@ fn draw(tile: u32, thread: u32) {
             let p = project(queued);
             let sheets_overlapped = overlapped_sheets(p);
             let here = clamp(sheets_overlapped, vec2f(first_sheet), vec2f(first_sheet + f32(SHEETS)));
-            let is_drawn = lane < count && here.x < here.y && is_visible(p.xy, margin, region);
+            var is_drawn = lane < count && here.x < here.y && is_visible(p.xy, margin, region, region.open);
             let index = index_of(queued);
             let value = value_at(index);
             let gradient = gradient_at(queued);
@@ -461,16 +502,42 @@ fn draw(tile: u32, thread: u32) {
             }
             let m = amount(alpha);
             color = shade(color, gradient, lighting(p.xy, PERSPECTIVE));
-            let own = footprint_at(p, near, select(vec4f(0.0), vec4f(color * m, m), is_drawn));
+            // The sheet of the group that takes the kernel as a whole; before the first if none does.
+            var whole = -1.0;
+            if ECONOMIES {
+                let center_sheet = floor((p.z - gather.near) / frame.slab_width);
+                let is_deep = !is_visible(p.xy, margin, region, region.shallow);
+                let last_of_first = floor(max(sheets_overlapped.x, 0.0) / f32(SHEETS)) * f32(SHEETS) + f32(SHEETS - 1u);
+                if is_deep || alpha < gather.whole_below {
+                    let sheet = clamp(center_sheet, sheets_overlapped.x, sheets_overlapped.y - 1.0);
+                    whole = select(sheet, min(sheet, last_of_first), is_deep) - first_sheet;
+                    is_drawn = is_drawn && whole >= 0.0 && whole < f32(SHEETS);
+                }
+            }
+            var own = footprint_at(p, near, whole, vec4f(color * m, m));
+            if ECONOMIES {
+                let rim = max(max(own.rim.x, own.rim.y), max(own.rim.z, own.rim.w));
+                let part = sqrt(clamp(rim, 0.0, frame.support * frame.support)) / frame.support;
+                is_drawn = is_drawn && rim > 0.0 && is_visible(p.xy, half_boxes[group] * part + BOX_SLACK, region, region.open);
+            }
+            own.amount = select(vec4f(0.0), own.amount, is_drawn);
             if is_drawn {
-                // Of the groups that the kernel reaches into, counted from the nearest.
-                let nth = group - u32(max(sheets_overlapped.x, 0.0)) / SHEETS;
+                // Of the groups that the kernel reaches into, counted from the nearest; a whole one is drawn once.
+                let nth = select(group - u32(max(sheets_overlapped.x, 0.0)) / SHEETS, 0u, whole >= 0.0);
                 let word = (nth * gather.bricks + queued_place.x) * 2u + queued_place.y / 32u;
                 let bit = 1u << (queued_place.y % 32u);
                 if (atomicOr(&gathered.words[gather.drawn + word], bit) & bit) == 0u {
-                    sections_rasterized += u32(here.y - here.x);
+                    sections_rasterized += select(u32(here.y - here.x), 1u, whole >= 0.0);
                     voxels_shaded += select(0u, 1u, nth == 0u);
                 }
+            }
+
+            if ECONOMIES {
+                // Those that are drawn, one after the other.
+                let drawn = subgroupBallot(is_drawn).x;
+                count = countOneBits(drawn);
+                own = footprint_of(own, min(nth_set_bit(vec2u(drawn, 0u), lane), lanes - 1u));
+                own.amount = select(vec4f(0.0), own.amount, lane < count);
             }
 
             // Every lane adds all voxels' sections at its own pixels, two voxels at a time.
@@ -498,7 +565,7 @@ fn draw(tile: u32, thread: u32) {
                 image = composite_sheet(image, sheets.second);
                 image = composite_sheet(image, sheets.first);
             }
-            region = opened(region, is_inside & (transpose(image)[3] < vec4f(opaque_from)), column, rows);
+            region = opened(region, is_inside, transpose(image)[3], column, rows);
             if lane == 0u {
                 let tiles = tile_grid(frame.size);
                 let number = (at * tiles.y + pixel.y / TILE) * tiles.x + pixel.x / TILE;

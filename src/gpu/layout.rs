@@ -260,8 +260,16 @@ pub struct Gather {
     pub shear: f32,
     /// Half its width, pixels.
     pub half_width: f32,
+    /// Voxels of less opacity are projected whole.
+    pub whole_below: f32,
+    /// From this opacity on kernels are projected whole.
+    pub beta: f32,
+    /// A whole kernel's integral through its centre, over what a footprint must add to a sheet's alpha.
+    pub peak: f32,
     /// Unused.
-    pub padding: u32,
+    pub padding_0: u32,
+    /// Unused.
+    pub padding_1: u32,
 }
 
 /// The tiles and groups that one dispatch draws.

@@ -72,7 +72,9 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
 }
 
 /// What the tile rasterizer's threads share, over a volume of so many `bricks`.
-pub fn gather(view: &View, kernel: &Kernel, bins: &TileBins, bricks: u32) -> Gather {
+pub fn gather(view: &View, kernel: &Kernel, splatting: &Splatting, bins: &TileBins, bricks: u32) -> Gather {
+    let economies = splatting.economies;
+    let whole = kernel.section(0.0, -kernel.radius(), kernel.radius());
     let support_squared = kernel.support().powi(2);
     let in_f32 = |numbers: [f64; 4]| numbers.map(|x| x as f32);
     let FootprintMap { footprint_from_pixels, .. } = view.footprint;
@@ -93,7 +95,15 @@ pub fn gather(view: &View, kernel: &Kernel, bins: &TileBins, bricks: u32) -> Gat
         composited: bins.groups + 2 * bricks * groups_per_kernel(view),
         shear: shear as f32,
         half_width: half_width as f32,
-        padding: 0,
+        whole_below: economies.whole_below as f32,
+        beta: if splatting.order == Order::FrontToBack && economies.beta < 1.0 {
+            economies.beta as f32
+        } else {
+            f32::MAX
+        },
+        peak: (whole / economies.resolution).min(f32::MAX.into()) as f32,
+        padding_0: 0,
+        padding_1: 0,
     }
 }
 

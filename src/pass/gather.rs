@@ -8,13 +8,13 @@ use crate::gpu::bindings::{ComputeStage, at_offset, storage, texture, texture_of
 use crate::gpu::layout::{Brick, Frame, Gather as GatherUniform, Gathered, Part};
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
-use crate::splatting::{Compositing, FootprintBox, Order, Splatting};
+use crate::splatting::{Compositing, Economies, FootprintBox, Order, Splatting};
 
 /// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug, Default)]
 pub struct Gather {
     /// By compositing, and by the other parts of a mode, one bit each.
-    stages: [[OnceLock<ComputeStage>; 16]; 3],
+    stages: [[OnceLock<ComputeStage>; 32]; 3],
     no_labels: OnceLock<VolumeTexture>,
 }
 
@@ -25,14 +25,16 @@ pub struct GatherMode {
     order: Order,
     footprint_box: FootprintBox,
     perspective: bool,
+    economies: bool,
     labels: bool,
 }
 
 impl GatherMode {
     /// The mode that splatting settings ask for, with or without an eye, and with or without `labels` that have ramps of their own.
     pub fn of(splatting: &Splatting, perspective: bool, labels: bool) -> Self {
-        let Splatting { compositing, order, footprint_box, .. } = *splatting;
-        Self { compositing, order, footprint_box, perspective, labels }
+        let Splatting { compositing, order, footprint_box, economies, .. } = *splatting;
+        let economies = economies != Economies::default();
+        Self { compositing, order, footprint_box, perspective, economies, labels }
     }
 }
 
@@ -65,8 +67,8 @@ pub struct GatherBuffers<'a> {
 
 impl Gather {
     fn stage(&self, mode: GatherMode) -> &OnceLock<ComputeStage> {
-        let GatherMode { compositing, order, footprint_box, perspective, labels } = mode;
-        let bits = [order as usize, footprint_box as usize, usize::from(perspective), usize::from(labels)];
+        let GatherMode { compositing, order, footprint_box, perspective, economies, labels } = mode;
+        let bits = [order as usize, footprint_box as usize, perspective.into(), economies.into(), labels.into()];
         &self.stages[compositing as usize][bits.iter().fold(0, |number, bit| 2 * number + bit)]
     }
 
@@ -91,6 +93,7 @@ impl Gather {
                 ("COMPOSITING", f64::from(mode.compositing as u32)),
                 ("ORDER", f64::from(mode.order as u32)),
                 ("PERSPECTIVE", f64::from(u8::from(mode.perspective))),
+                ("ECONOMIES", f64::from(u8::from(mode.economies))),
                 ("PARALLELOGRAM", f64::from(mode.footprint_box as u32)),
                 ("LABELS", f64::from(u8::from(mode.labels))),
             ];

@@ -136,7 +136,7 @@ impl TileRasterizer {
             }
         };
 
-        let uniform = uniforms::gather(view, kernel, bins, bricks.len() as u32);
+        let uniform = uniforms::gather(view, kernel, splatting, bins, bricks.len() as u32);
         let [columns, rows] = tile_grid(view.size);
         let words = uniform.composited + (columns * rows * bins.groups).div_ceil(32);
         let bytes = size_of::<Gathered>() as u64 + u64::from(words) * 4;

@@ -19,6 +19,8 @@ pub struct Splat {
     pub depth: f64,
     /// `(C·m, m)` over λ, times the low-pass amplitude where that is the same for all sections ([`Geometry::scale`]).
     pub amount: DVec4,
+    /// α.
+    pub alpha: f64,
 }
 
 /// The voxels that take part, in memory order: their positions in memory.
@@ -45,7 +47,8 @@ pub fn splats(
     let splat = |&index: &u32| {
         let voxel = volume.grid().voxel_at(index);
         let amount = emission(volume, transfer, scene, geometry, index) * geometry.scale(voxel);
-        Splat { center: geometry.pixel(voxel), depth: geometry.depth(voxel), amount }
+        let alpha = alpha(volume, transfer, index);
+        Splat { center: geometry.pixel(voxel), depth: geometry.depth(voxel), amount, alpha }
     };
     voxels.par_iter().map(splat).collect()
 }

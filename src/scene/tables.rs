@@ -179,6 +179,9 @@ pub(super) fn splatting(mut section: Section) -> Result<Splatting, SceneError> {
     section.read("tiles", &mut splatting.tiles, Entry::boolean)?;
     section.read("rasterizer", &mut splatting.rasterizer, |entry| entry.choice(&rasterizers))?;
     section.read("footprint_box", &mut splatting.footprint_box, |entry| entry.choice(&boxes))?;
+    section.read("whole_below", &mut splatting.economies.whole_below, |entry| entry.number(SHARE))?;
+    section.read("beta", &mut splatting.economies.beta, |entry| entry.number(THRESHOLD))?;
+    section.read("resolution", &mut splatting.economies.resolution, |entry| entry.number(SHARE))?;
     section.finish()?;
     Ok(splatting)
 }
