@@ -43,10 +43,10 @@ const SCENES: [(&str, &str, &[&str]); 10] = [
         "head-labels",
         "head:64",
         &[
-            "image={width=144,height=144,background=[1,1,1,1]}",
+            "image={width=144,height=144,background=[0.1,0.1,0.15,1]}",
             "camera={direction=[0.75,0.6,-0.2],height=170.0}",
             "transfer={opacity=[[0,0]],label=[\
-             {label=1,color=[[0,[0.9,0.7,0.55]]],opacity=[[0,0.04]]},\
+             {label=1,color=[[0,[0.95,0.75,0.6]]],opacity=[[0,0.06]]},\
              {label=4,color=[[0,[0.85,0.45,0.45]]],opacity=[[60,0],[120,0.9]]},\
              {label=5,color=[[0,[0.85,0.45,0.45]]],opacity=[[60,0],[120,0.9]]},\
              {label=7,color=[[240,[0.95,0.95,1]],[255,[0.1,0.3,0.7]]],opacity=[[0,0.9]]},\
