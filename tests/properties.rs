@@ -9,9 +9,9 @@ use std::f64::consts::TAU;
 use glam::{DVec3, UVec3};
 use sheetsplat::headless::Headless;
 use sheetsplat::image::Image;
-use sheetsplat::plan::View;
 use sheetsplat::scene::Scene;
 use sheetsplat::splatting::{Compositing, FootprintForm, Order};
+use sheetsplat::view::View;
 use sheetsplat::volume::{Volume, builtin};
 
 use common::{F16, F32, Random, camera, gpu, scene, transfer};

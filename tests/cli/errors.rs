@@ -108,14 +108,9 @@ fn bad_labels_are_2() {
 
 #[test]
 fn what_is_not_implemented_is_2() {
-    let render = |set: &str, words: &[&str]| {
-        assert_fails(2, &format!("render good.nrrd -o out.png --set {set}"), words);
-    };
-    render("camera.projection=perspective", &["good.nrrd", "camera.projection", "perspective", "orthographic"]);
-    for method in ["axis-aligned", "composite-every-sample"] {
-        let set = format!("splatting.method={method}");
-        render(&set, &["good.nrrd", "splatting.method", method, "image-aligned"]);
-    }
+    let method = "composite-every-sample";
+    let words = ["good.nrrd", "splatting.method", method, "image-aligned", "axis-aligned"];
+    assert_fails(2, &format!("render good.nrrd -o out.png --set splatting.method={method}"), &words);
 }
 
 #[test]
@@ -157,17 +152,13 @@ fn what_no_renderer_can_do_is_2() {
         render("--set camera.height=1e300", &["camera.height", "1e300", "5.1e27"]);
         let deep = "--set volume.spacing=[1,1e4,1] --set splatting.slab_width=0.05";
         render(deep, &["splatting.slab_width", "0.05", "65536 slabs"]);
+        let perspective =
+            |sets: &str, words: &[&str]| render(&format!("--set camera.projection=perspective {sets}"), words);
+        perspective("--set camera.near=1e-300", &["camera.near", "1e-300", "9.6e-23"]);
+        perspective("--set camera.near=1e300", &["camera.near", "1e300", "9.6e27"]);
+        perspective("--set camera.distance=1e300", &["camera.distance", "1e300"]);
+        perspective("--set camera.distance=1e12", &["camera.distance", "1e12", "slabs"]);
+        perspective("--set camera.fov_y=1e-12", &["camera.distance", "slabs"]);
+        perspective(deep, &["splatting.slab_width", "0.05", "65536 slabs"]);
     }
-    let perspective = |sets: &str, words: &[&str]| {
-        let arguments =
-            format!("render good.nrrd -o out.png --backend reference --set camera.projection=perspective {sets}");
-        assert_fails(2, &arguments, &[&["good.nrrd"], words].concat());
-    };
-    perspective("--set camera.near=1e-300", &["camera.near", "1e-300", "9.6e-23"]);
-    perspective("--set camera.near=1e300", &["camera.near", "1e300", "9.6e27"]);
-    perspective("--set camera.distance=1e300", &["camera.distance", "1e300"]);
-    perspective("--set camera.distance=1e12", &["camera.distance", "1e12", "slabs"]);
-    perspective("--set camera.fov_y=1e-12", &["camera.distance", "slabs"]);
-    let deep = "--set volume.spacing=[1,1e4,1] --set splatting.slab_width=0.05";
-    perspective(deep, &["splatting.slab_width", "0.05", "65536 slabs"]);
 }

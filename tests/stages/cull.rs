@@ -14,14 +14,15 @@ use sheetsplat::gpu::volume_texture::VolumeTexture;
 use sheetsplat::headless::Headless;
 use sheetsplat::kernel::Kernel;
 use sheetsplat::pass::cull::{Cull, CullBuffers, CullList};
-use sheetsplat::plan::{FramePlan, TILE, View, tile_grid};
+use sheetsplat::plan::{FramePlan, TILE, tile_grid};
 use sheetsplat::scene::Scene;
 use sheetsplat::transfer_function::{Ramp, TransferFunction};
+use sheetsplat::view::View;
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat};
 
 use crate::common::{Random, camera, gpu, scene};
-use crate::{at_offsets, compute, contents, indirect, init};
+use crate::{compute, contents, indirect, init};
 
 /// The stages with one list of bricks and what they read and write.
 pub(crate) struct Culling<'a> {
@@ -30,6 +31,8 @@ pub(crate) struct Culling<'a> {
     pub(crate) view: View,
     pub(crate) frame: Frame,
     pub(crate) plan: FramePlan,
+    /// The uniform of every group of the plan.
+    groups: Vec<Group>,
     /// Of every place of every brick the index into the volume, [`ABSENT`] without a voxel.
     pub(crate) indices: Vec<u32>,
     pub(crate) bricks: Vec<Brick>,
@@ -60,15 +63,9 @@ impl<'a> Culling<'a> {
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
         let frame = uniforms::frame(&view, &kernel, grid, &ramps, scene);
         let targets = Targets::new(device, size, TextureFormat::Rgba32Float, sheets);
-        let groups: Vec<Group> = (0..)
-            .zip(&plan.groups)
-            .map(|(index, group)| {
-                let [bricks] = &group.bricks[..] else { panic!("one list") };
-                let (first_brick, brick_count) = (bricks.start, bricks.end - bricks.start);
-                Group { near: group.near as f32, first_brick, brick_count, index }
-            })
-            .collect();
-        let (groups, stride) = at_offsets(device, &groups);
+        let stride = device.limits().min_uniform_buffer_offset_alignment;
+        let group_bytes = uniforms::groups(&plan, &kernel, &scene.splatting, stride as usize);
+        let groups = init(device, &group_bytes, BufferUsages::UNIFORM);
         let bytes = vec![0_u8; size_of::<Tally>() + targets.opaque_tiles.size() as usize];
         let culled = init(device, &bytes, BufferUsages::STORAGE);
         let labels = labels.map(|labels| VolumeTexture::upload_labels(device, gpu.queue(), labels).unwrap());
@@ -98,6 +95,7 @@ impl<'a> Culling<'a> {
             stage,
             view,
             frame,
+            groups: group_bytes.chunks(stride as usize).map(uniform).collect(),
             plan,
             bricks,
             targets,
@@ -121,6 +119,11 @@ impl<'a> Culling<'a> {
     pub(crate) fn splats(&self) -> Vec<layout::Splat> {
         contents(self.gpu, &self.list.splats)
     }
+}
+
+/// The uniform at the start of some bytes.
+fn uniform(bytes: &[u8]) -> Group {
+    bytemuck::pod_read_unaligned(&bytes[..size_of::<Group>()])
 }
 
 /// A place without a voxel.
@@ -162,14 +165,14 @@ impl Decisions {
     }
 
     /// The first and the last pixel from which the box filter covers the footprints' boxes around centres from `low` to `high`.
-    fn filter(&mut self, frame: &Frame, low: DVec2, high: DVec2) -> [[u32; 2]; 2] {
+    fn filter(&mut self, size: [u32; 2], group: &Group, low: DVec2, high: DVec2) -> [[u32; 2]; 2] {
         // Pixel centres are at half-integers; the shader's slack.
-        let margin = DVec2::from(frame.half_box.map(f64::from)) + 0.01;
+        let margin = half_box(group) + 0.01;
         let (low, high) = ((low - margin - 0.5).to_array(), (high + margin - 0.5).to_array());
         let axes = [0, 1].map(|axis| {
-            let last = f64::from(frame.size[axis] - 1);
+            let last = f64::from(size[axis] - 1);
             let first = self.ceil(low[axis], last);
-            [first, self.floor(high[axis] - f64::from(frame.reach[axis]), last, EPSILON).max(first)]
+            [first, self.floor(high[axis] - f64::from(group.box_filter[axis]), last, EPSILON).max(first)]
         });
         [[axes[0][0], axes[1][0]], [axes[0][1], axes[1][1]]]
     }
@@ -177,6 +180,10 @@ impl Decisions {
     fn pixel(&mut self, center: DVec2, size: [u32; 2]) -> [u32; 2] {
         [self.floor(center.x, f64::from(size[0] - 1), EPSILON), self.floor(center.y, f64::from(size[1] - 1), EPSILON)]
     }
+}
+
+fn half_box(group: &Group) -> DVec2 {
+    DVec2::from(group.half_box.map(f64::from))
 }
 
 /// Hidden boxes: an image's occlusion buffer.
@@ -241,23 +248,24 @@ struct Rules<'a> {
     sheets: u32,
     bricks: &'a [Brick],
     indices: &'a [u32],
-    plan: &'a FramePlan,
+    groups: &'a [Group],
+    /// The list's bricks in bucket order.
+    order: &'a [u32],
     /// Voxels, by index into the volume, that f32 arithmetic may treat otherwise.
     unsure: BTreeSet<u32>,
 }
 
 impl Rules<'_> {
     fn project(&self, p: DVec3) -> DVec3 {
-        DVec3::from(self.frame.screen_from_voxel.map(|row| DVec4::from(row.map(f64::from)).dot(p.extend(1.0))))
-    }
-
-    fn half_box(&self) -> DVec2 {
-        DVec2::from(self.frame.half_box.map(f64::from))
+        let [x, y, depth, _] =
+            self.frame.screen_from_voxel.map(|row| DVec4::from(row.map(f64::from)).dot(p.extend(1.0)));
+        let middle = DVec2::from(self.frame.size.map(f64::from)) / 2.0;
+        (DVec2::new(x, y) + middle).extend(depth)
     }
 
     /// Whether any pixel of the image lies in the box around `low..high` widened by the footprint.
-    fn is_on_screen(&self, decisions: &mut Decisions, low: DVec2, high: DVec2) -> bool {
-        let (low, high) = (low - self.half_box(), high + self.half_box());
+    fn is_on_screen(&self, decisions: &mut Decisions, group: &Group, low: DVec2, high: DVec2) -> bool {
+        let (low, high) = (low - half_box(group), high + half_box(group));
         let size = self.frame.size.map(f64::from);
         // All four, so that every unsure one is noted.
         let sides = [
@@ -269,7 +277,14 @@ impl Rules<'_> {
         sides.into_iter().all(|side| side)
     }
 
-    fn visits(&self, decisions: &mut Decisions, brick: &Brick, hidden: u64, near: f64, occluded: &Occluded) -> bool {
+    fn visits(
+        &self,
+        decisions: &mut Decisions,
+        brick: &Brick,
+        hidden: u64,
+        group: &Group,
+        occluded: &Occluded,
+    ) -> bool {
         if brick::present(brick) & !hidden == 0 {
             return false;
         }
@@ -284,18 +299,20 @@ impl Rules<'_> {
         }
         let (least, most) = (least - 1e-3, most + 1e-3);
         let radius = f64::from(self.frame.radius);
+        let near = f64::from(group.near);
         let far = near + f64::from(self.sheets) * f64::from(self.frame.slab_width);
         let is_before = decisions.at_least(near, most.z + radius);
         let is_behind = decisions.at_least(least.z - radius, far);
-        if is_before || is_behind || !self.is_on_screen(decisions, least.truncate(), most.truncate()) {
+        if is_before || is_behind || !self.is_on_screen(decisions, group, least.truncate(), most.truncate()) {
             return false;
         }
-        if self.frame.culling == 0 {
+        if group.culling == 0 {
             return true;
         }
         let all_occluded = |margin: f64| {
             let mut ignored = Decisions::default();
-            let [first, last] = ignored.filter(self.frame, least.truncate() - margin, most.truncate() + margin);
+            let [first, last] =
+                ignored.filter(self.frame.size, group, least.truncate() - margin, most.truncate() + margin);
             (first[1]..=last[1]).all(|y| (first[0]..=last[0]).all(|x| occluded.at([x, y])))
         };
         decisions.unsure |= all_occluded(EPSILON) != all_occluded(-EPSILON);
@@ -305,14 +322,12 @@ impl Rules<'_> {
     /// What a group draws after what was expected so far.
     fn cull(&mut self, group: usize, occluded: &Occluded, so_far: &mut Expected) {
         so_far.drawn.clear();
-        let group = &self.plan.groups[group];
-        let near = f64::from(group.near as f32);
-        let range = group.bricks[0].start as usize..group.bricks[0].end as usize;
-        for &at in &self.plan.orders[0][range] {
+        let group = &self.groups[group];
+        for &at in &self.order[group.first_brick as usize..][..group.brick_count as usize] {
             let brick = self.bricks[at as usize];
             so_far.counts[3] += 1;
             let mut decisions = Decisions::default();
-            let visits = self.visits(&mut decisions, &brick, so_far.states[at as usize].0, near, occluded);
+            let visits = self.visits(&mut decisions, &brick, so_far.states[at as usize].0, group, occluded);
             if decisions.unsure {
                 // Not by a hair: a box, which has its slack, without any of its voxels.
                 self.unsure.extend(indices(self.grid, &brick).into_iter().filter(|&index| index != ABSENT));
@@ -326,7 +341,7 @@ impl Rules<'_> {
                 let id = at * BRICK_VOXELS + slot;
                 let p = self.project(self.grid.voxel_at(self.indices[id as usize]).as_dvec3());
                 let mut decisions = Decisions::default();
-                self.cull_voxel(&mut decisions, (at, slot, id), p, near, occluded, so_far);
+                self.cull_voxel(&mut decisions, (at, slot, id), p, group, occluded, so_far);
                 if decisions.unsure {
                     self.unsure.insert(self.indices[id as usize]);
                 }
@@ -340,16 +355,16 @@ impl Rules<'_> {
         decisions: &mut Decisions,
         (brick, slot, id): (u32, u32, u32),
         p: DVec3,
-        near: f64,
+        group: &Group,
         occluded: &Occluded,
         so_far: &mut Expected,
     ) {
         let size = self.frame.size;
         let center = p.truncate();
-        let is_on_screen = self.is_on_screen(decisions, center, center);
-        let [first, last] = decisions.filter(self.frame, center, center);
+        let is_on_screen = self.is_on_screen(decisions, group, center, center);
+        let [first, last] = decisions.filter(size, group, center, center);
         let corners = [first, [last[0], first[1]], [first[0], last[1]], last];
-        let is_hidden = self.frame.culling == 1 && corners.into_iter().all(|corner| occluded.at(corner));
+        let is_hidden = group.culling == 1 && corners.into_iter().all(|corner| occluded.at(corner));
         let state = &mut so_far.states[brick as usize];
         if !is_on_screen || is_hidden {
             state.0 |= 1 << slot;
@@ -357,6 +372,7 @@ impl Rules<'_> {
         }
         // The sheets of the group that the kernel's depths overlap.
         let (radius, width) = (f64::from(self.frame.radius), f64::from(self.frame.slab_width));
+        let near = f64::from(group.near);
         let (first, end) = ((p.z - radius - near) / width, (p.z + radius - near) / width);
         let sheets = f64::from(self.sheets);
         let first = decisions.floor(first, sheets, EPSILON / width);
@@ -369,8 +385,8 @@ impl Rules<'_> {
         so_far.counts[0] += u32::from(state.1 >> slot & 1 == 0);
         state.1 |= 1 << slot;
         // Every tile with a pixel whose centre is in the footprint's box, and at most one row or column of tiles more.
-        let low = decisions.pixel(center - self.half_box() - 0.5, size).map(|pixel| pixel / TILE);
-        let high = decisions.pixel(center + self.half_box(), size).map(|pixel| pixel / TILE);
+        let low = decisions.pixel(center - half_box(group) - 0.5, size).map(|pixel| pixel / TILE);
+        let high = decisions.pixel(center + half_box(group), size).map(|pixel| pixel / TILE);
         let columns = tile_grid(size)[0];
         so_far.tiles.extend((low[1]..=high[1]).flat_map(|y| (low[0]..=high[0]).map(move |x| y * columns + x)));
     }
@@ -431,7 +447,8 @@ impl Case {
             sheets: self.sheets,
             bricks: &culling.bricks,
             indices: &culling.indices,
-            plan: &culling.plan,
+            groups: &culling.groups,
+            order: &culling.plan.orders[0],
             unsure: BTreeSet::new(),
         };
         let mut so_far = Expected { states: vec![(0, 0); culling.bricks.len()], ..Expected::default() };

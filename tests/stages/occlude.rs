@@ -3,6 +3,8 @@
 
 use std::collections::BTreeSet;
 
+use bytemuck::Zeroable;
+use sheetsplat::gpu::layout::Group;
 use sheetsplat::gpu::targets::Targets;
 use sheetsplat::headless::Headless;
 use sheetsplat::pass::occlude::Occlude;
@@ -10,7 +12,7 @@ use sheetsplat::plan::{TILE, tile_grid};
 use sheetsplat::wgpu::{BufferUsages, TextureFormat};
 
 use crate::common::{Random, gpu};
-use crate::{compute, contents, frame, init, tile_list};
+use crate::{at_offsets, compute, contents, frame, init, tile_list};
 
 /// A bit per pixel of an image.
 #[derive(Clone, PartialEq)]
@@ -118,14 +120,16 @@ impl Fixture<'_> {
     /// Computes the listed tiles from a mask; what the occlusion buffer then holds.
     fn run(&self, mask: &Mask, tiles: &[u32]) -> Vec<u32> {
         let device = self.gpu.device();
-        let mut frame = frame(|scene| (scene.image.width, scene.image.height) = mask.size.into());
-        frame.reach = self.reach;
+        let frame = frame(|scene| (scene.image.width, scene.image.height) = mask.size.into());
         let frame = init(device, &[frame], BufferUsages::UNIFORM);
+        // Not at the first offset.
+        let group = Group { box_filter: self.reach, ..Group::zeroed() };
+        let (group, offset) = at_offsets(device, &[Group::zeroed(), group]);
         // As the composite stage leaves it: off the image all is opaque.
         self.gpu.queue().write_buffer(&self.targets.opaque, 0, bytemuck::cast_slice(&mask.words(true)));
         let tiles = tile_list(device, tiles);
-        let groups = self.stage.bind(device, &frame, &tiles, &self.targets);
-        compute(self.gpu, |pass| self.stage.record(pass, &groups, &tiles));
+        let groups = self.stage.bind(device, [&frame, &group], &tiles, &self.targets);
+        compute(self.gpu, |pass| self.stage.record(pass, &groups, offset, &tiles));
         contents(self.gpu, &self.targets.occluded)
     }
 }

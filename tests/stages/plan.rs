@@ -3,9 +3,10 @@
 
 use glam::{DVec3, UVec3};
 use sheetsplat::brick::{self, BrickList};
-use sheetsplat::plan::{FramePlan, View, add_sections, count_sections};
+use sheetsplat::plan::{FramePlan, Overlaps};
 use sheetsplat::reference::Geometry;
 use sheetsplat::splatting::Order;
+use sheetsplat::view::View;
 use sheetsplat::volume::Grid;
 
 use crate::common::{Random, camera, scene};
@@ -47,15 +48,15 @@ fn every_kernel_is_looked_at_by_every_group_that_it_reaches_into() {
                                     sections += 1;
                                     let first = k - k.rem_euclid(sheets as i32);
                                     let group = plan.groups.iter().find(|group| group.first_slab == first).unwrap();
-                                    assert!((group.near - f64::from(first) * geometry.slab_width).abs() < 1e-9);
+                                    assert!((group.planes.start - f64::from(first) * geometry.slab_width).abs() < 1e-9);
                                     assert!(group.bricks[list].contains(&slot), "voxel {voxel}, slab {k}");
                                 }
                             }
                         }
                     }
                 }
-                let counted = lists.iter().map(|list| count_sections(list.bricks(), &view).unwrap());
-                assert_eq!(counted.reduce(add_sections).unwrap().0, sections);
+                let counted = lists.iter().map(|list| Overlaps::count(list.bricks(), &view));
+                assert_eq!(counted.reduce(Overlaps::and).unwrap().sections, sections);
             }
         }
     }

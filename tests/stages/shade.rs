@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use glam::{DVec3, DVec4, UVec3};
+use glam::{DVec2, DVec3, DVec4, UVec3};
 use sheetsplat::brick;
 use sheetsplat::classify::classify;
 use sheetsplat::gpu::layout;
@@ -14,6 +14,7 @@ use sheetsplat::scene::{Scene, TransferSettings};
 use sheetsplat::shading::{Light, Shading};
 use sheetsplat::splatting::Compositing;
 use sheetsplat::transfer_function::{LabelTables, Ramp, TransferFunction};
+use sheetsplat::view::View;
 use sheetsplat::volume::{Labels, Volume};
 
 use crate::common::{F16, F32, Random, camera, gpu, scene, transfer};
@@ -92,6 +93,19 @@ fn highlight_cosine(volume: &Volume, index: u32, scene: &Scene) -> f64 {
     normal.dot((to_light + to_eye).normalize_or_zero()).abs()
 }
 
+/// What f32 may move a voxel's pixel coordinates, sheet depth and depth from the eye by.
+fn place_error(view: &View, voxel: UVec3, center: DVec2) -> DVec4 {
+    // A dot product of four: every term has a rounded coefficient and product and passes up to three sums; one more for the
+    // twin's own way to the same number.
+    let p = voxel.as_dvec3().extend(1.0);
+    let [x, y, depth, from_eye] = view.screen_from_voxel.map(|row| 6.0 * F32 * (row * p).abs().element_sum());
+    // Pixels are a quotient, which WGSL's division is good to 2.5 ULP of, from the image's middle, which is added.
+    let w = view.screen_from_voxel[3].dot(p);
+    let from_middle = center - DVec2::from(view.size.map(f64::from)) / 2.0;
+    let quotient = (DVec2::new(x, y) + from_middle.abs() * from_eye) / w + 5.0 * F32 * from_middle.abs();
+    (quotient + F32 * center.abs()).extend(depth).extend(from_eye)
+}
+
 /// Culls a frame, group by group, and compares the splat record of every voxel on the screen with the twin's.
 fn check(name: &str, volume: &Volume, scene: &Scene) {
     let gpu = gpu();
@@ -140,14 +154,12 @@ fn check(name: &str, volume: &Volume, scene: &Scene) {
         let (record, index) = (&records[id], culling.indices[id]);
         let twin = twins[&index];
         let voxel = volume.grid().voxel_at(index);
-        let (actual, expected) =
-            (DVec3::new(record.x_px.into(), record.y_px.into(), record.depth.into()), twin.center.extend(twin.depth));
-        // A dot product of four: every term has a rounded coefficient and product and passes up to three sums; one more
-        // for the twin's own way to the same number.
-        let p = voxel.as_dvec3().extend(1.0);
-        let terms = DVec3::from(view.screen_from_voxel.map(|row| (row * p).abs().element_sum()));
+        let layout::Splat { x_px, y_px, depth, from_eye, .. } = *record;
+        let actual = DVec4::from([x_px, y_px, depth, from_eye].map(f64::from));
+        let expected = twin.center.extend(twin.depth).extend(1.0);
+        let error = (actual - expected).abs();
         assert!(
-            (actual - expected).abs().cmple(6.0 * F32 * terms).all(),
+            error.cmple(place_error(&view, voxel, twin.center)).all(),
             "{name}: {voxel} at {actual}, not {expected}"
         );
 

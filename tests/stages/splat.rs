@@ -3,7 +3,9 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
+use bytemuck::Zeroable;
 use glam::{DVec2, DVec3, DVec4, UVec3};
 use sheetsplat::footprint::{FootprintTable, SECTION_SIZE, SECTIONS, section_extent, section_spacing};
 use sheetsplat::gpu::brick_lists::BrickLists;
@@ -13,11 +15,12 @@ use sheetsplat::gpu::{layout, readback};
 use sheetsplat::headless::Headless;
 use sheetsplat::kernel::Kernel;
 use sheetsplat::pass::cull::{Cull, CullBuffers, CullList};
-use sheetsplat::pass::splat::Splat as Stage;
-use sheetsplat::plan::{TILE, View, tile_grid};
+use sheetsplat::pass::splat::{Splat as Stage, SplatMode};
+use sheetsplat::plan::{TILE, tile_grid};
 use sheetsplat::reference::{self, Geometry};
 use sheetsplat::scene::Scene;
 use sheetsplat::splatting::FootprintForm;
+use sheetsplat::view::View;
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
 
@@ -131,7 +134,7 @@ impl<'a> Fixture<'a> {
         let device = self.gpu.device();
         let near = (f64::from(first_slab) * self.view.slabs.width) as f32;
         // Not at the first offset.
-        let of = |near| layout::Group { near, first_brick: 0, brick_count: 0, index: 0 };
+        let of = |near| layout::Group { near, ..layout::Group::zeroed() };
         let (groups, offset) = at_offsets(device, &[of(1e9), of(near)]);
         let args = init(device, &[indirect(instances.len() as u32)], BufferUsages::INDIRECT | BufferUsages::STORAGE);
         let tiles = tile_list(device, tiles);
@@ -148,8 +151,9 @@ impl<'a> Fixture<'a> {
         let views: Vec<_> =
             self.sheets.iter().map(|sheet| sheet.create_view(&wgpu::TextureViewDescriptor::default())).collect();
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let form = self.scene.splatting.footprint;
-        self.stage.splat.record(&mut encoder, None, form, &views, (&clear, &tiles), [(&group, offset, &args)]);
+        let mode = SplatMode { form: self.scene.splatting.footprint, perspective: self.view.perspective.is_some() };
+        self.stage.splat.prepare(device, mode);
+        self.stage.splat.record(&mut encoder, None, mode, &views, (&clear, &tiles), [(&group, offset, &args)]);
         self.gpu.queue().submit([encoder.finish()]);
         let read = |sheet| pixels(&readback::texture(device, self.gpu.queue(), sheet).unwrap());
         self.sheets.iter().map(read).collect()
@@ -162,10 +166,15 @@ impl<'a> Fixture<'a> {
 
     /// A splat for the twin: the record's f32 coordinates are taken as they are, so only the stage's own errors count.
     fn twin_of(&self, splat: &layout::Splat) -> reference::Splat {
-        let layout::Splat { x_px, y_px, depth, rg, ba } = *splat;
+        let layout::Splat { x_px, y_px, depth, rg, ba, .. } = *splat;
         assert_eq!((rg, ba), (AMOUNT_RG, AMOUNT_BA));
         let center = DVec2::new(x_px.into(), y_px.into());
-        reference::Splat { center, depth: depth.into(), amount: AMOUNT * self.amplitude() }
+        reference::Splat { center, depth: depth.into(), amount: AMOUNT * self.amplitude(), alpha: 1.0 }
+    }
+
+    /// The slabs that a splat's kernel reaches into.
+    fn touched(&self, splat: &reference::Splat) -> Range<i32> {
+        self.view.slabs.touched(splat.depth - self.view.reach, splat.depth + self.view.reach)
     }
 
     /// The low-pass rule's amplitude over λ.
@@ -186,6 +195,7 @@ impl<'a> Fixture<'a> {
             x_px: coordinate(random, self.scene.image.width),
             y_px: coordinate(random, self.scene.image.height),
             depth: random.uniform(-60.0, 60.0) as f32,
+            from_eye: 1.0,
             rg: AMOUNT_RG,
             ba: AMOUNT_BA,
         }
@@ -245,7 +255,7 @@ fn for_random_sections(
                 let fixture = Fixture::new(&stage, view_scene(view, kernel, width, form), view.1);
                 let splat = fixture.random_splat(&mut random);
                 let twin = fixture.twin_of(&splat);
-                let slabs: Vec<i32> = fixture.view.slabs.touched(twin.depth).collect();
+                let slabs: Vec<i32> = fixture.touched(&twin).collect();
                 for (k, sheet) in fixture.draw(&[splat], &[0], &slabs) {
                     check(&fixture, &twin, k, &sheet);
                 }
@@ -373,7 +383,7 @@ fn pixels_just_inside_the_rim_are_drawn() {
             for side in [DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y] {
                 let center = DVec2::new(30.5, 20.5) - side * (4.0 - inside);
                 let (x_px, y_px) = (center.x as f32, center.y as f32);
-                let splat = layout::Splat { x_px, y_px, depth: 4.0, rg: AMOUNT_RG, ba: AMOUNT_BA };
+                let splat = layout::Splat { x_px, y_px, depth: 4.0, from_eye: 1.0, rg: AMOUNT_RG, ba: AMOUNT_BA };
                 let sheet = &fixture.draw(&[splat], &[0], &[0])[&0];
                 let pixel = 20 * 70 + 30;
                 let actual = sheet[pixel].w;
@@ -416,7 +426,7 @@ fn sections_sum_to_the_footprint_and_the_footprint_to_one() {
                 ..fixture.random_splat(&mut random)
             };
             let twin = fixture.twin_of(&splat);
-            let slabs: Vec<i32> = fixture.view.slabs.touched(twin.depth).collect();
+            let slabs: Vec<i32> = fixture.touched(&twin).collect();
             let sheets = fixture.draw(&[splat], &[0], &slabs);
             let sum: Vec<DVec4> =
                 (0..sheets[&slabs[0]].len()).map(|i| sheets.values().map(|sheet| sheet[i]).sum()).collect();

@@ -1,5 +1,6 @@
 //! `shaders/tiles.wgsl` against a plain evaluation of its rules: exact lists, arguments and counts.
 
+use bytemuck::Zeroable;
 use sheetsplat::gpu::layout::{Frame, Group, Indirect, Tally};
 use sheetsplat::gpu::targets::Targets;
 use sheetsplat::headless::Headless;
@@ -82,14 +83,13 @@ impl Case {
         let culled: Vec<u32> = counts.into_iter().chain(self.touched.iter().map(|&touched| touched.into())).collect();
         let culled = init(device, &culled, BufferUsages::STORAGE);
         let frame = Frame {
-            reach: self.reach,
             culling: self.culling.into(),
             tiles: self.tiles.into(),
             ..frame(|scene| (scene.image.width, scene.image.height) = self.size.into())
         };
         let frame = init(device, &[frame], BufferUsages::UNIFORM);
         let uniforms: Vec<Group> =
-            (0..GROUPS).map(|index| Group { near: 0.0, first_brick: 0, brick_count: 0, index }).collect();
+            (0..GROUPS).map(|index| Group { box_filter: self.reach, index, ..Group::zeroed() }).collect();
         let (groups, stride) = at_offsets(device, &uniforms);
         let lists = stage.prepare(device, [&frame, &groups, &culled], &targets, GROUPS as usize, None);
         compute(gpu, |pass| stage.record(pass, &lists, group * stride));
