@@ -146,7 +146,7 @@ pub fn group(view: &View, kernel: &Kernel, splatting: &Splatting, planes: Range<
 
 /// Half a box, pixels, in f32; far beyond any image there are numbers, not infinities.
 pub fn in_f32_pixels(half_box: DVec2) -> [f32; 2] {
-    half_box.min(DVec2::splat(1e9)).as_vec2().to_array()
+    half_box.min(DVec2::splat(1e30)).as_vec2().to_array()
 }
 
 /// Half the largest box that is tested, pixels. Few footprints larger than that fit the screen, and hardly one is ever hidden.
