@@ -14,13 +14,14 @@
 @group(0) @binding(4) var<storage, read> starts: array<u32>;
 // A brick's number and, in the last byte, the units of the tile that it may touch.
 @group(0) @binding(5) var<storage, read> entries: array<u32>;
-// The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0).
+// The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0); then the table of labels.
 @group(0) @binding(6) var<storage, read> control_points: array<vec4f>;
 @group(0) @binding(7) var values: texture_2d_array<f32>;
 @group(0) @binding(8) var<storage, read_write> acc: array<vec4f>;
 @group(0) @binding(9) var<storage, read_write> gathered: Gathered;
 // Of every group, nearest first, half the screen box around its footprints, pixels.
 @group(0) @binding(10) var<storage, read> half_boxes: array<vec2f>;
+@group(0) @binding(11) var labels: texture_2d_array<u32>;
 
 // `frame.compositing` and `frame.order`.
 override COMPOSITING: u32 = 0u;
@@ -29,6 +30,8 @@ override ORDER: u32 = 0u;
 override PERSPECTIVE: bool = false;
 // Whether a footprint's box is the parallelogram of Fig. 13, else its bounding rectangle.
 override PARALLELOGRAM: bool = false;
+// Whether any of §8's economies is asked for.
+override ECONOMIES: bool = false;
 
 // Read once: a uniform read in a loop costs a software driver a gather.
 var<private> frame: Frame;
@@ -62,6 +65,8 @@ struct Region {
     open_high: vec2f,
     // For each of the units' rows the lanes whose pixel there is not opaque.
     open: vec4u,
+    // The same for pixels that have not reached β.
+    shallow: vec4u,
 }
 
 // A voxel's kernel as the pixels see it.
@@ -75,6 +80,8 @@ struct Footprint {
     // In perspective, how its sections' footprints lie on the screen.
     axis: vec2f,
     maps: SectionMaps,
+    // Among the economies: ρ² from which a footprint adds too little, by sheet.
+    rim: vec4f,
 }
 
 // One of the ramps: where its control points are, and the one of the first of them that this lane holds.
@@ -101,37 +108,29 @@ fn half(found: vec3u, width: u32) -> vec3u {
 }
 
 // Piecewise linear between the control points, clamped outside.
-fn ramp_at(ramp: Ramp, value: f32) -> vec3f {
-    let count = ramp.end - ramp.first;
+fn ramp_at(held: Ramp, value: f32) -> vec3f {
+    let count = held.end - held.first;
     // How many points are at or below the value; every lane holds one of the first of them.
     var below = 0u;
-    below += select(0u, 16u, lanes >= 32u && is_below(ramp, below + 15u, value));
-    below += select(0u, 8u, lanes >= 16u && is_below(ramp, below + 7u, value));
-    below += select(0u, 4u, is_below(ramp, below + 3u, value));
-    below += select(0u, 2u, is_below(ramp, below + 1u, value));
-    below += select(0u, 1u, is_below(ramp, below, value));
-    below += select(0u, 1u, is_below(ramp, below, value));
-    var a = subgroupShuffle(ramp.own, max(below, 1u) - 1u);
-    var b = subgroupShuffle(ramp.own, min(below, min(count, lanes) - 1u));
+    below += select(0u, 16u, lanes >= 32u && is_below(held, below + 15u, value));
+    below += select(0u, 8u, lanes >= 16u && is_below(held, below + 7u, value));
+    below += select(0u, 4u, is_below(held, below + 3u, value));
+    below += select(0u, 2u, is_below(held, below + 1u, value));
+    below += select(0u, 1u, is_below(held, below, value));
+    below += select(0u, 1u, is_below(held, below, value));
+    let a = subgroupShuffle(held.own, max(below, 1u) - 1u);
+    let b = subgroupShuffle(held.own, min(below, min(count, lanes) - 1u));
+    var result = between(a, b, value);
     // More points than lanes are searched in memory.
     for (var once = count > lanes; once; once = false) {
-        below = 0u;
-        var above = count;
-        while below < above {
-            let middle = (below + above) / 2u;
-            let is_at_or_below = control_points[ramp.first + middle].x <= value;
-            below = select(below, middle + 1u, is_at_or_below);
-            above = select(middle, above, is_at_or_below);
-        }
-        a = control_points[ramp.first + max(below, 1u) - 1u];
-        b = control_points[ramp.first + min(below, count - 1u)];
+        result = ramp(held.first, held.end, value);
     }
-    return between(a, b, value);
+    return result;
 }
 
 // Whether one of the first control points is at or below a value.
-fn is_below(ramp: Ramp, at: u32, value: f32) -> bool {
-    return at < min(ramp.end - ramp.first, lanes) && subgroupShuffle(ramp.own.x, at % lanes) <= value;
+fn is_below(held: Ramp, at: u32, value: f32) -> bool {
+    return at < min(held.end - held.first, lanes) && subgroupShuffle(held.own.x, at % lanes) <= value;
 }
 
 fn ramp_of(first: u32, end: u32) -> Ramp {
@@ -162,16 +161,17 @@ fn sections(footprint: Footprint, column: f32, rows: vec4f) -> mat4x4f {
         let a = along * along;
         let b = across * across;
         let maps = footprint.maps;
+        let planes = footprint.planes;
         return mat4x4f(
-            section(a * maps.along.x + b * maps.across.x, footprint.first_plane, footprint.planes.x) * maps.amplitude.x,
-            section(a * maps.along.y + b * maps.across.y, footprint.planes.x, footprint.planes.y) * maps.amplitude.y,
-            section(a * maps.along.z + b * maps.across.z, footprint.planes.y, footprint.planes.z) * maps.amplitude.z,
-            section(a * maps.along.w + b * maps.across.w, footprint.planes.z, footprint.planes.w) * maps.amplitude.w,
+            section(a * maps.along.x + b * maps.across.x, footprint.first_plane, planes.x, footprint.rim.x) * maps.amplitude.x,
+            section(a * maps.along.y + b * maps.across.y, planes.x, planes.y, footprint.rim.y) * maps.amplitude.y,
+            section(a * maps.along.z + b * maps.across.z, planes.y, planes.z, footprint.rim.z) * maps.amplitude.z,
+            section(a * maps.along.w + b * maps.across.w, planes.z, planes.w, footprint.rim.w) * maps.amplitude.w,
         );
     }
     let rho_squared = dy * (gather.metric.z * dy + gather.metric.y * dx) + gather.metric.x * dx * dx;
     let rim = rim_at(rho_squared);
-    let in_plane = exp2(rho_squared * gather.metric.w);
+    let in_plane = in_plane_at(rho_squared, footprint.rim.x);
     let plane_0 = clamp(vec4f(footprint.first_plane), -rim, rim);
     let plane_1 = clamp(vec4f(footprint.planes.x), -rim, rim);
     let plane_2 = clamp(vec4f(footprint.planes.y), -rim, rim);
@@ -186,10 +186,19 @@ fn sections(footprint: Footprint, column: f32, rows: vec4f) -> mat4x4f {
 }
 
 // One section, between two planes.
-fn section(rho_squared: vec4f, near: f32, far: f32) -> vec4f {
+fn section(rho_squared: vec4f, near: f32, far: f32, footprint_rim: f32) -> vec4f {
     let rim = rim_at(rho_squared);
     let thickness = clamp(vec4f(far), -rim, rim) - clamp(vec4f(near), -rim, rim);
-    return thickness * exp2(rho_squared * gather.metric.w);
+    return thickness * in_plane_at(rho_squared, footprint_rim);
+}
+
+// The Gaussian of ρ², up to the footprint's rim.
+fn in_plane_at(rho_squared: vec4f, footprint_rim: f32) -> vec4f {
+    let in_plane = exp2(rho_squared * gather.metric.w);
+    if ECONOMIES {
+        return select(vec4f(0.0), in_plane, rho_squared < vec4f(footprint_rim));
+    }
+    return in_plane;
 }
 
 // H(0, 0, t) where the chord of the kernel's ball ends.
@@ -221,6 +230,9 @@ fn footprint_of(own: Footprint, other: u32) -> Footprint {
         footprint.maps.across = subgroupShuffle(own.maps.across, other);
         footprint.maps.amplitude = subgroupShuffle(own.maps.amplitude, other);
     }
+    if ECONOMIES {
+        footprint.rim = subgroupShuffle(own.rim, other);
+    }
     return footprint;
 }
 
@@ -241,16 +253,22 @@ fn overlapped_sheets(p: vec4f) -> vec2f {
     return vec2f(floor(sheets.x), ceil(sheets.y));
 }
 
-// What a voxel at p adds to the group whose first sheet starts at `near`.
-fn footprint_at(p: vec4f, near: f32, amount: vec4f) -> Footprint {
+// What a voxel at p adds to the group whose first sheet starts at `near`, in sections or, into the sheet `whole` of them, as a whole.
+fn footprint_at(p: vec4f, near: f32, whole: f32, amount: vec4f) -> Footprint {
     var footprint: Footprint;
     footprint.center_px = p.xy;
-    let steps = near - p.z + vec4f(1.0, 2.0, 3.0, 4.0) * frame.slab_width;
+    var first_step = near - p.z;
+    var steps = near - p.z + vec4f(1.0, 2.0, 3.0, 4.0) * frame.slab_width;
+    if ECONOMIES && whole >= 0.0 {
+        // As far as a kernel reaches, on either side of the sheet.
+        first_step = -WHOLE;
+        steps = select(vec4f(-WHOLE), vec4f(WHOLE), vec4f(1.0, 2.0, 3.0, 4.0) > vec4f(whole));
+    }
     if PERSPECTIVE {
         let ray = local_ray(p.xy);
         let per_depth = select(frame.kernel_per_depth, ray.kernel_per_depth, frame.kernel_per_depth == 0.0);
         let cut = near_cut(ray, p.w);
-        let first = max((near - p.z) * per_depth, cut);
+        let first = max(first_step * per_depth, cut);
         let planes = max(steps * per_depth, vec4f(cut));
         footprint.amount = amount * ray.per_lambda;
         footprint.first_plane = along(first);
@@ -260,15 +278,33 @@ fn footprint_at(p: vec4f, near: f32, amount: vec4f) -> Footprint {
     } else {
         let planes = steps * frame.kernel_per_depth;
         footprint.amount = amount * frame.amplitude;
-        footprint.first_plane = along((near - p.z) * frame.kernel_per_depth);
+        footprint.first_plane = along(first_step * frame.kernel_per_depth);
         footprint.planes = vec4f(along(planes.x), along(planes.y), along(planes.z), along(planes.w));
+    }
+    if ECONOMIES {
+        let amplitude = select(vec4f(1.0), footprint.maps.amplitude, PERSPECTIVE);
+        footprint.rim = log(footprint.amount.a * amplitude * gather.peak) / frame.falloff;
     }
     return footprint;
 }
 
-// Bounds of what is not opaque.
-fn opened(region: Region, is_open: vec4<bool>, column: f32, rows: vec4f) -> Region {
+// Sheet depths beyond every kernel's reach.
+const WHOLE = 1e6;
+
+// Which pixels are not opaque, and their bounds.
+fn opened(region: Region, is_inside: vec4<bool>, opacity: vec4f, column: f32, rows: vec4f) -> Region {
+    // Pixels off the image count as opaque.
+    let is_open = is_inside & (opacity < vec4f(select(3e38, frame.opacity_threshold, frame.culling != 0u)));
     var result = region;
+    if ECONOMIES {
+        let is_shallow = is_inside & (opacity < vec4f(gather.beta));
+        result.shallow = vec4u(
+            subgroupBallot(is_shallow.x).x,
+            subgroupBallot(is_shallow.y).x,
+            subgroupBallot(is_shallow.z).x,
+            subgroupBallot(is_shallow.w).x,
+        );
+    }
     result.open = vec4u(
         subgroupBallot(is_open.x).x,
         subgroupBallot(is_open.y).x,
@@ -284,9 +320,9 @@ fn opened(region: Region, is_open: vec4<bool>, column: f32, rows: vec4f) -> Regi
     return result;
 }
 
-// Whether the box around a voxel's footprint holds a pixel that is not opaque. Lanes 0 to 15 hold the pixels across the upper
+// Whether the box around a voxel's footprint holds a pixel of those in `open`. Lanes 0 to 15 hold the pixels across the upper
 // units of a region, 16 to 31 those across the lower.
-fn is_visible(center_px: vec2f, margin: vec2f, region: Region) -> bool {
+fn is_visible(center_px: vec2f, margin: vec2f, region: Region, open: vec4u) -> bool {
     let center = center_px - region.low;
     let size = region.high - region.low;
     let first_row = i32(clamp(ceil(center.y - margin.y), 0.0, 16.0));
@@ -304,7 +340,7 @@ fn is_visible(center_px: vec2f, margin: vec2f, region: Region) -> bool {
         across_lower = across(center.x + gather.shear * (rows + 4.0), half_width, size.x);
     }
     let box = (upper & across_upper) | (lower & (across_lower << vec4u(16u)));
-    return end_row > first_row && any((box & region.open) != vec4u(0u));
+    return end_row > first_row && any((box & open) != vec4u(0u));
 }
 
 // The pixels of a row within a distance of a point, one bit each.
@@ -346,9 +382,7 @@ fn draw(tile: u32, thread: u32) {
     if is_inside.w {
         image[3] = acc[slot + 3u * frame.size.x];
     }
-    // Pixels off the image count as opaque.
-    let opaque_from = select(3e38, frame.opacity_threshold, frame.culling != 0u);
-    region = opened(region, is_inside & (transpose(image)[3] < vec4f(opaque_from)), column, rows);
+    region = opened(region, is_inside, transpose(image)[3], column, rows);
 
     var voxels_shaded = 0u;
     var sections_rasterized = 0u;
@@ -452,22 +486,58 @@ fn draw(tile: u32, thread: u32) {
             let p = project(queued);
             let sheets_overlapped = overlapped_sheets(p);
             let here = clamp(sheets_overlapped, vec2f(first_sheet), vec2f(first_sheet + f32(SHEETS)));
-            let is_drawn = lane < count && here.x < here.y && is_visible(p.xy, margin, region);
-            let value = value_at(index_of(queued));
+            var is_drawn = lane < count && here.x < here.y && is_visible(p.xy, margin, region, region.open);
+            let index = index_of(queued);
+            let value = value_at(index);
             let gradient = gradient_at(queued);
-            let alpha = ramp_at(opacity_ramp, value).x * ramp_at(gradient_opacity_ramp, gradient.magnitude).x;
+            var color: vec3f;
+            var alpha: f32;
+            if LABELS {
+                let ramps = ramps_of(index);
+                color = ramp(ramps.x, ramps.y, value);
+                alpha = ramp(ramps.y, ramps.z, value).x * ramp(ramps.z, ramps.w, gradient.magnitude).x;
+            } else {
+                color = ramp_at(color_ramp, value);
+                alpha = ramp_at(opacity_ramp, value).x * ramp_at(gradient_opacity_ramp, gradient.magnitude).x;
+            }
             let m = amount(alpha);
-            let color = shade(ramp_at(color_ramp, value), gradient, lighting(p.xy, PERSPECTIVE));
-            let own = footprint_at(p, near, select(vec4f(0.0), vec4f(color * m, m), is_drawn));
+            color = shade(color, gradient, lighting(p.xy, PERSPECTIVE));
+            // The sheet of the group that takes the kernel as a whole; before the first if none does.
+            var whole = -1.0;
+            if ECONOMIES {
+                let center_sheet = floor((p.z - gather.near) / frame.slab_width);
+                let is_deep = !is_visible(p.xy, margin, region, region.shallow);
+                let last_of_first = floor(max(sheets_overlapped.x, 0.0) / f32(SHEETS)) * f32(SHEETS) + f32(SHEETS - 1u);
+                if is_deep || alpha < gather.whole_below {
+                    let sheet = clamp(center_sheet, sheets_overlapped.x, sheets_overlapped.y - 1.0);
+                    whole = select(sheet, min(sheet, last_of_first), is_deep) - first_sheet;
+                    is_drawn = is_drawn && whole >= 0.0 && whole < f32(SHEETS);
+                }
+            }
+            var own = footprint_at(p, near, whole, vec4f(color * m, m));
+            if ECONOMIES {
+                let rim = max(max(own.rim.x, own.rim.y), max(own.rim.z, own.rim.w));
+                let part = sqrt(clamp(rim, 0.0, frame.support * frame.support)) / frame.support;
+                is_drawn = is_drawn && rim > 0.0 && is_visible(p.xy, half_boxes[group] * part + BOX_SLACK, region, region.open);
+            }
+            own.amount = select(vec4f(0.0), own.amount, is_drawn);
             if is_drawn {
-                // Of the groups that the kernel reaches into, counted from the nearest.
-                let nth = group - u32(max(sheets_overlapped.x, 0.0)) / SHEETS;
+                // Of the groups that the kernel reaches into, counted from the nearest; a whole one is drawn once.
+                let nth = select(group - u32(max(sheets_overlapped.x, 0.0)) / SHEETS, 0u, whole >= 0.0);
                 let word = (nth * gather.bricks + queued_place.x) * 2u + queued_place.y / 32u;
                 let bit = 1u << (queued_place.y % 32u);
                 if (atomicOr(&gathered.words[gather.drawn + word], bit) & bit) == 0u {
-                    sections_rasterized += u32(here.y - here.x);
+                    sections_rasterized += select(u32(here.y - here.x), 1u, whole >= 0.0);
                     voxels_shaded += select(0u, 1u, nth == 0u);
                 }
+            }
+
+            if ECONOMIES {
+                // Those that are drawn, one after the other.
+                let drawn = subgroupBallot(is_drawn).x;
+                count = countOneBits(drawn);
+                own = footprint_of(own, min(nth_set_bit(vec2u(drawn, 0u), lane), lanes - 1u));
+                own.amount = select(vec4f(0.0), own.amount, lane < count);
             }
 
             // Every lane adds all voxels' sections at its own pixels, two voxels at a time.
@@ -495,7 +565,7 @@ fn draw(tile: u32, thread: u32) {
                 image = composite_sheet(image, sheets.second);
                 image = composite_sheet(image, sheets.first);
             }
-            region = opened(region, is_inside & (transpose(image)[3] < vec4f(opaque_from)), column, rows);
+            region = opened(region, is_inside, transpose(image)[3], column, rows);
             if lane == 0u {
                 let tiles = tile_grid(frame.size);
                 let number = (at * tiles.y + pixel.y / TILE) * tiles.x + pixel.x / TILE;

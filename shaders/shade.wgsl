@@ -4,23 +4,13 @@
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> bricks: array<Brick>;
 @group(0) @binding(2) var values: texture_2d_array<f32>;
-// The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0).
+// The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0); then the table of labels.
 @group(0) @binding(3) var<storage, read> control_points: array<vec4f>;
 // Places: 64 times the brick's number, and the place in the brick.
 @group(0) @binding(4) var<storage, read> fresh: array<u32>;
 @group(0) @binding(5) var<storage, read> args: Indirect;
 @group(0) @binding(6) var<storage, read_write> splats: array<Splat>;
-
-// Piecewise linear between the control points first..end, clamped outside.
-fn ramp(first: u32, end: u32, value: f32) -> vec3f {
-    var upper = first;
-    while upper < end && control_points[upper].x <= value {
-        upper += 1u;
-    }
-    let a = control_points[max(upper, first + 1u) - 1u];
-    let b = control_points[min(upper, end - 1u)];
-    return between(a, b, value);
-}
+@group(0) @binding(7) var labels: texture_2d_array<u32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
@@ -30,11 +20,13 @@ fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) wor
     }
     let id = fresh[at];
     let voxel = voxel_of(bricks[id / BRICK_VOXELS], id % BRICK_VOXELS);
-    let value = value_at(index_of(voxel));
+    let index = index_of(voxel);
+    let value = value_at(index);
     let gradient = gradient_at(voxel);
-    let color = ramp(0u, frame.ramps.x, value);
-    let opacity = ramp(frame.ramps.x, frame.ramps.y, value).x;
-    let gradient_opacity = ramp(frame.ramps.y, frame.ramps.z, gradient.magnitude).x;
+    let ramps = ramps_of(index);
+    let color = ramp(ramps.x, ramps.y, value);
+    let opacity = ramp(ramps.y, ramps.z, value).x;
+    let gradient_opacity = ramp(ramps.z, ramps.w, gradient.magnitude).x;
     let m = amount(opacity * gradient_opacity);
     let p = project(voxel);
     let c = shade(color, gradient, lighting(p.xy, frame.near > 0.0)) * m;

@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
-use wgpu::{Device, Queue};
+use wgpu::{Device, Queue, TextureView};
 
 use crate::classify::{classify, takes_part};
 use crate::error::RenderError;
@@ -12,7 +12,7 @@ use crate::gpu::volume_texture::VolumeTexture;
 use crate::iso_range::ValueSet;
 use crate::plan::{Overlaps, tile_grid};
 use crate::stats::{Counts, GroupSlabs, Totals};
-use crate::transfer_function::{Ramp, TransferFunction};
+use crate::transfer_function::{LabelTables, Ramp, Tables, TransferFunction};
 use crate::value_list::ValueList;
 use crate::view::View;
 use crate::volume::{Grid, Volume};
@@ -22,9 +22,10 @@ use crate::volume::{Grid, Volume};
 pub struct ClassifiedVolume {
     volume: Arc<Volume>,
     transfer: TransferFunction,
-    values: ValueSet,
     list: OnceLock<ValueList>,
     pub(crate) texture: VolumeTexture,
+    /// Uploaded when tables first ask for labels.
+    labels: Option<VolumeTexture>,
     pub(crate) lists: BrickLists,
     /// Counts changes of the lists.
     pub(crate) revision: u64,
@@ -42,7 +43,8 @@ pub struct Touched {
 }
 
 impl ClassifiedVolume {
-    /// Uploads a volume's values, and the bricks of the voxels that take part (SPEC §3).
+    /// Uploads a volume's values, and the bricks of the voxels that take part (SPEC §3). Of a volume that is not segmented the
+    /// labels' tables are left out.
     ///
     /// # Errors
     /// If the volume is larger than the device's textures.
@@ -50,12 +52,37 @@ impl ClassifiedVolume {
         device: &Device,
         queue: &Queue,
         volume: Arc<Volume>,
-        transfer: TransferFunction,
+        mut transfer: TransferFunction,
     ) -> Result<Self, RenderError> {
+        if volume.labels().is_none() {
+            transfer.labels.clear();
+        }
         let texture = VolumeTexture::upload(device, queue, volume.values())?;
         let lists = BrickLists::upload(device, volume.grid(), &classify(&volume, &transfer));
-        let values = ValueSet::of(&transfer);
-        Ok(Self { volume, transfer, values, list: OnceLock::new(), texture, lists, revision: 0 })
+        Ok(Self { volume, transfer, list: OnceLock::new(), texture, labels: None, lists, revision: 0 })
+    }
+
+    /// Brings the GPU up to date.
+    ///
+    /// # Errors
+    /// If the volume's labels need more than the device allows.
+    pub(crate) fn flush(&mut self, device: &Device, queue: &Queue) -> Result<(), RenderError> {
+        if let (None, Some(labels)) = (&self.labels, self.volume.labels())
+            && self.shades_by_label()
+        {
+            self.labels = Some(VolumeTexture::upload_labels(device, queue, labels)?);
+        }
+        self.lists.flush(device, queue);
+        Ok(())
+    }
+
+    /// The labels on the GPU, if shading asks for them.
+    pub(crate) fn labels(&self) -> Option<&TextureView> {
+        self.labels.as_ref().filter(|_| self.shades_by_label()).map(|labels| &labels.view)
+    }
+
+    fn shades_by_label(&self) -> bool {
+        self.transfer.labels.values().any(LabelTables::matter_to_shading)
     }
 
     /// The volume.
@@ -79,29 +106,30 @@ impl ClassifiedVolume {
         self.list.get_or_init(|| ValueList::new(self.volume.values()))
     }
 
-    /// Changes colours, opacities, gradient opacity or iso-ranges (§5.1). Only voxels that enter or leave are touched: those
-    /// whose values gain or lose their opacity, found by binary search. Where the gradient opacity changes, all that are in range
-    /// must be looked at.
-    pub fn set_transfer_function(&mut self, transfer: TransferFunction) -> Touched {
-        let values = ValueSet::of(&transfer);
-        let is_everywhere = |ramp: &Option<Ramp<f64>>| {
-            ramp.as_ref().is_none_or(|ramp| ramp.points().iter().all(|&(_, opacity)| opacity > 0.0))
-        };
-        let gradients = [&transfer.gradient_opacity, &self.transfer.gradient_opacity];
-        let same_gradients = gradients[0] == gradients[1] || gradients.into_iter().all(is_everywhere);
-        let candidates = if same_gradients && values == self.values {
+    /// Changes colours, opacities, gradient opacity, iso-ranges or the labels' tables (§5.1). Only voxels that enter or leave are
+    /// touched: those whose values gain or lose their opacity, found by binary search. Where a gradient opacity changes, all that are
+    /// in range must be looked at. Of a volume that is not segmented the labels' tables are left out.
+    pub fn set_transfer_function(&mut self, mut transfer: TransferFunction) -> Touched {
+        if self.volume.labels().is_none() {
+            transfer.labels.clear();
+        }
+        let labels = self.transfer.labels.keys().chain(transfer.labels.keys()).copied().map(Some);
+        let mut labels: Vec<Option<u16>> = labels.chain([None]).collect();
+        labels.sort_unstable();
+        labels.dedup();
+        // Some have another label, and are looked at in vain.
+        let changed = (labels.into_iter())
+            .map(|label| changed_values(&self.transfer.tables(label), &transfer.tables(label)))
+            .fold(ValueSet::default(), |all, values| all.union(&values));
+        let candidates = if changed.ranges().is_empty() {
             Vec::new()
         } else {
-            let set = match same_gradients {
-                true => values.symmetric_difference(&self.values),
-                false => values.union(&self.values),
-            };
-            let mut candidates = self.value_list().within(self.volume.values(), &set);
+            let mut candidates = self.value_list().within(self.volume.values(), &changed);
             // In memory order, where neighbours share cache lines.
             candidates.par_sort_unstable();
             candidates
         };
-        (self.transfer, self.values) = (transfer, values);
+        self.transfer = transfer;
 
         let (volume, transfer, lists) = (&*self.volume, &self.transfer, &self.lists);
         let (entering, leaving): (Vec<u32>, Vec<u32>) = (candidates.into_par_iter())
@@ -120,9 +148,18 @@ impl ClassifiedVolume {
         self.set_transfer_function(TransferFunction { iso_ranges, ..self.transfer.clone() })
     }
 
+    /// Shows or hides the voxels of a label. Touches what [`Self::set_transfer_function`] does; nothing in a volume that is not
+    /// segmented.
+    pub fn set_label_visible(&mut self, label: u16, visible: bool) -> Touched {
+        let mut transfer = self.transfer.clone();
+        transfer.labels.entry(label).or_default().visible = visible;
+        self.set_transfer_function(transfer)
+    }
+
     /// Bytes of GPU memory.
     pub fn gpu_bytes(&self) -> u64 {
-        self.texture.gpu_bytes + self.lists.gpu_bytes()
+        let textures = [Some(&self.texture), self.labels.as_ref()].into_iter().flatten();
+        textures.map(|texture| texture.gpu_bytes).sum::<u64>() + self.lists.gpu_bytes()
     }
 
     /// What of a frame's counts (Table 4) is known before it is drawn.
@@ -143,5 +180,18 @@ impl ClassifiedVolume {
             ..Counts::default()
         };
         Totals { counts, group_sheets: groups.firsts.iter().map(|&first| sheets_of(first)).collect() }
+    }
+}
+
+/// The values of voxels that may enter or leave when their tables change.
+fn changed_values(old: &Tables, new: &Tables) -> ValueSet {
+    let is_everywhere =
+        |ramp: Option<&Ramp<f64>>| ramp.is_none_or(|ramp| ramp.points().iter().all(|&(_, opacity)| opacity > 0.0));
+    let gradients = [old.gradient_opacity, new.gradient_opacity];
+    let same_gradients = gradients[0] == gradients[1] || gradients.into_iter().all(is_everywhere);
+    let values = [old, new].map(ValueSet::of_tables);
+    match same_gradients {
+        true => values[0].symmetric_difference(&values[1]),
+        false => values[0].union(&values[1]),
     }
 }

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use crate::transfer_function::{Ramp, TransferFunction};
+use crate::transfer_function::{Ramp, Tables, TransferFunction};
 
 /// A set of values: ranges of ordinals, ascending, disjoint and not adjacent.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -32,10 +32,19 @@ fn above(x: f64) -> u32 {
 }
 
 impl ValueSet {
-    /// The values that can take part under a transfer function (SPEC §3): in an iso-range, and with an opacity above 0.
+    /// The values that can take part under a transfer function (SPEC §3) without a label: in an iso-range, and with an opacity
+    /// above 0.
     pub fn of(transfer: &TransferFunction) -> Self {
-        let opaque = Self::support(&transfer.opacity);
-        match &transfer.iso_ranges {
+        Self::of_tables(&transfer.tables(None))
+    }
+
+    /// The values that can take part under the tables of a label.
+    pub fn of_tables(tables: &Tables) -> Self {
+        if !tables.visible {
+            return Self::default();
+        }
+        let opaque = Self::support(tables.opacity);
+        match tables.iso_ranges {
             None => opaque,
             Some(ranges) => {
                 opaque.intersection(&Self::of_ranges(ranges.iter().map(|&[lo, hi]| at_least(lo)..above(hi)).collect()))
@@ -111,6 +120,8 @@ impl ValueSet {
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "tests")]
 mod tests {
+    use std::collections::BTreeMap;
+
     use glam::DVec3;
 
     use super::*;
@@ -121,6 +132,7 @@ mod tests {
             opacity: Ramp::new(opacity.to_vec()).unwrap(),
             gradient_opacity: None,
             iso_ranges: iso_ranges.map(<[[f64; 2]]>::to_vec),
+            labels: BTreeMap::new(),
         }
     }
 

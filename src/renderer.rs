@@ -17,7 +17,7 @@ use crate::rasterizer::quads::QuadRasterizer;
 use crate::rasterizer::tiles::TileRasterizer;
 use crate::rasterizer::{Given, filled};
 use crate::scene_view::{Prepared, SceneView};
-use crate::splatting::{FootprintBox, Rasterizer, Splatting};
+use crate::splatting::{Economies, FootprintBox, Rasterizer, Splatting};
 use crate::view::View;
 
 /// What a renderer is made for.
@@ -92,7 +92,7 @@ impl Renderer {
             _ => Some(CompositingBuffer::new(device, size)?),
         };
         let by_tiles = by_tiles(device, splatting)?;
-        volume.lists.flush(device, queue);
+        volume.flush(device, queue)?;
         let old = frame.take();
         let (old_compositing, uniform, control_points, drawing, totals) = old.map_or_else(Default::default, |old| {
             let PreparedFrame { compositing, uniform, control_points, drawing, totals, .. } = old;
@@ -215,9 +215,10 @@ fn by_tiles(device: &Device, splatting: &Splatting) -> Result<bool, RenderError>
     let insists = insists_on_tiles(splatting);
     match (splatting.rasterizer, TileRasterizer::obstacle(device, splatting)) {
         (Rasterizer::Quads, _) if insists => Err(RenderError::OutOfRange {
-            key: "splatting.footprint_box",
-            found: "\"parallelogram\" with splatting.rasterizer = \"quads\"".to_owned(),
-            allowed: "\"rectangle\" with it, or the rasterizer \"tiles\"".to_owned(),
+            key: "splatting.rasterizer",
+            found: "\"quads\" with splatting.footprint_box = \"parallelogram\", whole_below, beta or resolution"
+                .to_owned(),
+            allowed: "\"tiles\" or \"auto\" with them".to_owned(),
         }),
         (Rasterizer::Quads, _) => Ok(false),
         (_, Some(obstacle)) if insists => Err(obstacle),
@@ -227,5 +228,7 @@ fn by_tiles(device: &Device, splatting: &Splatting) -> Result<bool, RenderError>
 
 /// Whether quads will not do.
 fn insists_on_tiles(splatting: &Splatting) -> bool {
-    splatting.rasterizer == Rasterizer::Tiles || splatting.footprint_box == FootprintBox::Parallelogram
+    splatting.rasterizer == Rasterizer::Tiles
+        || splatting.footprint_box == FootprintBox::Parallelogram
+        || splatting.economies != Economies::default()
 }

@@ -36,8 +36,12 @@ impl SceneView {
     /// not looked at.
     ///
     /// # Errors
-    /// If the volume is larger than the device's textures.
+    /// If the volume is larger than the device's textures, or has no labels and the scene has tables for some.
     pub fn new(device: &Device, queue: &Queue, volume: Arc<Volume>, scene: &Scene) -> Result<Self, RenderError> {
+        if !scene.transfer.labels.is_empty() && volume.labels().is_none() {
+            let (key, found) = ("transfer.label", "tables for a volume without labels".to_owned());
+            return Err(RenderError::OutOfRange { key, found, allowed: "none, or labels in the volume".to_owned() });
+        }
         let transfer = scene.transfer.resolve(&volume);
         let volume = ClassifiedVolume::new(device, queue, volume, transfer)?;
         Ok(Self { volume, scene: scene.clone(), frame: None })
@@ -53,7 +57,7 @@ impl SceneView {
         &self.volume
     }
 
-    /// Changes colours, opacities, gradient opacity or iso-ranges. What keeps its opacity above 0 is shaded anew and nothing more;
+    /// Changes colours, opacities, gradient opacity, iso-ranges or the labels' tables. What keeps its opacity above 0 is shaded anew and nothing more;
     /// see [`ClassifiedVolume::set_transfer_function`].
     pub fn set_transfer_function(&mut self, transfer: TransferFunction) -> Touched {
         self.volume.set_transfer_function(transfer)
@@ -62,6 +66,11 @@ impl SceneView {
     /// Changes the iso-ranges alone; touches only voxels that enter or leave.
     pub fn set_iso_ranges(&mut self, iso_ranges: Option<Vec<[f64; 2]>>) -> Touched {
         self.volume.set_iso_ranges(iso_ranges)
+    }
+
+    /// Shows or hides the voxels of a label of a segmented volume; touches only those.
+    pub fn set_label_visible(&mut self, label: u16, visible: bool) -> Touched {
+        self.volume.set_label_visible(label, visible)
     }
 
     /// Changes the camera: bricks are sorted into buckets again.

@@ -62,6 +62,26 @@ pub enum FootprintBox {
     Parallelogram,
 }
 
+/// Ways to draw less where it hardly shows (§8, the paper's future work). By tiles only.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Economies {
+    /// Voxels with an opacity per unit length below this are projected as whole kernels, into the sheet that their centre lies in.
+    /// 0 for none.
+    pub whole_below: f64,
+    /// β-acceleration: where everything within a kernel's box has this opacity by then, the kernel is projected whole, into the first
+    /// group of sheets that it reaches. Changes no channel by more than `1 - beta`. Front to back only; 1 for off.
+    pub beta: f64,
+    /// A footprint ends where it adds less than this to its sheet's alpha. 0 for the whole kernel.
+    pub resolution: f64,
+}
+
+impl Default for Economies {
+    /// None.
+    fn default() -> Self {
+        Self { whole_below: 0.0, beta: 1.0, resolution: 0.0 }
+    }
+}
+
 /// All splatting settings of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Splatting {
@@ -91,6 +111,8 @@ pub struct Splatting {
     pub rasterizer: Rasterizer,
     /// What early splat elimination tests.
     pub footprint_box: FootprintBox,
+    /// What is left out where it hardly shows.
+    pub economies: Economies,
 }
 
 impl Default for Splatting {
@@ -108,6 +130,7 @@ impl Default for Splatting {
             tiles: true,
             rasterizer: Rasterizer::Auto,
             footprint_box: FootprintBox::Rectangle,
+            economies: Economies::default(),
         }
     }
 }

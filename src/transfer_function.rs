@@ -1,5 +1,6 @@
 //! Transfer functions: from voxel values to colour and opacity (SPEC §3).
 
+use std::collections::BTreeMap;
 use std::ops::{Add, Mul};
 
 use glam::DVec3;
@@ -71,7 +72,7 @@ impl<T: Copy + Add<Output = T> + Mul<f64, Output = T>> Ramp<T> {
     }
 }
 
-/// What a voxel's value and gradient look like.
+/// What a voxel's value and gradient look like, and its label in a segmented volume.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TransferFunction {
     /// Red, green and blue in [0, 1] over voxel values.
@@ -82,21 +83,89 @@ pub struct TransferFunction {
     pub gradient_opacity: Option<Ramp<f64>>,
     /// Closed intervals `[lo, hi]` of the values that take part; `None` is all of them.
     pub iso_ranges: Option<Vec<[f64; 2]>>,
+    /// Of a segmented volume the tables of single labels. Labels without any go by the ramps above. They mean nothing for other
+    /// volumes.
+    pub labels: BTreeMap<u16, LabelTables>,
 }
 
-impl TransferFunction {
-    /// α, the opacity per unit length: `opacity(value) · gradient_opacity(|g|)`, and 0 outside the iso-ranges.
+/// What a label's voxels look like instead.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LabelTables {
+    /// Whether they take part at all.
+    pub visible: bool,
+    /// As [`TransferFunction::color`], which `None` stands for.
+    pub color: Option<Ramp<DVec3>>,
+    /// As [`TransferFunction::opacity`], which `None` stands for.
+    pub opacity: Option<Ramp<f64>>,
+    /// As [`TransferFunction::gradient_opacity`], which `None` stands for.
+    pub gradient_opacity: Option<Ramp<f64>>,
+}
+
+impl Default for LabelTables {
+    fn default() -> Self {
+        Self { visible: true, color: None, opacity: None, gradient_opacity: None }
+    }
+}
+
+impl LabelTables {
+    /// Whether voxels that take part look otherwise than without them; else only who takes part is another.
+    pub fn matter_to_shading(&self) -> bool {
+        self.visible && (self.color.is_some() || self.opacity.is_some() || self.gradient_opacity.is_some())
+    }
+}
+
+/// The tables that voxels of one label go by, whether they are the label's own or not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tables<'a> {
+    /// Whether they take part at all.
+    pub visible: bool,
+    /// [`TransferFunction::color`].
+    pub color: &'a Ramp<DVec3>,
+    /// [`TransferFunction::opacity`].
+    pub opacity: &'a Ramp<f64>,
+    /// [`TransferFunction::gradient_opacity`].
+    pub gradient_opacity: Option<&'a Ramp<f64>>,
+    /// [`TransferFunction::iso_ranges`], the same for all labels.
+    pub iso_ranges: Option<&'a [[f64; 2]]>,
+}
+
+impl Tables<'_> {
+    /// α, the opacity per unit length: `opacity(value) · gradient_opacity(|g|)`, and 0 outside the iso-ranges or if invisible.
     pub fn alpha(&self, value: f64, gradient_magnitude: f64) -> f64 {
-        if !self.in_iso_range(value) {
+        if !self.visible || !self.in_iso_range(value) {
             return 0.0;
         }
-        let factor = self.gradient_opacity.as_ref().map_or(1.0, |ramp| ramp.at(gradient_magnitude));
+        let factor = self.gradient_opacity.map_or(1.0, |ramp| ramp.at(gradient_magnitude));
         self.opacity.at(value) * factor
     }
 
     /// Whether a voxel of this value takes part at all.
     pub fn in_iso_range(&self, value: f64) -> bool {
-        self.iso_ranges.as_ref().is_none_or(|ranges| ranges.iter().any(|&[lo, hi]| lo <= value && value <= hi))
+        self.iso_ranges.is_none_or(|ranges| ranges.iter().any(|&[lo, hi]| lo <= value && value <= hi))
+    }
+}
+
+impl TransferFunction {
+    /// The tables that voxels of a label go by; `None` for those of a volume that is not segmented.
+    pub fn tables(&self, label: Option<u16>) -> Tables<'_> {
+        let own = label.and_then(|label| self.labels.get(&label));
+        Tables {
+            visible: own.is_none_or(|own| own.visible),
+            color: own.and_then(|own| own.color.as_ref()).unwrap_or(&self.color),
+            opacity: own.and_then(|own| own.opacity.as_ref()).unwrap_or(&self.opacity),
+            gradient_opacity: own.and_then(|own| own.gradient_opacity.as_ref()).or(self.gradient_opacity.as_ref()),
+            iso_ranges: self.iso_ranges.as_deref(),
+        }
+    }
+
+    /// [`Tables::alpha`] without a label.
+    pub fn alpha(&self, value: f64, gradient_magnitude: f64) -> f64 {
+        self.tables(None).alpha(value, gradient_magnitude)
+    }
+
+    /// Whether a voxel of this value takes part at all.
+    pub fn in_iso_range(&self, value: f64) -> bool {
+        self.tables(None).in_iso_range(value)
     }
 
     /// A transfer function for volumes that come without one: a nearly opaque surface around what stands out from the
@@ -118,6 +187,7 @@ impl TransferFunction {
             opacity: Ramp { points: opacity },
             gradient_opacity: None,
             iso_ranges: None,
+            labels: BTreeMap::new(),
         }
     }
 }

@@ -53,6 +53,8 @@ impl ValueList {
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "tests")]
 mod tests {
+    use std::collections::BTreeMap;
+
     use glam::DVec3;
 
     use super::*;
@@ -68,6 +70,7 @@ mod tests {
                 opacity: Ramp::new(vec![(0.0, 1.0)]).unwrap(),
                 gradient_opacity: None,
                 iso_ranges: Some(vec![iso_range]),
+                labels: BTreeMap::new(),
             });
             let mut found = list.within(&values, &set);
             assert!(found.is_sorted_by_key(|&voxel| values[voxel as usize]));

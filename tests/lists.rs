@@ -31,8 +31,8 @@ fn head() -> (Arc<Volume>, Scene) {
 
 /// The transfer function as settings, so that a fresh view can be made with it.
 fn settings(transfer: &TransferFunction) -> TransferSettings {
-    let TransferFunction { color, opacity, gradient_opacity, iso_ranges } = transfer.clone();
-    TransferSettings { color: Some(color), opacity: Some(opacity), gradient_opacity, iso_ranges }
+    let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels } = transfer.clone();
+    TransferSettings { color: Some(color), opacity: Some(opacity), gradient_opacity, iso_ranges, labels }
 }
 
 /// The voxels that take part, by a scan.
@@ -41,7 +41,7 @@ fn taking_part(volume: &Volume, transfer: &TransferFunction) -> Vec<bool> {
         .zip(volume.values())
         .map(|(index, &value)| {
             let gradient = volume.gradient(volume.grid().voxel_at(index));
-            transfer.alpha(value.into(), gradient.length()) > 0.0
+            transfer.tables(volume.label(index)).alpha(value.into(), gradient.length()) > 0.0
         })
         .collect()
 }

@@ -1,6 +1,7 @@
 //! Scene files, `--set` overrides and their errors; transfer functions, given and chosen.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::{DVec3, UVec3};
@@ -8,7 +9,7 @@ use sheetsplat::camera::{Camera, Projection};
 use sheetsplat::scene::{ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use sheetsplat::shading::{Light, Shading};
 use sheetsplat::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
-use sheetsplat::transfer_function::{Ramp, RampError, TransferFunction};
+use sheetsplat::transfer_function::{LabelTables, Ramp, RampError, TransferFunction};
 use sheetsplat::volume::Volume;
 
 const MINIMAL: &str = "[volume]\npath = 'a.nrrd'\n";
@@ -26,7 +27,7 @@ fn file(path: &str) -> VolumeSource {
 fn defaults() {
     let scene = parse(MINIMAL, &[]).unwrap();
     assert_eq!(scene, Scene::new(file("folder/a.nrrd")));
-    assert_eq!(scene.spacing, None);
+    assert_eq!((scene.spacing, &scene.labels), (None, &None));
     assert_eq!(scene.camera, Camera::default());
     assert_eq!(scene.image, ImageSettings { width: 512, height: 512, background: [0.0, 0.0, 0.0, 1.0] });
     assert_eq!(scene.transfer, TransferSettings::default());
@@ -45,6 +46,7 @@ fn every_key() {
         [volume]
         path = "../b.nrrd"
         spacing = [1, 1.5, 3.0]
+        labels = "segments/b.nrrd"
         [camera]
         projection = "perspective"
         direction = [1, 0.5, 0]
@@ -63,6 +65,15 @@ fn every_key() {
         opacity = [[40, 0], [60, 0.8]]
         gradient_opacity = [[0, 0.5]]
         iso_ranges = [[40, 255], [300, 300]]
+        [[transfer.label]]
+        label = 65535
+        visible = true
+        color = [[3, [1, 1, 1]]]
+        opacity = [[0, 0], [9, 1]]
+        gradient_opacity = [[2, 0.25]]
+        [[transfer.label]]
+        label = 0
+        visible = false
         [shading]
         enabled = false
         light = [0, 0, 2]
@@ -88,6 +99,7 @@ fn every_key() {
     let expected = Scene {
         volume: file("folder/../b.nrrd"),
         spacing: Some(DVec3::new(1.0, 1.5, 3.0)),
+        labels: Some(PathBuf::from("folder/segments/b.nrrd")),
         camera: Camera {
             projection: Projection::Perspective { fov_y: 45.0, distance: Some(400.0), near: Some(2.0) },
             direction: DVec3::new(1.0, 0.5, 0.0),
@@ -100,6 +112,19 @@ fn every_key() {
             opacity: Some(Ramp::new(vec![(40.0, 0.0), (60.0, 0.8)]).unwrap()),
             gradient_opacity: Some(Ramp::new(vec![(0.0, 0.5)]).unwrap()),
             iso_ranges: Some(vec![[40.0, 255.0], [300.0, 300.0]]),
+            labels: [
+                (0, LabelTables { visible: false, ..LabelTables::default() }),
+                (
+                    65535,
+                    LabelTables {
+                        visible: true,
+                        color: Some(Ramp::new(vec![(3.0, DVec3::ONE)]).unwrap()),
+                        opacity: Some(Ramp::new(vec![(0.0, 0.0), (9.0, 1.0)]).unwrap()),
+                        gradient_opacity: Some(Ramp::new(vec![(2.0, 0.25)]).unwrap()),
+                    },
+                ),
+            ]
+            .into(),
         },
         shading: Shading {
             enabled: false,
@@ -146,7 +171,8 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
     ("volume.spacing", "2.0", "volume.spacing", "2.0 (float)", "3 numbers, each a finite number > 0"),
     ("volume.spacing", "[1, 0, 1]", "volume.spacing[1]", "0", "a finite number > 0"),
     ("volume.spacing", "[1, 1, inf]", "volume.spacing[2]", "inf", "a finite number > 0"),
-    ("volume.file", "'a'", "volume.file", "an unknown key", "path, builtin, spacing"),
+    ("volume.labels", "3", "volume.labels", "3 (integer)", "a label file's path"),
+    ("volume.file", "'a'", "volume.file", "an unknown key", "path, builtin, spacing, labels"),
     ("camera.projection", "'ortho'", "camera.projection", "\"ortho\"", "\"orthographic\" or \"perspective\""),
     ("camera.projection", "1", "camera.projection", "1 (integer)", "\"orthographic\" or \"perspective\""),
     ("camera.direction", "[0, 0, 0.0]", "camera.direction", "[0, 0, 0.0]", "a vector other than [0, 0, 0]"),
@@ -211,6 +237,37 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
     ("transfer.iso_ranges", "[[0, 1], [5, 4.5]]", "transfer.iso_ranges[1]", "[5, 4.5]", "[lo, hi] with lo <= hi"),
     ("transfer.iso_ranges", "[[0, inf]]", "transfer.iso_ranges[0][1]", "inf", "a finite number"),
     ("transfer.colour", "[]", "transfer.colour", "an unknown key", "color, opacity, gradient_opacity, iso_ranges"),
+    ("transfer.label", "{ label = 1 }", "transfer.label", "{ label = 1 } (table)", "tables [[transfer.label]]"),
+    ("transfer.label", "[3]", "transfer.label[0]", "3 (integer)", "a table [[transfer.label]]"),
+    ("transfer.label", "[{}]", "transfer.label[0].label", "no such key", "an integer from 0 to 65535"),
+    ("transfer.label", "[{label = -1}]", "transfer.label[0].label", "-1", "an integer from 0 to 65535"),
+    ("transfer.label", "[{label = 65536}]", "transfer.label[0].label", "65536", "an integer from 0 to 65535"),
+    ("transfer.label", "[{label = 1.0}]", "transfer.label[0].label", "1.0 (float)", "an integer from 0 to 65535"),
+    (
+        "transfer.label",
+        "[{label = 1}, {label = 1}]",
+        "transfer.label[1].label",
+        "1",
+        "a label that no table before has",
+    ),
+    ("transfer.label", "[{label = 1, visible = 0}]", "transfer.label[0].visible", "0 (integer)", "true or false"),
+    (
+        "transfer.label",
+        "[{label = 1}, {label = 2, opacity = [[0, 0], [60, 1.5]]}]",
+        "transfer.label[1].opacity[1][1]",
+        "1.5",
+        "a number in [0, 1]",
+    ),
+    ("transfer.label", "[{label = 1, color = []}]", "transfer.label[0].color", "[]", "one or more [value, [r, g, b]]"),
+    (
+        "transfer.label",
+        "[{label = 1, iso_ranges = [[0, 1]]}]",
+        "transfer.label[0].iso_ranges",
+        "an unknown key",
+        "label, visible, color, opacity, gradient_opacity",
+    ),
+    // Of a volume without labels.
+    ("transfer.label", "[{label = 1}]", "transfer.label", "tables for a volume without labels", "volume.labels"),
     ("shading.enabled", "1", "shading.enabled", "1 (integer)", "true or false"),
     ("shading.light", "'sun'", "shading.light", "\"sun\"", "\"headlight\" or [x, y, z]"),
     ("shading.light", "3", "shading.light", "3 (integer)", "\"headlight\" or [x, y, z]"),
@@ -305,6 +362,26 @@ fn refused_files() {
 }
 
 #[test]
+fn label_tables_need_labels() {
+    let text = "[[transfer.label]]\nlabel = 3\n[volume]\n";
+    for volume in ["builtin = 'head'", "builtin = 'tomato:64'", "path = 'a.nrrd'\nlabels = 'b.nrrd'"] {
+        assert_eq!(parse(&format!("{text}{volume}"), &[]).unwrap().transfer.labels.len(), 1, "{volume}");
+    }
+    let refused = |text: &str, sets: &[&str], origin: &str| {
+        let message = parse(text, sets).unwrap_err().to_string();
+        let expected = "transfer.label: found tables for a volume without labels, \
+                        allowed: none, or volume.labels, or volume.builtin = \"head\" or \"tomato\"";
+        assert_eq!(message, format!("{origin}: {expected}"));
+    };
+    refused(&format!("{text}builtin = 'cube'"), &[], "scene.toml");
+    refused(&format!("{text}builtin = 'head'"), &["volume.builtin=nerve:40"], "--set");
+    refused(MINIMAL, &["transfer.label=[{label=1}]"], "--set");
+    parse(MINIMAL, &["transfer.label=[{label=1}]", "volume.labels=b.nrrd"]).unwrap();
+    // What is wrong is the name, which the volume's own error explains.
+    parse(&format!("{text}builtin = 'skull'"), &[]).unwrap();
+}
+
+#[test]
 fn long_values_are_cut() {
     let text = format!("{MINIMAL}[camera]\nprojection = \"\"\"\n{}\n\"\"\"", "ä\n".repeat(1000));
     let SceneError::Invalid { found, .. } = parse(&text, &[]).unwrap_err() else { panic!("another error") };
@@ -391,6 +468,23 @@ fn directions_of_any_length() {
     }
 }
 
+/// What a label's table leaves out is the main one's.
+#[test]
+fn tables_of_labels() {
+    let scene = "[volume]\nbuiltin = 'head:8'\n[transfer]\ncolor = [[0, [1, 1, 1]]]\nopacity = [[0, 0.5]]\n\
+                 gradient_opacity = [[0, 0.5]]\niso_ranges = [[10, 20]]\n\
+                 [[transfer.label]]\nlabel = 2\nopacity = [[0, 0.25]]\n\
+                 [[transfer.label]]\nlabel = 4\ncolor = [[0, [1, 0, 0]]]\ngradient_opacity = [[0, 1]]\n\
+                 [[transfer.label]]\nlabel = 5\nvisible = false\nopacity = [[0, 1]]";
+    let scene = parse(scene, &[]).unwrap();
+    let transfer = scene.transfer.resolve(&scene.load_volume().unwrap());
+    let looks = [None, Some(0), Some(2), Some(4), Some(5)].map(|label| {
+        let tables = transfer.tables(label);
+        (tables.color.at(15.0).y, tables.alpha(15.0, 3.0), tables.alpha(25.0, 3.0))
+    });
+    assert_eq!(looks, [(1.0, 0.25, 0.0), (1.0, 0.25, 0.0), (1.0, 0.125, 0.0), (0.0, 0.5, 0.0), (1.0, 0.0, 0.0)]);
+}
+
 #[test]
 fn scene_files() {
     let folder = tempfile::tempdir().unwrap();
@@ -459,6 +553,7 @@ fn alpha() {
         opacity: Ramp::new(vec![(0.0, 0.0), (10.0, 1.0)]).unwrap(),
         gradient_opacity: None,
         iso_ranges: None,
+        labels: BTreeMap::new(),
     };
     assert_eq!((transfer.alpha(5.0, 0.0), transfer.alpha(20.0, 0.0)), (0.5, 1.0));
     transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.0), (4.0, 1.0)]).unwrap());

@@ -32,7 +32,7 @@ struct Frame {
     tiles: u32,
     per_unit: f32,
     headlight: u32,
-    padding: u32,
+    last_label: u32,
 }
 
 const LINEAR = 0u;

@@ -13,7 +13,11 @@ struct Gather {
     composited: u32,
     shear: f32,
     half_width: f32,
-    padding: u32,
+    whole_below: f32,
+    beta: f32,
+    peak: f32,
+    padding_0: u32,
+    padding_1: u32,
 }
 
 struct Part {

@@ -36,6 +36,12 @@ pub fn texture(stages: ShaderStages, view_dimension: TextureViewDimension) -> Sl
     (stages, BindingType::Texture { sample_type, view_dimension, multisampled: false })
 }
 
+/// The same of whole numbers.
+pub fn texture_of_integers(stages: ShaderStages, view_dimension: TextureViewDimension) -> Slot {
+    let sample_type = TextureSampleType::Uint;
+    (stages, BindingType::Texture { sample_type, view_dimension, multisampled: false })
+}
+
 /// A buffer of at least `size` bytes: the previous one if it is large enough, and not much too large.
 pub fn grown(device: &Device, previous: Option<Buffer>, label: &str, size: u64, usage: BufferUsages) -> Buffer {
     let fits = |buffer: &Buffer| (size..=4 * size).contains(&buffer.size()) && buffer.usage().contains(usage);

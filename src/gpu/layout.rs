@@ -53,7 +53,7 @@ pub struct Frame {
     pub gradient: [f32; 4],
     /// Volume dimensions; w unused.
     pub dims: [u32; 4],
-    /// Ends of the colour, opacity and gradient opacity ramps in the control points; w unused.
+    /// Ends of the colour, opacity and gradient opacity ramps in the control points, and where there the table of labels starts.
     pub ramps: [u32; 4],
     /// Image width and height, pixels.
     pub size: [u32; 2],
@@ -92,8 +92,8 @@ pub struct Frame {
     pub per_unit: f32,
     /// 1 if the light is at the eye, 0 if it is elsewhere.
     pub headlight: u32,
-    /// Unused.
-    pub padding: u32,
+    /// Last entry of the table of labels, which is that of all greater labels, too.
+    pub last_label: u32,
 }
 
 /// One sheet group and one list's bricks that may reach into it.
@@ -260,8 +260,16 @@ pub struct Gather {
     pub shear: f32,
     /// Half its width, pixels.
     pub half_width: f32,
+    /// Voxels of less opacity are projected whole.
+    pub whole_below: f32,
+    /// From this opacity on kernels are projected whole.
+    pub beta: f32,
+    /// A whole kernel's integral through its centre, over what a footprint must add to a sheet's alpha.
+    pub peak: f32,
     /// Unused.
-    pub padding: u32,
+    pub padding_0: u32,
+    /// Unused.
+    pub padding_1: u32,
 }
 
 /// The tiles and groups that one dispatch draws.

@@ -28,7 +28,7 @@ pub const CULL_VOXELS: Shader = shader!("cull_voxels", "frame", "brick", "tally"
 /// Those voxels in a row.
 pub const COMPACT: Shader = shader!("compact", "brick", "tally", "culled", "scan");
 /// Shades those that were not shaded before.
-pub const SHADE: Shader = shader!("shade", "frame", "brick", "volume", "project", "splat", "shading");
+pub const SHADE: Shader = shader!("shade", "frame", "brick", "volume", "project", "splat", "shading", "ramps");
 /// The tiles they touch.
 pub const TILES: Shader = shader!("tiles", "frame", "brick", "tally", "culled", "tile_list");
 /// Zeroes the sheet buffers there.
@@ -43,8 +43,19 @@ pub const COMPOSITE: Shader = shader!("composite", "frame", "brick", "band", "ti
 /// Computes the occlusion buffer.
 pub const OCCLUDE: Shader = shader!("occlude", "frame", "brick", "tile_list");
 /// Draws whole tiles from front to back.
-pub const GATHER: Shader =
-    shader!("gather", "frame", "brick", "tally", "gather", "volume", "project", "local_ray", "shading", "compositing");
+pub const GATHER: Shader = shader!(
+    "gather",
+    "frame",
+    "brick",
+    "tally",
+    "gather",
+    "volume",
+    "project",
+    "local_ray",
+    "shading",
+    "ramps",
+    "compositing"
+);
 /// Lays the result over the background.
 pub const RESOLVE: Shader = shader!("resolve", "frame", "band");
 

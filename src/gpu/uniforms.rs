@@ -1,6 +1,6 @@
 //! A frame's plain data in the GPU's layout.
 
-use std::ops::{Add, Mul};
+use std::ops::{Add, Mul, Range};
 
 use glam::{DMat2, DVec2, DVec3, DVec4};
 
@@ -12,7 +12,7 @@ use crate::scene::Scene;
 use crate::shading::{Light, MIN_GRADIENT, Shading};
 use crate::splatting::{Compositing, Order, Splatting};
 use crate::tile_bins::{self, TileBins};
-use crate::transfer_function::{Ramp, TransferFunction};
+use crate::transfer_function::{Ramp, Tables, TransferFunction};
 use crate::view::View;
 use crate::volume::Grid;
 
@@ -48,7 +48,7 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
         background: DVec4::new(r * a, g * a, b * a, a).as_vec4().to_array(),
         gradient: (0.5 / grid.aspect()).extend(MIN_GRADIENT).as_vec4().to_array(),
         dims: grid.dims.extend(0).to_array(),
-        ramps: [color_end, opacity_end, gradient_opacity_end, 0],
+        ramps: [color_end, opacity_end, gradient_opacity_end, ramps.label_table.start],
         size: view.size,
         amplitude: (view.footprint.amplitude / view.lambda) as f32,
         radius: kernel.radius() as f32,
@@ -67,12 +67,14 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
         tiles: u32::from(scene.splatting.tiles),
         per_unit: grid.unit().recip().sqrt().min(f32::MAX.into()) as f32,
         headlight: u32::from(scene.shading.light == Light::Headlight),
-        padding: 0,
+        last_label: ramps.label_table.len().saturating_sub(1) as u32,
     }
 }
 
 /// What the tile rasterizer's threads share, over a volume of so many `bricks`.
-pub fn gather(view: &View, kernel: &Kernel, bins: &TileBins, bricks: u32) -> Gather {
+pub fn gather(view: &View, kernel: &Kernel, splatting: &Splatting, bins: &TileBins, bricks: u32) -> Gather {
+    let economies = splatting.economies;
+    let whole = kernel.section(0.0, -kernel.radius(), kernel.radius());
     let support_squared = kernel.support().powi(2);
     let in_f32 = |numbers: [f64; 4]| numbers.map(|x| x as f32);
     let FootprintMap { footprint_from_pixels, .. } = view.footprint;
@@ -93,7 +95,15 @@ pub fn gather(view: &View, kernel: &Kernel, bins: &TileBins, bricks: u32) -> Gat
         composited: bins.groups + 2 * bricks * groups_per_kernel(view),
         shear: shear as f32,
         half_width: half_width as f32,
-        padding: 0,
+        whole_below: economies.whole_below as f32,
+        beta: if splatting.order == Order::FrontToBack && economies.beta < 1.0 {
+            economies.beta as f32
+        } else {
+            f32::MAX
+        },
+        peak: (whole / economies.resolution).min(f32::MAX.into()) as f32,
+        padding_0: 0,
+        padding_1: 0,
     }
 }
 
@@ -152,35 +162,64 @@ fn half_vector(to_light: DVec3, to_eye: DVec3) -> DVec3 {
     if sum.length() < 1e-12 { DVec3::ZERO } else { sum.normalize() }
 }
 
-/// A transfer function's control points for `shade.wgsl`.
+/// A transfer function's control points, for the stages that shade.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ramps {
-    /// Value, then rgb or (ordinate, 0, 0); colour, opacity, gradient opacity, one after the other.
+    /// Value, then rgb or (ordinate, 0, 0); colour, opacity, gradient opacity, one after the other: first the main ones, then those
+    /// of labels. Then the table of labels.
     pub points: Vec<[f32; 4]>,
-    /// Where each ramp ends.
+    /// Where each of the main ramps ends.
     pub ends: [u32; 3],
+    /// Where in `points` there is for every label where its ramps start and where each of them ends, as numbers that `f32` counts
+    /// exactly. The last one is the main ramps', and serves all greater labels. Empty if no label has ramps of its own.
+    pub label_table: Range<u32>,
+    /// The most control points of each ramp.
+    lengths: [u32; 3],
 }
 
 impl Ramps {
     /// All ramps of a transfer function; without a gradient opacity that one is 1 everywhere.
     pub fn new(transfer: &TransferFunction) -> Self {
-        let scalar = |(at, y): (f64, f64)| DVec4::new(at, y, 0.0, 0.0);
-        let gradient_opacity = transfer.gradient_opacity.as_ref().map_or(vec![(0.0, 1.0)], in_f32);
-        let mut points: Vec<DVec4> =
-            in_f32(&transfer.color).into_iter().map(|(at, rgb)| DVec4::new(at, rgb.x, rgb.y, rgb.z)).collect();
-        let color_end = points.len() as u32;
-        points.extend(in_f32(&transfer.opacity).into_iter().map(scalar));
-        let opacity_end = points.len() as u32;
-        points.extend(gradient_opacity.into_iter().map(scalar));
-        let ends = [color_end, opacity_end, points.len() as u32];
-        Self { points: points.iter().map(|point| point.as_vec4().to_array()).collect(), ends }
+        let mut points = Vec::new();
+        let main @ [_, ends @ ..] = append(&mut points, &transfer.tables(None));
+        let mut all = vec![main];
+        let own: Vec<u16> = (transfer.labels.iter())
+            .filter(|(_, tables)| tables.matter_to_shading())
+            .map(|(&label, _)| label)
+            .collect();
+        let mut label_table = 0..0;
+        if let Some(&last) = own.last() {
+            let mut table = vec![main; usize::from(last) + 2];
+            for label in own {
+                table[usize::from(label)] = append(&mut points, &transfer.tables(Some(label)));
+                all.push(table[usize::from(label)]);
+            }
+            label_table = points.len() as u32..(points.len() + table.len()) as u32;
+            points.extend(table.into_iter().map(|numbers| numbers.map(|number| number as f32)));
+        }
+        let lengths = [0, 1, 2].map(|ramp| all.iter().map(|ends| ends[ramp + 1] - ends[ramp]).max().unwrap_or(0));
+        Self { points, ends, label_table, lengths }
     }
 
-    /// Control points of each ramp.
+    /// The most control points of each ramp, of all labels.
     pub fn lengths(&self) -> [u32; 3] {
-        let [color, opacity, gradient_opacity] = self.ends;
-        [color, opacity - color, gradient_opacity - opacity]
+        self.lengths
     }
+}
+
+/// Appends the control points of a label's ramps; where they start, and where each of them ends.
+fn append(points: &mut Vec<[f32; 4]>, tables: &Tables) -> [u32; 4] {
+    let mut bounds = [points.len() as u32; 4];
+    let scalar = |(at, y): (f64, f64)| DVec4::new(at, y, 0.0, 0.0);
+    let color = in_f32(tables.color).into_iter().map(|(at, rgb)| DVec4::new(at, rgb.x, rgb.y, rgb.z)).collect();
+    let opacity = in_f32(tables.opacity).into_iter().map(scalar).collect();
+    let gradient_opacity = tables.gradient_opacity.map_or(vec![(0.0, 1.0)], in_f32).into_iter().map(scalar).collect();
+    let ramps: [Vec<DVec4>; 3] = [color, opacity, gradient_opacity];
+    for (end, ramp) in bounds[1..].iter_mut().zip(ramps) {
+        points.extend(ramp.iter().map(|point| point.as_vec4().to_array()));
+        *end = points.len() as u32;
+    }
+    bounds
 }
 
 /// A ramp's control points, cut off where `f32` ends, as values do.

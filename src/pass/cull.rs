@@ -1,16 +1,19 @@
 //! Early splat elimination (§6): which bricks a sheet group visits, which of their voxels it draws, those voxels in a row,
 //! and the shading of those that were not shaded before.
 
+use std::sync::OnceLock;
+
 use wgpu::{
     BindGroup, BindingResource, Buffer, BufferUsages, ComputePass, Device, ShaderStages, TextureView,
     TextureViewDimension,
 };
 
 use crate::brick::BRICK_VOXELS;
-use crate::gpu::bindings::{ComputeStage, at_offset, grown, storage, texture, uniform};
+use crate::gpu::bindings::{ComputeStage, at_offset, grown, storage, texture, texture_of_integers, uniform};
 use crate::gpu::brick_lists::BrickBuffer;
 use crate::gpu::layout::{Brick, BrickState, Culled, Frame, Group, Indirect, Splat, Visit};
 use crate::gpu::shaders;
+use crate::gpu::volume_texture::VolumeTexture;
 
 /// The four stages' pipelines.
 #[derive(Debug)]
@@ -19,6 +22,9 @@ pub struct Cull {
     voxels: ComputeStage,
     compact: ComputeStage,
     shade: ComputeStage,
+    /// Compiled when first asked for.
+    shade_by_label: OnceLock<ComputeStage>,
+    no_labels: VolumeTexture,
 }
 
 /// One list's buffers and bind groups.
@@ -37,6 +43,7 @@ pub struct CullList {
     fresh: Buffer,
     fresh_args: Buffer,
     groups: [BindGroup; 4],
+    has_labels: bool,
 }
 
 /// What all lists share.
@@ -48,6 +55,8 @@ pub struct CullBuffers<'a> {
     pub groups: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
+    /// Its labels, if any of them has ramps of its own.
+    pub labels: Option<&'a TextureView>,
     /// Control points of the ramps.
     pub control_points: &'a Buffer,
     /// The occlusion buffer.
@@ -91,7 +100,19 @@ impl Cull {
             storage::<Indirect>(stage, false),
             storage::<Culled>(stage, false),
         ];
-        let shade = [
+        Self {
+            bricks: ComputeStage::new(device, shaders::CULL_BRICKS, "main", &bricks, &sheets),
+            voxels: ComputeStage::new(device, shaders::CULL_VOXELS, "main", &voxels, &sheets),
+            compact: ComputeStage::new(device, shaders::COMPACT, "main", &compact, &[]),
+            shade: Self::compile_shade(device, false),
+            shade_by_label: OnceLock::new(),
+            no_labels: VolumeTexture::no_labels(device),
+        }
+    }
+
+    fn compile_shade(device: &Device, labels: bool) -> ComputeStage {
+        let stage = ShaderStages::COMPUTE;
+        let slots = [
             uniform::<Frame>(stage, false),
             storage::<Brick>(stage, true),
             texture(stage, TextureViewDimension::D2Array),
@@ -99,13 +120,10 @@ impl Cull {
             storage::<u32>(stage, true),
             storage::<Indirect>(stage, true),
             storage::<Splat>(stage, false),
+            texture_of_integers(stage, TextureViewDimension::D2Array),
         ];
-        Self {
-            bricks: ComputeStage::new(device, shaders::CULL_BRICKS, "main", &bricks, &sheets),
-            voxels: ComputeStage::new(device, shaders::CULL_VOXELS, "main", &voxels, &sheets),
-            compact: ComputeStage::new(device, shaders::COMPACT, "main", &compact, &[]),
-            shade: ComputeStage::new(device, shaders::SHADE, "main", &shade, &[]),
-        }
+        let constants = [("LABELS", f64::from(u8::from(labels)))];
+        ComputeStage::new(device, shaders::SHADE, "main", &slots, &constants)
     }
 
     /// Allocates a list's buffers, or takes those of the `previous` frame. `order` is the list's bricks by first group; no group looks at more than `most_bricks` of
@@ -137,7 +155,7 @@ impl Cull {
         let fresh = buffer(fresh, "sheetsplat.fresh", most_voxels as usize, size_of::<u32>(), none);
         let fresh_args = buffer(fresh_args, "sheetsplat.fresh_args", 1, size_of::<Indirect>(), indirect);
 
-        let CullBuffers { frame, groups, values, control_points, occluded, culled } = shared;
+        let CullBuffers { frame, groups, values, labels, control_points, occluded, culled } = shared;
         let (frame, group) = (frame.as_entire_binding(), at_offset::<Group>(groups));
         let whole = Buffer::as_entire_binding;
         let bricks = [
@@ -171,14 +189,20 @@ impl Cull {
             whole(&fresh),
             whole(&fresh_args),
             whole(&splats),
+            BindingResource::TextureView(labels.unwrap_or(&self.no_labels.view)),
         ];
+        let has_labels = labels.is_some();
+        let shade_stage = match has_labels {
+            true => self.shade_by_label.get_or_init(|| Self::compile_shade(device, true)),
+            false => &self.shade,
+        };
         let groups = [
             self.bricks.bind(device, &bricks),
             self.voxels.bind(device, &voxels),
             self.compact.bind(device, &compact),
-            self.shade.bind(device, &shade),
+            shade_stage.bind(device, &shade),
         ];
-        CullList { states, splats, instances, draw_args, visits, visit_args, fresh, fresh_args, groups }
+        CullList { states, splats, instances, draw_args, visits, visit_args, fresh, fresh_args, groups, has_labels }
     }
 
     /// Decides what the group at `offset` draws of a list.
@@ -187,7 +211,10 @@ impl Cull {
         self.bricks.dispatch(pass, bricks, &[offset], 1);
         self.voxels.dispatch_indirect(pass, voxels, &[offset], &list.visit_args);
         self.compact.dispatch(pass, compact, &[], 1);
-        self.shade.dispatch_indirect(pass, shade, &[], &list.fresh_args);
+        let shade_stage = if list.has_labels { self.shade_by_label.get() } else { Some(&self.shade) };
+        if let Some(stage) = shade_stage {
+            stage.dispatch_indirect(pass, shade, &[], &list.fresh_args);
+        }
     }
 }
 

@@ -4,15 +4,18 @@ use std::sync::OnceLock;
 
 use wgpu::{BindGroup, Buffer, ComputePass, Device, ShaderStages, TextureView, TextureViewDimension};
 
-use crate::gpu::bindings::{ComputeStage, at_offset, storage, texture, uniform};
+use crate::gpu::bindings::{ComputeStage, at_offset, storage, texture, texture_of_integers, uniform};
 use crate::gpu::layout::{Brick, Frame, Gather as GatherUniform, Gathered, Part};
 use crate::gpu::shaders;
-use crate::splatting::{Compositing, FootprintBox, Order, Splatting};
+use crate::gpu::volume_texture::VolumeTexture;
+use crate::splatting::{Compositing, Economies, FootprintBox, Order, Splatting};
 
 /// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug, Default)]
 pub struct Gather {
-    stages: [[[[OnceLock<ComputeStage>; 2]; 2]; 2]; 3],
+    /// By compositing, and by the other parts of a mode, one bit each.
+    stages: [[OnceLock<ComputeStage>; 32]; 3],
+    no_labels: OnceLock<VolumeTexture>,
 }
 
 /// What a pipeline is compiled for.
@@ -22,13 +25,16 @@ pub struct GatherMode {
     order: Order,
     footprint_box: FootprintBox,
     perspective: bool,
+    economies: bool,
+    labels: bool,
 }
 
 impl GatherMode {
-    /// The mode that splatting settings ask for, with or without an eye.
-    pub fn of(splatting: &Splatting, perspective: bool) -> Self {
-        let Splatting { compositing, order, footprint_box, .. } = *splatting;
-        Self { compositing, order, footprint_box, perspective }
+    /// The mode that splatting settings ask for, with or without an eye, and with or without `labels` that have ramps of their own.
+    pub fn of(splatting: &Splatting, perspective: bool, labels: bool) -> Self {
+        let Splatting { compositing, order, footprint_box, economies, .. } = *splatting;
+        let economies = economies != Economies::default();
+        Self { compositing, order, footprint_box, perspective, economies, labels }
     }
 }
 
@@ -51,6 +57,8 @@ pub struct GatherBuffers<'a> {
     pub control_points: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
+    /// Its labels, for a mode that asks for them.
+    pub labels: Option<&'a TextureView>,
     /// [`Gathered`].
     pub gathered: &'a Buffer,
     /// [`TileBins::half_boxes`](crate::tile_bins::TileBins::half_boxes), `[[f32; 2]]`.
@@ -59,8 +67,9 @@ pub struct GatherBuffers<'a> {
 
 impl Gather {
     fn stage(&self, mode: GatherMode) -> &OnceLock<ComputeStage> {
-        let GatherMode { compositing, order, footprint_box, perspective } = mode;
-        &self.stages[compositing as usize][order as usize][footprint_box as usize][usize::from(perspective)]
+        let GatherMode { compositing, order, footprint_box, perspective, economies, labels } = mode;
+        let bits = [order as usize, footprint_box as usize, perspective.into(), economies.into(), labels.into()];
+        &self.stages[compositing as usize][bits.iter().fold(0, |number, bit| 2 * number + bit)]
     }
 
     fn compiled(&self, device: &Device, mode: GatherMode) -> &ComputeStage {
@@ -78,12 +87,15 @@ impl Gather {
                 storage::<[f32; 4]>(stage, false),
                 storage::<Gathered>(stage, false),
                 storage::<[f32; 2]>(stage, true),
+                texture_of_integers(stage, TextureViewDimension::D2Array),
             ];
             let constants = [
                 ("COMPOSITING", f64::from(mode.compositing as u32)),
                 ("ORDER", f64::from(mode.order as u32)),
                 ("PERSPECTIVE", f64::from(u8::from(mode.perspective))),
+                ("ECONOMIES", f64::from(u8::from(mode.economies))),
                 ("PARALLELOGRAM", f64::from(mode.footprint_box as u32)),
+                ("LABELS", f64::from(u8::from(mode.labels))),
             ];
             ComputeStage::new(device, shaders::GATHER, "main", &slots, &constants)
         })
@@ -91,7 +103,9 @@ impl Gather {
 
     /// Binds a band of the compositing buffer, `[vec4f]`, for one mode.
     pub fn bind(&self, device: &Device, mode: GatherMode, buffers: GatherBuffers<'_>, acc: &Buffer) -> BindGroup {
-        let GatherBuffers { frame, gather, parts, bricks, starts, entries, control_points, values, .. } = buffers;
+        let GatherBuffers { frame, gather, parts, bricks, starts, entries, control_points, values, labels, .. } =
+            buffers;
+        let labels = labels.unwrap_or_else(|| &self.no_labels.get_or_init(|| VolumeTexture::no_labels(device)).view);
         let whole = Buffer::as_entire_binding;
         let resources = [
             whole(frame),
@@ -105,6 +119,7 @@ impl Gather {
             whole(acc),
             whole(buffers.gathered),
             whole(buffers.half_boxes),
+            wgpu::BindingResource::TextureView(labels),
         ];
         self.compiled(device, mode).bind(device, &resources)
     }

@@ -27,7 +27,7 @@ pub(crate) struct Given<'a> {
     pub(crate) frame: &'a Buffer,
     /// Control points of the ramps.
     pub(crate) control_points: &'a Buffer,
-    /// How many the ramps have.
+    /// The most that each of the ramps has.
     pub(crate) ramp_lengths: [u32; 3],
     pub(crate) compositing: &'a CompositingBuffer,
 }

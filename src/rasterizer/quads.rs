@@ -121,6 +121,7 @@ impl QuadRasterizer {
             frame,
             groups: &groups,
             values: &volume.texture.view,
+            labels: volume.labels(),
             control_points,
             occluded: &targets.occluded,
             culled: &culled,

@@ -89,7 +89,8 @@ impl TileRasterizer {
         let limits = device.limits();
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let mut old = Old::of(previous);
-        let search_passes = given.ramp_lengths.iter().map(|&points| search_passes(points)).sum();
+        let in_memory = volume.labels().is_some();
+        let search_passes = given.ramp_lengths.iter().map(|&points| search_passes(points, in_memory)).sum();
         let is_current = |old: &Binned| {
             old.view == *view
                 && (old.order, old.revision, old.search_passes) == (splatting.order, volume.revision, search_passes)
@@ -135,7 +136,7 @@ impl TileRasterizer {
             }
         };
 
-        let uniform = uniforms::gather(view, kernel, bins, bricks.len() as u32);
+        let uniform = uniforms::gather(view, kernel, splatting, bins, bricks.len() as u32);
         let [columns, rows] = tile_grid(view.size);
         let words = uniform.composited + (columns * rows * bins.groups).div_ceil(32);
         let bytes = size_of::<Gathered>() as u64 + u64::from(words) * 4;
@@ -166,7 +167,7 @@ impl TileRasterizer {
         part_bytes.resize(part_bytes.len().max(stride), 0);
         let parts = given.filled(old.parts.take(), "sheetsplat.parts", &part_bytes, BufferUsages::UNIFORM);
 
-        let mode = GatherMode::of(splatting, view.perspective.is_some());
+        let mode = GatherMode::of(splatting, view.perspective.is_some(), volume.labels().is_some());
         let buffers = GatherBuffers {
             frame: given.frame,
             gather: &uniform,
@@ -176,6 +177,7 @@ impl TileRasterizer {
             entries: &entries,
             control_points: given.control_points,
             values: &volume.texture.view,
+            labels: volume.labels(),
             gathered: &gathered,
             half_boxes: &half_boxes,
         };
@@ -235,10 +237,10 @@ impl TileFrame {
     }
 }
 
-/// Passes through loops that a lookup among so many control points takes: none if every thread of a subgroup can hold one, else those
-/// of a binary search and 2 around it.
-fn search_passes(points: u32) -> u32 {
-    if points <= *SUBGROUP_SIZES.start() { 0 } else { 2 + points.ilog2() + 1 }
+/// Passes through loops that a lookup among so many control points takes: none if every thread of a subgroup can hold one, unless they
+/// are searched `in_memory` anyway, else those of a binary search and 2 around it.
+fn search_passes(points: u32, in_memory: bool) -> u32 {
+    if points <= *SUBGROUP_SIZES.start() && !in_memory { 0 } else { 2 + points.ilog2() + 1 }
 }
 
 /// What of the previous frame may be taken over.

@@ -11,7 +11,7 @@ use crate::error::RenderError;
 use crate::kernel::Kernel;
 use crate::scene::Scene;
 use crate::slab::SlabGrid;
-use crate::splatting::Method;
+use crate::splatting::{Economies, Method};
 use crate::volume::Grid;
 
 /// The largest image, pixels along a side: what the largest GPUs allow.
@@ -41,6 +41,8 @@ pub struct Geometry {
     pub ro: DVec3,
     /// `λ = |rw|`.
     pub lambda: f64,
+    /// Ways to draw less (§8). Not the one that depends on what was drawn before: `beta`.
+    pub economies: Economies,
     /// Slab width in terms of [`Geometry::depth`]: orthographic `Δ·λw`, perspective Δ.
     pub slab_width: f64,
     /// Pixel offset → footprint coordinates, after the low-pass rule.
@@ -76,6 +78,7 @@ impl Geometry {
             center: camera.center / grid.unit(),
             eye,
             method: splatting.method,
+            economies: splatting.economies,
             pix,
             ro: ray.ro,
             lambda: ray.lambda,
@@ -183,6 +186,21 @@ impl Geometry {
         Ray::new(p.normalize(), &self.basis, self.grid.aspect())
     }
 
+    /// Whether a voxel is projected as a whole kernel for its low opacity (§8).
+    fn is_whole(&self, splat: &Splat) -> bool {
+        splat.alpha < self.economies.whole_below
+    }
+
+    /// The slabs that a kernel is drawn into: those that it overlaps, or that of its centre.
+    pub fn drawn_slabs(&self, splat: &Splat, radius: f64) -> Range<i32> {
+        let slabs = self.slabs(splat, radius);
+        if !self.is_whole(splat) || slabs.is_empty() {
+            return slabs;
+        }
+        let slab = ((splat.depth / self.slab_width).floor() as i32).clamp(slabs.start, slabs.end - 1);
+        slab..slab + 1
+    }
+
     /// The slabs that a kernel overlaps by more than rounding errors, nearer than the near plane not counted.
     pub fn slabs(&self, splat: &Splat, radius: f64) -> Range<i32> {
         const ROUNDING: f64 = 1e-9;
@@ -212,12 +230,16 @@ impl Geometry {
     /// - Axis-aligned sheets take the kernel whole, `pix` at the voxel's depth; the near plane cuts those, too.
     pub fn section(&self, splat: &Splat, sheet: i32, kernel: &Kernel) -> Option<Section> {
         let (near, far) = match self.method {
-            Method::ImageAligned => (f64::from(sheet) * self.slab_width, (f64::from(sheet) + 1.0) * self.slab_width),
-            Method::AxisAligned | Method::CompositeEverySample => (f64::NEG_INFINITY, f64::INFINITY),
+            Method::ImageAligned if !self.is_whole(splat) => {
+                (f64::from(sheet) * self.slab_width, (f64::from(sheet) + 1.0) * self.slab_width)
+            }
+            _ => (f64::NEG_INFINITY, f64::INFINITY),
         };
+        let whole = kernel.section(0.0, -kernel.radius(), kernel.radius());
         let section = |footprint: Footprint, t0: f64, t1: f64, amplitude: f64| {
             let amount = splat.amount * amplitude;
-            Some(Section { center: splat.center, footprint, t0, t1, amount })
+            let rim = (amount.w * whole / self.economies.resolution).ln() / kernel.falloff();
+            Some(Section { center: splat.center, footprint, t0, t1, amount, rim })
         };
         let Some(eye) = &self.eye else {
             return section(self.footprint(), near - splat.depth, far - splat.depth, 1.0);
@@ -230,8 +252,8 @@ impl Geometry {
             return None;
         }
         let middle = match self.method {
-            Method::ImageAligned => (first + last) / 2.0,
-            Method::AxisAligned | Method::CompositeEverySample => 0.0,
+            Method::ImageAligned if !self.is_whole(splat) => (first + last) / 2.0,
+            _ => 0.0,
         };
         let footprint = ray.footprint(eye.pix(splat.depth + middle * ray.depth_per_warped));
         section(footprint, t0, t1, footprint.amplitude)

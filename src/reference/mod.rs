@@ -102,7 +102,10 @@ pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Res
     let buckets = frame.buckets();
     let sections = match scene.splatting.method {
         Method::CompositeEverySample => frame.splats.len() as u64,
-        Method::ImageAligned | Method::AxisAligned => buckets.values().map(|bucket| bucket.len() as u64).sum(),
+        Method::AxisAligned => frame.splats.len() as u64,
+        Method::ImageAligned => {
+            frame.splats.iter().map(|splat| frame.geometry.slabs(splat, frame.kernel.radius()).len() as u64).sum()
+        }
     };
     let sheets =
         buckets.first_key_value().zip(buckets.last_key_value()).map_or(0, |((first, _), (last, _))| last - first + 1);

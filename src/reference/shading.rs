@@ -19,6 +19,8 @@ pub struct Splat {
     pub depth: f64,
     /// `(C·m, m)` over λ, times the low-pass amplitude where that is the same for all sections ([`Geometry::scale`]).
     pub amount: DVec4,
+    /// α.
+    pub alpha: f64,
 }
 
 /// The voxels that take part, in memory order: their positions in memory.
@@ -45,7 +47,8 @@ pub fn splats(
     let splat = |&index: &u32| {
         let voxel = volume.grid().voxel_at(index);
         let amount = emission(volume, transfer, scene, geometry, index) * geometry.scale(voxel);
-        Splat { center: geometry.pixel(voxel), depth: geometry.depth(voxel), amount }
+        let alpha = alpha(volume, transfer, index);
+        Splat { center: geometry.pixel(voxel), depth: geometry.depth(voxel), amount, alpha }
     };
     voxels.par_iter().map(splat).collect()
 }
@@ -53,7 +56,7 @@ pub fn splats(
 /// `(C·m, m)` of a voxel.
 pub fn emission(volume: &Volume, transfer: &TransferFunction, scene: &Scene, geometry: &Geometry, index: u32) -> DVec4 {
     let voxel = volume.grid().voxel_at(index);
-    let base = transfer.color.at(f64::from(volume.values()[index as usize]));
+    let base = transfer.tables(volume.label(index)).color.at(f64::from(volume.values()[index as usize]));
     let color = color(&scene.shading, base, volume.gradient(voxel), -geometry.ray(voxel));
     color.extend(1.0) * amount(scene.splatting.compositing, alpha(volume, transfer, index))
 }
@@ -61,11 +64,12 @@ pub fn emission(volume: &Volume, transfer: &TransferFunction, scene: &Scene, geo
 /// α of a voxel.
 fn alpha(volume: &Volume, transfer: &TransferFunction, index: u32) -> f64 {
     let value = f64::from(volume.values()[index as usize]);
+    let tables = transfer.tables(volume.label(index));
     // Most voxels are ruled out by their value: spare them the gradient.
-    if transfer.opacity.at(value) <= 0.0 {
+    if tables.opacity.at(value) <= 0.0 {
         return 0.0;
     }
-    transfer.alpha(value, volume.gradient(volume.grid().voxel_at(index)).length())
+    tables.alpha(value, volume.gradient(volume.grid().voxel_at(index)).length())
 }
 
 /// `m`: the amount per unit length (SPEC §5).

@@ -14,7 +14,7 @@ pub fn buckets(voxels: &[u32], splats: &[Splat], geometry: &Geometry, kernel: &K
     let mut buckets = BTreeMap::<i32, Vec<u32>>::new();
     for ((&voxel, splat), index) in voxels.iter().zip(splats).zip(0..) {
         let touched = match geometry.method {
-            Method::ImageAligned => geometry.slabs(splat, kernel.radius()),
+            Method::ImageAligned => geometry.drawn_slabs(splat, kernel.radius()),
             Method::AxisAligned => {
                 let slice = geometry.slice(geometry.grid.voxel_at(voxel));
                 slice..slice + 1

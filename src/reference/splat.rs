@@ -20,6 +20,8 @@ pub struct Section {
     pub t1: f64,
     /// `(C·m, m)` times the low-pass amplitude over λ.
     pub amount: DVec4,
+    /// ρ² from which on it adds too little to be drawn (§8).
+    pub rim: f64,
 }
 
 impl Section {
@@ -63,6 +65,9 @@ pub fn draw(sections: &[Section], kernel: &Kernel, buffer: &mut Buffer, blend: i
             for (y, x) in (low_y..=high_y).flat_map(|y| (low_x..=high_x).map(move |x| (y, x))) {
                 let offset = DVec2::new(x as f64, y as f64) + 0.5 - section.center;
                 let rho_squared = (section.footprint.from_pixels * offset).length_squared();
+                if rho_squared >= section.rim {
+                    continue;
+                }
                 let amount = kernel.section(rho_squared, section.t0, section.t1);
                 blend(&mut pixels[(y - first_row) * width + x], section.amount * amount);
             }

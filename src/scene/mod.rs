@@ -3,6 +3,7 @@
 mod reader;
 mod tables;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -11,8 +12,8 @@ use toml::Table;
 use crate::camera::Camera;
 use crate::shading::Shading;
 use crate::splatting::Splatting;
-use crate::transfer_function::{Ramp, TransferFunction};
-use crate::volume::{Volume, VolumeError, builtin};
+use crate::transfer_function::{LabelTables, Ramp, TransferFunction};
+use crate::volume::{Labels, Volume, VolumeError, builtin};
 use reader::{OVERRIDE, Origins, Section, apply_override};
 
 /// Why a scene could not be read.
@@ -86,6 +87,8 @@ pub struct TransferSettings {
     pub gradient_opacity: Option<Ramp<f64>>,
     /// Closed intervals `[lo, hi]` of the values that take part; `None` is all of them.
     pub iso_ranges: Option<Vec<[f64; 2]>>,
+    /// Tables of single labels of a segmented volume; for others there may be none.
+    pub labels: BTreeMap<u16, LabelTables>,
 }
 
 impl TransferSettings {
@@ -104,6 +107,7 @@ impl TransferSettings {
             opacity,
             gradient_opacity: self.gradient_opacity.clone(),
             iso_ranges: self.iso_ranges.clone(),
+            labels: self.labels.clone(),
         }
     }
 }
@@ -119,6 +123,8 @@ pub struct Scene {
     pub volume: VolumeSource,
     /// World units from voxel to voxel, each above 0, in place of the volume's own.
     pub spacing: Option<DVec3>,
+    /// A file with a label for every voxel, in place of the volume's own labels.
+    pub labels: Option<PathBuf>,
     /// The camera.
     pub camera: Camera,
     /// Image size and background.
@@ -137,6 +143,7 @@ impl Scene {
         Self {
             volume,
             spacing: None,
+            labels: None,
             camera: Camera::default(),
             image: ImageSettings::default(),
             transfer: TransferSettings::default(),
@@ -145,8 +152,8 @@ impl Scene {
         }
     }
 
-    /// Reads a scene file and applies `--set` overrides. A relative `volume.path`, overridden or not, is relative to
-    /// the scene file's folder.
+    /// Reads a scene file and applies `--set` overrides. A relative `volume.path` or `volume.labels`, overridden or not, is relative
+    /// to the scene file's folder.
     ///
     /// # Errors
     /// If the file cannot be read or is not TOML, if a key is unknown, or if a value is not allowed.
@@ -156,7 +163,7 @@ impl Scene {
     }
 
     /// Reads a scene from text, as [`Self::open`] does from a file. `origin` names the text in errors; a relative
-    /// `volume.path` is relative to `folder`.
+    /// `volume.path` or `volume.labels` is relative to `folder`.
     ///
     /// # Errors
     /// If the text is not TOML, if a key is unknown, or if a value is not allowed.
@@ -168,8 +175,8 @@ impl Scene {
         Self::build(root, origin, folder, None, sets)
     }
 
-    /// A scene that shows a volume with every setting at its default but for the `--set` overrides. A `volume.path`
-    /// among those is relative to the current directory.
+    /// A scene that shows a volume with every setting at its default but for the `--set` overrides. A `volume.path` or
+    /// `volume.labels` among those is relative to the current directory.
     ///
     /// # Errors
     /// If an override's key is unknown or its value is not allowed.
@@ -177,15 +184,24 @@ impl Scene {
         Self::build(Table::new(), OVERRIDE, Path::new(""), Some(source), sets)
     }
 
-    /// Loads or computes the volume, at the scene's spacing if it gives one.
+    /// Loads or computes the volume, at the scene's spacing if it gives one, and with the scene's labels, if it names some. The
+    /// label file's spacing must be the volume's, unless the scene's replaces both.
     ///
     /// # Errors
-    /// If the volume file cannot be read, is of no known format or does not hold what its header promises, or if there
-    /// is no such builtin volume.
+    /// If the volume or label file cannot be read, is of no known format or does not hold what its header promises, if the
+    /// labels do not fit the volume, or if there is no such builtin volume.
     pub fn load_volume(&self) -> Result<Volume, VolumeError> {
         let (volume, origin) = match &self.volume {
             VolumeSource::File(path) => (Volume::open(path)?, path.display().to_string()),
             VolumeSource::Builtin(name) => (builtin::volume(name)?, format!("builtin:{name}")),
+        };
+        let volume = match &self.labels {
+            Some(path) => {
+                let labels = Labels::open(path)?;
+                let spacing = labels.spacing.filter(|_| self.spacing.is_none());
+                volume.with_labels(Labels { spacing, ..labels })?
+            }
+            None => volume,
         };
         match self.spacing {
             Some(spacing) => volume.with_spacing(&origin, spacing),
@@ -214,15 +230,31 @@ impl Scene {
         ];
         // Before any table is read: a misspelt table explains best why keys seem to be missing.
         root.finish()?;
-        let (volume, spacing) = tables::volume(volume, folder, source)?;
-        Ok(Self {
-            volume,
+        let tables::VolumeSettings { source, spacing, labels } = tables::volume(volume, folder, source)?;
+        let scene = Self {
+            volume: source,
             spacing,
+            labels,
             camera: tables::camera(camera)?,
             image: tables::image(image)?,
             transfer: tables::transfer(transfer)?,
             shading: tables::shading(shading)?,
             splatting: tables::splatting(splatting)?,
-        })
+        };
+        if !scene.transfer.labels.is_empty() && !scene.may_have_labels() {
+            let allowed = "none, or volume.labels, or volume.builtin = \"head\" or \"tomato\"";
+            let related = ["volume.path", "volume.builtin", "volume.labels"];
+            return Err(origins.invalid("transfer.label", &related, "tables for a volume without labels", allowed));
+        }
+        Ok(scene)
+    }
+
+    /// Whether the volume is segmented; an unknown builtin volume might be.
+    fn may_have_labels(&self) -> bool {
+        let has_none = match &self.volume {
+            VolumeSource::File(_) => true,
+            VolumeSource::Builtin(name) => builtin::labels(name).is_some_and(<[_]>::is_empty),
+        };
+        self.labels.is_some() || !has_none
     }
 }

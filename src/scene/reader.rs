@@ -82,8 +82,8 @@ fn is_within(key: &str, ancestor: &str) -> bool {
 /// A table whose keys are taken out one by one; what is left at the end nobody knows.
 pub(super) struct Section<'a> {
     pub(super) origins: &'a Origins<'a>,
-    /// Empty for the root.
-    name: &'static str,
+    /// Its full key; empty for the root.
+    name: String,
     table: Table,
     /// The keys asked for so far.
     known: Vec<&'static str>,
@@ -92,17 +92,15 @@ pub(super) struct Section<'a> {
 impl<'a> Section<'a> {
     /// The whole file.
     pub(super) fn root(origins: &'a Origins<'a>, table: Table) -> Self {
-        Self { origins, name: "", table, known: Vec::new() }
+        Self { origins, name: String::new(), table, known: Vec::new() }
     }
 
     /// The table under a key of the root; empty if missing.
     pub(super) fn section(&mut self, name: &'static str) -> Result<Self, SceneError> {
-        let mut table = Table::new();
-        self.read(name, &mut table, |entry| match entry.value {
-            Value::Table(ref table) => Ok(table.clone()),
-            _ => Err(entry.mistyped("a table")),
-        })?;
-        Ok(Self { origins: self.origins, name, table, known: Vec::new() })
+        let empty = Self { origins: self.origins, name: name.to_owned(), table: Table::new(), known: Vec::new() };
+        let mut section = empty;
+        self.read(name, &mut section, |entry| entry.section("a table"))?;
+        Ok(section)
     }
 
     /// Replaces `into` by the value of a key, if it is there.
@@ -117,6 +115,18 @@ impl<'a> Section<'a> {
             *into = read(&Entry { origins: self.origins, key: self.key(name), value })?;
         }
         Ok(())
+    }
+
+    /// The value of a key that must be there.
+    pub(super) fn require<T>(
+        &mut self,
+        name: &'static str,
+        allowed: &str,
+        read: impl FnOnce(&Entry<'a>) -> Result<T, SceneError>,
+    ) -> Result<T, SceneError> {
+        let mut value = None;
+        self.read(name, &mut value, |entry| read(entry).map(Some))?;
+        value.ok_or_else(|| self.origins.invalid(&self.key(name), &[], "no such key", allowed))
     }
 
     /// Refuses the keys that nobody asked for.
@@ -143,6 +153,9 @@ pub(super) struct Bounds {
     pub(super) contain: fn(f64) -> bool,
 }
 
+/// The labels of a segmented volume.
+pub(super) const LABEL: &str = "an integer from 0 to 65535";
+
 /// Any finite number.
 pub(super) const FINITE: Bounds = Bounds { text: "a finite number", contain: |_| true };
 
@@ -153,7 +166,7 @@ pub(super) struct Entry<'a> {
     pub(super) value: Value,
 }
 
-impl Entry<'_> {
+impl<'a> Entry<'a> {
     /// The error for a value that is not allowed.
     pub(super) fn refused(&self, allowed: impl Into<String>) -> SceneError {
         self.origins.invalid(&self.key, &[], concise(&self.value), allowed)
@@ -162,6 +175,12 @@ impl Entry<'_> {
     /// The error for a value of the wrong type.
     pub(super) fn mistyped(&self, allowed: impl Into<String>) -> SceneError {
         self.origins.invalid(&self.key, &[], typed(&self.value), allowed)
+    }
+
+    /// A table.
+    pub(super) fn section(&self, allowed: &str) -> Result<Section<'a>, SceneError> {
+        let table = self.value.as_table().ok_or_else(|| self.mistyped(allowed))?.clone();
+        Ok(Section { origins: self.origins, name: self.key.clone(), table, known: Vec::new() })
     }
 
     pub(super) fn boolean(&self) -> Result<bool, SceneError> {
@@ -185,6 +204,12 @@ impl Entry<'_> {
         let allowed = "an integer from 1 to the device's texture limit";
         let integer = self.value.as_integer().ok_or_else(|| self.mistyped(allowed))?;
         u32::try_from(integer).ok().filter(|&pixels| pixels > 0).ok_or_else(|| self.refused(allowed))
+    }
+
+    /// A label.
+    pub(super) fn label(&self) -> Result<u16, SceneError> {
+        let integer = self.value.as_integer().ok_or_else(|| self.mistyped(LABEL))?;
+        u16::try_from(integer).map_err(|_| self.refused(LABEL))
     }
 
     /// A number, written as a float or as an integer.

@@ -1,14 +1,16 @@
 //! The tables of a scene file: their keys, types and ranges (SPEC §7).
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::reader::{Bounds, Entry, FINITE, Section};
+use super::reader::{Bounds, Entry, FINITE, LABEL, Section};
 use super::{ImageSettings, SceneError, TransferSettings, VolumeSource};
 use crate::camera::{Camera, Projection};
 use crate::shading::{Light, Shading};
 use crate::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
+use crate::transfer_function::{LabelTables, Ramp};
 
 const POSITIVE: Bounds = Bounds { text: "a finite number > 0", contain: |x| x > 0.0 };
 const NOT_NEGATIVE: Bounds = Bounds { text: "a finite number >= 0", contain: |x| x >= 0.0 };
@@ -19,16 +21,25 @@ const RADIUS: Bounds = Bounds { text: "a number in [1, 4]", contain: |x| (1.0..=
 const FALLOFF: Bounds = Bounds { text: "a number in (0, 16]", contain: |x| x > 0.0 && x <= 16.0 };
 const SLAB_WIDTH: Bounds = Bounds { text: "a number in [0.05, 8]", contain: |x| (0.05..=8.0).contains(&x) };
 
-/// `[volume]`: the source, or `given` if the table names none, and the spacing.
+/// `[volume]`.
+pub(super) struct VolumeSettings {
+    pub(super) source: VolumeSource,
+    pub(super) spacing: Option<DVec3>,
+    pub(super) labels: Option<PathBuf>,
+}
+
+/// `[volume]`: the source is `given` if the table names none.
 pub(super) fn volume(
     mut section: Section,
     folder: &Path,
     given: Option<VolumeSource>,
-) -> Result<(VolumeSource, Option<DVec3>), SceneError> {
-    let (mut path, mut builtin, mut spacing) = (None, None, None);
+) -> Result<VolumeSettings, SceneError> {
+    let (mut path, mut builtin, mut spacing, mut labels) = (None, None, None, None);
     section.read("path", &mut path, |entry| entry.text("a volume file's path").map(Some))?;
     section.read("builtin", &mut builtin, |entry| entry.text("a builtin volume's name").map(Some))?;
     section.read("spacing", &mut spacing, |entry| entry.numbers(POSITIVE).map(|s| Some(DVec3::from_array(s))))?;
+    section
+        .read("labels", &mut labels, |entry| entry.text("a label file's path").map(|path| Some(folder.join(path))))?;
     let origins = section.origins;
     section.finish()?;
     let refused = |found| origins.invalid("volume", &[], found, "either volume.path or volume.builtin");
@@ -38,7 +49,7 @@ pub(super) fn volume(
         (None, None) => given.ok_or_else(|| refused("neither path nor builtin"))?,
         (Some(_), Some(_)) => return Err(refused("both path and builtin")),
     };
-    Ok((source, spacing))
+    Ok(VolumeSettings { source, spacing, labels })
 }
 
 /// `[camera]`. Keys of the projection that is not in use are checked and have no effect, so that overriding
@@ -88,16 +99,45 @@ pub(super) fn image(mut section: Section) -> Result<ImageSettings, SceneError> {
 /// `[transfer]`.
 pub(super) fn transfer(mut section: Section) -> Result<TransferSettings, SceneError> {
     let mut transfer = TransferSettings::default();
-    let color = |entry: &Entry| entry.numbers(SHARE).map(DVec3::from_array);
-    let opacity = |entry: &Entry| entry.number(SHARE);
-    section.read("color", &mut transfer.color, |entry| entry.ramp("[value, [r, g, b]]", color).map(Some))?;
-    section.read("opacity", &mut transfer.opacity, |entry| entry.ramp("[value, opacity]", opacity).map(Some))?;
-    section.read("gradient_opacity", &mut transfer.gradient_opacity, |entry| {
-        entry.ramp("[gradient magnitude, factor]", opacity).map(Some)
-    })?;
+    let TransferSettings { color, opacity, gradient_opacity, .. } = &mut transfer;
+    ramps(&mut section, color, opacity, gradient_opacity)?;
     section.read("iso_ranges", &mut transfer.iso_ranges, |entry| iso_ranges(entry).map(Some))?;
+    section.read("label", &mut transfer.labels, labels)?;
     section.finish()?;
     Ok(transfer)
+}
+
+/// The ramps that the main table and those of labels may give.
+fn ramps(
+    section: &mut Section,
+    color: &mut Option<Ramp<DVec3>>,
+    opacity: &mut Option<Ramp<f64>>,
+    gradient_opacity: &mut Option<Ramp<f64>>,
+) -> Result<(), SceneError> {
+    let rgb = |entry: &Entry| entry.numbers(SHARE).map(DVec3::from_array);
+    let share = |entry: &Entry| entry.number(SHARE);
+    section.read("color", color, |entry| entry.ramp("[value, [r, g, b]]", rgb).map(Some))?;
+    section.read("opacity", opacity, |entry| entry.ramp("[value, opacity]", share).map(Some))?;
+    let point = "[gradient magnitude, factor]";
+    section.read("gradient_opacity", gradient_opacity, |entry| entry.ramp(point, share).map(Some))
+}
+
+/// `[[transfer.label]]`.
+fn labels(entry: &Entry) -> Result<BTreeMap<u16, LabelTables>, SceneError> {
+    let mut labels = BTreeMap::new();
+    for item in entry.items("tables [[transfer.label]]")? {
+        let mut section = item.section("a table [[transfer.label]]")?;
+        let label = section.require("label", LABEL, |entry| match entry.label()? {
+            label if labels.contains_key(&label) => Err(entry.refused("a label that no table before has")),
+            label => Ok(label),
+        })?;
+        let mut tables = LabelTables::default();
+        section.read("visible", &mut tables.visible, Entry::boolean)?;
+        ramps(&mut section, &mut tables.color, &mut tables.opacity, &mut tables.gradient_opacity)?;
+        section.finish()?;
+        labels.insert(label, tables);
+    }
+    Ok(labels)
 }
 
 /// `[shading]`.
@@ -139,6 +179,9 @@ pub(super) fn splatting(mut section: Section) -> Result<Splatting, SceneError> {
     section.read("tiles", &mut splatting.tiles, Entry::boolean)?;
     section.read("rasterizer", &mut splatting.rasterizer, |entry| entry.choice(&rasterizers))?;
     section.read("footprint_box", &mut splatting.footprint_box, |entry| entry.choice(&boxes))?;
+    section.read("whole_below", &mut splatting.economies.whole_below, |entry| entry.number(SHARE))?;
+    section.read("beta", &mut splatting.economies.beta, |entry| entry.number(THRESHOLD))?;
+    section.read("resolution", &mut splatting.economies.resolution, |entry| entry.number(SHARE))?;
     section.finish()?;
     Ok(splatting)
 }

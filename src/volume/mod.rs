@@ -2,13 +2,16 @@
 
 pub mod builtin;
 mod grid;
+mod labels;
 mod nrrd;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
 
 pub use grid::Grid;
+pub use labels::Labels;
 
 /// The largest ratio of two spacings.
 const MAX_ASPECT: f64 = 1e4;
@@ -40,13 +43,30 @@ pub enum VolumeError {
     },
 }
 
+fn invalid(origin: &str, field: &str, found: String, allowed: String) -> VolumeError {
+    VolumeError::Invalid { origin: origin.to_owned(), field: field.to_owned(), found, allowed }
+}
+
+/// Reads a file of a format that its extension tells.
+fn of_format<T>(path: &Path, nrrd: fn(&Path) -> Result<T, VolumeError>) -> Result<T, VolumeError> {
+    match path.extension().and_then(|extension| extension.to_str()) {
+        Some("nrrd" | "nhdr") => nrrd(path),
+        extension => {
+            let found = extension.map_or("none".to_owned(), |extension| format!("\".{extension}\""));
+            Err(invalid(&path.display().to_string(), "extension", found, ".nrrd or .nhdr".to_owned()))
+        }
+    }
+}
+
 /// A scalar volume on a rectilinear grid (SPEC §2): `dims` voxels, x fastest in memory, `spacing` world units apart.
 ///
-/// World axes are the volume's axes and the origin is the volume's centre. Values are finite `f32`.
+/// World axes are the volume's axes and the origin is the volume's centre. Values are finite `f32`. A segmented volume has a label
+/// for every voxel besides; clones share them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Volume {
     grid: Grid,
     values: Vec<f32>,
+    labels: Option<Arc<[u16]>>,
 }
 
 impl Volume {
@@ -56,12 +76,7 @@ impl Volume {
     /// If a dimension is 0, there are more than `u32::MAX` voxels, the number of values differs from the product of the
     /// dimensions, a spacing is not within [1e-100, 1e100] or 10⁴ times another, or a value is not finite (the error names the voxel).
     pub fn new(origin: &str, dims: UVec3, spacing: DVec3, values: Vec<f32>) -> Result<Self, VolumeError> {
-        let invalid = |field: &str, found: String, allowed: &str| VolumeError::Invalid {
-            origin: origin.to_owned(),
-            field: field.to_owned(),
-            found,
-            allowed: allowed.to_owned(),
-        };
+        let invalid = |field: &str, found: String, allowed: &str| invalid(origin, field, found, allowed.to_owned());
         let count = dims.to_array().iter().try_fold(1_u32, |product, &n| product.checked_mul(n));
         let Some(count) = count.filter(|&count| count > 0) else {
             return Err(invalid("sizes", format!("{dims}"), "three sizes of at least 1, at most 4294967295 voxels"));
@@ -73,7 +88,7 @@ impl Volume {
             let voxel = Grid { dims, spacing }.voxel_at(at as u32);
             return Err(invalid("data", format!("{} at voxel {voxel}", values[at]), "finite values"));
         }
-        Self { grid: Grid { dims, spacing: DVec3::ONE }, values }.with_spacing(origin, spacing)
+        Self { grid: Grid { dims, spacing: DVec3::ONE }, values, labels: None }.with_spacing(origin, spacing)
     }
 
     /// The same values at another spacing (world units per voxel step).
@@ -84,12 +99,8 @@ impl Volume {
         let (least, largest) = (spacing.min_element(), spacing.max_element());
         // Squares and products of such lengths stay within `f64`, and warped voxels within `f32`.
         if !(spacing.is_finite() && least >= 1e-100 && largest <= 1e100 && largest / least <= MAX_ASPECT) {
-            return Err(VolumeError::Invalid {
-                origin: origin.to_owned(),
-                field: "spacing".to_owned(),
-                found: format!("{:?}", spacing.to_array()),
-                allowed: format!("three numbers from 1e-100 to 1e100, none above {MAX_ASPECT} times another"),
-            });
+            let allowed = format!("three numbers from 1e-100 to 1e100, none above {MAX_ASPECT} times another");
+            return Err(invalid(origin, "spacing", format!("{:?}", spacing.to_array()), allowed));
         }
         self.grid.spacing = spacing;
         Ok(self)
@@ -100,15 +111,7 @@ impl Volume {
     /// # Errors
     /// If the file cannot be read, is of no known format, or does not hold what its header promises.
     pub fn open(path: &Path) -> Result<Self, VolumeError> {
-        match path.extension().and_then(|extension| extension.to_str()) {
-            Some("nrrd" | "nhdr") => nrrd::read(path),
-            extension => Err(VolumeError::Invalid {
-                origin: path.display().to_string(),
-                field: "extension".to_owned(),
-                found: extension.map_or("none".to_owned(), |extension| format!("\".{extension}\"")),
-                allowed: ".nrrd or .nhdr".to_owned(),
-            }),
-        }
+        of_format(path, nrrd::read)
     }
 
     /// Where the voxels are.

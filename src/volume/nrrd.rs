@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use flate2::bufread::MultiGzDecoder;
 use glam::{DVec3, UVec3};
 
-use super::{Volume, VolumeError};
+use super::{Grid, Labels, Volume, VolumeError};
 
 /// No header line is longer than this, in bytes.
 const MAX_LINE: u64 = 64 << 10;
@@ -28,12 +28,36 @@ const MAX_COSINE: f64 = 1e-4;
 
 /// Reads the volume of one NRRD file, or of the detached header and the data file it names.
 pub(super) fn read(path: &Path) -> Result<Volume, VolumeError> {
-    let mut file = Source::open(path)?;
-    let header = Header::read(&mut file)?;
-    let (dims, spacing) = (header.dims()?, header.spacing()?);
-    let layout = header.layout(dims)?;
-    let data = header.data_path()?.map_or(Ok(file), |path| Source::open(&path))?;
-    Volume::new(&path.display().to_string(), dims, spacing, layout.read(data)?)
+    let Opened { dims, spacing, layout, data } = Opened::new(path)?;
+    let values = layout.read(data, layout.sample.values)?;
+    Volume::new(&path.display().to_string(), dims, spacing.unwrap_or(DVec3::ONE), values)
+}
+
+/// Reads such a file's samples as labels.
+pub(super) fn read_labels(path: &Path) -> Result<Labels, VolumeError> {
+    let Opened { dims, spacing, layout, data } = Opened::new(path)?;
+    let values = layout.read(data, layout.sample.labels)?;
+    Ok(Labels { origin: path.display().to_string(), dims, spacing, values: values.into() })
+}
+
+/// What a header says, and the file that the samples are in.
+struct Opened {
+    dims: UVec3,
+    /// If the header gives one.
+    spacing: Option<DVec3>,
+    layout: Layout,
+    data: Source,
+}
+
+impl Opened {
+    fn new(path: &Path) -> Result<Self, VolumeError> {
+        let mut file = Source::open(path)?;
+        let header = Header::read(&mut file)?;
+        let (dims, spacing) = (header.dims()?, header.spacing()?);
+        let layout = header.layout(dims)?;
+        let data = header.data_path()?.map_or(Ok(file), |path| Source::open(&path))?;
+        Ok(Self { dims, spacing, layout, data })
+    }
 }
 
 /// One file while it is read.
@@ -169,13 +193,13 @@ impl Header {
         })
     }
 
-    fn spacing(&self) -> Result<DVec3, VolumeError> {
+    fn spacing(&self) -> Result<Option<DVec3>, VolumeError> {
         match (self.get("spacings"), self.get("space directions")) {
-            (None, None) => Ok(DVec3::ONE),
-            (None, Some(_)) => self.directed_spacing(),
+            (None, None) => Ok(None),
+            (None, Some(_)) => self.directed_spacing().map(Some),
             (Some(_), None) => self.value("spacings", "three positive finite numbers", |text| {
                 let spacings = three(text?.split_whitespace().map(number))?;
-                spacings.iter().all(|&spacing| spacing > 0.0).then_some(DVec3::from_array(spacings))
+                spacings.iter().all(|&spacing| spacing > 0.0).then_some(Some(DVec3::from_array(spacings)))
             }),
             (Some(_), Some(_)) => {
                 Err(self.invalid("space directions", "`spacings` as well", "one of `spacings` and `space directions`"))
@@ -233,16 +257,20 @@ impl Header {
         let skips = self.get("line skip").or(self.get("byte skip")).is_some();
         let window = skips && self.get("data file").is_some();
         // `dims` has fitted the product in 32 bits.
-        Ok(Layout { sample, count: dims.element_product(), big_endian, gzip, line_skip, byte_skip, window })
+        Ok(Layout { sample, dims, count: dims.element_product(), big_endian, gzip, line_skip, byte_skip, window })
     }
 }
+
+/// Appends the samples in some bytes, a whole number of them; `true` if they are big endian. Stops at one that is not allowed, and
+/// gives it back.
+type Convert<T> = fn(bool, &[u8], &mut Vec<T>) -> Result<(), f64>;
 
 /// The type of the samples in the file.
 #[derive(Clone, Copy)]
 struct Sample {
     bytes: u64,
-    /// Appends the samples in some bytes, a whole number of them; `true` if they are big endian.
-    convert: fn(bool, &[u8], &mut Vec<f32>),
+    values: Convert<f32>,
+    labels: Convert<u16>,
 }
 
 impl Sample {
@@ -253,9 +281,22 @@ impl Sample {
             ($type:ty) => {
                 Self {
                     bytes: size_of::<$type>() as u64,
-                    convert: |big_endian, bytes, values| {
+                    values: |big_endian, bytes, values| {
                         let from_bytes = if big_endian { <$type>::from_be_bytes } else { <$type>::from_le_bytes };
                         values.extend(bytes.as_chunks().0.iter().map(|&sample| from_bytes(sample) as f32));
+                        Ok(())
+                    },
+                    labels: |big_endian, bytes, labels| {
+                        let from_bytes = if big_endian { <$type>::from_be_bytes } else { <$type>::from_le_bytes };
+                        for &sample in bytes.as_chunks().0 {
+                            let sample = from_bytes(sample) as f64;
+                            let label = sample as u16;
+                            if f64::from(label) != sample {
+                                return Err(sample);
+                            }
+                            labels.push(label);
+                        }
+                        Ok(())
                     },
                 }
             };
@@ -281,6 +322,7 @@ impl Sample {
 /// How the samples lie in their file.
 struct Layout {
     sample: Sample,
+    dims: UVec3,
     count: u32,
     big_endian: bool,
     gzip: bool,
@@ -292,12 +334,12 @@ struct Layout {
 }
 
 impl Layout {
-    fn read(&self, mut file: Source) -> Result<Vec<f32>, VolumeError> {
+    fn read<T>(&self, mut file: Source, convert: Convert<T>) -> Result<Vec<T>, VolumeError> {
         file.skip_lines(self.line_skip)?;
-        if self.gzip { self.read_gzip(file) } else { self.read_raw(file) }
+        if self.gzip { self.read_gzip(file, convert) } else { self.read_raw(file, convert) }
     }
 
-    fn read_raw(&self, mut file: Source) -> Result<Vec<f32>, VolumeError> {
+    fn read_raw<T>(&self, mut file: Source, convert: Convert<T>) -> Result<Vec<T>, VolumeError> {
         let left = file.left()?;
         let skip = self.byte_skip.unwrap_or(left.saturating_sub(self.bytes()));
         let held = left.saturating_sub(skip);
@@ -306,10 +348,10 @@ impl Layout {
         }
         file.reader.seek_relative(skip as i64).map_err(io_error(&file.path))?;
         // The file holds them all, so memory for them may be asked for at once.
-        self.read_samples(&file.path, &mut file.reader, self.count as usize)
+        self.read_samples(&file.path, &mut file.reader, self.count as usize, convert)
     }
 
-    fn read_gzip(&self, mut file: Source) -> Result<Vec<f32>, VolumeError> {
+    fn read_gzip<T>(&self, mut file: Source, convert: Convert<T>) -> Result<Vec<T>, VolumeError> {
         let skip = self.byte_skip.unwrap_or(0);
         let most = file.left()?.saturating_mul(MAX_EXPANSION).saturating_sub(skip);
         if most < self.bytes() {
@@ -318,7 +360,7 @@ impl Layout {
         let mut stream = MultiGzDecoder::new(file.reader);
         io::copy(&mut stream.by_ref().take(skip), &mut io::sink()).map_err(gzip_error(&file.path))?;
         // What the stream holds is not known yet: memory grows with what comes out of it.
-        let values = self.read_samples(&file.path, &mut stream, 0)?;
+        let values = self.read_samples(&file.path, &mut stream, 0, convert)?;
         // Reading on to the end is also what checks the last checksum.
         match io::copy(&mut stream.take(1), &mut io::sink()).map_err(gzip_error(&file.path))? {
             0 => Ok(values),
@@ -326,7 +368,13 @@ impl Layout {
         }
     }
 
-    fn read_samples(&self, path: &Path, stream: &mut impl Read, expected: usize) -> Result<Vec<f32>, VolumeError> {
+    fn read_samples<T>(
+        &self,
+        path: &Path,
+        stream: &mut impl Read,
+        expected: usize,
+        convert: Convert<T>,
+    ) -> Result<Vec<T>, VolumeError> {
         let too_many = |error| invalid(path, "data", format!("{} samples: {error}", self.count), "fewer");
         let (mut values, mut chunk) = (Vec::new(), Vec::with_capacity(CHUNK as usize));
         values.try_reserve_exact(expected).map_err(too_many)?;
@@ -339,7 +387,10 @@ impl Layout {
                 return Err(self.mismatch(path, self.bytes() - left + read));
             }
             values.try_reserve(chunk.len() / self.sample.bytes as usize).map_err(too_many)?;
-            (self.sample.convert)(self.big_endian, &chunk, &mut values);
+            convert(self.big_endian, &chunk, &mut values).map_err(|sample| {
+                let voxel = Grid { dims: self.dims, spacing: DVec3::ONE }.voxel_at(values.len() as u32);
+                invalid(path, "data", format!("{sample} at voxel {voxel}"), "labels, whole numbers from 0 to 65535")
+            })?;
             left -= read;
         }
         values.shrink_to_fit();

@@ -2,7 +2,7 @@
 //! (§6): what a sheet group draws, in which order, and what is known of every brick afterwards. What the drawn voxels look
 //! like is `shade.rs`'s.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DVec2, DVec3, DVec4, UVec3};
 use sheetsplat::brick::{self, BRICK_VOXELS};
@@ -43,11 +43,11 @@ pub(crate) struct Culling<'a> {
 }
 
 impl<'a> Culling<'a> {
-    /// Of voxels in memory order, of a grid with these values.
+    /// Of voxels in memory order, of a grid with these values and labels.
     pub(crate) fn new(
         gpu: &'a Headless,
         (stage, sheets): (&'a Cull, u32),
-        (grid, values): (&Grid, &[f32]),
+        (grid, values, labels): (&Grid, &[f32], Option<&[u16]>),
         voxels: &[u32],
         transfer: &TransferFunction,
         scene: &Scene,
@@ -68,10 +68,12 @@ impl<'a> Culling<'a> {
         let groups = init(device, &group_bytes, BufferUsages::UNIFORM);
         let bytes = vec![0_u8; size_of::<Tally>() + targets.opaque_tiles.size() as usize];
         let culled = init(device, &bytes, BufferUsages::STORAGE);
+        let labels = labels.map(|labels| VolumeTexture::upload_labels(device, gpu.queue(), labels).unwrap());
         let shared = CullBuffers {
             frame: &init(device, &[frame], BufferUsages::UNIFORM),
             groups: &groups,
             values: &VolumeTexture::upload(device, gpu.queue(), values).unwrap().view,
+            labels: labels.as_ref().map(|labels| &labels.view),
             control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
             occluded: &targets.occluded,
             culled: &culled,
@@ -417,6 +419,7 @@ impl Case {
             opacity: Ramp::new(vec![(0.0, 0.5)]).unwrap(),
             gradient_opacity: None,
             iso_ranges: None,
+            labels: BTreeMap::new(),
         }
     }
 
@@ -426,7 +429,7 @@ impl Case {
         let values = vec![1.0; self.grid.dims.element_product() as usize];
         // Voxels that f32 arithmetic may decide otherwise about are left out, which changes their bricks.
         for _ in 0..30 {
-            let volume = (&self.grid, &values[..]);
+            let volume = (&self.grid, &values[..], None);
             let culling = Culling::new(gpu, (stage, self.sheets), volume, &self.voxels, &transfer, &self.scene);
             let (_, unsure) = self.expected(&culling, masks);
             if unsure.is_empty() {

@@ -12,6 +12,8 @@ mod shade;
 mod splat;
 mod tiles;
 
+use std::collections::BTreeMap;
+
 use glam::{DVec3, UVec3};
 use sheetsplat::gpu::layout::{Frame, Indirect, QUADS, TileList};
 use sheetsplat::gpu::readback;
@@ -39,7 +41,13 @@ fn frame_over(grid: &Grid, scene: &Scene) -> Frame {
     let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
     let transfer = common::transfer(&[(0.0, [1.0; 3])], &[(0.0, 1.0)]);
     let (color, opacity) = (transfer.color.unwrap(), transfer.opacity.unwrap());
-    let ramps = Ramps::new(&TransferFunction { color, opacity, gradient_opacity: None, iso_ranges: None });
+    let ramps = Ramps::new(&TransferFunction {
+        color,
+        opacity,
+        gradient_opacity: None,
+        iso_ranges: None,
+        labels: BTreeMap::new(),
+    });
     uniforms::frame(&view, &kernel, grid, &ramps, scene)
 }
 

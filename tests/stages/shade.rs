@@ -13,9 +13,9 @@ use sheetsplat::reference::{Geometry, shading};
 use sheetsplat::scene::{Scene, TransferSettings};
 use sheetsplat::shading::{Light, Shading};
 use sheetsplat::splatting::Compositing;
-use sheetsplat::transfer_function::{Ramp, TransferFunction};
+use sheetsplat::transfer_function::{LabelTables, Ramp, TransferFunction};
 use sheetsplat::view::View;
-use sheetsplat::volume::Volume;
+use sheetsplat::volume::{Labels, Volume};
 
 use crate::common::{F16, F32, Random, camera, gpu, scene, transfer};
 use crate::cull::Culling;
@@ -50,11 +50,11 @@ fn ramp_error<T: Copy>(points: &[(f64, T)], difference: impl Fn(T, T) -> f64, at
 fn tolerance(volume: &Volume, index: u32, transfer: &TransferFunction, scene: &Scene, amount: DVec4) -> DVec4 {
     let value = f64::from(volume.values()[index as usize]);
     let magnitude = volume.gradient(volume.grid().voxel_at(index)).length();
-    let alpha = transfer.alpha(value, magnitude);
+    let tables = transfer.tables(volume.label(index));
+    let alpha = tables.alpha(value, magnitude);
     let scalar = |a: f64, b: f64| (a - b).abs();
-    let factor_error =
-        transfer.gradient_opacity.as_ref().map_or(0.0, |ramp| ramp_error(ramp.points(), scalar, magnitude));
-    let alpha_error = ramp_error(transfer.opacity.points(), scalar, value) + factor_error + F32;
+    let factor_error = tables.gradient_opacity.map_or(0.0, |ramp| ramp_error(ramp.points(), scalar, magnitude));
+    let alpha_error = ramp_error(tables.opacity.points(), scalar, value) + factor_error + F32;
 
     // -ln(1 - α): WGSL's log is good to 2⁻²¹ for arguments in [0.5, 2] and to 3 ULP beyond.
     let m = shading::amount(scene.splatting.compositing, alpha);
@@ -67,7 +67,7 @@ fn tolerance(volume: &Volume, index: u32, transfer: &TransferFunction, scene: &S
     // counts.
     let normal_error = 16.0 * F32;
     let Shading { ambient, diffuse, specular, shininess, .. } = scene.shading;
-    let color_error = ramp_error(transfer.color.points(), |a: DVec3, b| (a - b).abs().max_element(), value);
+    let color_error = ramp_error(tables.color.points(), |a: DVec3, b| (a - b).abs().max_element(), value);
     // pow is exp2(y·log2(x)): log2 to 2⁻²¹, times y; exp2 to 3 ULP and more where its result is small. A cosine's power
     // is steep at 0 where the exponent is below 1, at 1 where it is above.
     let cosine = highlight_cosine(volume, index, scene);
@@ -116,7 +116,9 @@ fn check(name: &str, volume: &Volume, scene: &Scene) {
     let sheets = 2;
     let stage = Cull::new(gpu.device(), sheets);
     let voxels = classify(volume, &transfer);
-    let culling = Culling::new(&gpu, (&stage, sheets), (volume.grid(), volume.values()), &voxels, &transfer, scene);
+    let labels = volume.labels().filter(|_| transfer.labels.values().any(LabelTables::matter_to_shading));
+    let of_volume = (volume.grid(), volume.values(), labels);
+    let culling = Culling::new(&gpu, (&stage, sheets), of_volume, &voxels, &transfer, scene);
     assert!(culling.plan.groups.len() > 1, "{name}: one group");
     (0..culling.plan.groups.len()).for_each(|group| culling.cull(group));
     let (records, states, view) = (culling.splats(), culling.states(), culling.view);
@@ -346,4 +348,36 @@ fn many_control_points_and_values_exactly_on_them() {
     check("values at control points", &volume, &scene);
     scene.transfer = crate::common::transfer(&[(3.0, [0.2, 0.4, 0.8])], &[(100.25, 0.75)]);
     check("one control point", &volume, &scene);
+}
+
+/// Labels with tables of their own, complete and not, and some that only hide; those after the last table go by the main one.
+#[test]
+fn labels_have_their_own_tables() {
+    let labelled = |labels: &[u16]| {
+        let volume = noise(DIMS, DVec3::new(1.0, 2.0, 1.5));
+        let mut random = Random(5);
+        let values = (0..volume.values().len()).map(|_| labels[random.bits() as usize % labels.len()]).collect();
+        let labels = Labels { origin: "noise".to_owned(), dims: DIMS, spacing: None, values };
+        volume.with_labels(labels).unwrap()
+    };
+    let own = LabelTables {
+        color: Some(Ramp::new(vec![(0.0, DVec3::new(0.9, 0.1, 0.2)), (200.0, DVec3::new(0.2, 0.6, 0.1))]).unwrap()),
+        opacity: Some(Ramp::new(vec![(0.0, 0.9), (60.0, 0.0), (80.0, 0.0), (255.0, 0.5)]).unwrap()),
+        gradient_opacity: Some(Ramp::new(vec![(5.0, 0.0), (30.0, 0.25), (90.0, 1.0)]).unwrap()),
+        ..LabelTables::default()
+    };
+    let hidden = LabelTables { visible: false, ..own.clone() };
+    let colored = LabelTables { color: own.color.clone(), ..LabelTables::default() };
+    for [first, second, third, rest] in [[0, 1, 2, 3], [7, 300, 65535, 4], [1, 2, 65534, 65535]] {
+        let volume = labelled(&[first, second, third, rest]);
+        let mut scene = oblique();
+        scene.splatting.compositing = Compositing::Exponential;
+        scene.transfer.labels = [(first, own.clone()), (second, hidden.clone()), (third, colored.clone())].into();
+        check(&format!("labels up to {third}"), &volume, &scene);
+        scene.transfer.gradient_opacity = Some(Ramp::new(vec![(20.0, 0.1), (70.0, 0.8)]).unwrap());
+        scene.transfer.iso_ranges = Some(vec![[20.0, 150.0], [180.0, 250.0]]);
+        check(&format!("labels up to {third}, iso-ranges"), &volume, &scene);
+        scene.transfer.labels = [(second, hidden.clone())].into();
+        check(&format!("label {second} hidden"), &volume, &scene);
+    }
 }

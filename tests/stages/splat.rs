@@ -45,6 +45,7 @@ impl<'a> Stages<'a> {
             frame: &uniform,
             groups: &uniform,
             values: &VolumeTexture::upload(device, gpu.queue(), &[0.0]).unwrap().view,
+            labels: None,
             control_points: &storage,
             occluded: &storage,
             culled: &storage,
@@ -168,7 +169,7 @@ impl<'a> Fixture<'a> {
         let layout::Splat { x_px, y_px, depth, rg, ba, .. } = *splat;
         assert_eq!((rg, ba), (AMOUNT_RG, AMOUNT_BA));
         let center = DVec2::new(x_px.into(), y_px.into());
-        reference::Splat { center, depth: depth.into(), amount: AMOUNT * self.amplitude() }
+        reference::Splat { center, depth: depth.into(), amount: AMOUNT * self.amplitude(), alpha: 1.0 }
     }
 
     /// The slabs that a splat's kernel reaches into.

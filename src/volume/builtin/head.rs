@@ -20,21 +20,46 @@ const CORTEX: f64 = 3.2;
 
 const EYE: DVec3 = dvec3(32.5, -76.5, 6.0);
 
+/// What every label means. The brain's two include the cerebellum, the brainstem and the optic nerves.
+pub(super) const LABELS: &[(u16, &str)] = &[
+    (label::AIR, "air"),
+    (label::SKIN, "skin and soft tissue"),
+    (label::SKULL, "skull"),
+    (label::FLUID, "fluid around the brain"),
+    (label::GREY, "grey matter"),
+    (label::WHITE, "white matter"),
+    (label::VENTRICLES, "ventricles"),
+    (label::EYES, "eyes"),
+];
+
+mod label {
+    pub(super) const AIR: u16 = 0;
+    pub(super) const SKIN: u16 = 1;
+    pub(super) const SKULL: u16 = 2;
+    pub(super) const FLUID: u16 = 3;
+    pub(super) const GREY: u16 = 4;
+    pub(super) const WHITE: u16 = 5;
+    pub(super) const VENTRICLES: u16 = 6;
+    pub(super) const EYES: u16 = 7;
+}
+
 /// The values rise from tissue to tissue inwards — skin, bone, brain, eyes — so that every threshold between two of
 /// them finds one clean surface, without the fringe where a steeper edge passes through the value of another tissue.
-pub(super) fn values(grid: &Grid) -> Vec<f32> {
-    let layer = |value, distance: fn(DVec3) -> f64| Layer::new(value, move |p| SCALE * distance(mirrored(p / SCALE)));
+pub(super) fn painted(grid: &Grid) -> (Vec<f32>, Vec<u16>) {
+    let layer = |value, label, distance: fn(DVec3) -> f64| {
+        Layer::new(value, label, move |p| SCALE * distance(mirrored(p / SCALE)))
+    };
     grid.paint(&[
-        layer(90.0, skin),
-        layer(150.0, bone),
-        layer(50.0, cavity),
-        layer(200.0, brain).with_core(SCALE * CORTEX, 225.0),
-        layer(200.0, nuclei),
-        layer(40.0, ventricles),
-        layer(0.0, airways),
-        layer(245.0, eyeball),
-        layer(255.0, lens),
-        layer(0.0, |p| p.z - NECK),
+        layer(90.0, label::SKIN, skin),
+        layer(150.0, label::SKULL, bone),
+        layer(50.0, label::FLUID, cavity),
+        layer(200.0, label::GREY, brain).with_core(SCALE * CORTEX, 225.0, label::WHITE),
+        layer(200.0, label::GREY, nuclei),
+        layer(40.0, label::VENTRICLES, ventricles),
+        layer(0.0, label::AIR, airways),
+        layer(245.0, label::EYES, eyeball),
+        layer(255.0, label::EYES, lens),
+        layer(0.0, label::AIR, |p| p.z - NECK),
     ])
 }
 

@@ -10,7 +10,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use glam::{DVec3, UVec3};
 use rayon::prelude::*;
 
-use super::{Grid, Volume, VolumeError};
+use super::{Grid, Labels, Volume, VolumeError};
 
 /// The volumes that [`volume`] knows.
 pub const NAMES: &[&str] = &["cube", "head", "nerve", "tomato", "marschner-lobb"];
@@ -22,7 +22,8 @@ const SIZES: std::ops::RangeInclusive<u32> = 2..=1024;
 /// dimension and the same extent in world units.
 ///
 /// The values are those of an 8-bit scanner, whole numbers from 0 to 255 — but for `marschner-lobb`, whose values are
-/// not rounded — and the same in every run.
+/// not rounded — and the same in every run. [`labels`] says which volumes are segmented: there every voxel has the label of the tissue
+/// that fills most of it.
 ///
 /// # Errors
 /// If the name is unknown or N is not a whole number from 2 to 1024.
@@ -34,13 +35,13 @@ pub fn volume(name: &str) -> Result<Volume, VolumeError> {
         found: format!("\"{found}\""),
         allowed,
     };
-    let (kind, size) = name.split_once(':').map_or((name, None), |(kind, size)| (kind, Some(size)));
-    let (dims, spacing, values): (_, _, fn(&Grid) -> Vec<f32>) = match kind {
-        "cube" => ([48, 48, 48], DVec3::ONE, cube),
-        "head" => ([256, 256, 163], DVec3::ONE, head::values),
-        "nerve" => ([512, 512, 76], DVec3::new(1.0, 1.0, 5.0), nerve::values),
-        "tomato" => ([256, 256, 64], DVec3::new(1.0, 1.0, 3.0), tomato::values),
-        "marschner-lobb" => ([64, 64, 64], DVec3::ONE, marschner_lobb),
+    let (kind, size) = kind_and_size(name);
+    let (dims, spacing, painted) = match kind {
+        "cube" => ([48, 48, 48], DVec3::ONE, Painted::Values(cube)),
+        "head" => ([256, 256, 163], DVec3::ONE, Painted::Tissues(head::painted)),
+        "nerve" => ([512, 512, 76], DVec3::new(1.0, 1.0, 5.0), Painted::Values(nerve::values)),
+        "tomato" => ([256, 256, 64], DVec3::new(1.0, 1.0, 3.0), Painted::Tissues(tomato::painted)),
+        "marschner-lobb" => ([64, 64, 64], DVec3::ONE, Painted::Values(marschner_lobb)),
         _ => return Err(invalid("name", kind, format!("{}, each alone or as NAME:N", NAMES.join(", ")))),
     };
     let full = UVec3::from(dims);
@@ -53,7 +54,43 @@ pub fn volume(name: &str) -> Result<Volume, VolumeError> {
     };
     let dims = UVec3::from(dims.map(|side| ((side * n + longest / 2) / longest).max(1)));
     let grid = Grid { dims, spacing: spacing * (f64::from(longest) / f64::from(n)) };
-    Volume::new(&origin, grid.dims, grid.spacing, values(&grid))
+    let (values, labels) = match painted {
+        Painted::Values(values) => (values(&grid), None),
+        Painted::Tissues(painted) => {
+            let (values, labels) = painted(&grid);
+            (values, Some(labels))
+        }
+    };
+    let volume = Volume::new(&origin, grid.dims, grid.spacing, values)?;
+    match labels {
+        Some(labels) => volume.with_labels(Labels { origin, dims: grid.dims, spacing: None, values: labels.into() }),
+        None => Ok(volume),
+    }
+}
+
+/// How a volume is made: values alone, or with labels.
+enum Painted {
+    Values(fn(&Grid) -> Vec<f32>),
+    Tissues(fn(&Grid) -> (Vec<f32>, Vec<u16>)),
+}
+
+/// What the labels of a procedural volume mean, number and name, for `NAME` or `NAME:N`: none if it is not segmented, `None` if there
+/// is no such volume.
+///
+/// | | 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7 |
+/// |---|---|---|---|---|---|---|---|---|
+/// | `head` | air | skin and soft tissue | skull | fluid around the brain | grey matter | white matter | ventricles | eyes |
+/// | `tomato` | air | wall | gel | placenta | core | seeds | | |
+pub fn labels(name: &str) -> Option<&'static [(u16, &'static str)]> {
+    match kind_and_size(name).0 {
+        "head" => Some(head::LABELS),
+        "tomato" => Some(tomato::LABELS),
+        kind => NAMES.contains(&kind).then_some(&[]),
+    }
+}
+
+fn kind_and_size(name: &str) -> (&str, Option<&str>) {
+    name.split_once(':').map_or((name, None), |(kind, size)| (kind, Some(size)))
 }
 
 /// A solid cube of 32³ world units: 255 inside, 0 outside, nothing in between.

@@ -76,23 +76,42 @@ pub(super) fn sculpt(p: DVec3, start: f64, parts: &[Part]) -> f64 {
     })
 }
 
-/// A tissue: its value, and the distance to it at a world position.
+/// Labels are below this; 0 is what no layer covers.
+const LABELS: usize = 8;
+
+/// What a voxel is painted with.
+#[derive(Clone, Copy)]
+pub(super) struct Tissue {
+    pub(super) value: f64,
+    pub(super) label: u16,
+}
+
+/// A tissue, and the distance to it at a world position.
 pub(super) struct Layer<'a> {
-    value: f64,
-    /// How deep below the surface another tissue begins, and its value.
-    core: (f64, f64),
+    tissue: Tissue,
+    /// How deep below the surface another tissue begins.
+    depth: f64,
+    core: Tissue,
     distance: Box<dyn Fn(DVec3) -> f64 + Sync + 'a>,
 }
 
 impl<'a> Layer<'a> {
-    pub(super) fn new(value: f64, distance: impl Fn(DVec3) -> f64 + Sync + 'a) -> Self {
-        Self { value, core: (0.0, value), distance: Box::new(distance) }
+    pub(super) fn new(value: f64, label: u16, distance: impl Fn(DVec3) -> f64 + Sync + 'a) -> Self {
+        let tissue = Tissue { value, label };
+        Self { tissue, depth: 0.0, core: tissue, distance: Box::new(distance) }
     }
 
     /// The same with another tissue from a depth on.
-    pub(super) fn with_core(self, depth: f64, value: f64) -> Self {
-        Self { core: (depth, value), ..self }
+    pub(super) fn with_core(self, depth: f64, value: f64, label: u16) -> Self {
+        Self { depth, core: Tissue { value, label }, ..self }
     }
+}
+
+/// Values and labels from slice `z` on.
+struct Slab<'a> {
+    z: u32,
+    values: &'a mut [f32],
+    labels: &'a mut [u16],
 }
 
 impl Grid {
@@ -102,25 +121,30 @@ impl Grid {
     }
 
     /// Values of layers painted over each other onto 0, in order, with edges as soft as a scanner's. A voxel longer
-    /// than it is wide is a mean along its length that reaches to the next ones, as a thick slice is.
-    pub(super) fn paint(&self, layers: &[Layer]) -> Vec<f32> {
+    /// than it is wide is a mean along its length that reaches to the next ones, as a thick slice is. A voxel's label is that of
+    /// the tissue it has most of.
+    pub(super) fn paint(&self, layers: &[Layer]) -> (Vec<f32>, Vec<u16>) {
         let slice = self.dims.x as usize * self.dims.y as usize;
-        let mut values = vec![0.0; slice * self.dims.z as usize];
+        let count = slice * self.dims.z as usize;
+        let (mut values, mut labels) = (vec![0.0; count], vec![0; count]);
         let everything: Vec<_> = layers.iter().collect();
-        values.par_chunks_mut(slice * BLOCK as usize).enumerate().for_each(|(slab, values)| {
+        let slabs = slice * BLOCK as usize;
+        let slabs = values.par_chunks_mut(slabs).zip(labels.par_chunks_mut(slabs));
+        slabs.enumerate().for_each(|(slab, (values, labels))| {
             let z = slab as u32 * BLOCK;
+            let mut slab = Slab { z, values, labels };
             for y in (0..self.dims.y).step_by(BLOCK as usize) {
                 for x in (0..self.dims.x).step_by(BLOCK as usize) {
-                    self.paint_block(values, z, UVec3::new(x, y, z), BLOCK, &everything);
+                    self.paint_block(&mut slab, UVec3::new(x, y, z), BLOCK, &everything);
                 }
             }
         });
-        values
+        (values, labels)
     }
 
-    /// Paints the block of `size`³ voxels at `low` into `values`, which start at slice `z`. Only the layers that can
-    /// change within the block are handed down to its eighths.
-    fn paint_block(&self, values: &mut [f32], z: u32, low: UVec3, size: u32, layers: &[&Layer]) {
+    /// Paints the block of `size`³ voxels at `low`. Only the layers that can change within the block are handed down to its
+    /// eighths.
+    fn paint_block(&self, slab: &mut Slab, low: UVec3, size: u32, layers: &[&Layer]) {
         let high = (low + size).min(self.dims);
         if low.cmpge(high).any() {
             return;
@@ -130,14 +154,14 @@ impl Grid {
         let reach = (extent * self.spacing).length() / 2.0 * SLACK + SOFTNESS * self.unit();
         let center = self.position((low + high - 1).as_dvec3() / 2.0);
         let mut kept: Vec<&Layer> = Vec::with_capacity(layers.len());
-        let mut uniform = Some(0.0);
+        let mut uniform = Some(Tissue { value: 0.0, label: 0 });
         // From the top down to one that hides the others.
         for &layer in layers.iter().rev() {
             let distance = (layer.distance)(center);
             if distance > reach {
                 continue;
             }
-            let solid = (distance < -reach - layer.core.0).then_some(layer.core.1);
+            let solid = (distance < -reach - layer.depth).then_some(layer.core);
             uniform = solid.filter(|_| kept.is_empty());
             kept.push(layer);
             if distance < -reach {
@@ -145,52 +169,61 @@ impl Grid {
             }
         }
         kept.reverse();
+        let z = slab.z;
         let row = |y: u32, k: u32| (self.dims.x as usize) * (y as usize + self.dims.y as usize * (k - z) as usize);
-        if let Some(value) = uniform {
+        if let Some(Tissue { value, label }) = uniform {
             for (k, y) in (low.z..high.z).flat_map(|k| (low.y..high.y).map(move |y| (k, y))) {
-                values[row(y, k) + low.x as usize..row(y, k) + high.x as usize].fill(value as f32);
+                let voxels = row(y, k) + low.x as usize..row(y, k) + high.x as usize;
+                slab.values[voxels.clone()].fill(value as f32);
+                slab.labels[voxels].fill(label);
             }
         } else if size > 2 {
             for corner in 0..8 {
                 let offset = UVec3::new(corner & 1, corner >> 1 & 1, corner >> 2) * (size / 2);
-                self.paint_block(values, z, low + offset, size / 2, &kept);
+                self.paint_block(slab, low + offset, size / 2, &kept);
             }
         } else {
             for (k, y) in (low.z..high.z).flat_map(|k| (low.y..high.y).map(move |y| (k, y))) {
                 for x in low.x..high.x {
-                    values[row(y, k) + x as usize] = self.voxel(UVec3::new(x, y, k), &kept);
+                    let at = row(y, k) + x as usize;
+                    (slab.values[at], slab.labels[at]) = self.voxel(UVec3::new(x, y, k), &kept);
                 }
             }
         }
     }
 
-    fn voxel(&self, voxel: UVec3, layers: &[&Layer]) -> f32 {
+    fn voxel(&self, voxel: UVec3, layers: &[&Layer]) -> (f32, u16) {
         // Weights of a tent from slice to slice.
         let n = self.samples();
-        let sum: f64 = (1 - n..n)
-            .map(|k| {
-                let shift = DVec3::Z * (f64::from(k) / f64::from(n));
-                f64::from(n - k.abs()) * self.value(self.position(voxel.as_dvec3() + shift), layers)
-            })
-            .sum();
-        (sum / f64::from(n * n)).round() as f32
+        let (mut sum, mut shares) = (0.0, [0.0; LABELS]);
+        for k in 1 - n..n {
+            let shift = DVec3::Z * (f64::from(k) / f64::from(n));
+            let weight = f64::from(n - k.abs());
+            sum += weight * self.value(self.position(voxel.as_dvec3() + shift), layers, weight, &mut shares);
+        }
+        // Of equal shares the first label's.
+        let most = (1..LABELS).fold(0, |most, label| if shares[label] > shares[most] { label } else { most });
+        ((sum / f64::from(n * n)).round() as f32, most as u16)
     }
 
-    /// The value at a world position: from the top layer down, as long as something shows through.
-    fn value(&self, p: DVec3, layers: &[&Layer]) -> f64 {
+    /// The value at a world position: from the top layer down, as long as something shows through. Adds how much of every tissue
+    /// there is, times a weight, to the labels' shares.
+    fn value(&self, p: DVec3, layers: &[&Layer], weight: f64, shares: &mut [f64; LABELS]) -> f64 {
         let soft = SOFTNESS * self.unit();
         let (mut value, mut through) = (0.0, 1.0);
-        for layer in layers.iter().rev() {
-            let distance = (layer.distance)(p);
-            let (depth, core) = layer.core;
+        for &&Layer { tissue, depth, core, ref distance } in layers.iter().rev() {
+            let distance = distance(p);
             let coverage = smoothstep(soft, -soft, distance);
-            let tissue = layer.value + (core - layer.value) * smoothstep(soft, -soft, distance + depth);
-            value += through * coverage * tissue;
+            let in_core = smoothstep(soft, -soft, distance + depth);
+            value += through * coverage * (tissue.value + (core.value - tissue.value) * in_core);
+            shares[usize::from(tissue.label)] += weight * through * coverage * (1.0 - in_core);
+            shares[usize::from(core.label)] += weight * through * coverage * in_core;
             through *= 1.0 - coverage;
             if through == 0.0 {
                 break;
             }
         }
+        shares[0] += weight * through;
         value
     }
 

@@ -18,16 +18,34 @@ const WALL: f64 = 15.0;
 /// Seeds in each chamber.
 const SEEDS: u32 = 22;
 
-pub(super) fn values(grid: &Grid) -> Vec<f32> {
+/// What every label means.
+pub(super) const LABELS: &[(u16, &str)] = &[
+    (0, "air"),
+    (label::WALL, "wall"),
+    (label::GEL, "gel"),
+    (label::PLACENTA, "placenta"),
+    (label::CORE, "core"),
+    (label::SEEDS, "seeds"),
+];
+
+mod label {
+    pub(super) const WALL: u16 = 1;
+    pub(super) const GEL: u16 = 2;
+    pub(super) const PLACENTA: u16 = 3;
+    pub(super) const CORE: u16 = 4;
+    pub(super) const SEEDS: u16 = 5;
+}
+
+pub(super) fn painted(grid: &Grid) -> (Vec<f32>, Vec<u16>) {
     let mut layers = vec![
-        Layer::new(90.0, outside),
-        Layer::new(50.0, chambers),
-        Layer::new(140.0, placenta),
-        Layer::new(170.0, core),
+        Layer::new(90.0, label::WALL, outside),
+        Layer::new(50.0, label::GEL, chambers),
+        Layer::new(140.0, label::PLACENTA, placenta),
+        Layer::new(170.0, label::CORE, core),
     ];
     layers.extend((0..COUNT as u32 * SEEDS).map(|index| {
         let seed = Seed::new(index);
-        Layer::new(230.0, move |p| seed.distance(p))
+        Layer::new(230.0, label::SEEDS, move |p| seed.distance(p))
     }));
     grid.paint(&layers)
 }

@@ -1,0 +1,75 @@
+//! Labels: which segment of a segmented volume every voxel belongs to.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::{DVec3, UVec3};
+
+use super::{Volume, VolumeError, invalid, nrrd, of_format};
+
+/// Two spacings that differ by less than this, relative to the larger one, are one spacing that was written down twice.
+const SAME_SPACING: f64 = 1e-4;
+
+/// A label for every voxel of a grid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Labels {
+    /// Names them in errors: a file.
+    pub origin: String,
+    /// Voxels along x, y and z.
+    pub dims: UVec3,
+    /// World units from voxel to voxel, if they say so; else they go with any.
+    pub spacing: Option<DVec3>,
+    /// The labels, x fastest.
+    pub values: Arc<[u16]>,
+}
+
+impl Labels {
+    /// Reads a label file, a volume file (`.nrrd`, `.nhdr`) of whole numbers from 0 to 65535 of any type.
+    ///
+    /// # Errors
+    /// If the file cannot be read, is of no known format, does not hold what its header promises, or has a sample that is no
+    /// label (the error names the voxel).
+    pub fn open(path: &Path) -> Result<Self, VolumeError> {
+        of_format(path, nrrd::read_labels)
+    }
+}
+
+impl Volume {
+    /// The same values with other labels.
+    ///
+    /// # Errors
+    /// If the labels are those of another grid.
+    pub fn with_labels(mut self, labels: Labels) -> Result<Self, VolumeError> {
+        let Labels { origin, dims, spacing, values } = labels;
+        let shown = |spacing: DVec3| format!("{:?}", spacing.to_array());
+        if dims != self.dims() {
+            return Err(invalid(&origin, "sizes", format!("{dims}"), format!("{}, the volume's", self.dims())));
+        }
+        if values.len() != self.values.len() {
+            let (found, allowed) = (values.len(), self.values.len());
+            return Err(invalid(&origin, "data", format!("{found} labels"), format!("{allowed} labels")));
+        }
+        let differs = |spacing: &DVec3| {
+            let largest = spacing.max(self.spacing());
+            !(*spacing - self.spacing()).abs().cmple(SAME_SPACING * largest).all()
+        };
+        if let Some(other) = spacing.filter(differs) {
+            return Err(invalid(&origin, "spacing", shown(other), format!("{}, the volume's", shown(self.spacing()))));
+        }
+        self.labels = Some(values);
+        Ok(self)
+    }
+
+    /// All labels, x fastest, then y, then z; `None` if the volume is not segmented.
+    pub fn labels(&self) -> Option<&[u16]> {
+        self.labels.as_deref()
+    }
+
+    /// The label of a voxel, given as an index into the volume; `None` if the volume is not segmented.
+    ///
+    /// # Panics
+    /// If the volume is segmented and the voxel lies outside it.
+    pub fn label(&self, index: u32) -> Option<u16> {
+        self.labels.as_ref().map(|labels| labels[index as usize])
+    }
+}

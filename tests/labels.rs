@@ -1,0 +1,319 @@
+//! Segmented volumes: label files and what is wrong with them, and whole frames of labels with tables of their own against the f64
+//! twin, by both rasterizers.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+#[expect(dead_code, reason = "not every file needs all of it")]
+mod common;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::{DVec3, UVec3};
+use sheetsplat::error::RenderError;
+use sheetsplat::headless::Headless;
+use sheetsplat::image::Image;
+use sheetsplat::reference;
+use sheetsplat::scene::Scene;
+use sheetsplat::splatting::{Compositing, Order, Rasterizer};
+use sheetsplat::transfer_function::{LabelTables, Ramp, TransferFunction};
+use sheetsplat::volume::{Labels, Volume, VolumeError, builtin};
+
+use common::{Random, camera, gpu, scene, transfer};
+
+/// A folder with a volume of 2×3×2 voxels, 1×1×2.5 apart, and a label file beside it.
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        let folder = Self(tempfile::tempdir().unwrap());
+        folder.write("volume.nrrd", "type: uint8\nspacings: 1 1 2.5\nsizes: 2 3 2", &[7; 12]);
+        folder
+    }
+
+    fn write(&self, name: &str, fields: &str, data: &[u8]) {
+        let header = format!("NRRD0005\ndimension: 3\nencoding: raw\nendian: little\n{fields}\n\n");
+        std::fs::write(self.0.path().join(name), [header.as_bytes(), data].concat()).unwrap();
+    }
+
+    /// The volume of a scene in the folder.
+    fn load(&self, volume: &str) -> Result<Volume, VolumeError> {
+        let scene = format!("[volume]\n{volume}\nlabels = 'labels.nrrd'");
+        Scene::parse(&scene, "scene.toml", self.0.path(), &[]).unwrap().load_volume()
+    }
+
+    #[track_caller]
+    fn assert_refused(&self, volume: &str, field: &str, found: &str, allowed: &str) {
+        let path = self.0.path().join("labels.nrrd");
+        let message = self.load(volume).unwrap_err().to_string();
+        assert_eq!(message, format!("{}: {field}: found {found}, allowed: {allowed}", path.display()));
+    }
+}
+
+const PATH: &str = "path = 'volume.nrrd'";
+
+#[test]
+fn labels_of_every_type() {
+    let folder = Folder::new();
+    let labels: [u16; 12] = [0, 1, 2, 3, 4, 5, 127, 100, 9, 0, 0, 1];
+    macro_rules! check {
+        ($($type:ty, $name:literal);*) => {$(
+            for (endian, bytes) in [
+                ("little", labels.map(|label| (label as $type).to_le_bytes()).concat()),
+                ("big", labels.map(|label| (label as $type).to_be_bytes()).concat()),
+            ] {
+                let header = format!(
+                    "NRRD0001\ntype: {}\nendian: {endian}\ndimension: 3\nsizes: 2 3 2\nencoding: raw\n\n", $name
+                );
+                std::fs::write(folder.0.path().join("labels.nrrd"), [header.as_bytes(), &bytes].concat()).unwrap();
+                assert_eq!(folder.load(PATH).unwrap().labels(), Some(&labels[..]), "{} {endian}", $name);
+            }
+        )*};
+    }
+    check!(i8, "int8"; u8, "uint8"; i16, "int16"; u16, "uint16"; i32, "int32"; u32, "uint32"; i64, "int64"; u64, "uint64";
+           f32, "float"; f64, "double");
+    // The largest, in types that hold it.
+    folder.write("labels.nrrd", "type: ushort\nsizes: 2 3 2", &[0xff; 24]);
+    let volume = folder.load(PATH).unwrap();
+    assert_eq!((volume.label(0), volume.label(11)), (Some(65535), Some(65535)));
+    folder.write("labels.nrrd", "type: int\nsizes: 2 3 2", &65535_i32.to_le_bytes().repeat(12));
+    assert_eq!(folder.load(PATH).unwrap().labels(), Some(&[65535; 12][..]));
+}
+
+#[test]
+fn what_is_no_label_is_named_with_its_voxel() {
+    let folder = Folder::new();
+    let allowed = "labels, whole numbers from 0 to 65535";
+    let refused = |name: &str, good: &[u8], bad: &[u8], shown: &str| {
+        // The eighth voxel.
+        let data = [good.repeat(7), bad.to_vec(), good.repeat(4)].concat();
+        folder.write("labels.nrrd", &format!("type: {name}\nsizes: 2 3 2"), &data);
+        folder.assert_refused(PATH, "data", &format!("{shown} at voxel [1, 0, 1]"), allowed);
+    };
+    refused("int8", &[1], &[0xff], "-1");
+    refused("short", &[1, 0], &(-32768_i16).to_le_bytes(), "-32768");
+    refused("int", &1_i32.to_le_bytes(), &65536_i32.to_le_bytes(), "65536");
+    refused("int", &1_i32.to_le_bytes(), &16_777_217_i32.to_le_bytes(), "16777217");
+    refused("uint64", &1_u64.to_le_bytes(), &(1_u64 << 40).to_le_bytes(), "1099511627776");
+    refused("float", &1_f32.to_le_bytes(), &2.5_f32.to_le_bytes(), "2.5");
+    refused("float", &1_f32.to_le_bytes(), &f32::NAN.to_le_bytes(), "NaN");
+    // Not a whole number, though the nearest f32 is.
+    refused("double", &1_f64.to_le_bytes(), &3.000_000_000_1_f64.to_le_bytes(), "3.0000000001");
+}
+
+#[test]
+fn labels_of_another_grid_are_refused() {
+    let folder = Folder::new();
+    folder.write("labels.nrrd", "type: uint8\nsizes: 3 2 2", &[0; 12]);
+    folder.assert_refused(PATH, "sizes", "[3, 2, 2]", "[2, 3, 2], the volume's");
+    folder.write("labels.nrrd", "type: uint8\nsizes: 2 3 1", &[0; 6]);
+    folder.assert_refused(PATH, "sizes", "[2, 3, 1]", "[2, 3, 2], the volume's");
+    folder.assert_refused("builtin = 'head:16'", "sizes", "[2, 3, 1]", "[16, 16, 10], the volume's");
+
+    // Their spacing counts if they state one, up to how it was written, and unless the scene has another for both files.
+    let with_spacing =
+        |fields: &str| folder.write("labels.nrrd", &format!("type: uint8\nsizes: 2 3 2{fields}"), &[3; 12]);
+    for same in
+        ["", "\nspacings: 1 1 2.5", "\nspacings: 1.00004 1 2.5", "\nspace directions: (0,1,0) (-1,0,0) (0,0,2.5)"]
+    {
+        with_spacing(same);
+        let volume = folder.load(PATH).unwrap();
+        assert_eq!((volume.label(5), volume.spacing()), (Some(3), DVec3::new(1.0, 1.0, 2.5)), "{same}");
+    }
+    let allowed = "[1.0, 1.0, 2.5], the volume's";
+    for (other, found) in [
+        ("spacings: 1 1 2.499", "[1.0, 1.0, 2.499]"),
+        ("spacings: 1 1.001 2.5", "[1.0, 1.001, 2.5]"),
+        ("space directions: (2,0,0) (0,2,0) (0,0,5)", "[2.0, 2.0, 5.0]"),
+    ] {
+        with_spacing(&format!("\n{other}"));
+        folder.assert_refused(PATH, "spacing", found, allowed);
+        let volume = folder.load(&format!("{PATH}\nspacing = [4, 4, 4]")).unwrap();
+        assert_eq!((volume.label(5), volume.spacing()), (Some(3), DVec3::splat(4.0)), "{other}");
+    }
+}
+
+#[test]
+fn broken_label_files_are_refused() {
+    let folder = Folder::new();
+    let path = folder.0.path().join("labels.nrrd");
+    let message = folder.load(PATH).unwrap_err().to_string();
+    assert!(message.starts_with(&format!("{}: No such file", path.display())), "{message}");
+    folder.write("labels.nrrd", "type: uint8\nsizes: 2 3 2", &[0; 11]);
+    folder.assert_refused(PATH, "data", "11 bytes", "12 bytes (12 samples of 1)");
+    assert!(
+        matches!(Labels::open(Path::new("labels.png")), Err(VolumeError::Invalid { field, .. }) if field == "extension")
+    );
+
+    let volume = builtin::volume("cube:4").unwrap();
+    let labels = Labels { origin: "here".to_owned(), dims: volume.dims(), spacing: None, values: Arc::new([1; 63]) };
+    let message = volume.with_labels(labels).unwrap_err().to_string();
+    assert_eq!(message, "here: data: found 63 labels, allowed: 64 labels");
+}
+
+#[test]
+fn a_label_file_replaces_the_builtin_labels() {
+    let folder = Folder::new();
+    folder.write("labels.nrrd", "type: uint8\nsizes: 8 8 5", &[9; 320]);
+    assert_eq!(folder.load("builtin = 'head:8'").unwrap().labels(), Some(&[9; 320][..]));
+    folder.write("labels.nrrd", "type: uint8\nsizes: 8 8 8", &[5; 512]);
+    assert_eq!(folder.load("builtin = 'cube:8'").unwrap().labels(), Some(&[5; 512][..]));
+}
+
+/// A volume of noise in blocks of labels, some of them so small that neighbours differ.
+fn segmented(labels: &[u16], spacing: [f64; 3]) -> Volume {
+    let dims = UVec3::new(15, 13, 14);
+    let mut random = Random(4);
+    let values = (0..dims.element_product()).map(|_| random.uniform(0.0, 255.0) as f32).collect();
+    let volume = Volume::new("segmented", dims, spacing.into(), values).unwrap();
+    let label = |index: u32| {
+        let block = volume.grid().voxel_at(index) / UVec3::new(5, 2, 3);
+        labels[(block.x + 2 * block.y + 5 * block.z) as usize % labels.len()]
+    };
+    let values = (0..dims.element_product()).map(label).collect();
+    volume.with_labels(Labels { origin: "blocks".to_owned(), dims, spacing: None, values }).unwrap()
+}
+
+fn ramp<T>(points: &[(f64, T)]) -> Option<Ramp<T>>
+where
+    T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f64, Output = T>,
+{
+    Some(Ramp::new(points.to_vec()).unwrap())
+}
+
+fn rgb(color: [f64; 3]) -> Option<Ramp<DVec3>> {
+    ramp(&[(0.0, DVec3::from(color)), (255.0, DVec3::from(color) / 2.0)])
+}
+
+/// Every way in which a label can differ from the main table.
+fn tables(labels: &[u16]) -> impl Iterator<Item = (u16, LabelTables)> {
+    let none = LabelTables::default;
+    let gradients = [(10.0, 0.0), (20.0, 0.3), (60.0, 1.0)];
+    let many: Vec<(f64, f64)> = (0..45).map(|at| (f64::from(at) * 5.5, f64::from(at % 4) / 8.0)).collect();
+    let all = [
+        LabelTables { color: rgb([1.0, 0.2, 0.1]), opacity: ramp(&[(0.0, 0.6)]), ..none() },
+        LabelTables { visible: false, color: rgb([0.1, 1.0, 0.1]), opacity: ramp(&[(0.0, 1.0)]), ..none() },
+        LabelTables { color: rgb([0.1, 0.2, 1.0]), ..none() },
+        LabelTables { opacity: ramp(&[(100.0, 0.0), (110.0, 0.5), (200.0, 0.0)]), ..none() },
+        LabelTables { gradient_opacity: ramp(&gradients), ..none() },
+        LabelTables { opacity: ramp(&many), gradient_opacity: ramp(&[(0.0, 1.0)]), ..none() },
+        LabelTables { visible: false, ..none() },
+    ];
+    labels.iter().copied().zip(all)
+}
+
+/// The largest error of any channel.
+fn largest_error(actual: &Image, expected: &Image) -> f64 {
+    assert_eq!(actual.pixels.len(), expected.pixels.len());
+    let errors = actual.pixels.as_flattened().iter().zip(expected.pixels.as_flattened());
+    errors.map(|(a, b)| (f64::from(*a) - f64::from(*b)).abs()).fold(0.0, f64::max)
+}
+
+/// Draws a scene by both rasterizers without culling and with it, and compares with the twin.
+fn check(gpu: &Headless, name: &str, volume: &Volume, scene: &Scene) {
+    let transfer = scene.transfer.resolve(volume);
+    let expected = reference::render(volume, &transfer, scene).unwrap();
+    let counts = reference::count(volume, &transfer, scene).unwrap();
+    let plain = TransferFunction { labels: BTreeMap::new(), ..transfer };
+    let plain = reference::render(volume, &plain, scene).unwrap();
+    assert!(largest_error(&plain, &expected) > 0.1, "{name}: without labels it looks the same");
+    for rasterizer in [Rasterizer::Quads, Rasterizer::Tiles] {
+        let mut scene = scene.clone();
+        scene.splatting.rasterizer = rasterizer;
+        let name = format!("{name} {rasterizer:?}");
+        scene.splatting.culling = false;
+        let drawn = gpu.render_volume(volume.clone(), &scene).unwrap();
+        assert_eq!(drawn.stats.counts.voxels_in_range, counts.voxels_in_range, "{name}");
+        // Quads keep a voxel's amounts as f16, tiles as f32.
+        let error = largest_error(&drawn.image, &expected);
+        let allowed = if rasterizer == Rasterizer::Quads { 1e-3 } else { 1e-4 };
+        assert!(error < allowed, "{name}: differs by {error}");
+        scene.splatting.culling = true;
+        let culled = gpu.render_volume(volume.clone(), &scene).unwrap();
+        let error = largest_error(&culled.image, &drawn.image);
+        assert!(error < 1.0 - scene.splatting.opacity_threshold + 1e-4, "{name}: culling changes by {error}");
+    }
+}
+
+#[test]
+fn frames_of_labels_are_the_twins() {
+    let gpu = gpu();
+    // The last one has no table; the greatest label there is.
+    for labels in [[0, 1, 2, 3, 4, 5, 6, 7], [9, 65535, 300, 12, 65534, 20, 40000, 1]] {
+        for (spacing, compositing, order) in [
+            ([1.0, 1.0, 1.0], Compositing::Linear, Order::FrontToBack),
+            ([1.0, 1.0, 2.5], Compositing::Exponential, Order::FrontToBack),
+            ([1.3, 1.0, 0.8], Compositing::Exponential, Order::BackToFront),
+            ([1.0, 2.0, 1.0], Compositing::Xray, Order::FrontToBack),
+        ] {
+            let volume = segmented(&labels, spacing);
+            let mut scene = scene(61, 53);
+            scene.camera = camera([0.5, 0.7, -0.4], 36.0);
+            scene.transfer = transfer(
+                &[(20.0, [0.9, 0.8, 0.3]), (250.0, [1.0, 1.0, 1.0])],
+                &[(10.0, 0.0), (100.0, 0.3), (200.0, 0.1)],
+            );
+            scene.transfer.labels = tables(&labels).collect();
+            scene.splatting.compositing = compositing;
+            scene.splatting.order = order;
+            check(&gpu, &format!("{labels:?} {spacing:?} {compositing:?}"), &volume, &scene);
+            // The main table's gradient opacity for those that have none of their own, and iso-ranges for all.
+            scene.transfer.gradient_opacity = ramp(&[(5.0, 0.2), (40.0, 1.0)]);
+            scene.transfer.iso_ranges = Some(vec![[30.0, 90.0], [120.0, 230.0]]);
+            check(&gpu, &format!("{labels:?} {spacing:?} {compositing:?}, all tables"), &volume, &scene);
+        }
+    }
+}
+
+/// More voxels than a layer of the texture holds, with labels where the next one begins.
+#[test]
+fn labels_in_several_layers() {
+    let gpu = gpu();
+    let dims = UVec3::new(2049, 1100, 2);
+    let place = UVec3::new(14, 947, 1);
+    let near = |index: u32| (index % dims.x).abs_diff(place.x) < 12 && (index / dims.x % dims.y).abs_diff(place.y) < 8;
+    let values = (0..dims.element_product()).map(|index| if near(index) { 200.0 } else { 0.0 }).collect();
+    let labels: Arc<[u16]> = (0..dims.element_product()).map(|index| (index * 7 / 3 % 4) as u16).collect();
+    let volume = Volume::new("layers", dims, DVec3::ONE, values).unwrap();
+    let labels = Labels { origin: "layers".to_owned(), dims, spacing: None, values: labels };
+    let volume = volume.with_labels(labels).unwrap();
+    let mut scene = scene(64, 48);
+    scene.camera = camera([0.02, 0.5, -0.9], 30.0);
+    scene.camera.center = volume.grid().world_position(place);
+    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(100.0, 0.0), (150.0, 0.2)]);
+    scene.transfer.labels = tables(&[1, 2, 3]).collect();
+    scene.transfer.iso_ranges = Some(vec![[100.0, 300.0]]);
+    check(&gpu, "several layers", &volume, &scene);
+}
+
+/// Tables that only hide leave nothing for shading to ask: the labels stay on the CPU.
+#[test]
+fn hiding_a_label_needs_no_texture() {
+    let gpu = gpu();
+    let volume = Arc::new(segmented(&[3, 4], [1.0; 3]));
+    let mut scene = scene(32, 32);
+    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.5)]);
+    let bytes = |scene: &Scene| {
+        let mut view = gpu.view(volume.clone(), scene).unwrap();
+        gpu.draw(&mut view).unwrap();
+        view.volume().gpu_bytes()
+    };
+    let all = bytes(&scene);
+    scene.transfer.labels =
+        [(3, LabelTables { visible: false, color: rgb([1.0; 3]), ..LabelTables::default() })].into();
+    assert!(bytes(&scene) < all, "hiding half of the voxels needs more memory");
+    scene.transfer.labels.insert(4, LabelTables { color: rgb([1.0; 3]), ..LabelTables::default() });
+    assert!(bytes(&scene) > all - 100, "labels take no memory");
+}
+
+#[test]
+fn tables_without_labels_are_an_error() {
+    let gpu = gpu();
+    let mut scene = scene(16, 16);
+    scene.transfer.labels = tables(&[1]).collect();
+    let error = gpu.render_volume(builtin::volume("cube:8").unwrap(), &scene).unwrap_err();
+    assert!(matches!(error, RenderError::OutOfRange { key: "transfer.label", .. }), "{error}");
+    // A label that no voxel has is none: one transfer function serves many volumes.
+    scene.transfer.labels = tables(&[77]).collect();
+    gpu.render_volume(builtin::volume("head:8").unwrap(), &scene).unwrap();
+}
