@@ -144,7 +144,8 @@ pub fn group(view: &View, kernel: &Kernel, splatting: &Splatting, planes: Range<
     }
 }
 
-/// Half a box, pixels, in f32; far beyond any image there are numbers, not infinities.
+/// Half a box, pixels, in f32; where it is infinite a number larger than that of any orthographic view, whose pixels are 1e-25
+/// `unit`s at least.
 pub fn in_f32_pixels(half_box: DVec2) -> [f32; 2] {
     half_box.min(DVec2::splat(1e30)).as_vec2().to_array()
 }
