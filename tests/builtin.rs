@@ -134,8 +134,11 @@ fn head_is_symmetric() {
     }
 }
 
-/// Labels of the builtin volumes that are segmented, and the values of their tissues.
-const TISSUES: [(&str, &[(&str, &[f32])]); 2] = [
+/// What a label means, and the values of its tissue where there is nothing else.
+type Tissue = (&'static str, &'static [f32]);
+
+/// The builtin volumes that are segmented, and their tissues by label.
+const TISSUES: [(&str, &[Tissue]); 2] = [
     (
         "head",
         &[
