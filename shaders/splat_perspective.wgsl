@@ -1,4 +1,4 @@
-// Draws the kernel sections of a group of sheets as footprint quads in perspective: every voxel's kernel is turned to its ray, and each
+// Draws the kernel sections of a group of sheets, or whole kernels, as footprint quads in perspective: every voxel's kernel is turned to its ray, and each
 // of its sections mapped at its own depth (§3.3.2, end of §4.2).
 
 // What the fragments of a quad share.
@@ -91,6 +91,12 @@ fn section(quad: Quad, sheet: u32) -> f32 {
     let planes = vec4f(quad.near[sheet], quad.far[sheet], 0.0, 0.0);
     let cut = cut_by_ball(planes, beyond_chord(footprint, quad.falloff));
     return (quad.whole[sheet] + cut.x - cut.y) * in_plane(footprint, quad.falloff) * quad.amplitude[sheet];
+}
+
+// A whole kernel, composited by itself (§3, composite-every-sample): what a sheet with nothing else in it is composited as.
+@fragment
+fn fragment_sample(quad: Quad) -> One {
+    return One(composite(vec4f(0.0), quad.amount * section(quad, 0u), frame.compositing, FRONT_TO_BACK));
 }
 
 @fragment

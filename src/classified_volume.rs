@@ -171,12 +171,14 @@ impl ClassifiedVolume {
             (first + groups.sheets as i32).min(slabs.end).saturating_sub(first.max(slabs.start)).max(0) as u64
         };
         let [columns, rows] = tile_grid(view.size).map(u64::from);
+        // Composite-every-sample has no groups, and no sheets.
+        let sheets = if groups.firsts.is_empty() { 0 } else { slabs.len() as u64 };
         let counts = Counts {
             voxels_total: self.grid().dims.as_u64vec3().element_product(),
             voxels_in_range: voxels,
             sections_total: sections,
-            sheets: slabs.len() as u64,
-            tiles_total: columns * rows * slabs.len() as u64,
+            sheets,
+            tiles_total: columns * rows * sheets,
             ..Counts::default()
         };
         Totals { counts, group_sheets: groups.firsts.iter().map(|&first| sheets_of(first)).collect() }

@@ -9,16 +9,6 @@ use crate::volume::VolumeError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
-    /// The scene asks for something that is specified but not implemented yet.
-    #[error("{key}: found {found}, allowed: {allowed} (the only one implemented so far)")]
-    Unsupported {
-        /// The scene key.
-        key: &'static str,
-        /// What the scene says.
-        found: &'static str,
-        /// What is implemented.
-        allowed: &'static str,
-    },
     /// A scene value that is fine by itself asks of this volume what no renderer can do.
     #[error("{key}: found {found}, allowed: {allowed}")]
     OutOfRange {
@@ -56,12 +46,6 @@ impl From<Unfit> for RenderError {
             found: format!("\"tiles\" with {required} {what}"),
             allowed: format!("at most {actual}, or \"quads\""),
         }
-    }
-}
-
-impl RenderError {
-    pub(crate) fn unsupported(key: &'static str, found: &'static str, allowed: &'static str) -> Self {
-        Self::Unsupported { key, found, allowed }
     }
 }
 

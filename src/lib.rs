@@ -33,7 +33,8 @@
 //! integrated along the view ray ([`footprint`]) · *sheet buffer* the image of one slab · *sheet group* consecutive sheets drawn
 //! together · *compositing buffer* the accumulated image · *opacity buffer* its alpha · *occlusion buffer* the box-filtered
 //! opacity buffer · *bucket* what touches one slab or group ([`bucket`]) · *iso-range* a closed interval of values that take
-//! part ([`iso_range`]) · *brick* 4×4×4 neighbouring voxels ([`brick`]) ·
+//! part ([`iso_range`]) · *label* which segment of a segmented volume a voxel belongs to
+//! ([`Volume::labels`](volume::Volume::labels)) · *brick* 4×4×4 neighbouring voxels ([`brick`]) ·
 //! *tile* a 32×32 pixel square.
 
 pub mod brick;

@@ -5,6 +5,7 @@ use wgpu::{BindGroup, Buffer, CommandEncoder};
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
 use crate::rasterizer::quads::QuadFrame;
+use crate::rasterizer::samples::SampleFrame;
 use crate::rasterizer::tiles::TileFrame;
 use crate::stats::{GroupSlabs, Totals};
 use crate::view::View;
@@ -31,6 +32,7 @@ pub(crate) struct PreparedFrame {
 pub(crate) enum Drawing {
     Quads(Box<QuadFrame>),
     Tiles(Box<TileFrame>),
+    Samples(Box<SampleFrame>),
 }
 
 /// A frame's counts: a [`Tally`](crate::gpu::layout::Tally), for every group the tiles it composited, `[u32]`, and timestamps from `timestamps` on.
@@ -57,6 +59,7 @@ impl Drawing {
         match self {
             Self::Quads(frame) => frame.passes(),
             Self::Tiles(_) => TileFrame::PASSES,
+            Self::Samples(_) => SampleFrame::PASSES,
         }
     }
 
@@ -65,6 +68,7 @@ impl Drawing {
         match self {
             Self::Quads(frame) => frame.group_slabs(),
             Self::Tiles(frame) => frame.group_slabs(),
+            Self::Samples(frame) => frame.group_slabs(),
         }
     }
 
@@ -73,6 +77,7 @@ impl Drawing {
         match self {
             Self::Quads(frame) => frame.copy_counts(encoder, staging),
             Self::Tiles(frame) => frame.copy_counts(encoder, staging),
+            Self::Samples(frame) => frame.copy_counts(encoder, staging),
         }
     }
 
@@ -81,13 +86,14 @@ impl Drawing {
         match self {
             Self::Quads(frame) => frame.gpu_bytes(),
             Self::Tiles(frame) => frame.gpu_bytes(),
+            Self::Samples(frame) => frame.gpu_bytes(),
         }
     }
 
     /// `"quads"` or `"tiles"`.
     pub(crate) fn rasterizer(&self) -> &'static str {
         match self {
-            Self::Quads(_) => "quads",
+            Self::Quads(_) | Self::Samples(_) => "quads",
             Self::Tiles(_) => "tiles",
         }
     }

@@ -6,7 +6,7 @@ use wgpu::{BufferUsages, CommandEncoder, Device, Queue, TextureFormat, TextureVi
 
 use crate::error::RenderError;
 use crate::gpu::device::{self, DeviceError};
-use crate::gpu::layout::Tally;
+use crate::gpu::layout::{Frame, Tally};
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::{PASS_BYTES, Timer};
 use crate::gpu::uniforms::{self, Ramps};
@@ -14,10 +14,11 @@ use crate::kernel::Kernel;
 use crate::pass::resolve::Resolve;
 use crate::prepared_frame::{Drawing, PreparedFrame, Staging};
 use crate::rasterizer::quads::QuadRasterizer;
+use crate::rasterizer::samples::SampleRasterizer;
 use crate::rasterizer::tiles::TileRasterizer;
 use crate::rasterizer::{Given, filled};
 use crate::scene_view::{Prepared, SceneView};
-use crate::splatting::{Economies, FootprintBox, Rasterizer, Splatting};
+use crate::splatting::{Economies, FootprintBox, Method, Rasterizer, Splatting};
 use crate::view::View;
 
 /// What a renderer is made for.
@@ -47,6 +48,7 @@ pub struct Renderer {
     profile: bool,
     /// Compiled when first needed.
     quads: OnceLock<QuadRasterizer>,
+    samples: OnceLock<SampleRasterizer>,
     tiles: TileRasterizer,
     resolve: Resolve,
 }
@@ -65,6 +67,7 @@ impl Renderer {
             sheets,
             profile: options.profile,
             quads: OnceLock::new(),
+            samples: OnceLock::new(),
             tiles: TileRasterizer::default(),
             resolve: Resolve::new(device, options.target_format),
         })
@@ -91,7 +94,7 @@ impl Renderer {
             Some(old) if old.compositing.size == size => None,
             _ => Some(CompositingBuffer::new(device, size)?),
         };
-        let by_tiles = by_tiles(device, splatting)?;
+        let way = way(device, splatting)?;
         volume.flush(device, queue)?;
         let old = frame.take();
         let (old_compositing, uniform, control_points, drawing, totals) = old.map_or_else(Default::default, |old| {
@@ -120,7 +123,7 @@ impl Renderer {
             compositing: &compositing,
         };
         let was = drawing.as_ref().map(Drawing::rasterizer);
-        let (drawing, bucketed) = self.draw_with(given, by_tiles, drawing)?;
+        let (drawing, bucketed) = self.draw_with(given, way, &frame_uniform, drawing)?;
         let totals = totals.filter(|_| !bucketed && was == Some(drawing.rasterizer()));
 
         // The rasterizer's passes, and resolve.
@@ -155,15 +158,22 @@ impl Renderer {
     fn draw_with(
         &self,
         given: Given<'_>,
-        by_tiles: bool,
+        way: Way,
+        frame: &Frame,
         previous: Option<Drawing>,
     ) -> Result<(Drawing, bool), RenderError> {
-        let (old_quads, old_tiles) = match previous {
-            Some(Drawing::Quads(frame)) => (Some(*frame), None),
-            Some(Drawing::Tiles(frame)) => (None, Some(*frame)),
-            None => (None, None),
-        };
-        if by_tiles {
+        let (mut old_quads, mut old_tiles, mut old_samples) = (None, None, None);
+        match previous {
+            Some(Drawing::Quads(frame)) => old_quads = Some(*frame),
+            Some(Drawing::Tiles(frame)) => old_tiles = Some(*frame),
+            Some(Drawing::Samples(frame)) => old_samples = Some(*frame),
+            None => {}
+        }
+        if way == Way::Samples {
+            let (frame, sorted) = self.samples(given.device).prepare(given, frame, old_samples)?;
+            return Ok((Drawing::Samples(Box::new(frame)), sorted));
+        }
+        if way == Way::Tiles {
             match self.tiles.prepare(given, old_tiles) {
                 Ok((frame, bucketed)) => return Ok((Drawing::Tiles(Box::new(frame)), bucketed)),
                 Err(error) if insists_on_tiles(given.splatting) => return Err(error),
@@ -172,6 +182,10 @@ impl Renderer {
         }
         let (frame, bucketed) = self.quads(given.device).prepare(given, old_quads);
         Ok((Drawing::Quads(Box::new(frame)), bucketed))
+    }
+
+    fn samples(&self, device: &Device) -> &SampleRasterizer {
+        self.samples.get_or_init(|| SampleRasterizer::new(device, self.sheet_format))
     }
 
     fn quads(&self, device: &Device) -> &QuadRasterizer {
@@ -188,6 +202,11 @@ impl Renderer {
         }
         match drawing {
             Drawing::Tiles(tiles) => self.tiles.record(encoder, timer, tiles),
+            Drawing::Samples(samples) => {
+                if let Some(rasterizer) = self.samples.get() {
+                    rasterizer.record(encoder, timer, samples);
+                }
+            }
             Drawing::Quads(quads) => {
                 if let Some(rasterizer) = self.quads.get() {
                     rasterizer.record(encoder, timer, quads);
@@ -207,11 +226,20 @@ impl Renderer {
     }
 }
 
-/// Whether to draw by tiles, or to try it.
+/// How to draw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Way {
+    Quads,
+    /// If the view fits.
+    Tiles,
+    Samples,
+}
+
+/// How to draw.
 ///
 /// # Errors
 /// If the settings insist on what the device or the other settings do not allow.
-fn by_tiles(device: &Device, splatting: &Splatting) -> Result<bool, RenderError> {
+fn way(device: &Device, splatting: &Splatting) -> Result<Way, RenderError> {
     let insists = insists_on_tiles(splatting);
     match (splatting.rasterizer, TileRasterizer::obstacle(device, splatting)) {
         (Rasterizer::Quads, _) if insists => Err(RenderError::OutOfRange {
@@ -220,9 +248,10 @@ fn by_tiles(device: &Device, splatting: &Splatting) -> Result<bool, RenderError>
                 .to_owned(),
             allowed: "\"tiles\" or \"auto\" with them".to_owned(),
         }),
-        (Rasterizer::Quads, _) => Ok(false),
-        (_, Some(obstacle)) if insists => Err(obstacle),
-        (_, obstacle) => Ok(obstacle.is_none()),
+        (Rasterizer::Tiles | Rasterizer::Auto, Some(obstacle)) if insists => Err(obstacle),
+        _ if splatting.method == Method::CompositeEverySample => Ok(Way::Samples),
+        (Rasterizer::Tiles | Rasterizer::Auto, None) => Ok(Way::Tiles),
+        _ => Ok(Way::Quads),
     }
 }
 

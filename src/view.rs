@@ -15,6 +15,9 @@ use crate::volume::Grid;
 /// How far from its slice, in slices, an axis-aligned voxel reaches: into no other, whatever the rounding.
 const SLICE_REACH: f64 = 0.25;
 
+/// Slabs around slices.
+const SLICES: SlabGrid = SlabGrid { origin: -0.5, width: 1.0 };
+
 /// A view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
@@ -26,7 +29,8 @@ pub struct View {
     /// depth; and to the depth from the eye, 1 without one.
     ///
     /// Sheet depth is what [`View::slabs`] are planes of. Image-aligned it is orthographic the depth in the warped grid, in perspective
-    /// the depth in `unit`s, both from the volume's centre; axis-aligned it is the slice, counted along w.
+    /// the depth in `unit`s, both from the volume's centre; axis-aligned it is the slice, counted along w;
+    /// where every voxel is composited by itself, 0.
     pub screen_from_voxel: [DVec4; 4],
     /// The slabs.
     pub slabs: SlabGrid,
@@ -35,6 +39,8 @@ pub struct View {
     /// Grid units of a kernel to one of sheet depth: 1, or so many that a slice holds all of it. Image-aligned in perspective every
     /// voxel has its own.
     pub kernel_per_depth: f64,
+    /// Size of a pixel, `unit`s; in perspective at [`Camera::center`].
+    pub pix: f64,
     /// How a footprint lies on the screen; in perspective that of the central ray at [`Camera::center`].
     pub footprint: FootprintMap,
     /// `λ` of the central ray: warped length of one `unit` along it.
@@ -73,7 +79,7 @@ pub struct Bounds {
 
 impl View {
     /// # Errors
-    /// If the method is one that is not implemented yet, pixels are too small or too large for `f32`, or there are more than
+    /// If pixels are too small or too large for `f32`, or there are more than
     /// [`MAX_SLABS`].
     pub fn new(grid: &Grid, camera: &Camera, splatting: &Splatting, size: [u32; 2]) -> Result<Self, RenderError> {
         let [width, height] = size;
@@ -108,6 +114,8 @@ impl View {
                 eye.check_slabs(grid, splatting.slab_width)?;
                 (slabs, row(along_w, 0.0), reach, 1.0)
             }
+            // One by one: no sheet before or behind another.
+            (Method::CompositeEverySample, _) => (SLICES, DVec4::ZERO, SLICE_REACH, 2.0 * radius),
             (Method::AxisAligned, _) => {
                 let (axis, sign) = slice_axis(basis.w);
                 if grid.dims[axis] > MAX_SLABS {
@@ -117,11 +125,7 @@ impl View {
                 }
                 let mut row = DVec4::ZERO;
                 row[axis] = sign;
-                (SlabGrid { origin: -0.5, width: 1.0 }, row, SLICE_REACH, 2.0 * radius)
-            }
-            (Method::CompositeEverySample, _) => {
-                let (key, allowed) = ("splatting.method", "\"image-aligned\" or \"axis-aligned\"");
-                return Err(RenderError::unsupported(key, "\"composite-every-sample\"", allowed));
+                (SLICES, row, SLICE_REACH, 2.0 * radius)
             }
         };
         let perspective = eye.map(|eye| Perspective {
@@ -143,6 +147,7 @@ impl View {
             slabs,
             reach,
             kernel_per_depth,
+            pix,
             footprint: FootprintMap::new(&warped, pix),
             lambda,
             perspective,

@@ -127,8 +127,91 @@ fn head_is_symmetric() {
     let head = volume("head:64");
     let UVec3 { x: nx, y: ny, z: nz } = head.dims();
     for voxel in (0..nx * ny * nz).map(|index| head.grid().voxel_at(index)) {
-        assert_eq!(head.value(voxel), head.value(UVec3::new(nx - 1 - voxel.x, voxel.y, voxel.z)), "{voxel}");
+        let mirrored = UVec3::new(nx - 1 - voxel.x, voxel.y, voxel.z);
+        assert_eq!(head.value(voxel), head.value(mirrored), "{voxel}");
+        let label = |p: UVec3| head.label(p.x + nx * (p.y + ny * p.z));
+        assert_eq!(label(voxel), label(mirrored), "{voxel}");
     }
+}
+
+/// Labels of the builtin volumes that are segmented, and the values of their tissues.
+const TISSUES: [(&str, &[(&str, &[f32])]); 2] = [
+    (
+        "head",
+        &[
+            ("air", &[0.0]),
+            ("skin and soft tissue", &[90.0]),
+            ("skull", &[150.0]),
+            ("fluid around the brain", &[50.0]),
+            ("grey matter", &[200.0]),
+            ("white matter", &[225.0]),
+            ("ventricles", &[40.0]),
+            ("eyes", &[245.0, 255.0]),
+        ],
+    ),
+    (
+        "tomato",
+        &[
+            ("air", &[0.0]),
+            ("wall", &[90.0]),
+            ("gel", &[50.0]),
+            ("placenta", &[140.0]),
+            ("core", &[170.0]),
+            ("seeds", &[230.0]),
+        ],
+    ),
+];
+
+/// Every label is there and names its tissue: it lies wherever a voxel and its neighbours have that tissue's value.
+#[test]
+fn labels_are_the_tissues() {
+    for (name, tissues) in TISSUES {
+        let names: Vec<(u16, &str)> = (0..).zip(tissues.iter().map(|tissue| tissue.0)).collect();
+        assert_eq!(builtin::labels(name), Some(&names[..]));
+        assert_eq!(builtin::labels(&format!("{name}:99")), Some(&names[..]));
+        let volume = volume(name);
+        let (values, dims) = (volume.values(), volume.dims());
+        let steps = [1, dims.x as usize, (dims.x * dims.y) as usize];
+        let mut inside = vec![0; tissues.len()];
+        for (index, &value) in values.iter().enumerate() {
+            let at = volume.grid().voxel_at(index as u32);
+            if at.cmpeq(UVec3::ZERO).any() || (at + 1).cmpeq(dims).any() {
+                continue;
+            }
+            let mut neighbours = steps.iter().flat_map(|step| [index - step, index + step]);
+            let Some(tissue) = tissues.iter().position(|tissue| tissue.1.contains(&value)) else { continue };
+            if neighbours.all(|at| values[at] == value) {
+                assert_eq!(volume.label(index as u32), Some(tissue as u16), "{name}: {at} of {value}");
+                inside[tissue] += 1;
+            }
+        }
+        assert!(inside.iter().all(|&count| count > 50), "{name}: {inside:?}");
+    }
+    for name in ["cube", "nerve:64", "marschner-lobb:20"] {
+        assert_eq!((builtin::labels(name), volume(name).labels()), (Some(&[][..]), None), "{name}");
+    }
+    assert_eq!(builtin::labels("skull"), None);
+}
+
+/// From outside, in rows along y above the face, where no bone is near: the skin begins where it fills half of a voxel.
+#[test]
+fn a_label_begins_half_way() {
+    let head = volume("head");
+    let UVec3 { x: nx, y: ny, z: nz } = head.dims();
+    let mut entered = 0;
+    for (x, z) in (nz * 2 / 3..nz).flat_map(|z| (0..nx).map(move |x| (x, z))) {
+        let row = (0..ny).map(|y| x + nx * (y + ny * z));
+        for index in row {
+            let (value, label) = (head.values()[index as usize], head.label(index).unwrap());
+            if label != 0 {
+                assert!(label == 1 && value >= 45.0, "{value} is {label}");
+                entered += 1;
+                break;
+            }
+            assert!(value <= 45.0, "{value} is air");
+        }
+    }
+    assert!(entered > 3000, "{entered} rows enter the head");
 }
 
 #[test]

@@ -26,7 +26,7 @@ const OPACITY_THRESHOLD: f64 = 0.999;
 const MAX_BYTES: u64 = 64 << 10;
 
 /// Name, builtin volume, and the settings that differ from the defaults.
-const SCENES: [(&str, &str, &[&str]); 9] = [
+const SCENES: [(&str, &str, &[&str]); 10] = [
     ("head", "head:72", &["image={width=160,height=160}", "camera={direction=[0.5,0.85,-0.2],height=170.0}"]),
     (
         "head-xray",
@@ -37,6 +37,21 @@ const SCENES: [(&str, &str, &[&str]); 9] = [
             "transfer={color=[[0,[1,1,1]]], opacity=[[20,0],[255,0.07]]}",
             "shading.enabled=false",
             "splatting.compositing=\"xray\"",
+        ],
+    ),
+    (
+        "head-labels",
+        "head:64",
+        &[
+            "image={width=144,height=144,background=[0.1,0.1,0.15,1]}",
+            "camera={direction=[0.75,0.6,-0.2],height=170.0}",
+            "transfer={opacity=[[0,0]],label=[\
+             {label=1,color=[[0,[0.95,0.75,0.6]]],opacity=[[0,0.06]]},\
+             {label=4,color=[[0,[0.85,0.45,0.45]]],opacity=[[60,0],[120,0.9]]},\
+             {label=5,color=[[0,[0.85,0.45,0.45]]],opacity=[[60,0],[120,0.9]]},\
+             {label=7,color=[[240,[0.95,0.95,1]],[255,[0.1,0.3,0.7]]],opacity=[[0,0.9]]},\
+             {label=2,visible=false,opacity=[[0,1]]}]}",
+            "splatting.compositing=\"exponential\"",
         ],
     ),
     (

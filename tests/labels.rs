@@ -10,6 +10,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
+use sheetsplat::camera::Projection;
 use sheetsplat::error::RenderError;
 use sheetsplat::headless::Headless;
 use sheetsplat::image::Image;
@@ -263,6 +264,20 @@ fn frames_of_labels_are_the_twins() {
             check(&gpu, &format!("{labels:?} {spacing:?} {compositing:?}, all tables"), &volume, &scene);
         }
     }
+}
+
+/// The same with an eye.
+#[test]
+fn labels_in_perspective_are_the_twins() {
+    let gpu = gpu();
+    let labels = [0, 1, 2, 3, 4, 5, 6, 7];
+    let mut scene = scene(61, 53);
+    scene.camera = camera([0.5, 0.7, -0.4], 36.0);
+    scene.camera.projection = Projection::Perspective { fov_y: 40.0, distance: Some(45.0), near: None };
+    scene.transfer = transfer(&[(20.0, [0.9, 0.8, 0.3])], &[(10.0, 0.0), (100.0, 0.3), (200.0, 0.1)]);
+    scene.transfer.labels = tables(&labels).collect();
+    scene.splatting.compositing = Compositing::Exponential;
+    check(&gpu, "perspective", &segmented(&labels, [1.0, 1.0, 1.6]), &scene);
 }
 
 /// More voxels than a layer of the texture holds, with labels where the next one begins.

@@ -85,7 +85,7 @@ fn shared() -> [Layout; 14] {
             tiles,
             per_unit,
             headlight,
-            padding,
+            last_label
         }),
         layout!(Group { half_box, box_filter, culling, near, first_brick, brick_count, index, padding }),
         layout!(Brick { present, x, y, z, extent }),
@@ -101,7 +101,7 @@ fn shared() -> [Layout; 14] {
             bricks_visited,
             padding_0,
             padding_1,
-            padding_2,
+            padding_2
         }),
         layout!(Culled { tally, tiles }).goes_on(),
         layout!(Band { first_row, rows }),
@@ -119,7 +119,11 @@ fn shared() -> [Layout; 14] {
             composited,
             shear,
             half_width,
-            padding,
+            whole_below,
+            beta,
+            peak,
+            padding_0,
+            padding_1
         }),
         layout!(Part { first_row, first_tile, end_tile, first_group, end_group }),
         layout!(Gathered { tally, words }).goes_on(),

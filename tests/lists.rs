@@ -8,13 +8,14 @@ mod common;
 use std::sync::Arc;
 
 use glam::DVec3;
+use sheetsplat::classified_volume::Touched;
 use sheetsplat::headless::Headless;
 use sheetsplat::iso_range::ValueSet;
 use sheetsplat::renderer::Renderer;
 use sheetsplat::scene::{Scene, TransferSettings};
 use sheetsplat::scene_view::SceneView;
 use sheetsplat::shading::Light;
-use sheetsplat::splatting::{Compositing, FootprintForm};
+use sheetsplat::splatting::{Compositing, FootprintForm, Rasterizer};
 use sheetsplat::transfer_function::{Ramp, TransferFunction};
 use sheetsplat::volume::{Volume, builtin};
 
@@ -108,6 +109,103 @@ fn a_changed_view_is_a_fresh_one() {
     }
     assert!(entered > 10_000 && left > 10_000, "{entered} entered, {left} left");
     assert!((1..20).contains(&rebuilt), "{rebuilt} of 40 changes needed more room");
+}
+
+/// A change of labels' tables or visibility is the fresh view's, too, whoever rasterizes.
+#[test]
+fn changed_labels_are_fresh_ones() {
+    let gpu = gpu();
+    for (rasterizer, seed) in [(Rasterizer::Tiles, 21), (Rasterizer::Quads, 22)] {
+        let (volume, mut scene) = head();
+        scene.splatting.rasterizer = rasterizer;
+        let mut view = gpu.view(volume.clone(), &scene).unwrap();
+        assert_fresh(&gpu, &mut view, "without tables");
+        let mut random = Random(seed);
+        let (mut entered, mut left) = (0, 0);
+        for step in 0..30 {
+            let before = taking_part(&volume, view.volume().transfer());
+            let mut transfer = view.volume().transfer().clone();
+            let label = (random.bits() % 8) as u16;
+            let start = random.uniform(0.0, 150.0);
+            let tables = transfer.labels.entry(label).or_default();
+            let touched = match random.bits() % 7 {
+                0 | 1 => view.set_label_visible(label, !tables.visible),
+                2 => {
+                    transfer.labels.remove(&label);
+                    view.set_transfer_function(transfer)
+                }
+                3 => {
+                    tables.color = Some(Ramp::new(vec![(start, random.direction().abs())]).unwrap());
+                    view.set_transfer_function(transfer)
+                }
+                4 => {
+                    let points = vec![(start, 0.0), (start + 30.0, random.uniform(0.1, 1.0))];
+                    tables.opacity = Some(Ramp::new(points).unwrap());
+                    view.set_transfer_function(transfer)
+                }
+                5 => {
+                    let points = vec![(start / 20.0, 0.0), (start / 20.0 + 3.0, 1.0)];
+                    tables.gradient_opacity = Some(Ramp::new(points).unwrap());
+                    view.set_transfer_function(transfer)
+                }
+                _ => view.set_iso_ranges((start < 50.0).then(|| vec![[2.0 * start, 250.0]])),
+            };
+            let after = taking_part(&volume, view.volume().transfer());
+            let count = |was: bool, is: bool| {
+                before.iter().zip(&after).filter(|&(&before, &after)| (before, after) == (was, is)).count() as u64
+            };
+            let name = format!("{rasterizer:?}, step {step}");
+            assert_eq!((touched.entered, touched.left), (count(false, true), count(true, false)), "{name}");
+            entered += touched.entered;
+            left += touched.left;
+            // Not every change is drawn.
+            if random.uniform(0.0, 1.0) < 0.75 {
+                assert_fresh(&gpu, &mut view, &name);
+            }
+        }
+        assert!(entered > 1000 && left > 1000, "{entered} entered, {left} left");
+    }
+}
+
+/// What a change of a label touches: its own voxels, and none if who takes part stays the same.
+#[test]
+fn a_change_of_a_label_touches_its_voxels() {
+    let gpu = gpu();
+    let (volume, scene) = head();
+    let mut view = gpu.view(volume.clone(), &scene).unwrap();
+    let of_label = |label: u16| {
+        let part = taking_part(&volume, &scene.transfer.resolve(&volume)).into_iter().zip(volume.labels().unwrap());
+        part.filter(|&(is_part, &of)| is_part && of == label).count() as u64
+    };
+    let prepare = |view: &mut SceneView| gpu.renderer().prepare(gpu.device(), gpu.queue(), view).unwrap().bucketed;
+    assert!(prepare(&mut view) && of_label(4) > 100 && of_label(7) > 10);
+    assert_eq!(view.set_label_visible(4, true), Touched::default());
+    assert!(!prepare(&mut view), "nothing changed");
+    assert_eq!(view.set_label_visible(4, false), Touched { left: of_label(4), ..Touched::default() });
+    assert_fresh(&gpu, &mut view, "grey matter hidden");
+    let touched = view.set_label_visible(4, true);
+    assert_eq!((touched.entered, touched.left), (of_label(4), 0));
+    assert_fresh(&gpu, &mut view, "grey matter shown");
+    // Hidden by its opacity instead.
+    let mut transfer = view.volume().transfer().clone();
+    transfer.labels.entry(7).or_default().opacity = Some(Ramp::new(vec![(0.0, 0.0)]).unwrap());
+    assert_eq!(view.set_transfer_function(transfer), Touched { left: of_label(7), ..Touched::default() });
+    assert_fresh(&gpu, &mut view, "eyes without opacity");
+    // Colours and opacities of a label that is in view: shaded anew, and no more.
+    for green in [0.2, 0.7] {
+        let mut transfer = view.volume().transfer().clone();
+        let tables = transfer.labels.entry(5).or_default();
+        tables.color = Some(Ramp::new(vec![(0.0, DVec3::new(0.1, green, 0.1))]).unwrap());
+        tables.opacity = Some(Ramp::new(vec![(60.0, 0.0), (140.0, green)]).unwrap());
+        assert_eq!(view.set_transfer_function(transfer), Touched::default());
+        assert!(!prepare(&mut view), "colour and opacity of a label");
+        assert_fresh(&gpu, &mut view, "colour and opacity of a label");
+    }
+    // A volume that is not segmented has nothing to hide.
+    let cube = Arc::new(builtin::volume("cube:16").unwrap());
+    let mut view = gpu.view(cube, &scene).unwrap();
+    assert_eq!(view.set_label_visible(0, false), Touched::default());
+    assert_fresh(&gpu, &mut view, "no labels");
 }
 
 /// What each setter costs: buckets only for cameras, slabs and bricks; voxels only for those that enter and leave.

@@ -8,7 +8,9 @@ use glam::{DVec3, UVec3};
 use sheetsplat::camera::{Camera, Projection};
 use sheetsplat::scene::{ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use sheetsplat::shading::{Light, Shading};
-use sheetsplat::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
+use sheetsplat::splatting::{
+    Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting,
+};
 use sheetsplat::transfer_function::{LabelTables, Ramp, RampError, TransferFunction};
 use sheetsplat::volume::Volume;
 
@@ -94,6 +96,9 @@ fn every_key() {
         tiles = false
         rasterizer = "tiles"
         footprint_box = "parallelogram"
+        whole_below = 0.25
+        beta = 0.75
+        resolution = 0.001
     "#;
     let scene = parse(text, &[]).unwrap();
     let expected = Scene {
@@ -147,6 +152,7 @@ fn every_key() {
             tiles: false,
             rasterizer: Rasterizer::Tiles,
             footprint_box: FootprintBox::Parallelogram,
+            economies: Economies { whole_below: 0.25, beta: 0.75, resolution: 0.001 },
         },
     };
     assert_eq!(scene, expected);
@@ -319,6 +325,9 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
         "\"square\"",
         "\"rectangle\" or \"parallelogram\"",
     ),
+    ("splatting.whole_below", "1.5", "splatting.whole_below", "1.5", "a number in [0, 1]"),
+    ("splatting.beta", "0", "splatting.beta", "0", "a number in (0, 1]"),
+    ("splatting.resolution", "-0.1", "splatting.resolution", "-0.1", "a number in [0, 1]"),
     ("splatting.tile", "true", "splatting.tile", "an unknown key", "method, radius, falloff, slab_width, footprint"),
 ];
 

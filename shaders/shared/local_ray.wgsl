@@ -51,7 +51,7 @@ fn section_maps(ray: LocalRay, from_eye: f32, near: vec4f, far: vec4f) -> Sectio
     return SectionMaps(min(along, vec4f(1.0)), min(across, vec4f(1.0)), amplitude);
 }
 
-// Where the near plane cuts a kernel, seen from its centre.
+// Where the near plane cuts a kernel, seen from its centre; without an eye nowhere.
 fn near_cut(ray: LocalRay, from_eye: f32) -> f32 {
-    return (frame.near - from_eye) * ray.kernel_per_depth;
+    return select(-1e9, (frame.near - from_eye) * ray.kernel_per_depth, frame.near > 0.0);
 }

@@ -20,9 +20,9 @@ fn warped_ray(px: vec2f) -> vec3f {
     return frame.right.xyz * slope.x + frame.down.xyz * slope.y + frame.ahead.xyz;
 }
 
-// How far right and down a ray goes per depth.
+// How far right and down a ray goes per depth; without an eye not at all.
 fn slope_of(px: vec2f) -> vec2f {
-    return (px - 0.5 * vec2f(frame.size)) * frame.pixel_per_depth;
+    return select(vec2f(0.0), (px - 0.5 * vec2f(frame.size)) * frame.pixel_per_depth, frame.near > 0.0);
 }
 
 // The sheet depths between which a kernel overlaps sheets, with more than `error`, the depths' rounding errors: what ends at a

@@ -75,7 +75,7 @@ pub struct Frame {
     pub section_width: f32,
     /// Depth of the near plane; 0 without an eye.
     pub near: f32,
-    /// Size of a pixel at depth 1 from the eye, `unit`s; 0 without one.
+    /// Size of a pixel at depth 1 from the eye, `unit`s; without one of every pixel.
     pub pixel_per_depth: f32,
     /// Opacity from which a pixel counts as opaque.
     pub opacity_threshold: f32,

@@ -36,8 +36,17 @@ pub const CLEAR: Shader = shader!("clear", "frame", "brick", "tile_list", "sheet
 /// Draws footprints into the sheet buffers.
 pub const SPLAT: Shader = shader!("splat", "frame", "brick", "splat", "sheets", "footprints");
 /// The same in perspective.
-pub const SPLAT_PERSPECTIVE: Shader =
-    shader!("splat_perspective", "frame", "brick", "splat", "sheets", "footprints", "project", "local_ray");
+pub const SPLAT_PERSPECTIVE: Shader = shader!(
+    "splat_perspective",
+    "frame",
+    "brick",
+    "splat",
+    "sheets",
+    "footprints",
+    "project",
+    "local_ray",
+    "compositing"
+);
 /// Composites the sheet buffers.
 pub const COMPOSITE: Shader = shader!("composite", "frame", "brick", "band", "tile_list", "compositing");
 /// Computes the occlusion buffer.

@@ -59,11 +59,11 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
         kernel_per_depth: if own_depths { 0.0 } else { view.kernel_per_depth as f32 },
         section_width: view.section_width() as f32,
         near: eye.map_or(0.0, |eye| eye.near) as f32,
-        pixel_per_depth: eye.map_or(0.0, |eye| eye.pixel_per_depth) as f32,
+        pixel_per_depth: eye.map_or(view.pix, |eye| eye.pixel_per_depth) as f32,
         opacity_threshold: scene.splatting.opacity_threshold as f32,
         compositing: scene.splatting.compositing as u32,
         order: scene.splatting.order as u32,
-        culling: u32::from(culls(&scene.splatting)),
+        culling: u32::from(scene.splatting.culling && hides(&scene.splatting)),
         tiles: u32::from(scene.splatting.tiles),
         per_unit: grid.unit().recip().sqrt().min(f32::MAX.into()) as f32,
         headlight: u32::from(scene.shading.light == Light::Headlight),
@@ -96,11 +96,7 @@ pub fn gather(view: &View, kernel: &Kernel, splatting: &Splatting, bins: &TileBi
         shear: shear as f32,
         half_width: half_width as f32,
         whole_below: economies.whole_below as f32,
-        beta: if splatting.order == Order::FrontToBack && economies.beta < 1.0 {
-            economies.beta as f32
-        } else {
-            f32::MAX
-        },
+        beta: if hides(splatting) && economies.beta < 1.0 { economies.beta as f32 } else { f32::MAX },
         peak: (whole / economies.resolution).min(f32::MAX.into()) as f32,
         padding_0: 0,
         padding_1: 0,
@@ -120,25 +116,32 @@ fn groups_per_kernel(view: &View) -> u32 {
 pub fn groups(plan: &FramePlan, kernel: &Kernel, splatting: &Splatting, stride: usize) -> Vec<u8> {
     let mut bytes = Vec::new();
     for (index, group) in (0..).zip(&plan.groups) {
-        let half_box = plan.view.half_box(kernel.support(), group.planes.clone());
+        let uniform = self::group(&plan.view, kernel, splatting, group.planes.clone());
         for bricks in &group.bricks {
-            let uniform = Group {
-                half_box: in_f32_pixels(half_box),
-                // A footprint's box holds that many pixel centres and one more, or one less.
-                box_filter: ((2.0 * half_box.min(DVec2::splat(MAX_HALF_BOX))).floor() - 1.0).as_uvec2().to_array(),
-                culling: u32::from(culls(splatting) && half_box.max_element() <= MAX_HALF_BOX),
-                near: group.planes.start as f32,
-                first_brick: bricks.start,
-                brick_count: bricks.end - bricks.start,
-                index,
-                padding: 0,
-            };
+            let count = bricks.end - bricks.start;
+            let uniform = Group { first_brick: bricks.start, brick_count: count, index, ..uniform };
             bytes.extend_from_slice(bytemuck::bytes_of(&uniform));
             bytes.resize(bytes.len().next_multiple_of(stride), 0);
         }
     }
     bytes.resize(bytes.len().max(stride), 0);
     bytes
+}
+
+/// The group of sheets between two planes of sheet depth, without bricks.
+pub fn group(view: &View, kernel: &Kernel, splatting: &Splatting, planes: Range<f64>) -> Group {
+    let half_box = view.half_box(kernel.support(), planes.clone());
+    Group {
+        half_box: in_f32_pixels(half_box),
+        // A footprint's box holds that many pixel centres and one more, or one less.
+        box_filter: ((2.0 * half_box.min(DVec2::splat(MAX_HALF_BOX))).floor() - 1.0).as_uvec2().to_array(),
+        culling: u32::from(splatting.culling && hides(splatting) && half_box.max_element() <= MAX_HALF_BOX),
+        near: planes.start as f32,
+        first_brick: 0,
+        brick_count: 0,
+        index: 0,
+        padding: 0,
+    }
 }
 
 /// Half a box, pixels, in f32; where it is infinite a number larger than that of any orthographic view, whose pixels are 1e-25
@@ -150,9 +153,9 @@ pub fn in_f32_pixels(half_box: DVec2) -> [f32; 2] {
 /// Half the largest box that is tested, pixels. Few footprints larger than that fit the screen, and hardly one is ever hidden.
 const MAX_HALF_BOX: f64 = 256.0;
 
-/// Early splat elimination needs the front first, and something that hides (SPEC §5).
-fn culls(splatting: &Splatting) -> bool {
-    splatting.culling && splatting.order == Order::FrontToBack && splatting.compositing != Compositing::Xray
+/// Whether what is drawn hides what comes later (SPEC §5): front to back, and nothing to look through.
+fn hides(splatting: &Splatting) -> bool {
+    splatting.order == Order::FrontToBack && splatting.compositing != Compositing::Xray
 }
 
 /// `hv = normalize(l + c)`, 0 where they cancel (SPEC §3).

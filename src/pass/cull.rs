@@ -1,19 +1,14 @@
 //! Early splat elimination (§6): which bricks a sheet group visits, which of their voxels it draws, those voxels in a row,
 //! and the shading of those that were not shaded before.
 
-use std::sync::OnceLock;
-
-use wgpu::{
-    BindGroup, BindingResource, Buffer, BufferUsages, ComputePass, Device, ShaderStages, TextureView,
-    TextureViewDimension,
-};
+use wgpu::{BindGroup, Buffer, BufferUsages, ComputePass, Device, ShaderStages, TextureView};
 
 use crate::brick::BRICK_VOXELS;
-use crate::gpu::bindings::{ComputeStage, at_offset, grown, storage, texture, texture_of_integers, uniform};
+use crate::gpu::bindings::{ComputeStage, at_offset, grown, storage, uniform};
 use crate::gpu::brick_lists::BrickBuffer;
 use crate::gpu::layout::{Brick, BrickState, Culled, Frame, Group, Indirect, Splat, Visit};
 use crate::gpu::shaders;
-use crate::gpu::volume_texture::VolumeTexture;
+use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};
 
 /// The four stages' pipelines.
 #[derive(Debug)]
@@ -21,10 +16,7 @@ pub struct Cull {
     bricks: ComputeStage,
     voxels: ComputeStage,
     compact: ComputeStage,
-    shade: ComputeStage,
-    /// Compiled when first asked for.
-    shade_by_label: OnceLock<ComputeStage>,
-    no_labels: VolumeTexture,
+    shade: Shade,
 }
 
 /// One list's buffers and bind groups.
@@ -42,8 +34,8 @@ pub struct CullList {
     visit_args: Buffer,
     fresh: Buffer,
     fresh_args: Buffer,
-    groups: [BindGroup; 4],
-    has_labels: bool,
+    groups: [BindGroup; 3],
+    shade_group: ShadeGroup,
 }
 
 /// What all lists share.
@@ -104,26 +96,8 @@ impl Cull {
             bricks: ComputeStage::new(device, shaders::CULL_BRICKS, "main", &bricks, &sheets),
             voxels: ComputeStage::new(device, shaders::CULL_VOXELS, "main", &voxels, &sheets),
             compact: ComputeStage::new(device, shaders::COMPACT, "main", &compact, &[]),
-            shade: Self::compile_shade(device, false),
-            shade_by_label: OnceLock::new(),
-            no_labels: VolumeTexture::no_labels(device),
+            shade: Shade::new(device),
         }
-    }
-
-    fn compile_shade(device: &Device, labels: bool) -> ComputeStage {
-        let stage = ShaderStages::COMPUTE;
-        let slots = [
-            uniform::<Frame>(stage, false),
-            storage::<Brick>(stage, true),
-            texture(stage, TextureViewDimension::D2Array),
-            storage::<[f32; 4]>(stage, true),
-            storage::<u32>(stage, true),
-            storage::<Indirect>(stage, true),
-            storage::<Splat>(stage, false),
-            texture_of_integers(stage, TextureViewDimension::D2Array),
-        ];
-        let constants = [("LABELS", f64::from(u8::from(labels)))];
-        ComputeStage::new(device, shaders::SHADE, "main", &slots, &constants)
     }
 
     /// Allocates a list's buffers, or takes those of the `previous` frame. `order` is the list's bricks by first group; no group looks at more than `most_bricks` of
@@ -155,7 +129,7 @@ impl Cull {
         let fresh = buffer(fresh, "sheetsplat.fresh", most_voxels as usize, size_of::<u32>(), none);
         let fresh_args = buffer(fresh_args, "sheetsplat.fresh_args", 1, size_of::<Indirect>(), indirect);
 
-        let CullBuffers { frame, groups, values, labels, control_points, occluded, culled } = shared;
+        let CullBuffers { frame, groups, occluded, culled, .. } = shared;
         let (frame, group) = (frame.as_entire_binding(), at_offset::<Group>(groups));
         let whole = Buffer::as_entire_binding;
         let bricks = [
@@ -181,40 +155,31 @@ impl Cull {
         ];
         let lists = [&visits, &visit_args, &instances, &draw_args, &fresh, &fresh_args, culled];
         let compact = lists.map(whole);
-        let shade = [
-            frame,
-            whole(&list.buffer),
-            BindingResource::TextureView(values),
-            whole(control_points),
-            whole(&fresh),
-            whole(&fresh_args),
-            whole(&splats),
-            BindingResource::TextureView(labels.unwrap_or(&self.no_labels.view)),
-        ];
-        let has_labels = labels.is_some();
-        let shade_stage = match has_labels {
-            true => self.shade_by_label.get_or_init(|| Self::compile_shade(device, true)),
-            false => &self.shade,
-        };
-        let groups = [
-            self.bricks.bind(device, &bricks),
-            self.voxels.bind(device, &voxels),
-            self.compact.bind(device, &compact),
-            shade_stage.bind(device, &shade),
-        ];
-        CullList { states, splats, instances, draw_args, visits, visit_args, fresh, fresh_args, groups, has_labels }
+        let shade_group = self.shade.bind(
+            device,
+            ShadeBuffers {
+                frame: shared.frame,
+                bricks: &list.buffer,
+                values: shared.values,
+                labels: shared.labels,
+                control_points: shared.control_points,
+                places: &fresh,
+                args: &fresh_args,
+                splats: &splats,
+            },
+        );
+        let groups =
+            [self.bricks.bind(device, &bricks), self.voxels.bind(device, &voxels), self.compact.bind(device, &compact)];
+        CullList { states, splats, instances, draw_args, visits, visit_args, fresh, fresh_args, groups, shade_group }
     }
 
     /// Decides what the group at `offset` draws of a list.
     pub fn record(&self, pass: &mut ComputePass<'_>, list: &CullList, offset: u32) {
-        let [bricks, voxels, compact, shade] = &list.groups;
+        let [bricks, voxels, compact] = &list.groups;
         self.bricks.dispatch(pass, bricks, &[offset], 1);
         self.voxels.dispatch_indirect(pass, voxels, &[offset], &list.visit_args);
         self.compact.dispatch(pass, compact, &[], 1);
-        let shade_stage = if list.has_labels { self.shade_by_label.get() } else { Some(&self.shade) };
-        if let Some(stage) = shade_stage {
-            stage.dispatch_indirect(pass, shade, &[], &list.fresh_args);
-        }
+        self.shade.record(pass, &list.shade_group, &list.fresh_args);
     }
 }
 

@@ -1,5 +1,5 @@
 //! The GPU's stages, one per file, in the order of the data flow: per group of sheets
-//! cull bricks → cull voxels → compact → tiles → splat → composite → occlude, at the end resolve (Fig. 12).
+//! cull bricks → cull voxels → compact → shade → tiles → splat → composite → occlude, at the end resolve (Fig. 12).
 //!
 //! Each holds its pipeline, makes its bind group, and records itself; none allocates, submits or waits while recording.
 
@@ -8,5 +8,7 @@ pub mod cull;
 pub mod gather;
 pub mod occlude;
 pub mod resolve;
+pub mod sample;
+pub mod shade;
 pub mod splat;
 pub mod tiles;

@@ -10,7 +10,7 @@ use wgpu::{
 };
 
 use crate::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
-use crate::gpu::bindings::{at_offset, bind, layout, storage, texture, uniform};
+use crate::gpu::bindings::{Slot, at_offset, bind, layout, storage, texture, uniform};
 use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::layout::{Frame, Group, Indirect, QUADS, Splat as SplatRecord, TileList};
 use crate::gpu::shaders::{self, Shader};
@@ -49,52 +49,29 @@ impl Splat {
             "sheetsplat.clear",
             &[uniform::<Frame>(ShaderStages::VERTEX, false), storage::<TileList>(ShaderStages::VERTEX, true)],
         );
-        let both = ShaderStages::VERTEX_FRAGMENT;
-        let (splat_layout, splat_pipeline_layout) = layout(
-            device,
-            "sheetsplat.splat",
-            &[
-                uniform::<Frame>(both, false),
-                uniform::<Group>(ShaderStages::VERTEX, true),
-                storage::<SplatRecord>(ShaderStages::VERTEX, true),
-                storage::<u32>(ShaderStages::VERTEX, true),
-                storage::<Indirect>(ShaderStages::VERTEX, true),
-                texture(both, TextureViewDimension::D2Array),
-            ],
-        );
+        let (splat_layout, splat_pipeline_layout) = layout(device, "sheetsplat.splat", &splat_slots());
+        let entry = format!("fragment_{sheets}");
         Self {
-            clear: pipeline(device, shaders::CLEAR, &clear_pipeline_layout, format, sheets, None, &[]),
+            clear: pipeline(device, (shaders::CLEAR, &entry), &clear_pipeline_layout, format, sheets, None, &[]),
             clear_layout,
             layout: splat_layout,
             pipeline_layout: splat_pipeline_layout,
             format,
             sheets,
             splat: Default::default(),
-            indices: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("sheetsplat.quad_indices"),
-                contents: bytemuck::cast_slice(&quad_indices()),
-                usage: wgpu::BufferUsages::INDEX,
-            }),
+            indices: quad_indices(device),
         }
     }
 
     /// The pipeline for a footprint form, without or with an eye.
     fn pipeline(&self, device: &Device, mode: SplatMode) -> &RenderPipeline {
         self.cell(mode).get_or_init(|| {
-            let add = wgpu::BlendComponent {
-                src_factor: wgpu::BlendFactor::One,
-                dst_factor: wgpu::BlendFactor::One,
-                operation: wgpu::BlendOperation::Add,
-            };
-            let additive = Some(wgpu::BlendState { color: add, alpha: add });
-            let constants = [
-                ("SECTIONS", f64::from(u8::from(mode.form == FootprintForm::Sections))),
-                ("SHEETS", f64::from(self.sheets)),
-                ("PLANE_TEXELS", f64::from(SUMMED_AREA_SIZE)),
-                ("LAYERS", f64::from(SUMMED_AREA_LAYERS)),
-            ];
+            let additive = Some(added_to(wgpu::BlendFactor::One));
             let shader = if mode.perspective { shaders::SPLAT_PERSPECTIVE } else { shaders::SPLAT };
-            pipeline(device, shader, &self.pipeline_layout, self.format, self.sheets, additive, &constants)
+            let entry = format!("fragment_{}", self.sheets);
+            let constants = constants(mode.form, self.sheets);
+            let layout = &self.pipeline_layout;
+            pipeline(device, (shader, &entry), layout, self.format, self.sheets, additive, &constants)
         })
     }
 
@@ -174,15 +151,53 @@ impl Splat {
     }
 }
 
-/// The vertices 4q to 4q + 3 of quad q as two triangles.
-fn quad_indices() -> Vec<u16> {
-    (0..QUADS).flat_map(|quad| [0, 1, 2, 2, 1, 3].map(|corner| 4 * quad + corner)).collect()
+/// What the shaders that draw quads declare.
+pub(super) fn splat_slots() -> [Slot; 6] {
+    let both = ShaderStages::VERTEX_FRAGMENT;
+    [
+        uniform::<Frame>(both, false),
+        uniform::<Group>(ShaderStages::VERTEX, true),
+        storage::<SplatRecord>(ShaderStages::VERTEX, true),
+        storage::<u32>(ShaderStages::VERTEX, true),
+        storage::<Indirect>(ShaderStages::VERTEX, true),
+        texture(both, TextureViewDimension::D2Array),
+    ]
+}
+
+/// Their constants.
+pub(super) fn constants(form: FootprintForm, sheets: u32) -> [(&'static str, f64); 4] {
+    [
+        ("SECTIONS", f64::from(u8::from(form == FootprintForm::Sections))),
+        ("SHEETS", f64::from(sheets)),
+        ("PLANE_TEXELS", f64::from(SUMMED_AREA_SIZE)),
+        ("LAYERS", f64::from(SUMMED_AREA_LAYERS)),
+    ]
+}
+
+/// Blending that adds what is drawn to a part of what is there.
+pub(super) fn added_to(there: wgpu::BlendFactor) -> wgpu::BlendState {
+    let component = wgpu::BlendComponent {
+        src_factor: wgpu::BlendFactor::One,
+        dst_factor: there,
+        operation: wgpu::BlendOperation::Add,
+    };
+    wgpu::BlendState { color: component, alpha: component }
+}
+
+/// The vertices 4q to 4q + 3 of quad q as two triangles, for an instance's quads.
+pub(super) fn quad_indices(device: &Device) -> Buffer {
+    let indices: Vec<u16> = (0..QUADS).flat_map(|quad| [0, 1, 2, 2, 1, 3].map(|corner| 4 * quad + corner)).collect();
+    device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some("sheetsplat.quad_indices"),
+        contents: bytemuck::cast_slice(&indices),
+        usage: wgpu::BufferUsages::INDEX,
+    })
 }
 
 /// A pipeline that draws quads into all sheets of a group.
-fn pipeline(
+pub(super) fn pipeline(
     device: &Device,
-    shader: Shader,
+    (shader, entry): (Shader, &str),
     layout: &wgpu::PipelineLayout,
     format: TextureFormat,
     sheets: u32,
@@ -211,7 +226,7 @@ fn pipeline(
         multisample: wgpu::MultisampleState::default(),
         fragment: Some(wgpu::FragmentState {
             module: &module,
-            entry_point: Some(&format!("fragment_{sheets}")),
+            entry_point: Some(entry),
             compilation_options,
             targets: &vec![target; sheets as usize],
         }),

@@ -1,17 +1,20 @@
-//! The two ways from bricks to the compositing buffer. Each holds its stages' pipelines, prepares its part of a frame, and
+//! The ways from bricks to the compositing buffer. Each holds its stages' pipelines, prepares its part of a frame, and
 //! records it.
 
 pub(crate) mod quads;
+pub(crate) mod samples;
 pub(crate) mod tiles;
 
 use wgpu::{Buffer, BufferUsages, ComputePassDescriptor, Device, Queue};
 
 use crate::classified_volume::ClassifiedVolume;
+use crate::footprint::FootprintTable;
 use crate::gpu::bindings::grown;
+use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
 use crate::kernel::Kernel;
-use crate::splatting::Splatting;
+use crate::splatting::{FootprintForm, Splatting};
 use crate::view::View;
 
 /// What a rasterizer prepares a frame from.
@@ -36,6 +39,29 @@ impl Given<'_> {
     /// A buffer with these contents, the old one if it has the right size.
     fn filled(&self, old: Option<Buffer>, label: &str, bytes: &[u8], usage: BufferUsages) -> Buffer {
         filled(self.device, self.queue, old, label, bytes, usage)
+    }
+}
+
+/// A table, and what it is for: the kernel, and the slab width that the sections form depends on.
+#[derive(Debug)]
+pub(crate) struct Footprints {
+    pub(crate) texture: FootprintTexture,
+    kernel: Kernel,
+    width: Option<f64>,
+}
+
+impl Footprints {
+    /// The old table if it will do.
+    pub(crate) fn renewed(old: Option<Self>, given: Given<'_>) -> Self {
+        let (form, kernel) = (given.splatting.footprint, *given.kernel);
+        // The summed-area form serves every width (§3.3.1).
+        let width = given.view.section_width();
+        let of = (form == FootprintForm::Sections).then_some(width);
+        let fits = |old: &Self| (old.texture.form, old.kernel, old.width) == (form, kernel, of);
+        old.filter(fits).unwrap_or_else(|| {
+            let table = FootprintTable::new(form, &kernel, width);
+            Self { texture: FootprintTexture::upload(given.device, given.queue, &table), kernel, width: of }
+        })
     }
 }
 

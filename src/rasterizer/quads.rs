@@ -3,24 +3,21 @@
 use wgpu::util::DeviceExt;
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, TextureFormat, TextureView};
 
-use super::{Given, compute};
+use super::{Footprints, Given, compute};
 use crate::brick;
 use crate::classified_volume::ClassifiedVolume;
-use crate::footprint::FootprintTable;
 use crate::gpu::bindings::grown;
-use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::layout::{Group, Tally};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
-use crate::kernel::Kernel;
 use crate::pass::composite::Composite;
 use crate::pass::cull::{Cull, CullBuffers, CullList};
 use crate::pass::occlude::Occlude;
 use crate::pass::splat::{Splat, SplatMode};
 use crate::pass::tiles::{TileLists, Tiles};
 use crate::plan::FramePlan;
-use crate::splatting::{FootprintForm, Order};
+use crate::splatting::Order;
 use crate::stats::GroupSlabs;
 use crate::view::View;
 
@@ -65,14 +62,6 @@ struct Planned {
     orders: Vec<Buffer>,
     /// For every list the most bricks and voxels that any group can visit.
     most: Vec<(u32, u32)>,
-}
-
-/// A table, and what it is for: the kernel, and the slab width that the sections form depends on.
-#[derive(Debug)]
-struct Footprints {
-    texture: FootprintTexture,
-    kernel: Kernel,
-    width: Option<f64>,
 }
 
 #[derive(Debug)]
@@ -248,21 +237,6 @@ impl Planned {
             })
         };
         Self { order, revision: volume.revision, orders: plan.orders.iter().map(upload).collect(), most, plan }
-    }
-}
-
-impl Footprints {
-    /// The old table if it will do.
-    fn renewed(old: Option<Self>, given: Given<'_>) -> Self {
-        let (form, kernel) = (given.splatting.footprint, *given.kernel);
-        // The summed-area form serves every width (§3.3.1).
-        let width = given.view.section_width();
-        let of = (form == FootprintForm::Sections).then_some(width);
-        let fits = |old: &Self| (old.texture.form, old.kernel, old.width) == (form, kernel, of);
-        old.filter(fits).unwrap_or_else(|| {
-            let table = FootprintTable::new(form, &kernel, width);
-            Self { texture: FootprintTexture::upload(given.device, given.queue, &table), kernel, width: of }
-        })
     }
 }
 

@@ -10,7 +10,7 @@ use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
 use crate::pass::gather::{Gather, GatherBuffers, GatherMode};
 use crate::plan::tile_grid;
-use crate::splatting::{FootprintForm, Order, Splatting};
+use crate::splatting::{FootprintForm, Method, Order, Splatting};
 use crate::stats::GroupSlabs;
 use crate::tile_bins::{SHEETS, SIDE, TileBins};
 use crate::view::View;
@@ -61,6 +61,10 @@ impl TileRasterizer {
             let key = "splatting.rasterizer";
             Some(RenderError::OutOfRange { key, found: format!("\"tiles\" with {found}"), allowed: allowed.to_owned() })
         };
+        if splatting.method == Method::CompositeEverySample {
+            let found = "splatting.method = \"composite-every-sample\"".to_owned();
+            return refused(found, "\"image-aligned\" or \"axis-aligned\" with it, or \"quads\"");
+        }
         if splatting.footprint != FootprintForm::SummedArea {
             return refused("splatting.footprint = \"sections\"".to_owned(), "\"summed-area\" with it, or \"quads\"");
         }

@@ -13,6 +13,11 @@ pub(crate) fn assert_fails(code: i32, arguments: &str, words: &[&str]) {
     folder.write("empty.toml", "");
     folder.write("empty.nrrd", "");
     folder.write("short.nrrd", &folder.read("good.nrrd")[..120]);
+    folder.write_nrrd("labels.nrrd", [2, 2, 2], [1.0, 1.0, 1.0], &[0.0, 1.0, 2.0, 3.0, 3.0, 3.0, 0.0, 0.0]);
+    folder.write_nrrd("half.nrrd", [2, 2, 2], [1.0, 1.0, 1.0], &[0.0, 1.0, 2.0, 3.0, 3.0, 3.5, 0.0, 0.0]);
+    folder.write_nrrd("larger.nrrd", [2, 2, 3], [1.0, 1.0, 1.0], &[0.0; 12]);
+    folder.write_nrrd("longer.nrrd", [2, 2, 2], [1.0, 1.0, 3.0], &[0.0; 8]);
+    folder.write("labelled.toml", "[volume]\npath = \"good.nrrd\"\n[[transfer.label]]\nlabel = 3\n");
     folder.write("picture.jpg", "not a volume");
     fs::create_dir(folder.path("folder.toml")).unwrap();
     fs::create_dir(folder.path("folder.nrrd")).unwrap();
@@ -77,6 +82,28 @@ fn a_bad_set_is_2() {
     render("transfer.opacity=[]", &["transfer.opacity"]);
     render("nothing", &["nothing", "table.key=value"]);
     render("=3", &["table.key=value"]);
+}
+
+#[test]
+fn bad_labels_are_2() {
+    for backend in ["gpu", "reference"] {
+        let render = |input: &str, labels: &str, words: &[&str]| {
+            let set = format!("--set volume.labels={labels} --backend {backend}");
+            assert_fails(2, &format!("render {input} -o out.png {set}"), words);
+        };
+        render("good.nrrd", "half.nrrd", &["half.nrrd", "data", "3.5 at voxel [1, 0, 1]", "0 to 65535"]);
+        render("good.nrrd", "larger.nrrd", &["larger.nrrd", "sizes", "[2, 2, 3]", "[2, 2, 2]"]);
+        render("good.nrrd", "longer.nrrd", &["longer.nrrd", "spacing", "3.0", "[1.0, 1.0, 1.0]"]);
+        render("labelled.toml", "gone.nrrd", &["gone.nrrd", "No such file"]);
+        render("builtin:head:16", "labels.nrrd", &["labels.nrrd", "sizes", "[2, 2, 2]", "[16, 16, 10]"]);
+        let without = format!("render labelled.toml -o out.png --backend {backend}");
+        assert_fails(2, &without, &["labelled.toml", "transfer.label", "without labels", "volume.labels"]);
+    }
+    assert_fails(
+        2,
+        "render builtin:cube -o out.png --set transfer.label=[{label=1}]",
+        &["--set", "transfer.label", "volume.labels"],
+    );
 }
 
 #[test]

@@ -8,6 +8,7 @@ mod cull;
 mod occlude;
 mod plan;
 mod resolve;
+mod section;
 mod shade;
 mod splat;
 mod tiles;

@@ -3,7 +3,7 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::ops::Range;
+use std::ops::Deref;
 
 use bytemuck::Zeroable;
 use glam::{DVec2, DVec3, DVec4, UVec3};
@@ -13,18 +13,17 @@ use sheetsplat::gpu::footprint_texture::FootprintTexture;
 use sheetsplat::gpu::volume_texture::VolumeTexture;
 use sheetsplat::gpu::{layout, readback};
 use sheetsplat::headless::Headless;
-use sheetsplat::kernel::Kernel;
 use sheetsplat::pass::cull::{Cull, CullBuffers, CullList};
 use sheetsplat::pass::splat::{Splat as Stage, SplatMode};
 use sheetsplat::plan::{TILE, tile_grid};
-use sheetsplat::reference::{self, Geometry};
+use sheetsplat::reference;
 use sheetsplat::scene::Scene;
 use sheetsplat::splatting::FootprintForm;
-use sheetsplat::view::View;
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
 
-use crate::common::{F32, Random, camera, gpu, pixels, scene};
+use crate::common::{F32, Random, gpu, pixels};
+use crate::section::{AMOUNT, KERNELS, Seen, VIEWS, view_scene};
 use crate::{at_offsets, frame_over, indirect, init, tile_list};
 
 /// The stage for groups of so many sheets, and a list to draw, of which it takes what the culling stages wrote.
@@ -62,16 +61,21 @@ impl<'a> Stages<'a> {
 struct Fixture<'a> {
     gpu: &'a Headless,
     stage: &'a Stages<'a>,
-    scene: Scene,
-    kernel: Kernel,
-    view: View,
-    geometry: Geometry,
+    seen: Seen,
     frame: wgpu::Buffer,
     footprints: FootprintTexture,
     /// The sheet buffers of a group.
     sheets: Vec<wgpu::Texture>,
     /// All tiles of the image.
     tiles: Vec<u32>,
+}
+
+impl Deref for Fixture<'_> {
+    type Target = Seen;
+
+    fn deref(&self) -> &Seen {
+        &self.seen
+    }
 }
 
 /// An f32 sheet buffer, read back.
@@ -81,10 +85,9 @@ impl<'a> Fixture<'a> {
     fn new(stage: &'a Stages<'a>, scene: Scene, spacing: [f64; 3]) -> Self {
         let gpu = stage.gpu;
         let grid = Grid { dims: UVec3::splat(9), spacing: DVec3::from(spacing) };
-        let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
-        let size = [scene.image.width, scene.image.height];
-        let view = View::new(&grid, &scene.camera, &scene.splatting, size).unwrap();
-        let table = FootprintTable::new(scene.splatting.footprint, &kernel, view.slabs.width);
+        let seen = Seen::new(&grid, scene);
+        let size = seen.view.size;
+        let table = FootprintTable::new(seen.scene.splatting.footprint, &seen.kernel, seen.view.slabs.width);
         let sheet = |_| {
             gpu.device().create_texture(&wgpu::TextureDescriptor {
                 label: Some("sheet"),
@@ -101,14 +104,11 @@ impl<'a> Fixture<'a> {
         Self {
             gpu,
             stage,
-            kernel,
-            view,
-            geometry: Geometry::new(&grid, &scene).unwrap(),
-            frame: init(gpu.device(), &[frame_over(&grid, &scene)], BufferUsages::UNIFORM),
+            frame: init(gpu.device(), &[frame_over(&grid, &seen.scene)], BufferUsages::UNIFORM),
             footprints: FootprintTexture::upload(gpu.device(), gpu.queue(), &table),
             sheets: (0..stage.sheets).map(sheet).collect(),
             tiles: (0..columns * rows).collect(),
-            scene,
+            seen,
         }
     }
 
@@ -128,6 +128,11 @@ impl<'a> Fixture<'a> {
     /// The first slab of a slab's group.
     fn first_of_group(&self, k: i32) -> i32 {
         k - k.rem_euclid(self.stage.sheets as i32)
+    }
+
+    /// What the summed-area form may err by in a section.
+    fn tolerance(&self, splat: &reference::Splat, k: i32) -> f64 {
+        self.summed_area_tolerance(splat, self.first_of_group(k), k)
     }
 
     fn draw_group(&self, splats: &[layout::Splat], instances: &[u32], first_slab: i32, tiles: &[u32]) -> Vec<Sheet> {
@@ -151,17 +156,12 @@ impl<'a> Fixture<'a> {
         let views: Vec<_> =
             self.sheets.iter().map(|sheet| sheet.create_view(&wgpu::TextureViewDescriptor::default())).collect();
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let mode = SplatMode { form: self.scene.splatting.footprint, perspective: self.view.perspective.is_some() };
+        let mode = SplatMode { form: self.scene.splatting.footprint, perspective: false };
         self.stage.splat.prepare(device, mode);
         self.stage.splat.record(&mut encoder, None, mode, &views, (&clear, &tiles), [(&group, offset, &args)]);
         self.gpu.queue().submit([encoder.finish()]);
         let read = |sheet| pixels(&readback::texture(device, self.gpu.queue(), sheet).unwrap());
         self.sheets.iter().map(read).collect()
-    }
-
-    /// The twin's sheet buffer of one slab.
-    fn twin(&self, splats: &[reference::Splat], slab: i32) -> Vec<DVec4> {
-        reference::splat::sheet(splats, slab, &self.geometry, &self.kernel).pixels
     }
 
     /// A splat for the twin: the record's f32 coordinates are taken as they are, so only the stage's own errors count.
@@ -170,22 +170,6 @@ impl<'a> Fixture<'a> {
         assert_eq!((rg, ba), (AMOUNT_RG, AMOUNT_BA));
         let center = DVec2::new(x_px.into(), y_px.into());
         reference::Splat { center, depth: depth.into(), amount: AMOUNT * self.amplitude(), alpha: 1.0 }
-    }
-
-    /// The slabs that a splat's kernel reaches into.
-    fn touched(&self, splat: &reference::Splat) -> Range<i32> {
-        self.view.slabs.touched(splat.depth - self.view.reach, splat.depth + self.view.reach)
-    }
-
-    /// The low-pass rule's amplitude over λ.
-    fn amplitude(&self) -> f64 {
-        self.geometry.amplitude / self.geometry.lambda
-    }
-
-    /// Depths of a slab's planes, seen from a splat.
-    fn planes(&self, splat: &reference::Splat, slab: i32) -> (f64, f64) {
-        let t0 = f64::from(slab) * self.view.slabs.width - splat.depth;
-        (t0, t0 + self.view.slabs.width)
     }
 
     /// A random splat whose footprint is at least partly on the screen.
@@ -205,40 +189,9 @@ impl<'a> Fixture<'a> {
 /// 1, 0.5, 0.25 and 1 as f16: what a record holds, which the stage multiplies by the amplitude over λ.
 const AMOUNT_RG: u32 = 0x3800_3c00;
 const AMOUNT_BA: u32 = 0x3c00_3400;
-const AMOUNT: DVec4 = DVec4::new(1.0, 0.5, 0.25, 1.0);
 
 /// Sheets of a group.
 const GROUPS: [u32; 3] = [1, 2, 4];
-
-/// Radius and falloff.
-const KERNELS: [(f64, f64); 9] =
-    [(2.0, 2.0), (1.4, 2.0), (1.0, 2.0), (4.0, 2.0), (1.0, 0.1), (4.0, 0.1), (3.0, 0.5), (2.0, 16.0), (4.0, 16.0)];
-
-/// Direction, spacing, and `unit`s per pixel: head-on and oblique, sheared footprints, magnified and minified, and one
-/// that is minified along one singular direction only.
-const VIEWS: [([f64; 3], [f64; 3], f64); 8] = [
-    ([0.0, 1.0, 0.0], [1.0, 1.0, 1.0], 0.25),
-    ([0.3, 0.9, -0.2], [1.0, 1.0, 1.0], 0.6),
-    ([0.6, 0.5, 0.6], [1.0, 1.0, 5.0], 0.4),
-    ([0.6, 0.5, 0.6], [3.2, 3.2, 1.5], 0.1),
-    ([-0.7, 0.2, 0.4], [1.0, 1.0, 2.0], 0.03),
-    ([0.6, 0.5, 0.6], [1.0, 1.0, 5.0], 2.0),
-    ([0.0, 1.0, 0.1], [1.0, 1.0, 1.0], 7.0),
-    ([0.2, 0.1, 0.9], [1.0, 3.0, 1.0], 30.0),
-];
-
-/// The view with slabs `width` wide in the warped grid, where the footprint tables live.
-fn view_scene(view: ([f64; 3], [f64; 3], f64), kernel: (f64, f64), width: f64, form: FootprintForm) -> Scene {
-    let (direction, spacing, units_per_pixel) = view;
-    let mut scene = scene(70, 45);
-    let unit = spacing.into_iter().fold(f64::INFINITY, f64::min);
-    scene.camera = camera(direction, units_per_pixel * unit * 45.0);
-    (scene.splatting.radius, scene.splatting.falloff) = kernel;
-    scene.splatting.footprint = form;
-    let warped = scene.camera.basis().w / (DVec3::from(spacing) / unit);
-    scene.splatting.slab_width = width / warped.length();
-    scene
-}
 
 /// Calls `check` with random splats of every kernel and view, one at a time, and each slab that they touch or that shares a
 /// group with one: fixture, splat, slab, sheet buffer.
@@ -264,59 +217,12 @@ fn for_random_sections(
     }
 }
 
-impl Fixture<'_> {
-    /// The whole footprint's peak, per unit of a splat's amount.
-    fn whole(&self) -> f64 {
-        self.kernel.section(0.0, -self.kernel.radius(), self.kernel.radius())
-    }
-
-    /// What the summed-area form may err by in a section (SPEC §4): a thousandth of its peak. Nothing can hold it better
-    /// than an f32 that also holds whole footprints. And the slab's planes come in f32, seen from a depth in f32: worth their
-    /// share of the kernel's value there.
-    fn summed_area_tolerance(&self, splat: &reference::Splat, k: i32) -> f64 {
-        let (t0, t1) = self.planes(splat, k);
-        let plane_error = self.plane_error(splat, k);
-        let nearest = if t0 * t1 < 0.0 { 0.0 } else { t0.abs().min(t1.abs()) - plane_error };
-        1e-3 * self.kernel.section(0.0, t0, t1) + F32 * self.whole() + plane_error * self.kernel.value(nearest.max(0.0))
-    }
-
-    /// What f32 may move a slab's planes by, seen from a splat: the group's plane, the slab's width and its multiple are
-    /// rounded, and so are their differences from the depth and sums, which no number before them exceeds.
-    fn plane_error(&self, splat: &reference::Splat, k: i32) -> f64 {
-        let (first, width) = (self.first_of_group(k), self.view.slabs.width);
-        let plane = f64::from(first).abs() * width;
-        4.0 * F32 * (plane.max((f64::from(first) * width - splat.depth).abs()) + f64::from(k - first + 1) * width)
-    }
-
-    /// Distance of a pixel's centre from a splat, in footprint coordinates.
-    fn rho(&self, splat: &reference::Splat, pixel: usize) -> f64 {
-        let width = self.scene.image.width as usize;
-        let center = DVec2::new((pixel % width) as f64, (pixel / width) as f64) + 0.5;
-        (self.geometry.footprint_from_pixels * (center - splat.center)).length()
-    }
-
-    /// `tolerance` is that of a kernel of amount 1, before the amplitude.
-    fn assert_close(&self, sheet: &[DVec4], expected: &[DVec4], tolerance: impl Fn(usize) -> f64, what: &str) {
-        assert_eq!(sheet.len(), expected.len());
-        for (pixel, (actual, expected)) in sheet.iter().zip(expected).enumerate() {
-            let error = (*actual - *expected).abs().max_element() / self.amplitude();
-            assert!(
-                error <= tolerance(pixel),
-                "{what}, {:?}, {:?}, pixel {pixel}: {actual}, not {expected} ± {}",
-                self.kernel,
-                self.view,
-                tolerance(pixel)
-            );
-        }
-    }
-}
-
 #[test]
 fn summed_area_sections() {
     let mut lit = 0;
     for_random_sections(FootprintForm::SummedArea, &[0.25, 1.0, 3.7], |fixture, splat, k, sheet| {
         let expected = fixture.twin(&[*splat], k);
-        let tolerance = fixture.summed_area_tolerance(splat, k);
+        let tolerance = fixture.tolerance(splat, k);
         fixture.assert_close(sheet, &expected, |_| tolerance, &format!("{splat:?} in slab {k}"));
         lit += expected.iter().filter(|pixel| pixel.w > 0.0).count();
     });
@@ -329,7 +235,7 @@ fn summed_area_sections() {
 fn stored_sections() {
     let mut lit = 0;
     for_random_sections(FootprintForm::Sections, &[0.25, 1.0, 3.7], |fixture, splat, k, sheet| {
-        let Fixture { kernel, view, .. } = fixture;
+        let Seen { kernel, view, .. } = &fixture.seen;
         let (t0, t1) = fixture.planes(splat, k);
         let middle = (t0 + t1) / 2.0;
         let spacing = section_spacing(kernel, view.slabs.width);
@@ -488,7 +394,7 @@ fn instances_add_up() {
             let tolerance = |pixel: usize| {
                 let here = twins.iter().filter(|twin| fixture.rho(twin, pixel) <= 2.0);
                 // Each has its own error, and the sum so far is rounded when it is added.
-                here.map(|twin| fixture.summed_area_tolerance(twin, k) + F32 * most).sum()
+                here.map(|twin| fixture.tolerance(twin, k) + F32 * most).sum()
             };
             fixture.assert_close(&sheet, &expected, tolerance, "many splats");
         }

@@ -133,9 +133,9 @@ impl Failure {
     pub(crate) fn of(error: Error, input: &str) -> Self {
         match error {
             Error::Scene(_) | Error::Volume(_) => Self::Input(error.to_string()),
-            Error::Render(
-                RenderError::Unsupported { .. } | RenderError::OutOfRange { .. } | RenderError::Limit { .. },
-            ) => Self::Input(format!("{input}: {error}")),
+            Error::Render(RenderError::OutOfRange { .. } | RenderError::Limit { .. }) => {
+                Self::Input(format!("{input}: {error}"))
+            }
             _ => Self::Other(error.to_string()),
         }
     }

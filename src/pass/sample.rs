@@ -1,0 +1,114 @@
+//! Draws whole kernels one by one into one buffer, each composited by itself: composite-every-sample (§3, Westover's first form).
+
+use std::sync::OnceLock;
+
+use wgpu::{
+    BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, PipelineLayout, RenderPassTimestampWrites,
+    RenderPipeline, TextureFormat, TextureView,
+};
+
+use super::splat::{added_to, constants, pipeline, quad_indices, splat_slots};
+use crate::gpu::bindings::{at_offset, bind, layout};
+use crate::gpu::footprint_texture::FootprintTexture;
+use crate::gpu::layout::{Group, QUADS};
+use crate::gpu::shaders;
+use crate::splatting::{Compositing, FootprintForm};
+
+/// The stage's pipelines; each is compiled when it is first asked for.
+#[derive(Debug)]
+pub struct Sample {
+    layout: BindGroupLayout,
+    pipeline_layout: PipelineLayout,
+    format: TextureFormat,
+    /// By footprint form, and by whether samples are composited or summed up.
+    pipelines: [[OnceLock<RenderPipeline>; 2]; 2],
+    indices: Buffer,
+}
+
+/// What a pipeline is compiled for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SampleMode {
+    /// How footprints are stored.
+    pub form: FootprintForm,
+    /// How samples are composited.
+    pub compositing: Compositing,
+}
+
+/// Buffers of the stage.
+#[derive(Clone, Copy, Debug)]
+pub struct SampleBuffers<'a> {
+    /// One [`Frame`](crate::gpu::layout::Frame).
+    pub frame: &'a Buffer,
+    /// One [`Group`], of one sheet that all kernels are in.
+    pub group: &'a Buffer,
+    /// `[Splat]`.
+    pub splats: &'a Buffer,
+    /// `[u32]`: which of them are drawn, from back to front.
+    pub order: &'a Buffer,
+    /// [`Indirect`](crate::gpu::layout::Indirect): how many they are.
+    pub args: &'a Buffer,
+    /// The kernel's footprints.
+    pub footprints: &'a FootprintTexture,
+}
+
+impl Sample {
+    /// The stage for a buffer of the given format, nothing compiled.
+    pub fn new(device: &Device, format: TextureFormat) -> Self {
+        let (layout, pipeline_layout) = layout(device, "sheetsplat.sample", &splat_slots());
+        Self { layout, pipeline_layout, format, pipelines: Default::default(), indices: quad_indices(device) }
+    }
+
+    fn pipeline(&self, mode: SampleMode) -> &OnceLock<RenderPipeline> {
+        &self.pipelines[mode.form as usize][usize::from(mode.compositing == Compositing::Xray)]
+    }
+
+    /// Compiles what a mode needs, and binds buffers.
+    pub fn bind(&self, device: &Device, mode: SampleMode, buffers: SampleBuffers<'_>) -> BindGroup {
+        self.pipeline(mode).get_or_init(|| {
+            let over = added_to(match mode.compositing {
+                Compositing::Linear | Compositing::Exponential => wgpu::BlendFactor::OneMinusSrcAlpha,
+                Compositing::Xray => wgpu::BlendFactor::One,
+            });
+            let shader = (shaders::SPLAT_PERSPECTIVE, "fragment_sample");
+            pipeline(device, shader, &self.pipeline_layout, self.format, 1, Some(over), &constants(mode.form, 1))
+        });
+        let SampleBuffers { frame, group, splats, order, args, footprints } = buffers;
+        let resources = [
+            frame.as_entire_binding(),
+            at_offset::<Group>(group),
+            splats.as_entire_binding(),
+            order.as_entire_binding(),
+            args.as_entire_binding(),
+            wgpu::BindingResource::TextureView(&footprints.view),
+        ];
+        bind(device, "sheetsplat.sample", &self.layout, &resources)
+    }
+
+    /// Draws `count` kernels into a cleared `target`, in the mode that the group was bound for.
+    pub fn record(
+        &self,
+        encoder: &mut CommandEncoder,
+        timestamp_writes: Option<RenderPassTimestampWrites<'_>>,
+        (mode, group): (SampleMode, &BindGroup),
+        target: &TextureView,
+        count: u32,
+    ) {
+        let Some(pipeline) = self.pipeline(mode).get() else { return };
+        let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store };
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("sheetsplat.sample"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: target,
+                depth_slice: None,
+                resolve_target: None,
+                ops,
+            })],
+            timestamp_writes,
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint16);
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, group, &[0]);
+        pass.draw_indexed(0..6 * u32::from(QUADS), 0, 0..count.div_ceil(u32::from(QUADS)));
+    }
+}

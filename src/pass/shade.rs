@@ -1,0 +1,94 @@
+//! Projects and shades voxels, those of a list of places (Fig. 12).
+
+use std::sync::OnceLock;
+
+use wgpu::{BindGroup, BindingResource, Buffer, ComputePass, Device, ShaderStages, TextureView, TextureViewDimension};
+
+use crate::gpu::bindings::{ComputeStage, storage, texture, texture_of_integers, uniform};
+use crate::gpu::layout::{Brick, Frame, Indirect, Splat};
+use crate::gpu::shaders;
+use crate::gpu::volume_texture::VolumeTexture;
+
+/// The stage's pipelines: without and with labels that have ramps of their own. Each is compiled when it is first asked for.
+#[derive(Debug)]
+pub struct Shade {
+    stages: [OnceLock<ComputeStage>; 2],
+    no_labels: VolumeTexture,
+}
+
+/// What the stage reads and writes.
+#[derive(Clone, Copy, Debug)]
+pub struct ShadeBuffers<'a> {
+    /// One [`Frame`].
+    pub frame: &'a Buffer,
+    /// `[Brick]`.
+    pub bricks: &'a Buffer,
+    /// The volume's values.
+    pub values: &'a TextureView,
+    /// Its labels, if any of them has ramps of its own.
+    pub labels: Option<&'a TextureView>,
+    /// Control points of the ramps.
+    pub control_points: &'a Buffer,
+    /// `[u32]`: the places.
+    pub places: &'a Buffer,
+    /// [`Indirect`]: how many they are.
+    pub args: &'a Buffer,
+    /// `[Splat]`, one per place of the list; those of the places are written.
+    pub splats: &'a Buffer,
+}
+
+/// Bound buffers.
+#[derive(Debug)]
+pub struct ShadeGroup {
+    group: BindGroup,
+    has_labels: bool,
+}
+
+impl Shade {
+    /// The stage, nothing compiled.
+    pub fn new(device: &Device) -> Self {
+        Self { stages: Default::default(), no_labels: VolumeTexture::no_labels(device) }
+    }
+
+    /// Binds buffers.
+    pub fn bind(&self, device: &Device, buffers: ShadeBuffers<'_>) -> ShadeGroup {
+        let ShadeBuffers { frame, bricks, values, labels, control_points, places, args, splats } = buffers;
+        let whole = Buffer::as_entire_binding;
+        let resources = [
+            whole(frame),
+            whole(bricks),
+            BindingResource::TextureView(values),
+            whole(control_points),
+            whole(places),
+            whole(args),
+            whole(splats),
+            BindingResource::TextureView(labels.unwrap_or(&self.no_labels.view)),
+        ];
+        let has_labels = labels.is_some();
+        let stage = self.stages[usize::from(has_labels)].get_or_init(|| compile(device, has_labels));
+        ShadeGroup { group: stage.bind(device, &resources), has_labels }
+    }
+
+    /// Shades as many voxels as `args` says.
+    pub fn record(&self, pass: &mut ComputePass<'_>, bound: &ShadeGroup, args: &Buffer) {
+        if let Some(stage) = self.stages[usize::from(bound.has_labels)].get() {
+            stage.dispatch_indirect(pass, &bound.group, &[], args);
+        }
+    }
+}
+
+fn compile(device: &Device, labels: bool) -> ComputeStage {
+    let stage = ShaderStages::COMPUTE;
+    let slots = [
+        uniform::<Frame>(stage, false),
+        storage::<Brick>(stage, true),
+        texture(stage, TextureViewDimension::D2Array),
+        storage::<[f32; 4]>(stage, true),
+        storage::<u32>(stage, true),
+        storage::<Indirect>(stage, true),
+        storage::<Splat>(stage, false),
+        texture_of_integers(stage, TextureViewDimension::D2Array),
+    ];
+    let constants = [("LABELS", f64::from(u8::from(labels)))];
+    ComputeStage::new(device, shaders::SHADE, "main", &slots, &constants)
+}
