@@ -134,8 +134,11 @@ fn head_is_symmetric() {
     }
 }
 
-/// Labels of the builtin volumes that are segmented, and the values of their tissues.
-const TISSUES: [(&str, &[(&str, &[f32])]); 2] = [
+/// A label and the values of its tissue.
+type Tissue = (&'static str, &'static [f32]);
+
+/// The builtin volumes that are segmented.
+const TISSUES: [(&str, &[Tissue]); 2] = [
     (
         "head",
         &[
