@@ -47,6 +47,9 @@ const SHEETS = 4u;
 // Pixels across a tile, and across the widest region.
 const TILE_SIDE = 16u;
 
+// Units of a tile.
+const UNITS = 8u;
+
 // The four sheets of a group at a thread's four pixels: red, green, blue and alpha columns.
 struct Sheets {
     first: mat4x4f,
@@ -388,10 +391,18 @@ fn draw(tile: u32, thread: u32) {
     var sections_rasterized = 0u;
     var bricks_visited = 0u;
     let first_bin = tile * gather.groups;
-    var end = starts[first_bin + part.first_group];
-    for (var at = part.first_group; at < part.end_group && any(region.open != vec4u(0u)); at += 1u) {
+    let reached = gather.reached + tile * UNITS + firstTrailingBit(units);
+    var at = atomicLoad(&gathered.words[reached]);
+    var end = starts[first_bin + at];
+    // A driver may end loops that go on for too long: what would take too many passes is left to the next dispatch.
+    var passes = 0u;
+    for (; at < gather.groups && any(region.open != vec4u(0u)); at += 1u) {
         var cursor = end;
         end = starts[first_bin + at + 1u];
+        if passes + gather.passes_per_group + (end - cursor) * gather.passes_per_brick > gather.most_passes {
+            break;
+        }
+        passes += gather.passes_per_group;
         if cursor == end {
             continue;
         }
@@ -427,6 +438,7 @@ fn draw(tile: u32, thread: u32) {
             while count < lanes {
                 while queued_count == visible_count && (to_visit != 0u || cursor < end) {
                     while to_visit == 0u && cursor < end {
+                        passes += gather.passes_per_fetch;
                         let entry = entries[min(cursor + lane, end - 1u)];
                         to_visit = subgroupBallot(cursor + lane < end && ((entry >> 24u) & units) != 0u).x;
                         fetched = entry & 0xffffffu;
@@ -444,6 +456,7 @@ fn draw(tile: u32, thread: u32) {
                     corner = subgroupShuffle(fetched_corner, next);
                     let present = subgroupShuffle(fetched_present, next);
                     bricks_visited += 1u;
+                    passes += gather.passes_per_visit;
 
                     // Every lane tests a run of the brick's places.
                     let run = BRICK_VOXELS / lanes;
@@ -481,6 +494,7 @@ fn draw(tile: u32, thread: u32) {
                 break;
             }
             has_drawn = true;
+            passes += gather.passes_per_queue;
 
             // Every lane shades its voxel.
             let p = project(queued);
@@ -591,6 +605,8 @@ fn draw(tile: u32, thread: u32) {
     }
     let counts = subgroupAdd(vec2u(voxels_shaded, sections_rasterized));
     if lane == 0u {
+        // Where all is opaque nothing is left to do.
+        atomicStore(&gathered.words[reached], select(at, gather.groups, all(region.open == vec4u(0u))));
         atomicAdd(&gathered.tally.voxels_shaded, counts.x);
         atomicAdd(&gathered.tally.sections_rasterized, counts.y);
         atomicAdd(&gathered.tally.bricks_visited, bricks_visited);
@@ -607,9 +623,14 @@ fn main(
     lanes = subgroup_size;
     lane = subgroup_invocation_id;
     let tile = part.first_tile + unfold(workgroup);
-    let first_bin = tile * gather_uniform.groups;
-    let has_entries = tile < part.end_tile && starts[first_bin + part.first_group] < starts[first_bin + part.end_group];
-    for (var once = has_entries; once; once = false) {
+    var is_left = false;
+    if tile < part.end_tile {
+        let first_bin = tile * gather_uniform.groups;
+        let unit = firstTrailingBit(subgroupOr(1u << (thread / 8u)));
+        let at = atomicLoad(&gathered.words[gather_uniform.reached + tile * UNITS + unit]);
+        is_left = starts[first_bin + at] < starts[first_bin + gather_uniform.groups];
+    }
+    for (; is_left; is_left = false) {
         draw(tile, thread);
     }
 }
