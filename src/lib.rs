@@ -60,6 +60,7 @@ pub mod scene;
 pub mod scene_view;
 pub mod shading;
 pub mod slab;
+pub mod slice_lists;
 pub mod splatting;
 pub mod stats;
 pub mod tile_bins;

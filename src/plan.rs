@@ -21,7 +21,7 @@ pub fn tile_grid(size: [u32; 2]) -> [u32; 2] {
 /// A frame: which bricks every sheet group looks at, in the order the groups are composited.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FramePlan {
-    /// The view.
+    /// The view; that of another frame's plan will do where [`View::has_depths_of`] says so.
     pub view: View,
     /// Sheets of a group.
     pub sheets: u32,
@@ -58,8 +58,8 @@ impl FramePlan {
                 }
                 let touched = |at: u32| {
                     let (middle, half) = brick::bounds(&bricks[at as usize]);
-                    let depths = view.bounds(middle, half)?.depths;
-                    Some((at, groups.touched(depths.start, depths.end)))
+                    let depths = view.depths(middle, half);
+                    (depths.start < depths.end).then(|| (at, groups.touched(depths.start, depths.end)))
                 };
                 let (in_view, touched): (Vec<u32>, Vec<Range<i32>>) = in_memory.into_iter().filter_map(touched).unzip();
                 let mut buckets = Buckets::sort(&touched);

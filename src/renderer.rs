@@ -98,7 +98,8 @@ impl Renderer {
         volume.flush(device, queue)?;
         let old = frame.take();
         let (old_compositing, uniform, control_points, drawing, totals) = old.map_or_else(Default::default, |old| {
-            let PreparedFrame { compositing, uniform, control_points, drawing, totals, .. } = old;
+            let PreparedFrame { compositing, uniform, control_points, drawing, totals, view, .. } = old;
+            let totals = totals.filter(|_| view == seen);
             (Some(compositing), Some(uniform), Some(control_points), Some(drawing), totals)
         });
         let Some(compositing) = compositing.or(old_compositing) else { unreachable!("made where there was none") };

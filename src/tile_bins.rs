@@ -172,7 +172,8 @@ fn place(bricks: &[Brick], view: &View) -> Vec<Placed> {
         .filter_map(|(number, brick)| {
             let (middle, half) = brick::bounds(brick);
             let bounds = view.bounds(middle, half)?;
-            Some(Placed {
+            let is_beyond_near = bounds.depths.start < bounds.depths.end;
+            is_beyond_near.then(|| Placed {
                 number: number as u32,
                 low: bounds.low,
                 high: bounds.high,

@@ -197,26 +197,42 @@ impl View {
     /// The bounds of a box of voxels, given its middle and half its extent in voxel indices; `None` before the near plane.
     pub fn bounds(&self, middle: DVec3, half: DVec3) -> Option<Bounds> {
         let rows = self.screen_from_voxel;
-        let [x, y, depth, from_eye] = rows.map(|row| row.dot(middle.extend(1.0)));
-        let [dx, dy, spread, thickness] = rows.map(|row| row.truncate().abs().dot(half));
+        let [x, y, _, from_eye] = rows.map(|row| row.dot(middle.extend(1.0)));
+        let [dx, dy, _, thickness] = rows.map(|row| row.truncate().abs().dot(half));
         let (low, high) = (DVec2::new(x - dx, y - dy), DVec2::new(x + dx, y + dy));
-        let mut reach = self.reach;
-        let (mut nearest, mut farthest) = (1.0, 1.0);
-        if let Some(Perspective { eye, eye_voxel, is_image_aligned, .. }) = &self.perspective {
-            (nearest, farthest) = ((from_eye - thickness).max(eye.near), from_eye + thickness);
-            if farthest <= eye.near {
-                return None;
-            }
-            if *is_image_aligned {
-                let distance = ((middle - eye_voxel).abs() - half).max(DVec3::ZERO).length();
-                reach = reach.min(self.radius * farthest / distance);
-            }
-        }
-        Some(Bounds {
+        let near = self.perspective.map_or(0.0, |perspective| perspective.eye.near);
+        let (nearest, farthest) = ((from_eye - thickness).max(near), from_eye + thickness);
+        (farthest > near).then(|| Bounds {
             low: (low / nearest).min(low / farthest) + self.middle(),
             high: (high / nearest).max(high / farthest) + self.middle(),
-            depths: depth - spread - reach..depth + spread + reach,
+            depths: self.depths(middle, half),
         })
+    }
+
+    /// The sheet depths that the kernels of a box of voxels reach, given its middle and half its extent in voxel indices; where sheets
+    /// are parallel to the image those beyond the near plane, empty if there are none.
+    pub fn depths(&self, middle: DVec3, half: DVec3) -> Range<f64> {
+        let [_, _, depth, from_eye] = self.screen_from_voxel.map(|row| row.dot(middle.extend(1.0)));
+        let [_, _, spread, thickness] = self.screen_from_voxel.map(|row| row.truncate().abs().dot(half));
+        let Some(Perspective { eye, eye_voxel, is_image_aligned: true, .. }) = &self.perspective else {
+            return depth - spread - self.reach..depth + spread + self.reach;
+        };
+        let distance = ((middle - eye_voxel).abs() - half).max(DVec3::ZERO).length();
+        let reach = self.reach.min(self.radius * (from_eye + thickness).max(0.0) / distance);
+        (depth - spread - reach).max(self.slabs.origin + eye.near)..depth + spread + reach
+    }
+
+    /// Whether the kernels of all voxels reach the same sheet depths in another view: axis-aligned, in all that look along the same
+    /// axis (§3.1).
+    pub fn has_depths_of(&self, other: &Self) -> bool {
+        let eye = |view: &Self| view.perspective.filter(|perspective| perspective.is_image_aligned);
+        let depths = |view: &Self| (view.screen_from_voxel[2], view.slabs, view.reach, view.radius);
+        depths(self) == depths(other) && eye(self) == eye(other)
+    }
+
+    /// Whether sheets are volume slices, the same from many directions.
+    pub fn is_by_slices(&self) -> bool {
+        self.slabs == SLICES
     }
 
     /// Half the screen box, pixels, around the footprints of a radius (grid units) that kernels leave on the screen between two planes

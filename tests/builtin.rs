@@ -134,10 +134,10 @@ fn head_is_symmetric() {
     }
 }
 
-/// A label and the values of its tissue.
+/// What a label means, and the values of its tissue where there is nothing else.
 type Tissue = (&'static str, &'static [f32]);
 
-/// The builtin volumes that are segmented.
+/// The builtin volumes that are segmented, and their tissues by label.
 const TISSUES: [(&str, &[Tissue]); 2] = [
     (
         "head",

@@ -16,7 +16,7 @@ use sheetsplat::headless::Headless;
 use sheetsplat::image::Image;
 use sheetsplat::reference;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::{Compositing, Order, Rasterizer};
+use sheetsplat::splatting::{Compositing, Method, Order, Rasterizer};
 use sheetsplat::transfer_function::{LabelTables, Ramp, TransferFunction};
 use sheetsplat::volume::{Labels, Volume, VolumeError, builtin};
 
@@ -278,6 +278,23 @@ fn labels_in_perspective_are_the_twins() {
     scene.transfer.labels = tables(&labels).collect();
     scene.splatting.compositing = Compositing::Exponential;
     check(&gpu, "perspective", &segmented(&labels, [1.0, 1.0, 1.6]), &scene);
+}
+
+/// The same drawn kernel by kernel, which shades as quads do.
+#[test]
+fn labels_of_every_sample_are_the_twins() {
+    let gpu = gpu();
+    let labels = [0, 1, 2, 3, 4, 5, 6, 7];
+    let volume = segmented(&labels, [1.0, 1.0, 1.6]);
+    let mut scene = scene(61, 53);
+    scene.camera = camera([0.5, 0.7, -0.4], 36.0);
+    scene.transfer = transfer(&[(20.0, [0.9, 0.8, 0.3])], &[(10.0, 0.0), (100.0, 0.3), (200.0, 0.1)]);
+    scene.transfer.labels = tables(&labels).collect();
+    scene.splatting.method = Method::CompositeEverySample;
+    let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
+    let drawn = gpu.render_volume(volume, &scene).unwrap();
+    let error = largest_error(&drawn.image, &expected);
+    assert!(error < 1e-3, "differs by {error}");
 }
 
 /// More voxels than a layer of the texture holds, with labels where the next one begins.

@@ -8,6 +8,7 @@ mod common;
 use std::sync::Arc;
 
 use glam::DVec3;
+use sheetsplat::camera::{Camera, Projection};
 use sheetsplat::classified_volume::Touched;
 use sheetsplat::headless::Headless;
 use sheetsplat::iso_range::ValueSet;
@@ -15,7 +16,7 @@ use sheetsplat::renderer::Renderer;
 use sheetsplat::scene::{Scene, TransferSettings};
 use sheetsplat::scene_view::SceneView;
 use sheetsplat::shading::Light;
-use sheetsplat::splatting::{Compositing, FootprintForm, Rasterizer};
+use sheetsplat::splatting::{Compositing, FootprintForm, Method, Rasterizer};
 use sheetsplat::transfer_function::{Ramp, TransferFunction};
 use sheetsplat::volume::{Volume, builtin};
 
@@ -206,6 +207,33 @@ fn a_change_of_a_label_touches_its_voxels() {
     let mut view = gpu.view(cube, &scene).unwrap();
     assert_eq!(view.set_label_visible(0, false), Touched::default());
     assert_fresh(&gpu, &mut view, "no labels");
+}
+
+/// Axis-aligned slices are the same from many directions (§3.1): every axis is sorted once, and a new view sorts nothing.
+#[test]
+fn a_turn_sorts_no_slices() {
+    let gpu = gpu();
+    let (volume, mut scene) = head();
+    scene.splatting.method = Method::AxisAligned;
+    scene.splatting.rasterizer = Rasterizer::Quads;
+    let mut view = gpu.view(volume, &scene).unwrap();
+    let mut look = |direction: [f64; 3], projection: Option<Projection>| {
+        let camera = camera(direction, 170.0);
+        view.set_camera(Camera { projection: projection.unwrap_or(camera.projection), ..camera });
+        let bucketed = gpu.renderer().prepare(gpu.device(), gpu.queue(), &mut view).unwrap().bucketed;
+        assert_fresh(&gpu, &mut view, &format!("{direction:?}"));
+        bucketed
+    };
+    assert!(look([0.5, 0.8, -0.2], None), "along y for the first time");
+    assert!(!look([0.6, 0.7, 0.1], None), "still along y");
+    let perspective = Projection::Perspective { fov_y: 40.0, distance: None, near: None };
+    assert!(!look([0.6, 0.7, 0.1], Some(perspective)), "with an eye");
+    assert!(look([0.8, 0.5, -0.2], None), "along x");
+    assert!(look([0.1, 0.2, 0.9], None), "along z");
+    assert!(look([0.1, 0.2, -0.9], None), "against z");
+    assert!(!look([-0.3, 0.7, 0.6], None), "y is known");
+    assert!(!look([0.7, 0.3, 0.3], None), "x, too");
+    assert!(!look([0.0, 0.0, -1.0], None), "and -z");
 }
 
 /// What each setter costs: buckets only for cameras, slabs and bricks; voxels only for those that enter and leave.

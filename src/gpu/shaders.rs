@@ -45,6 +45,19 @@ pub const SPLAT_PERSPECTIVE: Shader = shader!(
     "footprints",
     "project",
     "local_ray",
+    "turned_quads"
+);
+/// Draws whole kernels, each composited by itself.
+pub const SAMPLE: Shader = shader!(
+    "sample",
+    "frame",
+    "brick",
+    "splat",
+    "sheets",
+    "footprints",
+    "project",
+    "local_ray",
+    "turned_quads",
     "compositing"
 );
 /// Composites the sheet buffers.
@@ -69,7 +82,7 @@ pub const GATHER: Shader = shader!(
 pub const RESOLVE: Shader = shader!("resolve", "frame", "band");
 
 /// Every shader, in the order of the data flow.
-pub const ALL: [Shader; 12] = [
+pub const ALL: [Shader; 13] = [
     CULL_BRICKS,
     CULL_VOXELS,
     COMPACT,
@@ -78,6 +91,7 @@ pub const ALL: [Shader; 12] = [
     CLEAR,
     SPLAT,
     SPLAT_PERSPECTIVE,
+    SAMPLE,
     COMPOSITE,
     OCCLUDE,
     GATHER,

@@ -7,7 +7,8 @@ use wgpu::{
     RenderPipeline, TextureFormat, TextureView,
 };
 
-use super::splat::{added_to, constants, pipeline, quad_indices, splat_slots};
+use super::splat::{added_to, pipeline, quad_indices, splat_slots};
+use crate::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
 use crate::gpu::bindings::{at_offset, bind, layout};
 use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::layout::{Group, QUADS};
@@ -69,8 +70,14 @@ impl Sample {
                 Compositing::Linear | Compositing::Exponential => wgpu::BlendFactor::OneMinusSrcAlpha,
                 Compositing::Xray => wgpu::BlendFactor::One,
             });
-            let shader = (shaders::SPLAT_PERSPECTIVE, "fragment_sample");
-            pipeline(device, shader, &self.pipeline_layout, self.format, 1, Some(over), &constants(mode.form, 1))
+            let constants = [
+                ("SECTIONS", f64::from(u8::from(mode.form == FootprintForm::Sections))),
+                ("SHEETS", 1.0),
+                ("PLANE_TEXELS", f64::from(SUMMED_AREA_SIZE)),
+                ("LAYERS", f64::from(SUMMED_AREA_LAYERS)),
+            ];
+            let shader = (shaders::SAMPLE, ["vertex", "fragment"]);
+            pipeline(device, shader, &self.pipeline_layout, self.format, 1, Some(over), &constants)
         });
         let SampleBuffers { frame, group, splats, order, args, footprints } = buffers;
         let resources = [

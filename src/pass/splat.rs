@@ -52,7 +52,15 @@ impl Splat {
         let (splat_layout, splat_pipeline_layout) = layout(device, "sheetsplat.splat", &splat_slots());
         let entry = format!("fragment_{sheets}");
         Self {
-            clear: pipeline(device, (shaders::CLEAR, &entry), &clear_pipeline_layout, format, sheets, None, &[]),
+            clear: pipeline(
+                device,
+                (shaders::CLEAR, ["vertex", &entry]),
+                &clear_pipeline_layout,
+                format,
+                sheets,
+                None,
+                &[],
+            ),
             clear_layout,
             layout: splat_layout,
             pipeline_layout: splat_pipeline_layout,
@@ -69,9 +77,14 @@ impl Splat {
             let additive = Some(added_to(wgpu::BlendFactor::One));
             let shader = if mode.perspective { shaders::SPLAT_PERSPECTIVE } else { shaders::SPLAT };
             let entry = format!("fragment_{}", self.sheets);
-            let constants = constants(mode.form, self.sheets);
+            let constants = [
+                ("SECTIONS", f64::from(u8::from(mode.form == FootprintForm::Sections))),
+                ("SHEETS", f64::from(self.sheets)),
+                ("PLANE_TEXELS", f64::from(SUMMED_AREA_SIZE)),
+                ("LAYERS", f64::from(SUMMED_AREA_LAYERS)),
+            ];
             let layout = &self.pipeline_layout;
-            pipeline(device, (shader, &entry), layout, self.format, self.sheets, additive, &constants)
+            pipeline(device, (shader, ["vertex", &entry]), layout, self.format, self.sheets, additive, &constants)
         })
     }
 
@@ -164,16 +177,6 @@ pub(super) fn splat_slots() -> [Slot; 6] {
     ]
 }
 
-/// Their constants.
-pub(super) fn constants(form: FootprintForm, sheets: u32) -> [(&'static str, f64); 4] {
-    [
-        ("SECTIONS", f64::from(u8::from(form == FootprintForm::Sections))),
-        ("SHEETS", f64::from(sheets)),
-        ("PLANE_TEXELS", f64::from(SUMMED_AREA_SIZE)),
-        ("LAYERS", f64::from(SUMMED_AREA_LAYERS)),
-    ]
-}
-
 /// Blending that adds what is drawn to a part of what is there.
 pub(super) fn added_to(there: wgpu::BlendFactor) -> wgpu::BlendState {
     let component = wgpu::BlendComponent {
@@ -197,7 +200,7 @@ pub(super) fn quad_indices(device: &Device) -> Buffer {
 /// A pipeline that draws quads into all sheets of a group.
 pub(super) fn pipeline(
     device: &Device,
-    (shader, entry): (Shader, &str),
+    (shader, [vertex, fragment]): (Shader, [&str; 2]),
     layout: &wgpu::PipelineLayout,
     format: TextureFormat,
     sheets: u32,
@@ -214,7 +217,7 @@ pub(super) fn pipeline(
         layout: Some(layout),
         vertex: wgpu::VertexState {
             module: &module,
-            entry_point: Some("vertex"),
+            entry_point: Some(vertex),
             compilation_options: compilation_options.clone(),
             buffers: &[],
         },
@@ -226,7 +229,7 @@ pub(super) fn pipeline(
         multisample: wgpu::MultisampleState::default(),
         fragment: Some(wgpu::FragmentState {
             module: &module,
-            entry_point: Some(entry),
+            entry_point: Some(fragment),
             compilation_options,
             targets: &vec![target; sheets as usize],
         }),

@@ -37,6 +37,8 @@ pub(crate) struct QuadRasterizer {
 #[derive(Debug)]
 pub(crate) struct QuadFrame {
     planned: Planned,
+    /// Axis-aligned, one for each of the other axes that views have looked along (§3.1): turning back sorts nothing.
+    other_axes: Vec<Planned>,
     targets: Targets,
     footprints: Footprints,
     groups: Buffer,
@@ -90,12 +92,18 @@ impl QuadRasterizer {
         let old = Old::of(previous);
         let targets = old.targets.filter(|old| old.size == view.size);
         let targets = targets.unwrap_or_else(|| Targets::new(device, view.size, self.sheet_format, self.sheets));
-        let is_current =
-            |old: &Planned| old.plan.view == *view && (old.order, old.revision) == (splatting.order, volume.revision);
-        let (planned, is_new) = match old.planned.filter(is_current) {
-            Some(planned) => (planned, false),
-            None => (Planned::new(device, volume, *view, self.sheets, splatting.order), true),
+        let mut other_axes = old.planned;
+        other_axes.retain(|old| {
+            (old.order, old.revision) == (splatting.order, volume.revision)
+                && (old.plan.view.has_depths_of(view) || old.plan.view.is_by_slices())
+        });
+        let current = other_axes.iter().position(|old| old.plan.view.has_depths_of(view));
+        let is_new = current.is_none();
+        let mut planned = match current {
+            Some(at) => other_axes.swap_remove(at),
+            None => Planned::new(device, volume, *view, self.sheets, splatting.order),
         };
+        planned.plan.view = *view;
         let plan = &planned.plan;
         let footprints = Footprints::renewed(old.footprints, given);
         let alignment = device.limits().min_uniform_buffer_offset_alignment as usize;
@@ -139,6 +147,7 @@ impl QuadRasterizer {
             sheet_views: (0..self.sheets).map(|layer| targets.sheet_view(layer)).collect(),
             group_stride: group_stride as u32,
             planned,
+            other_axes,
             targets,
             footprints,
             groups,
@@ -207,7 +216,7 @@ impl QuadFrame {
     pub(crate) fn gpu_bytes(&self) -> u64 {
         let lists: u64 = self.lists.iter().map(|list| list.cull.gpu_bytes()).sum();
         let TileLists { composited, occluding, counts, .. } = &self.tile_lists;
-        let orders = self.planned.orders.iter();
+        let orders = self.other_axes.iter().chain([&self.planned]).flat_map(|planned| &planned.orders);
         let buffers: u64 = [&self.groups, &self.culled, composited, occluding, counts]
             .into_iter()
             .chain(orders)
@@ -243,7 +252,7 @@ impl Planned {
 /// What of the previous frame may be taken over.
 #[derive(Default)]
 struct Old {
-    planned: Option<Planned>,
+    planned: Vec<Planned>,
     targets: Option<Targets>,
     footprints: Option<Footprints>,
     groups: Option<Buffer>,
@@ -256,7 +265,7 @@ impl Old {
     fn of(frame: Option<QuadFrame>) -> Self {
         let Some(frame) = frame else { return Self::default() };
         Self {
-            planned: Some(frame.planned),
+            planned: frame.other_axes.into_iter().chain([frame.planned]).collect(),
             targets: Some(frame.targets),
             footprints: Some(frame.footprints),
             groups: Some(frame.groups),

@@ -200,7 +200,6 @@ impl Sorted {
         // Depths that differ by less than rounding errors may are equal.
         let depth =
             |voxel: UVec3| ((voxel.as_dvec3() - grid.center()).dot(along_w) * f64::from(1 << 20)).round() as i64;
-        let index = |voxel: UVec3| voxel.x + grid.dims.x * (voxel.y + grid.dims.y * voxel.z);
         let half_box = view.half_box(kernel.support(), PLANES);
         let size = DVec2::from(view.size.map(f64::from));
         let is_on_screen = |voxel: UVec3| {
@@ -213,7 +212,7 @@ impl Sorted {
             .flat_map_iter(|(number, brick)| {
                 brick::voxels(brick)
                     .filter(|&(_, voxel)| is_on_screen(voxel))
-                    .map(move |(slot, voxel)| (depth(voxel), index(voxel), number as u32 * BRICK_VOXELS + slot))
+                    .map(move |(slot, voxel)| (depth(voxel), grid.index_of(voxel), number as u32 * BRICK_VOXELS + slot))
             })
             .collect();
         voxels.par_sort_unstable();

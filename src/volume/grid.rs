@@ -18,6 +18,11 @@ impl Grid {
         UVec3::new(x, rest % self.dims.y, rest / self.dims.y)
     }
 
+    /// A voxel's position in memory.
+    pub fn index_of(&self, voxel: UVec3) -> u32 {
+        voxel.x + self.dims.x * (voxel.y + self.dims.y * voxel.z)
+    }
+
     /// `min(sx, sy, sz)`: the length, in world units, that opacities and slab widths are given in (SPEC §2).
     pub fn unit(&self) -> f64 {
         self.spacing.min_element()

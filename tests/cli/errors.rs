@@ -107,13 +107,6 @@ fn bad_labels_are_2() {
 }
 
 #[test]
-fn what_is_not_implemented_is_2() {
-    let method = "composite-every-sample";
-    let words = ["good.nrrd", "splatting.method", method, "image-aligned", "axis-aligned"];
-    assert_fails(2, &format!("render good.nrrd -o out.png --set splatting.method={method}"), &words);
-}
-
-#[test]
 fn an_image_beyond_the_texture_limit_is_2() {
     let render = |set: &str, words: &[&str]| {
         assert_fails(2, &format!("render good.nrrd -o out.png {set}"), words);
