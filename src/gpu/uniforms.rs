@@ -113,9 +113,10 @@ pub fn gather(view: &View, kernel: &Kernel, splatting: &Splatting, bins: &TileBi
     }
 }
 
-/// How much of the kernel's ball, from the middle out, the polynomial for chords is fitted to. Farther out the Gaussian is so small
-/// that its errors do not show: they stay below 3e-6 of the kernel's peak.
-const CHORD_SPAN: f64 = 0.6;
+/// How much of the kernel's ball, from the middle out, the polynomial for chords is fitted to: where chords are long they cut sections
+/// that are small. Farther out they cut large ones only, and the Gaussian is small; the errors stay below 5e-6 of a whole footprint's
+/// peak.
+const CHORD_SPAN: f64 = 0.45;
 
 /// The most groups of the tile rasterizer that a kernel reaches into.
 fn groups_per_kernel(view: &View) -> u32 {
