@@ -9,13 +9,12 @@ use sheetsplat::gpu::uniforms::{self, Ramps};
 use sheetsplat::gpu::volume_texture::VolumeTexture;
 use sheetsplat::headless::Headless;
 use sheetsplat::pass::gather::{Gather, GatherBuffers, GatherMode};
-use sheetsplat::plan::tile_grid;
 use sheetsplat::reference;
 use sheetsplat::reference::footprint::Footprint;
 use sheetsplat::scene::{Scene, TransferSettings};
 use sheetsplat::shading::Light;
 use sheetsplat::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order};
-use sheetsplat::tile_bins::{SHEETS, SIDE, TileBins};
+use sheetsplat::tile_bins::{Passes, SHEETS, SIDE, TileBins, UNITS};
 use sheetsplat::transfer_function::{Ramp, TransferFunction};
 use sheetsplat::volume::{Grid, Volume};
 use sheetsplat::wgpu::BufferUsages;
@@ -72,13 +71,10 @@ impl<'a> Fixture<'a> {
             (0..size[1]).step_by(band_rows as usize).map(|first| (first, band_rows.min(size[1] - first))).collect();
         let parts: Vec<Part> = bands
             .iter()
-            .flat_map(|&(first_row, rows)| bins.runs.iter().map(move |run| (first_row, rows, run)))
-            .map(|(first_row, rows, run)| Part {
+            .map(|&(first_row, rows)| Part {
                 first_row,
                 first_tile: first_row / SIDE * columns,
                 end_tile: (first_row / SIDE + rows.div_ceil(SIDE)) * columns,
-                first_group: run.start,
-                end_group: run.end,
             })
             .collect();
         let accs: Vec<_> = bands
@@ -90,8 +86,7 @@ impl<'a> Fixture<'a> {
             })
             .collect();
         let storage = |words: &[u32]| init(device, words, BufferUsages::STORAGE);
-        let [tile_columns, tile_rows] = tile_grid(size);
-        let words = gather.composited + (tile_columns * tile_rows * bins.groups).div_ceil(32);
+        let words = gather.reached + bins.tiles * UNITS;
         let gathered = storage(&vec![0; size_of::<Gathered>() / 4 + words as usize]);
         let (parts_buffer, stride) = at_offsets(device, &parts);
         let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|half| half.as_vec2().to_array()).collect();
@@ -113,7 +108,9 @@ impl<'a> Fixture<'a> {
         compute(gpu, |pass| {
             for (at, part) in parts.iter().enumerate() {
                 let tiles = part.end_tile - part.first_tile;
-                stage.record(pass, mode, &groups[at / bins.runs.len()], at as u32 * stride, tiles);
+                for _ in 0..bins.dispatches {
+                    stage.record(pass, mode, &groups[at], at as u32 * stride, tiles);
+                }
             }
         });
         let acc = accs.iter().flat_map(|acc| pixels(&contents::<u8>(gpu, acc))).collect();
@@ -199,11 +196,13 @@ fn sections() {
                 let tiles = view.size.map(|pixels| pixels.div_ceil(SIDE)).iter().product::<u32>();
                 let bins = TileBins {
                     first_slab: first,
+                    tiles,
                     groups: 1,
                     starts: (0..=tiles).collect(),
                     entries: vec![0xff00_0000; tiles as usize],
                     half_boxes: vec![view.half_box(kernel.support(), 0.0..1.0)],
-                    runs: std::iter::once(0..1).collect(),
+                    passes: fixture.bins().passes,
+                    dispatches: 1,
                 };
                 let drawn = fixture.draw(&bins, Some(near), &fixture.empty(), u32::MAX);
                 let group = first..first + SHEETS as i32;
@@ -326,7 +325,7 @@ fn frames() {
 
 /// However groups are shared among dispatches, and rows among bindings: the same work, the same bytes.
 #[test]
-fn runs_and_bands_change_no_bit() {
+fn dispatches_and_bands_change_no_bit() {
     let (gpu, stage) = (gpu(), Gather::default());
     let mut random = Random(43);
     for order in [Order::FrontToBack, Order::BackToFront] {
@@ -335,14 +334,21 @@ fn runs_and_bands_change_no_bit() {
         (scene.splatting.order, scene.splatting.opacity_threshold) = (order, 0.8);
         let fixture = Fixture::new(&gpu, &stage, scene, volume);
         let bins = fixture.bins();
-        assert!(bins.groups > 8 && bins.runs.len() == 1, "{:?}", bins.runs);
+        assert!(bins.groups > 8 && bins.dispatches == 1, "{}", bins.dispatches);
         let whole = fixture.draw(&bins, None, &fixture.empty(), u32::MAX);
         assert!(whole.acc.iter().any(|pixel| pixel.w > 0.9));
         assert!(whole.tally.sections_rasterized > 10_000, "{:?}", whole.tally);
-        let middle = bins.groups / 2;
-        let single = (0..bins.groups).map(|group| group..group + 1).collect();
-        for (runs, rows) in [(vec![0..middle, middle..bins.groups], u32::MAX), (single, 32), (bins.runs.clone(), 64)] {
-            let parts = fixture.draw(&TileBins { runs, ..bins.clone() }, None, &fixture.empty(), rows);
+        // What no group exceeds.
+        let bricks = bins.starts.windows(2).map(|group| group[1] - group[0]).max().unwrap();
+        let one_group = bins.passes.per_group + bricks * bins.passes.per_brick();
+        // Enough for all, if each takes one group.
+        let dispatches = bins.groups;
+        for (most, rows) in [(3 * one_group, u32::MAX), (one_group, 32), (bins.passes.most, 64)] {
+            let passes = Passes { most, ..bins.passes };
+            let first = TileBins { passes, dispatches: 1, ..bins.clone() };
+            let is_cut = fixture.draw(&first, None, &fixture.empty(), rows).acc != whole.acc;
+            assert_eq!(is_cut, most < bins.passes.most, "one dispatch of {most} passes");
+            let parts = fixture.draw(&TileBins { dispatches, ..first }, None, &fixture.empty(), rows);
             // What is behind opaque pixels alone is not even fetched, or fetched in another dispatch.
             let tally = Tally { bricks_visited: whole.tally.bricks_visited, ..parts.tally };
             assert!(Drawn { tally, ..parts } == whole, "{order:?}, {rows} rows");
