@@ -343,7 +343,7 @@ fn dispatches_and_bands_change_no_bit() {
         let one_group = bins.passes.per_group + bricks * bins.passes.per_brick();
         // Enough for all, if each takes one group.
         let dispatches = bins.groups;
-        for (most, rows) in [(3 * one_group, u32::MAX), (one_group, 32), (bins.passes.most, 64)] {
+        for (most, rows) in [(one_group + 1000, u32::MAX), (one_group, 32), (bins.passes.most, 64)] {
             let passes = Passes { most, ..bins.passes };
             let first = TileBins { passes, dispatches: 1, ..bins.clone() };
             let is_cut = fixture.draw(&first, None, &fixture.empty(), rows).acc != whole.acc;
