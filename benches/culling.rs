@@ -9,13 +9,10 @@
 mod common;
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use sheetsplat::camera::Projection;
 use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::scene::Scene;
-use sheetsplat::scene_view::SceneView;
-use sheetsplat::stats::Stats;
 
 const SIDE_ON: &str = "builtin:nerve, side-on";
 
@@ -35,7 +32,7 @@ fn main() {
         let mut frame = |on: bool| {
             (scene.splatting.culling, scene.splatting.tiles) = (on, on);
             view.set_splatting(scene.splatting);
-            timed(&headless, &mut view)
+            common::timed(&headless, &mut view)
         };
         // The first frame compiles shaders.
         frame(true);
@@ -44,8 +41,8 @@ fn main() {
             without.push(frame(false));
             with.push(frame(true));
         }
-        let (all, drawn) = (without[0].1.counts, with[0].1.counts);
-        let (slow, fast) = (median(&without), median(&with));
+        let ((slow, all), (fast, stats)) = (common::median(without), common::median(with));
+        let (all, drawn) = (all.counts, stats.counts);
         println!(
             "| {} | {slow:.0} | {:.2} | {fast:.0} | {:.1} | {:.1} % | {} |",
             common::label(name),
@@ -54,23 +51,11 @@ fn main() {
             100.0 * drawn.sections_rasterized as f64 / drawn.sections_total as f64,
             drawn.quads,
         );
-        last = with.pop();
+        last = Some(stats);
     }
-    if let Some((_, stats)) = last {
+    if let Some(stats) = last {
         println!("\n{pairs} pairs; {} ({})", stats.adapter, stats.driver);
     }
-}
-
-fn timed(headless: &Headless, view: &mut SceneView) -> (f64, Stats) {
-    let start = Instant::now();
-    let stats = headless.draw(view).unwrap().stats;
-    (start.elapsed().as_secs_f64() * 1e3, stats)
-}
-
-fn median(frames: &[(f64, Stats)]) -> f64 {
-    let mut times: Vec<f64> = frames.iter().map(|frame| frame.0).collect();
-    times.sort_by(f64::total_cmp);
-    times[times.len() / 2]
 }
 
 fn open(name: &str) -> Scene {

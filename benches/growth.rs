@@ -7,8 +7,6 @@
 #[expect(dead_code, reason = "not every bench needs all of it")]
 mod common;
 
-use std::time::Instant;
-
 use sheetsplat::headless::{Headless, HeadlessOptions};
 
 fn main() {
@@ -25,11 +23,10 @@ fn main() {
         for (view, times) in views.iter_mut().zip(&mut times) {
             // Another camera each time, so that buckets are part of the frame.
             view.turn(1.0);
-            let start = Instant::now();
-            let stats = headless.draw(view).unwrap().stats;
+            let (ms, stats) = common::timed(&headless, view);
             // The first round compiles shaders and allocates.
             if round > 0 {
-                times.push((start.elapsed().as_secs_f64() * 1e3, stats.counts));
+                times.push((ms, stats.counts));
             }
             last = Some(stats);
         }
@@ -37,9 +34,8 @@ fn main() {
     println!("| volume | voxels in range | sections drawn | quads | ms per frame | of the one before |");
     println!("|---|---|---|---|---|---|");
     let mut before: Option<f64> = None;
-    for (name, times) in names.iter().zip(&mut times) {
-        times.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let (ms, counts) = times[times.len() / 2];
+    for (name, times) in names.iter().zip(times) {
+        let (ms, counts) = common::median(times);
         let ratio = before.map_or(String::new(), |before| format!("{:.2}", ms / before));
         println!(
             "| {name} | {} | {:.1} % | {} | {ms:.0} | {ratio} |",

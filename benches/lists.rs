@@ -6,6 +6,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a bench")]
 
+#[expect(dead_code, reason = "not every bench needs all of it")]
 mod common;
 
 use std::path::Path;
@@ -76,7 +77,7 @@ fn bench(headless: &Headless, scene: &Scene, name: &str, pairs: usize) {
 
     let transfer = scene.transfer.resolve(&volume);
     let set = ValueSet::of(&transfer);
-    let search = median((0..pairs).map(|_| {
+    let search = common::median((0..pairs).map(|_| {
         let start = Instant::now();
         let found = list.within(volume.values(), &set).len();
         (milliseconds(start), found as u64)
@@ -87,7 +88,7 @@ fn bench(headless: &Headless, scene: &Scene, name: &str, pairs: usize) {
     let start = Instant::now();
     let slices = SliceLists::new(volume.values(), volume.grid(), 2);
     let sort_ms = milliseconds(start);
-    let search = median((0..pairs).map(|_| {
+    let search = common::median((0..pairs).map(|_| {
         let start = Instant::now();
         let of_slice = |slice| slices.within(volume.values(), slice, &set).map(<[u32]>::len).sum::<usize>();
         let found: usize = (0..slices.len()).map(of_slice).sum();
@@ -120,7 +121,7 @@ fn bench(headless: &Headless, scene: &Scene, name: &str, pairs: usize) {
             prepare(headless, &mut headless.view(volume.clone(), scene).unwrap());
             anew.push((milliseconds(start), 0));
         }
-        let (changed, anew) = (median(changed.into_iter()).0, median(anew.into_iter()).0);
+        let (changed, anew) = (common::median(changed).0, common::median(anew).0);
         let rebuilt = if touched.rebuilt { " (rebuilt)" } else { "" };
         println!(
             "| {what}{rebuilt} | {} | {} | {changed:.2} | {anew:.0} | {:.0} |",
@@ -140,12 +141,6 @@ fn prepare(headless: &Headless, view: &mut SceneView) {
 
 fn milliseconds(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
-}
-
-fn median(times: impl Iterator<Item = (f64, u64)>) -> (f64, u64) {
-    let mut times: Vec<(f64, u64)> = times.collect();
-    times.sort_by(|a, b| a.0.total_cmp(&b.0));
-    times[times.len() / 2]
 }
 
 fn default_scenes() -> Vec<String> {

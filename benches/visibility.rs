@@ -6,6 +6,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a bench")]
 
+#[expect(dead_code, reason = "not every bench needs all of it")]
 mod common;
 
 use sheetsplat::reference;

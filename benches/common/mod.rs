@@ -1,8 +1,12 @@
-//! What the benches share: their arguments, and scenes by name.
+//! What the benches share: their arguments, scenes by name, times and medians.
 
 use std::path::Path;
+use std::time::Instant;
 
+use sheetsplat::headless::Headless;
 use sheetsplat::scene::{Scene, VolumeSource};
+use sheetsplat::scene_view::SceneView;
+use sheetsplat::stats::Stats;
 
 /// A number that may come first, and the names after it.
 pub(crate) fn arguments(default: usize) -> (usize, Vec<String>) {
@@ -26,4 +30,18 @@ pub(crate) fn open(name: &str) -> Scene {
 /// What a table calls it.
 pub(crate) fn label(name: &str) -> String {
     Path::new(name).file_stem().unwrap().display().to_string()
+}
+
+/// Draws a frame: the milliseconds from planning to read-back, and what it consisted of.
+pub(crate) fn timed(headless: &Headless, view: &mut SceneView) -> (f64, Stats) {
+    let start = Instant::now();
+    let stats = headless.draw(view).unwrap().stats;
+    (start.elapsed().as_secs_f64() * 1e3, stats)
+}
+
+/// Of some runs the one with the median time.
+pub(crate) fn median<T>(runs: impl IntoIterator<Item = (f64, T)>) -> (f64, T) {
+    let mut runs: Vec<(f64, T)> = runs.into_iter().collect();
+    runs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    runs.swap_remove(runs.len() / 2)
 }
