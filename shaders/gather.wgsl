@@ -22,6 +22,8 @@
 // Of every group, nearest first, half the screen box around its footprints, pixels.
 @group(0) @binding(10) var<storage, read> half_boxes: array<vec2f>;
 @group(0) @binding(11) var labels: texture_2d_array<u32>;
+// The next dispatch: nothing, if no subgroup says otherwise.
+@group(0) @binding(12) var<storage, read_write> next: Indirect;
 
 // `frame.compositing` and `frame.order`.
 override COMPOSITING: u32 = 0u;
@@ -333,7 +335,11 @@ fn draw(tile: u32, thread: u32) {
     let counts = subgroupAdd(vec2u(voxels_shaded, sections_rasterized));
     if lane == 0u {
         // Where all is opaque nothing is left to do.
-        atomicStore(&gathered.words[reached], select(at, gather.groups, all(region.open == vec4u(0u))));
+        let is_done = at == gather.groups || all(region.open == vec4u(0u));
+        atomicStore(&gathered.words[reached], select(at, gather.groups, is_done));
+        if !is_done {
+            next = indirect(part.end_tile - part.first_tile);
+        }
         atomicAdd(&gathered.tally.voxels_shaded, counts.x);
         atomicAdd(&gathered.tally.sections_rasterized, counts.y);
         atomicAdd(&gathered.tally.bricks_visited, bricks_visited);

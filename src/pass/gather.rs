@@ -2,10 +2,13 @@
 
 use std::sync::OnceLock;
 
-use wgpu::{BindGroup, Buffer, ComputePass, Device, ShaderStages, TextureView, TextureViewDimension};
+use wgpu::{
+    BindGroup, Buffer, BufferDescriptor, BufferUsages, CommandEncoder, ComputePass, Device, ShaderStages, TextureView,
+    TextureViewDimension,
+};
 
 use crate::gpu::bindings::{ComputeStage, at_offset, storage, texture, texture_of_integers, uniform};
-use crate::gpu::layout::{Brick, Frame, Gather as GatherUniform, Gathered, Part};
+use crate::gpu::layout::{Brick, Frame, Gather as GatherUniform, Gathered, Indirect, Part};
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
 use crate::splatting::{Compositing, Economies, FootprintBox, Order, Splatting};
@@ -88,6 +91,7 @@ impl Gather {
                 storage::<Gathered>(stage, false),
                 storage::<[f32; 2]>(stage, true),
                 texture_of_integers(stage, TextureViewDimension::D2Array),
+                storage::<Indirect>(stage, false),
             ];
             let constants = [
                 ("COMPOSITING", f64::from(mode.compositing as u32)),
@@ -101,8 +105,34 @@ impl Gather {
         })
     }
 
-    /// Binds a band of the compositing buffer, `[vec4f]`, for one mode.
-    pub fn bind(&self, device: &Device, mode: GatherMode, buffers: GatherBuffers<'_>, acc: &Buffer) -> BindGroup {
+    /// Binds a band of the compositing buffer, `[vec4f]`, for one mode and so many dispatches.
+    pub fn bind(
+        &self,
+        device: &Device,
+        mode: GatherMode,
+        buffers: GatherBuffers<'_>,
+        acc: &Buffer,
+        dispatches: u32,
+    ) -> GatherBand {
+        let descriptor = BufferDescriptor {
+            label: Some("sheetsplat.next"),
+            size: size_of::<Indirect>() as u64,
+            usage: BufferUsages::STORAGE | BufferUsages::INDIRECT | BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        };
+        let next: Vec<Buffer> = (0..dispatches).map(|_| device.create_buffer(&descriptor)).collect();
+        let groups = next.iter().map(|next| self.bind_one(device, mode, buffers, acc, next)).collect();
+        GatherBand { mode, groups, next }
+    }
+
+    fn bind_one(
+        &self,
+        device: &Device,
+        mode: GatherMode,
+        buffers: GatherBuffers<'_>,
+        acc: &Buffer,
+        next: &Buffer,
+    ) -> BindGroup {
         let GatherBuffers { frame, gather, parts, bricks, starts, entries, control_points, values, labels, .. } =
             buffers;
         let labels = labels.unwrap_or_else(|| &self.no_labels.get_or_init(|| VolumeTexture::no_labels(device)).view);
@@ -120,14 +150,39 @@ impl Gather {
             whole(buffers.gathered),
             whole(buffers.half_boxes),
             wgpu::BindingResource::TextureView(labels),
+            whole(next),
         ];
         self.compiled(device, mode).bind(device, &resources)
     }
 
-    /// Draws so many tiles of the part at `offset`, in the mode that the group was bound for.
-    pub fn record(&self, pass: &mut ComputePass<'_>, mode: GatherMode, group: &BindGroup, offset: u32, tiles: u32) {
-        if let Some(stage) = self.stage(mode).get() {
-            stage.dispatch(pass, group, &[offset], tiles);
+    /// Draws so many tiles of the part at `offset`. The band must have been cleared.
+    pub fn record(&self, pass: &mut ComputePass<'_>, band: &GatherBand, offset: u32, tiles: u32) {
+        let (Some(stage), Some(first)) = (self.stage(band.mode).get(), band.groups.first()) else { return };
+        stage.dispatch(pass, first, &[offset], tiles);
+        for (group, args) in band.groups[1..].iter().zip(&band.next) {
+            stage.dispatch_indirect(pass, group, &[offset], args);
         }
+    }
+}
+
+/// A band, bound.
+#[derive(Debug)]
+pub struct GatherBand {
+    mode: GatherMode,
+    /// One for every dispatch.
+    groups: Vec<BindGroup>,
+    /// [`Indirect`]: what each leaves to the next, all tiles or nothing.
+    next: Vec<Buffer>,
+}
+
+impl GatherBand {
+    /// Makes it ready for a frame.
+    pub fn clear(&self, encoder: &mut CommandEncoder) {
+        self.next.iter().for_each(|args| encoder.clear_buffer(args, 0, None));
+    }
+
+    /// Bytes of GPU memory.
+    pub fn gpu_bytes(&self) -> u64 {
+        self.next.iter().map(Buffer::size).sum()
     }
 }

@@ -1,6 +1,6 @@
 //! The tile rasterizer: one compute stage draws every tile front to back, its sheets in registers.
 
-use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Features};
+use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Features};
 
 use super::Given;
 use crate::error::RenderError;
@@ -8,7 +8,7 @@ use crate::gpu::bindings::grown;
 use crate::gpu::layout::{Brick, Gathered, Part, Tally};
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
-use crate::pass::gather::{Gather, GatherBuffers, GatherMode};
+use crate::pass::gather::{Gather, GatherBand, GatherBuffers, GatherMode};
 use crate::splatting::{FootprintForm, Method, Order, Splatting};
 use crate::stats::GroupSlabs;
 use crate::tile_bins::{SHEETS, SIDE, TileBins, UNITS};
@@ -27,7 +27,6 @@ pub(crate) struct TileRasterizer {
 #[derive(Debug)]
 pub(crate) struct TileFrame {
     binned: Binned,
-    mode: GatherMode,
     uniform: Buffer,
     parts: Buffer,
     /// All bricks in one buffer, where the volume's own are in several.
@@ -38,7 +37,7 @@ pub(crate) struct TileFrame {
     half_boxes: Buffer,
     /// For every band of the compositing buffer its number, and the offset of its part and its tiles.
     dispatches: Vec<(usize, u32, u32)>,
-    bands: Vec<BindGroup>,
+    bands: Vec<GatherBand>,
 }
 
 /// What only changes with the view or the bricks.
@@ -176,11 +175,10 @@ impl TileRasterizer {
             gathered: &gathered,
             half_boxes: &half_boxes,
         };
-        let bands = given.compositing.bands.iter().map(|band| self.gather.bind(device, mode, buffers, &band.acc));
-        let bands = bands.collect();
+        let bind = |acc| self.gather.bind(device, mode, buffers, acc, bins.dispatches);
+        let bands = given.compositing.bands.iter().map(|band| bind(&band.acc)).collect();
         let frame = TileFrame {
             binned,
-            mode,
             uniform,
             parts,
             bricks: own_bricks,
@@ -197,11 +195,10 @@ impl TileRasterizer {
     /// Draws the frame.
     pub(crate) fn record(&self, encoder: &mut CommandEncoder, timer: &mut Option<Timer>, frame: &TileFrame) {
         encoder.clear_buffer(&frame.gathered, 0, None);
+        frame.bands.iter().for_each(|band| band.clear(encoder));
         let mut pass = encoder.begin_compute_pass(&super::compute("sheetsplat.gather", timer, "gather"));
         for &(band, offset, tiles) in &frame.dispatches {
-            for _ in 0..frame.binned.bins.dispatches {
-                self.gather.record(&mut pass, frame.mode, &frame.bands[band], offset, tiles);
-            }
+            self.gather.record(&mut pass, &frame.bands[band], offset, tiles);
         }
     }
 }
@@ -230,7 +227,9 @@ impl TileFrame {
     /// Bytes of GPU memory.
     pub(crate) fn gpu_bytes(&self) -> u64 {
         let Self { uniform, parts, starts, entries, gathered, half_boxes, bricks, .. } = self;
-        [uniform, parts, starts, entries, gathered, half_boxes].into_iter().chain(bricks).map(Buffer::size).sum()
+        let bands: u64 = self.bands.iter().map(GatherBand::gpu_bytes).sum();
+        let buffers = [uniform, parts, starts, entries, gathered, half_boxes].into_iter().chain(bricks);
+        bands + buffers.map(Buffer::size).sum::<u64>()
     }
 }
 

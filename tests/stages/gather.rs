@@ -104,13 +104,11 @@ impl<'a> Fixture<'a> {
             gathered: &gathered,
             half_boxes: &init(device, &half_boxes, BufferUsages::STORAGE),
         };
-        let groups: Vec<_> = accs.iter().map(|acc| stage.bind(device, mode, buffers, acc)).collect();
+        let bound: Vec<_> = accs.iter().map(|acc| stage.bind(device, mode, buffers, acc, bins.dispatches)).collect();
         compute(gpu, |pass| {
             for (at, part) in parts.iter().enumerate() {
                 let tiles = part.end_tile - part.first_tile;
-                for _ in 0..bins.dispatches {
-                    stage.record(pass, mode, &groups[at], at as u32 * stride, tiles);
-                }
+                stage.record(pass, &bound[at], at as u32 * stride, tiles);
             }
         });
         let acc = accs.iter().flat_map(|acc| pixels(&contents::<u8>(gpu, acc))).collect();
