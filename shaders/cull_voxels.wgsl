@@ -71,9 +71,12 @@ fn main(@builtin(local_invocation_index) slot: u32, @builtin(workgroup_id) workg
         let depths = (overlapped(p, error, frame.near > 0.0) - group.near) / frame.slab_width;
         let first_sheet = max(floor(depths.x), 0.0);
         let end_sheet = min(ceil(depths.y), f32(SHEETS));
-        if !on_screen || group.culling != 0u && is_hidden(center_px) {
+        let is_drawn = on_screen && !(group.culling != 0u && is_hidden(center_px));
+        // Front to back boxes only shrink: what is off the screen or hidden stays so. Back to front, where nothing is hidden, they grow.
+        if !is_drawn && frame.order == FRONT_TO_BACK {
             atomicOr(&hidden_now[word], bit);
-        } else if first_sheet < end_sheet {
+        }
+        if is_drawn && first_sheet < end_sheet {
             atomicOr(&drawn_now[word], bit);
             atomicAdd(&sections_now, u32(end_sheet - first_sheet));
             mark_tiles(center_px);

@@ -47,6 +47,9 @@ const SHEETS = 4u;
 // Pixels across a tile, and across the widest region.
 const TILE_SIDE = 16u;
 
+// Units of a tile.
+const UNITS = 8u;
+
 // The four sheets of a group at a thread's four pixels: red, green, blue and alpha columns.
 struct Sheets {
     first: mat4x4f,
@@ -55,185 +58,9 @@ struct Sheets {
     fourth: mat4x4f,
 }
 
-// The pixels of a subgroup.
-struct Region {
-    // Bounds of its pixel centres.
-    low: vec2f,
-    high: vec2f,
-    // Bounds of those that are not opaque.
-    open_low: vec2f,
-    open_high: vec2f,
-    // For each of the units' rows the lanes whose pixel there is not opaque.
-    open: vec4u,
-    // The same for pixels that have not reached β.
-    shallow: vec4u,
-}
-
-// A voxel's kernel as the pixels see it.
-struct Footprint {
-    center_px: vec2f,
-    // `(C·m, m)` times the low-pass amplitude over λ; 0 without a voxel.
-    amount: vec4f,
-    // H(0, 0, t) of eq. 3 at the group's first plane and at the four after it.
-    first_plane: f32,
-    planes: vec4f,
-    // In perspective, how its sections' footprints lie on the screen.
-    axis: vec2f,
-    maps: SectionMaps,
-    // Among the economies: ρ² from which a footprint adds too little, by sheet.
-    rim: vec4f,
-}
-
-// One of the ramps: where its control points are, and the one of the first of them that this lane holds.
-struct Ramp {
-    first: u32,
-    end: u32,
-    own: vec4f,
-}
-
-// Where the n-th set bit is.
-fn nth_set_bit(bits: vec2u, n: u32) -> u32 {
-    let low = countOneBits(bits.x);
-    var found = vec3u(bits.x, n, 0u);
-    if n >= low {
-        found = vec3u(bits.y, n - low, 32u);
-    }
-    return half(half(half(half(half(found, 16u), 8u), 4u), 2u), 1u).z;
-}
-
-// One step of a binary search in (word, bits to skip, position): goes on in the upper bits if the lower ones have too few.
-fn half(found: vec3u, width: u32) -> vec3u {
-    let count = countOneBits(found.x & ((1u << width) - 1u));
-    return select(found, vec3u(found.x >> width, found.y - count, found.z + width), found.y >= count);
-}
-
-// Piecewise linear between the control points, clamped outside.
-fn ramp_at(held: Ramp, value: f32) -> vec3f {
-    let count = held.end - held.first;
-    // How many points are at or below the value; every lane holds one of the first of them.
-    var below = 0u;
-    below += select(0u, 16u, lanes >= 32u && is_below(held, below + 15u, value));
-    below += select(0u, 8u, lanes >= 16u && is_below(held, below + 7u, value));
-    below += select(0u, 4u, is_below(held, below + 3u, value));
-    below += select(0u, 2u, is_below(held, below + 1u, value));
-    below += select(0u, 1u, is_below(held, below, value));
-    below += select(0u, 1u, is_below(held, below, value));
-    let a = subgroupShuffle(held.own, max(below, 1u) - 1u);
-    let b = subgroupShuffle(held.own, min(below, min(count, lanes) - 1u));
-    var result = between(a, b, value);
-    // More points than lanes are searched in memory.
-    for (var once = count > lanes; once; once = false) {
-        result = ramp(held.first, held.end, value);
-    }
-    return result;
-}
-
-// Whether one of the first control points is at or below a value.
-fn is_below(held: Ramp, at: u32, value: f32) -> bool {
-    return at < min(held.end - held.first, lanes) && subgroupShuffle(held.own.x, at % lanes) <= value;
-}
-
-fn ramp_of(first: u32, end: u32) -> Ramp {
-    return Ramp(first, end, control_points[min(first + lane, end - 1u)]);
-}
-
-// H(0, 0, t) of eq. 3: the kernel's integral along the ray through its centre, from the centre to t.
-fn along(t: f32) -> f32 {
-    let x = clamp(t, -frame.support, frame.support);
-    let z = x * x * gather.along_scale - 1.0;
-    return x * polynomial(gather.along, z);
-}
-
-fn polynomial(c: array<vec4f, 4>, z: f32) -> f32 {
-    let powers = vec4f(1.0, z, z * z, z * z * z);
-    let fourth = z * z * z * z;
-    return dot(powers, c[0]) + fourth * (dot(powers, c[1]) + fourth * (dot(powers, c[2]) + fourth * dot(powers, c[3])));
-}
-
-// The sections of a kernel in the group's four sheets at a column's four pixels: two entries of eq. 3 subtracted, where
-// H(a, b, t) is H(0, 0, t) times the Gaussian of ρ² = a² + b², and t ends at the chord of the kernel's ball.
-fn sections(footprint: Footprint, column: f32, rows: vec4f) -> mat4x4f {
-    let dx = column - footprint.center_px.x;
-    let dy = rows - footprint.center_px.y;
-    if PERSPECTIVE {
-        let along = footprint.axis.x * dx + footprint.axis.y * dy;
-        let across = footprint.axis.x * dy - footprint.axis.y * dx;
-        let a = along * along;
-        let b = across * across;
-        let maps = footprint.maps;
-        let planes = footprint.planes;
-        return mat4x4f(
-            section(a * maps.along.x + b * maps.across.x, footprint.first_plane, planes.x, footprint.rim.x) * maps.amplitude.x,
-            section(a * maps.along.y + b * maps.across.y, planes.x, planes.y, footprint.rim.y) * maps.amplitude.y,
-            section(a * maps.along.z + b * maps.across.z, planes.y, planes.z, footprint.rim.z) * maps.amplitude.z,
-            section(a * maps.along.w + b * maps.across.w, planes.z, planes.w, footprint.rim.w) * maps.amplitude.w,
-        );
-    }
-    let rho_squared = dy * (gather.metric.z * dy + gather.metric.y * dx) + gather.metric.x * dx * dx;
-    let rim = rim_at(rho_squared);
-    let in_plane = in_plane_at(rho_squared, footprint.rim.x);
-    let plane_0 = clamp(vec4f(footprint.first_plane), -rim, rim);
-    let plane_1 = clamp(vec4f(footprint.planes.x), -rim, rim);
-    let plane_2 = clamp(vec4f(footprint.planes.y), -rim, rim);
-    let plane_3 = clamp(vec4f(footprint.planes.z), -rim, rim);
-    let plane_4 = clamp(vec4f(footprint.planes.w), -rim, rim);
-    return mat4x4f(
-        (plane_1 - plane_0) * in_plane,
-        (plane_2 - plane_1) * in_plane,
-        (plane_3 - plane_2) * in_plane,
-        (plane_4 - plane_3) * in_plane,
-    );
-}
-
-// One section, between two planes.
-fn section(rho_squared: vec4f, near: f32, far: f32, footprint_rim: f32) -> vec4f {
-    let rim = rim_at(rho_squared);
-    let thickness = clamp(vec4f(far), -rim, rim) - clamp(vec4f(near), -rim, rim);
-    return thickness * in_plane_at(rho_squared, footprint_rim);
-}
-
-// The Gaussian of ρ², up to the footprint's rim.
-fn in_plane_at(rho_squared: vec4f, footprint_rim: f32) -> vec4f {
-    let in_plane = exp2(rho_squared * gather.metric.w);
-    if ECONOMIES {
-        return select(vec4f(0.0), in_plane, rho_squared < vec4f(footprint_rim));
-    }
-    return in_plane;
-}
-
-// H(0, 0, t) where the chord of the kernel's ball ends.
-fn rim_at(rho_squared: vec4f) -> vec4f {
-    let chord_squared = max(frame.support * frame.support - rho_squared, vec4f(0.0));
-    let z = chord_squared * gather.chord_scale.x + gather.chord_scale.y;
-    let c = gather.chord;
-    let low = c[0].x + z * (c[0].y + z * (c[0].z + z * c[0].w));
-    let high = c[1].x + z * (c[1].y + z * (c[1].z + z * c[1].w));
-    let z_squared = z * z;
-    return sqrt(chord_squared) * (low + z_squared * z_squared * high);
-}
-
 // What a voxel adds to a sheet at four pixels.
 fn added(section: vec4f, amount: vec4f) -> mat4x4f {
     return mat4x4f(section * amount.x, section * amount.y, section * amount.z, section * amount.w);
-}
-
-// What another lane holds.
-fn footprint_of(own: Footprint, other: u32) -> Footprint {
-    var footprint: Footprint;
-    footprint.center_px = subgroupShuffle(own.center_px, other);
-    footprint.amount = subgroupShuffle(own.amount, other);
-    footprint.first_plane = subgroupShuffle(own.first_plane, other);
-    footprint.planes = subgroupShuffle(own.planes, other);
-    if PERSPECTIVE {
-        footprint.axis = subgroupShuffle(own.axis, other);
-        footprint.maps.along = subgroupShuffle(own.maps.along, other);
-        footprint.maps.across = subgroupShuffle(own.maps.across, other);
-        footprint.maps.amplitude = subgroupShuffle(own.maps.amplitude, other);
-    }
-    if ECONOMIES {
-        footprint.rim = subgroupShuffle(own.rim, other);
-    }
-    return footprint;
 }
 
 // A sheet over or under what is there, at four pixels.
@@ -251,103 +78,6 @@ fn composite_sheet(image: mat4x4f, sheet: mat4x4f) -> mat4x4f {
 fn overlapped_sheets(p: vec4f) -> vec2f {
     let sheets = (overlapped(p, gather.depth_error, PERSPECTIVE) - gather.near) / frame.slab_width;
     return vec2f(floor(sheets.x), ceil(sheets.y));
-}
-
-// What a voxel at p adds to the group whose first sheet starts at `near`, in sections or, into the sheet `whole` of them, as a whole.
-fn footprint_at(p: vec4f, near: f32, whole: f32, amount: vec4f) -> Footprint {
-    var footprint: Footprint;
-    footprint.center_px = p.xy;
-    var first_step = near - p.z;
-    var steps = near - p.z + vec4f(1.0, 2.0, 3.0, 4.0) * frame.slab_width;
-    if ECONOMIES && whole >= 0.0 {
-        // As far as a kernel reaches, on either side of the sheet.
-        first_step = -WHOLE;
-        steps = select(vec4f(-WHOLE), vec4f(WHOLE), vec4f(1.0, 2.0, 3.0, 4.0) > vec4f(whole));
-    }
-    if PERSPECTIVE {
-        let ray = local_ray(p.xy);
-        let per_depth = select(frame.kernel_per_depth, ray.kernel_per_depth, frame.kernel_per_depth == 0.0);
-        let cut = near_cut(ray, p.w);
-        let first = max(first_step * per_depth, cut);
-        let planes = max(steps * per_depth, vec4f(cut));
-        footprint.amount = amount * ray.per_lambda;
-        footprint.first_plane = along(first);
-        footprint.planes = vec4f(along(planes.x), along(planes.y), along(planes.z), along(planes.w));
-        footprint.axis = ray.axis;
-        footprint.maps = section_maps(ray, p.w, vec4f(first, planes.xyz), planes);
-    } else {
-        let planes = steps * frame.kernel_per_depth;
-        footprint.amount = amount * frame.amplitude;
-        footprint.first_plane = along(first_step * frame.kernel_per_depth);
-        footprint.planes = vec4f(along(planes.x), along(planes.y), along(planes.z), along(planes.w));
-    }
-    if ECONOMIES {
-        let amplitude = select(vec4f(1.0), footprint.maps.amplitude, PERSPECTIVE);
-        footprint.rim = log(footprint.amount.a * amplitude * gather.peak) / frame.falloff;
-    }
-    return footprint;
-}
-
-// Sheet depths beyond every kernel's reach.
-const WHOLE = 1e6;
-
-// Which pixels are not opaque, and their bounds.
-fn opened(region: Region, is_inside: vec4<bool>, opacity: vec4f, column: f32, rows: vec4f) -> Region {
-    // Pixels off the image count as opaque.
-    let is_open = is_inside & (opacity < vec4f(select(3e38, frame.opacity_threshold, frame.culling != 0u)));
-    var result = region;
-    if ECONOMIES {
-        let is_shallow = is_inside & (opacity < vec4f(gather.beta));
-        result.shallow = vec4u(
-            subgroupBallot(is_shallow.x).x,
-            subgroupBallot(is_shallow.y).x,
-            subgroupBallot(is_shallow.z).x,
-            subgroupBallot(is_shallow.w).x,
-        );
-    }
-    result.open = vec4u(
-        subgroupBallot(is_open.x).x,
-        subgroupBallot(is_open.y).x,
-        subgroupBallot(is_open.z).x,
-        subgroupBallot(is_open.w).x,
-    );
-    let from_top = select(vec4f(1e9), rows, is_open);
-    let from_bottom = select(vec4f(-1e9), rows, is_open);
-    let top = min(min(from_top.x, from_top.y), min(from_top.z, from_top.w));
-    let bottom = max(max(from_bottom.x, from_bottom.y), max(from_bottom.z, from_bottom.w));
-    result.open_low = subgroupMin(vec2f(select(1e9, column, any(is_open)), top));
-    result.open_high = subgroupMax(vec2f(select(-1e9, column, any(is_open)), bottom));
-    return result;
-}
-
-// Whether the box around a voxel's footprint holds a pixel of those in `open`. Lanes 0 to 15 hold the pixels across the upper
-// units of a region, 16 to 31 those across the lower.
-fn is_visible(center_px: vec2f, margin: vec2f, region: Region, open: vec4u) -> bool {
-    let center = center_px - region.low;
-    let size = region.high - region.low;
-    let first_row = i32(clamp(ceil(center.y - margin.y), 0.0, 16.0));
-    let end_row = i32(clamp(floor(center.y + margin.y), -1.0, size.y)) + 1;
-    let down = i32((1u << u32(end_row)) - (1u << u32(first_row)));
-    let upper = vec4u(-(vec4i(down) >> vec4u(0u, 1u, 2u, 3u) & vec4i(1)));
-    let lower = vec4u(-(vec4i(down) >> vec4u(4u, 5u, 6u, 7u) & vec4i(1)));
-    var across_upper = across(vec4f(center.x), margin.x, size.x);
-    var across_lower = across_upper;
-    if PARALLELOGRAM {
-        // The sides follow the shear of eq. 9.
-        let rows = vec4f(0.0, 1.0, 2.0, 3.0) - center.y;
-        let half_width = gather.half_width + BOX_SLACK;
-        across_upper = across(center.x + gather.shear * rows, half_width, size.x);
-        across_lower = across(center.x + gather.shear * (rows + 4.0), half_width, size.x);
-    }
-    let box = (upper & across_upper) | (lower & (across_lower << vec4u(16u)));
-    return end_row > first_row && any((box & open) != vec4u(0u));
-}
-
-// The pixels of a row within a distance of a point, one bit each.
-fn across(center: vec4f, half_width: f32, last: f32) -> vec4u {
-    let first = vec4i(clamp(ceil(center - half_width), vec4f(0.0), vec4f(16.0)));
-    let end = vec4i(clamp(floor(center + half_width), vec4f(-1.0), vec4f(last))) + 1;
-    return select(vec4u(0u), (vec4u(1u) << vec4u(end)) - (vec4u(1u) << vec4u(first)), end > first);
 }
 
 fn draw(tile: u32, thread: u32) {
@@ -388,10 +118,18 @@ fn draw(tile: u32, thread: u32) {
     var sections_rasterized = 0u;
     var bricks_visited = 0u;
     let first_bin = tile * gather.groups;
-    var end = starts[first_bin + part.first_group];
-    for (var at = part.first_group; at < part.end_group && any(region.open != vec4u(0u)); at += 1u) {
+    let reached = gather.reached + tile * UNITS + firstTrailingBit(units);
+    var at = atomicLoad(&gathered.words[reached]);
+    var end = starts[first_bin + at];
+    // A driver may end loops that go on for too long: what would take too many passes is left to the next dispatch.
+    var passes = 0u;
+    for (; at < gather.groups && any(region.open != vec4u(0u)); at += 1u) {
         var cursor = end;
         end = starts[first_bin + at + 1u];
+        if passes + gather.passes_per_group + (end - cursor) * gather.passes_per_brick > gather.most_passes {
+            break;
+        }
+        passes += gather.passes_per_group;
         if cursor == end {
             continue;
         }
@@ -427,6 +165,7 @@ fn draw(tile: u32, thread: u32) {
             while count < lanes {
                 while queued_count == visible_count && (to_visit != 0u || cursor < end) {
                     while to_visit == 0u && cursor < end {
+                        passes += gather.passes_per_fetch;
                         let entry = entries[min(cursor + lane, end - 1u)];
                         to_visit = subgroupBallot(cursor + lane < end && ((entry >> 24u) & units) != 0u).x;
                         fetched = entry & 0xffffffu;
@@ -444,6 +183,7 @@ fn draw(tile: u32, thread: u32) {
                     corner = subgroupShuffle(fetched_corner, next);
                     let present = subgroupShuffle(fetched_present, next);
                     bricks_visited += 1u;
+                    passes += gather.passes_per_visit;
 
                     // Every lane tests a run of the brick's places.
                     let run = BRICK_VOXELS / lanes;
@@ -481,6 +221,7 @@ fn draw(tile: u32, thread: u32) {
                 break;
             }
             has_drawn = true;
+            passes += gather.passes_per_queue;
 
             // Every lane shades its voxel.
             let p = project(queued);
@@ -591,6 +332,8 @@ fn draw(tile: u32, thread: u32) {
     }
     let counts = subgroupAdd(vec2u(voxels_shaded, sections_rasterized));
     if lane == 0u {
+        // Where all is opaque nothing is left to do.
+        atomicStore(&gathered.words[reached], select(at, gather.groups, all(region.open == vec4u(0u))));
         atomicAdd(&gathered.tally.voxels_shaded, counts.x);
         atomicAdd(&gathered.tally.sections_rasterized, counts.y);
         atomicAdd(&gathered.tally.bricks_visited, bricks_visited);
@@ -607,9 +350,14 @@ fn main(
     lanes = subgroup_size;
     lane = subgroup_invocation_id;
     let tile = part.first_tile + unfold(workgroup);
-    let first_bin = tile * gather_uniform.groups;
-    let has_entries = tile < part.end_tile && starts[first_bin + part.first_group] < starts[first_bin + part.end_group];
-    for (var once = has_entries; once; once = false) {
+    var is_left = false;
+    if tile < part.end_tile {
+        let first_bin = tile * gather_uniform.groups;
+        let unit = firstTrailingBit(subgroupOr(1u << (thread / 8u)));
+        let at = atomicLoad(&gathered.words[gather_uniform.reached + tile * UNITS + unit]);
+        is_left = starts[first_bin + at] < starts[first_bin + gather_uniform.groups];
+    }
+    for (; is_left; is_left = false) {
         draw(tile, thread);
     }
 }

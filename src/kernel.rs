@@ -154,6 +154,35 @@ mod tests {
     }
 
     #[test]
+    fn the_polynomial_is_the_cumulative_kernel() {
+        fn error<const N: usize>(kernel: &Kernel, span: f64) -> f64 {
+            let coefficients = kernel.cumulative_polynomial::<N>(span);
+            let whole = 2.0 * kernel.cumulative(0.0, kernel.support());
+            (0..=2000).fold(0.0, |worst: f64, step| {
+                let z = f64::from(step) / 1000.0 - 1.0;
+                let t = kernel.support() * (1.0 - span * (1.0 - z) / 2.0).max(0.0).sqrt();
+                let found = t * coefficients.iter().rev().fold(0.0, |sum, coefficient| sum * z + coefficient);
+                worst.max((found - kernel.cumulative(0.0, t)).abs() / whole)
+            })
+        }
+        // To what f32 holds of a whole footprint.
+        for (radius, falloff) in KERNELS.into_iter().chain([(4.0, 0.1), (4.0, 2.0), (2.0, 16.0)]) {
+            let kernel = Kernel::new(radius, falloff);
+            assert!(
+                error::<16>(&kernel, 1.0) < 2.0_f64.powi(-24),
+                "{radius} {falloff}: {:e}",
+                error::<16>(&kernel, 1.0)
+            );
+            assert!(
+                error::<8>(&kernel, 0.45) < 2.0_f64.powi(-24),
+                "{radius} {falloff}: {:e}",
+                error::<8>(&kernel, 0.45)
+            );
+        }
+        assert!(error::<16>(&Kernel::new(2.0, 2.0), 1.0) < 1e-11);
+    }
+
+    #[test]
     fn sections_of_one_kernel_sum_to_the_whole_footprint() {
         let kernel = Kernel::new(2.0, 2.0);
         for rho_squared in [0.0, 0.5, 2.0, 3.9] {

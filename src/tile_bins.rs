@@ -17,6 +17,9 @@ pub const SIDE: u32 = 16;
 /// Width and height of the units that a tile consists of, two across and four down, pixels.
 const UNIT: [u32; 2] = [8, 4];
 
+/// Units of a tile.
+pub const UNITS: u32 = SIDE * SIDE / (UNIT[0] * UNIT[1]);
+
 /// Sheets of a group.
 pub const SHEETS: u32 = 4;
 
@@ -24,24 +27,65 @@ pub const SHEETS: u32 = 4;
 const MAX_BRICKS: usize = 1 << 24;
 
 /// Passes through all its loops that a thread may take in one dispatch: llvmpipe ends loops after 65535. The pass that finds a loop
-/// at its end counts, and in that pass one through every loop inside.
+/// at its end counts, and in that pass one through every loop inside. Threads count them, and go on in the next dispatch.
 const MAX_PASSES: u32 = 65000;
 
 /// Queues that a brick's voxels fill at most: one voxel for each of the 8 threads.
 const QUEUES_PER_BRICK: u32 = 8;
 
-/// Passes that a brick takes at most: 12 to fetch and visit it and to test its places, 20 for each of its queues (that one, 8 to
-/// fill it, 6 that do not search for control points, and 5 for its voxels, two by two), and 4 to share a queue with another brick.
-const PASSES_PER_BRICK: u32 = 12 + QUEUES_PER_BRICK * 20 + 4;
+/// Passes of a brick at most: 12 to fetch and visit it and to test its places, and 4 to share a queue with another brick.
+const PASSES_PER_VISIT: u32 = 16;
 
-/// Passes that a group takes at most besides: that one, 12 that find no more voxels, and 2 to composite; without bricks 14.
+/// Passes to fetch as many entries as there are threads.
+const PASSES_PER_FETCH: u32 = 3;
+
+/// Passes of a queue at most: that one, 8 to fill it, 6 that do not search for control points, and 5 for its voxels, two by two.
+const PASSES_PER_QUEUE: u32 = 20;
+
+/// Passes of a group at most besides: that one, 12 that find no more voxels, and 2 to composite; without bricks 14.
 const PASSES_PER_GROUP: u32 = 16;
+
+/// Passes that a thread may take, and takes at most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Passes {
+    /// In one dispatch.
+    pub most: u32,
+    /// For a group, bricks not counted.
+    pub per_group: u32,
+    /// To fetch entries, one for each thread.
+    pub per_fetch: u32,
+    /// To visit a brick.
+    pub per_visit: u32,
+    /// For a queue of voxels.
+    pub per_queue: u32,
+}
+
+impl Passes {
+    /// Those of a view whose voxels take at most `search` passes to look up their control points in memory.
+    fn new(search: u32) -> Self {
+        let per_queue = PASSES_PER_QUEUE + search;
+        Self {
+            most: MAX_PASSES,
+            per_group: PASSES_PER_GROUP,
+            per_fetch: PASSES_PER_FETCH,
+            per_visit: PASSES_PER_VISIT,
+            per_queue,
+        }
+    }
+
+    /// For a brick, visited and in queues.
+    pub fn per_brick(&self) -> u32 {
+        self.per_visit + QUEUES_PER_BRICK * self.per_queue
+    }
+}
 
 /// Bricks by tile and sheet group.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TileBins {
     /// The first slab of the nearest group.
     pub first_slab: i32,
+    /// Number of tiles.
+    pub tiles: u32,
     /// Sheet groups of every tile.
     pub groups: u32,
     /// Where every tile's groups start in `entries`, in the order they are composited in, tile after tile; at last the end.
@@ -50,8 +94,10 @@ pub struct TileBins {
     pub entries: Vec<u32>,
     /// For every group, nearest first, half the screen box around its footprints, pixels.
     pub half_boxes: Vec<DVec2>,
-    /// The groups in runs that one dispatch can take.
-    pub runs: Vec<Range<u32>>,
+    /// What bounds a dispatch.
+    pub passes: Passes,
+    /// Dispatches that are enough for every tile.
+    pub dispatches: u32,
 }
 
 /// Why a view cannot be drawn by tiles.
@@ -147,8 +193,18 @@ impl TileBins {
                 next[bin] += 1;
             });
         }
-        let runs = runs(&starts, groups as usize, PASSES_PER_BRICK + QUEUES_PER_BRICK * search_passes)?;
-        Ok(Self { first_slab: first_group * SHEETS as i32, groups, starts, entries, half_boxes, runs })
+        let passes = Passes::new(search_passes);
+        let dispatches = dispatches(&starts, &entries, groups as usize, &passes)?;
+        Ok(Self {
+            first_slab: first_group * SHEETS as i32,
+            tiles: columns * rows,
+            groups,
+            starts,
+            entries,
+            half_boxes,
+            passes,
+            dispatches,
+        })
     }
 }
 
@@ -195,32 +251,37 @@ fn units_touched(pixels: &Pixels, corner: [u32; 2]) -> u32 {
         pixels.first[axis] < low + UNIT[axis] && pixels.last[axis] >= low
     };
     let bit = |unit: u32| u32::from(touches(0, unit % 2) && touches(1, unit / 2)) << unit;
-    (0..SIDE * SIDE / (UNIT[0] * UNIT[1])).map(bit).sum()
+    (0..UNITS).map(bit).sum()
 }
 
-/// Runs of groups that in no tile take more than the most passes.
-fn runs(starts: &[u32], groups: usize, passes_per_brick: u32) -> Result<Vec<Range<u32>>, Unfit> {
-    let mut runs = Vec::new();
-    let mut first = 0;
-    // Entries of every tile in the current run.
-    let tiles = (starts.len() - 1).checked_div(groups).unwrap_or(0);
-    let size = |tile: usize, from: usize, to: usize| starts[tile * groups + to] - starts[tile * groups + from];
-    let largest = |from: usize, to: usize| (0..tiles).map(|tile| size(tile, from, to)).max().unwrap_or(0);
-    let most = |groups: usize| MAX_PASSES.saturating_sub(groups as u32 * PASSES_PER_GROUP) / passes_per_brick;
-    let fits = |from: usize, to: usize| largest(from, to) <= most(to - from);
-    while first < groups {
-        if !fits(first, first + 1) {
-            let (required, actual) = (largest(first, first + 1).into(), most(1).into());
-            return Err(Unfit { what: "bricks behind a tile in one sheet group", required, actual });
+/// Dispatches that are enough for every subgroup of every tile: in each it takes groups until one might be too much.
+fn dispatches(starts: &[u32], entries: &[u32], groups: usize, passes: &Passes) -> Result<u32, Unfit> {
+    let most_bricks = passes.most.saturating_sub(passes.per_group) / passes.per_brick();
+    // Of one unit's 8 threads, or of 32 threads and all units: those need the fewest queues.
+    let of_subgroup = |starts: &[u32], units: u32, per_brick: u32| {
+        let (mut dispatches, mut taken) = (1, 0);
+        for group in starts.windows(2) {
+            let bricks = &entries[group[0] as usize..group[1] as usize];
+            if taken + passes.per_group + bricks.len() as u32 * passes.per_brick() > passes.most {
+                dispatches += 1;
+                taken = 0;
+            }
+            let visited = bricks.iter().filter(|&&entry| entry >> 24 & units != 0).count() as u32;
+            taken += passes.per_group + visited * per_brick + (bricks.len() as u32).div_ceil(8) * passes.per_fetch;
         }
-        // The largest run that fits, by bisection: sizes grow with the run.
-        let (mut end, mut too_far) = (first + 1, groups + 1);
-        while too_far - end > 1 {
-            let middle = end.midpoint(too_far);
-            *(if fits(first, middle) { &mut end } else { &mut too_far }) = middle;
+        dispatches
+    };
+    let of_tile = |first: usize| {
+        let starts = &starts[first..=first + groups];
+        let bricks = starts.windows(2).map(|group| group[1] - group[0]).max().unwrap_or(0);
+        if bricks > most_bricks {
+            let (what, required) = ("bricks behind a tile in one sheet group", bricks.into());
+            return Err(Unfit { what, required, actual: most_bricks.into() });
         }
-        runs.push(first as u32..end as u32);
-        first = end;
-    }
-    Ok(runs)
+        let of_unit = |unit: u32| of_subgroup(starts, 1 << unit, passes.per_brick());
+        let of_all = of_subgroup(starts, !0, passes.per_visit + QUEUES_PER_BRICK / 4 * passes.per_queue);
+        Ok((0..UNITS).map(of_unit).fold(of_all, u32::max))
+    };
+    let tiles = (0..starts.len() - 1).into_par_iter().step_by(groups.max(1));
+    tiles.map(of_tile).try_reduce(|| 0, |a, b| Ok(a.max(b)))
 }

@@ -122,10 +122,18 @@ fn shared() -> [Layout; 14] {
             whole_below,
             beta,
             peak,
+            reached,
+            most_passes,
+            passes_per_group,
+            passes_per_fetch,
+            passes_per_visit,
+            passes_per_queue,
+            passes_per_brick,
             padding_0,
-            padding_1
+            padding_1,
+            padding_2
         }),
-        layout!(Part { first_row, first_tile, end_tile, first_group, end_group }),
+        layout!(Part { first_row, first_tile, end_tile }),
         layout!(Gathered { tally, words }).goes_on(),
     ]
 }

@@ -16,16 +16,22 @@ struct Gather {
     whole_below: f32,
     beta: f32,
     peak: f32,
+    reached: u32,
+    most_passes: u32,
+    passes_per_group: u32,
+    passes_per_fetch: u32,
+    passes_per_visit: u32,
+    passes_per_queue: u32,
+    passes_per_brick: u32,
     padding_0: u32,
     padding_1: u32,
+    padding_2: u32,
 }
 
 struct Part {
     first_row: u32,
     first_tile: u32,
     end_tile: u32,
-    first_group: u32,
-    end_group: u32,
 }
 
 struct Gathered {

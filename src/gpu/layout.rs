@@ -266,13 +266,29 @@ pub struct Gather {
     pub beta: f32,
     /// A whole kernel's integral through its centre, over what a footprint must add to a sheet's alpha.
     pub peak: f32,
+    /// Where in [`Gathered`]'s words it is written, for every unit of every tile, at which group its subgroup goes on.
+    pub reached: u32,
+    /// Passes through loops that a thread may take in one dispatch; see [`tile_bins`](crate::tile_bins).
+    pub most_passes: u32,
+    /// Those of a group at most, bricks not counted.
+    pub passes_per_group: u32,
+    /// Those to fetch entries, one for each thread.
+    pub passes_per_fetch: u32,
+    /// Those of a visit to a brick at most.
+    pub passes_per_visit: u32,
+    /// Those of a queue at most.
+    pub passes_per_queue: u32,
+    /// Those of a brick at most, visited and in queues.
+    pub passes_per_brick: u32,
     /// Unused.
     pub padding_0: u32,
     /// Unused.
     pub padding_1: u32,
+    /// Unused.
+    pub padding_2: u32,
 }
 
-/// The tiles and groups that one dispatch draws.
+/// The tiles that a dispatch draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Part {
@@ -282,10 +298,6 @@ pub struct Part {
     pub first_tile: u32,
     /// The tile after the last.
     pub end_tile: u32,
-    /// The first group.
-    pub first_group: u32,
-    /// The group after the last.
-    pub end_group: u32,
 }
 
 /// What the tile rasterizer counts. Then, in words: how many 32×32 tiles every group composited, and bits as [`Gather`] says.

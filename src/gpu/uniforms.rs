@@ -7,7 +7,7 @@ use glam::{DMat2, DVec2, DVec3, DVec4};
 use super::layout::{Frame, Gather, Group};
 use crate::grid_warp::{self, FootprintMap};
 use crate::kernel::Kernel;
-use crate::plan::FramePlan;
+use crate::plan::{FramePlan, tile_grid};
 use crate::scene::Scene;
 use crate::shading::{Light, MIN_GRADIENT, Shading};
 use crate::splatting::{Compositing, Order, Splatting};
@@ -80,6 +80,8 @@ pub fn gather(view: &View, kernel: &Kernel, splatting: &Splatting, bins: &TileBi
     let FootprintMap { footprint_from_pixels, .. } = view.footprint;
     let (x, y) = (footprint_from_pixels.x_axis, footprint_from_pixels.y_axis);
     let (shear, half_width) = view.footprint.parallelogram(kernel.support());
+    let composited = bins.groups + 2 * bricks * groups_per_kernel(view);
+    let [columns, rows] = tile_grid(view.size);
     Gather {
         along: bytemuck::cast(kernel.cumulative_polynomial::<16>(1.0).map(|x| x as f32)),
         chord: bytemuck::cast(kernel.cumulative_polynomial::<8>(CHORD_SPAN).map(|x| x as f32)),
@@ -92,20 +94,29 @@ pub fn gather(view: &View, kernel: &Kernel, splatting: &Splatting, bins: &TileBi
         groups: bins.groups,
         bricks,
         drawn: bins.groups,
-        composited: bins.groups + 2 * bricks * groups_per_kernel(view),
+        composited,
         shear: shear as f32,
         half_width: half_width as f32,
         whole_below: economies.whole_below as f32,
         beta: if hides(splatting) && economies.beta < 1.0 { economies.beta as f32 } else { f32::MAX },
         peak: (whole / economies.resolution).min(f32::MAX.into()) as f32,
+        reached: composited + (columns * rows * bins.groups).div_ceil(32),
+        most_passes: bins.passes.most,
+        passes_per_group: bins.passes.per_group,
+        passes_per_fetch: bins.passes.per_fetch,
+        passes_per_visit: bins.passes.per_visit,
+        passes_per_queue: bins.passes.per_queue,
+        passes_per_brick: bins.passes.per_brick(),
         padding_0: 0,
         padding_1: 0,
+        padding_2: 0,
     }
 }
 
-/// How much of the kernel's ball, from the middle out, the polynomial for chords is fitted to. Farther out the Gaussian is so small
-/// that its errors do not show: they stay below 3e-6 of the kernel's peak.
-const CHORD_SPAN: f64 = 0.6;
+/// How much of the kernel's ball, from the middle out, the polynomial for chords is fitted to: where chords are long they cut sections
+/// that are small. Farther out they cut large ones only, and the Gaussian is small; the errors stay below 5e-6 of a whole footprint's
+/// peak.
+const CHORD_SPAN: f64 = 0.45;
 
 /// The most groups of the tile rasterizer that a kernel reaches into.
 fn groups_per_kernel(view: &View) -> u32 {

@@ -9,10 +9,9 @@ use crate::gpu::layout::{Brick, Gathered, Part, Tally};
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
 use crate::pass::gather::{Gather, GatherBuffers, GatherMode};
-use crate::plan::tile_grid;
 use crate::splatting::{FootprintForm, Method, Order, Splatting};
 use crate::stats::GroupSlabs;
-use crate::tile_bins::{SHEETS, SIDE, TileBins};
+use crate::tile_bins::{SHEETS, SIDE, TileBins, UNITS};
 use crate::view::View;
 
 /// Threads that a subgroup may have.
@@ -37,7 +36,7 @@ pub(crate) struct TileFrame {
     entries: Buffer,
     gathered: Buffer,
     half_boxes: Buffer,
-    /// For every band of the compositing buffer and run of groups: the band's number, and the dispatch's offset and workgroups.
+    /// For every band of the compositing buffer its number, and the offset of its part and its tiles.
     dispatches: Vec<(usize, u32, u32)>,
     bands: Vec<BindGroup>,
 }
@@ -141,8 +140,7 @@ impl TileRasterizer {
         };
 
         let uniform = uniforms::gather(view, kernel, splatting, bins, bricks.len() as u32);
-        let [columns, rows] = tile_grid(view.size);
-        let words = uniform.composited + (columns * rows * bins.groups).div_ceil(32);
+        let words = uniform.reached + bins.tiles * UNITS;
         let bytes = size_of::<Gathered>() as u64 + u64::from(words) * 4;
         let usage = storage | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         let gathered = grown(device, old.gathered.take(), "sheetsplat.gathered", bytes, usage);
@@ -156,17 +154,10 @@ impl TileRasterizer {
             let band = band.band;
             let first_tile = band.first_row / SIDE * columns;
             let tiles = band.rows.div_ceil(SIDE) * columns;
-            for run in &bins.runs {
-                dispatches.push((at, part_bytes.len() as u32, tiles));
-                part_bytes.extend_from_slice(bytemuck::bytes_of(&Part {
-                    first_row: band.first_row,
-                    first_tile,
-                    end_tile: first_tile + tiles,
-                    first_group: run.start,
-                    end_group: run.end,
-                }));
-                part_bytes.resize(part_bytes.len().next_multiple_of(stride), 0);
-            }
+            let part = Part { first_row: band.first_row, first_tile, end_tile: first_tile + tiles };
+            dispatches.push((at, part_bytes.len() as u32, tiles));
+            part_bytes.extend_from_slice(bytemuck::bytes_of(&part));
+            part_bytes.resize(part_bytes.len().next_multiple_of(stride), 0);
         }
         part_bytes.resize(part_bytes.len().max(stride), 0);
         let parts = given.filled(old.parts.take(), "sheetsplat.parts", &part_bytes, BufferUsages::UNIFORM);
@@ -208,7 +199,9 @@ impl TileRasterizer {
         encoder.clear_buffer(&frame.gathered, 0, None);
         let mut pass = encoder.begin_compute_pass(&super::compute("sheetsplat.gather", timer, "gather"));
         for &(band, offset, tiles) in &frame.dispatches {
-            self.gather.record(&mut pass, frame.mode, &frame.bands[band], offset, tiles);
+            for _ in 0..frame.binned.bins.dispatches {
+                self.gather.record(&mut pass, frame.mode, &frame.bands[band], offset, tiles);
+            }
         }
     }
 }

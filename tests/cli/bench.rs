@@ -87,7 +87,11 @@ fn bench_of_bad_input_is_2() {
     assert_fails(2, "bench unknown.toml", &["unknown.toml", "camera.zoom", "unknown key"]);
     assert_fails(2, "bench builtin:brain", &["builtin:brain", "brain"]);
     assert_fails(2, "bench good.nrrd --set splatting.slab_width=9", &["--set", "splatting.slab_width", "9"]);
-    assert_fails(2, "bench good.nrrd --set splatting.method=composite-every-sample", &["splatting.method"]);
+    assert_fails(
+        2,
+        "bench good.nrrd --set splatting.rasterizer=tiles --set splatting.footprint=sections",
+        &["sections"],
+    );
     assert_fails(1, "bench good.nrrd --adapter Voodoo", &["Voodoo"]);
 }
 

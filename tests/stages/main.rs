@@ -5,12 +5,14 @@
 mod common;
 mod composite;
 mod cull;
+mod gather;
 mod occlude;
 mod plan;
 mod resolve;
 mod section;
 mod shade;
 mod splat;
+mod tile_bins;
 mod tiles;
 
 use std::collections::BTreeMap;

@@ -1,0 +1,38 @@
+// Ramps whose first control points the lanes of a subgroup hold between them.
+
+// One of the ramps: where its control points are, and the one of the first of them that this lane holds.
+struct Ramp {
+    first: u32,
+    end: u32,
+    own: vec4f,
+}
+
+// Piecewise linear between the control points, clamped outside.
+fn ramp_at(held: Ramp, value: f32) -> vec3f {
+    let count = held.end - held.first;
+    // How many points are at or below the value; every lane holds one of the first of them.
+    var below = 0u;
+    below += select(0u, 16u, lanes >= 32u && is_below(held, below + 15u, value));
+    below += select(0u, 8u, lanes >= 16u && is_below(held, below + 7u, value));
+    below += select(0u, 4u, is_below(held, below + 3u, value));
+    below += select(0u, 2u, is_below(held, below + 1u, value));
+    below += select(0u, 1u, is_below(held, below, value));
+    below += select(0u, 1u, is_below(held, below, value));
+    let a = subgroupShuffle(held.own, max(below, 1u) - 1u);
+    let b = subgroupShuffle(held.own, min(below, min(count, lanes) - 1u));
+    var result = between(a, b, value);
+    // More points than lanes are searched in memory.
+    for (var once = count > lanes; once; once = false) {
+        result = ramp(held.first, held.end, value);
+    }
+    return result;
+}
+
+// Whether one of the first control points is at or below a value.
+fn is_below(held: Ramp, at: u32, value: f32) -> bool {
+    return at < min(held.end - held.first, lanes) && subgroupShuffle(held.own.x, at % lanes) <= value;
+}
+
+fn ramp_of(first: u32, end: u32) -> Ramp {
+    return Ramp(first, end, control_points[min(first + lane, end - 1u)]);
+}

@@ -1,0 +1,162 @@
+//! §8's economies: what `whole_below` and `resolution` leave out is what the f64 twin leaves out, and what `beta` changes stays within
+//! its bound. Off by default, and refused where they cannot be had.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+#[expect(dead_code, reason = "not every file needs all of it")]
+mod common;
+
+use glam::{DVec3, UVec3};
+use sheetsplat::camera::{Camera, Projection};
+use sheetsplat::error::RenderError;
+use sheetsplat::headless::{Headless, Rendering};
+use sheetsplat::image::Image;
+use sheetsplat::reference;
+use sheetsplat::scene::Scene;
+use sheetsplat::splatting::{Compositing, Economies, FootprintForm, Method, Order, Rasterizer};
+use sheetsplat::volume::{Volume, builtin};
+
+use common::{Random, camera, gpu, scene, transfer};
+
+const NONE: Economies = Economies { whole_below: 0.0, beta: 1.0, resolution: 0.0 };
+
+/// The tomato's tissues from faint to solid, or noise, seen obliquely.
+fn cases() -> Vec<(&'static str, Volume, Scene)> {
+    let mut random = Random(71);
+    let values = (0..17 * 20 * 15).map(|_| random.uniform(0.0, 200.0) as f32).collect();
+    let noise = Volume::new("noise", UVec3::new(17, 20, 15), DVec3::new(1.0, 1.0, 3.0), values).unwrap();
+    let mut scene = Scene { camera: camera([0.3, 0.9, -0.4], 42.0), ..scene(90, 75) };
+    scene.transfer =
+        transfer(&[(0.0, [0.2, 0.4, 1.0]), (200.0, [1.0, 0.8, 0.3])], &[(10.0, 0.0), (60.0, 0.05), (200.0, 0.9)]);
+    scene.splatting.culling = false;
+    let tomato = builtin::volume("tomato:40").unwrap();
+    let mut of_tomato = scene.clone();
+    of_tomato.camera = Camera { direction: DVec3::new(0.5, 0.6, 0.6), ..Camera::default() };
+    vec![("noise", noise, scene), ("tomato", tomato, of_tomato)]
+}
+
+fn render(gpu: &Headless, volume: &Volume, scene: &Scene) -> Rendering {
+    gpu.render_volume(volume.clone(), scene).unwrap()
+}
+
+fn twin(volume: &Volume, scene: &Scene) -> Image {
+    reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap()
+}
+
+fn errors(a: &Image, b: &Image) -> impl Iterator<Item = f32> {
+    a.pixels.as_flattened().iter().zip(b.pixels.as_flattened()).map(|(a, b)| (a - b).abs())
+}
+
+fn largest_difference(a: &Image, b: &Image) -> f32 {
+    errors(a, b).fold(0.0, f32::max)
+}
+
+fn decibels(a: &Image, b: &Image) -> f64 {
+    let sum: f64 = errors(a, b).map(|error| f64::from(error * error)).sum();
+    -10.0 * (sum / (4 * a.pixels.len()) as f64).log10()
+}
+
+fn eye() -> Projection {
+    Projection::Perspective { fov_y: 35.0, distance: None, near: None }
+}
+
+#[test]
+fn the_twin_economises_alike() {
+    let gpu = gpu();
+    let faint = Economies { whole_below: 0.3, ..NONE };
+    let all = Economies { whole_below: 1.0, ..NONE };
+    let fine = Economies { resolution: 1.0 / 256.0, ..NONE };
+    let coarse = Economies { resolution: 0.05, whole_below: 0.1, ..NONE };
+    for (name, volume, mut scene) in cases() {
+        let orthographic = scene.camera.projection;
+        let plain = twin(&volume, &scene);
+        let everything = render(&gpu, &volume, &scene).stats.counts.sections_rasterized;
+        for (projection, compositing, order) in [
+            (orthographic, Compositing::Linear, Order::FrontToBack),
+            (orthographic, Compositing::Exponential, Order::BackToFront),
+            (eye(), Compositing::Exponential, Order::FrontToBack),
+            (eye(), Compositing::Xray, Order::FrontToBack),
+        ] {
+            for economies in [faint, all, fine, coarse] {
+                scene.camera.projection = projection;
+                (scene.splatting.compositing, scene.splatting.order) = (compositing, order);
+                scene.splatting.economies = economies;
+                let (ours, expected) = (render(&gpu, &volume, &scene), twin(&volume, &scene));
+                let what = format!("{name}, {:?}, {economies:?}", scene.splatting);
+                // Where a footprint ends it drops to 0: rounding may take a pixel on the rim in or out.
+                let rim = if economies.resolution > 0.0 { economies.resolution as f32 } else { 0.0 };
+                let worst = largest_difference(&ours.image, &expected);
+                assert!(worst < 1e-3 + rim && decibels(&ours.image, &expected) > 75.0, "{worst}: {what}");
+                let drawn = ours.stats.counts.sections_rasterized;
+                assert!(drawn > 0 && drawn < everything, "{drawn} of {everything} sections: {what}");
+                if projection == orthographic && compositing == Compositing::Linear {
+                    assert!(largest_difference(&expected, &plain) > 1e-4, "nothing was saved: {what}");
+                }
+            }
+        }
+    }
+}
+
+/// Voxels behind β in a pixel matter to it by no more than 1 - β; all that is projected whole is behind β wherever it is drawn.
+#[test]
+fn beta_keeps_its_bound() {
+    let gpu = gpu();
+    let mut changed = 0;
+    for (name, volume, mut scene) in cases() {
+        for (projection, compositing) in [
+            (scene.camera.projection, Compositing::Linear),
+            (scene.camera.projection, Compositing::Exponential),
+            (eye(), Compositing::Linear),
+        ] {
+            scene.camera.projection = projection;
+            scene.splatting.compositing = compositing;
+            scene.splatting.economies = NONE;
+            let plain = render(&gpu, &volume, &scene);
+            let mut sections = plain.stats.counts.sections_rasterized;
+            for beta in [0.98, 0.9, 0.6, 0.2] {
+                scene.splatting.economies.beta = beta;
+                let economic = render(&gpu, &volume, &scene);
+                let worst = largest_difference(&economic.image, &plain.image);
+                assert!(
+                    f64::from(worst) <= 1.0 - beta + 2e-5,
+                    "{name}, {projection:?}, {compositing:?}, β {beta}: {worst}"
+                );
+                let fewer = economic.stats.counts.sections_rasterized;
+                assert!(
+                    fewer <= sections,
+                    "{name}, {projection:?}, {compositing:?}, β {beta}: {fewer}, not {sections}"
+                );
+                changed += u32::from(fewer < sections);
+                sections = fewer;
+            }
+        }
+        // Nothing is behind anything.
+        scene.splatting.compositing = Compositing::Xray;
+        let with = render(&gpu, &volume, &scene).image;
+        scene.splatting.economies = NONE;
+        assert_eq!(with, render(&gpu, &volume, &scene).image, "{name}");
+    }
+    assert!(changed > 12, "β told only {changed} frames from others");
+}
+
+#[test]
+fn off_by_default_and_by_tiles_only() {
+    let gpu = gpu();
+    let (_, volume, scene) = cases().remove(0);
+    assert_eq!(scene.splatting.economies, NONE);
+    let refused = |change: &dyn Fn(&mut Scene)| {
+        let mut scene = scene.clone();
+        scene.splatting.economies.resolution = 0.01;
+        change(&mut scene);
+        match gpu.render_volume(volume.clone(), &scene) {
+            Err(RenderError::OutOfRange { key, found, .. }) => (key, found),
+            other => panic!("{:?}", other.map(|rendering| rendering.stats)),
+        }
+    };
+    let (key, found) = refused(&|scene| scene.splatting.rasterizer = Rasterizer::Quads);
+    assert!(key == "splatting.rasterizer" && found.contains("resolution"), "{key}: {found}");
+    let (key, found) = refused(&|scene| scene.splatting.footprint = FootprintForm::Sections);
+    assert!(key == "splatting.rasterizer" && found.contains("sections"), "{key}: {found}");
+    let (key, found) = refused(&|scene| scene.splatting.method = Method::CompositeEverySample);
+    assert!(key == "splatting.rasterizer" && found.contains("composite-every-sample"), "{key}: {found}");
+}

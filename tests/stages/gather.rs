@@ -1,0 +1,429 @@
+//! `shaders/gather.wgsl` against the f64 twin: sections of single kernels, frames of random volumes, and which voxels are hidden.
+
+use glam::{DVec2, DVec3, DVec4, UVec3};
+use sheetsplat::brick::{self, BrickList};
+use sheetsplat::camera::Projection;
+use sheetsplat::classify::classify;
+use sheetsplat::gpu::layout::{Gathered, Part, Tally};
+use sheetsplat::gpu::uniforms::{self, Ramps};
+use sheetsplat::gpu::volume_texture::VolumeTexture;
+use sheetsplat::headless::Headless;
+use sheetsplat::pass::gather::{Gather, GatherBuffers, GatherMode};
+use sheetsplat::reference;
+use sheetsplat::reference::footprint::Footprint;
+use sheetsplat::scene::{Scene, TransferSettings};
+use sheetsplat::shading::Light;
+use sheetsplat::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order};
+use sheetsplat::tile_bins::{Passes, SHEETS, SIDE, TileBins, UNITS};
+use sheetsplat::transfer_function::{Ramp, TransferFunction};
+use sheetsplat::volume::{Grid, Volume};
+use sheetsplat::wgpu::BufferUsages;
+
+use crate::common::{Random, camera, gpu, pixels, scene, transfer};
+use crate::section::{AMOUNT, KERNELS, Seen, VIEWS, view_scene};
+use crate::{at_offsets, compute, contents, init};
+
+/// A scene over a volume, on the GPU and in the twin.
+struct Fixture<'a> {
+    gpu: &'a Headless,
+    stage: &'a Gather,
+    seen: Seen,
+    volume: Volume,
+    transfer: TransferFunction,
+    bricks: BrickList,
+}
+
+/// What the stage leaves behind.
+#[derive(Debug, PartialEq)]
+struct Drawn {
+    acc: Vec<DVec4>,
+    tally: Tally,
+    /// 32×32 tiles that every group composited.
+    tiles: Vec<u32>,
+    /// For every group of those that a kernel reaches into a bit per place: two words per brick.
+    drawn: Vec<u32>,
+}
+
+impl<'a> Fixture<'a> {
+    fn new(gpu: &'a Headless, stage: &'a Gather, scene: Scene, volume: Volume) -> Self {
+        let transfer = scene.transfer.resolve(&volume);
+        let voxels = classify(&volume, &transfer);
+        let bricks = BrickList::new(volume.grid(), &voxels);
+        Self { gpu, stage, seen: Seen::new(volume.grid(), scene), volume, transfer, bricks }
+    }
+
+    fn bins(&self) -> TileBins {
+        let Seen { view, kernel, scene, .. } = &self.seen;
+        TileBins::new(self.bricks.bricks(), view, scene.splatting.order, kernel.support(), 0, u64::MAX).unwrap()
+    }
+
+    /// Draws over `acc`, in bands of at most so many rows. The nearest group begins at `near`, where that is given.
+    fn draw(&self, bins: &TileBins, near: Option<f32>, acc: &[DVec4], band_rows: u32) -> Drawn {
+        let Self { gpu, stage, seen, volume, bricks, .. } = self;
+        let (device, size) = (gpu.device(), seen.view.size);
+        let bricks = bricks.bricks();
+        let ramps = Ramps::new(&self.transfer);
+        let frame = uniforms::frame(&seen.view, &seen.kernel, volume.grid(), &ramps, &seen.scene);
+        let mut gather = uniforms::gather(&seen.view, &seen.kernel, &seen.scene.splatting, bins, bricks.len() as u32);
+        gather.near = near.unwrap_or(gather.near);
+        let columns = size[0].div_ceil(SIDE);
+        let bands: Vec<(u32, u32)> =
+            (0..size[1]).step_by(band_rows as usize).map(|first| (first, band_rows.min(size[1] - first))).collect();
+        let parts: Vec<Part> = bands
+            .iter()
+            .map(|&(first_row, rows)| Part {
+                first_row,
+                first_tile: first_row / SIDE * columns,
+                end_tile: (first_row / SIDE + rows.div_ceil(SIDE)) * columns,
+            })
+            .collect();
+        let accs: Vec<_> = bands
+            .iter()
+            .map(|&(first, rows)| {
+                let [first, end] = [first, first + rows].map(|row| (row * size[0]) as usize);
+                let pixels: Vec<[f32; 4]> = acc[first..end].iter().map(|pixel| pixel.as_vec4().to_array()).collect();
+                init(device, &pixels, BufferUsages::STORAGE)
+            })
+            .collect();
+        let storage = |words: &[u32]| init(device, words, BufferUsages::STORAGE);
+        let words = gather.reached + bins.tiles * UNITS;
+        let gathered = storage(&vec![0; size_of::<Gathered>() / 4 + words as usize]);
+        let (parts_buffer, stride) = at_offsets(device, &parts);
+        let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|half| half.as_vec2().to_array()).collect();
+        let mode = GatherMode::of(&seen.scene.splatting, seen.view.perspective.is_some(), false);
+        let buffers = GatherBuffers {
+            frame: &init(device, &[frame], BufferUsages::UNIFORM),
+            gather: &init(device, &[gather], BufferUsages::UNIFORM),
+            parts: &parts_buffer,
+            bricks: &init(device, bricks, BufferUsages::STORAGE),
+            starts: &storage(&bins.starts),
+            entries: &storage(&bins.entries),
+            control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
+            values: &VolumeTexture::upload(device, gpu.queue(), volume.values()).unwrap().view,
+            labels: None,
+            gathered: &gathered,
+            half_boxes: &init(device, &half_boxes, BufferUsages::STORAGE),
+        };
+        let groups: Vec<_> = accs.iter().map(|acc| stage.bind(device, mode, buffers, acc)).collect();
+        compute(gpu, |pass| {
+            for (at, part) in parts.iter().enumerate() {
+                let tiles = part.end_tile - part.first_tile;
+                for _ in 0..bins.dispatches {
+                    stage.record(pass, mode, &groups[at], at as u32 * stride, tiles);
+                }
+            }
+        });
+        let acc = accs.iter().flat_map(|acc| pixels(&contents::<u8>(gpu, acc))).collect();
+        let left: Vec<u32> = contents(gpu, &gathered);
+        let (tally, words) = left.split_at(size_of::<Tally>() / 4);
+        Drawn {
+            acc,
+            tally: bytemuck::pod_read_unaligned(bytemuck::cast_slice(tally)),
+            tiles: words[..bins.groups as usize].to_vec(),
+            drawn: words[gather.drawn as usize..gather.composited as usize].to_vec(),
+        }
+    }
+
+    /// Draws everything over nothing.
+    fn draw_all(&self) -> Drawn {
+        let bins = self.bins();
+        self.draw(&bins, None, &self.empty(), u32::MAX)
+    }
+
+    fn empty(&self) -> Vec<DVec4> {
+        vec![DVec4::ZERO; self.seen.view.size.map(|pixels| pixels as usize).iter().product()]
+    }
+
+    /// The twin's compositing buffer, with nothing culled.
+    fn twin(&self) -> Vec<DVec4> {
+        let mut scene = self.seen.scene.clone();
+        scene.image.background = [0.0; 4];
+        let image = reference::render(&self.volume, &self.transfer, &scene).unwrap();
+        image.pixels.iter().map(|pixel| DVec4::from_array(pixel.map(f64::from))).collect()
+    }
+}
+
+/// A voxel at one corner of a volume: of all voxels its place on the screen is known to the last bit.
+fn one_voxel(spacing: [f64; 3]) -> (Volume, TransferSettings) {
+    let mut values = vec![0.0; 729];
+    values[0] = 1.0;
+    let volume = Volume::new("voxel", UVec3::splat(9), DVec3::from(spacing), values).unwrap();
+    let color = AMOUNT.truncate().to_array();
+    (volume, transfer(&[(0.0, color)], &[(0.0, 0.0), (1.0, AMOUNT.w)]))
+}
+
+/// Moves a scene's camera so that a voxel falls on a point of the screen.
+fn look_at(scene: &mut Scene, grid: &Grid, voxel: UVec3, at: DVec2) {
+    let seen = Seen::new(grid, scene.clone());
+    let offset = (at - seen.geometry.size / 2.0) * seen.geometry.pix * grid.unit();
+    let basis = seen.view.basis;
+    scene.camera.center = grid.world_position(voxel) - offset.x * basis.u + offset.y * basis.v;
+}
+
+/// Four sheets at a time, added up, so that a first sheet alone, the first two, and so on fall among them: against the same precision
+/// as the quads'.
+#[test]
+fn sections() {
+    let (gpu, stage) = (gpu(), Gather::default());
+    let mut random = Random(41);
+    let mut lit = 0;
+    for (kernel, view) in KERNELS.into_iter().flat_map(|kernel| VIEWS.map(|view| (kernel, view))) {
+        for width in [0.25, 1.0, 3.7] {
+            let (volume, transfer) = one_voxel(view.1);
+            let mut scene = view_scene(view, kernel, width, FootprintForm::SummedArea);
+            (scene.transfer, scene.shading.enabled) = (transfer, false);
+            scene.splatting.compositing = Compositing::Xray;
+            let at = DVec2::new(random.uniform(-2.0, 72.0), random.uniform(-2.0, 47.0));
+            look_at(&mut scene, volume.grid(), UVec3::ZERO, at);
+            let fixture = Fixture::new(&gpu, &stage, scene, volume);
+            let Seen { view, kernel, .. } = &fixture.seen;
+
+            // The twin's splat is where f32 puts the voxel, at any depth.
+            let [x, y, z, _] = view.screen_from_voxel.map(|row| row.w as f32);
+            let splat = reference::Splat {
+                center: DVec2::new((x + 35.0).into(), (y + 22.5).into()),
+                depth: random.uniform(-60.0, 60.0),
+                amount: AMOUNT * fixture.seen.amplitude(),
+                alpha: AMOUNT.w,
+            };
+            let touched = fixture.seen.touched(&splat);
+            let first = random.uniform(f64::from(touched.start) - 4.0, f64::from(touched.end)) as i32;
+            for first in [touched.start - 3, touched.start - 2, first] {
+                let near = (f64::from(first) * view.slabs.width - splat.depth + f64::from(z)) as f32;
+                // What f32 makes of the near plane.
+                let depth = f64::from(first) * view.slabs.width - (f64::from(near) - f64::from(z));
+                let splat = reference::Splat { depth, ..splat };
+                let tiles = view.size.map(|pixels| pixels.div_ceil(SIDE)).iter().product::<u32>();
+                let bins = TileBins {
+                    first_slab: first,
+                    tiles,
+                    groups: 1,
+                    starts: (0..=tiles).collect(),
+                    entries: vec![0xff00_0000; tiles as usize],
+                    half_boxes: vec![view.half_box(kernel.support(), 0.0..1.0)],
+                    passes: fixture.bins().passes,
+                    dispatches: 1,
+                };
+                let drawn = fixture.draw(&bins, Some(near), &fixture.empty(), u32::MAX);
+                let group = first..first + SHEETS as i32;
+                let expected = group
+                    .clone()
+                    .map(|k| fixture.seen.twin(&[splat], k))
+                    .reduce(|sum, sheet| sum.iter().zip(&sheet).map(|(sum, sheet)| sum + sheet).collect())
+                    .unwrap();
+                let tolerance: f64 = group.clone().map(|k| fixture.seen.summed_area_tolerance(&splat, first, k)).sum();
+                let what = format!("{splat:?} in slabs {group:?}");
+                fixture.seen.assert_close(&drawn.acc, &expected, |_| tolerance, &what);
+                lit += expected.iter().filter(|pixel| pixel.w > 0.0).count();
+
+                let sections = group.filter(|k| fixture.seen.touched(&splat).contains(k)).count() as u32;
+                let half_box = view.footprint.half_box(kernel.support());
+                let is_on_screen = (splat.center + half_box - 0.5).min_element() >= 0.0
+                    && (fixture.seen.geometry.size - 0.5 - splat.center + half_box).min_element() >= 0.0;
+                let sections = if is_on_screen { sections } else { 0 };
+                assert_eq!(drawn.tally.sections_rasterized, sections, "{what}");
+                assert_eq!(drawn.tally.voxels_shaded, sections.min(1), "{what}");
+            }
+        }
+    }
+    assert!(lit > 100_000, "only {lit} pixels were compared");
+}
+
+/// Values of a small volume with noise everywhere, transparent in places, with its transfer function: ramps that a thread holds,
+/// or others with more points than that.
+fn noise(random: &mut Random, dims: UVec3, spacing: [f64; 3], opacity: f64, points: u32) -> (Volume, TransferSettings) {
+    let values = (0..dims.element_product()).map(|_| random.uniform(0.0, 255.0) as f32).collect();
+    let volume = Volume::new("noise", dims, DVec3::from(spacing), values).unwrap();
+    let at = |i: u32| 255.0 * f64::from(i) / f64::from(points);
+    let color: Vec<_> = (0..points).map(|i| (at(i), [(); 3].map(|()| random.uniform(0.0, 1.0)))).collect();
+    let scalar: Vec<_> = (0..points).map(|i| (at(i) + 60.0, random.uniform(0.1, 1.0) * opacity)).collect();
+    let opacity: Vec<_> = [(40.0, 0.0)].into_iter().chain(scalar).collect();
+    let gradient = (0..points).map(|i| (at(i), random.uniform(0.2, 1.0))).collect();
+    (volume, TransferSettings { gradient_opacity: Some(Ramp::new(gradient).unwrap()), ..transfer(&color, &opacity) })
+}
+
+/// Direction, spacing, `unit`s per pixel, and image size.
+type Frame = ([f64; 3], [f64; 3], f64, [u32; 2]);
+
+/// Along an axis and oblique, anisotropic, magnified and minified, with parts off
+/// the screen, and sizes that are no multiples of a tile's.
+const FRAMES: [Frame; 8] = [
+    ([0.0, 1.0, 0.0], [1.0, 1.0, 1.0], 0.25, [70, 45]),
+    ([-0.3, -0.9, 0.2], [1.0, 1.0, 1.0], 0.5, [33, 50]),
+    ([0.0, 0.0, 1.0], [1.0, 1.0, 3.0], 0.7, [16, 32]),
+    ([0.6, 0.5, 0.6], [1.0, 1.0, 3.0], 0.4, [65, 17]),
+    ([0.6, -0.5, -0.6], [1.0, 1.0, 5.0], 0.3, [47, 64]),
+    ([0.5, 0.3, 0.8], [3.2, 3.2, 1.5], 0.05, [40, 31]),
+    ([0.1, 0.9, 0.4], [1.0, 1.0, 5.0], 4.0, [15, 7]),
+    ([0.7, 0.2, 0.3], [1.0, 2.0, 1.0], 12.0, [1, 1]),
+];
+
+/// A scene with a frame's camera, not quite at the middle.
+fn frame_scene((direction, spacing, units_per_pixel, [width, height]): Frame, random: &mut Random) -> Scene {
+    let mut scene = scene(width, height);
+    let unit = spacing.into_iter().fold(f64::INFINITY, f64::min);
+    scene.camera = camera(direction, units_per_pixel * unit * f64::from(height));
+    scene.camera.up = DVec3::new(0.2, 0.3, 1.0);
+    scene.camera.center = DVec3::from_array([(); 3].map(|()| random.uniform(-2.0, 2.0)));
+    scene
+}
+
+/// An eye that sees a frame's plane of the middle at the frame's scale, before the volume or in it.
+fn eye((_, spacing, units_per_pixel, [_, height]): Frame, random: &mut Random) -> Projection {
+    let unit = spacing.into_iter().fold(f64::INFINITY, f64::min);
+    let distance = random.uniform(6.0, 40.0);
+    let fov_y = 2.0 * (units_per_pixel * f64::from(height) / 2.0 / distance).atan().to_degrees();
+    let near = random.uniform(1.0, 6.0);
+    Projection::Perspective { fov_y, distance: Some(distance * unit), near: Some(near * unit) }
+}
+
+#[test]
+fn frames() {
+    let (gpu, stage) = (gpu(), Gather::default());
+    let mut random = Random(42);
+    let mut lit = 0;
+    for (compositing, order) in [Compositing::Linear, Compositing::Exponential, Compositing::Xray]
+        .into_iter()
+        .flat_map(|compositing| [Order::FrontToBack, Order::BackToFront].map(|order| (compositing, order)))
+    {
+        for frame in FRAMES.into_iter().cycle().take(10) {
+            let mut scene = frame_scene(frame, &mut random);
+            let (radius, falloff) = KERNELS[random.bits() as usize % KERNELS.len()];
+            (scene.splatting.radius, scene.splatting.falloff) = (radius, falloff);
+            scene.splatting.slab_width = [0.3, 1.0, 2.6][random.bits() as usize % 3];
+            (scene.splatting.compositing, scene.splatting.order) = (compositing, order);
+            scene.splatting.culling = false;
+            if random.bits().is_multiple_of(2) {
+                scene.camera.projection = eye(frame, &mut random);
+            }
+            if random.bits().is_multiple_of(3) {
+                scene.splatting.method = Method::AxisAligned;
+            }
+            if random.bits().is_multiple_of(2) {
+                scene.shading.light = Light::Direction(random.direction());
+            }
+            let dims = UVec3::new(7, 10, 9);
+            let points = [1, 4, 8, 9, 40][random.bits() as usize % 5];
+            let opacity = if compositing == Compositing::Xray { 0.01 } else { 0.6 };
+            let (volume, transfer) = noise(&mut random, dims, frame.1, opacity, points);
+            scene.transfer = transfer;
+            let fixture = Fixture::new(&gpu, &stage, scene, volume);
+            let (actual, expected) = (fixture.draw_all().acc, fixture.twin());
+            let errors: Vec<DVec4> =
+                actual.iter().zip(&expected).map(|(actual, expected)| *actual - *expected).collect();
+            let worst = errors.iter().map(|error| error.abs().max_element()).fold(0.0, f64::max);
+            let mean_square =
+                errors.iter().map(|error| error.length_squared()).sum::<f64>() / (4 * errors.len()) as f64;
+            // Every kernel errs by less than 5e-6 of its peak, and mostly near its rim: too few of them meet in a pixel for more.
+            let what = format!("{:?}, {:?}", fixture.seen.scene, fixture.seen.kernel);
+            assert!(worst < 1e-4 && mean_square < 1e-10, "{worst}, mean square {mean_square}: {what}");
+            lit += expected.iter().filter(|pixel| (0.01..0.99).contains(&pixel.w)).count();
+        }
+    }
+    assert!(lit > 20_000, "only {lit} pixels were compared");
+}
+
+/// However groups are shared among dispatches, and rows among bindings: the same work, the same bytes.
+#[test]
+fn dispatches_and_bands_change_no_bit() {
+    let (gpu, stage) = (gpu(), Gather::default());
+    let mut random = Random(43);
+    for order in [Order::FrontToBack, Order::BackToFront] {
+        let (volume, transfer) = noise(&mut random, UVec3::new(17, 30, 21), [1.0, 1.0, 2.0], 0.9, 4);
+        let mut scene = Scene { transfer, camera: camera([0.3, 0.9, -0.2], 40.0), ..scene(101, 77) };
+        (scene.splatting.order, scene.splatting.opacity_threshold) = (order, 0.8);
+        let fixture = Fixture::new(&gpu, &stage, scene, volume);
+        let bins = fixture.bins();
+        assert!(bins.groups > 8 && bins.dispatches == 1, "{}", bins.dispatches);
+        let whole = fixture.draw(&bins, None, &fixture.empty(), u32::MAX);
+        assert!(whole.acc.iter().any(|pixel| pixel.w > 0.9));
+        assert!(whole.tally.sections_rasterized > 10_000, "{:?}", whole.tally);
+        // What no group exceeds.
+        let bricks = bins.starts.windows(2).map(|group| group[1] - group[0]).max().unwrap();
+        let one_group = bins.passes.per_group + bricks * bins.passes.per_brick();
+        // Enough for all, if each takes one group.
+        let dispatches = bins.groups;
+        for (most, rows) in [(one_group + 1000, u32::MAX), (one_group, 32), (bins.passes.most, 64)] {
+            let passes = Passes { most, ..bins.passes };
+            let first = TileBins { passes, dispatches: 1, ..bins.clone() };
+            let is_cut = fixture.draw(&first, None, &fixture.empty(), rows).acc != whole.acc;
+            assert_eq!(is_cut, most < bins.passes.most, "one dispatch of {most} passes");
+            let parts = fixture.draw(&TileBins { dispatches, ..first }, None, &fixture.empty(), rows);
+            // What is behind opaque pixels alone is not even fetched, or fetched in another dispatch.
+            let tally = Tally { bricks_visited: whole.tally.bricks_visited, ..parts.tally };
+            assert!(Drawn { tally, ..parts } == whole, "{order:?}, {rows} rows");
+        }
+    }
+}
+
+/// A mask of opaque pixels, drawn over: a voxel is drawn if and only if a pixel is not opaque whose centre lies in its footprint's box.
+/// Of a parallelogram what is outside the rectangle need not count.
+#[test]
+fn hidden_behind_what_is_there() {
+    let (gpu, stage) = (gpu(), Gather::default());
+    let mut random = Random(44);
+    let (mut drawn_in_all, mut hidden_in_all) = (0, 0);
+    for footprint_box in [FootprintBox::Rectangle, FootprintBox::Parallelogram] {
+        for frame in FRAMES.into_iter().cycle().take(24) {
+            let mut scene = frame_scene(frame, &mut random);
+            scene.splatting.footprint_box = footprint_box;
+            scene.splatting.radius = random.uniform(1.0, 3.0);
+            // So faint that nothing becomes opaque meanwhile.
+            scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 1e-6)]);
+            let values = vec![1.0; 8 * 9 * 7];
+            let volume = Volume::new("dense", UVec3::new(8, 9, 7), DVec3::from(frame.1), values).unwrap();
+            let fixture = Fixture::new(&gpu, &stage, scene, volume);
+            let open = open_pixels(&mut random, fixture.seen.view.size);
+            let mut acc = vec![DVec4::ONE; fixture.empty().len()];
+            for &[x, y] in &open {
+                acc[(y * fixture.seen.view.size[0] + x) as usize] = DVec4::ZERO;
+            }
+            let drawn = fixture.draw(&fixture.bins(), None, &acc, u32::MAX).drawn;
+
+            let Seen { kernel, geometry, .. } = &fixture.seen;
+            let half_box = geometry.half_box(kernel.support());
+            let sheared = Footprint::new(geometry.footprint_from_pixels).sheared_from_pixels();
+            let half_width = kernel.support() / sheared.x_axis.x;
+            // Whether the box, so many pixels larger, holds the centre of an open pixel.
+            let is_open = |center: DVec2, slack: f64, also_outside: bool| {
+                open.iter().any(|&[x, y]| {
+                    let d = DVec2::new(x.into(), y.into()) + 0.5 - center;
+                    let in_rectangle = d.abs().cmple(half_box + slack);
+                    let across = d.x + d.y * sheared.y_axis.x / sheared.x_axis.x;
+                    let is_between = in_rectangle.y && across.abs() <= half_width + slack;
+                    match footprint_box {
+                        FootprintBox::Rectangle => in_rectangle.all(),
+                        FootprintBox::Parallelogram => is_between && (in_rectangle.x || also_outside),
+                    }
+                })
+            };
+            for (at, brick) in fixture.bricks.bricks().iter().enumerate() {
+                for (slot, voxel) in brick::voxels(brick) {
+                    // In the first group that the kernel reaches into.
+                    let is_drawn = drawn[at * 2 + slot as usize / 32] >> (slot % 32) & 1 == 1;
+                    let center = geometry.pixel(voxel);
+                    let what = || format!("{voxel} at {center}, {footprint_box:?}, {frame:?}, {kernel:?}");
+                    assert!(is_drawn || !is_open(center, 0.0, false), "not drawn: {}", what());
+                    // The shader's slack is a hundredth of a pixel.
+                    assert!(!is_drawn || is_open(center, 0.02, true), "drawn: {}", what());
+                    drawn_in_all += usize::from(is_drawn);
+                    hidden_in_all += usize::from(!is_drawn);
+                }
+            }
+        }
+    }
+    assert!(drawn_in_all > 2000 && hidden_in_all > 2000, "{drawn_in_all} drawn, {hidden_in_all} hidden");
+}
+
+/// Some rectangles and single pixels of an image.
+fn open_pixels(random: &mut Random, size: [u32; 2]) -> Vec<[u32; 2]> {
+    let mut pixels = Vec::new();
+    for _ in 0..random.bits() % 4 {
+        let most = if random.bits().is_multiple_of(2) { 1.0 } else { 12.0 };
+        let [left, top] = size.map(|side| random.uniform(0.0, f64::from(side)) as u32);
+        let [width, height] = [(); 2].map(|()| random.uniform(1.0, most + 1.0) as u32);
+        let rows = top..size[1].min(top + height);
+        pixels.extend(rows.flat_map(|y| (left..size[0].min(left + width)).map(move |x| [x, y])));
+    }
+    pixels
+}

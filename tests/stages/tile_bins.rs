@@ -1,0 +1,174 @@
+//! The tile rasterizer's bins against `reference::geometry`: every kernel's brick is in the bin of every tile and sheet group that the
+//! kernel reaches into.
+
+use std::collections::BTreeSet;
+
+use glam::{DVec2, DVec4, UVec3};
+use sheetsplat::brick::{self, BrickList};
+use sheetsplat::camera::Projection;
+use sheetsplat::kernel::Kernel;
+use sheetsplat::reference::{self, Geometry};
+use sheetsplat::scene::Scene;
+use sheetsplat::splatting::Order;
+use sheetsplat::tile_bins::{SHEETS, SIDE, TileBins, Unfit};
+use sheetsplat::view::View;
+use sheetsplat::volume::Grid;
+
+use crate::common::{Random, camera, scene};
+
+/// Width and height of the units of a tile.
+const UNIT: [u32; 2] = [8, 4];
+
+/// A view of some bricks.
+struct Case {
+    scene: Scene,
+    grid: Grid,
+    bricks: BrickList,
+}
+
+impl Case {
+    /// With voxels that take no part.
+    fn new(random: &mut Random, spacing: [f64; 3], size: [u32; 2]) -> Self {
+        let grid = Grid { dims: UVec3::new(15, 13, 18), spacing: spacing.into() };
+        let count = grid.dims.element_product();
+        let voxels: Vec<u32> = (0..count).filter(|_| random.uniform(0.0, 1.0) < 0.3).collect();
+        let mut scene = scene(size[0], size[1]);
+        let unit = grid.unit();
+        scene.camera = camera(random.direction().to_array(), random.uniform(5.0, 40.0) * unit);
+        scene.splatting.radius = random.uniform(1.0, 3.0);
+        scene.splatting.slab_width = [0.3, 1.0, 2.6][random.bits() as usize % 3];
+        if random.bits().is_multiple_of(2) {
+            let distance = Some(random.uniform(10.0, 60.0) * unit);
+            scene.camera.projection = Projection::Perspective { fov_y: 40.0, distance, near: Some(4.0 * unit) };
+        }
+        if random.bits().is_multiple_of(2) {
+            scene.splatting.order = Order::BackToFront;
+        }
+        Self { scene, grid, bricks: BrickList::new(&grid, &voxels) }
+    }
+
+    fn kernel(&self) -> Kernel {
+        Kernel::new(self.scene.splatting.radius, self.scene.splatting.falloff)
+    }
+
+    fn bins(&self, most_words: u64) -> Result<TileBins, Unfit> {
+        let Scene { camera, splatting, image, .. } = &self.scene;
+        let view = View::new(&self.grid, camera, splatting, [image.width, image.height]).unwrap();
+        TileBins::new(self.bricks.bricks(), &view, splatting.order, self.kernel().support(), 0, most_words)
+    }
+
+    /// What the kernels need: group, number of the unit on the screen, brick.
+    fn needed(&self) -> BTreeSet<(i32, [u32; 2], u32)> {
+        let geometry = Geometry::new(&self.grid, &self.scene).unwrap();
+        let kernel = self.kernel();
+        let last = geometry.size - 1.0;
+        let mut needed = BTreeSet::new();
+        for (number, brick) in (0..).zip(self.bricks.bricks()) {
+            for (_, voxel) in brick::voxels(brick).filter(|(_, voxel)| geometry.is_beyond_near(*voxel)) {
+                let (center, depth) = (geometry.pixel(voxel), geometry.depth(voxel));
+                let splat = reference::Splat { center, depth, amount: DVec4::ONE, alpha: 1.0 };
+                for k in geometry.slabs(&splat, kernel.radius()) {
+                    let Some(section) = geometry.section(&splat, k, &kernel) else { continue };
+                    let (low, high) = section.pixels(kernel.support());
+                    let (low, high) = (low.max(DVec2::ZERO), high.min(last));
+                    if low.cmple(high).all() {
+                        let [low, high] = [low, high].map(|pixel| pixel.as_uvec2().to_array());
+                        let units = |axis: usize| low[axis] / UNIT[axis]..=high[axis] / UNIT[axis];
+                        let group = k.div_euclid(SHEETS as i32);
+                        needed.extend(units(1).flat_map(|y| units(0).map(move |x| (group, [x, y], number))));
+                    }
+                }
+            }
+        }
+        needed
+    }
+
+    /// What the bins hold.
+    fn held(&self, bins: &TileBins) -> BTreeSet<(i32, [u32; 2], u32)> {
+        let columns = self.scene.image.width.div_ceil(SIDE);
+        let first_group = bins.first_slab.div_euclid(SHEETS as i32);
+        let mut held = BTreeSet::new();
+        for (bin, bounds) in bins.starts.windows(2).enumerate() {
+            let (tile, at) = (bin as u32 / bins.groups, bin as u32 % bins.groups);
+            let in_order = match self.scene.splatting.order {
+                Order::FrontToBack => at,
+                Order::BackToFront => bins.groups - 1 - at,
+            };
+            let entries = &bins.entries[bounds[0] as usize..bounds[1] as usize];
+            let position = |entry: &u32| brick::position(&self.bricks.bricks()[(entry & 0xff_ffff) as usize]);
+            assert!(entries.is_sorted_by(|a, b| position(a) < position(b)), "in memory order, once each");
+            for entry in entries {
+                for unit in (0..8).filter(|unit| entry >> (24 + unit) & 1 == 1) {
+                    let at = [tile % columns * 2 + unit % 2, tile / columns * 4 + unit / 2];
+                    held.insert((first_group + in_order as i32, at, entry & 0xff_ffff));
+                }
+            }
+        }
+        held
+    }
+}
+
+#[test]
+fn every_kernel_is_in_the_bins_that_it_reaches_into() {
+    let mut random = Random(51);
+    // Needed and held, of views without and with an eye.
+    let mut all = [[0, 0]; 2];
+    for spacing in [[1.0, 1.0, 1.0], [1.0, 1.0, 5.0], [3.2, 3.2, 1.5]] {
+        for size in [[64, 48], [33, 17], [7, 90], [1, 1]].into_iter().cycle().take(12) {
+            let case = Case::new(&mut random, spacing, size);
+            let bins = case.bins(u64::MAX).unwrap();
+            let (needed, held) = (case.needed(), case.held(&bins));
+            assert_eq!(bins.half_boxes.len(), bins.groups as usize);
+            let missing: Vec<_> = needed.difference(&held).collect();
+            assert!(missing.is_empty(), "{} of {}, {:?}: {:?}", missing.len(), needed.len(), missing[0], case.scene);
+            let of = &mut all[usize::from(matches!(case.scene.camera.projection, Projection::Perspective { .. }))];
+            *of = [of[0] + needed.len(), of[1] + held.len()];
+        }
+    }
+    // Bricks are boxes around their voxels, and footprints have one box in all of a group.
+    let [without, with] = all.map(|[needed, held]| held as f64 / needed as f64);
+    assert!(without < 1.6 && with < 3.0, "{without} and {with} times as much as needed");
+}
+
+/// As many dispatches as what is behind two pixels may take, and hardly more.
+#[test]
+fn dispatches_are_enough() {
+    let mut random = Random(52);
+    for (side, slab_width, is_one) in [(20, 1.0, true), (24, 1.0, false), (24, 0.3, false), (4, 0.05, true)] {
+        let mut case = Case::new(&mut random, [1.0; 3], [2, 2]);
+        case.grid.dims = UVec3::splat(side);
+        case.bricks = BrickList::new(&case.grid, &(0..side.pow(3)).collect::<Vec<_>>());
+        case.scene.camera = camera([0.3, 0.9, -0.2], 30.0);
+        (case.scene.splatting.radius, case.scene.splatting.slab_width) = (1.5, slab_width);
+        let bins = case.bins(u64::MAX).unwrap();
+        assert_eq!(bins.dispatches == 1, is_one, "{side} {slab_width}: {}", bins.dispatches);
+        let (passes, bricks) = (bins.passes, bins.entries.len() as u32);
+        let all = bins.groups * passes.per_group + bricks * (passes.per_brick() + passes.per_fetch);
+        assert!(bins.dispatches * passes.most >= all - bricks * passes.per_fetch, "{} for {all}", bins.dispatches);
+        assert!(bins.dispatches <= 2 * (all / passes.most) + 1, "{} for {all}", bins.dispatches);
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_named() {
+    let mut random = Random(53);
+    let mut case = Case::new(&mut random, [1.0; 3], [64, 48]);
+    case.scene.camera = camera([0.3, 0.9, -0.2], 30.0);
+    let bins = case.bins(u64::MAX).unwrap();
+    let [starts, entries] = [&bins.starts, &bins.entries].map(|list| list.len() as u64);
+    assert!(starts < entries);
+    assert_eq!(case.bins(entries).as_ref(), Ok(&bins), "just enough room");
+    let unfit = |what, required, actual| Err(Unfit { what, required, actual });
+    assert_eq!(case.bins(entries - 1), unfit("bricks' parts in tiles and sheet groups", entries, entries - 1));
+    assert_eq!(case.bins(starts - 1), unfit("tiles times sheet groups", starts - 1, starts - 2));
+
+    // 2744 bricks behind two pixels, in four sheets.
+    case.grid.dims = UVec3::splat(56);
+    case.bricks = BrickList::new(&case.grid, &(0..56 * 56 * 56).collect::<Vec<_>>());
+    (case.scene.image.width, case.scene.image.height) = (2, 2);
+    (case.scene.splatting.slab_width, case.scene.camera) = (8.0, camera([0.0, 1.0, 0.0], 60.0));
+    let Err(Unfit { what: "bricks behind a tile in one sheet group", required, actual }) = case.bins(u64::MAX) else {
+        panic!("all bricks fit");
+    };
+    assert!(actual < required && required <= 2744, "{required} {actual}");
+}
