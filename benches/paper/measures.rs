@@ -137,8 +137,13 @@ pub(crate) fn warp_or_slices(degrees: f64) -> [(f64, f64); 2] {
     let variance: f64 = 6.0 / 25.0;
     let gaussian = |t: f64| (-t * t / (2.0 * variance)).exp() / (std::f64::consts::TAU * variance).sqrt();
     let linear = |t: f64| (1.0 - t.abs()).max(0.0);
-    let scene =
-        turned(&open("ball", &["splatting.compositing=\"xray\"", "transfer.opacity=[[0,0],[510,0.02]]"]), degrees);
+    let scene = turned(
+        &open(
+            "ball",
+            &["image={width=64,height=64}", "splatting.compositing=\"xray\"", "transfer.opacity=[[0,0],[510,0.02]]"],
+        ),
+        degrees,
+    );
     let image = |volume: &Volume| reference::render(volume, &scene.transfer.resolve(volume), &scene).unwrap();
     let warped = image(&thick);
     let peak = warped.pixels.iter().fold(0.0_f32, |peak, pixel| peak.max(pixel[0]));

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
-use sheetsplat::scene::Scene;
+use sheetsplat::scene::{Scene, VolumeSource};
 
 /// Down the x axis, from which the nerve is seen in the tables.
 const SIDE_ON: &str = "camera.direction=[1,0,0]";
@@ -32,13 +32,13 @@ fn shared(path: &str) -> Option<PathBuf> {
 pub(crate) fn neuron() -> Option<Scene> {
     let scene = open("nerve", &[]);
     shared("data/neuron.nrrd").map(|path| Scene {
-        volume: sheetsplat::scene::VolumeSource::File(path),
+        volume: VolumeSource::File(path),
         spacing: Some(NEURON_SPACING),
         ..scene
     })
 }
 
-/// The direction of a camera that turned about its `up` by some degrees, by the right hand.
+/// A scene whose camera turned about its `up` by some degrees, by the right hand.
 pub(crate) fn turned(scene: &Scene, degrees: f64) -> Scene {
     let mut scene = scene.clone();
     let rotation = DMat3::from_axis_angle(scene.camera.up.normalize(), degrees.to_radians());
