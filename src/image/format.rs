@@ -1,0 +1,74 @@
+//! File formats, and what can be wrong with a file.
+
+use std::path::{Path, PathBuf};
+
+/// Why an image could not be opened or saved.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImageError {
+    /// The extension names no known format.
+    #[error("{}: extension: found {found}, allowed: .png, .exr or .npy", path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// Its extension.
+        found: String,
+    },
+    /// The file could not be read or written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// The image could not be encoded.
+    #[error("{}: {source}", path.display())]
+    Encode {
+        /// The file.
+        path: PathBuf,
+        /// What the encoder said.
+        source: ::image::ImageError,
+    },
+    /// The file is not what its extension says.
+    #[error("{}: {source}", path.display())]
+    Decode {
+        /// The file.
+        path: PathBuf,
+        /// What the decoder said.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// The file holds no image of four channels.
+    #[error("{}: {what}: found {found}, allowed: {allowed}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What of it (`shape`, …).
+        what: &'static str,
+        /// What the file says.
+        found: String,
+        /// What would do.
+        allowed: String,
+    },
+}
+
+/// File formats by extension.
+pub(super) enum Format {
+    Png,
+    Exr,
+    Npy,
+}
+
+impl Format {
+    pub(super) fn of(path: &Path) -> Result<Self, ImageError> {
+        match path.extension().and_then(|extension| extension.to_str()) {
+            Some("png") => Ok(Self::Png),
+            Some("exr") => Ok(Self::Exr),
+            Some("npy") => Ok(Self::Npy),
+            extension => Err(ImageError::Format {
+                path: path.to_owned(),
+                found: extension.map_or("none".to_owned(), |extension| format!("\".{extension}\"")),
+            }),
+        }
+    }
+}

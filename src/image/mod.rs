@@ -1,0 +1,29 @@
+//! Rendered images and the files they are saved as.
+
+#[cfg(feature = "codecs")]
+mod format;
+#[cfg(feature = "codecs")]
+mod open;
+#[cfg(feature = "codecs")]
+mod save;
+
+#[cfg(feature = "codecs")]
+use format::Format;
+#[cfg(feature = "codecs")]
+pub use format::ImageError;
+#[cfg(feature = "codecs")]
+pub use save::PngDepth;
+#[cfg(feature = "codecs")]
+#[doc(hidden)]
+pub use save::{aside, write_aside};
+
+/// An image of f32 premultiplied RGBA, row 0 at the top. Colours are display-referred (SPEC §3).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// Pixels per row.
+    pub width: u32,
+    /// Number of rows.
+    pub height: u32,
+    /// `width · height` pixels, row by row.
+    pub pixels: Vec<[f32; 4]>,
+}
