@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use wgpu::{Adapter, Backends, Device, DeviceType, Instance, InstanceDescriptor, Queue, TextureFormat};
+use wgpu::{Adapter, AdapterInfo, Backends, Device, DeviceType, Instance, InstanceDescriptor, Queue, TextureFormat};
 
 use crate::error::{Error, RenderError};
 use crate::gpu::device::{DeviceError, DeviceRequirements};
@@ -174,8 +174,8 @@ impl Headless {
         Ok(Rendering {
             image: Image { width, height, pixels: bytemuck::pod_collect_to_vec(&bytes) },
             stats: Stats {
+                driver: driver_name(&info),
                 adapter: info.name,
-                driver: [info.driver, info.driver_info].join(" ").trim().to_owned(),
                 backend: info.backend.to_str().to_owned(),
                 width,
                 height,
@@ -231,6 +231,11 @@ fn choose_adapter(name: Option<&str>) -> Result<Adapter, DeviceError> {
         required: name.map_or("any Vulkan, Metal or DirectX 12 adapter".to_owned(), |name| format!("\"{name}\"")),
         actual: if names.is_empty() { "none".to_owned() } else { names.join(", ") },
     })
+}
+
+/// An adapter's driver, and its version where it tells.
+pub(crate) fn driver_name(info: &AdapterInfo) -> String {
+    format!("{} {}", info.driver, info.driver_info).trim().to_owned()
 }
 
 fn milliseconds_since(start: Instant) -> f64 {

@@ -44,6 +44,8 @@ pub mod classified_volume;
 pub mod classify;
 pub mod error;
 pub mod footprint;
+#[cfg(feature = "golden")]
+pub mod golden;
 pub mod gpu;
 pub mod grid_warp;
 pub mod headless;
@@ -72,6 +74,6 @@ pub mod volume;
 pub use wgpu;
 
 /// The README's code, run as a doc test.
-#[cfg(doctest)]
+#[cfg(all(doctest, feature = "golden"))]
 #[doc = include_str!("../README.md")]
 pub struct Readme;

@@ -1,0 +1,109 @@
+//! Why an image does not pass.
+
+use std::fmt::{Display, Formatter};
+use std::path::PathBuf;
+
+use super::{Bless, Comparison, ComparisonError, LaxTolerance, MadeOn};
+use crate::image::ImageError;
+
+/// Why an image was not compared with its golden, or does not look like it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum GoldenError {
+    /// The golden's name is none.
+    #[error("golden: found name {found:?}, allowed: letters, digits, \"-\", \"_\" and, not first, \".\"; not \"all\"")]
+    Name {
+        /// The name.
+        found: String,
+    },
+    /// The environment variable names no goldens.
+    #[error("{variable}: {0}", variable = Bless::VARIABLE)]
+    Bless(Box<GoldenError>),
+    /// The tolerance is too wide.
+    #[error(transparent)]
+    Lax(#[from] LaxTolerance),
+    /// The test's source file is not where it was compiled.
+    #[error("{file}: not found in {} nor above it; Golden::new takes the folder of the goldens", manifest_dir.display())]
+    Source {
+        /// The file.
+        file: String,
+        /// The package's folder.
+        manifest_dir: PathBuf,
+    },
+    /// The image itself is none.
+    #[error("golden \"{name}\": {source}")]
+    Subject {
+        /// The golden's name.
+        name: String,
+        /// What is wrong with it.
+        source: ComparisonError,
+    },
+    /// A golden could not be written, or what an earlier failure left could not be removed.
+    #[error(transparent)]
+    File(#[from] ImageError),
+    /// The image does not look like its golden.
+    #[error(transparent)]
+    Failure(#[from] Box<Failure>),
+}
+
+/// An image that does not pass. Displayed, it is a report of several lines.
+#[derive(Debug, thiserror::Error)]
+pub struct Failure {
+    /// The golden's name.
+    pub name: String,
+    /// The golden's file.
+    pub golden: PathBuf,
+    /// What the golden was made on, if it says so.
+    pub golden_made_on: Option<MadeOn>,
+    /// What the image was made on, if known.
+    pub actual_made_on: Option<MadeOn>,
+    /// Why it does not pass.
+    pub reason: Reason,
+    /// The folder with `NAME-actual.png`, `NAME-report.txt` and, of images of one size, `NAME-difference.png`; or why they
+    /// could not be left there.
+    pub left_in: Result<PathBuf, ImageError>,
+}
+
+/// Why an image does not pass.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum Reason {
+    /// There is no golden.
+    Missing,
+    /// The golden cannot be read.
+    Unreadable(ImageError),
+    /// The golden is no image of the same size.
+    Incomparable(ComparisonError),
+    /// They differ by more than is allowed.
+    Differs(Comparison),
+}
+
+impl Display for Failure {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        let Self { name, golden, left_in, .. } = self;
+        let golden = golden.display();
+        let made_on = |made_on: &Option<MadeOn>| match made_on {
+            Some(made_on) => made_on.to_string(),
+            None => "an unknown adapter".to_owned(),
+        };
+        match &self.reason {
+            Reason::Missing => writeln!(f, "golden \"{name}\": {golden}: there is none")?,
+            Reason::Unreadable(error) => writeln!(f, "golden \"{name}\": {error}")?,
+            Reason::Incomparable(error) => writeln!(f, "golden \"{name}\": {golden}: {error}")?,
+            Reason::Differs(comparison) => {
+                writeln!(f, "golden \"{name}\": {golden}: the actual image differs")?;
+                writeln!(f, "{comparison}")?;
+                if !MadeOn::same(self.golden_made_on.as_ref(), self.actual_made_on.as_ref()) {
+                    writeln!(f, "compared with the widest tolerance, as the adapters are not the same")?;
+                }
+                writeln!(f, "golden made on: {}", made_on(&self.golden_made_on))?;
+            }
+        }
+        writeln!(f, "actual image made on: {}", made_on(&self.actual_made_on))?;
+        match left_in {
+            Ok(folder) => writeln!(f, "left: {}-*", folder.join(name).display())?,
+            Err(error) => writeln!(f, "nothing left: {error}")?,
+        }
+        write!(f, "{}={name} makes the actual image the golden, if it is right", Bless::VARIABLE)
+    }
+}

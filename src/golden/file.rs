@@ -1,0 +1,58 @@
+//! Goldens as files: PNGs as small as can be, with the adapter and driver as text.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use super::MadeOn;
+use crate::image::{ImageError, write_aside};
+
+const ADAPTER: &str = "Adapter";
+const DRIVER: &str = "Driver";
+
+/// Writes pixels of 8 bits with straight alpha, aside and then renamed, into a folder that is made if there is none.
+pub(super) fn write(
+    path: &Path,
+    [width, height]: [u32; 2],
+    pixels: &[[u8; 4]],
+    made_on: Option<&MadeOn>,
+) -> Result<(), ImageError> {
+    let write = || {
+        let bytes = encode([width, height], pixels, made_on)?;
+        path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
+        write_aside(path, &bytes)
+    };
+    write().map_err(|source| ImageError::Io { path: path.to_owned(), source })
+}
+
+fn encode([width, height]: [u32; 2], pixels: &[[u8; 4]], made_on: Option<&MadeOn>) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    let opaque = pixels.iter().all(|pixel| pixel[3] == u8::MAX);
+    encoder.set_color(if opaque { png::ColorType::Rgb } else { png::ColorType::Rgba });
+    encoder.set_compression(png::Compression::High);
+    encoder.set_filter(png::Filter::Adaptive);
+    if let Some(MadeOn { adapter, driver }) = made_on {
+        encoder.add_itxt_chunk(ADAPTER.to_owned(), adapter.clone())?;
+        encoder.add_itxt_chunk(DRIVER.to_owned(), driver.clone())?;
+    }
+    let mut writer = encoder.write_header()?;
+    let channels: Vec<u8> = if opaque {
+        pixels.iter().flat_map(|&[r, g, b, _]| [r, g, b]).collect()
+    } else {
+        pixels.as_flattened().to_vec()
+    };
+    writer.write_image_data(&channels)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// What a file says it was made on; nothing unless it is a PNG with such a text.
+pub(super) fn made_on(path: &Path) -> Option<MadeOn> {
+    let reader = png::Decoder::new(BufReader::new(File::open(path).ok()?)).read_info().ok()?;
+    let text = |keyword: &str| {
+        let chunks = &reader.info().utf8_text;
+        chunks.iter().find(|chunk| chunk.keyword == keyword && !chunk.compressed)?.get_text().ok()
+    };
+    Some(MadeOn { adapter: text(ADAPTER)?, driver: text(DRIVER)? })
+}

@@ -1,0 +1,262 @@
+//! Golden images for tests: pictures that were looked at once, and that later ones must look like.
+//!
+//! [`assert_golden!`](crate::assert_golden) compares an image with `goldens/NAME.png` in the folder of the test's source file:
+//!
+//! ```no_run
+//! use sheetsplat::assert_golden;
+//! use sheetsplat::golden::Tolerance;
+//! # use sheetsplat::headless::{Headless, HeadlessOptions};
+//! # use sheetsplat::scene::{Scene, VolumeSource};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let headless = Headless::new(&HeadlessOptions::default())?;
+//! # let scene = Scene::from_volume(VolumeSource::Builtin("head:48".to_owned()), &[])?;
+//! let rendering = headless.render(&scene)?;
+//! assert_golden!("head", rendering);
+//! // With a tolerance of its own: 4 of 255 per channel, and one pixel in 1000 that may differ by more.
+//! assert_golden!("head", rendering, Tolerance::new(4, 0.001)?);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! [`golden!`](crate::golden!) is the same as a value, for what else can be set, and [`Golden::check`] gives a result instead of
+//! panicking. [`Comparison`] alone compares any two images:
+//!
+//! ```
+//! use sheetsplat::golden::{Comparison, Tolerance};
+//! use sheetsplat::image::Image;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let golden = Image { width: 8, height: 4, pixels: vec![[0.5, 0.5, 0.5, 1.0]; 32] };
+//! let mut actual = golden.clone();
+//! actual.pixels[9] = [0.5, 0.7, 0.5, 1.0];
+//! let comparison = Comparison::new(&actual, &golden, Tolerance::default())?;
+//! assert!(!comparison.passes());
+//! assert_eq!((comparison.max, comparison.worst, comparison.outliers), ([0, 51, 0, 0], [1, 1], 1));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Blessing
+//!
+//! `SHEETSPLAT_BLESS=all cargo test`, or the names of goldens with commas between them, makes an image the golden where there is
+//! none or the image fails. Goldens that pass are left as they are, to the byte. Look at what changed before you commit it.
+//!
+//! # Failures
+//!
+//! What fails is left under `target/goldens`, in a folder named like the test's source file: the actual image, an image of where it
+//! differs, and a report. A later success removes them.
+//!
+//! # Adapters
+//!
+//! A [`Rendering`](crate::headless::Rendering) says what it was made on, and so does its golden, in texts `Adapter` and `Driver` of
+//! the PNG; reports name both. On another adapter than the golden's an image is compared with [`Tolerance::WIDEST`], whatever the
+//! test says: GPUs round differently. So is an image that does not say what it was made on with a golden that does.
+
+mod bless;
+mod comparison;
+mod error;
+mod file;
+mod site;
+mod subject;
+mod tolerance;
+
+use std::io::ErrorKind;
+use std::path::PathBuf;
+
+pub use bless::Bless;
+pub use comparison::{Comparison, ComparisonError};
+pub use error::{Failure, GoldenError, Reason};
+#[doc(hidden)]
+pub use site::Site;
+pub use subject::{MadeOn, Picture, Subject};
+pub use tolerance::{LaxTolerance, Tolerance};
+
+use crate::image::{Image, ImageError, PngDepth, write_aside};
+
+/// Asserts that an image looks like its golden, `goldens/NAME.png` in the folder of the source file.
+///
+/// `assert_golden!(name, image)`, or `assert_golden!(name, image, tolerance)`, where `image` is a [`Subject`](crate::golden::Subject)
+/// or a reference to one. See [`golden`](mod@crate::golden).
+///
+/// # Panics
+/// With a report, if it does not look like it, or for any other [`GoldenError`](crate::golden::GoldenError).
+#[macro_export]
+macro_rules! assert_golden {
+    ($name:expr, $image:expr $(,)?) => {
+        $crate::assert_golden!($name, $image, $crate::golden::Tolerance::default())
+    };
+    ($name:expr, $image:expr, $tolerance:expr $(,)?) => {
+        match $crate::golden!($name).and_then(|golden| golden.tolerance($tolerance).check(&$image)) {
+            Ok($crate::golden::Outcome::Passed(_)) => {}
+            Ok($crate::golden::Outcome::Blessed(path)) => println!("blessed {}", path.display()),
+            Err(error) => panic!("{error}"),
+        }
+    };
+}
+
+/// The golden that [`assert_golden!`](crate::assert_golden) would compare with here: a
+/// `Result<`[`Golden`](crate::golden::Golden)`, `[`GoldenError`](crate::golden::GoldenError)`>`.
+#[macro_export]
+macro_rules! golden {
+    ($name:expr $(,)?) => {
+        $crate::golden::Golden::beside(
+            $name,
+            $crate::golden::Site {
+                manifest_dir: env!("CARGO_MANIFEST_DIR"),
+                file: file!(),
+                target_tmpdir: option_env!("CARGO_TARGET_TMPDIR"),
+            },
+        )
+    };
+}
+
+/// A golden, and how images are compared with it.
+#[derive(Clone, Debug)]
+pub struct Golden {
+    name: String,
+    folder: PathBuf,
+    failures: PathBuf,
+    tolerance: Tolerance,
+    bless: Option<Bless>,
+}
+
+/// What became of an image that was checked.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// It looks like its golden.
+    Passed(Comparison),
+    /// It is now the golden, this file.
+    Blessed(PathBuf),
+}
+
+impl Golden {
+    /// The golden `folder/NAME.png`; what fails is left in the folder `failures`.
+    ///
+    /// # Errors
+    /// If the name has other characters than letters, digits, `-`, `_` and `.`, begins with `.`, is empty, or is `all`.
+    pub fn new(name: &str, folder: impl Into<PathBuf>, failures: impl Into<PathBuf>) -> Result<Self, GoldenError> {
+        bless::check_name(name)?;
+        Ok(Self {
+            name: name.to_owned(),
+            folder: folder.into(),
+            failures: failures.into(),
+            tolerance: Tolerance::default(),
+            bless: None,
+        })
+    }
+
+    /// What [`golden!`](crate::golden!) calls.
+    ///
+    /// # Errors
+    /// As [`Golden::new`], and if the source file is gone.
+    #[doc(hidden)]
+    pub fn beside(name: &str, site: Site<'_>) -> Result<Self, GoldenError> {
+        Self::new(name, site.goldens()?, site.failures())
+    }
+
+    /// Allows another tolerance than the default.
+    #[must_use]
+    pub fn tolerance(self, tolerance: Tolerance) -> Self {
+        Self { tolerance, ..self }
+    }
+
+    /// Leaves what fails in another folder: for several images that have one golden.
+    #[must_use]
+    pub fn failures(self, folder: impl Into<PathBuf>) -> Self {
+        Self { failures: folder.into(), ..self }
+    }
+
+    /// Blesses by this, not by the environment variable.
+    #[must_use]
+    pub fn bless(self, bless: Bless) -> Self {
+        Self { bless: Some(bless), ..self }
+    }
+
+    /// The golden's file.
+    pub fn path(&self) -> PathBuf {
+        self.folder.join(format!("{}.png", self.name))
+    }
+
+    /// Compares an image with the golden, and makes it the golden if it fails and is blessed.
+    ///
+    /// # Errors
+    /// If it fails, with what is left of it, or is no image at all, or a file cannot be written.
+    pub fn check(&self, subject: &impl Subject) -> Result<Outcome, GoldenError> {
+        let bless = self.bless.clone().map_or_else(Bless::from_env, Ok)?;
+        let (image, made_on) = (subject.image(), subject.made_on());
+        let pixels = comparison::eight_bit(image, "actual")
+            .map_err(|source| GoldenError::Subject { name: self.name.clone(), source })?;
+        let write = |path: PathBuf| file::write(&path, [image.width, image.height], &pixels, made_on.as_ref());
+        match self.compare(image, made_on.as_ref()) {
+            Ok(comparison) => {
+                self.clear()?;
+                Ok(Outcome::Passed(comparison))
+            }
+            Err(_) if bless.contains(&self.name) => {
+                write(self.path())?;
+                self.clear()?;
+                Ok(Outcome::Blessed(self.path()))
+            }
+            Err(mut failure) => {
+                // What cannot be left must not hide why the image fails.
+                let left =
+                    self.clear().and_then(|()| write(self.left("actual.png"))).and_then(|()| self.leave(&failure));
+                failure.left_in = left.map(|()| self.failures.clone());
+                Err(failure.into())
+            }
+        }
+    }
+
+    /// The comparison if it passes, else a failure that has left nothing yet.
+    fn compare(&self, actual: &Image, made_on: Option<&MadeOn>) -> Result<Comparison, Box<Failure>> {
+        let failure = |reason, golden_made_on| {
+            Box::new(Failure {
+                name: self.name.clone(),
+                golden: self.path(),
+                golden_made_on,
+                actual_made_on: made_on.cloned(),
+                reason,
+                left_in: Ok(self.failures.clone()),
+            })
+        };
+        let golden = Picture::open(&self.path()).map_err(|error| match error {
+            ImageError::Io { source, .. } if source.kind() == ErrorKind::NotFound => failure(Reason::Missing, None),
+            error => failure(Reason::Unreadable(error), None),
+        })?;
+        let same = MadeOn::same(golden.made_on.as_ref(), made_on);
+        let tolerance = if same { self.tolerance } else { Tolerance::WIDEST };
+        match Comparison::new(actual, &golden.image, tolerance) {
+            Ok(comparison) if comparison.passes() => Ok(comparison),
+            Ok(comparison) => Err(failure(Reason::Differs(comparison), golden.made_on)),
+            Err(error) => Err(failure(Reason::Incomparable(error), golden.made_on)),
+        }
+    }
+
+    /// A file that a failure leaves.
+    fn left(&self, what: &str) -> PathBuf {
+        self.failures.join(format!("{}-{what}", self.name))
+    }
+
+    /// Leaves a report, and where the image differs.
+    fn leave(&self, failure: &Failure) -> Result<(), ImageError> {
+        if let Reason::Differs(comparison) = &failure.reason {
+            comparison.difference_image().save(&self.left("difference.png"), PngDepth::Eight)?;
+        }
+        let path = self.left("report.txt");
+        write_aside(&path, format!("{failure}\n").as_bytes()).map_err(|source| ImageError::Io { path, source })
+    }
+
+    /// Removes what an earlier failure left.
+    fn clear(&self) -> Result<(), ImageError> {
+        for path in ["actual.png", "difference.png", "report.txt"].map(|what| self.left(what)) {
+            match std::fs::remove_file(&path) {
+                Err(source) if source.kind() != ErrorKind::NotFound => {
+                    return Err(ImageError::Io { path, source });
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
