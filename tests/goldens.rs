@@ -4,22 +4,21 @@
 //! processors by up to 3 of 255 (approximate reciprocals): so much is tolerated, and a few outliers. What a failing
 //! picture looks like, and where it differs, is left in `target/goldens`. `SHEETSPLAT_BLESS=all`, or the names of scenes
 //! with commas between them, rewrites the goldens that fail, and only those.
+#![cfg(feature = "golden")]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{DynamicImage, Rgb, RgbImage, RgbaImage};
+use sheetsplat::golden;
+use sheetsplat::golden::{Bless, Picture, Tolerance};
 use sheetsplat::headless::{Headless, HeadlessOptions};
-use sheetsplat::image::PngDepth;
 use sheetsplat::scene::{Scene, VolumeSource};
 use sheetsplat::splatting::{FootprintForm, Rasterizer};
 
 /// Steps of 255 that a channel may differ by.
 const TOLERANCE: u8 = 3;
-/// One pixel in so many may have a channel that differs by more.
-const PIXELS_PER_OUTLIER: usize = 1000;
+/// Share of the pixels that may have a channel that differs by more.
+const OUTLIERS: f64 = 0.001;
 /// Rasterizers find voxels to be hidden at different sheets, which may change the picture by one minus this: too little to see.
 const OPACITY_THRESHOLD: f64 = 0.999;
 /// Bytes that a golden may have.
@@ -111,91 +110,17 @@ const SCENES: [(&str, &str, &[&str]); 10] = [
     ),
 ];
 
-/// What a picture and its golden differ in.
-struct Difference {
-    max: u8,
-    mean: f64,
-    outliers: usize,
-    picture: RgbImage,
-}
-
-impl Difference {
-    fn new(actual: &RgbaImage, golden: &RgbaImage) -> Self {
-        let mut difference =
-            Self { max: 0, mean: 0.0, outliers: 0, picture: RgbImage::new(actual.width(), actual.height()) };
-        for ((actual, golden), out) in actual.pixels().zip(golden.pixels()).zip(difference.picture.pixels_mut()) {
-            let channels: [u8; 4] = std::array::from_fn(|i| actual.0[i].abs_diff(golden.0[i]));
-            let most = channels.into_iter().max().unwrap();
-            difference.max = difference.max.max(most);
-            difference.mean += channels.into_iter().map(f64::from).sum::<f64>() / 4.0;
-            difference.outliers += usize::from(most > TOLERANCE);
-            // Within the tolerance dark grey, beyond it red.
-            let shade = most.saturating_mul(20);
-            *out = if most > TOLERANCE { Rgb([255, shade / 2, 0]) } else { Rgb([shade, shade, shade]) };
-        }
-        difference.mean /= f64::from(actual.width() * actual.height());
-        difference
-    }
-}
-
-const GOLDENS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/goldens");
-
-fn golden_path(name: &str) -> PathBuf {
-    Path::new(GOLDENS).join(name).with_extension("png")
-}
-
-/// Why a picture does not pass, if so.
-fn complaint(name: &str, actual: &RgbaImage, folder: &Path) -> Option<String> {
-    let path = golden_path(name);
-    let golden = match image::open(&path) {
-        Ok(golden) => golden.to_rgba8(),
-        Err(error) => return Some(format!("{}: {error}", path.display())),
-    };
-    let bytes = std::fs::metadata(&path).unwrap().len();
-    if bytes > MAX_BYTES {
-        return Some(format!("{} has {bytes} bytes, allowed: {MAX_BYTES}", path.display()));
-    }
-    if golden.dimensions() != actual.dimensions() {
-        return Some(format!("is {:?} pixels, its golden {:?}", actual.dimensions(), golden.dimensions()));
-    }
-    let Difference { max, mean, outliers, picture } = Difference::new(actual, &golden);
-    let pixels = actual.pixels().len();
-    if outliers <= pixels / PIXELS_PER_OUTLIER {
-        return None;
-    }
-    let path = folder.join(format!("{name}-difference.png"));
-    picture.save(&path).unwrap();
-    Some(format!(
-        "differs by {max} at most, by {mean:.3} on average, by more than {TOLERANCE} in {outliers} of {pixels} pixels: {}",
-        path.display()
-    ))
-}
-
-/// Writes a golden as small as PNG allows.
-fn bless(name: &str, actual: &RgbaImage) {
-    let opaque = actual.pixels().all(|pixel| pixel.0[3] == 255);
-    let picture = DynamicImage::ImageRgba8(actual.clone());
-    let picture = if opaque { DynamicImage::ImageRgb8(picture.to_rgb8()) } else { picture };
-    let path = golden_path(name);
-    std::fs::create_dir_all(GOLDENS).unwrap();
-    let file = std::io::BufWriter::new(std::fs::File::create(&path).unwrap());
-    let encoder = PngEncoder::new_with_quality(file, CompressionType::Best, FilterType::Adaptive);
-    picture.write_with_encoder(encoder).unwrap();
-    println!("blessed {}", path.display());
-}
-
 #[test]
 fn pictures_look_like_their_goldens() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap().join("goldens");
-    std::fs::create_dir_all(&folder).unwrap();
-    let blessed = std::env::var("SHEETSPLAT_BLESS").unwrap_or_default();
-    let blessed: BTreeSet<&str> = blessed.split(',').filter(|name| !name.is_empty()).collect();
-    for name in &blessed {
-        assert!(*name == "all" || SCENES.iter().any(|scene| scene.0 == *name), "SHEETSPLAT_BLESS: no scene \"{name}\"");
+    if let Bless::Names(names) = Bless::from_env().unwrap() {
+        for name in names {
+            assert!(SCENES.iter().any(|scene| scene.0 == name), "{}: no scene \"{name}\"", Bless::VARIABLE);
+        }
     }
     let options = HeadlessOptions { adapter: Some("llvmpipe".to_owned()), ..HeadlessOptions::default() };
     let gpu = Headless::new(&options)
         .unwrap_or_else(|error| panic!(".ci/setup --lavapipe installs what is missing: {error}"));
+    let failures = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("goldens");
     let mut complaints = Vec::new();
     for (name, volume, settings) in SCENES {
         let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
@@ -206,43 +131,29 @@ fn pictures_look_like_their_goldens() {
                 continue;
             }
             scene.splatting.rasterizer = rasterizer;
-            let picture = folder.join(format!("{name}-{rasterizer:?}.png").to_lowercase());
-            gpu.render(&scene).unwrap().image.save(&picture, PngDepth::Eight).unwrap();
-            let actual = image::open(&picture).unwrap().to_rgba8();
-            let complaint = complaint(name, &actual, &folder);
-            if complaint.is_some() && (blessed.contains("all") || blessed.contains(name)) {
-                bless(name, &actual);
-                continue;
+            let golden = golden!(name)
+                .unwrap()
+                .tolerance(Tolerance::new(TOLERANCE, OUTLIERS).unwrap())
+                .failures(failures.join(format!("{rasterizer:?}").to_lowercase()));
+            if let Err(complaint) = golden.check(&gpu.render(&scene).unwrap()) {
+                complaints.push(format!("{rasterizer:?}: {complaint}"));
             }
-            let Some(complaint) = complaint else {
-                std::fs::remove_file(&picture).unwrap();
-                continue;
-            };
-            complaints.push(format!("{name}, {rasterizer:?} ({}): {complaint}", picture.display()));
         }
     }
-    assert!(complaints.is_empty(), "SHEETSPLAT_BLESS rewrites what is right:\n{}", complaints.join("\n"));
+    assert!(complaints.is_empty(), "{}", complaints.join("\n\n"));
 }
 
 #[test]
-fn every_golden_has_a_scene() {
-    for file in std::fs::read_dir(GOLDENS).unwrap() {
+fn every_golden_is_of_a_scene_small_and_made_on_lavapipe() {
+    let paths = SCENES.map(|scene| golden!(scene.0).unwrap().path());
+    for file in std::fs::read_dir(paths[0].parent().unwrap()).unwrap() {
         let path = file.unwrap().path();
-        assert!(SCENES.iter().any(|scene| golden_path(scene.0) == path), "{} is of no scene", path.display());
+        let shown = path.display();
+        assert!(paths.contains(&path), "{shown} is of no scene");
+        let bytes = std::fs::metadata(&path).unwrap().len();
+        assert!(bytes <= MAX_BYTES, "{shown} has {bytes} bytes, allowed: {MAX_BYTES}");
+        // Of a golden that does not say so, the widest tolerance would hold.
+        let made_on = Picture::open(&path).unwrap().made_on;
+        assert!(made_on.as_ref().is_some_and(|it| it.adapter.starts_with("llvmpipe")), "{shown}: made on {made_on:?}");
     }
-}
-
-/// The comparison itself: it must see what is there to see.
-#[test]
-fn differences_are_counted() {
-    let golden = RgbaImage::from_pixel(40, 50, image::Rgba([100, 100, 100, 255]));
-    let mut actual = golden.clone();
-    actual.put_pixel(3, 4, image::Rgba([103, 97, 100, 255]));
-    let within = Difference::new(&actual, &golden);
-    assert_eq!((within.max, within.outliers), (3, 0));
-    actual.put_pixel(5, 6, image::Rgba([100, 100, 104, 255]));
-    actual.put_pixel(7, 8, image::Rgba([100, 100, 100, 155]));
-    let beyond = Difference::new(&actual, &golden);
-    assert_eq!((beyond.max, beyond.outliers), (100, 2));
-    assert!((beyond.mean - (6.0 + 4.0 + 100.0) / 4.0 / 2000.0).abs() < 1e-12);
 }
