@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod bench;
+mod compare;
 mod errors;
 mod extremes;
 mod outputs;
@@ -160,6 +161,7 @@ fn help_and_version_are_results() {
         ("--help", "bench"),
         ("render --help", "--set"),
         ("bench --help", "--frames"),
+        ("compare --help", "--outliers"),
         ("--version", env!("CARGO_PKG_VERSION")),
     ] {
         let run = folder.run(arguments);

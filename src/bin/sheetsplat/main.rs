@@ -1,6 +1,7 @@
 //! The command line program.
 
 mod bench;
+mod compare;
 mod render;
 
 use std::io::Write;
@@ -22,6 +23,8 @@ enum Command {
     Render(render::Arguments),
     /// Time a first frame and turning frames; prints one line of JSON.
     Bench(bench::Arguments),
+    /// Compare two images: prints what they differ in, exit code 1 if by more than is allowed.
+    Compare(compare::Arguments),
 }
 
 /// What went wrong, by whose fault.
@@ -38,6 +41,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
     };
     let (message, code) = match result {
         Ok(()) => return ExitCode::SUCCESS,

@@ -1,0 +1,61 @@
+//! `sheetsplat compare`.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use sheetsplat::golden::{Comparison, ComparisonError, Picture, Tolerance};
+use sheetsplat::image::{Image, PngDepth};
+
+use crate::Failure;
+
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// An image: .png, .exr or .npy.
+    actual: PathBuf,
+    /// What it should look like, of any of these formats and the same size.
+    golden: PathBuf,
+    /// Steps of 255 that a channel may differ by: 0 to 16.
+    #[arg(long, value_name = "STEPS", default_value_t = Tolerance::default().per_channel())]
+    tolerance: u8,
+    /// Share of the pixels that may differ by more: 0 to 0.01.
+    #[arg(long, value_name = "SHARE", default_value_t = Tolerance::default().outliers())]
+    outliers: f64,
+    /// Save an image of where they differ: black to grey within the tolerance, red to yellow beyond it.
+    #[arg(long, value_name = "FILE")]
+    difference: Option<PathBuf>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let Arguments { actual, golden, tolerance, outliers, difference } = arguments;
+    let tolerance = Tolerance::new(*tolerance, *outliers).map_err(|error| Failure::Input(error.to_string()))?;
+    if let Some(path) = difference {
+        Image::check_format(path)?;
+        if [actual, golden].contains(&path) {
+            let path = path.display();
+            return Err(Failure::Input(format!(
+                "--difference: found {path}, allowed: another file than those compared"
+            )));
+        }
+    }
+    let open = |path: &Path| Picture::open(path).map_err(|error| Failure::Input(error.to_string()));
+    let pictures = [open(actual)?, open(golden)?];
+    let files = format!("{} and {}", actual.display(), golden.display());
+    let comparison = Comparison::new(&pictures[0].image, &pictures[1].image, tolerance).map_err(|error| {
+        let message = format!("{files}: {error}");
+        // Images of two sizes are good input: the answer is that they differ.
+        if matches!(error, ComparisonError::Size { .. }) { Failure::Other(message) } else { Failure::Input(message) }
+    })?;
+    if let Some(path) = difference {
+        comparison.difference_image().save(path, PngDepth::Eight)?;
+    }
+    let mut report = format!("{comparison}\n");
+    for (path, picture) in [actual, golden].into_iter().zip(&pictures) {
+        if let Some(made_on) = &picture.made_on {
+            report += &format!("{} made on: {made_on}\n", path.display());
+        }
+    }
+    std::io::stdout()
+        .write_all(report.as_bytes())
+        .map_err(|error| Failure::Other(format!("standard output: {error}")))?;
+    if comparison.passes() { Ok(()) } else { Err(Failure::Other(format!("{files} differ"))) }
+}
