@@ -76,9 +76,19 @@ fn main(@builtin(local_invocation_index) slot: u32, @builtin(workgroup_id) workg
         if !is_drawn && frame.order == FRONT_TO_BACK {
             atomicOr(&hidden_now[word], bit);
         }
-        if is_drawn && first_sheet < end_sheet {
+        var sections = select(0u, u32(end_sheet - first_sheet), is_drawn && first_sheet < end_sheet);
+        // In perspective the group's box may reach onto the screen where no section's own does. (Software drivers execute an `if`
+        // whether or not, but no loop.)
+        let is_beside = sections > 0u && frame.near > 0.0 && any(abs(center_px - 0.5 * vec2f(frame.size)) > 0.5 * vec2f(frame.size));
+        for (var once = is_beside; once; once = false) {
+            let ray = local_ray(center_px);
+            let planes = sheet_planes(ray, p.z, p.w, group.near);
+            let maps = section_maps(ray, p.w, planes.near, planes.far);
+            sections = sections_on_screen(center_px, ray.axis, maps, vec2f(first_sheet, end_sheet));
+        }
+        if sections > 0u {
             atomicOr(&drawn_now[word], bit);
-            atomicAdd(&sections_now, u32(end_sheet - first_sheet));
+            atomicAdd(&sections_now, sections);
             mark_tiles(center_px);
         }
     }

@@ -270,8 +270,12 @@ fn draw(tile: u32, thread: u32) {
                 let word = (nth * gather.bricks + queued_place.x) * 2u + queued_place.y / 32u;
                 let bit = 1u << (queued_place.y % 32u);
                 if (atomicOr(&gathered.words[gather.drawn + word], bit) & bit) == 0u {
-                    sections_rasterized += select(u32(here.y - here.x), 1u, whole >= 0.0);
-                    voxels_shaded += select(0u, 1u, nth == 0u);
+                    var sections = u32(here.y - here.x);
+                    if PERSPECTIVE {
+                        sections = sections_on_screen(p.xy, own.axis, own.maps, here - first_sheet);
+                    }
+                    sections_rasterized += select(sections, min(sections, 1u), whole >= 0.0);
+                    voxels_shaded += select(0u, 1u, nth == 0u && sections > 0u);
                 }
             }
 

@@ -12,7 +12,10 @@
 //! scene file  → Scene  ─ View, FramePlan or TileBins: which bricks every group of sheets looks at (plain data)
 //! SceneView: both, and what the next frame can keep of the last one
 //!
-//! on the GPU, per group of sheets:
+//! on the GPU, by tiles:
+//!   gather   every tile front to back with the sheets of a group in registers: which voxels are not hidden, their shading, their
+//!            kernel sections, and the sheets into the compositing buffer
+//! or by quads, per group of sheets:
 //!   cull     which bricks, then which of their voxels are not hidden; those are shaded, once each, and only they need gradients
 //!   tiles    where the group's splats fall
 //!   splat    one quad per voxel adds its kernel sections to the group's sheet buffers
@@ -21,6 +24,8 @@
 //! at the end:
 //!   resolve  the result over the background, into the host's target
 //! ```
+//!
+//! Both rasterizers draw the same image, to rounding ([`splatting::Rasterizer`]).
 //!
 //! [`headless`] does all of it with a device of its own. A host with a device uses [`renderer`] and [`scene_view`]. Settings are those of
 //! [`scene`]. Every stage has a plain f64 twin in
@@ -35,7 +40,7 @@
 //! opacity buffer · *bucket* what touches one slab or group ([`bucket`]) · *iso-range* a closed interval of values that take
 //! part ([`iso_range`]) · *label* which segment of a segmented volume a voxel belongs to
 //! ([`Volume::labels`](volume::Volume::labels)) · *brick* 4×4×4 neighbouring voxels ([`brick`]) ·
-//! *tile* a 32×32 pixel square.
+//! *tile* a 32×32 pixel square; of the tile rasterizer 16×16.
 
 pub mod brick;
 pub mod bucket;

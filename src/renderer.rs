@@ -124,8 +124,8 @@ impl Renderer {
             compositing: &compositing,
         };
         let was = drawing.as_ref().map(Drawing::rasterizer);
-        let (drawing, bucketed) = self.draw_with(given, way, &frame_uniform, drawing)?;
-        let totals = totals.filter(|_| !bucketed && was == Some(drawing.rasterizer()));
+        let (drawing, prepared) = self.draw_with(given, way, &frame_uniform, drawing)?;
+        let totals = totals.filter(|_| !prepared.bucketed && was == Some(drawing.rasterizer()));
 
         // The rasterizer's passes, and resolve.
         let passes = drawing.passes() + 1;
@@ -152,7 +152,7 @@ impl Renderer {
             totals,
             staging: Some(Staging { buffer: staging, timestamps, stages: Vec::new(), period }),
         });
-        Ok(Prepared { bucketed })
+        Ok(prepared)
     }
 
     /// Prepares a rasterizer's part: by tiles, unless the view does not fit them and the scene does not insist.
@@ -162,7 +162,7 @@ impl Renderer {
         way: Way,
         frame: &Frame,
         previous: Option<Drawing>,
-    ) -> Result<(Drawing, bool), RenderError> {
+    ) -> Result<(Drawing, Prepared), RenderError> {
         let (mut old_quads, mut old_tiles, mut old_samples) = (None, None, None);
         match previous {
             Some(Drawing::Quads(frame)) => old_quads = Some(*frame),
@@ -171,18 +171,18 @@ impl Renderer {
             None => {}
         }
         if way == Way::Samples {
-            let (frame, sorted) = self.samples(given.device).prepare(given, frame, old_samples)?;
-            return Ok((Drawing::Samples(Box::new(frame)), sorted));
+            let (frame, prepared) = self.samples(given.device).prepare(given, frame, old_samples)?;
+            return Ok((Drawing::Samples(Box::new(frame)), prepared));
         }
         if way == Way::Tiles {
             match self.tiles.prepare(given, old_tiles) {
-                Ok((frame, bucketed)) => return Ok((Drawing::Tiles(Box::new(frame)), bucketed)),
+                Ok((frame, prepared)) => return Ok((Drawing::Tiles(Box::new(frame)), prepared)),
                 Err(error) if insists_on_tiles(given.splatting) => return Err(error),
                 Err(_) => {}
             }
         }
-        let (frame, bucketed) = self.quads(given.device).prepare(given, old_quads);
-        Ok((Drawing::Quads(Box::new(frame)), bucketed))
+        let (frame, prepared) = self.quads(given.device).prepare(given, old_quads);
+        Ok((Drawing::Quads(Box::new(frame)), prepared))
     }
 
     fn samples(&self, device: &Device) -> &SampleRasterizer {

@@ -29,6 +29,8 @@ pub struct SceneView {
 pub struct Prepared {
     /// Whether bricks were sorted into buckets.
     pub bucketed: bool,
+    /// Whether a footprint table was made: for another kernel, or by sections for another slab width (§3.3.1).
+    pub tabled: bool,
 }
 
 impl SceneView {

@@ -58,7 +58,7 @@ pub enum FootprintBox {
     /// The bounding rectangle.
     Rectangle,
     /// The parallelogram that the shear of eq. 9 makes of a square: less, where the grid is anisotropic and seen obliquely. By
-    /// tiles only, as its filter is not separable.
+    /// tiles only, as its filter is not separable. In perspective, where every voxel has its own shear, the rectangle still.
     Parallelogram,
 }
 

@@ -52,7 +52,8 @@ pub struct Counts {
     pub voxels_total: u64,
     /// Voxels that take part (SPEC §3).
     pub voxels_in_range: u64,
-    /// Voxels whose colour was computed for this frame. The tile rasterizer does so wherever a voxel shows, and counts it once.
+    /// Voxels whose colour was computed for this frame. Tiles compute it again for every group and every part of a tile that a voxel
+    /// is drawn in; it counts once.
     pub voxels_shaded: u64,
     /// Voxel–slab overlaps of positive length, wherever they fall on the screen.
     pub sections_total: u64,
@@ -64,11 +65,11 @@ pub struct Counts {
     pub tiles_total: u64,
     /// Those of them that were composited.
     pub tiles_composited: u64,
-    /// Quads drawn, each for one voxel and a group of sheets; none by tiles.
+    /// Quads drawn, each for one voxel and a group of sheets; 0 by tiles.
     pub quads: u64,
-    /// Tests of a brick against a sheet group; none by tiles, which have bricks in bins.
+    /// Tests of a brick against a sheet group; 0 by tiles, which test voxels.
     pub bricks_tested: u64,
-    /// Those of them whose voxels were looked at.
+    /// Those of them whose voxels were looked at; by tiles for every part of a tile anew.
     pub bricks_visited: u64,
 }
 

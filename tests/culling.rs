@@ -2,110 +2,89 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+#[expect(dead_code, reason = "not every file needs all of it")]
+mod common;
+
 use glam::{DVec3, UVec3};
+use sheetsplat::camera::Projection;
 use sheetsplat::headless::{Headless, HeadlessOptions, Rendering};
-use sheetsplat::image::Image;
 use sheetsplat::reference;
 use sheetsplat::reference::visibility::Test;
 use sheetsplat::scene::{Scene, VolumeSource};
-use sheetsplat::splatting::{Compositing, FootprintForm, Rasterizer};
+use sheetsplat::splatting::{Compositing, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
 use sheetsplat::transfer_function::Ramp;
 use sheetsplat::volume::{Volume, builtin};
 
+use common::images::largest_difference;
+use common::{FORMS, RASTERIZERS, Random, SPACINGS, camera, lavapipe, random_eye, random_volume, scene, transfer};
+
 /// What f32 and f16 arithmetic may differ by between two ways to the same image: amounts are f16, but the same ones; sums of
 /// a few hundred f32 terms of at most 1 differ by some 1e-5.
-const ROUNDING: f32 = 2e-5;
+const ROUNDING: f64 = 2e-5;
 
 fn headless(sheets_per_group: Option<u32>) -> Headless {
-    let adapter = Some("llvmpipe".to_owned());
-    Headless::new(&HeadlessOptions { adapter, sheets_per_group, ..HeadlessOptions::default() }).unwrap()
+    Headless::new(&HeadlessOptions { sheets_per_group, ..lavapipe() }).unwrap()
 }
 
-/// SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ (z >> 31)) as f64 / u64::MAX as f64
-    }
-
-    fn pick<T: Copy>(&mut self, choices: &[T]) -> T {
-        choices[(self.next() * choices.len() as f64) as usize % choices.len()]
-    }
-}
-
-/// Balls and noise on a grid that is no multiple of a brick.
-fn random_volume(random: &mut Random) -> Volume {
-    let dims = UVec3::new(0, 0, 0).map(|_: u32| 9 + (random.next() * 22.0) as u32);
-    let spacing = DVec3::from(random.pick(&[[1.0, 1.0, 1.0], [1.0, 1.0, 2.0], [3.2, 3.2, 1.5], [1.0, 1.0, 5.0]]));
-    let balls: Vec<(DVec3, f64)> = (0..5)
-        .map(|_| (DVec3::new(random.next(), random.next(), random.next()) * dims.as_dvec3(), 2.0 + 7.0 * random.next()))
-        .collect();
-    let mut values = Vec::new();
-    for z in 0..dims.z {
-        for y in 0..dims.y {
-            for x in 0..dims.x {
-                let p = UVec3::new(x, y, z).as_dvec3();
-                let inside = balls.iter().any(|(center, radius)| p.distance(*center) < *radius);
-                values.push(if inside { 200.0 } else { 20.0 * random.next() } as f32);
-            }
+/// A volume and a view of it, orthographic or in perspective, with sheets parallel to the image or slices.
+fn random_case(random: &mut Random) -> (Volume, Scene) {
+    let spacing = random.pick(&SPACINGS);
+    let volume = random_volume(random, (9.0, 31.0), spacing);
+    let mut scene = scene(random.uniform(33.0, 123.0) as u32, random.uniform(33.0, 123.0) as u32);
+    scene.camera.direction = random.direction();
+    match random.bits() % 4 {
+        0 => {}
+        1 => {
+            // Close by: the object reaches beyond every edge of the image.
+            scene.camera.projection = Projection::Orthographic { height: Some(12.0) };
+            scene.camera.center = random.within(DVec3::splat(-4.0), DVec3::splat(4.0));
         }
+        _ => scene.camera = random_eye(random, volume.grid()),
     }
-    Volume::new("random", dims, spacing, values).unwrap()
-}
-
-fn random_scene(random: &mut Random) -> Scene {
-    let mut scene = Scene::new(VolumeSource::Builtin("cube".to_owned()));
-    scene.camera.direction = DVec3::new(random.next() - 0.5, random.next() - 0.5, random.next() - 0.45);
-    scene.image.width = 33 + (random.next() * 90.0) as u32;
-    scene.image.height = 33 + (random.next() * 90.0) as u32;
-    scene.transfer.color = Some(Ramp::new(vec![(0.0, DVec3::new(0.2, 0.5, 1.0)), (200.0, DVec3::ONE)]).unwrap());
     let (haze, solid) = (random.pick(&[0.0, 0.01, 0.2]), random.pick(&[0.3, 0.9, 1.0]));
-    scene.transfer.opacity = Some(Ramp::new(vec![(5.0, 0.0), (20.0, haze), (200.0, solid)]).unwrap());
+    let opacity = [(5.0, 0.0), (20.0, haze), (200.0, solid)];
+    scene.transfer = transfer(&[(0.0, [0.2, 0.5, 1.0]), (200.0, [1.0, 1.0, 1.0])], &opacity);
+    scene.splatting.method = random.pick(&[Method::ImageAligned, Method::ImageAligned, Method::AxisAligned]);
     scene.splatting.compositing = random.pick(&[Compositing::Linear, Compositing::Exponential]);
     scene.splatting.opacity_threshold = random.pick(&[0.5, 0.8, 0.95, 0.999, 1.0]);
     scene.splatting.slab_width = random.pick(&[0.5, 1.0, 2.0]);
     scene.splatting.radius = random.pick(&[1.4, 2.0]);
-    scene.splatting.footprint = random.pick(&[FootprintForm::SummedArea, FootprintForm::Sections]);
-    if random.next() < 0.5 {
-        // Close by: the object reaches beyond every edge of the image.
-        scene.camera.projection = sheetsplat::camera::Projection::Orthographic { height: Some(12.0) };
-        scene.camera.center = DVec3::new(random.next(), random.next(), random.next()) * 8.0 - 4.0;
-    }
-    scene
-}
-
-fn largest_difference(a: &Image, b: &Image) -> f32 {
-    a.pixels.as_flattened().iter().zip(b.pixels.as_flattened()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    (volume, scene)
 }
 
 fn render(headless: &Headless, volume: &Volume, scene: &Scene) -> Rendering {
     headless.render_volume(volume.clone(), scene).unwrap()
 }
 
+/// How voxels are drawn, and how they are tested for being hidden.
+fn ways() -> impl Iterator<Item = (Rasterizer, FootprintForm, FootprintBox)> {
+    let parallelogram = (Rasterizer::Tiles, FootprintForm::SummedArea, FootprintBox::Parallelogram);
+    FORMS.into_iter().map(|(rasterizer, form)| (rasterizer, form, FootprintBox::Rectangle)).chain([parallelogram])
+}
+
 #[test]
 fn culling_keeps_its_guarantee() {
     let headless = headless(None);
     let mut random = Random(1999);
-    let mut culled = 0;
+    let mut culled = vec![0; ways().count()];
     for case in 0..40 {
-        let volume = random_volume(&mut random);
-        let mut scene = random_scene(&mut random);
-        scene.splatting.culling = true;
-        let with = render(&headless, &volume, &scene);
-        scene.splatting.culling = false;
-        let without = render(&headless, &volume, &scene);
-        let allowed = (1.0 - scene.splatting.opacity_threshold) as f32 + ROUNDING;
-        let difference = largest_difference(&with.image, &without.image);
-        assert!(difference <= allowed, "case {case}: {difference} > {allowed} with {scene:?}");
-        assert!(with.stats.counts.sections_rasterized <= without.stats.counts.sections_rasterized);
-        culled += usize::from(with.stats.counts.sections_rasterized < without.stats.counts.sections_rasterized);
+        let (volume, mut scene) = random_case(&mut random);
+        for (way, culled) in ways().zip(&mut culled) {
+            let Splatting { rasterizer, footprint, footprint_box, .. } = &mut scene.splatting;
+            (*rasterizer, *footprint, *footprint_box) = way;
+            let [with, without] = [true, false].map(|culling| {
+                scene.splatting.culling = culling;
+                render(&headless, &volume, &scene)
+            });
+            let allowed = 1.0 - scene.splatting.opacity_threshold + ROUNDING;
+            let difference = largest_difference(&with.image, &without.image);
+            assert!(difference <= allowed, "case {case}: {difference} > {allowed} with {scene:?}");
+            let [with, without] = [with, without].map(|rendering| rendering.stats.counts.sections_rasterized);
+            assert!(with <= without, "case {case}: {with} sections, {without} without culling, with {scene:?}");
+            *culled += usize::from(with < without);
+        }
     }
-    assert!(culled > 20, "only {culled} of the cases cull anything");
+    assert!(culled.iter().all(|&culled| culled > 20), "only {culled:?} of the cases cull anything");
 }
 
 #[test]
@@ -113,14 +92,16 @@ fn tiles_change_no_bit() {
     let headless = headless(None);
     let mut random = Random(42);
     for case in 0..12 {
-        let volume = random_volume(&mut random);
-        let mut scene = random_scene(&mut random);
-        scene.splatting.tiles = true;
-        let with = render(&headless, &volume, &scene);
-        scene.splatting.tiles = false;
-        let without = render(&headless, &volume, &scene);
-        assert_eq!(with.image, without.image, "case {case}");
-        assert!(with.stats.counts.tiles_composited <= without.stats.counts.tiles_composited);
+        let (volume, mut scene) = random_case(&mut random);
+        for rasterizer in RASTERIZERS {
+            scene.splatting.rasterizer = rasterizer;
+            let [with, without] = [true, false].map(|tiles| {
+                scene.splatting.tiles = tiles;
+                render(&headless, &volume, &scene)
+            });
+            assert_eq!(with.image, without.image, "case {case}, {rasterizer:?}");
+            assert!(with.stats.counts.tiles_composited <= without.stats.counts.tiles_composited);
+        }
     }
 }
 
@@ -128,17 +109,19 @@ fn tiles_change_no_bit() {
 fn groups_change_nothing_but_rounding() {
     let renderers = [1, 2, 4].map(|sheets| headless(Some(sheets)));
     let mut random = Random(7);
-    for case in 0..10 {
-        let volume = random_volume(&mut random);
-        let mut scene = random_scene(&mut random);
+    for case in 0..12 {
+        let (volume, mut scene) = random_case(&mut random);
         scene.splatting.culling = false;
         scene.splatting.rasterizer = Rasterizer::Quads;
+        // Of two stored sections that are equally near f32 picks one.
+        scene.splatting.footprint = FootprintForm::SummedArea;
         let [one, two, four] = [0, 1, 2].map(|at| render(&renderers[at], &volume, &scene));
-        for other in [&two, &four] {
-            let difference = largest_difference(&one.image, &other.image);
+        for (few, many) in [(&one, &two), (&two, &four)] {
+            let difference = largest_difference(&few.image, &many.image);
             assert!(difference <= ROUNDING, "case {case}: {difference}");
-            assert_eq!(one.stats.counts.sections_rasterized, other.stats.counts.sections_rasterized);
-            assert!(one.stats.counts.quads >= other.stats.counts.quads);
+            let [few, many] = [few, many].map(|rendering| rendering.stats.counts);
+            assert_eq!(few.sections_rasterized, many.sections_rasterized, "case {case}");
+            assert!(few.quads >= many.quads);
         }
     }
 }
@@ -146,13 +129,20 @@ fn groups_change_nothing_but_rounding() {
 #[test]
 fn culled_frames_are_byte_identical() {
     let mut random = Random(3);
-    let volume = random_volume(&mut random);
-    let mut scene = random_scene(&mut random);
-    scene.splatting.opacity_threshold = 0.8;
-    let headless_a = headless(None);
-    let first = render(&headless_a, &volume, &scene);
-    assert_eq!(first.image, render(&headless_a, &volume, &scene).image);
-    assert_eq!(first.image, render(&headless(None), &volume, &scene).image);
+    let devices = [headless(None), headless(None)];
+    for _ in 0..3 {
+        let (volume, mut scene) = random_case(&mut random);
+        scene.splatting.opacity_threshold = 0.8;
+        for way in ways() {
+            let Splatting { rasterizer, footprint, footprint_box, .. } = &mut scene.splatting;
+            (*rasterizer, *footprint, *footprint_box) = way;
+            let first = render(&devices[0], &volume, &scene);
+            for device in &devices {
+                let again = render(device, &volume, &scene);
+                assert!(first.image == again.image && first.stats.counts == again.stats.counts, "{scene:?}");
+            }
+        }
+    }
 }
 
 /// The GPU lets through what the exact test lets through, and little more.
@@ -160,17 +150,44 @@ fn culled_frames_are_byte_identical() {
 fn culling_is_nearly_exact() {
     let headless = headless(None);
     let volume = builtin::volume("head:96").unwrap();
-    let mut scene = Scene::new(VolumeSource::Builtin("head:96".to_owned()));
-    scene.camera.direction = DVec3::new(0.55, 0.8, -0.12);
-    (scene.image.width, scene.image.height) = (192, 192);
-    scene.camera.projection = sheetsplat::camera::Projection::Orthographic { height: Some(172.0) };
+    let mut scene = Scene { camera: camera([0.55, 0.8, -0.12], 172.0), ..scene(192, 192) };
     let transfer = scene.transfer.resolve(&volume);
     let exact = reference::render_culled(&volume, &transfer, &scene, Some(Test::Box)).unwrap().sections;
-    let counts = render(&headless, &volume, &scene).stats.counts;
-    let ratio = counts.sections_rasterized as f64 / exact as f64;
-    println!("{} of {} sections, exactly {exact}: ratio {ratio:.3}", counts.sections_rasterized, counts.sections_total);
-    assert!(counts.sections_rasterized as f64 > 0.99 * exact as f64);
-    assert!(ratio <= 1.25, "{ratio}");
+    for rasterizer in RASTERIZERS {
+        scene.splatting.rasterizer = rasterizer;
+        let counts = render(&headless, &volume, &scene).stats.counts;
+        let (drawn, all) = (counts.sections_rasterized, counts.sections_total);
+        let ratio = drawn as f64 / exact as f64;
+        println!("{rasterizer:?}: {drawn} of {all} sections, exactly {exact}: ratio {ratio:.3}");
+        assert!((0.99..=1.25).contains(&ratio), "{rasterizer:?}: {ratio}");
+    }
+}
+
+/// Fig. 13: around a footprint the parallelogram holds no more pixels than matter, and fewer than the rectangle where the grid is
+/// anisotropic and seen obliquely.
+#[test]
+fn the_parallelogram_hides_more() {
+    let headless = headless(None);
+    let head = builtin::volume("head:64").unwrap();
+    let drawn = |spacing: [f64; 3], direction: [f64; 3]| {
+        let volume = head.clone().with_spacing("head", DVec3::from(spacing)).unwrap();
+        let mut scene = scene(150, 140);
+        (scene.camera.direction, scene.camera.up) = (DVec3::from(direction), DVec3::new(0.3, 0.1, 1.0));
+        scene.splatting.rasterizer = Rasterizer::Tiles;
+        [FootprintBox::Rectangle, FootprintBox::Parallelogram].map(|footprint_box| {
+            scene.splatting.footprint_box = footprint_box;
+            render(&headless, &volume, &scene).stats.counts.sections_rasterized
+        })
+    };
+    for spacing in [[1.0, 1.0, 3.0], [1.0, 1.0, 5.0], [3.2, 3.2, 1.5]] {
+        let [rectangle, parallelogram] = drawn(spacing, [0.4, 0.7, -0.6]);
+        println!("{spacing:?}: {parallelogram} of {rectangle} sections");
+        assert!(parallelogram < rectangle, "{spacing:?}: {parallelogram} of {rectangle} sections");
+    }
+    for (spacing, direction) in [([1.0, 1.0, 1.0], [0.4, 0.7, -0.6]), ([1.0, 1.0, 5.0], [0.0, 1.0, 0.0])] {
+        let [rectangle, parallelogram] = drawn(spacing, direction);
+        assert!(parallelogram <= rectangle, "{spacing:?}: {parallelogram} of {rectangle} sections");
+    }
 }
 
 /// Fig. 10's test costs nothing visible, Fig. 11a's shows errors.
@@ -179,11 +196,11 @@ fn the_papers_simpler_tests() {
     let volume = builtin::volume("head:48").unwrap();
     let mut scene = Scene::new(VolumeSource::Builtin("head:48".to_owned()));
     (scene.image.width, scene.image.height) = (96, 96);
-    scene.camera.projection = sheetsplat::camera::Projection::Orthographic { height: Some(172.0) };
+    scene.camera.projection = Projection::Orthographic { height: Some(172.0) };
     let transfer = scene.transfer.resolve(&volume);
     let image = |test| reference::render_culled(&volume, &transfer, &scene, test).unwrap().image;
     let all = image(None);
-    let allowed = (1.0 - scene.splatting.opacity_threshold) as f32;
+    let allowed = 1.0 - scene.splatting.opacity_threshold;
     assert!(largest_difference(&all, &image(Some(Test::Box))) <= allowed);
     let by_center = largest_difference(&all, &image(Some(Test::Center)));
     assert!(by_center > 2.0 * allowed, "the centre's pixel alone is off by {by_center} only");
@@ -209,7 +226,7 @@ fn what_the_rectangle_costs() {
         let transfer = scene.transfer.resolve(&volume);
         let render = |test| reference::render_culled(&volume, &transfer, &scene, test).unwrap();
         let [all, rectangle, parallelogram] = [None, Some(Test::Box), Some(Test::Parallelogram)].map(render);
-        let allowed = (1.0 - scene.splatting.opacity_threshold) as f32;
+        let allowed = 1.0 - scene.splatting.opacity_threshold;
         assert!(largest_difference(&all.image, &rectangle.image) <= allowed);
         assert!(largest_difference(&all.image, &parallelogram.image) <= allowed);
         let cost = rectangle.sections as f64 / parallelogram.sections as f64;
@@ -234,7 +251,7 @@ fn tiles_and_the_bounding_box() {
     let areas = |voxels: &[UVec3]| {
         let mut scene = Scene::new(VolumeSource::Builtin("cube".to_owned()));
         scene.camera.direction = DVec3::Y;
-        scene.camera.projection = sheetsplat::camera::Projection::Orthographic { height: Some(100.0) };
+        scene.camera.projection = Projection::Orthographic { height: Some(100.0) };
         (scene.image.width, scene.image.height) = (200, 200);
         scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0), (1.0, 0.5)]).unwrap());
         let volume = volume(voxels);
@@ -261,10 +278,8 @@ fn profiled_frames() {
     let mut scene = Scene::new(VolumeSource::Builtin("head:64".to_owned()));
     (scene.image.width, scene.image.height) = (40, 40);
     scene.splatting.slab_width = 0.05;
-    let devices = [false, true].map(|profile| {
-        let (adapter, sheets_per_group) = (Some("llvmpipe".to_owned()), Some(1));
-        Headless::new(&HeadlessOptions { adapter, sheets_per_group, profile, ..HeadlessOptions::default() }).unwrap()
-    });
+    let devices = [false, true]
+        .map(|profile| Headless::new(&HeadlessOptions { sheets_per_group: Some(1), profile, ..lavapipe() }).unwrap());
     for (rasterizer, stages) in [
         (Rasterizer::Quads, &["composite", "cull", "resolve", "splat"][..]),
         (Rasterizer::Tiles, &["gather", "resolve"]),

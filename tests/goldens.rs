@@ -25,7 +25,7 @@ const OPACITY_THRESHOLD: f64 = 0.999;
 const MAX_BYTES: u64 = 64 << 10;
 
 /// Name, builtin volume, and the settings that differ from the defaults.
-const SCENES: [(&str, &str, &[&str]); 10] = [
+const SCENES: [(&str, &str, &[&str]); 12] = [
     ("head", "head:72", &["image={width=160,height=160}", "camera={direction=[0.5,0.85,-0.2],height=170.0}"]),
     (
         "head-xray",
@@ -86,6 +86,23 @@ const SCENES: [(&str, &str, &[&str]); 10] = [
             "image={width=128,height=128,background=[0,0,0,0]}",
             "camera={direction=[0.1,1,-0.4],height=280.0}",
             "splatting={footprint=\"sections\",radius=1.4}",
+        ],
+    ),
+    (
+        "nerve-perspective",
+        "nerve:144",
+        &[
+            "image={width=160,height=120}",
+            "camera={projection=\"perspective\",fov_y=70.0,distance=330.0,near=20.0,direction=[0.5,0.6,-0.4],center=[40,0,0]}",
+        ],
+    ),
+    (
+        "head-axis-aligned",
+        "head:72",
+        &[
+            "image={width=128,height=128}",
+            "camera={direction=[0.62,0.66,-0.35],height=170.0}",
+            "splatting={method=\"axis-aligned\",compositing=\"exponential\"}",
         ],
     ),
     (

@@ -131,6 +131,7 @@ fn small_bindings_split_voxels_and_image() {
     let volume = builtin::volume("head:64").unwrap();
     let voxels = classify(&volume, &scene.transfer.resolve(&volume));
     let bricks = BrickList::new(volume.grid(), &voxels);
+    // Without subgroups, so by quads.
     let full = open(Limits::default(), Features::FLOAT32_BLENDABLE, None).unwrap();
     // 32 rows of 150 pixels are 75 KiB: one tile's rows, and two.
     for (bytes, bands) in [(76 << 10, 4), (150 << 10, 2)] {

@@ -14,13 +14,13 @@ use sheetsplat::headless::Headless;
 use sheetsplat::iso_range::ValueSet;
 use sheetsplat::renderer::Renderer;
 use sheetsplat::scene::{Scene, TransferSettings};
-use sheetsplat::scene_view::SceneView;
+use sheetsplat::scene_view::{Prepared, SceneView};
 use sheetsplat::shading::Light;
-use sheetsplat::splatting::{Compositing, FootprintForm, Method, Rasterizer};
+use sheetsplat::splatting::{Compositing, FootprintForm, Method, Rasterizer, Splatting};
 use sheetsplat::transfer_function::{Ramp, TransferFunction};
 use sheetsplat::volume::{Volume, builtin};
 
-use common::{Random, camera, gpu, scene, transfer};
+use common::{RASTERIZERS, Random, camera, gpu, scene, transfer};
 
 fn skin() -> TransferSettings {
     transfer(&[(20.0, [0.2, 0.4, 0.9]), (200.0, [1.0, 0.8, 0.6])], &[(60.0, 0.0), (120.0, 0.6), (255.0, 1.0)])
@@ -66,11 +66,18 @@ fn assert_fresh(gpu: &Headless, view: &mut SceneView, name: &str) {
 #[test]
 fn a_changed_view_is_a_fresh_one() {
     let gpu = gpu();
+    for rasterizer in RASTERIZERS {
+        assert_changes_are_fresh(&gpu, rasterizer);
+    }
+}
+
+fn assert_changes_are_fresh(gpu: &Headless, rasterizer: Rasterizer) {
     let (volume, mut scene) = head();
+    scene.splatting.rasterizer = rasterizer;
     // Few voxels at first, so that room is made later.
     scene.transfer.iso_ranges = Some(vec![[200.0, 255.0]]);
     let mut view = gpu.view(volume.clone(), &scene).unwrap();
-    assert_fresh(&gpu, &mut view, "first");
+    assert_fresh(gpu, &mut view, "first");
     let mut random = Random(8);
     let (mut entered, mut left, mut rebuilt) = (0, 0, 0);
     for step in 0..40 {
@@ -105,7 +112,7 @@ fn a_changed_view_is_a_fresh_one() {
         rebuilt += u64::from(touched.rebuilt);
         // Not every change is drawn.
         if random.uniform(0.0, 1.0) < 0.75 || touched.rebuilt {
-            assert_fresh(&gpu, &mut view, &format!("step {step}"));
+            assert_fresh(gpu, &mut view, &format!("{rasterizer:?}, step {step}"));
         }
     }
     assert!(entered > 10_000 && left > 10_000, "{entered} entered, {left} left");
@@ -236,12 +243,61 @@ fn a_turn_sorts_no_slices() {
     assert!(!look([0.0, 0.0, -1.0], None), "and -z");
 }
 
+/// Table 3's knobs, at run time: the image is a fresh view's, and what makes footprints is made anew for another kernel, by sections
+/// also for another slab width, and never for a threshold (§3.3.1).
+#[test]
+fn knobs_are_turned_at_run_time() {
+    let gpu = gpu();
+    let (volume, mut scene) = head();
+    let prepare = |view: &mut SceneView| gpu.renderer().prepare(gpu.device(), gpu.queue(), view).unwrap();
+    let perspective = Projection::Perspective { fov_y: 30.0, distance: None, near: None };
+    let projections = [scene.camera.projection, perspective];
+    for (rasterizer, footprint, projection) in [
+        (Rasterizer::Tiles, FootprintForm::SummedArea),
+        (Rasterizer::Quads, FootprintForm::SummedArea),
+        (Rasterizer::Quads, FootprintForm::Sections),
+    ]
+    .into_iter()
+    .flat_map(|(rasterizer, footprint)| projections.map(|projection| (rasterizer, footprint, projection)))
+    {
+        (scene.splatting.rasterizer, scene.splatting.footprint) = (rasterizer, footprint);
+        scene.camera.projection = projection;
+        let mut view = gpu.view(volume.clone(), &scene).unwrap();
+        let has_table = rasterizer == Rasterizer::Quads;
+        assert_eq!(prepare(&mut view), Prepared { bucketed: true, tabled: has_table }, "the first frame");
+        let first = scene.splatting;
+        let (sections, wider) = (footprint == FootprintForm::Sections, Splatting { slab_width: 2.0, ..first });
+        let narrower = Splatting { radius: 1.4, slab_width: 3.0, ..first };
+        for (name, splatting, bucketed, tabled) in [
+            ("slab width 2", wider, true, sections),
+            ("slab width 3", Splatting { slab_width: 3.0, ..first }, true, sections),
+            ("threshold 0.8", Splatting { slab_width: 3.0, opacity_threshold: 0.8, ..first }, false, false),
+            ("radius 1.4", narrower, true, has_table),
+            ("falloff 3", Splatting { falloff: 3.0, ..narrower }, false, has_table),
+            ("as at first", first, true, has_table),
+        ] {
+            view.set_splatting(splatting);
+            let name = format!("{rasterizer:?}, {footprint:?}, {projection:?}: {name}");
+            assert_eq!(prepare(&mut view), Prepared { bucketed, tabled }, "{name}");
+            assert_fresh(&gpu, &mut view, &name);
+        }
+    }
+}
+
 /// What each setter costs: buckets only for cameras, slabs and bricks; voxels only for those that enter and leave.
 #[test]
 fn a_change_costs_what_it_must() {
     let gpu = gpu();
+    // What is not for tiles is drawn by quads meanwhile, or always.
+    for rasterizer in [Rasterizer::Auto, Rasterizer::Quads] {
+        assert_costs(&gpu, rasterizer);
+    }
+}
+
+fn assert_costs(gpu: &Headless, rasterizer: Rasterizer) {
     let renderer: &Renderer = gpu.renderer();
-    let (volume, scene) = head();
+    let (volume, mut scene) = head();
+    scene.splatting.rasterizer = rasterizer;
     let mut view = gpu.view(volume, &scene).unwrap();
     let prepare = |view: &mut SceneView| renderer.prepare(gpu.device(), gpu.queue(), view).unwrap().bucketed;
     assert!(prepare(&mut view), "the first frame has no buckets yet");
@@ -249,10 +305,10 @@ fn a_change_costs_what_it_must() {
 
     view.set_light(Light::Direction(DVec3::new(1.0, 0.3, 2.0)));
     assert!(!prepare(&mut view), "light");
-    assert_fresh(&gpu, &mut view, "light");
+    assert_fresh(gpu, &mut view, "light");
     view.set_shading(sheetsplat::shading::Shading { ambient: 0.5, shininess: 3.0, ..scene.shading });
     assert!(!prepare(&mut view), "shading");
-    assert_fresh(&gpu, &mut view, "shading");
+    assert_fresh(gpu, &mut view, "shading");
     let old = view.volume().transfer().clone();
     let color = Ramp::new(vec![(0.0, DVec3::new(1.0, 0.2, 0.1)), (200.0, DVec3::ONE)]).unwrap();
     // More control points than before, and other opacities above 0 for the same values.
@@ -260,34 +316,34 @@ fn a_change_costs_what_it_must() {
     let touched = view.set_transfer_function(TransferFunction { color, opacity, ..old });
     assert_eq!((touched.entered, touched.left), (0, 0));
     assert!(!prepare(&mut view), "colours and opacities");
-    assert_fresh(&gpu, &mut view, "colours and opacities");
+    assert_fresh(gpu, &mut view, "colours and opacities");
     let mut splatting = scene.splatting;
     splatting.compositing = Compositing::Exponential;
     splatting.opacity_threshold = 0.8;
     view.set_splatting(splatting);
     assert!(!prepare(&mut view), "compositing");
-    assert_fresh(&gpu, &mut view, "compositing");
+    assert_fresh(gpu, &mut view, "compositing");
     view.set_splatting(sheetsplat::splatting::Splatting { footprint: FootprintForm::Sections, ..splatting });
-    assert_fresh(&gpu, &mut view, "footprint");
+    assert_fresh(gpu, &mut view, "footprint");
     view.set_splatting(sheetsplat::splatting::Splatting { radius: 1.4, ..splatting });
     assert!(prepare(&mut view), "radius");
-    assert_fresh(&gpu, &mut view, "radius");
+    assert_fresh(gpu, &mut view, "radius");
 
     view.turn(20.0);
     assert!(prepare(&mut view), "camera");
-    assert_fresh(&gpu, &mut view, "camera");
+    assert_fresh(gpu, &mut view, "camera");
     view.set_image(sheetsplat::scene::ImageSettings { width: 130, height: 40, background: [0.1, 0.2, 0.3, 0.5] });
-    assert_fresh(&gpu, &mut view, "image");
+    assert_fresh(gpu, &mut view, "image");
     let touched = view.set_iso_ranges(Some(vec![[100.0, 255.0]]));
     assert!(touched.left > 0 && touched.entered == 0);
     assert!(prepare(&mut view), "bricks changed");
-    assert_fresh(&gpu, &mut view, "iso-range");
+    assert_fresh(gpu, &mut view, "iso-range");
     // Prepared twice before it is drawn.
     assert!(view.set_iso_ranges(Some(vec![[80.0, 255.0]])).entered > 0);
     assert!(prepare(&mut view));
     assert!(view.set_iso_ranges(Some(vec![[70.0, 255.0]])).entered > 0);
     assert!(prepare(&mut view));
-    assert_fresh(&gpu, &mut view, "two iso-ranges");
+    assert_fresh(gpu, &mut view, "two iso-ranges");
     // Prepared, and then asked for more than the device allows.
     assert!(view.set_iso_ranges(None).entered > 0);
     assert!(prepare(&mut view));
@@ -295,21 +351,24 @@ fn a_change_costs_what_it_must() {
     view.set_image(sheetsplat::scene::ImageSettings { width: 1 << 20, ..image });
     assert!(renderer.prepare(gpu.device(), gpu.queue(), &mut view).is_err());
     view.set_image(image);
-    assert_fresh(&gpu, &mut view, "after an error");
+    assert_fresh(gpu, &mut view, "after an error");
 }
 
 /// A view that starts with nothing to show.
 #[test]
 fn from_nothing() {
     let gpu = gpu();
-    let (volume, mut scene) = head();
-    scene.transfer.iso_ranges = Some(vec![[1e6, 2e6]]);
-    let mut view = gpu.view(volume, &scene).unwrap();
-    assert_fresh(&gpu, &mut view, "nothing");
-    assert!(view.set_iso_ranges(None).entered > 1000);
-    assert_fresh(&gpu, &mut view, "everything");
-    view.set_iso_ranges(Some(Vec::new()));
-    assert_fresh(&gpu, &mut view, "nothing again");
+    for rasterizer in RASTERIZERS {
+        let (volume, mut scene) = head();
+        scene.splatting.rasterizer = rasterizer;
+        scene.transfer.iso_ranges = Some(vec![[1e6, 2e6]]);
+        let mut view = gpu.view(volume, &scene).unwrap();
+        assert_fresh(&gpu, &mut view, "nothing");
+        assert!(view.set_iso_ranges(None).entered > 1000);
+        assert_fresh(&gpu, &mut view, "everything");
+        view.set_iso_ranges(Some(Vec::new()));
+        assert_fresh(&gpu, &mut view, "nothing again");
+    }
 }
 
 /// The least value takes part only where the transfer function says so: those voxels are not in the sorted list.

@@ -7,14 +7,16 @@ mod common;
 use std::f64::consts::TAU;
 
 use glam::{DVec3, UVec3};
+use sheetsplat::camera::Projection;
 use sheetsplat::headless::Headless;
 use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::{Compositing, FootprintForm, Order};
+use sheetsplat::splatting::{Compositing, Order, Rasterizer};
 use sheetsplat::view::View;
 use sheetsplat::volume::{Volume, builtin};
 
-use common::{F16, F32, Random, camera, gpu, scene, transfer};
+use common::images::largest_difference;
+use common::{F16, F32, FORMS, RASTERIZERS, Random, camera, gpu, scene, transfer};
 
 const COMPOSITINGS: [Compositing; 3] = [Compositing::Linear, Compositing::Exponential, Compositing::Xray];
 
@@ -26,13 +28,6 @@ fn render(gpu: &Headless, volume: &Volume, scene: &Scene) -> (Image, u64) {
 /// Alpha, row by row.
 fn alpha(image: &Image) -> Vec<f64> {
     image.pixels.iter().map(|pixel| pixel[3].into()).collect()
-}
-
-/// The largest difference of any channel of two images.
-fn difference(a: &Image, b: &Image) -> f64 {
-    assert_eq!(a.pixels.len(), b.pixels.len());
-    let channels = a.pixels.as_flattened().iter().zip(b.pixels.as_flattened());
-    channels.map(|(a, b)| f64::from(a - b).abs()).fold(0.0, f64::max)
 }
 
 /// A small head, semi-transparent, from an oblique direction.
@@ -61,13 +56,16 @@ fn empty_volume_is_exactly_the_background() {
             (scene.splatting.compositing, scene.splatting.order) = (compositing, order);
             for background in [[0.0, 0.0, 0.0, 1.0], [0.3, 0.7, 1.0, 1.0], [0.3, 0.7, 1.0, 0.6], [1.0, 1.0, 1.0, 0.0]] {
                 scene.image.background = background;
-                let (image, _) = render(&gpu, &volume, &scene);
                 let [r, g, b, a] = background;
                 let expected = [r * a, g * a, b * a, a].map(|channel| channel as f32);
-                assert!(
-                    image.pixels.iter().all(|pixel| *pixel == expected),
-                    "{compositing:?} {order:?} {background:?} {center}"
-                );
+                for rasterizer in RASTERIZERS {
+                    scene.splatting.rasterizer = rasterizer;
+                    let (image, _) = render(&gpu, &volume, &scene);
+                    assert!(
+                        image.pixels.iter().all(|pixel| *pixel == expected),
+                        "{rasterizer:?} {compositing:?} {order:?} {background:?} {center}"
+                    );
+                }
             }
         }
     }
@@ -123,7 +121,7 @@ impl UniformSlab {
         }
     }
 
-    fn check(&self, gpu: &Headless, direction: DVec3, slab_width: f64) {
+    fn check(&self, gpu: &Headless, rasterizer: Rasterizer, direction: DVec3, slab_width: f64) {
         const SIZE: u32 = 48;
         let volume = self.volume();
         let mut scene = scene(SIZE, SIZE);
@@ -134,7 +132,7 @@ impl UniformSlab {
         scene.image.background = [0.0; 4];
         scene.shading.enabled = false;
         scene.transfer = transfer(&[(0.0, [0.2, 0.5, 0.9])], &[(0.0, Self::OPACITY)]);
-        scene.splatting.compositing = Compositing::Exponential;
+        (scene.splatting.rasterizer, scene.splatting.compositing) = (rasterizer, Compositing::Exponential);
         scene.splatting.slab_width = slab_width;
         self.assert_shows_no_border(&volume, &scene);
         let (image, _) = render(gpu, &volume, &scene);
@@ -165,9 +163,10 @@ impl UniformSlab {
 #[test]
 fn uniform_slab_opacity_is_that_of_its_thickness() {
     let gpu = gpu();
-    let mut random = Random(17);
-    for spacing in [DVec3::ONE, DVec3::new(1.0, 1.0, 5.0)] {
-        for axis in [0, 2] {
+    for rasterizer in RASTERIZERS {
+        let mut random = Random(17);
+        for (spacing, axis) in [DVec3::ONE, DVec3::new(1.0, 1.0, 5.0)].into_iter().flat_map(|s| [0, 2].map(|a| (s, a)))
+        {
             let slab = UniformSlab { axis, layers: 4, spacing };
             for slab_width in [1.0, 1.0, 1.0, 0.5, 1.7] {
                 // Anywhere, but not so flat along the slab that its borders come into sight.
@@ -177,9 +176,9 @@ fn uniform_slab_opacity_is_that_of_its_thickness() {
                         break direction;
                     }
                 };
-                slab.check(&gpu, direction, slab_width);
+                slab.check(&gpu, rasterizer, direction, slab_width);
             }
-            slab.check(&gpu, DVec3::AXES[axis], 1.0);
+            slab.check(&gpu, rasterizer, DVec3::AXES[axis], 1.0);
         }
     }
 }
@@ -187,10 +186,13 @@ fn uniform_slab_opacity_is_that_of_its_thickness() {
 #[test]
 fn exponential_alpha_does_not_depend_on_the_slab_width() {
     let gpu = gpu();
-    for spacing in [DVec3::ONE, DVec3::new(1.0, 1.0, 5.0)] {
+    for (spacing, rasterizer) in [DVec3::ONE, DVec3::new(1.0, 1.0, 5.0)]
+        .into_iter()
+        .flat_map(|spacing| RASTERIZERS.map(|rasterizer| (spacing, rasterizer)))
+    {
         let (volume, mut scene) = head();
         let volume = volume.with_spacing("head", spacing).unwrap();
-        scene.splatting.compositing = Compositing::Exponential;
+        (scene.splatting.rasterizer, scene.splatting.compositing) = (rasterizer, Compositing::Exponential);
         // With thinner sheets pixels become opaque at other sheets.
         scene.splatting.culling = false;
         scene.image.background = [0.0; 4];
@@ -206,7 +208,10 @@ fn exponential_alpha_does_not_depend_on_the_slab_width() {
             let finest = slab_width.min(1.0);
             let tolerance = 2.0 * step / finest + 4.0 * F32 * sheets as f64;
             let worst = alpha(&image).iter().zip(&reference).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            assert!(worst < tolerance, "slab width {slab_width}, spacing {spacing}: {worst}, not below {tolerance}");
+            assert!(
+                worst < tolerance,
+                "{rasterizer:?} {slab_width}, spacing {spacing}: {worst}, not below {tolerance}"
+            );
         }
     }
 }
@@ -217,18 +222,21 @@ fn back_to_front_equals_front_to_back() {
     let (volume, mut scene) = head();
     // Nothing is culled back to front.
     scene.splatting.culling = false;
-    for compositing in COMPOSITINGS {
-        for footprint in [FootprintForm::SummedArea, FootprintForm::Sections] {
-            (scene.splatting.compositing, scene.splatting.footprint) = (compositing, footprint);
-            scene.splatting.order = Order::FrontToBack;
-            let (front_to_back, sheets) = render(&gpu, &volume, &scene);
-            scene.splatting.order = Order::BackToFront;
-            let (back_to_front, _) = render(&gpu, &volume, &scene);
-            let difference = difference(&front_to_back, &back_to_front);
-            // Per sheet a subtraction, a product and a sum of numbers up to 1, in either order.
-            let tolerance = 6.0 * F32 * sheets as f64;
-            assert!(difference < tolerance, "{compositing:?} {footprint:?}: {difference}, not below {tolerance}");
-        }
+    // Close by in perspective: footprints of nearer sections reach onto the screen where farther ones do not.
+    let close = Projection::Perspective { fov_y: 50.0, distance: Some(45.0), near: None };
+    let projections = [scene.camera.projection, close];
+    let cases = COMPOSITINGS.into_iter().flat_map(|compositing| FORMS.map(|form| (compositing, form)));
+    for ((compositing, form), projection) in cases.flat_map(|case| projections.map(|projection| (case, projection))) {
+        (scene.splatting.compositing, scene.camera.projection) = (compositing, projection);
+        (scene.splatting.rasterizer, scene.splatting.footprint) = form;
+        scene.splatting.order = Order::FrontToBack;
+        let (front_to_back, sheets) = render(&gpu, &volume, &scene);
+        scene.splatting.order = Order::BackToFront;
+        let (back_to_front, _) = render(&gpu, &volume, &scene);
+        let difference = largest_difference(&front_to_back, &back_to_front);
+        // Per sheet a subtraction, a product and a sum of numbers up to 1, in either order.
+        let tolerance = 6.0 * F32 * sheets as f64;
+        assert!(difference < tolerance, "{compositing:?} {form:?} {projection:?}: {difference}, not below {tolerance}");
     }
 }
 
@@ -236,18 +244,20 @@ fn back_to_front_equals_front_to_back() {
 fn every_run_gives_the_same_bytes() {
     let (volume, mut scene) = head();
     let (first, second) = (gpu(), gpu());
-    for compositing in COMPOSITINGS {
-        for footprint in [FootprintForm::SummedArea, FootprintForm::Sections] {
-            (scene.splatting.compositing, scene.splatting.footprint) = (compositing, footprint);
-            let bytes = |gpu: &Headless| {
-                let (image, _) = render(gpu, &volume, &scene);
-                bytemuck::cast_slice::<_, u8>(image.pixels.as_flattened()).to_vec()
-            };
-            let image = bytes(&first);
-            assert_eq!(image.len(), 96 * 80 * 16);
-            assert!(image == bytes(&first), "{compositing:?} {footprint:?}, on the same device");
-            assert!(image == bytes(&second), "{compositing:?} {footprint:?}, on a new device");
-        }
+    let perspective = Projection::Perspective { fov_y: 60.0, distance: None, near: None };
+    let projections = [scene.camera.projection, perspective, perspective];
+    let cases = COMPOSITINGS.into_iter().zip(projections);
+    for ((compositing, projection), form) in cases.flat_map(|case| FORMS.map(|form| (case, form))) {
+        (scene.splatting.compositing, scene.camera.projection) = (compositing, projection);
+        (scene.splatting.rasterizer, scene.splatting.footprint) = form;
+        let bytes = |gpu: &Headless| {
+            let (image, _) = render(gpu, &volume, &scene);
+            bytemuck::cast_slice::<_, u8>(image.pixels.as_flattened()).to_vec()
+        };
+        let image = bytes(&first);
+        assert_eq!(image.len(), 96 * 80 * 16);
+        assert!(image == bytes(&first), "{compositing:?} {form:?} {projection:?}, on the same device");
+        assert!(image == bytes(&second), "{compositing:?} {form:?} {projection:?}, on a new device");
     }
 }
 
@@ -259,19 +269,24 @@ fn constant_colour_is_constant_colour_times_alpha() {
     scene.transfer = transfer(&[(0.0, color)], &[(30.0, 0.0), (200.0, 1.0)]);
     scene.shading.enabled = false;
     scene.image.background = [0.0; 4];
-    for compositing in [Compositing::Linear, Compositing::Exponential] {
+    for (rasterizer, compositing) in RASTERIZERS
+        .into_iter()
+        .flat_map(|rasterizer| [Compositing::Linear, Compositing::Exponential].map(|how| (rasterizer, how)))
+    {
+        (scene.splatting.rasterizer, scene.splatting.compositing) = (rasterizer, compositing);
+        // Quads round amount and amount times colour to f16 each; sheets and their sum are f32.
+        let rounding = if rasterizer == Rasterizer::Quads { 2.0 * F16 } else { 0.0 };
         for slab_width in [0.5, 1.0, 3.0] {
-            (scene.splatting.compositing, scene.splatting.slab_width) = (compositing, slab_width);
+            scene.splatting.slab_width = slab_width;
             let (image, sheets) = render(&gpu, &volume, &scene);
             assert!(image.pixels.iter().any(|pixel| pixel[3] > 0.99));
             for (i, pixel) in image.pixels.iter().enumerate() {
                 let alpha = f64::from(pixel[3]);
                 for (channel, color) in pixel.iter().zip(color) {
-                    // Amount and amount times colour are rounded to f16 each; sheets and their sum are f32.
-                    let tolerance = 2.0 * F16 * color * alpha + 4.0 * F32 * sheets as f64;
+                    let tolerance = rounding * color * alpha + 4.0 * F32 * sheets as f64;
                     assert!(
                         (f64::from(*channel) - color * alpha).abs() <= tolerance,
-                        "{compositing:?} slab width {slab_width} pixel {i}: {pixel:?}"
+                        "{rasterizer:?} {compositing:?} slab width {slab_width} pixel {i}: {pixel:?}"
                     );
                 }
             }

@@ -1,22 +1,21 @@
-//! The f64 twin by itself: what must hold of its perspective, its axis-aligned sheets and its composite-every-sample, and how far it is from
-//! a dense ray march of the same field. `cargo test --release --test twins -- --nocapture` prints what was measured.
+//! The f64 twin by itself: what must hold of its perspective, its axis-aligned sheets and its composite-every-sample.
+//! `cargo test --release --test twins -- --nocapture` prints what was measured.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
 mod common;
 
-use std::path::Path;
-
-use glam::{DVec3, UVec2, UVec3};
+use glam::{DVec3, UVec3};
 use sheetsplat::camera::{Camera, Projection};
 use sheetsplat::image::Image;
 use sheetsplat::kernel::Kernel;
+use sheetsplat::reference;
 use sheetsplat::reference::visibility::Test;
-use sheetsplat::reference::{self, ray_march};
 use sheetsplat::scene::Scene;
 use sheetsplat::splatting::{Compositing, Method, Order};
 use sheetsplat::volume::{Volume, builtin};
 
+use common::images::{largest_difference, rms};
 use common::{Random, camera, scene, transfer};
 
 const METHODS: [Method; 3] = [Method::ImageAligned, Method::AxisAligned, Method::CompositeEverySample];
@@ -32,27 +31,9 @@ fn perspective(direction: [f64; 3], fov_y: f64, distance: f64, near: Option<f64>
 }
 
 /// Differences of all channels.
-fn errors(a: &[[f32; 4]], b: &[[f32; 4]]) -> Vec<f64> {
-    assert_eq!(a.len(), b.len());
-    a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| f64::from(a - b)).collect()
-}
-
-fn rms(a: &Image, b: &Image) -> f64 {
-    let errors = errors(&a.pixels, &b.pixels);
-    (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()
-}
-
-fn largest_difference(a: &Image, b: &Image) -> f64 {
-    errors(&a.pixels, &b.pixels).into_iter().fold(0.0, |worst: f64, error| worst.max(error.abs()))
-}
-
-/// Decibels over the pixels where either differs from opaque black.
-fn psnr(a: &[[f32; 4]], b: &[[f32; 4]]) -> f64 {
-    const BLACK: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
-    let (a, b): (Vec<[f32; 4]>, Vec<[f32; 4]>) = a.iter().zip(b).filter(|(a, b)| **a != BLACK || **b != BLACK).unzip();
-    assert!(a.len() > 500, "only {} pixels show anything", a.len());
-    let errors = errors(&a, &b);
-    -10.0 * (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).log10()
+fn errors(a: &Image, b: &Image) -> Vec<f64> {
+    assert_eq!(a.pixels.len(), b.pixels.len());
+    a.pixels.as_flattened().iter().zip(b.pixels.as_flattened()).map(|(a, b)| f64::from(a - b)).collect()
 }
 
 /// A small head, semi-transparent.
@@ -60,62 +41,6 @@ fn head() -> (Volume, Scene) {
     let mut scene = scene(72, 60);
     scene.transfer = transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (120.0, 0.3)]);
     (builtin::volume("head:32").unwrap(), scene)
-}
-
-/// The twin and every so-manieth pixel marched.
-fn against_the_ray_march(volume: &Volume, scene: &Scene, stride: u32) -> f64 {
-    let transfer = scene.transfer.resolve(volume);
-    let splatted = reference::render(volume, &transfer, scene).unwrap();
-    let lines = |size: u32| (0..size).step_by(stride as usize);
-    let pixels: Vec<UVec2> =
-        lines(splatted.height).flat_map(|y| lines(splatted.width).map(move |x| UVec2::new(x, y))).collect();
-    let marched = ray_march::pixels(volume, &transfer, scene, &pixels).unwrap();
-    let splatted: Vec<[f32; 4]> =
-        pixels.iter().map(|at| splatted.pixels[(at.x + at.y * splatted.width) as usize]).collect();
-    psnr(&splatted, &marched)
-}
-
-/// The nerve at fov 30, an image large enough that a grid unit covers a pixel at the far end, so that no low-pass rule sets in.
-#[test]
-fn ray_march_of_the_nerve() {
-    let volume = builtin::volume("nerve:128").unwrap();
-    let mut scene = scene(288, 288);
-    scene.camera.projection = Projection::Perspective { fov_y: 30.0, distance: None, near: None };
-    scene.splatting.compositing = Compositing::Exponential;
-    let decibels = against_the_ray_march(&volume, &scene, 2);
-    println!("builtin:nerve:128: {decibels:.1} dB");
-    assert!(decibels >= 45.0, "{decibels}");
-}
-
-/// A real, strongly anisotropic volume, where the data lie beside the checkout.
-#[test]
-fn ray_march_of_the_quarter_head() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes/quarter-head-perspective.toml");
-    if !path.exists() {
-        println!("skipped: there is no {}", path.display());
-        return;
-    }
-    let mut scene = Scene::open(&path, &[]).unwrap();
-    (scene.image.width, scene.image.height) = (192, 192);
-    let volume = scene.load_volume().unwrap();
-    let decibels = against_the_ray_march(&volume, &scene, 1);
-    println!("quarter-head-perspective: {decibels:.1} dB");
-    assert!(decibels >= 45.0, "{decibels}");
-}
-
-/// Orthographic, slabs and march are the same field, so what is left is the slab width: it goes with its square.
-#[test]
-fn ray_march_and_thin_slabs() {
-    let (volume, mut scene) = head();
-    let volume = volume.with_spacing("head", DVec3::new(1.0, 1.0, 3.0)).unwrap();
-    scene.camera = camera([0.4, 0.9, -0.3], 60.0);
-    scene.splatting.compositing = Compositing::Exponential;
-    let decibels = [1.0, 0.5, 0.25].map(|slab_width| {
-        scene.splatting.slab_width = slab_width;
-        against_the_ray_march(&volume, &scene, 1)
-    });
-    println!("slab widths 1, 0.5, 0.25: {decibels:.1?} dB");
-    assert!(decibels[0] > 45.0 && decibels[1] > decibels[0] + 10.0 && decibels[2] > decibels[1] + 10.0, "{decibels:?}");
 }
 
 /// An eye that moves away while its angle narrows sees what an orthographic camera sees: the difference halves when the distance doubles.
@@ -259,7 +184,7 @@ fn axis_aligned_equals_image_aligned_along_an_axis() {
             let image_aligned = render(&volume, &scene);
             scene.splatting.method = Method::AxisAligned;
             let axis_aligned = render(&volume, &scene);
-            let errors = errors(&image_aligned.pixels, &axis_aligned.pixels);
+            let errors = errors(&image_aligned, &axis_aligned);
             let worst = |channel: usize| errors.iter().skip(channel).step_by(4).fold(0.0, |w: f64, e| w.max(e.abs()));
             println!("{spacing} {direction:?}: alpha {:.1e}, red {:.1e}, blue {:.1e}", worst(3), worst(0), worst(2));
             assert!(worst(3) < 1e-6 && worst(0) < 5e-3 && worst(2) < 5e-3, "{spacing} {direction:?}");
@@ -423,45 +348,4 @@ fn no_view_breaks_down() {
         let valid = |channel: &f32| (0.0..=1.000_001).contains(channel);
         assert!(culled.image.pixels.as_flattened().iter().all(valid), "{:?}", scene.camera);
     }
-}
-
-/// Figs. 3 and 6: the cube at 44.8° and 45.2°, both faces under a headlight.
-#[test]
-fn the_cube_does_not_pop() {
-    let volume = builtin::volume("cube").unwrap();
-    let mut scene = scene(256, 256);
-    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (255.0, 0.5)]);
-    (scene.shading.ambient, scene.shading.diffuse, scene.shading.specular) = (0.0, 1.0, 0.0);
-    let pixels_per_unit = 128.0 / volume.grid().bounding_radius(2.0);
-    // The mean red of a face, away from its edges: it reaches 22 units to a side and 16 up and down.
-    let face = |image: &Image, side: f64| {
-        let reds = image.pixels.iter().enumerate().filter_map(|(at, pixel)| {
-            let x = side * ((at % 256) as f64 - 127.5) / pixels_per_unit;
-            let y = ((at / 256) as f64 - 127.5) / pixels_per_unit;
-            ((6.0..16.0).contains(&x) && y.abs() < 10.0).then_some(f64::from(pixel[0]))
-        });
-        let (count, sum) = reds.fold((0.0, 0.0), |(count, sum), red| (count + 1.0, sum + red));
-        sum / count
-    };
-    let measured = METHODS.map(|method| {
-        scene.splatting.method = method;
-        let [before, after] = [44.8_f64, 45.2].map(|degrees| {
-            let (sine, cosine) = degrees.to_radians().sin_cos();
-            scene.camera.direction = DVec3::new(sine, cosine, 0.0);
-            render(&volume, &scene)
-        });
-        // Alpha is 1 everywhere: the rms is that of the colours.
-        let rms = rms(&before, &after) * (4.0_f64 / 3.0).sqrt();
-        let ratio = face(&before, 1.0) / face(&before, -1.0);
-        println!("cube, {method:?}: rms {rms:.4}, right face over left {ratio:.4}");
-        (rms, ratio)
-    });
-    let [(image_aligned, ratio), (axis_aligned, popped), _] = measured;
-    assert!(image_aligned <= 0.003, "{image_aligned}");
-    assert!((0.045..0.055).contains(&axis_aligned), "{axis_aligned}");
-    // The face that looks a little more towards the light is the brighter one, by less than the cosines' ratio of 1.0070: along the flatter
-    // of two rays more of the lit layer lies before the dark inside.
-    let cosines = 44.8_f64.to_radians().cos() / 45.2_f64.to_radians().cos();
-    assert!(1.0 < ratio && ratio < cosines, "{ratio}");
-    assert!(popped > 1.2, "{popped}");
 }

@@ -51,7 +51,40 @@ fn section_maps(ray: LocalRay, from_eye: f32, near: vec4f, far: vec4f) -> Sectio
     return SectionMaps(min(along, vec4f(1.0)), min(across, vec4f(1.0)), amplitude);
 }
 
+// The near and far planes of up to four sheets, seen from a kernel's centre along its ray; none before the near plane.
+struct SheetPlanes {
+    near: vec4f,
+    far: vec4f,
+    // From one to the other, where the near plane does not cut.
+    thickness: f32,
+}
+
+// The sheets from `near` on.
+fn sheet_planes(ray: LocalRay, depth: f32, from_eye: f32, near: f32) -> SheetPlanes {
+    let per_depth = select(frame.kernel_per_depth, ray.kernel_per_depth, frame.kernel_per_depth == 0.0);
+    let cut = vec4f(near_cut(ray, from_eye));
+    let depths = near - depth + vec4f(0.0, 1.0, 2.0, 3.0) * frame.slab_width;
+    let near_planes = max(depths * per_depth, cut);
+    let far_planes = max((depths + frame.slab_width) * per_depth, cut);
+    return SheetPlanes(near_planes, far_planes, frame.slab_width * per_depth);
+}
+
 // Where the near plane cuts a kernel, seen from its centre; without an eye nowhere.
 fn near_cut(ray: LocalRay, from_eye: f32) -> f32 {
     return select(-1e9, (frame.near - from_eye) * ray.kernel_per_depth, frame.near > 0.0);
+}
+
+// How many of a group's sections in the sheets from `sheets.x` to the one before `sheets.y` have a footprint whose own box holds a
+// pixel: the group's box is larger.
+fn sections_on_screen(center_px: vec2f, axis: vec2f, maps: SectionMaps, sheets: vec2f) -> u32 {
+    let squared = axis * axis;
+    let x = frame.support * sqrt(squared.x / maps.along + squared.y / maps.across);
+    let y = frame.support * sqrt(squared.y / maps.along + squared.x / maps.across);
+    let last = vec2f(frame.size) - 0.5;
+    let sheet = vec4f(0.0, 1.0, 2.0, 3.0);
+    let is_on_screen = (center_px.x + x >= vec4f(0.5)) & (center_px.x - x <= vec4f(last.x))
+        & (center_px.y + y >= vec4f(0.5)) & (center_px.y - y <= vec4f(last.y))
+        & (sheet >= vec4f(sheets.x)) & (sheet < vec4f(sheets.y));
+    let counts = select(vec4u(0u), vec4u(1u), is_on_screen);
+    return counts.x + counts.y + counts.z + counts.w;
 }

@@ -31,11 +31,9 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
     let splat = splats[instances[min(quad, args.count - 1u)]];
     let center_px = vec2f(splat.x_px, splat.y_px);
     let ray = local_ray(center_px);
-    let per_depth = select(frame.kernel_per_depth, ray.kernel_per_depth, frame.kernel_per_depth == 0.0);
-    let cut = near_cut(ray, splat.from_eye);
-    let depths = group.near - splat.depth + vec4f(0.0, 1.0, 2.0, 3.0) * frame.slab_width;
-    let near = max(depths * per_depth, vec4f(cut));
-    let far = max((depths + frame.slab_width) * per_depth, vec4f(cut));
+    let planes = sheet_planes(ray, splat.depth, splat.from_eye, group.near);
+    let near = planes.near;
+    let far = planes.far;
     let maps = section_maps(ray, splat.from_eye, near, far);
     let along = sqrt(maps.along);
     let across = sqrt(maps.across);
@@ -50,7 +48,7 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
     let amount = vec4f(unpack2x16float(splat.rg), unpack2x16float(splat.ba)) * ray.per_lambda;
     if SECTIONS {
         // Stored sections are whole: the near plane leaves out those before it.
-        let middle = select(vec4f(1e9), (depths + 0.5 * frame.slab_width) * per_depth, far > vec4f(cut));
+        let middle = select(vec4f(1e9), far - 0.5 * planes.thickness, far > near);
         return Quad(position, center_px, ray.axis, along, across, amount, maps.amplitude, middle, vec4f(0.0), vec4f(0.0), 0.0);
     }
     let falloff = layer_falloff();

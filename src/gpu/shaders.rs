@@ -24,7 +24,7 @@ macro_rules! shader {
 /// Which bricks a sheet group visits.
 pub const CULL_BRICKS: Shader = shader!("cull_bricks", "frame", "brick", "tally", "culled", "scan", "project");
 /// Which voxels it draws.
-pub const CULL_VOXELS: Shader = shader!("cull_voxels", "frame", "brick", "tally", "culled", "project");
+pub const CULL_VOXELS: Shader = shader!("cull_voxels", "frame", "brick", "tally", "culled", "project", "local_ray");
 /// Those voxels in a row.
 pub const COMPACT: Shader = shader!("compact", "brick", "tally", "culled", "scan");
 /// Shades those that were not shaded before.

@@ -37,6 +37,8 @@ impl GatherMode {
     pub fn of(splatting: &Splatting, perspective: bool, labels: bool) -> Self {
         let Splatting { compositing, order, footprint_box, economies, .. } = *splatting;
         let economies = economies != Economies::default();
+        // Every voxel has its own parallelogram there.
+        let footprint_box = if perspective { FootprintBox::Rectangle } else { footprint_box };
         Self { compositing, order, footprint_box, perspective, economies, labels }
     }
 }

@@ -51,17 +51,18 @@ pub(crate) struct Footprints {
 }
 
 impl Footprints {
-    /// The old table if it will do.
-    pub(crate) fn renewed(old: Option<Self>, given: Given<'_>) -> Self {
+    /// The old table if it will do. Also whether it had to make one.
+    pub(crate) fn renewed(old: Option<Self>, given: Given<'_>) -> (Self, bool) {
         let (form, kernel) = (given.splatting.footprint, *given.kernel);
         // The summed-area form serves every width (§3.3.1).
         let width = given.view.section_width();
         let of = (form == FootprintForm::Sections).then_some(width);
         let fits = |old: &Self| (old.texture.form, old.kernel, old.width) == (form, kernel, of);
-        old.filter(fits).unwrap_or_else(|| {
-            let table = FootprintTable::new(form, &kernel, width);
-            Self { texture: FootprintTexture::upload(given.device, given.queue, &table), kernel, width: of }
-        })
+        if let Some(old) = old.filter(fits) {
+            return (old, false);
+        }
+        let table = FootprintTable::new(form, &kernel, width);
+        (Self { texture: FootprintTexture::upload(given.device, given.queue, &table), kernel, width: of }, true)
     }
 }
 

@@ -17,6 +17,7 @@ use crate::pass::occlude::Occlude;
 use crate::pass::splat::{Splat, SplatMode};
 use crate::pass::tiles::{TileLists, Tiles};
 use crate::plan::FramePlan;
+use crate::scene_view::Prepared;
 use crate::splatting::Order;
 use crate::stats::GroupSlabs;
 use crate::view::View;
@@ -86,8 +87,8 @@ impl QuadRasterizer {
         }
     }
 
-    /// Buckets bricks if need be, and allocates what does not fit any more. Also whether it had to bucket.
-    pub(crate) fn prepare(&self, given: Given<'_>, previous: Option<QuadFrame>) -> (QuadFrame, bool) {
+    /// Buckets bricks if need be, and allocates what does not fit any more.
+    pub(crate) fn prepare(&self, given: Given<'_>, previous: Option<QuadFrame>) -> (QuadFrame, Prepared) {
         let Given { device, volume, view, splatting, frame, control_points, compositing, .. } = given;
         let old = Old::of(previous);
         let targets = old.targets.filter(|old| old.size == view.size);
@@ -98,14 +99,14 @@ impl QuadRasterizer {
                 && (old.plan.view.has_depths_of(view) || old.plan.view.is_by_slices())
         });
         let current = other_axes.iter().position(|old| old.plan.view.has_depths_of(view));
-        let is_new = current.is_none();
+        let bucketed = current.is_none();
         let mut planned = match current {
             Some(at) => other_axes.swap_remove(at),
             None => Planned::new(device, volume, *view, self.sheets, splatting.order),
         };
         planned.plan.view = *view;
         let plan = &planned.plan;
-        let footprints = Footprints::renewed(old.footprints, given);
+        let (footprints, tabled) = Footprints::renewed(old.footprints, given);
         let alignment = device.limits().min_uniform_buffer_offset_alignment as usize;
         let group_stride = size_of::<Group>().next_multiple_of(alignment);
         let group_bytes = uniforms::groups(plan, given.kernel, splatting, group_stride);
@@ -155,7 +156,7 @@ impl QuadRasterizer {
             tile_lists,
             lists,
         };
-        (frame, is_new)
+        (frame, Prepared { bucketed, tabled })
     }
 
     /// Draws the frame.

@@ -17,6 +17,7 @@ use crate::pass::composite::Composite;
 use crate::pass::sample::{Sample, SampleBuffers, SampleMode};
 use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};
 use crate::plan::tile_grid;
+use crate::scene_view::Prepared;
 use crate::splatting::Compositing;
 use crate::stats::GroupSlabs;
 use crate::view::View;
@@ -79,7 +80,7 @@ impl SampleRasterizer {
         }
     }
 
-    /// Sorts voxels if need be. Also whether it had to.
+    /// Sorts voxels if need be.
     ///
     /// # Errors
     /// If the voxels need more than one binding.
@@ -88,7 +89,7 @@ impl SampleRasterizer {
         given: Given<'_>,
         frame: &Frame,
         previous: Option<SampleFrame>,
-    ) -> Result<(SampleFrame, bool), RenderError> {
+    ) -> Result<(SampleFrame, Prepared), RenderError> {
         let Given { device, volume, view, kernel, splatting, .. } = given;
         let limits = device.limits();
         let actual = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
@@ -104,11 +105,11 @@ impl SampleRasterizer {
         };
         let is_current =
             |old: &Sorted| old.view == *view && (old.support, old.revision) == (kernel.support(), volume.revision);
-        let (sorted, is_new) = match old_sorted.filter(is_current) {
+        let (sorted, bucketed) = match old_sorted.filter(is_current) {
             Some(sorted) => (sorted, false),
             None => (Sorted::new(given), true),
         };
-        let footprints = Footprints::renewed(old_footprints, given);
+        let (footprints, tabled) = Footprints::renewed(old_footprints, given);
         let targets = Targets::new(device, view.size, self.format, 1);
         let buffers = Buffers::new(given, frame, &sorted.places, required);
 
@@ -151,7 +152,7 @@ impl SampleRasterizer {
             mode,
             sample_group,
         };
-        Ok((frame, is_new))
+        Ok((frame, Prepared { bucketed, tabled }))
     }
 
     /// Draws the frame.

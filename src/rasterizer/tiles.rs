@@ -9,6 +9,7 @@ use crate::gpu::layout::{Brick, Gathered, Part, Tally};
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
 use crate::pass::gather::{Gather, GatherBand, GatherBuffers, GatherMode};
+use crate::scene_view::Prepared;
 use crate::splatting::{FootprintForm, Method, Order, Splatting};
 use crate::stats::GroupSlabs;
 use crate::tile_bins::{SHEETS, SIDE, TileBins, UNITS};
@@ -78,7 +79,7 @@ impl TileRasterizer {
         None
     }
 
-    /// Bins bricks if need be, and allocates what does not fit any more. Also whether it had to bin.
+    /// Bins bricks if need be, and allocates what does not fit any more. Sections need no table here.
     ///
     /// # Errors
     /// If there is too much behind a tile, or more bricks than a binding holds.
@@ -86,7 +87,7 @@ impl TileRasterizer {
         &self,
         given: Given<'_>,
         previous: Option<TileFrame>,
-    ) -> Result<(TileFrame, bool), RenderError> {
+    ) -> Result<(TileFrame, Prepared), RenderError> {
         let Given { device, volume, view, kernel, splatting, .. } = given;
         let limits = device.limits();
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
@@ -189,7 +190,7 @@ impl TileRasterizer {
             dispatches,
             bands,
         };
-        Ok((frame, stale))
+        Ok((frame, Prepared { bucketed: stale, tabled: false }))
     }
 
     /// Draws the frame.

@@ -6,7 +6,11 @@ mod bench;
 mod compare;
 mod errors;
 mod extremes;
+#[expect(dead_code, reason = "not every file needs all of it")]
+#[path = "../common/images.rs"]
+mod images;
 mod outputs;
+mod rasterizers;
 mod statistics;
 
 use std::collections::BTreeSet;
@@ -16,6 +20,8 @@ use std::process::Command;
 
 use glam::DVec3;
 use serde_json::Value;
+
+use images::{BLACK, psnr};
 
 /// A temporary folder, which is also the program's current directory.
 struct Folder(tempfile::TempDir);
@@ -69,8 +75,14 @@ impl Folder {
     }
 
     fn run_in(&self, folder: &str, arguments: &str) -> Run {
+        self.run_with(&[], folder, arguments)
+    }
+
+    /// With environment variables.
+    fn run_with(&self, environment: &[(&str, &str)], folder: &str, arguments: &str) -> Run {
         let output = Command::new(env!("CARGO_BIN_EXE_sheetsplat"))
             .env("WGPU_ADAPTER_NAME", "llvmpipe")
+            .envs(environment.iter().copied())
             .args(arguments.split(' '))
             .current_dir(self.path(folder))
             .output()
@@ -126,18 +138,6 @@ impl Run {
         }
     }
 }
-
-/// Decibels over the pixels where either image differs from the background (premultiplied).
-fn psnr(a: &[[f32; 4]], b: &[[f32; 4]], background: [f32; 4]) -> f64 {
-    assert_eq!(a.len(), b.len());
-    let pixels: Vec<_> = a.iter().zip(b).filter(|&(a, b)| *a != background || *b != background).collect();
-    assert!(pixels.len() > 50, "only {} pixels show anything", pixels.len());
-    let squares: f64 =
-        pixels.iter().flat_map(|(a, b)| a.iter().zip(*b)).map(|(&a, &b)| (f64::from(a) - f64::from(b)).powi(2)).sum();
-    -10.0 * (squares / (pixels.len() * 4) as f64).log10()
-}
-
-const BLACK: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
 
 /// A small picture with everything between transparent and opaque in it.
 const SMALL: &str = "builtin:marschner-lobb:12 --set image.width=27 --set image.height=20 \

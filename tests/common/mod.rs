@@ -1,17 +1,31 @@
-//! What the GPU tests share.
+//! What the tests share.
 
-use glam::{DVec3, DVec4};
+pub(crate) mod images;
+
+use glam::{DVec3, DVec4, UVec3};
 use sheetsplat::camera::{Camera, Projection};
 use sheetsplat::gpu::device::DeviceRequirements;
 use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::scene::{ImageSettings, Scene, TransferSettings, VolumeSource};
+use sheetsplat::splatting::{FootprintForm, Rasterizer};
 use sheetsplat::transfer_function::Ramp;
+use sheetsplat::volume::{Grid, Volume};
 use sheetsplat::wgpu::{Features, Limits, TextureFormat};
 
 /// What rounding to the nearest f32 changes at most, relative.
 pub(crate) const F32: f64 = 1.0 / (1 << 24) as f64;
 /// What rounding to the nearest f16 changes at most, relative; below 2⁻¹⁴ half a step of 2⁻²⁴ instead.
 pub(crate) const F16: f64 = 1.0 / (1 << 11) as f64;
+
+/// Both ways to draw sheets, whatever `auto` would choose.
+pub(crate) const RASTERIZERS: [Rasterizer; 2] = [Rasterizer::Quads, Rasterizer::Tiles];
+
+/// Both, with all that each can draw from.
+pub(crate) const FORMS: [(Rasterizer, FootprintForm); 3] = [
+    (Rasterizer::Quads, FootprintForm::SummedArea),
+    (Rasterizer::Quads, FootprintForm::Sections),
+    (Rasterizer::Tiles, FootprintForm::SummedArea),
+];
 
 /// Mesa's software driver: the tests compare images on it, so that they mean the same on every machine.
 pub(crate) fn lavapipe() -> HeadlessOptions {
@@ -52,6 +66,42 @@ pub(crate) fn camera(direction: [f64; 3], height: f64) -> Camera {
     Camera { projection, direction: DVec3::from(direction), ..Camera::default() }
 }
 
+/// Balls in a haze of noise: values of 0 to 20, and of 150 to 250 in the balls. Its sides are at least `least` and less than `end`, rarely
+/// multiples of a brick's.
+pub(crate) fn random_volume(random: &mut Random, (least, end): (f64, f64), spacing: [f64; 3]) -> Volume {
+    let dims = UVec3::from([(); 3].map(|()| random.uniform(least, end) as u32));
+    let balls: Vec<(DVec3, f64)> =
+        (0..5).map(|_| (random.within(DVec3::ZERO, dims.as_dvec3()), random.uniform(0.06, 0.3) * end)).collect();
+    let grid = Grid { dims, spacing: DVec3::from(spacing) };
+    let value = |index| {
+        let p = grid.voxel_at(index).as_dvec3();
+        let inside = balls.iter().any(|(center, radius)| p.distance(*center) < *radius);
+        (if inside { random.uniform(150.0, 250.0) } else { random.uniform(0.0, 20.0) }) as f32
+    };
+    let values = (0..dims.element_product()).map(value).collect();
+    Volume::new("random", dims, grid.spacing, values).unwrap()
+}
+
+/// Spacings of volumes that are seen in perspective.
+pub(crate) const SPACINGS: [[f64; 3]; 4] = [[1.0, 1.0, 1.0], [1.0, 1.0, 3.0], [1.0, 1.0, 5.0], [3.0, 1.0, 2.0]];
+
+/// An eye far outside a volume, close by, or inside it, that looks at the volume, past it, or out of it, through a narrow or a
+/// wide angle. The near plane is a `unit` from it, or closer, or cuts the volume.
+pub(crate) fn random_eye(random: &mut Random, grid: &Grid) -> Camera {
+    let half = grid.center() * grid.spacing + grid.spacing;
+    let place = random.bits() % 4;
+    let position = match place {
+        0 => random.direction() * half.length() * random.uniform(1.5, 4.0),
+        1 => random.direction() * half.length() * random.uniform(0.8, 1.2),
+        _ => random.within(-half, half),
+    };
+    let center = random.within(-half, half) * if place == 3 { 2.0 } else { 0.6 };
+    let distance = (center - position).length();
+    let near = random.pick(&[None, Some(0.3 * grid.unit()), Some(2.5 * grid.unit()), Some(0.5 * distance)]);
+    let projection = Projection::Perspective { fov_y: random.uniform(10.0, 110.0), distance: Some(distance), near };
+    Camera { projection, direction: center - position, up: random.direction(), center }
+}
+
 /// Control points of a colour and an opacity ramp.
 pub(crate) fn transfer(color: &[(f64, [f64; 3])], opacity: &[(f64, f64)]) -> TransferSettings {
     TransferSettings {
@@ -78,6 +128,16 @@ impl Random {
     /// Uniform in [low, high).
     pub(crate) fn uniform(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// One of some things.
+    pub(crate) fn pick<T: Copy>(&mut self, choices: &[T]) -> T {
+        choices[self.bits() as usize % choices.len()]
+    }
+
+    /// A point, uniform in a box.
+    pub(crate) fn within(&mut self, low: DVec3, high: DVec3) -> DVec3 {
+        low + DVec3::from([(); 3].map(|()| self.uniform(0.0, 1.0))) * (high - low)
     }
 
     /// A direction, uniform over the sphere.

@@ -286,9 +286,9 @@ fn frames() {
     {
         for frame in FRAMES.into_iter().cycle().take(10) {
             let mut scene = frame_scene(frame, &mut random);
-            let (radius, falloff) = KERNELS[random.bits() as usize % KERNELS.len()];
+            let (radius, falloff) = random.pick(&KERNELS);
             (scene.splatting.radius, scene.splatting.falloff) = (radius, falloff);
-            scene.splatting.slab_width = [0.3, 1.0, 2.6][random.bits() as usize % 3];
+            scene.splatting.slab_width = random.pick(&[0.3, 1.0, 2.6]);
             (scene.splatting.compositing, scene.splatting.order) = (compositing, order);
             scene.splatting.culling = false;
             if random.bits().is_multiple_of(2) {
@@ -301,7 +301,7 @@ fn frames() {
                 scene.shading.light = Light::Direction(random.direction());
             }
             let dims = UVec3::new(7, 10, 9);
-            let points = [1, 4, 8, 9, 40][random.bits() as usize % 5];
+            let points = random.pick(&[1, 4, 8, 9, 40]);
             let opacity = if compositing == Compositing::Xray { 0.01 } else { 0.6 };
             let (volume, transfer) = noise(&mut random, dims, frame.1, opacity, points);
             scene.transfer = transfer;

@@ -1,6 +1,7 @@
 //! Every GPU stage against its f64 twin in `sheetsplat::reference`, one stage at a time, in float.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+#[expect(dead_code, reason = "not every file needs all of it")]
 #[path = "../common/mod.rs"]
 mod common;
 mod composite;

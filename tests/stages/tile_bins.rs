@@ -36,7 +36,7 @@ impl Case {
         let unit = grid.unit();
         scene.camera = camera(random.direction().to_array(), random.uniform(5.0, 40.0) * unit);
         scene.splatting.radius = random.uniform(1.0, 3.0);
-        scene.splatting.slab_width = [0.3, 1.0, 2.6][random.bits() as usize % 3];
+        scene.splatting.slab_width = random.pick(&[0.3, 1.0, 2.6]);
         if random.bits().is_multiple_of(2) {
             let distance = Some(random.uniform(10.0, 60.0) * unit);
             scene.camera.projection = Projection::Perspective { fov_y: 40.0, distance, near: Some(4.0 * unit) };

@@ -1,0 +1,113 @@
+//! Minified views (the low-pass rule of SPEC §5): at a quarter of its size a view is the full-size view, box-filtered.
+//! `cargo test --release --test minified -- --nocapture` prints what was measured.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+#[expect(dead_code, reason = "not every file needs all of it")]
+mod common;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use sheetsplat::image::Image;
+use sheetsplat::kernel::Kernel;
+use sheetsplat::reference::composite::composite;
+use sheetsplat::reference::footprint::Ray;
+use sheetsplat::reference::{Buffer, Geometry, resolve, shading, sheets, splat};
+use sheetsplat::scene::Scene;
+use sheetsplat::splatting::Rasterizer;
+use sheetsplat::volume::{Volume, builtin};
+
+use common::images::color_rms;
+use common::{camera, gpu, scene};
+
+const FACTOR: u32 = 4;
+
+/// The mean of so many pixels across and down.
+fn box_filtered(image: &Image) -> Image {
+    let (width, height) = (image.width / FACTOR, image.height / FACTOR);
+    let pixel = |at: u32| {
+        let corner = (at % width + at / width * image.width) * FACTOR;
+        let block =
+            (0..FACTOR * FACTOR).map(|i| image.pixels[(corner + i % FACTOR + i / FACTOR * image.width) as usize]);
+        let sum = block.fold([0.0; 4], |sum: [f32; 4], pixel| std::array::from_fn(|i| sum[i] + pixel[i]));
+        sum.map(|channel| channel / (FACTOR * FACTOR) as f32)
+    };
+    Image { width, height, pixels: (0..width * height).map(pixel).collect() }
+}
+
+fn minified(scene: &Scene) -> Scene {
+    let mut small = scene.clone();
+    small.image.width /= FACTOR;
+    small.image.height /= FACTOR;
+    small
+}
+
+/// Decibels over the colours of all pixels.
+fn decibels(a: &Image, b: &Image) -> f64 {
+    -20.0 * color_rms(a, b).log10()
+}
+
+/// Decibels by rasterizer between a view at a quarter of its size and the box-filtered one; also the latter.
+fn by_rasterizer(volume: &Arc<Volume>, scene: &Scene) -> ([f64; 2], Image) {
+    let gpu = gpu();
+    let render = |scene: &Scene| gpu.render_volume(volume.clone(), scene).unwrap().image;
+    let filtered = box_filtered(&render(scene));
+    let by_both = [Rasterizer::Quads, Rasterizer::Tiles].map(|rasterizer| {
+        let mut small = minified(scene);
+        small.splatting.rasterizer = rasterizer;
+        decibels(&render(&small), &filtered)
+    });
+    (by_both, filtered)
+}
+
+/// The twin's image of an orthographic view without the low-pass rule: footprints as small as they come.
+fn without_low_pass(volume: &Volume, scene: &Scene) -> Image {
+    let transfer = scene.transfer.resolve(volume);
+    let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
+    let mut geometry = Geometry::new(volume.grid(), scene).unwrap();
+    let ray = Ray::new(geometry.basis.w, &geometry.basis, volume.grid().aspect());
+    (geometry.footprint_from_pixels, geometry.amplitude) = (ray.footprint_from_units * geometry.pix, 1.0);
+    let voxels = shading::taking_part(volume, &transfer, &geometry);
+    let splats = shading::splats(&voxels, volume, &transfer, scene, &geometry);
+    let mut acc = Buffer::new(scene.image.width, scene.image.height);
+    for (k, bucket) in sheets::buckets(&voxels, &splats, &geometry, &kernel) {
+        let in_sheet: Vec<_> = bucket.iter().map(|&index| splats[index as usize]).collect();
+        let sheet = splat::sheet(&in_sheet, k, &geometry, &kernel);
+        composite(&mut acc, &sheet, scene.splatting.compositing, scene.splatting.order);
+    }
+    resolve::resolve(&acc, scene.splatting.compositing, scene.image.background).into_image()
+}
+
+/// What is finer than a pixel is what the rule is for: without it a pixel shows what lies behind its centre. (Solid objects look more like
+/// the filtered image without it, as the rule blurs a little more than a box.)
+#[test]
+fn fine_structures() {
+    let volume = Arc::new(builtin::volume("nerve:160").unwrap());
+    let mut scene = scene(320, 320);
+    scene.camera = camera([0.2, 0.9, -0.5], 960.0);
+    scene.splatting.culling = false;
+    let (by_both, filtered) = by_rasterizer(&volume, &scene);
+    let without = decibels(&without_low_pass(&volume, &minified(&scene)), &filtered);
+    println!("builtin:nerve:160: {by_both:.1?} dB, without the low-pass rule {without:.1} dB");
+    assert!(by_both.iter().all(|&decibels| decibels >= 34.0 && decibels > without + 2.5), "{by_both:?}, {without}");
+}
+
+/// Real volumes at the size of their scenes, where the data lie beside the checkout.
+#[test]
+fn ct_heads() {
+    for (name, least) in [("ct-head-opaque", 34.0), ("ct-head-semi", 40.0)] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../shared/scenes/{name}.toml"));
+        if !path.exists() {
+            println!("skipped: there is no {}", path.display());
+            continue;
+        }
+        let mut scene = Scene::open(&path, &[]).unwrap();
+        // What culling may change is another matter.
+        scene.splatting.culling = false;
+        let volume = Arc::new(scene.load_volume().unwrap());
+        let (by_both, filtered) = by_rasterizer(&volume, &scene);
+        let without = decibels(&without_low_pass(&volume, &minified(&scene)), &filtered);
+        println!("{name}: {by_both:.1?} dB, without the low-pass rule {without:.1} dB");
+        assert!(by_both.iter().all(|&decibels| decibels >= least), "{name}: {by_both:?}");
+    }
+}

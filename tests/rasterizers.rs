@@ -1,0 +1,159 @@
+//! The rasterizers against each other, and which of them draws what: `splatting.rasterizer` and `splatting.footprint_box`.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+#[expect(dead_code, reason = "not every file needs all of it")]
+mod common;
+
+use glam::{DVec3, UVec3};
+use sheetsplat::camera::Projection;
+use sheetsplat::error::RenderError;
+use sheetsplat::gpu::device::DeviceRequirements;
+use sheetsplat::gpu::targets::CompositingBuffer;
+use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::scene::Scene;
+use sheetsplat::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer};
+use sheetsplat::volume::{Volume, builtin};
+use sheetsplat::wgpu::{Features, Limits};
+
+use common::{RASTERIZERS, Random, gpu, lavapipe, scene, transfer};
+
+fn head() -> (Volume, Scene) {
+    let mut scene = scene(90, 75);
+    scene.camera.direction = DVec3::new(0.4, 0.9, -0.3);
+    scene.transfer = transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (120.0, 0.3)]);
+    (builtin::volume("head:32").unwrap(), scene)
+}
+
+/// A device with these features alone.
+fn open(features: Features) -> Headless {
+    let requirements = Some(DeviceRequirements { features, limits: Limits::default() });
+    Headless::new(&HeadlessOptions { requirements, ..lavapipe() }).unwrap()
+}
+
+/// Which rasterizer a frame was drawn with.
+fn drawn_by(gpu: &Headless, volume: &Volume, scene: &Scene) -> String {
+    gpu.render_volume(volume.clone(), scene).unwrap().stats.rasterizer
+}
+
+/// The key that a refused scene's message names, and the message.
+fn refusal(gpu: &Headless, volume: &Volume, scene: &Scene) -> (&'static str, String) {
+    match gpu.render_volume(volume.clone(), scene) {
+        Err(error @ RenderError::OutOfRange { key, .. }) => (key, error.to_string()),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// More than there may be behind a tile: 2744 bricks in two pixels, and in four sheets.
+fn crowded() -> (Volume, Scene) {
+    let mut scene = scene(2, 2);
+    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.001)]);
+    scene.splatting.slab_width = 8.0;
+    let values = vec![1.0; 56 * 56 * 56];
+    (Volume::new("crowded", UVec3::splat(56), DVec3::ONE, values).unwrap(), scene)
+}
+
+#[test]
+fn auto_takes_tiles_where_they_can_be_had() {
+    let [subgroups, none] = [Features::SUBGROUP, Features::empty()].map(open);
+    let (volume, mut scene) = head();
+    assert_eq!(scene.splatting.rasterizer, Rasterizer::Auto, "the default");
+    assert_eq!(drawn_by(&subgroups, &volume, &scene), "tiles");
+    assert_eq!(drawn_by(&none, &volume, &scene), "quads");
+    for rasterizer in RASTERIZERS {
+        scene.splatting.rasterizer = rasterizer;
+        assert_eq!(drawn_by(&subgroups, &volume, &scene), format!("{rasterizer:?}").to_lowercase());
+    }
+    scene.splatting.rasterizer = Rasterizer::Auto;
+    scene.splatting.footprint = FootprintForm::Sections;
+    assert_eq!(drawn_by(&subgroups, &volume, &scene), "quads");
+    let (volume, scene) = crowded();
+    assert_eq!(drawn_by(&subgroups, &volume, &scene), "quads");
+}
+
+#[test]
+fn what_insists_on_tiles_is_refused_without() {
+    let [subgroups, none] = [Features::SUBGROUP, Features::empty()].map(open);
+    let refused = |gpu: &Headless, (volume, scene): &(Volume, Scene), words: &[&str]| {
+        let (key, message) = refusal(gpu, volume, scene);
+        assert_eq!(key, "splatting.rasterizer", "{message}");
+        words.iter().for_each(|word| assert!(message.contains(word), "no {word:?} in {message}"));
+    };
+    let with = |change: fn(&mut Scene)| {
+        let (volume, mut scene) = head();
+        change(&mut scene);
+        (volume, scene)
+    };
+    let tiles = with(|scene| scene.splatting.rasterizer = Rasterizer::Tiles);
+    refused(&none, &tiles, &["\"tiles\"", "subgroups", "\"quads\""]);
+    let parallelogram = with(|scene| scene.splatting.footprint_box = FootprintBox::Parallelogram);
+    refused(&none, &parallelogram, &["\"tiles\"", "subgroups"]);
+    assert_eq!(drawn_by(&subgroups, &parallelogram.0, &parallelogram.1), "tiles");
+    let sections = with(|scene| {
+        (scene.splatting.rasterizer, scene.splatting.footprint) = (Rasterizer::Tiles, FootprintForm::Sections);
+    });
+    refused(&subgroups, &sections, &["splatting.footprint", "\"sections\"", "\"summed-area\"", "\"quads\""]);
+    let quads = with(|scene| {
+        (scene.splatting.rasterizer, scene.splatting.footprint_box) = (Rasterizer::Quads, FootprintBox::Parallelogram);
+    });
+    refused(&subgroups, &quads, &["\"quads\"", "splatting.footprint_box", "\"parallelogram\"", "\"tiles\""]);
+    let (volume, mut scene) = crowded();
+    scene.splatting.rasterizer = Rasterizer::Tiles;
+    refused(&subgroups, &(volume, scene), &["bricks behind a tile", "\"quads\""]);
+}
+
+/// With nothing culled, and amounts that quads round to f16.
+#[test]
+fn rasterizers_agree() {
+    let gpu = gpu();
+    let (volume, mut scene) = head();
+    scene.splatting.culling = false;
+    let mut random = Random(61);
+    let compositings = [Compositing::Linear, Compositing::Exponential, Compositing::Xray];
+    for compositing in compositings.into_iter().cycle().take(24) {
+        scene.splatting.compositing = compositing;
+        scene.splatting.order = random.pick(&[Order::FrontToBack, Order::BackToFront]);
+        scene.splatting.method = random.pick(&[Method::ImageAligned, Method::AxisAligned]);
+        scene.splatting.slab_width = random.pick(&[0.4, 1.0, 2.5]);
+        scene.camera.direction = random.direction();
+        scene.camera.projection = random.pick(&[
+            Projection::Orthographic { height: Some(150.0) },
+            Projection::Perspective { fov_y: 40.0, distance: None, near: None },
+            Projection::Perspective { fov_y: 60.0, distance: Some(90.0), near: Some(30.0) },
+        ]);
+        let spacing = random.pick(&[[1.0, 1.0, 1.0], [1.0, 1.0, 3.0], [1.0, 1.0, 5.0], [3.2, 3.2, 1.5]]);
+        let volume = volume.clone().with_spacing("head", DVec3::from(spacing) * 4.0).unwrap();
+        let [quads, tiles] = RASTERIZERS.map(|rasterizer| {
+            scene.splatting.rasterizer = rasterizer;
+            gpu.render_volume(volume.clone(), &scene).unwrap().image
+        });
+        // Over the pixels that show something.
+        let shown = quads.pixels.iter().zip(&tiles.pixels).filter(|(quads, _)| quads[..3].iter().any(|&c| c > 0.0));
+        let squares: Vec<f64> =
+            shown.flat_map(|(quads, tiles)| quads.iter().zip(tiles).map(|(a, b)| f64::from(a - b).powi(2))).collect();
+        assert!(squares.len() > 4 * 250, "{} channels show something of {scene:?}", squares.len());
+        let decibels = -10.0 * (squares.iter().sum::<f64>() / squares.len() as f64).log10();
+        println!("{decibels:.1} dB");
+        assert!(decibels >= 80.0, "{decibels:.1} dB: {scene:?}");
+    }
+}
+
+/// Bindings that hold few rows of the image, and few bricks: the image is drawn band by band, from a list of all bricks.
+#[test]
+fn small_bindings_change_no_bit_of_tiles() {
+    let (volume, mut scene) = head();
+    (scene.image.width, scene.image.height) = (300, 200);
+    scene.splatting.rasterizer = Rasterizer::Tiles;
+    let [full, small] = [Limits::default().max_storage_buffer_binding_size, 200 << 10].map(|bytes| {
+        let limits = Limits { max_storage_buffer_binding_size: bytes, ..Limits::default() };
+        let requirements = Some(DeviceRequirements { features: Features::SUBGROUP, limits });
+        Headless::new(&HeadlessOptions { requirements, ..lavapipe() }).unwrap()
+    });
+    let compositing_buffer = CompositingBuffer::new(small.device(), [300, 200]).unwrap();
+    assert_eq!(compositing_buffer.bands.len(), 7);
+    for order in [Order::FrontToBack, Order::BackToFront] {
+        scene.splatting.order = order;
+        let [full, small] = [&full, &small].map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap());
+        assert!(full.image == small.image, "{order:?}");
+        assert_eq!(full.stats.counts, small.stats.counts);
+    }
+}

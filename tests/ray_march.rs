@@ -1,0 +1,104 @@
+//! Images against a dense ray march of the same pre-shaded field (`reference::ray_march`): the f64 twin's, and the GPU's by each
+//! rasterizer. `cargo test --release --test ray_march -- --nocapture` prints what was measured.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+#[expect(dead_code, reason = "not every file needs all of it")]
+mod common;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::{DVec3, UVec2};
+use sheetsplat::camera::Projection;
+use sheetsplat::image::Image;
+use sheetsplat::reference::{self, ray_march};
+use sheetsplat::scene::Scene;
+use sheetsplat::splatting::{Compositing, Rasterizer};
+use sheetsplat::volume::{Volume, builtin};
+
+use common::images::{BLACK, psnr};
+use common::{camera, gpu, scene, transfer};
+
+/// Some pixels of an image, as the march sees them.
+struct Marched {
+    at: Vec<UVec2>,
+    pixels: Vec<[f32; 4]>,
+}
+
+impl Marched {
+    /// Every `stride`th pixel across and down.
+    fn new(volume: &Volume, scene: &Scene, stride: u32) -> Self {
+        let lines = |size: u32| (0..size).step_by(stride as usize);
+        let at: Vec<UVec2> =
+            lines(scene.image.height).flat_map(|y| lines(scene.image.width).map(move |x| UVec2::new(x, y))).collect();
+        let pixels = ray_march::pixels(volume, &scene.transfer.resolve(volume), scene, &at).unwrap();
+        Self { at, pixels }
+    }
+
+    fn psnr(&self, image: &Image) -> f64 {
+        let pixels: Vec<[f32; 4]> =
+            self.at.iter().map(|at| image.pixels[(at.x + at.y * image.width) as usize]).collect();
+        psnr(&pixels, &self.pixels, BLACK, 500)
+    }
+}
+
+fn twin(volume: &Volume, scene: &Scene) -> Image {
+    reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap()
+}
+
+/// Asserts that the twin and the GPU are within 45 dB of the march.
+fn assert_close(name: &str, volume: Volume, mut scene: Scene, stride: u32) {
+    let volume = Arc::new(volume);
+    let marched = Marched::new(&volume, &scene, stride);
+    let by_twin = marched.psnr(&twin(&volume, &scene));
+    let gpu = gpu();
+    let mut by = |rasterizer, culling| {
+        (scene.splatting.rasterizer, scene.splatting.culling) = (rasterizer, culling);
+        marched.psnr(&gpu.render_volume(volume.clone(), &scene).unwrap().image)
+    };
+    let [quads, tiles] =
+        [Rasterizer::Quads, Rasterizer::Tiles].map(|rasterizer| [false, true].map(|c| by(rasterizer, c)));
+    println!("{name}: twin {by_twin:.1} dB; without and with culling: quads {quads:.1?} dB, tiles {tiles:.1?} dB");
+    let all = [&[by_twin][..], &quads, &tiles].concat();
+    assert!(all.iter().all(|&decibels| decibels >= 45.0), "{name}: {all:?}");
+}
+
+/// The nerve at fov 30, an image large enough that a grid unit covers a pixel at the far end, so that no low-pass rule sets in.
+#[test]
+fn nerve() {
+    let mut scene = scene(288, 288);
+    scene.camera.projection = Projection::Perspective { fov_y: 30.0, distance: None, near: None };
+    scene.splatting.compositing = Compositing::Exponential;
+    assert_close("builtin:nerve:128", builtin::volume("nerve:128").unwrap(), scene, 2);
+}
+
+/// A real, strongly anisotropic volume, where the data lie beside the checkout.
+#[test]
+fn quarter_head() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes/quarter-head-perspective.toml");
+    if !path.exists() {
+        println!("skipped: there is no {}", path.display());
+        return;
+    }
+    let mut scene = Scene::open(&path, &[]).unwrap();
+    (scene.image.width, scene.image.height) = (192, 192);
+    let volume = scene.load_volume().unwrap();
+    assert_close("quarter-head-perspective", volume, scene, 1);
+}
+
+/// Orthographic, slabs and march are the same field, so what is left is the slab width: it goes with its square.
+#[test]
+fn thin_slabs() {
+    let volume = builtin::volume("head:32").unwrap().with_spacing("head", DVec3::new(1.0, 1.0, 3.0)).unwrap();
+    let mut scene = scene(72, 60);
+    scene.transfer = transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (120.0, 0.3)]);
+    scene.camera = camera([0.4, 0.9, -0.3], 60.0);
+    scene.splatting.compositing = Compositing::Exponential;
+    let marched = Marched::new(&volume, &scene, 1);
+    let decibels = [1.0, 0.5, 0.25].map(|slab_width| {
+        scene.splatting.slab_width = slab_width;
+        marched.psnr(&twin(&volume, &scene))
+    });
+    println!("slab widths 1, 0.5, 0.25: {decibels:.1?} dB");
+    assert!(decibels[0] > 45.0 && decibels[1] > decibels[0] + 10.0 && decibels[2] > decibels[1] + 10.0, "{decibels:?}");
+}

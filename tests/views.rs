@@ -1,0 +1,82 @@
+//! Views in perspective and sheets along the slices (SPEC §§2, 3.1, 5): whole frames by each rasterizer against the f64 twin, with
+//! eyes outside, beside and inside the volume. `cargo test --release --test views -- --nocapture` prints what was measured.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+#[expect(dead_code, reason = "not every file needs all of it")]
+mod common;
+
+use sheetsplat::headless::{Headless, Rendering};
+use sheetsplat::reference;
+use sheetsplat::scene::Scene;
+use sheetsplat::shading::Light;
+use sheetsplat::splatting::{Compositing, Method, Order, Rasterizer};
+use sheetsplat::stats::Counts;
+use sheetsplat::volume::Volume;
+
+use common::images::{BLACK, largest_difference, psnr};
+use common::{F32, Random, SPACINGS, gpu, random_eye, random_volume, scene, transfer};
+
+/// Any view in perspective, and any along the slices, of which some are orthographic.
+fn random_case(random: &mut Random) -> (Volume, Scene) {
+    let spacing = random.pick(&SPACINGS);
+    let volume = random_volume(random, (5.0, 14.0), spacing);
+    let mut scene = scene(random.uniform(20.0, 70.0) as u32, random.uniform(20.0, 60.0) as u32);
+    scene.splatting.method = random.pick(&[Method::ImageAligned, Method::AxisAligned]);
+    if scene.splatting.method == Method::ImageAligned || !random.bits().is_multiple_of(3) {
+        scene.camera = random_eye(random, volume.grid());
+    } else {
+        scene.camera.direction = random.direction();
+    }
+    let (haze, solid) = (random.pick(&[0.0, 0.02, 0.2]), random.pick(&[0.3, 0.9, 1.0]));
+    let opacity = [(5.0, 0.0), (20.0, haze), (200.0, solid)];
+    scene.transfer = transfer(&[(0.0, [0.2, 0.5, 1.0]), (200.0, [1.0, 0.9, 0.8])], &opacity);
+    let fixed = Light::Direction(random.direction());
+    scene.shading.light = random.pick(&[Light::Headlight, fixed]);
+    scene.splatting.compositing = random.pick(&[Compositing::Linear, Compositing::Exponential, Compositing::Xray]);
+    scene.splatting.slab_width = random.pick(&[0.5, 1.0, 2.0, 3.0]);
+    scene.splatting.radius = random.pick(&[1.4, 2.0, 2.7]);
+    // The twin culls nothing.
+    scene.splatting.culling = false;
+    (volume, scene)
+}
+
+fn render(gpu: &Headless, volume: &Volume, scene: &Scene, rasterizer: Rasterizer, order: Order) -> Rendering {
+    let mut scene = scene.clone();
+    (scene.splatting.rasterizer, scene.splatting.order) = (rasterizer, order);
+    gpu.render_volume(volume.clone(), &scene).unwrap()
+}
+
+#[test]
+fn any_view_is_that_of_the_twin() {
+    let gpu = gpu();
+    let mut random = Random(1998);
+    let rasterizers = [Rasterizer::Quads, Rasterizer::Tiles];
+    // Decibels by rasterizer and method.
+    let mut worst = [[f64::INFINITY; 2]; 2];
+    let mut seen = 0;
+    for case in 0..24 {
+        let (volume, scene) = random_case(&mut random);
+        let transfer = scene.transfer.resolve(&volume);
+        let expected = reference::render(&volume, &transfer, &scene).unwrap();
+        let all = |counts: &Counts| [counts.voxels_in_range, counts.sections_total, counts.sheets, counts.tiles_total];
+        let counts = reference::count(&volume, &transfer, &scene).unwrap();
+        seen += usize::from(expected.pixels.iter().filter(|pixel| **pixel != BLACK).count() > 100);
+        for (at, rasterizer) in rasterizers.into_iter().enumerate() {
+            let [forwards, backwards] =
+                [Order::FrontToBack, Order::BackToFront].map(|order| render(&gpu, &volume, &scene, rasterizer, order));
+            for rendering in [&forwards, &backwards] {
+                assert_eq!(all(&rendering.stats.counts), all(&counts), "case {case}, {rasterizer:?}: {scene:?}");
+            }
+            let decibels = psnr(&forwards.image.pixels, &expected.pixels, BLACK, 0);
+            let worst = &mut worst[at][scene.splatting.method as usize];
+            *worst = worst.min(decibels);
+            assert!(decibels >= 75.0, "case {case}, {rasterizer:?}: {decibels:.1} dB with {scene:?}");
+            // Per sheet a subtraction, a product and a sum of numbers up to 1, in either order.
+            let allowed = 6.0 * F32 * counts.sheets as f64;
+            let difference = largest_difference(&forwards.image, &backwards.image);
+            assert!(difference <= allowed, "case {case}, {rasterizer:?}: {difference} > {allowed} with {scene:?}");
+        }
+    }
+    println!("image-aligned in perspective and axis-aligned, at least: {worst:.1?} dB by {rasterizers:?}");
+    assert!(seen > 15, "only {seen} views show much");
+}
