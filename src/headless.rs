@@ -3,10 +3,10 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use wgpu::{Adapter, AdapterInfo, Backends, Device, DeviceType, Instance, InstanceDescriptor, Queue, TextureFormat};
+use wgpu::{Adapter, AdapterInfo, Backends, Device, Instance, Queue, TextureFormat};
 
 use crate::error::{Error, RenderError};
-use crate::gpu::device::{DeviceError, DeviceRequirements};
+use crate::gpu::device::{self, DeviceError, DeviceRequirements, scoped};
 use crate::gpu::readback;
 use crate::image::Image;
 use crate::renderer::{Renderer, RendererOptions};
@@ -198,39 +198,11 @@ impl Drop for Headless {
     }
 }
 
-/// The result of `work`, and the first error that the device reported meanwhile, if any.
-fn scoped<T>(device: &Device, work: impl FnOnce() -> T) -> (T, Option<String>) {
-    let scopes = [wgpu::ErrorFilter::Validation, wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Internal]
-        .map(|filter| device.push_error_scope(filter));
-    let result = work();
-    // Scopes are a stack: the last pushed is the first popped. All must be popped even after an error.
-    let errors: Vec<_> = scopes.into_iter().rev().filter_map(|scope| pollster::block_on(scope.pop())).collect();
-    (result, errors.first().map(ToString::to_string))
-}
-
-/// The adapter with `name` in its name, or the most capable one: a GPU before a software driver.
+/// The adapter with `name` in its name, or the most capable one.
 fn choose_adapter(name: Option<&str>) -> Result<Adapter, DeviceError> {
-    let mut descriptor = InstanceDescriptor::new_without_display_handle_from_env();
-    // Our own arguments need no validating dispatch before every indirect call.
-    descriptor.flags -= wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL;
-    descriptor.backends &= Backends::PRIMARY;
-    let instance = Instance::new(descriptor);
+    let instance = Instance::new(device::instance_descriptor());
     let adapters = pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY));
-    let names: Vec<String> = adapters.iter().map(|adapter| adapter.get_info().name).collect();
-    let wanted = |adapter: &Adapter| {
-        name.is_none_or(|name| adapter.get_info().name.to_lowercase().contains(&name.to_lowercase()))
-    };
-    let rank = |adapter: &Adapter| match adapter.get_info().device_type {
-        DeviceType::DiscreteGpu => 0,
-        DeviceType::IntegratedGpu => 1,
-        DeviceType::VirtualGpu => 2,
-        DeviceType::Cpu => 3,
-        DeviceType::Other => 4,
-    };
-    adapters.into_iter().filter(wanted).min_by_key(rank).ok_or_else(|| DeviceError::NoAdapter {
-        required: name.map_or("any Vulkan, Metal or DirectX 12 adapter".to_owned(), |name| format!("\"{name}\"")),
-        actual: if names.is_empty() { "none".to_owned() } else { names.join(", ") },
-    })
+    device::choose_adapter(&adapters, name)
 }
 
 /// An adapter's driver, and its version where it tells.
