@@ -3,6 +3,8 @@
 mod bench;
 mod compare;
 mod render;
+#[cfg(feature = "viewer")]
+mod view;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -25,6 +27,9 @@ enum Command {
     Bench(bench::Arguments),
     /// Compare two images: prints what they differ in, exit code 1 if by more than is allowed.
     Compare(compare::Arguments),
+    /// Show a scene in a window, to be turned and changed.
+    #[cfg(feature = "viewer")]
+    View(view::Arguments),
 }
 
 /// What went wrong, by whose fault.
@@ -42,13 +47,22 @@ fn main() -> ExitCode {
         Command::Render(arguments) => render::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        #[cfg(feature = "viewer")]
+        Command::View(arguments) => view::run(&arguments),
     };
-    let (message, code) = match result {
-        Ok(()) => return ExitCode::SUCCESS,
-        Err(Failure::Input(message)) => (message, ExitCode::from(2)),
-        Err(Failure::Other(message)) => (message, ExitCode::FAILURE),
-    };
+    let Err(failure) = result else { return ExitCode::SUCCESS };
     // `eprintln` would panic where nobody can be told.
-    let _ = writeln!(std::io::stderr(), "sheetsplat: {message}");
-    code
+    let _ = writeln!(std::io::stderr(), "sheetsplat: {}", failure.message());
+    match failure {
+        Failure::Input(_) => ExitCode::from(2),
+        Failure::Other(_) => ExitCode::FAILURE,
+    }
+}
+
+impl Failure {
+    fn message(&self) -> &str {
+        match self {
+            Self::Input(message) | Self::Other(message) => message,
+        }
+    }
 }

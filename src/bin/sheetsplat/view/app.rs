@@ -1,0 +1,262 @@
+//! The window's contents: the picture with what a pointer does to it, and the panel.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use eframe::egui::emath::GuiRounding;
+use eframe::egui::{
+    CentralPanel, Color32, ColorImage, Context, Panel, PointerButton, Rect, Response, ScrollArea, Sense, Ui,
+    ViewportCommand, pos2,
+};
+use glam::DVec2;
+use sheetsplat::camera::Camera;
+use sheetsplat::image::PngDepth;
+use sheetsplat::scene::{ImageSettings, Scene};
+use sheetsplat::transfer_function::TransferFunction;
+use sheetsplat::volume::Volume;
+
+use super::editor::Editor;
+use super::guest::Guest;
+use super::histogram::{Histogram, extent};
+use super::pace::Pace;
+use super::{Outcome, navigation, panel, plot, screenshot};
+use crate::Failure;
+
+/// Degrees that the camera turns by for a drag over the picture's whole height.
+const TURN: f64 = 180.0;
+
+/// How much more a point of scrolling shows.
+const ZOOM_PER_POINT: f64 = 0.004;
+
+/// For so long after a scroll the next one is waited for before the picture is refined.
+const SCROLL_PAUSE: Duration = Duration::from_millis(300);
+
+/// For so long the window's pixels are waited for.
+const CAPTURE_PATIENCE: Duration = Duration::from_secs(20);
+
+pub(super) struct App {
+    input: String,
+    scene: Scene,
+    transfer: TransferFunction,
+    /// The camera that the scene came with.
+    home: Camera,
+    editor: Editor,
+    histogram: Histogram,
+    guest: Guest,
+    pace: Pace,
+    scrolled: Option<Instant>,
+    /// Where the picture is in the window, pixels.
+    picture: Rect,
+    /// Why the scene as it is now cannot be drawn.
+    problem: Option<String>,
+    /// What became of the last picture that was saved.
+    saved: String,
+    capture: Option<Capture>,
+    /// Save the window's first complete frame here, and close it.
+    screenshot: Option<PathBuf>,
+    outcome: Outcome,
+}
+
+/// Pixels of the window on their way to a file.
+struct Capture {
+    arrival: Receiver<Arc<ColorImage>>,
+    since: Instant,
+    part: Option<Rect>,
+    path: PathBuf,
+}
+
+impl App {
+    pub(super) fn new(
+        context: &eframe::CreationContext<'_>,
+        arguments: &super::Arguments,
+        scene: Scene,
+        volume: Volume,
+        outcome: Outcome,
+    ) -> Result<Self, Failure> {
+        let Some(host) = &context.wgpu_render_state else {
+            return Err(Failure::Other("the window has no wgpu device".to_owned()));
+        };
+        let guest = Guest::new(host, volume, &scene, &arguments.input)?;
+        let values = guest.volume().values();
+        let editor = Editor::new(guest.transfer(), extent(values));
+        Ok(Self {
+            input: arguments.input.clone(),
+            home: scene.camera,
+            transfer: guest.transfer().clone(),
+            histogram: Histogram::new(values, editor.range()),
+            editor,
+            guest,
+            scene,
+            pace: Pace::default(),
+            scrolled: None,
+            picture: Rect::NOTHING,
+            problem: None,
+            saved: String::new(),
+            capture: None,
+            screenshot: arguments.screenshot.clone(),
+            outcome,
+        })
+    }
+
+    fn panel(&mut self, ui: &mut Ui) {
+        ui.heading("Transfer function");
+        let before = self.editor.points().to_vec();
+        plot::show(ui, &mut self.editor, &self.histogram);
+        if before != self.editor.points() {
+            self.transfer = self.editor.apply(&self.transfer);
+        }
+        ui.separator();
+        ui.heading("Splatting");
+        panel::splatting(ui, &mut self.scene.splatting);
+        ui.separator();
+        ui.heading("Light");
+        panel::shading(ui, &mut self.scene.shading);
+        ui.separator();
+        ui.heading("Frame");
+        panel::stats(ui, self.guest.stats());
+        ui.separator();
+        ui.horizontal(|ui| {
+            if ui.button("Reset camera").clicked() {
+                self.scene.camera = self.home;
+            }
+            let is_idle = self.capture.is_none();
+            if ui.add_enabled(is_idle, eframe::egui::Button::new("Save picture")).clicked() {
+                self.capture(ui.ctx(), screenshot::free_name(), Some(self.picture));
+            }
+            if ui.add_enabled(is_idle, eframe::egui::Button::new("Save window")).clicked() {
+                self.capture(ui.ctx(), screenshot::free_name(), None);
+            }
+        });
+        ui.label(&self.saved);
+        if let Some(problem) = &self.problem {
+            ui.colored_label(Color32::LIGHT_RED, problem);
+        }
+    }
+
+    /// Orbit, zoom and pan. Returns whether the picture is being changed by the pointer.
+    fn navigate(&mut self, ui: &Ui, response: &Response) -> bool {
+        let points = response.rect.size();
+        let size = [points.x.max(1.0) as u32, points.y.max(1.0) as u32];
+        let (camera, radius) = (&mut self.scene.camera, self.scene.splatting.radius);
+        let height = navigation::height(camera, self.guest.grid(), radius, size);
+        let moved = DVec2::new(response.drag_delta().x.into(), response.drag_delta().y.into()) / f64::from(size[1]);
+        let pans = ui.input(|input| input.modifiers.shift) || !response.dragged_by(PointerButton::Primary);
+        if moved != DVec2::ZERO {
+            if pans {
+                navigation::pan(camera, moved * height);
+            } else {
+                navigation::orbit(camera, moved * TURN);
+            }
+        }
+        if response.hovered() {
+            let (scroll, pinch) =
+                ui.input(|input| (f64::from(input.smooth_scroll_delta().y), f64::from(input.zoom_delta())));
+            let factor = (-scroll * ZOOM_PER_POINT).exp() / pinch;
+            if factor != 1.0 {
+                navigation::zoom(camera, self.guest.grid(), height, factor);
+                self.scrolled = Some(Instant::now());
+            }
+        }
+        if self.scrolled.is_some_and(|scrolled| scrolled.elapsed() > SCROLL_PAUSE) {
+            self.scrolled = None;
+        }
+        if self.scrolled.is_some() {
+            ui.ctx().request_repaint_after(SCROLL_PAUSE);
+        }
+        self.scrolled.is_some() || ui.input(|input| input.pointer.any_down())
+    }
+
+    /// The picture over all that is left of the window. Returns whether it was drawn anew.
+    fn picture(&mut self, ui: &mut Ui) -> bool {
+        let scale = ui.pixels_per_point();
+        let rect = ui.max_rect().round_to_pixels(scale);
+        let response = ui.allocate_rect(rect, Sense::drag());
+        let is_changing = self.navigate(ui, &response);
+        self.picture = rect * scale;
+        let pixel = self.pace.pixel(is_changing);
+        let [width, height] = [rect.width(), rect.height()].map(|points| ((points * scale).round() as u32).max(1));
+        let [width, height] = [width, height].map(|pixels| pixels.div_ceil(pixel));
+        self.scene.image = ImageSettings { width, height, ..self.scene.image };
+        let result = self.guest.show(&self.scene, &self.transfer);
+        let drawn = matches!(result, Ok(true));
+        match result {
+            Ok(true) => {
+                self.pace.drawn(pixel, self.guest.stats().frame_ms + self.guest.stats().prepare_ms);
+                self.problem = None;
+            }
+            Ok(false) => {}
+            Err(error) => {
+                let failure = Failure::of(error.into(), &self.input);
+                self.problem = Some(failure.message().to_owned());
+                if self.screenshot.is_some() {
+                    self.finish(ui.ctx(), Err(failure));
+                }
+            }
+        }
+        if let Some(texture) = self.guest.texture() {
+            let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+            ui.painter().image(texture, rect, whole, Color32::WHITE);
+        }
+        drawn
+    }
+
+    /// Asks for the window's pixels.
+    fn capture(&mut self, context: &Context, path: PathBuf, part: Option<Rect>) {
+        let (sender, arrival) = channel();
+        context.request_screenshot(move |window| {
+            // Whoever gave up waiting does not care.
+            let _ = sender.send(window);
+        });
+        self.capture = Some(Capture { arrival, since: Instant::now(), part, path });
+    }
+
+    /// Saves the window's pixels once they are there.
+    fn save(&mut self, context: &Context) {
+        let Some(Capture { arrival, since, part, path }) = &self.capture else { return };
+        let result = match arrival.try_recv() {
+            Ok(window) => screenshot::image(&window, *part).save(path, PngDepth::Eight).map_err(Failure::from),
+            Err(_) if since.elapsed() < CAPTURE_PATIENCE => {
+                // They come while frames are drawn.
+                context.request_repaint();
+                return;
+            }
+            Err(_) => Err(Failure::Other(format!("{}: the window's pixels did not arrive", path.display()))),
+        };
+        self.saved = match &result {
+            Ok(()) => format!("saved {}", path.display()),
+            Err(failure) => failure.message().to_owned(),
+        };
+        self.capture = None;
+        if self.screenshot.is_some() {
+            self.finish(context, result);
+        }
+    }
+
+    /// Closes the window.
+    fn finish(&mut self, context: &Context, result: Result<(), Failure>) {
+        self.outcome.borrow_mut().get_or_insert(result);
+        context.send_viewport_cmd(ViewportCommand::Close);
+    }
+}
+
+impl eframe::App for App {
+    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        let context = ui.ctx().clone();
+        self.save(&context);
+        Panel::right("settings").default_size(330.0).show(ui, |ui| {
+            ScrollArea::vertical().auto_shrink(false).show(ui, |ui| self.panel(ui));
+        });
+        let drawn = CentralPanel::no_frame().show(ui, |ui| self.picture(ui)).inner;
+        if drawn {
+            // The statistics are of the frame before.
+            context.request_repaint();
+        } else if self.outcome.borrow().is_none()
+            && self.capture.is_none()
+            && let Some(path) = self.screenshot.clone()
+        {
+            self.capture(&context, path, None);
+        }
+    }
+}

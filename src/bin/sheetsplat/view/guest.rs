@@ -1,0 +1,189 @@
+//! The renderer as a guest on the window's device: all that the viewer knows of it.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use eframe::egui::TextureId;
+use eframe::egui_wgpu::{self, RenderState, WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
+use sheetsplat::error::RenderError;
+use sheetsplat::gpu::device::{self, DeviceError, DeviceRequirements};
+use sheetsplat::renderer::{Renderer, RendererOptions};
+use sheetsplat::scene::Scene;
+use sheetsplat::scene_view::SceneView;
+use sheetsplat::stats::Stats;
+use sheetsplat::transfer_function::TransferFunction;
+use sheetsplat::volume::{Grid, Volume};
+use sheetsplat::wgpu;
+
+use crate::Failure;
+
+/// Of textures that the window shows. It holds display-referred colours, as sheetsplat's are.
+const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+
+/// A view of a volume, drawn into a texture that the window shows.
+pub(super) struct Guest {
+    host: RenderState,
+    renderer: Renderer,
+    view: SceneView,
+    picture: Option<Picture>,
+    stats: Stats,
+}
+
+/// What was drawn last.
+struct Picture {
+    texture: wgpu::Texture,
+    id: TextureId,
+}
+
+/// How the window is to open its device: the adapter with `name` in its name, and what the renderer can use of it.
+pub(super) fn device_options(name: Option<String>) -> WgpuConfiguration {
+    let choose = move |adapters: &[wgpu::Adapter], surface: Option<&wgpu::Surface<'_>>| {
+        let shows = |adapter: &&wgpu::Adapter| surface.is_none_or(|surface| adapter.is_surface_supported(surface));
+        let adapters: Vec<wgpu::Adapter> = adapters.iter().filter(shows).cloned().collect();
+        device::choose_adapter(&adapters, name.as_deref()).map_err(|error| error.to_string())
+    };
+    let describe = |adapter: &wgpu::Adapter| {
+        let DeviceRequirements { features, limits } = DeviceRequirements::for_adapter(adapter);
+        wgpu::DeviceDescriptor {
+            label: Some("sheetsplat"),
+            required_features: features,
+            required_limits: limits,
+            ..wgpu::DeviceDescriptor::default()
+        }
+    };
+    let setup = WgpuSetupCreateNew {
+        instance_descriptor: device::instance_descriptor(),
+        native_adapter_selector: Some(Arc::new(choose)),
+        device_descriptor: Arc::new(describe),
+        ..WgpuSetupCreateNew::without_display_handle()
+    };
+    WgpuConfiguration { wgpu_setup: WgpuSetup::CreateNew(setup), ..egui_wgpu::WgpuConfiguration::default() }
+}
+
+impl Guest {
+    /// Uploads the volume to the window's device.
+    pub(super) fn new(host: &RenderState, volume: Volume, scene: &Scene, input: &str) -> Result<Self, Failure> {
+        let RenderState { adapter, device, queue, .. } = host;
+        let info = adapter.get_info();
+        let options = RendererOptions { target_format: FORMAT, ..RendererOptions::default() };
+        let renderer = match device::scoped(device, || Renderer::new(device, &options)) {
+            (renderer, None) => renderer,
+            (_, Some(error)) => Err(DeviceError::Pipelines { adapter: info.name.clone(), error }),
+        }
+        .map_err(|error| Failure::Other(error.to_string()))?;
+        let view = checked(device, || SceneView::new(device, queue, volume.into(), scene))
+            .map_err(|error| Failure::of(error.into(), input))?;
+        let stats = Stats { adapter: info.name, backend: info.backend.to_str().to_owned(), ..Stats::default() };
+        Ok(Self { host: host.clone(), renderer, view, picture: None, stats })
+    }
+
+    /// The volume.
+    pub(super) fn volume(&self) -> &Volume {
+        self.view.volume().volume()
+    }
+
+    /// Where its voxels are.
+    pub(super) fn grid(&self) -> &Grid {
+        self.view.volume().grid()
+    }
+
+    /// The transfer function.
+    pub(super) fn transfer(&self) -> &TransferFunction {
+        self.view.volume().transfer()
+    }
+
+    /// What the last frame was made of and took.
+    pub(super) fn stats(&self) -> &Stats {
+        &self.stats
+    }
+
+    /// The last frame.
+    pub(super) fn texture(&self) -> Option<TextureId> {
+        self.picture.as_ref().map(|picture| picture.id)
+    }
+
+    /// Draws a frame, if it differs from the last one that was asked for, and waits for it. Returns whether it did.
+    pub(super) fn show(&mut self, scene: &Scene, transfer: &TransferFunction) -> Result<bool, RenderError> {
+        let is_shown = self.stats.width > 0 && scene == self.view.scene() && transfer == self.transfer();
+        if is_shown {
+            return Ok(false);
+        }
+        (self.stats.width, self.stats.height) = (scene.image.width, scene.image.height);
+        let device = self.host.device.clone();
+        checked(&device, || self.draw(scene, transfer)).map(|()| true)
+    }
+
+    fn draw(&mut self, scene: &Scene, transfer: &TransferFunction) -> Result<(), RenderError> {
+        let start = Instant::now();
+        let Self { view, renderer, .. } = self;
+        let RenderState { device, queue, .. } = &self.host;
+        if transfer != view.volume().transfer() {
+            view.set_transfer_function(transfer.clone());
+        }
+        view.set_camera(scene.camera);
+        view.set_image(scene.image);
+        view.set_shading(scene.shading);
+        view.set_splatting(scene.splatting);
+        renderer.prepare(device, queue, view)?;
+        self.stats.prepare_ms = start.elapsed().as_secs_f64() * 1e3;
+
+        let start = Instant::now();
+        let target = self.target([scene.image.width, scene.image.height]);
+        let Self { view, renderer, host: RenderState { device, queue, .. }, .. } = self;
+        let mut encoder =
+            device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.frame") });
+        renderer.record(&mut encoder, view, &target);
+        queue.submit([encoder.finish()]);
+        let counts = view.counts();
+        device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| RenderError::Device(error.to_string()))?;
+        if let Some(counts) = counts.and_then(|counts| counts.try_get()) {
+            self.stats.counts = counts?.0;
+        }
+        self.stats.rasterizer = view.rasterizer().unwrap_or_default().to_owned();
+        self.stats.gpu_bytes = view.gpu_bytes();
+        self.stats.frame_ms = start.elapsed().as_secs_f64() * 1e3;
+        Ok(())
+    }
+
+    /// The picture's texture, a new one if the size is another.
+    fn target(&mut self, [width, height]: [u32; 2]) -> wgpu::TextureView {
+        let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
+        if let Some(Picture { texture, .. }) = &self.picture
+            && texture.size() == size
+        {
+            return texture.create_view(&wgpu::TextureViewDescriptor::default());
+        }
+        let RenderState { device, renderer, .. } = &self.host;
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("sheetsplat.picture"),
+            size,
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: FORMAT,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        });
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let filter = wgpu::FilterMode::Linear;
+        let mut painter = renderer.write();
+        let id = match &self.picture {
+            Some(Picture { id, .. }) => {
+                painter.update_egui_texture_from_wgpu_texture(device, &view, filter, *id);
+                *id
+            }
+            None => painter.register_native_texture(device, &view, filter),
+        };
+        drop(painter);
+        self.picture = Some(Picture { texture, id });
+        view
+    }
+}
+
+/// What the device reports while `work` runs becomes an error.
+fn checked<T>(device: &wgpu::Device, work: impl FnOnce() -> Result<T, RenderError>) -> Result<T, RenderError> {
+    match device::scoped(device, work) {
+        (result, None) => result,
+        (_, Some(error)) => Err(RenderError::Device(error)),
+    }
+}

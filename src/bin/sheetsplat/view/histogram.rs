@@ -1,0 +1,48 @@
+//! How often which values occur.
+
+/// Bars of a [`Histogram`].
+const BINS: usize = 256;
+
+/// A volume's values, counted.
+pub(super) struct Histogram {
+    /// Heights in [0, 1], by the logarithm of the count: a background of millions hides no object of hundreds.
+    pub(super) heights: Vec<f32>,
+}
+
+impl Histogram {
+    /// Of values within a range that has an extent.
+    pub(super) fn new(values: &[f32], [lo, hi]: [f64; 2]) -> Self {
+        let mut counts = [0_u64; BINS];
+        let scale = BINS as f64 / (hi - lo);
+        for &value in values {
+            counts[(((f64::from(value) - lo) * scale) as usize).min(BINS - 1)] += 1;
+        }
+        let logarithm = |count: u64| (count as f64).ln_1p();
+        let most = counts.iter().copied().max().map_or(1.0, logarithm).max(1.0);
+        Self { heights: counts.iter().map(|&count| (logarithm(count) / most) as f32).collect() }
+    }
+}
+
+/// The least and the largest value.
+pub(super) fn extent(values: &[f32]) -> [f64; 2] {
+    let (lo, hi) = values.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), &v| (lo.min(v), hi.max(v)));
+    [lo.into(), hi.into()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bars_stand_where_the_values_are_and_grow_with_the_logarithm() {
+        let values: Vec<f32> = [vec![10.0; 999], vec![20.0; 9], vec![15.1; 99]].concat();
+        assert_eq!(extent(&values), [10.0, 20.0]);
+        let Histogram { heights } = Histogram::new(&values, extent(&values));
+        assert_eq!(heights.len(), BINS);
+        let third = 1.0 / 3.0;
+        for (bin, expected) in [(0, 1.0), (BINS - 1, third), (BINS * 51 / 100, 2.0 * third)] {
+            assert!((heights[bin] - expected).abs() < 1e-6, "{bin}: {}", heights[bin]);
+        }
+        assert_eq!(heights.iter().filter(|&&height| height > 0.0).count(), 3);
+    }
+}

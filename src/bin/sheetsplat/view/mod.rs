@@ -1,0 +1,90 @@
+//! `sheetsplat view`: a window with the picture and its settings.
+
+mod app;
+mod editor;
+mod guest;
+mod histogram;
+mod navigation;
+mod pace;
+mod panel;
+mod plot;
+mod screenshot;
+
+use std::cell::RefCell;
+use std::path::PathBuf;
+use std::rc::Rc;
+
+use eframe::NativeOptions;
+use eframe::egui::ViewportBuilder;
+use sheetsplat::image::Image;
+
+use crate::Failure;
+use crate::render::open_scene;
+use app::App;
+
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// A scene file (.toml), a volume file (.nrrd, .nhdr), or builtin:NAME[:N]. Its image size is not looked at.
+    input: String,
+    /// Set a scene value, as in --set splatting.slab_width=2.0. Can be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Size of the window, in points (pixels, unless the display is scaled).
+    #[arg(long, value_name = "WxH", default_value = "1280x800", value_parser = parse_size)]
+    size: [u16; 2],
+    /// Save the window's first complete frame, and close it: .png, .exr or .npy.
+    #[arg(long, value_name = "FILE")]
+    screenshot: Option<PathBuf>,
+    /// Part of the name of the adapter to use.
+    #[arg(long, value_name = "NAME", env = "WGPU_ADAPTER_NAME")]
+    adapter: Option<String>,
+}
+
+/// How it ended, if not by the user closing the window.
+type Outcome = Rc<RefCell<Option<Result<(), Failure>>>>;
+
+/// `WxH`.
+fn parse_size(text: &str) -> Result<[u16; 2], String> {
+    let parse = |side: &str| side.parse::<u16>().ok().filter(|side| (100..=16384).contains(side));
+    let sides = text.split_once('x').and_then(|(width, height)| Some([parse(width)?, parse(height)?]));
+    sides.ok_or_else(|| "allowed: WxH, each 100 to 16384".to_owned())
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if let Some(path) = &arguments.screenshot {
+        Image::check_format(path)?;
+    }
+    let scene = open_scene(&arguments.input, &arguments.set)?;
+    let volume = scene.load_volume().map_err(|error| Failure::of(error.into(), &arguments.input))?;
+
+    let title = format!("{} - sheetsplat", arguments.input);
+    let viewport = ViewportBuilder::default().with_inner_size(arguments.size.map(f32::from)).with_title(&title);
+    let options = NativeOptions {
+        viewport,
+        wgpu_options: guest::device_options(arguments.adapter.clone()),
+        // Pictures are shown, and saved, as they are.
+        dithering: false,
+        ..NativeOptions::default()
+    };
+    let outcome = Outcome::default();
+    let shared = outcome.clone();
+    let start =
+        |context: &eframe::CreationContext<'_>| match App::new(context, arguments, scene, volume, shared.clone()) {
+            Ok(app) => Ok(Box::new(app) as Box<dyn eframe::App>),
+            Err(failure) => {
+                let message = failure.message().to_owned();
+                *shared.borrow_mut() = Some(Err(failure));
+                Err(message.into())
+            }
+        };
+    let result = eframe::run_native("sheetsplat", options, Box::new(start));
+    let outcome = outcome.borrow_mut().take();
+    match (outcome, result) {
+        (Some(outcome), _) => outcome,
+        (None, Err(error)) => Err(Failure::Other(format!("no window: {error}"))),
+        (None, Ok(())) if arguments.screenshot.is_some() => {
+            Err(Failure::Other("--screenshot: the window was closed before its first frame".to_owned()))
+        }
+        (None, Ok(())) => Ok(()),
+    }
+}

@@ -1,0 +1,134 @@
+//! Orbit, zoom and pan: what a drag and a scroll do to the camera.
+
+use glam::{DMat3, DVec2};
+use sheetsplat::camera::{Camera, Projection};
+use sheetsplat::volume::Grid;
+
+/// Degrees that the camera's elevation over the plane across `up` stays within: at 90 there would be no up on the screen.
+const MAX_ELEVATION: f64 = 89.0;
+
+/// Heights that can be zoomed to, in diameters of the volume.
+const HEIGHTS: [f64; 2] = [1e-3, 1e2];
+
+/// Turns the camera around its centre, so that what is in front follows a pointer that moves right and down by some degrees: about `up`
+/// (azimuth), then up or down (elevation, clamped). `up` stays up.
+pub(super) fn orbit(camera: &mut Camera, degrees: DVec2) {
+    let (up, w) = (camera.up.normalize(), camera.direction.normalize());
+    let horizontal = w.reject_from_normalized(up).normalize();
+    let azimuth = DMat3::from_axis_angle(up, -degrees.x.to_radians());
+    let elevation = w.dot(up).clamp(-1.0, 1.0).asin() - degrees.y.to_radians();
+    let limit = MAX_ELEVATION.to_radians();
+    let (sine, cosine) = elevation.clamp(-limit, limit).sin_cos();
+    camera.direction = azimuth * horizontal * cosine + up * sine;
+}
+
+/// World units over the image's height, at the depth of the camera's centre.
+pub(super) fn height(camera: &Camera, grid: &Grid, kernel_radius: f64, size: [u32; 2]) -> f64 {
+    let [width, height] = size;
+    match camera.projection {
+        Projection::Orthographic { height: given } => given
+            .or_else(|| camera.orthographic_height(grid, kernel_radius, width, height))
+            .unwrap_or(grid.bounding_radius(kernel_radius)),
+        Projection::Perspective { fov_y, distance, .. } => {
+            let half_angle = fov_y.to_radians() / 2.0;
+            let whole = grid.bounding_radius(kernel_radius) / half_angle.sin();
+            2.0 * half_angle.tan() * distance.unwrap_or(whole)
+        }
+    }
+}
+
+/// Shows `factor` times as many world units over the image's height, which is `height` now: another height, or another distance of
+/// the eye from the centre.
+pub(super) fn zoom(camera: &mut Camera, grid: &Grid, height: f64, factor: f64) {
+    let diameter = 2.0 * grid.bounding_radius(0.0);
+    let height = (height * factor).clamp(HEIGHTS[0] * diameter, HEIGHTS[1] * diameter);
+    match &mut camera.projection {
+        Projection::Orthographic { height: given } => *given = Some(height),
+        Projection::Perspective { fov_y, distance, .. } => {
+            *distance = Some(height / (2.0 * (fov_y.to_radians() / 2.0).tan()));
+        }
+    }
+}
+
+/// Moves the centre, so that what is at its depth follows a pointer that moves right and down by some world units.
+pub(super) fn pan(camera: &mut Camera, moved: DVec2) {
+    let basis = camera.basis();
+    camera.center += basis.v * moved.y - basis.u * moved.x;
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec3, UVec3};
+
+    use super::*;
+
+    const GRID: Grid = Grid { dims: UVec3::new(20, 20, 10), spacing: DVec3::new(1.0, 1.0, 3.0) };
+
+    /// Where a world point is on the screen, right and up of the centre.
+    fn on_screen(camera: &Camera, point: DVec3) -> DVec2 {
+        let basis = camera.basis();
+        DVec2::new((point - camera.center).dot(basis.u), (point - camera.center).dot(basis.v))
+    }
+
+    #[test]
+    fn what_is_in_front_follows_the_pointer() {
+        for (direction, up) in
+            [(DVec3::Y, DVec3::Z), (DVec3::new(0.3, 0.9, -0.2), DVec3::Z), (DVec3::X, DVec3::new(0.1, 2.0, 0.3))]
+        {
+            let camera = Camera { direction, up, center: DVec3::new(1.0, 2.0, 3.0), ..Camera::default() };
+            let front = camera.center - direction.normalize();
+            for (degrees, way) in [(DVec2::X, DVec2::X), (-DVec2::X, -DVec2::X), (DVec2::Y, -DVec2::Y)] {
+                let mut turned = camera;
+                orbit(&mut turned, 3.0 * degrees);
+                let moved = on_screen(&turned, front) - on_screen(&camera, front);
+                assert!(moved.normalize().dot(way) > 0.99, "{direction} {up} {degrees}: {moved}");
+            }
+        }
+    }
+
+    #[test]
+    fn orbiting_turns_by_the_right_hand_about_up() {
+        let mut camera = Camera::default();
+        orbit(&mut camera, DVec2::new(-90.0, 0.0));
+        assert!(camera.direction.abs_diff_eq(-DVec3::X, 1e-12), "{}", camera.direction);
+        orbit(&mut camera, DVec2::new(-270.0, 0.0));
+        assert!(camera.direction.abs_diff_eq(DVec3::Y, 1e-12), "{}", camera.direction);
+    }
+
+    #[test]
+    fn elevation_is_clamped_and_comes_back() {
+        for sign in [1.0, -1.0] {
+            let mut camera = Camera { direction: DVec3::new(1.0, 1.0, 0.0), ..Camera::default() };
+            orbit(&mut camera, DVec2::new(0.0, sign * 1000.0));
+            let elevation = camera.direction.z.asin().to_degrees();
+            assert!((elevation + sign * MAX_ELEVATION).abs() < 1e-9, "{elevation}");
+            orbit(&mut camera, DVec2::new(0.0, -sign * MAX_ELEVATION));
+            assert!(camera.direction.abs_diff_eq(DVec3::new(0.5_f64.sqrt(), 0.5_f64.sqrt(), 0.0), 1e-9));
+        }
+    }
+
+    #[test]
+    fn zoom_scales_the_visible_height_in_both_projections() {
+        let perspective = Projection::Perspective { fov_y: 40.0, distance: None, near: None };
+        for projection in [Projection::Orthographic { height: None }, perspective] {
+            let mut camera = Camera { projection, ..Camera::default() };
+            let size = [300, 400];
+            let whole = height(&camera, &GRID, 2.0, size);
+            assert!(whole > 30.0, "{whole}");
+            zoom(&mut camera, &GRID, whole, 0.25);
+            let quarter = height(&camera, &GRID, 2.0, size);
+            assert!((quarter - whole / 4.0).abs() < 1e-9, "{quarter} {whole}");
+            zoom(&mut camera, &GRID, quarter, 1e-30);
+            assert!(height(&camera, &GRID, 2.0, size) > 0.01);
+            zoom(&mut camera, &GRID, quarter, 1e30);
+            assert!(height(&camera, &GRID, 2.0, size) < 1e4);
+        }
+    }
+
+    #[test]
+    fn what_is_at_the_centre_follows_a_pan() {
+        let mut camera = Camera { direction: DVec3::new(0.3, 0.9, -0.2), ..Camera::default() };
+        pan(&mut camera, DVec2::new(5.0, 2.0));
+        assert!(on_screen(&camera, DVec3::ZERO).abs_diff_eq(DVec2::new(5.0, -2.0), 1e-12));
+    }
+}

@@ -1,0 +1,127 @@
+//! The settings beside the picture.
+
+use std::ops::RangeInclusive;
+
+use eframe::egui::{ComboBox, Grid, Slider, Ui};
+use glam::DVec3;
+use sheetsplat::shading::{Light, Shading};
+use sheetsplat::splatting::{Compositing, Method, Rasterizer, Splatting};
+use sheetsplat::stats::Stats;
+
+/// Kernel, slabs, compositing and culling, by the names and within the ranges of a scene file.
+pub(super) fn splatting(ui: &mut Ui, splatting: &mut Splatting) {
+    ui.add(Slider::new(&mut splatting.slab_width, 0.05..=8.0).logarithmic(true).text("slab width"));
+    ui.add(Slider::new(&mut splatting.radius, 1.0..=4.0).text("kernel radius"));
+    slider(ui, &mut splatting.opacity_threshold, 0.01..=1.0, "opacity threshold");
+    ui.checkbox(&mut splatting.culling, "culling");
+    choice(
+        ui,
+        "compositing",
+        &mut splatting.compositing,
+        &[(Compositing::Linear, "linear"), (Compositing::Exponential, "exponential"), (Compositing::Xray, "xray")],
+    );
+    choice(
+        ui,
+        "method",
+        &mut splatting.method,
+        &[
+            (Method::ImageAligned, "image-aligned"),
+            (Method::AxisAligned, "axis-aligned"),
+            (Method::CompositeEverySample, "composite-every-sample"),
+        ],
+    );
+    choice(
+        ui,
+        "rasterizer",
+        &mut splatting.rasterizer,
+        &[(Rasterizer::Auto, "auto"), (Rasterizer::Tiles, "tiles"), (Rasterizer::Quads, "quads")],
+    );
+}
+
+/// Light and material.
+pub(super) fn shading(ui: &mut Ui, shading: &mut Shading) {
+    ui.checkbox(&mut shading.enabled, "shading");
+    if !shading.enabled {
+        return;
+    }
+    let mut is_headlight = shading.light == Light::Headlight;
+    if ui.checkbox(&mut is_headlight, "headlight").changed() {
+        shading.light = if is_headlight { Light::Headlight } else { Light::Direction(direction([-135.0, 45.0])) };
+    }
+    if let Light::Direction(to_light) = &mut shading.light {
+        let [mut azimuth, mut elevation] = angles(*to_light);
+        let across = ui.add(Slider::new(&mut azimuth, -180.0..=180.0).suffix("°").text("light azimuth"));
+        // Straight above there is no azimuth.
+        let above = ui.add(Slider::new(&mut elevation, -89.0..=89.0).suffix("°").text("light elevation"));
+        if across.union(above).changed() {
+            *to_light = direction([azimuth, elevation]);
+        }
+    }
+    slider(ui, &mut shading.ambient, 0.0..=1.0, "ambient");
+    slider(ui, &mut shading.diffuse, 0.0..=1.0, "diffuse");
+    slider(ui, &mut shading.specular, 0.0..=1.0, "specular");
+}
+
+/// What the last frame was made of and took.
+pub(super) fn stats(ui: &mut Ui, stats: &Stats) {
+    let counts = &stats.counts;
+    let rows = [
+        ("frame", format!("{:.1} ms, prepared in {:.1} ms", stats.frame_ms, stats.prepare_ms)),
+        ("image", format!("{} × {}", stats.width, stats.height)),
+        ("voxels", format!("{} of {} shaded", counts.voxels_shaded, counts.voxels_in_range)),
+        ("sections", format!("{} of {}", counts.sections_rasterized, counts.sections_total)),
+        ("sheets", counts.sheets.to_string()),
+        ("rasterizer", stats.rasterizer.clone()),
+        ("GPU memory", format!("{:.1} MiB", stats.gpu_bytes as f64 / 1024.0 / 1024.0)),
+        ("adapter", format!("{}, {}", stats.adapter, stats.backend)),
+    ];
+    Grid::new("statistics").num_columns(2).show(ui, |ui| {
+        for (name, value) in rows {
+            ui.weak(name);
+            ui.label(value);
+            ui.end_row();
+        }
+    });
+}
+
+/// A slider that leaves a value of the scene's that is beyond its ends alone.
+fn slider(ui: &mut Ui, value: &mut f64, range: RangeInclusive<f64>, name: &str) {
+    ui.add(Slider::new(value, range).clamping(eframe::egui::SliderClamping::Edits).text(name));
+}
+
+/// One of several values.
+fn choice<T: Copy + PartialEq>(ui: &mut Ui, name: &str, value: &mut T, choices: &[(T, &str)]) {
+    let current = choices.iter().find(|choice| choice.0 == *value).map_or("", |choice| choice.1);
+    ComboBox::from_label(name).selected_text(current).show_ui(ui, |ui| {
+        for &(choice, text) in choices {
+            ui.selectable_value(value, choice, text);
+        }
+    });
+}
+
+/// A world direction by azimuth, from x towards y, and elevation over the xy plane, in degrees.
+fn direction(angles: [f64; 2]) -> DVec3 {
+    let [(azimuth_sine, azimuth_cosine), (sine, cosine)] = angles.map(|angle| angle.to_radians().sin_cos());
+    DVec3::new(azimuth_cosine * cosine, azimuth_sine * cosine, sine)
+}
+
+/// Azimuth and elevation of a direction, which has any length but 0.
+fn angles(direction: DVec3) -> [f64; 2] {
+    let DVec3 { x, y, z } = direction.normalize();
+    [y.atan2(x).to_degrees(), z.clamp(-1.0, 1.0).asin().to_degrees()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_are_those_of_the_direction() {
+        assert!(direction([90.0, 0.0]).abs_diff_eq(DVec3::Y, 1e-12));
+        assert!(direction([0.0, 89.0]).z > 0.99);
+        for expected in [[-135.0, 45.0], [20.0, -89.0], [180.0, 0.0]] {
+            let found = angles(3.0 * direction(expected));
+            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?} {expected:?}");
+        }
+    }
+}
