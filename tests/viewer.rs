@@ -71,7 +71,7 @@ fn the_window_shows_the_rendering_and_the_panel() {
     let [plain, text] = [share(&|p| p[0] == p[1] && p[1] == p[2] && p[0] < 60), share(&|p| p[0] > 120)];
     assert!(plain > 0.5, "most of the panel is dark grey: {plain}");
     assert!(text > 0.02, "and has light text and curves: {text}");
-    let skin = share(&|p| p[0] > 200 && p[0] > p[1] + 20 && p[1] > p[2]);
+    let skin = share(&|p| p[0] > 200 && p[0] > p[1].saturating_add(20) && p[1] > p[2]);
     assert!(skin > 0.001, "and the colours of the transfer function: {skin}");
 }
 

@@ -28,7 +28,7 @@ use crate::Failure;
 const TURN: f64 = 180.0;
 
 /// How much more a point of scrolling shows.
-const ZOOM_PER_POINT: f64 = 0.004;
+const ZOOM_PER_POINT: f64 = 0.0015;
 
 /// For so long after a scroll the next one is waited for before the picture is refined.
 const SCROLL_PAUSE: Duration = Duration::from_millis(300);

@@ -15,7 +15,7 @@ use std::path::PathBuf;
 use std::rc::Rc;
 
 use eframe::NativeOptions;
-use eframe::egui::ViewportBuilder;
+use eframe::egui::{IconData, ViewportBuilder};
 use sheetsplat::image::Image;
 
 use crate::Failure;
@@ -58,7 +58,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let volume = scene.load_volume().map_err(|error| Failure::of(error.into(), &arguments.input))?;
 
     let title = format!("{} - sheetsplat", arguments.input);
-    let viewport = ViewportBuilder::default().with_inner_size(arguments.size.map(f32::from)).with_title(&title);
+    let viewport = ViewportBuilder::default()
+        .with_inner_size(arguments.size.map(f32::from))
+        .with_title(&title)
+        .with_icon(IconData::default());
     let options = NativeOptions {
         viewport,
         wgpu_options: guest::device_options(arguments.adapter.clone()),

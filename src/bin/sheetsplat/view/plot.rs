@@ -1,6 +1,6 @@
 //! The transfer function editor: its control points over the histogram.
 
-use eframe::egui::{Color32, DragValue, Mesh, PointerButton, Pos2, Rect, Sense, Shape, Slider, Stroke, Ui, pos2, vec2};
+use eframe::egui::{Color32, DragValue, Mesh, PointerButton, Pos2, Rect, Sense, Shape, Stroke, Ui, pos2, vec2};
 use glam::DVec3;
 
 use super::editor::{ControlPoint, Editor};
@@ -121,22 +121,23 @@ fn strip(editor: &Editor, space: Space) -> Mesh {
     mesh
 }
 
-/// The numbers of the selected point.
+/// The selected point's colour, value and opacity, in one row as the hint without one, so that nothing below moves.
 fn selected(ui: &mut Ui, editor: &mut Editor) {
     let [lo, hi] = editor.range();
-    let Some(index) = editor.selected else {
-        ui.weak("Drag points; double click adds one, right click removes it.");
-        return;
-    };
-    let Some(&ControlPoint { mut value, mut opacity, color }) = editor.points().get(index) else { return };
-    let [r, g, b, _] = color32(color).to_array();
+    let point = editor.selected.and_then(|index| Some((index, *editor.points().get(index)?)));
     ui.horizontal(|ui| {
+        let Some((index, ControlPoint { mut value, mut opacity, color })) = point else {
+            ui.weak("Drag; double click adds, right click removes.");
+            return;
+        };
+        let [r, g, b, _] = color32(color).to_array();
         let mut srgb = [r, g, b];
         if ui.color_edit_button_srgb(&mut srgb).changed() {
             editor.recolor(index, DVec3::from_array(srgb.map(f64::from)) / 255.0);
         }
-        let value_field = ui.add(DragValue::new(&mut value).speed((hi - lo) / 500.0).range(lo..=hi));
-        if value_field.union(ui.add(Slider::new(&mut opacity, 0.0..=1.0).text("opacity"))).changed() {
+        let value_field = ui.add(DragValue::new(&mut value).speed((hi - lo) / 500.0).range(lo..=hi).prefix("value "));
+        let opacity_field = DragValue::new(&mut opacity).speed(0.005).range(0.0..=1.0).prefix("opacity ");
+        if value_field.union(ui.add(opacity_field)).changed() {
             editor.drag(index, value, opacity);
         }
     });

@@ -7,15 +7,15 @@ use sheetsplat::image::Image;
 
 /// The first of `sheetsplat-1.png`, `sheetsplat-2.png`, … that is not in the current folder yet.
 pub(super) fn free_name() -> PathBuf {
-    let names = (1_u32..).map(|number| PathBuf::from(format!("sheetsplat-{number}.png")));
-    names.into_iter().find(|name| !name.exists()).unwrap_or_default()
+    let mut names = (1_u32..).map(|number| PathBuf::from(format!("sheetsplat-{number}.png")));
+    names.find(|name| !name.exists()).unwrap_or_default()
 }
 
 /// The pixels of the window, or of a part of it, given in pixels.
 pub(super) fn image(window: &ColorImage, part: Option<Rect>) -> Image {
     let [width, height] = window.size;
     let [columns, rows] = part.map_or([0..width, 0..height], |part| {
-        let range = |from: f32, to: f32, end: usize| (from as usize).min(end)..(to as usize).min(end);
+        let range = |from: f32, to: f32, end: usize| (from.round() as usize).min(end)..(to.round() as usize).min(end);
         [range(part.min.x, part.max.x, width), range(part.min.y, part.max.y, height)]
     });
     let pixels = rows.clone().flat_map(|row| &window.pixels[row * width..][columns.clone()]);
@@ -40,7 +40,7 @@ mod tests {
             |image: &Image| image.pixels.iter().map(|pixel| (pixel[0] * 255.0).round() as u8).collect::<Vec<_>>();
         let whole = image(&window, None);
         assert_eq!((whole.width, whole.height, reds(&whole)), (3, 2, vec![0, 1, 2, 3, 4, 5]));
-        let right = image(&window, Some(Rect::from_min_max(pos2(1.0, 0.0), pos2(9.0, 9.0))));
+        let right = image(&window, Some(Rect::from_min_max(pos2(0.9999, 0.0), pos2(9.0, 9.0))));
         assert_eq!((right.width, right.height, reds(&right)), (2, 2, vec![1, 2, 4, 5]));
         assert_eq!(right.pixels[0][2..], [1.0, 1.0]);
     }
