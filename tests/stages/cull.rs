@@ -618,7 +618,7 @@ fn any_eye_and_slices() {
     let mut all = Seen::default();
     for sheets in SHEETS {
         let stage = Cull::new(gpu.device(), sheets);
-        for spacing in SPACINGS.into_iter().cycle().take(12) {
+        for spacing in SPACINGS.into_iter().cycle().take(6) {
             let mut case = dense(&mut random, sheets, true);
             case.grid.spacing = spacing.into();
             let splatting = &mut case.scene.splatting;

@@ -18,7 +18,7 @@ use sheetsplat::transfer_function::{LabelTables, Ramp, TransferFunction};
 use sheetsplat::view::View;
 use sheetsplat::volume::{Labels, Volume};
 
-use crate::common::{F16, F32, Random, SPACINGS, camera, gpu, random_eye, scene, transfer};
+use crate::common::{COMPOSITINGS, F16, F32, Random, SPACINGS, camera, gpu, random_eye, scene, transfer};
 use crate::cull::Culling;
 
 /// Values of a volume with noise everywhere, so that gradients point anywhere.
@@ -231,7 +231,7 @@ const DIMS: UVec3 = UVec3::new(11, 9, 8);
 #[test]
 fn compositing_and_light() {
     let volume = noise(DIMS, DVec3::ONE);
-    for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray] {
+    for compositing in COMPOSITINGS {
         for light in [Light::Headlight, Light::Direction(DVec3::new(2.0, -1.0, 3.0))] {
             let mut scene = oblique();
             scene.splatting.compositing = compositing;
@@ -284,7 +284,7 @@ fn any_eye_and_slices() {
     let mut all = 0;
     for method in [Method::ImageAligned, Method::AxisAligned] {
         for light in [Light::Headlight, Light::Direction(DVec3::new(2.0, -1.0, 3.0))] {
-            for spacing in SPACINGS.into_iter().cycle().take(12) {
+            for spacing in SPACINGS.into_iter().cycle().take(8) {
                 let volume = noise(DIMS, spacing.into());
                 let mut scene = oblique();
                 (scene.splatting.method, scene.shading.light) = (method, light);
@@ -296,7 +296,7 @@ fn any_eye_and_slices() {
             }
         }
     }
-    assert!(all > 5000, "only {all} voxels were shaded");
+    assert!(all > 3000, "only {all} voxels were shaded");
 }
 
 /// Borders on all sides, and axes along which there is no neighbour.

@@ -284,7 +284,7 @@ fn any_eye_and_slices() {
     {
         let (mut lit, mut cut, mut worst) = (0, 0, 0.0_f64);
         for stage in GROUPS.map(|sheets| Stages::new(&gpu, sheets)) {
-            for _ in 0..24 {
+            for _ in 0..16 {
                 let (grid, scene) = random_view(&mut random, method, form);
                 let fixture = Fixture::over(&stage, scene, &grid);
                 let kernel = KernelInView::random(&fixture.seen, &mut random);
@@ -327,7 +327,7 @@ fn any_eye_and_slices() {
         println!(
             "{method:?}, {form:?}: {lit} pixels lit, {cut} sections of cut kernels, errors up to {worst:.3} of the tolerance"
         );
-        assert!(lit > 20_000 && cut > 5, "only {lit} pixels, {cut} sections of cut kernels");
+        assert!(lit > 10_000 && cut > 3, "only {lit} pixels, {cut} sections of cut kernels");
     }
 }
 
