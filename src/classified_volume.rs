@@ -5,7 +5,8 @@ use std::sync::{Arc, OnceLock};
 use rayon::prelude::*;
 use wgpu::{Device, Queue, TextureView};
 
-use crate::classify::{classify, takes_part};
+use crate::classify::{classify, in_rows, takes_part};
+use crate::clip::ClippedVoxels;
 use crate::error::RenderError;
 use crate::gpu::brick_lists::BrickLists;
 use crate::gpu::volume_texture::VolumeTexture;
@@ -22,6 +23,7 @@ use crate::volume::{Grid, Volume};
 pub struct ClassifiedVolume {
     volume: Arc<Volume>,
     transfer: TransferFunction,
+    clipped: ClippedVoxels,
     list: OnceLock<ValueList>,
     pub(crate) texture: VolumeTexture,
     /// Uploaded when tables first ask for labels.
@@ -53,13 +55,14 @@ impl ClassifiedVolume {
         queue: &Queue,
         volume: Arc<Volume>,
         mut transfer: TransferFunction,
+        clipped: ClippedVoxels,
     ) -> Result<Self, RenderError> {
         if volume.labels().is_none() {
             transfer.labels.clear();
         }
         let texture = VolumeTexture::upload(device, queue, volume.values())?;
-        let lists = BrickLists::upload(device, volume.grid(), &classify(&volume, &transfer));
-        Ok(Self { volume, transfer, list: OnceLock::new(), texture, labels: None, lists, revision: 0 })
+        let lists = BrickLists::upload(device, volume.grid(), &classify(&volume, &transfer, &clipped));
+        Ok(Self { volume, transfer, clipped, list: OnceLock::new(), texture, labels: None, lists, revision: 0 })
     }
 
     /// Brings the GPU up to date.
@@ -131,9 +134,30 @@ impl ClassifiedVolume {
         };
         self.transfer = transfer;
 
-        let (volume, transfer, lists) = (&*self.volume, &self.transfer, &self.lists);
+        self.look_at(candidates)
+    }
+
+    /// Changes which voxels are clipped; touches only voxels that enter or leave.
+    pub fn set_clip(&mut self, clipped: ClippedVoxels) -> Touched {
+        let length = self.volume.dims().x;
+        let candidates = in_rows(&self.volume, |y, z, row| {
+            let [old, new] = [&self.clipped, &clipped].map(|clipped| clipped.in_row(y, z, length));
+            // Either may be empty, anywhere.
+            let changed =
+                (old.start.min(new.start)..old.end.max(new.end)).filter(|x| old.contains(x) != new.contains(x));
+            changed.map(|x| row + x).collect()
+        });
+        self.clipped = clipped;
+        self.look_at(candidates)
+    }
+
+    /// Lets those of some voxels, in memory order, enter and leave that must.
+    fn look_at(&mut self, candidates: Vec<u32>) -> Touched {
+        let (volume, transfer, clipped, lists) = (&*self.volume, &self.transfer, &self.clipped, &self.lists);
+        let takes_part =
+            |index: u32| clipped.contain(volume.grid().voxel_at(index)) && takes_part(volume, transfer, index);
         let (entering, leaving): (Vec<u32>, Vec<u32>) = (candidates.into_par_iter())
-            .filter(|&index| takes_part(volume, transfer, index) != lists.contains(index))
+            .filter(|&index| takes_part(index) != lists.contains(index))
             .partition(|&index| !lists.contains(index));
         if !entering.is_empty() || !leaving.is_empty() {
             self.lists.change(&entering, &leaving);

@@ -9,6 +9,7 @@ use crate::error::{Error, RenderError};
 use crate::gpu::device::{DeviceError, DeviceRequirements};
 use crate::gpu::readback;
 use crate::image::Image;
+use crate::pick::Pick;
 use crate::renderer::{Renderer, RendererOptions};
 use crate::scene::{ImageSettings, Scene};
 use crate::scene_view::SceneView;
@@ -131,6 +132,30 @@ impl Headless {
     /// If the scene asks for what the device or the renderer cannot do, or the device fails.
     pub fn draw(&self, view: &mut SceneView) -> Result<Rendering, RenderError> {
         self.scoped(|| self.draw_unscoped(view))
+    }
+
+    /// What the last drawn frame of a view shows first at a pixel, counted from the upper left; `None` where the opacity of
+    /// [`SceneView::set_first_hit`] is not reached.
+    ///
+    /// # Errors
+    /// If the frame has no first hits, the pixel is off the image, or the device fails.
+    pub fn pick(&self, view: &SceneView, pixel: [u32; 2]) -> Result<Option<Pick>, RenderError> {
+        self.scoped(|| {
+            let descriptor = wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.pick") };
+            let mut encoder = self.device.create_command_encoder(&descriptor);
+            let Some(mut pending) = view.pick(&self.device, &mut encoder, pixel) else {
+                let ImageSettings { width, height, .. } = view.scene().image;
+                let allowed = format!("a pixel of {width}×{height}, in a frame with first hits");
+                return Err(RenderError::OutOfRange { key: "pick", found: format!("{pixel:?}"), allowed });
+            };
+            self.queue.submit([encoder.finish()]);
+            // Asks for it, and then it is there.
+            let early = pending.try_get();
+            let failed = |error: wgpu::PollError| RenderError::Readback(error.to_string());
+            self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(failed)?;
+            let missing = || Err(RenderError::Readback("the pick did not arrive".to_owned()));
+            early.or_else(|| pending.try_get()).unwrap_or_else(missing)
+        })
     }
 
     /// What the device reports while `work` runs becomes an error.

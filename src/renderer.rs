@@ -11,14 +11,16 @@ use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::{PASS_BYTES, Timer};
 use crate::gpu::uniforms::{self, Ramps};
 use crate::kernel::Kernel;
+use crate::pass::composite::{CutBuffers, RayMode};
+use crate::pass::first_hit::FirstHit;
 use crate::pass::resolve::Resolve;
-use crate::prepared_frame::{Drawing, PreparedFrame, Staging};
+use crate::prepared_frame::{Drawing, FirstHits, PreparedFrame, Staging};
 use crate::rasterizer::quads::QuadRasterizer;
 use crate::rasterizer::samples::SampleRasterizer;
 use crate::rasterizer::tiles::TileRasterizer;
 use crate::rasterizer::{Given, filled};
 use crate::scene_view::{Prepared, SceneView};
-use crate::splatting::{Economies, FootprintBox, Method, Rasterizer, Splatting};
+use crate::splatting::{Compositing, Economies, FootprintBox, Method, Order, Rasterizer, Splatting};
 use crate::view::View;
 
 /// What a renderer is made for.
@@ -51,6 +53,9 @@ pub struct Renderer {
     samples: OnceLock<SampleRasterizer>,
     tiles: TileRasterizer,
     resolve: Resolve,
+    first_hit: OnceLock<FirstHit>,
+    /// Stands for a host's depth where there is none.
+    no_surfaces: OnceLock<TextureView>,
 }
 
 impl Renderer {
@@ -70,6 +75,8 @@ impl Renderer {
             samples: OnceLock::new(),
             tiles: TileRasterizer::default(),
             resolve: Resolve::new(device, options.target_format),
+            first_hit: OnceLock::new(),
+            no_surfaces: OnceLock::new(),
         })
     }
 
@@ -84,7 +91,7 @@ impl Renderer {
     /// # Errors
     /// If the scene asks for something not implemented, or for more than the device's limits allow.
     pub fn prepare(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
-        let SceneView { volume, scene, frame } = view;
+        let SceneView { volume, scene, surfaces, first_hit, frame } = view;
         let splatting = &scene.splatting;
         let size = [scene.image.width, scene.image.height];
         let seen = View::new(volume.grid(), &scene.camera, splatting, size)?;
@@ -94,14 +101,22 @@ impl Renderer {
             Some(old) if old.compositing.size == size => None,
             _ => Some(CompositingBuffer::new(device, size)?),
         };
+        let rays = RayMode { cut: surfaces.is_some() || !scene.clip.is_empty(), first_hit: first_hit.is_some() };
+        check_rays(device, splatting, rays, *first_hit, size)?;
+        let grid = *volume.grid();
+        let depths = match surfaces {
+            Some(surfaces) => Some((surfaces.depths(&seen, &grid)?, surfaces.origin)),
+            None => None,
+        };
         let way = way(device, splatting)?;
         volume.flush(device, queue)?;
         let old = frame.take();
-        let (old_compositing, uniform, control_points, drawing, totals) = old.map_or_else(Default::default, |old| {
-            let PreparedFrame { compositing, uniform, control_points, drawing, totals, view, .. } = old;
-            let totals = totals.filter(|_| view == seen);
-            (Some(compositing), Some(uniform), Some(control_points), Some(drawing), totals)
-        });
+        let (old_compositing, uniform, control_points, cut, drawing, totals) =
+            old.map_or_else(Default::default, |old| {
+                let PreparedFrame { compositing, uniform, control_points, cut, drawing, totals, view, .. } = old;
+                let totals = totals.filter(|_| view == seen);
+                (Some(compositing), Some(uniform), Some(control_points), Some(cut), Some(drawing), totals)
+            });
         let Some(compositing) = compositing.or(old_compositing) else { unreachable!("made where there was none") };
         let ramps = Ramps::new(volume.transfer());
         let filled = |old, label, bytes: &[u8], usage| filled(device, queue, old, label, bytes, usage);
@@ -110,6 +125,15 @@ impl Renderer {
         let frame_uniform = uniforms::frame(&seen, &kernel, volume.grid(), &ramps, scene);
         let bytes = bytemuck::bytes_of(&frame_uniform);
         let uniform = filled(uniform, "sheetsplat.frame", bytes, BufferUsages::UNIFORM);
+        let cut_uniform = uniforms::cut(&seen, &grid, &scene.clip, depths, *first_hit);
+        let cut = filled(cut, "sheetsplat.cut", bytemuck::bytes_of(&cut_uniform), BufferUsages::UNIFORM);
+        let cut_buffers = CutBuffers {
+            uniform: &cut,
+            surfaces: match surfaces {
+                Some(surfaces) => &surfaces.depth,
+                None => self.no_surfaces.get_or_init(|| no_surfaces(device)),
+            },
+        };
 
         let given = Given {
             device,
@@ -122,10 +146,19 @@ impl Renderer {
             control_points: &control_points,
             ramp_lengths: ramps.lengths(),
             compositing: &compositing,
+            rays,
+            cut: cut_buffers,
         };
         let was = drawing.as_ref().map(Drawing::rasterizer);
         let (drawing, prepared) = self.draw_with(given, way, &frame_uniform, drawing)?;
         let totals = totals.filter(|_| !prepared.bucketed && was == Some(drawing.rasterizer()));
+
+        let first_hits = drawing.first_hits().filter(|_| rays.first_hit).map(|words| {
+            let stage = self.first_hit.get_or_init(|| FirstHit::new(device));
+            let texture = FirstHit::texture(device, size);
+            let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+            FirstHits { group: stage.bind(device, &uniform, cut_buffers, words), texture, view }
+        });
 
         // The rasterizer's passes, and resolve.
         let passes = drawing.passes() + 1;
@@ -139,7 +172,9 @@ impl Renderer {
             mapped_at_creation: false,
         });
         let period = queue.get_timestamp_period();
-        let shared_bytes = compositing.gpu_bytes() + uniform.size() + control_points.size();
+        let pixels = u64::from(size[0]) * u64::from(size[1]);
+        let hit_bytes = first_hits.as_ref().map_or(0, |_| 4 * pixels);
+        let shared_bytes = compositing.gpu_bytes() + uniform.size() + control_points.size() + cut.size() + hit_bytes;
         *frame = Some(PreparedFrame {
             gpu_bytes: volume.gpu_bytes() + drawing.gpu_bytes() + shared_bytes,
             resolve_groups: compositing.bands.iter().map(|band| self.resolve.bind(device, &uniform, band)).collect(),
@@ -148,6 +183,8 @@ impl Renderer {
             compositing,
             uniform,
             control_points,
+            cut,
+            first_hits,
             timer,
             totals,
             staging: Some(Staging { buffer: staging, timestamps, stages: Vec::new(), period }),
@@ -214,6 +251,9 @@ impl Renderer {
                 }
             }
         }
+        if let (Some(stage), Some(FirstHits { view, group, .. })) = (self.first_hit.get(), &frame.first_hits) {
+            stage.record(encoder, group, view);
+        }
         let bands = compositing.bands.iter().map(|band| band.band);
         let times = timer.as_mut().map(|timer| timer.render("resolve"));
         self.resolve.record(encoder, times, target, compositing.size[0], frame.resolve_groups.iter().zip(bands));
@@ -234,6 +274,58 @@ enum Way {
     /// If the view fits.
     Tiles,
     Samples,
+}
+
+/// Checks that the settings allow what of rays is looked at.
+fn check_rays(
+    device: &Device,
+    splatting: &Splatting,
+    rays: RayMode,
+    first_hit: Option<f64>,
+    [width, height]: [u32; 2],
+) -> Result<(), RenderError> {
+    let refused = |key, found: String, allowed: String| Err(RenderError::OutOfRange { key, found, allowed });
+    if splatting.method == Method::CompositeEverySample && rays != RayMode::default() {
+        let found = "\"composite-every-sample\" with clip planes, surfaces or first hits".to_owned();
+        return refused("splatting.method", found, "a method with sheets".to_owned());
+    }
+    let Some(opacity) = first_hit else { return Ok(()) };
+    let hides = splatting.culling && splatting.compositing != Compositing::Xray;
+    let most = if hides { splatting.opacity_threshold } else { 1.0 };
+    if !(opacity > 0.0 && opacity <= most) {
+        let allowed = format!("above 0, at most {most}{}", if hides { ", the opacity_threshold" } else { "" });
+        return refused("first_hit", opacity.to_string(), allowed);
+    }
+    if splatting.order != Order::FrontToBack {
+        return refused(
+            "splatting.order",
+            "\"back-to-front\" with first hits".to_owned(),
+            "\"front-to-back\"".to_owned(),
+        );
+    }
+    let limits = device.limits();
+    let actual = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    let required = 4 * u64::from(width) * u64::from(height);
+    if required > actual {
+        let (what, limit) = ("the image's first hits", "max_storage_buffer_binding_size");
+        return Err(RenderError::Limit { what, limit, required, actual });
+    }
+    Ok(())
+}
+
+/// A depth texture that nobody reads.
+fn no_surfaces(device: &Device) -> TextureView {
+    let texture = device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("sheetsplat.no_surfaces"),
+        size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: TextureFormat::Depth32Float,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    });
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
 /// How to draw.

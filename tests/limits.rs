@@ -7,6 +7,7 @@ mod common;
 use glam::DVec3;
 use sheetsplat::brick::BrickList;
 use sheetsplat::classify::classify;
+use sheetsplat::clip::ClippedVoxels;
 use sheetsplat::error::RenderError;
 use sheetsplat::gpu::brick_lists::BrickLists;
 use sheetsplat::gpu::device::{self, DeviceError, DeviceRequirements};
@@ -129,7 +130,7 @@ fn attachments_limit_the_sheets_of_a_group() {
 fn small_bindings_split_voxels_and_image() {
     let (_, mut scene) = head();
     let volume = builtin::volume("head:64").unwrap();
-    let voxels = classify(&volume, &scene.transfer.resolve(&volume));
+    let voxels = classify(&volume, &scene.transfer.resolve(&volume), &ClippedVoxels::default());
     let bricks = BrickList::new(volume.grid(), &voxels);
     // Without subgroups, so by quads.
     let full = open(Limits::default(), Features::FLOAT32_BLENDABLE, None).unwrap();

@@ -1,6 +1,7 @@
 //! What the tests share.
 
 pub(crate) mod images;
+pub(crate) mod surfaces;
 
 use glam::{DVec3, DVec4, UVec3};
 use sheetsplat::camera::{Camera, Projection};

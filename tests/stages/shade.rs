@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3, DVec4, UVec3};
 use sheetsplat::brick;
 use sheetsplat::classify::classify;
+use sheetsplat::clip::ClippedVoxels;
 use sheetsplat::gpu::layout;
 use sheetsplat::headless::Headless;
 use sheetsplat::kernel::Kernel;
@@ -132,7 +133,7 @@ fn shaded(gpu: &Headless, name: &str, volume: &Volume, scene: &Scene) -> usize {
     let scene = &scene;
     let sheets = 2;
     let stage = Cull::new(gpu.device(), sheets);
-    let voxels = classify(volume, &transfer);
+    let voxels = classify(volume, &transfer, &ClippedVoxels::default());
     let labels = volume.labels().filter(|_| transfer.labels.values().any(LabelTables::matter_to_shading));
     let of_volume = (volume.grid(), volume.values(), labels);
     let culling = Culling::new(gpu, (&stage, sheets), of_volume, &voxels, &transfer, scene);
