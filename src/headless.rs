@@ -8,6 +8,7 @@ use wgpu::{Adapter, AdapterInfo, Backends, Device, DeviceType, Instance, Instanc
 use crate::error::{Error, RenderError};
 use crate::gpu::device::{DeviceError, DeviceRequirements};
 use crate::gpu::readback;
+use crate::gpu_volume::GpuVolume;
 use crate::image::Image;
 use crate::renderer::{Renderer, RendererOptions};
 use crate::scene::{ImageSettings, Scene};
@@ -122,7 +123,7 @@ impl Headless {
     /// # Errors
     /// If the volume is larger than the device's textures, or the device fails.
     pub fn view(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<SceneView, RenderError> {
-        self.scoped(|| SceneView::new(&self.device, &self.queue, volume.into(), scene))
+        self.scoped(|| SceneView::new(&self.device, &GpuVolume::new(&self.device, &self.queue, volume)?, scene))
     }
 
     /// Draws one frame of a view and reads it back.

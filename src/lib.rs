@@ -52,6 +52,7 @@ pub mod footprint;
 #[cfg(feature = "golden")]
 pub mod golden;
 pub mod gpu;
+pub mod gpu_volume;
 pub mod grid_warp;
 pub mod headless;
 pub mod image;

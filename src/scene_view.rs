@@ -1,19 +1,17 @@
 //! What is shown and how, and what the next frame can keep of the last one: every setter says what it costs (§5.1).
 
-use std::sync::Arc;
-
-use wgpu::{Device, Queue};
+use wgpu::Device;
 
 use crate::camera::Camera;
 use crate::classified_volume::{ClassifiedVolume, Touched};
 use crate::error::RenderError;
+use crate::gpu_volume::GpuVolume;
 use crate::prepared_frame::PreparedFrame;
 use crate::scene::{ImageSettings, Scene};
 use crate::shading::{Light, Shading};
 use crate::splatting::Splatting;
 use crate::stats::PendingCounts;
 use crate::transfer_function::TransferFunction;
-use crate::volume::Volume;
 
 /// A view of a volume: camera, image, transfer function, shading and splatting settings, and the last frame's buffers. Setters
 /// take effect with the next [`Renderer::prepare`](crate::renderer::Renderer::prepare).
@@ -34,18 +32,18 @@ pub struct Prepared {
 }
 
 impl SceneView {
-    /// Uploads a volume, and the bricks of the voxels that take part under a scene's transfer function. The scene's own volume is
-    /// not looked at.
+    /// Uploads the bricks of the voxels that take part under a scene's transfer function, to the volume's device. The scene's own
+    /// volume is not looked at.
     ///
     /// # Errors
-    /// If the volume is larger than the device's textures, or has no labels and the scene has tables for some.
-    pub fn new(device: &Device, queue: &Queue, volume: Arc<Volume>, scene: &Scene) -> Result<Self, RenderError> {
-        if !scene.transfer.labels.is_empty() && volume.labels().is_none() {
+    /// If the volume has no labels and the scene has tables for some.
+    pub fn new(device: &Device, volume: &GpuVolume, scene: &Scene) -> Result<Self, RenderError> {
+        if !scene.transfer.labels.is_empty() && volume.volume().labels().is_none() {
             let (key, found) = ("transfer.label", "tables for a volume without labels".to_owned());
             return Err(RenderError::OutOfRange { key, found, allowed: "none, or labels in the volume".to_owned() });
         }
-        let transfer = scene.transfer.resolve(&volume);
-        let volume = ClassifiedVolume::new(device, queue, volume, transfer)?;
+        let transfer = scene.transfer.resolve(volume.volume());
+        let volume = ClassifiedVolume::new(device, volume, transfer);
         Ok(Self { volume, scene: scene.clone(), frame: None })
     }
 
@@ -113,7 +111,8 @@ impl SceneView {
         self.frame.as_ref().map(|frame| frame.drawing.rasterizer())
     }
 
-    /// Bytes of GPU memory that the view holds.
+    /// Bytes of GPU memory that the view holds, with the volume's, which other views may share: without those it is that less
+    /// [`GpuVolume::gpu_bytes`].
     pub fn gpu_bytes(&self) -> u64 {
         self.frame.as_ref().map_or(self.volume.gpu_bytes(), PreparedFrame::gpu_bytes)
     }
