@@ -9,7 +9,7 @@ use sheetsplat::brick::BrickList;
 use sheetsplat::classify::classify;
 use sheetsplat::error::RenderError;
 use sheetsplat::gpu::brick_lists::BrickLists;
-use sheetsplat::gpu::device::{self, DeviceError, DeviceRequirements};
+use sheetsplat::gpu::device::{DeviceError, DeviceRequirements, InsufficientLimit};
 use sheetsplat::gpu::layout::{Band, Brick};
 use sheetsplat::gpu::targets::CompositingBuffer;
 use sheetsplat::gpu::volume_texture::VolumeTexture;
@@ -297,9 +297,10 @@ fn a_limit_that_is_too_small_is_named() {
     ];
     for (name, needed, available, limits) in small {
         match open(limits, Features::empty(), None) {
-            Err(error @ DeviceError::Limit { limit, required, actual }) => {
-                assert_eq!((limit, required, actual), (name, needed, available));
+            Err(error @ DeviceError::Limits(_)) => {
                 let message = error.to_string();
+                let DeviceError::Limits(limits) = error else { unreachable!() };
+                assert_eq!(limits, [InsufficientLimit { limit: name, required: needed, actual: available }]);
                 for part in [name, &needed.to_string(), &available.to_string()] {
                     assert!(message.contains(part), "{message}");
                 }
@@ -307,7 +308,7 @@ fn a_limit_that_is_too_small_is_named() {
             other => panic!("{name}: {other:?}"),
         }
     }
-    device::check(gpu().device()).unwrap();
+    DeviceRequirements::check(gpu().device()).unwrap();
 }
 
 #[test]

@@ -1,9 +1,8 @@
 //! `shaders/composite.wgsl` against `reference::composite`: random sheets over random compositing buffers, in some tiles.
 
 use glam::{DVec3, DVec4};
-use sheetsplat::gpu::readback;
 use sheetsplat::gpu::targets::{BandBuffer, CompositingBuffer, Targets};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::{Headless, readback};
 use sheetsplat::pass::composite::Composite;
 use sheetsplat::plan::{TILE, tile_grid};
 use sheetsplat::reference::Buffer;

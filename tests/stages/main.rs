@@ -20,9 +20,8 @@ use std::collections::BTreeMap;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::gpu::layout::{Frame, Indirect, QUADS, TileList};
-use sheetsplat::gpu::readback;
 use sheetsplat::gpu::uniforms::{self, Ramps};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::{Headless, readback};
 use sheetsplat::kernel::Kernel;
 use sheetsplat::scene::Scene;
 use sheetsplat::transfer_function::TransferFunction;
