@@ -59,7 +59,7 @@ fn perspective([x, y, z, w]: [DVec4; 4], pixels: DVec2) -> Result<Camera, Render
     let [right, up, depth, ahead] = [x, y, z, w].map(DVec4::truncate);
     for (axis, off) in [("width", right.dot(ahead)), ("height", up.dot(ahead))] {
         if off.abs() > TOLERANCE {
-            let found = format!("an eye {off} of half the image's {axis} off its centre");
+            let found = format!("an eye {off:.6} of half the image's {axis} off its centre");
             return Err(refused(found, "eyes before the centre, and volumes scaled alike along all axes"));
         }
     }
@@ -76,7 +76,10 @@ fn perspective([x, y, z, w]: [DVec4; 4], pixels: DVec2) -> Result<Camera, Render
     let slope = depth.dot(ahead);
     let tilt = (depth - slope * ahead).length();
     if tilt > TOLERANCE * depth.length().max(1.0) {
-        return Err(refused(format!("a near plane tilted by {tilt} against the image"), "near planes parallel to it"));
+        return Err(refused(
+            format!("a near plane tilted by {tilt:.6} against the image"),
+            "near planes parallel to it",
+        ));
     }
     let at_eye = depth.dot(eye) + z.w;
     let planes = [-at_eye / slope, at_eye / (1.0 - slope)];
@@ -103,10 +106,10 @@ fn check_screen(right: DVec3, up: DVec3, pixels: DVec2) -> Result<(), RenderErro
     let cosine = right.dot(up) / (right.length() * up.length());
     if cosine.abs() > TOLERANCE {
         let angle = cosine.acos().to_degrees();
-        return Err(refused(format!("a sheared image, whose axes are {angle}° apart"), "axes 90° apart"));
+        return Err(refused(format!("a sheared image, whose axes are {angle:.4}° apart"), "axes 90° apart"));
     }
     if (width / height - 1.0).abs() > TOLERANCE {
-        let found = format!("pixels {} times as wide as high", height / width);
+        let found = format!("pixels {:.6} times as wide as high", height / width);
         return Err(refused(found, "square pixels, and volumes scaled alike along all axes"));
     }
     Ok(())

@@ -88,9 +88,11 @@ impl Renderer {
         volume.flush(device, queue)?;
         let old = frame.take();
         let (old_compositing, uniform, control_points, drawing, totals) = old.map_or_else(Default::default, |old| {
-            let PreparedFrame { compositing, uniform, control_points, drawing, totals, view, .. } = old;
+            let PreparedFrame { sheets, compositing, uniform, control_points, drawing, totals, view, .. } = old;
+            // That of another renderer may have other sheets.
+            let drawing = (sheets == (self.sheet_format, self.sheets)).then_some(drawing);
             let totals = totals.filter(|_| view == seen);
-            (Some(compositing), Some(uniform), Some(control_points), Some(drawing), totals)
+            (Some(compositing), Some(uniform), Some(control_points), drawing, totals)
         });
         let Some(compositing) = compositing.or(old_compositing) else { unreachable!("made where there was none") };
         let ramps = Ramps::new(volume.transfer());
@@ -131,6 +133,7 @@ impl Renderer {
         let shared_bytes = compositing.gpu_bytes() + uniform.size() + control_points.size();
         *frame = Some(PreparedFrame {
             gpu_bytes: volume.gpu_bytes() + drawing.gpu_bytes() + shared_bytes,
+            sheets: (self.sheet_format, self.sheets),
             resolve_groups: compositing.bands.iter().map(|band| self.resolve.bind(device, &uniform, band)).collect(),
             view: seen,
             drawing,

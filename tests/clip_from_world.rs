@@ -123,7 +123,7 @@ fn what_is_no_camera_says_what_it_is() {
     (oblique.x_axis.z, oblique.y_axis.z) = (0.1, 0.2);
     let not_a_number = DMat4::from_cols_array(&[f64::NAN; 16]);
     for (clip_from_world, found) in [
-        (shifted * perspective * view, "0.25 of half the image's width off its centre"),
+        (shifted * perspective * view, "0.250000 of half the image's width off its centre"),
         (stretched * perspective * view, "pixels 1.1"),
         (stretched * orthographic * view, "pixels 1.1"),
         (sheared * perspective * view, "a sheared image"),

@@ -322,3 +322,16 @@ fn limits_beyond_the_adapter_are_an_error_that_names_it() {
         other => panic!("{other:?}"),
     }
 }
+
+/// Work and bytes are the same on the least device and the best.
+#[test]
+fn deterministic_options_leave_nothing_to_the_device() {
+    let requirements = Some(DeviceRequirements { features: Features::empty(), limits: Limits::default() });
+    let options = HeadlessOptions { adapter: common::lavapipe().adapter, ..HeadlessOptions::DETERMINISTIC };
+    let (volume, scene) = head();
+    let renderings = [HeadlessOptions { requirements, ..options.clone() }, options]
+        .map(|options| Headless::new(&options).unwrap().render_volume(volume.clone(), &scene).unwrap());
+    assert_eq!(renderings[0].stats.counts, renderings[1].stats.counts);
+    assert!(renderings[0].image == renderings[1].image);
+    assert!(renderings[0].image != gpu().render_volume(volume, &scene).unwrap().image, "gpu() draws by tiles, in f32");
+}

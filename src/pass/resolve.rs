@@ -85,7 +85,6 @@ impl Resolve {
     ) {
         let origin = placement.origin;
         for (group, Band { first_row, rows }) in bands {
-            // Nothing is drawn where origins are so far off that the numbers below have no room.
             let Some([x, y, covered_width, covered_height]) = placement.covered(width, first_row..first_row + rows)
             else {
                 continue;
@@ -94,10 +93,11 @@ impl Resolve {
             pass.set_bind_group(0, group, &[]);
             pass.set_viewport(origin[0] as f32, origin[1] as f32, width as f32, height as f32, 0.0, 1.0);
             pass.set_scissor_rect(x, y, covered_width, covered_height);
-            // The instance's number is the one that a draw has without a buffer to write or a feature to ask for.
-            let [x, y] = origin.map(|at| (at + ORIGIN_BIAS) as u32);
+            // The instance's number is the one that a draw has without a buffer to write or a feature to ask for. Origins that do not
+            // fit are those of scissors outside of the target, which wgpu refuses.
+            let [x, y] = origin.map(|at| at.wrapping_add(ORIGIN_BIAS) as u32 & 0xffff);
             let instance = x | y << 16;
-            pass.draw(0..3, instance..instance + 1);
+            pass.draw(0..3, instance..instance.saturating_add(1));
         }
     }
 }
