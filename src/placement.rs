@@ -12,7 +12,7 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// The image in the upper left corner of a target of the given width and height, or of its own.
+    /// The image in the upper left corner of a target of the given width and height, all of which it may change.
     pub const fn whole([width, height]: [u32; 2]) -> Self {
         Self { origin: [0, 0], scissor: [0, 0, width, height] }
     }

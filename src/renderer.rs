@@ -224,9 +224,9 @@ impl Renderer {
         }
     }
 
-    /// Records a pass of its own that draws the view's image into a target, which keeps what the image does not cover. The target must
-    /// be of the format and sample count that the renderer was made for, without a depth attachment; what
-    /// is wrong with it, wgpu reports.
+    /// Records a pass of its own that draws the view's image into a target, which keeps what the image does not cover; nothing, if
+    /// the view was never prepared. The renderer must have been made for the target's format and sample count and for no depth
+    /// attachment, and the scissor must lie in the target; what is wrong with them, wgpu reports.
     pub fn present(&self, encoder: &mut CommandEncoder, view: &mut SceneView, target: &TextureView, at: Placement) {
         let Some(frame) = &mut view.frame else { return };
         // Whoever waits for the counts has them, and their buffer.
@@ -250,7 +250,7 @@ impl Renderer {
     }
 
     /// Draws the view's image in a pass of the host's, whose attachments must be of the formats and the sample count that the
-    /// renderer was made for; what is wrong with them, wgpu reports. Nothing, if the view was never prepared. Changes the pass's
+    /// renderer was made for; what is wrong with them, wgpu reports. Draws nothing, if the view was never prepared. Changes the pass's
     /// pipeline, bind group 0, viewport and scissor rectangle. A view may also be drawn by other renderers of its device than the
     /// one that recorded it, and as often as the host likes.
     pub fn draw(&self, pass: &mut RenderPass<'_>, view: &SceneView, at: Placement) {

@@ -32,8 +32,8 @@ pub struct RendererOptions {
 /// What becomes of what is in the target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Blend {
-    /// The image, premultiplied, goes over it: `image + (1 - image.a)·target`, by the target's numbers. Over an opaque background
-    /// that is the image.
+    /// The image, premultiplied, goes over it: `image + (1 - image.a)·target`, of the numbers that the target holds, so where those are
+    /// linear light that is blended. With an opaque background it is the image.
     Over,
     /// The image takes its place.
     Replace,

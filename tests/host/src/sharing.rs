@@ -159,3 +159,34 @@ fn everything_may_be_dropped() {
     host.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
     assert_eq!(ours(), 0, "allocations are left");
 }
+
+/// A frame's counts and times come while it is presented again; times only of what the library's own passes draw.
+#[test]
+fn counts_come_while_the_image_is_presented() {
+    let host = Host::new();
+    let renderer = host.renderer(RendererOptions { profile: true, ..replacing(F32) });
+    let target = host.target(F32, [90, 70], 1);
+    let to = target.create_view(&wgpu::TextureViewDescriptor::default());
+    let mut view = host.view(&scene(OPAQUE));
+    for presents in [0, 1, 3] {
+        renderer.prepare(&host.device, &host.queue, &mut view).unwrap();
+        let mut encoder = host.encoder();
+        renderer.record(&mut encoder, &mut view);
+        for _ in 0..presents {
+            renderer.present(&mut encoder, &mut view, &to, Placement::whole([90, 70]));
+        }
+        host.submit(encoder);
+        let counts = view.counts().unwrap();
+        assert!(view.counts().is_none(), "once per frame");
+        let mut encoder = host.encoder();
+        renderer.present(&mut encoder, &mut view, &to, Placement::whole([90, 70]));
+        host.submit(encoder);
+        host.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+        let (counts, times) = counts.try_get().unwrap().unwrap();
+        assert!(counts.voxels_shaded > 1000 && counts.sections_rasterized > counts.voxels_shaded, "{counts:?}");
+        let stages: Vec<_> = times.keys().copied().collect();
+        let expected = if presents == 0 { &["gather"][..] } else { &["gather", "resolve"] };
+        assert_eq!(stages, expected, "presented {presents} times");
+        assert!(times.values().all(|&ms| ms > 0.0), "{times:?}");
+    }
+}
