@@ -241,8 +241,7 @@ impl View {
         let Some(Perspective { eye, aspect, .. }) = &self.perspective else {
             return self.footprint.half_box(support);
         };
-        let depths = self.depths_from_eye(planes);
-        let nearest = depths.start.max(eye.near);
+        let nearest = self.nearest_from_eye(planes).max(eye.near);
         // Half the image, and a pixel for every grid unit of a footprint that the low-pass rule widens.
         let half = (self.middle() + support) * eye.pixel_per_depth;
         let w = self.basis.w * aspect;
@@ -256,18 +255,18 @@ impl View {
             // The steepest ray is that of the farthest voxel that reaches the image.
             let s = (half + support * axis.length() / nearest) / spare;
             let pixels = support * (axis - s * w).length().max((axis + s * w).length()) / eye.pix(nearest);
-            // An ellipsoid is a `unit` thick at least.
-            if eye.pix(depths.end) > 1.0 { pixels.hypot(support) } else { pixels }
+            // The low-pass rule adds at most what the ellipse's axes lack of `support`: an ellipsoid is a `unit` thick at least. Together they
+            // are largest where pixels are smallest, so boxes shrink on the way back.
+            let thinnest = eye.pix(nearest).recip().min(1.0);
+            pixels.hypot(support * (1.0 - thinnest * thinnest).sqrt())
         };
         DVec2::new(half_box(self.basis.u, half.x), half_box(self.basis.v, half.y))
     }
 
-    /// Depths from the eye at which sections between two planes of sheet depth are projected.
-    fn depths_from_eye(&self, planes: Range<f64>) -> Range<f64> {
+    /// The least depth from the eye at which sections between two planes of sheet depth are projected.
+    fn nearest_from_eye(&self, planes: Range<f64>) -> f64 {
         match &self.perspective {
-            Some(Perspective { is_image_aligned: true, .. }) | None => {
-                planes.start - self.slabs.origin..planes.end - self.slabs.origin
-            }
+            Some(Perspective { is_image_aligned: true, .. }) | None => planes.start - self.slabs.origin,
             // Those of whole slices.
             Some(Perspective { last, .. }) => {
                 let slice = self.screen_from_voxel[2].truncate();
@@ -278,7 +277,7 @@ impl View {
                 let row = self.screen_from_voxel[3];
                 let (middle, half) = ((first + end) / 2.0, (end - first) / 2.0);
                 let (depth, spread) = (row.dot(middle.extend(1.0)), row.truncate().abs().dot(half));
-                depth - spread..depth + spread
+                depth - spread
             }
         }
     }

@@ -21,7 +21,7 @@ use sheetsplat::stats::Counts;
 use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::{Features, Limits, TextureFormat};
 
-use common::{F16, F32, gpu, scene, transfer};
+use common::{COMPOSITINGS, F16, F32, gpu, scene, transfer};
 
 fn open(limits: Limits, features: Features, sheet_format: Option<TextureFormat>) -> Result<Headless, DeviceError> {
     let requirements = Some(DeviceRequirements { features, limits });
@@ -56,7 +56,7 @@ fn webgpu_default_limits_and_no_features() {
     let full = gpu();
     assert_eq!(full.renderer().sheet_format(), TextureFormat::Rgba32Float);
     let (volume, mut scene) = head();
-    for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray] {
+    for compositing in COMPOSITINGS {
         for footprint in [FootprintForm::SummedArea, FootprintForm::Sections] {
             (scene.splatting.compositing, scene.splatting.footprint) = (compositing, footprint);
             // Which pixels are opaque depends on the last bit of a sum: f16 and f32 cull differently.
@@ -152,7 +152,7 @@ fn small_bindings_split_voxels_and_image() {
             assert!(band.acc.size() <= bytes && band.acc.size() == u64::from(rows) * 150 * 16);
         }
         scene.splatting.culling = false;
-        for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray] {
+        for compositing in COMPOSITINGS {
             for background in [[0.0, 0.0, 0.0, 1.0], [0.2, 0.9, 0.5, 0.5]] {
                 (scene.splatting.compositing, scene.image.background) = (compositing, background);
                 let renderings = [&small, &full].map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap());

@@ -10,7 +10,7 @@ use sheetsplat::reference::composite::composite;
 use sheetsplat::splatting::{Compositing, Order};
 use sheetsplat::wgpu::{self, BufferUsages};
 
-use crate::common::{F32, Random, gpu, gpu_with_small_bindings};
+use crate::common::{COMPOSITINGS, F32, Random, gpu, gpu_with_small_bindings};
 use crate::{compute, contents, frame, init, tile_list};
 
 /// Premultiplied colours, in f32: a share of the pixels with no alpha at all, tiny ones, and, if asked for, some above 1.
@@ -176,7 +176,7 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
     let mut random = Random(u64::from(size[0]));
     let [columns, rows] = tile_grid(size);
     let (mut opaque, mut listed) = (0, 0);
-    for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray] {
+    for compositing in COMPOSITINGS {
         for (order, layers) in [Order::FrontToBack, Order::BackToFront]
             .into_iter()
             .flat_map(|order| [1, 2, 4].map(|layers| (order, layers)))

@@ -19,7 +19,7 @@ use sheetsplat::transfer_function::{Ramp, TransferFunction};
 use sheetsplat::volume::{Grid, Volume};
 use sheetsplat::wgpu::BufferUsages;
 
-use crate::common::{Random, camera, gpu, pixels, scene, transfer};
+use crate::common::{COMPOSITINGS, Random, camera, gpu, pixels, scene, transfer};
 use crate::section::{AMOUNT, KERNELS, Seen, VIEWS, view_scene};
 use crate::{at_offsets, compute, contents, init};
 
@@ -280,7 +280,7 @@ fn frames() {
     let (gpu, stage) = (gpu(), Gather::default());
     let mut random = Random(42);
     let mut lit = 0;
-    for (compositing, order) in [Compositing::Linear, Compositing::Exponential, Compositing::Xray]
+    for (compositing, order) in COMPOSITINGS
         .into_iter()
         .flat_map(|compositing| [Order::FrontToBack, Order::BackToFront].map(|order| (compositing, order)))
     {

@@ -11,7 +11,7 @@ use sheetsplat::renderer_options::{Blend, RendererOptions};
 use sheetsplat::splatting::Compositing;
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
 
-use crate::common::{F32, Random, gpu, gpu_with_small_bindings, pixels};
+use crate::common::{COMPOSITINGS, F32, Random, gpu, gpu_with_small_bindings, pixels};
 use crate::{frame, init};
 
 const BACKGROUNDS: [[f64; 4]; 5] =
@@ -35,7 +35,7 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
         view_formats: &[],
     });
     let view = target.create_view(&wgpu::TextureViewDescriptor::default());
-    for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray] {
+    for compositing in COMPOSITINGS {
         for background in BACKGROUNDS {
             // Summed projections pass 1; the others cannot. Some pixels are empty, some opaque.
             let most = if compositing == Compositing::Xray { 3.0 } else { 1.0 };
