@@ -1,6 +1,6 @@
 //! A prepared frame: the buffers that recording needs, and what of them the next frame can take over.
 
-use wgpu::{BindGroup, Buffer, CommandEncoder, Texture, TextureView};
+use wgpu::{BindGroup, Buffer, CommandEncoder, Texture, TextureFormat, TextureView};
 
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
@@ -13,6 +13,8 @@ use crate::view::View;
 /// A frame whose buffers are all allocated and filled: recording it cannot fail.
 #[derive(Debug)]
 pub(crate) struct PreparedFrame {
+    /// Format and number of the sheets of the renderer that prepared it.
+    pub(crate) sheets: (TextureFormat, u32),
     pub(crate) view: View,
     pub(crate) drawing: Drawing,
     pub(crate) compositing: CompositingBuffer,

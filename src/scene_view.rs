@@ -1,13 +1,12 @@
 //! What is shown and how, and what the next frame can keep of the last one: every setter says what it costs (§5.1).
 
-use std::sync::Arc;
-
-use wgpu::{CommandEncoder, Device, Queue, Texture};
+use wgpu::{CommandEncoder, Device, Texture};
 
 use crate::camera::Camera;
 use crate::classified_volume::{ClassifiedVolume, Touched};
 use crate::clip::Clip;
 use crate::error::RenderError;
+use crate::gpu_volume::GpuVolume;
 use crate::pick::PendingPick;
 use crate::prepared_frame::PreparedFrame;
 use crate::scene::{ImageSettings, Scene};
@@ -16,7 +15,6 @@ use crate::splatting::Splatting;
 use crate::stats::PendingCounts;
 use crate::surfaces::Surfaces;
 use crate::transfer_function::TransferFunction;
-use crate::volume::Volume;
 
 /// A view of a volume: camera, image, transfer function, shading and splatting settings, and the last frame's buffers. Setters
 /// take effect with the next [`Renderer::prepare`](crate::renderer::Renderer::prepare).
@@ -39,21 +37,20 @@ pub struct Prepared {
 }
 
 impl SceneView {
-    /// Uploads a volume, and the bricks of the voxels that take part under a scene's transfer function. The scene's own volume is
-    /// not looked at.
+    /// Uploads the bricks of the voxels that take part under a scene's transfer function, to the volume's device. The scene's own
+    /// volume is not looked at.
     ///
     /// # Errors
-    /// If the volume is larger than the device's textures, or has no labels and the scene has tables for some, or if the scene's clip
-    /// planes are none.
-    pub fn new(device: &Device, queue: &Queue, volume: Arc<Volume>, scene: &Scene) -> Result<Self, RenderError> {
-        if !scene.transfer.labels.is_empty() && volume.labels().is_none() {
+    /// If the volume has no labels and the scene has tables for some, or if the scene's clip planes are none.
+    pub fn new(device: &Device, volume: &GpuVolume, scene: &Scene) -> Result<Self, RenderError> {
+        if !scene.transfer.labels.is_empty() && volume.volume().labels().is_none() {
             let (key, found) = ("transfer.label", "tables for a volume without labels".to_owned());
             return Err(RenderError::OutOfRange { key, found, allowed: "none, or labels in the volume".to_owned() });
         }
-        let transfer = scene.transfer.resolve(&volume);
         scene.clip.check()?;
-        let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
-        let volume = ClassifiedVolume::new(device, queue, volume, transfer, clipped)?;
+        let transfer = scene.transfer.resolve(volume.volume());
+        let clipped = scene.clip.voxels(volume.volume().grid(), scene.splatting.radius);
+        let volume = ClassifiedVolume::new(device, volume, transfer, clipped);
         Ok(Self { volume, scene: scene.clone(), surfaces: None, first_hit: None, frame: None })
     }
 
@@ -165,7 +162,8 @@ impl SceneView {
         self.frame.as_ref().map(|frame| frame.drawing.rasterizer())
     }
 
-    /// Bytes of GPU memory that the view holds.
+    /// Bytes of GPU memory that the view holds, with the volume's, which other views may share: without those it is that less
+    /// [`GpuVolume::gpu_bytes`].
     pub fn gpu_bytes(&self) -> u64 {
         self.frame.as_ref().map_or(self.volume.gpu_bytes(), PreparedFrame::gpu_bytes)
     }

@@ -11,8 +11,8 @@ use std::sync::Arc;
 use glam::{DVec3, UVec2, UVec3};
 use sheetsplat::camera::Projection;
 use sheetsplat::clip::Clip;
-use sheetsplat::gpu::readback;
-use sheetsplat::headless::Headless;
+
+use sheetsplat::headless::{Headless, readback};
 use sheetsplat::image::Image;
 use sheetsplat::pick::Pick;
 use sheetsplat::reference::{self, Host, ray_march};

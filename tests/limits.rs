@@ -10,7 +10,7 @@ use sheetsplat::classify::classify;
 use sheetsplat::clip::ClippedVoxels;
 use sheetsplat::error::RenderError;
 use sheetsplat::gpu::brick_lists::BrickLists;
-use sheetsplat::gpu::device::{self, DeviceError, DeviceRequirements};
+use sheetsplat::gpu::device::{DeviceError, DeviceRequirements, InsufficientLimit};
 use sheetsplat::gpu::layout::{Band, Brick};
 use sheetsplat::gpu::targets::CompositingBuffer;
 use sheetsplat::gpu::volume_texture::VolumeTexture;
@@ -298,9 +298,10 @@ fn a_limit_that_is_too_small_is_named() {
     ];
     for (name, needed, available, limits) in small {
         match open(limits, Features::empty(), None) {
-            Err(error @ DeviceError::Limit { limit, required, actual }) => {
-                assert_eq!((limit, required, actual), (name, needed, available));
+            Err(error @ DeviceError::Limits(_)) => {
                 let message = error.to_string();
+                let DeviceError::Limits(limits) = error else { unreachable!() };
+                assert_eq!(limits, [InsufficientLimit { limit: name, required: needed, actual: available }]);
                 for part in [name, &needed.to_string(), &available.to_string()] {
                     assert!(message.contains(part), "{message}");
                 }
@@ -308,7 +309,7 @@ fn a_limit_that_is_too_small_is_named() {
             other => panic!("{name}: {other:?}"),
         }
     }
-    device::check(gpu().device()).unwrap();
+    DeviceRequirements::check(gpu().device()).unwrap();
 }
 
 #[test]
@@ -321,4 +322,17 @@ fn limits_beyond_the_adapter_are_an_error_that_names_it() {
         }
         other => panic!("{other:?}"),
     }
+}
+
+/// Work and bytes are the same on the least device and the best.
+#[test]
+fn deterministic_options_leave_nothing_to_the_device() {
+    let requirements = Some(DeviceRequirements { features: Features::empty(), limits: Limits::default() });
+    let options = HeadlessOptions { adapter: common::lavapipe().adapter, ..HeadlessOptions::DETERMINISTIC };
+    let (volume, scene) = head();
+    let renderings = [HeadlessOptions { requirements, ..options.clone() }, options]
+        .map(|options| Headless::new(&options).unwrap().render_volume(volume.clone(), &scene).unwrap());
+    assert_eq!(renderings[0].stats.counts, renderings[1].stats.counts);
+    assert!(renderings[0].image == renderings[1].image);
+    assert!(renderings[0].image != gpu().render_volume(volume, &scene).unwrap().image, "gpu() draws by tiles, in f32");
 }

@@ -121,7 +121,7 @@ impl QuadRasterizer {
         let shared = CullBuffers {
             frame,
             groups: &groups,
-            values: &volume.texture.view,
+            values: volume.values(),
             labels: volume.labels(),
             control_points,
             occluded: &targets.occluded,

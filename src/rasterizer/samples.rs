@@ -114,7 +114,7 @@ impl SampleRasterizer {
             ShadeBuffers {
                 frame: given.frame,
                 bricks: volume.lists.lists.first().map_or(&buffers.splats, |list| &list.buffer),
-                values: &volume.texture.view,
+                values: volume.values(),
                 labels: volume.labels(),
                 control_points: given.control_points,
                 places: &buffers.order,

@@ -180,7 +180,7 @@ impl TileRasterizer {
             starts: &starts,
             entries: &entries,
             control_points: given.control_points,
-            values: &volume.texture.view,
+            values: volume.values(),
             labels: volume.labels(),
             gathered: &gathered,
             half_boxes: &half_boxes,

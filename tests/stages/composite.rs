@@ -2,9 +2,8 @@
 
 use glam::{DVec3, DVec4};
 use sheetsplat::gpu::layout::Group;
-use sheetsplat::gpu::readback;
 use sheetsplat::gpu::targets::{BandBuffer, CompositingBuffer, Targets};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::{Headless, readback};
 use sheetsplat::pass::composite::{Composite, CompositeBuffers, RayMode};
 use sheetsplat::plan::{TILE, tile_grid};
 use sheetsplat::reference::Buffer;

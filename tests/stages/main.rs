@@ -22,9 +22,8 @@ use std::collections::BTreeMap;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::gpu::layout::{Cut, Frame, Indirect, QUADS, TileList};
-use sheetsplat::gpu::readback;
 use sheetsplat::gpu::uniforms::{self, Ramps};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::{Headless, readback};
 use sheetsplat::kernel::Kernel;
 use sheetsplat::pass::composite::CutBuffers;
 use sheetsplat::scene::Scene;
