@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod dependencies;
+mod depth;
 mod devices;
 mod passes;
 mod sharing;
