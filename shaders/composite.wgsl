@@ -9,6 +9,15 @@
 // The opacity buffer, cut off at the threshold: one bit per pixel, set from `opacity_threshold` on.
 @group(0) @binding(5) var<storage, read_write> opaque: array<u32>;
 @group(0) @binding(6) var<storage, read_write> opaque_tiles: array<u32>;
+@group(0) @binding(7) var<uniform> group: Group;
+@group(0) @binding(8) var<uniform> cut: Cut;
+@group(0) @binding(9) var surfaces: texture_depth_2d;
+// Of every pixel the sheet depth of its first hit, as bits; 0 is none.
+@group(0) @binding(10) var<storage, read_write> hits: array<u32>;
+
+// Whether anything is cut, and whether first hits are asked for.
+override CUT: bool = false;
+override FIRST_HIT: bool = false;
 
 const ROWS = 8u;
 
@@ -34,15 +43,31 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
         if all(pixel < frame.size) {
             let slot = (pixel.y - band.first_row) * frame.size.x + pixel.x;
             var image = acc[slot];
+            var ray = vec2f(-FAR, FAR);
+            if CUT {
+                ray = shown(vec2f(pixel) + 0.5);
+            }
             for (var i = 0u; i < layers; i += 1u) {
                 let layer = select(layers - 1u - i, i, frame.order == FRONT_TO_BACK);
-                let sheet = textureLoad(sheets, pixel, layer, 0);
+                var sheet = textureLoad(sheets, pixel, layer, 0);
+                let near = group.near + f32(layer) * frame.slab_width;
+                let part = vec2f(max(ray.x, near), min(ray.y, near + frame.slab_width));
+                if CUT {
+                    sheet *= max(part.y - part.x, 0.0) / frame.slab_width;
+                }
                 if sheet.a > 0.0 {
+                    let before = image.a;
                     image = composite(image, sheet, frame.compositing, frame.order);
+                    if FIRST_HIT && before < cut.first_hit && image.a >= cut.first_hit {
+                        let share = (cut.first_hit - before) / (image.a - before);
+                        hits[pixel.y * frame.size.x + pixel.x] = noted(mix(part.x, part.y, share));
+                    }
                 }
             }
             acc[slot] = image;
-            is_opaque = image.a >= frame.opacity_threshold;
+            // What lies behind a cut is as hidden as what lies behind opaque voxels.
+            let is_cut = CUT && ray.y <= group.near + f32(layers) * frame.slab_width;
+            is_opaque = image.a >= frame.opacity_threshold || is_cut;
         }
         if is_opaque {
             atomicOr(&opaque_rows[row], 1u << local.x);

@@ -24,6 +24,8 @@
 @group(0) @binding(11) var labels: texture_2d_array<u32>;
 // The next dispatch: nothing, if no subgroup says otherwise.
 @group(0) @binding(12) var<storage, read_write> next: Indirect;
+@group(0) @binding(13) var<uniform> cut: Cut;
+@group(0) @binding(14) var surfaces: texture_depth_2d;
 
 // `frame.compositing` and `frame.order`.
 override COMPOSITING: u32 = 0u;
@@ -34,6 +36,9 @@ override PERSPECTIVE: bool = false;
 override PARALLELOGRAM: bool = false;
 // Whether any of §8's economies is asked for.
 override ECONOMIES: bool = false;
+// Whether anything is cut, and whether first hits are asked for.
+override CUT: bool = false;
+override FIRST_HIT: bool = false;
 
 // Read once: a uniform read in a loop costs a software driver a gather.
 var<private> frame: Frame;
@@ -52,6 +57,9 @@ const TILE_SIDE = 16u;
 // Units of a tile.
 const UNITS = 8u;
 
+// Pixels of a thread.
+const PIXELS = 4u;
+
 // The four sheets of a group at a thread's four pixels: red, green, blue and alpha columns.
 struct Sheets {
     first: mat4x4f,
@@ -65,15 +73,37 @@ fn added(section: vec4f, amount: vec4f) -> mat4x4f {
     return mat4x4f(section * amount.x, section * amount.y, section * amount.z, section * amount.w);
 }
 
-// A sheet over or under what is there, at four pixels.
-fn composite_sheet(image: mat4x4f, sheet: mat4x4f) -> mat4x4f {
-    let pixels = transpose(sheet);
-    return mat4x4f(
+// Of a thread's four pixels the sheet depths from and to which their rays show something, and those of first hits, as bits.
+var<private> shown_from: vec4f;
+var<private> shown_to: vec4f;
+var<private> hits: vec4u;
+
+// A sheet over or under what is there, at four pixels; its slab begins at a sheet depth.
+fn composite_sheet(image: mat4x4f, sheet: mat4x4f, near: f32) -> mat4x4f {
+    var pixels = transpose(sheet);
+    var first = vec4f(near);
+    var last = vec4f(near + frame.slab_width);
+    if CUT {
+        first = max(first, shown_from);
+        last = min(last, shown_to);
+        let share = max(last - first, vec4f(0.0)) / frame.slab_width;
+        pixels = mat4x4f(pixels[0] * share.x, pixels[1] * share.y, pixels[2] * share.z, pixels[3] * share.w);
+    }
+    let result = mat4x4f(
         composite(image[0], pixels[0], COMPOSITING, ORDER),
         composite(image[1], pixels[1], COMPOSITING, ORDER),
         composite(image[2], pixels[2], COMPOSITING, ORDER),
         composite(image[3], pixels[3], COMPOSITING, ORDER),
     );
+    if FIRST_HIT {
+        let before = transpose(image)[3];
+        let after = transpose(result)[3];
+        let is_hit = (before < vec4f(cut.first_hit)) & (after >= vec4f(cut.first_hit));
+        let sheet_depths = mix(first, last, (cut.first_hit - before) / (after - before));
+        let here = vec4u(noted(sheet_depths.x), noted(sheet_depths.y), noted(sheet_depths.z), noted(sheet_depths.w));
+        hits = select(hits, here, is_hit);
+    }
+    return result;
 }
 
 // The frame's sheets from the first that a kernel overlaps to the one after the last.
@@ -114,7 +144,30 @@ fn draw(tile: u32, thread: u32) {
     if is_inside.w {
         image[3] = acc[slot + 3u * frame.size.x];
     }
-    region = opened(region, is_inside, transpose(image)[3], column, rows);
+    var is_shown = is_inside;
+    if CUT {
+        let across = array<vec2f, 4>(
+            shown(vec2f(column, rows.x)),
+            shown(vec2f(column, rows.y)),
+            shown(vec2f(column, rows.z)),
+            shown(vec2f(column, rows.w)),
+        );
+        shown_from = vec4f(across[0].x, across[1].x, across[2].x, across[3].x);
+        shown_to = vec4f(across[0].y, across[1].y, across[2].y, across[3].y);
+        is_shown &= shown_from < shown_to;
+    }
+    if FIRST_HIT {
+        let word = gather.hits + pixel.y * frame.size.x + pixel.x;
+        let past = vec4u(0u, 1u, 2u, 3u) * frame.size.x;
+        let last = gather.hits + frame.size.x * frame.size.y - 1u;
+        hits = vec4u(
+            atomicLoad(&gathered.words[min(word + past.x, last)]),
+            atomicLoad(&gathered.words[min(word + past.y, last)]),
+            atomicLoad(&gathered.words[min(word + past.z, last)]),
+            atomicLoad(&gathered.words[min(word + past.w, last)]),
+        );
+    }
+    region = opened(region, is_shown, transpose(image)[3], column, rows);
 
     var voxels_shaded = 0u;
     var sections_rasterized = 0u;
@@ -301,18 +354,24 @@ fn draw(tile: u32, thread: u32) {
         }
 
         for (; has_drawn; has_drawn = false) {
+            let width = frame.slab_width;
             if ORDER == FRONT_TO_BACK {
-                image = composite_sheet(image, sheets.first);
-                image = composite_sheet(image, sheets.second);
-                image = composite_sheet(image, sheets.third);
-                image = composite_sheet(image, sheets.fourth);
+                image = composite_sheet(image, sheets.first, near);
+                image = composite_sheet(image, sheets.second, near + width);
+                image = composite_sheet(image, sheets.third, near + 2.0 * width);
+                image = composite_sheet(image, sheets.fourth, near + 3.0 * width);
             } else {
-                image = composite_sheet(image, sheets.fourth);
-                image = composite_sheet(image, sheets.third);
-                image = composite_sheet(image, sheets.second);
-                image = composite_sheet(image, sheets.first);
+                image = composite_sheet(image, sheets.fourth, near + 3.0 * width);
+                image = composite_sheet(image, sheets.third, near + 2.0 * width);
+                image = composite_sheet(image, sheets.second, near + width);
+                image = composite_sheet(image, sheets.first, near);
             }
-            region = opened(region, is_inside, transpose(image)[3], column, rows);
+            var is_left = is_shown;
+            if CUT && frame.culling != 0u {
+                // What lies behind a cut is as hidden as what lies behind opaque voxels.
+                is_left &= shown_to > vec4f(far);
+            }
+            region = opened(region, is_left, transpose(image)[3], column, rows);
             if lane == 0u {
                 let tiles = tile_grid(frame.size);
                 let number = (at * tiles.y + pixel.y / TILE) * tiles.x + pixel.x / TILE;
@@ -335,6 +394,14 @@ fn draw(tile: u32, thread: u32) {
     }
     if is_inside.w {
         acc[slot + 3u * frame.size.x] = image[3];
+    }
+    if FIRST_HIT {
+        let word = gather.hits + pixel.y * frame.size.x + pixel.x;
+        for (var i = 0u; i < PIXELS; i += 1u) {
+            if is_inside[i] {
+                atomicStore(&gathered.words[word + i * frame.size.x], hits[i]);
+            }
+        }
     }
     let counts = subgroupAdd(vec2u(voxels_shaded, sections_rasterized));
     if lane == 0u {

@@ -1,14 +1,15 @@
 //! A volume under a transfer function, on the GPU: its values, the voxels that take part (§5.1), and how those change.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use rayon::prelude::*;
 use wgpu::{Device, Queue, TextureView};
 
-use crate::classify::{classify, takes_part};
+use crate::classify::{classify, in_rows, takes_part};
+use crate::clip::ClippedVoxels;
 use crate::error::RenderError;
 use crate::gpu::brick_lists::BrickLists;
-use crate::gpu::volume_texture::VolumeTexture;
+use crate::gpu_volume::GpuVolume;
 use crate::iso_range::ValueSet;
 use crate::plan::{Overlaps, tile_grid};
 use crate::stats::{Counts, GroupSlabs, Totals};
@@ -20,12 +21,9 @@ use crate::volume::{Grid, Volume};
 /// The voxels of a volume that take part under a transfer function.
 #[derive(Debug)]
 pub struct ClassifiedVolume {
-    volume: Arc<Volume>,
+    volume: GpuVolume,
     transfer: TransferFunction,
-    list: OnceLock<ValueList>,
-    pub(crate) texture: VolumeTexture,
-    /// Uploaded when tables first ask for labels.
-    labels: Option<VolumeTexture>,
+    clipped: ClippedVoxels,
     pub(crate) lists: BrickLists,
     /// Counts changes of the lists.
     pub(crate) revision: u64,
@@ -43,23 +41,15 @@ pub struct Touched {
 }
 
 impl ClassifiedVolume {
-    /// Uploads a volume's values, and the bricks of the voxels that take part (SPEC §3). Of a volume that is not segmented the
+    /// Uploads the bricks of the voxels that take part (SPEC §3) to the volume's device. Of a volume that is not segmented the
     /// labels' tables are left out.
-    ///
-    /// # Errors
-    /// If the volume is larger than the device's textures.
-    pub fn new(
-        device: &Device,
-        queue: &Queue,
-        volume: Arc<Volume>,
-        mut transfer: TransferFunction,
-    ) -> Result<Self, RenderError> {
-        if volume.labels().is_none() {
+    pub fn new(device: &Device, volume: &GpuVolume, mut transfer: TransferFunction, clipped: ClippedVoxels) -> Self {
+        let voxels = volume.volume();
+        if voxels.labels().is_none() {
             transfer.labels.clear();
         }
-        let texture = VolumeTexture::upload(device, queue, volume.values())?;
-        let lists = BrickLists::upload(device, volume.grid(), &classify(&volume, &transfer));
-        Ok(Self { volume, transfer, list: OnceLock::new(), texture, labels: None, lists, revision: 0 })
+        let lists = BrickLists::upload(device, voxels.grid(), &classify(voxels, &transfer, &clipped));
+        Self { volume: volume.clone(), transfer, clipped, lists, revision: 0 }
     }
 
     /// Brings the GPU up to date.
@@ -67,18 +57,21 @@ impl ClassifiedVolume {
     /// # Errors
     /// If the volume's labels need more than the device allows.
     pub(crate) fn flush(&mut self, device: &Device, queue: &Queue) -> Result<(), RenderError> {
-        if let (None, Some(labels)) = (&self.labels, self.volume.labels())
-            && self.shades_by_label()
-        {
-            self.labels = Some(VolumeTexture::upload_labels(device, queue, labels)?);
+        if self.shades_by_label() {
+            self.volume.upload_labels(device, queue)?;
         }
         self.lists.flush(device, queue);
         Ok(())
     }
 
+    /// The values on the GPU.
+    pub(crate) fn values(&self) -> &TextureView {
+        self.volume.values()
+    }
+
     /// The labels on the GPU, if shading asks for them.
     pub(crate) fn labels(&self) -> Option<&TextureView> {
-        self.labels.as_ref().filter(|_| self.shades_by_label()).map(|labels| &labels.view)
+        self.volume.labels().filter(|_| self.shades_by_label())
     }
 
     fn shades_by_label(&self) -> bool {
@@ -87,12 +80,17 @@ impl ClassifiedVolume {
 
     /// The volume.
     pub fn volume(&self) -> &Arc<Volume> {
+        self.volume.volume()
+    }
+
+    /// The volume on the GPU, which other views may share.
+    pub fn gpu_volume(&self) -> &GpuVolume {
         &self.volume
     }
 
     /// Where the voxels are.
     pub fn grid(&self) -> &Grid {
-        self.volume.grid()
+        self.volume().grid()
     }
 
     /// The transfer function.
@@ -100,17 +98,16 @@ impl ClassifiedVolume {
         &self.transfer
     }
 
-    /// The voxels sorted by value (Table 1), for every later change. Sorted when first asked for, so that a single frame need not
-    /// wait for it; a program with iso-ranges to move asks when it has loaded the volume.
+    /// The voxels sorted by value: [`GpuVolume::value_list`].
     pub fn value_list(&self) -> &ValueList {
-        self.list.get_or_init(|| ValueList::new(self.volume.values()))
+        self.volume.value_list()
     }
 
     /// Changes colours, opacities, gradient opacity, iso-ranges or the labels' tables (§5.1). Only voxels that enter or leave are
     /// touched: those whose values gain or lose their opacity, found by binary search. Where a gradient opacity changes, all that are
     /// in range must be looked at. Of a volume that is not segmented the labels' tables are left out.
     pub fn set_transfer_function(&mut self, mut transfer: TransferFunction) -> Touched {
-        if self.volume.labels().is_none() {
+        if self.volume().labels().is_none() {
             transfer.labels.clear();
         }
         let labels = self.transfer.labels.keys().chain(transfer.labels.keys()).copied().map(Some);
@@ -124,16 +121,37 @@ impl ClassifiedVolume {
         let candidates = if changed.ranges().is_empty() {
             Vec::new()
         } else {
-            let mut candidates = self.value_list().within(self.volume.values(), &changed);
+            let mut candidates = self.value_list().within(self.volume().values(), &changed);
             // In memory order, where neighbours share cache lines.
             candidates.par_sort_unstable();
             candidates
         };
         self.transfer = transfer;
 
-        let (volume, transfer, lists) = (&*self.volume, &self.transfer, &self.lists);
+        self.look_at(candidates)
+    }
+
+    /// Changes which voxels are clipped; touches only voxels that enter or leave.
+    pub fn set_clip(&mut self, clipped: ClippedVoxels) -> Touched {
+        let volume = self.volume();
+        let candidates = in_rows(volume, |y, z, row| {
+            let [old, new] = [&self.clipped, &clipped].map(|clipped| clipped.in_row(y, z, volume.dims().x));
+            // Either may be empty, anywhere.
+            let changed =
+                (old.start.min(new.start)..old.end.max(new.end)).filter(|x| old.contains(x) != new.contains(x));
+            changed.map(|x| row + x).collect()
+        });
+        self.clipped = clipped;
+        self.look_at(candidates)
+    }
+
+    /// Lets those of some voxels, in memory order, enter and leave that must.
+    fn look_at(&mut self, candidates: Vec<u32>) -> Touched {
+        let (volume, transfer, clipped, lists) = (&**self.volume(), &self.transfer, &self.clipped, &self.lists);
+        let takes_part =
+            |index: u32| clipped.contain(volume.grid().voxel_at(index)) && takes_part(volume, transfer, index);
         let (entering, leaving): (Vec<u32>, Vec<u32>) = (candidates.into_par_iter())
-            .filter(|&index| takes_part(volume, transfer, index) != lists.contains(index))
+            .filter(|&index| takes_part(index) != lists.contains(index))
             .partition(|&index| !lists.contains(index));
         if !entering.is_empty() || !leaving.is_empty() {
             self.lists.change(&entering, &leaving);
@@ -156,10 +174,9 @@ impl ClassifiedVolume {
         self.set_transfer_function(transfer)
     }
 
-    /// Bytes of GPU memory.
+    /// Bytes of GPU memory, with the volume's, which other views may share ([`GpuVolume::gpu_bytes`]).
     pub fn gpu_bytes(&self) -> u64 {
-        let textures = [Some(&self.texture), self.labels.as_ref()].into_iter().flatten();
-        textures.map(|texture| texture.gpu_bytes).sum::<u64>() + self.lists.gpu_bytes()
+        self.volume.gpu_bytes() + self.lists.gpu_bytes()
     }
 
     /// What of a frame's counts (Table 4) is known before it is drawn.

@@ -2,23 +2,27 @@
 
 use rayon::prelude::*;
 
+use crate::clip::ClippedVoxels;
 use crate::transfer_function::TransferFunction;
 use crate::volume::Volume;
 
 /// Indices of the voxels that take part, in memory order, x fastest.
-pub fn classify(volume: &Volume, transfer: &TransferFunction) -> Vec<u32> {
-    let row = volume.dims().x as usize;
-    let rows: Vec<Vec<u32>> = (0..volume.values().len() / row)
-        .into_par_iter()
-        .map(|y| {
-            let indices = (y * row) as u32..=((y + 1) * row - 1) as u32;
-            indices.filter(|&index| takes_part(volume, transfer, index)).collect()
-        })
-        .collect();
+pub fn classify(volume: &Volume, transfer: &TransferFunction, clipped: &ClippedVoxels) -> Vec<u32> {
+    in_rows(volume, |y, z, row| {
+        let inside = clipped.in_row(y, z, volume.dims().x);
+        inside.map(|x| row + x).filter(|&index| takes_part(volume, transfer, index)).collect()
+    })
+}
+
+/// What a function picks from every row of voxels along x, given its y, its z and the index of its first voxel, in memory order.
+pub fn in_rows(volume: &Volume, pick: impl Fn(u32, u32, u32) -> Vec<u32> + Sync) -> Vec<u32> {
+    let dims = volume.dims();
+    let row = |row: u32| pick(row % dims.y, row / dims.y, row * dims.x);
+    let rows: Vec<Vec<u32>> = (0..dims.y * dims.z).into_par_iter().map(row).collect();
     rows.concat()
 }
 
-/// Whether a voxel takes part: visible, inside an iso-range and with an opacity above 0.
+/// Whether a voxel that is not clipped takes part: visible, inside an iso-range and with an opacity above 0.
 pub fn takes_part(volume: &Volume, transfer: &TransferFunction, index: u32) -> bool {
     let value = f64::from(volume.values()[index as usize]);
     let tables = transfer.tables(volume.label(index));

@@ -9,10 +9,10 @@ use crate::volume::VolumeError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
-    /// A scene value that is fine by itself asks of this volume what no renderer can do.
+    /// A scene value that is fine by itself asks of this volume what no renderer can do; or a host's matrix is no camera's.
     #[error("{key}: found {found}, allowed: {allowed}")]
     OutOfRange {
-        /// The scene key.
+        /// The scene key, or the parameter.
         key: &'static str,
         /// What the scene says or leads to.
         found: String,

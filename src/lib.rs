@@ -27,9 +27,25 @@
 //!
 //! Both rasterizers draw the same image, to rounding ([`splatting::Rasterizer`]).
 //!
-//! [`headless`] does all of it with a device of its own. A host with a device uses [`renderer`] and [`scene_view`]. Settings are those of
-//! [`scene`]. Every stage has a plain f64 twin in
+//! [`headless`] does all of it with a device of its own. Settings are those of [`scene`]. Every stage has a plain f64 twin in
 //! [`reference`](mod@reference).
+//!
+//! # On a host's device
+//!
+//! The types at the crate's root are those a host needs. The host owns instance, adapter, device, queue, encoder and target; nothing
+//! outside [`headless`] opens a device, submits, or waits.
+//!
+//! ```text
+//! DeviceRequirements  what to ask for when opening the device
+//! RendererOptions     what is drawn into → Renderer: pipelines, once
+//! Volume              → GpuVolume: its textures, shared by views
+//! Scene               → SceneView: what is shown of a volume, and setters
+//!
+//! Renderer::prepare   allocates, writes buffers; can fail
+//! Renderer::record    into the host's encoder: all but the last stage
+//! Renderer::present   the last stage in a pass of its own, at a Placement in the target
+//! Renderer::draw      the same in a pass of the host's
+//! ```
 //!
 //! # Glossary
 //!
@@ -47,22 +63,28 @@ pub mod bucket;
 pub mod camera;
 pub mod classified_volume;
 pub mod classify;
+pub mod clip;
+mod clip_from_world;
 pub mod error;
 pub mod footprint;
 #[cfg(feature = "golden")]
 pub mod golden;
 pub mod gpu;
+pub mod gpu_volume;
 pub mod grid_warp;
 pub mod headless;
 pub mod image;
 pub mod iso_range;
 pub mod kernel;
 pub mod pass;
+pub mod pick;
+pub mod placement;
 pub mod plan;
 mod prepared_frame;
 mod rasterizer;
 pub mod reference;
 pub mod renderer;
+pub mod renderer_options;
 pub mod scene;
 pub mod scene_view;
 pub mod shading;
@@ -70,12 +92,22 @@ pub mod slab;
 pub mod slice_lists;
 pub mod splatting;
 pub mod stats;
+pub mod surfaces;
 pub mod tile_bins;
 pub mod transfer_function;
 pub mod value_list;
 pub mod view;
 pub mod volume;
 
+pub use camera::Camera;
+pub use gpu::device::DeviceRequirements;
+pub use gpu_volume::GpuVolume;
+pub use placement::Placement;
+pub use renderer::Renderer;
+pub use renderer_options::{Blend, RendererOptions};
+pub use scene::Scene;
+pub use scene_view::SceneView;
+pub use volume::Volume;
 pub use wgpu;
 
 /// The README's code, run as a doc test.

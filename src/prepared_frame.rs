@@ -1,6 +1,6 @@
 //! A prepared frame: the buffers that recording needs, and what of them the next frame can take over.
 
-use wgpu::{BindGroup, Buffer, CommandEncoder};
+use wgpu::{BindGroup, Buffer, CommandEncoder, Texture, TextureFormat, TextureView};
 
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
@@ -13,18 +13,32 @@ use crate::view::View;
 /// A frame whose buffers are all allocated and filled: recording it cannot fail.
 #[derive(Debug)]
 pub(crate) struct PreparedFrame {
+    /// Format and number of the sheets of the renderer that prepared it.
+    pub(crate) sheets: (TextureFormat, u32),
     pub(crate) view: View,
     pub(crate) drawing: Drawing,
     pub(crate) compositing: CompositingBuffer,
     pub(crate) uniform: Buffer,
     pub(crate) control_points: Buffer,
     pub(crate) resolve_groups: Vec<BindGroup>,
+    /// What cuts rays.
+    pub(crate) cut: Buffer,
+    /// If they were asked for.
+    pub(crate) first_hits: Option<FirstHits>,
     pub(crate) timer: Option<Timer>,
     /// Counted when first asked for.
     pub(crate) totals: Option<Totals>,
     /// Where a recorded frame leaves its counts; gone when somebody waits for them.
     pub(crate) staging: Option<Staging>,
     pub(crate) gpu_bytes: u64,
+}
+
+/// The depths of first hits.
+#[derive(Debug)]
+pub(crate) struct FirstHits {
+    pub(crate) texture: Texture,
+    pub(crate) view: TextureView,
+    pub(crate) group: BindGroup,
 }
 
 /// A rasterizer's part of a frame.
@@ -78,6 +92,15 @@ impl Drawing {
             Self::Quads(frame) => frame.copy_counts(encoder, staging),
             Self::Tiles(frame) => frame.copy_counts(encoder, staging),
             Self::Samples(frame) => frame.copy_counts(encoder, staging),
+        }
+    }
+
+    /// The words of first hits, and where in their buffer they start, bytes; samples have none.
+    pub(crate) fn first_hits(&self) -> Option<(&Buffer, u64)> {
+        match self {
+            Self::Quads(frame) => Some(frame.first_hits()),
+            Self::Tiles(frame) => Some(frame.first_hits()),
+            Self::Samples(_) => None,
         }
     }
 

@@ -1,75 +1,72 @@
-//! The renderer a host embeds: it owns pipelines, never a device, and neither submits nor waits.
+//! The renderer a host embeds: it owns pipelines, never a device, and neither submits nor waits. Every frame it prepares, which can
+//! fail, records, and presents, which cannot.
 
 use std::sync::OnceLock;
 
-use wgpu::{BufferUsages, CommandEncoder, Device, Queue, TextureFormat, TextureView};
+use wgpu::{BufferUsages, CommandEncoder, Device, Queue, RenderPass, TextureFormat, TextureView};
 
 use crate::error::RenderError;
-use crate::gpu::device::{self, DeviceError};
+use crate::gpu::device::{self, DeviceError, DeviceRequirements};
 use crate::gpu::layout::{Frame, Tally};
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::{PASS_BYTES, Timer};
 use crate::gpu::uniforms::{self, Ramps};
 use crate::kernel::Kernel;
+use crate::pass::composite::{CutBuffers, RayMode};
+use crate::pass::first_hit::FirstHit;
 use crate::pass::resolve::Resolve;
-use crate::prepared_frame::{Drawing, PreparedFrame, Staging};
+use crate::placement::Placement;
+use crate::prepared_frame::{Drawing, FirstHits, PreparedFrame, Staging};
 use crate::rasterizer::quads::QuadRasterizer;
 use crate::rasterizer::samples::SampleRasterizer;
 use crate::rasterizer::tiles::TileRasterizer;
 use crate::rasterizer::{Given, filled};
+use crate::renderer_options::RendererOptions;
 use crate::scene_view::{Prepared, SceneView};
-use crate::splatting::{Economies, FootprintBox, Method, Rasterizer, Splatting};
+use crate::splatting::{Compositing, Economies, FootprintBox, Method, Order, Rasterizer, Splatting};
 use crate::view::View;
-
-/// What a renderer is made for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RendererOptions {
-    /// Format of the sheet buffer, `Rgba32Float` or `Rgba16Float`; `None` takes the better one that the device blends.
-    pub sheet_format: Option<TextureFormat>,
-    /// Sheets drawn by one quad: 1, 2 or 4; `None` takes as many as the device's colour attachments allow.
-    pub sheets_per_group: Option<u32>,
-    /// Times every stage, where the device has timestamp queries.
-    pub profile: bool,
-    /// Format of the views that frames are drawn into; any renderable float or normalised format.
-    pub target_format: TextureFormat,
-}
-
-impl Default for RendererOptions {
-    fn default() -> Self {
-        Self { sheet_format: None, sheets_per_group: None, profile: false, target_format: TextureFormat::Rgba32Float }
-    }
-}
 
 /// The pipelines of every stage, for one device. Volumes and frames are separate and can be many.
 #[derive(Debug)]
 pub struct Renderer {
     sheet_format: TextureFormat,
     sheets: u32,
+    rasterizer: Rasterizer,
     profile: bool,
+    /// Nanoseconds of a timestamp's tick.
+    period: f32,
     /// Compiled when first needed.
     quads: OnceLock<QuadRasterizer>,
     samples: OnceLock<SampleRasterizer>,
     tiles: TileRasterizer,
     resolve: Resolve,
+    first_hit: OnceLock<FirstHit>,
+    /// Stands for a host's depth where there is none.
+    no_surfaces: OnceLock<TextureView>,
 }
 
 impl Renderer {
     /// Compiles what every frame needs; a rasterizer's stages are compiled with the first frame that it draws.
     ///
     /// # Errors
-    /// If a limit of the device is too small or it cannot blend the sheet format asked for.
-    pub fn new(device: &Device, options: &RendererOptions) -> Result<Self, DeviceError> {
-        device::check(device)?;
+    /// If limits of the device are not enough, or it cannot do what the options ask for.
+    pub fn new(device: &Device, queue: &Queue, options: &RendererOptions) -> Result<Self, DeviceError> {
+        DeviceRequirements::check(device)?;
         let sheet_format = device::sheet_format(device, options.sheet_format)?;
-        let sheets = options.sheets_per_group.unwrap_or(device::sheets_per_group(device, sheet_format));
+        let sheets = device::sheets_per_group(device, sheet_format, options.sheets_per_group)?;
+        options.check_target(device)?;
         Ok(Self {
             sheet_format,
             sheets,
+            rasterizer: options.rasterizer,
             profile: options.profile,
+            period: queue.get_timestamp_period(),
             quads: OnceLock::new(),
             samples: OnceLock::new(),
             tiles: TileRasterizer::default(),
-            resolve: Resolve::new(device, options.target_format),
+            resolve: Resolve::new(device, options),
+            first_hit: OnceLock::new(),
+            no_surfaces: OnceLock::new(),
         })
     }
 
@@ -84,8 +81,8 @@ impl Renderer {
     /// # Errors
     /// If the scene asks for something not implemented, or for more than the device's limits allow.
     pub fn prepare(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
-        let SceneView { volume, scene, frame } = view;
-        let splatting = &scene.splatting;
+        let SceneView { volume, scene, surfaces, first_hit, frame } = view;
+        let splatting = &self.settled(scene.splatting);
         let size = [scene.image.width, scene.image.height];
         let seen = View::new(volume.grid(), &scene.camera, splatting, size)?;
         let kernel = Kernel::new(splatting.radius, splatting.falloff);
@@ -94,14 +91,25 @@ impl Renderer {
             Some(old) if old.compositing.size == size => None,
             _ => Some(CompositingBuffer::new(device, size)?),
         };
+        let rays = RayMode { cut: surfaces.is_some() || !scene.clip.is_empty(), first_hit: first_hit.is_some() };
+        check_rays(device, splatting, rays, *first_hit, size)?;
+        let grid = *volume.grid();
+        let depths = match surfaces {
+            Some(surfaces) => Some((surfaces.depths(&seen, &grid)?, surfaces.origin)),
+            None => None,
+        };
         let way = way(device, splatting)?;
         volume.flush(device, queue)?;
         let old = frame.take();
-        let (old_compositing, uniform, control_points, drawing, totals) = old.map_or_else(Default::default, |old| {
-            let PreparedFrame { compositing, uniform, control_points, drawing, totals, view, .. } = old;
-            let totals = totals.filter(|_| view == seen);
-            (Some(compositing), Some(uniform), Some(control_points), Some(drawing), totals)
-        });
+        let (old_compositing, uniform, control_points, cut, drawing, totals) =
+            old.map_or_else(Default::default, |old| {
+                let PreparedFrame { sheets, compositing, uniform, control_points, cut, drawing, totals, view, .. } =
+                    old;
+                // That of another renderer may have other sheets.
+                let drawing = (sheets == (self.sheet_format, self.sheets)).then_some(drawing);
+                let totals = totals.filter(|_| view == seen);
+                (Some(compositing), Some(uniform), Some(control_points), Some(cut), drawing, totals)
+            });
         let Some(compositing) = compositing.or(old_compositing) else { unreachable!("made where there was none") };
         let ramps = Ramps::new(volume.transfer());
         let filled = |old, label, bytes: &[u8], usage| filled(device, queue, old, label, bytes, usage);
@@ -110,6 +118,15 @@ impl Renderer {
         let frame_uniform = uniforms::frame(&seen, &kernel, volume.grid(), &ramps, scene);
         let bytes = bytemuck::bytes_of(&frame_uniform);
         let uniform = filled(uniform, "sheetsplat.frame", bytes, BufferUsages::UNIFORM);
+        let cut_uniform = uniforms::cut(&seen, &grid, &scene.clip, depths, *first_hit);
+        let cut = filled(cut, "sheetsplat.cut", bytemuck::bytes_of(&cut_uniform), BufferUsages::UNIFORM);
+        let cut_buffers = CutBuffers {
+            uniform: &cut,
+            surfaces: match surfaces {
+                Some(surfaces) => &surfaces.depth,
+                None => self.no_surfaces.get_or_init(|| no_surfaces(device)),
+            },
+        };
 
         let given = Given {
             device,
@@ -122,10 +139,19 @@ impl Renderer {
             control_points: &control_points,
             ramp_lengths: ramps.lengths(),
             compositing: &compositing,
+            rays,
+            cut: cut_buffers,
         };
         let was = drawing.as_ref().map(Drawing::rasterizer);
         let (drawing, prepared) = self.draw_with(given, way, &frame_uniform, drawing)?;
         let totals = totals.filter(|_| !prepared.bucketed && was == Some(drawing.rasterizer()));
+
+        let first_hits = drawing.first_hits().filter(|_| rays.first_hit).map(|words| {
+            let stage = self.first_hit.get_or_init(|| FirstHit::new(device));
+            let texture = FirstHit::texture(device, size);
+            let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+            FirstHits { group: stage.bind(device, &uniform, cut_buffers, words), texture, view }
+        });
 
         // The rasterizer's passes, and resolve.
         let passes = drawing.passes() + 1;
@@ -138,19 +164,23 @@ impl Renderer {
             usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
             mapped_at_creation: false,
         });
-        let period = queue.get_timestamp_period();
-        let shared_bytes = compositing.gpu_bytes() + uniform.size() + control_points.size();
+        let pixels = u64::from(size[0]) * u64::from(size[1]);
+        let hit_bytes = first_hits.as_ref().map_or(0, |_| 4 * pixels);
+        let shared_bytes = compositing.gpu_bytes() + uniform.size() + control_points.size() + cut.size() + hit_bytes;
         *frame = Some(PreparedFrame {
             gpu_bytes: volume.gpu_bytes() + drawing.gpu_bytes() + shared_bytes,
+            sheets: (self.sheet_format, self.sheets),
             resolve_groups: compositing.bands.iter().map(|band| self.resolve.bind(device, &uniform, band)).collect(),
             view: seen,
             drawing,
             compositing,
             uniform,
             control_points,
+            cut,
+            first_hits,
             timer,
             totals,
-            staging: Some(Staging { buffer: staging, timestamps, stages: Vec::new(), period }),
+            staging: Some(Staging { buffer: staging, timestamps, stages: Vec::new(), period: self.period }),
         });
         Ok(prepared)
     }
@@ -185,6 +215,12 @@ impl Renderer {
         Ok((Drawing::Quads(Box::new(frame)), prepared))
     }
 
+    /// The settings, with the renderer's rasterizer where they leave the choice.
+    fn settled(&self, splatting: Splatting) -> Splatting {
+        let is_open = splatting.rasterizer == Rasterizer::Auto && !insists_on_tiles(&splatting);
+        Splatting { rasterizer: if is_open { self.rasterizer } else { splatting.rasterizer }, ..splatting }
+    }
+
     fn samples(&self, device: &Device) -> &SampleRasterizer {
         self.samples.get_or_init(|| SampleRasterizer::new(device, self.sheet_format))
     }
@@ -193,11 +229,15 @@ impl Renderer {
         self.quads.get_or_init(|| QuadRasterizer::new(device, self.sheet_format, self.sheets))
     }
 
-    /// Records the view's prepared frame; nothing, if there is none. The target must have the renderer's target format and the
-    /// scene's image size.
-    pub fn record(&self, encoder: &mut CommandEncoder, view: &mut SceneView, target: &TextureView) {
+    /// Records the drawing of the view's prepared frame into the view's own buffers, from where [`Self::present`] and [`Self::draw`]
+    /// take it, in this encoder or later ones; nothing, if the view was never prepared. The renderer must be the one that prepared it, and
+    /// what is recorded must be submitted before the view is prepared again.
+    pub fn record(&self, encoder: &mut CommandEncoder, view: &mut SceneView) {
         let Some(frame) = &mut view.frame else { return };
         let PreparedFrame { drawing, compositing, timer, .. } = frame;
+        if let Some(timer) = timer {
+            timer.restart();
+        }
         for band in &compositing.bands {
             encoder.clear_buffer(&band.acc, 0, None);
         }
@@ -214,16 +254,56 @@ impl Renderer {
                 }
             }
         }
-        let bands = compositing.bands.iter().map(|band| band.band);
-        let times = timer.as_mut().map(|timer| timer.render("resolve"));
-        self.resolve.record(encoder, times, target, compositing.size[0], frame.resolve_groups.iter().zip(bands));
-
+        if let (Some(stage), Some(FirstHits { view, group, .. })) = (self.first_hit.get(), &frame.first_hits) {
+            stage.record(encoder, group, view);
+        }
         if let Some(staging) = &mut frame.staging {
             drawing.copy_counts(encoder, &staging.buffer);
             if let Some(timer) = timer {
-                staging.stages = timer.finish(encoder, &staging.buffer, staging.timestamps);
+                staging.stages = timer.copy(encoder, &staging.buffer, staging.timestamps);
             }
         }
+    }
+
+    /// Records a pass of its own that draws the view's image into a target, which keeps what the image does not cover; nothing, if
+    /// the view was never prepared. The renderer must have been made for the target's format and sample count and for no depth
+    /// attachment, and the scissor must lie in the target; what is wrong with them, wgpu reports.
+    pub fn present(&self, encoder: &mut CommandEncoder, view: &mut SceneView, target: &TextureView, at: Placement) {
+        let Some(frame) = &mut view.frame else { return };
+        // Whoever waits for the counts has them, and their buffer.
+        let timer = frame.timer.as_mut().filter(|timer| frame.staging.is_some() && timer.has_room());
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("sheetsplat.resolve"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: target,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
+            })],
+            timestamp_writes: timer.map(|timer| timer.render("resolve")),
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        self.draw_frame(&mut pass, frame, at);
+        drop(pass);
+        if let (Some(timer), Some(staging)) = (&frame.timer, &mut frame.staging) {
+            staging.stages = timer.copy(encoder, &staging.buffer, staging.timestamps);
+        }
+    }
+
+    /// Draws the view's image in a pass of the host's, whose attachments must be of the formats and the sample count that the
+    /// renderer was made for; what is wrong with them, wgpu reports. Draws nothing, if the view was never prepared. Changes the pass's
+    /// pipeline, bind group 0, viewport and scissor rectangle. A view may also be drawn by other renderers of its device than the
+    /// one that recorded it, and as often as the host likes.
+    pub fn draw(&self, pass: &mut RenderPass<'_>, view: &SceneView, at: Placement) {
+        if let Some(frame) = &view.frame {
+            self.draw_frame(pass, frame, at);
+        }
+    }
+
+    fn draw_frame(&self, pass: &mut RenderPass<'_>, frame: &PreparedFrame, at: Placement) {
+        let PreparedFrame { compositing, resolve_groups, .. } = frame;
+        let bands = compositing.bands.iter().map(|band| band.band);
+        self.resolve.draw(pass, compositing.size, resolve_groups.iter().zip(bands), at);
     }
 }
 
@@ -234,6 +314,58 @@ enum Way {
     /// If the view fits.
     Tiles,
     Samples,
+}
+
+/// Checks that the settings allow what of rays is looked at.
+fn check_rays(
+    device: &Device,
+    splatting: &Splatting,
+    rays: RayMode,
+    first_hit: Option<f64>,
+    [width, height]: [u32; 2],
+) -> Result<(), RenderError> {
+    let refused = |key, found: String, allowed: String| Err(RenderError::OutOfRange { key, found, allowed });
+    if splatting.method == Method::CompositeEverySample && rays != RayMode::default() {
+        let found = "\"composite-every-sample\" with clip planes, surfaces or first hits".to_owned();
+        return refused("splatting.method", found, "a method with sheets".to_owned());
+    }
+    let Some(opacity) = first_hit else { return Ok(()) };
+    let hides = splatting.culling && splatting.compositing != Compositing::Xray;
+    let most = if hides { splatting.opacity_threshold } else { 1.0 };
+    if !(opacity > 0.0 && opacity <= most) {
+        let allowed = format!("above 0, at most {most}{}", if hides { ", the opacity_threshold" } else { "" });
+        return refused("first_hit", opacity.to_string(), allowed);
+    }
+    if splatting.order != Order::FrontToBack {
+        return refused(
+            "splatting.order",
+            "\"back-to-front\" with first hits".to_owned(),
+            "\"front-to-back\"".to_owned(),
+        );
+    }
+    let limits = device.limits();
+    let actual = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    let required = 4 * u64::from(width) * u64::from(height);
+    if required > actual {
+        let (what, limit) = ("the image's first hits", "max_storage_buffer_binding_size");
+        return Err(RenderError::Limit { what, limit, required, actual });
+    }
+    Ok(())
+}
+
+/// A depth texture that nobody reads.
+fn no_surfaces(device: &Device) -> TextureView {
+    let texture = device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("sheetsplat.no_surfaces"),
+        size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: TextureFormat::Depth32Float,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    });
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
 /// How to draw.

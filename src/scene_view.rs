@@ -1,19 +1,20 @@
 //! What is shown and how, and what the next frame can keep of the last one: every setter says what it costs (§5.1).
 
-use std::sync::Arc;
-
-use wgpu::{Device, Queue};
+use wgpu::{CommandEncoder, Device, Texture};
 
 use crate::camera::Camera;
 use crate::classified_volume::{ClassifiedVolume, Touched};
+use crate::clip::Clip;
 use crate::error::RenderError;
+use crate::gpu_volume::GpuVolume;
+use crate::pick::PendingPick;
 use crate::prepared_frame::PreparedFrame;
 use crate::scene::{ImageSettings, Scene};
 use crate::shading::{Light, Shading};
 use crate::splatting::Splatting;
 use crate::stats::PendingCounts;
+use crate::surfaces::Surfaces;
 use crate::transfer_function::TransferFunction;
-use crate::volume::Volume;
 
 /// A view of a volume: camera, image, transfer function, shading and splatting settings, and the last frame's buffers. Setters
 /// take effect with the next [`Renderer::prepare`](crate::renderer::Renderer::prepare).
@@ -21,6 +22,8 @@ use crate::volume::Volume;
 pub struct SceneView {
     pub(crate) volume: ClassifiedVolume,
     pub(crate) scene: Scene,
+    pub(crate) surfaces: Option<Surfaces>,
+    pub(crate) first_hit: Option<f64>,
     pub(crate) frame: Option<PreparedFrame>,
 }
 
@@ -34,19 +37,21 @@ pub struct Prepared {
 }
 
 impl SceneView {
-    /// Uploads a volume, and the bricks of the voxels that take part under a scene's transfer function. The scene's own volume is
-    /// not looked at.
+    /// Uploads the bricks of the voxels that take part under a scene's transfer function, to the volume's device. The scene's own
+    /// volume is not looked at.
     ///
     /// # Errors
-    /// If the volume is larger than the device's textures, or has no labels and the scene has tables for some.
-    pub fn new(device: &Device, queue: &Queue, volume: Arc<Volume>, scene: &Scene) -> Result<Self, RenderError> {
-        if !scene.transfer.labels.is_empty() && volume.labels().is_none() {
+    /// If the volume has no labels and the scene has tables for some, or if the scene's clip planes are none.
+    pub fn new(device: &Device, volume: &GpuVolume, scene: &Scene) -> Result<Self, RenderError> {
+        if !scene.transfer.labels.is_empty() && volume.volume().labels().is_none() {
             let (key, found) = ("transfer.label", "tables for a volume without labels".to_owned());
             return Err(RenderError::OutOfRange { key, found, allowed: "none, or labels in the volume".to_owned() });
         }
-        let transfer = scene.transfer.resolve(&volume);
-        let volume = ClassifiedVolume::new(device, queue, volume, transfer)?;
-        Ok(Self { volume, scene: scene.clone(), frame: None })
+        scene.clip.check()?;
+        let transfer = scene.transfer.resolve(volume.volume());
+        let clipped = scene.clip.voxels(volume.volume().grid(), scene.splatting.radius);
+        let volume = ClassifiedVolume::new(device, volume, transfer, clipped);
+        Ok(Self { volume, scene: scene.clone(), surfaces: None, first_hit: None, frame: None })
     }
 
     /// The settings. Its `volume` and `transfer` are those that the view was made with.
@@ -91,9 +96,53 @@ impl SceneView {
     }
 
     /// Changes the splatting settings. Another slab width or kernel sorts bricks into buckets again, another kernel also makes
-    /// another footprint table.
+    /// another footprint table; where planes clip, voxels enter or leave with another radius.
     pub fn set_splatting(&mut self, splatting: Splatting) {
+        let Scene { clip, splatting: old, .. } = &self.scene;
+        if !clip.is_empty() && splatting.radius != old.radius {
+            self.volume.set_clip(clip.voxels(self.volume.grid(), splatting.radius));
+        }
         self.scene.splatting = splatting;
+    }
+
+    /// Changes what is cut away. Touches only voxels that enter or leave.
+    ///
+    /// # Errors
+    /// If there are too many planes, or some are none; then nothing changes.
+    pub fn set_clip(&mut self, clip: Clip) -> Result<Touched, RenderError> {
+        clip.check()?;
+        let clipped = clip.voxels(self.volume.grid(), self.scene.splatting.radius);
+        self.scene.clip = clip;
+        Ok(self.volume.set_clip(clipped))
+    }
+
+    /// Opaque surfaces of the host, `None` for none: in front of them the volume shows, behind them it does not, and voxels there are
+    /// culled as behind opaque ones (§6). Where a surface lies in a slab, it cuts the slab's sheet in proportion, as clip planes do
+    /// ([`clip`](crate::clip)). The texture must hold what it is to hold when the frame is submitted.
+    pub fn set_surfaces(&mut self, surfaces: Option<Surfaces>) {
+        self.surfaces = surfaces;
+    }
+
+    /// Asks for the depth at which every pixel's opacity reaches a value, above 0 and at most 1; `None` for none. Front to back only, and
+    /// with culling at most [`Splatting::opacity_threshold`]. See [`Self::first_hits`] and [`Self::pick`].
+    pub fn set_first_hit(&mut self, opacity: Option<f64>) {
+        self.first_hit = opacity;
+    }
+
+    /// The depths of first hits, a `R32Float` texture of the image's size (to sample or copy), once they have been asked for and a frame
+    /// was prepared; recording the frame writes them. In world units along the camera's direction, from the eye, orthographic from the
+    /// plane through [`Camera::center`]; infinite where the opacity is not reached. Within a sheet opacity is taken to grow evenly.
+    pub fn first_hits(&self) -> Option<&Texture> {
+        self.frame.as_ref()?.first_hits.as_ref().map(|hits| &hits.texture)
+    }
+
+    /// Records a copy of the first hit at a pixel, counted from the upper left: after [`Renderer::record`](crate::renderer::Renderer::record),
+    /// in the same encoder or a later one. `None` if none were asked for, or off the image. Allocates a few bytes.
+    pub fn pick(&self, device: &Device, encoder: &mut CommandEncoder, pixel: [u32; 2]) -> Option<PendingPick> {
+        let frame = self.frame.as_ref()?;
+        let hits = frame.first_hits.as_ref()?;
+        let is_inside = pixel[0] < frame.view.size[0] && pixel[1] < frame.view.size[1];
+        is_inside.then(|| PendingPick::record(device, encoder, &hits.texture, pixel, &frame.view, self.volume.volume()))
     }
 
     /// Changes the image's size, for which all buffers of that size are allocated again, or its background, which costs nothing.
@@ -113,7 +162,8 @@ impl SceneView {
         self.frame.as_ref().map(|frame| frame.drawing.rasterizer())
     }
 
-    /// Bytes of GPU memory that the view holds.
+    /// Bytes of GPU memory that the view holds, with the volume's, which other views may share: without those it is that less
+    /// [`GpuVolume::gpu_bytes`].
     pub fn gpu_bytes(&self) -> u64 {
         self.frame.as_ref().map_or(self.volume.gpu_bytes(), PreparedFrame::gpu_bytes)
     }

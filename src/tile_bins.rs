@@ -27,7 +27,8 @@ pub const SHEETS: u32 = 4;
 const MAX_BRICKS: usize = 1 << 24;
 
 /// Passes through all its loops that a thread may take in one dispatch: llvmpipe ends loops after 65535. The pass that finds a loop
-/// at its end counts, and in that pass one through every loop inside. Threads count them, and go on in the next dispatch.
+/// at its end counts, and in that pass one through every loop inside. Threads count them, and go on in the next dispatch. What is left is
+/// for what comes before and after, planes that clip a thread's four pixels first of all.
 const MAX_PASSES: u32 = 65000;
 
 /// Queues that a brick's voxels fill at most: one voxel for each of the 8 threads.

@@ -39,6 +39,8 @@ pub struct View {
     /// Grid units of a kernel to one of sheet depth: 1, or so many that a slice holds all of it. Image-aligned in perspective every
     /// voxel has its own.
     pub kernel_per_depth: f64,
+    /// [`Camera::center`], `unit`s.
+    pub center: DVec3,
     /// Size of a pixel, `unit`s; in perspective at [`Camera::center`].
     pub pix: f64,
     /// How a footprint lies on the screen; in perspective that of the central ray at [`Camera::center`].
@@ -64,6 +66,29 @@ pub struct Perspective {
     pub last: DVec3,
     /// Whether planes of constant sheet depth are parallel to the image.
     pub is_image_aligned: bool,
+}
+
+/// The rays of pixels: positions in `unit`s from the volume's centre, by a pixel's place (x right of the image's middle, y below it,
+/// pixels) and the depth along w from the eye, orthographic from the camera's centre.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rays {
+    /// Where the depth is 0: per pixel right, per pixel down, and at the image's middle.
+    pub origin: [DVec3; 3],
+    /// By one `unit` of depth: the same.
+    pub along: [DVec3; 3],
+}
+
+impl Rays {
+    /// The position on a pixel's ray at a depth.
+    pub fn at(&self, place: DVec2, depth: f64) -> DVec3 {
+        let of = |[right, down, middle]: [DVec3; 3]| right * place.x + down * place.y + middle;
+        of(self.origin) + of(self.along) * depth
+    }
+
+    /// The depth of a position.
+    pub fn depth_of(&self, position: DVec3) -> f64 {
+        self.along[2].dot(position - self.origin[2])
+    }
 }
 
 /// The bounds of some voxels in a view.
@@ -147,12 +172,31 @@ impl View {
             slabs,
             reach,
             kernel_per_depth,
+            center: camera.center / grid.unit(),
             pix,
             footprint: FootprintMap::new(&warped, pix),
             lambda,
             perspective,
             radius,
         })
+    }
+
+    /// The rays of its pixels.
+    pub fn rays(&self) -> Rays {
+        let ViewBasis { u, v, w } = self.basis;
+        match &self.perspective {
+            None => Rays { origin: [u * self.pix, -v * self.pix, self.center], along: [DVec3::ZERO, DVec3::ZERO, w] },
+            Some(Perspective { eye, .. }) => Rays {
+                origin: [DVec3::ZERO, DVec3::ZERO, eye.position],
+                along: [u * eye.pixel_per_depth, -v * eye.pixel_per_depth, w],
+            },
+        }
+    }
+
+    /// The sheet depth of positions in `unit`s from the volume's centre: the product of this row with (x, y, z, 1).
+    pub fn sheet_depth_row(&self, aspect: DVec3, center: DVec3) -> DVec4 {
+        let row = self.screen_from_voxel[2];
+        (row.truncate() / aspect).extend(row.dot(center.extend(1.0)))
     }
 
     /// The middle of the image, pixels.
@@ -241,8 +285,7 @@ impl View {
         let Some(Perspective { eye, aspect, .. }) = &self.perspective else {
             return self.footprint.half_box(support);
         };
-        let depths = self.depths_from_eye(planes);
-        let nearest = depths.start.max(eye.near);
+        let nearest = self.nearest_from_eye(planes).max(eye.near);
         // Half the image, and a pixel for every grid unit of a footprint that the low-pass rule widens.
         let half = (self.middle() + support) * eye.pixel_per_depth;
         let w = self.basis.w * aspect;
@@ -256,18 +299,18 @@ impl View {
             // The steepest ray is that of the farthest voxel that reaches the image.
             let s = (half + support * axis.length() / nearest) / spare;
             let pixels = support * (axis - s * w).length().max((axis + s * w).length()) / eye.pix(nearest);
-            // An ellipsoid is a `unit` thick at least.
-            if eye.pix(depths.end) > 1.0 { pixels.hypot(support) } else { pixels }
+            // The low-pass rule adds at most what the ellipse's axes lack of `support`: an ellipsoid is a `unit` thick at least. Together they
+            // are largest where pixels are smallest, so boxes shrink on the way back.
+            let thinnest = eye.pix(nearest).recip().min(1.0);
+            pixels.hypot(support * (1.0 - thinnest * thinnest).sqrt())
         };
         DVec2::new(half_box(self.basis.u, half.x), half_box(self.basis.v, half.y))
     }
 
-    /// Depths from the eye at which sections between two planes of sheet depth are projected.
-    fn depths_from_eye(&self, planes: Range<f64>) -> Range<f64> {
+    /// The least depth from the eye at which sections between two planes of sheet depth are projected.
+    fn nearest_from_eye(&self, planes: Range<f64>) -> f64 {
         match &self.perspective {
-            Some(Perspective { is_image_aligned: true, .. }) | None => {
-                planes.start - self.slabs.origin..planes.end - self.slabs.origin
-            }
+            Some(Perspective { is_image_aligned: true, .. }) | None => planes.start - self.slabs.origin,
             // Those of whole slices.
             Some(Perspective { last, .. }) => {
                 let slice = self.screen_from_voxel[2].truncate();
@@ -278,7 +321,7 @@ impl View {
                 let row = self.screen_from_voxel[3];
                 let (middle, half) = ((first + end) / 2.0, (end - first) / 2.0);
                 let (depth, spread) = (row.dot(middle.extend(1.0)), row.truncate().abs().dot(half));
-                depth - spread..depth + spread
+                depth - spread
             }
         }
     }

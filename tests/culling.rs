@@ -145,21 +145,31 @@ fn culled_frames_are_byte_identical() {
     }
 }
 
-/// The GPU lets through what the exact test lets through, and little more.
+/// The GPU lets through what the exact test of every section's own box lets through, and little more: the sheets of a group are tested
+/// at once, in perspective with one box for all. Where slices are slanted before an eye, that is the box of their nearest corner, far larger
+/// than most.
 #[test]
 fn culling_is_nearly_exact() {
     let headless = headless(None);
     let volume = builtin::volume("head:96").unwrap();
     let mut scene = Scene { camera: camera([0.55, 0.8, -0.12], 172.0), ..scene(192, 192) };
     let transfer = scene.transfer.resolve(&volume);
-    let exact = reference::render_culled(&volume, &transfer, &scene, Some(Test::Box)).unwrap().sections;
-    for rasterizer in RASTERIZERS {
-        scene.splatting.rasterizer = rasterizer;
-        let counts = render(&headless, &volume, &scene).stats.counts;
-        let (drawn, all) = (counts.sections_rasterized, counts.sections_total);
-        let ratio = drawn as f64 / exact as f64;
-        println!("{rasterizer:?}: {drawn} of {all} sections, exactly {exact}: ratio {ratio:.3}");
-        assert!((0.99..=1.25).contains(&ratio), "{rasterizer:?}: {ratio}");
+    let eye = Projection::Perspective { fov_y: 30.0, distance: None, near: None };
+    for projection in [scene.camera.projection, eye] {
+        for method in [Method::ImageAligned, Method::AxisAligned] {
+            (scene.camera.projection, scene.splatting.method) = (projection, method);
+            let exact = reference::render_culled(&volume, &transfer, &scene, Some(Test::Box)).unwrap().sections;
+            for rasterizer in RASTERIZERS {
+                scene.splatting.rasterizer = rasterizer;
+                let counts = render(&headless, &volume, &scene).stats.counts;
+                let (drawn, all) = (counts.sections_rasterized, counts.sections_total);
+                let ratio = drawn as f64 / exact as f64;
+                let what = format!("{projection:?}, {method:?}, {rasterizer:?}");
+                println!("{what}: {drawn} of {all} sections, exactly {exact}: ratio {ratio:.3}");
+                let has_slanted_slices = projection == eye && method == Method::AxisAligned;
+                assert!(ratio >= 0.99 && (ratio <= 1.25 || has_slanted_slices), "{what}: {ratio}");
+            }
+        }
     }
 }
 

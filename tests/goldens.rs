@@ -25,7 +25,7 @@ const OPACITY_THRESHOLD: f64 = 0.999;
 const MAX_BYTES: u64 = 64 << 10;
 
 /// Name, builtin volume, and the settings that differ from the defaults.
-const SCENES: [(&str, &str, &[&str]); 12] = [
+const SCENES: [(&str, &str, &[&str]); 13] = [
     ("head", "head:72", &["image={width=160,height=160}", "camera={direction=[0.5,0.85,-0.2],height=170.0}"]),
     (
         "head-xray",
@@ -94,6 +94,17 @@ const SCENES: [(&str, &str, &[&str]); 12] = [
         &[
             "image={width=160,height=120}",
             "camera={projection=\"perspective\",fov_y=70.0,distance=330.0,near=20.0,direction=[0.5,0.6,-0.4],center=[40,0,0]}",
+        ],
+    ),
+    (
+        "head-clipped",
+        "head:72",
+        &[
+            "image={width=128,height=128}",
+            "camera={direction=[0.5,0.75,-0.45],height=170.0}",
+            "clip={planes=[[0.3,1,0.2,8]],crop=[[-200,-200,-200],[200,200,55]]}",
+            "transfer={color=[[20,[0.9,0.6,0.5]],[110,[0.8,0.75,0.6]],[200,[1,1,0.95]]],opacity=[[30,0],[60,0.8]]}",
+            "shading={ambient=0.6,diffuse=0.4}",
         ],
     ),
     (

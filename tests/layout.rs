@@ -6,7 +6,7 @@ use std::mem::offset_of;
 use naga::proc::Layouter;
 use naga::{AddressSpace, Handle, Module, Type, TypeInner};
 use sheetsplat::gpu::layout::{
-    Band, Brick, BrickState, Culled, Frame, Gather, Gathered, Group, Indirect, Part, Splat, Tally, TileList, Visit,
+    Band, Brick, BrickState, Culled, Cut, Frame, Gather, Gathered, Group, Indirect, Part, Splat, Tally, TileList, Visit,
 };
 use sheetsplat::gpu::shaders;
 
@@ -49,9 +49,23 @@ macro_rules! layout {
     }};
 }
 
-fn shared() -> [Layout; 14] {
+fn shared() -> [Layout; 15] {
     [
         layout!(Splat { x_px, y_px, depth, from_eye, rg, ba }),
+        layout!(Cut {
+            sheet_at,
+            sheet_along,
+            surface_depth,
+            surface_w,
+            planes,
+            surface_origin,
+            no_surface,
+            first_hit,
+            unit,
+            none,
+            plane_count,
+            has_surfaces,
+        }),
         layout!(Frame {
             screen_from_voxel,
             right,
@@ -129,9 +143,9 @@ fn shared() -> [Layout; 14] {
             passes_per_visit,
             passes_per_queue,
             passes_per_brick,
+            hits,
             padding_0,
-            padding_1,
-            padding_2
+            padding_1
         }),
         layout!(Part { first_row, first_tile, end_tile }),
         layout!(Gathered { tally, words }).goes_on(),

@@ -7,9 +7,10 @@ mod common;
 use glam::DVec3;
 use sheetsplat::brick::BrickList;
 use sheetsplat::classify::classify;
+use sheetsplat::clip::ClippedVoxels;
 use sheetsplat::error::RenderError;
 use sheetsplat::gpu::brick_lists::BrickLists;
-use sheetsplat::gpu::device::{self, DeviceError, DeviceRequirements};
+use sheetsplat::gpu::device::{DeviceError, DeviceRequirements, InsufficientLimit};
 use sheetsplat::gpu::layout::{Band, Brick};
 use sheetsplat::gpu::targets::CompositingBuffer;
 use sheetsplat::gpu::volume_texture::VolumeTexture;
@@ -21,7 +22,7 @@ use sheetsplat::stats::Counts;
 use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::{Features, Limits, TextureFormat};
 
-use common::{F16, F32, gpu, scene, transfer};
+use common::{COMPOSITINGS, F16, F32, gpu, scene, transfer};
 
 fn open(limits: Limits, features: Features, sheet_format: Option<TextureFormat>) -> Result<Headless, DeviceError> {
     let requirements = Some(DeviceRequirements { features, limits });
@@ -56,7 +57,7 @@ fn webgpu_default_limits_and_no_features() {
     let full = gpu();
     assert_eq!(full.renderer().sheet_format(), TextureFormat::Rgba32Float);
     let (volume, mut scene) = head();
-    for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray] {
+    for compositing in COMPOSITINGS {
         for footprint in [FootprintForm::SummedArea, FootprintForm::Sections] {
             (scene.splatting.compositing, scene.splatting.footprint) = (compositing, footprint);
             // Which pixels are opaque depends on the last bit of a sum: f16 and f32 cull differently.
@@ -129,7 +130,7 @@ fn attachments_limit_the_sheets_of_a_group() {
 fn small_bindings_split_voxels_and_image() {
     let (_, mut scene) = head();
     let volume = builtin::volume("head:64").unwrap();
-    let voxels = classify(&volume, &scene.transfer.resolve(&volume));
+    let voxels = classify(&volume, &scene.transfer.resolve(&volume), &ClippedVoxels::default());
     let bricks = BrickList::new(volume.grid(), &voxels);
     // Without subgroups, so by quads.
     let full = open(Limits::default(), Features::FLOAT32_BLENDABLE, None).unwrap();
@@ -152,7 +153,7 @@ fn small_bindings_split_voxels_and_image() {
             assert!(band.acc.size() <= bytes && band.acc.size() == u64::from(rows) * 150 * 16);
         }
         scene.splatting.culling = false;
-        for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray] {
+        for compositing in COMPOSITINGS {
             for background in [[0.0, 0.0, 0.0, 1.0], [0.2, 0.9, 0.5, 0.5]] {
                 (scene.splatting.compositing, scene.image.background) = (compositing, background);
                 let renderings = [&small, &full].map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap());
@@ -297,9 +298,10 @@ fn a_limit_that_is_too_small_is_named() {
     ];
     for (name, needed, available, limits) in small {
         match open(limits, Features::empty(), None) {
-            Err(error @ DeviceError::Limit { limit, required, actual }) => {
-                assert_eq!((limit, required, actual), (name, needed, available));
+            Err(error @ DeviceError::Limits(_)) => {
                 let message = error.to_string();
+                let DeviceError::Limits(limits) = error else { unreachable!() };
+                assert_eq!(limits, [InsufficientLimit { limit: name, required: needed, actual: available }]);
                 for part in [name, &needed.to_string(), &available.to_string()] {
                     assert!(message.contains(part), "{message}");
                 }
@@ -307,7 +309,7 @@ fn a_limit_that_is_too_small_is_named() {
             other => panic!("{name}: {other:?}"),
         }
     }
-    device::check(gpu().device()).unwrap();
+    DeviceRequirements::check(gpu().device()).unwrap();
 }
 
 #[test]
@@ -320,4 +322,17 @@ fn limits_beyond_the_adapter_are_an_error_that_names_it() {
         }
         other => panic!("{other:?}"),
     }
+}
+
+/// Work and bytes are the same on the least device and the best.
+#[test]
+fn deterministic_options_leave_nothing_to_the_device() {
+    let requirements = Some(DeviceRequirements { features: Features::empty(), limits: Limits::default() });
+    let options = HeadlessOptions { adapter: common::lavapipe().adapter, ..HeadlessOptions::DETERMINISTIC };
+    let (volume, scene) = head();
+    let renderings = [HeadlessOptions { requirements, ..options.clone() }, options]
+        .map(|options| Headless::new(&options).unwrap().render_volume(volume.clone(), &scene).unwrap());
+    assert_eq!(renderings[0].stats.counts, renderings[1].stats.counts);
+    assert!(renderings[0].image == renderings[1].image);
+    assert!(renderings[0].image != gpu().render_volume(volume, &scene).unwrap().image, "gpu() draws by tiles, in f32");
 }

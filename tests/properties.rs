@@ -16,9 +16,7 @@ use sheetsplat::view::View;
 use sheetsplat::volume::{Volume, builtin};
 
 use common::images::largest_difference;
-use common::{F16, F32, FORMS, RASTERIZERS, Random, camera, gpu, scene, transfer};
-
-const COMPOSITINGS: [Compositing; 3] = [Compositing::Linear, Compositing::Exponential, Compositing::Xray];
+use common::{COMPOSITINGS, F16, F32, FORMS, RASTERIZERS, Random, camera, gpu, scene, transfer};
 
 fn render(gpu: &Headless, volume: &Volume, scene: &Scene) -> (Image, u64) {
     let rendering = gpu.render_volume(volume.clone(), scene).unwrap();

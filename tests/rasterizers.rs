@@ -11,11 +11,12 @@ use sheetsplat::gpu::device::DeviceRequirements;
 use sheetsplat::gpu::targets::CompositingBuffer;
 use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer};
+use sheetsplat::splatting::{FootprintBox, FootprintForm, Method, Order, Rasterizer};
 use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::{Features, Limits};
 
-use common::{RASTERIZERS, Random, gpu, lavapipe, scene, transfer};
+use common::images::{BLACK, psnr};
+use common::{COMPOSITINGS, RASTERIZERS, Random, gpu, lavapipe, scene, transfer};
 
 fn head() -> (Volume, Scene) {
     let mut scene = scene(90, 75);
@@ -108,8 +109,7 @@ fn rasterizers_agree() {
     let (volume, mut scene) = head();
     scene.splatting.culling = false;
     let mut random = Random(61);
-    let compositings = [Compositing::Linear, Compositing::Exponential, Compositing::Xray];
-    for compositing in compositings.into_iter().cycle().take(24) {
+    for compositing in COMPOSITINGS.into_iter().cycle().take(24) {
         scene.splatting.compositing = compositing;
         scene.splatting.order = random.pick(&[Order::FrontToBack, Order::BackToFront]);
         scene.splatting.method = random.pick(&[Method::ImageAligned, Method::AxisAligned]);
@@ -126,12 +126,7 @@ fn rasterizers_agree() {
             scene.splatting.rasterizer = rasterizer;
             gpu.render_volume(volume.clone(), &scene).unwrap().image
         });
-        // Over the pixels that show something.
-        let shown = quads.pixels.iter().zip(&tiles.pixels).filter(|(quads, _)| quads[..3].iter().any(|&c| c > 0.0));
-        let squares: Vec<f64> =
-            shown.flat_map(|(quads, tiles)| quads.iter().zip(tiles).map(|(a, b)| f64::from(a - b).powi(2))).collect();
-        assert!(squares.len() > 4 * 250, "{} channels show something of {scene:?}", squares.len());
-        let decibels = -10.0 * (squares.iter().sum::<f64>() / squares.len() as f64).log10();
+        let decibels = psnr(&quads.pixels, &tiles.pixels, BLACK, 250);
         println!("{decibels:.1} dB");
         assert!(decibels >= 80.0, "{decibels:.1} dB: {scene:?}");
     }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec3, UVec3};
 use sheetsplat::camera::{Camera, Projection};
+use sheetsplat::clip::Clip;
 use sheetsplat::scene::{ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use sheetsplat::shading::{Light, Shading};
 use sheetsplat::splatting::{
@@ -62,6 +63,9 @@ fn every_key() {
         width = 1
         height = 300
         background = [1, 0.5, 0, 0.25]
+        [clip]
+        planes = [[0, 0, 2, -1], [1, 0.5, 0, 3]]
+        crop = [[-1, -2, -3], [4, 5, 6.5]]
         [transfer]
         color = [[-1, [0, 0, 0]], [80.5, [0.9, 0.7, 1]]]
         opacity = [[40, 0], [60, 0.8]]
@@ -112,6 +116,10 @@ fn every_key() {
             center: DVec3::new(1.0, -2.0, 3.5),
         },
         image: ImageSettings { width: 1, height: 300, background: [1.0, 0.5, 0.0, 0.25] },
+        clip: Clip {
+            planes: vec![[0.0, 0.0, 2.0, -1.0], [1.0, 0.5, 0.0, 3.0]],
+            crop: Some([DVec3::new(-1.0, -2.0, -3.0), DVec3::new(4.0, 5.0, 6.5)]),
+        },
         transfer: TransferSettings {
             color: Some(Ramp::new(vec![(-1.0, DVec3::ZERO), (80.5, DVec3::new(0.9, 0.7, 1.0))]).unwrap()),
             opacity: Some(Ramp::new(vec![(40.0, 0.0), (60.0, 0.8)]).unwrap()),
@@ -238,6 +246,20 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
     ("transfer.opacity", "0.5", "transfer.opacity", "0.5 (float)", "an array of one or more [value, opacity]"),
     ("transfer.gradient_opacity", "[]", "transfer.gradient_opacity", "[]", "one or more [gradient magnitude, factor]"),
     ("transfer.gradient_opacity", "[[0, 2]]", "transfer.gradient_opacity[0][1]", "2", "a number in [0, 1]"),
+    ("clip.planes", "1", "clip.planes", "1 (integer)", "an array of at most 6 [nx, ny, nz, d]"),
+    ("clip.planes", "[[1, 0, 0]]", "clip.planes[0]", "[1, 0, 0]", "4 numbers, each a finite number"),
+    ("clip.planes", "[[1, 0, 0, 0], [0, 0, 0, 5]]", "clip.planes[1]", "[0, 0, 0, 5]", "a normal other than 0"),
+    ("clip.planes", "[[1, nan, 0, 0]]", "clip.planes[0][1]", "nan", "a finite number"),
+    (
+        "clip.planes",
+        "[[1,0,0,0],[1,0,0,0],[1,0,0,0],[1,0,0,0],[1,0,0,0],[1,0,0,0],[1,0,0,0]]",
+        "clip.planes",
+        "[[1, 0",
+        "at most 6",
+    ),
+    ("clip.crop", "[[0, 0, 0]]", "clip.crop", "[[0, 0, 0]]", "[[x, y, z], [x, y, z]]"),
+    ("clip.crop", "[[0, 0, 0], [1, 0, 1]]", "clip.crop", "[[0, 0, 0], [1, 0, 1]]", "each number of the first below"),
+    ("clip.box", "1", "clip.box", "an unknown key", "planes, crop"),
     ("transfer.iso_ranges", "[]", "transfer.iso_ranges", "[]", "an array of one or more [lo, hi]"),
     ("transfer.iso_ranges", "[40, 255]", "transfer.iso_ranges[0]", "40 (integer)", "2 numbers, each a finite number"),
     ("transfer.iso_ranges", "[[0, 1], [5, 4.5]]", "transfer.iso_ranges[1]", "[5, 4.5]", "[lo, hi] with lo <= hi"),
@@ -357,7 +379,7 @@ fn refused_files() {
         ("[volume]\npath = 'a'\nbuiltin = 'b'", "volume: found both path and builtin, allowed: either volume.path"),
         ("volume = 'a.nrrd'", "volume: found \"a.nrrd\" (string), allowed: a table"),
         ("[[volume]]\npath = 'a'", "volume: found [{ path = \"a\" }] (array), allowed: a table"),
-        ("[volumes]\npath = 'a'", "volumes: found an unknown key, allowed: volume, camera, image, transfer, shading"),
+        ("[volumes]\npath = 'a'", "volumes: found an unknown key, allowed: volume, camera, image, clip, transfer"),
         ("[volume]\npath = 'a'\n[a.b]", "a: found an unknown key, allowed: volume, camera"),
         ("\"a\\nb\" = 1", "a\\nb: found an unknown key, allowed: volume, camera"),
         ("[volume]\npath = ", "TOML parse error at line 2, column 8"),

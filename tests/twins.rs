@@ -16,10 +16,9 @@ use sheetsplat::splatting::{Compositing, Method, Order};
 use sheetsplat::volume::{Volume, builtin};
 
 use common::images::{largest_difference, rms};
-use common::{Random, camera, scene, transfer};
+use common::{COMPOSITINGS, Random, camera, scene, transfer};
 
 const METHODS: [Method; 3] = [Method::ImageAligned, Method::AxisAligned, Method::CompositeEverySample];
-const COMPOSITINGS: [Compositing; 3] = [Compositing::Linear, Compositing::Exponential, Compositing::Xray];
 
 fn render(volume: &Volume, scene: &Scene) -> Image {
     reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap()

@@ -9,12 +9,12 @@ use sheetsplat::headless::{Headless, Rendering};
 use sheetsplat::reference;
 use sheetsplat::scene::Scene;
 use sheetsplat::shading::Light;
-use sheetsplat::splatting::{Compositing, Method, Order, Rasterizer};
+use sheetsplat::splatting::{Method, Order, Rasterizer};
 use sheetsplat::stats::Counts;
 use sheetsplat::volume::Volume;
 
 use common::images::{BLACK, largest_difference, psnr};
-use common::{F32, Random, SPACINGS, gpu, random_eye, random_volume, scene, transfer};
+use common::{COMPOSITINGS, F32, RASTERIZERS, Random, SPACINGS, gpu, random_eye, random_volume, scene, transfer};
 
 /// Any view in perspective, and any along the slices, of which some are orthographic.
 fn random_case(random: &mut Random) -> (Volume, Scene) {
@@ -32,7 +32,7 @@ fn random_case(random: &mut Random) -> (Volume, Scene) {
     scene.transfer = transfer(&[(0.0, [0.2, 0.5, 1.0]), (200.0, [1.0, 0.9, 0.8])], &opacity);
     let fixed = Light::Direction(random.direction());
     scene.shading.light = random.pick(&[Light::Headlight, fixed]);
-    scene.splatting.compositing = random.pick(&[Compositing::Linear, Compositing::Exponential, Compositing::Xray]);
+    scene.splatting.compositing = random.pick(&COMPOSITINGS);
     scene.splatting.slab_width = random.pick(&[0.5, 1.0, 2.0, 3.0]);
     scene.splatting.radius = random.pick(&[1.4, 2.0, 2.7]);
     // The twin culls nothing.
@@ -50,7 +50,6 @@ fn render(gpu: &Headless, volume: &Volume, scene: &Scene, rasterizer: Rasterizer
 fn any_view_is_that_of_the_twin() {
     let gpu = gpu();
     let mut random = Random(1998);
-    let rasterizers = [Rasterizer::Quads, Rasterizer::Tiles];
     // Decibels by rasterizer and method.
     let mut worst = [[f64::INFINITY; 2]; 2];
     let mut seen = 0;
@@ -61,7 +60,7 @@ fn any_view_is_that_of_the_twin() {
         let all = |counts: &Counts| [counts.voxels_in_range, counts.sections_total, counts.sheets, counts.tiles_total];
         let counts = reference::count(&volume, &transfer, &scene).unwrap();
         seen += usize::from(expected.pixels.iter().filter(|pixel| **pixel != BLACK).count() > 100);
-        for (at, rasterizer) in rasterizers.into_iter().enumerate() {
+        for (at, rasterizer) in RASTERIZERS.into_iter().enumerate() {
             let [forwards, backwards] =
                 [Order::FrontToBack, Order::BackToFront].map(|order| render(&gpu, &volume, &scene, rasterizer, order));
             for rendering in [&forwards, &backwards] {
@@ -77,6 +76,6 @@ fn any_view_is_that_of_the_twin() {
             assert!(difference <= allowed, "case {case}, {rasterizer:?}: {difference} > {allowed} with {scene:?}");
         }
     }
-    println!("image-aligned in perspective and axis-aligned, at least: {worst:.1?} dB by {rasterizers:?}");
+    println!("image-aligned in perspective and axis-aligned, at least: {worst:.1?} dB by {RASTERIZERS:?}");
     assert!(seen > 15, "only {seen} views show much");
 }

@@ -23,9 +23,9 @@ struct Gather {
     passes_per_visit: u32,
     passes_per_queue: u32,
     passes_per_brick: u32,
+    hits: u32,
     padding_0: u32,
     padding_1: u32,
-    padding_2: u32,
 }
 
 struct Part {

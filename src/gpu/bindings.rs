@@ -36,7 +36,13 @@ pub fn texture(stages: ShaderStages, view_dimension: TextureViewDimension) -> Sl
     (stages, BindingType::Texture { sample_type, view_dimension, multisampled: false })
 }
 
-/// The same of whole numbers.
+/// A depth texture.
+pub fn depth_texture(stages: ShaderStages) -> Slot {
+    let view_dimension = TextureViewDimension::D2;
+    (stages, BindingType::Texture { sample_type: TextureSampleType::Depth, view_dimension, multisampled: false })
+}
+
+/// A texture of whole numbers.
 pub fn texture_of_integers(stages: ShaderStages, view_dimension: TextureViewDimension) -> Slot {
     let sample_type = TextureSampleType::Uint;
     (stages, BindingType::Texture { sample_type, view_dimension, multisampled: false })

@@ -145,9 +145,13 @@ impl BrickBuffer {
     }
 }
 
+/// What lists may take of a binding where the device allows more: WebGPU's default. Where a list ends decides in which order a
+/// sheet's footprints are added, and so their sum's last bit, which is the same on all devices that have the default.
+const MOST_BYTES: u64 = 128 << 20;
+
 /// The most bricks of a list: all records of its bricks, and of their places for voxels, must fit one binding.
 fn max_list_length(limits: &wgpu::Limits) -> usize {
-    let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).min(MOST_BYTES);
     let records =
         [size_of::<Brick>(), size_of::<Visit>(), size_of::<BrickState>(), size_of::<Splat>() * BRICK_VOXELS as usize];
     let record = records.into_iter().max().unwrap_or(1);

@@ -1,10 +1,10 @@
 //! What the renderer needs of a device, and what it makes of one that has more.
 
-use wgpu::{
-    Adapter, Backends, Device, DeviceType, ErrorFilter, Features, InstanceDescriptor, InstanceFlags, Limits,
-    TextureFormat,
-};
+use std::fmt;
 
+use wgpu::{Adapter, Device, DeviceDescriptor, Features, Limits, TextureFormat};
+
+use super::layout::FOLD;
 use super::volume_texture;
 
 /// Why no device could be used.
@@ -43,24 +43,49 @@ pub enum DeviceError {
         /// What the device has.
         actual: Features,
     },
-    /// A limit is below what every frame needs.
-    #[error("device limit {limit}: required {required}, actual: {actual}")]
-    Limit {
-        /// wgpu's name of the limit.
-        limit: &'static str,
-        /// What is needed.
-        required: u64,
-        /// What the device has.
-        actual: u64,
+    /// Limits that are not enough for any frame.
+    #[error("device limits: {}", list(.0))]
+    Limits(Vec<InsufficientLimit>),
+    /// An option of the renderer that this device, or any, cannot fulfil.
+    #[error("{option}: found {found}, allowed: {allowed}")]
+    Unsupported {
+        /// The field of [`RendererOptions`](crate::renderer_options::RendererOptions).
+        option: &'static str,
+        /// What it is.
+        found: String,
+        /// What would do on this device.
+        allowed: String,
     },
+}
+
+/// A limit of a device that is not enough.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InsufficientLimit {
+    /// wgpu's name of the limit.
+    pub limit: &'static str,
+    /// What is needed: at least that much, of `min_…` limits at most.
+    pub required: u64,
+    /// What the device has.
+    pub actual: u64,
+}
+
+impl fmt::Display for InsufficientLimit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { limit, required, actual } = self;
+        write!(f, "{limit}: required {required}, actual: {actual}")
+    }
+}
+
+fn list(limits: &[InsufficientLimit]) -> String {
+    limits.iter().map(InsufficientLimit::to_string).collect::<Vec<_>>().join("; ")
 }
 
 /// Features that the renderer uses where a device has them. None is required.
 pub const WANTED_FEATURES: Features =
     Features::FLOAT32_BLENDABLE.union(Features::TIMESTAMP_QUERY).union(Features::SUBGROUP);
 
-/// Features and limits for a device that renders as well as the adapter can: to be merged into a device descriptor.
-#[derive(Clone, Debug)]
+/// Features and limits of a device.
+#[derive(Clone, Debug, PartialEq)]
 pub struct DeviceRequirements {
     /// Features to request.
     pub features: Features,
@@ -69,8 +94,31 @@ pub struct DeviceRequirements {
 }
 
 impl DeviceRequirements {
-    /// What to request from this adapter: WebGPU's default limits, raised where the adapter allows larger images and
-    /// volumes.
+    /// What no frame can do without: less than WebGPU's defaults. What an image or a volume needs beyond it, they say when they are
+    /// prepared.
+    pub const LEAST: Self = Self {
+        features: Features::empty(),
+        limits: Limits {
+            max_texture_dimension_2d: volume_texture::SIDE,
+            max_texture_array_layers: 128,
+            max_storage_buffers_per_shader_stage: 8,
+            max_uniform_buffers_per_shader_stage: 3,
+            max_dynamic_uniform_buffers_per_pipeline_layout: 1,
+            max_color_attachments: 1,
+            max_color_attachment_bytes_per_sample: 16,
+            max_compute_workgroup_storage_size: 2048,
+            max_compute_invocations_per_workgroup: 256,
+            max_compute_workgroup_size_x: 256,
+            max_compute_workgroup_size_y: 8,
+            max_compute_workgroup_size_z: 1,
+            max_compute_workgroups_per_dimension: FOLD,
+            // Everything else is no more than WebGL 2 has, without compute shaders and storage buffers.
+            ..Limits::downlevel_webgl2_defaults()
+        },
+    };
+
+    /// What to request from this adapter, to render as well as it can: WebGPU's default limits, raised where the adapter allows
+    /// larger images and volumes, and lowered where it has less. Whether that is enough, [`Self::check`] says.
     pub fn for_adapter(adapter: &Adapter) -> Self {
         let available = adapter.limits();
         let limits = Limits {
@@ -79,104 +127,67 @@ impl DeviceRequirements {
             max_buffer_size: available.max_buffer_size,
             max_storage_buffer_binding_size: available.max_storage_buffer_binding_size,
             // Four sheets of RGBA32F.
-            max_color_attachment_bytes_per_sample: available.max_color_attachment_bytes_per_sample.min(64),
+            max_color_attachment_bytes_per_sample: 64,
             ..Limits::default()
         };
-        Self { features: adapter.features() & WANTED_FEATURES, limits }
+        Self { features: adapter.features() & WANTED_FEATURES, limits: limits.or_worse_values_from(&available) }
+    }
+
+    /// Adds these features to a host's descriptor, and takes the better of each limit.
+    pub fn merge_into(&self, descriptor: &mut DeviceDescriptor<'_>) {
+        descriptor.required_features |= self.features;
+        descriptor.required_limits = descriptor.required_limits.clone().or_better_values_from(&self.limits);
+    }
+
+    /// Checks that a device can run every pass: that it has [`Self::LEAST`].
+    ///
+    /// # Errors
+    /// [`DeviceError::Limits`] with every limit that is not enough, what is required, and what the device has.
+    pub fn check(device: &Device) -> Result<(), DeviceError> {
+        let mut insufficient = Vec::new();
+        Self::LEAST.limits.check_limits_with_fail_fn(&device.limits(), false, |limit, required, actual| {
+            insufficient.push(InsufficientLimit { limit, required, actual });
+        });
+        if insufficient.is_empty() { Ok(()) } else { Err(DeviceError::Limits(insufficient)) }
     }
 }
 
-/// Checks that a device can run every pass.
+/// How many sheets one quad draws into: `wanted` if given, else as many colour attachments as the device allows, up to 4.
 ///
 /// # Errors
-/// If a limit is too small; the error says required and actual.
-pub fn check(device: &Device) -> Result<(), DeviceError> {
-    let limits = device.limits();
-    let needs: [(&'static str, u64, u64); 9] = [
-        ("max_texture_dimension_2d", volume_texture::SIDE.into(), limits.max_texture_dimension_2d.into()),
-        ("max_texture_array_layers", 128, limits.max_texture_array_layers.into()),
-        ("max_storage_buffers_per_shader_stage", 8, limits.max_storage_buffers_per_shader_stage.into()),
-        ("max_uniform_buffers_per_shader_stage", 2, limits.max_uniform_buffers_per_shader_stage.into()),
-        (
-            "max_dynamic_uniform_buffers_per_pipeline_layout",
-            1,
-            limits.max_dynamic_uniform_buffers_per_pipeline_layout.into(),
-        ),
-        ("max_compute_invocations_per_workgroup", 256, limits.max_compute_invocations_per_workgroup.into()),
-        ("max_compute_workgroup_size_x", 256, limits.max_compute_workgroup_size_x.into()),
-        ("max_compute_workgroups_per_dimension", 32768, limits.max_compute_workgroups_per_dimension.into()),
-        ("max_color_attachment_bytes_per_sample", 16, limits.max_color_attachment_bytes_per_sample.into()),
-    ];
-    match needs.into_iter().find(|(_, required, actual)| actual < required) {
-        Some((limit, required, actual)) => Err(DeviceError::Limit { limit, required, actual }),
-        None => Ok(()),
-    }
-}
-
-/// How many sheets one quad can draw into: as many colour attachments as the device allows, up to 4.
-pub fn sheets_per_group(device: &Device, format: TextureFormat) -> u32 {
+/// If `wanted` is not 1, 2 or 4, or more than the device allows.
+pub fn sheets_per_group(device: &Device, format: TextureFormat, wanted: Option<u32>) -> Result<u32, DeviceError> {
     let limits = device.limits();
     let bytes = format.target_pixel_byte_cost().unwrap_or(16);
-    match limits.max_color_attachments.min(limits.max_color_attachment_bytes_per_sample / bytes) {
-        0 | 1 => 1,
-        2 | 3 => 2,
-        _ => 4,
+    let attachments = limits.max_color_attachments.min(limits.max_color_attachment_bytes_per_sample / bytes);
+    let possible = [1, 2, 4].into_iter().filter(|&sheets| sheets == 1 || sheets <= attachments);
+    let most = possible.clone().max().unwrap_or(1);
+    let sheets = wanted.unwrap_or(most);
+    if possible.clone().any(|possible| possible == sheets) {
+        return Ok(sheets);
     }
+    let possible: Vec<String> = possible.map(|sheets| sheets.to_string()).collect();
+    let allowed = format!("{} of {format:?} on this device", possible.join(" or "));
+    Err(DeviceError::Unsupported { option: "sheets_per_group", found: sheets.to_string(), allowed })
 }
 
 /// The format of sheet buffers: `wanted` if given, else `Rgba32Float` where that can be blended, else `Rgba16Float`.
 ///
 /// # Errors
-/// If `wanted` is `Rgba32Float` and the device cannot blend it.
+/// If `wanted` is `Rgba32Float` and the device cannot blend it, or is none of the two.
 pub fn sheet_format(device: &Device, wanted: Option<TextureFormat>) -> Result<TextureFormat, DeviceError> {
     let blends_f32 = device.features().contains(Features::FLOAT32_BLENDABLE);
     match wanted {
         Some(TextureFormat::Rgba32Float) if !blends_f32 => {
             Err(DeviceError::MissingFeatures { required: Features::FLOAT32_BLENDABLE, actual: device.features() })
         }
-        Some(format) => Ok(format),
+        Some(format @ (TextureFormat::Rgba32Float | TextureFormat::Rgba16Float)) => Ok(format),
+        Some(format) => Err(DeviceError::Unsupported {
+            option: "sheet_format",
+            found: format!("{format:?}"),
+            allowed: "Rgba32Float or Rgba16Float".to_owned(),
+        }),
         None if blends_f32 => Ok(TextureFormat::Rgba32Float),
         None => Ok(TextureFormat::Rgba16Float),
     }
-}
-
-/// The instance of a program of its own: the drivers that can run the renderer, and what the environment says.
-pub fn instance_descriptor() -> InstanceDescriptor {
-    let mut descriptor = InstanceDescriptor::new_without_display_handle_from_env();
-    // Our own arguments need no validating dispatch before every indirect call.
-    descriptor.flags -= InstanceFlags::VALIDATION_INDIRECT_CALL;
-    descriptor.backends &= Backends::PRIMARY;
-    descriptor
-}
-
-/// The adapter with `name` in its name, in any case, or the most capable one: a GPU before a software driver.
-///
-/// # Errors
-/// If there is none.
-pub fn choose_adapter(adapters: &[Adapter], name: Option<&str>) -> Result<Adapter, DeviceError> {
-    let names: Vec<String> = adapters.iter().map(|adapter| adapter.get_info().name).collect();
-    let wanted = |adapter: &&Adapter| {
-        name.is_none_or(|name| adapter.get_info().name.to_lowercase().contains(&name.to_lowercase()))
-    };
-    let rank = |adapter: &&Adapter| match adapter.get_info().device_type {
-        DeviceType::DiscreteGpu => 0,
-        DeviceType::IntegratedGpu => 1,
-        DeviceType::VirtualGpu => 2,
-        DeviceType::Cpu => 3,
-        DeviceType::Other => 4,
-    };
-    adapters.iter().filter(wanted).min_by_key(rank).cloned().ok_or_else(|| DeviceError::NoAdapter {
-        required: name.map_or("any Vulkan, Metal or DirectX 12 adapter".to_owned(), |name| format!("\"{name}\"")),
-        actual: if names.is_empty() { "none".to_owned() } else { names.join(", ") },
-    })
-}
-
-/// The result of `work`, and the first error that the device reported meanwhile, if any.
-pub fn scoped<T>(device: &Device, work: impl FnOnce() -> T) -> (T, Option<String>) {
-    let scopes = [ErrorFilter::Validation, ErrorFilter::OutOfMemory, ErrorFilter::Internal]
-        .map(|filter| device.push_error_scope(filter));
-    let result = work();
-    // Scopes are a stack: the last pushed is the first popped. All must be popped even after an error.
-    let errors: Vec<_> = scopes.into_iter().rev().filter_map(|scope| pollster::block_on(scope.pop())).collect();
-    (result, errors.first().map(ToString::to_string))
 }

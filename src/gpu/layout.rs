@@ -118,6 +118,37 @@ pub struct Group {
     pub padding: u32,
 }
 
+/// What clip planes and a host's surfaces leave of rays. A pixel's ray is found by its place (x right of the image's middle, y below it,
+/// pixels, and 1), and on it a point by its depth along w, `unit`s from the eye, orthographic from the camera's centre.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Cut {
+    /// The product with the place is the sheet depth at depth 0.
+    pub sheet_at: [f32; 4],
+    /// The product with the place is the sheet depth per depth.
+    pub sheet_along: [f32; 4],
+    /// The product with (x, y, the host's depth, 1), over that of [`Self::surface_w`], is the depth of a surface.
+    pub surface_depth: [f32; 4],
+    /// See there.
+    pub surface_w: [f32; 4],
+    /// Two for each plane, whose products with the place are the distance from it at depth 0 and per depth.
+    pub planes: [[f32; 4]; 24],
+    /// The texel of the host's depth that is the image's first.
+    pub surface_origin: [u32; 2],
+    /// The host's depth where there is no surface.
+    pub no_surface: f32,
+    /// The opacity whose depth is asked for.
+    pub first_hit: f32,
+    /// World units of a `unit`.
+    pub unit: f32,
+    /// The depth where that opacity is not reached.
+    pub none: f32,
+    /// Number of planes.
+    pub plane_count: u32,
+    /// 1 with surfaces, 0 without.
+    pub has_surfaces: u32,
+}
+
 /// 4×4×4 places for voxels, x fastest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
@@ -280,12 +311,12 @@ pub struct Gather {
     pub passes_per_queue: u32,
     /// Those of a brick at most, visited and in queues.
     pub passes_per_brick: u32,
+    /// Where in [`Gathered`]'s words first hits are written, for every pixel.
+    pub hits: u32,
     /// Unused.
     pub padding_0: u32,
     /// Unused.
     pub padding_1: u32,
-    /// Unused.
-    pub padding_2: u32,
 }
 
 /// The tiles that a dispatch draws.

@@ -1,11 +1,10 @@
-//! What the passes share: the device's capabilities, memory layouts, shader sources, targets, read-back.
+//! What the passes share: the device's capabilities, memory layouts, shader sources, targets.
 
 pub mod bindings;
 pub mod brick_lists;
 pub mod device;
 pub mod footprint_texture;
 pub mod layout;
-pub mod readback;
 pub mod shaders;
 pub mod targets;
 pub mod timer;

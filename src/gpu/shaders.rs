@@ -61,7 +61,7 @@ pub const SAMPLE: Shader = shader!(
     "compositing"
 );
 /// Composites the sheet buffers.
-pub const COMPOSITE: Shader = shader!("composite", "frame", "brick", "band", "tile_list", "compositing");
+pub const COMPOSITE: Shader = shader!("composite", "frame", "brick", "band", "tile_list", "compositing", "cut");
 /// Computes the occlusion buffer.
 pub const OCCLUDE: Shader = shader!("occlude", "frame", "brick", "tile_list");
 /// Draws whole tiles from front to back.
@@ -80,13 +80,16 @@ pub const GATHER: Shader = shader!(
     "local_ray",
     "shading",
     "ramps",
-    "compositing"
+    "compositing",
+    "cut"
 );
+/// Writes the depths of first hits.
+pub const FIRST_HIT: Shader = shader!("first_hit", "frame", "cut");
 /// Lays the result over the background.
 pub const RESOLVE: Shader = shader!("resolve", "frame", "band");
 
 /// Every shader, in the order of the data flow.
-pub const ALL: [Shader; 13] = [
+pub const ALL: [Shader; 14] = [
     CULL_BRICKS,
     CULL_VOXELS,
     COMPACT,
@@ -99,6 +102,7 @@ pub const ALL: [Shader; 13] = [
     COMPOSITE,
     OCCLUDE,
     GATHER,
+    FIRST_HIT,
     RESOLVE,
 ];
 

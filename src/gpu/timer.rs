@@ -18,7 +18,9 @@ pub const PASS_BYTES: u64 = 2 * wgpu::QUERY_SIZE as u64;
 pub struct Timer {
     sets: Vec<QuerySet>,
     results: Buffer,
+    /// The stage of every pass so far.
     stages: Vec<&'static str>,
+    passes: usize,
 }
 
 impl Timer {
@@ -41,7 +43,18 @@ impl Timer {
                 mapped_at_creation: false,
             }),
             stages: Vec::new(),
+            passes,
         })
+    }
+
+    /// Starts a frame anew.
+    pub fn restart(&mut self) {
+        self.stages.clear();
+    }
+
+    /// Whether there is room for another pass.
+    pub fn has_room(&self) -> bool {
+        self.stages.len() < self.passes
     }
 
     fn next(&mut self, stage: &'static str) -> (&QuerySet, u32) {
@@ -70,9 +83,9 @@ impl Timer {
         }
     }
 
-    /// Ends a frame: copies its timestamps to `staging` from `offset` on, and starts anew. The stages, pass by pass.
-    pub fn finish(&mut self, encoder: &mut CommandEncoder, staging: &Buffer, offset: u64) -> Vec<&'static str> {
-        let stages = std::mem::take(&mut self.stages);
+    /// Copies the frame's timestamps so far to `staging` from `offset` on. The stages, pass by pass.
+    pub fn copy(&self, encoder: &mut CommandEncoder, staging: &Buffer, offset: u64) -> Vec<&'static str> {
+        let stages = self.stages.clone();
         for (at, (set, passes)) in self.sets.iter().zip(stages.chunks(PASSES_PER_SET)).enumerate() {
             let bytes = (at * PASSES_PER_SET) as u64 * PASS_BYTES;
             encoder.resolve_query_set(set, 0..2 * passes.len() as u32, &self.results, bytes);

@@ -4,16 +4,18 @@ use std::ops::{Add, Mul, Range};
 
 use glam::{DMat2, DVec2, DVec3, DVec4};
 
-use super::layout::{Frame, Gather, Group};
+use super::layout::{Cut, Frame, Gather, Gathered, Group};
+use crate::clip::{Clip, HalfSpace};
 use crate::grid_warp::{self, FootprintMap};
 use crate::kernel::Kernel;
 use crate::plan::{FramePlan, tile_grid};
 use crate::scene::Scene;
 use crate::shading::{Light, MIN_GRADIENT, Shading};
 use crate::splatting::{Compositing, Order, Splatting};
+use crate::surfaces::SurfaceDepths;
 use crate::tile_bins::{self, TileBins};
 use crate::transfer_function::{Ramp, Tables, TransferFunction};
-use crate::view::View;
+use crate::view::{Rays, View};
 use crate::volume::Grid;
 
 /// What ambient, diffuse, specular and shininess are clamped to: beyond it no image changes any more, and `f32` ends.
@@ -82,6 +84,7 @@ pub fn gather(view: &View, kernel: &Kernel, splatting: &Splatting, bins: &TileBi
     let (shear, half_width) = view.footprint.parallelogram(kernel.support());
     let composited = bins.groups + 2 * bricks * groups_per_kernel(view);
     let [columns, rows] = tile_grid(view.size);
+    let reached = composited + (columns * rows * bins.groups).div_ceil(32);
     Gather {
         along: bytemuck::cast(kernel.cumulative_polynomial::<16>(1.0).map(|x| x as f32)),
         chord: bytemuck::cast(kernel.cumulative_polynomial::<8>(CHORD_SPAN).map(|x| x as f32)),
@@ -100,16 +103,57 @@ pub fn gather(view: &View, kernel: &Kernel, splatting: &Splatting, bins: &TileBi
         whole_below: economies.whole_below as f32,
         beta: if hides(splatting) && economies.beta < 1.0 { economies.beta as f32 } else { f32::MAX },
         peak: (whole / economies.resolution).min(f32::MAX.into()) as f32,
-        reached: composited + (columns * rows * bins.groups).div_ceil(32),
+        reached,
         most_passes: bins.passes.most,
         passes_per_group: bins.passes.per_group,
         passes_per_fetch: bins.passes.per_fetch,
         passes_per_visit: bins.passes.per_visit,
         passes_per_queue: bins.passes.per_queue,
         passes_per_brick: bins.passes.per_brick(),
+        // Its byte can be a binding's first.
+        hits: (reached + bins.tiles * tile_bins::UNITS + WORDS_BEFORE).next_multiple_of(64) - WORDS_BEFORE,
         padding_0: 0,
         padding_1: 0,
-        padding_2: 0,
+    }
+}
+
+/// Words of [`Gathered`] that are not counted.
+const WORDS_BEFORE: u32 = (std::mem::offset_of!(Gathered, words) / 4) as u32;
+
+/// What clip planes and a host's surfaces leave of rays.
+pub fn cut(
+    view: &View,
+    grid: &Grid,
+    clip: &Clip,
+    surfaces: Option<(SurfaceDepths, [u32; 2])>,
+    first_hit: Option<f64>,
+) -> Cut {
+    let Rays { origin, along } = view.rays();
+    let row = |normal: DVec3, [right, down, middle]: [DVec3; 3], offset: f64| {
+        let middle = normal.dot(middle) + offset;
+        DVec4::new(normal.dot(right), normal.dot(down), middle, 0.0).as_vec4().to_array()
+    };
+    let half_spaces = clip.half_spaces(grid);
+    let mut planes = [[0.0; 4]; 24];
+    for (rows, &HalfSpace { normal, offset }) in planes.chunks_exact_mut(2).zip(&half_spaces) {
+        rows.copy_from_slice(&[row(normal, origin, offset), row(normal, along, 0.0)]);
+    }
+    let sheet_depth = view.sheet_depth_row(grid.aspect(), grid.center());
+    let (normal, offset) = (sheet_depth.truncate(), sheet_depth.w);
+    let in_f32 = |row: DVec4| row.as_vec4().to_array();
+    Cut {
+        sheet_at: row(normal, origin, offset),
+        sheet_along: row(normal, along, 0.0),
+        surface_depth: surfaces.map_or([0.0; 4], |(depths, _)| in_f32(depths.depth)),
+        surface_w: surfaces.map_or([0.0; 4], |(depths, _)| in_f32(depths.w)),
+        planes,
+        surface_origin: surfaces.map_or([0; 2], |(_, origin)| origin),
+        no_surface: surfaces.map_or(1.0, |(depths, _)| depths.none) as f32,
+        first_hit: first_hit.unwrap_or(f64::INFINITY) as f32,
+        unit: grid.unit() as f32,
+        none: f32::INFINITY,
+        plane_count: half_spaces.len() as u32,
+        has_surfaces: surfaces.is_some().into(),
     }
 }
 

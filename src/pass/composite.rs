@@ -1,44 +1,87 @@
 //! Composites a group of sheet buffers into the compositing buffer (eq. 2) and notes opaque pixels.
 
+use std::sync::OnceLock;
+
 use wgpu::{BindGroup, Buffer, ComputePass, Device, ShaderStages, TextureView, TextureViewDimension};
 
-use crate::gpu::bindings::{ComputeStage, storage, texture, uniform};
-use crate::gpu::layout::{Band, Frame, TileList};
+use crate::gpu::bindings::{ComputeStage, at_offset, depth_texture, storage, texture, uniform};
+use crate::gpu::layout::{Band, Cut, Frame, Group, TileList};
 use crate::gpu::shaders;
 use crate::gpu::targets::{BandBuffer, Targets};
 
-/// The stage's pipeline.
-#[derive(Debug)]
+/// The stage's pipelines; each is compiled when it is first asked for.
+#[derive(Debug, Default)]
 pub struct Composite {
-    stage: ComputeStage,
+    stages: [OnceLock<ComputeStage>; 4],
+}
+
+/// What of pixels' rays a stage that composites looks at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RayMode {
+    /// Whether clip planes or a host's surfaces cut them.
+    pub cut: bool,
+    /// Whether first hits are noted.
+    pub first_hit: bool,
+}
+
+/// What cuts rays.
+#[derive(Clone, Copy, Debug)]
+pub struct CutBuffers<'a> {
+    /// One [`Cut`].
+    pub uniform: &'a Buffer,
+    /// A host's depth, or any depth texture.
+    pub surfaces: &'a TextureView,
+}
+
+/// Buffers of the stage.
+#[derive(Clone, Copy, Debug)]
+pub struct CompositeBuffers<'a> {
+    /// One [`Frame`].
+    pub frame: &'a Buffer,
+    /// One [`Group`] at every dynamic offset.
+    pub groups: &'a Buffer,
+    /// The sheet buffers.
+    pub sheets: &'a TextureView,
+    /// The list of tiles to composite.
+    pub tiles: &'a Buffer,
+    /// Opacity buffers.
+    pub targets: &'a Targets,
+    /// What cuts rays.
+    pub cut: CutBuffers<'a>,
+    /// First hits, `[u32]`.
+    pub hits: &'a Buffer,
 }
 
 impl Composite {
-    /// Compiles the stage.
-    pub fn new(device: &Device) -> Self {
-        let stage = ShaderStages::COMPUTE;
-        let slots = [
-            uniform::<Frame>(stage, false),
-            uniform::<Band>(stage, false),
-            texture(stage, TextureViewDimension::D2Array),
-            storage::<[f32; 4]>(stage, false),
-            storage::<TileList>(stage, true),
-            storage::<u32>(stage, false),
-            storage::<u32>(stage, false),
-        ];
-        Self { stage: ComputeStage::new(device, shaders::COMPOSITE, "main", &slots, &[]) }
+    fn stage(&self, mode: RayMode) -> &OnceLock<ComputeStage> {
+        &self.stages[2 * usize::from(mode.cut) + usize::from(mode.first_hit)]
     }
 
-    /// Binds a band of the compositing buffer; `tiles` is the list of tiles to composite.
-    pub fn bind(
-        &self,
-        device: &Device,
-        frame: &Buffer,
-        band: &BandBuffer,
-        sheets: &TextureView,
-        tiles: &Buffer,
-        targets: &Targets,
-    ) -> BindGroup {
+    fn compiled(&self, device: &Device, mode: RayMode) -> &ComputeStage {
+        self.stage(mode).get_or_init(|| {
+            let stage = ShaderStages::COMPUTE;
+            let slots = [
+                uniform::<Frame>(stage, false),
+                uniform::<Band>(stage, false),
+                texture(stage, TextureViewDimension::D2Array),
+                storage::<[f32; 4]>(stage, false),
+                storage::<TileList>(stage, true),
+                storage::<u32>(stage, false),
+                storage::<u32>(stage, false),
+                uniform::<Group>(stage, true),
+                uniform::<Cut>(stage, false),
+                depth_texture(stage),
+                storage::<u32>(stage, false),
+            ];
+            let constants = [("CUT", mode.cut), ("FIRST_HIT", mode.first_hit)];
+            let constants = constants.map(|(name, is_on)| (name, f64::from(u8::from(is_on))));
+            ComputeStage::new(device, shaders::COMPOSITE, "main", &slots, &constants)
+        })
+    }
+
+    /// Binds a band of the compositing buffer.
+    pub fn bind(&self, device: &Device, mode: RayMode, buffers: CompositeBuffers<'_>, band: &BandBuffer) -> BindGroup {
+        let CompositeBuffers { frame, groups, sheets, tiles, targets, cut, hits } = buffers;
         let resources = [
             frame.as_entire_binding(),
             band.uniform.as_entire_binding(),
@@ -47,14 +90,19 @@ impl Composite {
             tiles.as_entire_binding(),
             targets.opaque.as_entire_binding(),
             targets.opaque_tiles.as_entire_binding(),
+            at_offset::<Group>(groups),
+            cut.uniform.as_entire_binding(),
+            wgpu::BindingResource::TextureView(cut.surfaces),
+            hits.as_entire_binding(),
         ];
-        self.stage.bind(device, &resources)
+        self.compiled(device, mode).bind(device, &resources)
     }
 
-    /// Composites the listed tiles of every band.
-    pub fn record(&self, pass: &mut ComputePass<'_>, bands: &[BindGroup], tiles: &Buffer) {
+    /// Composites the listed tiles of every band, of the group at `offset`.
+    pub fn record(&self, pass: &mut ComputePass<'_>, mode: RayMode, bands: &[BindGroup], offset: u32, tiles: &Buffer) {
+        let Some(stage) = self.stage(mode).get() else { return };
         for band in bands {
-            self.stage.dispatch_indirect(pass, band, &[], tiles);
+            stage.dispatch_indirect(pass, band, &[offset], tiles);
         }
     }
 }

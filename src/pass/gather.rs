@@ -7,17 +7,18 @@ use wgpu::{
     TextureViewDimension,
 };
 
-use crate::gpu::bindings::{ComputeStage, at_offset, storage, texture, texture_of_integers, uniform};
-use crate::gpu::layout::{Brick, Frame, Gather as GatherUniform, Gathered, Indirect, Part};
+use super::composite::{CutBuffers, RayMode};
+use crate::gpu::bindings::{ComputeStage, at_offset, depth_texture, storage, texture, texture_of_integers, uniform};
+use crate::gpu::layout::{Brick, Cut, Frame, Gather as GatherUniform, Gathered, Indirect, Part};
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
 use crate::splatting::{Compositing, Economies, FootprintBox, Order, Splatting};
 
 /// The stage's pipelines; each is compiled when it is first asked for.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Gather {
     /// By compositing, and by the other parts of a mode, one bit each.
-    stages: [[OnceLock<ComputeStage>; 32]; 3],
+    stages: Vec<OnceLock<ComputeStage>>,
     no_labels: OnceLock<VolumeTexture>,
 }
 
@@ -30,16 +31,17 @@ pub struct GatherMode {
     perspective: bool,
     economies: bool,
     labels: bool,
+    rays: RayMode,
 }
 
 impl GatherMode {
     /// The mode that splatting settings ask for, with or without an eye, and with or without `labels` that have ramps of their own.
-    pub fn of(splatting: &Splatting, perspective: bool, labels: bool) -> Self {
+    pub fn of(splatting: &Splatting, perspective: bool, labels: bool, rays: RayMode) -> Self {
         let Splatting { compositing, order, footprint_box, economies, .. } = *splatting;
         let economies = economies != Economies::default();
         // Every voxel has its own parallelogram there.
         let footprint_box = if perspective { FootprintBox::Rectangle } else { footprint_box };
-        Self { compositing, order, footprint_box, perspective, economies, labels }
+        Self { compositing, order, footprint_box, perspective, economies, labels, rays }
     }
 }
 
@@ -68,13 +70,23 @@ pub struct GatherBuffers<'a> {
     pub gathered: &'a Buffer,
     /// [`TileBins::half_boxes`](crate::tile_bins::TileBins::half_boxes), `[[f32; 2]]`.
     pub half_boxes: &'a Buffer,
+    /// What cuts rays.
+    pub cut: CutBuffers<'a>,
+}
+
+impl Default for Gather {
+    fn default() -> Self {
+        Self { stages: (0..3 << 7).map(|_| OnceLock::new()).collect(), no_labels: OnceLock::new() }
+    }
 }
 
 impl Gather {
     fn stage(&self, mode: GatherMode) -> &OnceLock<ComputeStage> {
-        let GatherMode { compositing, order, footprint_box, perspective, economies, labels } = mode;
-        let bits = [order as usize, footprint_box as usize, perspective.into(), economies.into(), labels.into()];
-        &self.stages[compositing as usize][bits.iter().fold(0, |number, bit| 2 * number + bit)]
+        let GatherMode { compositing, order, footprint_box, perspective, economies, labels, rays } = mode;
+        let [order, footprint_box] = [order as usize, footprint_box as usize];
+        let flags = [perspective, economies, labels, rays.cut, rays.first_hit].map(usize::from);
+        let bits = [order, footprint_box].into_iter().chain(flags);
+        &self.stages[bits.fold(compositing as usize, |number, bit| 2 * number + bit)]
     }
 
     fn compiled(&self, device: &Device, mode: GatherMode) -> &ComputeStage {
@@ -94,6 +106,8 @@ impl Gather {
                 storage::<[f32; 2]>(stage, true),
                 texture_of_integers(stage, TextureViewDimension::D2Array),
                 storage::<Indirect>(stage, false),
+                uniform::<Cut>(stage, false),
+                depth_texture(stage),
             ];
             let constants = [
                 ("COMPOSITING", f64::from(mode.compositing as u32)),
@@ -102,6 +116,8 @@ impl Gather {
                 ("ECONOMIES", f64::from(u8::from(mode.economies))),
                 ("PARALLELOGRAM", f64::from(mode.footprint_box as u32)),
                 ("LABELS", f64::from(u8::from(mode.labels))),
+                ("CUT", f64::from(u8::from(mode.rays.cut))),
+                ("FIRST_HIT", f64::from(u8::from(mode.rays.first_hit))),
             ];
             ComputeStage::new(device, shaders::GATHER, "main", &slots, &constants)
         })
@@ -153,6 +169,8 @@ impl Gather {
             whole(buffers.half_boxes),
             wgpu::BindingResource::TextureView(labels),
             whole(next),
+            whole(buffers.cut.uniform),
+            wgpu::BindingResource::TextureView(buffers.cut.surfaces),
         ];
         self.compiled(device, mode).bind(device, &resources)
     }

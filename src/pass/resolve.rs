@@ -1,14 +1,13 @@
-//! Lays the compositing buffer over the background, into the target.
+//! Lays the compositing buffer over the background, into the host's target.
 
-use wgpu::{
-    BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, RenderPassTimestampWrites, RenderPipeline,
-    ShaderStages, TextureFormat, TextureView,
-};
+use wgpu::{BindGroup, BindGroupLayout, Buffer, Device, RenderPass, RenderPipeline, ShaderStages};
 
 use crate::gpu::bindings::{bind, layout, storage, uniform};
 use crate::gpu::layout::{Band, Frame};
 use crate::gpu::shaders;
 use crate::gpu::targets::BandBuffer;
+use crate::placement::Placement;
+use crate::renderer_options::RendererOptions;
 
 /// The stage's pipeline.
 #[derive(Debug)]
@@ -17,9 +16,13 @@ pub struct Resolve {
     pipeline: RenderPipeline,
 }
 
+/// What is added to both numbers of an origin, so that they are not negative, as `shaders/resolve.wgsl` takes it away again.
+/// No texture is wider than 32768 pixels.
+const ORIGIN_BIAS: i32 = 32767;
+
 impl Resolve {
-    /// Compiles the stage for targets of the given format.
-    pub fn new(device: &Device, target_format: TextureFormat) -> Self {
+    /// Compiles the stage for targets of the kind that the options say.
+    pub fn new(device: &Device, options: &RendererOptions) -> Self {
         let stage = ShaderStages::FRAGMENT;
         let (layout, pipeline_layout) = layout(
             device,
@@ -37,13 +40,27 @@ impl Resolve {
                 buffers: &[],
             },
             primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: None,
-            multisample: wgpu::MultisampleState::default(),
+            // The pass has a depth attachment, and nothing is done with it.
+            depth_stencil: options.depth_format.map(|format| wgpu::DepthStencilState {
+                format,
+                depth_write_enabled: Some(false),
+                depth_compare: Some(wgpu::CompareFunction::Always),
+                stencil: wgpu::StencilState::default(),
+                bias: wgpu::DepthBiasState::default(),
+            }),
+            multisample: wgpu::MultisampleState { count: options.sample_count, ..wgpu::MultisampleState::default() },
             fragment: Some(wgpu::FragmentState {
                 module: &module,
                 entry_point: Some("fragment"),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                targets: &[Some(target_format.into())],
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants: &[("LINEAR_LIGHT", f64::from(u8::from(options.is_linear())))],
+                    ..wgpu::PipelineCompilationOptions::default()
+                },
+                targets: &[Some(wgpu::ColorTargetState {
+                    format: options.target_format,
+                    blend: options.blend_state(),
+                    write_mask: wgpu::ColorWrites::ALL,
+                })],
             }),
             multiview_mask: None,
             cache: None,
@@ -57,34 +74,30 @@ impl Resolve {
         bind(device, "sheetsplat.resolve", &self.layout, &resources)
     }
 
-    /// Overwrites the target, `width` pixels wide, band by band.
-    pub fn record<'a>(
+    /// Draws an image of the given width and height, band by band, where it is to go. Leaves its pipeline, bind group 0, viewport and
+    /// scissor rectangle in the pass.
+    pub fn draw<'a>(
         &self,
-        encoder: &mut CommandEncoder,
-        timestamp_writes: Option<RenderPassTimestampWrites<'_>>,
-        target: &TextureView,
-        width: u32,
+        pass: &mut RenderPass<'_>,
+        [width, height]: [u32; 2],
         bands: impl IntoIterator<Item = (&'a BindGroup, Band)>,
+        placement: Placement,
     ) {
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("sheetsplat.resolve"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: target,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
-            timestamp_writes,
-            ..wgpu::RenderPassDescriptor::default()
-        });
-        pass.set_pipeline(&self.pipeline);
-        for (group, band) in bands {
-            pass.set_scissor_rect(0, band.first_row, width, band.rows);
+        let origin = placement.origin;
+        for (group, Band { first_row, rows }) in bands {
+            let Some([x, y, covered_width, covered_height]) = placement.covered(width, first_row..first_row + rows)
+            else {
+                continue;
+            };
+            pass.set_pipeline(&self.pipeline);
             pass.set_bind_group(0, group, &[]);
-            pass.draw(0..3, 0..1);
+            pass.set_viewport(origin[0] as f32, origin[1] as f32, width as f32, height as f32, 0.0, 1.0);
+            pass.set_scissor_rect(x, y, covered_width, covered_height);
+            // The instance's number is the one that a draw has without a buffer to write or a feature to ask for. Origins that do not
+            // fit are those of scissors outside of the target, which wgpu refuses.
+            let [x, y] = origin.map(|at| at.wrapping_add(ORIGIN_BIAS) as u32 & 0xffff);
+            let instance = x | y << 16;
+            pass.draw(0..3, instance..instance.saturating_add(1));
         }
     }
 }

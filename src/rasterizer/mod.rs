@@ -14,6 +14,7 @@ use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
 use crate::kernel::Kernel;
+use crate::pass::composite::{CutBuffers, RayMode};
 use crate::splatting::{FootprintForm, Splatting};
 use crate::view::View;
 
@@ -33,6 +34,10 @@ pub(crate) struct Given<'a> {
     /// The most that each of the ramps has.
     pub(crate) ramp_lengths: [u32; 3],
     pub(crate) compositing: &'a CompositingBuffer,
+    /// What of pixels' rays is looked at.
+    pub(crate) rays: RayMode,
+    /// What cuts them.
+    pub(crate) cut: CutBuffers<'a>,
 }
 
 impl Given<'_> {

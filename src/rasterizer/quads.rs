@@ -11,7 +11,7 @@ use crate::gpu::layout::{Group, Tally};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
-use crate::pass::composite::Composite;
+use crate::pass::composite::{Composite, CompositeBuffers, RayMode};
 use crate::pass::cull::{Cull, CullBuffers, CullList};
 use crate::pass::occlude::Occlude;
 use crate::pass::splat::{Splat, SplatMode};
@@ -50,6 +50,9 @@ pub(crate) struct QuadFrame {
     sheet_views: Vec<TextureView>,
     splat_mode: SplatMode,
     clear_group: BindGroup,
+    rays: RayMode,
+    /// First hits, `[u32]`, one per pixel; of one, if they are not asked for.
+    hits: Buffer,
     composite_groups: Vec<BindGroup>,
     occlude_groups: [BindGroup; 2],
 }
@@ -82,7 +85,7 @@ impl QuadRasterizer {
             cull: Cull::new(device, sheets),
             tiles: Tiles::new(device),
             splat: Splat::new(device, sheet_format, sheets),
-            composite: Composite::new(device),
+            composite: Composite::default(),
             occlude: Occlude::new(device),
         }
     }
@@ -118,7 +121,7 @@ impl QuadRasterizer {
         let shared = CullBuffers {
             frame,
             groups: &groups,
-            values: &volume.texture.view,
+            values: volume.values(),
             labels: volume.labels(),
             control_points,
             occluded: &targets.occluded,
@@ -137,12 +140,25 @@ impl QuadRasterizer {
         let tile_lists = self.tiles.prepare(device, buffers, &targets, plan.groups.len(), old.tile_lists);
         let tiles = &tile_lists.composited;
         let sheets = targets.sheets_view();
-        let composite = |band| self.composite.bind(device, frame, band, &sheets, tiles, &targets);
+        let pixels = u64::from(view.size[0]) * u64::from(view.size[1]);
+        let hit_bytes = if given.rays.first_hit { 4 * pixels } else { 4 };
+        let hits = grown(device, old.hits, "sheetsplat.hits", hit_bytes, usage);
+        let buffers = CompositeBuffers {
+            frame,
+            groups: &groups,
+            sheets: &sheets,
+            tiles,
+            targets: &targets,
+            cut: given.cut,
+            hits: &hits,
+        };
+        let composite = |band| self.composite.bind(device, given.rays, buffers, band);
         let splat_mode = SplatMode { form: splatting.footprint, perspective: view.perspective.is_some() };
         self.splat.prepare(device, splat_mode);
         let frame = QuadFrame {
             splat_mode,
             clear_group: self.splat.bind_clear(device, frame, tiles),
+            rays: given.rays,
             composite_groups: compositing.bands.iter().map(composite).collect(),
             occlude_groups: self.occlude.bind(device, [frame, &groups], &tile_lists.occluding, &targets),
             sheet_views: (0..self.sheets).map(|layer| targets.sheet_view(layer)).collect(),
@@ -155,6 +171,7 @@ impl QuadRasterizer {
             culled,
             tile_lists,
             lists,
+            hits,
         };
         (frame, Prepared { bucketed, tabled })
     }
@@ -163,7 +180,7 @@ impl QuadRasterizer {
     pub(crate) fn record(&self, encoder: &mut CommandEncoder, timer: &mut Option<Timer>, frame: &QuadFrame) {
         let QuadFrame { planned: Planned { plan, .. }, targets, tile_lists, .. } = frame;
         let masks = [&targets.opaque, &targets.opaque_columns, &targets.occluded, &targets.opaque_tiles, &frame.culled];
-        for buffer in masks.into_iter().chain(frame.lists.iter().map(|list| &list.cull.states)) {
+        for buffer in masks.into_iter().chain([&frame.hits]).chain(frame.lists.iter().map(|list| &list.cull.states)) {
             encoder.clear_buffer(buffer, 0, None);
         }
         let mut offsets = (0..).step_by(frame.group_stride as usize);
@@ -188,7 +205,8 @@ impl QuadRasterizer {
             self.splat.record(encoder, times, frame.splat_mode, &frame.sheet_views, clear, draws);
 
             let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.composite", timer, "composite"));
-            self.composite.record(&mut pass, &frame.composite_groups, &tile_lists.composited);
+            let bands = &frame.composite_groups;
+            self.composite.record(&mut pass, frame.rays, bands, any_offset, &tile_lists.composited);
             self.occlude.record(&mut pass, &frame.occlude_groups, any_offset, &tile_lists.occluding);
         }
     }
@@ -213,12 +231,17 @@ impl QuadFrame {
         encoder.copy_buffer_to_buffer(&self.tile_lists.counts, 0, staging, tally, tiles);
     }
 
+    /// The words of first hits, and where in their buffer they start, bytes.
+    pub(crate) fn first_hits(&self) -> (&Buffer, u64) {
+        (&self.hits, 0)
+    }
+
     /// Bytes of GPU memory.
     pub(crate) fn gpu_bytes(&self) -> u64 {
         let lists: u64 = self.lists.iter().map(|list| list.cull.gpu_bytes()).sum();
         let TileLists { composited, occluding, counts, .. } = &self.tile_lists;
         let orders = self.other_axes.iter().chain([&self.planned]).flat_map(|planned| &planned.orders);
-        let buffers: u64 = [&self.groups, &self.culled, composited, occluding, counts]
+        let buffers: u64 = [&self.groups, &self.culled, &self.hits, composited, occluding, counts]
             .into_iter()
             .chain(orders)
             .map(Buffer::size)
@@ -258,6 +281,7 @@ struct Old {
     footprints: Option<Footprints>,
     groups: Option<Buffer>,
     culled: Option<Buffer>,
+    hits: Option<Buffer>,
     tile_lists: Option<TileLists>,
     lists: Vec<PreparedList>,
 }
@@ -271,6 +295,7 @@ impl Old {
             footprints: Some(frame.footprints),
             groups: Some(frame.groups),
             culled: Some(frame.culled),
+            hits: Some(frame.hits),
             tile_lists: Some(frame.tile_lists),
             lists: frame.lists,
         }

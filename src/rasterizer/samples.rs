@@ -13,7 +13,7 @@ use crate::gpu::layout::{FOLD, Frame, Indirect, QUADS, Splat, Tally, TileList};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
-use crate::pass::composite::Composite;
+use crate::pass::composite::{Composite, CompositeBuffers, RayMode};
 use crate::pass::sample::{Sample, SampleBuffers, SampleMode};
 use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};
 use crate::plan::tile_grid;
@@ -68,16 +68,12 @@ struct Buffers {
     /// The frame, for the composite stage: samples are composited already.
     sum: Buffer,
     counts: Buffer,
+    no_hits: Buffer,
 }
 
 impl SampleRasterizer {
     pub(crate) fn new(device: &Device, format: TextureFormat) -> Self {
-        Self {
-            format,
-            shade: Shade::new(device),
-            sample: Sample::new(device, format),
-            composite: Composite::new(device),
-        }
+        Self { format, shade: Shade::new(device), sample: Sample::new(device, format), composite: Composite::default() }
     }
 
     /// Sorts voxels if need be.
@@ -118,7 +114,7 @@ impl SampleRasterizer {
             ShadeBuffers {
                 frame: given.frame,
                 bricks: volume.lists.lists.first().map_or(&buffers.splats, |list| &list.buffer),
-                values: &volume.texture.view,
+                values: volume.values(),
                 labels: volume.labels(),
                 control_points: given.control_points,
                 places: &buffers.order,
@@ -140,7 +136,16 @@ impl SampleRasterizer {
             },
         );
         let sheets = targets.sheets_view();
-        let composite = |band| self.composite.bind(device, &buffers.sum, band, &sheets, &buffers.tiles, &targets);
+        let composite_buffers = CompositeBuffers {
+            frame: &buffers.sum,
+            groups: &buffers.group,
+            sheets: &sheets,
+            tiles: &buffers.tiles,
+            targets: &targets,
+            cut: given.cut,
+            hits: &buffers.no_hits,
+        };
+        let composite = |band| self.composite.bind(device, RayMode::default(), composite_buffers, band);
         let frame = SampleFrame {
             composite_groups: given.compositing.bands.iter().map(composite).collect(),
             target: targets.sheet_view(0),
@@ -165,7 +170,7 @@ impl SampleRasterizer {
         let count = frame.sorted.places.len() as u32;
         self.sample.record(encoder, times, (frame.mode, &frame.sample_group), &frame.target, count);
         let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.composite", timer, "composite"));
-        self.composite.record(&mut pass, &frame.composite_groups, &buffers.tiles);
+        self.composite.record(&mut pass, RayMode::default(), &frame.composite_groups, 0, &buffers.tiles);
     }
 }
 
@@ -186,8 +191,9 @@ impl SampleFrame {
 
     /// Bytes of GPU memory.
     pub(crate) fn gpu_bytes(&self) -> u64 {
-        let Buffers { order, args, group, splats, tiles, sum, counts } = &self.buffers;
-        let buffers: u64 = [order, args, group, splats, tiles, sum, counts].into_iter().map(Buffer::size).sum();
+        let Buffers { order, args, group, splats, tiles, sum, counts, no_hits } = &self.buffers;
+        let buffers: u64 =
+            [order, args, group, splats, tiles, sum, counts, no_hits].into_iter().map(Buffer::size).sum();
         self.targets.gpu_bytes() + self.footprints.texture.gpu_bytes + buffers
     }
 }
@@ -245,6 +251,7 @@ impl Buffers {
             tiles: filled("sheetsplat.tiles", &tile_words, indirect),
             sum: filled("sheetsplat.sum", bytemuck::bytes_of(&sum), BufferUsages::UNIFORM),
             counts: filled("sheetsplat.counts", bytemuck::bytes_of(&counts), BufferUsages::COPY_SRC),
+            no_hits: filled("sheetsplat.no_hits", &[0; 4], storage),
         }
     }
 }

@@ -1,5 +1,7 @@
 //! The tile rasterizer: one compute stage draws every tile front to back, its sheets in registers.
 
+use std::mem::offset_of;
+
 use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Features};
 
 use super::Given;
@@ -12,7 +14,7 @@ use crate::pass::gather::{Gather, GatherBand, GatherBuffers, GatherMode};
 use crate::scene_view::Prepared;
 use crate::splatting::{FootprintForm, Method, Order, Splatting};
 use crate::stats::GroupSlabs;
-use crate::tile_bins::{SHEETS, SIDE, TileBins, UNITS};
+use crate::tile_bins::{SHEETS, SIDE, TileBins};
 use crate::view::View;
 
 /// Threads that a subgroup may have.
@@ -35,6 +37,8 @@ pub(crate) struct TileFrame {
     starts: Buffer,
     entries: Buffer,
     gathered: Buffer,
+    /// Where in it first hits start, bytes.
+    hits: u64,
     half_boxes: Buffer,
     /// For every band of the compositing buffer its number, and the offset of its part and its tiles.
     dispatches: Vec<(usize, u32, u32)>,
@@ -140,8 +144,13 @@ impl TileRasterizer {
         };
 
         let uniform = uniforms::gather(view, kernel, splatting, bins, bricks.len() as u32);
-        let words = uniform.reached + bins.tiles * UNITS;
-        let bytes = size_of::<Gathered>() as u64 + u64::from(words) * 4;
+        let pixels = u64::from(view.size[0]) * u64::from(view.size[1]);
+        let hits = offset_of!(Gathered, words) as u64 + u64::from(uniform.hits) * 4;
+        let bytes = hits + if given.rays.first_hit { 4 * pixels } else { 0 };
+        if bytes > binding {
+            let (what, limit) = ("the tile rasterizer's counts and first hits", "max_storage_buffer_binding_size");
+            return Err(RenderError::Limit { what, limit, required: bytes, actual: binding });
+        }
         let usage = storage | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         let gathered = grown(device, old.gathered.take(), "sheetsplat.gathered", bytes, usage);
         let uniform_bytes = bytemuck::bytes_of(&uniform);
@@ -162,7 +171,7 @@ impl TileRasterizer {
         part_bytes.resize(part_bytes.len().max(stride), 0);
         let parts = given.filled(old.parts.take(), "sheetsplat.parts", &part_bytes, BufferUsages::UNIFORM);
 
-        let mode = GatherMode::of(splatting, view.perspective.is_some(), volume.labels().is_some());
+        let mode = GatherMode::of(splatting, view.perspective.is_some(), volume.labels().is_some(), given.rays);
         let buffers = GatherBuffers {
             frame: given.frame,
             gather: &uniform,
@@ -171,10 +180,11 @@ impl TileRasterizer {
             starts: &starts,
             entries: &entries,
             control_points: given.control_points,
-            values: &volume.texture.view,
+            values: volume.values(),
             labels: volume.labels(),
             gathered: &gathered,
             half_boxes: &half_boxes,
+            cut: given.cut,
         };
         let bind = |acc| self.gather.bind(device, mode, buffers, acc, bins.dispatches);
         let bands = given.compositing.bands.iter().map(|band| bind(&band.acc)).collect();
@@ -186,6 +196,7 @@ impl TileRasterizer {
             starts,
             entries,
             gathered,
+            hits,
             half_boxes,
             dispatches,
             bands,
@@ -223,6 +234,11 @@ impl TileFrame {
     pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer) {
         let bytes = size_of::<Tally>() as u64 + u64::from(self.binned.bins.groups) * 4;
         encoder.copy_buffer_to_buffer(&self.gathered, 0, staging, 0, bytes);
+    }
+
+    /// The words of first hits, and where in their buffer they start, bytes.
+    pub(crate) fn first_hits(&self) -> (&Buffer, u64) {
+        (&self.gathered, self.hits)
     }
 
     /// Bytes of GPU memory.

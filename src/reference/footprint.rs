@@ -97,8 +97,7 @@ mod tests {
         assert!((amplitude - 0.25).abs() < 1e-12);
     }
 
-    /// §4.2: "our grid warping technique yields the exact same footprint (for a complete kernel) as projecting an ellipsoidal
-    /// kernel directly". Here the ellipsoid is integrated along world rays, sample by sample.
+    /// A whole kernel's footprint is that of Westover's ellipsoid (§4.2), which here is integrated along world rays, sample by sample.
     #[test]
     fn the_warped_footprint_is_westovers_ellipsoid() {
         // Wide enough that the cut-off at the radius does not disturb the sum.

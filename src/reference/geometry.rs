@@ -7,6 +7,7 @@ use glam::{DMat2, DVec2, DVec3, UVec3};
 use super::footprint::{Footprint, Ray};
 use super::{Section, Splat};
 use crate::camera::{Camera, Eye, ViewBasis};
+use crate::clip::HalfSpace;
 use crate::error::RenderError;
 use crate::kernel::Kernel;
 use crate::scene::Scene;
@@ -21,7 +22,7 @@ const MAX_SIZE: u32 = 32768;
 ///
 /// Orthographic rays are all alike. In perspective `pix`, `ro`, `lambda`, `footprint_from_pixels` and `amplitude` are those of the
 /// central ray at the camera's `center`, and every voxel and section has its own: [`Geometry::section`].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Geometry {
     /// The viewing coordinate system.
     pub basis: ViewBasis,
@@ -49,6 +50,10 @@ pub struct Geometry {
     pub footprint_from_pixels: DMat2,
     /// The low-pass rule's amplitude.
     pub amplitude: f64,
+    /// What clip planes keep.
+    pub clip: Vec<HalfSpace>,
+    /// The kernel's radius, grid units.
+    pub radius: f64,
 }
 
 impl Geometry {
@@ -62,6 +67,7 @@ impl Geometry {
                 return Err(RenderError::OutOfRange { key, found, allowed });
             }
         }
+        scene.clip.check()?;
         let (camera, splatting) = (&scene.camera, &scene.splatting);
         let (basis, aspect) = (camera.basis(), grid.aspect());
         let eye = camera.eye(grid, splatting.radius, height)?;
@@ -85,6 +91,8 @@ impl Geometry {
             slab_width: if eye.is_some() { splatting.slab_width } else { splatting.slab_width * ray.lambda },
             footprint_from_pixels: footprint.from_pixels,
             amplitude: footprint.amplitude,
+            clip: scene.clip.half_spaces(grid),
+            radius: splatting.radius,
         };
         if splatting.method == Method::ImageAligned {
             geometry.check_slabs(splatting.radius, splatting.slab_width)?;
@@ -115,6 +123,15 @@ impl Geometry {
     /// lies before the eye, `r·w > 0`, also those beside it.
     pub fn is_beyond_near(&self, voxel: UVec3) -> bool {
         self.eye.is_none_or(|eye| self.position(voxel).dot(self.basis.w) > eye.near)
+    }
+
+    /// Whether any of a voxel's kernel, a ball in the warped grid, is inside of all clip planes, each taken for itself.
+    pub fn is_inside(&self, voxel: UVec3) -> bool {
+        let (p, aspect) = (self.grid.world_position(voxel) / self.grid.unit(), self.grid.aspect());
+        let reaches = |HalfSpace { normal, offset }: &HalfSpace| {
+            (normal.dot(p) + offset) / (*normal * aspect).length() + self.radius >= 0.0
+        };
+        self.clip.iter().all(reaches)
     }
 
     /// The local ray at a voxel, a unit vector: `w`, in perspective `normalize(p - e)`.
@@ -158,6 +175,12 @@ impl Geometry {
     /// Perspective keeps this one order for the whole image. Where a ray runs against w along that axis it is the wrong one: only
     /// rays at more than asin |w_axis|, so at least 35.3°, from the image's centre can do so.
     pub fn slice(&self, voxel: UVec3) -> i32 {
+        let (axis, sign) = self.slice_axis();
+        sign as i32 * voxel[axis] as i32
+    }
+
+    /// That axis, and whether slices are counted up (1) or down (-1) along it.
+    pub fn slice_axis(&self) -> (usize, f64) {
         let w = self.basis.w.abs();
         let axis = if w.x >= w.y && w.x >= w.z {
             0
@@ -166,8 +189,7 @@ impl Geometry {
         } else {
             2
         };
-        let index = voxel[axis] as i32;
-        if self.basis.w[axis] < 0.0 { -index } else { index }
+        (axis, if self.basis.w[axis] < 0.0 { -1.0 } else { 1.0 })
     }
 
     /// What a voxel's `(C·m, m)` is multiplied by: `1/λ`, and the low-pass amplitude where it is the same for all sections.

@@ -2,6 +2,8 @@
 //! matrices of eqs. 4–11, and slow. Tests compare every stage with it; `sheetsplat render --backend reference` shows it.
 
 pub mod composite;
+pub mod cut;
+mod first_hit;
 pub mod footprint;
 pub mod geometry;
 pub mod ray_march;
@@ -26,6 +28,8 @@ use crate::stats::Counts;
 use crate::transfer_function::TransferFunction;
 use crate::volume::Volume;
 
+pub use cut::Cuts;
+use first_hit::FirstHits;
 pub use geometry::Geometry;
 pub use shading::Splat;
 pub use splat::Section;
@@ -93,6 +97,15 @@ pub fn render(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Re
     render_culled(volume, transfer, scene, None).map(|culled| culled.image)
 }
 
+/// What a host adds to a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Host<'a> {
+    /// For every pixel the depth along w of an opaque surface, `unit`s from the eye (orthographic: from the camera's centre).
+    pub surfaces: Option<&'a [f64]>,
+    /// The opacity whose depth is asked for.
+    pub first_hit: Option<f64>,
+}
+
 /// What [`render`] draws: all there is. Voxels composited one by one make a section each, and neither sheets nor tiles.
 ///
 /// # Errors
@@ -132,6 +145,9 @@ pub struct Culled {
     pub sections: u64,
     /// Where they fell.
     pub areas: Areas,
+    /// For every pixel the depth along w at which the opacity asked for is reached, in `unit`s as those of surfaces; infinite where it
+    /// is not. Within a sheet opacity is taken to grow evenly. Empty if nothing was asked.
+    pub first_hits: Vec<f64>,
 }
 
 /// Renders with early splat elimination by one of the paper's tests, sheet by sheet, and counts what is drawn. Nothing is culled back to
@@ -145,10 +161,27 @@ pub fn render_culled(
     scene: &Scene,
     test: Option<visibility::Test>,
 ) -> Result<Culled, RenderError> {
+    render_for(Host::default(), volume, transfer, scene, test)
+}
+
+/// The same between a host's surfaces. Voxels composited one by one know nothing of them, nor of clip planes.
+///
+/// # Errors
+/// If the scene asks for more than can be computed.
+pub fn render_for(
+    host: Host<'_>,
+    volume: &Volume,
+    transfer: &TransferFunction,
+    scene: &Scene,
+    test: Option<visibility::Test>,
+) -> Result<Culled, RenderError> {
     let frame = Frame::new(volume, transfer, scene)?;
     let (compositing, order) = (scene.splatting.compositing, scene.splatting.order);
     let test = test.filter(|_| order == Order::FrontToBack && compositing != Compositing::Xray);
     let support = frame.kernel.support();
+    let is_cut = host.surfaces.is_some() || !scene.clip.is_empty();
+    let cuts = is_cut.then(|| Cuts::new(&frame.geometry, host.surfaces));
+    let mut first_hits = FirstHits::new(host.first_hit, &frame.geometry);
 
     let mut acc = Buffer::new(scene.image.width, scene.image.height);
     let (mut sections, mut areas) = (0, Areas::default());
@@ -169,15 +202,21 @@ pub fn render_culled(
     for (k, bucket) in buckets {
         let mut in_sheet = frame.sections(&bucket, k);
         if let Some(test) = test {
-            let mask = visibility::OpaqueMask::new(&acc, scene.splatting.opacity_threshold);
+            let cuts = cuts.as_ref().map(|cuts| (cuts, k));
+            let mask = visibility::OpaqueMask::new(&acc, scene.splatting.opacity_threshold, cuts);
             in_sheet = mask.visible(&in_sheet, test, support);
         }
         sections += in_sheet.len() as u64;
         areas.add(&in_sheet, frame.geometry.size, support);
         let mut sheet = Buffer::new(scene.image.width, scene.image.height);
         splat::draw(&in_sheet, &frame.kernel, &mut sheet, |pixel, amount| *pixel += amount);
+        if let Some(cuts) = &cuts {
+            cuts.apply(&mut sheet, k);
+        }
+        let before = acc.clone();
         composite::composite(&mut acc, &sheet, compositing, order);
+        first_hits.note(&before, &acc, k, cuts.as_ref());
     }
     let image = resolve::resolve(&acc, compositing, scene.image.background).into_image();
-    Ok(Culled { image, sections, areas })
+    Ok(Culled { image, sections, areas, first_hits: first_hits.depths(&frame.geometry) })
 }

@@ -10,7 +10,7 @@ use glam::{DVec3, DVec4, IVec3, UVec2, UVec3};
 use rayon::prelude::*;
 
 use super::composite::composite_pixel;
-use super::{Buffer, Geometry, resolve, shading};
+use super::{Buffer, Geometry, cut, resolve, shading};
 use crate::error::RenderError;
 use crate::image::Image;
 use crate::kernel::Kernel;
@@ -58,8 +58,10 @@ pub fn pixels(
 struct PixelRay {
     origin: DVec3,
     step: DVec3,
-    /// Where it begins: at the near plane, or at minus infinity.
+    /// Where it begins: at the near plane, at a clip plane, or at minus infinity.
     first: f64,
+    /// Where it ends: at a clip plane, or at infinity.
+    last: f64,
 }
 
 impl PixelRay {
@@ -74,16 +76,24 @@ impl PixelRay {
                 (eye.position, r, eye.near / r.dot(basis.w))
             }
         };
-        Self { origin: origin / grid.aspect() + grid.center(), step: direction / grid.aspect(), first }
+        // Of depths along w to lengths.
+        let per_depth = direction.dot(basis.w).recip();
+        let inside = cut::PixelRay::new(geometry, pixel).inside(&geometry.clip);
+        Self {
+            origin: origin / grid.aspect() + grid.center(),
+            step: direction / grid.aspect(),
+            first: first.max(inside.start * per_depth),
+            last: inside.end * per_depth,
+        }
     }
 
     fn at(&self, length: f64) -> DVec3 {
         self.origin + length * self.step
     }
 
-    /// Where it is within a box, from the near plane on.
+    /// Where it is within a box, from the near plane on and inside of all clip planes.
     fn within(&self, low: DVec3, high: DVec3) -> (f64, f64) {
-        (0..3).fold((self.first, f64::INFINITY), |(first, last), axis| {
+        (0..3).fold((self.first, self.last), |(first, last), axis| {
             // A ray within the planes of an axis has infinities of two signs there, or none at all on one of them.
             let at = [low, high].map(|plane| (plane[axis] - self.origin[axis]) / self.step[axis]);
             (first.max(at[0].min(at[1])), last.min(at[0].max(at[1])))

@@ -26,9 +26,12 @@ pub struct Splat {
 /// The voxels that take part, in memory order: their positions in memory.
 pub fn taking_part(volume: &Volume, transfer: &TransferFunction, geometry: &Geometry) -> Vec<u32> {
     let alpha = |&index: &u32| alpha(volume, transfer, index);
-    let is_beyond_near = |&index: &u32| geometry.is_beyond_near(volume.grid().voxel_at(index));
+    let is_shown = |&index: &u32| {
+        let voxel = volume.grid().voxel_at(index);
+        geometry.is_beyond_near(voxel) && geometry.is_inside(voxel)
+    };
     let voxels = (0..volume.values().len() as u32).into_par_iter();
-    voxels.filter(|index| alpha(index) > 0.0 && is_beyond_near(index)).collect()
+    voxels.filter(|index| alpha(index) > 0.0 && is_shown(index)).collect()
 }
 
 /// Projects and shades the voxels that take part, in memory order.

@@ -2,6 +2,7 @@
 
 use glam::{DMat2, DVec2};
 
+use super::cut::Cuts;
 use super::{Buffer, Section};
 use crate::plan::TILE;
 
@@ -26,15 +27,17 @@ pub struct OpaqueMask {
 }
 
 impl OpaqueMask {
-    /// The mask of a compositing buffer: alpha at least `threshold`.
-    pub fn new(acc: &Buffer, threshold: f64) -> Self {
+    /// The mask of a compositing buffer: alpha at least `threshold`, or that nothing shows from this sheet on.
+    pub fn new(acc: &Buffer, threshold: f64, cuts: Option<(&Cuts, i32)>) -> Self {
+        let is_cut = |pixel: usize| cuts.is_some_and(|(cuts, sheet)| cuts.ends_before(pixel, sheet));
         let size = [acc.width, acc.pixels.len() / acc.width];
         let stride = size[0] + 1;
         let mut sums = vec![0; stride * (size[1] + 1)];
         for y in 0..size[1] {
             let mut row = 0;
             for x in 0..size[0] {
-                row += u32::from(acc.pixels[y * size[0] + x].w < threshold);
+                let pixel = y * size[0] + x;
+                row += u32::from(acc.pixels[pixel].w < threshold && !is_cut(pixel));
                 sums[(y + 1) * stride + x + 1] = sums[y * stride + x + 1] + row;
             }
         }

@@ -10,6 +10,7 @@ use glam::DVec3;
 use toml::Table;
 
 use crate::camera::Camera;
+use crate::clip::Clip;
 use crate::shading::Shading;
 use crate::splatting::Splatting;
 use crate::transfer_function::{LabelTables, Ramp, TransferFunction};
@@ -129,6 +130,8 @@ pub struct Scene {
     pub camera: Camera,
     /// Image size and background.
     pub image: ImageSettings,
+    /// What is cut away.
+    pub clip: Clip,
     /// Colour and opacity.
     pub transfer: TransferSettings,
     /// Light and material.
@@ -146,6 +149,7 @@ impl Scene {
             labels: None,
             camera: Camera::default(),
             image: ImageSettings::default(),
+            clip: Clip::default(),
             transfer: TransferSettings::default(),
             shading: Shading::default(),
             splatting: Splatting::default(),
@@ -220,10 +224,11 @@ impl Scene {
         let overridden = sets.iter().map(|set| apply_override(&mut root, set)).collect::<Result<_, _>>()?;
         let origins = Origins { file: origin, overridden };
         let mut root = Section::root(&origins, root);
-        let [volume, camera, image, transfer, shading, splatting] = [
+        let [volume, camera, image, clip, transfer, shading, splatting] = [
             root.section("volume")?,
             root.section("camera")?,
             root.section("image")?,
+            root.section("clip")?,
             root.section("transfer")?,
             root.section("shading")?,
             root.section("splatting")?,
@@ -237,6 +242,7 @@ impl Scene {
             labels,
             camera: tables::camera(camera)?,
             image: tables::image(image)?,
+            clip: tables::clip(clip)?,
             transfer: tables::transfer(transfer)?,
             shading: tables::shading(shading)?,
             splatting: tables::splatting(splatting)?,

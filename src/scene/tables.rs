@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::reader::{Bounds, Entry, FINITE, LABEL, Section};
 use super::{ImageSettings, SceneError, TransferSettings, VolumeSource};
 use crate::camera::{Camera, Projection};
+use crate::clip::{Clip, MAX_PLANES};
 use crate::shading::{Light, Shading};
 use crate::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
 use crate::transfer_function::{LabelTables, Ramp};
@@ -94,6 +95,40 @@ pub(super) fn image(mut section: Section) -> Result<ImageSettings, SceneError> {
     section.read("background", &mut image.background, |entry| entry.numbers(SHARE))?;
     section.finish()?;
     Ok(image)
+}
+
+/// `[clip]`.
+pub(super) fn clip(mut section: Section) -> Result<Clip, SceneError> {
+    let mut clip = Clip::default();
+    section.read("planes", &mut clip.planes, planes)?;
+    section.read("crop", &mut clip.crop, |entry| crop(entry).map(Some))?;
+    section.finish()?;
+    Ok(clip)
+}
+
+/// At most so many planes.
+fn planes(entry: &Entry) -> Result<Vec<[f64; 4]>, SceneError> {
+    let items = entry.items(&format!("an array of at most {MAX_PLANES} [nx, ny, nz, d]"))?;
+    if items.len() > MAX_PLANES {
+        return Err(entry.refused(format!("at most {MAX_PLANES} planes")));
+    }
+    let plane = |item: &Entry| {
+        let plane = item.numbers(FINITE)?;
+        let clip = Clip { planes: vec![plane], crop: None };
+        clip.check().map_err(|_| item.refused("[nx, ny, nz, d] with a normal other than 0"))?;
+        Ok(plane)
+    };
+    items.iter().map(plane).collect()
+}
+
+/// Two corners.
+fn crop(entry: &Entry) -> Result<[DVec3; 2], SceneError> {
+    let allowed = "[[x, y, z], [x, y, z]], each number of the first below that of the second";
+    let [low, high] = entry.array(allowed)?;
+    let crop = [DVec3::from_array(low.numbers(FINITE)?), DVec3::from_array(high.numbers(FINITE)?)];
+    let clip = Clip { planes: Vec::new(), crop: Some(crop) };
+    clip.check().map_err(|_| entry.refused(allowed))?;
+    Ok(crop)
 }
 
 /// `[transfer]`.

@@ -1,13 +1,14 @@
 //! What the tests share.
 
 pub(crate) mod images;
+pub(crate) mod surfaces;
 
 use glam::{DVec3, DVec4, UVec3};
 use sheetsplat::camera::{Camera, Projection};
 use sheetsplat::gpu::device::DeviceRequirements;
 use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::scene::{ImageSettings, Scene, TransferSettings, VolumeSource};
-use sheetsplat::splatting::{FootprintForm, Rasterizer};
+use sheetsplat::splatting::{Compositing, FootprintForm, Rasterizer};
 use sheetsplat::transfer_function::Ramp;
 use sheetsplat::volume::{Grid, Volume};
 use sheetsplat::wgpu::{Features, Limits, TextureFormat};
@@ -16,6 +17,9 @@ use sheetsplat::wgpu::{Features, Limits, TextureFormat};
 pub(crate) const F32: f64 = 1.0 / (1 << 24) as f64;
 /// What rounding to the nearest f16 changes at most, relative; below 2⁻¹⁴ half a step of 2⁻²⁴ instead.
 pub(crate) const F16: f64 = 1.0 / (1 << 11) as f64;
+
+/// Every way to composite sheets.
+pub(crate) const COMPOSITINGS: [Compositing; 3] = [Compositing::Linear, Compositing::Exponential, Compositing::Xray];
 
 /// Both ways to draw sheets, whatever `auto` would choose.
 pub(crate) const RASTERIZERS: [Rasterizer; 2] = [Rasterizer::Quads, Rasterizer::Tiles];

@@ -1,18 +1,18 @@
 //! `shaders/composite.wgsl` against `reference::composite`: random sheets over random compositing buffers, in some tiles.
 
 use glam::{DVec3, DVec4};
-use sheetsplat::gpu::readback;
+use sheetsplat::gpu::layout::Group;
 use sheetsplat::gpu::targets::{BandBuffer, CompositingBuffer, Targets};
-use sheetsplat::headless::Headless;
-use sheetsplat::pass::composite::Composite;
+use sheetsplat::headless::{Headless, readback};
+use sheetsplat::pass::composite::{Composite, CompositeBuffers, RayMode};
 use sheetsplat::plan::{TILE, tile_grid};
 use sheetsplat::reference::Buffer;
 use sheetsplat::reference::composite::composite;
 use sheetsplat::splatting::{Compositing, Order};
 use sheetsplat::wgpu::{self, BufferUsages};
 
-use crate::common::{F32, Random, gpu, gpu_with_small_bindings};
-use crate::{compute, contents, frame, init, tile_list};
+use crate::common::{COMPOSITINGS, F32, Random, gpu, gpu_with_small_bindings};
+use crate::{Uncut, compute, contents, frame, init, tile_list};
 
 /// Premultiplied colours, in f32: a share of the pixels with no alpha at all, tiny ones, and, if asked for, some above 1.
 fn random_pixels(random: &mut Random, size: [u32; 2], above_one: bool) -> Vec<[f32; 4]> {
@@ -104,9 +104,20 @@ impl Case {
             ..wgpu::TextureViewDescriptor::default()
         });
         let tiles = tile_list(device, &self.tiles);
-        let bind = |band| stage.bind(device, &frame, band, &view, &tiles, &targets);
+        let uncut = Uncut::new(device);
+        let words = |usage| init(device, &[0_u32; size_of::<Group>() / 4], usage);
+        let buffers = CompositeBuffers {
+            frame: &frame,
+            groups: &words(BufferUsages::UNIFORM),
+            sheets: &view,
+            tiles: &tiles,
+            targets: &targets,
+            cut: uncut.buffers(),
+            hits: &words(BufferUsages::STORAGE),
+        };
+        let bind = |band| stage.bind(device, RayMode::default(), buffers, band);
         let groups: Vec<_> = compositing_buffer.bands.iter().map(bind).collect();
-        compute(gpu, |pass| stage.record(pass, &groups, &tiles));
+        compute(gpu, |pass| stage.record(pass, RayMode::default(), &groups, 0, &tiles));
         let acc = |band: &BandBuffer| readback::buffer(device, queue, &band.acc).unwrap();
         Outcome {
             acc: compositing_buffer.bands.iter().flat_map(|band| bytemuck::pod_collect_to_vec(&acc(band))).collect(),
@@ -173,11 +184,11 @@ impl Case {
 }
 
 fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
-    let stage = Composite::new(gpu.device());
+    let stage = Composite::default();
     let mut random = Random(u64::from(size[0]));
     let [columns, rows] = tile_grid(size);
     let (mut opaque, mut listed) = (0, 0);
-    for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray] {
+    for compositing in COMPOSITINGS {
         for (order, layers) in [Order::FrontToBack, Order::BackToFront]
             .into_iter()
             .flat_map(|order| [1, 2, 4].map(|layers| (order, layers)))
@@ -240,5 +251,5 @@ fn no_tile_listed() {
         tiles: Vec::new(),
         stale: 0xdead_beef,
     };
-    case.check(&case.run(&gpu, &Composite::new(gpu.device()), 1));
+    case.check(&case.run(&gpu, &Composite::default(), 1));
 }

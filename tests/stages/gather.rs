@@ -4,10 +4,12 @@ use glam::{DVec2, DVec3, DVec4, UVec3};
 use sheetsplat::brick::{self, BrickList};
 use sheetsplat::camera::Projection;
 use sheetsplat::classify::classify;
+use sheetsplat::clip::ClippedVoxels;
 use sheetsplat::gpu::layout::{Gathered, Part, Tally};
 use sheetsplat::gpu::uniforms::{self, Ramps};
 use sheetsplat::gpu::volume_texture::VolumeTexture;
 use sheetsplat::headless::Headless;
+use sheetsplat::pass::composite::RayMode;
 use sheetsplat::pass::gather::{Gather, GatherBuffers, GatherMode};
 use sheetsplat::reference;
 use sheetsplat::reference::footprint::Footprint;
@@ -19,9 +21,9 @@ use sheetsplat::transfer_function::{Ramp, TransferFunction};
 use sheetsplat::volume::{Grid, Volume};
 use sheetsplat::wgpu::BufferUsages;
 
-use crate::common::{Random, camera, gpu, pixels, scene, transfer};
+use crate::common::{COMPOSITINGS, Random, camera, gpu, pixels, scene, transfer};
 use crate::section::{AMOUNT, KERNELS, Seen, VIEWS, view_scene};
-use crate::{at_offsets, compute, contents, init};
+use crate::{Uncut, at_offsets, compute, contents, init};
 
 /// A scene over a volume, on the GPU and in the twin.
 struct Fixture<'a> {
@@ -47,7 +49,7 @@ struct Drawn {
 impl<'a> Fixture<'a> {
     fn new(gpu: &'a Headless, stage: &'a Gather, scene: Scene, volume: Volume) -> Self {
         let transfer = scene.transfer.resolve(&volume);
-        let voxels = classify(&volume, &transfer);
+        let voxels = classify(&volume, &transfer, &ClippedVoxels::default());
         let bricks = BrickList::new(volume.grid(), &voxels);
         Self { gpu, stage, seen: Seen::new(volume.grid(), scene), volume, transfer, bricks }
     }
@@ -90,7 +92,8 @@ impl<'a> Fixture<'a> {
         let gathered = storage(&vec![0; size_of::<Gathered>() / 4 + words as usize]);
         let (parts_buffer, stride) = at_offsets(device, &parts);
         let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|half| half.as_vec2().to_array()).collect();
-        let mode = GatherMode::of(&seen.scene.splatting, seen.view.perspective.is_some(), false);
+        let uncut = Uncut::new(device);
+        let mode = GatherMode::of(&seen.scene.splatting, seen.view.perspective.is_some(), false, RayMode::default());
         let buffers = GatherBuffers {
             frame: &init(device, &[frame], BufferUsages::UNIFORM),
             gather: &init(device, &[gather], BufferUsages::UNIFORM),
@@ -103,6 +106,7 @@ impl<'a> Fixture<'a> {
             labels: None,
             gathered: &gathered,
             half_boxes: &init(device, &half_boxes, BufferUsages::STORAGE),
+            cut: uncut.buffers(),
         };
         let bound: Vec<_> = accs.iter().map(|acc| stage.bind(device, mode, buffers, acc, bins.dispatches)).collect();
         compute(gpu, |pass| {
@@ -280,7 +284,7 @@ fn frames() {
     let (gpu, stage) = (gpu(), Gather::default());
     let mut random = Random(42);
     let mut lit = 0;
-    for (compositing, order) in [Compositing::Linear, Compositing::Exponential, Compositing::Xray]
+    for (compositing, order) in COMPOSITINGS
         .into_iter()
         .flat_map(|compositing| [Order::FrontToBack, Order::BackToFront].map(|order| (compositing, order)))
     {

@@ -7,9 +7,11 @@ mod common;
 mod composite;
 mod cull;
 mod gather;
+mod kernel_in_view;
 mod occlude;
 mod plan;
 mod resolve;
+mod sample;
 mod section;
 mod shade;
 mod splat;
@@ -19,17 +21,17 @@ mod tiles;
 use std::collections::BTreeMap;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::gpu::layout::{Frame, Indirect, QUADS, TileList};
-use sheetsplat::gpu::readback;
+use sheetsplat::gpu::layout::{Cut, Frame, Indirect, QUADS, TileList};
 use sheetsplat::gpu::uniforms::{self, Ramps};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::{Headless, readback};
 use sheetsplat::kernel::Kernel;
+use sheetsplat::pass::composite::CutBuffers;
 use sheetsplat::scene::Scene;
 use sheetsplat::transfer_function::TransferFunction;
 use sheetsplat::view::View;
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::util::DeviceExt;
-use sheetsplat::wgpu::{self, Buffer, BufferUsages, Device};
+use sheetsplat::wgpu::{self, Buffer, BufferUsages, Device, TextureView};
 
 /// A frame, for stages that see nothing of the volume but it.
 fn frame(adjust: impl FnOnce(&mut Scene)) -> Frame {
@@ -56,6 +58,35 @@ fn frame_over(grid: &Grid, scene: &Scene) -> Frame {
 }
 
 /// A buffer with contents.
+/// What cuts no ray.
+struct Uncut {
+    uniform: Buffer,
+    surfaces: TextureView,
+}
+
+impl Uncut {
+    fn new(device: &Device) -> Self {
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("test.surfaces"),
+            size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Depth32Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        });
+        Self {
+            uniform: init(device, &[0_u32; size_of::<Cut>() / 4], BufferUsages::UNIFORM),
+            surfaces: texture.create_view(&wgpu::TextureViewDescriptor::default()),
+        }
+    }
+
+    fn buffers(&self) -> CutBuffers<'_> {
+        CutBuffers { uniform: &self.uniform, surfaces: &self.surfaces }
+    }
+}
+
 fn init<T: bytemuck::NoUninit>(device: &Device, contents: &[T], usage: BufferUsages) -> Buffer {
     device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
         label: Some("test"),

@@ -2,16 +2,24 @@
 //! opaque. On bits, so exact.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use bytemuck::Zeroable;
+use glam::{DVec3, UVec3};
+use sheetsplat::brick::BrickList;
 use sheetsplat::gpu::layout::Group;
 use sheetsplat::gpu::targets::Targets;
+use sheetsplat::gpu::uniforms;
 use sheetsplat::headless::Headless;
+use sheetsplat::kernel::Kernel;
 use sheetsplat::pass::occlude::Occlude;
-use sheetsplat::plan::{TILE, tile_grid};
+use sheetsplat::plan::{FramePlan, TILE, tile_grid};
+use sheetsplat::splatting::{Method, Order};
+use sheetsplat::view::View;
+use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::{BufferUsages, TextureFormat};
 
-use crate::common::{Random, gpu};
+use crate::common::{Random, SPACINGS, gpu, random_eye, scene};
 use crate::{at_offsets, compute, contents, frame, init, tile_list};
 
 /// A bit per pixel of an image.
@@ -185,4 +193,32 @@ fn tiles_that_are_not_listed_stay() {
         assert_eq!(word, expected, "row {} of tile {tile}", at / 5);
     }
     assert!(fixture.run(&mask, &[]).contains(&0x0f0f_0f0f), "nothing listed, nothing done");
+}
+
+/// What a group's box has left in a tile where nothing changes serves the groups behind it, if none has a larger box.
+#[test]
+fn boxes_shrink_on_the_way_back() {
+    let mut random = Random(13);
+    let mut shrunk = 0;
+    for spacing in SPACINGS {
+        let grid = Grid { dims: UVec3::new(40, 31, 36), spacing: DVec3::from(spacing) };
+        let bricks = BrickList::new(&grid, &(0..grid.dims.element_product()).collect::<Vec<_>>());
+        for _ in 0..30 {
+            let mut scene = scene(90, 70);
+            scene.camera = random_eye(&mut random, &grid);
+            scene.splatting.method = random.pick(&[Method::ImageAligned, Method::AxisAligned]);
+            scene.splatting.slab_width = random.pick(&[0.3, 1.0, 2.6]);
+            let view = View::new(&grid, &scene.camera, &scene.splatting, [90, 70]).unwrap();
+            let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
+            let plan = FramePlan::new([bricks.bricks()], view, random.pick(&[1, 2, 4]), Order::FrontToBack);
+            let filter =
+                |planes: &Range<f64>| uniforms::group(&view, &kernel, &scene.splatting, planes.clone()).box_filter;
+            let filters: Vec<[u32; 2]> = plan.groups.iter().map(|group| filter(&group.planes)).collect();
+            for pair in filters.windows(2) {
+                assert!(pair[1][0] <= pair[0][0] && pair[1][1] <= pair[0][1], "{pair:?}, {scene:?}");
+                shrunk += usize::from(pair[0] != pair[1]);
+            }
+        }
+    }
+    assert!(shrunk > 100, "boxes shrink {shrunk} times only");
 }

@@ -1,15 +1,17 @@
 //! `shaders/resolve.wgsl` against `reference::resolve`: a random compositing buffer over backgrounds.
 
 use glam::{DVec3, DVec4};
-use sheetsplat::gpu::{layout, readback, targets::CompositingBuffer};
-use sheetsplat::headless::Headless;
+use sheetsplat::gpu::{layout, targets::CompositingBuffer};
+use sheetsplat::headless::{Headless, readback};
 use sheetsplat::pass::resolve::Resolve;
+use sheetsplat::placement::Placement;
 use sheetsplat::reference::Buffer;
 use sheetsplat::reference::resolve::resolve;
+use sheetsplat::renderer_options::{Blend, RendererOptions};
 use sheetsplat::splatting::Compositing;
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
 
-use crate::common::{F32, Random, gpu, gpu_with_small_bindings, pixels};
+use crate::common::{COMPOSITINGS, F32, Random, gpu, gpu_with_small_bindings, pixels};
 use crate::{frame, init};
 
 const BACKGROUNDS: [[f64; 4]; 5] =
@@ -17,7 +19,8 @@ const BACKGROUNDS: [[f64; 4]; 5] =
 
 fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
     let (device, queue) = (gpu.device(), gpu.queue());
-    let stage = Resolve::new(device, TextureFormat::Rgba32Float);
+    let options = RendererOptions { blend: Blend::Replace, ..RendererOptions::for_target(TextureFormat::Rgba32Float) };
+    let stage = Resolve::new(device, &options);
     let mut random = Random(9);
     let compositing_buffer = CompositingBuffer::new(device, size).unwrap();
     assert_eq!(compositing_buffer.bands.len(), bands);
@@ -32,7 +35,7 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
         view_formats: &[],
     });
     let view = target.create_view(&wgpu::TextureViewDescriptor::default());
-    for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray] {
+    for compositing in COMPOSITINGS {
         for background in BACKGROUNDS {
             // Summed projections pass 1; the others cannot. Some pixels are empty, some opaque.
             let most = if compositing == Compositing::Xray { 3.0 } else { 1.0 };
@@ -57,7 +60,17 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
             let frame = init(device, &[frame], BufferUsages::UNIFORM);
             let groups: Vec<_> = compositing_buffer.bands.iter().map(|band| stage.bind(device, &frame, band)).collect();
             let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            stage.record(&mut encoder, None, &view, size[0], groups.iter().zip(rows));
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: &view,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations::default(),
+                })],
+                ..wgpu::RenderPassDescriptor::default()
+            });
+            stage.draw(&mut pass, size, groups.iter().zip(rows), Placement::whole(size));
+            drop(pass);
             queue.submit([encoder.finish()]);
             let actual = pixels(&readback::texture(device, queue, &target).unwrap());
 

@@ -14,6 +14,10 @@ use crate::common::{F32, camera, scene};
 
 /// `(C·m, m)` of the splats that are drawn.
 pub(crate) const AMOUNT: DVec4 = DVec4::new(1.0, 0.5, 0.25, 1.0);
+/// The same as f16: what a record holds, which the stages that draw multiply by the amplitude over λ.
+pub(crate) const AMOUNT_RG: u32 = 0x3800_3c00;
+/// See [`AMOUNT_RG`].
+pub(crate) const AMOUNT_BA: u32 = 0x3c00_3400;
 
 /// Radius and falloff.
 pub(crate) const KERNELS: [(f64, f64); 9] =

@@ -6,18 +6,20 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3, DVec4, UVec3};
 use sheetsplat::brick;
 use sheetsplat::classify::classify;
+use sheetsplat::clip::ClippedVoxels;
 use sheetsplat::gpu::layout;
+use sheetsplat::headless::Headless;
 use sheetsplat::kernel::Kernel;
 use sheetsplat::pass::cull::Cull;
 use sheetsplat::reference::{Geometry, shading};
 use sheetsplat::scene::{Scene, TransferSettings};
 use sheetsplat::shading::{Light, Shading};
-use sheetsplat::splatting::Compositing;
+use sheetsplat::splatting::{Compositing, Method};
 use sheetsplat::transfer_function::{LabelTables, Ramp, TransferFunction};
 use sheetsplat::view::View;
 use sheetsplat::volume::{Labels, Volume};
 
-use crate::common::{F16, F32, Random, camera, gpu, scene, transfer};
+use crate::common::{COMPOSITINGS, F16, F32, Random, SPACINGS, camera, gpu, random_eye, scene, transfer};
 use crate::cull::Culling;
 
 /// Values of a volume with noise everywhere, so that gradients point anywhere.
@@ -46,8 +48,16 @@ fn ramp_error<T: Copy>(points: &[(f64, T)], difference: impl Fn(T, T) -> f64, at
     F32 * (8.0 + 4.0 * positions * steepest.fold(0.0, f64::max))
 }
 
-/// What the GPU's record of a voxel may differ by, from the precisions of its number formats and functions alone.
-fn tolerance(volume: &Volume, index: u32, transfer: &TransferFunction, scene: &Scene, amount: DVec4) -> DVec4 {
+/// What the GPU's record of a voxel may differ by, from the precisions of its number formats and functions alone, and from what f32 may
+/// turn its ray by.
+fn tolerance(
+    volume: &Volume,
+    index: u32,
+    transfer: &TransferFunction,
+    (scene, geometry): (&Scene, &Geometry),
+    ray_error: f64,
+    amount: DVec4,
+) -> DVec4 {
     let value = f64::from(volume.values()[index as usize]);
     let magnitude = volume.gradient(volume.grid().voxel_at(index)).length();
     let tables = transfer.tables(volume.label(index));
@@ -65,13 +75,14 @@ fn tolerance(volume: &Volume, index: u32, transfer: &TransferFunction, scene: &S
 
     // A gradient's components are rounded three times and divided twice; of the square root's sum of squares half the error
     // counts.
-    let normal_error = 16.0 * F32;
+    let normal_error = 16.0 * F32 + ray_error;
     let Shading { ambient, diffuse, specular, shininess, .. } = scene.shading;
     let color_error = ramp_error(tables.color.points(), |a: DVec3, b| (a - b).abs().max_element(), value);
     // pow is exp2(y·log2(x)): log2 to 2⁻²¹, times y; exp2 to 3 ULP and more where its result is small. A cosine's power
     // is steep at 0 where the exponent is below 1, at 1 where it is above.
-    let cosine = highlight_cosine(volume, index, scene);
-    let steepest = [cosine - normal_error, cosine + normal_error]
+    let (cosine, stretch) = highlight_cosine(volume, index, scene, geometry);
+    let half_error = 16.0 * F32 + ray_error * stretch;
+    let steepest = [cosine - half_error, cosine + half_error]
         .map(|off| (off.clamp(0.0, 1.0).powf(shininess) - cosine.powf(shininess)).abs());
     let highlight_error = specular * (steepest[0].max(steepest[1]) + (shininess + 2.0) * 2.0_f64.powi(-21));
     let shaded_error = color_error * (ambient + diffuse) + diffuse * normal_error + highlight_error + 8.0 * F32;
@@ -82,19 +93,21 @@ fn tolerance(volume: &Volume, index: u32, transfer: &TransferFunction, scene: &S
     before_f16 + amount * F16 + 2.0_f64.powi(-25)
 }
 
-/// `|n·hv|` of SPEC §3.
-fn highlight_cosine(volume: &Volume, index: u32, scene: &Scene) -> f64 {
-    let to_eye = -scene.camera.basis().w;
+/// `|n·hv|` of SPEC §3, and by how much normalising `l + c` makes errors of its terms larger.
+fn highlight_cosine(volume: &Volume, index: u32, scene: &Scene, geometry: &Geometry) -> (f64, f64) {
+    let voxel = volume.grid().voxel_at(index);
+    let to_eye = -geometry.ray(voxel);
     let to_light = match scene.shading.light {
         Light::Headlight => to_eye,
         Light::Direction(direction) => direction.normalize(),
     };
-    let normal = volume.gradient(volume.grid().voxel_at(index)).normalize_or_zero();
-    normal.dot((to_light + to_eye).normalize_or_zero()).abs()
+    let normal = volume.gradient(voxel).normalize_or_zero();
+    let sum = to_light + to_eye;
+    (normal.dot(sum.normalize_or_zero()).abs(), 2.0 / sum.length().max(1e-6))
 }
 
 /// What f32 may move a voxel's pixel coordinates, sheet depth and depth from the eye by.
-fn place_error(view: &View, voxel: UVec3, center: DVec2) -> DVec4 {
+pub(crate) fn place_error(view: &View, voxel: UVec3, center: DVec2) -> DVec4 {
     // A dot product of four: every term has a rounded coefficient and product and passes up to three sums; one more for the
     // twin's own way to the same number.
     let p = voxel.as_dvec3().extend(1.0);
@@ -108,70 +121,92 @@ fn place_error(view: &View, voxel: UVec3, center: DVec2) -> DVec4 {
 
 /// Culls a frame, group by group, and compares the splat record of every voxel on the screen with the twin's.
 fn check(name: &str, volume: &Volume, scene: &Scene) {
-    let gpu = gpu();
+    let shaded = shaded(&gpu(), name, volume, scene);
+    assert!(shaded > 50, "{name}: {shaded} voxels");
+}
+
+/// The same; how many voxels were shaded.
+fn shaded(gpu: &Headless, name: &str, volume: &Volume, scene: &Scene) -> usize {
     let transfer = scene.transfer.resolve(volume);
     let mut scene = scene.clone();
     scene.splatting.culling = false;
     let scene = &scene;
     let sheets = 2;
     let stage = Cull::new(gpu.device(), sheets);
-    let voxels = classify(volume, &transfer);
+    let voxels = classify(volume, &transfer, &ClippedVoxels::default());
     let labels = volume.labels().filter(|_| transfer.labels.values().any(LabelTables::matter_to_shading));
     let of_volume = (volume.grid(), volume.values(), labels);
-    let culling = Culling::new(&gpu, (&stage, sheets), of_volume, &voxels, &transfer, scene);
-    assert!(culling.plan.groups.len() > 1, "{name}: one group");
+    let culling = Culling::new(gpu, (&stage, sheets), of_volume, &voxels, &transfer, scene);
+    assert!(culling.plan.groups.len() > 1 || culling.view.perspective.is_some(), "{name}: one group");
     (0..culling.plan.groups.len()).for_each(|group| culling.cull(group));
     let (records, states, view) = (culling.splats(), culling.states(), culling.view);
 
     let geometry = Geometry::new(volume.grid(), scene).unwrap();
+    let taking_part = shading::taking_part(volume, &transfer, &geometry);
     let expected = shading::shade(volume, &transfer, scene, &geometry);
-    assert_eq!(voxels.len(), expected.len(), "{name}: which voxels take part");
-    let twins: BTreeMap<u32, &shading::Splat> = voxels.iter().copied().zip(&expected).collect();
+    let twins: BTreeMap<u32, &shading::Splat> = taking_part.iter().copied().zip(&expected).collect();
     let held: usize = culling.bricks.iter().map(|brick| brick::voxels(brick).count()).sum();
-    assert_eq!(held, twins.len(), "{name}: bricks hold every voxel");
+    assert_eq!(held, voxels.len(), "{name}: bricks hold every voxel");
+    let is_beyond_near = |index: &&u32| geometry.is_beyond_near(volume.grid().voxel_at(**index));
+    assert_eq!(voxels.iter().filter(is_beyond_near).count(), twins.len(), "{name}: which voxels take part");
     // Whose footprint's box holds a pixel's centre is on the screen; f32 may differ about those that barely do.
     let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
-    let half_box = geometry.half_box(kernel.support());
-    let inside = |twin: &shading::Splat| {
-        let (low, high) = (twin.center - half_box, twin.center + half_box);
-        (high - 0.5).min(geometry.size - 0.5 - low).min_element()
+    let inside = |index: u32| {
+        let Some(&twin) = twins.get(&index) else { return f64::NEG_INFINITY };
+        let sheets = match geometry.method {
+            Method::ImageAligned => geometry.slabs(twin, kernel.radius()),
+            _ => 0..1,
+        };
+        let boxes = sheets.filter_map(|k| geometry.section(twin, k, &kernel)).map(|section| {
+            let half_box = section.footprint.half_box(kernel.support());
+            let (low, high) = (section.center - half_box, section.center + half_box);
+            (high - 0.5).min(geometry.size - 0.5 - low).min_element()
+        });
+        boxes.fold(f64::NEG_INFINITY, f64::max)
     };
     let mut shaded = Vec::new();
     for (at, (brick, (hidden, of_brick))) in culling.bricks.iter().zip(states).enumerate() {
         for (slot, _) in brick::voxels(brick) {
             let id = (at as u32 * brick::BRICK_VOXELS + slot) as usize;
-            let (inside, is_shaded) = (inside(twins[&culling.indices[id]]), of_brick >> slot & 1 == 1);
+            let (inside, is_shaded) = (inside(culling.indices[id]), of_brick >> slot & 1 == 1);
             assert!(inside.abs() < 1e-3 || is_shaded == (inside > 0.0), "{name}: {id} is {inside} px on the screen");
-            assert!(is_shaded != (hidden >> slot & 1 == 1), "{name}: {id} is shaded or hidden");
+            // In perspective boxes shrink: what was shaded is hidden when nothing of it is left on the screen.
+            let is_one = is_shaded != (hidden >> slot & 1 == 1);
+            assert!(geometry.eye.is_some() || is_one, "{name}: {id} is shaded or hidden");
             if is_shaded {
                 shaded.push(id);
             }
         }
     }
-    assert!(shaded.len() > 50, "{name}: {} voxels", shaded.len());
 
-    for id in shaded {
+    for &id in &shaded {
         let (record, index) = (&records[id], culling.indices[id]);
         let twin = twins[&index];
         let voxel = volume.grid().voxel_at(index);
         let layout::Splat { x_px, y_px, depth, from_eye, .. } = *record;
         let actual = DVec4::from([x_px, y_px, depth, from_eye].map(f64::from));
-        let expected = twin.center.extend(twin.depth).extend(1.0);
+        let depth = match geometry.method {
+            Method::ImageAligned => twin.depth + view.slabs.origin,
+            _ => f64::from(geometry.slice(voxel)),
+        };
+        let expected = twin.center.extend(depth).extend(geometry.eye.map_or(1.0, |_| twin.depth));
         let error = (actual - expected).abs();
-        assert!(
-            error.cmple(place_error(&view, voxel, twin.center)).all(),
-            "{name}: {voxel} at {actual}, not {expected}"
-        );
+        let place_error = place_error(&view, voxel, twin.center);
+        assert!(error.cmple(place_error).all(), "{name}: {voxel} at {actual}, not {expected}");
 
         let actual = decode(record);
-        // The records leave the amplitude over λ to the splat stage.
-        let expected = twin.amount / (geometry.amplitude / geometry.lambda);
-        let tolerance = tolerance(volume, index, &transfer, scene, expected);
+        // The records leave what depends on the ray and on the section to the splat stage.
+        let expected = twin.amount / geometry.scale(voxel);
+        // The GPU takes the ray from where the voxel is on the screen.
+        let ray_error =
+            geometry.eye.map_or(0.0, |eye| place_error.x.hypot(place_error.y) * eye.pixel_per_depth + 16.0 * F32);
+        let tolerance = tolerance(volume, index, &transfer, (scene, &geometry), ray_error, expected);
         assert!(
             (actual - expected).abs().cmple(tolerance).all(),
             "{name}: {voxel} is {actual}, not {expected} ± {tolerance}"
         );
     }
+    shaded.len()
 }
 
 fn decode(record: &layout::Splat) -> DVec4 {
@@ -197,7 +232,7 @@ const DIMS: UVec3 = UVec3::new(11, 9, 8);
 #[test]
 fn compositing_and_light() {
     let volume = noise(DIMS, DVec3::ONE);
-    for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray] {
+    for compositing in COMPOSITINGS {
         for light in [Light::Headlight, Light::Direction(DVec3::new(2.0, -1.0, 3.0))] {
             let mut scene = oblique();
             scene.splatting.compositing = compositing;
@@ -240,6 +275,29 @@ fn anisotropic_and_minified() {
             check(&format!("spacing {spacing} height {height}"), &noise(DIMS, spacing), &scene);
         }
     }
+}
+
+/// Every voxel is lit and seen along its own ray, up to the near plane.
+#[test]
+fn any_eye_and_slices() {
+    let gpu = gpu();
+    let mut random = Random(19);
+    let mut all = 0;
+    for method in [Method::ImageAligned, Method::AxisAligned] {
+        for light in [Light::Headlight, Light::Direction(DVec3::new(2.0, -1.0, 3.0))] {
+            for spacing in SPACINGS.into_iter().cycle().take(8) {
+                let volume = noise(DIMS, spacing.into());
+                let mut scene = oblique();
+                (scene.splatting.method, scene.shading.light) = (method, light);
+                scene.splatting.compositing = random.pick(&[Compositing::Linear, Compositing::Exponential]);
+                if method == Method::ImageAligned || !random.bits().is_multiple_of(3) {
+                    scene.camera = random_eye(&mut random, volume.grid());
+                }
+                all += shaded(&gpu, &format!("{method:?} {light:?} {spacing:?} {:?}", scene.camera), &volume, &scene);
+            }
+        }
+    }
+    assert!(all > 3000, "only {all} voxels were shaded");
 }
 
 /// Borders on all sides, and axes along which there is no neighbour.

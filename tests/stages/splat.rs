@@ -1,5 +1,5 @@
-//! `shaders/splat.wgsl` and `shaders/clear.wgsl` against `reference::splat`: hand-made splat records drawn into f32 sheet
-//! buffers, in groups of 1, 2 and 4 sheets.
+//! `shaders/splat.wgsl`, `shaders/splat_perspective.wgsl` and `shaders/clear.wgsl` against `reference::splat`: hand-made splat records
+//! drawn into f32 sheet buffers, in groups of 1, 2 and 4 sheets.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -10,20 +10,21 @@ use glam::{DVec2, DVec3, DVec4, UVec3};
 use sheetsplat::footprint::{FootprintTable, SECTION_SIZE, SECTIONS, section_extent, section_spacing};
 use sheetsplat::gpu::brick_lists::BrickLists;
 use sheetsplat::gpu::footprint_texture::FootprintTexture;
+use sheetsplat::gpu::layout;
 use sheetsplat::gpu::volume_texture::VolumeTexture;
-use sheetsplat::gpu::{layout, readback};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::{Headless, readback};
 use sheetsplat::pass::cull::{Cull, CullBuffers, CullList};
 use sheetsplat::pass::splat::{Splat as Stage, SplatMode};
 use sheetsplat::plan::{TILE, tile_grid};
 use sheetsplat::reference;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::FootprintForm;
+use sheetsplat::splatting::{FootprintForm, Method};
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
 
 use crate::common::{F32, Random, gpu, pixels};
-use crate::section::{AMOUNT, KERNELS, Seen, VIEWS, view_scene};
+use crate::kernel_in_view::{KernelInView, random_view};
+use crate::section::{AMOUNT, AMOUNT_BA, AMOUNT_RG, KERNELS, Seen, VIEWS, view_scene};
 use crate::{at_offsets, frame_over, indirect, init, tile_list};
 
 /// The stage for groups of so many sheets, and a list to draw, of which it takes what the culling stages wrote.
@@ -83,11 +84,14 @@ type Sheet = Vec<DVec4>;
 
 impl<'a> Fixture<'a> {
     fn new(stage: &'a Stages<'a>, scene: Scene, spacing: [f64; 3]) -> Self {
+        Self::over(stage, scene, &Grid { dims: UVec3::splat(9), spacing: DVec3::from(spacing) })
+    }
+
+    fn over(stage: &'a Stages<'a>, scene: Scene, grid: &Grid) -> Self {
         let gpu = stage.gpu;
-        let grid = Grid { dims: UVec3::splat(9), spacing: DVec3::from(spacing) };
-        let seen = Seen::new(&grid, scene);
+        let seen = Seen::new(grid, scene);
         let size = seen.view.size;
-        let table = FootprintTable::new(seen.scene.splatting.footprint, &seen.kernel, seen.view.slabs.width);
+        let table = FootprintTable::new(seen.scene.splatting.footprint, &seen.kernel, seen.view.section_width());
         let sheet = |_| {
             gpu.device().create_texture(&wgpu::TextureDescriptor {
                 label: Some("sheet"),
@@ -104,7 +108,7 @@ impl<'a> Fixture<'a> {
         Self {
             gpu,
             stage,
-            frame: init(gpu.device(), &[frame_over(&grid, &seen.scene)], BufferUsages::UNIFORM),
+            frame: init(gpu.device(), &[frame_over(grid, &seen.scene)], BufferUsages::UNIFORM),
             footprints: FootprintTexture::upload(gpu.device(), gpu.queue(), &table),
             sheets: (0..stage.sheets).map(sheet).collect(),
             tiles: (0..columns * rows).collect(),
@@ -137,7 +141,7 @@ impl<'a> Fixture<'a> {
 
     fn draw_group(&self, splats: &[layout::Splat], instances: &[u32], first_slab: i32, tiles: &[u32]) -> Vec<Sheet> {
         let device = self.gpu.device();
-        let near = (f64::from(first_slab) * self.view.slabs.width) as f32;
+        let near = self.view.slabs.plane(first_slab) as f32;
         // Not at the first offset.
         let of = |near| layout::Group { near, ..layout::Group::zeroed() };
         let (groups, offset) = at_offsets(device, &[of(1e9), of(near)]);
@@ -156,7 +160,8 @@ impl<'a> Fixture<'a> {
         let views: Vec<_> =
             self.sheets.iter().map(|sheet| sheet.create_view(&wgpu::TextureViewDescriptor::default())).collect();
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let mode = SplatMode { form: self.scene.splatting.footprint, perspective: false };
+        let perspective = self.view.perspective.is_some();
+        let mode = SplatMode { form: self.scene.splatting.footprint, perspective };
         self.stage.splat.prepare(device, mode);
         self.stage.splat.record(&mut encoder, None, mode, &views, (&clear, &tiles), [(&group, offset, &args)]);
         self.gpu.queue().submit([encoder.finish()]);
@@ -185,10 +190,6 @@ impl<'a> Fixture<'a> {
         }
     }
 }
-
-/// 1, 0.5, 0.25 and 1 as f16: what a record holds, which the stage multiplies by the amplitude over λ.
-const AMOUNT_RG: u32 = 0x3800_3c00;
-const AMOUNT_BA: u32 = 0x3c00_3400;
 
 /// Sheets of a group.
 const GROUPS: [u32; 3] = [1, 2, 4];
@@ -270,6 +271,64 @@ fn stored_sections() {
         lit += expected.iter().filter(|pixel| pixel.w > 0.0).count();
     });
     assert!(lit > 100_000, "only {lit} pixels were compared");
+}
+
+/// Kernels that each have their own ray, cut off by the near plane or not, in slabs, and in slices also without an eye.
+#[test]
+fn any_eye_and_slices() {
+    let gpu = gpu();
+    let mut random = Random(17);
+    for (method, form) in [Method::ImageAligned, Method::AxisAligned]
+        .into_iter()
+        .flat_map(|method| [FootprintForm::SummedArea, FootprintForm::Sections].map(|form| (method, form)))
+    {
+        let (mut lit, mut cut, mut worst) = (0, 0, 0.0_f64);
+        for stage in GROUPS.map(|sheets| Stages::new(&gpu, sheets)) {
+            for _ in 0..16 {
+                let (grid, scene) = random_view(&mut random, method, form);
+                let fixture = Fixture::over(&stage, scene, &grid);
+                let kernel = KernelInView::random(&fixture.seen, &mut random);
+                let sheets = kernel.sheets();
+                let slabs =
+                    [(); 3].map(|()| random.uniform(f64::from(sheets.start) - 2.0, f64::from(sheets.end) + 1.0));
+                for (k, sheet) in fixture.draw(&[kernel.record], &[0], &slabs.map(|k| k.floor() as i32)) {
+                    let section = match (kernel.section(k), form) {
+                        (Some(section), FootprintForm::Sections) => kernel.stored(section, k),
+                        (section, FootprintForm::SummedArea) => section,
+                        // Stored sections are as thick as those of the central ray: they may reach into sheets that the kernel does not.
+                        (None, FootprintForm::Sections) => continue,
+                    };
+                    let Some(section) = section else {
+                        let most = sheet.iter().map(|pixel| pixel.w).fold(0.0, f64::max);
+                        let is_none = form == FootprintForm::Sections || most <= kernel.rounding(k);
+                        assert!(
+                            is_none,
+                            "{most} in sheet {k} of {sheets:?}, {:?}, {:?}",
+                            fixture.kernel, fixture.scene
+                        );
+                        continue;
+                    };
+                    kernel.draw(&section, k, |pixel, expected, tolerance| {
+                        let error = (sheet[pixel] - expected).abs().max_element();
+                        assert!(
+                            error <= tolerance,
+                            "{section:?} in sheet {k}, {:?}, {:?}, pixel {pixel}: {}, not {expected} ± {tolerance}",
+                            fixture.kernel,
+                            fixture.scene,
+                            sheet[pixel],
+                        );
+                        worst = worst.max(error / tolerance.max(1e-300));
+                        lit += usize::from(expected.w > 0.0);
+                    });
+                    cut += usize::from(kernel.is_cut());
+                }
+            }
+        }
+        println!(
+            "{method:?}, {form:?}: {lit} pixels lit, {cut} sections of cut kernels, errors up to {worst:.3} of the tolerance"
+        );
+        assert!(lit > 10_000 && cut > 3, "only {lit} pixels, {cut} sections of cut kernels");
+    }
 }
 
 /// Pixel centres just inside the rim, where it touches the quad's sides, of a kernel that is not small there: the

@@ -6,14 +6,12 @@ use std::time::Instant;
 use eframe::egui::TextureId;
 use eframe::egui_wgpu::{self, RenderState, WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
 use sheetsplat::error::RenderError;
-use sheetsplat::gpu::device::{self, DeviceError, DeviceRequirements};
-use sheetsplat::renderer::{Renderer, RendererOptions};
-use sheetsplat::scene::Scene;
-use sheetsplat::scene_view::SceneView;
+use sheetsplat::gpu::device::{DeviceError, DeviceRequirements};
+use sheetsplat::headless::device;
 use sheetsplat::stats::Stats;
 use sheetsplat::transfer_function::TransferFunction;
 use sheetsplat::volume::{Grid, Volume};
-use sheetsplat::wgpu;
+use sheetsplat::{Blend, GpuVolume, Placement, Renderer, RendererOptions, Scene, SceneView, wgpu};
 
 use crate::Failure;
 
@@ -43,13 +41,9 @@ pub(super) fn device_options(name: Option<String>) -> WgpuConfiguration {
         device::choose_adapter(&adapters, name.as_deref()).map_err(|error| error.to_string())
     };
     let describe = |adapter: &wgpu::Adapter| {
-        let DeviceRequirements { features, limits } = DeviceRequirements::for_adapter(adapter);
-        wgpu::DeviceDescriptor {
-            label: Some("sheetsplat"),
-            required_features: features,
-            required_limits: limits,
-            ..wgpu::DeviceDescriptor::default()
-        }
+        let mut descriptor = wgpu::DeviceDescriptor { label: Some("sheetsplat"), ..wgpu::DeviceDescriptor::default() };
+        DeviceRequirements::for_adapter(adapter).merge_into(&mut descriptor);
+        descriptor
     };
     let setup = WgpuSetupCreateNew {
         instance_descriptor: device::instance_descriptor(),
@@ -65,14 +59,14 @@ impl Guest {
     pub(super) fn new(host: &RenderState, volume: Volume, scene: &Scene, input: &str) -> Result<Self, Failure> {
         let RenderState { adapter, device, queue, .. } = host;
         let info = adapter.get_info();
-        let options = RendererOptions { target_format: FORMAT, ..RendererOptions::default() };
-        let renderer = match device::scoped(device, || Renderer::new(device, &options)) {
+        let options = RendererOptions { blend: Blend::Replace, ..RendererOptions::for_target(FORMAT) };
+        let renderer = match device::scoped(device, || Renderer::new(device, queue, &options)) {
             (renderer, None) => renderer,
             (_, Some(error)) => Err(DeviceError::Pipelines { adapter: info.name.clone(), error }),
         }
         .map_err(|error| Failure::Other(error.to_string()))?;
-        let view = checked(device, || SceneView::new(device, queue, volume.into(), scene))
-            .map_err(|error| Failure::of(error.into(), input))?;
+        let view = || SceneView::new(device, &GpuVolume::new(device, queue, volume)?, scene);
+        let view = checked(device, view).map_err(|error| Failure::of(error.into(), input))?;
         let stats = Stats { adapter: info.name, backend: info.backend.to_str().to_owned(), ..Stats::default() };
         Ok(Self { host: host.clone(), renderer, view, picture: None, stats })
     }
@@ -132,7 +126,9 @@ impl Guest {
         let Self { view, renderer, host: RenderState { device, queue, .. }, .. } = self;
         let mut encoder =
             device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.frame") });
-        renderer.record(&mut encoder, view, &target);
+        renderer.record(&mut encoder, view);
+        let at = Placement::whole([scene.image.width, scene.image.height]);
+        renderer.present(&mut encoder, view, &target, at);
         queue.submit([encoder.finish()]);
         let counts = view.counts();
         device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| RenderError::Device(error.to_string()))?;

@@ -1,22 +1,30 @@
 //! Rendering without a host: an own device, and images in memory. The only part that creates devices, submits and waits.
 
+pub mod device;
+pub mod readback;
+
 use std::sync::Arc;
 use std::time::Instant;
 
 use wgpu::{Adapter, AdapterInfo, Backends, Device, Instance, Queue, TextureFormat};
 
+use self::device::scoped;
 use crate::error::{Error, RenderError};
-use crate::gpu::device::{self, DeviceError, DeviceRequirements, scoped};
-use crate::gpu::readback;
+use crate::gpu::device::{DeviceError, DeviceRequirements};
+use crate::gpu_volume::GpuVolume;
 use crate::image::Image;
-use crate::renderer::{Renderer, RendererOptions};
+use crate::pick::Pick;
+use crate::placement::Placement;
+use crate::renderer::Renderer;
+use crate::renderer_options::{Blend, RendererOptions};
 use crate::scene::{ImageSettings, Scene};
 use crate::scene_view::SceneView;
+use crate::splatting::Rasterizer;
 use crate::stats::Stats;
 use crate::volume::Volume;
 
 /// How to choose and open a device.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct HeadlessOptions {
     /// Part of the adapter's name, in any case; `None` prefers a GPU to a software driver.
     pub adapter: Option<String>,
@@ -26,9 +34,31 @@ pub struct HeadlessOptions {
     pub sheet_format: Option<TextureFormat>,
     /// Sheets drawn by one quad; see [`RendererOptions`].
     pub sheets_per_group: Option<u32>,
+    /// What scenes that leave the choice are drawn by; see [`RendererOptions`].
+    pub rasterizer: Rasterizer,
     /// Times every stage; see [`RendererOptions`].
     pub profile: bool,
 }
+
+impl HeadlessOptions {
+    /// The most capable adapter, and on it what [`RendererOptions::DETERMINISTIC`] promises.
+    pub const DETERMINISTIC: Self = Self::of(RendererOptions::DETERMINISTIC);
+
+    const fn of(renderer: RendererOptions) -> Self {
+        let RendererOptions { sheet_format, sheets_per_group, rasterizer, profile, .. } = renderer;
+        Self { adapter: None, requirements: None, sheet_format, sheets_per_group, rasterizer, profile }
+    }
+}
+
+/// The most capable adapter, and all that it can do.
+impl Default for HeadlessOptions {
+    fn default() -> Self {
+        Self::of(RendererOptions::for_target(FORMAT))
+    }
+}
+
+/// The target's format.
+const FORMAT: TextureFormat = TextureFormat::Rgba32Float;
 
 /// A device of its own and a renderer on it.
 #[derive(Debug)]
@@ -66,10 +96,12 @@ impl Headless {
         let renderer_options = RendererOptions {
             sheet_format: options.sheet_format,
             sheets_per_group: options.sheets_per_group,
+            rasterizer: options.rasterizer,
             profile: options.profile,
-            ..RendererOptions::default()
+            blend: Blend::Replace,
+            ..RendererOptions::for_target(FORMAT)
         };
-        let renderer = match scoped(&device, || Renderer::new(&device, &renderer_options)) {
+        let renderer = match scoped(&device, || Renderer::new(&device, &queue, &renderer_options)) {
             (renderer, None) => renderer?,
             (_, Some(error)) => return Err(DeviceError::Pipelines { adapter: adapter.get_info().name, error }),
         };
@@ -122,7 +154,7 @@ impl Headless {
     /// # Errors
     /// If the volume is larger than the device's textures, or the device fails.
     pub fn view(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<SceneView, RenderError> {
-        self.scoped(|| SceneView::new(&self.device, &self.queue, volume.into(), scene))
+        self.scoped(|| SceneView::new(&self.device, &GpuVolume::new(&self.device, &self.queue, volume)?, scene))
     }
 
     /// Draws one frame of a view and reads it back.
@@ -131,6 +163,30 @@ impl Headless {
     /// If the scene asks for what the device or the renderer cannot do, or the device fails.
     pub fn draw(&self, view: &mut SceneView) -> Result<Rendering, RenderError> {
         self.scoped(|| self.draw_unscoped(view))
+    }
+
+    /// What the last drawn frame of a view shows first at a pixel, counted from the upper left; `None` where the opacity of
+    /// [`SceneView::set_first_hit`] is not reached.
+    ///
+    /// # Errors
+    /// If the frame has no first hits, the pixel is off the image, or the device fails.
+    pub fn pick(&self, view: &SceneView, pixel: [u32; 2]) -> Result<Option<Pick>, RenderError> {
+        self.scoped(|| {
+            let descriptor = wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.pick") };
+            let mut encoder = self.device.create_command_encoder(&descriptor);
+            let Some(mut pending) = view.pick(&self.device, &mut encoder, pixel) else {
+                let ImageSettings { width, height, .. } = view.scene().image;
+                let allowed = format!("a pixel of {width}×{height}, in a frame with first hits");
+                return Err(RenderError::OutOfRange { key: "pick", found: format!("{pixel:?}"), allowed });
+            };
+            self.queue.submit([encoder.finish()]);
+            // Asks for it, and then it is there.
+            let early = pending.try_get();
+            let failed = |error: wgpu::PollError| RenderError::Readback(error.to_string());
+            self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(failed)?;
+            let missing = || Err(RenderError::Readback("the pick did not arrive".to_owned()));
+            early.or_else(|| pending.try_get()).unwrap_or_else(missing)
+        })
     }
 
     /// What the device reports while `work` runs becomes an error.
@@ -154,14 +210,15 @@ impl Headless {
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
-            format: TextureFormat::Rgba32Float,
+            format: FORMAT,
             usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
             view_formats: &[],
         });
         let view = target.create_view(&wgpu::TextureViewDescriptor::default());
         let mut encoder =
             self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.frame") });
-        self.renderer.record(&mut encoder, scene_view, &view);
+        self.renderer.record(&mut encoder, scene_view);
+        self.renderer.present(&mut encoder, scene_view, &view, Placement::whole([width, height]));
         self.queue.submit([encoder.finish()]);
         let counts = scene_view.counts();
         let bytes = readback::texture(&self.device, &self.queue, &target)?;

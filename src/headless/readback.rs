@@ -1,4 +1,4 @@
-//! Reading buffers and textures back. Blocks: only `headless` and tests call it.
+//! Reading buffers and textures back. Blocks.
 
 use wgpu::{Buffer, BufferUsages, Device, Queue, Texture};
 

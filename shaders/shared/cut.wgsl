@@ -1,0 +1,56 @@
+// What clip planes and a host's surfaces leave of a pixel's ray; `gpu::layout::Cut` documents the fields. A stage that includes this
+// declares `cut: Cut` and `surfaces: texture_depth_2d`.
+struct Cut {
+    sheet_at: vec4f,
+    sheet_along: vec4f,
+    surface_depth: vec4f,
+    surface_w: vec4f,
+    planes: array<vec4f, 24>,
+    surface_origin: vec2u,
+    no_surface: f32,
+    first_hit: f32,
+    unit: f32,
+    none: f32,
+    plane_count: u32,
+    has_surfaces: u32,
+}
+
+// Beyond every depth.
+const FAR = 1e30;
+
+// The sheet depths at which the ray through a point of the image shows something, from and to; from beyond to, if nowhere.
+fn shown(point_px: vec2f) -> vec2f {
+    let at = vec3f(point_px - 0.5 * vec2f(frame.size), 1.0);
+    // Along w.
+    var depths = vec2f(-FAR, FAR);
+    for (var i = 0u; i < cut.plane_count; i += 1u) {
+        let distance = dot(cut.planes[2u * i].xyz, at);
+        let slope = dot(cut.planes[2u * i + 1u].xyz, at);
+        let crossing = -distance / slope;
+        depths.x = select(depths.x, max(depths.x, crossing), slope > 0.0);
+        depths.y = select(depths.y, min(depths.y, crossing), slope < 0.0);
+        depths.y = select(depths.y, -FAR, slope == 0.0 && distance < 0.0);
+    }
+    if cut.has_surfaces != 0u {
+        let z = textureLoad(surfaces, vec2u(point_px) + cut.surface_origin, 0);
+        let ndc = vec4f(at.xy, z, 1.0);
+        let surface = dot(cut.surface_depth, ndc) / dot(cut.surface_w, ndc);
+        depths.y = select(min(depths.y, surface), depths.y, z == cut.no_surface);
+    }
+    let slope = dot(cut.sheet_along.xyz, at);
+    let ends = dot(cut.sheet_at.xyz, at) + slope * depths;
+    // Sheets are counted along w: a ray wide off the axis may meet slices the other way round, or stay in one.
+    let sheets = select(vec2f(min(ends.x, ends.y), max(ends.x, ends.y)), vec2f(-FAR, FAR), slope == 0.0);
+    return select(vec2f(FAR, -FAR), sheets, depths.x < depths.y);
+}
+
+// The depth along w at which the ray through a point of the image meets a sheet depth.
+fn depth_along_ray(point_px: vec2f, sheet_depth: f32) -> f32 {
+    let at = vec3f(point_px - 0.5 * vec2f(frame.size), 1.0);
+    return (sheet_depth - dot(cut.sheet_at.xyz, at)) / dot(cut.sheet_along.xyz, at);
+}
+
+// A first hit in a word; 0 is none.
+fn noted(sheet_depth: f32) -> u32 {
+    return bitcast<u32>(select(sheet_depth, 1e-30, sheet_depth == 0.0));
+}

@@ -1,0 +1,201 @@
+//! Clipping: planes and a crop box that cut parts of a volume away, with all their kernels (§8 of the paper leaves it open; every
+//! viewer has it).
+//!
+//! What is cut is the field that the kernels make, ray by ray: of a pixel's ray a single stretch is inside of all planes, and a
+//! sheet counts there by the share of its slab that the stretch covers. Cuts are as fine as slabs, whatever their direction, and move
+//! without steps. Voxels whose kernels lie outside altogether do not take part.
+//!
+//! A cut face shows what the plane lays open, with the colours that those voxels have inside: gradients are those of the whole volume. The
+//! face is not shaded by the plane's own normal. It is as soft as kernels are, and a voxel in front of the plane shows as far as its
+//! kernel reaches behind it.
+
+use std::ops::Range;
+
+use glam::{DVec3, DVec4, UVec3};
+
+use crate::error::RenderError;
+use crate::volume::Grid;
+
+/// The most planes, beside a crop box.
+pub const MAX_PLANES: usize = 6;
+
+/// What is cut away: nothing, unless planes or a box say so. A point is kept if it is inside of all of them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Clip {
+    /// At most [`MAX_PLANES`]: `[nx, ny, nz, d]` keeps the world points p with `n·p + d ≥ 0`. Normals have any length but 0.
+    pub planes: Vec<[f64; 4]>,
+    /// Corners of the box that is kept, the lesser one first, in world units.
+    pub crop: Option<[DVec3; 2]>,
+}
+
+/// What lies on one side of a plane, in `unit`s (SPEC §2): `normal·p + offset ≥ 0`, with a normal of length 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HalfSpace {
+    /// Points to what is kept.
+    pub normal: DVec3,
+    /// Distance of the volume's centre from the plane, negative if it is cut away.
+    pub offset: f64,
+}
+
+impl Clip {
+    /// Whether nothing is cut away.
+    pub fn is_empty(&self) -> bool {
+        self.planes.is_empty() && self.crop.is_none()
+    }
+
+    /// Checks what types do not say.
+    ///
+    /// # Errors
+    /// If there are too many planes, a normal is 0, a number is not finite, or a box has no volume.
+    pub fn check(&self) -> Result<(), RenderError> {
+        let refused = |key, found: String, allowed: String| Err(RenderError::OutOfRange { key, found, allowed });
+        if self.planes.len() > MAX_PLANES {
+            return refused("clip.planes", format!("{} planes", self.planes.len()), format!("at most {MAX_PLANES}"));
+        }
+        let is_plane = |plane: &&[f64; 4]| normalized(plane).is_some();
+        if let Some(plane) = self.planes.iter().find(|plane| !is_plane(plane)) {
+            let allowed = "[nx, ny, nz, d], finite, with a normal other than 0";
+            return refused("clip.planes", format!("{plane:?}"), allowed.to_owned());
+        }
+        match self.crop {
+            Some([low, high]) if !(low.is_finite() && high.is_finite() && low.cmplt(high).all()) => {
+                let allowed = "[[x, y, z], [x, y, z]], finite, each number of the first below that of the second";
+                refused("clip.crop", format!("{:?}", [low.to_array(), high.to_array()]), allowed.to_owned())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The half spaces whose common part is kept.
+    pub fn half_spaces(&self, grid: &Grid) -> Vec<HalfSpace> {
+        let unit = grid.unit();
+        let planes = self.planes.iter().filter_map(normalized);
+        let crop = self.crop.iter().flat_map(|&[low, high]| {
+            DVec3::AXES.into_iter().flat_map(move |axis| [(axis, -axis.dot(low)), (-axis, axis.dot(high))])
+        });
+        planes.chain(crop).map(|(normal, offset)| HalfSpace { normal, offset: offset / unit }).collect()
+    }
+
+    /// Which voxels may be seen: those whose kernels, of a radius in grid units, reach inside.
+    pub fn voxels(&self, grid: &Grid, radius: f64) -> ClippedVoxels {
+        let planes = self.half_spaces(grid).into_iter().map(|HalfSpace { normal, offset }| {
+            // In the warped grid, where kernels are balls, per grid unit.
+            let warped = normal * grid.aspect();
+            let row = warped.extend(offset - warped.dot(grid.center())) / warped.length();
+            row + radius * DVec4::W
+        });
+        ClippedVoxels { planes: planes.collect() }
+    }
+}
+
+/// A plane with a normal of length 1; `None` if it has none.
+fn normalized(plane: &[f64; 4]) -> Option<(DVec3, f64)> {
+    let [x, y, z, d] = *plane;
+    let normal = DVec3::new(x, y, z);
+    // Scaled first: squares leave the range of f64 long before the numbers do.
+    let largest = normal.abs().max_element();
+    let length = largest * (normal / largest).length();
+    let (normal, offset) = (normal / largest / (length / largest), d / length);
+    (largest > 0.0 && normal.is_finite() && offset.is_finite()).then_some((normal, offset))
+}
+
+/// Which voxels have kernels that reach inside.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ClippedVoxels {
+    /// Rows whose products with (i, j, k, 1) are all at least 0 there.
+    planes: Vec<DVec4>,
+}
+
+impl ClippedVoxels {
+    /// Whether a voxel is one.
+    pub fn contain(&self, voxel: UVec3) -> bool {
+        let voxel = voxel.as_dvec3().extend(1.0);
+        self.planes.iter().all(|plane| plane.dot(voxel) >= 0.0)
+    }
+
+    /// Those of a row of `length` voxels along x, all in one stretch.
+    pub fn in_row(&self, y: u32, z: u32, length: u32) -> Range<u32> {
+        if self.planes.is_empty() {
+            return 0..length;
+        }
+        let from = DVec4::new(0.0, f64::from(y), f64::from(z), 1.0);
+        let (mut first, mut end) = (0.0_f64, f64::from(length));
+        for plane in &self.planes {
+            let crossing = -plane.dot(from) / plane.x;
+            if plane.x > 0.0 {
+                first = first.max(crossing);
+            } else if plane.x < 0.0 {
+                end = end.min(crossing + 1.0);
+            }
+        }
+        // As exact as the test of a voxel: the estimate may be one off.
+        let is_kept = |x: u32| self.contain(UVec3::new(x, y, z));
+        let mut kept =
+            (first - 1.0).clamp(0.0, f64::from(length)) as u32..(end + 1.0).clamp(0.0, f64::from(length)) as u32;
+        while kept.start < kept.end && !is_kept(kept.start) {
+            kept.start += 1;
+        }
+        while kept.start < kept.end && !is_kept(kept.end - 1) {
+            kept.end -= 1;
+        }
+        kept
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use super::*;
+
+    fn grid() -> Grid {
+        Grid { dims: UVec3::new(9, 7, 5), spacing: DVec3::new(2.0, 2.0, 6.0) }
+    }
+
+    #[test]
+    fn a_crop_box_keeps_kernels_that_reach_in() {
+        let crop = Some([DVec3::new(-1.0, -1e9, -1e9), DVec3::new(3.0, 1e9, 6.0)]);
+        let voxels = Clip { crop, ..Clip::default() }.voxels(&grid(), 1.25);
+        // x: voxels are 2 apart, number 4 is the centre, and 1.25 of them are added on either side.
+        let kept: Vec<u32> = (0..9).filter(|&x| voxels.contain(UVec3::new(x, 3, 2))).collect();
+        assert_eq!(kept, [3, 4, 5, 6]);
+        let kept: Vec<u32> = (0..5).filter(|&z| voxels.contain(UVec3::new(4, 3, z))).collect();
+        assert_eq!(kept, [0, 1, 2, 3, 4]);
+    }
+
+    #[test]
+    fn rows_are_what_voxels_are() {
+        let grid = grid();
+        for at in 0..200 {
+            let angle = f64::from(at);
+            let planes = [1.0, 1.7, 2.9].map(|factor: f64| {
+                let (sine, cosine) = (angle * factor).sin_cos();
+                [sine, cosine * factor.sin(), (angle + factor).sin(), 6.0 * (angle * factor).cos()]
+            });
+            let crop = (at % 3 == 0).then_some([DVec3::splat(-5.0), DVec3::splat(4.0)]);
+            let voxels = Clip { planes: planes.to_vec(), crop }.voxels(&grid, 0.5 + f64::from(at % 4));
+            for (y, z) in (0..7).flat_map(|y| (0..5).map(move |z| (y, z))) {
+                let each: Vec<u32> = (0..9).filter(|&x| voxels.contain(UVec3::new(x, y, z))).collect();
+                assert_eq!(voxels.in_row(y, z, 9).collect::<Vec<u32>>(), each, "{planes:?} {crop:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_plane_or_box_is_refused() {
+        let planes = |planes: &[[f64; 4]]| Clip { planes: planes.to_vec(), crop: None };
+        let crop = |low: DVec3, high: DVec3| Clip { planes: Vec::new(), crop: Some([low, high]) };
+        planes(&[[1e-200, 0.0, 0.0, 1e-200]; 6]).check().unwrap();
+        crop(DVec3::ZERO, DVec3::ONE).check().unwrap();
+        for (clip, words) in [
+            (planes(&[[1.0, 0.0, 0.0, 0.0]; 7]), ["clip.planes", "7 planes", "at most 6"]),
+            (planes(&[[0.0, 0.0, 0.0, 1.0]]), ["clip.planes", "[0.0, 0.0, 0.0, 1.0]", "other than 0"]),
+            (planes(&[[f64::NAN, 0.0, 0.0, 1.0]]), ["clip.planes", "NaN", "finite"]),
+            (planes(&[[1.0, 0.0, 0.0, f64::INFINITY]]), ["clip.planes", "inf", "finite"]),
+            (crop(DVec3::ONE, DVec3::new(2.0, 1.0, 2.0)), ["clip.crop", "[2.0, 1.0, 2.0]", "below"]),
+            (crop(DVec3::NAN, DVec3::ONE), ["clip.crop", "NaN", "finite"]),
+        ] {
+            let message = clip.check().unwrap_err().to_string();
+            words.iter().for_each(|word| assert!(message.contains(word), "no {word:?} in {message}"));
+        }
+    }
+}

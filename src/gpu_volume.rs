@@ -1,0 +1,77 @@
+//! A volume on the GPU, shared by any number of views and renderers of one device.
+
+use std::sync::{Arc, OnceLock};
+
+use wgpu::{Device, Queue, TextureView};
+
+use crate::error::RenderError;
+use crate::gpu::volume_texture::VolumeTexture;
+use crate::value_list::ValueList;
+use crate::volume::Volume;
+
+/// A volume and its textures on a device. A clone is the same volume: nothing is uploaded twice.
+#[derive(Clone, Debug)]
+pub struct GpuVolume {
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug)]
+struct Shared {
+    volume: Arc<Volume>,
+    values: VolumeTexture,
+    /// Uploaded when tables first ask for labels.
+    labels: OnceLock<VolumeTexture>,
+    value_list: OnceLock<ValueList>,
+}
+
+impl GpuVolume {
+    /// Uploads a volume's values: 4 bytes a voxel. Labels, 2 bytes a voxel, follow when a view first has tables for some.
+    ///
+    /// # Errors
+    /// If the volume needs more layers than the device's textures have.
+    pub fn new(device: &Device, queue: &Queue, volume: impl Into<Arc<Volume>>) -> Result<Self, RenderError> {
+        let volume = volume.into();
+        let values = VolumeTexture::upload(device, queue, volume.values())?;
+        Ok(Self { shared: Arc::new(Shared { volume, values, labels: OnceLock::new(), value_list: OnceLock::new() }) })
+    }
+
+    /// The volume.
+    pub fn volume(&self) -> &Arc<Volume> {
+        &self.shared.volume
+    }
+
+    /// The voxels sorted by value (Table 1), once for all views. Sorted when first asked for, so that a single frame need not
+    /// wait for it; a program with iso-ranges to move asks when it has loaded the volume.
+    pub fn value_list(&self) -> &ValueList {
+        self.shared.value_list.get_or_init(|| ValueList::new(self.shared.volume.values()))
+    }
+
+    /// Bytes of GPU memory, however many views there are.
+    pub fn gpu_bytes(&self) -> u64 {
+        let textures = [Some(&self.shared.values), self.shared.labels.get()];
+        textures.into_iter().flatten().map(|texture| texture.gpu_bytes).sum()
+    }
+
+    /// The values, `R32Float`.
+    pub(crate) fn values(&self) -> &TextureView {
+        &self.shared.values.view
+    }
+
+    /// The labels, `R16Uint`, if they were uploaded.
+    pub(crate) fn labels(&self) -> Option<&TextureView> {
+        self.shared.labels.get().map(|labels| &labels.view)
+    }
+
+    /// Uploads the labels, if there are any and they are not there yet.
+    ///
+    /// # Errors
+    /// If they need more layers than the device's textures have.
+    pub(crate) fn upload_labels(&self, device: &Device, queue: &Queue) -> Result<(), RenderError> {
+        if let (None, Some(labels)) = (self.shared.labels.get(), self.shared.volume.labels()) {
+            let labels = VolumeTexture::upload_labels(device, queue, labels)?;
+            // Another thread may have been first: its are the same.
+            let _ = self.shared.labels.set(labels);
+        }
+        Ok(())
+    }
+}

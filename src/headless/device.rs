@@ -1,0 +1,46 @@
+//! How a program without a host opens its device: what the command line and a window of its own share.
+
+use wgpu::{Adapter, Backends, Device, DeviceType, ErrorFilter, InstanceDescriptor, InstanceFlags};
+
+use crate::gpu::device::DeviceError;
+
+/// The instance of a program of its own: the drivers that can run the renderer, and what the environment says.
+pub fn instance_descriptor() -> InstanceDescriptor {
+    let mut descriptor = InstanceDescriptor::new_without_display_handle_from_env();
+    // Our own arguments need no validating dispatch before every indirect call.
+    descriptor.flags -= InstanceFlags::VALIDATION_INDIRECT_CALL;
+    descriptor.backends &= Backends::PRIMARY;
+    descriptor
+}
+
+/// The adapter with `name` in its name, in any case, or the most capable one: a GPU before a software driver.
+///
+/// # Errors
+/// If there is none.
+pub fn choose_adapter(adapters: &[Adapter], name: Option<&str>) -> Result<Adapter, DeviceError> {
+    let names: Vec<String> = adapters.iter().map(|adapter| adapter.get_info().name).collect();
+    let wanted = |adapter: &&Adapter| {
+        name.is_none_or(|name| adapter.get_info().name.to_lowercase().contains(&name.to_lowercase()))
+    };
+    let rank = |adapter: &&Adapter| match adapter.get_info().device_type {
+        DeviceType::DiscreteGpu => 0,
+        DeviceType::IntegratedGpu => 1,
+        DeviceType::VirtualGpu => 2,
+        DeviceType::Cpu => 3,
+        DeviceType::Other => 4,
+    };
+    adapters.iter().filter(wanted).min_by_key(rank).cloned().ok_or_else(|| DeviceError::NoAdapter {
+        required: name.map_or("any Vulkan, Metal or DirectX 12 adapter".to_owned(), |name| format!("\"{name}\"")),
+        actual: if names.is_empty() { "none".to_owned() } else { names.join(", ") },
+    })
+}
+
+/// The result of `work`, and the first error that the device reported meanwhile, if any.
+pub fn scoped<T>(device: &Device, work: impl FnOnce() -> T) -> (T, Option<String>) {
+    let scopes = [ErrorFilter::Validation, ErrorFilter::OutOfMemory, ErrorFilter::Internal]
+        .map(|filter| device.push_error_scope(filter));
+    let result = work();
+    // Scopes are a stack: the last pushed is the first popped. All must be popped even after an error.
+    let errors: Vec<_> = scopes.into_iter().rev().filter_map(|scope| pollster::block_on(scope.pop())).collect();
+    (result, errors.first().map(ToString::to_string))
+}

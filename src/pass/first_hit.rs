@@ -1,0 +1,109 @@
+//! Writes the depths of first hits into a texture.
+
+use wgpu::{
+    BindGroup, BindGroupLayout, Buffer, BufferBinding, CommandEncoder, Device, RenderPipeline, ShaderStages, Texture,
+    TextureFormat, TextureUsages, TextureView,
+};
+
+use super::composite::CutBuffers;
+use crate::gpu::bindings::{bind, depth_texture, layout, storage, uniform};
+use crate::gpu::layout::{Cut, Frame};
+use crate::gpu::shaders;
+
+/// Depths, one per pixel.
+pub const FORMAT: TextureFormat = TextureFormat::R32Float;
+
+/// The stage's pipeline.
+#[derive(Debug)]
+pub struct FirstHit {
+    layout: BindGroupLayout,
+    pipeline: RenderPipeline,
+}
+
+impl FirstHit {
+    /// Compiles the stage.
+    pub fn new(device: &Device) -> Self {
+        let stage = ShaderStages::FRAGMENT;
+        let slots = [
+            uniform::<Frame>(stage, false),
+            uniform::<Cut>(stage, false),
+            depth_texture(stage),
+            storage::<u32>(stage, true),
+        ];
+        let (layout, pipeline_layout) = layout(device, "sheetsplat.first_hit", &slots);
+        let module = shaders::FIRST_HIT.module(device);
+        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("sheetsplat.first_hit"),
+            layout: Some(&pipeline_layout),
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("vertex"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                buffers: &[],
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: None,
+            multisample: wgpu::MultisampleState::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some("fragment"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                targets: &[Some(FORMAT.into())],
+            }),
+            multiview_mask: None,
+            cache: None,
+        });
+        Self { layout, pipeline }
+    }
+
+    /// A texture for the depths of an image.
+    pub fn texture(device: &Device, [width, height]: [u32; 2]) -> Texture {
+        device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("sheetsplat.first_hits"),
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: FORMAT,
+            usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_SRC,
+            view_formats: &[],
+        })
+    }
+
+    /// Binds the words of first hits, which start so many bytes into their buffer.
+    pub fn bind(
+        &self,
+        device: &Device,
+        frame: &Buffer,
+        cut: CutBuffers<'_>,
+        (hits, offset): (&Buffer, u64),
+    ) -> BindGroup {
+        let resources = [
+            frame.as_entire_binding(),
+            cut.uniform.as_entire_binding(),
+            wgpu::BindingResource::TextureView(cut.surfaces),
+            wgpu::BindingResource::Buffer(BufferBinding { buffer: hits, offset, size: None }),
+        ];
+        bind(device, "sheetsplat.first_hit", &self.layout, &resources)
+    }
+
+    /// Overwrites the texture.
+    pub fn record(&self, encoder: &mut CommandEncoder, group: &BindGroup, target: &TextureView) {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("sheetsplat.first_hit"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: target,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, group, &[]);
+        pass.draw(0..3, 0..1);
+    }
+}

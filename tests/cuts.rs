@@ -1,0 +1,397 @@
+//! Clip planes, a host's surfaces, and first hits (SPEC is silent; `clip`, `surfaces`): by each rasterizer against the f64 twin, with
+//! culling, against a ray march, and what lists and errors make of them. `cargo test --release --test cuts -- --nocapture` prints what
+//! was measured.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+#[expect(dead_code, reason = "not every file needs all of it")]
+mod common;
+
+use std::sync::Arc;
+
+use glam::{DVec3, UVec2, UVec3};
+use sheetsplat::camera::Projection;
+use sheetsplat::clip::Clip;
+
+use sheetsplat::headless::{Headless, readback};
+use sheetsplat::image::Image;
+use sheetsplat::pick::Pick;
+use sheetsplat::reference::{self, Host, ray_march};
+use sheetsplat::scene::Scene;
+use sheetsplat::scene_view::SceneView;
+use sheetsplat::splatting::{Compositing, Method, Order, Rasterizer};
+use sheetsplat::stats::Counts;
+use sheetsplat::view::View;
+use sheetsplat::volume::{Grid, Volume, builtin};
+
+use common::images::{BLACK, largest_difference, psnr};
+use common::surfaces::{DepthRange, surfaces};
+use common::{RASTERIZERS, Random, SPACINGS, camera, gpu, random_eye, random_volume, scene, transfer};
+
+/// Any view of any volume.
+fn random_case(random: &mut Random) -> (Volume, Scene) {
+    let spacing = random.pick(&SPACINGS);
+    let volume = random_volume(random, (6.0, 16.0), spacing);
+    let mut scene = scene(random.uniform(20.0, 70.0) as u32, random.uniform(20.0, 60.0) as u32);
+    scene.splatting.method = random.pick(&[Method::ImageAligned, Method::ImageAligned, Method::AxisAligned]);
+    match random.bits() % 2 {
+        0 => scene.camera.direction = random.direction(),
+        _ => scene.camera = random_eye(random, volume.grid()),
+    }
+    let (haze, solid) = (random.pick(&[0.0, 0.02, 0.2]), random.pick(&[0.3, 0.9, 1.0]));
+    let opacity = [(5.0, 0.0), (20.0, haze), (200.0, solid)];
+    scene.transfer = transfer(&[(0.0, [0.2, 0.5, 1.0]), (200.0, [1.0, 0.9, 0.8])], &opacity);
+    scene.splatting.compositing = random.pick(&[Compositing::Linear, Compositing::Exponential, Compositing::Xray]);
+    scene.splatting.slab_width = random.pick(&[0.5, 1.0, 2.0]);
+    scene.splatting.radius = random.pick(&[1.4, 2.0, 2.7]);
+    (volume, scene)
+}
+
+/// Up to six planes through the volume, and now and then a box.
+fn random_clip(random: &mut Random, grid: &Grid) -> Clip {
+    let half = grid.center() * grid.spacing;
+    let plane = |random: &mut Random| {
+        let normal = random.direction() * random.uniform(0.1, 5.0);
+        let through = random.within(-half, half) * 0.6;
+        // The side that the centre is on, mostly.
+        let d = -normal.dot(through);
+        let sign = if d < 0.0 && !random.bits().is_multiple_of(4) { -1.0 } else { 1.0 };
+        [normal.x * sign, normal.y * sign, normal.z * sign, d * sign]
+    };
+    let count = random.pick(&[0, 1, 1, 2, 6]);
+    let planes: Vec<[f64; 4]> = (0..count).map(|_| plane(random)).collect();
+    let crop = (planes.is_empty() || random.bits().is_multiple_of(4)).then(|| {
+        let low = random.within(-half, DVec3::ZERO);
+        [low, low + random.within(grid.spacing, half * 1.5 + grid.spacing)]
+    });
+    Clip { planes, crop }
+}
+
+/// Depths of a host's wavy surface around the volume's middle, with holes.
+fn random_surface(random: &mut Random, view: &View, unit: f64) -> Vec<f64> {
+    let middle = view.rays().depth_of(DVec3::ZERO);
+    let size = UVec2::from(view.size);
+    let (slope, wave) = (random.direction() * 8.0 / unit.max(1.0), random.uniform(0.5, 4.0));
+    (0..size.x * size.y)
+        .map(|at| {
+            let place = UVec2::new(at % size.x, at / size.x).as_dvec2() / size.as_dvec2() - 0.5;
+            let is_hole = (place.x * 9.0).sin() * (place.y * 7.0).cos() > 0.6;
+            let depth = middle + slope.x * place.x + slope.y * place.y + wave * (place.x * 20.0).sin();
+            if is_hole { f64::INFINITY } else { depth.max(0.05) }
+        })
+        .collect()
+}
+
+fn view_of(volume: &Volume, scene: &Scene) -> View {
+    let size = [scene.image.width, scene.image.height];
+    View::new(volume.grid(), &scene.camera, &scene.splatting, size).unwrap()
+}
+
+/// Draws a frame, with its first hits in `unit`s if they were asked for.
+fn draw(gpu: &Headless, view: &mut SceneView) -> (Image, Vec<f64>, Counts) {
+    let rendering = gpu.draw(view).unwrap();
+    let unit = view.volume().grid().unit();
+    let hits = view.first_hits().map_or(Vec::new(), |texture| {
+        let bytes = readback::texture(gpu.device(), gpu.queue(), texture).unwrap();
+        bytemuck::pod_collect_to_vec::<_, f32>(&bytes).into_iter().map(|depth| f64::from(depth) / unit).collect()
+    });
+    (rendering.image, hits, rendering.stats.counts)
+}
+
+#[test]
+fn cuts_are_those_of_the_twin() {
+    let gpu = gpu();
+    let mut random = Random(1905);
+    let mut worst = [f64::INFINITY; 2];
+    let mut changed = 0;
+    for case in 0..40 {
+        let (volume, mut scene) = random_case(&mut random);
+        scene.splatting.culling = false;
+        // As few pipelines as show everything.
+        scene.splatting.order = if scene.splatting.compositing == Compositing::Exponential {
+            Order::BackToFront
+        } else {
+            Order::FrontToBack
+        };
+        let unit = volume.grid().unit();
+        let transfer = scene.transfer.resolve(&volume);
+        let whole = reference::render(&volume, &transfer, &scene).unwrap();
+        if case % 3 != 0 {
+            scene.clip = random_clip(&mut random, volume.grid());
+        }
+        let view = view_of(&volume, &scene);
+        let depths = (case % 3 != 1).then(|| random_surface(&mut random, &view, unit));
+        let first_hit = (scene.splatting.order == Order::FrontToBack).then(|| random.pick(&[0.05, 0.5, 0.9]));
+        let host = Host { surfaces: depths.as_deref(), first_hit };
+        let expected = reference::render_for(host, &volume, &transfer, &scene, None).unwrap();
+        changed += usize::from(largest_difference(&whole, &expected.image) > 0.1);
+        let range = random.pick(&[DepthRange::Standard, DepthRange::Reversed, DepthRange::Infinite]);
+        for (rasterizer, worst) in RASTERIZERS.into_iter().zip(&mut worst) {
+            scene.splatting.rasterizer = rasterizer;
+            let mut scene_view = gpu.view(volume.clone(), &scene).unwrap();
+            let origin = [case % 4, case % 5];
+            let planes = [0.01, 1000.0];
+            scene_view
+                .set_surfaces(depths.as_ref().map(|depths| surfaces(&gpu, &view, unit, range, planes, depths, origin)));
+            scene_view.set_first_hit(first_hit);
+            let (image, hits, _) = draw(&gpu, &mut scene_view);
+            let decibels = match psnr(&image.pixels, &expected.image.pixels, BLACK, 0) {
+                // Neither shows anything.
+                decibels if decibels.is_nan() => f64::INFINITY,
+                decibels => decibels,
+            };
+            assert!(decibels >= 60.0, "case {case}, {rasterizer:?}, {range:?}: {decibels:.1} dB with {scene:?}");
+            *worst = worst.min(decibels);
+            assert_eq!(hits.len(), expected.first_hits.len());
+            let off = hits.iter().zip(&expected.first_hits).filter(|(hit, expected)| {
+                // Infinite where nothing is hit.
+                hit != expected && (**hit - **expected).abs() / expected.abs().max(10.0) > 1e-3
+            });
+            let off = off.count();
+            assert!(
+                off <= hits.len() / 200,
+                "case {case}, {rasterizer:?}: {off} of {} hits with {scene:?}",
+                hits.len()
+            );
+        }
+    }
+    println!("cut frames: at least {worst:.1?} dB by {RASTERIZERS:?}");
+    assert!(changed > 20, "cuts show in {changed} cases only");
+}
+
+/// What lies behind a cut is culled as what lies behind opaque voxels.
+#[test]
+fn culling_keeps_its_guarantee() {
+    let gpu = gpu();
+    let mut random = Random(64);
+    let mut fewer = [0; 2];
+    for case in 0..24 {
+        let (volume, mut scene) = random_case(&mut random);
+        scene.splatting.compositing = Compositing::Linear;
+        scene.splatting.opacity_threshold = random.pick(&[0.8, 0.95, 1.0]);
+        scene.clip = if case % 2 == 0 { random_clip(&mut random, volume.grid()) } else { Clip::default() };
+        let view = view_of(&volume, &scene);
+        let unit = volume.grid().unit();
+        let depths = random_surface(&mut random, &view, unit);
+        for (rasterizer, fewer) in RASTERIZERS.into_iter().zip(&mut fewer) {
+            scene.splatting.rasterizer = rasterizer;
+            let [with, without] = [true, false].map(|culling| {
+                scene.splatting.culling = culling;
+                let mut scene_view = gpu.view(volume.clone(), &scene).unwrap();
+                let range = DepthRange::Reversed;
+                scene_view.set_surfaces(Some(surfaces(&gpu, &view, unit, range, [0.01, 1000.0], &depths, [0, 0])));
+                draw(&gpu, &mut scene_view)
+            });
+            let allowed = 1.0 - scene.splatting.opacity_threshold + 2e-5;
+            let difference = largest_difference(&with.0, &without.0);
+            assert!(difference <= allowed, "case {case}, {rasterizer:?}: {difference} > {allowed} with {scene:?}");
+            let [with, without] = [with, without].map(|(_, _, counts)| counts.sections_rasterized);
+            assert!(with <= without);
+            *fewer += usize::from(with < without);
+        }
+    }
+    assert!(fewer.iter().all(|&fewer| fewer > 11), "culling culls in {fewer:?} of 24 cases");
+}
+
+/// A wall in front of everything hides everything, and costs next to nothing; one behind it all changes nothing.
+#[test]
+fn walls() {
+    let gpu = gpu();
+    let volume = Arc::new(builtin::volume("head:48").unwrap());
+    let mut scene = scene(100, 90);
+    scene.camera.direction = DVec3::new(0.4, 0.8, -0.3);
+    let unit = volume.grid().unit();
+    for (rasterizer, projection) in RASTERIZERS.into_iter().flat_map(|rasterizer| {
+        let perspective = Projection::Perspective { fov_y: 40.0, distance: Some(400.0), near: None };
+        [Projection::Orthographic { height: None }, perspective].map(|projection| (rasterizer, projection))
+    }) {
+        (scene.splatting.rasterizer, scene.camera.projection) = (rasterizer, projection);
+        let view = view_of(&volume, &scene);
+        let middle = view.rays().depth_of(DVec3::ZERO);
+        let with_wall = |depth: Option<f64>| {
+            let mut scene_view = gpu.view(volume.clone(), &scene).unwrap();
+            let wall = depth.map(|depth| vec![depth; 9000]);
+            let planes = [middle - 60.0, middle + 90.0];
+            scene_view.set_surfaces(
+                wall.map(|wall| surfaces(&gpu, &view, unit, DepthRange::Standard, planes, &wall, [0, 0])),
+            );
+            draw(&gpu, &mut scene_view)
+        };
+        let (none, behind, before, between) = (
+            with_wall(None),
+            with_wall(Some(middle + 50.0)),
+            with_wall(Some(middle - 50.0)),
+            with_wall(Some(middle - 12.0)),
+        );
+        assert_eq!(none.0, behind.0);
+        assert!(before.0.pixels.iter().all(|&pixel| pixel == BLACK));
+        let [hidden, cut, all] = [&before, &between, &none].map(|(_, _, counts)| counts.sections_rasterized);
+        assert!(hidden < all / 10, "{rasterizer:?}: {hidden} sections behind a wall, {all} without");
+        assert!(cut <= all);
+        // Through the face.
+        let difference = largest_difference(&between.0, &none.0);
+        println!("{rasterizer:?}: {hidden}, {cut}, {all} sections, difference {difference}");
+        assert!(difference > 0.3, "{difference}");
+    }
+}
+
+/// A clipped field is what a ray march through the kept part gathers.
+#[test]
+fn cuts_are_exact_along_rays() {
+    let gpu = gpu();
+    let volume = builtin::volume("tomato:40").unwrap();
+    let mut scene = scene(120, 100);
+    scene.transfer =
+        transfer(&[(40.0, [0.9, 0.2, 0.1]), (220.0, [0.9, 1.0, 0.6])], &[(30.0, 0.0), (90.0, 0.1), (200.0, 0.5)]);
+    scene.splatting.compositing = Compositing::Exponential;
+    scene.splatting.culling = false;
+    scene.splatting.slab_width = 0.5;
+    scene.splatting.rasterizer = Rasterizer::Tiles;
+    let grid = *volume.grid();
+    let half = grid.center() * grid.spacing;
+    let perspective = Projection::Perspective { fov_y: 30.0, distance: None, near: None };
+    for (projection, normal, d) in [
+        (Projection::Orthographic { height: None }, [0.0, 1.0, 0.0], 0.0),
+        (Projection::Orthographic { height: None }, [1.0, 0.3, 0.1], 4.0),
+        (perspective, [0.5, 1.0, 0.4], -3.0),
+        (perspective, [1.0, 0.0, 0.0], 0.0),
+    ] {
+        scene.camera = camera([0.3, 0.9, -0.25], 1.0);
+        scene.camera.projection = projection;
+        scene.clip.planes = vec![[normal[0], normal[1], normal[2], d]];
+        scene.clip.crop = Some([-half * DVec3::new(2.0, 2.0, 0.5), half * 2.0]);
+        let transfer = scene.transfer.resolve(&volume);
+        let pixels: Vec<UVec2> = (0..12_000).step_by(7).map(|at| UVec2::new(at % 120, at / 120)).collect();
+        let marched = ray_march::pixels(&volume, &transfer, &scene, &pixels).unwrap();
+        let image = gpu.render_volume(volume.clone(), &scene).unwrap().image;
+        let drawn: Vec<[f32; 4]> = pixels.iter().map(|at| image.pixels[(at.y * 120 + at.x) as usize]).collect();
+        let decibels = psnr(&drawn, &marched, BLACK, 100);
+        scene.clip = Clip::default();
+        let whole = gpu.render_volume(volume.clone(), &scene).unwrap().image;
+        let whole: Vec<[f32; 4]> = pixels.iter().map(|at| whole.pixels[(at.y * 120 + at.x) as usize]).collect();
+        let unclipped = psnr(&whole, &ray_march::pixels(&volume, &transfer, &scene, &pixels).unwrap(), BLACK, 100);
+        println!("{normal:?} {d}, {projection:?}: {decibels:.1} dB, {unclipped:.1} dB of the whole volume");
+        assert!(decibels >= 38.0, "{decibels:.1} dB");
+    }
+}
+
+/// A plane that moves is a fresh view, and only voxels that enter or leave are touched.
+#[test]
+fn moved_planes_are_fresh_ones() {
+    let gpu = gpu();
+    let volume = Arc::new(builtin::volume("head:40").unwrap());
+    let mut random = Random(12);
+    let mut scene = scene(60, 50);
+    scene.camera.direction = DVec3::new(0.3, 0.8, -0.3);
+    scene.camera.projection = Projection::Orthographic { height: Some(260.0) };
+    let mut view = gpu.view(volume.clone(), &scene).unwrap();
+    let mut last = draw(&gpu, &mut view).2.voxels_in_range;
+    for step in 0..20 {
+        scene.clip = if step == 7 { Clip::default() } else { random_clip(&mut random, volume.grid()) };
+        let touched = view.set_clip(scene.clip.clone()).unwrap();
+        if step % 5 == 4 {
+            scene.splatting.radius = random.pick(&[1.4, 2.0, 3.0]);
+            view.set_splatting(scene.splatting);
+        }
+        let changed = draw(&gpu, &mut view);
+        let count = changed.2.voxels_in_range;
+        if step % 5 != 4 {
+            assert_eq!(count, last + touched.entered - touched.left, "step {step}");
+        }
+        last = count;
+        let fresh = draw(&gpu, &mut gpu.view(volume.clone(), &scene).unwrap());
+        assert_eq!(changed, fresh, "step {step}: {:?}", scene.clip);
+    }
+    // Half a head: what is left.
+    let touched = view.set_clip(Clip { planes: vec![[0.0, 1.0, 0.0, 0.0]], crop: None }).unwrap();
+    let again = view.set_clip(Clip { planes: vec![[0.0, 7.0, 0.0, 0.0]], crop: None }).unwrap();
+    assert!(touched.entered + touched.left > 0);
+    assert_eq!((again.entered, again.left), (0, 0), "the same plane");
+}
+
+/// What is under the cursor.
+#[test]
+fn picks() {
+    let gpu = gpu();
+    let mut values = vec![0.0_f32; 21 * 21 * 21];
+    let grid = Grid { dims: UVec3::splat(21), spacing: DVec3::new(1.0, 2.0, 1.0) };
+    // A plate at y = 12, with values that count up along x.
+    for (x, z) in (0..21).flat_map(|x| (0..21).map(move |z| (x, z))) {
+        values[grid.index_of(UVec3::new(x, 12, z)) as usize] = 100.0 + x as f32;
+    }
+    let volume = Volume::new("plate", grid.dims, grid.spacing, values).unwrap();
+    let mut scene = scene(21, 21);
+    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(50.0, 0.0), (100.0, 1.0)]);
+    for (rasterizer, projection, depth) in RASTERIZERS.into_iter().flat_map(|rasterizer| {
+        [
+            (rasterizer, Projection::Orthographic { height: Some(21.0) }, 4.0),
+            (rasterizer, Projection::Perspective { fov_y: 90.0, distance: Some(6.5), near: None }, 10.5),
+        ]
+    }) {
+        scene.splatting.rasterizer = rasterizer;
+        scene.camera.projection = projection;
+        let mut view = gpu.view(volume.clone(), &scene).unwrap();
+        view.set_first_hit(Some(0.5));
+        gpu.draw(&mut view).unwrap();
+        let picked = gpu.pick(&view, [13, 6]).unwrap().unwrap();
+        // Kernels reach half the opacity before the plate's middle, by less than a voxel.
+        assert!((depth - 2.0..depth).contains(&picked.depth), "{projection:?}: {picked:?}, not {depth}");
+        // Orthographic the pixel is the voxel's; in perspective the plate is 21 units across at 10.5 units.
+        assert_eq!((picked.voxel, picked.value), (UVec3::new(13, 12, 14), 113.0), "{projection:?}: {picked:?}");
+        let plate = DVec3::new(3.0, 4.0, 4.0);
+        assert!((picked.position - plate).abs().cmple(DVec3::new(0.6, 2.0, 0.6)).all(), "{picked:?}");
+        let Pick { label, .. } = picked;
+        assert_eq!(label, None);
+        // Nothing is as opaque as that beside the plate.
+        scene.camera.center = DVec3::new(100.0, 0.0, 0.0);
+        let mut beside = gpu.view(volume.clone(), &scene).unwrap();
+        beside.set_first_hit(Some(0.5));
+        gpu.draw(&mut beside).unwrap();
+        assert_eq!(gpu.pick(&beside, [3, 3]).unwrap(), None);
+        let error = gpu.pick(&beside, [21, 3]).unwrap_err().to_string();
+        assert!(error.contains("[21, 3]") && error.contains("21×21"), "{error}");
+        scene.camera.center = DVec3::ZERO;
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let gpu = gpu();
+    let volume = Arc::new(builtin::volume("head:24").unwrap());
+    let mut scene = scene(40, 30);
+    let unit = volume.grid().unit();
+    let seen = view_of(&volume, &scene);
+    let depths = vec![f64::INFINITY; 1200];
+    let refusal = |scene: &Scene, change: &dyn Fn(&mut SceneView)| {
+        let mut view = gpu.view(volume.clone(), scene).unwrap();
+        change(&mut view);
+        gpu.draw(&mut view).map(|rendering| rendering.stats).unwrap_err().to_string()
+    };
+    let good = surfaces(&gpu, &seen, unit, DepthRange::Standard, [-99.0, 99.0], &depths, [0, 0]);
+    let assert_words = |message: &str, words: &[&str]| {
+        words.iter().for_each(|word| assert!(message.contains(word), "no {word:?} in {message}"));
+    };
+    let mut small = good.clone();
+    small.origin = [4, 1];
+    let message = refusal(&scene, &|view| view.set_surfaces(Some(small.clone())));
+    assert_words(&message, &["surfaces.depth", "43×32", "44×31"]);
+    let mut turned = good.clone();
+    turned.clip_from_world *= glam::DMat4::from_rotation_z(0.01);
+    let message = refusal(&scene, &|view| view.set_surfaces(Some(turned.clone())));
+    assert_words(&message, &["surfaces.clip_from_world", "pixels off the camera's", "0.02"]);
+    let mut broken = good.clone();
+    broken.clip_from_world.x_axis.x = f64::NAN;
+    let message = refusal(&scene, &|view| view.set_surfaces(Some(broken.clone())));
+    assert_words(&message, &["surfaces.clip_from_world"]);
+    for opacity in [0.0, 0.96, f64::NAN] {
+        let message = refusal(&scene, &|view| view.set_first_hit(Some(opacity)));
+        assert_words(&message, &["first_hit", "at most 0.95"]);
+    }
+    let mut backwards = scene.clone();
+    backwards.splatting.order = Order::BackToFront;
+    assert_words(&refusal(&backwards, &|view| view.set_first_hit(Some(0.5))), &["splatting.order", "front-to-back"]);
+    scene.splatting.method = Method::CompositeEverySample;
+    scene.clip.planes = vec![[1.0, 0.0, 0.0, 0.0]];
+    assert_words(&refusal(&scene, &|_| ()), &["splatting.method", "composite-every-sample", "clip planes"]);
+    scene.clip.planes = vec![[1.0, 0.0, 0.0, 0.0]; 7];
+    assert_words(&gpu.view(volume.clone(), &scene).unwrap_err().to_string(), &["clip.planes", "7 planes"]);
+}

@@ -1,0 +1,169 @@
+//! Devices with little, with too little, and options that no device has.
+
+use sheetsplat::gpu::device::{DeviceError, InsufficientLimit};
+use sheetsplat::{Blend, DeviceRequirements, Renderer, RendererOptions};
+use wgpu::{Features, Limits, TextureFormat};
+
+use crate::{Host, OPAQUE, TRANSPARENT, pixels, scene};
+
+const F32: TextureFormat = TextureFormat::Rgba32Float;
+
+fn replacing(format: TextureFormat) -> RendererOptions {
+    RendererOptions { blend: Blend::Replace, ..RendererOptions::for_target(format) }
+}
+
+/// Of what the least devices can do, and those that can do all, the images agree; with every method and rasterizer.
+#[test]
+fn the_least_device_and_webgpus_defaults_do() {
+    let full = Host::new();
+    let least = Limits { max_storage_buffer_binding_size: 16 << 20, ..DeviceRequirements::LEAST.limits };
+    for limits in [least, Limits::default()] {
+        for features in [Features::empty(), Features::SUBGROUP] {
+            let host = Host::with(features, limits.clone());
+            DeviceRequirements::check(&host.device).unwrap();
+            for (key, value) in [
+                ("method", "'image-aligned'"),
+                ("method", "'axis-aligned'"),
+                ("method", "'composite-every-sample'"),
+                ("footprint", "'sections'"),
+            ] {
+                let mut scene = scene(OPAQUE);
+                // Where pixels become opaque, f16 and f32 may see differently.
+                let sets = ["splatting.culling=false".to_owned(), format!("splatting.{key}={value}")];
+                let text = "volume.builtin = 'head:32'";
+                scene.splatting =
+                    sheetsplat::Scene::parse(text, "", std::path::Path::new("."), &sets).unwrap().splatting;
+                let images = [&host, &full].map(|host| {
+                    let renderer = host.renderer(replacing(F32));
+                    pixels(&host.render(&renderer, F32, &mut host.view(&scene)))
+                });
+                let channels = images[0].as_flattened().iter().zip(images[1].as_flattened());
+                let most = channels.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+                // Sheets are f16 ones there.
+                assert!(most < 0.02, "{key} {value} {features:?}: {most}");
+            }
+        }
+    }
+}
+
+#[test]
+fn check_names_all_that_is_too_little() {
+    let limits = Limits {
+        max_texture_dimension_2d: 1024,
+        max_storage_buffers_per_shader_stage: 7,
+        max_compute_invocations_per_workgroup: 128,
+        ..Limits::default()
+    };
+    let host = Host::with(Features::empty(), limits);
+    let expected = [
+        ("max_texture_dimension_2d", 2048, 1024),
+        ("max_storage_buffers_per_shader_stage", 8, 7),
+        ("max_compute_invocations_per_workgroup", 256, 128),
+    ];
+    let expected = expected.map(|(limit, required, actual)| InsufficientLimit { limit, required, actual });
+    for result in
+        [DeviceRequirements::check(&host.device), Renderer::new(&host.device, &host.queue, &replacing(F32)).map(|_| ())]
+    {
+        let error = result.unwrap_err();
+        let message = error.to_string();
+        assert!(message.contains("max_storage_buffers_per_shader_stage: required 8, actual: 7"), "{message}");
+        assert!(matches!(error, DeviceError::Limits(limits) if limits == expected), "{message}");
+    }
+}
+
+#[test]
+fn merging_takes_the_better_of_both() {
+    let mut descriptor = wgpu::DeviceDescriptor {
+        required_features: Features::DEPTH_CLIP_CONTROL,
+        required_limits: Limits {
+            max_texture_dimension_2d: 9000,
+            max_storage_buffers_per_shader_stage: 3,
+            min_uniform_buffer_offset_alignment: 64,
+            ..Limits::default()
+        },
+        ..wgpu::DeviceDescriptor::default()
+    };
+    DeviceRequirements { features: Features::SUBGROUP, limits: Limits::default() }.merge_into(&mut descriptor);
+    assert_eq!(descriptor.required_features, Features::DEPTH_CLIP_CONTROL | Features::SUBGROUP);
+    let expected = Limits {
+        max_texture_dimension_2d: 9000,
+        // Lower is better.
+        min_uniform_buffer_offset_alignment: 64,
+        ..Limits::default()
+    };
+    assert_eq!(descriptor.required_limits, expected);
+}
+
+#[test]
+fn options_that_cannot_be_had_are_named() {
+    let host = Host::with(Features::empty(), Limits::default());
+    let of = RendererOptions::for_target;
+    let depth = |format| RendererOptions { depth_format: Some(format), ..of(TextureFormat::Rgba8Unorm) };
+    let samples = |sample_count, format| RendererOptions { sample_count, ..replacing(format) };
+    let sheets = |sheets| RendererOptions { sheets_per_group: Some(sheets), ..of(TextureFormat::Rgba8Unorm) };
+    let sheet_format = |format| RendererOptions { sheet_format: Some(format), ..of(TextureFormat::Rgba8Unorm) };
+    for (options, option, found) in [
+        (of(TextureFormat::Rgba8Uint), "target_format", "Rgba8Uint"),
+        (of(TextureFormat::Bc7RgbaUnorm), "target_format", "Bc7RgbaUnorm"),
+        (of(TextureFormat::Depth32Float), "target_format", "Depth32Float"),
+        (of(TextureFormat::NV12), "target_format", "NV12"),
+        (of(TextureFormat::Rgba8Snorm), "target_format", "Rgba8Snorm"),
+        (of(TextureFormat::Rgb9e5Ufloat), "target_format", "Rgb9e5Ufloat"),
+        (of(F32), "blend", "Rgba32Float"),
+        (depth(TextureFormat::Rgba8Unorm), "depth_format", "Rgba8Unorm"),
+        (samples(0, TextureFormat::Rgba8Unorm), "sample_count", "0"),
+        (samples(3, TextureFormat::Rgba8Unorm), "sample_count", "3"),
+        (samples(8, TextureFormat::Rgba8Unorm), "sample_count", "8 of Rgba8Unorm"),
+        (samples(4, F32), "sample_count", "4 of Rgba32Float"),
+        (sheets(0), "sheets_per_group", "0"),
+        (sheets(3), "sheets_per_group", "3"),
+        (sheets(8), "sheets_per_group", "8"),
+        (sheet_format(TextureFormat::Rgba8Unorm), "sheet_format", "Rgba8Unorm"),
+    ] {
+        match Renderer::new(&host.device, &host.queue, &options) {
+            Err(error @ DeviceError::Unsupported { .. }) => {
+                let message = error.to_string();
+                let start = format!("{option}: found ");
+                assert!(message.starts_with(&start) && message.contains(found), "{option} {found}: {message}");
+                assert!(message.contains(", allowed: "), "{message}");
+            }
+            other => panic!("{option} {found}: {other:?}"),
+        }
+    }
+    // What they name as allowed is.
+    for options in [replacing(F32), of(TextureFormat::Rgba16Float), samples(4, TextureFormat::Rgba8Unorm), sheets(2)] {
+        host.renderer(options);
+    }
+    Host::new().renderer(of(F32));
+}
+
+/// All formats that every device can render to and blend.
+#[test]
+fn every_renderable_format_will_do() {
+    use TextureFormat::{Bgra8Unorm, R8Unorm, R16Float, Rg8Unorm, Rg16Float, Rgb10a2Unorm, Rgba8Unorm};
+    let host = Host::with(Features::empty(), Limits::default());
+    for format in [R8Unorm, Rg8Unorm, Rgba8Unorm, Bgra8Unorm, Rgb10a2Unorm, R16Float, Rg16Float] {
+        let renderer = host.renderer(RendererOptions::for_target(format));
+        let texels = host.render(&renderer, format, &mut host.view(&scene(OPAQUE)));
+        assert!(texels.iter().any(|&byte| byte != texels[0]), "{format:?}: nothing is to be seen");
+    }
+}
+
+/// One adapter, devices with WebGPU's default limits and with all there is: the same bytes.
+#[test]
+fn deterministic_renderers_do_not_look_at_the_device() {
+    let hosts = [Host::with(Features::empty(), Limits::default()), Host::new()];
+    for background in [OPAQUE, TRANSPARENT] {
+        let scene = scene(background);
+        let images = |options: RendererOptions| {
+            hosts.each_ref().map(|host| {
+                let renderer = host.renderer(options);
+                pixels(&host.render(&renderer, F32, &mut host.view(&scene)))
+            })
+        };
+        let [least, full] = images(RendererOptions::DETERMINISTIC);
+        assert!(least == full, "the same bytes");
+        let [least, full] = images(replacing(F32));
+        assert!(least != full, "devices differ, where they may choose");
+    }
+}
