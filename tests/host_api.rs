@@ -4,10 +4,13 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use sheetsplat::clip::Clip;
 use sheetsplat::gpu::device::DeviceError;
 use sheetsplat::headless::{Headless, Rendering};
 use sheetsplat::image::Image;
+use sheetsplat::pick::PendingPick;
 use sheetsplat::stats::{PendingCounts, Stats};
+use sheetsplat::surfaces::Surfaces;
 use sheetsplat::{
     Camera, DeviceRequirements, GpuVolume, Placement, Renderer, RendererOptions, Scene, SceneView, Volume,
 };
@@ -25,6 +28,8 @@ const _: () = {
     is_send_and_sync::<SceneView>();
     is_send_and_sync::<Scene>();
     is_send_and_sync::<Camera>();
+    is_send_and_sync::<Clip>();
+    is_send_and_sync::<Surfaces>();
     is_send_and_sync::<Volume>();
     is_send_and_sync::<Image>();
     is_send_and_sync::<Stats>();
@@ -33,6 +38,7 @@ const _: () = {
     is_send_and_sync::<sheetsplat::error::Error>();
     // It is asked by one.
     is_send::<PendingCounts>();
+    is_send::<PendingPick>();
 };
 
 /// What only `headless` does: own a device, submit, and wait.
@@ -51,6 +57,10 @@ const ITS_OWN: [&str; 9] = [
 fn sources(folder: &Path, files: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
+        // The programs are hosts themselves.
+        if path.ends_with("src/bin") {
+            continue;
+        }
         if path.is_dir() { sources(&path, files) } else { files.push(path) }
     }
 }
