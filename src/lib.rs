@@ -23,6 +23,7 @@
 //!   occlude  the occlusion buffer: where a whole footprint is behind opaque pixels
 //! at the end:
 //!   resolve  the result over the background, into the host's target
+//!   first_hit  the depths at which an opacity was reached, if asked for
 //! ```
 //!
 //! Both rasterizers draw the same image, to rounding ([`splatting::Rasterizer`]).
@@ -45,6 +46,32 @@
 //! Renderer::record    into the host's encoder: all but the last stage
 //! Renderer::present   the last stage in a pass of its own, at a Placement in the target
 //! Renderer::draw      the same in a pass of the host's
+//! ```
+//!
+//! A host with a scene around the volume makes the camera from its own matrices ([`Camera::from_clip_from_world`]) and hands over its
+//! depth texture ([`SceneView::set_surfaces`]): what lies behind its surfaces is neither shown nor drawn. In turn it may ask for the depth
+//! at which the volume reaches an opacity ([`SceneView::set_first_hit`]), as a texture or for single pixels ([`SceneView::pick`]).
+//! [`clip`] planes and a crop box cut the volume open.
+//!
+//! The README has a whole frame on a host's device. Half a head, and what is at a pixel of it:
+//!
+//! ```
+//! use sheetsplat::Scene;
+//! use sheetsplat::headless::{Headless, HeadlessOptions};
+//! use sheetsplat::scene::VolumeSource;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let settings = ["clip.planes=[[0, 1, 0, 0]]".to_owned(), "image={width=64,height=64}".to_owned()];
+//! let scene = Scene::from_volume(VolumeSource::Builtin("head:48".to_owned()), &settings)?;
+//! let headless = Headless::new(&HeadlessOptions::default())?;
+//! let mut view = headless.view(scene.load_volume()?, &scene)?;
+//! view.set_first_hit(Some(0.5));
+//! headless.draw(&mut view)?;
+//! let pick = headless.pick(&view, [32, 32])?.expect("the head is in the middle");
+//! // On the cut face, to a voxel (of 5.3 units).
+//! assert!(pick.position.y.abs() < 8.0, "{pick:?}");
+//! # Ok(())
+//! # }
 //! ```
 //!
 //! # Glossary
