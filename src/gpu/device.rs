@@ -102,7 +102,7 @@ impl DeviceRequirements {
             max_texture_dimension_2d: volume_texture::SIDE,
             max_texture_array_layers: 128,
             max_storage_buffers_per_shader_stage: 8,
-            max_uniform_buffers_per_shader_stage: 3,
+            max_uniform_buffers_per_shader_stage: 4,
             max_dynamic_uniform_buffers_per_pipeline_layout: 1,
             max_color_attachments: 1,
             max_color_attachment_bytes_per_sample: 16,
