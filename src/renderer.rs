@@ -5,7 +5,8 @@ use std::sync::OnceLock;
 
 use wgpu::{BufferUsages, CommandEncoder, Device, Queue, RenderPass, TextureFormat, TextureView};
 
-use crate::error::RenderError;
+use crate::error::{RenderError, check_device};
+use crate::fault::scoped;
 use crate::gpu::device::{self, DeviceError, DeviceRequirements};
 use crate::gpu::layout::{Frame, Tally};
 use crate::gpu::targets::CompositingBuffer;
@@ -29,6 +30,7 @@ use crate::view::View;
 /// The pipelines of every stage, for one device. Volumes and frames are separate and can be many.
 #[derive(Debug)]
 pub struct Renderer {
+    device: Device,
     sheet_format: TextureFormat,
     sheets: u32,
     rasterizer: Rasterizer,
@@ -49,13 +51,17 @@ impl Renderer {
     /// Compiles what every frame needs; a rasterizer's stages are compiled with the first frame that it draws.
     ///
     /// # Errors
-    /// If limits of the device are not enough, or it cannot do what the options ask for.
+    /// If limits of the device are not enough, or it cannot do what the options ask for, or fails.
     pub fn new(device: &Device, queue: &Queue, options: &RendererOptions) -> Result<Self, DeviceError> {
         DeviceRequirements::check(device)?;
         let sheet_format = device::sheet_format(device, options.sheet_format)?;
         let sheets = device::sheets_per_group(device, sheet_format, options.sheets_per_group)?;
         options.check_target(device)?;
+        let adapter = || device.adapter_info().name;
+        let resolve = scoped(device, || Resolve::new(device, options))
+            .map_err(|fault| DeviceError::Pipelines { adapter: adapter(), fault })?;
         Ok(Self {
+            device: device.clone(),
             sheet_format,
             sheets,
             rasterizer: options.rasterizer,
@@ -64,7 +70,7 @@ impl Renderer {
             quads: OnceLock::new(),
             samples: OnceLock::new(),
             tiles: TileRasterizer::default(),
-            resolve: Resolve::new(device, options),
+            resolve,
             first_hit: OnceLock::new(),
             no_surfaces: OnceLock::new(),
         })
@@ -79,8 +85,21 @@ impl Renderer {
     /// changed (§5.1), buffers if they are too small. A change of colours, opacities or light writes a few hundred bytes.
     ///
     /// # Errors
-    /// If the scene asks for something not implemented, or for more than the device's limits allow.
+    /// If the scene asks for something not implemented, or for more than the device's limits allow, or the device fails. After a
+    /// failure of the device the view has no frame, and is not drawn until it is prepared again: after
+    /// [`OutOfMemory`](crate::fault::DeviceFault::OutOfMemory) with less, after any other by a new renderer.
     pub fn prepare(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
+        check_device(device, &self.device, "the renderer")?;
+        check_device(device, view.volume.gpu_volume().device(), "the view")?;
+        scoped(device, || self.prepare_unscoped(device, queue, view)).unwrap_or_else(|fault| {
+            // What there was no memory for is not valid.
+            view.frame = None;
+            view.volume.lists.forget();
+            Err(fault.into())
+        })
+    }
+
+    fn prepare_unscoped(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
         let SceneView { volume, scene, surfaces, first_hit, frame } = view;
         let splatting = &self.settled(scene.splatting);
         let size = [scene.image.width, scene.image.height];

@@ -57,6 +57,19 @@ pub fn grown(device: &Device, previous: Option<Buffer>, label: &str, size: u64, 
     })
 }
 
+/// A new buffer of `size` bytes that starts with these, of which there is one at least. Where the device gives none, its error scope says
+/// why, and nothing is written.
+pub fn uploaded(device: &Device, label: &str, bytes: &[u8], size: u64, usage: BufferUsages) -> Buffer {
+    let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: true };
+    let buffer = device.create_buffer(&descriptor);
+    if let Ok(mut mapped) = buffer.get_mapped_range_mut(..bytes.len() as u64) {
+        mapped.copy_from_slice(bytes);
+        drop(mapped);
+        buffer.unmap();
+    }
+    buffer
+}
+
 /// The layout of group 0 with the given bindings in order, and the pipeline layout of that group alone.
 pub fn layout(device: &Device, label: &str, slots: &[Slot]) -> (BindGroupLayout, wgpu::PipelineLayout) {
     let entries: Vec<BindGroupLayoutEntry> = (0..)

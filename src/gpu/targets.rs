@@ -1,11 +1,11 @@
 //! What depends on the image's size alone: compositing buffer, sheet buffers, opacity and occlusion buffers.
 
-use wgpu::util::DeviceExt;
 use wgpu::{
     Buffer, BufferUsages, Device, Texture, TextureFormat, TextureUsages, TextureView, TextureViewDescriptor,
     TextureViewDimension,
 };
 
+use super::bindings::uploaded;
 use super::layout::Band;
 use crate::error::RenderError;
 use crate::plan::{TILE, tile_grid};
@@ -151,11 +151,13 @@ impl BandBuffer {
         let band = Band { first_row, rows };
         Self {
             band,
-            uniform: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("sheetsplat.band"),
-                contents: bytemuck::bytes_of(&band),
-                usage: BufferUsages::UNIFORM,
-            }),
+            uniform: uploaded(
+                device,
+                "sheetsplat.band",
+                bytemuck::bytes_of(&band),
+                size_of::<Band>() as u64,
+                BufferUsages::UNIFORM,
+            ),
             acc: device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("sheetsplat.acc"),
                 size: u64::from(width) * u64::from(rows) * ACC_BYTES,

@@ -1,12 +1,11 @@
 //! The quad rasterizer (Fig. 12): for every group of sheets the stages cull, tiles, splat, composite and occlude.
 
-use wgpu::util::DeviceExt;
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, TextureFormat, TextureView};
 
 use super::{Footprints, Given, compute};
 use crate::brick;
 use crate::classified_volume::ClassifiedVolume;
-use crate::gpu::bindings::grown;
+use crate::gpu::bindings::{grown, uploaded};
 use crate::gpu::layout::{Group, Tally};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
@@ -263,11 +262,8 @@ impl Planned {
             })
             .collect();
         let upload = |order: &Vec<u32>| {
-            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("sheetsplat.order"),
-                contents: bytemuck::cast_slice(order),
-                usage: BufferUsages::STORAGE,
-            })
+            let bytes: &[u8] = if order.is_empty() { &[0; 4] } else { bytemuck::cast_slice(order) };
+            uploaded(device, "sheetsplat.order", bytes, bytes.len() as u64, BufferUsages::STORAGE)
         };
         Self { order, revision: volume.revision, orders: plan.orders.iter().map(upload).collect(), most, plan }
     }

@@ -4,6 +4,7 @@
 
 mod dependencies;
 mod devices;
+mod faults;
 mod passes;
 mod sharing;
 mod targets;
