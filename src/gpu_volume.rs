@@ -38,6 +38,12 @@ impl GpuVolume {
         Ok(Self { shared: Arc::new(Shared { device, volume, values, labels, value_list }) })
     }
 
+    /// What [`Self::gpu_bytes`] of a volume of so many voxels, at most 2³² - 1, will be: as long as no view shades by label, and after that.
+    pub fn estimate(voxels: u32) -> [u64; 2] {
+        let [values, labels] = VolumeTexture::estimate(voxels.into());
+        [values, values + labels]
+    }
+
     /// The volume.
     pub fn volume(&self) -> &Arc<Volume> {
         &self.shared.volume

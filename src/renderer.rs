@@ -85,8 +85,9 @@ impl Renderer {
     /// changed (§5.1), buffers if they are too small. A change of colours, opacities or light writes a few hundred bytes.
     ///
     /// # Errors
-    /// If the scene asks for something not implemented, or for more than the device's limits allow, or the device fails. After a
-    /// failure of the device the view has no frame, and is not drawn until it is prepared again: after
+    /// If the scene asks for something not implemented, or for more than the device's limits allow, or the device fails. What is found
+    /// before anything is allocated leaves the view's last frame. After anything else, and a failure of the device always, the view has no
+    /// frame, and is not drawn until it is prepared again: after
     /// [`OutOfMemory`](crate::fault::DeviceFault::OutOfMemory) with less, after any other by a new renderer.
     pub fn prepare(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
         check_device(device, &self.device, "the renderer")?;
@@ -131,14 +132,14 @@ impl Renderer {
             });
         let Some(compositing) = compositing.or(old_compositing) else { unreachable!("made where there was none") };
         let ramps = Ramps::new(volume.transfer());
-        let filled = |old, label, bytes: &[u8], usage| filled(device, queue, old, label, bytes, usage);
+        let filled = |old, label: &'static str, bytes: &[u8], usage| filled(device, queue, old, label, bytes, usage);
         let points = bytemuck::cast_slice(&ramps.points);
-        let control_points = filled(control_points, "sheetsplat.control_points", points, BufferUsages::STORAGE);
+        let control_points = filled(control_points, "sheetsplat.control_points", points, BufferUsages::STORAGE)?;
         let frame_uniform = uniforms::frame(&seen, &kernel, volume.grid(), &ramps, scene);
         let bytes = bytemuck::bytes_of(&frame_uniform);
-        let uniform = filled(uniform, "sheetsplat.frame", bytes, BufferUsages::UNIFORM);
+        let uniform = filled(uniform, "sheetsplat.frame", bytes, BufferUsages::UNIFORM)?;
         let cut_uniform = uniforms::cut(&seen, &grid, &scene.clip, depths, *first_hit);
-        let cut = filled(cut, "sheetsplat.cut", bytemuck::bytes_of(&cut_uniform), BufferUsages::UNIFORM);
+        let cut = filled(cut, "sheetsplat.cut", bytemuck::bytes_of(&cut_uniform), BufferUsages::UNIFORM)?;
         let cut_buffers = CutBuffers {
             uniform: &cut,
             surfaces: match surfaces {
@@ -183,11 +184,13 @@ impl Renderer {
             usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
             mapped_at_creation: false,
         });
+        let timer_bytes = timer.as_ref().map_or(0, Timer::gpu_bytes);
         let pixels = u64::from(size[0]) * u64::from(size[1]);
         let hit_bytes = first_hits.as_ref().map_or(0, |_| 4 * pixels);
         let shared_bytes = compositing.gpu_bytes() + uniform.size() + control_points.size() + cut.size() + hit_bytes;
+        let count_bytes = staging.size() + timer_bytes;
         *frame = Some(PreparedFrame {
-            gpu_bytes: volume.gpu_bytes() + drawing.gpu_bytes() + shared_bytes,
+            gpu_bytes: volume.gpu_bytes() + drawing.gpu_bytes() + shared_bytes + count_bytes,
             sheets: (self.sheet_format, self.sheets),
             resolve_groups: compositing.bands.iter().map(|band| self.resolve.bind(device, &uniform, band)).collect(),
             view: seen,
@@ -230,7 +233,7 @@ impl Renderer {
                 Err(_) => {}
             }
         }
-        let (frame, prepared) = self.quads(given.device).prepare(given, old_quads);
+        let (frame, prepared) = self.quads(given.device).prepare(given, old_quads)?;
         Ok((Drawing::Quads(Box::new(frame)), prepared))
     }
 

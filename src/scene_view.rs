@@ -166,7 +166,8 @@ impl SceneView {
     }
 
     /// Bytes of GPU memory that the view holds, with the volume's, which other views may share: without those it is that less
-    /// [`GpuVolume::gpu_bytes`].
+    /// [`GpuVolume::gpu_bytes`]. All of it is given back when view and volume are dropped and what was submitted is done. A buffer that
+    /// a frame needs no more than a part of is kept, at most 4 times as large as a new view's; textures always fit.
     pub fn gpu_bytes(&self) -> u64 {
         self.frame.as_ref().map_or(self.volume.gpu_bytes(), PreparedFrame::gpu_bytes)
     }
