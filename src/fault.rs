@@ -87,7 +87,7 @@ fn is_lost(device: &Device) -> bool {
 
 /// What a future that is ready gives; `None` of one that is not.
 fn now<T>(future: impl Future<Output = Option<T>>) -> Option<T> {
-    match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
+    match Future::poll(pin!(future), &mut Context::from_waker(Waker::noop())) {
         Poll::Ready(result) => result,
         Poll::Pending => None,
     }
