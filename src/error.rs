@@ -1,5 +1,8 @@
 //! Errors of the renderer. Loading errors live with the volume and the scene.
 
+use wgpu::Device;
+
+use crate::fault::DeviceFault;
 use crate::gpu::device::DeviceError;
 use crate::scene::SceneError;
 use crate::tile_bins::Unfit;
@@ -31,12 +34,21 @@ pub enum RenderError {
         /// What the device allows.
         actual: u64,
     },
-    /// The device reported an error: out of memory, or a bug that its validation found.
-    #[error("device error: {0}")]
-    Device(String),
-    /// The GPU stopped working, or refused to hand the image back.
+    /// The device failed: it is lost, or out of memory, or found a mistake.
+    #[error(transparent)]
+    Device(#[from] DeviceFault),
+    /// What was drawn did not come back.
     #[error("read-back failed: {0}")]
     Readback(String),
+}
+
+/// Checks that something is on the device that is to work with it: wgpu may panic if not.
+pub(crate) fn check_device(device: &Device, of: &Device, what: &str) -> Result<(), RenderError> {
+    if device == of {
+        return Ok(());
+    }
+    let (found, allowed) = (format!("another one than that of {what}"), format!("the device of {what}"));
+    Err(RenderError::OutOfRange { key: "device", found, allowed })
 }
 
 impl From<Unfit> for RenderError {

@@ -6,6 +6,7 @@ use wgpu::{Adapter, Device, DeviceDescriptor, Features, Limits, TextureFormat};
 
 use super::layout::FOLD;
 use super::volume_texture;
+use crate::fault::DeviceFault;
 
 /// Why no device could be used.
 #[derive(Debug, thiserror::Error)]
@@ -28,12 +29,12 @@ pub enum DeviceError {
         source: wgpu::RequestDeviceError,
     },
     /// The device could not compile the renderer.
-    #[error("adapter \"{adapter}\" cannot run the renderer: {error}")]
+    #[error("adapter \"{adapter}\" cannot run the renderer: {fault}")]
     Pipelines {
         /// The adapter's name.
         adapter: String,
-        /// What wgpu said.
-        error: String,
+        /// What the device reported.
+        fault: DeviceFault,
     },
     /// A feature is missing that the options ask for.
     #[error("device feature: required {required:?}, actual: {actual:?}")]

@@ -1,6 +1,6 @@
 //! How a program without a host opens its device: what the command line and a window of its own share.
 
-use wgpu::{Adapter, Backends, Device, DeviceType, ErrorFilter, InstanceDescriptor, InstanceFlags};
+use wgpu::{Adapter, Backends, DeviceType, InstanceDescriptor, InstanceFlags};
 
 use crate::gpu::device::DeviceError;
 
@@ -33,14 +33,4 @@ pub fn choose_adapter(adapters: &[Adapter], name: Option<&str>) -> Result<Adapte
         required: name.map_or("any Vulkan, Metal or DirectX 12 adapter".to_owned(), |name| format!("\"{name}\"")),
         actual: if names.is_empty() { "none".to_owned() } else { names.join(", ") },
     })
-}
-
-/// The result of `work`, and the first error that the device reported meanwhile, if any.
-pub fn scoped<T>(device: &Device, work: impl FnOnce() -> T) -> (T, Option<String>) {
-    let scopes = [ErrorFilter::Validation, ErrorFilter::OutOfMemory, ErrorFilter::Internal]
-        .map(|filter| device.push_error_scope(filter));
-    let result = work();
-    // Scopes are a stack: the last pushed is the first popped. All must be popped even after an error.
-    let errors: Vec<_> = scopes.into_iter().rev().filter_map(|scope| pollster::block_on(scope.pop())).collect();
-    (result, errors.first().map(ToString::to_string))
 }

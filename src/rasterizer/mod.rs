@@ -8,6 +8,7 @@ pub(crate) mod tiles;
 use wgpu::{Buffer, BufferUsages, ComputePassDescriptor, Device, Queue};
 
 use crate::classified_volume::ClassifiedVolume;
+use crate::error::RenderError;
 use crate::footprint::FootprintTable;
 use crate::gpu::bindings::grown;
 use crate::gpu::footprint_texture::FootprintTexture;
@@ -41,8 +42,14 @@ pub(crate) struct Given<'a> {
 }
 
 impl Given<'_> {
-    /// A buffer with these contents, the old one if it has the right size.
-    fn filled(&self, old: Option<Buffer>, label: &str, bytes: &[u8], usage: BufferUsages) -> Buffer {
+    /// See [`filled`].
+    fn filled(
+        &self,
+        old: Option<Buffer>,
+        label: &'static str,
+        bytes: &[u8],
+        usage: BufferUsages,
+    ) -> Result<Buffer, RenderError> {
         filled(self.device, self.queue, old, label, bytes, usage)
     }
 }
@@ -72,18 +79,21 @@ impl Footprints {
 }
 
 /// A buffer with these contents, the old one if it has the right size.
+///
+/// # Errors
+/// If the device's buffers may not be that large.
 pub(crate) fn filled(
     device: &Device,
     queue: &Queue,
     old: Option<Buffer>,
-    label: &str,
+    label: &'static str,
     bytes: &[u8],
     usage: BufferUsages,
-) -> Buffer {
+) -> Result<Buffer, RenderError> {
     // Of one element at least: bindings may not be empty.
-    let buffer = grown(device, old, label, (bytes.len() as u64).max(8), usage | BufferUsages::COPY_DST);
+    let buffer = grown(device, old, label, (bytes.len() as u64).max(8), usage | BufferUsages::COPY_DST)?;
     queue.write_buffer(&buffer, 0, bytes);
-    buffer
+    Ok(buffer)
 }
 
 /// A compute pass that is timed if anything is.
