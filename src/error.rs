@@ -1,12 +1,8 @@
-//! Errors of the renderer. Loading errors live with the volume and the scene.
+//! Errors of the renderer. Loading errors live with the volume and the scene, and all of them together with [`headless`](crate::headless).
 
 use wgpu::Device;
 
 use crate::fault::DeviceFault;
-use crate::gpu::device::DeviceError;
-use crate::scene::SceneError;
-use crate::tile_bins::Unfit;
-use crate::volume::VolumeError;
 
 /// Why a frame could not be prepared or read back.
 #[derive(Debug, thiserror::Error)]
@@ -49,32 +45,4 @@ pub(crate) fn check_device(device: &Device, of: &Device, what: &str) -> Result<(
     }
     let (found, allowed) = (format!("another one than that of {what}"), format!("the device of {what}"));
     Err(RenderError::OutOfRange { key: "device", found, allowed })
-}
-
-impl From<Unfit> for RenderError {
-    fn from(Unfit { what, required, actual }: Unfit) -> Self {
-        Self::OutOfRange {
-            key: "splatting.rasterizer",
-            found: format!("\"tiles\" with {required} {what}"),
-            allowed: format!("at most {actual}, or \"quads\""),
-        }
-    }
-}
-
-/// Anything that can go wrong between a scene file and its image.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum Error {
-    /// The scene.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The volume.
-    #[error(transparent)]
-    Volume(#[from] VolumeError),
-    /// The device.
-    #[error(transparent)]
-    Device(#[from] DeviceError),
-    /// The frame.
-    #[error(transparent)]
-    Render(#[from] RenderError),
 }

@@ -17,7 +17,7 @@ use crate::pass::composite::{CutBuffers, RayMode};
 use crate::pass::first_hit::FirstHit;
 use crate::pass::resolve::Resolve;
 use crate::placement::Placement;
-use crate::prepared_frame::{Drawing, FirstHits, PreparedFrame, Staging};
+use crate::prepared_frame::{Drawing, FirstHits, PreparedFrame};
 use crate::rasterizer::quads::QuadRasterizer;
 use crate::rasterizer::samples::SampleRasterizer;
 use crate::rasterizer::tiles::TileRasterizer;
@@ -25,6 +25,7 @@ use crate::rasterizer::{Given, filled};
 use crate::renderer_options::RendererOptions;
 use crate::scene_view::{Prepared, SceneView};
 use crate::splatting::{Compositing, Economies, FootprintBox, Method, Order, Rasterizer, Splatting};
+use crate::stats::Staging;
 use crate::view::View;
 
 /// The pipelines of every stage, for one device. Volumes and frames are separate and can be many.

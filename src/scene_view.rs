@@ -10,6 +10,7 @@ use crate::fault::scoped;
 use crate::gpu_volume::GpuVolume;
 use crate::pick::PendingPick;
 use crate::prepared_frame::PreparedFrame;
+pub use crate::rasterizer::Prepared;
 use crate::scene::{ImageSettings, Scene};
 use crate::shading::{Light, Shading};
 use crate::splatting::Splatting;
@@ -26,15 +27,6 @@ pub struct SceneView {
     pub(crate) surfaces: Option<Surfaces>,
     pub(crate) first_hit: Option<f64>,
     pub(crate) frame: Option<PreparedFrame>,
-}
-
-/// What [`Renderer::prepare`](crate::renderer::Renderer::prepare) had to do.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Prepared {
-    /// Whether bricks were sorted into buckets.
-    pub bucketed: bool,
-    /// Whether a footprint table was made: for another kernel, or by sections for another slab width (§3.3.1).
-    pub tabled: bool,
 }
 
 impl SceneView {

@@ -1,6 +1,7 @@
 //! Rendering without a host: an own device, and images in memory. The only part that creates devices, submits and waits.
 
 pub mod device;
+mod error;
 pub mod readback;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -9,7 +10,8 @@ use std::time::Instant;
 
 use wgpu::{Adapter, AdapterInfo, Backends, Device, Instance, Queue, TextureFormat};
 
-use crate::error::{Error, RenderError};
+pub use self::error::Error;
+use crate::error::RenderError;
 use crate::fault::{DeviceFault, scoped};
 use crate::gpu::device::{DeviceError, DeviceRequirements};
 use crate::gpu_volume::GpuVolume;

@@ -19,6 +19,15 @@ use crate::pass::composite::{CutBuffers, RayMode};
 use crate::splatting::{FootprintForm, Splatting};
 use crate::view::View;
 
+/// What [`Renderer::prepare`](crate::renderer::Renderer::prepare) had to do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Prepared {
+    /// Whether bricks were sorted into buckets.
+    pub bucketed: bool,
+    /// Whether a footprint table was made: for another kernel, or by sections for another slab width (§3.3.1).
+    pub tabled: bool,
+}
+
 /// What a rasterizer prepares a frame from.
 #[derive(Clone, Copy)]
 pub(crate) struct Given<'a> {

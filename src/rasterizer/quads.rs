@@ -2,7 +2,7 @@
 
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, TextureFormat, TextureView};
 
-use super::{Footprints, Given, compute};
+use super::{Footprints, Given, Prepared, compute};
 use crate::brick;
 use crate::classified_volume::ClassifiedVolume;
 use crate::error::RenderError;
@@ -17,7 +17,6 @@ use crate::pass::occlude::Occlude;
 use crate::pass::splat::{Splat, SplatMode};
 use crate::pass::tiles::{TileLists, Tiles};
 use crate::plan::FramePlan;
-use crate::scene_view::Prepared;
 use crate::splatting::Order;
 use crate::stats::GroupSlabs;
 use crate::view::View;

@@ -5,7 +5,7 @@ use glam::{DVec2, UVec3};
 use rayon::prelude::*;
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, TextureFormat, TextureView};
 
-use super::{Footprints, Given, compute};
+use super::{Footprints, Given, Prepared, compute};
 use crate::brick::{self, BRICK_VOXELS};
 use crate::error::RenderError;
 use crate::gpu::bindings::grown;
@@ -17,7 +17,6 @@ use crate::pass::composite::{Composite, CompositeBuffers, RayMode};
 use crate::pass::sample::{Sample, SampleBuffers, SampleMode};
 use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};
 use crate::plan::tile_grid;
-use crate::scene_view::Prepared;
 use crate::splatting::Compositing;
 use crate::stats::GroupSlabs;
 use crate::view::View;

@@ -4,14 +4,13 @@ use std::mem::offset_of;
 
 use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Features};
 
-use super::Given;
+use super::{Given, Prepared};
 use crate::error::RenderError;
 use crate::gpu::bindings::grown;
 use crate::gpu::layout::{Brick, Gathered, Part, Tally};
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
 use crate::pass::gather::{Gather, GatherBand, GatherBuffers, GatherMode};
-use crate::scene_view::Prepared;
 use crate::splatting::{FootprintForm, Method, Order, Splatting};
 use crate::stats::GroupSlabs;
 use crate::tile_bins::{SHEETS, SIDE, TileBins};

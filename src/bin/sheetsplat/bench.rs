@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use serde::Serialize;
-use sheetsplat::error::Error;
+use sheetsplat::headless::Error;
 use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::stats::Stats;
 

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::ValueEnum;
-use sheetsplat::error::{Error, RenderError};
-use sheetsplat::headless::{Headless, HeadlessOptions, Rendering};
+use sheetsplat::error::RenderError;
+use sheetsplat::headless::{Error, Headless, HeadlessOptions, Rendering};
 use sheetsplat::image::{Image, ImageError, PngDepth, aside};
 use sheetsplat::reference;
 use sheetsplat::scene::{Scene, SceneError, VolumeSource};
