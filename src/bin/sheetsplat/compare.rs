@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use sheetsplat::golden::{Comparison, ComparisonError, Picture, Tolerance};
 use sheetsplat::image::{Image, PngDepth};
 
-use crate::Failure;
+use crate::failure::Failure;
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {

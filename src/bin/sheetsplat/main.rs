@@ -1,7 +1,9 @@
 //! The command line program.
 
+mod arguments;
 mod bench;
 mod compare;
+mod failure;
 mod render;
 #[cfg(feature = "viewer")]
 mod view;
@@ -10,6 +12,8 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+use failure::Failure;
 
 /// Volume rendering by image-aligned sheet-buffer splatting.
 #[derive(Parser)]
@@ -27,17 +31,9 @@ enum Command {
     Bench(bench::Arguments),
     /// Compare two images: prints what they differ in, exit code 1 if by more than is allowed.
     Compare(compare::Arguments),
-    /// Show a scene in a window, to be turned and changed.
+    /// Show a scene in a window, to be turned and changed; its image size is not looked at.
     #[cfg(feature = "viewer")]
     View(view::Arguments),
-}
-
-/// What went wrong, by whose fault.
-enum Failure {
-    /// Bad usage or bad input: exit code 2.
-    Input(String),
-    /// Anything else: exit code 1.
-    Other(String),
 }
 
 fn main() -> ExitCode {
@@ -56,13 +52,5 @@ fn main() -> ExitCode {
     match failure {
         Failure::Input(_) => ExitCode::from(2),
         Failure::Other(_) => ExitCode::FAILURE,
-    }
-}
-
-impl Failure {
-    fn message(&self) -> &str {
-        match self {
-            Self::Input(message) | Self::Other(message) => message,
-        }
     }
 }
