@@ -9,6 +9,7 @@ mod extremes;
 #[expect(dead_code, reason = "not every file needs all of it")]
 #[path = "../common/images.rs"]
 mod images;
+mod orbit;
 mod outputs;
 mod rasterizers;
 mod statistics;
@@ -80,19 +81,20 @@ impl Folder {
 
     /// With environment variables.
     fn run_with(&self, environment: &[(&str, &str)], folder: &str, arguments: &str) -> Run {
-        let output = Command::new(env!("CARGO_BIN_EXE_sheetsplat"))
-            .env("WGPU_ADAPTER_NAME", "llvmpipe")
-            .envs(environment.iter().copied())
-            .args(arguments.split(' '))
-            .current_dir(self.path(folder))
-            .output()
-            .unwrap();
+        let output = self.command(arguments).envs(environment.iter().copied()).current_dir(self.path(folder)).output();
+        let output = output.unwrap();
         Run {
             arguments: arguments.to_owned(),
             code: output.status.code(),
             stdout: String::from_utf8(output.stdout).unwrap(),
             stderr: String::from_utf8(output.stderr).unwrap(),
         }
+    }
+
+    fn command(&self, arguments: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_sheetsplat"));
+        command.env("WGPU_ADAPTER_NAME", "llvmpipe").args(arguments.split(' ')).current_dir(&self.0);
+        command
     }
 
     /// Renders what must succeed.
@@ -161,6 +163,7 @@ fn help_and_version_are_results() {
         ("--help", "bench"),
         ("render --help", "--set"),
         ("bench --help", "--frames"),
+        ("orbit --help", "--count"),
         ("compare --help", "--outliers"),
         ("--version", env!("CARGO_PKG_VERSION")),
     ] {

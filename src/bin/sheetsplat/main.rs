@@ -4,6 +4,8 @@ mod arguments;
 mod bench;
 mod compare;
 mod failure;
+mod orbit;
+mod progress;
 mod render;
 #[cfg(feature = "viewer")]
 mod view;
@@ -21,12 +23,17 @@ use failure::Failure;
 struct Arguments {
     #[command(subcommand)]
     command: Command,
+    /// Show no progress.
+    #[arg(short, long, global = true)]
+    quiet: bool,
 }
 
 #[derive(Subcommand)]
 enum Command {
     /// Render a scene file, a volume file, or a builtin volume to an image.
     Render(render::Arguments),
+    /// Draw a turntable: numbered images or a movie of the camera turning about its up.
+    Orbit(orbit::Arguments),
     /// Time a first frame and turning frames; prints one line of JSON.
     Bench(bench::Arguments),
     /// Compare two images: prints what they differ in, exit code 1 if by more than is allowed.
@@ -39,8 +46,10 @@ enum Command {
 fn main() -> ExitCode {
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("error")).init();
     // Clap itself exits with 2 on bad usage, with 0 on --help.
-    let result = match Arguments::parse().command {
+    let Arguments { command, quiet } = Arguments::parse();
+    let result = match command {
         Command::Render(arguments) => render::run(&arguments),
+        Command::Orbit(arguments) => orbit::run(&arguments, quiet),
         Command::Bench(arguments) => bench::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         #[cfg(feature = "viewer")]
