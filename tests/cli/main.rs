@@ -13,6 +13,7 @@ mod orbit;
 mod outputs;
 mod rasterizers;
 mod statistics;
+mod sweep;
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -164,6 +165,7 @@ fn help_and_version_are_results() {
         ("render --help", "--set"),
         ("bench --help", "--frames"),
         ("orbit --help", "--count"),
+        ("sweep --help", "--columns"),
         ("compare --help", "--outliers"),
         ("--version", env!("CARGO_PKG_VERSION")),
     ] {

@@ -7,6 +7,7 @@ mod failure;
 mod orbit;
 mod progress;
 mod render;
+mod sweep;
 #[cfg(feature = "viewer")]
 mod view;
 
@@ -34,6 +35,8 @@ enum Command {
     Render(render::Arguments),
     /// Draw a turntable: numbered images or a movie of the camera turning about its up.
     Orbit(orbit::Arguments),
+    /// Draw a contact sheet: --set KEY=A,B,C gives a tile for each value, two of them a grid.
+    Sweep(sweep::Arguments),
     /// Time a first frame and turning frames; prints one line of JSON.
     Bench(bench::Arguments),
     /// Compare two images: prints what they differ in, exit code 1 if by more than is allowed.
@@ -50,6 +53,7 @@ fn main() -> ExitCode {
     let result = match command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments, quiet),
+        Command::Sweep(arguments) => sweep::run(&arguments, quiet),
         Command::Bench(arguments) => bench::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         #[cfg(feature = "viewer")]

@@ -126,10 +126,10 @@ fn draw(
         return Ok(());
     }
     let Arguments { input, turn, count, .. } = arguments;
-    let mut progress = Progress::new(frames.len(), quiet);
     let volume = input.load_volume(scene)?;
     let headless = input.headless(false)?;
     let mut view = headless.view(volume, scene).map_err(|error| input.failure(error))?;
+    let mut progress = Progress::new(frames.len(), quiet);
     for &frame in frames {
         // From where the scene's camera is, whichever frame was drawn before.
         view.set_camera(scene.camera.turned(turn * f64::from(frame) / f64::from(*count)));
