@@ -1,6 +1,8 @@
 //! How a program without a host opens its device: what the command line and a window of its own share.
 
-use wgpu::{Adapter, Backends, Device, DeviceType, ErrorFilter, InstanceDescriptor, InstanceFlags};
+use wgpu::{
+    Adapter, AdapterInfo, Backends, Device, DeviceType, ErrorFilter, Instance, InstanceDescriptor, InstanceFlags,
+};
 
 use crate::gpu::device::DeviceError;
 
@@ -11,6 +13,17 @@ pub fn instance_descriptor() -> InstanceDescriptor {
     descriptor.flags -= InstanceFlags::VALIDATION_INDIRECT_CALL;
     descriptor.backends &= Backends::PRIMARY;
     descriptor
+}
+
+/// The adapters of [`instance_descriptor`]'s instance.
+pub fn adapters() -> Vec<Adapter> {
+    let instance = Instance::new(instance_descriptor());
+    pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY))
+}
+
+/// An adapter's driver, and its version where it tells.
+pub fn driver_name(info: &AdapterInfo) -> String {
+    format!("{} {}", info.driver, info.driver_info).trim().to_owned()
 }
 
 /// The adapter with `name` in its name, in any case, or the most capable one: a GPU before a software driver.

@@ -6,9 +6,9 @@ pub mod readback;
 use std::sync::Arc;
 use std::time::Instant;
 
-use wgpu::{Adapter, AdapterInfo, Backends, Device, Instance, Queue, TextureFormat};
+use wgpu::{Adapter, Device, Queue, TextureFormat};
 
-use self::device::scoped;
+use self::device::{driver_name, scoped};
 use crate::error::{Error, RenderError};
 use crate::gpu::device::{DeviceError, DeviceRequirements};
 use crate::gpu_volume::GpuVolume;
@@ -257,14 +257,7 @@ impl Drop for Headless {
 
 /// The adapter with `name` in its name, or the most capable one.
 fn choose_adapter(name: Option<&str>) -> Result<Adapter, DeviceError> {
-    let instance = Instance::new(device::instance_descriptor());
-    let adapters = pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY));
-    device::choose_adapter(&adapters, name)
-}
-
-/// An adapter's driver, and its version where it tells.
-pub(crate) fn driver_name(info: &AdapterInfo) -> String {
-    format!("{} {}", info.driver, info.driver_info).trim().to_owned()
+    device::choose_adapter(&device::adapters(), name)
 }
 
 fn milliseconds_since(start: Instant) -> f64 {

@@ -11,6 +11,7 @@ mod extremes;
 mod images;
 mod orbit;
 mod outputs;
+mod program;
 mod rasterizers;
 mod statistics;
 mod sweep;
@@ -155,22 +156,3 @@ const RASTERIZERS: [&str; 2] = [QUADS, TILES];
 const UNCULLED: &str = "--set splatting.culling=false";
 
 const TRANSPARENT: &str = "--set image.background=[0.2,0.4,0.6,0.25]";
-
-#[test]
-fn help_and_version_are_results() {
-    let folder = Folder::new();
-    for (arguments, words) in [
-        ("--help", "render"),
-        ("--help", "bench"),
-        ("render --help", "--set"),
-        ("bench --help", "--frames"),
-        ("orbit --help", "--count"),
-        ("sweep --help", "--columns"),
-        ("compare --help", "--outliers"),
-        ("--version", env!("CARGO_PKG_VERSION")),
-    ] {
-        let run = folder.run(arguments);
-        assert_eq!(run.code, Some(0), "{arguments}: {}", run.stderr);
-        assert!(run.stdout.contains(words), "{arguments}: {}", run.stdout);
-    }
-}

@@ -1,10 +1,13 @@
 //! Arguments that several subcommands take.
 
+use std::time::Instant;
+
 use clap::ValueEnum;
 use sheetsplat::error::Error;
 use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::image::PngDepth;
 use sheetsplat::scene::{Scene, SceneError, VolumeSource};
+use sheetsplat::stats::Stats;
 use sheetsplat::volume::Volume;
 
 use crate::failure::Failure;
@@ -38,12 +41,18 @@ impl Input {
     }
 
     pub(crate) fn load_volume(&self, scene: &Scene) -> Result<Volume, Failure> {
-        scene.load_volume().map_err(|error| self.failure(error))
+        let start = Instant::now();
+        let volume = scene.load_volume().map_err(|error| self.failure(error))?;
+        log::info!("{}: {} voxels, loaded in {:.1?}", self.name, volume.grid().dims, start.elapsed());
+        Ok(volume)
     }
 
     pub(crate) fn headless(&self, profile: bool) -> Result<Headless, Failure> {
         let options = HeadlessOptions { adapter: self.adapter.clone(), profile, ..HeadlessOptions::default() };
-        Headless::new(&options).map_err(|error| Failure::Other(error.to_string()))
+        let start = Instant::now();
+        let headless = Headless::new(&options).map_err(|error| Failure::Other(error.to_string()))?;
+        log::info!("renderer ready after {:.1?}", start.elapsed());
+        Ok(headless)
     }
 
     pub(crate) fn failure(&self, error: impl Into<Error>) -> Failure {
@@ -66,4 +75,10 @@ impl From<Depth> for PngDepth {
             Depth::Sixteen => Self::Sixteen,
         }
     }
+}
+
+/// Logs what a frame was drawn on, and how long it took.
+pub(crate) fn log_frame(what: &str, stats: &Stats) {
+    let Stats { adapter, rasterizer, prepare_ms, frame_ms, .. } = stats;
+    log::info!("{what}: {:.1} ms by {rasterizer} on {adapter}", prepare_ms + frame_ms);
 }

@@ -7,8 +7,10 @@ use sheetsplat::stats::Stats;
 
 use crate::arguments::Input;
 use crate::failure::Failure;
+use crate::stdout;
 
 #[derive(clap::Args)]
+#[command(after_help = "Example:\n  sheetsplat bench builtin:head --frames 20 --rotate 3")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
@@ -65,8 +67,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         peak_rss_mib: peak_rss_mib(),
         last,
     };
-    println!("{}", serde_json::to_string(&report).map_err(|error| Failure::Other(error.to_string()))?);
-    Ok(())
+    let json = serde_json::to_string(&report).map_err(|error| Failure::Other(error.to_string()))?;
+    stdout((json + "\n").as_bytes())
 }
 
 /// The process's largest resident set so far, where the system tells it.

@@ -1,8 +1,10 @@
 //! The command line program.
 
+mod adapters;
 mod arguments;
 mod bench;
 mod compare;
+mod documents;
 mod failure;
 mod orbit;
 mod progress;
@@ -14,19 +16,31 @@ mod view;
 use std::io::Write;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use failure::Failure;
 
+const EXAMPLES: &str = "\
+Examples:
+  sheetsplat render builtin:head -o head.png
+  sheetsplat render scene.toml -o image.exr --set camera.direction=[1,0,0]
+  sheetsplat orbit head.nrrd -o turn.gif
+  sheetsplat adapters
+
+Exit codes: 0 success, 2 bad usage or input, 1 anything else. Logs: -v, or the environment variable RUST_LOG.";
+
 /// Volume rendering by image-aligned sheet-buffer splatting.
 #[derive(Parser)]
-#[command(version, about)]
+#[command(version, about, after_help = EXAMPLES)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// Show no progress.
-    #[arg(short, long, global = true)]
+    /// Say nothing but errors: no progress, no warnings.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
+    /// Log volumes and frames instead of showing progress. RUST_LOG overrules it.
+    #[arg(short, long, global = true)]
+    verbose: bool,
 }
 
 #[derive(Subcommand)]
@@ -41,21 +55,36 @@ enum Command {
     Bench(bench::Arguments),
     /// Compare two images: prints what they differ in, exit code 1 if by more than is allowed.
     Compare(compare::Arguments),
+    /// List the adapters, whether they are usable, and which limits are missing where they are not.
+    Adapters(adapters::Arguments),
+    /// Print completions for a shell.
+    Completions(documents::Completions),
+    /// Print a man page.
+    Man(documents::Man),
     /// Show a scene in a window, to be turned and changed; its image size is not looked at.
     #[cfg(feature = "viewer")]
     View(view::Arguments),
 }
 
 fn main() -> ExitCode {
-    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("error")).init();
     // Clap itself exits with 2 on bad usage, with 0 on --help.
-    let Arguments { command, quiet } = Arguments::parse();
+    let Arguments { command, quiet, verbose } = Arguments::parse();
+    let filter = match (quiet, verbose) {
+        (true, _) => "error",
+        (false, false) => "error,sheetsplat=warn",
+        (false, true) => "error,sheetsplat=info",
+    };
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(filter)).init();
+    let progress = !quiet && !verbose;
     let result = match command {
         Command::Render(arguments) => render::run(&arguments),
-        Command::Orbit(arguments) => orbit::run(&arguments, quiet),
-        Command::Sweep(arguments) => sweep::run(&arguments, quiet),
+        Command::Orbit(arguments) => orbit::run(&arguments, progress),
+        Command::Sweep(arguments) => sweep::run(&arguments, progress),
         Command::Bench(arguments) => bench::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Adapters(arguments) => adapters::run(&arguments),
+        Command::Completions(arguments) => documents::completions(&arguments, Arguments::command()),
+        Command::Man(arguments) => documents::man(&arguments, Arguments::command()),
         #[cfg(feature = "viewer")]
         Command::View(arguments) => view::run(&arguments),
     };
@@ -66,4 +95,11 @@ fn main() -> ExitCode {
         Failure::Input(_) => ExitCode::from(2),
         Failure::Other(_) => ExitCode::FAILURE,
     }
+}
+
+/// Prints a result.
+fn stdout(bytes: &[u8]) -> Result<(), Failure> {
+    let mut stdout = std::io::stdout().lock();
+    let written = stdout.write_all(bytes).and_then(|()| stdout.flush());
+    written.map_err(|error| Failure::Other(format!("standard output: {error}")))
 }

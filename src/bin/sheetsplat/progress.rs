@@ -15,8 +15,8 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
-    pub(crate) fn new(total: usize, quiet: bool) -> Self {
-        let progress = Self { total, done: 0, start: Instant::now(), is_shown: !quiet && stderr().is_terminal() };
+    pub(crate) fn new(total: usize, is_wanted: bool) -> Self {
+        let progress = Self { total, done: 0, start: Instant::now(), is_shown: is_wanted && stderr().is_terminal() };
         progress.show();
         progress
     }

@@ -11,10 +11,14 @@ use sheetsplat::reference;
 use sheetsplat::scene::Scene;
 use sheetsplat::stats::Stats;
 
-use crate::arguments::{Depth, Input};
+use crate::arguments::{Depth, Input, log_frame};
 use crate::failure::Failure;
 
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  sheetsplat render builtin:head -o head.png
+  sheetsplat render head.nrrd -o image.exr --set splatting.slab_width=0.5 --stats stats.json")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
@@ -53,6 +57,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Backend::Reference => render_reference(&scene),
     }
     .map_err(|error| arguments.input.failure(error))?;
+    log_frame(&arguments.output.display().to_string(), &stats);
     // Aside before the image is saved: either both files are there in the end or neither.
     let failed = |path: &Path, error: std::io::Error| Failure::Other(format!("{}: {error}", path.display()));
     let stats_file = match &arguments.stats {
@@ -64,7 +69,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     image.save(&arguments.output, arguments.depth.into())?;
     if arguments.profile && stats.stages_ms.is_empty() {
-        eprintln!("sheetsplat: --profile: found no timestamp queries on {}", stats.adapter);
+        log::warn!("--profile: found no timestamp queries on {}", stats.adapter);
     }
     for (stage, ms) in &stats.stages_ms {
         println!("{stage:10} {ms:10.3} ms");

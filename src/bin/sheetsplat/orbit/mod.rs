@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use sheetsplat::image::{Image, aside};
 use sheetsplat::scene::Scene;
 
-use crate::arguments::{Depth, Input};
+use crate::arguments::{Depth, Input, log_frame};
 use crate::failure::Failure;
 use crate::progress::Progress;
 use movie::{Encoder, Format, Settings};
@@ -19,6 +19,11 @@ use numbered::Pattern;
 use y4m::Chroma;
 
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  sheetsplat orbit scene.toml -o turn.apng
+  sheetsplat orbit scene.toml -o frame-%04d.png --count 600 --frames 0..60
+  sheetsplat orbit scene.toml -o - | ffmpeg -i - turn.mp4")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
@@ -60,7 +65,7 @@ fn parse_frames(text: &str) -> Result<Range<u32>, String> {
     frames.ok_or_else(|| "allowed: A..B, A less than B".to_owned())
 }
 
-pub(crate) fn run(arguments: &Arguments, quiet: bool) -> Result<(), Failure> {
+pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> {
     let Arguments { input, output, count, overwrite, .. } = arguments;
     let frames = arguments.frames.clone().unwrap_or(0..*count);
     if frames.end > *count {
@@ -70,24 +75,28 @@ pub(crate) fn run(arguments: &Arguments, quiet: bool) -> Result<(), Failure> {
     let format = if output == Path::new("-") { Some(Format::Y4m) } else { Format::of(output) };
     let scene = input.scene()?;
     if let Some(format) = format {
-        return movie(arguments, &scene, format, frames, quiet);
+        return movie(arguments, &scene, format, frames, progress);
     }
     let pattern = Pattern::parse(output).ok_or_else(|| {
         let allowed = "numbered images (frame-%04d.png, frame-####.png), a movie (.apng, .gif, .y4m), or -";
         Failure::Input(format!("--output: found {}, allowed: {allowed}", output.display()))
     })?;
     Image::check_format(output)?;
+    let wanted = frames.len();
     let frames: Vec<u32> = frames.filter(|&frame| *overwrite || !pattern.path(frame).exists()).collect();
-    draw(
-        arguments,
-        &scene,
-        &frames,
-        quiet,
-        |frame, image| Ok(image.save(&pattern.path(frame), arguments.depth.into())?),
-    )
+    log::info!("{} of {wanted} frames are there already", wanted - frames.len());
+    draw(arguments, &scene, &frames, progress, |frame, image| {
+        Ok(image.save(&pattern.path(frame), arguments.depth.into())?)
+    })
 }
 
-fn movie(arguments: &Arguments, scene: &Scene, format: Format, frames: Range<u32>, quiet: bool) -> Result<(), Failure> {
+fn movie(
+    arguments: &Arguments,
+    scene: &Scene,
+    format: Format,
+    frames: Range<u32>,
+    progress: bool,
+) -> Result<(), Failure> {
     let Arguments { input, output, fps, depth, chroma, .. } = arguments;
     let settings = Settings {
         width: scene.image.width,
@@ -101,7 +110,7 @@ fn movie(arguments: &Arguments, scene: &Scene, format: Format, frames: Range<u32
     let frames: Vec<u32> = frames.collect();
     let encode = |to: &mut dyn Write, failed: &dyn Fn(io::Error) -> Failure| {
         let mut encoder = Encoder::new(format, &settings, &mut *to).map_err(failed)?;
-        draw(arguments, scene, &frames, quiet, |_, image| encoder.add(image).map_err(failed))?;
+        draw(arguments, scene, &frames, progress, |_, image| encoder.add(image).map_err(failed))?;
         encoder.finish().and_then(|()| to.flush()).map_err(failed)
     };
     if output == Path::new("-") {
@@ -119,7 +128,7 @@ fn draw(
     arguments: &Arguments,
     scene: &Scene,
     frames: &[u32],
-    quiet: bool,
+    progress: bool,
     mut take: impl FnMut(u32, &Image) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     if frames.is_empty() {
@@ -129,12 +138,13 @@ fn draw(
     let volume = input.load_volume(scene)?;
     let headless = input.headless(false)?;
     let mut view = headless.view(volume, scene).map_err(|error| input.failure(error))?;
-    let mut progress = Progress::new(frames.len(), quiet);
+    let mut progress = Progress::new(frames.len(), progress);
     for &frame in frames {
         // From where the scene's camera is, whichever frame was drawn before.
         view.set_camera(scene.camera.turned(turn * f64::from(frame) / f64::from(*count)));
         let rendering = headless.draw(&mut view).map_err(|error| input.failure(error))?;
         take(frame, &rendering.image)?;
+        log_frame(&format!("frame {frame}"), &rendering.stats);
         progress.step();
     }
     Ok(())

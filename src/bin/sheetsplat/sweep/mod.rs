@@ -9,7 +9,7 @@ use std::sync::Arc;
 use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
 
-use crate::arguments::{Depth, Input};
+use crate::arguments::{Depth, Input, log_frame};
 use crate::failure::Failure;
 use crate::progress::Progress;
 use axis::{Axis, swept};
@@ -19,6 +19,10 @@ use sheet::{Layout, Tile};
 const LARGEST: u32 = 32_768;
 
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  sheetsplat sweep builtin:head -o sheet.png --set splatting.slab_width=0.5,1,2
+  sheetsplat sweep scene.toml -o grid.png --set splatting.radius=1.4,2 --set splatting.compositing=linear,exponential")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
@@ -33,7 +37,7 @@ pub(crate) struct Arguments {
     depth: Depth,
 }
 
-pub(crate) fn run(arguments: &Arguments, quiet: bool) -> Result<(), Failure> {
+pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> {
     let Arguments { input, output, .. } = arguments;
     Image::check_format(output)?;
     let axes = swept(&input.sets);
@@ -59,7 +63,7 @@ pub(crate) fn run(arguments: &Arguments, quiet: bool) -> Result<(), Failure> {
         let allowed = format!("sheets of at most {LARGEST} pixels a side");
         Failure::Input(format!("{}: found {count} tiles in rows of {columns}, allowed: {allowed}", output.display()))
     })?;
-    let tiles = draw(input, scenes, quiet)?;
+    let tiles = draw(input, scenes, progress)?;
     Ok(layout.draw(&tiles).save(output, arguments.depth.into())?)
 }
 
@@ -99,9 +103,9 @@ fn combinations(axes: &[Axis]) -> Vec<Vec<String>> {
 }
 
 /// Draws every scene; a volume is loaded again only where another one is asked for.
-fn draw(input: &Input, scenes: Vec<(Scene, Vec<String>)>, quiet: bool) -> Result<Vec<Tile>, Failure> {
+fn draw(input: &Input, scenes: Vec<(Scene, Vec<String>)>, progress: bool) -> Result<Vec<Tile>, Failure> {
     let headless = input.headless(false)?;
-    let mut progress = Progress::new(scenes.len(), quiet);
+    let mut progress = Progress::new(scenes.len(), progress);
     let mut last: Option<(Scene, Arc<_>)> = None;
     let mut tiles = Vec::new();
     for (scene, label) in scenes {
@@ -112,6 +116,7 @@ fn draw(input: &Input, scenes: Vec<(Scene, Vec<String>)>, quiet: bool) -> Result
             _ => Arc::new(input.load_volume(&scene)?),
         };
         let rendering = headless.render_volume(volume.clone(), &scene).map_err(|error| input.failure(error))?;
+        log_frame(&label.join(", "), &rendering.stats);
         tiles.push(Tile { image: rendering.image, label });
         progress.step();
         last = Some((scene, volume));

@@ -23,6 +23,10 @@ use crate::failure::Failure;
 use app::App;
 
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  sheetsplat view builtin:head
+  sheetsplat view scene.toml --size 1600x1000")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
