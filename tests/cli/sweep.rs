@@ -122,8 +122,8 @@ fn bad_usage_and_input_are_2_and_leave_nothing() {
         ("-o s.png --set nonesuch.key=1,2", &["nonesuch"]),
         ("-o s.png --set splatting.radius=1,2 --set splatting.falloff=1,2 --columns 2", &["--columns", "2", "one"]),
         ("-o s.png --set splatting.radius=1,2 --columns 0", &["--columns", "0"]),
-        ("-o s.png --set splatting.radius=1,2 --set image.width=20000", &["s.png", "2 tiles", "32768"]),
-        ("-o s.png --set splatting.radius=1,2 --set image.width=4294967295", &["s.png", "2 tiles", "32768"]),
+        ("-o s.png --set splatting.radius=1,2 --set image.width=20000", &["s.png", "2 tiles", "16384"]),
+        ("-o s.png --set splatting.radius=1,2 --set image.width=4294967295", &["s.png", "2 tiles", "16384"]),
         ("-o s.png --set volume.builtin=cube:8,nonesuch", &["nonesuch"]),
     ] {
         folder.run(&format!("sweep {WIDE} {arguments}")).assert_failure(2, words);

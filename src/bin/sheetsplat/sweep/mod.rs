@@ -15,8 +15,8 @@ use crate::progress::Progress;
 use axis::{Axis, swept};
 use sheet::{Layout, Tile};
 
-/// Pixels of a sheet's longer side.
-const LARGEST: u32 = 32_768;
+/// Pixels of a sheet's longer side: as floats a square one takes 4 GiB.
+const LARGEST: u32 = 16_384;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
