@@ -147,9 +147,7 @@ impl SceneView {
 
     /// Turns the camera about its `up` by an angle in degrees, by the right hand.
     pub fn turn(&mut self, degrees: f64) {
-        let Camera { direction, up, .. } = self.scene.camera;
-        let rotation = glam::DMat3::from_axis_angle(up.normalize(), degrees.to_radians());
-        self.scene.camera.direction = rotation * direction;
+        self.scene.camera = self.scene.camera.turned(degrees);
     }
 
     /// How the prepared frame is drawn: `"quads"` or `"tiles"`.

@@ -145,11 +145,17 @@ impl DeviceRequirements {
     /// # Errors
     /// [`DeviceError::Limits`] with every limit that is not enough, what is required, and what the device has.
     pub fn check(device: &Device) -> Result<(), DeviceError> {
+        let insufficient = Self::insufficient(&device.limits());
+        if insufficient.is_empty() { Ok(()) } else { Err(DeviceError::Limits(insufficient)) }
+    }
+
+    /// Every limit that is less than [`Self::LEAST`] asks for.
+    pub fn insufficient(limits: &Limits) -> Vec<InsufficientLimit> {
         let mut insufficient = Vec::new();
-        Self::LEAST.limits.check_limits_with_fail_fn(&device.limits(), false, |limit, required, actual| {
+        Self::LEAST.limits.check_limits_with_fail_fn(limits, false, |limit, required, actual| {
             insufficient.push(InsufficientLimit { limit, required, actual });
         });
-        if insufficient.is_empty() { Ok(()) } else { Err(DeviceError::Limits(insufficient)) }
+        insufficient
     }
 }
 

@@ -1,6 +1,8 @@
 //! How a program without a host opens its device: what the command line and a window of its own share.
 
-use wgpu::{Adapter, Backends, DeviceType, InstanceDescriptor, InstanceFlags};
+use std::sync::OnceLock;
+
+use wgpu::{Adapter, AdapterInfo, Backends, DeviceType, Instance, InstanceDescriptor, InstanceFlags};
 
 use crate::gpu::device::DeviceError;
 
@@ -11,6 +13,19 @@ pub fn instance_descriptor() -> InstanceDescriptor {
     descriptor.flags -= InstanceFlags::VALIDATION_INDIRECT_CALL;
     descriptor.backends &= Backends::PRIMARY;
     descriptor
+}
+
+/// The adapters of [`instance_descriptor`]'s instance.
+pub fn adapters() -> Vec<Adapter> {
+    // One for all, as only within an instance devices can be told from one another.
+    static INSTANCE: OnceLock<Instance> = OnceLock::new();
+    let instance = INSTANCE.get_or_init(|| Instance::new(instance_descriptor()));
+    pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY))
+}
+
+/// An adapter's driver, and its version where it tells.
+pub fn driver_name(info: &AdapterInfo) -> String {
+    format!("{} {}", info.driver, info.driver_info).trim().to_owned()
 }
 
 /// The adapter with `name` in its name, in any case, or the most capable one: a GPU before a software driver.

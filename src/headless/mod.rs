@@ -5,11 +5,12 @@ mod error;
 pub mod readback;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 use std::time::Instant;
 
-use wgpu::{Adapter, AdapterInfo, Backends, Device, Instance, Queue, TextureFormat};
+use wgpu::{Adapter, Device, Queue, TextureFormat};
 
+use self::device::driver_name;
 pub use self::error::Error;
 use crate::error::RenderError;
 use crate::fault::{DeviceFault, scoped};
@@ -261,16 +262,7 @@ fn wait(device: &Device) -> Result<(), RenderError> {
 
 /// The adapter with `name` in its name, or the most capable one: a GPU before a software driver.
 fn choose_adapter(name: Option<&str>) -> Result<Adapter, DeviceError> {
-    // One for all, as only within an instance devices can be told from one another.
-    static INSTANCE: OnceLock<Instance> = OnceLock::new();
-    let instance = INSTANCE.get_or_init(|| Instance::new(device::instance_descriptor()));
-    let adapters = pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY));
-    device::choose_adapter(&adapters, name)
-}
-
-/// An adapter's driver, and its version where it tells.
-pub(crate) fn driver_name(info: &AdapterInfo) -> String {
-    format!("{} {}", info.driver, info.driver_info).trim().to_owned()
+    device::choose_adapter(&device::adapters(), name)
 }
 
 fn milliseconds_since(start: Instant) -> f64 {

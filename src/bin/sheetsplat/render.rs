@@ -4,25 +4,26 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::ValueEnum;
-use sheetsplat::error::RenderError;
-use sheetsplat::headless::{Error, Headless, HeadlessOptions, Rendering};
-use sheetsplat::image::{Image, ImageError, PngDepth, aside};
+use sheetsplat::headless::{Error, Rendering};
+use sheetsplat::image::{Image, aside};
 use sheetsplat::reference;
-use sheetsplat::scene::{Scene, SceneError, VolumeSource};
+use sheetsplat::scene::Scene;
 use sheetsplat::stats::Stats;
 
-use crate::Failure;
+use crate::arguments::{Depth, Input, log_frame};
+use crate::failure::Failure;
 
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  sheetsplat render builtin:head -o head.png
+  sheetsplat render head.nrrd -o image.exr --set splatting.slab_width=0.5 --stats stats.json")]
 pub(crate) struct Arguments {
-    /// A scene file (.toml), a volume file (.nrrd, .nhdr), or builtin:NAME[:N].
-    input: String,
+    #[command(flatten)]
+    input: Input,
     /// The image: .png, .exr or .npy.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Set a scene value, as in --set splatting.slab_width=2.0. Can be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
     /// Bits per channel of a PNG.
     #[arg(long, value_enum, default_value = "8")]
     depth: Depth,
@@ -35,17 +36,6 @@ pub(crate) struct Arguments {
     /// Time every stage on the GPU, where the adapter has timestamp queries: stages_ms in the statistics, and printed.
     #[arg(long)]
     profile: bool,
-    /// Part of the name of the adapter to use.
-    #[arg(long, value_name = "NAME", env = "WGPU_ADAPTER_NAME")]
-    adapter: Option<String>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Depth {
-    #[value(name = "8")]
-    Eight,
-    #[value(name = "16")]
-    Sixteen,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -60,21 +50,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let path = arguments.output.display();
         return Err(Failure::Input(format!("--stats: found {path}, allowed: another file than --output")));
     }
-    let scene = open_scene(&arguments.input, &arguments.set)?;
+    let scene = arguments.input.scene()?;
     let Rendering { image, stats } = match arguments.backend {
-        Backend::Gpu => {
-            let (adapter, profile) = (arguments.adapter.clone(), arguments.profile);
-            let options = HeadlessOptions { adapter, profile, ..HeadlessOptions::default() };
-            let headless = Headless::new(&options).map_err(|error| Failure::Other(error.to_string()))?;
-            headless.render(&scene)
-        }
+        Backend::Gpu => arguments.input.headless(arguments.profile)?.render(&scene),
         Backend::Reference => render_reference(&scene),
     }
-    .map_err(|error| Failure::of(error, &arguments.input))?;
-    let depth = match arguments.depth {
-        Depth::Eight => PngDepth::Eight,
-        Depth::Sixteen => PngDepth::Sixteen,
-    };
+    .map_err(|error| arguments.input.failure(error))?;
+    log_frame(&arguments.output.display().to_string(), &stats);
     // Aside before the image is saved: either both files are there in the end or neither.
     let failed = |path: &Path, error: std::io::Error| Failure::Other(format!("{}: {error}", path.display()));
     let stats_file = match &arguments.stats {
@@ -84,9 +66,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
         None => None,
     };
-    image.save(&arguments.output, depth)?;
+    image.save(&arguments.output, arguments.depth.into())?;
     if arguments.profile && stats.stages_ms.is_empty() {
-        eprintln!("sheetsplat: --profile: found no timestamp queries on {}", stats.adapter);
+        log::warn!("--profile: found no timestamp queries on {}", stats.adapter);
     }
     for (stage, ms) in &stats.stages_ms {
         println!("{stage:10} {ms:10.3} ms");
@@ -95,15 +77,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         file.persist(path).map_err(|error| failed(path, error.error))?;
     }
     Ok(())
-}
-
-/// A scene file by its extension; anything else is a volume.
-pub(crate) fn open_scene(input: &str, sets: &[String]) -> Result<Scene, SceneError> {
-    match input.strip_prefix("builtin:") {
-        Some(name) => Scene::from_volume(VolumeSource::Builtin(name.to_owned()), sets),
-        None if input.ends_with(".toml") => Scene::open(input.as_ref(), sets),
-        None => Scene::from_volume(VolumeSource::File(input.into()), sets),
-    }
 }
 
 fn render_reference(scene: &Scene) -> Result<Rendering, Error> {
@@ -126,32 +99,4 @@ fn render_reference(scene: &Scene) -> Result<Rendering, Error> {
         ..Stats::default()
     };
     Ok(Rendering { image, stats })
-}
-
-impl Failure {
-    /// What is wrong with rendering `input`; scene and volume errors name their file themselves.
-    pub(crate) fn of(error: Error, input: &str) -> Self {
-        match error {
-            Error::Scene(_) | Error::Volume(_) => Self::Input(error.to_string()),
-            Error::Render(RenderError::OutOfRange { .. } | RenderError::Limit { .. }) => {
-                Self::Input(format!("{input}: {error}"))
-            }
-            _ => Self::Other(error.to_string()),
-        }
-    }
-}
-
-impl From<SceneError> for Failure {
-    fn from(error: SceneError) -> Self {
-        Self::Input(error.to_string())
-    }
-}
-
-impl From<ImageError> for Failure {
-    fn from(error: ImageError) -> Self {
-        match error {
-            ImageError::Format { .. } => Self::Input(error.to_string()),
-            _ => Self::Other(error.to_string()),
-        }
-    }
 }

@@ -13,7 +13,7 @@ use sheetsplat::transfer_function::TransferFunction;
 use sheetsplat::volume::{Grid, Volume};
 use sheetsplat::{Blend, DeviceRequirements, GpuVolume, Placement, Renderer, RendererOptions, Scene, SceneView, wgpu};
 
-use crate::Failure;
+use crate::failure::Failure;
 
 /// Of textures that the window shows. It holds display-referred colours, as sheetsplat's are.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
