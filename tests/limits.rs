@@ -146,7 +146,8 @@ fn small_bindings_split_voxels_and_image() {
         let of_lists: Vec<Brick> = lists.bricks().flatten().copied().collect();
         assert_eq!(of_lists, bricks.bricks(), "together they are all there is");
         assert!(lists.lists.iter().all(|list| list.buffer.size() <= bytes));
-        let compositing_buffer = CompositingBuffer::new(small.device(), [150, 110]).unwrap();
+        let rows = CompositingBuffer::bands(&small.device().limits(), [150, 110]).unwrap();
+        let compositing_buffer = CompositingBuffer::new(small.device(), [150, 110], &rows);
         assert_eq!(compositing_buffer.bands.len(), bands);
         for (at, band) in compositing_buffer.bands.iter().enumerate() {
             let Band { first_row, rows } = band.band;

@@ -7,11 +7,12 @@ use wgpu::{
     RenderPipeline, TextureFormat, TextureView,
 };
 
-use super::splat::{added_to, pipeline, quad_indices, splat_slots};
+use super::splat::{added_to, quad_indices, sheets_of_a_group, splat_slots};
 use crate::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
 use crate::gpu::bindings::{at_offset, bind, layout};
 use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::layout::{Group, QUADS};
+use crate::gpu::render_pipeline::render_pipeline;
 use crate::gpu::shaders;
 use crate::splatting::{Compositing, FootprintForm};
 
@@ -77,7 +78,8 @@ impl Sample {
                 ("LAYERS", f64::from(SUMMED_AREA_LAYERS)),
             ];
             let shader = (shaders::SAMPLE, ["vertex", "fragment"]);
-            pipeline(device, shader, &self.pipeline_layout, self.format, 1, Some(over), &constants)
+            let sheet = sheets_of_a_group(self.format, 1, Some(over));
+            render_pipeline(device, shader, &self.pipeline_layout, &sheet, &constants)
         });
         let SampleBuffers { frame, group, splats, order, args, footprints } = buffers;
         let resources = [

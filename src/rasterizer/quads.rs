@@ -1,13 +1,15 @@
 //! The quad rasterizer (Fig. 12): for every group of sheets the stages cull, tiles, splat, composite and occlude.
 
-use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, TextureFormat, TextureView};
+use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Limits, TextureFormat, TextureView};
 
-use super::{Footprints, Given, Prepared, compute};
+use super::{Footprints, Given, Needs, Prepared, compute};
 use crate::brick;
 use crate::classified_volume::ClassifiedVolume;
 use crate::error::RenderError;
-use crate::gpu::bindings::{grown, uploaded};
-use crate::gpu::layout::{Group, Tally};
+use crate::footprint::FootprintTable;
+use crate::frame_request::FrameRequest;
+use crate::gpu::bindings::{Wanted, grown, sizes, uploaded, wanted, wanted_for};
+use crate::gpu::layout::{Brick, Group, Tally};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
@@ -16,7 +18,7 @@ use crate::pass::cull::{Cull, CullBuffers, CullList};
 use crate::pass::occlude::Occlude;
 use crate::pass::splat::{Splat, SplatMode};
 use crate::pass::tiles::{TileLists, Tiles};
-use crate::plan::FramePlan;
+use crate::plan::{FramePlan, tile_grid};
 use crate::splatting::Order;
 use crate::stats::GroupSlabs;
 use crate::view::View;
@@ -98,7 +100,8 @@ impl QuadRasterizer {
         given: Given<'_>,
         previous: Option<QuadFrame>,
     ) -> Result<(QuadFrame, Prepared), RenderError> {
-        let Given { device, volume, view, splatting, frame, control_points, compositing, .. } = given;
+        let Given { device, volume, request, frame, control_points, compositing, .. } = given;
+        let FrameRequest { view, splatting, kernel, rays, .. } = request;
         let old = Old::of(previous);
         let targets = old.targets.filter(|old| old.size == view.size);
         let targets = match targets {
@@ -119,13 +122,11 @@ impl QuadRasterizer {
         planned.plan.view = *view;
         let plan = &planned.plan;
         let (footprints, tabled) = Footprints::renewed(old.footprints, given);
-        let alignment = device.limits().min_uniform_buffer_offset_alignment as usize;
-        let group_stride = size_of::<Group>().next_multiple_of(alignment);
-        let group_bytes = uniforms::groups(plan, given.kernel, splatting, group_stride);
+        let group_stride = group_stride(&device.limits());
+        let group_bytes = uniforms::groups(plan, kernel, splatting, group_stride);
         let groups = given.filled(old.groups, "sheetsplat.groups", &group_bytes, BufferUsages::UNIFORM)?;
-        let culled_bytes = size_of::<Tally>() as u64 + targets.opaque_tiles.size();
-        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-        let culled = grown(device, old.culled, "sheetsplat.culled", culled_bytes, usage)?;
+        let [wanted_culled, wanted_hits] = counts_and_hits(request);
+        let culled = grown(device, old.culled, &wanted_culled)?;
 
         let shared = CullBuffers {
             frame,
@@ -149,9 +150,7 @@ impl QuadRasterizer {
         let tile_lists = self.tiles.prepare(device, buffers, &targets, plan.groups.len(), old.tile_lists)?;
         let tiles = &tile_lists.composited;
         let sheets = targets.sheets_view();
-        let pixels = u64::from(view.size[0]) * u64::from(view.size[1]);
-        let hit_bytes = if given.rays.first_hit { 4 * pixels } else { 4 };
-        let hits = grown(device, old.hits, "sheetsplat.hits", hit_bytes, usage)?;
+        let hits = grown(device, old.hits, &wanted_hits)?;
         let buffers = CompositeBuffers {
             frame,
             groups: &groups,
@@ -161,13 +160,13 @@ impl QuadRasterizer {
             cut: given.cut,
             hits: &hits,
         };
-        let composite = |band| self.composite.bind(device, given.rays, buffers, band);
+        let composite = |band| self.composite.bind(device, *rays, buffers, band);
         let splat_mode = SplatMode { form: splatting.footprint, perspective: view.perspective.is_some() };
         self.splat.prepare(device, splat_mode);
         let frame = QuadFrame {
             splat_mode,
             clear_group: self.splat.bind_clear(device, frame, tiles),
-            rays: given.rays,
+            rays: *rays,
             composite_groups: compositing.bands.iter().map(composite).collect(),
             occlude_groups: self.occlude.bind(device, [frame, &groups], &tile_lists.occluding, &targets),
             sheet_views: (0..self.sheets).map(|layer| targets.sheet_view(layer)).collect(),
@@ -183,6 +182,36 @@ impl QuadRasterizer {
             hits,
         };
         Ok((frame, Prepared { bucketed, tabled }))
+    }
+
+    /// What a new frame of these lists of bricks will take, with groups of `sheets` sheets.
+    ///
+    /// # Errors
+    /// Those of [`Self::prepare`].
+    pub(crate) fn estimate(
+        limits: &Limits,
+        request: &FrameRequest,
+        lists: &[&[Brick]],
+        (sheet_format, sheets): (TextureFormat, u32),
+    ) -> Result<Needs, RenderError> {
+        let FrameRequest { view, kernel, splatting, .. } = request;
+        let plan = FramePlan::new(lists.iter().copied(), *view, sheets, splatting.order);
+        let most = most_of(lists.iter().copied(), &plan);
+        let group_bytes = uniforms::groups(&plan, kernel, splatting, group_stride(limits)).len() as u64;
+        let [columns, rows] = tile_grid(view.size);
+        let mut buffers = vec![wanted_for("sheetsplat.groups", group_bytes, BufferUsages::UNIFORM)];
+        buffers.extend(counts_and_hits(request));
+        buffers.extend(Tiles::wanted(columns * rows, plan.groups.len()));
+        for ((bricks, order), most) in lists.iter().zip(&plan.orders).zip(most) {
+            buffers.push(wanted("sheetsplat.order", order_bytes(order).len() as u64, BufferUsages::STORAGE));
+            buffers.extend(Cull::wanted(bricks.len(), most));
+        }
+        let targets = Targets::estimate(limits, view.size, sheet_format, sheets)?;
+        Ok(Needs {
+            bytes: sizes(limits, &buffers)? + targets + FootprintTable::bytes(splatting.footprint),
+            groups: plan.groups.len(),
+            passes: passes(&plan),
+        })
     }
 
     /// Draws the frame.
@@ -224,7 +253,7 @@ impl QuadRasterizer {
 impl QuadFrame {
     /// Passes of the frame: every group has three.
     pub(crate) fn passes(&self) -> usize {
-        3 * self.planned.plan.groups.len()
+        passes(&self.planned.plan)
     }
 
     /// Its groups' slabs.
@@ -262,17 +291,9 @@ impl QuadFrame {
 impl Planned {
     fn new(device: &Device, volume: &ClassifiedVolume, view: View, sheets: u32, order: Order) -> Self {
         let plan = FramePlan::new(volume.lists.bricks(), view, sheets, order);
-        let most = (volume.lists.bricks().zip(&plan.orders).enumerate())
-            .map(|(at, (bricks, order))| {
-                let voxels = |&brick: &u32| brick::present(&bricks[brick as usize]).count_ones();
-                most(plan.groups.iter().map(|group| {
-                    let bricks = group.bricks[at].clone();
-                    order[bricks.start as usize..bricks.end as usize].iter().map(voxels)
-                }))
-            })
-            .collect();
+        let most = most_of(volume.lists.bricks(), &plan);
         let upload = |order: &Vec<u32>| {
-            let bytes: &[u8] = if order.is_empty() { &[0; 4] } else { bytemuck::cast_slice(order) };
+            let bytes = order_bytes(order);
             uploaded(device, "sheetsplat.order", bytes, bytes.len() as u64, BufferUsages::STORAGE)
         };
         Self { order, revision: volume.revision, orders: plan.orders.iter().map(upload).collect(), most, plan }
@@ -306,6 +327,41 @@ impl Old {
             lists: frame.lists,
         }
     }
+}
+
+/// Timed ones: every group has three.
+fn passes(plan: &FramePlan) -> usize {
+    3 * plan.groups.len()
+}
+
+/// Bytes from one group to the next.
+fn group_stride(limits: &Limits) -> usize {
+    size_of::<Group>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize)
+}
+
+/// The buffers of what culling counts, and of first hits.
+fn counts_and_hits(request: &FrameRequest) -> [Wanted; 2] {
+    let [columns, rows] = tile_grid(request.view.size);
+    let culled_bytes = size_of::<Tally>() as u64 + u64::from(columns * rows) * 4;
+    let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
+    [wanted("sheetsplat.culled", culled_bytes, usage), wanted("sheetsplat.hits", request.hit_bytes().max(4), usage)]
+}
+
+/// A list's bricks in bucket order; bindings may not be empty.
+fn order_bytes(order: &[u32]) -> &[u8] {
+    if order.is_empty() { &[0; 4] } else { bytemuck::cast_slice(order) }
+}
+
+/// For every list the most bricks and voxels that any group can visit.
+fn most_of<'a>(lists: impl Iterator<Item = &'a [Brick]>, plan: &FramePlan) -> Vec<(u32, u32)> {
+    let of_list = |(at, (bricks, order)): (usize, (&[Brick], &Vec<u32>))| {
+        let voxels = |&brick: &u32| brick::present(&bricks[brick as usize]).count_ones();
+        most(plan.groups.iter().map(|group| {
+            let bricks = group.bricks[at].clone();
+            order[bricks.start as usize..bricks.end as usize].iter().map(voxels)
+        }))
+    };
+    lists.zip(&plan.orders).enumerate().map(of_list).collect()
 }
 
 /// The most bricks and voxels that any group can visit, from the voxel counts of every group's bricks.

@@ -213,9 +213,11 @@ pub fn render_for(
         if let Some(cuts) = &cuts {
             cuts.apply(&mut sheet, k);
         }
-        let before = acc.clone();
+        let before = host.first_hit.map(|_| acc.clone());
         composite::composite(&mut acc, &sheet, compositing, order);
-        first_hits.note(&before, &acc, k, cuts.as_ref());
+        if let Some(before) = before {
+            first_hits.note(&before, &acc, k, cuts.as_ref());
+        }
     }
     let image = resolve::resolve(&acc, compositing, scene.image.background).into_image();
     Ok(Culled { image, sections, areas, first_hits: first_hits.depths(&frame.geometry) })

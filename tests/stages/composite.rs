@@ -78,7 +78,8 @@ impl Case {
         let Self { size, compositing, order, threshold, .. } = *self;
         let layers = self.sheets.len() as u32;
         let targets = Targets::new(device, size, wgpu::TextureFormat::Rgba32Float, layers).unwrap();
-        let compositing_buffer = CompositingBuffer::new(device, size).unwrap();
+        let cut = CompositingBuffer::bands(&device.limits(), size).unwrap();
+        let compositing_buffer = CompositingBuffer::new(device, size, &cut);
         assert_eq!(compositing_buffer.bands.len(), bands);
         let layout =
             wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(size[0] * 16), rows_per_image: Some(size[1]) };

@@ -22,7 +22,8 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
     let options = RendererOptions { blend: Blend::Replace, ..RendererOptions::for_target(TextureFormat::Rgba32Float) };
     let stage = Resolve::new(device, &options);
     let mut random = Random(9);
-    let compositing_buffer = CompositingBuffer::new(device, size).unwrap();
+    let cut = CompositingBuffer::bands(&device.limits(), size).unwrap();
+    let compositing_buffer = CompositingBuffer::new(device, size, &cut);
     assert_eq!(compositing_buffer.bands.len(), bands);
     let target = device.create_texture(&wgpu::TextureDescriptor {
         label: Some("target"),

@@ -3,8 +3,7 @@
 use std::time::Instant;
 
 use clap::ValueEnum;
-use sheetsplat::headless::Error;
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::{Error, Headless, HeadlessOptions};
 use sheetsplat::image::PngDepth;
 use sheetsplat::scene::{Scene, SceneError, VolumeSource};
 use sheetsplat::stats::Stats;
