@@ -1,7 +1,6 @@
 // Composites a group of sheet buffers into the compositing buffer (eq. 2, front to back by default; SPEC §5), in the tiles
 // that received splats, and notes which pixels are opaque (§6). One workgroup per tile.
 
-@group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> band: Band;
 @group(0) @binding(2) var sheets: texture_2d_array<f32>;
 @group(0) @binding(3) var<storage, read_write> acc: array<vec4f>;
@@ -25,6 +24,7 @@ var<workgroup> opaque_rows: array<atomic<u32>, TILE>;
 
 @compute @workgroup_size(32, 8)
 fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workgroup: vec3u) {
+    start(workgroup.z);
     let at = unfold(workgroup);
     if at >= composited.args.count {
         return;

@@ -6,8 +6,7 @@
 // the rectangle of its units. Software drivers execute what an `if` leaves out but not a loop without iterations, hence some
 // loops that run at most once.
 
-@group(0) @binding(0) var<uniform> frame_uniform: Frame;
-@group(0) @binding(1) var<uniform> gather_uniform: Gather;
+@group(0) @binding(1) var<uniform> gathers: array<Gather, 1>;
 @group(0) @binding(2) var<uniform> part: Part;
 @group(0) @binding(3) var<storage, read> bricks: array<Brick>;
 // Where every sheet group of every tile starts in `entries`.
@@ -40,8 +39,6 @@ override ECONOMIES: bool = false;
 override CUT: bool = false;
 override FIRST_HIT: bool = false;
 
-// Read once: a uniform read in a loop costs a software driver a gather.
-var<private> frame: Frame;
 var<private> gather: Gather;
 
 // The subgroup.
@@ -113,8 +110,6 @@ fn overlapped_sheets(p: vec4f) -> vec2f {
 }
 
 fn draw(tile: u32, thread: u32) {
-    frame = frame_uniform;
-    gather = gather_uniform;
     let color_ramp = ramp_of(0u, frame.ramps.x);
     let opacity_ramp = ramp_of(frame.ramps.x, frame.ramps.y);
     let gradient_opacity_ramp = ramp_of(frame.ramps.y, frame.ramps.z);
@@ -426,13 +421,15 @@ fn main(
 ) {
     lanes = subgroup_size;
     lane = subgroup_invocation_id;
+    start(workgroup.z);
+    gather = gathers[zero];
     let tile = part.first_tile + unfold(workgroup);
     var is_left = false;
     if tile < part.end_tile {
-        let first_bin = tile * gather_uniform.groups;
+        let first_bin = tile * gather.groups;
         let unit = firstTrailingBit(subgroupOr(1u << (thread / 8u)));
-        let at = atomicLoad(&gathered.words[gather_uniform.reached + tile * UNITS + unit]);
-        is_left = starts[first_bin + at] < starts[first_bin + gather_uniform.groups];
+        let at = atomicLoad(&gathered.words[gather.reached + tile * UNITS + unit]);
+        is_left = starts[first_bin + at] < starts[first_bin + gather.groups];
     }
     for (; is_left; is_left = false) {
         draw(tile, thread);

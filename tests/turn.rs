@@ -13,7 +13,7 @@ use sheetsplat::scene::Scene;
 use sheetsplat::splatting::Method;
 use sheetsplat::volume::{Volume, builtin};
 
-use common::{RASTERIZERS, gpu, scene, transfer};
+use common::{gpu, scene, transfer};
 
 /// Pairs of angles half a degree apart, from head-on to side-on, and the two around 45°.
 const ANGLES: [f64; 8] = [0.0, 15.0, 30.0, 44.5, 45.0, 60.0, 75.0, 89.5];
@@ -38,17 +38,13 @@ fn largest_change(gpu: &Headless, volume: &Arc<Volume>, scene: &Scene) -> f64 {
 #[test]
 fn image_aligned_sheets_do_not_pop() {
     let gpu = gpu();
-    let volume = Arc::new(builtin::volume("nerve:192").unwrap());
-    let mut scene = scene(96, 96);
+    let volume = Arc::new(builtin::volume("nerve:256").unwrap());
+    let mut scene = scene(128, 128);
     scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(30.0, 0.0), (90.0, 0.2)]);
-    for rasterizer in RASTERIZERS {
-        scene.splatting.rasterizer = rasterizer;
-        let [image_aligned, axis_aligned] = [Method::ImageAligned, Method::AxisAligned].map(|method| {
-            scene.splatting.method = method;
-            largest_change(&gpu, &volume, &scene)
-        });
-        let ratio = axis_aligned / image_aligned;
-        println!("{rasterizer:?}: {image_aligned:.2e}, {axis_aligned:.2e}, {ratio:.1}");
-        assert!(ratio >= 10.0, "{rasterizer:?}: {image_aligned:.2e}, {axis_aligned:.2e}");
-    }
+    let [image_aligned, axis_aligned] = [Method::ImageAligned, Method::AxisAligned].map(|method| {
+        scene.splatting.method = method;
+        largest_change(&gpu, &volume, &scene)
+    });
+    println!("{image_aligned:.2e}, {axis_aligned:.2e}, {:.1}", axis_aligned / image_aligned);
+    assert!(axis_aligned >= 10.0 * image_aligned, "{image_aligned:.2e}, {axis_aligned:.2e}");
 }

@@ -23,7 +23,7 @@ fn shown(point_px: vec2f) -> vec2f {
     let at = vec3f(point_px - 0.5 * vec2f(frame.size), 1.0);
     // Along w.
     var depths = vec2f(-FAR, FAR);
-    for (var i = 0u; i < cut.plane_count; i += 1u) {
+    for (var i = 0u; i < cut.plane_count + zero; i += 1u) {
         let distance = dot(cut.planes[2u * i].xyz, at);
         let slope = dot(cut.planes[2u * i + 1u].xyz, at);
         let crossing = -distance / slope;
