@@ -176,10 +176,10 @@ impl ClassifiedVolume {
     }
 
     /// Bytes of GPU memory that the volume will hold once prepared.
-    pub(crate) fn estimate(&self) -> u64 {
-        let [values, both] = GpuVolume::estimate(self.volume().values().len() as u32);
+    pub(crate) fn estimate(&self) -> Result<u64, RenderError> {
+        let [values, both] = GpuVolume::estimate(self.volume.device(), self.volume().values().len() as u32)?;
         let has_labels = self.shades_by_label() || self.volume.labels().is_some();
-        if has_labels { both } else { values }
+        Ok(if has_labels { both } else { values })
     }
 
     /// Bytes of GPU memory, with the volume's, which other views may share ([`GpuVolume::gpu_bytes`]).

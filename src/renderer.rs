@@ -141,7 +141,7 @@ impl Renderer {
             cut_uniform(),
             staging(timestamps_at(needs.groups), timer.is_some(), passes),
         ];
-        let volume = view.volume.estimate() + settled.gpu_bytes();
+        let volume = view.volume.estimate()? + settled.gpu_bytes();
         let compositing = CompositingBuffer::estimate(request.view.size, request.bands.len());
         let counts = timer.unwrap_or(0) + sizes(&limits, &buffers)?;
         Ok(volume + compositing + needs.bytes + request.hit_bytes() + counts)

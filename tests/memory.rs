@@ -85,11 +85,11 @@ fn a_volumes_bytes_are_known_before() {
         let values = (0..count).map(|voxel| (voxel % 7) as f32).collect();
         let volume = Volume::new("steps", dims, DVec3::ONE, values).unwrap();
         let on_gpu = GpuVolume::new(gpu.device(), gpu.queue(), volume).unwrap();
-        assert_eq!(on_gpu.gpu_bytes(), GpuVolume::estimate(count)[0], "{dims}");
+        assert_eq!(on_gpu.gpu_bytes(), GpuVolume::estimate(gpu.device(), count).unwrap()[0], "{dims}");
     }
     // With labels, of whose tables some matter to shading.
     let (volume, mut scene) = head(20);
-    let [values, both] = GpuVolume::estimate(volume.values().len() as u32);
+    let [values, both] = GpuVolume::estimate(gpu.device(), volume.values().len() as u32).unwrap();
     let mut view = gpu.view(volume.clone(), &scene).unwrap();
     gpu.draw(&mut view).unwrap();
     assert_eq!(view.volume().gpu_volume().gpu_bytes(), values);

@@ -7,7 +7,7 @@ use sheetsplat::classify::classify;
 use sheetsplat::clip::ClippedVoxels;
 use sheetsplat::gpu::layout::{Gathered, Part, Tally};
 use sheetsplat::gpu::uniforms::{self, Ramps};
-use sheetsplat::gpu::volume_texture::VolumeTexture;
+use sheetsplat::gpu::volume_texture::{SIDES, VolumeTexture};
 use sheetsplat::headless::Headless;
 use sheetsplat::pass::composite::RayMode;
 use sheetsplat::pass::gather::{Gather, GatherBuffers, GatherMode};
@@ -93,6 +93,7 @@ impl<'a> Fixture<'a> {
         let (parts_buffer, stride) = at_offsets(device, &parts);
         let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|half| half.as_vec2().to_array()).collect();
         let uncut = Uncut::new(device);
+        let side = SIDES[size[0] as usize % SIDES.len()];
         let mode = GatherMode::of(&seen.scene.splatting, seen.view.perspective.is_some(), false, RayMode::default());
         let buffers = GatherBuffers {
             frame: &init(device, &[frame], BufferUsages::UNIFORM),
@@ -102,7 +103,7 @@ impl<'a> Fixture<'a> {
             starts: &storage(&bins.starts),
             entries: &storage(&bins.entries),
             control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
-            values: &VolumeTexture::upload(device, gpu.queue(), volume.values()).unwrap().view,
+            values: &VolumeTexture::upload_folded(device, gpu.queue(), volume.values(), side).view,
             labels: None,
             gathered: &gathered,
             half_boxes: &init(device, &half_boxes, BufferUsages::STORAGE),
