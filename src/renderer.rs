@@ -8,7 +8,7 @@ use wgpu::{BufferUsages, CommandEncoder, Device, Queue, RenderPass, TextureForma
 use crate::error::{RenderError, check_device};
 use crate::fault::scoped;
 use crate::gpu::device::{self, DeviceError, DeviceRequirements};
-use crate::gpu::layout::{Frame, Tally};
+use crate::gpu::layout::Tally;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::{PASS_BYTES, Timer};
 use crate::gpu::uniforms::{self, Ramps};
@@ -103,6 +103,7 @@ impl Renderer {
 
     fn prepare_unscoped(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
         let SceneView { volume, scene, surfaces, first_hit, frame } = view;
+        scene.splatting.check()?;
         let splatting = &self.settled(scene.splatting);
         let size = [scene.image.width, scene.image.height];
         let seen = View::new(volume.grid(), &scene.camera, splatting, size)?;
@@ -139,7 +140,7 @@ impl Renderer {
         let frame_uniform = uniforms::frame(&seen, &kernel, volume.grid(), &ramps, scene);
         let bytes = bytemuck::bytes_of(&frame_uniform);
         let uniform = filled(uniform, "sheetsplat.frame", bytes, BufferUsages::UNIFORM)?;
-        let cut_uniform = uniforms::cut(&seen, &grid, &scene.clip, depths, *first_hit);
+        let cut_uniform = uniforms::cut(&seen, &grid, scene, depths, *first_hit);
         let cut = filled(cut, "sheetsplat.cut", bytemuck::bytes_of(&cut_uniform), BufferUsages::UNIFORM)?;
         let cut_buffers = CutBuffers {
             uniform: &cut,
@@ -164,7 +165,7 @@ impl Renderer {
             cut: cut_buffers,
         };
         let was = drawing.as_ref().map(Drawing::rasterizer);
-        let (drawing, prepared) = self.draw_with(given, way, &frame_uniform, drawing)?;
+        let (drawing, prepared) = self.draw_with(given, way, drawing)?;
         let totals = totals.filter(|_| !prepared.bucketed && was == Some(drawing.rasterizer()));
 
         let first_hits = drawing.first_hits().filter(|_| rays.first_hit).map(|words| {
@@ -213,7 +214,6 @@ impl Renderer {
         &self,
         given: Given<'_>,
         way: Way,
-        frame: &Frame,
         previous: Option<Drawing>,
     ) -> Result<(Drawing, Prepared), RenderError> {
         let (mut old_quads, mut old_tiles, mut old_samples) = (None, None, None);
@@ -224,7 +224,7 @@ impl Renderer {
             None => {}
         }
         if way == Way::Samples {
-            let (frame, prepared) = self.samples(given.device).prepare(given, frame, old_samples)?;
+            let (frame, prepared) = self.samples(given.device).prepare(given, old_samples)?;
             return Ok((Drawing::Samples(Box::new(frame)), prepared));
         }
         if way == Way::Tiles {
@@ -353,7 +353,11 @@ fn check_rays(
         return refused("splatting.method", found, "a method with sheets".to_owned());
     }
     let Some(opacity) = first_hit else { return Ok(()) };
-    let hides = splatting.culling && splatting.compositing != Compositing::Xray;
+    if splatting.compositing == Compositing::Minimum {
+        let allowed = "another one: the least is known at the end of a ray";
+        return refused("splatting.compositing", "\"minimum\" with first hits".to_owned(), allowed.to_owned());
+    }
+    let hides = splatting.culling && splatting.compositing.hides();
     let most = if hides { splatting.opacity_threshold } else { 1.0 };
     if !(opacity > 0.0 && opacity <= most) {
         let allowed = format!("above 0, at most {most}{}", if hides { ", the opacity_threshold" } else { "" });

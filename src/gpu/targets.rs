@@ -34,6 +34,8 @@ pub struct Targets {
     pub occluded: Buffer,
     /// A word per tile: 1 where all its pixels are opaque.
     pub opaque_tiles: Buffer,
+    /// A word per tile: [`Group::number`](super::layout::Group::number) of the group that it was composited for last, 0 of none.
+    pub last_groups: Buffer,
 }
 
 /// One band of the compositing buffer.
@@ -114,6 +116,7 @@ impl Targets {
             opaque_columns: mask("sheetsplat.opaque_columns", columns * height)?,
             occluded: mask("sheetsplat.occluded", columns * height)?,
             opaque_tiles: mask("sheetsplat.opaque_tiles", columns * rows)?,
+            last_groups: mask("sheetsplat.last_groups", columns * rows)?,
             sheets: sheet_buffers(),
         })
     }
@@ -136,14 +139,18 @@ impl Targets {
         })
     }
 
+    /// What is zero at the start of a frame.
+    pub fn masks(&self) -> [&Buffer; 5] {
+        let Self { opaque, opaque_columns, occluded, opaque_tiles, last_groups, .. } = self;
+        [opaque, opaque_columns, occluded, opaque_tiles, last_groups]
+    }
+
     /// Bytes of GPU memory.
     pub fn gpu_bytes(&self) -> u64 {
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
         let texel = u64::from(self.sheets.format().block_copy_size(None).unwrap_or(0));
         let sheets = pixels * texel * u64::from(self.sheets.depth_or_array_layers());
-        let masks = [&self.opaque, &self.opaque_columns, &self.occluded, &self.opaque_tiles];
-        let masks: u64 = masks.map(Buffer::size).iter().sum();
-        sheets + masks
+        sheets + self.masks().map(Buffer::size).iter().sum::<u64>()
     }
 }
 

@@ -5,6 +5,8 @@ pub(crate) mod quads;
 pub(crate) mod samples;
 pub(crate) mod tiles;
 
+use std::ops::Range;
+
 use wgpu::{Buffer, BufferUsages, ComputePassDescriptor, Device, Queue};
 
 use crate::classified_volume::ClassifiedVolume;
@@ -15,6 +17,7 @@ use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
 use crate::kernel::Kernel;
+use crate::means;
 use crate::pass::composite::{CutBuffers, RayMode};
 use crate::splatting::{FootprintForm, Splatting};
 use crate::view::View;
@@ -51,6 +54,11 @@ pub(crate) struct Given<'a> {
 }
 
 impl Given<'_> {
+    /// See [`means::covered`].
+    fn covered(&self) -> Range<f64> {
+        means::covered(self.view, self.volume.grid(), self.splatting)
+    }
+
     /// See [`filled`].
     fn filled(
         &self,

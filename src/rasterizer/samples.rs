@@ -9,11 +9,11 @@ use super::{Footprints, Given, Prepared, compute};
 use crate::brick::{self, BRICK_VOXELS};
 use crate::error::RenderError;
 use crate::gpu::bindings::grown;
-use crate::gpu::layout::{FOLD, Frame, Indirect, QUADS, Splat, Tally, TileList};
+use crate::gpu::layout::{FOLD, Indirect, QUADS, Splat, Tally, TileList};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
-use crate::pass::composite::{Composite, CompositeBuffers, RayMode};
+use crate::pass::composite::{Composite, CompositeBuffers, CompositeMode, RayMode};
 use crate::pass::sample::{Sample, SampleBuffers, SampleMode};
 use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};
 use crate::plan::tile_grid;
@@ -23,6 +23,10 @@ use crate::view::View;
 
 /// Planes around all kernels, in the sheet depth of such views.
 const PLANES: std::ops::Range<f64> = -0.5..0.5;
+
+/// How the one buffer goes into the compositing buffer: its samples are composited already.
+const SUM: CompositeMode =
+    CompositeMode { compositing: Compositing::Xray, rays: RayMode { cut: false, first_hit: false } };
 
 /// The stages.
 #[derive(Debug)]
@@ -64,8 +68,6 @@ struct Buffers {
     group: Buffer,
     splats: Buffer,
     tiles: Buffer,
-    /// The frame, for the composite stage: samples are composited already.
-    sum: Buffer,
     counts: Buffer,
     no_hits: Buffer,
 }
@@ -82,7 +84,6 @@ impl SampleRasterizer {
     pub(crate) fn prepare(
         &self,
         given: Given<'_>,
-        frame: &Frame,
         previous: Option<SampleFrame>,
     ) -> Result<(SampleFrame, Prepared), RenderError> {
         let Given { device, volume, view, kernel, splatting, .. } = given;
@@ -106,7 +107,7 @@ impl SampleRasterizer {
         };
         let (footprints, tabled) = Footprints::renewed(old_footprints, given);
         let targets = Targets::new(device, view.size, self.format, 1)?;
-        let buffers = Buffers::new(given, frame, &sorted.places, required)?;
+        let buffers = Buffers::new(given, &sorted.places, required)?;
 
         let shade_group = self.shade.bind(
             device,
@@ -136,7 +137,7 @@ impl SampleRasterizer {
         );
         let sheets = targets.sheets_view();
         let composite_buffers = CompositeBuffers {
-            frame: &buffers.sum,
+            frame: given.frame,
             groups: &buffers.group,
             sheets: &sheets,
             tiles: &buffers.tiles,
@@ -144,7 +145,7 @@ impl SampleRasterizer {
             cut: given.cut,
             hits: &buffers.no_hits,
         };
-        let composite = |band| self.composite.bind(device, RayMode::default(), composite_buffers, band);
+        let composite = |band| self.composite.bind(device, SUM, composite_buffers, band);
         let frame = SampleFrame {
             composite_groups: given.compositing.bands.iter().map(composite).collect(),
             target: targets.sheet_view(0),
@@ -169,7 +170,7 @@ impl SampleRasterizer {
         let count = frame.sorted.places.len() as u32;
         self.sample.record(encoder, times, (frame.mode, &frame.sample_group), &frame.target, count);
         let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.composite", timer, "composite"));
-        self.composite.record(&mut pass, RayMode::default(), &frame.composite_groups, 0, &buffers.tiles);
+        self.composite.record(&mut pass, SUM, &frame.composite_groups, 0, &buffers.tiles);
     }
 }
 
@@ -190,9 +191,8 @@ impl SampleFrame {
 
     /// Bytes of GPU memory.
     pub(crate) fn gpu_bytes(&self) -> u64 {
-        let Buffers { order, args, group, splats, tiles, sum, counts, no_hits } = &self.buffers;
-        let buffers: u64 =
-            [order, args, group, splats, tiles, sum, counts, no_hits].into_iter().map(Buffer::size).sum();
+        let Buffers { order, args, group, splats, tiles, counts, no_hits } = &self.buffers;
+        let buffers: u64 = [order, args, group, splats, tiles, counts, no_hits].into_iter().map(Buffer::size).sum();
         self.targets.gpu_bytes() + self.footprints.texture.gpu_bytes + buffers
     }
 }
@@ -228,7 +228,7 @@ impl Sorted {
 }
 
 impl Buffers {
-    fn new(given: Given<'_>, frame: &Frame, places: &[u32], splat_bytes: u64) -> Result<Self, RenderError> {
+    fn new(given: Given<'_>, places: &[u32], splat_bytes: u64) -> Result<Self, RenderError> {
         let Given { device, view, kernel, splatting, .. } = given;
         let count = places.len() as u32;
         let (storage, indirect) = (BufferUsages::STORAGE, BufferUsages::STORAGE | BufferUsages::INDIRECT);
@@ -241,14 +241,12 @@ impl Buffers {
         let group = uniforms::group(view, kernel, splatting, PLANES);
         let counts =
             Tally { voxels_shaded: count, sections_rasterized: count, quads: count, ..bytemuck::Zeroable::zeroed() };
-        let sum = Frame { compositing: Compositing::Xray as u32, ..*frame };
         Ok(Self {
             order: filled("sheetsplat.order", bytemuck::cast_slice(places), storage)?,
             args: filled("sheetsplat.args", bytemuck::bytes_of(&workgroups(count, 64)), indirect)?,
             group: filled("sheetsplat.group", bytemuck::bytes_of(&group), BufferUsages::UNIFORM)?,
             splats: grown(device, None, "sheetsplat.splats", splat_bytes.max(size_of::<Splat>() as u64), storage)?,
             tiles: filled("sheetsplat.tiles", &tile_words, indirect)?,
-            sum: filled("sheetsplat.sum", bytemuck::bytes_of(&sum), BufferUsages::UNIFORM)?,
             counts: filled("sheetsplat.counts", bytemuck::bytes_of(&counts), BufferUsages::COPY_SRC)?,
             no_hits: filled("sheetsplat.no_hits", &[0; 4], storage)?,
         })

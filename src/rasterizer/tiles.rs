@@ -1,6 +1,7 @@
 //! The tile rasterizer: one compute stage draws every tile front to back, its sheets in registers.
 
 use std::mem::offset_of;
+use std::ops::Range;
 
 use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Features};
 
@@ -50,6 +51,8 @@ struct Binned {
     bins: TileBins,
     view: View,
     order: Order,
+    /// [`means::covered`](crate::means::covered).
+    covered: Range<f64>,
     /// Of the kernel; it changes the footprints' boxes.
     support: f64,
     search_passes: u32,
@@ -95,12 +98,12 @@ impl TileRasterizer {
         let limits = device.limits();
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let mut old = Old::of(previous);
-        let in_memory = volume.labels().is_some();
+        let (in_memory, covered) = (volume.labels().is_some(), given.covered());
         let search_passes = given.ramp_lengths.iter().map(|&points| search_passes(points, in_memory)).sum();
         let is_current = |old: &Binned| {
             old.view == *view
                 && (old.order, old.revision, old.search_passes) == (splatting.order, volume.revision, search_passes)
-                && old.support == kernel.support()
+                && (old.support, &old.covered) == (kernel.support(), &covered)
         };
         let (current, stale) = match old.binned.take() {
             Some(binned) if is_current(&binned) => (Some(binned), false),
@@ -110,9 +113,9 @@ impl TileRasterizer {
         let binned = match current {
             Some(binned) => binned,
             None => {
-                let support = kernel.support();
-                let bins = TileBins::new(bricks, view, splatting.order, support, search_passes, binding / 4)?;
-                Binned { bins, view: *view, order: splatting.order, support, search_passes, revision: volume.revision }
+                let (order, support) = (splatting.order, kernel.support());
+                let bins = TileBins::new(bricks, view, order, covered.clone(), support, search_passes, binding / 4)?;
+                Binned { bins, view: *view, order, covered, support, search_passes, revision: volume.revision }
             }
         };
         let bins = &binned.bins;
