@@ -20,23 +20,18 @@ pub fn composite_pixel(acc: &mut DVec4, sheet: DVec4, compositing: Compositing, 
     let scale = match compositing {
         Compositing::Linear => 1.0 / sheet.w.max(1.0),
         Compositing::Exponential if sheet.w > 0.0 => -(-sheet.w).exp_m1() / sheet.w,
-        Compositing::Maximum | Compositing::Minimum => 1.0 / sheet.w.max(1.0),
         _ => 1.0,
     };
     let sheet = sheet * scale;
-    // Of equal ones the nearer.
-    let passes = |a: f64, b: f64| a > b || a == b && order == Order::BackToFront;
+    // Of equal ones the nearer: scaled, all above 1 are equal to the last bit.
+    let kept = |acc: DVec4, color: DVec4, opacity: f64| {
+        let passes = opacity > acc.w || opacity == acc.w && order == Order::BackToFront;
+        if passes { (color / color.w.max(1.0)).truncate().extend(opacity) } else { acc }
+    };
     *acc = match (compositing, order) {
         (Compositing::Xray | Compositing::Average, _) => *acc + sheet,
-        (Compositing::Maximum, _) => {
-            if passes(sheet.w, acc.w) {
-                sheet
-            } else {
-                *acc
-            }
-        }
-        (Compositing::Minimum, _) if passes(2.0 - sheet.w, acc.w) => sheet.truncate().extend(2.0 - sheet.w),
-        (Compositing::Minimum, _) => *acc,
+        (Compositing::Maximum, _) => kept(*acc, sheet, sheet.w.min(1.0)),
+        (Compositing::Minimum, _) => kept(*acc, sheet, 2.0 - sheet.w.min(1.0)),
         (Compositing::Surface, _) if acc.w >= 1.0 => *acc,
         (Compositing::Surface, _) if sheet.w < 0.5 => sheet,
         (Compositing::Surface, _) => {
