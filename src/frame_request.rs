@@ -1,5 +1,7 @@
 //! What a frame asks for: everything about it that is known before anything is allocated, and can be refused.
 
+use std::ops::Range;
+
 use wgpu::Device;
 
 use crate::error::RenderError;
@@ -7,6 +9,7 @@ use crate::gpu::layout::Band;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::uniforms::Ramps;
 use crate::kernel::Kernel;
+use crate::means;
 use crate::pass::composite::RayMode;
 use crate::rasterizer::way::{Way, check_rays, insists_on_tiles};
 use crate::scene_view::SceneView;
@@ -22,6 +25,8 @@ pub(crate) struct FrameRequest {
     pub(crate) view: View,
     pub(crate) kernel: Kernel,
     pub(crate) ramps: Ramps,
+    /// The sheet depths whose slabs count even where they hold nothing: [`means::covered`].
+    pub(crate) covered: Range<f64>,
     pub(crate) rays: RayMode,
     /// The opacity of first hits.
     pub(crate) first_hit: Option<f64>,
@@ -38,6 +43,7 @@ impl FrameRequest {
     pub(crate) fn new(device: &Device, view: &SceneView, rasterizer: Rasterizer) -> Result<Self, RenderError> {
         let SceneView { volume, scene, surfaces, first_hit, .. } = view;
         let splatting = settled(scene.splatting, rasterizer);
+        splatting.check()?;
         let (grid, size) = (volume.grid(), [scene.image.width, scene.image.height]);
         let seen = View::new(grid, &scene.camera, &splatting, size)?;
         let bands = CompositingBuffer::bands(&device.limits(), size)?;
@@ -49,6 +55,7 @@ impl FrameRequest {
         };
         Ok(Self {
             way: Way::of(device, &splatting)?,
+            covered: means::covered(&seen, grid, &splatting),
             kernel: Kernel::new(splatting.radius, splatting.falloff),
             ramps: Ramps::new(volume.transfer()),
             first_hit: *first_hit,

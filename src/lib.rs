@@ -105,6 +105,7 @@ pub mod headless;
 pub mod image;
 pub mod iso_range;
 pub mod kernel;
+pub mod means;
 pub mod pass;
 pub mod pick;
 pub mod placement;

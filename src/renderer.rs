@@ -163,7 +163,7 @@ impl Renderer {
         let control_points = write(kept.control_points, &control_points(&request), points)?;
         let frame_values = uniforms::frame(seen, kernel, &grid, ramps, scene);
         let uniform = write(kept.uniform, &frame_uniform(), bytemuck::bytes_of(&frame_values))?;
-        let cut_values = uniforms::cut(seen, &grid, &scene.clip, request.surfaces, request.first_hit);
+        let cut_values = uniforms::cut(seen, &grid, scene, request.surfaces, request.first_hit);
         let cut = write(kept.cut, &cut_uniform(), bytemuck::bytes_of(&cut_values))?;
         let cut_buffers = CutBuffers {
             uniform: &cut,
@@ -184,7 +184,7 @@ impl Renderer {
             cut: cut_buffers,
         };
         let was = kept.drawing.as_ref().map(Drawing::rasterizer);
-        let (drawing, prepared) = self.draw_with(given, &frame_values, kept.drawing)?;
+        let (drawing, prepared) = self.draw_with(given, kept.drawing)?;
         let totals = kept.totals.filter(|_| !prepared.bucketed && was == Some(drawing.rasterizer()));
 
         let first_hits = drawing.first_hits().filter(|_| rays.first_hit).map(|words| {
@@ -221,12 +221,7 @@ impl Renderer {
     }
 
     /// Prepares a rasterizer's part: by tiles, unless the view does not fit them and the scene does not insist.
-    fn draw_with(
-        &self,
-        given: Given<'_>,
-        frame: &Frame,
-        previous: Option<Drawing>,
-    ) -> Result<(Drawing, Prepared), RenderError> {
+    fn draw_with(&self, given: Given<'_>, previous: Option<Drawing>) -> Result<(Drawing, Prepared), RenderError> {
         let (mut old_quads, mut old_tiles, mut old_samples) = (None, None, None);
         match previous {
             Some(Drawing::Quads(frame)) => old_quads = Some(*frame),
@@ -236,7 +231,7 @@ impl Renderer {
         }
         let FrameRequest { way, splatting, .. } = given.request;
         if *way == Way::Samples {
-            let (frame, prepared) = self.samples(given.device).prepare(given, frame, old_samples)?;
+            let (frame, prepared) = self.samples(given.device).prepare(given, old_samples)?;
             return Ok((Drawing::Samples(Box::new(frame)), prepared));
         }
         if *way == Way::Tiles {

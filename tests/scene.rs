@@ -329,7 +329,7 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
         "'over'",
         "splatting.compositing",
         "\"over\"",
-        "\"linear\" or \"exponential\" or \"xray\"",
+        "\"linear\" or \"exponential\" or \"xray\" or \"maximum\" or \"minimum\" or \"average\" or \"surface\"",
     ),
     ("splatting.order", "''", "splatting.order", "\"\"", "\"front-to-back\" or \"back-to-front\""),
     ("splatting.order", "1979-05-27", "splatting.order", "1979-05-27 (datetime)", "\"front-to-back\""),

@@ -1,4 +1,4 @@
-// What clip planes and a host's surfaces leave of a pixel's ray; `gpu::layout::Cut` documents the fields. A stage that includes this
+// What clip planes and a host's surfaces leave of a pixel's ray, and the volume's box; `gpu::layout::Cut` documents the fields. A stage that includes this
 // declares `cut: Cut` and `surfaces: texture_depth_2d`.
 struct Cut {
     sheet_at: vec4f,
@@ -6,6 +6,9 @@ struct Cut {
     surface_depth: vec4f,
     surface_w: vec4f,
     planes: array<vec4f, 24>,
+    box_at: array<vec4f, 3>,
+    box_along: array<vec4f, 3>,
+    box_half: vec4f,
     surface_origin: vec2u,
     no_surface: f32,
     first_hit: f32,
@@ -18,10 +21,14 @@ struct Cut {
 // Beyond every depth.
 const FAR = 1e30;
 
-// The sheet depths at which the ray through a point of the image shows something, from and to; from beyond to, if nowhere.
-fn shown(point_px: vec2f) -> vec2f {
-    let at = vec3f(point_px - 0.5 * vec2f(frame.size), 1.0);
-    // Along w.
+// A point of the image as rays go by it.
+fn place_of(point_px: vec2f) -> vec3f {
+    return vec3f(point_px - 0.5 * vec2f(frame.size), 1.0);
+}
+
+// The depths along w at which the ray through a point of the image shows something, from and to.
+fn shown_depths(point_px: vec2f) -> vec2f {
+    let at = place_of(point_px);
     var depths = vec2f(-FAR, FAR);
     for (var i = 0u; i < cut.plane_count + zero; i += 1u) {
         let distance = dot(cut.planes[2u * i].xyz, at);
@@ -37,6 +44,11 @@ fn shown(point_px: vec2f) -> vec2f {
         let surface = dot(cut.surface_depth, ndc) / dot(cut.surface_w, ndc);
         depths.y = select(min(depths.y, surface), depths.y, z == cut.no_surface);
     }
+    return depths;
+}
+
+// The sheet depths of a ray's depths; from beyond to, if those are.
+fn sheet_depths(at: vec3f, depths: vec2f) -> vec2f {
     let slope = dot(cut.sheet_along.xyz, at);
     let ends = dot(cut.sheet_at.xyz, at) + slope * depths;
     // Sheets are counted along w: a ray wide off the axis may meet slices the other way round, or stay in one.
@@ -44,9 +56,14 @@ fn shown(point_px: vec2f) -> vec2f {
     return select(vec2f(FAR, -FAR), sheets, depths.x < depths.y);
 }
 
+// The sheet depths at which the ray through a point of the image shows something, from and to; from beyond to, if nowhere.
+fn shown(point_px: vec2f) -> vec2f {
+    return sheet_depths(place_of(point_px), shown_depths(point_px));
+}
+
 // The depth along w at which the ray through a point of the image meets a sheet depth.
 fn depth_along_ray(point_px: vec2f, sheet_depth: f32) -> f32 {
-    let at = vec3f(point_px - 0.5 * vec2f(frame.size), 1.0);
+    let at = place_of(point_px);
     return (sheet_depth - dot(cut.sheet_at.xyz, at)) / dot(cut.sheet_along.xyz, at);
 }
 

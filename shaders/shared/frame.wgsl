@@ -50,6 +50,10 @@ fn start(unknown_zero: u32) {
 const LINEAR = 0u;
 const EXPONENTIAL = 1u;
 const XRAY = 2u;
+const MAXIMUM = 3u;
+const MINIMUM = 4u;
+const AVERAGE = 5u;
+const SURFACE = 6u;
 
 const FRONT_TO_BACK = 0u;
 const BACK_TO_FRONT = 1u;

@@ -34,6 +34,8 @@ pub struct Targets {
     pub occluded: Buffer,
     /// A word per tile: 1 where all its pixels are opaque.
     pub opaque_tiles: Buffer,
+    /// A word per tile: [`Group::number`](super::layout::Group::number) of the group that it was composited for last, 0 of none.
+    pub last_groups: Buffer,
 }
 
 /// One band of the compositing buffer.
@@ -111,13 +113,15 @@ impl Targets {
                 view_formats: &[],
             })
         };
-        let [opaque, opaque_columns, occluded, opaque_tiles] = masks(size).map(|mask| grown(device, None, &mask));
+        let [opaque, opaque_columns, occluded, opaque_tiles, last_groups] =
+            masks(size).map(|mask| grown(device, None, &mask));
         Ok(Self {
             size,
             opaque: opaque?,
             opaque_columns: opaque_columns?,
             occluded: occluded?,
             opaque_tiles: opaque_tiles?,
+            last_groups: last_groups?,
             sheets: sheet_buffers(),
         })
     }
@@ -160,19 +164,23 @@ impl Targets {
         })
     }
 
+    /// What is zero at the start of a frame.
+    pub fn masks(&self) -> [&Buffer; 5] {
+        let Self { opaque, opaque_columns, occluded, opaque_tiles, last_groups, .. } = self;
+        [opaque, opaque_columns, occluded, opaque_tiles, last_groups]
+    }
+
     /// Bytes of GPU memory.
     pub fn gpu_bytes(&self) -> u64 {
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
         let texel = u64::from(self.sheets.format().block_copy_size(None).unwrap_or(0));
         let sheets = pixels * texel * u64::from(self.sheets.depth_or_array_layers());
-        let masks = [&self.opaque, &self.opaque_columns, &self.occluded, &self.opaque_tiles];
-        let masks: u64 = masks.map(Buffer::size).iter().sum();
-        sheets + masks
+        sheets + self.masks().map(Buffer::size).iter().sum::<u64>()
     }
 }
 
 /// The buffers of [`Targets`], in its order.
-fn masks(size: [u32; 2]) -> [Wanted; 4] {
+fn masks(size: [u32; 2]) -> [Wanted; 5] {
     let [columns, rows] = tile_grid(size);
     let mask = |label, words: u32| {
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
@@ -183,6 +191,7 @@ fn masks(size: [u32; 2]) -> [Wanted; 4] {
         mask("sheetsplat.opaque_columns", columns * size[1]),
         mask("sheetsplat.occluded", columns * size[1]),
         mask("sheetsplat.opaque_tiles", columns * rows),
+        mask("sheetsplat.last_groups", columns * rows),
     ]
 }
 

@@ -78,7 +78,7 @@ pub struct GatherBuffers<'a> {
 
 impl Default for Gather {
     fn default() -> Self {
-        Self { stages: (0..3 << 7).map(|_| OnceLock::new()).collect(), no_labels: OnceLock::new() }
+        Self { stages: (0..Compositing::COUNT << 7).map(|_| OnceLock::new()).collect(), no_labels: OnceLock::new() }
     }
 }
 

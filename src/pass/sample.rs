@@ -68,8 +68,8 @@ impl Sample {
     pub fn bind(&self, device: &Device, mode: SampleMode, buffers: SampleBuffers<'_>) -> BindGroup {
         self.pipeline(mode).get_or_init(|| {
             let over = added_to(match mode.compositing {
-                Compositing::Linear | Compositing::Exponential => wgpu::BlendFactor::OneMinusSrcAlpha,
                 Compositing::Xray => wgpu::BlendFactor::One,
+                _ => wgpu::BlendFactor::OneMinusSrcAlpha,
             });
             let constants = [
                 ("SECTIONS", f64::from(u8::from(mode.form == FootprintForm::Sections))),

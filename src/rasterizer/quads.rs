@@ -1,5 +1,7 @@
 //! The quad rasterizer (Fig. 12): for every group of sheets the stages cull, tiles, splat, composite and occlude.
 
+use std::ops::Range;
+
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Limits, TextureFormat, TextureView};
 
 use super::{Footprints, Given, Needs, Prepared, compute};
@@ -13,7 +15,7 @@ use crate::gpu::layout::{Brick, Group, Tally};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
-use crate::pass::composite::{Composite, CompositeBuffers, RayMode};
+use crate::pass::composite::{Composite, CompositeBuffers, CompositeMode};
 use crate::pass::cull::{Cull, CullBuffers, CullList};
 use crate::pass::occlude::Occlude;
 use crate::pass::splat::{Splat, SplatMode};
@@ -21,7 +23,6 @@ use crate::pass::tiles::{TileLists, Tiles};
 use crate::plan::{FramePlan, tile_grid};
 use crate::splatting::Order;
 use crate::stats::GroupSlabs;
-use crate::view::View;
 
 /// The stages.
 #[derive(Debug)]
@@ -51,7 +52,7 @@ pub(crate) struct QuadFrame {
     sheet_views: Vec<TextureView>,
     splat_mode: SplatMode,
     clear_group: BindGroup,
-    rays: RayMode,
+    composite_mode: CompositeMode,
     /// First hits, `[u32]`, one per pixel; of one, if they are not asked for.
     hits: Buffer,
     composite_groups: Vec<BindGroup>,
@@ -63,6 +64,8 @@ pub(crate) struct QuadFrame {
 struct Planned {
     plan: FramePlan,
     order: Order,
+    /// [`means::covered`](crate::means::covered).
+    covered: Range<f64>,
     /// [`ClassifiedVolume::revision`].
     revision: u64,
     /// For every list its bricks in bucket order, `[u32]`.
@@ -101,7 +104,7 @@ impl QuadRasterizer {
         previous: Option<QuadFrame>,
     ) -> Result<(QuadFrame, Prepared), RenderError> {
         let Given { device, volume, request, frame, control_points, compositing, .. } = given;
-        let FrameRequest { view, splatting, kernel, rays, .. } = request;
+        let FrameRequest { view, splatting, kernel, covered, rays, .. } = request;
         let old = Old::of(previous);
         let targets = old.targets.filter(|old| old.size == view.size);
         let targets = match targets {
@@ -110,14 +113,14 @@ impl QuadRasterizer {
         };
         let mut other_axes = old.planned;
         other_axes.retain(|old| {
-            (old.order, old.revision) == (splatting.order, volume.revision)
+            (old.order, old.revision, &old.covered) == (splatting.order, volume.revision, covered)
                 && (old.plan.view.has_depths_of(view) || old.plan.view.is_by_slices())
         });
         let current = other_axes.iter().position(|old| old.plan.view.has_depths_of(view));
         let bucketed = current.is_none();
         let mut planned = match current {
             Some(at) => other_axes.swap_remove(at),
-            None => Planned::new(device, volume, *view, self.sheets, splatting.order),
+            None => Planned::new(device, volume, request, self.sheets),
         };
         planned.plan.view = *view;
         let plan = &planned.plan;
@@ -160,13 +163,14 @@ impl QuadRasterizer {
             cut: given.cut,
             hits: &hits,
         };
-        let composite = |band| self.composite.bind(device, *rays, buffers, band);
+        let composite_mode = CompositeMode { compositing: splatting.compositing, rays: *rays };
+        let composite = |band| self.composite.bind(device, composite_mode, buffers, band);
         let splat_mode = SplatMode { form: splatting.footprint, perspective: view.perspective.is_some() };
         self.splat.prepare(device, splat_mode);
         let frame = QuadFrame {
             splat_mode,
             clear_group: self.splat.bind_clear(device, frame, tiles),
-            rays: *rays,
+            composite_mode,
             composite_groups: compositing.bands.iter().map(composite).collect(),
             occlude_groups: self.occlude.bind(device, [frame, &groups], &tile_lists.occluding, &targets),
             sheet_views: (0..self.sheets).map(|layer| targets.sheet_view(layer)).collect(),
@@ -194,8 +198,8 @@ impl QuadRasterizer {
         lists: &[&[Brick]],
         (sheet_format, sheets): (TextureFormat, u32),
     ) -> Result<Needs, RenderError> {
-        let FrameRequest { view, kernel, splatting, .. } = request;
-        let plan = FramePlan::new(lists.iter().copied(), *view, sheets, splatting.order);
+        let FrameRequest { view, kernel, splatting, covered, .. } = request;
+        let plan = FramePlan::new(lists.iter().copied(), *view, sheets, splatting.order, covered.clone());
         let most = most_of(lists.iter().copied(), &plan);
         let group_bytes = uniforms::groups(&plan, kernel, splatting, group_stride(limits)).len() as u64;
         let [columns, rows] = tile_grid(view.size);
@@ -217,18 +221,17 @@ impl QuadRasterizer {
     /// Draws the frame.
     pub(crate) fn record(&self, encoder: &mut CommandEncoder, timer: &mut Option<Timer>, frame: &QuadFrame) {
         let QuadFrame { planned: Planned { plan, .. }, targets, tile_lists, .. } = frame;
-        let masks = [&targets.opaque, &targets.opaque_columns, &targets.occluded, &targets.opaque_tiles, &frame.culled];
-        for buffer in masks.into_iter().chain([&frame.hits]).chain(frame.lists.iter().map(|list| &list.cull.states)) {
+        let masks = targets.masks().into_iter().chain([&frame.culled, &frame.hits]);
+        for buffer in masks.chain(frame.lists.iter().map(|list| &list.cull.states)) {
             encoder.clear_buffer(buffer, 0, None);
         }
         let mut offsets = (0..).step_by(frame.group_stride as usize);
         for group in &plan.groups {
             // (list, offset of its group uniform) for the lists that reach into the group.
-            let lists: Vec<(&PreparedList, u32)> = (frame.lists.iter().zip(&mut offsets).zip(&group.bricks))
-                .filter(|(_, bricks)| !bricks.is_empty())
-                .map(|(list, _)| list)
-                .collect();
-            let Some(&(_, any_offset)) = lists.first() else { continue };
+            let all: Vec<(&PreparedList, u32)> = frame.lists.iter().zip(&mut offsets).collect();
+            let Some(&(_, any_offset)) = all.first() else { continue };
+            let reaches = |(list, bricks): (_, &Range<u32>)| (!bricks.is_empty()).then_some(list);
+            let lists: Vec<(&PreparedList, u32)> = all.into_iter().zip(&group.bricks).filter_map(reaches).collect();
 
             let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.cull", timer, "cull"));
             for &(list, offset) in &lists {
@@ -244,7 +247,7 @@ impl QuadRasterizer {
 
             let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.composite", timer, "composite"));
             let bands = &frame.composite_groups;
-            self.composite.record(&mut pass, frame.rays, bands, any_offset, &tile_lists.composited);
+            self.composite.record(&mut pass, frame.composite_mode, bands, any_offset, &tile_lists.composited);
             self.occlude.record(&mut pass, &frame.occlude_groups, any_offset, &tile_lists.occluding);
         }
     }
@@ -289,14 +292,16 @@ impl QuadFrame {
 }
 
 impl Planned {
-    fn new(device: &Device, volume: &ClassifiedVolume, view: View, sheets: u32, order: Order) -> Self {
-        let plan = FramePlan::new(volume.lists.bricks(), view, sheets, order);
+    fn new(device: &Device, volume: &ClassifiedVolume, request: &FrameRequest, sheets: u32) -> Self {
+        let FrameRequest { view, splatting, covered, .. } = request;
+        let (order, covered) = (splatting.order, covered.clone());
+        let plan = FramePlan::new(volume.lists.bricks(), *view, sheets, order, covered.clone());
         let most = most_of(volume.lists.bricks(), &plan);
         let upload = |order: &Vec<u32>| {
             let bytes = order_bytes(order);
             uploaded(device, "sheetsplat.order", bytes, bytes.len() as u64, BufferUsages::STORAGE)
         };
-        Self { order, revision: volume.revision, orders: plan.orders.iter().map(upload).collect(), most, plan }
+        Self { order, covered, revision: volume.revision, orders: plan.orders.iter().map(upload).collect(), most, plan }
     }
 }
 

@@ -11,11 +11,11 @@ use crate::error::RenderError;
 use crate::footprint::FootprintTable;
 use crate::frame_request::FrameRequest;
 use crate::gpu::bindings::{Wanted, grown, sizes, wanted, wanted_for, written};
-use crate::gpu::layout::{Brick, FOLD, Frame, Group, Indirect, QUADS, Splat, Tally};
+use crate::gpu::layout::{Brick, FOLD, Group, Indirect, QUADS, Splat, Tally};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
-use crate::pass::composite::{Composite, CompositeBuffers, RayMode};
+use crate::pass::composite::{Composite, CompositeBuffers, CompositeMode, RayMode};
 use crate::pass::sample::{Sample, SampleBuffers, SampleMode};
 use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};
 use crate::plan::tile_grid;
@@ -26,6 +26,10 @@ use crate::volume::Grid;
 
 /// Planes around all kernels, in the sheet depth of such views.
 const PLANES: std::ops::Range<f64> = -0.5..0.5;
+
+/// How the one buffer goes into the compositing buffer: its samples are composited already.
+const SUM: CompositeMode =
+    CompositeMode { compositing: Compositing::Xray, rays: RayMode { cut: false, first_hit: false } };
 
 /// The stages.
 #[derive(Debug)]
@@ -67,8 +71,6 @@ struct Buffers {
     group: Buffer,
     splats: Buffer,
     tiles: Buffer,
-    /// The frame, for the composite stage: samples are composited already.
-    sum: Buffer,
     counts: Buffer,
     no_hits: Buffer,
 }
@@ -85,7 +87,6 @@ impl SampleRasterizer {
     pub(crate) fn prepare(
         &self,
         given: Given<'_>,
-        frame: &Frame,
         previous: Option<SampleFrame>,
     ) -> Result<(SampleFrame, Prepared), RenderError> {
         let Given { device, volume, request, .. } = given;
@@ -104,7 +105,7 @@ impl SampleRasterizer {
         };
         let (footprints, tabled) = Footprints::renewed(old_footprints, given);
         let targets = Targets::new(device, view.size, self.format, 1)?;
-        let buffers = Buffers::new(given, frame, &sorted.places, splat_bytes)?;
+        let buffers = Buffers::new(given, &sorted.places, splat_bytes)?;
 
         let shade_group = self.shade.bind(
             device,
@@ -134,7 +135,7 @@ impl SampleRasterizer {
         );
         let sheets = targets.sheets_view();
         let composite_buffers = CompositeBuffers {
-            frame: &buffers.sum,
+            frame: given.frame,
             groups: &buffers.group,
             sheets: &sheets,
             tiles: &buffers.tiles,
@@ -142,7 +143,7 @@ impl SampleRasterizer {
             cut: given.cut,
             hits: &buffers.no_hits,
         };
-        let composite = |band| self.composite.bind(device, RayMode::default(), composite_buffers, band);
+        let composite = |band| self.composite.bind(device, SUM, composite_buffers, band);
         let frame = SampleFrame {
             composite_groups: given.compositing.bands.iter().map(composite).collect(),
             target: targets.sheet_view(0),
@@ -185,7 +186,7 @@ impl SampleRasterizer {
         let count = frame.sorted.places.len() as u32;
         self.sample.record(encoder, times, (frame.mode, &frame.sample_group), &frame.target, count);
         let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.composite", timer, "composite"));
-        self.composite.record(&mut pass, RayMode::default(), &frame.composite_groups, 0, &buffers.tiles);
+        self.composite.record(&mut pass, SUM, &frame.composite_groups, 0, &buffers.tiles);
     }
 }
 
@@ -206,9 +207,8 @@ impl SampleFrame {
 
     /// Bytes of GPU memory.
     pub(crate) fn gpu_bytes(&self) -> u64 {
-        let Buffers { order, args, group, splats, tiles, sum, counts, no_hits } = &self.buffers;
-        let buffers: u64 =
-            [order, args, group, splats, tiles, sum, counts, no_hits].into_iter().map(Buffer::size).sum();
+        let Buffers { order, args, group, splats, tiles, counts, no_hits } = &self.buffers;
+        let buffers: u64 = [order, args, group, splats, tiles, counts, no_hits].into_iter().map(Buffer::size).sum();
         self.targets.gpu_bytes() + self.footprints.texture.gpu_bytes + buffers
     }
 }
@@ -244,7 +244,7 @@ impl Sorted {
 
 impl Buffers {
     /// For so many voxels on an image, in their order.
-    fn wanted(size: [u32; 2], voxels: usize, splat_bytes: u64) -> [Wanted; 8] {
+    fn wanted(size: [u32; 2], voxels: usize, splat_bytes: u64) -> [Wanted; 7] {
         let (storage, indirect) = (BufferUsages::STORAGE, BufferUsages::STORAGE | BufferUsages::INDIRECT);
         let [columns, rows] = tile_grid(size);
         let one = |label, bytes: usize, usage| wanted_for(label, bytes as u64, usage);
@@ -254,13 +254,12 @@ impl Buffers {
             one("sheetsplat.group", size_of::<Group>(), BufferUsages::UNIFORM),
             wanted("sheetsplat.splats", splat_bytes.max(size_of::<Splat>() as u64), storage),
             one("sheetsplat.tiles", size_of::<Indirect>() + 4 * (columns * rows) as usize, indirect),
-            one("sheetsplat.sum", size_of::<Frame>(), BufferUsages::UNIFORM),
             one("sheetsplat.counts", size_of::<Tally>(), BufferUsages::COPY_SRC),
             one("sheetsplat.no_hits", 4, storage),
         ]
     }
 
-    fn new(given: Given<'_>, frame: &Frame, places: &[u32], splat_bytes: u64) -> Result<Self, RenderError> {
+    fn new(given: Given<'_>, places: &[u32], splat_bytes: u64) -> Result<Self, RenderError> {
         let Given { device, queue, request, .. } = given;
         let FrameRequest { view, kernel, splatting, .. } = request;
         let count = places.len() as u32;
@@ -269,9 +268,7 @@ impl Buffers {
         tile_words.extend((0..columns * rows).flat_map(u32::to_ne_bytes));
         let tally =
             Tally { voxels_shaded: count, sections_rasterized: count, quads: count, ..bytemuck::Zeroable::zeroed() };
-        let sum_frame = Frame { compositing: Compositing::Xray as u32, ..*frame };
-        let [order, args, group, splats, tiles, sum, counts, no_hits] =
-            Self::wanted(view.size, places.len(), splat_bytes);
+        let [order, args, group, splats, tiles, counts, no_hits] = Self::wanted(view.size, places.len(), splat_bytes);
         let filled = |wanted: Wanted, bytes: &[u8]| written(device, queue, None, &wanted, bytes);
         Ok(Self {
             order: filled(order, bytemuck::cast_slice(places))?,
@@ -279,7 +276,6 @@ impl Buffers {
             group: filled(group, bytemuck::bytes_of(&uniforms::group(view, kernel, splatting, PLANES)))?,
             splats: grown(device, None, &splats)?,
             tiles: filled(tiles, &tile_words)?,
-            sum: filled(sum, bytemuck::bytes_of(&sum_frame))?,
             counts: filled(counts, bytemuck::bytes_of(&tally))?,
             no_hits: filled(no_hits, &[0; 4])?,
         })

@@ -1,6 +1,7 @@
 //! The tile rasterizer: one compute stage draws every tile front to back, its sheets in registers.
 
 use std::mem::offset_of;
+use std::ops::Range;
 
 use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Features, Limits};
 
@@ -51,6 +52,8 @@ struct Binned {
     bins: TileBins,
     view: View,
     order: Order,
+    /// [`means::covered`](crate::means::covered).
+    covered: Range<f64>,
     /// Of the kernel; it changes the footprints' boxes.
     support: f64,
     search_passes: u32,
@@ -93,14 +96,14 @@ impl TileRasterizer {
         previous: Option<TileFrame>,
     ) -> Result<(TileFrame, Prepared), RenderError> {
         let Given { device, queue, volume, request, .. } = given;
-        let FrameRequest { splatting, view, kernel, rays, .. } = request;
+        let FrameRequest { splatting, view, kernel, covered, rays, .. } = request;
         let limits = device.limits();
         let mut old = Old::of(previous);
         let search_passes = all_search_passes(request, volume.labels().is_some());
         let is_current = |old: &Binned| {
             old.view == *view
                 && (old.order, old.revision, old.search_passes) == (splatting.order, volume.revision, search_passes)
-                && old.support == kernel.support()
+                && (old.support, &old.covered) == (kernel.support(), covered)
         };
         let (current, stale) = match old.binned.take() {
             Some(binned) if is_current(&binned) => (Some(binned), false),
@@ -113,6 +116,7 @@ impl TileRasterizer {
                 bins: bins(&limits, request, bricks, search_passes)?,
                 view: *view,
                 order: splatting.order,
+                covered: covered.clone(),
                 support: kernel.support(),
                 search_passes,
                 revision: volume.revision,
@@ -323,8 +327,10 @@ fn bins(
     bricks: &[Brick],
     search_passes: u32,
 ) -> Result<TileBins, RenderError> {
-    let FrameRequest { view, splatting, kernel, .. } = request;
-    Ok(TileBins::new(bricks, view, splatting.order, kernel.support(), search_passes, binding(limits) / 4)?)
+    let FrameRequest { view, splatting, kernel, covered, .. } = request;
+    let most_words = binding(limits) / 4;
+    let (order, support) = (splatting.order, kernel.support());
+    Ok(TileBins::new(bricks, view, order, covered.clone(), support, search_passes, most_words)?)
 }
 
 /// Those of all ramps.

@@ -62,7 +62,11 @@ pub(crate) fn check_rays(
         return refused("splatting.method", found, "a method with sheets".to_owned());
     }
     let Some(opacity) = first_hit else { return Ok(()) };
-    let hides = splatting.culling && splatting.compositing != Compositing::Xray;
+    if splatting.compositing == Compositing::Minimum {
+        let allowed = "another one: the least is known at the end of a ray";
+        return refused("splatting.compositing", "\"minimum\" with first hits".to_owned(), allowed.to_owned());
+    }
+    let hides = splatting.culling && splatting.compositing.hides();
     let most = if hides { splatting.opacity_threshold } else { 1.0 };
     if !(opacity > 0.0 && opacity <= most) {
         let allowed = format!("above 0, at most {most}{}", if hides { ", the opacity_threshold" } else { "" });

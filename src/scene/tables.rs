@@ -196,8 +196,15 @@ pub(super) fn splatting(mut section: Section) -> Result<Splatting, SceneError> {
         ("composite-every-sample", Method::CompositeEverySample),
     ];
     let forms = [("summed-area", FootprintForm::SummedArea), ("sections", FootprintForm::Sections)];
-    let compositings =
-        [("linear", Compositing::Linear), ("exponential", Compositing::Exponential), ("xray", Compositing::Xray)];
+    let compositings = [
+        ("linear", Compositing::Linear),
+        ("exponential", Compositing::Exponential),
+        ("xray", Compositing::Xray),
+        ("maximum", Compositing::Maximum),
+        ("minimum", Compositing::Minimum),
+        ("average", Compositing::Average),
+        ("surface", Compositing::Surface),
+    ];
     let orders = [("front-to-back", Order::FrontToBack), ("back-to-front", Order::BackToFront)];
     let rasterizers = [("auto", Rasterizer::Auto), ("quads", Rasterizer::Quads), ("tiles", Rasterizer::Tiles)];
     let boxes = [("rectangle", FootprintBox::Rectangle), ("parallelogram", FootprintBox::Parallelogram)];

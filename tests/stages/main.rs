@@ -8,6 +8,7 @@ mod composite;
 mod cull;
 mod gather;
 mod kernel_in_view;
+mod means;
 mod occlude;
 mod plan;
 mod resolve;
