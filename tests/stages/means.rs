@@ -76,7 +76,8 @@ fn composited(
 ) -> Buffer {
     let (device, queue, view) = (gpu.device(), gpu.queue(), &seen.view);
     let targets = Targets::new(device, view.size, wgpu::TextureFormat::Rgba32Float, LAYERS).unwrap();
-    let compositing_buffer = CompositingBuffer::new(device, view.size).unwrap();
+    let bands = CompositingBuffer::bands(&device.limits(), view.size).unwrap();
+    let compositing_buffer = CompositingBuffer::new(device, view.size, &bands);
     let uniform = |slab: i32| Group {
         near: view.slabs.plane(slab) as f32,
         number: ((slab - slabs(seen).start) / LAYERS as i32 + 1) as u32,
