@@ -119,7 +119,9 @@ impl SceneView {
     }
 
     /// Asks for the depth at which every pixel's opacity reaches a value, above 0 and at most 1; `None` for none. Front to back only, and
-    /// with culling at most [`Splatting::opacity_threshold`]. See [`Self::first_hits`] and [`Self::pick`].
+    /// with culling at most [`Splatting::opacity_threshold`]; not for [`Compositing::Minimum`](crate::splatting::Compositing::Minimum), and
+    /// whatever the value that of the surface for [`Compositing::Surface`](crate::splatting::Compositing::Surface). See
+    /// [`Self::first_hits`] and [`Self::pick`].
     pub fn set_first_hit(&mut self, opacity: Option<f64>) {
         self.first_hit = opacity;
     }

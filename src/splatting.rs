@@ -106,7 +106,8 @@ pub struct Economies {
     /// 0 for none.
     pub whole_below: f64,
     /// β-acceleration: where everything within a kernel's box has this opacity by then, the kernel is projected whole, into the first
-    /// group of sheets that it reaches. Changes no channel by more than `1 - beta`. Front to back only; 1 for off.
+    /// group of sheets that it reaches. Changes no channel by more than `1 - beta`. Front to back only, and none for
+    /// [`Compositing::Surface`]; 1 for off.
     pub beta: f64,
     /// A footprint ends where it adds less than this to its sheet's alpha. 0 for the whole kernel.
     pub resolution: f64,
@@ -137,7 +138,7 @@ pub struct Splatting {
     /// In which order sheets are composited.
     pub order: Order,
     /// Opacity from which a pixel counts as opaque, above 0, at most 1 (§6): with culling no channel differs by more than
-    /// 1 minus this from the image without.
+    /// 1 minus this from the image without. For [`Compositing::Surface`] it is 1.
     pub opacity_threshold: f64,
     /// Early splat elimination (§6): splats behind opaque pixels alone are not drawn. Without effect back to front and where
     /// nothing hides ([`Compositing::hides`]).

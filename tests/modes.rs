@@ -300,6 +300,35 @@ fn the_minimum_of_a_gap_is_nothing() {
     }
 }
 
+/// The same where whole groups of sheets are empty, between others, before and behind them: nothing is drawn there.
+#[test]
+fn the_minimum_of_empty_groups_is_nothing() {
+    let gpu = gpu();
+    // By slabs of 8 and groups of 4: something in every slab of two groups, and nothing in that between them.
+    for parts in [&[0..16, 52..100][..], &[0..16], &[52..100], &[0..100]] {
+        let (volume, mut scene) = constant([9, 100, 9], DVec3::ONE);
+        let value = |index| f32::from(parts.iter().any(|part| part.contains(&volume.grid().voxel_at(index).y)));
+        let volume = Volume::new("parts", volume.grid().dims, DVec3::ONE, (0..8100).map(value).collect()).unwrap();
+        scene.camera = camera([0.0, 1.0, 0.0], 4.0);
+        (scene.splatting.radius, scene.splatting.falloff) = (2.0, 2.0);
+        (scene.splatting.compositing, scene.splatting.slab_width) = (Compositing::Minimum, 8.0);
+        scene.transfer = transfer(&[(0.0, COLOR)], &[(0.0, 0.0), (1.0, OPACITY)]);
+        for (rasterizer, order) in
+            RASTERIZERS.into_iter().flat_map(|r| [Order::FrontToBack, Order::BackToFront].map(|order| (r, order)))
+        {
+            (scene.splatting.rasterizer, scene.splatting.order) = (rasterizer, order);
+            let image = render(&gpu, &volume, &scene).0;
+            if parts[0].len() == 100 {
+                let alpha = image.pixels[54 * 120 + 60][3];
+                assert!(alpha > 0.25, "{rasterizer:?} {order:?}: {alpha}");
+            } else {
+                let is_empty = image.pixels.iter().all(|pixel| *pixel == [0.0; 4]);
+                assert!(is_empty, "{parts:?} {rasterizer:?} {order:?}");
+            }
+        }
+    }
+}
+
 /// Looked at from the other side a picture is mirrored.
 #[test]
 fn maximum_and_average_are_the_same_from_behind() {

@@ -370,6 +370,32 @@ fn dispatches_and_bands_change_no_bit() {
     }
 }
 
+/// The least opacity is 0 where there is nothing behind the last brick, also if a dispatch ends there.
+#[test]
+fn the_least_is_looked_for_behind_all_bricks() {
+    let (gpu, stage) = (gpu(), Gather::default());
+    let dims = UVec3::new(12, 60, 12);
+    let value = |index: u32| if (4..8).contains(&(index / dims.x % dims.y)) { 1.0 } else { 0.0 };
+    let volume = Volume::new("front", dims, DVec3::ONE, (0..dims.element_product()).map(value).collect()).unwrap();
+    // One pixel in the middle sees it all, so that a group takes about as many passes as it may.
+    let mut scene = Scene { camera: camera([0.0, 1.0, 0.0], 200.0), ..scene(17, 17) };
+    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (1.0, 0.5)]);
+    scene.splatting.compositing = Compositing::Minimum;
+    let fixture = Fixture::new(&gpu, &stage, scene, volume);
+    let bins = fixture.bins();
+    let bricks = bins.starts.windows(2).map(|group| group[1] - group[0]).max().unwrap();
+    let passes = Passes { most: bins.passes.per_group + bricks * bins.passes.per_brick(), ..bins.passes };
+    let middle = |dispatches| {
+        let bins = TileBins { passes, dispatches, ..bins.clone() };
+        fixture.draw(&bins, None, &fixture.empty(), u32::MAX).acc[8 * 17 + 8]
+    };
+    // What is not there is kept as 2, less opacity.
+    let nothing = DVec4::W * 2.0;
+    assert_eq!(middle(bins.groups), nothing);
+    // The dispatch that draws the last brick has seen nothing else, where it takes that many passes: by 8 threads.
+    assert!((1..bins.groups).any(|dispatches| middle(dispatches) != nothing));
+}
+
 /// A mask of opaque pixels, drawn over: a voxel is drawn if and only if a pixel is not opaque whose centre lies in its footprint's box.
 /// Of a parallelogram what is outside the rectangle need not count.
 #[test]
