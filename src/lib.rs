@@ -85,6 +85,7 @@
 //! ([`Volume::labels`](volume::Volume::labels)) · *brick* 4×4×4 neighbouring voxels ([`brick`]) ·
 //! *tile* a 32×32 pixel square; of the tile rasterizer 16×16.
 
+pub mod appearance;
 pub mod brick;
 pub mod bucket;
 pub mod camera;

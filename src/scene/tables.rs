@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::reader::{Bounds, Entry, FINITE, LABEL, Section};
 use super::{ImageSettings, SceneError, TransferSettings, VolumeSource};
+use crate::appearance::Colormap;
 use crate::camera::{Camera, Projection};
 use crate::clip::{Clip, MAX_PLANES};
 use crate::shading::{Light, Shading};
@@ -136,9 +137,14 @@ pub(super) fn transfer(mut section: Section) -> Result<TransferSettings, SceneEr
     let mut transfer = TransferSettings::default();
     let TransferSettings { color, opacity, gradient_opacity, .. } = &mut transfer;
     ramps(&mut section, color, opacity, gradient_opacity)?;
+    section.read("colormap", &mut transfer.colormap, |entry| entry.choice(&Colormap::ALL).map(Some))?;
     section.read("iso_ranges", &mut transfer.iso_ranges, |entry| iso_ranges(entry).map(Some))?;
     section.read("label", &mut transfer.labels, labels)?;
+    let origins = section.origins;
     section.finish()?;
+    if transfer.color.is_some() && transfer.colormap.is_some() {
+        return Err(origins.invalid("transfer", &[], "both color and colormap", "one of transfer.color and transfer.colormap"));
+    }
     Ok(transfer)
 }
 
@@ -175,9 +181,8 @@ fn labels(entry: &Entry) -> Result<BTreeMap<u16, LabelTables>, SceneError> {
     Ok(labels)
 }
 
-/// `[shading]`.
-pub(super) fn shading(mut section: Section) -> Result<Shading, SceneError> {
-    let mut shading = Shading::default();
+/// `[shading]`, over what a preset gives.
+pub(super) fn shading(mut section: Section, mut shading: Shading) -> Result<Shading, SceneError> {
     section.read("enabled", &mut shading.enabled, Entry::boolean)?;
     section.read("light", &mut shading.light, light)?;
     section.read("ambient", &mut shading.ambient, |entry| entry.number(NOT_NEGATIVE))?;
@@ -188,8 +193,8 @@ pub(super) fn shading(mut section: Section) -> Result<Shading, SceneError> {
     Ok(shading)
 }
 
-/// `[splatting]`.
-pub(super) fn splatting(mut section: Section) -> Result<Splatting, SceneError> {
+/// `[splatting]`, over what a preset gives.
+pub(super) fn splatting(mut section: Section, compositing: Compositing) -> Result<Splatting, SceneError> {
     let methods = [
         ("image-aligned", Method::ImageAligned),
         ("axis-aligned", Method::AxisAligned),
@@ -201,7 +206,7 @@ pub(super) fn splatting(mut section: Section) -> Result<Splatting, SceneError> {
     let orders = [("front-to-back", Order::FrontToBack), ("back-to-front", Order::BackToFront)];
     let rasterizers = [("auto", Rasterizer::Auto), ("quads", Rasterizer::Quads), ("tiles", Rasterizer::Tiles)];
     let boxes = [("rectangle", FootprintBox::Rectangle), ("parallelogram", FootprintBox::Parallelogram)];
-    let mut splatting = Splatting::default();
+    let mut splatting = Splatting { compositing, ..Splatting::default() };
     section.read("method", &mut splatting.method, |entry| entry.choice(&methods))?;
     section.read("radius", &mut splatting.radius, |entry| entry.number(RADIUS))?;
     section.read("falloff", &mut splatting.falloff, |entry| entry.number(FALLOFF))?;

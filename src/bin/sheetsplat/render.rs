@@ -84,6 +84,7 @@ fn render_reference(scene: &Scene) -> Result<Rendering, Error> {
     let volume = scene.load_volume()?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
     let start = Instant::now();
+    scene.transfer.check(&volume)?;
     let transfer = scene.transfer.resolve(&volume);
     let image = reference::render(&volume, &transfer, scene)?;
     let stats = Stats {
