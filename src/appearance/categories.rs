@@ -12,22 +12,25 @@ use crate::volume::Volume;
 /// Opacity of every label but 0.
 const OPACITY: f64 = 0.9;
 
-/// The values of a volume, ascending, if all of them are labels: whole numbers from 0 to 65535.
-pub fn values(volume: &Volume) -> Option<Vec<u16>> {
+/// Each of some labels once, ascending.
+pub fn distinct(labels: impl IntoIterator<Item = u16>) -> Vec<u16> {
     let mut present = vec![false; 1 << 16];
-    for &value in volume.values() {
-        let label = value as u16;
-        if f32::from(label) != value {
-            return None;
-        }
+    for label in labels {
         present[usize::from(label)] = true;
     }
-    Some((0..=u16::MAX).filter(|&label| present[usize::from(label)]).collect())
+    (0..=u16::MAX).filter(|&label| present[usize::from(label)]).collect()
 }
 
-/// Whether a volume's values look like labels and not like amounts: at least three labels in regions with sharp borders. Between two
-/// different values on an axis, one step to either side of a voxel, an image mostly has a third one, and rarely twice the same beside one
-/// another. A mask of two values is not meant: it has a surface, like any object.
+/// The values of a volume, each once, ascending, if all of them are labels: whole numbers from 0 to 65535.
+pub fn values(volume: &Volume) -> Option<Vec<u16>> {
+    let is_label = |&value: &f32| f32::from(value as u16) == value;
+    let all_are = volume.values().iter().all(is_label);
+    all_are.then(|| distinct(volume.values().iter().map(|&value| value as u16)))
+}
+
+/// Whether a volume's values look like labels and not like amounts: at least three labels, in regions with sharp borders. Of the voxels
+/// whose neighbours on an axis differ, at most a third has a value that neither has, where in images most do; and of neighbours that are
+/// not background at least half are alike. A mask of two values is not meant: it has a surface, like any object.
 pub fn is_label_map(volume: &Volume) -> bool {
     values(volume).is_some_and(|labels| labels.len() >= 3) && Borders::of(volume).are_sharp()
 }
@@ -45,7 +48,6 @@ impl Borders {
     fn of(volume: &Volume) -> Self {
         let (dims, values) = (volume.dims(), volume.values());
         let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
-        // The commonest value of the borders is what objects lie in.
         let background = background(volume);
         let steps = [(1, nx), (nx, ny), (nx * ny, nz)];
         let row = |row: usize| {
@@ -78,7 +80,7 @@ impl Borders {
     }
 
     fn are_sharp(&self) -> bool {
-        8 * self.between[1] <= self.between[0] && 2 * self.pairs[1] >= self.pairs[0]
+        3 * self.between[1] <= self.between[0] && 2 * self.pairs[1] >= self.pairs[0]
     }
 }
 
@@ -92,34 +94,33 @@ fn background(volume: &Volume) -> f32 {
     commonest.map_or(0.0, f32::from)
 }
 
-/// A label's colour, the same in every volume. Hues are a golden section of the circle apart, which keeps any number of consecutive ones
-/// as different as can be; lightness changes besides.
+/// A label's colour, red, green and blue in [0, 1], the same in every volume. Hue and lightness go in steps of the plastic number's powers,
+/// which fill a square as evenly as the golden ratio's fill a line, so that the first labels, however many, differ as they can.
 pub fn color(label: u16) -> DVec3 {
-    const GOLDEN: f64 = 0.618_033_988_749_894_9;
-    const LIGHTNESS: [f64; 3] = [0.72, 0.58, 0.84];
-    let hue = TAU * (0.08 + f64::from(label) * GOLDEN).fract();
-    let lightness = LIGHTNESS[usize::from(label) % LIGHTNESS.len()];
-    oklch(lightness, 0.14, hue)
+    const PLASTIC: f64 = 1.324_717_957_244_746;
+    const LIGHTNESS: [f64; 2] = [0.52, 0.9];
+    let step = |start: f64, size: f64| (start + f64::from(label) * size).fract();
+    let hue = TAU * step(0.85, 1.0 / PLASTIC);
+    let lightness = LIGHTNESS[0] + (LIGHTNESS[1] - LIGHTNESS[0]) * step(0.2, 1.0 / (PLASTIC * PLASTIC));
+    // Three digits are as good, and easier to read in a scene file.
+    (oklch(lightness, 0.15, hue) * 1e3).round() / 1e3
 }
 
 /// A label map's transfer function. A label's colour is at its number, so that no voxel has one in between.
 pub fn transfer(labels: &[u16]) -> TransferFunction {
-    let shown: Vec<_> = labels.iter().filter(|&&label| label > 0).map(|&label| (f64::from(label), color(label))).collect();
+    let shown: Vec<_> =
+        labels.iter().filter(|&&label| label > 0).map(|&label| (f64::from(label), color(label))).collect();
     let shown = if shown.is_empty() { vec![(0.0, DVec3::ONE)] } else { shown };
     TransferFunction::by_value(Ramp::through(shown), Ramp::through(vec![(0.0, 0.0), (1.0, OPACITY)]))
 }
 
 /// Tables with the same colours for the labels of a segmented volume; its opacities go by its values. Label 0 is hidden.
 pub fn tables(labels: &[u16]) -> BTreeMap<u16, LabelTables> {
-    let mut present = vec![false; 1 << 16];
-    for &label in labels {
-        present[usize::from(label)] = true;
-    }
     let table = |label: u16| {
         let color = Some(Ramp::through(vec![(0.0, color(label))]));
         LabelTables { visible: label > 0, color, ..LabelTables::default() }
     };
-    (0..=u16::MAX).filter(|&label| present[usize::from(label)]).map(|label| (label, table(label))).collect()
+    distinct(labels.iter().copied()).into_iter().map(|label| (label, table(label))).collect()
 }
 
 /// An sRGB colour from lightness, chroma and hue of Ottosson's Oklab, less colourful where the gamut ends.

@@ -38,9 +38,7 @@ impl Hounsfield {
             return Self { water: OFFSET, per_unit: 1.0 };
         }
         match Object::find(values) {
-            Some(Object { background, faint, .. }) => {
-                Self { water: faint, per_unit: (faint - background) / -AIR }
-            }
+            Some(Object { background, faint, .. }) => Self { water: faint, per_unit: (faint - background) / -AIR },
             None => Self { water: 0.0, per_unit: 1.0 },
         }
     }

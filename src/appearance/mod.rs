@@ -33,10 +33,8 @@ impl TransferFunction {
 fn surface(volume: &Volume) -> TransferFunction {
     match Object::find(volume.values()) {
         Some(object) => {
-            let color = vec![
-                (object.threshold(), DVec3::new(0.92, 0.74, 0.62)),
-                (object.bright, DVec3::new(1.0, 0.95, 0.85)),
-            ];
+            let color =
+                vec![(object.threshold(), DVec3::new(0.92, 0.74, 0.62)), (object.bright, DVec3::new(1.0, 0.95, 0.85))];
             TransferFunction::by_value(Ramp::through(color), object.surface(0.9))
         }
         None => constant(0.5),
@@ -45,10 +43,7 @@ fn surface(volume: &Volume) -> TransferFunction {
 
 /// A grey haze, for volumes whose values are all the same.
 fn constant(opacity: f64) -> TransferFunction {
-    TransferFunction::by_value(
-        Ramp::through(vec![(0.0, DVec3::splat(0.7))]),
-        Ramp::through(vec![(0.0, opacity)]),
-    )
+    TransferFunction::by_value(Ramp::through(vec![(0.0, DVec3::splat(0.7))]), Ramp::through(vec![(0.0, opacity)]))
 }
 
 /// The values that a volume shows under a transfer function: of those with an opacity above 0, and in an iso-range, from the 0.5 % to the

@@ -9,7 +9,7 @@ use crate::transfer_function::{Ramp, TransferFunction};
 use crate::volume::{Grid, Volume};
 
 /// Share of the rays that are as bright as there is, or would be brighter.
-const SATURATED: f64 = 0.002;
+const SATURATED: f64 = 0.01;
 
 /// White, with an opacity in proportion to the value above that of the background, such that along the volume's axes the brightest rays
 /// just reach 1.

@@ -1,7 +1,9 @@
 //! Scenes: what to show and how, from a scene file, from `--set` overrides, or from a volume alone (SPEC §7).
 
+mod names;
 mod reader;
 mod tables;
+mod writer;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -96,6 +98,15 @@ pub struct TransferSettings {
     pub iso_ranges: Option<Vec<[f64; 2]>>,
     /// Tables of single labels of a segmented volume; for others there may be none.
     pub labels: BTreeMap<u16, LabelTables>,
+}
+
+impl From<TransferFunction> for TransferSettings {
+    /// Nothing is left to choose.
+    fn from(transfer: TransferFunction) -> Self {
+        let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels } = transfer;
+        let (color, opacity) = (Some(color), Some(opacity));
+        Self { preset: None, colormap: None, color, opacity, gradient_opacity, iso_ranges, labels }
+    }
 }
 
 impl TransferSettings {
@@ -246,6 +257,15 @@ impl Scene {
         }
     }
 
+    /// The same scene with what it leaves to the volume filled in: transfer function, and how much the camera shows. It renders the same
+    /// image; preset and colour map are in what they led to.
+    pub fn explicit(&self, volume: &Volume) -> Self {
+        let transfer = self.transfer.resolve(volume).into();
+        let ImageSettings { width, height, .. } = self.image;
+        let camera = self.camera.explicit(volume.grid(), self.splatting.radius, width, height);
+        Self { camera, transfer, ..self.clone() }
+    }
+
     /// `source` is for scenes whose tables name no volume.
     fn build(
         mut root: Table,
@@ -257,8 +277,6 @@ impl Scene {
         let overridden = sets.iter().map(|set| apply_override(&mut root, set)).collect::<Result<_, _>>()?;
         let origins = Origins { file: origin, overridden };
         let mut root = Section::root(&origins, root);
-        let mut preset = None;
-        root.read("preset", &mut preset, |entry| entry.choice(&Preset::ALL).map(Some))?;
         let [volume, camera, image, clip, transfer, shading, splatting] = [
             root.section("volume")?,
             root.section("camera")?,
@@ -268,6 +286,8 @@ impl Scene {
             root.section("shading")?,
             root.section("splatting")?,
         ];
+        let mut preset = None;
+        root.read("preset", &mut preset, |entry| entry.choice(&Preset::ALL).map(Some))?;
         // Before any table is read: a misspelt table explains best why keys seem to be missing.
         root.finish()?;
         let compositing = preset.map_or(Splatting::default().compositing, Preset::compositing);
