@@ -4,6 +4,7 @@
 #[expect(dead_code, reason = "not every file needs all of it")]
 mod common;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::{DVec3, UVec3};
@@ -11,7 +12,7 @@ use sheetsplat::appearance::{Colormap, Preset, categories, shown_range};
 use sheetsplat::camera::Projection;
 use sheetsplat::scene::{Scene, TransferSettings, VolumeSource};
 use sheetsplat::splatting::Compositing;
-use sheetsplat::transfer_function::{LabelTables, Ramp, TransferFunction};
+use sheetsplat::transfer_function::{Ramp, TransferFunction};
 use sheetsplat::volume::{Labels, Volume, builtin};
 
 use common::{Random, camera, gpu, scene};
@@ -241,18 +242,22 @@ fn the_labels_preset_colours_segments_too() {
     scene.transfer.check(&volume).unwrap();
     let transfer = scene.transfer.resolve(&volume);
     assert_eq!(transfer.tables(Some(5)).color.at(200.0), categories::color(5));
-    // A table of the scene's stands as it is.
-    assert_eq!(
-        transfer.labels[&2],
-        LabelTables { opacity: Ramp::new(vec![(0.0, 0.5)]).ok(), ..LabelTables::default() }
-    );
+    // What a table of the scene's leaves out.
+    assert_eq!(transfer.tables(Some(2)).opacity, &Ramp::new(vec![(0.0, 0.5)]).unwrap());
+    assert_eq!(transfer.tables(Some(2)).color.at(1.0), categories::color(2));
     assert!(transfer.tables(Some(0)).visible);
     assert!(!Preset::Labels.transfer(&volume).tables(Some(0)).visible);
 
     let message =
         builtin_scene("cube:8", &["preset=labels"]).transfer.check(&row(&[0.5, 1.0])).unwrap_err().to_string();
     assert!(message.starts_with("preset: found labels for a volume that has none, allowed: values that"), "{message}");
-    let labels = Labels { origin: "l".to_owned(), dims: UVec3::new(2, 1, 1), spacing: None, values: [1, 2].into() };
+    let labels = Labels {
+        origin: "l".to_owned(),
+        dims: UVec3::new(2, 1, 1),
+        spacing: None,
+        values: [1, 2].into(),
+        names: BTreeMap::new(),
+    };
     let labelled = row(&[0.5, 1.0]).with_labels(labels).unwrap();
     builtin_scene("cube:8", &["preset=labels"]).transfer.check(&labelled).unwrap();
 }

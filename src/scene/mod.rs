@@ -110,7 +110,7 @@ impl From<TransferFunction> for TransferSettings {
 }
 
 impl TransferSettings {
-    /// The whole transfer function for a volume. Colour, opacity and each label's tables that are not given are those of the preset, or
+    /// The whole transfer function for a volume. Colours and opacities that are not given, those of labels too, are the preset's, or
     /// [`TransferFunction::from_histogram`]'s, each for itself; a colour map spans the values that show ([`shown_range`]).
     pub fn resolve(&self, volume: &Volume) -> TransferFunction {
         let chosen = || match self.preset {
@@ -129,7 +129,17 @@ impl TransferSettings {
         // No preset gives any.
         transfer.gradient_opacity = self.gradient_opacity.clone();
         transfer.iso_ranges = self.iso_ranges.clone();
-        transfer.labels.extend(self.labels.iter().map(|(&label, tables)| (label, tables.clone())));
+        for (&label, own) in &self.labels {
+            let LabelTables { color, opacity, gradient_opacity, .. } =
+                transfer.labels.remove(&label).unwrap_or_default();
+            let tables = LabelTables {
+                visible: own.visible,
+                color: own.color.clone().or(color),
+                opacity: own.opacity.clone().or(opacity),
+                gradient_opacity: own.gradient_opacity.clone().or(gradient_opacity),
+            };
+            transfer.labels.insert(label, tables);
+        }
         match (&self.color, self.colormap) {
             (Some(color), _) => transfer.color = color.clone(),
             (None, Some(map)) => transfer.color = map.over(shown_range(volume, &transfer).unwrap_or_default()),

@@ -16,7 +16,10 @@ const GAP: u32 = 6;
 /// Pixels between two columns.
 const COLUMN_GAP: u32 = 12;
 
-/// A label's name, and its colours from the least value that shows to the greatest.
+/// Characters of a label's name that are shown.
+const LONGEST: usize = 40;
+
+/// A label's number and name, and its colours from the least value that shows to the greatest.
 struct Entry {
     text: String,
     colors: Vec<[f32; 4]>,
@@ -51,7 +54,11 @@ fn entries(volume: &Volume, transfer: &TransferFunction) -> Result<Vec<Entry>, F
         let table = transfer.tables(Some(label));
         let place = |x: u32| f64::from(x) / f64::from(PATCH[0] - 1);
         let colors = (0..PATCH[0]).map(|x| table.color.at(values[0] * (1.0 - place(x)) + values[1] * place(x)));
-        Entry { text: label.to_string(), colors: colors.map(|rgb| rgb.as_vec3().extend(1.0).to_array()).collect() }
+        let name = volume.label_name(label).map_or_else(String::new, |name| format!(" {}", shortened(name)));
+        Entry {
+            text: format!("{label}{name}"),
+            colors: colors.map(|rgb| rgb.as_vec3().extend(1.0).to_array()).collect(),
+        }
     };
     let refused = |found: &str, allowed: &str| {
         Err(Failure::Input(format!("--annotate: legend: found {found}, allowed: {allowed}")))
@@ -76,4 +83,12 @@ fn entries(volume: &Volume, transfer: &TransferFunction) -> Result<Vec<Entry>, F
         return refused("no label with a colour of its own", "some, as with --preset labels");
     }
     Ok(entries)
+}
+
+/// A name of bounded length.
+fn shortened(name: &str) -> String {
+    match name.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}...", &name[..end]),
+        None => name.to_owned(),
+    }
 }
