@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::quantile::histogram;
 use crate::transfer_function::{LabelTables, Ramp, TransferFunction};
 use crate::volume::Volume;
 
@@ -13,9 +14,9 @@ use crate::volume::Volume;
 const OPACITY: f64 = 0.9;
 
 /// Each of some labels once, ascending.
-pub fn distinct(labels: impl IntoIterator<Item = u16>) -> Vec<u16> {
+pub fn distinct(labels: &[u16]) -> Vec<u16> {
     let mut present = vec![false; 1 << 16];
-    for label in labels {
+    for &label in labels {
         present[usize::from(label)] = true;
     }
     (0..=u16::MAX).filter(|&label| present[usize::from(label)]).collect()
@@ -23,17 +24,32 @@ pub fn distinct(labels: impl IntoIterator<Item = u16>) -> Vec<u16> {
 
 /// The values of a volume, each once, ascending, if all of them are labels: whole numbers from 0 to 65535.
 pub fn values(volume: &Volume) -> Option<Vec<u16>> {
-    let is_label = |&value: &f32| f32::from(value as u16) == value;
-    let all_are = volume.values().iter().all(is_label);
-    all_are.then(|| distinct(volume.values().iter().map(|&value| value as u16)))
+    counts(volume).map(|counts| counts.into_iter().map(|(label, _)| label).collect())
+}
+
+/// The values of a volume if all of them are labels, ascending, and how many voxels have them.
+fn counts(volume: &Volume) -> Option<Vec<(u16, u64)>> {
+    let values = volume.values();
+    if !values.par_iter().all(|&value| f32::from(value as u16) == value) {
+        return None;
+    }
+    let counts = histogram(values, |value| Some(value as u16));
+    Some((0..=u16::MAX).zip(counts).filter(|&(_, count)| count > 0).collect())
 }
 
 /// Whether a volume's values look like labels and not like amounts: at least three labels, in regions with sharp borders. Of the voxels
 /// whose neighbours on an axis differ, at most a third has a value that neither has, where in images most do; and of neighbours that are
 /// not background at least half are alike. A mask of two values is not meant: it has a surface, like any object.
 pub fn is_label_map(volume: &Volume) -> bool {
-    values(volume).is_some_and(|labels| labels.len() >= 3) && Borders::of(volume).are_sharp()
+    let Some(counts) = counts(volume).filter(|counts| counts.len() >= 3) else { return false };
+    // Of several that are the commonest the least.
+    let background = counts.iter().rev().max_by_key(|(_, count)| count).map_or(0.0, |&(label, _)| f32::from(label));
+    Borders::of(volume, background).are_sharp()
 }
+
+/// Rows that are looked at, and the distance between them.
+const MOST_ROWS: u64 = 8192;
+const PRIME: u64 = 1_000_003;
 
 /// How values change from voxel to voxel along the axes.
 #[derive(Clone, Copy, Default)]
@@ -45,10 +61,10 @@ struct Borders {
 }
 
 impl Borders {
-    fn of(volume: &Volume) -> Self {
+    /// Of as many rows of voxels as tell it.
+    fn of(volume: &Volume, background: f32) -> Self {
         let (dims, values) = (volume.dims(), volume.values());
         let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
-        let background = background(volume);
         let steps = [(1, nx), (nx, ny), (nx * ny, nz)];
         let row = |row: usize| {
             let mut borders = Self::default();
@@ -71,7 +87,11 @@ impl Borders {
             }
             borders
         };
-        (0..ny * nz).into_par_iter().map(row).reduce(Self::default, Self::and)
+        // A prime apart, so that they lie everywhere.
+        let rows = (ny * nz) as u64;
+        let place = |at: u64| if rows > MOST_ROWS { at * PRIME % rows } else { at };
+        let looked_at = (0..rows.min(MOST_ROWS)).into_par_iter().map(|at| place(at) as usize);
+        looked_at.map(row).reduce(Self::default, Self::and)
     }
 
     fn and(self, other: Self) -> Self {
@@ -82,16 +102,6 @@ impl Borders {
     fn are_sharp(&self) -> bool {
         3 * self.between[1] <= self.between[0] && 2 * self.pairs[1] >= self.pairs[0]
     }
-}
-
-/// The commonest value of a volume whose values are labels.
-fn background(volume: &Volume) -> f32 {
-    let mut counts = vec![0_u32; 1 << 16];
-    for &value in volume.values() {
-        counts[usize::from(value as u16)] += 1;
-    }
-    let commonest = (0..=u16::MAX).max_by_key(|&label| (counts[usize::from(label)], u16::MAX - label));
-    commonest.map_or(0.0, f32::from)
 }
 
 /// A label's colour, red, green and blue in [0, 1], the same in every volume. Hue and lightness go in steps of the plastic number's powers,
@@ -120,7 +130,7 @@ pub fn tables(labels: &[u16]) -> BTreeMap<u16, LabelTables> {
         let color = Some(Ramp::through(vec![(0.0, color(label))]));
         LabelTables { visible: label > 0, color, ..LabelTables::default() }
     };
-    distinct(labels.iter().copied()).into_iter().map(|label| (label, table(label))).collect()
+    distinct(labels).into_iter().map(|label| (label, table(label))).collect()
 }
 
 /// An sRGB colour from lightness, chroma and hue of Ottosson's Oklab, less colourful where the gamut ends.

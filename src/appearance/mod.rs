@@ -4,6 +4,7 @@ pub mod categories;
 mod colormap;
 mod hounsfield;
 mod object;
+mod padding;
 mod preset;
 mod quantile;
 mod xray;
@@ -12,7 +13,7 @@ use glam::DVec3;
 
 pub use colormap::Colormap;
 pub use preset::Preset;
-pub use quantile::quantile;
+pub use quantile::quantiles;
 
 use crate::iso_range::ValueSet;
 use crate::transfer_function::{Ramp, TransferFunction};
@@ -52,6 +53,6 @@ fn constant(opacity: f64) -> TransferFunction {
 pub fn shown_range(volume: &Volume, transfer: &TransferFunction) -> Option<[f64; 2]> {
     const TAIL: f64 = 0.005;
     let shown = ValueSet::of(transfer);
-    let end = |share| quantile(volume.values(), |value| shown.contains(value), share).map(f64::from);
-    Some([end(TAIL)?, end(1.0 - TAIL)?])
+    let ends = quantiles(volume.values(), |value| shown.contains(value), [TAIL, 1.0 - TAIL]);
+    ends.map(|ends| ends.map(f64::from))
 }

@@ -2,11 +2,14 @@
 
 use rayon::prelude::*;
 
-use super::hounsfield;
-use super::quantile::quantile;
+use super::padding::{AIR, is_padded};
+use super::quantile::quantiles;
 use crate::transfer_function::Ramp;
 
 const BINS: usize = 256;
+
+/// Values that one thread counts at a time.
+const CHUNK: usize = 1 << 18;
 
 /// Share of the values at either end that the histogram does not reach to: hot pixels, and what else stands far apart.
 const TAIL: f64 = 0.0005;
@@ -27,13 +30,20 @@ impl Object {
     pub(super) fn find(values: &[f32]) -> Option<Self> {
         let [lo, hi] = ends(values)?;
         let (start, range) = (f64::from(lo), f64::from(hi) - f64::from(lo));
-        let (mut counts, mut least_count) = ([0.0; BINS], 0.0);
-        for &value in values {
-            // What is below the first bin counts there.
-            let bin = (f64::from(value) - start) / range * BINS as f64;
-            counts[(bin as usize).min(BINS - 1)] += 1.0;
-            least_count += if value <= lo { 1.0 } else { 0.0 };
-        }
+        let bin = |value: f32| (f64::from(value) - start) / range * BINS as f64;
+        let counted = values.par_chunks(CHUNK).map(|chunk| {
+            let (mut counts, mut least_count) = ([0.0; BINS], 0.0);
+            for &value in chunk {
+                // What is below the first bin counts there.
+                counts[(bin(value) as usize).min(BINS - 1)] += 1.0;
+                least_count += if value <= lo { 1.0 } else { 0.0 };
+            }
+            (counts, least_count)
+        });
+        let (mut counts, least_count) = counted.reduce(
+            || ([0.0; BINS], 0.0),
+            |(a, least_a), (b, least_b)| (std::array::from_fn(|bin| a[bin] + b[bin]), least_a + least_b),
+        );
         let value_of = |bin: f64| start + (bin + 0.5) / BINS as f64 * range;
 
         // Sparse data, such as a labelled cell: its background was cleared already, all the rest is object.
@@ -83,9 +93,9 @@ fn ends(values: &[f32]) -> Option<[f32; 2]> {
         return None;
     }
     // Of the others: a cleared background may be all but the whole volume.
-    let lo = quantile(values, |value| value < greatest, TAIL)?;
-    let hi = quantile(values, |value| value > least, 1.0 - TAIL)?;
-    let lo = if hounsfield::is_padded(values, least) { lo.max(hounsfield::AIR as f32) } else { lo };
+    let [lo] = quantiles(values, |value| value < greatest, [TAIL])?;
+    let [hi] = quantiles(values, |value| value > least, [1.0 - TAIL])?;
+    let lo = if is_padded(values, least) { lo.max(AIR as f32) } else { lo };
     Some(if lo < hi { [lo, hi] } else { [least, greatest] })
 }
 

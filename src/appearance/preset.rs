@@ -66,8 +66,8 @@ impl Preset {
         }
     }
 
-    /// The transfer function for a volume. Those of CT are in Hounsfield units: the values as they are where some are below -100; where
-    /// none is and the greatest lies within 1500 to 8191, 1024 is taken to have been added; for all else the background
+    /// The transfer function for a volume. Those of CT are in Hounsfield units: the values as they are where one in a thousand is below
+    /// -100; else, where the greatest lies within 1500 to 8191, 1024 is taken to have been added; for all else the background
     /// (what Otsu's threshold finds) is taken for air, -1000, and the faintest eighth of the rest for water, 0. Where
     /// [`Self::Labels`] finds no labels, it is as [`TransferFunction::from_histogram`].
     pub fn transfer(self, volume: &Volume) -> TransferFunction {

@@ -7,23 +7,28 @@ use crate::iso_range::{of_ordinal, ordinal};
 /// Values that one thread counts at a time.
 const CHUNK: usize = 1 << 20;
 
-/// Of the values that count, the one that has a share, in [0, 1], of the others before it when they are sorted; `None` if none count.
-/// Values are finite.
-pub fn quantile(values: &[f32], counts: impl Fn(f32) -> bool + Sync, share: f64) -> Option<f32> {
+/// Of the values that count, those that have a share, in [0, 1], of the others before them when they are sorted; `None` if none
+/// count. Values are finite.
+pub fn quantiles<const N: usize>(
+    values: &[f32],
+    counts: impl Fn(f32) -> bool + Sync,
+    shares: [f64; N],
+) -> Option<[f32; N]> {
     // Two digits of 16 bits: first how many values have which upper one, then the lower ones of those that have the wanted one.
     let upper = histogram(values, |value| counts(value).then(|| (ordinal(value) >> 16) as u16));
-    let count: u64 = upper.iter().sum();
-    let rank = (share * count.checked_sub(1)? as f64).round() as u64;
-    let (digit, rank) = digit_at(&upper, rank);
-    let lower = histogram(values, |value| {
-        let ordinal = ordinal(value);
-        (ordinal >> 16 == digit && counts(value)).then_some(ordinal as u16)
-    });
-    Some(of_ordinal(digit << 16 | digit_at(&lower, rank).0))
+    let last = upper.iter().sum::<u64>().checked_sub(1)?;
+    Some(shares.map(|share| {
+        let (digit, rank) = digit_at(&upper, (share * last as f64).round() as u64);
+        let lower = histogram(values, |value| {
+            let ordinal = ordinal(value);
+            (ordinal >> 16 == digit && counts(value)).then_some(ordinal as u16)
+        });
+        of_ordinal(digit << 16 | digit_at(&lower, rank).0)
+    }))
 }
 
-/// How many values have which digit.
-fn histogram(values: &[f32], digit: impl Fn(f32) -> Option<u16> + Sync) -> Vec<u64> {
+/// How many values have which of 65536 digits, or other properties.
+pub(super) fn histogram(values: &[f32], digit: impl Fn(f32) -> Option<u16> + Sync) -> Vec<u64> {
     let zeros = || vec![0_u64; 1 << 16];
     let counted = values.par_chunks(CHUNK).fold(zeros, |mut counts, chunk| {
         for digit in chunk.iter().filter_map(|&value| digit(value)) {
@@ -46,7 +51,6 @@ fn digit_at(counts: &[u64], mut rank: u64) -> (u32, u64) {
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "tests")]
 mod tests {
     use super::*;
 
@@ -58,18 +62,17 @@ mod tests {
         sorted.sort_by(f32::total_cmp);
         for share in [0.0, 0.001, 0.25, 0.5, 0.77, 0.9999, 1.0] {
             let expected = sorted[(share * (sorted.len() - 1) as f64).round() as usize];
-            assert_eq!(quantile(&values, |_| true, share), Some(expected), "{share}");
+            assert_eq!(quantiles(&values, |_| true, [share]), Some([expected]), "{share}");
         }
         let positive: Vec<f32> = sorted.into_iter().filter(|&value| value > 5.0).collect();
-        assert_eq!(quantile(&values, |value| value > 5.0, 0.0), Some(positive[0]));
-        assert_eq!(quantile(&values, |value| value > 5.0, 1.0), Some(f32::MAX));
-        assert_eq!(quantile(&values, |_| false, 0.5), None);
-        assert_eq!(quantile(&[], |_| true, 0.5), None);
+        assert_eq!(quantiles(&values, |value| value > 5.0, [1.0, 0.0]), Some([f32::MAX, positive[0]]));
+        assert_eq!(quantiles(&values, |_| false, [0.5]), None);
+        assert_eq!(quantiles(&[], |_| true, [0.5]), None);
     }
 
     #[test]
     fn neighbours_far_from_the_origin_are_told_apart() {
         let values: Vec<f32> = (0..100_u32).map(|at| (1_000_000 + at) as f32).collect();
-        assert_eq!(quantile(&values, |_| true, 0.5).unwrap() - 1e6, 50.0);
+        assert_eq!(quantiles(&values, |_| true, [0.5]), Some([1_000_050.0]));
     }
 }

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::constant;
 use super::object::Object;
-use super::quantile::quantile;
+use super::quantile::quantiles;
 use crate::transfer_function::{Ramp, TransferFunction};
 use crate::volume::{Grid, Volume};
 
@@ -19,9 +19,9 @@ pub(super) fn transfer(volume: &Volume) -> TransferFunction {
         let longest = volume.dims().as_dvec3() * volume.grid().aspect();
         return constant(longest.max_element().recip());
     };
-    let top = quantile(values, |value| f64::from(value) > background, 1.0).map_or(background, f64::from);
+    let top = f64::from(values.iter().copied().fold(f32::MIN, f32::max));
     let sums = ray_sums(volume.grid(), values, background);
-    let brightest = quantile(&sums, |sum| sum > 0.0, 1.0 - SATURATED).map_or(1.0, f64::from);
+    let brightest = quantiles(&sums, |sum| sum > 0.0, [1.0 - SATURATED]).map_or(1.0, |[sum]| f64::from(sum));
     let opacity = ((top - background) / brightest).min(1.0);
     let color = Ramp::through(vec![(background, DVec3::ONE)]);
     TransferFunction::by_value(color, Ramp::through(vec![(background, 0.0), (top, opacity)]))

@@ -138,9 +138,9 @@ pub(super) fn transfer(mut section: Section) -> Result<TransferSettings, SceneEr
     let mut transfer = TransferSettings::default();
     let TransferSettings { color, opacity, gradient_opacity, .. } = &mut transfer;
     ramps(&mut section, color, opacity, gradient_opacity)?;
-    section.read("colormap", &mut transfer.colormap, |entry| entry.choice(&Colormap::ALL).map(Some))?;
     section.read("iso_ranges", &mut transfer.iso_ranges, |entry| iso_ranges(entry).map(Some))?;
     section.read("label", &mut transfer.labels, labels)?;
+    section.read("colormap", &mut transfer.colormap, |entry| entry.choice(&Colormap::ALL).map(Some))?;
     let origins = section.origins;
     section.finish()?;
     if transfer.color.is_some() && transfer.colormap.is_some() {

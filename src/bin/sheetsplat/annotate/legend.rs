@@ -68,7 +68,7 @@ fn entries(volume: &Volume, transfer: &TransferFunction) -> Result<Vec<Entry>, F
             let values = shown_range(volume, transfer).unwrap_or_default();
             let has_color =
                 |label: &u16| transfer.labels.get(label).is_some_and(|tables| tables.visible && tables.color.is_some());
-            let present = categories::distinct(labels.iter().copied());
+            let present = categories::distinct(labels);
             present.into_iter().filter(has_color).map(|label| entry(label, values)).collect()
         }
         None => match categories::values(volume) {
