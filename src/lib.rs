@@ -9,6 +9,7 @@
 //!
 //! ```text
 //! volume file → Volume ─ classify → ClassifiedVolume: its values, and which voxels of which bricks take part, on the GPU
+//!                      ─ appearance: what the scene leaves open, such as the transfer function
 //! scene file  → Scene  ─ View, FramePlan or TileBins: which bricks every group of sheets looks at (plain data)
 //! SceneView: both, and what the next frame can keep of the last one
 //!

@@ -131,13 +131,20 @@ fn a_legend_names_every_label_in_its_colour() {
     }
     assert_eq!(patch(4), [0, 0, 0, 255], "no more");
     // Of a segmented volume, those with colours.
-    let segmented = "builtin:head:24 --set image={width=220,height=160} --annotate legend";
+    let segmented = "builtin:head:24 --set image={width=320,height=160} --annotate legend";
     let of = |sets: &str| folder.annotated(&format!("{segmented} --set transfer.label=[{sets}]"));
     let image = of(
         "{label=3,color=[[0,[1,0,0]]]},{label=5,color=[[0,[0,1,0]]]},{label=7,visible=false,color=[[0,[0,0,1]]]},{label=1,opacity=[[0,0]]}",
     );
     let patch = |row: u32| image.get_pixel(MARGIN + PADDING + 10, MARGIN + PADDING + 16 * row + 8).0;
     assert_eq!([patch(0), patch(1), patch(2)], [[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 0, 255]]);
+    // By name too: "3 fluid around the brain" and "5 white matter".
+    let text_end = |row: u32| {
+        let rows = MARGIN + PADDING + 16 * row..MARGIN + PADDING + 16 * (row + 1);
+        (0..320).rev().find(|&x| rows.clone().any(|y| image.get_pixel(x, y).0[1] > 120)).unwrap()
+    };
+    let start = MARGIN + PADDING + 26;
+    assert_eq!([text_end(0), text_end(1)].map(|end| (end - start) / 8 + 1), [24, 14]);
 }
 
 #[test]
