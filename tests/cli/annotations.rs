@@ -144,7 +144,7 @@ fn a_legend_names_every_label_in_its_colour() {
         (0..320).rev().find(|&x| rows.clone().any(|y| image.get_pixel(x, y).0[1] > 120)).unwrap()
     };
     let start = MARGIN + PADDING + 26;
-    assert_eq!([text_end(0), text_end(1)].map(|end| (end - start) / 8 + 1), [24, 14]);
+    assert_eq!([text_end(0), text_end(1)].map(|end| (end - start) / 7 + 1), [24, 14]);
 }
 
 #[test]
