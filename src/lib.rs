@@ -9,6 +9,7 @@
 //!
 //! ```text
 //! volume file → Volume ─ classify → ClassifiedVolume: its values, and which voxels of which bricks take part, on the GPU
+//!                      ─ appearance: what the scene leaves open, such as the transfer function
 //! scene file  → Scene  ─ View, FramePlan or TileBins: which bricks every group of sheets looks at (plain data)
 //! SceneView: both, and what the next frame can keep of the last one
 //!
@@ -86,6 +87,7 @@
 //! ([`Volume::labels`](volume::Volume::labels)) · *brick* 4×4×4 neighbouring voxels ([`brick`]) ·
 //! *tile* a 32×32 pixel square; of the tile rasterizer 16×16.
 
+pub mod appearance;
 pub mod brick;
 pub mod bucket;
 pub mod camera;

@@ -147,7 +147,13 @@ fn broken_label_files_are_refused() {
     );
 
     let volume = builtin::volume("cube:4").unwrap();
-    let labels = Labels { origin: "here".to_owned(), dims: volume.dims(), spacing: None, values: Arc::new([1; 63]) };
+    let labels = Labels {
+        origin: "here".to_owned(),
+        dims: volume.dims(),
+        spacing: None,
+        values: Arc::new([1; 63]),
+        names: BTreeMap::new(),
+    };
     let message = volume.with_labels(labels).unwrap_err().to_string();
     assert_eq!(message, "here: data: found 63 labels, allowed: 64 labels");
 }
@@ -156,7 +162,9 @@ fn broken_label_files_are_refused() {
 fn a_label_file_replaces_the_builtin_labels() {
     let folder = Folder::new();
     folder.write("labels.nrrd", "type: uint8\nsizes: 8 8 5", &[9; 320]);
-    assert_eq!(folder.load("builtin = 'head:8'").unwrap().labels(), Some(&[9; 320][..]));
+    let volume = folder.load("builtin = 'head:8'").unwrap();
+    assert_eq!((volume.labels(), volume.label_name(2)), (Some(&[9; 320][..]), None));
+    assert_eq!(builtin::volume("head:8").unwrap().label_name(2), Some("skull"));
     folder.write("labels.nrrd", "type: uint8\nsizes: 8 8 8", &[5; 512]);
     assert_eq!(folder.load("builtin = 'cube:8'").unwrap().labels(), Some(&[5; 512][..]));
 }
@@ -172,7 +180,9 @@ fn segmented(labels: &[u16], spacing: [f64; 3]) -> Volume {
         labels[(block.x + 2 * block.y + 5 * block.z) as usize % labels.len()]
     };
     let values = (0..dims.element_product()).map(label).collect();
-    volume.with_labels(Labels { origin: "blocks".to_owned(), dims, spacing: None, values }).unwrap()
+    volume
+        .with_labels(Labels { origin: "blocks".to_owned(), dims, spacing: None, values, names: BTreeMap::new() })
+        .unwrap()
 }
 
 fn ramp<T>(points: &[(f64, T)]) -> Option<Ramp<T>>
@@ -307,7 +317,7 @@ fn labels_in_several_layers() {
     let values = (0..dims.element_product()).map(|index| if near(index) { 200.0 } else { 0.0 }).collect();
     let labels: Arc<[u16]> = (0..dims.element_product()).map(|index| (index * 7 / 3 % 4) as u16).collect();
     let volume = Volume::new("layers", dims, DVec3::ONE, values).unwrap();
-    let labels = Labels { origin: "layers".to_owned(), dims, spacing: None, values: labels };
+    let labels = Labels { origin: "layers".to_owned(), dims, spacing: None, values: labels, names: BTreeMap::new() };
     let volume = volume.with_labels(labels).unwrap();
     let mut scene = scene(64, 48);
     scene.camera = camera([0.02, 0.5, -0.9], 30.0);

@@ -31,12 +31,6 @@ fn head() -> (Arc<Volume>, Scene) {
     (Arc::new(builtin::volume("head:48").unwrap()), scene)
 }
 
-/// The transfer function as settings, so that a fresh view can be made with it.
-fn settings(transfer: &TransferFunction) -> TransferSettings {
-    let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels } = transfer.clone();
-    TransferSettings { color: Some(color), opacity: Some(opacity), gradient_opacity, iso_ranges, labels }
-}
-
 /// The voxels that take part, by a scan.
 fn taking_part(volume: &Volume, transfer: &TransferFunction) -> Vec<bool> {
     (0..)
@@ -50,7 +44,7 @@ fn taking_part(volume: &Volume, transfer: &TransferFunction) -> Vec<bool> {
 
 fn assert_fresh(gpu: &Headless, view: &mut SceneView, name: &str) {
     let drawn = gpu.draw(view).unwrap();
-    let scene = Scene { transfer: settings(view.volume().transfer()), ..view.scene().clone() };
+    let scene = Scene { transfer: view.volume().transfer().clone().into(), ..view.scene().clone() };
     let fresh = gpu.render_volume(view.volume().volume().clone(), &scene).unwrap();
     assert!(drawn.image == fresh.image, "{name}: the image is not that of a fresh view");
     let counts = |rendering: &sheetsplat::headless::Rendering| {

@@ -136,6 +136,7 @@ fn every_key() {
                 ),
             ]
             .into(),
+            ..TransferSettings::default()
         },
         shading: Shading {
             enabled: false,
@@ -244,6 +245,8 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
     ("transfer.opacity", "0.5", "transfer.opacity", "0.5 (float)", "an array of one or more [value, opacity]"),
     ("transfer.gradient_opacity", "[]", "transfer.gradient_opacity", "[]", "one or more [gradient magnitude, factor]"),
     ("transfer.gradient_opacity", "[[0, 2]]", "transfer.gradient_opacity[0][1]", "2", "a number in [0, 1]"),
+    ("transfer.colormap", "'jet'", "transfer.colormap", "\"jet\"", "\"viridis\" or \"magma\" or \"inferno\""),
+    ("transfer.colormap", "1", "transfer.colormap", "1 (integer)", "\"viridis\" or \"magma\""),
     ("clip.planes", "1", "clip.planes", "1 (integer)", "an array of at most 6 [nx, ny, nz, d]"),
     ("clip.planes", "[[1, 0, 0]]", "clip.planes[0]", "[1, 0, 0]", "4 numbers, each a finite number"),
     ("clip.planes", "[[1, 0, 0, 0], [0, 0, 0, 5]]", "clip.planes[1]", "[0, 0, 0, 5]", "a normal other than 0"),

@@ -31,6 +31,8 @@ pub(super) fn apply_override(root: &mut Table, argument: &str) -> Result<String,
                 match key {
                     "volume.path" => _ = section.remove("builtin"),
                     "volume.builtin" => _ = section.remove("path"),
+                    "transfer.color" => _ = section.remove("colormap"),
+                    "transfer.colormap" => _ = section.remove("color"),
                     _ => {}
                 }
                 section.insert(name.to_owned(), value);

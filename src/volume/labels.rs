@@ -1,5 +1,6 @@
 //! Labels: which segment of a segmented volume every voxel belongs to.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -21,6 +22,8 @@ pub struct Labels {
     pub spacing: Option<DVec3>,
     /// The labels, x fastest.
     pub values: Arc<[u16]>,
+    /// What they are called, as far as that is known.
+    pub names: BTreeMap<u16, String>,
 }
 
 impl Labels {
@@ -40,7 +43,7 @@ impl Volume {
     /// # Errors
     /// If the labels are those of another grid.
     pub fn with_labels(mut self, labels: Labels) -> Result<Self, VolumeError> {
-        let Labels { origin, dims, spacing, values } = labels;
+        let Labels { origin, dims, spacing, values, names } = labels;
         let shown = |spacing: DVec3| format!("{:?}", spacing.to_array());
         if dims != self.dims() {
             return Err(invalid(&origin, "sizes", format!("{dims}"), format!("{}, the volume's", self.dims())));
@@ -57,12 +60,18 @@ impl Volume {
             return Err(invalid(&origin, "spacing", shown(other), format!("{}, the volume's", shown(self.spacing()))));
         }
         self.labels = Some(values);
+        self.label_names = names;
         Ok(self)
     }
 
     /// All labels, x fastest, then y, then z; `None` if the volume is not segmented.
     pub fn labels(&self) -> Option<&[u16]> {
         self.labels.as_deref()
+    }
+
+    /// What a label is called, if that is known: of a segmented volume, or of one whose values are labels.
+    pub fn label_name(&self, label: u16) -> Option<&str> {
+        self.label_names.get(&label).map(String::as_str)
     }
 
     /// The label of a voxel, given as an index into the volume; `None` if the volume is not segmented.

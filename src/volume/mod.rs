@@ -5,6 +5,7 @@ mod grid;
 mod labels;
 mod nrrd;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -67,6 +68,7 @@ pub struct Volume {
     grid: Grid,
     values: Vec<f32>,
     labels: Option<Arc<[u16]>>,
+    label_names: BTreeMap<u16, String>,
 }
 
 impl Volume {
@@ -88,7 +90,8 @@ impl Volume {
             let voxel = Grid { dims, spacing }.voxel_at(at as u32);
             return Err(invalid("data", format!("{} at voxel {voxel}", values[at]), "finite values"));
         }
-        Self { grid: Grid { dims, spacing: DVec3::ONE }, values, labels: None }.with_spacing(origin, spacing)
+        Self { grid: Grid { dims, spacing: DVec3::ONE }, values, labels: None, label_names: BTreeMap::new() }
+            .with_spacing(origin, spacing)
     }
 
     /// The same values at another spacing (world units per voxel step).

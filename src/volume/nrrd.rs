@@ -37,7 +37,7 @@ pub(super) fn read(path: &Path) -> Result<Volume, VolumeError> {
 pub(super) fn read_labels(path: &Path) -> Result<Labels, VolumeError> {
     let Opened { dims, spacing, layout, data } = Opened::new(path)?;
     let values = layout.read(data, layout.sample.labels)?;
-    Ok(Labels { origin: path.display().to_string(), dims, spacing, values: values.into() })
+    Ok(Labels { origin: path.display().to_string(), dims, spacing, values: values.into(), names: BTreeMap::new() })
 }
 
 /// What a header says, and the file that the samples are in.

@@ -2,6 +2,7 @@
 #![cfg(feature = "cli")]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod annotations;
 mod bench;
 mod compare;
 mod errors;
@@ -9,6 +10,7 @@ mod extremes;
 #[expect(dead_code, reason = "not every file needs all of it")]
 #[path = "../common/images.rs"]
 mod images;
+mod looks;
 mod orbit;
 mod outputs;
 mod program;

@@ -415,7 +415,7 @@ fn labels_have_their_own_tables() {
         let volume = noise(DIMS, DVec3::new(1.0, 2.0, 1.5));
         let mut random = Random(5);
         let values = (0..volume.values().len()).map(|_| labels[random.bits() as usize % labels.len()]).collect();
-        let labels = Labels { origin: "noise".to_owned(), dims: DIMS, spacing: None, values };
+        let labels = Labels { origin: "noise".to_owned(), dims: DIMS, spacing: None, values, names: BTreeMap::new() };
         volume.with_labels(labels).unwrap()
     };
     let own = LabelTables {

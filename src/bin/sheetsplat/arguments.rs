@@ -3,6 +3,8 @@
 use std::time::Instant;
 
 use clap::ValueEnum;
+use clap::builder::PossibleValuesParser;
+use sheetsplat::appearance::{Colormap, Preset};
 use sheetsplat::headless::{Error, Headless, HeadlessOptions};
 use sheetsplat::image::PngDepth;
 use sheetsplat::scene::{Scene, SceneError, VolumeSource};
@@ -20,9 +22,30 @@ pub(crate) struct Input {
     /// Set a scene value, as in --set splatting.slab_width=2.0. Can be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(crate) sets: Vec<String>,
+    #[command(flatten)]
+    look: Look,
     /// Part of the name of the adapter to use.
     #[arg(long, value_name = "NAME", env = "WGPU_ADAPTER_NAME")]
     pub(crate) adapter: Option<String>,
+}
+
+/// Appearance by name; short for --set of the scene's keys, and before them.
+#[derive(clap::Args)]
+struct Look {
+    /// Transfer function, shading and compositing for a kind of data, where the scene gives none of its own: short for --set
+    /// preset=NAME.
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Preset::ALL.map(|(name, _)| name)))]
+    preset: Option<String>,
+    /// Colours over the values that show, in place of the scene's: short for --set transfer.colormap=NAME.
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Colormap::ALL.map(|(name, _)| name)))]
+    colormap: Option<String>,
+}
+
+impl Look {
+    fn sets(&self) -> impl Iterator<Item = String> {
+        let preset = self.preset.iter().map(|name| format!("preset={name}"));
+        preset.chain(self.colormap.iter().map(|name| format!("transfer.colormap={name}")))
+    }
 }
 
 impl Input {
@@ -32,6 +55,7 @@ impl Input {
 
     /// The scene with these settings in place of the arguments'. By its extension a scene file; anything else is a volume.
     pub(crate) fn scene_with(&self, sets: &[String]) -> Result<Scene, SceneError> {
+        let sets = &self.look.sets().chain(sets.iter().cloned()).collect::<Vec<_>>();
         match self.name.strip_prefix("builtin:") {
             Some(name) => Scene::from_volume(VolumeSource::Builtin(name.to_owned()), sets),
             None if self.name.ends_with(".toml") => Scene::open(self.name.as_ref(), sets),
