@@ -1,17 +1,23 @@
 //! Scalar volumes: extent, spacing and values, without any appearance.
 
 pub mod builtin;
+mod format;
 mod grid;
 mod labels;
 mod nrrd;
+mod orientation;
+mod samples;
+mod source;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
 
+use format::Loaded;
 pub use grid::Grid;
 pub use labels::Labels;
+pub use orientation::{Orientation, View};
 
 /// The largest ratio of two spacings.
 const MAX_ASPECT: f64 = 1e4;
@@ -47,17 +53,6 @@ fn invalid(origin: &str, field: &str, found: String, allowed: String) -> VolumeE
     VolumeError::Invalid { origin: origin.to_owned(), field: field.to_owned(), found, allowed }
 }
 
-/// Reads a file of a format that its extension tells.
-fn of_format<T>(path: &Path, nrrd: fn(&Path) -> Result<T, VolumeError>) -> Result<T, VolumeError> {
-    match path.extension().and_then(|extension| extension.to_str()) {
-        Some("nrrd" | "nhdr") => nrrd(path),
-        extension => {
-            let found = extension.map_or("none".to_owned(), |extension| format!("\".{extension}\""));
-            Err(invalid(&path.display().to_string(), "extension", found, ".nrrd or .nhdr".to_owned()))
-        }
-    }
-}
-
 /// A scalar volume on a rectilinear grid (SPEC §2): `dims` voxels, x fastest in memory, `spacing` world units apart.
 ///
 /// World axes are the volume's axes and the origin is the volume's centre. Values are finite `f32`. A segmented volume has a label
@@ -67,6 +62,7 @@ pub struct Volume {
     grid: Grid,
     values: Vec<f32>,
     labels: Option<Arc<[u16]>>,
+    orientation: Option<Orientation>,
 }
 
 impl Volume {
@@ -88,7 +84,8 @@ impl Volume {
             let voxel = Grid { dims, spacing }.voxel_at(at as u32);
             return Err(invalid("data", format!("{} at voxel {voxel}", values[at]), "finite values"));
         }
-        Self { grid: Grid { dims, spacing: DVec3::ONE }, values, labels: None }.with_spacing(origin, spacing)
+        Self { grid: Grid { dims, spacing: DVec3::ONE }, values, labels: None, orientation: None }
+            .with_spacing(origin, spacing)
     }
 
     /// The same values at another spacing (world units per voxel step).
@@ -106,12 +103,14 @@ impl Volume {
         Ok(self)
     }
 
-    /// Reads a volume file; the format is told by the extension (`.nrrd`, `.nhdr`).
+    /// Reads a volume file. Its format is told by its first bytes, or else by the extension: NRRD (`.nrrd`, `.nhdr`).
     ///
     /// # Errors
-    /// If the file cannot be read, is of no known format, or does not hold what its header promises.
+    /// If the file cannot be read, is of no format that is compiled in, or does not hold what its header promises.
     pub fn open(path: &Path) -> Result<Self, VolumeError> {
-        of_format(path, nrrd::read)
+        let Loaded { dims, spacing, orientation, values } = format::read(path)?;
+        let origin = path.display().to_string();
+        Self::new(&origin, dims, spacing.unwrap_or(DVec3::ONE), values)?.with_orientation(&origin, orientation)
     }
 
     /// Where the voxels are.

@@ -1,0 +1,255 @@
+//! Samples: the numbers of a file, which become values or labels as they are read.
+//!
+//! Whatever a header promises is checked against what the file can hold before memory is asked for, and samples are converted as
+//! they are read, so a load needs little more than the values themselves.
+
+use std::fmt::Display;
+use std::fs::File;
+use std::io::{self, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use flate2::bufread::MultiGzDecoder;
+use glam::{DVec3, UVec3};
+
+use super::source::{CHUNK, Source, invalid, io_error};
+use super::{Grid, VolumeError};
+
+/// Deflate spends at least 2 bits on a match of at most 258 bytes, so no stream expands by more.
+const MAX_EXPANSION: u64 = 1032;
+
+/// A number as a file has it.
+pub(super) trait Sample: Copy {
+    fn to_f32(self) -> f32;
+    fn to_f64(self) -> f64;
+}
+
+/// What samples become.
+pub(super) trait Voxel: Sized {
+    const ALLOWED: &'static str;
+
+    /// `None` if the sample is not allowed.
+    fn of(sample: impl Sample) -> Option<Self>;
+}
+
+/// A value. Whether it is finite is the volume's to check.
+impl Voxel for f32 {
+    const ALLOWED: &'static str = "numbers";
+
+    fn of(sample: impl Sample) -> Option<Self> {
+        Some(sample.to_f32())
+    }
+}
+
+/// A label.
+impl Voxel for u16 {
+    const ALLOWED: &'static str = "labels, whole numbers from 0 to 65535";
+
+    fn of(sample: impl Sample) -> Option<Self> {
+        let sample = sample.to_f64();
+        let label = sample as Self;
+        (f64::from(label) == sample).then_some(label)
+    }
+}
+
+macro_rules! sample_types {
+    ($($name:ident: $type:ty),*) => {
+        /// The type of the samples in a file.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(super) enum SampleType {
+            $(#[doc = concat!("`", stringify!($type), "`")] $name),*
+        }
+
+        $(impl Sample for $type {
+            fn to_f32(self) -> f32 {
+                self as f32
+            }
+
+            fn to_f64(self) -> f64 {
+                self as f64
+            }
+        })*
+
+        impl SampleType {
+            /// The size of one.
+            pub(super) fn bytes(self) -> u64 {
+                match self {
+                    $(Self::$name => size_of::<$type>() as u64),*
+                }
+            }
+
+            /// Appends the samples in some bytes, a whole number of them. Stops at one that is not allowed, and gives it back.
+            fn convert<T: Voxel>(self, layout: &Samples, bytes: &[u8], into: &mut Vec<T>) -> Result<(), f64> {
+                match self {
+                    $(Self::$name => {
+                        let from_bytes = if layout.big_endian { <$type>::from_be_bytes } else { <$type>::from_le_bytes };
+                        let samples = bytes.as_chunks().0.iter().map(|&sample| from_bytes(sample));
+                        match layout.rescale {
+                            None => append(samples, into),
+                            Some([slope, intercept]) => {
+                                append(samples.map(|sample| sample.to_f64() * slope + intercept), into)
+                            }
+                        }
+                    })*
+                }
+            }
+        }
+    };
+}
+
+sample_types!(
+    I8: i8, U8: u8, I16: i16, U16: u16, I32: i32, U32: u32, I64: i64, U64: u64, F32: f32, F64: f64
+);
+
+fn append<S: Sample, T: Voxel>(samples: impl Iterator<Item = S>, into: &mut Vec<T>) -> Result<(), f64> {
+    for sample in samples {
+        into.push(T::of(sample).ok_or_else(|| sample.to_f64())?);
+    }
+    Ok(())
+}
+
+/// What a header says of the samples: as many as the grid has voxels, x fastest.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Samples {
+    pub(super) kind: SampleType,
+    pub(super) dims: UVec3,
+    pub(super) big_endian: bool,
+    /// Slope and intercept: a value is `sample · slope + intercept`.
+    pub(super) rescale: Option<[f64; 2]>,
+}
+
+impl Samples {
+    /// What they take up, decompressed.
+    pub(super) fn bytes(&self) -> u64 {
+        u64::from(self.count()) * self.kind.bytes()
+    }
+
+    /// Readers have fitted the product in 32 bits: [`dims_of`].
+    fn count(&self) -> u32 {
+        self.dims.element_product()
+    }
+
+    fn mismatch(&self, path: &Path, held: impl Display) -> VolumeError {
+        let allowed = format!("{} bytes ({} samples of {})", self.bytes(), self.count(), self.kind.bytes());
+        invalid(path, "data", format!("{held} bytes"), allowed)
+    }
+}
+
+/// Three sizes as a grid's, if each is at least 1 and there are not too many voxels.
+pub(super) fn dims_of<N: TryInto<u32>>(sizes: [N; 3]) -> Option<UVec3> {
+    let [Ok(x), Ok(y), Ok(z)] = sizes.map(TryInto::try_into) else { return None };
+    let voxels = x.checked_mul(y)?.checked_mul(z)?;
+    (voxels > 0).then_some(UVec3::new(x, y, z))
+}
+
+/// What [`dims_of`] takes.
+pub(super) const SIZES: &str = "three positive integers, at most 4294967295 voxels";
+
+/// What is left of a file, decompressed.
+pub(super) struct Stream {
+    path: PathBuf,
+    reader: Reader,
+    /// How many bytes are left; of a compressed stream, no more than these.
+    left: u64,
+}
+
+enum Reader {
+    Raw(BufReader<File>),
+    /// What it decodes, for errors.
+    Decoder(Box<dyn Read>, &'static str),
+}
+
+impl Stream {
+    /// The rest of a file as it is.
+    pub(super) fn raw(mut file: Source) -> Result<Self, VolumeError> {
+        Ok(Self { left: file.left()?, path: file.path, reader: Reader::Raw(file.reader) })
+    }
+
+    /// The rest of a file, of one or more gzip members.
+    pub(super) fn gzip(mut file: Source) -> Result<Self, VolumeError> {
+        let left = file.left()?.saturating_mul(MAX_EXPANSION);
+        let decoder = Box::new(MultiGzDecoder::new(file.reader));
+        Ok(Self { path: file.path, reader: Reader::Decoder(decoder, "whole and undamaged gzip members"), left })
+    }
+
+    /// How many bytes are left, if the stream is not compressed.
+    pub(super) fn exactly_left(&self) -> Option<u64> {
+        matches!(self.reader, Reader::Raw(_)).then_some(self.left)
+    }
+
+    /// Skips bytes; if there are too few, all of them.
+    pub(super) fn skip(&mut self, bytes: u64) -> Result<(), VolumeError> {
+        let bytes = bytes.min(self.left);
+        self.left -= bytes;
+        match &mut self.reader {
+            Reader::Raw(reader) => reader.seek_relative(bytes as i64).map_err(io_error(&self.path)),
+            Reader::Decoder(reader, _) => {
+                let skipped = io::copy(&mut reader.by_ref().take(bytes), &mut io::sink());
+                skipped.map(drop).map_err(|error| self.damage(error))
+            }
+        }
+    }
+
+    /// The samples, and then nothing else unless it is a `window` into a file of which more may follow.
+    pub(super) fn samples<T: Voxel>(mut self, samples: &Samples, window: bool) -> Result<Vec<T>, VolumeError> {
+        let expected = samples.bytes();
+        match self.exactly_left() {
+            Some(left) if left < expected || left > expected && !window => {
+                return Err(samples.mismatch(&self.path, left));
+            }
+            None if self.left < expected => {
+                return Err(samples.mismatch(&self.path, format!("at most {}", self.left)));
+            }
+            _ => {}
+        }
+        let values = self.read_samples(samples)?;
+        // Reading on to the end is also what checks a compressed stream's last checksum.
+        if matches!(self.reader, Reader::Decoder(..)) && self.read_up_to(1, &mut Vec::new())? > 0 {
+            return Err(samples.mismatch(&self.path, format!("more than {expected}")));
+        }
+        Ok(values)
+    }
+
+    fn read_samples<T: Voxel>(&mut self, samples: &Samples) -> Result<Vec<T>, VolumeError> {
+        let path = self.path.clone();
+        let too_many = |error| invalid(&path, "data", format!("{} samples: {error}", samples.count()), "fewer");
+        let (mut values, mut chunk) = (Vec::new(), Vec::with_capacity(CHUNK as usize));
+        // What a compressed stream holds is not known yet: memory grows with what comes out of it. A file that is not
+        // compressed holds them all.
+        let known = if self.exactly_left().is_some() { samples.count() as usize } else { 0 };
+        values.try_reserve_exact(known).map_err(too_many)?;
+        let mut left = samples.bytes();
+        while left > 0 {
+            chunk.clear();
+            let wanted = left.min(CHUNK);
+            let read = self.read_up_to(wanted, &mut chunk)?;
+            if read < wanted {
+                return Err(samples.mismatch(&path, samples.bytes() - left + read));
+            }
+            values.try_reserve(chunk.len() / samples.kind.bytes() as usize).map_err(too_many)?;
+            samples.kind.convert(samples, &chunk, &mut values).map_err(|sample| {
+                let voxel = Grid { dims: samples.dims, spacing: DVec3::ONE }.voxel_at(values.len() as u32);
+                invalid(&path, "data", format!("{sample} at voxel {voxel}"), T::ALLOWED)
+            })?;
+            left -= read;
+        }
+        values.shrink_to_fit();
+        Ok(values)
+    }
+
+    /// Appends so many bytes, fewer at the end.
+    fn read_up_to(&mut self, bytes: u64, into: &mut Vec<u8>) -> Result<u64, VolumeError> {
+        let read = match &mut self.reader {
+            Reader::Raw(reader) => reader.by_ref().take(bytes).read_to_end(into),
+            Reader::Decoder(reader, _) => reader.by_ref().take(bytes).read_to_end(into),
+        };
+        read.map(|read| read as u64).map_err(|error| self.damage(error))
+    }
+
+    /// Decoders report damage as an I/O error, without the code that the operating system's own carry.
+    fn damage(&self, error: io::Error) -> VolumeError {
+        match (&self.reader, error.raw_os_error()) {
+            (Reader::Decoder(_, allowed), None) => invalid(&self.path, "data", error, allowed),
+            _ => io_error(&self.path)(error),
+        }
+    }
+}
