@@ -23,6 +23,34 @@ fn exr_and_npy_hold_the_same_premultiplied_floats() {
 }
 
 #[test]
+fn views_are_the_anatomys() {
+    let folder = Folder::new();
+    let values: Vec<u8> = (0..60).map(|i| (i * 4) as u8).collect();
+    // X runs to the patient's left, y to the head, z to the front.
+    let axes = "space: LPS\nspace directions: (1,0,0) (0,0,2) (0,-1,0)";
+    let write = |name: &str, axes: &str| {
+        let header = format!("NRRD0004\ntype: uint8\ndimension: 3\nsizes: 5 4 3\n{axes}\nencoding: raw\n\n");
+        folder.write(name, [header.as_bytes(), &values].concat());
+    };
+    write("lying.nrrd", axes);
+    write("mirrored.nrrd", &axes.replace("LPS", "LAS"));
+    write("nowhere.nrrd", "spacings: 1 2 1");
+    let size = "--set image.width=16 --set image.height=12";
+    let plain = folder.pixels(&format!("nowhere.nrrd {size} --set camera.direction=[0,0,-1] --set camera.up=[0,1,0]"));
+    assert_eq!(folder.pixels(&format!("lying.nrrd {size} --view front")), plain);
+    assert_eq!(folder.pixels(&format!("lying.nrrd {size} --view front --set camera.direction=[1,0,0]")), plain);
+    assert_ne!(folder.pixels(&format!("lying.nrrd {size} --view back")), plain);
+    let mirrored = folder.run(&format!("render mirrored.nrrd {size} --view front -o out.png"));
+    mirrored.assert_success();
+    assert!(mirrored.stderr.contains("mirrored.nrrd: --view: the axes are left-handed"), "{}", mirrored.stderr);
+    let found = ["nowhere.nrrd", "--view", "no orientation", "camera.direction"];
+    folder.run(&format!("render nowhere.nrrd {size} --view front -o out.png")).assert_failure(2, &found);
+    folder
+        .run(&format!("render lying.nrrd {size} --view above -o out.png"))
+        .assert_failure(2, &["above", "top, bottom"]);
+}
+
+#[test]
 fn png_holds_the_rounded_floats_with_straight_alpha() {
     let folder = Folder::new();
     for background in [TRANSPARENT, "--set image.background=[1,1,1,0]", "--set image.background=[0.1,0.2,0.9,1]"] {

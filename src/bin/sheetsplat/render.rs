@@ -10,6 +10,7 @@ use sheetsplat::image::{Image, ImageError, PngDepth, aside};
 use sheetsplat::reference;
 use sheetsplat::scene::{Scene, SceneError, VolumeSource};
 use sheetsplat::stats::Stats;
+use sheetsplat::volume::{self, Volume};
 
 use crate::Failure;
 
@@ -23,6 +24,10 @@ pub(crate) struct Arguments {
     /// Set a scene value, as in --set splatting.slab_width=2.0. Can be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// The side of the patient to look at, where the volume's file says how the patient lies; in place of the scene's
+    /// camera.direction and camera.up.
+    #[arg(long, value_enum, value_name = "SIDE")]
+    view: Option<View>,
     /// Bits per channel of a PNG.
     #[arg(long, value_enum, default_value = "8")]
     depth: Depth,
@@ -49,6 +54,16 @@ enum Depth {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
+enum View {
+    Front,
+    Back,
+    Left,
+    Right,
+    Top,
+    Bottom,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
 enum Backend {
     Gpu,
     Reference,
@@ -60,17 +75,25 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let path = arguments.output.display();
         return Err(Failure::Input(format!("--stats: found {path}, allowed: another file than --output")));
     }
-    let scene = open_scene(&arguments.input, &arguments.set)?;
-    let Rendering { image, stats } = match arguments.backend {
+    let mut scene = open_scene(&arguments.input, &arguments.set)?;
+    let failed = |error| Failure::of(error, &arguments.input);
+    let start = Instant::now();
+    let volume = scene.load_volume().map_err(|error| failed(error.into()))?;
+    let load_ms = start.elapsed().as_secs_f64() * 1e3;
+    if let Some(view) = arguments.view {
+        look_at(view, &volume, &arguments.input, &mut scene)?;
+    }
+    let Rendering { image, mut stats } = match arguments.backend {
         Backend::Gpu => {
             let (adapter, profile) = (arguments.adapter.clone(), arguments.profile);
             let options = HeadlessOptions { adapter, profile, ..HeadlessOptions::default() };
             let headless = Headless::new(&options).map_err(|error| Failure::Other(error.to_string()))?;
-            headless.render(&scene)
+            headless.render_volume(volume, &scene)
         }
-        Backend::Reference => render_reference(&scene),
+        Backend::Reference => render_reference(&volume, &scene),
     }
-    .map_err(|error| Failure::of(error, &arguments.input))?;
+    .map_err(|error| failed(error.into()))?;
+    stats.load_ms = load_ms;
     let depth = match arguments.depth {
         Depth::Eight => PngDepth::Eight,
         Depth::Sixteen => PngDepth::Sixteen,
@@ -106,13 +129,33 @@ pub(crate) fn open_scene(input: &str, sets: &[String]) -> Result<Scene, SceneErr
     }
 }
 
-fn render_reference(scene: &Scene) -> Result<Rendering, Error> {
+/// Turns the camera to a side of the patient.
+fn look_at(view: View, volume: &Volume, input: &str, scene: &mut Scene) -> Result<(), Failure> {
+    let Some(orientation) = volume.orientation() else {
+        let allowed = "a volume whose file says how the patient lies, or --set camera.direction and camera.up";
+        return Err(Failure::Input(format!("{input}: --view: found no orientation in the file, allowed: {allowed}")));
+    };
+    let side = match view {
+        View::Front => volume::View::Front,
+        View::Back => volume::View::Back,
+        View::Left => volume::View::Left,
+        View::Right => volume::View::Right,
+        View::Top => volume::View::Top,
+        View::Bottom => volume::View::Bottom,
+    };
+    [scene.camera.direction, scene.camera.up] = orientation.direction_and_up(side);
+    if orientation.is_mirrored() {
+        eprintln!(
+            "sheetsplat: {input}: --view: the axes are left-handed, so the image is a mirror image of the patient"
+        );
+    }
+    Ok(())
+}
+
+fn render_reference(volume: &Volume, scene: &Scene) -> Result<Rendering, RenderError> {
     let start = Instant::now();
-    let volume = scene.load_volume()?;
-    let load_ms = start.elapsed().as_secs_f64() * 1e3;
-    let start = Instant::now();
-    let transfer = scene.transfer.resolve(&volume);
-    let image = reference::render(&volume, &transfer, scene)?;
+    let transfer = scene.transfer.resolve(volume);
+    let image = reference::render(volume, &transfer, scene)?;
     let stats = Stats {
         adapter: "CPU".to_owned(),
         driver: "f64".to_owned(),
@@ -120,9 +163,8 @@ fn render_reference(scene: &Scene) -> Result<Rendering, Error> {
         rasterizer: "reference".to_owned(),
         width: image.width,
         height: image.height,
-        load_ms,
         frame_ms: start.elapsed().as_secs_f64() * 1e3,
-        counts: reference::count(&volume, &transfer, scene)?,
+        counts: reference::count(volume, &transfer, scene)?,
         ..Stats::default()
     };
     Ok(Rendering { image, stats })
