@@ -20,6 +20,8 @@ pub(super) struct Loaded<T> {
     pub(super) values: Vec<T>,
 }
 
+type Reader<T> = fn(&Path) -> Result<Loaded<T>, VolumeError>;
+
 /// A format, and what reads it.
 struct Format<T> {
     name: &'static str,
@@ -27,16 +29,39 @@ struct Format<T> {
     extensions: &'static [&'static str],
     /// Whether a file that begins like this is surely of this format.
     is_magic: fn(&[u8]) -> bool,
-    read: fn(&Path) -> Result<Loaded<T>, VolumeError>,
+    /// Or the feature that it is compiled with.
+    read: Result<Reader<T>, &'static str>,
+}
+
+/// A module's `read`, or the feature that it is compiled with.
+macro_rules! reader {
+    ($feature:literal, $read:path) => {{
+        #[cfg(feature = $feature)]
+        let read: Result<Reader<_>, _> = Ok($read);
+        #[cfg(not(feature = $feature))]
+        let read = Err($feature);
+        read
+    }};
 }
 
 fn formats<T: Voxel>() -> Vec<Format<T>> {
-    vec![Format {
-        name: "NRRD",
-        extensions: &[".nrrd", ".nhdr"],
-        is_magic: |head| head.starts_with(b"NRRD000"),
-        read: nrrd::read,
-    }]
+    vec![
+        Format {
+            name: "NRRD",
+            extensions: &[".nrrd", ".nhdr"],
+            is_magic: |head| head.starts_with(b"NRRD000"),
+            read: Ok(nrrd::read),
+        },
+        Format {
+            name: "NIfTI",
+            extensions: &[".nii", ".nii.gz", ".hdr", ".img", ".hdr.gz", ".img.gz"],
+            is_magic: |head| {
+                matches!(head.get(344..348), Some(b"n+1\0" | b"ni1\0"))
+                    || matches!(head.get(4..8), Some(b"n+2\0" | b"ni2\0"))
+            },
+            read: reader!("nifti", super::nifti::read),
+        },
+    ]
 }
 
 /// Reads a file: of the format that its first bytes tell, else of the one that its name tells.
@@ -46,12 +71,25 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
     let mut head = Vec::new();
     Source::open(path)?.reader.take(1024).read_to_end(&mut head).map_err(io_error(path))?;
     let is_named = |format: &&Format<T>| format.extensions.iter().any(|extension| name.ends_with(extension));
-    match formats.iter().find(|format| (format.is_magic)(&head)).or_else(|| formats.iter().find(is_named)) {
-        Some(format) => (format.read)(path),
-        None => {
-            let known = formats.iter().map(|format| format!("{} ({})", format.name, format.extensions.join(", ")));
-            let extension = path.extension().map_or("none".into(), |extension| format!(".{}", extension.display()));
-            Err(invalid(path, "format", format!("{extension:?}"), known.collect::<Vec<_>>().join(", ")))
-        }
-    }
+    let format = formats.iter().find(|format| (format.is_magic)(&head)).or_else(|| formats.iter().find(is_named));
+    let found = match format {
+        Some(Format { read: Ok(read), .. }) => return read(path),
+        Some(Format { name, read: Err(feature), .. }) => format!("{name}, which needs the feature `{feature}`"),
+        None => match path.extension() {
+            Some(extension) => format!("\".{}\"", extension.display()),
+            None => "none".to_owned(),
+        },
+    };
+    let list = |compiled: bool| {
+        let formats = formats.iter().filter(|format| format.read.is_ok() == compiled);
+        formats
+            .map(|format| format!("{} ({})", format.name, format.extensions.join(", ")))
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    let allowed = match (list(true), list(false)) {
+        (compiled, left_out) if left_out.is_empty() => compiled,
+        (compiled, left_out) => format!("{compiled}; not compiled in: {left_out}"),
+    };
+    Err(invalid(path, "format", found, allowed))
 }

@@ -4,6 +4,8 @@ pub mod builtin;
 mod format;
 mod grid;
 mod labels;
+#[cfg(feature = "nifti")]
+mod nifti;
 mod nrrd;
 mod orientation;
 mod samples;
@@ -103,7 +105,8 @@ impl Volume {
         Ok(self)
     }
 
-    /// Reads a volume file. Its format is told by its first bytes, or else by the extension: NRRD (`.nrrd`, `.nhdr`).
+    /// Reads a volume file. Its format is told by its first bytes, or else by the extension: NRRD (`.nrrd`, `.nhdr`), and, each
+    /// with the feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`).
     ///
     /// # Errors
     /// If the file cannot be read, is of no format that is compiled in, or does not hold what its header promises.

@@ -189,6 +189,18 @@ impl Stream {
         }
     }
 
+    /// So many bytes of a header.
+    #[cfg(feature = "nifti")]
+    pub(super) fn bytes(&mut self, bytes: u64) -> Result<Vec<u8>, VolumeError> {
+        let mut header = Vec::new();
+        let read = self.read_up_to(bytes, &mut header)?;
+        self.left -= read.min(self.left);
+        if read < bytes {
+            return Err(invalid(&self.path, "header", format!("{read} bytes"), format!("{bytes} bytes")));
+        }
+        Ok(header)
+    }
+
     /// The samples, and then nothing else unless it is a `window` into a file of which more may follow.
     pub(super) fn samples<T: Voxel>(mut self, samples: &Samples, window: bool) -> Result<Vec<T>, VolumeError> {
         let expected = samples.bytes();

@@ -12,7 +12,7 @@ use crate::render::open_scene;
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// A scene file (.toml), a volume file (.nrrd, .nhdr), or builtin:NAME[:N].
+    /// A scene file (.toml), a volume file, or builtin:NAME[:N].
     input: String,
     /// Frames to time after the first one.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]

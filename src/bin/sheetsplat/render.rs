@@ -16,7 +16,7 @@ use crate::Failure;
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// A scene file (.toml), a volume file (.nrrd, .nhdr), or builtin:NAME[:N].
+    /// A scene file (.toml), a volume file, or builtin:NAME[:N].
     input: String,
     /// The image: .png, .exr or .npy.
     #[arg(short, long, value_name = "FILE")]

@@ -24,7 +24,7 @@ use app::App;
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// A scene file (.toml), a volume file (.nrrd, .nhdr), or builtin:NAME[:N]. Its image size is not looked at.
+    /// A scene file (.toml), a volume file, or builtin:NAME[:N]. Its image size is not looked at.
     input: String,
     /// Set a scene value, as in --set splatting.slab_width=2.0. Can be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
