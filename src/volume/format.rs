@@ -61,6 +61,12 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             },
             read: reader!("nifti", super::nifti::read),
         },
+        Format {
+            name: "MetaImage",
+            extensions: &[".mha", ".mhd"],
+            is_magic: |head| head.starts_with(b"ObjectType = Image"),
+            read: reader!("metaimage", super::metaimage::read),
+        },
     ]
 }
 

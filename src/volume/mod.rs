@@ -1,9 +1,12 @@
 //! Scalar volumes: extent, spacing and values, without any appearance.
 
 pub mod builtin;
+mod fields;
 mod format;
 mod grid;
 mod labels;
+#[cfg(feature = "metaimage")]
+mod metaimage;
 #[cfg(feature = "nifti")]
 mod nifti;
 mod nrrd;
@@ -106,7 +109,7 @@ impl Volume {
     }
 
     /// Reads a volume file. Its format is told by its first bytes, or else by the extension: NRRD (`.nrrd`, `.nhdr`), and, each
-    /// with the feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`).
+    /// with the feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`) and MetaImage (`.mha`, `.mhd`).
     ///
     /// # Errors
     /// If the file cannot be read, is of no format that is compiled in, or does not hold what its header promises.

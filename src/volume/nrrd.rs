@@ -3,14 +3,13 @@
 //! Axes are those of the array. Units and the fields that describe what a sample means (`old min`, `kinds`, …) do not change the
 //! volume.
 
-use std::collections::BTreeMap;
-use std::fmt::Display;
 use std::io::{BufRead, Read};
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3, UVec3};
 
 use super::VolumeError;
+use super::fields::Fields;
 use super::format::Loaded;
 use super::orientation::{Orientation, RAS_FROM_LPS, lengths_and_directions, orthogonal};
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
@@ -28,10 +27,7 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
 }
 
 /// The fields of a header, under the format's first spelling of their names.
-struct Header {
-    path: PathBuf,
-    fields: BTreeMap<String, String>,
-}
+struct Header(Fields);
 
 impl Header {
     /// Reads the header and leaves `file` where the data of an attached one begin.
@@ -43,7 +39,7 @@ impl Header {
         if !matches!(version, Some("1" | "2" | "3" | "4" | "5")) {
             return Err(invalid(&file.path, "magic", shown(&magic), "a first line NRRD0001 to NRRD0005"));
         }
-        let mut header = Self { path: file.path.clone(), fields: BTreeMap::new() };
+        let mut header = Self(Fields::new(file.path.clone()));
         let mut budget = MAX_HEADER;
         while let Some(line) = file.line(&mut budget)? {
             if line.is_empty() {
@@ -51,9 +47,9 @@ impl Header {
             }
             header.add(&line)?;
         }
-        match header.get("data file") {
+        match header.0.get("data file") {
             Some(_) => Ok(header),
-            None => Err(header.invalid("header", "the end of the file", "a blank line before the data")),
+            None => Err(header.0.invalid("header", "the end of the file", "a blank line before the data")),
         }
     }
 
@@ -67,7 +63,7 @@ impl Header {
         let delimits =
             |&(at, _): &(usize, &str)| matches!(line.as_bytes().get(at + 1), Some(b'=' | b' ' | b'\t') | None);
         let Some((at, _)) = line.match_indices(':').find(delimits).or_else(|| line.match_indices(':').next()) else {
-            return Err(self.invalid("header", shown(line), "`field: value`, `key:=value` or `# comment`"));
+            return Err(self.0.invalid("header", shown(line), "`field: value`, `key:=value` or `# comment`"));
         };
         let (name, value) = line.split_at(at);
         let value = value.strip_prefix(':').unwrap_or(value);
@@ -81,47 +77,32 @@ impl Header {
             "byteskip" => "byte skip",
             name => name,
         };
-        match self.fields.insert(name.to_owned(), value.trim().to_owned()) {
-            None => Ok(()),
-            Some(_) => Err(self.invalid(name, "the field twice", "each field once")),
-        }
-    }
-
-    fn get(&self, name: &str) -> Option<&str> {
-        self.fields.get(name).map(String::as_str)
-    }
-
-    fn invalid(&self, field: &str, found: impl Display, allowed: impl Display) -> VolumeError {
-        invalid(&self.path, field, found, allowed)
-    }
-
-    /// A field as `parse` makes it from its text, or from the lack of it.
-    fn value<T>(&self, name: &str, allowed: &str, parse: impl Fn(Option<&str>) -> Option<T>) -> Result<T, VolumeError> {
-        let text = self.get(name);
-        parse(text).ok_or_else(|| self.invalid(name, text.map_or("no such field".to_owned(), shown), allowed))
+        self.0.add(name, value)
     }
 
     fn dims(&self) -> Result<UVec3, VolumeError> {
-        self.value("dimension", "3", |text| text?.parse::<u32>().ok().filter(|&dimension| dimension == 3))?;
-        self.value("sizes", SIZES, |text| {
+        self.0.value("dimension", "3", |text| text?.parse::<u32>().ok().filter(|&dimension| dimension == 3))?;
+        self.0.value("sizes", SIZES, |text| {
             dims_of(three(text?.split_whitespace().map(|size| size.parse::<u32>().ok()))?)
         })
     }
 
     fn spacing_and_orientation(&self) -> Result<(Option<DVec3>, Option<Orientation>), VolumeError> {
-        match (self.get("spacings"), self.get("space directions")) {
+        match (self.0.get("spacings"), self.0.get("space directions")) {
             (None, None) => Ok((None, None)),
             (None, Some(_)) => {
                 let (spacing, axes) = self.directions()?;
                 Ok((Some(spacing), self.orientation(axes)?))
             }
-            (Some(_), None) => self.value("spacings", "three positive finite numbers", |text| {
+            (Some(_), None) => self.0.value("spacings", "three positive finite numbers", |text| {
                 let spacings = three(text?.split_whitespace().map(number))?;
                 spacings.iter().all(|&spacing| spacing > 0.0).then_some((Some(DVec3::from_array(spacings)), None))
             }),
-            (Some(_), Some(_)) => {
-                Err(self.invalid("space directions", "`spacings` as well", "one of `spacings` and `space directions`"))
-            }
+            (Some(_), Some(_)) => Err(self.0.invalid(
+                "space directions",
+                "`spacings` as well",
+                "one of `spacings` and `space directions`",
+            )),
         }
     }
 
@@ -129,58 +110,59 @@ impl Header {
     fn directions(&self) -> Result<(DVec3, DMat3), VolumeError> {
         let name = "space directions";
         let axes =
-            self.value(name, "three vectors (x,y,z) of positive finite length, none of them `none`", |text| {
+            self.0.value(name, "three vectors (x,y,z) of positive finite length, none of them `none`", |text| {
                 let axes = vectors(text?)?;
                 axes.iter().all(|axis| axis.length() > 0.0 && axis.length().is_finite()).then_some(axes)
             })?;
-        lengths_and_directions(axes).map_err(|found| self.invalid(name, found, orthogonal()))
+        lengths_and_directions(axes).map_err(|found| self.0.invalid(name, found, orthogonal()))
     }
 
     /// How axes of these directions lie in a patient; other spaces than a patient's have no such thing.
     fn orientation(&self, axes: DMat3) -> Result<Option<Orientation>, VolumeError> {
-        let ras_from_space = match self.get("space").map(lower).as_deref() {
+        let ras_from_space = match self.0.get("space").map(lower).as_deref() {
             Some("right-anterior-superior" | "ras") => DVec3::ONE,
             Some("left-anterior-superior" | "las") => DVec3::new(-1.0, 1.0, 1.0),
             Some("left-posterior-superior" | "lps") => RAS_FROM_LPS,
             _ => return Ok(None),
         };
-        let origin = self.value("space origin", "a vector (x,y,z)", |text| text.map_or(Some(DVec3::ZERO), vector))?;
+        let origin = self.0.value("space origin", "a vector (x,y,z)", |text| text.map_or(Some(DVec3::ZERO), vector))?;
         let axes = DMat3::from_diagonal(ras_from_space) * axes;
         Ok(Some(Orientation { axes, origin: ras_from_space * origin }))
     }
 
     /// Where the samples are, if they are not in the header's own file.
     fn data_path(&self) -> Result<Option<PathBuf>, VolumeError> {
-        let Some(name) = self.get("data file") else { return Ok(None) };
+        let Some(name) = self.0.get("data file") else { return Ok(None) };
         match name.split_whitespace().collect::<Vec<_>>().as_slice() {
             // `slice%03d.raw 1 20 1` is a pattern, and the numbers it runs through.
             [pattern, _, _, _, ..] if pattern.contains('%') => {}
             [] | ["LIST", ..] => {}
-            _ => return Ok(Some(self.path.parent().unwrap_or(Path::new("")).join(name))),
+            _ => return Ok(Some(self.0.path.parent().unwrap_or(Path::new("")).join(name))),
         }
-        Err(self.invalid("data file", shown(name), "the name of one file, no LIST and no pattern"))
+        Err(self.0.invalid("data file", shown(name), "the name of one file, no LIST and no pattern"))
     }
 
     fn layout(&self, dims: UVec3) -> Result<Layout, VolumeError> {
-        let kind = self.value("type", TYPES, |text| sample_type(text?))?;
-        let big_endian = self.value("endian", "little or big", |text| match text.map(lower).as_deref() {
+        let kind = self.0.value("type", TYPES, |text| sample_type(text?))?;
+        let big_endian = self.0.value("endian", "little or big", |text| match text.map(lower).as_deref() {
             Some("little") => Some(false),
             Some("big") => Some(true),
             None if kind.bytes() == 1 => Some(false),
             _ => None,
         })?;
-        let gzip = self.value("encoding", "raw, gzip or gz", |text| match lower(text?).as_str() {
+        let gzip = self.0.value("encoding", "raw, gzip or gz", |text| match lower(text?).as_str() {
             "raw" => Some(false),
             "gzip" | "gz" => Some(true),
             _ => None,
         })?;
-        let line_skip = self.value("line skip", "a number of lines", |text| text.unwrap_or("0").parse().ok())?;
-        let byte_skip = self.value("byte skip", "a number of bytes, or -1 if encoding is raw", |text| match text {
-            Some("-1") => (!gzip).then_some(None),
-            text => text.unwrap_or("0").parse().ok().map(Some),
-        })?;
-        let skips = self.get("line skip").or(self.get("byte skip")).is_some();
-        let window = skips && self.get("data file").is_some();
+        let line_skip = self.0.value("line skip", "a number of lines", |text| text.unwrap_or("0").parse().ok())?;
+        let byte_skip =
+            self.0.value("byte skip", "a number of bytes, or -1 if encoding is raw", |text| match text {
+                Some("-1") => (!gzip).then_some(None),
+                text => text.unwrap_or("0").parse().ok().map(Some),
+            })?;
+        let skips = self.0.get("line skip").or(self.0.get("byte skip")).is_some();
+        let window = skips && self.0.get("data file").is_some();
         let samples = Samples { kind, dims, big_endian, rescale: None };
         Ok(Layout { samples, gzip, line_skip, byte_skip, window })
     }

@@ -5,10 +5,14 @@
 
 use std::fmt::Display;
 use std::fs::File;
+#[cfg(feature = "metaimage")]
+use std::io::BufRead;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use flate2::bufread::MultiGzDecoder;
+#[cfg(feature = "metaimage")]
+use flate2::bufread::ZlibDecoder;
 use glam::{DVec3, UVec3};
 
 use super::source::{CHUNK, Source, invalid, io_error};
@@ -171,6 +175,14 @@ impl Stream {
         Ok(Self { path: file.path, reader: Reader::Decoder(decoder, "whole and undamaged gzip members"), left })
     }
 
+    /// The rest of a file, one zlib stream.
+    #[cfg(feature = "metaimage")]
+    pub(super) fn zlib(mut file: Source) -> Result<Self, VolumeError> {
+        let left = file.left()?.saturating_mul(MAX_EXPANSION);
+        let decoder = Box::new(Zlib(ZlibDecoder::new(file.reader)));
+        Ok(Self { path: file.path, reader: Reader::Decoder(decoder, "one whole and undamaged zlib stream"), left })
+    }
+
     /// How many bytes are left, if the stream is not compressed.
     pub(super) fn exactly_left(&self) -> Option<u64> {
         matches!(self.reader, Reader::Raw(_)).then_some(self.left)
@@ -263,5 +275,20 @@ impl Stream {
             (Reader::Decoder(_, allowed), None) => invalid(&self.path, "data", error, allowed),
             _ => io_error(&self.path)(error),
         }
+    }
+}
+
+/// A zlib stream that nothing may follow.
+#[cfg(feature = "metaimage")]
+struct Zlib(ZlibDecoder<BufReader<File>>);
+
+#[cfg(feature = "metaimage")]
+impl Read for Zlib {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = self.0.read(buffer)?;
+        if read == 0 && !buffer.is_empty() && !self.0.get_mut().fill_buf()?.is_empty() {
+            return Err(io::Error::other("bytes after the end of the stream"));
+        }
+        Ok(read)
     }
 }
