@@ -93,9 +93,9 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
             .collect::<Vec<_>>()
             .join(", ")
     };
-    let allowed = match (list(true), list(false)) {
-        (compiled, left_out) if left_out.is_empty() => compiled,
-        (compiled, left_out) => format!("{compiled}; not compiled in: {left_out}"),
-    };
+    let mut allowed = format!("{}, or raw samples by `volume.dims` and `volume.type`", list(true));
+    if formats.iter().any(|format| format.read.is_err()) {
+        allowed = format!("{allowed}; not compiled in: {}", list(false));
+    }
     Err(invalid(path, "format", found, allowed))
 }

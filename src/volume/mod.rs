@@ -11,6 +11,7 @@ mod metaimage;
 mod nifti;
 mod nrrd;
 mod orientation;
+mod raw;
 mod samples;
 mod source;
 
@@ -23,6 +24,10 @@ use format::Loaded;
 pub use grid::Grid;
 pub use labels::Labels;
 pub use orientation::{Orientation, View};
+pub use raw::RawLayout;
+pub(crate) use raw::TYPES as RAW_TYPES;
+pub use samples::SampleType;
+pub(crate) use samples::{SIZES, dims_of};
 
 /// The largest ratio of two spacings.
 const MAX_ASPECT: f64 = 1e4;

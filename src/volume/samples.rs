@@ -59,7 +59,7 @@ macro_rules! sample_types {
     ($($name:ident: $type:ty),*) => {
         /// The type of the samples in a file.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub(super) enum SampleType {
+        pub enum SampleType {
             $(#[doc = concat!("`", stringify!($type), "`")] $name),*
         }
 
@@ -139,14 +139,14 @@ impl Samples {
 }
 
 /// Three sizes as a grid's, if each is at least 1 and there are not too many voxels.
-pub(super) fn dims_of<N: TryInto<u32>>(sizes: [N; 3]) -> Option<UVec3> {
+pub(crate) fn dims_of<N: TryInto<u32>>(sizes: [N; 3]) -> Option<UVec3> {
     let [Ok(x), Ok(y), Ok(z)] = sizes.map(TryInto::try_into) else { return None };
     let voxels = x.checked_mul(y)?.checked_mul(z)?;
     (voxels > 0).then_some(UVec3::new(x, y, z))
 }
 
 /// What [`dims_of`] takes.
-pub(super) const SIZES: &str = "three positive integers, at most 4294967295 voxels";
+pub(crate) const SIZES: &str = "three positive integers, at most 4294967295 voxels";
 
 /// What is left of a file, decompressed.
 pub(super) struct Stream {

@@ -6,6 +6,7 @@
 mod dispatch;
 mod metaimage;
 mod nifti;
+mod raw;
 
 use std::fs;
 use std::path::{Path, PathBuf};

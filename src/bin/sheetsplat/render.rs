@@ -28,6 +28,8 @@ pub(crate) struct Arguments {
     /// camera.direction and camera.up.
     #[arg(long, value_enum, value_name = "SIDE")]
     view: Option<View>,
+    #[command(flatten)]
+    raw: Raw,
     /// Bits per channel of a PNG.
     #[arg(long, value_enum, default_value = "8")]
     depth: Depth,
@@ -43,6 +45,41 @@ pub(crate) struct Arguments {
     /// Part of the name of the adapter to use.
     #[arg(long, value_name = "NAME", env = "WGPU_ADAPTER_NAME")]
     adapter: Option<String>,
+}
+
+/// What a raw file has no header to say; short for --set of the scene's keys, and before them.
+#[derive(clap::Args)]
+struct Raw {
+    /// Voxels of a file without a header: short for --set volume.dims=[X,Y,Z].
+    #[arg(long, value_name = "X,Y,Z")]
+    dims: Option<String>,
+    /// Its samples' type, uint8, int16, float32, …: short for --set volume.type=TYPE.
+    #[arg(long, value_name = "TYPE")]
+    r#type: Option<String>,
+    /// Its byte order, little or big: short for --set volume.endian=ORDER.
+    #[arg(long, value_name = "ORDER")]
+    endian: Option<String>,
+    /// Bytes before its first sample: short for --set volume.offset=N.
+    #[arg(long, value_name = "N")]
+    offset: Option<String>,
+    /// World units from voxel to voxel, of any volume: short for --set volume.spacing=[X,Y,Z].
+    #[arg(long, value_name = "X,Y,Z")]
+    spacing: Option<String>,
+}
+
+impl Raw {
+    fn sets(&self) -> Vec<String> {
+        let array = |key: &str, value: &Option<String>| value.as_ref().map(|value| format!("volume.{key}=[{value}]"));
+        let plain = |key: &str, value: &Option<String>| value.as_ref().map(|value| format!("volume.{key}={value}"));
+        let sets = [
+            array("dims", &self.dims),
+            plain("type", &self.r#type),
+            plain("endian", &self.endian),
+            plain("offset", &self.offset),
+            array("spacing", &self.spacing),
+        ];
+        sets.into_iter().flatten().collect()
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -75,7 +112,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         let path = arguments.output.display();
         return Err(Failure::Input(format!("--stats: found {path}, allowed: another file than --output")));
     }
-    let mut scene = open_scene(&arguments.input, &arguments.set)?;
+    let sets = [arguments.raw.sets(), arguments.set.clone()].concat();
+    let mut scene = open_scene(&arguments.input, &sets)?;
     let failed = |error| Failure::of(error, &arguments.input);
     let start = Instant::now();
     let volume = scene.load_volume().map_err(|error| failed(error.into()))?;
