@@ -67,6 +67,12 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             is_magic: |head| head.starts_with(b"ObjectType = Image"),
             read: reader!("metaimage", super::metaimage::read),
         },
+        Format {
+            name: "NPY",
+            extensions: &[".npy"],
+            is_magic: |head| head.starts_with(b"\x93NUMPY"),
+            read: reader!("npy", super::npy::read),
+        },
     ]
 }
 

@@ -100,7 +100,7 @@ impl Header {
         let slope = one("ElementToIntensityFunctionSlope")?.unwrap_or(1.0);
         let intercept = one("ElementToIntensityFunctionOffset")?.unwrap_or(0.0);
         let rescale = Some([slope, intercept]).filter(|&rescale| rescale != [1.0, 0.0]);
-        Ok(Samples { kind, dims, big_endian, rescale })
+        Ok(Samples { kind, dims, big_endian, rescale, z_fastest: false })
     }
 
     fn spacing(&self) -> Result<Option<DVec3>, VolumeError> {

@@ -9,6 +9,8 @@ mod labels;
 mod metaimage;
 #[cfg(feature = "nifti")]
 mod nifti;
+#[cfg(feature = "npy")]
+mod npy;
 mod nrrd;
 mod orientation;
 mod raw;
@@ -114,7 +116,7 @@ impl Volume {
     }
 
     /// Reads a volume file. Its format is told by its first bytes, or else by the extension: NRRD (`.nrrd`, `.nhdr`), and, each
-    /// with the feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`) and MetaImage (`.mha`, `.mhd`).
+    /// with the feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MetaImage (`.mha`, `.mhd`) and NPY (`.npy`).
     ///
     /// # Errors
     /// If the file cannot be read, is of no format that is compiled in, or does not hold what its header promises.

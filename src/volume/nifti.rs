@@ -48,7 +48,7 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
         stream = open(&data)?;
     }
     stream.skip(vox_offset)?;
-    let samples = Samples { kind, dims, big_endian: header.big_endian, rescale };
+    let samples = Samples { kind, dims, big_endian: header.big_endian, rescale, z_fastest: false };
     Ok(Loaded { dims, spacing: Some(spacing), orientation, values: stream.samples(&samples, false)? })
 }
 

@@ -163,7 +163,7 @@ impl Header {
             })?;
         let skips = self.0.get("line skip").or(self.0.get("byte skip")).is_some();
         let window = skips && self.0.get("data file").is_some();
-        let samples = Samples { kind, dims, big_endian, rescale: None };
+        let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
         Ok(Layout { samples, gzip, line_skip, byte_skip, window })
     }
 }

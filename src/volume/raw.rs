@@ -48,7 +48,7 @@ impl Volume {
         }
         let mut stream = Stream::raw(Source::open(path)?)?;
         stream.skip(offset)?;
-        let values = stream.samples(&Samples { kind, dims, big_endian, rescale: None }, false)?;
+        let values = stream.samples(&Samples { kind, dims, big_endian, rescale: None, z_fastest: false }, false)?;
         Self::new(&path.display().to_string(), dims, DVec3::ONE, values)
     }
 }

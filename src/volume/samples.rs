@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use flate2::bufread::MultiGzDecoder;
 #[cfg(feature = "metaimage")]
 use flate2::bufread::ZlibDecoder;
-use glam::{DVec3, UVec3};
+use glam::{DVec3, UVec3, Vec3Swizzles};
 
 use super::source::{CHUNK, Source, invalid, io_error};
 use super::{Grid, VolumeError};
@@ -28,7 +28,7 @@ pub(super) trait Sample: Copy {
 }
 
 /// What samples become.
-pub(super) trait Voxel: Sized {
+pub(super) trait Voxel: Copy {
     const ALLOWED: &'static str;
 
     /// `None` if the sample is not allowed.
@@ -111,7 +111,7 @@ fn append<S: Sample, T: Voxel>(samples: impl Iterator<Item = S>, into: &mut Vec<
     Ok(())
 }
 
-/// What a header says of the samples: as many as the grid has voxels, x fastest.
+/// What a header says of the samples: as many as the grid has voxels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Samples {
     pub(super) kind: SampleType,
@@ -119,6 +119,8 @@ pub(super) struct Samples {
     pub(super) big_endian: bool,
     /// Slope and intercept: a value is `sample · slope + intercept`.
     pub(super) rescale: Option<[f64; 2]>,
+    /// Whether z is fastest in the file, then y, then x, instead of x, then y, then z.
+    pub(super) z_fastest: bool,
 }
 
 impl Samples {
@@ -130,6 +132,22 @@ impl Samples {
     /// Readers have fitted the product in 32 bits: [`dims_of`].
     fn count(&self) -> u32 {
         self.dims.element_product()
+    }
+
+    /// The voxel that a sample is of, by its position in the file.
+    fn voxel_at(&self, index: usize) -> UVec3 {
+        let in_file = |dims| Grid { dims, spacing: DVec3::ONE }.voxel_at(index as u32);
+        if self.z_fastest { in_file(self.dims.zyx()).zyx() } else { in_file(self.dims) }
+    }
+
+    /// Samples in the order of the file, x fastest.
+    fn in_order<T: Copy>(&self, samples: Vec<T>) -> Vec<T> {
+        if !self.z_fastest {
+            return samples;
+        }
+        let [nx, ny, nz] = self.dims.to_array().map(|n| n as usize);
+        let rows = (0..nz).flat_map(|z| (0..ny).map(move |y| z + nz * y));
+        rows.flat_map(|first| (0..nx).map(move |x| first + nz * ny * x)).map(|at| samples[at]).collect()
     }
 
     fn mismatch(&self, path: &Path, held: impl Display) -> VolumeError {
@@ -202,7 +220,7 @@ impl Stream {
     }
 
     /// So many bytes of a header.
-    #[cfg(feature = "nifti")]
+    #[cfg(any(feature = "nifti", feature = "npy"))]
     pub(super) fn bytes(&mut self, bytes: u64) -> Result<Vec<u8>, VolumeError> {
         let mut header = Vec::new();
         let read = self.read_up_to(bytes, &mut header)?;
@@ -251,13 +269,13 @@ impl Stream {
             }
             values.try_reserve(chunk.len() / samples.kind.bytes() as usize).map_err(too_many)?;
             samples.kind.convert(samples, &chunk, &mut values).map_err(|sample| {
-                let voxel = Grid { dims: samples.dims, spacing: DVec3::ONE }.voxel_at(values.len() as u32);
+                let voxel = samples.voxel_at(values.len());
                 invalid(&path, "data", format!("{sample} at voxel {voxel}"), T::ALLOWED)
             })?;
             left -= read;
         }
         values.shrink_to_fit();
-        Ok(values)
+        Ok(samples.in_order(values))
     }
 
     /// Appends so many bytes, fewer at the end.

@@ -6,6 +6,7 @@
 mod dispatch;
 mod metaimage;
 mod nifti;
+mod npy;
 mod raw;
 
 use std::fs;
