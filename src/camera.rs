@@ -59,6 +59,12 @@ impl Camera {
         ViewBasis { u, v: u.cross(w), w }
     }
 
+    /// The camera turned about its `up` by an angle in degrees, by the right hand; `center` stays.
+    pub fn turned(self, degrees: f64) -> Self {
+        let rotation = DMat3::from_axis_angle(self.up.normalize(), degrees.to_radians());
+        Self { direction: rotation * self.direction, ..self }
+    }
+
     /// Size of a pixel in `unit`s (SPEC §2) for an image `height_world` world units and `height` pixels high.
     ///
     /// # Errors

@@ -1,9 +1,8 @@
-//! Errors of the renderer. Loading errors live with the volume and the scene.
+//! Errors of the renderer. Loading errors live with the volume and the scene, and all of them together with [`headless`](crate::headless).
 
-use crate::gpu::device::DeviceError;
-use crate::scene::SceneError;
-use crate::tile_bins::Unfit;
-use crate::volume::VolumeError;
+use wgpu::Device;
+
+use crate::fault::DeviceFault;
 
 /// Why a frame could not be prepared or read back.
 #[derive(Debug, thiserror::Error)]
@@ -31,38 +30,19 @@ pub enum RenderError {
         /// What the device allows.
         actual: u64,
     },
-    /// The device reported an error: out of memory, or a bug that its validation found.
-    #[error("device error: {0}")]
-    Device(String),
-    /// The GPU stopped working, or refused to hand the image back.
+    /// The device failed: it is lost, or out of memory, or found a mistake.
+    #[error(transparent)]
+    Device(#[from] DeviceFault),
+    /// What was drawn did not come back.
     #[error("read-back failed: {0}")]
     Readback(String),
 }
 
-impl From<Unfit> for RenderError {
-    fn from(Unfit { what, required, actual }: Unfit) -> Self {
-        Self::OutOfRange {
-            key: "splatting.rasterizer",
-            found: format!("\"tiles\" with {required} {what}"),
-            allowed: format!("at most {actual}, or \"quads\""),
-        }
+/// Checks that something is on the device that is to work with it: wgpu may panic if not.
+pub(crate) fn check_device(device: &Device, of: &Device, what: &str) -> Result<(), RenderError> {
+    if device == of {
+        return Ok(());
     }
-}
-
-/// Anything that can go wrong between a scene file and its image.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum Error {
-    /// The scene.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The volume.
-    #[error(transparent)]
-    Volume(#[from] VolumeError),
-    /// The device.
-    #[error(transparent)]
-    Device(#[from] DeviceError),
-    /// The frame.
-    #[error(transparent)]
-    Render(#[from] RenderError),
+    let (found, allowed) = (format!("another one than that of {what}"), format!("the device of {what}"));
+    Err(RenderError::OutOfRange { key: "device", found, allowed })
 }

@@ -5,6 +5,7 @@ use std::sync::{Arc, OnceLock};
 use wgpu::{Device, Queue, TextureView};
 
 use crate::error::RenderError;
+use crate::fault::scoped;
 use crate::gpu::volume_texture::VolumeTexture;
 use crate::value_list::ValueList;
 use crate::volume::Volume;
@@ -17,6 +18,7 @@ pub struct GpuVolume {
 
 #[derive(Debug)]
 struct Shared {
+    device: Device,
     volume: Arc<Volume>,
     values: VolumeTexture,
     /// Uploaded when tables first ask for labels.
@@ -28,11 +30,18 @@ impl GpuVolume {
     /// Uploads a volume's values: 4 bytes a voxel. Labels, 2 bytes a voxel, follow when a view first has tables for some.
     ///
     /// # Errors
-    /// If the volume needs more layers than the device's textures have.
+    /// If the volume needs more layers than the device's textures have, or the device fails.
     pub fn new(device: &Device, queue: &Queue, volume: impl Into<Arc<Volume>>) -> Result<Self, RenderError> {
         let volume = volume.into();
-        let values = VolumeTexture::upload(device, queue, volume.values())?;
-        Ok(Self { shared: Arc::new(Shared { volume, values, labels: OnceLock::new(), value_list: OnceLock::new() }) })
+        let values = scoped(device, || VolumeTexture::upload(device, queue, volume.values()))??;
+        let (device, labels, value_list) = (device.clone(), OnceLock::new(), OnceLock::new());
+        Ok(Self { shared: Arc::new(Shared { device, volume, values, labels, value_list }) })
+    }
+
+    /// What [`Self::gpu_bytes`] of a volume of so many voxels, at most 2³² - 1, will be: as long as no view shades by label, and after that.
+    pub fn estimate(voxels: u32) -> [u64; 2] {
+        let [values, labels] = VolumeTexture::estimate(voxels.into());
+        [values, values + labels]
     }
 
     /// The volume.
@@ -52,6 +61,11 @@ impl GpuVolume {
         textures.into_iter().flatten().map(|texture| texture.gpu_bytes).sum()
     }
 
+    /// The device that it is on.
+    pub(crate) fn device(&self) -> &Device {
+        &self.shared.device
+    }
+
     /// The values, `R32Float`.
     pub(crate) fn values(&self) -> &TextureView {
         &self.shared.values.view
@@ -65,10 +79,11 @@ impl GpuVolume {
     /// Uploads the labels, if there are any and they are not there yet.
     ///
     /// # Errors
-    /// If they need more layers than the device's textures have.
+    /// If they need more layers than the device's textures have, or the device fails.
     pub(crate) fn upload_labels(&self, device: &Device, queue: &Queue) -> Result<(), RenderError> {
         if let (None, Some(labels)) = (self.shared.labels.get(), self.shared.volume.labels()) {
-            let labels = VolumeTexture::upload_labels(device, queue, labels)?;
+            // Those that there was no memory for are not kept.
+            let labels = scoped(device, || VolumeTexture::upload_labels(device, queue, labels))??;
             // Another thread may have been first: its are the same.
             let _ = self.shared.labels.set(labels);
         }

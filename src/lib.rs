@@ -93,6 +93,7 @@ pub mod classify;
 pub mod clip;
 mod clip_from_world;
 pub mod error;
+pub mod fault;
 pub mod footprint;
 #[cfg(feature = "golden")]
 pub mod golden;

@@ -7,7 +7,7 @@ use crate::gpu::timer::Timer;
 use crate::rasterizer::quads::QuadFrame;
 use crate::rasterizer::samples::SampleFrame;
 use crate::rasterizer::tiles::TileFrame;
-use crate::stats::{GroupSlabs, Totals};
+use crate::stats::{GroupSlabs, Staging, Totals};
 use crate::view::View;
 
 /// A frame whose buffers are all allocated and filled: recording it cannot fail.
@@ -47,17 +47,6 @@ pub(crate) enum Drawing {
     Quads(Box<QuadFrame>),
     Tiles(Box<TileFrame>),
     Samples(Box<SampleFrame>),
-}
-
-/// A frame's counts: a [`Tally`](crate::gpu::layout::Tally), for every group the tiles it composited, `[u32]`, and timestamps from `timestamps` on.
-#[derive(Debug)]
-pub(crate) struct Staging {
-    pub(crate) buffer: Buffer,
-    pub(crate) timestamps: u64,
-    /// The stage of every pass that was timed.
-    pub(crate) stages: Vec<&'static str>,
-    /// Nanoseconds of a timestamp's tick.
-    pub(crate) period: f32,
 }
 
 impl PreparedFrame {

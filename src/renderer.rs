@@ -5,7 +5,8 @@ use std::sync::OnceLock;
 
 use wgpu::{BufferUsages, CommandEncoder, Device, Queue, RenderPass, TextureFormat, TextureView};
 
-use crate::error::RenderError;
+use crate::error::{RenderError, check_device};
+use crate::fault::scoped;
 use crate::gpu::device::{self, DeviceError, DeviceRequirements};
 use crate::gpu::layout::{Frame, Tally};
 use crate::gpu::targets::CompositingBuffer;
@@ -16,7 +17,7 @@ use crate::pass::composite::{CutBuffers, RayMode};
 use crate::pass::first_hit::FirstHit;
 use crate::pass::resolve::Resolve;
 use crate::placement::Placement;
-use crate::prepared_frame::{Drawing, FirstHits, PreparedFrame, Staging};
+use crate::prepared_frame::{Drawing, FirstHits, PreparedFrame};
 use crate::rasterizer::quads::QuadRasterizer;
 use crate::rasterizer::samples::SampleRasterizer;
 use crate::rasterizer::tiles::TileRasterizer;
@@ -24,11 +25,13 @@ use crate::rasterizer::{Given, filled};
 use crate::renderer_options::RendererOptions;
 use crate::scene_view::{Prepared, SceneView};
 use crate::splatting::{Compositing, Economies, FootprintBox, Method, Order, Rasterizer, Splatting};
+use crate::stats::Staging;
 use crate::view::View;
 
 /// The pipelines of every stage, for one device. Volumes and frames are separate and can be many.
 #[derive(Debug)]
 pub struct Renderer {
+    device: Device,
     sheet_format: TextureFormat,
     sheets: u32,
     rasterizer: Rasterizer,
@@ -49,13 +52,17 @@ impl Renderer {
     /// Compiles what every frame needs; a rasterizer's stages are compiled with the first frame that it draws.
     ///
     /// # Errors
-    /// If limits of the device are not enough, or it cannot do what the options ask for.
+    /// If limits of the device are not enough, or it cannot do what the options ask for, or fails.
     pub fn new(device: &Device, queue: &Queue, options: &RendererOptions) -> Result<Self, DeviceError> {
         DeviceRequirements::check(device)?;
         let sheet_format = device::sheet_format(device, options.sheet_format)?;
         let sheets = device::sheets_per_group(device, sheet_format, options.sheets_per_group)?;
         options.check_target(device)?;
+        let adapter = || device.adapter_info().name;
+        let resolve = scoped(device, || Resolve::new(device, options))
+            .map_err(|fault| DeviceError::Pipelines { adapter: adapter(), fault })?;
         Ok(Self {
+            device: device.clone(),
             sheet_format,
             sheets,
             rasterizer: options.rasterizer,
@@ -64,7 +71,7 @@ impl Renderer {
             quads: OnceLock::new(),
             samples: OnceLock::new(),
             tiles: TileRasterizer::default(),
-            resolve: Resolve::new(device, options),
+            resolve,
             first_hit: OnceLock::new(),
             no_surfaces: OnceLock::new(),
         })
@@ -79,8 +86,22 @@ impl Renderer {
     /// changed (§5.1), buffers if they are too small. A change of colours, opacities or light writes a few hundred bytes.
     ///
     /// # Errors
-    /// If the scene asks for something not implemented, or for more than the device's limits allow.
+    /// If the scene asks for something not implemented, or for more than the device's limits allow, or the device fails. What is found
+    /// before anything is allocated leaves the view's last frame. After anything else, and a failure of the device always, the view has no
+    /// frame, and is not drawn until it is prepared again: after
+    /// [`OutOfMemory`](crate::fault::DeviceFault::OutOfMemory) with less, after any other by a new renderer.
     pub fn prepare(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
+        check_device(device, &self.device, "the renderer")?;
+        check_device(device, view.volume.gpu_volume().device(), "the view")?;
+        scoped(device, || self.prepare_unscoped(device, queue, view)).unwrap_or_else(|fault| {
+            // What there was no memory for is not valid.
+            view.frame = None;
+            view.volume.lists.forget();
+            Err(fault.into())
+        })
+    }
+
+    fn prepare_unscoped(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
         let SceneView { volume, scene, surfaces, first_hit, frame } = view;
         let splatting = &self.settled(scene.splatting);
         let size = [scene.image.width, scene.image.height];
@@ -112,14 +133,14 @@ impl Renderer {
             });
         let Some(compositing) = compositing.or(old_compositing) else { unreachable!("made where there was none") };
         let ramps = Ramps::new(volume.transfer());
-        let filled = |old, label, bytes: &[u8], usage| filled(device, queue, old, label, bytes, usage);
+        let filled = |old, label: &'static str, bytes: &[u8], usage| filled(device, queue, old, label, bytes, usage);
         let points = bytemuck::cast_slice(&ramps.points);
-        let control_points = filled(control_points, "sheetsplat.control_points", points, BufferUsages::STORAGE);
+        let control_points = filled(control_points, "sheetsplat.control_points", points, BufferUsages::STORAGE)?;
         let frame_uniform = uniforms::frame(&seen, &kernel, volume.grid(), &ramps, scene);
         let bytes = bytemuck::bytes_of(&frame_uniform);
-        let uniform = filled(uniform, "sheetsplat.frame", bytes, BufferUsages::UNIFORM);
+        let uniform = filled(uniform, "sheetsplat.frame", bytes, BufferUsages::UNIFORM)?;
         let cut_uniform = uniforms::cut(&seen, &grid, &scene.clip, depths, *first_hit);
-        let cut = filled(cut, "sheetsplat.cut", bytemuck::bytes_of(&cut_uniform), BufferUsages::UNIFORM);
+        let cut = filled(cut, "sheetsplat.cut", bytemuck::bytes_of(&cut_uniform), BufferUsages::UNIFORM)?;
         let cut_buffers = CutBuffers {
             uniform: &cut,
             surfaces: match surfaces {
@@ -164,11 +185,13 @@ impl Renderer {
             usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
             mapped_at_creation: false,
         });
+        let timer_bytes = timer.as_ref().map_or(0, Timer::gpu_bytes);
         let pixels = u64::from(size[0]) * u64::from(size[1]);
         let hit_bytes = first_hits.as_ref().map_or(0, |_| 4 * pixels);
         let shared_bytes = compositing.gpu_bytes() + uniform.size() + control_points.size() + cut.size() + hit_bytes;
+        let count_bytes = staging.size() + timer_bytes;
         *frame = Some(PreparedFrame {
-            gpu_bytes: volume.gpu_bytes() + drawing.gpu_bytes() + shared_bytes,
+            gpu_bytes: volume.gpu_bytes() + drawing.gpu_bytes() + shared_bytes + count_bytes,
             sheets: (self.sheet_format, self.sheets),
             resolve_groups: compositing.bands.iter().map(|band| self.resolve.bind(device, &uniform, band)).collect(),
             view: seen,
@@ -211,7 +234,7 @@ impl Renderer {
                 Err(_) => {}
             }
         }
-        let (frame, prepared) = self.quads(given.device).prepare(given, old_quads);
+        let (frame, prepared) = self.quads(given.device).prepare(given, old_quads)?;
         Ok((Drawing::Quads(Box::new(frame)), prepared))
     }
 

@@ -5,10 +5,12 @@ use wgpu::{CommandEncoder, Device, Texture};
 use crate::camera::Camera;
 use crate::classified_volume::{ClassifiedVolume, Touched};
 use crate::clip::Clip;
-use crate::error::RenderError;
+use crate::error::{RenderError, check_device};
+use crate::fault::scoped;
 use crate::gpu_volume::GpuVolume;
 use crate::pick::PendingPick;
 use crate::prepared_frame::PreparedFrame;
+pub use crate::rasterizer::Prepared;
 use crate::scene::{ImageSettings, Scene};
 use crate::shading::{Light, Shading};
 use crate::splatting::Splatting;
@@ -27,22 +29,15 @@ pub struct SceneView {
     pub(crate) frame: Option<PreparedFrame>,
 }
 
-/// What [`Renderer::prepare`](crate::renderer::Renderer::prepare) had to do.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Prepared {
-    /// Whether bricks were sorted into buckets.
-    pub bucketed: bool,
-    /// Whether a footprint table was made: for another kernel, or by sections for another slab width (§3.3.1).
-    pub tabled: bool,
-}
-
 impl SceneView {
     /// Uploads the bricks of the voxels that take part under a scene's transfer function, to the volume's device. The scene's own
     /// volume is not looked at.
     ///
     /// # Errors
-    /// If the volume has no labels and the scene has tables for some, or if the scene's clip planes are none.
+    /// If the volume has no labels and the scene has tables for some, or if the scene's clip planes are none; if the volume is on
+    /// another device, or the device fails.
     pub fn new(device: &Device, volume: &GpuVolume, scene: &Scene) -> Result<Self, RenderError> {
+        check_device(device, volume.device(), "the volume")?;
         if !scene.transfer.labels.is_empty() && volume.volume().labels().is_none() {
             let (key, found) = ("transfer.label", "tables for a volume without labels".to_owned());
             return Err(RenderError::OutOfRange { key, found, allowed: "none, or labels in the volume".to_owned() });
@@ -50,7 +45,7 @@ impl SceneView {
         scene.clip.check()?;
         let transfer = scene.transfer.resolve(volume.volume());
         let clipped = scene.clip.voxels(volume.volume().grid(), scene.splatting.radius);
-        let volume = ClassifiedVolume::new(device, volume, transfer, clipped);
+        let volume = scoped(device, || ClassifiedVolume::new(device, volume, transfer, clipped))?;
         Ok(Self { volume, scene: scene.clone(), surfaces: None, first_hit: None, frame: None })
     }
 
@@ -152,9 +147,7 @@ impl SceneView {
 
     /// Turns the camera about its `up` by an angle in degrees, by the right hand.
     pub fn turn(&mut self, degrees: f64) {
-        let Camera { direction, up, .. } = self.scene.camera;
-        let rotation = glam::DMat3::from_axis_angle(up.normalize(), degrees.to_radians());
-        self.scene.camera.direction = rotation * direction;
+        self.scene.camera = self.scene.camera.turned(degrees);
     }
 
     /// How the prepared frame is drawn: `"quads"` or `"tiles"`.
@@ -163,7 +156,8 @@ impl SceneView {
     }
 
     /// Bytes of GPU memory that the view holds, with the volume's, which other views may share: without those it is that less
-    /// [`GpuVolume::gpu_bytes`].
+    /// [`GpuVolume::gpu_bytes`]. All of it is given back when view and volume are dropped and what was submitted is done. A buffer that
+    /// a frame needs no more than a part of is kept, at most 4 times as large as a new view's; textures always fit.
     pub fn gpu_bytes(&self) -> u64 {
         self.frame.as_ref().map_or(self.volume.gpu_bytes(), PreparedFrame::gpu_bytes)
     }

@@ -4,12 +4,11 @@ use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, channel};
 
 use serde::Serialize;
-use wgpu::BufferAsyncError;
+use wgpu::{Buffer, BufferAsyncError};
 
 use crate::error::RenderError;
 use crate::gpu::layout::Tally;
 use crate::gpu::timer::stage_ms;
-use crate::prepared_frame::Staging;
 
 /// Milliseconds by stage.
 pub type StageTimes = BTreeMap<&'static str, f64>;
@@ -109,6 +108,17 @@ impl Totals {
             ..self.counts
         }
     }
+}
+
+/// A frame's counts: a [`Tally`](crate::gpu::layout::Tally), for every group the tiles it composited, `[u32]`, and timestamps from `timestamps` on.
+#[derive(Debug)]
+pub(crate) struct Staging {
+    pub(crate) buffer: Buffer,
+    pub(crate) timestamps: u64,
+    /// The stage of every pass that was timed.
+    pub(crate) stages: Vec<&'static str>,
+    /// Nanoseconds of a timestamp's tick.
+    pub(crate) period: f32,
 }
 
 /// A frame's counts on their way from the GPU.

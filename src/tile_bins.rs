@@ -7,6 +7,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use crate::brick;
+use crate::error::RenderError;
 use crate::gpu::layout::Brick;
 use crate::splatting::Order;
 use crate::view::View;
@@ -110,6 +111,16 @@ pub struct Unfit {
     pub required: u64,
     /// How much there may be.
     pub actual: u64,
+}
+
+impl From<Unfit> for RenderError {
+    fn from(Unfit { what, required, actual }: Unfit) -> Self {
+        Self::OutOfRange {
+            key: "splatting.rasterizer",
+            found: format!("\"tiles\" with {required} {what}"),
+            allowed: format!("at most {actual}, or \"quads\""),
+        }
+    }
 }
 
 /// Where a brick's voxels are: bounds of their pixel coordinates, and the groups that their kernels may reach.

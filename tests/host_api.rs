@@ -35,7 +35,7 @@ const _: () = {
     is_send_and_sync::<Stats>();
     is_send_and_sync::<Headless>();
     is_send_and_sync::<Rendering>();
-    is_send_and_sync::<sheetsplat::error::Error>();
+    is_send_and_sync::<sheetsplat::headless::Error>();
     // It is asked by one.
     is_send::<PendingCounts>();
     is_send::<PendingPick>();

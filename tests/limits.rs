@@ -4,8 +4,9 @@
 #[expect(dead_code, reason = "not every file needs all of it")]
 mod common;
 
-use glam::DVec3;
+use glam::{DVec3, UVec3};
 use sheetsplat::brick::BrickList;
+use sheetsplat::camera::Projection;
 use sheetsplat::classify::classify;
 use sheetsplat::clip::ClippedVoxels;
 use sheetsplat::error::RenderError;
@@ -335,4 +336,58 @@ fn deterministic_options_leave_nothing_to_the_device() {
     assert_eq!(renderings[0].stats.counts, renderings[1].stats.counts);
     assert!(renderings[0].image == renderings[1].image);
     assert!(renderings[0].image != gpu().render_volume(volume, &scene).unwrap().image, "gpu() draws by tiles, in f32");
+}
+
+/// A bit per pixel of a tall image, where bindings hold a few rows of it.
+#[test]
+fn masks_larger_than_a_binding_are_an_error() {
+    let limits = Limits { max_storage_buffer_binding_size: 76 << 10, ..Limits::default() };
+    let gpu = open(Limits { max_texture_dimension_2d: 16384, ..limits }, Features::empty(), None).unwrap();
+    let (volume, mut scene) = head();
+    let mut view = gpu.view(volume, &scene).unwrap();
+    (scene.image.width, scene.image.height) = (150, 16384);
+    view.set_image(scene.image);
+    match gpu.draw(&mut view) {
+        Err(RenderError::Limit { what, limit, required, actual }) => {
+            assert_eq!((what, limit), ("sheetsplat.opaque", "max_storage_buffer_binding_size"));
+            // Five words hold a row.
+            assert_eq!((required, actual), (5 * 4 * 16384, 76 << 10));
+        }
+        other => panic!("{other:?}"),
+    }
+    (scene.image.width, scene.image.height) = (150, 110);
+    view.set_image(scene.image);
+    gpu.draw(&mut view).unwrap();
+}
+
+/// More values than WebGPU's default binding holds: some at the end take part, and are drawn as those of a volume of their own.
+#[test]
+fn a_volume_larger_than_a_binding_is_rendered_with_webgpus_default_limits() {
+    let gpu = open(Limits::default(), Features::empty(), None).unwrap();
+    let (small, shape) = (UVec3::splat(12), UVec3::new(330, 330, 320));
+    assert!(4 * shape.as_u64vec3().element_product() > gpu.device().limits().max_storage_buffer_binding_size);
+    let value = |p: UVec3| if (p - small / 2).element_product().is_multiple_of(3) { 50.0 } else { 150.0 + p.x as f32 };
+    let inside = |p: UVec3| if p.cmpge(small / 2).all() && p.cmplt(small).all() { value(p) } else { 0.0 };
+    let whole = |dims: UVec3| {
+        let mut values = vec![0.0; dims.element_product() as usize];
+        for voxel in 0..small.element_product() {
+            let p = UVec3::new(voxel % small.x, voxel / small.x % small.y, voxel / (small.x * small.y));
+            let at = dims - small + p;
+            values[(at.x + dims.x * (at.y + dims.y * at.z)) as usize] = inside(p);
+        }
+        Volume::new("balls", dims, DVec3::ONE, values).unwrap()
+    };
+    let (_, mut scene) = head();
+    scene.camera.projection = Projection::Orthographic { height: Some(14.0) };
+    let images = [small, shape].map(|dims| {
+        // The same voxels in the middle.
+        scene.camera.center = (dims - small).as_dvec3() / 2.0;
+        gpu.render_volume(whole(dims), &scene).unwrap()
+    });
+    let [alone, end] = &images;
+    assert_eq!(alone.stats.counts.voxels_in_range, end.stats.counts.voxels_in_range);
+    let (_, largest) = difference(&alone.image, &end.image);
+    // Slabs lie elsewhere.
+    assert!(largest < 0.05, "{largest}");
+    assert!(end.image.pixels.iter().any(|pixel| pixel[0] > 0.2), "something is to be seen");
 }

@@ -6,7 +6,8 @@ use std::path::Path;
 use wgpu::AdapterInfo;
 
 use super::file;
-use crate::headless::{Rendering, driver_name};
+use crate::headless::Rendering;
+use crate::headless::device::driver_name;
 use crate::image::{Image, ImageError};
 
 /// The adapter and driver that made an image.

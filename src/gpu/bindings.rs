@@ -7,6 +7,7 @@ use wgpu::{
 
 use super::layout::{FOLD, Indirect};
 use super::shaders::Shader;
+use crate::error::RenderError;
 
 /// What a shader declares at one binding.
 pub type Slot = (ShaderStages, BindingType);
@@ -48,13 +49,45 @@ pub fn texture_of_integers(stages: ShaderStages, view_dimension: TextureViewDime
     (stages, BindingType::Texture { sample_type, view_dimension, multisampled: false })
 }
 
-/// A buffer of at least `size` bytes: the previous one if it is large enough, and not much too large.
-pub fn grown(device: &Device, previous: Option<Buffer>, label: &str, size: u64, usage: BufferUsages) -> Buffer {
+/// A buffer of at least `size` bytes: the previous one if it is large enough, and at most 4 times too large.
+///
+/// # Errors
+/// If the device's buffers, or its bindings to them, may not be that large.
+pub fn grown(
+    device: &Device,
+    previous: Option<Buffer>,
+    label: &'static str,
+    size: u64,
+    usage: BufferUsages,
+) -> Result<Buffer, RenderError> {
+    let limits = device.limits();
+    let (limit, actual) = match usage.contains(BufferUsages::STORAGE) {
+        true if limits.max_storage_buffer_binding_size < limits.max_buffer_size => {
+            ("max_storage_buffer_binding_size", limits.max_storage_buffer_binding_size)
+        }
+        _ => ("max_buffer_size", limits.max_buffer_size),
+    };
+    if size > actual {
+        return Err(RenderError::Limit { what: label, limit, required: size, actual });
+    }
     let fits = |buffer: &Buffer| (size..=4 * size).contains(&buffer.size()) && buffer.usage().contains(usage);
-    previous.filter(fits).unwrap_or_else(|| {
+    Ok(previous.filter(fits).unwrap_or_else(|| {
         let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
         device.create_buffer(&descriptor)
-    })
+    }))
+}
+
+/// A new buffer of `size` bytes that starts with these, of which there is one at least. Where the device gives none, its error scope says
+/// why, and nothing is written.
+pub fn uploaded(device: &Device, label: &str, bytes: &[u8], size: u64, usage: BufferUsages) -> Buffer {
+    let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: true };
+    let buffer = device.create_buffer(&descriptor);
+    if let Ok(mut mapped) = buffer.get_mapped_range_mut(..bytes.len() as u64) {
+        mapped.copy_from_slice(bytes);
+        drop(mapped);
+        buffer.unmap();
+    }
+    buffer
 }
 
 /// The layout of group 0 with the given bindings in order, and the pipeline layout of that group alone.

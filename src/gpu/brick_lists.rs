@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
-use wgpu::{Buffer, BufferDescriptor, BufferUsages, Device, Queue};
+use wgpu::{Buffer, BufferUsages, Device, Queue};
 
+use super::bindings::uploaded;
 use super::layout::{Brick, BrickState, Splat, Visit};
 use crate::brick::{self, BRICK_VOXELS, BrickList};
 use crate::volume::Grid;
@@ -87,6 +88,11 @@ impl BrickLists {
         self.state != State::Full
     }
 
+    /// Uploads all of them again with the next [`Self::flush`]: the device's may be lost.
+    pub fn forget(&mut self) {
+        self.state = State::Full;
+    }
+
     /// Brings the GPU up to date.
     pub fn flush(&mut self, device: &Device, queue: &Queue) {
         match self.state {
@@ -120,17 +126,10 @@ impl BrickLists {
 
 impl BrickBuffer {
     fn upload(device: &Device, range: Range<usize>, capacity: usize, bricks: &BrickList) -> Self {
-        let buffer = device.create_buffer(&BufferDescriptor {
-            label: Some("sheetsplat.bricks"),
-            size: (capacity * size_of::<Brick>()) as u64,
-            usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
-            mapped_at_creation: true,
-        });
-        let bytes: &[u8] = bytemuck::cast_slice(&bricks.bricks()[range.clone()]);
-        if let Ok(mut mapped) = buffer.get_mapped_range_mut(..bytes.len() as u64) {
-            mapped.copy_from_slice(bytes);
-        }
-        buffer.unmap();
+        let bytes = bytemuck::cast_slice(&bricks.bricks()[range.clone()]);
+        let size = (capacity * size_of::<Brick>()) as u64;
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
+        let buffer = uploaded(device, "sheetsplat.bricks", bytes, size, usage);
         Self { range, buffer }
     }
 

@@ -6,6 +6,7 @@ use wgpu::{Adapter, Device, DeviceDescriptor, Features, Limits, TextureFormat};
 
 use super::layout::FOLD;
 use super::volume_texture;
+use crate::fault::DeviceFault;
 
 /// Why no device could be used.
 #[derive(Debug, thiserror::Error)]
@@ -28,12 +29,12 @@ pub enum DeviceError {
         source: wgpu::RequestDeviceError,
     },
     /// The device could not compile the renderer.
-    #[error("adapter \"{adapter}\" cannot run the renderer: {error}")]
+    #[error("adapter \"{adapter}\" cannot run the renderer: {fault}")]
     Pipelines {
         /// The adapter's name.
         adapter: String,
-        /// What wgpu said.
-        error: String,
+        /// What the device reported.
+        fault: DeviceFault,
     },
     /// A feature is missing that the options ask for.
     #[error("device feature: required {required:?}, actual: {actual:?}")]
@@ -102,7 +103,7 @@ impl DeviceRequirements {
             max_texture_dimension_2d: volume_texture::SIDE,
             max_texture_array_layers: 128,
             max_storage_buffers_per_shader_stage: 8,
-            max_uniform_buffers_per_shader_stage: 3,
+            max_uniform_buffers_per_shader_stage: 4,
             max_dynamic_uniform_buffers_per_pipeline_layout: 1,
             max_color_attachments: 1,
             max_color_attachment_bytes_per_sample: 16,
@@ -144,11 +145,17 @@ impl DeviceRequirements {
     /// # Errors
     /// [`DeviceError::Limits`] with every limit that is not enough, what is required, and what the device has.
     pub fn check(device: &Device) -> Result<(), DeviceError> {
+        let insufficient = Self::insufficient(&device.limits());
+        if insufficient.is_empty() { Ok(()) } else { Err(DeviceError::Limits(insufficient)) }
+    }
+
+    /// Every limit that is less than [`Self::LEAST`] asks for.
+    pub fn insufficient(limits: &Limits) -> Vec<InsufficientLimit> {
         let mut insufficient = Vec::new();
-        Self::LEAST.limits.check_limits_with_fail_fn(&device.limits(), false, |limit, required, actual| {
+        Self::LEAST.limits.check_limits_with_fail_fn(limits, false, |limit, required, actual| {
             insufficient.push(InsufficientLimit { limit, required, actual });
         });
-        if insufficient.is_empty() { Ok(()) } else { Err(DeviceError::Limits(insufficient)) }
+        insufficient
     }
 }
 

@@ -1,11 +1,11 @@
 //! What depends on the image's size alone: compositing buffer, sheet buffers, opacity and occlusion buffers.
 
-use wgpu::util::DeviceExt;
 use wgpu::{
     Buffer, BufferUsages, Device, Texture, TextureFormat, TextureUsages, TextureView, TextureViewDescriptor,
     TextureViewDimension,
 };
 
+use super::bindings::{grown, uploaded};
 use super::layout::Band;
 use crate::error::RenderError;
 use crate::plan::{TILE, tile_grid};
@@ -83,38 +83,39 @@ impl CompositingBuffer {
 
 impl Targets {
     /// Targets for groups of `sheets` sheets. A compositing buffer of that size must have been possible.
-    pub fn new(device: &Device, size: [u32; 2], sheet_format: TextureFormat, sheets: u32) -> Self {
+    ///
+    /// # Errors
+    /// If a bit per pixel is more than a binding.
+    pub fn new(device: &Device, size: [u32; 2], sheet_format: TextureFormat, sheets: u32) -> Result<Self, RenderError> {
         let [width, height] = size;
-        let sheets = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("sheetsplat.sheets"),
-            size: wgpu::Extent3d { width, height, depth_or_array_layers: sheets },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: sheet_format,
-            usage: TextureUsages::RENDER_ATTACHMENT
-                | TextureUsages::TEXTURE_BINDING
-                | TextureUsages::COPY_SRC
-                | TextureUsages::COPY_DST,
-            view_formats: &[],
-        });
-        let mask = |label, words: u32| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size: u64::from(words) * 4,
-                usage: BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC,
-                mapped_at_creation: false,
+        let sheet_buffers = || {
+            device.create_texture(&wgpu::TextureDescriptor {
+                label: Some("sheetsplat.sheets"),
+                size: wgpu::Extent3d { width, height, depth_or_array_layers: sheets },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: sheet_format,
+                usage: TextureUsages::RENDER_ATTACHMENT
+                    | TextureUsages::TEXTURE_BINDING
+                    | TextureUsages::COPY_SRC
+                    | TextureUsages::COPY_DST,
+                view_formats: &[],
             })
         };
+        let mask = |label, words: u32| {
+            let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
+            grown(device, None, label, u64::from(words) * 4, usage)
+        };
         let [columns, rows] = tile_grid(size);
-        Self {
+        Ok(Self {
             size,
-            sheets,
-            opaque: mask("sheetsplat.opaque", columns * height),
-            opaque_columns: mask("sheetsplat.opaque_columns", columns * height),
-            occluded: mask("sheetsplat.occluded", columns * height),
-            opaque_tiles: mask("sheetsplat.opaque_tiles", columns * rows),
-        }
+            opaque: mask("sheetsplat.opaque", columns * height)?,
+            opaque_columns: mask("sheetsplat.opaque_columns", columns * height)?,
+            occluded: mask("sheetsplat.occluded", columns * height)?,
+            opaque_tiles: mask("sheetsplat.opaque_tiles", columns * rows)?,
+            sheets: sheet_buffers(),
+        })
     }
 
     /// All sheet buffers, for compositing.
@@ -151,11 +152,13 @@ impl BandBuffer {
         let band = Band { first_row, rows };
         Self {
             band,
-            uniform: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("sheetsplat.band"),
-                contents: bytemuck::bytes_of(&band),
-                usage: BufferUsages::UNIFORM,
-            }),
+            uniform: uploaded(
+                device,
+                "sheetsplat.band",
+                bytemuck::bytes_of(&band),
+                size_of::<Band>() as u64,
+                BufferUsages::UNIFORM,
+            ),
             acc: device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("sheetsplat.acc"),
                 size: u64::from(width) * u64::from(rows) * ACC_BYTES,

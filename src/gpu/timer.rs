@@ -47,6 +47,11 @@ impl Timer {
         })
     }
 
+    /// Bytes of GPU memory, without those of the queries, which drivers do not tell.
+    pub fn gpu_bytes(&self) -> u64 {
+        self.results.size()
+    }
+
     /// Starts a frame anew.
     pub fn restart(&mut self) {
         self.stages.clear();

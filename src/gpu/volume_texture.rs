@@ -37,6 +37,11 @@ impl VolumeTexture {
         Self::fold(device, queue, what, TextureFormat::R16Uint, labels)
     }
 
+    /// Bytes of GPU memory that the values of so many voxels will take, and their labels.
+    pub fn estimate(voxels: u64) -> [u64; 2] {
+        [TextureFormat::R32Float, TextureFormat::R16Uint].map(|format| bytes(format, folded(voxels)))
+    }
+
     /// A texture of one label, for stages of volumes that have none.
     pub fn no_labels(device: &Device) -> Self {
         Self::new(device, "sheetsplat.no_labels", TextureFormat::R16Uint, [1; 3]).1
@@ -63,8 +68,7 @@ impl VolumeTexture {
             dimension: Some(wgpu::TextureViewDimension::D2Array),
             ..wgpu::TextureViewDescriptor::default()
         });
-        let texels = [width, height, layers].map(u64::from).iter().product::<u64>();
-        (texture, Self { view, gpu_bytes: u64::from(format.block_copy_size(None).unwrap_or(0)) * texels })
+        (texture, Self { view, gpu_bytes: bytes(format, [width, height, layers]) })
     }
 
     fn fold<T: bytemuck::NoUninit>(
@@ -74,14 +78,13 @@ impl VolumeTexture {
         format: TextureFormat,
         values: &[T],
     ) -> Result<Self, RenderError> {
-        let rows = (values.len() as u64).div_ceil(SIDE.into()) as u32;
-        let (height, layers) = (rows.min(SIDE), rows.div_ceil(SIDE));
+        let size @ [_, _, layers] = folded(values.len() as u64);
         let actual = device.limits().max_texture_array_layers;
         if layers > actual {
             let limit = "max_texture_array_layers";
             return Err(RenderError::Limit { what, limit, required: layers.into(), actual: actual.into() });
         }
-        let (texture, uploaded) = Self::new(device, label, format, [SIDE, height, layers]);
+        let (texture, uploaded) = Self::new(device, label, format, size);
         let write = |values: &[T], width: u32, row: u32| {
             let origin = wgpu::Origin3d { x: 0, y: row % SIDE, z: row / SIDE };
             let height = values.len() as u32 / width;
@@ -107,4 +110,14 @@ impl VolumeTexture {
         }
         Ok(uploaded)
     }
+}
+
+/// Width, height and layers for one number per voxel.
+fn folded(voxels: u64) -> [u32; 3] {
+    let rows = voxels.div_ceil(SIDE.into()) as u32;
+    [SIDE, rows.min(SIDE), rows.div_ceil(SIDE)]
+}
+
+fn bytes(format: TextureFormat, size: [u32; 3]) -> u64 {
+    u64::from(format.block_copy_size(None).unwrap_or(0)) * size.map(u64::from).iter().product::<u64>()
 }

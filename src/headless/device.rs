@@ -1,6 +1,8 @@
 //! How a program without a host opens its device: what the command line and a window of its own share.
 
-use wgpu::{Adapter, Backends, Device, DeviceType, ErrorFilter, InstanceDescriptor, InstanceFlags};
+use std::sync::OnceLock;
+
+use wgpu::{Adapter, AdapterInfo, Backends, DeviceType, Instance, InstanceDescriptor, InstanceFlags};
 
 use crate::gpu::device::DeviceError;
 
@@ -11,6 +13,19 @@ pub fn instance_descriptor() -> InstanceDescriptor {
     descriptor.flags -= InstanceFlags::VALIDATION_INDIRECT_CALL;
     descriptor.backends &= Backends::PRIMARY;
     descriptor
+}
+
+/// The adapters of [`instance_descriptor`]'s instance.
+pub fn adapters() -> Vec<Adapter> {
+    // One for all, as only within an instance devices can be told from one another.
+    static INSTANCE: OnceLock<Instance> = OnceLock::new();
+    let instance = INSTANCE.get_or_init(|| Instance::new(instance_descriptor()));
+    pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY))
+}
+
+/// An adapter's driver, and its version where it tells.
+pub fn driver_name(info: &AdapterInfo) -> String {
+    format!("{} {}", info.driver, info.driver_info).trim().to_owned()
 }
 
 /// The adapter with `name` in its name, in any case, or the most capable one: a GPU before a software driver.
@@ -33,14 +48,4 @@ pub fn choose_adapter(adapters: &[Adapter], name: Option<&str>) -> Result<Adapte
         required: name.map_or("any Vulkan, Metal or DirectX 12 adapter".to_owned(), |name| format!("\"{name}\"")),
         actual: if names.is_empty() { "none".to_owned() } else { names.join(", ") },
     })
-}
-
-/// The result of `work`, and the first error that the device reported meanwhile, if any.
-pub fn scoped<T>(device: &Device, work: impl FnOnce() -> T) -> (T, Option<String>) {
-    let scopes = [ErrorFilter::Validation, ErrorFilter::OutOfMemory, ErrorFilter::Internal]
-        .map(|filter| device.push_error_scope(filter));
-    let result = work();
-    // Scopes are a stack: the last pushed is the first popped. All must be popped even after an error.
-    let errors: Vec<_> = scopes.into_iter().rev().filter_map(|scope| pollster::block_on(scope.pop())).collect();
-    (result, errors.first().map(ToString::to_string))
 }

@@ -1,15 +1,19 @@
 //! Rendering without a host: an own device, and images in memory. The only part that creates devices, submits and waits.
 
 pub mod device;
+mod error;
 pub mod readback;
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Instant;
 
-use wgpu::{Adapter, AdapterInfo, Backends, Device, Instance, Queue, TextureFormat};
+use wgpu::{Adapter, Device, Queue, TextureFormat};
 
-use self::device::scoped;
-use crate::error::{Error, RenderError};
+use self::device::driver_name;
+pub use self::error::Error;
+use crate::error::RenderError;
+use crate::fault::{DeviceFault, scoped};
 use crate::gpu::device::{DeviceError, DeviceRequirements};
 use crate::gpu_volume::GpuVolume;
 use crate::image::Image;
@@ -101,10 +105,7 @@ impl Headless {
             blend: Blend::Replace,
             ..RendererOptions::for_target(FORMAT)
         };
-        let renderer = match scoped(&device, || Renderer::new(&device, &queue, &renderer_options)) {
-            (renderer, None) => renderer?,
-            (_, Some(error)) => return Err(DeviceError::Pipelines { adapter: adapter.get_info().name, error }),
-        };
+        let renderer = Renderer::new(&device, &queue, &renderer_options)?;
         Ok(Self { adapter, device, queue, renderer })
     }
 
@@ -154,7 +155,7 @@ impl Headless {
     /// # Errors
     /// If the volume is larger than the device's textures, or the device fails.
     pub fn view(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<SceneView, RenderError> {
-        self.scoped(|| SceneView::new(&self.device, &GpuVolume::new(&self.device, &self.queue, volume)?, scene))
+        SceneView::new(&self.device, &GpuVolume::new(&self.device, &self.queue, volume)?, scene)
     }
 
     /// Draws one frame of a view and reads it back.
@@ -162,7 +163,7 @@ impl Headless {
     /// # Errors
     /// If the scene asks for what the device or the renderer cannot do, or the device fails.
     pub fn draw(&self, view: &mut SceneView) -> Result<Rendering, RenderError> {
-        self.scoped(|| self.draw_unscoped(view))
+        scoped(&self.device, || self.draw_unscoped(view))?
     }
 
     /// What the last drawn frame of a view shows first at a pixel, counted from the upper left; `None` where the opacity of
@@ -171,7 +172,7 @@ impl Headless {
     /// # Errors
     /// If the frame has no first hits, the pixel is off the image, or the device fails.
     pub fn pick(&self, view: &SceneView, pixel: [u32; 2]) -> Result<Option<Pick>, RenderError> {
-        self.scoped(|| {
+        scoped(&self.device, || {
             let descriptor = wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.pick") };
             let mut encoder = self.device.create_command_encoder(&descriptor);
             let Some(mut pending) = view.pick(&self.device, &mut encoder, pixel) else {
@@ -182,19 +183,10 @@ impl Headless {
             self.queue.submit([encoder.finish()]);
             // Asks for it, and then it is there.
             let early = pending.try_get();
-            let failed = |error: wgpu::PollError| RenderError::Readback(error.to_string());
-            self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(failed)?;
+            wait(&self.device)?;
             let missing = || Err(RenderError::Readback("the pick did not arrive".to_owned()));
             early.or_else(|| pending.try_get()).unwrap_or_else(missing)
-        })
-    }
-
-    /// What the device reports while `work` runs becomes an error.
-    fn scoped<T>(&self, work: impl FnOnce() -> Result<T, RenderError>) -> Result<T, RenderError> {
-        match scoped(&self.device, work) {
-            (result, None) => result,
-            (_, Some(error)) => Err(RenderError::Device(error)),
-        }
+        })?
     }
 
     fn draw_unscoped(&self, scene_view: &mut SceneView) -> Result<Rendering, RenderError> {
@@ -251,20 +243,26 @@ impl Headless {
 impl Drop for Headless {
     fn drop(&mut self) {
         // A software driver's threads must not outlive the process's memory.
-        let _ = self.device.poll(wgpu::PollType::wait_indefinitely());
+        let _ = wait(&self.device);
     }
 }
 
-/// The adapter with `name` in its name, or the most capable one.
-fn choose_adapter(name: Option<&str>) -> Result<Adapter, DeviceError> {
-    let instance = Instance::new(device::instance_descriptor());
-    let adapters = pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY));
-    device::choose_adapter(&adapters, name)
+/// Waits for all that was submitted.
+///
+/// # Errors
+/// If the device is lost.
+fn wait(device: &Device) -> Result<(), RenderError> {
+    // wgpu panics where the driver loses the device meanwhile.
+    match catch_unwind(AssertUnwindSafe(|| device.poll(wgpu::PollType::wait_indefinitely()))) {
+        Ok(Ok(_)) => Ok(()),
+        Ok(Err(error)) => Err(RenderError::Readback(error.to_string())),
+        Err(_) => Err(DeviceFault::Lost.into()),
+    }
 }
 
-/// An adapter's driver, and its version where it tells.
-pub(crate) fn driver_name(info: &AdapterInfo) -> String {
-    format!("{} {}", info.driver, info.driver_info).trim().to_owned()
+/// The adapter with `name` in its name, or the most capable one: a GPU before a software driver.
+fn choose_adapter(name: Option<&str>) -> Result<Adapter, DeviceError> {
+    device::choose_adapter(&device::adapters(), name)
 }
 
 fn milliseconds_since(start: Instant) -> f64 {

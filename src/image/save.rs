@@ -69,7 +69,7 @@ impl Image {
     }
 
     /// Every pixel with straight alpha, its channels rounded to steps of 1/`full`; black where nothing is to be seen.
-    pub(crate) fn straight_channels(&self, full: u16) -> impl Iterator<Item = [u16; 4]> {
+    pub fn straight_channels(&self, full: u16) -> impl Iterator<Item = [u16; 4]> {
         let full = f32::from(full);
         self.pixels.iter().map(move |&[r, g, b, a]| {
             let scale = if a > 0.0 { a.recip() } else { 0.0 };

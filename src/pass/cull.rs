@@ -4,6 +4,7 @@
 use wgpu::{BindGroup, Buffer, BufferUsages, ComputePass, Device, ShaderStages, TextureView};
 
 use crate::brick::BRICK_VOXELS;
+use crate::error::RenderError;
 use crate::gpu::bindings::{ComputeStage, at_offset, grown, storage, uniform};
 use crate::gpu::brick_lists::BrickBuffer;
 use crate::gpu::layout::{Brick, BrickState, Culled, Frame, Group, Indirect, Splat, Visit};
@@ -102,6 +103,9 @@ impl Cull {
 
     /// Allocates a list's buffers, or takes those of the `previous` frame. `order` is the list's bricks by first group; no group looks at more than `most_bricks` of
     /// them, with at most `most_voxels` voxels.
+    ///
+    /// # Errors
+    /// If the device's buffers may not be that large.
     pub fn prepare(
         &self,
         device: &Device,
@@ -110,7 +114,7 @@ impl Cull {
         order: &Buffer,
         (most_bricks, most_voxels): (u32, u32),
         previous: Option<CullList>,
-    ) -> CullList {
+    ) -> Result<CullList, RenderError> {
         let buffer = |previous: Option<Buffer>, label, count: usize, record: usize, usage| {
             let usage = BufferUsages::STORAGE | usage;
             grown(device, previous, label, (count.max(1) * record) as u64, usage)
@@ -120,14 +124,14 @@ impl Cull {
         let places = bricks * BRICK_VOXELS as usize;
         let old = previous.map(CullList::buffers).unwrap_or_default();
         let [states, splats, instances, draw_args, visits, visit_args, fresh, fresh_args] = old;
-        let states = buffer(states, "sheetsplat.states", bricks, size_of::<BrickState>(), BufferUsages::COPY_DST);
-        let splats = buffer(splats, "sheetsplat.splats", places, size_of::<Splat>(), BufferUsages::COPY_SRC);
-        let instances = buffer(instances, "sheetsplat.instances", most_voxels as usize, size_of::<u32>(), none);
-        let draw_args = buffer(draw_args, "sheetsplat.draw_args", 1, size_of::<Indirect>(), indirect);
-        let visits = buffer(visits, "sheetsplat.visits", most_bricks as usize, size_of::<Visit>(), none);
-        let visit_args = buffer(visit_args, "sheetsplat.visit_args", 1, size_of::<Indirect>(), indirect);
-        let fresh = buffer(fresh, "sheetsplat.fresh", most_voxels as usize, size_of::<u32>(), none);
-        let fresh_args = buffer(fresh_args, "sheetsplat.fresh_args", 1, size_of::<Indirect>(), indirect);
+        let states = buffer(states, "sheetsplat.states", bricks, size_of::<BrickState>(), BufferUsages::COPY_DST)?;
+        let splats = buffer(splats, "sheetsplat.splats", places, size_of::<Splat>(), BufferUsages::COPY_SRC)?;
+        let instances = buffer(instances, "sheetsplat.instances", most_voxels as usize, size_of::<u32>(), none)?;
+        let draw_args = buffer(draw_args, "sheetsplat.draw_args", 1, size_of::<Indirect>(), indirect)?;
+        let visits = buffer(visits, "sheetsplat.visits", most_bricks as usize, size_of::<Visit>(), none)?;
+        let visit_args = buffer(visit_args, "sheetsplat.visit_args", 1, size_of::<Indirect>(), indirect)?;
+        let fresh = buffer(fresh, "sheetsplat.fresh", most_voxels as usize, size_of::<u32>(), none)?;
+        let fresh_args = buffer(fresh_args, "sheetsplat.fresh_args", 1, size_of::<Indirect>(), indirect)?;
 
         let CullBuffers { frame, groups, occluded, culled, .. } = shared;
         let (frame, group) = (frame.as_entire_binding(), at_offset::<Group>(groups));
@@ -170,7 +174,19 @@ impl Cull {
         );
         let groups =
             [self.bricks.bind(device, &bricks), self.voxels.bind(device, &voxels), self.compact.bind(device, &compact)];
-        CullList { states, splats, instances, draw_args, visits, visit_args, fresh, fresh_args, groups, shade_group }
+        let list = CullList {
+            states,
+            splats,
+            instances,
+            draw_args,
+            visits,
+            visit_args,
+            fresh,
+            fresh_args,
+            groups,
+            shade_group,
+        };
+        Ok(list)
     }
 
     /// Decides what the group at `offset` draws of a list.

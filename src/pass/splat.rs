@@ -3,14 +3,13 @@
 
 use std::sync::OnceLock;
 
-use wgpu::util::DeviceExt;
 use wgpu::{
     BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, PipelineLayout, RenderPassTimestampWrites,
     RenderPipeline, ShaderStages, TextureFormat, TextureView, TextureViewDimension,
 };
 
 use crate::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
-use crate::gpu::bindings::{Slot, at_offset, bind, layout, storage, texture, uniform};
+use crate::gpu::bindings::{Slot, at_offset, bind, layout, storage, texture, uniform, uploaded};
 use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::layout::{Frame, Group, Indirect, QUADS, Splat as SplatRecord, TileList};
 use crate::gpu::shaders::{self, Shader};
@@ -190,11 +189,8 @@ pub(super) fn added_to(there: wgpu::BlendFactor) -> wgpu::BlendState {
 /// The vertices 4q to 4q + 3 of quad q as two triangles, for an instance's quads.
 pub(super) fn quad_indices(device: &Device) -> Buffer {
     let indices: Vec<u16> = (0..QUADS).flat_map(|quad| [0, 1, 2, 2, 1, 3].map(|corner| 4 * quad + corner)).collect();
-    device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some("sheetsplat.quad_indices"),
-        contents: bytemuck::cast_slice(&indices),
-        usage: wgpu::BufferUsages::INDEX,
-    })
+    let bytes: &[u8] = bytemuck::cast_slice(&indices);
+    uploaded(device, "sheetsplat.quad_indices", bytes, bytes.len() as u64, wgpu::BufferUsages::INDEX)
 }
 
 /// A pipeline that draws quads into all sheets of a group.

@@ -2,6 +2,7 @@
 
 use wgpu::{BindGroup, Buffer, BufferUsages, ComputePass, Device, ShaderStages};
 
+use crate::error::RenderError;
 use crate::gpu::bindings::{ComputeStage, at_offset, grown, storage, uniform};
 use crate::gpu::layout::{Culled, Frame, Group, TileList};
 use crate::gpu::shaders;
@@ -42,6 +43,9 @@ impl Tiles {
     }
 
     /// Allocates the lists for a frame of `group_count` groups, or takes those of the `previous` frame.
+    ///
+    /// # Errors
+    /// If the device's buffers may not be that large.
     pub fn prepare(
         &self,
         device: &Device,
@@ -49,15 +53,15 @@ impl Tiles {
         targets: &Targets,
         group_count: usize,
         previous: Option<TileLists>,
-    ) -> TileLists {
+    ) -> Result<TileLists, RenderError> {
         let buffer = |previous, label, size, usage| grown(device, previous, label, size, BufferUsages::STORAGE | usage);
         let [old_composited, old_occluding, old_counts] =
             previous.map_or([None, None, None], |old| [old.composited, old.occluding, old.counts].map(Some));
         let list_bytes = size_of::<TileList>() as u64 + targets.opaque_tiles.size();
-        let composited = buffer(old_composited, "sheetsplat.composited_tiles", list_bytes, BufferUsages::INDIRECT);
-        let occluding = buffer(old_occluding, "sheetsplat.occluding_tiles", list_bytes, BufferUsages::INDIRECT);
+        let composited = buffer(old_composited, "sheetsplat.composited_tiles", list_bytes, BufferUsages::INDIRECT)?;
+        let occluding = buffer(old_occluding, "sheetsplat.occluding_tiles", list_bytes, BufferUsages::INDIRECT)?;
         let counts =
-            buffer(old_counts, "sheetsplat.tile_counts", group_count.max(1) as u64 * 4, BufferUsages::COPY_SRC);
+            buffer(old_counts, "sheetsplat.tile_counts", group_count.max(1) as u64 * 4, BufferUsages::COPY_SRC)?;
         let resources = [
             frame.as_entire_binding(),
             at_offset::<Group>(groups),
@@ -68,7 +72,7 @@ impl Tiles {
             counts.as_entire_binding(),
         ];
         let group = self.stage.bind(device, &resources);
-        TileLists { composited, occluding, counts, group }
+        Ok(TileLists { composited, occluding, counts, group })
     }
 
     /// Lists the tiles of the group at `offset`.

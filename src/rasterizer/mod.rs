@@ -8,6 +8,7 @@ pub(crate) mod tiles;
 use wgpu::{Buffer, BufferUsages, ComputePassDescriptor, Device, Queue};
 
 use crate::classified_volume::ClassifiedVolume;
+use crate::error::RenderError;
 use crate::footprint::FootprintTable;
 use crate::gpu::bindings::grown;
 use crate::gpu::footprint_texture::FootprintTexture;
@@ -17,6 +18,15 @@ use crate::kernel::Kernel;
 use crate::pass::composite::{CutBuffers, RayMode};
 use crate::splatting::{FootprintForm, Splatting};
 use crate::view::View;
+
+/// What [`Renderer::prepare`](crate::renderer::Renderer::prepare) had to do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Prepared {
+    /// Whether bricks were sorted into buckets.
+    pub bucketed: bool,
+    /// Whether a footprint table was made: for another kernel, or by sections for another slab width (§3.3.1).
+    pub tabled: bool,
+}
 
 /// What a rasterizer prepares a frame from.
 #[derive(Clone, Copy)]
@@ -41,8 +51,14 @@ pub(crate) struct Given<'a> {
 }
 
 impl Given<'_> {
-    /// A buffer with these contents, the old one if it has the right size.
-    fn filled(&self, old: Option<Buffer>, label: &str, bytes: &[u8], usage: BufferUsages) -> Buffer {
+    /// See [`filled`].
+    fn filled(
+        &self,
+        old: Option<Buffer>,
+        label: &'static str,
+        bytes: &[u8],
+        usage: BufferUsages,
+    ) -> Result<Buffer, RenderError> {
         filled(self.device, self.queue, old, label, bytes, usage)
     }
 }
@@ -72,18 +88,21 @@ impl Footprints {
 }
 
 /// A buffer with these contents, the old one if it has the right size.
+///
+/// # Errors
+/// If the device's buffers may not be that large.
 pub(crate) fn filled(
     device: &Device,
     queue: &Queue,
     old: Option<Buffer>,
-    label: &str,
+    label: &'static str,
     bytes: &[u8],
     usage: BufferUsages,
-) -> Buffer {
+) -> Result<Buffer, RenderError> {
     // Of one element at least: bindings may not be empty.
-    let buffer = grown(device, old, label, (bytes.len() as u64).max(8), usage | BufferUsages::COPY_DST);
+    let buffer = grown(device, old, label, (bytes.len() as u64).max(8), usage | BufferUsages::COPY_DST)?;
     queue.write_buffer(&buffer, 0, bytes);
-    buffer
+    Ok(buffer)
 }
 
 /// A compute pass that is timed if anything is.

@@ -1,12 +1,12 @@
 //! The quad rasterizer (Fig. 12): for every group of sheets the stages cull, tiles, splat, composite and occlude.
 
-use wgpu::util::DeviceExt;
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, TextureFormat, TextureView};
 
-use super::{Footprints, Given, compute};
+use super::{Footprints, Given, Prepared, compute};
 use crate::brick;
 use crate::classified_volume::ClassifiedVolume;
-use crate::gpu::bindings::grown;
+use crate::error::RenderError;
+use crate::gpu::bindings::{grown, uploaded};
 use crate::gpu::layout::{Group, Tally};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
@@ -17,7 +17,6 @@ use crate::pass::occlude::Occlude;
 use crate::pass::splat::{Splat, SplatMode};
 use crate::pass::tiles::{TileLists, Tiles};
 use crate::plan::FramePlan;
-use crate::scene_view::Prepared;
 use crate::splatting::Order;
 use crate::stats::GroupSlabs;
 use crate::view::View;
@@ -91,11 +90,21 @@ impl QuadRasterizer {
     }
 
     /// Buckets bricks if need be, and allocates what does not fit any more.
-    pub(crate) fn prepare(&self, given: Given<'_>, previous: Option<QuadFrame>) -> (QuadFrame, Prepared) {
+    ///
+    /// # Errors
+    /// If the device's buffers may not be that large.
+    pub(crate) fn prepare(
+        &self,
+        given: Given<'_>,
+        previous: Option<QuadFrame>,
+    ) -> Result<(QuadFrame, Prepared), RenderError> {
         let Given { device, volume, view, splatting, frame, control_points, compositing, .. } = given;
         let old = Old::of(previous);
         let targets = old.targets.filter(|old| old.size == view.size);
-        let targets = targets.unwrap_or_else(|| Targets::new(device, view.size, self.sheet_format, self.sheets));
+        let targets = match targets {
+            Some(targets) => targets,
+            None => Targets::new(device, view.size, self.sheet_format, self.sheets)?,
+        };
         let mut other_axes = old.planned;
         other_axes.retain(|old| {
             (old.order, old.revision) == (splatting.order, volume.revision)
@@ -113,10 +122,10 @@ impl QuadRasterizer {
         let alignment = device.limits().min_uniform_buffer_offset_alignment as usize;
         let group_stride = size_of::<Group>().next_multiple_of(alignment);
         let group_bytes = uniforms::groups(plan, given.kernel, splatting, group_stride);
-        let groups = given.filled(old.groups, "sheetsplat.groups", &group_bytes, BufferUsages::UNIFORM);
+        let groups = given.filled(old.groups, "sheetsplat.groups", &group_bytes, BufferUsages::UNIFORM)?;
         let culled_bytes = size_of::<Tally>() as u64 + targets.opaque_tiles.size();
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-        let culled = grown(device, old.culled, "sheetsplat.culled", culled_bytes, usage);
+        let culled = grown(device, old.culled, "sheetsplat.culled", culled_bytes, usage)?;
 
         let shared = CullBuffers {
             frame,
@@ -131,18 +140,18 @@ impl QuadRasterizer {
         let lists: Vec<PreparedList> = (volume.lists.lists.iter().zip(&planned.orders).zip(&planned.most))
             .map(|((list, order), &most)| {
                 let previous = old_lists.next().map(|old| old.cull);
-                let cull = self.cull.prepare(device, shared, list, order, most, previous);
+                let cull = self.cull.prepare(device, shared, list, order, most, previous)?;
                 let splat_group = self.splat.bind(device, frame, &groups, &cull, &footprints.texture);
-                PreparedList { cull, splat_group }
+                Ok(PreparedList { cull, splat_group })
             })
-            .collect();
+            .collect::<Result<_, RenderError>>()?;
         let buffers = [frame, &groups, &culled];
-        let tile_lists = self.tiles.prepare(device, buffers, &targets, plan.groups.len(), old.tile_lists);
+        let tile_lists = self.tiles.prepare(device, buffers, &targets, plan.groups.len(), old.tile_lists)?;
         let tiles = &tile_lists.composited;
         let sheets = targets.sheets_view();
         let pixels = u64::from(view.size[0]) * u64::from(view.size[1]);
         let hit_bytes = if given.rays.first_hit { 4 * pixels } else { 4 };
-        let hits = grown(device, old.hits, "sheetsplat.hits", hit_bytes, usage);
+        let hits = grown(device, old.hits, "sheetsplat.hits", hit_bytes, usage)?;
         let buffers = CompositeBuffers {
             frame,
             groups: &groups,
@@ -173,7 +182,7 @@ impl QuadRasterizer {
             lists,
             hits,
         };
-        (frame, Prepared { bucketed, tabled })
+        Ok((frame, Prepared { bucketed, tabled }))
     }
 
     /// Draws the frame.
@@ -263,11 +272,8 @@ impl Planned {
             })
             .collect();
         let upload = |order: &Vec<u32>| {
-            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("sheetsplat.order"),
-                contents: bytemuck::cast_slice(order),
-                usage: BufferUsages::STORAGE,
-            })
+            let bytes: &[u8] = if order.is_empty() { &[0; 4] } else { bytemuck::cast_slice(order) };
+            uploaded(device, "sheetsplat.order", bytes, bytes.len() as u64, BufferUsages::STORAGE)
         };
         Self { order, revision: volume.revision, orders: plan.orders.iter().map(upload).collect(), most, plan }
     }

@@ -5,7 +5,7 @@ use glam::{DVec2, UVec3};
 use rayon::prelude::*;
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, TextureFormat, TextureView};
 
-use super::{Footprints, Given, compute};
+use super::{Footprints, Given, Prepared, compute};
 use crate::brick::{self, BRICK_VOXELS};
 use crate::error::RenderError;
 use crate::gpu::bindings::grown;
@@ -17,7 +17,6 @@ use crate::pass::composite::{Composite, CompositeBuffers, RayMode};
 use crate::pass::sample::{Sample, SampleBuffers, SampleMode};
 use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};
 use crate::plan::tile_grid;
-use crate::scene_view::Prepared;
 use crate::splatting::Compositing;
 use crate::stats::GroupSlabs;
 use crate::view::View;
@@ -106,8 +105,8 @@ impl SampleRasterizer {
             None => (Sorted::new(given), true),
         };
         let (footprints, tabled) = Footprints::renewed(old_footprints, given);
-        let targets = Targets::new(device, view.size, self.format, 1);
-        let buffers = Buffers::new(given, frame, &sorted.places, required);
+        let targets = Targets::new(device, view.size, self.format, 1)?;
+        let buffers = Buffers::new(given, frame, &sorted.places, required)?;
 
         let shade_group = self.shade.bind(
             device,
@@ -229,7 +228,7 @@ impl Sorted {
 }
 
 impl Buffers {
-    fn new(given: Given<'_>, frame: &Frame, places: &[u32], splat_bytes: u64) -> Self {
+    fn new(given: Given<'_>, frame: &Frame, places: &[u32], splat_bytes: u64) -> Result<Self, RenderError> {
         let Given { device, view, kernel, splatting, .. } = given;
         let count = places.len() as u32;
         let (storage, indirect) = (BufferUsages::STORAGE, BufferUsages::STORAGE | BufferUsages::INDIRECT);
@@ -243,16 +242,16 @@ impl Buffers {
         let counts =
             Tally { voxels_shaded: count, sections_rasterized: count, quads: count, ..bytemuck::Zeroable::zeroed() };
         let sum = Frame { compositing: Compositing::Xray as u32, ..*frame };
-        Self {
-            order: filled("sheetsplat.order", bytemuck::cast_slice(places), storage),
-            args: filled("sheetsplat.args", bytemuck::bytes_of(&workgroups(count, 64)), indirect),
-            group: filled("sheetsplat.group", bytemuck::bytes_of(&group), BufferUsages::UNIFORM),
-            splats: grown(device, None, "sheetsplat.splats", splat_bytes.max(size_of::<Splat>() as u64), storage),
-            tiles: filled("sheetsplat.tiles", &tile_words, indirect),
-            sum: filled("sheetsplat.sum", bytemuck::bytes_of(&sum), BufferUsages::UNIFORM),
-            counts: filled("sheetsplat.counts", bytemuck::bytes_of(&counts), BufferUsages::COPY_SRC),
-            no_hits: filled("sheetsplat.no_hits", &[0; 4], storage),
-        }
+        Ok(Self {
+            order: filled("sheetsplat.order", bytemuck::cast_slice(places), storage)?,
+            args: filled("sheetsplat.args", bytemuck::bytes_of(&workgroups(count, 64)), indirect)?,
+            group: filled("sheetsplat.group", bytemuck::bytes_of(&group), BufferUsages::UNIFORM)?,
+            splats: grown(device, None, "sheetsplat.splats", splat_bytes.max(size_of::<Splat>() as u64), storage)?,
+            tiles: filled("sheetsplat.tiles", &tile_words, indirect)?,
+            sum: filled("sheetsplat.sum", bytemuck::bytes_of(&sum), BufferUsages::UNIFORM)?,
+            counts: filled("sheetsplat.counts", bytemuck::bytes_of(&counts), BufferUsages::COPY_SRC)?,
+            no_hits: filled("sheetsplat.no_hits", &[0; 4], storage)?,
+        })
     }
 }
 

@@ -4,14 +4,13 @@ use std::mem::offset_of;
 
 use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Features};
 
-use super::Given;
+use super::{Given, Prepared};
 use crate::error::RenderError;
 use crate::gpu::bindings::grown;
 use crate::gpu::layout::{Brick, Gathered, Part, Tally};
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
 use crate::pass::gather::{Gather, GatherBand, GatherBuffers, GatherMode};
-use crate::scene_view::Prepared;
 use crate::splatting::{FootprintForm, Method, Order, Splatting};
 use crate::stats::GroupSlabs;
 use crate::tile_bins::{SHEETS, SIDE, TileBins};
@@ -121,13 +120,13 @@ impl TileRasterizer {
         let (starts, entries) = match (old.starts.take(), old.entries.take()) {
             (Some(starts), Some(entries)) if !stale => (starts, entries),
             (starts, entries) => (
-                given.filled(starts, "sheetsplat.bin_starts", bytemuck::cast_slice(&bins.starts), storage),
-                given.filled(entries, "sheetsplat.bin_entries", bytemuck::cast_slice(&bins.entries), storage),
+                given.filled(starts, "sheetsplat.bin_starts", bytemuck::cast_slice(&bins.starts), storage)?,
+                given.filled(entries, "sheetsplat.bin_entries", bytemuck::cast_slice(&bins.entries), storage)?,
             ),
         };
         let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|&pixels| uniforms::in_f32_pixels(pixels)).collect();
         let half_boxes = bytemuck::cast_slice(&half_boxes);
-        let half_boxes = given.filled(old.half_boxes.take(), "sheetsplat.half_boxes", half_boxes, storage);
+        let half_boxes = given.filled(old.half_boxes.take(), "sheetsplat.half_boxes", half_boxes, storage)?;
         let own_bricks = match (&volume.lists.lists[..], old.bricks.take()) {
             ([_], _) => None,
             (_, Some(bricks)) if !stale => Some(bricks),
@@ -139,7 +138,7 @@ impl TileRasterizer {
                     let (what, limit) = ("the bricks of the tile rasterizer", "max_storage_buffer_binding_size");
                     return Err(RenderError::Limit { what, limit, required: bytes.len() as u64, actual: binding });
                 }
-                Some(given.filled(old, "sheetsplat.all_bricks", bytes, storage))
+                Some(given.filled(old, "sheetsplat.all_bricks", bytes, storage)?)
             }
         };
 
@@ -152,9 +151,9 @@ impl TileRasterizer {
             return Err(RenderError::Limit { what, limit, required: bytes, actual: binding });
         }
         let usage = storage | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-        let gathered = grown(device, old.gathered.take(), "sheetsplat.gathered", bytes, usage);
+        let gathered = grown(device, old.gathered.take(), "sheetsplat.gathered", bytes, usage)?;
         let uniform_bytes = bytemuck::bytes_of(&uniform);
-        let uniform = given.filled(old.uniform.take(), "sheetsplat.gather", uniform_bytes, BufferUsages::UNIFORM);
+        let uniform = given.filled(old.uniform.take(), "sheetsplat.gather", uniform_bytes, BufferUsages::UNIFORM)?;
 
         let stride = size_of::<Part>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize);
         let (mut part_bytes, mut dispatches) = (Vec::new(), Vec::new());
@@ -169,7 +168,7 @@ impl TileRasterizer {
             part_bytes.resize(part_bytes.len().next_multiple_of(stride), 0);
         }
         part_bytes.resize(part_bytes.len().max(stride), 0);
-        let parts = given.filled(old.parts.take(), "sheetsplat.parts", &part_bytes, BufferUsages::UNIFORM);
+        let parts = given.filled(old.parts.take(), "sheetsplat.parts", &part_bytes, BufferUsages::UNIFORM)?;
 
         let mode = GatherMode::of(splatting, view.perspective.is_some(), volume.labels().is_some(), given.rays);
         let buffers = GatherBuffers {

@@ -155,3 +155,11 @@ fn what_no_renderer_can_do_is_2() {
         perspective(deep, &["splatting.slab_width", "0.05", "65536 slabs"]);
     }
 }
+
+/// The driver's textures are not that large.
+#[test]
+fn a_device_that_fails_is_1() {
+    let set = "--set image.width=16384 --set image.height=16384 --set splatting.rasterizer=\"quads\"";
+    let arguments = format!("render good.nrrd -o out.png --adapter llvmpipe {set}");
+    assert_fails(1, &arguments, &["the device is out of memory", "sheetsplat.sheets"]);
+}

@@ -23,58 +23,6 @@ fn exr_and_npy_hold_the_same_premultiplied_floats() {
 }
 
 #[test]
-fn views_are_the_anatomys() {
-    let folder = Folder::new();
-    let values: Vec<u8> = (0..60).map(|i| (i * 4) as u8).collect();
-    // X runs to the patient's left, y to the head, z to the front.
-    let axes = "space: LPS\nspace directions: (1,0,0) (0,0,2) (0,-1,0)";
-    let write = |name: &str, axes: &str| {
-        let header = format!("NRRD0004\ntype: uint8\ndimension: 3\nsizes: 5 4 3\n{axes}\nencoding: raw\n\n");
-        folder.write(name, [header.as_bytes(), &values].concat());
-    };
-    write("lying.nrrd", axes);
-    write("mirrored.nrrd", &axes.replace("LPS", "LAS"));
-    write("nowhere.nrrd", "spacings: 1 2 1");
-    let size = "--set image.width=16 --set image.height=12";
-    let plain = folder.pixels(&format!("nowhere.nrrd {size} --set camera.direction=[0,0,-1] --set camera.up=[0,1,0]"));
-    assert_eq!(folder.pixels(&format!("lying.nrrd {size} --view front")), plain);
-    assert_eq!(folder.pixels(&format!("lying.nrrd {size} --view front --set camera.direction=[1,0,0]")), plain);
-    assert_ne!(folder.pixels(&format!("lying.nrrd {size} --view back")), plain);
-    let mirrored = folder.run(&format!("render mirrored.nrrd {size} --view front -o out.png"));
-    mirrored.assert_success();
-    assert!(mirrored.stderr.contains("mirrored.nrrd: --view: the axes are left-handed"), "{}", mirrored.stderr);
-    let found = ["nowhere.nrrd", "--view", "no orientation", "camera.direction"];
-    folder.run(&format!("render nowhere.nrrd {size} --view front -o out.png")).assert_failure(2, &found);
-    folder
-        .run(&format!("render lying.nrrd {size} --view above -o out.png"))
-        .assert_failure(2, &["above", "top, bottom"]);
-}
-
-#[test]
-fn raw_files_are_what_the_arguments_say() {
-    let folder = Folder::new();
-    let values: Vec<f32> = (0..60).map(|i| (i * 4) as f32).collect();
-    folder.write_nrrd("a.nrrd", [5, 4, 3], [1.0, 1.0, 2.0], &values);
-    folder.write("a.raw", values.iter().flat_map(|&value| (value as u16).to_be_bytes()).collect::<Vec<u8>>());
-    let size = "--set image.width=16 --set image.height=12";
-    let plain = folder.pixels(&format!("a.nrrd {size}"));
-    let raw = format!("a.raw {size} --type uint16 --endian big --spacing 1,1,2");
-    assert_eq!(folder.pixels(&format!("{raw} --dims 5,4,3")), plain);
-    assert_eq!(
-        folder.pixels(&format!("{raw} --dims 5,4,2 --offset 40 --set volume.offset=0 --set volume.dims=[5,4,3]")),
-        plain
-    );
-    let refused = |arguments: &str, words: &[&str]| {
-        folder.run(&format!("render {arguments} -o out.png")).assert_failure(2, words);
-    };
-    refused(&format!("a.raw {size}"), &["a.raw", "format", "\".raw\"", "volume.dims"]);
-    refused(&raw, &["--set", "volume.dims", "no such key"]);
-    refused(&format!("{raw} --dims 5,4"), &["--set", "volume.dims", "[5, 4]", "three positive integers"]);
-    refused(&format!("{raw} --dims 5,4,2"), &["a.raw", "data", "120 bytes", "80 bytes"]);
-    refused("a.raw --dims 5,4,3 --type half", &["--set", "volume.type", "half", "uint16"]);
-}
-
-#[test]
 fn png_holds_the_rounded_floats_with_straight_alpha() {
     let folder = Folder::new();
     for background in [TRANSPARENT, "--set image.background=[1,1,1,0]", "--set image.background=[0.1,0.2,0.9,1]"] {

@@ -77,7 +77,7 @@ impl Case {
         let (device, queue) = (gpu.device(), gpu.queue());
         let Self { size, compositing, order, threshold, .. } = *self;
         let layers = self.sheets.len() as u32;
-        let targets = Targets::new(device, size, wgpu::TextureFormat::Rgba32Float, layers);
+        let targets = Targets::new(device, size, wgpu::TextureFormat::Rgba32Float, layers).unwrap();
         let compositing_buffer = CompositingBuffer::new(device, size).unwrap();
         assert_eq!(compositing_buffer.bands.len(), bands);
         let layout =

@@ -65,7 +65,7 @@ impl<'a> Culling<'a> {
         let ramps = Ramps::new(transfer);
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
         let frame = uniforms::frame(&view, &kernel, grid, &ramps, scene);
-        let targets = Targets::new(device, size, TextureFormat::Rgba32Float, sheets);
+        let targets = Targets::new(device, size, TextureFormat::Rgba32Float, sheets).unwrap();
         let stride = device.limits().min_uniform_buffer_offset_alignment;
         let group_bytes = uniforms::groups(&plan, &kernel, &scene.splatting, stride as usize);
         let groups = init(device, &group_bytes, BufferUsages::UNIFORM);
@@ -92,7 +92,7 @@ impl<'a> Culling<'a> {
         let most_bricks = plan.groups.iter().map(|group| counts(group).len()).max().unwrap();
         let most_voxels = plan.groups.iter().map(|group| counts(group).iter().sum()).max().unwrap();
         Self {
-            list: stage.prepare(device, shared, list, &order, (most_bricks as u32, most_voxels), None),
+            list: stage.prepare(device, shared, list, &order, (most_bricks as u32, most_voxels), None).unwrap(),
             indices: bricks.iter().flat_map(|brick| indices(grid, brick)).collect(),
             gpu,
             stage,

@@ -153,7 +153,7 @@ fn occluded_where_the_whole_box_is_opaque() {
         let most = [0.0, 8.0, 68.0, 140.0][random.bits() as usize % 4];
         // A box is never wider than the image: `reach` is at most its size.
         let reach = size.map(|side: u32| side.min(random.uniform(0.0, most + 1.0) as u32));
-        let targets = Targets::new(gpu.device(), size, TextureFormat::Rgba32Float, 1);
+        let targets = Targets::new(gpu.device(), size, TextureFormat::Rgba32Float, 1).unwrap();
         let fixture = Fixture { gpu: &gpu, stage: &stage, reach, targets };
         let [columns, rows] = tile_grid(size);
         let mut mask = Mask::random(&mut random, size);
@@ -179,7 +179,7 @@ fn tiles_that_are_not_listed_stay() {
     let gpu = gpu();
     let stage = Occlude::new(gpu.device());
     let size = [150, 75];
-    let targets = Targets::new(gpu.device(), size, TextureFormat::Rgba32Float, 1);
+    let targets = Targets::new(gpu.device(), size, TextureFormat::Rgba32Float, 1).unwrap();
     for stale in [&targets.opaque_columns, &targets.occluded] {
         gpu.queue().write_buffer(stale, 0, bytemuck::cast_slice(&vec![0x0f0f_0f0f_u32; stale.size() as usize / 4]));
     }

@@ -52,7 +52,7 @@ impl<'a> Stages<'a> {
         };
         let grid = Grid { dims: UVec3::ONE, spacing: DVec3::ONE };
         let lists = BrickLists::upload(device, &grid, &[0]);
-        let list = Cull::new(device, sheets).prepare(device, shared, &lists.lists[0], &storage, (1, 1), None);
+        let list = Cull::new(device, sheets).prepare(device, shared, &lists.lists[0], &storage, (1, 1), None).unwrap();
         let splat = Stage::new(device, TextureFormat::Rgba32Float, sheets);
         Self { gpu, sheets, splat, list: RefCell::new(list) }
     }

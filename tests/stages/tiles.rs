@@ -75,7 +75,7 @@ impl Case {
     fn check(&self, gpu: &Headless, stage: &Tiles, group: u32) {
         const GROUPS: u32 = 5;
         let device = gpu.device();
-        let targets = Targets::new(device, self.size, TextureFormat::Rgba32Float, 1);
+        let targets = Targets::new(device, self.size, TextureFormat::Rgba32Float, 1).unwrap();
         let opaque: Vec<u32> = self.opaque.iter().map(|&opaque| opaque.into()).collect();
         gpu.queue().write_buffer(&targets.opaque_tiles, 0, bytemuck::cast_slice(&opaque));
         let counts: [u32; 8] = [3, 1, 4, 1, 5, 9, 2, 6];
@@ -91,7 +91,7 @@ impl Case {
         let uniforms: Vec<Group> =
             (0..GROUPS).map(|index| Group { box_filter: self.reach, index, ..Group::zeroed() }).collect();
         let (groups, stride) = at_offsets(device, &uniforms);
-        let lists = stage.prepare(device, [&frame, &groups, &culled], &targets, GROUPS as usize, None);
+        let lists = stage.prepare(device, [&frame, &groups, &culled], &targets, GROUPS as usize, None).unwrap();
         compute(gpu, |pass| stage.record(pass, &lists, group * stride));
 
         for (name, buffer, expected) in

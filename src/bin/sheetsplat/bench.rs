@@ -3,32 +3,26 @@
 use std::time::Instant;
 
 use serde::Serialize;
-use sheetsplat::error::Error;
-use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::stats::Stats;
 
-use crate::Failure;
-use crate::render::open_scene;
+use crate::arguments::Input;
+use crate::failure::Failure;
+use crate::stdout;
 
 #[derive(clap::Args)]
+#[command(after_help = "Example:\n  sheetsplat bench builtin:head --frames 20 --rotate 3")]
 pub(crate) struct Arguments {
-    /// A scene file (.toml), a volume file, or builtin:NAME[:N].
-    input: String,
+    #[command(flatten)]
+    input: Input,
     /// Frames to time after the first one.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
     frames: u32,
     /// Degrees to turn about the camera's up before each of them.
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     rotate: f64,
-    /// Set a scene value, as in --set splatting.slab_width=2.0. Can be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
     /// Time every stage on the GPU, where the adapter has timestamp queries: stages_ms in the statistics.
     #[arg(long)]
     profile: bool,
-    /// Part of the name of the adapter to use.
-    #[arg(long, value_name = "NAME", env = "WGPU_ADAPTER_NAME")]
-    adapter: Option<String>,
 }
 
 /// What is printed: times in milliseconds, and the last frame's stats.
@@ -44,25 +38,24 @@ struct Report {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let scene = open_scene(&arguments.input, &arguments.set)?;
-    let failed = |error: Error| Failure::of(error, &arguments.input);
+    let input = &arguments.input;
+    let mut scene = input.scene()?;
     let start = Instant::now();
-    let volume = scene.load_volume().map_err(|error| failed(error.into()))?;
+    let volume = input.load_volume(&scene)?;
     let load_ms = milliseconds_since(start);
+    input.look_at(&volume, &mut scene)?;
 
     let start = Instant::now();
-    let (adapter, profile) = (arguments.adapter.clone(), arguments.profile);
-    let options = HeadlessOptions { adapter, profile, ..HeadlessOptions::default() };
-    let headless = Headless::new(&options).map_err(|error| Failure::Other(error.to_string()))?;
-    let mut view = headless.view(volume, &scene).map_err(|error| failed(error.into()))?;
-    let mut last = headless.draw(&mut view).map_err(|error| failed(error.into()))?.stats;
+    let headless = input.headless(arguments.profile)?;
+    let mut view = headless.view(volume, &scene).map_err(|error| input.failure(error))?;
+    let mut last = headless.draw(&mut view).map_err(|error| input.failure(error))?.stats;
     let first_frame_ms = milliseconds_since(start);
 
     let mut times = Vec::new();
     for _ in 0..arguments.frames {
         view.turn(arguments.rotate);
         let start = Instant::now();
-        last = headless.draw(&mut view).map_err(|error| failed(error.into()))?.stats;
+        last = headless.draw(&mut view).map_err(|error| input.failure(error))?.stats;
         times.push(milliseconds_since(start));
     }
     times.sort_by(f64::total_cmp);
@@ -75,8 +68,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         peak_rss_mib: peak_rss_mib(),
         last,
     };
-    println!("{}", serde_json::to_string(&report).map_err(|error| Failure::Other(error.to_string()))?);
-    Ok(())
+    let json = serde_json::to_string(&report).map_err(|error| Failure::Other(error.to_string()))?;
+    stdout((json + "\n").as_bytes())
 }
 
 /// The process's largest resident set so far, where the system tells it.

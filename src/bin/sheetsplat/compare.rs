@@ -1,14 +1,15 @@
 //! `sheetsplat compare`.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use sheetsplat::golden::{Comparison, ComparisonError, Picture, Tolerance};
 use sheetsplat::image::{Image, PngDepth};
 
-use crate::Failure;
+use crate::failure::Failure;
+use crate::stdout;
 
 #[derive(clap::Args)]
+#[command(after_help = "Example:\n  sheetsplat compare actual.png golden.png --difference difference.png")]
 pub(crate) struct Arguments {
     /// An image: .png, .exr or .npy.
     actual: PathBuf,
@@ -54,8 +55,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             report += &format!("{} made on: {made_on}\n", path.display());
         }
     }
-    std::io::stdout()
-        .write_all(report.as_bytes())
-        .map_err(|error| Failure::Other(format!("standard output: {error}")))?;
+    stdout(report.as_bytes())?;
     if comparison.passes() { Ok(()) } else { Err(Failure::Other(format!("{files} differ"))) }
 }

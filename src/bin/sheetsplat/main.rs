@@ -1,52 +1,90 @@
 //! The command line program.
 
+mod adapters;
+mod arguments;
 mod bench;
 mod compare;
+mod documents;
+mod failure;
+mod orbit;
+mod progress;
 mod render;
+mod sweep;
 #[cfg(feature = "viewer")]
 mod view;
 
 use std::io::Write;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
+
+use failure::Failure;
+
+const EXAMPLES: &str = "\
+Examples:
+  sheetsplat render builtin:head -o head.png
+  sheetsplat render scene.toml -o image.exr --set camera.direction=[1,0,0]
+  sheetsplat orbit head.nrrd -o turn.gif
+  sheetsplat adapters
+
+Exit codes: 0 success, 2 bad usage or input, 1 anything else. Logs: -v, or the environment variable RUST_LOG.";
 
 /// Volume rendering by image-aligned sheet-buffer splatting.
 #[derive(Parser)]
-#[command(version, about)]
+#[command(version, about, after_help = EXAMPLES)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
+    /// Say nothing but errors: no progress, no warnings.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Log volumes and frames instead of showing progress. RUST_LOG overrules it.
+    #[arg(short, long, global = true)]
+    verbose: bool,
 }
 
 #[derive(Subcommand)]
 enum Command {
     /// Render a scene file, a volume file, or a builtin volume to an image.
     Render(render::Arguments),
+    /// Draw a turntable: numbered images or a movie of the camera turning about its up.
+    Orbit(orbit::Arguments),
+    /// Draw a contact sheet: --set KEY=A,B,C gives a tile for each value, two of them a grid.
+    Sweep(sweep::Arguments),
     /// Time a first frame and turning frames; prints one line of JSON.
     Bench(bench::Arguments),
     /// Compare two images: prints what they differ in, exit code 1 if by more than is allowed.
     Compare(compare::Arguments),
-    /// Show a scene in a window, to be turned and changed.
+    /// List the adapters, whether they are usable, and which limits are missing where they are not.
+    Adapters(adapters::Arguments),
+    /// Print completions for a shell.
+    Completions(documents::Completions),
+    /// Print a man page.
+    Man(documents::Man),
+    /// Show a scene in a window, to be turned and changed; its image size is not looked at.
     #[cfg(feature = "viewer")]
     View(view::Arguments),
 }
 
-/// What went wrong, by whose fault.
-enum Failure {
-    /// Bad usage or bad input: exit code 2.
-    Input(String),
-    /// Anything else: exit code 1.
-    Other(String),
-}
-
 fn main() -> ExitCode {
-    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("error")).init();
     // Clap itself exits with 2 on bad usage, with 0 on --help.
-    let result = match Arguments::parse().command {
+    let Arguments { command, quiet, verbose } = Arguments::parse();
+    let filter = match (quiet, verbose) {
+        (true, _) => "error",
+        (false, false) => "error,sheetsplat=warn",
+        (false, true) => "error,sheetsplat=info",
+    };
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(filter)).init();
+    let progress = !quiet && !verbose;
+    let result = match command {
         Command::Render(arguments) => render::run(&arguments),
+        Command::Orbit(arguments) => orbit::run(&arguments, progress),
+        Command::Sweep(arguments) => sweep::run(&arguments, progress),
         Command::Bench(arguments) => bench::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Adapters(arguments) => adapters::run(&arguments),
+        Command::Completions(arguments) => documents::completions(&arguments, Arguments::command()),
+        Command::Man(arguments) => documents::man(&arguments, Arguments::command()),
         #[cfg(feature = "viewer")]
         Command::View(arguments) => view::run(&arguments),
     };
@@ -59,10 +97,9 @@ fn main() -> ExitCode {
     }
 }
 
-impl Failure {
-    fn message(&self) -> &str {
-        match self {
-            Self::Input(message) | Self::Other(message) => message,
-        }
-    }
+/// Prints a result.
+fn stdout(bytes: &[u8]) -> Result<(), Failure> {
+    let mut stdout = std::io::stdout().lock();
+    let written = stdout.write_all(bytes).and_then(|()| stdout.flush());
+    written.map_err(|error| Failure::Other(format!("standard output: {error}")))
 }

@@ -165,4 +165,22 @@ fn walls_cut_as_clip_planes_do() {
     let finite = hits.iter().zip(&is_wall).filter(|(hit, _)| hit.is_finite());
     assert!(finite.clone().any(|(_, is_wall)| *is_wall) && finite.clone().any(|(_, is_wall)| !is_wall));
     assert!(finite.clone().all(|(&hit, _)| f64::from(hit) < eye.length() + 150.0 && hit > 50.0));
+
+    // The same at a pixel, once the application's own submission is done.
+    let at = hits.iter().position(|hit| hit.is_finite()).unwrap();
+    let mut encoder = host.encoder();
+    let pixel = [at as u32 % SIZE[0], at as u32 / SIZE[0]];
+    let mut pending = view.pick(&host.device, &mut encoder, pixel).unwrap();
+    assert!(view.pick(&host.device, &mut encoder, [SIZE[0], 0]).is_none(), "off the image");
+    host.submit(encoder);
+    assert!(pending.try_get().is_none(), "nothing waits");
+    host.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+    let pick = pending.try_get().unwrap().unwrap().unwrap();
+    assert_eq!(pick.depth, f64::from(hits[at]));
+    let clip = clip_from_world() * pick.position.extend(1.0);
+    let there =
+        [(clip.x / clip.w + 1.0) / 2.0 * f64::from(SIZE[0]), (1.0 - clip.y / clip.w) / 2.0 * f64::from(SIZE[1])];
+    for axis in 0..2 {
+        assert!((there[axis] - f64::from(pixel[axis]) - 0.5).abs() < 1e-6, "{there:?} for {pixel:?}");
+    }
 }

@@ -5,6 +5,7 @@
 mod dependencies;
 mod depth;
 mod devices;
+mod faults;
 mod formats;
 mod passes;
 mod sharing;

@@ -22,7 +22,7 @@ use super::guest::Guest;
 use super::histogram::{Histogram, extent};
 use super::pace::Pace;
 use super::{Outcome, navigation, panel, plot, screenshot};
-use crate::Failure;
+use crate::failure::Failure;
 
 /// Degrees that the camera turns by for a drag over the picture's whole height.
 const TURN: f64 = 180.0;
@@ -78,11 +78,11 @@ impl App {
         let Some(host) = &context.wgpu_render_state else {
             return Err(Failure::Other("the window has no wgpu device".to_owned()));
         };
-        let guest = Guest::new(host, volume, &scene, &arguments.input)?;
+        let guest = Guest::new(host, volume, &scene, &arguments.input.name)?;
         let values = guest.volume().values();
         let editor = Editor::new(guest.transfer(), extent(values));
         Ok(Self {
-            input: arguments.input.clone(),
+            input: arguments.input.name.clone(),
             home: scene.camera,
             transfer: guest.transfer().clone(),
             histogram: Histogram::new(values, editor.range()),

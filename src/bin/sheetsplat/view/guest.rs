@@ -6,14 +6,14 @@ use std::time::Instant;
 use eframe::egui::TextureId;
 use eframe::egui_wgpu::{self, RenderState, WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
 use sheetsplat::error::RenderError;
-use sheetsplat::gpu::device::{DeviceError, DeviceRequirements};
+use sheetsplat::fault::scoped;
 use sheetsplat::headless::device;
 use sheetsplat::stats::Stats;
 use sheetsplat::transfer_function::TransferFunction;
 use sheetsplat::volume::{Grid, Volume};
-use sheetsplat::{Blend, GpuVolume, Placement, Renderer, RendererOptions, Scene, SceneView, wgpu};
+use sheetsplat::{Blend, DeviceRequirements, GpuVolume, Placement, Renderer, RendererOptions, Scene, SceneView, wgpu};
 
-use crate::Failure;
+use crate::failure::Failure;
 
 /// Of textures that the window shows. It holds display-referred colours, as sheetsplat's are.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
@@ -60,13 +60,10 @@ impl Guest {
         let RenderState { adapter, device, queue, .. } = host;
         let info = adapter.get_info();
         let options = RendererOptions { blend: Blend::Replace, ..RendererOptions::for_target(FORMAT) };
-        let renderer = match device::scoped(device, || Renderer::new(device, queue, &options)) {
-            (renderer, None) => renderer,
-            (_, Some(error)) => Err(DeviceError::Pipelines { adapter: info.name.clone(), error }),
-        }
-        .map_err(|error| Failure::Other(error.to_string()))?;
-        let view = || SceneView::new(device, &GpuVolume::new(device, queue, volume)?, scene);
-        let view = checked(device, view).map_err(|error| Failure::of(error.into(), input))?;
+        let renderer = Renderer::new(device, queue, &options).map_err(|error| Failure::Other(error.to_string()))?;
+        let volume = GpuVolume::new(device, queue, volume);
+        let view = volume.and_then(|volume| SceneView::new(device, &volume, scene));
+        let view = view.map_err(|error| Failure::of(error.into(), input))?;
         let stats = Stats { adapter: info.name, backend: info.backend.to_str().to_owned(), ..Stats::default() };
         Ok(Self { host: host.clone(), renderer, view, picture: None, stats })
     }
@@ -104,7 +101,7 @@ impl Guest {
         }
         (self.stats.width, self.stats.height) = (scene.image.width, scene.image.height);
         let device = self.host.device.clone();
-        checked(&device, || self.draw(scene, transfer)).map(|()| true)
+        scoped(&device, || self.draw(scene, transfer))?.map(|()| true)
     }
 
     fn draw(&mut self, scene: &Scene, transfer: &TransferFunction) -> Result<(), RenderError> {
@@ -131,7 +128,7 @@ impl Guest {
         renderer.present(&mut encoder, view, &target, at);
         queue.submit([encoder.finish()]);
         let counts = view.counts();
-        device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| RenderError::Device(error.to_string()))?;
+        device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| RenderError::Readback(error.to_string()))?;
         if let Some(counts) = counts.and_then(|counts| counts.try_get()) {
             self.stats.counts = counts?.0;
         }
@@ -173,13 +170,5 @@ impl Guest {
         drop(painter);
         self.picture = Some(Picture { texture, id });
         view
-    }
-}
-
-/// What the device reports while `work` runs becomes an error.
-fn checked<T>(device: &wgpu::Device, work: impl FnOnce() -> Result<T, RenderError>) -> Result<T, RenderError> {
-    match device::scoped(device, work) {
-        (result, None) => result,
-        (_, Some(error)) => Err(RenderError::Device(error)),
     }
 }

@@ -18,26 +18,24 @@ use eframe::NativeOptions;
 use eframe::egui::{IconData, ViewportBuilder};
 use sheetsplat::image::Image;
 
-use crate::Failure;
-use crate::render::open_scene;
+use crate::arguments::Input;
+use crate::failure::Failure;
 use app::App;
 
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  sheetsplat view builtin:head
+  sheetsplat view scene.toml --size 1600x1000")]
 pub(crate) struct Arguments {
-    /// A scene file (.toml), a volume file, or builtin:NAME[:N]. Its image size is not looked at.
-    input: String,
-    /// Set a scene value, as in --set splatting.slab_width=2.0. Can be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
+    #[command(flatten)]
+    input: Input,
     /// Size of the window, in points (pixels, unless the display is scaled).
     #[arg(long, value_name = "WxH", default_value = "1280x800", value_parser = parse_size)]
     size: [u16; 2],
     /// Save the window's first complete frame, and close it: .png, .exr or .npy.
     #[arg(long, value_name = "FILE")]
     screenshot: Option<PathBuf>,
-    /// Part of the name of the adapter to use.
-    #[arg(long, value_name = "NAME", env = "WGPU_ADAPTER_NAME")]
-    adapter: Option<String>,
 }
 
 /// How it ended, if not by the user closing the window.
@@ -54,17 +52,18 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.screenshot {
         Image::check_format(path)?;
     }
-    let scene = open_scene(&arguments.input, &arguments.set)?;
-    let volume = scene.load_volume().map_err(|error| Failure::of(error.into(), &arguments.input))?;
+    let mut scene = arguments.input.scene()?;
+    let volume = arguments.input.load_volume(&scene)?;
+    arguments.input.look_at(&volume, &mut scene)?;
 
-    let title = format!("{} - sheetsplat", arguments.input);
+    let title = format!("{} - sheetsplat", arguments.input.name);
     let viewport = ViewportBuilder::default()
         .with_inner_size(arguments.size.map(f32::from))
         .with_title(&title)
         .with_icon(IconData::default());
     let options = NativeOptions {
         viewport,
-        wgpu_options: guest::device_options(arguments.adapter.clone()),
+        wgpu_options: guest::device_options(arguments.input.adapter.clone()),
         // Pictures are shown, and saved, as they are.
         dithering: false,
         ..NativeOptions::default()

@@ -1,0 +1,152 @@
+//! `sheetsplat orbit`: turntables.
+
+mod movie;
+mod numbered;
+mod y4m;
+
+use std::io::{self, BufWriter, Write};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use sheetsplat::image::{Image, aside};
+use sheetsplat::scene::Scene;
+
+use crate::arguments::{Depth, Input, log_frame};
+use crate::failure::Failure;
+use crate::progress::Progress;
+use movie::{Encoder, Format, Settings};
+use numbered::Pattern;
+use y4m::Chroma;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  sheetsplat orbit scene.toml -o turn.apng
+  sheetsplat orbit scene.toml -o frame-%04d.png --count 600 --frames 0..60
+  sheetsplat orbit scene.toml -o - | ffmpeg -i - turn.mp4")]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    input: Input,
+    /// Numbered images (frame-%04d.png, frame-####.exr), a movie (.apng, .gif, .y4m), or - for YUV4MPEG2 on standard output.
+    #[arg(short, long, value_name = "FILES")]
+    output: PathBuf,
+    /// Degrees that all frames turn by, about the camera's up, by the right hand. The last frame is one step before the end.
+    #[arg(long, value_name = "DEGREES", default_value_t = 360.0, allow_negative_numbers = true, value_parser = parse_turn)]
+    turn: f64,
+    /// Frames in all.
+    #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..))]
+    count: u32,
+    /// Draw only these of all frames, counted from 0, without B: parts of a movie can be drawn anywhere and at any time.
+    #[arg(long, value_name = "A..B", value_parser = parse_frames)]
+    frames: Option<Range<u32>>,
+    /// Draw numbered images again that are there.
+    #[arg(long)]
+    overwrite: bool,
+    /// Frames per second of a movie.
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u16).range(1..))]
+    fps: u16,
+    /// Bits per channel of PNG and APNG.
+    #[arg(long, value_enum, default_value = "8")]
+    depth: Depth,
+    /// Colour resolution of YUV4MPEG2: halved both ways, for which width and height must be even, or full.
+    #[arg(long, value_enum, default_value = "420")]
+    chroma: Chroma,
+}
+
+/// A finite number.
+fn parse_turn(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|turn: &f64| turn.is_finite()).ok_or_else(|| "allowed: a finite number".to_owned())
+}
+
+/// `A..B`, not empty.
+fn parse_frames(text: &str) -> Result<Range<u32>, String> {
+    let parse = |(from, to): (&str, &str)| Some(from.parse().ok()?..to.parse().ok()?);
+    let frames = text.split_once("..").and_then(parse).filter(|frames| !frames.is_empty());
+    frames.ok_or_else(|| "allowed: A..B, A less than B".to_owned())
+}
+
+pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> {
+    let Arguments { input, output, count, overwrite, .. } = arguments;
+    let frames = arguments.frames.clone().unwrap_or(0..*count);
+    if frames.end > *count {
+        let Range { start, end } = frames;
+        return Err(Failure::Input(format!("--frames: found {start}..{end}, allowed: within 0..{count} (--count)")));
+    }
+    let format = if output == Path::new("-") { Some(Format::Y4m) } else { Format::of(output) };
+    let scene = input.scene()?;
+    if let Some(format) = format {
+        return movie(arguments, &scene, format, frames, progress);
+    }
+    let pattern = Pattern::parse(output).ok_or_else(|| {
+        let allowed = "numbered images (frame-%04d.png, frame-####.png), a movie (.apng, .gif, .y4m), or -";
+        Failure::Input(format!("--output: found {}, allowed: {allowed}", output.display()))
+    })?;
+    Image::check_format(output)?;
+    let wanted = frames.len();
+    let frames: Vec<u32> = frames.filter(|&frame| *overwrite || !pattern.path(frame).exists()).collect();
+    log::info!("{} of {wanted} frames are there already", wanted - frames.len());
+    draw(arguments, &scene, &frames, progress, |frame, image| {
+        Ok(image.save(&pattern.path(frame), arguments.depth.into())?)
+    })
+}
+
+fn movie(
+    arguments: &Arguments,
+    scene: &Scene,
+    format: Format,
+    frames: Range<u32>,
+    progress: bool,
+) -> Result<(), Failure> {
+    let Arguments { input, output, fps, depth, chroma, .. } = arguments;
+    let settings = Settings {
+        width: scene.image.width,
+        height: scene.image.height,
+        frames: frames.end - frames.start,
+        fps: *fps,
+        depth: (*depth).into(),
+        chroma: *chroma,
+    };
+    format.check(&settings).map_err(|message| Failure::Input(format!("{}: {message}", input.name)))?;
+    let frames: Vec<u32> = frames.collect();
+    let encode = |to: &mut dyn Write, failed: &dyn Fn(io::Error) -> Failure| {
+        let mut encoder = Encoder::new(format, &settings, &mut *to).map_err(failed)?;
+        draw(arguments, scene, &frames, progress, |_, image| encoder.add(image).map_err(failed))?;
+        encoder.finish().and_then(|()| to.flush()).map_err(failed)
+    };
+    if output == Path::new("-") {
+        return encode(&mut io::stdout().lock(), &|error| Failure::Other(format!("standard output: {error}")));
+    }
+    let failed = |error: io::Error| Failure::Other(format!("{}: {error}", output.display()));
+    let file = aside(output, &[]).map_err(failed)?;
+    encode(&mut BufWriter::new(file.as_file()), &failed)?;
+    file.persist(output).map_err(|error| failed(error.error))?;
+    Ok(())
+}
+
+/// Draws frames and hands them over, each as if it were the only one.
+fn draw(
+    arguments: &Arguments,
+    scene: &Scene,
+    frames: &[u32],
+    progress: bool,
+    mut take: impl FnMut(u32, &Image) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    if frames.is_empty() {
+        return Ok(());
+    }
+    let Arguments { input, turn, count, .. } = arguments;
+    let (volume, mut scene) = (input.load_volume(scene)?, scene.clone());
+    input.look_at(&volume, &mut scene)?;
+    let headless = input.headless(false)?;
+    let mut view = headless.view(volume, &scene).map_err(|error| input.failure(error))?;
+    let mut progress = Progress::new(frames.len(), progress);
+    for &frame in frames {
+        // From where the scene's camera is, whichever frame was drawn before.
+        view.set_camera(scene.camera.turned(turn * f64::from(frame) / f64::from(*count)));
+        let rendering = headless.draw(&mut view).map_err(|error| input.failure(error))?;
+        take(frame, &rendering.image)?;
+        log_frame(&format!("frame {frame}"), &rendering.stats);
+        progress.step();
+    }
+    Ok(())
+}

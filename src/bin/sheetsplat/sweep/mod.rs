@@ -1,0 +1,129 @@
+//! `sheetsplat sweep`: contact sheets.
+
+mod axis;
+mod sheet;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use sheetsplat::image::Image;
+use sheetsplat::scene::Scene;
+
+use crate::arguments::{Depth, Input, log_frame};
+use crate::failure::Failure;
+use crate::progress::Progress;
+use axis::{Axis, swept};
+use sheet::{Layout, Tile};
+
+/// Pixels of a sheet's longer side: as floats a square one takes 4 GiB.
+const LARGEST: u32 = 16_384;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  sheetsplat sweep builtin:head -o sheet.png --set splatting.slab_width=0.5,1,2
+  sheetsplat sweep scene.toml -o grid.png --set splatting.radius=1.4,2 --set splatting.compositing=linear,exponential")]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    input: Input,
+    /// The sheet: .png, .exr or .npy.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Tiles in a row; without it all values of the setting, or the first one of two.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    columns: Option<u32>,
+    /// Bits per channel of a PNG.
+    #[arg(long, value_enum, default_value = "8")]
+    depth: Depth,
+}
+
+pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> {
+    let Arguments { input, output, .. } = arguments;
+    Image::check_format(output)?;
+    let axes = swept(&input.sets);
+    check(&axes, arguments)?;
+    let columns = arguments.columns.unwrap_or(axes[0].values.len() as u32);
+
+    // All of them before the first is drawn: bad values are found at once.
+    let mut scenes = Vec::new();
+    for values in combinations(&axes) {
+        let mut sets = input.sets.clone();
+        let assign = |(axis, value): (&Axis, &String)| (axis.at, format!("{}={value}", axis.key));
+        for (at, set) in axes.iter().zip(&values).map(assign) {
+            sets[at] = set;
+        }
+        let label = axes.iter().zip(&values).map(|(axis, value)| format!("{} = {value}", axis.key));
+        scenes.push((input.scene_with(&sets)?, label.collect::<Vec<_>>()));
+    }
+    let sizes: Vec<_> =
+        scenes.iter().map(|(scene, label)| ([scene.image.width, scene.image.height], label.as_slice())).collect();
+    let layout = Layout::new(columns, &sizes).filter(|layout| layout.size.iter().all(|&side| side <= LARGEST));
+    let layout = layout.ok_or_else(|| {
+        let count = scenes.len();
+        let allowed = format!("sheets of at most {LARGEST} pixels a side");
+        Failure::Input(format!("{}: found {count} tiles in rows of {columns}, allowed: {allowed}", output.display()))
+    })?;
+    let tiles = draw(input, scenes, progress)?;
+    Ok(layout.draw(&tiles).save(output, arguments.depth.into())?)
+}
+
+fn check(axes: &[Axis], arguments: &Arguments) -> Result<(), Failure> {
+    let keys: Vec<&str> = axes.iter().map(|axis| axis.key.as_str()).collect();
+    let found = if keys.is_empty() { "none".to_owned() } else { keys.join(", ") };
+    if !(1..=2).contains(&axes.len()) {
+        let allowed = "one or two, as in --set splatting.slab_width=0.5,1,2";
+        return Err(Failure::Input(format!("--set: settings with several values: found {found}, allowed: {allowed}")));
+    }
+    for Axis { at, key, .. } in axes {
+        // Its labels would not be true.
+        let mut later = arguments.input.sets[at + 1..].iter().filter_map(|set| set.split_once('='));
+        if later.any(|(later, _)| later.trim() == key) {
+            let allowed = "before its several values only";
+            return Err(Failure::Input(format!("--set: {key}: found once more, allowed: {allowed}")));
+        }
+        if arguments.input.view.is_some() && ["camera", "camera.direction", "camera.up"].contains(&key.as_str()) {
+            return Err(Failure::Input(format!("--view: found with several values of {key}, allowed: without them")));
+        }
+    }
+    if let (Some(columns), 2) = (arguments.columns, axes.len()) {
+        return Err(Failure::Input(format!(
+            "--columns: found {columns} with {found}, allowed: with one swept setting"
+        )));
+    }
+    Ok(())
+}
+
+/// A value of every axis, those of the first one changing fastest.
+fn combinations(axes: &[Axis]) -> Vec<Vec<String>> {
+    let mut all: Vec<Vec<String>> = vec![Vec::new()];
+    for axis in axes {
+        let with = |value: &String| {
+            all.iter().map(|values| [values.as_slice(), std::slice::from_ref(value)].concat()).collect()
+        };
+        all = axis.values.iter().flat_map(|value| -> Vec<_> { with(value) }).collect();
+    }
+    all
+}
+
+/// Draws every scene; a volume is loaded again only where another one is asked for.
+fn draw(input: &Input, scenes: Vec<(Scene, Vec<String>)>, progress: bool) -> Result<Vec<Tile>, Failure> {
+    let headless = input.headless(false)?;
+    let mut progress = Progress::new(scenes.len(), progress);
+    let mut last: Option<(Scene, Arc<_>)> = None;
+    let mut tiles = Vec::new();
+    for (mut scene, label) in scenes {
+        let is_same =
+            |last: &Scene| (&last.volume, last.spacing, &last.labels) == (&scene.volume, scene.spacing, &scene.labels);
+        let volume = match last {
+            Some((last, volume)) if is_same(&last) => volume,
+            _ => Arc::new(input.load_volume(&scene)?),
+        };
+        input.look_at(&volume, &mut scene)?;
+        let rendering = headless.render_volume(volume.clone(), &scene).map_err(|error| input.failure(error))?;
+        log_frame(&label.join(", "), &rendering.stats);
+        tiles.push(Tile { image: rendering.image, label });
+        progress.step();
+        last = Some((scene, volume));
+    }
+    Ok(tiles)
+}

@@ -1,0 +1,24 @@
+//! All errors together.
+
+use crate::error::RenderError;
+use crate::gpu::device::DeviceError;
+use crate::scene::SceneError;
+use crate::volume::VolumeError;
+
+/// Anything that can go wrong between a scene file and its image.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The volume.
+    #[error(transparent)]
+    Volume(#[from] VolumeError),
+    /// The device.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+    /// The frame.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+}

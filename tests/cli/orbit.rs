@@ -1,0 +1,189 @@
+//! `sheetsplat orbit`: turntables, in parts and as movies.
+
+use glam::DMat3;
+use image::AnimationDecoder;
+
+use crate::*;
+
+/// Frames that all differ from one another.
+const TURNING: &str = "builtin:marschner-lobb:12 --set image.width=28 --set image.height=20 \
+                       --set transfer.opacity=[[60,0],[200,0.6]] --set camera={direction=[0.3,0.9,-0.2],up=[0.1,0,1]}";
+
+impl Folder {
+    fn orbit(&self, arguments: &str) {
+        let run = self.run(&format!("orbit {arguments}"));
+        run.assert_success();
+        assert!(!run.stderr.contains(['\r', '\x1b', '[']), "progress is for terminals: {arguments}\n{}", run.stderr);
+    }
+}
+
+fn set(names: &[&str]) -> BTreeSet<String> {
+    names.iter().map(|&name| name.to_owned()).collect()
+}
+
+#[test]
+fn frames_are_the_same_however_they_are_shared_out() {
+    for (rasterizer, extension) in RASTERIZERS.iter().zip(["png", "npy"]) {
+        let folder = Folder::new();
+        let turning = format!("{TURNING} {rasterizer} --turn 100 --count 4");
+        folder.orbit(&format!("{turning} -o all-%02d.{extension}"));
+        folder.orbit(&format!("{turning} -o part-##.{extension} --frames 2..4"));
+        folder.orbit(&format!("{turning} -o part-##.{extension} --frames 0..2"));
+        let mut frames = BTreeSet::new();
+        for frame in 0..4 {
+            let all = folder.read(&format!("all-0{frame}.{extension}"));
+            assert_eq!(all, folder.read(&format!("part-0{frame}.{extension}")), "frame {frame}");
+
+            let rotation =
+                DMat3::from_axis_angle(DVec3::new(0.1, 0.0, 1.0).normalize(), (25.0 * f64::from(frame)).to_radians());
+            let [x, y, z] = (rotation * DVec3::new(0.3, 0.9, -0.2)).to_array();
+            folder.render(&format!(
+                "{TURNING} {rasterizer} --set camera.direction=[{x:?},{y:?},{z:?}] -o one.{extension}"
+            ));
+            assert_eq!(all, folder.read(&format!("one.{extension}")), "frame {frame}");
+            frames.insert(all);
+        }
+        assert_eq!(frames.len(), 4, "all frames differ");
+    }
+}
+
+#[test]
+fn the_camera_turns_by_the_right_hand_and_ends_a_step_early() {
+    let folder = Folder::new();
+    let from = |direction: &str| folder.pixels(&format!("{SMALL} --set camera.direction={direction}"));
+    folder.orbit(&format!("{SMALL} --set camera.direction=[0,1,0] --count 4 -o %d.npy"));
+    assert_eq!(folder.names(), set(&["0.npy", "1.npy", "2.npy", "3.npy"]));
+    for (frame, direction) in ["[0,1,0]", "[-1,0,0]", "[0,-1,0]", "[1,0,0]"].into_iter().enumerate() {
+        let (.., turned) = folder.read_npy(&format!("{frame}.npy"));
+        let decibels = psnr(&turned, &from(direction).2, BLACK, 50);
+        assert!(decibels > 80.0, "frame {frame}: {decibels:.1} dB");
+    }
+    folder.orbit(&format!("{SMALL} --set camera.direction=[0,1,0] --turn -180 --count 2 --frames 1..2 -o back-%d.npy"));
+    let (.., turned) = folder.read_npy("back-1.npy");
+    assert!(psnr(&turned, &from("[1,0,0]").2, BLACK, 50) > 80.0);
+}
+
+#[test]
+fn what_is_there_is_not_drawn_again() {
+    let folder = Folder::new();
+    folder.write("f1.png", "not an image");
+    folder.orbit(&format!("{TURNING} --count 3 -o f%d.png"));
+    assert_eq!(folder.names(), set(&["f0.png", "f1.png", "f2.png"]), "nothing else stays");
+    assert_eq!(folder.read("f1.png"), b"not an image");
+    let last = folder.read("f2.png");
+    fs::remove_file(folder.path("f2.png")).unwrap();
+    folder.orbit(&format!("{TURNING} --count 3 -o f%d.png"));
+    assert_eq!(folder.read("f2.png"), last);
+    // With every frame there, no device is needed.
+    folder.orbit(&format!("{TURNING} --count 3 -o f%d.png --adapter nonesuch"));
+    folder.orbit(&format!("{TURNING} --count 3 -o f%d.png --overwrite --depth 16"));
+    assert!(matches!(image::open(folder.path("f1.png")).unwrap(), image::DynamicImage::ImageRgba16(_)));
+}
+
+#[test]
+fn an_apng_holds_the_frames_with_alpha() {
+    let folder = Folder::new();
+    let turning = format!("{TURNING} {TRANSPARENT} --count 5 --frames 1..4");
+    folder.orbit(&format!("{turning} -o f%d.png"));
+    folder.write("movie.apng", "old");
+    folder.orbit(&format!("{turning} -o movie.apng --fps 20"));
+    let bytes = folder.read("movie.apng");
+    let decoder = image::codecs::png::PngDecoder::new(std::io::Cursor::new(bytes)).unwrap().apng().unwrap();
+    let frames = decoder.into_frames().collect_frames().unwrap();
+    assert_eq!(frames.len(), 3);
+    for (frame, number) in frames.iter().zip(1..) {
+        assert_eq!(frame.delay().numer_denom_ms(), (50, 1));
+        let still = image::open(folder.path(&format!("f{number}.png"))).unwrap().to_rgba8();
+        assert_eq!(*frame.buffer(), still, "frame {number}");
+    }
+    folder.orbit(&format!("{turning} -o deep.apng --depth 16"));
+    folder.orbit(&format!("{turning} -o deep%d.png --depth 16"));
+    let [first, still] = ["deep.apng", "deep1.png"]
+        .map(|name| image::load_from_memory_with_format(&folder.read(name), image::ImageFormat::Png).unwrap());
+    assert!(matches!(first, image::DynamicImage::ImageRgba16(_)));
+    assert_eq!(first, still);
+}
+
+#[test]
+fn a_gif_is_over_black_and_keeps_time() {
+    let folder = Folder::new();
+    let turning = format!("{TURNING} {TRANSPARENT} --count 6");
+    folder.orbit(&format!("{turning} -o f%d.npy"));
+    folder.orbit(&format!("{turning} -o movie.gif --fps 30"));
+    let mut options = gif::DecodeOptions::new();
+    options.set_color_output(gif::ColorOutput::RGBA);
+    let bytes = folder.read("movie.gif");
+    let mut decoder = options.read_info(bytes.as_slice()).unwrap();
+    assert_eq!((decoder.width(), decoder.height(), decoder.repeat()), (28, 20, gif::Repeat::Infinite));
+    let mut delays = Vec::new();
+    while let Some(frame) = decoder.read_next_frame().unwrap() {
+        let (.., still) = folder.read_npy(&format!("f{}.npy", delays.len()));
+        let shown: Vec<[f32; 4]> = frame
+            .buffer
+            .as_chunks::<4>()
+            .0
+            .iter()
+            .map(|pixel| pixel.map(|channel| f32::from(channel) / 255.0))
+            .collect();
+        let over_black: Vec<[f32; 4]> = still.iter().map(|&[r, g, b, _]| [r, g, b, 1.0]).collect();
+        let decibels = psnr(&shown, &over_black, [0.0; 4], 50);
+        assert!(decibels > 30.0, "frame {}: {decibels:.1} dB", delays.len());
+        delays.push(frame.delay);
+    }
+    // Hundredths of a second: six frames last 20.
+    assert_eq!(delays, [3, 4, 3, 3, 4, 3]);
+}
+
+#[test]
+fn video_encoders_get_planes_of_luma_and_chroma() {
+    let folder = Folder::new();
+    let turning = format!("{TURNING} --count 3 --fps 25");
+    folder.orbit(&format!("{turning} -o movie.y4m"));
+    let streamed = folder.command(&format!("orbit {turning} -o -")).output().unwrap();
+    assert_eq!(streamed.status.code(), Some(0));
+    assert!(streamed.stdout == folder.read("movie.y4m"), "the stream is the file");
+    let header = b"YUV4MPEG2 W28 H20 F25:1 Ip A1:1 C420jpeg XCOLORRANGE=LIMITED\n";
+    assert!(streamed.stdout.starts_with(header));
+    assert_eq!(streamed.stdout.len(), header.len() + 3 * (6 + 28 * 20 * 3 / 2));
+
+    folder.orbit(&format!("{turning} -o full.y4m --chroma 444 --set image.width=27"));
+    let full = folder.read("full.y4m");
+    let header = b"YUV4MPEG2 W27 H20 F25:1 Ip A1:1 C444 XCOLORRANGE=LIMITED\n";
+    assert!(full.starts_with(header));
+    assert_eq!(full.len(), header.len() + 3 * (6 + 27 * 20 * 3));
+    // The corner is black, the middle is not.
+    let luma = &full[header.len() + 6..][..27 * 20];
+    assert_eq!(luma[0], 16);
+    assert!(luma[10 * 27 + 13] > 30 && luma.iter().all(|y| (16..=235).contains(y)));
+}
+
+#[test]
+fn bad_usage_and_input_are_2_and_leave_nothing() {
+    let folder = Folder::new();
+    for (arguments, words) in [
+        ("-o out.png", &["--output", "out.png", "frame-%04d.png", ".apng", ".gif"] as &[&str]),
+        ("-o %d-%d.png", &["--output", "%d-%d.png"]),
+        ("-o %d.jpg", &["%d.jpg", ".jpg", ".png"]),
+        ("-o out.mp4", &["--output", "out.mp4", ".y4m"]),
+        ("-o %d.png --count 0", &["--count", "0"]),
+        ("-o %d.png --count 4 --frames 2..5", &["--frames", "2..5", "0..4", "--count"]),
+        ("-o %d.png --frames 2..2", &["--frames", "2..2", "A..B"]),
+        ("-o %d.png --frames 3", &["--frames", "'3'", "A..B"]),
+        ("-o %d.png --turn inf", &["--turn", "inf", "finite"]),
+        ("-o out.gif --fps 60", &["--fps", "60", "50"]),
+        ("-o out.gif --set image.width=65536", &["image.width", "65536", "65535"]),
+        ("-o out.y4m --set image.width=27", &["image.width", "27×20", "even", "--chroma 444"]),
+        ("-o - --set image.height=19", &["image.height", "28×19", "even"]),
+        ("-o %d.png --set image.width=0", &["image.width", "0"]),
+        ("-o out.apng --set volume.builtin=nonesuch", &["nonesuch"]),
+    ] {
+        folder.run(&format!("orbit {TURNING} {arguments}")).assert_failure(2, words);
+        assert_eq!(folder.names(), BTreeSet::new(), "{arguments}");
+    }
+    folder.run("orbit gone.toml -o %d.png").assert_failure(2, &["gone.toml"]);
+    for output in ["no/%d.png", "no/out.gif"] {
+        folder.run(&format!("orbit {TURNING} --count 1 -o {output}")).assert_failure(1, &["no/", "No such file"]);
+    }
+    folder.run(&format!("orbit {TURNING} -o out.apng --adapter nonesuch")).assert_failure(1, &["nonesuch", "llvmpipe"]);
+    assert_eq!(folder.names(), BTreeSet::new());
+}
