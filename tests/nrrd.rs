@@ -238,6 +238,20 @@ fn spacings() {
 }
 
 #[test]
+fn units() {
+    let folder = Folder::new();
+    let unit = |fields: &str| {
+        let volume = folder.attached(&format!("{PLAIN}{fields}\n"), &bytes()).unwrap();
+        volume.unit().map(str::to_owned)
+    };
+    assert_eq!(unit("spacings: 1 1 1"), None);
+    assert_eq!(unit("units: \"um\" \"um\" \"micron\"").as_deref(), Some("µm"));
+    assert_eq!(unit("space units: \"mm\" \"mm\" \"mm\"\nunits: \"m\" \"m\" \"m\"").as_deref(), Some("mm"));
+    assert_eq!(unit("units: \"mm\" \"mm\" \"s\""), None);
+    assert_eq!(unit("units: mm"), None);
+}
+
+#[test]
 fn space_directions() {
     let folder = Folder::new();
     let open = |value: &str| folder.attached(&format!("{PLAIN}space directions: {value}\n"), &bytes());

@@ -12,7 +12,7 @@ use crate::clip::{Clip, MAX_PLANES};
 use crate::shading::{Light, Shading};
 use crate::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
 use crate::transfer_function::{LabelTables, Ramp};
-use crate::volume::{RAW_TYPES, RawLayout, SampleType};
+use crate::volume::{RawLayout, SampleType};
 
 const POSITIVE: Bounds = Bounds { text: "a finite number > 0", contain: |x| x > 0.0 };
 const NOT_NEGATIVE: Bounds = Bounds { text: "a finite number >= 0", contain: |x| x >= 0.0 };
@@ -64,7 +64,7 @@ pub(super) fn volume(
 fn raw_layout(section: &mut Section) -> Result<Option<RawLayout>, SceneError> {
     let (mut dims, mut sample_type, mut big_endian, mut offset) = (None, None, None, None);
     section.read("dims", &mut dims, |entry| entry.dims().map(Some))?;
-    section.read("type", &mut sample_type, |entry| entry.choice(&RAW_TYPES).map(Some))?;
+    section.read("type", &mut sample_type, |entry| entry.choice(&SampleType::NAMED).map(Some))?;
     let endians = [("little", false), ("big", true)];
     section.read("endian", &mut big_endian, |entry| entry.choice(&endians).map(Some))?;
     section.read("offset", &mut offset, |entry| entry.bytes().map(Some))?;
@@ -76,7 +76,7 @@ fn raw_layout(section: &mut Section) -> Result<Option<RawLayout>, SceneError> {
         return Ok(None);
     };
     let Some(sample_type) = sample_type else {
-        let names = RAW_TYPES.map(|(name, _)| format!("{name:?}")).join(" or ");
+        let names = SampleType::NAMED.map(|(name, _)| format!("{name:?}")).join(" or ");
         return Err(missing("volume.type", &names));
     };
     let is_one_byte = matches!(sample_type, SampleType::I8 | SampleType::U8);

@@ -31,7 +31,7 @@ impl Labels {
     /// If the file cannot be read, is of no known format, does not hold what its header promises, or has a sample that is no
     /// label (the error names the voxel).
     pub fn open(path: &Path) -> Result<Self, VolumeError> {
-        let Loaded { dims, spacing, values, .. } = format::read(path)?;
+        let (_, Loaded { dims, spacing, values, .. }) = format::read(path)?;
         Ok(Self { origin: path.display().to_string(), dims, spacing, values: values.into() })
     }
 }

@@ -13,6 +13,7 @@ use super::format::Loaded;
 use super::orientation::{Orientation, RAS_FROM_LPS, lengths_and_directions, orthogonal};
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
 use super::source::{MAX_HEADER, Source, number, shown, three};
+use super::unit::unit;
 
 /// Largest error of a direction's length.
 const UNIT_LENGTH: f64 = 1e-4;
@@ -29,7 +30,9 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
     let mut stream = if is_compressed { Stream::zlib(data)? } else { Stream::raw(data)? };
     let before_the_end = stream.exactly_left().unwrap_or(0).saturating_sub(samples.bytes());
     stream.skip(header_size.unwrap_or(before_the_end))?;
-    Ok(Loaded { dims: samples.dims, spacing, orientation, values: stream.samples(&samples, false)? })
+    let Samples { dims, kind, .. } = samples;
+    let unit = header.0.get("DistanceUnits").and_then(unit);
+    Ok(Loaded { dims, kind, spacing, unit, orientation, values: stream.samples(&samples, false)? })
 }
 
 struct Header(Fields);

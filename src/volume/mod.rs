@@ -2,6 +2,7 @@
 
 pub mod builtin;
 mod fields;
+mod folder;
 mod format;
 mod grid;
 mod labels;
@@ -16,6 +17,11 @@ mod orientation;
 mod raw;
 mod samples;
 mod source;
+#[cfg(feature = "tiff")]
+mod tiff;
+mod unit;
+#[cfg(feature = "tiff")]
+mod xml;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -27,7 +33,6 @@ pub use grid::Grid;
 pub use labels::Labels;
 pub use orientation::{Orientation, View};
 pub use raw::RawLayout;
-pub(crate) use raw::TYPES as RAW_TYPES;
 pub use samples::SampleType;
 pub(crate) use samples::{SIZES, dims_of};
 
@@ -61,6 +66,15 @@ pub enum VolumeError {
     },
 }
 
+/// How a file holds a volume.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Encoding {
+    /// The format's name: `NRRD`, `NIfTI`, `raw`.
+    pub format: &'static str,
+    /// The type of its samples, before slope and intercept.
+    pub sample_type: SampleType,
+}
+
 fn invalid(origin: &str, field: &str, found: String, allowed: String) -> VolumeError {
     VolumeError::Invalid { origin: origin.to_owned(), field: field.to_owned(), found, allowed }
 }
@@ -75,6 +89,8 @@ pub struct Volume {
     values: Vec<f32>,
     labels: Option<Arc<[u16]>>,
     orientation: Option<Orientation>,
+    unit: Option<String>,
+    encoding: Option<Encoding>,
 }
 
 impl Volume {
@@ -96,8 +112,8 @@ impl Volume {
             let voxel = Grid { dims, spacing }.voxel_at(at as u32);
             return Err(invalid("data", format!("{} at voxel {voxel}", values[at]), "finite values"));
         }
-        Self { grid: Grid { dims, spacing: DVec3::ONE }, values, labels: None, orientation: None }
-            .with_spacing(origin, spacing)
+        let grid = Grid { dims, spacing: DVec3::ONE };
+        Self { grid, values, labels: None, orientation: None, unit: None, encoding: None }.with_spacing(origin, spacing)
     }
 
     /// The same values at another spacing (world units per voxel step).
@@ -116,14 +132,17 @@ impl Volume {
     }
 
     /// Reads a volume file. Its format is told by its first bytes, or else by the extension: NRRD (`.nrrd`, `.nhdr`), and, each
-    /// with the feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MetaImage (`.mha`, `.mhd`) and NPY (`.npy`).
+    /// with the feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MetaImage (`.mha`, `.mhd`), NPY (`.npy`) and
+    /// TIFF (`.tif`, `.tiff`). Or a folder of slices: TIFF files of one page.
     ///
     /// # Errors
     /// If the file cannot be read, is of no format that is compiled in, or does not hold what its header promises.
     pub fn open(path: &Path) -> Result<Self, VolumeError> {
-        let Loaded { dims, spacing, orientation, values } = format::read(path)?;
+        let (format, Loaded { dims, kind: sample_type, spacing, unit, orientation, values }) = format::read(path)?;
         let origin = path.display().to_string();
-        Self::new(&origin, dims, spacing.unwrap_or(DVec3::ONE), values)?.with_orientation(&origin, orientation)
+        let volume = Self::new(&origin, dims, spacing.unwrap_or(DVec3::ONE), values)?;
+        let encoding = Some(Encoding { format, sample_type });
+        Self { unit, encoding, ..volume }.with_orientation(&origin, orientation)
     }
 
     /// Where the voxels are.
@@ -139,6 +158,16 @@ impl Volume {
     /// World units from voxel to voxel along x, y and z.
     pub fn spacing(&self) -> DVec3 {
         self.grid.spacing
+    }
+
+    /// What a world unit is, if the file says so: `mm`, `µm`, or what else stands there.
+    pub fn unit(&self) -> Option<&str> {
+        self.unit.as_deref()
+    }
+
+    /// How the file held the values; `None` if they come from no file.
+    pub fn encoding(&self) -> Option<Encoding> {
+        self.encoding
     }
 
     /// All values, x fastest, then y, then z.

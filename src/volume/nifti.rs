@@ -49,7 +49,8 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
     }
     stream.skip(vox_offset)?;
     let samples = Samples { kind, dims, big_endian: header.big_endian, rescale, z_fastest: false };
-    Ok(Loaded { dims, spacing: Some(spacing), orientation, values: stream.samples(&samples, false)? })
+    let (spacing, unit) = (Some(spacing), header.unit());
+    Ok(Loaded { dims, kind, spacing, unit, orientation, values: stream.samples(&samples, false)? })
 }
 
 /// The rest of a file's name where it ends with `from`, or with that and `.gz`; with `to` instead.
@@ -76,6 +77,7 @@ struct Header {
     datatype: i64,
     bitpix: i64,
     pixdim: [f64; 4],
+    xyzt_units: u8,
     vox_offset: f64,
     slope_and_intercept: [f64; 2],
     qform_code: i64,
@@ -157,6 +159,7 @@ impl Header {
                 datatype: bytes.i16(70),
                 bitpix: bytes.i16(72),
                 pixdim: bytes.f32s(76),
+                xyzt_units: bytes.bytes[123],
                 vox_offset,
                 slope_and_intercept: [slope, intercept],
                 qform_code: bytes.i16(252),
@@ -176,6 +179,7 @@ impl Header {
             datatype: bytes.i16(12),
             bitpix: bytes.i16(14),
             pixdim: bytes.f64s(104),
+            xyzt_units: i32::from_le_bytes(bytes.at(500)) as u8,
             vox_offset: i64::from_le_bytes(bytes.at(168)) as f64,
             slope_and_intercept: [slope, intercept],
             qform_code: bytes.i32(344),
@@ -201,7 +205,7 @@ impl Header {
 
     fn sample_type(&self) -> Result<SampleType, VolumeError> {
         let Some(&(_, kind)) = TYPES.iter().find(|(code, _)| *code == self.datatype) else {
-            let allowed = TYPES.map(|(code, kind)| format!("{code} ({kind:?})")).join(", ");
+            let allowed = TYPES.map(|(code, kind)| format!("{code} ({kind})")).join(", ");
             return Err(self.invalid("datatype", self.datatype, allowed));
         };
         let bits = 8 * kind.bytes() as i64;
@@ -231,6 +235,17 @@ impl Header {
             None if slope == 0.0 || [slope, intercept] == [1.0, 0.0] => Ok(None),
             None => Ok(Some([slope, intercept])),
         }
+    }
+
+    fn unit(&self) -> Option<String> {
+        // The bits above are the unit of time.
+        let name = match self.xyzt_units & 7 {
+            1 => "m",
+            2 => "mm",
+            3 => "µm",
+            _ => return None,
+        };
+        Some(name.to_owned())
     }
 
     fn spacing_and_orientation(&self) -> Result<(DVec3, Option<Orientation>), VolumeError> {

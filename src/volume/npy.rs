@@ -29,7 +29,9 @@ const TYPES: [(&str, SampleType); 10] = [
 pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
     let mut stream = Stream::raw(Source::open(path)?)?;
     let samples = parse(path, &header(path, &mut stream)?)?;
-    Ok(Loaded { dims: samples.dims, spacing: None, orientation: None, values: stream.samples(&samples, false)? })
+    let Samples { dims, kind, .. } = samples;
+    let values = stream.samples(&samples, false)?;
+    Ok(Loaded { dims, kind, spacing: None, unit: None, orientation: None, values })
 }
 
 /// The text between the header's length and the samples.

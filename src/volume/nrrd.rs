@@ -1,6 +1,6 @@
 //! NRRD files: a text header, then the samples, in the same file or in one of their own.
 //!
-//! Axes are those of the array. Units and the fields that describe what a sample means (`old min`, `kinds`, …) do not change the
+//! Axes are those of the array. The fields that describe what a sample means (`old min`, `kinds`, …) do not change the
 //! volume.
 
 use std::io::{BufRead, Read};
@@ -14,6 +14,7 @@ use super::format::Loaded;
 use super::orientation::{Orientation, RAS_FROM_LPS, lengths_and_directions, orthogonal};
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
 use super::source::{MAX_HEADER, Source, invalid, io_error, lower, number, shown, three, vector};
+use super::unit;
 
 /// Reads one NRRD file, or the detached header and the data file it names.
 pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
@@ -23,7 +24,8 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
     let (spacing, orientation) = header.spacing_and_orientation()?;
     let layout = header.layout(dims)?;
     let data = header.data_path()?.map_or(Ok(file), |path| Source::open(&path))?;
-    Ok(Loaded { dims, spacing, orientation, values: layout.read(data)? })
+    let (kind, unit) = (layout.samples.kind, header.unit());
+    Ok(Loaded { dims, kind, spacing, unit, orientation, values: layout.read(data)? })
 }
 
 /// The fields of a header, under the format's first spelling of their names.
@@ -104,6 +106,12 @@ impl Header {
                 "one of `spacings` and `space directions`",
             )),
         }
+    }
+
+    /// The unit of all axes, of the space or else of the array: three names in quotes.
+    fn unit(&self) -> Option<String> {
+        let names = self.0.get("space units").or(self.0.get("units"))?.split('"').skip(1).step_by(2);
+        unit::common(names)
     }
 
     /// Lengths and directions of the axis vectors of `space directions`.

@@ -6,7 +6,7 @@ use glam::{DVec3, UVec3};
 
 use super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
 use super::source::{Source, invalid};
-use super::{Volume, VolumeError};
+use super::{Encoding, Volume, VolumeError};
 
 /// What a raw file has no header to say.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,20 +20,6 @@ pub struct RawLayout {
     /// Bytes before the first sample.
     pub offset: u64,
 }
-
-/// The types by their names in scenes.
-pub(crate) const TYPES: [(&str, SampleType); 10] = [
-    ("int8", SampleType::I8),
-    ("uint8", SampleType::U8),
-    ("int16", SampleType::I16),
-    ("uint16", SampleType::U16),
-    ("int32", SampleType::I32),
-    ("uint32", SampleType::U32),
-    ("int64", SampleType::I64),
-    ("uint64", SampleType::U64),
-    ("float32", SampleType::F32),
-    ("float64", SampleType::F64),
-];
 
 impl Volume {
     /// Reads a file of samples without a header, whatever its name. Spacing is 1.
@@ -49,6 +35,7 @@ impl Volume {
         let mut stream = Stream::raw(Source::open(path)?)?;
         stream.skip(offset)?;
         let values = stream.samples(&Samples { kind, dims, big_endian, rescale: None, z_fastest: false }, false)?;
-        Self::new(&path.display().to_string(), dims, DVec3::ONE, values)
+        let volume = Self::new(&path.display().to_string(), dims, DVec3::ONE, values)?;
+        Ok(Self { encoding: Some(Encoding { format: "raw", sample_type: kind }), ..volume })
     }
 }

@@ -3,7 +3,8 @@
 //! Whatever a header promises is checked against what the file can hold before memory is asked for, and samples are converted as
 //! they are read, so a load needs little more than the values themselves.
 
-use std::fmt::Display;
+use std::collections::TryReserveError;
+use std::fmt::{self, Display, Formatter};
 use std::fs::File;
 #[cfg(feature = "metaimage")]
 use std::io::BufRead;
@@ -56,11 +57,19 @@ impl Voxel for u16 {
 }
 
 macro_rules! sample_types {
-    ($($name:ident: $type:ty),*) => {
-        /// The type of the samples in a file.
+    ($($name:ident: $type:ty = $text:literal),*) => {
+        /// The type of the samples in a file. Shown as scenes name it: `int8`, `float32`.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum SampleType {
             $(#[doc = concat!("`", stringify!($type), "`")] $name),*
+        }
+
+        impl Display for SampleType {
+            fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+                f.write_str(match self {
+                    $(Self::$name => $text),*
+                })
+            }
         }
 
         $(impl Sample for $type {
@@ -74,6 +83,9 @@ macro_rules! sample_types {
         })*
 
         impl SampleType {
+            /// All of them, by name.
+            pub(crate) const NAMED: [(&'static str, Self); 10] = [$(($text, Self::$name)),*];
+
             /// The size of one.
             pub(super) fn bytes(self) -> u64 {
                 match self {
@@ -101,7 +113,16 @@ macro_rules! sample_types {
 }
 
 sample_types!(
-    I8: i8, U8: u8, I16: i16, U16: u16, I32: i32, U32: u32, I64: i64, U64: u64, F32: f32, F64: f64
+    I8: i8 = "int8",
+    U8: u8 = "uint8",
+    I16: i16 = "int16",
+    U16: u16 = "uint16",
+    I32: i32 = "int32",
+    U32: u32 = "uint32",
+    I64: i64 = "int64",
+    U64: u64 = "uint64",
+    F32: f32 = "float32",
+    F64: f64 = "float64"
 );
 
 fn append<S: Sample, T: Voxel>(samples: impl Iterator<Item = S>, into: &mut Vec<T>) -> Result<(), f64> {
@@ -148,6 +169,18 @@ impl Samples {
         let [nx, ny, nz] = self.dims.to_array().map(|n| n as usize);
         let rows = (0..nz).flat_map(|z| (0..ny).map(move |y| z + nz * y));
         rows.flat_map(|first| (0..nx).map(move |x| first + nz * ny * x)).map(|at| samples[at]).collect()
+    }
+
+    /// Appends what all the bytes of some samples are, `into` being the values before them.
+    pub(super) fn append<T: Voxel>(&self, path: &Path, bytes: &[u8], into: &mut Vec<T>) -> Result<(), VolumeError> {
+        into.try_reserve(bytes.len() / self.kind.bytes() as usize).map_err(self.too_many(path))?;
+        self.kind.convert(self, bytes, into).map_err(|sample| {
+            invalid(path, "data", format!("{sample} at voxel {}", self.voxel_at(into.len())), T::ALLOWED)
+        })
+    }
+
+    fn too_many(&self, path: &Path) -> impl Fn(TryReserveError) -> VolumeError {
+        move |error| invalid(path, "data", format!("{} samples: {error}", self.count()), "fewer")
     }
 
     fn mismatch(&self, path: &Path, held: impl Display) -> VolumeError {
@@ -253,12 +286,11 @@ impl Stream {
 
     fn read_samples<T: Voxel>(&mut self, samples: &Samples) -> Result<Vec<T>, VolumeError> {
         let path = self.path.clone();
-        let too_many = |error| invalid(&path, "data", format!("{} samples: {error}", samples.count()), "fewer");
         let (mut values, mut chunk) = (Vec::new(), Vec::with_capacity(CHUNK as usize));
         // What a compressed stream holds is not known yet: memory grows with what comes out of it. A file that is not
         // compressed holds them all.
         let known = if self.exactly_left().is_some() { samples.count() as usize } else { 0 };
-        values.try_reserve_exact(known).map_err(too_many)?;
+        values.try_reserve_exact(known).map_err(samples.too_many(&path))?;
         let mut left = samples.bytes();
         while left > 0 {
             chunk.clear();
@@ -267,11 +299,7 @@ impl Stream {
             if read < wanted {
                 return Err(samples.mismatch(&path, samples.bytes() - left + read));
             }
-            values.try_reserve(chunk.len() / samples.kind.bytes() as usize).map_err(too_many)?;
-            samples.kind.convert(samples, &chunk, &mut values).map_err(|sample| {
-                let voxel = samples.voxel_at(values.len());
-                invalid(&path, "data", format!("{sample} at voxel {voxel}"), T::ALLOWED)
-            })?;
+            samples.append(&path, &chunk, &mut values)?;
             left -= read;
         }
         values.shrink_to_fit();

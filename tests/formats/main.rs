@@ -8,6 +8,7 @@ mod metaimage;
 mod nifti;
 mod npy;
 mod raw;
+mod tiff;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -71,6 +72,8 @@ impl Folder {
 
     fn open(&self, name: &str, bytes: &[u8]) -> Result<Volume, VolumeError> {
         let path = self.0.path().join(name);
+        // Written over, a file may be waited for until it is on the disk; a new one is not.
+        _ = fs::remove_file(&path);
         fs::write(&path, bytes).unwrap();
         Volume::open(&path)
     }

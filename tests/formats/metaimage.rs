@@ -57,6 +57,9 @@ fn spellings_slope_and_size() {
         .replace("DimSize", "ElementSize = 1 2 4\nRotation = 0 1 0 -1 0 0 0 0 1\nPosition = 1 2 3\nDimSize");
     let volume = local(&header, &data()).unwrap();
     assert!(volume.values().iter().zip(values()).all(|(&found, value)| found == 2.0 * value - 1.0));
+    assert_eq!(volume.unit(), None);
+    let micrometers = header.replace("DimSize", "DistanceUnits = um\nDimSize");
+    assert_eq!(local(&micrometers, &data()).unwrap().unit(), Some("µm"));
     assert_eq!(volume.spacing(), DVec3::new(1.0, 2.0, 4.0));
     let orientation = volume.orientation().unwrap();
     assert_eq!(orientation.axes, DMat3::from_cols(DVec3::NEG_Y, DVec3::X, DVec3::Z));

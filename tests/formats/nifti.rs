@@ -4,7 +4,7 @@ use std::io::Write;
 use std::time::{Duration, Instant};
 
 use flate2::{Compression, write::GzEncoder};
-use sheetsplat::volume::Labels;
+use sheetsplat::volume::{Encoding, Labels, SampleType};
 
 use crate::*;
 
@@ -59,7 +59,20 @@ fn pairs_open_by_either_name() {
 #[test]
 fn of_itk() {
     let lps = DVec3::new(-1.0, -1.0, 1.0);
-    assert_lies(&open("itk.nii.gz"), DMat3::from_diagonal(lps) * rotation(), lps * ORIGIN);
+    let volume = open("itk.nii.gz");
+    assert_lies(&volume, DMat3::from_diagonal(lps) * rotation(), lps * ORIGIN);
+    assert_eq!(volume.unit(), Some("mm"));
+    assert_eq!(volume.encoding(), Some(Encoding { format: "NIfTI", sample_type: SampleType::F64 }));
+}
+
+#[test]
+fn units() {
+    let folder = Folder::new();
+    // Bits 3 to 5 are the unit of time.
+    for (code, unit) in [(0, None), (9, Some("m")), (2, Some("mm")), (11, Some("µm")), (8, None), (4, None)] {
+        assert_eq!(folder.open("a.nii", &patched("sform.nii", 123, &[code])).unwrap().unit(), unit, "{code}");
+        assert_eq!(folder.open("a.nii", &patched("nifti2.nii", 500, &[code])).unwrap().unit(), unit, "{code}");
+    }
 }
 
 #[test]
@@ -117,7 +130,7 @@ fn wrong_fields() {
     for size in [0_i16, -5] {
         refused(42, &size.to_le_bytes(), "dim", &size.to_string(), "three positive integers");
     }
-    refused(70, &[128, 0], "datatype", "128", "4 (I16)");
+    refused(70, &[128, 0], "datatype", "128", "4 (int16)");
     refused(72, &[8, 0], "bitpix", "8", "16, as datatype 4");
     for (offset, found) in [(348.0_f32, "348"), (353.5, "353.5"), (-1.0, "-1"), (f32::NAN, "NaN"), (1e30, "1000000")] {
         refused(108, &offset.to_le_bytes(), "vox_offset", found, "a whole number from 352");
