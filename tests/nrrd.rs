@@ -37,6 +37,8 @@ impl Folder {
 
     fn write(&self, name: &str, parts: &[&[u8]]) -> PathBuf {
         let path = self.0.path().join(name);
+        // Written over, a file may be waited for until it is on the disk; a new one is not.
+        _ = fs::remove_file(&path);
         fs::write(&path, parts.concat()).unwrap();
         path
     }

@@ -95,6 +95,20 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             read: reader!("tiff", super::tiff::read),
             read_folder: reader!("tiff", super::tiff::read_folder).ok(),
         },
+        Format {
+            name: "VTI",
+            extensions: &[".vti"],
+            is_magic: |head| head.windows(8).any(|window| window == b"<VTKFile"),
+            read: reader!("vtk", super::vtk::read_image_data),
+            read_folder: None,
+        },
+        Format {
+            name: "VTK",
+            extensions: &[".vtk"],
+            is_magic: |head| head.starts_with(b"# vtk DataFile"),
+            read: reader!("vtk", super::vtk::read_legacy),
+            read_folder: None,
+        },
     ]
 }
 

@@ -10,13 +10,10 @@ use glam::{DMat3, DVec3, UVec3};
 use super::VolumeError;
 use super::fields::Fields;
 use super::format::Loaded;
-use super::orientation::{Orientation, RAS_FROM_LPS, lengths_and_directions, orthogonal};
+use super::orientation::{Orientation, RAS_FROM_LPS, unit_directions};
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
 use super::source::{MAX_HEADER, Source, number, shown, three};
 use super::unit::unit;
-
-/// Largest error of a direction's length.
-const UNIT_LENGTH: f64 = 1e-4;
 
 /// Reads one MetaImage file, or the header and the data file it names.
 pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
@@ -120,12 +117,8 @@ impl Header {
             return Ok(None);
         };
         let columns = DMat3::from_cols_array(&matrix);
-        let (lengths, axes) = lengths_and_directions([columns.x_axis, columns.y_axis, columns.z_axis])
-            .map_err(|found| self.0.invalid(&name, found, orthogonal()))?;
-        if (lengths - 1.0).abs().max_element() > UNIT_LENGTH {
-            let found = format!("axes of the lengths {:?}", lengths.to_array());
-            return Err(self.0.invalid(&name, found, format!("lengths of 1, to {UNIT_LENGTH}")));
-        }
+        let axes = unit_directions([columns.x_axis, columns.y_axis, columns.z_axis])
+            .map_err(|(found, allowed)| self.0.invalid(&name, found, allowed))?;
         let origin = self.numbers(&["Offset", "Position", "Origin"])?;
         let origin = origin.map_or(DVec3::ZERO, |(_, origin)| DVec3::from_array(origin));
         Ok(Some(Orientation { axes: DMat3::from_diagonal(RAS_FROM_LPS) * axes, origin: RAS_FROM_LPS * origin }))

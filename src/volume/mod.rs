@@ -20,7 +20,9 @@ mod source;
 #[cfg(feature = "tiff")]
 mod tiff;
 mod unit;
-#[cfg(feature = "tiff")]
+#[cfg(feature = "vtk")]
+mod vtk;
+#[cfg(any(feature = "tiff", feature = "vtk"))]
 mod xml;
 
 use std::path::{Path, PathBuf};
@@ -132,8 +134,8 @@ impl Volume {
     }
 
     /// Reads a volume file. Its format is told by its first bytes, or else by the extension: NRRD (`.nrrd`, `.nhdr`), and, each
-    /// with the feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MetaImage (`.mha`, `.mhd`), NPY (`.npy`) and
-    /// TIFF (`.tif`, `.tiff`). Or a folder of slices: TIFF files of one page.
+    /// with the feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MetaImage (`.mha`, `.mhd`), NPY (`.npy`), TIFF
+    /// (`.tif`, `.tiff`) and VTK (`.vti`, `.vtk`). Or a folder of slices: TIFF files of one page.
     ///
     /// # Errors
     /// If the file cannot be read, is of no format that is compiled in, or does not hold what its header promises.

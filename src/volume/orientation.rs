@@ -7,6 +7,10 @@ use super::{Volume, VolumeError, invalid};
 /// Largest cosine between two axes that still counts as a right angle.
 const MAX_COSINE: f64 = 1e-4;
 
+/// Largest error of a direction's length.
+#[cfg(any(feature = "metaimage", feature = "vtk"))]
+const UNIT_LENGTH: f64 = 1e-4;
+
 /// LPS, as DICOM and MetaImage count, to RAS.
 pub(super) const RAS_FROM_LPS: DVec3 = DVec3::new(-1.0, -1.0, 1.0);
 
@@ -102,6 +106,20 @@ pub(super) fn lengths_and_directions(steps: [DVec3; 3]) -> Result<(DVec3, DMat3)
         return Err(format!("axes that are not orthogonal, at a cosine of {cosine:.6}"));
     }
     Ok((DVec3::from_array(lengths), DMat3::from_cols(x, y, z)))
+}
+
+/// Directions of three vectors that are of length 1 already.
+///
+/// # Errors
+/// What they are instead, and what is allowed.
+#[cfg(any(feature = "metaimage", feature = "vtk"))]
+pub(super) fn unit_directions(axes: [DVec3; 3]) -> Result<DMat3, (String, String)> {
+    let (lengths, directions) = lengths_and_directions(axes).map_err(|found| (found, orthogonal()))?;
+    if (lengths - 1.0).abs().max_element() > UNIT_LENGTH {
+        let found = format!("axes of the lengths {:?}", lengths.to_array());
+        return Err((found, format!("lengths of 1, to {UNIT_LENGTH}")));
+    }
+    Ok(directions)
 }
 
 /// What [`lengths_and_directions`] takes.

@@ -20,7 +20,7 @@ use super::source::{CHUNK, Source, invalid, io_error};
 use super::{Grid, VolumeError};
 
 /// Deflate spends at least 2 bits on a match of at most 258 bytes, so no stream expands by more.
-const MAX_EXPANSION: u64 = 1032;
+pub(super) const MAX_EXPANSION: u64 = 1032;
 
 /// A number as a file has it.
 pub(super) trait Sample: Copy {
@@ -91,6 +91,15 @@ macro_rules! sample_types {
                 match self {
                     $(Self::$name => size_of::<$type>() as u64),*
                 }
+            }
+
+            /// Appends the bytes, in the machine's order, of a sample that is written as text.
+            #[cfg(feature = "vtk")]
+            pub(super) fn parse(self, text: &str, into: &mut Vec<u8>) -> Option<()> {
+                match self {
+                    $(Self::$name => into.extend(text.parse::<$type>().ok()?.to_ne_bytes())),*
+                }
+                Some(())
             }
 
             /// Appends the samples in some bytes, a whole number of them. Stops at one that is not allowed, and gives it back.
@@ -183,7 +192,7 @@ impl Samples {
         move |error| invalid(path, "data", format!("{} samples: {error}", self.count()), "fewer")
     }
 
-    fn mismatch(&self, path: &Path, held: impl Display) -> VolumeError {
+    pub(super) fn mismatch(&self, path: &Path, held: impl Display) -> VolumeError {
         let allowed = format!("{} bytes ({} samples of {})", self.bytes(), self.count(), self.kind.bytes());
         invalid(path, "data", format!("{held} bytes"), allowed)
     }
@@ -234,6 +243,12 @@ impl Stream {
         Ok(Self { path: file.path, reader: Reader::Decoder(decoder, "one whole and undamaged zlib stream"), left })
     }
 
+    /// What `reader` decodes from a file; `allowed` is what it takes, and no more than `left` bytes come out of it.
+    #[cfg(feature = "vtk")]
+    pub(super) fn decoded(path: &Path, reader: Box<dyn Read>, allowed: &'static str, left: u64) -> Self {
+        Self { path: path.to_owned(), reader: Reader::Decoder(reader, allowed), left }
+    }
+
     /// How many bytes are left, if the stream is not compressed.
     pub(super) fn exactly_left(&self) -> Option<u64> {
         matches!(self.reader, Reader::Raw(_)).then_some(self.left)
@@ -253,7 +268,7 @@ impl Stream {
     }
 
     /// So many bytes of a header.
-    #[cfg(any(feature = "nifti", feature = "npy"))]
+    #[cfg(any(feature = "nifti", feature = "npy", feature = "vtk"))]
     pub(super) fn bytes(&mut self, bytes: u64) -> Result<Vec<u8>, VolumeError> {
         let mut header = Vec::new();
         let read = self.read_up_to(bytes, &mut header)?;

@@ -9,6 +9,7 @@ mod nifti;
 mod npy;
 mod raw;
 mod tiff;
+mod vtk;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -84,6 +85,15 @@ fn patched(name: &str, at: usize, bytes: &[u8]) -> Vec<u8> {
     let mut all = fs::read(fixture(name)).unwrap();
     all[at..at + bytes.len()].copy_from_slice(bytes);
     all
+}
+
+/// A fixture's bytes with other text in place of some.
+#[track_caller]
+fn replaced(name: &str, text: &str, instead: &str) -> Vec<u8> {
+    let bytes = fs::read(fixture(name)).unwrap();
+    let at = bytes.windows(text.len()).position(|window| window == text.as_bytes());
+    let at = at.unwrap_or_else(|| panic!("{name}: no {text}"));
+    [&bytes[..at], instead.as_bytes(), &bytes[at + text.len()..]].concat()
 }
 
 /// Asserts that the message names the file, the field, what was found and what is allowed.

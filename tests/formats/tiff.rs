@@ -24,11 +24,7 @@ fn with_tags(name: &str, tags: &[(u16, u32)]) -> Vec<u8> {
 
 /// A file with some text in place of other text, which is not shorter.
 fn with_text(name: &str, text: &str, instead: &str) -> Vec<u8> {
-    let instead = format!("{instead}{}", "\n".repeat(text.len() - instead.len()));
-    let mut bytes = fs::read(fixture(name)).unwrap();
-    let at = bytes.windows(text.len()).position(|window| window == text.as_bytes()).unwrap();
-    bytes[at..at + text.len()].copy_from_slice(instead.as_bytes());
-    bytes
+    replaced(name, text, &format!("{instead}{}", "\n".repeat(text.len() - instead.len())))
 }
 
 #[test]
