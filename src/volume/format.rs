@@ -53,7 +53,7 @@ macro_rules! reader {
 }
 
 /// Formats that have a slice in every file of a folder.
-const SLICES: [&str; 1] = ["TIFF"];
+const SLICES: [&str; 2] = ["TIFF", "DICOM"];
 
 fn formats<T: Voxel>() -> Vec<Format<T>> {
     vec![
@@ -94,6 +94,13 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             is_magic: |head| matches!(head.get(..4), Some(b"II*\0" | b"MM\0*" | b"II+\0" | b"MM\0+")),
             read: reader!("tiff", super::tiff::read),
             read_folder: reader!("tiff", super::tiff::read_folder).ok(),
+        },
+        Format {
+            name: "DICOM",
+            extensions: &[".dcm"],
+            is_magic: |head| head.get(128..132) == Some(b"DICM"),
+            read: reader!("dicom", super::dicom::read),
+            read_folder: reader!("dicom", super::dicom::read_folder).ok(),
         },
         Format {
             name: "VTI",

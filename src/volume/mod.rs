@@ -1,6 +1,8 @@
 //! Scalar volumes: extent, spacing and values, without any appearance.
 
 pub mod builtin;
+#[cfg(feature = "dicom")]
+mod dicom;
 mod fields;
 mod folder;
 mod format;
@@ -135,7 +137,8 @@ impl Volume {
 
     /// Reads a volume file. Its format is told by its first bytes, or else by the extension: NRRD (`.nrrd`, `.nhdr`), and, each
     /// with the feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MetaImage (`.mha`, `.mhd`), NPY (`.npy`), TIFF
-    /// (`.tif`, `.tiff`) and VTK (`.vti`, `.vtk`). Or a folder of slices: TIFF files of one page.
+    /// (`.tif`, `.tiff`), DICOM (`.dcm`) and VTK (`.vti`, `.vtk`). Or a folder of slices: TIFF files of one page, or DICOM files of one
+    /// series.
     ///
     /// # Errors
     /// If the file cannot be read, is of no format that is compiled in, or does not hold what its header promises.

@@ -94,3 +94,41 @@ fn raw_files_are_what_the_arguments_say() {
     refused(&format!("{raw} --dims 5,4,2"), &["a.raw", "data", "120 bytes", "80 bytes"]);
     refused("a.raw --dims 5,4,3 --type half", &["--set", "volume.type", "half", "uint16"]);
 }
+
+/// What a file does not say, or says otherwise than a grid can be, is told with what is made of it.
+#[test]
+fn warnings_state_what_is_assumed() {
+    let folder = Folder::new();
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
+    let warned = |input: &str, words: &str| {
+        let run = folder.run(&format!("render {input} {SIZE} -o out.npy"));
+        run.assert_success();
+        assert!(run.stderr.contains(words), "{}", run.stderr);
+    };
+    let fixture = |name: &str| fixtures.join(name).display().to_string();
+    warned(&fixture("plain.tif"), "plain.tif: no distance between slices is given: taken to be 0.5 mm");
+    warned(&fixture("series/IM1"), "IM1: one slice; a folder with all slices of a series is read as one volume");
+
+    // The slice in the middle a twentieth of a step up.
+    fs::create_dir(folder.path("series")).unwrap();
+    for name in ["IM1", "IM2", "IM3.dcm"] {
+        fs::copy(fixtures.join("series").join(name), folder.path("series").join(name)).unwrap();
+    }
+    let slice = folder.read("series/IM3.dcm");
+    let position = b"DS\x10\x0012.0\\-21.5\\32.0  ";
+    let at = slice.windows(position.len()).position(|window| window == position).unwrap();
+    let shifted = [&slice[..at], b"DS\x10\x0012.1\\-21.55\\32.1 ", &slice[at + position.len()..]].concat();
+    folder.write("series/IM3.dcm", shifted);
+    warned(
+        "series",
+        "series: slices are not evenly spaced: taken to be 3.0000 mm apart, which is wrong by up to 0.1500 mm",
+    );
+
+    // Numbers that leave one out.
+    fs::create_dir(folder.path("slices")).unwrap();
+    for (from, to) in [(8, 8), (9, 9), (10, 11)] {
+        let from = fixtures.join(format!("slices/z{from}.tif"));
+        fs::copy(from, folder.path(&format!("slices/z{to}.tif"))).unwrap();
+    }
+    warned("slices", "slices: the slices' numbers go up by [1, 2]: taken as neighbours, none is left out");
+}

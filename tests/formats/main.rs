@@ -3,6 +3,7 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod dicom;
 mod dispatch;
 mod metaimage;
 mod nifti;
