@@ -250,7 +250,6 @@ fn damage() {
     for name in FRAMES.into_iter().chain(["series/IM2"]) {
         let name_of_copy = name.rsplit('/').next().unwrap();
         let whole = fs::read(fixture(name)).unwrap();
-        assert_survives_damage(name_of_copy, &whole);
         let folder = Folder::new();
         let values = Volume::open(&fixture(name)).unwrap().values().to_vec();
         for length in 0..whole.len() {

@@ -120,31 +120,3 @@ fn assert_exact(name: &str, whole: &[u8]) {
     let longer = [whole, b"\n"].concat();
     assert!(matches!(folder.open(name, &longer), Err(VolumeError::Invalid { .. })), "{name}: one byte more");
 }
-
-/// Damages a file in many ways, and asserts that it is a whole volume or an error.
-fn assert_survives_damage(name: &str, whole: &[u8]) {
-    let folder = Folder::new();
-    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-    let mut random = |below: usize| {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state % below as u64) as usize
-    };
-    for _ in 0..500 {
-        let mut mutant = whole.to_vec();
-        for _ in 0..=random(3) {
-            let at = random(mutant.len());
-            match random(5) {
-                0 => mutant[at] = random(256) as u8,
-                1 => mutant[at] ^= 1 << random(8),
-                2 => mutant[at] = b"0123456789-+.=<>\"# \n"[random(20)],
-                3 => mutant.insert(at, random(256) as u8),
-                _ => _ = mutant.remove(at),
-            }
-        }
-        if let Ok(volume) = folder.open(name, &mutant) {
-            assert_eq!(volume.values().len(), volume.dims().element_product() as usize);
-        }
-    }
-}

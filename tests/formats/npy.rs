@@ -97,6 +97,5 @@ fn damage() {
     for name in ["c.npy", "fortran-big.npy", "version2.npy"] {
         let whole = fs::read(fixture(name)).unwrap();
         assert_exact(name, &whole);
-        assert_survives_damage(name, &whole);
     }
 }

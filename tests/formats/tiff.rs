@@ -207,7 +207,6 @@ fn thumbnails_are_no_slices() {
 fn damage() {
     for name in ["plain.tif", "zlib-big.tif", "lzw-bigtiff.tif", "tiled.tif", "packbits.tif", "imagej.tif", "ome.tif"] {
         let whole = fs::read(fixture(name)).unwrap();
-        assert_survives_damage(name, &whole);
         let folder = Folder::new();
         for length in 0..whole.len() {
             // What is cut off may be nothing that counts.

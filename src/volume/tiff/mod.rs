@@ -4,8 +4,10 @@
 //! between pages, is then that between columns. Values are those of the file, whatever it says is black.
 
 mod description;
+mod directory;
 mod pages;
 mod run;
+mod trial;
 
 use std::path::{Path, PathBuf};
 

@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Display, Formatter};
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use ::tiff::decoder::ifd::Value;
@@ -13,6 +13,8 @@ use ::tiff::{ColorType, TiffError};
 use super::super::VolumeError;
 use super::super::samples::SampleType;
 use super::super::source::{Source, invalid, io_error};
+use super::directory::{most_values, overlong_entry};
+use super::trial::{self, is_suspicious};
 
 /// The values of the tags that count.
 const UNCOMPRESSED: u16 = 1;
@@ -64,10 +66,18 @@ impl Pages {
     pub(super) fn open(path: &Path) -> Result<Self, VolumeError> {
         let mut file = Source::open(path)?;
         let unclaimed = file.left()?;
-        let decoder = Decoder::new(BufReader::new(file.reader.into_inner())).map_err(failed(path, "page 1"))?;
-        // Memory for pages is not the decoder's.
+        let mut reader = BufReader::new(file.reader.into_inner());
+        let overlong = overlong_entry(&mut reader, unclaimed).map_err(io_error(path))?;
+        if let Some((tag, values)) = overlong {
+            let allowed = format!("at most {} in so small a file", most_values(unclaimed));
+            return Err(invalid(path, &format!("tag {tag}"), format!("{values} values"), allowed));
+        }
+        reader.rewind().map_err(io_error(path))?;
+        let decoder = Decoder::new(reader).map_err(failed(path, "page 1"))?;
+        // Memory for pages is not the decoder's, but that for the values of tags.
         let mut limits = Limits::default();
         limits.intermediate_buffer_size = usize::MAX;
+        limits.decoding_buffer_size = most_values(unclaimed) as usize * size_of::<Value>();
         let mut pages = Self {
             path: path.to_owned(),
             page: Page { size: [0; 2], kind: SampleType::U8 },
@@ -173,22 +183,30 @@ impl Pages {
         Ok(())
     }
 
-    /// Refuses chunks that take up more than is left of the file, or promise more than can be in them.
+    /// Refuses chunks that take up more than is left of the file, or promise more than is in them.
     fn check_chunks(&mut self) -> Result<(), VolumeError> {
-        let expansion = if self.is_compressed()? { MAX_EXPANSION } else { 1 };
+        let method = self.unsigned::<u16>(Tag::Compression)?.unwrap_or(UNCOMPRESSED);
+        let expansion = if method == UNCOMPRESSED { 1 } else { MAX_EXPANSION };
         let claimed = self.counts.iter().fold(0_u64, |sum, &count| sum.saturating_add(count));
         let Some(unclaimed) = self.unclaimed.checked_sub(claimed) else {
             let allowed = format!("the {} bytes that are left of the file", self.unclaimed);
             return Err(invalid(&self.path, &self.name(), format!("{claimed} bytes of samples"), allowed));
         };
         self.unclaimed = unclaimed;
-        for (chunk, &count) in self.counts.iter().enumerate() {
+        for chunk in 0..self.counts.len() {
             let (width, height) = match self.decoder.get_chunk_type() {
                 ChunkType::Strip => self.decoder.chunk_data_dimensions(chunk as u32),
                 ChunkType::Tile => self.decoder.chunk_dimensions(),
             };
             let bytes = Page { size: [width, height], ..self.page }.bytes();
-            if count.saturating_mul(expansion) < bytes {
+            let (offset, count) = (self.offsets.get(chunk).copied().unwrap_or(u64::MAX), self.counts[chunk]);
+            let mut holds = count.saturating_mul(expansion) >= bytes;
+            if holds && method != UNCOMPRESSED && is_suspicious(count, bytes) {
+                let file = self.decoder.inner();
+                let code = file.seek(SeekFrom::Start(offset)).map(|_| file.take(count));
+                holds = code.and_then(|code| trial::holds(code, method, bytes)).map_err(io_error(&self.path))?;
+            }
+            if !holds {
                 let (found, allowed) = (format!("{count} bytes for {bytes}"), "a strip or tile that holds its pixels");
                 return Err(invalid(&self.path, &self.name(), found, allowed));
             }

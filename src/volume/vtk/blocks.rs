@@ -1,7 +1,7 @@
 //! What an array's bytes are packed in: base64 text, and compressed blocks.
 
 use std::io::{self, BufRead, Read};
-use std::vec;
+use std::{slice, vec};
 
 use flate2::read::ZlibDecoder;
 
@@ -37,12 +37,49 @@ impl Compressor {
                 if block.len() as u64 == size { Ok(block) } else { Err(damaged(format!("{} bytes", block.len()))) }
             }
             Self::Lz4 => {
+                // Known before any room is made.
+                let decoded = lz4_length(code);
+                if decoded != Some(size) {
+                    return Err(damaged(format!("{} bytes", decoded.unwrap_or_default())));
+                }
                 let mut block = vec![0; size as usize];
                 let decoded = lz4_flex::block::decompress_into(code, &mut block).map_err(io::Error::other)?;
                 if decoded as u64 == size { Ok(block) } else { Err(damaged(format!("{decoded} bytes"))) }
             }
         }
     }
+}
+
+/// How long a block of LZ4 is, by the lengths of literals and matches in it.
+fn lz4_length(code: &[u8]) -> Option<u64> {
+    let mut code = code.iter();
+    let mut total = 0;
+    loop {
+        let token = *code.next()?;
+        let literals = lz4_number(token >> 4, &mut code)?;
+        total += literals;
+        if literals > 0 {
+            code.nth(literals as usize - 1)?;
+        }
+        // The last ones have no match.
+        if code.as_slice().is_empty() {
+            return Some(total);
+        }
+        let _offset = code.nth(1)?;
+        total += 4 + lz4_number(token & 15, &mut code)?;
+    }
+}
+
+/// A number of 4 bits that goes on after 15, and then after every 255.
+fn lz4_number(first: u8, code: &mut slice::Iter<u8>) -> Option<u64> {
+    let mut number = u64::from(first);
+    let mut goes_on = first == 15;
+    while goes_on {
+        let byte = *code.next()?;
+        number += u64::from(byte);
+        goes_on = byte == 255;
+    }
+    Some(number)
 }
 
 /// How the numbers before an array are written.
@@ -193,6 +230,16 @@ mod tests {
         let mut bytes = Vec::new();
         Base64::new(text.as_bytes()).read_to_end(&mut bytes)?;
         Ok(bytes)
+    }
+
+    #[test]
+    fn lengths_of_lz4() {
+        for length in [0, 1, 12, 13, 14, 15, 16, 300, 5000, 100_000] {
+            let bytes: Vec<u8> = (0..length).map(|at: usize| (((at * at) >> 7) & at) as u8).collect();
+            let code = lz4_flex::block::compress(&bytes);
+            assert_eq!(lz4_length(&code), Some(length as u64));
+            assert_ne!(lz4_length(&code[..code.len() - 1]), Some(length as u64));
+        }
     }
 
     #[test]
