@@ -9,6 +9,7 @@ mod extremes;
 #[expect(dead_code, reason = "not every file needs all of it")]
 #[path = "../common/images.rs"]
 mod images;
+mod info;
 mod inputs;
 mod orbit;
 mod outputs;

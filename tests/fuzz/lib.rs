@@ -12,17 +12,14 @@ static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| {
     folder
 });
 
-/// Writes bytes to a file of this name, and opens it: what is no error must be a whole volume.
+/// Writes bytes to a file of this name, and opens it: a whole volume or an error.
 pub fn volume(name: &str, bytes: &[u8], open: impl Fn(&Path) -> Result<Volume, VolumeError>) {
     let path = FOLDER.join(name);
     // Written over, a file may be waited for until it is on the disk; a new one is not.
     _ = fs::remove_file(&path);
     fs::write(&path, bytes).expect("a temporary file");
-    match open(&path) {
-        Ok(volume) => {
-            assert_eq!(volume.values().len(), volume.dims().element_product() as usize);
-            assert!(volume.values().iter().all(|value| value.is_finite()));
-        }
-        Err(error) => assert!(error.to_string().contains("sheetsplat-fuzz"), "{error}"),
+    if let Ok(volume) = open(&path) {
+        assert_eq!(volume.values().len(), volume.dims().element_product() as usize);
+        assert!(volume.values().iter().all(|value| value.is_finite()));
     }
 }
