@@ -1,27 +1,11 @@
-//! File formats: which one a file is of, and what every reader gives.
+//! File formats: which one a file is of.
 
 use std::path::{Path, PathBuf};
 
-use glam::{DVec3, UVec3};
-
-use super::samples::{SampleType, Voxel};
+use super::loaded::Loaded;
+use super::samples::Voxel;
 use super::source::invalid;
-use super::{Orientation, VolumeError, folder, nrrd};
-
-/// What is in a file of values or of labels.
-pub(super) struct Loaded<T> {
-    pub(super) dims: UVec3,
-    /// Of the samples that the values come from.
-    pub(super) kind: SampleType,
-    /// If the file gives one.
-    pub(super) spacing: Option<DVec3>,
-    /// What the spacing is in, if the file says so.
-    pub(super) unit: Option<String>,
-    /// If the file gives one.
-    pub(super) orientation: Option<Orientation>,
-    /// X fastest, as many as there are voxels.
-    pub(super) values: Vec<T>,
-}
+use super::{VolumeError, folder, nrrd};
 
 type Reader<T> = fn(&Path) -> Result<Loaded<T>, VolumeError>;
 

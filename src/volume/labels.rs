@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
 
-use super::format::{self, Loaded};
+use super::format;
+use super::loaded::Loaded;
 use super::{Volume, VolumeError, invalid};
 
 /// Two spacings that differ by less than this, relative to the larger one, are one spacing that was written down twice.

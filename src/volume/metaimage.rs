@@ -9,7 +9,7 @@ use glam::{DMat3, DVec3, UVec3};
 
 use super::VolumeError;
 use super::fields::Fields;
-use super::format::Loaded;
+use super::loaded::Loaded;
 use super::orientation::{Orientation, RAS_FROM_LPS, unit_directions};
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
 use super::source::{MAX_HEADER, Source, number, shown, three};

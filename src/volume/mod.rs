@@ -8,6 +8,7 @@ mod folder;
 mod format;
 mod grid;
 mod labels;
+mod loaded;
 #[cfg(feature = "metaimage")]
 mod metaimage;
 #[cfg(feature = "nifti")]
@@ -32,9 +33,9 @@ use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
 
-use format::Loaded;
 pub use grid::Grid;
 pub use labels::Labels;
+use loaded::Loaded;
 pub use orientation::{Orientation, View};
 pub use raw::RawLayout;
 pub use samples::SampleType;

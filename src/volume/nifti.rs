@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DQuat, DVec3, UVec3};
 
 use super::VolumeError;
-use super::format::Loaded;
+use super::loaded::Loaded;
 use super::orientation::{Orientation, lengths_and_directions, orthogonal};
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
 use super::source::{Source, invalid, io_error};

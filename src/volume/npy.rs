@@ -8,7 +8,7 @@ use std::path::Path;
 use glam::UVec3;
 
 use super::VolumeError;
-use super::format::Loaded;
+use super::loaded::Loaded;
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
 use super::source::{MAX_HEADER, Source, invalid, shown, three};
 

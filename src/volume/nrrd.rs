@@ -10,7 +10,7 @@ use glam::{DMat3, DVec3, UVec3};
 
 use super::VolumeError;
 use super::fields::Fields;
-use super::format::Loaded;
+use super::loaded::Loaded;
 use super::orientation::{Orientation, RAS_FROM_LPS, lengths_and_directions, orthogonal};
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
 use super::source::{MAX_HEADER, Source, invalid, io_error, lower, number, shown, three, vector};

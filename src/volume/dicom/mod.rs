@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use self::image::Image;
 use self::series::Series;
 use super::VolumeError;
-use super::format::Loaded;
+use super::loaded::Loaded;
 use super::orientation::{Orientation, RAS_FROM_LPS};
 use super::samples::{SIZES, Samples, Voxel, dims_of};
 use super::source::invalid;
@@ -50,13 +50,16 @@ fn assemble<T: Voxel>(path: &Path, images: Vec<Image>) -> Result<Loaded<T>, Volu
     let dims = dims_of(sizes).ok_or_else(|| invalid(path, "Rows, Columns, slices", format!("{sizes:?}"), SIZES))?;
     let kind = first.pixels.kind;
     let mut values = Vec::new();
-    for slice in &slices {
-        let image = &images[slice.image];
-        let bytes = image.frame(slice.frame)?;
-        let rescale = Some(slice.rescale).filter(|&rescale| rescale != [1.0, 0.0]);
-        let big_endian = cfg!(target_endian = "big");
-        let samples = Samples { kind: image.pixels.kind, dims, big_endian, rescale, z_fastest: false };
-        samples.append(&image.path, &bytes, &mut values)?;
+    // As many at a time as there are threads: codecs take long.
+    for slices in slices.chunks(rayon::current_num_threads()) {
+        let frames: Vec<_> = slices.par_iter().map(|slice| images[slice.image].frame(slice.frame)).collect();
+        for (slice, frame) in slices.iter().zip(frames) {
+            let image = &images[slice.image];
+            let rescale = Some(slice.rescale).filter(|&rescale| rescale != [1.0, 0.0]);
+            let big_endian = cfg!(target_endian = "big");
+            let samples = Samples { kind: image.pixels.kind, dims, big_endian, rescale, z_fastest: false };
+            samples.append(&image.path, &frame?, &mut values)?;
+        }
     }
     values.shrink_to_fit();
     let origin = RAS_FROM_LPS * slices[0].position;

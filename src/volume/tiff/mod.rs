@@ -16,7 +16,7 @@ use glam::DVec3;
 use self::description::Calibration;
 use self::pages::{Page, Pages};
 use super::VolumeError;
-use super::format::Loaded;
+use super::loaded::Loaded;
 use super::samples::{SIZES, Samples, Stream, Voxel, dims_of};
 use super::source::{Source, invalid};
 

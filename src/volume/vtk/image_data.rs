@@ -10,7 +10,7 @@ use quick_xml::events::Event;
 
 use super::super::VolumeError;
 use super::super::fields::Fields;
-use super::super::format::Loaded;
+use super::super::loaded::Loaded;
 use super::super::orientation::unit_directions;
 use super::super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
 use super::super::source::{Source, invalid, io_error, number, three};

@@ -7,7 +7,7 @@ use glam::{DVec3, UVec3};
 
 use super::super::VolumeError;
 use super::super::fields::Fields;
-use super::super::format::Loaded;
+use super::super::loaded::Loaded;
 use super::super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
 use super::super::source::{MAX_HEADER, Source, invalid, io_error, number, shown, three};
 use super::numbers::Numbers;
@@ -123,9 +123,7 @@ impl Header {
                     let count = self.number(name, count)?;
                     section = Some((*name == "CELL_DATA", count));
                 }
-                (["METADATA", ..], _) => {
-                    while self.file.line(&mut self.budget)?.is_some_and(|line| !line.trim().is_empty()) {}
-                }
+                (["METADATA", ..], _) => self.skip_metadata()?,
                 (["SCALARS", _name, kind, components @ ..], Some((of_cells, count))) => {
                     let kind = self.kind(kind)?;
                     let components = components.first().map_or(Ok(1), |number| self.number("SCALARS", number))?;
@@ -168,7 +166,7 @@ impl Header {
             let words: Vec<&str> = words.iter().map(String::as_str).collect();
             let [name, components, tuples, kind] = words.as_slice() else {
                 if words[0] == "METADATA" {
-                    while self.file.line(&mut self.budget)?.is_some_and(|line| !line.trim().is_empty()) {}
+                    self.skip_metadata()?;
                     continue;
                 }
                 let allowed = "name, components, tuples and type of an array";
@@ -183,6 +181,12 @@ impl Header {
             found += 1;
         }
         Ok(None)
+    }
+
+    /// Skips what is said of an array, up to a blank line.
+    fn skip_metadata(&mut self) -> Result<(), VolumeError> {
+        while self.file.line(&mut self.budget)?.is_some_and(|line| !line.trim().is_empty()) {}
+        Ok(())
     }
 
     fn number(&self, field: &str, text: &str) -> Result<u64, VolumeError> {
