@@ -18,6 +18,8 @@ pub(super) const COMPOSITINGS: &[(&str, Compositing)] = &[
     ("average", Compositing::Average),
     ("surface", Compositing::Surface),
 ];
+/// Whether a sample's most significant byte comes first.
+pub(super) const ENDIANS: &[(&str, bool)] = &[("little", false), ("big", true)];
 pub(super) const ORDERS: &[(&str, Order)] =
     &[("front-to-back", Order::FrontToBack), ("back-to-front", Order::BackToFront)];
 pub(super) const RASTERIZERS: &[(&str, Rasterizer)] =

@@ -6,7 +6,7 @@ use std::path::{Component, Path, PathBuf};
 use glam::DVec3;
 use toml::Value;
 
-use super::names::{BOXES, COMPOSITINGS, FORMS, METHODS, ORDERS, RASTERIZERS, name_of};
+use super::names::{BOXES, COMPOSITINGS, ENDIANS, FORMS, METHODS, ORDERS, RASTERIZERS, name_of};
 use super::{ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use crate::appearance::{Colormap, Preset};
 use crate::camera::{Camera, Projection};
@@ -14,6 +14,7 @@ use crate::clip::Clip;
 use crate::shading::{Light, Shading};
 use crate::splatting::{Economies, Splatting};
 use crate::transfer_function::Ramp;
+use crate::volume::{RawLayout, SampleType};
 
 /// More control points than this are written line by line.
 const ON_ONE_LINE: usize = 3;
@@ -34,6 +35,10 @@ impl Scene {
         text.table("volume");
         match volume {
             VolumeSource::File(path) => text.line("path", within(folder, path, "volume.path")?),
+            VolumeSource::Raw(path, layout) => {
+                text.line("path", within(folder, path, "volume.path")?);
+                write_raw_layout(&mut text, layout);
+            }
             VolumeSource::Builtin(name) => text.line("builtin", name.as_str()),
         }
         text.given("spacing", spacing.map(vector));
@@ -97,6 +102,14 @@ impl Text {
         self.ramp("opacity", opacity, |&opacity| opacity.into());
         self.ramp("gradient_opacity", gradient_opacity, |&factor| factor.into());
     }
+}
+
+fn write_raw_layout(text: &mut Text, layout: &RawLayout) {
+    let RawLayout { dims, sample_type, big_endian, offset } = *layout;
+    text.line("dims", Value::Array(dims.to_array().map(|n| Value::from(i64::from(n))).to_vec()));
+    text.line("type", name_of(&SampleType::NAMED, sample_type));
+    text.line("endian", name_of(ENDIANS, big_endian));
+    text.line("offset", offset as i64);
 }
 
 fn vector(vector: DVec3) -> Value {
