@@ -101,9 +101,6 @@ struct Pixels {
     high: vec2f,
 }
 
-// Those in each of its units. Functions take the number of the part: structs by value cost drivers time to compile.
-var<private> pixels: array<Pixels, 4>;
-
 // Of four pixels some from one image, some from another.
 fn chosen(otherwise: mat4x4f, here: mat4x4f, is_here: vec4<bool>) -> mat4x4f {
     return mat4x4f(
@@ -119,44 +116,47 @@ fn after_gap(image: mat4x4f) -> mat4x4f {
     return chosen(mat4x4f(), image, transpose(image)[3] >= vec4f(1.0));
 }
 
-fn after_gaps() {
+fn after_gaps(old: array<Pixels, 4>) -> array<Pixels, 4> {
+    var changed = old;
     if COMPOSITING == SURFACE {
-        pixels[0].image = after_gap(pixels[0].image);
-        pixels[1].image = after_gap(pixels[1].image);
-        pixels[2].image = after_gap(pixels[2].image);
-        pixels[3].image = after_gap(pixels[3].image);
+        changed[0].image = after_gap(old[0].image);
+        changed[1].image = after_gap(old[1].image);
+        changed[2].image = after_gap(old[2].image);
+        changed[3].image = after_gap(old[3].image);
     }
+    return changed;
 }
 
 // A sheet over or under what is there, at four pixels; its slab begins at a sheet depth.
-fn composite_sheet(nth: u32, sheet: mat4x4f, near: f32) {
-    let image = pixels[nth].image;
-    var columns = transpose(sheet);
+fn composite_sheet(old: Pixels, sheet: mat4x4f, near: f32) -> Pixels {
+    var changed = old;
+    let image = old.image;
+    var pixels = transpose(sheet);
     var first = vec4f(near);
     var last = vec4f(near + frame.slab_width);
     var scale = vec4f(1.0);
     if CUT {
-        first = max(first, pixels[nth].shown_from);
-        last = min(last, pixels[nth].shown_to);
+        first = max(first, old.shown_from);
+        last = min(last, old.shown_to);
         if COMPOSITING != MINIMUM {
             scale = max(last - first, vec4f(0.0)) / frame.slab_width;
         }
     }
     if is_by_means() {
-        scale *= pixels[nth].weights;
+        scale *= old.weights;
     }
     if CUT || is_by_means() {
-        columns = mat4x4f(columns[0] * scale.x, columns[1] * scale.y, columns[2] * scale.z, columns[3] * scale.w);
+        pixels = mat4x4f(pixels[0] * scale.x, pixels[1] * scale.y, pixels[2] * scale.z, pixels[3] * scale.w);
     }
     var result = mat4x4f(
-        composite(image[0], columns[0], COMPOSITING, ORDER),
-        composite(image[1], columns[1], COMPOSITING, ORDER),
-        composite(image[2], columns[2], COMPOSITING, ORDER),
-        composite(image[3], columns[3], COMPOSITING, ORDER),
+        composite(image[0], pixels[0], COMPOSITING, ORDER),
+        composite(image[1], pixels[1], COMPOSITING, ORDER),
+        composite(image[2], pixels[2], COMPOSITING, ORDER),
+        composite(image[3], pixels[3], COMPOSITING, ORDER),
     );
     if COMPOSITING == MINIMUM {
         let middle = vec4f(near + 0.5 * frame.slab_width);
-        result = chosen(image, result, (pixels[nth].counted_from <= middle) & (middle <= pixels[nth].counted_to));
+        result = chosen(image, result, (old.counted_from <= middle) & (middle <= old.counted_to));
     }
     if FIRST_HIT {
         let before = transpose(image)[3];
@@ -165,44 +165,39 @@ fn composite_sheet(nth: u32, sheet: mat4x4f, near: f32) {
         var sheet_depths = mix(first, last, (cut.first_hit - before) / (after - before));
         if COMPOSITING == SURFACE {
             is_hit = (before < vec4f(1.0)) & (after >= vec4f(1.0));
-            let opacity = transpose(columns)[3];
+            let opacity = transpose(pixels)[3];
             let at = (0.5 - before) / (opacity - before) - 0.5;
             sheet_depths = near + at * frame.slab_width;
             if CUT {
-                sheet_depths = clamp(sheet_depths, pixels[nth].shown_from, pixels[nth].shown_to);
+                sheet_depths = clamp(sheet_depths, old.shown_from, old.shown_to);
             }
         }
         let here = vec4u(noted(sheet_depths.x), noted(sheet_depths.y), noted(sheet_depths.z), noted(sheet_depths.w));
-        pixels[nth].hits = select(pixels[nth].hits, here, is_hit);
+        changed.hits = select(old.hits, here, is_hit);
     }
-    pixels[nth].image = result;
+    changed.image = result;
+    return changed;
 }
 
 // A group's sheets, one after the other.
-fn composite_group(nth: u32, near: f32) {
+fn composite_group(old: Pixels, near: f32) -> Pixels {
     let width = frame.slab_width;
+    let sheets = old.sheets;
     if ORDER == FRONT_TO_BACK {
-        composite_sheet(nth, pixels[nth].sheets.first, near);
-        composite_sheet(nth, pixels[nth].sheets.second, near + width);
-        composite_sheet(nth, pixels[nth].sheets.third, near + 2.0 * width);
-        composite_sheet(nth, pixels[nth].sheets.fourth, near + 3.0 * width);
-    } else {
-        composite_sheet(nth, pixels[nth].sheets.fourth, near + 3.0 * width);
-        composite_sheet(nth, pixels[nth].sheets.third, near + 2.0 * width);
-        composite_sheet(nth, pixels[nth].sheets.second, near + width);
-        composite_sheet(nth, pixels[nth].sheets.first, near);
+        var changed = composite_sheet(old, sheets.first, near);
+        changed = composite_sheet(changed, sheets.second, near + width);
+        changed = composite_sheet(changed, sheets.third, near + 2.0 * width);
+        return composite_sheet(changed, sheets.fourth, near + 3.0 * width);
     }
-    if CUT && frame.culling != 0u {
-        // What lies behind a cut is as hidden as what lies behind opaque voxels.
-        let far = near + f32(SHEETS) * width;
-        pixels[nth].is_shown &= pixels[nth].shown_to > vec4f(far);
-    }
+    var changed = composite_sheet(old, sheets.fourth, near + 3.0 * width);
+    changed = composite_sheet(changed, sheets.third, near + 2.0 * width);
+    changed = composite_sheet(changed, sheets.second, near + width);
+    return composite_sheet(changed, sheets.first, near);
 }
 
 // Adds voxels' sections, those of the lanes in a mask, two at a time.
-fn add_sections(nth: u32, own: Footprint, voxels: u32) {
-    let column = pixels[nth].column;
-    let rows = pixels[nth].rows;
+fn add_sections(old: Pixels, own: Footprint, voxels: u32) -> Pixels {
+    var changed = old;
     var left = voxels;
     while left != 0u {
         let first = firstTrailingBit(left);
@@ -212,51 +207,53 @@ fn add_sections(nth: u32, own: Footprint, voxels: u32) {
         var b = footprint_of(own, second);
         b.amount = select(b.amount, vec4f(0.0), left == 0u);
         left &= left - 1u;
-        let s = sections(a, column, rows);
-        let t = sections(b, column, rows);
-        pixels[nth].sheets.first += added(s[0], a.amount) + added(t[0], b.amount);
-        pixels[nth].sheets.second += added(s[1], a.amount) + added(t[1], b.amount);
-        pixels[nth].sheets.third += added(s[2], a.amount) + added(t[2], b.amount);
-        pixels[nth].sheets.fourth += added(s[3], a.amount) + added(t[3], b.amount);
+        let s = sections(a, old.column, old.rows);
+        let t = sections(b, old.column, old.rows);
+        changed.sheets.first += added(s[0], a.amount) + added(t[0], b.amount);
+        changed.sheets.second += added(s[1], a.amount) + added(t[1], b.amount);
+        changed.sheets.third += added(s[2], a.amount) + added(t[2], b.amount);
+        changed.sheets.fourth += added(s[3], a.amount) + added(t[3], b.amount);
     }
+    return changed;
 }
 
 // Which of the lanes' voxels have a box that reaches pixels of the subgroup's that are not opaque.
-fn reaching(nth: u32, open: vec4u, is_drawn: bool, center_px: vec2f, margin: vec2f) -> u32 {
-    let is_near = all(center_px + margin >= pixels[nth].low) && all(center_px - margin <= pixels[nth].high);
-    let bits = select((1u << lanes) - 1u, ~0u, lanes == 32u) << (nth * lanes % 32u);
+fn reaching(pixels: Pixels, open: vec4u, part: u32, is_drawn: bool, center_px: vec2f, margin: vec2f) -> u32 {
+    let is_near = all(center_px + margin >= pixels.low) && all(center_px - margin <= pixels.high);
+    let bits = select((1u << lanes) - 1u, ~0u, lanes == 32u) << (part * lanes % 32u);
     return subgroupBallot(is_drawn && is_near && any((open & vec4u(bits)) != vec4u(0u))).x;
 }
 
 // A thread's pixels in one part of its subgroup's units, as they were left.
-fn take_up(nth: u32, tile: u32, number: u32) {
+fn pixels_at(tile: u32, number: u32) -> Pixels {
+    var pixels: Pixels;
     let columns = (frame.size.x + TILE_SIDE - 1u) / TILE_SIDE;
     let unit = number / 8u;
     let first = vec2u(tile % columns, tile / columns) * TILE_SIDE + vec2u((unit & 1u) * 8u + number % 8u, (unit >> 1u) * 4u);
     let column = f32(first.x) + 0.5;
     let rows = f32(first.y) + vec4f(0.5, 1.5, 2.5, 3.5);
-    pixels[nth].column = column;
-    pixels[nth].rows = rows;
-    pixels[nth].low = subgroupMin(vec2f(column, rows.x));
-    pixels[nth].high = subgroupMax(vec2f(column, rows.w));
-    pixels[nth].first = first;
+    pixels.column = column;
+    pixels.rows = rows;
+    pixels.low = subgroupMin(vec2f(column, rows.x));
+    pixels.high = subgroupMax(vec2f(column, rows.w));
+    pixels.first = first;
     let slot = (first.y - part.first_row) * frame.size.x + first.x;
-    pixels[nth].slot = slot;
+    pixels.slot = slot;
     let is_inside = vec4<bool>(first.x < frame.size.x) & (vec4u(first.y) + vec4u(0u, 1u, 2u, 3u) < vec4u(frame.size.y));
-    pixels[nth].is_inside = is_inside;
+    pixels.is_inside = is_inside;
     if is_inside.x {
-        pixels[nth].image[0] = acc[slot];
+        pixels.image[0] = acc[slot];
     }
     if is_inside.y {
-        pixels[nth].image[1] = acc[slot + frame.size.x];
+        pixels.image[1] = acc[slot + frame.size.x];
     }
     if is_inside.z {
-        pixels[nth].image[2] = acc[slot + 2u * frame.size.x];
+        pixels.image[2] = acc[slot + 2u * frame.size.x];
     }
     if is_inside.w {
-        pixels[nth].image[3] = acc[slot + 3u * frame.size.x];
+        pixels.image[3] = acc[slot + 3u * frame.size.x];
     }
-    pixels[nth].is_shown = is_inside;
+    pixels.is_shown = is_inside;
     if CUT {
         let across = array<vec2f, 4>(
             shown(vec2f(column, rows.x)),
@@ -264,9 +261,9 @@ fn take_up(nth: u32, tile: u32, number: u32) {
             shown(vec2f(column, rows.z)),
             shown(vec2f(column, rows.w)),
         );
-        pixels[nth].shown_from = vec4f(across[0].x, across[1].x, across[2].x, across[3].x);
-        pixels[nth].shown_to = vec4f(across[0].y, across[1].y, across[2].y, across[3].y);
-        pixels[nth].is_shown &= pixels[nth].shown_from < pixels[nth].shown_to;
+        pixels.shown_from = vec4f(across[0].x, across[1].x, across[2].x, across[3].x);
+        pixels.shown_to = vec4f(across[0].y, across[1].y, across[2].y, across[3].y);
+        pixels.is_shown &= pixels.shown_from < pixels.shown_to;
     }
     if is_by_means() {
         let across = array<Means, 4>(
@@ -275,47 +272,58 @@ fn take_up(nth: u32, tile: u32, number: u32) {
             means(vec2f(column, rows.z)),
             means(vec2f(column, rows.w)),
         );
-        pixels[nth].weights = vec4f(across[0].weight, across[1].weight, across[2].weight, across[3].weight);
-        pixels[nth].counted_from = vec4f(across[0].counted.x, across[1].counted.x, across[2].counted.x, across[3].counted.x);
-        pixels[nth].counted_to = vec4f(across[0].counted.y, across[1].counted.y, across[2].counted.y, across[3].counted.y);
+        pixels.weights = vec4f(across[0].weight, across[1].weight, across[2].weight, across[3].weight);
+        pixels.counted_from = vec4f(across[0].counted.x, across[1].counted.x, across[2].counted.x, across[3].counted.x);
+        pixels.counted_to = vec4f(across[0].counted.y, across[1].counted.y, across[2].counted.y, across[3].counted.y);
     }
     if FIRST_HIT {
         let word = gather.hits + first.y * frame.size.x + first.x;
         let past = vec4u(0u, 1u, 2u, 3u) * frame.size.x;
         let last = gather.hits + frame.size.x * frame.size.y - 1u;
-        pixels[nth].hits = vec4u(
+        pixels.hits = vec4u(
             atomicLoad(&gathered.words[min(word + past.x, last)]),
             atomicLoad(&gathered.words[min(word + past.y, last)]),
             atomicLoad(&gathered.words[min(word + past.z, last)]),
             atomicLoad(&gathered.words[min(word + past.w, last)]),
         );
     }
+    return pixels;
 }
 
 // Leaves them for the next dispatch or the image.
-fn leave(nth: u32) {
-    let slot = pixels[nth].slot;
-    let is_inside = pixels[nth].is_inside;
+fn leave(pixels: Pixels) {
+    let slot = pixels.slot;
+    let is_inside = pixels.is_inside;
     if is_inside.x {
-        acc[slot] = pixels[nth].image[0];
+        acc[slot] = pixels.image[0];
     }
     if is_inside.y {
-        acc[slot + frame.size.x] = pixels[nth].image[1];
+        acc[slot + frame.size.x] = pixels.image[1];
     }
     if is_inside.z {
-        acc[slot + 2u * frame.size.x] = pixels[nth].image[2];
+        acc[slot + 2u * frame.size.x] = pixels.image[2];
     }
     if is_inside.w {
-        acc[slot + 3u * frame.size.x] = pixels[nth].image[3];
+        acc[slot + 3u * frame.size.x] = pixels.image[3];
     }
     if FIRST_HIT {
-        let word = gather.hits + pixels[nth].first.y * frame.size.x + pixels[nth].first.x;
+        let word = gather.hits + pixels.first.y * frame.size.x + pixels.first.x;
         for (var i = 0u; i < PIXELS; i += 1u) {
             if is_inside[i] {
-                atomicStore(&gathered.words[word + i * frame.size.x], pixels[nth].hits[i]);
+                atomicStore(&gathered.words[word + i * frame.size.x], pixels.hits[i]);
             }
         }
     }
+}
+
+// Those that a group before `far` leaves to be seen.
+fn left_behind(old: Pixels, far: f32) -> Pixels {
+    var changed = old;
+    if CUT && frame.culling != 0u {
+        // What lies behind a cut is as hidden as what lies behind opaque voxels.
+        changed.is_shown = old.is_shown & (old.shown_to > vec4f(far));
+    }
+    return changed;
 }
 
 // The frame's sheets from the first that a kernel overlaps to the one after the last.
@@ -330,20 +338,21 @@ fn draw(tile: u32, thread: u32) {
     let gradient_opacity_ramp = ramp_of(frame.ramps.y, frame.ramps.z);
 
     let number = thread / lanes * lanes * PARTS + lane;
-    take_up(0u, tile, number);
+    var pixels: array<Pixels, 4>;
+    pixels[0] = pixels_at(tile, number);
     if PARTS > 1u {
-        take_up(1u, tile, number + lanes);
+        pixels[1] = pixels_at(tile, number + lanes);
     }
     if PARTS > 2u {
-        take_up(2u, tile, number + 2u * lanes);
-        take_up(3u, tile, number + 3u * lanes);
+        pixels[2] = pixels_at(tile, number + 2u * lanes);
+        pixels[3] = pixels_at(tile, number + 3u * lanes);
     }
     let unit = first_unit(thread);
     let units = ((1u << (lanes * PARTS / 8u)) - 1u) << unit;
     var region: Region;
     region.low = pixels[0].low;
     region.high = pixels[PARTS - 1u].high;
-    region = opened(region);
+    region = opened(region, pixels);
 
     var voxels_shaded = 0u;
     var sections_rasterized = 0u;
@@ -362,7 +371,7 @@ fn draw(tile: u32, thread: u32) {
         }
         passes += gather.passes_per_group;
         if cursor == end && COMPOSITING != MINIMUM {
-            after_gaps();
+            pixels = after_gaps(pixels);
             continue;
         }
         let group = select(gather.groups - 1u - at, at, ORDER == FRONT_TO_BACK);
@@ -517,29 +526,29 @@ fn draw(tile: u32, thread: u32) {
             let beyond = max(max(near - p.z, p.z - far) - gather.depth_error, 0.0) * frame.kernel_per_depth / frame.support;
             let part = select(sqrt(max(1.0 - beyond * beyond, 0.0)), 1.0, whole >= 0.0);
             let extent = half_boxes[group] * part + BOX_SLACK;
-            add_sections(0u, own, reaching(0u, region.open, is_drawn, p.xy, extent));
+            pixels[0] = add_sections(pixels[0], own, reaching(pixels[0], region.open, 0u, is_drawn, p.xy, extent));
             if PARTS > 1u {
-                add_sections(1u, own, reaching(1u, region.open, is_drawn, p.xy, extent));
+                pixels[1] = add_sections(pixels[1], own, reaching(pixels[1], region.open, 1u, is_drawn, p.xy, extent));
             }
             if PARTS > 2u {
-                add_sections(2u, own, reaching(2u, region.open, is_drawn, p.xy, extent));
-                add_sections(3u, own, reaching(3u, region.open, is_drawn, p.xy, extent));
+                pixels[2] = add_sections(pixels[2], own, reaching(pixels[2], region.open, 2u, is_drawn, p.xy, extent));
+                pixels[3] = add_sections(pixels[3], own, reaching(pixels[3], region.open, 3u, is_drawn, p.xy, extent));
             }
         }
 
         if !has_drawn {
-            after_gaps();
+            pixels = after_gaps(pixels);
         }
         for (; has_drawn; has_drawn = false) {
-            composite_group(0u, near);
+            pixels[0] = left_behind(composite_group(pixels[0], near), far);
             if PARTS > 1u {
-                composite_group(1u, near);
+                pixels[1] = left_behind(composite_group(pixels[1], near), far);
             }
             if PARTS > 2u {
-                composite_group(2u, near);
-                composite_group(3u, near);
+                pixels[2] = left_behind(composite_group(pixels[2], near), far);
+                pixels[3] = left_behind(composite_group(pixels[3], near), far);
             }
-            region = opened(region);
+            region = opened(region, pixels);
             if lane == 0u {
                 let tiles = tile_grid(frame.size);
                 let first = pixels[0].first / TILE;
@@ -552,13 +561,13 @@ fn draw(tile: u32, thread: u32) {
         }
     }
 
-    leave(0u);
+    leave(pixels[0]);
     if PARTS > 1u {
-        leave(1u);
+        leave(pixels[1]);
     }
     if PARTS > 2u {
-        leave(2u);
-        leave(3u);
+        leave(pixels[2]);
+        leave(pixels[3]);
     }
     let counts = subgroupAdd(vec2u(voxels_shaded, sections_rasterized));
     if lane == 0u {

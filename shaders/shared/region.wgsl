@@ -15,19 +15,19 @@ struct Region {
 }
 
 // Which pixels are not opaque, and their bounds.
-fn opened(region: Region) -> Region {
+fn opened(region: Region, pixels: array<Pixels, 4>) -> Region {
     var result = region;
     result.open = vec4u(0u);
     result.shallow = vec4u(0u);
     result.open_low = vec2f(1e9);
     result.open_high = vec2f(-1e9);
-    result = opened_part(result, 0u, 0u);
+    result = opened_part(result, pixels[0], 0u);
     if PARTS > 1u {
-        result = opened_part(result, 1u, lanes);
+        result = opened_part(result, pixels[1], lanes);
     }
     if PARTS > 2u {
-        result = opened_part(result, 2u, 2u * lanes);
-        result = opened_part(result, 3u, 3u * lanes);
+        result = opened_part(result, pixels[2], 2u * lanes);
+        result = opened_part(result, pixels[3], 3u * lanes);
     }
     result.open_low = subgroupMin(result.open_low);
     result.open_high = subgroupMax(result.open_high);
@@ -35,21 +35,21 @@ fn opened(region: Region) -> Region {
 }
 
 // Adds a part of the pixels, from a bit on; bounds as this thread knows them.
-fn opened_part(region: Region, nth: u32, first: u32) -> Region {
-    let opacity = transpose(pixels[nth].image)[3];
+fn opened_part(region: Region, pixels: Pixels, first: u32) -> Region {
+    let opacity = transpose(pixels.image)[3];
     // Pixels off the image count as opaque.
-    let is_open = pixels[nth].is_shown & (opacity < vec4f(select(3e38, frame.opacity_threshold, frame.culling != 0u)));
+    let is_open = pixels.is_shown & (opacity < vec4f(select(3e38, frame.opacity_threshold, frame.culling != 0u)));
     var result = region;
     if ECONOMIES {
-        result.shallow |= bits_of(pixels[nth].is_shown & (opacity < vec4f(gather.beta))) << vec4u(first);
+        result.shallow |= bits_of(pixels.is_shown & (opacity < vec4f(gather.beta))) << vec4u(first);
     }
     result.open |= bits_of(is_open) << vec4u(first);
-    let from_top = select(vec4f(1e9), pixels[nth].rows, is_open);
-    let from_bottom = select(vec4f(-1e9), pixels[nth].rows, is_open);
+    let from_top = select(vec4f(1e9), pixels.rows, is_open);
+    let from_bottom = select(vec4f(-1e9), pixels.rows, is_open);
     let top = min(min(from_top.x, from_top.y), min(from_top.z, from_top.w));
     let bottom = max(max(from_bottom.x, from_bottom.y), max(from_bottom.z, from_bottom.w));
-    result.open_low = min(region.open_low, vec2f(select(1e9, pixels[nth].column, any(is_open)), top));
-    result.open_high = max(region.open_high, vec2f(select(-1e9, pixels[nth].column, any(is_open)), bottom));
+    result.open_low = min(region.open_low, vec2f(select(1e9, pixels.column, any(is_open)), top));
+    result.open_high = max(region.open_high, vec2f(select(-1e9, pixels.column, any(is_open)), bottom));
     return result;
 }
 
