@@ -2,9 +2,9 @@
 // pixels in registers, gathers the kernel sections that fall on them (§3.2), composites them (eq. 2), and skips what lies behind
 // its opaque pixels (§6). Subgroups share nothing, so there are no barriers, and sums have one order whatever else runs.
 //
-// A tile consists of units of 8×4 pixels, of which a thread holds four, one below the other, in one or more of the units, so that
-// a subgroup of 8 to 32 threads holds the rectangle of its units, and what it fetches and shades serves as many as possible. Software
-// drivers execute what an `if` leaves out but not a loop without iterations, hence some loops that run at most once.
+// A tile's 64 threads hold four pixels each, one below the other, in units of 8×4 pixels; a subgroup of 8 to 32 threads holds
+// the rectangle of its units. Software drivers execute what an `if` leaves out but not a loop without iterations, hence some
+// loops that run at most once.
 
 @group(0) @binding(1) var<uniform> gathers: array<Gather, 1>;
 @group(0) @binding(2) var<uniform> part: Part;
@@ -38,10 +38,6 @@ override ECONOMIES: bool = false;
 // Whether anything is cut, and whether first hits are asked for.
 override CUT: bool = false;
 override FIRST_HIT: bool = false;
-// Units in which a thread has pixels: 1, 2 or 4. A subgroup's unit n of them is that of `n·lanes` threads later.
-override PARTS: u32 = 1u;
-// Threads of a tile.
-override THREADS: u32 = 64u;
 
 var<private> gather: Gather;
 
@@ -74,32 +70,15 @@ fn added(section: vec4f, amount: vec4f) -> mat4x4f {
     return mat4x4f(section * amount.x, section * amount.y, section * amount.z, section * amount.w);
 }
 
-// A thread's four pixels in a unit.
-struct Pixels {
-    // Their centres.
-    column: f32,
-    rows: vec4f,
-    // Where the first is in `acc`, and on the image.
-    slot: u32,
-    first: vec2u,
-    is_inside: vec4<bool>,
-    // Which may still show something.
-    is_shown: vec4<bool>,
-    // What they have, and the sheets of the current group.
-    image: mat4x4f,
-    sheets: Sheets,
-    // The sheet depths from and to which their rays show something, and those of first hits, as bits.
-    shown_from: vec4f,
-    shown_to: vec4f,
-    hits: vec4u,
-    // How they look at their sheets, see `Means`.
-    weights: vec4f,
-    counted_from: vec4f,
-    counted_to: vec4f,
-    // Bounds of the centres of all the subgroup's pixels in these units.
-    low: vec2f,
-    high: vec2f,
-}
+// Of a thread's four pixels the sheet depths from and to which their rays show something, and those of first hits, as bits.
+var<private> shown_from: vec4f;
+var<private> shown_to: vec4f;
+var<private> hits: vec4u;
+
+// How these pixels look at their sheets, see `Means`.
+var<private> weights: vec4f;
+var<private> counted_from: vec4f;
+var<private> counted_to: vec4f;
 
 // Of four pixels some from one image, some from another.
 fn chosen(otherwise: mat4x4f, here: mat4x4f, is_here: vec4<bool>) -> mat4x4f {
@@ -113,37 +92,27 @@ fn chosen(otherwise: mat4x4f, here: mat4x4f, is_here: vec4<bool>) -> mat4x4f {
 
 // What four pixels hold after a group without anything: of a surface that is not reached, nothing.
 fn after_gap(image: mat4x4f) -> mat4x4f {
-    return chosen(mat4x4f(), image, transpose(image)[3] >= vec4f(1.0));
-}
-
-fn after_gaps(old: array<Pixels, 4>) -> array<Pixels, 4> {
-    var changed = old;
     if COMPOSITING == SURFACE {
-        changed[0].image = after_gap(old[0].image);
-        changed[1].image = after_gap(old[1].image);
-        changed[2].image = after_gap(old[2].image);
-        changed[3].image = after_gap(old[3].image);
+        return chosen(mat4x4f(), image, transpose(image)[3] >= vec4f(1.0));
     }
-    return changed;
+    return image;
 }
 
 // A sheet over or under what is there, at four pixels; its slab begins at a sheet depth.
-fn composite_sheet(old: Pixels, sheet: mat4x4f, near: f32) -> Pixels {
-    var changed = old;
-    let image = old.image;
+fn composite_sheet(image: mat4x4f, sheet: mat4x4f, near: f32) -> mat4x4f {
     var pixels = transpose(sheet);
     var first = vec4f(near);
     var last = vec4f(near + frame.slab_width);
     var scale = vec4f(1.0);
     if CUT {
-        first = max(first, old.shown_from);
-        last = min(last, old.shown_to);
+        first = max(first, shown_from);
+        last = min(last, shown_to);
         if COMPOSITING != MINIMUM {
             scale = max(last - first, vec4f(0.0)) / frame.slab_width;
         }
     }
     if is_by_means() {
-        scale *= old.weights;
+        scale *= weights;
     }
     if CUT || is_by_means() {
         pixels = mat4x4f(pixels[0] * scale.x, pixels[1] * scale.y, pixels[2] * scale.z, pixels[3] * scale.w);
@@ -156,7 +125,7 @@ fn composite_sheet(old: Pixels, sheet: mat4x4f, near: f32) -> Pixels {
     );
     if COMPOSITING == MINIMUM {
         let middle = vec4f(near + 0.5 * frame.slab_width);
-        result = chosen(image, result, (old.counted_from <= middle) & (middle <= old.counted_to));
+        result = chosen(image, result, (counted_from <= middle) & (middle <= counted_to));
     }
     if FIRST_HIT {
         let before = transpose(image)[3];
@@ -169,161 +138,13 @@ fn composite_sheet(old: Pixels, sheet: mat4x4f, near: f32) -> Pixels {
             let at = (0.5 - before) / (opacity - before) - 0.5;
             sheet_depths = near + at * frame.slab_width;
             if CUT {
-                sheet_depths = clamp(sheet_depths, old.shown_from, old.shown_to);
+                sheet_depths = clamp(sheet_depths, shown_from, shown_to);
             }
         }
         let here = vec4u(noted(sheet_depths.x), noted(sheet_depths.y), noted(sheet_depths.z), noted(sheet_depths.w));
-        changed.hits = select(old.hits, here, is_hit);
+        hits = select(hits, here, is_hit);
     }
-    changed.image = result;
-    return changed;
-}
-
-// A group's sheets, one after the other.
-fn composite_group(old: Pixels, near: f32) -> Pixels {
-    let width = frame.slab_width;
-    let sheets = old.sheets;
-    if ORDER == FRONT_TO_BACK {
-        var changed = composite_sheet(old, sheets.first, near);
-        changed = composite_sheet(changed, sheets.second, near + width);
-        changed = composite_sheet(changed, sheets.third, near + 2.0 * width);
-        return composite_sheet(changed, sheets.fourth, near + 3.0 * width);
-    }
-    var changed = composite_sheet(old, sheets.fourth, near + 3.0 * width);
-    changed = composite_sheet(changed, sheets.third, near + 2.0 * width);
-    changed = composite_sheet(changed, sheets.second, near + width);
-    return composite_sheet(changed, sheets.first, near);
-}
-
-// Adds voxels' sections, those of the lanes in a mask, two at a time.
-fn add_sections(old: Pixels, own: Footprint, voxels: u32) -> Pixels {
-    var changed = old;
-    var left = voxels;
-    while left != 0u {
-        let first = firstTrailingBit(left);
-        left &= left - 1u;
-        let second = select(firstTrailingBit(left), first, left == 0u);
-        let a = footprint_of(own, first);
-        var b = footprint_of(own, second);
-        b.amount = select(b.amount, vec4f(0.0), left == 0u);
-        left &= left - 1u;
-        let s = sections(a, old.column, old.rows);
-        let t = sections(b, old.column, old.rows);
-        changed.sheets.first += added(s[0], a.amount) + added(t[0], b.amount);
-        changed.sheets.second += added(s[1], a.amount) + added(t[1], b.amount);
-        changed.sheets.third += added(s[2], a.amount) + added(t[2], b.amount);
-        changed.sheets.fourth += added(s[3], a.amount) + added(t[3], b.amount);
-    }
-    return changed;
-}
-
-// Which of the lanes' voxels have a box that reaches pixels of the subgroup's that are not opaque.
-fn reaching(pixels: Pixels, open: vec4u, part: u32, is_drawn: bool, center_px: vec2f, margin: vec2f) -> u32 {
-    let is_near = all(center_px + margin >= pixels.low) && all(center_px - margin <= pixels.high);
-    let bits = select((1u << lanes) - 1u, ~0u, lanes == 32u) << (part * lanes % 32u);
-    return subgroupBallot(is_drawn && is_near && any((open & vec4u(bits)) != vec4u(0u))).x;
-}
-
-// A thread's pixels in one part of its subgroup's units, as they were left.
-fn pixels_at(tile: u32, number: u32) -> Pixels {
-    var pixels: Pixels;
-    let columns = (frame.size.x + TILE_SIDE - 1u) / TILE_SIDE;
-    let unit = number / 8u;
-    let first = vec2u(tile % columns, tile / columns) * TILE_SIDE + vec2u((unit & 1u) * 8u + number % 8u, (unit >> 1u) * 4u);
-    let column = f32(first.x) + 0.5;
-    let rows = f32(first.y) + vec4f(0.5, 1.5, 2.5, 3.5);
-    pixels.column = column;
-    pixels.rows = rows;
-    pixels.low = subgroupMin(vec2f(column, rows.x));
-    pixels.high = subgroupMax(vec2f(column, rows.w));
-    pixels.first = first;
-    let slot = (first.y - part.first_row) * frame.size.x + first.x;
-    pixels.slot = slot;
-    let is_inside = vec4<bool>(first.x < frame.size.x) & (vec4u(first.y) + vec4u(0u, 1u, 2u, 3u) < vec4u(frame.size.y));
-    pixels.is_inside = is_inside;
-    if is_inside.x {
-        pixels.image[0] = acc[slot];
-    }
-    if is_inside.y {
-        pixels.image[1] = acc[slot + frame.size.x];
-    }
-    if is_inside.z {
-        pixels.image[2] = acc[slot + 2u * frame.size.x];
-    }
-    if is_inside.w {
-        pixels.image[3] = acc[slot + 3u * frame.size.x];
-    }
-    pixels.is_shown = is_inside;
-    if CUT {
-        let across = array<vec2f, 4>(
-            shown(vec2f(column, rows.x)),
-            shown(vec2f(column, rows.y)),
-            shown(vec2f(column, rows.z)),
-            shown(vec2f(column, rows.w)),
-        );
-        pixels.shown_from = vec4f(across[0].x, across[1].x, across[2].x, across[3].x);
-        pixels.shown_to = vec4f(across[0].y, across[1].y, across[2].y, across[3].y);
-        pixels.is_shown &= pixels.shown_from < pixels.shown_to;
-    }
-    if is_by_means() {
-        let across = array<Means, 4>(
-            means(vec2f(column, rows.x)),
-            means(vec2f(column, rows.y)),
-            means(vec2f(column, rows.z)),
-            means(vec2f(column, rows.w)),
-        );
-        pixels.weights = vec4f(across[0].weight, across[1].weight, across[2].weight, across[3].weight);
-        pixels.counted_from = vec4f(across[0].counted.x, across[1].counted.x, across[2].counted.x, across[3].counted.x);
-        pixels.counted_to = vec4f(across[0].counted.y, across[1].counted.y, across[2].counted.y, across[3].counted.y);
-    }
-    if FIRST_HIT {
-        let word = gather.hits + first.y * frame.size.x + first.x;
-        let past = vec4u(0u, 1u, 2u, 3u) * frame.size.x;
-        let last = gather.hits + frame.size.x * frame.size.y - 1u;
-        pixels.hits = vec4u(
-            atomicLoad(&gathered.words[min(word + past.x, last)]),
-            atomicLoad(&gathered.words[min(word + past.y, last)]),
-            atomicLoad(&gathered.words[min(word + past.z, last)]),
-            atomicLoad(&gathered.words[min(word + past.w, last)]),
-        );
-    }
-    return pixels;
-}
-
-// Leaves them for the next dispatch or the image.
-fn leave(pixels: Pixels) {
-    let slot = pixels.slot;
-    let is_inside = pixels.is_inside;
-    if is_inside.x {
-        acc[slot] = pixels.image[0];
-    }
-    if is_inside.y {
-        acc[slot + frame.size.x] = pixels.image[1];
-    }
-    if is_inside.z {
-        acc[slot + 2u * frame.size.x] = pixels.image[2];
-    }
-    if is_inside.w {
-        acc[slot + 3u * frame.size.x] = pixels.image[3];
-    }
-    if FIRST_HIT {
-        let word = gather.hits + pixels.first.y * frame.size.x + pixels.first.x;
-        for (var i = 0u; i < PIXELS; i += 1u) {
-            if is_inside[i] {
-                atomicStore(&gathered.words[word + i * frame.size.x], pixels.hits[i]);
-            }
-        }
-    }
-}
-
-// Those that a group before `far` leaves to be seen.
-fn left_behind(old: Pixels, far: f32) -> Pixels {
-    var changed = old;
-    if CUT && frame.culling != 0u {
-        // What lies behind a cut is as hidden as what lies behind opaque voxels.
-        changed.is_shown = old.is_shown & (old.shown_to > vec4f(far));
-    }
-    return changed;
+    return result;
 }
 
 // The frame's sheets from the first that a kernel overlaps to the one after the last.
@@ -337,28 +158,72 @@ fn draw(tile: u32, thread: u32) {
     let opacity_ramp = ramp_of(frame.ramps.x, frame.ramps.y);
     let gradient_opacity_ramp = ramp_of(frame.ramps.y, frame.ramps.z);
 
-    let number = thread / lanes * lanes * PARTS + lane;
-    var pixels: array<Pixels, 4>;
-    pixels[0] = pixels_at(tile, number);
-    if PARTS > 1u {
-        pixels[1] = pixels_at(tile, number + lanes);
-    }
-    if PARTS > 2u {
-        pixels[2] = pixels_at(tile, number + 2u * lanes);
-        pixels[3] = pixels_at(tile, number + 3u * lanes);
-    }
-    let unit = first_unit(thread);
-    let units = ((1u << (lanes * PARTS / 8u)) - 1u) << unit;
+    let columns = (frame.size.x + TILE_SIDE - 1u) / TILE_SIDE;
+    let unit = thread / 8u;
+    let pixel = vec2u(tile % columns, tile / columns) * TILE_SIDE + vec2u((unit & 1u) * 8u + thread % 8u, (unit >> 1u) * 4u);
+    let column = f32(pixel.x) + 0.5;
+    let rows = f32(pixel.y) + vec4f(0.5, 1.5, 2.5, 3.5);
+    let units = subgroupOr(1u << unit);
     var region: Region;
-    region.low = pixels[0].low;
-    region.high = pixels[PARTS - 1u].high;
-    region = opened(region, pixels);
+    region.low = subgroupMin(vec2f(column, rows.x));
+    region.high = subgroupMax(vec2f(column, rows.w));
+
+    let slot = (pixel.y - part.first_row) * frame.size.x + pixel.x;
+    let is_inside = vec4<bool>(pixel.x < frame.size.x) & (vec4u(pixel.y) + vec4u(0u, 1u, 2u, 3u) < vec4u(frame.size.y));
+    var image = mat4x4f();
+    if is_inside.x {
+        image[0] = acc[slot];
+    }
+    if is_inside.y {
+        image[1] = acc[slot + frame.size.x];
+    }
+    if is_inside.z {
+        image[2] = acc[slot + 2u * frame.size.x];
+    }
+    if is_inside.w {
+        image[3] = acc[slot + 3u * frame.size.x];
+    }
+    var is_shown = is_inside;
+    if CUT {
+        let across = array<vec2f, 4>(
+            shown(vec2f(column, rows.x)),
+            shown(vec2f(column, rows.y)),
+            shown(vec2f(column, rows.z)),
+            shown(vec2f(column, rows.w)),
+        );
+        shown_from = vec4f(across[0].x, across[1].x, across[2].x, across[3].x);
+        shown_to = vec4f(across[0].y, across[1].y, across[2].y, across[3].y);
+        is_shown &= shown_from < shown_to;
+    }
+    if is_by_means() {
+        let across = array<Means, 4>(
+            means(vec2f(column, rows.x)),
+            means(vec2f(column, rows.y)),
+            means(vec2f(column, rows.z)),
+            means(vec2f(column, rows.w)),
+        );
+        weights = vec4f(across[0].weight, across[1].weight, across[2].weight, across[3].weight);
+        counted_from = vec4f(across[0].counted.x, across[1].counted.x, across[2].counted.x, across[3].counted.x);
+        counted_to = vec4f(across[0].counted.y, across[1].counted.y, across[2].counted.y, across[3].counted.y);
+    }
+    if FIRST_HIT {
+        let word = gather.hits + pixel.y * frame.size.x + pixel.x;
+        let past = vec4u(0u, 1u, 2u, 3u) * frame.size.x;
+        let last = gather.hits + frame.size.x * frame.size.y - 1u;
+        hits = vec4u(
+            atomicLoad(&gathered.words[min(word + past.x, last)]),
+            atomicLoad(&gathered.words[min(word + past.y, last)]),
+            atomicLoad(&gathered.words[min(word + past.z, last)]),
+            atomicLoad(&gathered.words[min(word + past.w, last)]),
+        );
+    }
+    region = opened(region, is_shown, transpose(image)[3], column, rows);
 
     var voxels_shaded = 0u;
     var sections_rasterized = 0u;
     var bricks_visited = 0u;
     let first_bin = tile * gather.groups;
-    let reached = gather.reached + tile * UNITS + unit;
+    let reached = gather.reached + tile * UNITS + firstTrailingBit(units);
     var at = atomicLoad(&gathered.words[reached]);
     var end = starts[first_bin + at];
     // A driver may end loops that go on for too long: what would take too many passes is left to the next dispatch.
@@ -371,7 +236,7 @@ fn draw(tile: u32, thread: u32) {
         }
         passes += gather.passes_per_group;
         if cursor == end && COMPOSITING != MINIMUM {
-            pixels = after_gaps(pixels);
+            image = after_gap(image);
             continue;
         }
         let group = select(gather.groups - 1u - at, at, ORDER == FRONT_TO_BACK);
@@ -384,10 +249,7 @@ fn draw(tile: u32, thread: u32) {
         let middle = 0.5 * vec2f(frame.size);
         let reaching_low = vec3f(region.open_low - margin - middle, near - reach);
         let reaching_high = vec3f(region.open_high + margin - middle, far + reach);
-        pixels[0].sheets = Sheets();
-        pixels[1].sheets = Sheets();
-        pixels[2].sheets = Sheets();
-        pixels[3].sheets = Sheets();
+        var sheets = Sheets();
         // What is empty is the least.
         var has_drawn = COMPOSITING == MINIMUM;
 
@@ -506,6 +368,7 @@ fn draw(tile: u32, thread: u32) {
                 let part = sqrt(clamp(rim, 0.0, frame.support * frame.support)) / frame.support;
                 is_drawn = is_drawn && rim > 0.0 && is_visible(p.xy, half_boxes[group] * part + BOX_SLACK, region, region.open);
             }
+            own.amount = select(vec4f(0.0), own.amount, is_drawn);
             if is_drawn {
                 // Of the groups that the kernel reaches into, counted from the nearest; a whole one is drawn once.
                 let nth = select(group - u32(max(sheets_overlapped.x, 0.0)) / SHEETS, 0u, whole >= 0.0);
@@ -521,53 +384,79 @@ fn draw(tile: u32, thread: u32) {
                 }
             }
 
-            // Every lane adds the sections of all voxels that reach its pixels. Of a kernel in front or behind, what reaches into the group is
-            // trimmed to its extent (§3.2).
-            let beyond = max(max(near - p.z, p.z - far) - gather.depth_error, 0.0) * frame.kernel_per_depth / frame.support;
-            let part = select(sqrt(max(1.0 - beyond * beyond, 0.0)), 1.0, whole >= 0.0);
-            let extent = half_boxes[group] * part + BOX_SLACK;
-            pixels[0] = add_sections(pixels[0], own, reaching(pixels[0], region.open, 0u, is_drawn, p.xy, extent));
-            if PARTS > 1u {
-                pixels[1] = add_sections(pixels[1], own, reaching(pixels[1], region.open, 1u, is_drawn, p.xy, extent));
+            if ECONOMIES {
+                // Those that are drawn, one after the other.
+                let drawn = subgroupBallot(is_drawn).x;
+                count = countOneBits(drawn);
+                own = footprint_of(own, min(nth_set_bit(vec2u(drawn, 0u), lane), lanes - 1u));
+                own.amount = select(vec4f(0.0), own.amount, lane < count);
             }
-            if PARTS > 2u {
-                pixels[2] = add_sections(pixels[2], own, reaching(pixels[2], region.open, 2u, is_drawn, p.xy, extent));
-                pixels[3] = add_sections(pixels[3], own, reaching(pixels[3], region.open, 3u, is_drawn, p.xy, extent));
+
+            // Every lane adds all voxels' sections at its own pixels, two voxels at a time.
+            for (var i = 0u; i < count; i += 2u) {
+                let a = footprint_of(own, i);
+                let b = footprint_of(own, i + 1u);
+                let s = sections(a, column, rows);
+                let t = sections(b, column, rows);
+                sheets.first += added(s[0], a.amount) + added(t[0], b.amount);
+                sheets.second += added(s[1], a.amount) + added(t[1], b.amount);
+                sheets.third += added(s[2], a.amount) + added(t[2], b.amount);
+                sheets.fourth += added(s[3], a.amount) + added(t[3], b.amount);
             }
         }
 
         if !has_drawn {
-            pixels = after_gaps(pixels);
+            image = after_gap(image);
         }
         for (; has_drawn; has_drawn = false) {
-            pixels[0] = left_behind(composite_group(pixels[0], near), far);
-            if PARTS > 1u {
-                pixels[1] = left_behind(composite_group(pixels[1], near), far);
+            let width = frame.slab_width;
+            if ORDER == FRONT_TO_BACK {
+                image = composite_sheet(image, sheets.first, near);
+                image = composite_sheet(image, sheets.second, near + width);
+                image = composite_sheet(image, sheets.third, near + 2.0 * width);
+                image = composite_sheet(image, sheets.fourth, near + 3.0 * width);
+            } else {
+                image = composite_sheet(image, sheets.fourth, near + 3.0 * width);
+                image = composite_sheet(image, sheets.third, near + 2.0 * width);
+                image = composite_sheet(image, sheets.second, near + width);
+                image = composite_sheet(image, sheets.first, near);
             }
-            if PARTS > 2u {
-                pixels[2] = left_behind(composite_group(pixels[2], near), far);
-                pixels[3] = left_behind(composite_group(pixels[3], near), far);
+            var is_left = is_shown;
+            if CUT && frame.culling != 0u {
+                // What lies behind a cut is as hidden as what lies behind opaque voxels.
+                is_left &= shown_to > vec4f(far);
             }
-            region = opened(region, pixels);
+            region = opened(region, is_left, transpose(image)[3], column, rows);
             if lane == 0u {
                 let tiles = tile_grid(frame.size);
-                let first = pixels[0].first / TILE;
-                let tile_number = (at * tiles.y + first.y) * tiles.x + first.x;
-                let bit = 1u << (tile_number % 32u);
-                if (atomicOr(&gathered.words[gather.composited + tile_number / 32u], bit) & bit) == 0u {
+                let number = (at * tiles.y + pixel.y / TILE) * tiles.x + pixel.x / TILE;
+                let bit = 1u << (number % 32u);
+                if (atomicOr(&gathered.words[gather.composited + number / 32u], bit) & bit) == 0u {
                     atomicAdd(&gathered.words[at], 1u);
                 }
             }
         }
     }
 
-    leave(pixels[0]);
-    if PARTS > 1u {
-        leave(pixels[1]);
+    if is_inside.x {
+        acc[slot] = image[0];
     }
-    if PARTS > 2u {
-        leave(pixels[2]);
-        leave(pixels[3]);
+    if is_inside.y {
+        acc[slot + frame.size.x] = image[1];
+    }
+    if is_inside.z {
+        acc[slot + 2u * frame.size.x] = image[2];
+    }
+    if is_inside.w {
+        acc[slot + 3u * frame.size.x] = image[3];
+    }
+    if FIRST_HIT {
+        let word = gather.hits + pixel.y * frame.size.x + pixel.x;
+        for (var i = 0u; i < PIXELS; i += 1u) {
+            if is_inside[i] {
+                atomicStore(&gathered.words[word + i * frame.size.x], hits[i]);
+            }
+        }
     }
     let counts = subgroupAdd(vec2u(voxels_shaded, sections_rasterized));
     if lane == 0u {
@@ -583,12 +472,7 @@ fn draw(tile: u32, thread: u32) {
     }
 }
 
-// The first of a subgroup's units.
-fn first_unit(thread: u32) -> u32 {
-    return thread / lanes * lanes * PARTS / 8u;
-}
-
-@compute @workgroup_size(THREADS)
+@compute @workgroup_size(64)
 fn main(
     @builtin(local_invocation_index) thread: u32,
     @builtin(workgroup_id) workgroup: vec3u,
@@ -603,7 +487,8 @@ fn main(
     var is_left = false;
     if tile < part.end_tile {
         let first_bin = tile * gather.groups;
-        let at = atomicLoad(&gathered.words[gather.reached + tile * UNITS + first_unit(thread)]);
+        let unit = firstTrailingBit(subgroupOr(1u << (thread / 8u)));
+        let at = atomicLoad(&gathered.words[gather.reached + tile * UNITS + unit]);
         // Behind the last bricks of a tile there is nothing, which is the least.
         let first = select(at, 0u, COMPOSITING == MINIMUM && at < gather.groups);
         is_left = starts[first_bin + first] < starts[first_bin + gather.groups];

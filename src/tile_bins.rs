@@ -41,9 +41,8 @@ const PASSES_PER_VISIT: u32 = 16;
 /// Passes to fetch as many entries as there are threads.
 const PASSES_PER_FETCH: u32 = 3;
 
-/// Passes of a queue at most: that one, 8 to fill it, 6 that do not search for control points, and 5 for its voxels, two by two, in each of
-/// a thread's 4 units.
-const PASSES_PER_QUEUE: u32 = 35;
+/// Passes of a queue at most: that one, 8 to fill it, 6 that do not search for control points, and 5 for its voxels, two by two.
+const PASSES_PER_QUEUE: u32 = 20;
 
 /// Passes of a group at most besides: that one, 12 that find no more voxels, and 2 to composite; without bricks 14.
 const PASSES_PER_GROUP: u32 = 16;
@@ -274,7 +273,7 @@ fn units_touched(pixels: &Pixels, corner: [u32; 2]) -> u32 {
 /// Dispatches that are enough for every subgroup of every tile: in each it takes groups until one might be too much.
 fn dispatches(starts: &[u32], entries: &[u32], groups: usize, passes: &Passes) -> Result<u32, Unfit> {
     let most_bricks = passes.most.saturating_sub(passes.per_group) / passes.per_brick();
-    // Of half of a tile, or of 32 threads and all units: those need the fewest queues.
+    // Of one unit's 8 threads, or of 32 threads and all units: those need the fewest queues.
     let of_subgroup = |starts: &[u32], units: u32, per_brick: u32| {
         let (mut dispatches, mut taken) = (1, 0);
         for group in starts.windows(2) {
@@ -295,9 +294,9 @@ fn dispatches(starts: &[u32], entries: &[u32], groups: usize, passes: &Passes) -
             let (what, required) = ("bricks behind a tile in one sheet group", bricks.into());
             return Err(Unfit { what, required, actual: most_bricks.into() });
         }
-        let of_half = |units: u32| of_subgroup(starts, units, passes.per_brick());
+        let of_unit = |unit: u32| of_subgroup(starts, 1 << unit, passes.per_brick());
         let of_all = of_subgroup(starts, !0, passes.per_visit + QUEUES_PER_BRICK / 4 * passes.per_queue);
-        Ok(of_all.max(of_half(0x0f)).max(of_half(0xf0)))
+        Ok((0..UNITS).map(of_unit).fold(of_all, u32::max))
     };
     let tiles = (0..starts.len() - 1).into_par_iter().step_by(groups.max(1));
     tiles.map(of_tile).try_reduce(|| 0, |a, b| Ok(a.max(b)))

@@ -8,57 +8,42 @@ struct Region {
     // Bounds of those that are not opaque.
     open_low: vec2f,
     open_high: vec2f,
-    // For each of the units' rows the pixels there that are not opaque, lane by lane and part by part.
+    // For each of the units' rows the lanes whose pixel there is not opaque.
     open: vec4u,
     // The same for pixels that have not reached β.
     shallow: vec4u,
 }
 
 // Which pixels are not opaque, and their bounds.
-fn opened(region: Region, pixels: array<Pixels, 4>) -> Region {
-    var result = region;
-    result.open = vec4u(0u);
-    result.shallow = vec4u(0u);
-    result.open_low = vec2f(1e9);
-    result.open_high = vec2f(-1e9);
-    result = opened_part(result, pixels[0], 0u);
-    if PARTS > 1u {
-        result = opened_part(result, pixels[1], lanes);
-    }
-    if PARTS > 2u {
-        result = opened_part(result, pixels[2], 2u * lanes);
-        result = opened_part(result, pixels[3], 3u * lanes);
-    }
-    result.open_low = subgroupMin(result.open_low);
-    result.open_high = subgroupMax(result.open_high);
-    return result;
-}
-
-// Adds a part of the pixels, from a bit on; bounds as this thread knows them.
-fn opened_part(region: Region, pixels: Pixels, first: u32) -> Region {
-    let opacity = transpose(pixels.image)[3];
+fn opened(region: Region, is_inside: vec4<bool>, opacity: vec4f, column: f32, rows: vec4f) -> Region {
     // Pixels off the image count as opaque.
-    let is_open = pixels.is_shown & (opacity < vec4f(select(3e38, frame.opacity_threshold, frame.culling != 0u)));
+    let is_open = is_inside & (opacity < vec4f(select(3e38, frame.opacity_threshold, frame.culling != 0u)));
     var result = region;
     if ECONOMIES {
-        result.shallow |= bits_of(pixels.is_shown & (opacity < vec4f(gather.beta))) << vec4u(first);
+        let is_shallow = is_inside & (opacity < vec4f(gather.beta));
+        result.shallow = vec4u(
+            subgroupBallot(is_shallow.x).x,
+            subgroupBallot(is_shallow.y).x,
+            subgroupBallot(is_shallow.z).x,
+            subgroupBallot(is_shallow.w).x,
+        );
     }
-    result.open |= bits_of(is_open) << vec4u(first);
-    let from_top = select(vec4f(1e9), pixels.rows, is_open);
-    let from_bottom = select(vec4f(-1e9), pixels.rows, is_open);
+    result.open = vec4u(
+        subgroupBallot(is_open.x).x,
+        subgroupBallot(is_open.y).x,
+        subgroupBallot(is_open.z).x,
+        subgroupBallot(is_open.w).x,
+    );
+    let from_top = select(vec4f(1e9), rows, is_open);
+    let from_bottom = select(vec4f(-1e9), rows, is_open);
     let top = min(min(from_top.x, from_top.y), min(from_top.z, from_top.w));
     let bottom = max(max(from_bottom.x, from_bottom.y), max(from_bottom.z, from_bottom.w));
-    result.open_low = min(region.open_low, vec2f(select(1e9, pixels.column, any(is_open)), top));
-    result.open_high = max(region.open_high, vec2f(select(-1e9, pixels.column, any(is_open)), bottom));
+    result.open_low = subgroupMin(vec2f(select(1e9, column, any(is_open)), top));
+    result.open_high = subgroupMax(vec2f(select(-1e9, column, any(is_open)), bottom));
     return result;
 }
 
-// For each of four rows the lanes where something is so.
-fn bits_of(is_so: vec4<bool>) -> vec4u {
-    return vec4u(subgroupBallot(is_so.x).x, subgroupBallot(is_so.y).x, subgroupBallot(is_so.z).x, subgroupBallot(is_so.w).x);
-}
-
-// Whether the box around a voxel's footprint holds a pixel of those in `open`. Bits 0 to 15 are the pixels across the upper
+// Whether the box around a voxel's footprint holds a pixel of those in `open`. Lanes 0 to 15 hold the pixels across the upper
 // units of a region, 16 to 31 those across the lower.
 fn is_visible(center_px: vec2f, margin: vec2f, region: Region, open: vec4u) -> bool {
     let center = center_px - region.low;

@@ -94,7 +94,6 @@ impl Gather {
     fn compiled(&self, device: &Device, mode: GatherMode) -> &ComputeStage {
         self.stage(mode).get_or_init(|| {
             let stage = ShaderStages::COMPUTE;
-            let parts = parts(device);
             let slots = [
                 uniform::<Frame>(stage, false),
                 uniform::<GatherUniform>(stage, false),
@@ -113,8 +112,6 @@ impl Gather {
                 depth_texture(stage),
             ];
             let constants = [
-                ("PARTS", f64::from(parts)),
-                ("THREADS", f64::from(THREADS / parts)),
                 ("COMPOSITING", f64::from(mode.compositing as u32)),
                 ("ORDER", f64::from(mode.order as u32)),
                 ("PERSPECTIVE", f64::from(u8::from(mode.perspective))),
@@ -184,18 +181,6 @@ impl Gather {
             stage.dispatch_indirect(pass, group, &[offset], args);
         }
     }
-}
-
-/// Threads of a tile where each has pixels in one unit.
-const THREADS: u32 = 64;
-
-/// The most threads of a subgroup, each of which has a bit in a word.
-const MOST_LANES: u32 = 32;
-
-/// Units in which a thread has pixels: as many as make a subgroup's region as large as its words have bits, if subgroups have one size.
-fn parts(device: &Device) -> u32 {
-    let info = device.adapter_info();
-    if info.subgroup_min_size == info.subgroup_max_size { (MOST_LANES / info.subgroup_min_size).clamp(1, 4) } else { 1 }
 }
 
 /// Bytes of what a dispatch leaves to the next.
