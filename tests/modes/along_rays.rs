@@ -1,11 +1,12 @@
 //! What maximum, minimum and average make of a whole ray.
 
-use glam::{DVec2, DVec3};
+use glam::{DVec3, UVec2};
 use sheetsplat::camera::Projection;
 use sheetsplat::clip::Clip;
 use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
 use sheetsplat::splatting::{Compositing, Method, Order};
+use sheetsplat::view::View;
 use sheetsplat::volume::{Volume, builtin};
 
 use crate::common::images::largest_difference;
@@ -13,11 +14,10 @@ use crate::common::{RASTERIZERS, Random, camera, gpu, scene, transfer};
 use crate::{COLOR, OPACITY, constant, render, view_of};
 
 /// Of a pixel's ray what lies in the box of half the given extent, grid steps: from where to where, grid steps from the volume's centre.
-fn in_box(volume: &Volume, scene: &Scene, pixel: usize, half: DVec3) -> Option<[DVec3; 2]> {
-    let (grid, rays, width) = (volume.grid(), view_of(volume, scene).rays(), scene.image.width as usize);
-    let size = DVec2::new(f64::from(scene.image.width), f64::from(scene.image.height));
-    let place = DVec2::new((pixel % width) as f64, (pixel / width) as f64) + 0.5 - size / 2.0;
-    let [origin, end] = [0.0, 1.0].map(|depth| rays.at(place, depth) / grid.aspect());
+fn in_box(view: &View, aspect: DVec3, pixel: usize, half: DVec3) -> Option<[DVec3; 2]> {
+    let size = UVec2::from(view.size);
+    let place = UVec2::new(pixel as u32 % size.x, pixel as u32 / size.x).as_dvec2() + 0.5 - size.as_dvec2() / 2.0;
+    let [origin, end] = [0.0, 1.0].map(|depth| view.rays().at(place, depth) / aspect);
     let (mut first, mut last) = (f64::NEG_INFINITY, f64::INFINITY);
     for axis in 0..3 {
         let at = [-half[axis], half[axis]].map(|plane| (plane - origin[axis]) / (end - origin)[axis]);
@@ -51,14 +51,14 @@ fn the_average_of_a_constant_is_the_constant() {
     let (mut inside, mut brightest) = (0, 0.0_f64);
     for (volume, mut scene) in views_of_a_constant(&mut Random(5)) {
         scene.splatting.compositing = Compositing::Average;
-        let (center, radius) = (volume.grid().center(), scene.splatting.radius);
+        let (center, radius, view) = (volume.grid().center(), scene.splatting.radius, view_of(&volume, &scene));
         for rasterizer in RASTERIZERS {
             scene.splatting.rasterizer = rasterizer;
             let image = render(&gpu, &volume, &scene).0;
             for (at, pixel) in image.pixels.iter().enumerate() {
                 let alpha = f64::from(pixel[3]);
                 brightest = brightest.max(alpha / OPACITY);
-                let Some(ends) = in_box(&volume, &scene, at, center + 0.5) else {
+                let Some(ends) = in_box(&view, volume.grid().aspect(), at, center + 0.5) else {
                     assert_eq!(alpha, 0.0, "pixel {at} is beside the volume: {scene:?}");
                     continue;
                 };
@@ -69,7 +69,7 @@ fn the_average_of_a_constant_is_the_constant() {
                 if ends.into_iter().all(is_inside) {
                     inside += 1;
                     // f16 amounts by quads; and with an eye kernels are seen as along their own ray from everywhere.
-                    let tolerance = if view_of(&volume, &scene).perspective.is_some() { 5e-3 } else { 2e-3 };
+                    let tolerance = if view.perspective.is_some() { 5e-3 } else { 2e-3 };
                     assert!((alpha / OPACITY - 1.0).abs() < tolerance, "pixel {at}: {alpha} with {scene:?}");
                     assert!((f64::from(pixel[2]) / alpha - COLOR[2]).abs() < 2e-3, "pixel {at}: {pixel:?}");
                 }
@@ -88,7 +88,7 @@ fn the_minimum_of_a_constant_is_the_constant_inside() {
     let mut inside = 0;
     for (volume, mut scene) in views_of_a_constant(&mut Random(6)) {
         scene.splatting.compositing = Compositing::Minimum;
-        let complete = volume.grid().center() - scene.splatting.radius;
+        let (complete, view) = (volume.grid().center() - scene.splatting.radius, view_of(&volume, &scene));
         // A middle may be a hundredth of a slab outside.
         let [within, around] = [complete - 0.1, complete + 0.1];
         for (rasterizer, order) in RASTERIZERS.into_iter().zip([Order::FrontToBack, Order::BackToFront]) {
@@ -96,10 +96,10 @@ fn the_minimum_of_a_constant_is_the_constant_inside() {
             let image = render(&gpu, &volume, &scene).0;
             for (at, pixel) in image.pixels.iter().enumerate() {
                 let alpha = f64::from(pixel[3]);
-                if in_box(&volume, &scene, at, within).is_some() {
+                if in_box(&view, volume.grid().aspect(), at, within).is_some() {
                     inside += 1;
                     assert!((alpha / OPACITY - 1.0).abs() < 5e-3, "pixel {at}: {alpha} with {scene:?}");
-                } else if in_box(&volume, &scene, at, around).is_none() {
+                } else if in_box(&view, volume.grid().aspect(), at, around).is_none() {
                     assert_eq!(*pixel, [0.0; 4], "pixel {at}: {scene:?}");
                 }
             }
