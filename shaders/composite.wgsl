@@ -13,7 +13,6 @@
 @group(0) @binding(9) var surfaces: texture_depth_2d;
 // Of every pixel the sheet depth of its first hit, as bits; 0 is none.
 @group(0) @binding(10) var<storage, read_write> hits: array<u32>;
-
 // For every tile the number of the group that it was composited for last.
 @group(0) @binding(11) var<storage, read_write> last_groups: array<u32>;
 
@@ -65,7 +64,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
             let slot = (pixel.y - band.first_row) * frame.size.x + pixel.x;
             var image = acc[slot];
             if COMPOSITING == SURFACE && is_after_gap && image.a < 1.0 {
-                // The sheet right before holds nothing.
+                // What is kept of a surface that is not reached is of another sheet than the one right before, which holds nothing.
                 image = vec4f(0.0);
             }
             var ray = vec2f(-FAR, FAR);

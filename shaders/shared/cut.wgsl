@@ -1,5 +1,5 @@
-// What clip planes and a host's surfaces leave of a pixel's ray, and the volume's box; `gpu::layout::Cut` documents the fields. A stage that includes this
-// declares `cut: Cut` and `surfaces: texture_depth_2d`.
+// What clip planes and a host's surfaces leave of a pixel's ray, and the volume's box; `gpu::layout::Cut` documents the fields. A
+// stage that includes this declares `cut: Cut` and `surfaces: texture_depth_2d`.
 struct Cut {
     sheet_at: vec4f,
     sheet_along: vec4f,

@@ -83,7 +83,8 @@ pub const GATHER: Shader = shader!(
     "ramps",
     "compositing",
     "cut",
-    "means"
+    "means",
+    "gathered_sheets"
 );
 /// Writes the depths of first hits.
 pub const FIRST_HIT: Shader = shader!("first_hit", "frame", "cut");

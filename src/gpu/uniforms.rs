@@ -67,7 +67,7 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
         compositing: scene.splatting.compositing as u32,
         order: scene.splatting.order as u32,
         culling: u32::from(scene.splatting.culling && hides(&scene.splatting)),
-        // Where nothing is, nothing is the least.
+        // What is empty counts for the least.
         tiles: u32::from(scene.splatting.tiles && scene.splatting.compositing != Compositing::Minimum),
         per_unit: grid.unit().recip().sqrt().min(f32::MAX.into()) as f32,
         headlight: u32::from(scene.shading.light == Light::Headlight),
