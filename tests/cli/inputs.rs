@@ -107,6 +107,10 @@ fn warnings_state_what_is_assumed() {
     };
     let fixture = |name: &str| fixtures.join(name).display().to_string();
     warned(&fixture("plain.tif"), "plain.tif: no distance between slices is given: taken to be 0.5 mm");
+    let movie = fs::read(fixture("imagej.tif")).unwrap();
+    let at = movie.windows(8).position(|window| window == b"slices=3").unwrap();
+    folder.write("movie.tif", [&movie[..at], b"frames=3", &movie[at + 8..]].concat());
+    warned("movie.tif", "movie.tif: the description says 3 frames: taken to be slices");
     warned(&fixture("series/IM1"), "IM1: one slice; a folder with all slices of a series is read as one volume");
 
     // The slice in the middle a twentieth of a step up.

@@ -90,8 +90,10 @@ fn what_image_j_says() {
     let refused = |instead: &str, field: &str, found: &str, allowed: &str| {
         assert_refused(open(instead), "a.tif", field, found, allowed);
     };
-    refused("channels=2\nspacing=3\nunit=um", "channels", "2", "one number for each voxel");
-    refused("frames=3\nspacing=3\nunit=um", "frames", "3", "1: one volume");
+    refused("channels=2\nspacing=3\nunit=um", "slices, channels, frames", "3, 2, 1", "one of them above 1");
+    refused("frames=3\nspacing=3\nunit=um", "slices, channels, frames", "3, 1, 3", "one of them above 1");
+    let frames = folder.open("a.tif", &with_text("imagej.tif", "slices=3", "frames=3")).unwrap();
+    assert_eq!((frames.values(), frames.spacing()), (values().as_slice(), SPACING));
     refused("zunit=mm\nspacing=3\nunit=um", "unit, yunit, zunit", "um, unit's, mm", "one unit for all");
     refused("spacing=0\nunit=um", "spacing", "0", "a finite number but 0");
     refused("cf=0\nc0=-32768\nc1=x\nunit=um", "c1", "x", "a finite number");

@@ -63,9 +63,17 @@ impl Calibration {
             fields.value(name, "a positive integer", parse)
         };
         let images = count("images")?;
-        for name in ["channels", "frames"] {
-            if count(name)? > 1 {
-                return Err(fields.invalid(name, count(name)?, "1: one volume of one number for each voxel"));
+        let [slices, channels, frames] = [count("slices")?, count("channels")?, count("frames")?];
+        match [slices, channels, frames].map(|count| count > 1) {
+            [_, false, false] => {}
+            // Programs that know of no axes write so.
+            [false, true, false] | [false, false, true] => {
+                let what = if channels > 1 { "channels" } else { "frames" };
+                log::warn!("{}: the description says {images} {what}: taken to be slices", pages.path.display());
+            }
+            _ => {
+                let found = format!("{slices}, {channels}, {frames}");
+                return Err(fields.invalid("slices, channels, frames", found, "one of them above 1: one volume"));
             }
         }
         let units = ["unit", "yunit", "zunit"].map(|name| fields.get(name));
