@@ -9,8 +9,9 @@ use std::time::{Duration, Instant};
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use glam::{DVec3, UVec3};
-use sheetsplat::volume::{Volume, VolumeError};
+use glam::{DMat3, DVec3, UVec3};
+use sheetsplat::Camera;
+use sheetsplat::volume::{Orientation, View, Volume, VolumeError};
 use tempfile::TempDir;
 
 /// Header of a 2×3×4 volume of `uint8`; the tests replace or add lines.
@@ -36,6 +37,8 @@ impl Folder {
 
     fn write(&self, name: &str, parts: &[&[u8]]) -> PathBuf {
         let path = self.0.path().join(name);
+        // Written over, a file may be waited for until it is on the disk; a new one is not.
+        _ = fs::remove_file(&path);
         fs::write(&path, parts.concat()).unwrap();
         path
     }
@@ -237,6 +240,20 @@ fn spacings() {
 }
 
 #[test]
+fn units() {
+    let folder = Folder::new();
+    let unit = |fields: &str| {
+        let volume = folder.attached(&format!("{PLAIN}{fields}\n"), &bytes()).unwrap();
+        volume.unit().map(str::to_owned)
+    };
+    assert_eq!(unit("spacings: 1 1 1"), None);
+    assert_eq!(unit("units: \"um\" \"um\" \"micron\"").as_deref(), Some("µm"));
+    assert_eq!(unit("space units: \"mm\" \"mm\" \"mm\"\nunits: \"m\" \"m\" \"m\"").as_deref(), Some("mm"));
+    assert_eq!(unit("units: \"mm\" \"mm\" \"s\""), None);
+    assert_eq!(unit("units: mm"), None);
+}
+
+#[test]
 fn space_directions() {
     let folder = Folder::new();
     let open = |value: &str| folder.attached(&format!("{PLAIN}space directions: {value}\n"), &bytes());
@@ -277,6 +294,77 @@ fn space_directions() {
     }
     let both = open("(1,0,0) (0,1,0) (0,0,1)\nspacings: 1 1 1");
     assert_refused(both, "volume.nrrd", "space directions", "`spacings` as well", "one of");
+}
+
+#[test]
+fn orientation() {
+    let folder = Folder::new();
+    let open = |space: &str, rest: &str| {
+        let directions = "space directions: (0,-2,0) (0.5,0,0) (0,0,3)";
+        folder.attached(&format!("{PLAIN}space: {space}\n{directions}\n{rest}"), &bytes())
+    };
+    for (names, signs) in [
+        (["right-anterior-superior", "RAS"], DVec3::ONE),
+        (["left-anterior-superior", "las"], DVec3::new(-1.0, 1.0, 1.0)),
+        (["Left-Posterior-Superior", "LPS"], DVec3::new(-1.0, -1.0, 1.0)),
+    ] {
+        let axes = [DVec3::NEG_Y, DVec3::X, DVec3::Z].map(|axis| axis * signs);
+        for name in names {
+            let volume = open(name, "space origin: (1, 2.5, -3)\n").unwrap();
+            let orientation = volume.orientation().unwrap();
+            assert_eq!(orientation.axes, DMat3::from_cols_array_2d(&axes.map(|axis| axis.to_array())), "{name}");
+            assert_eq!(orientation.origin, DVec3::new(1.0, 2.5, -3.0) * signs, "{name}");
+            assert_eq!(orientation.is_mirrored(), signs.element_product() < 0.0, "{name}");
+            assert_eq!(open(name, "").unwrap().orientation().unwrap().origin, DVec3::ZERO);
+        }
+    }
+    // Spaces that are not a patient's.
+    assert_eq!(open("scanner-xyz", "").unwrap().orientation(), None);
+    assert_eq!(
+        folder.attached(&format!("{PLAIN}space: RAS\nspacings: 1 1 1\n"), &bytes()).unwrap().orientation(),
+        None
+    );
+    for wrong in ["1 2 3", "(1,2)", "(1,2,nan)", "none"] {
+        let refused = open("RAS", &format!("space origin: {wrong}\n"));
+        assert_refused(refused, "volume.nrrd", "space origin", wrong, "a vector (x,y,z)");
+    }
+}
+
+#[test]
+fn anatomical_views() {
+    // A volume whose x runs to the patient's left, y to the head, z to the front.
+    let folder = Folder::new();
+    let header = format!("{PLAIN}space: LPS\nspace directions: (1,0,0) (0,0,1) (0,-1,0)\n");
+    let volume = folder.attached(&header, &bytes()).unwrap();
+    let orientation = volume.orientation().unwrap();
+    assert!(!orientation.is_mirrored());
+    let [left, up, front] = DMat3::IDENTITY.to_cols_array_2d().map(DVec3::from_array);
+    for (view, expected) in [
+        (View::Front, [-front, up]),
+        (View::Back, [front, up]),
+        (View::Left, [-left, up]),
+        (View::Right, [left, up]),
+        (View::Top, [-up, front]),
+        (View::Bottom, [up, front]),
+    ] {
+        assert_eq!(orientation.direction_and_up(view), expected, "{view:?}");
+    }
+    // Who faces the patient has the patient's left on the right.
+    let [direction, up] = orientation.direction_and_up(View::Front);
+    assert_eq!(Camera { direction, up, ..Camera::default() }.basis().u, left);
+}
+
+#[test]
+fn orientations_are_orthonormal() {
+    let volume = Folder::new().attached(PLAIN, &bytes()).unwrap();
+    let set = |axes: DMat3, origin: DVec3| volume.clone().with_orientation("here", Some(Orientation { axes, origin }));
+    let mirrored = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
+    assert!(set(mirrored, DVec3::ONE).unwrap().orientation().unwrap().is_mirrored());
+    let skewed = DMat3::from_cols(DVec3::X, DVec3::new(1e-3, 1.0, 0.0), DVec3::Z);
+    let wrong = [(skewed, DVec3::ZERO), (DMat3::IDENTITY * 1.001, DVec3::ZERO), (DMat3::IDENTITY, DVec3::NAN)];
+    for (axes, origin) in wrong.into_iter().chain([(DMat3::NAN, DVec3::ZERO)]) {
+        assert_refused(set(axes, origin), "here", "orientation", "[", "finite orthogonal unit vectors");
+    }
 }
 
 #[test]

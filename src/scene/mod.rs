@@ -18,7 +18,7 @@ use crate::error::RenderError;
 use crate::shading::Shading;
 use crate::splatting::Splatting;
 use crate::transfer_function::{LabelTables, Ramp, TransferFunction};
-use crate::volume::{Labels, Volume, VolumeError, builtin};
+use crate::volume::{Labels, RawLayout, Volume, VolumeError, builtin};
 use reader::{OVERRIDE, Origins, Section, apply_override};
 
 /// Why a scene could not be read.
@@ -60,6 +60,8 @@ pub enum SceneError {
 pub enum VolumeSource {
     /// A volume file.
     File(PathBuf),
+    /// A file of samples without a header.
+    Raw(PathBuf, RawLayout),
     /// A procedural volume, `NAME` or `NAME:N` (see [`builtin::volume`]).
     Builtin(String),
 }
@@ -171,7 +173,7 @@ impl TransferSettings {
 ///
 /// The readers below take `--set` overrides, each `table.key=value` (or `table={…}` for a whole table). They apply in
 /// turn, over the file's values. The value is TOML, or a string if it does not parse as TOML. An override of
-/// `volume.path` also removes `volume.builtin`, and the other way round.
+/// `volume.path` also removes `volume.builtin`, and one of `volume.builtin` removes `volume.path` and what says how to read a raw file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// Where the volume comes from.
@@ -251,6 +253,7 @@ impl Scene {
     pub fn load_volume(&self) -> Result<Volume, VolumeError> {
         let (volume, origin) = match &self.volume {
             VolumeSource::File(path) => (Volume::open(path)?, path.display().to_string()),
+            VolumeSource::Raw(path, layout) => (Volume::open_raw(path, layout)?, path.display().to_string()),
             VolumeSource::Builtin(name) => (builtin::volume(name)?, format!("builtin:{name}")),
         };
         let volume = match &self.labels {
@@ -324,7 +327,7 @@ impl Scene {
     /// Whether the volume is segmented; an unknown builtin volume might be.
     fn may_have_labels(&self) -> bool {
         let has_none = match &self.volume {
-            VolumeSource::File(_) => true,
+            VolumeSource::File(_) | VolumeSource::Raw(..) => true,
             VolumeSource::Builtin(name) => builtin::labels(name).is_some_and(<[_]>::is_empty),
         };
         self.labels.is_some() || !has_none

@@ -2,10 +2,12 @@
 
 use std::ops::{Add, Mul};
 
+use glam::UVec3;
 use toml::{Table, Value};
 
 use super::SceneError;
 use crate::transfer_function::{Ramp, RampError};
+use crate::volume::{SIZES, dims_of};
 
 /// The origin of what was set on the command line.
 pub(super) const OVERRIDE: &str = "--set";
@@ -30,7 +32,9 @@ pub(super) fn apply_override(root: &mut Table, argument: &str) -> Result<String,
                 // They are two names of one thing: the last one given counts.
                 match key {
                     "volume.path" => _ = section.remove("builtin"),
-                    "volume.builtin" => _ = section.remove("path"),
+                    "volume.builtin" => {
+                        section.retain(|name, _| !["path", "dims", "type", "endian", "offset"].contains(&name));
+                    }
                     "transfer.color" => _ = section.remove("colormap"),
                     "transfer.colormap" => _ = section.remove("color"),
                     _ => {}
@@ -206,6 +210,20 @@ impl<'a> Entry<'a> {
         let allowed = "an integer from 1 to the device's texture limit";
         let integer = self.value.as_integer().ok_or_else(|| self.mistyped(allowed))?;
         u32::try_from(integer).ok().filter(|&pixels| pixels > 0).ok_or_else(|| self.refused(allowed))
+    }
+
+    /// Voxels along x, y and z.
+    pub(super) fn dims(&self) -> Result<UVec3, SceneError> {
+        let sizes = self.array::<3>(SIZES)?.map(|size| size.value.as_integer().ok_or_else(|| size.mistyped(SIZES)));
+        let [x, y, z] = sizes;
+        dims_of([x?, y?, z?]).ok_or_else(|| self.refused(SIZES))
+    }
+
+    /// A number of bytes.
+    pub(super) fn bytes(&self) -> Result<u64, SceneError> {
+        let allowed = "an integer >= 0";
+        let integer = self.value.as_integer().ok_or_else(|| self.mistyped(allowed))?;
+        u64::try_from(integer).map_err(|_| self.refused(allowed))
     }
 
     /// A label.

@@ -14,6 +14,7 @@ use crate::clip::{Clip, MAX_PLANES};
 use crate::shading::{Light, Shading};
 use crate::splatting::{Compositing, Splatting};
 use crate::transfer_function::{LabelTables, Ramp};
+use crate::volume::{RawLayout, SampleType};
 
 const POSITIVE: Bounds = Bounds { text: "a finite number > 0", contain: |x| x > 0.0 };
 const NOT_NEGATIVE: Bounds = Bounds { text: "a finite number >= 0", contain: |x| x >= 0.0 };
@@ -43,6 +44,7 @@ pub(super) fn volume(
     section.read("spacing", &mut spacing, |entry| entry.numbers(POSITIVE).map(|s| Some(DVec3::from_array(s))))?;
     section
         .read("labels", &mut labels, |entry| entry.text("a label file's path").map(|path| Some(folder.join(path))))?;
+    let raw = raw_layout(&mut section)?;
     let origins = section.origins;
     section.finish()?;
     let refused = |found| origins.invalid("volume", &[], found, "either volume.path or volume.builtin");
@@ -52,7 +54,38 @@ pub(super) fn volume(
         (None, None) => given.ok_or_else(|| refused("neither path nor builtin"))?,
         (Some(_), Some(_)) => return Err(refused("both path and builtin")),
     };
+    let source = match (source, raw) {
+        (source, None) => source,
+        (VolumeSource::File(path), Some(layout)) => VolumeSource::Raw(path, layout),
+        (_, Some(_)) => return Err(origins.invalid("volume.dims", &[], "a volume that is no file", "volume.path")),
+    };
     Ok(VolumeSettings { source, spacing, labels })
+}
+
+/// What says how to read a raw file: `dims`, and then `type`, `endian` and `offset`.
+fn raw_layout(section: &mut Section) -> Result<Option<RawLayout>, SceneError> {
+    let (mut dims, mut sample_type, mut big_endian, mut offset) = (None, None, None, None);
+    section.read("dims", &mut dims, |entry| entry.dims().map(Some))?;
+    section.read("type", &mut sample_type, |entry| entry.choice(&SampleType::NAMED).map(Some))?;
+    let endians = [("little", false), ("big", true)];
+    section.read("endian", &mut big_endian, |entry| entry.choice(&endians).map(Some))?;
+    section.read("offset", &mut offset, |entry| entry.bytes().map(Some))?;
+    let missing = |key: &str, allowed: &str| section.origins.invalid(key, &["volume.dims"], "no such key", allowed);
+    let Some(dims) = dims else {
+        if sample_type.is_some() || big_endian.is_some() || offset.is_some() {
+            return Err(missing("volume.dims", "the sizes of a raw file, which has type, endian and offset"));
+        }
+        return Ok(None);
+    };
+    let Some(sample_type) = sample_type else {
+        let names = SampleType::NAMED.map(|(name, _)| format!("{name:?}")).join(" or ");
+        return Err(missing("volume.type", &names));
+    };
+    let is_one_byte = matches!(sample_type, SampleType::I8 | SampleType::U8);
+    let Some(big_endian) = big_endian.or(is_one_byte.then_some(false)) else {
+        return Err(missing("volume.endian", "\"little\" or \"big\""));
+    };
+    Ok(Some(RawLayout { dims, sample_type, big_endian, offset: offset.unwrap_or(0) }))
 }
 
 /// `[camera]`. Keys of the projection that is not in use are checked and have no effect, so that overriding

@@ -6,7 +6,9 @@ use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
 
-use super::{Volume, VolumeError, invalid, nrrd, of_format};
+use super::format;
+use super::loaded::Loaded;
+use super::{Volume, VolumeError, invalid};
 
 /// Two spacings that differ by less than this, relative to the larger one, are one spacing that was written down twice.
 const SAME_SPACING: f64 = 1e-4;
@@ -27,13 +29,14 @@ pub struct Labels {
 }
 
 impl Labels {
-    /// Reads a label file, a volume file (`.nrrd`, `.nhdr`) of whole numbers from 0 to 65535 of any type.
+    /// Reads a label file, a volume file of any format that [`Volume::open`] reads, of whole numbers from 0 to 65535 of any type.
     ///
     /// # Errors
     /// If the file cannot be read, is of no known format, does not hold what its header promises, or has a sample that is no
     /// label (the error names the voxel).
     pub fn open(path: &Path) -> Result<Self, VolumeError> {
-        of_format(path, nrrd::read_labels)
+        let (_, Loaded { dims, spacing, label_names: names, values, .. }) = format::read(path)?;
+        Ok(Self { origin: path.display().to_string(), dims, spacing, values: values.into(), names })
     }
 }
 
@@ -69,9 +72,9 @@ impl Volume {
         self.labels.as_deref()
     }
 
-    /// What a label is called, if that is known: of a segmented volume, or of one whose values are labels.
-    pub fn label_name(&self, label: u16) -> Option<&str> {
-        self.label_names.get(&label).map(String::as_str)
+    /// What labels are called, as far as that is known: those of a segmented volume, or of one whose values are labels.
+    pub fn label_names(&self) -> &BTreeMap<u16, String> {
+        &self.label_names
     }
 
     /// The label of a voxel, given as an index into the volume; `None` if the volume is not segmented.

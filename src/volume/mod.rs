@@ -1,9 +1,32 @@
 //! Scalar volumes: extent, spacing and values, without any appearance.
 
 pub mod builtin;
+#[cfg(feature = "dicom")]
+mod dicom;
+mod fields;
+mod folder;
+mod format;
 mod grid;
 mod labels;
+mod loaded;
+#[cfg(feature = "metaimage")]
+mod metaimage;
+#[cfg(feature = "nifti")]
+mod nifti;
+#[cfg(feature = "npy")]
+mod npy;
 mod nrrd;
+mod orientation;
+mod raw;
+mod samples;
+mod source;
+#[cfg(feature = "tiff")]
+mod tiff;
+mod unit;
+#[cfg(feature = "vtk")]
+mod vtk;
+#[cfg(any(feature = "tiff", feature = "vtk"))]
+mod xml;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,6 +36,11 @@ use glam::{DVec3, UVec3};
 
 pub use grid::Grid;
 pub use labels::Labels;
+use loaded::Loaded;
+pub use orientation::{Orientation, View};
+pub use raw::RawLayout;
+pub use samples::SampleType;
+pub(crate) use samples::{SIZES, dims_of};
 
 /// The largest ratio of two spacings.
 const MAX_ASPECT: f64 = 1e4;
@@ -44,19 +72,17 @@ pub enum VolumeError {
     },
 }
 
-fn invalid(origin: &str, field: &str, found: String, allowed: String) -> VolumeError {
-    VolumeError::Invalid { origin: origin.to_owned(), field: field.to_owned(), found, allowed }
+/// How a file holds a volume.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Encoding {
+    /// The format's name: `NRRD`, `NIfTI`, `raw`.
+    pub format: &'static str,
+    /// The type of its samples, before slope and intercept.
+    pub sample_type: SampleType,
 }
 
-/// Reads a file of a format that its extension tells.
-fn of_format<T>(path: &Path, nrrd: fn(&Path) -> Result<T, VolumeError>) -> Result<T, VolumeError> {
-    match path.extension().and_then(|extension| extension.to_str()) {
-        Some("nrrd" | "nhdr") => nrrd(path),
-        extension => {
-            let found = extension.map_or("none".to_owned(), |extension| format!("\".{extension}\""));
-            Err(invalid(&path.display().to_string(), "extension", found, ".nrrd or .nhdr".to_owned()))
-        }
-    }
+fn invalid(origin: &str, field: &str, found: String, allowed: String) -> VolumeError {
+    VolumeError::Invalid { origin: origin.to_owned(), field: field.to_owned(), found, allowed }
 }
 
 /// A scalar volume on a rectilinear grid (SPEC §2): `dims` voxels, x fastest in memory, `spacing` world units apart.
@@ -69,6 +95,9 @@ pub struct Volume {
     values: Vec<f32>,
     labels: Option<Arc<[u16]>>,
     label_names: BTreeMap<u16, String>,
+    orientation: Option<Orientation>,
+    unit: Option<String>,
+    encoding: Option<Encoding>,
 }
 
 impl Volume {
@@ -90,7 +119,9 @@ impl Volume {
             let voxel = Grid { dims, spacing }.voxel_at(at as u32);
             return Err(invalid("data", format!("{} at voxel {voxel}", values[at]), "finite values"));
         }
-        Self { grid: Grid { dims, spacing: DVec3::ONE }, values, labels: None, label_names: BTreeMap::new() }
+        let grid = Grid { dims, spacing: DVec3::ONE };
+        let label_names = BTreeMap::new();
+        Self { grid, values, labels: None, label_names, orientation: None, unit: None, encoding: None }
             .with_spacing(origin, spacing)
     }
 
@@ -109,12 +140,20 @@ impl Volume {
         Ok(self)
     }
 
-    /// Reads a volume file; the format is told by the extension (`.nrrd`, `.nhdr`).
+    /// Reads a volume file. Its format is told by its first bytes, or else by the extension: NRRD (`.nrrd`, `.nhdr`), and, each
+    /// with the feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MetaImage (`.mha`, `.mhd`), NPY (`.npy`), TIFF
+    /// (`.tif`, `.tiff`), DICOM (`.dcm`) and VTK (`.vti`, `.vtk`). Or a folder of slices: TIFF files of one page, or DICOM files of one
+    /// series.
     ///
     /// # Errors
-    /// If the file cannot be read, is of no known format, or does not hold what its header promises.
+    /// If the file cannot be read, is of no format that is compiled in, or does not hold what its header promises.
     pub fn open(path: &Path) -> Result<Self, VolumeError> {
-        of_format(path, nrrd::read)
+        let (format, Loaded { dims, kind: sample_type, spacing, unit, orientation, label_names, values }) =
+            format::read(path)?;
+        let origin = path.display().to_string();
+        let volume = Self::new(&origin, dims, spacing.unwrap_or(DVec3::ONE), values)?;
+        let encoding = Some(Encoding { format, sample_type });
+        Self { unit, encoding, label_names, ..volume }.with_orientation(&origin, orientation)
     }
 
     /// Where the voxels are.
@@ -130,6 +169,16 @@ impl Volume {
     /// World units from voxel to voxel along x, y and z.
     pub fn spacing(&self) -> DVec3 {
         self.grid.spacing
+    }
+
+    /// What a world unit is, if the file says so: `mm`, `µm`, or what else stands there.
+    pub fn unit(&self) -> Option<&str> {
+        self.unit.as_deref()
+    }
+
+    /// How the file held the values; `None` if they come from no file.
+    pub fn encoding(&self) -> Option<Encoding> {
+        self.encoding
     }
 
     /// All values, x fastest, then y, then z.

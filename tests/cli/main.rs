@@ -10,6 +10,8 @@ mod extremes;
 #[expect(dead_code, reason = "not every file needs all of it")]
 #[path = "../common/images.rs"]
 mod images;
+mod info;
+mod inputs;
 mod looks;
 mod orbit;
 mod outputs;

@@ -10,21 +10,27 @@ use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::image::PngDepth;
 use sheetsplat::scene::{Scene, SceneError, VolumeSource};
 use sheetsplat::stats::Stats;
-use sheetsplat::volume::Volume;
+use sheetsplat::volume::{self, Orientation, Volume};
 
 use crate::failure::Failure;
 
 /// What to draw, and on which adapter.
 #[derive(clap::Args)]
 pub(crate) struct Input {
-    /// A scene file (.toml), a volume file (.nrrd, .nhdr), or builtin:NAME[:N].
+    /// A scene file (.toml), a volume file, or builtin:NAME[:N].
     #[arg(value_name = "INPUT")]
     pub(crate) name: String,
     /// Set a scene value, as in --set splatting.slab_width=2.0. Can be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(crate) sets: Vec<String>,
     #[command(flatten)]
+    raw: Raw,
+    #[command(flatten)]
     look: Look,
+    /// The side of the patient to look at, where the volume's file says how the patient lies; in place of the scene's
+    /// camera.direction and camera.up.
+    #[arg(long, value_enum, value_name = "SIDE")]
+    pub(crate) view: Option<View>,
     /// Part of the name of the adapter to use.
     #[arg(long, value_name = "NAME", env = "WGPU_ADAPTER_NAME")]
     pub(crate) adapter: Option<String>,
@@ -49,26 +55,102 @@ impl Look {
     }
 }
 
+/// What a raw file has no header to say; short for --set of the scene's keys, and before them.
+#[derive(clap::Args)]
+struct Raw {
+    /// Voxels of a file without a header: short for --set volume.dims=[X,Y,Z].
+    #[arg(long, value_name = "X,Y,Z")]
+    dims: Option<String>,
+    /// Its samples' type, uint8, int16, float32, …: short for --set volume.type=TYPE.
+    #[arg(long, value_name = "TYPE")]
+    r#type: Option<String>,
+    /// Its byte order, little or big: short for --set volume.endian=ORDER.
+    #[arg(long, value_name = "ORDER")]
+    endian: Option<String>,
+    /// Bytes before its first sample: short for --set volume.offset=N.
+    #[arg(long, value_name = "N")]
+    offset: Option<String>,
+    /// World units from voxel to voxel, of any volume: short for --set volume.spacing=[X,Y,Z].
+    #[arg(long, value_name = "X,Y,Z")]
+    spacing: Option<String>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum View {
+    Front,
+    Back,
+    Left,
+    Right,
+    Top,
+    Bottom,
+}
+
+impl Raw {
+    fn sets(&self) -> Vec<String> {
+        let array = |key: &str, value: &Option<String>| value.as_ref().map(|value| format!("volume.{key}=[{value}]"));
+        let plain = |key: &str, value: &Option<String>| value.as_ref().map(|value| format!("volume.{key}={value}"));
+        let sets = [
+            array("dims", &self.dims),
+            plain("type", &self.r#type),
+            plain("endian", &self.endian),
+            plain("offset", &self.offset),
+            array("spacing", &self.spacing),
+        ];
+        sets.into_iter().flatten().collect()
+    }
+}
+
+impl From<View> for volume::View {
+    fn from(view: View) -> Self {
+        match view {
+            View::Front => Self::Front,
+            View::Back => Self::Back,
+            View::Left => Self::Left,
+            View::Right => Self::Right,
+            View::Top => Self::Top,
+            View::Bottom => Self::Bottom,
+        }
+    }
+}
+
 impl Input {
     pub(crate) fn scene(&self) -> Result<Scene, SceneError> {
         self.scene_with(&self.sets)
     }
 
-    /// The scene with these settings in place of the arguments'. By its extension a scene file; anything else is a volume.
+    /// The scene with these settings in place of those of --set. By its extension a scene file; anything else is a volume.
     pub(crate) fn scene_with(&self, sets: &[String]) -> Result<Scene, SceneError> {
-        let sets = &self.look.sets().chain(sets.iter().cloned()).collect::<Vec<_>>();
+        let sets = self.raw.sets().into_iter().chain(self.look.sets()).chain(sets.iter().cloned()).collect::<Vec<_>>();
         match self.name.strip_prefix("builtin:") {
-            Some(name) => Scene::from_volume(VolumeSource::Builtin(name.to_owned()), sets),
-            None if self.name.ends_with(".toml") => Scene::open(self.name.as_ref(), sets),
-            None => Scene::from_volume(VolumeSource::File(self.name.clone().into()), sets),
+            Some(name) => Scene::from_volume(VolumeSource::Builtin(name.to_owned()), &sets),
+            None if self.name.ends_with(".toml") => Scene::open(self.name.as_ref(), &sets),
+            None => Scene::from_volume(VolumeSource::File(self.name.clone().into()), &sets),
         }
     }
 
+    /// Loads the scene's volume.
     pub(crate) fn load_volume(&self, scene: &Scene) -> Result<Volume, Failure> {
         let start = Instant::now();
         let volume = scene.load_volume().map_err(|error| self.failure(error))?;
         log::info!("{}: {} voxels, loaded in {:.1?}", self.name, volume.grid().dims, start.elapsed());
+        if self.view.is_some() && volume.orientation().is_some_and(Orientation::is_mirrored) {
+            let name = &self.name;
+            log::warn!("{name}: --view: the axes are left-handed, so the image is a mirror image of the patient");
+        }
         Ok(volume)
+    }
+
+    /// Turns the scene's camera to the side of the patient that --view says.
+    pub(crate) fn look_at(&self, volume: &Volume, scene: &mut Scene) -> Result<(), Failure> {
+        let (Some(view), name) = (self.view, &self.name) else { return Ok(()) };
+        let Some(orientation) = volume.orientation() else {
+            let allowed = "a volume whose file says how the patient lies, or --set camera.direction and camera.up";
+            return Err(Failure::Input(format!(
+                "{name}: --view: found no orientation in the file, allowed: {allowed}"
+            )));
+        };
+        [scene.camera.direction, scene.camera.up] = orientation.direction_and_up(view.into());
+        Ok(())
     }
 
     pub(crate) fn headless(&self, profile: bool) -> Result<Headless, Failure> {

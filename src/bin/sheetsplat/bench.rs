@@ -39,10 +39,11 @@ struct Report {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let input = &arguments.input;
-    let scene = input.scene()?;
+    let mut scene = input.scene()?;
     let start = Instant::now();
     let volume = input.load_volume(&scene)?;
     let load_ms = milliseconds_since(start);
+    input.look_at(&volume, &mut scene)?;
 
     let start = Instant::now();
     let headless = input.headless(arguments.profile)?;

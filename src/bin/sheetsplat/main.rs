@@ -8,6 +8,7 @@ mod canvas;
 mod compare;
 mod documents;
 mod failure;
+mod info;
 mod orbit;
 mod progress;
 mod render;
@@ -27,6 +28,7 @@ Examples:
   sheetsplat render builtin:head -o head.png
   sheetsplat render scene.toml -o image.exr --set camera.direction=[1,0,0]
   sheetsplat orbit head.nrrd -o turn.gif
+  sheetsplat info head.nrrd
   sheetsplat adapters
 
 Exit codes: 0 success, 2 bad usage or input, 1 anything else. Logs: -v, or the environment variable RUST_LOG.";
@@ -57,6 +59,8 @@ enum Command {
     Bench(bench::Arguments),
     /// Compare two images: prints what they differ in, exit code 1 if by more than is allowed.
     Compare(compare::Arguments),
+    /// Tell what a volume is: format, size, unit, orientation, and how its values are distributed.
+    Info(info::Arguments),
     /// List the adapters, whether they are usable, and which limits are missing where they are not.
     Adapters(adapters::Arguments),
     /// Print completions for a shell.
@@ -84,6 +88,7 @@ fn main() -> ExitCode {
         Command::Sweep(arguments) => sweep::run(&arguments, progress),
         Command::Bench(arguments) => bench::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Info(arguments) => info::run(&arguments),
         Command::Adapters(arguments) => adapters::run(&arguments),
         Command::Completions(arguments) => documents::completions(&arguments, Arguments::command()),
         Command::Man(arguments) => documents::man(&arguments, Arguments::command()),

@@ -22,6 +22,8 @@ use crate::failure::Failure;
 Examples:
   sheetsplat render builtin:head -o head.png
   sheetsplat render head.nrrd -o image.exr --set splatting.slab_width=0.5 --stats stats.json
+  sheetsplat render ct.nii.gz -o face.png --view front
+  sheetsplat render ct.raw -o ct.png --dims 256,256,113 --type uint16 --endian big
   sheetsplat render ct.nrrd -o skull.png --preset ct-bone --annotate scale --save-scene skull.toml
   sheetsplat render cells.nrrd -o cells.png --preset confocal --colormap magma --annotate scale,colors")]
 pub(crate) struct Arguments {
@@ -58,10 +60,11 @@ enum Backend {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let Arguments { input, output, stats: stats_file, save_scene, .. } = arguments;
     check_files(arguments)?;
-    let scene = input.scene()?;
+    let mut scene = input.scene()?;
     let start = Instant::now();
     let volume = input.load_volume(&scene)?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
+    input.look_at(&volume, &mut scene)?;
     scene.transfer.check(&volume).map_err(|error| input.failure(error))?;
     let start = Instant::now();
     // What is saved is what is rendered.

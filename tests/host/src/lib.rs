@@ -6,6 +6,7 @@ mod dependencies;
 mod depth;
 mod devices;
 mod faults;
+mod formats;
 mod passes;
 mod sharing;
 mod targets;

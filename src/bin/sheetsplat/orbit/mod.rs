@@ -139,10 +139,11 @@ fn draw(
         return Ok(());
     }
     let Arguments { input, annotate, turn, count, .. } = arguments;
-    let volume = input.load_volume(scene)?;
-    let overlay = annotate.overlay(scene, &volume)?;
+    let (volume, mut scene) = (input.load_volume(scene)?, scene.clone());
+    input.look_at(&volume, &mut scene)?;
+    let overlay = annotate.overlay(&scene, &volume)?;
     let headless = input.headless(false)?;
-    let mut view = headless.view(volume, scene).map_err(|error| input.failure(error))?;
+    let mut view = headless.view(volume, &scene).map_err(|error| input.failure(error))?;
     let mut progress = Progress::new(frames.len(), progress);
     for &frame in frames {
         // From where the scene's camera is, whichever frame was drawn before.

@@ -85,6 +85,9 @@ fn check(axes: &[Axis], arguments: &Arguments) -> Result<(), Failure> {
             let allowed = "before its several values only";
             return Err(Failure::Input(format!("--set: {key}: found once more, allowed: {allowed}")));
         }
+        if arguments.input.view.is_some() && ["camera", "camera.direction", "camera.up"].contains(&key.as_str()) {
+            return Err(Failure::Input(format!("--view: found with several values of {key}, allowed: without them")));
+        }
     }
     if let (Some(columns), 2) = (arguments.columns, axes.len()) {
         return Err(Failure::Input(format!(
@@ -113,13 +116,14 @@ fn draw(arguments: &Arguments, scenes: Vec<(Scene, Vec<String>)>, progress: bool
     let mut progress = Progress::new(scenes.len(), progress);
     let mut last: Option<(Scene, Arc<_>)> = None;
     let mut tiles = Vec::new();
-    for (scene, label) in scenes {
+    for (mut scene, label) in scenes {
         let is_same =
             |last: &Scene| (&last.volume, last.spacing, &last.labels) == (&scene.volume, scene.spacing, &scene.labels);
         let volume = match last {
             Some((last, volume)) if is_same(&last) => volume,
             _ => Arc::new(input.load_volume(&scene)?),
         };
+        input.look_at(&volume, &mut scene)?;
         let overlay = annotate.overlay(&scene, &volume)?;
         let mut rendering = headless.render_volume(volume.clone(), &scene).map_err(|error| input.failure(error))?;
         log_frame(&label.join(", "), &rendering.stats);

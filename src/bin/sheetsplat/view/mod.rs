@@ -52,8 +52,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.screenshot {
         Image::check_format(path)?;
     }
-    let scene = arguments.input.scene()?;
+    let mut scene = arguments.input.scene()?;
     let volume = arguments.input.load_volume(&scene)?;
+    arguments.input.look_at(&volume, &mut scene)?;
 
     let title = format!("{} - sheetsplat", arguments.input.name);
     let viewport = ViewportBuilder::default()

@@ -1,0 +1,165 @@
+//! `sheetsplat info`: what a volume file says of itself, and how its values are distributed.
+
+mod statistics;
+
+use std::fmt::Write;
+
+use glam::DVec3;
+use serde::{Serialize, Serializer};
+use sheetsplat::appearance::quantiles;
+use sheetsplat::volume::{Orientation, SampleType, Volume};
+
+use crate::arguments::Input;
+use crate::failure::Failure;
+use crate::stdout;
+use statistics::{Histogram, extent_and_mean};
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  sheetsplat info head.nii.gz
+  sheetsplat info series/ --json")]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    input: Input,
+    /// One line of JSON instead of text.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Percent of the values, and the name that has in JSON.
+const PERCENTILES: [(f64, &str); 9] = [
+    (0.1, "0.1"),
+    (1.0, "1"),
+    (5.0, "5"),
+    (25.0, "25"),
+    (50.0, "50"),
+    (75.0, "75"),
+    (95.0, "95"),
+    (99.0, "99"),
+    (99.9, "99.9"),
+];
+
+/// Columns and rows of the histogram.
+const COLUMNS: usize = 64;
+const ROWS: usize = 8;
+
+#[derive(Serialize)]
+struct Info {
+    format: &'static str,
+    dims: [u32; 3],
+    r#type: String,
+    spacing: [f64; 3],
+    unit: Option<String>,
+    min: f64,
+    max: f64,
+    mean: f64,
+    #[serde(serialize_with = "as_map")]
+    percentiles: [f64; PERCENTILES.len()],
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let input = &arguments.input;
+    let volume = input.load_volume(&input.scene()?)?;
+    let [min, max, mean] = extent_and_mean(volume.values());
+    let percentiles = quantiles(volume.values(), |_| true, PERCENTILES.map(|(percent, _)| percent / 100.0));
+    let encoding = volume.encoding();
+    let info = Info {
+        format: encoding.map_or("builtin", |encoding| encoding.format),
+        dims: volume.dims().to_array(),
+        r#type: encoding.map_or(SampleType::F32, |encoding| encoding.sample_type).to_string(),
+        spacing: volume.spacing().to_array(),
+        unit: volume.unit().map(str::to_owned),
+        min,
+        max,
+        mean,
+        percentiles: percentiles.unwrap_or_default().map(f64::from),
+    };
+    let text = if arguments.json {
+        serde_json::to_string(&info).map_err(|error| Failure::Other(error.to_string()))? + "\n"
+    } else {
+        described(&info, &volume)
+    };
+    stdout(text.as_bytes())
+}
+
+/// Percentiles by their names, ascending.
+fn as_map<S: Serializer>(percentiles: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(PERCENTILES.iter().map(|&(_, name)| name).zip(percentiles))
+}
+
+fn described(info: &Info, volume: &Volume) -> String {
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| _ = writeln!(text, "{name:<12} {value}");
+    let [x, y, z] = info.dims;
+    line("format", info.format.to_owned());
+    line("type", info.r#type.clone());
+    line("dims", format!("{x} × {y} × {z}"));
+    let [x, y, z] = info.spacing.map(short);
+    line("spacing", format!("{x} × {y} × {z} {}", info.unit.as_deref().unwrap_or("(no unit)")));
+    line("orientation", volume.orientation().map_or("not given".to_owned(), orientation));
+    line("range", format!("{} to {}, mean {}", short(info.min), short(info.max), short(info.mean)));
+    for (&(_, name), &value) in PERCENTILES.iter().zip(&info.percentiles) {
+        line(&format!("{name:>9} %"), short(value));
+    }
+    if info.min == info.max {
+        return text;
+    }
+    // A few values far from the others would take most of the width.
+    let tails = [info.percentiles[0], info.percentiles[PERCENTILES.len() - 1]];
+    let histogram = Histogram::new(volume.values(), if tails[0] < tails[1] { tails } else { [info.min, info.max] });
+    let isos: Vec<String> = histogram.iso_values().into_iter().map(short).collect();
+    line("iso-values", format!("{} (suggested)", isos.join(", ")));
+    text + &chart(&histogram)
+}
+
+/// Where the axes point in a patient.
+fn orientation(orientation: &Orientation) -> String {
+    let sides = [["right", "left"], ["front", "back"], ["head", "feet"]];
+    let axis = |axis: DVec3| {
+        let along = (0..3).fold(0, |best, i| if axis[i].abs() > axis[best].abs() { i } else { best });
+        let degrees = axis[along].abs().min(1.0).acos().to_degrees();
+        let side = sides[along][usize::from(axis[along] < 0.0)];
+        if degrees < 0.5 { side.to_owned() } else { format!("{side} (within {degrees:.0}°)") }
+    };
+    let [x, y, z] = [0, 1, 2].map(|i| axis(orientation.axes.col(i)));
+    let handedness = if orientation.is_mirrored() { ", left-handed" } else { "" };
+    format!("x to the {x}, y to the {y}, z to the {z}{handedness}")
+}
+
+/// Bars over values, as high as the logarithms of the counts.
+fn chart(histogram: &Histogram) -> String {
+    const EIGHTHS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    let bars = histogram.counts.chunks(histogram.counts.len() / COLUMNS);
+    let heights: Vec<f64> = bars.map(|counts| (counts.iter().sum::<u64>() as f64).ln_1p()).collect();
+    let highest = heights.iter().copied().fold(1.0, f64::max);
+    let mut text = String::new();
+    for row in (0..ROWS).rev() {
+        let cell = |height: &f64| {
+            let eighths = height / highest * (8 * ROWS) as f64 - (8 * row) as f64;
+            // What is there at all is seen.
+            let least = if row == 0 && *height > 0.0 { 1 } else { 0 };
+            EIGHTHS[(eighths.round().clamp(0.0, 8.0) as usize).max(least)]
+        };
+        let line: String = heights.iter().map(cell).collect();
+        text += line.trim_end();
+        text.push('\n');
+    }
+    let [low, high] = histogram.range.map(short);
+    let width = COLUMNS.saturating_sub(low.chars().count());
+    text + &format!("{low}{high:>width$}\n")
+}
+
+/// A number with as many digits as a reader can use.
+fn short(number: f64) -> String {
+    let exponent = if number == 0.0 { 0 } else { number.abs().log10().floor() as i32 };
+    if !(-5..=9).contains(&exponent) {
+        return format!("{number:.4e}");
+    }
+    let decimals = (5 - exponent).clamp(0, 9) as usize;
+    let text = format!("{number:.decimals$}");
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}

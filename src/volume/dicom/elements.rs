@@ -1,0 +1,423 @@
+//! Data elements: a file as the few of them that count here.
+//!
+//! Lengths are checked against the file before anything is kept, and what is not needed is skipped.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+use std::sync::Arc;
+
+use super::super::VolumeError;
+use super::super::source::{Source, invalid, io_error, number, shown};
+
+/// A group and an element, as one number.
+pub(super) type Tag = u32;
+
+macro_rules! tags {
+    ($($constant:ident = $tag:literal $name:literal,)*) => {
+        /// Elements that are kept, and the sequences that hold them.
+        pub(super) mod tags {
+            $(pub(in super::super) const $constant: super::Tag = $tag;)*
+        }
+
+        /// An element's name in the standard, if it is kept.
+        fn name(tag: Tag) -> Option<&'static str> {
+            match tag {
+                $($tag => Some($name),)*
+                _ => None,
+            }
+        }
+    };
+}
+
+tags! {
+    MEDIA_SOP_CLASS = 0x0002_0002 "MediaStorageSOPClassUID",
+    TRANSFER_SYNTAX = 0x0002_0010 "TransferSyntaxUID",
+    MODALITY = 0x0008_0060 "Modality",
+    SERIES_DESCRIPTION = 0x0008_103e "SeriesDescription",
+    SLICE_THICKNESS = 0x0018_0050 "SliceThickness",
+    SPACING_BETWEEN_SLICES = 0x0018_0088 "SpacingBetweenSlices",
+    SERIES = 0x0020_000e "SeriesInstanceUID",
+    POSITION = 0x0020_0032 "ImagePositionPatient",
+    ORIENTATION = 0x0020_0037 "ImageOrientationPatient",
+    PLANE_POSITION = 0x0020_9113 "PlanePositionSequence",
+    PLANE_ORIENTATION = 0x0020_9116 "PlaneOrientationSequence",
+    SAMPLES_PER_PIXEL = 0x0028_0002 "SamplesPerPixel",
+    PHOTOMETRIC = 0x0028_0004 "PhotometricInterpretation",
+    FRAMES = 0x0028_0008 "NumberOfFrames",
+    ROWS = 0x0028_0010 "Rows",
+    COLUMNS = 0x0028_0011 "Columns",
+    PIXEL_SPACING = 0x0028_0030 "PixelSpacing",
+    BITS_ALLOCATED = 0x0028_0100 "BitsAllocated",
+    BITS_STORED = 0x0028_0101 "BitsStored",
+    HIGH_BIT = 0x0028_0102 "HighBit",
+    PIXEL_REPRESENTATION = 0x0028_0103 "PixelRepresentation",
+    INTERCEPT = 0x0028_1052 "RescaleIntercept",
+    SLOPE = 0x0028_1053 "RescaleSlope",
+    PIXEL_MEASURES = 0x0028_9110 "PixelMeasuresSequence",
+    PIXEL_TRANSFORMATION = 0x0028_9145 "PixelValueTransformationSequence",
+    SHARED_GROUPS = 0x5200_9229 "SharedFunctionalGroupsSequence",
+    FRAME_GROUPS = 0x5200_9230 "PerFrameFunctionalGroupsSequence",
+    FLOAT_PIXEL_DATA = 0x7fe0_0008 "FloatPixelData",
+    DOUBLE_PIXEL_DATA = 0x7fe0_0009 "DoubleFloatPixelData",
+    PIXEL_DATA = 0x7fe0_0010 "PixelData",
+}
+
+const SEQUENCES: [Tag; 6] = [
+    tags::PLANE_POSITION,
+    tags::PLANE_ORIENTATION,
+    tags::PIXEL_MEASURES,
+    tags::PIXEL_TRANSFORMATION,
+    tags::SHARED_GROUPS,
+    tags::FRAME_GROUPS,
+];
+const PIXELS: [Tag; 3] = [tags::FLOAT_PIXEL_DATA, tags::DOUBLE_PIXEL_DATA, tags::PIXEL_DATA];
+
+const ITEM: Tag = 0xfffe_e000;
+const ITEM_END: Tag = 0xfffe_e00d;
+const SEQUENCE_END: Tag = 0xfffe_e0dd;
+/// The length of what ends by a delimiter.
+const UNDEFINED: u32 = u32::MAX;
+
+/// Sequences in sequences; the standard's need five.
+const MAX_DEPTH: u32 = 32;
+/// Items of all sequences that are kept: a few for every frame.
+const MAX_ITEMS: u32 = 1 << 20;
+/// Bytes of a value that is kept.
+const MAX_VALUE: u32 = 1 << 12;
+
+/// A file's elements, and where its pixels are.
+pub(super) struct Elements {
+    pub(super) data: Dataset,
+    pub(super) transfer_syntax: String,
+    pub(super) big_endian: bool,
+    pub(super) pixels: Option<(Tag, PixelData)>,
+}
+
+/// Where pixels are in the file.
+pub(super) enum PixelData {
+    /// Samples, one after the other.
+    Native {
+        at: u64,
+        bytes: u64,
+        /// Whether they are written as words of 16 bits.
+        in_words: bool,
+    },
+    /// Frames as a codec has them, each with its first byte and its length; without the table of offsets.
+    Fragments(Vec<[u64; 2]>),
+}
+
+/// Elements that count, of a file or of an item in it.
+pub(super) struct Dataset {
+    path: Arc<Path>,
+    big_endian: bool,
+    values: BTreeMap<Tag, Vec<u8>>,
+    items: BTreeMap<Tag, Vec<Dataset>>,
+}
+
+impl Dataset {
+    /// A value as text, without what pads it.
+    pub(super) fn text(&self, tag: Tag) -> Option<String> {
+        let text = String::from_utf8_lossy(self.values.get(&tag)?).into_owned();
+        Some(text.trim_matches([' ', '\0']).to_owned()).filter(|text| !text.is_empty())
+    }
+
+    /// A number of 16 bits.
+    pub(super) fn unsigned(&self, tag: Tag) -> Result<Option<u16>, VolumeError> {
+        let Some(value) = self.values.get(&tag) else { return Ok(None) };
+        match *value.as_slice() {
+            [low, high] if !self.big_endian => Ok(Some(u16::from_le_bytes([low, high]))),
+            [high, low] => Ok(Some(u16::from_be_bytes([high, low]))),
+            _ => Err(self.invalid(tag, format!("{} bytes", value.len()), "one number of 2 bytes")),
+        }
+    }
+
+    /// Finite numbers, written as text.
+    pub(super) fn numbers<const N: usize>(&self, tag: Tag) -> Result<Option<[f64; N]>, VolumeError> {
+        let Some(text) = self.text(tag) else { return Ok(None) };
+        let numbers: Option<Vec<f64>> = text.split('\\').map(number).collect();
+        let numbers = numbers.and_then(|numbers| numbers.try_into().ok());
+        numbers.map(Some).ok_or_else(|| self.invalid(tag, shown(&text), format!("finite numbers, {N} of them")))
+    }
+
+    /// The items of a sequence, none if it is not there.
+    pub(super) fn items(&self, tag: Tag) -> &[Self] {
+        self.items.get(&tag).map_or(&[], Vec::as_slice)
+    }
+
+    pub(super) fn invalid(
+        &self,
+        tag: Tag,
+        found: impl std::fmt::Display,
+        allowed: impl std::fmt::Display,
+    ) -> VolumeError {
+        invalid(&self.path, &shown_tag(tag), found, allowed)
+    }
+
+    pub(super) fn missing(&self, tag: Tag, allowed: &str) -> VolumeError {
+        self.invalid(tag, "no such element", allowed)
+    }
+}
+
+fn shown_tag(tag: Tag) -> String {
+    name(tag).map_or_else(|| format!("element ({:04x},{:04x})", tag >> 16, tag & 0xffff), str::to_owned)
+}
+
+impl Elements {
+    /// Reads what is before the pixels; what is behind them is not looked at.
+    pub(super) fn read(path: &Path) -> Result<Self, VolumeError> {
+        let mut source = Source::open(path)?;
+        let length = source.left()?;
+        let mut parser = Parser {
+            path: path.into(),
+            reader: source.reader,
+            at: 0,
+            length,
+            begun: None,
+            implicit: false,
+            big_endian: false,
+            items: 0,
+            pixels: None,
+        };
+        let (_, magic) = (parser.bytes::<128>()?, parser.bytes::<4>()?);
+        if magic != *b"DICM" {
+            return Err(invalid(path, "magic", format!("\"{}\"", magic.escape_ascii()), "DICM after 128 bytes"));
+        }
+        let mut meta = parser.empty();
+        while parser.at < length {
+            let tag = parser.bytes::<4>()?;
+            parser.begun = Some(tag);
+            // Whichever order the rest is in: this part is little-endian.
+            if tag[..2] != [2, 0] {
+                break;
+            }
+            let header = parser.header()?;
+            parser.value(&header, length, &mut meta)?;
+        }
+        let transfer_syntax = meta
+            .text(tags::TRANSFER_SYNTAX)
+            .ok_or_else(|| meta.missing(tags::TRANSFER_SYNTAX, "how the file is encoded"))?;
+        (parser.implicit, parser.big_endian) = match transfer_syntax.as_str() {
+            "1.2.840.10008.1.2" => (true, false),
+            "1.2.840.10008.1.2.2" => (false, true),
+            "1.2.840.10008.1.2.1.99" => {
+                let allowed = "encodings that do not compress the whole file";
+                return Err(meta.invalid(tags::TRANSFER_SYNTAX, &transfer_syntax, allowed));
+            }
+            _ => (false, false),
+        };
+        let mut data = parser.elements(length, 0)?;
+        data.values.extend(meta.values);
+        Ok(Self { data, transfer_syntax, big_endian: parser.big_endian, pixels: parser.pixels })
+    }
+}
+
+struct Parser {
+    path: Arc<Path>,
+    reader: BufReader<File>,
+    /// Where the reader is, but for `begun`.
+    at: u64,
+    /// Of the file.
+    length: u64,
+    /// The tag of the next element, if it is read already.
+    begun: Option<[u8; 4]>,
+    implicit: bool,
+    big_endian: bool,
+    /// Items that are kept so far.
+    items: u32,
+    pixels: Option<(Tag, PixelData)>,
+}
+
+/// What an element says of its value.
+struct Header {
+    tag: Tag,
+    is_sequence: bool,
+    /// Whether its value may be of items whose elements do not say their types.
+    is_unknown: bool,
+    in_words: bool,
+    length: u32,
+}
+
+impl Parser {
+    fn empty(&self) -> Dataset {
+        let (values, items) = (BTreeMap::new(), BTreeMap::new());
+        Dataset { path: self.path.clone(), big_endian: self.big_endian, values, items }
+    }
+
+    fn bytes<const N: usize>(&mut self) -> Result<[u8; N], VolumeError> {
+        let mut bytes = [0; N];
+        if self.length - self.at < N as u64 {
+            return Err(invalid(&self.path, "elements", "the end of the file", "whole elements"));
+        }
+        self.reader.read_exact(&mut bytes).map_err(io_error(&self.path))?;
+        self.at += N as u64;
+        Ok(bytes)
+    }
+
+    fn u16(&mut self) -> Result<u16, VolumeError> {
+        let bytes = self.bytes()?;
+        Ok(if self.big_endian { u16::from_be_bytes(bytes) } else { u16::from_le_bytes(bytes) })
+    }
+
+    fn u32(&mut self) -> Result<u32, VolumeError> {
+        let bytes = self.bytes()?;
+        Ok(if self.big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) })
+    }
+
+    fn skip(&mut self, bytes: u64) -> Result<(), VolumeError> {
+        self.at += bytes;
+        self.reader.seek_relative(bytes as i64).map_err(io_error(&self.path))
+    }
+
+    fn header(&mut self) -> Result<Header, VolumeError> {
+        let [a, b, c, d] = self.begun.take().map_or_else(|| self.bytes(), Ok)?;
+        let tag = if self.big_endian { [a, b, c, d] } else { [b, a, d, c] };
+        let tag = Tag::from_be_bytes(tag);
+        let mut header = Header { tag, is_sequence: false, is_unknown: false, in_words: false, length: 0 };
+        if self.implicit || matches!(tag, ITEM | ITEM_END | SEQUENCE_END) {
+            header.is_sequence = SEQUENCES.contains(&tag);
+            header.in_words = true;
+            header.length = self.u32()?;
+            return Ok(header);
+        }
+        let kind = self.bytes::<2>()?;
+        if !kind.iter().all(u8::is_ascii_uppercase) {
+            let found = format!("the type \"{}\"", kind.escape_ascii());
+            return Err(invalid(&self.path, &shown_tag(tag), found, "a type of two letters"));
+        }
+        header.is_sequence = kind == *b"SQ";
+        header.is_unknown = kind == *b"UN";
+        header.in_words = kind == *b"OW";
+        let is_long = [b"OB", b"OD", b"OF", b"OL", b"OV", b"OW", b"SQ", b"SV", b"UC", b"UN", b"UR", b"UT", b"UV"];
+        header.length = if is_long.contains(&&kind) {
+            self.bytes::<2>()?;
+            self.u32()?
+        } else {
+            self.u16()?.into()
+        };
+        Ok(header)
+    }
+
+    /// Elements up to a place in the file, or to the end of an item.
+    fn elements(&mut self, end: u64, depth: u32) -> Result<Dataset, VolumeError> {
+        let mut data = self.empty();
+        if depth > MAX_DEPTH {
+            return Err(invalid(
+                &self.path,
+                "elements",
+                "more sequences in one another",
+                format!("{MAX_DEPTH} of them"),
+            ));
+        }
+        while self.at < end || self.begun.is_some() {
+            let header = self.header()?;
+            if header.tag == ITEM_END && depth > 0 {
+                break;
+            }
+            if depth == 0 && PIXELS.contains(&header.tag) {
+                self.pixels = Some((header.tag, self.pixels(&header)?));
+                break;
+            }
+            if header.length == UNDEFINED || header.is_sequence {
+                self.sequence(&header, end, depth, &mut data)?;
+            } else {
+                self.value(&header, end, &mut data)?;
+            }
+        }
+        Ok(data)
+    }
+
+    /// Reads a value, or skips it.
+    fn value(&mut self, header: &Header, end: u64, data: &mut Dataset) -> Result<(), VolumeError> {
+        let &Header { tag, length, .. } = header;
+        self.check_length(header, end)?;
+        if name(tag).is_none() || length > MAX_VALUE {
+            return self.skip(length.into());
+        }
+        let mut value = vec![0; length as usize];
+        self.reader.read_exact(&mut value).map_err(io_error(&self.path))?;
+        self.at += u64::from(length);
+        data.values.insert(tag, value);
+        Ok(())
+    }
+
+    fn check_length(&self, header: &Header, end: u64) -> Result<(), VolumeError> {
+        let left = end.min(self.length).saturating_sub(self.at);
+        if u64::from(header.length) <= left {
+            return Ok(());
+        }
+        let found = format!("{} bytes", header.length);
+        Err(invalid(&self.path, &shown_tag(header.tag), found, format!("at most the {left} that are left")))
+    }
+
+    /// Reads the items of a sequence, or, where nobody needs them, finds their end.
+    fn sequence(&mut self, header: &Header, end: u64, depth: u32, data: &mut Dataset) -> Result<(), VolumeError> {
+        let &Header { tag, length, .. } = header;
+        let is_kept = SEQUENCES.contains(&tag);
+        let end = if length == UNDEFINED {
+            end
+        } else {
+            self.check_length(header, end)?;
+            if !is_kept {
+                return self.skip(length.into());
+            }
+            self.at + u64::from(length)
+        };
+        // Of unknown type, a sequence is encoded as if no element said its type.
+        let implicit = self.implicit;
+        self.implicit |= header.is_unknown;
+        let mut items = Vec::new();
+        while self.at < end {
+            let item = self.header()?;
+            match item.tag {
+                SEQUENCE_END => break,
+                ITEM => {}
+                other => return Err(invalid(&self.path, &shown_tag(tag), shown_tag(other), "items")),
+            }
+            let item_end = if item.length == UNDEFINED {
+                end
+            } else {
+                self.check_length(&item, end)?;
+                self.at + u64::from(item.length)
+            };
+            let item = self.elements(item_end, depth + 1)?;
+            if is_kept {
+                self.items += 1;
+                if self.items > MAX_ITEMS {
+                    let allowed = format!("at most {MAX_ITEMS} items");
+                    return Err(invalid(&self.path, &shown_tag(tag), "more", allowed));
+                }
+                items.push(item);
+            }
+        }
+        self.implicit = implicit;
+        if is_kept {
+            data.items.insert(tag, items);
+        }
+        Ok(())
+    }
+
+    fn pixels(&mut self, header: &Header) -> Result<PixelData, VolumeError> {
+        if header.length != UNDEFINED {
+            self.check_length(header, self.length)?;
+            let (at, bytes) = (self.at, header.length.into());
+            return Ok(PixelData::Native { at, bytes, in_words: header.in_words });
+        }
+        let mut fragments = Vec::new();
+        loop {
+            let item = self.header()?;
+            match item.tag {
+                SEQUENCE_END => break,
+                ITEM => {}
+                other => return Err(invalid(&self.path, &shown_tag(header.tag), shown_tag(other), "fragments")),
+            }
+            self.check_length(&item, self.length)?;
+            fragments.push([self.at, item.length.into()]);
+            self.skip(item.length.into())?;
+        }
+        // The first one is the table of offsets.
+        fragments.drain(..fragments.len().min(1));
+        Ok(PixelData::Fragments(fragments))
+    }
+}

@@ -1,0 +1,282 @@
+//! One file: what its pixels are, and where its frames lie.
+
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use super::super::VolumeError;
+use super::super::samples::SampleType;
+use super::super::source::{Source, invalid, io_error};
+use super::codecs::Codec;
+use super::elements::{Dataset, Elements, PixelData, Tag, tags};
+
+/// A class of files that are no images but list others.
+const DIRECTORY: &str = "1.2.840.10008.1.3.10";
+
+/// An image of one or more frames.
+pub(super) struct Image {
+    pub(super) path: PathBuf,
+    /// The series that it is of, and how people call that.
+    pub(super) series: String,
+    pub(super) description: String,
+    pub(super) pixels: Pixels,
+    pub(super) frames: Vec<Frame>,
+    codec: Codec,
+    data: PixelData,
+}
+
+/// Of every frame of an image.
+#[derive(Clone, Copy)]
+pub(super) struct Pixels {
+    pub(super) columns: u16,
+    pub(super) rows: u16,
+    pub(super) kind: SampleType,
+    /// How many of a sample's bits count, from the lowest one.
+    bits: u16,
+    big_endian: bool,
+}
+
+/// Where a frame lies, in LPS and millimetres.
+#[derive(Clone, Copy)]
+pub(super) struct Frame {
+    /// The first pixel.
+    pub(super) position: DVec3,
+    /// Where x and y point.
+    pub(super) directions: [DVec3; 2],
+    /// From pixel to pixel along x and y.
+    pub(super) spacing: [f64; 2],
+    /// From frame to frame, as far as the frame itself tells.
+    pub(super) thickness: Option<f64>,
+    /// Slope and intercept.
+    pub(super) rescale: [f64; 2],
+}
+
+impl Image {
+    /// Reads what is before the pixels; `None` if the file is no image.
+    pub(super) fn open(path: &Path) -> Result<Option<Self>, VolumeError> {
+        let Elements { data, transfer_syntax, big_endian, pixels } = Elements::read(path)?;
+        let Some((tag, pixel_data)) = pixels else { return Ok(None) };
+        if data.text(tags::MEDIA_SOP_CLASS).as_deref() == Some(DIRECTORY) {
+            return Ok(None);
+        }
+        let codec = Codec::of(&transfer_syntax)
+            .ok_or_else(|| data.invalid(tags::TRANSFER_SYNTAX, &transfer_syntax, Codec::ALLOWED))?;
+        let pixels = Pixels::of(&data, tag, big_endian)?;
+        if let PixelData::Native { in_words: true, .. } = pixel_data
+            && big_endian
+            && pixels.kind.bytes() == 1
+        {
+            return Err(data.invalid(tag, "bytes in big-endian words", "bytes, or samples of 2 bytes"));
+        }
+        let count = data.numbers::<1>(tags::FRAMES)?.map_or(1.0, |[count]| count);
+        if count.fract() != 0.0 || !(1.0..=f64::from(u32::MAX)).contains(&count) {
+            return Err(data.invalid(tags::FRAMES, count, "a positive integer"));
+        }
+        let count = count as usize;
+        pixels.check(&data, tag, &pixel_data, count, codec)?;
+        Ok(Some(Self {
+            path: path.to_owned(),
+            series: data.text(tags::SERIES).unwrap_or_default(),
+            description: [tags::MODALITY, tags::SERIES_DESCRIPTION]
+                .into_iter()
+                .filter_map(|tag| data.text(tag))
+                .collect::<Vec<_>>()
+                .join(" "),
+            frames: frames(&data, count)?,
+            pixels,
+            codec,
+            data: pixel_data,
+        }))
+    }
+
+    /// A frame's samples, in the machine's byte order.
+    pub(super) fn frame(&self, index: usize) -> Result<Vec<u8>, VolumeError> {
+        let mut file = Source::open(&self.path)?;
+        let mut read = |at: u64, bytes: u64, into: &mut Vec<u8>| {
+            file.reader.seek(SeekFrom::Start(at)).map_err(io_error(&self.path))?;
+            let read = file.reader.by_ref().take(bytes).read_to_end(into).map_err(io_error(&self.path))?;
+            if read as u64 == bytes {
+                return Ok(());
+            }
+            Err(invalid(&self.path, "PixelData", format!("{read} bytes of a frame"), format!("{bytes} bytes")))
+        };
+        let mut bytes = Vec::new();
+        match &self.data {
+            PixelData::Native { at, .. } => {
+                let size = self.pixels.bytes();
+                read(at + index as u64 * size, size, &mut bytes)?;
+                if self.pixels.big_endian != cfg!(target_endian = "big") {
+                    bytes.chunks_exact_mut(self.pixels.kind.bytes() as usize).for_each(<[u8]>::reverse);
+                }
+            }
+            PixelData::Fragments(fragments) => {
+                // A single frame may be in several of them.
+                let of_frame = if self.frames.len() == 1 { fragments } else { &fragments[index..=index] };
+                for &[at, length] in of_frame {
+                    read(at, length, &mut bytes)?;
+                }
+                let Pixels { columns, rows, kind, .. } = self.pixels;
+                bytes = self.codec.decode(bytes, [columns, rows], kind.bytes() as usize).map_err(|found| {
+                    invalid(&self.path, "PixelData", found, format!("a frame of {columns} × {rows} {kind}"))
+                })?;
+            }
+        }
+        self.pixels.clear_unused_bits(&mut bytes);
+        Ok(bytes)
+    }
+}
+
+impl Pixels {
+    fn of(data: &Dataset, tag: Tag, big_endian: bool) -> Result<Self, VolumeError> {
+        let required = |tag: Tag| data.unsigned(tag)?.ok_or_else(|| data.missing(tag, "a number for every image"));
+        let [columns, rows] = [required(tags::COLUMNS)?, required(tags::ROWS)?];
+        for (tag, size) in [(tags::COLUMNS, columns), (tags::ROWS, rows)] {
+            if size == 0 {
+                return Err(data.invalid(tag, size, "at least 1"));
+            }
+        }
+        let samples = data.unsigned(tags::SAMPLES_PER_PIXEL)?.unwrap_or(1);
+        if samples != 1 {
+            return Err(data.invalid(tags::SAMPLES_PER_PIXEL, samples, "1"));
+        }
+        let photometric = data.text(tags::PHOTOMETRIC).unwrap_or_default();
+        if !photometric.starts_with("MONOCHROME") {
+            return Err(data.invalid(tags::PHOTOMETRIC, photometric, "MONOCHROME1 or MONOCHROME2"));
+        }
+        let allocated = required(tags::BITS_ALLOCATED)?;
+        let is_signed = data.unsigned(tags::PIXEL_REPRESENTATION)?.unwrap_or(0) == 1;
+        let kind = match (tag, allocated, is_signed) {
+            (tags::FLOAT_PIXEL_DATA, 32, _) => SampleType::F32,
+            (tags::DOUBLE_PIXEL_DATA, 64, _) => SampleType::F64,
+            (tags::PIXEL_DATA, 8, false) => SampleType::U8,
+            (tags::PIXEL_DATA, 8, true) => SampleType::I8,
+            (tags::PIXEL_DATA, 16, false) => SampleType::U16,
+            (tags::PIXEL_DATA, 16, true) => SampleType::I16,
+            (tags::PIXEL_DATA, 32, false) => SampleType::U32,
+            (tags::PIXEL_DATA, 32, true) => SampleType::I32,
+            _ => return Err(data.invalid(tags::BITS_ALLOCATED, allocated, "8, 16 or 32, of floats 32 or 64")),
+        };
+        if tag != tags::PIXEL_DATA {
+            return Ok(Self { columns, rows, kind, bits: allocated, big_endian });
+        }
+        let bits = data.unsigned(tags::BITS_STORED)?.unwrap_or(allocated);
+        if !(1..=allocated).contains(&bits) {
+            return Err(data.invalid(tags::BITS_STORED, bits, format!("1 to {allocated}")));
+        }
+        let high = data.unsigned(tags::HIGH_BIT)?.unwrap_or(bits - 1);
+        if high != bits - 1 {
+            return Err(data.invalid(tags::HIGH_BIT, high, format!("{}, the highest of {bits}", bits - 1)));
+        }
+        Ok(Self { columns, rows, kind, bits, big_endian })
+    }
+
+    /// Of a frame.
+    fn bytes(&self) -> u64 {
+        u64::from(self.columns) * u64::from(self.rows) * self.kind.bytes()
+    }
+
+    /// Refuses pixel data that are not those of so many frames.
+    fn check(
+        &self,
+        data: &Dataset,
+        tag: Tag,
+        pixel_data: &PixelData,
+        frames: usize,
+        codec: Codec,
+    ) -> Result<(), VolumeError> {
+        match pixel_data {
+            PixelData::Native { bytes, .. } if codec == Codec::None => {
+                let expected = self.bytes().saturating_mul(frames as u64);
+                // Padded to an even length.
+                if *bytes == expected || *bytes == expected.saturating_add(expected % 2) {
+                    return Ok(());
+                }
+                let Self { columns, rows, kind, .. } = self;
+                let allowed = format!("{expected} bytes ({frames} frames of {columns} × {rows} {kind})");
+                Err(data.invalid(tag, format!("{bytes} bytes"), allowed))
+            }
+            PixelData::Fragments(fragments) if codec != Codec::None => {
+                if frames == fragments.len() || frames == 1 && !fragments.is_empty() {
+                    return Ok(());
+                }
+                let found = format!("{} fragments for {frames} frames", fragments.len());
+                Err(data.invalid(tag, found, "one for each frame"))
+            }
+            PixelData::Native { .. } => Err(data.invalid(tag, "bare samples", "frames as the transfer syntax says")),
+            PixelData::Fragments(_) => Err(data.invalid(tag, "fragments", "bare samples, as the transfer syntax says")),
+        }
+    }
+
+    /// Sets the bits above those that count to what the number means; other things may be there.
+    fn clear_unused_bits(&self, bytes: &mut [u8]) {
+        let shift = 8 * self.kind.bytes() as u32 - u32::from(self.bits);
+        if shift == 0 {
+            return;
+        }
+        macro_rules! clear {
+            ($type:ty) => {
+                for sample in bytes.as_chunks_mut().0 {
+                    *sample = (<$type>::from_ne_bytes(*sample) << shift >> shift).to_ne_bytes();
+                }
+            };
+        }
+        match self.kind {
+            SampleType::U8 => clear!(u8),
+            SampleType::I8 => clear!(i8),
+            SampleType::U16 => clear!(u16),
+            SampleType::I16 => clear!(i16),
+            SampleType::U32 => clear!(u32),
+            SampleType::I32 => clear!(i32),
+            SampleType::U64 | SampleType::I64 | SampleType::F32 | SampleType::F64 => {}
+        }
+    }
+}
+
+/// Where frames lie: each of them by its own groups of elements, or those that all share, or the file's own elements.
+fn frames(data: &Dataset, count: usize) -> Result<Vec<Frame>, VolumeError> {
+    let shared = data.items(tags::SHARED_GROUPS).first();
+    let groups = data.items(tags::FRAME_GROUPS);
+    if groups.len() != count && (count > 1 || !groups.is_empty()) {
+        return Err(data.invalid(
+            tags::FRAME_GROUPS,
+            format!("{} items", groups.len()),
+            format!("{count}, one per frame"),
+        ));
+    }
+    let of = |frame: usize| {
+        let own = groups.get(frame);
+        let group = |sequence: Tag| {
+            let mut groups = [own, shared].into_iter().flatten();
+            groups.find_map(|groups| groups.items(sequence).first()).unwrap_or(data)
+        };
+        let positive = |text: Option<[f64; 1]>| text.map(|[number]| number.abs()).filter(|&number| number > 0.0);
+        let plane = group(tags::PLANE_POSITION);
+        let allowed = "where the image lies in the patient";
+        let position = plane.numbers(tags::POSITION)?.ok_or_else(|| plane.missing(tags::POSITION, allowed))?;
+        let plane = group(tags::PLANE_ORIENTATION);
+        let orientation =
+            plane.numbers::<6>(tags::ORIENTATION)?.ok_or_else(|| plane.missing(tags::ORIENTATION, allowed))?;
+        let [row, column] = [0, 3].map(|first| DVec3::from_slice(&orientation[first..]));
+        let measures = group(tags::PIXEL_MEASURES);
+        let [y, x] = measures
+            .numbers(tags::PIXEL_SPACING)?
+            .ok_or_else(|| measures.missing(tags::PIXEL_SPACING, "the distances between pixels"))?;
+        if x <= 0.0 || y <= 0.0 {
+            return Err(measures.invalid(tags::PIXEL_SPACING, format!("[{y}, {x}]"), "two positive numbers"));
+        }
+        let between = positive(measures.numbers(tags::SPACING_BETWEEN_SLICES)?);
+        let thickness = between.or(positive(measures.numbers(tags::SLICE_THICKNESS)?));
+        let values = group(tags::PIXEL_TRANSFORMATION);
+        let slope = values.numbers(tags::SLOPE)?.map_or(1.0, |[slope]| slope);
+        let intercept = values.numbers(tags::INTERCEPT)?.map_or(0.0, |[intercept]| intercept);
+        Ok(Frame {
+            position: DVec3::from_array(position),
+            directions: [row, column],
+            spacing: [x, y],
+            thickness,
+            rescale: [slope, intercept],
+        })
+    };
+    (0..count).map(of).collect()
+}

@@ -1,0 +1,171 @@
+//! Slices of one grid: their order, and how far they are from one another.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use glam::{DMat3, DVec3};
+
+use super::super::VolumeError;
+use super::super::orientation::{lengths_and_directions, orthogonal};
+use super::super::source::invalid;
+use super::image::{Frame, Image};
+
+/// Directions that differ by less, and sizes of pixels that differ by less of themselves, are the same, written down twice.
+const SAME: f64 = 1e-4;
+/// The part of a step that positions may be off without a word.
+const EVEN: f64 = 0.01;
+/// The part of a pixel that slices may be off sideways.
+const STRAIGHT: f64 = 0.05;
+/// Steps larger than this many usual ones are gaps.
+const GAP: f64 = 1.5;
+
+/// Refuses files of several series, and lists these.
+pub(super) fn check_one(folder: &Path, images: &[Image]) -> Result<(), VolumeError> {
+    let mut series: BTreeMap<&str, (usize, &str)> = BTreeMap::new();
+    for image in images {
+        series.entry(&image.series).or_insert((0, &image.description)).0 += 1;
+    }
+    let listed = series.iter().take(8).map(|(id, (count, description))| format!("{count} of {description} ({id})"));
+    let found = match series.len() {
+        0 => "no image".to_owned(),
+        1 => return Ok(()),
+        count => {
+            format!("{count} series: {}{}", listed.collect::<Vec<_>>().join(", "), if count > 8 { ", …" } else { "" })
+        }
+    };
+    Err(invalid(folder, "SeriesInstanceUID", found, "the slices of one series"))
+}
+
+/// A frame of a volume.
+pub(super) struct Slice {
+    /// The image that it is in, and its number there.
+    pub(super) image: usize,
+    pub(super) frame: usize,
+    pub(super) position: DVec3,
+    pub(super) rescale: [f64; 2],
+}
+
+/// All frames of a volume, along its z axis.
+pub(super) struct Series {
+    pub(super) slices: Vec<Slice>,
+    pub(super) spacing: DVec3,
+    /// The directions of x, y and z, in LPS.
+    pub(super) axes: DMat3,
+}
+
+impl Series {
+    /// The volume that some images' frames make up.
+    pub(super) fn of(path: &Path, images: &[Image]) -> Result<Self, VolumeError> {
+        let first = check_alike(path, images)?;
+        let [row, column] = first.directions;
+        let (_, axes) = lengths_and_directions([row, column, row.cross(column)])
+            .map_err(|found| invalid(path, "ImageOrientationPatient", found, orthogonal()))?;
+        let mut slices: Vec<Slice> = Vec::new();
+        for (image, Image { frames, .. }) in images.iter().enumerate() {
+            slices.extend(frames.iter().enumerate().map(|(frame, &Frame { position, rescale, .. })| Slice {
+                image,
+                frame,
+                position,
+                rescale,
+            }));
+        }
+        let along = |slice: &Slice| slice.position.dot(axes.z_axis);
+        slices.sort_by(|a, b| along(a).total_cmp(&along(b)));
+        let name = |slice: &Slice| match images[slice.image].frames.len() {
+            1 => images[slice.image].path.file_name().unwrap_or_default().display().to_string(),
+            _ => format!("frame {}", slice.frame + 1),
+        };
+        let [x, y] = first.spacing;
+        let z = match step(&slices.iter().map(along).collect::<Vec<_>>()) {
+            Steps::None => first.thickness.unwrap_or(x),
+            Steps::Even { step, off } => {
+                if off > EVEN * step {
+                    let path = path.display();
+                    log::warn!(
+                        "{path}: slices are not evenly spaced: taken to be {step:.4} mm apart, which is wrong by up to {off:.4} mm"
+                    );
+                }
+                step
+            }
+            Steps::Uneven { at, step, usual } => {
+                let [one, next] = [&slices[at], &slices[at + 1]].map(name);
+                let found = format!("{step:.4} mm between {one} and {next}, {usual:.4} mm between others");
+                let allowed = "slices at even distances, one at each place";
+                return Err(invalid(path, "ImagePositionPatient", found, allowed));
+            }
+        };
+        // How far slices are off the line through the first one, along the normal.
+        let sideways = |slice: &Slice| {
+            let offset = slice.position - slices[0].position;
+            (offset - offset.dot(axes.z_axis) * axes.z_axis).length()
+        };
+        if let Some(slice) = slices.iter().max_by(|a, b| sideways(a).total_cmp(&sideways(b)))
+            && sideways(slice) > STRAIGHT * x.min(y)
+        {
+            let found =
+                format!("a sheared stack, {} being {:.4} mm off (a tilted gantry?)", name(slice), sideways(slice));
+            return Err(invalid(path, "ImagePositionPatient", found, "slices straight above one another"));
+        }
+        Ok(Self { slices, spacing: DVec3::new(x, y, z), axes })
+    }
+}
+
+/// Gives the first of some frames that have the same sizes and directions; refuses others, and lists what there is.
+fn check_alike<'a>(path: &Path, images: &'a [Image]) -> Result<&'a Frame, VolumeError> {
+    let mut kinds: Vec<(&Image, &Frame, usize)> = Vec::new();
+    for image in images {
+        for frame in &image.frames {
+            let is_like = |&&mut (other, kind, _): &&mut (&Image, &Frame, usize)| {
+                let near = |a: f64, b: f64| (a - b).abs() <= SAME * a.max(b);
+                [other.pixels.columns, other.pixels.rows] == [image.pixels.columns, image.pixels.rows]
+                    && near(kind.spacing[0], frame.spacing[0])
+                    && near(kind.spacing[1], frame.spacing[1])
+                    && (0..2).all(|axis| kind.directions[axis].abs_diff_eq(frame.directions[axis], SAME))
+            };
+            match kinds.iter_mut().find(is_like) {
+                Some((_, _, count)) => *count += 1,
+                None => kinds.push((image, frame, 1)),
+            }
+        }
+    }
+    if let [(_, first, _)] = kinds.as_slice() {
+        return Ok(first);
+    }
+    let listed = kinds.iter().take(8).map(|(image, frame, count)| {
+        let ([x, y], [row, column]) = (frame.spacing, frame.directions);
+        let (columns, rows) = (image.pixels.columns, image.pixels.rows);
+        format!("{count} of {columns} × {rows}, {x} × {y} mm, along {row} and {column}")
+    });
+    let found = listed.collect::<Vec<_>>().join("; ");
+    Err(invalid(path, "slices", found, "slices of one size, one distance of pixels, and one orientation"))
+}
+
+/// What the steps between ascending positions are.
+enum Steps {
+    /// There are none.
+    None,
+    /// All about the same; positions are at most so far from where even steps would have them.
+    Even { step: f64, off: f64 },
+    /// The one after this position is another than usual.
+    Uneven { at: usize, step: f64, usual: f64 },
+}
+
+fn step(positions: &[f64]) -> Steps {
+    let steps: Vec<f64> = positions.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let Some(last) = steps.len().checked_sub(1) else { return Steps::None };
+    let usual = median(&steps);
+    let is_other = |&step: &f64| step > GAP * usual || step * GAP < usual || step <= 0.0;
+    if let Some(at) = steps.iter().position(is_other) {
+        return Steps::Uneven { at, step: steps[at], usual };
+    }
+    let step = (positions[last + 1] - positions[0]) / (last + 1) as f64;
+    let errors = positions.iter().enumerate().map(|(i, position)| (position - positions[0] - i as f64 * step).abs());
+    let off = errors.fold(0.0, f64::max);
+    Steps::Even { step, off }
+}
+
+fn median(steps: &[f64]) -> f64 {
+    let mut sorted = steps.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted[sorted.len() / 2]
+}

@@ -1,0 +1,46 @@
+//! The named fields of a text header.
+
+use std::collections::BTreeMap;
+use std::fmt::Display;
+use std::path::PathBuf;
+
+use super::VolumeError;
+use super::source::{invalid, shown};
+
+/// A header's fields, each of them at most once.
+pub(super) struct Fields {
+    pub(super) path: PathBuf,
+    fields: BTreeMap<String, String>,
+}
+
+impl Fields {
+    pub(super) fn new(path: PathBuf) -> Self {
+        Self { path, fields: BTreeMap::new() }
+    }
+
+    pub(super) fn add(&mut self, name: &str, value: &str) -> Result<(), VolumeError> {
+        match self.fields.insert(name.to_owned(), value.trim().to_owned()) {
+            None => Ok(()),
+            Some(_) => Err(self.invalid(name, "the field twice", "each field once")),
+        }
+    }
+
+    pub(super) fn get(&self, name: &str) -> Option<&str> {
+        self.fields.get(name).map(String::as_str)
+    }
+
+    /// A field as `parse` makes it from its text, or from the lack of it.
+    pub(super) fn value<T>(
+        &self,
+        name: &str,
+        allowed: &str,
+        parse: impl Fn(Option<&str>) -> Option<T>,
+    ) -> Result<T, VolumeError> {
+        let text = self.get(name);
+        parse(text).ok_or_else(|| self.invalid(name, text.map_or("no such field".to_owned(), shown), allowed))
+    }
+
+    pub(super) fn invalid(&self, field: &str, found: impl Display, allowed: impl Display) -> VolumeError {
+        invalid(&self.path, field, found, allowed)
+    }
+}

@@ -1,0 +1,69 @@
+//! Folders of slices.
+
+use std::fs;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use super::VolumeError;
+use super::source::{Source, io_error};
+
+/// The first bytes of a file.
+pub(super) fn head(path: &Path) -> Result<Vec<u8>, VolumeError> {
+    let mut head = Vec::new();
+    Source::open(path)?.reader.take(1024).read_to_end(&mut head).map_err(io_error(path))?;
+    Ok(head)
+}
+
+/// The files in a folder, not those in its folders, in the order that people count in.
+pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>, VolumeError> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).map_err(io_error(folder))? {
+        let path = entry.map_err(io_error(folder))?.path();
+        if fs::metadata(&path).is_ok_and(|metadata| metadata.is_file()) {
+            files.push(path);
+        }
+    }
+    files.sort_by_cached_key(|path| natural(&path.file_name().unwrap_or_default().to_string_lossy()));
+    Ok(files)
+}
+
+/// A part of a name.
+#[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Part {
+    /// How many digits it has without leading zeros, which compares numbers of any size, and these digits.
+    Number(usize, String),
+    Text(String),
+}
+
+/// A name in parts that sort as people count: 2 before 10. Names of one key, as `01` and `1`, sort by the last part, the name.
+pub(super) fn natural(name: &str) -> Vec<Part> {
+    let mut parts = Vec::new();
+    let mut rest = name;
+    while let Some(first) = rest.chars().next() {
+        let is_digit = |character: char| character.is_ascii_digit();
+        let end = rest.find(|character| is_digit(character) != is_digit(first)).unwrap_or(rest.len());
+        let (part, after) = rest.split_at(end);
+        let digits = part.trim_start_matches('0');
+        parts.push(match is_digit(first) {
+            true => Part::Number(digits.len(), digits.to_owned()),
+            false => Part::Text(part.to_owned()),
+        });
+        rest = after;
+    }
+    parts.push(Part::Text(name.to_owned()));
+    parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_sort_as_numbers() {
+        let sorted = ["a2b10.tif", "a10b1.tif", "a010b2.tif", "a99999999999999999999.tif", "b1.tif", "b.tif"];
+        let mut names = sorted;
+        names.reverse();
+        names.sort_by_cached_key(|name| natural(name));
+        assert_eq!(names, sorted);
+    }
+}

@@ -1,0 +1,165 @@
+//! File formats: which one a file is of.
+
+use std::path::{Path, PathBuf};
+
+use super::loaded::Loaded;
+use super::samples::Voxel;
+use super::source::invalid;
+use super::{VolumeError, folder, nrrd};
+
+type Reader<T> = fn(&Path) -> Result<Loaded<T>, VolumeError>;
+
+/// Of a folder, and those of its files that are of the format.
+type FolderReader<T> = fn(&Path, &[PathBuf]) -> Result<Loaded<T>, VolumeError>;
+
+/// A format, and what reads it.
+struct Format<T> {
+    name: &'static str,
+    /// What its files' names end with.
+    extensions: &'static [&'static str],
+    /// Whether a file that begins like this is surely of this format.
+    is_magic: fn(&[u8]) -> bool,
+    /// Or the feature that it is compiled with.
+    read: Result<Reader<T>, &'static str>,
+    /// Where slices come one by one, in a folder.
+    read_folder: Option<FolderReader<T>>,
+}
+
+/// A module's function, or the feature that it is compiled with.
+macro_rules! reader {
+    ($feature:literal, $read:path) => {{
+        #[cfg(feature = $feature)]
+        let read: Result<_, &'static str> = Ok($read as _);
+        #[cfg(not(feature = $feature))]
+        let read = Err($feature);
+        read
+    }};
+}
+
+/// Formats that have a slice in every file of a folder.
+const SLICES: [&str; 2] = ["TIFF", "DICOM"];
+
+fn formats<T: Voxel>() -> Vec<Format<T>> {
+    vec![
+        Format {
+            name: "NRRD",
+            extensions: &[".nrrd", ".nhdr"],
+            is_magic: |head| head.starts_with(b"NRRD000"),
+            read: Ok(nrrd::read),
+            read_folder: None,
+        },
+        Format {
+            name: "NIfTI",
+            extensions: &[".nii", ".nii.gz", ".hdr", ".img", ".hdr.gz", ".img.gz"],
+            is_magic: |head| {
+                matches!(head.get(344..348), Some(b"n+1\0" | b"ni1\0"))
+                    || matches!(head.get(4..8), Some(b"n+2\0" | b"ni2\0"))
+            },
+            read: reader!("nifti", super::nifti::read),
+            read_folder: None,
+        },
+        Format {
+            name: "MetaImage",
+            extensions: &[".mha", ".mhd"],
+            is_magic: |head| head.starts_with(b"ObjectType = Image"),
+            read: reader!("metaimage", super::metaimage::read),
+            read_folder: None,
+        },
+        Format {
+            name: "NPY",
+            extensions: &[".npy"],
+            is_magic: |head| head.starts_with(b"\x93NUMPY"),
+            read: reader!("npy", super::npy::read),
+            read_folder: None,
+        },
+        Format {
+            name: "TIFF",
+            extensions: &[".tif", ".tiff"],
+            is_magic: |head| matches!(head.get(..4), Some(b"II*\0" | b"MM\0*" | b"II+\0" | b"MM\0+")),
+            read: reader!("tiff", super::tiff::read),
+            read_folder: reader!("tiff", super::tiff::read_folder).ok(),
+        },
+        Format {
+            name: "DICOM",
+            extensions: &[".dcm"],
+            is_magic: |head| head.get(128..132) == Some(b"DICM"),
+            read: reader!("dicom", super::dicom::read),
+            read_folder: reader!("dicom", super::dicom::read_folder).ok(),
+        },
+        Format {
+            name: "VTI",
+            extensions: &[".vti"],
+            is_magic: |head| head.windows(8).any(|window| window == b"<VTKFile"),
+            read: reader!("vtk", super::vtk::read_image_data),
+            read_folder: None,
+        },
+        Format {
+            name: "VTK",
+            extensions: &[".vtk"],
+            is_magic: |head| head.starts_with(b"# vtk DataFile"),
+            read: reader!("vtk", super::vtk::read_legacy),
+            read_folder: None,
+        },
+    ]
+}
+
+/// Reads a file, and says of which format it is: the format that its first bytes tell, else the one that its name tells. Reads a
+/// folder of slices, whose format the first bytes of all its files tell.
+pub(super) fn read<T: Voxel>(path: &Path) -> Result<(&'static str, Loaded<T>), VolumeError> {
+    let formats = formats();
+    if path.is_dir() {
+        return read_folder(path, &formats);
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let head = folder::head(path)?;
+    let is_named = |format: &&Format<T>| format.extensions.iter().any(|extension| name.ends_with(extension));
+    let format = formats.iter().find(|format| (format.is_magic)(&head)).or_else(|| formats.iter().find(is_named));
+    let found = match format {
+        Some(Format { name, read: Ok(read), .. }) => return Ok((name, read(path)?)),
+        Some(Format { name, read: Err(feature), .. }) => needs(name, feature),
+        None => match path.extension() {
+            Some(extension) => format!("\".{}\"", extension.display()),
+            None => "none".to_owned(),
+        },
+    };
+    let list = |compiled: bool| {
+        let formats = formats.iter().filter(|format| format.read.is_ok() == compiled);
+        let names = formats.map(|Format { name, extensions, .. }| format!("{name} ({})", extensions.join(", ")));
+        names.collect::<Vec<_>>().join(", ")
+    };
+    let mut allowed = format!("{}, or raw samples by `volume.dims` and `volume.type`", list(true));
+    if formats.iter().any(|format| format.read.is_err()) {
+        allowed = format!("{allowed}; not compiled in: {}", list(false));
+    }
+    Err(invalid(path, "format", found, allowed))
+}
+
+fn read_folder<T: Voxel>(path: &Path, formats: &[Format<T>]) -> Result<(&'static str, Loaded<T>), VolumeError> {
+    let mut slices: Vec<(&Format<T>, Vec<PathBuf>)> = Vec::new();
+    let files = folder::files(path)?;
+    let count = files.len();
+    for file in files {
+        let head = folder::head(&file)?;
+        let of_slices = |format: &&Format<T>| SLICES.contains(&format.name) && (format.is_magic)(&head);
+        let Some(format) = formats.iter().find(of_slices) else { continue };
+        match slices.iter_mut().find(|(other, _)| other.name == format.name) {
+            Some((_, files)) => files.push(file),
+            None => slices.push((format, vec![file])),
+        }
+    }
+    let found = match slices.as_slice() {
+        [] => format!("{count} files, no slices among them"),
+        [(Format { name, read_folder: Some(read), .. }, files)] => return Ok((name, read(path, files)?)),
+        [(Format { name, read: Err(feature), .. }, _)] => needs(name, feature),
+        several => {
+            let counts = several.iter().map(|(Format { name, .. }, files)| format!("{} {name} files", files.len()));
+            counts.collect::<Vec<_>>().join(" and ")
+        }
+    };
+    let allowed = format!("a volume file, or a folder with the slices of one volume, {}", SLICES.join(" or "));
+    Err(invalid(path, "folder", found, allowed))
+}
+
+fn needs(name: &str, feature: &str) -> String {
+    format!("{name}, which needs the feature `{feature}`")
+}

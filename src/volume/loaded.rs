@@ -1,0 +1,25 @@
+//! What every reader gives.
+
+use std::collections::BTreeMap;
+
+use glam::{DVec3, UVec3};
+
+use super::Orientation;
+use super::samples::SampleType;
+
+/// What is in a file of values or of labels.
+pub(super) struct Loaded<T> {
+    pub(super) dims: UVec3,
+    /// Of the samples that the values come from.
+    pub(super) kind: SampleType,
+    /// If the file gives one.
+    pub(super) spacing: Option<DVec3>,
+    /// What the spacing is in, if the file says so.
+    pub(super) unit: Option<String>,
+    /// If the file gives one.
+    pub(super) orientation: Option<Orientation>,
+    /// What the values are called, where they are labels.
+    pub(super) label_names: BTreeMap<u16, String>,
+    /// X fastest, as many as there are voxels.
+    pub(super) values: Vec<T>,
+}

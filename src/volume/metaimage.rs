@@ -1,0 +1,178 @@
+//! MetaImage files: a text header, then the samples, in the same file (`.mha`) or in one of their own (`.mhd`), as they are or as a
+//! zlib stream.
+//!
+//! Directions and origins are LPS, as ITK means them. The file must end where the samples end.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use glam::{DMat3, DVec3, UVec3};
+
+use super::VolumeError;
+use super::fields::Fields;
+use super::loaded::Loaded;
+use super::orientation::{Orientation, RAS_FROM_LPS, unit_directions};
+use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
+use super::source::{MAX_HEADER, Source, number, shown, three};
+use super::unit::unit;
+
+/// Reads one MetaImage file, or the header and the data file it names.
+pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
+    let mut file = Source::open(path)?;
+    let header = Header::read(&mut file)?;
+    header.check_kind()?;
+    let (spacing, orientation) = (header.spacing()?, header.orientation()?);
+    let samples = header.samples()?;
+    let (is_compressed, header_size) = (header.flag("CompressedData")?.unwrap_or(false), header.header_size()?);
+    let data = header.data_path()?.map_or(Ok(file), |path| Source::open(&path))?;
+    let mut stream = if is_compressed { Stream::zlib(data)? } else { Stream::raw(data)? };
+    let before_the_end = stream.exactly_left().unwrap_or(0).saturating_sub(samples.bytes());
+    stream.skip(header_size.unwrap_or(before_the_end))?;
+    let Samples { dims, kind, .. } = samples;
+    let unit = header.0.get("DistanceUnits").and_then(unit);
+    Ok(Loaded {
+        dims,
+        kind,
+        spacing,
+        unit,
+        orientation,
+        label_names: BTreeMap::new(),
+        values: stream.samples(&samples, false)?,
+    })
+}
+
+struct Header(Fields);
+
+impl Header {
+    /// Reads the header and leaves `file` where the data of a local one begin.
+    fn read(file: &mut Source) -> Result<Self, VolumeError> {
+        let mut fields = Fields::new(file.path.clone());
+        let mut budget = MAX_HEADER;
+        while let Some(line) = file.line(&mut budget)? {
+            let Some((name, value)) = line.split_once('=') else {
+                return Err(fields.invalid("header", shown(&line), "`Field = value`"));
+            };
+            fields.add(name.trim(), value)?;
+            if name.trim() == "ElementDataFile" {
+                return Ok(Self(fields));
+            }
+        }
+        Err(fields.invalid("header", "the end of the file", "a last field ElementDataFile"))
+    }
+
+    /// Refuses what is no volume of one number per voxel.
+    fn check_kind(&self) -> Result<(), VolumeError> {
+        let is = |name: &str, expected: &str, default: &str| {
+            let matches = |text: Option<&str>| (text.unwrap_or(default).eq_ignore_ascii_case(expected)).then_some(());
+            self.0.value(name, expected, matches)
+        };
+        is("ObjectType", "Image", "Image")?;
+        is("NDims", "3", "")?;
+        is("ElementNumberOfChannels", "1", "1")?;
+        is("BinaryData", "True", "True")
+    }
+
+    /// `True` or `False`.
+    fn flag(&self, name: &str) -> Result<Option<bool>, VolumeError> {
+        self.0.value(name, "True or False", |text| match text.map(str::to_ascii_lowercase).as_deref() {
+            None => Some(None),
+            Some("true" | "1") => Some(Some(true)),
+            Some("false" | "0") => Some(Some(false)),
+            Some(_) => None,
+        })
+    }
+
+    /// N numbers, under the first of a field's names that is there.
+    fn numbers<const N: usize>(&self, names: &[&str]) -> Result<Option<(String, [f64; N])>, VolumeError> {
+        let Some(name) = names.iter().find(|name| self.0.get(name).is_some()) else { return Ok(None) };
+        let numbers = self.0.value(name, &format!("finite numbers, {N} of them"), |text| {
+            text?.split_whitespace().map(number).collect::<Option<Vec<_>>>()?.try_into().ok()
+        })?;
+        Ok(Some(((*name).to_owned(), numbers)))
+    }
+
+    fn samples(&self) -> Result<Samples, VolumeError> {
+        let dims: UVec3 = self.0.value("DimSize", SIZES, |text| {
+            dims_of(three(text?.split_whitespace().map(|size| size.parse::<u32>().ok()))?)
+        })?;
+        let kind = self.0.value("ElementType", TYPES, |text| sample_type(text?))?;
+        let (old, new) = ("ElementByteOrderMSB", "BinaryDataByteOrderMSB");
+        let big_endian = match (self.flag(new)?, self.flag(old)?) {
+            (Some(new), Some(old)) if old != new => {
+                return Err(self.0.invalid("BinaryDataByteOrderMSB", new, format!("{old}, as ElementByteOrderMSB")));
+            }
+            (Some(big_endian), _) | (None, Some(big_endian)) => big_endian,
+            (None, None) if kind.bytes() == 1 => false,
+            (None, None) => return Err(self.0.invalid("BinaryDataByteOrderMSB", "no such field", "True or False")),
+        };
+        let one = |name: &str| self.numbers::<1>(&[name]).map(|found| found.map(|(_, [number])| number));
+        let slope = one("ElementToIntensityFunctionSlope")?.unwrap_or(1.0);
+        let intercept = one("ElementToIntensityFunctionOffset")?.unwrap_or(0.0);
+        let rescale = Some([slope, intercept]).filter(|&rescale| rescale != [1.0, 0.0]);
+        Ok(Samples { kind, dims, big_endian, rescale, z_fastest: false })
+    }
+
+    fn spacing(&self) -> Result<Option<DVec3>, VolumeError> {
+        let Some((name, spacing)) = self.numbers(&["ElementSpacing", "ElementSize"])? else { return Ok(None) };
+        if spacing.iter().any(|&spacing| spacing <= 0.0) {
+            return Err(self.0.invalid(&name, format!("{spacing:?}"), "three positive finite numbers"));
+        }
+        Ok(Some(DVec3::from_array(spacing)))
+    }
+
+    /// Three numbers at a time are an axis of the volume.
+    fn orientation(&self) -> Result<Option<Orientation>, VolumeError> {
+        let Some((name, matrix)) = self.numbers(&["TransformMatrix", "Rotation", "Orientation"])? else {
+            return Ok(None);
+        };
+        let columns = DMat3::from_cols_array(&matrix);
+        let axes = unit_directions([columns.x_axis, columns.y_axis, columns.z_axis])
+            .map_err(|(found, allowed)| self.0.invalid(&name, found, allowed))?;
+        let origin = self.numbers(&["Offset", "Position", "Origin"])?;
+        let origin = origin.map_or(DVec3::ZERO, |(_, origin)| DVec3::from_array(origin));
+        Ok(Some(Orientation { axes: DMat3::from_diagonal(RAS_FROM_LPS) * axes, origin: RAS_FROM_LPS * origin }))
+    }
+
+    /// How many bytes to skip in the data file; `None`: the samples end where it ends.
+    fn header_size(&self) -> Result<Option<u64>, VolumeError> {
+        let is_compressed = self.flag("CompressedData")?.unwrap_or(false);
+        self.0.value("HeaderSize", "a number of bytes, or -1 if the data are not compressed", |text| match text {
+            Some("-1") => (!is_compressed).then_some(None),
+            Some(text) if !is_compressed => text.parse().ok().map(Some),
+            Some("0") | None => Some(Some(0)),
+            Some(_) => None,
+        })
+    }
+
+    /// Where the samples are, if they are not in the header's own file.
+    fn data_path(&self) -> Result<Option<PathBuf>, VolumeError> {
+        let name = self.0.get("ElementDataFile").unwrap_or_default();
+        match name.split_whitespace().next() {
+            None | Some("LIST") => {}
+            Some(pattern) if pattern.contains('%') => {}
+            Some(local) if local.eq_ignore_ascii_case("LOCAL") => return Ok(None),
+            Some(_) => return Ok(Some(self.0.path.parent().unwrap_or(Path::new("")).join(name))),
+        }
+        Err(self.0.invalid("ElementDataFile", shown(name), "LOCAL or the name of one file, no LIST and no pattern"))
+    }
+}
+
+const TYPES: &str = "MET_CHAR, MET_UCHAR, MET_SHORT, MET_USHORT, MET_INT, MET_UINT, MET_LONG, MET_ULONG, \
+                     MET_LONG_LONG, MET_ULONG_LONG, MET_FLOAT or MET_DOUBLE";
+
+fn sample_type(name: &str) -> Option<SampleType> {
+    Some(match name {
+        "MET_CHAR" => SampleType::I8,
+        "MET_UCHAR" => SampleType::U8,
+        "MET_SHORT" => SampleType::I16,
+        "MET_USHORT" => SampleType::U16,
+        // In files, though not in C, a long has 4 bytes.
+        "MET_INT" | "MET_LONG" => SampleType::I32,
+        "MET_UINT" | "MET_ULONG" => SampleType::U32,
+        "MET_LONG_LONG" => SampleType::I64,
+        "MET_ULONG_LONG" => SampleType::U64,
+        "MET_FLOAT" => SampleType::F32,
+        "MET_DOUBLE" => SampleType::F64,
+        _ => return None,
+    })
+}

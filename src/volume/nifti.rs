@@ -1,0 +1,295 @@
+//! NIfTI-1 and NIfTI-2 files: a binary header, then the samples, in the same file (`.nii`) or in one of their own (`.hdr`, `.img`),
+//! each of them gzipped or not.
+//!
+//! Spacing and orientation are those of the sform if there is one, else those of the qform, else only `pixdim` counts. The file
+//! must end where the samples end.
+
+use std::collections::BTreeMap;
+use std::io::BufRead;
+use std::path::{Path, PathBuf};
+
+use glam::{DMat3, DQuat, DVec3, UVec3};
+
+use super::VolumeError;
+use super::loaded::Loaded;
+use super::orientation::{Orientation, lengths_and_directions, orthogonal};
+use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
+use super::source::{Source, invalid, io_error};
+
+/// Numbers of the format's data types, and bits of each.
+const TYPES: [(i64, SampleType); 10] = [
+    (2, SampleType::U8),
+    (4, SampleType::I16),
+    (8, SampleType::I32),
+    (16, SampleType::F32),
+    (64, SampleType::F64),
+    (256, SampleType::I8),
+    (512, SampleType::U16),
+    (768, SampleType::U32),
+    (1024, SampleType::I64),
+    (1280, SampleType::U64),
+];
+
+/// Reads a file, or the two files of a pair by the name of either.
+pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
+    let header_path = sibling(path, ".img", ".hdr").unwrap_or_else(|| path.to_owned());
+    let mut stream = open(&header_path)?;
+    let header = Header::read(&header_path, &mut stream)?;
+    let (dims, vox_offset) = (header.dims()?, header.vox_offset()?);
+    let (kind, rescale) = (header.sample_type()?, header.rescale()?);
+    let (spacing, orientation) = header.spacing_and_orientation()?;
+    if header.is_pair {
+        let Some(data) = sibling(&header_path, ".hdr", ".img") else {
+            return Err(header.invalid(
+                "magic",
+                "that of a pair of files",
+                "that of a single file, or a name with .hdr",
+            ));
+        };
+        stream = open(&data)?;
+    }
+    stream.skip(vox_offset)?;
+    let samples = Samples { kind, dims, big_endian: header.big_endian, rescale, z_fastest: false };
+    let (spacing, unit) = (Some(spacing), header.unit());
+    Ok(Loaded {
+        dims,
+        kind,
+        spacing,
+        unit,
+        orientation,
+        label_names: BTreeMap::new(),
+        values: stream.samples(&samples, false)?,
+    })
+}
+
+/// The rest of a file's name where it ends with `from`, or with that and `.gz`; with `to` instead.
+fn sibling(path: &Path, from: &str, to: &str) -> Option<PathBuf> {
+    let name = path.file_name()?.to_str()?;
+    let (stem, gz) = name.strip_suffix(".gz").map_or((name, ""), |stem| (stem, ".gz"));
+    Some(path.with_file_name(format!("{}{to}{gz}", stem.strip_suffix(from)?)))
+}
+
+fn open(path: &Path) -> Result<Stream, VolumeError> {
+    let mut file = Source::open(path)?;
+    let is_gzip = file.reader.fill_buf().map_err(io_error(path))?.starts_with(&[0x1f, 0x8b]);
+    if is_gzip { Stream::gzip(file) } else { Stream::raw(file) }
+}
+
+/// The fields that count, as numbers of one type, whichever the version.
+struct Header {
+    path: PathBuf,
+    /// Bytes that the header takes up.
+    bytes: u64,
+    big_endian: bool,
+    is_pair: bool,
+    dim: [i64; 8],
+    datatype: i64,
+    bitpix: i64,
+    pixdim: [f64; 4],
+    xyzt_units: u8,
+    vox_offset: f64,
+    slope_and_intercept: [f64; 2],
+    qform_code: i64,
+    sform_code: i64,
+    quatern_bcd: DVec3,
+    qoffset: DVec3,
+    /// `srow_x`, `srow_y`, `srow_z`.
+    srows: [[f64; 4]; 3],
+}
+
+/// The bytes of a header, by their place in it.
+struct Bytes {
+    bytes: Vec<u8>,
+    big_endian: bool,
+}
+
+impl Bytes {
+    /// Little-endian bytes of a number.
+    fn at<const N: usize>(&self, at: usize) -> [u8; N] {
+        let mut bytes = [0; N];
+        bytes.copy_from_slice(&self.bytes[at..at + N]);
+        if self.big_endian {
+            bytes.reverse();
+        }
+        bytes
+    }
+
+    fn i16(&self, at: usize) -> i64 {
+        i16::from_le_bytes(self.at(at)).into()
+    }
+
+    fn i32(&self, at: usize) -> i64 {
+        i32::from_le_bytes(self.at(at)).into()
+    }
+
+    fn f32s<const N: usize>(&self, at: usize) -> [f64; N] {
+        std::array::from_fn(|i| f32::from_le_bytes(self.at(at + 4 * i)).into())
+    }
+
+    fn f64s<const N: usize>(&self, at: usize) -> [f64; N] {
+        std::array::from_fn(|i| f64::from_le_bytes(self.at(at + 8 * i)))
+    }
+}
+
+impl Header {
+    /// Reads the header and nothing more.
+    fn read(path: &Path, stream: &mut Stream) -> Result<Self, VolumeError> {
+        let mut bytes = stream.bytes(348)?;
+        let size = bytes.first_chunk().map_or([0; 4], |&size| size);
+        let (version, big_endian) = match (i32::from_le_bytes(size), i32::from_be_bytes(size)) {
+            (348, _) => (1, false),
+            (_, 348) => (1, true),
+            (540, _) => (2, false),
+            (_, 540) => (2, true),
+            (size, _) => return Err(invalid(path, "sizeof_hdr", size, "348 or 540, in either byte order")),
+        };
+        if version == 2 {
+            bytes.extend(stream.bytes(540 - 348)?);
+        }
+        let magic = if version == 1 { &bytes[344..348] } else { &bytes[4..12] };
+        let is_pair = match magic {
+            b"n+1\0" | b"n+2\0\r\n\x1a\n" => false,
+            b"ni1\0" | b"ni2\0\r\n\x1a\n" => true,
+            other => {
+                let allowed = if version == 1 { "n+1 or ni1" } else { "n+2 or ni2, then \\0\\r\\n\\x1a\\n" };
+                return Err(invalid(path, "magic", format!("\"{}\"", other.escape_ascii()), allowed));
+            }
+        };
+        let path = path.to_owned();
+        let bytes = Bytes { bytes, big_endian };
+        if version == 1 {
+            let [[vox_offset], [slope], [intercept]] = [108, 112, 116].map(|at| bytes.f32s(at));
+            return Ok(Self {
+                path,
+                bytes: 348,
+                big_endian,
+                is_pair,
+                dim: std::array::from_fn(|i| bytes.i16(40 + 2 * i)),
+                datatype: bytes.i16(70),
+                bitpix: bytes.i16(72),
+                pixdim: bytes.f32s(76),
+                xyzt_units: bytes.bytes[123],
+                vox_offset,
+                slope_and_intercept: [slope, intercept],
+                qform_code: bytes.i16(252),
+                sform_code: bytes.i16(254),
+                quatern_bcd: DVec3::from_array(bytes.f32s(256)),
+                qoffset: DVec3::from_array(bytes.f32s(268)),
+                srows: [280, 296, 312].map(|at| bytes.f32s(at)),
+            });
+        }
+        let [[slope], [intercept]] = [176, 184].map(|at| bytes.f64s(at));
+        Ok(Self {
+            path,
+            bytes: 540,
+            big_endian,
+            is_pair,
+            dim: std::array::from_fn(|i| i64::from_le_bytes(bytes.at(16 + 8 * i))),
+            datatype: bytes.i16(12),
+            bitpix: bytes.i16(14),
+            pixdim: bytes.f64s(104),
+            xyzt_units: i32::from_le_bytes(bytes.at(500)) as u8,
+            vox_offset: i64::from_le_bytes(bytes.at(168)) as f64,
+            slope_and_intercept: [slope, intercept],
+            qform_code: bytes.i32(344),
+            sform_code: bytes.i32(348),
+            quatern_bcd: DVec3::from_array(bytes.f64s(352)),
+            qoffset: DVec3::from_array(bytes.f64s(376)),
+            srows: [400, 432, 464].map(|at| bytes.f64s(at)),
+        })
+    }
+
+    fn invalid(&self, field: &str, found: impl std::fmt::Display, allowed: impl std::fmt::Display) -> VolumeError {
+        invalid(&self.path, field, found, allowed)
+    }
+
+    fn dims(&self) -> Result<UVec3, VolumeError> {
+        let [rank, x, y, z, rest @ ..] = self.dim;
+        let more = usize::try_from(rank - 3).ok().and_then(|more| rest.get(..more));
+        let is_one_volume = more.is_some_and(|sizes| sizes.iter().all(|&size| size == 1));
+        dims_of([x, y, z]).filter(|_| is_one_volume).ok_or_else(|| {
+            self.invalid("dim", format!("{:?}", self.dim), format!("3 to 7, then {SIZES}, and any further sizes 1"))
+        })
+    }
+
+    fn sample_type(&self) -> Result<SampleType, VolumeError> {
+        let Some(&(_, kind)) = TYPES.iter().find(|(code, _)| *code == self.datatype) else {
+            let allowed = TYPES.map(|(code, kind)| format!("{code} ({kind})")).join(", ");
+            return Err(self.invalid("datatype", self.datatype, allowed));
+        };
+        let bits = 8 * kind.bytes() as i64;
+        if self.bitpix != bits {
+            return Err(self.invalid("bitpix", self.bitpix, format!("{bits}, as datatype {} has", self.datatype)));
+        }
+        Ok(kind)
+    }
+
+    /// Bytes between the header, or the beginning of the other file, and the samples.
+    fn vox_offset(&self) -> Result<u64, VolumeError> {
+        let before = if self.is_pair { 0 } else { self.bytes };
+        // A single file has four bytes after the header that announce extensions.
+        let least = if self.is_pair { 0 } else { before + 4 };
+        let offset = self.vox_offset;
+        if offset.fract() != 0.0 || !(least as f64..=i64::MAX as f64).contains(&offset) {
+            return Err(self.invalid("vox_offset", offset, format!("a whole number from {least}")));
+        }
+        Ok(offset as u64 - before)
+    }
+
+    /// A slope of 0 stands for none.
+    fn rescale(&self) -> Result<Option<[f64; 2]>, VolumeError> {
+        let [slope, intercept] = self.slope_and_intercept;
+        match [("scl_slope", slope), ("scl_inter", intercept)].iter().find(|(_, value)| !value.is_finite()) {
+            Some((field, value)) => Err(self.invalid(field, value, "a finite number")),
+            None if slope == 0.0 || [slope, intercept] == [1.0, 0.0] => Ok(None),
+            None => Ok(Some([slope, intercept])),
+        }
+    }
+
+    fn unit(&self) -> Option<String> {
+        // The bits above are the unit of time.
+        let name = match self.xyzt_units & 7 {
+            1 => "m",
+            2 => "mm",
+            3 => "µm",
+            _ => return None,
+        };
+        Some(name.to_owned())
+    }
+
+    fn spacing_and_orientation(&self) -> Result<(DVec3, Option<Orientation>), VolumeError> {
+        if self.sform_code > 0 {
+            let column = |i: usize| DVec3::from_array(self.srows.map(|row| row[i]));
+            let lengths_and_axes = lengths_and_directions([column(0), column(1), column(2)]);
+            let (spacing, axes) =
+                lengths_and_axes.map_err(|found| self.invalid("srow_x, srow_y, srow_z", found, orthogonal()))?;
+            return Ok((
+                spacing,
+                Some(Orientation { axes, origin: self.origin("srow_x, srow_y, srow_z", column(3))? }),
+            ));
+        }
+        let [qfac, spacing @ ..] = self.pixdim;
+        if !spacing.iter().all(|&spacing| spacing > 0.0 && spacing.is_finite()) {
+            return Err(self.invalid("pixdim", format!("{spacing:?}"), "three positive finite numbers"));
+        }
+        let spacing = DVec3::from_array(spacing);
+        if self.qform_code <= 0 {
+            return Ok((spacing, None));
+        }
+        let squares = self.quatern_bcd.length_squared();
+        // Written as `f32`, a half turn's may be a little above 1.
+        if squares.is_nan() || squares > 1.0 + 1e-5 {
+            let allowed = "three numbers whose squares add up to at most 1";
+            return Err(self.invalid("quatern_b, quatern_c, quatern_d", self.quatern_bcd, allowed));
+        }
+        let rotation = DQuat::from_vec4(self.quatern_bcd.extend((1.0 - squares).max(0.0).sqrt())).normalize();
+        let handedness = DVec3::new(1.0, 1.0, if qfac < 0.0 { -1.0 } else { 1.0 });
+        let axes = DMat3::from_quat(rotation) * DMat3::from_diagonal(handedness);
+        let origin = self.origin("qoffset_x, qoffset_y, qoffset_z", self.qoffset)?;
+        Ok((spacing, Some(Orientation { axes, origin })))
+    }
+
+    fn origin(&self, field: &str, origin: DVec3) -> Result<DVec3, VolumeError> {
+        if origin.is_finite() { Ok(origin) } else { Err(self.invalid(field, origin, "finite numbers")) }
+    }
+}

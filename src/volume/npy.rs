@@ -1,0 +1,97 @@
+//! NPY files of NumPy: a header of three fields, then the samples.
+//!
+//! An array's axes are z, y and x, whichever of them is fastest in memory. The header is read here, not by `npyz`: that allocates
+//! what a header's length says, multiplies sizes unchecked, and recurses into nested brackets.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use glam::UVec3;
+
+use super::VolumeError;
+use super::loaded::Loaded;
+use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
+use super::source::{MAX_HEADER, Source, invalid, shown, three};
+
+const TYPES: [(&str, SampleType); 10] = [
+    ("i1", SampleType::I8),
+    ("u1", SampleType::U8),
+    ("i2", SampleType::I16),
+    ("u2", SampleType::U16),
+    ("i4", SampleType::I32),
+    ("u4", SampleType::U32),
+    ("i8", SampleType::I64),
+    ("u8", SampleType::U64),
+    ("f4", SampleType::F32),
+    ("f8", SampleType::F64),
+];
+
+/// Reads the array of one file.
+pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
+    let mut stream = Stream::raw(Source::open(path)?)?;
+    let samples = parse(path, &header(path, &mut stream)?)?;
+    let Samples { dims, kind, .. } = samples;
+    let values = stream.samples(&samples, false)?;
+    Ok(Loaded { dims, kind, spacing: None, unit: None, orientation: None, label_names: BTreeMap::new(), values })
+}
+
+/// The text between the header's length and the samples.
+fn header(path: &Path, stream: &mut Stream) -> Result<String, VolumeError> {
+    let start = stream.bytes(8)?;
+    let length = match start.strip_prefix(b"\x93NUMPY") {
+        Some([1, 0]) => stream.bytes(2)?,
+        Some([2 | 3, 0]) => stream.bytes(4)?,
+        _ => {
+            let found = format!("\"{}\"", start.escape_ascii());
+            return Err(invalid(path, "magic", found, "\\x93NUMPY and version 1.0, 2.0 or 3.0"));
+        }
+    };
+    let length = length.iter().rev().fold(0, |length, &byte| length << 8 | u64::from(byte));
+    if length > MAX_HEADER {
+        return Err(invalid(path, "header", format!("{length} bytes"), format!("at most {MAX_HEADER} bytes")));
+    }
+    Ok(String::from_utf8_lossy(&stream.bytes(length)?).into_owned())
+}
+
+/// `{'descr': '<f4', 'fortran_order': False, 'shape': (3, 4, 5), }`, the fields in any order.
+fn parse(path: &Path, header: &str) -> Result<Samples, VolumeError> {
+    let field = |name: &str, allowed: &str| {
+        let dict = header.trim().strip_prefix('{').and_then(|dict| dict.strip_suffix('}'));
+        let after = dict.and_then(|dict| dict.split_once(&format!("'{name}'")));
+        let value = after.and_then(|(_, after)| after.trim_start().strip_prefix(':'));
+        value.map(str::trim_start).ok_or_else(|| invalid(path, name, format!("none in {}", shown(header)), allowed))
+    };
+
+    let types = format!("'<', '>' or '|', and one of {}", TYPES.map(|(name, _)| name).join(", "));
+    let descr = field("descr", &types)?;
+    let sample_type = || {
+        let (descr, _) = descr.strip_prefix('\'')?.split_once('\'')?;
+        let (order, name) = descr.split_at_checked(1)?;
+        let &(_, kind) = TYPES.iter().find(|(known, _)| *known == name)?;
+        match order {
+            "<" => Some((kind, false)),
+            ">" => Some((kind, true)),
+            "|" if kind.bytes() == 1 => Some((kind, false)),
+            _ => None,
+        }
+    };
+    let (kind, big_endian) = sample_type().ok_or_else(|| invalid(path, "descr", shown(descr), &types))?;
+
+    let order = field("fortran_order", "True or False")?;
+    let z_fastest = match (order.starts_with("True"), order.starts_with("False")) {
+        (true, _) => true,
+        (_, true) => false,
+        _ => return Err(invalid(path, "fortran_order", shown(order), "True or False")),
+    };
+
+    let allowed = format!("three dimensions z, y, x: {SIZES}");
+    let shape = field("shape", &allowed)?;
+    let dims = || -> Option<UVec3> {
+        let (sizes, _) = shape.strip_prefix('(')?.split_once(')')?;
+        let sizes = sizes.trim_end().strip_suffix(',').unwrap_or(sizes);
+        let [z, y, x] = three(sizes.split(',').map(|size| size.trim().parse::<u32>().ok()))?;
+        dims_of([x, y, z])
+    };
+    let dims = dims().ok_or_else(|| invalid(path, "shape", shown(shape), &allowed))?;
+    Ok(Samples { kind, dims, big_endian, rescale: None, z_fastest })
+}

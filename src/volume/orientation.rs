@@ -1,0 +1,128 @@
+//! How a volume lies in a patient.
+
+use glam::{DMat3, DVec3};
+
+use super::{Volume, VolumeError, invalid};
+
+/// Largest cosine between two axes that still counts as a right angle.
+const MAX_COSINE: f64 = 1e-4;
+
+/// Largest error of a direction's length.
+#[cfg(any(feature = "metaimage", feature = "vtk"))]
+const UNIT_LENGTH: f64 = 1e-4;
+
+/// LPS, as DICOM and MetaImage count, to RAS.
+pub(super) const RAS_FROM_LPS: DVec3 = DVec3::new(-1.0, -1.0, 1.0);
+
+/// Where a volume's axes point in a patient, in RAS: +x to the patient's right, +y to the front (anterior), +z to the head (superior).
+///
+/// It is kept beside the grid and does not move it: world axes are the volume's own (SPEC §2).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Orientation {
+    /// Column by column the unit vectors along the volume's x, y and z, in RAS.
+    pub axes: DMat3,
+    /// Voxel (0, 0, 0) in RAS, in world units; 0 where the file gives none.
+    pub origin: DVec3,
+}
+
+/// The side of a patient that is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum View {
+    /// The face; the head is up.
+    Front,
+    /// The back; the head is up.
+    Back,
+    /// The patient's left side; the head is up.
+    Left,
+    /// The patient's right side; the head is up.
+    Right,
+    /// The top of the head; the face is up.
+    Top,
+    /// From the feet; the face is up.
+    Bottom,
+}
+
+impl Orientation {
+    /// `Camera::direction` and `Camera::up`, in world space, for a view of the patient.
+    pub fn direction_and_up(&self, view: View) -> [DVec3; 2] {
+        let ras = match view {
+            View::Front => [DVec3::NEG_Y, DVec3::Z],
+            View::Back => [DVec3::Y, DVec3::Z],
+            View::Left => [DVec3::X, DVec3::Z],
+            View::Right => [DVec3::NEG_X, DVec3::Z],
+            View::Top => [DVec3::NEG_Z, DVec3::Y],
+            View::Bottom => [DVec3::Z, DVec3::Y],
+        };
+        // The axes are orthonormal, so the transpose is the inverse.
+        ras.map(|vector| self.axes.transpose() * vector)
+    }
+
+    /// Whether the volume's axes are left-handed in the patient, so that every image of the volume is a mirror image.
+    pub fn is_mirrored(&self) -> bool {
+        self.axes.determinant() < 0.0
+    }
+}
+
+impl Volume {
+    /// How the volume lies in a patient, if its file says so.
+    pub fn orientation(&self) -> Option<&Orientation> {
+        self.orientation.as_ref()
+    }
+
+    /// The same volume, lying otherwise, or nobody knows how. `origin` names it in errors.
+    ///
+    /// # Errors
+    /// If the axes are not unit vectors at right angles (to 1 in 10⁴), or a number is not finite.
+    pub fn with_orientation(mut self, origin: &str, orientation: Option<Orientation>) -> Result<Self, VolumeError> {
+        if let Some(Orientation { axes, origin: first }) = orientation {
+            let excess = (axes.transpose() * axes - DMat3::IDENTITY).to_cols_array();
+            if !(first.is_finite() && excess.iter().all(|excess| excess.abs() <= 2.0 * MAX_COSINE)) {
+                let allowed = "finite orthogonal unit vectors and a finite origin".to_owned();
+                return Err(invalid(
+                    origin,
+                    "orientation",
+                    format!("{:?}, {first:?}", axes.to_cols_array_2d()),
+                    allowed,
+                ));
+            }
+        }
+        self.orientation = orientation;
+        Ok(self)
+    }
+}
+
+/// Lengths and directions of the vectors from voxel to voxel along the three axes.
+///
+/// # Errors
+/// What they are instead of orthogonal and of positive finite length.
+pub(super) fn lengths_and_directions(steps: [DVec3; 3]) -> Result<(DVec3, DMat3), String> {
+    let lengths = steps.map(DVec3::length);
+    if !lengths.iter().all(|&length| length > 0.0 && length.is_finite()) {
+        return Err(format!("axes of the lengths {lengths:?}"));
+    }
+    let [x, y, z] = steps.map(|step| step / step.length());
+    let cosine = DVec3::new(x.dot(y), y.dot(z), z.dot(x)).abs().max_element();
+    if cosine > MAX_COSINE {
+        return Err(format!("axes that are not orthogonal, at a cosine of {cosine:.6}"));
+    }
+    Ok((DVec3::from_array(lengths), DMat3::from_cols(x, y, z)))
+}
+
+/// Directions of three vectors that are of length 1 already.
+///
+/// # Errors
+/// What they are instead, and what is allowed.
+#[cfg(any(feature = "metaimage", feature = "vtk"))]
+pub(super) fn unit_directions(axes: [DVec3; 3]) -> Result<DMat3, (String, String)> {
+    let (lengths, directions) = lengths_and_directions(axes).map_err(|found| (found, orthogonal()))?;
+    if (lengths - 1.0).abs().max_element() > UNIT_LENGTH {
+        let found = format!("axes of the lengths {:?}", lengths.to_array());
+        return Err((found, format!("lengths of 1, to {UNIT_LENGTH}")));
+    }
+    Ok(directions)
+}
+
+/// What [`lengths_and_directions`] takes.
+pub(super) fn orthogonal() -> String {
+    format!("orthogonal axes, cosines of at most {MAX_COSINE}")
+}

@@ -1,0 +1,355 @@
+//! Samples: the numbers of a file, which become values or labels as they are read.
+//!
+//! Whatever a header promises is checked against what the file can hold before memory is asked for, and samples are converted as
+//! they are read, so a load needs little more than the values themselves.
+
+use std::collections::TryReserveError;
+use std::fmt::{self, Display, Formatter};
+use std::fs::File;
+#[cfg(feature = "metaimage")]
+use std::io::BufRead;
+use std::io::{self, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use flate2::bufread::MultiGzDecoder;
+#[cfg(feature = "metaimage")]
+use flate2::bufread::ZlibDecoder;
+use glam::{DVec3, UVec3, Vec3Swizzles};
+
+use super::source::{CHUNK, Source, invalid, io_error};
+use super::{Grid, VolumeError};
+
+/// Deflate spends at least 2 bits on a match of at most 258 bytes, so no stream expands by more.
+pub(super) const MAX_EXPANSION: u64 = 1032;
+
+/// A number as a file has it.
+pub(super) trait Sample: Copy {
+    fn to_f32(self) -> f32;
+    fn to_f64(self) -> f64;
+}
+
+/// What samples become.
+pub(super) trait Voxel: Copy {
+    const ALLOWED: &'static str;
+
+    /// `None` if the sample is not allowed.
+    fn of(sample: impl Sample) -> Option<Self>;
+}
+
+/// A value. Whether it is finite is the volume's to check.
+impl Voxel for f32 {
+    const ALLOWED: &'static str = "numbers";
+
+    fn of(sample: impl Sample) -> Option<Self> {
+        Some(sample.to_f32())
+    }
+}
+
+/// A label.
+impl Voxel for u16 {
+    const ALLOWED: &'static str = "labels, whole numbers from 0 to 65535";
+
+    fn of(sample: impl Sample) -> Option<Self> {
+        let sample = sample.to_f64();
+        let label = sample as Self;
+        (f64::from(label) == sample).then_some(label)
+    }
+}
+
+macro_rules! sample_types {
+    ($($name:ident: $type:ty = $text:literal),*) => {
+        /// The type of the samples in a file. Shown as scenes name it: `int8`, `float32`.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum SampleType {
+            $(#[doc = concat!("`", stringify!($type), "`")] $name),*
+        }
+
+        impl Display for SampleType {
+            fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+                f.write_str(match self {
+                    $(Self::$name => $text),*
+                })
+            }
+        }
+
+        $(impl Sample for $type {
+            fn to_f32(self) -> f32 {
+                self as f32
+            }
+
+            fn to_f64(self) -> f64 {
+                self as f64
+            }
+        })*
+
+        impl SampleType {
+            /// All of them, by name.
+            pub(crate) const NAMED: [(&'static str, Self); 10] = [$(($text, Self::$name)),*];
+
+            /// The size of one.
+            pub(super) fn bytes(self) -> u64 {
+                match self {
+                    $(Self::$name => size_of::<$type>() as u64),*
+                }
+            }
+
+            /// Appends the bytes, in the machine's order, of a sample that is written as text.
+            #[cfg(feature = "vtk")]
+            pub(super) fn parse(self, text: &str, into: &mut Vec<u8>) -> Option<()> {
+                match self {
+                    $(Self::$name => into.extend(text.parse::<$type>().ok()?.to_ne_bytes())),*
+                }
+                Some(())
+            }
+
+            /// Appends the samples in some bytes, a whole number of them. Stops at one that is not allowed, and gives it back.
+            fn convert<T: Voxel>(self, layout: &Samples, bytes: &[u8], into: &mut Vec<T>) -> Result<(), f64> {
+                match self {
+                    $(Self::$name => {
+                        let from_bytes = if layout.big_endian { <$type>::from_be_bytes } else { <$type>::from_le_bytes };
+                        let samples = bytes.as_chunks().0.iter().map(|&sample| from_bytes(sample));
+                        match layout.rescale {
+                            None => append(samples, into),
+                            Some([slope, intercept]) => {
+                                append(samples.map(|sample| sample.to_f64() * slope + intercept), into)
+                            }
+                        }
+                    })*
+                }
+            }
+        }
+    };
+}
+
+sample_types!(
+    I8: i8 = "int8",
+    U8: u8 = "uint8",
+    I16: i16 = "int16",
+    U16: u16 = "uint16",
+    I32: i32 = "int32",
+    U32: u32 = "uint32",
+    I64: i64 = "int64",
+    U64: u64 = "uint64",
+    F32: f32 = "float32",
+    F64: f64 = "float64"
+);
+
+fn append<S: Sample, T: Voxel>(samples: impl Iterator<Item = S>, into: &mut Vec<T>) -> Result<(), f64> {
+    for sample in samples {
+        into.push(T::of(sample).ok_or_else(|| sample.to_f64())?);
+    }
+    Ok(())
+}
+
+/// What a header says of the samples: as many as the grid has voxels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Samples {
+    pub(super) kind: SampleType,
+    pub(super) dims: UVec3,
+    pub(super) big_endian: bool,
+    /// Slope and intercept: a value is `sample · slope + intercept`.
+    pub(super) rescale: Option<[f64; 2]>,
+    /// Whether z is fastest in the file, then y, then x, instead of x, then y, then z.
+    pub(super) z_fastest: bool,
+}
+
+impl Samples {
+    /// What they take up, decompressed.
+    pub(super) fn bytes(&self) -> u64 {
+        u64::from(self.count()) * self.kind.bytes()
+    }
+
+    /// Readers have fitted the product in 32 bits: [`dims_of`].
+    fn count(&self) -> u32 {
+        self.dims.element_product()
+    }
+
+    /// The voxel that a sample is of, by its position in the file.
+    fn voxel_at(&self, index: usize) -> UVec3 {
+        let in_file = |dims| Grid { dims, spacing: DVec3::ONE }.voxel_at(index as u32);
+        if self.z_fastest { in_file(self.dims.zyx()).zyx() } else { in_file(self.dims) }
+    }
+
+    /// Samples in the order of the file, x fastest.
+    fn in_order<T: Copy>(&self, samples: Vec<T>) -> Vec<T> {
+        if !self.z_fastest {
+            return samples;
+        }
+        let [nx, ny, nz] = self.dims.to_array().map(|n| n as usize);
+        let rows = (0..nz).flat_map(|z| (0..ny).map(move |y| z + nz * y));
+        rows.flat_map(|first| (0..nx).map(move |x| first + nz * ny * x)).map(|at| samples[at]).collect()
+    }
+
+    /// Appends what all the bytes of some samples are, `into` being the values before them.
+    pub(super) fn append<T: Voxel>(&self, path: &Path, bytes: &[u8], into: &mut Vec<T>) -> Result<(), VolumeError> {
+        into.try_reserve(bytes.len() / self.kind.bytes() as usize).map_err(self.too_many(path))?;
+        self.kind.convert(self, bytes, into).map_err(|sample| {
+            invalid(path, "data", format!("{sample} at voxel {}", self.voxel_at(into.len())), T::ALLOWED)
+        })
+    }
+
+    fn too_many(&self, path: &Path) -> impl Fn(TryReserveError) -> VolumeError {
+        move |error| invalid(path, "data", format!("{} samples: {error}", self.count()), "fewer")
+    }
+
+    pub(super) fn mismatch(&self, path: &Path, held: impl Display) -> VolumeError {
+        let allowed = format!("{} bytes ({} samples of {})", self.bytes(), self.count(), self.kind.bytes());
+        invalid(path, "data", format!("{held} bytes"), allowed)
+    }
+}
+
+/// Three sizes as a grid's, if each is at least 1 and there are not too many voxels.
+pub(crate) fn dims_of<N: TryInto<u32>>(sizes: [N; 3]) -> Option<UVec3> {
+    let [Ok(x), Ok(y), Ok(z)] = sizes.map(TryInto::try_into) else { return None };
+    let voxels = x.checked_mul(y)?.checked_mul(z)?;
+    (voxels > 0).then_some(UVec3::new(x, y, z))
+}
+
+/// What [`dims_of`] takes.
+pub(crate) const SIZES: &str = "three positive integers, at most 4294967295 voxels";
+
+/// What is left of a file, decompressed.
+pub(super) struct Stream {
+    path: PathBuf,
+    reader: Reader,
+    /// How many bytes are left; of a compressed stream, no more than these.
+    left: u64,
+}
+
+enum Reader {
+    Raw(BufReader<File>),
+    /// What it decodes, for errors.
+    Decoder(Box<dyn Read>, &'static str),
+}
+
+impl Stream {
+    /// The rest of a file as it is.
+    pub(super) fn raw(mut file: Source) -> Result<Self, VolumeError> {
+        Ok(Self { left: file.left()?, path: file.path, reader: Reader::Raw(file.reader) })
+    }
+
+    /// The rest of a file, of one or more gzip members.
+    pub(super) fn gzip(mut file: Source) -> Result<Self, VolumeError> {
+        let left = file.left()?.saturating_mul(MAX_EXPANSION);
+        let decoder = Box::new(MultiGzDecoder::new(file.reader));
+        Ok(Self { path: file.path, reader: Reader::Decoder(decoder, "whole and undamaged gzip members"), left })
+    }
+
+    /// The rest of a file, one zlib stream.
+    #[cfg(feature = "metaimage")]
+    pub(super) fn zlib(mut file: Source) -> Result<Self, VolumeError> {
+        let left = file.left()?.saturating_mul(MAX_EXPANSION);
+        let decoder = Box::new(Zlib(ZlibDecoder::new(file.reader)));
+        Ok(Self { path: file.path, reader: Reader::Decoder(decoder, "one whole and undamaged zlib stream"), left })
+    }
+
+    /// What `reader` decodes from a file; `allowed` is what it takes, and no more than `left` bytes come out of it.
+    #[cfg(feature = "vtk")]
+    pub(super) fn decoded(path: &Path, reader: Box<dyn Read>, allowed: &'static str, left: u64) -> Self {
+        Self { path: path.to_owned(), reader: Reader::Decoder(reader, allowed), left }
+    }
+
+    /// How many bytes are left, if the stream is not compressed.
+    pub(super) fn exactly_left(&self) -> Option<u64> {
+        matches!(self.reader, Reader::Raw(_)).then_some(self.left)
+    }
+
+    /// Skips bytes; if there are too few, all of them.
+    pub(super) fn skip(&mut self, bytes: u64) -> Result<(), VolumeError> {
+        let bytes = bytes.min(self.left);
+        self.left -= bytes;
+        match &mut self.reader {
+            Reader::Raw(reader) => reader.seek_relative(bytes as i64).map_err(io_error(&self.path)),
+            Reader::Decoder(reader, _) => {
+                let skipped = io::copy(&mut reader.by_ref().take(bytes), &mut io::sink());
+                skipped.map(drop).map_err(|error| self.damage(error))
+            }
+        }
+    }
+
+    /// So many bytes of a header.
+    #[cfg(any(feature = "nifti", feature = "npy", feature = "vtk"))]
+    pub(super) fn bytes(&mut self, bytes: u64) -> Result<Vec<u8>, VolumeError> {
+        let mut header = Vec::new();
+        let read = self.read_up_to(bytes, &mut header)?;
+        self.left -= read.min(self.left);
+        if read < bytes {
+            return Err(invalid(&self.path, "header", format!("{read} bytes"), format!("{bytes} bytes")));
+        }
+        Ok(header)
+    }
+
+    /// The samples, and then nothing else unless it is a `window` into a file of which more may follow.
+    pub(super) fn samples<T: Voxel>(mut self, samples: &Samples, window: bool) -> Result<Vec<T>, VolumeError> {
+        let expected = samples.bytes();
+        match self.exactly_left() {
+            Some(left) if left < expected || left > expected && !window => {
+                return Err(samples.mismatch(&self.path, left));
+            }
+            None if self.left < expected => {
+                return Err(samples.mismatch(&self.path, format!("at most {}", self.left)));
+            }
+            _ => {}
+        }
+        let values = self.read_samples(samples)?;
+        // Reading on to the end is also what checks a compressed stream's last checksum.
+        if matches!(self.reader, Reader::Decoder(..)) && self.read_up_to(1, &mut Vec::new())? > 0 {
+            return Err(samples.mismatch(&self.path, format!("more than {expected}")));
+        }
+        Ok(values)
+    }
+
+    fn read_samples<T: Voxel>(&mut self, samples: &Samples) -> Result<Vec<T>, VolumeError> {
+        let path = self.path.clone();
+        let (mut values, mut chunk) = (Vec::new(), Vec::with_capacity(CHUNK as usize));
+        // What a compressed stream holds is not known yet: memory grows with what comes out of it. A file that is not
+        // compressed holds them all.
+        let known = if self.exactly_left().is_some() { samples.count() as usize } else { 0 };
+        values.try_reserve_exact(known).map_err(samples.too_many(&path))?;
+        let mut left = samples.bytes();
+        while left > 0 {
+            chunk.clear();
+            let wanted = left.min(CHUNK);
+            let read = self.read_up_to(wanted, &mut chunk)?;
+            if read < wanted {
+                return Err(samples.mismatch(&path, samples.bytes() - left + read));
+            }
+            samples.append(&path, &chunk, &mut values)?;
+            left -= read;
+        }
+        values.shrink_to_fit();
+        Ok(samples.in_order(values))
+    }
+
+    /// Appends so many bytes, fewer at the end.
+    fn read_up_to(&mut self, bytes: u64, into: &mut Vec<u8>) -> Result<u64, VolumeError> {
+        let read = match &mut self.reader {
+            Reader::Raw(reader) => reader.by_ref().take(bytes).read_to_end(into),
+            Reader::Decoder(reader, _) => reader.by_ref().take(bytes).read_to_end(into),
+        };
+        read.map(|read| read as u64).map_err(|error| self.damage(error))
+    }
+
+    /// Decoders report damage as an I/O error, without the code that the operating system's own carry.
+    fn damage(&self, error: io::Error) -> VolumeError {
+        match (&self.reader, error.raw_os_error()) {
+            (Reader::Decoder(_, allowed), None) => invalid(&self.path, "data", error, allowed),
+            _ => io_error(&self.path)(error),
+        }
+    }
+}
+
+/// A zlib stream that nothing may follow.
+#[cfg(feature = "metaimage")]
+struct Zlib(ZlibDecoder<BufReader<File>>);
+
+#[cfg(feature = "metaimage")]
+impl Read for Zlib {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = self.0.read(buffer)?;
+        if read == 0 && !buffer.is_empty() && !self.0.get_mut().fill_buf()?.is_empty() {
+            return Err(io::Error::other("bytes after the end of the stream"));
+        }
+        Ok(read)
+    }
+}

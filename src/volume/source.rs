@@ -1,0 +1,100 @@
+//! Files while they are read, and the words for what is wrong with them.
+
+use std::fmt::Display;
+use std::fs::{self, File};
+use std::io::{self, BufRead, BufReader, Read, Seek};
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use super::VolumeError;
+
+/// No header line is longer than this, in bytes.
+const MAX_LINE: u64 = 64 << 10;
+/// No header is longer than this, in bytes.
+pub(super) const MAX_HEADER: u64 = 1 << 20;
+/// Files are read this many bytes at a time: a multiple of the size of every sample type.
+pub(super) const CHUNK: u64 = 64 << 10;
+
+/// One file while it is read.
+pub(super) struct Source {
+    pub(super) path: PathBuf,
+    bytes: u64,
+    pub(super) reader: BufReader<File>,
+}
+
+impl Source {
+    pub(super) fn open(path: &Path) -> Result<Self, VolumeError> {
+        // Asked before opening: to open a pipe would wait for its writer.
+        let metadata = fs::metadata(path).map_err(io_error(path))?;
+        if !metadata.is_file() {
+            return Err(invalid(path, "file", "a folder, pipe or device", "a regular file"));
+        }
+        let reader = BufReader::with_capacity(CHUNK as usize, File::open(path).map_err(io_error(path))?);
+        Ok(Self { path: path.to_owned(), bytes: metadata.len(), reader })
+    }
+
+    /// How many bytes are left to read.
+    pub(super) fn left(&mut self) -> Result<u64, VolumeError> {
+        Ok(self.bytes.saturating_sub(self.reader.stream_position().map_err(io_error(&self.path))?))
+    }
+
+    /// The next header line without its end, or `None` at the end of the file; `budget` is what the header may still
+    /// take up.
+    pub(super) fn line(&mut self, budget: &mut u64) -> Result<Option<String>, VolumeError> {
+        let (mut line, limit) = (Vec::new(), MAX_LINE.min(*budget));
+        let read = self.reader.by_ref().take(limit).read_until(b'\n', &mut line);
+        let read = read.map_err(io_error(&self.path))? as u64;
+        if read == limit && !line.ends_with(b"\n") {
+            let allowed = format!("lines of less than {MAX_LINE} bytes, less than {MAX_HEADER} bytes in all");
+            return Err(invalid(&self.path, "header", "more", allowed));
+        }
+        *budget -= read;
+        let text = line.strip_suffix(b"\n").unwrap_or(&line);
+        let text = text.strip_suffix(b"\r").unwrap_or(text);
+        Ok((read > 0).then(|| String::from_utf8_lossy(text).into_owned()))
+    }
+
+    pub(super) fn skip_lines(&mut self, lines: u64) -> Result<(), VolumeError> {
+        for skipped in 0..lines {
+            if self.reader.skip_until(b'\n').map_err(io_error(&self.path))? == 0 {
+                let allowed = format!("at most the {skipped} lines of the file");
+                return Err(invalid(&self.path, "line skip", lines, allowed));
+            }
+        }
+        Ok(())
+    }
+}
+
+pub(super) fn invalid(path: &Path, field: &str, found: impl Display, allowed: impl Display) -> VolumeError {
+    super::invalid(&path.display().to_string(), field, found.to_string(), allowed.to_string())
+}
+
+pub(super) fn io_error(path: &Path) -> impl Fn(io::Error) -> VolumeError {
+    |source| VolumeError::Io { path: path.to_owned(), source }
+}
+
+/// Text from the file, short and on one line.
+pub(super) fn shown(text: &str) -> String {
+    let short: String = text.chars().take(60).collect();
+    format!("{short:?}{}", if short.len() < text.len() { "…" } else { "" })
+}
+
+pub(super) fn lower(text: &str) -> String {
+    text.to_ascii_lowercase()
+}
+
+pub(super) fn three<T>(items: impl Iterator<Item = Option<T>>) -> Option<[T; 3]> {
+    items.collect::<Option<Vec<T>>>()?.try_into().ok()
+}
+
+/// A finite number.
+pub(super) fn number(text: &str) -> Option<f64> {
+    text.trim().parse().ok().filter(|number: &f64| number.is_finite())
+}
+
+/// `(x,y,z)`, with or without space around the numbers.
+pub(super) fn vector(text: &str) -> Option<DVec3> {
+    let components = text.trim().strip_prefix('(')?.strip_suffix(')')?;
+    three(components.split(',').map(number)).map(DVec3::from_array)
+}

@@ -1,0 +1,197 @@
+//! What a file says of its pages: the description that ImageJ or OME wrote, and the resolution.
+
+use std::path::Path;
+
+use ::tiff::tags::Tag;
+use quick_xml::Reader;
+use quick_xml::events::Event;
+
+use super::super::VolumeError;
+use super::super::fields::Fields;
+use super::super::source::{invalid, number};
+use super::super::unit::{common, unit};
+use super::super::xml;
+use super::pages::Pages;
+
+/// Pixels an inch that programs write without meaning it.
+const NOMINAL_DPI: f64 = 72.0;
+
+/// How large voxels are, how many slices there should be, and what their samples mean.
+#[derive(Default)]
+pub(super) struct Calibration {
+    /// Along x and y.
+    pub(super) spacing: Option<[f64; 2]>,
+    /// Along z, which has none of its own where x and y have none.
+    pub(super) between_slices: Option<f64>,
+    pub(super) unit: Option<String>,
+    pub(super) slices: Option<u32>,
+    /// Slope and intercept.
+    pub(super) rescale: Option<[f64; 2]>,
+}
+
+impl Calibration {
+    /// What the first page says.
+    pub(super) fn of(pages: &mut Pages) -> Result<Self, VolumeError> {
+        let description = pages.description()?;
+        if description.starts_with("ImageJ=") {
+            return Self::of_image_j(pages, &description);
+        }
+        if description.contains("<OME") || description.contains("<ome:OME") {
+            return Self::of_ome(&pages.path, &description);
+        }
+        let resolution_unit = pages.unsigned::<u16>(Tag::ResolutionUnit)?.unwrap_or(INCH);
+        let (spacing, unit) = match (pixels_per_unit(pages), resolution_unit) {
+            (Some([x, y]), INCH) if [x, y] != [NOMINAL_DPI; 2] => (Some([25.4 / x, 25.4 / y]), unit("mm")),
+            (Some([x, y]), CENTIMETER) => (Some([10.0 / x, 10.0 / y]), unit("mm")),
+            // Only what they are to one another.
+            (Some([x, y]), NO_UNIT) if x != y => (Some([1.0, x / y]), None),
+            _ => (None, None),
+        };
+        Ok(Self { spacing, unit, ..Self::default() })
+    }
+
+    /// Lines of `name=value`, which are not all of a name.
+    fn of_image_j(pages: &mut Pages, description: &str) -> Result<Self, VolumeError> {
+        let mut fields = Fields::new(pages.path.clone());
+        for (name, value) in description.lines().filter_map(|line| line.split_once('=')) {
+            if fields.get(name).is_none() {
+                fields.add(name, value)?;
+            }
+        }
+        let count = |name: &str| {
+            let parse = |text: Option<&str>| text.unwrap_or("1").parse::<u32>().ok().filter(|&count| count > 0);
+            fields.value(name, "a positive integer", parse)
+        };
+        let images = count("images")?;
+        let [slices, channels, frames] = [count("slices")?, count("channels")?, count("frames")?];
+        match [slices, channels, frames].map(|count| count > 1) {
+            [_, false, false] => {}
+            // Programs that know of no axes write so.
+            [false, true, false] | [false, false, true] => {
+                let what = if channels > 1 { "channels" } else { "frames" };
+                log::warn!("{}: the description says {images} {what}: taken to be slices", pages.path.display());
+            }
+            _ => {
+                let found = format!("{slices}, {channels}, {frames}");
+                return Err(fields.invalid("slices, channels, frames", found, "one of them above 1: one volume"));
+            }
+        }
+        let units = ["unit", "yunit", "zunit"].map(|name| fields.get(name));
+        let along_x = units[0].and_then(unit);
+        if units[1..].iter().flatten().any(|&other| unit(other) != along_x) {
+            let found = units.map(|unit| unit.unwrap_or("unit's")).join(", ");
+            return Err(fields.invalid("unit, yunit, zunit", found, "one unit for all"));
+        }
+        // As ImageJ itself has it: a step back is a step.
+        let between = fields.value("spacing", "a finite number but 0", |text| match text {
+            None => Some(None),
+            Some(text) => number(text).map(f64::abs).filter(|&spacing| spacing > 0.0).map(Some),
+        })?;
+        let (mut spacing, mut length_unit) = (None, along_x);
+        if let Some([x, y]) = pixels_per_unit(pages) {
+            let resolution_unit = pages.unsigned::<u16>(Tag::ResolutionUnit)?;
+            if length_unit.is_none() {
+                length_unit = match resolution_unit {
+                    Some(INCH) if [x, y] != [NOMINAL_DPI; 2] => unit("inch"),
+                    Some(CENTIMETER) => unit("cm"),
+                    _ => None,
+                };
+            }
+            if length_unit.is_some() || resolution_unit == Some(NO_UNIT) {
+                spacing = Some([1.0 / x, 1.0 / y]);
+            }
+        }
+        if between.is_some() {
+            spacing = spacing.or(Some([1.0, 1.0]));
+        }
+        let rescale = value_function(&fields)?;
+        // It leaves out a distance of 1.
+        let between_slices = between.or((images > 1).then_some(1.0));
+        Ok(Self { spacing, between_slices, unit: length_unit, slices: Some(images), rescale })
+    }
+
+    /// The attributes of the one element `Pixels`.
+    fn of_ome(path: &Path, description: &str) -> Result<Self, VolumeError> {
+        let damage = |error| xml::damage(path, error);
+        let mut reader = Reader::from_str(description);
+        let mut pixels: Option<Fields> = None;
+        loop {
+            match reader.read_event().map_err(damage)? {
+                Event::Start(element) | Event::Empty(element) => match element.local_name().as_ref() {
+                    "Pixels" if pixels.is_some() => {
+                        return Err(invalid(path, "Pixels", "more than one image", "one image"));
+                    }
+                    "Pixels" => pixels = Some(xml::attributes(path, &element)?),
+                    "TiffData" => check_order(&xml::attributes(path, &element)?)?,
+                    _ => {}
+                },
+                Event::Eof => break,
+                _ => {}
+            }
+        }
+        let Some(pixels) = pixels else {
+            return Err(invalid(path, "Pixels", "no such element", "one image"));
+        };
+        let count = |name: &str| {
+            pixels.value(name, "a positive integer", |text| text?.parse::<u32>().ok().filter(|&count| count > 0))
+        };
+        for name in ["SizeC", "SizeT"] {
+            if count(name)? > 1 {
+                return Err(pixels.invalid(name, count(name)?, "1: one volume of one number for each voxel"));
+            }
+        }
+        let size = |name: &str| {
+            pixels.value(name, "a positive finite number", |text| match text {
+                None => Some(None),
+                Some(text) => number(text).filter(|&size| size > 0.0).map(Some),
+            })
+        };
+        let [x, y, z] = [size("PhysicalSizeX")?, size("PhysicalSizeY")?, size("PhysicalSizeZ")?];
+        let names = ["PhysicalSizeXUnit", "PhysicalSizeYUnit", "PhysicalSizeZUnit"];
+        let units = names.map(|name| pixels.get(name).unwrap_or("µm"));
+        let unit = common(units);
+        if units.iter().any(|&other| unit != super::super::unit::unit(other)) {
+            return Err(pixels.invalid("PhysicalSizeXUnit, YUnit, ZUnit", units.join(", "), "one unit for all"));
+        }
+        let spacing = x.zip(y).map(|(x, y)| [x, y]);
+        let unit = unit.filter(|_| spacing.is_some());
+        Ok(Self { spacing, between_slices: z, unit, slices: Some(count("SizeZ")?), rescale: None })
+    }
+}
+
+/// Values of the tag `ResolutionUnit`.
+const NO_UNIT: u16 = 1;
+const INCH: u16 = 2;
+const CENTIMETER: u16 = 3;
+
+fn pixels_per_unit(pages: &mut Pages) -> Option<[f64; 2]> {
+    Some([pages.fraction(Tag::XResolution)?, pages.fraction(Tag::YResolution)?])
+}
+
+/// ImageJ's calibration of values, if it is a straight line.
+fn value_function(fields: &Fields) -> Result<Option<[f64; 2]>, VolumeError> {
+    match fields.get("cf") {
+        None => Ok(None),
+        Some("0") => {
+            let coefficient = |name: &str| fields.value(name, "a finite number", |text| number(text?));
+            Ok(Some([coefficient("c1")?, coefficient("c0")?]))
+        }
+        Some(other) => {
+            let path = fields.path.display();
+            log::warn!(
+                "{path}: the description's calibration function {other} is no straight line: values are those stored"
+            );
+            Ok(None)
+        }
+    }
+}
+
+/// Refuses pages that are not in the order of their slices.
+fn check_order(tiff_data: &Fields) -> Result<(), VolumeError> {
+    let number = |name: &str| tiff_data.value(name, "a number", |text| text.unwrap_or("0").parse::<u32>().ok());
+    let [page, slice] = [number("IFD")?, number("FirstZ")?];
+    if page == slice {
+        return Ok(());
+    }
+    Err(tiff_data.invalid("TiffData", format!("slice {slice} on page {page}"), "pages in the order of the slices"))
+}

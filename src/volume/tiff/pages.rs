@@ -1,0 +1,272 @@
+//! The pages of one file.
+
+use std::fmt::{self, Display, Formatter};
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use ::tiff::decoder::ifd::Value;
+use ::tiff::decoder::{ChunkType, Decoder, DecodingSampleType, Limits};
+use ::tiff::tags::{ByteOrder, Tag};
+use ::tiff::{ColorType, TiffError};
+
+use super::super::VolumeError;
+use super::super::samples::SampleType;
+use super::super::source::{Source, invalid, io_error};
+use super::directory::{most_values, overlong_entry};
+use super::trial::{self, is_suspicious};
+
+/// The values of the tags that count.
+const UNCOMPRESSED: u16 = 1;
+const REDUCED: u32 = 1;
+const WHITE_IS_ZERO: u16 = 0;
+
+/// LZW's longest string is 4096 bytes, for a code of 12 bits; no other compression here expands by more.
+const MAX_EXPANSION: u64 = 4096;
+
+/// Size and type of a page.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) struct Page {
+    pub(super) size: [u32; 2],
+    pub(super) kind: SampleType,
+}
+
+impl Page {
+    fn bytes(self) -> u64 {
+        let [width, height] = self.size.map(u64::from);
+        // Two sizes of 32 bits: their product is one of 64.
+        (width * height).saturating_mul(self.kind.bytes())
+    }
+}
+
+impl Display for Page {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let [width, height] = self.size;
+        write!(f, "{width} × {height} {}", self.kind)
+    }
+}
+
+/// A file, at one of its pages.
+pub(super) struct Pages {
+    pub(super) path: PathBuf,
+    /// The page that it is at.
+    pub(super) page: Page,
+    decoder: Decoder<BufReader<File>>,
+    /// The number of directories up to here.
+    number: u32,
+    /// Bytes of the file that no page so far has claimed.
+    unclaimed: u64,
+    /// The page's chunks: strips or tiles.
+    offsets: Vec<u64>,
+    counts: Vec<u64>,
+}
+
+impl Pages {
+    /// Opens a file at its first page.
+    pub(super) fn open(path: &Path) -> Result<Self, VolumeError> {
+        let mut file = Source::open(path)?;
+        let unclaimed = file.left()?;
+        let mut reader = BufReader::new(file.reader.into_inner());
+        let overlong = overlong_entry(&mut reader, unclaimed).map_err(io_error(path))?;
+        if let Some((tag, values)) = overlong {
+            let allowed = format!("at most {} in so small a file", most_values(unclaimed));
+            return Err(invalid(path, &format!("tag {tag}"), format!("{values} values"), allowed));
+        }
+        reader.rewind().map_err(io_error(path))?;
+        let decoder = Decoder::new(reader).map_err(failed(path, "page 1"))?;
+        // Memory for pages is not the decoder's, but that for the values of tags.
+        let mut limits = Limits::default();
+        limits.intermediate_buffer_size = usize::MAX;
+        limits.decoding_buffer_size = most_values(unclaimed) as usize * size_of::<Value>();
+        let mut pages = Self {
+            path: path.to_owned(),
+            page: Page { size: [0; 2], kind: SampleType::U8 },
+            decoder: decoder.with_limits(limits),
+            number: 1,
+            unclaimed,
+            offsets: Vec::new(),
+            counts: Vec::new(),
+        };
+        if pages.is_reduced()? && !pages.next()? {
+            return Err(invalid(path, "pages", "reduced pictures only", "one of full size"));
+        }
+        pages.describe()?;
+        pages.check_chunks()?;
+        Ok(pages)
+    }
+
+    /// What errors call the page.
+    pub(super) fn name(&self) -> String {
+        format!("page {}", self.number)
+    }
+
+    pub(super) fn has_more(&self) -> bool {
+        self.decoder.more_images()
+    }
+
+    /// Goes to the next page, if there is one; thumbnails are none.
+    pub(super) fn next(&mut self) -> Result<bool, VolumeError> {
+        while self.decoder.more_images() {
+            self.number += 1;
+            self.decoder.next_image().map_err(failed(&self.path, &self.name()))?;
+            if !self.is_reduced()? {
+                self.describe()?;
+                self.check_chunks()?;
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    pub(super) fn is_big_endian(&self) -> bool {
+        self.decoder.byte_order() == ByteOrder::BigEndian
+    }
+
+    pub(super) fn unsigned<N: TryFrom<u64>>(&mut self, tag: Tag) -> Result<Option<N>, VolumeError> {
+        let name = self.name();
+        self.decoder.find_tag_unsigned(tag).map_err(failed(&self.path, &name))
+    }
+
+    /// A positive fraction; whatever else stands there says nothing.
+    pub(super) fn fraction(&mut self, tag: Tag) -> Option<f64> {
+        let value = match self.decoder.find_tag(tag).ok()?? {
+            Value::Rational(numerator, denominator) => f64::from(numerator) / f64::from(denominator),
+            Value::Float(value) => value.into(),
+            Value::Double(value) => value,
+            _ => return None,
+        };
+        (value > 0.0 && value.is_finite()).then_some(value)
+    }
+
+    /// The first page's text, whichever bytes it is of.
+    pub(super) fn description(&mut self) -> Result<String, VolumeError> {
+        let (name, limit) = (self.name(), self.unclaimed);
+        let mut directory = self.decoder.image_ifd();
+        let Some(entry) = directory.find_entry(Tag::ImageDescription) else { return Ok(String::new()) };
+        if entry.count() > limit {
+            let found = format!("{} bytes", entry.count());
+            return Err(invalid(&self.path, "ImageDescription", found, "no more than the file has"));
+        }
+        let mut bytes = vec![0; entry.count() as usize];
+        directory.find_tag_bytes(Tag::ImageDescription, &mut bytes, 0).map_err(failed(&self.path, &name))?;
+        Ok(String::from_utf8_lossy(&bytes).trim_end_matches('\0').to_owned())
+    }
+
+    fn is_reduced(&mut self) -> Result<bool, VolumeError> {
+        Ok(self.unsigned::<u32>(Tag::NewSubfileType)?.is_some_and(|kind| kind & REDUCED != 0))
+    }
+
+    /// Takes down what the page is, and refuses what is no grid of numbers, or more than the file can hold.
+    fn describe(&mut self) -> Result<(), VolumeError> {
+        let name = self.name();
+        let failed = failed(&self.path, &name);
+        let (width, height) = self.decoder.dimensions().map_err(&failed)?;
+        let color = self.decoder.colortype().map_err(&failed)?;
+        let layout = self.decoder.image_buffer_layout().map_err(&failed)?;
+        let kind = match (color, layout.sample_type) {
+            (ColorType::Gray(8 | 16 | 32 | 64), Some(sample_type)) => sample_type_of(sample_type),
+            _ => None,
+        };
+        let Some(kind) = kind else {
+            let found = format!("{color:?}, {:?}", layout.sample_format);
+            let allowed = "one integer of 8 to 64 bits or one float of 32 or 64 bits for each pixel";
+            return Err(invalid(&self.path, &name, found, allowed));
+        };
+        self.page = Page { size: [width, height], kind };
+        let tags = match self.decoder.get_chunk_type() {
+            ChunkType::Strip => [Tag::StripOffsets, Tag::StripByteCounts],
+            ChunkType::Tile => [Tag::TileOffsets, Tag::TileByteCounts],
+        };
+        let [offsets, counts] = tags.map(|tag| self.decoder.find_tag_unsigned_vec(tag));
+        self.offsets = offsets.map_err(&failed)?.unwrap_or_default();
+        self.counts = counts.map_err(&failed)?.unwrap_or_default();
+        Ok(())
+    }
+
+    /// Refuses chunks that take up more than is left of the file, or promise more than is in them.
+    fn check_chunks(&mut self) -> Result<(), VolumeError> {
+        let method = self.unsigned::<u16>(Tag::Compression)?.unwrap_or(UNCOMPRESSED);
+        let expansion = if method == UNCOMPRESSED { 1 } else { MAX_EXPANSION };
+        let claimed = self.counts.iter().fold(0_u64, |sum, &count| sum.saturating_add(count));
+        let Some(unclaimed) = self.unclaimed.checked_sub(claimed) else {
+            let allowed = format!("the {} bytes that are left of the file", self.unclaimed);
+            return Err(invalid(&self.path, &self.name(), format!("{claimed} bytes of samples"), allowed));
+        };
+        self.unclaimed = unclaimed;
+        for chunk in 0..self.counts.len() {
+            let (width, height) = match self.decoder.get_chunk_type() {
+                ChunkType::Strip => self.decoder.chunk_data_dimensions(chunk as u32),
+                ChunkType::Tile => self.decoder.chunk_dimensions(),
+            };
+            let bytes = Page { size: [width, height], ..self.page }.bytes();
+            let (offset, count) = (self.offsets.get(chunk).copied().unwrap_or(u64::MAX), self.counts[chunk]);
+            let mut holds = count.saturating_mul(expansion) >= bytes;
+            if holds && method != UNCOMPRESSED && is_suspicious(count, bytes) {
+                let file = self.decoder.inner();
+                let code = file.seek(SeekFrom::Start(offset)).map(|_| file.take(count));
+                holds = code.and_then(|code| trial::holds(code, method, bytes)).map_err(io_error(&self.path))?;
+            }
+            if !holds {
+                let (found, allowed) = (format!("{count} bytes for {bytes}"), "a strip or tile that holds its pixels");
+                return Err(invalid(&self.path, &self.name(), found, allowed));
+            }
+        }
+        Ok(())
+    }
+
+    fn is_compressed(&mut self) -> Result<bool, VolumeError> {
+        Ok(self.unsigned::<u16>(Tag::Compression)?.is_some_and(|method| method != UNCOMPRESSED))
+    }
+
+    /// Where the page's samples begin if nothing but samples follows.
+    pub(super) fn contiguous(&mut self) -> Result<u64, VolumeError> {
+        let mut ends = self.offsets.iter().zip(&self.counts).map(|(offset, count)| offset.checked_add(*count));
+        let follow = self.offsets.iter().skip(1).all(|&offset| ends.next() == Some(Some(offset)));
+        let is_strips = self.decoder.get_chunk_type() == ChunkType::Strip;
+        let is_one_piece = follow && is_strips && !self.is_compressed()?;
+        let first = self.offsets.first().filter(|_| is_one_piece);
+        let allowed = "as many as the description says, or uncompressed samples in one piece";
+        first.copied().ok_or_else(|| invalid(&self.path, "pages", "1", allowed))
+    }
+
+    /// The page's samples, in the machine's byte order.
+    pub(super) fn bytes(&mut self) -> Result<Vec<u8>, VolumeError> {
+        // Checked against the file; pages of it that nothing is decoded into take up no memory.
+        let mut bytes = vec![0; self.page.bytes() as usize];
+        let name = self.name();
+        self.decoder.read_image_bytes(&mut bytes).map_err(failed(&self.path, &name))?;
+        if self.unsigned::<u16>(Tag::PhotometricInterpretation)? == Some(WHITE_IS_ZERO) {
+            if matches!(self.page.kind, SampleType::F32 | SampleType::F64) {
+                let allowed = "BlackIsZero, for floats";
+                return Err(invalid(&self.path, "PhotometricInterpretation", "WhiteIsZero", allowed));
+            }
+            // The decoder has made white of what is 0.
+            bytes.iter_mut().for_each(|byte| *byte = !*byte);
+        }
+        Ok(bytes)
+    }
+}
+
+fn sample_type_of(sample_type: DecodingSampleType) -> Option<SampleType> {
+    Some(match sample_type {
+        DecodingSampleType::U8 => SampleType::U8,
+        DecodingSampleType::U16 => SampleType::U16,
+        DecodingSampleType::U32 => SampleType::U32,
+        DecodingSampleType::U64 => SampleType::U64,
+        DecodingSampleType::I8 => SampleType::I8,
+        DecodingSampleType::I16 => SampleType::I16,
+        DecodingSampleType::I32 => SampleType::I32,
+        DecodingSampleType::I64 => SampleType::I64,
+        DecodingSampleType::F32 => SampleType::F32,
+        DecodingSampleType::F64 => SampleType::F64,
+        DecodingSampleType::F16 => return None,
+    })
+}
+
+/// The decoder reports damage as an I/O error, without the code that the operating system's own carry.
+fn failed(path: &Path, page: &str) -> impl Fn(TiffError) -> VolumeError {
+    move |error| match error {
+        TiffError::IoError(error) if error.raw_os_error().is_some() => io_error(path)(error),
+        error => invalid(path, page, error, "grey pixels, as they are or by LZW, Deflate or PackBits"),
+    }
+}

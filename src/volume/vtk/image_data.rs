@@ -1,0 +1,298 @@
+//! XML ImageData: one piece, its samples in the XML, as text or base64, or behind it, as base64 or as they are; in blocks of zlib or LZ4
+//! or in one.
+
+use std::collections::BTreeMap;
+use std::io::{self, BufRead, Read, Seek, SeekFrom};
+use std::path::Path;
+
+use glam::{DMat3, DVec3, UVec3};
+use quick_xml::Reader;
+use quick_xml::events::Event;
+
+use super::super::VolumeError;
+use super::super::fields::Fields;
+use super::super::loaded::Loaded;
+use super::super::orientation::unit_directions;
+use super::super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
+use super::super::source::{Source, invalid, io_error, number, three};
+use super::super::xml;
+use super::blocks::{Base64, Blocks, Compressor, HeaderType};
+use super::numbers::Numbers;
+use super::warn_of_choice;
+
+const TYPES: [(&str, SampleType); 10] = [
+    ("Int8", SampleType::I8),
+    ("UInt8", SampleType::U8),
+    ("Int16", SampleType::I16),
+    ("UInt16", SampleType::U16),
+    ("Int32", SampleType::I32),
+    ("UInt32", SampleType::U32),
+    ("Int64", SampleType::I64),
+    ("UInt64", SampleType::U64),
+    ("Float32", SampleType::F32),
+    ("Float64", SampleType::F64),
+];
+
+/// Reads the array of one file.
+pub(in super::super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
+    let header = Header::read(path)?;
+    let spacing = header.spacing()?;
+    header.check_direction()?;
+    let array = header.choose()?;
+    let dims = header.dims(array)?;
+    let kind = array.fields.value("type", &TYPES.map(|(name, _)| name).join(", "), |text| {
+        TYPES.iter().find(|(name, _)| Some(*name) == text).map(|&(_, kind)| kind)
+    })?;
+    let big_endian = header.file.value("byte_order", "LittleEndian or BigEndian", |text| match text {
+        None | Some("LittleEndian") => Some(false),
+        Some("BigEndian") => Some(true),
+        Some(_) => None,
+    })?;
+    let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
+    let values = header.open(path, array, &samples)?.samples(&samples, false)?;
+    Ok(Loaded {
+        dims,
+        kind,
+        spacing: Some(spacing),
+        unit: None,
+        orientation: None,
+        label_names: BTreeMap::new(),
+        values,
+    })
+}
+
+/// The elements that count, as their attributes.
+struct Header {
+    file: Fields,
+    image: Fields,
+    arrays: Vec<Array>,
+    /// What is behind the XML: how it is encoded, and where it begins.
+    appended: Option<(Fields, u64)>,
+}
+
+struct Array {
+    fields: Fields,
+    of_cells: bool,
+    /// Whether its section says that it is the one.
+    is_active: bool,
+    /// Where its text begins, if it has text.
+    at: u64,
+}
+
+impl Header {
+    /// Reads the XML, or what of it is before the appended data.
+    fn read(path: &Path) -> Result<Self, VolumeError> {
+        let mut reader = Reader::from_reader(Source::open(path)?.reader);
+        let (mut file, mut image, mut piece) = (None, None, None);
+        let (mut arrays, mut appended) = (Vec::new(), None);
+        let mut section: Option<(bool, Option<String>)> = None;
+        // The names that sections say are active.
+        let mut active_names = Vec::new();
+        let mut buffer = Vec::new();
+        while appended.is_none() {
+            buffer.clear();
+            let element = match reader.read_event_into(&mut buffer).map_err(|error| xml::damage(path, error))? {
+                Event::Start(element) | Event::Empty(element) => element,
+                Event::End(end) if matches!(end.name().as_ref(), "PointData" | "CellData") => {
+                    section = None;
+                    continue;
+                }
+                Event::End(end) if end.name().as_ref() == "VTKFile" => break,
+                Event::Eof => {
+                    let allowed = "an XML file of VTK with ImageData";
+                    return Err(invalid(path, "header", "the end of the file", allowed));
+                }
+                _ => continue,
+            };
+            let fields = xml::attributes(path, &element)?;
+            match (element.name().as_ref(), &section) {
+                ("VTKFile", _) => file = file.or(Some(fields)),
+                ("ImageData", _) => image = image.or(Some(fields)),
+                ("Piece", _) if piece.is_some() => return Err(invalid(path, "Piece", "more than one", "one")),
+                ("Piece", _) => piece = Some(fields),
+                (name @ ("PointData" | "CellData"), _) => {
+                    let active = fields.get("Scalars").map(str::to_owned);
+                    active_names.extend(active.clone());
+                    section = Some((name == "CellData", active));
+                }
+                ("DataArray", Some((of_cells, active))) => arrays.push(Array {
+                    is_active: active.is_some() && fields.get("Name") == active.as_deref(),
+                    of_cells: *of_cells,
+                    at: reader.buffer_position(),
+                    fields,
+                }),
+                ("AppendedData", _) => {
+                    let Some(skipped) = underscore(reader.get_mut()).map_err(io_error(path))? else {
+                        return Err(invalid(path, "AppendedData", "no underscore", "one before the data"));
+                    };
+                    appended = Some((fields, reader.buffer_position() + skipped));
+                }
+                _ => {}
+            }
+        }
+        let missing = |element: &str| invalid(path, element, "no such element", "an XML file of VTK with ImageData");
+        let file = file.ok_or_else(|| missing("VTKFile"))?;
+        file.value("type", "ImageData", |text| (text? == "ImageData").then_some(()))?;
+        let image = image.ok_or_else(|| missing("ImageData"))?;
+        let (whole, part) =
+            (extent(&image, "WholeExtent")?, extent(&piece.ok_or_else(|| missing("Piece"))?, "Extent")?);
+        if part != whole {
+            return Err(image.invalid("Extent", format!("{part:?}"), format!("{whole:?}, as the whole")));
+        }
+        let has_array = |name: &&String| arrays.iter().any(|array: &Array| array.is_active && array.name() == *name);
+        if let Some(name) = active_names.iter().find(|name| !has_array(name)) {
+            return Err(image.invalid("Scalars", name, "the name of an array that is there"));
+        }
+        Ok(Self { file, image, arrays, appended })
+    }
+
+    fn spacing(&self) -> Result<DVec3, VolumeError> {
+        self.image.value("Spacing", "three positive finite numbers", |text| {
+            let spacing = three(text.unwrap_or("1 1 1").split_whitespace().map(number))?;
+            spacing.iter().all(|&spacing| spacing > 0.0).then_some(DVec3::from_array(spacing))
+        })
+    }
+
+    /// Refuses axes that are no axes of a rectilinear grid.
+    fn check_direction(&self) -> Result<(), VolumeError> {
+        let Some(matrix) = self.image.value("Direction", "nine finite numbers", |text| match text {
+            None => Some(None),
+            Some(text) => {
+                let numbers = text.split_whitespace().map(number).collect::<Option<Vec<_>>>()?;
+                numbers.try_into().ok().map(|numbers| Some(DMat3::from_cols_array(&numbers)))
+            }
+        })?
+        else {
+            return Ok(());
+        };
+        // Row by row in the file.
+        let rows = matrix.transpose();
+        let directions = unit_directions([rows.x_axis, rows.y_axis, rows.z_axis]);
+        directions.map(drop).map_err(|(found, allowed)| self.image.invalid("Direction", found, allowed))
+    }
+
+    /// The array to read: the active one, else the first one of single numbers.
+    fn choose(&self) -> Result<&Array, VolumeError> {
+        let numbers: Vec<&Array> = self.arrays.iter().filter(|array| array.components() == "1").collect();
+        let active = numbers.iter().find(|array| array.is_active);
+        let of_points = numbers.iter().find(|array| !array.of_cells);
+        let Some(chosen) = active.or(of_points).or(numbers.first()) else {
+            let all = self.arrays.iter().map(|array| format!("{} ({} components)", array.name(), array.components()));
+            let found = format!("arrays {}", all.collect::<Vec<_>>().join(", "));
+            return Err(self.image.invalid("DataArray", found, "at least one with a number for each point or cell"));
+        };
+        if active.is_none() {
+            warn_of_choice(&self.image.path, numbers.iter().map(|array| array.name()), chosen.name());
+        }
+        Ok(chosen)
+    }
+
+    fn dims(&self, array: &Array) -> Result<UVec3, VolumeError> {
+        let extent = extent(&self.image, "WholeExtent")?;
+        let size = |axis: usize| {
+            let steps = extent[2 * axis + 1].checked_sub(extent[2 * axis])?;
+            // A flat grid has cells all the same.
+            if array.of_cells { Some(steps.max(1)) } else { steps.checked_add(1) }
+        };
+        let sizes = || dims_of([size(0)?, size(1)?, size(2)?]);
+        sizes().ok_or_else(|| self.image.invalid("WholeExtent", format!("{extent:?}"), SIZES))
+    }
+
+    /// The array's bytes.
+    fn open(&self, path: &Path, array: &Array, samples: &Samples) -> Result<Stream, VolumeError> {
+        let Array { fields, at, .. } = array;
+        let (at, encoding) = match (fields.get("format"), &self.appended) {
+            (Some("ascii"), _) => (*at, "ascii"),
+            (Some("binary"), _) => (*at, "base64"),
+            (Some("appended"), Some((appended, first))) => {
+                let offset = fields.value("offset", "a number of bytes", |text| text?.trim().parse::<u64>().ok())?;
+                let encodings = ["raw", "base64"];
+                let encoding = appended.value("encoding", "raw or base64", |text| {
+                    encodings.into_iter().find(|&encoding| Some(encoding) == text)
+                })?;
+                (first.saturating_add(offset), encoding)
+            }
+            (other, _) => {
+                let allowed = "ascii, binary, or, if there are appended data, appended";
+                return Err(fields.invalid("format", other.unwrap_or("none"), allowed));
+            }
+        };
+        let mut file = Source::open(path)?;
+        file.reader.seek(SeekFrom::Start(at)).map_err(io_error(path))?;
+        let left = file.left()?;
+        let (reader, expansion): (Box<dyn Read>, u64) = match encoding {
+            // A digit and a space.
+            "ascii" => (Box::new(Numbers::new(file.reader, samples.kind, &[])), samples.kind.bytes().div_ceil(2)),
+            "base64" => self.unpacked(Base64::new(file.reader), samples)?,
+            _ => self.unpacked(file.reader, samples)?,
+        };
+        Ok(Stream::decoded(
+            path,
+            reader,
+            "numbers, base64 or blocks as the header says",
+            left.saturating_mul(expansion),
+        ))
+    }
+
+    /// What comes after the array's own header, uncompressed, and how much more that may be.
+    fn unpacked(
+        &self,
+        mut reader: impl Read + 'static,
+        samples: &Samples,
+    ) -> Result<(Box<dyn Read>, u64), VolumeError> {
+        let bytes = self.file.value("header_type", "UInt32 or UInt64", |text| match text {
+            None | Some("UInt32") => Some(4),
+            Some("UInt64") => Some(8),
+            Some(_) => None,
+        })?;
+        let allowed = "vtkZLibDataCompressor or vtkLZ4DataCompressor";
+        let compressor = self.file.value("compressor", allowed, |text| match text {
+            None => Some(None),
+            Some("vtkZLibDataCompressor") => Some(Some(Compressor::Zlib)),
+            Some("vtkLZ4DataCompressor") => Some(Some(Compressor::Lz4)),
+            Some(_) => None,
+        })?;
+        let header = HeaderType { bytes, big_endian: samples.big_endian };
+        let damaged = |error| invalid(&self.file.path, "data", error, "as many bytes as the header says");
+        if let Some(compressor) = compressor {
+            let blocks = Blocks::new(reader, header, compressor, samples.bytes()).map_err(damaged)?;
+            return Ok((Box::new(blocks), compressor.max_expansion()));
+        }
+        let held = header.read(&mut reader).map_err(damaged)?;
+        if held != samples.bytes() {
+            return Err(samples.mismatch(&self.file.path, held));
+        }
+        Ok((Box::new(reader.take(held)), 1))
+    }
+}
+
+impl Array {
+    fn name(&self) -> &str {
+        self.fields.get("Name").unwrap_or("without a name")
+    }
+
+    fn components(&self) -> &str {
+        self.fields.get("NumberOfComponents").unwrap_or("1")
+    }
+}
+
+/// First and last point along x, y and z.
+fn extent(fields: &Fields, name: &str) -> Result<[i64; 6], VolumeError> {
+    fields.value(name, "six integers", |text| {
+        text?.split_whitespace().map(|number| number.parse().ok()).collect::<Option<Vec<_>>>()?.try_into().ok()
+    })
+}
+
+/// Skips what is before appended data: space, and an underscore. Gives the number of bytes, `None` if there is no underscore.
+fn underscore(reader: &mut impl BufRead) -> io::Result<Option<u64>> {
+    let mut skipped = 0;
+    loop {
+        match reader.fill_buf()?.first() {
+            Some(byte) if byte.is_ascii_whitespace() => {}
+            Some(b'_') => return Ok(Some(skipped + 1)),
+            _ => return Ok(None),
+        }
+        reader.consume(1);
+        skipped += 1;
+    }
+}

@@ -1,0 +1,136 @@
+//! Numbers in text.
+
+use std::io::{self, BufRead, Read};
+
+use super::super::samples::SampleType;
+
+/// No number is written with more bytes.
+const MAX_TOKEN: usize = 64;
+
+/// The numbers in a text, as the bytes of samples in the machine's byte order. The text ends at an XML tag, at one of the words that
+/// begin what may follow in the older files, or with the file.
+pub(super) struct Numbers<R> {
+    reader: R,
+    kind: SampleType,
+    /// Words that end the text.
+    keywords: &'static [&'static str],
+    token: Vec<u8>,
+    samples: Vec<u8>,
+    /// How many bytes of `samples` are read.
+    read: usize,
+    has_ended: bool,
+}
+
+impl<R: BufRead> Numbers<R> {
+    pub(super) fn new(reader: R, kind: SampleType, keywords: &'static [&'static str]) -> Self {
+        Self { reader, kind, keywords, token: Vec::new(), samples: Vec::new(), read: 0, has_ended: false }
+    }
+
+    /// Turns what is in the reader's buffer into samples, but for a number that may go on.
+    fn fill(&mut self) -> io::Result<()> {
+        self.samples.clear();
+        self.read = 0;
+        let buffer = self.reader.fill_buf()?;
+        if buffer.is_empty() {
+            self.has_ended = true;
+            if !self.token.is_empty() {
+                // It may have been a longer one.
+                return Err(io::Error::other("the end of the file after a digit, not after a line"));
+            }
+            return Ok(());
+        }
+        let length = buffer.len();
+        // Taken out, so that tokens can be finished meanwhile.
+        let buffer = buffer.to_vec();
+        for &byte in &buffer {
+            match byte {
+                b'<' => self.has_ended = true,
+                byte if !byte.is_ascii_whitespace() => {
+                    self.token.push(byte);
+                    if self.token.len() > MAX_TOKEN {
+                        return Err(self.no_number());
+                    }
+                    continue;
+                }
+                _ => {}
+            }
+            self.finish_token()?;
+            if self.has_ended {
+                break;
+            }
+        }
+        self.reader.consume(length);
+        Ok(())
+    }
+
+    fn finish_token(&mut self) -> io::Result<()> {
+        if self.token.is_empty() {
+            return Ok(());
+        }
+        let text = str::from_utf8(&self.token).unwrap_or_default();
+        if self.kind.parse(text, &mut self.samples).is_none() {
+            if !self.keywords.contains(&text) {
+                return Err(self.no_number());
+            }
+            self.has_ended = true;
+        }
+        self.token.clear();
+        Ok(())
+    }
+
+    fn no_number(&self) -> io::Error {
+        io::Error::other(format!("\"{}\", no number of type {}", self.token.escape_ascii(), self.kind))
+    }
+}
+
+impl<R: BufRead> Read for Numbers<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        while self.read == self.samples.len() && !self.has_ended {
+            self.fill()?;
+        }
+        let read = (&self.samples[self.read..]).read(buffer)?;
+        self.read += read;
+        Ok(read)
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use std::io::BufReader;
+
+    use super::*;
+
+    fn bytes(text: &str, kind: SampleType) -> io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        // A buffer that ends within numbers.
+        let text = format!("{text}\n");
+        let mut numbers = Numbers::new(BufReader::with_capacity(3, text.as_bytes()), kind, &["METADATA"]);
+        numbers.read_to_end(&mut bytes)?;
+        Ok(bytes)
+    }
+
+    #[test]
+    fn numbers_end_where_the_text_does() {
+        for text in ["1 -2\n300", " 1\t-2 300 ", "1 -2 300</DataArray>4", "1 -2 300\nMETADATA\n4"] {
+            let expected: Vec<u8> = [1_i16, -2, 300].iter().flat_map(|number| number.to_ne_bytes()).collect();
+            assert_eq!(bytes(text, SampleType::I16).unwrap(), expected, "{text}");
+        }
+        assert_eq!(bytes("1.5e2 nan", SampleType::F32).unwrap()[..4], 150.0_f32.to_ne_bytes());
+        assert_eq!(bytes("18446744073709551615", SampleType::U64).unwrap(), u64::MAX.to_ne_bytes());
+    }
+
+    #[test]
+    fn a_number_that_may_go_on_is_none() {
+        let message = Numbers::new("1 23".as_bytes(), SampleType::U8, &[]).read_to_end(&mut Vec::new()).unwrap_err();
+        assert!(message.to_string().contains("the end of the file after a digit"), "{message}");
+    }
+
+    #[test]
+    fn what_is_no_number_is_told() {
+        for text in ["1 300", "1 x", "1 1.5", "1 -1", &"1".repeat(1000), "1 é"] {
+            let message = bytes(text, SampleType::U8).unwrap_err().to_string();
+            assert!(message.contains("no number of type uint8"), "{text}: {message}");
+        }
+    }
+}

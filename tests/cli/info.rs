@@ -1,0 +1,86 @@
+//! `sheetsplat info`.
+
+use crate::*;
+
+/// What it prints.
+#[track_caller]
+fn info(folder: &Folder, arguments: &str) -> String {
+    let run = folder.run(&format!("info {arguments}"));
+    assert_eq!(run.code, Some(0), "{arguments}\n{}", run.stderr);
+    run.stdout
+}
+
+fn fixture(name: &str) -> String {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name).display().to_string()
+}
+
+#[test]
+fn json_has_the_files_facts() {
+    let folder = Folder::new();
+    let json = |arguments: &str| -> Value {
+        let text = info(&folder, &format!("{arguments} --json"));
+        assert_eq!(text.lines().count(), 1, "{text}");
+        serde_json::from_str(&text).unwrap()
+    };
+    let sform = json(&fixture("itk.nii.gz"));
+    assert_eq!(sform["format"], "NIfTI");
+    assert_eq!(sform["dims"], serde_json::json!([5, 4, 3]));
+    assert_eq!(sform["type"], "float64");
+    assert_eq!(sform["unit"], "mm");
+    for (spacing, expected) in sform["spacing"].as_array().unwrap().iter().zip([0.5, 2.0, 3.0]) {
+        assert!((spacing.as_f64().unwrap() - expected).abs() < 1e-6);
+    }
+    assert_eq!([&sform["min"], &sform["max"], &sform["mean"]], [0.0, 234.0, 117.0]);
+
+    // After slope and intercept, and by the arguments.
+    let sloped = json(&fixture("sform.nii"));
+    assert_eq!([&sloped["type"], &sloped["unit"]], [&Value::from("int16"), &Value::Null]);
+    assert_eq!([&sloped["min"], &sloped["max"], &sloped["mean"]], [-3.0, 114.0, 55.5]);
+    let values: Vec<u8> = (0..=255).flat_map(|value| [value; 4]).collect();
+    folder.write("a.bin", values);
+    let raw = json("a.bin --dims 32,32,1 --type uint8 --set volume.spacing=[1,2,3]");
+    assert_eq!(raw["format"], "raw");
+    assert_eq!(raw["spacing"], serde_json::json!([1.0, 2.0, 3.0]));
+    let percentiles = raw["percentiles"].as_object().unwrap();
+    let expected = [("0.1", 0.0), ("1", 2.0), ("5", 12.0), ("25", 64.0), ("50", 128.0), ("75", 191.0)];
+    for (name, value) in expected.into_iter().chain([("95", 243.0), ("99", 253.0), ("99.9", 255.0)]) {
+        assert_eq!(percentiles[name], value, "{name}");
+    }
+    assert_eq!(percentiles.len(), 9);
+}
+
+#[test]
+fn text_has_them_and_a_histogram() {
+    let folder = Folder::new();
+    let text = info(&folder, &fixture("series"));
+    let has = |line: &str| assert!(text.lines().any(|found| found == line), "no {line:?} in\n{text}");
+    has("format       DICOM");
+    has("type         int16");
+    has("dims         5 × 4 × 3");
+    has("spacing      0.5 × 2 × 3 mm");
+    has("orientation  x to the left (within 48°), y to the back (within 48°), z to the left (within 48°)");
+    has("range        0 to 234, mean 117");
+    has("       50 %  120");
+    has(&format!("0{:>63}", 234));
+    // Three slices a hundred apart.
+    let isos = text.lines().find_map(|line| line.strip_prefix("iso-values   ")).unwrap();
+    let isos: Vec<f64> = isos.trim_end_matches(" (suggested)").split(", ").map(|iso| iso.parse().unwrap()).collect();
+    assert!(isos.len() == 2 && (34.0..100.0).contains(&isos[0]) && (134.0..200.0).contains(&isos[1]), "{isos:?}");
+    let bars = |text: &str| text.chars().filter(|character| ('▁'..='█').contains(character)).count();
+    assert!(bars(&text) > 100, "{text}");
+
+    folder.write_nrrd("one.nrrd", [2, 2, 1], [1.0; 3], &[7.25; 4]);
+    let constant = info(&folder, "one.nrrd");
+    assert!(constant.contains("range        7.25 to 7.25, mean 7.25\n"), "{constant}");
+    assert!(constant.contains("orientation  not given\n") && constant.contains("1 × 1 × 1 (no unit)"), "{constant}");
+    assert!(!constant.contains("iso-values") && bars(&constant) == 0, "{constant}");
+    assert!(info(&folder, "builtin:cube").contains("format       builtin\n"));
+}
+
+#[test]
+fn what_is_no_volume_is_bad_input() {
+    let folder = Folder::new();
+    folder.run("info missing.nrrd").assert_failure(2, &["missing.nrrd"]);
+    folder.write("a.nii", "no volume");
+    folder.run("info a.nii --json").assert_failure(2, &["a.nii", "header", "9 bytes", "348 bytes"]);
+}

@@ -1,0 +1,138 @@
+//! What is drawn: volume files by name or by arguments, and the side they are seen from.
+
+use crate::*;
+
+const SIZE: &str = "--set image.width=16 --set image.height=12";
+
+/// `--view front` of the patients below.
+const FRONT: &str = "--set camera.direction=[0,0,-1] --set camera.up=[0,1,0]";
+
+/// The same volume three times: x runs to the patient's left, y to the head, z to the front; x runs to the right; nobody knows.
+fn with_patients() -> Folder {
+    let folder = Folder::new();
+    let values: Vec<u8> = (0..60).map(|i| (i * 4) as u8).collect();
+    let axes = "space: LPS\nspace directions: (1,0,0) (0,0,2) (0,-1,0)";
+    let write = |name: &str, axes: &str| {
+        let header = format!("NRRD0004\ntype: uint8\ndimension: 3\nsizes: 5 4 3\n{axes}\nencoding: raw\n\n");
+        folder.write(name, [header.as_bytes(), &values].concat());
+    };
+    write("lying.nrrd", axes);
+    write("mirrored.nrrd", &axes.replace("LPS", "LAS"));
+    write("nowhere.nrrd", "spacings: 1 2 1");
+    folder
+}
+
+#[test]
+fn views_are_the_anatomys() {
+    let folder = with_patients();
+    let (size, front) = (SIZE, FRONT);
+    let plain = folder.pixels(&format!("nowhere.nrrd {size} {front}"));
+    assert_eq!(folder.pixels(&format!("lying.nrrd {size} --view front")), plain);
+    assert_eq!(folder.pixels(&format!("lying.nrrd {size} --view front --set camera.direction=[1,0,0]")), plain);
+    assert_ne!(folder.pixels(&format!("lying.nrrd {size} --view back")), plain);
+    let mirrored = folder.run(&format!("render mirrored.nrrd {size} --view front -o out.png"));
+    mirrored.assert_success();
+    assert!(mirrored.stderr.contains("mirrored.nrrd: --view: the axes are left-handed"), "{}", mirrored.stderr);
+    let found = ["nowhere.nrrd", "--view", "no orientation", "camera.direction"];
+    folder.run(&format!("render nowhere.nrrd {size} --view front -o out.png")).assert_failure(2, &found);
+    folder
+        .run(&format!("render lying.nrrd {size} --view above -o out.png"))
+        .assert_failure(2, &["above", "top, bottom"]);
+}
+
+/// Frames, tiles and times begin where a picture does.
+#[test]
+fn every_subcommand_takes_views() {
+    let folder = with_patients();
+    let orbit = |name: &str, arguments: &str| {
+        folder.run(&format!("orbit {arguments} {SIZE} --count 3 -o {name}-%d.npy")).assert_success();
+        [0, 1, 2].map(|frame| folder.read_npy(&format!("{name}-{frame}.npy")))
+    };
+    let frames = orbit("view", "lying.nrrd --view front");
+    assert_eq!(frames, orbit("camera", &format!("nowhere.nrrd {FRONT}")));
+    assert_eq!(frames[0], folder.pixels(&format!("lying.nrrd {SIZE} --view front")));
+
+    let swept = "--set splatting.slab_width=1,2";
+    let sweep = |arguments: &str| {
+        let run = folder.run(&format!("sweep {arguments} {SIZE} -o sheet.npy"));
+        run.assert_success();
+        (folder.read_npy("sheet.npy"), run.stderr)
+    };
+    let (sheet, _) = sweep(&format!("nowhere.nrrd {FRONT} {swept}"));
+    assert_eq!(sweep(&format!("lying.nrrd --view front {swept}")).0, sheet);
+    let (_, warning) = sweep(&format!("mirrored.nrrd --view front {swept}"));
+    assert_eq!(warning.matches("left-handed").count(), 1, "{warning}");
+    let both = "--view front --set camera.up=[0,0,1],[1,0,0]";
+    folder.run(&format!("sweep lying.nrrd {both} -o out.npy")).assert_failure(2, &["--view", "camera.up"]);
+
+    let found = ["nowhere.nrrd", "--view", "no orientation"];
+    folder.run("bench nowhere.nrrd --view front").assert_failure(2, &found);
+}
+
+#[test]
+fn raw_files_are_what_the_arguments_say() {
+    let folder = Folder::new();
+    let values: Vec<f32> = (0..60).map(|i| (i * 4) as f32).collect();
+    folder.write_nrrd("a.nrrd", [5, 4, 3], [1.0, 1.0, 2.0], &values);
+    folder.write("a.raw", values.iter().flat_map(|&value| (value as u16).to_be_bytes()).collect::<Vec<u8>>());
+    let size = SIZE;
+    let plain = folder.pixels(&format!("a.nrrd {size}"));
+    let raw = format!("a.raw {size} --type uint16 --endian big --spacing 1,1,2");
+    assert_eq!(folder.pixels(&format!("{raw} --dims 5,4,3")), plain);
+    assert_eq!(
+        folder.pixels(&format!("{raw} --dims 5,4,2 --offset 40 --set volume.offset=0 --set volume.dims=[5,4,3]")),
+        plain
+    );
+    folder.run(&format!("orbit {raw} --dims 5,4,3 --count 1 -o frame-%d.npy")).assert_success();
+    assert_eq!(folder.read_npy("frame-0.npy"), plain);
+    let refused = |arguments: &str, words: &[&str]| {
+        folder.run(&format!("render {arguments} -o out.png")).assert_failure(2, words);
+    };
+    refused(&format!("a.raw {size}"), &["a.raw", "format", "\".raw\"", "volume.dims"]);
+    refused(&raw, &["--set", "volume.dims", "no such key"]);
+    refused(&format!("{raw} --dims 5,4"), &["--set", "volume.dims", "[5, 4]", "three positive integers"]);
+    refused(&format!("{raw} --dims 5,4,2"), &["a.raw", "data", "120 bytes", "80 bytes"]);
+    refused("a.raw --dims 5,4,3 --type half", &["--set", "volume.type", "half", "uint16"]);
+}
+
+/// What a file does not say, or says otherwise than a grid can be, is told with what is made of it.
+#[test]
+fn warnings_state_what_is_assumed() {
+    let folder = Folder::new();
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
+    let warned = |input: &str, words: &str| {
+        let run = folder.run(&format!("render {input} {SIZE} -o out.npy"));
+        run.assert_success();
+        assert!(run.stderr.contains(words), "{}", run.stderr);
+    };
+    let fixture = |name: &str| fixtures.join(name).display().to_string();
+    warned(&fixture("plain.tif"), "plain.tif: no distance between slices is given: taken to be 0.5 mm");
+    let movie = fs::read(fixture("imagej.tif")).unwrap();
+    let at = movie.windows(8).position(|window| window == b"slices=3").unwrap();
+    folder.write("movie.tif", [&movie[..at], b"frames=3", &movie[at + 8..]].concat());
+    warned("movie.tif", "movie.tif: the description says 3 frames: taken to be slices");
+    warned(&fixture("series/IM1"), "IM1: one slice; a folder with all slices of a series is read as one volume");
+
+    // The slice in the middle a twentieth of a step up.
+    fs::create_dir(folder.path("series")).unwrap();
+    for name in ["IM1", "IM2", "IM3.dcm"] {
+        fs::copy(fixtures.join("series").join(name), folder.path("series").join(name)).unwrap();
+    }
+    let slice = folder.read("series/IM3.dcm");
+    let position = b"DS\x10\x0012.0\\-21.5\\32.0  ";
+    let at = slice.windows(position.len()).position(|window| window == position).unwrap();
+    let shifted = [&slice[..at], b"DS\x10\x0012.1\\-21.55\\32.1 ", &slice[at + position.len()..]].concat();
+    folder.write("series/IM3.dcm", shifted);
+    warned(
+        "series",
+        "series: slices are not evenly spaced: taken to be 3.0000 mm apart, which is wrong by up to 0.1500 mm",
+    );
+
+    // Numbers that leave one out.
+    fs::create_dir(folder.path("slices")).unwrap();
+    for (from, to) in [(8, 8), (9, 9), (10, 11)] {
+        let from = fixtures.join(format!("slices/z{from}.tif"));
+        fs::copy(from, folder.path(&format!("slices/z{to}.tif"))).unwrap();
+    }
+    warned("slices", "slices: the slices' numbers go up by [1, 2]: taken as neighbours, none is left out");
+}

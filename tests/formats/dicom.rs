@@ -1,0 +1,276 @@
+//! DICOM, as pydicom writes it; and series that are none.
+
+use sheetsplat::volume::{Encoding, Labels, SampleType};
+
+use crate::*;
+
+const RAS_FROM_LPS: DVec3 = DVec3::new(-1.0, -1.0, 1.0);
+const FRAMES: [&str; 7] =
+    ["frames.dcm", "implicit.dcm", "undefined.dcm", "big.dcm", "float.dcm", "rle.dcm", "jpeg-lossless.dcm"];
+
+#[track_caller]
+fn assert_lies_as_written(volume: &Volume) {
+    assert_lies(volume, DMat3::from_diagonal(RAS_FROM_LPS) * rotation(), RAS_FROM_LPS * ORIGIN);
+    assert_eq!(volume.unit(), Some("mm"));
+}
+
+/// Slices in files without endings, in an order that neither names nor numbers tell, each with its own slope; a report among them.
+#[test]
+fn series_of_pydicom() {
+    let volume = open("series");
+    assert_lies_as_written(&volume);
+    assert_eq!(volume.encoding(), Some(Encoding { format: "DICOM", sample_type: SampleType::I16 }));
+    let labels = Labels::open(&fixture("series")).unwrap();
+    assert!(labels.values.iter().map(|&label| f32::from(label)).eq(values()));
+}
+
+#[test]
+fn frames_of_pydicom() {
+    use SampleType::{F32, I16, U16, U32};
+    for (name, kind) in FRAMES.into_iter().zip([U16, I16, U32, U16, F32, U16, U16]) {
+        let volume = open(name);
+        assert_lies_as_written(&volume);
+        assert_eq!(volume.encoding().unwrap().sample_type, kind, "{name}");
+    }
+}
+
+#[test]
+fn one_slice_is_as_thick_as_it_says() {
+    let volume = Volume::open(&fixture("series/IM2")).unwrap();
+    assert_eq!((volume.dims(), volume.values()), (DIMS.with_z(1), &values()[..20]));
+    assert_near(volume.spacing(), SPACING.with_z(9.0));
+    let report = Volume::open(&fixture("series/report"));
+    assert_refused(report, "report", "PixelData", "no such element", "an image");
+}
+
+/// A slice of 3 × 2 pixels, as text and as numbers of 16 bits.
+#[derive(Clone)]
+struct Slice {
+    text: Vec<(u16, u16, &'static [u8; 2], String)>,
+    numbers: Vec<(u16, u16, u16)>,
+    samples: Vec<u16>,
+}
+
+/// Elements that the tests change.
+const SERIES: (u16, u16) = (0x20, 0x0e);
+const POSITION: (u16, u16) = (0x20, 0x32);
+const ORIENTATION: (u16, u16) = (0x20, 0x37);
+const FRAME_COUNT: (u16, u16) = (0x28, 0x08);
+const PIXEL_SPACING: (u16, u16) = (0x28, 0x30);
+const SLOPE: (u16, u16) = (0x28, 0x1053);
+
+impl Slice {
+    fn at(z: f64) -> Self {
+        let text = [
+            (0x08, 0x60, b"CS", "CT"),
+            (0x08, 0x103e, b"LO", "a chest"),
+            (0x20, 0x0e, b"UI", "1.2.3"),
+            (0x20, 0x37, b"DS", "1\\0\\0\\0\\1\\0"),
+            (0x28, 0x04, b"CS", "MONOCHROME2"),
+            (0x28, 0x30, b"DS", "0.5\\0.5"),
+        ];
+        let slice = Self {
+            text: text.map(|(group, element, kind, text)| (group, element, kind, text.to_owned())).to_vec(),
+            numbers: vec![
+                (0x28, 0x02, 1),
+                (0x28, 0x10, 2),
+                (0x28, 0x11, 3),
+                (0x28, 0x100, 16),
+                (0x28, 0x101, 16),
+                (0x28, 0x102, 15),
+                (0x28, 0x103, 0),
+            ],
+            samples: (0..6).map(|i| 10 * z as u16 + i).collect(),
+        };
+        slice.with(POSITION, &format!("1\\2\\{z}"))
+    }
+
+    fn with(mut self, (group, element): (u16, u16), text: &str) -> Self {
+        self.text.retain(|&(g, e, ..)| (g, e) != (group, element));
+        if !text.is_empty() {
+            self.text.push((group, element, b"DS", text.to_owned()));
+        }
+        self
+    }
+
+    fn number(mut self, group: u16, element: u16, number: u16) -> Self {
+        self.numbers.retain(|&(g, e, _)| (g, e) != (group, element));
+        self.numbers.push((group, element, number));
+        self
+    }
+
+    fn bytes(&self) -> Vec<u8> {
+        let element = |group: u16, element: u16, kind: &[u8], value: &[u8]| {
+            let length = (value.len() as u16).to_le_bytes();
+            [&group.to_le_bytes(), &element.to_le_bytes(), kind, &length, value].concat()
+        };
+        let mut bytes = [&[0; 128], &b"DICM"[..], &element(2, 0x10, b"UI", b"1.2.840.10008.1.2.1\0")].concat();
+        let even = |text: &str| [text, if text.len() % 2 == 1 { " " } else { "" }].concat();
+        for (group, number, kind, text) in &self.text {
+            bytes.extend(element(*group, *number, &kind[..], even(text).as_bytes()));
+        }
+        for &(group, number, value) in &self.numbers {
+            bytes.extend(element(group, number, b"US", &value.to_le_bytes()));
+        }
+        bytes.extend([0xe0, 0x7f, 0x10, 0x00, b'O', b'W', 0, 0]);
+        bytes.extend((2 * self.samples.len() as u32).to_le_bytes());
+        bytes.extend(self.samples.iter().flat_map(|sample| sample.to_le_bytes()));
+        bytes
+    }
+}
+
+/// Opens the folder of some slices, which are named `0`, `1`, …
+fn series(slices: &[Slice]) -> Result<Volume, VolumeError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("series");
+    fs::create_dir(&path).unwrap();
+    for (number, slice) in slices.iter().enumerate() {
+        fs::write(path.join(number.to_string()), slice.bytes()).unwrap();
+    }
+    Volume::open(&path)
+}
+
+fn at(places: &[f64]) -> Vec<Slice> {
+    places.iter().map(|&z| Slice::at(z)).collect()
+}
+
+#[test]
+fn places_order_and_space_slices() {
+    let volume = series(&at(&[4.0, 0.0, 6.0, 2.0])).unwrap();
+    assert_eq!((volume.dims(), volume.spacing()), (UVec3::new(3, 2, 4), DVec3::new(0.5, 0.5, 2.0)));
+    let expected: Vec<f32> = (0..24).map(|i| (20 * (i / 6) + i % 6) as f32).collect();
+    assert_eq!(volume.values(), expected);
+    // From the head down: the normal points up all the same.
+    assert_near(volume.orientation().unwrap().origin, DVec3::new(-1.0, -2.0, 0.0));
+    let names: Vec<Slice> = at(&[0.0, 3.0]).into_iter().map(|slice| slice.with(SLOPE, "2")).collect();
+    assert!(series(&names).unwrap().values().iter().zip([0, 1, 2, 3, 4, 5, 30]).all(|(&v, e)| v == 2.0 * e as f32));
+}
+
+#[test]
+fn uneven_places_are_gaps_or_about_even() {
+    let refused = |places: &[f64], found: &str| {
+        let allowed = "slices at even distances, one at each place";
+        assert_refused(series(&at(places)), "series", "ImagePositionPatient", found, allowed);
+    };
+    refused(&[0.0, 2.0, 4.0, 8.0, 10.0], "4.0000 mm between 2 and 3, 2.0000 mm between others");
+    refused(&[0.0, 2.0, 4.0, 4.0], "0.0000 mm between 2 and 3, 2.0000 mm between others");
+    refused(&[0.0, 2.0, 4.0, 5.0], "1.0000 mm between 2 and 3");
+    refused(&[1.0, 1.0], "0.0000 mm between 0 and 1");
+    // Off by a tenth of a step; a warning says so.
+    let volume = series(&at(&[0.0, 2.2, 4.0, 6.0])).unwrap();
+    assert_eq!(volume.spacing().z, 2.0);
+}
+
+#[test]
+fn sheared_stacks_are_refused() {
+    let shifted = |shift: f64| {
+        let slice = |z: f64| Slice::at(z).with(POSITION, &format!("1\\{}\\{z}", 2.0 + shift * z));
+        series(&[slice(0.0), slice(2.0), slice(4.0)])
+    };
+    let allowed = "slices straight above one another";
+    assert_refused(shifted(0.1), "series", "ImagePositionPatient", "2 being 0.4000 mm off (a tilted gantry?)", allowed);
+    assert_eq!(shifted(0.001).unwrap().dims().z, 3);
+    // Slices tilted about x that are stacked along z.
+    let tilted: Vec<Slice> =
+        at(&[0.0, 2.0, 4.0]).into_iter().map(|slice| slice.with(ORIENTATION, "1\\0\\0\\0\\0.8\\0.6")).collect();
+    assert_refused(series(&tilted), "series", "ImagePositionPatient", "a sheared stack, 2 being 2.4000 mm", allowed);
+    let skew: Vec<Slice> =
+        at(&[0.0, 2.0]).into_iter().map(|slice| slice.with(ORIENTATION, "1\\0\\0\\0.1\\0.995\\0")).collect();
+    assert_refused(series(&skew), "series", "ImageOrientationPatient", "not orthogonal", "orthogonal axes");
+}
+
+#[test]
+fn mixed_series_are_listed() {
+    let mut slices = at(&[0.0, 2.0, 4.0]);
+    slices[1] = Slice::at(2.0).with(SERIES, "1.2.4").with((0x08, 0x103e), "scout");
+    let found = "2 series: 2 of CT a chest (1.2.3), 1 of CT scout (1.2.4)";
+    assert_refused(series(&slices), "series", "SeriesInstanceUID", found, "the slices of one series");
+    slices[1] = Slice::at(2.0).with(ORIENTATION, "0\\1\\0\\0\\0\\1").with(PIXEL_SPACING, "1\\2");
+    let found =
+        "2 of 3 × 2, 0.5 × 0.5 mm, along [1, 0, 0] and [0, 1, 0]; 1 of 3 × 2, 2 × 1 mm, along [0, 1, 0] and [0, 0, 1]";
+    assert_refused(series(&slices), "series", "slices", found, "one orientation");
+    let mut slices = at(&[0.0, 2.0]);
+    slices[0] = Slice::at(0.0).number(0x28, 0x10, 3).number(0x28, 0x11, 2);
+    assert_refused(series(&slices), "series", "slices", "1 of 2 × 3", "slices of one size");
+}
+
+#[test]
+fn wrong_elements() {
+    let refused = |slice: Slice, field: &str, found: &str, allowed: &str| {
+        assert_refused(Folder::new().open("a.dcm", &slice.bytes()), "a.dcm", field, found, allowed);
+    };
+    let slice = || Slice::at(1.0);
+    refused(slice().with(POSITION, ""), "ImagePositionPatient", "no such element", "where the image lies");
+    refused(slice().with(POSITION, "1\\2"), "ImagePositionPatient", "1\\\\2", "finite numbers, 3 of them");
+    refused(slice().with(ORIENTATION, "1\\0\\0\\0\\1\\x"), "ImageOrientationPatient", "x", "6 of them");
+    refused(slice().with(ORIENTATION, "0\\0\\0\\0\\1\\0"), "ImageOrientationPatient", "lengths [0.0", "orthogonal");
+    refused(slice().with(PIXEL_SPACING, ""), "PixelSpacing", "no such element", "distances between pixels");
+    refused(slice().with(PIXEL_SPACING, "0\\1"), "PixelSpacing", "[0, 1]", "two positive numbers");
+    refused(slice().with(SLOPE, "inf"), "RescaleSlope", "inf", "finite numbers");
+    refused(slice().with(FRAME_COUNT, "0"), "NumberOfFrames", "0", "a positive integer");
+    refused(slice().with(FRAME_COUNT, "3"), "PixelData", "12 bytes", "36 bytes (3 frames of 3 × 2 uint16)");
+    refused(slice().number(0x28, 0x02, 3), "SamplesPerPixel", "3", "1");
+    refused(slice().with((0x28, 0x04), "PALETTE COLOR"), "PhotometricInterpretation", "PALETTE", "MONOCHROME1");
+    refused(slice().number(0x28, 0x10, 0), "Rows", "0", "at least 1");
+    refused(slice().number(0x28, 0x10, 3), "PixelData", "12 bytes", "18 bytes");
+    refused(slice().number(0x28, 0x10, 1), "PixelData", "12 bytes", "6 bytes");
+    refused(slice().number(0x28, 0x100, 12), "BitsAllocated", "12", "8, 16 or 32");
+    refused(slice().number(0x28, 0x101, 17), "BitsStored", "17", "1 to 16");
+    refused(slice().number(0x28, 0x102, 11), "HighBit", "11", "15, the highest of 16");
+    let frames = Slice { samples: vec![0; 12], ..slice().with(FRAME_COUNT, "2") };
+    refused(frames, "PerFrameFunctionalGroupsSequence", "0 items", "2, one per frame");
+
+    let folder = Folder::new();
+    let open = |name: &str, text: &str, instead: &str| folder.open("a.dcm", &replaced(name, text, instead));
+    let syntax =
+        |result, found: &str, allowed: &str| assert_refused(result, "a.dcm", "TransferSyntaxUID", found, allowed);
+    syntax(open("rle.dcm", "1.2.840.10008.1.2.5\0", "1.2.840.10008.1.2.9\0"), "1.2.9", ".5 (RLE)");
+    syntax(open("jpeg-lossless.dcm", "1.2.4.70", "1.2.4.90"), "1.2.840.10008.1.2.4.90", ".4.70 (JPEG)");
+    syntax(open("jpeg-lossless.dcm", "1.2.4.70", "1.2.1.99"), "1.2.840.10008.1.2.1.99", "compress the whole file");
+    assert_refused(open("rle.dcm", "1.2.5\0", "1.2.1\0"), "a.dcm", "PixelData", "fragments", "bare samples");
+    assert_refused(open("frames.dcm", "DICM", "DICN"), "a.dcm", "magic", "DICN", "DICM after 128 bytes");
+    assert_refused(open("frames.dcm", "1.2.1\0", "1.2.5\0"), "a.dcm", "PixelData", "bare samples", "frames as the");
+}
+
+/// Frames that are damaged, and frames that are not those that the file says.
+#[test]
+fn wrong_frames() {
+    let folder = Folder::new();
+    let open = |name: &str, text: &str, instead: &str| folder.open("a.dcm", &replaced(name, text, instead));
+    let columns = |count: u8| ["\x28\0\x11\0US\x02\0", &char::from(count).to_string(), "\0"].concat();
+    let allowed = "a frame of 6 × 4 uint16";
+    let rle = open("rle.dcm", &columns(5), &columns(6));
+    assert_refused(rle, "a.dcm", "PixelData", "20 samples in a segment, not 24", allowed);
+    let jpeg = open("jpeg-lossless.dcm", &columns(5), &columns(6));
+    assert_refused(jpeg, "a.dcm", "PixelData", "5 × 4 samples of 2 bytes", allowed);
+}
+
+#[test]
+fn damage() {
+    for name in FRAMES.into_iter().chain(["series/IM2"]) {
+        let name_of_copy = name.rsplit('/').next().unwrap();
+        let whole = fs::read(fixture(name)).unwrap();
+        let folder = Folder::new();
+        let values = Volume::open(&fixture(name)).unwrap().values().to_vec();
+        for length in 0..whole.len() {
+            if let Ok(volume) = folder.open(name_of_copy, &whole[..length]) {
+                assert_eq!(volume.values(), values, "{name}: {length} bytes");
+            }
+        }
+        assert_eq!(folder.open(name_of_copy, &[&whole[..], b"padding"].concat()).unwrap().values(), values, "{name}");
+    }
+}
+
+/// Lengths of 4 GiB, and sequences in sequences without end.
+#[test]
+fn lies_cost_nothing() {
+    let start = std::time::Instant::now();
+    let folder = Folder::new();
+    let head = [&[0; 128], &b"DICM\x02\0\x10\0UI\x14\x001.2.840.10008.1.2.1\0"[..]].concat();
+    let long = [&head[..], b"\x08\0\0\0UT\0\0\xfe\xff\xff\xff"].concat();
+    assert_refused(folder.open("a.dcm", &long), "a.dcm", "element (0008,0000)", "4294967294 bytes", "at most the 0");
+    let nested = b"\x08\0\x11\x11SQ\0\0\xff\xff\xff\xff\xfe\xff\0\xe0\xff\xff\xff\xff".repeat(100_000);
+    let nested = [&head[..], &nested].concat();
+    assert_refused(folder.open("a.dcm", &nested), "a.dcm", "elements", "more sequences", "32 of them");
+    assert!(start.elapsed().as_secs() < 5);
+}

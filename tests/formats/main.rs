@@ -1,0 +1,122 @@
+//! Readers of formats other than NRRD: files that other programs wrote (`tests/fixtures/make.py`), voxel for voxel, and files that are
+//! damaged or lie.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+mod dicom;
+mod dispatch;
+mod metaimage;
+mod nifti;
+mod npy;
+mod raw;
+mod tiff;
+mod vtk;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use glam::{DMat3, DVec3, UVec3};
+use sheetsplat::volume::{Orientation, Volume, VolumeError};
+use tempfile::TempDir;
+
+/// Of every fixture.
+const DIMS: UVec3 = UVec3::new(5, 4, 3);
+/// Of those that have one.
+const SPACING: DVec3 = DVec3::new(0.5, 2.0, 3.0);
+const ORIGIN: DVec3 = DVec3::new(10.0, -20.5, 30.0);
+
+/// Of those that are rotated, whose axes are those of no space.
+fn rotation() -> DMat3 {
+    let third = |x: f64, y: f64, z: f64| DVec3::new(x, y, z) / 3.0;
+    DMat3::from_cols(third(2.0, 2.0, -1.0), third(-1.0, 2.0, 2.0), third(2.0, -1.0, 2.0))
+}
+
+/// The values of every fixture, before slope and intercept.
+fn values() -> Vec<f32> {
+    (0..60).map(|i| (i % 5 + 10 * (i / 5 % 4) + 100 * (i / 20)) as f32).collect()
+}
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
+}
+
+/// Opens a fixture and compares every voxel.
+#[track_caller]
+fn open(name: &str) -> Volume {
+    let volume = Volume::open(&fixture(name)).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!((volume.dims(), volume.values()), (DIMS, values().as_slice()), "{name}");
+    volume
+}
+
+#[track_caller]
+fn assert_near(found: DVec3, expected: DVec3) {
+    assert!((found - expected).abs().max_element() < 1e-5, "{found}, not {expected}");
+}
+
+/// Asserts spacing, axes and origin, these in RAS.
+#[track_caller]
+fn assert_lies(volume: &Volume, axes: DMat3, origin: DVec3) {
+    let &Orientation { axes: found, origin: first } = volume.orientation().unwrap();
+    for i in 0..3 {
+        assert_near(found.col(i), axes.col(i));
+    }
+    assert_near(first, origin);
+    assert_near(volume.spacing(), SPACING);
+}
+
+/// A folder for one test's files.
+struct Folder(TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn open(&self, name: &str, bytes: &[u8]) -> Result<Volume, VolumeError> {
+        let path = self.0.path().join(name);
+        // Written over, a file may be waited for until it is on the disk; a new one is not.
+        _ = fs::remove_file(&path);
+        fs::write(&path, bytes).unwrap();
+        Volume::open(&path)
+    }
+}
+
+/// A fixture's bytes with some replaced.
+fn patched(name: &str, at: usize, bytes: &[u8]) -> Vec<u8> {
+    let mut all = fs::read(fixture(name)).unwrap();
+    all[at..at + bytes.len()].copy_from_slice(bytes);
+    all
+}
+
+/// A fixture's bytes with other text in place of some.
+#[track_caller]
+fn replaced(name: &str, text: &str, instead: &str) -> Vec<u8> {
+    let bytes = fs::read(fixture(name)).unwrap();
+    let at = bytes.windows(text.len()).position(|window| window == text.as_bytes());
+    let at = at.unwrap_or_else(|| panic!("{name}: no {text}"));
+    [&bytes[..at], instead.as_bytes(), &bytes[at + text.len()..]].concat()
+}
+
+/// Asserts that the message names the file, the field, what was found and what is allowed.
+#[track_caller]
+fn assert_refused(result: Result<Volume, VolumeError>, file: &str, field: &str, found: &str, allowed: &str) {
+    let error = result.expect_err("a volume");
+    let message = error.to_string();
+    let VolumeError::Invalid { origin, field: at, found: what, allowed: instead } = error else { panic!("{message}") };
+    assert!(origin.ends_with(file), "{message}");
+    assert_eq!(at, field, "{message}");
+    assert!(what.contains(found), "found {found:?}: {message}");
+    assert!(instead.contains(allowed), "allowed {allowed:?}: {message}");
+}
+
+/// Asserts that no beginning of a file is a volume, and that a longer file is none.
+fn assert_exact(name: &str, whole: &[u8]) {
+    let folder = Folder::new();
+    assert!(folder.open(name, whole).is_ok(), "{name}");
+    for length in 0..whole.len() {
+        let result = folder.open(name, &whole[..length]);
+        assert!(result.is_err(), "{name}: {length} of {} bytes", whole.len());
+    }
+    let longer = [whole, b"\n"].concat();
+    assert!(matches!(folder.open(name, &longer), Err(VolumeError::Invalid { .. })), "{name}: one byte more");
+}

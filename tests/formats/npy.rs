@@ -1,0 +1,101 @@
+//! NPY, as NumPy writes it.
+
+use sheetsplat::volume::Labels;
+
+use crate::*;
+
+const HEADER: &str = "{'descr': '<i2', 'fortran_order': False, 'shape': (3, 4, 5), }\n";
+
+fn npy(header: &str) -> Vec<u8> {
+    let data: Vec<u8> = values().iter().flat_map(|&value| (value as i16).to_le_bytes()).collect();
+    [b"\x93NUMPY\x01\x00", &(header.len() as u16).to_le_bytes()[..], header.as_bytes(), &data].concat()
+}
+
+#[test]
+fn of_numpy() {
+    for (name, order) in [("c.npy", "False"), ("fortran-big.npy", "True"), ("version2.npy", "False")] {
+        let header = String::from_utf8_lossy(&fs::read(fixture(name)).unwrap()).into_owned();
+        assert!(header.contains(&format!("'fortran_order': {order}")), "{name}");
+        let volume = open(name);
+        assert_eq!((volume.spacing(), volume.orientation()), (DVec3::ONE, None));
+    }
+}
+
+#[test]
+fn labels() {
+    let labels = Labels::open(&fixture("fortran-big.npy")).unwrap();
+    assert_eq!(labels.spacing, None);
+    assert!(labels.values.iter().map(|&label| f32::from(label)).eq(values()));
+}
+
+/// A label that is none is named by its voxel, whatever the order.
+#[test]
+fn voxels_by_either_order() {
+    let folder = Folder::new();
+    let path = folder.0.path().join("a.npy");
+    let header = HEADER.len() + 10;
+    // The sample after the tenth: in C order of row 2, in Fortran order of the plane x = 0.
+    for (fortran, voxel) in [("False", "[1, 2, 0]"), ("True ", "[0, 3, 2]")] {
+        let mut bytes = npy(&HEADER.replace("False", fortran));
+        bytes[header + 22..][..2].copy_from_slice(&(-1_i16).to_le_bytes());
+        fs::write(&path, bytes).unwrap();
+        let error = Labels::open(&path).unwrap_err().to_string();
+        assert!(error.contains(&format!("data: found -1 at voxel {voxel}")), "{error}");
+    }
+}
+
+#[test]
+fn non_finite_values_name_the_voxel() {
+    let folder = Folder::new();
+    let mut bytes = fs::read(fixture("version2.npy")).unwrap();
+    let at = bytes.len() - 60 * 8 + 27 * 8;
+    bytes[at..at + 8].copy_from_slice(&f64::NAN.to_le_bytes());
+    assert_refused(folder.open("a.npy", &bytes), "a.npy", "data", "NaN at voxel [2, 1, 1]", "finite values");
+}
+
+#[test]
+fn wrong_headers() {
+    let folder = Folder::new();
+    assert_eq!(folder.open("a.npy", &npy(HEADER)).unwrap().values(), values());
+    let spread = "{ 'shape' : (3,4,5),'fortran_order':False , 'descr' :'<i2'}";
+    assert_eq!(folder.open("a.npy", &npy(spread)).unwrap().values(), values());
+    for (from, to, field, found, allowed) in [
+        ("<i2", "<f2", "descr", "'<f2'", "f4, f8"),
+        ("<i2", "|i2", "descr", "'|i2'", "'<', '>' or '|'"),
+        ("<i2", "<c8", "descr", "'<c8'", "f4, f8"),
+        ("<i2", "", "descr", "''", "f4, f8"),
+        ("<i2", "é", "descr", "'é'", "f4, f8"),
+        ("'<i2'", "[('a', '<i2')]", "descr", "[('a'", "f4, f8"),
+        ("'descr'", "'description'", "descr", "none in", "f4, f8"),
+        ("False", "0", "fortran_order", "0", "True or False"),
+        ("(3, 4, 5)", "(12, 5)", "shape", "(12, 5)", "three dimensions z, y, x"),
+        ("(3, 4, 5)", "(3, 4, 5, 1)", "shape", "(3, 4, 5, 1)", "three dimensions z, y, x"),
+        ("(3, 4, 5)", "(3, 0, 5)", "shape", "(3, 0, 5)", "three positive integers"),
+        ("(3, 4, 5)", "(65536, 65536, 1)", "shape", "65536", "at most 4294967295 voxels"),
+        ("(3, 4, 5)", "(1600, 1600, 1600)", "data", "120 bytes", "8192000000 bytes"),
+        ("(3, 4, 5)", "(3, 4, 4)", "data", "120 bytes", "96 bytes"),
+        ("}", "", "descr", "none in", "f4, f8"),
+    ] {
+        assert!(HEADER.contains(from), "{from}");
+        assert_refused(folder.open("a.npy", &npy(&HEADER.replace(from, to))), "a.npy", field, found, allowed);
+    }
+    let brackets = format!("{{'shape': {}", "(".repeat(60_000));
+    assert_refused(folder.open("a.npy", &npy(&brackets)), "a.npy", "descr", "none in", "f4, f8");
+    for (at, bytes, field, found) in [
+        (6, &[4, 0][..], "magic", "\\x04"),
+        (6, &[2, 0, 0xff, 0xff, 0xff, 0xff][..], "header", "4294967295 bytes"),
+        (6, &[2, 0, 0xff, 0xff, 0, 0][..], "header", "bytes"),
+    ] {
+        let mut file = npy(HEADER);
+        file[at..at + bytes.len()].copy_from_slice(bytes);
+        assert_refused(folder.open("a.npy", &file), "a.npy", field, found, "");
+    }
+}
+
+#[test]
+fn damage() {
+    for name in ["c.npy", "fortran-big.npy", "version2.npy"] {
+        let whole = fs::read(fixture(name)).unwrap();
+        assert_exact(name, &whole);
+    }
+}

@@ -1,0 +1,197 @@
+//! Mutated files: every reader, and the scene parser, give a whole volume or an error, do not panic or hang, and take no more memory
+//! than the file's size warrants.
+//!
+//! One test, since the allocator counts for the whole process. `tests/fuzz` looks for more where this stops.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+mod mutate;
+mod promises;
+
+use std::fs;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use glam::UVec3;
+use peak_alloc::PeakAlloc;
+use sheetsplat::scene::Scene;
+use sheetsplat::volume::{Labels, RawLayout, SampleType, Volume, VolumeError};
+
+use mutate::{Random, mutant};
+
+#[global_allocator]
+static ALLOCATOR: PeakAlloc = PeakAlloc;
+
+/// Mutants of files, all readers together, and of scenes.
+const FILES: usize = 20_000;
+const SCENES: usize = 5_000;
+
+/// Bytes that a load may take beyond four times the file's, and three times the values' if there are any. Users may be promised 64 MiB.
+const ROOM: usize = 8 << 20;
+
+/// No load of these files takes so long.
+const LONG: Duration = Duration::from_secs(5);
+
+/// What a run came to.
+#[derive(Default)]
+struct Count {
+    inputs: usize,
+    accepted: usize,
+}
+
+/// A file that is mutated, and what to open then: itself, its header, or its folder.
+struct Victim {
+    file: PathBuf,
+    open: PathBuf,
+}
+
+/// The fixtures, copied to where they can be damaged.
+fn victims(folder: &Path) -> Vec<Victim> {
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
+    let mut victims = Vec::new();
+    let mut files = |from: &Path, to: &Path| {
+        let mut paths: Vec<PathBuf> = fs::read_dir(from).unwrap().map(|entry| entry.unwrap().path()).collect();
+        paths.sort();
+        for path in paths {
+            let copy = to.join(path.file_name().unwrap());
+            if path.is_dir() {
+                fs::create_dir(&copy).unwrap();
+            } else if path.extension().is_none_or(|extension| extension != "py") {
+                fs::copy(&path, &copy).unwrap();
+                let open = match copy.file_name().unwrap().to_str().unwrap() {
+                    "flipped.raw" => to.join("flipped.mhd"),
+                    "zlib.zraw" => to.join("zlib.mhd"),
+                    _ if to == folder => copy.clone(),
+                    _ => to.to_owned(),
+                };
+                victims.push(Victim { file: copy, open });
+            }
+        }
+    };
+    files(&fixtures, folder);
+    for slices in ["series", "slices"] {
+        files(&fixtures.join(slices), &folder.join(slices));
+    }
+    victims
+}
+
+fn open(path: &Path) -> Result<Volume, VolumeError> {
+    if path.extension().is_some_and(|extension| extension == "raw") {
+        let layout = RawLayout { dims: UVec3::new(5, 4, 3), sample_type: SampleType::F32, big_endian: true, offset: 7 };
+        return Volume::open_raw(path, &layout);
+    }
+    Volume::open(path)
+}
+
+/// Bytes of a file, or of those in a folder.
+fn size(path: &Path) -> usize {
+    if path.is_dir() {
+        return fs::read_dir(path).unwrap().map(|entry| size(&entry.unwrap().path())).sum();
+    }
+    fs::metadata(path).map_or(0, |metadata| metadata.len() as usize)
+}
+
+/// Runs something that must not panic, take long, or take more memory than `bytes` and what the result has.
+fn bounded<T>(what: &str, bytes: usize, run: impl Fn() -> T, size: impl Fn(&T) -> usize) -> T {
+    let before = ALLOCATOR.current_usage();
+    let measured = || {
+        ALLOCATOR.reset_peak_usage();
+        let start = Instant::now();
+        let result = catch_unwind(AssertUnwindSafe(&run)).unwrap_or_else(|_| panic!("{what}: a panic"));
+        let (peak, elapsed) = (ALLOCATOR.peak_usage().saturating_sub(before), start.elapsed());
+        let allowed = ROOM + 4 * bytes + 3 * size(&result);
+        assert!(peak <= allowed, "{what}: {peak} bytes of memory, not {allowed}");
+        (result, elapsed)
+    };
+    let (result, elapsed) = measured();
+    if elapsed > LONG {
+        // It may have been the machine.
+        drop(result);
+        let (result, again) = measured();
+        assert!(again <= LONG, "{what}: {elapsed:?}, and then {again:?}");
+        return result;
+    }
+    result
+}
+
+fn mutate_files(random: &mut Random) -> Count {
+    let folder = tempfile::tempdir().unwrap();
+    let victims = victims(folder.path());
+    let mut count = Count::default();
+    let wholes: Vec<Vec<u8>> = victims.iter().map(|victim| fs::read(&victim.file).unwrap()).collect();
+    for (Victim { file, open: path }, whole) in victims.iter().zip(&wholes) {
+        for round in 0..FILES.div_ceil(victims.len()) {
+            let other = &wholes[random.below(wholes.len())];
+            let mutant = mutant(random, whole, other);
+            // Written over, a file may be waited for until it is on the disk; a new one is not.
+            fs::remove_file(file).unwrap();
+            fs::write(file, &mutant).unwrap();
+            let what = format!("{}, mutant {round}", file.strip_prefix(folder.path()).unwrap().display());
+            let values = |result: &Result<Volume, _>| result.as_ref().map_or(0, |volume| 4 * volume.values().len());
+            match bounded(&what, size(path), || open(path), values) {
+                Ok(volume) => {
+                    assert_eq!(volume.values().len(), volume.dims().element_product() as usize, "{what}");
+                    assert!(
+                        volume.spacing().min_element() > 0.0 && volume.values().iter().all(|x| x.is_finite()),
+                        "{what}"
+                    );
+                    count.accepted += 1;
+                }
+                // A damaged header may name any other file for the data.
+                Err(error) => assert!(error.to_string().contains(": "), "{what}: {error}"),
+            }
+            if round % 4 == 0 {
+                let labels = |result: &Result<Labels, _>| result.as_ref().map_or(0, |labels| 2 * labels.values.len());
+                _ = bounded(&what, size(path), || Labels::open(path), labels);
+            }
+            count.inputs += 1;
+        }
+        fs::write(file, whole).unwrap();
+    }
+    count
+}
+
+fn mutate_scenes(random: &mut Random) -> Count {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let readme = fs::read_to_string(root.join("README.md")).unwrap();
+    let commented = readme.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    let mut scenes = vec![commented.to_owned(), commented.replace("\n# ", "\n")];
+    let paper = fs::read_dir(root.join("assets/paper")).unwrap().map(|entry| entry.unwrap().path());
+    let mut paths: Vec<PathBuf> = paper.filter(|path| path.extension().is_some_and(|toml| toml == "toml")).collect();
+    paths.sort();
+    scenes.extend(paths.iter().map(|path| fs::read_to_string(path).unwrap()));
+    let mut count = Count::default();
+    for (number, whole) in scenes.iter().enumerate() {
+        for round in 0..SCENES.div_ceil(scenes.len()) {
+            let other = &scenes[random.below(scenes.len())];
+            let mutant = mutant(random, whole.as_bytes(), other.as_bytes());
+            let text = String::from_utf8_lossy(&mutant);
+            let what = format!("scene {number}, mutant {round}");
+            let parse = || Scene::parse(&text, "a scene", Path::new("."), &[]);
+            match bounded(&what, text.len(), parse, |_| 0) {
+                Ok(_) => count.accepted += 1,
+                Err(error) => assert!(error.to_string().contains("a scene"), "{what}: {error}"),
+            }
+            count.inputs += 1;
+        }
+    }
+    count
+}
+
+#[test]
+fn damaged_files_are_volumes_or_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    promises::are_refused(folder.path());
+    let mut random = Random::new();
+    let start = Instant::now();
+    for (what, least, count) in
+        [("files", FILES, mutate_files(&mut random)), ("scenes", SCENES, mutate_scenes(&mut random))]
+    {
+        let Count { inputs, accepted } = count;
+        println!("{what}: {accepted} of {inputs} accepted, after {:.1?}", start.elapsed());
+        assert!(inputs >= least);
+        // Neither harmless nor hopeless.
+        assert!(20 * accepted > inputs && 20 * accepted < 19 * inputs, "{what}: {accepted} of {inputs}");
+    }
+}

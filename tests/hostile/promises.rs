@@ -1,0 +1,116 @@
+//! Headers that promise as much as their compression could give at best, before code that gives next to nothing.
+
+use std::fs;
+use std::path::Path;
+
+use sheetsplat::volume::Volume;
+
+use crate::bounded;
+
+/// Bytes of code in every file.
+const CODE: usize = 1 << 20;
+
+pub(crate) fn are_refused(folder: &Path) {
+    let zeros = vec![0; CODE];
+    // Empty blocks of stored bytes, a valid beginning of anything.
+    let stored: Vec<u8> = [0, 0, 0, 0xff, 0xff].iter().copied().cycle().take(CODE).collect();
+    let deflate = |head: &[u8]| [head, &stored[head.len()..]].concat();
+    let gzip = deflate(&[0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 3]);
+    let zlib = deflate(&[0x78, 0x9c]);
+    let noise: Vec<u8> = (0..CODE).map(|at| ((at * at) >> 3) as u8).collect();
+
+    let nrrd = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1000 1000 1000\nencoding: gzip\n\n";
+    let meta_image = "ObjectType = Image\nNDims = 3\nBinaryData = True\nCompressedData = True\nDimSize = 1000 1000 1000\n\
+                      ElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
+    let mut files = vec![
+        ("gzip.nrrd".to_owned(), [nrrd.as_bytes(), &gzip].concat()),
+        ("zlib.mha".to_owned(), [meta_image.as_bytes(), &zlib].concat()),
+    ];
+    for (compression, code) in [(5, &zeros), (5, &noise), (8, &zlib), (32773, &zeros), (32773, &noise)] {
+        files.push((format!("{compression}.tif"), tiff(compression, code)));
+    }
+    for (compressor, code) in [("ZLib", &zlib), ("LZ4", &noise), ("LZ4", &vec![0xff; CODE])] {
+        files.push((format!("{compressor}.vti"), image_data(compressor, code)));
+    }
+    for syntax in ["1.2.840.10008.1.2.5\0", "1.2.840.10008.1.2.4.70"] {
+        files.push((format!("{}.dcm", syntax.trim_end_matches('\0')), dicom(syntax, &jpeg())));
+        files.push(("zeros.dcm".to_owned(), dicom(syntax, &zeros)));
+    }
+    for (name, bytes) in files {
+        let path = folder.join(&name);
+        fs::write(&path, &bytes).unwrap();
+        let result = bounded(&name, bytes.len(), || Volume::open(&path), |_| 0);
+        assert!(result.is_err(), "{name}");
+    }
+}
+
+/// One strip of the largest size that 2³⁰ bytes have.
+fn tiff(compression: u32, code: &[u8]) -> Vec<u8> {
+    let side = 1 << 15;
+    let tags: [(u16, u32); 8] = [
+        (256, side),
+        (257, side),
+        (258, 8),
+        (259, compression),
+        (262, 1),
+        (273, 8),
+        (278, side),
+        (279, code.len() as u32),
+    ];
+    let mut bytes = [&b"II*\0"[..], &(8 + code.len() as u32).to_le_bytes(), code].concat();
+    bytes.extend((tags.len() as u16).to_le_bytes());
+    for (tag, value) in tags {
+        bytes.extend(tag.to_le_bytes());
+        bytes.extend(4_u16.to_le_bytes());
+        bytes.extend(1_u32.to_le_bytes());
+        bytes.extend(value.to_le_bytes());
+    }
+    bytes.extend([0; 4]);
+    bytes
+}
+
+/// One block of 2²⁷ bytes.
+fn image_data(compressor: &str, code: &[u8]) -> Vec<u8> {
+    let header = format!(
+        "<VTKFile type=\"ImageData\" compressor=\"vtk{compressor}DataCompressor\"><ImageData WholeExtent=\"0 511 0 511 0 511\">\
+         <Piece Extent=\"0 511 0 511 0 511\"><PointData Scalars=\"a\"><DataArray Name=\"a\" type=\"UInt8\" \
+         format=\"appended\" offset=\"0\"/></PointData></Piece></ImageData><AppendedData encoding=\"raw\">_"
+    );
+    let sizes = [1, 1_u32 << 27, 0, code.len() as u32].map(u32::to_le_bytes).concat();
+    [header.as_bytes(), &sizes, code].concat()
+}
+
+/// The beginning of a lossless frame of 30000 × 30000 samples.
+fn jpeg() -> Vec<u8> {
+    let side = [0x75, 0x30];
+    let frame = [&[0xff, 0xd8, 0xff, 0xc3, 0, 11, 16], &side[..], &side, &[1, 1, 0x11, 0]].concat();
+    let scan = [0xff, 0xda, 0, 8, 1, 1, 0, 1, 0, 0];
+    let mut bytes = [&frame[..], &scan].concat();
+    bytes.resize(CODE, 0);
+    bytes
+}
+
+/// A frame of 30000 × 30000 samples of 16 bits in one fragment.
+fn dicom(syntax: &str, code: &[u8]) -> Vec<u8> {
+    let element = |group: u16, element: u16, kind: &[u8], value: &[u8]| {
+        let length = (value.len() as u16).to_le_bytes();
+        [&group.to_le_bytes(), &element.to_le_bytes(), kind, &length, value].concat()
+    };
+    let number = |number: u16| number.to_le_bytes();
+    let parts = [
+        [&[0; 128], &b"DICM"[..]].concat(),
+        element(2, 0x10, b"UI", syntax.as_bytes()),
+        element(0x20, 0x32, b"DS", b"0\\0\\0 "),
+        element(0x20, 0x37, b"DS", b"1\\0\\0\\0\\1\\0 "),
+        element(0x28, 0x04, b"CS", b"MONOCHROME2 "),
+        element(0x28, 0x10, b"US", &number(30000)),
+        element(0x28, 0x11, b"US", &number(30000)),
+        element(0x28, 0x30, b"DS", b"1\\1 "),
+        element(0x28, 0x100, b"US", &number(16)),
+        [0xe0, 0x7f, 0x10, 0x00, b'O', b'W', 0, 0, 0xff, 0xff, 0xff, 0xff].to_vec(),
+        [0xfe, 0xff, 0x00, 0xe0, 0, 0, 0, 0].to_vec(),
+        [&[0xfe, 0xff, 0x00, 0xe0], &(code.len() as u32).to_le_bytes()[..], code].concat(),
+        [0xfe, 0xff, 0xdd, 0xe0, 0, 0, 0, 0].to_vec(),
+    ];
+    parts.concat()
+}
