@@ -98,7 +98,6 @@ mod clip_from_world;
 pub mod error;
 pub mod fault;
 pub mod footprint;
-mod frame_request;
 #[cfg(feature = "golden")]
 pub mod golden;
 pub mod gpu;

@@ -7,7 +7,6 @@ use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Queue, RenderPass, Text
 
 use crate::error::{RenderError, check_device};
 use crate::fault::scoped;
-use crate::frame_request::FrameRequest;
 use crate::gpu::bindings::{Wanted, grown, sizes, wanted, wanted_for, written};
 use crate::gpu::device::{self, DeviceError, DeviceRequirements};
 use crate::gpu::layout::{Cut, Frame, Tally};
@@ -21,6 +20,7 @@ use crate::placement::Placement;
 use crate::prepared_frame::{Drawing, FirstHits, Kept, PreparedFrame};
 use crate::rasterizer::Given;
 use crate::rasterizer::quads::QuadRasterizer;
+use crate::rasterizer::request::FrameRequest;
 use crate::rasterizer::samples::SampleRasterizer;
 use crate::rasterizer::tiles::TileRasterizer;
 use crate::rasterizer::way::{Way, insists_on_tiles};
@@ -110,7 +110,7 @@ impl Renderer {
     /// If the scene asks for something not implemented, or for more than the device's limits allow.
     pub fn estimate(&self, view: &SceneView) -> Result<u64, RenderError> {
         check_device(view.volume.gpu_volume().device(), &self.device, "the renderer")?;
-        let request = FrameRequest::new(&self.device, view, self.rasterizer)?;
+        let request = self.request(view)?;
         let limits = self.device.limits();
         let settled = view.volume.lists.settled(&limits);
         let lists = settled.lists();
@@ -147,9 +147,14 @@ impl Renderer {
         Ok(volume + compositing + needs.bytes + request.hit_bytes() + counts)
     }
 
+    fn request(&self, view: &SceneView) -> Result<FrameRequest, RenderError> {
+        let SceneView { volume, scene, surfaces, first_hit, .. } = view;
+        FrameRequest::new(&self.device, volume, scene, (surfaces.as_ref(), *first_hit), self.rasterizer)
+    }
+
     fn prepare_unscoped(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
         // What can fail comes before anything is taken from the last frame.
-        let request = FrameRequest::new(device, view, self.rasterizer)?;
+        let request = self.request(view)?;
         let SceneView { volume, scene, surfaces, frame, .. } = view;
         volume.flush(device, queue)?;
         let sheets = (self.sheet_format, self.sheets);

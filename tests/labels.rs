@@ -162,8 +162,8 @@ fn a_label_file_replaces_the_builtin_labels() {
     let folder = Folder::new();
     folder.write("labels.nrrd", "type: uint8\nsizes: 8 8 5", &[9; 320]);
     let volume = folder.load("builtin = 'head:8'").unwrap();
-    assert_eq!((volume.labels(), volume.label_name(2)), (Some(&[9; 320][..]), None));
-    assert_eq!(builtin::volume("head:8").unwrap().label_name(2), Some("skull"));
+    assert_eq!((volume.labels(), volume.label_names().get(&2)), (Some(&[9; 320][..]), None));
+    assert_eq!(builtin::volume("head:8").unwrap().label_names()[&2], "skull");
     folder.write("labels.nrrd", "type: uint8\nsizes: 8 8 8", &[5; 512]);
     assert_eq!(folder.load("builtin = 'cube:8'").unwrap().labels(), Some(&[5; 512][..]));
 }
@@ -357,4 +357,19 @@ fn tables_without_labels_are_an_error() {
     // A label that no voxel has is none: one transfer function serves many volumes.
     scene.transfer.labels = tables(&[77]).collect();
     gpu.render_volume(builtin::volume("head:8").unwrap(), &scene).unwrap();
+}
+
+/// As 3D Slicer writes segmentations.
+#[test]
+fn names_of_segments_are_read() {
+    let folder = Folder::new();
+    let segments = "Segment0_ID:=Segment_1\nSegment0_LabelValue:=5\nSegment0_Name:=left lung: lower\nSegment1_Name:=no value\n\
+                    Segment2_LabelValue:=many\nSegment2_Name:=bad\nSegment3_LabelValue:=7\nother_LabelValue:=9\nother_Name:=no";
+    folder.write("labels.nrrd", &format!("type: uint8\nsizes: 2 3 2\n{segments}"), &[5; 12]);
+    let names = BTreeMap::from([(5, "left lung: lower".to_owned())]);
+    assert_eq!(folder.load(PATH).unwrap().label_names(), &names);
+    // Of a volume whose values are labels; so they are even if there is but one.
+    let volume = Volume::open(&folder.0.path().join("labels.nrrd")).unwrap();
+    assert_eq!(volume.label_names(), &names);
+    assert!(sheetsplat::appearance::categories::is_label_map(&volume));
 }

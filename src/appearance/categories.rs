@@ -33,15 +33,22 @@ fn counts(volume: &Volume) -> Option<Vec<(u16, u64)>> {
     if !values.par_iter().all(|&value| f32::from(value as u16) == value) {
         return None;
     }
-    let counts = histogram(values, |value| Some(value as u16));
+    let counts = histogram(values, 1 << 16, |value| Some(usize::from(value as u16)));
     Some((0..=u16::MAX).zip(counts).filter(|&(_, count)| count > 0).collect())
 }
 
 /// Whether a volume's values look like labels and not like amounts: at least three labels, in regions with sharp borders. Of the voxels
 /// whose neighbours on an axis differ, at most a third has a value that neither has, where in images most do; and of neighbours that are
-/// not background at least half are alike. A mask of two values is not meant: it has a surface, like any object.
+/// not background at least half are alike. A mask of two values is not meant: it has a surface, like any object. Where a file names its
+/// labels, they are labels in any case.
 pub fn is_label_map(volume: &Volume) -> bool {
-    let Some(counts) = counts(volume).filter(|counts| counts.len() >= 3) else { return false };
+    let Some(counts) = counts(volume) else { return false };
+    if volume.labels().is_none() && !volume.label_names().is_empty() {
+        return true;
+    }
+    if counts.len() < 3 {
+        return false;
+    }
     // Of several that are the commonest the least.
     let background = counts.iter().rev().max_by_key(|(_, count)| count).map_or(0.0, |&(label, _)| f32::from(label));
     Borders::of(volume, background).are_sharp()

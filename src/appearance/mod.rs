@@ -13,7 +13,7 @@ use glam::DVec3;
 
 pub use colormap::Colormap;
 pub use preset::Preset;
-pub use quantile::quantiles;
+pub use quantile::{histogram, quantiles};
 
 use crate::iso_range::ValueSet;
 use crate::transfer_function::{Ramp, TransferFunction};

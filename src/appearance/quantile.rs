@@ -1,4 +1,4 @@
-//! Quantiles of many values, exact and without sorting them.
+//! Histograms, and quantiles, exact and without sorting.
 
 use rayon::prelude::*;
 
@@ -14,36 +14,43 @@ pub fn quantiles<const N: usize>(
     counts: impl Fn(f32) -> bool + Sync,
     shares: [f64; N],
 ) -> Option<[f32; N]> {
-    // Two digits of 16 bits: first how many values have which upper one, then the lower ones of those that have the wanted one.
-    let upper = histogram(values, |value| counts(value).then(|| (ordinal(value) >> 16) as u16));
+    // Two digits of 16 bits: first how many values have which upper one, then the lower ones of those that have a wanted one.
+    let digits = |value: f32| ((ordinal(value) >> 16) as usize, (ordinal(value) & 0xffff) as usize);
+    let upper = histogram(values, 1 << 16, |value| counts(value).then(|| digits(value).0));
     let last = upper.iter().sum::<u64>().checked_sub(1)?;
-    Some(shares.map(|share| {
-        let (digit, rank) = digit_at(&upper, (share * last as f64).round() as u64);
-        let lower = histogram(values, |value| {
-            let ordinal = ordinal(value);
-            (ordinal >> 16 == digit && counts(value)).then_some(ordinal as u16)
-        });
-        of_ordinal(digit << 16 | digit_at(&lower, rank).0)
+    let places = shares.map(|share| bin_at(&upper, (share * last as f64).round() as u64));
+    let mut wanted = places.map(|(digit, _)| digit).to_vec();
+    wanted.sort_unstable();
+    wanted.dedup();
+    let lower = histogram(values, wanted.len() << 16, |value| {
+        let (digit, rest) = digits(value);
+        let at = wanted.binary_search(&digit).ok()?;
+        counts(value).then_some(at << 16 | rest)
+    });
+    Some(places.map(|(digit, rank)| {
+        let at = wanted.binary_search(&digit).unwrap_or_default();
+        let (rest, _) = bin_at(&lower[at << 16..][..1 << 16], rank);
+        of_ordinal((digit << 16 | rest) as u32)
     }))
 }
 
-/// How many values have which of 65536 digits, or other properties.
-pub(super) fn histogram(values: &[f32], digit: impl Fn(f32) -> Option<u16> + Sync) -> Vec<u64> {
-    let zeros = || vec![0_u64; 1 << 16];
+/// How many values are in which of some bins; `None` is in no bin.
+pub fn histogram(values: &[f32], bins: usize, bin: impl Fn(f32) -> Option<usize> + Sync) -> Vec<u64> {
+    let zeros = || vec![0_u64; bins];
     let counted = values.par_chunks(CHUNK).fold(zeros, |mut counts, chunk| {
-        for digit in chunk.iter().filter_map(|&value| digit(value)) {
-            counts[usize::from(digit)] += 1;
+        for bin in chunk.iter().filter_map(|&value| bin(value)) {
+            counts[bin] += 1;
         }
         counts
     });
     counted.reduce(zeros, |a, b| a.iter().zip(b).map(|(a, b)| a + b).collect())
 }
 
-/// The digit of the value of a rank, and its rank among those.
-fn digit_at(counts: &[u64], mut rank: u64) -> (u32, u64) {
-    for (digit, &count) in (0..).zip(counts) {
+/// The bin of the value of a rank, and its rank in there.
+fn bin_at(counts: &[u64], mut rank: u64) -> (usize, u64) {
+    for (bin, &count) in counts.iter().enumerate() {
         if rank < count {
-            return (digit, rank);
+            return (bin, rank);
         }
         rank -= count;
     }

@@ -2,6 +2,7 @@
 //! records it.
 
 pub(crate) mod quads;
+pub(crate) mod request;
 pub(crate) mod samples;
 pub(crate) mod tiles;
 pub(crate) mod way;
@@ -11,13 +12,13 @@ use wgpu::{Buffer, BufferUsages, ComputePassDescriptor, Device, Queue};
 use crate::classified_volume::ClassifiedVolume;
 use crate::error::RenderError;
 use crate::footprint::FootprintTable;
-use crate::frame_request::FrameRequest;
 use crate::gpu::bindings::filled;
 use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
 use crate::kernel::Kernel;
 use crate::pass::composite::CutBuffers;
+use crate::rasterizer::request::FrameRequest;
 use crate::splatting::FootprintForm;
 
 /// What [`Renderer::prepare`](crate::renderer::Renderer::prepare) had to do.

@@ -9,7 +9,6 @@ use crate::brick;
 use crate::classified_volume::ClassifiedVolume;
 use crate::error::RenderError;
 use crate::footprint::FootprintTable;
-use crate::frame_request::FrameRequest;
 use crate::gpu::bindings::{Wanted, grown, sizes, uploaded, wanted, wanted_for};
 use crate::gpu::layout::{Brick, Group, Tally};
 use crate::gpu::targets::Targets;
@@ -21,6 +20,7 @@ use crate::pass::occlude::Occlude;
 use crate::pass::splat::{Splat, SplatMode};
 use crate::pass::tiles::{TileLists, Tiles};
 use crate::plan::{FramePlan, tile_grid};
+use crate::rasterizer::request::FrameRequest;
 use crate::splatting::Order;
 use crate::stats::GroupSlabs;
 

@@ -9,7 +9,6 @@ use super::{Footprints, Given, Needs, Prepared, compute};
 use crate::brick::{self, BRICK_VOXELS};
 use crate::error::RenderError;
 use crate::footprint::FootprintTable;
-use crate::frame_request::FrameRequest;
 use crate::gpu::bindings::{Wanted, grown, sizes, wanted, wanted_for, written};
 use crate::gpu::layout::{Brick, FOLD, Group, Indirect, QUADS, Splat, Tally};
 use crate::gpu::targets::Targets;
@@ -19,6 +18,7 @@ use crate::pass::composite::{Composite, CompositeBuffers, CompositeMode, RayMode
 use crate::pass::sample::{Sample, SampleBuffers, SampleMode};
 use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};
 use crate::plan::tile_grid;
+use crate::rasterizer::request::FrameRequest;
 use crate::splatting::Compositing;
 use crate::stats::GroupSlabs;
 use crate::view::View;

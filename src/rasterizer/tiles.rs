@@ -3,23 +3,21 @@
 use std::mem::offset_of;
 use std::ops::Range;
 
-use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Features, Limits};
+use wgpu::{Buffer, BufferUsages, CommandEncoder, Limits};
 
+use super::way::SUBGROUP_SIZES;
 use super::{Given, Needs, Prepared};
 use crate::error::RenderError;
-use crate::frame_request::FrameRequest;
 use crate::gpu::bindings::{Wanted, grown, sizes, wanted, wanted_for, written};
 use crate::gpu::layout::{Brick, Gather as GatherUniform, Gathered, Part, Tally};
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
 use crate::pass::gather::{Gather, GatherBand, GatherBuffers, GatherMode};
-use crate::splatting::{FootprintForm, Method, Order, Splatting};
+use crate::rasterizer::request::FrameRequest;
+use crate::splatting::Order;
 use crate::stats::GroupSlabs;
 use crate::tile_bins::{SHEETS, SIDE, TileBins};
 use crate::view::View;
-
-/// Threads that a subgroup may have.
-const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;
 
 /// The stage.
 #[derive(Debug, Default)]
@@ -61,31 +59,6 @@ struct Binned {
 }
 
 impl TileRasterizer {
-    /// Why a device or some settings cannot be drawn by tiles; `None` if they can.
-    pub(crate) fn obstacle(device: &Device, splatting: &Splatting) -> Option<RenderError> {
-        let refused = |found: String, allowed: &'static str| {
-            let key = "splatting.rasterizer";
-            Some(RenderError::OutOfRange { key, found: format!("\"tiles\" with {found}"), allowed: allowed.to_owned() })
-        };
-        if splatting.method == Method::CompositeEverySample {
-            let found = "splatting.method = \"composite-every-sample\"".to_owned();
-            return refused(found, "\"image-aligned\" or \"axis-aligned\" with it, or \"quads\"");
-        }
-        if splatting.footprint != FootprintForm::SummedArea {
-            return refused("splatting.footprint = \"sections\"".to_owned(), "\"summed-area\" with it, or \"quads\"");
-        }
-        if !device.features().contains(Features::SUBGROUP) {
-            return refused("a device without subgroups".to_owned(), "\"quads\"");
-        }
-        let info = device.adapter_info();
-        let sizes = [info.subgroup_min_size, info.subgroup_max_size];
-        if sizes.iter().any(|size| !SUBGROUP_SIZES.contains(size)) {
-            let found = format!("subgroups of {} to {} threads", sizes[0], sizes[1]);
-            return refused(found, "subgroups of 8 to 32 threads, or \"quads\"");
-        }
-        None
-    }
-
     /// Bins bricks if need be, and allocates what does not fit any more. Sections need no table here.
     ///
     /// # Errors

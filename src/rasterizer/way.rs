@@ -1,11 +1,13 @@
 //! Which rasterizer draws a view, and what it does not draw.
 
-use wgpu::Device;
+use wgpu::{Device, Features};
 
-use super::tiles::TileRasterizer;
 use crate::error::RenderError;
 use crate::pass::composite::RayMode;
-use crate::splatting::{Compositing, Economies, FootprintBox, Method, Order, Rasterizer, Splatting};
+use crate::splatting::{Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
+
+/// Threads that a subgroup may have.
+pub(super) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;
 
 /// How to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,7 +25,7 @@ impl Way {
     /// If they insist on what the device or the other settings do not allow.
     pub(crate) fn of(device: &Device, splatting: &Splatting) -> Result<Self, RenderError> {
         let insists = insists_on_tiles(splatting);
-        match (splatting.rasterizer, TileRasterizer::obstacle(device, splatting)) {
+        match (splatting.rasterizer, obstacle_to_tiles(device, splatting)) {
             (Rasterizer::Quads, _) if insists => Err(RenderError::OutOfRange {
                 key: "splatting.rasterizer",
                 found: "\"quads\" with splatting.footprint_box = \"parallelogram\", whole_below, beta or resolution"
@@ -36,6 +38,31 @@ impl Way {
             _ => Ok(Self::Quads),
         }
     }
+}
+
+/// Why a device or some settings cannot be drawn by tiles; `None` if they can.
+fn obstacle_to_tiles(device: &Device, splatting: &Splatting) -> Option<RenderError> {
+    let refused = |found: String, allowed: &'static str| {
+        let key = "splatting.rasterizer";
+        Some(RenderError::OutOfRange { key, found: format!("\"tiles\" with {found}"), allowed: allowed.to_owned() })
+    };
+    if splatting.method == Method::CompositeEverySample {
+        let found = "splatting.method = \"composite-every-sample\"".to_owned();
+        return refused(found, "\"image-aligned\" or \"axis-aligned\" with it, or \"quads\"");
+    }
+    if splatting.footprint != FootprintForm::SummedArea {
+        return refused("splatting.footprint = \"sections\"".to_owned(), "\"summed-area\" with it, or \"quads\"");
+    }
+    if !device.features().contains(Features::SUBGROUP) {
+        return refused("a device without subgroups".to_owned(), "\"quads\"");
+    }
+    let info = device.adapter_info();
+    let sizes = [info.subgroup_min_size, info.subgroup_max_size];
+    if sizes.iter().any(|size| !SUBGROUP_SIZES.contains(size)) {
+        let found = format!("subgroups of {} to {} threads", sizes[0], sizes[1]);
+        return refused(found, "subgroups of 8 to 32 threads, or \"quads\"");
+    }
+    None
 }
 
 /// Whether quads will not do.

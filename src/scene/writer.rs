@@ -6,7 +6,7 @@ use std::path::{Component, Path, PathBuf};
 use glam::DVec3;
 use toml::Value;
 
-use super::names::{BOXES, COMPOSITINGS, ENDIANS, FORMS, METHODS, ORDERS, RASTERIZERS, name_of};
+use super::names::{BOXES, COMPOSITINGS, FORMS, METHODS, ORDERS, RASTERIZERS, name_of};
 use super::{ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use crate::appearance::{Colormap, Preset};
 use crate::camera::{Camera, Projection};
@@ -14,7 +14,7 @@ use crate::clip::Clip;
 use crate::shading::{Light, Shading};
 use crate::splatting::{Economies, Splatting};
 use crate::transfer_function::Ramp;
-use crate::volume::{RawLayout, SampleType};
+use crate::volume::RawLayout;
 
 /// More control points than this are written line by line.
 const ON_ONE_LINE: usize = 3;
@@ -25,7 +25,7 @@ impl Scene {
     /// [`Self::explicit`] fills it in.
     ///
     /// # Errors
-    /// If the volume's path or that of its labels is not UTF-8.
+    /// If the volume's path or that of its labels is not UTF-8, or its offset in a raw file is more than TOML can say.
     pub fn to_toml(&self, folder: &Path) -> Result<String, SceneError> {
         let Self { volume, spacing, labels, camera, image, clip, transfer, shading, splatting } = self;
         let mut text = Text::default();
@@ -36,8 +36,14 @@ impl Scene {
         match volume {
             VolumeSource::File(path) => text.line("path", within(folder, path, "volume.path")?),
             VolumeSource::Raw(path, layout) => {
+                let RawLayout { dims, sample_type, big_endian, offset } = *layout;
                 text.line("path", within(folder, path, "volume.path")?);
-                write_raw_layout(&mut text, layout);
+                text.line("dims", dims.to_array().map(i64::from).map(Value::from).to_vec());
+                text.line("type", sample_type.to_string());
+                text.line("endian", if big_endian { "big" } else { "little" });
+                let allowed = format!("at most {}, as TOML has no larger number", i64::MAX);
+                let offset = i64::try_from(offset).map_err(|_| invalid("volume.offset", offset.to_string(), &allowed));
+                text.line("offset", offset?);
             }
             VolumeSource::Builtin(name) => text.line("builtin", name.as_str()),
         }
@@ -102,14 +108,6 @@ impl Text {
         self.ramp("opacity", opacity, |&opacity| opacity.into());
         self.ramp("gradient_opacity", gradient_opacity, |&factor| factor.into());
     }
-}
-
-fn write_raw_layout(text: &mut Text, layout: &RawLayout) {
-    let RawLayout { dims, sample_type, big_endian, offset } = *layout;
-    text.line("dims", Value::Array(dims.to_array().map(|n| Value::from(i64::from(n))).to_vec()));
-    text.line("type", name_of(&SampleType::NAMED, sample_type));
-    text.line("endian", name_of(ENDIANS, big_endian));
-    text.line("offset", offset as i64);
 }
 
 fn vector(vector: DVec3) -> Value {
@@ -211,12 +209,12 @@ fn write_splatting(text: &mut Text, splatting: &Splatting) {
 /// A file's path as it is if absolute, else relative to a folder.
 fn within(folder: &Path, path: &Path, key: &str) -> Result<String, SceneError> {
     let found = if path.is_absolute() { path.to_owned() } else { relative(folder, path) };
-    found.to_str().map(str::to_owned).ok_or_else(|| SceneError::Invalid {
-        origin: "scene".to_owned(),
-        key: key.to_owned(),
-        found: format!("{}", found.display()),
-        allowed: "a path in UTF-8".to_owned(),
-    })
+    found.to_str().map(str::to_owned).ok_or_else(|| invalid(key, found.display().to_string(), "a path in UTF-8"))
+}
+
+/// The error for what cannot be written.
+fn invalid(key: &str, found: String, allowed: &str) -> SceneError {
+    SceneError::Invalid { origin: "scene".to_owned(), key: key.to_owned(), found, allowed: allowed.to_owned() }
 }
 
 /// The way from a folder to a file; where they have nothing in common, or are not there, the file's absolute path.

@@ -35,8 +35,8 @@ impl Labels {
     /// If the file cannot be read, is of no known format, does not hold what its header promises, or has a sample that is no
     /// label (the error names the voxel).
     pub fn open(path: &Path) -> Result<Self, VolumeError> {
-        let (_, Loaded { dims, spacing, values, .. }) = format::read(path)?;
-        Ok(Self { origin: path.display().to_string(), dims, spacing, values: values.into(), names: BTreeMap::new() })
+        let (_, Loaded { dims, spacing, label_names: names, values, .. }) = format::read(path)?;
+        Ok(Self { origin: path.display().to_string(), dims, spacing, values: values.into(), names })
     }
 }
 
@@ -72,9 +72,9 @@ impl Volume {
         self.labels.as_deref()
     }
 
-    /// What a label is called, if that is known: of a segmented volume, or of one whose values are labels.
-    pub fn label_name(&self, label: u16) -> Option<&str> {
-        self.label_names.get(&label).map(String::as_str)
+    /// What labels are called, as far as that is known: those of a segmented volume, or of one whose values are labels.
+    pub fn label_names(&self) -> &BTreeMap<u16, String> {
+        &self.label_names
     }
 
     /// The label of a voxel, given as an index into the volume; `None` if the volume is not segmented.

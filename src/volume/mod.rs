@@ -120,8 +120,8 @@ impl Volume {
             return Err(invalid("data", format!("{} at voxel {voxel}", values[at]), "finite values"));
         }
         let grid = Grid { dims, spacing: DVec3::ONE };
-        let (labels, label_names) = (None, BTreeMap::new());
-        Self { grid, values, labels, label_names, orientation: None, unit: None, encoding: None }
+        let label_names = BTreeMap::new();
+        Self { grid, values, labels: None, label_names, orientation: None, unit: None, encoding: None }
             .with_spacing(origin, spacing)
     }
 
@@ -148,11 +148,12 @@ impl Volume {
     /// # Errors
     /// If the file cannot be read, is of no format that is compiled in, or does not hold what its header promises.
     pub fn open(path: &Path) -> Result<Self, VolumeError> {
-        let (format, Loaded { dims, kind: sample_type, spacing, unit, orientation, values }) = format::read(path)?;
+        let (format, Loaded { dims, kind: sample_type, spacing, unit, orientation, label_names, values }) =
+            format::read(path)?;
         let origin = path.display().to_string();
         let volume = Self::new(&origin, dims, spacing.unwrap_or(DVec3::ONE), values)?;
         let encoding = Some(Encoding { format, sample_type });
-        Self { unit, encoding, ..volume }.with_orientation(&origin, orientation)
+        Self { unit, encoding, label_names, ..volume }.with_orientation(&origin, orientation)
     }
 
     /// Where the voxels are.

@@ -61,6 +61,27 @@ fn a_scale_bar_is_as_long_as_it_says() {
 }
 
 #[test]
+fn a_scale_bar_has_the_volumes_unit() {
+    let folder = Folder::new();
+    let values: Vec<f32> = (0..512).map(|i| (i % 7) as f32).collect();
+    folder.write_nrrd("plain.nrrd", [8, 8, 8], [1.0, 1.0, 1.0], &values);
+    let plain = String::from_utf8_lossy(&folder.read("plain.nrrd")[..60]).into_owned();
+    assert!(plain.contains("dimension: 3\n"));
+    let texts = ["mm", "um", "\u{b5}m"].map(|unit| {
+        let header = "dimension: 3\n";
+        let bytes = folder.read("plain.nrrd");
+        let at = bytes.windows(header.len()).position(|window| window == header.as_bytes()).unwrap() + header.len();
+        let units = format!("units: \"{unit}\" \"{unit}\" \"{unit}\"\n");
+        folder.write("units.nrrd", [&bytes[..at], units.as_bytes(), &bytes[at..]].concat());
+        folder.annotated("units.nrrd --set image={width=320,height=200} --set camera.height=100 --annotate scale")
+    });
+    let plain =
+        folder.annotated("plain.nrrd --set image={width=320,height=200} --set camera.height=100 --annotate scale");
+    assert_eq!(bar(&plain), bar(&texts[0]));
+    assert!(plain != texts[0] && texts[0] != texts[1]);
+}
+
+#[test]
 fn a_plate_keeps_text_readable_on_any_background() {
     let folder = Folder::new();
     for background in ["[0,0,0,1]", "[1,1,1,1]", "[0.5,0.5,0.5,1]", "[1,1,1,0]"] {

@@ -23,9 +23,9 @@ pub(crate) struct Input {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(crate) sets: Vec<String>,
     #[command(flatten)]
-    look: Look,
-    #[command(flatten)]
     raw: Raw,
+    #[command(flatten)]
+    look: Look,
     /// The side of the patient to look at, where the volume's file says how the patient lies; in place of the scene's
     /// camera.direction and camera.up.
     #[arg(long, value_enum, value_name = "SIDE")]
@@ -48,9 +48,9 @@ struct Look {
 }
 
 impl Look {
-    fn sets(&self) -> Vec<String> {
+    fn sets(&self) -> impl Iterator<Item = String> {
         let preset = self.preset.iter().map(|name| format!("preset={name}"));
-        preset.chain(self.colormap.iter().map(|name| format!("transfer.colormap={name}"))).collect()
+        preset.chain(self.colormap.iter().map(|name| format!("transfer.colormap={name}")))
     }
 }
 
@@ -119,7 +119,7 @@ impl Input {
 
     /// The scene with these settings in place of those of --set. By its extension a scene file; anything else is a volume.
     pub(crate) fn scene_with(&self, sets: &[String]) -> Result<Scene, SceneError> {
-        let sets = [&self.raw.sets(), &self.look.sets(), sets].concat();
+        let sets = self.raw.sets().into_iter().chain(self.look.sets()).chain(sets.iter().cloned()).collect::<Vec<_>>();
         match self.name.strip_prefix("builtin:") {
             Some(name) => Scene::from_volume(VolumeSource::Builtin(name.to_owned()), &sets),
             None if self.name.ends_with(".toml") => Scene::open(self.name.as_ref(), &sets),

@@ -22,10 +22,10 @@ use crate::failure::Failure;
 Examples:
   sheetsplat render builtin:head -o head.png
   sheetsplat render head.nrrd -o image.exr --set splatting.slab_width=0.5 --stats stats.json
-  sheetsplat render ct.nrrd -o skull.png --preset ct-bone --annotate scale --save-scene skull.toml
-  sheetsplat render cells.nrrd -o cells.png --preset confocal --colormap magma --annotate scale,colors
   sheetsplat render ct.nii.gz -o face.png --view front
-  sheetsplat render ct.raw -o ct.png --dims 256,256,113 --type uint16 --endian big")]
+  sheetsplat render ct.raw -o ct.png --dims 256,256,113 --type uint16 --endian big
+  sheetsplat render ct.nrrd -o skull.png --preset ct-bone --annotate scale --save-scene skull.toml
+  sheetsplat render cells.nrrd -o cells.png --preset confocal --colormap magma --annotate scale,colors")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,

@@ -54,7 +54,7 @@ fn entries(volume: &Volume, transfer: &TransferFunction) -> Result<Vec<Entry>, F
         let table = transfer.tables(Some(label));
         let place = |x: u32| f64::from(x) / f64::from(PATCH[0] - 1);
         let colors = (0..PATCH[0]).map(|x| table.color.at(values[0] * (1.0 - place(x)) + values[1] * place(x)));
-        let name = volume.label_name(label).map_or_else(String::new, |name| format!(" {}", shortened(name)));
+        let name = volume.label_names().get(&label).map_or_else(String::new, |name| format!(" {}", shortened(name)));
         Entry {
             text: format!("{label}{name}"),
             colors: colors.map(|rgb| rgb.as_vec3().extend(1.0).to_array()).collect(),

@@ -24,7 +24,8 @@ pub(super) fn plate(scene: &Scene, volume: &Volume) -> Result<Image, Failure> {
     let pixel = shown / f64::from(height);
     let length = round_down((SHARE * f64::from(width)).max(1.0) * pixel);
     let bar = ((length / pixel).round() as u32).max(1);
-    let label = format!("{} units", written(length, length));
+    let unit = volume.unit().unwrap_or(if length == 1.0 { "unit" } else { "units" });
+    let label = format!("{} {unit}", written(length, length));
 
     let text = text_width(&label);
     let inner = bar.max(text);

@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use wgpu::Device;
 
+use super::way::{Way, check_rays, insists_on_tiles};
+use crate::classified_volume::ClassifiedVolume;
 use crate::error::RenderError;
 use crate::gpu::layout::Band;
 use crate::gpu::targets::CompositingBuffer;
@@ -11,10 +13,9 @@ use crate::gpu::uniforms::Ramps;
 use crate::kernel::Kernel;
 use crate::means;
 use crate::pass::composite::RayMode;
-use crate::rasterizer::way::{Way, check_rays, insists_on_tiles};
-use crate::scene_view::SceneView;
+use crate::scene::Scene;
 use crate::splatting::{Rasterizer, Splatting};
-use crate::surfaces::SurfaceDepths;
+use crate::surfaces::{SurfaceDepths, Surfaces};
 use crate::view::View;
 
 /// A frame of a view.
@@ -40,15 +41,20 @@ pub(crate) struct FrameRequest {
 impl FrameRequest {
     /// # Errors
     /// If the scene asks for something not implemented, or for more than the device's limits allow.
-    pub(crate) fn new(device: &Device, view: &SceneView, rasterizer: Rasterizer) -> Result<Self, RenderError> {
-        let SceneView { volume, scene, surfaces, first_hit, .. } = view;
+    pub(crate) fn new(
+        device: &Device,
+        volume: &ClassifiedVolume,
+        scene: &Scene,
+        (surfaces, first_hit): (Option<&Surfaces>, Option<f64>),
+        rasterizer: Rasterizer,
+    ) -> Result<Self, RenderError> {
         let splatting = settled(scene.splatting, rasterizer);
         splatting.check()?;
         let (grid, size) = (volume.grid(), [scene.image.width, scene.image.height]);
         let seen = View::new(grid, &scene.camera, &splatting, size)?;
         let bands = CompositingBuffer::bands(&device.limits(), size)?;
         let rays = RayMode { cut: surfaces.is_some() || !scene.clip.is_empty(), first_hit: first_hit.is_some() };
-        check_rays(device, &splatting, rays, *first_hit, size)?;
+        check_rays(device, &splatting, rays, first_hit, size)?;
         let surfaces = match surfaces {
             Some(surfaces) => Some((surfaces.depths(&seen, grid)?, surfaces.origin)),
             None => None,
@@ -58,7 +64,7 @@ impl FrameRequest {
             covered: means::covered(&seen, grid, &splatting),
             kernel: Kernel::new(splatting.radius, splatting.falloff),
             ramps: Ramps::new(volume.transfer()),
-            first_hit: *first_hit,
+            first_hit,
             view: seen,
             splatting,
             rays,
