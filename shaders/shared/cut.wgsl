@@ -21,6 +21,9 @@ struct Cut {
 // Beyond every depth.
 const FAR = 1e30;
 
+// Planes that there is room for.
+const MOST_PLANES = 12u;
+
 // A point of the image as rays go by it.
 fn place_of(point_px: vec2f) -> vec3f {
     return vec3f(point_px - 0.5 * vec2f(frame.size), 1.0);
@@ -30,20 +33,21 @@ fn place_of(point_px: vec2f) -> vec3f {
 fn shown_depths(point_px: vec2f) -> vec2f {
     let at = place_of(point_px);
     var depths = vec2f(-FAR, FAR);
-    for (var i = 0u; i < cut.plane_count + zero; i += 1u) {
+    // Neither a loop's end nor an `if` depends on a uniform, for the reason that `start` gives.
+    for (var i = 0u; i < MOST_PLANES; i += 1u) {
         let distance = dot(cut.planes[2u * i].xyz, at);
         let slope = dot(cut.planes[2u * i + 1u].xyz, at);
         let crossing = -distance / slope;
-        depths.x = select(depths.x, max(depths.x, crossing), slope > 0.0);
-        depths.y = select(depths.y, min(depths.y, crossing), slope < 0.0);
-        depths.y = select(depths.y, -FAR, slope == 0.0 && distance < 0.0);
+        let is_plane = i < cut.plane_count;
+        depths.x = select(depths.x, max(depths.x, crossing), is_plane && slope > 0.0);
+        depths.y = select(depths.y, min(depths.y, crossing), is_plane && slope < 0.0);
+        depths.y = select(depths.y, -FAR, is_plane && slope == 0.0 && distance < 0.0);
     }
-    if cut.has_surfaces != 0u {
-        let z = textureLoad(surfaces, vec2u(point_px) + cut.surface_origin, 0);
-        let ndc = vec4f(at.xy, z, 1.0);
-        let surface = dot(cut.surface_depth, ndc) / dot(cut.surface_w, ndc);
-        depths.y = select(min(depths.y, surface), depths.y, z == cut.no_surface);
-    }
+    let z = textureLoad(surfaces, vec2u(point_px) + cut.surface_origin, 0);
+    let ndc = vec4f(at.xy, z, 1.0);
+    let surface = dot(cut.surface_depth, ndc) / dot(cut.surface_w, ndc);
+    let is_surface = cut.has_surfaces != 0u && z != cut.no_surface;
+    depths.y = select(depths.y, min(depths.y, surface), is_surface);
     return depths;
 }
 
