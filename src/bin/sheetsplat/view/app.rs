@@ -117,7 +117,7 @@ impl App {
         ui.heading("Frame");
         panel::stats(ui, self.guest.stats());
         ui.separator();
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             if ui.button("Reset camera").clicked() {
                 self.scene.camera = self.home;
             }
