@@ -1,10 +1,10 @@
 // Zeroes the sheet buffers in the tiles that are about to receive splats.
 
-@group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> composited: TileList;
 
 @vertex
 fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> @builtin(position) vec4f {
+    start(vertex >> 31u);
     let quad = instance * QUADS + vertex / 4u;
     let corner = vertex % 4u;
     if quad >= composited.args.count {

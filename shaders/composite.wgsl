@@ -1,7 +1,6 @@
 // Composites a group of sheet buffers into the compositing buffer (eq. 2, front to back by default; SPEC §5), in the tiles
 // that received splats, and notes which pixels are opaque (§6). One workgroup per tile.
 
-@group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> band: Band;
 @group(0) @binding(2) var sheets: texture_2d_array<f32>;
 @group(0) @binding(3) var<storage, read_write> acc: array<vec4f>;
@@ -14,7 +13,11 @@
 @group(0) @binding(9) var surfaces: texture_depth_2d;
 // Of every pixel the sheet depth of its first hit, as bits; 0 is none.
 @group(0) @binding(10) var<storage, read_write> hits: array<u32>;
+// For every tile the number of the group that it was composited for last.
+@group(0) @binding(11) var<storage, read_write> last_groups: array<u32>;
 
+// `frame.compositing`.
+override COMPOSITING: u32 = 0u;
 // Whether anything is cut, and whether first hits are asked for.
 override CUT: bool = false;
 override FIRST_HIT: bool = false;
@@ -23,8 +26,24 @@ const ROWS = 8u;
 
 var<workgroup> opaque_rows: array<atomic<u32>, TILE>;
 
+// Whether a sheet changes what is there.
+fn counts(opacity: f32, middle: f32, counted: vec2f) -> bool {
+    switch COMPOSITING {
+        case MINIMUM: {
+            return counted.x <= middle && middle <= counted.y;
+        }
+        case SURFACE: {
+            return true;
+        }
+        default: {
+            return opacity > 0.0;
+        }
+    }
+}
+
 @compute @workgroup_size(32, 8)
 fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workgroup: vec3u) {
+    start(workgroup.z);
     let at = unfold(workgroup);
     if at >= composited.args.count {
         return;
@@ -36,6 +55,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
         return;
     }
     let layers = textureNumLayers(sheets);
+    let is_after_gap = last_groups[tile] + 1u != group.number;
     for (var row = local.y; row < TILE; row += ROWS) {
         let pixel = corner + vec2u(local.x, row);
         // Pixels off the image count as opaque.
@@ -43,22 +63,37 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
         if all(pixel < frame.size) {
             let slot = (pixel.y - band.first_row) * frame.size.x + pixel.x;
             var image = acc[slot];
+            if COMPOSITING == SURFACE && is_after_gap && image.a < 1.0 {
+                // What is kept of a surface that is not reached is of another sheet than the one right before, which holds nothing.
+                image = vec4f(0.0);
+            }
             var ray = vec2f(-FAR, FAR);
             if CUT {
                 ray = shown(vec2f(pixel) + 0.5);
+            }
+            var looks = Means();
+            if is_by_means() {
+                looks = means(vec2f(pixel) + 0.5);
             }
             for (var i = 0u; i < layers; i += 1u) {
                 let layer = select(layers - 1u - i, i, frame.order == FRONT_TO_BACK);
                 var sheet = textureLoad(sheets, pixel, layer, 0);
                 let near = group.near + f32(layer) * frame.slab_width;
                 let part = vec2f(max(ray.x, near), min(ray.y, near + frame.slab_width));
-                if CUT {
+                if CUT && COMPOSITING != MINIMUM {
                     sheet *= max(part.y - part.x, 0.0) / frame.slab_width;
                 }
-                if sheet.a > 0.0 {
+                if is_by_means() {
+                    sheet *= looks.weight;
+                }
+                if counts(sheet.a, near + 0.5 * frame.slab_width, looks.counted) {
                     let before = image.a;
-                    image = composite(image, sheet, frame.compositing, frame.order);
-                    if FIRST_HIT && before < cut.first_hit && image.a >= cut.first_hit {
+                    image = composite(image, sheet, COMPOSITING, frame.order);
+                    if FIRST_HIT && COMPOSITING == SURFACE && before < 1.0 && image.a >= 1.0 {
+                        let at = near + (crossing(before, sheet.a) - 0.5) * frame.slab_width;
+                        hits[pixel.y * frame.size.x + pixel.x] = noted(clamp(at, ray.x, ray.y));
+                    }
+                    if FIRST_HIT && COMPOSITING != SURFACE && before < cut.first_hit && image.a >= cut.first_hit {
                         let share = (cut.first_hit - before) / (image.a - before);
                         hits[pixel.y * frame.size.x + pixel.x] = noted(mix(part.x, part.y, share));
                     }
@@ -85,6 +120,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
                 all_opaque &= atomicLoad(&opaque_rows[row]);
             }
             opaque_tiles[tile] = select(0u, 1u, all_opaque == 0xffffffffu);
+            last_groups[tile] = group.number;
         }
     }
 }

@@ -1,7 +1,6 @@
 // Which bricks a sheet group visits (§6): those that reach into the group and are not behind opaque pixels alone. One
 // workgroup, so that the visits keep the order of the bricks: the same frame gives the same bytes.
 
-@group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> group: Group;
 @group(0) @binding(2) var<storage, read> bricks: array<Brick>;
 // Bricks by their first sheet group.
@@ -75,7 +74,8 @@ fn is_visited(at: u32) -> bool {
 }
 
 @compute @workgroup_size(256)
-fn main(@builtin(local_invocation_index) thread: u32) {
+fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
+    start(workgroup.z);
     // Every thread takes a run of bricks, at most 32 at a time: their answers fit a word.
     var total = 0u;
     for (var base = 0u; base < group.brick_count; base += WORKGROUP_SIZE * 32u) {

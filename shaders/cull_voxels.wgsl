@@ -1,6 +1,5 @@
 // Which voxels of the visited bricks a sheet group draws (§6). One workgroup per visited brick, one thread per place for a voxel.
 
-@group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> group: Group;
 @group(0) @binding(2) var<storage, read> bricks: array<Brick>;
 @group(0) @binding(3) var<storage, read> occluded: array<u32>;
@@ -51,6 +50,7 @@ fn mark_tiles(center_px: vec2f) {
 
 @compute @workgroup_size(64)
 fn main(@builtin(local_invocation_index) slot: u32, @builtin(workgroup_id) workgroup: vec3u) {
+    start(workgroup.z);
     let at = unfold(workgroup);
     if at >= visit_args.count {
         return;

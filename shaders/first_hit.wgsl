@@ -1,7 +1,6 @@
 // The depth at which opacity has reached a value (a first hit): world units along the view direction, from the eye; orthographic from
 // the plane through the camera's centre.
 
-@group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> cut: Cut;
 @group(0) @binding(2) var surfaces: texture_depth_2d;
 @group(0) @binding(3) var<storage, read> hits: array<u32>;
@@ -14,6 +13,7 @@ fn vertex(@builtin(vertex_index) corner: u32) -> @builtin(position) vec4f {
 
 @fragment
 fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
+    start(u32(position.z));
     let pixel = vec2u(position.xy);
     let hit = hits[pixel.y * frame.size.x + pixel.x];
     let depth = depth_along_ray(position.xy, bitcast<f32>(hit)) * cut.unit;

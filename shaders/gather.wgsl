@@ -6,8 +6,7 @@
 // the rectangle of its units. Software drivers execute what an `if` leaves out but not a loop without iterations, hence some
 // loops that run at most once.
 
-@group(0) @binding(0) var<uniform> frame_uniform: Frame;
-@group(0) @binding(1) var<uniform> gather_uniform: Gather;
+@group(0) @binding(1) var<uniform> gathers: array<Gather, 1>;
 @group(0) @binding(2) var<uniform> part: Part;
 @group(0) @binding(3) var<storage, read> bricks: array<Brick>;
 // Where every sheet group of every tile starts in `entries`.
@@ -40,8 +39,6 @@ override ECONOMIES: bool = false;
 override CUT: bool = false;
 override FIRST_HIT: bool = false;
 
-// Read once: a uniform read in a loop costs a software driver a gather.
-var<private> frame: Frame;
 var<private> gather: Gather;
 
 // The subgroup.
@@ -60,52 +57,6 @@ const UNITS = 8u;
 // Pixels of a thread.
 const PIXELS = 4u;
 
-// The four sheets of a group at a thread's four pixels: red, green, blue and alpha columns.
-struct Sheets {
-    first: mat4x4f,
-    second: mat4x4f,
-    third: mat4x4f,
-    fourth: mat4x4f,
-}
-
-// What a voxel adds to a sheet at four pixels.
-fn added(section: vec4f, amount: vec4f) -> mat4x4f {
-    return mat4x4f(section * amount.x, section * amount.y, section * amount.z, section * amount.w);
-}
-
-// Of a thread's four pixels the sheet depths from and to which their rays show something, and those of first hits, as bits.
-var<private> shown_from: vec4f;
-var<private> shown_to: vec4f;
-var<private> hits: vec4u;
-
-// A sheet over or under what is there, at four pixels; its slab begins at a sheet depth.
-fn composite_sheet(image: mat4x4f, sheet: mat4x4f, near: f32) -> mat4x4f {
-    var pixels = transpose(sheet);
-    var first = vec4f(near);
-    var last = vec4f(near + frame.slab_width);
-    if CUT {
-        first = max(first, shown_from);
-        last = min(last, shown_to);
-        let share = max(last - first, vec4f(0.0)) / frame.slab_width;
-        pixels = mat4x4f(pixels[0] * share.x, pixels[1] * share.y, pixels[2] * share.z, pixels[3] * share.w);
-    }
-    let result = mat4x4f(
-        composite(image[0], pixels[0], COMPOSITING, ORDER),
-        composite(image[1], pixels[1], COMPOSITING, ORDER),
-        composite(image[2], pixels[2], COMPOSITING, ORDER),
-        composite(image[3], pixels[3], COMPOSITING, ORDER),
-    );
-    if FIRST_HIT {
-        let before = transpose(image)[3];
-        let after = transpose(result)[3];
-        let is_hit = (before < vec4f(cut.first_hit)) & (after >= vec4f(cut.first_hit));
-        let sheet_depths = mix(first, last, (cut.first_hit - before) / (after - before));
-        let here = vec4u(noted(sheet_depths.x), noted(sheet_depths.y), noted(sheet_depths.z), noted(sheet_depths.w));
-        hits = select(hits, here, is_hit);
-    }
-    return result;
-}
-
 // The frame's sheets from the first that a kernel overlaps to the one after the last.
 fn overlapped_sheets(p: vec4f) -> vec2f {
     let sheets = (overlapped(p, gather.depth_error, PERSPECTIVE) - gather.near) / frame.slab_width;
@@ -113,8 +64,6 @@ fn overlapped_sheets(p: vec4f) -> vec2f {
 }
 
 fn draw(tile: u32, thread: u32) {
-    frame = frame_uniform;
-    gather = gather_uniform;
     let color_ramp = ramp_of(0u, frame.ramps.x);
     let opacity_ramp = ramp_of(frame.ramps.x, frame.ramps.y);
     let gradient_opacity_ramp = ramp_of(frame.ramps.y, frame.ramps.z);
@@ -145,15 +94,8 @@ fn draw(tile: u32, thread: u32) {
         image[3] = acc[slot + 3u * frame.size.x];
     }
     var is_shown = is_inside;
+    look(column, rows);
     if CUT {
-        let across = array<vec2f, 4>(
-            shown(vec2f(column, rows.x)),
-            shown(vec2f(column, rows.y)),
-            shown(vec2f(column, rows.z)),
-            shown(vec2f(column, rows.w)),
-        );
-        shown_from = vec4f(across[0].x, across[1].x, across[2].x, across[3].x);
-        shown_to = vec4f(across[0].y, across[1].y, across[2].y, across[3].y);
         is_shown &= shown_from < shown_to;
     }
     if FIRST_HIT {
@@ -185,7 +127,8 @@ fn draw(tile: u32, thread: u32) {
             break;
         }
         passes += gather.passes_per_group;
-        if cursor == end {
+        if cursor == end && COMPOSITING != MINIMUM {
+            image = after_gap(image);
             continue;
         }
         let group = select(gather.groups - 1u - at, at, ORDER == FRONT_TO_BACK);
@@ -199,7 +142,8 @@ fn draw(tile: u32, thread: u32) {
         let reaching_low = vec3f(region.open_low - margin - middle, near - reach);
         let reaching_high = vec3f(region.open_high + margin - middle, far + reach);
         var sheets = Sheets();
-        var has_drawn = false;
+        // What is empty counts for the least.
+        var has_drawn = COMPOSITING == MINIMUM;
 
         // Entries are fetched one per lane: the brick's number, corner and voxels.
         var to_visit = 0u;
@@ -353,6 +297,9 @@ fn draw(tile: u32, thread: u32) {
             }
         }
 
+        if !has_drawn {
+            image = after_gap(image);
+        }
         for (; has_drawn; has_drawn = false) {
             let width = frame.slab_width;
             if ORDER == FRONT_TO_BACK {
@@ -426,13 +373,17 @@ fn main(
 ) {
     lanes = subgroup_size;
     lane = subgroup_invocation_id;
+    start(workgroup.z);
+    gather = gathers[zero];
     let tile = part.first_tile + unfold(workgroup);
     var is_left = false;
     if tile < part.end_tile {
-        let first_bin = tile * gather_uniform.groups;
+        let first_bin = tile * gather.groups;
         let unit = firstTrailingBit(subgroupOr(1u << (thread / 8u)));
-        let at = atomicLoad(&gathered.words[gather_uniform.reached + tile * UNITS + unit]);
-        is_left = starts[first_bin + at] < starts[first_bin + gather_uniform.groups];
+        let at = atomicLoad(&gathered.words[gather.reached + tile * UNITS + unit]);
+        // Groups without bricks count for the least, also behind the last brick of the tile.
+        let first = select(at, 0u, COMPOSITING == MINIMUM && at < gather.groups);
+        is_left = starts[first_bin + first] < starts[first_bin + gather.groups];
     }
     for (; is_left; is_left = false) {
         draw(tile, thread);

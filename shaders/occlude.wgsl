@@ -3,7 +3,6 @@
 // without rounding, and on bits. In perspective every group has its box, and boxes shrink on the way back: what a larger box in front
 // has left in a tile holds for the smaller one, too. One workgroup per tile, one thread per row of 32 pixels.
 
-@group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> group: Group;
 @group(0) @binding(2) var<storage, read> occluding: TileList;
 @group(0) @binding(3) var<storage, read> source: array<u32>;
@@ -29,6 +28,7 @@ fn word_of(workgroup: vec3u, thread: u32) -> Word {
 // Down the columns, from every pixel on; rows off the image count as opaque.
 @compute @workgroup_size(32)
 fn columns(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
+    start(workgroup.z);
     let word = word_of(workgroup, thread);
     if !word.inside {
         return;
@@ -54,6 +54,7 @@ fn row_word(y: u32, x: u32) -> u32 {
 // Along the rows, from every pixel on.
 @compute @workgroup_size(32)
 fn rows(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
+    start(workgroup.z);
     let word = word_of(workgroup, thread);
     if !word.inside {
         return;

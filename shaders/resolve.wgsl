@@ -1,6 +1,5 @@
 // Lays the compositing buffer over the background (SPEC §5): premultiplied in, premultiplied out.
 
-@group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> band: Band;
 @group(0) @binding(2) var<storage, read> acc: array<vec4f>;
 
@@ -23,10 +22,21 @@ fn vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) instance:
 
 @fragment
 fn fragment(corner: Corner) -> @location(0) vec4f {
+    start(u32(corner.position.z));
     let pixel = vec2u(vec2i(corner.position.xy) - corner.origin);
     var image = acc[(pixel.y - band.first_row) * frame.size.x + pixel.x];
-    if frame.compositing == XRAY {
-        image = min(image, vec4f(1.0));
+    switch frame.compositing {
+        case XRAY, AVERAGE: {
+            image = min(image, vec4f(1.0));
+        }
+        case MINIMUM: {
+            image.a = select(2.0 - image.a, 0.0, image.a == 0.0);
+        }
+        case SURFACE: {
+            image = select(vec4f(0.0), image, image.a >= 1.0);
+        }
+        default: {
+        }
     }
     image += (1.0 - image.a) * frame.background;
     if LINEAR_LIGHT && image.a > 0.0 {

@@ -2,5 +2,6 @@
 
 @fragment
 fn fragment(quad: Quad) -> One {
+    start(u32(quad.position.z));
     return One(composite(vec4f(0.0), quad.amount * section(quad, 0u), frame.compositing, FRONT_TO_BACK));
 }

@@ -1,7 +1,6 @@
 // Projects and shades the voxels that are drawn for the first time, so once each (Fig. 12). SPEC §3 for classification and
 // shading. Only here does a voxel need its gradient: most are hidden, and never do (§6).
 
-@group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> bricks: array<Brick>;
 @group(0) @binding(2) var values: texture_2d_array<f32>;
 // The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0); then the table of labels.
@@ -14,6 +13,7 @@
 
 @compute @workgroup_size(64)
 fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
+    start(workgroup.z);
     let at = unfold(workgroup) * SHADE_WORKGROUP + thread;
     if at >= args.count {
         return;

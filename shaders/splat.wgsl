@@ -22,6 +22,7 @@ struct Quad {
 
 @vertex
 fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Quad {
+    start(vertex >> 31u);
     // The last instance may have fewer quads: the others repeat the last one, without area.
     let quad = instance * QUADS + vertex / 4u;
     let splat = splats[instances[min(quad, args.count - 1u)]];
@@ -89,17 +90,20 @@ fn sections(quad: Quad) -> vec4f {
 
 @fragment
 fn fragment_1(quad: Quad) -> One {
+    start(u32(quad.position.z));
     return One(quad.amount * sections(quad).x);
 }
 
 @fragment
 fn fragment_2(quad: Quad) -> Two {
+    start(u32(quad.position.z));
     let s = sections(quad);
     return Two(quad.amount * s.x, quad.amount * s.y);
 }
 
 @fragment
 fn fragment_4(quad: Quad) -> Four {
+    start(u32(quad.position.z));
     let s = sections(quad);
     return Four(quad.amount * s.x, quad.amount * s.y, quad.amount * s.z, quad.amount * s.w);
 }

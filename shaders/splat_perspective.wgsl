@@ -2,16 +2,19 @@
 
 @fragment
 fn fragment_1(quad: Quad) -> One {
+    start(u32(quad.position.z));
     return One(quad.amount * section(quad, 0u));
 }
 
 @fragment
 fn fragment_2(quad: Quad) -> Two {
+    start(u32(quad.position.z));
     return Two(quad.amount * section(quad, 0u), quad.amount * section(quad, 1u));
 }
 
 @fragment
 fn fragment_4(quad: Quad) -> Four {
+    start(u32(quad.position.z));
     return Four(
         quad.amount * section(quad, 0u),
         quad.amount * section(quad, 1u),

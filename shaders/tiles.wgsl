@@ -1,6 +1,5 @@
 // Which tiles a sheet group composites, and around which the occlusion buffer changes (§6). One workgroup.
 
-@group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> group: Group;
 @group(0) @binding(2) var<storage, read_write> culled: Culled;
 // 1 for tiles whose pixels are all opaque: no splat changes them any more.
@@ -35,7 +34,8 @@ fn is_near_composited(at: vec2u, grid: vec2u) -> bool {
 }
 
 @compute @workgroup_size(256)
-fn main(@builtin(local_invocation_index) thread: u32) {
+fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
+    start(workgroup.z);
     let grid = tile_grid(frame.size);
     let count = grid.x * grid.y;
     // The lists' order does not matter: tiles do not overlap.

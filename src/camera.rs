@@ -90,19 +90,37 @@ impl Camera {
         Some(given.unwrap_or(whole * (f64::from(height) / f64::from(width)).max(1.0)))
     }
 
+    /// `fov_y`, `distance` and `near` of a perspective camera: as given, or so that the volume's sphere ([`Grid::bounding_radius`]) fits
+    /// between the image's upper and lower edge, and one [`Grid::unit`]. `None` for an orthographic camera.
+    fn perspective(&self, grid: &Grid, kernel_radius: f64) -> Option<[f64; 3]> {
+        let Projection::Perspective { fov_y, distance, near } = self.projection else { return None };
+        let whole = grid.bounding_radius(kernel_radius) / (fov_y.to_radians() / 2.0).sin();
+        Some([fov_y, distance.unwrap_or(whole), near.unwrap_or(grid.unit())])
+    }
+
+    /// The same camera with all of its projection given: what it shows of this volume by default it shows of any.
+    pub fn explicit(&self, grid: &Grid, kernel_radius: f64, width: u32, height: u32) -> Self {
+        let projection = match self.perspective(grid, kernel_radius) {
+            Some([fov_y, distance, near]) => {
+                Projection::Perspective { fov_y, distance: Some(distance), near: Some(near) }
+            }
+            None => Projection::Orthographic { height: self.orthographic_height(grid, kernel_radius, width, height) },
+        };
+        Self { projection, ..*self }
+    }
+
     /// The eye of a perspective camera over an image `height` pixels high; `None` for an orthographic one. The default distance
-    /// shows the volume's sphere ([`Grid::bounding_radius`]) between the image's upper and lower edge, whatever its width.
+    /// shows the volume's sphere whole from top to bottom, whatever the image's width.
     ///
     /// # Errors
     /// If pixels at the near plane or at the far end of the volume are too small or too large for `f32`.
     pub fn eye(&self, grid: &Grid, kernel_radius: f64, height: u32) -> Result<Option<Eye>, RenderError> {
-        let Projection::Perspective { fov_y, distance, near } = self.projection else { return Ok(None) };
-        let half_angle = fov_y.to_radians() / 2.0;
+        let Some([fov_y, distance, near]) = self.perspective(grid, kernel_radius) else { return Ok(None) };
         let (unit, sphere) = (grid.unit(), grid.bounding_radius(kernel_radius));
-        let distance = distance.unwrap_or(sphere / half_angle.sin()) / unit;
+        let [distance, near] = [distance, near].map(|world| world / unit);
         let position = self.center / unit - distance * self.basis().w;
-        let pixel_per_depth = 2.0 * half_angle.tan() / f64::from(height);
-        let eye = Eye { position, distance, near: near.unwrap_or(unit) / unit, pixel_per_depth };
+        let pixel_per_depth = 2.0 * (fov_y.to_radians() / 2.0).tan() / f64::from(height);
+        let eye = Eye { position, distance, near, pixel_per_depth };
         let (least, largest) = (PIXELS.start() / pixel_per_depth, PIXELS.end() / pixel_per_depth);
         let farthest = position.length() + sphere / unit;
         let (key, found, allowed) = if !(least..=largest).contains(&eye.near) {

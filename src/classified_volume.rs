@@ -74,7 +74,8 @@ impl ClassifiedVolume {
         self.volume.labels().filter(|_| self.shades_by_label())
     }
 
-    fn shades_by_label(&self) -> bool {
+    /// Whether shading asks for labels.
+    pub(crate) fn shades_by_label(&self) -> bool {
         self.transfer.labels.values().any(LabelTables::matter_to_shading)
     }
 
@@ -172,6 +173,13 @@ impl ClassifiedVolume {
         let mut transfer = self.transfer.clone();
         transfer.labels.entry(label).or_default().visible = visible;
         self.set_transfer_function(transfer)
+    }
+
+    /// Bytes of GPU memory that the volume will hold once prepared.
+    pub(crate) fn estimate(&self) -> Result<u64, RenderError> {
+        let [values, both] = GpuVolume::estimate(self.volume.device(), self.volume().values().len() as u32)?;
+        let has_labels = self.shades_by_label() || self.volume.labels().is_some();
+        Ok(if has_labels { both } else { values })
     }
 
     /// Bytes of GPU memory, with the volume's, which other views may share ([`GpuVolume::gpu_bytes`]).

@@ -1,5 +1,5 @@
-//! Clipping: planes and a crop box that cut parts of a volume away, with all their kernels (§8 of the paper leaves it open; every
-//! viewer has it).
+//! Clipping: planes and a crop box that cut parts of a volume away, with all their kernels. The paper has none; every viewer
+//! does.
 //!
 //! What is cut is the field that the kernels make, ray by ray: of a pixel's ray a single stretch is inside of all planes, and a
 //! sheet counts there by the share of its slab that the stretch covers. Cuts are as fine as slabs, whatever their direction, and move

@@ -30,6 +30,15 @@ pub struct FootprintTable {
 }
 
 impl FootprintTable {
+    /// Bytes of a table's texels.
+    pub fn bytes(form: FootprintForm) -> u64 {
+        let [size, layers, numbers] = match form {
+            FootprintForm::Sections => [SECTION_SIZE, SECTIONS, 1],
+            FootprintForm::SummedArea => [SUMMED_AREA_SIZE, SUMMED_AREA_LAYERS, 2],
+        };
+        u64::from(size * size * layers * numbers) * size_of::<f32>() as u64
+    }
+
     /// The table for slabs `width` wide (warped grid units; the summed-area form serves every width).
     pub fn new(form: FootprintForm, kernel: &Kernel, width: f64) -> Self {
         match form {

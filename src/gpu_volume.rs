@@ -39,9 +39,12 @@ impl GpuVolume {
     }
 
     /// What [`Self::gpu_bytes`] of a volume of so many voxels, at most 2³² - 1, will be: as long as no view shades by label, and after that.
-    pub fn estimate(voxels: u32) -> [u64; 2] {
-        let [values, labels] = VolumeTexture::estimate(voxels.into());
-        [values, values + labels]
+    ///
+    /// # Errors
+    /// If the volume needs more layers than the device's textures have.
+    pub fn estimate(device: &Device, voxels: u32) -> Result<[u64; 2], RenderError> {
+        let [values, labels] = VolumeTexture::estimate(&device.limits(), voxels.into())?;
+        Ok([values, values + labels])
     }
 
     /// The volume.

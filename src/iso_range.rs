@@ -19,6 +19,11 @@ pub fn ordinal(value: f32) -> u32 {
     if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
 }
 
+/// The value of an [`ordinal`].
+pub fn of_ordinal(ordinal: u32) -> f32 {
+    f32::from_bits(if ordinal >> 31 == 1 { ordinal & !(1 << 31) } else { !ordinal })
+}
+
 /// Ordinal of the first `f32` that is at least `x`.
 fn at_least(x: f64) -> u32 {
     let nearest = x as f32;
@@ -141,6 +146,7 @@ mod tests {
         let values = [f32::MIN, -1.0, -f32::from_bits(1), 0.0, f32::from_bits(1), 1.0, 1.0_f32.next_up(), f32::MAX];
         assert!(values.map(ordinal).is_sorted_by(|a, b| a < b));
         assert_eq!(ordinal(-0.0), ordinal(0.0));
+        assert_eq!(values.map(ordinal).map(of_ordinal), values);
     }
 
     #[test]

@@ -9,6 +9,7 @@
 //!
 //! ```text
 //! volume file → Volume ─ classify → ClassifiedVolume: its values, and which voxels of which bricks take part, on the GPU
+//!                      ─ appearance: what the scene leaves open, such as the transfer function
 //! scene file  → Scene  ─ View, FramePlan or TileBins: which bricks every group of sheets looks at (plain data)
 //! SceneView: both, and what the next frame can keep of the last one
 //!
@@ -80,11 +81,13 @@
 //! space between two slicing planes ([`slab`]) · *kernel section* the part of a kernel in one slab · *footprint* a section
 //! integrated along the view ray ([`footprint`]) · *sheet buffer* the image of one slab · *sheet group* consecutive sheets drawn
 //! together · *compositing buffer* the accumulated image · *opacity buffer* its alpha · *occlusion buffer* the box-filtered
-//! opacity buffer · *bucket* what touches one slab or group ([`bucket`]) · *iso-range* a closed interval of values that take
+//! opacity buffer · *mean* of a sheet, what it holds at a pixel over the length of the ray in its slab
+//! ([`splatting::Compositing`]) · *bucket* what touches one slab or group ([`bucket`]) · *iso-range* a closed interval of values that take
 //! part ([`iso_range`]) · *label* which segment of a segmented volume a voxel belongs to
 //! ([`Volume::labels`](volume::Volume::labels)) · *brick* 4×4×4 neighbouring voxels ([`brick`]) ·
 //! *tile* a 32×32 pixel square; of the tile rasterizer 16×16.
 
+pub mod appearance;
 pub mod brick;
 pub mod bucket;
 pub mod camera;
@@ -104,6 +107,7 @@ pub mod headless;
 pub mod image;
 pub mod iso_range;
 pub mod kernel;
+pub mod means;
 pub mod pass;
 pub mod pick;
 pub mod placement;

@@ -27,7 +27,7 @@ pub struct FramePlan {
     pub sheets: u32,
     /// For every list its bricks, sorted by first group.
     pub orders: Vec<Vec<u32>>,
-    /// The groups that any brick may reach into.
+    /// The groups that any brick may reach into, and those that count without.
     pub groups: Vec<GroupPlan>,
 }
 
@@ -43,8 +43,15 @@ pub struct GroupPlan {
 }
 
 impl FramePlan {
-    /// Buckets the bricks of every list (§5.1), in groups of `sheets` sheets.
-    pub fn new<'a>(lists: impl IntoIterator<Item = &'a [Brick]>, view: View, sheets: u32, order: Order) -> Self {
+    /// Buckets the bricks of every list (§5.1), in groups of `sheets` sheets. The sheet depths `covered` count even where they hold
+    /// nothing.
+    pub fn new<'a>(
+        lists: impl IntoIterator<Item = &'a [Brick]>,
+        view: View,
+        sheets: u32,
+        order: Order,
+        covered: Range<f64>,
+    ) -> Self {
         // A group is a thick slab.
         let groups = view.slabs.groups(sheets);
         let buckets: Vec<Buckets> = lists
@@ -67,15 +74,20 @@ impl FramePlan {
                 buckets
             })
             .collect();
-        let first = buckets.iter().filter_map(|b| b.range().map(|range| range.start)).min().unwrap_or(0);
-        let end = buckets.iter().filter_map(|b| b.range().map(|range| range.end)).max().unwrap_or(0);
+        let covered = groups.covered(covered);
+        let all: Vec<Range<i32>> = buckets.iter().filter_map(Buckets::range).chain(covered.clone()).collect();
+        let first = all.iter().map(|range| range.start).min().unwrap_or(0);
+        let end = all.iter().map(|range| range.end).max().unwrap_or(0);
+        let counts = |group: i32| covered.as_ref().is_some_and(|covered| covered.contains(&group));
         let mut plans: Vec<GroupPlan> = (first..end)
             .map(|group| GroupPlan {
                 first_slab: group * sheets as i32,
                 planes: groups.plane(group)..groups.plane(group + 1),
                 bricks: buckets.iter().map(|buckets| buckets.touching(group)).collect(),
             })
-            .filter(|group| group.bricks.iter().any(|range| !range.is_empty()))
+            .zip(first..end)
+            .filter(|(group, number)| counts(*number) || group.bricks.iter().any(|range| !range.is_empty()))
+            .map(|(group, _)| group)
             .collect();
         if order == Order::BackToFront {
             plans.reverse();

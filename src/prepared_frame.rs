@@ -49,6 +49,40 @@ pub(crate) enum Drawing {
     Samples(Box<SampleFrame>),
 }
 
+/// What of a view's last frame the next one may take over.
+#[derive(Debug, Default)]
+pub(crate) struct Kept {
+    pub(crate) drawing: Option<Drawing>,
+    pub(crate) compositing: Option<CompositingBuffer>,
+    pub(crate) uniform: Option<Buffer>,
+    pub(crate) control_points: Option<Buffer>,
+    pub(crate) cut: Option<Buffer>,
+    /// So that a host that bound it need not bind it again.
+    pub(crate) first_hits: Option<Texture>,
+    pub(crate) totals: Option<Totals>,
+    /// If nobody waits for the counts in it.
+    pub(crate) staging: Option<Buffer>,
+}
+
+impl Kept {
+    /// For a frame of `view`, drawn into sheets of such a format and number.
+    pub(crate) fn of(frame: Option<PreparedFrame>, sheets: (TextureFormat, u32), view: &View) -> Self {
+        let Some(old) = frame else { return Self::default() };
+        let same_size = old.compositing.size == view.size;
+        Self {
+            // That of another renderer may have other sheets.
+            drawing: (old.sheets == sheets).then_some(old.drawing),
+            compositing: same_size.then_some(old.compositing),
+            uniform: Some(old.uniform),
+            control_points: Some(old.control_points),
+            cut: Some(old.cut),
+            first_hits: old.first_hits.filter(|_| same_size).map(|hits| hits.texture),
+            totals: old.totals.filter(|_| old.view == *view),
+            staging: old.staging.map(|staging| staging.buffer),
+        }
+    }
+}
+
 impl PreparedFrame {
     /// Bytes of GPU memory that the frame and its volume hold.
     pub(crate) fn gpu_bytes(&self) -> u64 {

@@ -3,30 +3,31 @@
 
 use std::sync::OnceLock;
 
-use wgpu::{BufferUsages, CommandEncoder, Device, Queue, RenderPass, TextureFormat, TextureView};
+use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Queue, RenderPass, TextureFormat, TextureView};
 
 use crate::error::{RenderError, check_device};
 use crate::fault::scoped;
+use crate::gpu::bindings::{Wanted, grown, sizes, wanted, wanted_for, written};
 use crate::gpu::device::{self, DeviceError, DeviceRequirements};
-use crate::gpu::layout::{Frame, Tally};
-use crate::gpu::targets::CompositingBuffer;
+use crate::gpu::layout::{Cut, Frame, Tally};
+use crate::gpu::targets::{CompositingBuffer, no_surfaces};
 use crate::gpu::timer::{PASS_BYTES, Timer};
-use crate::gpu::uniforms::{self, Ramps};
-use crate::kernel::Kernel;
-use crate::pass::composite::{CutBuffers, RayMode};
+use crate::gpu::uniforms;
+use crate::pass::composite::CutBuffers;
 use crate::pass::first_hit::FirstHit;
 use crate::pass::resolve::Resolve;
 use crate::placement::Placement;
-use crate::prepared_frame::{Drawing, FirstHits, PreparedFrame};
+use crate::prepared_frame::{Drawing, FirstHits, Kept, PreparedFrame};
+use crate::rasterizer::Given;
 use crate::rasterizer::quads::QuadRasterizer;
+use crate::rasterizer::request::FrameRequest;
 use crate::rasterizer::samples::SampleRasterizer;
 use crate::rasterizer::tiles::TileRasterizer;
-use crate::rasterizer::{Given, filled};
+use crate::rasterizer::way::{Way, insists_on_tiles};
 use crate::renderer_options::RendererOptions;
 use crate::scene_view::{Prepared, SceneView};
-use crate::splatting::{Compositing, Economies, FootprintBox, Method, Order, Rasterizer, Splatting};
+use crate::splatting::Rasterizer;
 use crate::stats::Staging;
-use crate::view::View;
 
 /// The pipelines of every stage, for one device. Volumes and frames are separate and can be many.
 #[derive(Debug)]
@@ -101,46 +102,74 @@ impl Renderer {
         })
     }
 
+    /// Bytes of GPU memory that a new view with these settings will hold once prepared, [`SceneView::gpu_bytes`], exactly; nothing is
+    /// allocated, and [`Self::prepare`] will refuse for limits' sake what this refuses. Sorts bricks into buckets as a first frame does.
+    /// What the volume itself takes, and whether to upload it, [`GpuVolume::estimate`](crate::gpu_volume::GpuVolume::estimate) says.
+    ///
+    /// # Errors
+    /// If the scene asks for something not implemented, or for more than the device's limits allow.
+    pub fn estimate(&self, view: &SceneView) -> Result<u64, RenderError> {
+        check_device(view.volume.gpu_volume().device(), &self.device, "the renderer")?;
+        let request = self.request(view)?;
+        let limits = self.device.limits();
+        let settled = view.volume.lists.settled(&limits);
+        let lists = settled.lists();
+        let by_label = view.volume.shades_by_label();
+        let tiles = match request.way {
+            Way::Tiles => {
+                let bricks = (settled.all(), lists.len());
+                match TileRasterizer::estimate(&limits, &request, bricks, by_label) {
+                    Err(error) if insists_on_tiles(&request.splatting) => return Err(error),
+                    needs => needs.ok(),
+                }
+            }
+            Way::Quads | Way::Samples => None,
+        };
+        let needs = match (tiles, request.way) {
+            (Some(needs), _) => needs,
+            (None, Way::Samples) => {
+                let bricks = (view.volume.grid(), settled.all());
+                SampleRasterizer::estimate(&limits, &request, bricks, self.sheet_format)?
+            }
+            (None, _) => QuadRasterizer::estimate(&limits, &request, &lists, (self.sheet_format, self.sheets))?,
+        };
+        let passes = needs.passes + 1;
+        let timer = if self.profile { Timer::estimate(&self.device, passes) } else { None };
+        let buffers = [
+            frame_uniform(),
+            control_points(&request),
+            cut_uniform(),
+            staging(timestamps_at(needs.groups), timer.is_some(), passes),
+        ];
+        let volume = view.volume.estimate()? + settled.gpu_bytes();
+        let compositing = CompositingBuffer::estimate(request.view.size, request.bands.len());
+        let counts = timer.unwrap_or(0) + sizes(&limits, &buffers)?;
+        Ok(volume + compositing + needs.bytes + request.hit_bytes() + counts)
+    }
+
+    fn request(&self, view: &SceneView) -> Result<FrameRequest, RenderError> {
+        let SceneView { volume, scene, surfaces, first_hit, .. } = view;
+        FrameRequest::new(&self.device, volume, scene, (surfaces.as_ref(), *first_hit), self.rasterizer)
+    }
+
     fn prepare_unscoped(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
-        let SceneView { volume, scene, surfaces, first_hit, frame } = view;
-        let splatting = &self.settled(scene.splatting);
-        let size = [scene.image.width, scene.image.height];
-        let seen = View::new(volume.grid(), &scene.camera, splatting, size)?;
-        let kernel = Kernel::new(splatting.radius, splatting.falloff);
         // What can fail comes before anything is taken from the last frame.
-        let compositing = match frame {
-            Some(old) if old.compositing.size == size => None,
-            _ => Some(CompositingBuffer::new(device, size)?),
-        };
-        let rays = RayMode { cut: surfaces.is_some() || !scene.clip.is_empty(), first_hit: first_hit.is_some() };
-        check_rays(device, splatting, rays, *first_hit, size)?;
-        let grid = *volume.grid();
-        let depths = match surfaces {
-            Some(surfaces) => Some((surfaces.depths(&seen, &grid)?, surfaces.origin)),
-            None => None,
-        };
-        let way = way(device, splatting)?;
+        let request = self.request(view)?;
+        let SceneView { volume, scene, surfaces, frame, .. } = view;
         volume.flush(device, queue)?;
-        let old = frame.take();
-        let (old_compositing, uniform, control_points, cut, drawing, totals) =
-            old.map_or_else(Default::default, |old| {
-                let PreparedFrame { sheets, compositing, uniform, control_points, cut, drawing, totals, view, .. } =
-                    old;
-                // That of another renderer may have other sheets.
-                let drawing = (sheets == (self.sheet_format, self.sheets)).then_some(drawing);
-                let totals = totals.filter(|_| view == seen);
-                (Some(compositing), Some(uniform), Some(control_points), Some(cut), drawing, totals)
-            });
-        let Some(compositing) = compositing.or(old_compositing) else { unreachable!("made where there was none") };
-        let ramps = Ramps::new(volume.transfer());
-        let filled = |old, label: &'static str, bytes: &[u8], usage| filled(device, queue, old, label, bytes, usage);
+        let sheets = (self.sheet_format, self.sheets);
+        let kept = Kept::of(frame.take(), sheets, &request.view);
+        let FrameRequest { view: seen, kernel, ramps, rays, .. } = &request;
+        let size = seen.size;
+        let grid = *volume.grid();
+        let compositing = kept.compositing.unwrap_or_else(|| CompositingBuffer::new(device, size, &request.bands));
+        let write = |old, wanted: &Wanted, bytes: &[u8]| written(device, queue, old, wanted, bytes);
         let points = bytemuck::cast_slice(&ramps.points);
-        let control_points = filled(control_points, "sheetsplat.control_points", points, BufferUsages::STORAGE)?;
-        let frame_uniform = uniforms::frame(&seen, &kernel, volume.grid(), &ramps, scene);
-        let bytes = bytemuck::bytes_of(&frame_uniform);
-        let uniform = filled(uniform, "sheetsplat.frame", bytes, BufferUsages::UNIFORM)?;
-        let cut_uniform = uniforms::cut(&seen, &grid, &scene.clip, depths, *first_hit);
-        let cut = filled(cut, "sheetsplat.cut", bytemuck::bytes_of(&cut_uniform), BufferUsages::UNIFORM)?;
+        let control_points = write(kept.control_points, &control_points(&request), points)?;
+        let frame_values = uniforms::frame(seen, kernel, &grid, ramps, scene);
+        let uniform = write(kept.uniform, &frame_uniform(), bytemuck::bytes_of(&frame_values))?;
+        let cut_values = uniforms::cut(seen, &grid, scene, request.surfaces, request.first_hit);
+        let cut = write(kept.cut, &cut_uniform(), bytemuck::bytes_of(&cut_values))?;
         let cut_buffers = CutBuffers {
             uniform: &cut,
             surfaces: match surfaces {
@@ -153,23 +182,19 @@ impl Renderer {
             device,
             queue,
             volume,
-            view: &seen,
-            kernel: &kernel,
-            splatting,
+            request: &request,
             frame: &uniform,
             control_points: &control_points,
-            ramp_lengths: ramps.lengths(),
             compositing: &compositing,
-            rays,
             cut: cut_buffers,
         };
-        let was = drawing.as_ref().map(Drawing::rasterizer);
-        let (drawing, prepared) = self.draw_with(given, way, &frame_uniform, drawing)?;
-        let totals = totals.filter(|_| !prepared.bucketed && was == Some(drawing.rasterizer()));
+        let was = kept.drawing.as_ref().map(Drawing::rasterizer);
+        let (drawing, prepared) = self.draw_with(given, kept.drawing)?;
+        let totals = kept.totals.filter(|_| !prepared.bucketed && was == Some(drawing.rasterizer()));
 
         let first_hits = drawing.first_hits().filter(|_| rays.first_hit).map(|words| {
             let stage = self.first_hit.get_or_init(|| FirstHit::new(device));
-            let texture = FirstHit::texture(device, size);
+            let texture = kept.first_hits.unwrap_or_else(|| FirstHit::texture(device, size));
             let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
             FirstHits { group: stage.bind(device, &uniform, cut_buffers, words), texture, view }
         });
@@ -177,24 +202,16 @@ impl Renderer {
         // The rasterizer's passes, and resolve.
         let passes = drawing.passes() + 1;
         let timer = if self.profile { Timer::new(device, passes) } else { None };
-        let timestamps =
-            (size_of::<Tally>() as u64 + drawing.group_slabs().firsts.len() as u64 * 4).next_multiple_of(8);
-        let staging = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("sheetsplat.counts"),
-            size: timestamps + timer.as_ref().map_or(0, |_| passes as u64 * PASS_BYTES),
-            usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
+        let timestamps = timestamps_at(drawing.group_slabs().firsts.len());
+        let staging = grown(device, kept.staging, &staging(timestamps, timer.is_some(), passes))?;
         let timer_bytes = timer.as_ref().map_or(0, Timer::gpu_bytes);
-        let pixels = u64::from(size[0]) * u64::from(size[1]);
-        let hit_bytes = first_hits.as_ref().map_or(0, |_| 4 * pixels);
-        let shared_bytes = compositing.gpu_bytes() + uniform.size() + control_points.size() + cut.size() + hit_bytes;
-        let count_bytes = staging.size() + timer_bytes;
+        let buffers: u64 = [&uniform, &control_points, &cut, &staging].map(Buffer::size).iter().sum();
+        let shared_bytes = compositing.gpu_bytes() + buffers + request.hit_bytes() + timer_bytes;
         *frame = Some(PreparedFrame {
-            gpu_bytes: volume.gpu_bytes() + drawing.gpu_bytes() + shared_bytes + count_bytes,
-            sheets: (self.sheet_format, self.sheets),
+            gpu_bytes: volume.gpu_bytes() + drawing.gpu_bytes() + shared_bytes,
+            sheets,
             resolve_groups: compositing.bands.iter().map(|band| self.resolve.bind(device, &uniform, band)).collect(),
-            view: seen,
+            view: *seen,
             drawing,
             compositing,
             uniform,
@@ -209,13 +226,7 @@ impl Renderer {
     }
 
     /// Prepares a rasterizer's part: by tiles, unless the view does not fit them and the scene does not insist.
-    fn draw_with(
-        &self,
-        given: Given<'_>,
-        way: Way,
-        frame: &Frame,
-        previous: Option<Drawing>,
-    ) -> Result<(Drawing, Prepared), RenderError> {
+    fn draw_with(&self, given: Given<'_>, previous: Option<Drawing>) -> Result<(Drawing, Prepared), RenderError> {
         let (mut old_quads, mut old_tiles, mut old_samples) = (None, None, None);
         match previous {
             Some(Drawing::Quads(frame)) => old_quads = Some(*frame),
@@ -223,25 +234,20 @@ impl Renderer {
             Some(Drawing::Samples(frame)) => old_samples = Some(*frame),
             None => {}
         }
-        if way == Way::Samples {
-            let (frame, prepared) = self.samples(given.device).prepare(given, frame, old_samples)?;
+        let FrameRequest { way, splatting, .. } = given.request;
+        if *way == Way::Samples {
+            let (frame, prepared) = self.samples(given.device).prepare(given, old_samples)?;
             return Ok((Drawing::Samples(Box::new(frame)), prepared));
         }
-        if way == Way::Tiles {
+        if *way == Way::Tiles {
             match self.tiles.prepare(given, old_tiles) {
                 Ok((frame, prepared)) => return Ok((Drawing::Tiles(Box::new(frame)), prepared)),
-                Err(error) if insists_on_tiles(given.splatting) => return Err(error),
+                Err(error) if insists_on_tiles(splatting) => return Err(error),
                 Err(_) => {}
             }
         }
         let (frame, prepared) = self.quads(given.device).prepare(given, old_quads)?;
         Ok((Drawing::Quads(Box::new(frame)), prepared))
-    }
-
-    /// The settings, with the renderer's rasterizer where they leave the choice.
-    fn settled(&self, splatting: Splatting) -> Splatting {
-        let is_open = splatting.rasterizer == Rasterizer::Auto && !insists_on_tiles(&splatting);
-        Splatting { rasterizer: if is_open { self.rasterizer } else { splatting.rasterizer }, ..splatting }
     }
 
     fn samples(&self, device: &Device) -> &SampleRasterizer {
@@ -330,90 +336,26 @@ impl Renderer {
     }
 }
 
-/// How to draw.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Way {
-    Quads,
-    /// If the view fits.
-    Tiles,
-    Samples,
+fn frame_uniform() -> Wanted {
+    wanted_for("sheetsplat.frame", size_of::<Frame>() as u64, BufferUsages::UNIFORM)
 }
 
-/// Checks that the settings allow what of rays is looked at.
-fn check_rays(
-    device: &Device,
-    splatting: &Splatting,
-    rays: RayMode,
-    first_hit: Option<f64>,
-    [width, height]: [u32; 2],
-) -> Result<(), RenderError> {
-    let refused = |key, found: String, allowed: String| Err(RenderError::OutOfRange { key, found, allowed });
-    if splatting.method == Method::CompositeEverySample && rays != RayMode::default() {
-        let found = "\"composite-every-sample\" with clip planes, surfaces or first hits".to_owned();
-        return refused("splatting.method", found, "a method with sheets".to_owned());
-    }
-    let Some(opacity) = first_hit else { return Ok(()) };
-    let hides = splatting.culling && splatting.compositing != Compositing::Xray;
-    let most = if hides { splatting.opacity_threshold } else { 1.0 };
-    if !(opacity > 0.0 && opacity <= most) {
-        let allowed = format!("above 0, at most {most}{}", if hides { ", the opacity_threshold" } else { "" });
-        return refused("first_hit", opacity.to_string(), allowed);
-    }
-    if splatting.order != Order::FrontToBack {
-        return refused(
-            "splatting.order",
-            "\"back-to-front\" with first hits".to_owned(),
-            "\"front-to-back\"".to_owned(),
-        );
-    }
-    let limits = device.limits();
-    let actual = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    let required = 4 * u64::from(width) * u64::from(height);
-    if required > actual {
-        let (what, limit) = ("the image's first hits", "max_storage_buffer_binding_size");
-        return Err(RenderError::Limit { what, limit, required, actual });
-    }
-    Ok(())
+fn cut_uniform() -> Wanted {
+    wanted_for("sheetsplat.cut", size_of::<Cut>() as u64, BufferUsages::UNIFORM)
 }
 
-/// A depth texture that nobody reads.
-fn no_surfaces(device: &Device) -> TextureView {
-    let texture = device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("sheetsplat.no_surfaces"),
-        size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: TextureFormat::Depth32Float,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING,
-        view_formats: &[],
-    });
-    texture.create_view(&wgpu::TextureViewDescriptor::default())
+fn control_points(request: &FrameRequest) -> Wanted {
+    let bytes = size_of_val(&request.ramps.points[..]) as u64;
+    wanted_for("sheetsplat.control_points", bytes, BufferUsages::STORAGE)
 }
 
-/// How to draw.
-///
-/// # Errors
-/// If the settings insist on what the device or the other settings do not allow.
-fn way(device: &Device, splatting: &Splatting) -> Result<Way, RenderError> {
-    let insists = insists_on_tiles(splatting);
-    match (splatting.rasterizer, TileRasterizer::obstacle(device, splatting)) {
-        (Rasterizer::Quads, _) if insists => Err(RenderError::OutOfRange {
-            key: "splatting.rasterizer",
-            found: "\"quads\" with splatting.footprint_box = \"parallelogram\", whole_below, beta or resolution"
-                .to_owned(),
-            allowed: "\"tiles\" or \"auto\" with them".to_owned(),
-        }),
-        (Rasterizer::Tiles | Rasterizer::Auto, Some(obstacle)) if insists => Err(obstacle),
-        _ if splatting.method == Method::CompositeEverySample => Ok(Way::Samples),
-        (Rasterizer::Tiles | Rasterizer::Auto, None) => Ok(Way::Tiles),
-        _ => Ok(Way::Quads),
-    }
+/// Where counts of so many sheet groups end, bytes.
+fn timestamps_at(groups: usize) -> u64 {
+    (size_of::<Tally>() as u64 + groups as u64 * 4).next_multiple_of(8)
 }
 
-/// Whether quads will not do.
-fn insists_on_tiles(splatting: &Splatting) -> bool {
-    splatting.rasterizer == Rasterizer::Tiles
-        || splatting.footprint_box == FootprintBox::Parallelogram
-        || splatting.economies != Economies::default()
+/// For counts, and behind them the timestamps of so many passes, if they are timed.
+fn staging(timestamps: u64, timed: bool, passes: usize) -> Wanted {
+    let bytes = timestamps + if timed { passes as u64 * PASS_BYTES } else { 0 };
+    wanted("sheetsplat.counts", bytes, BufferUsages::COPY_DST | BufferUsages::MAP_READ)
 }

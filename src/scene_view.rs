@@ -34,14 +34,11 @@ impl SceneView {
     /// volume is not looked at.
     ///
     /// # Errors
-    /// If the volume has no labels and the scene has tables for some, or if the scene's clip planes are none; if the volume is on
+    /// If the volume has no labels and the scene has tables or a preset for some, or if the scene's clip planes are none; if the volume is on
     /// another device, or the device fails.
     pub fn new(device: &Device, volume: &GpuVolume, scene: &Scene) -> Result<Self, RenderError> {
         check_device(device, volume.device(), "the volume")?;
-        if !scene.transfer.labels.is_empty() && volume.volume().labels().is_none() {
-            let (key, found) = ("transfer.label", "tables for a volume without labels".to_owned());
-            return Err(RenderError::OutOfRange { key, found, allowed: "none, or labels in the volume".to_owned() });
-        }
+        scene.transfer.check(volume.volume())?;
         scene.clip.check()?;
         let transfer = scene.transfer.resolve(volume.volume());
         let clipped = scene.clip.voxels(volume.volume().grid(), scene.splatting.radius);
@@ -119,7 +116,9 @@ impl SceneView {
     }
 
     /// Asks for the depth at which every pixel's opacity reaches a value, above 0 and at most 1; `None` for none. Front to back only, and
-    /// with culling at most [`Splatting::opacity_threshold`]. See [`Self::first_hits`] and [`Self::pick`].
+    /// with culling at most [`Splatting::opacity_threshold`]; not for [`Compositing::Minimum`](crate::splatting::Compositing::Minimum), and
+    /// whatever the value that of the surface for [`Compositing::Surface`](crate::splatting::Compositing::Surface). See
+    /// [`Self::first_hits`] and [`Self::pick`].
     pub fn set_first_hit(&mut self, opacity: Option<f64>) {
         self.first_hit = opacity;
     }

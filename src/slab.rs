@@ -36,6 +36,11 @@ impl SlabGrid {
         first as i32..end as i32
     }
 
+    /// The slabs that these depths overlap; `None` if there are none.
+    pub fn covered(&self, depths: Range<f64>) -> Option<Range<i32>> {
+        (depths.start < depths.end).then(|| self.touched(depths.start, depths.end))
+    }
+
     /// Checks that a volume which reaches `depth` from its centre, kernels included, is cut into at most [`MAX_SLABS`].
     ///
     /// # Errors

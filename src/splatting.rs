@@ -1,5 +1,7 @@
 //! Splatting settings (SPEC §§4–6): kernel, slabs, compositing, early splat elimination.
 
+use crate::error::RenderError;
+
 /// Which voxels share a sheet buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
@@ -21,6 +23,11 @@ pub enum FootprintForm {
 }
 
 /// How a sheet's accumulated amount becomes colour and opacity; numbered as in the shaders.
+///
+/// From [`Self::Maximum`] on it is sheets' means that count: amounts are opacities per unit length, as for [`Self::Linear`], and the mean of
+/// a sheet at a pixel is what it holds there over the length of the pixel's ray within its slab, in `unit`s (axis-aligned: from one slice
+/// to the next), so the mean opacity per unit length, and colour times that. What a cut leaves of a slab counts by its share of the slab, but for
+/// [`Self::Minimum`]. They need sheets, so a method other than [`Method::CompositeEverySample`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Compositing {
     /// The paper's: opacities add up within a sheet, at most to 1.
@@ -29,6 +36,36 @@ pub enum Compositing {
     Exponential,
     /// Summed projection, clamped to 1 at the end.
     Xray,
+    /// Maximum intensity: of the means along a ray the one of most opacity, the nearest of equal ones. Above 1 opacity is scaled to 1
+    /// first.
+    Maximum,
+    /// Minimum intensity: the one of least opacity, of the slabs whose middle on the ray lies where kernels are complete: in the box of
+    /// voxel centres, less the kernel's radius on every side but no more than a quarter of the box; in perspective also as far beyond the near plane
+    /// as kernels reach; and inside of all that cuts. Where that stretch is shorter than a slab, it is the slab around its middle. Nothing
+    /// where the ray misses it.
+    Minimum,
+    /// The sum of sheets over the length of the ray in the volume, which is what the ray's part in the box of voxels (half a voxel
+    /// around their centres) shows, from the near plane on. Every channel is clamped to 1. Nothing where the ray misses the box of voxel
+    /// centres.
+    Average,
+    /// An iso-surface's look: opaque where the mean opacity first reaches one half, if it grows evenly from the middle of a slab to that of the
+    /// next, with the colour that the mean has there. Nothing in front of it counts. Front to back only.
+    Surface,
+}
+
+impl Compositing {
+    /// How many there are.
+    pub const COUNT: usize = 7;
+
+    /// Whether sheets' means count.
+    pub fn is_by_means(self) -> bool {
+        matches!(self, Self::Maximum | Self::Minimum | Self::Average | Self::Surface)
+    }
+
+    /// Whether what is opaque hides what lies behind it: nothing else can be culled (§6).
+    pub fn hides(self) -> bool {
+        matches!(self, Self::Linear | Self::Exponential | Self::Surface)
+    }
 }
 
 /// The order in which sheets meet the compositing buffer; numbered as in the shaders.
@@ -69,7 +106,8 @@ pub struct Economies {
     /// 0 for none.
     pub whole_below: f64,
     /// β-acceleration: where everything within a kernel's box has this opacity by then, the kernel is projected whole, into the first
-    /// group of sheets that it reaches. Changes no channel by more than `1 - beta`. Front to back only; 1 for off.
+    /// group of sheets that it reaches. Changes no channel by more than `1 - beta`. Front to back only, and none for
+    /// [`Compositing::Surface`]; 1 for off.
     pub beta: f64,
     /// A footprint ends where it adds less than this to its sheet's alpha. 0 for the whole kernel.
     pub resolution: f64,
@@ -100,12 +138,13 @@ pub struct Splatting {
     /// In which order sheets are composited.
     pub order: Order,
     /// Opacity from which a pixel counts as opaque, above 0, at most 1 (§6): with culling no channel differs by more than
-    /// 1 minus this from the image without.
+    /// 1 minus this from the image without. For [`Compositing::Surface`] it is 1.
     pub opacity_threshold: f64,
-    /// Early splat elimination (§6): splats behind opaque pixels alone are not drawn. Without effect back to front and for
-    /// `Xray`.
+    /// Early splat elimination (§6): splats behind opaque pixels alone are not drawn. Without effect back to front and where
+    /// nothing hides ([`Compositing::hides`]).
     pub culling: bool,
-    /// Composite only tiles that received splats (§6). Never changes the image.
+    /// Composite only tiles that received splats (§6). Never changes the image. Without effect for [`Compositing::Minimum`], which looks at
+    /// what is empty, too.
     pub tiles: bool,
     /// How kernel sections get to the pixels.
     pub rasterizer: Rasterizer,
@@ -113,6 +152,29 @@ pub struct Splatting {
     pub footprint_box: FootprintBox,
     /// What is left out where it hardly shows.
     pub economies: Economies,
+}
+
+impl Splatting {
+    /// Checks that the settings go together, whatever the device and the rasterizer.
+    ///
+    /// # Errors
+    /// If means are asked for where there are no sheets, or surfaces back to front.
+    pub fn check(&self) -> Result<(), RenderError> {
+        let refused = |found: String, allowed: &str| {
+            let (key, allowed) = ("splatting.compositing", allowed.to_owned());
+            Err(RenderError::OutOfRange { key, found, allowed })
+        };
+        let name = format!("{:?}", self.compositing).to_lowercase();
+        if self.compositing.is_by_means() && self.method == Method::CompositeEverySample {
+            let found = format!("\"{name}\" with splatting.method = \"composite-every-sample\"");
+            return refused(found, "\"linear\", \"exponential\" or \"xray\" with it, or a method with sheets");
+        }
+        if self.compositing == Compositing::Surface && self.order == Order::BackToFront {
+            let found = format!("\"{name}\" with splatting.order = \"back-to-front\"");
+            return refused(found, "\"front-to-back\" with it");
+        }
+        Ok(())
+    }
 }
 
 impl Default for Splatting {

@@ -138,7 +138,8 @@ struct Pixels {
 }
 
 impl TileBins {
-    /// Sorts bricks by the tiles and groups they may touch, with kernels of the radius `support`. A thread passes through loops at most
+    /// Sorts bricks by the tiles and groups they may touch, with kernels of the radius `support`. The sheet depths `covered` are in some
+    /// group even where they hold nothing. A thread passes through loops at most
     /// `search_passes` times to look up a voxel's control points in memory. Neither list may have more than `most_words` words.
     ///
     /// # Errors
@@ -147,6 +148,7 @@ impl TileBins {
         bricks: &[Brick],
         view: &View,
         order: Order,
+        covered: Range<f64>,
         support: f64,
         search_passes: u32,
         most_words: u64,
@@ -156,14 +158,16 @@ impl TileBins {
         };
         check("bricks", bricks.len() as u64, MAX_BRICKS as u64)?;
         let placed = place(bricks, view);
-        let first_group = placed.iter().map(|brick| brick.groups.start).min().unwrap_or(0);
-        let end_group = placed.iter().map(|brick| brick.groups.end).max().unwrap_or(0);
+        let planes = view.slabs.groups(SHEETS);
+        let covered = planes.covered(covered);
+        let all = || placed.iter().map(|brick| &brick.groups).chain(&covered);
+        let first_group = all().map(|groups| groups.start).min().unwrap_or(0);
+        let end_group = all().map(|groups| groups.end).max().unwrap_or(0);
         let groups = (end_group - first_group) as u32;
         let [columns, rows] = view.size.map(|pixels| pixels.div_ceil(SIDE));
         let bins = u64::from(columns) * u64::from(rows) * u64::from(groups);
         check("tiles times sheet groups", bins, most_words - 1)?;
 
-        let planes = view.slabs.groups(SHEETS);
         let half_boxes: Vec<DVec2> = (first_group..end_group)
             .map(|group| view.half_box(support, planes.plane(group)..planes.plane(group + 1)))
             .collect();

@@ -5,8 +5,6 @@ use std::ops::{Add, Mul};
 
 use glam::DVec3;
 
-use crate::volume::Volume;
-
 /// Why control points make no [`Ramp`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -51,6 +49,12 @@ impl<T: Copy + Add<Output = T> + Mul<f64, Output = T>> Ramp<T> {
             return Err(RampError::NotIncreasing { index: before + 1 });
         }
         Ok(Self { points })
+    }
+
+    /// A ramp through points that are known to be as [`Self::new`] asks for.
+    pub(crate) fn through(points: Vec<(f64, T)>) -> Self {
+        debug_assert!(!points.is_empty() && points.is_sorted_by(|a, b| a.0 < b.0));
+        Self { points }
     }
 
     /// The control points, by increasing position.
@@ -146,6 +150,11 @@ impl Tables<'_> {
 }
 
 impl TransferFunction {
+    /// Colour and opacity by value, and nothing else.
+    pub(crate) fn by_value(color: Ramp<DVec3>, opacity: Ramp<f64>) -> Self {
+        Self { color, opacity, gradient_opacity: None, iso_ranges: None, labels: BTreeMap::new() }
+    }
+
     /// The tables that voxels of a label go by; `None` for those of a volume that is not segmented.
     pub fn tables(&self, label: Option<u16>) -> Tables<'_> {
         let own = label.and_then(|label| self.labels.get(&label));
@@ -167,105 +176,4 @@ impl TransferFunction {
     pub fn in_iso_range(&self, value: f64) -> bool {
         self.tables(None).in_iso_range(value)
     }
-
-    /// A transfer function for volumes that come without one: a nearly opaque surface around what stands out from the
-    /// background, skin-coloured, whitening towards high values. A constant volume becomes a grey haze.
-    pub fn from_histogram(volume: &Volume) -> Self {
-        let (color, opacity) = match Surface::find(volume.values()) {
-            Some(Surface { background, threshold, bright }) => {
-                // Soft enough that the surface shows no voxel steps, and always clear of the background.
-                let half_width = (threshold - background) / 3.0;
-                (
-                    vec![(threshold, DVec3::new(0.92, 0.74, 0.62)), (bright, DVec3::new(1.0, 0.95, 0.85))],
-                    vec![(threshold - half_width, 0.0), (threshold + half_width, 0.9)],
-                )
-            }
-            None => (vec![(0.0, DVec3::splat(0.7))], vec![(0.0, 0.5)]),
-        };
-        Self {
-            color: Ramp { points: color },
-            opacity: Ramp { points: opacity },
-            gradient_opacity: None,
-            iso_ranges: None,
-            labels: BTreeMap::new(),
-        }
-    }
-}
-
-/// What a histogram tells about the object in a volume; `background < threshold < bright`.
-struct Surface {
-    /// The background's mean value.
-    background: f64,
-    /// The value that separates the object from the background.
-    threshold: f64,
-    /// What only the brightest eighth of the object exceeds.
-    bright: f64,
-}
-
-impl Surface {
-    const BINS: usize = 256;
-
-    /// `None` if all values are the same.
-    ///
-    /// Otsu's threshold tells object from background. It lies half way between their means, though, where faint parts
-    /// (skin, leaves, thin branches) are lost; where object meets background, samples mix the two, so the surface is
-    /// put half way between the background's mean and the object's faintest eighth.
-    fn find(values: &[f32]) -> Option<Self> {
-        let (lo, hi) = values.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), &v| (lo.min(v), hi.max(v)));
-        if lo >= hi {
-            return None;
-        }
-        let (least, range) = (f64::from(lo), f64::from(hi) - f64::from(lo));
-        let (mut counts, mut least_count) = ([0.0; Self::BINS], 0.0);
-        for &value in values {
-            let bin = (f64::from(value) - least) / range * Self::BINS as f64;
-            counts[(bin as usize).min(Self::BINS - 1)] += 1.0;
-            least_count += if value == lo { 1.0 } else { 0.0 };
-        }
-        let value_of = |bin: f64| least + (bin + 0.5) / Self::BINS as f64 * range;
-
-        // Sparse data, such as a labelled cell: its background was cleared already, all the rest is object.
-        let (background, first) = if least_count > 0.99 * values.len() as f64 {
-            counts[0] -= least_count;
-            (least, 0)
-        } else {
-            let first = otsu_split(&counts);
-            let (count, sum) = count_and_sum(&counts[..first]);
-            (value_of(sum / count), first)
-        };
-        let object = &counts[first..];
-        let (object_count, _) = count_and_sum(object);
-        let quantile = |share: f64| {
-            let mut left = share * object_count;
-            let bin = object.iter().position(|count| {
-                left -= count;
-                left <= 0.0
-            });
-            value_of((first + bin.unwrap_or(object.len() - 1)) as f64)
-        };
-        Some(Self { background, threshold: (background + quantile(0.125)) / 2.0, bright: quantile(0.875) })
-    }
-}
-
-/// The first bin of the upper class when the variance between the two classes is the greatest (Otsu 1979). Neither the
-/// first bin nor the last one may be empty.
-fn otsu_split(counts: &[f64]) -> usize {
-    let (total_count, total_sum) = count_and_sum(counts);
-    let (mut count, mut sum) = (0.0, 0.0);
-    let (mut best, mut best_variance) = (1, 0.0);
-    for split in 1..counts.len() {
-        count += counts[split - 1];
-        sum += counts[split - 1] * (split - 1) as f64;
-        let distance = (total_sum - sum) / (total_count - count) - sum / count;
-        let variance = count * (total_count - count) * distance * distance;
-        if variance > best_variance {
-            (best, best_variance) = (split, variance);
-        }
-    }
-    best
-}
-
-/// The number of values in some bins, and the sum of their bins' indices.
-fn count_and_sum(counts: &[f64]) -> (f64, f64) {
-    counts.iter().enumerate().fold((0.0, 0.0), |(count, sum), (bin, &n)| (count + n, sum + n * bin as f64))
 }

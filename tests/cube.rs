@@ -92,9 +92,13 @@ fn the_cube_does_not_pop() {
         assert!((0.045..0.055).contains(&rms), "{name}: {rms}");
         assert!(ratio > 1.2, "{name}: {ratio}");
     }
-    // A lit layer that hides all behind it.
     scene.splatting.method = Method::ImageAligned;
     scene.splatting.compositing = Compositing::Exponential;
+    for (name, Turned { rms, ratio }) in by_all(&scene) {
+        assert!(rms <= 0.00165, "{name}: {rms}");
+        assert!(1.0027 < ratio && ratio < cosines, "{name}: {ratio}");
+    }
+    // A lit layer that hides all behind it.
     scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0), (255.0, 1.0)]).unwrap());
     for (name, Turned { ratio, .. }) in by_all(&scene) {
         assert!((ratio / cosines - 1.0).abs() < 0.001, "{name}: {ratio}, not {cosines}");

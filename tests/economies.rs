@@ -68,6 +68,8 @@ fn the_twin_economises_alike() {
             (orthographic, Compositing::Exponential, Order::BackToFront),
             (eye(), Compositing::Exponential, Order::FrontToBack),
             (eye(), Compositing::Xray, Order::FrontToBack),
+            (eye(), Compositing::Maximum, Order::BackToFront),
+            (orthographic, Compositing::Average, Order::FrontToBack),
         ] {
             for economies in [faint, all, fine, coarse] {
                 scene.camera.projection = projection;

@@ -5,7 +5,7 @@
 mod common;
 
 use sheetsplat::error::RenderError;
-use sheetsplat::fault::DeviceFault;
+use sheetsplat::fault::{DeviceFault, scoped};
 use sheetsplat::gpu::device::DeviceError;
 use sheetsplat::scene::Scene;
 use sheetsplat::splatting::Rasterizer;
@@ -146,4 +146,24 @@ fn too_large_an_image_is_out_of_memory_and_the_device_goes_on() {
     let after = gpu.draw(&mut view).unwrap();
     assert!(after.image == before.image);
     assert_eq!(after.stats.gpu_bytes, before.stats.gpu_bytes);
+}
+
+/// What a device cannot compile: a host's shader in the library's scope. The device goes on.
+#[test]
+fn a_shader_that_does_not_compile_is_an_error_and_the_device_goes_on() {
+    let gpu = gpu();
+    let descriptor = |source: &'static str| wgpu::ShaderModuleDescriptor {
+        label: Some("host.shader"),
+        source: wgpu::ShaderSource::Wgsl(source.into()),
+    };
+    let compiled = |source| scoped(gpu.device(), || gpu.device().create_shader_module(descriptor(source)));
+    for source in ["fn main() { return 1; }", "@compute fn main() {}", "not a shader"] {
+        match compiled(source) {
+            Err(DeviceFault::Validation(message)) => assert!(message.contains("host.shader"), "{message}"),
+            other => panic!("{source}: {other:?}"),
+        }
+    }
+    assert!(compiled("@compute @workgroup_size(1) fn main() {}").is_ok());
+    let (volume, scene) = head();
+    gpu.render_volume(volume, &scene).unwrap();
 }

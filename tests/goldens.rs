@@ -25,7 +25,7 @@ const OPACITY_THRESHOLD: f64 = 0.999;
 const MAX_BYTES: u64 = 64 << 10;
 
 /// Name, builtin volume, and the settings that differ from the defaults.
-const SCENES: [(&str, &str, &[&str]); 13] = [
+const SCENES: [(&str, &str, &[&str]); 17] = [
     ("head", "head:72", &["image={width=160,height=160}", "camera={direction=[0.5,0.85,-0.2],height=170.0}"]),
     (
         "head-xray",
@@ -134,6 +134,49 @@ const SCENES: [(&str, &str, &[&str]); 13] = [
             "camera={direction=[0.2,0.7,-0.7],height=70.0}",
             "transfer={color=[[100,[0.3,0.5,0.9]],[150,[1,0.9,0.5]]],opacity=[[115,0],[130,0.9]]}",
             "splatting={footprint=\"sections\",slab_width=0.7}",
+        ],
+    ),
+    (
+        "head-surface",
+        "head:72",
+        &[
+            "image={width=144,height=144,background=[1,1,1,1]}",
+            "camera={direction=[-0.6,0.75,-0.25],height=170.0}",
+            "splatting.compositing=\"surface\"",
+        ],
+    ),
+    (
+        "nerve-maximum",
+        "nerve:128",
+        &[
+            "image={width=160,height=128}",
+            "camera={direction=[0.3,0.4,-0.85],height=480.0}",
+            "transfer={color=[[0,[0.3,0.1,0.5]],[255,[1,0.9,0.6]]],opacity=[[0,0],[255,1]]}",
+            "shading.enabled=false",
+            "splatting={compositing=\"maximum\",slab_width=0.5}",
+        ],
+    ),
+    (
+        "head-minimum",
+        "head:64",
+        &[
+            "image={width=128,height=128}",
+            "camera={direction=[0.5,0.8,-0.3],height=130.0}",
+            "clip.crop=[[-35,-40,-30],[35,40,40]]",
+            "transfer={color=[[0,[1,1,1]]],opacity=[[0,0],[200,1]]}",
+            "shading.enabled=false",
+            "splatting.compositing=\"minimum\"",
+        ],
+    ),
+    (
+        "tomato-average",
+        "tomato:64",
+        &[
+            "image={width=144,height=112}",
+            "camera={direction=[0.4,0.6,-0.6],height=230.0}",
+            "transfer={color=[[40,[0.9,0.2,0.1]],[120,[1,0.6,0.2]],[220,[0.9,1,0.6]]],opacity=[[10,0],[90,1]]}",
+            "shading.enabled=false",
+            "splatting.compositing=\"average\"",
         ],
     ),
 ];

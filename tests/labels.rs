@@ -146,7 +146,13 @@ fn broken_label_files_are_refused() {
     assert!(matches!(Labels::open(&other), Err(VolumeError::Invalid { field, .. }) if field == "format"));
 
     let volume = builtin::volume("cube:4").unwrap();
-    let labels = Labels { origin: "here".to_owned(), dims: volume.dims(), spacing: None, values: Arc::new([1; 63]) };
+    let labels = Labels {
+        origin: "here".to_owned(),
+        dims: volume.dims(),
+        spacing: None,
+        values: Arc::new([1; 63]),
+        names: BTreeMap::new(),
+    };
     let message = volume.with_labels(labels).unwrap_err().to_string();
     assert_eq!(message, "here: data: found 63 labels, allowed: 64 labels");
 }
@@ -155,7 +161,9 @@ fn broken_label_files_are_refused() {
 fn a_label_file_replaces_the_builtin_labels() {
     let folder = Folder::new();
     folder.write("labels.nrrd", "type: uint8\nsizes: 8 8 5", &[9; 320]);
-    assert_eq!(folder.load("builtin = 'head:8'").unwrap().labels(), Some(&[9; 320][..]));
+    let volume = folder.load("builtin = 'head:8'").unwrap();
+    assert_eq!((volume.labels(), volume.label_names().get(&2)), (Some(&[9; 320][..]), None));
+    assert_eq!(builtin::volume("head:8").unwrap().label_names()[&2], "skull");
     folder.write("labels.nrrd", "type: uint8\nsizes: 8 8 8", &[5; 512]);
     assert_eq!(folder.load("builtin = 'cube:8'").unwrap().labels(), Some(&[5; 512][..]));
 }
@@ -171,7 +179,9 @@ fn segmented(labels: &[u16], spacing: [f64; 3]) -> Volume {
         labels[(block.x + 2 * block.y + 5 * block.z) as usize % labels.len()]
     };
     let values = (0..dims.element_product()).map(label).collect();
-    volume.with_labels(Labels { origin: "blocks".to_owned(), dims, spacing: None, values }).unwrap()
+    volume
+        .with_labels(Labels { origin: "blocks".to_owned(), dims, spacing: None, values, names: BTreeMap::new() })
+        .unwrap()
 }
 
 fn ramp<T>(points: &[(f64, T)]) -> Option<Ramp<T>>
@@ -306,7 +316,7 @@ fn labels_in_several_layers() {
     let values = (0..dims.element_product()).map(|index| if near(index) { 200.0 } else { 0.0 }).collect();
     let labels: Arc<[u16]> = (0..dims.element_product()).map(|index| (index * 7 / 3 % 4) as u16).collect();
     let volume = Volume::new("layers", dims, DVec3::ONE, values).unwrap();
-    let labels = Labels { origin: "layers".to_owned(), dims, spacing: None, values: labels };
+    let labels = Labels { origin: "layers".to_owned(), dims, spacing: None, values: labels, names: BTreeMap::new() };
     let volume = volume.with_labels(labels).unwrap();
     let mut scene = scene(64, 48);
     scene.camera = camera([0.02, 0.5, -0.9], 30.0);
@@ -347,4 +357,19 @@ fn tables_without_labels_are_an_error() {
     // A label that no voxel has is none: one transfer function serves many volumes.
     scene.transfer.labels = tables(&[77]).collect();
     gpu.render_volume(builtin::volume("head:8").unwrap(), &scene).unwrap();
+}
+
+/// As 3D Slicer writes segmentations.
+#[test]
+fn names_of_segments_are_read() {
+    let folder = Folder::new();
+    let segments = "Segment0_ID:=Segment_1\nSegment0_LabelValue:=5\nSegment0_Name:=left lung: lower\nSegment1_Name:=no value\n\
+                    Segment2_LabelValue:=many\nSegment2_Name:=bad\nSegment3_LabelValue:=7\nother_LabelValue:=9\nother_Name:=no";
+    folder.write("labels.nrrd", &format!("type: uint8\nsizes: 2 3 2\n{segments}"), &[5; 12]);
+    let names = BTreeMap::from([(5, "left lung: lower".to_owned())]);
+    assert_eq!(folder.load(PATH).unwrap().label_names(), &names);
+    // Of a volume whose values are labels; so they are even if there is but one.
+    let volume = Volume::open(&folder.0.path().join("labels.nrrd")).unwrap();
+    assert_eq!(volume.label_names(), &names);
+    assert!(sheetsplat::appearance::categories::is_label_map(&volume));
 }

@@ -58,6 +58,9 @@ fn shared() -> [Layout; 15] {
             surface_depth,
             surface_w,
             planes,
+            box_at,
+            box_along,
+            box_half,
             surface_origin,
             no_surface,
             first_hit,
@@ -101,7 +104,7 @@ fn shared() -> [Layout; 15] {
             headlight,
             last_label
         }),
-        layout!(Group { half_box, box_filter, culling, near, first_brick, brick_count, index, padding }),
+        layout!(Group { half_box, box_filter, culling, near, first_brick, brick_count, index, number }),
         layout!(Brick { present, x, y, z, extent }),
         layout!(BrickState { hidden, shaded }),
         layout!(Visit { drawn, fresh, brick, padding }),

@@ -20,7 +20,7 @@ use sheetsplat::splatting::{Compositing, FootprintForm, Method, Rasterizer, Spla
 use sheetsplat::transfer_function::{Ramp, TransferFunction};
 use sheetsplat::volume::{Volume, builtin};
 
-use common::{RASTERIZERS, Random, camera, gpu, scene, transfer};
+use common::{COMPOSITINGS, RASTERIZERS, Random, camera, gpu, scene, transfer};
 
 fn skin() -> TransferSettings {
     transfer(&[(20.0, [0.2, 0.4, 0.9]), (200.0, [1.0, 0.8, 0.6])], &[(60.0, 0.0), (120.0, 0.6), (255.0, 1.0)])
@@ -29,12 +29,6 @@ fn skin() -> TransferSettings {
 fn head() -> (Arc<Volume>, Scene) {
     let scene = Scene { camera: camera([0.5, 0.8, -0.2], 170.0), transfer: skin(), ..scene(90, 75) };
     (Arc::new(builtin::volume("head:48").unwrap()), scene)
-}
-
-/// The transfer function as settings, so that a fresh view can be made with it.
-fn settings(transfer: &TransferFunction) -> TransferSettings {
-    let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels } = transfer.clone();
-    TransferSettings { color: Some(color), opacity: Some(opacity), gradient_opacity, iso_ranges, labels }
 }
 
 /// The voxels that take part, by a scan.
@@ -50,7 +44,7 @@ fn taking_part(volume: &Volume, transfer: &TransferFunction) -> Vec<bool> {
 
 fn assert_fresh(gpu: &Headless, view: &mut SceneView, name: &str) {
     let drawn = gpu.draw(view).unwrap();
-    let scene = Scene { transfer: settings(view.volume().transfer()), ..view.scene().clone() };
+    let scene = Scene { transfer: view.volume().transfer().clone().into(), ..view.scene().clone() };
     let fresh = gpu.render_volume(view.volume().volume().clone(), &scene).unwrap();
     assert!(drawn.image == fresh.image, "{name}: the image is not that of a fresh view");
     let counts = |rendering: &sheetsplat::headless::Rendering| {
@@ -280,6 +274,30 @@ fn knobs_are_turned_at_run_time() {
             let name = format!("{rasterizer:?}, {footprint:?}, {projection:?}: {name}");
             assert_eq!(prepare(&mut view), Prepared { bucketed, tabled }, "{name}");
             assert_fresh(&gpu, &mut view, &name);
+        }
+    }
+}
+
+/// From any compositing to any other. Buckets stay, but for the least: it looks at what is empty, too.
+#[test]
+fn every_compositing_is_a_fresh_one() {
+    let gpu = gpu();
+    let looks_at_all = |compositing| compositing == Compositing::Minimum;
+    for rasterizer in RASTERIZERS {
+        let (volume, mut scene) = head();
+        scene.splatting.rasterizer = rasterizer;
+        let mut view = gpu.view(volume, &scene).unwrap();
+        gpu.draw(&mut view).unwrap();
+        for skip in 1..COMPOSITINGS.len() {
+            for at in 0..COMPOSITINGS.len() {
+                let [old, compositing] =
+                    [view.scene().splatting.compositing, COMPOSITINGS[at * skip % COMPOSITINGS.len()]];
+                view.set_splatting(Splatting { compositing, ..view.scene().splatting });
+                let name = format!("{rasterizer:?}: {old:?}, then {compositing:?}");
+                let prepared = gpu.renderer().prepare(gpu.device(), gpu.queue(), &mut view).unwrap();
+                assert_eq!(prepared.bucketed, looks_at_all(old) != looks_at_all(compositing), "{name}");
+                assert_fresh(&gpu, &mut view, &name);
+            }
         }
     }
 }

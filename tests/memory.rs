@@ -5,14 +5,17 @@
 mod common;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::GpuVolume;
-use sheetsplat::headless::Headless;
+use sheetsplat::camera::Projection;
+use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::scene::Scene;
+use sheetsplat::shading::Light;
+use sheetsplat::splatting::{Method, Order, Splatting};
 use sheetsplat::transfer_function::LabelTables;
 use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::PollType;
+use sheetsplat::{GpuVolume, SceneView};
 
-use common::{RASTERIZERS, gpu, scene, transfer};
+use common::{FORMS, RASTERIZERS, gpu, gpu_with_small_bindings, lavapipe, scene, transfer};
 
 fn head(size: u32) -> (Volume, Scene) {
     let mut scene = scene(60, 50);
@@ -82,11 +85,11 @@ fn a_volumes_bytes_are_known_before() {
         let values = (0..count).map(|voxel| (voxel % 7) as f32).collect();
         let volume = Volume::new("steps", dims, DVec3::ONE, values).unwrap();
         let on_gpu = GpuVolume::new(gpu.device(), gpu.queue(), volume).unwrap();
-        assert_eq!(on_gpu.gpu_bytes(), GpuVolume::estimate(count)[0], "{dims}");
+        assert_eq!(on_gpu.gpu_bytes(), GpuVolume::estimate(gpu.device(), count).unwrap()[0], "{dims}");
     }
     // With labels, of whose tables some matter to shading.
     let (volume, mut scene) = head(20);
-    let [values, both] = GpuVolume::estimate(volume.values().len() as u32);
+    let [values, both] = GpuVolume::estimate(gpu.device(), volume.values().len() as u32).unwrap();
     let mut view = gpu.view(volume.clone(), &scene).unwrap();
     gpu.draw(&mut view).unwrap();
     assert_eq!(view.volume().gpu_volume().gpu_bytes(), values);
@@ -95,4 +98,111 @@ fn a_volumes_bytes_are_known_before() {
     let mut view = gpu.view(volume, &scene).unwrap();
     gpu.draw(&mut view).unwrap();
     assert_eq!(view.volume().gpu_volume().gpu_bytes(), both);
+}
+
+/// Exactly, before anything of a frame is allocated: whatever draws, of several brick lists and bands of rows, too.
+#[test]
+fn a_frames_bytes_are_known_before() {
+    let [roomy, small] = [gpu(), gpu_with_small_bindings(64 << 10)];
+    let profiling = Headless::new(&HeadlessOptions { profile: true, ..lavapipe() }).unwrap();
+    let (volume, base) = head(40);
+    let mut scenes = Vec::new();
+    for (rasterizer, footprint) in FORMS {
+        let mut scene = base.clone();
+        (scene.splatting.rasterizer, scene.splatting.footprint) = (rasterizer, footprint);
+        scenes.push(scene.clone());
+        scene.camera.projection = Projection::Perspective { fov_y: 40.0, distance: None, near: None };
+        scene.splatting.order = Order::BackToFront;
+        scenes.push(scene.clone());
+        scene.splatting.method = Method::AxisAligned;
+        scene.transfer.labels = [(1, LabelTables { color: scene.transfer.color.clone(), ..Default::default() })].into();
+        scenes.push(scene);
+    }
+    let mut every_sample = base.clone();
+    every_sample.splatting.method = Method::CompositeEverySample;
+    scenes.push(every_sample);
+    let mut empty = base.clone();
+    empty.transfer.iso_ranges = Some(vec![[-2.0, -1.0]]);
+    scenes.push(empty);
+    for (name, gpu) in [("roomy", &roomy), ("small", &small), ("profiling", &profiling)] {
+        let mut checked = 0;
+        for scene in &scenes {
+            let mut view = gpu.view(volume.clone(), scene).unwrap();
+            let Splatting { method, order, rasterizer, .. } = scene.splatting;
+            let case = format!("{name}: {method:?} {order:?} {rasterizer:?}");
+            for first_hit in [None, Some(0.2)] {
+                let asks = method != Method::CompositeEverySample && order == Order::FrontToBack;
+                view.set_first_hit(first_hit.filter(|_| asks));
+                let before = view.gpu_bytes();
+                let estimate = gpu.renderer().estimate(&view);
+                assert_eq!(view.gpu_bytes(), before, "{case}: nothing is allocated");
+                match (estimate, gpu.renderer().prepare(gpu.device(), gpu.queue(), &mut view)) {
+                    (Ok(estimate), Ok(_)) => {
+                        assert_eq!(estimate, fresh(gpu, &view), "{case} {first_hit:?}");
+                        checked += 1;
+                    }
+                    (Err(estimate), Err(error)) => assert_eq!(estimate.to_string(), error.to_string(), "{case}"),
+                    (estimate, prepared) => panic!("{case}: {estimate:?}, {prepared:?}"),
+                }
+            }
+        }
+        assert!(checked >= 10, "{name}: {checked}");
+    }
+}
+
+/// What a new view with the same settings holds.
+fn fresh(gpu: &Headless, view: &SceneView) -> u64 {
+    let volume = view.volume().gpu_volume();
+    let mut fresh = SceneView::new(gpu.device(), volume, view.scene()).unwrap();
+    fresh.set_first_hit(view.first_hits().map(|_| 0.2));
+    gpu.renderer().prepare(gpu.device(), gpu.queue(), &mut fresh).unwrap();
+    fresh.gpu_bytes()
+}
+
+/// After changes that leave room, or none, for the bricks that came.
+#[test]
+fn a_changed_views_bytes_are_known_before() {
+    let gpu = gpu();
+    let (volume, mut scene) = head(40);
+    scene.transfer.iso_ranges = Some(vec![[100.0, 110.0]]);
+    for rasterizer in RASTERIZERS {
+        scene.splatting.rasterizer = rasterizer;
+        let mut view = gpu.view(volume.clone(), &scene).unwrap();
+        for range in [[99.0, 111.0], [50.0, 255.0], [90.0, 95.0], [40.0, 255.0]] {
+            view.set_iso_ranges(Some(vec![range]));
+            let estimate = gpu.renderer().estimate(&view).unwrap();
+            let mut again = scene.clone();
+            again.transfer.iso_ranges = Some(vec![range]);
+            let mut fresh = gpu.view(volume.clone(), &again).unwrap();
+            gpu.renderer().prepare(gpu.device(), gpu.queue(), &mut fresh).unwrap();
+            assert_eq!(estimate, fresh.gpu_bytes(), "{rasterizer:?} {range:?}");
+            gpu.draw(&mut view).unwrap();
+        }
+    }
+}
+
+/// A host may bind the texture of first hits once, and the frames that follow keep no more than that.
+#[test]
+fn first_hits_stay_where_they_are() {
+    let gpu = gpu();
+    for rasterizer in RASTERIZERS {
+        let (volume, mut scene) = head(16);
+        scene.splatting.rasterizer = rasterizer;
+        let mut view = gpu.view(volume, &scene).unwrap();
+        view.set_first_hit(Some(0.1));
+        gpu.draw(&mut view).unwrap();
+        let texture = view.first_hits().unwrap().clone();
+        let (bytes, held) = (view.gpu_bytes(), allocated(&gpu));
+        for _ in 0..5 {
+            view.set_light(Light::Direction(DVec3::X));
+            gpu.draw(&mut view).unwrap();
+            assert!(*view.first_hits().unwrap() == texture, "{rasterizer:?}");
+        }
+        assert_eq!(view.gpu_bytes(), bytes);
+        assert!(allocated(&gpu) <= held + 1024, "{rasterizer:?}");
+        scene.image.width += 1;
+        view.set_image(scene.image);
+        gpu.renderer().prepare(gpu.device(), gpu.queue(), &mut view).unwrap();
+        assert!(*view.first_hits().unwrap() != texture, "of another size");
+    }
 }

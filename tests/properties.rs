@@ -52,6 +52,9 @@ fn empty_volume_is_exactly_the_background() {
             COMPOSITINGS.into_iter().flat_map(|c| [Order::FrontToBack, Order::BackToFront].map(|order| (c, order)))
         {
             (scene.splatting.compositing, scene.splatting.order) = (compositing, order);
+            if scene.splatting.check().is_err() {
+                continue;
+            }
             for background in [[0.0, 0.0, 0.0, 1.0], [0.3, 0.7, 1.0, 1.0], [0.3, 0.7, 1.0, 0.6], [1.0, 1.0, 1.0, 0.0]] {
                 scene.image.background = background;
                 let [r, g, b, a] = background;
@@ -223,7 +226,8 @@ fn back_to_front_equals_front_to_back() {
     // Close by in perspective: footprints of nearer sections reach onto the screen where farther ones do not.
     let close = Projection::Perspective { fov_y: 50.0, distance: Some(45.0), near: None };
     let projections = [scene.camera.projection, close];
-    let cases = COMPOSITINGS.into_iter().flat_map(|compositing| FORMS.map(|form| (compositing, form)));
+    let both_ways = COMPOSITINGS.into_iter().filter(|&compositing| compositing != Compositing::Surface);
+    let cases = both_ways.flat_map(|compositing| FORMS.map(|form| (compositing, form)));
     for ((compositing, form), projection) in cases.flat_map(|case| projections.map(|projection| (case, projection))) {
         (scene.splatting.compositing, scene.camera.projection) = (compositing, projection);
         (scene.splatting.rasterizer, scene.splatting.footprint) = form;
@@ -244,7 +248,7 @@ fn every_run_gives_the_same_bytes() {
     let (first, second) = (gpu(), gpu());
     let perspective = Projection::Perspective { fov_y: 60.0, distance: None, near: None };
     let projections = [scene.camera.projection, perspective, perspective];
-    let cases = COMPOSITINGS.into_iter().zip(projections);
+    let cases = COMPOSITINGS.into_iter().zip(projections.into_iter().cycle());
     for ((compositing, projection), form) in cases.flat_map(|case| FORMS.map(|form| (case, form))) {
         (scene.splatting.compositing, scene.camera.projection) = (compositing, projection);
         (scene.splatting.rasterizer, scene.splatting.footprint) = form;

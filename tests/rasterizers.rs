@@ -16,7 +16,7 @@ use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::{Features, Limits};
 
 use common::images::{BLACK, psnr};
-use common::{COMPOSITINGS, RASTERIZERS, Random, gpu, lavapipe, scene, transfer};
+use common::{BY_AMOUNTS, RASTERIZERS, Random, gpu, lavapipe, scene, transfer};
 
 fn head() -> (Volume, Scene) {
     let mut scene = scene(90, 75);
@@ -109,7 +109,7 @@ fn rasterizers_agree() {
     let (volume, mut scene) = head();
     scene.splatting.culling = false;
     let mut random = Random(61);
-    for compositing in COMPOSITINGS.into_iter().cycle().take(24) {
+    for compositing in BY_AMOUNTS.into_iter().cycle().take(24) {
         scene.splatting.compositing = compositing;
         scene.splatting.order = random.pick(&[Order::FrontToBack, Order::BackToFront]);
         scene.splatting.method = random.pick(&[Method::ImageAligned, Method::AxisAligned]);
@@ -143,8 +143,7 @@ fn small_bindings_change_no_bit_of_tiles() {
         let requirements = Some(DeviceRequirements { features: Features::SUBGROUP, limits });
         Headless::new(&HeadlessOptions { requirements, ..lavapipe() }).unwrap()
     });
-    let compositing_buffer = CompositingBuffer::new(small.device(), [300, 200]).unwrap();
-    assert_eq!(compositing_buffer.bands.len(), 7);
+    assert_eq!(CompositingBuffer::bands(&small.device().limits(), [300, 200]).unwrap().len(), 7);
     for order in [Order::FrontToBack, Order::BackToFront] {
         scene.splatting.order = order;
         let [full, small] = [&full, &small].map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap());

@@ -16,7 +16,7 @@ use sheetsplat::splatting::{Compositing, Method, Order};
 use sheetsplat::volume::{Volume, builtin};
 
 use common::images::{largest_difference, rms};
-use common::{COMPOSITINGS, Random, camera, scene, transfer};
+use common::{BY_AMOUNTS, Random, camera, scene, transfer};
 
 const METHODS: [Method; 3] = [Method::ImageAligned, Method::AxisAligned, Method::CompositeEverySample];
 
@@ -219,7 +219,7 @@ fn back_to_front_equals_front_to_back() {
     let (volume, mut scene) = head();
     let volume = volume.with_spacing("head", DVec3::new(1.0, 1.0, 2.0)).unwrap();
     let mut by_method = Vec::new();
-    for (method, compositing) in METHODS.into_iter().flat_map(|method| COMPOSITINGS.map(|c| (method, c))) {
+    for (method, compositing) in METHODS.into_iter().flat_map(|method| BY_AMOUNTS.map(|c| (method, c))) {
         for camera in [camera([0.4, 0.9, -0.3], 50.0), perspective([0.4, 0.9, -0.3], 40.0, 60.0, None)] {
             scene.camera = camera;
             (scene.splatting.method, scene.splatting.compositing) = (method, compositing);
@@ -341,7 +341,7 @@ fn no_view_breaks_down() {
         scene.camera = perspective(random.direction().to_array(), fov_y, random.uniform(0.01, 60.0), Some(near));
         scene.camera.center = random.direction() * 10.0;
         scene.splatting.method = METHODS[case % 3];
-        scene.splatting.compositing = COMPOSITINGS[case / 3 % 3];
+        scene.splatting.compositing = BY_AMOUNTS[case / 3 % 3];
         let transfer = scene.transfer.resolve(&volume);
         let culled = reference::render_culled(&volume, &transfer, &scene, Some(Test::Box)).unwrap();
         let valid = |channel: &f32| (0.0..=1.000_001).contains(channel);

@@ -14,7 +14,7 @@ use sheetsplat::stats::Counts;
 use sheetsplat::volume::Volume;
 
 use common::images::{BLACK, largest_difference, psnr};
-use common::{COMPOSITINGS, F32, RASTERIZERS, Random, SPACINGS, gpu, random_eye, random_volume, scene, transfer};
+use common::{BY_AMOUNTS, F32, RASTERIZERS, Random, SPACINGS, gpu, random_eye, random_volume, scene, transfer};
 
 /// Any view in perspective, and any along the slices, of which some are orthographic.
 fn random_case(random: &mut Random) -> (Volume, Scene) {
@@ -32,7 +32,7 @@ fn random_case(random: &mut Random) -> (Volume, Scene) {
     scene.transfer = transfer(&[(0.0, [0.2, 0.5, 1.0]), (200.0, [1.0, 0.9, 0.8])], &opacity);
     let fixed = Light::Direction(random.direction());
     scene.shading.light = random.pick(&[Light::Headlight, fixed]);
-    scene.splatting.compositing = random.pick(&COMPOSITINGS);
+    scene.splatting.compositing = random.pick(&BY_AMOUNTS);
     scene.splatting.slab_width = random.pick(&[0.5, 1.0, 2.0, 3.0]);
     scene.splatting.radius = random.pick(&[1.4, 2.0, 2.7]);
     // The twin culls nothing.

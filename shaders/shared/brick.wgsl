@@ -30,7 +30,7 @@ struct Group {
     first_brick: u32,
     brick_count: u32,
     index: u32,
-    padding: u32,
+    number: u32,
 }
 
 // What the GPU decides about the size of a draw or dispatch.

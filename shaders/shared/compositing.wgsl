@@ -8,15 +8,33 @@ fn absorbed(a: f32) -> f32 {
     return (1.0 - exp(-a)) / a;
 }
 
-// A sheet over or under what is there.
+// Where from the middle of a slab to that of the next one the mean opacity is one half.
+fn crossing(before: f32, opacity: f32) -> f32 {
+    return (0.5 - before) / (opacity - before);
+}
+
+// A sheet, or its mean, over or under what is there. `MINIMUM` keeps 2 less the opacity, so that 0 is what nothing counts for; `SURFACE`
+// the mean of the last sheet, until it is opaque.
 fn composite(behind: vec4f, sheet: vec4f, compositing: u32, order: u32) -> vec4f {
     var s = sheet;
     switch compositing {
         case EXPONENTIAL: {
             s *= absorbed(s.a);
         }
-        case XRAY: {
+        case XRAY, AVERAGE: {
             return behind + s;
+        }
+        case MAXIMUM, MINIMUM: {
+            s = vec4f(s.rgb / max(s.a, 1.0), min(s.a, 1.0));
+            s.a = select(s.a, 2.0 - s.a, compositing == MINIMUM);
+            // Of equal ones the nearer.
+            let is_taken = s.a > behind.a || order != FRONT_TO_BACK && s.a == behind.a;
+            return select(behind, s, is_taken);
+        }
+        case SURFACE: {
+            let at = mix(behind, s, crossing(behind.a, s.a));
+            let last = select(s, vec4f(2.0 * at.rgb, 1.0), s.a >= 0.5);
+            return select(last, behind, behind.a >= 1.0);
         }
         default: {
             s /= max(s.a, 1.0);

@@ -1,11 +1,14 @@
-// What clip planes and a host's surfaces leave of a pixel's ray; `gpu::layout::Cut` documents the fields. A stage that includes this
-// declares `cut: Cut` and `surfaces: texture_depth_2d`.
+// What clip planes and a host's surfaces leave of a pixel's ray, and the volume's box; `gpu::layout::Cut` documents the fields. A
+// stage that includes this declares `cut: Cut` and `surfaces: texture_depth_2d`.
 struct Cut {
     sheet_at: vec4f,
     sheet_along: vec4f,
     surface_depth: vec4f,
     surface_w: vec4f,
     planes: array<vec4f, 24>,
+    box_at: array<vec4f, 3>,
+    box_along: array<vec4f, 3>,
+    box_half: vec4f,
     surface_origin: vec2u,
     no_surface: f32,
     first_hit: f32,
@@ -18,25 +21,38 @@ struct Cut {
 // Beyond every depth.
 const FAR = 1e30;
 
-// The sheet depths at which the ray through a point of the image shows something, from and to; from beyond to, if nowhere.
-fn shown(point_px: vec2f) -> vec2f {
-    let at = vec3f(point_px - 0.5 * vec2f(frame.size), 1.0);
-    // Along w.
+// Planes that there is room for.
+const MOST_PLANES = 12u;
+
+// A point of the image as rays go by it.
+fn place_of(point_px: vec2f) -> vec3f {
+    return vec3f(point_px - 0.5 * vec2f(frame.size), 1.0);
+}
+
+// The depths along w at which the ray through a point of the image shows something, from and to.
+fn shown_depths(point_px: vec2f) -> vec2f {
+    let at = place_of(point_px);
     var depths = vec2f(-FAR, FAR);
-    for (var i = 0u; i < cut.plane_count; i += 1u) {
+    // Neither a loop's end nor an `if` depends on a uniform, for the reason that `start` gives.
+    for (var i = 0u; i < MOST_PLANES; i += 1u) {
         let distance = dot(cut.planes[2u * i].xyz, at);
         let slope = dot(cut.planes[2u * i + 1u].xyz, at);
         let crossing = -distance / slope;
-        depths.x = select(depths.x, max(depths.x, crossing), slope > 0.0);
-        depths.y = select(depths.y, min(depths.y, crossing), slope < 0.0);
-        depths.y = select(depths.y, -FAR, slope == 0.0 && distance < 0.0);
+        let is_plane = i < cut.plane_count;
+        depths.x = select(depths.x, max(depths.x, crossing), is_plane && slope > 0.0);
+        depths.y = select(depths.y, min(depths.y, crossing), is_plane && slope < 0.0);
+        depths.y = select(depths.y, -FAR, is_plane && slope == 0.0 && distance < 0.0);
     }
-    if cut.has_surfaces != 0u {
-        let z = textureLoad(surfaces, vec2u(point_px) + cut.surface_origin, 0);
-        let ndc = vec4f(at.xy, z, 1.0);
-        let surface = dot(cut.surface_depth, ndc) / dot(cut.surface_w, ndc);
-        depths.y = select(min(depths.y, surface), depths.y, z == cut.no_surface);
-    }
+    let z = textureLoad(surfaces, vec2u(point_px) + cut.surface_origin, 0);
+    let ndc = vec4f(at.xy, z, 1.0);
+    let surface = dot(cut.surface_depth, ndc) / dot(cut.surface_w, ndc);
+    let is_surface = cut.has_surfaces != 0u && z != cut.no_surface;
+    depths.y = select(depths.y, min(depths.y, surface), is_surface);
+    return depths;
+}
+
+// The sheet depths of a ray's depths; from beyond to, if those are.
+fn sheet_depths(at: vec3f, depths: vec2f) -> vec2f {
     let slope = dot(cut.sheet_along.xyz, at);
     let ends = dot(cut.sheet_at.xyz, at) + slope * depths;
     // Sheets are counted along w: a ray wide off the axis may meet slices the other way round, or stay in one.
@@ -44,9 +60,14 @@ fn shown(point_px: vec2f) -> vec2f {
     return select(vec2f(FAR, -FAR), sheets, depths.x < depths.y);
 }
 
+// The sheet depths at which the ray through a point of the image shows something, from and to; from beyond to, if nowhere.
+fn shown(point_px: vec2f) -> vec2f {
+    return sheet_depths(place_of(point_px), shown_depths(point_px));
+}
+
 // The depth along w at which the ray through a point of the image meets a sheet depth.
 fn depth_along_ray(point_px: vec2f, sheet_depth: f32) -> f32 {
-    let at = vec3f(point_px - 0.5 * vec2f(frame.size), 1.0);
+    let at = place_of(point_px);
     return (sheet_depth - dot(cut.sheet_at.xyz, at)) / dot(cut.sheet_along.xyz, at);
 }
 

@@ -1,7 +1,6 @@
 // Kernel footprints from their stored forms (§§3.2, 3.3.1), and the quads that they are drawn with: what `splat` and
 // `splat_perspective` share.
 
-@group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> group: Group;
 @group(0) @binding(2) var<storage, read> splats: array<Splat>;
 @group(0) @binding(3) var<storage, read> instances: array<u32>;

@@ -35,9 +35,25 @@ struct Frame {
     last_label: u32,
 }
 
+@group(0) @binding(0) var<uniform> frames: array<Frame, 1>;
+var<private> frame: Frame;
+var<private> zero: u32;
+
+// Every entry point's first step, with a 0 that no driver can know to be one, such as its workgroup's z. Lavapipe puts into a stage the
+// values of uniforms that decide an `if` or end a loop, and compiles it anew with each draw; of a place unknown to it, it takes them as
+// they come. And read here, they are read once: in a loop each costs it a gather.
+fn start(unknown_zero: u32) {
+    zero = unknown_zero;
+    frame = frames[unknown_zero];
+}
+
 const LINEAR = 0u;
 const EXPONENTIAL = 1u;
 const XRAY = 2u;
+const MAXIMUM = 3u;
+const MINIMUM = 4u;
+const AVERAGE = 5u;
+const SURFACE = 6u;
 
 const FRONT_TO_BACK = 0u;
 const BACK_TO_FRONT = 1u;

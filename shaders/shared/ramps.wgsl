@@ -9,7 +9,8 @@ fn ramps_of(index: u32) -> vec4u {
     if !LABELS {
         return vec4u(0u, frame.ramps.xyz);
     }
-    let label = textureLoad(labels, vec2u(index & 2047u, (index >> 11u) & 2047u), index >> 22u, 0).x;
+    let texel = texel_of(index, textureDimensions(labels).x);
+    let label = textureLoad(labels, texel.xy, texel.z, 0).x;
     return vec4u(control_points[frame.ramps.w + min(label, frame.last_label)]);
 }
 

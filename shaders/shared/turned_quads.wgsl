@@ -27,6 +27,7 @@ struct Quad {
 
 @vertex
 fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Quad {
+    start(vertex >> 31u);
     let quad = instance * QUADS + vertex / 4u;
     let splat = splats[instances[min(quad, args.count - 1u)]];
     let center_px = vec2f(splat.x_px, splat.y_px);

@@ -1,7 +1,14 @@
 // The volume's values and gradients. The stage declares `values`, a texture array that `gpu::volume_texture` folds.
 
 fn value_at(index: u32) -> f32 {
-    return textureLoad(values, vec2u(index & 2047u, (index >> 11u) & 2047u), index >> 22u, 0).x;
+    let texel = texel_of(index, textureDimensions(values).x);
+    return textureLoad(values, texel.xy, texel.z, 0).x;
+}
+
+// Column, row and layer of a voxel's texel in layers of a power of two a side.
+fn texel_of(index: u32, side: u32) -> vec3u {
+    let row = index >> firstTrailingBit(side);
+    return vec3u(index & (side - 1u), row & (side - 1u), row >> firstTrailingBit(side));
 }
 
 // Index of a voxel in the volume, x fastest.

@@ -2,7 +2,8 @@
 
 use wgpu::{
     BindGroup, BindGroupLayout, BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
-    BufferUsages, ComputePass, ComputePipeline, Device, ShaderStages, TextureSampleType, TextureViewDimension,
+    BufferDescriptor, BufferUsages, ComputePass, ComputePipeline, Device, Limits, Queue, ShaderStages,
+    TextureSampleType, TextureViewDimension,
 };
 
 use super::layout::{FOLD, Indirect};
@@ -49,18 +50,29 @@ pub fn texture_of_integers(stages: ShaderStages, view_dimension: TextureViewDime
     (stages, BindingType::Texture { sample_type, view_dimension, multisampled: false })
 }
 
-/// A buffer of at least `size` bytes: the previous one if it is large enough, and at most 4 times too large.
+/// A buffer to be.
+pub type Wanted = BufferDescriptor<'static>;
+
+/// A buffer of so many bytes.
+pub fn wanted(label: &'static str, size: u64, usage: BufferUsages) -> Wanted {
+    BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false }
+}
+
+/// A buffer for contents of so many bytes.
+pub fn wanted_for(label: &'static str, bytes: u64, usage: BufferUsages) -> Wanted {
+    // Of one element at least: bindings may not be empty.
+    wanted(label, bytes.max(8), usage | BufferUsages::COPY_DST)
+}
+
+/// Bytes of some buffers.
 ///
 /// # Errors
-/// If the device's buffers, or its bindings to them, may not be that large.
-pub fn grown(
-    device: &Device,
-    previous: Option<Buffer>,
-    label: &'static str,
-    size: u64,
-    usage: BufferUsages,
-) -> Result<Buffer, RenderError> {
-    let limits = device.limits();
+/// If the device's buffers, or its bindings to them, may not be as large as one of them.
+pub fn sizes(limits: &Limits, buffers: &[Wanted]) -> Result<u64, RenderError> {
+    buffers.iter().map(|buffer| check(limits, buffer)).sum()
+}
+
+fn check(limits: &Limits, &Wanted { label, size, usage, .. }: &Wanted) -> Result<u64, RenderError> {
     let (limit, actual) = match usage.contains(BufferUsages::STORAGE) {
         true if limits.max_storage_buffer_binding_size < limits.max_buffer_size => {
             ("max_storage_buffer_binding_size", limits.max_storage_buffer_binding_size)
@@ -68,13 +80,50 @@ pub fn grown(
         _ => ("max_buffer_size", limits.max_buffer_size),
     };
     if size > actual {
-        return Err(RenderError::Limit { what: label, limit, required: size, actual });
+        return Err(RenderError::Limit { what: label.unwrap_or_default(), limit, required: size, actual });
     }
-    let fits = |buffer: &Buffer| (size..=4 * size).contains(&buffer.size()) && buffer.usage().contains(usage);
-    Ok(previous.filter(fits).unwrap_or_else(|| {
-        let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
-        device.create_buffer(&descriptor)
-    }))
+    Ok(size)
+}
+
+/// A buffer of at least the wanted size: the previous one if it is large enough, and at most 4 times too large.
+///
+/// # Errors
+/// If the device's buffers, or its bindings to them, may not be that large.
+pub fn grown(device: &Device, previous: Option<Buffer>, wanted: &Wanted) -> Result<Buffer, RenderError> {
+    let size = check(&device.limits(), wanted)?;
+    let fits = |buffer: &Buffer| (size..=4 * size).contains(&buffer.size()) && buffer.usage().contains(wanted.usage);
+    Ok(previous.filter(fits).unwrap_or_else(|| device.create_buffer(wanted)))
+}
+
+/// A buffer with these contents, the old one if it has the right size.
+///
+/// # Errors
+/// If the device's buffers may not be that large.
+pub fn filled(
+    device: &Device,
+    queue: &Queue,
+    old: Option<Buffer>,
+    label: &'static str,
+    bytes: &[u8],
+    usage: BufferUsages,
+) -> Result<Buffer, RenderError> {
+    written(device, queue, old, &wanted_for(label, bytes.len() as u64, usage), bytes)
+}
+
+/// The same with the buffer described.
+///
+/// # Errors
+/// See [`filled`].
+pub fn written(
+    device: &Device,
+    queue: &Queue,
+    old: Option<Buffer>,
+    wanted: &Wanted,
+    bytes: &[u8],
+) -> Result<Buffer, RenderError> {
+    let buffer = grown(device, old, wanted)?;
+    queue.write_buffer(&buffer, 0, bytes);
+    Ok(buffer)
 }
 
 /// A new buffer of `size` bytes that starts with these, of which there is one at least. Where the device gives none, its error scope says

@@ -45,14 +45,16 @@ impl BrickLists {
     }
 
     fn of(device: &Device, bricks: BrickList) -> Self {
-        let count = bricks.bricks().len();
-        // Room for bricks that come later.
-        let capacity = max_list_length(&device.limits()).min(count + count / 8 + 16);
-        let lists = (0..count)
-            .step_by(capacity)
-            .map(|first| BrickBuffer::upload(device, first..count.min(first + capacity), capacity, &bricks))
-            .collect();
+        let (ranges, capacity) = split(&device.limits(), bricks.bricks().len());
+        let lists = ranges.map(|range| BrickBuffer::upload(device, range, capacity, &bricks)).collect();
         Self { lists, bricks, state: State::Current }
+    }
+
+    /// What [`Self::upload`] would make of these bricks.
+    pub fn settled(&self, limits: &wgpu::Limits) -> SettledBricks {
+        let bricks = self.bricks.compacted();
+        let (ranges, capacity) = split(limits, bricks.bricks().len());
+        SettledBricks { ranges: ranges.collect(), capacity, bricks }
     }
 
     /// Bricks of every list.
@@ -124,6 +126,31 @@ impl BrickLists {
     }
 }
 
+/// Bricks in lists, before they are uploaded.
+#[derive(Debug)]
+pub struct SettledBricks {
+    bricks: BrickList,
+    ranges: Vec<Range<usize>>,
+    capacity: usize,
+}
+
+impl SettledBricks {
+    /// Bricks of every list.
+    pub fn lists(&self) -> Vec<&[Brick]> {
+        self.ranges.iter().map(|range| &self.bricks.bricks()[range.clone()]).collect()
+    }
+
+    /// The bricks of all lists together.
+    pub fn all(&self) -> &[Brick] {
+        self.bricks.bricks()
+    }
+
+    /// Bytes of GPU memory.
+    pub fn gpu_bytes(&self) -> u64 {
+        (self.ranges.len() * self.capacity * size_of::<Brick>()) as u64
+    }
+}
+
 impl BrickBuffer {
     fn upload(device: &Device, range: Range<usize>, capacity: usize, bricks: &BrickList) -> Self {
         let bytes = bytemuck::cast_slice(&bricks.bricks()[range.clone()]);
@@ -147,6 +174,12 @@ impl BrickBuffer {
 /// What lists may take of a binding where the device allows more: WebGPU's default. Where a list ends decides in which order a
 /// sheet's footprints are added, and so their sum's last bit, which is the same on all devices that have the default.
 const MOST_BYTES: u64 = 128 << 20;
+
+/// The lists of so many bricks, and what each has room for: for bricks that come later, too.
+fn split(limits: &wgpu::Limits, count: usize) -> (impl Iterator<Item = Range<usize>> + use<>, usize) {
+    let capacity = max_list_length(limits).min(count + count / 8 + 16);
+    ((0..count).step_by(capacity).map(move |first| first..count.min(first + capacity)), capacity)
+}
 
 /// The most bricks of a list: all records of its bricks, and of their places for voxels, must fit one binding.
 fn max_list_length(limits: &wgpu::Limits) -> usize {

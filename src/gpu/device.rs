@@ -100,7 +100,7 @@ impl DeviceRequirements {
     pub const LEAST: Self = Self {
         features: Features::empty(),
         limits: Limits {
-            max_texture_dimension_2d: volume_texture::SIDE,
+            max_texture_dimension_2d: volume_texture::LEAST_SIDE,
             max_texture_array_layers: 128,
             max_storage_buffers_per_shader_stage: 8,
             max_uniform_buffers_per_shader_stage: 4,

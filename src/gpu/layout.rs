@@ -77,9 +77,9 @@ pub struct Frame {
     pub near: f32,
     /// Size of a pixel at depth 1 from the eye, `unit`s; without one of every pixel.
     pub pixel_per_depth: f32,
-    /// Opacity from which a pixel counts as opaque.
+    /// Opacity from which a pixel counts as opaque; of surfaces 1.
     pub opacity_threshold: f32,
-    /// 0 linear, 1 exponential, 2 xray.
+    /// 0 linear, 1 exponential, 2 xray, 3 maximum, 4 minimum, 5 average, 6 surface.
     pub compositing: u32,
     /// 0 front to back, 1 back to front.
     pub order: u32,
@@ -114,11 +114,11 @@ pub struct Group {
     pub brick_count: u32,
     /// The group's number in the frame.
     pub index: u32,
-    /// Unused.
-    pub padding: u32,
+    /// The same, but for groups that the frame leaves out counted, too, from the nearest on; the first is 1.
+    pub number: u32,
 }
 
-/// What clip planes and a host's surfaces leave of rays. A pixel's ray is found by its place (x right of the image's middle, y below it,
+/// What clip planes and a host's surfaces leave of rays, and the volume's box. A pixel's ray is found by its place (x right of the image's middle, y below it,
 /// pixels, and 1), and on it a point by its depth along w, `unit`s from the eye, orthographic from the camera's centre.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -133,6 +133,12 @@ pub struct Cut {
     pub surface_w: [f32; 4],
     /// Two for each plane, whose products with the place are the distance from it at depth 0 and per depth.
     pub planes: [[f32; 4]; 24],
+    /// For each axis of the grid what the product with the place is where the ray is at depth 0: grid steps from the volume's centre.
+    pub box_at: [[f32; 4]; 3],
+    /// The same per depth.
+    pub box_along: [[f32; 4]; 3],
+    /// Half the extent of a [`RayBox`](crate::means::RayBox), grid steps, and its nearest depth.
+    pub box_half: [f32; 4],
     /// The texel of the host's depth that is the image's first.
     pub surface_origin: [u32; 2],
     /// The host's depth where there is no surface.

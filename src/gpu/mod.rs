@@ -5,6 +5,7 @@ pub mod brick_lists;
 pub mod device;
 pub mod footprint_texture;
 pub mod layout;
+pub mod render_pipeline;
 pub mod shaders;
 pub mod targets;
 pub mod timer;

@@ -61,7 +61,8 @@ pub const SAMPLE: Shader = shader!(
     "compositing"
 );
 /// Composites the sheet buffers.
-pub const COMPOSITE: Shader = shader!("composite", "frame", "brick", "band", "tile_list", "compositing", "cut");
+pub const COMPOSITE: Shader =
+    shader!("composite", "frame", "brick", "band", "tile_list", "compositing", "cut", "means");
 /// Computes the occlusion buffer.
 pub const OCCLUDE: Shader = shader!("occlude", "frame", "brick", "tile_list");
 /// Draws whole tiles from front to back.
@@ -81,7 +82,9 @@ pub const GATHER: Shader = shader!(
     "shading",
     "ramps",
     "compositing",
-    "cut"
+    "cut",
+    "means",
+    "gathered_sheets"
 );
 /// Writes the depths of first hits.
 pub const FIRST_HIT: Shader = shader!("first_hit", "frame", "cut");

@@ -1,11 +1,11 @@
 //! What depends on the image's size alone: compositing buffer, sheet buffers, opacity and occlusion buffers.
 
 use wgpu::{
-    Buffer, BufferUsages, Device, Texture, TextureFormat, TextureUsages, TextureView, TextureViewDescriptor,
+    Buffer, BufferUsages, Device, Limits, Texture, TextureFormat, TextureUsages, TextureView, TextureViewDescriptor,
     TextureViewDimension,
 };
 
-use super::bindings::{grown, uploaded};
+use super::bindings::{Wanted, grown, sizes, uploaded, wanted};
 use super::layout::Band;
 use crate::error::RenderError;
 use crate::plan::{TILE, tile_grid};
@@ -34,6 +34,8 @@ pub struct Targets {
     pub occluded: Buffer,
     /// A word per tile: 1 where all its pixels are opaque.
     pub opaque_tiles: Buffer,
+    /// A word per tile: [`Group::number`](super::layout::Group::number) of the group that it was composited for last, 0 of none.
+    pub last_groups: Buffer,
 }
 
 /// One band of the compositing buffer.
@@ -51,10 +53,11 @@ pub struct BandBuffer {
 const ACC_BYTES: u64 = 16;
 
 impl CompositingBuffer {
+    /// The bands of an image, as few as the limits allow.
+    ///
     /// # Errors
-    /// If the image is larger than the device's textures may be, or 32 rows of it than a binding.
-    pub fn new(device: &Device, size: [u32; 2]) -> Result<Self, RenderError> {
-        let limits = device.limits();
+    /// If the image is larger than textures may be, or 32 rows of it than a binding.
+    pub fn bands(limits: &Limits, size: [u32; 2]) -> Result<Vec<Band>, RenderError> {
         let limit = |what, limit, required: u64, actual: u64| {
             if required > actual { Err(RenderError::Limit { what, limit, required, actual }) } else { Ok(()) }
         };
@@ -68,11 +71,18 @@ impl CompositingBuffer {
         limit("32 rows of image.width", "max_storage_buffer_binding_size", row_bytes * u64::from(TILE), binding)?;
 
         let rows_per_band = (binding / row_bytes / u64::from(TILE)).min(height.div_ceil(TILE).into()) as u32 * TILE;
-        let bands = (0..height)
-            .step_by(rows_per_band as usize)
-            .map(|first_row| BandBuffer::new(device, width, first_row, rows_per_band.min(height - first_row)))
-            .collect();
-        Ok(Self { size, bands })
+        let first_rows = (0..height).step_by(rows_per_band as usize);
+        Ok(first_rows.map(|first_row| Band { first_row, rows: rows_per_band.min(height - first_row) }).collect())
+    }
+
+    /// Allocates these bands.
+    pub fn new(device: &Device, size: [u32; 2], bands: &[Band]) -> Self {
+        Self { size, bands: bands.iter().map(|&band| BandBuffer::new(device, size[0], band)).collect() }
+    }
+
+    /// Bytes of GPU memory that so many bands take.
+    pub fn estimate([width, height]: [u32; 2], bands: usize) -> u64 {
+        (bands * size_of::<Band>()) as u64 + u64::from(width) * u64::from(height) * ACC_BYTES
     }
 
     /// Bytes of GPU memory.
@@ -103,19 +113,37 @@ impl Targets {
                 view_formats: &[],
             })
         };
-        let mask = |label, words: u32| {
-            let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-            grown(device, None, label, u64::from(words) * 4, usage)
-        };
-        let [columns, rows] = tile_grid(size);
+        let [opaque, opaque_columns, occluded, opaque_tiles, last_groups] =
+            masks(size).map(|mask| grown(device, None, &mask));
         Ok(Self {
             size,
-            opaque: mask("sheetsplat.opaque", columns * height)?,
-            opaque_columns: mask("sheetsplat.opaque_columns", columns * height)?,
-            occluded: mask("sheetsplat.occluded", columns * height)?,
-            opaque_tiles: mask("sheetsplat.opaque_tiles", columns * rows)?,
+            opaque: opaque?,
+            opaque_columns: opaque_columns?,
+            occluded: occluded?,
+            opaque_tiles: opaque_tiles?,
+            last_groups: last_groups?,
             sheets: sheet_buffers(),
         })
+    }
+
+    /// Bytes of GPU memory that such targets take.
+    ///
+    /// # Errors
+    /// If a bit per pixel is more than a binding.
+    pub fn estimate(
+        limits: &Limits,
+        size: [u32; 2],
+        sheet_format: TextureFormat,
+        sheets: u32,
+    ) -> Result<u64, RenderError> {
+        let texel = u64::from(sheet_format.block_copy_size(None).unwrap_or(0));
+        let texels = size.map(u64::from).iter().product::<u64>() * u64::from(sheets);
+        Ok(texels * texel + sizes(limits, &masks(size))?)
+    }
+
+    /// Number of tiles.
+    pub fn tiles(&self) -> u32 {
+        tile_grid(self.size).iter().product()
     }
 
     /// All sheet buffers, for compositing.
@@ -136,20 +164,54 @@ impl Targets {
         })
     }
 
+    /// What is zero at the start of a frame.
+    pub fn masks(&self) -> [&Buffer; 5] {
+        let Self { opaque, opaque_columns, occluded, opaque_tiles, last_groups, .. } = self;
+        [opaque, opaque_columns, occluded, opaque_tiles, last_groups]
+    }
+
     /// Bytes of GPU memory.
     pub fn gpu_bytes(&self) -> u64 {
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
         let texel = u64::from(self.sheets.format().block_copy_size(None).unwrap_or(0));
         let sheets = pixels * texel * u64::from(self.sheets.depth_or_array_layers());
-        let masks = [&self.opaque, &self.opaque_columns, &self.occluded, &self.opaque_tiles];
-        let masks: u64 = masks.map(Buffer::size).iter().sum();
-        sheets + masks
+        sheets + self.masks().map(Buffer::size).iter().sum::<u64>()
     }
 }
 
+/// The buffers of [`Targets`], in its order.
+fn masks(size: [u32; 2]) -> [Wanted; 5] {
+    let [columns, rows] = tile_grid(size);
+    let mask = |label, words: u32| {
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
+        wanted(label, u64::from(words) * 4, usage)
+    };
+    [
+        mask("sheetsplat.opaque", columns * size[1]),
+        mask("sheetsplat.opaque_columns", columns * size[1]),
+        mask("sheetsplat.occluded", columns * size[1]),
+        mask("sheetsplat.opaque_tiles", columns * rows),
+        mask("sheetsplat.last_groups", columns * rows),
+    ]
+}
+
+/// A depth texture that nobody reads: stands for a host's where there is none.
+pub fn no_surfaces(device: &Device) -> TextureView {
+    let texture = device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("sheetsplat.no_surfaces"),
+        size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: TextureFormat::Depth32Float,
+        usage: TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    });
+    texture.create_view(&TextureViewDescriptor::default())
+}
+
 impl BandBuffer {
-    fn new(device: &Device, width: u32, first_row: u32, rows: u32) -> Self {
-        let band = Band { first_row, rows };
+    fn new(device: &Device, width: u32, band: Band) -> Self {
         Self {
             band,
             uniform: uploaded(
@@ -161,7 +223,7 @@ impl BandBuffer {
             ),
             acc: device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("sheetsplat.acc"),
-                size: u64::from(width) * u64::from(rows) * ACC_BYTES,
+                size: u64::from(width) * u64::from(band.rows) * ACC_BYTES,
                 usage: BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC,
                 mapped_at_creation: false,
             }),

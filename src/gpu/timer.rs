@@ -33,18 +33,23 @@ impl Timer {
                 count: 2 * PASSES_PER_SET as u32,
             })
         };
-        let sets = passes.div_ceil(PASSES_PER_SET);
-        device.features().contains(Features::TIMESTAMP_QUERY).then(|| Self {
-            sets: (0..sets).map(set).collect(),
+        Self::estimate(device, passes).map(|size| Self {
+            sets: (0..passes.div_ceil(PASSES_PER_SET)).map(set).collect(),
             results: device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("sheetsplat.timestamps"),
-                size: (sets * PASSES_PER_SET) as u64 * PASS_BYTES,
+                size,
                 usage: BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC,
                 mapped_at_creation: false,
             }),
             stages: Vec::new(),
             passes,
         })
+    }
+
+    /// What [`Self::gpu_bytes`] of such a timer will be.
+    pub fn estimate(device: &Device, passes: usize) -> Option<u64> {
+        let has_queries = device.features().contains(Features::TIMESTAMP_QUERY);
+        has_queries.then(|| passes.next_multiple_of(PASSES_PER_SET) as u64 * PASS_BYTES)
     }
 
     /// Bytes of GPU memory, without those of the queries, which drivers do not tell.

@@ -5,9 +5,10 @@ use std::ops::{Add, Mul, Range};
 use glam::{DMat2, DVec2, DVec3, DVec4};
 
 use super::layout::{Cut, Frame, Gather, Gathered, Group};
-use crate::clip::{Clip, HalfSpace};
+use crate::clip::HalfSpace;
 use crate::grid_warp::{self, FootprintMap};
 use crate::kernel::Kernel;
+use crate::means::RayBox;
 use crate::plan::{FramePlan, tile_grid};
 use crate::scene::Scene;
 use crate::shading::{Light, MIN_GRADIENT, Shading};
@@ -62,11 +63,12 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
         section_width: view.section_width() as f32,
         near: eye.map_or(0.0, |eye| eye.near) as f32,
         pixel_per_depth: eye.map_or(view.pix, |eye| eye.pixel_per_depth) as f32,
-        opacity_threshold: scene.splatting.opacity_threshold as f32,
+        opacity_threshold: opacity_threshold(&scene.splatting) as f32,
         compositing: scene.splatting.compositing as u32,
         order: scene.splatting.order as u32,
         culling: u32::from(scene.splatting.culling && hides(&scene.splatting)),
-        tiles: u32::from(scene.splatting.tiles),
+        // What is empty counts for the least.
+        tiles: u32::from(scene.splatting.tiles && scene.splatting.compositing != Compositing::Minimum),
         per_unit: grid.unit().recip().sqrt().min(f32::MAX.into()) as f32,
         headlight: u32::from(scene.shading.light == Light::Headlight),
         last_label: ramps.label_table.len().saturating_sub(1) as u32,
@@ -76,6 +78,8 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
 /// What the tile rasterizer's threads share, over a volume of so many `bricks`.
 pub fn gather(view: &View, kernel: &Kernel, splatting: &Splatting, bins: &TileBins, bricks: u32) -> Gather {
     let economies = splatting.economies;
+    // What is behind a surface is culled; nothing else is behind anything.
+    let has_beta = hides(splatting) && splatting.compositing != Compositing::Surface && economies.beta < 1.0;
     let whole = kernel.section(0.0, -kernel.radius(), kernel.radius());
     let support_squared = kernel.support().powi(2);
     let in_f32 = |numbers: [f64; 4]| numbers.map(|x| x as f32);
@@ -101,7 +105,7 @@ pub fn gather(view: &View, kernel: &Kernel, splatting: &Splatting, bins: &TileBi
         shear: shear as f32,
         half_width: half_width as f32,
         whole_below: economies.whole_below as f32,
-        beta: if hides(splatting) && economies.beta < 1.0 { economies.beta as f32 } else { f32::MAX },
+        beta: if has_beta { economies.beta as f32 } else { f32::MAX },
         peak: (whole / economies.resolution).min(f32::MAX.into()) as f32,
         reached,
         most_passes: bins.passes.most,
@@ -120,11 +124,11 @@ pub fn gather(view: &View, kernel: &Kernel, splatting: &Splatting, bins: &TileBi
 /// Words of [`Gathered`] that are not counted.
 const WORDS_BEFORE: u32 = (std::mem::offset_of!(Gathered, words) / 4) as u32;
 
-/// What clip planes and a host's surfaces leave of rays.
+/// What clip planes and a host's surfaces leave of rays, and the box of a volume that compositing by means looks at.
 pub fn cut(
     view: &View,
     grid: &Grid,
-    clip: &Clip,
+    Scene { clip, splatting, .. }: &Scene,
     surfaces: Option<(SurfaceDepths, [u32; 2])>,
     first_hit: Option<f64>,
 ) -> Cut {
@@ -138,6 +142,8 @@ pub fn cut(
     for (rows, &HalfSpace { normal, offset }) in planes.chunks_exact_mut(2).zip(&half_spaces) {
         rows.copy_from_slice(&[row(normal, origin, offset), row(normal, along, 0.0)]);
     }
+    let RayBox { half, nearest } = RayBox::new(view, grid, splatting);
+    let axes = DVec3::AXES.map(|axis| axis / grid.aspect());
     let sheet_depth = view.sheet_depth_row(grid.aspect(), grid.center());
     let (normal, offset) = (sheet_depth.truncate(), sheet_depth.w);
     let in_f32 = |row: DVec4| row.as_vec4().to_array();
@@ -147,6 +153,9 @@ pub fn cut(
         surface_depth: surfaces.map_or([0.0; 4], |(depths, _)| in_f32(depths.depth)),
         surface_w: surfaces.map_or([0.0; 4], |(depths, _)| in_f32(depths.w)),
         planes,
+        box_at: axes.map(|axis| row(axis, origin, 0.0)),
+        box_along: axes.map(|axis| row(axis, along, 0.0)),
+        box_half: in_f32(half.extend(nearest.max(f64::from(f32::MIN)))),
         surface_origin: surfaces.map_or([0; 2], |(_, origin)| origin),
         no_surface: surfaces.map_or(1.0, |(depths, _)| depths.none) as f32,
         first_hit: first_hit.unwrap_or(f64::INFINITY) as f32,
@@ -170,8 +179,10 @@ fn groups_per_kernel(view: &View) -> u32 {
 /// One [`Group`] every `stride` bytes: group after group, and of every group list after list.
 pub fn groups(plan: &FramePlan, kernel: &Kernel, splatting: &Splatting, stride: usize) -> Vec<u8> {
     let mut bytes = Vec::new();
+    let first_slab = plan.groups.iter().map(|group| group.first_slab).min().unwrap_or(0);
     for (index, group) in (0..).zip(&plan.groups) {
-        let uniform = self::group(&plan.view, kernel, splatting, group.planes.clone());
+        let number = (group.first_slab - first_slab) as u32 / plan.sheets + 1;
+        let uniform = Group { number, ..self::group(&plan.view, kernel, splatting, group.planes.clone()) };
         for bricks in &group.bricks {
             let count = bricks.end - bricks.start;
             let uniform = Group { first_brick: bricks.start, brick_count: count, index, ..uniform };
@@ -195,7 +206,7 @@ pub fn group(view: &View, kernel: &Kernel, splatting: &Splatting, planes: Range<
         first_brick: 0,
         brick_count: 0,
         index: 0,
-        padding: 0,
+        number: 1,
     }
 }
 
@@ -210,7 +221,12 @@ const MAX_HALF_BOX: f64 = 256.0;
 
 /// Whether what is drawn hides what comes later (SPEC §5): front to back, and nothing to look through.
 fn hides(splatting: &Splatting) -> bool {
-    splatting.order == Order::FrontToBack && splatting.compositing != Compositing::Xray
+    splatting.order == Order::FrontToBack && splatting.compositing.hides()
+}
+
+/// From which opacity on pixels are opaque. What is kept of a surface that is not reached yet is none.
+fn opacity_threshold(splatting: &Splatting) -> f64 {
+    if splatting.compositing == Compositing::Surface { 1.0 } else { splatting.opacity_threshold }
 }
 
 /// `hv = normalize(l + c)`, 0 where they cancel (SPEC §3).

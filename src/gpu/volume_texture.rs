@@ -1,15 +1,21 @@
 //! The volume's values and labels on the GPU, as texture arrays: unlike a buffer's, their size is not limited by what one binding
-//! may hold.
+//! may hold. Layers have 2048 texels a side, or 4096 or 8192 where a volume would need more layers than the device has: with WebGPU's
+//! default limits there is room for any.
 
-use wgpu::{Device, Extent3d, Queue, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView};
+use wgpu::{
+    Device, Extent3d, Limits, Queue, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,
+};
 
 use crate::error::RenderError;
 
-/// Texels along both sides of a layer, as `shaders/shared/volume.wgsl` folds indices.
-pub const SIDE: u32 = 2048;
+/// The least of [`SIDES`].
+pub const LEAST_SIDE: u32 = 2048;
 
-/// One number per voxel, x fastest, folded into rows and layers of a power of two: that of voxel i is texel i mod 2048 of row
-/// ⌊i/2048⌋.
+/// Texels that a layer may have along both sides.
+pub const SIDES: [u32; 3] = [LEAST_SIDE, 4096, 8192];
+
+/// One number per voxel, x fastest, folded into rows and layers of a power of two, the side: that of voxel i is texel i mod side of row
+/// ⌊i/side⌋, as `shaders/shared/volume.wgsl` unfolds it.
 #[derive(Debug)]
 pub struct VolumeTexture {
     /// All layers.
@@ -24,8 +30,13 @@ impl VolumeTexture {
     /// # Errors
     /// If they need more layers than the device's textures have.
     pub fn upload(device: &Device, queue: &Queue, values: &[f32]) -> Result<Self, RenderError> {
-        let what = ("sheetsplat.values", "the volume's values, 4194304 a layer");
-        Self::fold(device, queue, what, TextureFormat::R32Float, values)
+        let side = side(&device.limits(), "the volume's values", values.len() as u64)?;
+        Ok(Self::upload_folded(device, queue, values, side))
+    }
+
+    /// The same with layers of a given side, whether they need it or not.
+    pub fn upload_folded(device: &Device, queue: &Queue, values: &[f32], side: u32) -> Self {
+        Self::fold(device, queue, "sheetsplat.values", TextureFormat::R32Float, values, side)
     }
 
     /// Uploads a segmented volume's labels, `R16Uint`.
@@ -33,13 +44,17 @@ impl VolumeTexture {
     /// # Errors
     /// If they need more layers than the device's textures have.
     pub fn upload_labels(device: &Device, queue: &Queue, labels: &[u16]) -> Result<Self, RenderError> {
-        let what = ("sheetsplat.labels", "the volume's labels, 4194304 a layer");
-        Self::fold(device, queue, what, TextureFormat::R16Uint, labels)
+        let side = side(&device.limits(), "the volume's labels", labels.len() as u64)?;
+        Ok(Self::fold(device, queue, "sheetsplat.labels", TextureFormat::R16Uint, labels, side))
     }
 
     /// Bytes of GPU memory that the values of so many voxels will take, and their labels.
-    pub fn estimate(voxels: u64) -> [u64; 2] {
-        [TextureFormat::R32Float, TextureFormat::R16Uint].map(|format| bytes(format, folded(voxels)))
+    ///
+    /// # Errors
+    /// If they need more layers than textures may have.
+    pub fn estimate(limits: &Limits, voxels: u64) -> Result<[u64; 2], RenderError> {
+        let side = side(limits, "the volume's values", voxels)?;
+        Ok([TextureFormat::R32Float, TextureFormat::R16Uint].map(|format| bytes(format, folded(voxels, side))))
     }
 
     /// A texture of one label, for stages of volumes that have none.
@@ -74,19 +89,14 @@ impl VolumeTexture {
     fn fold<T: bytemuck::NoUninit>(
         device: &Device,
         queue: &Queue,
-        (label, what): (&str, &'static str),
+        label: &str,
         format: TextureFormat,
         values: &[T],
-    ) -> Result<Self, RenderError> {
-        let size @ [_, _, layers] = folded(values.len() as u64);
-        let actual = device.limits().max_texture_array_layers;
-        if layers > actual {
-            let limit = "max_texture_array_layers";
-            return Err(RenderError::Limit { what, limit, required: layers.into(), actual: actual.into() });
-        }
-        let (texture, uploaded) = Self::new(device, label, format, size);
+        side: u32,
+    ) -> Self {
+        let (texture, uploaded) = Self::new(device, label, format, folded(values.len() as u64, side));
         let write = |values: &[T], width: u32, row: u32| {
-            let origin = wgpu::Origin3d { x: 0, y: row % SIDE, z: row / SIDE };
+            let origin = wgpu::Origin3d { x: 0, y: row % side, z: row / side };
             let height = values.len() as u32 / width;
             queue.write_texture(
                 wgpu::TexelCopyTextureInfo { origin, ..texture.as_image_copy() },
@@ -99,23 +109,40 @@ impl VolumeTexture {
                 Extent3d { width, height, depth_or_array_layers: 1 },
             );
         };
-        for (layer, values) in (0..).zip(values.chunks((SIDE * SIDE) as usize)) {
-            let (whole, rest) = values.split_at(values.len() / SIDE as usize * SIDE as usize);
+        for (layer, values) in (0..).zip(values.chunks((side * side) as usize)) {
+            let (whole, rest) = values.split_at(values.len() / side as usize * side as usize);
             if !whole.is_empty() {
-                write(whole, SIDE, layer * SIDE);
+                write(whole, side, layer * side);
             }
             if !rest.is_empty() {
-                write(rest, rest.len() as u32, layer * SIDE + whole.len() as u32 / SIDE);
+                write(rest, rest.len() as u32, layer * side + whole.len() as u32 / side);
             }
         }
-        Ok(uploaded)
+        uploaded
     }
 }
 
+/// The least side with which so many voxels have layers enough.
+///
+/// # Errors
+/// If none has.
+pub fn side(limits: &Limits, what: &'static str, voxels: u64) -> Result<u32, RenderError> {
+    let mut required = 0;
+    for side in SIDES.into_iter().filter(|&side| side <= limits.max_texture_dimension_2d) {
+        let [_, _, layers] = folded(voxels, side);
+        if layers <= limits.max_texture_array_layers {
+            return Ok(side);
+        }
+        required = layers.into();
+    }
+    let (limit, actual) = ("max_texture_array_layers", limits.max_texture_array_layers.into());
+    Err(RenderError::Limit { what, limit, required, actual })
+}
+
 /// Width, height and layers for one number per voxel.
-fn folded(voxels: u64) -> [u32; 3] {
-    let rows = voxels.div_ceil(SIDE.into()) as u32;
-    [SIDE, rows.min(SIDE), rows.div_ceil(SIDE)]
+fn folded(voxels: u64, side: u32) -> [u32; 3] {
+    let rows = voxels.div_ceil(side.into()) as u32;
+    [side, rows.min(side), rows.div_ceil(side)]
 }
 
 fn bytes(format: TextureFormat, size: [u32; 3]) -> u64 {

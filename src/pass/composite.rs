@@ -8,11 +8,22 @@ use crate::gpu::bindings::{ComputeStage, at_offset, depth_texture, storage, text
 use crate::gpu::layout::{Band, Cut, Frame, Group, TileList};
 use crate::gpu::shaders;
 use crate::gpu::targets::{BandBuffer, Targets};
+use crate::splatting::Compositing;
 
 /// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug, Default)]
 pub struct Composite {
-    stages: [OnceLock<ComputeStage>; 4],
+    /// By compositing, and by the other parts of a mode, one bit each.
+    stages: [OnceLock<ComputeStage>; Compositing::COUNT << 2],
+}
+
+/// What a pipeline is compiled for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CompositeMode {
+    /// How sheets are composited.
+    pub compositing: Compositing,
+    /// What of pixels' rays is looked at.
+    pub rays: RayMode,
 }
 
 /// What of pixels' rays a stage that composites looks at.
@@ -53,11 +64,12 @@ pub struct CompositeBuffers<'a> {
 }
 
 impl Composite {
-    fn stage(&self, mode: RayMode) -> &OnceLock<ComputeStage> {
-        &self.stages[2 * usize::from(mode.cut) + usize::from(mode.first_hit)]
+    fn stage(&self, CompositeMode { compositing, rays }: CompositeMode) -> &OnceLock<ComputeStage> {
+        let bits = [rays.cut, rays.first_hit].map(usize::from);
+        &self.stages[bits.into_iter().fold(compositing as usize, |number, bit| 2 * number + bit)]
     }
 
-    fn compiled(&self, device: &Device, mode: RayMode) -> &ComputeStage {
+    fn compiled(&self, device: &Device, mode: CompositeMode) -> &ComputeStage {
         self.stage(mode).get_or_init(|| {
             let stage = ShaderStages::COMPUTE;
             let slots = [
@@ -72,15 +84,25 @@ impl Composite {
                 uniform::<Cut>(stage, false),
                 depth_texture(stage),
                 storage::<u32>(stage, false),
+                storage::<u32>(stage, false),
             ];
-            let constants = [("CUT", mode.cut), ("FIRST_HIT", mode.first_hit)];
-            let constants = constants.map(|(name, is_on)| (name, f64::from(u8::from(is_on))));
+            let constants = [
+                ("COMPOSITING", f64::from(mode.compositing as u32)),
+                ("CUT", f64::from(u8::from(mode.rays.cut))),
+                ("FIRST_HIT", f64::from(u8::from(mode.rays.first_hit))),
+            ];
             ComputeStage::new(device, shaders::COMPOSITE, "main", &slots, &constants)
         })
     }
 
     /// Binds a band of the compositing buffer.
-    pub fn bind(&self, device: &Device, mode: RayMode, buffers: CompositeBuffers<'_>, band: &BandBuffer) -> BindGroup {
+    pub fn bind(
+        &self,
+        device: &Device,
+        mode: CompositeMode,
+        buffers: CompositeBuffers<'_>,
+        band: &BandBuffer,
+    ) -> BindGroup {
         let CompositeBuffers { frame, groups, sheets, tiles, targets, cut, hits } = buffers;
         let resources = [
             frame.as_entire_binding(),
@@ -94,12 +116,20 @@ impl Composite {
             cut.uniform.as_entire_binding(),
             wgpu::BindingResource::TextureView(cut.surfaces),
             hits.as_entire_binding(),
+            targets.last_groups.as_entire_binding(),
         ];
         self.compiled(device, mode).bind(device, &resources)
     }
 
     /// Composites the listed tiles of every band, of the group at `offset`.
-    pub fn record(&self, pass: &mut ComputePass<'_>, mode: RayMode, bands: &[BindGroup], offset: u32, tiles: &Buffer) {
+    pub fn record(
+        &self,
+        pass: &mut ComputePass<'_>,
+        mode: CompositeMode,
+        bands: &[BindGroup],
+        offset: u32,
+        tiles: &Buffer,
+    ) {
         let Some(stage) = self.stage(mode).get() else { return };
         for band in bands {
             stage.dispatch_indirect(pass, band, &[offset], tiles);

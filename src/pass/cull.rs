@@ -5,7 +5,7 @@ use wgpu::{BindGroup, Buffer, BufferUsages, ComputePass, Device, ShaderStages, T
 
 use crate::brick::BRICK_VOXELS;
 use crate::error::RenderError;
-use crate::gpu::bindings::{ComputeStage, at_offset, grown, storage, uniform};
+use crate::gpu::bindings::{ComputeStage, Wanted, at_offset, grown, storage, uniform, wanted};
 use crate::gpu::brick_lists::BrickBuffer;
 use crate::gpu::layout::{Brick, BrickState, Culled, Frame, Group, Indirect, Splat, Visit};
 use crate::gpu::shaders;
@@ -101,8 +101,29 @@ impl Cull {
         }
     }
 
-    /// Allocates a list's buffers, or takes those of the `previous` frame. `order` is the list's bricks by first group; no group looks at more than `most_bricks` of
-    /// them, with at most `most_voxels` voxels.
+    /// A list's buffers, in [`CullList`]'s order: for so many bricks, of which no group looks at more than `most_bricks`, with at most
+    /// `most_voxels` voxels.
+    pub fn wanted(bricks: usize, (most_bricks, most_voxels): (u32, u32)) -> [Wanted; 8] {
+        let buffer = |label, count: usize, record: usize, usage| {
+            wanted(label, (count.max(1) * record) as u64, BufferUsages::STORAGE | usage)
+        };
+        let (none, indirect) = (BufferUsages::empty(), BufferUsages::INDIRECT);
+        let (most_bricks, most_voxels) = (most_bricks as usize, most_voxels as usize);
+        let places = bricks * BRICK_VOXELS as usize;
+        [
+            buffer("sheetsplat.states", bricks, size_of::<BrickState>(), BufferUsages::COPY_DST),
+            buffer("sheetsplat.splats", places, size_of::<Splat>(), BufferUsages::COPY_SRC),
+            buffer("sheetsplat.instances", most_voxels, size_of::<u32>(), none),
+            buffer("sheetsplat.draw_args", 1, size_of::<Indirect>(), indirect),
+            buffer("sheetsplat.visits", most_bricks, size_of::<Visit>(), none),
+            buffer("sheetsplat.visit_args", 1, size_of::<Indirect>(), indirect),
+            buffer("sheetsplat.fresh", most_voxels, size_of::<u32>(), none),
+            buffer("sheetsplat.fresh_args", 1, size_of::<Indirect>(), indirect),
+        ]
+    }
+
+    /// Allocates a list's buffers, or takes those of the `previous` frame. `order` is the list's bricks by first group; `most` is what
+    /// [`Self::wanted`] says.
     ///
     /// # Errors
     /// If the device's buffers may not be that large.
@@ -112,26 +133,14 @@ impl Cull {
         shared: CullBuffers<'_>,
         list: &BrickBuffer,
         order: &Buffer,
-        (most_bricks, most_voxels): (u32, u32),
+        most: (u32, u32),
         previous: Option<CullList>,
     ) -> Result<CullList, RenderError> {
-        let buffer = |previous: Option<Buffer>, label, count: usize, record: usize, usage| {
-            let usage = BufferUsages::STORAGE | usage;
-            grown(device, previous, label, (count.max(1) * record) as u64, usage)
-        };
-        let (none, indirect) = (BufferUsages::empty(), BufferUsages::INDIRECT);
-        let bricks = list.brick_count();
-        let places = bricks * BRICK_VOXELS as usize;
-        let old = previous.map(CullList::buffers).unwrap_or_default();
-        let [states, splats, instances, draw_args, visits, visit_args, fresh, fresh_args] = old;
-        let states = buffer(states, "sheetsplat.states", bricks, size_of::<BrickState>(), BufferUsages::COPY_DST)?;
-        let splats = buffer(splats, "sheetsplat.splats", places, size_of::<Splat>(), BufferUsages::COPY_SRC)?;
-        let instances = buffer(instances, "sheetsplat.instances", most_voxels as usize, size_of::<u32>(), none)?;
-        let draw_args = buffer(draw_args, "sheetsplat.draw_args", 1, size_of::<Indirect>(), indirect)?;
-        let visits = buffer(visits, "sheetsplat.visits", most_bricks as usize, size_of::<Visit>(), none)?;
-        let visit_args = buffer(visit_args, "sheetsplat.visit_args", 1, size_of::<Indirect>(), indirect)?;
-        let fresh = buffer(fresh, "sheetsplat.fresh", most_voxels as usize, size_of::<u32>(), none)?;
-        let fresh_args = buffer(fresh_args, "sheetsplat.fresh_args", 1, size_of::<Indirect>(), indirect)?;
+        let mut old = previous.map_or_else(Vec::new, CullList::buffers).into_iter();
+        let buffers = Self::wanted(list.brick_count(), most).map(|wanted| grown(device, old.next(), &wanted));
+        let [states, splats, instances, draw_args, visits, visit_args, fresh, fresh_args] = buffers;
+        let (states, splats, instances, draw_args) = (states?, splats?, instances?, draw_args?);
+        let (visits, visit_args, fresh, fresh_args) = (visits?, visit_args?, fresh?, fresh_args?);
 
         let CullBuffers { frame, groups, occluded, culled, .. } = shared;
         let (frame, group) = (frame.as_entire_binding(), at_offset::<Group>(groups));
@@ -200,9 +209,9 @@ impl Cull {
 }
 
 impl CullList {
-    fn buffers(self) -> [Option<Buffer>; 8] {
+    fn buffers(self) -> Vec<Buffer> {
         let Self { states, splats, instances, draw_args, visits, visit_args, fresh, fresh_args, .. } = self;
-        [states, splats, instances, draw_args, visits, visit_args, fresh, fresh_args].map(Some)
+        vec![states, splats, instances, draw_args, visits, visit_args, fresh, fresh_args]
     }
 
     /// Bytes of GPU memory.

@@ -8,6 +8,7 @@ use wgpu::{
 use super::composite::CutBuffers;
 use crate::gpu::bindings::{bind, depth_texture, layout, storage, uniform};
 use crate::gpu::layout::{Cut, Frame};
+use crate::gpu::render_pipeline::{Attachments, render_pipeline};
 use crate::gpu::shaders;
 
 /// Depths, one per pixel.
@@ -31,28 +32,9 @@ impl FirstHit {
             storage::<u32>(stage, true),
         ];
         let (layout, pipeline_layout) = layout(device, "sheetsplat.first_hit", &slots);
-        let module = shaders::FIRST_HIT.module(device);
-        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("sheetsplat.first_hit"),
-            layout: Some(&pipeline_layout),
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("vertex"),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                buffers: &[],
-            },
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: None,
-            multisample: wgpu::MultisampleState::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("fragment"),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                targets: &[Some(FORMAT.into())],
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
+        let attachments = Attachments::colors([FORMAT.into()]);
+        let shader = (shaders::FIRST_HIT, ["vertex", "fragment"]);
+        let pipeline = render_pipeline(device, shader, &pipeline_layout, &attachments, &[]);
         Self { layout, pipeline }
     }
 

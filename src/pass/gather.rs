@@ -3,12 +3,14 @@
 use std::sync::OnceLock;
 
 use wgpu::{
-    BindGroup, Buffer, BufferDescriptor, BufferUsages, CommandEncoder, ComputePass, Device, ShaderStages, TextureView,
+    BindGroup, Buffer, BufferUsages, CommandEncoder, ComputePass, Device, ShaderStages, TextureView,
     TextureViewDimension,
 };
 
 use super::composite::{CutBuffers, RayMode};
-use crate::gpu::bindings::{ComputeStage, at_offset, depth_texture, storage, texture, texture_of_integers, uniform};
+use crate::gpu::bindings::{
+    ComputeStage, at_offset, depth_texture, storage, texture, texture_of_integers, uniform, wanted,
+};
 use crate::gpu::layout::{Brick, Cut, Frame, Gather as GatherUniform, Gathered, Indirect, Part};
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
@@ -76,7 +78,7 @@ pub struct GatherBuffers<'a> {
 
 impl Default for Gather {
     fn default() -> Self {
-        Self { stages: (0..3 << 7).map(|_| OnceLock::new()).collect(), no_labels: OnceLock::new() }
+        Self { stages: (0..Compositing::COUNT << 7).map(|_| OnceLock::new()).collect(), no_labels: OnceLock::new() }
     }
 }
 
@@ -132,12 +134,8 @@ impl Gather {
         acc: &Buffer,
         dispatches: u32,
     ) -> GatherBand {
-        let descriptor = BufferDescriptor {
-            label: Some("sheetsplat.next"),
-            size: size_of::<Indirect>() as u64,
-            usage: BufferUsages::STORAGE | BufferUsages::INDIRECT | BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        };
+        let usage = BufferUsages::STORAGE | BufferUsages::INDIRECT | BufferUsages::COPY_DST;
+        let descriptor = wanted("sheetsplat.next", NEXT_BYTES, usage);
         let next: Vec<Buffer> = (0..dispatches).map(|_| device.create_buffer(&descriptor)).collect();
         let groups = next.iter().map(|next| self.bind_one(device, mode, buffers, acc, next)).collect();
         GatherBand { mode, groups, next }
@@ -185,6 +183,9 @@ impl Gather {
     }
 }
 
+/// Bytes of what a dispatch leaves to the next.
+const NEXT_BYTES: u64 = size_of::<Indirect>() as u64;
+
 /// A band, bound.
 #[derive(Debug)]
 pub struct GatherBand {
@@ -199,6 +200,11 @@ impl GatherBand {
     /// Makes it ready for a frame.
     pub fn clear(&self, encoder: &mut CommandEncoder) {
         self.next.iter().for_each(|args| encoder.clear_buffer(args, 0, None));
+    }
+
+    /// Bytes of GPU memory that one takes with so many dispatches.
+    pub fn estimate(dispatches: u32) -> u64 {
+        u64::from(dispatches) * NEXT_BYTES
     }
 
     /// Bytes of GPU memory.

@@ -4,6 +4,7 @@ use wgpu::{BindGroup, BindGroupLayout, Buffer, Device, RenderPass, RenderPipelin
 
 use crate::gpu::bindings::{bind, layout, storage, uniform};
 use crate::gpu::layout::{Band, Frame};
+use crate::gpu::render_pipeline::{Attachments, render_pipeline};
 use crate::gpu::shaders;
 use crate::gpu::targets::BandBuffer;
 use crate::placement::Placement;
@@ -29,42 +30,25 @@ impl Resolve {
             "sheetsplat.resolve",
             &[uniform::<Frame>(stage, false), uniform::<Band>(stage, false), storage::<[f32; 4]>(stage, true)],
         );
-        let module = shaders::RESOLVE.module(device);
-        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("sheetsplat.resolve"),
-            layout: Some(&pipeline_layout),
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("vertex"),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                buffers: &[],
-            },
-            primitive: wgpu::PrimitiveState::default(),
+        let attachments = Attachments {
+            colors: vec![Some(wgpu::ColorTargetState {
+                format: options.target_format,
+                blend: options.blend_state(),
+                write_mask: wgpu::ColorWrites::ALL,
+            })],
             // The pass has a depth attachment, and nothing is done with it.
-            depth_stencil: options.depth_format.map(|format| wgpu::DepthStencilState {
+            depth: options.depth_format.map(|format| wgpu::DepthStencilState {
                 format,
                 depth_write_enabled: Some(false),
                 depth_compare: Some(wgpu::CompareFunction::Always),
                 stencil: wgpu::StencilState::default(),
                 bias: wgpu::DepthBiasState::default(),
             }),
-            multisample: wgpu::MultisampleState { count: options.sample_count, ..wgpu::MultisampleState::default() },
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("fragment"),
-                compilation_options: wgpu::PipelineCompilationOptions {
-                    constants: &[("LINEAR_LIGHT", f64::from(u8::from(options.is_linear())))],
-                    ..wgpu::PipelineCompilationOptions::default()
-                },
-                targets: &[Some(wgpu::ColorTargetState {
-                    format: options.target_format,
-                    blend: options.blend_state(),
-                    write_mask: wgpu::ColorWrites::ALL,
-                })],
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
+            samples: options.sample_count,
+        };
+        let shader = (shaders::RESOLVE, ["vertex", "fragment"]);
+        let constants = [("LINEAR_LIGHT", f64::from(u8::from(options.is_linear())))];
+        let pipeline = render_pipeline(device, shader, &pipeline_layout, &attachments, &constants);
         Self { layout, pipeline }
     }
 

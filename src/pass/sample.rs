@@ -7,11 +7,12 @@ use wgpu::{
     RenderPipeline, TextureFormat, TextureView,
 };
 
-use super::splat::{added_to, pipeline, quad_indices, splat_slots};
+use super::splat::{added_to, quad_indices, sheets_of_a_group, splat_slots};
 use crate::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
 use crate::gpu::bindings::{at_offset, bind, layout};
 use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::layout::{Group, QUADS};
+use crate::gpu::render_pipeline::render_pipeline;
 use crate::gpu::shaders;
 use crate::splatting::{Compositing, FootprintForm};
 
@@ -67,8 +68,8 @@ impl Sample {
     pub fn bind(&self, device: &Device, mode: SampleMode, buffers: SampleBuffers<'_>) -> BindGroup {
         self.pipeline(mode).get_or_init(|| {
             let over = added_to(match mode.compositing {
-                Compositing::Linear | Compositing::Exponential => wgpu::BlendFactor::OneMinusSrcAlpha,
                 Compositing::Xray => wgpu::BlendFactor::One,
+                _ => wgpu::BlendFactor::OneMinusSrcAlpha,
             });
             let constants = [
                 ("SECTIONS", f64::from(u8::from(mode.form == FootprintForm::Sections))),
@@ -77,7 +78,8 @@ impl Sample {
                 ("LAYERS", f64::from(SUMMED_AREA_LAYERS)),
             ];
             let shader = (shaders::SAMPLE, ["vertex", "fragment"]);
-            pipeline(device, shader, &self.pipeline_layout, self.format, 1, Some(over), &constants)
+            let sheet = sheets_of_a_group(self.format, 1, Some(over));
+            render_pipeline(device, shader, &self.pipeline_layout, &sheet, &constants)
         });
         let SampleBuffers { frame, group, splats, order, args, footprints } = buffers;
         let resources = [

@@ -12,7 +12,8 @@ use crate::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
 use crate::gpu::bindings::{Slot, at_offset, bind, layout, storage, texture, uniform, uploaded};
 use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::layout::{Frame, Group, Indirect, QUADS, Splat as SplatRecord, TileList};
-use crate::gpu::shaders::{self, Shader};
+use crate::gpu::render_pipeline::{Attachments, render_pipeline};
+use crate::gpu::shaders;
 use crate::pass::cull::CullList;
 use crate::splatting::FootprintForm;
 
@@ -51,13 +52,11 @@ impl Splat {
         let (splat_layout, splat_pipeline_layout) = layout(device, "sheetsplat.splat", &splat_slots());
         let entry = format!("fragment_{sheets}");
         Self {
-            clear: pipeline(
+            clear: render_pipeline(
                 device,
                 (shaders::CLEAR, ["vertex", &entry]),
                 &clear_pipeline_layout,
-                format,
-                sheets,
-                None,
+                &sheets_of_a_group(format, sheets, None),
                 &[],
             ),
             clear_layout,
@@ -82,8 +81,8 @@ impl Splat {
                 ("PLANE_TEXELS", f64::from(SUMMED_AREA_SIZE)),
                 ("LAYERS", f64::from(SUMMED_AREA_LAYERS)),
             ];
-            let layout = &self.pipeline_layout;
-            pipeline(device, (shader, ["vertex", &entry]), layout, self.format, self.sheets, additive, &constants)
+            let sheets = sheets_of_a_group(self.format, self.sheets, additive);
+            render_pipeline(device, (shader, ["vertex", &entry]), &self.pipeline_layout, &sheets, &constants)
         })
     }
 
@@ -193,43 +192,8 @@ pub(super) fn quad_indices(device: &Device) -> Buffer {
     uploaded(device, "sheetsplat.quad_indices", bytes, bytes.len() as u64, wgpu::BufferUsages::INDEX)
 }
 
-/// A pipeline that draws quads into all sheets of a group.
-pub(super) fn pipeline(
-    device: &Device,
-    (shader, [vertex, fragment]): (Shader, [&str; 2]),
-    layout: &wgpu::PipelineLayout,
-    format: TextureFormat,
-    sheets: u32,
-    blend: Option<wgpu::BlendState>,
-    constants: &[(&str, f64)],
-) -> RenderPipeline {
-    let label = format!("sheetsplat.{}", shader.stage);
-    let module = shader.module(device);
-    let target = Some(wgpu::ColorTargetState { format, blend, write_mask: wgpu::ColorWrites::ALL });
-    let compilation_options =
-        wgpu::PipelineCompilationOptions { constants, ..wgpu::PipelineCompilationOptions::default() };
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(&label),
-        layout: Some(layout),
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some(vertex),
-            compilation_options: compilation_options.clone(),
-            buffers: &[],
-        },
-        primitive: wgpu::PrimitiveState {
-            topology: wgpu::PrimitiveTopology::TriangleList,
-            ..wgpu::PrimitiveState::default()
-        },
-        depth_stencil: None,
-        multisample: wgpu::MultisampleState::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &module,
-            entry_point: Some(fragment),
-            compilation_options,
-            targets: &vec![target; sheets as usize],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
+/// All sheets of a group.
+pub(super) fn sheets_of_a_group(format: TextureFormat, sheets: u32, blend: Option<wgpu::BlendState>) -> Attachments {
+    let target = wgpu::ColorTargetState { format, blend, write_mask: wgpu::ColorWrites::ALL };
+    Attachments::colors(vec![target; sheets as usize])
 }

@@ -3,7 +3,7 @@
 use wgpu::{BindGroup, Buffer, BufferUsages, ComputePass, Device, ShaderStages};
 
 use crate::error::RenderError;
-use crate::gpu::bindings::{ComputeStage, at_offset, grown, storage, uniform};
+use crate::gpu::bindings::{ComputeStage, Wanted, at_offset, grown, storage, uniform, wanted};
 use crate::gpu::layout::{Culled, Frame, Group, TileList};
 use crate::gpu::shaders;
 use crate::gpu::targets::Targets;
@@ -42,6 +42,18 @@ impl Tiles {
         Self { stage: ComputeStage::new(device, shaders::TILES, "main", &slots, &[]) }
     }
 
+    /// The buffers for so many tiles and groups, in [`TileLists`]' order.
+    pub fn wanted(tiles: u32, group_count: usize) -> [Wanted; 3] {
+        let list_bytes = size_of::<TileList>() as u64 + u64::from(tiles) * 4;
+        let (storage, indirect) = (BufferUsages::STORAGE, BufferUsages::STORAGE | BufferUsages::INDIRECT);
+        let count_bytes = group_count.max(1) as u64 * 4;
+        [
+            wanted("sheetsplat.composited_tiles", list_bytes, indirect),
+            wanted("sheetsplat.occluding_tiles", list_bytes, indirect),
+            wanted("sheetsplat.tile_counts", count_bytes, storage | BufferUsages::COPY_SRC),
+        ]
+    }
+
     /// Allocates the lists for a frame of `group_count` groups, or takes those of the `previous` frame.
     ///
     /// # Errors
@@ -54,14 +66,12 @@ impl Tiles {
         group_count: usize,
         previous: Option<TileLists>,
     ) -> Result<TileLists, RenderError> {
-        let buffer = |previous, label, size, usage| grown(device, previous, label, size, BufferUsages::STORAGE | usage);
         let [old_composited, old_occluding, old_counts] =
             previous.map_or([None, None, None], |old| [old.composited, old.occluding, old.counts].map(Some));
-        let list_bytes = size_of::<TileList>() as u64 + targets.opaque_tiles.size();
-        let composited = buffer(old_composited, "sheetsplat.composited_tiles", list_bytes, BufferUsages::INDIRECT)?;
-        let occluding = buffer(old_occluding, "sheetsplat.occluding_tiles", list_bytes, BufferUsages::INDIRECT)?;
-        let counts =
-            buffer(old_counts, "sheetsplat.tile_counts", group_count.max(1) as u64 * 4, BufferUsages::COPY_SRC)?;
+        let [composited, occluding, counts] = Self::wanted(targets.tiles(), group_count);
+        let composited = grown(device, old_composited, &composited)?;
+        let occluding = grown(device, old_occluding, &occluding)?;
+        let counts = grown(device, old_counts, &counts)?;
         let resources = [
             frame.as_entire_binding(),
             at_offset::<Group>(groups),

@@ -2,22 +2,24 @@
 //! records it.
 
 pub(crate) mod quads;
+pub(crate) mod request;
 pub(crate) mod samples;
 pub(crate) mod tiles;
+pub(crate) mod way;
 
 use wgpu::{Buffer, BufferUsages, ComputePassDescriptor, Device, Queue};
 
 use crate::classified_volume::ClassifiedVolume;
 use crate::error::RenderError;
 use crate::footprint::FootprintTable;
-use crate::gpu::bindings::grown;
+use crate::gpu::bindings::filled;
 use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
 use crate::kernel::Kernel;
-use crate::pass::composite::{CutBuffers, RayMode};
-use crate::splatting::{FootprintForm, Splatting};
-use crate::view::View;
+use crate::pass::composite::CutBuffers;
+use crate::rasterizer::request::FrameRequest;
+use crate::splatting::FootprintForm;
 
 /// What [`Renderer::prepare`](crate::renderer::Renderer::prepare) had to do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -34,20 +36,24 @@ pub(crate) struct Given<'a> {
     pub(crate) device: &'a Device,
     pub(crate) queue: &'a Queue,
     pub(crate) volume: &'a ClassifiedVolume,
-    pub(crate) view: &'a View,
-    pub(crate) kernel: &'a Kernel,
-    pub(crate) splatting: &'a Splatting,
+    pub(crate) request: &'a FrameRequest,
     /// One [`Frame`](crate::gpu::layout::Frame).
     pub(crate) frame: &'a Buffer,
     /// Control points of the ramps.
     pub(crate) control_points: &'a Buffer,
-    /// The most that each of the ramps has.
-    pub(crate) ramp_lengths: [u32; 3],
     pub(crate) compositing: &'a CompositingBuffer,
-    /// What of pixels' rays is looked at.
-    pub(crate) rays: RayMode,
-    /// What cuts them.
     pub(crate) cut: CutBuffers<'a>,
+}
+
+/// What a rasterizer's part of a frame takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Needs {
+    /// Bytes of GPU memory.
+    pub(crate) bytes: u64,
+    /// Sheet groups.
+    pub(crate) groups: usize,
+    /// Passes that are timed.
+    pub(crate) passes: usize,
 }
 
 impl Given<'_> {
@@ -74,9 +80,10 @@ pub(crate) struct Footprints {
 impl Footprints {
     /// The old table if it will do. Also whether it had to make one.
     pub(crate) fn renewed(old: Option<Self>, given: Given<'_>) -> (Self, bool) {
-        let (form, kernel) = (given.splatting.footprint, *given.kernel);
+        let FrameRequest { splatting, kernel, view, .. } = given.request;
+        let (form, kernel) = (splatting.footprint, *kernel);
         // The summed-area form serves every width (§3.3.1).
-        let width = given.view.section_width();
+        let width = view.section_width();
         let of = (form == FootprintForm::Sections).then_some(width);
         let fits = |old: &Self| (old.texture.form, old.kernel, old.width) == (form, kernel, of);
         if let Some(old) = old.filter(fits) {
@@ -85,24 +92,6 @@ impl Footprints {
         let table = FootprintTable::new(form, &kernel, width);
         (Self { texture: FootprintTexture::upload(given.device, given.queue, &table), kernel, width: of }, true)
     }
-}
-
-/// A buffer with these contents, the old one if it has the right size.
-///
-/// # Errors
-/// If the device's buffers may not be that large.
-pub(crate) fn filled(
-    device: &Device,
-    queue: &Queue,
-    old: Option<Buffer>,
-    label: &'static str,
-    bytes: &[u8],
-    usage: BufferUsages,
-) -> Result<Buffer, RenderError> {
-    // Of one element at least: bindings may not be empty.
-    let buffer = grown(device, old, label, (bytes.len() as u64).max(8), usage | BufferUsages::COPY_DST)?;
-    queue.write_buffer(&buffer, 0, bytes);
-    Ok(buffer)
 }
 
 /// A compute pass that is timed if anything is.

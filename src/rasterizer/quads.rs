@@ -1,25 +1,28 @@
 //! The quad rasterizer (Fig. 12): for every group of sheets the stages cull, tiles, splat, composite and occlude.
 
-use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, TextureFormat, TextureView};
+use std::ops::Range;
 
-use super::{Footprints, Given, Prepared, compute};
+use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Limits, TextureFormat, TextureView};
+
+use super::{Footprints, Given, Needs, Prepared, compute};
 use crate::brick;
 use crate::classified_volume::ClassifiedVolume;
 use crate::error::RenderError;
-use crate::gpu::bindings::{grown, uploaded};
-use crate::gpu::layout::{Group, Tally};
+use crate::footprint::FootprintTable;
+use crate::gpu::bindings::{Wanted, grown, sizes, uploaded, wanted, wanted_for};
+use crate::gpu::layout::{Brick, Group, Tally};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
-use crate::pass::composite::{Composite, CompositeBuffers, RayMode};
+use crate::pass::composite::{Composite, CompositeBuffers, CompositeMode};
 use crate::pass::cull::{Cull, CullBuffers, CullList};
 use crate::pass::occlude::Occlude;
 use crate::pass::splat::{Splat, SplatMode};
 use crate::pass::tiles::{TileLists, Tiles};
-use crate::plan::FramePlan;
+use crate::plan::{FramePlan, tile_grid};
+use crate::rasterizer::request::FrameRequest;
 use crate::splatting::Order;
 use crate::stats::GroupSlabs;
-use crate::view::View;
 
 /// The stages.
 #[derive(Debug)]
@@ -49,7 +52,7 @@ pub(crate) struct QuadFrame {
     sheet_views: Vec<TextureView>,
     splat_mode: SplatMode,
     clear_group: BindGroup,
-    rays: RayMode,
+    composite_mode: CompositeMode,
     /// First hits, `[u32]`, one per pixel; of one, if they are not asked for.
     hits: Buffer,
     composite_groups: Vec<BindGroup>,
@@ -61,6 +64,8 @@ pub(crate) struct QuadFrame {
 struct Planned {
     plan: FramePlan,
     order: Order,
+    /// [`means::covered`](crate::means::covered).
+    covered: Range<f64>,
     /// [`ClassifiedVolume::revision`].
     revision: u64,
     /// For every list its bricks in bucket order, `[u32]`.
@@ -98,7 +103,8 @@ impl QuadRasterizer {
         given: Given<'_>,
         previous: Option<QuadFrame>,
     ) -> Result<(QuadFrame, Prepared), RenderError> {
-        let Given { device, volume, view, splatting, frame, control_points, compositing, .. } = given;
+        let Given { device, volume, request, frame, control_points, compositing, .. } = given;
+        let FrameRequest { view, splatting, kernel, covered, rays, .. } = request;
         let old = Old::of(previous);
         let targets = old.targets.filter(|old| old.size == view.size);
         let targets = match targets {
@@ -107,25 +113,23 @@ impl QuadRasterizer {
         };
         let mut other_axes = old.planned;
         other_axes.retain(|old| {
-            (old.order, old.revision) == (splatting.order, volume.revision)
+            (old.order, old.revision, &old.covered) == (splatting.order, volume.revision, covered)
                 && (old.plan.view.has_depths_of(view) || old.plan.view.is_by_slices())
         });
         let current = other_axes.iter().position(|old| old.plan.view.has_depths_of(view));
         let bucketed = current.is_none();
         let mut planned = match current {
             Some(at) => other_axes.swap_remove(at),
-            None => Planned::new(device, volume, *view, self.sheets, splatting.order),
+            None => Planned::new(device, volume, request, self.sheets),
         };
         planned.plan.view = *view;
         let plan = &planned.plan;
         let (footprints, tabled) = Footprints::renewed(old.footprints, given);
-        let alignment = device.limits().min_uniform_buffer_offset_alignment as usize;
-        let group_stride = size_of::<Group>().next_multiple_of(alignment);
-        let group_bytes = uniforms::groups(plan, given.kernel, splatting, group_stride);
+        let group_stride = group_stride(&device.limits());
+        let group_bytes = uniforms::groups(plan, kernel, splatting, group_stride);
         let groups = given.filled(old.groups, "sheetsplat.groups", &group_bytes, BufferUsages::UNIFORM)?;
-        let culled_bytes = size_of::<Tally>() as u64 + targets.opaque_tiles.size();
-        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-        let culled = grown(device, old.culled, "sheetsplat.culled", culled_bytes, usage)?;
+        let [wanted_culled, wanted_hits] = counts_and_hits(request);
+        let culled = grown(device, old.culled, &wanted_culled)?;
 
         let shared = CullBuffers {
             frame,
@@ -149,9 +153,7 @@ impl QuadRasterizer {
         let tile_lists = self.tiles.prepare(device, buffers, &targets, plan.groups.len(), old.tile_lists)?;
         let tiles = &tile_lists.composited;
         let sheets = targets.sheets_view();
-        let pixels = u64::from(view.size[0]) * u64::from(view.size[1]);
-        let hit_bytes = if given.rays.first_hit { 4 * pixels } else { 4 };
-        let hits = grown(device, old.hits, "sheetsplat.hits", hit_bytes, usage)?;
+        let hits = grown(device, old.hits, &wanted_hits)?;
         let buffers = CompositeBuffers {
             frame,
             groups: &groups,
@@ -161,13 +163,14 @@ impl QuadRasterizer {
             cut: given.cut,
             hits: &hits,
         };
-        let composite = |band| self.composite.bind(device, given.rays, buffers, band);
+        let composite_mode = CompositeMode { compositing: splatting.compositing, rays: *rays };
+        let composite = |band| self.composite.bind(device, composite_mode, buffers, band);
         let splat_mode = SplatMode { form: splatting.footprint, perspective: view.perspective.is_some() };
         self.splat.prepare(device, splat_mode);
         let frame = QuadFrame {
             splat_mode,
             clear_group: self.splat.bind_clear(device, frame, tiles),
-            rays: given.rays,
+            composite_mode,
             composite_groups: compositing.bands.iter().map(composite).collect(),
             occlude_groups: self.occlude.bind(device, [frame, &groups], &tile_lists.occluding, &targets),
             sheet_views: (0..self.sheets).map(|layer| targets.sheet_view(layer)).collect(),
@@ -185,21 +188,50 @@ impl QuadRasterizer {
         Ok((frame, Prepared { bucketed, tabled }))
     }
 
+    /// What a new frame of these lists of bricks will take, with groups of `sheets` sheets.
+    ///
+    /// # Errors
+    /// Those of [`Self::prepare`].
+    pub(crate) fn estimate(
+        limits: &Limits,
+        request: &FrameRequest,
+        lists: &[&[Brick]],
+        (sheet_format, sheets): (TextureFormat, u32),
+    ) -> Result<Needs, RenderError> {
+        let FrameRequest { view, kernel, splatting, covered, .. } = request;
+        let plan = FramePlan::new(lists.iter().copied(), *view, sheets, splatting.order, covered.clone());
+        let most = most_of(lists.iter().copied(), &plan);
+        let group_bytes = uniforms::groups(&plan, kernel, splatting, group_stride(limits)).len() as u64;
+        let [columns, rows] = tile_grid(view.size);
+        let mut buffers = vec![wanted_for("sheetsplat.groups", group_bytes, BufferUsages::UNIFORM)];
+        buffers.extend(counts_and_hits(request));
+        buffers.extend(Tiles::wanted(columns * rows, plan.groups.len()));
+        for ((bricks, order), most) in lists.iter().zip(&plan.orders).zip(most) {
+            buffers.push(wanted("sheetsplat.order", order_bytes(order).len() as u64, BufferUsages::STORAGE));
+            buffers.extend(Cull::wanted(bricks.len(), most));
+        }
+        let targets = Targets::estimate(limits, view.size, sheet_format, sheets)?;
+        Ok(Needs {
+            bytes: sizes(limits, &buffers)? + targets + FootprintTable::bytes(splatting.footprint),
+            groups: plan.groups.len(),
+            passes: passes(&plan),
+        })
+    }
+
     /// Draws the frame.
     pub(crate) fn record(&self, encoder: &mut CommandEncoder, timer: &mut Option<Timer>, frame: &QuadFrame) {
         let QuadFrame { planned: Planned { plan, .. }, targets, tile_lists, .. } = frame;
-        let masks = [&targets.opaque, &targets.opaque_columns, &targets.occluded, &targets.opaque_tiles, &frame.culled];
-        for buffer in masks.into_iter().chain([&frame.hits]).chain(frame.lists.iter().map(|list| &list.cull.states)) {
+        let masks = targets.masks().into_iter().chain([&frame.culled, &frame.hits]);
+        for buffer in masks.chain(frame.lists.iter().map(|list| &list.cull.states)) {
             encoder.clear_buffer(buffer, 0, None);
         }
         let mut offsets = (0..).step_by(frame.group_stride as usize);
         for group in &plan.groups {
             // (list, offset of its group uniform) for the lists that reach into the group.
-            let lists: Vec<(&PreparedList, u32)> = (frame.lists.iter().zip(&mut offsets).zip(&group.bricks))
-                .filter(|(_, bricks)| !bricks.is_empty())
-                .map(|(list, _)| list)
-                .collect();
-            let Some(&(_, any_offset)) = lists.first() else { continue };
+            let all: Vec<(&PreparedList, u32)> = frame.lists.iter().zip(&mut offsets).collect();
+            let Some(&(_, any_offset)) = all.first() else { continue };
+            let reaches = |(list, bricks): (_, &Range<u32>)| (!bricks.is_empty()).then_some(list);
+            let lists: Vec<(&PreparedList, u32)> = all.into_iter().zip(&group.bricks).filter_map(reaches).collect();
 
             let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.cull", timer, "cull"));
             for &(list, offset) in &lists {
@@ -215,7 +247,7 @@ impl QuadRasterizer {
 
             let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.composite", timer, "composite"));
             let bands = &frame.composite_groups;
-            self.composite.record(&mut pass, frame.rays, bands, any_offset, &tile_lists.composited);
+            self.composite.record(&mut pass, frame.composite_mode, bands, any_offset, &tile_lists.composited);
             self.occlude.record(&mut pass, &frame.occlude_groups, any_offset, &tile_lists.occluding);
         }
     }
@@ -224,7 +256,7 @@ impl QuadRasterizer {
 impl QuadFrame {
     /// Passes of the frame: every group has three.
     pub(crate) fn passes(&self) -> usize {
-        3 * self.planned.plan.groups.len()
+        passes(&self.planned.plan)
     }
 
     /// Its groups' slabs.
@@ -260,22 +292,16 @@ impl QuadFrame {
 }
 
 impl Planned {
-    fn new(device: &Device, volume: &ClassifiedVolume, view: View, sheets: u32, order: Order) -> Self {
-        let plan = FramePlan::new(volume.lists.bricks(), view, sheets, order);
-        let most = (volume.lists.bricks().zip(&plan.orders).enumerate())
-            .map(|(at, (bricks, order))| {
-                let voxels = |&brick: &u32| brick::present(&bricks[brick as usize]).count_ones();
-                most(plan.groups.iter().map(|group| {
-                    let bricks = group.bricks[at].clone();
-                    order[bricks.start as usize..bricks.end as usize].iter().map(voxels)
-                }))
-            })
-            .collect();
+    fn new(device: &Device, volume: &ClassifiedVolume, request: &FrameRequest, sheets: u32) -> Self {
+        let FrameRequest { view, splatting, covered, .. } = request;
+        let (order, covered) = (splatting.order, covered.clone());
+        let plan = FramePlan::new(volume.lists.bricks(), *view, sheets, order, covered.clone());
+        let most = most_of(volume.lists.bricks(), &plan);
         let upload = |order: &Vec<u32>| {
-            let bytes: &[u8] = if order.is_empty() { &[0; 4] } else { bytemuck::cast_slice(order) };
+            let bytes = order_bytes(order);
             uploaded(device, "sheetsplat.order", bytes, bytes.len() as u64, BufferUsages::STORAGE)
         };
-        Self { order, revision: volume.revision, orders: plan.orders.iter().map(upload).collect(), most, plan }
+        Self { order, covered, revision: volume.revision, orders: plan.orders.iter().map(upload).collect(), most, plan }
     }
 }
 
@@ -306,6 +332,41 @@ impl Old {
             lists: frame.lists,
         }
     }
+}
+
+/// Timed ones: every group has three.
+fn passes(plan: &FramePlan) -> usize {
+    3 * plan.groups.len()
+}
+
+/// Bytes from one group to the next.
+fn group_stride(limits: &Limits) -> usize {
+    size_of::<Group>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize)
+}
+
+/// The buffers of what culling counts, and of first hits.
+fn counts_and_hits(request: &FrameRequest) -> [Wanted; 2] {
+    let [columns, rows] = tile_grid(request.view.size);
+    let culled_bytes = size_of::<Tally>() as u64 + u64::from(columns * rows) * 4;
+    let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
+    [wanted("sheetsplat.culled", culled_bytes, usage), wanted("sheetsplat.hits", request.hit_bytes().max(4), usage)]
+}
+
+/// A list's bricks in bucket order; bindings may not be empty.
+fn order_bytes(order: &[u32]) -> &[u8] {
+    if order.is_empty() { &[0; 4] } else { bytemuck::cast_slice(order) }
+}
+
+/// For every list the most bricks and voxels that any group can visit.
+fn most_of<'a>(lists: impl Iterator<Item = &'a [Brick]>, plan: &FramePlan) -> Vec<(u32, u32)> {
+    let of_list = |(at, (bricks, order)): (usize, (&[Brick], &Vec<u32>))| {
+        let voxels = |&brick: &u32| brick::present(&bricks[brick as usize]).count_ones();
+        most(plan.groups.iter().map(|group| {
+            let bricks = group.bricks[at].clone();
+            order[bricks.start as usize..bricks.end as usize].iter().map(voxels)
+        }))
+    };
+    lists.zip(&plan.orders).enumerate().map(of_list).collect()
 }
 
 /// The most bricks and voxels that any group can visit, from the voxel counts of every group's bricks.

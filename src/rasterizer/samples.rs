@@ -3,26 +3,33 @@
 
 use glam::{DVec2, UVec3};
 use rayon::prelude::*;
-use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, TextureFormat, TextureView};
+use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Limits, TextureFormat, TextureView};
 
-use super::{Footprints, Given, Prepared, compute};
+use super::{Footprints, Given, Needs, Prepared, compute};
 use crate::brick::{self, BRICK_VOXELS};
 use crate::error::RenderError;
-use crate::gpu::bindings::grown;
-use crate::gpu::layout::{FOLD, Frame, Indirect, QUADS, Splat, Tally, TileList};
+use crate::footprint::FootprintTable;
+use crate::gpu::bindings::{Wanted, grown, sizes, wanted, wanted_for, written};
+use crate::gpu::layout::{Brick, FOLD, Group, Indirect, QUADS, Splat, Tally};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
-use crate::pass::composite::{Composite, CompositeBuffers, RayMode};
+use crate::pass::composite::{Composite, CompositeBuffers, CompositeMode, RayMode};
 use crate::pass::sample::{Sample, SampleBuffers, SampleMode};
 use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};
 use crate::plan::tile_grid;
+use crate::rasterizer::request::FrameRequest;
 use crate::splatting::Compositing;
 use crate::stats::GroupSlabs;
 use crate::view::View;
+use crate::volume::Grid;
 
 /// Planes around all kernels, in the sheet depth of such views.
 const PLANES: std::ops::Range<f64> = -0.5..0.5;
+
+/// How the one buffer goes into the compositing buffer: its samples are composited already.
+const SUM: CompositeMode =
+    CompositeMode { compositing: Compositing::Xray, rays: RayMode { cut: false, first_hit: false } };
 
 /// The stages.
 #[derive(Debug)]
@@ -64,8 +71,6 @@ struct Buffers {
     group: Buffer,
     splats: Buffer,
     tiles: Buffer,
-    /// The frame, for the composite stage: samples are composited already.
-    sum: Buffer,
     counts: Buffer,
     no_hits: Buffer,
 }
@@ -82,18 +87,12 @@ impl SampleRasterizer {
     pub(crate) fn prepare(
         &self,
         given: Given<'_>,
-        frame: &Frame,
         previous: Option<SampleFrame>,
     ) -> Result<(SampleFrame, Prepared), RenderError> {
-        let Given { device, volume, view, kernel, splatting, .. } = given;
-        let limits = device.limits();
-        let actual = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let places = volume.lists.all().len() as u64 * u64::from(BRICK_VOXELS);
-        let required = places * size_of::<Splat>() as u64;
-        if required > actual {
-            let what = "the voxels of splatting.method = \"composite-every-sample\"";
-            return Err(RenderError::Limit { what, limit: "max_storage_buffer_binding_size", required, actual });
-        }
+        let Given { device, volume, request, .. } = given;
+        let FrameRequest { view, kernel, splatting, .. } = request;
+        let bricks = volume.lists.all();
+        let splat_bytes = splat_bytes(&device.limits(), bricks.len())?;
         let (old_sorted, old_footprints) = match previous {
             Some(old) => (Some(old.sorted), Some(old.footprints)),
             None => (None, None),
@@ -102,11 +101,11 @@ impl SampleRasterizer {
             |old: &Sorted| old.view == *view && (old.support, old.revision) == (kernel.support(), volume.revision);
         let (sorted, bucketed) = match old_sorted.filter(is_current) {
             Some(sorted) => (sorted, false),
-            None => (Sorted::new(given), true),
+            None => (Sorted::new(request, volume.grid(), bricks, volume.revision), true),
         };
         let (footprints, tabled) = Footprints::renewed(old_footprints, given);
         let targets = Targets::new(device, view.size, self.format, 1)?;
-        let buffers = Buffers::new(given, frame, &sorted.places, required)?;
+        let buffers = Buffers::new(given, &sorted.places, splat_bytes)?;
 
         let shade_group = self.shade.bind(
             device,
@@ -136,7 +135,7 @@ impl SampleRasterizer {
         );
         let sheets = targets.sheets_view();
         let composite_buffers = CompositeBuffers {
-            frame: &buffers.sum,
+            frame: given.frame,
             groups: &buffers.group,
             sheets: &sheets,
             tiles: &buffers.tiles,
@@ -144,7 +143,7 @@ impl SampleRasterizer {
             cut: given.cut,
             hits: &buffers.no_hits,
         };
-        let composite = |band| self.composite.bind(device, RayMode::default(), composite_buffers, band);
+        let composite = |band| self.composite.bind(device, SUM, composite_buffers, band);
         let frame = SampleFrame {
             composite_groups: given.compositing.bands.iter().map(composite).collect(),
             target: targets.sheet_view(0),
@@ -159,6 +158,24 @@ impl SampleRasterizer {
         Ok((frame, Prepared { bucketed, tabled }))
     }
 
+    /// What a new frame of these bricks will take.
+    ///
+    /// # Errors
+    /// Those of [`Self::prepare`].
+    pub(crate) fn estimate(
+        limits: &Limits,
+        request: &FrameRequest,
+        (grid, bricks): (&Grid, &[Brick]),
+        sheet_format: TextureFormat,
+    ) -> Result<Needs, RenderError> {
+        let splat_bytes = splat_bytes(limits, bricks.len())?;
+        let voxels = Sorted::new(request, grid, bricks, 0).places.len();
+        let buffers = sizes(limits, &Buffers::wanted(request.view.size, voxels, splat_bytes))?;
+        let targets = Targets::estimate(limits, request.view.size, sheet_format, 1)?;
+        let bytes = buffers + targets + FootprintTable::bytes(request.splatting.footprint);
+        Ok(Needs { bytes, groups: 0, passes: SampleFrame::PASSES })
+    }
+
     /// Draws the frame.
     pub(crate) fn record(&self, encoder: &mut CommandEncoder, timer: &mut Option<Timer>, frame: &SampleFrame) {
         let SampleFrame { buffers, .. } = frame;
@@ -169,7 +186,7 @@ impl SampleRasterizer {
         let count = frame.sorted.places.len() as u32;
         self.sample.record(encoder, times, (frame.mode, &frame.sample_group), &frame.target, count);
         let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.composite", timer, "composite"));
-        self.composite.record(&mut pass, RayMode::default(), &frame.composite_groups, 0, &buffers.tiles);
+        self.composite.record(&mut pass, SUM, &frame.composite_groups, 0, &buffers.tiles);
     }
 }
 
@@ -190,18 +207,16 @@ impl SampleFrame {
 
     /// Bytes of GPU memory.
     pub(crate) fn gpu_bytes(&self) -> u64 {
-        let Buffers { order, args, group, splats, tiles, sum, counts, no_hits } = &self.buffers;
-        let buffers: u64 =
-            [order, args, group, splats, tiles, sum, counts, no_hits].into_iter().map(Buffer::size).sum();
+        let Buffers { order, args, group, splats, tiles, counts, no_hits } = &self.buffers;
+        let buffers: u64 = [order, args, group, splats, tiles, counts, no_hits].into_iter().map(Buffer::size).sum();
         self.targets.gpu_bytes() + self.footprints.texture.gpu_bytes + buffers
     }
 }
 
 impl Sorted {
     /// Sorts by depth along w, equal ones in memory order.
-    fn new(given: Given<'_>) -> Self {
-        let Given { volume, view, kernel, .. } = given;
-        let grid = volume.grid();
+    fn new(request: &FrameRequest, grid: &Grid, bricks: &[Brick], revision: u64) -> Self {
+        let FrameRequest { view, kernel, .. } = request;
         let along_w = view.basis.w * grid.aspect();
         // Depths that differ by less than rounding errors may are equal.
         let depth =
@@ -214,7 +229,7 @@ impl Sorted {
                 && (px + half_box).cmpge(DVec2::splat(0.5)).all()
                 && (px - half_box).cmple(size - 0.5).all()
         };
-        let mut voxels: Vec<(i64, u32, u32)> = (volume.lists.all().par_iter().enumerate())
+        let mut voxels: Vec<(i64, u32, u32)> = (bricks.par_iter().enumerate())
             .flat_map_iter(|(number, brick)| {
                 brick::voxels(brick)
                     .filter(|&(_, voxel)| is_on_screen(voxel))
@@ -223,36 +238,59 @@ impl Sorted {
             .collect();
         voxels.par_sort_unstable();
         let places = voxels.into_iter().rev().map(|(_, _, place)| place).collect();
-        Self { view: *view, support: kernel.support(), revision: volume.revision, places }
+        Self { view: *view, support: kernel.support(), revision, places }
     }
 }
 
 impl Buffers {
-    fn new(given: Given<'_>, frame: &Frame, places: &[u32], splat_bytes: u64) -> Result<Self, RenderError> {
-        let Given { device, view, kernel, splatting, .. } = given;
-        let count = places.len() as u32;
+    /// For so many voxels on an image, in their order.
+    fn wanted(size: [u32; 2], voxels: usize, splat_bytes: u64) -> [Wanted; 7] {
         let (storage, indirect) = (BufferUsages::STORAGE, BufferUsages::STORAGE | BufferUsages::INDIRECT);
-        let filled = |label, bytes: &[u8], usage| given.filled(None, label, bytes, usage);
+        let [columns, rows] = tile_grid(size);
+        let one = |label, bytes: usize, usage| wanted_for(label, bytes as u64, usage);
+        [
+            one("sheetsplat.order", 4 * voxels, storage),
+            one("sheetsplat.args", size_of::<Indirect>(), indirect),
+            one("sheetsplat.group", size_of::<Group>(), BufferUsages::UNIFORM),
+            wanted("sheetsplat.splats", splat_bytes.max(size_of::<Splat>() as u64), storage),
+            one("sheetsplat.tiles", size_of::<Indirect>() + 4 * (columns * rows) as usize, indirect),
+            one("sheetsplat.counts", size_of::<Tally>(), BufferUsages::COPY_SRC),
+            one("sheetsplat.no_hits", 4, storage),
+        ]
+    }
+
+    fn new(given: Given<'_>, places: &[u32], splat_bytes: u64) -> Result<Self, RenderError> {
+        let Given { device, queue, request, .. } = given;
+        let FrameRequest { view, kernel, splatting, .. } = request;
+        let count = places.len() as u32;
         let [columns, rows] = tile_grid(view.size);
-        let tiles = columns * rows;
-        let list = TileList { args: workgroups(tiles, 1), tiles: [0] };
-        let mut tile_words: Vec<u8> = bytemuck::bytes_of(&list.args).to_vec();
-        tile_words.extend((0..tiles).flat_map(u32::to_ne_bytes));
-        let group = uniforms::group(view, kernel, splatting, PLANES);
-        let counts =
+        let mut tile_words: Vec<u8> = bytemuck::bytes_of(&workgroups(columns * rows, 1)).to_vec();
+        tile_words.extend((0..columns * rows).flat_map(u32::to_ne_bytes));
+        let tally =
             Tally { voxels_shaded: count, sections_rasterized: count, quads: count, ..bytemuck::Zeroable::zeroed() };
-        let sum = Frame { compositing: Compositing::Xray as u32, ..*frame };
+        let [order, args, group, splats, tiles, counts, no_hits] = Self::wanted(view.size, places.len(), splat_bytes);
+        let filled = |wanted: Wanted, bytes: &[u8]| written(device, queue, None, &wanted, bytes);
         Ok(Self {
-            order: filled("sheetsplat.order", bytemuck::cast_slice(places), storage)?,
-            args: filled("sheetsplat.args", bytemuck::bytes_of(&workgroups(count, 64)), indirect)?,
-            group: filled("sheetsplat.group", bytemuck::bytes_of(&group), BufferUsages::UNIFORM)?,
-            splats: grown(device, None, "sheetsplat.splats", splat_bytes.max(size_of::<Splat>() as u64), storage)?,
-            tiles: filled("sheetsplat.tiles", &tile_words, indirect)?,
-            sum: filled("sheetsplat.sum", bytemuck::bytes_of(&sum), BufferUsages::UNIFORM)?,
-            counts: filled("sheetsplat.counts", bytemuck::bytes_of(&counts), BufferUsages::COPY_SRC)?,
-            no_hits: filled("sheetsplat.no_hits", &[0; 4], storage)?,
+            order: filled(order, bytemuck::cast_slice(places))?,
+            args: filled(args, bytemuck::bytes_of(&workgroups(count, 64)))?,
+            group: filled(group, bytemuck::bytes_of(&uniforms::group(view, kernel, splatting, PLANES)))?,
+            splats: grown(device, None, &splats)?,
+            tiles: filled(tiles, &tile_words)?,
+            counts: filled(counts, bytemuck::bytes_of(&tally))?,
+            no_hits: filled(no_hits, &[0; 4])?,
         })
     }
+}
+
+/// Bytes of the splats of so many bricks.
+fn splat_bytes(limits: &Limits, bricks: usize) -> Result<u64, RenderError> {
+    let actual = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    let required = bricks as u64 * u64::from(BRICK_VOXELS) * size_of::<Splat>() as u64;
+    if required > actual {
+        let what = "the voxels of splatting.method = \"composite-every-sample\"";
+        return Err(RenderError::Limit { what, limit: "max_storage_buffer_binding_size", required, actual });
+    }
+    Ok(required)
 }
 
 /// Arguments for `count` things, of which a workgroup takes `each`.

@@ -1,23 +1,23 @@
 //! The tile rasterizer: one compute stage draws every tile front to back, its sheets in registers.
 
 use std::mem::offset_of;
+use std::ops::Range;
 
-use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Features};
+use wgpu::{Buffer, BufferUsages, CommandEncoder, Limits};
 
-use super::{Given, Prepared};
+use super::way::SUBGROUP_SIZES;
+use super::{Given, Needs, Prepared};
 use crate::error::RenderError;
-use crate::gpu::bindings::grown;
-use crate::gpu::layout::{Brick, Gathered, Part, Tally};
+use crate::gpu::bindings::{Wanted, grown, sizes, wanted, wanted_for, written};
+use crate::gpu::layout::{Brick, Gather as GatherUniform, Gathered, Part, Tally};
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
 use crate::pass::gather::{Gather, GatherBand, GatherBuffers, GatherMode};
-use crate::splatting::{FootprintForm, Method, Order, Splatting};
+use crate::rasterizer::request::FrameRequest;
+use crate::splatting::Order;
 use crate::stats::GroupSlabs;
 use crate::tile_bins::{SHEETS, SIDE, TileBins};
 use crate::view::View;
-
-/// Threads that a subgroup may have.
-const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;
 
 /// The stage.
 #[derive(Debug, Default)]
@@ -50,6 +50,8 @@ struct Binned {
     bins: TileBins,
     view: View,
     order: Order,
+    /// [`means::covered`](crate::means::covered).
+    covered: Range<f64>,
     /// Of the kernel; it changes the footprints' boxes.
     support: f64,
     search_passes: u32,
@@ -57,31 +59,6 @@ struct Binned {
 }
 
 impl TileRasterizer {
-    /// Why a device or some settings cannot be drawn by tiles; `None` if they can.
-    pub(crate) fn obstacle(device: &Device, splatting: &Splatting) -> Option<RenderError> {
-        let refused = |found: String, allowed: &'static str| {
-            let key = "splatting.rasterizer";
-            Some(RenderError::OutOfRange { key, found: format!("\"tiles\" with {found}"), allowed: allowed.to_owned() })
-        };
-        if splatting.method == Method::CompositeEverySample {
-            let found = "splatting.method = \"composite-every-sample\"".to_owned();
-            return refused(found, "\"image-aligned\" or \"axis-aligned\" with it, or \"quads\"");
-        }
-        if splatting.footprint != FootprintForm::SummedArea {
-            return refused("splatting.footprint = \"sections\"".to_owned(), "\"summed-area\" with it, or \"quads\"");
-        }
-        if !device.features().contains(Features::SUBGROUP) {
-            return refused("a device without subgroups".to_owned(), "\"quads\"");
-        }
-        let info = device.adapter_info();
-        let sizes = [info.subgroup_min_size, info.subgroup_max_size];
-        if sizes.iter().any(|size| !SUBGROUP_SIZES.contains(size)) {
-            let found = format!("subgroups of {} to {} threads", sizes[0], sizes[1]);
-            return refused(found, "subgroups of 8 to 32 threads, or \"quads\"");
-        }
-        None
-    }
-
     /// Bins bricks if need be, and allocates what does not fit any more. Sections need no table here.
     ///
     /// # Errors
@@ -91,16 +68,15 @@ impl TileRasterizer {
         given: Given<'_>,
         previous: Option<TileFrame>,
     ) -> Result<(TileFrame, Prepared), RenderError> {
-        let Given { device, volume, view, kernel, splatting, .. } = given;
+        let Given { device, queue, volume, request, .. } = given;
+        let FrameRequest { splatting, view, kernel, covered, rays, .. } = request;
         let limits = device.limits();
-        let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let mut old = Old::of(previous);
-        let in_memory = volume.labels().is_some();
-        let search_passes = given.ramp_lengths.iter().map(|&points| search_passes(points, in_memory)).sum();
+        let search_passes = all_search_passes(request, volume.labels().is_some());
         let is_current = |old: &Binned| {
             old.view == *view
                 && (old.order, old.revision, old.search_passes) == (splatting.order, volume.revision, search_passes)
-                && old.support == kernel.support()
+                && (old.support, &old.covered) == (kernel.support(), covered)
         };
         let (current, stale) = match old.binned.take() {
             Some(binned) if is_current(&binned) => (Some(binned), false),
@@ -109,57 +85,41 @@ impl TileRasterizer {
         let bricks = volume.lists.all();
         let binned = match current {
             Some(binned) => binned,
-            None => {
-                let support = kernel.support();
-                let bins = TileBins::new(bricks, view, splatting.order, support, search_passes, binding / 4)?;
-                Binned { bins, view: *view, order: splatting.order, support, search_passes, revision: volume.revision }
-            }
+            None => Binned {
+                bins: bins(&limits, request, bricks, search_passes)?,
+                view: *view,
+                order: splatting.order,
+                covered: covered.clone(),
+                support: kernel.support(),
+                search_passes,
+                revision: volume.revision,
+            },
         };
         let bins = &binned.bins;
-        let storage = BufferUsages::STORAGE;
+        let uniform = uniforms::gather(view, kernel, splatting, bins, bricks.len() as u32);
+        let wanted = WantedBuffers::new(&limits, request, bins, (bricks.len(), volume.lists.lists.len()))?;
+        let write = |old, wanted: &Wanted, bytes: &[u8]| written(device, queue, old, wanted, bytes);
         let (starts, entries) = match (old.starts.take(), old.entries.take()) {
             (Some(starts), Some(entries)) if !stale => (starts, entries),
             (starts, entries) => (
-                given.filled(starts, "sheetsplat.bin_starts", bytemuck::cast_slice(&bins.starts), storage)?,
-                given.filled(entries, "sheetsplat.bin_entries", bytemuck::cast_slice(&bins.entries), storage)?,
+                write(starts, &wanted.starts, bytemuck::cast_slice(&bins.starts))?,
+                write(entries, &wanted.entries, bytemuck::cast_slice(&bins.entries))?,
             ),
         };
         let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|&pixels| uniforms::in_f32_pixels(pixels)).collect();
-        let half_boxes = bytemuck::cast_slice(&half_boxes);
-        let half_boxes = given.filled(old.half_boxes.take(), "sheetsplat.half_boxes", half_boxes, storage)?;
-        let own_bricks = match (&volume.lists.lists[..], old.bricks.take()) {
-            ([_], _) => None,
+        let half_boxes = write(old.half_boxes.take(), &wanted.half_boxes, bytemuck::cast_slice(&half_boxes))?;
+        let own_bricks = match (wanted.bricks, old.bricks.take()) {
+            (None, _) => None,
             (_, Some(bricks)) if !stale => Some(bricks),
-            (_, old) => {
-                // Bindings may not be empty.
-                let none = [bytemuck::Zeroable::zeroed()];
-                let bytes: &[u8] = bytemuck::cast_slice::<Brick, _>(if bricks.is_empty() { &none } else { bricks });
-                if bytes.len() as u64 > binding {
-                    let (what, limit) = ("the bricks of the tile rasterizer", "max_storage_buffer_binding_size");
-                    return Err(RenderError::Limit { what, limit, required: bytes.len() as u64, actual: binding });
-                }
-                Some(given.filled(old, "sheetsplat.all_bricks", bytes, storage)?)
-            }
+            (Some(wanted), old) => Some(write(old, &wanted, bytemuck::cast_slice(bricks))?),
         };
+        let gathered = grown(device, old.gathered.take(), &wanted.gathered)?;
+        let uniform = write(old.uniform.take(), &wanted.uniform, bytemuck::bytes_of(&uniform))?;
 
-        let uniform = uniforms::gather(view, kernel, splatting, bins, bricks.len() as u32);
-        let pixels = u64::from(view.size[0]) * u64::from(view.size[1]);
-        let hits = offset_of!(Gathered, words) as u64 + u64::from(uniform.hits) * 4;
-        let bytes = hits + if given.rays.first_hit { 4 * pixels } else { 0 };
-        if bytes > binding {
-            let (what, limit) = ("the tile rasterizer's counts and first hits", "max_storage_buffer_binding_size");
-            return Err(RenderError::Limit { what, limit, required: bytes, actual: binding });
-        }
-        let usage = storage | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-        let gathered = grown(device, old.gathered.take(), "sheetsplat.gathered", bytes, usage)?;
-        let uniform_bytes = bytemuck::bytes_of(&uniform);
-        let uniform = given.filled(old.uniform.take(), "sheetsplat.gather", uniform_bytes, BufferUsages::UNIFORM)?;
-
-        let stride = size_of::<Part>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize);
+        let stride = part_stride(&limits);
         let (mut part_bytes, mut dispatches) = (Vec::new(), Vec::new());
         let columns = view.size[0].div_ceil(SIDE);
-        for (at, band) in given.compositing.bands.iter().enumerate() {
-            let band = band.band;
+        for (at, band) in request.bands.iter().enumerate() {
             let first_tile = band.first_row / SIDE * columns;
             let tiles = band.rows.div_ceil(SIDE) * columns;
             let part = Part { first_row: band.first_row, first_tile, end_tile: first_tile + tiles };
@@ -167,10 +127,9 @@ impl TileRasterizer {
             part_bytes.extend_from_slice(bytemuck::bytes_of(&part));
             part_bytes.resize(part_bytes.len().next_multiple_of(stride), 0);
         }
-        part_bytes.resize(part_bytes.len().max(stride), 0);
-        let parts = given.filled(old.parts.take(), "sheetsplat.parts", &part_bytes, BufferUsages::UNIFORM)?;
+        let parts = write(old.parts.take(), &wanted.parts, &part_bytes)?;
 
-        let mode = GatherMode::of(splatting, view.perspective.is_some(), volume.labels().is_some(), given.rays);
+        let mode = GatherMode::of(splatting, view.perspective.is_some(), volume.labels().is_some(), *rays);
         let buffers = GatherBuffers {
             frame: given.frame,
             gather: &uniform,
@@ -195,12 +154,32 @@ impl TileRasterizer {
             starts,
             entries,
             gathered,
-            hits,
+            hits: wanted.hits,
             half_boxes,
             dispatches,
             bands,
         };
         Ok((frame, Prepared { bucketed: stale, tabled: false }))
+    }
+
+    /// What a new frame of these bricks, in so many lists, will take.
+    ///
+    /// # Errors
+    /// Those of [`Self::prepare`].
+    pub(crate) fn estimate(
+        limits: &Limits,
+        request: &FrameRequest,
+        (bricks, lists): (&[Brick], usize),
+        by_label: bool,
+    ) -> Result<Needs, RenderError> {
+        let bins = bins(limits, request, bricks, all_search_passes(request, by_label))?;
+        let wanted = WantedBuffers::new(limits, request, &bins, (bricks.len(), lists))?;
+        let WantedBuffers { uniform, parts, starts, entries, gathered, half_boxes, bricks, .. } = wanted;
+        let buffers: Vec<Wanted> =
+            [uniform, parts, starts, entries, gathered, half_boxes].into_iter().chain(bricks).collect();
+        let bands = request.bands.len() as u64 * GatherBand::estimate(bins.dispatches);
+        let groups = bins.groups as usize;
+        Ok(Needs { bytes: sizes(limits, &buffers)? + bands, groups, passes: TileFrame::PASSES })
     }
 
     /// Draws the frame.
@@ -247,6 +226,89 @@ impl TileFrame {
         let buffers = [uniform, parts, starts, entries, gathered, half_boxes].into_iter().chain(bricks);
         bands + buffers.map(Buffer::size).sum::<u64>()
     }
+}
+
+/// The buffers of a frame, all but those of bands.
+struct WantedBuffers {
+    uniform: Wanted,
+    parts: Wanted,
+    starts: Wanted,
+    entries: Wanted,
+    gathered: Wanted,
+    /// Where in it first hits start, bytes.
+    hits: u64,
+    half_boxes: Wanted,
+    /// If the volume's own are in several buffers, or in none.
+    bricks: Option<Wanted>,
+}
+
+impl WantedBuffers {
+    /// For so many bricks, in so many lists.
+    fn new(
+        limits: &Limits,
+        request: &FrameRequest,
+        bins: &TileBins,
+        (bricks, lists): (usize, usize),
+    ) -> Result<Self, RenderError> {
+        let FrameRequest { view, kernel, splatting, .. } = request;
+        let (binding, storage) = (binding(limits), BufferUsages::STORAGE);
+        let within = |what, required: u64| {
+            let (limit, actual) = ("max_storage_buffer_binding_size", binding);
+            if required > actual { Err(RenderError::Limit { what, limit, required, actual }) } else { Ok(required) }
+        };
+        // Bindings may not be empty.
+        let brick_bytes = (bricks.max(1) * size_of::<Brick>()) as u64;
+        let brick_bytes = match lists {
+            1 => None,
+            _ => Some(within("the bricks of the tile rasterizer", brick_bytes)?),
+        };
+        let words = uniforms::gather(view, kernel, splatting, bins, bricks as u32).hits;
+        let hits = offset_of!(Gathered, words) as u64 + u64::from(words) * 4;
+        let gathered = within("the tile rasterizer's counts and first hits", hits + request.hit_bytes())?;
+        let words = |words: usize| words as u64 * 4;
+        let part_bytes = (request.bands.len() * part_stride(limits)) as u64;
+        Ok(Self {
+            uniform: wanted_for("sheetsplat.gather", size_of::<GatherUniform>() as u64, BufferUsages::UNIFORM),
+            parts: wanted_for("sheetsplat.parts", part_bytes, BufferUsages::UNIFORM),
+            starts: wanted_for("sheetsplat.bin_starts", words(bins.starts.len()), storage),
+            entries: wanted_for("sheetsplat.bin_entries", words(bins.entries.len()), storage),
+            gathered: wanted(
+                "sheetsplat.gathered",
+                gathered,
+                storage | BufferUsages::COPY_DST | BufferUsages::COPY_SRC,
+            ),
+            hits,
+            half_boxes: wanted_for("sheetsplat.half_boxes", words(2 * bins.half_boxes.len()), storage),
+            bricks: brick_bytes.map(|bytes| wanted_for("sheetsplat.all_bricks", bytes, storage)),
+        })
+    }
+}
+
+/// Bytes that a storage binding may have.
+fn binding(limits: &Limits) -> u64 {
+    limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
+}
+
+/// Bytes from one part to the next.
+fn part_stride(limits: &Limits) -> usize {
+    size_of::<Part>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize)
+}
+
+fn bins(
+    limits: &Limits,
+    request: &FrameRequest,
+    bricks: &[Brick],
+    search_passes: u32,
+) -> Result<TileBins, RenderError> {
+    let FrameRequest { view, splatting, kernel, covered, .. } = request;
+    let most_words = binding(limits) / 4;
+    let (order, support) = (splatting.order, kernel.support());
+    Ok(TileBins::new(bricks, view, order, covered.clone(), support, search_passes, most_words)?)
+}
+
+/// Those of all ramps.
+fn all_search_passes(request: &FrameRequest, by_label: bool) -> u32 {
+    request.ramps.lengths().iter().map(|&points| search_passes(points, by_label)).sum()
 }
 
 /// Passes through loops that a lookup among so many control points takes: none if every thread of a subgroup can hold one, unless they

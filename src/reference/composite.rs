@@ -12,17 +12,38 @@ pub fn composite(acc: &mut Buffer, sheet: &Buffer, compositing: Compositing, ord
     }
 }
 
-/// Composites what one sheet, or one voxel alone, has at a pixel.
+/// Composites what one sheet, or one voxel alone, has at a pixel; for compositing by means its mean.
+///
+/// For `Minimum` the compositing buffer keeps 2 less the opacity, and 0 where nothing counted; for `Surface` the mean of the last sheet
+/// while that is below one half.
 pub fn composite_pixel(acc: &mut DVec4, sheet: DVec4, compositing: Compositing, order: Order) {
     let scale = match compositing {
         Compositing::Linear => 1.0 / sheet.w.max(1.0),
         Compositing::Exponential if sheet.w > 0.0 => -(-sheet.w).exp_m1() / sheet.w,
-        Compositing::Exponential | Compositing::Xray => 1.0,
+        _ => 1.0,
     };
     let sheet = sheet * scale;
+    // Of equal ones the nearer: scaled, all above 1 are equal to the last bit.
+    let kept = |acc: DVec4, color: DVec4, opacity: f64| {
+        let passes = opacity > acc.w || opacity == acc.w && order == Order::BackToFront;
+        if passes { (color / color.w.max(1.0)).truncate().extend(opacity) } else { acc }
+    };
     *acc = match (compositing, order) {
-        (Compositing::Xray, _) => *acc + sheet,
+        (Compositing::Xray | Compositing::Average, _) => *acc + sheet,
+        (Compositing::Maximum, _) => kept(*acc, sheet, sheet.w.min(1.0)),
+        (Compositing::Minimum, _) => kept(*acc, sheet, 2.0 - sheet.w.min(1.0)),
+        (Compositing::Surface, _) if acc.w >= 1.0 => *acc,
+        (Compositing::Surface, _) if sheet.w < 0.5 => sheet,
+        (Compositing::Surface, _) => {
+            let there = acc.lerp(sheet, crossing(*acc, sheet));
+            (there.truncate() / there.w).extend(1.0)
+        }
         (_, Order::FrontToBack) => *acc + (1.0 - acc.w) * sheet,
         (_, Order::BackToFront) => sheet + (1.0 - sheet.w) * *acc,
     };
+}
+
+/// Where between the middles of a slab and of the next one their means' opacity is one half, if it grows evenly.
+pub fn crossing(before: DVec4, mean: DVec4) -> f64 {
+    (0.5 - before.w) / (mean.w - before.w)
 }

@@ -23,11 +23,7 @@ impl Cuts {
         let pixels = (0..width * geometry.size.y as u32).into_par_iter();
         let stretch = |at: u32| {
             let ray = PixelRay::new(geometry, UVec2::new(at % width, at / width));
-            let mut depths = ray.inside(&geometry.clip);
-            if let Some(surfaces) = surfaces {
-                depths.end = depths.end.min(surfaces[at as usize]);
-            }
-            ray.sheets(geometry, depths)
+            ray.sheets(geometry, shown(geometry, surfaces, at))
         };
         Self { stretches: pixels.map(stretch).collect() }
     }
@@ -44,11 +40,26 @@ impl Cuts {
         self.stretches[pixel].end <= f64::from(number)
     }
 
+    /// The stretch that shows at a pixel, in sheets.
+    pub fn stretch(&self, pixel: usize) -> &Range<f64> {
+        &self.stretches[pixel]
+    }
+
     /// The stretch of a sheet that shows at a pixel, in sheets.
     pub fn within(&self, pixel: usize, number: i32) -> Range<f64> {
-        let stretch = &self.stretches[pixel];
+        let stretch = self.stretch(pixel);
         stretch.start.max(f64::from(number))..stretch.end.min(f64::from(number) + 1.0)
     }
+}
+
+/// The depths at which a pixel shows something, from and to: what clip planes leave in front of opaque surfaces.
+pub fn shown(geometry: &Geometry, surfaces: Option<&[f64]>, pixel: u32) -> Range<f64> {
+    let width = geometry.size.x as u32;
+    let mut depths = PixelRay::new(geometry, UVec2::new(pixel % width, pixel / width)).inside(&geometry.clip);
+    if let Some(surfaces) = surfaces {
+        depths.end = depths.end.min(surfaces[pixel as usize]);
+    }
+    depths
 }
 
 /// The part of a sheet that a stretch covers.

@@ -1,31 +1,45 @@
 //! At which depth a pixel's opacity reaches a value; the twin of `shaders/first_hit.wgsl`.
 
+use glam::UVec2;
+
+use super::composite::crossing;
 use super::cut::PixelRay;
 use super::{Buffer, Cuts, Geometry};
-use glam::UVec2;
+use crate::splatting::Compositing;
 
 /// Of every pixel, row by row, where the opacity is reached, in sheets (number k fills `k..k + 1`).
 pub(super) struct FirstHits {
     opacity: f64,
+    compositing: Compositing,
     sheets: Vec<Option<f64>>,
 }
 
 impl FirstHits {
     /// None yet; of no pixel, if no opacity is asked for.
-    pub(super) fn new(opacity: Option<f64>, geometry: &Geometry) -> Self {
+    pub(super) fn new(opacity: Option<f64>, compositing: Compositing, geometry: &Geometry) -> Self {
         let pixels = (geometry.size.x * geometry.size.y) as usize;
-        Self { opacity: opacity.unwrap_or(0.0), sheets: vec![None; if opacity.is_some() { pixels } else { 0 }] }
+        let sheets = vec![None; if opacity.is_some() { pixels } else { 0 }];
+        Self { opacity: opacity.unwrap_or(0.0), compositing, sheets }
     }
 
-    /// Notes the pixels whose opacity one sheet raised to the value: there, if it grows evenly over what shows of the sheet.
-    pub(super) fn note(&mut self, before: &Buffer, after: &Buffer, number: i32, cuts: Option<&Cuts>) {
+    /// Notes the pixels whose opacity one sheet raised to the value: there, if it grows evenly over what shows of the sheet. A surface is
+    /// where it is.
+    pub(super) fn note(&mut self, before: &Buffer, sheet: &Buffer, after: &Buffer, number: i32, cuts: Option<&Cuts>) {
+        let is_surface = self.compositing == Compositing::Surface;
+        let opacity = if is_surface { 1.0 } else { self.opacity };
         for (pixel, hit) in self.sheets.iter_mut().enumerate().filter(|(_, hit)| hit.is_none()) {
-            let [before, after] = [before, after].map(|acc| acc.pixels[pixel].w);
-            if after >= self.opacity {
-                let whole = f64::from(number)..f64::from(number) + 1.0;
-                let shown = cuts.map_or(whole, |cuts| cuts.within(pixel, number));
-                *hit = Some(shown.start + (shown.end - shown.start) * (self.opacity - before) / (after - before));
+            let [before, sheet, after] = [before, sheet, after].map(|buffer| buffer.pixels[pixel]);
+            if after.w < opacity {
+                continue;
             }
+            let whole = f64::from(number)..f64::from(number) + 1.0;
+            let shown = cuts.map_or(whole, |cuts| cuts.within(pixel, number));
+            *hit = Some(if is_surface {
+                let at = f64::from(number) - 0.5 + crossing(before, sheet);
+                cuts.map_or(at, |cuts| at.max(cuts.stretch(pixel).start).min(cuts.stretch(pixel).end))
+            } else {
+                shown.start + (shown.end - shown.start) * (opacity - before.w) / (after.w - before.w)
+            });
         }
     }
 

@@ -68,6 +68,7 @@ impl Geometry {
             }
         }
         scene.clip.check()?;
+        scene.splatting.check()?;
         let (camera, splatting) = (&scene.camera, &scene.splatting);
         let (basis, aspect) = (camera.basis(), grid.aspect());
         let eye = camera.eye(grid, splatting.radius, height)?;

@@ -6,6 +6,7 @@ pub mod cut;
 mod first_hit;
 pub mod footprint;
 pub mod geometry;
+pub mod means;
 pub mod ray_march;
 pub mod resolve;
 pub mod shading;
@@ -31,6 +32,7 @@ use crate::volume::Volume;
 pub use cut::Cuts;
 use first_hit::FirstHits;
 pub use geometry::Geometry;
+pub use means::Means;
 pub use shading::Splat;
 pub use splat::Section;
 pub use visibility::Areas;
@@ -151,7 +153,7 @@ pub struct Culled {
 }
 
 /// Renders with early splat elimination by one of the paper's tests, sheet by sheet, and counts what is drawn. Nothing is culled back to
-/// front, for `xray`, and where voxels are composited one by one.
+/// front, where nothing hides ([`Compositing::hides`]), and where voxels are composited one by one.
 ///
 /// # Errors
 /// If the scene asks for more than can be computed.
@@ -177,11 +179,14 @@ pub fn render_for(
 ) -> Result<Culled, RenderError> {
     let frame = Frame::new(volume, transfer, scene)?;
     let (compositing, order) = (scene.splatting.compositing, scene.splatting.order);
-    let test = test.filter(|_| order == Order::FrontToBack && compositing != Compositing::Xray);
+    let test = test.filter(|_| order == Order::FrontToBack && compositing.hides());
+    // What is kept of a surface that is not reached yet is none.
+    let threshold = if compositing == Compositing::Surface { 1.0 } else { scene.splatting.opacity_threshold };
     let support = frame.kernel.support();
     let is_cut = host.surfaces.is_some() || !scene.clip.is_empty();
     let cuts = is_cut.then(|| Cuts::new(&frame.geometry, host.surfaces));
-    let mut first_hits = FirstHits::new(host.first_hit, &frame.geometry);
+    let means = compositing.is_by_means().then(|| Means::new(&frame.geometry, compositing, host.surfaces));
+    let mut first_hits = FirstHits::new(host.first_hit, compositing, &frame.geometry);
 
     let mut acc = Buffer::new(scene.image.width, scene.image.height);
     let (mut sections, mut areas) = (0, Areas::default());
@@ -195,7 +200,15 @@ pub fn render_for(
         let over = |acc: &mut DVec4, amount| composite::composite_pixel(acc, amount, compositing, order);
         splat::draw(&kernels, &frame.kernel, &mut acc, over);
     }
-    let mut buckets: Vec<(i32, Vec<u32>)> = frame.buckets().into_iter().collect();
+    let mut buckets = frame.buckets();
+    if let Some(means) = &means {
+        // Sheets without anything are sheets.
+        let touched = buckets.first_key_value().zip(buckets.last_key_value()).map(|(first, last)| *first.0..last.0 + 1);
+        for k in touched.into_iter().chain([means.sheets()]).flatten() {
+            buckets.entry(k).or_default();
+        }
+    }
+    let mut buckets: Vec<(i32, Vec<u32>)> = buckets.into_iter().collect();
     if order == Order::BackToFront {
         buckets.reverse();
     }
@@ -203,19 +216,29 @@ pub fn render_for(
         let mut in_sheet = frame.sections(&bucket, k);
         if let Some(test) = test {
             let cuts = cuts.as_ref().map(|cuts| (cuts, k));
-            let mask = visibility::OpaqueMask::new(&acc, scene.splatting.opacity_threshold, cuts);
+            let mask = visibility::OpaqueMask::new(&acc, threshold, cuts);
             in_sheet = mask.visible(&in_sheet, test, support);
         }
         sections += in_sheet.len() as u64;
         areas.add(&in_sheet, frame.geometry.size, support);
         let mut sheet = Buffer::new(scene.image.width, scene.image.height);
         splat::draw(&in_sheet, &frame.kernel, &mut sheet, |pixel, amount| *pixel += amount);
-        if let Some(cuts) = &cuts {
+        // The least mean is that of what there is.
+        if let Some(cuts) = cuts.as_ref().filter(|_| compositing != Compositing::Minimum) {
             cuts.apply(&mut sheet, k);
         }
-        let before = acc.clone();
+        let before = (means.is_some() || host.first_hit.is_some()).then(|| acc.clone());
+        if let Some(means) = &means {
+            means.apply(&mut sheet);
+        }
         composite::composite(&mut acc, &sheet, compositing, order);
-        first_hits.note(&before, &acc, k, cuts.as_ref());
+        if let (Some(means), Some(before)) = (&means, &before) {
+            let uncounted = |pixel: &usize| !means.counts(*pixel, k);
+            (0..acc.pixels.len()).filter(uncounted).for_each(|pixel| acc.pixels[pixel] = before.pixels[pixel]);
+        }
+        if let (Some(_), Some(before)) = (host.first_hit, &before) {
+            first_hits.note(before, &sheet, &acc, k, cuts.as_ref());
+        }
     }
     let image = resolve::resolve(&acc, compositing, scene.image.background).into_image();
     Ok(Culled { image, sections, areas, first_hits: first_hits.depths(&frame.geometry) })

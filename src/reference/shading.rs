@@ -78,8 +78,8 @@ fn alpha(volume: &Volume, transfer: &TransferFunction, index: u32) -> f64 {
 /// `m`: the amount per unit length (SPEC §5).
 pub fn amount(compositing: Compositing, alpha: f64) -> f64 {
     match compositing {
-        Compositing::Linear | Compositing::Xray => alpha,
         Compositing::Exponential => -(-alpha.min(0.9999)).ln_1p(),
+        _ => alpha,
     }
 }
 

@@ -1,7 +1,9 @@
 //! Scenes: what to show and how, from a scene file, from `--set` overrides, or from a volume alone (SPEC §7).
 
+mod names;
 mod reader;
 mod tables;
+mod writer;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,8 +11,10 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use toml::Table;
 
+use crate::appearance::{Colormap, Preset, shown_range};
 use crate::camera::Camera;
 use crate::clip::Clip;
+use crate::error::RenderError;
 use crate::shading::Shading;
 use crate::splatting::Splatting;
 use crate::transfer_function::{LabelTables, Ramp, TransferFunction};
@@ -82,9 +86,13 @@ impl Default for ImageSettings {
 /// The transfer function as far as a scene gives it; what is missing is chosen once the volume is known.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TransferSettings {
-    /// Red, green and blue in [0, 1] over voxel values; `None` is chosen from the value histogram.
+    /// What chooses what is missing; `None` is [`TransferFunction::from_histogram`].
+    pub preset: Option<Preset>,
+    /// Colours over the values that show, where `color` is `None`.
+    pub colormap: Option<Colormap>,
+    /// Red, green and blue in [0, 1] over voxel values; `None` is chosen.
     pub color: Option<Ramp<DVec3>>,
-    /// Opacity per unit length in [0, 1] over voxel values; `None` is chosen from the value histogram.
+    /// Opacity per unit length in [0, 1] over voxel values; `None` is chosen.
     pub opacity: Option<Ramp<f64>>,
     /// A factor in [0, 1] over gradient magnitudes (value per world unit); `None` is 1 everywhere.
     pub gradient_opacity: Option<Ramp<f64>>,
@@ -94,24 +102,70 @@ pub struct TransferSettings {
     pub labels: BTreeMap<u16, LabelTables>,
 }
 
+impl From<TransferFunction> for TransferSettings {
+    /// Nothing is left to choose.
+    fn from(transfer: TransferFunction) -> Self {
+        let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels } = transfer;
+        let (color, opacity) = (Some(color), Some(opacity));
+        Self { preset: None, colormap: None, color, opacity, gradient_opacity, iso_ranges, labels }
+    }
+}
+
 impl TransferSettings {
-    /// The whole transfer function for a volume. Colour and opacity that are not given are those of
-    /// [`TransferFunction::from_histogram`], each for itself.
+    /// The whole transfer function for a volume. Colours and opacities that are not given, those of labels too, are the preset's, or
+    /// [`TransferFunction::from_histogram`]'s, each for itself; a colour map spans the values that show ([`shown_range`]).
     pub fn resolve(&self, volume: &Volume) -> TransferFunction {
-        let (color, opacity) = match (self.color.clone(), self.opacity.clone()) {
-            (Some(color), Some(opacity)) => (color, opacity),
-            (color, opacity) => {
-                let chosen = TransferFunction::from_histogram(volume);
-                (color.unwrap_or(chosen.color), opacity.unwrap_or(chosen.opacity))
-            }
+        let chosen = || match self.preset {
+            Some(preset) => preset.transfer(volume),
+            None => TransferFunction::from_histogram(volume),
         };
-        TransferFunction {
-            color,
-            opacity,
-            gradient_opacity: self.gradient_opacity.clone(),
-            iso_ranges: self.iso_ranges.clone(),
-            labels: self.labels.clone(),
+        let mut transfer = match (&self.color, &self.opacity) {
+            (Some(color), Some(opacity)) if self.preset.is_none() => {
+                TransferFunction::by_value(color.clone(), opacity.clone())
+            }
+            _ => chosen(),
+        };
+        if let Some(opacity) = &self.opacity {
+            transfer.opacity = opacity.clone();
         }
+        // No preset gives any.
+        transfer.gradient_opacity = self.gradient_opacity.clone();
+        transfer.iso_ranges = self.iso_ranges.clone();
+        for (&label, own) in &self.labels {
+            let LabelTables { color, opacity, gradient_opacity, .. } =
+                transfer.labels.remove(&label).unwrap_or_default();
+            let tables = LabelTables {
+                visible: own.visible,
+                color: own.color.clone().or(color),
+                opacity: own.opacity.clone().or(opacity),
+                gradient_opacity: own.gradient_opacity.clone().or(gradient_opacity),
+            };
+            transfer.labels.insert(label, tables);
+        }
+        match (&self.color, self.colormap) {
+            (Some(color), _) => transfer.color = color.clone(),
+            (None, Some(map)) => transfer.color = map.over(shown_range(volume, &transfer).unwrap_or_default()),
+            (None, None) => {}
+        }
+        transfer
+    }
+
+    /// Checks that a volume has what the settings are for.
+    ///
+    /// # Errors
+    /// If it has no labels and there are tables for some, or the preset for labels.
+    pub fn check(&self, volume: &Volume) -> Result<(), RenderError> {
+        let invalid = |key, found: &str, allowed: &str| {
+            Err(RenderError::OutOfRange { key, found: found.to_owned(), allowed: allowed.to_owned() })
+        };
+        if !self.labels.is_empty() && volume.labels().is_none() {
+            return invalid("transfer.label", "tables for a volume without labels", "none, or labels in the volume");
+        }
+        if self.preset.is_some_and(|preset| !preset.suits(volume)) {
+            let allowed = "values that are whole numbers from 0 to 65535, or labels in the volume";
+            return invalid("preset", "labels for a volume that has none", allowed);
+        }
+        Ok(())
     }
 }
 
@@ -216,6 +270,15 @@ impl Scene {
         }
     }
 
+    /// The same scene with what it leaves to the volume filled in: transfer function, and how much the camera shows. It renders the same
+    /// image; preset and colour map are in what they led to.
+    pub fn explicit(&self, volume: &Volume) -> Self {
+        let transfer = self.transfer.resolve(volume).into();
+        let ImageSettings { width, height, .. } = self.image;
+        let camera = self.camera.explicit(volume.grid(), self.splatting.radius, width, height);
+        Self { camera, transfer, ..self.clone() }
+    }
+
     /// `source` is for scenes whose tables name no volume.
     fn build(
         mut root: Table,
@@ -236,8 +299,11 @@ impl Scene {
             root.section("shading")?,
             root.section("splatting")?,
         ];
+        let mut preset = None;
+        root.read("preset", &mut preset, |entry| entry.choice(&Preset::ALL).map(Some))?;
         // Before any table is read: a misspelt table explains best why keys seem to be missing.
         root.finish()?;
+        let compositing = preset.map_or(Splatting::default().compositing, Preset::compositing);
         let tables::VolumeSettings { source, spacing, labels } = tables::volume(volume, folder, source)?;
         let scene = Self {
             volume: source,
@@ -246,9 +312,9 @@ impl Scene {
             camera: tables::camera(camera)?,
             image: tables::image(image)?,
             clip: tables::clip(clip)?,
-            transfer: tables::transfer(transfer)?,
-            shading: tables::shading(shading)?,
-            splatting: tables::splatting(splatting)?,
+            transfer: TransferSettings { preset, ..tables::transfer(transfer)? },
+            shading: tables::shading(shading, preset.map_or_else(Shading::default, Preset::shading))?,
+            splatting: tables::splatting(splatting, compositing)?,
         };
         if !scene.transfer.labels.is_empty() && !scene.may_have_labels() {
             let allowed = "none, or volume.labels, or volume.builtin = \"head\" or \"tomato\"";

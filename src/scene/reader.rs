@@ -35,6 +35,8 @@ pub(super) fn apply_override(root: &mut Table, argument: &str) -> Result<String,
                     "volume.builtin" => {
                         section.retain(|name, _| !["path", "dims", "type", "endian", "offset"].contains(&name));
                     }
+                    "transfer.color" => _ = section.remove("colormap"),
+                    "transfer.colormap" => _ = section.remove("color"),
                     _ => {}
                 }
                 section.insert(name.to_owned(), value);

@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
+use super::names::{BOXES, COMPOSITINGS, ENDIANS, FORMS, METHODS, ORDERS, RASTERIZERS};
 use super::reader::{Bounds, Entry, FINITE, LABEL, Section};
 use super::{ImageSettings, SceneError, TransferSettings, VolumeSource};
+use crate::appearance::Colormap;
 use crate::camera::{Camera, Projection};
 use crate::clip::{Clip, MAX_PLANES};
 use crate::shading::{Light, Shading};
-use crate::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
+use crate::splatting::{Compositing, Splatting};
 use crate::transfer_function::{LabelTables, Ramp};
 use crate::volume::{RawLayout, SampleType};
 
@@ -65,8 +67,7 @@ fn raw_layout(section: &mut Section) -> Result<Option<RawLayout>, SceneError> {
     let (mut dims, mut sample_type, mut big_endian, mut offset) = (None, None, None, None);
     section.read("dims", &mut dims, |entry| entry.dims().map(Some))?;
     section.read("type", &mut sample_type, |entry| entry.choice(&SampleType::NAMED).map(Some))?;
-    let endians = [("little", false), ("big", true)];
-    section.read("endian", &mut big_endian, |entry| entry.choice(&endians).map(Some))?;
+    section.read("endian", &mut big_endian, |entry| entry.choice(ENDIANS).map(Some))?;
     section.read("offset", &mut offset, |entry| entry.bytes().map(Some))?;
     let missing = |key: &str, allowed: &str| section.origins.invalid(key, &["volume.dims"], "no such key", allowed);
     let Some(dims) = dims else {
@@ -171,7 +172,17 @@ pub(super) fn transfer(mut section: Section) -> Result<TransferSettings, SceneEr
     ramps(&mut section, color, opacity, gradient_opacity)?;
     section.read("iso_ranges", &mut transfer.iso_ranges, |entry| iso_ranges(entry).map(Some))?;
     section.read("label", &mut transfer.labels, labels)?;
+    section.read("colormap", &mut transfer.colormap, |entry| entry.choice(&Colormap::ALL).map(Some))?;
+    let origins = section.origins;
     section.finish()?;
+    if transfer.color.is_some() && transfer.colormap.is_some() {
+        return Err(origins.invalid(
+            "transfer",
+            &[],
+            "both color and colormap",
+            "one of transfer.color and transfer.colormap",
+        ));
+    }
     Ok(transfer)
 }
 
@@ -208,9 +219,8 @@ fn labels(entry: &Entry) -> Result<BTreeMap<u16, LabelTables>, SceneError> {
     Ok(labels)
 }
 
-/// `[shading]`.
-pub(super) fn shading(mut section: Section) -> Result<Shading, SceneError> {
-    let mut shading = Shading::default();
+/// `[shading]`, over what a preset gives.
+pub(super) fn shading(mut section: Section, mut shading: Shading) -> Result<Shading, SceneError> {
     section.read("enabled", &mut shading.enabled, Entry::boolean)?;
     section.read("light", &mut shading.light, light)?;
     section.read("ambient", &mut shading.ambient, |entry| entry.number(NOT_NEGATIVE))?;
@@ -221,32 +231,21 @@ pub(super) fn shading(mut section: Section) -> Result<Shading, SceneError> {
     Ok(shading)
 }
 
-/// `[splatting]`.
-pub(super) fn splatting(mut section: Section) -> Result<Splatting, SceneError> {
-    let methods = [
-        ("image-aligned", Method::ImageAligned),
-        ("axis-aligned", Method::AxisAligned),
-        ("composite-every-sample", Method::CompositeEverySample),
-    ];
-    let forms = [("summed-area", FootprintForm::SummedArea), ("sections", FootprintForm::Sections)];
-    let compositings =
-        [("linear", Compositing::Linear), ("exponential", Compositing::Exponential), ("xray", Compositing::Xray)];
-    let orders = [("front-to-back", Order::FrontToBack), ("back-to-front", Order::BackToFront)];
-    let rasterizers = [("auto", Rasterizer::Auto), ("quads", Rasterizer::Quads), ("tiles", Rasterizer::Tiles)];
-    let boxes = [("rectangle", FootprintBox::Rectangle), ("parallelogram", FootprintBox::Parallelogram)];
-    let mut splatting = Splatting::default();
-    section.read("method", &mut splatting.method, |entry| entry.choice(&methods))?;
+/// `[splatting]`, over what a preset gives.
+pub(super) fn splatting(mut section: Section, compositing: Compositing) -> Result<Splatting, SceneError> {
+    let mut splatting = Splatting { compositing, ..Splatting::default() };
+    section.read("method", &mut splatting.method, |entry| entry.choice(METHODS))?;
     section.read("radius", &mut splatting.radius, |entry| entry.number(RADIUS))?;
     section.read("falloff", &mut splatting.falloff, |entry| entry.number(FALLOFF))?;
     section.read("slab_width", &mut splatting.slab_width, |entry| entry.number(SLAB_WIDTH))?;
-    section.read("footprint", &mut splatting.footprint, |entry| entry.choice(&forms))?;
-    section.read("compositing", &mut splatting.compositing, |entry| entry.choice(&compositings))?;
-    section.read("order", &mut splatting.order, |entry| entry.choice(&orders))?;
+    section.read("footprint", &mut splatting.footprint, |entry| entry.choice(FORMS))?;
+    section.read("compositing", &mut splatting.compositing, |entry| entry.choice(COMPOSITINGS))?;
+    section.read("order", &mut splatting.order, |entry| entry.choice(ORDERS))?;
     section.read("opacity_threshold", &mut splatting.opacity_threshold, |entry| entry.number(THRESHOLD))?;
     section.read("culling", &mut splatting.culling, Entry::boolean)?;
     section.read("tiles", &mut splatting.tiles, Entry::boolean)?;
-    section.read("rasterizer", &mut splatting.rasterizer, |entry| entry.choice(&rasterizers))?;
-    section.read("footprint_box", &mut splatting.footprint_box, |entry| entry.choice(&boxes))?;
+    section.read("rasterizer", &mut splatting.rasterizer, |entry| entry.choice(RASTERIZERS))?;
+    section.read("footprint_box", &mut splatting.footprint_box, |entry| entry.choice(BOXES))?;
     section.read("whole_below", &mut splatting.economies.whole_below, |entry| entry.number(SHARE))?;
     section.read("beta", &mut splatting.economies.beta, |entry| entry.number(THRESHOLD))?;
     section.read("resolution", &mut splatting.economies.resolution, |entry| entry.number(SHARE))?;

@@ -1,5 +1,6 @@
 //! Labels: which segment of a segmented volume every voxel belongs to.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -23,6 +24,8 @@ pub struct Labels {
     pub spacing: Option<DVec3>,
     /// The labels, x fastest.
     pub values: Arc<[u16]>,
+    /// What they are called, as far as that is known.
+    pub names: BTreeMap<u16, String>,
 }
 
 impl Labels {
@@ -32,8 +35,8 @@ impl Labels {
     /// If the file cannot be read, is of no known format, does not hold what its header promises, or has a sample that is no
     /// label (the error names the voxel).
     pub fn open(path: &Path) -> Result<Self, VolumeError> {
-        let (_, Loaded { dims, spacing, values, .. }) = format::read(path)?;
-        Ok(Self { origin: path.display().to_string(), dims, spacing, values: values.into() })
+        let (_, Loaded { dims, spacing, label_names: names, values, .. }) = format::read(path)?;
+        Ok(Self { origin: path.display().to_string(), dims, spacing, values: values.into(), names })
     }
 }
 
@@ -43,7 +46,7 @@ impl Volume {
     /// # Errors
     /// If the labels are those of another grid.
     pub fn with_labels(mut self, labels: Labels) -> Result<Self, VolumeError> {
-        let Labels { origin, dims, spacing, values } = labels;
+        let Labels { origin, dims, spacing, values, names } = labels;
         let shown = |spacing: DVec3| format!("{:?}", spacing.to_array());
         if dims != self.dims() {
             return Err(invalid(&origin, "sizes", format!("{dims}"), format!("{}, the volume's", self.dims())));
@@ -60,12 +63,18 @@ impl Volume {
             return Err(invalid(&origin, "spacing", shown(other), format!("{}, the volume's", shown(self.spacing()))));
         }
         self.labels = Some(values);
+        self.label_names = names;
         Ok(self)
     }
 
     /// All labels, x fastest, then y, then z; `None` if the volume is not segmented.
     pub fn labels(&self) -> Option<&[u16]> {
         self.labels.as_deref()
+    }
+
+    /// What labels are called, as far as that is known: those of a segmented volume, or of one whose values are labels.
+    pub fn label_names(&self) -> &BTreeMap<u16, String> {
+        &self.label_names
     }
 
     /// The label of a voxel, given as an index into the volume; `None` if the volume is not segmented.

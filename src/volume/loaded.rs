@@ -1,5 +1,7 @@
 //! What every reader gives.
 
+use std::collections::BTreeMap;
+
 use glam::{DVec3, UVec3};
 
 use super::Orientation;
@@ -16,6 +18,8 @@ pub(super) struct Loaded<T> {
     pub(super) unit: Option<String>,
     /// If the file gives one.
     pub(super) orientation: Option<Orientation>,
+    /// What the values are called, where they are labels.
+    pub(super) label_names: BTreeMap<u16, String>,
     /// X fastest, as many as there are voxels.
     pub(super) values: Vec<T>,
 }

@@ -3,6 +3,7 @@
 //!
 //! Directions and origins are LPS, as ITK means them. The file must end where the samples end.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3, UVec3};
@@ -29,7 +30,15 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
     stream.skip(header_size.unwrap_or(before_the_end))?;
     let Samples { dims, kind, .. } = samples;
     let unit = header.0.get("DistanceUnits").and_then(unit);
-    Ok(Loaded { dims, kind, spacing, unit, orientation, values: stream.samples(&samples, false)? })
+    Ok(Loaded {
+        dims,
+        kind,
+        spacing,
+        unit,
+        orientation,
+        label_names: BTreeMap::new(),
+        values: stream.samples(&samples, false)?,
+    })
 }
 
 struct Header(Fields);

@@ -28,6 +28,7 @@ mod vtk;
 #[cfg(any(feature = "tiff", feature = "vtk"))]
 mod xml;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -93,6 +94,7 @@ pub struct Volume {
     grid: Grid,
     values: Vec<f32>,
     labels: Option<Arc<[u16]>>,
+    label_names: BTreeMap<u16, String>,
     orientation: Option<Orientation>,
     unit: Option<String>,
     encoding: Option<Encoding>,
@@ -118,7 +120,9 @@ impl Volume {
             return Err(invalid("data", format!("{} at voxel {voxel}", values[at]), "finite values"));
         }
         let grid = Grid { dims, spacing: DVec3::ONE };
-        Self { grid, values, labels: None, orientation: None, unit: None, encoding: None }.with_spacing(origin, spacing)
+        let label_names = BTreeMap::new();
+        Self { grid, values, labels: None, label_names, orientation: None, unit: None, encoding: None }
+            .with_spacing(origin, spacing)
     }
 
     /// The same values at another spacing (world units per voxel step).
@@ -144,11 +148,12 @@ impl Volume {
     /// # Errors
     /// If the file cannot be read, is of no format that is compiled in, or does not hold what its header promises.
     pub fn open(path: &Path) -> Result<Self, VolumeError> {
-        let (format, Loaded { dims, kind: sample_type, spacing, unit, orientation, values }) = format::read(path)?;
+        let (format, Loaded { dims, kind: sample_type, spacing, unit, orientation, label_names, values }) =
+            format::read(path)?;
         let origin = path.display().to_string();
         let volume = Self::new(&origin, dims, spacing.unwrap_or(DVec3::ONE), values)?;
         let encoding = Some(Encoding { format, sample_type });
-        Self { unit, encoding, ..volume }.with_orientation(&origin, orientation)
+        Self { unit, encoding, label_names, ..volume }.with_orientation(&origin, orientation)
     }
 
     /// Where the voxels are.

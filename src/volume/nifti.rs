@@ -4,6 +4,7 @@
 //! Spacing and orientation are those of the sform if there is one, else those of the qform, else only `pixdim` counts. The file
 //! must end where the samples end.
 
+use std::collections::BTreeMap;
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
@@ -50,7 +51,15 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
     stream.skip(vox_offset)?;
     let samples = Samples { kind, dims, big_endian: header.big_endian, rescale, z_fastest: false };
     let (spacing, unit) = (Some(spacing), header.unit());
-    Ok(Loaded { dims, kind, spacing, unit, orientation, values: stream.samples(&samples, false)? })
+    Ok(Loaded {
+        dims,
+        kind,
+        spacing,
+        unit,
+        orientation,
+        label_names: BTreeMap::new(),
+        values: stream.samples(&samples, false)?,
+    })
 }
 
 /// The rest of a file's name where it ends with `from`, or with that and `.gz`; with `to` instead.

@@ -3,6 +3,7 @@
 //! An array's axes are z, y and x, whichever of them is fastest in memory. The header is read here, not by `npyz`: that allocates
 //! what a header's length says, multiplies sizes unchecked, and recurses into nested brackets.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::UVec3;
@@ -31,7 +32,7 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
     let samples = parse(path, &header(path, &mut stream)?)?;
     let Samples { dims, kind, .. } = samples;
     let values = stream.samples(&samples, false)?;
-    Ok(Loaded { dims, kind, spacing: None, unit: None, orientation: None, values })
+    Ok(Loaded { dims, kind, spacing: None, unit: None, orientation: None, label_names: BTreeMap::new(), values })
 }
 
 /// The text between the header's length and the samples.

@@ -3,6 +3,7 @@
 //! Axes are those of the array. The fields that describe what a sample means (`old min`, `kinds`, …) do not change the
 //! volume.
 
+use std::collections::BTreeMap;
 use std::io::{BufRead, Read};
 use std::path::{Path, PathBuf};
 
@@ -25,11 +26,11 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
     let layout = header.layout(dims)?;
     let data = header.data_path()?.map_or(Ok(file), |path| Source::open(&path))?;
     let (kind, unit) = (layout.samples.kind, header.unit());
-    Ok(Loaded { dims, kind, spacing, unit, orientation, values: layout.read(data)? })
+    Ok(Loaded { dims, kind, spacing, unit, orientation, label_names: header.label_names(), values: layout.read(data)? })
 }
 
-/// The fields of a header, under the format's first spelling of their names.
-struct Header(Fields);
+/// The fields of a header, under the format's first spelling of their names, and its pairs of keys and values.
+struct Header(Fields, BTreeMap<String, String>);
 
 impl Header {
     /// Reads the header and leaves `file` where the data of an attached one begin.
@@ -41,7 +42,7 @@ impl Header {
         if !matches!(version, Some("1" | "2" | "3" | "4" | "5")) {
             return Err(invalid(&file.path, "magic", shown(&magic), "a first line NRRD0001 to NRRD0005"));
         }
-        let mut header = Self(Fields::new(file.path.clone()));
+        let mut header = Self(Fields::new(file.path.clone()), BTreeMap::new());
         let mut budget = MAX_HEADER;
         while let Some(line) = file.line(&mut budget)? {
             if line.is_empty() {
@@ -69,7 +70,8 @@ impl Header {
         };
         let (name, value) = line.split_at(at);
         let value = value.strip_prefix(':').unwrap_or(value);
-        if value.starts_with('=') {
+        if let Some(value) = value.strip_prefix('=') {
+            self.1.insert(name.trim().to_owned(), value.trim().to_owned());
             return Ok(());
         }
         let name = name.trim().to_ascii_lowercase();
@@ -112,6 +114,15 @@ impl Header {
     fn unit(&self) -> Option<String> {
         let names = self.0.get("space units").or(self.0.get("units"))?.split('"').skip(1).step_by(2);
         unit::common(names)
+    }
+
+    /// The names of segments, as 3D Slicer writes them: `Segment0_LabelValue:=3`, `Segment0_Name:=liver`.
+    fn label_names(&self) -> BTreeMap<u16, String> {
+        let label = |(key, value): (&String, &String)| {
+            let segment = key.strip_suffix("_LabelValue").filter(|segment| segment.starts_with("Segment"))?;
+            Some((value.parse().ok()?, self.1.get(&format!("{segment}_Name"))?.clone()))
+        };
+        self.1.iter().filter_map(label).collect()
     }
 
     /// Lengths and directions of the axis vectors of `space directions`.

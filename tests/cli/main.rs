@@ -2,6 +2,7 @@
 #![cfg(feature = "cli")]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod annotations;
 mod bench;
 mod compare;
 mod errors;
@@ -11,6 +12,7 @@ mod extremes;
 mod images;
 mod info;
 mod inputs;
+mod looks;
 mod orbit;
 mod outputs;
 mod program;

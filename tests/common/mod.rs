@@ -19,7 +19,22 @@ pub(crate) const F32: f64 = 1.0 / (1 << 24) as f64;
 pub(crate) const F16: f64 = 1.0 / (1 << 11) as f64;
 
 /// Every way to composite sheets.
-pub(crate) const COMPOSITINGS: [Compositing; 3] = [Compositing::Linear, Compositing::Exponential, Compositing::Xray];
+pub(crate) const COMPOSITINGS: [Compositing; Compositing::COUNT] = [
+    Compositing::Linear,
+    Compositing::Exponential,
+    Compositing::Xray,
+    Compositing::Maximum,
+    Compositing::Minimum,
+    Compositing::Average,
+    Compositing::Surface,
+];
+
+/// Those by amounts, which can do without sheets.
+pub(crate) const BY_AMOUNTS: [Compositing; 3] = [Compositing::Linear, Compositing::Exponential, Compositing::Xray];
+
+/// Those by means.
+pub(crate) const BY_MEANS: [Compositing; 4] =
+    [Compositing::Maximum, Compositing::Minimum, Compositing::Average, Compositing::Surface];
 
 /// Both ways to draw sheets, whatever `auto` would choose.
 pub(crate) const RASTERIZERS: [Rasterizer; 2] = [Rasterizer::Quads, Rasterizer::Tiles];

@@ -4,14 +4,14 @@ use glam::{DVec3, DVec4};
 use sheetsplat::gpu::layout::Group;
 use sheetsplat::gpu::targets::{BandBuffer, CompositingBuffer, Targets};
 use sheetsplat::headless::{Headless, readback};
-use sheetsplat::pass::composite::{Composite, CompositeBuffers, RayMode};
+use sheetsplat::pass::composite::{Composite, CompositeBuffers, CompositeMode, RayMode};
 use sheetsplat::plan::{TILE, tile_grid};
 use sheetsplat::reference::Buffer;
 use sheetsplat::reference::composite::composite;
 use sheetsplat::splatting::{Compositing, Order};
 use sheetsplat::wgpu::{self, BufferUsages};
 
-use crate::common::{COMPOSITINGS, F32, Random, gpu, gpu_with_small_bindings};
+use crate::common::{BY_AMOUNTS, F32, Random, gpu, gpu_with_small_bindings};
 use crate::{Uncut, compute, contents, frame, init, tile_list};
 
 /// Premultiplied colours, in f32: a share of the pixels with no alpha at all, tiny ones, and, if asked for, some above 1.
@@ -45,7 +45,7 @@ fn tolerance(compositing: Compositing, alpha: f64, most: f64) -> f64 {
     let exp_error = match compositing {
         Compositing::Exponential if alpha >= 0.06 => (3.0 + 2.0 * alpha) * 2.0 * F32 * (-alpha).exp(),
         Compositing::Exponential => alpha.powi(6) / 720.0,
-        Compositing::Linear | Compositing::Xray => 0.0,
+        _ => 0.0,
     };
     exp_error + 10.0 * F32 * most
 }
@@ -78,7 +78,8 @@ impl Case {
         let Self { size, compositing, order, threshold, .. } = *self;
         let layers = self.sheets.len() as u32;
         let targets = Targets::new(device, size, wgpu::TextureFormat::Rgba32Float, layers).unwrap();
-        let compositing_buffer = CompositingBuffer::new(device, size).unwrap();
+        let cut = CompositingBuffer::bands(&device.limits(), size).unwrap();
+        let compositing_buffer = CompositingBuffer::new(device, size, &cut);
         assert_eq!(compositing_buffer.bands.len(), bands);
         let layout =
             wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(size[0] * 16), rows_per_image: Some(size[1]) };
@@ -115,9 +116,10 @@ impl Case {
             cut: uncut.buffers(),
             hits: &words(BufferUsages::STORAGE),
         };
-        let bind = |band| stage.bind(device, RayMode::default(), buffers, band);
+        let mode = CompositeMode { compositing, rays: RayMode::default() };
+        let bind = |band| stage.bind(device, mode, buffers, band);
         let groups: Vec<_> = compositing_buffer.bands.iter().map(bind).collect();
-        compute(gpu, |pass| stage.record(pass, RayMode::default(), &groups, 0, &tiles));
+        compute(gpu, |pass| stage.record(pass, mode, &groups, 0, &tiles));
         let acc = |band: &BandBuffer| readback::buffer(device, queue, &band.acc).unwrap();
         Outcome {
             acc: compositing_buffer.bands.iter().flat_map(|band| bytemuck::pod_collect_to_vec(&acc(band))).collect(),
@@ -188,7 +190,7 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
     let mut random = Random(u64::from(size[0]));
     let [columns, rows] = tile_grid(size);
     let (mut opaque, mut listed) = (0, 0);
-    for compositing in COMPOSITINGS {
+    for compositing in BY_AMOUNTS {
         for (order, layers) in [Order::FrontToBack, Order::BackToFront]
             .into_iter()
             .flat_map(|order| [1, 2, 4].map(|layers| (order, layers)))

@@ -60,7 +60,7 @@ impl<'a> Culling<'a> {
         let view = View::new(grid, &scene.camera, &scene.splatting, size).unwrap();
         let lists = BrickLists::upload(device, grid, voxels);
         let bricks = lists.bricks().next().unwrap().to_vec();
-        let plan = FramePlan::new([bricks.as_slice()], view, sheets, scene.splatting.order);
+        let plan = FramePlan::new([bricks.as_slice()], view, sheets, scene.splatting.order, 0.0..0.0);
         let [list] = &lists.lists[..] else { panic!("{} lists", lists.lists.len()) };
         let ramps = Ramps::new(transfer);
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);

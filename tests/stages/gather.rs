@@ -7,9 +7,10 @@ use sheetsplat::classify::classify;
 use sheetsplat::clip::ClippedVoxels;
 use sheetsplat::gpu::layout::{Gathered, Part, Tally};
 use sheetsplat::gpu::uniforms::{self, Ramps};
-use sheetsplat::gpu::volume_texture::VolumeTexture;
+use sheetsplat::gpu::volume_texture::{SIDES, VolumeTexture};
 use sheetsplat::headless::Headless;
-use sheetsplat::pass::composite::RayMode;
+use sheetsplat::means;
+use sheetsplat::pass::composite::{CutBuffers, RayMode};
 use sheetsplat::pass::gather::{Gather, GatherBuffers, GatherMode};
 use sheetsplat::reference;
 use sheetsplat::reference::footprint::Footprint;
@@ -21,7 +22,7 @@ use sheetsplat::transfer_function::{Ramp, TransferFunction};
 use sheetsplat::volume::{Grid, Volume};
 use sheetsplat::wgpu::BufferUsages;
 
-use crate::common::{COMPOSITINGS, Random, camera, gpu, pixels, scene, transfer};
+use crate::common::{BY_AMOUNTS, Random, camera, gpu, pixels, scene, transfer};
 use crate::section::{AMOUNT, KERNELS, Seen, VIEWS, view_scene};
 use crate::{Uncut, at_offsets, compute, contents, init};
 
@@ -55,8 +56,9 @@ impl<'a> Fixture<'a> {
     }
 
     fn bins(&self) -> TileBins {
-        let Seen { view, kernel, scene, .. } = &self.seen;
-        TileBins::new(self.bricks.bricks(), view, scene.splatting.order, kernel.support(), 0, u64::MAX).unwrap()
+        let Seen { view, kernel, scene: Scene { splatting, .. }, .. } = &self.seen;
+        let covered = means::covered(view, self.volume.grid(), splatting);
+        TileBins::new(self.bricks.bricks(), view, splatting.order, covered, kernel.support(), 0, u64::MAX).unwrap()
     }
 
     /// Draws over `acc`, in bands of at most so many rows. The nearest group begins at `near`, where that is given.
@@ -92,7 +94,8 @@ impl<'a> Fixture<'a> {
         let gathered = storage(&vec![0; size_of::<Gathered>() / 4 + words as usize]);
         let (parts_buffer, stride) = at_offsets(device, &parts);
         let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|half| half.as_vec2().to_array()).collect();
-        let uncut = Uncut::new(device);
+        let (uncut, cut) = (Uncut::new(device), uniforms::cut(&seen.view, volume.grid(), &seen.scene, None, None));
+        let side = SIDES[size[0] as usize % SIDES.len()];
         let mode = GatherMode::of(&seen.scene.splatting, seen.view.perspective.is_some(), false, RayMode::default());
         let buffers = GatherBuffers {
             frame: &init(device, &[frame], BufferUsages::UNIFORM),
@@ -102,11 +105,11 @@ impl<'a> Fixture<'a> {
             starts: &storage(&bins.starts),
             entries: &storage(&bins.entries),
             control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
-            values: &VolumeTexture::upload(device, gpu.queue(), volume.values()).unwrap().view,
+            values: &VolumeTexture::upload_folded(device, gpu.queue(), volume.values(), side).view,
             labels: None,
             gathered: &gathered,
             half_boxes: &init(device, &half_boxes, BufferUsages::STORAGE),
-            cut: uncut.buffers(),
+            cut: CutBuffers { uniform: &init(device, &[cut], BufferUsages::UNIFORM), ..uncut.buffers() },
         };
         let bound: Vec<_> = accs.iter().map(|acc| stage.bind(device, mode, buffers, acc, bins.dispatches)).collect();
         compute(gpu, |pass| {
@@ -284,7 +287,7 @@ fn frames() {
     let (gpu, stage) = (gpu(), Gather::default());
     let mut random = Random(42);
     let mut lit = 0;
-    for (compositing, order) in COMPOSITINGS
+    for (compositing, order) in BY_AMOUNTS
         .into_iter()
         .flat_map(|compositing| [Order::FrontToBack, Order::BackToFront].map(|order| (compositing, order)))
     {
@@ -330,10 +333,19 @@ fn frames() {
 fn dispatches_and_bands_change_no_bit() {
     let (gpu, stage) = (gpu(), Gather::default());
     let mut random = Random(43);
-    for order in [Order::FrontToBack, Order::BackToFront] {
+    for (compositing, order) in [
+        (Compositing::Linear, Order::FrontToBack),
+        (Compositing::Linear, Order::BackToFront),
+        (Compositing::Surface, Order::FrontToBack),
+        (Compositing::Minimum, Order::FrontToBack),
+        (Compositing::Minimum, Order::BackToFront),
+    ] {
         let (volume, transfer) = noise(&mut random, UVec3::new(17, 30, 21), [1.0, 1.0, 2.0], 0.9, 4);
+        // Opaque enough for surfaces.
+        let transfer = TransferSettings { gradient_opacity: None, ..transfer };
         let mut scene = Scene { transfer, camera: camera([0.3, 0.9, -0.2], 40.0), ..scene(101, 77) };
         (scene.splatting.order, scene.splatting.opacity_threshold) = (order, 0.8);
+        scene.splatting.compositing = compositing;
         let fixture = Fixture::new(&gpu, &stage, scene, volume);
         let bins = fixture.bins();
         assert!(bins.groups > 8 && bins.dispatches == 1, "{}", bins.dispatches);
@@ -353,9 +365,35 @@ fn dispatches_and_bands_change_no_bit() {
             let parts = fixture.draw(&TileBins { dispatches, ..first }, None, &fixture.empty(), rows);
             // What is behind opaque pixels alone is not even fetched, or fetched in another dispatch.
             let tally = Tally { bricks_visited: whole.tally.bricks_visited, ..parts.tally };
-            assert!(Drawn { tally, ..parts } == whole, "{order:?}, {rows} rows");
+            assert!(Drawn { tally, ..parts } == whole, "{compositing:?}, {order:?}, {rows} rows");
         }
     }
+}
+
+/// The least opacity is 0 where there is nothing behind the last brick, also if a dispatch ends there.
+#[test]
+fn the_least_is_looked_for_behind_all_bricks() {
+    let (gpu, stage) = (gpu(), Gather::default());
+    let dims = UVec3::new(12, 60, 12);
+    let value = |index: u32| if (4..8).contains(&(index / dims.x % dims.y)) { 1.0 } else { 0.0 };
+    let volume = Volume::new("front", dims, DVec3::ONE, (0..dims.element_product()).map(value).collect()).unwrap();
+    // One pixel in the middle sees it all, so that a group takes about as many passes as it may.
+    let mut scene = Scene { camera: camera([0.0, 1.0, 0.0], 200.0), ..scene(17, 17) };
+    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (1.0, 0.5)]);
+    scene.splatting.compositing = Compositing::Minimum;
+    let fixture = Fixture::new(&gpu, &stage, scene, volume);
+    let bins = fixture.bins();
+    let bricks = bins.starts.windows(2).map(|group| group[1] - group[0]).max().unwrap();
+    let passes = Passes { most: bins.passes.per_group + bricks * bins.passes.per_brick(), ..bins.passes };
+    let middle = |dispatches| {
+        let bins = TileBins { passes, dispatches, ..bins.clone() };
+        fixture.draw(&bins, None, &fixture.empty(), u32::MAX).acc[8 * 17 + 8]
+    };
+    // What is not there is kept as 2, less opacity.
+    let nothing = DVec4::W * 2.0;
+    assert_eq!(middle(bins.groups), nothing);
+    // The dispatch that draws the last brick has seen nothing else, where it takes that many passes: by 8 threads.
+    assert!((1..bins.groups).any(|dispatches| middle(dispatches) != nothing));
 }
 
 /// A mask of opaque pixels, drawn over: a voxel is drawn if and only if a pixel is not opaque whose centre lies in its footprint's box.

@@ -8,6 +8,7 @@ mod composite;
 mod cull;
 mod gather;
 mod kernel_in_view;
+mod means;
 mod occlude;
 mod plan;
 mod resolve;
@@ -22,6 +23,7 @@ use std::collections::BTreeMap;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::gpu::layout::{Cut, Frame, Indirect, QUADS, TileList};
+use sheetsplat::gpu::targets::no_surfaces;
 use sheetsplat::gpu::uniforms::{self, Ramps};
 use sheetsplat::headless::{Headless, readback};
 use sheetsplat::kernel::Kernel;
@@ -57,7 +59,6 @@ fn frame_over(grid: &Grid, scene: &Scene) -> Frame {
     uniforms::frame(&view, &kernel, grid, &ramps, scene)
 }
 
-/// A buffer with contents.
 /// What cuts no ray.
 struct Uncut {
     uniform: Buffer,
@@ -66,20 +67,8 @@ struct Uncut {
 
 impl Uncut {
     fn new(device: &Device) -> Self {
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("test.surfaces"),
-            size: wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Depth32Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
-        Self {
-            uniform: init(device, &[0_u32; size_of::<Cut>() / 4], BufferUsages::UNIFORM),
-            surfaces: texture.create_view(&wgpu::TextureViewDescriptor::default()),
-        }
+        let uniform = init(device, &[0_u32; size_of::<Cut>() / 4], BufferUsages::UNIFORM);
+        Self { uniform, surfaces: no_surfaces(device) }
     }
 
     fn buffers(&self) -> CutBuffers<'_> {
@@ -87,6 +76,7 @@ impl Uncut {
     }
 }
 
+/// A buffer with contents.
 fn init<T: bytemuck::NoUninit>(device: &Device, contents: &[T], usage: BufferUsages) -> Buffer {
     device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
         label: Some("test"),

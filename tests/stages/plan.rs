@@ -27,7 +27,7 @@ fn every_kernel_is_looked_at_by_every_group_that_it_reaches_into() {
                 (scene.splatting.radius, scene.splatting.slab_width) = (radius, slab_width);
                 let geometry = Geometry::new(&grid, &scene).unwrap();
                 let view = View::new(&grid, &scene.camera, &scene.splatting, [64, 48]).unwrap();
-                let plan = FramePlan::new(lists.each_ref().map(BrickList::bricks), view, sheets, order);
+                let plan = FramePlan::new(lists.each_ref().map(BrickList::bricks), view, sheets, order, 0.0..0.0);
 
                 let firsts: Vec<i32> = plan.groups.iter().map(|group| group.first_slab).collect();
                 let (forwards, backwards) = (firsts.is_sorted_by(|a, b| a < b), firsts.is_sorted_by(|a, b| a > b));

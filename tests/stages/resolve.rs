@@ -22,7 +22,8 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
     let options = RendererOptions { blend: Blend::Replace, ..RendererOptions::for_target(TextureFormat::Rgba32Float) };
     let stage = Resolve::new(device, &options);
     let mut random = Random(9);
-    let compositing_buffer = CompositingBuffer::new(device, size).unwrap();
+    let cut = CompositingBuffer::bands(&device.limits(), size).unwrap();
+    let compositing_buffer = CompositingBuffer::new(device, size, &cut);
     assert_eq!(compositing_buffer.bands.len(), bands);
     let target = device.create_texture(&wgpu::TextureDescriptor {
         label: Some("target"),
@@ -37,8 +38,13 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
     let view = target.create_view(&wgpu::TextureViewDescriptor::default());
     for compositing in COMPOSITINGS {
         for background in BACKGROUNDS {
-            // Summed projections pass 1; the others cannot. Some pixels are empty, some opaque.
-            let most = if compositing == Compositing::Xray { 3.0 } else { 1.0 };
+            // Sums pass 1; the others cannot. Some pixels are empty, some opaque.
+            let most = match compositing {
+                Compositing::Xray | Compositing::Average => 3.0,
+                // Two less the opacity.
+                Compositing::Minimum => 2.0,
+                _ => 1.0,
+            };
             let acc: Vec<[f32; 4]> = (0..size[0] * size[1])
                 .map(|_| {
                     let alpha = random.uniform(-0.2 * most, 1.2 * most).clamp(0.0, most);

@@ -11,7 +11,7 @@ use sheetsplat::reference::composite::composite_pixel;
 use sheetsplat::splatting::{FootprintForm, Method, Order};
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
 
-use crate::common::{COMPOSITINGS, F32, Random, gpu, pixels};
+use crate::common::{BY_AMOUNTS, F32, Random, gpu, pixels};
 use crate::kernel_in_view::{KernelInView, random_view};
 use crate::section::Seen;
 use crate::{frame_over, indirect, init};
@@ -24,7 +24,7 @@ fn kernels_one_by_one() {
     let (device, queue) = (gpu.device(), gpu.queue());
     let stage = Sample::new(device, TextureFormat::Rgba32Float);
     let mut random = Random(29);
-    for (compositing, form) in COMPOSITINGS
+    for (compositing, form) in BY_AMOUNTS
         .into_iter()
         .flat_map(|compositing| [FootprintForm::SummedArea, FootprintForm::Sections].map(|form| (compositing, form)))
     {

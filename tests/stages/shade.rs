@@ -19,7 +19,7 @@ use sheetsplat::transfer_function::{LabelTables, Ramp, TransferFunction};
 use sheetsplat::view::View;
 use sheetsplat::volume::{Labels, Volume};
 
-use crate::common::{COMPOSITINGS, F16, F32, Random, SPACINGS, camera, gpu, random_eye, scene, transfer};
+use crate::common::{BY_AMOUNTS, F16, F32, Random, SPACINGS, camera, gpu, random_eye, scene, transfer};
 use crate::cull::Culling;
 
 /// Values of a volume with noise everywhere, so that gradients point anywhere.
@@ -70,7 +70,7 @@ fn tolerance(
     let m = shading::amount(scene.splatting.compositing, alpha);
     let m_error = match scene.splatting.compositing {
         Compositing::Exponential => alpha_error / (1.0 - alpha.min(0.9999)) + 2.0_f64.powi(-21) + 8.0 * F32 * m,
-        Compositing::Linear | Compositing::Xray => alpha_error,
+        _ => alpha_error,
     };
 
     // A gradient's components are rounded three times and divided twice; of the square root's sum of squares half the error
@@ -232,7 +232,7 @@ const DIMS: UVec3 = UVec3::new(11, 9, 8);
 #[test]
 fn compositing_and_light() {
     let volume = noise(DIMS, DVec3::ONE);
-    for compositing in COMPOSITINGS {
+    for compositing in BY_AMOUNTS {
         for light in [Light::Headlight, Light::Direction(DVec3::new(2.0, -1.0, 3.0))] {
             let mut scene = oblique();
             scene.splatting.compositing = compositing;
@@ -415,7 +415,7 @@ fn labels_have_their_own_tables() {
         let volume = noise(DIMS, DVec3::new(1.0, 2.0, 1.5));
         let mut random = Random(5);
         let values = (0..volume.values().len()).map(|_| labels[random.bits() as usize % labels.len()]).collect();
-        let labels = Labels { origin: "noise".to_owned(), dims: DIMS, spacing: None, values };
+        let labels = Labels { origin: "noise".to_owned(), dims: DIMS, spacing: None, values, names: BTreeMap::new() };
         volume.with_labels(labels).unwrap()
     };
     let own = LabelTables {

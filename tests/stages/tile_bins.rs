@@ -54,7 +54,7 @@ impl Case {
     fn bins(&self, most_words: u64) -> Result<TileBins, Unfit> {
         let Scene { camera, splatting, image, .. } = &self.scene;
         let view = View::new(&self.grid, camera, splatting, [image.width, image.height]).unwrap();
-        TileBins::new(self.bricks.bricks(), &view, splatting.order, self.kernel().support(), 0, most_words)
+        TileBins::new(self.bricks.bricks(), &view, splatting.order, 0.0..0.0, self.kernel().support(), 0, most_words)
     }
 
     /// What the kernels need: group, number of the unit on the screen, brick.

@@ -3,8 +3,9 @@
 use std::time::Instant;
 
 use clap::ValueEnum;
-use sheetsplat::headless::Error;
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use clap::builder::PossibleValuesParser;
+use sheetsplat::appearance::{Colormap, Preset};
+use sheetsplat::headless::{Error, Headless, HeadlessOptions};
 use sheetsplat::image::PngDepth;
 use sheetsplat::scene::{Scene, SceneError, VolumeSource};
 use sheetsplat::stats::Stats;
@@ -23,6 +24,8 @@ pub(crate) struct Input {
     pub(crate) sets: Vec<String>,
     #[command(flatten)]
     raw: Raw,
+    #[command(flatten)]
+    look: Look,
     /// The side of the patient to look at, where the volume's file says how the patient lies; in place of the scene's
     /// camera.direction and camera.up.
     #[arg(long, value_enum, value_name = "SIDE")]
@@ -30,6 +33,25 @@ pub(crate) struct Input {
     /// Part of the name of the adapter to use.
     #[arg(long, value_name = "NAME", env = "WGPU_ADAPTER_NAME")]
     pub(crate) adapter: Option<String>,
+}
+
+/// Appearance by name; short for --set of the scene's keys, and before them.
+#[derive(clap::Args)]
+struct Look {
+    /// Transfer function, shading and compositing for a kind of data, where the scene gives none of its own: short for --set
+    /// preset=NAME.
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Preset::ALL.map(|(name, _)| name)))]
+    preset: Option<String>,
+    /// Colours over the values that show, in place of the scene's: short for --set transfer.colormap=NAME.
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Colormap::ALL.map(|(name, _)| name)))]
+    colormap: Option<String>,
+}
+
+impl Look {
+    fn sets(&self) -> impl Iterator<Item = String> {
+        let preset = self.preset.iter().map(|name| format!("preset={name}"));
+        preset.chain(self.colormap.iter().map(|name| format!("transfer.colormap={name}")))
+    }
 }
 
 /// What a raw file has no header to say; short for --set of the scene's keys, and before them.
@@ -97,7 +119,7 @@ impl Input {
 
     /// The scene with these settings in place of those of --set. By its extension a scene file; anything else is a volume.
     pub(crate) fn scene_with(&self, sets: &[String]) -> Result<Scene, SceneError> {
-        let sets = [&self.raw.sets(), sets].concat();
+        let sets = self.raw.sets().into_iter().chain(self.look.sets()).chain(sets.iter().cloned()).collect::<Vec<_>>();
         match self.name.strip_prefix("builtin:") {
             Some(name) => Scene::from_volume(VolumeSource::Builtin(name.to_owned()), &sets),
             None if self.name.ends_with(".toml") => Scene::open(self.name.as_ref(), &sets),

@@ -6,6 +6,7 @@ use sheetsplat::image::ImageError;
 use sheetsplat::scene::SceneError;
 
 /// What went wrong, by whose fault.
+#[derive(Debug)]
 pub(crate) enum Failure {
     /// Bad usage or bad input: exit code 2.
     Input(String),

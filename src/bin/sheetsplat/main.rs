@@ -1,8 +1,10 @@
 //! The command line program.
 
 mod adapters;
+mod annotate;
 mod arguments;
 mod bench;
+mod canvas;
 mod compare;
 mod documents;
 mod failure;

@@ -1,6 +1,7 @@
 //! `sheetsplat render`.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use clap::ValueEnum;
@@ -12,6 +13,7 @@ use sheetsplat::scene::Scene;
 use sheetsplat::stats::Stats;
 use sheetsplat::volume::Volume;
 
+use crate::annotate::Annotate;
 use crate::arguments::{Depth, Input, log_frame};
 use crate::failure::Failure;
 
@@ -21,7 +23,9 @@ Examples:
   sheetsplat render builtin:head -o head.png
   sheetsplat render head.nrrd -o image.exr --set splatting.slab_width=0.5 --stats stats.json
   sheetsplat render ct.nii.gz -o face.png --view front
-  sheetsplat render ct.raw -o ct.png --dims 256,256,113 --type uint16 --endian big")]
+  sheetsplat render ct.raw -o ct.png --dims 256,256,113 --type uint16 --endian big
+  sheetsplat render ct.nrrd -o skull.png --preset ct-bone --annotate scale --save-scene skull.toml
+  sheetsplat render cells.nrrd -o cells.png --preset confocal --colormap magma --annotate scale,colors")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
@@ -34,6 +38,11 @@ pub(crate) struct Arguments {
     /// Write counts and times as JSON.
     #[arg(long, value_name = "FILE")]
     stats: Option<PathBuf>,
+    /// Write the whole scene that was rendered as a scene file: with what presets, colour maps and the volume made of it.
+    #[arg(long, value_name = "FILE")]
+    save_scene: Option<PathBuf>,
+    #[command(flatten)]
+    annotate: Annotate,
     /// The GPU, or the slow f64 evaluation on the CPU that it is tested against.
     #[arg(long, value_enum, default_value = "gpu")]
     backend: Backend,
@@ -49,44 +58,71 @@ enum Backend {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    Image::check_format(&arguments.output)?;
-    if arguments.stats.as_ref() == Some(&arguments.output) {
-        let path = arguments.output.display();
-        return Err(Failure::Input(format!("--stats: found {path}, allowed: another file than --output")));
-    }
-    let input = &arguments.input;
+    let Arguments { input, output, stats: stats_file, save_scene, .. } = arguments;
+    check_files(arguments)?;
     let mut scene = input.scene()?;
     let start = Instant::now();
     let volume = input.load_volume(&scene)?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
     input.look_at(&volume, &mut scene)?;
-    let Rendering { image, mut stats } = match arguments.backend {
+    scene.transfer.check(&volume).map_err(|error| input.failure(error))?;
+    let start = Instant::now();
+    // What is saved is what is rendered.
+    let scene = scene.explicit(&volume);
+    let explicit_ms = start.elapsed().as_secs_f64() * 1e3;
+    let overlay = arguments.annotate.overlay(&scene, &volume)?;
+    let volume = Arc::new(volume);
+    let rendering = match arguments.backend {
         Backend::Gpu => input.headless(arguments.profile)?.render_volume(volume, &scene),
         Backend::Reference => render_reference(&volume, &scene),
-    }
-    .map_err(|error| input.failure(error))?;
-    stats.load_ms = load_ms;
-    log_frame(&arguments.output.display().to_string(), &stats);
-    // Aside before the image is saved: either both files are there in the end or neither.
-    let failed = |path: &Path, error: std::io::Error| Failure::Other(format!("{}: {error}", path.display()));
-    let stats_file = match &arguments.stats {
-        Some(path) => {
-            let json = serde_json::to_string_pretty(&stats).map_err(|error| Failure::Other(error.to_string()))?;
-            Some((path, aside(path, (json + "\n").as_bytes()).map_err(|error| failed(path, error))?))
-        }
-        None => None,
     };
-    image.save(&arguments.output, arguments.depth.into())?;
+    let Rendering { mut image, mut stats } = rendering.map_err(|error| input.failure(error))?;
+    stats.load_ms = load_ms;
+    stats.prepare_ms += explicit_ms;
+    log_frame(&output.display().to_string(), &stats);
+    overlay.draw(&mut image);
+    // Aside before the image is saved: either all files are there in the end or none.
+    let failed = |path: &Path, error: std::io::Error| Failure::Other(format!("{}: {error}", path.display()));
+    let mut files = Vec::new();
+    if let Some(path) = stats_file {
+        let json = serde_json::to_string_pretty(&stats).map_err(|error| Failure::Other(error.to_string()))?;
+        files.push((path, aside(path, (json + "\n").as_bytes()).map_err(|error| failed(path, error))?));
+    }
+    if let Some(path) = save_scene {
+        let text = scene.to_toml(path.parent().unwrap_or(Path::new("")))?;
+        files.push((path, aside(path, text.as_bytes()).map_err(|error| failed(path, error))?));
+    }
+    image.save(output, arguments.depth.into())?;
     if arguments.profile && stats.stages_ms.is_empty() {
         log::warn!("--profile: found no timestamp queries on {}", stats.adapter);
     }
     for (stage, ms) in &stats.stages_ms {
         println!("{stage:10} {ms:10.3} ms");
     }
-    if let Some((path, file)) = stats_file {
+    for (path, file) in files {
         file.persist(path).map_err(|error| failed(path, error.error))?;
     }
     Ok(())
+}
+
+/// Checks the names of the files to be written.
+fn check_files(arguments: &Arguments) -> Result<(), Failure> {
+    let Arguments { output, stats, save_scene, .. } = arguments;
+    Image::check_format(output)?;
+    arguments.annotate.check_format(output)?;
+    let invalid = |option: &str, path: &Path, allowed: &str| {
+        Err(Failure::Input(format!("{option}: found {}, allowed: {allowed}", path.display())))
+    };
+    if let Some(path) = save_scene.as_ref().filter(|path| path.extension().is_none_or(|extension| extension != "toml"))
+    {
+        return invalid("--save-scene", path, "a file .toml");
+    }
+    match stats {
+        Some(path) if path == output || stats == save_scene => {
+            invalid("--stats", path, "another file than --output and --save-scene")
+        }
+        _ => Ok(()),
+    }
 }
 
 fn render_reference(volume: &Volume, scene: &Scene) -> Result<Rendering, RenderError> {

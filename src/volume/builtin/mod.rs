@@ -63,7 +63,11 @@ pub fn volume(name: &str) -> Result<Volume, VolumeError> {
     };
     let volume = Volume::new(&origin, grid.dims, grid.spacing, values)?;
     match labels {
-        Some(labels) => volume.with_labels(Labels { origin, dims: grid.dims, spacing: None, values: labels.into() }),
+        Some(values) => {
+            let names = self::labels(name).unwrap_or_default();
+            let names = names.iter().map(|&(label, name)| (label, name.to_owned())).collect();
+            volume.with_labels(Labels { origin, dims: grid.dims, spacing: None, values: values.into(), names })
+        }
         None => Ok(volume),
     }
 }

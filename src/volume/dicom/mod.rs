@@ -12,6 +12,7 @@ mod elements;
 mod image;
 mod series;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::DMat3;
@@ -65,5 +66,13 @@ fn assemble<T: Voxel>(path: &Path, images: Vec<Image>) -> Result<Loaded<T>, Volu
     values.shrink_to_fit();
     let origin = RAS_FROM_LPS * slices[0].position;
     let orientation = Some(Orientation { axes: DMat3::from_diagonal(RAS_FROM_LPS) * axes, origin });
-    Ok(Loaded { dims, kind, spacing: Some(spacing), unit: Some("mm".to_owned()), orientation, values })
+    Ok(Loaded {
+        dims,
+        kind,
+        spacing: Some(spacing),
+        unit: Some("mm".to_owned()),
+        orientation,
+        label_names: BTreeMap::new(),
+        values,
+    })
 }

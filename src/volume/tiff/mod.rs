@@ -9,6 +9,7 @@ mod pages;
 mod run;
 mod trial;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -122,6 +123,14 @@ impl<'a, T: Voxel> Slices<'a, T> {
             });
             DVec3::new(x, y, z)
         });
-        Ok(Loaded { dims, kind, spacing, unit: calibration.unit.clone(), orientation: None, values: self.values })
+        Ok(Loaded {
+            dims,
+            kind,
+            spacing,
+            unit: calibration.unit.clone(),
+            orientation: None,
+            label_names: BTreeMap::new(),
+            values: self.values,
+        })
     }
 }

@@ -1,6 +1,7 @@
 //! XML ImageData: one piece, its samples in the XML, as text or base64, or behind it, as base64 or as they are; in blocks of zlib or LZ4
 //! or in one.
 
+use std::collections::BTreeMap;
 use std::io::{self, BufRead, Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -49,7 +50,15 @@ pub(in super::super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeE
     })?;
     let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
     let values = header.open(path, array, &samples)?.samples(&samples, false)?;
-    Ok(Loaded { dims, kind, spacing: Some(spacing), unit: None, orientation: None, values })
+    Ok(Loaded {
+        dims,
+        kind,
+        spacing: Some(spacing),
+        unit: None,
+        orientation: None,
+        label_names: BTreeMap::new(),
+        values,
+    })
 }
 
 /// The elements that count, as their attributes.

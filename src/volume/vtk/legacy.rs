@@ -1,5 +1,6 @@
 //! The older files: a text header of keywords, then the samples as text or, big-endian, as they are.
 
+use std::collections::BTreeMap;
 use std::io::{self, BufRead, Read};
 use std::path::Path;
 
@@ -47,7 +48,15 @@ pub(in super::super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeE
         check_rest(path, left, &samples)?;
         Stream::raw(file)?
     };
-    Ok(Loaded { dims, kind, spacing, unit: None, orientation: None, values: stream.samples(&samples, true)? })
+    Ok(Loaded {
+        dims,
+        kind,
+        spacing,
+        unit: None,
+        orientation: None,
+        label_names: BTreeMap::new(),
+        values: stream.samples(&samples, true)?,
+    })
 }
 
 /// Refuses a file in which something else than another array follows the samples, whose beginning has `left` bytes after it.

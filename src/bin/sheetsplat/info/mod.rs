@@ -6,12 +6,13 @@ use std::fmt::Write;
 
 use glam::DVec3;
 use serde::{Serialize, Serializer};
+use sheetsplat::appearance::quantiles;
 use sheetsplat::volume::{Orientation, SampleType, Volume};
 
 use crate::arguments::Input;
 use crate::failure::Failure;
 use crate::stdout;
-use statistics::{Histogram, extent_and_mean, quantiles};
+use statistics::{Histogram, extent_and_mean};
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -54,13 +55,14 @@ struct Info {
     max: f64,
     mean: f64,
     #[serde(serialize_with = "as_map")]
-    percentiles: Vec<f64>,
+    percentiles: [f64; PERCENTILES.len()],
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let input = &arguments.input;
     let volume = input.load_volume(&input.scene()?)?;
     let [min, max, mean] = extent_and_mean(volume.values());
+    let percentiles = quantiles(volume.values(), |_| true, PERCENTILES.map(|(percent, _)| percent / 100.0));
     let encoding = volume.encoding();
     let info = Info {
         format: encoding.map_or("builtin", |encoding| encoding.format),
@@ -71,7 +73,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         min,
         max,
         mean,
-        percentiles: quantiles(volume.values(), &PERCENTILES.map(|(percent, _)| percent / 100.0)),
+        percentiles: percentiles.unwrap_or_default().map(f64::from),
     };
     let text = if arguments.json {
         serde_json::to_string(&info).map_err(|error| Failure::Other(error.to_string()))? + "\n"

@@ -1,7 +1,7 @@
 //! How a volume's values are distributed.
 
 use rayon::prelude::*;
-use sheetsplat::iso_range::ordinal;
+use sheetsplat::appearance::histogram;
 
 /// Values that one thread takes at a time.
 const CHUNK: usize = 1 << 20;
@@ -27,60 +27,6 @@ pub(super) fn extent_and_mean(values: &[f32]) -> [f64; 3] {
     [least, largest, sum / values.len() as f64]
 }
 
-/// The values that have these shares, in [0, 1], of the others before them when all are sorted.
-pub(super) fn quantiles(values: &[f32], shares: &[f64]) -> Vec<f64> {
-    // Two digits of 16 bits: first how many values have which upper one, then the lower ones of those that have a wanted one.
-    let upper = count(values, |value| Some((ordinal(value) >> 16) as usize), 1 << 16);
-    let ranks = shares.iter().map(|share| (share * (values.len() - 1) as f64).round() as u64);
-    let places: Vec<(usize, u64)> = ranks.map(|rank| bin_of_rank(&upper, rank)).collect();
-    let mut wanted: Vec<usize> = places.iter().map(|&(bin, _)| bin).collect();
-    wanted.dedup();
-    let lower = count(
-        values,
-        |value| {
-            let ordinal = ordinal(value);
-            let at = wanted.binary_search(&((ordinal >> 16) as usize)).ok()?;
-            Some(at << 16 | (ordinal & 0xffff) as usize)
-        },
-        wanted.len() << 16,
-    );
-    let value = |&(bin, rank): &(usize, u64)| {
-        let at = wanted.binary_search(&bin).unwrap_or_default();
-        let (digit, _) = bin_of_rank(&lower[at << 16..][..1 << 16], rank);
-        value_of((bin << 16 | digit) as u32)
-    };
-    places.iter().map(value).collect()
-}
-
-/// The value that has an ordinal.
-fn value_of(ordinal: u32) -> f64 {
-    let bits = if ordinal >> 31 == 1 { ordinal & !(1 << 31) } else { !ordinal };
-    f32::from_bits(bits).into()
-}
-
-/// The bin of the value of a rank, and its rank in there.
-fn bin_of_rank(counts: &[u64], mut rank: u64) -> (usize, u64) {
-    for (bin, &count) in counts.iter().enumerate() {
-        if rank < count {
-            return (bin, rank);
-        }
-        rank -= count;
-    }
-    (0, 0)
-}
-
-/// How many values are in which bin.
-fn count(values: &[f32], bin: impl Fn(f32) -> Option<usize> + Sync, bins: usize) -> Vec<u64> {
-    let zeros = || vec![0_u64; bins];
-    let counted = values.par_chunks(CHUNK).fold(zeros, |mut counts, chunk| {
-        for bin in chunk.iter().filter_map(|&value| bin(value)) {
-            counts[bin] += 1;
-        }
-        counts
-    });
-    counted.reduce(zeros, |a, b| a.iter().zip(b).map(|(a, b)| a + b).collect())
-}
-
 /// How often values occur from a value to a larger one; what is beyond is in the bins at the ends.
 pub(super) struct Histogram {
     pub(super) range: [f64; 2],
@@ -91,7 +37,7 @@ impl Histogram {
     pub(super) fn new(values: &[f32], [low, high]: [f64; 2]) -> Self {
         let scale = BINS as f64 / (high - low);
         let bin = |value: f32| Some((((f64::from(value) - low) * scale) as usize).min(BINS - 1));
-        Self { range: [low, high], counts: count(values, bin, BINS) }
+        Self { range: [low, high], counts: histogram(values, BINS, bin) }
     }
 
     /// Where values fall into three classes, or into two if there are no more: the classes' variances are the least (Otsu 1979).
@@ -131,18 +77,6 @@ impl Histogram {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn quantiles_are_those_of_the_sorted_values() {
-        let mut values: Vec<f32> = (0..5001_i32).map(|at| ((at * 7919 % 5001 - 900) as f32).powi(3) * 1e-4).collect();
-        values.extend([f32::MAX, f32::MIN, 0.0, -0.0, 1e-40]);
-        let mut sorted = values.clone();
-        sorted.sort_by(f32::total_cmp);
-        let shares = [0.0, 0.001, 0.25, 0.5, 0.77, 0.9999, 1.0];
-        let expected = shares.map(|share| f64::from(sorted[(share * (sorted.len() - 1) as f64).round() as usize]));
-        assert_eq!(quantiles(&values, &shares), expected);
-        assert_eq!(quantiles(&[7.0], &[0.0, 1.0]), [7.0, 7.0]);
-    }
 
     #[test]
     fn extents_and_means() {

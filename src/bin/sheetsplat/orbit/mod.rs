@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use sheetsplat::image::{Image, aside};
 use sheetsplat::scene::Scene;
 
+use crate::annotate::Annotate;
 use crate::arguments::{Depth, Input, log_frame};
 use crate::failure::Failure;
 use crate::progress::Progress;
@@ -27,6 +28,8 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
+    #[command(flatten)]
+    annotate: Annotate,
     /// Numbered images (frame-%04d.png, frame-####.exr), a movie (.apng, .gif, .y4m), or - for YUV4MPEG2 on standard output.
     #[arg(short, long, value_name = "FILES")]
     output: PathBuf,
@@ -72,6 +75,7 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
         let Range { start, end } = frames;
         return Err(Failure::Input(format!("--frames: found {start}..{end}, allowed: within 0..{count} (--count)")));
     }
+    arguments.annotate.check_format(output)?;
     let format = if output == Path::new("-") { Some(Format::Y4m) } else { Format::of(output) };
     let scene = input.scene()?;
     if let Some(format) = format {
@@ -134,16 +138,18 @@ fn draw(
     if frames.is_empty() {
         return Ok(());
     }
-    let Arguments { input, turn, count, .. } = arguments;
+    let Arguments { input, annotate, turn, count, .. } = arguments;
     let (volume, mut scene) = (input.load_volume(scene)?, scene.clone());
     input.look_at(&volume, &mut scene)?;
+    let overlay = annotate.overlay(&scene, &volume)?;
     let headless = input.headless(false)?;
     let mut view = headless.view(volume, &scene).map_err(|error| input.failure(error))?;
     let mut progress = Progress::new(frames.len(), progress);
     for &frame in frames {
         // From where the scene's camera is, whichever frame was drawn before.
         view.set_camera(scene.camera.turned(turn * f64::from(frame) / f64::from(*count)));
-        let rendering = headless.draw(&mut view).map_err(|error| input.failure(error))?;
+        let mut rendering = headless.draw(&mut view).map_err(|error| input.failure(error))?;
+        overlay.draw(&mut rendering.image);
         take(frame, &rendering.image)?;
         log_frame(&format!("frame {frame}"), &rendering.stats);
         progress.step();

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
 
+use crate::annotate::Annotate;
 use crate::arguments::{Depth, Input, log_frame};
 use crate::failure::Failure;
 use crate::progress::Progress;
@@ -26,6 +27,8 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
+    #[command(flatten)]
+    annotate: Annotate,
     /// The sheet: .png, .exr or .npy.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -40,6 +43,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> {
     let Arguments { input, output, .. } = arguments;
     Image::check_format(output)?;
+    arguments.annotate.check_format(output)?;
     let axes = swept(&input.sets);
     check(&axes, arguments)?;
     let columns = arguments.columns.unwrap_or(axes[0].values.len() as u32);
@@ -63,7 +67,7 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
         let allowed = format!("sheets of at most {LARGEST} pixels a side");
         Failure::Input(format!("{}: found {count} tiles in rows of {columns}, allowed: {allowed}", output.display()))
     })?;
-    let tiles = draw(input, scenes, progress)?;
+    let tiles = draw(arguments, scenes, progress)?;
     Ok(layout.draw(&tiles).save(output, arguments.depth.into())?)
 }
 
@@ -106,7 +110,8 @@ fn combinations(axes: &[Axis]) -> Vec<Vec<String>> {
 }
 
 /// Draws every scene; a volume is loaded again only where another one is asked for.
-fn draw(input: &Input, scenes: Vec<(Scene, Vec<String>)>, progress: bool) -> Result<Vec<Tile>, Failure> {
+fn draw(arguments: &Arguments, scenes: Vec<(Scene, Vec<String>)>, progress: bool) -> Result<Vec<Tile>, Failure> {
+    let Arguments { input, annotate, .. } = arguments;
     let headless = input.headless(false)?;
     let mut progress = Progress::new(scenes.len(), progress);
     let mut last: Option<(Scene, Arc<_>)> = None;
@@ -119,8 +124,10 @@ fn draw(input: &Input, scenes: Vec<(Scene, Vec<String>)>, progress: bool) -> Res
             _ => Arc::new(input.load_volume(&scene)?),
         };
         input.look_at(&volume, &mut scene)?;
-        let rendering = headless.render_volume(volume.clone(), &scene).map_err(|error| input.failure(error))?;
+        let overlay = annotate.overlay(&scene, &volume)?;
+        let mut rendering = headless.render_volume(volume.clone(), &scene).map_err(|error| input.failure(error))?;
         log_frame(&label.join(", "), &rendering.stats);
+        overlay.draw(&mut rendering.image);
         tiles.push(Tile { image: rendering.image, label });
         progress.step();
         last = Some((scene, volume));

@@ -1,6 +1,6 @@
 //! The window's contents: the picture with what a pointer does to it, and the panel.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
@@ -51,7 +51,7 @@ pub(super) struct App {
     picture: Rect,
     /// Why the scene as it is now cannot be drawn.
     problem: Option<String>,
-    /// What became of the last picture that was saved.
+    /// What became of the last file that was saved.
     saved: String,
     capture: Option<Capture>,
     /// Save the window's first complete frame here, and close it.
@@ -123,10 +123,13 @@ impl App {
             }
             let is_idle = self.capture.is_none();
             if ui.add_enabled(is_idle, eframe::egui::Button::new("Save picture")).clicked() {
-                self.capture(ui.ctx(), screenshot::free_name(), Some(self.picture));
+                self.capture(ui.ctx(), screenshot::free_name("png"), Some(self.picture));
             }
             if ui.add_enabled(is_idle, eframe::egui::Button::new("Save window")).clicked() {
-                self.capture(ui.ctx(), screenshot::free_name(), None);
+                self.capture(ui.ctx(), screenshot::free_name("png"), None);
+            }
+            if ui.button("Save scene").clicked() {
+                self.save_scene();
             }
         });
         ui.label(&self.saved);
@@ -212,6 +215,16 @@ impl App {
         self.capture = Some(Capture { arrival, since: Instant::now(), part, path });
     }
 
+    /// Saves the scene as it is shown, the picture as large as in the window.
+    fn save_scene(&mut self) {
+        let path = screenshot::free_name("toml");
+        let size = self.picture.size();
+        let image = ImageSettings { width: size.x.round() as u32, height: size.y.round() as u32, ..self.scene.image };
+        let scene = Scene { image, ..self.scene.clone() };
+        let result = screenshot::save_scene(&scene, &self.transfer, self.guest.volume(), &path);
+        self.saved = saved(&path, &result);
+    }
+
     /// Saves the window's pixels once they are there.
     fn save(&mut self, context: &Context) {
         let Some(Capture { arrival, since, part, path }) = &self.capture else { return };
@@ -224,10 +237,7 @@ impl App {
             }
             Err(_) => Err(Failure::Other(format!("{}: the window's pixels did not arrive", path.display()))),
         };
-        self.saved = match &result {
-            Ok(()) => format!("saved {}", path.display()),
-            Err(failure) => failure.message().to_owned(),
-        };
+        self.saved = saved(path, &result);
         self.capture = None;
         if self.screenshot.is_some() {
             self.finish(context, result);
@@ -238,6 +248,14 @@ impl App {
     fn finish(&mut self, context: &Context, result: Result<(), Failure>) {
         self.outcome.borrow_mut().get_or_insert(result);
         context.send_viewport_cmd(ViewportCommand::Close);
+    }
+}
+
+/// What became of a file.
+fn saved(path: &Path, result: &Result<(), Failure>) -> String {
+    match result {
+        Ok(()) => format!("saved {}", path.display()),
+        Err(failure) => failure.message().to_owned(),
     }
 }
 

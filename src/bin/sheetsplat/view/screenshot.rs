@@ -1,14 +1,31 @@
-//! Pictures of the window, as files.
+//! Pictures of the window, and the scene that it shows, as files.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use eframe::egui::{ColorImage, Rect};
-use sheetsplat::image::Image;
+use sheetsplat::image::{Image, write_aside};
+use sheetsplat::scene::Scene;
+use sheetsplat::transfer_function::TransferFunction;
+use sheetsplat::volume::Volume;
 
-/// The first of `sheetsplat-1.png`, `sheetsplat-2.png`, … that is not in the current folder yet.
-pub(super) fn free_name() -> PathBuf {
-    let mut names = (1_u32..).map(|number| PathBuf::from(format!("sheetsplat-{number}.png")));
+use crate::failure::Failure;
+
+/// The first of `sheetsplat-1.png`, `sheetsplat-2.png`, …, or another extension, that is not in the current folder yet.
+pub(super) fn free_name(extension: &str) -> PathBuf {
+    let mut names = (1_u32..).map(|number| PathBuf::from(format!("sheetsplat-{number}.{extension}")));
     names.find(|name| !name.exists()).unwrap_or_default()
+}
+
+/// Saves a scene as it is shown, with another transfer function than it came with.
+pub(super) fn save_scene(
+    scene: &Scene,
+    transfer: &TransferFunction,
+    volume: &Volume,
+    path: &Path,
+) -> Result<(), Failure> {
+    let scene = Scene { transfer: transfer.clone().into(), ..scene.clone() };
+    let text = scene.explicit(volume).to_toml(path.parent().unwrap_or(Path::new("")))?;
+    write_aside(path, text.as_bytes()).map_err(|error| Failure::Other(format!("{}: {error}", path.display())))
 }
 
 /// The pixels of the window, or of a part of it, given in pixels.
@@ -27,10 +44,26 @@ pub(super) fn image(window: &ColorImage, part: Option<Rect>) -> Image {
 }
 
 #[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
 mod tests {
     use eframe::egui::{Color32, pos2};
+    use sheetsplat::scene::VolumeSource;
 
     use super::*;
+
+    #[test]
+    fn a_saved_scene_is_what_is_shown() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("shown.toml");
+        let sets = ["image.width=70".to_owned(), "preset=ct-bone".to_owned()];
+        let scene = Scene::from_volume(VolumeSource::Builtin("head:16".to_owned()), &sets).unwrap();
+        let volume = scene.load_volume().unwrap();
+        let edited = TransferFunction { iso_ranges: Some(vec![[3.0, 90.0]]), ..scene.transfer.resolve(&volume) };
+        save_scene(&scene, &edited, &volume, &path).unwrap();
+        let saved = Scene::open(&path, &[]).unwrap();
+        assert_eq!(saved.transfer.resolve(&volume), edited);
+        assert_eq!((saved.image, saved.shading, saved.splatting), (scene.image, scene.shading, scene.splatting));
+    }
 
     #[test]
     fn a_part_of_the_window_is_cut_out() {

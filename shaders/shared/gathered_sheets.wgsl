@@ -1,0 +1,116 @@
+// The sheets that a thread of the tile rasteriser holds, and how they are composited.
+
+// The four sheets of a group at a thread's four pixels: red, green, blue and alpha columns.
+struct Sheets {
+    first: mat4x4f,
+    second: mat4x4f,
+    third: mat4x4f,
+    fourth: mat4x4f,
+}
+
+// What a voxel adds to a sheet at four pixels.
+fn added(section: vec4f, amount: vec4f) -> mat4x4f {
+    return mat4x4f(section * amount.x, section * amount.y, section * amount.z, section * amount.w);
+}
+
+// Of a thread's four pixels the sheet depths from and to which their rays show something, and those of first hits, as bits.
+var<private> shown_from: vec4f;
+var<private> shown_to: vec4f;
+var<private> hits: vec4u;
+
+// How these pixels look at their sheets, see `Means`.
+var<private> weights: vec4f;
+var<private> counted_from: vec4f;
+var<private> counted_to: vec4f;
+
+// How the rays of a thread's four pixels, of one column, look at sheets.
+fn look(column: f32, rows: vec4f) {
+    if CUT {
+        let across = array<vec2f, 4>(
+            shown(vec2f(column, rows.x)),
+            shown(vec2f(column, rows.y)),
+            shown(vec2f(column, rows.z)),
+            shown(vec2f(column, rows.w)),
+        );
+        shown_from = vec4f(across[0].x, across[1].x, across[2].x, across[3].x);
+        shown_to = vec4f(across[0].y, across[1].y, across[2].y, across[3].y);
+    }
+    if is_by_means() {
+        let across = array<Means, 4>(
+            means(vec2f(column, rows.x)),
+            means(vec2f(column, rows.y)),
+            means(vec2f(column, rows.z)),
+            means(vec2f(column, rows.w)),
+        );
+        weights = vec4f(across[0].weight, across[1].weight, across[2].weight, across[3].weight);
+        counted_from = vec4f(across[0].counted.x, across[1].counted.x, across[2].counted.x, across[3].counted.x);
+        counted_to = vec4f(across[0].counted.y, across[1].counted.y, across[2].counted.y, across[3].counted.y);
+    }
+}
+
+// Of four pixels some from one image, some from another.
+fn chosen(otherwise: mat4x4f, here: mat4x4f, is_here: vec4<bool>) -> mat4x4f {
+    return mat4x4f(
+        select(otherwise[0], here[0], is_here.x),
+        select(otherwise[1], here[1], is_here.y),
+        select(otherwise[2], here[2], is_here.z),
+        select(otherwise[3], here[3], is_here.w),
+    );
+}
+
+// What four pixels hold after a group without anything: of a surface that is not reached, nothing.
+fn after_gap(image: mat4x4f) -> mat4x4f {
+    if COMPOSITING == SURFACE {
+        return chosen(mat4x4f(), image, transpose(image)[3] >= vec4f(1.0));
+    }
+    return image;
+}
+
+// A sheet over or under what is there, at four pixels; its slab begins at a sheet depth.
+fn composite_sheet(image: mat4x4f, sheet: mat4x4f, near: f32) -> mat4x4f {
+    var pixels = transpose(sheet);
+    var first = vec4f(near);
+    var last = vec4f(near + frame.slab_width);
+    var scale = vec4f(1.0);
+    if CUT {
+        first = max(first, shown_from);
+        last = min(last, shown_to);
+        if COMPOSITING != MINIMUM {
+            scale = max(last - first, vec4f(0.0)) / frame.slab_width;
+        }
+    }
+    if is_by_means() {
+        scale *= weights;
+    }
+    if CUT || is_by_means() {
+        pixels = mat4x4f(pixels[0] * scale.x, pixels[1] * scale.y, pixels[2] * scale.z, pixels[3] * scale.w);
+    }
+    var result = mat4x4f(
+        composite(image[0], pixels[0], COMPOSITING, ORDER),
+        composite(image[1], pixels[1], COMPOSITING, ORDER),
+        composite(image[2], pixels[2], COMPOSITING, ORDER),
+        composite(image[3], pixels[3], COMPOSITING, ORDER),
+    );
+    if COMPOSITING == MINIMUM {
+        let middle = vec4f(near + 0.5 * frame.slab_width);
+        result = chosen(image, result, (counted_from <= middle) & (middle <= counted_to));
+    }
+    if FIRST_HIT {
+        let before = transpose(image)[3];
+        let after = transpose(result)[3];
+        var is_hit = (before < vec4f(cut.first_hit)) & (after >= vec4f(cut.first_hit));
+        var sheet_depths = mix(first, last, (cut.first_hit - before) / (after - before));
+        if COMPOSITING == SURFACE {
+            is_hit = (before < vec4f(1.0)) & (after >= vec4f(1.0));
+            // As `crossing`, from the middle of the slab before.
+            let opacity = transpose(pixels)[3];
+            sheet_depths = near + ((0.5 - before) / (opacity - before) - 0.5) * frame.slab_width;
+            if CUT {
+                sheet_depths = clamp(sheet_depths, shown_from, shown_to);
+            }
+        }
+        let here = vec4u(noted(sheet_depths.x), noted(sheet_depths.y), noted(sheet_depths.z), noted(sheet_depths.w));
+        hits = select(hits, here, is_hit);
+    }
+    return result;
+}

@@ -1,0 +1,161 @@
+//! Label maps: volumes whose values are labels, not amounts. Every label has a colour of its own, 0 is not shown.
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::quantile::histogram;
+use crate::transfer_function::{LabelTables, Ramp, TransferFunction};
+use crate::volume::Volume;
+
+/// Opacity of every label but 0.
+const OPACITY: f64 = 0.9;
+
+/// Each of some labels once, ascending.
+pub fn distinct(labels: &[u16]) -> Vec<u16> {
+    let mut present = vec![false; 1 << 16];
+    for &label in labels {
+        present[usize::from(label)] = true;
+    }
+    (0..=u16::MAX).filter(|&label| present[usize::from(label)]).collect()
+}
+
+/// The values of a volume, each once, ascending, if all of them are labels: whole numbers from 0 to 65535.
+pub fn values(volume: &Volume) -> Option<Vec<u16>> {
+    counts(volume).map(|counts| counts.into_iter().map(|(label, _)| label).collect())
+}
+
+/// The values of a volume if all of them are labels, ascending, and how many voxels have them.
+fn counts(volume: &Volume) -> Option<Vec<(u16, u64)>> {
+    let values = volume.values();
+    if !values.par_iter().all(|&value| f32::from(value as u16) == value) {
+        return None;
+    }
+    let counts = histogram(values, 1 << 16, |value| Some(usize::from(value as u16)));
+    Some((0..=u16::MAX).zip(counts).filter(|&(_, count)| count > 0).collect())
+}
+
+/// Whether a volume's values look like labels and not like amounts: at least three labels, in regions with sharp borders. Of the voxels
+/// whose neighbours on an axis differ, at most a third has a value that neither has, where in images most do; and of neighbours that are
+/// not background at least half are alike. A mask of two values is not meant: it has a surface, like any object. Where a file names its
+/// labels, they are labels in any case.
+pub fn is_label_map(volume: &Volume) -> bool {
+    let Some(counts) = counts(volume) else { return false };
+    if volume.labels().is_none() && !volume.label_names().is_empty() {
+        return true;
+    }
+    if counts.len() < 3 {
+        return false;
+    }
+    // Of several that are the commonest the least.
+    let background = counts.iter().rev().max_by_key(|(_, count)| count).map_or(0.0, |&(label, _)| f32::from(label));
+    Borders::of(volume, background).are_sharp()
+}
+
+/// Rows that are looked at, and the distance between them.
+const MOST_ROWS: u64 = 8192;
+const PRIME: u64 = 1_000_003;
+
+/// How values change from voxel to voxel along the axes.
+#[derive(Clone, Copy, Default)]
+struct Borders {
+    /// Voxels between two different values, and those that have a third one.
+    between: [u64; 2],
+    /// Pairs of neighbours not both of which are background, and equal ones.
+    pairs: [u64; 2],
+}
+
+impl Borders {
+    /// Of as many rows of voxels as tell it.
+    fn of(volume: &Volume, background: f32) -> Self {
+        let (dims, values) = (volume.dims(), volume.values());
+        let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
+        let steps = [(1, nx), (nx, ny), (nx * ny, nz)];
+        let row = |row: usize| {
+            let mut borders = Self::default();
+            for x in 0..nx {
+                let at = row * nx + x;
+                for ((step, count), place) in steps.into_iter().zip([x, row % ny, row / ny]) {
+                    if place + 1 == count {
+                        continue;
+                    }
+                    let [here, next] = [values[at], values[at + step]];
+                    if here != background || next != background {
+                        borders.pairs[0] += 1;
+                        borders.pairs[1] += u64::from(here == next);
+                    }
+                    if place > 0 && values[at - step] != next {
+                        borders.between[0] += 1;
+                        borders.between[1] += u64::from(here != next && here != values[at - step]);
+                    }
+                }
+            }
+            borders
+        };
+        // A prime apart, so that they lie everywhere.
+        let rows = (ny * nz) as u64;
+        let place = |at: u64| if rows > MOST_ROWS { at * PRIME % rows } else { at };
+        let looked_at = (0..rows.min(MOST_ROWS)).into_par_iter().map(|at| place(at) as usize);
+        looked_at.map(row).reduce(Self::default, Self::and)
+    }
+
+    fn and(self, other: Self) -> Self {
+        let sum = |a: [u64; 2], b: [u64; 2]| [a[0] + b[0], a[1] + b[1]];
+        Self { between: sum(self.between, other.between), pairs: sum(self.pairs, other.pairs) }
+    }
+
+    fn are_sharp(&self) -> bool {
+        3 * self.between[1] <= self.between[0] && 2 * self.pairs[1] >= self.pairs[0]
+    }
+}
+
+/// A label's colour, red, green and blue in [0, 1], the same in every volume. Hue and lightness go in steps of the plastic number's powers,
+/// which fill a square as evenly as the golden ratio's fill a line, so that the first labels, however many, differ as they can.
+pub fn color(label: u16) -> DVec3 {
+    const PLASTIC: f64 = 1.324_717_957_244_746;
+    const LIGHTNESS: [f64; 2] = [0.52, 0.9];
+    let step = |start: f64, size: f64| (start + f64::from(label) * size).fract();
+    let hue = TAU * step(0.85, 1.0 / PLASTIC);
+    let lightness = LIGHTNESS[0] + (LIGHTNESS[1] - LIGHTNESS[0]) * step(0.2, 1.0 / (PLASTIC * PLASTIC));
+    // Three digits are as good, and easier to read in a scene file.
+    (oklch(lightness, 0.15, hue) * 1e3).round() / 1e3
+}
+
+/// A label map's transfer function. A label's colour is at its number, so that no voxel has one in between.
+pub fn transfer(labels: &[u16]) -> TransferFunction {
+    let shown: Vec<_> =
+        labels.iter().filter(|&&label| label > 0).map(|&label| (f64::from(label), color(label))).collect();
+    let shown = if shown.is_empty() { vec![(0.0, DVec3::ONE)] } else { shown };
+    TransferFunction::by_value(Ramp::through(shown), Ramp::through(vec![(0.0, 0.0), (1.0, OPACITY)]))
+}
+
+/// Tables with the same colours for the labels of a segmented volume; its opacities go by its values. Label 0 is hidden.
+pub fn tables(labels: &[u16]) -> BTreeMap<u16, LabelTables> {
+    let table = |label: u16| {
+        let color = Some(Ramp::through(vec![(0.0, color(label))]));
+        LabelTables { visible: label > 0, color, ..LabelTables::default() }
+    };
+    distinct(labels).into_iter().map(|label| (label, table(label))).collect()
+}
+
+/// An sRGB colour from lightness, chroma and hue of Ottosson's Oklab, less colourful where the gamut ends.
+fn oklch(lightness: f64, chroma: f64, hue: f64) -> DVec3 {
+    let rgb = |chroma: f64| {
+        let (a, b) = (chroma * libm::cos(hue), chroma * libm::sin(hue));
+        let l = (lightness + 0.396_337_777_4 * a + 0.215_803_757_3 * b).powi(3);
+        let m = (lightness - 0.105_561_345_8 * a - 0.063_854_172_8 * b).powi(3);
+        let s = (lightness - 0.089_484_177_5 * a - 1.291_485_548_0 * b).powi(3);
+        DVec3::new(
+            4.076_741_662_1 * l - 3.307_711_591_3 * m + 0.230_969_929_2 * s,
+            -1.268_438_004_6 * l + 2.609_757_401_1 * m - 0.341_319_396_5 * s,
+            -0.004_196_086_3 * l - 0.703_418_614_7 * m + 1.707_614_701_0 * s,
+        )
+    };
+    let is_in_gamut = |rgb: &DVec3| rgb.min_element() >= 0.0 && rgb.max_element() <= 1.0;
+    let chromas = (0..=20).map(|step| chroma * (1.0 - f64::from(step) / 20.0));
+    let linear = chromas.map(rgb).find(is_in_gamut).unwrap_or(DVec3::splat(lightness.powi(3)));
+    let encoded = |c: f64| if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * libm::pow(c, 1.0 / 2.4) - 0.055 };
+    DVec3::from(linear.to_array().map(encoded))
+}

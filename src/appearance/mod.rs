@@ -1,0 +1,58 @@
+//! Appearance chosen for a volume: what it looks like where nobody says so, presets, colour maps, and the colours of labels.
+
+pub mod categories;
+mod colormap;
+mod hounsfield;
+mod object;
+mod padding;
+mod preset;
+mod quantile;
+mod xray;
+
+use glam::DVec3;
+
+pub use colormap::Colormap;
+pub use preset::Preset;
+pub use quantile::{histogram, quantiles};
+
+use crate::iso_range::ValueSet;
+use crate::transfer_function::{Ramp, TransferFunction};
+use crate::volume::Volume;
+use object::Object;
+
+impl TransferFunction {
+    /// A transfer function for volumes that come without one: a nearly opaque surface around what stands out from the
+    /// background, skin-coloured, whitening towards high values. A constant volume becomes a grey haze. Label maps
+    /// ([`categories::is_label_map`]) have the colours of [`categories`] instead.
+    pub fn from_histogram(volume: &Volume) -> Self {
+        let labels = categories::is_label_map(volume).then(|| categories::values(volume)).flatten();
+        labels.map_or_else(|| surface(volume), |labels| categories::transfer(&labels))
+    }
+}
+
+/// [`TransferFunction::from_histogram`] where values are no labels.
+fn surface(volume: &Volume) -> TransferFunction {
+    match Object::find(volume.values()) {
+        Some(object) => {
+            let color =
+                vec![(object.threshold(), DVec3::new(0.92, 0.74, 0.62)), (object.bright, DVec3::new(1.0, 0.95, 0.85))];
+            TransferFunction::by_value(Ramp::through(color), object.surface(0.9))
+        }
+        None => constant(0.5),
+    }
+}
+
+/// A grey haze, for volumes whose values are all the same.
+fn constant(opacity: f64) -> TransferFunction {
+    TransferFunction::by_value(Ramp::through(vec![(0.0, DVec3::splat(0.7))]), Ramp::through(vec![(0.0, opacity)]))
+}
+
+/// The values that a volume shows under a transfer function: of those with an opacity above 0, and in an iso-range, from the 0.5 % to the
+/// 99.5 % quantile. What few voxels have beyond would take most of a colour map. `None` if nothing shows. Labels' own tables are not
+/// looked at.
+pub fn shown_range(volume: &Volume, transfer: &TransferFunction) -> Option<[f64; 2]> {
+    const TAIL: f64 = 0.005;
+    let shown = ValueSet::of(transfer);
+    let ends = quantiles(volume.values(), |value| shown.contains(value), [TAIL, 1.0 - TAIL]);
+    ends.map(|ends| ends.map(f64::from))
+}

@@ -1,0 +1,46 @@
+//! Opacities for summed projections.
+
+use glam::DVec3;
+
+use super::constant;
+use super::object::Object;
+use super::quantile::quantiles;
+use crate::transfer_function::{Ramp, TransferFunction};
+use crate::volume::{Grid, Volume};
+
+/// Share of the rays that are as bright as there is, or would be brighter.
+const SATURATED: f64 = 0.01;
+
+/// White, with an opacity in proportion to the value above that of the background, such that along the volume's axes the brightest rays
+/// just reach 1.
+pub(super) fn transfer(volume: &Volume) -> TransferFunction {
+    let values = volume.values();
+    let Some(Object { background, .. }) = Object::find(values) else {
+        let longest = volume.dims().as_dvec3() * volume.grid().aspect();
+        return constant(longest.max_element().recip());
+    };
+    let top = f64::from(values.iter().copied().fold(f32::MIN, f32::max));
+    let sums = ray_sums(volume.grid(), values, background);
+    let brightest = quantiles(&sums, |sum| sum > 0.0, [1.0 - SATURATED]).map_or(1.0, |[sum]| f64::from(sum));
+    let opacity = ((top - background) / brightest).min(1.0);
+    let color = Ramp::through(vec![(background, DVec3::ONE)]);
+    TransferFunction::by_value(color, Ramp::through(vec![(background, 0.0), (top, opacity)]))
+}
+
+/// Of all rays along the three axes through voxels the integral of what values are above the background, lengths in
+/// [`Grid::unit`]s.
+fn ray_sums(grid: &Grid, values: &[f32], background: f64) -> Vec<f32> {
+    let [nx, ny, nz] = grid.dims.to_array().map(|n| n as usize);
+    let mut sums = [vec![0.0; ny * nz], vec![0.0; nx * nz], vec![0.0; nx * ny]];
+    for (row, values) in values.chunks_exact(nx).enumerate() {
+        let (y, z) = (row % ny, row / ny);
+        for (x, &value) in values.iter().enumerate() {
+            let above = (f64::from(value) - background).max(0.0);
+            for (sums, at) in sums.iter_mut().zip([row, x + nx * z, x + nx * y]) {
+                sums[at] += above;
+            }
+        }
+    }
+    let steps = grid.aspect().to_array();
+    sums.iter().zip(steps).flat_map(|(sums, step)| sums.iter().map(move |sum| (sum * step) as f32)).collect()
+}

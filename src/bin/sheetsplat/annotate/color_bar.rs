@@ -1,0 +1,58 @@
+//! Which value has which colour.
+
+use sheetsplat::appearance::{categories, shown_range};
+use sheetsplat::image::Image;
+use sheetsplat::scene::Scene;
+use sheetsplat::splatting::Compositing;
+use sheetsplat::transfer_function::TransferFunction;
+use sheetsplat::volume::Volume;
+
+use super::round::ticks;
+use super::{PADDING, plate_for};
+use crate::canvas::{LINE, filled, lay, rule, text_width, write};
+use crate::failure::Failure;
+
+/// Pixels that the bar is wide, and what it is high within: half of the image where that allows.
+const WIDTH: u32 = 16;
+const HEIGHTS: [u32; 2] = [64, 320];
+
+/// Pixels of a tick and its distance from the number.
+const TICK: u32 = 4;
+const GAP: u32 = 4;
+
+/// The colours of the values that show, before light falls on them.
+pub(super) fn plate(scene: &Scene, volume: &Volume, transfer: &TransferFunction) -> Result<Image, Failure> {
+    let refused = |found: &str, allowed: &str| {
+        Err(Failure::Input(format!("--annotate: colors: found {found}, allowed: {allowed}")))
+    };
+    if scene.splatting.compositing == Compositing::Xray {
+        return refused("splatting.compositing = \"xray\", which adds colours up", "\"linear\" or \"exponential\"");
+    }
+    if volume.labels().is_none() && categories::is_label_map(volume) {
+        return refused("a volume of labels", "values that are amounts, or legend");
+    }
+    let Some([lo, hi]) = shown_range(volume, transfer) else {
+        return refused("no voxel with an opacity above 0", "volumes that show something");
+    };
+    let height = (scene.image.height / 2).clamp(HEIGHTS[0], HEIGHTS[1]);
+    // With half a line between numbers.
+    let apart = (hi - lo) / f64::from(height) * f64::from(LINE + LINE / 2);
+    let ticks = ticks([lo, hi], apart);
+    let text = ticks.iter().map(|(_, label)| text_width(label)).max().unwrap_or(0);
+
+    let top = PADDING + LINE / 2;
+    let mut plate = plate_for([WIDTH + TICK + GAP + text, height + LINE]);
+    // The middle of a row of pixels, from the upper end.
+    let value = |row: u32| hi - (hi - lo) * (f64::from(row) + 0.5) / f64::from(height);
+    for row in 0..height {
+        let [r, g, b] = transfer.color.at(value(row)).as_vec3().to_array();
+        lay(&mut plate, [PADDING, top + row], &filled([WIDTH, 1], [r, g, b, 1.0]));
+    }
+    for (value, label) in &ticks {
+        let share = if lo < hi { (hi - value) / (hi - lo) } else { 0.5 };
+        let row = ((share * f64::from(height)) as u32).min(height - 1);
+        rule(&mut plate, [PADDING + WIDTH, top + row], [TICK, 1]);
+        write(&mut plate, [PADDING + WIDTH + TICK + GAP, top + row - LINE / 2], label);
+    }
+    Ok(plate)
+}

@@ -1,0 +1,94 @@
+//! Which label has which colour.
+
+use sheetsplat::appearance::{categories, shown_range};
+use sheetsplat::image::Image;
+use sheetsplat::transfer_function::TransferFunction;
+use sheetsplat::volume::Volume;
+
+use super::{PADDING, plate_for};
+use crate::canvas::{LINE, filled, lay, text_width, write};
+use crate::failure::Failure;
+
+/// Pixels of the patch of colour in a line, and around it.
+const PATCH: [u32; 2] = [20, 12];
+const GAP: u32 = 6;
+
+/// Pixels between two columns.
+const COLUMN_GAP: u32 = 12;
+
+/// Characters of a label's name that are shown.
+const LONGEST: usize = 40;
+
+/// A label's number and name, and its colours from the least value that shows to the greatest.
+struct Entry {
+    text: String,
+    colors: Vec<[f32; 4]>,
+}
+
+/// As many columns as it takes for a plate of at most `room` pixels in height.
+pub(super) fn plate(volume: &Volume, transfer: &TransferFunction, room: u32) -> Result<Image, Failure> {
+    let entries = entries(volume, transfer)?;
+    let rows = (room.saturating_sub(2 * PADDING) / LINE).max(1).min(entries.len() as u32);
+    let columns: Vec<&[Entry]> = entries.chunks(rows as usize).collect();
+    let text_of = |column: &[Entry]| column.iter().map(|entry| text_width(&entry.text)).max().unwrap_or(0);
+    let widths: Vec<u32> = columns.iter().map(|column| PATCH[0] + GAP + text_of(column)).collect();
+    let gaps = COLUMN_GAP.saturating_mul(columns.len() as u32 - 1);
+    let width = widths.iter().fold(gaps, |sum, width| sum.saturating_add(*width));
+    let mut plate = plate_for([width, rows * LINE]);
+    let mut left = PADDING;
+    for (column, width) in columns.iter().zip(widths) {
+        for (entry, row) in column.iter().zip(0..) {
+            let top = PADDING + row * LINE;
+            for (&color, x) in entry.colors.iter().zip(0..) {
+                lay(&mut plate, [left + x, top + (LINE - PATCH[1]) / 2], &filled([1, PATCH[1]], color));
+            }
+            write(&mut plate, [left + PATCH[0] + GAP, top], &entry.text);
+        }
+        left += width + COLUMN_GAP;
+    }
+    Ok(plate)
+}
+
+fn entries(volume: &Volume, transfer: &TransferFunction) -> Result<Vec<Entry>, Failure> {
+    let entry = |label: u16, values: [f64; 2]| {
+        let table = transfer.tables(Some(label));
+        let place = |x: u32| f64::from(x) / f64::from(PATCH[0] - 1);
+        let colors = (0..PATCH[0]).map(|x| table.color.at(values[0] * (1.0 - place(x)) + values[1] * place(x)));
+        let name = volume.label_names().get(&label).map_or_else(String::new, |name| format!(" {}", shortened(name)));
+        Entry {
+            text: format!("{label}{name}"),
+            colors: colors.map(|rgb| rgb.as_vec3().extend(1.0).to_array()).collect(),
+        }
+    };
+    let refused = |found: &str, allowed: &str| {
+        Err(Failure::Input(format!("--annotate: legend: found {found}, allowed: {allowed}")))
+    };
+    let entries: Vec<Entry> = match volume.labels() {
+        Some(labels) => {
+            let values = shown_range(volume, transfer).unwrap_or_default();
+            let has_color =
+                |label: &u16| transfer.labels.get(label).is_some_and(|tables| tables.visible && tables.color.is_some());
+            let present = categories::distinct(labels);
+            present.into_iter().filter(has_color).map(|label| entry(label, values)).collect()
+        }
+        None => match categories::values(volume) {
+            Some(labels) => {
+                let shown = labels.into_iter().filter(|&label| transfer.alpha(f64::from(label), f64::INFINITY) > 0.0);
+                shown.map(|label| entry(label, [f64::from(label); 2])).collect()
+            }
+            None => return refused("a volume without labels", "label maps and segmented volumes"),
+        },
+    };
+    if entries.is_empty() {
+        return refused("no label with a colour of its own", "some, as with --preset labels");
+    }
+    Ok(entries)
+}
+
+/// A name of bounded length.
+fn shortened(name: &str) -> String {
+    match name.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}...", &name[..end]),
+        None => name.to_owned(),
+    }
+}

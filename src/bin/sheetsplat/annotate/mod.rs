@@ -1,0 +1,116 @@
+//! `--annotate`: scale bar, colour bar and legend, drawn over images.
+
+mod color_bar;
+mod legend;
+mod round;
+mod scale_bar;
+
+use std::path::Path;
+
+use clap::ValueEnum;
+use sheetsplat::image::Image;
+use sheetsplat::scene::Scene;
+use sheetsplat::volume::Volume;
+
+use crate::canvas::{filled, lay};
+use crate::failure::Failure;
+
+/// Pixels between plates, and from them to the image's edges.
+const MARGIN: u32 = 8;
+
+/// Pixels from a plate's edges to what is on it.
+const PADDING: u32 = 6;
+
+/// What text is readable on, whatever is behind: premultiplied.
+const PLATE: [f32; 4] = [0.0, 0.0, 0.0, 0.75];
+
+/// What is drawn over images.
+#[derive(clap::Args)]
+pub(crate) struct Annotate {
+    /// Draw over the image, with commas between them: scale, a bar of a round length; colors, which value has which colour;
+    /// legend, which label.
+    #[arg(long, value_name = "LIST", value_enum, value_delimiter = ',')]
+    annotate: Vec<Annotation>,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Annotation {
+    Scale,
+    Colors,
+    Legend,
+}
+
+/// Plates, and where their upper left corners are.
+pub(crate) struct Overlay(Vec<([u32; 2], Image)>);
+
+impl Annotate {
+    /// What to draw over a scene's images, whichever way its camera looks.
+    pub(crate) fn overlay(&self, scene: &Scene, volume: &Volume) -> Result<Overlay, Failure> {
+        let has = |annotation| self.annotate.contains(&annotation);
+        let size = [scene.image.width, scene.image.height];
+        if self.annotate.is_empty() {
+            return Ok(Overlay(Vec::new()));
+        }
+        let transfer = scene.transfer.resolve(volume);
+        let scale = has(Annotation::Scale).then(|| scale_bar::plate(scene, volume)).transpose()?;
+        let colors = has(Annotation::Colors).then(|| color_bar::plate(scene, volume, &transfer)).transpose()?;
+        let below = scale.as_ref().map_or(0, |plate| plate.height + MARGIN);
+        let room = size[1].saturating_sub(below + 2 * MARGIN);
+        let legend = has(Annotation::Legend).then(|| legend::plate(volume, &transfer, room)).transpose()?;
+        place(size, scale, colors, legend)
+    }
+
+    /// Checks that the output is to be looked at, and does not hold data.
+    pub(crate) fn check_format(&self, output: &Path) -> Result<(), Failure> {
+        let is_data = output.extension().is_some_and(|extension| extension == "exr" || extension == "npy");
+        if is_data && !self.annotate.is_empty() {
+            let found = output.display();
+            return Err(Failure::Input(format!("--annotate: found {found}, allowed: PNG files and movies")));
+        }
+        Ok(())
+    }
+}
+
+/// The legend in the upper left corner, the scale bar in the lower one, the colour bar to the right.
+fn place(
+    size: [u32; 2],
+    scale: Option<Image>,
+    colors: Option<Image>,
+    legend: Option<Image>,
+) -> Result<Overlay, Failure> {
+    let [left, right] = [[legend.as_ref(), scale.as_ref()], [colors.as_ref(), None]].map(|column| {
+        let plates = column.into_iter().flatten();
+        plates.fold([0, 0], |[width, height], plate| [width.max(plate.width + MARGIN), height + plate.height + MARGIN])
+    });
+    let needed = [left[0] + right[0] + MARGIN, left[1].max(right[1]) + MARGIN];
+    if size[0] < needed[0] || size[1] < needed[1] {
+        let ([width, height], [least_width, least_height]) = (size, needed);
+        return Err(Failure::Input(format!(
+            "--annotate: image.width × image.height: found {width}×{height}, allowed: at least {least_width}×{least_height} for these"
+        )));
+    }
+    let mut plates = Vec::new();
+    if let Some(plate) = legend {
+        plates.push(([MARGIN, MARGIN], plate));
+    }
+    if let Some(plate) = scale {
+        plates.push(([MARGIN, size[1] - MARGIN - plate.height], plate));
+    }
+    if let Some(plate) = colors {
+        plates.push(([size[0] - MARGIN - plate.width, (size[1] - plate.height) / 2], plate));
+    }
+    Ok(Overlay(plates))
+}
+
+impl Overlay {
+    pub(crate) fn draw(&self, image: &mut Image) {
+        for (corner, plate) in &self.0 {
+            lay(image, *corner, plate);
+        }
+    }
+}
+
+/// An empty plate for something of a size.
+fn plate_for([width, height]: [u32; 2]) -> Image {
+    filled([width.saturating_add(2 * PADDING), height.saturating_add(2 * PADDING)], PLATE)
+}

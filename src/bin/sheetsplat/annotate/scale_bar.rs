@@ -1,0 +1,36 @@
+//! A bar of a round length.
+
+use sheetsplat::image::Image;
+use sheetsplat::scene::Scene;
+use sheetsplat::volume::Volume;
+
+use super::round::{round_down, written};
+use super::{PADDING, plate_for};
+use crate::canvas::{LINE, rule, text_width, write};
+use crate::failure::Failure;
+
+/// The bar's thickness, and its length's greatest share of the image's width.
+const THICKNESS: u32 = 3;
+const SHARE: f64 = 0.25;
+
+/// Orthographic only: in perspective no length on the screen is a length of the volume but on one plane, and nothing in the image says
+/// which parts lie there.
+pub(super) fn plate(scene: &Scene, volume: &Volume) -> Result<Image, Failure> {
+    let [width, height] = [scene.image.width, scene.image.height];
+    let Some(shown) = scene.camera.orthographic_height(volume.grid(), scene.splatting.radius, width, height) else {
+        let found = "camera.projection = \"perspective\"";
+        return Err(Failure::Input(format!("--annotate: scale: found {found}, allowed: \"orthographic\"")));
+    };
+    let pixel = shown / f64::from(height);
+    let length = round_down((SHARE * f64::from(width)).max(1.0) * pixel);
+    let bar = ((length / pixel).round() as u32).max(1);
+    let unit = volume.unit().unwrap_or(if length == 1.0 { "unit" } else { "units" });
+    let label = format!("{} {unit}", written(length, length));
+
+    let text = text_width(&label);
+    let inner = bar.max(text);
+    let mut plate = plate_for([inner, LINE + THICKNESS]);
+    write(&mut plate, [PADDING + (inner - text) / 2, PADDING], &label);
+    rule(&mut plate, [PADDING + (inner - bar) / 2, PADDING + LINE], [bar, THICKNESS]);
+    Ok(plate)
+}

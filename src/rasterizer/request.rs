@@ -1,0 +1,91 @@
+//! What a frame asks for: everything about it that is known before anything is allocated, and can be refused.
+
+use std::ops::Range;
+
+use wgpu::Device;
+
+use super::way::{Way, check_rays, insists_on_tiles};
+use crate::classified_volume::ClassifiedVolume;
+use crate::error::RenderError;
+use crate::gpu::layout::Band;
+use crate::gpu::targets::CompositingBuffer;
+use crate::gpu::uniforms::Ramps;
+use crate::kernel::Kernel;
+use crate::means;
+use crate::pass::composite::RayMode;
+use crate::scene::Scene;
+use crate::splatting::{Rasterizer, Splatting};
+use crate::surfaces::{SurfaceDepths, Surfaces};
+use crate::view::View;
+
+/// A frame of a view.
+#[derive(Debug)]
+pub(crate) struct FrameRequest {
+    /// With the renderer's rasterizer where the scene leaves the choice.
+    pub(crate) splatting: Splatting,
+    pub(crate) view: View,
+    pub(crate) kernel: Kernel,
+    pub(crate) ramps: Ramps,
+    /// The sheet depths whose slabs count even where they hold nothing: [`means::covered`].
+    pub(crate) covered: Range<f64>,
+    pub(crate) rays: RayMode,
+    /// The opacity of first hits.
+    pub(crate) first_hit: Option<f64>,
+    /// A host's surfaces, and the texel that is the image's first.
+    pub(crate) surfaces: Option<(SurfaceDepths, [u32; 2])>,
+    pub(crate) way: Way,
+    /// Those of the compositing buffer.
+    pub(crate) bands: Vec<Band>,
+}
+
+impl FrameRequest {
+    /// # Errors
+    /// If the scene asks for something not implemented, or for more than the device's limits allow.
+    pub(crate) fn new(
+        device: &Device,
+        volume: &ClassifiedVolume,
+        scene: &Scene,
+        (surfaces, first_hit): (Option<&Surfaces>, Option<f64>),
+        rasterizer: Rasterizer,
+    ) -> Result<Self, RenderError> {
+        let splatting = settled(scene.splatting, rasterizer);
+        splatting.check()?;
+        let (grid, size) = (volume.grid(), [scene.image.width, scene.image.height]);
+        let seen = View::new(grid, &scene.camera, &splatting, size)?;
+        let bands = CompositingBuffer::bands(&device.limits(), size)?;
+        let rays = RayMode { cut: surfaces.is_some() || !scene.clip.is_empty(), first_hit: first_hit.is_some() };
+        check_rays(device, &splatting, rays, first_hit, size)?;
+        let surfaces = match surfaces {
+            Some(surfaces) => Some((surfaces.depths(&seen, grid)?, surfaces.origin)),
+            None => None,
+        };
+        Ok(Self {
+            way: Way::of(device, &splatting)?,
+            covered: means::covered(&seen, grid, &splatting),
+            kernel: Kernel::new(splatting.radius, splatting.falloff),
+            ramps: Ramps::new(volume.transfer()),
+            first_hit,
+            view: seen,
+            splatting,
+            rays,
+            surfaces,
+            bands,
+        })
+    }
+
+    /// Pixels of the image.
+    pub(crate) fn pixels(&self) -> u64 {
+        self.view.size.map(u64::from).iter().product()
+    }
+
+    /// Bytes of first hits, a word or a depth per pixel; none, if they are not asked for.
+    pub(crate) fn hit_bytes(&self) -> u64 {
+        if self.rays.first_hit { 4 * self.pixels() } else { 0 }
+    }
+}
+
+/// The settings, with the renderer's rasterizer where they leave the choice.
+fn settled(splatting: Splatting, rasterizer: Rasterizer) -> Splatting {
+    let is_open = splatting.rasterizer == Rasterizer::Auto && !insists_on_tiles(&splatting);
+    Splatting { rasterizer: if is_open { rasterizer } else { splatting.rasterizer }, ..splatting }
+}

@@ -1,0 +1,94 @@
+//! How pixels look at sheets for the compositings by means ([`Compositing`]); the twin of `shaders/shared/means.wgsl`.
+
+use std::ops::{Range, RangeInclusive};
+
+use glam::{DVec3, UVec2};
+use rayon::prelude::*;
+
+use super::cut::{self, PixelRay};
+use super::{Buffer, Geometry};
+use crate::clip::HalfSpace;
+use crate::splatting::Compositing;
+
+/// By how much slabs' middles may lie outside, in slabs, and rays miss a box of voxel centres, in grid steps.
+const HAIR: f64 = 0.01;
+
+/// Of every pixel, row by row, how it looks at sheets.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Means {
+    /// What sheets are multiplied by.
+    weights: Vec<f64>,
+    /// From where to where middles lie of the slabs that count, in sheets (number k fills `k..k + 1`); for `Minimum` alone.
+    counted: Option<Vec<RangeInclusive<f64>>>,
+}
+
+impl Means {
+    /// Those of a compositing by means, over all that clip planes and opaque surfaces show; see [`Cuts::new`](super::Cuts::new).
+    pub fn new(geometry: &Geometry, compositing: Compositing, surfaces: Option<&[f64]>) -> Self {
+        let width = geometry.size.x as u32;
+        let pixels = 0..width * geometry.size.y as u32;
+        let ray = |at: u32| PixelRay::new(geometry, UVec2::new(at % width, at / width));
+        let near = geometry.eye.map_or(f64::NEG_INFINITY, |eye| eye.near);
+        let in_box = |at: u32, half_steps: DVec3, nearest: f64| {
+            let inside = ray(at).inside(&centered_box(geometry, half_steps));
+            inside.start.max(nearest)..inside.end
+        };
+        let shown = |at: u32, inside: Range<f64>| {
+            let shown = cut::shown(geometry, surfaces, at);
+            inside.start.max(shown.start)..inside.end.min(shown.end)
+        };
+        let centers = geometry.grid.center();
+        let weight = |at: u32| {
+            let ray = ray(at);
+            if compositing != Compositing::Average {
+                let sheets_per_depth = ray.sheet(geometry, 1.0) - ray.sheet(geometry, 0.0);
+                return sheets_per_depth.abs() / ray.along.length();
+            }
+            let depths = shown(at, in_box(at, centers + 0.5, near));
+            let misses = in_box(at, centers + HAIR, near).is_empty() || depths.is_empty();
+            if misses { 0.0 } else { 1.0 / ((depths.end - depths.start) * ray.along.length()) }
+        };
+        // The farthest that a kernel reaches in depth from a voxel before the near plane.
+        let reach = geometry.radius * (geometry.basis.w * geometry.grid.aspect()).length();
+        let complete = (centers - geometry.radius).max(centers / 2.0) + HAIR;
+        let counted = |at: u32| {
+            let ray = ray(at);
+            let depths = shown(at, in_box(at, complete, near + reach));
+            if depths.is_empty() {
+                return f64::INFINITY..=f64::NEG_INFINITY;
+            }
+            let [a, b] = [depths.start, depths.end].map(|depth| ray.sheet(geometry, depth));
+            let middle = (a + b) / 2.0;
+            a.min(b).min(middle - 0.5) - HAIR..=a.max(b).max(middle + 0.5) + HAIR
+        };
+        Self {
+            weights: pixels.clone().into_par_iter().map(weight).collect(),
+            counted: (compositing == Compositing::Minimum).then(|| pixels.into_par_iter().map(counted).collect()),
+        }
+    }
+
+    /// The sheets that count at any pixel, whether there is anything in them or not.
+    pub fn sheets(&self) -> Range<i32> {
+        let counted = || self.counted.iter().flatten().filter(|counted| !counted.is_empty());
+        let first = counted().map(|counted| *counted.start()).fold(f64::INFINITY, f64::min);
+        let last = counted().map(|counted| *counted.end()).fold(f64::NEG_INFINITY, f64::max);
+        if first > last { 0..0 } else { (first - 0.5).ceil() as i32..(last + 0.5).floor() as i32 }
+    }
+
+    /// Turns a sheet into its means.
+    pub fn apply(&self, sheet: &mut Buffer) {
+        sheet.pixels.iter_mut().zip(&self.weights).for_each(|(pixel, weight)| *pixel *= *weight);
+    }
+
+    /// Whether a sheet counts at a pixel.
+    pub fn counts(&self, pixel: usize, number: i32) -> bool {
+        self.counted.as_ref().is_none_or(|counted| counted[pixel].contains(&(f64::from(number) + 0.5)))
+    }
+}
+
+/// A box around the volume's centre, of half its extent.
+fn centered_box(geometry: &Geometry, half_steps: DVec3) -> [HalfSpace; 6] {
+    let half = half_steps * geometry.grid.aspect();
+    let [x, y, z] = DVec3::AXES;
+    [x, y, z, -x, -y, -z].map(|normal| HalfSpace { normal, offset: normal.abs().dot(half) })
+}

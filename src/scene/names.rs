@@ -1,0 +1,33 @@
+//! What scene files call a setting's choices.
+
+use crate::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer};
+
+pub(super) const METHODS: &[(&str, Method)] = &[
+    ("image-aligned", Method::ImageAligned),
+    ("axis-aligned", Method::AxisAligned),
+    ("composite-every-sample", Method::CompositeEverySample),
+];
+pub(super) const FORMS: &[(&str, FootprintForm)] =
+    &[("summed-area", FootprintForm::SummedArea), ("sections", FootprintForm::Sections)];
+pub(super) const COMPOSITINGS: &[(&str, Compositing)] = &[
+    ("linear", Compositing::Linear),
+    ("exponential", Compositing::Exponential),
+    ("xray", Compositing::Xray),
+    ("maximum", Compositing::Maximum),
+    ("minimum", Compositing::Minimum),
+    ("average", Compositing::Average),
+    ("surface", Compositing::Surface),
+];
+/// Whether a sample's most significant byte comes first.
+pub(super) const ENDIANS: &[(&str, bool)] = &[("little", false), ("big", true)];
+pub(super) const ORDERS: &[(&str, Order)] =
+    &[("front-to-back", Order::FrontToBack), ("back-to-front", Order::BackToFront)];
+pub(super) const RASTERIZERS: &[(&str, Rasterizer)] =
+    &[("auto", Rasterizer::Auto), ("quads", Rasterizer::Quads), ("tiles", Rasterizer::Tiles)];
+pub(super) const BOXES: &[(&str, FootprintBox)] =
+    &[("rectangle", FootprintBox::Rectangle), ("parallelogram", FootprintBox::Parallelogram)];
+
+/// The name of a choice.
+pub(super) fn name_of<T: Copy + PartialEq>(choices: &[(&'static str, T)], choice: T) -> &'static str {
+    choices.iter().find(|(_, other)| *other == choice).map_or("", |(name, _)| name)
+}

@@ -1,0 +1,233 @@
+//! Scenes as TOML: the inverse of `tables`.
+
+use std::fmt::Write;
+use std::path::{Component, Path, PathBuf};
+
+use glam::DVec3;
+use toml::Value;
+
+use super::names::{BOXES, COMPOSITINGS, FORMS, METHODS, ORDERS, RASTERIZERS, name_of};
+use super::{ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
+use crate::appearance::{Colormap, Preset};
+use crate::camera::{Camera, Projection};
+use crate::clip::Clip;
+use crate::shading::{Light, Shading};
+use crate::splatting::{Economies, Splatting};
+use crate::transfer_function::Ramp;
+use crate::volume::RawLayout;
+
+/// More control points than this are written line by line.
+const ON_ONE_LINE: usize = 3;
+
+impl Scene {
+    /// The scene as the text of a scene file that is to lie in `folder`, which must exist if the scene names files: relative paths become
+    /// relative to it. Read back from there ([`Self::open`]), it is the same scene. What the scene leaves to the volume is left out;
+    /// [`Self::explicit`] fills it in.
+    ///
+    /// # Errors
+    /// If the volume's path or that of its labels is not UTF-8, or its offset in a raw file is more than TOML can say.
+    pub fn to_toml(&self, folder: &Path) -> Result<String, SceneError> {
+        let Self { volume, spacing, labels, camera, image, clip, transfer, shading, splatting } = self;
+        let mut text = Text::default();
+        if let Some(preset) = transfer.preset {
+            text.line("preset", name_of(&Preset::ALL, preset));
+        }
+        text.table("volume");
+        match volume {
+            VolumeSource::File(path) => text.line("path", within(folder, path, "volume.path")?),
+            VolumeSource::Raw(path, layout) => {
+                let RawLayout { dims, sample_type, big_endian, offset } = *layout;
+                text.line("path", within(folder, path, "volume.path")?);
+                text.line("dims", dims.to_array().map(i64::from).map(Value::from).to_vec());
+                text.line("type", sample_type.to_string());
+                text.line("endian", if big_endian { "big" } else { "little" });
+                let allowed = format!("at most {}, as TOML has no larger number", i64::MAX);
+                let offset = i64::try_from(offset).map_err(|_| invalid("volume.offset", offset.to_string(), &allowed));
+                text.line("offset", offset?);
+            }
+            VolumeSource::Builtin(name) => text.line("builtin", name.as_str()),
+        }
+        text.given("spacing", spacing.map(vector));
+        let labels = labels.as_ref().map(|path| within(folder, path, "volume.labels"));
+        text.given("labels", labels.transpose()?);
+        write_camera(&mut text, camera);
+        write_image(&mut text, image);
+        write_clip(&mut text, clip);
+        write_transfer(&mut text, transfer);
+        write_shading(&mut text, shading);
+        write_splatting(&mut text, splatting);
+        Ok(text.0)
+    }
+}
+
+/// Lines of TOML.
+#[derive(Default)]
+struct Text(String);
+
+impl Text {
+    fn table(&mut self, name: &str) {
+        let gap = if self.0.is_empty() { "" } else { "\n" };
+        let _ = writeln!(self.0, "{gap}[{name}]");
+    }
+
+    fn line(&mut self, key: &str, value: impl Into<Value>) {
+        let _ = writeln!(self.0, "{key} = {}", value.into());
+    }
+
+    fn given(&mut self, key: &str, value: Option<impl Into<Value>>) {
+        if let Some(value) = value {
+            self.line(key, value);
+        }
+    }
+
+    /// `[position, value]` points.
+    fn ramp<T>(&mut self, key: &str, ramp: Option<&Ramp<T>>, value: impl Fn(&T) -> Value)
+    where
+        T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f64, Output = T>,
+    {
+        let Some(ramp) = ramp else { return };
+        let points: Vec<Value> =
+            ramp.points().iter().map(|(at, y)| Value::Array(vec![(*at).into(), value(y)])).collect();
+        if points.len() <= ON_ONE_LINE {
+            return self.line(key, points);
+        }
+        let _ = writeln!(self.0, "{key} = [");
+        for point in points {
+            let _ = writeln!(self.0, "    {point},");
+        }
+        let _ = writeln!(self.0, "]");
+    }
+
+    fn ramps(
+        &mut self,
+        color: Option<&Ramp<DVec3>>,
+        opacity: Option<&Ramp<f64>>,
+        gradient_opacity: Option<&Ramp<f64>>,
+    ) {
+        self.ramp("color", color, |&rgb| vector(rgb));
+        self.ramp("opacity", opacity, |&opacity| opacity.into());
+        self.ramp("gradient_opacity", gradient_opacity, |&factor| factor.into());
+    }
+}
+
+fn vector(vector: DVec3) -> Value {
+    numbers(vector.to_array())
+}
+
+fn numbers(numbers: impl IntoIterator<Item = f64>) -> Value {
+    Value::Array(numbers.into_iter().map(Value::from).collect())
+}
+
+fn write_camera(text: &mut Text, camera: &Camera) {
+    let Camera { projection, direction, up, center } = camera;
+    text.table("camera");
+    match *projection {
+        Projection::Orthographic { height } => {
+            text.line("projection", "orthographic");
+            text.given("height", height);
+        }
+        Projection::Perspective { fov_y, distance, near } => {
+            text.line("projection", "perspective");
+            text.line("fov_y", fov_y);
+            text.given("distance", distance);
+            text.given("near", near);
+        }
+    }
+    text.line("direction", vector(*direction));
+    text.line("up", vector(*up));
+    text.line("center", vector(*center));
+}
+
+fn write_image(text: &mut Text, image: &ImageSettings) {
+    let ImageSettings { width, height, background } = *image;
+    text.table("image");
+    text.line("width", i64::from(width));
+    text.line("height", i64::from(height));
+    text.line("background", numbers(background));
+}
+
+fn write_clip(text: &mut Text, clip: &Clip) {
+    let Clip { planes, crop } = clip;
+    if !planes.is_empty() || crop.is_some() {
+        text.table("clip");
+        text.line("planes", planes.iter().map(|&plane| numbers(plane)).collect::<Vec<_>>());
+        text.given("crop", crop.map(|corners| corners.map(vector).to_vec()));
+    }
+}
+
+fn write_transfer(text: &mut Text, transfer: &TransferSettings) {
+    let TransferSettings { preset: _, colormap, color, opacity, gradient_opacity, iso_ranges, labels } = transfer;
+    text.table("transfer");
+    text.given("colormap", colormap.map(|map| name_of(&Colormap::ALL, map)));
+    text.ramps(color.as_ref(), opacity.as_ref(), gradient_opacity.as_ref());
+    let ranges = iso_ranges.as_ref().map(|ranges| ranges.iter().map(|&range| numbers(range)).collect::<Vec<_>>());
+    text.given("iso_ranges", ranges);
+    for (&label, tables) in labels {
+        let _ = writeln!(text.0, "\n[[transfer.label]]");
+        text.line("label", i64::from(label));
+        text.line("visible", tables.visible);
+        text.ramps(tables.color.as_ref(), tables.opacity.as_ref(), tables.gradient_opacity.as_ref());
+    }
+}
+
+fn write_shading(text: &mut Text, shading: &Shading) {
+    let Shading { enabled, ambient, diffuse, specular, shininess, light } = *shading;
+    text.table("shading");
+    text.line("enabled", enabled);
+    text.line("ambient", ambient);
+    text.line("diffuse", diffuse);
+    text.line("specular", specular);
+    text.line("shininess", shininess);
+    match light {
+        Light::Headlight => text.line("light", "headlight"),
+        Light::Direction(direction) => text.line("light", vector(direction)),
+    }
+}
+
+fn write_splatting(text: &mut Text, splatting: &Splatting) {
+    let Splatting { method, radius, falloff, slab_width, footprint, compositing, order, .. } = *splatting;
+    let Splatting { opacity_threshold, culling, tiles, rasterizer, footprint_box, economies, .. } = *splatting;
+    let Economies { whole_below, beta, resolution } = economies;
+    text.table("splatting");
+    text.line("method", name_of(METHODS, method));
+    text.line("radius", radius);
+    text.line("falloff", falloff);
+    text.line("slab_width", slab_width);
+    text.line("footprint", name_of(FORMS, footprint));
+    text.line("compositing", name_of(COMPOSITINGS, compositing));
+    text.line("order", name_of(ORDERS, order));
+    text.line("opacity_threshold", opacity_threshold);
+    text.line("culling", culling);
+    text.line("tiles", tiles);
+    text.line("rasterizer", name_of(RASTERIZERS, rasterizer));
+    text.line("footprint_box", name_of(BOXES, footprint_box));
+    text.line("whole_below", whole_below);
+    text.line("beta", beta);
+    text.line("resolution", resolution);
+}
+
+/// A file's path as it is if absolute, else relative to a folder.
+fn within(folder: &Path, path: &Path, key: &str) -> Result<String, SceneError> {
+    let found = if path.is_absolute() { path.to_owned() } else { relative(folder, path) };
+    found.to_str().map(str::to_owned).ok_or_else(|| invalid(key, found.display().to_string(), "a path in UTF-8"))
+}
+
+/// The error for what cannot be written.
+fn invalid(key: &str, found: String, allowed: &str) -> SceneError {
+    SceneError::Invalid { origin: "scene".to_owned(), key: key.to_owned(), found, allowed: allowed.to_owned() }
+}
+
+/// The way from a folder to a file; where they have nothing in common, or are not there, the file's absolute path.
+fn relative(folder: &Path, path: &Path) -> PathBuf {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    // Of what they truly are: behind a link `..` is elsewhere.
+    let (Ok(from), Ok(to)) = (folder.canonicalize(), path.canonicalize()) else {
+        return std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    };
+    let shared = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();
+    if shared == 0 {
+        return to;
+    }
+    let up = from.components().skip(shared).map(|_| Component::ParentDir);
+    up.chain(to.components().skip(shared)).collect()
+}

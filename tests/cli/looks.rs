@@ -1,0 +1,121 @@
+//! Appearance by name, and scenes saved as they were rendered.
+
+use crate::*;
+
+const HEAD: &str = "builtin:head:32 --set image.width=60 --set image.height=50 --set camera.direction=[0.5,0.8,-0.2]";
+
+#[test]
+fn presets_and_colour_maps_are_short_for_settings() {
+    let folder = Folder::new();
+    let mut images = BTreeSet::new();
+    for (short, long) in [
+        ("--preset ct-bone", "--set preset=ct-bone"),
+        ("--colormap inferno", "--set transfer.colormap=inferno"),
+        ("--preset confocal --colormap magma", "--set transfer.colormap=magma --set preset=confocal"),
+        // What is set besides comes after.
+        ("--preset xray --set preset=labels", "--set preset=labels"),
+    ] {
+        folder.render(&format!("{HEAD} {short} -o short.npy"));
+        folder.render(&format!("{HEAD} {long} -o long.npy"));
+        assert_eq!(folder.read("short.npy"), folder.read("long.npy"), "{short}");
+        images.insert(folder.read("short.npy"));
+    }
+    assert_eq!(images.len(), 4, "all differ");
+    // By other subcommands too, and of many values at once.
+    folder.run(&format!("orbit {HEAD} --preset ct-bone --count 1 -o %d.npy")).assert_success();
+    folder.render(&format!("{HEAD} --preset ct-bone -o bone.npy"));
+    assert_eq!(folder.read("0.npy"), folder.read("bone.npy"));
+    folder.run(&format!("sweep {HEAD} --set preset=ct-bone,xray --colormap hot -o sheet.png")).assert_success();
+    assert!(image::open(folder.path("sheet.png")).unwrap().width() > 120);
+    let bench = folder.run(&format!("bench {HEAD} --preset labels --frames 1"));
+    assert_eq!(bench.code, Some(0), "{}", bench.stderr);
+}
+
+#[test]
+fn a_scene_files_colours_give_way_to_a_colour_map_alone() {
+    let folder = Folder::new();
+    let scene = "[volume]\nbuiltin = \"head:24\"\n[image]\nwidth = 40\nheight = 40\n";
+    let transfer = "[transfer]\ncolor = [[0, [0, 0, 1]]]\nopacity = [[60, 0], [90, 0.9]]\n";
+    folder.write("scene.toml", format!("{scene}{transfer}"));
+    folder.write("mapped.toml", format!("{scene}[transfer]\ncolormap = \"hot\"\nopacity = [[60, 0], [90, 0.9]]\n"));
+    folder.write("preset.toml", format!("preset = \"ct-skin\"\n{scene}{transfer}"));
+    for (with, without) in
+        [("scene.toml --colormap hot", "mapped.toml"), ("scene.toml --preset ct-skin", "preset.toml")]
+    {
+        assert!(folder.pixels(with) == folder.pixels(without), "{with}");
+    }
+    let blue = |pixels: &[[f32; 4]]| pixels.iter().all(|[r, g, b, _]| r <= b && g <= b);
+    assert!(blue(&folder.pixels("preset.toml").2), "the file's colours stay");
+}
+
+#[test]
+fn a_saved_scene_renders_the_same_bytes_from_wherever_it_is() {
+    let folder = Folder::new();
+    for name in ["scenes", "data", "elsewhere"] {
+        fs::create_dir(folder.path(name)).unwrap();
+    }
+    let values: Vec<f32> =
+        (0..512).map(|i| if i % 8 > 2 && i / 64 > 1 { 900.0 + (i % 13) as f32 } else { -1000.0 }).collect();
+    folder.write_nrrd("data/small.nrrd", [8, 8, 8], [1.0, 1.0, 2.0], &values);
+    let labels: Vec<f32> = (0..512).map(|i| (i / 8 % 3) as f32).collect();
+    folder.write_nrrd("data/labels.nrrd", [8, 8, 8], [1.0, 1.0, 2.0], &labels);
+    folder.write(
+        "data/scene.toml",
+        "volume = { path = \"small.nrrd\", labels = \"labels.nrrd\" }\nimage = { width = 40, height = 30 }\n",
+    );
+    let small = "--set image.width=40 --set image.height=30";
+    for (at, arguments) in [
+        format!("data/small.nrrd {small}"),
+        format!("data/small.nrrd {small} --preset ct-bone --colormap viridis --set clip.planes=[[1,0,0,1]]"),
+        "data/scene.toml --preset labels --set transfer.label=[{label=2,visible=false}]".to_owned(),
+        format!("builtin:tomato:24 {small} --set camera.projection=perspective --set image.background=[1,1,1,0]"),
+        format!("{SMALL} --set splatting.rasterizer=quads --set camera.center=[1,0.1,-2]"),
+    ]
+    .iter()
+    .enumerate()
+    {
+        folder.render(&format!("{arguments} -o first.png --save-scene scenes/{at}.toml"));
+        folder.run_in("elsewhere", &format!("render ../scenes/{at}.toml -o ../second.png")).assert_success();
+        assert_eq!(folder.read("first.png"), folder.read("second.png"), "{arguments}");
+        let text = String::from_utf8(folder.read(&format!("scenes/{at}.toml"))).unwrap();
+        for key in ["color = ", "opacity = ", "compositing = ", "ambient = ", "direction = ", "width = "] {
+            assert!(text.contains(key), "{key} in {text}");
+        }
+        // Saved again, it is the same text.
+        folder.render(&format!("{arguments} -o first.npy"));
+        folder.render(&format!("scenes/{at}.toml -o again.npy --save-scene scenes/again.toml"));
+        assert_eq!(folder.read("first.npy"), folder.read("again.npy"), "{arguments}");
+        assert_eq!(String::from_utf8(folder.read("scenes/again.toml")).unwrap(), text);
+    }
+    assert!(String::from_utf8(folder.read("scenes/0.toml")).unwrap().contains("path = \"../data/small.nrrd\""));
+}
+
+#[test]
+fn bad_names_and_files_are_2_and_leave_nothing() {
+    let folder = Folder::new();
+    folder.write_nrrd("halves.nrrd", [2, 2, 2], [1.0, 1.0, 1.0], &[0.5; 8]);
+    let before = folder.names();
+    for (arguments, words) in [
+        (
+            format!("render {HEAD} -o a.png --preset ct-brain"),
+            &["--preset", "ct-brain", "ct-skin", "mr-head", "labels"] as &[&str],
+        ),
+        (format!("render {HEAD} -o a.png --colormap jet"), &["--colormap", "jet", "viridis", "coolwarm"]),
+        (format!("render {HEAD} -o a.png --set preset=jet"), &["--set: preset", "jet", "ct-skin"]),
+        (format!("render {HEAD} -o a.png --save-scene a.json"), &["--save-scene", "a.json", ".toml"]),
+        (format!("render {HEAD} -o a.png --save-scene s.toml --stats s.toml"), &["--stats", "s.toml", "--save-scene"]),
+        (
+            "render halves.nrrd -o a.png --preset labels --save-scene s.toml".to_owned(),
+            &["halves.nrrd", "preset", "0 to 65535"],
+        ),
+        ("render halves.nrrd -o a.png --preset labels --backend reference".to_owned(), &["halves.nrrd", "preset"]),
+        ("orbit halves.nrrd -o a.gif --preset labels".to_owned(), &["halves.nrrd", "preset", "0 to 65535"]),
+    ] {
+        folder.run(&arguments).assert_failure(2, words);
+        assert_eq!(folder.names(), before, "{arguments}");
+    }
+    let run = folder.run(&format!("render {HEAD} -o a.png --save-scene no/s.toml"));
+    run.assert_failure(1, &["no/s.toml", "No such file"]);
+    folder.run(&format!("render {HEAD} -o no/a.png --save-scene s.toml")).assert_failure(1, &["no/a.png"]);
+    assert_eq!(folder.names(), before);
+}

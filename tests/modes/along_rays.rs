@@ -1,0 +1,198 @@
+//! What maximum, minimum and average make of a whole ray.
+
+use glam::{DVec3, UVec2};
+use sheetsplat::camera::Projection;
+use sheetsplat::clip::Clip;
+use sheetsplat::image::Image;
+use sheetsplat::scene::Scene;
+use sheetsplat::splatting::{Compositing, Method, Order};
+use sheetsplat::view::View;
+use sheetsplat::volume::{Volume, builtin};
+
+use crate::common::images::largest_difference;
+use crate::common::{RASTERIZERS, Random, camera, gpu, scene, transfer};
+use crate::{COLOR, OPACITY, constant, render, view_of};
+
+/// Of a pixel's ray what lies in the box of half the given extent, grid steps: from where to where, grid steps from the volume's centre.
+fn in_box(view: &View, aspect: DVec3, pixel: usize, half: DVec3) -> Option<[DVec3; 2]> {
+    let size = UVec2::from(view.size);
+    let place = UVec2::new(pixel as u32 % size.x, pixel as u32 / size.x).as_dvec2() + 0.5 - size.as_dvec2() / 2.0;
+    let [origin, end] = [0.0, 1.0].map(|depth| view.rays().at(place, depth) / aspect);
+    let (mut first, mut last) = (f64::NEG_INFINITY, f64::INFINITY);
+    for axis in 0..3 {
+        let at = [-half[axis], half[axis]].map(|plane| (plane - origin[axis]) / (end - origin)[axis]);
+        (first, last) = (first.max(at[0].min(at[1])), last.min(at[0].max(at[1])));
+    }
+    (first < last).then(|| [first, last].map(|depth| origin + depth * (end - origin)))
+}
+
+/// Views of a constant volume: any direction, with an eye and without, sheets of any width and slices.
+fn views_of_a_constant(random: &mut Random) -> Vec<(Volume, Scene)> {
+    let mut views = Vec::new();
+    for case in 0..12 {
+        let spacing = DVec3::from(random.pick(&[[1.0, 1.0, 1.0], [1.0, 1.0, 2.0], [1.5, 2.0, 1.0]]));
+        let (volume, mut scene) = constant([22, 20, 21], spacing);
+        scene.camera.direction = if case == 0 { DVec3::Y } else { random.direction() };
+        if case % 3 == 1 {
+            scene.camera.projection = Projection::Perspective { fov_y: 20.0, distance: None, near: None };
+        }
+        if case % 4 == 3 {
+            scene.splatting.method = Method::AxisAligned;
+        }
+        scene.splatting.slab_width = random.pick(&[0.4, 1.0, 1.7]);
+        views.push((volume, scene));
+    }
+    views
+}
+
+#[test]
+fn the_average_of_a_constant_is_the_constant() {
+    let gpu = gpu();
+    let (mut inside, mut brightest) = (0, 0.0_f64);
+    for (volume, mut scene) in views_of_a_constant(&mut Random(5)) {
+        scene.splatting.compositing = Compositing::Average;
+        let (center, radius, view) = (volume.grid().center(), scene.splatting.radius, view_of(&volume, &scene));
+        for rasterizer in RASTERIZERS {
+            scene.splatting.rasterizer = rasterizer;
+            let image = render(&gpu, &volume, &scene).0;
+            for (at, pixel) in image.pixels.iter().enumerate() {
+                let alpha = f64::from(pixel[3]);
+                brightest = brightest.max(alpha / OPACITY);
+                let Some(ends) = in_box(&view, volume.grid().aspect(), at, center + 0.5) else {
+                    assert_eq!(alpha, 0.0, "pixel {at} is beside the volume: {scene:?}");
+                    continue;
+                };
+                // Farther from the faces' edges than kernels reach, also of a ray that comes in slanted.
+                let is_inside = |end: DVec3| {
+                    (center + 0.5 - end.abs()).to_array().iter().filter(|&&step| step >= 1.5 * radius).count() == 2
+                };
+                if ends.into_iter().all(is_inside) {
+                    inside += 1;
+                    // f16 amounts by quads; and with an eye kernels are seen as along their own ray from everywhere.
+                    let tolerance = if view.perspective.is_some() { 5e-3 } else { 2e-3 };
+                    assert!((alpha / OPACITY - 1.0).abs() < tolerance, "pixel {at}: {alpha} with {scene:?}");
+                    assert!((f64::from(pixel[2]) / alpha - COLOR[2]).abs() < 2e-3, "pixel {at}: {pixel:?}");
+                }
+            }
+        }
+    }
+    println!("{inside} pixels, at most {brightest:.3} times the constant at edges");
+    assert!(inside > 5000, "only {inside} pixels were compared");
+    // Kernels blur the volume's edges; no edge outshines what is inside by more than that.
+    assert!(brightest < 1.2, "{brightest} times the constant");
+}
+
+#[test]
+fn the_minimum_of_a_constant_is_the_constant_inside() {
+    let gpu = gpu();
+    let mut inside = 0;
+    for (volume, mut scene) in views_of_a_constant(&mut Random(6)) {
+        scene.splatting.compositing = Compositing::Minimum;
+        let (complete, view) = (volume.grid().center() - scene.splatting.radius, view_of(&volume, &scene));
+        // A middle may be a hundredth of a slab outside.
+        let [within, around] = [complete - 0.1, complete + 0.1];
+        for (rasterizer, order) in RASTERIZERS.into_iter().zip([Order::FrontToBack, Order::BackToFront]) {
+            (scene.splatting.rasterizer, scene.splatting.order) = (rasterizer, order);
+            let image = render(&gpu, &volume, &scene).0;
+            for (at, pixel) in image.pixels.iter().enumerate() {
+                let alpha = f64::from(pixel[3]);
+                if in_box(&view, volume.grid().aspect(), at, within).is_some() {
+                    inside += 1;
+                    assert!((alpha / OPACITY - 1.0).abs() < 5e-3, "pixel {at}: {alpha} with {scene:?}");
+                } else if in_box(&view, volume.grid().aspect(), at, around).is_none() {
+                    assert_eq!(*pixel, [0.0; 4], "pixel {at}: {scene:?}");
+                }
+            }
+        }
+    }
+    assert!(inside > 5000, "only {inside} pixels were compared");
+}
+
+/// The least opacity is 0 where there is anything without, wherever along the ray it is, and however little of the volume takes part.
+#[test]
+fn the_minimum_of_a_gap_is_nothing() {
+    let gpu = gpu();
+    for empty in [4..9, 20..60, 0..50, 12..60] {
+        let (volume, mut scene) = constant([15, 60, 15], DVec3::ONE);
+        let values: Vec<f32> = (0..volume.values().len() as u32)
+            .map(|index| f32::from(!empty.contains(&volume.grid().voxel_at(index).y)))
+            .collect();
+        let volume = Volume::new("gap", volume.grid().dims, DVec3::ONE, values).unwrap();
+        (scene.splatting.radius, scene.splatting.falloff) = (1.5, 2.0);
+        scene.splatting.compositing = Compositing::Minimum;
+        scene.transfer = transfer(&[(0.0, COLOR)], &[(0.0, 0.0), (1.0, OPACITY)]);
+        scene.camera = camera([0.0, 1.0, 0.0], 20.0);
+        for (rasterizer, order) in
+            RASTERIZERS.into_iter().flat_map(|r| [Order::FrontToBack, Order::BackToFront].map(|order| (r, order)))
+        {
+            (scene.splatting.rasterizer, scene.splatting.order) = (rasterizer, order);
+            scene.clip = Clip::default();
+            let image = render(&gpu, &volume, &scene).0;
+            assert!(image.pixels.iter().all(|pixel| *pixel == [0.0; 4]), "{empty:?} {rasterizer:?} {order:?}");
+            // What is cut away is no gap.
+            let side = |y: u32, sign: f64| [0.0, sign, 0.0, -sign * (f64::from(y) - 29.5 + sign)];
+            let kept = if empty.end < 55 { side(empty.end + 1, 1.0) } else { side(empty.start - 2, -1.0) };
+            scene.clip.planes = vec![kept];
+            let image = render(&gpu, &volume, &scene).0;
+            let alpha = image.pixels[54 * 120 + 60][3];
+            assert!(alpha > 0.25, "{empty:?} {rasterizer:?} {order:?}: {alpha}");
+        }
+    }
+}
+
+/// The same where whole groups of sheets are empty, between others, before and behind them: nothing is drawn there.
+#[test]
+fn the_minimum_of_empty_groups_is_nothing() {
+    let gpu = gpu();
+    // By slabs of 8 and groups of 4: something in every slab of two groups, and nothing in that between them.
+    for parts in [[0..16, 52..100], [0..16, 0..0], [0..0, 52..100], [0..0, 0..100]] {
+        let (volume, mut scene) = constant([9, 100, 9], DVec3::ONE);
+        let value = |index| f32::from(parts.iter().any(|part| part.contains(&volume.grid().voxel_at(index).y)));
+        let volume = Volume::new("parts", volume.grid().dims, DVec3::ONE, (0..8100).map(value).collect()).unwrap();
+        scene.camera = camera([0.0, 1.0, 0.0], 4.0);
+        (scene.splatting.radius, scene.splatting.falloff) = (2.0, 2.0);
+        (scene.splatting.compositing, scene.splatting.slab_width) = (Compositing::Minimum, 8.0);
+        scene.transfer = transfer(&[(0.0, COLOR)], &[(0.0, 0.0), (1.0, OPACITY)]);
+        for (rasterizer, order) in
+            RASTERIZERS.into_iter().flat_map(|r| [Order::FrontToBack, Order::BackToFront].map(|order| (r, order)))
+        {
+            (scene.splatting.rasterizer, scene.splatting.order) = (rasterizer, order);
+            let image = render(&gpu, &volume, &scene).0;
+            if parts[1].len() == 100 {
+                let alpha = image.pixels[54 * 120 + 60][3];
+                assert!(alpha > 0.25, "{rasterizer:?} {order:?}: {alpha}");
+            } else {
+                let is_empty = image.pixels.iter().all(|pixel| *pixel == [0.0; 4]);
+                assert!(is_empty, "{parts:?} {rasterizer:?} {order:?}");
+            }
+        }
+    }
+}
+
+/// Looked at from the other side a picture is mirrored.
+#[test]
+fn maximum_and_average_are_the_same_from_behind() {
+    let gpu = gpu();
+    let volume = builtin::volume("head:40").unwrap();
+    let mut random = Random(77);
+    for (compositing, rasterizer) in
+        [Compositing::Maximum, Compositing::Average].into_iter().flat_map(|c| RASTERIZERS.map(|r| (c, r)))
+    {
+        for width in [0.5, 1.0, 2.0] {
+            let mut scene = scene(70, 61);
+            (scene.splatting.compositing, scene.splatting.rasterizer) = (compositing, rasterizer);
+            scene.splatting.slab_width = width;
+            scene.shading.enabled = false;
+            scene.transfer = transfer(&[(0.0, [1.0, 0.7, 0.4])], &[(0.0, 0.0), (255.0, 1.0)]);
+            let direction = random.direction();
+            let [front, behind] = [direction, -direction].map(|direction| {
+                scene.camera.direction = direction;
+                render(&gpu, &volume, &scene).0
+            });
+            let mirrored = behind.pixels.chunks(70).flat_map(|row| row.iter().rev().copied()).collect();
+            let difference = largest_difference(&front, &Image { pixels: mirrored, ..behind });
+            assert!(difference < 1e-4, "{compositing:?} {rasterizer:?} {width}: {difference}");
+            assert!(front.pixels.iter().filter(|pixel| pixel[0] > 0.02).count() > 300);
+        }
+    }
+}

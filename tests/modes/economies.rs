@@ -1,0 +1,67 @@
+//! Culling, tiles and groups (SPEC §6): what they change is the cost.
+
+use glam::DVec3;
+use sheetsplat::camera::Projection;
+use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::splatting::Compositing;
+use sheetsplat::volume::builtin;
+
+use crate::common::{BY_MEANS, FORMS, RASTERIZERS, Random, gpu, lavapipe, scene};
+use crate::{OUTLIERS, random_case, render, share_off};
+
+/// Behind a surface everything is culled, and nothing changes.
+#[test]
+fn surfaces_cull_and_the_others_do_not() {
+    let gpu = gpu();
+    let volume = builtin::volume("head:48").unwrap();
+    let mut scene = scene(100, 90);
+    scene.camera.direction = DVec3::new(0.4, 0.8, -0.3);
+    // Below what a surface that is not reached keeps.
+    scene.splatting.opacity_threshold = 0.2;
+    let projections = [scene.camera.projection, Projection::Perspective { fov_y: 40.0, distance: None, near: None }];
+    for (compositing, projection) in
+        BY_MEANS.into_iter().flat_map(|compositing| projections.map(|projection| (compositing, projection)))
+    {
+        (scene.splatting.compositing, scene.camera.projection) = (compositing, projection);
+        for (rasterizer, footprint) in FORMS {
+            (scene.splatting.rasterizer, scene.splatting.footprint) = (rasterizer, footprint);
+            let [with, without] = [true, false].map(|culling| {
+                scene.splatting.culling = culling;
+                render(&gpu, &volume, &scene)
+            });
+            let share = share_off(&with.0.pixels, &without.0.pixels, 1e-4);
+            assert!(share <= OUTLIERS, "{compositing:?}, {rasterizer:?}, {footprint:?}: {share} of the pixels");
+            let [with, without] = [with, without].map(|(_, counts)| counts.sections_rasterized);
+            match compositing {
+                Compositing::Surface => assert!(with < without * 2 / 3, "{rasterizer:?}: {with} of {without}"),
+                _ => assert_eq!(with, without, "{compositing:?}, {rasterizer:?}"),
+            }
+        }
+    }
+}
+
+/// How sheets are grouped and which tiles are composited is none of the picture's business.
+#[test]
+fn tiles_and_groups_change_nothing() {
+    let renderers =
+        [1, 2, 4].map(|n| Headless::new(&HeadlessOptions { sheets_per_group: Some(n), ..lavapipe() }).unwrap());
+    let mut random = Random(91);
+    for (case, compositing) in (0..12).zip(BY_MEANS.into_iter().cycle()) {
+        let (volume, mut scene) = random_case(&mut random);
+        scene.splatting.compositing = compositing;
+        for rasterizer in RASTERIZERS {
+            scene.splatting.rasterizer = rasterizer;
+            let [with, without] = [true, false].map(|tiles| {
+                scene.splatting.tiles = tiles;
+                render(&renderers[2], &volume, &scene).0
+            });
+            assert_eq!(with, without, "case {case}, {rasterizer:?}");
+        }
+        scene.splatting.rasterizer = RASTERIZERS[0];
+        let [one, two, four] = [0, 1, 2].map(|at| render(&renderers[at], &volume, &scene).0);
+        for few in [one, two] {
+            let share = share_off(&few.pixels, &four.pixels, 1e-4);
+            assert!(share <= 5.0 * OUTLIERS, "case {case}: {share} of the pixels with {scene:?}");
+        }
+    }
+}

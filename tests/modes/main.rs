@@ -1,0 +1,91 @@
+//! Compositing by means (`splatting::Compositing`; SPEC is silent): whole frames by each rasterizer against the f64 twin, and what
+//! maximum, minimum, average and surface must show, whatever the view. `cargo test --release --test modes -- --nocapture` prints what was
+//! measured.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+mod along_rays;
+#[expect(dead_code, reason = "not every file needs all of it")]
+#[path = "../common/mod.rs"]
+mod common;
+mod economies;
+mod surface;
+mod twin;
+
+use glam::{DVec3, UVec3};
+use sheetsplat::headless::Headless;
+use sheetsplat::image::Image;
+use sheetsplat::scene::Scene;
+use sheetsplat::splatting::Method;
+use sheetsplat::stats::Counts;
+use sheetsplat::view::View;
+use sheetsplat::volume::Volume;
+
+use common::{Random, SPACINGS, random_eye, random_volume, scene, transfer};
+
+/// Where an opacity, a slab's middle or a ray is on an edge, rounding may decide otherwise: in so many of the pixels.
+pub(crate) const OUTLIERS: f64 = 0.001;
+
+/// The share of pixels with a channel that differs by more.
+pub(crate) fn share_off(a: &[[f32; 4]], b: &[[f32; 4]], by: f32) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let is_close = |(a, b): (&f32, &f32)| (a - b).abs() <= by;
+    let is_off = |(a, b): &(&[f32; 4], &[f32; 4])| !a.iter().zip(*b).all(is_close);
+    a.iter().zip(b).filter(is_off).count() as f64 / a.len() as f64
+}
+
+/// Any view of any volume, from outside, beside or inside, cut or not.
+pub(crate) fn random_case(random: &mut Random) -> (Volume, Scene) {
+    let spacing = random.pick(&SPACINGS);
+    let volume = random_volume(random, (6.0, 16.0), spacing);
+    let mut scene = scene(random.uniform(20.0, 70.0) as u32, random.uniform(20.0, 60.0) as u32);
+    scene.splatting.method = random.pick(&[Method::ImageAligned, Method::ImageAligned, Method::AxisAligned]);
+    scene.camera.direction = random.direction();
+    if random.bits().is_multiple_of(2) {
+        scene.camera = random_eye(random, volume.grid());
+    }
+    let (haze, solid) = (random.pick(&[0.0, 0.02, 0.3]), random.pick(&[0.3, 0.9, 1.0]));
+    // Voxels without opacity leave gaps.
+    let opacity = [(10.0, 0.0), (20.0, haze), (200.0, solid)];
+    scene.transfer = transfer(&[(0.0, [0.2, 0.5, 1.0]), (200.0, [1.0, 0.9, 0.8])], &opacity);
+    scene.splatting.slab_width = random.pick(&[0.5, 1.0, 2.0, 3.0]);
+    scene.splatting.radius = random.pick(&[1.4, 2.0, 2.7]);
+    scene.splatting.culling = false;
+    scene.image.background = random.pick(&[[0.0, 0.0, 0.0, 1.0], [0.2, 0.4, 0.6, 0.5]]);
+    if random.bits().is_multiple_of(2) {
+        let half = volume.grid().center() * volume.grid().spacing;
+        let normal = random.direction();
+        let through = random.within(-half, half) * 0.5;
+        scene.clip.planes = vec![[normal.x, normal.y, normal.z, -normal.dot(through)]];
+    }
+    if random.bits().is_multiple_of(4) {
+        let half = volume.grid().center() * volume.grid().spacing;
+        scene.clip.crop = Some([-half * 0.6, half * 0.7 + volume.grid().spacing * 0.1]);
+    }
+    (volume, scene)
+}
+
+pub(crate) fn view_of(volume: &Volume, scene: &Scene) -> View {
+    View::new(volume.grid(), &scene.camera, &scene.splatting, [scene.image.width, scene.image.height]).unwrap()
+}
+
+pub(crate) fn render(gpu: &Headless, volume: &Volume, scene: &Scene) -> (Image, Counts) {
+    let rendering = gpu.render_volume(volume.clone(), scene).unwrap();
+    (rendering.image, rendering.stats.counts)
+}
+
+/// What a constant volume is made of: opacity, and colour without shading.
+pub(crate) const OPACITY: f64 = 0.3;
+pub(crate) const COLOR: [f64; 3] = [0.2, 0.5, 0.9];
+
+/// A constant volume, seen as a kernel reconstructs it that leaves no ripple.
+pub(crate) fn constant(dims: [u32; 3], spacing: DVec3) -> (Volume, Scene) {
+    let dims = UVec3::from(dims);
+    let volume = Volume::new("constant", dims, spacing, vec![1.0; dims.element_product() as usize]).unwrap();
+    let mut scene = scene(120, 108);
+    scene.camera.up = DVec3::new(0.1, 0.2, 1.0);
+    (scene.splatting.radius, scene.splatting.falloff) = (3.0, 1.0);
+    scene.shading.enabled = false;
+    scene.image.background = [0.0; 4];
+    scene.transfer = transfer(&[(0.0, COLOR)], &[(0.0, OPACITY)]);
+    (volume, scene)
+}

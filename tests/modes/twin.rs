@@ -1,0 +1,166 @@
+//! Frames of random volumes, and of the thinnest, against the twin; and what is refused.
+
+use glam::DVec3;
+use sheetsplat::error::RenderError;
+use sheetsplat::headless::{Headless, readback};
+use sheetsplat::image::Image;
+use sheetsplat::reference::{self, Host};
+use sheetsplat::scene::Scene;
+use sheetsplat::splatting::{Compositing, Method, Order};
+use sheetsplat::view::View;
+use sheetsplat::volume::{Volume, builtin};
+
+use crate::common::surfaces::{DepthRange, surfaces};
+use crate::common::{BY_MEANS, RASTERIZERS, Random, camera, gpu, scene, transfer};
+use crate::{COLOR, OUTLIERS, constant, random_case, render, share_off, view_of};
+
+/// Depths of a host's wall before a part of the image.
+fn wall(view: &View) -> Vec<f64> {
+    let middle = view.rays().depth_of(DVec3::ZERO);
+    let depth = |at: u32| match (at % view.size[0]) * 4 / view.size[0] {
+        0 => (middle - 2.3).max(0.05),
+        1 => (middle + 3.1).max(0.05),
+        _ => f64::INFINITY,
+    };
+    (0..view.size[0] * view.size[1]).map(depth).collect()
+}
+
+/// Draws a frame, with its first hits in `unit`s if they were asked for.
+fn draw(gpu: &Headless, volume: &Volume, scene: &Scene, first_hit: Option<f64>, walls: bool) -> (Image, Vec<f64>) {
+    let unit = volume.grid().unit();
+    let mut view = gpu.view(volume.clone(), scene).unwrap();
+    view.set_first_hit(first_hit);
+    if walls {
+        let seen = view_of(volume, scene);
+        let depths = wall(&seen);
+        let range = DepthRange::Standard;
+        view.set_surfaces(Some(surfaces(gpu, &seen, unit, range, [0.01, 1000.0], &depths, [1, 2])));
+    }
+    let image = gpu.draw(&mut view).unwrap().image;
+    let hits = view.first_hits().map_or(Vec::new(), |texture| {
+        let bytes = readback::texture(gpu.device(), gpu.queue(), texture).unwrap();
+        bytemuck::pod_collect_to_vec::<_, f32>(&bytes).into_iter().map(|depth| f64::from(depth) / unit).collect()
+    });
+    (image, hits)
+}
+
+#[test]
+fn any_view_is_that_of_the_twin() {
+    let gpu = gpu();
+    let mut random = Random(2024);
+    for compositing in BY_MEANS {
+        let mut shown = 0;
+        let mut off = [0.0; 2];
+        const CASES: usize = 16;
+        for case in 0..CASES {
+            let (volume, mut scene) = random_case(&mut random);
+            scene.splatting.compositing = compositing;
+            let walls = random.bits().is_multiple_of(3);
+            let first_hit = (compositing != Compositing::Minimum && case % 2 == 0).then(|| random.pick(&[0.05, 0.4]));
+            if compositing != Compositing::Surface && first_hit.is_none() {
+                scene.splatting.order = random.pick(&[Order::FrontToBack, Order::BackToFront]);
+            }
+            let depths = walls.then(|| wall(&view_of(&volume, &scene)));
+            let host = Host { surfaces: depths.as_deref(), first_hit };
+            let expected =
+                reference::render_for(host, &volume, &scene.transfer.resolve(&volume), &scene, None).unwrap();
+            let background = expected.image.pixels.iter().filter(|pixel| {
+                let [r, g, b, a] = scene.image.background;
+                **pixel == [r * a, g * a, b * a, a].map(|channel| channel as f32)
+            });
+            shown += usize::from(background.count() + 100 < expected.image.pixels.len());
+            for (rasterizer, off) in RASTERIZERS.into_iter().zip(&mut off) {
+                scene.splatting.rasterizer = rasterizer;
+                let (image, hits) = draw(&gpu, &volume, &scene, first_hit, walls);
+                // Quads round amounts to f16.
+                let share = share_off(&image.pixels, &expected.image.pixels, 2e-3);
+                *off += share / CASES as f64;
+                assert!(share <= 4.0 * OUTLIERS, "case {case}, {rasterizer:?}: {share} of the pixels with {scene:?}");
+                assert_eq!(hits.len(), expected.first_hits.len());
+                let is_close = |(hit, expected): &(&f64, &f64)| {
+                    hit == expected || (**hit - **expected).abs() / expected.abs().max(10.0) <= 1e-3
+                };
+                let off = hits.len() - hits.iter().zip(&expected.first_hits).filter(is_close).count();
+                assert!(
+                    off <= hits.len() / 100,
+                    "case {case}, {rasterizer:?}: {off} of {} hits with {scene:?}",
+                    hits.len()
+                );
+            }
+        }
+        println!("{compositing:?}: {off:.5?} of the pixels are off by {RASTERIZERS:?}");
+        assert!(off.iter().all(|&off| off <= OUTLIERS), "{compositing:?}: {off:?} of the pixels are off");
+        assert!(shown >= CASES / 3, "{compositing:?}: only {shown} cases show much");
+    }
+}
+
+/// Volumes a voxel thick, or of a single one, and views along their faces.
+#[test]
+fn thin_volumes() {
+    let gpu = gpu();
+    for (dims, direction) in [
+        ([1, 9, 9], DVec3::X),
+        ([1, 9, 9], DVec3::new(1.0, 0.4, 0.3)),
+        ([9, 9, 1], DVec3::NEG_Z),
+        ([9, 1, 9], DVec3::X),
+        ([2, 9, 9], DVec3::X),
+        ([1, 1, 1], DVec3::new(0.5, 0.7, -0.4)),
+        ([4, 4, 4], DVec3::Y),
+    ] {
+        for (compositing, method) in
+            BY_MEANS.into_iter().flat_map(|c| [Method::ImageAligned, Method::AxisAligned].map(|method| (c, method)))
+        {
+            let (volume, mut scene) = constant(dims, DVec3::ONE);
+            scene.transfer = transfer(&[(0.0, COLOR)], &[(0.0, 0.9)]);
+            scene.camera = camera(direction.to_array(), 3.0);
+            scene.camera.up = DVec3::new(0.0, 0.6, 0.8);
+            (scene.splatting.compositing, scene.splatting.method) = (compositing, method);
+            (scene.splatting.radius, scene.splatting.falloff) = (2.0, 2.0);
+            let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
+            for rasterizer in RASTERIZERS {
+                scene.splatting.rasterizer = rasterizer;
+                let image = render(&gpu, &volume, &scene).0;
+                let what = format!("{dims:?} {direction} {compositing:?} {method:?} {rasterizer:?}");
+                let share = share_off(&image.pixels, &expected.pixels, 2e-3);
+                assert!(share <= 5.0 * OUTLIERS, "{what}: {share} of the pixels");
+                let alpha = image.pixels[54 * 120 + 60][3];
+                // Edge on, a single layer of voxel centres is nowhere.
+                let may_be_nothing = compositing == Compositing::Surface || dims[1] == 1;
+                assert!(may_be_nothing || alpha > 0.1, "{what}: {alpha}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_does_not_go_together_is_refused() {
+    let gpu = gpu();
+    let volume = builtin::volume("head:24").unwrap();
+    let refusal = |scene: &Scene, first_hit: Option<f64>| {
+        let mut view = gpu.view(volume.clone(), scene).unwrap();
+        view.set_first_hit(first_hit);
+        match gpu.draw(&mut view) {
+            Err(RenderError::OutOfRange { key, found, allowed }) => {
+                assert_eq!(key, "splatting.compositing");
+                format!("{found}, allowed: {allowed}")
+            }
+            other => panic!("{:?}", other.map(|rendering| rendering.stats)),
+        }
+    };
+    let assert_words = |message: &str, words: &[&str]| {
+        words.iter().for_each(|word| assert!(message.contains(word), "no {word:?} in {message}"));
+    };
+    for compositing in BY_MEANS {
+        let mut scene = scene(20, 20);
+        (scene.splatting.compositing, scene.splatting.method) = (compositing, Method::CompositeEverySample);
+        let name = format!("\"{}\"", format!("{compositing:?}").to_lowercase());
+        assert_words(&refusal(&scene, None), &[&name, "composite-every-sample", "\"linear\""]);
+        assert!(reference::render(&volume, &scene.transfer.resolve(&volume), &scene).is_err());
+    }
+    let mut scene = scene(20, 20);
+    (scene.splatting.compositing, scene.splatting.order) = (Compositing::Surface, Order::BackToFront);
+    assert_words(&refusal(&scene, None), &["\"surface\"", "back-to-front", "\"front-to-back\""]);
+    assert!(reference::render(&volume, &scene.transfer.resolve(&volume), &scene).is_err());
+    scene.splatting.compositing = Compositing::Minimum;
+    assert_words(&refusal(&scene, Some(0.5)), &["\"minimum\" with first hits"]);
+}

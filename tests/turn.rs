@@ -1,0 +1,50 @@
+//! Fig. 14: a nerve cell of 1:1:5 turns past 45°, where axis-aligned sheets change their axis and its brightness jumps; image-aligned
+//! sheets turn with it. `cargo test --test turn -- --nocapture` prints what was measured; `cargo bench --bench paper` draws the curves.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+#[expect(dead_code, reason = "not every file needs all of it")]
+mod common;
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use sheetsplat::headless::Headless;
+use sheetsplat::scene::Scene;
+use sheetsplat::splatting::Method;
+use sheetsplat::volume::{Volume, builtin};
+
+use common::{gpu, scene, transfer};
+
+/// Pairs of angles half a degree apart, from head-on to side-on, and the two around 45°.
+const ANGLES: [f64; 8] = [0.0, 15.0, 30.0, 44.5, 45.0, 60.0, 75.0, 89.5];
+const STEP: f64 = 0.5;
+
+/// The largest change of the image's mean brightness over a step.
+fn largest_change(gpu: &Headless, volume: &Arc<Volume>, scene: &Scene) -> f64 {
+    let mut view = gpu.view(volume.clone(), scene).unwrap();
+    let mut brightness = |degrees: f64| {
+        let mut camera = scene.camera;
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        camera.direction = DVec3::new(sine, 0.0, cosine);
+        camera.up = DVec3::Y;
+        view.set_camera(camera);
+        let image = gpu.draw(&mut view).unwrap().image;
+        let sum: f64 = image.pixels.iter().flat_map(|pixel| pixel[..3].iter()).map(|&c| f64::from(c)).sum();
+        sum / (3 * image.pixels.len()) as f64
+    };
+    ANGLES.map(|angle| (brightness(angle + STEP) - brightness(angle)).abs()).into_iter().fold(0.0, f64::max)
+}
+
+#[test]
+fn image_aligned_sheets_do_not_pop() {
+    let gpu = gpu();
+    let volume = Arc::new(builtin::volume("nerve:256").unwrap());
+    let mut scene = scene(128, 128);
+    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(30.0, 0.0), (90.0, 0.2)]);
+    let [image_aligned, axis_aligned] = [Method::ImageAligned, Method::AxisAligned].map(|method| {
+        scene.splatting.method = method;
+        largest_change(&gpu, &volume, &scene)
+    });
+    println!("{image_aligned:.2e}, {axis_aligned:.2e}, {:.1}", axis_aligned / image_aligned);
+    assert!(axis_aligned >= 10.0 * image_aligned, "{image_aligned:.2e}, {axis_aligned:.2e}");
+}
