@@ -9,7 +9,8 @@ use super::super::VolumeError;
 use super::super::samples::SampleType;
 use super::super::source::{Source, invalid, io_error};
 use super::codecs::Codec;
-use super::elements::{Dataset, Elements, PixelData, Tag, tags};
+use super::dataset::{Dataset, Tag, tags};
+use super::elements::{Elements, PixelData};
 
 /// A class of files that are no images but list others.
 const DIRECTORY: &str = "1.2.840.10008.1.3.10";

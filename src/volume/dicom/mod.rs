@@ -7,6 +7,7 @@
 //! deep as sequences nest, and index past the end of damaged frames.
 
 mod codecs;
+mod dataset;
 mod elements;
 mod image;
 mod series;

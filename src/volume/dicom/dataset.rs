@@ -1,0 +1,123 @@
+//! The elements that count, by their tags.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::super::VolumeError;
+use super::super::source::{invalid, number, shown};
+
+/// A group and an element, as one number.
+pub(super) type Tag = u32;
+
+macro_rules! tags {
+    ($($constant:ident = $tag:literal $name:literal,)*) => {
+        /// Elements that are kept, and the sequences that hold them.
+        pub(super) mod tags {
+            $(pub(in super::super) const $constant: super::Tag = $tag;)*
+        }
+
+        /// An element's name in the standard, if it is kept.
+        pub(super) fn name(tag: Tag) -> Option<&'static str> {
+            match tag {
+                $($tag => Some($name),)*
+                _ => None,
+            }
+        }
+    };
+}
+
+tags! {
+    MEDIA_SOP_CLASS = 0x0002_0002 "MediaStorageSOPClassUID",
+    TRANSFER_SYNTAX = 0x0002_0010 "TransferSyntaxUID",
+    MODALITY = 0x0008_0060 "Modality",
+    SERIES_DESCRIPTION = 0x0008_103e "SeriesDescription",
+    SLICE_THICKNESS = 0x0018_0050 "SliceThickness",
+    SPACING_BETWEEN_SLICES = 0x0018_0088 "SpacingBetweenSlices",
+    SERIES = 0x0020_000e "SeriesInstanceUID",
+    POSITION = 0x0020_0032 "ImagePositionPatient",
+    ORIENTATION = 0x0020_0037 "ImageOrientationPatient",
+    PLANE_POSITION = 0x0020_9113 "PlanePositionSequence",
+    PLANE_ORIENTATION = 0x0020_9116 "PlaneOrientationSequence",
+    SAMPLES_PER_PIXEL = 0x0028_0002 "SamplesPerPixel",
+    PHOTOMETRIC = 0x0028_0004 "PhotometricInterpretation",
+    FRAMES = 0x0028_0008 "NumberOfFrames",
+    ROWS = 0x0028_0010 "Rows",
+    COLUMNS = 0x0028_0011 "Columns",
+    PIXEL_SPACING = 0x0028_0030 "PixelSpacing",
+    BITS_ALLOCATED = 0x0028_0100 "BitsAllocated",
+    BITS_STORED = 0x0028_0101 "BitsStored",
+    HIGH_BIT = 0x0028_0102 "HighBit",
+    PIXEL_REPRESENTATION = 0x0028_0103 "PixelRepresentation",
+    INTERCEPT = 0x0028_1052 "RescaleIntercept",
+    SLOPE = 0x0028_1053 "RescaleSlope",
+    PIXEL_MEASURES = 0x0028_9110 "PixelMeasuresSequence",
+    PIXEL_TRANSFORMATION = 0x0028_9145 "PixelValueTransformationSequence",
+    SHARED_GROUPS = 0x5200_9229 "SharedFunctionalGroupsSequence",
+    FRAME_GROUPS = 0x5200_9230 "PerFrameFunctionalGroupsSequence",
+    FLOAT_PIXEL_DATA = 0x7fe0_0008 "FloatPixelData",
+    DOUBLE_PIXEL_DATA = 0x7fe0_0009 "DoubleFloatPixelData",
+    PIXEL_DATA = 0x7fe0_0010 "PixelData",
+}
+
+/// Elements that count, of a file or of an item in it.
+pub(super) struct Dataset {
+    path: Arc<Path>,
+    big_endian: bool,
+    pub(super) values: BTreeMap<Tag, Vec<u8>>,
+    pub(super) items: BTreeMap<Tag, Vec<Dataset>>,
+}
+
+impl Dataset {
+    /// Of a file in one of the two byte orders, without elements.
+    pub(super) fn new(path: Arc<Path>, big_endian: bool) -> Self {
+        Self { path, big_endian, values: BTreeMap::new(), items: BTreeMap::new() }
+    }
+
+    /// A value as text, without what pads it.
+    pub(super) fn text(&self, tag: Tag) -> Option<String> {
+        let text = String::from_utf8_lossy(self.values.get(&tag)?).into_owned();
+        Some(text.trim_matches([' ', '\0']).to_owned()).filter(|text| !text.is_empty())
+    }
+
+    /// A number of 16 bits.
+    pub(super) fn unsigned(&self, tag: Tag) -> Result<Option<u16>, VolumeError> {
+        let Some(value) = self.values.get(&tag) else { return Ok(None) };
+        match *value.as_slice() {
+            [low, high] if !self.big_endian => Ok(Some(u16::from_le_bytes([low, high]))),
+            [high, low] => Ok(Some(u16::from_be_bytes([high, low]))),
+            _ => Err(self.invalid(tag, format!("{} bytes", value.len()), "one number of 2 bytes")),
+        }
+    }
+
+    /// Finite numbers, written as text.
+    pub(super) fn numbers<const N: usize>(&self, tag: Tag) -> Result<Option<[f64; N]>, VolumeError> {
+        let Some(text) = self.text(tag) else { return Ok(None) };
+        let numbers: Option<Vec<f64>> = text.split('\\').map(number).collect();
+        let numbers = numbers.and_then(|numbers| numbers.try_into().ok());
+        numbers.map(Some).ok_or_else(|| self.invalid(tag, shown(&text), format!("finite numbers, {N} of them")))
+    }
+
+    /// The items of a sequence, none if it is not there.
+    pub(super) fn items(&self, tag: Tag) -> &[Self] {
+        self.items.get(&tag).map_or(&[], Vec::as_slice)
+    }
+
+    pub(super) fn invalid(
+        &self,
+        tag: Tag,
+        found: impl std::fmt::Display,
+        allowed: impl std::fmt::Display,
+    ) -> VolumeError {
+        invalid(&self.path, &shown_tag(tag), found, allowed)
+    }
+
+    pub(super) fn missing(&self, tag: Tag, allowed: &str) -> VolumeError {
+        self.invalid(tag, "no such element", allowed)
+    }
+}
+
+/// What errors call an element.
+pub(super) fn shown_tag(tag: Tag) -> String {
+    name(tag).map_or_else(|| format!("element ({:04x},{:04x})", tag >> 16, tag & 0xffff), str::to_owned)
+}
