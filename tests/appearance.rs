@@ -329,6 +329,27 @@ fn an_xray_along_an_axis_reaches_white_and_no_more() {
     }
 }
 
+/// A bright ball behind a dim wall: the brightest value along the ray shows, whatever is in front of it.
+#[test]
+fn a_mip_shows_the_brightest_value() {
+    let gpu = gpu();
+    let dims = UVec3::new(20, 24, 20);
+    let value = |index: u32| {
+        let p = UVec3::new(index % 20, index / 20 % 24, index / 480).as_dvec3();
+        match p {
+            p if p.distance(DVec3::new(9.5, 17.0, 9.5)) < 4.5 => 200.0,
+            p if (3.0..7.0).contains(&p.y) => 80.0,
+            _ => 0.0,
+        }
+    };
+    let volume = Volume::new("ball", dims, DVec3::ONE, (0..dims.element_product()).map(value).collect()).unwrap();
+    let mut scene = builtin_scene("cube:8", &["preset=mip", "image.width=40", "image.height=40"]);
+    scene.camera = camera([0.0, 1.0, 0.0], 20.0);
+    let image = gpu.render_volume(volume, &scene).unwrap().image;
+    let [ball, wall] = [20 * 40 + 20, 6 * 40 + 6].map(|at: usize| f64::from(image.pixels[at][0]));
+    assert!(ball > 0.9 && (0.3..0.5).contains(&wall), "{ball} {wall}");
+}
+
 #[test]
 fn every_preset_shows_something_of_every_builtin() {
     let gpu = gpu();

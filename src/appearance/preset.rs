@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::hounsfield::Hounsfield;
 use super::object::Object;
+use super::quantile::quantiles;
 use super::{categories, constant, xray};
 use crate::shading::Shading;
 use crate::splatting::Compositing;
@@ -23,6 +24,8 @@ pub enum Preset {
     MrHead,
     /// A summed projection, of any data.
     Xray,
+    /// A maximum intensity projection, of any data.
+    Mip,
     /// Fluorescence: what glows above the background, unshaded.
     Confocal,
     /// Labels: a colour for each; see [`categories`].
@@ -34,12 +37,13 @@ type Points<T> = [(f64, T)];
 
 impl Preset {
     /// All of them, with the names that scene files use.
-    pub const ALL: [(&'static str, Self); 7] = [
+    pub const ALL: [(&'static str, Self); 8] = [
         ("ct-skin", Self::CtSkin),
         ("ct-bone", Self::CtBone),
         ("ct-vessels", Self::CtVessels),
         ("mr-head", Self::MrHead),
         ("xray", Self::Xray),
+        ("mip", Self::Mip),
         ("confocal", Self::Confocal),
         ("labels", Self::Labels),
     ];
@@ -52,7 +56,7 @@ impl Preset {
             // Where a cut opens a head, gradients are mostly noise.
             Self::MrHead => Shading { ambient: 0.4, diffuse: 0.6, specular: 0.1, ..shading },
             Self::CtBone | Self::CtVessels => Shading { specular: 0.35, shininess: 40.0, ..shading },
-            Self::Xray | Self::Confocal => Shading { enabled: false, ..shading },
+            Self::Xray | Self::Mip | Self::Confocal => Shading { enabled: false, ..shading },
             // Inside of a label there is no gradient, and all light is ambient.
             Self::Labels => Shading { ambient: 0.4, diffuse: 0.6, specular: 0.1, ..shading },
         }
@@ -62,6 +66,7 @@ impl Preset {
     pub fn compositing(self) -> Compositing {
         match self {
             Self::Xray => Compositing::Xray,
+            Self::Mip => Compositing::Maximum,
             _ => Compositing::Exponential,
         }
     }
@@ -95,6 +100,7 @@ impl Preset {
             ),
             Self::MrHead => Object::find(values).map_or_else(|| constant(0.5), |object| mr_head(&object)),
             Self::Xray => xray::transfer(volume),
+            Self::Mip => Object::find(values).map_or_else(|| constant(0.5), |object| mip(values, &object)),
             Self::Confocal => Object::find(values).map_or_else(|| constant(0.5), |object| confocal(&object)),
             Self::Labels => labels(volume).unwrap_or_else(|| TransferFunction::from_histogram(volume)),
         }
@@ -123,6 +129,16 @@ fn mr_head(object: &Object) -> TransferFunction {
         (bright.max(2.0 * faint - threshold), DVec3::new(1.0, 0.97, 0.92)),
     ];
     TransferFunction::by_value(Ramp::through(color), object.surface(0.9))
+}
+
+/// White, brighter from the background to what few voxels exceed.
+fn mip(values: &[f32], object: &Object) -> TransferFunction {
+    const TAIL: f64 = 0.0005;
+    let background = object.background;
+    let top = quantiles(values, |value| f64::from(value) > background, [1.0 - TAIL]);
+    let top = top.map_or(object.bright, |[top]| f64::from(top));
+    let color = Ramp::through(vec![(background, DVec3::ONE)]);
+    TransferFunction::by_value(color, Ramp::through(vec![(background, 0.0), (top, 1.0)]))
 }
 
 fn confocal(object: &Object) -> TransferFunction {

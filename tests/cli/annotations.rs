@@ -131,6 +131,17 @@ fn a_colour_bar_has_the_transfer_functions_colours() {
 }
 
 #[test]
+fn a_projections_colour_bar_is_as_bright_as_the_projection() {
+    let folder = Folder::new();
+    let image =
+        folder.annotated("builtin:marschner-lobb:12 --preset mip --set image={width=200,height=160} --annotate colors");
+    // Grey, and darker from above to below, in the column that is grey all the way.
+    let greys = |x: u32| -> Vec<u8> { (41..119).map(|y| image.get_pixel(x, y).0[0]).collect() };
+    let falls = |greys: &Vec<u8>| greys.windows(2).all(|pair| pair[0] >= pair[1]) && greys[0] > 235 && greys[77] < 60;
+    assert!((100..192).map(greys).any(|greys| falls(&greys)));
+}
+
+#[test]
 fn a_legend_names_every_label_in_its_colour() {
     let folder = Folder::new();
     // Slabs of 1, 2, 3, 300 and nothing.
@@ -227,7 +238,7 @@ fn what_cannot_be_annotated_is_refused_by_name() {
         ),
         (
             "render builtin:cube:8 -o a.png --annotate colors --preset xray",
-            &["--annotate", "colors", "xray", "exponential"],
+            &["--annotate", "colors", "xray", "any other"],
         ),
         ("render labels.nrrd -o a.png --annotate colors", &["--annotate", "colors", "labels", "legend"]),
         (

@@ -1,5 +1,6 @@
 //! Which value has which colour.
 
+use glam::DVec3;
 use sheetsplat::appearance::{categories, shown_range};
 use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
@@ -20,14 +21,20 @@ const HEIGHTS: [u32; 2] = [64, 320];
 const TICK: u32 = 4;
 const GAP: u32 = 4;
 
-/// The colours of the values that show, before light falls on them.
+/// The colours of the values that show, before light falls on them; in projections as bright as their opacities make them.
 pub(super) fn plate(scene: &Scene, volume: &Volume, transfer: &TransferFunction) -> Result<Image, Failure> {
     let refused = |found: &str, allowed: &str| {
         Err(Failure::Input(format!("--annotate: colors: found {found}, allowed: {allowed}")))
     };
-    if scene.splatting.compositing == Compositing::Xray {
-        return refused("splatting.compositing = \"xray\", which adds colours up", "\"linear\" or \"exponential\"");
-    }
+    // Where one value is what a pixel shows, its opacity is brightness.
+    let is_projection = match scene.splatting.compositing {
+        Compositing::Maximum | Compositing::Minimum => true,
+        Compositing::Linear | Compositing::Exponential | Compositing::Surface => false,
+        Compositing::Xray | Compositing::Average => {
+            let found = "splatting.compositing = \"xray\" or \"average\", which add colours up";
+            return refused(found, "any other compositing");
+        }
+    };
     if volume.labels().is_none() && categories::is_label_map(volume) {
         return refused("a volume of labels", "values that are amounts, or legend");
     }
@@ -45,8 +52,11 @@ pub(super) fn plate(scene: &Scene, volume: &Volume, transfer: &TransferFunction)
     // The middle of a row of pixels, from the upper end.
     let value = |row: u32| hi - (hi - lo) * (f64::from(row) + 0.5) / f64::from(height);
     for row in 0..height {
-        let [r, g, b] = transfer.color.at(value(row)).as_vec3().to_array();
-        lay(&mut plate, [PADDING, top + row], &filled([WIDTH, 1], [r, g, b, 1.0]));
+        let share = if is_projection { transfer.opacity.at(value(row)) } else { 1.0 };
+        let [r, g, b, a] = scene.image.background;
+        let behind = DVec3::new(r, g, b) * a;
+        let color = behind.lerp(transfer.color.at(value(row)), share).as_vec3().extend(1.0);
+        lay(&mut plate, [PADDING, top + row], &filled([WIDTH, 1], color.to_array()));
     }
     for (value, label) in &ticks {
         let share = if lo < hi { (hi - value) / (hi - lo) } else { 0.5 };
