@@ -106,8 +106,13 @@ pub fn present(brick: &Brick) -> u64 {
 
 /// The voxels of a brick: place in the brick, and where in the volume.
 pub fn voxels(brick: &Brick) -> impl Iterator<Item = (u32, UVec3)> {
-    let (bits, origin) = (present(brick), UVec3::new(brick.x, brick.y, brick.z) / SIDE * SIDE);
+    let (bits, origin) = (present(brick), origin(brick));
     (0..BRICK_VOXELS).filter(move |slot| bits >> slot & 1 == 1).map(move |slot| (slot, origin + in_brick(slot)))
+}
+
+/// Where in the volume a brick's first place is.
+pub fn origin(brick: &Brick) -> UVec3 {
+    UVec3::new(brick.x, brick.y, brick.z) / SIDE * SIDE
 }
 
 /// The box of a brick's voxels: its middle and half its extent, voxels.
@@ -121,7 +126,8 @@ pub fn position(brick: &Brick) -> [u32; 3] {
     [brick.z / SIDE, brick.y / SIDE, brick.x / SIDE]
 }
 
-fn in_brick(slot: u32) -> UVec3 {
+/// Where in a brick a place is.
+pub fn in_brick(slot: u32) -> UVec3 {
     UVec3::new(slot % SIDE, slot / SIDE % SIDE, slot / (SIDE * SIDE))
 }
 

@@ -2,11 +2,13 @@
 
 use std::ops::Range;
 
+use glam::DVec4;
 use rayon::prelude::*;
 
 use crate::brick;
 use crate::bucket::Buckets;
 use crate::gpu::layout::Brick;
+use crate::slab;
 use crate::splatting::Order;
 use crate::view::View;
 
@@ -110,8 +112,12 @@ pub struct Overlaps {
 impl Overlaps {
     /// Those of some bricks.
     pub fn count(bricks: &[Brick], view: &View) -> Self {
+        let bricks = bricks.par_iter();
+        if view.perspective.is_none() {
+            let depths = PlaceDepths::new(view);
+            return bricks.map(|brick| depths.overlaps(brick)).reduce(Self::default, Self::and);
+        }
         bricks
-            .par_iter()
             .flat_map_iter(brick::voxels)
             .map(|(_, voxel)| view.touched(voxel))
             .filter(|slabs| !slabs.is_empty())
@@ -131,4 +137,46 @@ impl Overlaps {
             },
         }
     }
+}
+
+/// Sheet depths without perspective, in slabs: those of a brick's places are the brick's and the place's. Frames are counted as often
+/// as they are drawn, hence sums instead of [`View::touched`] for every voxel.
+struct PlaceDepths {
+    /// Of a voxel and 1.
+    depth: DVec4,
+    /// Of places, from the brick's first.
+    places: [f64; brick::BRICK_VOXELS as usize],
+    /// Of a kernel.
+    reach: f64,
+}
+
+impl PlaceDepths {
+    fn new(view: &View) -> Self {
+        let mut depth = view.screen_from_voxel[2];
+        depth.w -= view.slabs.origin;
+        depth /= view.slabs.width;
+        let places = std::array::from_fn(|place| depth.truncate().dot(brick::in_brick(place as u32).as_dvec3()));
+        Self { depth, places, reach: view.reach / view.slabs.width - slab::ROUNDING }
+    }
+
+    fn overlaps(&self, brick: &Brick) -> Overlaps {
+        let first = self.depth.dot(brick::origin(brick).as_dvec3().extend(1.0));
+        let (mut sections, mut nearest, mut farthest) = (0, i32::MAX, i32::MIN);
+        let mut left = brick::present(brick);
+        let voxels = left.count_ones().into();
+        while left != 0 {
+            let depth = first + self.places[left.trailing_zeros() as usize];
+            left &= left - 1;
+            let (first, end) = (floor(depth - self.reach), -floor(-depth - self.reach));
+            sections += (end - first) as u64;
+            (nearest, farthest) = (nearest.min(first), farthest.max(end));
+        }
+        Overlaps { voxels, sections, slabs: nearest..farthest }
+    }
+}
+
+/// The largest integer that is not above a slab's number: the numbers' range lets it do without the system's `floor`.
+fn floor(slab: f64) -> i32 {
+    const ABOVE_0: i32 = 2 * slab::MAX_SLABS as i32;
+    (slab + f64::from(ABOVE_0)) as i32 - ABOVE_0
 }

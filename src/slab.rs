@@ -7,6 +7,9 @@ use crate::error::RenderError;
 /// The most slabs that a volume may be cut into. 0.05 `unit`s wide, 1800³ voxels need fewer.
 pub const MAX_SLABS: u32 = 1 << 16;
 
+/// Slabs by which a kernel must at least overlap one: rounding errors do not count.
+pub const ROUNDING: f64 = 1e-9;
+
 /// Parallel planes `width` apart in terms of a view's sheet depth. Slab k lies between the planes k and k + 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlabGrid {
@@ -30,7 +33,6 @@ impl SlabGrid {
     /// The slabs that the depths between two overlap with positive length: with more than rounding errors, so that a kernel that
     /// ends at a plane does not reach the slab behind it.
     pub fn touched(&self, first: f64, end: f64) -> Range<i32> {
-        const ROUNDING: f64 = 1e-9;
         let first = ((first - self.origin) / self.width + ROUNDING).floor();
         let end = ((end - self.origin) / self.width - ROUNDING).ceil();
         first as i32..end as i32
