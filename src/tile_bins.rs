@@ -12,40 +12,35 @@ use crate::gpu::layout::Brick;
 use crate::splatting::Order;
 use crate::view::View;
 
-/// Side of the rasteriser's tiles, pixels.
-pub const SIDE: u32 = 16;
+/// Width and height of the rasteriser's tiles, pixels.
+pub const TILE: [u32; 2] = [16, 8];
 
-/// Width and height of the units that a tile consists of, two across and four down, pixels.
-const UNIT: [u32; 2] = [8, 4];
-
-/// Units of a tile.
-pub const UNITS: u32 = SIDE * SIDE / (UNIT[0] * UNIT[1]);
+/// Units of a tile: rounds in which the smallest subgroup draws it.
+pub const UNITS: u32 = 4;
 
 /// Sheets of a group.
 pub const SHEETS: u32 = 4;
 
-/// The most bricks: their numbers share a word with the units.
-const MAX_BRICKS: usize = 1 << 24;
+/// The most bricks: their numbers share a word with a place in the brick.
+const MAX_BRICKS: usize = 1 << 26;
 
 /// Passes through all its loops that a thread may take in one dispatch: llvmpipe ends loops after 65535. The pass that finds a loop
 /// at its end counts, and in that pass one through every loop inside. Threads count them, and go on in the next dispatch. What is left is
-/// for what comes before and after, planes that clip a thread's four pixels first of all.
-const MAX_PASSES: u32 = 65000;
+/// for what comes before and after: to look at every pixel's ray first of all.
+const MAX_PASSES: u32 = 64900;
 
-/// Queues that a brick's voxels fill at most: one voxel for each of the 8 threads.
-const QUEUES_PER_BRICK: u32 = 8;
+/// Passes of a group at most besides, with 8 threads in a subgroup: for itself, for the four units, and where parts of the queue end.
+const PASSES_PER_GROUP: u32 = 220;
 
-/// Passes of a brick at most: 12 to fetch and visit it and to test its places, and 4 to share a queue with another brick.
-const PASSES_PER_VISIT: u32 = 16;
+/// Passes of a brick at most, with 8 threads in a subgroup: 8 to fetch and visit it, 76 to find its voxels, 56 to shade them, 8 to keep
+/// them, 224 to add them to four units, and 10 where the queue is full.
+const PASSES_PER_BRICK: u32 = 382;
 
-/// Passes to fetch as many entries as there are threads.
-const PASSES_PER_FETCH: u32 = 3;
+/// Times that a brick's voxels are shaded side by side.
+const SHADED_PER_BRICK: u32 = 8;
 
-/// Passes of a queue at most: that one, 8 to fill it, 6 that do not search for control points, and 5 for its voxels, two by two.
-const PASSES_PER_QUEUE: u32 = 20;
-
-/// Passes of a group at most besides: that one, 12 that find no more voxels, and 2 to composite; without bricks 14.
-const PASSES_PER_GROUP: u32 = 16;
+/// Passes to look at how a unit's rays are cut, or along which way means are taken, where that is asked for.
+const PASSES_PER_LOOK: u32 = 140;
 
 /// Passes that a thread may take, and takes at most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,30 +49,17 @@ pub struct Passes {
     pub most: u32,
     /// For a group, bricks not counted.
     pub per_group: u32,
-    /// To fetch entries, one for each thread.
-    pub per_fetch: u32,
-    /// To visit a brick.
-    pub per_visit: u32,
-    /// For a queue of voxels.
-    pub per_queue: u32,
+    /// For a brick.
+    pub per_brick: u32,
+    /// To look up a voxel's control points in memory.
+    pub search: u32,
 }
 
 impl Passes {
     /// Those of a view whose voxels take at most `search` passes to look up their control points in memory.
-    fn new(search: u32) -> Self {
-        let per_queue = PASSES_PER_QUEUE + search;
-        Self {
-            most: MAX_PASSES,
-            per_group: PASSES_PER_GROUP,
-            per_fetch: PASSES_PER_FETCH,
-            per_visit: PASSES_PER_VISIT,
-            per_queue,
-        }
-    }
-
-    /// For a brick, visited and in queues.
-    pub fn per_brick(&self) -> u32 {
-        self.per_visit + QUEUES_PER_BRICK * self.per_queue
+    pub fn new(search: u32) -> Self {
+        let per_group = PASSES_PER_GROUP + UNITS * PASSES_PER_LOOK;
+        Self { most: MAX_PASSES, per_group, per_brick: PASSES_PER_BRICK + SHADED_PER_BRICK * search, search }
     }
 }
 
@@ -92,7 +74,7 @@ pub struct TileBins {
     pub groups: u32,
     /// Where every tile's groups start in `entries`, in the order they are composited in, tile after tile; at last the end.
     pub starts: Vec<u32>,
-    /// Number of a brick, and in the last byte the units of the tile that it may touch, row by row.
+    /// Numbers of bricks.
     pub entries: Vec<u32>,
     /// For every group, nearest first, half the screen box around its footprints, pixels.
     pub half_boxes: Vec<DVec2>,
@@ -139,8 +121,7 @@ struct Pixels {
 
 impl TileBins {
     /// Sorts bricks by the tiles and groups they may touch, with kernels of the radius `support`. The sheet depths `covered` are in some
-    /// group even where they hold nothing. A thread passes through loops at most
-    /// `search_passes` times to look up a voxel's control points in memory. Neither list may have more than `most_words` words.
+    /// group even where they hold nothing. A thread takes so many passes. Neither list may have more than `most_words` words.
     ///
     /// # Errors
     /// If there are more bricks, or more of them behind a tile, than the rasteriser can take.
@@ -150,7 +131,7 @@ impl TileBins {
         order: Order,
         covered: Range<f64>,
         support: f64,
-        search_passes: u32,
+        passes: Passes,
         most_words: u64,
     ) -> Result<Self, Unfit> {
         let check = |what, required: u64, actual: u64| {
@@ -164,7 +145,7 @@ impl TileBins {
         let first_group = all().map(|groups| groups.start).min().unwrap_or(0);
         let end_group = all().map(|groups| groups.end).max().unwrap_or(0);
         let groups = (end_group - first_group) as u32;
-        let [columns, rows] = view.size.map(|pixels| pixels.div_ceil(SIDE));
+        let [columns, rows] = grid(view.size);
         let bins = u64::from(columns) * u64::from(rows) * u64::from(groups);
         check("tiles times sheet groups", bins, most_words - 1)?;
 
@@ -172,45 +153,22 @@ impl TileBins {
             .map(|group| view.half_box(support, planes.plane(group)..planes.plane(group + 1)))
             .collect();
 
-        // A counting sort: bins' sizes, where they start, and their entries.
-        let bins_of = |brick: &Placed, visit: &mut dyn FnMut(usize, u32)| {
-            for group in brick.groups.clone() {
-                let at = match order {
-                    Order::FrontToBack => group - first_group,
-                    Order::BackToFront => end_group - 1 - group,
-                };
-                let half_box = half_boxes[(group - first_group) as usize];
-                let Some(pixels) = brick.pixels(half_box, view.size) else { continue };
-                for y in pixels.first[1] / SIDE..=pixels.last[1] / SIDE {
-                    for x in pixels.first[0] / SIDE..=pixels.last[0] / SIDE {
-                        let units = units_touched(&pixels, [x * SIDE, y * SIDE]);
-                        visit(((y * columns + x) * groups) as usize + at as usize, units);
-                    }
-                }
-            }
-        };
-        let mut starts = vec![0_u32; bins as usize + 1];
-        let mut total = 0_u64;
-        for brick in &placed {
-            bins_of(brick, &mut |bin, _| {
-                starts[bin + 1] += 1;
-                total += 1;
-            });
-        }
+        let sort = Sort { placed: &placed, half_boxes: &half_boxes, order, first_group, size: view.size };
+        let strip_rows = rows.div_ceil(STRIPS_PER_THREAD * rayon::current_num_threads() as u32).max(1);
+        let strips = (0..rows).into_par_iter().step_by(strip_rows as usize);
+        let strips: Vec<_> = strips.map(|first| sort.counted(first..(first + strip_rows).min(rows))).collect();
+        let total = strips.iter().map(|strip| strip.entries).sum();
         check("bricks' parts in tiles and sheet groups", total, most_words)?;
-        for bin in 1..starts.len() {
-            starts[bin] += starts[bin - 1];
+        let mut starts = Vec::with_capacity(bins as usize + 1);
+        let mut next = 0;
+        for count in strips.iter().flat_map(|strip| &strip.counts) {
+            starts.push(next);
+            next += count;
         }
-        let mut next = starts.clone();
-        let mut entries = vec![0; total as usize];
-        for brick in &placed {
-            bins_of(brick, &mut |bin, units| {
-                entries[next[bin] as usize] = brick.number | units << 24;
-                next[bin] += 1;
-            });
-        }
-        let passes = Passes::new(search_passes);
-        let dispatches = dispatches(&starts, &entries, groups as usize, &passes)?;
+        starts.push(next);
+        let entries: Vec<_> = strips.par_iter().map(|strip| sort.sorted(strip)).collect();
+        let entries = entries.concat();
+        let dispatches = dispatches(&starts, groups as usize, &passes)?;
         Ok(Self {
             first_slab: first_group * SHEETS as i32,
             tiles: columns * rows,
@@ -224,11 +182,90 @@ impl TileBins {
     }
 }
 
+/// Strips of tiles that a thread sorts the bricks of, one after the other.
+const STRIPS_PER_THREAD: u32 = 2;
+
+/// A counting sort of bricks, in strips of rows of tiles: these have bins that are next to each other.
+struct Sort<'a> {
+    placed: &'a [Placed],
+    half_boxes: &'a [DVec2],
+    order: Order,
+    first_group: i32,
+    size: [u32; 2],
+}
+
+/// Some rows of tiles, and how many bricks their bins hold.
+struct Strip {
+    rows: Range<u32>,
+    counts: Vec<u32>,
+    entries: u64,
+}
+
+impl Sort<'_> {
+    /// Calls `visit` with every brick's number and each of its bins, of those of some rows of tiles.
+    fn visit(&self, rows: &Range<u32>, mut visit: impl FnMut(u32, usize)) {
+        let ([columns, _], groups) = (grid(self.size), self.half_boxes.len());
+        let farthest = self.half_boxes.iter().fold(0.0_f64, |farthest, half_box| farthest.max(half_box.y)) + SLACK;
+        let (top, bottom) = (f64::from(rows.start * TILE[1]) - farthest, f64::from(rows.end * TILE[1]) + farthest);
+        for brick in self.placed.iter().filter(|brick| brick.high.y >= top && brick.low.y <= bottom) {
+            let mut touched: Option<(DVec2, Option<Pixels>)> = None;
+            for group in brick.groups.clone() {
+                let nth = (group - self.first_group) as usize;
+                let at = match self.order {
+                    Order::FrontToBack => nth,
+                    Order::BackToFront => groups - 1 - nth,
+                };
+                let half_box = self.half_boxes[nth];
+                // Without perspective groups have one size of box.
+                let (_, pixels) = match &touched {
+                    Some(touched) if touched.0 == half_box => touched,
+                    _ => touched.insert((half_box, brick.pixels(half_box, self.size))),
+                };
+                let Some(Pixels { first, last }) = pixels else { continue };
+                for y in (first[1] / TILE[1]).max(rows.start)..(last[1] / TILE[1] + 1).min(rows.end) {
+                    for x in first[0] / TILE[0]..=last[0] / TILE[0] {
+                        visit(brick.number, ((y - rows.start) * columns + x) as usize * groups + at);
+                    }
+                }
+            }
+        }
+    }
+
+    fn counted(&self, rows: Range<u32>) -> Strip {
+        let [columns, _] = grid(self.size);
+        let mut counts = vec![0; rows.len() * columns as usize * self.half_boxes.len()];
+        let mut entries = 0;
+        self.visit(&rows, |_, bin| {
+            counts[bin] += 1;
+            entries += 1;
+        });
+        Strip { rows, counts, entries }
+    }
+
+    /// The entries of a strip's bins, one bin after the other.
+    fn sorted(&self, strip: &Strip) -> Vec<u32> {
+        let mut end = 0;
+        let starts = strip.counts.iter().map(|count| {
+            end += count;
+            end - count
+        });
+        let mut next: Vec<u32> = starts.collect();
+        let mut entries = vec![0; strip.entries as usize];
+        self.visit(&strip.rows, |number, bin| {
+            entries[next[bin] as usize] = number;
+            next[bin] += 1;
+        });
+        entries
+    }
+}
+
+/// Pixels around footprints' boxes, for rounding errors: more than the shader rounds with.
+const SLACK: f64 = 0.02;
+
 impl Placed {
     /// Pixels that footprints may touch which reach so far around voxels.
     fn pixels(&self, half_box: DVec2, size: [u32; 2]) -> Option<Pixels> {
-        // More slack than the shader rounds with.
-        let reach = half_box + 0.02;
+        let reach = half_box + SLACK;
         let first = (self.low - reach - 0.5).ceil().max(DVec2::ZERO);
         let last = (self.high + reach - 0.5).floor().min(DVec2::from(size.map(f64::from)) - 1.0);
         let pixels = Pixels { first: first.as_uvec2().to_array(), last: last.as_uvec2().to_array() };
@@ -260,43 +297,30 @@ fn place(bricks: &[Brick], view: &View) -> Vec<Placed> {
     placed
 }
 
-/// Which units of the tile at `corner` some pixels touch, one bit each.
-fn units_touched(pixels: &Pixels, corner: [u32; 2]) -> u32 {
-    let touches = |axis: usize, unit: u32| {
-        let low = corner[axis] + unit * UNIT[axis];
-        pixels.first[axis] < low + UNIT[axis] && pixels.last[axis] >= low
-    };
-    let bit = |unit: u32| u32::from(touches(0, unit % 2) && touches(1, unit / 2)) << unit;
-    (0..UNITS).map(bit).sum()
+/// Columns and rows of tiles of an image.
+pub fn grid(size: [u32; 2]) -> [u32; 2] {
+    [size[0].div_ceil(TILE[0]), size[1].div_ceil(TILE[1])]
 }
 
-/// Dispatches that are enough for every subgroup of every tile: in each it takes groups until one might be too much.
-fn dispatches(starts: &[u32], entries: &[u32], groups: usize, passes: &Passes) -> Result<u32, Unfit> {
-    let most_bricks = passes.most.saturating_sub(passes.per_group) / passes.per_brick();
-    // Of one unit's 8 threads, or of 32 threads and all units: those need the fewest queues.
-    let of_subgroup = |starts: &[u32], units: u32, per_brick: u32| {
+/// Dispatches that are enough for every tile: in each it takes rounds until one might be too much.
+fn dispatches(starts: &[u32], groups: usize, passes: &Passes) -> Result<u32, Unfit> {
+    let most_bricks = passes.most.saturating_sub(passes.per_group) / passes.per_brick;
+    let of_tile = |first: usize| {
         let (mut dispatches, mut taken) = (1, 0);
-        for group in starts.windows(2) {
-            let bricks = &entries[group[0] as usize..group[1] as usize];
-            if taken + passes.per_group + bricks.len() as u32 * passes.per_brick() > passes.most {
+        for group in starts[first..=first + groups].windows(2) {
+            let bricks = group[1] - group[0];
+            if bricks > most_bricks {
+                let (what, required) = ("bricks behind a tile in one sheet group", bricks.into());
+                return Err(Unfit { what, required, actual: most_bricks.into() });
+            }
+            let of_group = passes.per_group + bricks * passes.per_brick;
+            if taken + of_group > passes.most {
                 dispatches += 1;
                 taken = 0;
             }
-            let visited = bricks.iter().filter(|&&entry| entry >> 24 & units != 0).count() as u32;
-            taken += passes.per_group + visited * per_brick + (bricks.len() as u32).div_ceil(8) * passes.per_fetch;
+            taken += of_group;
         }
-        dispatches
-    };
-    let of_tile = |first: usize| {
-        let starts = &starts[first..=first + groups];
-        let bricks = starts.windows(2).map(|group| group[1] - group[0]).max().unwrap_or(0);
-        if bricks > most_bricks {
-            let (what, required) = ("bricks behind a tile in one sheet group", bricks.into());
-            return Err(Unfit { what, required, actual: most_bricks.into() });
-        }
-        let of_unit = |unit: u32| of_subgroup(starts, 1 << unit, passes.per_brick());
-        let of_all = of_subgroup(starts, !0, passes.per_visit + QUEUES_PER_BRICK / 4 * passes.per_queue);
-        Ok((0..UNITS).map(of_unit).fold(of_all, u32::max))
+        Ok(dispatches)
     };
     let tiles = (0..starts.len() - 1).into_par_iter().step_by(groups.max(1));
     tiles.map(of_tile).try_reduce(|| 0, |a, b| Ok(a.max(b)))

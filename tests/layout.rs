@@ -142,13 +142,9 @@ fn shared() -> [Layout; 15] {
             reached,
             most_passes,
             passes_per_group,
-            passes_per_fetch,
-            passes_per_visit,
-            passes_per_queue,
             passes_per_brick,
-            hits,
-            padding_0,
-            padding_1
+            search_passes,
+            hits
         }),
         layout!(Part { first_row, first_tile, end_tile }),
         layout!(Gathered { tally, words }).goes_on(),

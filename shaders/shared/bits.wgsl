@@ -1,17 +1,52 @@
-// Bits of masks.
+// Bits of masks, and what a subgroup's lanes hold together.
+
+// The lanes in which something holds, one bit each.
+fn ballot(holds: bool) -> u32 {
+    return together(vec2u(select(0u, 1u << lane, holds), 0u)).x;
+}
+
+// The bits that any lane has. In fewer steps than a software driver needs, which asks one lane after the other.
+fn together(bits: vec2u) -> vec2u {
+    var result = bits;
+    result |= subgroupShuffleXor(result, 1u);
+    result |= subgroupShuffleXor(result, 2u);
+    result |= subgroupShuffleXor(result, 4u);
+    if THREADS > 8u {
+        return subgroupOr(result);
+    }
+    return result;
+}
+
+// The first bits of a mask, moved to the bits from a multiple of the lanes on.
+fn bits_from(first: u32, bits: u32) -> vec2u {
+    let moved = bits << (first % 32u);
+    return select(vec2u(0u, moved), vec2u(moved, 0u), first < 32u);
+}
 
 // Where the n-th set bit is.
 fn nth_set_bit(bits: vec2u, n: u32) -> u32 {
     let low = countOneBits(bits.x);
-    var found = vec3u(bits.x, n, 0u);
-    if n >= low {
-        found = vec3u(bits.y, n - low, 32u);
-    }
-    return half(half(half(half(half(found, 16u), 8u), 4u), 2u), 1u).z;
+    let in_upper = nth_in_word(bits.y, n - low);
+    return select(32u + in_upper, nth_in_word(bits.x, n), n < low);
 }
 
-// One step of a binary search in (word, bits to skip, position): goes on in the upper bits if the lower ones have too few.
-fn half(found: vec3u, width: u32) -> vec3u {
-    let count = countOneBits(found.x & ((1u << width) - 1u));
-    return select(found, vec3u(found.x >> width, found.y - count, found.z + width), found.y >= count);
+// The same in one word: by sums of the bits of each two, four and eight side by side.
+fn nth_in_word(word: u32, n: u32) -> u32 {
+    let twos = word - (word >> 1u & 0x55555555u);
+    let fours = (twos & 0x33333333u) + (twos >> 2u & 0x33333333u);
+    // In every byte how many are set up to its end.
+    let ends = ((fours + (fours >> 4u)) & 0x0f0f0f0fu) * 0x01010101u;
+    // The top bits of the bytes that end before the n-th.
+    let passed = ((n * 0x01010101u | 0x80808080u) - ends) & 0x80808080u;
+    var at = ((passed >> 7u) * 0x01010101u >> 24u) * 8u;
+    var left = n - (ends << 8u >> at & 255u);
+    var count = fours >> at & 15u;
+    var is_passed = left >= count;
+    at += select(0u, 4u, is_passed);
+    left -= select(0u, count, is_passed);
+    count = twos >> at & 3u;
+    is_passed = left >= count;
+    at += select(0u, 2u, is_passed);
+    left -= select(0u, count, is_passed);
+    return at + select(0u, 1u, left >= (word >> at & 1u));
 }

@@ -19,13 +19,9 @@ struct Gather {
     reached: u32,
     most_passes: u32,
     passes_per_group: u32,
-    passes_per_fetch: u32,
-    passes_per_visit: u32,
-    passes_per_queue: u32,
     passes_per_brick: u32,
+    search_passes: u32,
     hits: u32,
-    padding_0: u32,
-    padding_1: u32,
 }
 
 struct Part {

@@ -23,51 +23,58 @@ fn along(t: f32) -> f32 {
 }
 
 fn polynomial(c: array<vec4f, 4>, z: f32) -> f32 {
-    let powers = vec4f(1.0, z, z * z, z * z * z);
-    let fourth = z * z * z * z;
-    return dot(powers, c[0]) + fourth * (dot(powers, c[1]) + fourth * (dot(powers, c[2]) + fourth * dot(powers, c[3])));
+    let squared = z * z;
+    let fourth = squared * squared;
+    let low = cubic(c[0], z, squared) + fourth * cubic(c[1], z, squared);
+    let high = cubic(c[2], z, squared) + fourth * cubic(c[3], z, squared);
+    return low + fourth * fourth * high;
 }
 
-// The sections of a kernel in the group's four sheets at a column's four pixels: two entries of eq. 3 subtracted, where
-// H(a, b, t) is H(0, 0, t) times the Gaussian of ρ² = a² + b², and t ends at the chord of the kernel's ball.
-fn sections(footprint: Footprint, column: f32, rows: vec4f) -> mat4x4f {
-    let dx = column - footprint.center_px.x;
-    let dy = rows - footprint.center_px.y;
+fn cubic(c: vec4f, z: f32, squared: f32) -> f32 {
+    return c.x + z * c.y + squared * (c.z + z * c.w);
+}
+
+// Where a column's four pixels lie in a footprint.
+struct Offsets {
+    dx: f32,
+    dy: vec4f,
+}
+
+fn offsets_in(footprint: Footprint, column: f32, rows: vec4f) -> Offsets {
+    return Offsets(column - footprint.center_px.x, rows - footprint.center_px.y);
+}
+
+// How four pixels see a kernel in a sheet: H(a, b, t) of eq. 3 is H(0, 0, t) times the Gaussian of ρ² = a² + b², and t ends where the chord
+// of the kernel's ball does.
+struct Chords {
+    // H(0, 0, t) where they end, as bits, which numbers from 0 on may be compared by.
+    rim: vec4i,
+    in_plane: vec4f,
+}
+
+fn chords(footprint: Footprint, at: Offsets, sheet: u32) -> Chords {
     if PERSPECTIVE {
-        let along = footprint.axis.x * dx + footprint.axis.y * dy;
-        let across = footprint.axis.x * dy - footprint.axis.y * dx;
-        let a = along * along;
-        let b = across * across;
+        let along = footprint.axis.x * at.dx + footprint.axis.y * at.dy;
+        let across = footprint.axis.x * at.dy - footprint.axis.y * at.dx;
         let maps = footprint.maps;
-        let planes = footprint.planes;
-        return mat4x4f(
-            section(a * maps.along.x + b * maps.across.x, footprint.first_plane, planes.x, footprint.rim.x) * maps.amplitude.x,
-            section(a * maps.along.y + b * maps.across.y, planes.x, planes.y, footprint.rim.y) * maps.amplitude.y,
-            section(a * maps.along.z + b * maps.across.z, planes.y, planes.z, footprint.rim.z) * maps.amplitude.z,
-            section(a * maps.along.w + b * maps.across.w, planes.z, planes.w, footprint.rim.w) * maps.amplitude.w,
-        );
+        let rho_squared = along * along * maps.along[sheet] + across * across * maps.across[sheet];
+        let in_plane = in_plane_at(rho_squared, footprint.rim[sheet]) * maps.amplitude[sheet];
+        return Chords(bitcast<vec4i>(rim_at(rho_squared)), in_plane);
     }
-    let rho_squared = dy * (gather.metric.z * dy + gather.metric.y * dx) + gather.metric.x * dx * dx;
-    let rim = rim_at(rho_squared);
-    let in_plane = in_plane_at(rho_squared, footprint.rim.x);
-    let plane_0 = clamp(vec4f(footprint.first_plane), -rim, rim);
-    let plane_1 = clamp(vec4f(footprint.planes.x), -rim, rim);
-    let plane_2 = clamp(vec4f(footprint.planes.y), -rim, rim);
-    let plane_3 = clamp(vec4f(footprint.planes.z), -rim, rim);
-    let plane_4 = clamp(vec4f(footprint.planes.w), -rim, rim);
-    return mat4x4f(
-        (plane_1 - plane_0) * in_plane,
-        (plane_2 - plane_1) * in_plane,
-        (plane_3 - plane_2) * in_plane,
-        (plane_4 - plane_3) * in_plane,
-    );
+    let rho_squared = at.dy * (gather.metric.z * at.dy + gather.metric.y * at.dx) + gather.metric.x * at.dx * at.dx;
+    return Chords(bitcast<vec4i>(rim_at(rho_squared)), in_plane_at(rho_squared, footprint.rim.x));
 }
 
-// One section, between two planes.
-fn section(rho_squared: vec4f, near: f32, far: f32, footprint_rim: f32) -> vec4f {
-    let rim = rim_at(rho_squared);
-    let thickness = clamp(vec4f(far), -rim, rim) - clamp(vec4f(near), -rim, rim);
-    return thickness * in_plane_at(rho_squared, footprint_rim);
+// A section between two planes: two entries of eq. 3 subtracted.
+fn section(near: f32, far: f32, chords: Chords) -> vec4f {
+    return (cut_by_rim(far, chords.rim) - cut_by_rim(near, chords.rim)) * chords.in_plane;
+}
+
+// H(0, 0, t) at a plane, or at the rim on its side. Integers' least takes a driver half as long as numbers', which may be none.
+fn cut_by_rim(plane: f32, rim: vec4i) -> vec4f {
+    let bits = bitcast<i32>(plane);
+    let sign = bits & i32(0x80000000u);
+    return bitcast<vec4f>(min(vec4i(bits ^ sign), rim) | vec4i(sign));
 }
 
 // The Gaussian of ρ², up to the footprint's rim.

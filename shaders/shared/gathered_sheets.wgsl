@@ -8,6 +8,38 @@ struct Sheets {
     fourth: mat4x4f,
 }
 
+// The sheets of all of a tile's threads, while some of a group's voxels wait for the queue: 16 columns each.
+var<workgroup> saved: array<vec4f, 16u * TILE_THREADS>;
+
+fn save_sheets(thread: u32, sheets: Sheets) {
+    save_sheet(thread, 0u, sheets.first);
+    save_sheet(thread, 4u, sheets.second);
+    save_sheet(thread, 8u, sheets.third);
+    save_sheet(thread, 12u, sheets.fourth);
+}
+
+fn save_sheet(thread: u32, column: u32, sheet: mat4x4f) {
+    let first = column * TILE_THREADS + thread;
+    saved[first] = sheet[0];
+    saved[first + TILE_THREADS] = sheet[1];
+    saved[first + 2u * TILE_THREADS] = sheet[2];
+    saved[first + 3u * TILE_THREADS] = sheet[3];
+}
+
+fn saved_sheets(thread: u32) -> Sheets {
+    return Sheets(saved_sheet(thread, 0u), saved_sheet(thread, 4u), saved_sheet(thread, 8u), saved_sheet(thread, 12u));
+}
+
+fn saved_sheet(thread: u32, column: u32) -> mat4x4f {
+    let first = column * TILE_THREADS + thread;
+    return mat4x4f(
+        saved[first],
+        saved[first + TILE_THREADS],
+        saved[first + 2u * TILE_THREADS],
+        saved[first + 3u * TILE_THREADS],
+    );
+}
+
 // What a voxel adds to a sheet at four pixels.
 fn added(section: vec4f, amount: vec4f) -> mat4x4f {
     return mat4x4f(section * amount.x, section * amount.y, section * amount.z, section * amount.w);
@@ -58,14 +90,6 @@ fn chosen(otherwise: mat4x4f, here: mat4x4f, is_here: vec4<bool>) -> mat4x4f {
     );
 }
 
-// What four pixels hold after a group without anything: of a surface that is not reached, nothing.
-fn after_gap(image: mat4x4f) -> mat4x4f {
-    if COMPOSITING == SURFACE {
-        return chosen(mat4x4f(), image, transpose(image)[3] >= vec4f(1.0));
-    }
-    return image;
-}
-
 // A sheet over or under what is there, at four pixels; its slab begins at a sheet depth.
 fn composite_sheet(image: mat4x4f, sheet: mat4x4f, near: f32) -> mat4x4f {
     var pixels = transpose(sheet);
@@ -111,6 +135,24 @@ fn composite_sheet(image: mat4x4f, sheet: mat4x4f, near: f32) -> mat4x4f {
         }
         let here = vec4u(noted(sheet_depths.x), noted(sheet_depths.y), noted(sheet_depths.z), noted(sheet_depths.w));
         hits = select(hits, here, is_hit);
+    }
+    return result;
+}
+
+// A group's sheets over or under what is there; the first begins at a sheet depth.
+fn composite_group(image: mat4x4f, sheets: Sheets, near: f32) -> mat4x4f {
+    let width = frame.slab_width;
+    var result = image;
+    if ORDER == FRONT_TO_BACK {
+        result = composite_sheet(result, sheets.first, near);
+        result = composite_sheet(result, sheets.second, near + width);
+        result = composite_sheet(result, sheets.third, near + 2.0 * width);
+        result = composite_sheet(result, sheets.fourth, near + 3.0 * width);
+    } else {
+        result = composite_sheet(result, sheets.fourth, near + 3.0 * width);
+        result = composite_sheet(result, sheets.third, near + 2.0 * width);
+        result = composite_sheet(result, sheets.second, near + width);
+        result = composite_sheet(result, sheets.first, near);
     }
     return result;
 }

@@ -7,10 +7,10 @@ struct Ramp {
     own: vec4f,
 }
 
-// Piecewise linear between the control points, clamped outside.
+// Piecewise linear between the control points, of which there are no more than lanes, clamped outside.
 fn ramp_at(held: Ramp, value: f32) -> vec3f {
     let count = held.end - held.first;
-    // How many points are at or below the value; every lane holds one of the first of them.
+    // How many points are at or below the value.
     var below = 0u;
     below += select(0u, 16u, lanes >= 32u && is_below(held, below + 15u, value));
     below += select(0u, 8u, lanes >= 16u && is_below(held, below + 7u, value));
@@ -20,12 +20,12 @@ fn ramp_at(held: Ramp, value: f32) -> vec3f {
     below += select(0u, 1u, is_below(held, below, value));
     let a = subgroupShuffle(held.own, max(below, 1u) - 1u);
     let b = subgroupShuffle(held.own, min(below, min(count, lanes) - 1u));
-    var result = between(a, b, value);
-    // More points than lanes are searched in memory.
-    for (var once = count > lanes; once; once = false) {
-        result = ramp(held.first, held.end, value);
-    }
-    return result;
+    return between(a, b, value);
+}
+
+// Whether there are more control points than lanes.
+fn is_long(held: Ramp) -> bool {
+    return held.end - held.first > lanes;
 }
 
 // Whether one of the first control points is at or below a value.

@@ -1,74 +1,96 @@
-// The pixels that a subgroup of the tile rasteriser holds, and what of them is not opaque (§6).
+// The pixels of a tile that are not opaque (§6): a word for each of its four units, with the unit's rows in eight bits each. Units are
+// numbered row by row.
 
-// The pixels of a subgroup.
-struct Region {
-    // Bounds of its pixel centres.
-    low: vec2f,
-    high: vec2f,
-    // Bounds of those that are not opaque.
-    open_low: vec2f,
-    open_high: vec2f,
-    // For each of the units' rows the lanes whose pixel there is not opaque.
-    open: vec4u,
-    // The same for pixels that have not reached β.
-    shallow: vec4u,
+// Pixels across a tile.
+const TILE_WIDTH = 16u;
+
+// Pixels down a tile.
+const TILE_HEIGHT = 8u;
+
+// The word of a thread's unit, given which of its own four pixels are in it.
+fn unit_word(is_in: vec4<bool>) -> u32 {
+    let rows = vec4u(1u, 1u << 8u, 1u << 16u, 1u << 24u) << vec4u(lane % 8u);
+    let bits = select(vec4u(0u), rows, is_in);
+    var word = bits.x | bits.y | bits.z | bits.w;
+    word |= subgroupShuffleXor(word, 1u);
+    word |= subgroupShuffleXor(word, 2u);
+    return word | subgroupShuffleXor(word, 4u);
 }
 
-// Which pixels are not opaque, and their bounds.
-fn opened(region: Region, is_inside: vec4<bool>, opacity: vec4f, column: f32, rows: vec4f) -> Region {
-    // Pixels off the image count as opaque.
-    let is_open = is_inside & (opacity < vec4f(select(3e38, frame.opacity_threshold, frame.culling != 0u)));
-    var result = region;
-    if ECONOMIES {
-        let is_shallow = is_inside & (opacity < vec4f(gather.beta));
-        result.shallow = vec4u(
-            subgroupBallot(is_shallow.x).x,
-            subgroupBallot(is_shallow.y).x,
-            subgroupBallot(is_shallow.z).x,
-            subgroupBallot(is_shallow.w).x,
-        );
+// Some units' words anew: those of the unit that a thread holds, and of the others in its subgroup.
+fn with_units(words: vec4u, unit: u32, word: u32) -> vec4u {
+    var result = words;
+    for (var i = 0u; i < lanes; i += 8u) {
+        result = select(result, vec4u(subgroupShuffle(word, i)), vec4u(0u, 1u, 2u, 3u) == vec4u(subgroupShuffle(unit, i)));
     }
-    result.open = vec4u(
-        subgroupBallot(is_open.x).x,
-        subgroupBallot(is_open.y).x,
-        subgroupBallot(is_open.z).x,
-        subgroupBallot(is_open.w).x,
-    );
-    let from_top = select(vec4f(1e9), rows, is_open);
-    let from_bottom = select(vec4f(-1e9), rows, is_open);
-    let top = min(min(from_top.x, from_top.y), min(from_top.z, from_top.w));
-    let bottom = max(max(from_bottom.x, from_bottom.y), max(from_bottom.z, from_bottom.w));
-    result.open_low = subgroupMin(vec2f(select(1e9, column, any(is_open)), top));
-    result.open_high = subgroupMax(vec2f(select(-1e9, column, any(is_open)), bottom));
     return result;
 }
 
-// Whether the box around a voxel's footprint holds a pixel of those in `open`. Lanes 0 to 15 hold the pixels across the upper
-// units of a region, 16 to 31 those across the lower.
-fn is_visible(center_px: vec2f, margin: vec2f, region: Region, open: vec4u) -> bool {
-    let center = center_px - region.low;
-    let size = region.high - region.low;
-    let first_row = i32(clamp(ceil(center.y - margin.y), 0.0, 16.0));
-    let end_row = i32(clamp(floor(center.y + margin.y), -1.0, size.y)) + 1;
-    let down = i32((1u << u32(end_row)) - (1u << u32(first_row)));
-    let upper = vec4u(-(vec4i(down) >> vec4u(0u, 1u, 2u, 3u) & vec4i(1)));
-    let lower = vec4u(-(vec4i(down) >> vec4u(4u, 5u, 6u, 7u) & vec4i(1)));
-    var across_upper = across(vec4f(center.x), margin.x, size.x);
-    var across_lower = across_upper;
-    if PARALLELOGRAM {
-        // The sides follow the shear of eq. 9.
-        let rows = vec4f(0.0, 1.0, 2.0, 3.0) - center.y;
-        let half_width = gather.half_width + BOX_SLACK;
-        across_upper = across(center.x + gather.shear * rows, half_width, size.x);
-        across_lower = across(center.x + gather.shear * (rows + 4.0), half_width, size.x);
-    }
-    let box = (upper & across_upper) | (lower & (across_lower << vec4u(16u)));
-    return end_row > first_row && any((box & open) != vec4u(0u));
+// The units' bits.
+const UNIT_BITS = vec4u(1u, 2u, 4u, 8u);
+
+// Bounds of a tile's pixels, seen from the first.
+struct Bounds {
+    low: vec2f,
+    high: vec2f,
 }
 
-// The pixels of a row within a distance of a point, one bit each.
-fn across(center: vec4f, half_width: f32, last: f32) -> vec4u {
-    let first = vec4i(clamp(ceil(center - half_width), vec4f(0.0), vec4f(16.0)));
-    let end = vec4i(clamp(floor(center + half_width), vec4f(-1.0), vec4f(last))) + 1;
-    return select(vec4u(0u), (vec4u(1u) << vec4u(end)) - (vec4u(1u) << vec4u(first)), end > first);
+fn bounds_of(words: vec4u) -> Bounds {
+    let columns = columns_of(words.x | words.z) | columns_of(words.y | words.w) << 8u;
+    let upper = words.x | words.y;
+    let lower = words.z | words.w;
+    let first_row = select(firstTrailingBit(upper) / 8u, 4u + firstTrailingBit(lower) / 8u, upper == 0u);
+    let last_row = select(4u + firstLeadingBit(lower) / 8u, firstLeadingBit(upper) / 8u, lower == 0u);
+    return Bounds(
+        vec2f(f32(firstTrailingBit(columns)), f32(first_row)),
+        vec2f(f32(firstLeadingBit(columns)), f32(last_row)),
+    );
+}
+
+// The columns in which a unit has a pixel, one bit each.
+fn columns_of(word: u32) -> u32 {
+    let two = word | word >> 16u;
+    return (two | two >> 8u) & 255u;
+}
+
+// The units, one bit each, in which the box around a footprint holds one of some pixels. Its centre is seen from the tile's first pixel.
+fn units_in_box(words: vec4u, center: vec2f, half_box: vec2f) -> u32 {
+    let rows = run(vec4f(center.y), half_box.y, f32(TILE_HEIGHT)).x;
+    // One bit in the bytes of the rows that the box reaches.
+    let bytes = ((vec2u(rows) >> vec2u(0u, 4u)) & vec2u(15u)) * 0x204081u & vec2u(0x01010101u);
+    let columns = run(vec4f(center.x), half_box.x, f32(TILE_WIDTH)).x;
+    let halves = vec2u(columns & 255u, columns >> 8u);
+    return units_with(words, vec4u(bytes.x * halves, bytes.y * halves));
+}
+
+// The same for what the box and the parallelogram of Fig. 13 have in common: its sides follow the shear of eq. 9, and its corners reach
+// out of the box.
+fn units_in_parallelogram(words: vec4u, center: vec2f, half_box: vec2f, half_width: f32) -> u32 {
+    let rows = run(vec4f(center.y), half_box.y, f32(TILE_HEIGHT)).x;
+    let columns = run(vec4f(center.x), half_box.x, f32(TILE_WIDTH)).x;
+    let box = row_of_units(rows, columns, 0u, center, half_width) | row_of_units(rows, columns, 1u, center, half_width) << vec4u(8u)
+        | row_of_units(rows, columns, 2u, center, half_width) << vec4u(16u)
+        | row_of_units(rows, columns, 3u, center, half_width) << vec4u(24u);
+    return units_with(words, box);
+}
+
+// The parallelogram's pixels in a row of every unit, of those in some rows and columns.
+fn row_of_units(rows: u32, columns: u32, row: u32, center: vec2f, half_width: f32) -> vec4u {
+    let row_of = vec4u(row, row, row + 4u, row + 4u);
+    let across = run(center.x + gather.shear * (vec4f(row_of) - center.y), half_width, f32(TILE_WIDTH)) & vec4u(columns);
+    let is_reached = (vec4u(rows) >> row_of & vec4u(1u)) != vec4u(0u);
+    return select(vec4u(0u), across >> vec4u(0u, 8u, 0u, 8u) & vec4u(255u), is_reached);
+}
+
+// The units, one bit each, in which two sets of pixels have one in common.
+fn units_with(words: vec4u, others: vec4u) -> u32 {
+    let units = select(vec4u(0u), UNIT_BITS, (words & others) != vec4u(0u));
+    return units.x | units.y | units.z | units.w;
+}
+
+// The pixels of a row or column, one bit each, within a distance of a point.
+fn run(center: vec4f, distance: f32, count: f32) -> vec4u {
+    let first = vec4u(clamp(ceil(center - distance), vec4f(0.0), vec4f(count)));
+    let end = vec4u(clamp(floor(center + distance) + 1.0, vec4f(0.0), vec4f(count)));
+    return select(vec4u(0u), (vec4u(1u) << end) - (vec4u(1u) << first), end > first);
 }

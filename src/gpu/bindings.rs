@@ -184,7 +184,7 @@ impl ComputeStage {
             entry_point: Some(entry),
             compilation_options: wgpu::PipelineCompilationOptions {
                 constants,
-                ..wgpu::PipelineCompilationOptions::default()
+                zero_initialize_workgroup_memory: shader.needs_zeroed_memory(),
             },
             cache: None,
         });

@@ -126,6 +126,7 @@ impl DeviceRequirements {
             max_texture_dimension_2d: available.max_texture_dimension_2d,
             max_texture_array_layers: available.max_texture_array_layers,
             max_buffer_size: available.max_buffer_size,
+            max_compute_workgroup_storage_size: available.max_compute_workgroup_storage_size,
             max_storage_buffer_binding_size: available.max_storage_buffer_binding_size,
             // Four sheets of RGBA32F.
             max_color_attachment_bytes_per_sample: 64,

@@ -303,26 +303,18 @@ pub struct Gather {
     pub beta: f32,
     /// A whole kernel's integral through its centre, over what a footprint must add to a sheet's alpha.
     pub peak: f32,
-    /// Where in [`Gathered`]'s words it is written, for every unit of every tile, at which group its subgroup goes on.
+    /// Where in [`Gathered`]'s words it is written, for every unit of every tile, at which round of which group its subgroup goes on.
     pub reached: u32,
     /// Passes through loops that a thread may take in one dispatch; see [`tile_bins`](crate::tile_bins).
     pub most_passes: u32,
-    /// Those of a group at most, bricks not counted.
+    /// Those of a round at most, bricks not counted.
     pub passes_per_group: u32,
-    /// Those to fetch entries, one for each thread.
-    pub passes_per_fetch: u32,
-    /// Those of a visit to a brick at most.
-    pub passes_per_visit: u32,
-    /// Those of a queue at most.
-    pub passes_per_queue: u32,
-    /// Those of a brick at most, visited and in queues.
+    /// Those of a brick in a round at most.
     pub passes_per_brick: u32,
+    /// Those to look up a voxel's control points in memory at most.
+    pub search_passes: u32,
     /// Where in [`Gathered`]'s words first hits are written, for every pixel.
     pub hits: u32,
-    /// Unused.
-    pub padding_0: u32,
-    /// Unused.
-    pub padding_1: u32,
 }
 
 /// The tiles that a dispatch draws.

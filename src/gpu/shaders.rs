@@ -74,6 +74,8 @@ pub const GATHER: Shader = shader!(
     "gather",
     "bits",
     "region",
+    "queue",
+    "walk",
     "gathered_kernel",
     "held_ramps",
     "volume",
@@ -110,6 +112,12 @@ pub const ALL: [Shader; 14] = [
 ];
 
 impl Shader {
+    /// Whether its workgroups' memory must hold zeros at first. The tile rasterizer reads nothing of its own, which is large, before
+    /// it has written it.
+    pub fn needs_zeroed_memory(&self) -> bool {
+        *self != GATHER
+    }
+
     /// Compiles the shader.
     pub fn module(&self, device: &wgpu::Device) -> wgpu::ShaderModule {
         device.create_shader_module(wgpu::ShaderModuleDescriptor {

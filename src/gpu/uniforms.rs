@@ -110,14 +110,10 @@ pub fn gather(view: &View, kernel: &Kernel, splatting: &Splatting, bins: &TileBi
         reached,
         most_passes: bins.passes.most,
         passes_per_group: bins.passes.per_group,
-        passes_per_fetch: bins.passes.per_fetch,
-        passes_per_visit: bins.passes.per_visit,
-        passes_per_queue: bins.passes.per_queue,
-        passes_per_brick: bins.passes.per_brick(),
+        passes_per_brick: bins.passes.per_brick,
+        search_passes: bins.passes.search,
         // Its byte can be a binding's first.
         hits: (reached + bins.tiles * tile_bins::UNITS + WORDS_BEFORE).next_multiple_of(64) - WORDS_BEFORE,
-        padding_0: 0,
-        padding_1: 0,
     }
 }
 

@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use wgpu::{
-    BindGroup, Buffer, BufferUsages, CommandEncoder, ComputePass, Device, ShaderStages, TextureView,
+    BindGroup, Buffer, BufferUsages, CommandEncoder, ComputePass, Device, DeviceType, ShaderStages, TextureView,
     TextureViewDimension,
 };
 
@@ -15,6 +15,7 @@ use crate::gpu::layout::{Brick, Cut, Frame, Gather as GatherUniform, Gathered, I
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
 use crate::splatting::{Compositing, Economies, FootprintBox, Order, Splatting};
+use crate::tile_bins::SHEETS;
 
 /// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug)]
@@ -112,6 +113,8 @@ impl Gather {
                 depth_texture(stage),
             ];
             let constants = [
+                ("THREADS", f64::from(device.adapter_info().subgroup_max_size)),
+                ("QUEUE", f64::from(queue(device))),
                 ("COMPOSITING", f64::from(mode.compositing as u32)),
                 ("ORDER", f64::from(mode.order as u32)),
                 ("PERSPECTIVE", f64::from(u8::from(mode.perspective))),
@@ -181,6 +184,21 @@ impl Gather {
             stage.dispatch_indirect(pass, group, &[offset], args);
         }
     }
+}
+
+/// Bytes of memory for a workgroup that the stage asks for.
+pub const WORKGROUP_BYTES: u32 = 16384;
+
+/// Voxels in a workgroup's queue: as many as there is room for beside the sheets of its tile's pixels. On a GPU more than that asks for
+/// would keep workgroups from running side by side.
+fn queue(device: &Device) -> u32 {
+    const SHEETS_BYTES: u32 = 128 * SHEETS * 16;
+    const VOXEL_BYTES: u32 = 36;
+    let bytes = match device.adapter_info().device_type {
+        DeviceType::Cpu => device.limits().max_compute_workgroup_storage_size.min(2 * WORKGROUP_BYTES),
+        _ => WORKGROUP_BYTES,
+    };
+    (bytes - SHEETS_BYTES) / VOXEL_BYTES / 32 * 32
 }
 
 /// Bytes of what a dispatch leaves to the next.

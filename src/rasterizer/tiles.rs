@@ -16,7 +16,7 @@ use crate::pass::gather::{Gather, GatherBand, GatherBuffers, GatherMode};
 use crate::rasterizer::request::FrameRequest;
 use crate::splatting::Order;
 use crate::stats::GroupSlabs;
-use crate::tile_bins::{SHEETS, SIDE, TileBins};
+use crate::tile_bins::{self, Passes, SHEETS, TileBins};
 use crate::view::View;
 
 /// The stage.
@@ -54,7 +54,6 @@ struct Binned {
     covered: Range<f64>,
     /// Of the kernel; it changes the footprints' boxes.
     support: f64,
-    search_passes: u32,
     revision: u64,
 }
 
@@ -72,10 +71,10 @@ impl TileRasterizer {
         let FrameRequest { splatting, view, kernel, covered, rays, .. } = request;
         let limits = device.limits();
         let mut old = Old::of(previous);
-        let search_passes = all_search_passes(request, volume.labels().is_some());
+        let passes = passes(request, volume.labels().is_some());
         let is_current = |old: &Binned| {
             old.view == *view
-                && (old.order, old.revision, old.search_passes) == (splatting.order, volume.revision, search_passes)
+                && (old.order, old.revision, old.bins.passes) == (splatting.order, volume.revision, passes)
                 && (old.support, &old.covered) == (kernel.support(), covered)
         };
         let (current, stale) = match old.binned.take() {
@@ -86,12 +85,11 @@ impl TileRasterizer {
         let binned = match current {
             Some(binned) => binned,
             None => Binned {
-                bins: bins(&limits, request, bricks, search_passes)?,
+                bins: bins(&limits, request, bricks, passes)?,
                 view: *view,
                 order: splatting.order,
                 covered: covered.clone(),
                 support: kernel.support(),
-                search_passes,
                 revision: volume.revision,
             },
         };
@@ -118,10 +116,10 @@ impl TileRasterizer {
 
         let stride = part_stride(&limits);
         let (mut part_bytes, mut dispatches) = (Vec::new(), Vec::new());
-        let columns = view.size[0].div_ceil(SIDE);
+        let [columns, _] = tile_bins::grid(view.size);
         for (at, band) in request.bands.iter().enumerate() {
-            let first_tile = band.first_row / SIDE * columns;
-            let tiles = band.rows.div_ceil(SIDE) * columns;
+            let first_tile = band.first_row / tile_bins::TILE[1] * columns;
+            let tiles = band.rows.div_ceil(tile_bins::TILE[1]) * columns;
             let part = Part { first_row: band.first_row, first_tile, end_tile: first_tile + tiles };
             dispatches.push((at, part_bytes.len() as u32, tiles));
             part_bytes.extend_from_slice(bytemuck::bytes_of(&part));
@@ -172,7 +170,7 @@ impl TileRasterizer {
         (bricks, lists): (&[Brick], usize),
         by_label: bool,
     ) -> Result<Needs, RenderError> {
-        let bins = bins(limits, request, bricks, all_search_passes(request, by_label))?;
+        let bins = bins(limits, request, bricks, passes(request, by_label))?;
         let wanted = WantedBuffers::new(limits, request, &bins, (bricks.len(), lists))?;
         let WantedBuffers { uniform, parts, starts, entries, gathered, half_boxes, bricks, .. } = wanted;
         let buffers: Vec<Wanted> =
@@ -294,27 +292,24 @@ fn part_stride(limits: &Limits) -> usize {
     size_of::<Part>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize)
 }
 
-fn bins(
-    limits: &Limits,
-    request: &FrameRequest,
-    bricks: &[Brick],
-    search_passes: u32,
-) -> Result<TileBins, RenderError> {
+fn bins(limits: &Limits, request: &FrameRequest, bricks: &[Brick], passes: Passes) -> Result<TileBins, RenderError> {
     let FrameRequest { view, splatting, kernel, covered, .. } = request;
     let most_words = binding(limits) / 4;
     let (order, support) = (splatting.order, kernel.support());
-    Ok(TileBins::new(bricks, view, order, covered.clone(), support, search_passes, most_words)?)
+    Ok(TileBins::new(bricks, view, order, covered.clone(), support, passes, most_words)?)
 }
 
-/// Those of all ramps.
-fn all_search_passes(request: &FrameRequest, by_label: bool) -> u32 {
-    request.ramps.lengths().iter().map(|&points| search_passes(points, by_label)).sum()
+fn passes(request: &FrameRequest, by_label: bool) -> Passes {
+    let lengths = request.ramps.lengths();
+    // All ramps are searched if any is.
+    let in_memory = by_label || lengths.iter().any(|&points| points > *SUBGROUP_SIZES.start());
+    let search = if in_memory { 1 + lengths.iter().map(|&points| search_passes(points)).sum::<u32>() } else { 0 };
+    Passes::new(search)
 }
 
-/// Passes through loops that a lookup among so many control points takes: none if every thread of a subgroup can hold one, unless they
-/// are searched `in_memory` anyway, else those of a binary search and 2 around it.
-fn search_passes(points: u32, in_memory: bool) -> u32 {
-    if points <= *SUBGROUP_SIZES.start() && !in_memory { 0 } else { 2 + points.ilog2() + 1 }
+/// Passes through loops that a binary search among so many control points takes.
+fn search_passes(points: u32) -> u32 {
+    points.ilog2() + 2
 }
 
 /// What of the previous frame may be taken over.

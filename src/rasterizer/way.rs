@@ -4,6 +4,7 @@ use wgpu::{Device, Features};
 
 use crate::error::RenderError;
 use crate::pass::composite::RayMode;
+use crate::pass::gather::WORKGROUP_BYTES;
 use crate::splatting::{Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
 
 /// Threads that a subgroup may have.
@@ -61,6 +62,10 @@ fn obstacle_to_tiles(device: &Device, splatting: &Splatting) -> Option<RenderErr
     if sizes.iter().any(|size| !SUBGROUP_SIZES.contains(size)) {
         let found = format!("subgroups of {} to {} threads", sizes[0], sizes[1]);
         return refused(found, "subgroups of 8 to 32 threads, or \"quads\"");
+    }
+    let bytes = device.limits().max_compute_workgroup_storage_size;
+    if bytes < WORKGROUP_BYTES {
+        return refused(format!("max_compute_workgroup_storage_size of {bytes}"), "at least 16384, or \"quads\"");
     }
     None
 }

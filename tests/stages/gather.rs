@@ -17,7 +17,7 @@ use sheetsplat::reference::footprint::Footprint;
 use sheetsplat::scene::{Scene, TransferSettings};
 use sheetsplat::shading::Light;
 use sheetsplat::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order};
-use sheetsplat::tile_bins::{Passes, SHEETS, SIDE, TileBins, UNITS};
+use sheetsplat::tile_bins::{self, Passes, SHEETS, TileBins, UNITS};
 use sheetsplat::transfer_function::{Ramp, TransferFunction};
 use sheetsplat::volume::{Grid, Volume};
 use sheetsplat::wgpu::BufferUsages;
@@ -58,7 +58,8 @@ impl<'a> Fixture<'a> {
     fn bins(&self) -> TileBins {
         let Seen { view, kernel, scene: Scene { splatting, .. }, .. } = &self.seen;
         let covered = means::covered(view, self.volume.grid(), splatting);
-        TileBins::new(self.bricks.bricks(), view, splatting.order, covered, kernel.support(), 0, u64::MAX).unwrap()
+        let passes = Passes::new(0);
+        TileBins::new(self.bricks.bricks(), view, splatting.order, covered, kernel.support(), passes, u64::MAX).unwrap()
     }
 
     /// Draws over `acc`, in bands of at most so many rows. The nearest group begins at `near`, where that is given.
@@ -70,15 +71,15 @@ impl<'a> Fixture<'a> {
         let frame = uniforms::frame(&seen.view, &seen.kernel, volume.grid(), &ramps, &seen.scene);
         let mut gather = uniforms::gather(&seen.view, &seen.kernel, &seen.scene.splatting, bins, bricks.len() as u32);
         gather.near = near.unwrap_or(gather.near);
-        let columns = size[0].div_ceil(SIDE);
+        let ([columns, _], tile_rows) = (tile_bins::grid(size), tile_bins::TILE[1]);
         let bands: Vec<(u32, u32)> =
             (0..size[1]).step_by(band_rows as usize).map(|first| (first, band_rows.min(size[1] - first))).collect();
         let parts: Vec<Part> = bands
             .iter()
             .map(|&(first_row, rows)| Part {
                 first_row,
-                first_tile: first_row / SIDE * columns,
-                end_tile: (first_row / SIDE + rows.div_ceil(SIDE)) * columns,
+                first_tile: first_row / tile_rows * columns,
+                end_tile: (first_row / tile_rows + rows.div_ceil(tile_rows)) * columns,
             })
             .collect();
         let accs: Vec<_> = bands
@@ -198,13 +199,13 @@ fn sections() {
                 // What f32 makes of the near plane.
                 let depth = f64::from(first) * view.slabs.width - (f64::from(near) - f64::from(z));
                 let splat = reference::Splat { depth, ..splat };
-                let tiles = view.size.map(|pixels| pixels.div_ceil(SIDE)).iter().product::<u32>();
+                let tiles = tile_bins::grid(view.size).iter().product::<u32>();
                 let bins = TileBins {
                     first_slab: first,
                     tiles,
                     groups: 1,
                     starts: (0..=tiles).collect(),
-                    entries: vec![0xff00_0000; tiles as usize],
+                    entries: vec![0; tiles as usize],
                     half_boxes: vec![view.half_box(kernel.support(), 0.0..1.0)],
                     passes: fixture.bins().passes,
                     dispatches: 1,
@@ -330,7 +331,7 @@ fn frames() {
 
 /// However groups are shared among dispatches, and rows among bindings: the same work, the same bytes.
 #[test]
-fn dispatches_and_bands_change_no_bit() {
+fn dispatches_and_bands_change_no_more_than_rounding() {
     let (gpu, stage) = (gpu(), Gather::default());
     let mut random = Random(43);
     for (compositing, order) in [
@@ -348,24 +349,31 @@ fn dispatches_and_bands_change_no_bit() {
         scene.splatting.compositing = compositing;
         let fixture = Fixture::new(&gpu, &stage, scene, volume);
         let bins = fixture.bins();
-        assert!(bins.groups > 8 && bins.dispatches == 1, "{}", bins.dispatches);
+        assert!(bins.groups > 8, "{}", bins.groups);
         let whole = fixture.draw(&bins, None, &fixture.empty(), u32::MAX);
         assert!(whole.acc.iter().any(|pixel| pixel.w > 0.9));
         assert!(whole.tally.sections_rasterized > 10_000, "{:?}", whole.tally);
         // What no group exceeds.
         let bricks = bins.starts.windows(2).map(|group| group[1] - group[0]).max().unwrap();
-        let one_group = bins.passes.per_group + bricks * bins.passes.per_brick();
+        let one_group = bins.passes.per_group + bricks * bins.passes.per_brick;
         // Enough for all, if each takes one group.
         let dispatches = bins.groups;
         for (most, rows) in [(one_group + 1000, u32::MAX), (one_group, 32), (bins.passes.most, 64)] {
             let passes = Passes { most, ..bins.passes };
             let first = TileBins { passes, dispatches: 1, ..bins.clone() };
-            let is_cut = fixture.draw(&first, None, &fixture.empty(), rows).acc != whole.acc;
+            let is_same = |drawn: &Drawn| {
+                // Voxels are added in another order where a dispatch finds anew what it could have kept.
+                let pairs = drawn.acc.iter().zip(&whole.acc);
+                pairs.map(|(a, b)| (a - b).abs().max_element()).fold(0.0, f64::max) < 1e-5
+            };
+            let is_cut = !is_same(&fixture.draw(&first, None, &fixture.empty(), rows));
             assert_eq!(is_cut, most < bins.passes.most, "one dispatch of {most} passes");
             let parts = fixture.draw(&TileBins { dispatches, ..first }, None, &fixture.empty(), rows);
             // What is behind opaque pixels alone is not even fetched, or fetched in another dispatch.
             let tally = Tally { bricks_visited: whole.tally.bricks_visited, ..parts.tally };
-            assert!(Drawn { tally, ..parts } == whole, "{compositing:?}, {order:?}, {rows} rows");
+            assert!(is_same(&parts), "{compositing:?}, {order:?}, {rows} rows");
+            let acc = whole.acc.clone();
+            assert!(Drawn { tally, acc, ..parts } == whole, "{compositing:?}, {order:?}, {rows} rows");
         }
     }
 }
@@ -384,7 +392,7 @@ fn the_least_is_looked_for_behind_all_bricks() {
     let fixture = Fixture::new(&gpu, &stage, scene, volume);
     let bins = fixture.bins();
     let bricks = bins.starts.windows(2).map(|group| group[1] - group[0]).max().unwrap();
-    let passes = Passes { most: bins.passes.per_group + bricks * bins.passes.per_brick(), ..bins.passes };
+    let passes = Passes { most: bins.passes.per_group + bricks * bins.passes.per_brick, ..bins.passes };
     let middle = |dispatches| {
         let bins = TileBins { passes, dispatches, ..bins.clone() };
         fixture.draw(&bins, None, &fixture.empty(), u32::MAX).acc[8 * 17 + 8]
@@ -394,6 +402,28 @@ fn the_least_is_looked_for_behind_all_bricks() {
     assert_eq!(middle(bins.groups), nothing);
     // The dispatch that draws the last brick has seen nothing else, where it takes that many passes: by 8 threads.
     assert!((1..bins.groups).any(|dispatches| middle(dispatches) != nothing));
+}
+
+/// More voxels behind a tile and in a sheet group than a workgroup has room for, so that sheets wait for the rest of them.
+#[test]
+fn more_voxels_than_the_queue_holds() {
+    let (gpu, stage) = (gpu(), Gather::default());
+    let mut random = Random(45);
+    for (slab_width, order) in [(1.0, Order::FrontToBack), (0.3, Order::BackToFront), (2.6, Order::FrontToBack)] {
+        let (volume, transfer) = noise(&mut random, UVec3::splat(24), [1.0; 3], 0.05, 4);
+        let mut scene = Scene { transfer, camera: camera([0.3, 0.9, -0.2], 26.0), ..scene(33, 17) };
+        (scene.splatting.slab_width, scene.splatting.order, scene.splatting.culling) = (slab_width, order, false);
+        let fixture = Fixture::new(&gpu, &stage, scene, volume);
+        let bins = fixture.bins();
+        let bricks = bins.starts.windows(2).map(|bin| bin[1] - bin[0]).max().unwrap();
+        // The queue has room for a few hundred voxels; two thirds of all are drawn.
+        assert!(bricks * 64 > 3000 || slab_width < 1.0, "{bricks} bricks");
+        let (actual, expected) = (fixture.draw(&bins, None, &fixture.empty(), u32::MAX).acc, fixture.twin());
+        let errors = actual.iter().zip(&expected).map(|(actual, expected)| (*actual - *expected).abs().max_element());
+        let worst = errors.fold(0.0, f64::max);
+        assert!(worst < 1e-4, "{worst} at slab width {slab_width}");
+        assert!(expected.iter().any(|pixel| pixel.w > 0.1));
+    }
 }
 
 /// A mask of opaque pixels, drawn over: a voxel is drawn if and only if a pixel is not opaque whose centre lies in its footprint's box.

@@ -1,0 +1,46 @@
+// The voxels that a subgroup draws in a sheet group: found once for all pixels of a tile, shaded once, and kept for as long as their
+// kernels reach into the next group. They are in the workgroup's memory, of which every subgroup has a part of its own.
+
+// Voxels in all parts; a multiple of 32.
+override QUEUE: u32 = 224u;
+
+// Each voxel's screen coordinates as of `project`, as bits, with its brick and place in it instead of the depth from the eye; and what
+// it adds: (C·m, m).
+var<workgroup> queue_points: array<vec4u, QUEUE>;
+var<workgroup> queue_amounts: array<vec4f, QUEUE>;
+// The units whose pixels it is drawn to, one bit each, and from bit `WHOLE_SHIFT` on one more than the sheet that takes it as a whole.
+var<workgroup> queue_units: array<u32, QUEUE>;
+
+const WHOLE_SHIFT = 8u;
+
+// The subgroup's part.
+var<private> queue_first: u32;
+var<private> queue_size: u32;
+var<private> queue_count: u32;
+
+fn empty_queue(thread: u32) {
+    queue_size = QUEUE / (THREADS / lanes);
+    queue_first = thread / lanes * queue_size;
+    queue_count = 0u;
+}
+
+// How many of a subgroup's lanes before this one are in a ballot.
+fn before(lanes_in: u32) -> u32 {
+    return countOneBits(lanes_in & ((1u << lane) - 1u));
+}
+
+// Puts some lanes' voxels at its end.
+fn enqueue(is_in: bool, voxel: u32, point: vec4f, units: u32) {
+    let lanes_in = ballot(is_in);
+    if is_in {
+        let slot = queue_first + queue_count + before(lanes_in);
+        queue_points[slot] = vec4u(bitcast<vec3u>(point.xyz), voxel);
+        queue_units[slot] = units;
+    }
+    queue_count += countOneBits(lanes_in);
+}
+
+// Whether there is an n-th voxel, and some of a subgroup's units see it.
+fn is_queued_for(units: u32, n: u32) -> bool {
+    return n < queue_count && (queue_units[queue_first + min(n, queue_count - 1u)] & units) != 0u;
+}
