@@ -2,7 +2,7 @@
 // shading. Only here does a voxel need its gradient: most are hidden, and never do (§6).
 
 @group(0) @binding(1) var<storage, read> bricks: array<Brick>;
-@group(0) @binding(2) var values: texture_2d_array<f32>;
+@group(0) @binding(2) var values: texture_2d_array<u32>;
 // The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0); then the table of labels.
 @group(0) @binding(3) var<storage, read> control_points: array<vec4f>;
 // Places: 64 times the brick's number, and the place in the brick.

@@ -177,7 +177,7 @@ impl ClassifiedVolume {
 
     /// Bytes of GPU memory that the volume will hold once prepared.
     pub(crate) fn estimate(&self) -> Result<u64, RenderError> {
-        let [values, both] = GpuVolume::estimate(self.volume.device(), self.volume().values().len() as u32)?;
+        let [values, both] = self.volume.needs()?;
         let has_labels = self.shades_by_label() || self.volume.labels().is_some();
         Ok(if has_labels { both } else { values })
     }

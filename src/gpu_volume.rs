@@ -6,7 +6,7 @@ use wgpu::{Device, Queue, TextureView};
 
 use crate::error::RenderError;
 use crate::fault::scoped;
-use crate::gpu::volume_texture::VolumeTexture;
+use crate::gpu::volume_texture::{ValueFormat, VolumeTexture};
 use crate::value_list::ValueList;
 use crate::volume::Volume;
 
@@ -27,24 +27,47 @@ struct Shared {
 }
 
 impl GpuVolume {
-    /// Uploads a volume's values: 4 bytes a voxel. Labels, 2 bytes a voxel, follow when a view first has tables for some.
+    /// Uploads a volume's values: 4 bytes a voxel, or 1 or 2 where they are whole numbers in a range of 256 or 65536. Labels, 2 bytes a
+    /// voxel, follow when a view first has tables for some.
     ///
     /// # Errors
     /// If the volume needs more layers than the device's textures have, or the device fails.
     pub fn new(device: &Device, queue: &Queue, volume: impl Into<Arc<Volume>>) -> Result<Self, RenderError> {
+        Self::new_in_chunks(device, queue, volume, &|| {})
+    }
+
+    /// The same for a caller that submits every chunk of values that was written. The queue keeps its own copies of them until then.
+    ///
+    /// # Errors
+    /// See [`Self::new`].
+    pub(crate) fn new_in_chunks(
+        device: &Device,
+        queue: &Queue,
+        volume: impl Into<Arc<Volume>>,
+        written: &dyn Fn(),
+    ) -> Result<Self, RenderError> {
         let volume = volume.into();
-        let values = scoped(device, || VolumeTexture::upload(device, queue, volume.values()))??;
+        let upload = || VolumeTexture::upload_in_chunks(device, queue, volume.values(), written);
+        let values = scoped(device, upload)??;
         let (device, labels, value_list) = (device.clone(), OnceLock::new(), OnceLock::new());
         Ok(Self { shared: Arc::new(Shared { device, volume, values, labels, value_list }) })
     }
 
-    /// What [`Self::gpu_bytes`] of a volume of so many voxels, at most 2³² - 1, will be: as long as no view shades by label, and after that.
+    /// What [`Self::gpu_bytes`] of a volume will be: as long as no view shades by label, and after that. Looks at all values.
     ///
     /// # Errors
     /// If the volume needs more layers than the device's textures have.
-    pub fn estimate(device: &Device, voxels: u32) -> Result<[u64; 2], RenderError> {
-        let [values, labels] = VolumeTexture::estimate(&device.limits(), voxels.into())?;
-        Ok([values, values + labels])
+    pub fn estimate(device: &Device, volume: &Volume) -> Result<[u64; 2], RenderError> {
+        let values = volume.values();
+        estimate(device, values.len(), ValueFormat::of(values))
+    }
+
+    /// The same of this volume.
+    ///
+    /// # Errors
+    /// See [`Self::estimate`].
+    pub(crate) fn needs(&self) -> Result<[u64; 2], RenderError> {
+        estimate(&self.shared.device, self.shared.volume.values().len(), self.value_format())
     }
 
     /// The volume.
@@ -69,7 +92,12 @@ impl GpuVolume {
         &self.shared.device
     }
 
-    /// The values, `R32Float`.
+    /// What the values' texels mean.
+    pub(crate) fn value_format(&self) -> ValueFormat {
+        self.shared.values.format
+    }
+
+    /// The values, in their format.
     pub(crate) fn values(&self) -> &TextureView {
         &self.shared.values.view
     }
@@ -92,4 +120,9 @@ impl GpuVolume {
         }
         Ok(())
     }
+}
+
+fn estimate(device: &Device, voxels: usize, format: ValueFormat) -> Result<[u64; 2], RenderError> {
+    let [values, labels] = VolumeTexture::estimate(&device.limits(), voxels as u64, format)?;
+    Ok([values, values + labels])
 }

@@ -166,7 +166,7 @@ impl Renderer {
         let write = |old, wanted: &Wanted, bytes: &[u8]| written(device, queue, old, wanted, bytes);
         let points = bytemuck::cast_slice(&ramps.points);
         let control_points = write(kept.control_points, &control_points(&request), points)?;
-        let frame_values = uniforms::frame(seen, kernel, &grid, ramps, scene);
+        let frame_values = uniforms::frame(seen, kernel, (&grid, volume.gpu_volume().value_format()), ramps, scene);
         let uniform = write(kept.uniform, &frame_uniform(), bytemuck::bytes_of(&frame_values))?;
         let cut_values = uniforms::cut(seen, &grid, scene, request.surfaces, request.first_hit);
         let cut = write(kept.cut, &cut_uniform(), bytemuck::bytes_of(&cut_values))?;

@@ -102,7 +102,11 @@ fn shared() -> [Layout; 15] {
             tiles,
             per_unit,
             headlight,
-            last_label
+            last_label,
+            value_offset,
+            whole_values,
+            padding_0,
+            padding_1
         }),
         layout!(Group { half_box, box_filter, culling, near, first_brick, brick_count, index, number }),
         layout!(Brick { present, x, y, z, extent }),

@@ -75,21 +75,26 @@ fn a_view_that_shrinks_gives_back() {
     }
 }
 
-/// Exactly: of volumes of a part of a row, a row, several, and several layers.
+/// Exactly: of volumes of a part of a row, a row, several, and several layers, whose values take a byte each, two, or four.
 #[test]
 fn a_volumes_bytes_are_known_before() {
     let gpu = gpu();
     for dims in [[3, 5, 7], [2048, 1, 1], [2049, 1, 1], [64, 64, 65], [2048, 2049, 1]] {
         let dims = UVec3::from(dims);
         let count = dims.element_product();
-        let values = (0..count).map(|voxel| (voxel % 7) as f32).collect();
-        let volume = Volume::new("steps", dims, DVec3::ONE, values).unwrap();
-        let on_gpu = GpuVolume::new(gpu.device(), gpu.queue(), volume).unwrap();
-        assert_eq!(on_gpu.gpu_bytes(), GpuVolume::estimate(gpu.device(), count).unwrap()[0], "{dims}");
+        let rows = u64::from(count).div_ceil(2048).min(2048) * u64::from(count).div_ceil(1 << 22);
+        for (step, bytes) in [(1.0, 1), (300.0, 2), (0.5, 4)] {
+            let values = (0..count).map(|voxel| (voxel % 7) as f32 * step).collect();
+            let volume = Volume::new("steps", dims, DVec3::ONE, values).unwrap();
+            let [estimate, _] = GpuVolume::estimate(gpu.device(), &volume).unwrap();
+            let on_gpu = GpuVolume::new(gpu.device(), gpu.queue(), volume).unwrap();
+            assert_eq!(on_gpu.gpu_bytes(), estimate, "{dims}");
+            assert_eq!(estimate, rows * 2048 * bytes, "{dims}");
+        }
     }
     // With labels, of whose tables some matter to shading.
     let (volume, mut scene) = head(20);
-    let [values, both] = GpuVolume::estimate(gpu.device(), volume.values().len() as u32).unwrap();
+    let [values, both] = GpuVolume::estimate(gpu.device(), &volume).unwrap();
     let mut view = gpu.view(volume.clone(), &scene).unwrap();
     gpu.draw(&mut view).unwrap();
     assert_eq!(view.volume().gpu_volume().gpu_bytes(), values);

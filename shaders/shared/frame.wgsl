@@ -33,6 +33,10 @@ struct Frame {
     per_unit: f32,
     headlight: u32,
     last_label: u32,
+    value_offset: f32,
+    whole_values: u32,
+    padding_0: u32,
+    padding_1: u32,
 }
 
 @group(0) @binding(0) var<uniform> frames: array<Frame, 1>;

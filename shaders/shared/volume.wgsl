@@ -2,7 +2,8 @@
 
 fn value_at(index: u32) -> f32 {
     let texel = texel_of(index, textureDimensions(values).x);
-    return textureLoad(values, texel.xy, texel.z, 0).x;
+    let stored = textureLoad(values, texel.xy, texel.z, 0).x;
+    return select(bitcast<f32>(stored), f32(stored) + frame.value_offset, frame.whole_values != 0u);
 }
 
 // Column, row and layer of a voxel's texel in layers of a power of two a side.

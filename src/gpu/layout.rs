@@ -94,6 +94,14 @@ pub struct Frame {
     pub headlight: u32,
     /// Last entry of the table of labels, which is that of all greater labels, too.
     pub last_label: u32,
+    /// What is added to the texels of values that are whole numbers.
+    pub value_offset: f32,
+    /// 1 if they are, 0 if texels are the values' bits.
+    pub whole_values: u32,
+    /// Unused.
+    pub padding_0: u32,
+    /// Unused.
+    pub padding_1: u32,
 }
 
 /// One sheet group and one list's bricks that may reach into it.

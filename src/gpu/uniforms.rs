@@ -5,6 +5,7 @@ use std::ops::{Add, Mul, Range};
 use glam::{DMat2, DVec2, DVec3, DVec4};
 
 use super::layout::{Cut, Frame, Gather, Gathered, Group};
+use super::volume_texture::ValueFormat;
 use crate::clip::HalfSpace;
 use crate::grid_warp::{self, FootprintMap};
 use crate::kernel::Kernel;
@@ -22,8 +23,14 @@ use crate::volume::Grid;
 /// What ambient, diffuse, specular and shininess are clamped to: beyond it no image changes any more, and `f32` ends.
 const MAX_SHADING: f64 = 1e30;
 
-/// What is constant over a frame.
-pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &Scene) -> Frame {
+/// What is constant over a frame of a volume with such a grid, whose values are stored so.
+pub fn frame(
+    view: &View,
+    kernel: &Kernel,
+    (grid, values): (&Grid, ValueFormat),
+    ramps: &Ramps,
+    scene: &Scene,
+) -> Frame {
     let to_eye = -view.basis.w;
     let to_light = match scene.shading.light {
         Light::Headlight => to_eye,
@@ -72,6 +79,13 @@ pub fn frame(view: &View, kernel: &Kernel, grid: &Grid, ramps: &Ramps, scene: &S
         per_unit: grid.unit().recip().sqrt().min(f32::MAX.into()) as f32,
         headlight: u32::from(scene.shading.light == Light::Headlight),
         last_label: ramps.label_table.len().saturating_sub(1) as u32,
+        value_offset: match values {
+            ValueFormat::Offset8(least) | ValueFormat::Offset16(least) => least,
+            ValueFormat::Bits => 0.0,
+        },
+        whole_values: u32::from(values != ValueFormat::Bits),
+        padding_0: 0,
+        padding_1: 0,
     }
 }
 

@@ -2,6 +2,7 @@
 //! may hold. Layers have 2048 texels a side, or 4096 or 8192 where a volume would need more layers than the device has: with WebGPU's
 //! default limits there is room for any.
 
+use rayon::prelude::*;
 use wgpu::{
     Device, Extent3d, Limits, Queue, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,
 };
@@ -14,29 +15,103 @@ pub const LEAST_SIDE: u32 = 2048;
 /// Texels that a layer may have along both sides.
 pub const SIDES: [u32; 3] = [LEAST_SIDE, 4096, 8192];
 
+/// How values are stored: in as few bits as give each of them back to the last one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ValueFormat {
+    /// `R8Uint`: a whole number, less the volume's least, this one.
+    Offset8(f32),
+    /// `R16Uint`: the same.
+    Offset16(f32),
+    /// `R32Uint`: the bits of the `f32`.
+    Bits,
+}
+
+impl ValueFormat {
+    /// The shortest that holds these values. Looks at all of them.
+    pub fn of(values: &[f32]) -> Self {
+        let ranges = values.par_chunks(1 << 16).map(whole_range);
+        let range = ranges.try_reduce(|| [i32::MAX, i32::MIN], |a, b| Some([a[0].min(b[0]), a[1].max(b[1])]));
+        // Up to there `f32` counts every whole number, so that neither the difference nor the sum is rounded.
+        let range = range.filter(|ends| ends.iter().all(|end| end.unsigned_abs() <= 1 << 24));
+        match range.map(|[least, greatest]| (least as f32, greatest - least)) {
+            Some((least, 0..=0xff)) => Self::Offset8(least),
+            Some((least, 0x100..=0xffff)) => Self::Offset16(least),
+            _ => Self::Bits,
+        }
+    }
+
+    fn texture(self) -> TextureFormat {
+        match self {
+            Self::Offset8(_) => TextureFormat::R8Uint,
+            Self::Offset16(_) => TextureFormat::R16Uint,
+            Self::Bits => TextureFormat::R32Uint,
+        }
+    }
+}
+
+/// Labels are what their texels are.
+const LABELS: ValueFormat = ValueFormat::Offset16(0.0);
+
+/// Least and greatest of some values, if all are whole numbers. `-0.0` is none: from a whole number only `0.0` comes back.
+fn whole_range(values: &[f32]) -> Option<[i32; 2]> {
+    let (mut least, mut greatest, mut are_whole) = (i32::MAX, i32::MIN, true);
+    for &value in values {
+        let whole = value as i32;
+        are_whole &= (whole as f32).to_bits() == value.to_bits();
+        (least, greatest) = (least.min(whole), greatest.max(whole));
+    }
+    are_whole.then_some([least, greatest])
+}
+
 /// One number per voxel, x fastest, folded into rows and layers of a power of two, the side: that of voxel i is texel i mod side of row
 /// ⌊i/side⌋, as `shaders/shared/volume.wgsl` unfolds it.
 #[derive(Debug)]
 pub struct VolumeTexture {
     /// All layers.
     pub view: TextureView,
+    /// What its texels mean.
+    pub format: ValueFormat,
     /// Bytes of GPU memory.
     pub gpu_bytes: u64,
 }
 
 impl VolumeTexture {
-    /// Uploads a volume's values, `R32Float`.
+    /// Uploads a volume's values, as [`ValueFormat`] says.
     ///
     /// # Errors
     /// If they need more layers than the device's textures have.
     pub fn upload(device: &Device, queue: &Queue, values: &[f32]) -> Result<Self, RenderError> {
+        Self::upload_in_chunks(device, queue, values, &|| {})
+    }
+
+    /// The same for a caller that wants to know of every chunk that was written.
+    ///
+    /// # Errors
+    /// See [`Self::upload`].
+    pub fn upload_in_chunks(
+        device: &Device,
+        queue: &Queue,
+        values: &[f32],
+        written: &dyn Fn(),
+    ) -> Result<Self, RenderError> {
         let side = side(&device.limits(), "the volume's values", values.len() as u64)?;
-        Ok(Self::upload_folded(device, queue, values, side))
+        Ok(Self::fold(device, queue, values, side, written))
     }
 
     /// The same with layers of a given side, whether they need it or not.
     pub fn upload_folded(device: &Device, queue: &Queue, values: &[f32], side: u32) -> Self {
-        Self::fold(device, queue, "sheetsplat.values", TextureFormat::R32Float, values, side)
+        Self::fold(device, queue, values, side, &|| {})
+    }
+
+    fn fold(device: &Device, queue: &Queue, values: &[f32], side: u32, written: &dyn Fn()) -> Self {
+        let format = ValueFormat::of(values);
+        let (texture, uploaded) = Self::new(device, "sheetsplat.values", format, folded(values.len() as u64, side));
+        match format {
+            ValueFormat::Offset8(least) => fill(queue, &texture, values, |value| (value - least) as u8, written),
+            ValueFormat::Offset16(least) => fill(queue, &texture, values, |value| (value - least) as u16, written),
+            ValueFormat::Bits => fill(queue, &texture, values, f32::to_bits, written),
+        }
+        uploaded
     }
 
     /// Uploads a segmented volume's labels, `R16Uint`.
@@ -45,27 +120,29 @@ impl VolumeTexture {
     /// If they need more layers than the device's textures have.
     pub fn upload_labels(device: &Device, queue: &Queue, labels: &[u16]) -> Result<Self, RenderError> {
         let side = side(&device.limits(), "the volume's labels", labels.len() as u64)?;
-        Ok(Self::fold(device, queue, "sheetsplat.labels", TextureFormat::R16Uint, labels, side))
+        let (texture, uploaded) = Self::new(device, "sheetsplat.labels", LABELS, folded(labels.len() as u64, side));
+        fill(queue, &texture, labels, |label| label, &|| {});
+        Ok(uploaded)
     }
 
-    /// Bytes of GPU memory that the values of so many voxels will take, and their labels.
+    /// Bytes of GPU memory that so many values of a format will take, and as many labels.
     ///
     /// # Errors
     /// If they need more layers than textures may have.
-    pub fn estimate(limits: &Limits, voxels: u64) -> Result<[u64; 2], RenderError> {
+    pub fn estimate(limits: &Limits, voxels: u64, format: ValueFormat) -> Result<[u64; 2], RenderError> {
         let side = side(limits, "the volume's values", voxels)?;
-        Ok([TextureFormat::R32Float, TextureFormat::R16Uint].map(|format| bytes(format, folded(voxels, side))))
+        Ok([format, LABELS].map(|format| bytes(format, folded(voxels, side))))
     }
 
     /// A texture of one label, for stages of volumes that have none.
     pub fn no_labels(device: &Device) -> Self {
-        Self::new(device, "sheetsplat.no_labels", TextureFormat::R16Uint, [1; 3]).1
+        Self::new(device, "sheetsplat.no_labels", LABELS, [1; 3]).1
     }
 
     fn new(
         device: &Device,
         label: &str,
-        format: TextureFormat,
+        format: ValueFormat,
         [width, height, layers]: [u32; 3],
     ) -> (wgpu::Texture, Self) {
         let texture = device.create_texture(&TextureDescriptor {
@@ -74,7 +151,7 @@ impl VolumeTexture {
             mip_level_count: 1,
             sample_count: 1,
             dimension: TextureDimension::D2,
-            format,
+            format: format.texture(),
             usage: TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST,
             view_formats: &[],
         });
@@ -83,42 +160,50 @@ impl VolumeTexture {
             dimension: Some(wgpu::TextureViewDimension::D2Array),
             ..wgpu::TextureViewDescriptor::default()
         });
-        (texture, Self { view, gpu_bytes: bytes(format, [width, height, layers]) })
+        (texture, Self { view, format, gpu_bytes: bytes(format, [width, height, layers]) })
     }
+}
 
-    fn fold<T: bytemuck::NoUninit>(
-        device: &Device,
-        queue: &Queue,
-        label: &str,
-        format: TextureFormat,
-        values: &[T],
-        side: u32,
-    ) -> Self {
-        let (texture, uploaded) = Self::new(device, label, format, folded(values.len() as u64, side));
-        let write = |values: &[T], width: u32, row: u32| {
-            let origin = wgpu::Origin3d { x: 0, y: row % side, z: row / side };
-            let height = values.len() as u32 / width;
-            queue.write_texture(
-                wgpu::TexelCopyTextureInfo { origin, ..texture.as_image_copy() },
-                bytemuck::cast_slice(values),
-                wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(width * size_of::<T>() as u32),
-                    rows_per_image: None,
-                },
-                Extent3d { width, height, depth_or_array_layers: 1 },
-            );
-        };
-        for (layer, values) in (0..).zip(values.chunks((side * side) as usize)) {
-            let (whole, rest) = values.split_at(values.len() / side as usize * side as usize);
-            if !whole.is_empty() {
-                write(whole, side, layer * side);
-            }
-            if !rest.is_empty() {
-                write(rest, rest.len() as u32, layer * side + whole.len() as u32 / side);
-            }
+/// Values that are converted and sent at a time: whole rows of a layer, whatever its side.
+const CHUNK: usize = (LEAST_SIDE * LEAST_SIDE) as usize;
+
+/// Writes a texel for every value, chunk by chunk: there is never a second volume in memory, but for the queue's own copies of what is
+/// not submitted yet.
+fn fill<V: Copy, T: bytemuck::NoUninit>(
+    queue: &Queue,
+    texture: &wgpu::Texture,
+    values: &[V],
+    texel: impl Fn(V) -> T,
+    written: &dyn Fn(),
+) {
+    let side = texture.width();
+    let write = |texels: &[T], width: u32, row: u32| {
+        let origin = wgpu::Origin3d { x: 0, y: row % side, z: row / side };
+        let height = texels.len() as u32 / width;
+        queue.write_texture(
+            wgpu::TexelCopyTextureInfo { origin, ..texture.as_image_copy() },
+            bytemuck::cast_slice(texels),
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(width * size_of::<T>() as u32),
+                rows_per_image: None,
+            },
+            Extent3d { width, height, depth_or_array_layers: 1 },
+        );
+    };
+    let mut texels = Vec::with_capacity(CHUNK.min(values.len()));
+    for (chunk, values) in (0..).zip(values.chunks(CHUNK)) {
+        texels.clear();
+        texels.extend(values.iter().map(|&value| texel(value)));
+        let row = chunk * (CHUNK as u32 / side);
+        let (whole, rest) = texels.split_at(texels.len() / side as usize * side as usize);
+        if !whole.is_empty() {
+            write(whole, side, row);
         }
-        uploaded
+        if !rest.is_empty() {
+            write(rest, rest.len() as u32, row + whole.len() as u32 / side);
+        }
+        written();
     }
 }
 
@@ -145,6 +230,6 @@ fn folded(voxels: u64, side: u32) -> [u32; 3] {
     [side, rows.min(side), rows.div_ceil(side)]
 }
 
-fn bytes(format: TextureFormat, size: [u32; 3]) -> u64 {
-    u64::from(format.block_copy_size(None).unwrap_or(0)) * size.map(u64::from).iter().product::<u64>()
+fn bytes(format: ValueFormat, size: [u32; 3]) -> u64 {
+    u64::from(format.texture().block_copy_size(None).unwrap_or(0)) * size.map(u64::from).iter().product::<u64>()
 }

@@ -155,7 +155,12 @@ impl Headless {
     /// # Errors
     /// If the volume is larger than the device's textures, or the device fails.
     pub fn view(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<SceneView, RenderError> {
-        SceneView::new(&self.device, &GpuVolume::new(&self.device, &self.queue, volume)?, scene)
+        // Else wgpu's copies of the whole volume stay until the first frame.
+        let submit = || {
+            self.queue.submit([]);
+        };
+        let volume = GpuVolume::new_in_chunks(&self.device, &self.queue, volume, &submit)?;
+        SceneView::new(&self.device, &volume, scene)
     }
 
     /// Draws one frame of a view and reads it back.

@@ -8,9 +8,7 @@ use wgpu::{
 };
 
 use super::composite::{CutBuffers, RayMode};
-use crate::gpu::bindings::{
-    ComputeStage, at_offset, depth_texture, storage, texture, texture_of_integers, uniform, wanted,
-};
+use crate::gpu::bindings::{ComputeStage, at_offset, depth_texture, storage, texture_of_integers, uniform, wanted};
 use crate::gpu::layout::{Brick, Cut, Frame, Gather as GatherUniform, Gathered, Indirect, Part};
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
@@ -103,7 +101,7 @@ impl Gather {
                 storage::<u32>(stage, true),
                 storage::<u32>(stage, true),
                 storage::<[f32; 4]>(stage, true),
-                texture(stage, TextureViewDimension::D2Array),
+                texture_of_integers(stage, TextureViewDimension::D2Array),
                 storage::<[f32; 4]>(stage, false),
                 storage::<Gathered>(stage, false),
                 storage::<[f32; 2]>(stage, true),

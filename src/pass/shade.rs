@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use wgpu::{BindGroup, BindingResource, Buffer, ComputePass, Device, ShaderStages, TextureView, TextureViewDimension};
 
-use crate::gpu::bindings::{ComputeStage, storage, texture, texture_of_integers, uniform};
+use crate::gpu::bindings::{ComputeStage, storage, texture_of_integers, uniform};
 use crate::gpu::layout::{Brick, Frame, Indirect, Splat};
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
@@ -82,7 +82,7 @@ fn compile(device: &Device, labels: bool) -> ComputeStage {
     let slots = [
         uniform::<Frame>(stage, false),
         storage::<Brick>(stage, true),
-        texture(stage, TextureViewDimension::D2Array),
+        texture_of_integers(stage, TextureViewDimension::D2Array),
         storage::<[f32; 4]>(stage, true),
         storage::<u32>(stage, true),
         storage::<Indirect>(stage, true),

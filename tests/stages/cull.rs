@@ -64,7 +64,8 @@ impl<'a> Culling<'a> {
         let [list] = &lists.lists[..] else { panic!("{} lists", lists.lists.len()) };
         let ramps = Ramps::new(transfer);
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
-        let frame = uniforms::frame(&view, &kernel, grid, &ramps, scene);
+        let uploaded = VolumeTexture::upload(device, gpu.queue(), values).unwrap();
+        let frame = uniforms::frame(&view, &kernel, (grid, uploaded.format), &ramps, scene);
         let targets = Targets::new(device, size, TextureFormat::Rgba32Float, sheets).unwrap();
         let stride = device.limits().min_uniform_buffer_offset_alignment;
         let group_bytes = uniforms::groups(&plan, &kernel, &scene.splatting, stride as usize);
@@ -75,7 +76,7 @@ impl<'a> Culling<'a> {
         let shared = CullBuffers {
             frame: &init(device, &[frame], BufferUsages::UNIFORM),
             groups: &groups,
-            values: &VolumeTexture::upload(device, gpu.queue(), values).unwrap().view,
+            values: &uploaded.view,
             labels: labels.as_ref().map(|labels| &labels.view),
             control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
             occluded: &targets.occluded,

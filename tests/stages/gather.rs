@@ -68,7 +68,10 @@ impl<'a> Fixture<'a> {
         let (device, size) = (gpu.device(), seen.view.size);
         let bricks = bricks.bricks();
         let ramps = Ramps::new(&self.transfer);
-        let frame = uniforms::frame(&seen.view, &seen.kernel, volume.grid(), &ramps, &seen.scene);
+        let side = SIDES[size[0] as usize % SIDES.len()];
+        let values = VolumeTexture::upload_folded(device, gpu.queue(), volume.values(), side);
+        let grid = (volume.grid(), values.format);
+        let frame = uniforms::frame(&seen.view, &seen.kernel, grid, &ramps, &seen.scene);
         let mut gather = uniforms::gather(&seen.view, &seen.kernel, &seen.scene.splatting, bins, bricks.len() as u32);
         gather.near = near.unwrap_or(gather.near);
         let ([columns, _], tile_rows) = (tile_bins::grid(size), tile_bins::TILE[1]);
@@ -96,7 +99,6 @@ impl<'a> Fixture<'a> {
         let (parts_buffer, stride) = at_offsets(device, &parts);
         let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|half| half.as_vec2().to_array()).collect();
         let (uncut, cut) = (Uncut::new(device), uniforms::cut(&seen.view, volume.grid(), &seen.scene, None, None));
-        let side = SIDES[size[0] as usize % SIDES.len()];
         let mode = GatherMode::of(&seen.scene.splatting, seen.view.perspective.is_some(), false, RayMode::default());
         let buffers = GatherBuffers {
             frame: &init(device, &[frame], BufferUsages::UNIFORM),
@@ -106,7 +108,7 @@ impl<'a> Fixture<'a> {
             starts: &storage(&bins.starts),
             entries: &storage(&bins.entries),
             control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
-            values: &VolumeTexture::upload_folded(device, gpu.queue(), volume.values(), side).view,
+            values: &values.view,
             labels: None,
             gathered: &gathered,
             half_boxes: &init(device, &half_boxes, BufferUsages::STORAGE),

@@ -25,6 +25,7 @@ use glam::{DVec3, UVec3};
 use sheetsplat::gpu::layout::{Cut, Frame, Indirect, QUADS, TileList};
 use sheetsplat::gpu::targets::no_surfaces;
 use sheetsplat::gpu::uniforms::{self, Ramps};
+use sheetsplat::gpu::volume_texture::ValueFormat;
 use sheetsplat::headless::{Headless, readback};
 use sheetsplat::kernel::Kernel;
 use sheetsplat::pass::composite::CutBuffers;
@@ -56,7 +57,7 @@ fn frame_over(grid: &Grid, scene: &Scene) -> Frame {
         iso_ranges: None,
         labels: BTreeMap::new(),
     });
-    uniforms::frame(&view, &kernel, grid, &ramps, scene)
+    uniforms::frame(&view, &kernel, (grid, ValueFormat::Bits), &ramps, scene)
 }
 
 /// What cuts no ray.

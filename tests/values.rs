@@ -1,0 +1,150 @@
+//! What stages see of a volume's values, `shaders/shared/volume.wgsl`: each to its last bit, however they are stored.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+#[expect(dead_code, reason = "not every file needs all of it")]
+mod common;
+
+use glam::{DVec3, UVec3};
+use sheetsplat::gpu::layout::Frame;
+use sheetsplat::gpu::uniforms::{self, Ramps};
+use sheetsplat::gpu::volume_texture::{SIDES, ValueFormat, VolumeTexture};
+use sheetsplat::headless::{Headless, readback};
+use sheetsplat::kernel::Kernel;
+use sheetsplat::view::View;
+use sheetsplat::volume::Volume;
+use sheetsplat::wgpu::util::DeviceExt;
+use sheetsplat::wgpu::{self, BindingResource, BufferUsages};
+
+use common::{Random, gpu, scene, transfer};
+
+/// The bits of a value for every word of the result.
+const READ: &str = concat!(
+    include_str!("../shaders/shared/frame.wgsl"),
+    include_str!("../shaders/shared/volume.wgsl"),
+    "
+    @group(0) @binding(1) var values: texture_2d_array<u32>;
+    @group(0) @binding(2) var<storage, read_write> result: array<u32>;
+    @compute @workgroup_size(64)
+    fn main(@builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) workgroup: vec3u) {
+        start(workgroup.z);
+        let at = id.x + id.y * 64u * 32768u;
+        if at < arrayLength(&result) { result[at] = bitcast<u32>(value_at(at)); }
+    }"
+);
+
+/// A frame, of which the shader reads how values are stored.
+fn frame(values: ValueFormat) -> Frame {
+    let mut scene = scene(8, 8);
+    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 1.0)]);
+    let volume = Volume::new("one", UVec3::ONE, DVec3::ONE, vec![0.0]).unwrap();
+    let view = View::new(volume.grid(), &scene.camera, &scene.splatting, [8; 2]).unwrap();
+    let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
+    let ramps = Ramps::new(&scene.transfer.resolve(&volume));
+    uniforms::frame(&view, &kernel, (volume.grid(), values), &ramps, &scene)
+}
+
+/// Uploads values in layers of such a side and lets a shader read them.
+fn seen(gpu: &Headless, values: &[f32], side: u32) -> Vec<f32> {
+    let device = gpu.device();
+    let uploaded = VolumeTexture::upload_folded(device, gpu.queue(), values, side);
+    let init = |contents: &[u8], usage| {
+        device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some("values"), contents, usage })
+    };
+    let frame = init(bytemuck::bytes_of(&frame(uploaded.format)), BufferUsages::UNIFORM);
+    let result = init(&vec![0x55; size_of_val(values)], BufferUsages::STORAGE | BufferUsages::COPY_SRC);
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some("values"),
+        source: wgpu::ShaderSource::Wgsl(READ.into()),
+    });
+    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some("values"),
+        layout: None,
+        module: &module,
+        entry_point: Some("main"),
+        compilation_options: wgpu::PipelineCompilationOptions::default(),
+        cache: None,
+    });
+    let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("values"),
+        layout: &pipeline.get_bind_group_layout(0),
+        entries: &[
+            wgpu::BindGroupEntry { binding: 0, resource: frame.as_entire_binding() },
+            wgpu::BindGroupEntry { binding: 1, resource: BindingResource::TextureView(&uploaded.view) },
+            wgpu::BindGroupEntry { binding: 2, resource: result.as_entire_binding() },
+        ],
+    });
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        let workgroups = (values.len() as u32).div_ceil(64);
+        pass.dispatch_workgroups(workgroups.min(32768), workgroups.div_ceil(32768), 1);
+    }
+    gpu.queue().submit([encoder.finish()]);
+    bytemuck::pod_collect_to_vec(&readback::buffer(device, gpu.queue(), &result).unwrap())
+}
+
+/// In layers of every side: the format, and that the bits come back.
+fn check(name: &str, values: &[f32], format: ValueFormat) {
+    let gpu = gpu();
+    assert_eq!(ValueFormat::of(values), format, "{name}");
+    for side in SIDES {
+        let seen = seen(&gpu, values, side);
+        let differs = (0..values.len()).find(|&at| seen[at].to_bits() != values[at].to_bits());
+        assert_eq!(differs.map(|at| (at, values[at], seen[at])), None, "{name}, side {side}");
+    }
+}
+
+/// So many random whole numbers of a range, and both its ends.
+fn whole(count: usize, [least, greatest]: [i32; 2]) -> Vec<f32> {
+    let (mut random, values) = (Random(7), f64::from(greatest) - f64::from(least) + 1.0);
+    let inside = (2..count).map(|_| least + (random.uniform(0.0, values) as i32));
+    inside.chain([greatest, least]).map(|value| value as f32).collect()
+}
+
+#[test]
+fn small_ranges_take_a_byte() {
+    check("bytes", &whole(5000, [0, 255]), ValueFormat::Offset8(0.0));
+    check("below 0", &whole(5000, [-200, 55]), ValueFormat::Offset8(-200.0));
+    check("around 0", &whole(5000, [-1, 1]), ValueFormat::Offset8(-1.0));
+    check("large", &whole(5000, [(1 << 24) - 255, 1 << 24]), ValueFormat::Offset8(16_776_961.0));
+    check("one", &[7.0], ValueFormat::Offset8(7.0));
+}
+
+#[test]
+fn larger_ones_take_two() {
+    check("256", &whole(5000, [0, 256]), ValueFormat::Offset16(0.0));
+    check("Hounsfield units", &whole(5000, [-1024, 3071]), ValueFormat::Offset16(-1024.0));
+    check("65535", &whole(5000, [-32768, 32767]), ValueFormat::Offset16(-32768.0));
+    check("far below 0", &whole(5000, [-(1 << 24), 65535 - (1 << 24)]), ValueFormat::Offset16(-16_777_216.0));
+}
+
+#[test]
+fn all_others_are_kept_as_they_are() {
+    check("65536", &whole(5000, [0, 65536]), ValueFormat::Bits);
+    let large = 16_777_218.0;
+    check("beyond 2^24", &[large, large + 2.0], ValueFormat::Bits);
+    check("beyond -2^24", &[-large, -large + 2.0], ValueFormat::Bits);
+    check("beyond i32", &[2.0_f32.powi(31), 2.0_f32.powi(31), 2.0_f32.powi(40)], ValueFormat::Bits);
+    check("fractions", &[0.0, 1.0, 1.5, 2.0], ValueFormat::Bits);
+    check("signed 0", &[-0.0, 0.0, 1.0], ValueFormat::Bits);
+    let ends = [f32::MAX, f32::MIN_POSITIVE, f32::from_bits(1), f32::EPSILON];
+    check("ends", &ends.into_iter().chain(ends.map(|value| -value)).collect::<Vec<_>>(), ValueFormat::Bits);
+    let mut random = Random(3);
+    let anything = std::iter::repeat_with(|| f32::from_bits(random.bits() as u32)).filter(|value| value.is_finite());
+    check("anything", &anything.take(5000).collect::<Vec<_>>(), ValueFormat::Bits);
+}
+
+/// More values than are sent at a time: in layers of the least side the second begins, in others the first goes on.
+#[test]
+fn layers_go_on_where_they_were_left() {
+    let mut values = whole(2048 * 2050 + 77, [-1000, 9000]);
+    check("two bytes", &values, ValueFormat::Offset16(-1000.0));
+    // A single one decides, wherever it is.
+    *values.last_mut().unwrap() = 0.5;
+    check("four", &values, ValueFormat::Bits);
+    values[3] = -0.0;
+    *values.last_mut().unwrap() = 1.0;
+    assert_eq!(ValueFormat::of(&values), ValueFormat::Bits);
+}
