@@ -85,7 +85,7 @@
 //! ([`splatting::Compositing`]) · *bucket* what touches one slab or group ([`bucket`]) · *iso-range* a closed interval of values that take
 //! part ([`iso_range`]) · *label* which segment of a segmented volume a voxel belongs to
 //! ([`Volume::labels`](volume::Volume::labels)) · *brick* 4×4×4 neighbouring voxels ([`brick`]) ·
-//! *tile* a 32×32 pixel square; of the tile rasterizer 16×16.
+//! *tile* a 32×32 pixel square; of the tile rasterizer one of 16×8.
 
 pub mod appearance;
 pub mod brick;

@@ -51,8 +51,8 @@ pub struct Counts {
     pub voxels_total: u64,
     /// Voxels that take part (SPEC §3).
     pub voxels_in_range: u64,
-    /// Voxels whose colour was computed for this frame. Tiles compute it again for every group and every part of a tile that a voxel
-    /// is drawn in; it counts once.
+    /// Voxels whose colour was computed for this frame. Tiles compute it again for every tile that a voxel is drawn in, and where more
+    /// is behind a tile than it remembers for every group; it counts once.
     pub voxels_shaded: u64,
     /// Voxel–slab overlaps of positive length, wherever they fall on the screen.
     pub sections_total: u64,
@@ -68,7 +68,7 @@ pub struct Counts {
     pub quads: u64,
     /// Tests of a brick against a sheet group; 0 by tiles, which test voxels.
     pub bricks_tested: u64,
-    /// Those of them whose voxels were looked at; by tiles for every part of a tile anew.
+    /// Those of them whose voxels were looked at; by tiles for every tile and group anew.
     pub bricks_visited: u64,
 }
 

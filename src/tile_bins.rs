@@ -29,12 +29,16 @@ const MAX_BRICKS: usize = 1 << 26;
 /// for what comes before and after: to look at every pixel's ray first of all.
 const MAX_PASSES: u32 = 64900;
 
-/// Passes of a group at most besides, with 8 threads in a subgroup: for itself, for the four units, and where parts of the queue end.
-const PASSES_PER_GROUP: u32 = 220;
+/// Passes of a group at most besides, with 8 threads in a subgroup, and of each unit.
+const PASSES_PER_GROUP: u32 = 60;
+const PASSES_PER_UNIT: u32 = 40;
 
 /// Passes of a brick at most, with 8 threads in a subgroup: 8 to fetch and visit it, 76 to find its voxels, 56 to shade them, 8 to keep
-/// them, 224 to add them to four units, and 10 where the queue is full.
-const PASSES_PER_BRICK: u32 = 382;
+/// them, and 10 where the queue is full.
+const PASSES_PER_BRICK: u32 = 158;
+
+/// Passes to add a brick's voxels to a unit.
+const PASSES_PER_ADDITION: u32 = 56;
 
 /// Times that a brick's voxels are shaded side by side.
 const SHADED_PER_BRICK: u32 = 8;
@@ -56,10 +60,11 @@ pub struct Passes {
 }
 
 impl Passes {
-    /// Those of a view whose voxels take at most `search` passes to look up their control points in memory.
-    pub fn new(search: u32) -> Self {
-        let per_group = PASSES_PER_GROUP + UNITS * PASSES_PER_LOOK;
-        Self { most: MAX_PASSES, per_group, per_brick: PASSES_PER_BRICK + SHADED_PER_BRICK * search, search }
+    /// Those of a view whose voxels take at most `search` passes to look up their control points in memory, for so many of a tile's units.
+    pub fn new(search: u32, units: u32) -> Self {
+        let per_group = PASSES_PER_GROUP + units * (PASSES_PER_UNIT + PASSES_PER_LOOK);
+        let per_brick = PASSES_PER_BRICK + units * PASSES_PER_ADDITION + SHADED_PER_BRICK * search;
+        Self { most: MAX_PASSES, per_group, per_brick, search }
     }
 }
 
@@ -78,6 +83,8 @@ pub struct TileBins {
     pub entries: Vec<u32>,
     /// For every group, nearest first, half the screen box around its footprints, pixels.
     pub half_boxes: Vec<DVec2>,
+    /// Workgroups that a tile is divided among: its units, if there is too much behind one for all of them together.
+    pub parts: u32,
     /// What bounds a dispatch.
     pub passes: Passes,
     /// Dispatches that are enough for every tile.
@@ -121,7 +128,8 @@ struct Pixels {
 
 impl TileBins {
     /// Sorts bricks by the tiles and groups they may touch, with kernels of the radius `support`. The sheet depths `covered` are in some
-    /// group even where they hold nothing. A thread takes so many passes. Neither list may have more than `most_words` words.
+    /// group even where they hold nothing. To look up a voxel's control points in memory takes at most `search` passes through loops.
+    /// Neither list may have more than `most_words` words.
     ///
     /// # Errors
     /// If there are more bricks, or more of them behind a tile, than the rasteriser can take.
@@ -131,7 +139,7 @@ impl TileBins {
         order: Order,
         covered: Range<f64>,
         support: f64,
-        passes: Passes,
+        search: u32,
         most_words: u64,
     ) -> Result<Self, Unfit> {
         let check = |what, required: u64, actual: u64| {
@@ -168,7 +176,11 @@ impl TileBins {
         starts.push(next);
         let entries: Vec<_> = strips.par_iter().map(|strip| sort.sorted(strip)).collect();
         let entries = entries.concat();
-        let dispatches = dispatches(&starts, groups as usize, &passes)?;
+        let of_parts = |parts| {
+            let passes = Passes::new(search, UNITS / parts);
+            dispatches(&starts, groups as usize, &passes).map(|dispatches| (parts, passes, dispatches))
+        };
+        let (parts, passes, dispatches) = of_parts(1).or_else(|_| of_parts(UNITS))?;
         Ok(Self {
             first_slab: first_group * SHEETS as i32,
             tiles: columns * rows,
@@ -176,6 +188,7 @@ impl TileBins {
             starts,
             entries,
             half_boxes,
+            parts,
             passes,
             dispatches,
         })

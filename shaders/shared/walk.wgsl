@@ -98,7 +98,7 @@ struct Found {
 }
 
 // Finds voxels for as many lanes as there are voxels left. Returns for how many.
-fn find_voxels(sought: Sought, found: ptr<function, Found>) -> u32 {
+fn next_voxels(sought: Sought, found: ptr<function, Found>) -> u32 {
     var count = 0u;
     while count < lanes {
         while found_count == sought_count && (to_visit != 0u || walk_next < walk_end) {

@@ -76,6 +76,8 @@ pub const GATHER: Shader = shader!(
     "region",
     "queue",
     "walk",
+    "gathered_pixels",
+    "gathered_voxels",
     "gathered_kernel",
     "held_ramps",
     "volume",

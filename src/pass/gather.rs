@@ -13,7 +13,7 @@ use crate::gpu::layout::{Brick, Cut, Frame, Gather as GatherUniform, Gathered, I
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
 use crate::splatting::{Compositing, Economies, FootprintBox, Order, Splatting};
-use crate::tile_bins::SHEETS;
+use crate::tile_bins::{SHEETS, UNITS};
 
 /// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug)]
@@ -33,16 +33,19 @@ pub struct GatherMode {
     economies: bool,
     labels: bool,
     rays: RayMode,
+    /// Whether tiles are divided.
+    divided: bool,
 }
 
 impl GatherMode {
-    /// The mode that splatting settings ask for, with or without an eye, and with or without `labels` that have ramps of their own.
-    pub fn of(splatting: &Splatting, perspective: bool, labels: bool, rays: RayMode) -> Self {
+    /// The mode that splatting settings ask for, with or without an eye, and with or without `labels` that have ramps of their own; each
+    /// tile in so many parts.
+    pub fn of(splatting: &Splatting, perspective: bool, labels: bool, rays: RayMode, parts: u32) -> Self {
         let Splatting { compositing, order, footprint_box, economies, .. } = *splatting;
         let economies = economies != Economies::default();
         // Every voxel has its own parallelogram there.
         let footprint_box = if perspective { FootprintBox::Rectangle } else { footprint_box };
-        Self { compositing, order, footprint_box, perspective, economies, labels, rays }
+        Self { compositing, order, footprint_box, perspective, economies, labels, rays, divided: parts > 1 }
     }
 }
 
@@ -77,15 +80,15 @@ pub struct GatherBuffers<'a> {
 
 impl Default for Gather {
     fn default() -> Self {
-        Self { stages: (0..Compositing::COUNT << 7).map(|_| OnceLock::new()).collect(), no_labels: OnceLock::new() }
+        Self { stages: (0..Compositing::COUNT << 8).map(|_| OnceLock::new()).collect(), no_labels: OnceLock::new() }
     }
 }
 
 impl Gather {
     fn stage(&self, mode: GatherMode) -> &OnceLock<ComputeStage> {
-        let GatherMode { compositing, order, footprint_box, perspective, economies, labels, rays } = mode;
+        let GatherMode { compositing, order, footprint_box, perspective, economies, labels, rays, divided } = mode;
         let [order, footprint_box] = [order as usize, footprint_box as usize];
-        let flags = [perspective, economies, labels, rays.cut, rays.first_hit].map(usize::from);
+        let flags = [perspective, economies, labels, rays.cut, rays.first_hit, divided].map(usize::from);
         let bits = [order, footprint_box].into_iter().chain(flags);
         &self.stages[bits.fold(compositing as usize, |number, bit| 2 * number + bit)]
     }
@@ -113,6 +116,7 @@ impl Gather {
             let constants = [
                 ("THREADS", f64::from(device.adapter_info().subgroup_max_size)),
                 ("QUEUE", f64::from(queue(device))),
+                ("PARTS", f64::from(parts(device, mode))),
                 ("COMPOSITING", f64::from(mode.compositing as u32)),
                 ("ORDER", f64::from(mode.order as u32)),
                 ("PERSPECTIVE", f64::from(u8::from(mode.perspective))),
@@ -139,7 +143,7 @@ impl Gather {
         let descriptor = wanted("sheetsplat.next", NEXT_BYTES, usage);
         let next: Vec<Buffer> = (0..dispatches).map(|_| device.create_buffer(&descriptor)).collect();
         let groups = next.iter().map(|next| self.bind_one(device, mode, buffers, acc, next)).collect();
-        GatherBand { mode, groups, next }
+        GatherBand { mode, groups, next, parts: parts(device, mode) }
     }
 
     fn bind_one(
@@ -177,7 +181,7 @@ impl Gather {
     /// Draws so many tiles of the part at `offset`. The band must have been cleared.
     pub fn record(&self, pass: &mut ComputePass<'_>, band: &GatherBand, offset: u32, tiles: u32) {
         let (Some(stage), Some(first)) = (self.stage(band.mode).get(), band.groups.first()) else { return };
-        stage.dispatch(pass, first, &[offset], tiles);
+        stage.dispatch(pass, first, &[offset], tiles * band.parts);
         for (group, args) in band.groups[1..].iter().zip(&band.next) {
             stage.dispatch_indirect(pass, group, &[offset], args);
         }
@@ -186,6 +190,11 @@ impl Gather {
 
 /// Bytes of memory for a workgroup that the stage asks for.
 pub const WORKGROUP_BYTES: u32 = 16384;
+
+/// Workgroups that a tile is divided among: one for every round of its threads, or one for all.
+fn parts(device: &Device, mode: GatherMode) -> u32 {
+    if mode.divided { 8 * UNITS / device.adapter_info().subgroup_max_size } else { 1 }
+}
 
 /// Voxels in a workgroup's queue: as many as there is room for beside the sheets of its tile's pixels. On a GPU more than that asks for
 /// would keep workgroups from running side by side.
@@ -206,6 +215,8 @@ const NEXT_BYTES: u64 = size_of::<Indirect>() as u64;
 #[derive(Debug)]
 pub struct GatherBand {
     mode: GatherMode,
+    /// Workgroups for each tile.
+    parts: u32,
     /// One for every dispatch.
     groups: Vec<BindGroup>,
     /// [`Indirect`]: what each leaves to the next, all tiles or nothing.

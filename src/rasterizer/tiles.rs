@@ -16,7 +16,7 @@ use crate::pass::gather::{Gather, GatherBand, GatherBuffers, GatherMode};
 use crate::rasterizer::request::FrameRequest;
 use crate::splatting::Order;
 use crate::stats::GroupSlabs;
-use crate::tile_bins::{self, Passes, SHEETS, TileBins};
+use crate::tile_bins::{self, SHEETS, TileBins};
 use crate::view::View;
 
 /// The stage.
@@ -71,10 +71,10 @@ impl TileRasterizer {
         let FrameRequest { splatting, view, kernel, covered, rays, .. } = request;
         let limits = device.limits();
         let mut old = Old::of(previous);
-        let passes = passes(request, volume.labels().is_some());
+        let search = all_search_passes(request, volume.labels().is_some());
         let is_current = |old: &Binned| {
             old.view == *view
-                && (old.order, old.revision, old.bins.passes) == (splatting.order, volume.revision, passes)
+                && (old.order, old.revision, old.bins.passes.search) == (splatting.order, volume.revision, search)
                 && (old.support, &old.covered) == (kernel.support(), covered)
         };
         let (current, stale) = match old.binned.take() {
@@ -85,7 +85,7 @@ impl TileRasterizer {
         let binned = match current {
             Some(binned) => binned,
             None => Binned {
-                bins: bins(&limits, request, bricks, passes)?,
+                bins: bins(&limits, request, bricks, search)?,
                 view: *view,
                 order: splatting.order,
                 covered: covered.clone(),
@@ -127,7 +127,7 @@ impl TileRasterizer {
         }
         let parts = write(old.parts.take(), &wanted.parts, &part_bytes)?;
 
-        let mode = GatherMode::of(splatting, view.perspective.is_some(), volume.labels().is_some(), *rays);
+        let mode = GatherMode::of(splatting, view.perspective.is_some(), volume.labels().is_some(), *rays, bins.parts);
         let buffers = GatherBuffers {
             frame: given.frame,
             gather: &uniform,
@@ -170,7 +170,7 @@ impl TileRasterizer {
         (bricks, lists): (&[Brick], usize),
         by_label: bool,
     ) -> Result<Needs, RenderError> {
-        let bins = bins(limits, request, bricks, passes(request, by_label))?;
+        let bins = bins(limits, request, bricks, all_search_passes(request, by_label))?;
         let wanted = WantedBuffers::new(limits, request, &bins, (bricks.len(), lists))?;
         let WantedBuffers { uniform, parts, starts, entries, gathered, half_boxes, bricks, .. } = wanted;
         let buffers: Vec<Wanted> =
@@ -292,19 +292,19 @@ fn part_stride(limits: &Limits) -> usize {
     size_of::<Part>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize)
 }
 
-fn bins(limits: &Limits, request: &FrameRequest, bricks: &[Brick], passes: Passes) -> Result<TileBins, RenderError> {
+fn bins(limits: &Limits, request: &FrameRequest, bricks: &[Brick], search: u32) -> Result<TileBins, RenderError> {
     let FrameRequest { view, splatting, kernel, covered, .. } = request;
     let most_words = binding(limits) / 4;
     let (order, support) = (splatting.order, kernel.support());
-    Ok(TileBins::new(bricks, view, order, covered.clone(), support, passes, most_words)?)
+    Ok(TileBins::new(bricks, view, order, covered.clone(), support, search, most_words)?)
 }
 
-fn passes(request: &FrameRequest, by_label: bool) -> Passes {
+/// Passes through loops to look up a voxel's control points: all ramps are searched in memory if any is, as threads hold no more than one
+/// point each.
+fn all_search_passes(request: &FrameRequest, by_label: bool) -> u32 {
     let lengths = request.ramps.lengths();
-    // All ramps are searched if any is.
     let in_memory = by_label || lengths.iter().any(|&points| points > *SUBGROUP_SIZES.start());
-    let search = if in_memory { 1 + lengths.iter().map(|&points| search_passes(points)).sum::<u32>() } else { 0 };
-    Passes::new(search)
+    if in_memory { 1 + lengths.iter().map(|&points| search_passes(points)).sum::<u32>() } else { 0 }
 }
 
 /// Passes through loops that a binary search among so many control points takes.

@@ -58,8 +58,7 @@ impl<'a> Fixture<'a> {
     fn bins(&self) -> TileBins {
         let Seen { view, kernel, scene: Scene { splatting, .. }, .. } = &self.seen;
         let covered = means::covered(view, self.volume.grid(), splatting);
-        let passes = Passes::new(0);
-        TileBins::new(self.bricks.bricks(), view, splatting.order, covered, kernel.support(), passes, u64::MAX).unwrap()
+        TileBins::new(self.bricks.bricks(), view, splatting.order, covered, kernel.support(), 0, u64::MAX).unwrap()
     }
 
     /// Draws over `acc`, in bands of at most so many rows. The nearest group begins at `near`, where that is given.
@@ -99,7 +98,13 @@ impl<'a> Fixture<'a> {
         let (parts_buffer, stride) = at_offsets(device, &parts);
         let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|half| half.as_vec2().to_array()).collect();
         let (uncut, cut) = (Uncut::new(device), uniforms::cut(&seen.view, volume.grid(), &seen.scene, None, None));
-        let mode = GatherMode::of(&seen.scene.splatting, seen.view.perspective.is_some(), false, RayMode::default());
+        let mode = GatherMode::of(
+            &seen.scene.splatting,
+            seen.view.perspective.is_some(),
+            false,
+            RayMode::default(),
+            bins.parts,
+        );
         let buffers = GatherBuffers {
             frame: &init(device, &[frame], BufferUsages::UNIFORM),
             gather: &init(device, &[gather], BufferUsages::UNIFORM),
@@ -209,6 +214,7 @@ fn sections() {
                     starts: (0..=tiles).collect(),
                     entries: vec![0; tiles as usize],
                     half_boxes: vec![view.half_box(kernel.support(), 0.0..1.0)],
+                    parts: 1,
                     passes: fixture.bins().passes,
                     dispatches: 1,
                 };

@@ -10,7 +10,7 @@ use sheetsplat::kernel::Kernel;
 use sheetsplat::reference::{self, Geometry};
 use sheetsplat::scene::Scene;
 use sheetsplat::splatting::Order;
-use sheetsplat::tile_bins::{self, Passes, SHEETS, TILE, TileBins, Unfit};
+use sheetsplat::tile_bins::{self, SHEETS, TILE, TileBins, Unfit};
 use sheetsplat::view::View;
 use sheetsplat::volume::Grid;
 
@@ -51,16 +51,7 @@ impl Case {
     fn bins(&self, most_words: u64) -> Result<TileBins, Unfit> {
         let Scene { camera, splatting, image, .. } = &self.scene;
         let view = View::new(&self.grid, camera, splatting, [image.width, image.height]).unwrap();
-        let passes = Passes::new(0);
-        TileBins::new(
-            self.bricks.bricks(),
-            &view,
-            splatting.order,
-            0.0..0.0,
-            self.kernel().support(),
-            passes,
-            most_words,
-        )
+        TileBins::new(self.bricks.bricks(), &view, splatting.order, 0.0..0.0, self.kernel().support(), 0, most_words)
     }
 
     /// What the kernels need: group, tile, brick.

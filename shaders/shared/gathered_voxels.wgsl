@@ -1,0 +1,222 @@
+// The voxels that a subgroup of the tile rasteriser draws in a sheet group: which of those before stay, which come, their shading, and
+// their counts.
+
+// A group of sheets: its number, its first sheet, where that begins, and half the box around its footprints.
+struct SheetGroup {
+    number: u32,
+    first_sheet: f32,
+    near: f32,
+    half_box: vec2f,
+}
+
+// The frame's sheets from the first that a kernel overlaps to the one after the last.
+fn overlapped_sheets(p: vec4f) -> vec2f {
+    let sheets = (overlapped(p, gather.depth_error, PERSPECTIVE) - gather.near) / frame.slab_width;
+    return vec2f(floor(sheets.x), ceil(sheets.y));
+}
+
+// Those of them that are in the group.
+fn sheets_here(sheets: vec2f) -> vec2f {
+    return clamp(sheets, vec2f(group.first_sheet), vec2f(group.first_sheet + f32(SHEETS)));
+}
+
+// The first of the groups that a kernel overlaps, in the order in which they are drawn.
+fn first_group(sheets: vec2f) -> f32 {
+    let sheet = select(min(sheets.y, f32(gather.groups * SHEETS)) - 1.0, max(sheets.x, 0.0), ORDER == FRONT_TO_BACK);
+    return floor(sheet / f32(SHEETS));
+}
+
+// The units in which the box around a footprint, or a part of its extent, holds one of some pixels.
+fn units_seen(words: vec4u, center: vec2f, half_box: vec2f, part: f32) -> u32 {
+    let half = half_box * part + BOX_SLACK;
+    if PARALLELOGRAM {
+        return units_in_parallelogram(words, center, half, gather.half_width * part + BOX_SLACK);
+    }
+    return units_in_box(words, center, half);
+}
+
+// The extent of a kernel's sections in the group as a part of the kernel's: that of the section next to the kernel's centre.
+fn extent_here(p: vec4f) -> f32 {
+    if PERSPECTIVE || ECONOMIES {
+        return 1.0;
+    }
+    let far = group.near + f32(SHEETS) * frame.slab_width;
+    let beside = max(max(group.near - p.z, p.z - far), 0.0) * frame.kernel_per_depth / frame.support;
+    return sqrt(max(1.0 - beside * beside, 0.0));
+}
+
+// Whether a voxel that is not seen in one group may be seen in the next: there boxes around footprints are of another size.
+fn may_appear() -> bool {
+    return PERSPECTIVE || ECONOMIES;
+}
+
+// Where voxels are whose kernels reach the group, or start in it, and whose boxes reach open pixels.
+fn sought_here(is_start: bool) -> Sought {
+    let bounds = bounds_of(open);
+    let offset = first_px - 0.5 * vec2f(frame.size);
+    let margin = group.half_box + BOX_SLACK;
+    let far = group.near + f32(SHEETS) * frame.slab_width;
+    let reach = frame.reach + gather.depth_error;
+    let least_reach = select(frame.reach, 0.0, frame.kernel_per_depth == 0.0) - 2.0 * gather.depth_error;
+    var depths = vec2f(group.near - reach, far + reach);
+    if is_start && ORDER == FRONT_TO_BACK {
+        depths.x = group.near + least_reach;
+    }
+    if is_start && ORDER != FRONT_TO_BACK {
+        depths.y = far - least_reach;
+    }
+    return Sought(vec3f(bounds.low - margin + offset, depths.x), vec3f(bounds.high + margin + offset, depths.y));
+}
+
+// Of the voxels of the group before those stay in the queue that reach into this one and are seen there.
+fn keep_voxels() {
+    let count = queue_count;
+    queue_count = 0u;
+    for (var i = 0u; i < count; i += lanes) {
+        passes += 1u;
+        let slot = queue_first + min(i + lane, count - 1u);
+        let point = queue_points[slot];
+        let amount = queue_amounts[slot];
+        let p = vec4f(bitcast<vec3f>(point.xyz), 1.0);
+        let sheets = overlapped_sheets(p);
+        let is_in = i + lane < count && is_drawn_here(p, sheets);
+        let new_slot = queue_first + queue_count + before(ballot(is_in));
+        enqueue(is_in, point.w, p, units_here(p));
+        if is_in {
+            queue_amounts[new_slot] = amount;
+            count_drawn(point.w, p, sheets, false);
+        }
+    }
+}
+
+// Finds as many voxels as there is room for in the queue: all that reach into the group, or those that start in it.
+fn find_voxels(sought: Sought, is_start: bool) {
+    while queue_count + lanes <= queue_size {
+        passes += PASSES_PER_FIND;
+        var found: Found;
+        let count = next_voxels(sought, &found);
+        if count == 0u {
+            break;
+        }
+        let p = project(found.at);
+        let sheets = overlapped_sheets(p);
+        let is_sought = !is_start || first_group(sheets) == f32(group.number);
+        enqueue(lane < count && is_drawn_here(p, sheets) && is_sought, found.voxel, p, units_here(p));
+    }
+}
+
+// Whether a kernel reaches into the group, and its box holds an open pixel.
+fn is_drawn_here(p: vec4f, sheets: vec2f) -> bool {
+    let here = sheets_here(sheets);
+    return here.x < here.y && units_seen(open, p.xy - first_px, group.half_box, 1.0) != 0u;
+}
+
+// The units that a kernel's sections in the group reach.
+fn units_here(p: vec4f) -> u32 {
+    return units_seen(open, p.xy - first_px, group.half_box, extent_here(p));
+}
+
+// Shades the voxels in the queue from one on.
+fn shade_voxels(first: u32) {
+    for (var i = first; i < queue_count; i += lanes) {
+        // Every lane shades its voxel.
+        passes += PASSES_PER_SHADING + gather.search_passes;
+        let is_in = i + lane < queue_count;
+        let slot = queue_first + min(i + lane, queue_count - 1u);
+        let voxel = queue_points[slot].w;
+        let at = voxel_of(bricks[voxel / BRICK_VOXELS], voxel % BRICK_VOXELS);
+        let p = project(at);
+        let shaded = shaded(at, p);
+        let sheets = overlapped_sheets(p);
+        var units = queue_units[slot];
+        if ECONOMIES {
+            units = economic_units(shaded, p, sheets);
+        }
+        if is_in {
+            queue_amounts[slot] = shaded.amount;
+            queue_units[slot] = units;
+            if PERSPECTIVE {
+                queue_points[slot].w = bitcast<u32>(p.w);
+            }
+        }
+        if is_in && (!ECONOMIES || units != 0u) {
+            count_drawn(voxel, p, sheets, units >> WHOLE_SHIFT != 0u);
+        }
+    }
+}
+
+// The units that a voxel is drawn to among §8's economies, and the sheet of the group that takes it as a whole.
+fn economic_units(shaded: Shaded, p: vec4f, sheets: vec2f) -> u32 {
+    let center = p.xy - first_px;
+    let is_deep = units_seen(shallow, center, group.half_box, 1.0) == 0u;
+    let is_whole = is_deep || shaded.alpha < gather.whole_below;
+    var whole = -1.0;
+    var is_here = true;
+    if is_whole {
+        let last_of_first = floor(max(sheets.x, 0.0) / f32(SHEETS)) * f32(SHEETS) + f32(SHEETS - 1u);
+        let center_sheet = floor((p.z - gather.near) / frame.slab_width);
+        let sheet = clamp(center_sheet, sheets.x, sheets.y - 1.0);
+        whole = select(sheet, min(sheet, last_of_first), is_deep) - group.first_sheet;
+        is_here = whole >= 0.0 && whole < f32(SHEETS);
+    }
+    let rims = footprint_at(p, group.near, whole, shaded.amount).rim;
+    let rim = max(max(rims.x, rims.y), max(rims.z, rims.w));
+    let part = sqrt(clamp(rim, 0.0, frame.support * frame.support)) / frame.support;
+    let units = select(0u, units_seen(open, center, group.half_box, part), is_here && rim > 0.0);
+    return select(0u, units | select(0u, (1u + u32(max(whole, 0.0))) << WHOLE_SHIFT, is_whole), units != 0u);
+}
+
+// A voxel's color and what it adds per unit length, `(C·m, m)`, and its opacity.
+struct Shaded {
+    amount: vec4f,
+    alpha: f32,
+}
+
+fn shaded(voxel: vec3u, p: vec4f) -> Shaded {
+    let index = index_of(voxel);
+    let value = value_at(index);
+    let gradient = gradient_at(voxel);
+    var ramps = vec4u(0u, frame.ramps.xyz);
+    var color = vec3f(0.0);
+    var alpha = 0.0;
+    var is_searched = LABELS;
+    if LABELS {
+        ramps = ramps_of(index);
+    } else {
+        color = ramp_at(color_ramp, value);
+        alpha = ramp_at(opacity_ramp, value).x;
+        // Without a gradient opacity it is one point, which every lane holds.
+        var by_gradient = gradient_opacity_ramp.own.y;
+        for (var is_graded = ramps.w > ramps.z + 1u; is_graded; is_graded = false) {
+            by_gradient = ramp_at(gradient_opacity_ramp, gradient.magnitude).x;
+        }
+        alpha *= by_gradient;
+        is_searched = is_long(color_ramp) || is_long(opacity_ramp) || is_long(gradient_opacity_ramp);
+    }
+    for (; is_searched; is_searched = false) {
+        color = ramp(ramps.x, ramps.y, value);
+        alpha = ramp(ramps.y, ramps.z, value).x * ramp(ramps.z, ramps.w, gradient.magnitude).x;
+    }
+    let m = amount(alpha);
+    color = shade(color, gradient, lighting(p.xy, PERSPECTIVE));
+    return Shaded(vec4f(color * m, m), alpha);
+}
+
+// Counts a voxel that is drawn into the group, and its sections there, if no other tile has: as one if it is drawn as a whole.
+fn count_drawn(voxel: u32, p: vec4f, sheets: vec2f, is_whole: bool) {
+    // Of the groups that the kernel reaches into, counted from the nearest; a whole one is drawn once.
+    let nth = select(group.number - u32(max(sheets.x, 0.0)) / SHEETS, 0u, is_whole);
+    let word = nth * gather.bricks * 2u + voxel / 32u;
+    let bit = 1u << (voxel % 32u);
+    if (atomicOr(&gathered.words[gather.drawn + word], bit) & bit) != 0u {
+        return;
+    }
+    let here = sheets_here(sheets);
+    var sections = u32(here.y - here.x);
+    if PERSPECTIVE {
+        let footprint = footprint_at(p, group.near, -1.0, vec4f(0.0));
+        sections = sections_on_screen(p.xy, footprint.axis, footprint.maps, here - group.first_sheet);
+    }
+    sections = select(sections, min(sections, 1u), is_whole);
+    drawn += vec2u(select(0u, 1u, nth == 0u && sections > 0u), sections);
+}
