@@ -220,7 +220,9 @@ fn draw(tile: u32, first_thread: u32, thread: u32) {
         loop {
             passes += PASSES_PER_FILL;
             find_voxels(sought, is_kept);
+            subgroupBarrier();
             shade_voxels(first_new);
+            subgroupBarrier();
             let is_last = is_walked();
             has_drawn |= queue_count > 0u;
             for (var round = first_thread; round < end_thread; round += THREADS) {
@@ -258,6 +260,7 @@ fn draw(tile: u32, first_thread: u32, thread: u32) {
                     }
                 }
             }
+            subgroupBarrier();
             if is_last {
                 break;
             }

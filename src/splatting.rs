@@ -84,7 +84,7 @@ pub enum Rasterizer {
     Auto,
     /// Footprint quads, drawn into sheet buffers (§3.2).
     Quads,
-    /// Compute: every tile gathers its sections front to back. Needs [`wgpu::Features::SUBGROUP`] with 8 to 32 threads, 16 KiB of
+    /// Compute: every tile gathers its sections front to back. Needs [`TILE_FEATURES`](crate::gpu::device::TILE_FEATURES) with 8 to 32 threads, 16 KiB of
     /// memory for a workgroup as WebGPU has by default, and the summed-area form.
     Tiles,
 }

@@ -7,7 +7,7 @@ mod common;
 use glam::{DVec3, UVec3};
 use sheetsplat::camera::Projection;
 use sheetsplat::error::RenderError;
-use sheetsplat::gpu::device::DeviceRequirements;
+use sheetsplat::gpu::device::{DeviceRequirements, TILE_FEATURES};
 use sheetsplat::gpu::targets::CompositingBuffer;
 use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::scene::Scene;
@@ -55,7 +55,7 @@ fn crowded() -> (Volume, Scene) {
 
 #[test]
 fn auto_takes_tiles_where_they_can_be_had() {
-    let [subgroups, none] = [Features::SUBGROUP, Features::empty()].map(open);
+    let [subgroups, none] = [TILE_FEATURES, Features::empty()].map(open);
     let (volume, mut scene) = head();
     assert_eq!(scene.splatting.rasterizer, Rasterizer::Auto, "the default");
     assert_eq!(drawn_by(&subgroups, &volume, &scene), "tiles");
@@ -73,7 +73,7 @@ fn auto_takes_tiles_where_they_can_be_had() {
 
 #[test]
 fn what_insists_on_tiles_is_refused_without() {
-    let [subgroups, none] = [Features::SUBGROUP, Features::empty()].map(open);
+    let [subgroups, none] = [TILE_FEATURES, Features::empty()].map(open);
     let refused = |gpu: &Headless, (volume, scene): &(Volume, Scene), words: &[&str]| {
         let (key, message) = refusal(gpu, volume, scene);
         assert_eq!(key, "splatting.rasterizer", "{message}");
@@ -86,6 +86,11 @@ fn what_insists_on_tiles_is_refused_without() {
     };
     let tiles = with(|scene| scene.splatting.rasterizer = Rasterizer::Tiles);
     refused(&none, &tiles, &["\"tiles\"", "subgroups", "\"quads\""]);
+    refused(&open(Features::SUBGROUP), &tiles, &["\"tiles\"", "barriers", "\"quads\""]);
+    let limits = Limits { max_compute_workgroup_storage_size: 16383, ..Limits::default() };
+    let requirements = Some(DeviceRequirements { features: TILE_FEATURES, limits });
+    let little = Headless::new(&HeadlessOptions { requirements, ..lavapipe() }).unwrap();
+    refused(&little, &tiles, &["max_compute_workgroup_storage_size", "16383", "16384", "\"quads\""]);
     let parallelogram = with(|scene| scene.splatting.footprint_box = FootprintBox::Parallelogram);
     refused(&none, &parallelogram, &["\"tiles\"", "subgroups"]);
     assert_eq!(drawn_by(&subgroups, &parallelogram.0, &parallelogram.1), "tiles");
@@ -140,7 +145,7 @@ fn small_bindings_change_no_bit_of_tiles() {
     scene.splatting.rasterizer = Rasterizer::Tiles;
     let [full, small] = [Limits::default().max_storage_buffer_binding_size, 200 << 10].map(|bytes| {
         let limits = Limits { max_storage_buffer_binding_size: bytes, ..Limits::default() };
-        let requirements = Some(DeviceRequirements { features: Features::SUBGROUP, limits });
+        let requirements = Some(DeviceRequirements { features: TILE_FEATURES, limits });
         Headless::new(&HeadlessOptions { requirements, ..lavapipe() }).unwrap()
     });
     assert_eq!(CompositingBuffer::bands(&small.device().limits(), [300, 200]).unwrap().len(), 7);

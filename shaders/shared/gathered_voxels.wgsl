@@ -81,6 +81,7 @@ fn keep_voxels() {
         let sheets = overlapped_sheets(p);
         let is_in = i + lane < count && is_drawn_here(p, sheets);
         let new_slot = queue_first + queue_count + before(ballot(is_in));
+        subgroupBarrier();
         enqueue(is_in, point.w, p, units_here(p));
         if is_in {
             queue_amounts[new_slot] = amount;

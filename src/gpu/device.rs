@@ -82,8 +82,10 @@ fn list(limits: &[InsufficientLimit]) -> String {
 }
 
 /// Features that the renderer uses where a device has them. None is required.
-pub const WANTED_FEATURES: Features =
-    Features::FLOAT32_BLENDABLE.union(Features::TIMESTAMP_QUERY).union(Features::SUBGROUP);
+pub const WANTED_FEATURES: Features = Features::FLOAT32_BLENDABLE.union(Features::TIMESTAMP_QUERY).union(TILE_FEATURES);
+
+/// Features that the tile rasterizer cannot do without.
+pub const TILE_FEATURES: Features = Features::SUBGROUP.union(Features::SUBGROUP_BARRIER);
 
 /// Features and limits of a device.
 #[derive(Clone, Debug, PartialEq)]

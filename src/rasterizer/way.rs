@@ -1,8 +1,9 @@
 //! Which rasterizer draws a view, and what it does not draw.
 
-use wgpu::{Device, Features};
+use wgpu::Device;
 
 use crate::error::RenderError;
+use crate::gpu::device::TILE_FEATURES;
 use crate::pass::composite::RayMode;
 use crate::pass::gather::WORKGROUP_BYTES;
 use crate::splatting::{Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
@@ -54,8 +55,8 @@ fn obstacle_to_tiles(device: &Device, splatting: &Splatting) -> Option<RenderErr
     if splatting.footprint != FootprintForm::SummedArea {
         return refused("splatting.footprint = \"sections\"".to_owned(), "\"summed-area\" with it, or \"quads\"");
     }
-    if !device.features().contains(Features::SUBGROUP) {
-        return refused("a device without subgroups".to_owned(), "\"quads\"");
+    if !device.features().contains(TILE_FEATURES) {
+        return refused("a device without subgroups, or barriers for them".to_owned(), "\"quads\"");
     }
     let info = device.adapter_info();
     let sizes = [info.subgroup_min_size, info.subgroup_max_size];

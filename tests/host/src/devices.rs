@@ -1,6 +1,6 @@
 //! Devices with little, with too little, and options that no device has.
 
-use sheetsplat::gpu::device::{DeviceError, InsufficientLimit};
+use sheetsplat::gpu::device::{DeviceError, InsufficientLimit, TILE_FEATURES};
 use sheetsplat::{Blend, DeviceRequirements, Renderer, RendererOptions};
 use wgpu::{Features, Limits, TextureFormat};
 
@@ -18,7 +18,7 @@ fn the_least_device_and_webgpus_defaults_do() {
     let full = Host::new();
     let least = Limits { max_storage_buffer_binding_size: 16 << 20, ..DeviceRequirements::LEAST.limits };
     for limits in [least, Limits::default()] {
-        for features in [Features::empty(), Features::SUBGROUP] {
+        for features in [Features::empty(), TILE_FEATURES] {
             let host = Host::with(features, limits.clone());
             DeviceRequirements::check(&host.device).unwrap();
             for (key, value) in [
@@ -83,8 +83,8 @@ fn merging_takes_the_better_of_both() {
         },
         ..wgpu::DeviceDescriptor::default()
     };
-    DeviceRequirements { features: Features::SUBGROUP, limits: Limits::default() }.merge_into(&mut descriptor);
-    assert_eq!(descriptor.required_features, Features::DEPTH_CLIP_CONTROL | Features::SUBGROUP);
+    DeviceRequirements { features: TILE_FEATURES, limits: Limits::default() }.merge_into(&mut descriptor);
+    assert_eq!(descriptor.required_features, Features::DEPTH_CLIP_CONTROL | TILE_FEATURES);
     let expected = Limits {
         max_texture_dimension_2d: 9000,
         // Lower is better.
