@@ -1,6 +1,6 @@
 // The tile rasteriser: draws tiles front to back without sheet buffers in memory. A subgroup keeps the sheets of a group for its
 // pixels in registers, gathers the kernel sections that fall on them (§3.2), composites them (eq. 2), and skips what lies behind
-// its opaque pixels (§6). Subgroups share nothing, so there are no barriers, and sums have one order whatever else runs.
+// its opaque pixels (§6). Subgroups share nothing, so barriers are among a subgroup's threads, and sums have one order whatever else runs.
 //
 // Threads hold four pixels each, one below the other, in units of 8×4 pixels; a tile has four units, and a subgroup of 8 to 32 threads
 // goes round them, one, two or all at a time. What it knows of voxels serves all rounds. Software drivers execute what an `if` leaves

@@ -18,7 +18,8 @@ fn validated(shader: &Shader) -> Result<(Module, ModuleInfo), String> {
     let failed = |message: String| format!("{}: {message}", shader.stage);
     let module = naga::front::wgsl::parse_str(shader.source)
         .map_err(|error| failed(error.emit_to_string_with_path(shader.source, shader.stage)))?;
-    let subgroups = if *shader == WITH_SUBGROUPS { Capabilities::SUBGROUP } else { Capabilities::empty() };
+    let of_subgroups = Capabilities::SUBGROUP | Capabilities::SUBGROUP_BARRIER;
+    let subgroups = if *shader == WITH_SUBGROUPS { of_subgroups } else { Capabilities::empty() };
     let info = Validator::new(ValidationFlags::all(), WEBGPU_CORE | subgroups)
         .validate(&module)
         .map_err(|error| failed(error.emit_to_string_with_path(shader.source, shader.stage)))?;
