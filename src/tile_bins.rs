@@ -315,7 +315,7 @@ pub fn grid(size: [u32; 2]) -> [u32; 2] {
     [size[0].div_ceil(TILE[0]), size[1].div_ceil(TILE[1])]
 }
 
-/// Dispatches that are enough for every tile: in each it takes rounds until one might be too much.
+/// Dispatches that are enough for every tile: in each it takes groups until one might be too much.
 fn dispatches(starts: &[u32], groups: usize, passes: &Passes) -> Result<u32, Unfit> {
     let most_bricks = passes.most.saturating_sub(passes.per_group) / passes.per_brick;
     let of_tile = |first: usize| {

@@ -80,11 +80,10 @@ fn keep_voxels() {
         let p = vec4f(bitcast<vec3f>(point.xyz), 1.0);
         let sheets = overlapped_sheets(p);
         let is_in = i + lane < count && is_drawn_here(p, sheets);
-        let new_slot = queue_first + queue_count + before(ballot(is_in));
         subgroupBarrier();
-        enqueue(is_in, point.w, p, units_here(p));
+        let kept_slot = enqueue(is_in, point.w, p, units_here(p));
         if is_in {
-            queue_amounts[new_slot] = amount;
+            queue_amounts[kept_slot] = amount;
             count_drawn(point.w, p, sheets, false);
         }
     }
@@ -102,7 +101,7 @@ fn find_voxels(sought: Sought, is_start: bool) {
         let p = project(found.at);
         let sheets = overlapped_sheets(p);
         let is_sought = !is_start || first_group(sheets) == f32(group.number);
-        enqueue(lane < count && is_drawn_here(p, sheets) && is_sought, found.voxel, p, units_here(p));
+        _ = enqueue(lane < count && is_drawn_here(p, sheets) && is_sought, found.voxel, p, units_here(p));
     }
 }
 

@@ -29,15 +29,16 @@ fn before(lanes_in: u32) -> u32 {
     return countOneBits(lanes_in & ((1u << lane) - 1u));
 }
 
-// Puts some lanes' voxels at its end.
-fn enqueue(is_in: bool, voxel: u32, point: vec4f, units: u32) {
+// Puts some lanes' voxels at its end. Returns where.
+fn enqueue(is_in: bool, voxel: u32, point: vec4f, units: u32) -> u32 {
     let lanes_in = ballot(is_in);
+    let slot = queue_first + queue_count + before(lanes_in);
     if is_in {
-        let slot = queue_first + queue_count + before(lanes_in);
         queue_points[slot] = vec4u(bitcast<vec3u>(point.xyz), voxel);
         queue_units[slot] = units;
     }
     queue_count += countOneBits(lanes_in);
+    return slot;
 }
 
 // Whether there is an n-th voxel, and some of a subgroup's units see it.

@@ -311,13 +311,13 @@ pub struct Gather {
     pub beta: f32,
     /// A whole kernel's integral through its centre, over what a footprint must add to a sheet's alpha.
     pub peak: f32,
-    /// Where in [`Gathered`]'s words it is written, for every unit of every tile, at which round of which group its subgroup goes on.
+    /// Where in [`Gathered`]'s words it is written, for every unit of every tile, at which group its subgroup goes on.
     pub reached: u32,
     /// Passes through loops that a thread may take in one dispatch; see [`tile_bins`](crate::tile_bins).
     pub most_passes: u32,
-    /// Those of a round at most, bricks not counted.
+    /// Those of a group at most, bricks not counted.
     pub passes_per_group: u32,
-    /// Those of a brick in a round at most.
+    /// Those of a brick in a group at most.
     pub passes_per_brick: u32,
     /// Those to look up a voxel's control points in memory at most.
     pub search_passes: u32,

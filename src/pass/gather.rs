@@ -13,7 +13,7 @@ use crate::gpu::layout::{Brick, Cut, Frame, Gather as GatherUniform, Gathered, I
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
 use crate::splatting::{Compositing, Economies, FootprintBox, Order, Splatting};
-use crate::tile_bins::{SHEETS, UNITS};
+use crate::tile_bins::{SHEETS, TILE};
 
 /// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug)]
@@ -193,13 +193,15 @@ pub const WORKGROUP_BYTES: u32 = 16384;
 
 /// Workgroups that a tile is divided among: one for every round of its threads, or one for all.
 fn parts(device: &Device, mode: GatherMode) -> u32 {
-    if mode.divided { 8 * UNITS / device.adapter_info().subgroup_max_size } else { 1 }
+    // Threads hold four pixels.
+    if mode.divided { TILE[0] * TILE[1] / 4 / device.adapter_info().subgroup_max_size } else { 1 }
 }
 
 /// Voxels in a workgroup's queue: as many as there is room for beside the sheets of its tile's pixels. On a GPU more than that asks for
 /// would keep workgroups from running side by side.
 fn queue(device: &Device) -> u32 {
-    const SHEETS_BYTES: u32 = 128 * SHEETS * 16;
+    const SHEETS_BYTES: u32 = TILE[0] * TILE[1] * SHEETS * size_of::<[f32; 4]>() as u32;
+    // Point, amount and units.
     const VOXEL_BYTES: u32 = 36;
     let bytes = match device.adapter_info().device_type {
         DeviceType::Cpu => device.limits().max_compute_workgroup_storage_size.min(2 * WORKGROUP_BYTES),

@@ -18,6 +18,7 @@ mod shade;
 mod splat;
 mod tile_bins;
 mod tiles;
+mod values;
 
 use std::collections::BTreeMap;
 
@@ -34,7 +35,7 @@ use sheetsplat::transfer_function::TransferFunction;
 use sheetsplat::view::View;
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::util::DeviceExt;
-use sheetsplat::wgpu::{self, Buffer, BufferUsages, Device, TextureView};
+use sheetsplat::wgpu::{self, BindingResource, Buffer, BufferUsages, Device, TextureView};
 
 /// A frame, for stages that see nothing of the volume but it.
 fn frame(adjust: impl FnOnce(&mut Scene)) -> Frame {
@@ -125,40 +126,46 @@ fn contents<T: bytemuck::Pod>(gpu: &Headless, buffer: &Buffer) -> Vec<T> {
             let at = id.x + id.y * 64u * 32768u;
             if at < arrayLength(&source) { result[at] = source[at]; }
         }";
+    written(gpu, COPY, &[buffer.as_entire_binding()], buffer.size() / 4)
+}
+
+/// What the `main` of some WGSL writes into so many words, the binding after the last given one; its workgroups have 64 threads, at most
+/// 32768 of them in a row.
+fn written<T: bytemuck::Pod>(gpu: &Headless, source: &str, given: &[BindingResource<'_>], words: u64) -> Vec<T> {
     let device = gpu.device();
-    let copy = device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("copy"),
-        size: buffer.size(),
+    let result = device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("written"),
+        size: words * 4,
         usage: BufferUsages::STORAGE | BufferUsages::COPY_SRC,
         mapped_at_creation: false,
     });
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("copy"),
-        source: wgpu::ShaderSource::Wgsl(COPY.into()),
+        label: Some("written"),
+        source: wgpu::ShaderSource::Wgsl(source.into()),
     });
     let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some("copy"),
+        label: Some("written"),
         layout: None,
         module: &module,
         entry_point: Some("main"),
         compilation_options: wgpu::PipelineCompilationOptions::default(),
         cache: None,
     });
+    let resources = given.iter().cloned().chain([result.as_entire_binding()]);
+    let entries: Vec<_> =
+        (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
     let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("copy"),
+        label: Some("written"),
         layout: &pipeline.get_bind_group_layout(0),
-        entries: &[
-            wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() },
-            wgpu::BindGroupEntry { binding: 1, resource: copy.as_entire_binding() },
-        ],
+        entries: &entries,
     });
     compute(gpu, |pass| {
         pass.set_pipeline(&pipeline);
         pass.set_bind_group(0, &group, &[]);
-        let workgroups = (buffer.size() as u32 / 4).div_ceil(64);
+        let workgroups = (words as u32).div_ceil(64);
         pass.dispatch_workgroups(workgroups.min(32768), workgroups.div_ceil(32768), 1);
     });
-    bytemuck::pod_collect_to_vec::<u8, T>(&readback::buffer(device, gpu.queue(), &copy).unwrap())
+    bytemuck::pod_collect_to_vec::<u8, T>(&readback::buffer(device, gpu.queue(), &result).unwrap())
 }
 
 /// Submits a compute pass.

@@ -1,26 +1,22 @@
 //! What stages see of a volume's values, `shaders/shared/volume.wgsl`: each to its last bit, however they are stored.
-#![expect(clippy::unwrap_used, reason = "tests")]
-
-#[expect(dead_code, reason = "not every file needs all of it")]
-mod common;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::gpu::layout::Frame;
 use sheetsplat::gpu::uniforms::{self, Ramps};
 use sheetsplat::gpu::volume_texture::{SIDES, ValueFormat, VolumeTexture};
-use sheetsplat::headless::{Headless, readback};
+use sheetsplat::headless::Headless;
 use sheetsplat::kernel::Kernel;
 use sheetsplat::view::View;
 use sheetsplat::volume::Volume;
-use sheetsplat::wgpu::util::DeviceExt;
-use sheetsplat::wgpu::{self, BindingResource, BufferUsages};
+use sheetsplat::wgpu::{BindingResource, BufferUsages};
 
-use common::{Random, gpu, scene, transfer};
+use crate::common::{Random, gpu, scene, transfer};
+use crate::{init, written};
 
 /// The bits of a value for every word of the result.
 const READ: &str = concat!(
-    include_str!("../shaders/shared/frame.wgsl"),
-    include_str!("../shaders/shared/volume.wgsl"),
+    include_str!("../../shaders/shared/frame.wgsl"),
+    include_str!("../../shaders/shared/volume.wgsl"),
     "
     @group(0) @binding(1) var values: texture_2d_array<u32>;
     @group(0) @binding(2) var<storage, read_write> result: array<u32>;
@@ -47,42 +43,9 @@ fn frame(values: ValueFormat) -> Frame {
 fn seen(gpu: &Headless, values: &[f32], side: u32) -> Vec<f32> {
     let device = gpu.device();
     let uploaded = VolumeTexture::upload_folded(device, gpu.queue(), values, side);
-    let init = |contents: &[u8], usage| {
-        device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some("values"), contents, usage })
-    };
-    let frame = init(bytemuck::bytes_of(&frame(uploaded.format)), BufferUsages::UNIFORM);
-    let result = init(&vec![0x55; size_of_val(values)], BufferUsages::STORAGE | BufferUsages::COPY_SRC);
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("values"),
-        source: wgpu::ShaderSource::Wgsl(READ.into()),
-    });
-    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some("values"),
-        layout: None,
-        module: &module,
-        entry_point: Some("main"),
-        compilation_options: wgpu::PipelineCompilationOptions::default(),
-        cache: None,
-    });
-    let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("values"),
-        layout: &pipeline.get_bind_group_layout(0),
-        entries: &[
-            wgpu::BindGroupEntry { binding: 0, resource: frame.as_entire_binding() },
-            wgpu::BindGroupEntry { binding: 1, resource: BindingResource::TextureView(&uploaded.view) },
-            wgpu::BindGroupEntry { binding: 2, resource: result.as_entire_binding() },
-        ],
-    });
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    {
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        pass.set_pipeline(&pipeline);
-        pass.set_bind_group(0, &group, &[]);
-        let workgroups = (values.len() as u32).div_ceil(64);
-        pass.dispatch_workgroups(workgroups.min(32768), workgroups.div_ceil(32768), 1);
-    }
-    gpu.queue().submit([encoder.finish()]);
-    bytemuck::pod_collect_to_vec(&readback::buffer(device, gpu.queue(), &result).unwrap())
+    let frame = init(device, &[frame(uploaded.format)], BufferUsages::UNIFORM);
+    let given = [frame.as_entire_binding(), BindingResource::TextureView(&uploaded.view)];
+    written(gpu, READ, &given, values.len() as u64)
 }
 
 /// In layers of every side: the format, and that the bits come back.
