@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use crate::transfer_function::{Ramp, Tables, TransferFunction};
+use crate::settings::transfer_function::{Ramp, Tables, TransferFunction};
 
 /// A set of values: ranges of ordinals, ascending, disjoint and not adjacent.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -2,20 +2,20 @@
 
 use wgpu::{BindGroup, Buffer, CommandEncoder, Texture, TextureFormat, TextureView};
 
+use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
 use crate::rasterizer::quads::QuadFrame;
 use crate::rasterizer::samples::SampleFrame;
 use crate::rasterizer::tiles::TileFrame;
 use crate::stats::{GroupSlabs, Staging, Totals};
-use crate::view::View;
 
 /// A frame whose buffers are all allocated and filled: recording it cannot fail.
 #[derive(Debug)]
 pub(crate) struct PreparedFrame {
     /// Format and number of the sheets of the renderer that prepared it.
     pub(crate) sheets: (TextureFormat, u32),
-    pub(crate) view: View,
+    pub(crate) view: ViewGeometry,
     pub(crate) drawing: Drawing,
     pub(crate) compositing: CompositingBuffer,
     pub(crate) uniform: Buffer,
@@ -66,7 +66,7 @@ pub(crate) struct Kept {
 
 impl Kept {
     /// For a frame of `view`, drawn into sheets of such a format and number.
-    pub(crate) fn of(frame: Option<PreparedFrame>, sheets: (TextureFormat, u32), view: &View) -> Self {
+    pub(crate) fn of(frame: Option<PreparedFrame>, sheets: (TextureFormat, u32), view: &ViewGeometry) -> Self {
         let Some(old) = frame else { return Self::default() };
         let same_size = old.compositing.size == view.size;
         Self {

@@ -5,17 +5,17 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use wgpu::{Device, Queue, TextureView};
 
-use crate::classify::{classify, in_rows, takes_part};
-use crate::clip::ClippedVoxels;
 use crate::error::RenderError;
+use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::brick_lists::BrickLists;
-use crate::gpu_volume::GpuVolume;
-use crate::iso_range::ValueSet;
-use crate::plan::{Overlaps, tile_grid};
+use crate::gpu::gpu_volume::GpuVolume;
+use crate::lists::classify::{classify, in_rows, takes_part};
+use crate::lists::iso_range::ValueSet;
+use crate::lists::quad_plan::{Overlaps, tile_grid};
+use crate::lists::value_list::ValueList;
+use crate::settings::clip::ClippedVoxels;
+use crate::settings::transfer_function::{LabelTables, Ramp, Tables, TransferFunction};
 use crate::stats::{Counts, GroupSlabs, Totals};
-use crate::transfer_function::{LabelTables, Ramp, Tables, TransferFunction};
-use crate::value_list::ValueList;
-use crate::view::View;
 use crate::volume::{Grid, Volume};
 
 /// The voxels of a volume that take part under a transfer function.
@@ -188,7 +188,7 @@ impl ClassifiedVolume {
     }
 
     /// What of a frame's counts (Table 4) is known before it is drawn.
-    pub fn totals(&self, view: &View, groups: &GroupSlabs) -> Totals {
+    pub fn totals(&self, view: &ViewGeometry, groups: &GroupSlabs) -> Totals {
         let overlaps = self.lists.bricks().map(|bricks| Overlaps::count(bricks, view));
         let Overlaps { voxels, sections, slabs } = overlaps.fold(Overlaps::default(), Overlaps::and);
         // A group's first or last sheets can lie outside of what any kernel touches.

@@ -6,23 +6,26 @@
 
 #![expect(clippy::unwrap_used, reason = "a bench")]
 
+#[path = "../common/mod.rs"]
 #[expect(dead_code, reason = "not every bench needs all of it")]
 mod common;
+mod slice_lists;
 
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
-use sheetsplat::classified_volume::Touched;
+use sheetsplat::SceneView;
 use sheetsplat::headless::{Headless, HeadlessOptions};
-use sheetsplat::iso_range::ValueSet;
+use sheetsplat::internals::gpu::classified_volume::Touched;
+use sheetsplat::internals::iso_range::ValueSet;
+use sheetsplat::internals::value_list::ValueList;
 use sheetsplat::scene::Scene;
-use sheetsplat::scene_view::SceneView;
-use sheetsplat::shading::Light;
-use sheetsplat::slice_lists::SliceLists;
-use sheetsplat::transfer_function::{Ramp, TransferFunction};
-use sheetsplat::value_list::ValueList;
+use sheetsplat::settings::Light;
+use sheetsplat::settings::{Ramp, TransferFunction};
+
+use crate::slice_lists::SliceLists;
 
 /// A change by name. The number of the repetition makes it another one each time; of the scene's voxels the value is given that so
 /// many percent do not exceed.

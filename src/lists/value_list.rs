@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::iso_range::{ValueSet, ordinal};
+use crate::lists::iso_range::{ValueSet, ordinal};
 
 /// The relevant voxels of a volume, all but those of the least value, sorted by value and then by index.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -58,7 +58,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::transfer_function::{Ramp, TransferFunction};
+    use crate::settings::transfer_function::{Ramp, TransferFunction};
 
     #[test]
     fn finds_what_a_scan_finds() {

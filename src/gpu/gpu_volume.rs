@@ -5,9 +5,9 @@ use std::sync::{Arc, OnceLock};
 use wgpu::{Device, Queue, TextureView};
 
 use crate::error::RenderError;
-use crate::fault::scoped;
+use crate::gpu::fault::scoped;
 use crate::gpu::volume_texture::{ValueFormat, VolumeTexture};
-use crate::value_list::ValueList;
+use crate::lists::value_list::ValueList;
 use crate::volume::Volume;
 
 /// A volume and its textures on a device. A clone is the same volume: nothing is uploaded twice.

@@ -2,8 +2,8 @@
 
 use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 
-use crate::camera::{Camera, Projection};
 use crate::error::RenderError;
+use crate::settings::camera::{Camera, Projection};
 
 /// How far lengths may differ, or cosines be from 0, relative: more than matrices that were multiplied in f32 are rounded by, and
 /// less than a screen shows.

@@ -5,12 +5,12 @@ use std::ops::Range;
 use glam::DVec4;
 use rayon::prelude::*;
 
-use crate::brick;
-use crate::bucket::Buckets;
+use crate::geometry::slab;
+use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::layout::Brick;
-use crate::slab;
-use crate::splatting::Order;
-use crate::view::View;
+use crate::lists::brick;
+use crate::lists::bucket::Buckets;
+use crate::settings::splatting::Order;
 
 /// Side of a tile, pixels (§6).
 pub const TILE: u32 = 32;
@@ -23,8 +23,8 @@ pub fn tile_grid(size: [u32; 2]) -> [u32; 2] {
 /// A frame: which bricks every sheet group looks at, in the order the groups are composited.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FramePlan {
-    /// The view; that of another frame's plan will do where [`View::has_depths_of`] says so.
-    pub view: View,
+    /// The view; that of another frame's plan will do where [`ViewGeometry::has_depths_of`] says so.
+    pub view: ViewGeometry,
     /// Sheets of a group.
     pub sheets: u32,
     /// For every list its bricks, sorted by first group.
@@ -49,7 +49,7 @@ impl FramePlan {
     /// nothing.
     pub fn new<'a>(
         lists: impl IntoIterator<Item = &'a [Brick]>,
-        view: View,
+        view: ViewGeometry,
         sheets: u32,
         order: Order,
         covered: Range<f64>,
@@ -111,7 +111,7 @@ pub struct Overlaps {
 
 impl Overlaps {
     /// Those of some bricks.
-    pub fn count(bricks: &[Brick], view: &View) -> Self {
+    pub fn count(bricks: &[Brick], view: &ViewGeometry) -> Self {
         let bricks = bricks.par_iter();
         if view.perspective.is_none() {
             let depths = PlaceDepths::new(view);
@@ -140,7 +140,7 @@ impl Overlaps {
 }
 
 /// Sheet depths without perspective, in slabs: those of a brick's places are the brick's and the place's. Frames are counted as often
-/// as they are drawn, hence sums instead of [`View::touched`] for every voxel.
+/// as they are drawn, hence sums instead of [`ViewGeometry::touched`] for every voxel.
 struct PlaceDepths {
     /// Of a voxel and 1.
     depth: DVec4,
@@ -151,7 +151,7 @@ struct PlaceDepths {
 }
 
 impl PlaceDepths {
-    fn new(view: &View) -> Self {
+    fn new(view: &ViewGeometry) -> Self {
         let mut depth = view.screen_from_voxel[2];
         depth.w -= view.slabs.origin;
         depth /= view.slabs.width;

@@ -1,14 +1,20 @@
 //! The renderer a host embeds: it owns pipelines, never a device, and neither submits nor waits. Every frame it prepares, which can
 //! fail, records, and presents, which cannot.
 
+pub(crate) mod options;
+pub(crate) mod pick;
+pub(crate) mod placement;
+pub(crate) mod prepared_frame;
+pub(crate) mod scene_view;
+
 use std::sync::OnceLock;
 
 use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Queue, RenderPass, TextureFormat, TextureView};
 
 use crate::error::{RenderError, check_device};
-use crate::fault::scoped;
 use crate::gpu::bindings::{Wanted, grown, sizes, wanted, wanted_for, written};
 use crate::gpu::device::{self, DeviceError, DeviceRequirements};
+use crate::gpu::fault::scoped;
 use crate::gpu::layout::{Cut, Frame, Tally};
 use crate::gpu::targets::{CompositingBuffer, no_surfaces};
 use crate::gpu::timer::{PASS_BYTES, Timer};
@@ -16,17 +22,17 @@ use crate::gpu::uniforms;
 use crate::pass::composite::CutBuffers;
 use crate::pass::first_hit::FirstHit;
 use crate::pass::resolve::Resolve;
-use crate::placement::Placement;
-use crate::prepared_frame::{Drawing, FirstHits, Kept, PreparedFrame};
 use crate::rasterizer::Given;
 use crate::rasterizer::quads::QuadRasterizer;
 use crate::rasterizer::request::FrameRequest;
 use crate::rasterizer::samples::SampleRasterizer;
 use crate::rasterizer::tiles::TileRasterizer;
 use crate::rasterizer::way::{Way, insists_on_tiles};
-use crate::renderer_options::RendererOptions;
-use crate::scene_view::{Prepared, SceneView};
-use crate::splatting::Rasterizer;
+use crate::renderer::options::RendererOptions;
+use crate::renderer::placement::Placement;
+use crate::renderer::prepared_frame::{Drawing, FirstHits, Kept, PreparedFrame};
+use crate::renderer::scene_view::{Prepared, SceneView};
+use crate::settings::splatting::Rasterizer;
 use crate::stats::Staging;
 
 /// The pipelines of every stage, for one device. Volumes and frames are separate and can be many.
@@ -90,7 +96,7 @@ impl Renderer {
     /// If the scene asks for something not implemented, or for more than the device's limits allow, or the device fails. What is found
     /// before anything is allocated leaves the view's last frame. After anything else, and a failure of the device always, the view has no
     /// frame, and is not drawn until it is prepared again: after
-    /// [`OutOfMemory`](crate::fault::DeviceFault::OutOfMemory) with less, after any other by a new renderer.
+    /// [`OutOfMemory`](crate::gpu::fault::DeviceFault::OutOfMemory) with less, after any other by a new renderer.
     pub fn prepare(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
         check_device(device, &self.device, "the renderer")?;
         check_device(device, view.volume.gpu_volume().device(), "the view")?;
@@ -104,7 +110,7 @@ impl Renderer {
 
     /// Bytes of GPU memory that a new view with these settings will hold once prepared, [`SceneView::gpu_bytes`], exactly; nothing is
     /// allocated, and [`Self::prepare`] will refuse for limits' sake what this refuses. Sorts bricks into buckets as a first frame does.
-    /// What the volume itself takes, and whether to upload it, [`GpuVolume::estimate`](crate::gpu_volume::GpuVolume::estimate) says.
+    /// What the volume itself takes, and whether to upload it, [`GpuVolume::estimate`](crate::gpu::gpu_volume::GpuVolume::estimate) says.
     ///
     /// # Errors
     /// If the scene asks for something not implemented, or for more than the device's limits allow.

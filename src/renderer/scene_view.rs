@@ -2,21 +2,21 @@
 
 use wgpu::{CommandEncoder, Device, Texture};
 
-use crate::camera::Camera;
-use crate::classified_volume::{ClassifiedVolume, Touched};
-use crate::clip::Clip;
 use crate::error::{RenderError, check_device};
-use crate::fault::scoped;
-use crate::gpu_volume::GpuVolume;
-use crate::pick::PendingPick;
-use crate::prepared_frame::PreparedFrame;
+use crate::geometry::surfaces::Surfaces;
+use crate::gpu::classified_volume::{ClassifiedVolume, Touched};
+use crate::gpu::fault::scoped;
+use crate::gpu::gpu_volume::GpuVolume;
 pub use crate::rasterizer::Prepared;
+use crate::renderer::pick::PendingPick;
+use crate::renderer::prepared_frame::PreparedFrame;
 use crate::scene::{ImageSettings, Scene};
-use crate::shading::{Light, Shading};
-use crate::splatting::Splatting;
+use crate::settings::camera::Camera;
+use crate::settings::clip::Clip;
+use crate::settings::shading::{Light, Shading};
+use crate::settings::splatting::Splatting;
+use crate::settings::transfer_function::TransferFunction;
 use crate::stats::PendingCounts;
-use crate::surfaces::Surfaces;
-use crate::transfer_function::TransferFunction;
 
 /// A view of a volume: camera, image, transfer function, shading and splatting settings, and the last frame's buffers. Setters
 /// take effect with the next [`Renderer::prepare`](crate::renderer::Renderer::prepare).
@@ -110,14 +110,14 @@ impl SceneView {
 
     /// Opaque surfaces of the host, `None` for none: in front of them the volume shows, behind them it does not, and voxels there are
     /// culled as behind opaque ones (§6). Where a surface lies in a slab, it cuts the slab's sheet in proportion, as clip planes do
-    /// ([`clip`](crate::clip)). The texture must hold what it is to hold when the frame is submitted.
+    /// ([`Clip`](crate::settings::Clip)). The texture must hold what it is to hold when the frame is submitted.
     pub fn set_surfaces(&mut self, surfaces: Option<Surfaces>) {
         self.surfaces = surfaces;
     }
 
     /// Asks for the depth at which every pixel's opacity reaches a value, above 0 and at most 1; `None` for none. Front to back only, and
-    /// with culling at most [`Splatting::opacity_threshold`]; not for [`Compositing::Minimum`](crate::splatting::Compositing::Minimum), and
-    /// whatever the value that of the surface for [`Compositing::Surface`](crate::splatting::Compositing::Surface). See
+    /// with culling at most [`Splatting::opacity_threshold`]; not for [`Compositing::Minimum`](crate::settings::splatting::Compositing::Minimum), and
+    /// whatever the value that of the surface for [`Compositing::Surface`](crate::settings::splatting::Compositing::Surface). See
     /// [`Self::first_hits`] and [`Self::pick`].
     pub fn set_first_hit(&mut self, opacity: Option<f64>) {
         self.first_hit = opacity;

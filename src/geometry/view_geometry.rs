@@ -5,11 +5,11 @@ use std::ops::Range;
 
 use glam::{DVec2, DVec3, DVec4, UVec3};
 
-use crate::camera::{Camera, Eye, ViewBasis};
 use crate::error::RenderError;
-use crate::grid_warp::{self, FootprintMap};
-use crate::slab::{MAX_SLABS, SlabGrid};
-use crate::splatting::{Method, Splatting};
+use crate::geometry::grid_warp::{self, FootprintMap};
+use crate::geometry::slab::{MAX_SLABS, SlabGrid};
+use crate::settings::camera::{Camera, Eye, ViewBasis};
+use crate::settings::splatting::{Method, Splatting};
 use crate::volume::Grid;
 
 /// How far from its slice, in slices, an axis-aligned voxel reaches: into no other, whatever the rounding.
@@ -20,7 +20,7 @@ const SLICES: SlabGrid = SlabGrid { origin: -0.5, width: 1.0 };
 
 /// A view.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
+pub struct ViewGeometry {
     /// The viewing coordinate system in world space.
     pub basis: ViewBasis,
     /// Pixels: width, height.
@@ -28,7 +28,7 @@ pub struct View {
     /// Rows that map voxel indices (i, j, k, 1) to pixels right of the image's middle and below it, both times the fourth; to sheet
     /// depth; and to the depth from the eye, 1 without one.
     ///
-    /// Sheet depth is what [`View::slabs`] are planes of. Image-aligned it is orthographic the depth in the warped grid, in perspective
+    /// Sheet depth is what [`ViewGeometry::slabs`] are planes of. Image-aligned it is orthographic the depth in the warped grid, in perspective
     /// the depth in `unit`s, both from the volume's centre; axis-aligned it is the slice, counted along w;
     /// where every voxel is composited by itself, 0.
     pub screen_from_voxel: [DVec4; 4],
@@ -102,7 +102,7 @@ pub struct Bounds {
     pub depths: Range<f64>,
 }
 
-impl View {
+impl ViewGeometry {
     /// # Errors
     /// If pixels are too small or too large for `f32`, or there are more than
     /// [`MAX_SLABS`].

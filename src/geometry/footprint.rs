@@ -4,8 +4,8 @@
 //! extent. The ball's truncation is not baked into the summed-area table: the splat shader clamps z to the chord, so the
 //! table stays smooth up to the rim.
 
-use crate::kernel::Kernel;
-use crate::splatting::FootprintForm;
+use crate::geometry::kernel::Kernel;
+use crate::settings::splatting::FootprintForm;
 
 /// Number of pre-integrated sections (§3.2).
 pub const SECTIONS: u32 = 128;

@@ -4,7 +4,7 @@ use glam::{DMat4, DVec2, DVec3, DVec4};
 use wgpu::{TextureUsages, TextureView};
 
 use crate::error::RenderError;
-use crate::view::{Rays, View};
+use crate::geometry::view_geometry::{Rays, ViewGeometry};
 use crate::volume::Grid;
 
 /// How far a host's projection may be from the camera's, pixels.
@@ -36,7 +36,7 @@ pub struct SurfaceDepths {
 
 impl Surfaces {
     /// Checks that the texture covers the image, and that its projection is the view's.
-    pub(crate) fn depths(&self, view: &View, grid: &Grid) -> Result<SurfaceDepths, RenderError> {
+    pub(crate) fn depths(&self, view: &ViewGeometry, grid: &Grid) -> Result<SurfaceDepths, RenderError> {
         let refused = |key, found: String, allowed: String| Err(RenderError::OutOfRange { key, found, allowed });
         let texture = self.depth.texture();
         let reached = [0, 1].map(|axis| u64::from(self.origin[axis]) + u64::from(view.size[axis]));
@@ -69,7 +69,7 @@ impl Surfaces {
     }
 
     /// By how many pixels the host's projection is off, at most, of points at the volume's near end, its middle and its far end.
-    fn disagreement(&self, view: &View, rays: &Rays, grid: &Grid) -> f64 {
+    fn disagreement(&self, view: &ViewGeometry, rays: &Rays, grid: &Grid) -> f64 {
         let half = DVec2::from(view.size.map(f64::from)) / 2.0;
         let (middle, half_depth) = (rays.depth_of(DVec3::ZERO), (grid.center() * grid.aspect()).length() + 1.0);
         // In front of an eye.
@@ -85,7 +85,7 @@ impl Surfaces {
         off.fold(0.0, |worst: f64, off| if worst.is_nan() || off <= worst { worst } else { off })
     }
 
-    fn by_value(&self, view: &View, rays: &Rays, unit: f64) -> SurfaceDepths {
+    fn by_value(&self, view: &ViewGeometry, rays: &Rays, unit: f64) -> SurfaceDepths {
         let world_from_clip = self.clip_from_world.inverse();
         let [x, y, z, w] = [0, 1, 2, 3].map(|row| world_from_clip.row(row));
         let ahead = view.basis.w / unit;

@@ -3,7 +3,7 @@
 use wgpu::{BlendState, Device, Features, TextureFormat, TextureFormatFeatureFlags, TextureSampleType, TextureUsages};
 
 use crate::gpu::device::DeviceError;
-use crate::splatting::Rasterizer;
+use crate::settings::splatting::Rasterizer;
 
 /// What a renderer is made for.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use crate::splatting::{Compositing, Splatting};
-use crate::view::View;
+use crate::geometry::view_geometry::ViewGeometry;
+use crate::settings::splatting::{Compositing, Splatting};
 use crate::volume::Grid;
 
 /// A box around the volume's centre.
@@ -20,7 +20,7 @@ pub struct RayBox {
 impl RayBox {
     /// That of [`Compositing::Minimum`], where kernels are complete, or of [`Compositing::Average`], all voxels; the others look at
     /// none.
-    pub fn new(view: &View, grid: &Grid, splatting: &Splatting) -> Self {
+    pub fn new(view: &ViewGeometry, grid: &Grid, splatting: &Splatting) -> Self {
         let (centers, near) = (grid.center(), view.perspective.map_or(f64::NEG_INFINITY, |it| it.eye.near));
         if splatting.compositing != Compositing::Minimum {
             return Self { half: centers + 0.5, nearest: near };
@@ -33,7 +33,7 @@ impl RayBox {
 
 /// The sheet depths whose slabs count even where they hold nothing, empty for none: those that some ray counts for
 /// [`Compositing::Minimum`].
-pub fn covered(view: &View, grid: &Grid, splatting: &Splatting) -> Range<f64> {
+pub fn covered(view: &ViewGeometry, grid: &Grid, splatting: &Splatting) -> Range<f64> {
     if splatting.compositing != Compositing::Minimum {
         return 0.0..0.0;
     }

@@ -5,7 +5,7 @@
 
 use glam::{DMat2, DMat3, DVec2, DVec3};
 
-use crate::camera::ViewBasis;
+use crate::settings::camera::ViewBasis;
 
 /// Eq. 4: world to view, rows u, v, w.
 pub fn m_view(basis: &ViewBasis) -> DMat3 {
@@ -118,7 +118,7 @@ impl FootprintMap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Camera;
+    use crate::settings::camera::Camera;
 
     fn views() -> Vec<(ViewBasis, DVec3)> {
         let directions = [DVec3::Y, DVec3::X, DVec3::new(0.3, 0.9, -0.2), DVec3::new(-0.7, 0.1, 0.69), DVec3::ONE];

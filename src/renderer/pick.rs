@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3, UVec3};
 use wgpu::{Buffer, BufferAsyncError, BufferDescriptor, BufferUsages, CommandEncoder, Device, MapMode, Texture};
 
 use crate::error::RenderError;
-use crate::view::View;
+use crate::geometry::view_geometry::ViewGeometry;
 use crate::volume::Volume;
 
 /// A point of a volume.
@@ -29,7 +29,7 @@ pub struct Pick {
 #[derive(Debug)]
 pub struct PendingPick {
     staging: Buffer,
-    view: View,
+    view: ViewGeometry,
     pixel: [u32; 2],
     volume: Arc<Volume>,
     arrival: Option<Receiver<Result<(), BufferAsyncError>>>,
@@ -41,7 +41,7 @@ impl PendingPick {
         encoder: &mut CommandEncoder,
         first_hits: &Texture,
         pixel: [u32; 2],
-        view: &View,
+        view: &ViewGeometry,
         volume: &Arc<Volume>,
     ) -> Self {
         let staging = device.create_buffer(&BufferDescriptor {

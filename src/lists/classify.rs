@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::clip::ClippedVoxels;
-use crate::transfer_function::TransferFunction;
+use crate::settings::clip::ClippedVoxels;
+use crate::settings::transfer_function::TransferFunction;
 use crate::volume::Volume;
 
 /// Indices of the voxels that take part, in memory order, x fastest.

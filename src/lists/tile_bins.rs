@@ -6,11 +6,11 @@ use std::ops::Range;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use crate::brick;
 use crate::error::RenderError;
+use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::layout::Brick;
-use crate::splatting::Order;
-use crate::view::View;
+use crate::lists::brick;
+use crate::settings::splatting::Order;
 
 /// Width and height of the rasteriser's tiles, pixels.
 pub const TILE: [u32; 2] = [16, 8];
@@ -135,7 +135,7 @@ impl TileBins {
     /// If there are more bricks, or more of them behind a tile, than the rasteriser can take.
     pub fn new(
         bricks: &[Brick],
-        view: &View,
+        view: &ViewGeometry,
         order: Order,
         covered: Range<f64>,
         support: f64,
@@ -287,7 +287,7 @@ impl Placed {
 }
 
 /// The bricks that are before the eye, in memory order whatever changes of iso-range came before: equal scenes add up in equal order.
-fn place(bricks: &[Brick], view: &View) -> Vec<Placed> {
+fn place(bricks: &[Brick], view: &ViewGeometry) -> Vec<Placed> {
     let groups = view.slabs.groups(SHEETS);
     let mut placed: Vec<Placed> = (bricks.par_iter().enumerate())
         .filter(|(_, brick)| brick.present != [0; 2])
