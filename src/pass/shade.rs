@@ -55,14 +55,14 @@ impl Shade {
         let ShadeBuffers { frame, bricks, values, labels, control_points, places, args, splats } = buffers;
         let whole = Buffer::as_entire_binding;
         let resources = [
-            whole(frame),
-            whole(bricks),
-            BindingResource::TextureView(values),
-            whole(control_points),
-            whole(places),
-            whole(args),
-            whole(splats),
-            BindingResource::TextureView(labels.unwrap_or(&self.no_labels.view)),
+            ("frames", whole(frame)),
+            ("bricks", whole(bricks)),
+            ("values", BindingResource::TextureView(values)),
+            ("control_points", whole(control_points)),
+            ("fresh", whole(places)),
+            ("args", whole(args)),
+            ("splats", whole(splats)),
+            ("labels", BindingResource::TextureView(labels.unwrap_or(&self.no_labels.view))),
         ];
         let has_labels = labels.is_some();
         let stage = self.stages[usize::from(has_labels)].get_or_init(|| compile(device, has_labels));
@@ -80,14 +80,14 @@ impl Shade {
 fn compile(device: &Device, labels: bool) -> ComputeStage {
     let stage = ShaderStages::COMPUTE;
     let slots = [
-        uniform::<Frame>(stage, false),
-        storage::<Brick>(stage, true),
-        texture_of_integers(stage, TextureViewDimension::D2Array),
-        storage::<[f32; 4]>(stage, true),
-        storage::<u32>(stage, true),
-        storage::<Indirect>(stage, true),
-        storage::<Splat>(stage, false),
-        texture_of_integers(stage, TextureViewDimension::D2Array),
+        ("frames", uniform::<Frame>(stage, false)),
+        ("bricks", storage::<Brick>(stage, true)),
+        ("values", texture_of_integers(stage, TextureViewDimension::D2Array)),
+        ("control_points", storage::<[f32; 4]>(stage, true)),
+        ("fresh", storage::<u32>(stage, true)),
+        ("args", storage::<Indirect>(stage, true)),
+        ("splats", storage::<Splat>(stage, false)),
+        ("labels", texture_of_integers(stage, TextureViewDimension::D2Array)),
     ];
     let constants = [("LABELS", f64::from(u8::from(labels)))];
     ComputeStage::new(device, shaders::SHADE, "main", &slots, &constants)
