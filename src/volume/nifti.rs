@@ -62,11 +62,20 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
     })
 }
 
-/// The rest of a file's name where it ends with `from`, or with that and `.gz`; with `to` instead.
+/// The other file of a pair, if there is one.
+pub(super) fn data_files(path: &Path) -> Result<Vec<PathBuf>, VolumeError> {
+    let sibling = sibling(path, ".img", ".hdr").or_else(|| sibling(path, ".hdr", ".img"));
+    Ok(sibling.filter(|sibling| sibling.exists()).into_iter().collect())
+}
+
+/// The rest of a file's name where it ends with `from`, or with that and `.gz`; with `to` instead. All of them are in upper case if
+/// the name's end is.
 fn sibling(path: &Path, from: &str, to: &str) -> Option<PathBuf> {
     let name = path.file_name()?.to_str()?;
-    let (stem, gz) = name.strip_suffix(".gz").map_or((name, ""), |stem| (stem, ".gz"));
-    Some(path.with_file_name(format!("{}{to}{gz}", stem.strip_suffix(from)?)))
+    [str::to_ascii_lowercase, str::to_ascii_uppercase].iter().find_map(|case| {
+        let (stem, gz) = name.strip_suffix(&case(".gz")).map_or((name, ""), |stem| (stem, &name[stem.len()..]));
+        Some(path.with_file_name(format!("{}{}{gz}", stem.strip_suffix(&case(from))?, case(to))))
+    })
 }
 
 fn open(path: &Path) -> Result<Stream, VolumeError> {

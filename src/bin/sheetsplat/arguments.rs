@@ -1,5 +1,6 @@
 //! Arguments that several subcommands take.
 
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::ValueEnum;
@@ -122,9 +123,22 @@ impl Input {
         let sets = self.raw.sets().into_iter().chain(self.look.sets()).chain(sets.iter().cloned()).collect::<Vec<_>>();
         match self.name.strip_prefix("builtin:") {
             Some(name) => Scene::from_volume(VolumeSource::Builtin(name.to_owned()), &sets),
-            None if self.name.ends_with(".toml") => Scene::open(self.name.as_ref(), &sets),
+            None if self.is_scene_file() => Scene::open(self.name.as_ref(), &sets),
             None => Scene::from_volume(VolumeSource::File(self.name.clone().into()), &sets),
         }
+    }
+
+    fn is_scene_file(&self) -> bool {
+        Path::new(&self.name).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+    }
+
+    /// The files that a scene and its volume are read from.
+    pub(crate) fn files(&self, scene: &Scene) -> Result<Vec<PathBuf>, Failure> {
+        let mut files = scene.files().map_err(|error| self.failure(error))?;
+        if self.is_scene_file() {
+            files.push(self.name.clone().into());
+        }
+        Ok(files)
     }
 
     /// Loads the scene's volume.

@@ -7,7 +7,7 @@ use sheetsplat::stats::Stats;
 
 use crate::arguments::Input;
 use crate::failure::Failure;
-use crate::stdout;
+use crate::{outputs, stdout};
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  sheetsplat bench builtin:head --frames 20 --rotate 3")]
@@ -40,6 +40,7 @@ struct Report {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let input = &arguments.input;
     let mut scene = input.scene()?;
+    outputs::check(&[], true, &input.files(&scene)?)?;
     let start = Instant::now();
     let volume = input.load_volume(&scene)?;
     let load_ms = milliseconds_since(start);

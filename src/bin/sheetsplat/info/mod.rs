@@ -11,7 +11,7 @@ use sheetsplat::volume::{Orientation, SampleType, Volume};
 
 use crate::arguments::Input;
 use crate::failure::Failure;
-use crate::stdout;
+use crate::{outputs, stdout};
 use statistics::{Histogram, extent_and_mean};
 
 #[derive(clap::Args)]
@@ -60,7 +60,9 @@ struct Info {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let input = &arguments.input;
-    let volume = input.load_volume(&input.scene()?)?;
+    let scene = input.scene()?;
+    outputs::check(&[], true, &input.files(&scene)?)?;
+    let volume = input.load_volume(&scene)?;
     let [min, max, mean] = extent_and_mean(volume.values());
     let percentiles = quantiles(volume.values(), |_| true, PERCENTILES.map(|(percent, _)| percent / 100.0));
     let encoding = volume.encoding();

@@ -8,12 +8,14 @@ use std::io::{self, BufWriter, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use sheetsplat::image::{Image, aside};
+use sheetsplat::image::Image;
+use sheetsplat::image::output::Target;
 use sheetsplat::scene::Scene;
 
 use crate::annotate::Annotate;
 use crate::arguments::{Depth, Input, log_frame};
 use crate::failure::Failure;
+use crate::outputs;
 use crate::progress::Progress;
 use movie::{Encoder, Format, Settings};
 use numbered::Pattern;
@@ -87,8 +89,11 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
     })?;
     Image::check_format(output)?;
     let wanted = frames.len();
+    let named = frames.clone().map(|frame| ("--output", pattern.path(frame)));
+    outputs::check_distinct(named, false, &input.files(&scene)?)?;
     let frames: Vec<u32> = frames.filter(|&frame| *overwrite || !pattern.path(frame).exists()).collect();
     log::info!("{} of {wanted} frames are there already", wanted - frames.len());
+    frames.iter().try_for_each(|&frame| outputs::check_writable(&pattern.path(frame)))?;
     draw(arguments, &scene, &frames, progress, |frame, image| {
         Ok(image.save(&pattern.path(frame), arguments.depth.into())?)
     })
@@ -117,14 +122,16 @@ fn movie(
         draw(arguments, scene, &frames, progress, |_, image| encoder.add(image).map_err(failed))?;
         encoder.finish().and_then(|()| to.flush()).map_err(failed)
     };
+    let inputs = input.files(scene)?;
     if output == Path::new("-") {
+        outputs::check(&[], true, &inputs)?;
         return encode(&mut io::stdout().lock(), &|error| Failure::Other(format!("standard output: {error}")));
     }
-    let failed = |error: io::Error| Failure::Other(format!("{}: {error}", output.display()));
-    let file = aside(output, &[]).map_err(failed)?;
-    encode(&mut BufWriter::new(file.as_file()), &failed)?;
-    file.persist(output).map_err(|error| failed(error.error))?;
-    Ok(())
+    outputs::check(&[("--output", output)], false, &inputs)?;
+    let failed = outputs::failed(output);
+    let mut file = Target::of(output).and_then(Target::create).map_err(&failed)?;
+    encode(&mut BufWriter::new(&mut file), &failed)?;
+    outputs::commit(vec![file])
 }
 
 /// Draws frames and hands them over, each as if it were the only one.

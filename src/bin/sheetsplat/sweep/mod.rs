@@ -12,6 +12,7 @@ use sheetsplat::scene::Scene;
 use crate::annotate::Annotate;
 use crate::arguments::{Depth, Input, log_frame};
 use crate::failure::Failure;
+use crate::outputs;
 use crate::progress::Progress;
 use axis::{Axis, swept};
 use sheet::{Layout, Tile};
@@ -67,8 +68,13 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
         let allowed = format!("sheets of at most {LARGEST} pixels a side");
         Failure::Input(format!("{}: found {count} tiles in rows of {columns}, allowed: {allowed}", output.display()))
     })?;
+    let mut inputs = Vec::new();
+    for (scene, _) in &scenes {
+        inputs.extend(input.files(scene)?);
+    }
+    outputs::check(&[("--output", output)], false, &inputs)?;
     let tiles = draw(arguments, scenes, progress)?;
-    Ok(layout.draw(&tiles).save(output, arguments.depth.into())?)
+    outputs::write(&[(output, layout.draw(&tiles).encode(output, arguments.depth.into())?)], &[])
 }
 
 fn check(axes: &[Axis], arguments: &Arguments) -> Result<(), Failure> {
