@@ -270,22 +270,6 @@ impl Scene {
         }
     }
 
-    /// The files that [`Self::load_volume`] reads.
-    ///
-    /// # Errors
-    /// If the volume or label file cannot be read, or its header is invalid.
-    pub fn files(&self) -> Result<Vec<PathBuf>, VolumeError> {
-        let mut files = match &self.volume {
-            VolumeSource::File(path) => Volume::files(path)?,
-            VolumeSource::Raw(path, _) => vec![path.clone()],
-            VolumeSource::Builtin(_) => Vec::new(),
-        };
-        if let Some(path) = &self.labels {
-            files.extend(Volume::files(path)?);
-        }
-        Ok(files)
-    }
-
     /// The same scene with what it leaves to the volume filled in: transfer function, and how much the camera shows. It renders the same
     /// image; preset and colour map are in what they led to.
     pub fn explicit(&self, volume: &Volume) -> Self {

@@ -12,8 +12,6 @@ type Reader<T> = fn(&Path) -> Result<Loaded<T>, VolumeError>;
 /// Of a folder, and those of its files that are of the format.
 type FolderReader<T> = fn(&Path, &[PathBuf]) -> Result<Loaded<T>, VolumeError>;
 
-type DataFiles = fn(&Path) -> Result<Vec<PathBuf>, VolumeError>;
-
 /// A format, and what reads it.
 struct Format<T> {
     name: &'static str,
@@ -25,8 +23,6 @@ struct Format<T> {
     read: Result<Reader<T>, &'static str>,
     /// Where slices come one by one, in a folder.
     read_folder: Option<FolderReader<T>>,
-    /// Where samples may be in files of their own: which files these are, by the header.
-    data_files: Option<DataFiles>,
 }
 
 /// A module's function, or the feature that it is compiled with.
@@ -51,7 +47,6 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             is_magic: |head| head.starts_with(b"NRRD000"),
             read: Ok(nrrd::read),
             read_folder: None,
-            data_files: Some(nrrd::data_files),
         },
         Format {
             name: "NIfTI",
@@ -62,7 +57,6 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             },
             read: reader!("nifti", super::nifti::read),
             read_folder: None,
-            data_files: reader!("nifti", super::nifti::data_files).ok(),
         },
         Format {
             name: "MetaImage",
@@ -70,7 +64,6 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             is_magic: |head| head.starts_with(b"ObjectType = Image"),
             read: reader!("metaimage", super::metaimage::read),
             read_folder: None,
-            data_files: reader!("metaimage", super::metaimage::data_files).ok(),
         },
         Format {
             name: "NPY",
@@ -78,7 +71,6 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             is_magic: |head| head.starts_with(b"\x93NUMPY"),
             read: reader!("npy", super::npy::read),
             read_folder: None,
-            data_files: None,
         },
         Format {
             name: "TIFF",
@@ -86,7 +78,6 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             is_magic: |head| matches!(head.get(..4), Some(b"II*\0" | b"MM\0*" | b"II+\0" | b"MM\0+")),
             read: reader!("tiff", super::tiff::read),
             read_folder: reader!("tiff", super::tiff::read_folder).ok(),
-            data_files: None,
         },
         Format {
             name: "DICOM",
@@ -94,7 +85,6 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             is_magic: |head| head.get(128..132) == Some(b"DICM"),
             read: reader!("dicom", super::dicom::read),
             read_folder: reader!("dicom", super::dicom::read_folder).ok(),
-            data_files: None,
         },
         Format {
             name: "VTI",
@@ -102,7 +92,6 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             is_magic: |head| head.windows(8).any(|window| window == b"<VTKFile"),
             read: reader!("vtk", super::vtk::read_image_data),
             read_folder: None,
-            data_files: None,
         },
         Format {
             name: "VTK",
@@ -110,7 +99,6 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             is_magic: |head| head.starts_with(b"# vtk DataFile"),
             read: reader!("vtk", super::vtk::read_legacy),
             read_folder: None,
-            data_files: None,
         },
     ]
 }
@@ -120,10 +108,12 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
 pub(super) fn read<T: Voxel>(path: &Path) -> Result<(&'static str, Loaded<T>), VolumeError> {
     let formats = formats();
     if path.is_dir() {
-        let Slices { name, read, files } = slices(path, &formats)?;
-        return Ok((name, read(path, &files)?));
+        return read_folder(path, &formats);
     }
-    let format = format_of(path, &formats)?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let head = folder::head(path)?;
+    let is_named = |format: &&Format<T>| format.extensions.iter().any(|extension| name.ends_with(extension));
+    let format = formats.iter().find(|format| (format.is_magic)(&head)).or_else(|| formats.iter().find(is_named));
     let found = match format {
         Some(Format { name, read: Ok(read), .. }) => return Ok((name, read(path)?)),
         Some(Format { name, read: Err(feature), .. }) => needs(name, feature),
@@ -144,34 +134,7 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<(&'static str, Loaded<T>), V
     Err(invalid(path, "format", found, allowed))
 }
 
-/// The format that a file's first bytes tell, else the one that its name tells.
-fn format_of<'a, T: Voxel>(path: &Path, formats: &'a [Format<T>]) -> Result<Option<&'a Format<T>>, VolumeError> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let head = folder::head(path)?;
-    let is_named = |format: &&Format<T>| format.extensions.iter().any(|extension| name.ends_with(extension));
-    Ok(formats.iter().find(|format| (format.is_magic)(&head)).or_else(|| formats.iter().find(is_named)))
-}
-
-/// The files that [`read`] reads: the file, or the slices in a folder, and what a header names.
-pub(super) fn files(path: &Path) -> Result<Vec<PathBuf>, VolumeError> {
-    let formats = formats::<f32>();
-    if path.is_dir() {
-        return Ok(slices(path, &formats)?.files);
-    }
-    let data_files = format_of(path, &formats)?.and_then(|format| format.data_files);
-    let mut files = data_files.map_or(Ok(Vec::new()), |data_files| data_files(path))?;
-    files.push(path.to_owned());
-    Ok(files)
-}
-
-/// The slices in a folder, and what reads them.
-struct Slices<T> {
-    name: &'static str,
-    read: FolderReader<T>,
-    files: Vec<PathBuf>,
-}
-
-fn slices<T: Voxel>(path: &Path, formats: &[Format<T>]) -> Result<Slices<T>, VolumeError> {
+fn read_folder<T: Voxel>(path: &Path, formats: &[Format<T>]) -> Result<(&'static str, Loaded<T>), VolumeError> {
     let mut slices: Vec<(&Format<T>, Vec<PathBuf>)> = Vec::new();
     let files = folder::files(path)?;
     let count = files.len();
@@ -186,9 +149,7 @@ fn slices<T: Voxel>(path: &Path, formats: &[Format<T>]) -> Result<Slices<T>, Vol
     }
     let found = match slices.as_slice() {
         [] => format!("{count} files, no slices among them"),
-        &[(&Format { name, read_folder: Some(read), .. }, ref files)] => {
-            return Ok(Slices { name, read, files: files.clone() });
-        }
+        [(Format { name, read_folder: Some(read), .. }, files)] => return Ok((name, read(path, files)?)),
         [(Format { name, read: Err(feature), .. }, _)] => needs(name, feature),
         several => {
             let counts = several.iter().map(|(Format { name, .. }, files)| format!("{} {name} files", files.len()));

@@ -41,11 +41,6 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
     })
 }
 
-/// The data file that a header names.
-pub(super) fn data_files(path: &Path) -> Result<Vec<PathBuf>, VolumeError> {
-    Ok(Header::read(&mut Source::open(path)?)?.data_path()?.into_iter().collect())
-}
-
 struct Header(Fields);
 
 impl Header {

@@ -156,14 +156,6 @@ impl Volume {
         Self { unit, encoding, label_names, ..volume }.with_orientation(&origin, orientation)
     }
 
-    /// The files that [`Volume::open`] reads: the file itself, or the slices in a folder, and the data files that a header names.
-    ///
-    /// # Errors
-    /// If the file or folder cannot be read, or a header is invalid.
-    pub fn files(path: &Path) -> Result<Vec<PathBuf>, VolumeError> {
-        format::files(path)
-    }
-
     /// Where the voxels are.
     pub fn grid(&self) -> &Grid {
         &self.grid

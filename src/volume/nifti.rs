@@ -62,12 +62,6 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
     })
 }
 
-/// The other file of a pair, if there is one.
-pub(super) fn data_files(path: &Path) -> Result<Vec<PathBuf>, VolumeError> {
-    let sibling = sibling(path, ".img", ".hdr").or_else(|| sibling(path, ".hdr", ".img"));
-    Ok(sibling.filter(|sibling| sibling.exists()).into_iter().collect())
-}
-
 /// The rest of a file's name where it ends with `from`, or with that and `.gz`; with `to` instead. All of them are in upper case if
 /// the name's end is.
 fn sibling(path: &Path, from: &str, to: &str) -> Option<PathBuf> {

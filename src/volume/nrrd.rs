@@ -29,11 +29,6 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
     Ok(Loaded { dims, kind, spacing, unit, orientation, label_names: header.label_names(), values: layout.read(data)? })
 }
 
-/// The data file that a header names.
-pub(super) fn data_files(path: &Path) -> Result<Vec<PathBuf>, VolumeError> {
-    Ok(Header::read(&mut Source::open(path)?)?.data_path()?.into_iter().collect())
-}
-
 /// The fields of a header, under the format's first spelling of their names, and its pairs of keys and values.
 struct Header(Fields, BTreeMap<String, String>);
 
