@@ -3,12 +3,12 @@
 //!
 //! Directions and origins are LPS, as ITK means them. The file must end where the samples end.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3, UVec3};
 
 use super::VolumeError;
+use super::access::Access;
 use super::fields::Fields;
 use super::loaded::Loaded;
 use super::orientation::{Orientation, RAS_FROM_LPS, unit_directions};
@@ -17,28 +17,21 @@ use super::source::{MAX_HEADER, Source, number, shown, three};
 use super::unit::unit;
 
 /// Reads one MetaImage file, or the header and the data file it names.
-pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
-    let mut file = Source::open(path)?;
+pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+    let mut file = access.open(path)?;
     let header = Header::read(&mut file)?;
     header.check_kind()?;
     let (spacing, orientation) = (header.spacing()?, header.orientation()?);
     let samples = header.samples()?;
     let (is_compressed, header_size) = (header.flag("CompressedData")?.unwrap_or(false), header.header_size()?);
-    let data = header.data_path()?.map_or(Ok(file), |path| Source::open(&path))?;
+    let data = header.data_path()?.map_or(Ok(file), |path| access.open(&path))?;
     let mut stream = if is_compressed { Stream::zlib(data)? } else { Stream::raw(data)? };
     let before_the_end = stream.exactly_left().unwrap_or(0).saturating_sub(samples.bytes());
     stream.skip(header_size.unwrap_or(before_the_end))?;
     let Samples { dims, kind, .. } = samples;
     let unit = header.0.get("DistanceUnits").and_then(unit);
-    Ok(Loaded {
-        dims,
-        kind,
-        spacing,
-        unit,
-        orientation,
-        label_names: BTreeMap::new(),
-        values: stream.samples(&samples, false)?,
-    })
+    let loaded = Loaded::new(dims, kind, stream.samples(&samples, false)?);
+    Ok(Loaded { spacing, unit, orientation, ..loaded })
 }
 
 struct Header(Fields);

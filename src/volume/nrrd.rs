@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DVec3, UVec3};
 
 use super::VolumeError;
+use super::access::Access;
 use super::fields::Fields;
 use super::loaded::Loaded;
 use super::orientation::{Orientation, RAS_FROM_LPS, lengths_and_directions, orthogonal};
@@ -18,15 +19,16 @@ use super::source::{MAX_HEADER, Source, invalid, io_error, lower, number, shown,
 use super::unit;
 
 /// Reads one NRRD file, or the detached header and the data file it names.
-pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
-    let mut file = Source::open(path)?;
+pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+    let mut file = access.open(path)?;
     let header = Header::read(&mut file)?;
     let dims = header.dims()?;
     let (spacing, orientation) = header.spacing_and_orientation()?;
     let layout = header.layout(dims)?;
-    let data = header.data_path()?.map_or(Ok(file), |path| Source::open(&path))?;
+    let data = header.data_path()?.map_or(Ok(file), |path| access.open(&path))?;
     let (kind, unit) = (layout.samples.kind, header.unit());
-    Ok(Loaded { dims, kind, spacing, unit, orientation, label_names: header.label_names(), values: layout.read(data)? })
+    let loaded = Loaded::new(dims, kind, layout.read(data)?);
+    Ok(Loaded { spacing, unit, orientation, label_names: header.label_names(), ..loaded })
 }
 
 /// The fields of a header, under the format's first spelling of their names, and its pairs of keys and values.

@@ -16,6 +16,7 @@ use flate2::bufread::MultiGzDecoder;
 use flate2::bufread::ZlibDecoder;
 use glam::{DVec3, UVec3, Vec3Swizzles};
 
+use super::access::Access;
 use super::source::{CHUNK, Source, invalid, io_error};
 use super::{Grid, VolumeError};
 
@@ -188,6 +189,14 @@ impl Samples {
         })
     }
 
+    /// Asks for the memory that their values take.
+    pub(super) fn reserve<T>(&self, path: &Path, access: &Access) -> Result<(), VolumeError> {
+        let [x, y, z] = self.dims.to_array();
+        // To turn axes takes room for a second order.
+        let copies = if self.z_fastest { 2 } else { 1 };
+        access.reserve(path, "data", format!("{x} × {y} × {z} voxels"), copies * u64::from(self.count()) * size_of::<T>() as u64)
+    }
+
     fn too_many(&self, path: &Path) -> impl Fn(TryReserveError) -> VolumeError {
         move |error| invalid(path, "data", format!("{} samples: {error}", self.count()), "fewer")
     }
@@ -214,6 +223,7 @@ pub(super) struct Stream {
     reader: Reader,
     /// How many bytes are left; of a compressed stream, no more than these.
     left: u64,
+    access: Access,
 }
 
 enum Reader {
@@ -225,14 +235,14 @@ enum Reader {
 impl Stream {
     /// The rest of a file as it is.
     pub(super) fn raw(mut file: Source) -> Result<Self, VolumeError> {
-        Ok(Self { left: file.left()?, path: file.path, reader: Reader::Raw(file.reader) })
+        Ok(Self { left: file.left()?, path: file.path, reader: Reader::Raw(file.reader), access: file.access })
     }
 
     /// The rest of a file, of one or more gzip members.
     pub(super) fn gzip(mut file: Source) -> Result<Self, VolumeError> {
         let left = file.left()?.saturating_mul(MAX_EXPANSION);
         let decoder = Box::new(MultiGzDecoder::new(file.reader));
-        Ok(Self { path: file.path, reader: Reader::Decoder(decoder, "whole and undamaged gzip members"), left })
+        Ok(Self::decoded(&file.path, decoder, "whole and undamaged gzip members", left, &file.access))
     }
 
     /// The rest of a file, one zlib stream.
@@ -240,13 +250,18 @@ impl Stream {
     pub(super) fn zlib(mut file: Source) -> Result<Self, VolumeError> {
         let left = file.left()?.saturating_mul(MAX_EXPANSION);
         let decoder = Box::new(Zlib(ZlibDecoder::new(file.reader)));
-        Ok(Self { path: file.path, reader: Reader::Decoder(decoder, "one whole and undamaged zlib stream"), left })
+        Ok(Self::decoded(&file.path, decoder, "one whole and undamaged zlib stream", left, &file.access))
     }
 
     /// What `reader` decodes from a file; `allowed` is what it takes, and no more than `left` bytes come out of it.
-    #[cfg(feature = "vtk")]
-    pub(super) fn decoded(path: &Path, reader: Box<dyn Read>, allowed: &'static str, left: u64) -> Self {
-        Self { path: path.to_owned(), reader: Reader::Decoder(reader, allowed), left }
+    pub(super) fn decoded(
+        path: &Path,
+        reader: Box<dyn Read>,
+        allowed: &'static str,
+        left: u64,
+        access: &Access,
+    ) -> Self {
+        Self { path: path.to_owned(), reader: Reader::Decoder(reader, allowed), left, access: access.clone() }
     }
 
     /// How many bytes are left, if the stream is not compressed.
@@ -291,6 +306,7 @@ impl Stream {
             }
             _ => {}
         }
+        samples.reserve::<T>(&self.path, &self.access)?;
         let values = self.read_samples(samples)?;
         // Reading on to the end is also what checks a compressed stream's last checksum.
         if matches!(self.reader, Reader::Decoder(..)) && self.read_up_to(1, &mut Vec::new())? > 0 {

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::VolumeError;
+use super::access::Access;
 
 /// No header line is longer than this, in bytes.
 const MAX_LINE: u64 = 64 << 10;
@@ -21,17 +22,19 @@ pub(super) struct Source {
     pub(super) path: PathBuf,
     bytes: u64,
     pub(super) reader: BufReader<File>,
+    pub(super) access: Access,
 }
 
 impl Source {
-    pub(super) fn open(path: &Path) -> Result<Self, VolumeError> {
+    /// Opens `path` by where it leads, `resolved`. [`Access::open`] does both.
+    pub(super) fn open(path: &Path, resolved: &Path, access: &Access) -> Result<Self, VolumeError> {
         // Asked before opening: to open a pipe would wait for its writer.
-        let metadata = fs::metadata(path).map_err(io_error(path))?;
+        let metadata = fs::metadata(resolved).map_err(io_error(path))?;
         if !metadata.is_file() {
             return Err(invalid(path, "file", "a folder, pipe or device", "a regular file"));
         }
-        let reader = BufReader::with_capacity(CHUNK as usize, File::open(path).map_err(io_error(path))?);
-        Ok(Self { path: path.to_owned(), bytes: metadata.len(), reader })
+        let reader = BufReader::with_capacity(CHUNK as usize, File::open(resolved).map_err(io_error(path))?);
+        Ok(Self { path: path.to_owned(), bytes: metadata.len(), reader, access: access.clone() })
     }
 
     /// How many bytes are left to read.
