@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use toml::Table;
 
-use crate::appearance::{Colormap, Preset, shown_range};
+use crate::appearance::{Colormap, Preset};
 use crate::camera::Camera;
 use crate::clip::Clip;
 use crate::error::RenderError;
@@ -124,7 +124,8 @@ impl From<TransferFunction> for TransferSettings {
 
 impl TransferSettings {
     /// The whole transfer function for a volume. Colours and opacities that are not given, those of labels too, are the preset's, or
-    /// [`TransferFunction::from_histogram`]'s, each for itself; a colour map spans the values that show ([`shown_range`]).
+    /// [`TransferFunction::from_histogram`]'s, each for itself; a colour map is laid over the values that show
+    /// ([`Colormap::of`]).
     pub fn resolve(&self, volume: &Volume) -> TransferFunction {
         let chosen = || match self.preset {
             Some(preset) => preset.transfer(volume),
@@ -155,7 +156,7 @@ impl TransferSettings {
         }
         match (&self.color, self.colormap) {
             (Some(color), _) => transfer.color = color.clone(),
-            (None, Some(map)) => transfer.color = map.over(shown_range(volume, &transfer).unwrap_or_default()),
+            (None, Some(map)) => transfer.color = map.of(volume, &transfer).unwrap_or(transfer.color),
             (None, None) => {}
         }
         transfer
@@ -164,13 +165,17 @@ impl TransferSettings {
     /// Checks that a volume has what the settings are for.
     ///
     /// # Errors
-    /// If it has no labels and there are tables for some, or the preset for labels.
+    /// If it has no labels and there are tables for some, or the preset for labels, or if it has no palette and the colour map is that.
     pub fn check(&self, volume: &Volume) -> Result<(), RenderError> {
         let invalid = |key, found: &str, allowed: &str| {
             Err(RenderError::OutOfRange { key, found: found.to_owned(), allowed: allowed.to_owned() })
         };
         if !self.labels.is_empty() && volume.labels().is_none() {
             return invalid("transfer.label", "tables for a volume without labels", "none, or labels in the volume");
+        }
+        if self.colormap == Some(Colormap::File) && volume.palette().is_none() {
+            let allowed = "another colour map, or a TIFF file whose pixels are indices of a palette";
+            return invalid("transfer.colormap", "file, for a volume without a palette", allowed);
         }
         if self.preset.is_some_and(|preset| !preset.suits(volume)) {
             let allowed = "values that are whole numbers from 0 to 65535, or labels in the volume";
@@ -240,7 +245,8 @@ impl Scene {
     pub fn open_with(path: &Path, sets: &[String], options: &ReadOptions) -> Result<Self, SceneError> {
         let access = Access::new(options)?;
         let resolved = access.resolve(path)?;
-        let text = std::fs::read_to_string(resolved).map_err(|source| SceneError::Io { path: path.to_owned(), source })?;
+        let text =
+            std::fs::read_to_string(resolved).map_err(|source| SceneError::Io { path: path.to_owned(), source })?;
         Self::parse(&text, &path.display().to_string(), path.parent().unwrap_or(Path::new("")), sets)
     }
 

@@ -135,7 +135,11 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static s
     Err(invalid(path, "format", found, allowed))
 }
 
-fn read_folder<T: Voxel>(path: &Path, access: &Access, formats: &[Format<T>]) -> Result<(&'static str, Loaded<T>), VolumeError> {
+fn read_folder<T: Voxel>(
+    path: &Path,
+    access: &Access,
+    formats: &[Format<T>],
+) -> Result<(&'static str, Loaded<T>), VolumeError> {
     let mut slices: Vec<(&Format<T>, Vec<PathBuf>)> = Vec::new();
     let files = folder::files(path, access)?;
     let count = files.len();

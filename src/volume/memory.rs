@@ -25,9 +25,7 @@ fn group_limit(groups: &str, root: &Path) -> Option<u64> {
         let (folder, file) = match controllers {
             // Version 2 has one tree of groups for all.
             "" => (root.to_owned(), "memory.max"),
-            _ if controllers.split(',').any(|name| name == "memory") => {
-                (root.join("memory"), "memory.limit_in_bytes")
-            }
+            _ if controllers.split(',').any(|name| name == "memory") => (root.join("memory"), "memory.limit_in_bytes"),
             _ => return None,
         };
         // Within a container the path may be that outside, so groups may be missing.

@@ -126,8 +126,16 @@ impl Volume {
         }
         let grid = Grid { dims, spacing: DVec3::ONE };
         let label_names = BTreeMap::new();
-        let volume =
-            Self { grid, values, labels: None, label_names, orientation: None, unit: None, encoding: None, palette: None };
+        let volume = Self {
+            grid,
+            values,
+            labels: None,
+            label_names,
+            orientation: None,
+            unit: None,
+            encoding: None,
+            palette: None,
+        };
         volume.with_spacing(origin, spacing)
     }
 

@@ -194,7 +194,12 @@ impl Samples {
         let [x, y, z] = self.dims.to_array();
         // To turn axes takes room for a second order.
         let copies = if self.z_fastest { 2 } else { 1 };
-        access.reserve(path, "data", format!("{x} × {y} × {z} voxels"), copies * u64::from(self.count()) * size_of::<T>() as u64)
+        access.reserve(
+            path,
+            "data",
+            format!("{x} × {y} × {z} voxels"),
+            copies * u64::from(self.count()) * size_of::<T>() as u64,
+        )
     }
 
     fn too_many(&self, path: &Path) -> impl Fn(TryReserveError) -> VolumeError {

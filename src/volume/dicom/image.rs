@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::super::VolumeError;
-use super::super::samples::SampleType;
 use super::super::access::Access;
+use super::super::samples::SampleType;
 use super::super::source::{invalid, io_error};
 use super::codecs::Codec;
 use super::dataset::{Dataset, Tag, tags};

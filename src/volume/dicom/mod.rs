@@ -38,7 +38,11 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
 }
 
 /// Reads the slices of a series, each in a file of its own.
-pub(super) fn read_folder<T: Voxel>(folder: &Path, files: &[PathBuf], access: &Access) -> Result<Loaded<T>, VolumeError> {
+pub(super) fn read_folder<T: Voxel>(
+    folder: &Path,
+    files: &[PathBuf],
+    access: &Access,
+) -> Result<Loaded<T>, VolumeError> {
     let images: Result<Vec<_>, _> = files.par_iter().map(|path| Image::open(path, access)).collect();
     let images: Vec<Image> = images?.into_iter().flatten().collect();
     series::check_one(folder, &images)?;

@@ -47,11 +47,7 @@ fn find(file: &mut BufReader<File>, most: u64) -> io::Result<Option<(u16, u64)>>
 }
 
 /// Where the entry of a tag with one value of 16 bits has the low byte of that, in the directory at `directory`.
-pub(super) fn low_byte_of(
-    file: &mut (impl Read + Seek),
-    directory: u64,
-    tag: u16,
-) -> io::Result<Option<u64>> {
+pub(super) fn low_byte_of(file: &mut (impl Read + Seek), directory: u64, tag: u16) -> io::Result<Option<u64>> {
     /// The type of values of 16 bits.
     const SHORT: u64 = 3;
     let mut magic = [0; 4];

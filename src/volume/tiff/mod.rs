@@ -135,7 +135,7 @@ impl<'a, T: Voxel> Slices<'a, T> {
             });
             DVec3::new(x, y, z)
         });
-        let palette = self.palette.map(|colors| values_of(&colors, self.rescale));
+        let palette = self.palette.map(|colors| values_of(&colors, self.rescale)).filter(|palette| !palette.is_empty());
         let unit = calibration.unit.clone();
         Ok(Loaded { spacing, unit, palette, ..Loaded::new(dims, kind, self.values) })
     }
@@ -148,6 +148,7 @@ fn values_of(colors: &[[u8; 3]], rescale: Option<[f64; 2]>) -> Vec<(f64, DVec3)>
     // As f32, which values are.
     let value = |index: usize| f64::from((index as f64 * slope + intercept) as f32);
     let mut points: Vec<_> = colors.iter().enumerate().map(|(index, &color)| (value(index), rgb(color))).collect();
+    points.retain(|(value, _)| value.is_finite());
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     points.dedup_by_key(|point| point.0);
     points

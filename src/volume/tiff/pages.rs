@@ -10,8 +10,8 @@ use ::tiff::tags::{ByteOrder, Tag};
 use ::tiff::{ColorType, TiffError};
 
 use super::super::VolumeError;
-use super::super::samples::SampleType;
 use super::super::access::Access;
+use super::super::samples::SampleType;
 use super::super::source::{invalid, io_error};
 use super::directory::{low_byte_of, most_values, overlong_entry};
 use super::overlay::Overlay;

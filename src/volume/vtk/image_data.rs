@@ -187,7 +187,13 @@ impl Header {
             if array.of_cells { Some(steps.max(1)) } else { steps.checked_add(1) }
         };
         let sizes = || dims_of([size(0)?, size(1)?, size(2)?]);
-        sizes().ok_or_else(|| self.image.invalid("WholeExtent", format!("{extent:?}"), format!("a last point behind the first one, or the same, along x, y and z; {SIZES}")))
+        sizes().ok_or_else(|| {
+            self.image.invalid(
+                "WholeExtent",
+                format!("{extent:?}"),
+                format!("a last point behind the first one, or the same, along x, y and z; {SIZES}"),
+            )
+        })
     }
 
     /// The array's bytes.
