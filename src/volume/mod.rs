@@ -2,6 +2,7 @@
 
 mod access;
 pub mod builtin;
+mod data_files;
 #[cfg(feature = "dicom")]
 mod dicom;
 mod fields;
@@ -18,6 +19,7 @@ mod nifti;
 #[cfg(feature = "npy")]
 mod npy;
 mod nrrd;
+mod numbers;
 mod orientation;
 mod raw;
 mod samples;

@@ -6,17 +6,17 @@
 use std::collections::TryReserveError;
 use std::fmt::{self, Display, Formatter};
 use std::fs::File;
-#[cfg(feature = "metaimage")]
-use std::io::BufRead;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
+use bzip2::bufread::MultiBzDecoder;
 use flate2::bufread::MultiGzDecoder;
 #[cfg(feature = "metaimage")]
 use flate2::bufread::ZlibDecoder;
 use glam::{DVec3, UVec3, Vec3Swizzles};
 
 use super::access::Access;
+use super::numbers::{Numbers, TextEnd};
 use super::source::{CHUNK, Source, invalid, io_error};
 use super::{Grid, VolumeError};
 
@@ -95,7 +95,6 @@ macro_rules! sample_types {
             }
 
             /// Appends the bytes, in the machine's order, of a sample that is written as text.
-            #[cfg(feature = "vtk")]
             pub(super) fn parse(self, text: &str, into: &mut Vec<u8>) -> Option<()> {
                 match self {
                     $(Self::$name => into.extend(text.parse::<$type>().ok()?.to_ne_bytes())),*
@@ -258,6 +257,28 @@ impl Stream {
         Ok(Self::decoded(&file.path, decoder, "one whole and undamaged zlib stream", left, &file.access))
     }
 
+    /// The rest of a file, of one or more bzip2 streams. How much comes out of them is not limited by their size: only by what is asked
+    /// for.
+    pub(super) fn bzip2(file: Source) -> Self {
+        let decoder = Box::new(MultiBzDecoder::new(file.reader));
+        Self::decoded(&file.path, decoder, "whole and undamaged bzip2 streams", u64::MAX, &file.access)
+    }
+
+    /// The rest of a file, numbers as text, as bytes of samples in the machine's order.
+    pub(super) fn text(mut file: Source, kind: SampleType, end: TextEnd) -> Result<Self, VolumeError> {
+        // A digit and a space.
+        let left = (file.left()? / 2 + 1).saturating_mul(kind.bytes());
+        let decoder = Box::new(Numbers::new(file.reader, kind, end));
+        Ok(Self::decoded(&file.path, decoder, "numbers as text", left, &file.access))
+    }
+
+    /// The rest of a file, two hexadecimal digits for each byte.
+    pub(super) fn hex(mut file: Source) -> Result<Self, VolumeError> {
+        let left = file.left()? / 2;
+        let decoder = Box::new(Hex(file.reader));
+        Ok(Self::decoded(&file.path, decoder, "pairs of hexadecimal digits", left, &file.access))
+    }
+
     /// What `reader` decodes from a file; `allowed` is what it takes, and no more than `left` bytes come out of it.
     pub(super) fn decoded(
         path: &Path,
@@ -357,6 +378,38 @@ impl Stream {
             (Reader::Decoder(_, allowed), None) => invalid(&self.path, "data", error, allowed),
             _ => io_error(&self.path)(error),
         }
+    }
+}
+
+/// Bytes written as hexadecimal digits, with any space between them.
+struct Hex<R>(R);
+
+impl<R: BufRead> Read for Hex<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let (mut written, mut high) = (0, None);
+        while written < buffer.len() {
+            let Some(&byte) = self.0.fill_buf()?.first() else {
+                match high {
+                    None => break,
+                    Some(_) => return Err(io::Error::other("a digit without a second one")),
+                }
+            };
+            self.0.consume(1);
+            if byte.is_ascii_whitespace() {
+                continue;
+            }
+            let Some(digit) = char::from(byte).to_digit(16) else {
+                return Err(io::Error::other(format!("\"{}\", no hexadecimal digit", byte.escape_ascii())));
+            };
+            match high.take() {
+                None => high = Some(digit << 4),
+                Some(high) => {
+                    buffer[written] = (high | digit) as u8;
+                    written += 1;
+                }
+            }
+        }
+        Ok(written)
     }
 }
 

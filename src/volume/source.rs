@@ -58,6 +58,23 @@ impl Source {
         Ok((read > 0).then(|| String::from_utf8_lossy(text).into_owned()))
     }
 
+    /// Skips bytes; if there are too few, all of them.
+    pub(super) fn skip(&mut self, bytes: u64) -> Result<(), VolumeError> {
+        let bytes = bytes.min(self.left()?);
+        self.reader.seek_relative(bytes as i64).map_err(io_error(&self.path))
+    }
+
+    /// The lines that are left of a header, without blank ones.
+    pub(super) fn lines(&mut self, budget: &mut u64) -> Result<Vec<String>, VolumeError> {
+        let mut lines = Vec::new();
+        while let Some(line) = self.line(budget)? {
+            if !line.trim().is_empty() {
+                lines.push(line.trim().to_owned());
+            }
+        }
+        Ok(lines)
+    }
+
     pub(super) fn skip_lines(&mut self, lines: u64) -> Result<(), VolumeError> {
         for skipped in 0..lines {
             if self.reader.skip_until(b'\n').map_err(io_error(&self.path))? == 0 {

@@ -12,12 +12,12 @@ use super::super::VolumeError;
 use super::super::access::Access;
 use super::super::fields::Fields;
 use super::super::loaded::Loaded;
+use super::super::numbers::TextEnd;
 use super::super::orientation::unit_directions;
 use super::super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
 use super::super::source::{invalid, io_error, number, three};
 use super::super::xml;
 use super::blocks::{Base64, Blocks, Compressor, HeaderType};
-use super::numbers::Numbers;
 use super::warn_of_choice;
 
 const TYPES: [(&str, SampleType); 10] = [
@@ -219,8 +219,7 @@ impl Header {
         file.reader.seek(SeekFrom::Start(at)).map_err(io_error(path))?;
         let left = file.left()?;
         let (reader, expansion): (Box<dyn Read>, u64) = match encoding {
-            // A digit and a space.
-            "ascii" => (Box::new(Numbers::new(file.reader, samples.kind, &[])), samples.kind.bytes().div_ceil(2)),
+            "ascii" => return Stream::text(file, samples.kind, TextEnd::Tag),
             "base64" => self.unpacked(Base64::new(file.reader), samples, access)?,
             _ => self.unpacked(file.reader, samples, access)?,
         };

@@ -9,9 +9,9 @@ use super::super::VolumeError;
 use super::super::access::Access;
 use super::super::fields::Fields;
 use super::super::loaded::Loaded;
+use super::super::numbers::TextEnd;
 use super::super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
 use super::super::source::{MAX_HEADER, Source, invalid, io_error, number, shown, three};
-use super::numbers::Numbers;
 
 /// What may follow an array.
 const KEYWORDS: &[&str] = &[
@@ -39,13 +39,10 @@ pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<L
     let Header { mut file, is_text, .. } = header;
     let big_endian = !is_text || cfg!(target_endian = "big");
     let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
-    let left = file.left()?;
     let stream = if is_text {
-        // A digit and a space.
-        let left = (left / 2 + 1).saturating_mul(kind.bytes());
-        Stream::decoded(path, Box::new(Numbers::new(file.reader, kind, KEYWORDS)), "numbers as text", left, access)
+        Stream::text(file, kind, TextEnd::Words(KEYWORDS))?
     } else {
-        check_rest(path, access, left, &samples)?;
+        check_rest(path, access, file.left()?, &samples)?;
         Stream::raw(file)?
     };
     let loaded = Loaded::new(dims, kind, stream.samples(&samples, true)?);
