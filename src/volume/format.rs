@@ -74,6 +74,13 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             read_folder: None,
         },
         Format {
+            name: "NPZ",
+            extensions: &[".npz"],
+            is_magic: |head| head.starts_with(b"PK\x03\x04"),
+            read: reader!("npy", super::npz::read),
+            read_folder: None,
+        },
+        Format {
             name: "TIFF",
             extensions: &[".tif", ".tiff"],
             is_magic: |head| matches!(head.get(..4), Some(b"II*\0" | b"MM\0*" | b"II+\0" | b"MM\0+")),
@@ -108,11 +115,12 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
 /// folder of slices, whose format the first bytes of all its files tell.
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static str, Loaded<T>), VolumeError> {
     let formats = formats();
-    if access.resolve(path)?.is_dir() {
+    let (file, _) = archive_and_array(path);
+    if access.resolve(file)?.is_dir() {
         return read_folder(path, access, &formats);
     }
-    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let head = folder::head(path, access)?;
+    let name = file.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let head = folder::head(file, access)?;
     let is_named = |format: &&Format<T>| format.extensions.iter().any(|extension| name.ends_with(extension));
     let format = formats.iter().find(|format| (format.is_magic)(&head)).or_else(|| formats.iter().find(is_named));
     let found = match format {
@@ -163,6 +171,16 @@ fn read_folder<T: Voxel>(
     };
     let allowed = format!("a volume file, or a folder with the slices of one volume, {}", SLICES.join(" or "));
     Err(invalid(path, "folder", found, allowed))
+}
+
+/// What is before the colon, and what is behind it, of a path such as `file.npz:name`; any other path is all before it.
+pub(super) fn archive_and_array(path: &Path) -> (&Path, Option<&str>) {
+    const EXTENSION: &str = ".npz:";
+    let split = path.to_str().filter(|_| !path.exists()).and_then(|text| {
+        let at = text.to_ascii_lowercase().rfind(EXTENSION)? + EXTENSION.len();
+        Some((Path::new(&text[..at - 1]), Some(&text[at..])))
+    });
+    split.unwrap_or((path, None))
 }
 
 fn needs(name: &str, feature: &str) -> String {

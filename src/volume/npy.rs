@@ -28,7 +28,11 @@ const TYPES: [(&str, SampleType); 10] = [
 
 /// Reads the array of one file.
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
-    let mut stream = Stream::raw(access.open(path)?)?;
+    read_array(path, Stream::raw(access.open(path)?)?)
+}
+
+/// Reads an array from the beginning of its header.
+pub(super) fn read_array<T: Voxel>(path: &Path, mut stream: Stream) -> Result<Loaded<T>, VolumeError> {
     let samples = parse(path, &header(path, &mut stream)?)?;
     let Samples { dims, kind, .. } = samples;
     let values = stream.samples(&samples, false)?;
