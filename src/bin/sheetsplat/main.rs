@@ -15,6 +15,7 @@ mod interrupt;
 mod orbit;
 mod outputs;
 mod progress;
+mod reading;
 mod render;
 mod sweep;
 #[cfg(feature = "viewer")]
