@@ -289,6 +289,15 @@ impl Scene {
     /// # Errors
     /// As [`Self::load_volume`], and if a file is not in the folder.
     pub fn load_volume_with(&self, options: &ReadOptions) -> Result<Volume, VolumeError> {
+        self.load_volume_and_files(options).map(|(volume, _)| volume)
+    }
+
+    /// As [`Self::load_volume_with`], and which files the volume and its labels were read from: slices in a folder and data files that a
+    /// header names too.
+    ///
+    /// # Errors
+    /// As [`Self::load_volume_with`].
+    pub fn load_volume_and_files(&self, options: &ReadOptions) -> Result<(Volume, Vec<PathBuf>), VolumeError> {
         let access = Access::new(options)?;
         let (volume, origin) = match &self.volume {
             VolumeSource::File(path) => (Volume::read(path, &access)?, path.display().to_string()),
@@ -303,10 +312,11 @@ impl Scene {
             }
             None => volume,
         };
-        match self.spacing {
-            Some(spacing) => volume.with_spacing(&origin, spacing),
-            None => Ok(volume),
-        }
+        let volume = match self.spacing {
+            Some(spacing) => volume.with_spacing(&origin, spacing)?,
+            None => volume,
+        };
+        Ok((volume, access.files()))
     }
 
     /// The same scene with what it leaves to the volume filled in: transfer function, and how much the camera shows. It renders the same

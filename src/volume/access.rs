@@ -1,10 +1,11 @@
 //! What reading may open, and how much memory it may take.
 
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::VolumeError;
 use super::memory;
@@ -47,6 +48,7 @@ struct Inner {
     folder: Option<Folder>,
     limit: u64,
     reserved: AtomicU64,
+    files: Mutex<BTreeSet<PathBuf>>,
 }
 
 /// The folder that files are confined to.
@@ -64,7 +66,7 @@ impl Access {
         };
         let folder = options.confine.as_ref().map(folder).transpose()?;
         let limit = options.memory.unwrap_or_else(memory::default_limit);
-        Ok(Self(Arc::new(Inner { folder, limit, reserved: AtomicU64::new(0) })))
+        Ok(Self(Arc::new(Inner { folder, limit, reserved: AtomicU64::new(0), files: Mutex::default() })))
     }
 
     /// The path to open for a file or folder, which has no links in it if reading is confined.
@@ -90,7 +92,19 @@ impl Access {
     }
 
     pub(super) fn open(&self, path: &Path) -> Result<Source, VolumeError> {
+        let source = self.open_to_look(path)?;
+        self.0.files.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_owned());
+        Ok(source)
+    }
+
+    /// Opens a file only to find out what it is.
+    pub(super) fn open_to_look(&self, path: &Path) -> Result<Source, VolumeError> {
         Source::open(path, &self.resolve(path)?, self)
+    }
+
+    /// The files that were opened so far, but for those only looked at.
+    pub(crate) fn files(&self) -> Vec<PathBuf> {
+        self.0.files.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect()
     }
 
     /// Asks for memory before it is allocated: `bytes` of it, for what `found` says.

@@ -11,7 +11,7 @@ use super::source::io_error;
 /// The first bytes of a file.
 pub(super) fn head(path: &Path, access: &Access) -> Result<Vec<u8>, VolumeError> {
     let mut head = Vec::new();
-    access.open(path)?.reader.take(1024).read_to_end(&mut head).map_err(io_error(path))?;
+    access.open_to_look(path)?.reader.take(1024).read_to_end(&mut head).map_err(io_error(path))?;
     Ok(head)
 }
 

@@ -103,10 +103,12 @@ fn an_input_by_another_name_is_no_output() {
         ("orbit here/a.nrrd -o soft.apng", "a.nrrd"),
         ("orbit scene.toml -o hard.gif", "a.nrrd"),
         ("render a.nhdr -o hard.png", "nrrd.raw"),
-        ("sweep a.nhdr -o hard.png --set splatting.slab_width=1,2", "nrrd.raw"),
     ] {
         assert_refused(&folder, &format!("{arguments} {NO_DEVICE}"), &["--output", "the input"], kept);
     }
+    // One tile's volume is loaded after another.
+    let sweep = "sweep a.nrrd -o hard.png --set volume.path=a.nrrd,a.nhdr";
+    assert_refused(&folder, sweep, &["--output", "the input"], "nrrd.raw");
     assert_refused(&folder, "compare image.png image.png --difference soft.png", &["--difference"], "image.png");
 }
 
@@ -141,7 +143,7 @@ fn standard_output_is_an_output() {
     for (arguments, input) in [
         (format!("info a.nrrd {NO_DEVICE}"), "a.nrrd"),
         (format!("bench scene.toml {NO_DEVICE}"), "labels.nrrd"),
-        (format!("orbit a.nhdr -o - {NO_DEVICE}"), "nrrd.raw"),
+        ("orbit a.nhdr -o -".to_owned(), "nrrd.raw"),
         (format!("render a.nrrd -o a.png --profile {NO_DEVICE}"), "a.nrrd"),
         (format!("render a.nrrd -o image.png --profile {NO_DEVICE}"), "image.png"),
         ("compare image.png image.png".to_owned(), "image.png"),

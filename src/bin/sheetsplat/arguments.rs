@@ -13,6 +13,7 @@ use sheetsplat::stats::Stats;
 use sheetsplat::volume::{self, Orientation, Volume};
 
 use crate::failure::Failure;
+use crate::outputs::Outputs;
 use crate::reading::Reading;
 
 /// What to draw, and on which adapter.
@@ -136,19 +137,22 @@ impl Input {
         Path::new(&self.name).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
     }
 
-    /// The files that a scene and its volume are read from.
-    pub(crate) fn files(&self, scene: &Scene) -> Result<Vec<PathBuf>, Failure> {
-        let mut files = scene.files().map_err(|error| self.failure(error))?;
-        if self.is_scene_file() {
-            files.push(self.name.clone().into());
-        }
-        Ok(files)
+    /// The files that the arguments and the scene name to be read. A header may name others.
+    pub(crate) fn files(&self, scene: &Scene) -> Vec<PathBuf> {
+        let scene_file = self.is_scene_file().then(|| self.name.clone().into());
+        let volume = match &scene.volume {
+            VolumeSource::File(path) | VolumeSource::Raw(path, _) => Some(path.clone()),
+            VolumeSource::Builtin(_) => None,
+        };
+        [scene_file, volume, scene.labels.clone()].into_iter().flatten().collect()
     }
 
-    /// Loads the scene's volume.
-    pub(crate) fn load_volume(&self, scene: &Scene) -> Result<Volume, Failure> {
+    /// Loads the scene's volume, from files that are no outputs.
+    pub(crate) fn load_volume(&self, scene: &Scene, outputs: &Outputs) -> Result<Volume, Failure> {
         let start = Instant::now();
-        let volume = scene.load_volume_with(&self.reading.options()).map_err(|error| self.failure(error))?;
+        let loaded = scene.load_volume_and_files(&self.reading.options());
+        let (volume, files) = loaded.map_err(|error| self.failure(error))?;
+        outputs.refuse(&files)?;
         log::info!("{}: {} voxels, loaded in {:.1?}", self.name, volume.grid().dims, start.elapsed());
         if self.view.is_some() && volume.orientation().is_some_and(Orientation::is_mirrored) {
             let name = &self.name;

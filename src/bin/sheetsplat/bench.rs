@@ -7,7 +7,8 @@ use sheetsplat::stats::Stats;
 
 use crate::arguments::Input;
 use crate::failure::Failure;
-use crate::{outputs, stdout};
+use crate::outputs::Outputs;
+use crate::stdout;
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  sheetsplat bench builtin:head --frames 20 --rotate 3")]
@@ -40,9 +41,9 @@ struct Report {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let input = &arguments.input;
     let mut scene = input.scene()?;
-    outputs::check(&[], true, &input.files(&scene)?)?;
+    let outputs = Outputs::check(&[], true, &input.files(&scene))?;
     let start = Instant::now();
-    let volume = input.load_volume(&scene)?;
+    let volume = input.load_volume(&scene, &outputs)?;
     let load_ms = milliseconds_since(start);
     input.look_at(&volume, &mut scene)?;
 

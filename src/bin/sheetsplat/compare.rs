@@ -6,7 +6,7 @@ use sheetsplat::golden::{Comparison, ComparisonError, Picture, Tolerance};
 use sheetsplat::image::{Image, PngDepth};
 
 use crate::failure::Failure;
-use crate::outputs;
+use crate::outputs::{self, Outputs};
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  sheetsplat compare actual.png golden.png --difference difference.png")]
@@ -33,7 +33,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Image::check_format(path)?;
     }
     let named: Vec<_> = difference.iter().map(|path| ("--difference", path.as_path())).collect();
-    outputs::check(&named, true, &[actual.clone(), golden.clone()])?;
+    Outputs::check(&named, true, &[actual.clone(), golden.clone()])?;
     let open = |path: &Path| Picture::open(path).map_err(|error| Failure::Input(error.to_string()));
     let pictures = [open(actual)?, open(golden)?];
     let files = format!("{} and {}", actual.display(), golden.display());

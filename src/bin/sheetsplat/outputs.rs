@@ -13,44 +13,53 @@ use crate::stdout;
 /// A file that is to be written: the option that names it, and its path.
 pub(crate) type Named<'a> = (&'static str, &'a Path);
 
-/// Checks, before anything is drawn, that every file may be written, and that none of them is an input or another one. So it is with
-/// the file that standard output goes to, if a run `prints`.
-pub(crate) fn check(files: &[Named<'_>], prints: bool, inputs: &[PathBuf]) -> Result<(), Failure> {
-    check_distinct(files.iter().map(|&(option, path)| (option, path.to_owned())), prints, inputs)?;
-    files.iter().try_for_each(|(_, path)| check_writable(path))
+/// The files that a run will write, standard output among them if it prints: the option that names each, and its path.
+pub(crate) struct Outputs(HashMap<Identity, (&'static str, String)>);
+
+impl Outputs {
+    /// Checks, before anything is drawn, that every file may be written, and that none of them is another one or one of the inputs that
+    /// are known by name. [`Outputs::refuse`] takes the others.
+    pub(crate) fn check(files: &[Named<'_>], prints: bool, inputs: &[PathBuf]) -> Result<Self, Failure> {
+        let outputs = Self::distinct(files.iter().map(|&(option, path)| (option, path.to_owned())), prints)?;
+        outputs.refuse(inputs)?;
+        files.iter().try_for_each(|(_, path)| check_writable(path))?;
+        Ok(outputs)
+    }
+
+    /// Checks that no file is another one, whatever links and paths lead to it.
+    pub(crate) fn distinct(
+        files: impl Iterator<Item = (&'static str, PathBuf)>,
+        prints: bool,
+    ) -> Result<Self, Failure> {
+        let mut outputs = HashMap::new();
+        if prints && let Some(identity) = Identity::of_standard_output() {
+            outputs.insert(identity, ("standard output", "a file".to_owned()));
+        }
+        for (option, path) in files {
+            // What leads nowhere is an error of its own, once it is written to.
+            let Ok(identity) = Identity::of(&path) else { continue };
+            let found = path.display().to_string();
+            if let Some((other, _)) = outputs.get(&identity) {
+                return Err(invalid(option, &found, &format!("the file of {other}")));
+            }
+            outputs.insert(identity, (option, found));
+        }
+        Ok(Self(outputs))
+    }
+
+    /// Refuses to write any of these files.
+    pub(crate) fn refuse(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
+        for input in inputs {
+            if let Some((option, found)) = Identity::of(input).ok().and_then(|identity| self.0.get(&identity)) {
+                return Err(invalid(option, found, &format!("the input {}", input.display())));
+            }
+        }
+        Ok(())
+    }
 }
 
-/// Checks that no file is an input or another file, whatever links and paths lead to it.
-pub(crate) fn check_distinct(
-    files: impl Iterator<Item = (&'static str, PathBuf)>,
-    prints: bool,
-    inputs: &[PathBuf],
-) -> Result<(), Failure> {
-    let mut taken = HashMap::new();
-    for path in inputs {
-        if let Ok(identity) = Identity::of(path) {
-            taken.insert(identity, format!("the input {}", path.display()));
-        }
-    }
-    let invalid = |option: &str, found: &str, taken: &str| {
-        Err(Failure::Input(format!("{option}: found {found}, which is {taken}, allowed: another file")))
-    };
-    if prints && let Some(identity) = Identity::of_standard_output() {
-        if let Some(taken) = taken.get(&identity) {
-            return invalid("standard output", "a file", taken);
-        }
-        taken.insert(identity, "standard output".to_owned());
-    }
-    for (option, path) in files {
-        // What leads nowhere is an error of its own, once it is written to.
-        let Ok(identity) = Identity::of(&path) else { continue };
-        let found = path.display().to_string();
-        if let Some(taken) = taken.get(&identity) {
-            return invalid(option, &found, taken);
-        }
-        taken.insert(identity, format!("the file of {option}"));
-    }
-    Ok(())
+fn invalid(option: &str, found: &str, other: &str) -> Failure {
+    Failure::Input(format!("{option}: found {found}, which is also {other}, allowed: another file"))
 }
 
 /// Checks that a path leads to what can be written to.

@@ -16,7 +16,7 @@ use sheetsplat::volume::Volume;
 use crate::annotate::Annotate;
 use crate::arguments::{Depth, Input, log_frame};
 use crate::failure::Failure;
-use crate::outputs;
+use crate::outputs::{self, Outputs};
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -65,9 +65,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut named = vec![("--output", output.as_path())];
     named.extend(stats_file.as_deref().map(|path| ("--stats", path)));
     named.extend(save_scene.as_deref().map(|path| ("--save-scene", path)));
-    outputs::check(&named, arguments.profile, &input.files(&scene)?)?;
+    let outputs = Outputs::check(&named, arguments.profile, &input.files(&scene))?;
     let start = Instant::now();
-    let volume = input.load_volume(&scene)?;
+    let volume = input.load_volume(&scene, &outputs)?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
     input.look_at(&volume, &mut scene)?;
     scene.transfer.check(&volume).map_err(|error| input.failure(error))?;

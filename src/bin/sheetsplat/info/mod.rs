@@ -11,7 +11,8 @@ use sheetsplat::volume::{Orientation, SampleType, Volume};
 
 use crate::arguments::Input;
 use crate::failure::Failure;
-use crate::{outputs, stdout};
+use crate::outputs::Outputs;
+use crate::stdout;
 use statistics::{Histogram, extent_and_mean};
 
 #[derive(clap::Args)]
@@ -61,8 +62,8 @@ struct Info {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let input = &arguments.input;
     let scene = input.scene()?;
-    outputs::check(&[], true, &input.files(&scene)?)?;
-    let volume = input.load_volume(&scene)?;
+    let outputs = Outputs::check(&[], true, &input.files(&scene))?;
+    let volume = input.load_volume(&scene, &outputs)?;
     let [min, max, mean] = extent_and_mean(volume.values());
     let percentiles = quantiles(volume.values(), |_| true, PERCENTILES.map(|(percent, _)| percent / 100.0));
     let encoding = volume.encoding();

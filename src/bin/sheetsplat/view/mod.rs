@@ -20,7 +20,7 @@ use sheetsplat::image::Image;
 
 use crate::arguments::Input;
 use crate::failure::Failure;
-use crate::outputs;
+use crate::outputs::Outputs;
 use app::App;
 
 #[derive(clap::Args)]
@@ -55,8 +55,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let mut scene = arguments.input.scene()?;
     let named: Vec<_> = arguments.screenshot.iter().map(|path| ("--screenshot", path.as_path())).collect();
-    outputs::check(&named, false, &arguments.input.files(&scene)?)?;
-    let volume = arguments.input.load_volume(&scene)?;
+    let outputs = Outputs::check(&named, false, &arguments.input.files(&scene))?;
+    let volume = arguments.input.load_volume(&scene, &outputs)?;
     arguments.input.look_at(&volume, &mut scene)?;
 
     let title = format!("{} - sheetsplat", arguments.input.name);
