@@ -155,9 +155,10 @@ fn standard_output_is_an_output() {
         assert_eq!(folder.read(input), before, "{arguments}");
         assert_eq!(folder.names(), names, "{arguments}");
     }
-    // What stands in a file already stays there.
+    // What stands in a file already stays there. By a link of our own: who may replace /dev/stdout must not lose it to a bug.
     folder.write("log", "before\n");
-    let (code, stderr) = run_into(&folder, "log", &format!("render {SMALL} -o a.png --stats /dev/stdout"));
+    symlink("/proc/self/fd/1", folder.path("printed")).unwrap();
+    let (code, stderr) = run_into(&folder, "log", &format!("render {SMALL} -o a.png --stats printed"));
     assert_eq!(code, Some(0), "{stderr}");
     let log = String::from_utf8(folder.read("log")).unwrap();
     let stats: Value = serde_json::from_str(log.strip_prefix("before\n").unwrap()).unwrap();
@@ -167,13 +168,11 @@ fn standard_output_is_an_output() {
 #[test]
 fn pipes_and_devices_are_written_to() {
     let folder = with_inputs();
-    let run = folder.run(&format!("render {SMALL} -o a.png --stats /dev/stdout"));
+    symlink("/proc/self/fd/1", folder.path("printed")).unwrap();
+    let run = folder.run(&format!("render {SMALL} -o a.png --stats printed"));
     assert_eq!(run.code, Some(0), "{}", run.stderr);
     assert_eq!(serde_json::from_str::<Value>(&run.stdout).unwrap()["width"], 27);
-
-    let render = format!("render {SMALL} -o plain.npy --stats /dev/null");
-    folder.run(&render).assert_success();
-    assert!(fs::metadata("/dev/null").unwrap().file_type().is_char_device());
+    assert!(fs::symlink_metadata(folder.path("printed")).unwrap().is_symlink());
     for (name, arguments) in [
         ("pipe.npy", format!("render {SMALL} -o pipe.npy")),
         ("pipe.png", "compare image.png image.png --difference pipe.png".to_owned()),
@@ -234,27 +233,30 @@ fn a_file_that_is_replaced_keeps_its_mode() {
     }
 }
 
-/// As somebody who may write anywhere in the folder, but not that file.
+/// A run by somebody who may write into the folder, but is not root, who may write everything.
+fn unprivileged(folder: &Folder, arguments: &str) -> Command {
+    fs::set_permissions(folder.path(""), Permissions::from_mode(0o777)).unwrap();
+    if fs::metadata(folder.path("")).unwrap().uid() != 0 {
+        return folder.command(arguments);
+    }
+    // Where others can reach it. By another process: a test that starts a program at that moment would hold the copy open.
+    let program = folder.path("sheetsplat");
+    assert!(Command::new("cp").arg(env!("CARGO_BIN_EXE_sheetsplat")).arg(&program).status().unwrap().success());
+    let mut command = Command::new(program);
+    command.env("WGPU_ADAPTER_NAME", "llvmpipe").args(arguments.split(' ')).current_dir(folder.path(""));
+    command.uid(65534).gid(65534);
+    command
+}
+
 #[test]
 fn a_file_that_may_not_be_written_stays() {
     let folder = with_inputs();
     folder.write("out.png", "precious");
     fs::set_permissions(folder.path("out.png"), Permissions::from_mode(0o444)).unwrap();
-    fs::set_permissions(folder.path(""), Permissions::from_mode(0o777)).unwrap();
     for arguments in
-        ["compare image.png image.png --difference out.png", &format!("render a.nrrd -o out.png {NO_DEVICE}")]
+        ["compare image.png image.png --difference out.png", &format!("render a.nrrd -o out.png --stats s {NO_DEVICE}")]
     {
-        let mut command = folder.command(arguments);
-        if fs::metadata("/proc/self").is_ok_and(|process| process.uid() == 0) {
-            // Root may write everything; others may not reach the program.
-            let program = folder.path("sheetsplat");
-            // By another process: a test that starts a program at that moment would hold the copy open.
-            let copied = Command::new("cp").arg(env!("CARGO_BIN_EXE_sheetsplat")).arg(&program).status().unwrap();
-            assert!(copied.success());
-            command = Command::new(program);
-            command.args(arguments.split(' ')).current_dir(folder.path("")).uid(65534).gid(65534);
-        }
-        let output = command.output().unwrap();
+        let output = unprivileged(&folder, arguments).output().unwrap();
         let stderr = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(1), "{arguments}: {stderr}");
         assert!(stderr.contains("out.png: Permission denied"), "{arguments}: {stderr}");
@@ -284,11 +286,22 @@ fn what_cannot_be_printed_leaves_no_file() {
         assert_fails_to_print(output.status, &String::from_utf8(output.stderr).unwrap(), &arguments);
         assert_eq!(folder.names(), names, "{arguments}, closed");
     }
+}
+
+/// By somebody who cannot replace a device if it is taken for a file.
+#[test]
+fn a_full_device_leaves_no_file() {
+    let folder = with_inputs();
     symlink("/dev/full", folder.path("full.png")).unwrap();
+    let arguments = format!("render {SMALL} -o full.png --stats new.json --save-scene new.toml");
+    let mut command = unprivileged(&folder, &arguments);
     let names = folder.names();
-    let outputs = "-o full.png --stats new.json --save-scene new.toml";
-    folder.run(&format!("render {SMALL} {outputs}")).assert_failure(1, &["full.png", "No space left"]);
+    let output = command.output().unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
+    assert!(stderr.contains("full.png: No space left"), "{stderr}");
     assert_eq!(folder.names(), names);
+    assert!(fs::symlink_metadata(folder.path("full.png")).unwrap().is_symlink());
 }
 
 fn assert_fails_to_print(status: ExitStatus, stderr: &str, arguments: &str) {
