@@ -11,6 +11,7 @@ use sheetsplat::volume::{Orientation, SampleType, Volume};
 
 use crate::arguments::Input;
 use crate::failure::Failure;
+use crate::outputs::Outputs;
 use crate::stdout;
 use statistics::{Histogram, extent_and_mean};
 
@@ -60,7 +61,9 @@ struct Info {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let input = &arguments.input;
-    let volume = input.load_volume(&input.scene()?)?;
+    let scene = input.scene()?;
+    let outputs = Outputs::check(&[], true, &input.files(&scene))?;
+    let volume = input.load_volume(&scene, &outputs)?;
     let [min, max, mean] = extent_and_mean(volume.values());
     let percentiles = quantiles(volume.values(), |_| true, PERCENTILES.map(|(percent, _)| percent / 100.0));
     let encoding = volume.encoding();
