@@ -26,7 +26,7 @@ impl Volume {
     ///
     /// # Errors
     /// If the file cannot be read, a dimension is 0, there are more than `u32::MAX` voxels, the file does not end where the samples
-    /// do, or a value is not finite (the error names the voxel).
+    /// do, or no value is finite.
     pub fn open_raw(path: &Path, layout: &RawLayout) -> Result<Self, VolumeError> {
         let &RawLayout { dims, sample_type: kind, big_endian, offset } = layout;
         if dims_of(dims.to_array()).is_none() {

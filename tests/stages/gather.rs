@@ -101,7 +101,7 @@ impl<'a> Fixture<'a> {
         let mode = GatherMode::of(
             &seen.scene.splatting,
             seen.view.perspective.is_some(),
-            false,
+            [false, volume.holes() > 0],
             RayMode::default(),
             bins.parts,
         );
