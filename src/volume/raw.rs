@@ -27,7 +27,7 @@ impl Volume {
     ///
     /// # Errors
     /// If the file cannot be read, a dimension is 0, there are more than `u32::MAX` voxels, the file does not end where the samples
-    /// do, they would take more memory than [`ReadOptions::memory`] allows by default, or a value is not finite (the error names the voxel).
+    /// do, they would take more memory than [`ReadOptions::memory`] allows by default, or no value is finite.
     pub fn open_raw(path: &Path, layout: &RawLayout) -> Result<Self, VolumeError> {
         Self::open_raw_with(path, layout, &ReadOptions::default())
     }

@@ -37,7 +37,7 @@ pub(super) trait Voxel: Copy {
     fn of(sample: impl Sample) -> Option<Self>;
 }
 
-/// A value. Whether it is finite is the volume's to check.
+/// A value. Where it is not finite the volume has a hole.
 impl Voxel for f32 {
     const ALLOWED: &'static str = "numbers";
 

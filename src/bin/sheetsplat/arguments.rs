@@ -154,6 +154,10 @@ impl Input {
         let (volume, files) = loaded.map_err(|error| self.failure(error))?;
         outputs.refuse(&files)?;
         log::info!("{}: {} voxels, loaded in {:.1?}", self.name, volume.grid().dims, start.elapsed());
+        let (holes, samples) = (volume.holes(), volume.values().len());
+        if holes > 0 {
+            log::warn!("{}: {holes} of {samples} samples are NaN or infinite: these holes are not drawn", self.name);
+        }
         if self.view.is_some() && volume.orientation().is_some_and(Orientation::is_mirrored) {
             let name = &self.name;
             log::warn!("{name}: --view: the axes are left-handed, so the image is a mirror image of the patient");
