@@ -36,8 +36,10 @@ macro_rules! reader {
     }};
 }
 
+const DICOM: &str = "DICOM";
+
 /// Formats that have a slice in every file of a folder.
-const SLICES: [&str; 2] = ["TIFF", "DICOM"];
+const SLICES: [&str; 2] = ["TIFF", DICOM];
 
 fn formats<T: Voxel>() -> Vec<Format<T>> {
     vec![
@@ -56,6 +58,14 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
                     || matches!(head.get(4..8), Some(b"n+2\0" | b"ni2\0"))
             },
             read: reader!("nifti", super::nifti::read),
+            read_folder: None,
+        },
+        Format {
+            name: "MGH",
+            extensions: &[".mgh", ".mgz", ".mgh.gz"],
+            // It begins with its version, 1, and may be gzipped.
+            is_magic: |_| false,
+            read: reader!("mgh", super::mgh::read),
             read_folder: None,
         },
         Format {
@@ -80,7 +90,7 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             read_folder: reader!("tiff", super::tiff::read_folder).ok(),
         },
         Format {
-            name: "DICOM",
+            name: DICOM,
             extensions: &[".dcm"],
             is_magic: |head| head.get(128..132) == Some(b"DICM"),
             read: reader!("dicom", super::dicom::read),
@@ -110,10 +120,8 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<(&'static str, Loaded<T>), V
     if path.is_dir() {
         return read_folder(path, &formats);
     }
-    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let head = folder::head(path)?;
-    let is_named = |format: &&Format<T>| format.extensions.iter().any(|extension| name.ends_with(extension));
-    let format = formats.iter().find(|format| (format.is_magic)(&head)).or_else(|| formats.iter().find(is_named));
+    let format = format_of(&formats, path, &head).map(|(format, _)| format);
     let found = match format {
         Some(Format { name, read: Ok(read), .. }) => return Ok((name, read(path)?)),
         Some(Format { name, read: Err(feature), .. }) => needs(name, feature),
@@ -134,14 +142,43 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<(&'static str, Loaded<T>), V
     Err(invalid(path, "format", found, allowed))
 }
 
+/// A file's format, and whether its first bytes tell that.
+fn format_of<'a, T>(formats: &'a [Format<T>], path: &Path, head: &[u8]) -> Option<(&'a Format<T>, bool)> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let is_named = |format: &Format<T>| format.extensions.iter().any(|extension| name.ends_with(extension));
+    let named = formats.iter().find(|format| is_named(format));
+    // Bytes that may mean something else count only where no name speaks against it.
+    let is_bare = |format: &Format<T>| {
+        format.name == DICOM && is_bare_dicom(head) && named.is_none_or(|named| named.name == DICOM)
+    };
+    let by_head = |format: &&Format<T>| (format.is_magic)(head) || is_bare(format);
+    formats.iter().find(by_head).map(|format| (format, true)).or(named.map(|format| (format, false)))
+}
+
+/// Whether a file begins as DICOM files do that lack the 128 bytes and "DICM" before the elements: with one of group 2 or 8.
+pub(super) fn is_bare_dicom(head: &[u8]) -> bool {
+    match *head {
+        [2, 0, 0, 0, b'U', b'L', 4, 0, ..] => true,
+        // The type of the element, or its length, which is even.
+        [8, 0, 0..=0x70, 0, a, b, c, d, ..] => {
+            a.is_ascii_uppercase() && b.is_ascii_uppercase() || a % 2 == 0 && [b, c, d] == [0; 3]
+        }
+        _ => false,
+    }
+}
+
 fn read_folder<T: Voxel>(path: &Path, formats: &[Format<T>]) -> Result<(&'static str, Loaded<T>), VolumeError> {
     let mut slices: Vec<(&Format<T>, Vec<PathBuf>)> = Vec::new();
     let files = folder::files(path)?;
     let count = files.len();
     for file in files {
         let head = folder::head(&file)?;
-        let of_slices = |format: &&Format<T>| SLICES.contains(&format.name) && (format.is_magic)(&head);
-        let Some(format) = formats.iter().find(of_slices) else { continue };
+        let of_slices = |(format, _): &(&Format<T>, bool)| SLICES.contains(&format.name);
+        let Some((format, is_certain)) = format_of(formats, &file, &head).filter(of_slices) else { continue };
+        if !is_certain {
+            log::warn!("{}: left out: its first bytes are not those of a {} file", file.display(), format.name);
+            continue;
+        }
         match slices.iter_mut().find(|(other, _)| other.name == format.name) {
             Some((_, files)) => files.push(file),
             None => slices.push((format, vec![file])),

@@ -11,6 +11,8 @@ mod labels;
 mod loaded;
 #[cfg(feature = "metaimage")]
 mod metaimage;
+#[cfg(feature = "mgh")]
+mod mgh;
 #[cfg(feature = "nifti")]
 mod nifti;
 #[cfg(feature = "npy")]
@@ -19,6 +21,7 @@ mod nrrd;
 mod orientation;
 mod raw;
 mod samples;
+mod shear;
 mod source;
 #[cfg(feature = "tiff")]
 mod tiff;
