@@ -155,34 +155,43 @@ fn format_of<'a, T>(formats: &'a [Format<T>], path: &Path, head: &[u8]) -> Optio
     formats.iter().find(by_head).map(|format| (format, true)).or(named.map(|format| (format, false)))
 }
 
-/// Whether a file begins as DICOM files do that lack the 128 bytes and "DICM" before the elements: with one of group 2 or 8.
+/// Whether a file begins as DICOM files do that lack the 128 bytes and "DICM" before the elements: with one of group 2 or 8, and its
+/// type, or else its length, which is even.
 pub(super) fn is_bare_dicom(head: &[u8]) -> bool {
-    match *head {
-        [2, 0, 0, 0, b'U', b'L', 4, 0, ..] => true,
-        // The type of the element, or its length, which is even.
-        [8, 0, 0..=0x70, 0, a, b, c, d, ..] => {
-            a.is_ascii_uppercase() && b.is_ascii_uppercase() || a % 2 == 0 && [b, c, d] == [0; 3]
-        }
-        _ => false,
-    }
+    let &[group @ (2 | 8), 0, 0..=0x70, 0, a, b, c, d, ..] = head else { return false };
+    let has_type = a.is_ascii_uppercase() && b.is_ascii_uppercase();
+    has_type || group == 8 && a % 2 == 0 && [b, c, d] == [0; 3]
 }
 
 fn read_folder<T: Voxel>(path: &Path, formats: &[Format<T>]) -> Result<(&'static str, Loaded<T>), VolumeError> {
     let mut slices: Vec<(&Format<T>, Vec<PathBuf>)> = Vec::new();
     let files = folder::files(path)?;
     let count = files.len();
+    let is_of_slices = |format: &Format<T>| SLICES.contains(&format.name);
+    let mut left_out = Vec::new();
     for file in files {
         let head = folder::head(&file)?;
-        let of_slices = |(format, _): &(&Format<T>, bool)| SLICES.contains(&format.name);
-        let Some((format, is_certain)) = format_of(formats, &file, &head).filter(of_slices) else { continue };
-        if !is_certain {
-            log::warn!("{}: left out: its first bytes are not those of a {} file", file.display(), format.name);
-            continue;
-        }
+        let format = match format_of(formats, &file, &head) {
+            Some((format, true)) if is_of_slices(format) => format,
+            other => {
+                let name = file.file_name().unwrap_or_default().to_string_lossy();
+                // Slices often have names without an extension.
+                let has_extension = name.contains('.');
+                if other.map_or(!has_extension, |(format, _)| is_of_slices(format)) {
+                    left_out.push(name.into_owned());
+                }
+                continue;
+            }
+        };
         match slices.iter_mut().find(|(other, _)| other.name == format.name) {
             Some((_, files)) => files.push(file),
             None => slices.push((format, vec![file])),
         }
+    }
+    if !left_out.is_empty() && !slices.is_empty() {
+        let (path, count, names) = (path.display(), left_out.len(), &left_out[..left_out.len().min(8)].join(", "));
+        let more = if count > 8 { ", …" } else { "" };
+        log::warn!("{path}: {count} files do not begin as slices do and are left out: {names}{more}");
     }
     let found = match slices.as_slice() {
         [] => format!("{count} files, no slices among them"),

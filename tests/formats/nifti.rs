@@ -139,7 +139,16 @@ fn wrong_fields() {
     refused(116, &nan, "scl_inter", "NaN", "finite number, as the slope is 0.5");
     refused(280, &nan, "srow_x, srow_y, srow_z", "NaN", "positive finite length");
     refused(280, &[0; 48], "srow_x, srow_y, srow_z", "lengths [0.0", "positive finite length");
-    refused(280, &99_f32.to_le_bytes(), "srow_x, srow_y, srow_z", "° from a right angle", "each less than 80°");
+    let flat = [[1_f32, 0.0, 2.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.1, 0.0]].as_flattened().to_vec();
+    let flat: Vec<u8> = flat.iter().flat_map(|number| number.to_le_bytes()).collect();
+    refused(280, &flat, "srow_x, srow_y, srow_z", "axes at 87.14° from a right angle", "each less than 80°");
+    refused(
+        280,
+        &99_f32.to_le_bytes(),
+        "srow_x, srow_y, srow_z",
+        "an orthogonal grid of [5.0, 70.0",
+        "at most 16 times",
+    );
     refused(292, &nan, "srow_x, srow_y, srow_z", "NaN", "finite");
 
     // By the qform, or neither.

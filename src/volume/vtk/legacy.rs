@@ -55,7 +55,7 @@ pub(in super::super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeE
         unit: None,
         orientation: None,
         label_names: BTreeMap::new(),
-        values: stream.samples(&samples, true)?,
+        values: stream.samples(&samples, !is_text)?,
     })
 }
 
