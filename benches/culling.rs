@@ -10,9 +10,9 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
-use sheetsplat::camera::Projection;
 use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::scene::Scene;
+use sheetsplat::settings::Projection;
 
 const SIDE_ON: &str = "builtin:nerve, side-on";
 

@@ -9,8 +9,8 @@
 #[expect(dead_code, reason = "not every bench needs all of it")]
 mod common;
 
-use sheetsplat::reference;
-use sheetsplat::reference::visibility::Test;
+use sheetsplat::internals::reference;
+use sheetsplat::internals::reference::visibility::Test;
 
 fn main() {
     let (side, scenes) = common::arguments(256);

@@ -2,7 +2,7 @@
 
 use wgpu::Device;
 
-use crate::fault::DeviceFault;
+use crate::gpu::fault::DeviceFault;
 
 /// Why a frame could not be prepared or read back.
 #[derive(Debug, thiserror::Error)]

@@ -5,56 +5,30 @@
 //! that paper; "SPEC" is this project's specification of what an image must be, \[17\] is the paper's reference on
 //! antialiasing.
 //!
-//! # From a file to a picture
+//! # A picture of a file
 //!
-//! ```text
-//! volume file → Volume ─ classify → ClassifiedVolume: its values, and which voxels of which bricks take part, on the GPU
-//!                      ─ appearance: what the scene leaves open, such as the transfer function
-//! scene file  → Scene  ─ View, FramePlan or TileBins: which bricks every group of sheets looks at (plain data)
-//! SceneView: both, and what the next frame can keep of the last one
+//! [`headless`] opens a GPU device of its own, without a window. A [`Scene`] says what is drawn and how; [`Scene::parse`] reads the
+//! scene file's text, and [`Scene::from_volume`] makes a scene with the defaults for one volume.
 //!
-//! on the GPU, by tiles:
-//!   gather   every tile front to back with the sheets of a group in registers: which voxels are not hidden, their shading, their
-//!            kernel sections, and the sheets into the compositing buffer
-//! or by quads, per group of sheets:
-//!   cull     which bricks, then which of their voxels are not hidden; those are shaded, once each, and only they need gradients
-//!   tiles    where the group's splats fall
-//!   splat    one quad per voxel adds its kernel sections to the group's sheet buffers
-//!   composite  the sheets into the compositing buffer, and which pixels are opaque now
-//!   occlude  the occlusion buffer: where a whole footprint is behind opaque pixels
-//! at the end:
-//!   resolve  the result over the background, into the host's target
-//!   first_hit  the depths at which an opacity was reached, if asked for
+//! ```
+//! use sheetsplat::Scene;
+//! use sheetsplat::headless::{Headless, HeadlessOptions};
+//! use sheetsplat::scene::VolumeSource;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let settings = ["image={width=64,height=64}".to_owned()];
+//! let scene = Scene::from_volume(VolumeSource::Builtin("head:48".to_owned()), &settings)?;
+//! let headless = Headless::new(&HeadlessOptions::default())?;
+//! let rendering = headless.render(&scene)?;
+//! assert_eq!(rendering.image.pixels.len(), 64 * 64);
+//! # Ok(())
+//! # }
 //! ```
 //!
-//! Both rasterizers draw the same image, to rounding ([`splatting::Rasterizer`]).
+//! # Many pictures of one volume
 //!
-//! [`headless`] does all of it with a device of its own. Settings are those of [`scene`]. Every stage has a plain f64 twin in
-//! [`reference`](mod@reference).
-//!
-//! # On a host's device
-//!
-//! The types at the crate's root are those a host needs. The host owns instance, adapter, device, queue, encoder and target; nothing
-//! outside [`headless`] opens a device, submits, or waits.
-//!
-//! ```text
-//! DeviceRequirements  what to ask for when opening the device
-//! RendererOptions     what is drawn into → Renderer: pipelines, once
-//! Volume              → GpuVolume: its textures, shared by views
-//! Scene               → SceneView: what is shown of a volume, and setters
-//!
-//! Renderer::prepare   allocates, writes buffers; can fail
-//! Renderer::record    into the host's encoder: all but the last stage
-//! Renderer::present   the last stage in a pass of its own, at a Placement in the target
-//! Renderer::draw      the same in a pass of the host's
-//! ```
-//!
-//! A host with a scene around the volume makes the camera from its own matrices ([`Camera::from_clip_from_world`]) and hands over its
-//! depth texture ([`SceneView::set_surfaces`]): what lies behind its surfaces is neither shown nor drawn. In turn it may ask for the depth
-//! at which the volume reaches an opacity ([`SceneView::set_first_hit`]), as a texture or for single pixels ([`SceneView::pick`]).
-//! [`clip`] planes and a crop box cut the volume open.
-//!
-//! The README has a whole frame on a host's device. Half a head, and what is at a pixel of it:
+//! A [`SceneView`] keeps what the next frame can use (§5): its setters say what each change costs. It also answers which point of the
+//! volume a pixel shows:
 //!
 //! ```
 //! use sheetsplat::Scene;
@@ -69,80 +43,138 @@
 //! view.set_first_hit(Some(0.5));
 //! headless.draw(&mut view)?;
 //! let pick = headless.pick(&view, [32, 32])?.expect("the head is in the middle");
-//! // On the cut face, to a voxel (of 5.3 units).
+//! // The picked point lies on the cut face, to within one voxel, which is 5.3 units long.
 //! assert!(pick.position.y.abs() < 8.0, "{pick:?}");
 //! # Ok(())
 //! # }
 //! ```
 //!
+//! # On a host's device
+//!
+//! An application that owns a wgpu device uses the types at the crate's root. The host owns instance, adapter, device, queue, encoder and
+//! target; nothing outside [`headless`] opens a device, submits, or waits.
+//!
+//! | type | what the host does with it |
+//! |---|---|
+//! | [`DeviceRequirements`] | asks for what the renderer needs when it opens the device |
+//! | [`Renderer`], [`RendererOptions`] | makes the pipelines, once for each kind of target |
+//! | [`Volume`], [`GpuVolume`] | loads a volume and puts it on the GPU, shared by all views |
+//! | [`Scene`], [`SceneView`] | says what is shown of a volume, and changes it |
+//! | [`Renderer::prepare`] | allocates and writes buffers; this can fail |
+//! | [`Renderer::record`] | encodes all stages but the last into the host's encoder |
+//! | [`Renderer::present`], [`Renderer::draw`] | encodes the last stage, in a pass of its own or of the host's, at a [`Placement`] |
+//!
+//! A host with a scene around the volume makes the camera from its own matrices ([`Camera::from_clip_from_world`]) and hands over its
+//! depth texture ([`SceneView::set_surfaces`]): what lies behind its surfaces is neither shown nor drawn. In turn it may ask for the depth
+//! at which the volume reaches an opacity ([`SceneView::set_first_hit`]), as a texture or for single pixels ([`SceneView::pick`]).
+//! [`Clip`](settings::Clip) planes and a crop box cut the volume open. The README has a whole frame on a host's device.
+//!
+//! # The stages
+//!
+//! ```text
+//! volume file → Volume ─ classify → the values, and which voxels of which bricks take part, on the GPU
+//!                      ─ appearance → what the scene leaves open, such as the transfer function
+//! scene file  → Scene  ─ the view's geometry → which bricks every group of sheets looks at (plain data)
+//!
+//! the tile rasterizer, one compute stage:
+//!   gather   draws every tile front to back with a group's sheets in registers: culls, shades, adds kernel sections, composites
+//! the quad rasterizer, for every group of sheets:
+//!   cull     finds the bricks, then the voxels that are not hidden; each voxel is shaded once, and only visible voxels need gradients
+//!   tiles    marks where the group's splats fall
+//!   splat    adds every voxel's kernel sections to the group's sheet buffers, one quad per voxel
+//!   composite  lays the sheets over the compositing buffer and marks the pixels that have become opaque
+//!   occlude  fills the occlusion buffer: where a whole footprint is behind opaque pixels
+//! at the end:
+//!   resolve  lays the result over the background, into the host's target
+//!   first_hit  writes the depths at which an opacity was reached, if the host asked for them
+//! ```
+//!
+//! Both rasterizers draw the same image up to rounding ([`Rasterizer`](settings::Rasterizer)). Every stage has a plain f64 twin, which
+//! tests compare with it.
+//!
 //! # Glossary
 //!
-//! *voxel* a grid sample · *kernel* a radially symmetric function around each voxel of the warped grid ([`kernel`]) · *slab* the
-//! space between two slicing planes ([`slab`]) · *kernel section* the part of a kernel in one slab · *footprint* a section
-//! integrated along the view ray ([`footprint`]) · *sheet buffer* the image of one slab · *sheet group* consecutive sheets drawn
+//! *voxel* a grid sample · *kernel* a radially symmetric function around each voxel of the warped grid · *slab* the
+//! space between two slicing planes · *kernel section* the part of a kernel in one slab · *footprint* a section
+//! integrated along the view ray · *sheet buffer* the image of one slab · *sheet group* consecutive sheets drawn
 //! together · *compositing buffer* the accumulated image · *opacity buffer* its alpha · *occlusion buffer* the box-filtered
-//! opacity buffer · *mean* of a sheet, what it holds at a pixel over the length of the ray in its slab
-//! ([`splatting::Compositing`]) · *bucket* what touches one slab or group ([`bucket`]) · *iso-range* a closed interval of values that take
-//! part ([`iso_range`]) · *label* which segment of a segmented volume a voxel belongs to
-//! ([`Volume::labels`](volume::Volume::labels)) · *brick* 4×4×4 neighbouring voxels ([`brick`]) ·
-//! *tile* a 32×32 pixel square; of the tile rasterizer one of 16×8.
+//! opacity buffer · *mean* of a sheet, the sheet's value at a pixel divided by the length of the ray in its slab
+//! ([`Compositing`](settings::Compositing)) · *bucket* the voxels that touch one slab or group · *iso-range* a closed interval of values
+//! that take part · *label* the number of the segment that a voxel of a segmented volume belongs to
+//! ([`Volume::labels`]) · *brick* 4×4×4 neighbouring voxels · *tile* a square of 32×32 pixels.
 
 pub mod appearance;
-pub mod brick;
-pub mod bucket;
-pub mod camera;
-pub mod classified_volume;
-pub mod classify;
-pub mod clip;
-mod clip_from_world;
-pub mod error;
-pub mod fault;
-pub mod footprint;
+mod error;
+mod geometry;
 #[cfg(feature = "golden")]
 pub mod golden;
-pub mod gpu;
-pub mod gpu_volume;
-pub mod grid_warp;
+mod gpu;
 pub mod headless;
 pub mod image;
-pub mod iso_range;
-pub mod kernel;
-pub mod means;
-pub mod pass;
-pub mod pick;
-pub mod placement;
-pub mod plan;
-mod prepared_frame;
+mod lists;
+mod pass;
 mod rasterizer;
-pub mod reference;
-pub mod renderer;
-pub mod renderer_options;
+mod reference;
+mod renderer;
 pub mod scene;
-pub mod scene_view;
-pub mod shading;
-pub mod slab;
-pub mod slice_lists;
-pub mod splatting;
+pub mod settings;
 pub mod stats;
-pub mod surfaces;
-pub mod tile_bins;
-pub mod transfer_function;
-pub mod value_list;
-pub mod view;
 pub mod volume;
 
-pub use camera::Camera;
-pub use gpu::device::DeviceRequirements;
-pub use gpu_volume::GpuVolume;
-pub use placement::Placement;
+pub use error::RenderError;
+pub use geometry::surfaces::{SurfaceDepths, Surfaces};
+pub use gpu::device::{DeviceError, DeviceRequirements, InsufficientLimit};
+pub use gpu::fault::{DeviceFault, scoped};
+pub use gpu::gpu_volume::GpuVolume;
+pub use image::Image;
 pub use renderer::Renderer;
-pub use renderer_options::{Blend, RendererOptions};
+pub use renderer::options::{Blend, RendererOptions};
+pub use renderer::pick::{PendingPick, Pick};
+pub use renderer::placement::Placement;
+pub use renderer::scene_view::{Prepared, SceneView};
 pub use scene::Scene;
-pub use scene_view::SceneView;
+pub use settings::Camera;
+pub use stats::Stats;
 pub use volume::Volume;
-pub use wgpu;
+// The libraries whose types stand in this one's signatures.
+pub use {glam, wgpu};
 
-/// The README's code, run as a doc test.
+/// The stages and lists by themselves, for this project's own tests and benches. Nothing in here is part of the public interface: it
+/// changes without notice.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::geometry::{footprint, grid_warp, kernel, means, slab, view_geometry};
+    pub use crate::lists::{brick, bucket, classify, iso_range, quad_plan, tile_bins, value_list};
+    pub use crate::settings::camera::{Eye, ViewBasis};
+    pub use crate::settings::clip::ClippedVoxels;
+    pub use crate::settings::shading::MIN_GRADIENT;
+
+    /// What the passes share.
+    pub mod gpu {
+        pub use crate::gpu::{
+            bindings, brick_lists, classified_volume, device, footprint_texture, layout, render_pipeline, shaders,
+            targets, timer, uniforms, volume_texture,
+        };
+    }
+
+    /// The GPU's stages.
+    pub mod pass {
+        pub use crate::pass::{composite, cull, first_hit, gather, occlude, resolve, sample, shade, splat, tiles};
+    }
+
+    /// The f64 twins of the stages.
+    pub mod reference {
+        pub use crate::reference::*;
+    }
+}
+
+/// The code in the README and the guide, run as doc tests.
 #[cfg(all(doctest, feature = "golden"))]
-#[doc = include_str!("../README.md")]
-pub struct Readme;
+mod guide {
+    #[doc = include_str!("../README.md")]
+    struct Readme;
+    #[doc = include_str!("../docs/guide/golden-images.md")]
+    struct GoldenImages;
+    #[doc = include_str!("../docs/guide/library.md")]
+    struct Library;
+}

@@ -10,8 +10,8 @@ use std::fmt::Write;
 use glam::DVec3;
 use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::image::Image;
-use sheetsplat::reference;
-use sheetsplat::splatting::{Compositing, FootprintForm, Rasterizer};
+use sheetsplat::internals::reference;
+use sheetsplat::settings::{Compositing, FootprintForm, Rasterizer};
 use sheetsplat::volume::builtin;
 use sheetsplat::wgpu::TextureFormat;
 

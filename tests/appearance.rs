@@ -9,10 +9,10 @@ use std::path::Path;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::appearance::{Colormap, Preset, categories, shown_range};
-use sheetsplat::camera::Projection;
 use sheetsplat::scene::{Scene, TransferSettings, VolumeSource};
-use sheetsplat::splatting::Compositing;
-use sheetsplat::transfer_function::{Ramp, TransferFunction};
+use sheetsplat::settings::Compositing;
+use sheetsplat::settings::Projection;
+use sheetsplat::settings::{Ramp, TransferFunction};
 use sheetsplat::volume::{Labels, Volume, builtin};
 
 use common::{Random, camera, gpu, scene};

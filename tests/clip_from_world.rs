@@ -6,9 +6,9 @@ mod common;
 
 use glam::dcamera::rh::{proj::directx as proj, view};
 use glam::{DMat4, DQuat, DVec2, DVec3, UVec3};
-use sheetsplat::camera::{Camera, Projection};
-use sheetsplat::splatting::Splatting;
-use sheetsplat::view::View;
+use sheetsplat::internals::view_geometry::ViewGeometry;
+use sheetsplat::settings::Splatting;
+use sheetsplat::settings::{Camera, Projection};
 use sheetsplat::volume::Grid;
 
 use common::Random;
@@ -69,7 +69,7 @@ fn points_fall_on_the_hosts_pixels() {
             if let (Some(near), Some(plane)) = (near(&camera), plane) {
                 assert!((near / plane - 1.0).abs() < 1e-9, "near {near}, not {plane}");
             }
-            let seen = View::new(&grid, &camera, &Splatting::default(), SIZE).unwrap();
+            let seen = ViewGeometry::new(&grid, &camera, &Splatting::default(), SIZE).unwrap();
             for _ in 0..50 {
                 let voxel = random.within(DVec3::ZERO, grid.dims.as_dvec3()).as_uvec3();
                 let (expected, w) = pixel(&clip_from_world, (voxel.as_dvec3() - grid.center()) * grid.spacing);
@@ -100,7 +100,7 @@ fn matrices_in_f32_are_cameras_too() {
         ] {
             let clip_from_world = (projection.as_mat4() * view.as_mat4() * world.as_mat4()).as_dmat4();
             let camera = Camera::from_clip_from_world(clip_from_world, SIZE).unwrap();
-            let seen = View::new(&grid, &camera, &Splatting::default(), SIZE).unwrap();
+            let seen = ViewGeometry::new(&grid, &camera, &Splatting::default(), SIZE).unwrap();
             let voxel = random.within(DVec3::ZERO, grid.dims.as_dvec3()).as_uvec3();
             let (expected, _) = pixel(&clip_from_world, voxel.as_dvec3() - grid.center());
             let actual = seen.project(voxel).truncate();

@@ -7,10 +7,10 @@ mod common;
 
 use glam::DVec3;
 use sheetsplat::image::Image;
-use sheetsplat::reference;
+use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::{Compositing, Method, Rasterizer, Splatting};
-use sheetsplat::transfer_function::Ramp;
+use sheetsplat::settings::Ramp;
+use sheetsplat::settings::{Compositing, Method, Rasterizer, Splatting};
 use sheetsplat::volume::{Volume, builtin};
 
 use common::images::color_rms;

@@ -6,13 +6,13 @@
 mod common;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::camera::Projection;
 use sheetsplat::headless::{Headless, HeadlessOptions, Rendering};
-use sheetsplat::reference;
-use sheetsplat::reference::visibility::Test;
+use sheetsplat::internals::reference;
+use sheetsplat::internals::reference::visibility::Test;
 use sheetsplat::scene::{Scene, VolumeSource};
-use sheetsplat::splatting::{Compositing, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
-use sheetsplat::transfer_function::Ramp;
+use sheetsplat::settings::Projection;
+use sheetsplat::settings::Ramp;
+use sheetsplat::settings::{Compositing, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
 use sheetsplat::volume::{Volume, builtin};
 
 use common::images::largest_difference;

@@ -9,18 +9,18 @@ mod common;
 use std::sync::Arc;
 
 use glam::{DVec3, UVec2, UVec3};
-use sheetsplat::camera::Projection;
-use sheetsplat::clip::Clip;
+use sheetsplat::settings::Clip;
+use sheetsplat::settings::Projection;
 
+use sheetsplat::Pick;
+use sheetsplat::SceneView;
 use sheetsplat::headless::{Headless, readback};
 use sheetsplat::image::Image;
-use sheetsplat::pick::Pick;
-use sheetsplat::reference::{self, Host, ray_march};
+use sheetsplat::internals::reference::{self, Host, ray_march};
+use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::scene_view::SceneView;
-use sheetsplat::splatting::{Compositing, Method, Order, Rasterizer};
+use sheetsplat::settings::{Compositing, Method, Order, Rasterizer};
 use sheetsplat::stats::Counts;
-use sheetsplat::view::View;
 use sheetsplat::volume::{Grid, Volume, builtin};
 
 use common::images::{BLACK, largest_difference, psnr};
@@ -67,7 +67,7 @@ fn random_clip(random: &mut Random, grid: &Grid) -> Clip {
 }
 
 /// Depths of a host's wavy surface around the volume's middle, with holes.
-fn random_surface(random: &mut Random, view: &View, unit: f64) -> Vec<f64> {
+fn random_surface(random: &mut Random, view: &ViewGeometry, unit: f64) -> Vec<f64> {
     let middle = view.rays().depth_of(DVec3::ZERO);
     let size = UVec2::from(view.size);
     let (slope, wave) = (random.direction() * 8.0 / unit.max(1.0), random.uniform(0.5, 4.0));
@@ -81,9 +81,9 @@ fn random_surface(random: &mut Random, view: &View, unit: f64) -> Vec<f64> {
         .collect()
 }
 
-fn view_of(volume: &Volume, scene: &Scene) -> View {
+fn view_of(volume: &Volume, scene: &Scene) -> ViewGeometry {
     let size = [scene.image.width, scene.image.height];
-    View::new(volume.grid(), &scene.camera, &scene.splatting, size).unwrap()
+    ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, size).unwrap()
 }
 
 /// Draws a frame, with its first hits in `unit`s if they were asked for.

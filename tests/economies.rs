@@ -7,13 +7,13 @@
 mod common;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::camera::{Camera, Projection};
-use sheetsplat::error::RenderError;
+use sheetsplat::RenderError;
 use sheetsplat::headless::{Headless, Rendering};
 use sheetsplat::image::Image;
-use sheetsplat::reference;
+use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::{Compositing, Economies, FootprintForm, Method, Order, Rasterizer};
+use sheetsplat::settings::{Camera, Projection};
+use sheetsplat::settings::{Compositing, Economies, FootprintForm, Method, Order, Rasterizer};
 use sheetsplat::volume::{Volume, builtin};
 
 use common::images::{largest_difference, rms};

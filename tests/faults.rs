@@ -4,15 +4,15 @@
 #[expect(dead_code, reason = "not every file needs all of it")]
 mod common;
 
-use sheetsplat::error::RenderError;
-use sheetsplat::fault::{DeviceFault, scoped};
-use sheetsplat::gpu::device::DeviceError;
+use sheetsplat::DeviceError;
+use sheetsplat::RenderError;
+use sheetsplat::Surfaces;
+use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::Rasterizer;
-use sheetsplat::surfaces::Surfaces;
-use sheetsplat::view::View;
+use sheetsplat::settings::Rasterizer;
 use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::{self, TextureFormat, TextureViewDescriptor};
+use sheetsplat::{DeviceFault, scoped};
 use sheetsplat::{GpuVolume, Renderer, RendererOptions, SceneView};
 
 use common::surfaces::{DepthRange, clip_from_world};
@@ -101,7 +101,7 @@ fn what_validation_finds_is_an_error_and_the_device_goes_on() {
         view_formats: &[],
     });
     let grid = *view.volume().grid();
-    let shown = View::new(&grid, &scene.camera, &scene.splatting, [60, 50]).unwrap();
+    let shown = ViewGeometry::new(&grid, &scene.camera, &scene.splatting, [60, 50]).unwrap();
     let clip_from_world = clip_from_world(&shown, grid.unit(), DepthRange::Standard, [-50.0, 50.0]);
     let depth = depth.create_view(&TextureViewDescriptor::default());
     view.set_surfaces(Some(Surfaces { depth, origin: [0; 2], clip_from_world }));

@@ -13,7 +13,7 @@ use sheetsplat::golden;
 use sheetsplat::golden::{Bless, Picture, Tolerance};
 use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::scene::{Scene, VolumeSource};
-use sheetsplat::splatting::{FootprintForm, Rasterizer};
+use sheetsplat::settings::{FootprintForm, Rasterizer};
 
 /// Steps of 255 that a channel may differ by.
 const TOLERANCE: u8 = 3;

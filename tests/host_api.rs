@@ -4,13 +4,13 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use sheetsplat::clip::Clip;
-use sheetsplat::gpu::device::DeviceError;
+use sheetsplat::DeviceError;
+use sheetsplat::PendingPick;
+use sheetsplat::Surfaces;
 use sheetsplat::headless::{Headless, Rendering};
 use sheetsplat::image::Image;
-use sheetsplat::pick::PendingPick;
+use sheetsplat::settings::Clip;
 use sheetsplat::stats::{PendingCounts, Stats};
-use sheetsplat::surfaces::Surfaces;
 use sheetsplat::{
     Camera, DeviceRequirements, GpuVolume, Placement, Renderer, RendererOptions, Scene, SceneView, Volume,
 };

@@ -9,14 +9,14 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::camera::Projection;
-use sheetsplat::error::RenderError;
+use sheetsplat::RenderError;
 use sheetsplat::headless::Headless;
 use sheetsplat::image::Image;
-use sheetsplat::reference;
+use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::{Compositing, Method, Order, Rasterizer};
-use sheetsplat::transfer_function::{LabelTables, Ramp, TransferFunction};
+use sheetsplat::settings::Projection;
+use sheetsplat::settings::{Compositing, Method, Order, Rasterizer};
+use sheetsplat::settings::{LabelTables, Ramp, TransferFunction};
 use sheetsplat::volume::{Labels, Volume, VolumeError, builtin};
 
 use common::{Random, camera, gpu, scene, transfer};

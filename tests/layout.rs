@@ -5,10 +5,10 @@ use std::mem::offset_of;
 
 use naga::proc::Layouter;
 use naga::{AddressSpace, Handle, Module, Type, TypeInner};
-use sheetsplat::gpu::layout::{
+use sheetsplat::internals::gpu::layout::{
     Band, Brick, BrickState, Culled, Cut, Frame, Gather, Gathered, Group, Indirect, Part, Splat, Tally, TileList, Visit,
 };
-use sheetsplat::gpu::shaders;
+use sheetsplat::internals::gpu::shaders;
 
 /// A `repr(C)` struct as Rust lays it out: name, size, and members with name, offset and size.
 struct Layout {

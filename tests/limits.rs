@@ -5,23 +5,23 @@
 mod common;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::brick::BrickList;
-use sheetsplat::camera::Projection;
-use sheetsplat::classify::classify;
-use sheetsplat::clip::ClippedVoxels;
-use sheetsplat::error::RenderError;
-use sheetsplat::gpu::brick_lists::BrickLists;
-use sheetsplat::gpu::device::{DeviceError, DeviceRequirements, InsufficientLimit};
-use sheetsplat::gpu::layout::{Band, Brick};
-use sheetsplat::gpu::targets::CompositingBuffer;
-use sheetsplat::gpu::volume_texture;
+use sheetsplat::RenderError;
 use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::image::Image;
+use sheetsplat::internals::ClippedVoxels;
+use sheetsplat::internals::brick::BrickList;
+use sheetsplat::internals::classify::classify;
+use sheetsplat::internals::gpu::brick_lists::BrickLists;
+use sheetsplat::internals::gpu::layout::{Band, Brick};
+use sheetsplat::internals::gpu::targets::CompositingBuffer;
+use sheetsplat::internals::gpu::volume_texture;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::{Compositing, FootprintForm, Rasterizer};
+use sheetsplat::settings::Projection;
+use sheetsplat::settings::{Compositing, FootprintForm, Rasterizer};
 use sheetsplat::stats::Counts;
 use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::{Features, Limits, TextureFormat};
+use sheetsplat::{DeviceError, DeviceRequirements, InsufficientLimit};
 
 use common::{COMPOSITINGS, F16, F32, gpu, scene, transfer};
 

@@ -4,21 +4,26 @@
 
 #[expect(dead_code, reason = "not every file needs all of it")]
 mod common;
+#[path = "../benches/lists/slice_lists.rs"]
+mod slice_lists;
 
 use std::sync::Arc;
 
 use glam::DVec3;
-use sheetsplat::camera::{Camera, Projection};
-use sheetsplat::classified_volume::Touched;
+use sheetsplat::Renderer;
 use sheetsplat::headless::Headless;
-use sheetsplat::iso_range::ValueSet;
-use sheetsplat::renderer::Renderer;
+use sheetsplat::internals::gpu::classified_volume::Touched;
+use sheetsplat::internals::iso_range::{ValueSet, ordinal};
+use sheetsplat::internals::value_list::ValueList;
 use sheetsplat::scene::{Scene, TransferSettings};
-use sheetsplat::scene_view::{Prepared, SceneView};
-use sheetsplat::shading::Light;
-use sheetsplat::splatting::{Compositing, FootprintForm, Method, Rasterizer, Splatting};
-use sheetsplat::transfer_function::{Ramp, TransferFunction};
+use sheetsplat::settings::Light;
+use sheetsplat::settings::{Camera, Projection};
+use sheetsplat::settings::{Compositing, FootprintForm, Method, Rasterizer, Splatting};
+use sheetsplat::settings::{Ramp, TransferFunction};
 use sheetsplat::volume::{Volume, builtin};
+use sheetsplat::{Prepared, SceneView};
+
+use slice_lists::SliceLists;
 
 use common::{COMPOSITINGS, RASTERIZERS, Random, camera, gpu, scene, transfer};
 
@@ -324,7 +329,7 @@ fn assert_costs(gpu: &Headless, rasterizer: Rasterizer) {
     view.set_light(Light::Direction(DVec3::new(1.0, 0.3, 2.0)));
     assert!(!prepare(&mut view), "light");
     assert_fresh(gpu, &mut view, "light");
-    view.set_shading(sheetsplat::shading::Shading { ambient: 0.5, shininess: 3.0, ..scene.shading });
+    view.set_shading(sheetsplat::settings::Shading { ambient: 0.5, shininess: 3.0, ..scene.shading });
     assert!(!prepare(&mut view), "shading");
     assert_fresh(gpu, &mut view, "shading");
     let old = view.volume().transfer().clone();
@@ -341,9 +346,9 @@ fn assert_costs(gpu: &Headless, rasterizer: Rasterizer) {
     view.set_splatting(splatting);
     assert!(!prepare(&mut view), "compositing");
     assert_fresh(gpu, &mut view, "compositing");
-    view.set_splatting(sheetsplat::splatting::Splatting { footprint: FootprintForm::Sections, ..splatting });
+    view.set_splatting(sheetsplat::settings::Splatting { footprint: FootprintForm::Sections, ..splatting });
     assert_fresh(gpu, &mut view, "footprint");
-    view.set_splatting(sheetsplat::splatting::Splatting { radius: 1.4, ..splatting });
+    view.set_splatting(sheetsplat::settings::Splatting { radius: 1.4, ..splatting });
     assert!(prepare(&mut view), "radius");
     assert_fresh(gpu, &mut view, "radius");
 
@@ -402,4 +407,29 @@ fn the_value_list_leaves_out_the_background() {
     assert_eq!(list.bytes(), 4 * (volume.values().len() - background) as u64);
     let all = TransferFunction { opacity: Ramp::new(vec![(0.0, 1.0)]).unwrap(), ..view.volume().transfer().clone() };
     assert_eq!(list.within(volume.values(), &ValueSet::of(&all)).len(), volume.values().len());
+}
+
+#[test]
+fn slices_together_hold_what_the_volume_list_holds() {
+    let volume = builtin::volume("tomato:24").unwrap();
+    let transfer = TransferSettings::default().resolve(&volume);
+    let transfer = TransferFunction { iso_ranges: Some(vec![[30.0, 90.0]]), ..transfer };
+    let (values, set) = (volume.values(), ValueSet::of(&transfer));
+    let mut expected = ValueList::new(values).within(values, &set);
+    expected.sort_unstable();
+    assert!(expected.len() > 100 && expected.len() < values.len() / 2, "{}", expected.len());
+    for axis in 0..3 {
+        let lists = SliceLists::new(values, volume.grid(), axis);
+        assert_eq!(lists.len(), volume.grid().dims[axis] as usize);
+        let mut found = Vec::new();
+        for slice in 0..lists.len() {
+            for voxels in lists.within(values, slice, &set) {
+                assert!(voxels.is_sorted_by_key(|&voxel| ordinal(values[voxel as usize])));
+                assert!(voxels.iter().all(|&voxel| volume.grid().voxel_at(voxel)[axis] as usize == slice));
+                found.extend_from_slice(voxels);
+            }
+        }
+        found.sort_unstable();
+        assert_eq!(found, expected, "axis {axis}");
+    }
 }

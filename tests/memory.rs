@@ -5,12 +5,12 @@
 mod common;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::camera::Projection;
 use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::scene::Scene;
-use sheetsplat::shading::Light;
-use sheetsplat::splatting::{Method, Order, Splatting};
-use sheetsplat::transfer_function::LabelTables;
+use sheetsplat::settings::LabelTables;
+use sheetsplat::settings::Light;
+use sheetsplat::settings::Projection;
+use sheetsplat::settings::{Method, Order, Splatting};
 use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::PollType;
 use sheetsplat::{GpuVolume, SceneView};

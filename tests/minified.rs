@@ -9,12 +9,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 use sheetsplat::image::Image;
-use sheetsplat::kernel::Kernel;
-use sheetsplat::reference::composite::composite;
-use sheetsplat::reference::footprint::Ray;
-use sheetsplat::reference::{Buffer, Geometry, resolve, shading, sheets, splat};
+use sheetsplat::internals::kernel::Kernel;
+use sheetsplat::internals::reference::composite::composite;
+use sheetsplat::internals::reference::footprint::Ray;
+use sheetsplat::internals::reference::{Buffer, Geometry, resolve, shading, sheets, splat};
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::Rasterizer;
+use sheetsplat::settings::Rasterizer;
 use sheetsplat::volume::{Volume, builtin};
 
 use common::images::color_rms;

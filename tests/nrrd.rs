@@ -11,7 +11,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use glam::{DMat3, DVec3, UVec3};
 use sheetsplat::Camera;
-use sheetsplat::volume::{Orientation, View, Volume, VolumeError};
+use sheetsplat::volume::{Orientation, PatientSide, Volume, VolumeError};
 use tempfile::TempDir;
 
 /// Header of a 2×3×4 volume of `uint8`; the tests replace or add lines.
@@ -340,17 +340,17 @@ fn anatomical_views() {
     assert!(!orientation.is_mirrored());
     let [left, up, front] = DMat3::IDENTITY.to_cols_array_2d().map(DVec3::from_array);
     for (view, expected) in [
-        (View::Front, [-front, up]),
-        (View::Back, [front, up]),
-        (View::Left, [-left, up]),
-        (View::Right, [left, up]),
-        (View::Top, [-up, front]),
-        (View::Bottom, [up, front]),
+        (PatientSide::Front, [-front, up]),
+        (PatientSide::Back, [front, up]),
+        (PatientSide::Left, [-left, up]),
+        (PatientSide::Right, [left, up]),
+        (PatientSide::Top, [-up, front]),
+        (PatientSide::Bottom, [up, front]),
     ] {
         assert_eq!(orientation.direction_and_up(view), expected, "{view:?}");
     }
     // Who faces the patient has the patient's left on the right.
-    let [direction, up] = orientation.direction_and_up(View::Front);
+    let [direction, up] = orientation.direction_and_up(PatientSide::Front);
     assert_eq!(Camera { direction, up, ..Camera::default() }.basis().u, left);
 }
 

@@ -7,12 +7,12 @@ mod common;
 use std::f64::consts::TAU;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::camera::Projection;
 use sheetsplat::headless::Headless;
 use sheetsplat::image::Image;
+use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::{Compositing, Order, Rasterizer};
-use sheetsplat::view::View;
+use sheetsplat::settings::Projection;
+use sheetsplat::settings::{Compositing, Order, Rasterizer};
 use sheetsplat::volume::{Volume, builtin};
 
 use common::images::largest_difference;
@@ -106,7 +106,8 @@ impl UniformSlab {
     /// Checks that every ray of the image enters and leaves the slab farther from its borders than a kernel reaches.
     fn assert_shows_no_border(&self, volume: &Volume, scene: &Scene) {
         let view =
-            View::new(volume.grid(), &scene.camera, &scene.splatting, [scene.image.width, scene.image.height]).unwrap();
+            ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, [scene.image.width, scene.image.height])
+                .unwrap();
         let (basis, reach) = (view.basis, scene.splatting.radius * self.spacing);
         let half = volume.grid().center() * self.spacing;
         let height = scene.camera.orthographic_height(volume.grid(), 2.0, 1, 1).unwrap();

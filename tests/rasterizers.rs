@@ -5,13 +5,13 @@
 mod common;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::camera::Projection;
-use sheetsplat::error::RenderError;
-use sheetsplat::gpu::device::{DeviceRequirements, TILE_FEATURES};
-use sheetsplat::gpu::targets::CompositingBuffer;
+use sheetsplat::RenderError;
 use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::internals::gpu::device::{DeviceRequirements, TILE_FEATURES};
+use sheetsplat::internals::gpu::targets::CompositingBuffer;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::{FootprintBox, FootprintForm, Method, Order, Rasterizer};
+use sheetsplat::settings::Projection;
+use sheetsplat::settings::{FootprintBox, FootprintForm, Method, Order, Rasterizer};
 use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::{Features, Limits};
 

@@ -9,11 +9,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DVec3, UVec2};
-use sheetsplat::camera::Projection;
 use sheetsplat::image::Image;
-use sheetsplat::reference::{self, ray_march};
+use sheetsplat::internals::reference::{self, ray_march};
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::{Compositing, Rasterizer};
+use sheetsplat::settings::Projection;
+use sheetsplat::settings::{Compositing, Rasterizer};
 use sheetsplat::volume::{Volume, builtin};
 
 use common::images::{BLACK, psnr};

@@ -4,14 +4,12 @@
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use sheetsplat::camera::{Camera, Projection};
-use sheetsplat::clip::Clip;
 use sheetsplat::scene::{ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
-use sheetsplat::shading::{Light, Shading};
-use sheetsplat::splatting::{
-    Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting,
-};
-use sheetsplat::transfer_function::{LabelTables, Ramp};
+use sheetsplat::settings::Clip;
+use sheetsplat::settings::{Camera, Projection};
+use sheetsplat::settings::{Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
+use sheetsplat::settings::{LabelTables, Ramp};
+use sheetsplat::settings::{Light, Shading};
 
 const MINIMAL: &str = "[volume]\npath = 'a.nrrd'\n";
 

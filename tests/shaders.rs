@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, Module, ShaderStage, TypeInner};
-use sheetsplat::gpu::shaders::{self, Shader};
+use sheetsplat::internals::gpu::shaders::{self, Shader};
 
 /// What WebGPU core has beyond naga's least: `pack2x16float` and its inverse, which WGSL always has.
 const WEBGPU_CORE: Capabilities = Capabilities::SHADER_FLOAT16_IN_FLOAT32;

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::scene::{Scene, TransferSettings};
-use sheetsplat::transfer_function::{Ramp, RampError, TransferFunction};
+use sheetsplat::settings::{Ramp, RampError, TransferFunction};
 use sheetsplat::volume::Volume;
 
 #[test]

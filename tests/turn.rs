@@ -10,7 +10,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use sheetsplat::headless::Headless;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::Method;
+use sheetsplat::settings::Method;
 use sheetsplat::volume::{Volume, builtin};
 
 use common::{gpu, scene, transfer};

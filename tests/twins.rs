@@ -6,13 +6,13 @@
 mod common;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::camera::{Camera, Projection};
 use sheetsplat::image::Image;
-use sheetsplat::kernel::Kernel;
-use sheetsplat::reference;
-use sheetsplat::reference::visibility::Test;
+use sheetsplat::internals::kernel::Kernel;
+use sheetsplat::internals::reference;
+use sheetsplat::internals::reference::visibility::Test;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::{Compositing, Method, Order};
+use sheetsplat::settings::{Camera, Projection};
+use sheetsplat::settings::{Compositing, Method, Order};
 use sheetsplat::volume::{Volume, builtin};
 
 use common::images::{largest_difference, rms};

@@ -6,10 +6,10 @@
 mod common;
 
 use sheetsplat::headless::{Headless, Rendering};
-use sheetsplat::reference;
+use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
-use sheetsplat::shading::Light;
-use sheetsplat::splatting::{Method, Order, Rasterizer};
+use sheetsplat::settings::Light;
+use sheetsplat::settings::{Method, Order, Rasterizer};
 use sheetsplat::stats::Counts;
 use sheetsplat::volume::Volume;
 

@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::time::Instant;
 
+use sheetsplat::SceneView;
 use sheetsplat::headless::Headless;
 use sheetsplat::scene::{Scene, VolumeSource};
-use sheetsplat::scene_view::SceneView;
 use sheetsplat::stats::Stats;
 
 /// A number that may come first, and the names after it.

@@ -8,7 +8,7 @@ use image::{Rgb, RgbImage};
 use sheetsplat::headless::Headless;
 use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::{Method, Splatting};
+use sheetsplat::settings::{Method, Splatting};
 use sheetsplat::volume::Volume;
 
 use crate::measures::{METHODS, Turn, ball, difference, right_over_left, rms, warp_or_slices};

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use glam::{DVec3, UVec3, dvec3};
 use sheetsplat::headless::Headless;
 use sheetsplat::image::Image;
-use sheetsplat::reference;
+use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::Method;
+use sheetsplat::settings::Method;
 use sheetsplat::volume::Volume;
 
 use crate::scenes::{open, turned};

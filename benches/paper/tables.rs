@@ -1,8 +1,8 @@
 //! Tables 2 to 4, and a table of the economies of §8.
 
+use sheetsplat::SceneView;
 use sheetsplat::headless::Headless;
-use sheetsplat::scene_view::SceneView;
-use sheetsplat::splatting::{Economies, Method, Order, Rasterizer, Splatting};
+use sheetsplat::settings::{Economies, Method, Order, Rasterizer, Splatting};
 use sheetsplat::stats::{Counts, Stats};
 
 use crate::common::{median, timed};

@@ -7,7 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::quantile::histogram;
-use crate::transfer_function::{LabelTables, Ramp, TransferFunction};
+use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
 use crate::volume::Volume;
 
 /// Opacity of every label but 0.

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::transfer_function::Ramp;
+use crate::settings::transfer_function::Ramp;
 
 /// A named sequence of colours, to be laid over a range of values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

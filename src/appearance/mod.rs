@@ -15,8 +15,8 @@ pub use colormap::Colormap;
 pub use preset::Preset;
 pub use quantile::{histogram, quantiles};
 
-use crate::iso_range::ValueSet;
-use crate::transfer_function::{Ramp, TransferFunction};
+use crate::lists::iso_range::ValueSet;
+use crate::settings::transfer_function::{Ramp, TransferFunction};
 use crate::volume::Volume;
 use object::Object;
 

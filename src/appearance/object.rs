@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::padding::{AIR, is_padded};
 use super::quantile::quantiles;
-use crate::transfer_function::Ramp;
+use crate::settings::transfer_function::Ramp;
 
 const BINS: usize = 256;
 

@@ -6,9 +6,9 @@ use super::hounsfield::Hounsfield;
 use super::object::Object;
 use super::quantile::quantiles;
 use super::{categories, constant, xray};
-use crate::shading::Shading;
-use crate::splatting::Compositing;
-use crate::transfer_function::{Ramp, TransferFunction};
+use crate::settings::shading::Shading;
+use crate::settings::splatting::Compositing;
+use crate::settings::transfer_function::{Ramp, TransferFunction};
 use crate::volume::Volume;
 
 /// A kind of data, and what of it is to be seen.

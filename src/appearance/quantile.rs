@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::iso_range::{of_ordinal, ordinal};
+use crate::lists::iso_range::{of_ordinal, ordinal};
 
 /// Values that one thread counts at a time.
 const CHUNK: usize = 1 << 20;

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::constant;
 use super::object::Object;
 use super::quantile::quantiles;
-use crate::transfer_function::{Ramp, TransferFunction};
+use crate::settings::transfer_function::{Ramp, TransferFunction};
 use crate::volume::{Grid, Volume};
 
 /// Share of the rays that are as bright as there is, or would be brighter.

@@ -6,7 +6,7 @@ use wgpu::{Buffer, BufferUsages, Device, Queue};
 
 use super::bindings::uploaded;
 use super::layout::{Brick, BrickState, Splat, Visit};
-use crate::brick::{self, BRICK_VOXELS, BrickList};
+use crate::lists::brick::{self, BRICK_VOXELS, BrickList};
 use crate::volume::Grid;
 
 /// The bricks of all voxels that take part, in lists whose records each fit one storage binding.

@@ -6,7 +6,7 @@ use wgpu::{Adapter, Device, DeviceDescriptor, Features, Limits, TextureFormat};
 
 use super::layout::FOLD;
 use super::volume_texture;
-use crate::fault::DeviceFault;
+use crate::gpu::fault::DeviceFault;
 
 /// Why no device could be used.
 #[derive(Debug, thiserror::Error)]
@@ -50,7 +50,7 @@ pub enum DeviceError {
     /// An option of the renderer that this device, or any, cannot fulfil.
     #[error("{option}: found {found}, allowed: {allowed}")]
     Unsupported {
-        /// The field of [`RendererOptions`](crate::renderer_options::RendererOptions).
+        /// The field of [`RendererOptions`](crate::renderer::options::RendererOptions).
         option: &'static str,
         /// What it is.
         found: String,

@@ -3,8 +3,8 @@
 use wgpu::util::{DeviceExt, TextureDataOrder};
 use wgpu::{Device, Queue, TextureFormat, TextureView};
 
-use crate::footprint::FootprintTable;
-use crate::splatting::FootprintForm;
+use crate::geometry::footprint::FootprintTable;
+use crate::settings::splatting::FootprintForm;
 
 /// A footprint table on the GPU.
 #[derive(Debug)]

@@ -145,7 +145,7 @@ pub struct Cut {
     pub box_at: [[f32; 4]; 3],
     /// The same per depth.
     pub box_along: [[f32; 4]; 3],
-    /// Half the extent of a [`RayBox`](crate::means::RayBox), grid steps, and its nearest depth.
+    /// Half the extent of a [`RayBox`](crate::geometry::means::RayBox), grid steps, and its nearest depth.
     pub box_half: [f32; 4],
     /// The texel of the host's depth that is the image's first.
     pub surface_origin: [u32; 2],
@@ -313,7 +313,7 @@ pub struct Gather {
     pub peak: f32,
     /// Where in [`Gathered`]'s words it is written, for every unit of every tile, at which group its subgroup goes on.
     pub reached: u32,
-    /// Passes through loops that a thread may take in one dispatch; see [`tile_bins`](crate::tile_bins).
+    /// Passes through loops that a thread may take in one dispatch; see [`tile_bins`](crate::lists::tile_bins).
     pub most_passes: u32,
     /// Those of a group at most, bricks not counted.
     pub passes_per_group: u32,

@@ -2,8 +2,11 @@
 
 pub mod bindings;
 pub mod brick_lists;
+pub mod classified_volume;
 pub mod device;
+pub(crate) mod fault;
 pub mod footprint_texture;
+pub(crate) mod gpu_volume;
 pub mod layout;
 pub mod render_pipeline;
 pub mod shaders;

@@ -8,7 +8,7 @@ use wgpu::{
 use super::bindings::{Wanted, grown, sizes, uploaded, wanted};
 use super::layout::Band;
 use crate::error::RenderError;
-use crate::plan::{TILE, tile_grid};
+use crate::lists::quad_plan::{TILE, tile_grid};
 
 /// The compositing buffer.
 #[derive(Debug)]

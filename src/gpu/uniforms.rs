@@ -6,18 +6,18 @@ use glam::{DMat2, DVec2, DVec3, DVec4};
 
 use super::layout::{Cut, Frame, Gather, Gathered, Group};
 use super::volume_texture::ValueFormat;
-use crate::clip::HalfSpace;
-use crate::grid_warp::{self, FootprintMap};
-use crate::kernel::Kernel;
-use crate::means::RayBox;
-use crate::plan::{FramePlan, tile_grid};
+use crate::geometry::grid_warp::{self, FootprintMap};
+use crate::geometry::kernel::Kernel;
+use crate::geometry::means::RayBox;
+use crate::geometry::surfaces::SurfaceDepths;
+use crate::geometry::view_geometry::{Rays, ViewGeometry};
+use crate::lists::quad_plan::{FramePlan, tile_grid};
+use crate::lists::tile_bins::{self, TileBins};
 use crate::scene::Scene;
-use crate::shading::{Light, MIN_GRADIENT, Shading};
-use crate::splatting::{Compositing, Order, Splatting};
-use crate::surfaces::SurfaceDepths;
-use crate::tile_bins::{self, TileBins};
-use crate::transfer_function::{Ramp, Tables, TransferFunction};
-use crate::view::{Rays, View};
+use crate::settings::clip::HalfSpace;
+use crate::settings::shading::{Light, MIN_GRADIENT, Shading};
+use crate::settings::splatting::{Compositing, Order, Splatting};
+use crate::settings::transfer_function::{Ramp, Tables, TransferFunction};
 use crate::volume::Grid;
 
 /// What ambient, diffuse, specular and shininess are clamped to: beyond it no image changes any more, and `f32` ends.
@@ -25,7 +25,7 @@ const MAX_SHADING: f64 = 1e30;
 
 /// What is constant over a frame of a volume with such a grid, whose values are stored so.
 pub fn frame(
-    view: &View,
+    view: &ViewGeometry,
     kernel: &Kernel,
     (grid, values): (&Grid, ValueFormat),
     ramps: &Ramps,
@@ -90,7 +90,7 @@ pub fn frame(
 }
 
 /// What the tile rasterizer's threads share, over a volume of so many `bricks`.
-pub fn gather(view: &View, kernel: &Kernel, splatting: &Splatting, bins: &TileBins, bricks: u32) -> Gather {
+pub fn gather(view: &ViewGeometry, kernel: &Kernel, splatting: &Splatting, bins: &TileBins, bricks: u32) -> Gather {
     let economies = splatting.economies;
     // What is behind a surface is culled; nothing else is behind anything.
     let has_beta = hides(splatting) && splatting.compositing != Compositing::Surface && economies.beta < 1.0;
@@ -136,7 +136,7 @@ const WORDS_BEFORE: u32 = (std::mem::offset_of!(Gathered, words) / 4) as u32;
 
 /// What clip planes and a host's surfaces leave of rays, and the box of a volume that compositing by means looks at.
 pub fn cut(
-    view: &View,
+    view: &ViewGeometry,
     grid: &Grid,
     Scene { clip, splatting, .. }: &Scene,
     surfaces: Option<(SurfaceDepths, [u32; 2])>,
@@ -182,7 +182,7 @@ pub fn cut(
 const CHORD_SPAN: f64 = 0.45;
 
 /// The most groups of the tile rasterizer that a kernel reaches into.
-fn groups_per_kernel(view: &View) -> u32 {
+fn groups_per_kernel(view: &ViewGeometry) -> u32 {
     (2.0 * view.reach / (f64::from(tile_bins::SHEETS) * view.slabs.width)).ceil() as u32 + 1
 }
 
@@ -205,7 +205,7 @@ pub fn groups(plan: &FramePlan, kernel: &Kernel, splatting: &Splatting, stride: 
 }
 
 /// The group of sheets between two planes of sheet depth, without bricks.
-pub fn group(view: &View, kernel: &Kernel, splatting: &Splatting, planes: Range<f64>) -> Group {
+pub fn group(view: &ViewGeometry, kernel: &Kernel, splatting: &Splatting, planes: Range<f64>) -> Group {
     let half_box = view.half_box(kernel.support(), planes.clone());
     Group {
         half_box: in_f32_pixels(half_box),

@@ -8,7 +8,7 @@ use crate::gpu::bindings::{ComputeStage, at_offset, depth_texture, storage, text
 use crate::gpu::layout::{Band, Cut, Frame, Group, TileList};
 use crate::gpu::shaders;
 use crate::gpu::targets::{BandBuffer, Targets};
-use crate::splatting::Compositing;
+use crate::settings::splatting::Compositing;
 
 /// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug, Default)]

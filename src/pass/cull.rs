@@ -3,12 +3,12 @@
 
 use wgpu::{BindGroup, Buffer, BufferUsages, ComputePass, Device, ShaderStages, TextureView};
 
-use crate::brick::BRICK_VOXELS;
 use crate::error::RenderError;
 use crate::gpu::bindings::{ComputeStage, Wanted, at_offset, grown, storage, uniform, wanted};
 use crate::gpu::brick_lists::BrickBuffer;
 use crate::gpu::layout::{Brick, BrickState, Culled, Frame, Group, Indirect, Splat, Visit};
 use crate::gpu::shaders;
+use crate::lists::brick::BRICK_VOXELS;
 use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};
 
 /// The four stages' pipelines.

@@ -12,8 +12,8 @@ use crate::gpu::bindings::{ComputeStage, at_offset, depth_texture, storage, text
 use crate::gpu::layout::{Brick, Cut, Frame, Gather as GatherUniform, Gathered, Indirect, Part};
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
-use crate::splatting::{Compositing, Economies, FootprintBox, Order, Splatting};
-use crate::tile_bins::{SHEETS, TILE};
+use crate::lists::tile_bins::{SHEETS, TILE};
+use crate::settings::splatting::{Compositing, Economies, FootprintBox, Order, Splatting};
 
 /// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug)]
@@ -60,9 +60,9 @@ pub struct GatherBuffers<'a> {
     pub parts: &'a Buffer,
     /// `[Brick]`.
     pub bricks: &'a Buffer,
-    /// [`TileBins::starts`](crate::tile_bins::TileBins::starts).
+    /// [`TileBins::starts`](crate::lists::tile_bins::TileBins::starts).
     pub starts: &'a Buffer,
-    /// [`TileBins::entries`](crate::tile_bins::TileBins::entries).
+    /// [`TileBins::entries`](crate::lists::tile_bins::TileBins::entries).
     pub entries: &'a Buffer,
     /// Control points of the ramps.
     pub control_points: &'a Buffer,
@@ -72,7 +72,7 @@ pub struct GatherBuffers<'a> {
     pub labels: Option<&'a TextureView>,
     /// [`Gathered`].
     pub gathered: &'a Buffer,
-    /// [`TileBins::half_boxes`](crate::tile_bins::TileBins::half_boxes), `[[f32; 2]]`.
+    /// [`TileBins::half_boxes`](crate::lists::tile_bins::TileBins::half_boxes), `[[f32; 2]]`.
     pub half_boxes: &'a Buffer,
     /// What cuts rays.
     pub cut: CutBuffers<'a>,

@@ -7,8 +7,8 @@ use crate::gpu::layout::{Band, Frame};
 use crate::gpu::render_pipeline::{Attachments, render_pipeline};
 use crate::gpu::shaders;
 use crate::gpu::targets::BandBuffer;
-use crate::placement::Placement;
-use crate::renderer_options::RendererOptions;
+use crate::renderer::options::RendererOptions;
+use crate::renderer::placement::Placement;
 
 /// The stage's pipeline.
 #[derive(Debug)]

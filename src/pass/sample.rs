@@ -8,13 +8,13 @@ use wgpu::{
 };
 
 use super::splat::{added_to, quad_indices, sheets_of_a_group, splat_slots};
-use crate::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
+use crate::geometry::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
 use crate::gpu::bindings::{at_offset, bind, layout};
 use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::layout::{Group, QUADS};
 use crate::gpu::render_pipeline::render_pipeline;
 use crate::gpu::shaders;
-use crate::splatting::{Compositing, FootprintForm};
+use crate::settings::splatting::{Compositing, FootprintForm};
 
 /// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug)]

@@ -8,14 +8,14 @@ use wgpu::{
     RenderPipeline, ShaderStages, TextureFormat, TextureView, TextureViewDimension,
 };
 
-use crate::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
+use crate::geometry::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
 use crate::gpu::bindings::{Slot, at_offset, bind, layout, storage, texture, uniform, uploaded};
 use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::layout::{Frame, Group, Indirect, QUADS, Splat as SplatRecord, TileList};
 use crate::gpu::render_pipeline::{Attachments, render_pipeline};
 use crate::gpu::shaders;
 use crate::pass::cull::CullList;
-use crate::splatting::FootprintForm;
+use crate::settings::splatting::FootprintForm;
 
 /// The stage's pipelines: zeroing tiles, and those that draw.
 #[derive(Debug)]

@@ -9,17 +9,17 @@ pub(crate) mod way;
 
 use wgpu::{Buffer, BufferUsages, ComputePassDescriptor, Device, Queue};
 
-use crate::classified_volume::ClassifiedVolume;
 use crate::error::RenderError;
-use crate::footprint::FootprintTable;
+use crate::geometry::footprint::FootprintTable;
+use crate::geometry::kernel::Kernel;
 use crate::gpu::bindings::filled;
+use crate::gpu::classified_volume::ClassifiedVolume;
 use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
-use crate::kernel::Kernel;
 use crate::pass::composite::CutBuffers;
 use crate::rasterizer::request::FrameRequest;
-use crate::splatting::FootprintForm;
+use crate::settings::splatting::FootprintForm;
 
 /// What [`Renderer::prepare`](crate::renderer::Renderer::prepare) had to do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -5,23 +5,23 @@ use std::ops::Range;
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Limits, TextureFormat, TextureView};
 
 use super::{Footprints, Given, Needs, Prepared, compute};
-use crate::brick;
-use crate::classified_volume::ClassifiedVolume;
 use crate::error::RenderError;
-use crate::footprint::FootprintTable;
+use crate::geometry::footprint::FootprintTable;
 use crate::gpu::bindings::{Wanted, grown, sizes, uploaded, wanted, wanted_for};
+use crate::gpu::classified_volume::ClassifiedVolume;
 use crate::gpu::layout::{Brick, Group, Tally};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
+use crate::lists::brick;
+use crate::lists::quad_plan::{FramePlan, tile_grid};
 use crate::pass::composite::{Composite, CompositeBuffers, CompositeMode};
 use crate::pass::cull::{Cull, CullBuffers, CullList};
 use crate::pass::occlude::Occlude;
 use crate::pass::splat::{Splat, SplatMode};
 use crate::pass::tiles::{TileLists, Tiles};
-use crate::plan::{FramePlan, tile_grid};
 use crate::rasterizer::request::FrameRequest;
-use crate::splatting::Order;
+use crate::settings::splatting::Order;
 use crate::stats::GroupSlabs;
 
 /// The stages.
@@ -64,7 +64,7 @@ pub(crate) struct QuadFrame {
 struct Planned {
     plan: FramePlan,
     order: Order,
-    /// [`means::covered`](crate::means::covered).
+    /// [`means::covered`](crate::geometry::means::covered).
     covered: Range<f64>,
     /// [`ClassifiedVolume::revision`].
     revision: u64,

@@ -5,25 +5,25 @@ use std::ops::Range;
 use wgpu::Device;
 
 use super::way::{Way, check_rays, insists_on_tiles};
-use crate::classified_volume::ClassifiedVolume;
 use crate::error::RenderError;
+use crate::geometry::kernel::Kernel;
+use crate::geometry::means;
+use crate::geometry::surfaces::{SurfaceDepths, Surfaces};
+use crate::geometry::view_geometry::ViewGeometry;
+use crate::gpu::classified_volume::ClassifiedVolume;
 use crate::gpu::layout::Band;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::uniforms::Ramps;
-use crate::kernel::Kernel;
-use crate::means;
 use crate::pass::composite::RayMode;
 use crate::scene::Scene;
-use crate::splatting::{Rasterizer, Splatting};
-use crate::surfaces::{SurfaceDepths, Surfaces};
-use crate::view::View;
+use crate::settings::splatting::{Rasterizer, Splatting};
 
 /// A frame of a view.
 #[derive(Debug)]
 pub(crate) struct FrameRequest {
     /// With the renderer's rasterizer where the scene leaves the choice.
     pub(crate) splatting: Splatting,
-    pub(crate) view: View,
+    pub(crate) view: ViewGeometry,
     pub(crate) kernel: Kernel,
     pub(crate) ramps: Ramps,
     /// The sheet depths whose slabs count even where they hold nothing: [`means::covered`].
@@ -51,7 +51,7 @@ impl FrameRequest {
         let splatting = settled(scene.splatting, rasterizer);
         splatting.check()?;
         let (grid, size) = (volume.grid(), [scene.image.width, scene.image.height]);
-        let seen = View::new(grid, &scene.camera, &splatting, size)?;
+        let seen = ViewGeometry::new(grid, &scene.camera, &splatting, size)?;
         let bands = CompositingBuffer::bands(&device.limits(), size)?;
         let rays = RayMode { cut: surfaces.is_some() || !scene.clip.is_empty(), first_hit: first_hit.is_some() };
         check_rays(device, &splatting, rays, first_hit, size)?;

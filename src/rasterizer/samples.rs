@@ -6,22 +6,22 @@ use rayon::prelude::*;
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Limits, TextureFormat, TextureView};
 
 use super::{Footprints, Given, Needs, Prepared, compute};
-use crate::brick::{self, BRICK_VOXELS};
 use crate::error::RenderError;
-use crate::footprint::FootprintTable;
+use crate::geometry::footprint::FootprintTable;
+use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::bindings::{Wanted, grown, sizes, wanted, wanted_for, written};
 use crate::gpu::layout::{Brick, FOLD, Group, Indirect, QUADS, Splat, Tally};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
+use crate::lists::brick::{self, BRICK_VOXELS};
+use crate::lists::quad_plan::tile_grid;
 use crate::pass::composite::{Composite, CompositeBuffers, CompositeMode, RayMode};
 use crate::pass::sample::{Sample, SampleBuffers, SampleMode};
 use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};
-use crate::plan::tile_grid;
 use crate::rasterizer::request::FrameRequest;
-use crate::splatting::Compositing;
+use crate::settings::splatting::Compositing;
 use crate::stats::GroupSlabs;
-use crate::view::View;
 use crate::volume::Grid;
 
 /// Planes around all kernels, in the sheet depth of such views.
@@ -57,7 +57,7 @@ pub(crate) struct SampleFrame {
 /// What only changes with the view, or with the bricks.
 #[derive(Debug)]
 struct Sorted {
-    view: View,
+    view: ViewGeometry,
     support: f64,
     revision: u64,
     /// Places of the voxels on the screen, farthest first.

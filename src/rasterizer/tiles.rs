@@ -8,16 +8,16 @@ use wgpu::{Buffer, BufferUsages, CommandEncoder, Limits};
 use super::way::SUBGROUP_SIZES;
 use super::{Given, Needs, Prepared};
 use crate::error::RenderError;
+use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::bindings::{Wanted, grown, sizes, wanted, wanted_for, written};
 use crate::gpu::layout::{Brick, Gather as GatherUniform, Gathered, Part, Tally};
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
+use crate::lists::tile_bins::{self, SHEETS, TileBins};
 use crate::pass::gather::{Gather, GatherBand, GatherBuffers, GatherMode};
 use crate::rasterizer::request::FrameRequest;
-use crate::splatting::Order;
+use crate::settings::splatting::Order;
 use crate::stats::GroupSlabs;
-use crate::tile_bins::{self, SHEETS, TileBins};
-use crate::view::View;
 
 /// The stage.
 #[derive(Debug, Default)]
@@ -48,9 +48,9 @@ pub(crate) struct TileFrame {
 #[derive(Debug)]
 struct Binned {
     bins: TileBins,
-    view: View,
+    view: ViewGeometry,
     order: Order,
-    /// [`means::covered`](crate::means::covered).
+    /// [`means::covered`](crate::geometry::means::covered).
     covered: Range<f64>,
     /// Of the kernel; it changes the footprints' boxes.
     support: f64,

@@ -6,7 +6,9 @@ use crate::error::RenderError;
 use crate::gpu::device::TILE_FEATURES;
 use crate::pass::composite::RayMode;
 use crate::pass::gather::WORKGROUP_BYTES;
-use crate::splatting::{Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
+use crate::settings::splatting::{
+    Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting,
+};
 
 /// Threads that a subgroup may have.
 pub(super) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;

@@ -3,7 +3,7 @@
 use glam::DVec4;
 
 use super::Buffer;
-use crate::splatting::{Compositing, Order};
+use crate::settings::splatting::{Compositing, Order};
 
 /// Composites a sheet buffer into the compositing buffer.
 pub fn composite(acc: &mut Buffer, sheet: &Buffer, compositing: Compositing, order: Order) {

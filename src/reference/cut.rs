@@ -6,8 +6,8 @@ use glam::{DVec3, UVec2};
 use rayon::prelude::*;
 
 use super::{Buffer, Geometry};
-use crate::clip::HalfSpace;
-use crate::splatting::Method;
+use crate::settings::clip::HalfSpace;
+use crate::settings::splatting::Method;
 
 /// Of every pixel, row by row, the stretch of its ray that shows, in sheets: number k fills `k..k + 1`. Empty if nothing shows.
 #[derive(Clone, Debug, PartialEq)]

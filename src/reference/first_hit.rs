@@ -5,7 +5,7 @@ use glam::UVec2;
 use super::composite::crossing;
 use super::cut::PixelRay;
 use super::{Buffer, Cuts, Geometry};
-use crate::splatting::Compositing;
+use crate::settings::splatting::Compositing;
 
 /// Of every pixel, row by row, where the opacity is reached, in sheets (number k fills `k..k + 1`).
 pub(super) struct FirstHits {

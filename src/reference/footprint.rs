@@ -2,7 +2,7 @@
 
 use glam::{DMat2, DVec2, DVec3};
 
-use crate::camera::ViewBasis;
+use crate::settings::camera::ViewBasis;
 
 /// A local ray, as the footprints of a kernel see it: SPEC §5's `λ` and `ro`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,8 +82,8 @@ fn low_pass(m: DMat2) -> (DMat2, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Camera;
-    use crate::kernel::Kernel;
+    use crate::geometry::kernel::Kernel;
+    use crate::settings::camera::Camera;
 
     #[test]
     fn low_pass_leaves_large_maps_alone_and_raises_small_ones() {

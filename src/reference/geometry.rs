@@ -6,13 +6,13 @@ use glam::{DMat2, DVec2, DVec3, UVec3};
 
 use super::footprint::{Footprint, Ray};
 use super::{Section, Splat};
-use crate::camera::{Camera, Eye, ViewBasis};
-use crate::clip::HalfSpace;
 use crate::error::RenderError;
-use crate::kernel::Kernel;
+use crate::geometry::kernel::Kernel;
+use crate::geometry::slab::SlabGrid;
 use crate::scene::Scene;
-use crate::slab::SlabGrid;
-use crate::splatting::{Economies, Method};
+use crate::settings::camera::{Camera, Eye, ViewBasis};
+use crate::settings::clip::HalfSpace;
+use crate::settings::splatting::{Economies, Method};
 use crate::volume::Grid;
 
 /// The largest image, pixels along a side: what the largest GPUs allow.

@@ -7,8 +7,8 @@ use rayon::prelude::*;
 
 use super::cut::{self, PixelRay};
 use super::{Buffer, Geometry};
-use crate::clip::HalfSpace;
-use crate::splatting::Compositing;
+use crate::settings::clip::HalfSpace;
+use crate::settings::splatting::Compositing;
 
 /// By how much slabs' middles may lie outside, in slabs, and rays miss a box of voxel centres, in grid steps.
 const HAIR: f64 = 0.01;

@@ -20,13 +20,13 @@ use glam::DVec4;
 use rayon::prelude::*;
 
 use crate::error::RenderError;
+use crate::geometry::kernel::Kernel;
 use crate::image::Image;
-use crate::kernel::Kernel;
-use crate::plan::tile_grid;
+use crate::lists::quad_plan::tile_grid;
 use crate::scene::Scene;
-use crate::splatting::{Compositing, Method, Order};
+use crate::settings::splatting::{Compositing, Method, Order};
+use crate::settings::transfer_function::TransferFunction;
 use crate::stats::Counts;
-use crate::transfer_function::TransferFunction;
 use crate::volume::Volume;
 
 pub use cut::Cuts;

@@ -12,11 +12,11 @@ use rayon::prelude::*;
 use super::composite::composite_pixel;
 use super::{Buffer, Geometry, cut, resolve, shading};
 use crate::error::RenderError;
+use crate::geometry::kernel::Kernel;
 use crate::image::Image;
-use crate::kernel::Kernel;
 use crate::scene::Scene;
-use crate::splatting::{Compositing, Order};
-use crate::transfer_function::TransferFunction;
+use crate::settings::splatting::{Compositing, Order};
+use crate::settings::transfer_function::TransferFunction;
 use crate::volume::{Grid, Volume};
 
 /// Length of a step, `unit`s.
@@ -202,9 +202,9 @@ impl Field {
 #[expect(clippy::unwrap_used, reason = "tests")]
 mod tests {
     use super::*;
-    use crate::camera::{Camera, Projection};
     use crate::scene::VolumeSource;
-    use crate::transfer_function::Ramp;
+    use crate::settings::camera::{Camera, Projection};
+    use crate::settings::transfer_function::Ramp;
 
     /// One voxel: the field along a ray through its middle is the kernel itself, and what it adds up to is its footprint.
     #[test]

@@ -3,7 +3,7 @@
 use glam::{DVec3, DVec4};
 
 use super::Buffer;
-use crate::splatting::Compositing;
+use crate::settings::splatting::Compositing;
 
 /// Premultiplied in, premultiplied out; the background has straight alpha.
 pub fn resolve(acc: &Buffer, compositing: Compositing, background: [f64; 4]) -> Buffer {

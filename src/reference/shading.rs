@@ -5,9 +5,9 @@ use rayon::prelude::*;
 
 use super::Geometry;
 use crate::scene::Scene;
-use crate::shading::{Light, Shading};
-use crate::splatting::Compositing;
-use crate::transfer_function::TransferFunction;
+use crate::settings::shading::{Light, Shading};
+use crate::settings::splatting::Compositing;
+use crate::settings::transfer_function::TransferFunction;
 use crate::volume::Volume;
 
 /// A projected and shaded voxel.

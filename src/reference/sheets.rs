@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::{Geometry, Splat};
-use crate::kernel::Kernel;
-use crate::splatting::Method;
+use crate::geometry::kernel::Kernel;
+use crate::settings::splatting::Method;
 
 /// Indices of splats for every sheet that has any, front to back: image-aligned by slab (§3.2), axis-aligned by slice (§3.1).
 /// Composite-every-sample has no sheets.

@@ -4,7 +4,7 @@ use glam::{DMat2, DVec2};
 
 use super::cut::Cuts;
 use super::{Buffer, Section};
-use crate::plan::TILE;
+use crate::lists::quad_plan::TILE;
 
 /// When a voxel is culled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -12,12 +12,12 @@ use glam::DVec3;
 use toml::Table;
 
 use crate::appearance::{Colormap, Preset, shown_range};
-use crate::camera::Camera;
-use crate::clip::Clip;
 use crate::error::RenderError;
-use crate::shading::Shading;
-use crate::splatting::Splatting;
-use crate::transfer_function::{LabelTables, Ramp, TransferFunction};
+use crate::settings::camera::Camera;
+use crate::settings::clip::Clip;
+use crate::settings::shading::Shading;
+use crate::settings::splatting::Splatting;
+use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
 use crate::volume::{Labels, RawLayout, Volume, VolumeError, builtin};
 use reader::{OVERRIDE, Origins, Section, apply_override};
 

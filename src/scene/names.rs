@@ -1,6 +1,6 @@
 //! What scene files call a setting's choices.
 
-use crate::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer};
+use crate::settings::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer};
 
 pub(super) const METHODS: &[(&str, Method)] = &[
     ("image-aligned", Method::ImageAligned),

@@ -6,7 +6,7 @@ use glam::UVec3;
 use toml::{Table, Value};
 
 use super::SceneError;
-use crate::transfer_function::{Ramp, RampError};
+use crate::settings::transfer_function::{Ramp, RampError};
 use crate::volume::{SIZES, dims_of};
 
 /// The origin of what was set on the command line.

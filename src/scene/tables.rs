@@ -9,11 +9,11 @@ use super::names::{BOXES, COMPOSITINGS, ENDIANS, FORMS, METHODS, ORDERS, RASTERI
 use super::reader::{Bounds, Entry, FINITE, LABEL, Section};
 use super::{ImageSettings, SceneError, TransferSettings, VolumeSource};
 use crate::appearance::Colormap;
-use crate::camera::{Camera, Projection};
-use crate::clip::{Clip, MAX_PLANES};
-use crate::shading::{Light, Shading};
-use crate::splatting::{Compositing, Splatting};
-use crate::transfer_function::{LabelTables, Ramp};
+use crate::settings::camera::{Camera, Projection};
+use crate::settings::clip::{Clip, MAX_PLANES};
+use crate::settings::shading::{Light, Shading};
+use crate::settings::splatting::{Compositing, Splatting};
+use crate::settings::transfer_function::{LabelTables, Ramp};
 use crate::volume::{RawLayout, SampleType};
 
 const POSITIVE: Bounds = Bounds { text: "a finite number > 0", contain: |x| x > 0.0 };

@@ -9,11 +9,11 @@ use toml::Value;
 use super::names::{BOXES, COMPOSITINGS, FORMS, METHODS, ORDERS, RASTERIZERS, name_of};
 use super::{ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use crate::appearance::{Colormap, Preset};
-use crate::camera::{Camera, Projection};
-use crate::clip::Clip;
-use crate::shading::{Light, Shading};
-use crate::splatting::{Economies, Splatting};
-use crate::transfer_function::Ramp;
+use crate::settings::camera::{Camera, Projection};
+use crate::settings::clip::Clip;
+use crate::settings::shading::{Light, Shading};
+use crate::settings::splatting::{Economies, Splatting};
+use crate::settings::transfer_function::Ramp;
 use crate::volume::RawLayout;
 
 /// More control points than this are written line by line.

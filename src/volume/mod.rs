@@ -40,7 +40,7 @@ use glam::{DVec3, UVec3};
 pub use grid::Grid;
 pub use labels::Labels;
 use loaded::Loaded;
-pub use orientation::{Orientation, View};
+pub use orientation::{Orientation, PatientSide};
 pub use raw::RawLayout;
 pub use samples::SampleType;
 pub(crate) use samples::{SIZES, dims_of};

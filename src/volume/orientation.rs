@@ -27,7 +27,7 @@ pub struct Orientation {
 
 /// The side of a patient that is looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum View {
+pub enum PatientSide {
     /// The face; the head is up.
     Front,
     /// The back; the head is up.
@@ -44,14 +44,14 @@ pub enum View {
 
 impl Orientation {
     /// `Camera::direction` and `Camera::up`, in world space, for a view of the patient.
-    pub fn direction_and_up(&self, view: View) -> [DVec3; 2] {
+    pub fn direction_and_up(&self, view: PatientSide) -> [DVec3; 2] {
         let ras = match view {
-            View::Front => [DVec3::NEG_Y, DVec3::Z],
-            View::Back => [DVec3::Y, DVec3::Z],
-            View::Left => [DVec3::X, DVec3::Z],
-            View::Right => [DVec3::NEG_X, DVec3::Z],
-            View::Top => [DVec3::NEG_Z, DVec3::Y],
-            View::Bottom => [DVec3::Z, DVec3::Y],
+            PatientSide::Front => [DVec3::NEG_Y, DVec3::Z],
+            PatientSide::Back => [DVec3::Y, DVec3::Z],
+            PatientSide::Left => [DVec3::X, DVec3::Z],
+            PatientSide::Right => [DVec3::NEG_X, DVec3::Z],
+            PatientSide::Top => [DVec3::NEG_Z, DVec3::Y],
+            PatientSide::Bottom => [DVec3::Z, DVec3::Y],
         };
         // The axes are orthonormal, so the transpose is the inverse.
         ras.map(|vector| self.axes.transpose() * vector)

@@ -4,12 +4,12 @@ pub(crate) mod images;
 pub(crate) mod surfaces;
 
 use glam::{DVec3, DVec4, UVec3};
-use sheetsplat::camera::{Camera, Projection};
-use sheetsplat::gpu::device::DeviceRequirements;
+use sheetsplat::DeviceRequirements;
 use sheetsplat::headless::{Headless, HeadlessOptions};
 use sheetsplat::scene::{ImageSettings, Scene, TransferSettings, VolumeSource};
-use sheetsplat::splatting::{Compositing, FootprintForm, Rasterizer};
-use sheetsplat::transfer_function::Ramp;
+use sheetsplat::settings::Ramp;
+use sheetsplat::settings::{Camera, Projection};
+use sheetsplat::settings::{Compositing, FootprintForm, Rasterizer};
 use sheetsplat::volume::{Grid, Volume};
 use sheetsplat::wgpu::{Features, Limits, TextureFormat};
 

@@ -1,9 +1,9 @@
 //! A host's depth texture with depths of the test's choice.
 
 use glam::{DMat4, DVec3, DVec4};
+use sheetsplat::Surfaces;
 use sheetsplat::headless::Headless;
-use sheetsplat::surfaces::Surfaces;
-use sheetsplat::view::View;
+use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::wgpu::util::DeviceExt;
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
 
@@ -28,7 +28,7 @@ pub(crate) enum DepthRange {
 }
 
 /// What a host would draw the view with: from the volume's world coordinates to clip space. Planes are at these depths, `unit`s.
-pub(crate) fn clip_from_world(view: &View, unit: f64, range: DepthRange, [near, far]: [f64; 2]) -> DMat4 {
+pub(crate) fn clip_from_world(view: &ViewGeometry, unit: f64, range: DepthRange, [near, far]: [f64; 2]) -> DMat4 {
     let rays = view.rays();
     let half = DVec3::new(f64::from(view.size[0]), f64::from(view.size[1]), 0.0) / 2.0;
     let (u, v, w) = (view.basis.u, view.basis.v, view.basis.w);
@@ -59,7 +59,7 @@ pub(crate) fn clip_from_world(view: &View, unit: f64, range: DepthRange, [near, 
 /// A texture that holds the depths (`unit`s along w, infinite for none) of an image's pixels at `origin`, and what it means.
 pub(crate) fn surfaces(
     gpu: &Headless,
-    view: &View,
+    view: &ViewGeometry,
     unit: f64,
     range: DepthRange,
     planes: [f64; 2],

@@ -1,12 +1,12 @@
 //! What maximum, minimum and average make of a whole ray.
 
 use glam::{DVec3, UVec2};
-use sheetsplat::camera::Projection;
-use sheetsplat::clip::Clip;
 use sheetsplat::image::Image;
+use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::{Compositing, Method, Order};
-use sheetsplat::view::View;
+use sheetsplat::settings::Clip;
+use sheetsplat::settings::Projection;
+use sheetsplat::settings::{Compositing, Method, Order};
 use sheetsplat::volume::{Volume, builtin};
 
 use crate::common::images::largest_difference;
@@ -14,7 +14,7 @@ use crate::common::{RASTERIZERS, Random, camera, gpu, scene, transfer};
 use crate::{COLOR, OPACITY, constant, render, view_of};
 
 /// Of a pixel's ray what lies in the box of half the given extent, grid steps: from where to where, grid steps from the volume's centre.
-fn in_box(view: &View, aspect: DVec3, pixel: usize, half: DVec3) -> Option<[DVec3; 2]> {
+fn in_box(view: &ViewGeometry, aspect: DVec3, pixel: usize, half: DVec3) -> Option<[DVec3; 2]> {
     let size = UVec2::from(view.size);
     let place = UVec2::new(pixel as u32 % size.x, pixel as u32 / size.x).as_dvec2() + 0.5 - size.as_dvec2() / 2.0;
     let [origin, end] = [0.0, 1.0].map(|depth| view.rays().at(place, depth) / aspect);

@@ -1,9 +1,9 @@
 //! Culling, tiles and groups (SPEC §6): what they change is the cost.
 
 use glam::DVec3;
-use sheetsplat::camera::Projection;
 use sheetsplat::headless::{Headless, HeadlessOptions};
-use sheetsplat::splatting::Compositing;
+use sheetsplat::settings::Compositing;
+use sheetsplat::settings::Projection;
 use sheetsplat::volume::builtin;
 
 use crate::common::{BY_MEANS, FORMS, RASTERIZERS, Random, gpu, lavapipe, scene};

@@ -14,10 +14,10 @@ mod twin;
 use glam::{DVec3, UVec3};
 use sheetsplat::headless::Headless;
 use sheetsplat::image::Image;
+use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::Method;
+use sheetsplat::settings::Method;
 use sheetsplat::stats::Counts;
-use sheetsplat::view::View;
 use sheetsplat::volume::Volume;
 
 use common::{Random, SPACINGS, random_eye, random_volume, scene, transfer};
@@ -64,8 +64,8 @@ pub(crate) fn random_case(random: &mut Random) -> (Volume, Scene) {
     (volume, scene)
 }
 
-pub(crate) fn view_of(volume: &Volume, scene: &Scene) -> View {
-    View::new(volume.grid(), &scene.camera, &scene.splatting, [scene.image.width, scene.image.height]).unwrap()
+pub(crate) fn view_of(volume: &Volume, scene: &Scene) -> ViewGeometry {
+    ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, [scene.image.width, scene.image.height]).unwrap()
 }
 
 pub(crate) fn render(gpu: &Headless, volume: &Volume, scene: &Scene) -> (Image, Counts) {

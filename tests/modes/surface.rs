@@ -1,10 +1,10 @@
 //! What a surface is.
 
 use glam::DVec3;
-use sheetsplat::camera::Projection;
-use sheetsplat::reference;
+use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::Compositing;
+use sheetsplat::settings::Compositing;
+use sheetsplat::settings::Projection;
 use sheetsplat::volume::{Volume, builtin};
 
 use crate::common::{RASTERIZERS, camera, gpu, scene, transfer};

@@ -1,13 +1,13 @@
 //! Frames of random volumes, and of the thinnest, against the twin; and what is refused.
 
 use glam::DVec3;
-use sheetsplat::error::RenderError;
+use sheetsplat::RenderError;
 use sheetsplat::headless::{Headless, readback};
 use sheetsplat::image::Image;
-use sheetsplat::reference::{self, Host};
+use sheetsplat::internals::reference::{self, Host};
+use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::{Compositing, Method, Order};
-use sheetsplat::view::View;
+use sheetsplat::settings::{Compositing, Method, Order};
 use sheetsplat::volume::{Volume, builtin};
 
 use crate::common::surfaces::{DepthRange, surfaces};
@@ -15,7 +15,7 @@ use crate::common::{BY_MEANS, RASTERIZERS, Random, camera, gpu, scene, transfer}
 use crate::{COLOR, OUTLIERS, constant, random_case, render, share_off, view_of};
 
 /// Depths of a host's wall before a part of the image.
-fn wall(view: &View) -> Vec<f64> {
+fn wall(view: &ViewGeometry) -> Vec<f64> {
     let middle = view.rays().depth_of(DVec3::ZERO);
     let depth = |at: u32| match (at % view.size[0]) * 4 / view.size[0] {
         0 => (middle - 2.3).max(0.05),

@@ -1,14 +1,14 @@
 //! `shaders/composite.wgsl` against `reference::composite`: random sheets over random compositing buffers, in some tiles.
 
 use glam::{DVec3, DVec4};
-use sheetsplat::gpu::layout::Group;
-use sheetsplat::gpu::targets::{BandBuffer, CompositingBuffer, Targets};
 use sheetsplat::headless::{Headless, readback};
-use sheetsplat::pass::composite::{Composite, CompositeBuffers, CompositeMode, RayMode};
-use sheetsplat::plan::{TILE, tile_grid};
-use sheetsplat::reference::Buffer;
-use sheetsplat::reference::composite::composite;
-use sheetsplat::splatting::{Compositing, Order};
+use sheetsplat::internals::gpu::layout::Group;
+use sheetsplat::internals::gpu::targets::{BandBuffer, CompositingBuffer, Targets};
+use sheetsplat::internals::pass::composite::{Composite, CompositeBuffers, CompositeMode, RayMode};
+use sheetsplat::internals::quad_plan::{TILE, tile_grid};
+use sheetsplat::internals::reference::Buffer;
+use sheetsplat::internals::reference::composite::composite;
+use sheetsplat::settings::{Compositing, Order};
 use sheetsplat::wgpu::{self, BufferUsages};
 
 use crate::common::{BY_AMOUNTS, F32, Random, gpu, gpu_with_small_bindings};

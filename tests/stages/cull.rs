@@ -5,21 +5,21 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DVec2, DVec3, DVec4, UVec3};
-use sheetsplat::brick::{self, BRICK_VOXELS};
-use sheetsplat::gpu::brick_lists::BrickLists;
-use sheetsplat::gpu::layout::{self, Brick, BrickState, Frame, Group, Indirect, Tally};
-use sheetsplat::gpu::targets::Targets;
-use sheetsplat::gpu::uniforms::{self, Ramps};
-use sheetsplat::gpu::volume_texture::VolumeTexture;
 use sheetsplat::headless::Headless;
-use sheetsplat::kernel::Kernel;
-use sheetsplat::pass::cull::{Cull, CullBuffers, CullList};
-use sheetsplat::plan::{FramePlan, TILE, tile_grid};
-use sheetsplat::reference::{self, Geometry};
+use sheetsplat::internals::brick::{self, BRICK_VOXELS};
+use sheetsplat::internals::gpu::brick_lists::BrickLists;
+use sheetsplat::internals::gpu::layout::{self, Brick, BrickState, Frame, Group, Indirect, Tally};
+use sheetsplat::internals::gpu::targets::Targets;
+use sheetsplat::internals::gpu::uniforms::{self, Ramps};
+use sheetsplat::internals::gpu::volume_texture::VolumeTexture;
+use sheetsplat::internals::kernel::Kernel;
+use sheetsplat::internals::pass::cull::{Cull, CullBuffers, CullList};
+use sheetsplat::internals::quad_plan::{FramePlan, TILE, tile_grid};
+use sheetsplat::internals::reference::{self, Geometry};
+use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::{Method, Order};
-use sheetsplat::transfer_function::{Ramp, TransferFunction};
-use sheetsplat::view::View;
+use sheetsplat::settings::{Method, Order};
+use sheetsplat::settings::{Ramp, TransferFunction};
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat};
 
@@ -31,7 +31,7 @@ use crate::{compute, contents, indirect, init};
 pub(crate) struct Culling<'a> {
     gpu: &'a Headless,
     stage: &'a Cull,
-    pub(crate) view: View,
+    pub(crate) view: ViewGeometry,
     pub(crate) frame: Frame,
     pub(crate) plan: FramePlan,
     /// The uniform of every group of the plan.
@@ -57,7 +57,7 @@ impl<'a> Culling<'a> {
     ) -> Self {
         let device = gpu.device();
         let size = [scene.image.width, scene.image.height];
-        let view = View::new(grid, &scene.camera, &scene.splatting, size).unwrap();
+        let view = ViewGeometry::new(grid, &scene.camera, &scene.splatting, size).unwrap();
         let lists = BrickLists::upload(device, grid, voxels);
         let bricks = lists.bricks().next().unwrap().to_vec();
         let plan = FramePlan::new([bricks.as_slice()], view, sheets, scene.splatting.order, 0.0..0.0);
@@ -83,7 +83,7 @@ impl<'a> Culling<'a> {
             culled: &culled,
         };
         let order = init(device, &plan.orders[0], BufferUsages::STORAGE);
-        let counts = |group: &sheetsplat::plan::GroupPlan| {
+        let counts = |group: &sheetsplat::internals::quad_plan::GroupPlan| {
             let range = group.bricks[0].start as usize..group.bricks[0].end as usize;
             plan.orders[0][range]
                 .iter()
@@ -255,7 +255,7 @@ struct Expected {
 struct Rules<'a> {
     grid: &'a Grid,
     frame: &'a Frame,
-    view: &'a View,
+    view: &'a ViewGeometry,
     geometry: Geometry,
     kernel: Kernel,
     order_of_sheets: Order,

@@ -1,24 +1,24 @@
 //! `shaders/gather.wgsl` against the f64 twin: sections of single kernels, frames of random volumes, and which voxels are hidden.
 
 use glam::{DVec2, DVec3, DVec4, UVec3};
-use sheetsplat::brick::{self, BrickList};
-use sheetsplat::camera::Projection;
-use sheetsplat::classify::classify;
-use sheetsplat::clip::ClippedVoxels;
-use sheetsplat::gpu::layout::{Gathered, Part, Tally};
-use sheetsplat::gpu::uniforms::{self, Ramps};
-use sheetsplat::gpu::volume_texture::{SIDES, VolumeTexture};
 use sheetsplat::headless::Headless;
-use sheetsplat::means;
-use sheetsplat::pass::composite::{CutBuffers, RayMode};
-use sheetsplat::pass::gather::{Gather, GatherBuffers, GatherMode};
-use sheetsplat::reference;
-use sheetsplat::reference::footprint::Footprint;
+use sheetsplat::internals::ClippedVoxels;
+use sheetsplat::internals::brick::{self, BrickList};
+use sheetsplat::internals::classify::classify;
+use sheetsplat::internals::gpu::layout::{Gathered, Part, Tally};
+use sheetsplat::internals::gpu::uniforms::{self, Ramps};
+use sheetsplat::internals::gpu::volume_texture::{SIDES, VolumeTexture};
+use sheetsplat::internals::means;
+use sheetsplat::internals::pass::composite::{CutBuffers, RayMode};
+use sheetsplat::internals::pass::gather::{Gather, GatherBuffers, GatherMode};
+use sheetsplat::internals::reference;
+use sheetsplat::internals::reference::footprint::Footprint;
+use sheetsplat::internals::tile_bins::{self, Passes, SHEETS, TileBins, UNITS};
 use sheetsplat::scene::{Scene, TransferSettings};
-use sheetsplat::shading::Light;
-use sheetsplat::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order};
-use sheetsplat::tile_bins::{self, Passes, SHEETS, TileBins, UNITS};
-use sheetsplat::transfer_function::{Ramp, TransferFunction};
+use sheetsplat::settings::Light;
+use sheetsplat::settings::Projection;
+use sheetsplat::settings::{Compositing, FootprintBox, FootprintForm, Method, Order};
+use sheetsplat::settings::{Ramp, TransferFunction};
 use sheetsplat::volume::{Grid, Volume};
 use sheetsplat::wgpu::BufferUsages;
 

@@ -2,12 +2,12 @@
 //! the stages that draw it may err by.
 
 use glam::{DVec2, DVec4, UVec3};
-use sheetsplat::footprint::{SECTION_SIZE, SECTIONS, section_extent, section_spacing};
-use sheetsplat::gpu::layout;
-use sheetsplat::reference::footprint::Ray;
-use sheetsplat::reference::{self, Section};
+use sheetsplat::internals::footprint::{SECTION_SIZE, SECTIONS, section_extent, section_spacing};
+use sheetsplat::internals::gpu::layout;
+use sheetsplat::internals::reference::footprint::Ray;
+use sheetsplat::internals::reference::{self, Section};
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::{FootprintForm, Method};
+use sheetsplat::settings::{FootprintForm, Method};
 use sheetsplat::volume::Grid;
 
 use crate::common::{F32, Random, SPACINGS, random_eye, scene};

@@ -1,4 +1,4 @@
-//! Every GPU stage against its f64 twin in `sheetsplat::reference`, one stage at a time, in float.
+//! Every GPU stage against its f64 twin in `sheetsplat::internals::reference`, one stage at a time, in float.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
@@ -23,16 +23,16 @@ mod values;
 use std::collections::BTreeMap;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::gpu::layout::{Cut, Frame, Indirect, QUADS, TileList};
-use sheetsplat::gpu::targets::no_surfaces;
-use sheetsplat::gpu::uniforms::{self, Ramps};
-use sheetsplat::gpu::volume_texture::ValueFormat;
 use sheetsplat::headless::{Headless, readback};
-use sheetsplat::kernel::Kernel;
-use sheetsplat::pass::composite::CutBuffers;
+use sheetsplat::internals::gpu::layout::{Cut, Frame, Indirect, QUADS, TileList};
+use sheetsplat::internals::gpu::targets::no_surfaces;
+use sheetsplat::internals::gpu::uniforms::{self, Ramps};
+use sheetsplat::internals::gpu::volume_texture::ValueFormat;
+use sheetsplat::internals::kernel::Kernel;
+use sheetsplat::internals::pass::composite::CutBuffers;
+use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::transfer_function::TransferFunction;
-use sheetsplat::view::View;
+use sheetsplat::settings::TransferFunction;
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::util::DeviceExt;
 use sheetsplat::wgpu::{self, BindingResource, Buffer, BufferUsages, Device, TextureView};
@@ -47,7 +47,7 @@ fn frame(adjust: impl FnOnce(&mut Scene)) -> Frame {
 /// A frame over a grid, with ramps that are 1 everywhere.
 fn frame_over(grid: &Grid, scene: &Scene) -> Frame {
     let size = [scene.image.width, scene.image.height];
-    let view = View::new(grid, &scene.camera, &scene.splatting, size).unwrap();
+    let view = ViewGeometry::new(grid, &scene.camera, &scene.splatting, size).unwrap();
     let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
     let transfer = common::transfer(&[(0.0, [1.0; 3])], &[(0.0, 1.0)]);
     let (color, opacity) = (transfer.color.unwrap(), transfer.opacity.unwrap());

@@ -3,17 +3,17 @@
 
 use bytemuck::Zeroable;
 use glam::{DVec3, DVec4, UVec3};
-use sheetsplat::camera::Projection;
-use sheetsplat::clip::Clip;
-use sheetsplat::gpu::layout::Group;
-use sheetsplat::gpu::targets::{CompositingBuffer, Targets};
-use sheetsplat::gpu::uniforms;
 use sheetsplat::headless::{Headless, readback};
-use sheetsplat::pass::composite::{Composite, CompositeBuffers, CompositeMode, CutBuffers, RayMode};
-use sheetsplat::plan::tile_grid;
-use sheetsplat::reference::composite::composite;
-use sheetsplat::reference::{Buffer, Cuts, Means};
-use sheetsplat::splatting::{Compositing, Method, Order};
+use sheetsplat::internals::gpu::layout::Group;
+use sheetsplat::internals::gpu::targets::{CompositingBuffer, Targets};
+use sheetsplat::internals::gpu::uniforms;
+use sheetsplat::internals::pass::composite::{Composite, CompositeBuffers, CompositeMode, CutBuffers, RayMode};
+use sheetsplat::internals::quad_plan::tile_grid;
+use sheetsplat::internals::reference::composite::composite;
+use sheetsplat::internals::reference::{Buffer, Cuts, Means};
+use sheetsplat::settings::Clip;
+use sheetsplat::settings::Projection;
+use sheetsplat::settings::{Compositing, Method, Order};
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::{self, BufferUsages};
 

@@ -6,16 +6,16 @@ use std::ops::Range;
 
 use bytemuck::Zeroable;
 use glam::{DVec3, UVec3};
-use sheetsplat::brick::BrickList;
-use sheetsplat::gpu::layout::Group;
-use sheetsplat::gpu::targets::Targets;
-use sheetsplat::gpu::uniforms;
 use sheetsplat::headless::Headless;
-use sheetsplat::kernel::Kernel;
-use sheetsplat::pass::occlude::Occlude;
-use sheetsplat::plan::{FramePlan, TILE, tile_grid};
-use sheetsplat::splatting::{Method, Order};
-use sheetsplat::view::View;
+use sheetsplat::internals::brick::BrickList;
+use sheetsplat::internals::gpu::layout::Group;
+use sheetsplat::internals::gpu::targets::Targets;
+use sheetsplat::internals::gpu::uniforms;
+use sheetsplat::internals::kernel::Kernel;
+use sheetsplat::internals::pass::occlude::Occlude;
+use sheetsplat::internals::quad_plan::{FramePlan, TILE, tile_grid};
+use sheetsplat::internals::view_geometry::ViewGeometry;
+use sheetsplat::settings::{Method, Order};
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::{BufferUsages, TextureFormat};
 
@@ -208,7 +208,7 @@ fn boxes_shrink_on_the_way_back() {
             scene.camera = random_eye(&mut random, &grid);
             scene.splatting.method = random.pick(&[Method::ImageAligned, Method::AxisAligned]);
             scene.splatting.slab_width = random.pick(&[0.3, 1.0, 2.6]);
-            let view = View::new(&grid, &scene.camera, &scene.splatting, [90, 70]).unwrap();
+            let view = ViewGeometry::new(&grid, &scene.camera, &scene.splatting, [90, 70]).unwrap();
             let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
             let plan = FramePlan::new([bricks.bricks()], view, random.pick(&[1, 2, 4]), Order::FrontToBack, 0.0..0.0);
             let filter =

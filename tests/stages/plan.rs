@@ -2,11 +2,11 @@
 //! reaches into.
 
 use glam::{DVec3, UVec3};
-use sheetsplat::brick::{self, BrickList};
-use sheetsplat::plan::{FramePlan, Overlaps};
-use sheetsplat::reference::Geometry;
-use sheetsplat::splatting::Order;
-use sheetsplat::view::View;
+use sheetsplat::internals::brick::{self, BrickList};
+use sheetsplat::internals::quad_plan::{FramePlan, Overlaps};
+use sheetsplat::internals::reference::Geometry;
+use sheetsplat::internals::view_geometry::ViewGeometry;
+use sheetsplat::settings::Order;
 use sheetsplat::volume::Grid;
 
 use crate::common::{Random, camera, scene};
@@ -26,7 +26,7 @@ fn every_kernel_is_looked_at_by_every_group_that_it_reaches_into() {
                 scene.camera = camera(random.direction().to_array(), 12.0);
                 (scene.splatting.radius, scene.splatting.slab_width) = (radius, slab_width);
                 let geometry = Geometry::new(&grid, &scene).unwrap();
-                let view = View::new(&grid, &scene.camera, &scene.splatting, [64, 48]).unwrap();
+                let view = ViewGeometry::new(&grid, &scene.camera, &scene.splatting, [64, 48]).unwrap();
                 let plan = FramePlan::new(lists.each_ref().map(BrickList::bricks), view, sheets, order, 0.0..0.0);
 
                 let firsts: Vec<i32> = plan.groups.iter().map(|group| group.first_slab).collect();

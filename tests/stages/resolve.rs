@@ -1,15 +1,15 @@
 //! `shaders/resolve.wgsl` against `reference::resolve`: a random compositing buffer over backgrounds.
 
 use glam::{DVec3, DVec4};
-use sheetsplat::gpu::{layout, targets::CompositingBuffer};
+use sheetsplat::Placement;
 use sheetsplat::headless::{Headless, readback};
-use sheetsplat::pass::resolve::Resolve;
-use sheetsplat::placement::Placement;
-use sheetsplat::reference::Buffer;
-use sheetsplat::reference::resolve::resolve;
-use sheetsplat::renderer_options::{Blend, RendererOptions};
-use sheetsplat::splatting::Compositing;
+use sheetsplat::internals::gpu::{layout, targets::CompositingBuffer};
+use sheetsplat::internals::pass::resolve::Resolve;
+use sheetsplat::internals::reference::Buffer;
+use sheetsplat::internals::reference::resolve::resolve;
+use sheetsplat::settings::Compositing;
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
+use sheetsplat::{Blend, RendererOptions};
 
 use crate::common::{COMPOSITINGS, F32, Random, gpu, gpu_with_small_bindings, pixels};
 use crate::{frame, init};

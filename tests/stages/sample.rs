@@ -2,13 +2,13 @@
 
 use bytemuck::Zeroable;
 use glam::DVec4;
-use sheetsplat::footprint::FootprintTable;
-use sheetsplat::gpu::footprint_texture::FootprintTexture;
-use sheetsplat::gpu::layout;
 use sheetsplat::headless::readback;
-use sheetsplat::pass::sample::{Sample, SampleBuffers, SampleMode};
-use sheetsplat::reference::composite::composite_pixel;
-use sheetsplat::splatting::{FootprintForm, Method, Order};
+use sheetsplat::internals::footprint::FootprintTable;
+use sheetsplat::internals::gpu::footprint_texture::FootprintTexture;
+use sheetsplat::internals::gpu::layout;
+use sheetsplat::internals::pass::sample::{Sample, SampleBuffers, SampleMode};
+use sheetsplat::internals::reference::composite::composite_pixel;
+use sheetsplat::settings::{FootprintForm, Method, Order};
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
 
 use crate::common::{BY_AMOUNTS, F32, Random, gpu, pixels};

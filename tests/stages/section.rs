@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 use glam::{DVec2, DVec3, DVec4};
-use sheetsplat::kernel::Kernel;
-use sheetsplat::reference::{self, Geometry};
+use sheetsplat::internals::kernel::Kernel;
+use sheetsplat::internals::reference::{self, Geometry};
+use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::FootprintForm;
-use sheetsplat::view::View;
+use sheetsplat::settings::FootprintForm;
 use sheetsplat::volume::Grid;
 
 use crate::common::{F32, camera, scene};
@@ -59,7 +59,7 @@ pub(crate) fn view_scene(
 pub(crate) struct Seen {
     pub(crate) scene: Scene,
     pub(crate) kernel: Kernel,
-    pub(crate) view: View,
+    pub(crate) view: ViewGeometry,
     pub(crate) geometry: Geometry,
 }
 
@@ -68,7 +68,7 @@ impl Seen {
         let size = [scene.image.width, scene.image.height];
         Self {
             kernel: Kernel::new(scene.splatting.radius, scene.splatting.falloff),
-            view: View::new(grid, &scene.camera, &scene.splatting, size).unwrap(),
+            view: ViewGeometry::new(grid, &scene.camera, &scene.splatting, size).unwrap(),
             geometry: Geometry::new(grid, &scene).unwrap(),
             scene,
         }

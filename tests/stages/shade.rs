@@ -4,19 +4,19 @@
 use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3, DVec4, UVec3};
-use sheetsplat::brick;
-use sheetsplat::classify::classify;
-use sheetsplat::clip::ClippedVoxels;
-use sheetsplat::gpu::layout;
 use sheetsplat::headless::Headless;
-use sheetsplat::kernel::Kernel;
-use sheetsplat::pass::cull::Cull;
-use sheetsplat::reference::{Geometry, shading};
+use sheetsplat::internals::ClippedVoxels;
+use sheetsplat::internals::brick;
+use sheetsplat::internals::classify::classify;
+use sheetsplat::internals::gpu::layout;
+use sheetsplat::internals::kernel::Kernel;
+use sheetsplat::internals::pass::cull::Cull;
+use sheetsplat::internals::reference::{Geometry, shading};
+use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::{Scene, TransferSettings};
-use sheetsplat::shading::{Light, Shading};
-use sheetsplat::splatting::{Compositing, Method};
-use sheetsplat::transfer_function::{LabelTables, Ramp, TransferFunction};
-use sheetsplat::view::View;
+use sheetsplat::settings::{Compositing, Method};
+use sheetsplat::settings::{LabelTables, Ramp, TransferFunction};
+use sheetsplat::settings::{Light, Shading};
 use sheetsplat::volume::{Labels, Volume};
 
 use crate::common::{BY_AMOUNTS, F16, F32, Random, SPACINGS, camera, gpu, random_eye, scene, transfer};
@@ -107,7 +107,7 @@ fn highlight_cosine(volume: &Volume, index: u32, scene: &Scene, geometry: &Geome
 }
 
 /// What f32 may move a voxel's pixel coordinates, sheet depth and depth from the eye by.
-pub(crate) fn place_error(view: &View, voxel: UVec3, center: DVec2) -> DVec4 {
+pub(crate) fn place_error(view: &ViewGeometry, voxel: UVec3, center: DVec2) -> DVec4 {
     // A dot product of four: every term has a rounded coefficient and product and passes up to three sums; one more for the
     // twin's own way to the same number.
     let p = voxel.as_dvec3().extend(1.0);

@@ -7,18 +7,18 @@ use std::ops::Deref;
 
 use bytemuck::Zeroable;
 use glam::{DVec2, DVec3, DVec4, UVec3};
-use sheetsplat::footprint::{FootprintTable, SECTION_SIZE, SECTIONS, section_extent, section_spacing};
-use sheetsplat::gpu::brick_lists::BrickLists;
-use sheetsplat::gpu::footprint_texture::FootprintTexture;
-use sheetsplat::gpu::layout;
-use sheetsplat::gpu::volume_texture::VolumeTexture;
 use sheetsplat::headless::{Headless, readback};
-use sheetsplat::pass::cull::{Cull, CullBuffers, CullList};
-use sheetsplat::pass::splat::{Splat as Stage, SplatMode};
-use sheetsplat::plan::{TILE, tile_grid};
-use sheetsplat::reference;
+use sheetsplat::internals::footprint::{FootprintTable, SECTION_SIZE, SECTIONS, section_extent, section_spacing};
+use sheetsplat::internals::gpu::brick_lists::BrickLists;
+use sheetsplat::internals::gpu::footprint_texture::FootprintTexture;
+use sheetsplat::internals::gpu::layout;
+use sheetsplat::internals::gpu::volume_texture::VolumeTexture;
+use sheetsplat::internals::pass::cull::{Cull, CullBuffers, CullList};
+use sheetsplat::internals::pass::splat::{Splat as Stage, SplatMode};
+use sheetsplat::internals::quad_plan::{TILE, tile_grid};
+use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::{FootprintForm, Method};
+use sheetsplat::settings::{FootprintForm, Method};
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
 

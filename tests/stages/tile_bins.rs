@@ -4,14 +4,14 @@
 use std::collections::BTreeSet;
 
 use glam::{DVec2, DVec4, UVec3};
-use sheetsplat::brick::{self, BrickList};
-use sheetsplat::camera::Projection;
-use sheetsplat::kernel::Kernel;
-use sheetsplat::reference::{self, Geometry};
+use sheetsplat::internals::brick::{self, BrickList};
+use sheetsplat::internals::kernel::Kernel;
+use sheetsplat::internals::reference::{self, Geometry};
+use sheetsplat::internals::tile_bins::{self, SHEETS, TILE, TileBins, Unfit};
+use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::Order;
-use sheetsplat::tile_bins::{self, SHEETS, TILE, TileBins, Unfit};
-use sheetsplat::view::View;
+use sheetsplat::settings::Order;
+use sheetsplat::settings::Projection;
 use sheetsplat::volume::Grid;
 
 use crate::common::{Random, camera, scene};
@@ -50,7 +50,7 @@ impl Case {
 
     fn bins(&self, most_words: u64) -> Result<TileBins, Unfit> {
         let Scene { camera, splatting, image, .. } = &self.scene;
-        let view = View::new(&self.grid, camera, splatting, [image.width, image.height]).unwrap();
+        let view = ViewGeometry::new(&self.grid, camera, splatting, [image.width, image.height]).unwrap();
         TileBins::new(self.bricks.bricks(), &view, splatting.order, 0.0..0.0, self.kernel().support(), 0, most_words)
     }
 

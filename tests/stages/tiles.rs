@@ -1,11 +1,11 @@
 //! `shaders/tiles.wgsl` against a plain evaluation of its rules: exact lists, arguments and counts.
 
 use bytemuck::Zeroable;
-use sheetsplat::gpu::layout::{Frame, Group, Indirect, Tally};
-use sheetsplat::gpu::targets::Targets;
 use sheetsplat::headless::Headless;
-use sheetsplat::pass::tiles::Tiles;
-use sheetsplat::plan::{TILE, tile_grid};
+use sheetsplat::internals::gpu::layout::{Frame, Group, Indirect, Tally};
+use sheetsplat::internals::gpu::targets::Targets;
+use sheetsplat::internals::pass::tiles::Tiles;
+use sheetsplat::internals::quad_plan::{TILE, tile_grid};
 use sheetsplat::wgpu::{BufferUsages, TextureFormat};
 
 use crate::common::{Random, gpu};

@@ -1,12 +1,12 @@
 //! What stages see of a volume's values, `shaders/shared/volume.wgsl`: each to its last bit, however they are stored.
 
 use glam::{DVec3, UVec3};
-use sheetsplat::gpu::layout::Frame;
-use sheetsplat::gpu::uniforms::{self, Ramps};
-use sheetsplat::gpu::volume_texture::{SIDES, ValueFormat, VolumeTexture};
 use sheetsplat::headless::Headless;
-use sheetsplat::kernel::Kernel;
-use sheetsplat::view::View;
+use sheetsplat::internals::gpu::layout::Frame;
+use sheetsplat::internals::gpu::uniforms::{self, Ramps};
+use sheetsplat::internals::gpu::volume_texture::{SIDES, ValueFormat, VolumeTexture};
+use sheetsplat::internals::kernel::Kernel;
+use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::volume::Volume;
 use sheetsplat::wgpu::{BindingResource, BufferUsages};
 
@@ -33,7 +33,7 @@ fn frame(values: ValueFormat) -> Frame {
     let mut scene = scene(8, 8);
     scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 1.0)]);
     let volume = Volume::new("one", UVec3::ONE, DVec3::ONE, vec![0.0]).unwrap();
-    let view = View::new(volume.grid(), &scene.camera, &scene.splatting, [8; 2]).unwrap();
+    let view = ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, [8; 2]).unwrap();
     let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
     let ramps = Ramps::new(&scene.transfer.resolve(&volume));
     uniforms::frame(&view, &kernel, (volume.grid(), values), &ramps, &scene)

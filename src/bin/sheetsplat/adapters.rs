@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use sheetsplat::gpu::device::DeviceRequirements;
+use sheetsplat::DeviceRequirements;
 use sheetsplat::headless::device;
 
 use crate::failure::Failure;

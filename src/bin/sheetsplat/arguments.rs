@@ -99,7 +99,7 @@ impl Raw {
     }
 }
 
-impl From<View> for volume::View {
+impl From<View> for volume::PatientSide {
     fn from(view: View) -> Self {
         match view {
             View::Front => Self::Front,

@@ -1,6 +1,6 @@
 //! What ends the program without success.
 
-use sheetsplat::error::RenderError;
+use sheetsplat::RenderError;
 use sheetsplat::headless::Error;
 use sheetsplat::image::ImageError;
 use sheetsplat::scene::SceneError;

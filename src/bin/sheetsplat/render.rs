@@ -5,10 +5,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use clap::ValueEnum;
-use sheetsplat::error::RenderError;
+use sheetsplat::RenderError;
 use sheetsplat::headless::Rendering;
 use sheetsplat::image::{Image, aside};
-use sheetsplat::reference;
+use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
 use sheetsplat::stats::Stats;
 use sheetsplat::volume::Volume;

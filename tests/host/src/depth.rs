@@ -1,8 +1,8 @@
 //! A volume among a host's own surfaces: the host draws them with its own camera, and the volume goes where they let it.
 
 use glam::{DMat4, DVec3, DVec4};
-use sheetsplat::clip::Clip;
-use sheetsplat::surfaces::Surfaces;
+use sheetsplat::Surfaces;
+use sheetsplat::settings::Clip;
 use sheetsplat::{Camera, Placement, RendererOptions, Scene};
 use wgpu::util::DeviceExt;
 use wgpu::{BufferUsages, CompareFunction, LoadOp, Operations, StoreOp, Texture, TextureFormat, TextureView};

@@ -1,6 +1,6 @@
 //! Devices with little, with too little, and options that no device has.
 
-use sheetsplat::gpu::device::{DeviceError, InsufficientLimit, TILE_FEATURES};
+use sheetsplat::internals::gpu::device::{DeviceError, InsufficientLimit, TILE_FEATURES};
 use sheetsplat::{Blend, DeviceRequirements, Renderer, RendererOptions};
 use wgpu::{Features, Limits, TextureFormat};
 

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use sheetsplat::error::RenderError;
-use sheetsplat::fault::{DeviceFault, scoped};
-use sheetsplat::gpu::device::DeviceError;
+use sheetsplat::DeviceError;
+use sheetsplat::RenderError;
+use sheetsplat::{DeviceFault, scoped};
 use sheetsplat::{Placement, Renderer, RendererOptions};
 use wgpu::{TextureFormat, TextureViewDescriptor};
 

@@ -55,7 +55,7 @@ fn a_view_serves_several_renderers() {
     let host = Host::new();
     let quads = |format, sheet_format, sheets| {
         host.renderer(RendererOptions {
-            rasterizer: sheetsplat::splatting::Rasterizer::Quads,
+            rasterizer: sheetsplat::settings::Rasterizer::Quads,
             sheet_format: Some(sheet_format),
             sheets_per_group: Some(sheets),
             ..replacing(format)

@@ -4,8 +4,8 @@ use glam::DVec3;
 use sheetsplat::appearance::{categories, shown_range};
 use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
-use sheetsplat::splatting::Compositing;
-use sheetsplat::transfer_function::TransferFunction;
+use sheetsplat::settings::Compositing;
+use sheetsplat::settings::TransferFunction;
 use sheetsplat::volume::Volume;
 
 use super::round::ticks;

@@ -2,7 +2,7 @@
 
 use sheetsplat::appearance::{categories, shown_range};
 use sheetsplat::image::Image;
-use sheetsplat::transfer_function::TransferFunction;
+use sheetsplat::settings::TransferFunction;
 use sheetsplat::volume::Volume;
 
 use super::{PADDING, plate_for};

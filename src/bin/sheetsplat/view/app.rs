@@ -11,10 +11,10 @@ use eframe::egui::{
     ViewportCommand, pos2,
 };
 use glam::DVec2;
-use sheetsplat::camera::Camera;
 use sheetsplat::image::PngDepth;
 use sheetsplat::scene::{ImageSettings, Scene};
-use sheetsplat::transfer_function::TransferFunction;
+use sheetsplat::settings::Camera;
+use sheetsplat::settings::TransferFunction;
 use sheetsplat::volume::Volume;
 
 use super::editor::Editor;

@@ -1,7 +1,7 @@
 //! The transfer function as control points to be dragged: plain data, in values and opacities.
 
 use glam::DVec3;
-use sheetsplat::transfer_function::{Ramp, TransferFunction};
+use sheetsplat::settings::{Ramp, TransferFunction};
 
 /// A point of both ramps.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,11 +5,11 @@ use std::time::Instant;
 
 use eframe::egui::TextureId;
 use eframe::egui_wgpu::{self, RenderState, WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
-use sheetsplat::error::RenderError;
-use sheetsplat::fault::scoped;
+use sheetsplat::RenderError;
 use sheetsplat::headless::device;
+use sheetsplat::scoped;
+use sheetsplat::settings::TransferFunction;
 use sheetsplat::stats::Stats;
-use sheetsplat::transfer_function::TransferFunction;
 use sheetsplat::volume::{Grid, Volume};
 use sheetsplat::{Blend, DeviceRequirements, GpuVolume, Placement, Renderer, RendererOptions, Scene, SceneView, wgpu};
 

@@ -1,7 +1,7 @@
 //! Orbit, zoom and pan: what a drag and a scroll do to the camera.
 
 use glam::{DMat3, DVec2};
-use sheetsplat::camera::{Camera, Projection};
+use sheetsplat::settings::{Camera, Projection};
 use sheetsplat::volume::Grid;
 
 /// Degrees that the camera's elevation over the plane across `up` stays within: at 90 there would be no up on the screen.

@@ -4,8 +4,8 @@ use std::ops::RangeInclusive;
 
 use eframe::egui::{ComboBox, Grid, Slider, Ui};
 use glam::DVec3;
-use sheetsplat::shading::{Light, Shading};
-use sheetsplat::splatting::{Compositing, Method, Rasterizer, Splatting};
+use sheetsplat::settings::{Compositing, Method, Rasterizer, Splatting};
+use sheetsplat::settings::{Light, Shading};
 use sheetsplat::stats::Stats;
 
 /// Kernel, slabs, compositing and culling, by the names and within the ranges of a scene file.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use eframe::egui::{ColorImage, Rect};
 use sheetsplat::image::{Image, write_aside};
 use sheetsplat::scene::Scene;
-use sheetsplat::transfer_function::TransferFunction;
+use sheetsplat::settings::TransferFunction;
 use sheetsplat::volume::Volume;
 
 use crate::failure::Failure;

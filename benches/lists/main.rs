@@ -1,0 +1,156 @@
+//! What a change costs (§5.1): voxels touched and time of every setter, against making the view anew; and the iso-range's binary
+//! search, and the lists' memory beside Table 1's claim.
+//!
+//! `cargo bench --bench lists -- [PAIRS] [SCENE]…` takes scene files or builtin volumes; without any, the bonsai and the CT head
+//! where they are, else builtin ones.
+
+#![expect(clippy::unwrap_used, reason = "a bench")]
+
+#[path = "../common/mod.rs"]
+#[expect(dead_code, reason = "not every bench needs all of it")]
+mod common;
+mod slice_lists;
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use glam::DVec3;
+use sheetsplat::SceneView;
+use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::internals::gpu::classified_volume::Touched;
+use sheetsplat::internals::iso_range::ValueSet;
+use sheetsplat::internals::value_list::ValueList;
+use sheetsplat::scene::Scene;
+use sheetsplat::settings::Light;
+use sheetsplat::settings::{Ramp, TransferFunction};
+
+use crate::slice_lists::SliceLists;
+
+/// A change by name. The number of the repetition makes it another one each time; of the scene's voxels the value is given that so
+/// many percent do not exceed.
+type Change = (&'static str, fn(&mut SceneView, usize, &[f64]) -> Touched);
+
+const CHANGES: [Change; 7] = [
+    ("light", |view, at, _| {
+        view.set_light(Light::Direction(DVec3::new(at as f64, 1.0, 2.0)));
+        Touched::default()
+    }),
+    ("colour", |view, at, _| {
+        let color = Ramp::new(vec![(0.0, DVec3::splat(at as f64 / 100.0)), (255.0, DVec3::ONE)]).unwrap();
+        view.set_transfer_function(TransferFunction { color, ..view.volume().transfer().clone() })
+    }),
+    ("opacity, same support", |view, at, _| {
+        let opacity = view.volume().transfer().opacity.points();
+        let opacity = opacity.iter().map(|&(value, y)| (value, y * (1.0 - at as f64 / 1000.0))).collect();
+        let opacity = Ramp::new(opacity).unwrap();
+        view.set_transfer_function(TransferFunction { opacity, ..view.volume().transfer().clone() })
+    }),
+    ("gradient opacity", |view, at, _| {
+        let gradient_opacity = Some(Ramp::new(vec![(at as f64, 0.0), (at as f64 + 20.0, 1.0)]).unwrap());
+        view.set_transfer_function(TransferFunction { gradient_opacity, ..view.volume().transfer().clone() })
+    }),
+    ("iso-range, by 1 %", |view, at, of| view.set_iso_ranges(Some(vec![[of[50 + at % 50], 1e9]]))),
+    ("iso-range, by half", |view, at, of| view.set_iso_ranges(Some(vec![[of[25 + 50 * (at % 2)], 1e9]]))),
+    ("camera", |view, _, _| {
+        view.turn(3.0);
+        Touched::default()
+    }),
+];
+
+fn main() {
+    let (pairs, scenes) = common::arguments(7);
+    let scenes = if scenes.is_empty() { default_scenes() } else { scenes };
+    let headless = Headless::new(&HeadlessOptions::default()).unwrap();
+    for name in &scenes {
+        bench(&headless, &common::open(name), &common::label(name), pairs);
+    }
+}
+
+fn bench(headless: &Headless, scene: &Scene, name: &str, pairs: usize) {
+    let volume = Arc::new(scene.load_volume().unwrap());
+    let start = Instant::now();
+    let list = ValueList::new(volume.values());
+    let sort_ms = milliseconds(start);
+    let share = list.bytes() as f64 / size_of_val(volume.values()) as f64;
+    println!(
+        "\n{name}: sorted by value once in {sort_ms:.0} ms; the list takes {:.0} % of the volume's memory.",
+        100.0 * share
+    );
+
+    let transfer = scene.transfer.resolve(&volume);
+    let set = ValueSet::of(&transfer);
+    let search = common::median((0..pairs).map(|_| {
+        let start = Instant::now();
+        let found = list.within(volume.values(), &set).len();
+        (milliseconds(start), found as u64)
+    }));
+    println!("Extracting the scene's iso-range, {} voxels: {:.2} ms.\n", search.1, search.0);
+
+    // Slice by slice, as [8] has it for axis-aligned sheets.
+    let start = Instant::now();
+    let slices = SliceLists::new(volume.values(), volume.grid(), 2);
+    let sort_ms = milliseconds(start);
+    let search = common::median((0..pairs).map(|_| {
+        let start = Instant::now();
+        let of_slice = |slice| slices.within(volume.values(), slice, &set).map(<[u32]>::len).sum::<usize>();
+        let found: usize = (0..slices.len()).map(of_slice).sum();
+        (milliseconds(start), found as u64)
+    }));
+    println!("Slice by slice across z: sorted in {sort_ms:.0} ms; {} voxels found in {:.2} ms.\n", search.1, search.0);
+
+    let found = list.within(volume.values(), &set);
+    let mut values: Vec<f64> = found.iter().map(|&voxel| volume.values()[voxel as usize].into()).collect();
+    values.sort_by(f64::total_cmp);
+    let of: Vec<f64> = (0..=100).map(|percent| values[(values.len() - 1) * percent / 100]).collect();
+
+    println!("| change | voxels entered | left | change and prepare, ms | making the view anew, ms | ratio |");
+    println!("|---|---|---|---|---|---|");
+    for (what, change) in CHANGES {
+        let mut view = headless.view(volume.clone(), scene).unwrap();
+        view.volume().value_list();
+        prepare(headless, &mut view);
+        // The first change may find too little room.
+        change(&mut view, 0, &of);
+        prepare(headless, &mut view);
+        let mut touched = Touched::default();
+        let (mut changed, mut anew) = (Vec::new(), Vec::new());
+        for at in 1..=pairs {
+            let start = Instant::now();
+            touched = change(&mut view, at, &of);
+            prepare(headless, &mut view);
+            changed.push((milliseconds(start), 0));
+            let start = Instant::now();
+            prepare(headless, &mut headless.view(volume.clone(), scene).unwrap());
+            anew.push((milliseconds(start), 0));
+        }
+        let (changed, anew) = (common::median(changed).0, common::median(anew).0);
+        let rebuilt = if touched.rebuilt { " (rebuilt)" } else { "" };
+        println!(
+            "| {what}{rebuilt} | {} | {} | {changed:.2} | {anew:.0} | {:.0} |",
+            touched.entered,
+            touched.left,
+            anew / changed
+        );
+    }
+}
+
+/// Prepares a frame, and hands the device what that takes.
+fn prepare(headless: &Headless, view: &mut SceneView) {
+    headless.renderer().prepare(headless.device(), headless.queue(), view).unwrap();
+    headless.queue().submit([]);
+    headless.device().poll(sheetsplat::wgpu::PollType::wait_indefinitely()).unwrap();
+}
+
+fn milliseconds(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}
+
+fn default_scenes() -> Vec<String> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
+    let scenes = ["bonsai-gradient.toml", "ct-head-opaque.toml"].map(|name| folder.join(name));
+    match scenes.iter().all(|scene| scene.exists()) {
+        true => scenes.map(|scene| scene.display().to_string()).to_vec(),
+        false => ["builtin:head", "builtin:tomato"].map(str::to_owned).to_vec(),
+    }
+}

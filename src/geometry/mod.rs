@@ -1,0 +1,10 @@
+//! Where voxels, kernels and slabs lie (§§3 and 4): the kernel and its footprints, the warped grid, the slabs of a view, and what
+//! bounds a pixel's ray. Everything here is plain arithmetic in f64, without a GPU.
+
+pub mod footprint;
+pub mod grid_warp;
+pub mod kernel;
+pub mod means;
+pub mod slab;
+pub(crate) mod surfaces;
+pub mod view_geometry;

@@ -1,0 +1,105 @@
+//! Opaque surfaces of a host, in front of which a volume shows and behind which it does not.
+
+use glam::{DMat4, DVec2, DVec3, DVec4};
+use wgpu::{TextureUsages, TextureView};
+
+use crate::error::RenderError;
+use crate::geometry::view_geometry::{Rays, ViewGeometry};
+use crate::volume::Grid;
+
+/// How far a host's projection may be from the camera's, pixels.
+const AGREEMENT: f64 = 0.02;
+
+/// A host's depth texture, and the projection that it was drawn with.
+#[derive(Clone, Debug)]
+pub struct Surfaces {
+    /// A view of the depth aspect alone of a texture with [`TextureUsages::TEXTURE_BINDING`] and one sample per pixel. Where it holds
+    /// what the far plane has (1, reversed 0) there is no surface.
+    pub depth: TextureView,
+    /// The texel, from the left and from above, that is the image's first.
+    pub origin: [u32; 2],
+    /// From world coordinates, whose origin is the volume's centre, to wgpu's clip space: what the host multiplied projection, view
+    /// and the volume's place in the host's world to. It must show what the camera shows, over the image's pixels.
+    pub clip_from_world: DMat4,
+}
+
+/// How depth follows from a pixel's place (x right of the image's middle, y below it, pixels) and what the texture holds there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceDepths {
+    /// The product with (x, y, value, 1), over that of `w`, is the depth along w, `unit`s.
+    pub depth: DVec4,
+    /// See there.
+    pub w: DVec4,
+    /// The value where there is no surface.
+    pub none: f64,
+}
+
+impl Surfaces {
+    /// Checks that the texture covers the image, and that its projection is the view's.
+    pub(crate) fn depths(&self, view: &ViewGeometry, grid: &Grid) -> Result<SurfaceDepths, RenderError> {
+        let refused = |key, found: String, allowed: String| Err(RenderError::OutOfRange { key, found, allowed });
+        let texture = self.depth.texture();
+        let reached = [0, 1].map(|axis| u64::from(self.origin[axis]) + u64::from(view.size[axis]));
+        let format = texture.format();
+        if !format.has_depth_aspect() {
+            return refused("surfaces.depth", format!("{format:?}"), "a depth format".to_owned());
+        }
+        if texture.sample_count() != 1 {
+            let found = format!("{} samples per pixel", texture.sample_count());
+            return refused("surfaces.depth", found, "1: resolve it first".to_owned());
+        }
+        if !texture.usage().contains(TextureUsages::TEXTURE_BINDING) {
+            return refused(
+                "surfaces.depth",
+                format!("{:?}", texture.usage()),
+                "TEXTURE_BINDING among them".to_owned(),
+            );
+        }
+        if reached[0] > texture.width().into() || reached[1] > texture.height().into() {
+            let found = format!("{}×{} texels", texture.width(), texture.height());
+            return refused("surfaces.depth", found, format!("at least {}×{}", reached[0], reached[1]));
+        }
+        let rays = view.rays();
+        let off = self.disagreement(view, &rays, grid);
+        if off.is_nan() || off > AGREEMENT {
+            let found = format!("a projection that is {off:.3} pixels off the camera's");
+            return refused("surfaces.clip_from_world", found, format!("at most {AGREEMENT}"));
+        }
+        Ok(self.by_value(view, &rays, grid.unit()))
+    }
+
+    /// By how many pixels the host's projection is off, at most, of points at the volume's near end, its middle and its far end.
+    fn disagreement(&self, view: &ViewGeometry, rays: &Rays, grid: &Grid) -> f64 {
+        let half = DVec2::from(view.size.map(f64::from)) / 2.0;
+        let (middle, half_depth) = (rays.depth_of(DVec3::ZERO), (grid.center() * grid.aspect()).length() + 1.0);
+        // In front of an eye.
+        let least = if view.perspective.is_some() { 0.1 * (middle.abs() + half_depth) } else { f64::NEG_INFINITY };
+        let depths = [middle - half_depth, middle, middle + half_depth].map(|depth| depth.max(least));
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (0.1, -0.3)];
+        let points = corners.into_iter().flat_map(|(x, y)| depths.map(|depth| (DVec2::new(x, y) * half, depth)));
+        let off = points.map(|(place, depth)| {
+            let clip = self.clip_from_world * (rays.at(place, depth) * grid.unit()).extend(1.0);
+            let there = DVec2::new(clip.x, -clip.y) / clip.w * half;
+            if clip.w > 0.0 { (there - place).length() } else { f64::INFINITY }
+        });
+        off.fold(0.0, |worst: f64, off| if worst.is_nan() || off <= worst { worst } else { off })
+    }
+
+    fn by_value(&self, view: &ViewGeometry, rays: &Rays, unit: f64) -> SurfaceDepths {
+        let world_from_clip = self.clip_from_world.inverse();
+        let [x, y, z, w] = [0, 1, 2, 3].map(|row| world_from_clip.row(row));
+        let ahead = view.basis.w / unit;
+        let depth = x * ahead.x + y * ahead.y + z * ahead.z - w * view.basis.w.dot(rays.origin[2]);
+        // From pixels to normalized device coordinates.
+        let [width, height] = view.size.map(f64::from);
+        let scale = DVec4::new(2.0 / width, -2.0 / height, 1.0, 1.0);
+        let (depth, w) = (depth * scale, w * scale);
+        let at = |value: f64| {
+            let ndc = DVec4::new(0.0, 0.0, value, 1.0);
+            let (depth, w) = (depth.dot(ndc), w.dot(ndc));
+            // A far plane at infinity.
+            if w.abs() < 1e-12 * depth.abs() { f64::INFINITY } else { depth / w }
+        };
+        SurfaceDepths { depth, w, none: if at(0.0) > at(1.0) { 0.0 } else { 1.0 } }
+    }
+}

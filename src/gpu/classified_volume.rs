@@ -1,0 +1,224 @@
+//! A volume under a transfer function, on the GPU: its values, the voxels that take part (§5.1), and how those change.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+use wgpu::{Device, Queue, TextureView};
+
+use crate::error::RenderError;
+use crate::geometry::view_geometry::ViewGeometry;
+use crate::gpu::brick_lists::BrickLists;
+use crate::gpu::gpu_volume::GpuVolume;
+use crate::lists::classify::{classify, in_rows, takes_part};
+use crate::lists::iso_range::ValueSet;
+use crate::lists::quad_plan::{Overlaps, tile_grid};
+use crate::lists::value_list::ValueList;
+use crate::settings::clip::ClippedVoxels;
+use crate::settings::transfer_function::{LabelTables, Ramp, Tables, TransferFunction};
+use crate::stats::{Counts, GroupSlabs, Totals};
+use crate::volume::{Grid, Volume};
+
+/// The voxels of a volume that take part under a transfer function.
+#[derive(Debug)]
+pub struct ClassifiedVolume {
+    volume: GpuVolume,
+    transfer: TransferFunction,
+    clipped: ClippedVoxels,
+    pub(crate) lists: BrickLists,
+    /// Counts changes of the lists.
+    pub(crate) revision: u64,
+}
+
+/// What a change of transfer function or iso-ranges touched.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Touched {
+    /// Voxels that take part now and did not before.
+    pub entered: u64,
+    /// Voxels that took part before and do not now.
+    pub left: u64,
+    /// Whether all bricks must be uploaded again, as there is no room for those that came.
+    pub rebuilt: bool,
+}
+
+impl ClassifiedVolume {
+    /// Uploads the bricks of the voxels that take part (SPEC §3) to the volume's device. Of a volume that is not segmented the
+    /// labels' tables are left out.
+    pub fn new(device: &Device, volume: &GpuVolume, mut transfer: TransferFunction, clipped: ClippedVoxels) -> Self {
+        let voxels = volume.volume();
+        if voxels.labels().is_none() {
+            transfer.labels.clear();
+        }
+        let lists = BrickLists::upload(device, voxels.grid(), &classify(voxels, &transfer, &clipped));
+        Self { volume: volume.clone(), transfer, clipped, lists, revision: 0 }
+    }
+
+    /// Brings the GPU up to date.
+    ///
+    /// # Errors
+    /// If the volume's labels need more than the device allows.
+    pub(crate) fn flush(&mut self, device: &Device, queue: &Queue) -> Result<(), RenderError> {
+        if self.shades_by_label() {
+            self.volume.upload_labels(device, queue)?;
+        }
+        self.lists.flush(device, queue);
+        Ok(())
+    }
+
+    /// The values on the GPU.
+    pub(crate) fn values(&self) -> &TextureView {
+        self.volume.values()
+    }
+
+    /// The labels on the GPU, if shading asks for them.
+    pub(crate) fn labels(&self) -> Option<&TextureView> {
+        self.volume.labels().filter(|_| self.shades_by_label())
+    }
+
+    /// Whether shading asks for labels.
+    pub(crate) fn shades_by_label(&self) -> bool {
+        self.transfer.labels.values().any(LabelTables::matter_to_shading)
+    }
+
+    /// The volume.
+    pub fn volume(&self) -> &Arc<Volume> {
+        self.volume.volume()
+    }
+
+    /// The volume on the GPU, which other views may share.
+    pub fn gpu_volume(&self) -> &GpuVolume {
+        &self.volume
+    }
+
+    /// Where the voxels are.
+    pub fn grid(&self) -> &Grid {
+        self.volume().grid()
+    }
+
+    /// The transfer function.
+    pub fn transfer(&self) -> &TransferFunction {
+        &self.transfer
+    }
+
+    /// The voxels sorted by value: [`GpuVolume::value_list`].
+    pub fn value_list(&self) -> &ValueList {
+        self.volume.value_list()
+    }
+
+    /// Changes colours, opacities, gradient opacity, iso-ranges or the labels' tables (§5.1). Only voxels that enter or leave are
+    /// touched: those whose values gain or lose their opacity, found by binary search. Where a gradient opacity changes, all that are
+    /// in range must be looked at. Of a volume that is not segmented the labels' tables are left out.
+    pub fn set_transfer_function(&mut self, mut transfer: TransferFunction) -> Touched {
+        if self.volume().labels().is_none() {
+            transfer.labels.clear();
+        }
+        let labels = self.transfer.labels.keys().chain(transfer.labels.keys()).copied().map(Some);
+        let mut labels: Vec<Option<u16>> = labels.chain([None]).collect();
+        labels.sort_unstable();
+        labels.dedup();
+        // Some have another label, and are looked at in vain.
+        let changed = (labels.into_iter())
+            .map(|label| changed_values(&self.transfer.tables(label), &transfer.tables(label)))
+            .fold(ValueSet::default(), |all, values| all.union(&values));
+        let candidates = if changed.ranges().is_empty() {
+            Vec::new()
+        } else {
+            let mut candidates = self.value_list().within(self.volume().values(), &changed);
+            // In memory order, where neighbours share cache lines.
+            candidates.par_sort_unstable();
+            candidates
+        };
+        self.transfer = transfer;
+
+        self.look_at(candidates)
+    }
+
+    /// Changes which voxels are clipped; touches only voxels that enter or leave.
+    pub fn set_clip(&mut self, clipped: ClippedVoxels) -> Touched {
+        let volume = self.volume();
+        let candidates = in_rows(volume, |y, z, row| {
+            let [old, new] = [&self.clipped, &clipped].map(|clipped| clipped.in_row(y, z, volume.dims().x));
+            // Either may be empty, anywhere.
+            let changed =
+                (old.start.min(new.start)..old.end.max(new.end)).filter(|x| old.contains(x) != new.contains(x));
+            changed.map(|x| row + x).collect()
+        });
+        self.clipped = clipped;
+        self.look_at(candidates)
+    }
+
+    /// Lets those of some voxels, in memory order, enter and leave that must.
+    fn look_at(&mut self, candidates: Vec<u32>) -> Touched {
+        let (volume, transfer, clipped, lists) = (&**self.volume(), &self.transfer, &self.clipped, &self.lists);
+        let takes_part =
+            |index: u32| clipped.contain(volume.grid().voxel_at(index)) && takes_part(volume, transfer, index);
+        let (entering, leaving): (Vec<u32>, Vec<u32>) = (candidates.into_par_iter())
+            .filter(|&index| takes_part(index) != lists.contains(index))
+            .partition(|&index| !lists.contains(index));
+        if !entering.is_empty() || !leaving.is_empty() {
+            self.lists.change(&entering, &leaving);
+            self.revision += 1;
+        }
+        Touched { entered: entering.len() as u64, left: leaving.len() as u64, rebuilt: !self.lists.has_room() }
+    }
+
+    /// Changes the iso-ranges alone: closed intervals `[lo, hi]` of the values that take part, `None` for all. Touches what
+    /// [`Self::set_transfer_function`] does.
+    pub fn set_iso_ranges(&mut self, iso_ranges: Option<Vec<[f64; 2]>>) -> Touched {
+        self.set_transfer_function(TransferFunction { iso_ranges, ..self.transfer.clone() })
+    }
+
+    /// Shows or hides the voxels of a label. Touches what [`Self::set_transfer_function`] does; nothing in a volume that is not
+    /// segmented.
+    pub fn set_label_visible(&mut self, label: u16, visible: bool) -> Touched {
+        let mut transfer = self.transfer.clone();
+        transfer.labels.entry(label).or_default().visible = visible;
+        self.set_transfer_function(transfer)
+    }
+
+    /// Bytes of GPU memory that the volume will hold once prepared.
+    pub(crate) fn estimate(&self) -> Result<u64, RenderError> {
+        let [values, both] = self.volume.needs()?;
+        let has_labels = self.shades_by_label() || self.volume.labels().is_some();
+        Ok(if has_labels { both } else { values })
+    }
+
+    /// Bytes of GPU memory, with the volume's, which other views may share ([`GpuVolume::gpu_bytes`]).
+    pub fn gpu_bytes(&self) -> u64 {
+        self.volume.gpu_bytes() + self.lists.gpu_bytes()
+    }
+
+    /// What of a frame's counts (Table 4) is known before it is drawn.
+    pub fn totals(&self, view: &ViewGeometry, groups: &GroupSlabs) -> Totals {
+        let overlaps = self.lists.bricks().map(|bricks| Overlaps::count(bricks, view));
+        let Overlaps { voxels, sections, slabs } = overlaps.fold(Overlaps::default(), Overlaps::and);
+        // A group's first or last sheets can lie outside of what any kernel touches.
+        let sheets_of = |first: i32| {
+            (first + groups.sheets as i32).min(slabs.end).saturating_sub(first.max(slabs.start)).max(0) as u64
+        };
+        let [columns, rows] = tile_grid(view.size).map(u64::from);
+        // Composite-every-sample has no groups, and no sheets.
+        let sheets = if groups.firsts.is_empty() { 0 } else { slabs.len() as u64 };
+        let counts = Counts {
+            voxels_total: self.grid().dims.as_u64vec3().element_product(),
+            voxels_in_range: voxels,
+            sections_total: sections,
+            sheets,
+            tiles_total: columns * rows * sheets,
+            ..Counts::default()
+        };
+        Totals { counts, group_sheets: groups.firsts.iter().map(|&first| sheets_of(first)).collect() }
+    }
+}
+
+/// The values of voxels that may enter or leave when their tables change.
+fn changed_values(old: &Tables, new: &Tables) -> ValueSet {
+    let is_everywhere =
+        |ramp: Option<&Ramp<f64>>| ramp.is_none_or(|ramp| ramp.points().iter().all(|&(_, opacity)| opacity > 0.0));
+    let gradients = [old.gradient_opacity, new.gradient_opacity];
+    let same_gradients = gradients[0] == gradients[1] || gradients.into_iter().all(is_everywhere);
+    let values = [old, new].map(ValueSet::of_tables);
+    match same_gradients {
+        true => values[0].symmetric_difference(&values[1]),
+        false => values[0].union(&values[1]),
+    }
+}

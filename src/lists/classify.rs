@@ -1,0 +1,34 @@
+//! Classification (SPEC §3): which voxels take part. What they look like is decided when they are shaded.
+
+use rayon::prelude::*;
+
+use crate::settings::clip::ClippedVoxels;
+use crate::settings::transfer_function::TransferFunction;
+use crate::volume::Volume;
+
+/// Indices of the voxels that take part, in memory order, x fastest.
+pub fn classify(volume: &Volume, transfer: &TransferFunction, clipped: &ClippedVoxels) -> Vec<u32> {
+    in_rows(volume, |y, z, row| {
+        let inside = clipped.in_row(y, z, volume.dims().x);
+        inside.map(|x| row + x).filter(|&index| takes_part(volume, transfer, index)).collect()
+    })
+}
+
+/// What a function picks from every row of voxels along x, given its y, its z and the index of its first voxel, in memory order.
+pub fn in_rows(volume: &Volume, pick: impl Fn(u32, u32, u32) -> Vec<u32> + Sync) -> Vec<u32> {
+    let dims = volume.dims();
+    let row = |row: u32| pick(row % dims.y, row / dims.y, row * dims.x);
+    let rows: Vec<Vec<u32>> = (0..dims.y * dims.z).into_par_iter().map(row).collect();
+    rows.concat()
+}
+
+/// Whether a voxel that is not clipped takes part: visible, inside an iso-range and with an opacity above 0.
+pub fn takes_part(volume: &Volume, transfer: &TransferFunction, index: u32) -> bool {
+    let value = f64::from(volume.values()[index as usize]);
+    let tables = transfer.tables(volume.label(index));
+    // Most voxels are ruled out by their value, and without a gradient opacity nothing else counts: spare them the gradient.
+    let may_take_part = tables.visible && tables.opacity.at(value) > 0.0 && tables.in_iso_range(value);
+    may_take_part
+        && (tables.gradient_opacity.is_none()
+            || tables.alpha(value, volume.gradient(volume.grid().voxel_at(index)).length()) > 0.0)
+}

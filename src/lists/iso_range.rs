@@ -1,0 +1,178 @@
+//! Iso-ranges as sets of `f32` values (§5): what a transfer function lets take part, and how two of them differ.
+//!
+//! Every finite `f32` has an ordinal that orders as the values do, so that intervals with open and closed ends are all half-open
+//! ranges of whole numbers.
+
+use std::ops::Range;
+
+use crate::settings::transfer_function::{Ramp, Tables, TransferFunction};
+
+/// A set of values: ranges of ordinals, ascending, disjoint and not adjacent.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ValueSet {
+    ranges: Vec<Range<u32>>,
+}
+
+/// Where a value stands among all `f32`; the two zeros are one.
+pub fn ordinal(value: f32) -> u32 {
+    let bits = (value + 0.0).to_bits();
+    if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
+}
+
+/// The value of an [`ordinal`].
+pub fn of_ordinal(ordinal: u32) -> f32 {
+    f32::from_bits(if ordinal >> 31 == 1 { ordinal & !(1 << 31) } else { !ordinal })
+}
+
+/// Ordinal of the first `f32` that is at least `x`.
+fn at_least(x: f64) -> u32 {
+    let nearest = x as f32;
+    ordinal(if f64::from(nearest) < x { nearest.next_up() } else { nearest })
+}
+
+/// Ordinal of the first `f32` above `x`.
+fn above(x: f64) -> u32 {
+    let nearest = x as f32;
+    ordinal(if f64::from(nearest) <= x { nearest.next_up() } else { nearest })
+}
+
+impl ValueSet {
+    /// The values that can take part under a transfer function (SPEC §3) without a label: in an iso-range, and with an opacity
+    /// above 0.
+    pub fn of(transfer: &TransferFunction) -> Self {
+        Self::of_tables(&transfer.tables(None))
+    }
+
+    /// The values that can take part under the tables of a label.
+    pub fn of_tables(tables: &Tables) -> Self {
+        if !tables.visible {
+            return Self::default();
+        }
+        let opaque = Self::support(tables.opacity);
+        match tables.iso_ranges {
+            None => opaque,
+            Some(ranges) => {
+                opaque.intersection(&Self::of_ranges(ranges.iter().map(|&[lo, hi]| at_least(lo)..above(hi)).collect()))
+            }
+        }
+    }
+
+    /// Where a ramp with ordinates of at least 0 is above 0.
+    fn support(ramp: &Ramp<f64>) -> Self {
+        let points = ramp.points();
+        let mut ranges = Vec::new();
+        for (at, &(x, y)) in points.iter().enumerate() {
+            let before = at.checked_sub(1).map(|before| points[before]);
+            // Between this point and the one before it, clamped beyond the first.
+            if y > 0.0 || before.is_some_and(|(_, y)| y > 0.0) {
+                ranges.push(before.map_or(0, |(x, _)| above(x))..at_least(x));
+            }
+            if y > 0.0 {
+                ranges.push(at_least(x)..above(x));
+                if at + 1 == points.len() {
+                    ranges.push(above(x)..u32::MAX);
+                }
+            }
+        }
+        Self::of_ranges(ranges)
+    }
+
+    fn of_ranges(mut ranges: Vec<Range<u32>>) -> Self {
+        ranges.retain(|range| range.start < range.end);
+        ranges.sort_unstable_by_key(|range| range.start);
+        let mut merged: Vec<Range<u32>> = Vec::new();
+        for range in ranges {
+            match merged.last_mut() {
+                Some(last) if range.start <= last.end => last.end = last.end.max(range.end),
+                _ => merged.push(range),
+            }
+        }
+        Self { ranges: merged }
+    }
+
+    fn intersection(&self, other: &Self) -> Self {
+        let pairs = self.ranges.iter().flat_map(|a| other.ranges.iter().map(move |b| (a, b)));
+        Self::of_ranges(pairs.map(|(a, b)| a.start.max(b.start)..a.end.min(b.end)).collect())
+    }
+
+    /// The values in either set.
+    pub fn union(&self, other: &Self) -> Self {
+        Self::of_ranges([self.ranges.clone(), other.ranges.clone()].concat())
+    }
+
+    /// The values in one of the two sets alone.
+    pub fn symmetric_difference(&self, other: &Self) -> Self {
+        // What is left of both between the common parts.
+        let common = self.intersection(other);
+        let starts = common.ranges.iter().map(|range| range.end);
+        let ends = common.ranges.iter().map(|range| range.start);
+        let gaps = std::iter::once(0).chain(starts).zip(ends.chain(std::iter::once(u32::MAX)));
+        self.union(other).intersection(&Self::of_ranges(gaps.map(|(start, end)| start..end).collect()))
+    }
+
+    /// The ranges of ordinals.
+    pub fn ranges(&self) -> &[Range<u32>] {
+        &self.ranges
+    }
+
+    /// Whether a value is in the set.
+    pub fn contains(&self, value: f32) -> bool {
+        let at = ordinal(value);
+        self.ranges.iter().any(|range| range.contains(&at))
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use glam::DVec3;
+
+    use super::*;
+
+    fn transfer(opacity: &[(f64, f64)], iso_ranges: Option<&[[f64; 2]]>) -> TransferFunction {
+        TransferFunction {
+            color: Ramp::new(vec![(0.0, DVec3::ONE)]).unwrap(),
+            opacity: Ramp::new(opacity.to_vec()).unwrap(),
+            gradient_opacity: None,
+            iso_ranges: iso_ranges.map(<[[f64; 2]]>::to_vec),
+            labels: BTreeMap::new(),
+        }
+    }
+
+    #[test]
+    fn ordinals_order_as_values_do() {
+        let values = [f32::MIN, -1.0, -f32::from_bits(1), 0.0, f32::from_bits(1), 1.0, 1.0_f32.next_up(), f32::MAX];
+        assert!(values.map(ordinal).is_sorted_by(|a, b| a < b));
+        assert_eq!(ordinal(-0.0), ordinal(0.0));
+        assert_eq!(values.map(ordinal).map(of_ordinal), values);
+    }
+
+    #[test]
+    fn a_value_is_in_the_set_where_it_has_an_opacity() {
+        let cases = [
+            transfer(&[(10.0, 0.0), (20.0, 0.5)], None),
+            transfer(&[(10.0, 0.4), (20.0, 0.0), (30.0, 0.0), (40.0, 1.0), (50.0, 0.0)], None),
+            transfer(&[(0.1, 0.0), (0.3, 1.0), (0.7, 0.0)], Some(&[[0.2, 0.2], [0.25, 0.5]])),
+            transfer(&[(0.0, 1.0)], Some(&[[-1.0, 0.0], [5.0, 60.0], [50.0, 70.0]])),
+            transfer(&[(0.0, 0.0)], None),
+        ];
+        let sets = cases.each_ref().map(ValueSet::of);
+        let around = |x: f64| [(x as f32).next_down(), x as f32, (x as f32).next_up()];
+        let spots = [
+            -1e30, -1.0, 0.0, 0.1, 0.15, 0.2, 0.25, 0.3, 0.5, 0.7, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0,
+            70.0, 1e30,
+        ];
+        for value in spots.into_iter().flat_map(around) {
+            let expected = cases.each_ref().map(|transfer| transfer.alpha(f64::from(value), 0.0) > 0.0);
+            assert_eq!(sets.each_ref().map(|set| set.contains(value)), expected, "{value:?}");
+            for (a, in_a) in sets.iter().zip(expected) {
+                for (b, in_b) in sets.iter().zip(expected) {
+                    assert_eq!(a.symmetric_difference(b).contains(value), in_a != in_b, "{value:?}");
+                    assert_eq!(a.union(b).contains(value), in_a || in_b, "{value:?}");
+                }
+            }
+        }
+    }
+}

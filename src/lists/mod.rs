@@ -1,0 +1,10 @@
+//! What is kept of a volume under a transfer function (§5, Table 1), and which part of it each sheet looks at: value lists, bricks,
+//! buckets, and the plans that the rasterizers draw a frame by. Plain data, made without a GPU.
+
+pub mod brick;
+pub mod bucket;
+pub mod classify;
+pub mod iso_range;
+pub mod quad_plan;
+pub mod tile_bins;
+pub mod value_list;

@@ -1,0 +1,182 @@
+//! The frame plan: everything a frame's passes need, as plain data made without a GPU.
+
+use std::ops::Range;
+
+use glam::DVec4;
+use rayon::prelude::*;
+
+use crate::geometry::slab;
+use crate::geometry::view_geometry::ViewGeometry;
+use crate::gpu::layout::Brick;
+use crate::lists::brick;
+use crate::lists::bucket::Buckets;
+use crate::settings::splatting::Order;
+
+/// Side of a tile, pixels (§6).
+pub const TILE: u32 = 32;
+
+/// Tiles across and down an image.
+pub fn tile_grid(size: [u32; 2]) -> [u32; 2] {
+    size.map(|pixels| pixels.div_ceil(TILE))
+}
+
+/// A frame: which bricks every sheet group looks at, in the order the groups are composited.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FramePlan {
+    /// The view; that of another frame's plan will do where [`ViewGeometry::has_depths_of`] says so.
+    pub view: ViewGeometry,
+    /// Sheets of a group.
+    pub sheets: u32,
+    /// For every list its bricks, sorted by first group.
+    pub orders: Vec<Vec<u32>>,
+    /// The groups that any brick may reach into, and those that count without.
+    pub groups: Vec<GroupPlan>,
+}
+
+/// One sheet group.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GroupPlan {
+    /// Its first slab.
+    pub first_slab: i32,
+    /// Sheet depths of its near and far plane.
+    pub planes: Range<f64>,
+    /// For every list the range of its bricks that can reach into the group.
+    pub bricks: Vec<Range<u32>>,
+}
+
+impl FramePlan {
+    /// Buckets the bricks of every list (§5.1), in groups of `sheets` sheets. The sheet depths `covered` count even where they hold
+    /// nothing.
+    pub fn new<'a>(
+        lists: impl IntoIterator<Item = &'a [Brick]>,
+        view: ViewGeometry,
+        sheets: u32,
+        order: Order,
+        covered: Range<f64>,
+    ) -> Self {
+        // A group is a thick slab.
+        let groups = view.slabs.groups(sheets);
+        let buckets: Vec<Buckets> = lists
+            .into_iter()
+            .map(|bricks| {
+                // In memory order, whatever changes of iso-range came before: equal scenes add up in equal order.
+                let mut in_memory: Vec<u32> = (0..bricks.len() as u32).collect();
+                let position = |&at: &u32| brick::position(&bricks[at as usize]);
+                if !in_memory.is_sorted_by_key(position) {
+                    in_memory.sort_unstable_by_key(position);
+                }
+                let touched = |at: u32| {
+                    let (middle, half) = brick::bounds(&bricks[at as usize]);
+                    let depths = view.depths(middle, half);
+                    (depths.start < depths.end).then(|| (at, groups.touched(depths.start, depths.end)))
+                };
+                let (in_view, touched): (Vec<u32>, Vec<Range<i32>>) = in_memory.into_iter().filter_map(touched).unzip();
+                let mut buckets = Buckets::sort(&touched);
+                buckets.order.iter_mut().for_each(|at| *at = in_view[*at as usize]);
+                buckets
+            })
+            .collect();
+        let covered = groups.covered(covered);
+        let all: Vec<Range<i32>> = buckets.iter().filter_map(Buckets::range).chain(covered.clone()).collect();
+        let first = all.iter().map(|range| range.start).min().unwrap_or(0);
+        let end = all.iter().map(|range| range.end).max().unwrap_or(0);
+        let counts = |group: i32| covered.as_ref().is_some_and(|covered| covered.contains(&group));
+        let mut plans: Vec<GroupPlan> = (first..end)
+            .map(|group| GroupPlan {
+                first_slab: group * sheets as i32,
+                planes: groups.plane(group)..groups.plane(group + 1),
+                bricks: buckets.iter().map(|buckets| buckets.touching(group)).collect(),
+            })
+            .zip(first..end)
+            .filter(|(group, number)| counts(*number) || group.bricks.iter().any(|range| !range.is_empty()))
+            .map(|(group, _)| group)
+            .collect();
+        if order == Order::BackToFront {
+            plans.reverse();
+        }
+        Self { view, sheets, orders: buckets.into_iter().map(|buckets| buckets.order).collect(), groups: plans }
+    }
+}
+
+/// What the voxels of some bricks overlap.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Overlaps {
+    /// Voxels that overlap any slab: in perspective those beyond the near plane.
+    pub voxels: u64,
+    /// Voxel–slab overlaps of positive length, wherever they fall on the screen.
+    pub sections: u64,
+    /// From the first to the last slab.
+    pub slabs: Range<i32>,
+}
+
+impl Overlaps {
+    /// Those of some bricks.
+    pub fn count(bricks: &[Brick], view: &ViewGeometry) -> Self {
+        let bricks = bricks.par_iter();
+        if view.perspective.is_none() {
+            let depths = PlaceDepths::new(view);
+            return bricks.map(|brick| depths.overlaps(brick)).reduce(Self::default, Self::and);
+        }
+        bricks
+            .flat_map_iter(brick::voxels)
+            .map(|(_, voxel)| view.touched(voxel))
+            .filter(|slabs| !slabs.is_empty())
+            .map(|slabs| Self { voxels: 1, sections: slabs.len() as u64, slabs })
+            .reduce(Self::default, Self::and)
+    }
+
+    /// Those of two lists of bricks.
+    pub fn and(self, other: Self) -> Self {
+        match [self.voxels, other.voxels] {
+            [0, _] => other,
+            [_, 0] => self,
+            _ => Self {
+                voxels: self.voxels + other.voxels,
+                sections: self.sections + other.sections,
+                slabs: self.slabs.start.min(other.slabs.start)..self.slabs.end.max(other.slabs.end),
+            },
+        }
+    }
+}
+
+/// Sheet depths without perspective, in slabs: those of a brick's places are the brick's and the place's. Frames are counted as often
+/// as they are drawn, hence sums instead of [`ViewGeometry::touched`] for every voxel.
+struct PlaceDepths {
+    /// Of a voxel and 1.
+    depth: DVec4,
+    /// Of places, from the brick's first.
+    places: [f64; brick::BRICK_VOXELS as usize],
+    /// Of a kernel.
+    reach: f64,
+}
+
+impl PlaceDepths {
+    fn new(view: &ViewGeometry) -> Self {
+        let mut depth = view.screen_from_voxel[2];
+        depth.w -= view.slabs.origin;
+        depth /= view.slabs.width;
+        let places = std::array::from_fn(|place| depth.truncate().dot(brick::in_brick(place as u32).as_dvec3()));
+        Self { depth, places, reach: view.reach / view.slabs.width - slab::ROUNDING }
+    }
+
+    fn overlaps(&self, brick: &Brick) -> Overlaps {
+        let first = self.depth.dot(brick::origin(brick).as_dvec3().extend(1.0));
+        let (mut sections, mut nearest, mut farthest) = (0, i32::MAX, i32::MIN);
+        let mut left = brick::present(brick);
+        let voxels = left.count_ones().into();
+        while left != 0 {
+            let depth = first + self.places[left.trailing_zeros() as usize];
+            left &= left - 1;
+            let (first, end) = (floor(depth - self.reach), -floor(-depth - self.reach));
+            sections += (end - first) as u64;
+            (nearest, farthest) = (nearest.min(first), farthest.max(end));
+        }
+        Overlaps { voxels, sections, slabs: nearest..farthest }
+    }
+}
+
+/// The largest integer that is not above a slab's number: the numbers' range lets it do without the system's `floor`.
+fn floor(slab: f64) -> i32 {
+    const ABOVE_0: i32 = 2 * slab::MAX_SLABS as i32;
+    (slab + f64::from(ABOVE_0)) as i32 - ABOVE_0
+}

@@ -1,0 +1,340 @@
+//! Which bricks every sheet group of every tile looks at: the buckets (§5.1) of the tile rasteriser, which walks a tile's
+//! groups front to back.
+
+use std::ops::Range;
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use crate::error::RenderError;
+use crate::geometry::view_geometry::ViewGeometry;
+use crate::gpu::layout::Brick;
+use crate::lists::brick;
+use crate::settings::splatting::Order;
+
+/// Width and height of the rasteriser's tiles, pixels.
+pub const TILE: [u32; 2] = [16, 8];
+
+/// Units of a tile: rounds in which the smallest subgroup draws it.
+pub const UNITS: u32 = 4;
+
+/// Sheets of a group.
+pub const SHEETS: u32 = 4;
+
+/// The most bricks: their numbers share a word with a place in the brick.
+const MAX_BRICKS: usize = 1 << 26;
+
+/// Passes through all its loops that a thread may take in one dispatch: llvmpipe ends loops after 65535. The pass that finds a loop
+/// at its end counts, and in that pass one through every loop inside. Threads count them, and go on in the next dispatch. What is left is
+/// for what comes before and after: to look at every pixel's ray first of all.
+const MAX_PASSES: u32 = 64900;
+
+/// Passes of a group at most besides, with 8 threads in a subgroup, and of each unit.
+const PASSES_PER_GROUP: u32 = 60;
+const PASSES_PER_UNIT: u32 = 40;
+
+/// Passes of a brick at most, with 8 threads in a subgroup: 8 to fetch and visit it, 76 to find its voxels, 56 to shade them, 8 to keep
+/// them, and 10 where the queue is full.
+const PASSES_PER_BRICK: u32 = 158;
+
+/// Passes to add a brick's voxels to a unit.
+const PASSES_PER_ADDITION: u32 = 56;
+
+/// Times that a brick's voxels are shaded side by side.
+const SHADED_PER_BRICK: u32 = 8;
+
+/// Passes to look at how a unit's rays are cut, or along which way means are taken, where that is asked for.
+const PASSES_PER_LOOK: u32 = 140;
+
+/// Passes that a thread may take, and takes at most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Passes {
+    /// In one dispatch.
+    pub most: u32,
+    /// For a group, bricks not counted.
+    pub per_group: u32,
+    /// For a brick.
+    pub per_brick: u32,
+    /// To look up a voxel's control points in memory.
+    pub search: u32,
+}
+
+impl Passes {
+    /// Those of a view whose voxels take at most `search` passes to look up their control points in memory, for so many of a tile's units.
+    pub fn new(search: u32, units: u32) -> Self {
+        let per_group = PASSES_PER_GROUP + units * (PASSES_PER_UNIT + PASSES_PER_LOOK);
+        let per_brick = PASSES_PER_BRICK + units * PASSES_PER_ADDITION + SHADED_PER_BRICK * search;
+        Self { most: MAX_PASSES, per_group, per_brick, search }
+    }
+}
+
+/// Bricks by tile and sheet group.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TileBins {
+    /// The first slab of the nearest group.
+    pub first_slab: i32,
+    /// Number of tiles.
+    pub tiles: u32,
+    /// Sheet groups of every tile.
+    pub groups: u32,
+    /// Where every tile's groups start in `entries`, in the order they are composited in, tile after tile; at last the end.
+    pub starts: Vec<u32>,
+    /// Numbers of bricks.
+    pub entries: Vec<u32>,
+    /// For every group, nearest first, half the screen box around its footprints, pixels.
+    pub half_boxes: Vec<DVec2>,
+    /// Workgroups that a tile is divided among: its units, if there is too much behind one for all of them together.
+    pub parts: u32,
+    /// What bounds a dispatch.
+    pub passes: Passes,
+    /// Dispatches that are enough for every tile.
+    pub dispatches: u32,
+}
+
+/// Why a view cannot be drawn by tiles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unfit {
+    /// What there is too much of.
+    pub what: &'static str,
+    /// How much there is.
+    pub required: u64,
+    /// How much there may be.
+    pub actual: u64,
+}
+
+impl From<Unfit> for RenderError {
+    fn from(Unfit { what, required, actual }: Unfit) -> Self {
+        Self::OutOfRange {
+            key: "splatting.rasterizer",
+            found: format!("\"tiles\" with {required} {what}"),
+            allowed: format!("at most {actual}, or \"quads\""),
+        }
+    }
+}
+
+/// Where a brick's voxels are: bounds of their pixel coordinates, and the groups that their kernels may reach.
+struct Placed {
+    number: u32,
+    low: DVec2,
+    high: DVec2,
+    groups: Range<i32>,
+}
+
+/// Pixels that footprints may touch, both ends inclusive.
+struct Pixels {
+    first: [u32; 2],
+    last: [u32; 2],
+}
+
+impl TileBins {
+    /// Sorts bricks by the tiles and groups they may touch, with kernels of the radius `support`. The sheet depths `covered` are in some
+    /// group even where they hold nothing. To look up a voxel's control points in memory takes at most `search` passes through loops.
+    /// Neither list may have more than `most_words` words.
+    ///
+    /// # Errors
+    /// If there are more bricks, or more of them behind a tile, than the rasteriser can take.
+    pub fn new(
+        bricks: &[Brick],
+        view: &ViewGeometry,
+        order: Order,
+        covered: Range<f64>,
+        support: f64,
+        search: u32,
+        most_words: u64,
+    ) -> Result<Self, Unfit> {
+        let check = |what, required: u64, actual: u64| {
+            if required <= actual { Ok(()) } else { Err(Unfit { what, required, actual }) }
+        };
+        check("bricks", bricks.len() as u64, MAX_BRICKS as u64)?;
+        let placed = place(bricks, view);
+        let planes = view.slabs.groups(SHEETS);
+        let covered = planes.covered(covered);
+        let all = || placed.iter().map(|brick| &brick.groups).chain(&covered);
+        let first_group = all().map(|groups| groups.start).min().unwrap_or(0);
+        let end_group = all().map(|groups| groups.end).max().unwrap_or(0);
+        let groups = (end_group - first_group) as u32;
+        let [columns, rows] = grid(view.size);
+        let bins = u64::from(columns) * u64::from(rows) * u64::from(groups);
+        check("tiles times sheet groups", bins, most_words - 1)?;
+
+        let half_boxes: Vec<DVec2> = (first_group..end_group)
+            .map(|group| view.half_box(support, planes.plane(group)..planes.plane(group + 1)))
+            .collect();
+
+        let sort = Sort { placed: &placed, half_boxes: &half_boxes, order, first_group, size: view.size };
+        let strip_rows = rows.div_ceil(STRIPS_PER_THREAD * rayon::current_num_threads() as u32).max(1);
+        let strips = (0..rows).into_par_iter().step_by(strip_rows as usize);
+        let strips: Vec<_> = strips.map(|first| sort.counted(first..(first + strip_rows).min(rows))).collect();
+        let total = strips.iter().map(|strip| strip.entries).sum();
+        check("bricks' parts in tiles and sheet groups", total, most_words)?;
+        let mut starts = Vec::with_capacity(bins as usize + 1);
+        let mut next = 0;
+        for count in strips.iter().flat_map(|strip| &strip.counts) {
+            starts.push(next);
+            next += count;
+        }
+        starts.push(next);
+        let entries: Vec<_> = strips.par_iter().map(|strip| sort.sorted(strip)).collect();
+        let entries = entries.concat();
+        let of_parts = |parts| {
+            let passes = Passes::new(search, UNITS / parts);
+            dispatches(&starts, groups as usize, &passes).map(|dispatches| (parts, passes, dispatches))
+        };
+        let (parts, passes, dispatches) = of_parts(1).or_else(|_| of_parts(UNITS))?;
+        Ok(Self {
+            first_slab: first_group * SHEETS as i32,
+            tiles: columns * rows,
+            groups,
+            starts,
+            entries,
+            half_boxes,
+            parts,
+            passes,
+            dispatches,
+        })
+    }
+}
+
+/// Strips of tiles that a thread sorts the bricks of, one after the other.
+const STRIPS_PER_THREAD: u32 = 2;
+
+/// A counting sort of bricks, in strips of rows of tiles: these have bins that are next to each other.
+struct Sort<'a> {
+    placed: &'a [Placed],
+    half_boxes: &'a [DVec2],
+    order: Order,
+    first_group: i32,
+    size: [u32; 2],
+}
+
+/// Some rows of tiles, and how many bricks their bins hold.
+struct Strip {
+    rows: Range<u32>,
+    counts: Vec<u32>,
+    entries: u64,
+}
+
+impl Sort<'_> {
+    /// Calls `visit` with every brick's number and each of its bins, of those of some rows of tiles.
+    fn visit(&self, rows: &Range<u32>, mut visit: impl FnMut(u32, usize)) {
+        let ([columns, _], groups) = (grid(self.size), self.half_boxes.len());
+        let farthest = self.half_boxes.iter().fold(0.0_f64, |farthest, half_box| farthest.max(half_box.y)) + SLACK;
+        let (top, bottom) = (f64::from(rows.start * TILE[1]) - farthest, f64::from(rows.end * TILE[1]) + farthest);
+        for brick in self.placed.iter().filter(|brick| brick.high.y >= top && brick.low.y <= bottom) {
+            let mut touched: Option<(DVec2, Option<Pixels>)> = None;
+            for group in brick.groups.clone() {
+                let nth = (group - self.first_group) as usize;
+                let at = match self.order {
+                    Order::FrontToBack => nth,
+                    Order::BackToFront => groups - 1 - nth,
+                };
+                let half_box = self.half_boxes[nth];
+                // Without perspective groups have one size of box.
+                let (_, pixels) = match &touched {
+                    Some(touched) if touched.0 == half_box => touched,
+                    _ => touched.insert((half_box, brick.pixels(half_box, self.size))),
+                };
+                let Some(Pixels { first, last }) = pixels else { continue };
+                for y in (first[1] / TILE[1]).max(rows.start)..(last[1] / TILE[1] + 1).min(rows.end) {
+                    for x in first[0] / TILE[0]..=last[0] / TILE[0] {
+                        visit(brick.number, ((y - rows.start) * columns + x) as usize * groups + at);
+                    }
+                }
+            }
+        }
+    }
+
+    fn counted(&self, rows: Range<u32>) -> Strip {
+        let [columns, _] = grid(self.size);
+        let mut counts = vec![0; rows.len() * columns as usize * self.half_boxes.len()];
+        let mut entries = 0;
+        self.visit(&rows, |_, bin| {
+            counts[bin] += 1;
+            entries += 1;
+        });
+        Strip { rows, counts, entries }
+    }
+
+    /// The entries of a strip's bins, one bin after the other.
+    fn sorted(&self, strip: &Strip) -> Vec<u32> {
+        let mut end = 0;
+        let starts = strip.counts.iter().map(|count| {
+            end += count;
+            end - count
+        });
+        let mut next: Vec<u32> = starts.collect();
+        let mut entries = vec![0; strip.entries as usize];
+        self.visit(&strip.rows, |number, bin| {
+            entries[next[bin] as usize] = number;
+            next[bin] += 1;
+        });
+        entries
+    }
+}
+
+/// Pixels around footprints' boxes, for rounding errors: more than the shader rounds with.
+const SLACK: f64 = 0.02;
+
+impl Placed {
+    /// Pixels that footprints may touch which reach so far around voxels.
+    fn pixels(&self, half_box: DVec2, size: [u32; 2]) -> Option<Pixels> {
+        let reach = half_box + SLACK;
+        let first = (self.low - reach - 0.5).ceil().max(DVec2::ZERO);
+        let last = (self.high + reach - 0.5).floor().min(DVec2::from(size.map(f64::from)) - 1.0);
+        let pixels = Pixels { first: first.as_uvec2().to_array(), last: last.as_uvec2().to_array() };
+        first.cmple(last).all().then_some(pixels)
+    }
+}
+
+/// The bricks that are before the eye, in memory order whatever changes of iso-range came before: equal scenes add up in equal order.
+fn place(bricks: &[Brick], view: &ViewGeometry) -> Vec<Placed> {
+    let groups = view.slabs.groups(SHEETS);
+    let mut placed: Vec<Placed> = (bricks.par_iter().enumerate())
+        .filter(|(_, brick)| brick.present != [0; 2])
+        .filter_map(|(number, brick)| {
+            let (middle, half) = brick::bounds(brick);
+            let bounds = view.bounds(middle, half)?;
+            let is_beyond_near = bounds.depths.start < bounds.depths.end;
+            is_beyond_near.then(|| Placed {
+                number: number as u32,
+                low: bounds.low,
+                high: bounds.high,
+                groups: groups.touched(bounds.depths.start, bounds.depths.end),
+            })
+        })
+        .collect();
+    let position = |placed: &Placed| brick::position(&bricks[placed.number as usize]);
+    if !placed.is_sorted_by_key(position) {
+        placed.par_sort_unstable_by_key(position);
+    }
+    placed
+}
+
+/// Columns and rows of tiles of an image.
+pub fn grid(size: [u32; 2]) -> [u32; 2] {
+    [size[0].div_ceil(TILE[0]), size[1].div_ceil(TILE[1])]
+}
+
+/// Dispatches that are enough for every tile: in each it takes groups until one might be too much.
+fn dispatches(starts: &[u32], groups: usize, passes: &Passes) -> Result<u32, Unfit> {
+    let most_bricks = passes.most.saturating_sub(passes.per_group) / passes.per_brick;
+    let of_tile = |first: usize| {
+        let (mut dispatches, mut taken) = (1, 0);
+        for group in starts[first..=first + groups].windows(2) {
+            let bricks = group[1] - group[0];
+            if bricks > most_bricks {
+                let (what, required) = ("bricks behind a tile in one sheet group", bricks.into());
+                return Err(Unfit { what, required, actual: most_bricks.into() });
+            }
+            let of_group = passes.per_group + bricks * passes.per_brick;
+            if taken + of_group > passes.most {
+                dispatches += 1;
+                taken = 0;
+            }
+            taken += of_group;
+        }
+        Ok(dispatches)
+    };
+    let tiles = (0..starts.len() - 1).into_par_iter().step_by(groups.max(1));
+    tiles.map(of_tile).try_reduce(|| 0, |a, b| Ok(a.max(b)))
+}

@@ -1,0 +1,367 @@
+//! The renderer a host embeds: it owns pipelines, never a device, and neither submits nor waits. Every frame it prepares, which can
+//! fail, records, and presents, which cannot.
+
+pub(crate) mod options;
+pub(crate) mod pick;
+pub(crate) mod placement;
+pub(crate) mod prepared_frame;
+pub(crate) mod scene_view;
+
+use std::sync::OnceLock;
+
+use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Queue, RenderPass, TextureFormat, TextureView};
+
+use crate::error::{RenderError, check_device};
+use crate::gpu::bindings::{Wanted, grown, sizes, wanted, wanted_for, written};
+use crate::gpu::device::{self, DeviceError, DeviceRequirements};
+use crate::gpu::fault::scoped;
+use crate::gpu::layout::{Cut, Frame, Tally};
+use crate::gpu::targets::{CompositingBuffer, no_surfaces};
+use crate::gpu::timer::{PASS_BYTES, Timer};
+use crate::gpu::uniforms;
+use crate::pass::composite::CutBuffers;
+use crate::pass::first_hit::FirstHit;
+use crate::pass::resolve::Resolve;
+use crate::rasterizer::Given;
+use crate::rasterizer::quads::QuadRasterizer;
+use crate::rasterizer::request::FrameRequest;
+use crate::rasterizer::samples::SampleRasterizer;
+use crate::rasterizer::tiles::TileRasterizer;
+use crate::rasterizer::way::{Way, insists_on_tiles};
+use crate::renderer::options::RendererOptions;
+use crate::renderer::placement::Placement;
+use crate::renderer::prepared_frame::{Drawing, FirstHits, Kept, PreparedFrame};
+use crate::renderer::scene_view::{Prepared, SceneView};
+use crate::settings::splatting::Rasterizer;
+use crate::stats::Staging;
+
+/// The pipelines of every stage, for one device. Volumes and frames are separate and can be many.
+#[derive(Debug)]
+pub struct Renderer {
+    device: Device,
+    sheet_format: TextureFormat,
+    sheets: u32,
+    rasterizer: Rasterizer,
+    profile: bool,
+    /// Nanoseconds of a timestamp's tick.
+    period: f32,
+    /// Compiled when first needed.
+    quads: OnceLock<QuadRasterizer>,
+    samples: OnceLock<SampleRasterizer>,
+    tiles: TileRasterizer,
+    resolve: Resolve,
+    first_hit: OnceLock<FirstHit>,
+    /// Stands for a host's depth where there is none.
+    no_surfaces: OnceLock<TextureView>,
+}
+
+impl Renderer {
+    /// Compiles what every frame needs; a rasterizer's stages are compiled with the first frame that it draws.
+    ///
+    /// # Errors
+    /// If limits of the device are not enough, or it cannot do what the options ask for, or fails.
+    pub fn new(device: &Device, queue: &Queue, options: &RendererOptions) -> Result<Self, DeviceError> {
+        DeviceRequirements::check(device)?;
+        let sheet_format = device::sheet_format(device, options.sheet_format)?;
+        let sheets = device::sheets_per_group(device, sheet_format, options.sheets_per_group)?;
+        options.check_target(device)?;
+        let adapter = || device.adapter_info().name;
+        let resolve = scoped(device, || Resolve::new(device, options))
+            .map_err(|fault| DeviceError::Pipelines { adapter: adapter(), fault })?;
+        Ok(Self {
+            device: device.clone(),
+            sheet_format,
+            sheets,
+            rasterizer: options.rasterizer,
+            profile: options.profile,
+            period: queue.get_timestamp_period(),
+            quads: OnceLock::new(),
+            samples: OnceLock::new(),
+            tiles: TileRasterizer::default(),
+            resolve,
+            first_hit: OnceLock::new(),
+            no_surfaces: OnceLock::new(),
+        })
+    }
+
+    /// Format of the sheet buffer.
+    pub fn sheet_format(&self) -> TextureFormat {
+        self.sheet_format
+    }
+
+    /// Does what the view's changes since its last frame ask for, and no more: buckets if the camera, the slabs or the bricks
+    /// changed (§5.1), buffers if they are too small. A change of colours, opacities or light writes a few hundred bytes.
+    ///
+    /// # Errors
+    /// If the scene asks for something not implemented, or for more than the device's limits allow, or the device fails. What is found
+    /// before anything is allocated leaves the view's last frame. After anything else, and a failure of the device always, the view has no
+    /// frame, and is not drawn until it is prepared again: after
+    /// [`OutOfMemory`](crate::gpu::fault::DeviceFault::OutOfMemory) with less, after any other by a new renderer.
+    pub fn prepare(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
+        check_device(device, &self.device, "the renderer")?;
+        check_device(device, view.volume.gpu_volume().device(), "the view")?;
+        scoped(device, || self.prepare_unscoped(device, queue, view)).unwrap_or_else(|fault| {
+            // What there was no memory for is not valid.
+            view.frame = None;
+            view.volume.lists.forget();
+            Err(fault.into())
+        })
+    }
+
+    /// Bytes of GPU memory that a new view with these settings will hold once prepared, [`SceneView::gpu_bytes`], exactly; nothing is
+    /// allocated, and [`Self::prepare`] will refuse for limits' sake what this refuses. Sorts bricks into buckets as a first frame does.
+    /// What the volume itself takes, and whether to upload it, [`GpuVolume::estimate`](crate::gpu::gpu_volume::GpuVolume::estimate) says.
+    ///
+    /// # Errors
+    /// If the scene asks for something not implemented, or for more than the device's limits allow.
+    pub fn estimate(&self, view: &SceneView) -> Result<u64, RenderError> {
+        check_device(view.volume.gpu_volume().device(), &self.device, "the renderer")?;
+        let request = self.request(view)?;
+        let limits = self.device.limits();
+        let settled = view.volume.lists.settled(&limits);
+        let lists = settled.lists();
+        let by_label = view.volume.shades_by_label();
+        let tiles = match request.way {
+            Way::Tiles => {
+                let bricks = (settled.all(), lists.len());
+                match TileRasterizer::estimate(&limits, &request, bricks, by_label) {
+                    Err(error) if insists_on_tiles(&request.splatting) => return Err(error),
+                    needs => needs.ok(),
+                }
+            }
+            Way::Quads | Way::Samples => None,
+        };
+        let needs = match (tiles, request.way) {
+            (Some(needs), _) => needs,
+            (None, Way::Samples) => {
+                let bricks = (view.volume.grid(), settled.all());
+                SampleRasterizer::estimate(&limits, &request, bricks, self.sheet_format)?
+            }
+            (None, _) => QuadRasterizer::estimate(&limits, &request, &lists, (self.sheet_format, self.sheets))?,
+        };
+        let passes = needs.passes + 1;
+        let timer = if self.profile { Timer::estimate(&self.device, passes) } else { None };
+        let buffers = [
+            frame_uniform(),
+            control_points(&request),
+            cut_uniform(),
+            staging(timestamps_at(needs.groups), timer.is_some(), passes),
+        ];
+        let volume = view.volume.estimate()? + settled.gpu_bytes();
+        let compositing = CompositingBuffer::estimate(request.view.size, request.bands.len());
+        let counts = timer.unwrap_or(0) + sizes(&limits, &buffers)?;
+        Ok(volume + compositing + needs.bytes + request.hit_bytes() + counts)
+    }
+
+    fn request(&self, view: &SceneView) -> Result<FrameRequest, RenderError> {
+        let SceneView { volume, scene, surfaces, first_hit, .. } = view;
+        FrameRequest::new(&self.device, volume, scene, (surfaces.as_ref(), *first_hit), self.rasterizer)
+    }
+
+    fn prepare_unscoped(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
+        // What can fail comes before anything is taken from the last frame.
+        let request = self.request(view)?;
+        let SceneView { volume, scene, surfaces, frame, .. } = view;
+        volume.flush(device, queue)?;
+        let sheets = (self.sheet_format, self.sheets);
+        let kept = Kept::of(frame.take(), sheets, &request.view);
+        let FrameRequest { view: seen, kernel, ramps, rays, .. } = &request;
+        let size = seen.size;
+        let grid = *volume.grid();
+        let compositing = kept.compositing.unwrap_or_else(|| CompositingBuffer::new(device, size, &request.bands));
+        let write = |old, wanted: &Wanted, bytes: &[u8]| written(device, queue, old, wanted, bytes);
+        let points = bytemuck::cast_slice(&ramps.points);
+        let control_points = write(kept.control_points, &control_points(&request), points)?;
+        let frame_values = uniforms::frame(seen, kernel, (&grid, volume.gpu_volume().value_format()), ramps, scene);
+        let uniform = write(kept.uniform, &frame_uniform(), bytemuck::bytes_of(&frame_values))?;
+        let cut_values = uniforms::cut(seen, &grid, scene, request.surfaces, request.first_hit);
+        let cut = write(kept.cut, &cut_uniform(), bytemuck::bytes_of(&cut_values))?;
+        let cut_buffers = CutBuffers {
+            uniform: &cut,
+            surfaces: match surfaces {
+                Some(surfaces) => &surfaces.depth,
+                None => self.no_surfaces.get_or_init(|| no_surfaces(device)),
+            },
+        };
+
+        let given = Given {
+            device,
+            queue,
+            volume,
+            request: &request,
+            frame: &uniform,
+            control_points: &control_points,
+            compositing: &compositing,
+            cut: cut_buffers,
+        };
+        let was = kept.drawing.as_ref().map(Drawing::rasterizer);
+        let (drawing, prepared) = self.draw_with(given, kept.drawing)?;
+        let totals = kept.totals.filter(|_| !prepared.bucketed && was == Some(drawing.rasterizer()));
+
+        let first_hits = drawing.first_hits().filter(|_| rays.first_hit).map(|words| {
+            let stage = self.first_hit.get_or_init(|| FirstHit::new(device));
+            let texture = kept.first_hits.unwrap_or_else(|| FirstHit::texture(device, size));
+            let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+            FirstHits { group: stage.bind(device, &uniform, cut_buffers, words), texture, view }
+        });
+
+        // The rasterizer's passes, and resolve.
+        let passes = drawing.passes() + 1;
+        let timer = if self.profile { Timer::new(device, passes) } else { None };
+        let timestamps = timestamps_at(drawing.group_slabs().firsts.len());
+        let staging = grown(device, kept.staging, &staging(timestamps, timer.is_some(), passes))?;
+        let timer_bytes = timer.as_ref().map_or(0, Timer::gpu_bytes);
+        let buffers: u64 = [&uniform, &control_points, &cut, &staging].map(Buffer::size).iter().sum();
+        let shared_bytes = compositing.gpu_bytes() + buffers + request.hit_bytes() + timer_bytes;
+        *frame = Some(PreparedFrame {
+            gpu_bytes: volume.gpu_bytes() + drawing.gpu_bytes() + shared_bytes,
+            sheets,
+            resolve_groups: compositing.bands.iter().map(|band| self.resolve.bind(device, &uniform, band)).collect(),
+            view: *seen,
+            drawing,
+            compositing,
+            uniform,
+            control_points,
+            cut,
+            first_hits,
+            timer,
+            totals,
+            staging: Some(Staging { buffer: staging, timestamps, stages: Vec::new(), period: self.period }),
+        });
+        Ok(prepared)
+    }
+
+    /// Prepares a rasterizer's part: by tiles, unless the view does not fit them and the scene does not insist.
+    fn draw_with(&self, given: Given<'_>, previous: Option<Drawing>) -> Result<(Drawing, Prepared), RenderError> {
+        let (mut old_quads, mut old_tiles, mut old_samples) = (None, None, None);
+        match previous {
+            Some(Drawing::Quads(frame)) => old_quads = Some(*frame),
+            Some(Drawing::Tiles(frame)) => old_tiles = Some(*frame),
+            Some(Drawing::Samples(frame)) => old_samples = Some(*frame),
+            None => {}
+        }
+        let FrameRequest { way, splatting, .. } = given.request;
+        if *way == Way::Samples {
+            let (frame, prepared) = self.samples(given.device).prepare(given, old_samples)?;
+            return Ok((Drawing::Samples(Box::new(frame)), prepared));
+        }
+        if *way == Way::Tiles {
+            match self.tiles.prepare(given, old_tiles) {
+                Ok((frame, prepared)) => return Ok((Drawing::Tiles(Box::new(frame)), prepared)),
+                Err(error) if insists_on_tiles(splatting) => return Err(error),
+                Err(_) => {}
+            }
+        }
+        let (frame, prepared) = self.quads(given.device).prepare(given, old_quads)?;
+        Ok((Drawing::Quads(Box::new(frame)), prepared))
+    }
+
+    fn samples(&self, device: &Device) -> &SampleRasterizer {
+        self.samples.get_or_init(|| SampleRasterizer::new(device, self.sheet_format))
+    }
+
+    fn quads(&self, device: &Device) -> &QuadRasterizer {
+        self.quads.get_or_init(|| QuadRasterizer::new(device, self.sheet_format, self.sheets))
+    }
+
+    /// Records the drawing of the view's prepared frame into the view's own buffers, from where [`Self::present`] and [`Self::draw`]
+    /// take it, in this encoder or later ones; nothing, if the view was never prepared. The renderer must be the one that prepared it, and
+    /// what is recorded must be submitted before the view is prepared again.
+    pub fn record(&self, encoder: &mut CommandEncoder, view: &mut SceneView) {
+        let Some(frame) = &mut view.frame else { return };
+        let PreparedFrame { drawing, compositing, timer, .. } = frame;
+        if let Some(timer) = timer {
+            timer.restart();
+        }
+        for band in &compositing.bands {
+            encoder.clear_buffer(&band.acc, 0, None);
+        }
+        match drawing {
+            Drawing::Tiles(tiles) => self.tiles.record(encoder, timer, tiles),
+            Drawing::Samples(samples) => {
+                if let Some(rasterizer) = self.samples.get() {
+                    rasterizer.record(encoder, timer, samples);
+                }
+            }
+            Drawing::Quads(quads) => {
+                if let Some(rasterizer) = self.quads.get() {
+                    rasterizer.record(encoder, timer, quads);
+                }
+            }
+        }
+        if let (Some(stage), Some(FirstHits { view, group, .. })) = (self.first_hit.get(), &frame.first_hits) {
+            stage.record(encoder, group, view);
+        }
+        if let Some(staging) = &mut frame.staging {
+            drawing.copy_counts(encoder, &staging.buffer);
+            if let Some(timer) = timer {
+                staging.stages = timer.copy(encoder, &staging.buffer, staging.timestamps);
+            }
+        }
+    }
+
+    /// Records a pass of its own that draws the view's image into a target, which keeps what the image does not cover; nothing, if
+    /// the view was never prepared. The renderer must have been made for the target's format and sample count and for no depth
+    /// attachment, and the scissor must lie in the target; what is wrong with them, wgpu reports.
+    pub fn present(&self, encoder: &mut CommandEncoder, view: &mut SceneView, target: &TextureView, at: Placement) {
+        let Some(frame) = &mut view.frame else { return };
+        // Whoever waits for the counts has them, and their buffer.
+        let timer = frame.timer.as_mut().filter(|timer| frame.staging.is_some() && timer.has_room());
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("sheetsplat.resolve"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: target,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
+            })],
+            timestamp_writes: timer.map(|timer| timer.render("resolve")),
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        self.draw_frame(&mut pass, frame, at);
+        drop(pass);
+        if let (Some(timer), Some(staging)) = (&frame.timer, &mut frame.staging) {
+            staging.stages = timer.copy(encoder, &staging.buffer, staging.timestamps);
+        }
+    }
+
+    /// Draws the view's image in a pass of the host's, whose attachments must be of the formats and the sample count that the
+    /// renderer was made for; what is wrong with them, wgpu reports. Draws nothing, if the view was never prepared. Changes the pass's
+    /// pipeline, bind group 0, viewport and scissor rectangle. A view may also be drawn by other renderers of its device than the
+    /// one that recorded it, and as often as the host likes.
+    pub fn draw(&self, pass: &mut RenderPass<'_>, view: &SceneView, at: Placement) {
+        if let Some(frame) = &view.frame {
+            self.draw_frame(pass, frame, at);
+        }
+    }
+
+    fn draw_frame(&self, pass: &mut RenderPass<'_>, frame: &PreparedFrame, at: Placement) {
+        let PreparedFrame { compositing, resolve_groups, .. } = frame;
+        let bands = compositing.bands.iter().map(|band| band.band);
+        self.resolve.draw(pass, compositing.size, resolve_groups.iter().zip(bands), at);
+    }
+}
+
+fn frame_uniform() -> Wanted {
+    wanted_for("sheetsplat.frame", size_of::<Frame>() as u64, BufferUsages::UNIFORM)
+}
+
+fn cut_uniform() -> Wanted {
+    wanted_for("sheetsplat.cut", size_of::<Cut>() as u64, BufferUsages::UNIFORM)
+}
+
+fn control_points(request: &FrameRequest) -> Wanted {
+    let bytes = size_of_val(&request.ramps.points[..]) as u64;
+    wanted_for("sheetsplat.control_points", bytes, BufferUsages::STORAGE)
+}
+
+/// Where counts of so many sheet groups end, bytes.
+fn timestamps_at(groups: usize) -> u64 {
+    (size_of::<Tally>() as u64 + groups as u64 * 4).next_multiple_of(8)
+}
+
+/// For counts, and behind them the timestamps of so many passes, if they are timed.
+fn staging(timestamps: u64, timed: bool, passes: usize) -> Wanted {
+    let bytes = timestamps + if timed { passes as u64 * PASS_BYTES } else { 0 };
+    wanted("sheetsplat.counts", bytes, BufferUsages::COPY_DST | BufferUsages::MAP_READ)
+}

@@ -1,0 +1,173 @@
+//! What is shown and how, and what the next frame can keep of the last one: every setter says what it costs (§5.1).
+
+use wgpu::{CommandEncoder, Device, Texture};
+
+use crate::error::{RenderError, check_device};
+use crate::geometry::surfaces::Surfaces;
+use crate::gpu::classified_volume::{ClassifiedVolume, Touched};
+use crate::gpu::fault::scoped;
+use crate::gpu::gpu_volume::GpuVolume;
+pub use crate::rasterizer::Prepared;
+use crate::renderer::pick::PendingPick;
+use crate::renderer::prepared_frame::PreparedFrame;
+use crate::scene::{ImageSettings, Scene};
+use crate::settings::camera::Camera;
+use crate::settings::clip::Clip;
+use crate::settings::shading::{Light, Shading};
+use crate::settings::splatting::Splatting;
+use crate::settings::transfer_function::TransferFunction;
+use crate::stats::PendingCounts;
+
+/// A view of a volume: camera, image, transfer function, shading and splatting settings, and the last frame's buffers. Setters
+/// take effect with the next [`Renderer::prepare`](crate::renderer::Renderer::prepare).
+#[derive(Debug)]
+pub struct SceneView {
+    pub(crate) volume: ClassifiedVolume,
+    pub(crate) scene: Scene,
+    pub(crate) surfaces: Option<Surfaces>,
+    pub(crate) first_hit: Option<f64>,
+    pub(crate) frame: Option<PreparedFrame>,
+}
+
+impl SceneView {
+    /// Uploads the bricks of the voxels that take part under a scene's transfer function, to the volume's device. The scene's own
+    /// volume is not looked at.
+    ///
+    /// # Errors
+    /// If the volume has no labels and the scene has tables or a preset for some, or if the scene's clip planes are none; if the volume is on
+    /// another device, or the device fails.
+    pub fn new(device: &Device, volume: &GpuVolume, scene: &Scene) -> Result<Self, RenderError> {
+        check_device(device, volume.device(), "the volume")?;
+        scene.transfer.check(volume.volume())?;
+        scene.clip.check()?;
+        let transfer = scene.transfer.resolve(volume.volume());
+        let clipped = scene.clip.voxels(volume.volume().grid(), scene.splatting.radius);
+        let volume = scoped(device, || ClassifiedVolume::new(device, volume, transfer, clipped))?;
+        Ok(Self { volume, scene: scene.clone(), surfaces: None, first_hit: None, frame: None })
+    }
+
+    /// The settings. Its `volume` and `transfer` are those that the view was made with.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The volume under the current transfer function.
+    pub fn volume(&self) -> &ClassifiedVolume {
+        &self.volume
+    }
+
+    /// Changes colours, opacities, gradient opacity, iso-ranges or the labels' tables. What keeps its opacity above 0 is shaded anew and nothing more;
+    /// see [`ClassifiedVolume::set_transfer_function`].
+    pub fn set_transfer_function(&mut self, transfer: TransferFunction) -> Touched {
+        self.volume.set_transfer_function(transfer)
+    }
+
+    /// Changes the iso-ranges alone; touches only voxels that enter or leave.
+    pub fn set_iso_ranges(&mut self, iso_ranges: Option<Vec<[f64; 2]>>) -> Touched {
+        self.volume.set_iso_ranges(iso_ranges)
+    }
+
+    /// Shows or hides the voxels of a label of a segmented volume; touches only those.
+    pub fn set_label_visible(&mut self, label: u16, visible: bool) -> Touched {
+        self.volume.set_label_visible(label, visible)
+    }
+
+    /// Changes the camera: bricks are sorted into buckets again.
+    pub fn set_camera(&mut self, camera: Camera) {
+        self.scene.camera = camera;
+    }
+
+    /// Moves the light: voxels are shaded anew. A direction has any length but 0 and points to the light.
+    pub fn set_light(&mut self, light: Light) {
+        self.scene.shading.light = light;
+    }
+
+    /// Changes the material: voxels are shaded anew.
+    pub fn set_shading(&mut self, shading: Shading) {
+        self.scene.shading = shading;
+    }
+
+    /// Changes the splatting settings. Another slab width or kernel sorts bricks into buckets again, another kernel also makes
+    /// another footprint table; where planes clip, voxels enter or leave with another radius.
+    pub fn set_splatting(&mut self, splatting: Splatting) {
+        let Scene { clip, splatting: old, .. } = &self.scene;
+        if !clip.is_empty() && splatting.radius != old.radius {
+            self.volume.set_clip(clip.voxels(self.volume.grid(), splatting.radius));
+        }
+        self.scene.splatting = splatting;
+    }
+
+    /// Changes what is cut away. Touches only voxels that enter or leave.
+    ///
+    /// # Errors
+    /// If there are too many planes, or some are none; then nothing changes.
+    pub fn set_clip(&mut self, clip: Clip) -> Result<Touched, RenderError> {
+        clip.check()?;
+        let clipped = clip.voxels(self.volume.grid(), self.scene.splatting.radius);
+        self.scene.clip = clip;
+        Ok(self.volume.set_clip(clipped))
+    }
+
+    /// Opaque surfaces of the host, `None` for none: in front of them the volume shows, behind them it does not, and voxels there are
+    /// culled as behind opaque ones (§6). Where a surface lies in a slab, it cuts the slab's sheet in proportion, as clip planes do
+    /// ([`Clip`](crate::settings::Clip)). The texture must hold what it is to hold when the frame is submitted.
+    pub fn set_surfaces(&mut self, surfaces: Option<Surfaces>) {
+        self.surfaces = surfaces;
+    }
+
+    /// Asks for the depth at which every pixel's opacity reaches a value, above 0 and at most 1; `None` for none. Front to back only, and
+    /// with culling at most [`Splatting::opacity_threshold`]; not for [`Compositing::Minimum`](crate::settings::splatting::Compositing::Minimum), and
+    /// whatever the value that of the surface for [`Compositing::Surface`](crate::settings::splatting::Compositing::Surface). See
+    /// [`Self::first_hits`] and [`Self::pick`].
+    pub fn set_first_hit(&mut self, opacity: Option<f64>) {
+        self.first_hit = opacity;
+    }
+
+    /// The depths of first hits, a `R32Float` texture of the image's size (to sample or copy), once they have been asked for and a frame
+    /// was prepared; recording the frame writes them. In world units along the camera's direction, from the eye, orthographic from the
+    /// plane through [`Camera::center`]; infinite where the opacity is not reached. Within a sheet opacity is taken to grow evenly.
+    pub fn first_hits(&self) -> Option<&Texture> {
+        self.frame.as_ref()?.first_hits.as_ref().map(|hits| &hits.texture)
+    }
+
+    /// Records a copy of the first hit at a pixel, counted from the upper left: after [`Renderer::record`](crate::renderer::Renderer::record),
+    /// in the same encoder or a later one. `None` if none were asked for, or off the image. Allocates a few bytes.
+    pub fn pick(&self, device: &Device, encoder: &mut CommandEncoder, pixel: [u32; 2]) -> Option<PendingPick> {
+        let frame = self.frame.as_ref()?;
+        let hits = frame.first_hits.as_ref()?;
+        let is_inside = pixel[0] < frame.view.size[0] && pixel[1] < frame.view.size[1];
+        is_inside.then(|| PendingPick::record(device, encoder, &hits.texture, pixel, &frame.view, self.volume.volume()))
+    }
+
+    /// Changes the image's size, for which all buffers of that size are allocated again, or its background, which costs nothing.
+    pub fn set_image(&mut self, image: ImageSettings) {
+        self.scene.image = image;
+    }
+
+    /// Turns the camera about its `up` by an angle in degrees, by the right hand.
+    pub fn turn(&mut self, degrees: f64) {
+        self.scene.camera = self.scene.camera.turned(degrees);
+    }
+
+    /// How the prepared frame is drawn: `"quads"` or `"tiles"`.
+    pub fn rasterizer(&self) -> Option<&'static str> {
+        self.frame.as_ref().map(|frame| frame.drawing.rasterizer())
+    }
+
+    /// Bytes of GPU memory that the view holds, with the volume's, which other views may share: without those it is that less
+    /// [`GpuVolume::gpu_bytes`]. All of it is given back when view and volume are dropped and what was submitted is done. A buffer that
+    /// a frame needs no more than a part of is kept, at most 4 times as large as a new view's; textures always fit.
+    pub fn gpu_bytes(&self) -> u64 {
+        self.frame.as_ref().map_or(self.volume.gpu_bytes(), PreparedFrame::gpu_bytes)
+    }
+
+    /// Asks for the counts of the frame that was last recorded and submitted; `None` without one. They arrive when the device is
+    /// polled after the frame is done; nothing waits. Once per frame.
+    pub fn counts(&mut self) -> Option<PendingCounts> {
+        let (volume, frame) = (&self.volume, self.frame.as_mut()?);
+        let staging = frame.staging.take()?;
+        let PreparedFrame { drawing, totals, view, .. } = frame;
+        let totals = totals.get_or_insert_with(|| volume.totals(view, &drawing.group_slabs())).clone();
+        Some(PendingCounts::new(totals, staging))
+    }
+}
