@@ -1,18 +1,18 @@
 //! MGH files, as FreeSurfer writes them, plain (`.mgh`) or gzipped (`.mgz`): a binary header of 284 bytes, big-endian, then the
 //! samples. What follows these, parameters of the scan and a history, has no bearing on the volume.
 
-use std::collections::BTreeMap;
 use std::io::BufRead;
 use std::path::Path;
 
 use glam::{DMat3, DVec3};
 
 use super::VolumeError;
+use super::access::Access;
 use super::loaded::Loaded;
 use super::orientation::Orientation;
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
 use super::shear::{self, Lattice};
-use super::source::{Source, invalid, io_error};
+use super::source::{invalid, io_error};
 
 /// Bytes before the samples.
 const HEADER: u64 = 284;
@@ -25,8 +25,8 @@ const TYPES: [(i32, SampleType); 4] =
 const DIRECTIONS: &str = "x_ras, y_ras, z_ras";
 
 /// Reads a file with one frame.
-pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
-    let mut file = Source::open(path)?;
+pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+    let mut file = access.open(path)?;
     let is_gzip = file.reader.fill_buf().map_err(io_error(path))?.starts_with(&[0x1f, 0x8b]);
     let mut stream = if is_gzip { Stream::gzip(file)? } else { Stream::raw(file)? };
     let header = Header(stream.bytes(HEADER)?);
@@ -56,16 +56,10 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
     // The centre is that of voxel `dims / 2`, half a voxel beyond the middle of the centres.
     let origin = center - DMat3::from_cols(steps[0], steps[1], steps[2]) * (dims.as_dvec3() / 2.0);
     let samples = Samples { kind, dims, big_endian: true, rescale: None, z_fastest: false };
-    let loaded = Loaded {
-        dims,
-        kind,
-        spacing: Some(lattice.spacing),
-        unit: Some("mm".to_owned()),
-        orientation: Some(Orientation { axes: lattice.axes, origin }),
-        label_names: BTreeMap::new(),
-        values: stream.samples(&samples, true)?,
-    };
-    lattice.straighten(path, DIRECTIONS, loaded)
+    let orientation = Some(Orientation { axes: lattice.axes, origin });
+    let (spacing, unit) = (Some(lattice.spacing), Some("mm".to_owned()));
+    let loaded = Loaded { spacing, unit, orientation, ..Loaded::new(dims, kind, stream.samples(&samples, true)?) };
+    lattice.straighten(path, DIRECTIONS, loaded, access)
 }
 
 /// A header's bytes.

@@ -1,6 +1,8 @@
 //! Scalar volumes: extent, spacing and values, without any appearance.
 
+mod access;
 pub mod builtin;
+mod data_files;
 #[cfg(feature = "dicom")]
 mod dicom;
 mod fields;
@@ -9,6 +11,7 @@ mod format;
 mod grid;
 mod labels;
 mod loaded;
+mod memory;
 #[cfg(feature = "metaimage")]
 mod metaimage;
 #[cfg(feature = "mgh")]
@@ -17,7 +20,10 @@ mod mgh;
 mod nifti;
 #[cfg(feature = "npy")]
 mod npy;
+#[cfg(feature = "npy")]
+mod npz;
 mod nrrd;
+mod numbers;
 mod orientation;
 mod raw;
 mod samples;
@@ -37,6 +43,8 @@ use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
 
+pub(crate) use access::Access;
+pub use access::ReadOptions;
 pub use grid::Grid;
 pub use labels::Labels;
 use loaded::Loaded;
@@ -101,6 +109,7 @@ pub struct Volume {
     orientation: Option<Orientation>,
     unit: Option<String>,
     encoding: Option<Encoding>,
+    palette: Option<Vec<(f64, DVec3)>>,
 }
 
 impl Volume {
@@ -124,8 +133,17 @@ impl Volume {
         }
         let grid = Grid { dims, spacing: DVec3::ONE };
         let label_names = BTreeMap::new();
-        Self { grid, values, labels: None, label_names, orientation: None, unit: None, encoding: None }
-            .with_spacing(origin, spacing)
+        let volume = Self {
+            grid,
+            values,
+            labels: None,
+            label_names,
+            orientation: None,
+            unit: None,
+            encoding: None,
+            palette: None,
+        };
+        volume.with_spacing(origin, spacing)
     }
 
     /// The same values at another spacing (world units per voxel step).
@@ -144,19 +162,33 @@ impl Volume {
     }
 
     /// Reads a volume file. Its format is told by its first bytes, or else by the extension: NRRD (`.nrrd`, `.nhdr`), and, each
-    /// with the feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MetaImage (`.mha`, `.mhd`), NPY (`.npy`), TIFF
+    /// with the feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MetaImage (`.mha`, `.mhd`), NPY (`.npy`, and its
+    /// archives `.npz`: their one array, or the one named as in `file.npz:name`), TIFF
     /// (`.tif`, `.tiff`), DICOM (`.dcm`) and VTK (`.vti`, `.vtk`). Or a folder of slices: TIFF files of one page, or DICOM files of one
     /// series.
     ///
     /// # Errors
-    /// If the file cannot be read, is of no format that is compiled in, or does not hold what its header promises.
+    /// If the file cannot be read, is of no format that is compiled in, does not hold what its header promises, or would take more memory
+    /// than [`ReadOptions::memory`] allows by default.
     pub fn open(path: &Path) -> Result<Self, VolumeError> {
-        let (format, Loaded { dims, kind: sample_type, spacing, unit, orientation, label_names, values }) =
-            format::read(path)?;
+        Self::open_with(path, &ReadOptions::default())
+    }
+
+    /// As [`Self::open`], with a choice of the folder that files must lie in and of the memory limit.
+    ///
+    /// # Errors
+    /// As [`Self::open`], and if the file, or one that its header names, is not in the folder.
+    pub fn open_with(path: &Path, options: &ReadOptions) -> Result<Self, VolumeError> {
+        Self::read(path, &Access::new(options)?)
+    }
+
+    pub(crate) fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
+        let (format, loaded) = format::read(path, access)?;
+        let Loaded { dims, kind: sample_type, spacing, unit, orientation, palette, label_names, values } = loaded;
         let origin = path.display().to_string();
         let volume = Self::new(&origin, dims, spacing.unwrap_or(DVec3::ONE), values)?;
         let encoding = Some(Encoding { format, sample_type });
-        Self { unit, encoding, label_names, ..volume }.with_orientation(&origin, orientation)
+        Self { unit, encoding, palette, label_names, ..volume }.with_orientation(&origin, orientation)
     }
 
     /// Where the voxels are.
@@ -182,6 +214,11 @@ impl Volume {
     /// How the file held the values; `None` if they come from no file.
     pub fn encoding(&self) -> Option<Encoding> {
         self.encoding
+    }
+
+    /// The colours, red, green and blue in [0, 1], that the file gives to values, ascending by value; `None` if it has no palette.
+    pub fn palette(&self) -> Option<&[(f64, DVec3)]> {
+        self.palette.as_deref()
     }
 
     /// All values, x fastest, then y, then z.

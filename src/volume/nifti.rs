@@ -5,18 +5,18 @@
 //! must end where the samples end. Where headers in use break the standard's rules, they are read as nibabel and ITK read them. Of
 //! complex samples the magnitude is the value.
 
-use std::collections::BTreeMap;
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DQuat, DVec3, UVec3};
 
 use super::VolumeError;
+use super::access::Access;
 use super::loaded::Loaded;
 use super::orientation::Orientation;
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
 use super::shear::{self, Lattice};
-use super::source::{Source, invalid, io_error};
+use super::source::{invalid, io_error};
 
 /// Numbers of the format's data types, and bits of each.
 const TYPES: [(i64, SampleType); 10] = [
@@ -39,9 +39,9 @@ const COMPLEX_TYPES: [(i64, SampleType); 2] = [(32, SampleType::F32), (1792, Sam
 const SFORM: &str = "srow_x, srow_y, srow_z";
 
 /// Reads a file, or the two files of a pair by the name of either.
-pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
+pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let header_path = sibling(path, ".img", ".hdr").unwrap_or_else(|| path.to_owned());
-    let mut stream = open(&header_path)?;
+    let mut stream = open(&header_path, access)?;
     let header = Header::read(&header_path, &mut stream)?;
     let (dims, vox_offset) = (header.dims()?, header.vox_offset()?);
     let (kind, is_complex) = header.sample_type()?;
@@ -55,29 +55,35 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
                 "that of a single file, or a name with .hdr",
             ));
         };
-        stream = open(&data)?;
+        stream = open(&data, access)?;
     }
     stream.skip(vox_offset)?;
     let samples = Samples { kind, dims, big_endian: header.big_endian, rescale, z_fastest: false };
     let values = if is_complex {
         log::warn!("{}: the samples are complex: the values are their magnitudes", path.display());
-        magnitudes(&header, &samples, stream)?
+        magnitudes(&header, &samples, stream, access)?
     } else {
         stream.samples(&samples, false)?
     };
     let (spacing, unit) = (Some(lattice.spacing), header.unit());
-    let loaded = Loaded { dims, kind, spacing, unit, orientation, label_names: BTreeMap::new(), values };
-    lattice.straighten(path, SFORM, loaded)
+    let loaded = Loaded { spacing, unit, orientation, ..Loaded::new(dims, kind, values) };
+    lattice.straighten(path, SFORM, loaded, access)
 }
 
 /// The magnitudes of complex samples, each a real and an imaginary part. Slope and intercept count before: those of the parts, and
 /// the intercept of the real one.
-fn magnitudes<T: Voxel>(header: &Header, samples: &Samples, stream: Stream) -> Result<Vec<T>, VolumeError> {
+fn magnitudes<T: Voxel>(
+    header: &Header,
+    samples: &Samples,
+    stream: Stream,
+    access: &Access,
+) -> Result<Vec<T>, VolumeError> {
     let UVec3 { x, y, z } = samples.dims;
     let dims = dims_of([2 * u64::from(x), y.into(), z.into()])
         .ok_or_else(|| header.invalid("dim", samples.dims, "at most 2147483647 complex voxels"))?;
     let parts: Vec<f32> = stream.samples(&Samples { dims, rescale: None, ..*samples }, false)?;
     let [slope, intercept] = samples.rescale.unwrap_or([1.0, 0.0]);
+    samples.reserve::<T>(&header.path, access)?;
     let mut values = Vec::new();
     for &[real, imaginary] in parts.as_chunks().0 {
         let magnitude = (f64::from(real) * slope + intercept).hypot(f64::from(imaginary) * slope);
@@ -93,8 +99,8 @@ fn sibling(path: &Path, from: &str, to: &str) -> Option<PathBuf> {
     Some(path.with_file_name(format!("{}{to}{gz}", stem.strip_suffix(from)?)))
 }
 
-fn open(path: &Path) -> Result<Stream, VolumeError> {
-    let mut file = Source::open(path)?;
+fn open(path: &Path, access: &Access) -> Result<Stream, VolumeError> {
+    let mut file = access.open(path)?;
     let is_gzip = file.reader.fill_buf().map_err(io_error(path))?.starts_with(&[0x1f, 0x8b]);
     if is_gzip { Stream::gzip(file) } else { Stream::raw(file) }
 }
@@ -229,7 +235,7 @@ impl Header {
 
     fn dims(&self) -> Result<UVec3, VolumeError> {
         let [rank, x, y, z, rest @ ..] = self.dim;
-        let more = usize::try_from(rank - 3).ok().and_then(|more| rest.get(..more));
+        let more = rank.checked_sub(3).and_then(|more| usize::try_from(more).ok()).and_then(|more| rest.get(..more));
         let is_one_volume = more.is_some_and(|sizes| sizes.iter().all(|&size| size == 1));
         dims_of([x, y, z]).filter(|_| is_one_volume).ok_or_else(|| {
             self.invalid("dim", format!("{:?}", self.dim), format!("3 to 7, then {SIZES}, and any further sizes 1"))

@@ -11,6 +11,7 @@ use glam::{DMat3, DVec3, UVec3};
 use rayon::prelude::*;
 
 use super::VolumeError;
+use super::access::Access;
 use super::loaded::Loaded;
 use super::orientation::{MAX_COSINE, lengths_and_directions};
 use super::samples::{Voxel, dims_of};
@@ -114,6 +115,7 @@ impl Lattice {
         path: &Path,
         field: &str,
         loaded: Loaded<T>,
+        access: &Access,
     ) -> Result<Loaded<T>, VolumeError> {
         let Some(shear) = self.shear else { return Ok(loaded) };
         let ranges = shear.ranges(loaded.dims);
@@ -127,6 +129,8 @@ impl Lattice {
             invalid(path, field, format!("axes sheared by {degrees:.2}°, {found}"), allowed)
         };
         let Some(dims) = dims else { return Err(too_many(format!("an orthogonal grid of {sizes:?} voxels"))) };
+        let bytes = u64::from(dims.element_product()) * size_of::<T>() as u64;
+        access.reserve(path, field, format!("an orthogonal grid of {dims} voxels"), bytes)?;
         let mut values = Vec::new();
         let reserved = values.try_reserve_exact(dims.element_product() as usize);
         reserved.map_err(|error| too_many(format!("an orthogonal grid of {dims} voxels: {error}")))?;
@@ -231,27 +235,20 @@ fn cell(place: f64, samples: u32) -> Option<(usize, f64)> {
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "tests")]
 mod tests {
-    use std::collections::BTreeMap;
-
+    use super::super::ReadOptions;
     use super::super::orientation::Orientation;
     use super::super::samples::SampleType;
     use super::*;
 
     fn loaded<T>(dims: UVec3, lattice: &Lattice, origin: DVec3, values: Vec<T>) -> Loaded<T> {
-        Loaded {
-            dims,
-            kind: SampleType::F32,
-            spacing: Some(lattice.spacing),
-            unit: None,
-            orientation: Some(Orientation { axes: lattice.axes, origin }),
-            label_names: BTreeMap::new(),
-            values,
-        }
+        let orientation = Some(Orientation { axes: lattice.axes, origin });
+        Loaded { spacing: Some(lattice.spacing), orientation, ..Loaded::new(dims, SampleType::F32, values) }
     }
 
     fn straighten<T: Voxel>(dims: UVec3, steps: [DVec3; 3], values: Vec<T>) -> Loaded<T> {
         let lattice = Lattice::of(steps).unwrap();
-        lattice.straighten(Path::new("here"), "axes", loaded(dims, &lattice, DVec3::ZERO, values)).unwrap()
+        let access = Access::new(&ReadOptions::default()).unwrap();
+        lattice.straighten(Path::new("here"), "axes", loaded(dims, &lattice, DVec3::ZERO, values), &access).unwrap()
     }
 
     /// The places of a grid's voxels, x fastest.
@@ -366,10 +363,18 @@ mod tests {
         refused([DVec3::X, DVec3::Y, DVec3::splat(f64::NAN)], "NaN");
         // Fine columns, and slices far apart: a grid of mostly holes.
         let lattice = Lattice::of([1e-3 * DVec3::X, DVec3::Y, DVec3::new(1.0, 0.0, 1.0)]).unwrap();
-        let dims = UVec3::new(2, 1, 9);
         let loaded = loaded(dims, &lattice, DVec3::ZERO, vec![0.0_f32; 18]);
-        let error = lattice.straighten(Path::new("here"), "axes", loaded).err().unwrap().to_string();
+        let refused = |lattice: Lattice, options: ReadOptions| {
+            let loaded = loaded(UVec3::new(2, 1, 9), &lattice, DVec3::ZERO, vec![0.0_f32; 18]);
+            let access = Access::new(&options).unwrap();
+            lattice.straighten(Path::new("here"), "axes", loaded, &access).err().unwrap().to_string()
+        };
+        let error = refused(lattice, ReadOptions::default());
         let expected = "here: axes: found axes sheared by 45.00°, an orthogonal grid of [8002.0, 1.0, 9.0] voxels";
         assert!(error.starts_with(expected), "{error}");
+        // And one that takes too much memory.
+        let lattice = Lattice::of([DVec3::X, DVec3::Y, DVec3::new(1.0, 0.0, 1.0)]).unwrap();
+        let error = refused(lattice, ReadOptions::default().with_memory(100));
+        assert!(error.contains("[10, 1, 9] voxels, which take 360 bytes of memory, allowed: at most"), "{error}");
     }
 }

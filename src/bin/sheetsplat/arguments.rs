@@ -12,6 +12,7 @@ use sheetsplat::stats::Stats;
 use sheetsplat::volume::{self, Orientation, Volume};
 
 use crate::failure::Failure;
+use crate::reading::Reading;
 
 /// What to draw, and on which adapter.
 #[derive(clap::Args)]
@@ -26,6 +27,8 @@ pub(crate) struct Input {
     raw: Raw,
     #[command(flatten)]
     look: Look,
+    #[command(flatten)]
+    reading: Reading,
     /// The side of the patient to look at, where the volume's file says how the patient lies; in place of the scene's
     /// camera.direction and camera.up.
     #[arg(long, value_enum, value_name = "SIDE")]
@@ -42,7 +45,8 @@ struct Look {
     /// preset=NAME.
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Preset::ALL.map(|(name, _)| name)))]
     preset: Option<String>,
-    /// Colours over the values that show, in place of the scene's: short for --set transfer.colormap=NAME.
+    /// Colours over the values that show, or the palette of the volume's file, in place of the scene's: short for --set
+    /// transfer.colormap=NAME.
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Colormap::ALL.map(|(name, _)| name)))]
     colormap: Option<String>,
 }
@@ -122,7 +126,9 @@ impl Input {
         let sets = self.raw.sets().into_iter().chain(self.look.sets()).chain(sets.iter().cloned()).collect::<Vec<_>>();
         match self.name.strip_prefix("builtin:") {
             Some(name) => Scene::from_volume(VolumeSource::Builtin(name.to_owned()), &sets),
-            None if self.name.ends_with(".toml") => Scene::open(self.name.as_ref(), &sets),
+            None if self.name.ends_with(".toml") => {
+                Scene::open_with(self.name.as_ref(), &sets, &self.reading.options())
+            }
             None => Scene::from_volume(VolumeSource::File(self.name.clone().into()), &sets),
         }
     }
@@ -130,7 +136,7 @@ impl Input {
     /// Loads the scene's volume.
     pub(crate) fn load_volume(&self, scene: &Scene) -> Result<Volume, Failure> {
         let start = Instant::now();
-        let volume = scene.load_volume().map_err(|error| self.failure(error))?;
+        let volume = scene.load_volume_with(&self.reading.options()).map_err(|error| self.failure(error))?;
         log::info!("{}: {} voxels, loaded in {:.1?}", self.name, volume.grid().dims, start.elapsed());
         if self.view.is_some() && volume.orientation().is_some_and(Orientation::is_mirrored) {
             let name = &self.name;

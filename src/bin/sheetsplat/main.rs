@@ -11,6 +11,7 @@ mod failure;
 mod info;
 mod orbit;
 mod progress;
+mod reading;
 mod render;
 mod sweep;
 #[cfg(feature = "viewer")]

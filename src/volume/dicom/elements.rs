@@ -6,8 +6,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::super::VolumeError;
+use super::super::access::Access;
 use super::super::format::is_bare_dicom;
-use super::super::source::{Source, invalid};
+use super::super::source::invalid;
 use super::bytes::Bytes;
 use super::dataset::{Dataset, Tag, name, shown_tag, tags};
 
@@ -62,8 +63,8 @@ pub(super) enum PixelData {
 
 impl Elements {
     /// Reads what is before the pixels; what is behind them is not looked at.
-    pub(super) fn read(path: &Path) -> Result<Self, VolumeError> {
-        let (head, bytes) = Bytes::open(Source::open(path)?)?;
+    pub(super) fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
+        let (head, bytes) = Bytes::open(access.open(path)?)?;
         let mut parser = Parser {
             path: path.into(),
             bytes,

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::super::VolumeError;
+use super::super::access::Access;
 use super::super::samples::SampleType;
-use super::super::source::{Source, invalid, io_error};
+use super::super::source::{invalid, io_error};
 use super::codecs::Codec;
 use super::dataset::{Dataset, Tag, tags};
 use super::elements::{Elements, PixelData};
@@ -59,8 +60,8 @@ pub(super) struct Frame {
 
 impl Image {
     /// Reads what is before the pixels; `None` if the file is no image.
-    pub(super) fn open(path: &Path) -> Result<Option<Self>, VolumeError> {
-        let Elements { data, transfer_syntax, big_endian, pixels, mut rest } = Elements::read(path)?;
+    pub(super) fn open(path: &Path, access: &Access) -> Result<Option<Self>, VolumeError> {
+        let Elements { data, transfer_syntax, big_endian, pixels, mut rest } = Elements::read(path, access)?;
         let Some((tag, pixel_data)) = pixels else { return Ok(None) };
         if data.text(tags::MEDIA_SOP_CLASS).as_deref() == Some(DIRECTORY) {
             return Ok(None);
@@ -82,7 +83,10 @@ impl Image {
         pixels.check(&data, tag, &pixel_data, count, codec)?;
         let frames = frames(&data, count)?;
         let inflated = match &pixel_data {
-            PixelData::Native { bytes, .. } if rest.is_inflated() => Some(rest.read_up_to(*bytes)?),
+            PixelData::Native { bytes, .. } if rest.is_inflated() => {
+                access.reserve(path, "PixelData", format!("{count} inflated frames"), *bytes)?;
+                Some(rest.read_up_to(*bytes)?)
+            }
             _ => None,
         };
         Ok(Some(Self {
@@ -102,7 +106,7 @@ impl Image {
     }
 
     /// A frame's samples, in the machine's byte order.
-    pub(super) fn frame(&self, index: usize) -> Result<Vec<u8>, VolumeError> {
+    pub(super) fn frame(&self, index: usize, access: &Access) -> Result<Vec<u8>, VolumeError> {
         let Pixels { columns, rows, kind, .. } = self.pixels;
         let size = self.pixels.bytes();
         let mut bytes = match (&self.data, &self.inflated) {
@@ -111,11 +115,11 @@ impl Image {
                 self.check_read(of_frame.len(), size)?;
                 of_frame.to_vec()
             }
-            (&PixelData::Native { at, .. }, None) => self.read(&[[at + index as u64 * size, size]])?,
+            (&PixelData::Native { at, .. }, None) => self.read(&[[at + index as u64 * size, size]], access)?,
             (PixelData::Fragments(fragments), _) => {
                 // A single frame may be in several of them.
                 let of_frame = if self.frames.len() == 1 { fragments } else { &fragments[index..=index] };
-                let code = self.read(of_frame)?;
+                let code = self.read(of_frame, access)?;
                 self.codec.decode(code, [columns, rows], kind.bytes() as usize).map_err(|found| {
                     invalid(&self.path, "PixelData", found, format!("a frame of {columns} × {rows} {kind}"))
                 })?
@@ -129,8 +133,8 @@ impl Image {
     }
 
     /// The bytes of some stretches of the file, each given by its first byte and its length.
-    fn read(&self, stretches: &[[u64; 2]]) -> Result<Vec<u8>, VolumeError> {
-        let mut file = Source::open(&self.path)?;
+    fn read(&self, stretches: &[[u64; 2]], access: &Access) -> Result<Vec<u8>, VolumeError> {
+        let mut file = access.open(&self.path)?;
         let mut all = Vec::new();
         for &[at, bytes] in stretches {
             file.reader.seek(SeekFrom::Start(at)).map_err(io_error(&self.path))?;
