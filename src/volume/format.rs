@@ -188,9 +188,10 @@ fn read_folder<T: Voxel>(
             Some((format, true)) if is_of_slices(format) => format,
             other => {
                 let name = file.file_name().unwrap_or_default().to_string_lossy();
-                // Slices often have names without an extension.
-                let has_extension = name.contains('.');
-                if other.map_or(!has_extension, |(format, _)| is_of_slices(format)) {
+                // Slices often have names without an extension, or end with a number.
+                let extension = file.extension().unwrap_or_default().to_string_lossy();
+                let may_be_slice = !name.starts_with('.') && extension.bytes().all(|byte| byte.is_ascii_digit());
+                if other.map_or(may_be_slice, |(format, _)| is_of_slices(format)) {
                     left_out.push(name.into_owned());
                 }
                 continue;

@@ -21,6 +21,9 @@ use super::shear::{self, Lattice};
 use super::source::{MAX_HEADER, Source, invalid, io_error, lower, number, shown, three, vector};
 use super::unit;
 
+/// The field that may say that axes are not at right angles.
+const DIRECTIONS: &str = "space directions";
+
 /// Reads one NRRD file, or the detached header and the data file it names.
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let mut file = access.open(path)?;
@@ -43,9 +46,6 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
         None => Ok(loaded),
     }
 }
-
-/// The field that may say that axes are not at right angles.
-const DIRECTIONS: &str = "space directions";
 
 /// The fields of a header, under the format's first spelling of their names, its pairs of keys and values, and the names of the files in
 /// a list at its end.

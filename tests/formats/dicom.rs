@@ -229,9 +229,9 @@ fn tilted_gantries_are_sheared() {
     assert!(warnings[1].contains("sheared by 14.04°"), "{warnings:?}");
     // By more: on no line.
     let field = "ImagePositionPatient";
-    let found = "1 is 0.3000 mm off the line through the first and the last slice";
+    let found = "1, 0.3000 mm off the line through the first and the last slice";
     assert_refused(series(&off(&[0.0, 0.3, 0.0])), "series", field, found, "half a pixel of 0.5 mm");
-    let found = "1 is 0.4000 mm off the line";
+    let found = "1, 0.4000 mm off the line";
     assert_refused(series(&off(&[0.0, 0.9, 1.0])), "series", field, found, "half a pixel of 0.5 mm");
 
     // Slices tilted about x that are stacked along z.
@@ -272,11 +272,13 @@ fn folders_hold_files_without_preamble_too() {
     let volume = Volume::open(folder.path()).unwrap();
     assert_eq!((volume.dims(), volume.spacing().z), (UVec3::new(3, 2, 3), 2.0));
     // What has the name of a slice and is none is not left out in silence; other files are.
-    fs::write(folder.path().join("IM9"), b"\x03\x00\x16\x07").unwrap();
+    for name in ["IM9", "1.2.840", ".DS_Store"] {
+        fs::write(folder.path().join(name), b"\x03\x00\x16\x07").unwrap();
+    }
     fs::write(folder.path().join("3.dcm"), b"\x00\x05\x16\x07").unwrap();
     fs::write(folder.path().join("notes.txt"), b"notes").unwrap();
     let (again, warnings) = warned(|| Volume::open(folder.path()).unwrap());
-    assert_warned(&warnings, "2 files do not begin as slices do and are left out: 3.dcm, IM9");
+    assert_warned(&warnings, "3 files do not begin as slices do and are left out: 1.2.840, 3.dcm, IM9");
     assert_eq!(again.values(), volume.values());
 }
 

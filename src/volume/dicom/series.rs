@@ -118,7 +118,7 @@ impl Series {
             let drift = sideways(&slices[last]) / last as f64;
             (off, slice) = farthest(drift);
             if off > STRAIGHT * pixel {
-                let found = format!("{} {off:.4} mm off the line through the first and the last slice", name(slice));
+                let found = format!("{}, {off:.4} mm off the line through the first and the last slice", name(slice));
                 return Err(invalid(
                     path,
                     POSITION,
