@@ -104,7 +104,7 @@ fn what_insists_on_tiles_is_refused_without() {
     refused(&subgroups, &quads, &["\"quads\"", "splatting.footprint_box", "\"parallelogram\"", "\"tiles\""]);
     let (volume, mut scene) = crowded();
     scene.splatting.rasterizer = Rasterizer::Tiles;
-    refused(&subgroups, &(volume, scene), &["bricks behind a tile", "\"quads\""]);
+    refused(&subgroups, &(volume, scene), &["bricks behind a patch", "\"quads\""]);
 }
 
 /// With nothing culled, and amounts that quads round to f16.

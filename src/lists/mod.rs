@@ -5,6 +5,6 @@ pub mod brick;
 pub mod bucket;
 pub mod classify;
 pub mod iso_range;
+pub mod patch_bins;
 pub mod quad_plan;
-pub mod tile_bins;
 pub mod value_list;

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use wgpu::Device;
 
-use super::way::{Way, check_rays, insists_on_tiles};
+use super::kind::{RasterizerKind, check_rays, insists_on_tiles};
 use crate::error::RenderError;
 use crate::geometry::kernel::Kernel;
 use crate::geometry::means;
@@ -33,7 +33,7 @@ pub(crate) struct FrameRequest {
     pub(crate) first_hit: Option<f64>,
     /// A host's surfaces, and the texel that is the image's first.
     pub(crate) surfaces: Option<(SurfaceDepths, [u32; 2])>,
-    pub(crate) way: Way,
+    pub(crate) way: RasterizerKind,
     /// Those of the compositing buffer.
     pub(crate) bands: Vec<Band>,
 }
@@ -60,7 +60,7 @@ impl FrameRequest {
             None => None,
         };
         Ok(Self {
-            way: Way::of(device, &splatting)?,
+            way: RasterizerKind::of(device, &splatting)?,
             covered: means::covered(&seen, grid, &splatting),
             kernel: Kernel::new(splatting.radius, splatting.falloff),
             ramps: Ramps::new(volume.transfer()),

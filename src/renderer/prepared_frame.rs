@@ -51,7 +51,7 @@ pub(crate) enum Drawing {
 
 /// What of a view's last frame the next one may take over.
 #[derive(Debug, Default)]
-pub(crate) struct Kept {
+pub(crate) struct PreviousFrame {
     pub(crate) drawing: Option<Drawing>,
     pub(crate) compositing: Option<CompositingBuffer>,
     pub(crate) uniform: Option<Buffer>,
@@ -64,7 +64,7 @@ pub(crate) struct Kept {
     pub(crate) staging: Option<Buffer>,
 }
 
-impl Kept {
+impl PreviousFrame {
     /// For a frame of `view`, drawn into sheets of such a format and number.
     pub(crate) fn of(frame: Option<PreparedFrame>, sheets: (TextureFormat, u32), view: &ViewGeometry) -> Self {
         let Some(old) = frame else { return Self::default() };

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, DVec4};
 use sheetsplat::headless::{Headless, readback};
-use sheetsplat::internals::gpu::layout::Group;
+use sheetsplat::internals::gpu::layout::SheetGroup;
 use sheetsplat::internals::gpu::targets::{BandBuffer, CompositingBuffer, Targets};
 use sheetsplat::internals::pass::composite::{Composite, CompositeBuffers, CompositeMode, RayMode};
 use sheetsplat::internals::quad_plan::{TILE, tile_grid};
@@ -106,7 +106,7 @@ impl Case {
         });
         let tiles = tile_list(device, &self.tiles);
         let uncut = Uncut::new(device);
-        let words = |usage| init(device, &[0_u32; size_of::<Group>() / 4], usage);
+        let words = |usage| init(device, &[0_u32; size_of::<SheetGroup>() / 4], usage);
         let buffers = CompositeBuffers {
             frame: &frame,
             groups: &words(BufferUsages::UNIFORM),

@@ -5,15 +5,16 @@ use sheetsplat::headless::Headless;
 use sheetsplat::internals::ClippedVoxels;
 use sheetsplat::internals::brick::{self, BrickList};
 use sheetsplat::internals::classify::classify;
-use sheetsplat::internals::gpu::layout::{Gathered, Part, Tally};
+use sheetsplat::internals::gpu::gathered_layout::GatheredLayout;
+use sheetsplat::internals::gpu::layout::{Gathered, PatchRange, Tally};
 use sheetsplat::internals::gpu::uniforms::{self, Ramps};
 use sheetsplat::internals::gpu::volume_texture::{SIDES, VolumeTexture};
 use sheetsplat::internals::means;
 use sheetsplat::internals::pass::composite::{CutBuffers, RayMode};
 use sheetsplat::internals::pass::gather::{Gather, GatherBuffers, GatherMode};
+use sheetsplat::internals::patch_bins::{self, BLOCKS, Passes, PatchBins, SHEETS};
 use sheetsplat::internals::reference;
 use sheetsplat::internals::reference::footprint::Footprint;
-use sheetsplat::internals::tile_bins::{self, Passes, SHEETS, TileBins, UNITS};
 use sheetsplat::scene::{Scene, TransferSettings};
 use sheetsplat::settings::Light;
 use sheetsplat::settings::Projection;
@@ -55,14 +56,14 @@ impl<'a> Fixture<'a> {
         Self { gpu, stage, seen: Seen::new(volume.grid(), scene), volume, transfer, bricks }
     }
 
-    fn bins(&self) -> TileBins {
+    fn bins(&self) -> PatchBins {
         let Seen { view, kernel, scene: Scene { splatting, .. }, .. } = &self.seen;
         let covered = means::covered(view, self.volume.grid(), splatting);
-        TileBins::new(self.bricks.bricks(), view, splatting.order, covered, kernel.support(), 0, u64::MAX).unwrap()
+        PatchBins::new(self.bricks.bricks(), view, splatting.order, covered, kernel.support(), 0, u64::MAX).unwrap()
     }
 
     /// Draws over `acc`, in bands of at most so many rows. The nearest group begins at `near`, where that is given.
-    fn draw(&self, bins: &TileBins, near: Option<f32>, acc: &[DVec4], band_rows: u32) -> Drawn {
+    fn draw(&self, bins: &PatchBins, near: Option<f32>, acc: &[DVec4], band_rows: u32) -> Drawn {
         let Self { gpu, stage, seen, volume, bricks, .. } = self;
         let (device, size) = (gpu.device(), seen.view.size);
         let bricks = bricks.bricks();
@@ -71,17 +72,18 @@ impl<'a> Fixture<'a> {
         let values = VolumeTexture::upload_folded(device, gpu.queue(), volume.values(), side);
         let grid = (volume.grid(), values.format);
         let frame = uniforms::frame(&seen.view, &seen.kernel, grid, &ramps, &seen.scene);
-        let mut gather = uniforms::gather(&seen.view, &seen.kernel, &seen.scene.splatting, bins, bricks.len() as u32);
+        let results = GatheredLayout::new(&seen.view, bins, bricks.len() as u32);
+        let mut gather = uniforms::gather(&seen.view, &seen.kernel, &seen.scene.splatting, bins, &results);
         gather.near = near.unwrap_or(gather.near);
-        let ([columns, _], tile_rows) = (tile_bins::grid(size), tile_bins::TILE[1]);
+        let ([columns, _], tile_rows) = (patch_bins::grid(size), patch_bins::PATCH[1]);
         let bands: Vec<(u32, u32)> =
             (0..size[1]).step_by(band_rows as usize).map(|first| (first, band_rows.min(size[1] - first))).collect();
-        let parts: Vec<Part> = bands
+        let ranges: Vec<PatchRange> = bands
             .iter()
-            .map(|&(first_row, rows)| Part {
+            .map(|&(first_row, rows)| PatchRange {
                 first_row,
-                first_tile: first_row / tile_rows * columns,
-                end_tile: (first_row / tile_rows + rows.div_ceil(tile_rows)) * columns,
+                first_patch: first_row / tile_rows * columns,
+                end_patch: (first_row / tile_rows + rows.div_ceil(tile_rows)) * columns,
             })
             .collect();
         let accs: Vec<_> = bands
@@ -93,9 +95,9 @@ impl<'a> Fixture<'a> {
             })
             .collect();
         let storage = |words: &[u32]| init(device, words, BufferUsages::STORAGE);
-        let words = gather.reached + bins.tiles * UNITS;
+        let words = gather.reached + bins.patches * BLOCKS;
         let gathered = storage(&vec![0; size_of::<Gathered>() / 4 + words as usize]);
-        let (parts_buffer, stride) = at_offsets(device, &parts);
+        let (ranges_buffer, stride) = at_offsets(device, &ranges);
         let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|half| half.as_vec2().to_array()).collect();
         let (uncut, cut) = (Uncut::new(device), uniforms::cut(&seen.view, volume.grid(), &seen.scene, None, None));
         let mode = GatherMode::of(
@@ -103,12 +105,12 @@ impl<'a> Fixture<'a> {
             seen.view.perspective.is_some(),
             [false, volume.holes() > 0],
             RayMode::default(),
-            bins.parts,
+            bins.workgroups,
         );
         let buffers = GatherBuffers {
             frame: &init(device, &[frame], BufferUsages::UNIFORM),
             gather: &init(device, &[gather], BufferUsages::UNIFORM),
-            parts: &parts_buffer,
+            patch_ranges: &ranges_buffer,
             bricks: &init(device, bricks, BufferUsages::STORAGE),
             starts: &storage(&bins.starts),
             entries: &storage(&bins.entries),
@@ -121,8 +123,8 @@ impl<'a> Fixture<'a> {
         };
         let bound: Vec<_> = accs.iter().map(|acc| stage.bind(device, mode, buffers, acc, bins.dispatches)).collect();
         compute(gpu, |pass| {
-            for (at, part) in parts.iter().enumerate() {
-                let tiles = part.end_tile - part.first_tile;
+            for (at, range) in ranges.iter().enumerate() {
+                let tiles = range.end_patch - range.first_patch;
                 stage.record(pass, &bound[at], at as u32 * stride, tiles);
             }
         });
@@ -206,15 +208,15 @@ fn sections() {
                 // What f32 makes of the near plane.
                 let depth = f64::from(first) * view.slabs.width - (f64::from(near) - f64::from(z));
                 let splat = reference::Splat { depth, ..splat };
-                let tiles = tile_bins::grid(view.size).iter().product::<u32>();
-                let bins = TileBins {
+                let tiles = patch_bins::grid(view.size).iter().product::<u32>();
+                let bins = PatchBins {
                     first_slab: first,
-                    tiles,
+                    patches: tiles,
                     groups: 1,
                     starts: (0..=tiles).collect(),
                     entries: vec![0; tiles as usize],
                     half_boxes: vec![view.half_box(kernel.support(), 0.0..1.0)],
-                    parts: 1,
+                    workgroups: 1,
                     passes: fixture.bins().passes,
                     dispatches: 1,
                 };
@@ -374,7 +376,7 @@ fn dispatches_and_bands_change_no_more_than_rounding() {
         let dispatches = bins.groups;
         for (most, rows) in [(one_group + 1000, u32::MAX), (one_group, 32), (bins.passes.most, 64)] {
             let passes = Passes { most, ..bins.passes };
-            let first = TileBins { passes, dispatches: 1, ..bins.clone() };
+            let first = PatchBins { passes, dispatches: 1, ..bins.clone() };
             let is_same = |drawn: &Drawn| {
                 // Voxels are added in another order where a dispatch finds anew what it could have kept.
                 let pairs = drawn.acc.iter().zip(&whole.acc);
@@ -382,7 +384,7 @@ fn dispatches_and_bands_change_no_more_than_rounding() {
             };
             let is_cut = !is_same(&fixture.draw(&first, None, &fixture.empty(), rows));
             assert_eq!(is_cut, most < bins.passes.most, "one dispatch of {most} passes");
-            let parts = fixture.draw(&TileBins { dispatches, ..first }, None, &fixture.empty(), rows);
+            let parts = fixture.draw(&PatchBins { dispatches, ..first }, None, &fixture.empty(), rows);
             // What is behind opaque pixels alone is not even fetched, or fetched in another dispatch.
             let tally = Tally { bricks_visited: whole.tally.bricks_visited, ..parts.tally };
             assert!(is_same(&parts), "{compositing:?}, {order:?}, {rows} rows");
@@ -408,7 +410,7 @@ fn the_least_is_looked_for_behind_all_bricks() {
     let bricks = bins.starts.windows(2).map(|group| group[1] - group[0]).max().unwrap();
     let passes = Passes { most: bins.passes.per_group + bricks * bins.passes.per_brick, ..bins.passes };
     let middle = |dispatches| {
-        let bins = TileBins { passes, dispatches, ..bins.clone() };
+        let bins = PatchBins { passes, dispatches, ..bins.clone() };
         fixture.draw(&bins, None, &fixture.empty(), u32::MAX).acc[8 * 17 + 8]
     };
     // What is not there is kept as 2, less opacity.

@@ -4,7 +4,7 @@
 use bytemuck::Zeroable;
 use glam::{DVec3, DVec4, UVec3};
 use sheetsplat::headless::{Headless, readback};
-use sheetsplat::internals::gpu::layout::Group;
+use sheetsplat::internals::gpu::layout::SheetGroup;
 use sheetsplat::internals::gpu::targets::{CompositingBuffer, Targets};
 use sheetsplat::internals::gpu::uniforms;
 use sheetsplat::internals::pass::composite::{Composite, CompositeBuffers, CompositeMode, CutBuffers, RayMode};
@@ -78,10 +78,10 @@ fn composited(
     let targets = Targets::new(device, view.size, wgpu::TextureFormat::Rgba32Float, LAYERS).unwrap();
     let bands = CompositingBuffer::bands(&device.limits(), view.size).unwrap();
     let compositing_buffer = CompositingBuffer::new(device, view.size, &bands);
-    let uniform = |slab: i32| Group {
+    let uniform = |slab: i32| SheetGroup {
         near: view.slabs.plane(slab) as f32,
         number: ((slab - slabs(seen).start) / LAYERS as i32 + 1) as u32,
-        ..Group::zeroed()
+        ..SheetGroup::zeroed()
     };
     let (group_buffer, stride) = at_offsets(device, &groups.iter().map(|group| uniform(group.0)).collect::<Vec<_>>());
     let [columns, rows] = tile_grid(view.size);

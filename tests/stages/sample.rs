@@ -40,7 +40,7 @@ fn kernels_one_by_one() {
 
             let view = &seen.view;
             let table = FootprintTable::new(form, &seen.kernel, view.section_width());
-            let group = layout::Group { near: view.slabs.plane(0) as f32, ..layout::Group::zeroed() };
+            let group = layout::SheetGroup { near: view.slabs.plane(0) as f32, ..layout::SheetGroup::zeroed() };
             let mode = SampleMode { form, compositing };
             let count = order.len() as u32;
             let records: Vec<_> = kernels.iter().map(|kernel| kernel.record).collect();

@@ -144,7 +144,7 @@ impl<'a> Fixture<'a> {
         let device = self.gpu.device();
         let near = self.view.slabs.plane(first_slab) as f32;
         // Not at the first offset.
-        let of = |near| layout::Group { near, ..layout::Group::zeroed() };
+        let of = |near| layout::SheetGroup { near, ..layout::SheetGroup::zeroed() };
         let (groups, offset) = at_offsets(device, &[of(1e9), of(near)]);
         let args = init(device, &[indirect(instances.len() as u32)], BufferUsages::INDIRECT | BufferUsages::STORAGE);
         let tiles = tile_list(device, tiles);

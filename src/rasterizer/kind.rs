@@ -15,14 +15,14 @@ pub(super) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;
 
 /// How to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Way {
+pub(crate) enum RasterizerKind {
     Quads,
     /// If the view fits.
     Tiles,
     Samples,
 }
 
-impl Way {
+impl RasterizerKind {
     /// That of some settings.
     ///
     /// # Errors
