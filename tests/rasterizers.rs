@@ -15,6 +15,7 @@ use sheetsplat::settings::{FootprintBox, FootprintForm, Method, Order, Rasterize
 use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::{Features, Limits};
 
+use common::compare::assert_at_least;
 use common::images::{BLACK, psnr};
 use common::{BY_AMOUNTS, RASTERIZERS, Random, gpu, lavapipe, scene, transfer};
 
@@ -133,7 +134,7 @@ fn rasterizers_agree() {
         });
         let decibels = psnr(&quads.pixels, &tiles.pixels, BLACK, 250);
         println!("{decibels:.1} dB");
-        assert!(decibels >= 80.0, "{decibels:.1} dB: {scene:?}");
+        assert_at_least(decibels, 80.0, format_args!("{scene:?}"));
     }
 }
 

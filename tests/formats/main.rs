@@ -9,6 +9,8 @@ mod metaimage;
 mod nifti;
 mod npy;
 mod raw;
+#[path = "../common/shared.rs"]
+mod shared;
 mod tiff;
 mod vtk;
 
@@ -18,6 +20,8 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DVec3, UVec3};
 use sheetsplat::volume::{Orientation, Volume, VolumeError};
 use tempfile::TempDir;
+
+use shared::shared;
 
 /// Of every fixture.
 const DIMS: UVec3 = UVec3::new(5, 4, 3);

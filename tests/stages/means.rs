@@ -17,6 +17,7 @@ use sheetsplat::settings::{Compositing, Method, Order};
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::{self, BufferUsages};
 
+use crate::common::compare::apart;
 use crate::common::{BY_MEANS, Random, SPACINGS, gpu, pixels, random_eye, scene};
 use crate::section::Seen;
 use crate::{Uncut, at_offsets, compute, contents, frame_over, init, tile_list};
@@ -191,7 +192,7 @@ fn any_sheets_of_any_view() {
                 compared += 1;
                 lit += usize::from(expected.w > 0.0 && expected != DVec4::W * 2.0);
                 // A few ULP of the ray's own numbers, and of sums that the length of a short ray divides.
-                let error = (actual - expected).abs().max_element() / expected.abs().max_element().max(1.0);
+                let error = apart(actual, expected) / expected.abs().max_element().max(1.0);
                 off += usize::from(error > 2e-4);
             }
             assert!(
