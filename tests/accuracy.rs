@@ -16,13 +16,13 @@ use common::compare::assert_at_least;
 use common::images::{largest_difference, psnr};
 use common::{camera, scene, transfer};
 
-/// What a sheet is made of and drawn into, and the PSNR that is asked for, dB. Tiles have their sheets in registers, and amounts
-/// that are not rounded to f16.
-const VARIANTS: [(&str, Rasterizer, FootprintForm, TextureFormat, f64); 4] = [
-    ("summed-area, tiles", Rasterizer::Tiles, FootprintForm::SummedArea, TextureFormat::Rgba32Float, 90.0),
-    ("summed-area, Rgba32Float", Rasterizer::Quads, FootprintForm::SummedArea, TextureFormat::Rgba32Float, 60.0),
-    ("sections, Rgba32Float", Rasterizer::Quads, FootprintForm::Sections, TextureFormat::Rgba32Float, 45.0),
-    ("summed-area, Rgba16Float", Rasterizer::Quads, FootprintForm::SummedArea, TextureFormat::Rgba16Float, 45.0),
+/// What a sheet is made of and drawn into, and the PSNR that is asked for at every spacing, dB. Tiles have their sheets in registers, and
+/// amounts that are not rounded to f16.
+const VARIANTS: [(&str, Rasterizer, FootprintForm, TextureFormat, [f64; SPACINGS.len()]); 4] = [
+    ("summed-area, tiles", Rasterizer::Tiles, FootprintForm::SummedArea, TextureFormat::Rgba32Float, [111.0; 4]),
+    ("summed-area, Rgba32Float", Rasterizer::Quads, FootprintForm::SummedArea, TextureFormat::Rgba32Float, [88.0; 4]),
+    ("sections, Rgba32Float", Rasterizer::Quads, FootprintForm::Sections, TextureFormat::Rgba32Float, [64.0, 63.5, 71.0, 62.5]),
+    ("summed-area, Rgba16Float", Rasterizer::Quads, FootprintForm::SummedArea, TextureFormat::Rgba16Float, [60.0, 60.0, 62.0, 59.0]),
 ];
 const COMPOSITINGS: [Compositing; 2] = [Compositing::Linear, Compositing::Exponential];
 const SPACINGS: [[f64; 3]; 4] = [[1.0, 1.0, 1.0], [1.0, 1.0, 2.0], [3.2, 3.2, 1.5], [1.0, 1.0, 5.0]];
@@ -91,7 +91,7 @@ fn psnr_against_the_twin() {
     for (v, (name, .., required)) in VARIANTS.into_iter().enumerate() {
         for (c, s) in (0..COMPOSITINGS.len()).flat_map(|c| (0..SPACINGS.len()).map(move |s| (c, s))) {
             let what = format_args!("{name}, {:?}, {:?}", COMPOSITINGS[c], SPACINGS[s]);
-            assert_at_least(worst[v][c][s].psnr, required, what);
+            assert_at_least(worst[v][c][s].psnr, required[s], what);
         }
     }
 }

@@ -119,7 +119,7 @@ fn groups_change_nothing_but_rounding() {
         let [one, two, four] = [0, 1, 2].map(|at| render(&renderers[at], &volume, &scene));
         for (few, many) in [(&one, &two), (&two, &four)] {
             let difference = largest_difference(&few.image, &many.image);
-            assert_at_most(difference, ROUNDING, format_args!("case {case}"));
+            assert_at_most(difference, 1e-6, format_args!("case {case}"));
             let [few, many] = [few, many].map(|rendering| rendering.stats.counts);
             assert_eq!(few.sections_rasterized, many.sections_rasterized, "case {case}");
             assert!(few.quads >= many.quads);

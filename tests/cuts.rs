@@ -228,7 +228,7 @@ fn walls() {
         // Through the face.
         let difference = largest_difference(&between.0, &none.0);
         println!("{rasterizer:?}: {hidden}, {cut}, {all} sections, difference {difference}");
-        assert_at_least(difference, 0.3, format_args!("{rasterizer:?}, {projection:?}"));
+        assert_at_least(difference, 0.5, format_args!("{rasterizer:?}, {projection:?}"));
     }
 }
 
@@ -268,7 +268,7 @@ fn cuts_are_exact_along_rays() {
         let whole: Vec<[f32; 4]> = pixels.iter().map(|at| whole.pixels[(at.y * 120 + at.x) as usize]).collect();
         let unclipped = psnr(&whole, &ray_march::pixels(&volume, &transfer, &scene, &pixels).unwrap(), BLACK, 100);
         println!("{normal:?} {d}, {projection:?}: {decibels:.1} dB, {unclipped:.1} dB of the whole volume");
-        assert_at_least(decibels, 38.0, format_args!("{normal:?} {d}, {projection:?}"));
+        assert_at_least(decibels, 47.0, format_args!("{normal:?} {d}, {projection:?}"));
     }
 }
 

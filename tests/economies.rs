@@ -80,13 +80,13 @@ fn the_twin_economises_alike() {
                 let what = format!("{name}, {:?}, {economies:?}", scene.splatting);
                 // Where a footprint ends it drops to 0: rounding may take a pixel on the rim in or out.
                 let worst = largest_difference(&ours.image, &expected);
-                assert_at_most(worst, 1e-3 + economies.resolution, &what);
-                assert_at_least(decibels(&ours.image, &expected), 75.0, &what);
+                assert_at_most(worst, 2e-4 + economies.resolution / 8.0, &what);
+                assert_at_least(decibels(&ours.image, &expected), 104.0, &what);
                 let drawn = ours.stats.counts.sections_rasterized;
                 assert!(drawn > 0 && drawn < everything, "{drawn} of {everything} sections: {what}");
                 if projection == orthographic && compositing == Compositing::Linear {
                     let saved = largest_difference(&expected, &plain);
-                    assert_at_least(saved, 1e-4, format_args!("nothing was saved: {what}"));
+                    assert_at_least(saved, 4.5e-3, format_args!("nothing was saved: {what}"));
                 }
             }
         }

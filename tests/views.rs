@@ -71,8 +71,8 @@ fn any_view_is_that_of_the_twin() {
             let worst = &mut worst[at][scene.splatting.method as usize];
             *worst = worst.min(decibels);
             assert_at_least(decibels, 75.0, format_args!("case {case}, {rasterizer:?} with {scene:?}"));
-            // Per sheet a subtraction, a product and a sum of numbers up to 1, in either order.
-            let allowed = 6.0 * F32 * counts.sheets as f64;
+            // Per sheet a subtraction, a product and a sum of numbers up to 1, in either order, whose roundings have either sign.
+            let allowed = 1.5 * F32 * counts.sheets as f64;
             let difference = largest_difference(&forwards.image, &backwards.image);
             assert_at_most(difference, allowed, format_args!("case {case}, {rasterizer:?} with {scene:?}"));
         }

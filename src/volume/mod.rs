@@ -13,8 +13,8 @@ mod loaded;
 mod metaimage;
 #[cfg(feature = "nifti")]
 mod nifti;
-#[cfg(feature = "npy")]
-mod npy;
+#[cfg(any(feature = "codecs", feature = "npy"))]
+pub(crate) mod npy;
 mod nrrd;
 mod orientation;
 mod raw;

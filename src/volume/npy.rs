@@ -27,7 +27,7 @@ const TYPES: [(&str, SampleType); 10] = [
 ];
 
 /// Reads the array of one file.
-pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
+pub(crate) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
     let mut stream = Stream::raw(Source::open(path)?)?;
     let samples = parse(path, &header(path, &mut stream)?)?;
     let Samples { dims, kind, .. } = samples;

@@ -23,13 +23,13 @@ use super::{Grid, VolumeError};
 pub(super) const MAX_EXPANSION: u64 = 1032;
 
 /// A number as a file has it.
-pub(super) trait Sample: Copy {
+pub(crate) trait Sample: Copy {
     fn to_f32(self) -> f32;
     fn to_f64(self) -> f64;
 }
 
 /// What samples become.
-pub(super) trait Voxel: Copy {
+pub(crate) trait Voxel: Copy {
     const ALLOWED: &'static str;
 
     /// `None` if the sample is not allowed.
@@ -268,7 +268,7 @@ impl Stream {
     }
 
     /// So many bytes of a header.
-    #[cfg(any(feature = "nifti", feature = "npy", feature = "vtk"))]
+    #[cfg(any(feature = "codecs", feature = "nifti", feature = "npy", feature = "vtk"))]
     pub(super) fn bytes(&mut self, bytes: u64) -> Result<Vec<u8>, VolumeError> {
         let mut header = Vec::new();
         let read = self.read_up_to(bytes, &mut header)?;

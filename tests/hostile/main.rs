@@ -1,10 +1,11 @@
-//! Mutated files: every reader, and the scene parser, give a whole volume or an error, do not panic or hang, and take no more memory
-//! than the file's size warrants.
+//! Mutated files: every reader, of images too, and the scene parser give a whole result or an error, do not panic or hang, and take no
+//! more memory than the file's size warrants.
 //!
 //! One test, since the allocator counts for the whole process. `tests/fuzz` looks for more where this stops.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod images;
 mod mutate;
 mod promises;
 
@@ -168,9 +169,11 @@ fn damaged_files_are_volumes_or_errors() {
     let folder = tempfile::tempdir().unwrap();
     promises::are_refused(folder.path());
     let mut random = Random::new();
-    for (what, least, count) in
-        [("files", FILES, mutate_files(&mut random)), ("scenes", SCENES, mutate_scenes(&mut random))]
-    {
+    for (what, least, count) in [
+        ("files", FILES, mutate_files(&mut random)),
+        ("scenes", SCENES, mutate_scenes(&mut random)),
+        ("images", images::FILES, images::mutated(&mut random)),
+    ] {
         let Count { inputs, accepted } = count;
         println!("{what}: {accepted} of {inputs} accepted");
         assert!(inputs >= least);

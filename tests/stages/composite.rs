@@ -48,7 +48,7 @@ fn tolerance(compositing: Compositing, alpha: f64, most: f64) -> f64 {
         Compositing::Exponential => alpha.powi(6) / 720.0,
         _ => 0.0,
     };
-    exp_error + 10.0 * F32 * most
+    exp_error + 5.0 * F32 * most
 }
 
 /// One case: sheets over a compositing buffer.

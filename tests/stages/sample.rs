@@ -91,7 +91,8 @@ fn kernels_one_by_one() {
             for (pixel, (actual, (expected, tolerance))) in drawn.iter().zip(&expected).enumerate() {
                 let error = apart(*actual, *expected);
                 let what = format_args!("pixel {pixel}: {actual}, not {expected}, {:?}", seen.scene);
-                assert_at_most(error, *tolerance, what);
+                // The kernels' errors have either sign: together they come to far less than all their bounds.
+                assert_at_most(error, 0.2 * tolerance, what);
                 worst = worst.max(error / tolerance.max(1e-300));
                 lit += usize::from(expected.w > 0.0);
             }

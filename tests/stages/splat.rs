@@ -224,7 +224,8 @@ fn summed_area_sections() {
     let mut lit = 0;
     for_random_sections(FootprintForm::SummedArea, &[0.25, 1.0, 3.7], |fixture, splat, k, sheet| {
         let expected = fixture.twin(&[*splat], k);
-        let tolerance = fixture.tolerance(splat, k);
+        // A thousandth is what SPEC §4 allows; the table is four times as good.
+        let tolerance = fixture.tolerance(splat, k) / 4.0;
         fixture.assert_close(sheet, &expected, |_| tolerance, &format!("{splat:?} in slab {k}"));
         lit += expected.iter().filter(|pixel| pixel.w > 0.0).count();
     });
@@ -353,7 +354,7 @@ fn pixels_just_inside_the_rim_are_drawn() {
                 assert!(expected > 0.01 * fixture.whole(), "{expected} is not worth testing");
                 match form {
                     FootprintForm::SummedArea => {
-                        assert_at_most((actual - expected).abs(), 1e-3 * fixture.whole(), "just inside the rim");
+                        assert_at_most((actual - expected).abs(), 4e-6 * fixture.whole(), "just inside the rim");
                     }
                     // Bilinear between the last texel inside and 0 on the rim.
                     FootprintForm::Sections => assert!(actual > 0.0 && actual < expected, "{actual} {expected}"),
@@ -451,7 +452,8 @@ fn instances_add_up() {
             let tolerance = |pixel: usize| {
                 let here = twins.iter().filter(|twin| fixture.rho(twin, pixel) <= 2.0);
                 // Each has its own error, and the sum so far is rounded when it is added.
-                here.map(|twin| fixture.tolerance(twin, k) + F32 * most).sum()
+                // These have either sign, and mostly are far below what one may have.
+                here.map(|twin| fixture.tolerance(twin, k) / 100.0 + F32 * most).sum()
             };
             fixture.assert_close(&sheet, &expected, tolerance, "many splats");
         }
@@ -505,7 +507,7 @@ fn listed_tiles_are_zeroed_and_no_others() {
                         } else {
                             // Every addition is rounded to what an f32 of that size can hold.
                             let error = apart(*actual - f64::from(stale(at)), clean);
-                            assert_at_most(error, 40.0 * 65536.0 * F32, name);
+                            assert_at_most(error, 4.0 * 65536.0 * F32, name);
                         }
                     }
                 }
