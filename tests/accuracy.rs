@@ -21,8 +21,20 @@ use common::{camera, scene, transfer};
 const VARIANTS: [(&str, Rasterizer, FootprintForm, TextureFormat, [f64; SPACINGS.len()]); 4] = [
     ("summed-area, tiles", Rasterizer::Tiles, FootprintForm::SummedArea, TextureFormat::Rgba32Float, [111.0; 4]),
     ("summed-area, Rgba32Float", Rasterizer::Quads, FootprintForm::SummedArea, TextureFormat::Rgba32Float, [88.0; 4]),
-    ("sections, Rgba32Float", Rasterizer::Quads, FootprintForm::Sections, TextureFormat::Rgba32Float, [64.0, 63.5, 71.0, 62.5]),
-    ("summed-area, Rgba16Float", Rasterizer::Quads, FootprintForm::SummedArea, TextureFormat::Rgba16Float, [60.0, 60.0, 62.0, 59.0]),
+    (
+        "sections, Rgba32Float",
+        Rasterizer::Quads,
+        FootprintForm::Sections,
+        TextureFormat::Rgba32Float,
+        [64.0, 63.5, 71.0, 62.5],
+    ),
+    (
+        "summed-area, Rgba16Float",
+        Rasterizer::Quads,
+        FootprintForm::SummedArea,
+        TextureFormat::Rgba16Float,
+        [60.0, 60.0, 62.0, 59.0],
+    ),
 ];
 const COMPOSITINGS: [Compositing; 2] = [Compositing::Linear, Compositing::Exponential];
 const SPACINGS: [[f64; 3]; 4] = [[1.0, 1.0, 1.0], [1.0, 1.0, 2.0], [3.2, 3.2, 1.5], [1.0, 1.0, 5.0]];

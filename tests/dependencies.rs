@@ -105,7 +105,9 @@ fn one(words: &mut Words<'_>, allowed: &dyn Fn(&str) -> bool) -> bool {
 #[test]
 fn expressions_of_licences() {
     let allowed = |name: &str| ["A", "B", "C WITH D"].contains(&name);
-    for expression in ["A", "X OR A", "X/A", "A AND B", "(X OR A) AND B", "X OR (A AND (B OR Y))", "C WITH D", "X AND Y OR A"] {
+    for expression in
+        ["A", "X OR A", "X/A", "A AND B", "(X OR A) AND B", "X OR (A AND (B OR Y))", "C WITH D", "X AND Y OR A"]
+    {
         assert!(is_allowed(expression, &allowed), "{expression}");
     }
     for expression in ["X", "A AND X", "(A OR B) AND X", "C", "A WITH D", "A AND (X OR Y)"] {

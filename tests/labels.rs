@@ -229,7 +229,7 @@ fn check(gpu: &Headless, name: &str, volume: &Volume, scene: &Scene) {
         let drawn = gpu.render_volume(volume.clone(), &scene).unwrap();
         assert_eq!(drawn.stats.counts.voxels_in_range, counts.voxels_in_range, "{name}");
         // Quads keep a voxel's amounts as f16, tiles as f32.
-        let allowed = if rasterizer == Rasterizer::Quads { 1e-3 } else { 1e-4 };
+        let allowed = if rasterizer == Rasterizer::Quads { 4.8e-4 } else { 4.8e-5 };
         assert_at_most(largest_difference(&drawn.image, &expected), allowed, &name);
         scene.splatting.culling = true;
         let culled = gpu.render_volume(volume.clone(), &scene).unwrap();
@@ -295,7 +295,7 @@ fn labels_of_every_sample_are_the_twins() {
     scene.splatting.method = Method::CompositeEverySample;
     let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
     let drawn = gpu.render_volume(volume, &scene).unwrap();
-    assert_at_most(largest_difference(&drawn.image, &expected), 1e-3, "every sample");
+    assert_at_most(largest_difference(&drawn.image, &expected), 2.5e-4, "every sample");
 }
 
 /// More voxels than a layer of the texture holds, with labels where the next one begins.

@@ -54,7 +54,7 @@ fn webgpu_default_limits_and_no_features() {
             let images = [&least, &full].map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap().image);
             let decibels = compare::decibels(rms(&images[0], &images[1]));
             // Sheets are f16 there, and footprints drawn by quads.
-            assert_at_least(decibels, 45.0, format_args!("{compositing:?} {footprint:?}"));
+            assert_at_least(decibels, 52.0, format_args!("{compositing:?} {footprint:?}"));
             // Culling's guarantee holds for f16 sheets, too: what is drawn is drawn as without culling. A colour may pass
             // its alpha by an f16 rounding.
             scene.splatting.culling = true;
@@ -148,10 +148,10 @@ fn small_bindings_split_voxels_and_image() {
                 let renderings = [&small, &full].map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap());
                 assert_same_work(&renderings[0].stats.counts, &renderings[1].stats.counts);
                 let largest = largest_difference(&renderings[0].image, &renderings[1].image);
-                // The lists change the order in which a sheet's footprints are added: no more than 64 of them meet in a
-                // pixel of a sheet. What that changes in a sheet's amount changes the image no more.
+                // The lists change the order in which a sheet's footprints are added. What that changes in a sheet's amount, by
+                // roundings of either sign, changes the image no more.
                 let sheets = renderings[1].stats.counts.sheets as f64;
-                assert_at_most(largest, 64.0 * F32 * sheets, format_args!("{bytes} bytes {compositing:?}"));
+                assert_at_most(largest, 0.4 * F32 * sheets, format_args!("{bytes} bytes {compositing:?}"));
             }
         }
         // With culling every list's bricks are culled by what all lists drew: the guarantee holds.
@@ -380,6 +380,6 @@ fn a_volume_larger_than_a_binding_is_rendered_with_webgpus_default_limits() {
     let [alone, end] = &images;
     assert_eq!(alone.stats.counts.voxels_in_range, end.stats.counts.voxels_in_range);
     // Slabs lie elsewhere.
-    assert_at_most(largest_difference(&alone.image, &end.image), 0.05, "the same voxels");
+    assert_at_most(largest_difference(&alone.image, &end.image), 1.4e-3, "the same voxels");
     assert!(end.image.pixels.iter().any(|pixel| pixel[0] > 0.2), "something is to be seen");
 }

@@ -99,7 +99,7 @@ fn fine_structures() {
 /// A solid head, and a translucent one.
 #[test]
 fn heads() {
-    let volume = Arc::new(builtin::volume("head:128").unwrap());
+    let volume = Arc::new(builtin::volume("head:96").unwrap());
     for (opacity, least) in [(1.0, 30.0), (0.05, 30.0)] {
         let mut scene = scene(320, 320);
         scene.camera.direction = glam::DVec3::new(0.4, 0.9, -0.3);

@@ -153,13 +153,13 @@ impl UniformSlab {
             mean_alpha += weight * alpha;
             mean_depth += weight * depth;
         }
-        // A thousandth is what the issue asks for; amounts are stored as f16, which may take up half of it.
+        // Amounts are stored as f16, whose roundings have either sign.
         let (alpha, depth) = (mean_alpha / weights, mean_depth / weights);
         let expected_alpha = 1.0 - (-expected).exp();
         let name =
             format!("axis {}, spacing {}, direction {direction}, slab width {slab_width}", self.axis, self.spacing);
-        assert_at_most((alpha / expected_alpha - 1.0).abs(), 1e-3, format_args!("{name}: alpha"));
-        assert_at_most((depth / expected - 1.0).abs(), 1e-3, format_args!("{name}: depth"));
+        assert_at_most((alpha / expected_alpha - 1.0).abs(), 1.4e-4, format_args!("{name}: alpha"));
+        assert_at_most((depth / expected - 1.0).abs(), 1e-4, format_args!("{name}: depth"));
     }
 }
 
@@ -209,7 +209,9 @@ fn exponential_alpha_does_not_depend_on_the_slab_width() {
             // before it, and two roundings per sheet.
             let step = 2.0_f64.powi(-19);
             let finest = slab_width.min(1.0);
-            let tolerance = 2.0 * step / finest + 4.0 * F32 * sheets as f64;
+            let all = 2.0 * step / finest + 4.0 * F32 * sheets as f64;
+            // They have either sign, and are never all there at once.
+            let tolerance = 0.15 * all;
             let worst = largest(alpha(&image).iter().zip(&reference).map(|(a, b)| a - b));
             assert_at_most(worst, tolerance, format_args!("{rasterizer:?} {slab_width}, spacing {spacing}"));
         }
@@ -235,8 +237,8 @@ fn back_to_front_equals_front_to_back() {
         scene.splatting.order = Order::BackToFront;
         let (back_to_front, _) = render(&gpu, &volume, &scene);
         let difference = largest_difference(&front_to_back, &back_to_front);
-        // Per sheet a subtraction, a product and a sum of numbers up to 1, in either order.
-        let tolerance = 6.0 * F32 * sheets as f64;
+        // Per sheet a subtraction, a product and a sum of numbers up to 1, in either order, whose roundings have either sign.
+        let tolerance = 0.8 * F32 * sheets as f64;
         assert_at_most(difference, tolerance, format_args!("{compositing:?} {form:?} {projection:?}"));
     }
 }
@@ -285,7 +287,8 @@ fn constant_colour_is_constant_colour_times_alpha() {
                 let alpha = f64::from(pixel[3]);
                 for (channel, color) in pixel.iter().zip(color) {
                     let tolerance = rounding * color * alpha + 4.0 * F32 * sheets as f64;
-                    let what = format_args!("{rasterizer:?} {compositing:?} slab width {slab_width} pixel {i}: {pixel:?}");
+                    let what =
+                        format_args!("{rasterizer:?} {compositing:?} slab width {slab_width} pixel {i}: {pixel:?}");
                     assert_at_most((f64::from(*channel) - color * alpha).abs(), tolerance, what);
                 }
             }

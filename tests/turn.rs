@@ -47,5 +47,5 @@ fn image_aligned_sheets_do_not_pop() {
         largest_change(&gpu, &volume, &scene)
     });
     println!("{image_aligned:.2e}, {axis_aligned:.2e}, {:.1}", axis_aligned / image_aligned);
-    assert_at_least(axis_aligned / image_aligned, 10.0, "how much more axis-aligned sheets pop");
+    assert_at_least(axis_aligned / image_aligned, 15.0, "how much more axis-aligned sheets pop");
 }

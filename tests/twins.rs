@@ -17,7 +17,7 @@ use sheetsplat::volume::{Volume, builtin};
 
 use common::compare::{assert_at_least, assert_at_most, largest};
 use common::images::{largest_difference, rms};
-use common::{BY_AMOUNTS, Random, camera, scene, transfer};
+use common::{BY_AMOUNTS, F32, Random, camera, scene, transfer};
 
 const METHODS: [Method; 3] = [Method::ImageAligned, Method::AxisAligned, Method::CompositeEverySample];
 
@@ -68,7 +68,7 @@ fn a_far_eye_is_orthographic() {
                 rms(&orthographic, &render(&volume, &scene))
             });
             println!("{spacing:?} {method:?} {compositing:?}: {differences:.6?}");
-            assert_at_most(differences[0], 0.02, format_args!("{spacing:?} {method:?} {compositing:?}"));
+            assert_at_most(differences[0], 0.011, format_args!("{spacing:?} {method:?} {compositing:?}"));
             let rates = [differences[0] / differences[1], differences[1] / differences[2]];
             assert!(
                 rates.iter().all(|rate| (1.8..2.2).contains(rate)),
@@ -128,7 +128,7 @@ fn a_headlight_shines_from_the_eye() {
             * 30.0_f64.to_radians().tan();
         let cosine = (1.0 + offset.length_squared()).sqrt().recip();
         assert!(pixel[3] > 0.9999, "pixel {at} shows the wall alone");
-        assert_at_most((f64::from(pixel[0]) - cosine).abs(), 2e-3, format_args!("pixel {at}"));
+        assert_at_most((f64::from(pixel[0]) - cosine).abs(), 6e-4, format_args!("pixel {at}"));
     }
 }
 
@@ -153,7 +153,7 @@ fn minified_kernels_keep_their_amount() {
         };
         // Two grid units to a pixel, and one to 13.
         let (minified, magnified) = (total(20), total(521));
-        assert_at_most((minified / magnified - 1.0).abs(), 5e-3, format_args!("{method:?} {direction:?}"));
+        assert_at_most((minified / magnified - 1.0).abs(), 2.7e-4, format_args!("{method:?} {direction:?}"));
     }
 }
 
@@ -182,8 +182,8 @@ fn axis_aligned_equals_image_aligned_along_an_axis() {
             let errors = errors(&image_aligned, &axis_aligned);
             let worst = |channel: usize| largest(errors.iter().skip(channel).step_by(4).copied());
             println!("{spacing} {direction:?}: alpha {:.1e}, red {:.1e}, blue {:.1e}", worst(3), worst(0), worst(2));
-            assert_at_most(worst(3), 1e-6, format_args!("alpha, {spacing} {direction:?}"));
-            assert_at_most(worst(0).max(worst(2)), 5e-3, format_args!("colours, {spacing} {direction:?}"));
+            assert_at_most(worst(3), 2.0 * F32, format_args!("alpha, {spacing} {direction:?}"));
+            assert_at_most(worst(0).max(worst(2)), 3.6e-3, format_args!("colours, {spacing} {direction:?}"));
             assert!(image_aligned.pixels.iter().any(|pixel| pixel[3] > 0.5));
         }
     }
@@ -226,7 +226,7 @@ fn back_to_front_equals_front_to_back() {
             });
             let difference = largest_difference(&forwards, &backwards);
             // The images are f32.
-            assert_at_most(difference, 1e-6, format_args!("{method:?} {compositing:?}"));
+            assert_at_most(difference, 2.0 * F32, format_args!("{method:?} {compositing:?}"));
             by_method.push(forwards);
         }
     }
@@ -235,8 +235,8 @@ fn back_to_front_equals_front_to_back() {
     for (a, b) in [(image_aligned, axis_aligned), (axis_aligned, every_sample), (image_aligned, every_sample)] {
         let differences: Vec<f64> = (0..4).map(|at| largest_difference(&a[at], &b[at])).collect();
         println!("linear and exponential differ by {differences:.4?}");
-        differences.iter().for_each(|&difference| assert_at_least(difference, 1e-3, "the methods differ"));
-        assert_at_most(largest_difference(&a[4], &b[4]), 1e-5, "orthographic sums are those of whole kernels");
+        differences.iter().for_each(|&difference| assert_at_least(difference, 3.7e-3, "the methods differ"));
+        assert_at_most(largest_difference(&a[4], &b[4]), 2.0 * F32, "orthographic sums are those of whole kernels");
     }
 }
 
@@ -257,7 +257,7 @@ fn every_sample_is_composited_by_itself() {
         let [red, _, blue, alpha] = render(&volume, &scene).pixels[0].map(f64::from);
         let expected = [amount, amount * (1.0 - amount), amount + amount * (1.0 - amount)];
         let worst = largest([red, blue, alpha].iter().zip(expected).map(|(a, b)| a - b));
-        assert_at_most(worst, 1e-6, format_args!("{order:?}: {red} {blue} {alpha}, not {expected:?}"));
+        assert_at_most(worst, 1.5 * F32, format_args!("{order:?}: {red} {blue} {alpha}, not {expected:?}"));
     }
 }
 
@@ -310,7 +310,7 @@ fn the_near_plane_cuts_kernels() {
             let part = if before > 0.0 { kernel.section(0.0, -before / stretch, 2.0) * stretch } else { 0.0 };
             let alpha = f64::from(render(&volume, &scene).pixels[0][3]);
             let what = format_args!("{spacing:?} {method:?} near {before} before: {alpha}");
-            assert_at_most((alpha - 0.3 * part).abs(), 1e-6, what);
+            assert_at_most((alpha - 0.3 * part).abs(), 0.5 * F32, what);
             let counts = reference::count(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
             assert_eq!(counts.voxels_in_range, u64::from(before > 0.0));
             if method == Method::ImageAligned {

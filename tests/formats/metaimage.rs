@@ -1,6 +1,5 @@
 //! MetaImage, as ITK writes it.
 
-
 use crate::*;
 
 const RAS_FROM_LPS: DVec3 = DVec3::new(-1.0, -1.0, 1.0);

@@ -47,7 +47,8 @@ pub(crate) fn mutated(random: &mut Random) -> Count {
             fs::remove_file(path).unwrap();
             fs::write(path, &mutant).unwrap();
             let what = format!("{}, mutant {round}", path.file_name().unwrap().display());
-            let pixels = |result: &Result<Picture, _>| result.as_ref().map_or(0, |picture| 16 * picture.image.pixels.len());
+            let pixels =
+                |result: &Result<Picture, _>| result.as_ref().map_or(0, |picture| 16 * picture.image.pixels.len());
             match bounded(&what, mutant.len() * PER_BYTE / 4, || Picture::open(path), pixels) {
                 Ok(Picture { image, .. }) => {
                     assert_eq!(image.pixels.len(), image.width as usize * image.height as usize, "{what}");

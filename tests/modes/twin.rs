@@ -76,7 +76,11 @@ fn any_view_is_that_of_the_twin() {
                 // Quads round amounts to f16.
                 let share = share_off(&image.pixels, &expected.image.pixels, 2e-3);
                 *off += share / CASES as f64;
-                assert_at_most(share, 8.0 * OUTLIERS, format_args!("case {case}, {rasterizer:?}: pixels with {scene:?}"));
+                assert_at_most(
+                    share,
+                    8.0 * OUTLIERS,
+                    format_args!("case {case}, {rasterizer:?}: pixels with {scene:?}"),
+                );
                 assert_eq!(hits.len(), expected.first_hits.len());
                 let is_close = |(hit, expected): &(&f64, &f64)| {
                     hit == expected || (**hit - **expected).abs() / expected.abs().max(10.0) <= 1e-3
