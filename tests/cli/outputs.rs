@@ -159,7 +159,7 @@ fn the_reference_backend_agrees_with_the_gpu() {
         for rasterizer in RASTERIZERS {
             let (.., gpu) = folder.pixels(&format!("{SMALL} {sets} {UNCULLED} {rasterizer}"));
             let decibels = psnr(&gpu, &reference, BLACK, 50);
-            assert_at_least(decibels, 60.0, format_args!("{sets} {rasterizer}"));
+            assert_at_least(decibels, 82.0, format_args!("{sets} {rasterizer}"));
         }
     }
     folder.render(&format!("{SMALL} --backend reference -o out.png --stats stats.json"));
@@ -180,7 +180,7 @@ fn shared_quarter_head_agrees_with_the_reference() {
         for rasterizer in RASTERIZERS {
             let (.., gpu) = folder.pixels(&format!("{render} {UNCULLED} {rasterizer}"));
             let decibels = psnr(&gpu, &reference, BLACK, 50);
-            assert_at_least(decibels, 60.0, format_args!("{view} {rasterizer}"));
+            assert_at_least(decibels, 80.0, format_args!("{view} {rasterizer}"));
         }
     }
 }

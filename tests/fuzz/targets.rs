@@ -10,7 +10,7 @@ use sheetsplat::golden::Picture;
 use sheetsplat::volume::{RawLayout, SampleType, Volume, VolumeError};
 
 /// What takes an input, by its name.
-pub const TARGETS: [(&str, fn(&[u8])); 13] = [
+pub(crate) const TARGETS: [(&str, fn(&[u8])); 13] = [
     ("nrrd", |bytes| volume("volume.nrrd", bytes, Volume::open)),
     ("nifti", |bytes| volume("volume.nii", bytes, Volume::open)),
     ("metaimage", |bytes| volume("volume.mha", bytes, Volume::open)),
@@ -33,7 +33,7 @@ static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| {
 });
 
 /// Removes the temporary files of this process.
-pub fn clean_up() {
+pub(crate) fn clean_up() {
     _ = fs::remove_dir_all(&*FOLDER);
 }
 
