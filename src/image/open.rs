@@ -73,7 +73,7 @@ fn min_bits_per_pixel(format: ImageFormat, bytes: &[u8]) -> u64 {
     if format != ImageFormat::Png {
         return 3 * 16;
     }
-    let Some(&[depth, color]) = bytes.get(24..26).and_then(|fields| fields.as_array()) else { return 1 };
+    let Some(&[depth, color]) = bytes.get(24..26) else { return 1 };
     let channels = match color {
         2 => 3,
         4 => 2,

@@ -65,7 +65,7 @@ pub(crate) fn mutated(random: &mut Random) -> Count {
 /// Gives the chunks of a PNG the checksums that their contents have.
 fn mend_checksums(bytes: &mut [u8]) {
     let mut at = 8;
-    while let Some(&length) = bytes.get(at..at + 4).and_then(|length| length.as_array()) {
+    while let Some(&length) = bytes.get(at..).and_then(|rest| rest.first_chunk()) {
         let end = at.saturating_add(8 + u32::from_be_bytes(length) as usize);
         let Some(chunk) = bytes.get(at + 4..end) else { return };
         let mut crc = flate2::Crc::new();
