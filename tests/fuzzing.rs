@@ -33,6 +33,7 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
         "nrrd" => &["nrrd", "nhdr"],
         "nifti" => &["nii"],
         "metaimage" => &["mha"],
+        "mgh" => &["mgh"],
         "npy" => &["npy"],
         "tiff" => &["tif"],
         "dicom" => &["dcm"],

@@ -6,8 +6,7 @@ use std::path::Path;
 use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
 use super::{Format, Image, ImageError};
-use crate::volume::VolumeError;
-use crate::volume::npy;
+use crate::volume::{Access, ReadOptions, VolumeError, npy};
 
 /// No byte of a PNG or EXR file becomes more bytes: of what these compress by, deflate compresses best.
 const MAX_EXPANSION: u64 = 1032;
@@ -51,8 +50,9 @@ impl Image {
 
     /// An array of rows of pixels of channels, which the reader of volumes takes for slices of rows of voxels.
     fn decode_npy(path: &Path) -> Result<Self, ImageError> {
-        let array = npy::read::<f32>(path).map_err(|error| match error {
-            VolumeError::Io { path, source } => ImageError::Io { path, source },
+        let read = || npy::read::<f32>(path, &Access::new(&ReadOptions::default())?);
+        let array = read().map_err(|error| match error {
+            VolumeError::Io { path, source, .. } => ImageError::Io { path, source },
             VolumeError::Invalid { field, found, allowed, .. } => content(path, &field, found, allowed),
         })?;
         let [channels, width, height] = array.dims.to_array();

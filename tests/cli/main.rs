@@ -10,6 +10,7 @@ mod common;
 mod compare;
 mod errors;
 mod extremes;
+mod files;
 mod info;
 mod inputs;
 mod looks;

@@ -10,10 +10,12 @@ use sheetsplat::golden::Picture;
 use sheetsplat::volume::{RawLayout, SampleType, Volume, VolumeError};
 
 /// What takes an input, by its name.
-pub(crate) const TARGETS: [(&str, fn(&[u8])); 13] = [
+pub(crate) const TARGETS: [(&str, fn(&[u8])); 15] = [
     ("nrrd", |bytes| volume("volume.nrrd", bytes, Volume::open)),
     ("nifti", |bytes| volume("volume.nii", bytes, Volume::open)),
     ("metaimage", |bytes| volume("volume.mha", bytes, Volume::open)),
+    ("mgh", |bytes| volume("volume.mgh", bytes, Volume::open)),
+    ("npz", |bytes| volume("volume.npz", bytes, Volume::open)),
     ("npy", |bytes| volume("volume.npy", bytes, Volume::open)),
     ("raw", raw),
     ("tiff", |bytes| volume("volume.tif", bytes, Volume::open)),
@@ -50,6 +52,9 @@ fn file(name: &str, bytes: &[u8]) -> PathBuf {
 fn volume(name: &str, bytes: &[u8], open: impl Fn(&Path) -> Result<Volume, VolumeError>) {
     if let Ok(volume) = open(&file(name, bytes)) {
         assert_eq!(volume.values().len(), volume.dims().element_product() as usize);
+        let holes = volume.values().iter().filter(|value| value.is_nan()).count() as u64;
+        assert!(holes == volume.holes() && holes < volume.values().len() as u64);
+        assert!(!volume.values().iter().any(|value| value.is_infinite()));
     }
 }
 

@@ -59,6 +59,9 @@ def npy():
     numpy.save(path / "c.npy", PIXELS)
     numpy.save(path / "fortran-big.npy", numpy.asfortranarray(PIXELS.astype(">f4")))
     numpy.save(path / "doubles.npy", PIXELS.astype("f8"))
+    values = numpy.arange(24, dtype="i2").reshape(2, 3, 4)
+    numpy.savez(folder("npz") / "stored.npz", values)
+    numpy.savez_compressed(folder("npz") / "deflated.npz", a=values, b=values)
 
 
 def raw():
