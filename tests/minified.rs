@@ -100,7 +100,7 @@ fn fine_structures() {
 #[test]
 fn heads() {
     let volume = Arc::new(builtin::volume("head:96").unwrap());
-    for (opacity, least) in [(1.0, 30.0), (0.05, 30.0)] {
+    for (opacity, least) in [(1.0, 34.0), (0.05, 34.0)] {
         let mut scene = scene(320, 320);
         scene.camera.direction = glam::DVec3::new(0.4, 0.9, -0.3);
         scene.transfer =
