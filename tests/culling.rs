@@ -15,6 +15,7 @@ use sheetsplat::settings::Ramp;
 use sheetsplat::settings::{Compositing, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
 use sheetsplat::volume::{Volume, builtin};
 
+use common::compare::assert_at_most;
 use common::images::largest_difference;
 use common::{FORMS, RASTERIZERS, Random, SPACINGS, camera, lavapipe, random_eye, random_volume, scene, transfer};
 
@@ -78,7 +79,7 @@ fn culling_keeps_its_guarantee() {
             });
             let allowed = 1.0 - scene.splatting.opacity_threshold + ROUNDING;
             let difference = largest_difference(&with.image, &without.image);
-            assert!(difference <= allowed, "case {case}: {difference} > {allowed} with {scene:?}");
+            assert_at_most(difference, allowed, format_args!("case {case} with {scene:?}"));
             let [with, without] = [with, without].map(|rendering| rendering.stats.counts.sections_rasterized);
             assert!(with <= without, "case {case}: {with} sections, {without} without culling, with {scene:?}");
             *culled += usize::from(with < without);
@@ -118,7 +119,7 @@ fn groups_change_nothing_but_rounding() {
         let [one, two, four] = [0, 1, 2].map(|at| render(&renderers[at], &volume, &scene));
         for (few, many) in [(&one, &two), (&two, &four)] {
             let difference = largest_difference(&few.image, &many.image);
-            assert!(difference <= ROUNDING, "case {case}: {difference}");
+            assert_at_most(difference, 1e-6, format_args!("case {case}"));
             let [few, many] = [few, many].map(|rendering| rendering.stats.counts);
             assert_eq!(few.sections_rasterized, many.sections_rasterized, "case {case}");
             assert!(few.quads >= many.quads);
@@ -211,7 +212,7 @@ fn the_papers_simpler_tests() {
     let image = |test| reference::render_culled(&volume, &transfer, &scene, test).unwrap().image;
     let all = image(None);
     let allowed = 1.0 - scene.splatting.opacity_threshold;
-    assert!(largest_difference(&all, &image(Some(Test::Box))) <= allowed);
+    assert_at_most(largest_difference(&all, &image(Some(Test::Box))), allowed, "by the box");
     let by_center = largest_difference(&all, &image(Some(Test::Center)));
     assert!(by_center > 2.0 * allowed, "the centre's pixel alone is off by {by_center} only");
 }
@@ -237,8 +238,8 @@ fn what_the_rectangle_costs() {
         let render = |test| reference::render_culled(&volume, &transfer, &scene, test).unwrap();
         let [all, rectangle, parallelogram] = [None, Some(Test::Box), Some(Test::Parallelogram)].map(render);
         let allowed = 1.0 - scene.splatting.opacity_threshold;
-        assert!(largest_difference(&all.image, &rectangle.image) <= allowed);
-        assert!(largest_difference(&all.image, &parallelogram.image) <= allowed);
+        assert_at_most(largest_difference(&all.image, &rectangle.image), allowed, format_args!("{spacing:?}"));
+        assert_at_most(largest_difference(&all.image, &parallelogram.image), allowed, format_args!("{spacing:?}"));
         let cost = rectangle.sections as f64 / parallelogram.sections as f64;
         println!("{spacing:?} along {direction:?}: the rectangle lets through {cost:.3} times the sections");
         assert!(cost > 0.95);

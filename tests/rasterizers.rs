@@ -15,6 +15,7 @@ use sheetsplat::settings::{FootprintBox, FootprintForm, Method, Order, Rasterize
 use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::{Features, Limits};
 
+use common::compare::assert_at_least;
 use common::images::{BLACK, psnr};
 use common::{BY_AMOUNTS, RASTERIZERS, Random, gpu, lavapipe, scene, transfer};
 
@@ -114,7 +115,8 @@ fn rasterizers_agree() {
     let (volume, mut scene) = head();
     scene.splatting.culling = false;
     let mut random = Random(61);
-    for compositing in BY_AMOUNTS.into_iter().cycle().take(24) {
+    // Sums that are divided by their own alpha keep the least of what was not rounded.
+    for (compositing, required) in BY_AMOUNTS.into_iter().zip([80.0, 88.0, 92.0]).cycle().take(24) {
         scene.splatting.compositing = compositing;
         scene.splatting.order = random.pick(&[Order::FrontToBack, Order::BackToFront]);
         scene.splatting.method = random.pick(&[Method::ImageAligned, Method::AxisAligned]);
@@ -132,8 +134,7 @@ fn rasterizers_agree() {
             gpu.render_volume(volume.clone(), &scene).unwrap().image
         });
         let decibels = psnr(&quads.pixels, &tiles.pixels, BLACK, 250);
-        println!("{decibels:.1} dB");
-        assert!(decibels >= 80.0, "{decibels:.1} dB: {scene:?}");
+        assert_at_least(decibels, required, format_args!("{scene:?}"));
     }
 }
 

@@ -1,6 +1,9 @@
 //! Scene files, `--set` overrides and their errors; transfer functions, given and chosen.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+#[path = "common/shared.rs"]
+mod shared;
+
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -10,6 +13,8 @@ use sheetsplat::settings::{Camera, Projection};
 use sheetsplat::settings::{Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
 use sheetsplat::settings::{LabelTables, Ramp};
 use sheetsplat::settings::{Light, Shading};
+
+use shared::shared;
 
 const MINIMAL: &str = "[volume]\npath = 'a.nrrd'\n";
 
@@ -543,11 +548,12 @@ fn scene_files() {
 }
 
 #[test]
+#[ignore = "needs the shared data: SHEETSPLAT_SHARED=FOLDER"]
 fn shared_scenes() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
-    let Ok(entries) = folder.read_dir() else { return };
-    for path in entries.map(|entry| entry.unwrap().path()).filter(|path| path.extension().is_some_and(|e| e == "toml"))
-    {
+    let entries = shared("scenes").read_dir().unwrap().map(|entry| entry.unwrap().path());
+    let scenes: Vec<_> = entries.filter(|path| path.extension().is_some_and(|e| e == "toml")).collect();
+    assert!(!scenes.is_empty());
+    for path in scenes {
         let scene = Scene::open(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
         let VolumeSource::File(volume) = scene.volume else { panic!("{} has no file", path.display()) };
         assert!(volume.is_file(), "{}", volume.display());

@@ -18,8 +18,8 @@ mod metaimage;
 mod mgh;
 #[cfg(feature = "nifti")]
 mod nifti;
-#[cfg(feature = "npy")]
-mod npy;
+#[cfg(any(feature = "codecs", feature = "npy"))]
+pub(crate) mod npy;
 #[cfg(feature = "npy")]
 mod npz;
 mod nrrd;

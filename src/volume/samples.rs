@@ -24,13 +24,13 @@ use super::{Grid, VolumeError};
 pub(super) const MAX_EXPANSION: u64 = 1032;
 
 /// A number as a file has it.
-pub(super) trait Sample: Copy {
+pub(crate) trait Sample: Copy {
     fn to_f32(self) -> f32;
     fn to_f64(self) -> f64;
 }
 
 /// What samples become.
-pub(super) trait Voxel: Copy + Send + Sync {
+pub(crate) trait Voxel: Copy + Send + Sync {
     const ALLOWED: &'static str;
 
     /// A voxel that the file has no sample for.
@@ -326,7 +326,7 @@ impl Stream {
     }
 
     /// So many bytes of a header.
-    #[cfg(any(feature = "mgh", feature = "nifti", feature = "npy", feature = "vtk"))]
+    #[cfg(any(feature = "codecs", feature = "mgh", feature = "nifti", feature = "npy", feature = "vtk"))]
     pub(super) fn bytes(&mut self, bytes: u64) -> Result<Vec<u8>, VolumeError> {
         let mut header = Vec::new();
         let read = self.read_up_to(bytes, &mut header)?;

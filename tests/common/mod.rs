@@ -1,6 +1,8 @@
 //! What the tests share.
 
+pub(crate) mod compare;
 pub(crate) mod images;
+pub(crate) mod shared;
 pub(crate) mod surfaces;
 
 use glam::{DVec3, DVec4, UVec3};

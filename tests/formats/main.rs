@@ -11,6 +11,8 @@ mod mgh;
 mod nifti;
 mod npy;
 mod raw;
+#[path = "../common/shared.rs"]
+mod shared;
 mod shear;
 mod tiff;
 mod vtk;
@@ -23,6 +25,8 @@ use std::sync::Once;
 use glam::{DMat3, DVec3, UVec3};
 use sheetsplat::volume::{Orientation, Volume, VolumeError};
 use tempfile::TempDir;
+
+use shared::shared;
 
 /// Of every fixture.
 const DIMS: UVec3 = UVec3::new(5, 4, 3);

@@ -11,6 +11,7 @@ use sheetsplat::internals::reference::composite::composite;
 use sheetsplat::settings::{Compositing, Order};
 use sheetsplat::wgpu::{self, BufferUsages};
 
+use crate::common::compare::{apart, assert_at_most};
 use crate::common::{BY_AMOUNTS, F32, Random, gpu, gpu_with_small_bindings};
 use crate::{Uncut, compute, contents, frame, init, tile_list};
 
@@ -47,7 +48,7 @@ fn tolerance(compositing: Compositing, alpha: f64, most: f64) -> f64 {
         Compositing::Exponential => alpha.powi(6) / 720.0,
         _ => 0.0,
     };
-    exp_error + 10.0 * F32 * most
+    exp_error + 5.0 * F32 * most
 }
 
 /// One case: sheets over a compositing buffer.
@@ -156,12 +157,8 @@ impl Case {
             let most = expected.max_element().max(1.0);
             // The errors of sheets add up: none makes those before it larger.
             let tolerance: f64 = alphas().map(|alpha| tolerance(compositing, alpha, most)).sum();
-            assert!(
-                (*actual - *expected).abs().max_element() <= tolerance,
-                "{name}, pixel {x} {y}: sheets {:?}, acc {:?}: {actual}, not {expected} ± {tolerance}",
-                alphas().collect::<Vec<_>>(),
-                self.acc[i],
-            );
+            let what = format_args!("{name}, pixel {x} {y} over {:?}: {actual}, not {expected}", self.acc[i]);
+            assert_at_most(apart(*actual, *expected), tolerance, what);
         }
         // The masks say exactly what the compositing buffer holds; off the image all is opaque.
         let is_opaque = |x: u32, y: u32| {

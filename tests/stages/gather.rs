@@ -23,6 +23,7 @@ use sheetsplat::settings::{Ramp, TransferFunction};
 use sheetsplat::volume::{Grid, Volume};
 use sheetsplat::wgpu::BufferUsages;
 
+use crate::common::compare::{apart, assert_at_most, largest, root_mean_square};
 use crate::common::{BY_AMOUNTS, Random, camera, gpu, pixels, scene, transfer};
 use crate::section::{AMOUNT, KERNELS, Seen, VIEWS, view_scene};
 use crate::{Uncut, at_offsets, compute, contents, init};
@@ -330,15 +331,12 @@ fn frames() {
             }
             let fixture = Fixture::new(&gpu, &stage, scene, volume);
             let (actual, expected) = (fixture.draw_all().acc, fixture.twin());
-            assert!(actual.iter().chain(&expected).all(|pixel| pixel.is_finite()));
-            let errors: Vec<DVec4> =
-                actual.iter().zip(&expected).map(|(actual, expected)| *actual - *expected).collect();
-            let worst = errors.iter().map(|error| error.abs().max_element()).fold(0.0, f64::max);
-            let mean_square =
-                errors.iter().map(|error| error.length_squared()).sum::<f64>() / (4 * errors.len()) as f64;
+            let errors: Vec<f64> =
+                actual.iter().zip(&expected).flat_map(|(actual, expected)| (*actual - *expected).to_array()).collect();
             // Every kernel errs by less than 5e-6 of its peak, and mostly near its rim: too few of them meet in a pixel for more.
             let what = format!("{:?}, {:?}", fixture.seen.scene, fixture.seen.kernel);
-            assert!(worst < 1e-4 && mean_square < 1e-10, "{worst}, mean square {mean_square}: {what}");
+            assert_at_most(largest(errors.iter().copied()), 4e-5, &what);
+            assert_at_most(root_mean_square(errors), 5e-6, &what);
             lit += expected.iter().filter(|pixel| (0.01..0.99).contains(&pixel.w)).count();
         }
     }
@@ -380,7 +378,7 @@ fn dispatches_and_bands_change_no_more_than_rounding() {
             let is_same = |drawn: &Drawn| {
                 // Voxels are added in another order where a dispatch finds anew what it could have kept.
                 let pairs = drawn.acc.iter().zip(&whole.acc);
-                pairs.map(|(a, b)| (a - b).abs().max_element()).fold(0.0, f64::max) < 1e-5
+                largest(pairs.map(|(a, b)| apart(*a, *b))) < 1e-5
             };
             let is_cut = !is_same(&fixture.draw(&first, None, &fixture.empty(), rows));
             assert_eq!(is_cut, most < bins.passes.most, "one dispatch of {most} passes");
@@ -435,9 +433,8 @@ fn more_voxels_than_the_queue_holds() {
         // The queue has room for a few hundred voxels; two thirds of all are drawn.
         assert!(bricks * 64 > 3000 || slab_width < 1.0, "{bricks} bricks");
         let (actual, expected) = (fixture.draw(&bins, None, &fixture.empty(), u32::MAX).acc, fixture.twin());
-        let errors = actual.iter().zip(&expected).map(|(actual, expected)| (*actual - *expected).abs().max_element());
-        let worst = errors.fold(0.0, f64::max);
-        assert!(worst < 1e-4, "{worst} at slab width {slab_width}");
+        let errors = actual.iter().zip(&expected).map(|(actual, expected)| apart(*actual, *expected));
+        assert_at_most(largest(errors), 1e-5, format_args!("slab width {slab_width}"));
         assert!(expected.iter().any(|pixel| pixel.w > 0.1));
     }
 }
