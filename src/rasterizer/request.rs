@@ -16,6 +16,7 @@ use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::uniforms::Ramps;
 use crate::pass::composite::RayMode;
 use crate::scene::Scene;
+use crate::settings::camera::Camera;
 use crate::settings::splatting::{Rasterizer, Splatting};
 
 /// A frame of a view.
@@ -39,19 +40,21 @@ pub(crate) struct FrameRequest {
 }
 
 impl FrameRequest {
+    /// The camera is the scene's with what it leaves to an object filled in.
+    ///
     /// # Errors
     /// If the scene asks for something not implemented, or for more than the device's limits allow.
     pub(crate) fn new(
         device: &Device,
         volume: &ClassifiedVolume,
-        scene: &Scene,
+        (scene, camera): (&Scene, &Camera),
         (surfaces, first_hit): (Option<&Surfaces>, Option<f64>),
         rasterizer: Rasterizer,
     ) -> Result<Self, RenderError> {
         let splatting = settled(scene.splatting, rasterizer);
         splatting.check()?;
         let (grid, size) = (volume.grid(), [scene.image.width, scene.image.height]);
-        let seen = ViewGeometry::new(grid, &scene.camera, &splatting, size)?;
+        let seen = ViewGeometry::new(grid, camera, &splatting, size)?;
         let bands = CompositingBuffer::bands(&device.limits(), size)?;
         let rays = RayMode { cut: surfaces.is_some() || !scene.clip.is_empty(), first_hit: first_hit.is_some() };
         check_rays(device, &splatting, rays, first_hit, size)?;

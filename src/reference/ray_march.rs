@@ -45,7 +45,7 @@ pub fn pixels(
     scene: &Scene,
     pixels: &[UVec2],
 ) -> Result<Vec<[f32; 4]>, RenderError> {
-    let mut exponential = scene.clone();
+    let mut exponential = scene.framed(volume, transfer);
     exponential.splatting.compositing = Compositing::Exponential;
     let geometry = Geometry::new(volume.grid(), &exponential)?;
     let field = Field::new(volume, transfer, &exponential, &geometry);

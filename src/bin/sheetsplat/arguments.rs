@@ -1,12 +1,13 @@
 //! Arguments that several subcommands take.
 
+use std::path::Path;
 use std::time::Instant;
 
 use clap::ValueEnum;
 use clap::builder::PossibleValuesParser;
 use sheetsplat::appearance::{Colormap, Preset};
 use sheetsplat::headless::{Error, Headless, HeadlessOptions};
-use sheetsplat::image::PngDepth;
+use sheetsplat::image::{PngDepth, write_aside};
 use sheetsplat::scene::{Scene, SceneError, VolumeSource};
 use sheetsplat::stats::Stats;
 use sheetsplat::volume::{self, Orientation, Volume};
@@ -139,6 +140,20 @@ impl Input {
         Ok(volume)
     }
 
+    /// The scene as it is to be drawn, with nothing left to the volume: what is saved is what is drawn. `explicit` is
+    /// [`Scene::explicit`], or for cameras that turn [`Scene::explicit_all_around`].
+    pub(crate) fn settled(
+        &self,
+        volume: &Volume,
+        scene: &Scene,
+        explicit: impl Fn(&Scene, &Volume) -> Scene,
+    ) -> Result<Scene, Failure> {
+        let mut scene = scene.clone();
+        self.look_at(volume, &mut scene)?;
+        scene.transfer.check(volume).map_err(|error| self.failure(error))?;
+        Ok(explicit(&scene, volume))
+    }
+
     /// Turns the scene's camera to the side of the patient that --view says.
     pub(crate) fn look_at(&self, volume: &Volume, scene: &mut Scene) -> Result<(), Failure> {
         let (Some(view), name) = (self.view, &self.name) else { return Ok(()) };
@@ -186,4 +201,18 @@ impl From<Depth> for PngDepth {
 pub(crate) fn log_frame(what: &str, stats: &Stats) {
     let Stats { adapter, rasterizer, prepare_ms, frame_ms, .. } = stats;
     log::info!("{what}: {:.1} ms by {rasterizer} on {adapter}", prepare_ms + frame_ms);
+}
+
+/// Checks the name of a scene file to be written.
+pub(crate) fn check_scene_file(path: &Path) -> Result<(), Failure> {
+    match path.extension() {
+        Some(extension) if extension == "toml" => Ok(()),
+        _ => Err(Failure::Input(format!("--save-scene: found {}, allowed: a file .toml", path.display()))),
+    }
+}
+
+/// Writes a scene file.
+pub(crate) fn save(scene: &Scene, path: &Path) -> Result<(), Failure> {
+    let text = scene.to_toml(path.parent().unwrap_or(Path::new("")))?;
+    write_aside(path, text.as_bytes()).map_err(|error| Failure::Other(format!("{}: {error}", path.display())))
 }

@@ -14,7 +14,7 @@ use sheetsplat::stats::Stats;
 use sheetsplat::volume::Volume;
 
 use crate::annotate::Annotate;
-use crate::arguments::{Depth, Input, log_frame};
+use crate::arguments::{Depth, Input, check_scene_file, log_frame};
 use crate::failure::Failure;
 
 #[derive(clap::Args)]
@@ -60,15 +60,12 @@ enum Backend {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let Arguments { input, output, stats: stats_file, save_scene, .. } = arguments;
     check_files(arguments)?;
-    let mut scene = input.scene()?;
+    let scene = input.scene()?;
     let start = Instant::now();
     let volume = input.load_volume(&scene)?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
-    input.look_at(&volume, &mut scene)?;
-    scene.transfer.check(&volume).map_err(|error| input.failure(error))?;
     let start = Instant::now();
-    // What is saved is what is rendered.
-    let scene = scene.explicit(&volume);
+    let scene = input.settled(&volume, &scene, Scene::explicit)?;
     let explicit_ms = start.elapsed().as_secs_f64() * 1e3;
     let overlay = arguments.annotate.overlay(&scene, &volume)?;
     let volume = Arc::new(volume);
@@ -113,9 +110,8 @@ fn check_files(arguments: &Arguments) -> Result<(), Failure> {
     let invalid = |option: &str, path: &Path, allowed: &str| {
         Err(Failure::Input(format!("{option}: found {}, allowed: {allowed}", path.display())))
     };
-    if let Some(path) = save_scene.as_ref().filter(|path| path.extension().is_none_or(|extension| extension != "toml"))
-    {
-        return invalid("--save-scene", path, "a file .toml");
+    if let Some(path) = save_scene {
+        check_scene_file(path)?;
     }
     match stats {
         Some(path) if path == output || stats == save_scene => {

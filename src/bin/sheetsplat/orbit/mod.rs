@@ -12,7 +12,7 @@ use sheetsplat::image::{Image, aside};
 use sheetsplat::scene::Scene;
 
 use crate::annotate::Annotate;
-use crate::arguments::{Depth, Input, log_frame};
+use crate::arguments::{Depth, Input, check_scene_file, log_frame, save};
 use crate::failure::Failure;
 use crate::progress::Progress;
 use movie::{Encoder, Format, Settings};
@@ -42,6 +42,10 @@ pub(crate) struct Arguments {
     /// Draw only these of all frames, counted from 0, without B: parts of a movie can be drawn anywhere and at any time.
     #[arg(long, value_name = "A..B", value_parser = parse_frames)]
     frames: Option<Range<u32>>,
+    /// Write the scene as a scene file, with what presets, colour maps and the volume made of it: `render` draws the first frame from it,
+    /// and with camera.direction turned any other.
+    #[arg(long, value_name = "FILE")]
+    save_scene: Option<PathBuf>,
     /// Draw numbered images again that are there.
     #[arg(long)]
     overwrite: bool,
@@ -76,6 +80,9 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
         return Err(Failure::Input(format!("--frames: found {start}..{end}, allowed: within 0..{count} (--count)")));
     }
     arguments.annotate.check_format(output)?;
+    if let Some(path) = &arguments.save_scene {
+        check_scene_file(path)?;
+    }
     let format = if output == Path::new("-") { Some(Format::Y4m) } else { Format::of(output) };
     let scene = input.scene()?;
     if let Some(format) = format {
@@ -135,12 +142,12 @@ fn draw(
     progress: bool,
     mut take: impl FnMut(u32, &Image) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    if frames.is_empty() {
+    let Arguments { input, annotate, turn, count, save_scene, .. } = arguments;
+    if frames.is_empty() && save_scene.is_none() {
         return Ok(());
     }
-    let Arguments { input, annotate, turn, count, .. } = arguments;
-    let (volume, mut scene) = (input.load_volume(scene)?, scene.clone());
-    input.look_at(&volume, &mut scene)?;
+    let volume = input.load_volume(scene)?;
+    let scene = input.settled(&volume, scene, Scene::explicit_all_around)?;
     let overlay = annotate.overlay(&scene, &volume)?;
     let headless = input.headless(false)?;
     let mut view = headless.view(volume, &scene).map_err(|error| input.failure(error))?;
@@ -154,5 +161,8 @@ fn draw(
         log_frame(&format!("frame {frame}"), &rendering.stats);
         progress.step();
     }
-    Ok(())
+    match save_scene {
+        Some(path) => save(&scene, path),
+        None => Ok(()),
+    }
 }

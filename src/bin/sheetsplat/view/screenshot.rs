@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use eframe::egui::{ColorImage, Rect};
-use sheetsplat::image::{Image, write_aside};
+use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::TransferFunction;
 use sheetsplat::volume::Volume;
 
+use crate::arguments::save;
 use crate::failure::Failure;
 
 /// The first of `sheetsplat-1.png`, `sheetsplat-2.png`, …, or another extension, that is not in the current folder yet.
@@ -24,8 +25,7 @@ pub(super) fn save_scene(
     path: &Path,
 ) -> Result<(), Failure> {
     let scene = Scene { transfer: transfer.clone().into(), ..scene.clone() };
-    let text = scene.explicit(volume).to_toml(path.parent().unwrap_or(Path::new("")))?;
-    write_aside(path, text.as_bytes()).map_err(|error| Failure::Other(format!("{}: {error}", path.display())))
+    save(&scene.explicit(volume), path)
 }
 
 /// The pixels of the window, or of a part of it, given in pixels.
