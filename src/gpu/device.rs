@@ -13,12 +13,14 @@ use crate::gpu::fault::DeviceFault;
 #[non_exhaustive]
 pub enum DeviceError {
     /// There is no adapter, or none with the requested name.
-    #[error("no GPU adapter: required {required}, actual: {actual}")]
+    #[error("no GPU adapter: required {required}, actual: {actual}{}", advice.as_ref().map_or(String::new(), |advice| format!("; {advice}")))]
     NoAdapter {
         /// What was asked for.
         required: String,
         /// What there is.
         actual: String,
+        /// What to install, where there is no adapter at all.
+        advice: Option<String>,
     },
     /// The adapter refused to make a device.
     #[error("adapter \"{adapter}\" gave no device: {source}")]

@@ -1,6 +1,7 @@
 //! Rendering without a host: an own device, and images in memory. The only part that creates devices, submits and waits.
 
 pub mod device;
+mod driver;
 mod error;
 pub mod readback;
 

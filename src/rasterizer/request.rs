@@ -35,6 +35,8 @@ pub(crate) struct FrameRequest {
     /// A host's surfaces, and the texel that is the image's first.
     pub(crate) surfaces: Option<(SurfaceDepths, [u32; 2])>,
     pub(crate) way: Way,
+    /// Why the device does not draw by tiles.
+    pub(crate) fallback: Option<RenderError>,
     /// Those of the compositing buffer.
     pub(crate) bands: Vec<Band>,
 }
@@ -62,8 +64,10 @@ impl FrameRequest {
             Some(surfaces) => Some((surfaces.depths(&seen, grid)?, surfaces.origin)),
             None => None,
         };
+        let (way, fallback) = Way::of(device, &splatting)?;
         Ok(Self {
-            way: Way::of(device, &splatting)?,
+            way,
+            fallback,
             covered: means::covered(&seen, grid, &splatting),
             kernel: Kernel::new(splatting.radius, splatting.falloff),
             ramps: Ramps::new(volume.transfer()),

@@ -7,7 +7,7 @@ pub(crate) mod placement;
 pub(crate) mod prepared_frame;
 pub(crate) mod scene_view;
 
-use std::sync::OnceLock;
+use std::sync::{Once, OnceLock};
 
 use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Queue, RenderPass, TextureFormat, TextureView};
 
@@ -53,6 +53,8 @@ pub struct Renderer {
     first_hit: OnceLock<FirstHit>,
     /// Stands for a host's depth where there is none.
     no_surfaces: OnceLock<TextureView>,
+    /// Whether it was logged that tiles will not do.
+    fell_back: Once,
 }
 
 impl Renderer {
@@ -81,6 +83,7 @@ impl Renderer {
             resolve,
             first_hit: OnceLock::new(),
             no_surfaces: OnceLock::new(),
+            fell_back: Once::new(),
         })
     }
 
@@ -160,8 +163,9 @@ impl Renderer {
 
     fn prepare_unscoped(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
         // What can fail comes before anything is taken from the last frame.
-        let request = self.request(view)?;
+        let mut request = self.request(view)?;
         let SceneView { volume, scene, surfaces, frame, .. } = view;
+        let fallback = request.fallback.take();
         volume.flush(device, queue)?;
         let sheets = (self.sheet_format, self.sheets);
         let kept = Kept::of(frame.take(), sheets, &request.view);
@@ -195,7 +199,13 @@ impl Renderer {
             cut: cut_buffers,
         };
         let was = kept.drawing.as_ref().map(Drawing::rasterizer);
-        let (drawing, prepared) = self.draw_with(given, kept.drawing)?;
+        let (drawing, prepared, too_much) = self.draw_with(given, kept.drawing)?;
+        let fallback = fallback.or(too_much);
+        if let Some(reason) = &fallback {
+            self.fell_back.call_once(|| {
+                log::warn!("drawn by quads, which may take longer than by tiles: {reason}");
+            });
+        }
         let totals = kept.totals.filter(|_| !prepared.bucketed && was == Some(drawing.rasterizer()));
 
         let first_hits = drawing.first_hits().filter(|_| rays.first_hit).map(|words| {
@@ -219,6 +229,7 @@ impl Renderer {
             resolve_groups: compositing.bands.iter().map(|band| self.resolve.bind(device, &uniform, band)).collect(),
             view: *seen,
             drawing,
+            fallback,
             compositing,
             uniform,
             control_points,
@@ -231,8 +242,12 @@ impl Renderer {
         Ok(prepared)
     }
 
-    /// Prepares a rasterizer's part: by tiles, unless the view does not fit them and the scene does not insist.
-    fn draw_with(&self, given: Given<'_>, previous: Option<Drawing>) -> Result<(Drawing, Prepared), RenderError> {
+    /// Prepares a rasterizer's part: by tiles, unless the view does not fit them and the scene does not insist. Then the error is why.
+    fn draw_with(
+        &self,
+        given: Given<'_>,
+        previous: Option<Drawing>,
+    ) -> Result<(Drawing, Prepared, Option<RenderError>), RenderError> {
         let (mut old_quads, mut old_tiles, mut old_samples) = (None, None, None);
         match previous {
             Some(Drawing::Quads(frame)) => old_quads = Some(*frame),
@@ -243,17 +258,18 @@ impl Renderer {
         let FrameRequest { way, splatting, .. } = given.request;
         if *way == Way::Samples {
             let (frame, prepared) = self.samples(given.device).prepare(given, old_samples)?;
-            return Ok((Drawing::Samples(Box::new(frame)), prepared));
+            return Ok((Drawing::Samples(Box::new(frame)), prepared, None));
         }
+        let mut fallback = None;
         if *way == Way::Tiles {
             match self.tiles.prepare(given, old_tiles) {
-                Ok((frame, prepared)) => return Ok((Drawing::Tiles(Box::new(frame)), prepared)),
+                Ok((frame, prepared)) => return Ok((Drawing::Tiles(Box::new(frame)), prepared, None)),
                 Err(error) if insists_on_tiles(splatting) => return Err(error),
-                Err(_) => {}
+                Err(error) => fallback = Some(error),
             }
         }
         let (frame, prepared) = self.quads(given.device).prepare(given, old_quads)?;
-        Ok((Drawing::Quads(Box::new(frame)), prepared))
+        Ok((Drawing::Quads(Box::new(frame)), prepared, fallback))
     }
 
     fn samples(&self, device: &Device) -> &SampleRasterizer {

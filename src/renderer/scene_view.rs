@@ -172,6 +172,12 @@ impl SceneView {
         self.frame.as_ref().map(|frame| frame.drawing.rasterizer())
     }
 
+    /// Why the prepared frame is drawn by quads though the scene and the renderer leave the choice: what the device lacks, or what of the
+    /// frame is too much for tiles. `None` if it is drawn by tiles, or the settings rule these out. A renderer logs its first reason.
+    pub fn fallback(&self) -> Option<&RenderError> {
+        self.frame.as_ref()?.fallback.as_ref()
+    }
+
     /// Bytes of GPU memory that the view holds, with the volume's, which other views may share: without those it is that less
     /// [`GpuVolume::gpu_bytes`]. All of it is given back when view and volume are dropped and what was submitted is done. A buffer that
     /// a frame needs no more than a part of is kept, at most 4 times as large as a new view's; textures always fit.
