@@ -31,7 +31,7 @@ use crate::volume::Volume;
 /// How to choose and open a device.
 #[derive(Clone, Debug)]
 pub struct HeadlessOptions {
-    /// Part of the adapter's name, in any case; `None` prefers a GPU to a software driver.
+    /// Part of the adapter's name, in any case; `None` prefers an adapter that can run the renderer, and a GPU to a software driver.
     pub adapter: Option<String>,
     /// Features and limits to request; `None` takes what [`DeviceRequirements::for_adapter`] says.
     pub requirements: Option<DeviceRequirements>,
