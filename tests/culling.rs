@@ -10,6 +10,7 @@ use sheetsplat::headless::{Headless, HeadlessOptions, Rendering};
 use sheetsplat::internals::reference;
 use sheetsplat::internals::reference::visibility::Test;
 use sheetsplat::scene::{Scene, VolumeSource};
+use sheetsplat::settings::Camera;
 use sheetsplat::settings::Projection;
 use sheetsplat::settings::Ramp;
 use sheetsplat::settings::{Compositing, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};

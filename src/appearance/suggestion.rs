@@ -50,8 +50,8 @@ fn is_ct(values: &[f32], offset: f64) -> Option<bool> {
         values.par_iter().filter(is_in).count() as f64
     };
     let body = count(BODY);
-    // Of other measured values no span of 300 holds a third.
-    let is_ct = count(AIR) >= 0.02 * values.len() as f64 && count(SOFT_TISSUE) >= body / 3.0 && body > 0.0;
+    // Of other measured values, those of MR for one, no span of 300 holds half.
+    let is_ct = count(AIR) >= 0.02 * values.len() as f64 && count(SOFT_TISSUE) >= body / 2.0 && body > 0.0;
     is_ct.then(|| count(BONE) >= 0.01 * body)
 }
 

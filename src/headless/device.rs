@@ -60,7 +60,8 @@ pub fn choose_adapter(adapters: &[Adapter], name: Option<&str>) -> Result<Adapte
         None => {
             let names: Vec<&str> = candidates.iter().map(|candidate| candidate.name.as_str()).collect();
             Err(DeviceError::NoAdapter {
-                required: name.map_or("any Vulkan, Metal or DirectX 12 adapter".to_owned(), |name| format!("\"{name}\"")),
+                required: name
+                    .map_or("any Vulkan, Metal or DirectX 12 adapter".to_owned(), |name| format!("\"{name}\"")),
                 actual: if names.is_empty() { "none".to_owned() } else { names.join(", ") },
                 advice: names.is_empty().then(driver::advice),
             })
@@ -70,9 +71,8 @@ pub fn choose_adapter(adapters: &[Adapter], name: Option<&str>) -> Result<Adapte
 
 /// Which of some adapters is taken, and in place of which GPU, if that is a software driver only because the GPU will not do.
 fn choose(candidates: &[Candidate], name: Option<&str>) -> Option<(usize, Option<usize>)> {
-    let is_named = |at: &usize| {
-        name.is_none_or(|name| candidates[*at].name.to_lowercase().contains(&name.to_lowercase()))
-    };
+    let is_named =
+        |at: &usize| name.is_none_or(|name| candidates[*at].name.to_lowercase().contains(&name.to_lowercase()));
     let rank = |at: usize| match candidates[at].device_type {
         DeviceType::DiscreteGpu => 0,
         DeviceType::IntegratedGpu => 1,
@@ -90,7 +90,12 @@ fn choose(candidates: &[Candidate], name: Option<&str>) -> Option<(usize, Option
 /// Why a software driver draws though there is a GPU.
 fn note(gpu: &Candidate, chosen: &Candidate) -> String {
     let missing: Vec<String> = gpu.insufficient.iter().map(ToString::to_string).collect();
-    format!("{} cannot run the renderer ({}): {}, a software driver, is used", gpu.name, missing.join("; "), chosen.name)
+    format!(
+        "{} cannot run the renderer ({}): {}, a software driver, is used",
+        gpu.name,
+        missing.join("; "),
+        chosen.name
+    )
 }
 
 #[cfg(test)]

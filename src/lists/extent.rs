@@ -78,7 +78,8 @@ mod tests {
     /// A block of `[first, last]` with the value 100, and single voxels with the value 100 besides.
     fn volume([first, last]: [UVec3; 2], specks: &[UVec3]) -> Volume {
         let is_in = |voxel: UVec3| voxel.cmpge(first).all() && voxel.cmple(last).all();
-        let voxels = (0..DIMS.z).flat_map(|z| (0..DIMS.y).flat_map(move |y| (0..DIMS.x).map(move |x| UVec3::new(x, y, z))));
+        let voxels =
+            (0..DIMS.z).flat_map(|z| (0..DIMS.y).flat_map(move |y| (0..DIMS.x).map(move |x| UVec3::new(x, y, z))));
         let value = |voxel| if is_in(voxel) || specks.contains(&voxel) { 100.0 } else { 0.0 };
         Volume::new("block", DIMS, DVec3::ONE, voxels.map(value).collect()).unwrap()
     }
@@ -104,7 +105,9 @@ mod tests {
     fn cuts_iso_ranges_and_gradients_rule_voxels_out() {
         let block = [UVec3::new(4, 3, 6), UVec3::new(20, 13, 16)];
         let volume = volume(block, &[]);
-        let of = |transfer: &TransferFunction, clip: Clip| of_voxels(&volume, transfer, &clip.voxels(volume.grid(), 2.0), 0.0);
+        let of = |transfer: &TransferFunction, clip: Clip| {
+            of_voxels(&volume, transfer, &clip.voxels(volume.grid(), 2.0), 0.0)
+        };
         assert_eq!(of(&transfer(), Clip::default()), Some(block));
         // x ≥ 0 keeps the kernels of voxels from 14.5 - 2 on.
         let clip = Clip { planes: vec![[1.0, 0.0, 0.0, 0.0]], ..Clip::default() };

@@ -158,7 +158,13 @@ impl Renderer {
 
     fn request(&self, view: &SceneView) -> Result<FrameRequest, RenderError> {
         let SceneView { volume, scene, surfaces, first_hit, .. } = view;
-        FrameRequest::new(&self.device, volume, (scene, &view.camera()), (surfaces.as_ref(), *first_hit), self.rasterizer)
+        FrameRequest::new(
+            &self.device,
+            volume,
+            (scene, &view.camera()),
+            (surfaces.as_ref(), *first_hit),
+            self.rasterizer,
+        )
     }
 
     fn prepare_unscoped(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {

@@ -287,7 +287,8 @@ impl Scene {
     fn explicit_by(&self, volume: &Volume, fit: impl Fn(&Extent, &Camera, [u32; 2]) -> Camera) -> Self {
         let transfer = self.transfer.resolve(volume);
         let ImageSettings { width, height, .. } = self.image;
-        let camera = self.extent(volume, &transfer).map_or(self.camera, |extent| fit(&extent, &self.camera, [width, height]));
+        let camera =
+            self.extent(volume, &transfer).map_or(self.camera, |extent| fit(&extent, &self.camera, [width, height]));
         let camera = camera.explicit(volume.grid(), self.splatting.radius, width, height);
         Self { camera, transfer: transfer.into(), ..self.clone() }
     }

@@ -97,7 +97,9 @@ pub(super) fn camera(mut section: Section, fit: Fit) -> Result<Camera, SceneErro
     section.read("projection", &mut is_perspective, |entry| entry.choice(&projections))?;
     section.read("direction", &mut camera.direction, direction)?;
     section.read("up", &mut camera.up, direction)?;
-    section.read("center", &mut camera.center, |entry| entry.numbers(FINITE).map(|center| Some(DVec3::from_array(center))))?;
+    section.read("center", &mut camera.center, |entry| {
+        entry.numbers(FINITE).map(|center| Some(DVec3::from_array(center)))
+    })?;
     section.read("fit", &mut camera.fit, |entry| entry.choice(FITS))?;
     section.read("height", &mut height, |entry| entry.number(POSITIVE).map(Some))?;
     section.read("fov_y", &mut fov_y, |entry| entry.number(FOV))?;

@@ -51,7 +51,13 @@ fn orthographic([x, y]: [DVec4; 2], pixels: DVec2) -> Result<Camera, RenderError
     // The nearest point of the central ray.
     let center = -(right * (x.w / right.length_squared()) + up * (y.w / up.length_squared()));
     let projection = Projection::Orthographic { height: Some(2.0 / up.length()) };
-    Ok(Camera { projection, direction: up.cross(right).normalize(), up: up.normalize(), center: Some(center), fit: Fit::Volume })
+    Ok(Camera {
+        projection,
+        direction: up.cross(right).normalize(),
+        up: up.normalize(),
+        center: Some(center),
+        fit: Fit::Volume,
+    })
 }
 
 /// From all rows, where w is the depth from the eye.
@@ -94,7 +100,13 @@ fn perspective([x, y, z, w]: [DVec4; 4], pixels: DVec2) -> Result<Camera, Render
         distance: Some(distance),
         near: Some(near),
     };
-    Ok(Camera { projection, direction: ahead, up: up.normalize(), center: Some(eye + distance * ahead), fit: Fit::Volume })
+    Ok(Camera {
+        projection,
+        direction: ahead,
+        up: up.normalize(),
+        center: Some(eye + distance * ahead),
+        fit: Fit::Volume,
+    })
 }
 
 /// Checks that pixels are square.

@@ -31,9 +31,7 @@ impl Extent {
 
     fn corners(&self) -> [DVec3; 8] {
         let Self { low, high } = *self;
-        std::array::from_fn(|at| {
-            DVec3::select(glam::BVec3::new(at & 1 != 0, at & 2 != 0, at & 4 != 0), high, low)
-        })
+        std::array::from_fn(|at| DVec3::select(glam::BVec3::new(at & 1 != 0, at & 2 != 0, at & 4 != 0), high, low))
     }
 
     /// The camera with what it leaves open chosen such that the box fills an image of `size` pixels, seen in the camera's direction. A
@@ -90,7 +88,8 @@ mod tests {
     fn cameras() -> Vec<Camera> {
         let directions = [DVec3::Y, -DVec3::X, DVec3::new(0.3, 0.9, -0.2), DVec3::new(-1.0, 0.2, 2.5)];
         let up = DVec3::new(0.1, 0.2, 1.0);
-        let camera = |direction, projection| Camera { direction, up, projection, fit: Fit::Object, ..Camera::default() };
+        let camera =
+            |direction, projection| Camera { direction, up, projection, fit: Fit::Object, ..Camera::default() };
         let eye = |fov_y| Projection::Perspective { fov_y, distance: None, near: None };
         let projections = [Projection::Orthographic { height: None }, eye(30.0), eye(95.0)];
         directions.into_iter().flat_map(|way| projections.map(|projection| camera(way, projection))).collect()
@@ -178,7 +177,9 @@ mod tests {
         let center = Some(EXTENT.center() - 1e4 * DVec3::Y);
         let camera = Camera { projection, center, fit: Fit::Object, ..Camera::default() };
         let fitted = EXTENT.fit(&camera, [64, 64]);
-        assert!(matches!(fitted.projection, Projection::Perspective { distance: Some(distance), .. } if distance > 0.0));
+        assert!(
+            matches!(fitted.projection, Projection::Perspective { distance: Some(distance), .. } if distance > 0.0)
+        );
         assert!(reach(&fitted, [64, 64], &EXTENT) <= SHARE);
     }
 

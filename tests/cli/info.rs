@@ -57,7 +57,8 @@ fn frames_are_those_that_render_chooses_and_presets_fit_the_kind_of_data() {
     let voxels = (0..12 * 12 * 12).map(|at| inside([at % 12, at / 12 % 12, at / 144]));
     let values: Vec<f32> = voxels.clone().map(|inside| if inside { 90.0 } else { 0.0 }).collect();
     folder.write_nrrd("block.nrrd", [12; 3], [2.0, 1.0, 0.5], &values);
-    let json = |arguments: &str| -> Value { serde_json::from_str(&info(&folder, &format!("{arguments} --json"))).unwrap() };
+    let json =
+        |arguments: &str| -> Value { serde_json::from_str(&info(&folder, &format!("{arguments} --json"))).unwrap() };
     let block = json("block.nrrd");
     assert_eq!(block["frame"]["center"], serde_json::json!([-2.0, -1.0, -0.5]));
     // Along y: 3 spacings and two kernels of 2 grid units are 14 wide, 7 and 4 of them 5.5 high.

@@ -22,7 +22,10 @@ fn without_a_scene_file_the_object_fills_the_image() {
         let (wide, high) = (right + 1 - left, bottom + 1 - top);
         // 0.9 of an axis less the kernels' faint rims, and in perspective what is behind the box's front.
         assert!(high >= 56 && high <= 73 && wide <= 91, "{set}: {wide} × {high}");
-        assert!(left.abs_diff(99 - right) <= 6 && top.abs_diff(79 - bottom) <= 6, "{set}: {left} {right} {top} {bottom}");
+        assert!(
+            left.abs_diff(99 - right) <= 6 && top.abs_diff(79 - bottom) <= 6,
+            "{set}: {left} {right} {top} {bottom}"
+        );
     }
     // A scene file that says how to look at it, or what it looks like, frames the volume, whose diagonal is twice as long.
     for keys in ["[camera]", "[transfer]\niso_ranges = [[0, 300]]"] {

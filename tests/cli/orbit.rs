@@ -193,7 +193,9 @@ fn a_saved_scene_renders_the_frames_bytes() {
     let folder = Folder::new();
     let small = "--set image={width=60,height=40}";
     for sets in ["", "--set camera.projection=perspective --preset ct-skin", "--set camera.fit=volume"] {
-        folder.run(&format!("orbit builtin:head:32 {small} {sets} -o f%d.png --count 4 --overwrite --save-scene s.toml")).assert_success();
+        folder
+            .run(&format!("orbit builtin:head:32 {small} {sets} -o f%d.png --count 4 --overwrite --save-scene s.toml"))
+            .assert_success();
         folder.run("render s.toml -o first.png").assert_success();
         assert!(folder.read("first.png") == folder.read("f0.png"), "{sets}");
         // A quarter about z, by the right hand, from y.
@@ -202,10 +204,15 @@ fn a_saved_scene_renders_the_frames_bytes() {
         assert!(folder.read("second.png") == folder.read("f1.png"), "{sets}");
         let text = String::from_utf8(folder.read("s.toml")).unwrap();
         let camera = text.parse::<toml::Table>().unwrap()["camera"].clone();
-        assert!(camera.get("center").is_some() && (camera.get("height").or(camera.get("distance"))).is_some(), "{text}");
+        assert!(
+            camera.get("center").is_some() && (camera.get("height").or(camera.get("distance"))).is_some(),
+            "{text}"
+        );
     }
     // All frames are there already, and the scene is not.
     folder.run(&format!("orbit builtin:head:32 {small} -o f%d.png --count 4 --save-scene again.toml")).assert_success();
     assert!(folder.path("again.toml").exists());
-    folder.run("orbit builtin:cube:8 -o f%d.png --save-scene s.json").assert_failure(2, &["--save-scene", "s.json", ".toml"]);
+    folder
+        .run("orbit builtin:cube:8 -o f%d.png --save-scene s.json")
+        .assert_failure(2, &["--save-scene", "s.json", ".toml"]);
 }
