@@ -241,7 +241,7 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
         "1",
         "camera.hight",
         "an unknown key",
-        "projection, direction, up, center, height, fov_y, distance",
+        "projection, direction, up, center, fit, height, fov_y, distance",
     ),
     ("image.width", "0", "image.width", "0", "an integer from 1 to the device's texture limit"),
     ("image.width", "-5", "image.width", "-5", "an integer from 1"),

@@ -55,8 +55,8 @@ fn presets_and_colour_maps_are_short_for_settings() {
     }
     assert_eq!(images.len(), 4, "all differ");
     // By other subcommands too, and of many values at once.
-    folder.run(&format!("orbit {HEAD} --preset ct-bone --count 1 -o %d.npy")).assert_success();
-    folder.render(&format!("{HEAD} --preset ct-bone -o bone.npy"));
+    folder.run(&format!("orbit {HEAD} {WHOLE} --preset ct-bone --count 1 -o %d.npy")).assert_success();
+    folder.render(&format!("{HEAD} {WHOLE} --preset ct-bone -o bone.npy"));
     assert_eq!(folder.read("0.npy"), folder.read("bone.npy"));
     folder.run(&format!("sweep {HEAD} --set preset=ct-bone,xray --colormap hot -o sheet.png")).assert_success();
     assert!(image::open(folder.path("sheet.png")).unwrap().width() > 120);

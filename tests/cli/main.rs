@@ -30,6 +30,9 @@ use serde_json::Value;
 
 use images::{BLACK, psnr};
 
+/// A camera that does not follow what is visible, so that it is the same for one picture and for many.
+const WHOLE: &str = "--set camera.fit=volume";
+
 /// A temporary folder, which is also the program's current directory.
 struct Folder(tempfile::TempDir);
 

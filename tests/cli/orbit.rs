@@ -7,7 +7,7 @@ use crate::*;
 
 /// Frames that all differ from one another.
 const TURNING: &str = "builtin:marschner-lobb:12 --set image.width=28 --set image.height=20 \
-                       --set transfer.opacity=[[60,0],[200,0.6]] --set camera={direction=[0.3,0.9,-0.2],up=[0.1,0,1]}";
+                       --set transfer.opacity=[[60,0],[200,0.6]] --set camera={direction=[0.3,0.9,-0.2],up=[0.1,0,1],fit='volume'}";
 
 impl Folder {
     fn orbit(&self, arguments: &str) {
@@ -50,15 +50,15 @@ fn frames_are_the_same_however_they_are_shared_out() {
 #[test]
 fn the_camera_turns_by_the_right_hand_and_ends_a_step_early() {
     let folder = Folder::new();
-    let from = |direction: &str| folder.pixels(&format!("{SMALL} --set camera.direction={direction}"));
-    folder.orbit(&format!("{SMALL} --set camera.direction=[0,1,0] --count 4 -o %d.npy"));
+    let from = |direction: &str| folder.pixels(&format!("{SMALL} {WHOLE} --set camera.direction={direction}"));
+    folder.orbit(&format!("{SMALL} {WHOLE} --set camera.direction=[0,1,0] --count 4 -o %d.npy"));
     assert_eq!(folder.names(), set(&["0.npy", "1.npy", "2.npy", "3.npy"]));
     for (frame, direction) in ["[0,1,0]", "[-1,0,0]", "[0,-1,0]", "[1,0,0]"].into_iter().enumerate() {
         let (.., turned) = folder.read_npy(&format!("{frame}.npy"));
         let decibels = psnr(&turned, &from(direction).2, BLACK, 50);
         assert!(decibels > 80.0, "frame {frame}: {decibels:.1} dB");
     }
-    folder.orbit(&format!("{SMALL} --set camera.direction=[0,1,0] --turn -180 --count 2 --frames 1..2 -o back-%d.npy"));
+    folder.orbit(&format!("{SMALL} {WHOLE} --set camera.direction=[0,1,0] --turn -180 --count 2 --frames 1..2 -o back-%d.npy"));
     let (.., turned) = folder.read_npy("back-1.npy");
     assert!(psnr(&turned, &from("[1,0,0]").2, BLACK, 50) > 80.0);
 }
