@@ -58,7 +58,9 @@ fn the_camera_turns_by_the_right_hand_and_ends_a_step_early() {
         let decibels = psnr(&turned, &from(direction).2, BLACK, 50);
         assert!(decibels > 80.0, "frame {frame}: {decibels:.1} dB");
     }
-    folder.orbit(&format!("{SMALL} {WHOLE} --set camera.direction=[0,1,0] --turn -180 --count 2 --frames 1..2 -o back-%d.npy"));
+    folder.orbit(&format!(
+        "{SMALL} {WHOLE} --set camera.direction=[0,1,0] --turn -180 --count 2 --frames 1..2 -o back-%d.npy"
+    ));
     let (.., turned) = folder.read_npy("back-1.npy");
     assert!(psnr(&turned, &from("[1,0,0]").2, BLACK, 50) > 80.0);
 }
@@ -192,7 +194,7 @@ fn bad_usage_and_input_are_2_and_leave_nothing() {
 fn a_saved_scene_renders_the_frames_bytes() {
     let folder = Folder::new();
     let small = "--set image={width=60,height=40}";
-    for sets in ["", "--set camera.projection=perspective --preset ct-skin", "--set camera.fit=volume"] {
+    for sets in ["--preset ct-skin", "--set camera.projection=perspective", WHOLE] {
         folder
             .run(&format!("orbit builtin:head:32 {small} {sets} -o f%d.png --count 4 --overwrite --save-scene s.toml"))
             .assert_success();
