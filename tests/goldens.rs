@@ -195,7 +195,7 @@ fn pictures_look_like_their_goldens() {
     let mut complaints = Vec::new();
     for (name, volume, settings) in SCENES {
         let settings: Vec<String> =
-            ["camera.fit=volume"].iter().chain(settings).map(|&setting| setting.to_owned()).collect();
+            settings.iter().chain(&["camera.fit=volume"]).map(|&setting| setting.to_owned()).collect();
         let mut scene = Scene::from_volume(VolumeSource::Builtin(volume.to_owned()), &settings).unwrap();
         scene.splatting.opacity_threshold = OPACITY_THRESHOLD;
         for rasterizer in [Rasterizer::Quads, Rasterizer::Tiles] {
