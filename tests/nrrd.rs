@@ -272,9 +272,9 @@ fn space_directions() {
 
     let skewed = |cosine: f64| format!("(1,0,0) ({cosine},1,0) (0,0,1)");
     assert_eq!(spacing(&skewed(0.9e-4)).y, 1.0_f64.hypot(0.9e-4));
-    for skew in [1.1e-4, -1.1e-4, 0.5, 1e9] {
-        let allowed = "orthogonal axes, cosines of at most 0.0001";
-        assert_refused(open(&skewed(skew)), "volume.nrrd", "space directions", "not orthogonal", allowed);
+    for skew in [6.0, -1e9] {
+        let allowed = "each less than 80° from a right angle";
+        assert_refused(open(&skewed(skew)), "volume.nrrd", "space directions", "from a right angle", allowed);
     }
     let allowed = "three vectors (x,y,z) of positive finite length";
     for wrong in [
@@ -490,19 +490,6 @@ fn damaged_data() {
         let mut wrong = whole.clone();
         wrong[at] ^= 1;
         assert_refused(zipped(&wrong), "volume.nrrd", "data", "", "gzip members");
-    }
-}
-
-#[test]
-fn non_finite_samples_name_the_voxel() {
-    let folder = Folder::new();
-    let header = PLAIN.replace("uint8", "double\nendian: little");
-    for (value, found) in [(f64::NAN, "NaN"), (f64::NEG_INFINITY, "-inf"), (1e300, "inf")] {
-        let mut values = [0.0_f64; 24];
-        values[11] = value;
-        let data: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
-        let expected = format!("{found} at voxel [1, 2, 1]");
-        assert_refused(folder.attached(&header, &data), "volume.nrrd", "data", &expected, "finite values");
     }
 }
 

@@ -48,6 +48,8 @@ pub struct CullBuffers<'a> {
     pub groups: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
+    /// Whether any of them is a hole.
+    pub has_holes: bool,
     /// Its labels, if any of them has ramps of its own.
     pub labels: Option<&'a TextureView>,
     /// Control points of the ramps.
@@ -181,6 +183,7 @@ impl Cull {
                 frame: shared.frame,
                 bricks: &list.buffer,
                 values: shared.values,
+                has_holes: shared.has_holes,
                 labels: shared.labels,
                 control_points: shared.control_points,
                 places: &fresh,

@@ -32,20 +32,21 @@ pub struct GatherMode {
     perspective: bool,
     economies: bool,
     labels: bool,
+    holes: bool,
     rays: RayMode,
     /// Whether tiles are divided.
     divided: bool,
 }
 
 impl GatherMode {
-    /// The mode that splatting settings ask for, with or without an eye, and with or without `labels` that have ramps of their own; each
-    /// tile in so many parts.
-    pub fn of(splatting: &Splatting, perspective: bool, labels: bool, rays: RayMode, parts: u32) -> Self {
+    /// The mode that splatting settings ask for, with or without an eye, of a volume with or without labels that have ramps of their own
+    /// and with or without holes; each tile in so many parts.
+    pub fn of(splatting: &Splatting, perspective: bool, [labels, holes]: [bool; 2], rays: RayMode, parts: u32) -> Self {
         let Splatting { compositing, order, footprint_box, economies, .. } = *splatting;
         let economies = economies != Economies::default();
         // Every voxel has its own parallelogram there.
         let footprint_box = if perspective { FootprintBox::Rectangle } else { footprint_box };
-        Self { compositing, order, footprint_box, perspective, economies, labels, rays, divided: parts > 1 }
+        Self { compositing, order, footprint_box, perspective, economies, labels, holes, rays, divided: parts > 1 }
     }
 }
 
@@ -80,15 +81,16 @@ pub struct GatherBuffers<'a> {
 
 impl Default for Gather {
     fn default() -> Self {
-        Self { stages: (0..Compositing::COUNT << 8).map(|_| OnceLock::new()).collect(), no_labels: OnceLock::new() }
+        Self { stages: (0..Compositing::COUNT << 9).map(|_| OnceLock::new()).collect(), no_labels: OnceLock::new() }
     }
 }
 
 impl Gather {
     fn stage(&self, mode: GatherMode) -> &OnceLock<ComputeStage> {
-        let GatherMode { compositing, order, footprint_box, perspective, economies, labels, rays, divided } = mode;
+        let GatherMode { compositing, order, footprint_box, perspective, economies, labels, holes, rays, divided } =
+            mode;
         let [order, footprint_box] = [order as usize, footprint_box as usize];
-        let flags = [perspective, economies, labels, rays.cut, rays.first_hit, divided].map(usize::from);
+        let flags = [perspective, economies, labels, holes, rays.cut, rays.first_hit, divided].map(usize::from);
         let bits = [order, footprint_box].into_iter().chain(flags);
         &self.stages[bits.fold(compositing as usize, |number, bit| 2 * number + bit)]
     }
@@ -123,6 +125,7 @@ impl Gather {
                 ("ECONOMIES", f64::from(u8::from(mode.economies))),
                 ("PARALLELOGRAM", f64::from(mode.footprint_box as u32)),
                 ("LABELS", f64::from(u8::from(mode.labels))),
+                ("HOLES", f64::from(u8::from(mode.holes))),
                 ("CUT", f64::from(u8::from(mode.rays.cut))),
                 ("FIRST_HIT", f64::from(u8::from(mode.rays.first_hit))),
             ];

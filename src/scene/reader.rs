@@ -284,7 +284,7 @@ impl<'a> Entry<'a> {
             let [at, value] = item.array(point)?;
             Ok((at.number(FINITE)?, read(&value)?))
         });
-        Ramp::new(points.collect::<Result<_, _>>()?).map_err(|error| match error {
+        Ramp::new(points.collect::<Result<_, SceneError>>()?).map_err(|error| match error {
             RampError::Empty => self.refused(allowed),
             RampError::NotFinite { index } | RampError::NotIncreasing { index } => {
                 items[index].refused("points whose first number is above that of the point before")

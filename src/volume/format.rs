@@ -2,15 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
+use super::access::Access;
 use super::loaded::Loaded;
 use super::samples::Voxel;
 use super::source::invalid;
 use super::{VolumeError, folder, nrrd};
 
-type Reader<T> = fn(&Path) -> Result<Loaded<T>, VolumeError>;
+type Reader<T> = fn(&Path, &Access) -> Result<Loaded<T>, VolumeError>;
 
 /// Of a folder, and those of its files that are of the format.
-type FolderReader<T> = fn(&Path, &[PathBuf]) -> Result<Loaded<T>, VolumeError>;
+type FolderReader<T> = fn(&Path, &[PathBuf], &Access) -> Result<Loaded<T>, VolumeError>;
 
 /// A format, and what reads it.
 struct Format<T> {
@@ -36,8 +37,10 @@ macro_rules! reader {
     }};
 }
 
+const DICOM: &str = "DICOM";
+
 /// Formats that have a slice in every file of a folder.
-const SLICES: [&str; 2] = ["TIFF", "DICOM"];
+const SLICES: [&str; 2] = ["TIFF", DICOM];
 
 fn formats<T: Voxel>() -> Vec<Format<T>> {
     vec![
@@ -59,6 +62,14 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             read_folder: None,
         },
         Format {
+            name: "MGH",
+            extensions: &[".mgh", ".mgz", ".mgh.gz"],
+            // It begins with its version, 1, and may be gzipped.
+            is_magic: |_| false,
+            read: reader!("mgh", super::mgh::read),
+            read_folder: None,
+        },
+        Format {
             name: "MetaImage",
             extensions: &[".mha", ".mhd"],
             is_magic: |head| head.starts_with(b"ObjectType = Image"),
@@ -73,6 +84,13 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             read_folder: None,
         },
         Format {
+            name: "NPZ",
+            extensions: &[".npz"],
+            is_magic: |head| head.starts_with(b"PK\x03\x04"),
+            read: reader!("npy", super::npz::read),
+            read_folder: None,
+        },
+        Format {
             name: "TIFF",
             extensions: &[".tif", ".tiff"],
             is_magic: |head| matches!(head.get(..4), Some(b"II*\0" | b"MM\0*" | b"II+\0" | b"MM\0+")),
@@ -80,7 +98,7 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             read_folder: reader!("tiff", super::tiff::read_folder).ok(),
         },
         Format {
-            name: "DICOM",
+            name: DICOM,
             extensions: &[".dcm"],
             is_magic: |head| head.get(128..132) == Some(b"DICM"),
             read: reader!("dicom", super::dicom::read),
@@ -105,17 +123,16 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
 
 /// Reads a file, and says of which format it is: the format that its first bytes tell, else the one that its name tells. Reads a
 /// folder of slices, whose format the first bytes of all its files tell.
-pub(super) fn read<T: Voxel>(path: &Path) -> Result<(&'static str, Loaded<T>), VolumeError> {
+pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static str, Loaded<T>), VolumeError> {
     let formats = formats();
-    if path.is_dir() {
-        return read_folder(path, &formats);
+    let (file, _) = archive_and_array(path);
+    if access.resolve(file)?.is_dir() {
+        return read_folder(path, access, &formats);
     }
-    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let head = folder::head(path)?;
-    let is_named = |format: &&Format<T>| format.extensions.iter().any(|extension| name.ends_with(extension));
-    let format = formats.iter().find(|format| (format.is_magic)(&head)).or_else(|| formats.iter().find(is_named));
+    let head = folder::head(file, access)?;
+    let format = format_of(&formats, file, &head).map(|(format, _)| format);
     let found = match format {
-        Some(Format { name, read: Ok(read), .. }) => return Ok((name, read(path)?)),
+        Some(Format { name, read: Ok(read), .. }) => return Ok((name, read(path, access)?)),
         Some(Format { name, read: Err(feature), .. }) => needs(name, feature),
         None => match path.extension() {
             Some(extension) => format!("\".{}\"", extension.display()),
@@ -134,22 +151,65 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<(&'static str, Loaded<T>), V
     Err(invalid(path, "format", found, allowed))
 }
 
-fn read_folder<T: Voxel>(path: &Path, formats: &[Format<T>]) -> Result<(&'static str, Loaded<T>), VolumeError> {
+/// A file's format, and whether its first bytes tell that.
+fn format_of<'a, T>(formats: &'a [Format<T>], path: &Path, head: &[u8]) -> Option<(&'a Format<T>, bool)> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let is_named = |format: &Format<T>| format.extensions.iter().any(|extension| name.ends_with(extension));
+    let named = formats.iter().find(|format| is_named(format));
+    // Bytes that may mean something else count only where no name speaks against it.
+    let is_bare = |format: &Format<T>| {
+        format.name == DICOM && is_bare_dicom(head) && named.is_none_or(|named| named.name == DICOM)
+    };
+    let by_head = |format: &&Format<T>| (format.is_magic)(head) || is_bare(format);
+    formats.iter().find(by_head).map(|format| (format, true)).or(named.map(|format| (format, false)))
+}
+
+/// Whether a file begins as DICOM files do that lack the 128 bytes and "DICM" before the elements: with one of group 2 or 8, and its
+/// type, or else its length, which is even.
+pub(super) fn is_bare_dicom(head: &[u8]) -> bool {
+    let &[group @ (2 | 8), 0, 0..=0x70, 0, a, b, c, d, ..] = head else { return false };
+    let has_type = a.is_ascii_uppercase() && b.is_ascii_uppercase();
+    has_type || group == 8 && a % 2 == 0 && [b, c, d] == [0; 3]
+}
+
+fn read_folder<T: Voxel>(
+    path: &Path,
+    access: &Access,
+    formats: &[Format<T>],
+) -> Result<(&'static str, Loaded<T>), VolumeError> {
     let mut slices: Vec<(&Format<T>, Vec<PathBuf>)> = Vec::new();
-    let files = folder::files(path)?;
+    let files = folder::files(path, access)?;
     let count = files.len();
+    let is_of_slices = |format: &Format<T>| SLICES.contains(&format.name);
+    let mut left_out = Vec::new();
     for file in files {
-        let head = folder::head(&file)?;
-        let of_slices = |format: &&Format<T>| SLICES.contains(&format.name) && (format.is_magic)(&head);
-        let Some(format) = formats.iter().find(of_slices) else { continue };
+        let head = folder::head(&file, access)?;
+        let format = match format_of(formats, &file, &head) {
+            Some((format, true)) if is_of_slices(format) => format,
+            other => {
+                let name = file.file_name().unwrap_or_default().to_string_lossy();
+                // Slices often have names without an extension, or end with a number.
+                let extension = file.extension().unwrap_or_default().to_string_lossy();
+                let may_be_slice = !name.starts_with('.') && extension.bytes().all(|byte| byte.is_ascii_digit());
+                if other.map_or(may_be_slice, |(format, _)| is_of_slices(format)) {
+                    left_out.push(name.into_owned());
+                }
+                continue;
+            }
+        };
         match slices.iter_mut().find(|(other, _)| other.name == format.name) {
             Some((_, files)) => files.push(file),
             None => slices.push((format, vec![file])),
         }
     }
+    if !left_out.is_empty() && !slices.is_empty() {
+        let (path, count, names) = (path.display(), left_out.len(), &left_out[..left_out.len().min(8)].join(", "));
+        let more = if count > 8 { ", …" } else { "" };
+        log::warn!("{path}: {count} files do not begin as slices do and are left out: {names}{more}");
+    }
     let found = match slices.as_slice() {
         [] => format!("{count} files, no slices among them"),
-        [(Format { name, read_folder: Some(read), .. }, files)] => return Ok((name, read(path, files)?)),
+        [(Format { name, read_folder: Some(read), .. }, files)] => return Ok((name, read(path, files, access)?)),
         [(Format { name, read: Err(feature), .. }, _)] => needs(name, feature),
         several => {
             let counts = several.iter().map(|(Format { name, .. }, files)| format!("{} {name} files", files.len()));
@@ -158,6 +218,16 @@ fn read_folder<T: Voxel>(path: &Path, formats: &[Format<T>]) -> Result<(&'static
     };
     let allowed = format!("a volume file, or a folder with the slices of one volume, {}", SLICES.join(" or "));
     Err(invalid(path, "folder", found, allowed))
+}
+
+/// What is before the colon, and what is behind it, of a path such as `file.npz:name`; any other path is all before it.
+pub(super) fn archive_and_array(path: &Path) -> (&Path, Option<&str>) {
+    const EXTENSION: &str = ".npz:";
+    let split = path.to_str().filter(|_| !path.exists()).and_then(|text| {
+        let at = text.to_ascii_lowercase().rfind(EXTENSION)? + EXTENSION.len();
+        Some((Path::new(&text[..at - 1]), Some(&text[at..])))
+    });
+    split.unwrap_or((path, None))
 }
 
 fn needs(name: &str, feature: &str) -> String {

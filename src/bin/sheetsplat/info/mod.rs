@@ -13,6 +13,7 @@ use sheetsplat::volume::{Orientation, SampleType, Volume};
 
 use crate::arguments::Input;
 use crate::failure::Failure;
+use crate::outputs::Outputs;
 use crate::stdout;
 use statistics::{Histogram, extent_and_mean};
 
@@ -53,6 +54,8 @@ struct Info {
     r#type: String,
     spacing: [f64; 3],
     unit: Option<String>,
+    /// Voxels whose samples are NaN or infinite; what follows is that of the others.
+    holes: u64,
     min: f64,
     max: f64,
     mean: f64,
@@ -86,7 +89,8 @@ impl Frame {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let input = &arguments.input;
     let scene = input.scene()?;
-    let volume = input.load_volume(&scene)?;
+    let outputs = Outputs::check(&[], true, &input.files(&scene))?;
+    let volume = input.load_volume(&scene, &outputs)?;
     let scene = input.settled(&volume, &scene, Scene::explicit)?;
     let suggested = Preset::suggested(&volume);
     let [min, max, mean] = extent_and_mean(volume.values());
@@ -98,6 +102,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         r#type: encoding.map_or(SampleType::F32, |encoding| encoding.sample_type).to_string(),
         spacing: volume.spacing().to_array(),
         unit: volume.unit().map(str::to_owned),
+        holes: volume.holes(),
         min,
         max,
         mean,
@@ -128,6 +133,9 @@ fn described(info: &Info, volume: &Volume) -> String {
     let [x, y, z] = info.spacing.map(short);
     line("spacing", format!("{x} × {y} × {z} {}", info.unit.as_deref().unwrap_or("(no unit)")));
     line("orientation", volume.orientation().map_or("not given".to_owned(), orientation));
+    if info.holes > 0 {
+        line("holes", format!("{} samples are NaN or infinite", info.holes));
+    }
     line("range", format!("{} to {}, mean {}", short(info.min), short(info.max), short(info.mean)));
     let [x, y, z] = info.frame.center.map(short);
     let (name, length) = match info.frame.distance {

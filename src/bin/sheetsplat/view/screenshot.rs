@@ -3,18 +3,18 @@
 use std::path::{Path, PathBuf};
 
 use eframe::egui::{ColorImage, Rect};
-use sheetsplat::image::Image;
+use sheetsplat::image::{Image, output};
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::TransferFunction;
 use sheetsplat::volume::Volume;
 
-use crate::arguments::save;
+use crate::arguments::scene_file;
 use crate::failure::Failure;
 
 /// The first of `sheetsplat-1.png`, `sheetsplat-2.png`, …, or another extension, that is not in the current folder yet.
 pub(super) fn free_name(extension: &str) -> PathBuf {
     let mut names = (1_u32..).map(|number| PathBuf::from(format!("sheetsplat-{number}.{extension}")));
-    names.find(|name| !name.exists()).unwrap_or_default()
+    names.find(|name| name.symlink_metadata().is_err()).unwrap_or_default()
 }
 
 /// Saves a scene as it is shown, with another transfer function than it came with.
@@ -25,7 +25,8 @@ pub(super) fn save_scene(
     path: &Path,
 ) -> Result<(), Failure> {
     let scene = Scene { transfer: transfer.clone().into(), ..scene.clone() };
-    save(&scene.explicit(volume), path)
+    let text = scene_file(&scene.explicit(volume), path)?;
+    output::write(path, &text).map_err(|error| Failure::Other(format!("{}: {error}", path.display())))
 }
 
 /// The pixels of the window, or of a part of it, given in pixels.
