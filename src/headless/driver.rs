@@ -38,8 +38,8 @@ fn advice_for(os: &str, os_release: &str) -> String {
 /// What a distribution calls itself, and then those that it is like.
 fn names(os_release: &str) -> Vec<String> {
     let value = |key: &str| {
-        let values = os_release.lines().filter_map(|line| line.trim().strip_prefix(key)?.strip_prefix('='));
-        values.last().unwrap_or_default().trim_matches(['"', '\'']).to_lowercase()
+        let mut values = os_release.lines().filter_map(|line| line.trim().strip_prefix(key)?.strip_prefix('='));
+        values.next_back().unwrap_or_default().trim_matches(['"', '\'']).to_lowercase()
     };
     let like = value("ID_LIKE");
     std::iter::once(value("ID")).chain(like.split_whitespace().map(str::to_owned)).collect()

@@ -1,6 +1,6 @@
 //! `sheetsplat render`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
