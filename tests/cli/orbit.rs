@@ -217,4 +217,11 @@ fn a_saved_scene_renders_the_frames_bytes() {
     folder
         .run("orbit builtin:cube:8 -o f%d.png --save-scene s.json")
         .assert_failure(2, &["--save-scene", "s.json", ".toml"]);
+    // The scene that is read is not written.
+    let before = folder.read("s.toml");
+    for output in ["f%d.png", "f.gif"] {
+        let run = folder.run(&format!("orbit s.toml --count 4 -o {output} --save-scene ./s.toml"));
+        run.assert_failure(2, &["--save-scene", "s.toml"]);
+    }
+    assert!(folder.read("s.toml") == before && !folder.path("f.gif").exists());
 }
