@@ -74,7 +74,7 @@ fn frames_are_those_that_render_chooses_and_presets_fit_the_kind_of_data() {
     assert!(eye["frame"]["distance"].as_f64().unwrap() > 14.0 && eye["frame"]["height"].is_null(), "{eye}");
 
     // A body of soft tissue with some bone, in Hounsfield units, signed and not.
-    let tissue = |at: usize| if at % 20 == 0 { 700.0 } else { 40.0 + (at % 7) as f32 };
+    let tissue = |at: usize| if at.is_multiple_of(20) { 700.0 } else { 40.0 + (at % 7) as f32 };
     let body = |offset: f32| -> Vec<f32> {
         voxels.clone().enumerate().map(|(at, inside)| offset + if inside { tissue(at) } else { -1000.0 }).collect()
     };

@@ -26,7 +26,7 @@ fn without_a_scene_file_the_object_fills_the_image() {
         let [left, right, top, bottom] = lit(&folder, &format!("builtin:head:40 {size} {set}"));
         let (wide, high) = (right + 1 - left, bottom + 1 - top);
         // 0.9 of an axis less the kernels' faint rims, and in perspective what is behind the box's front.
-        assert!(high >= 54 && high <= 73 && wide <= 91, "{set}: {wide} × {high}");
+        assert!((54..=73).contains(&high) && wide <= 91, "{set}: {wide} × {high}");
         assert!(
             left.abs_diff(99 - right) <= 6 && top.abs_diff(79 - bottom) <= 6,
             "{set}: {left} {right} {top} {bottom}"
