@@ -42,7 +42,7 @@ pub(super) struct App {
     /// The camera that the scene came with.
     home: Camera,
     /// What a camera with open values shows.
-    extent: Option<Extent>,
+    object: Option<Extent>,
     editor: Editor,
     histogram: Histogram,
     guest: Guest,
@@ -79,14 +79,14 @@ impl App {
         let Some(host) = &context.wgpu_render_state else {
             return Err(Failure::Other("the window has no wgpu device".to_owned()));
         };
-        let extent = scene.extent(&volume, &scene.transfer.resolve(&volume));
+        let object = scene.extent(&volume, &scene.transfer.resolve(&volume));
         let guest = Guest::new(host, volume, &scene, &arguments.input.name)?;
         let values = guest.volume().values();
         let editor = Editor::new(guest.transfer(), extent(values));
         Ok(Self {
             input: arguments.input.name.clone(),
             home: scene.camera,
-            extent,
+            object,
             transfer: guest.transfer().clone(),
             histogram: Histogram::new(values, editor.range()),
             editor,
@@ -144,7 +144,7 @@ impl App {
     /// The camera over an image of `size` pixels: what it leaves open shows the object whole from everywhere.
     fn camera(&self, size: [u32; 2]) -> Camera {
         let camera = &self.scene.camera;
-        self.extent.map_or(*camera, |extent| extent.fit_all_around(camera, size))
+        self.object.map_or(*camera, |object| object.fit_all_around(camera, size))
     }
 
     /// Orbit, zoom and pan. Returns whether the picture is being changed by the pointer.
