@@ -123,6 +123,7 @@ pub(super) fn unit_directions(axes: [DVec3; 3]) -> Result<DMat3, (String, String
 }
 
 /// What [`lengths_and_directions`] takes.
+#[cfg(any(feature = "dicom", feature = "metaimage", feature = "vtk"))]
 pub(super) fn orthogonal() -> String {
     format!("orthogonal axes, cosines of at most {MAX_COSINE}")
 }

@@ -22,8 +22,11 @@ pub(super) struct Bytes {
 
 enum Reader {
     File(BufReader<File>),
-    Inflated(BufReader<DeflateDecoder<Chain<Cursor<Vec<u8>>, BufReader<File>>>>),
+    Inflated(BufReader<DeflateDecoder<Deflated>>),
 }
+
+/// What was read already, and the rest of the file.
+type Deflated = Chain<Cursor<Vec<u8>>, BufReader<File>>;
 
 impl Bytes {
     /// A file's first bytes, and all of it.
