@@ -10,6 +10,7 @@ use sheetsplat::headless::{Headless, HeadlessOptions, Rendering};
 use sheetsplat::internals::reference;
 use sheetsplat::internals::reference::visibility::Test;
 use sheetsplat::scene::{Scene, VolumeSource};
+use sheetsplat::settings::Camera;
 use sheetsplat::settings::Projection;
 use sheetsplat::settings::Ramp;
 use sheetsplat::settings::{Compositing, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
@@ -38,7 +39,7 @@ fn random_case(random: &mut Random) -> (Volume, Scene) {
         1 => {
             // Close by: the object reaches beyond every edge of the image.
             scene.camera.projection = Projection::Orthographic { height: Some(12.0) };
-            scene.camera.center = random.within(DVec3::splat(-4.0), DVec3::splat(4.0));
+            scene.camera.center = Some(random.within(DVec3::splat(-4.0), DVec3::splat(4.0)));
         }
         _ => scene.camera = random_eye(random, volume.grid()),
     }
@@ -206,6 +207,7 @@ fn the_parallelogram_hides_more() {
 fn the_papers_simpler_tests() {
     let volume = builtin::volume("head:48").unwrap();
     let mut scene = Scene::new(VolumeSource::Builtin("head:48".to_owned()));
+    scene.camera = Camera::default();
     (scene.image.width, scene.image.height) = (96, 96);
     scene.camera.projection = Projection::Orthographic { height: Some(172.0) };
     let transfer = scene.transfer.resolve(&volume);
@@ -231,6 +233,7 @@ fn what_the_rectangle_costs() {
     ] {
         let volume = volume.clone().with_spacing("head", DVec3::from(spacing)).unwrap();
         let mut scene = Scene::new(VolumeSource::Builtin("head:40".to_owned()));
+        scene.camera = Camera::default();
         scene.camera.direction = DVec3::from(direction);
         scene.camera.up = DVec3::new(0.3, 0.1, 1.0);
         (scene.image.width, scene.image.height) = (120, 120);
@@ -261,6 +264,7 @@ fn tiles_and_the_bounding_box() {
     };
     let areas = |voxels: &[UVec3]| {
         let mut scene = Scene::new(VolumeSource::Builtin("cube".to_owned()));
+        scene.camera = Camera::default();
         scene.camera.direction = DVec3::Y;
         scene.camera.projection = Projection::Orthographic { height: Some(100.0) };
         (scene.image.width, scene.image.height) = (200, 200);
@@ -287,6 +291,7 @@ fn tiles_and_the_bounding_box() {
 fn profiled_frames() {
     let volume = builtin::volume("head:64").unwrap();
     let mut scene = Scene::new(VolumeSource::Builtin("head:64".to_owned()));
+    scene.camera = Camera::default();
     (scene.image.width, scene.image.height) = (40, 40);
     scene.splatting.slab_width = 0.05;
     let devices = [false, true]

@@ -339,14 +339,14 @@ fn picks() {
         let Pick { label, .. } = picked;
         assert_eq!(label, None);
         // Nothing is as opaque as that beside the plate.
-        scene.camera.center = DVec3::new(100.0, 0.0, 0.0);
+        scene.camera.center = Some(DVec3::new(100.0, 0.0, 0.0));
         let mut beside = gpu.view(volume.clone(), &scene).unwrap();
         beside.set_first_hit(Some(0.5));
         gpu.draw(&mut beside).unwrap();
         assert_eq!(gpu.pick(&beside, [3, 3]).unwrap(), None);
         let error = gpu.pick(&beside, [21, 3]).unwrap_err().to_string();
         assert!(error.contains("[21, 3]") && error.contains("21×21"), "{error}");
-        scene.camera.center = DVec3::ZERO;
+        scene.camera.center = Some(DVec3::ZERO);
     }
 }
 

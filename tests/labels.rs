@@ -312,7 +312,7 @@ fn labels_in_several_layers() {
     let volume = volume.with_labels(labels).unwrap();
     let mut scene = scene(64, 48);
     scene.camera = camera([0.02, 0.5, -0.9], 30.0);
-    scene.camera.center = volume.grid().world_position(place);
+    scene.camera.center = Some(volume.grid().world_position(place));
     scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(100.0, 0.0), (150.0, 0.2)]);
     scene.transfer.labels = tables(&[1, 2, 3]).collect();
     scene.transfer.iso_ranges = Some(vec![[100.0, 300.0]]);

@@ -374,7 +374,7 @@ fn a_volume_larger_than_a_binding_is_rendered_with_webgpus_default_limits() {
     scene.camera.projection = Projection::Orthographic { height: Some(14.0) };
     let images = [small, shape].map(|dims| {
         // The same voxels in the middle.
-        scene.camera.center = (dims - small).as_dvec3() / 2.0;
+        scene.camera.center = Some((dims - small).as_dvec3() / 2.0);
         gpu.render_volume(whole(dims), &scene).unwrap()
     });
     let [alone, end] = &images;

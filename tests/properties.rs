@@ -48,7 +48,7 @@ fn empty_volume_is_exactly_the_background() {
     excluded.iso_ranges = Some(vec![[1000.0, 2000.0]]);
     let elsewhere = DVec3::new(1e4, 0.0, 0.0);
     for (transfer, center) in [(transparent, DVec3::ZERO), (excluded, DVec3::ZERO), (visible, elsewhere)] {
-        (scene.transfer, scene.camera.center) = (transfer, center);
+        (scene.transfer, scene.camera.center) = (transfer, Some(center));
         for (compositing, order) in
             COMPOSITINGS.into_iter().flat_map(|c| [Order::FrontToBack, Order::BackToFront].map(|order| (c, order)))
         {

@@ -157,3 +157,54 @@ fn small_bindings_change_no_bit_of_tiles() {
         assert_eq!(full.stats.counts, small.stats.counts);
     }
 }
+
+/// Counts this thread's warnings about quads.
+struct Warnings;
+
+thread_local! {
+    static WARNINGS: std::cell::RefCell<Vec<String>> = const { std::cell::RefCell::new(Vec::new()) };
+}
+
+impl log::Log for Warnings {
+    fn enabled(&self, metadata: &log::Metadata<'_>) -> bool {
+        metadata.level() <= log::Level::Warn
+    }
+
+    fn log(&self, record: &log::Record<'_>) {
+        if self.enabled(record.metadata()) && record.target().starts_with("sheetsplat") {
+            WARNINGS.with_borrow_mut(|warnings| warnings.push(record.args().to_string()));
+        }
+    }
+
+    fn flush(&self) {}
+}
+
+#[test]
+fn a_fallback_to_quads_says_why_once() {
+    log::set_logger(&Warnings).unwrap();
+    log::set_max_level(log::LevelFilter::Warn);
+    let (volume, scene) = head();
+    let sections = |mut scene: Scene| {
+        scene.splatting.footprint = FootprintForm::Sections;
+        scene
+    };
+    for (features, scene, reason) in [
+        (Features::empty(), scene.clone(), Some("subgroups")),
+        (TILE_FEATURES, scene.clone(), None),
+        // The settings ask for quads.
+        (Features::empty(), sections(scene), None),
+    ] {
+        let gpu = open(features);
+        let mut view = gpu.view(volume.clone(), &scene).unwrap();
+        assert!(view.fallback().is_none());
+        for _ in 0..2 {
+            gpu.draw(&mut view).unwrap();
+            assert_eq!(view.fallback().is_some(), reason.is_some());
+        }
+        let warnings = WARNINGS.take();
+        assert_eq!(warnings.len(), usize::from(reason.is_some()), "{warnings:?}");
+        for text in warnings.into_iter().chain(view.fallback().map(ToString::to_string)) {
+            assert!(text.contains(reason.unwrap()), "{text}");
+        }
+    }
+}

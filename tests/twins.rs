@@ -334,7 +334,7 @@ fn no_view_breaks_down() {
         let fov_y = [1e-3, 5.0, 60.0, 170.0, 179.999][case % 5];
         let near = [1e-9, 1e-3, 0.1, 1.0, 30.0][case / 5 % 5];
         scene.camera = perspective(random.direction().to_array(), fov_y, random.uniform(0.01, 60.0), Some(near));
-        scene.camera.center = random.direction() * 10.0;
+        scene.camera.center = Some(random.direction() * 10.0);
         scene.splatting.method = METHODS[case % 3];
         scene.splatting.compositing = BY_AMOUNTS[case / 3 % 3];
         let transfer = scene.transfer.resolve(&volume);

@@ -73,6 +73,7 @@ struct Frame {
 
 impl Frame {
     fn new(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Self, RenderError> {
+        let scene = &scene.framed(volume, transfer);
         let geometry = Geometry::new(volume.grid(), scene)?;
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
         let voxels = shading::taking_part(volume, transfer, &geometry);

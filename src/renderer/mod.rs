@@ -7,7 +7,7 @@ pub(crate) mod placement;
 pub(crate) mod prepared_frame;
 pub(crate) mod scene_view;
 
-use std::sync::OnceLock;
+use std::sync::{Once, OnceLock};
 
 use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Queue, RenderPass, TextureFormat, TextureView};
 
@@ -53,6 +53,8 @@ pub struct Renderer {
     first_hit: OnceLock<FirstHit>,
     /// Stands for a host's depth where there is none.
     no_surfaces: OnceLock<TextureView>,
+    /// Whether it was logged that tiles will not do.
+    fell_back: Once,
 }
 
 impl Renderer {
@@ -81,6 +83,7 @@ impl Renderer {
             resolve,
             first_hit: OnceLock::new(),
             no_surfaces: OnceLock::new(),
+            fell_back: Once::new(),
         })
     }
 
@@ -121,7 +124,7 @@ impl Renderer {
         let settled = view.volume.lists.settled(&limits);
         let lists = settled.lists();
         let by_label = view.volume.shades_by_label();
-        let tiles = match request.way {
+        let tiles = match request.kind {
             RasterizerKind::Tiles => {
                 let bricks = (settled.all(), lists.len());
                 match TileRasterizer::estimate(&limits, &request, bricks, by_label) {
@@ -131,7 +134,7 @@ impl Renderer {
             }
             RasterizerKind::Quads | RasterizerKind::Samples => None,
         };
-        let needs = match (tiles, request.way) {
+        let needs = match (tiles, request.kind) {
             (Some(needs), _) => needs,
             (None, RasterizerKind::Samples) => {
                 let bricks = (view.volume.grid(), settled.all());
@@ -155,13 +158,20 @@ impl Renderer {
 
     fn request(&self, view: &SceneView) -> Result<FrameRequest, RenderError> {
         let SceneView { volume, scene, surfaces, first_hit, .. } = view;
-        FrameRequest::new(&self.device, volume, scene, (surfaces.as_ref(), *first_hit), self.rasterizer)
+        FrameRequest::new(
+            &self.device,
+            volume,
+            (scene, &view.camera()),
+            (surfaces.as_ref(), *first_hit),
+            self.rasterizer,
+        )
     }
 
     fn prepare_unscoped(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
         // What can fail comes before anything is taken from the last frame.
-        let request = self.request(view)?;
+        let mut request = self.request(view)?;
         let SceneView { volume, scene, surfaces, frame, .. } = view;
+        let fallback = request.fallback.take();
         volume.flush(device, queue)?;
         let sheets = (self.sheet_format, self.sheets);
         let kept = PreviousFrame::of(frame.take(), sheets, &request.view);
@@ -195,7 +205,13 @@ impl Renderer {
             cut: cut_buffers,
         };
         let was = kept.drawing.as_ref().map(Drawing::rasterizer);
-        let (drawing, prepared) = self.draw_with(inputs, kept.drawing)?;
+        let (drawing, prepared, too_much) = self.draw_with(inputs, kept.drawing)?;
+        let fallback = fallback.or(too_much);
+        if let Some(reason) = &fallback {
+            self.fell_back.call_once(|| {
+                log::warn!("drawn by quads, which may take longer than by tiles: {reason}");
+            });
+        }
         let totals = kept.totals.filter(|_| !prepared.bucketed && was == Some(drawing.rasterizer()));
 
         let first_hits = drawing.first_hits().filter(|_| rays.first_hit).map(|words| {
@@ -219,6 +235,7 @@ impl Renderer {
             resolve_groups: compositing.bands.iter().map(|band| self.resolve.bind(device, &uniform, band)).collect(),
             view: *seen,
             drawing,
+            fallback,
             compositing,
             uniform,
             control_points,
@@ -231,12 +248,12 @@ impl Renderer {
         Ok(prepared)
     }
 
-    /// Prepares a rasterizer's part: by tiles, unless the view does not fit them and the scene does not insist.
+    /// Prepares a rasterizer's part: by tiles, unless the view does not fit them and the scene does not insist. Then the error is why.
     fn draw_with(
         &self,
         inputs: FrameInputs<'_>,
         previous: Option<Drawing>,
-    ) -> Result<(Drawing, Prepared), RenderError> {
+    ) -> Result<(Drawing, Prepared, Option<RenderError>), RenderError> {
         let (mut old_quads, mut old_tiles, mut old_samples) = (None, None, None);
         match previous {
             Some(Drawing::Quads(frame)) => old_quads = Some(*frame),
@@ -244,20 +261,21 @@ impl Renderer {
             Some(Drawing::Samples(frame)) => old_samples = Some(*frame),
             None => {}
         }
-        let FrameRequest { way, splatting, .. } = inputs.request;
-        if *way == RasterizerKind::Samples {
+        let FrameRequest { kind, splatting, .. } = inputs.request;
+        if *kind == RasterizerKind::Samples {
             let (frame, prepared) = self.samples(inputs.device).prepare(inputs, old_samples)?;
-            return Ok((Drawing::Samples(Box::new(frame)), prepared));
+            return Ok((Drawing::Samples(Box::new(frame)), prepared, None));
         }
-        if *way == RasterizerKind::Tiles {
+        let mut fallback = None;
+        if *kind == RasterizerKind::Tiles {
             match self.tiles.prepare(inputs, old_tiles) {
-                Ok((frame, prepared)) => return Ok((Drawing::Tiles(Box::new(frame)), prepared)),
+                Ok((frame, prepared)) => return Ok((Drawing::Tiles(Box::new(frame)), prepared, None)),
                 Err(error) if insists_on_tiles(splatting) => return Err(error),
-                Err(_) => {}
+                Err(error) => fallback = Some(error),
             }
         }
         let (frame, prepared) = self.quads(inputs.device).prepare(inputs, old_quads)?;
-        Ok((Drawing::Quads(Box::new(frame)), prepared))
+        Ok((Drawing::Quads(Box::new(frame)), prepared, fallback))
     }
 
     fn samples(&self, device: &Device) -> &SampleRasterizer {

@@ -2,6 +2,7 @@
 
 use wgpu::{BindGroup, Buffer, CommandEncoder, Texture, TextureFormat, TextureView};
 
+use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
@@ -17,6 +18,8 @@ pub(crate) struct PreparedFrame {
     pub(crate) sheets: (TextureFormat, u32),
     pub(crate) view: ViewGeometry,
     pub(crate) drawing: Drawing,
+    /// Why it is drawn by quads, where tiles were to draw it if they could.
+    pub(crate) fallback: Option<RenderError>,
     pub(crate) compositing: CompositingBuffer,
     pub(crate) uniform: Buffer,
     pub(crate) control_points: Buffer,

@@ -127,7 +127,11 @@ fn the_smallest_and_the_narrowest() {
         }
     }
     // Nothing but background.
-    for sets in ["camera.center=[1e300,1e300,1e300]", "transfer.iso_ranges=[[1e30,2e30]]", "transfer.opacity=[[0,0]]"] {
+    for sets in [
+        "camera={center=[1e300,1e300,1e300],fit='volume'}",
+        "transfer.iso_ranges=[[1e30,2e30]]",
+        "transfer.opacity=[[0,0]]",
+    ] {
         for rasterizer in RASTERIZERS {
             let render = format!("ball.nrrd --set image={{width=9,height=7}} --set {sets} {rasterizer}");
             assert_eq!(folder.pixels(&render).2, [BLACK; 63], "{render}");

@@ -33,6 +33,9 @@ use common::compare::{assert_at_least, assert_at_most};
 use common::images::{BLACK, psnr};
 use common::shared::shared;
 
+/// A camera that does not follow what is visible, so that it is the same for one picture and for many.
+const WHOLE: &str = "--set camera.fit=volume";
+
 /// A temporary folder, which is also the program's current directory.
 struct Folder(tempfile::TempDir);
 

@@ -116,7 +116,7 @@ fn sets_are_what_a_scene_file_says() {
     );
     folder.write("plain.toml", "[volume]\nbuiltin = \"cube:4\"\n[splatting]\nslab_width = 3\n");
     folder.render("scene.toml -o scene.npy");
-    let sets = "--set volume.spacing=[1,2,1.5] --set camera={direction=[1,1,0.5],up=[0,1,0],height=20} \
+    let sets = "--set volume.spacing=[1,2,1.5] --set camera={direction=[1,1,0.5],up=[0,1,0],height=20,fit=\"volume\"} \
                 --set image.width=30 --set image.height=21 --set transfer.opacity=[[60,0],[200,0.6]] \
                 --set splatting.compositing=exponential --set splatting.footprint=\"sections\" \
                 --set splatting.slab_width=0.5";

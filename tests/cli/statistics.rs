@@ -95,7 +95,7 @@ fn assert_stats_of_a_single_voxel(folder: &Folder, rasterizer: &str, name: &str,
     assert_counts("none takes part", &stats, &none.map(|key| (key, 0)));
 
     // Off the screen: counted, not drawn.
-    let stats = folder.stats(&format!("one.nrrd {haze} --set camera.center=[1000,0,0]"));
+    let stats = folder.stats(&format!("one.nrrd {haze} {WHOLE} --set camera.center=[1000,0,0]"));
     let expected = [("voxels_in_range", 1), ("sections_total", 4), ("sections_rasterized", 0), ("sheets", 4)];
     assert_counts("off the screen", &stats, &expected);
 }

@@ -173,7 +173,7 @@ fn look_at(scene: &mut Scene, grid: &Grid, voxel: UVec3, at: DVec2) {
     let seen = Seen::new(grid, scene.clone());
     let offset = (at - seen.geometry.size / 2.0) * seen.geometry.pix * grid.unit();
     let basis = seen.view.basis;
-    scene.camera.center = grid.world_position(voxel) - offset.x * basis.u + offset.y * basis.v;
+    scene.camera.center = Some(grid.world_position(voxel) - offset.x * basis.u + offset.y * basis.v);
 }
 
 /// Four sheets at a time, added up, so that a first sheet alone, the first two, and so on fall among them: against the same precision
@@ -281,7 +281,7 @@ fn frame_scene((direction, spacing, units_per_pixel, [width, height]): Frame, ra
     let unit = spacing.into_iter().fold(f64::INFINITY, f64::min);
     scene.camera = camera(direction, units_per_pixel * unit * f64::from(height));
     scene.camera.up = DVec3::new(0.2, 0.3, 1.0);
-    scene.camera.center = DVec3::from_array([(); 3].map(|()| random.uniform(-2.0, 2.0)));
+    scene.camera.center = Some(DVec3::from_array([(); 3].map(|()| random.uniform(-2.0, 2.0))));
     scene
 }
 

@@ -366,7 +366,7 @@ fn values_in_several_layers() {
     for (xs, ys, range) in places {
         let mut scene = oblique();
         scene.camera = camera([0.02, 0.5, -0.9], 30.0);
-        scene.camera.center = volume.grid().world_position(UVec3::new(xs.start + 14, ys.start + 7, 1));
+        scene.camera.center = Some(volume.grid().world_position(UVec3::new(xs.start + 14, ys.start + 7, 1)));
         scene.transfer.iso_ranges = Some(vec![range]);
         check(&format!("layers, from {xs:?} {ys:?}"), &volume, &scene);
     }
