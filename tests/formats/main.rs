@@ -1,14 +1,18 @@
-//! Readers of formats other than NRRD: files that other programs wrote (`tests/fixtures/make.py`), voxel for voxel, and files that are
+//! Readers of all formats, NRRD also in `tests/nrrd.rs`: files that other programs wrote (`tests/fixtures/make.py`), voxel for voxel, and files that are
 //! damaged or lie.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod data_files;
 mod dicom;
 mod dispatch;
 mod metaimage;
 mod nifti;
 mod npy;
+mod npz;
+mod nrrd;
 mod raw;
+mod reading;
 mod tiff;
 mod vtk;
 

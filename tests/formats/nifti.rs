@@ -212,3 +212,9 @@ fn measured() {
     let largest = nifti.values().iter().zip(nrrd.values()).map(|(&a, &b)| (f64::from(a) - slope * f64::from(b)).abs());
     assert!(largest.fold(0.0, f64::max) < 1e-3);
 }
+
+#[test]
+fn sizes_without_a_number_are_refused() {
+    let file = patched("nifti2.nii", 16, &i64::MIN.to_le_bytes());
+    assert_refused(Folder::new().open("a.nii", &file), "a.nii", "dim", "-9223372036854775808", "3 to 7");
+}
