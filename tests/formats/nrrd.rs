@@ -19,8 +19,8 @@ fn other_encodings() {
         let (text, instead) = (format!("encoding: {encoding}\n"), format!("encoding: {instead}\n"));
         assert_eq!(folder.open(name, &replaced(name, &text, &instead)).unwrap().values(), values(), "{instead}");
     }
-    let lowercase = replaced("hex.nrrd", "00CA".to_lowercase().as_str(), "00CA");
-    assert_eq!(folder.open("hex.nrrd", &lowercase).unwrap().values(), values());
+    let uppercase = replaced("hex.nrrd", "00c8", "00C8");
+    assert_eq!(folder.open("hex.nrrd", &uppercase).unwrap().values(), values());
 }
 
 #[test]
