@@ -262,3 +262,14 @@ fn pages_of_colours_are_refused() {
     let colors = Volume::open(&fixture("rgb.tif"));
     assert_refused(colors, "rgb.tif", "page 1", "RGB pages, 3 samples a pixel", "one sample a pixel");
 }
+
+/// A name may have the sign that errors show for numbers.
+#[test]
+fn names_with_number_signs() {
+    let folder = Folder::new();
+    for name in ["a5#.tif", "a#1.tif"] {
+        fs::copy(fixture("slices/z8.tif"), folder.0.path().join(name)).unwrap();
+    }
+    let name = folder.0.path().file_name().unwrap().to_str().unwrap();
+    assert_refused(Volume::open(folder.0.path()), name, "slices", "1 of a##.tif, 1 of a##.tif", "differ in one number");
+}
