@@ -1,0 +1,5 @@
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+    sheetsplat_fuzz::volume("volume.npz", bytes, sheetsplat::Volume::open);
+});
