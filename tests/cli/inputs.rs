@@ -189,15 +189,15 @@ fn a_files_palette_is_a_colour_map() {
     let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
     let (palette, gray) = (fixtures.join("palette.tif"), fixtures.join("packbits.tif"));
     let scene = |name: &str, colormap: &str| {
-        folder.render(&format!("{name} {SIZE} {colormap} -o out.npy --save-scene out.toml"));
+        folder.render(&format!("{name} {SIZE}{colormap} -o out.npy --save-scene out.toml"));
         String::from_utf8(folder.read("out.toml")).unwrap()
     };
-    let saved = scene(&palette.display().to_string(), "--colormap file");
+    let saved = scene(&palette.display().to_string(), " --colormap file");
     let color = |value: f64| format!("[{value:.1}, [{}, {}, 0.2]]", value / 255.0, (255.0 - value) / 255.0);
     for value in [51.0, 102.0, 204.0] {
         assert!(saved.contains(&color(value)), "no {} in {saved}", color(value));
     }
-    assert_eq!(scene(&palette.display().to_string(), "--set transfer.colormap=file"), saved);
+    assert_eq!(scene(&palette.display().to_string(), " --set transfer.colormap=file"), saved);
     let without = |saved: &str| saved.lines().filter(|line| !line.starts_with("path")).collect::<Vec<_>>().join("\n");
     let [plain, other] = [&palette, &gray].map(|path| without(&scene(&path.display().to_string(), "")));
     assert_eq!(plain, other, "the default stays");
