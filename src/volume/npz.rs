@@ -206,6 +206,9 @@ impl<R: Read> Read for Checked<R> {
 
 /// Some bytes of the file, which must be there.
 fn bytes_at(file: &mut Source, at: u64, bytes: u64) -> Result<Vec<u8>, VolumeError> {
+    if at > i64::MAX as u64 {
+        return Err(damaged(file));
+    }
     let mut found = Vec::new();
     let read =
         file.reader.seek(SeekFrom::Start(at)).and_then(|_| file.reader.by_ref().take(bytes).read_to_end(&mut found));

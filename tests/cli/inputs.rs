@@ -165,3 +165,72 @@ fn holes_are_said_once() {
     }
     assert!(!folder.names().contains("b.png"));
 }
+
+#[test]
+fn every_subcommand_confines_what_it_reads() {
+    let folder = with_patients();
+    fs::create_dir(folder.path("in")).unwrap();
+    fs::copy(folder.path("nowhere.nrrd"), folder.path("in/good.nrrd")).unwrap();
+    folder.write("in/scene.toml", "volume.path = '../nowhere.nrrd'");
+    folder.write("scene.toml", "volume.path = 'in/good.nrrd'");
+    folder.render(&format!("in/good.nrrd {SIZE} --confine in -o good.npy"));
+    folder.render(&format!("in/scene.toml {SIZE} -o good.npy"));
+    let words =
+        ["nowhere.nrrd: file: found a path that leads elsewhere", "files within in, to which reading is confined"];
+    for (command, output) in [("render", "-o a.npy"), ("orbit", "-o a-%d.npy"), ("bench", ""), ("info", "")] {
+        for input in ["in/scene.toml", "nowhere.nrrd"] {
+            let run = folder.run(format!("{command} {input} --confine in {output}").trim_end());
+            run.assert_failure(2, &words);
+        }
+        let scene = folder.run(format!("{command} scene.toml --confine in {output}").trim_end());
+        scene.assert_failure(2, &["scene.toml: file: found a path that leads elsewhere"]);
+    }
+    let sweep = "sweep in/scene.toml --confine in -o a.npy --set splatting.slab_width=1,2";
+    folder.run(sweep).assert_failure(2, &words);
+    folder.run("render in/good.nrrd --confine nothing -o a.npy").assert_failure(2, &["nothing: No such file"]);
+    assert!(!folder.path("a.npy").exists());
+}
+
+#[test]
+fn memory_has_a_limit() {
+    let folder = with_patients();
+    folder.render(&format!("nowhere.nrrd {SIZE} --memory 240 -o good.npy"));
+    let words = ["nowhere.nrrd: data: found 5 × 4 × 3 voxels, which take 240 bytes", "the memory limit of 239 bytes"];
+    folder.run("render nowhere.nrrd --memory 239B -o a.npy").assert_failure(2, &words);
+    let words = ["builtin:cube:1024", "4294967296 bytes", "the memory limit of 2147483648 bytes"];
+    folder.run("info builtin:cube:1024 --memory 2GiB").assert_failure(2, &words);
+    folder.run("info nowhere.nrrd --memory 2XB").assert_failure(2, &["--memory", "2XB", "such as 2GiB"]);
+    // Far more than the file holds, and far more than any machine has.
+    let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1600 1600 1600\nencoding: bzip2\n\n";
+    folder.write("bomb.nrrd", header);
+    let words = [
+        "bomb.nrrd: data: found 1600 × 1600 × 1600 voxels",
+        "16384000000 bytes",
+        "the memory limit of 8000000000 bytes",
+    ];
+    folder.run("info bomb.nrrd --memory 8GB").assert_failure(2, &words);
+}
+
+/// Each value has the colour that the file says, whatever the range of those that show.
+#[test]
+fn a_files_palette_is_a_colour_map() {
+    let folder = Folder::new();
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
+    let (palette, gray) = (fixtures.join("palette.tif"), fixtures.join("packbits.tif"));
+    let scene = |name: &str, colormap: &str| {
+        folder.render(&format!("{name} {SIZE}{colormap} -o out.npy --save-scene out.toml"));
+        String::from_utf8(folder.read("out.toml")).unwrap()
+    };
+    let saved = scene(&palette.display().to_string(), " --colormap file");
+    let color = |value: f64| format!("[{value:.1}, [{}, {}, 0.2]]", value / 255.0, (255.0 - value) / 255.0);
+    for value in [51.0, 102.0, 204.0] {
+        assert!(saved.contains(&color(value)), "no {} in {saved}", color(value));
+    }
+    assert_eq!(scene(&palette.display().to_string(), " --set transfer.colormap=file"), saved);
+    let without = |saved: &str| saved.lines().filter(|line| !line.starts_with("path")).collect::<Vec<_>>().join("\n");
+    let [plain, other] = [&palette, &gray].map(|path| without(&scene(&path.display().to_string(), "")));
+    assert_eq!(plain, other, "the default stays");
+    let words = ["packbits.tif", "transfer.colormap", "file, for a volume without a palette", "another colour map"];
+    let gray = format!("render {} --colormap file -o a.npy", gray.display());
+    folder.run(&gray).assert_failure(2, &words);
+}

@@ -1,8 +1,9 @@
-//! Readers of formats other than NRRD: files that other programs wrote (`tests/fixtures/make.py`), voxel for voxel, and files that are
+//! Readers of all formats, NRRD also in `tests/nrrd.rs`: files that other programs wrote (`tests/fixtures/make.py`), voxel for voxel, and files that are
 //! damaged or lie.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod data_files;
 mod dicom;
 mod dispatch;
 mod holes;
@@ -10,7 +11,10 @@ mod metaimage;
 mod mgh;
 mod nifti;
 mod npy;
+mod npz;
+mod nrrd;
 mod raw;
+mod reading;
 #[path = "../common/shared.rs"]
 mod shared;
 mod shear;

@@ -261,3 +261,9 @@ fn shared_scan() {
         assert!((f64::from(a) - slope * f64::from(b)).abs() < 1e-3, "{a}, not {slope} times {b}");
     }
 }
+
+#[test]
+fn sizes_without_a_number_are_refused() {
+    let file = patched("nifti2.nii", 16, &i64::MIN.to_le_bytes());
+    assert_refused(Folder::new().open("a.nii", &file), "a.nii", "dim", "-9223372036854775808", "3 to 7");
+}

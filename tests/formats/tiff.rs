@@ -187,10 +187,10 @@ fn wrong_pages() {
     let grey = "grey pixels";
     refused("plain.tif", &[(256, 0)], "page 1", "invalid dimensions", grey);
     refused("plain.tif", &[(257, 3)], "page 2", "5 × 4 int32", "5 × 3 int32, as the first page");
-    refused("plain.tif", &[(258, 1)], "page 1", "Gray(1)", "one integer of 8 to 64 bits");
+    refused("plain.tif", &[(258, 1)], "page 1", "Gray(1)", "an integer of 8 to 64 bits");
     refused("plain.tif", &[(259, 50000)], "page 1", "ZSTD", grey);
-    refused("plain.tif", &[(262, 3)], "page 1", "RGBPalette", grey);
-    refused("plain.tif", &[(277, 2)], "page 1", "Multiband", "for each pixel");
+    refused("plain.tif", &[(262, 3)], "ColorMap", "0 numbers", "768 numbers, of 8-bit indices");
+    refused("plain.tif", &[(277, 2)], "page 1", "Multiband", "one sample a pixel");
     refused("tiled.tif", &[(258, 16)], "page 1", "Gray(16), IEEEFP", "float of 32 or 64 bits");
     refused("plain.tif", &[(273, 1 << 20)], "page 1", "failed to fill whole buffer", grey);
     refused("plain.tif", &[(279, 79)], "page 1", "79 bytes for 80", "that holds its pixels");
@@ -218,4 +218,58 @@ fn damage() {
         }
         assert_eq!(folder.open(name, &[&whole[..], b"padding"].concat()).unwrap().values(), values(), "{name}");
     }
+}
+
+/// Value v is red v / 255, green 1 - v / 255 and blue 0.2.
+#[test]
+fn indices_of_a_palette_are_the_values() {
+    for name in ["palette.tif", "palette-big.tif"] {
+        let volume = open(name);
+        assert_eq!(volume.encoding(), Some(Encoding { format: "TIFF", sample_type: SampleType::U8 }), "{name}");
+        let palette = volume.palette().unwrap();
+        assert_eq!(palette.len(), 256, "{name}");
+        for (index, &(value, color)) in palette.iter().enumerate() {
+            assert_eq!(value, index as f64, "{name}");
+            let red = index as f64 / 255.0;
+            assert!((color - DVec3::new(red, 1.0 - red, 0.2)).abs().max_element() < 1e-9, "{name}: {index} is {color}");
+        }
+    }
+    assert_eq!(open("packbits.tif").palette(), None);
+}
+
+#[test]
+fn other_palettes() {
+    let folder = Folder::new();
+    // Of another number of colours.
+    let mut bytes = fs::read(fixture("palette.tif")).unwrap();
+    let at = entry(&bytes, 320) + 4;
+    bytes[at..at + 4].copy_from_slice(&48_u32.to_le_bytes());
+    let allowed = "768 numbers, of 8-bit indices";
+    assert_refused(folder.open("a.tif", &bytes), "a.tif", "ColorMap", "48 numbers", allowed);
+    // Numbers of 8 bits where 16 are meant: blue is 51.
+    let mut bytes = fs::read(fixture("palette.tif")).unwrap();
+    let at = entry(&bytes, 320) + 8;
+    let first = u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    for number in bytes[first..first + 2 * 768].chunks_mut(2) {
+        number[1] = 0;
+    }
+    let volume = folder.open("a.tif", &bytes).unwrap();
+    assert_eq!(volume.palette(), open("palette.tif").palette());
+}
+
+#[test]
+fn pages_of_colours_are_refused() {
+    let colors = Volume::open(&fixture("rgb.tif"));
+    assert_refused(colors, "rgb.tif", "page 1", "RGB pages, 3 samples a pixel", "one sample a pixel");
+}
+
+/// A name may have the sign that errors show for numbers.
+#[test]
+fn names_with_number_signs() {
+    let folder = Folder::new();
+    for name in ["a5#.tif", "a#1.tif"] {
+        fs::copy(fixture("slices/z8.tif"), folder.0.path().join(name)).unwrap();
+    }
+    let name = folder.0.path().file_name().unwrap().to_str().unwrap();
+    assert_refused(Volume::open(folder.0.path()), name, "slices", "1 of a##.tif, 1 of a##.tif", "differ in one number");
 }

@@ -134,18 +134,64 @@ fn wrong_legacy_headers() {
     };
     refused("ASCII", "UTF-8", "encoding", "UTF-8", "ASCII or BINARY");
     refused("STRUCTURED_POINTS", "POLYDATA", "header", "DATASET POLYDATA", "a file of STRUCTURED_POINTS");
-    refused("DIMENSIONS 5 4 3", "DIMENSIONS 5 4", "DIMENSIONS", "5 4", "three positive integers");
+    refused("DIMENSIONS 5 4 3", "DIMENSIONS 5 4", "DIMENSIONS", "5 4 SPACING", "three numbers");
     refused("DIMENSIONS 5 4 3\n", "", "DIMENSIONS", "no such field", "three positive integers");
     refused("DIMENSIONS 5 4 3", "DIMENSIONS 5 4 2", "POINT_DATA", "60", "40, as DIMENSIONS says");
     refused("SPACING 0.5 2 3", "SPACING 0.5 2 nan", "SPACING", "0.5 2 nan", "three positive finite numbers");
     refused("POINT_DATA 60", "POINT_DATA many", "POINT_DATA", "many", "a number of points");
     refused("SCALARS values float", "SCALARS values half", "type", "half", "char, signed_char");
     refused("LOOKUP_TABLE default\n", "", "SCALARS", "0", "LOOKUP_TABLE in the next line");
-    refused("time 1 2 double", "time 1 double", "FIELD", "time 1 double", "name, components, tuples and type");
-    refused("time 1 2 double", "time 1 200 double", "header", "1 1", "a file of STRUCTURED_POINTS");
+    refused("time 1 2 double", "time 1 double", "time", "double", "a number of points, cells or components");
+    refused("time 1 2 double", "time 1 200 double", "header", "\"1\"", "a file of STRUCTURED_POINTS");
     refused("224 230", "224 2x0", "data", "\"2x0\", no number of type float32", "numbers as text");
     refused("224 230", "224", "data", "236 bytes", "240 bytes");
     refused("224 230", "224 1 230", "data", "more than 240 bytes", "240 bytes");
+}
+
+/// Keywords count, lines do not.
+#[test]
+fn legacy_headers_are_of_keywords() {
+    let folder = Folder::new();
+    for (name, text, instead) in [
+        ("binary.vtk", "BINARY\n", "\n\nBINARY\n"),
+        ("text.vtk", "ASCII\n", "\n  ascii\n\n"),
+        ("text.vtk", "vtk output\n", "\n"),
+        ("binary.vtk", "DATASET STRUCTURED_POINTS", "dataset structured_points"),
+        ("binary.vtk", "DIMENSIONS 5 4 3\nSPACING 0.5 2 3\n", "DIMENSIONS 5\n4 3 SPACING\n0.5 2 3\n"),
+        ("text.vtk", "LOOKUP_TABLE default\n", "\nlookup_table default "),
+        ("binary-field.vtk", "values 1 60 double\n", "values\n1 60\n\ndouble\n"),
+    ] {
+        let volume =
+            folder.open(name, &replaced(name, text, instead)).unwrap_or_else(|error| panic!("{instead:?}: {error}"));
+        assert_eq!(
+            (volume.dims(), volume.spacing(), volume.values()),
+            (DIMS, SPACING, values().as_slice()),
+            "{instead:?}"
+        );
+    }
+}
+
+/// Points count from any number on, but not down.
+#[test]
+fn extents_may_begin_below_0() {
+    let with = |name: &str, text: &str, extent: &str| {
+        let all = String::from_utf8_lossy(&fs::read(fixture(name)).unwrap()).replace(text, extent);
+        Folder::new().open("a.vti", all.as_bytes())
+    };
+    assert_eq!(with("text.vti", "0 4 0 3 0 2", "-7 -3 -3 0 -2 0").unwrap().values(), values());
+    let cells = |extent: &str| {
+        let text = fs::read_to_string(fixture("text.vti")).unwrap().replace("PointData", "CellData");
+        let empty = text.replace("<CellData>\n      </CellData>", "").replace("0 4 0 3 0 2", extent);
+        Folder::new().open("a.vti", empty.as_bytes())
+    };
+    assert_eq!(cells("-5 0 -4 0 0 3").unwrap().values(), values());
+    let allowed = "a last point behind the first one, or the same";
+    for extent in ["0 4 3 0 0 2", "0 4 0 -1 0 2"] {
+        assert_refused(with("text.vti", "0 4 0 3 0 2", extent), "a.vti", "WholeExtent", "0, 4", allowed);
+    }
+    // A flat grid has a layer of cells; one whose points go down has none.
+    assert_refused(cells("0 60 1 0 0 0"), "a.vti", "WholeExtent", "60", allowed);
+    assert_eq!(cells("0 60 1 1 0 0").unwrap().dims(), UVec3::new(60, 1, 1));
 }
 
 #[test]

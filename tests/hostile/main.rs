@@ -59,6 +59,9 @@ fn victims(folder: &Path) -> Vec<Victim> {
                 let open = match copy.file_name().unwrap().to_str().unwrap() {
                     "flipped.raw" => to.join("flipped.mhd"),
                     "zlib.zraw" => to.join("zlib.mhd"),
+                    "part0.bin" => to.join("list.mhd"),
+                    "part1.bin" => to.join("pattern.nhdr"),
+                    "two.npz" => to.join("two.npz:values"),
                     _ if to == folder => copy.clone(),
                     _ => to.to_owned(),
                 };

@@ -7,6 +7,9 @@ use super::super::VolumeError;
 use super::super::folder::{Part, natural};
 use super::super::source::invalid;
 
+/// Stands for a number; shown as `#`, which a name may have.
+const NUMBER: &str = "/";
+
 /// Refuses names that are not one run of numbers, and warns of numbers that are left out.
 pub(super) fn check(folder: &Path, files: &[PathBuf]) -> Result<(), VolumeError> {
     let names: Vec<String> =
@@ -16,7 +19,7 @@ pub(super) fn check(folder: &Path, files: &[PathBuf]) -> Result<(), VolumeError>
     };
     let patterns = count_by(names.iter().map(|name| pattern(name)));
     if patterns.len() > 1 {
-        let listed = patterns.iter().take(8).map(|(pattern, count)| format!("{count} of {pattern}"));
+        let listed = patterns.iter().take(8).map(|(pattern, count)| format!("{count} of {}", shown(pattern)));
         return Err(refused(listed.collect::<Vec<_>>().join(", ")));
     }
     let numbers: Vec<Vec<u64>> = names.iter().map(|name| numbers(name)).collect();
@@ -26,7 +29,7 @@ pub(super) fn check(folder: &Path, files: &[PathBuf]) -> Result<(), VolumeError>
     let Some(run) = (0..columns).find(|&at| column(at).any(|number| number != numbers[0][at])) else { return Ok(()) };
     let mut steps: Vec<u64> = column(run).zip(column(run).skip(1)).map(|(one, next)| next - one).collect();
     if steps.contains(&0) {
-        return Err(refused(format!("more than one number that changes in {}", pattern(&names[0]))));
+        return Err(refused(format!("more than one number that changes in {}", shown(&pattern(&names[0])))));
     }
     steps.sort_unstable();
     steps.dedup();
@@ -37,14 +40,18 @@ pub(super) fn check(folder: &Path, files: &[PathBuf]) -> Result<(), VolumeError>
     Ok(())
 }
 
-/// A name with a sign in place of every number.
+/// A name with a sign that no name has in place of every number.
 fn pattern(name: &str) -> String {
     let parts = natural(name);
     let text = parts[..parts.len() - 1].iter().map(|part| match part {
-        Part::Number(..) => "#",
+        Part::Number(..) => NUMBER,
         Part::Text(text) => text,
     });
     text.collect()
+}
+
+fn shown(pattern: &str) -> String {
+    pattern.replace(NUMBER, "#")
 }
 
 /// The numbers in a name; one that is too large is the largest.
@@ -72,7 +79,8 @@ mod tests {
 
     #[test]
     fn names_are_patterns_and_numbers() {
-        assert_eq!(pattern("a10b001.tif"), "a#b#.tif");
+        assert_eq!(shown(&pattern("a10b001.tif")), "a#b#.tif");
+        assert_ne!(pattern("a5#.tif"), pattern("a#1.tif"));
         assert_eq!(numbers("a10b001.tif99999999999999999999"), [10, 1, u64::MAX]);
     }
 }

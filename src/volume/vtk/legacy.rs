@@ -1,4 +1,4 @@
-//! The older files: a text header of keywords, then the samples as text or, big-endian, as they are.
+//! The older files: a text header of keywords and values, in whichever lines they are, then the samples as text or, big-endian, as they are.
 
 use std::io::{self, BufRead, Read};
 use std::path::Path;
@@ -79,100 +79,137 @@ struct Array {
 }
 
 impl Header {
-    /// Reads the first three lines.
+    /// Reads the first two lines, and the word that says how samples are written.
     fn open(path: &Path, access: &Access) -> Result<Self, VolumeError> {
         let mut file = access.open(path)?;
         let mut budget = MAX_HEADER;
         let mut line = || Ok(file.line(&mut budget)?.unwrap_or_default());
-        let [magic, _title, encoding] = [line()?, line()?, line()?];
+        let [magic, _title] = [line()?, line()?];
         if !magic.starts_with("# vtk DataFile Version") {
             return Err(invalid(path, "magic", shown(&magic), "a first line # vtk DataFile Version"));
         }
-        let is_text = match encoding.trim() {
+        let mut header = Self { file, is_text: false, fields: Fields::new(path.to_owned()), budget };
+        let encoding = header.next_word()?.unwrap_or_default();
+        header.is_text = match encoding.to_ascii_uppercase().as_str() {
             "ASCII" => true,
             "BINARY" => false,
-            other => return Err(invalid(path, "encoding", shown(other), "ASCII or BINARY")),
+            _ => return Err(invalid(path, "encoding", shown(&encoding), "ASCII or BINARY")),
         };
-        Ok(Self { file, is_text, fields: Fields::new(path.to_owned()), budget })
+        Ok(header)
     }
 
-    /// The words of the next line that is not blank.
-    fn words(&mut self) -> Result<Vec<String>, VolumeError> {
-        while let Some(line) = self.file.line(&mut self.budget)? {
-            let words: Vec<String> = line.split_whitespace().map(str::to_owned).collect();
-            if !words.is_empty() {
-                return Ok(words);
+    /// The next word, in whichever line it is; `None` at the end of the file.
+    fn next_word(&mut self) -> Result<Option<String>, VolumeError> {
+        let mut word = Vec::new();
+        while let Some(&byte) = self.file.reader.fill_buf().map_err(io_error(&self.file.path))?.first() {
+            if byte.is_ascii_whitespace() && !word.is_empty() {
+                break;
+            }
+            self.budget = self
+                .budget
+                .checked_sub(1)
+                .ok_or_else(|| self.fields.invalid("header", "more", format!("less than {MAX_HEADER} bytes")))?;
+            self.file.reader.consume(1);
+            if !byte.is_ascii_whitespace() {
+                word.push(byte);
             }
         }
-        Err(self.fields.invalid("header", "the end of the file", "SCALARS, or an array of FIELD, with one component"))
+        Ok((!word.is_empty()).then(|| String::from_utf8_lossy(&word).into_owned()))
+    }
+
+    fn word(&mut self) -> Result<String, VolumeError> {
+        self.next_word()?.ok_or_else(|| {
+            self.fields.invalid("header", "the end of the file", "SCALARS, or an array of FIELD, with one component")
+        })
+    }
+
+    fn words<const N: usize>(&mut self) -> Result<[String; N], VolumeError> {
+        let mut words = [const { String::new() }; N];
+        for word in &mut words {
+            *word = self.word()?;
+        }
+        Ok(words)
     }
 
     /// Reads on to the samples of the first array of single numbers.
     fn find_array(&mut self) -> Result<Array, VolumeError> {
         let mut section: Option<(bool, u64)> = None;
         loop {
-            let words = self.words()?;
-            let words: Vec<&str> = words.iter().map(String::as_str).collect();
-            match (words.as_slice(), section) {
-                (["DATASET", "STRUCTURED_POINTS"], _) => {}
-                ([name @ ("DIMENSIONS" | "SPACING" | "ASPECT_RATIO" | "ORIGIN"), values @ ..], None) => {
-                    self.fields.add(name, &values.join(" "))?;
-                }
-                ([name @ ("POINT_DATA" | "CELL_DATA"), count], _) => {
-                    let count = self.number(name, count)?;
-                    section = Some((*name == "CELL_DATA", count));
-                }
-                (["METADATA", ..], _) => self.skip_metadata()?,
-                (["SCALARS", _name, kind, components @ ..], Some((of_cells, count))) => {
-                    let kind = self.kind(kind)?;
-                    let components = components.first().map_or(Ok(1), |number| self.number("SCALARS", number))?;
-                    match self.words()?.first().map(String::as_str) {
-                        Some("LOOKUP_TABLE") => {}
-                        other => {
-                            let found = shown(other.unwrap_or_default());
-                            return Err(self.fields.invalid("SCALARS", found, "LOOKUP_TABLE in the next line"));
-                        }
+            let keyword = self.word()?.to_ascii_uppercase();
+            match (keyword.as_str(), section) {
+                ("DATASET", _) => {
+                    let kind = self.word()?;
+                    if !kind.eq_ignore_ascii_case("STRUCTURED_POINTS") {
+                        return Err(self.unknown(&format!("DATASET {kind}")));
                     }
+                }
+                (name @ ("DIMENSIONS" | "SPACING" | "ASPECT_RATIO" | "ORIGIN"), None) => {
+                    let values: [String; 3] = self.words()?;
+                    let text = values.join(" ");
+                    if values.iter().any(|value| value.parse::<f64>().is_err()) {
+                        return Err(self.fields.invalid(name, shown(&text), "three numbers"));
+                    }
+                    self.fields.add(name, &text)?;
+                }
+                (name @ ("POINT_DATA" | "CELL_DATA"), _) => {
+                    let count = self.word()?;
+                    section = Some((name == "CELL_DATA", self.number(name, &count)?));
+                }
+                ("METADATA", _) => self.skip_metadata()?,
+                ("SCALARS", Some((of_cells, count))) => {
+                    let _name = self.word()?;
+                    // The number of components may be left out, so these are in one line.
+                    let line = self.file.line(&mut self.budget)?.unwrap_or_default();
+                    let mut words = line.split_whitespace();
+                    let kind = self.kind(words.next().unwrap_or_default())?;
+                    let components = words.next().map_or(Ok(1), |number| self.number("SCALARS", number))?;
+                    let [lookup_table, _name] = self.words()?;
+                    if !lookup_table.eq_ignore_ascii_case("LOOKUP_TABLE") {
+                        let allowed = "LOOKUP_TABLE in the next line";
+                        return Err(self.fields.invalid("SCALARS", shown(&lookup_table), allowed));
+                    }
+                    self.begin_samples()?;
                     if components == 1 {
                         return Ok(Array { kind, of_cells, count });
                     }
                     self.skip(kind, count.saturating_mul(components))?;
                 }
-                (["VECTORS" | "NORMALS", _name, kind], Some((_, count))) => {
-                    let kind = self.kind(kind)?;
+                ("VECTORS" | "NORMALS", Some((_, count))) => {
+                    let [_name, kind] = self.words()?;
+                    self.begin_samples()?;
+                    let kind = self.kind(&kind)?;
                     self.skip(kind, count.saturating_mul(3))?;
                 }
-                (["FIELD", _name, arrays], _) => {
-                    let arrays = self.number("FIELD", arrays)?;
+                ("FIELD", _) => {
+                    let [_name, arrays] = self.words()?;
+                    let arrays = self.number("FIELD", &arrays)?;
                     if let Some(array) = self.find_in_field(arrays, section)? {
                         return Ok(array);
                     }
                 }
-                _ => {
-                    let allowed = "a file of STRUCTURED_POINTS with DIMENSIONS, SPACING, ORIGIN, then POINT_DATA or CELL_DATA \
-                                   with SCALARS or FIELD";
-                    return Err(self.fields.invalid("header", shown(&words.join(" ")), allowed));
-                }
+                (other, _) => return Err(self.unknown(other)),
             }
         }
+    }
+
+    fn unknown(&self, found: &str) -> VolumeError {
+        let allowed = "a file of STRUCTURED_POINTS with DIMENSIONS, SPACING, ORIGIN, then POINT_DATA or CELL_DATA with SCALARS or FIELD";
+        self.fields.invalid("header", shown(found), allowed)
     }
 
     /// Reads on to the first of some arrays that has a number for each point or cell, or behind the last one.
     fn find_in_field(&mut self, arrays: u64, section: Option<(bool, u64)>) -> Result<Option<Array>, VolumeError> {
         let mut found = 0;
         while found < arrays {
-            let words = self.words()?;
-            let words: Vec<&str> = words.iter().map(String::as_str).collect();
-            let [name, components, tuples, kind] = words.as_slice() else {
-                if words[0] == "METADATA" {
-                    self.skip_metadata()?;
-                    continue;
-                }
-                let allowed = "name, components, tuples and type of an array";
-                return Err(self.fields.invalid("FIELD", shown(&words.join(" ")), allowed));
-            };
-            let (components, tuples) = (self.number(name, components)?, self.number(name, tuples)?);
-            let kind = self.kind(kind)?;
+            let name = self.word()?;
+            if name == "METADATA" {
+                self.skip_metadata()?;
+                continue;
+            }
+            let [components, tuples, kind] = self.words()?;
+            let (components, tuples) = (self.number(&name, &components)?, self.number(&name, &tuples)?);
+            let kind = self.kind(&kind)?;
+            self.begin_samples()?;
             if let Some((of_cells, count)) = section.filter(|&(_, count)| (components, tuples) == (1, count)) {
                 return Ok(Some(Array { kind, of_cells, count }));
             }
@@ -182,8 +219,17 @@ impl Header {
         Ok(None)
     }
 
+    /// Goes to where samples begin: text wherever the next word is, others in the next line.
+    fn begin_samples(&mut self) -> Result<(), VolumeError> {
+        if !self.is_text {
+            self.file.line(&mut self.budget)?;
+        }
+        Ok(())
+    }
+
     /// Skips what is said of an array, up to a blank line.
     fn skip_metadata(&mut self) -> Result<(), VolumeError> {
+        let _rest_of_line = self.file.line(&mut self.budget)?;
         while self.file.line(&mut self.budget)?.is_some_and(|line| !line.trim().is_empty()) {}
         Ok(())
     }

@@ -1,0 +1,199 @@
+//! Where files may be, and how much memory they may take.
+
+use std::os::unix::fs::symlink;
+
+use sheetsplat::Scene;
+use sheetsplat::volume::{Labels, RawLayout, ReadOptions, SampleType};
+
+use crate::*;
+
+/// A folder `in` with a volume, and files beside the folder.
+fn folders() -> (Folder, PathBuf, ReadOptions) {
+    let folder = Folder::new();
+    let inside = folder.0.path().join("in");
+    fs::create_dir(&inside).unwrap();
+    for name in ["c.npy", "list.mhd", "list.nhdr", "part0.bin", "part1.bin", "part2.bin", "pair.hdr", "pair.img"] {
+        fs::copy(fixture(name), inside.join(name)).unwrap();
+        fs::copy(fixture(name), folder.0.path().join(name)).unwrap();
+    }
+    let options = ReadOptions::default().confined_to(&inside);
+    (folder, inside, options)
+}
+
+/// Asserts that the message names the file and the folder.
+#[track_caller]
+fn assert_outside<T>(result: Result<T, VolumeError>, file: &str) {
+    let message = result.err().expect("an error").to_string();
+    let rest = message.split_once(file).map(|(_, rest)| rest);
+    assert!(
+        rest.is_some_and(|rest| rest.starts_with(": file: found a path that leads elsewhere, allowed: ")),
+        "{message}"
+    );
+    assert!(message.contains("/in, to which reading is confined"), "{message}");
+}
+
+#[test]
+fn files_are_confined() {
+    let (folder, inside, options) = folders();
+    let open = |name: &str| Volume::open_with(&inside.join(name), &options);
+    for name in ["c.npy", "list.mhd", "list.nhdr", "pair.hdr", "pair.img", "../in/c.npy"] {
+        assert_eq!(open(name).unwrap().values(), values(), "{name}");
+    }
+    assert_outside(open("../c.npy"), "c.npy");
+    assert_outside(Labels::open_with(&inside.join("../c.npy"), &options), "c.npy");
+    let layout = RawLayout { dims: DIMS, sample_type: SampleType::U8, big_endian: false, offset: 80 };
+    let raw = |name: &str| Volume::open_raw_with(&inside.join(name), &layout, &options);
+    assert!(raw("../c.npy").is_err_and(|error| error.to_string().contains("leads elsewhere")));
+    assert_outside(raw("../part0.bin"), "part0.bin");
+    assert_outside(Volume::open_with(folder.0.path(), &options), folder.0.path().to_str().unwrap());
+    // What is not there is not told from what is.
+    assert_outside(open("../missing.npy"), "missing.npy");
+    assert!(matches!(open("missing.npy"), Err(VolumeError::Io { .. })));
+    // A folder whose name only begins like the other one's.
+    fs::create_dir(folder.0.path().join("inner")).unwrap();
+    fs::copy(fixture("c.npy"), folder.0.path().join("inner/c.npy")).unwrap();
+    assert_outside(open("../inner/c.npy"), "c.npy");
+    let nowhere = ReadOptions::default().confined_to(folder.0.path().join("nowhere"));
+    let missing = Volume::open_with(&inside.join("c.npy"), &nowhere);
+    assert!(matches!(missing, Err(VolumeError::Io { path, .. }) if path.ends_with("nowhere")));
+}
+
+#[test]
+fn links_are_followed() {
+    let (folder, inside, options) = folders();
+    symlink(inside.join("c.npy"), inside.join("good.npy")).unwrap();
+    symlink(folder.0.path().join("c.npy"), inside.join("bad.npy")).unwrap();
+    symlink(folder.0.path().join("missing.npy"), inside.join("dangling.npy")).unwrap();
+    symlink(folder.0.path(), inside.join("up")).unwrap();
+    symlink(&inside, folder.0.path().join("link")).unwrap();
+    let open = |path: PathBuf| Volume::open_with(&path, &options);
+    assert_eq!(open(inside.join("good.npy")).unwrap().values(), values());
+    for name in ["bad.npy", "dangling.npy", "up/c.npy"] {
+        assert_outside(open(inside.join(name)), name);
+    }
+    assert_eq!(open(folder.0.path().join("link/c.npy")).unwrap().values(), values());
+    // The folder may itself be named by a link.
+    let linked = ReadOptions::default().confined_to(folder.0.path().join("link"));
+    assert_eq!(Volume::open_with(&inside.join("c.npy"), &linked).unwrap().values(), values());
+}
+
+#[test]
+fn what_headers_name_is_confined() {
+    let (folder, inside, options) = folders();
+    for (header, text, instead) in [
+        ("list.mhd", "part1.bin", "../part1.bin"),
+        ("list.nhdr", "part1.bin", "../part1.bin"),
+        ("list.mhd", "part1.bin", "/etc/passwd"),
+    ] {
+        fs::write(inside.join(header), replaced(header, text, instead)).unwrap();
+        assert_outside(Volume::open_with(&inside.join(header), &options), instead);
+    }
+    fs::write(inside.join("list.mhd"), replaced("list.mhd", "part1.bin", "../part1.bin")).unwrap();
+    assert_eq!(Volume::open(&inside.join("list.mhd")).unwrap().values(), values(), "as ever without the option");
+    fs::write(inside.join("one.mhd"), replaced("flipped.mhd", "flipped.raw", "../part1.bin")).unwrap();
+    assert_outside(Volume::open_with(&inside.join("one.mhd"), &options), "part1.bin");
+    fs::remove_file(inside.join("pair.img")).unwrap();
+    symlink(folder.0.path().join("pair.img"), inside.join("pair.img")).unwrap();
+    assert_outside(Volume::open_with(&inside.join("pair.hdr"), &options), "pair.img");
+    // A slice in a folder.
+    let slices = inside.join("slices");
+    fs::create_dir(&slices).unwrap();
+    for name in ["z8.tif", "z9.tif"] {
+        fs::copy(fixture("slices").join(name), slices.join(name)).unwrap();
+    }
+    assert_eq!(Volume::open_with(&slices, &options).unwrap().values(), &values()[..40]);
+    symlink(fixture("slices/z10.tif"), slices.join("z10.tif")).unwrap();
+    assert_outside(Volume::open_with(&slices, &options), "z10.tif");
+}
+
+#[test]
+fn what_scenes_name_is_confined() {
+    let (_folder, inside, options) = folders();
+    let load = |text: &str| Scene::parse(text, "scene.toml", &inside, &[]).unwrap().load_volume_with(&options);
+    assert_eq!(load("volume.path = 'c.npy'\nvolume.labels = 'c.npy'").unwrap().values(), values());
+    assert_outside(load("volume.path = '../c.npy'"), "c.npy");
+    assert_outside(load("volume.path = 'c.npy'\nvolume.labels = '../c.npy'"), "c.npy");
+    assert_outside(
+        load("volume = { path = '../part0.bin', dims = [5, 4, 1], type = 'uint16', endian = 'little' }"),
+        "part0.bin",
+    );
+    fs::write(inside.join("../scene.toml"), "volume.builtin = 'cube:8'").unwrap();
+    let error = Scene::open_with(&inside.join("../scene.toml"), &[], &options).unwrap_err().to_string();
+    assert!(error.contains("scene.toml: file: found a path that leads elsewhere"), "{error}");
+    fs::rename(inside.join("../scene.toml"), inside.join("scene.toml")).unwrap();
+    assert!(Scene::open_with(&inside.join("scene.toml"), &[], &options).is_ok());
+}
+
+/// 60 values of 4 bytes.
+#[test]
+fn memory_is_limited_in_every_format() {
+    let read = |name: &str, bytes: u64| Volume::open_with(&fixture(name), &ReadOptions::default().with_memory(bytes));
+    // Names, and what is needed besides the values.
+    for (name, besides) in [
+        ("itk.nrrd", 0),
+        ("bzip2.nrrd", 0),
+        ("text.nrrd", 0),
+        ("hex.nrrd", 0),
+        ("list.nhdr", 0),
+        ("local.mha", 0),
+        ("zlib.mha", 0),
+        ("sform.nii", 0),
+        ("itk.nii.gz", 0),
+        ("pair.hdr", 0),
+        ("c.npy", 0),
+        ("one.npz", 0),
+        // To turn its axes.
+        ("fortran-big.npy", 240),
+        // A page.
+        ("plain.tif", 80),
+        ("tiled.tif", 80),
+        ("slices", 40),
+        ("imagej-large.tif", 0),
+        ("series", 0),
+        ("frames.dcm", 0),
+        ("rle.dcm", 0),
+        ("text.vti", 0),
+        ("appended.vti", 0),
+        // A block.
+        ("appended-lz4.vti", 64),
+        ("text.vtk", 0),
+        ("binary.vtk", 0),
+    ] {
+        let needed = 240 + besides;
+        assert!(read(name, needed).is_ok(), "{name}: {:?}", read(name, needed).err());
+        let message = read(name, needed - 1).expect_err(name).to_string();
+        assert!(message.contains(": found ") && message.contains("bytes of memory, allowed: "), "{message}");
+        assert!(message.contains(&format!("the memory limit of {} bytes", needed - 1)), "{message}");
+    }
+    let exact = read("c.npy", 239).unwrap_err().to_string();
+    let expected = "c.npy: data: found 5 × 4 × 3 voxels, which take 240 bytes of memory, allowed: at most the memory limit of 239 bytes";
+    assert!(exact.ends_with(expected), "{exact}");
+}
+
+#[test]
+fn memory_is_limited_for_all_of_a_scene() {
+    let load = |text: &str, bytes: u64| {
+        let folder = fixture("");
+        Scene::parse(text, "scene.toml", &folder, &[])
+            .unwrap()
+            .load_volume_with(&ReadOptions::default().with_memory(bytes))
+    };
+    let labelled = "volume.path = 'c.npy'\nvolume.labels = 'c.npy'";
+    assert!(load(labelled, 240 + 120).is_ok());
+    let message = load(labelled, 240 + 119).unwrap_err().to_string();
+    assert!(
+        message.ends_with(
+            "take 120 bytes of memory, allowed: at most the memory limit of 359 bytes, of which 240 are taken"
+        ),
+        "{message}"
+    );
+    let raw = "volume = { path = 'part0.bin', dims = [5, 4, 1], type = 'uint16', endian = 'little' }";
+    assert!(load(raw, 80).is_ok());
+    assert!(load(raw, 79).unwrap_err().to_string().contains("part0.bin: data: found 5 × 4 × 1 voxels"));
+    // Values and labels.
+    assert!(load("volume.builtin = 'head:8'", 8 * 8 * 5 * 6).is_ok());
+    let message = load("volume.builtin = 'head:8'", 8 * 8 * 5 * 6 - 1).unwrap_err().to_string();
+    assert!(message.starts_with("builtin:head:8: size: found 8 × 8 × 5 voxels, which take 1920 bytes"), "{message}");
+    let message = load("volume.builtin = 'cube:1024'", 1 << 20).unwrap_err().to_string();
+    assert!(message.contains("4294967296 bytes"), "{message}");
+}
