@@ -6,6 +6,7 @@ use crate::settings::transfer_function::Ramp;
 
 /// A named sequence of colours, to be laid over a range of values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Colormap {
     /// Dark violet over green to yellow, of even steps in lightness.
     Viridis,

@@ -10,6 +10,7 @@ use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::layout::Brick;
 use crate::lists::brick;
+use crate::setting_error::SettingError;
 use crate::settings::splatting::Order;
 
 /// Width and height of the rasteriser's tiles, pixels.
@@ -104,11 +105,8 @@ pub struct Unfit {
 
 impl From<Unfit> for RenderError {
     fn from(Unfit { what, required, actual }: Unfit) -> Self {
-        Self::OutOfRange {
-            key: "splatting.rasterizer",
-            found: format!("\"tiles\" with {required} {what}"),
-            allowed: format!("at most {actual}, or \"quads\""),
-        }
+        let found = format!("\"tiles\" with {required} {what}");
+        SettingError::new("splatting.rasterizer", found, format!("at most {actual}, or \"quads\"")).into()
     }
 }
 

@@ -1,5 +1,6 @@
 //! Scenes: what to show and how, from a scene file, from `--set` overrides, or from a volume alone (SPEC §7).
 
+mod check;
 mod names;
 mod reader;
 mod tables;
@@ -12,7 +13,7 @@ use glam::DVec3;
 use toml::Table;
 
 use crate::appearance::{Colormap, Preset, shown_range};
-use crate::error::RenderError;
+use crate::setting_error::Allowed;
 use crate::settings::camera::Camera;
 use crate::settings::clip::Clip;
 use crate::settings::shading::Shading;
@@ -27,6 +28,7 @@ use reader::{OVERRIDE, Origins, Section, apply_override};
 pub enum SceneError {
     /// The scene file could not be opened or read.
     #[error("{}: {source}", path.display())]
+    #[non_exhaustive]
     Io {
         /// The scene file.
         path: PathBuf,
@@ -35,6 +37,7 @@ pub enum SceneError {
     },
     /// The scene file is not TOML.
     #[error("{origin}: {message}")]
+    #[non_exhaustive]
     Syntax {
         /// The scene file.
         origin: String,
@@ -43,20 +46,22 @@ pub enum SceneError {
     },
     /// A key is unknown or missing, or its value is of the wrong type or out of range.
     #[error("{origin}: {key}: found {found}, allowed: {allowed}")]
+    #[non_exhaustive]
     Invalid {
         /// The scene file, or `--set` where the value came from an override.
         origin: String,
         /// The full key, elements counted from 0: `camera.up`, `transfer.opacity[2]`.
         key: String,
-        /// What was found there.
+        /// What was found there, as it is written.
         found: String,
         /// What would have been accepted.
-        allowed: String,
+        allowed: Allowed,
     },
 }
 
 /// Where a scene's volume comes from.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum VolumeSource {
     /// A volume file.
     File(PathBuf),
@@ -148,24 +153,6 @@ impl TransferSettings {
             (None, None) => {}
         }
         transfer
-    }
-
-    /// Checks that a volume has what the settings are for.
-    ///
-    /// # Errors
-    /// If it has no labels and there are tables for some, or the preset for labels.
-    pub fn check(&self, volume: &Volume) -> Result<(), RenderError> {
-        let invalid = |key, found: &str, allowed: &str| {
-            Err(RenderError::OutOfRange { key, found: found.to_owned(), allowed: allowed.to_owned() })
-        };
-        if !self.labels.is_empty() && volume.labels().is_none() {
-            return invalid("transfer.label", "tables for a volume without labels", "none, or labels in the volume");
-        }
-        if self.preset.is_some_and(|preset| !preset.suits(volume)) {
-            let allowed = "values that are whole numbers from 0 to 65535, or labels in the volume";
-            return invalid("preset", "labels for a volume that has none", allowed);
-        }
-        Ok(())
     }
 }
 
@@ -288,7 +275,7 @@ impl Scene {
         sets: &[String],
     ) -> Result<Self, SceneError> {
         let overridden = sets.iter().map(|set| apply_override(&mut root, set)).collect::<Result<_, _>>()?;
-        let origins = Origins { file: origin, overridden };
+        let origins = Origins { file: origin, overridden, written: root.clone() };
         let mut root = Section::root(&origins, root);
         let [volume, camera, image, clip, transfer, shading, splatting] = [
             root.section("volume")?,
