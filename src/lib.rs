@@ -40,7 +40,7 @@
 //! let scene = Scene::from_volume(VolumeSource::Builtin("head:48".to_owned()), &settings)?;
 //! let headless = Headless::new(&HeadlessOptions::default())?;
 //! let mut view = headless.view(scene.load_volume()?, &scene)?;
-//! view.set_first_hit(Some(0.5));
+//! view.set_first_hit(Some(0.5))?;
 //! headless.draw(&mut view)?;
 //! let pick = headless.pick(&view, [32, 32])?.expect("the head is in the middle");
 //! // The picked point lies on the cut face, to within one voxel, which is 5.3 units long.

@@ -64,9 +64,8 @@ impl Worst {
 
 #[test]
 fn psnr_against_the_twin() {
-    let devices = VARIANTS.map(|(_, _, _, format, _)| {
-        Headless::new(&HeadlessOptions { sheet_format: Some(format), ..common::lavapipe() }).unwrap()
-    });
+    let devices =
+        VARIANTS.map(|(_, _, _, format, _)| Headless::new(&common::lavapipe().with_sheet_format(format)).unwrap());
     let head = builtin::volume("head:24").unwrap();
     // A translucent skin and a denser skull, shaded: gradients of many lengths and sums of many sheets.
     let mut scene = scene(96, 80);

@@ -158,7 +158,7 @@ fn accelerations(headless: &Headless) -> String {
         let scene = open(scene_name, &SMALL);
         let mut view = headless.view(scene.load_volume().unwrap(), &scene).unwrap();
         let images = tables::accelerations(scene.splatting).map(|(_, splatting)| {
-            view.set_splatting(splatting);
+            view.set_splatting(splatting).unwrap();
             headless.draw(&mut view).unwrap().image
         });
         let names: Vec<String> = (1..=5).map(|column| format!("fig16-{scene_name}-{column}")).collect();

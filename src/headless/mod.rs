@@ -66,13 +66,13 @@ impl HeadlessOptions {
     }
 
     /// With another format of the sheet buffer.
-    pub fn with_sheet_format(self, sheet_format: Option<TextureFormat>) -> Self {
-        Self { sheet_format, ..self }
+    pub fn with_sheet_format(self, format: TextureFormat) -> Self {
+        Self { sheet_format: Some(format), ..self }
     }
 
     /// With another number of sheets drawn by one quad.
-    pub fn with_sheets_per_group(self, sheets_per_group: Option<u32>) -> Self {
-        Self { sheets_per_group, ..self }
+    pub fn with_sheets_per_group(self, sheets: u32) -> Self {
+        Self { sheets_per_group: Some(sheets), ..self }
     }
 
     /// With another rasterizer for scenes that leave the choice.
@@ -249,7 +249,7 @@ impl Headless {
         let mut encoder =
             self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.frame") });
         self.renderer.record(&mut encoder, scene_view);
-        self.renderer.present(&mut encoder, scene_view, &view, Placement::whole([width, height]));
+        self.renderer.present(&mut encoder, scene_view, &view, Placement::whole([width, height]))?;
         self.queue.submit([encoder.finish()]);
         let counts = scene_view.counts();
         let bytes = readback::texture(&self.device, &self.queue, &target)?;

@@ -70,13 +70,13 @@ impl RendererOptions {
     };
 
     /// With another format of the sheet buffer.
-    pub const fn with_sheet_format(self, sheet_format: Option<TextureFormat>) -> Self {
-        Self { sheet_format, ..self }
+    pub const fn with_sheet_format(self, format: TextureFormat) -> Self {
+        Self { sheet_format: Some(format), ..self }
     }
 
     /// With another number of sheets drawn by one quad.
-    pub const fn with_sheets_per_group(self, sheets_per_group: Option<u32>) -> Self {
-        Self { sheets_per_group, ..self }
+    pub const fn with_sheets_per_group(self, sheets: u32) -> Self {
+        Self { sheets_per_group: Some(sheets), ..self }
     }
 
     /// With another rasterizer for scenes that leave the choice.
@@ -99,14 +99,14 @@ impl RendererOptions {
         Self { blend, ..self }
     }
 
-    /// With targets that hold linear light, display-referred colours, or what their format says.
-    pub const fn with_linear(self, linear: Option<bool>) -> Self {
-        Self { linear, ..self }
+    /// With targets that hold linear light, or display-referred colours, whatever their format says.
+    pub const fn with_linear(self, linear: bool) -> Self {
+        Self { linear: Some(linear), ..self }
     }
 
-    /// With a depth attachment in the passes drawn in, or none.
-    pub const fn with_depth_format(self, depth_format: Option<TextureFormat>) -> Self {
-        Self { depth_format, ..self }
+    /// With a depth attachment in the passes drawn in.
+    pub const fn with_depth_format(self, format: TextureFormat) -> Self {
+        Self { depth_format: Some(format), ..self }
     }
 
     /// With another number of samples per pixel.

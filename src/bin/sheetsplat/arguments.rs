@@ -35,6 +35,11 @@ pub(crate) struct Input {
     pub(crate) adapter: Option<String>,
 }
 
+/// Degrees: a finite number.
+pub(crate) fn parse_degrees(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|turn: &f64| turn.is_finite()).ok_or_else(|| "allowed: a finite number".to_owned())
+}
+
 /// Appearance by name; short for --set of the scene's keys, and before them.
 #[derive(clap::Args)]
 struct Look {
@@ -153,7 +158,8 @@ impl Input {
     }
 
     pub(crate) fn headless(&self, profile: bool) -> Result<Headless, Failure> {
-        let options = HeadlessOptions { adapter: self.adapter.clone(), profile, ..HeadlessOptions::default() };
+        let mut options = HeadlessOptions::default().with_profile(profile);
+        options.adapter = self.adapter.clone();
         let start = Instant::now();
         let headless = Headless::new(&options).map_err(|error| Failure::Other(error.to_string()))?;
         log::info!("renderer ready after {:.1?}", start.elapsed());

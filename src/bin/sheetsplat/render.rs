@@ -65,7 +65,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let volume = input.load_volume(&scene)?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
     input.look_at(&volume, &mut scene)?;
-    scene.transfer.check(&volume).map_err(|error| input.failure(error))?;
+    scene.transfer.check_volume(&volume).map_err(|error| input.failure(RenderError::from(error)))?;
     let start = Instant::now();
     // What is saved is what is rendered.
     let scene = scene.explicit(&volume);
