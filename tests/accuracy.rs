@@ -8,7 +8,7 @@ mod common;
 use std::fmt::Write;
 
 use glam::DVec3;
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::Headless;
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::settings::{Compositing, FootprintForm, Rasterizer};

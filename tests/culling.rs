@@ -6,7 +6,7 @@
 mod common;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::{Headless, HeadlessOptions, Rendering};
+use sheetsplat::headless::{Headless, Rendering};
 use sheetsplat::internals::reference;
 use sheetsplat::internals::reference::visibility::Test;
 use sheetsplat::scene::{Scene, VolumeSource};

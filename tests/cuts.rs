@@ -12,8 +12,6 @@ use glam::{DVec3, UVec2, UVec3};
 use sheetsplat::settings::Clip;
 use sheetsplat::settings::Projection;
 
-use sheetsplat::Pick;
-use sheetsplat::SceneView;
 use sheetsplat::headless::{Headless, readback};
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference::{self, Host, ray_march};
@@ -22,6 +20,7 @@ use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Compositing, Method, Order, Rasterizer};
 use sheetsplat::stats::Counts;
 use sheetsplat::volume::{Grid, Volume, builtin};
+use sheetsplat::{Pick, RenderError, SceneView, SettingError};
 
 use common::images::{BLACK, largest_difference, psnr};
 use common::surfaces::{DepthRange, surfaces};

@@ -192,7 +192,7 @@ fn assert_same_work(lists: &Counts, one: &Counts) {
 #[test]
 fn rgba32float_sheets_need_blending() {
     match open(Limits::default(), Features::empty(), Some(TextureFormat::Rgba32Float)) {
-        Err(error @ DeviceError::MissingFeatures { required, actual }) => {
+        Err(error @ DeviceError::MissingFeatures { required, actual, .. }) => {
             assert_eq!(required, Features::FLOAT32_BLENDABLE);
             assert!(!actual.contains(required));
             let message = error.to_string();
@@ -211,7 +211,7 @@ fn images_larger_than_a_texture_are_an_error() {
     for (size, key) in [((2049, 16), "image.width"), ((16, 3000), "image.height")] {
         (scene.image.width, scene.image.height) = size;
         match gpu.render_volume(volume.clone(), &scene) {
-            Err(error @ RenderError::Limit { what, limit, required, actual }) => {
+            Err(error @ RenderError::Limit { what, limit, required, actual, .. }) => {
                 let expected = (key, "max_texture_dimension_2d", u64::from(size.0.max(size.1)), 2048);
                 assert_eq!((what, limit, required, actual), expected);
                 let message = error.to_string();
@@ -253,7 +253,7 @@ fn a_row_of_tiles_larger_than_a_binding_is_an_error() {
     let (volume, mut scene) = head();
     (scene.image.width, scene.image.height) = (65, 16);
     match gpu.render_volume(volume.clone(), &scene) {
-        Err(RenderError::Limit { what, limit, required, actual }) => {
+        Err(RenderError::Limit { what, limit, required, actual, .. }) => {
             assert!(what.contains("image.width"), "{what}");
             assert_eq!((limit, required, actual), ("max_storage_buffer_binding_size", 65 * 32 * 16, 32 << 10));
         }
@@ -355,7 +355,7 @@ fn masks_larger_than_a_binding_are_an_error() {
     (scene.image.width, scene.image.height) = (150, 16384);
     view.set_image(scene.image).unwrap();
     match gpu.draw(&mut view) {
-        Err(RenderError::Limit { what, limit, required, actual }) => {
+        Err(RenderError::Limit { what, limit, required, actual, .. }) => {
             assert_eq!((what, limit), ("sheetsplat.opaque", "max_storage_buffer_binding_size"));
             // Five words hold a row.
             assert_eq!((required, actual), (5 * 4 * 16384, 76 << 10));

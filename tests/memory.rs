@@ -5,7 +5,7 @@
 mod common;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::Headless;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::LabelTables;
 use sheetsplat::settings::Light;

@@ -6,7 +6,7 @@ mod common;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::RenderError;
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::Headless;
 use sheetsplat::internals::gpu::device::{DeviceRequirements, TILE_FEATURES};
 use sheetsplat::internals::gpu::targets::CompositingBuffer;
 use sheetsplat::scene::Scene;

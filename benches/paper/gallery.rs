@@ -198,6 +198,7 @@ fn name(method: Method) -> &'static str {
         Method::ImageAligned => "image-aligned",
         Method::AxisAligned => "axis-aligned",
         Method::CompositeEverySample => "composite-every-sample",
+        other => unreachable!("{other:?}"),
     }
 }
 

@@ -7,7 +7,6 @@ use super::{Format, Image, ImageError};
 
 /// Bits per channel of a PNG file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum PngDepth {
     /// 8 bits.
     #[default]

@@ -19,7 +19,6 @@ const PARALLEL: f64 = 1e-9;
 
 /// How the volume is projected.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
 pub enum Projection {
     /// Parallel rays.
     Orthographic {

@@ -3,7 +3,8 @@
 //!
 //! These structs are not `non_exhaustive`, so that a host can make them as scenes are written: what it says, and
 //! `..Default::default()` for the rest. Later versions add fields, with defaults that draw what was drawn before; code that names every
-//! field has to name those too. The enums gain variants without notice, so a `match` needs an arm for others.
+//! field has to name those too. Enums that are likely to grow are
+//! `non_exhaustive`; those of two ways that exclude each other, such as [`Order`], are not.
 
 pub(crate) mod camera;
 pub(crate) mod clip;

@@ -30,7 +30,6 @@ pub enum Method {
 
 /// How kernel sections are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum FootprintForm {
     /// 128 pre-integrated sections, the nearest one picked (§3.2).
     Sections,
@@ -87,7 +86,6 @@ impl Compositing {
 
 /// The order in which sheets meet the compositing buffer; numbered as in the shaders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum Order {
     /// Nearest sheet first.
     FrontToBack,
@@ -110,7 +108,6 @@ pub enum Rasterizer {
 
 /// What is tested for being opaque around a footprint (§6, Fig. 13).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum FootprintBox {
     /// The bounding rectangle.
     Rectangle,

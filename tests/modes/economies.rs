@@ -1,7 +1,7 @@
 //! Culling, tiles and groups (SPEC §6): what they change is the cost.
 
 use glam::DVec3;
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::Headless;
 use sheetsplat::settings::Compositing;
 use sheetsplat::settings::Projection;
 use sheetsplat::volume::builtin;
