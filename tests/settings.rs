@@ -2,7 +2,7 @@
 //! names the same key; the values at the ends of the ranges draw finite images.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-#[expect(dead_code, reason = "other tests use the rest")]
+#[expect(dead_code, reason = "not every file needs all of it")]
 mod common;
 
 use std::path::Path;
