@@ -170,7 +170,13 @@ pub mod internals {
     }
 }
 
-/// The README's code, run as a doc test.
+/// The code in the README and the guide, run as doc tests.
 #[cfg(all(doctest, feature = "golden"))]
-#[doc = include_str!("../README.md")]
-pub struct Readme;
+mod guide {
+    #[doc = include_str!("../README.md")]
+    struct Readme;
+    #[doc = include_str!("../docs/guide/golden-images.md")]
+    struct GoldenImages;
+    #[doc = include_str!("../docs/guide/library.md")]
+    struct Library;
+}

@@ -433,7 +433,10 @@ fn many_scenes() -> Vec<Scene> {
     scenes.push(from_file);
     scenes.extend(Preset::ALL.map(|(name, _)| builtin_scene("head:24", &[image, &format!("preset={name}")])));
     scenes.extend(
-        Colormap::ALL.map(|(name, _)| builtin_scene("nerve:40", &[image, &format!("transfer.colormap={name}")])),
+        // A builtin volume has no file, so no palette.
+        Colormap::ALL[..8]
+            .iter()
+            .map(|(name, _)| builtin_scene("nerve:40", &[image, &format!("transfer.colormap={name}")])),
     );
     scenes
 }

@@ -15,14 +15,20 @@ const WEBGPU_CORE: Capabilities = Capabilities::SHADER_FLOAT16_IN_FLOAT32;
 const WITH_SUBGROUPS: Shader = shaders::GATHER;
 
 fn validated(shader: &Shader) -> Result<(Module, ModuleInfo), String> {
-    let failed = |message: String| format!("{}: {message}", shader.stage);
-    let module = naga::front::wgsl::parse_str(shader.source)
-        .map_err(|error| failed(error.emit_to_string_with_path(shader.source, shader.stage)))?;
+    let failed = |line: Option<u32>, message: String| {
+        let (path, line) = shader.origin(line.unwrap_or(1));
+        format!("shaders/{path}:{line}: {message}")
+    };
+    let module = naga::front::wgsl::parse_str(shader.source).map_err(|error| {
+        let line = error.location(shader.source).map(|location| location.line_number);
+        failed(line, error.emit_to_string_with_path(shader.source, shader.stage))
+    })?;
     let of_subgroups = Capabilities::SUBGROUP | Capabilities::SUBGROUP_BARRIER;
     let subgroups = if *shader == WITH_SUBGROUPS { of_subgroups } else { Capabilities::empty() };
-    let info = Validator::new(ValidationFlags::all(), WEBGPU_CORE | subgroups)
-        .validate(&module)
-        .map_err(|error| failed(error.emit_to_string_with_path(shader.source, shader.stage)))?;
+    let info = Validator::new(ValidationFlags::all(), WEBGPU_CORE | subgroups).validate(&module).map_err(|error| {
+        let line = error.location(shader.source).map(|location| location.line_number);
+        failed(line, error.emit_to_string_with_path(shader.source, shader.stage))
+    })?;
     Ok((module, info))
 }
 
@@ -56,6 +62,31 @@ fn every_shader_validates() {
 }
 
 #[test]
+fn errors_name_the_file_and_the_line() {
+    let broken = Shader {
+        stage: "broken",
+        source: "fn first() {}\n\nfn second() {}\nfn third() { nothing(); }\n",
+        files: &[
+            ("shared/one.wgsl", "fn first() {}\n\n"),
+            ("broken.wgsl", "fn second() {}\nfn third() { nothing(); }\n"),
+        ],
+    };
+    let error = validated(&broken).unwrap_err();
+    assert!(error.starts_with("shaders/broken.wgsl:2: "), "{error}");
+    assert_eq!(broken.origin(1), ("shared/one.wgsl", 1));
+    assert_eq!(broken.origin(3), ("broken.wgsl", 1));
+    assert_eq!(
+        broken.explain("at wgsl:4:7, and wgsl:1:2"),
+        "at shaders/broken.wgsl:2:7, and shaders/shared/one.wgsl:1:2"
+    );
+    for shader in &shaders::ALL {
+        assert_eq!(shader.files.iter().map(|&(_, text)| text).collect::<String>(), shader.source);
+        // Every file ends with a line of its own, else lines would be counted wrongly.
+        assert!(shader.files.iter().all(|(_, text)| text.ends_with('\n')), "{}", shader.stage);
+    }
+}
+
+#[test]
 fn every_file_is_used() {
     let files = files(&root().join("shaders"), "wgsl");
     assert!(files.len() >= shaders::ALL.len());
@@ -75,6 +106,8 @@ fn every_file_is_used() {
 fn entry_points_and_overrides_are_those_of_the_passes() {
     let passes = files(&root().join("src/pass"), "rs");
     let sources: Vec<String> = passes.iter().map(|file| std::fs::read_to_string(file).unwrap()).collect();
+    // The quads of all shaders have the same layout.
+    let splat_slots = std::fs::read_to_string(root().join("src/pass/splat.rs")).unwrap();
     let mut failures = Vec::new();
     for shader in &shaders::ALL {
         let (module, _) = validated(shader).unwrap();
@@ -93,6 +126,17 @@ fn entry_points_and_overrides_are_those_of_the_passes() {
                 || family != entry.name && pass.contains(&format!("\"{family}{{sheets}}\""));
             if !is_used {
                 failures.push(format!("{}: the pass does not use {}", shader.stage, entry.name));
+            }
+        }
+        // Bindings go by name, when a layout is made and when resources are bound.
+        for (_, global) in module.global_variables.iter() {
+            let (Some(binding), Some(name)) = (&global.binding, &global.name) else { continue };
+            if shader.binding(name) != Some(binding.binding) {
+                failures.push(format!("{}: {name} is not found at binding {}", shader.stage, binding.binding));
+            }
+            let layouts = if shader.source.contains("var footprints:") { &splat_slots } else { pass };
+            if [layouts, pass].iter().any(|text| !text.contains(&format!("(\"{name}\", "))) {
+                failures.push(format!("{}: the pass does not bind {name}", shader.stage));
             }
         }
         for (_, constant) in module.overrides.iter() {

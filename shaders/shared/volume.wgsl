@@ -1,9 +1,24 @@
 // The volume's values and gradients. The stage declares `values`, a texture array that `gpu::volume_texture` folds.
 
+// Whether any voxel is a hole (SPEC §3); then values are stored as the bits of an f32.
+override HOLES: bool = false;
+
 fn value_at(index: u32) -> f32 {
+    return value_of(stored_at(index));
+}
+
+fn stored_at(index: u32) -> u32 {
     let texel = texel_of(index, textureDimensions(values).x);
-    let stored = textureLoad(values, texel.xy, texel.z, 0).x;
+    return textureLoad(values, texel.xy, texel.z, 0).x;
+}
+
+fn value_of(stored: u32) -> f32 {
     return select(bitcast<f32>(stored), f32(stored) + frame.value_offset, frame.whole_values != 0u);
+}
+
+// Whether stored bits are a hole's, NaN. Compilers may assume that no float is NaN, so only the bits can tell.
+fn is_hole(stored: u32) -> bool {
+    return (stored & 0x7f800000u) == 0x7f800000u;
 }
 
 // Column, row and layer of a voxel's texel in layers of a power of two a side.
@@ -24,10 +39,14 @@ struct Gradient {
     magnitude: f32,
 }
 
-// Half the difference along an axis, value per `unit`; one-sided at the border, 0 with one sample.
+// Half the difference along an axis, value per `unit`; one-sided at the border and beside a hole, 0 without a neighbour.
 fn half_difference(index: u32, stride: u32, at: u32, count: u32, scale: f32) -> f32 {
-    let before = min(at, 1u);
-    let after = min(count - 1u - at, 1u);
+    var before = min(at, 1u);
+    var after = min(count - 1u - at, 1u);
+    if HOLES {
+        before = select(before, 0u, is_hole(stored_at(index - before * stride)));
+        after = select(after, 0u, is_hole(stored_at(index + after * stride)));
+    }
     // Halves, as values may be more than the largest f32 apart.
     let difference = 0.5 * value_at(index + after * stride) - 0.5 * value_at(index - before * stride);
     return difference * select(2.0 * scale, scale, before + after == 2u);

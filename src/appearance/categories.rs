@@ -22,7 +22,7 @@ pub fn distinct(labels: &[u16]) -> Vec<u16> {
     (0..=u16::MAX).filter(|&label| present[usize::from(label)]).collect()
 }
 
-/// The values of a volume, each once, ascending, if all of them are labels: whole numbers from 0 to 65535.
+/// The values of a volume but its holes, each once, ascending, if all of them are labels: whole numbers from 0 to 65535.
 pub fn values(volume: &Volume) -> Option<Vec<u16>> {
     counts(volume).map(|counts| counts.into_iter().map(|(label, _)| label).collect())
 }
@@ -30,7 +30,7 @@ pub fn values(volume: &Volume) -> Option<Vec<u16>> {
 /// The values of a volume if all of them are labels, ascending, and how many voxels have them.
 fn counts(volume: &Volume) -> Option<Vec<(u16, u64)>> {
     let values = volume.values();
-    if !values.par_iter().all(|&value| f32::from(value as u16) == value) {
+    if !values.par_iter().all(|&value| f32::from(value as u16) == value || value.is_nan()) {
         return None;
     }
     let counts = histogram(values, 1 << 16, |value| Some(usize::from(value as u16)));
@@ -77,16 +77,22 @@ impl Borders {
             let mut borders = Self::default();
             for x in 0..nx {
                 let at = row * nx + x;
+                if values[at].is_nan() {
+                    continue;
+                }
                 for ((step, count), place) in steps.into_iter().zip([x, row % ny, row / ny]) {
                     if place + 1 == count {
                         continue;
                     }
                     let [here, next] = [values[at], values[at + step]];
+                    if next.is_nan() {
+                        continue;
+                    }
                     if here != background || next != background {
                         borders.pairs[0] += 1;
                         borders.pairs[1] += u64::from(here == next);
                     }
-                    if place > 0 && values[at - step] != next {
+                    if place > 0 && !values[at - step].is_nan() && values[at - step] != next {
                         borders.between[0] += 1;
                         borders.between[1] += u64::from(here != next && here != values[at - step]);
                     }

@@ -2,9 +2,11 @@
 
 use glam::DVec3;
 
-use crate::settings::transfer_function::Ramp;
+use super::shown_range;
+use crate::settings::transfer_function::{Ramp, TransferFunction};
+use crate::volume::Volume;
 
-/// A named sequence of colours, to be laid over a range of values.
+/// A named sequence of colours, to be laid over a range of values; or the palette of the volume's own file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Colormap {
@@ -24,6 +26,8 @@ pub enum Colormap {
     Turbo,
     /// Blue over light grey to red.
     Coolwarm,
+    /// The colours that the volume's file gives to its values ([`Volume::palette`]).
+    File,
 }
 
 // Fitted to matplotlib's maps of these names (CC0; turbo's is Google's), which they meet within 6 of 255 in every channel.
@@ -59,7 +63,7 @@ const COOLWARM: &[u32] = &[
 
 impl Colormap {
     /// All of them, with the names that scene files use.
-    pub const ALL: [(&'static str, Self); 8] = [
+    pub const ALL: [(&'static str, Self); 9] = [
         ("viridis", Self::Viridis),
         ("magma", Self::Magma),
         ("inferno", Self::Inferno),
@@ -68,11 +72,12 @@ impl Colormap {
         ("hot", Self::Hot),
         ("turbo", Self::Turbo),
         ("coolwarm", Self::Coolwarm),
+        ("file", Self::File),
     ];
 
-    /// Colours at even distances, `0xrrggbb`.
-    fn colors(self) -> &'static [u32] {
-        match self {
+    /// Colours at even distances, `0xrrggbb`; `None` for the file's.
+    fn colors(self) -> Option<&'static [u32]> {
+        Some(match self {
             Self::Viridis => VIRIDIS,
             Self::Magma => MAGMA,
             Self::Inferno => INFERNO,
@@ -81,25 +86,34 @@ impl Colormap {
             Self::Hot => HOT,
             Self::Turbo => TURBO,
             Self::Coolwarm => COOLWARM,
-        }
+            Self::File => return None,
+        })
     }
 
-    /// The map over values from `lo` to `hi`; of a single value its last colour.
-    pub fn over(self, [lo, hi]: [f64; 2]) -> Ramp<DVec3> {
-        let colors = self.colors();
-        let last = (colors.len() - 1) as f64;
-        // Halves: the range may be larger than the largest f64.
-        let place = |at: usize| 2.0 * (lo / 2.0 + (hi / 2.0 - lo / 2.0) * (at as f64 / last));
-        let rgb = |color: u32| DVec3::from([16, 8, 0].map(|shift| f64::from(color >> shift & 0xff) / 255.0));
-        let mut points: Vec<_> = colors.iter().enumerate().map(|(at, &color)| (place(at), rgb(color))).collect();
-        // Values are f32, so that only equal ends leave no room.
-        points.dedup_by(|later, earlier| {
-            let is_same = later.0 <= earlier.0;
-            if is_same {
-                earlier.1 = later.1;
-            }
-            is_same
-        });
-        Ramp::through(points)
+    /// The map for a volume: over the values that it shows ([`shown_range`]), or the palette as its file has it. `None` for the palette
+    /// of a file that has none.
+    pub fn of(self, volume: &Volume, transfer: &TransferFunction) -> Option<Ramp<DVec3>> {
+        match self.colors() {
+            Some(colors) => Some(over(colors, shown_range(volume, transfer).unwrap_or_default())),
+            None => volume.palette().map(|palette| Ramp::through(palette.to_vec())),
+        }
     }
+}
+
+/// Colours at even distances over values from `lo` to `hi`; over a single value the last colour.
+fn over(colors: &[u32], [lo, hi]: [f64; 2]) -> Ramp<DVec3> {
+    let last = (colors.len() - 1) as f64;
+    // Halves: the range may be larger than the largest f64.
+    let place = |at: usize| 2.0 * (lo / 2.0 + (hi / 2.0 - lo / 2.0) * (at as f64 / last));
+    let rgb = |color: u32| DVec3::from([16, 8, 0].map(|shift| f64::from(color >> shift & 0xff) / 255.0));
+    let mut points: Vec<_> = colors.iter().enumerate().map(|(at, &color)| (place(at), rgb(color))).collect();
+    // Values are f32, so that only equal ends leave no room.
+    points.dedup_by(|later, earlier| {
+        let is_same = later.0 <= earlier.0;
+        if is_same {
+            earlier.1 = later.1;
+        }
+        is_same
+    });
+    Ramp::through(points)
 }

@@ -26,14 +26,14 @@ pub(super) struct Object {
 }
 
 impl Object {
-    /// `None` if all values are the same.
+    /// Of the finite values. `None` if all of them are the same.
     pub(super) fn find(values: &[f32]) -> Option<Self> {
         let [lo, hi] = ends(values)?;
         let (start, range) = (f64::from(lo), f64::from(hi) - f64::from(lo));
         let bin = |value: f32| (f64::from(value) - start) / range * BINS as f64;
         let counted = values.par_chunks(CHUNK).map(|chunk| {
             let (mut counts, mut least_count) = ([0.0; BINS], 0.0);
-            for &value in chunk {
+            for &value in chunk.iter().filter(|value| !value.is_nan()) {
                 // What is below the first bin counts there.
                 counts[(bin(value) as usize).min(BINS - 1)] += 1.0;
                 least_count += if value <= lo { 1.0 } else { 0.0 };
@@ -47,7 +47,7 @@ impl Object {
         let value_of = |bin: f64| start + (bin + 0.5) / BINS as f64 * range;
 
         // Sparse data, such as a labelled cell: its background was cleared already, all the rest is object.
-        let (background, first) = if least_count > 0.99 * values.len() as f64 {
+        let (background, first) = if least_count > 0.99 * counts.iter().sum::<f64>() {
             counts[0] -= least_count;
             (start, 0)
         } else {
@@ -86,6 +86,7 @@ impl Object {
 
 /// What the histogram reaches from and to; `None` if all values are the same.
 fn ends(values: &[f32]) -> Option<[f32; 2]> {
+    // `f32::min` and `f32::max` leave out holes.
     let widen = |(lo, hi): (f32, f32), (a, b): (f32, f32)| (lo.min(a), hi.max(b));
     let extent = values.par_iter().map(|&value| (value, value));
     let (least, greatest) = extent.reduce(|| (f32::INFINITY, f32::NEG_INFINITY), widen);

@@ -8,7 +8,7 @@ use crate::lists::iso_range::{of_ordinal, ordinal};
 const CHUNK: usize = 1 << 20;
 
 /// Of the values that count, those that have a share, in [0, 1], of the others before them when they are sorted; `None` if none
-/// count. Values are finite.
+/// count. Holes do not.
 pub fn quantiles<const N: usize>(
     values: &[f32],
     counts: impl Fn(f32) -> bool + Sync,
@@ -34,11 +34,11 @@ pub fn quantiles<const N: usize>(
     }))
 }
 
-/// How many values are in which of some bins; `None` is in no bin.
+/// How many values are in which of some bins; `None` is in no bin, and neither are holes (NaN).
 pub fn histogram(values: &[f32], bins: usize, bin: impl Fn(f32) -> Option<usize> + Sync) -> Vec<u64> {
     let zeros = || vec![0_u64; bins];
     let counted = values.par_chunks(CHUNK).fold(zeros, |mut counts, chunk| {
-        for bin in chunk.iter().filter_map(|&value| bin(value)) {
+        for bin in chunk.iter().filter(|value| !value.is_nan()).filter_map(|&value| bin(value)) {
             counts[bin] += 1;
         }
         counts
@@ -75,6 +75,12 @@ mod tests {
         assert_eq!(quantiles(&values, |value| value > 5.0, [1.0, 0.0]), Some([f32::MAX, positive[0]]));
         assert_eq!(quantiles(&values, |_| false, [0.5]), None);
         assert_eq!(quantiles(&[], |_| true, [0.5]), None);
+        // Of the finite values alone.
+        assert_eq!(
+            quantiles(&[f32::NAN, 3.0, f32::NAN, 1.0, 2.0, f32::NAN], |_| true, [0.0, 0.5, 1.0]),
+            Some([1.0, 2.0, 3.0])
+        );
+        assert_eq!(quantiles(&[f32::NAN], |_| true, [0.5]), None);
     }
 
     #[test]

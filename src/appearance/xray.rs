@@ -35,6 +35,7 @@ fn ray_sums(grid: &Grid, values: &[f32], background: f64) -> Vec<f32> {
     for (row, values) in values.chunks_exact(nx).enumerate() {
         let (y, z) = (row % ny, row / ny);
         for (x, &value) in values.iter().enumerate() {
+            // 0 in a hole: `f64::max` leaves out NaN.
             let above = (f64::from(value) - background).max(0.0);
             for (sums, at) in sums.iter_mut().zip([row, x + nx * z, x + nx * y]) {
                 sums[at] += above;

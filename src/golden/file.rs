@@ -5,7 +5,7 @@ use std::io::BufReader;
 use std::path::Path;
 
 use super::MadeOn;
-use crate::image::{ImageError, write_aside};
+use crate::image::{ImageError, output};
 
 const ADAPTER: &str = "Adapter";
 const DRIVER: &str = "Driver";
@@ -20,7 +20,7 @@ pub(super) fn write(
     let write = || {
         let bytes = encode([width, height], pixels, made_on)?;
         path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
-        write_aside(path, &bytes)
+        output::write(path, &bytes)
     };
     write().map_err(|source| ImageError::Io { path: path.to_owned(), source })
 }

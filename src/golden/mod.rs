@@ -72,7 +72,7 @@ pub use site::Site;
 pub use subject::{MadeOn, Picture, Subject};
 pub use tolerance::{LaxTolerance, Tolerance};
 
-use crate::image::{Image, ImageError, PngDepth, write_aside};
+use crate::image::{Image, ImageError, PngDepth, output};
 
 /// Asserts that an image looks like its golden, `goldens/NAME.png` in the folder of the source file.
 ///
@@ -244,7 +244,7 @@ impl Golden {
             comparison.difference_image().save(&self.left("difference.png"), PngDepth::Eight)?;
         }
         let path = self.left("report.txt");
-        write_aside(&path, format!("{failure}\n").as_bytes()).map_err(|source| ImageError::Io { path, source })
+        output::write(&path, format!("{failure}\n").as_bytes()).map_err(|source| ImageError::Io { path, source })
     }
 
     /// Removes what an earlier failure left.

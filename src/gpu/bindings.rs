@@ -2,7 +2,7 @@
 
 use wgpu::{
     BindGroup, BindGroupLayout, BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
-    BufferDescriptor, BufferUsages, ComputePass, ComputePipeline, Device, Limits, Queue, ShaderStages,
+    BufferDescriptor, BufferUsages, ComputePass, ComputePipeline, Device, Limits, PipelineLayout, Queue, ShaderStages,
     TextureSampleType, TextureViewDimension,
 };
 
@@ -10,7 +10,7 @@ use super::layout::{FOLD, Indirect};
 use super::shaders::Shader;
 use crate::error::RenderError;
 
-/// What a shader declares at one binding.
+/// The stages that see a binding, and its type.
 pub type Slot = (ShaderStages, BindingType);
 
 /// A uniform buffer that holds one `T`, at a dynamic offset if `dynamic`.
@@ -139,47 +139,74 @@ pub fn uploaded(device: &Device, label: &str, bytes: &[u8], size: u64, usage: Bu
     buffer
 }
 
-/// The layout of group 0 with the given bindings in order, and the pipeline layout of that group alone.
-pub fn layout(device: &Device, label: &str, slots: &[Slot]) -> (BindGroupLayout, wgpu::PipelineLayout) {
-    let entries: Vec<BindGroupLayoutEntry> = (0..)
-        .zip(slots)
-        .map(|(binding, &(visibility, ty))| BindGroupLayoutEntry { binding, visibility, ty, count: None })
-        .collect();
-    let group =
-        device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries });
-    let pipeline = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(label),
-        bind_group_layouts: &[Some(&group)],
-        immediate_size: 0,
-    });
-    (group, pipeline)
+/// The layout of a shader's bind group 0. Bindings go by the names of the shader's variables, so that no two can be mistaken for each other.
+#[derive(Debug)]
+pub struct Bindings {
+    label: String,
+    numbers: Vec<(&'static str, u32)>,
+    layout: BindGroupLayout,
+    /// The layout of pipelines that have this group alone.
+    pub pipeline_layout: PipelineLayout,
 }
 
-/// A bind group with the given resources in order.
-pub fn bind(device: &Device, label: &str, layout: &BindGroupLayout, resources: &[BindingResource<'_>]) -> BindGroup {
-    let entries: Vec<_> = (0..)
-        .zip(resources)
-        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource: resource.clone() })
-        .collect();
-    device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
+impl Bindings {
+    /// A layout with these slots. A name that the shader does not declare gives a layout that the device refuses.
+    pub fn new(device: &Device, shader: Shader, slots: &[(&'static str, Slot)]) -> Self {
+        let label = format!("sheetsplat.{}", shader.stage);
+        let numbers: Vec<_> = slots.iter().map(|&(name, _)| (name, shader.binding(name).unwrap_or(u32::MAX))).collect();
+        let entries: Vec<BindGroupLayoutEntry> = (numbers.iter().zip(slots))
+            .map(|(&(_, binding), &(_, (visibility, ty)))| BindGroupLayoutEntry {
+                binding,
+                visibility,
+                ty,
+                count: None,
+            })
+            .collect();
+        let layout = device
+            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(&label), entries: &entries });
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(&label),
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        Self { label, numbers, layout, pipeline_layout }
+    }
+
+    /// A bind group with a resource for every name, in any order.
+    pub fn bind(&self, device: &Device, resources: &[(&str, BindingResource<'_>)]) -> BindGroup {
+        let number =
+            |name| self.numbers.iter().find(|(known, _)| *known == name).map_or(u32::MAX, |&(_, number)| number);
+        let entries: Vec<_> = (resources.iter())
+            .map(|(name, resource)| wgpu::BindGroupEntry { binding: number(*name), resource: resource.clone() })
+            .collect();
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(&self.label),
+            layout: &self.layout,
+            entries: &entries,
+        })
+    }
 }
 
 /// A compute shader with its one bind group's layout.
 #[derive(Debug)]
 pub struct ComputeStage {
-    label: String,
-    layout: BindGroupLayout,
+    bindings: Bindings,
     pipeline: ComputePipeline,
 }
 
 impl ComputeStage {
-    /// Compiles an entry point of a shader, with the given bindings in order and pipeline constants.
-    pub fn new(device: &Device, shader: Shader, entry: &str, slots: &[Slot], constants: &[(&str, f64)]) -> Self {
-        let label = format!("sheetsplat.{}", shader.stage);
-        let (layout, pipeline_layout) = layout(device, &label, slots);
+    /// Compiles an entry point of a shader, with the given bindings and pipeline constants.
+    pub fn new(
+        device: &Device,
+        shader: Shader,
+        entry: &str,
+        slots: &[(&'static str, Slot)],
+        constants: &[(&str, f64)],
+    ) -> Self {
+        let bindings = Bindings::new(device, shader, slots);
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(&label),
-            layout: Some(&pipeline_layout),
+            label: Some(&bindings.label),
+            layout: Some(&bindings.pipeline_layout),
             module: &shader.module(device),
             entry_point: Some(entry),
             compilation_options: wgpu::PipelineCompilationOptions {
@@ -188,12 +215,12 @@ impl ComputeStage {
             },
             cache: None,
         });
-        Self { label, layout, pipeline }
+        Self { bindings, pipeline }
     }
 
-    /// Binds resources in order.
-    pub fn bind(&self, device: &Device, resources: &[BindingResource<'_>]) -> BindGroup {
-        bind(device, &self.label, &self.layout, resources)
+    /// Binds a resource for every name, in any order.
+    pub fn bind(&self, device: &Device, resources: &[(&str, BindingResource<'_>)]) -> BindGroup {
+        self.bindings.bind(device, resources)
     }
 
     /// Dispatches a fixed number of workgroups, folded as [`Indirect`] says.

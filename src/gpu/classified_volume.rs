@@ -69,6 +69,11 @@ impl ClassifiedVolume {
         self.volume.values()
     }
 
+    /// Whether any voxel is a hole.
+    pub(crate) fn has_holes(&self) -> bool {
+        self.volume().holes() > 0
+    }
+
     /// The labels on the GPU, if shading asks for them.
     pub(crate) fn labels(&self) -> Option<&TextureView> {
         self.volume.labels().filter(|_| self.shades_by_label())

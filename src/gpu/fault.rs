@@ -6,6 +6,8 @@ use std::task::{Context, Poll, Waker};
 
 use wgpu::{BufferDescriptor, BufferUsages, Device, ErrorFilter};
 
+use crate::gpu::shaders::{self, Shader};
+
 /// A failure that the device reported. Messages are one line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -34,7 +36,9 @@ impl From<wgpu::Error> for DeviceFault {
                 source = cause.source();
             }
             let lines: Vec<&str> = message.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
-            lines.join(": ")
+            let message = lines.join(": ");
+            let is_of = |shader: &&Shader| message.contains(&format!("sheetsplat.{}'", shader.stage));
+            shaders::ALL.iter().find(is_of).map_or(message.clone(), |shader| shader.explain(&message))
         };
         match error {
             wgpu::Error::OutOfMemory { source } => Self::OutOfMemory(message(&*source)),

@@ -1,99 +1,140 @@
-//! Shader sources: the shared structs first, then the stage's own file.
+//! Shader sources: every stage's own file, preceded by the files that it shares with others.
 
-/// A stage's name and its complete WGSL source.
+/// A stage's name, its complete WGSL source, and the files that the source was put together from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shader {
     /// The stage's word, which is also its file's name.
     pub stage: &'static str,
     /// WGSL.
     pub source: &'static str,
+    /// The parts of the source in their order: each file's path below `shaders/`, and its text.
+    pub files: &'static [(&'static str, &'static str)],
 }
 
 macro_rules! shader {
-    ($stage:literal $(, $shared:literal)*) => {
+    ($stage:literal $(, $file:literal)*) => {
         Shader {
             stage: $stage,
             source: concat!(
-                $(include_str!(concat!("../../shaders/shared/", $shared, ".wgsl")),)*
+                $(include_str!(concat!("../../shaders/", $file, ".wgsl")),)*
                 include_str!(concat!("../../shaders/", $stage, ".wgsl")),
             ),
+            files: &[
+                $((concat!($file, ".wgsl"), include_str!(concat!("../../shaders/", $file, ".wgsl"))),)*
+                (concat!($stage, ".wgsl"), include_str!(concat!("../../shaders/", $stage, ".wgsl"))),
+            ],
         }
     };
 }
 
-/// Which bricks a sheet group visits.
-pub const CULL_BRICKS: Shader = shader!("cull_bricks", "frame", "brick", "tally", "culled", "scan", "project");
-/// Which voxels it draws.
-pub const CULL_VOXELS: Shader = shader!("cull_voxels", "frame", "brick", "tally", "culled", "project", "local_ray");
-/// Those voxels in a row.
-pub const COMPACT: Shader = shader!("compact", "brick", "tally", "culled", "scan");
-/// Shades those that were not shaded before.
-pub const SHADE: Shader = shader!("shade", "frame", "brick", "volume", "project", "splat", "shading", "ramps");
-/// The tiles they touch.
-pub const TILES: Shader = shader!("tiles", "frame", "brick", "tally", "culled", "tile_list");
-/// Zeroes the sheet buffers there.
-pub const CLEAR: Shader = shader!("clear", "frame", "brick", "tile_list", "sheets");
+/// Finds the bricks that a sheet group visits.
+pub const CULL_BRICKS: Shader = shader!(
+    "cull_bricks",
+    "shared/frame",
+    "shared/brick",
+    "shared/tally",
+    "shared/culled",
+    "shared/scan",
+    "shared/project"
+);
+/// Finds the voxels that a sheet group draws.
+pub const CULL_VOXELS: Shader = shader!(
+    "cull_voxels",
+    "shared/frame",
+    "shared/brick",
+    "shared/tally",
+    "shared/culled",
+    "shared/project",
+    "shared/local_ray"
+);
+/// Puts the voxels that are drawn in a row.
+pub const COMPACT: Shader = shader!("compact", "shared/brick", "shared/tally", "shared/culled", "shared/scan");
+/// Shades the voxels that were not shaded before.
+pub const SHADE: Shader = shader!(
+    "shade",
+    "shared/frame",
+    "shared/brick",
+    "shared/volume",
+    "shared/project",
+    "shared/splat",
+    "shared/shading",
+    "shared/ramps"
+);
+/// Marks the tiles that splats touch.
+pub const TILES: Shader =
+    shader!("tiles", "shared/frame", "shared/brick", "shared/tally", "shared/culled", "shared/tile_list");
+/// Zeroes the sheet buffers in these tiles.
+pub const CLEAR: Shader = shader!("clear", "shared/frame", "shared/brick", "shared/tile_list", "shared/sheets");
 /// Draws footprints into the sheet buffers.
-pub const SPLAT: Shader = shader!("splat", "frame", "brick", "splat", "sheets", "footprints");
-/// The same in perspective.
+pub const SPLAT: Shader =
+    shader!("splat", "shared/frame", "shared/brick", "shared/splat", "shared/sheets", "shared/footprints");
+/// Draws footprints in perspective into the sheet buffers.
 pub const SPLAT_PERSPECTIVE: Shader = shader!(
     "splat_perspective",
-    "frame",
-    "brick",
-    "splat",
-    "sheets",
-    "footprints",
-    "project",
-    "local_ray",
-    "turned_quads"
+    "shared/frame",
+    "shared/brick",
+    "shared/splat",
+    "shared/sheets",
+    "shared/footprints",
+    "shared/project",
+    "shared/local_ray",
+    "shared/turned_quads"
 );
 /// Draws whole kernels, each composited by itself.
 pub const SAMPLE: Shader = shader!(
     "sample",
-    "frame",
-    "brick",
-    "splat",
-    "sheets",
-    "footprints",
-    "project",
-    "local_ray",
-    "turned_quads",
-    "compositing"
+    "shared/frame",
+    "shared/brick",
+    "shared/splat",
+    "shared/sheets",
+    "shared/footprints",
+    "shared/project",
+    "shared/local_ray",
+    "shared/turned_quads",
+    "shared/compositing"
 );
 /// Composites the sheet buffers.
-pub const COMPOSITE: Shader =
-    shader!("composite", "frame", "brick", "band", "tile_list", "compositing", "cut", "means");
+pub const COMPOSITE: Shader = shader!(
+    "composite",
+    "shared/frame",
+    "shared/brick",
+    "shared/band",
+    "shared/tile_list",
+    "shared/compositing",
+    "shared/cut",
+    "shared/means"
+);
 /// Computes the occlusion buffer.
-pub const OCCLUDE: Shader = shader!("occlude", "frame", "brick", "tile_list");
+pub const OCCLUDE: Shader = shader!("occlude", "shared/frame", "shared/brick", "shared/tile_list");
 /// Draws whole tiles from front to back.
 pub const GATHER: Shader = shader!(
     "gather",
-    "frame",
-    "brick",
-    "tally",
-    "gather",
-    "bits",
-    "region",
-    "queue",
-    "walk",
-    "gathered_pixels",
-    "gathered_voxels",
-    "gathered_kernel",
-    "held_ramps",
-    "volume",
-    "project",
-    "local_ray",
-    "shading",
-    "ramps",
-    "compositing",
-    "cut",
-    "means",
-    "gathered_sheets"
+    "shared/frame",
+    "shared/brick",
+    "shared/tally",
+    "gather/uniforms",
+    "gather/bits",
+    "gather/region",
+    "gather/queue",
+    "gather/walk",
+    "gather/pixels",
+    "gather/voxels",
+    "gather/kernel",
+    "gather/ramps",
+    "shared/volume",
+    "shared/project",
+    "shared/local_ray",
+    "shared/shading",
+    "shared/ramps",
+    "shared/compositing",
+    "shared/cut",
+    "shared/means",
+    "gather/sheets"
 );
 /// Writes the depths of first hits.
-pub const FIRST_HIT: Shader = shader!("first_hit", "frame", "cut");
+pub const FIRST_HIT: Shader = shader!("first_hit", "shared/frame", "shared/cut");
 /// Lays the result over the background.
-pub const RESOLVE: Shader = shader!("resolve", "frame", "band");
+pub const RESOLVE: Shader = shader!("resolve", "shared/frame", "shared/band");
 
 /// Every shader, in the order of the data flow.
 pub const ALL: [Shader; 14] = [
@@ -114,7 +155,7 @@ pub const ALL: [Shader; 14] = [
 ];
 
 impl Shader {
-    /// Whether its workgroups' memory must hold zeros at first. The tile rasterizer reads nothing of its own, which is large, before
+    /// Whether its workgroups' memory must hold zeros at first. The tile rasterizer's memory is large, and it reads nothing there before
     /// it has written it.
     pub fn needs_zeroed_memory(&self) -> bool {
         *self != GATHER
@@ -125,6 +166,48 @@ impl Shader {
         device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(&format!("sheetsplat.{}", self.stage)),
             source: wgpu::ShaderSource::Wgsl(self.source.into()),
+        })
+    }
+
+    /// The file below `shaders/` that a line of the source comes from, and the line's number in that file. Lines count from 1, as in
+    /// compilers' messages.
+    pub fn origin(&self, line: u32) -> (&'static str, u32) {
+        let mut first = 1;
+        for &(path, text) in self.files {
+            let lines = text.lines().count() as u32;
+            if line < first + lines {
+                return (path, line + 1 - first);
+            }
+            first += lines;
+        }
+        (self.stage, line)
+    }
+
+    /// A message of wgpu about this shader, with `wgsl:LINE:COLUMN` replaced by the file and the line there.
+    pub fn explain(&self, message: &str) -> String {
+        let mut explained = String::new();
+        let mut rest = message;
+        while let Some((before, after)) = rest.split_once("wgsl:") {
+            let digits = after.len() - after.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+            explained += before;
+            match after[..digits].parse() {
+                Ok(line) => {
+                    let (path, line) = self.origin(line);
+                    explained += &format!("shaders/{path}:{line}");
+                }
+                Err(_) => explained += "wgsl:",
+            }
+            rest = &after[digits..];
+        }
+        explained + rest
+    }
+
+    /// The number of a binding of group 0 by its name in the shader; `None` if there is no such binding.
+    pub fn binding(&self, name: &str) -> Option<u32> {
+        self.source.lines().find_map(|line| {
+            let (number, declaration) = line.strip_prefix("@group(0) @binding(")?.split_once(')')?;
+            let declared = declaration.split_once(':')?.0.split_whitespace().last()?;
+            if declared == name { number.parse().ok() } else { None }
         })
     }
 }

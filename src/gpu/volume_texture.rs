@@ -22,7 +22,7 @@ pub enum ValueFormat {
     Offset8(f32),
     /// `R16Uint`: the same.
     Offset16(f32),
-    /// `R32Uint`: the bits of the `f32`.
+    /// `R32Uint`: the bits of the `f32`; those of a hole are NaN's.
     Bits,
 }
 

@@ -57,7 +57,7 @@ pub enum ImageError {
     },
 }
 
-/// File formats by extension.
+/// File formats by extension, in upper or lower case.
 pub(super) enum Format {
     Png,
     Exr,
@@ -66,11 +66,12 @@ pub(super) enum Format {
 
 impl Format {
     pub(super) fn of(path: &Path) -> Result<Self, ImageError> {
-        match path.extension().and_then(|extension| extension.to_str()) {
+        let extension = path.extension().and_then(|extension| extension.to_str());
+        match extension.map(str::to_ascii_lowercase).as_deref() {
             Some("png") => Ok(Self::Png),
             Some("exr") => Ok(Self::Exr),
             Some("npy") => Ok(Self::Npy),
-            extension => Err(ImageError::Format {
+            _ => Err(ImageError::Format {
                 path: path.to_owned(),
                 found: extension.map_or("none".to_owned(), |extension| format!("\".{extension}\"")),
             }),

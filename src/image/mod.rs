@@ -5,6 +5,9 @@ mod format;
 #[cfg(feature = "codecs")]
 mod open;
 #[cfg(feature = "codecs")]
+#[doc(hidden)]
+pub mod output;
+#[cfg(feature = "codecs")]
 mod save;
 
 #[cfg(feature = "codecs")]
@@ -13,9 +16,6 @@ use format::Format;
 pub use format::ImageError;
 #[cfg(feature = "codecs")]
 pub use save::PngDepth;
-#[cfg(feature = "codecs")]
-#[doc(hidden)]
-pub use save::{aside, write_aside};
 
 /// An image of f32 premultiplied RGBA, row 0 at the top. Colours are display-referred (SPEC §3).
 #[derive(Clone, Debug, PartialEq)]

@@ -1,9 +1,8 @@
 //! Saving images.
 
-use std::io::Write;
 use std::path::Path;
 
-use super::{Format, Image, ImageError};
+use super::{Format, Image, ImageError, output};
 
 /// Bits per channel of a PNG file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -25,20 +24,29 @@ impl Image {
     }
 
     /// Saves the image by the file's extension: `.png` (straight alpha, `depth` bits), `.exr` or `.npy` (f32
-    /// premultiplied RGBA; NPY has shape height × width × 4). Written aside, then renamed.
+    /// premultiplied RGBA; NPY has shape height × width × 4). A regular file is written aside, then renamed, and keeps the permissions
+    /// of the one it replaces; symbolic links are followed, pipes and devices written to.
     ///
     /// # Errors
     /// If the extension is unknown or the file cannot be written.
     pub fn save(&self, path: &Path, depth: PngDepth) -> Result<(), ImageError> {
-        let bytes = match Format::of(path)? {
-            Format::Png => self.encode(path, self.straight(depth), ::image::ImageFormat::Png)?,
-            Format::Exr => self.encode(path, self.float(), ::image::ImageFormat::OpenExr)?,
-            Format::Npy => self.npy().map_err(|source| ImageError::Io { path: path.to_owned(), source })?,
-        };
-        write_aside(path, &bytes).map_err(|source| ImageError::Io { path: path.to_owned(), source })
+        let bytes = self.encode(path, depth)?;
+        output::write(path, &bytes).map_err(|source| ImageError::Io { path: path.to_owned(), source })
     }
 
-    fn encode(
+    /// The bytes that [`Image::save`] writes into a file.
+    ///
+    /// # Errors
+    /// If the extension is unknown or the image cannot be encoded.
+    pub fn encode(&self, path: &Path, depth: PngDepth) -> Result<Vec<u8>, ImageError> {
+        match Format::of(path)? {
+            Format::Png => self.encode_as(path, self.straight(depth), ::image::ImageFormat::Png),
+            Format::Exr => self.encode_as(path, self.float(), ::image::ImageFormat::OpenExr),
+            Format::Npy => self.npy().map_err(|source| ImageError::Io { path: path.to_owned(), source }),
+        }
+    }
+
+    fn encode_as(
         &self,
         path: &Path,
         image: Option<::image::DynamicImage>,
@@ -91,31 +99,4 @@ impl Image {
         writer.finish()?;
         Ok(bytes)
     }
-}
-
-/// Writes a file so that it is there whole or not at all: into a temporary file beside it, then renamed.
-///
-/// # Errors
-/// What the operating system says.
-pub fn write_aside(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    aside(path, bytes)?.persist(path)?;
-    Ok(())
-}
-
-/// The first half of [`write_aside`]: the temporary file, which is gone unless it is persisted.
-///
-/// # Errors
-/// What the operating system says.
-pub fn aside(path: &Path, bytes: &[u8]) -> std::io::Result<tempfile::NamedTempFile> {
-    if path.is_dir() {
-        return Err(std::io::ErrorKind::IsADirectory.into());
-    }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    // Temporary files are private by default; an image is as readable as any file the user makes.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.prefix(".sheetsplat-").tempfile_in(folder)?;
-    file.write_all(bytes)?;
-    Ok(file)
 }

@@ -22,12 +22,13 @@ pub fn in_rows(volume: &Volume, pick: impl Fn(u32, u32, u32) -> Vec<u32> + Sync)
     rows.concat()
 }
 
-/// Whether a voxel that is not clipped takes part: visible, inside an iso-range and with an opacity above 0.
+/// Whether a voxel that is not clipped takes part: no hole, visible, inside an iso-range and with an opacity above 0.
 pub fn takes_part(volume: &Volume, transfer: &TransferFunction, index: u32) -> bool {
     let value = f64::from(volume.values()[index as usize]);
     let tables = transfer.tables(volume.label(index));
     // Most voxels are ruled out by their value, and without a gradient opacity nothing else counts: spare them the gradient.
-    let may_take_part = tables.visible && tables.opacity.at(value) > 0.0 && tables.in_iso_range(value);
+    let may_take_part =
+        !value.is_nan() && tables.visible && tables.opacity.at(value) > 0.0 && tables.in_iso_range(value);
     may_take_part
         && (tables.gradient_opacity.is_none()
             || tables.alpha(value, volume.gradient(volume.grid().voxel_at(index)).length()) > 0.0)

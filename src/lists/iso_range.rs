@@ -24,6 +24,9 @@ pub fn of_ordinal(ordinal: u32) -> f32 {
     f32::from_bits(if ordinal >> 31 == 1 { ordinal & !(1 << 31) } else { !ordinal })
 }
 
+/// Above the ordinals of all finite values; that of a hole is larger.
+const END: u32 = f32::INFINITY.to_bits() | 1 << 31;
+
 /// Ordinal of the first `f32` that is at least `x`.
 fn at_least(x: f64) -> u32 {
     let nearest = x as f32;
@@ -70,7 +73,7 @@ impl ValueSet {
             if y > 0.0 {
                 ranges.push(at_least(x)..above(x));
                 if at + 1 == points.len() {
-                    ranges.push(above(x)..u32::MAX);
+                    ranges.push(above(x)..END);
                 }
             }
         }
@@ -106,7 +109,7 @@ impl ValueSet {
         let common = self.intersection(other);
         let starts = common.ranges.iter().map(|range| range.end);
         let ends = common.ranges.iter().map(|range| range.start);
-        let gaps = std::iter::once(0).chain(starts).zip(ends.chain(std::iter::once(u32::MAX)));
+        let gaps = std::iter::once(0).chain(starts).zip(ends.chain(std::iter::once(END)));
         self.union(other).intersection(&Self::of_ranges(gaps.map(|(start, end)| start..end).collect()))
     }
 
@@ -147,6 +150,8 @@ mod tests {
         assert!(values.map(ordinal).is_sorted_by(|a, b| a < b));
         assert_eq!(ordinal(-0.0), ordinal(0.0));
         assert_eq!(values.map(ordinal).map(of_ordinal), values);
+        assert_eq!([ordinal(f32::MAX) + 1, ordinal(f32::INFINITY)], [END; 2]);
+        assert!(ordinal(f32::NAN) > END);
     }
 
     #[test]
@@ -164,6 +169,7 @@ mod tests {
             -1e30, -1.0, 0.0, 0.1, 0.15, 0.2, 0.25, 0.3, 0.5, 0.7, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0,
             70.0, 1e30,
         ];
+        assert!(sets.iter().all(|set| !set.contains(f32::NAN)), "a hole has no value");
         for value in spots.into_iter().flat_map(around) {
             let expected = cases.each_ref().map(|transfer| transfer.alpha(f64::from(value), 0.0) > 0.0);
             assert_eq!(sets.each_ref().map(|set| set.contains(value)), expected, "{value:?}");

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::lists::iso_range::{ValueSet, ordinal};
 
-/// The relevant voxels of a volume, all but those of the least value, sorted by value and then by index.
+/// The relevant voxels of a volume, all but those of the least value and the holes, sorted by value and then by index.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ValueList {
     least: u32,
@@ -16,8 +16,9 @@ pub struct ValueList {
 impl ValueList {
     /// Sorts a volume's voxels.
     pub fn new(values: &[f32]) -> Self {
-        let least = values.par_iter().map(|&value| ordinal(value)).min().unwrap_or(0);
-        let mut keyed: Vec<u64> = (values.par_iter().enumerate())
+        let finite = || values.par_iter().enumerate().filter(|(_, value)| !value.is_nan());
+        let least = finite().map(|(_, &value)| ordinal(value)).min().unwrap_or(0);
+        let mut keyed: Vec<u64> = finite()
             .filter(|&(_, &value)| ordinal(value) != least)
             .map(|(index, &value)| u64::from(ordinal(value)) << 32 | index as u64)
             .collect();
@@ -62,7 +63,8 @@ mod tests {
 
     #[test]
     fn finds_what_a_scan_finds() {
-        let values: Vec<f32> = (0..500_u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as f32 - 100.0).collect();
+        let mut values: Vec<f32> = (0..500_u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as f32 - 100.0).collect();
+        values.iter_mut().step_by(7).for_each(|value| *value = f32::NAN);
         let list = ValueList::new(&values);
         for iso_range in [[-100.0, -90.0], [-1.0, 0.0], [20.5, 77.0], [155.0, 155.0], [-1e9, 1e9], [200.0, 300.0]] {
             let set = ValueSet::of(&TransferFunction {

@@ -73,18 +73,18 @@ impl Composite {
         self.stage(mode).get_or_init(|| {
             let stage = ShaderStages::COMPUTE;
             let slots = [
-                uniform::<Frame>(stage, false),
-                uniform::<Band>(stage, false),
-                texture(stage, TextureViewDimension::D2Array),
-                storage::<[f32; 4]>(stage, false),
-                storage::<TileList>(stage, true),
-                storage::<u32>(stage, false),
-                storage::<u32>(stage, false),
-                uniform::<Group>(stage, true),
-                uniform::<Cut>(stage, false),
-                depth_texture(stage),
-                storage::<u32>(stage, false),
-                storage::<u32>(stage, false),
+                ("frames", uniform::<Frame>(stage, false)),
+                ("band", uniform::<Band>(stage, false)),
+                ("sheets", texture(stage, TextureViewDimension::D2Array)),
+                ("acc", storage::<[f32; 4]>(stage, false)),
+                ("composited", storage::<TileList>(stage, true)),
+                ("opaque", storage::<u32>(stage, false)),
+                ("opaque_tiles", storage::<u32>(stage, false)),
+                ("group", uniform::<Group>(stage, true)),
+                ("cut", uniform::<Cut>(stage, false)),
+                ("surfaces", depth_texture(stage)),
+                ("hits", storage::<u32>(stage, false)),
+                ("last_groups", storage::<u32>(stage, false)),
             ];
             let constants = [
                 ("COMPOSITING", f64::from(mode.compositing as u32)),
@@ -105,18 +105,18 @@ impl Composite {
     ) -> BindGroup {
         let CompositeBuffers { frame, groups, sheets, tiles, targets, cut, hits } = buffers;
         let resources = [
-            frame.as_entire_binding(),
-            band.uniform.as_entire_binding(),
-            wgpu::BindingResource::TextureView(sheets),
-            band.acc.as_entire_binding(),
-            tiles.as_entire_binding(),
-            targets.opaque.as_entire_binding(),
-            targets.opaque_tiles.as_entire_binding(),
-            at_offset::<Group>(groups),
-            cut.uniform.as_entire_binding(),
-            wgpu::BindingResource::TextureView(cut.surfaces),
-            hits.as_entire_binding(),
-            targets.last_groups.as_entire_binding(),
+            ("frames", frame.as_entire_binding()),
+            ("band", band.uniform.as_entire_binding()),
+            ("sheets", wgpu::BindingResource::TextureView(sheets)),
+            ("acc", band.acc.as_entire_binding()),
+            ("composited", tiles.as_entire_binding()),
+            ("opaque", targets.opaque.as_entire_binding()),
+            ("opaque_tiles", targets.opaque_tiles.as_entire_binding()),
+            ("group", at_offset::<Group>(groups)),
+            ("cut", cut.uniform.as_entire_binding()),
+            ("surfaces", wgpu::BindingResource::TextureView(cut.surfaces)),
+            ("hits", hits.as_entire_binding()),
+            ("last_groups", targets.last_groups.as_entire_binding()),
         ];
         self.compiled(device, mode).bind(device, &resources)
     }

@@ -48,6 +48,8 @@ pub struct CullBuffers<'a> {
     pub groups: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
+    /// Whether any of them is a hole.
+    pub has_holes: bool,
     /// Its labels, if any of them has ramps of its own.
     pub labels: Option<&'a TextureView>,
     /// Control points of the ramps.
@@ -64,34 +66,34 @@ impl Cull {
         let stage = ShaderStages::COMPUTE;
         let sheets = [("SHEETS", f64::from(sheets))];
         let bricks = [
-            uniform::<Frame>(stage, false),
-            uniform::<Group>(stage, true),
-            storage::<Brick>(stage, true),
-            storage::<u32>(stage, true),
-            storage::<BrickState>(stage, true),
-            storage::<u32>(stage, true),
-            storage::<Visit>(stage, false),
-            storage::<Indirect>(stage, false),
-            storage::<Culled>(stage, false),
+            ("frames", uniform::<Frame>(stage, false)),
+            ("group", uniform::<Group>(stage, true)),
+            ("bricks", storage::<Brick>(stage, true)),
+            ("order", storage::<u32>(stage, true)),
+            ("states", storage::<BrickState>(stage, true)),
+            ("occluded", storage::<u32>(stage, true)),
+            ("visits", storage::<Visit>(stage, false)),
+            ("args", storage::<Indirect>(stage, false)),
+            ("culled", storage::<Culled>(stage, false)),
         ];
         let voxels = [
-            uniform::<Frame>(stage, false),
-            uniform::<Group>(stage, true),
-            storage::<Brick>(stage, true),
-            storage::<u32>(stage, true),
-            storage::<Visit>(stage, false),
-            storage::<BrickState>(stage, false),
-            storage::<Culled>(stage, false),
-            storage::<Indirect>(stage, true),
+            ("frames", uniform::<Frame>(stage, false)),
+            ("group", uniform::<Group>(stage, true)),
+            ("bricks", storage::<Brick>(stage, true)),
+            ("occluded", storage::<u32>(stage, true)),
+            ("visits", storage::<Visit>(stage, false)),
+            ("states", storage::<BrickState>(stage, false)),
+            ("culled", storage::<Culled>(stage, false)),
+            ("visit_args", storage::<Indirect>(stage, true)),
         ];
         let compact = [
-            storage::<Visit>(stage, true),
-            storage::<Indirect>(stage, true),
-            storage::<u32>(stage, false),
-            storage::<Indirect>(stage, false),
-            storage::<u32>(stage, false),
-            storage::<Indirect>(stage, false),
-            storage::<Culled>(stage, false),
+            ("visits", storage::<Visit>(stage, true)),
+            ("visit_args", storage::<Indirect>(stage, true)),
+            ("instances", storage::<u32>(stage, false)),
+            ("draw_args", storage::<Indirect>(stage, false)),
+            ("fresh", storage::<u32>(stage, false)),
+            ("fresh_args", storage::<Indirect>(stage, false)),
+            ("culled", storage::<Culled>(stage, false)),
         ];
         Self {
             bricks: ComputeStage::new(device, shaders::CULL_BRICKS, "main", &bricks, &sheets),
@@ -146,34 +148,42 @@ impl Cull {
         let (frame, group) = (frame.as_entire_binding(), at_offset::<Group>(groups));
         let whole = Buffer::as_entire_binding;
         let bricks = [
-            frame.clone(),
-            group.clone(),
-            whole(&list.buffer),
-            whole(order),
-            whole(&states),
-            whole(occluded),
-            whole(&visits),
-            whole(&visit_args),
-            whole(culled),
+            ("frames", frame.clone()),
+            ("group", group.clone()),
+            ("bricks", whole(&list.buffer)),
+            ("order", whole(order)),
+            ("states", whole(&states)),
+            ("occluded", whole(occluded)),
+            ("visits", whole(&visits)),
+            ("args", whole(&visit_args)),
+            ("culled", whole(culled)),
         ];
         let voxels = [
-            frame.clone(),
-            group,
-            whole(&list.buffer),
-            whole(occluded),
-            whole(&visits),
-            whole(&states),
-            whole(culled),
-            whole(&visit_args),
+            ("frames", frame.clone()),
+            ("group", group),
+            ("bricks", whole(&list.buffer)),
+            ("occluded", whole(occluded)),
+            ("visits", whole(&visits)),
+            ("states", whole(&states)),
+            ("culled", whole(culled)),
+            ("visit_args", whole(&visit_args)),
         ];
-        let lists = [&visits, &visit_args, &instances, &draw_args, &fresh, &fresh_args, culled];
-        let compact = lists.map(whole);
+        let compact = [
+            ("visits", whole(&visits)),
+            ("visit_args", whole(&visit_args)),
+            ("instances", whole(&instances)),
+            ("draw_args", whole(&draw_args)),
+            ("fresh", whole(&fresh)),
+            ("fresh_args", whole(&fresh_args)),
+            ("culled", whole(culled)),
+        ];
         let shade_group = self.shade.bind(
             device,
             ShadeBuffers {
                 frame: shared.frame,
                 bricks: &list.buffer,
                 values: shared.values,
+                has_holes: shared.has_holes,
                 labels: shared.labels,
                 control_points: shared.control_points,
                 places: &fresh,

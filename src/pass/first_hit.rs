@@ -1,12 +1,12 @@
 //! Writes the depths of first hits into a texture.
 
 use wgpu::{
-    BindGroup, BindGroupLayout, Buffer, BufferBinding, CommandEncoder, Device, RenderPipeline, ShaderStages, Texture,
-    TextureFormat, TextureUsages, TextureView,
+    BindGroup, Buffer, BufferBinding, CommandEncoder, Device, RenderPipeline, ShaderStages, Texture, TextureFormat,
+    TextureUsages, TextureView,
 };
 
 use super::composite::CutBuffers;
-use crate::gpu::bindings::{bind, depth_texture, layout, storage, uniform};
+use crate::gpu::bindings::{Bindings, depth_texture, storage, uniform};
 use crate::gpu::layout::{Cut, Frame};
 use crate::gpu::render_pipeline::{Attachments, render_pipeline};
 use crate::gpu::shaders;
@@ -17,7 +17,7 @@ pub const FORMAT: TextureFormat = TextureFormat::R32Float;
 /// The stage's pipeline.
 #[derive(Debug)]
 pub struct FirstHit {
-    layout: BindGroupLayout,
+    bindings: Bindings,
     pipeline: RenderPipeline,
 }
 
@@ -26,16 +26,16 @@ impl FirstHit {
     pub fn new(device: &Device) -> Self {
         let stage = ShaderStages::FRAGMENT;
         let slots = [
-            uniform::<Frame>(stage, false),
-            uniform::<Cut>(stage, false),
-            depth_texture(stage),
-            storage::<u32>(stage, true),
+            ("frames", uniform::<Frame>(stage, false)),
+            ("cut", uniform::<Cut>(stage, false)),
+            ("surfaces", depth_texture(stage)),
+            ("hits", storage::<u32>(stage, true)),
         ];
-        let (layout, pipeline_layout) = layout(device, "sheetsplat.first_hit", &slots);
+        let bindings = Bindings::new(device, shaders::FIRST_HIT, &slots);
         let attachments = Attachments::colors([FORMAT.into()]);
         let shader = (shaders::FIRST_HIT, ["vertex", "fragment"]);
-        let pipeline = render_pipeline(device, shader, &pipeline_layout, &attachments, &[]);
-        Self { layout, pipeline }
+        let pipeline = render_pipeline(device, shader, &bindings.pipeline_layout, &attachments, &[]);
+        Self { bindings, pipeline }
     }
 
     /// A texture for the depths of an image.
@@ -61,12 +61,12 @@ impl FirstHit {
         (hits, offset): (&Buffer, u64),
     ) -> BindGroup {
         let resources = [
-            frame.as_entire_binding(),
-            cut.uniform.as_entire_binding(),
-            wgpu::BindingResource::TextureView(cut.surfaces),
-            wgpu::BindingResource::Buffer(BufferBinding { buffer: hits, offset, size: None }),
+            ("frames", frame.as_entire_binding()),
+            ("cut", cut.uniform.as_entire_binding()),
+            ("surfaces", wgpu::BindingResource::TextureView(cut.surfaces)),
+            ("hits", wgpu::BindingResource::Buffer(BufferBinding { buffer: hits, offset, size: None })),
         ];
-        bind(device, "sheetsplat.first_hit", &self.layout, &resources)
+        self.bindings.bind(device, &resources)
     }
 
     /// Overwrites the texture.

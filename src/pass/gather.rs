@@ -32,20 +32,21 @@ pub struct GatherMode {
     perspective: bool,
     economies: bool,
     labels: bool,
+    holes: bool,
     rays: RayMode,
     /// Whether tiles are divided.
     divided: bool,
 }
 
 impl GatherMode {
-    /// The mode that splatting settings ask for, with or without an eye, and with or without `labels` that have ramps of their own; each
-    /// tile in so many parts.
-    pub fn of(splatting: &Splatting, perspective: bool, labels: bool, rays: RayMode, parts: u32) -> Self {
+    /// The mode that splatting settings ask for, with or without an eye, of a volume with or without labels that have ramps of their own
+    /// and with or without holes; each tile in so many parts.
+    pub fn of(splatting: &Splatting, perspective: bool, [labels, holes]: [bool; 2], rays: RayMode, parts: u32) -> Self {
         let Splatting { compositing, order, footprint_box, economies, .. } = *splatting;
         let economies = economies != Economies::default();
         // Every voxel has its own parallelogram there.
         let footprint_box = if perspective { FootprintBox::Rectangle } else { footprint_box };
-        Self { compositing, order, footprint_box, perspective, economies, labels, rays, divided: parts > 1 }
+        Self { compositing, order, footprint_box, perspective, economies, labels, holes, rays, divided: parts > 1 }
     }
 }
 
@@ -80,15 +81,16 @@ pub struct GatherBuffers<'a> {
 
 impl Default for Gather {
     fn default() -> Self {
-        Self { stages: (0..Compositing::COUNT << 8).map(|_| OnceLock::new()).collect(), no_labels: OnceLock::new() }
+        Self { stages: (0..Compositing::COUNT << 9).map(|_| OnceLock::new()).collect(), no_labels: OnceLock::new() }
     }
 }
 
 impl Gather {
     fn stage(&self, mode: GatherMode) -> &OnceLock<ComputeStage> {
-        let GatherMode { compositing, order, footprint_box, perspective, economies, labels, rays, divided } = mode;
+        let GatherMode { compositing, order, footprint_box, perspective, economies, labels, holes, rays, divided } =
+            mode;
         let [order, footprint_box] = [order as usize, footprint_box as usize];
-        let flags = [perspective, economies, labels, rays.cut, rays.first_hit, divided].map(usize::from);
+        let flags = [perspective, economies, labels, holes, rays.cut, rays.first_hit, divided].map(usize::from);
         let bits = [order, footprint_box].into_iter().chain(flags);
         &self.stages[bits.fold(compositing as usize, |number, bit| 2 * number + bit)]
     }
@@ -97,21 +99,21 @@ impl Gather {
         self.stage(mode).get_or_init(|| {
             let stage = ShaderStages::COMPUTE;
             let slots = [
-                uniform::<Frame>(stage, false),
-                uniform::<GatherUniform>(stage, false),
-                uniform::<Part>(stage, true),
-                storage::<Brick>(stage, true),
-                storage::<u32>(stage, true),
-                storage::<u32>(stage, true),
-                storage::<[f32; 4]>(stage, true),
-                texture_of_integers(stage, TextureViewDimension::D2Array),
-                storage::<[f32; 4]>(stage, false),
-                storage::<Gathered>(stage, false),
-                storage::<[f32; 2]>(stage, true),
-                texture_of_integers(stage, TextureViewDimension::D2Array),
-                storage::<Indirect>(stage, false),
-                uniform::<Cut>(stage, false),
-                depth_texture(stage),
+                ("frames", uniform::<Frame>(stage, false)),
+                ("gathers", uniform::<GatherUniform>(stage, false)),
+                ("part", uniform::<Part>(stage, true)),
+                ("bricks", storage::<Brick>(stage, true)),
+                ("starts", storage::<u32>(stage, true)),
+                ("entries", storage::<u32>(stage, true)),
+                ("control_points", storage::<[f32; 4]>(stage, true)),
+                ("values", texture_of_integers(stage, TextureViewDimension::D2Array)),
+                ("acc", storage::<[f32; 4]>(stage, false)),
+                ("gathered", storage::<Gathered>(stage, false)),
+                ("half_boxes", storage::<[f32; 2]>(stage, true)),
+                ("labels", texture_of_integers(stage, TextureViewDimension::D2Array)),
+                ("next", storage::<Indirect>(stage, false)),
+                ("cut", uniform::<Cut>(stage, false)),
+                ("surfaces", depth_texture(stage)),
             ];
             let constants = [
                 ("THREADS", f64::from(device.adapter_info().subgroup_max_size)),
@@ -123,6 +125,7 @@ impl Gather {
                 ("ECONOMIES", f64::from(u8::from(mode.economies))),
                 ("PARALLELOGRAM", f64::from(mode.footprint_box as u32)),
                 ("LABELS", f64::from(u8::from(mode.labels))),
+                ("HOLES", f64::from(u8::from(mode.holes))),
                 ("CUT", f64::from(u8::from(mode.rays.cut))),
                 ("FIRST_HIT", f64::from(u8::from(mode.rays.first_hit))),
             ];
@@ -159,21 +162,21 @@ impl Gather {
         let labels = labels.unwrap_or_else(|| &self.no_labels.get_or_init(|| VolumeTexture::no_labels(device)).view);
         let whole = Buffer::as_entire_binding;
         let resources = [
-            whole(frame),
-            whole(gather),
-            at_offset::<Part>(parts),
-            whole(bricks),
-            whole(starts),
-            whole(entries),
-            whole(control_points),
-            wgpu::BindingResource::TextureView(values),
-            whole(acc),
-            whole(buffers.gathered),
-            whole(buffers.half_boxes),
-            wgpu::BindingResource::TextureView(labels),
-            whole(next),
-            whole(buffers.cut.uniform),
-            wgpu::BindingResource::TextureView(buffers.cut.surfaces),
+            ("frames", whole(frame)),
+            ("gathers", whole(gather)),
+            ("part", at_offset::<Part>(parts)),
+            ("bricks", whole(bricks)),
+            ("starts", whole(starts)),
+            ("entries", whole(entries)),
+            ("control_points", whole(control_points)),
+            ("values", wgpu::BindingResource::TextureView(values)),
+            ("acc", whole(acc)),
+            ("gathered", whole(buffers.gathered)),
+            ("half_boxes", whole(buffers.half_boxes)),
+            ("labels", wgpu::BindingResource::TextureView(labels)),
+            ("next", whole(next)),
+            ("cut", whole(buffers.cut.uniform)),
+            ("surfaces", wgpu::BindingResource::TextureView(buffers.cut.surfaces)),
         ];
         self.compiled(device, mode).bind(device, &resources)
     }

@@ -19,11 +19,11 @@ impl Occlude {
     pub fn new(device: &Device) -> Self {
         let stage = ShaderStages::COMPUTE;
         let slots = [
-            uniform::<Frame>(stage, false),
-            uniform::<Group>(stage, true),
-            storage::<TileList>(stage, true),
-            storage::<u32>(stage, true),
-            storage::<u32>(stage, false),
+            ("frames", uniform::<Frame>(stage, false)),
+            ("group", uniform::<Group>(stage, true)),
+            ("occluding", storage::<TileList>(stage, true)),
+            ("source", storage::<u32>(stage, true)),
+            ("result", storage::<u32>(stage, false)),
         ];
         let compile = |entry| ComputeStage::new(device, shaders::OCCLUDE, entry, &slots, &[]);
         Self { columns: compile("columns"), rows: compile("rows") }
@@ -39,7 +39,13 @@ impl Occlude {
     ) -> [BindGroup; 2] {
         let bind = |stage: &ComputeStage, source: &Buffer, result: &Buffer| {
             let whole = Buffer::as_entire_binding;
-            let resources = [whole(frame), at_offset::<Group>(groups), whole(tiles), whole(source), whole(result)];
+            let resources = [
+                ("frames", whole(frame)),
+                ("group", at_offset::<Group>(groups)),
+                ("occluding", whole(tiles)),
+                ("source", whole(source)),
+                ("result", whole(result)),
+            ];
             stage.bind(device, &resources)
         };
         [

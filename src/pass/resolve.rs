@@ -1,8 +1,8 @@
 //! Lays the compositing buffer over the background, into the host's target.
 
-use wgpu::{BindGroup, BindGroupLayout, Buffer, Device, RenderPass, RenderPipeline, ShaderStages};
+use wgpu::{BindGroup, Buffer, Device, RenderPass, RenderPipeline, ShaderStages};
 
-use crate::gpu::bindings::{bind, layout, storage, uniform};
+use crate::gpu::bindings::{Bindings, storage, uniform};
 use crate::gpu::layout::{Band, Frame};
 use crate::gpu::render_pipeline::{Attachments, render_pipeline};
 use crate::gpu::shaders;
@@ -13,7 +13,7 @@ use crate::renderer::placement::Placement;
 /// The stage's pipeline.
 #[derive(Debug)]
 pub struct Resolve {
-    layout: BindGroupLayout,
+    bindings: Bindings,
     pipeline: RenderPipeline,
 }
 
@@ -25,11 +25,12 @@ impl Resolve {
     /// Compiles the stage for targets of the kind that the options say.
     pub fn new(device: &Device, options: &RendererOptions) -> Self {
         let stage = ShaderStages::FRAGMENT;
-        let (layout, pipeline_layout) = layout(
-            device,
-            "sheetsplat.resolve",
-            &[uniform::<Frame>(stage, false), uniform::<Band>(stage, false), storage::<[f32; 4]>(stage, true)],
-        );
+        let slots = [
+            ("frames", uniform::<Frame>(stage, false)),
+            ("band", uniform::<Band>(stage, false)),
+            ("acc", storage::<[f32; 4]>(stage, true)),
+        ];
+        let bindings = Bindings::new(device, shaders::RESOLVE, &slots);
         let attachments = Attachments {
             colors: vec![Some(wgpu::ColorTargetState {
                 format: options.target_format,
@@ -48,14 +49,15 @@ impl Resolve {
         };
         let shader = (shaders::RESOLVE, ["vertex", "fragment"]);
         let constants = [("LINEAR_LIGHT", f64::from(u8::from(options.is_linear())))];
-        let pipeline = render_pipeline(device, shader, &pipeline_layout, &attachments, &constants);
-        Self { layout, pipeline }
+        let pipeline = render_pipeline(device, shader, &bindings.pipeline_layout, &attachments, &constants);
+        Self { bindings, pipeline }
     }
 
     /// Binds a band of the compositing buffer.
     pub fn bind(&self, device: &Device, frame: &Buffer, band: &BandBuffer) -> BindGroup {
-        let resources = [frame, &band.uniform, &band.acc].map(Buffer::as_entire_binding);
-        bind(device, "sheetsplat.resolve", &self.layout, &resources)
+        let whole = Buffer::as_entire_binding;
+        let resources = [("frames", whole(frame)), ("band", whole(&band.uniform)), ("acc", whole(&band.acc))];
+        self.bindings.bind(device, &resources)
     }
 
     /// Draws an image of the given width and height, band by band, where it is to go. Leaves its pipeline, bind group 0, viewport and

@@ -3,13 +3,12 @@
 use std::sync::OnceLock;
 
 use wgpu::{
-    BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, PipelineLayout, RenderPassTimestampWrites,
-    RenderPipeline, TextureFormat, TextureView,
+    BindGroup, Buffer, CommandEncoder, Device, RenderPassTimestampWrites, RenderPipeline, TextureFormat, TextureView,
 };
 
 use super::splat::{added_to, quad_indices, sheets_of_a_group, splat_slots};
 use crate::geometry::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
-use crate::gpu::bindings::{at_offset, bind, layout};
+use crate::gpu::bindings::{Bindings, at_offset};
 use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::layout::{Group, QUADS};
 use crate::gpu::render_pipeline::render_pipeline;
@@ -19,8 +18,7 @@ use crate::settings::splatting::{Compositing, FootprintForm};
 /// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug)]
 pub struct Sample {
-    layout: BindGroupLayout,
-    pipeline_layout: PipelineLayout,
+    bindings: Bindings,
     format: TextureFormat,
     /// By footprint form, and by whether samples are composited or summed up.
     pipelines: [[OnceLock<RenderPipeline>; 2]; 2],
@@ -56,8 +54,8 @@ pub struct SampleBuffers<'a> {
 impl Sample {
     /// The stage for a buffer of the given format, nothing compiled.
     pub fn new(device: &Device, format: TextureFormat) -> Self {
-        let (layout, pipeline_layout) = layout(device, "sheetsplat.sample", &splat_slots());
-        Self { layout, pipeline_layout, format, pipelines: Default::default(), indices: quad_indices(device) }
+        let bindings = Bindings::new(device, shaders::SAMPLE, &splat_slots());
+        Self { bindings, format, pipelines: Default::default(), indices: quad_indices(device) }
     }
 
     fn pipeline(&self, mode: SampleMode) -> &OnceLock<RenderPipeline> {
@@ -79,18 +77,18 @@ impl Sample {
             ];
             let shader = (shaders::SAMPLE, ["vertex", "fragment"]);
             let sheet = sheets_of_a_group(self.format, 1, Some(over));
-            render_pipeline(device, shader, &self.pipeline_layout, &sheet, &constants)
+            render_pipeline(device, shader, &self.bindings.pipeline_layout, &sheet, &constants)
         });
         let SampleBuffers { frame, group, splats, order, args, footprints } = buffers;
         let resources = [
-            frame.as_entire_binding(),
-            at_offset::<Group>(group),
-            splats.as_entire_binding(),
-            order.as_entire_binding(),
-            args.as_entire_binding(),
-            wgpu::BindingResource::TextureView(&footprints.view),
+            ("frames", frame.as_entire_binding()),
+            ("group", at_offset::<Group>(group)),
+            ("splats", splats.as_entire_binding()),
+            ("instances", order.as_entire_binding()),
+            ("args", args.as_entire_binding()),
+            ("footprints", wgpu::BindingResource::TextureView(&footprints.view)),
         ];
-        bind(device, "sheetsplat.sample", &self.layout, &resources)
+        self.bindings.bind(device, &resources)
     }
 
     /// Draws `count` kernels into a cleared `target`, in the mode that the group was bound for.

@@ -9,10 +9,11 @@ use crate::gpu::layout::{Brick, Frame, Indirect, Splat};
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
 
-/// The stage's pipelines: without and with labels that have ramps of their own. Each is compiled when it is first asked for.
+/// The stage's pipelines: without and with labels that have ramps of their own, without and with holes. Each is compiled when it is first
+/// asked for.
 #[derive(Debug)]
 pub struct Shade {
-    stages: [OnceLock<ComputeStage>; 2],
+    stages: [[OnceLock<ComputeStage>; 2]; 2],
     no_labels: VolumeTexture,
 }
 
@@ -25,6 +26,8 @@ pub struct ShadeBuffers<'a> {
     pub bricks: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
+    /// Whether any of them is a hole.
+    pub has_holes: bool,
     /// Its labels, if any of them has ramps of its own.
     pub labels: Option<&'a TextureView>,
     /// Control points of the ramps.
@@ -42,6 +45,7 @@ pub struct ShadeBuffers<'a> {
 pub struct ShadeGroup {
     group: BindGroup,
     has_labels: bool,
+    has_holes: bool,
 }
 
 impl Shade {
@@ -52,43 +56,44 @@ impl Shade {
 
     /// Binds buffers.
     pub fn bind(&self, device: &Device, buffers: ShadeBuffers<'_>) -> ShadeGroup {
-        let ShadeBuffers { frame, bricks, values, labels, control_points, places, args, splats } = buffers;
+        let ShadeBuffers { frame, bricks, values, has_holes, labels, control_points, places, args, splats } = buffers;
         let whole = Buffer::as_entire_binding;
         let resources = [
-            whole(frame),
-            whole(bricks),
-            BindingResource::TextureView(values),
-            whole(control_points),
-            whole(places),
-            whole(args),
-            whole(splats),
-            BindingResource::TextureView(labels.unwrap_or(&self.no_labels.view)),
+            ("frames", whole(frame)),
+            ("bricks", whole(bricks)),
+            ("values", BindingResource::TextureView(values)),
+            ("control_points", whole(control_points)),
+            ("fresh", whole(places)),
+            ("args", whole(args)),
+            ("splats", whole(splats)),
+            ("labels", BindingResource::TextureView(labels.unwrap_or(&self.no_labels.view))),
         ];
         let has_labels = labels.is_some();
-        let stage = self.stages[usize::from(has_labels)].get_or_init(|| compile(device, has_labels));
-        ShadeGroup { group: stage.bind(device, &resources), has_labels }
+        let stage = &self.stages[usize::from(has_labels)][usize::from(has_holes)];
+        let stage = stage.get_or_init(|| compile(device, has_labels, has_holes));
+        ShadeGroup { group: stage.bind(device, &resources), has_labels, has_holes }
     }
 
     /// Shades as many voxels as `args` says.
     pub fn record(&self, pass: &mut ComputePass<'_>, bound: &ShadeGroup, args: &Buffer) {
-        if let Some(stage) = self.stages[usize::from(bound.has_labels)].get() {
+        if let Some(stage) = self.stages[usize::from(bound.has_labels)][usize::from(bound.has_holes)].get() {
             stage.dispatch_indirect(pass, &bound.group, &[], args);
         }
     }
 }
 
-fn compile(device: &Device, labels: bool) -> ComputeStage {
+fn compile(device: &Device, labels: bool, holes: bool) -> ComputeStage {
     let stage = ShaderStages::COMPUTE;
     let slots = [
-        uniform::<Frame>(stage, false),
-        storage::<Brick>(stage, true),
-        texture_of_integers(stage, TextureViewDimension::D2Array),
-        storage::<[f32; 4]>(stage, true),
-        storage::<u32>(stage, true),
-        storage::<Indirect>(stage, true),
-        storage::<Splat>(stage, false),
-        texture_of_integers(stage, TextureViewDimension::D2Array),
+        ("frames", uniform::<Frame>(stage, false)),
+        ("bricks", storage::<Brick>(stage, true)),
+        ("values", texture_of_integers(stage, TextureViewDimension::D2Array)),
+        ("control_points", storage::<[f32; 4]>(stage, true)),
+        ("fresh", storage::<u32>(stage, true)),
+        ("args", storage::<Indirect>(stage, true)),
+        ("splats", storage::<Splat>(stage, false)),
+        ("labels", texture_of_integers(stage, TextureViewDimension::D2Array)),
     ];
-    let constants = [("LABELS", f64::from(u8::from(labels)))];
+    let constants = [("LABELS", f64::from(u8::from(labels))), ("HOLES", f64::from(u8::from(holes)))];
     ComputeStage::new(device, shaders::SHADE, "main", &slots, &constants)
 }

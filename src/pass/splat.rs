@@ -4,12 +4,12 @@
 use std::sync::OnceLock;
 
 use wgpu::{
-    BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, PipelineLayout, RenderPassTimestampWrites,
-    RenderPipeline, ShaderStages, TextureFormat, TextureView, TextureViewDimension,
+    BindGroup, Buffer, CommandEncoder, Device, RenderPassTimestampWrites, RenderPipeline, ShaderStages, TextureFormat,
+    TextureView, TextureViewDimension,
 };
 
 use crate::geometry::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
-use crate::gpu::bindings::{Slot, at_offset, bind, layout, storage, texture, uniform, uploaded};
+use crate::gpu::bindings::{Bindings, Slot, at_offset, storage, texture, uniform, uploaded};
 use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::layout::{Frame, Group, Indirect, QUADS, Splat as SplatRecord, TileList};
 use crate::gpu::render_pipeline::{Attachments, render_pipeline};
@@ -20,10 +20,9 @@ use crate::settings::splatting::FootprintForm;
 /// The stage's pipelines: zeroing tiles, and those that draw.
 #[derive(Debug)]
 pub struct Splat {
-    clear_layout: BindGroupLayout,
+    clear_bindings: Bindings,
     clear: RenderPipeline,
-    layout: BindGroupLayout,
-    pipeline_layout: PipelineLayout,
+    bindings: Bindings,
     format: TextureFormat,
     sheets: u32,
     /// By footprint form, without and with an eye; each is compiled when it is first asked for.
@@ -44,24 +43,22 @@ pub struct SplatMode {
 impl Splat {
     /// Compiles the stage for groups of `sheets` sheets, 1, 2 or 4, in the given format.
     pub fn new(device: &Device, format: TextureFormat, sheets: u32) -> Self {
-        let (clear_layout, clear_pipeline_layout) = layout(
-            device,
-            "sheetsplat.clear",
-            &[uniform::<Frame>(ShaderStages::VERTEX, false), storage::<TileList>(ShaderStages::VERTEX, true)],
-        );
-        let (splat_layout, splat_pipeline_layout) = layout(device, "sheetsplat.splat", &splat_slots());
+        let clear_slots = [
+            ("frames", uniform::<Frame>(ShaderStages::VERTEX, false)),
+            ("composited", storage::<TileList>(ShaderStages::VERTEX, true)),
+        ];
+        let clear_bindings = Bindings::new(device, shaders::CLEAR, &clear_slots);
         let entry = format!("fragment_{sheets}");
         Self {
             clear: render_pipeline(
                 device,
                 (shaders::CLEAR, ["vertex", &entry]),
-                &clear_pipeline_layout,
+                &clear_bindings.pipeline_layout,
                 &sheets_of_a_group(format, sheets, None),
                 &[],
             ),
-            clear_layout,
-            layout: splat_layout,
-            pipeline_layout: splat_pipeline_layout,
+            clear_bindings,
+            bindings: Bindings::new(device, shaders::SPLAT, &splat_slots()),
             format,
             sheets,
             splat: Default::default(),
@@ -82,7 +79,7 @@ impl Splat {
                 ("LAYERS", f64::from(SUMMED_AREA_LAYERS)),
             ];
             let sheets = sheets_of_a_group(self.format, self.sheets, additive);
-            render_pipeline(device, (shader, ["vertex", &entry]), &self.pipeline_layout, &sheets, &constants)
+            render_pipeline(device, (shader, ["vertex", &entry]), &self.bindings.pipeline_layout, &sheets, &constants)
         })
     }
 
@@ -92,7 +89,8 @@ impl Splat {
 
     /// Binds the list of tiles to zero.
     pub fn bind_clear(&self, device: &Device, frame: &Buffer, tiles: &Buffer) -> BindGroup {
-        bind(device, "sheetsplat.clear", &self.clear_layout, &[frame, tiles].map(Buffer::as_entire_binding))
+        let resources = [("frames", frame.as_entire_binding()), ("composited", tiles.as_entire_binding())];
+        self.clear_bindings.bind(device, &resources)
     }
 
     /// Compiles what a mode needs.
@@ -110,14 +108,14 @@ impl Splat {
         footprints: &FootprintTexture,
     ) -> BindGroup {
         let resources = [
-            frame.as_entire_binding(),
-            at_offset::<Group>(groups),
-            list.splats.as_entire_binding(),
-            list.instances.as_entire_binding(),
-            list.draw_args.as_entire_binding(),
-            wgpu::BindingResource::TextureView(&footprints.view),
+            ("frames", frame.as_entire_binding()),
+            ("group", at_offset::<Group>(groups)),
+            ("splats", list.splats.as_entire_binding()),
+            ("instances", list.instances.as_entire_binding()),
+            ("args", list.draw_args.as_entire_binding()),
+            ("footprints", wgpu::BindingResource::TextureView(&footprints.view)),
         ];
-        bind(device, "sheetsplat.splat", &self.layout, &resources)
+        self.bindings.bind(device, &resources)
     }
 
     /// Zeroes the listed tiles of the sheet buffers, then adds the given lists' sections of a group: of every list its bind
@@ -163,15 +161,15 @@ impl Splat {
 }
 
 /// What the shaders that draw quads declare.
-pub(super) fn splat_slots() -> [Slot; 6] {
+pub(super) fn splat_slots() -> [(&'static str, Slot); 6] {
     let both = ShaderStages::VERTEX_FRAGMENT;
     [
-        uniform::<Frame>(both, false),
-        uniform::<Group>(ShaderStages::VERTEX, true),
-        storage::<SplatRecord>(ShaderStages::VERTEX, true),
-        storage::<u32>(ShaderStages::VERTEX, true),
-        storage::<Indirect>(ShaderStages::VERTEX, true),
-        texture(both, TextureViewDimension::D2Array),
+        ("frames", uniform::<Frame>(both, false)),
+        ("group", uniform::<Group>(ShaderStages::VERTEX, true)),
+        ("splats", storage::<SplatRecord>(ShaderStages::VERTEX, true)),
+        ("instances", storage::<u32>(ShaderStages::VERTEX, true)),
+        ("args", storage::<Indirect>(ShaderStages::VERTEX, true)),
+        ("footprints", texture(both, TextureViewDimension::D2Array)),
     ]
 }
 

@@ -31,13 +31,13 @@ impl Tiles {
     pub fn new(device: &Device) -> Self {
         let stage = ShaderStages::COMPUTE;
         let slots = [
-            uniform::<Frame>(stage, false),
-            uniform::<Group>(stage, true),
-            storage::<Culled>(stage, false),
-            storage::<u32>(stage, true),
-            storage::<TileList>(stage, false),
-            storage::<TileList>(stage, false),
-            storage::<u32>(stage, false),
+            ("frames", uniform::<Frame>(stage, false)),
+            ("group", uniform::<Group>(stage, true)),
+            ("culled", storage::<Culled>(stage, false)),
+            ("opaque_tiles", storage::<u32>(stage, true)),
+            ("composited", storage::<TileList>(stage, false)),
+            ("occluding", storage::<TileList>(stage, false)),
+            ("counts", storage::<u32>(stage, false)),
         ];
         Self { stage: ComputeStage::new(device, shaders::TILES, "main", &slots, &[]) }
     }
@@ -73,13 +73,13 @@ impl Tiles {
         let occluding = grown(device, old_occluding, &occluding)?;
         let counts = grown(device, old_counts, &counts)?;
         let resources = [
-            frame.as_entire_binding(),
-            at_offset::<Group>(groups),
-            culled.as_entire_binding(),
-            targets.opaque_tiles.as_entire_binding(),
-            composited.as_entire_binding(),
-            occluding.as_entire_binding(),
-            counts.as_entire_binding(),
+            ("frames", frame.as_entire_binding()),
+            ("group", at_offset::<Group>(groups)),
+            ("culled", culled.as_entire_binding()),
+            ("opaque_tiles", targets.opaque_tiles.as_entire_binding()),
+            ("composited", composited.as_entire_binding()),
+            ("occluding", occluding.as_entire_binding()),
+            ("counts", counts.as_entire_binding()),
         ];
         let group = self.stage.bind(device, &resources);
         Ok(TileLists { composited, occluding, counts, group })

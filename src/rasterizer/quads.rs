@@ -135,6 +135,7 @@ impl QuadRasterizer {
             frame,
             groups: &groups,
             values: volume.values(),
+            has_holes: volume.has_holes(),
             labels: volume.labels(),
             control_points,
             occluded: &targets.occluded,

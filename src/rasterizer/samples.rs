@@ -113,6 +113,7 @@ impl SampleRasterizer {
                 frame: given.frame,
                 bricks: volume.lists.lists.first().map_or(&buffers.splats, |list| &list.buffer),
                 values: volume.values(),
+                has_holes: volume.has_holes(),
                 labels: volume.labels(),
                 control_points: given.control_points,
                 places: &buffers.order,

@@ -127,7 +127,8 @@ impl TileRasterizer {
         }
         let parts = write(old.parts.take(), &wanted.parts, &part_bytes)?;
 
-        let mode = GatherMode::of(splatting, view.perspective.is_some(), volume.labels().is_some(), *rays, bins.parts);
+        let of_volume = [volume.labels().is_some(), volume.has_holes()];
+        let mode = GatherMode::of(splatting, view.perspective.is_some(), of_volume, *rays, bins.parts);
         let buffers = GatherBuffers {
             frame: given.frame,
             gather: &uniform,

@@ -65,12 +65,12 @@ pub fn emission(volume: &Volume, transfer: &TransferFunction, scene: &Scene, geo
     color.extend(1.0) * amount(scene.splatting.compositing, alpha(volume, transfer, index))
 }
 
-/// α of a voxel.
+/// α of a voxel; 0 for a hole.
 fn alpha(volume: &Volume, transfer: &TransferFunction, index: u32) -> f64 {
     let value = f64::from(volume.values()[index as usize]);
     let tables = transfer.tables(volume.label(index));
     // Most voxels are ruled out by their value: spare them the gradient.
-    if tables.opacity.at(value) <= 0.0 {
+    if value.is_nan() || tables.opacity.at(value) <= 0.0 {
         return 0.0;
     }
     tables.alpha(value, volume.gradient(volume.grid().voxel_at(index)).length())

@@ -19,7 +19,7 @@ pub struct Pick {
     pub depth: f64,
     /// The nearest voxel.
     pub voxel: UVec3,
-    /// That voxel's value.
+    /// That voxel's value, NaN in a hole.
     pub value: f32,
     /// That voxel's label, in a segmented volume.
     pub label: Option<u16>,

@@ -1,6 +1,7 @@
 //! Checks of what a scene holds beside the settings' own types.
 
 use super::{ImageSettings, Scene, TransferSettings};
+use crate::appearance::Colormap;
 use crate::setting_error::{Interval, SettingError};
 use crate::settings::transfer_function::{check_iso_ranges, check_labels, check_ramps};
 use crate::volume::{Volume, check_spacing};
@@ -38,11 +39,15 @@ impl TransferSettings {
     /// Checks that a volume has what the settings are for.
     ///
     /// # Errors
-    /// If it has no labels and there are tables for some, or the preset for labels.
+    /// If it has no labels and there are tables for some, or the preset for labels, or if it has no palette and the colour map is that.
     pub fn check_volume(&self, volume: &Volume) -> Result<(), SettingError> {
         if !self.labels.is_empty() && volume.labels().is_none() {
             let found = "tables for a volume without labels";
             return Err(SettingError::new("transfer.label", found, "none, or labels in the volume"));
+        }
+        if self.colormap == Some(Colormap::File) && volume.palette().is_none() {
+            let allowed = "another colour map, or a TIFF file whose pixels are indices of a palette";
+            return Err(SettingError::new("transfer.colormap", "file, for a volume without a palette", allowed));
         }
         if self.preset.is_some_and(|preset| !preset.suits(volume)) {
             let allowed = "values that are whole numbers from 0 to 65535, or labels in the volume";

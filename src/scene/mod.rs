@@ -12,14 +12,14 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use toml::Table;
 
-use crate::appearance::{Colormap, Preset, shown_range};
+use crate::appearance::{Colormap, Preset};
 use crate::setting_error::Allowed;
 use crate::settings::camera::Camera;
 use crate::settings::clip::Clip;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::Splatting;
 use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
-use crate::volume::{Labels, RawLayout, Volume, VolumeError, builtin};
+use crate::volume::{Access, Labels, RawLayout, ReadOptions, Volume, VolumeError, builtin};
 use reader::{OVERRIDE, Origins, Section, apply_override};
 
 /// Why a scene could not be read.
@@ -59,9 +59,19 @@ pub enum SceneError {
     },
 }
 
+impl From<VolumeError> for SceneError {
+    fn from(error: VolumeError) -> Self {
+        match error {
+            VolumeError::Io { path, source } => Self::Io { path, source },
+            VolumeError::Invalid { origin, field, found, allowed } => {
+                Self::Invalid { origin, key: field, found, allowed: allowed.into() }
+            }
+        }
+    }
+}
+
 /// Where a scene's volume comes from.
 #[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum VolumeSource {
     /// A volume file.
     File(PathBuf),
@@ -118,7 +128,8 @@ impl From<TransferFunction> for TransferSettings {
 
 impl TransferSettings {
     /// The whole transfer function for a volume. Colours and opacities that are not given, those of labels too, are the preset's, or
-    /// [`TransferFunction::from_histogram`]'s, each for itself; a colour map spans the values that show ([`shown_range`]).
+    /// [`TransferFunction::from_histogram`]'s, each for itself; a colour map is laid over the values that show
+    /// ([`Colormap::of`]).
     pub fn resolve(&self, volume: &Volume) -> TransferFunction {
         let chosen = || match self.preset {
             Some(preset) => preset.transfer(volume),
@@ -149,7 +160,7 @@ impl TransferSettings {
         }
         match (&self.color, self.colormap) {
             (Some(color), _) => transfer.color = color.clone(),
-            (None, Some(map)) => transfer.color = map.over(shown_range(volume, &transfer).unwrap_or_default()),
+            (None, Some(map)) => transfer.color = map.of(volume, &transfer).unwrap_or(transfer.color),
             (None, None) => {}
         }
         transfer
@@ -205,7 +216,19 @@ impl Scene {
     /// # Errors
     /// If the file cannot be read or is not TOML, if a key is unknown, or if a value is not allowed.
     pub fn open(path: &Path, sets: &[String]) -> Result<Self, SceneError> {
-        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Io { path: path.to_owned(), source })?;
+        Self::open_with(path, sets, &ReadOptions::default())
+    }
+
+    /// As [`Self::open`], with a choice of the folder that the scene file must lie in. What it names is read by
+    /// [`Self::load_volume_with`].
+    ///
+    /// # Errors
+    /// As [`Self::open`], and if the scene file is not in the folder.
+    pub fn open_with(path: &Path, sets: &[String], options: &ReadOptions) -> Result<Self, SceneError> {
+        let access = Access::new(options)?;
+        let resolved = access.resolve(path)?;
+        let text =
+            std::fs::read_to_string(resolved).map_err(|source| SceneError::Io { path: path.to_owned(), source })?;
         Self::parse(&text, &path.display().to_string(), path.parent().unwrap_or(Path::new("")), sets)
     }
 
@@ -236,25 +259,46 @@ impl Scene {
     ///
     /// # Errors
     /// If the volume or label file cannot be read, is of no known format or does not hold what its header promises, if the
-    /// labels do not fit the volume, or if there is no such builtin volume.
+    /// labels do not fit the volume, if there is no such builtin volume, or if both would take more memory than
+    /// [`ReadOptions::memory`] allows by default.
     pub fn load_volume(&self) -> Result<Volume, VolumeError> {
+        self.load_volume_with(&ReadOptions::default())
+    }
+
+    /// As [`Self::load_volume`], with a choice of the folder that files must lie in and of the memory limit, which holds for values and
+    /// labels together.
+    ///
+    /// # Errors
+    /// As [`Self::load_volume`], and if a file is not in the folder.
+    pub fn load_volume_with(&self, options: &ReadOptions) -> Result<Volume, VolumeError> {
+        self.load_volume_and_files(options).map(|(volume, _)| volume)
+    }
+
+    /// As [`Self::load_volume_with`], and which files the volume and its labels were read from: slices in a folder and data files that a
+    /// header names too.
+    ///
+    /// # Errors
+    /// As [`Self::load_volume_with`].
+    pub fn load_volume_and_files(&self, options: &ReadOptions) -> Result<(Volume, Vec<PathBuf>), VolumeError> {
+        let access = Access::new(options)?;
         let (volume, origin) = match &self.volume {
-            VolumeSource::File(path) => (Volume::open(path)?, path.display().to_string()),
-            VolumeSource::Raw(path, layout) => (Volume::open_raw(path, layout)?, path.display().to_string()),
-            VolumeSource::Builtin(name) => (builtin::volume(name)?, format!("builtin:{name}")),
+            VolumeSource::File(path) => (Volume::read(path, &access)?, path.display().to_string()),
+            VolumeSource::Raw(path, layout) => (Volume::read_raw(path, layout, &access)?, path.display().to_string()),
+            VolumeSource::Builtin(name) => (builtin::read(name, &access)?, format!("builtin:{name}")),
         };
         let volume = match &self.labels {
             Some(path) => {
-                let labels = Labels::open(path)?;
+                let labels = Labels::read(path, &access)?;
                 let spacing = labels.spacing.filter(|_| self.spacing.is_none());
                 volume.with_labels(Labels { spacing, ..labels })?
             }
             None => volume,
         };
-        match self.spacing {
-            Some(spacing) => volume.with_spacing(&origin, spacing),
-            None => Ok(volume),
-        }
+        let volume = match self.spacing {
+            Some(spacing) => volume.with_spacing(&origin, spacing)?,
+            None => volume,
+        };
+        Ok((volume, access.files()))
     }
 
     /// The same scene with what it leaves to the volume filled in: transfer function, and how much the camera shows. It renders the same

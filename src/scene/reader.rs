@@ -302,7 +302,7 @@ impl<'a> Entry<'a> {
             let [at, value] = item.array(point)?;
             Ok((at.number(Interval::FINITE)?, read(&value)?))
         });
-        Ramp::new(points.collect::<Result<_, _>>()?).map_err(|error| match error {
+        Ramp::new(points.collect::<Result<_, SceneError>>()?).map_err(|error| match error {
             RampError::Empty => self.refused(allowed),
             RampError::NotFinite { index, position } => {
                 let key = format!("{}[{index}][0]", self.key);

@@ -5,20 +5,21 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::VolumeError;
-use super::source::{Source, io_error};
+use super::access::Access;
+use super::source::io_error;
 
 /// The first bytes of a file.
-pub(super) fn head(path: &Path) -> Result<Vec<u8>, VolumeError> {
+pub(super) fn head(path: &Path, access: &Access) -> Result<Vec<u8>, VolumeError> {
     let mut head = Vec::new();
-    Source::open(path)?.reader.take(1024).read_to_end(&mut head).map_err(io_error(path))?;
+    access.open_to_look(path)?.reader.take(1024).read_to_end(&mut head).map_err(io_error(path))?;
     Ok(head)
 }
 
 /// The files in a folder, not those in its folders, in the order that people count in.
-pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>, VolumeError> {
+pub(super) fn files(folder: &Path, access: &Access) -> Result<Vec<PathBuf>, VolumeError> {
     let mut files = Vec::new();
-    for entry in fs::read_dir(folder).map_err(io_error(folder))? {
-        let path = entry.map_err(io_error(folder))?.path();
+    for entry in fs::read_dir(access.resolve(folder)?).map_err(io_error(folder))? {
+        let path = folder.join(entry.map_err(io_error(folder))?.file_name());
         if fs::metadata(&path).is_ok_and(|metadata| metadata.is_file()) {
             files.push(path);
         }

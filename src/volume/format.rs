@@ -2,15 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
+use super::access::Access;
 use super::loaded::Loaded;
 use super::samples::Voxel;
 use super::source::invalid;
 use super::{VolumeError, folder, nrrd};
 
-type Reader<T> = fn(&Path) -> Result<Loaded<T>, VolumeError>;
+type Reader<T> = fn(&Path, &Access) -> Result<Loaded<T>, VolumeError>;
 
 /// Of a folder, and those of its files that are of the format.
-type FolderReader<T> = fn(&Path, &[PathBuf]) -> Result<Loaded<T>, VolumeError>;
+type FolderReader<T> = fn(&Path, &[PathBuf], &Access) -> Result<Loaded<T>, VolumeError>;
 
 /// A format, and what reads it.
 struct Format<T> {
@@ -73,6 +74,13 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             read_folder: None,
         },
         Format {
+            name: "NPZ",
+            extensions: &[".npz"],
+            is_magic: |head| head.starts_with(b"PK\x03\x04"),
+            read: reader!("npy", super::npz::read),
+            read_folder: None,
+        },
+        Format {
             name: "TIFF",
             extensions: &[".tif", ".tiff"],
             is_magic: |head| matches!(head.get(..4), Some(b"II*\0" | b"MM\0*" | b"II+\0" | b"MM\0+")),
@@ -105,17 +113,18 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
 
 /// Reads a file, and says of which format it is: the format that its first bytes tell, else the one that its name tells. Reads a
 /// folder of slices, whose format the first bytes of all its files tell.
-pub(super) fn read<T: Voxel>(path: &Path) -> Result<(&'static str, Loaded<T>), VolumeError> {
+pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static str, Loaded<T>), VolumeError> {
     let formats = formats();
-    if path.is_dir() {
-        return read_folder(path, &formats);
+    let (file, _) = archive_and_array(path);
+    if access.resolve(file)?.is_dir() {
+        return read_folder(path, access, &formats);
     }
-    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let head = folder::head(path)?;
+    let name = file.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let head = folder::head(file, access)?;
     let is_named = |format: &&Format<T>| format.extensions.iter().any(|extension| name.ends_with(extension));
     let format = formats.iter().find(|format| (format.is_magic)(&head)).or_else(|| formats.iter().find(is_named));
     let found = match format {
-        Some(Format { name, read: Ok(read), .. }) => return Ok((name, read(path)?)),
+        Some(Format { name, read: Ok(read), .. }) => return Ok((name, read(path, access)?)),
         Some(Format { name, read: Err(feature), .. }) => needs(name, feature),
         None => match path.extension() {
             Some(extension) => format!("\".{}\"", extension.display()),
@@ -134,12 +143,16 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<(&'static str, Loaded<T>), V
     Err(invalid(path, "format", found, allowed))
 }
 
-fn read_folder<T: Voxel>(path: &Path, formats: &[Format<T>]) -> Result<(&'static str, Loaded<T>), VolumeError> {
+fn read_folder<T: Voxel>(
+    path: &Path,
+    access: &Access,
+    formats: &[Format<T>],
+) -> Result<(&'static str, Loaded<T>), VolumeError> {
     let mut slices: Vec<(&Format<T>, Vec<PathBuf>)> = Vec::new();
-    let files = folder::files(path)?;
+    let files = folder::files(path, access)?;
     let count = files.len();
     for file in files {
-        let head = folder::head(&file)?;
+        let head = folder::head(&file, access)?;
         let of_slices = |format: &&Format<T>| SLICES.contains(&format.name) && (format.is_magic)(&head);
         let Some(format) = formats.iter().find(of_slices) else { continue };
         match slices.iter_mut().find(|(other, _)| other.name == format.name) {
@@ -149,7 +162,7 @@ fn read_folder<T: Voxel>(path: &Path, formats: &[Format<T>]) -> Result<(&'static
     }
     let found = match slices.as_slice() {
         [] => format!("{count} files, no slices among them"),
-        [(Format { name, read_folder: Some(read), .. }, files)] => return Ok((name, read(path, files)?)),
+        [(Format { name, read_folder: Some(read), .. }, files)] => return Ok((name, read(path, files, access)?)),
         [(Format { name, read: Err(feature), .. }, _)] => needs(name, feature),
         several => {
             let counts = several.iter().map(|(Format { name, .. }, files)| format!("{} {name} files", files.len()));
@@ -158,6 +171,16 @@ fn read_folder<T: Voxel>(path: &Path, formats: &[Format<T>]) -> Result<(&'static
     };
     let allowed = format!("a volume file, or a folder with the slices of one volume, {}", SLICES.join(" or "));
     Err(invalid(path, "folder", found, allowed))
+}
+
+/// What is before the colon, and what is behind it, of a path such as `file.npz:name`; any other path is all before it.
+pub(super) fn archive_and_array(path: &Path) -> (&Path, Option<&str>) {
+    const EXTENSION: &str = ".npz:";
+    let split = path.to_str().filter(|_| !path.exists()).and_then(|text| {
+        let at = text.to_ascii_lowercase().rfind(EXTENSION)? + EXTENSION.len();
+        Some((Path::new(&text[..at - 1]), Some(&text[at..])))
+    });
+    split.unwrap_or((path, None))
 }
 
 fn needs(name: &str, feature: &str) -> String {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
 
+use super::access::{Access, ReadOptions};
 use super::format;
 use super::loaded::Loaded;
 use super::{Volume, VolumeError, invalid};
@@ -35,7 +36,19 @@ impl Labels {
     /// If the file cannot be read, is of no known format, does not hold what its header promises, or has a sample that is no
     /// label (the error names the voxel).
     pub fn open(path: &Path) -> Result<Self, VolumeError> {
-        let (_, Loaded { dims, spacing, label_names: names, values, .. }) = format::read(path)?;
+        Self::open_with(path, &ReadOptions::default())
+    }
+
+    /// As [`Self::open`], with a choice of the folder that files must lie in and of the memory limit.
+    ///
+    /// # Errors
+    /// As [`Self::open`], and if the file, or one that its header names, is not in the folder.
+    pub fn open_with(path: &Path, options: &ReadOptions) -> Result<Self, VolumeError> {
+        Self::read(path, &Access::new(options)?)
+    }
+
+    pub(crate) fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
+        let (_, Loaded { dims, spacing, label_names: names, values, .. }) = format::read(path, access)?;
         Ok(Self { origin: path.display().to_string(), dims, spacing, values: values.into(), names })
     }
 }

@@ -18,8 +18,18 @@ pub(super) struct Loaded<T> {
     pub(super) unit: Option<String>,
     /// If the file gives one.
     pub(super) orientation: Option<Orientation>,
+    /// The colours that the file gives to values, ascending by value.
+    pub(super) palette: Option<Vec<(f64, DVec3)>>,
     /// What the values are called, where they are labels.
     pub(super) label_names: BTreeMap<u16, String>,
     /// X fastest, as many as there are voxels.
     pub(super) values: Vec<T>,
+}
+
+impl<T> Loaded<T> {
+    /// Values of which the file says nothing else.
+    pub(super) fn new(dims: UVec3, kind: SampleType, values: Vec<T>) -> Self {
+        let label_names = BTreeMap::new();
+        Self { dims, kind, spacing: None, unit: None, orientation: None, palette: None, label_names, values }
+    }
 }

@@ -1,14 +1,15 @@
-//! MetaImage files: a text header, then the samples, in the same file (`.mha`) or in one of their own (`.mhd`), as they are or as a
+//! MetaImage files: a text header, then the samples, in the same file (`.mha`) or in one or more of their own (`.mhd`), as they are or as a
 //! zlib stream.
 //!
 //! Directions and origins are LPS, as ITK means them. The file must end where the samples end.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use glam::{DMat3, DVec3, UVec3};
 
 use super::VolumeError;
+use super::access::Access;
+use super::data_files::DataFiles;
 use super::fields::Fields;
 use super::loaded::Loaded;
 use super::orientation::{Orientation, RAS_FROM_LPS, unit_directions};
@@ -17,31 +18,31 @@ use super::source::{MAX_HEADER, Source, number, shown, three};
 use super::unit::unit;
 
 /// Reads one MetaImage file, or the header and the data file it names.
-pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
-    let mut file = Source::open(path)?;
+pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+    let mut file = access.open(path)?;
     let header = Header::read(&mut file)?;
     header.check_kind()?;
     let (spacing, orientation) = (header.spacing()?, header.orientation()?);
     let samples = header.samples()?;
     let (is_compressed, header_size) = (header.flag("CompressedData")?.unwrap_or(false), header.header_size()?);
-    let data = header.data_path()?.map_or(Ok(file), |path| Source::open(&path))?;
-    let mut stream = if is_compressed { Stream::zlib(data)? } else { Stream::raw(data)? };
-    let before_the_end = stream.exactly_left().unwrap_or(0).saturating_sub(samples.bytes());
-    stream.skip(header_size.unwrap_or(before_the_end))?;
+    let read = |data: Source, samples: &Samples| {
+        let mut stream = if is_compressed { Stream::zlib(data)? } else { Stream::raw(data)? };
+        let before_the_end = stream.exactly_left().unwrap_or(0).saturating_sub(samples.bytes());
+        stream.skip(header_size.unwrap_or(before_the_end))?;
+        stream.samples(samples, false)
+    };
+    let values = match header.data_files(&samples)? {
+        Some(files) => files.read(path, "ElementDataFile", &samples, access, read)?,
+        None => read(file, &samples)?,
+    };
     let Samples { dims, kind, .. } = samples;
     let unit = header.0.get("DistanceUnits").and_then(unit);
-    Ok(Loaded {
-        dims,
-        kind,
-        spacing,
-        unit,
-        orientation,
-        label_names: BTreeMap::new(),
-        values: stream.samples(&samples, false)?,
-    })
+    let loaded = Loaded::new(dims, kind, values);
+    Ok(Loaded { spacing, unit, orientation, ..loaded })
 }
 
-struct Header(Fields);
+/// The fields of a header, and the names of the files in a list at its end.
+struct Header(Fields, Vec<String>);
 
 impl Header {
     /// Reads the header and leaves `file` where the data of a local one begin.
@@ -54,7 +55,9 @@ impl Header {
             };
             fields.add(name.trim(), value)?;
             if name.trim() == "ElementDataFile" {
-                return Ok(Self(fields));
+                let is_list = value.split_whitespace().next() == Some("LIST");
+                let listed = if is_list { file.lines(&mut budget)? } else { Vec::new() };
+                return Ok(Self(fields, listed));
             }
         }
         Err(fields.invalid("header", "the end of the file", "a last field ElementDataFile"))
@@ -145,15 +148,30 @@ impl Header {
     }
 
     /// Where the samples are, if they are not in the header's own file.
-    fn data_path(&self) -> Result<Option<PathBuf>, VolumeError> {
-        let name = self.0.get("ElementDataFile").unwrap_or_default();
-        match name.split_whitespace().next() {
-            None | Some("LIST") => {}
-            Some(pattern) if pattern.contains('%') => {}
-            Some(local) if local.eq_ignore_ascii_case("LOCAL") => return Ok(None),
-            Some(_) => return Ok(Some(self.0.path.parent().unwrap_or(Path::new("")).join(name))),
-        }
-        Err(self.0.invalid("ElementDataFile", shown(name), "LOCAL or the name of one file, no LIST and no pattern"))
+    fn data_files(&self, samples: &Samples) -> Result<Option<DataFiles>, VolumeError> {
+        let value = self.0.get("ElementDataFile").unwrap_or_default();
+        let header = &self.0.path;
+        let files = match value.split_whitespace().collect::<Vec<_>>().as_slice() {
+            [] => None,
+            [local] if local.eq_ignore_ascii_case("LOCAL") => return Ok(None),
+            ["LIST"] => Some(DataFiles::listed(header, self.1.clone(), 2)),
+            ["LIST", axes] => {
+                let axes = axes.strip_suffix(['D', 'd']).unwrap_or(axes).parse().ok();
+                let axes = axes.filter(|axes| (1..=3).contains(axes));
+                axes.map(|axes| DataFiles::listed(header, self.1.clone(), axes))
+            }
+            &[pattern, min, max, step] if pattern.contains('%') => {
+                DataFiles::numbered(header, [pattern, min, max, step], 2)
+            }
+            // From 1, as ITK has it.
+            [pattern] if pattern.contains('%') => {
+                DataFiles::numbered(header, [pattern, "1", &samples.dims.z.to_string(), "1"], 2)
+            }
+            _ => Some(DataFiles::one(header, value)),
+        };
+        let allowed = "LOCAL, the name of one file, a pattern with one %d, alone or with the numbers `min max step`, or LIST, perhaps with \
+                       how many axes a file has whole, and names in the lines after it";
+        files.map(Some).ok_or_else(|| self.0.invalid("ElementDataFile", shown(value), allowed))
     }
 }
 

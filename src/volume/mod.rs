@@ -1,6 +1,8 @@
 //! Scalar volumes: extent, spacing and values, without any appearance.
 
+mod access;
 pub mod builtin;
+mod data_files;
 #[cfg(feature = "dicom")]
 mod dicom;
 mod fields;
@@ -9,13 +11,17 @@ mod format;
 mod grid;
 mod labels;
 mod loaded;
+mod memory;
 #[cfg(feature = "metaimage")]
 mod metaimage;
 #[cfg(feature = "nifti")]
 mod nifti;
 #[cfg(feature = "npy")]
 mod npy;
+#[cfg(feature = "npy")]
+mod npz;
 mod nrrd;
+mod numbers;
 mod orientation;
 mod raw;
 mod samples;
@@ -33,7 +39,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
+use rayon::prelude::*;
 
+pub(crate) use access::Access;
+pub use access::ReadOptions;
 pub use grid::Grid;
 pub(crate) use grid::{SPACING, check_spacing};
 pub use labels::Labels;
@@ -94,26 +103,40 @@ fn invalid(origin: &str, field: &str, found: String, allowed: String) -> VolumeE
 
 /// A scalar volume on a rectilinear grid (SPEC §2): `dims` voxels, x fastest in memory, `spacing` world units apart.
 ///
-/// World axes are the volume's axes and the origin is the volume's centre. Values are finite `f32`. A segmented volume has a label
-/// for every voxel besides; clones share them.
-#[derive(Clone, Debug, PartialEq)]
+/// World axes are the volume's axes and the origin is the volume's centre. Values are finite `f32`, except in holes (SPEC §3), where
+/// they are NaN. A segmented volume has a label for every voxel besides; clones share them.
+#[derive(Clone, Debug)]
 pub struct Volume {
     grid: Grid,
     values: Vec<f32>,
+    /// How many of the values are NaN.
+    holes: u64,
     labels: Option<Arc<[u16]>>,
     label_names: BTreeMap<u16, String>,
     orientation: Option<Orientation>,
     unit: Option<String>,
     encoding: Option<Encoding>,
+    palette: Option<Vec<(f64, DVec3)>>,
+}
+
+impl PartialEq for Volume {
+    /// Two holes are equal.
+    fn eq(&self, other: &Self) -> bool {
+        let Self { grid, values, holes, labels, label_names, orientation, unit, encoding, palette } = other;
+        let facts = (grid, holes, labels, label_names, orientation, unit, encoding, palette);
+        let Self { grid, holes, labels, label_names, orientation, unit, encoding, palette, .. } = self;
+        facts == (grid, holes, labels, label_names, orientation, unit, encoding, palette)
+            && self.values.iter().zip(values).all(|(a, b)| a == b || a.is_nan() && b.is_nan())
+    }
 }
 
 impl Volume {
-    /// A volume from its values, x fastest. `origin` names it in errors.
+    /// A volume from its values, x fastest. A value that is NaN or infinite is a hole (SPEC §3). `origin` names the volume in errors.
     ///
     /// # Errors
     /// If a dimension is 0, there are more than `u32::MAX` voxels, the number of values differs from the product of the
-    /// dimensions, a spacing is not within [1e-100, 1e100] or 10⁴ times another, or a value is not finite (the error names the voxel).
-    pub fn new(origin: &str, dims: UVec3, spacing: DVec3, values: Vec<f32>) -> Result<Self, VolumeError> {
+    /// dimensions, a spacing is not within [1e-100, 1e100] or 10⁴ times another, or no value is finite.
+    pub fn new(origin: &str, dims: UVec3, spacing: DVec3, mut values: Vec<f32>) -> Result<Self, VolumeError> {
         let invalid = |field: &str, found: String, allowed: &str| invalid(origin, field, found, allowed.to_owned());
         let grid = Grid { dims, spacing };
         grid.check().map_err(|error| refused(origin, error))?;
@@ -121,12 +144,22 @@ impl Volume {
         if values.len() != count as usize {
             return Err(invalid("data", format!("{} values", values.len()), &format!("{count} values")));
         }
-        if let Some(at) = values.iter().position(|value| !value.is_finite()) {
-            let voxel = grid.voxel_at(at as u32);
-            return Err(invalid("data", format!("{} at voxel {voxel}", values[at]), "finite values"));
+        let holes = punch_holes(&mut values);
+        if holes == u64::from(count) {
+            return Err(invalid("data", "only NaN or infinite samples".to_owned(), "at least one finite sample"));
         }
         let label_names = BTreeMap::new();
-        Ok(Self { grid, values, labels: None, label_names, orientation: None, unit: None, encoding: None })
+        Ok(Self {
+            grid,
+            values,
+            holes,
+            labels: None,
+            label_names,
+            orientation: None,
+            unit: None,
+            encoding: None,
+            palette: None,
+        })
     }
 
     /// The same values at another spacing (world units per voxel step).
@@ -140,19 +173,33 @@ impl Volume {
     }
 
     /// Reads a volume file. Its format is told by its first bytes, or else by the extension: NRRD (`.nrrd`, `.nhdr`), and, each
-    /// with the feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MetaImage (`.mha`, `.mhd`), NPY (`.npy`), TIFF
+    /// with the feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MetaImage (`.mha`, `.mhd`), NPY (`.npy`, and its
+    /// archives `.npz`: their one array, or the one named as in `file.npz:name`), TIFF
     /// (`.tif`, `.tiff`), DICOM (`.dcm`) and VTK (`.vti`, `.vtk`). Or a folder of slices: TIFF files of one page, or DICOM files of one
     /// series.
     ///
     /// # Errors
-    /// If the file cannot be read, is of no format that is compiled in, or does not hold what its header promises.
+    /// If the file cannot be read, is of no format that is compiled in, does not hold what its header promises, or would take more memory
+    /// than [`ReadOptions::memory`] allows by default.
     pub fn open(path: &Path) -> Result<Self, VolumeError> {
-        let (format, Loaded { dims, kind: sample_type, spacing, unit, orientation, label_names, values }) =
-            format::read(path)?;
+        Self::open_with(path, &ReadOptions::default())
+    }
+
+    /// As [`Self::open`], with a choice of the folder that files must lie in and of the memory limit.
+    ///
+    /// # Errors
+    /// As [`Self::open`], and if the file, or one that its header names, is not in the folder.
+    pub fn open_with(path: &Path, options: &ReadOptions) -> Result<Self, VolumeError> {
+        Self::read(path, &Access::new(options)?)
+    }
+
+    pub(crate) fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
+        let (format, loaded) = format::read(path, access)?;
+        let Loaded { dims, kind: sample_type, spacing, unit, orientation, palette, label_names, values } = loaded;
         let origin = path.display().to_string();
         let volume = Self::new(&origin, dims, spacing.unwrap_or(DVec3::ONE), values)?;
         let encoding = Some(Encoding { format, sample_type });
-        Self { unit, encoding, label_names, ..volume }.with_orientation(&origin, orientation)
+        Self { unit, encoding, palette, label_names, ..volume }.with_orientation(&origin, orientation)
     }
 
     /// Where the voxels are.
@@ -180,12 +227,23 @@ impl Volume {
         self.encoding
     }
 
-    /// All values, x fastest, then y, then z.
+    /// The colours, red, green and blue in [0, 1], that the file gives to values, ascending by value; `None` if it has no palette.
+    pub fn palette(&self) -> Option<&[(f64, DVec3)]> {
+        self.palette.as_deref()
+    }
+
+    /// All values, x fastest, then y, then z. Those of holes are NaN.
     pub fn values(&self) -> &[f32] {
         &self.values
     }
 
-    /// The value of one voxel.
+    /// How many voxels are holes: their samples are NaN or infinite. They never take part in an image, nor in what is said of the
+    /// volume's values.
+    pub fn holes(&self) -> u64 {
+        self.holes
+    }
+
+    /// The value of one voxel, NaN in a hole.
     ///
     /// # Panics
     /// If the voxel lies outside the volume.
@@ -196,20 +254,38 @@ impl Volume {
     }
 
     /// Gradient in value per world unit, estimated in the unwarped space (§4.2): central differences, one-sided at the
-    /// border, 0 along an axis with one sample.
+    /// border and beside a hole, 0 along an axis without a neighbour on either side, and 0 in a hole.
     pub fn gradient(&self, voxel: UVec3) -> DVec3 {
         let Grid { dims, spacing } = self.grid;
         let strides = [1, dims.x as usize, dims.x as usize * dims.y as usize];
         let at: usize = (0..3).map(|axis| voxel[axis] as usize * strides[axis]).sum();
+        if self.values[at].is_nan() {
+            return DVec3::ZERO;
+        }
         let difference = |axis: usize| {
-            let (before, after) = (voxel[axis].min(1), (dims[axis] - 1 - voxel[axis]).min(1));
-            if before + after == 0 {
+            let stride = strides[axis];
+            let has_before = voxel[axis] > 0 && !self.values[at - stride].is_nan();
+            let has_after = voxel[axis] + 1 < dims[axis] && !self.values[at + stride].is_nan();
+            let steps = u8::from(has_before) + u8::from(has_after);
+            if steps == 0 {
                 return 0.0;
             }
-            let low = self.values[at - before as usize * strides[axis]];
-            let high = self.values[at + after as usize * strides[axis]];
-            (f64::from(high) - f64::from(low)) / (f64::from(before + after) * spacing[axis])
+            let low = self.values[if has_before { at - stride } else { at }];
+            let high = self.values[if has_after { at + stride } else { at }];
+            (f64::from(high) - f64::from(low)) / (f64::from(steps) * spacing[axis])
         };
         DVec3::new(difference(0), difference(1), difference(2))
     }
+}
+
+/// Makes holes of the values that are not finite; how many they are.
+fn punch_holes(values: &mut [f32]) -> u64 {
+    let punch = |value: &mut f32| {
+        let is_hole = !value.is_finite();
+        if is_hole {
+            *value = f32::NAN;
+        }
+        u64::from(is_hole)
+    };
+    values.par_iter_mut().map(punch).sum()
 }

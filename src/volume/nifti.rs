@@ -4,17 +4,17 @@
 //! Spacing and orientation are those of the sform if there is one, else those of the qform, else only `pixdim` counts. The file
 //! must end where the samples end.
 
-use std::collections::BTreeMap;
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DQuat, DVec3, UVec3};
 
 use super::VolumeError;
+use super::access::Access;
 use super::loaded::Loaded;
 use super::orientation::{Orientation, lengths_and_directions, orthogonal};
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
-use super::source::{Source, invalid, io_error};
+use super::source::{invalid, io_error};
 
 /// Numbers of the format's data types, and bits of each.
 const TYPES: [(i64, SampleType); 10] = [
@@ -31,9 +31,9 @@ const TYPES: [(i64, SampleType); 10] = [
 ];
 
 /// Reads a file, or the two files of a pair by the name of either.
-pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
+pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let header_path = sibling(path, ".img", ".hdr").unwrap_or_else(|| path.to_owned());
-    let mut stream = open(&header_path)?;
+    let mut stream = open(&header_path, access)?;
     let header = Header::read(&header_path, &mut stream)?;
     let (dims, vox_offset) = (header.dims()?, header.vox_offset()?);
     let (kind, rescale) = (header.sample_type()?, header.rescale()?);
@@ -46,31 +46,27 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
                 "that of a single file, or a name with .hdr",
             ));
         };
-        stream = open(&data)?;
+        stream = open(&data, access)?;
     }
     stream.skip(vox_offset)?;
     let samples = Samples { kind, dims, big_endian: header.big_endian, rescale, z_fastest: false };
     let (spacing, unit) = (Some(spacing), header.unit());
-    Ok(Loaded {
-        dims,
-        kind,
-        spacing,
-        unit,
-        orientation,
-        label_names: BTreeMap::new(),
-        values: stream.samples(&samples, false)?,
+    let loaded = Loaded::new(dims, kind, stream.samples(&samples, false)?);
+    Ok(Loaded { spacing, unit, orientation, ..loaded })
+}
+
+/// The rest of a file's name where it ends with `from`, or with that and `.gz`; with `to` instead. All of them are in upper case if
+/// the name's end is.
+fn sibling(path: &Path, from: &str, to: &str) -> Option<PathBuf> {
+    let name = path.file_name()?.to_str()?;
+    [str::to_ascii_lowercase, str::to_ascii_uppercase].iter().find_map(|case| {
+        let (stem, gz) = name.strip_suffix(&case(".gz")).map_or((name, ""), |stem| (stem, &name[stem.len()..]));
+        Some(path.with_file_name(format!("{}{}{gz}", stem.strip_suffix(&case(from))?, case(to))))
     })
 }
 
-/// The rest of a file's name where it ends with `from`, or with that and `.gz`; with `to` instead.
-fn sibling(path: &Path, from: &str, to: &str) -> Option<PathBuf> {
-    let name = path.file_name()?.to_str()?;
-    let (stem, gz) = name.strip_suffix(".gz").map_or((name, ""), |stem| (stem, ".gz"));
-    Some(path.with_file_name(format!("{}{to}{gz}", stem.strip_suffix(from)?)))
-}
-
-fn open(path: &Path) -> Result<Stream, VolumeError> {
-    let mut file = Source::open(path)?;
+fn open(path: &Path, access: &Access) -> Result<Stream, VolumeError> {
+    let mut file = access.open(path)?;
     let is_gzip = file.reader.fill_buf().map_err(io_error(path))?.starts_with(&[0x1f, 0x8b]);
     if is_gzip { Stream::gzip(file) } else { Stream::raw(file) }
 }
@@ -205,7 +201,7 @@ impl Header {
 
     fn dims(&self) -> Result<UVec3, VolumeError> {
         let [rank, x, y, z, rest @ ..] = self.dim;
-        let more = usize::try_from(rank - 3).ok().and_then(|more| rest.get(..more));
+        let more = rank.checked_sub(3).and_then(|more| usize::try_from(more).ok()).and_then(|more| rest.get(..more));
         let is_one_volume = more.is_some_and(|sizes| sizes.iter().all(|&size| size == 1));
         dims_of([x, y, z]).filter(|_| is_one_volume).ok_or_else(|| {
             self.invalid("dim", format!("{:?}", self.dim), format!("3 to 7, then {SIZES}, and any further sizes 1"))

@@ -3,15 +3,15 @@
 //! An array's axes are z, y and x, whichever of them is fastest in memory. The header is read here, not by `npyz`: that allocates
 //! what a header's length says, multiplies sizes unchecked, and recurses into nested brackets.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::UVec3;
 
 use super::VolumeError;
+use super::access::Access;
 use super::loaded::Loaded;
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
-use super::source::{MAX_HEADER, Source, invalid, shown, three};
+use super::source::{MAX_HEADER, invalid, shown, three};
 
 const TYPES: [(&str, SampleType); 10] = [
     ("i1", SampleType::I8),
@@ -27,12 +27,16 @@ const TYPES: [(&str, SampleType); 10] = [
 ];
 
 /// Reads the array of one file.
-pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
-    let mut stream = Stream::raw(Source::open(path)?)?;
+pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+    read_array(path, Stream::raw(access.open(path)?)?)
+}
+
+/// Reads an array from the beginning of its header.
+pub(super) fn read_array<T: Voxel>(path: &Path, mut stream: Stream) -> Result<Loaded<T>, VolumeError> {
     let samples = parse(path, &header(path, &mut stream)?)?;
     let Samples { dims, kind, .. } = samples;
     let values = stream.samples(&samples, false)?;
-    Ok(Loaded { dims, kind, spacing: None, unit: None, orientation: None, label_names: BTreeMap::new(), values })
+    Ok(Loaded::new(dims, kind, values))
 }
 
 /// The text between the header's length and the samples.

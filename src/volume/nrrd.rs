@@ -1,36 +1,46 @@
-//! NRRD files: a text header, then the samples, in the same file or in one of their own.
+//! NRRD files: a text header, then the samples, in the same file or in one or more of their own.
 //!
 //! Axes are those of the array. The fields that describe what a sample means (`old min`, `kinds`, …) do not change the
 //! volume.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, Read};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use glam::{DMat3, DVec3, UVec3};
 
 use super::VolumeError;
+use super::access::Access;
+use super::data_files::DataFiles;
 use super::fields::Fields;
 use super::loaded::Loaded;
+use super::numbers::TextEnd;
 use super::orientation::{Orientation, RAS_FROM_LPS, lengths_and_directions, orthogonal};
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
 use super::source::{MAX_HEADER, Source, invalid, io_error, lower, number, shown, three, vector};
 use super::unit;
 
 /// Reads one NRRD file, or the detached header and the data file it names.
-pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
-    let mut file = Source::open(path)?;
+pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+    let mut file = access.open(path)?;
     let header = Header::read(&mut file)?;
     let dims = header.dims()?;
     let (spacing, orientation) = header.spacing_and_orientation()?;
     let layout = header.layout(dims)?;
-    let data = header.data_path()?.map_or(Ok(file), |path| Source::open(&path))?;
-    let (kind, unit) = (layout.samples.kind, header.unit());
-    Ok(Loaded { dims, kind, spacing, unit, orientation, label_names: header.label_names(), values: layout.read(data)? })
+    let values = match header.data_files()? {
+        Some(files) => {
+            files.read(path, "data file", &layout.samples, access, |file, samples| layout.read(file, samples))?
+        }
+        None => layout.read(file, &layout.samples)?,
+    };
+    let unit = header.unit();
+    let loaded = Loaded::new(dims, layout.samples.kind, values);
+    Ok(Loaded { spacing, unit, orientation, label_names: header.label_names(), ..loaded })
 }
 
-/// The fields of a header, under the format's first spelling of their names, and its pairs of keys and values.
-struct Header(Fields, BTreeMap<String, String>);
+/// The fields of a header, under the format's first spelling of their names, its pairs of keys and values, and the names of the files in
+/// a list at its end.
+struct Header(Fields, BTreeMap<String, String>, Vec<String>);
 
 impl Header {
     /// Reads the header and leaves `file` where the data of an attached one begin.
@@ -42,13 +52,16 @@ impl Header {
         if !matches!(version, Some("1" | "2" | "3" | "4" | "5")) {
             return Err(invalid(&file.path, "magic", shown(&magic), "a first line NRRD0001 to NRRD0005"));
         }
-        let mut header = Self(Fields::new(file.path.clone()), BTreeMap::new());
+        let mut header = Self(Fields::new(file.path.clone()), BTreeMap::new(), Vec::new());
         let mut budget = MAX_HEADER;
         while let Some(line) = file.line(&mut budget)? {
             if line.is_empty() {
                 return Ok(header);
             }
             header.add(&line)?;
+            if header.0.get("data file").is_some_and(is_list) {
+                header.2 = file.lines(&mut budget)?;
+            }
         }
         match header.0.get("data file") {
             Some(_) => Ok(header),
@@ -150,40 +163,58 @@ impl Header {
     }
 
     /// Where the samples are, if they are not in the header's own file.
-    fn data_path(&self) -> Result<Option<PathBuf>, VolumeError> {
-        let Some(name) = self.0.get("data file") else { return Ok(None) };
-        match name.split_whitespace().collect::<Vec<_>>().as_slice() {
-            // `slice%03d.raw 1 20 1` is a pattern, and the numbers it runs through.
-            [pattern, _, _, _, ..] if pattern.contains('%') => {}
-            [] | ["LIST", ..] => {}
-            _ => return Ok(Some(self.0.path.parent().unwrap_or(Path::new("")).join(name))),
-        }
-        Err(self.0.invalid("data file", shown(name), "the name of one file, no LIST and no pattern"))
+    fn data_files(&self) -> Result<Option<DataFiles>, VolumeError> {
+        let Some(value) = self.0.get("data file") else { return Ok(None) };
+        let header = &self.0.path;
+        let axes = |text: &str| text.parse().ok().filter(|axes| (1..=3).contains(axes));
+        let files = match value.split_whitespace().collect::<Vec<_>>().as_slice() {
+            [] => None,
+            ["LIST"] => Some(DataFiles::listed(header, self.2.clone(), 2)),
+            ["LIST", each] => axes(each).map(|axes| DataFiles::listed(header, self.2.clone(), axes)),
+            &[pattern, min, max, step] if pattern.contains('%') => {
+                DataFiles::numbered(header, [pattern, min, max, step], 2)
+            }
+            &[pattern, min, max, step, each] if pattern.contains('%') => {
+                axes(each).and_then(|axes| DataFiles::numbered(header, [pattern, min, max, step], axes))
+            }
+            _ => Some(DataFiles::one(header, value)),
+        };
+        let allowed = "the name of one file, a pattern with one %d and the numbers `min max step`, or LIST and names in the lines after \
+                       it; behind the last two how many axes a file has whole, 1 to 3";
+        files.map(Some).ok_or_else(|| self.0.invalid("data file", shown(value), allowed))
     }
 
     fn layout(&self, dims: UVec3) -> Result<Layout, VolumeError> {
         let kind = self.0.value("type", TYPES, |text| sample_type(text?))?;
+        let allowed = "raw, gzip or gz, bzip2 or bz2, ascii, text or txt, or hex";
+        let encoding = self.0.value("encoding", allowed, |text| {
+            Some(match lower(text?).as_str() {
+                "raw" => Encoding::Raw,
+                "gzip" | "gz" => Encoding::Gzip,
+                "bzip2" | "bz2" => Encoding::Bzip2,
+                "ascii" | "text" | "txt" => Encoding::Text,
+                "hex" => Encoding::Hex,
+                _ => return None,
+            })
+        })?;
         let big_endian = self.0.value("endian", "little or big", |text| match text.map(lower).as_deref() {
             Some("little") => Some(false),
             Some("big") => Some(true),
-            None if kind.bytes() == 1 => Some(false),
-            _ => None,
-        })?;
-        let gzip = self.0.value("encoding", "raw, gzip or gz", |text| match lower(text?).as_str() {
-            "raw" => Some(false),
-            "gzip" | "gz" => Some(true),
+            None if kind.bytes() == 1 || encoding == Encoding::Text => Some(false),
             _ => None,
         })?;
         let line_skip = self.0.value("line skip", "a number of lines", |text| text.unwrap_or("0").parse().ok())?;
         let byte_skip =
             self.0.value("byte skip", "a number of bytes, or -1 if encoding is raw", |text| match text {
-                Some("-1") => (!gzip).then_some(None),
+                Some("-1") => (encoding == Encoding::Raw).then_some(None),
                 text => text.unwrap_or("0").parse().ok().map(Some),
             })?;
         let skips = self.0.get("line skip").or(self.0.get("byte skip")).is_some();
         let window = skips && self.0.get("data file").is_some();
+        // Text becomes samples in the machine's order.
+        let big_endian = if encoding == Encoding::Text { cfg!(target_endian = "big") } else { big_endian };
         let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
-        Ok(Layout { samples, gzip, line_skip, byte_skip, window })
+        Ok(Layout { samples, encoding, line_skip, byte_skip, window })
     }
 }
 
@@ -207,10 +238,20 @@ fn sample_type(text: &str) -> Option<SampleType> {
     })
 }
 
-/// How the samples lie in their file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Encoding {
+    Raw,
+    Gzip,
+    Bzip2,
+    Text,
+    Hex,
+}
+
+/// How the samples lie in their file, or in each of their files.
 struct Layout {
+    /// All of them.
     samples: Samples,
-    gzip: bool,
+    encoding: Encoding,
     line_skip: u64,
     /// `None`: the samples end where the file ends.
     byte_skip: Option<u64>,
@@ -219,14 +260,29 @@ struct Layout {
 }
 
 impl Layout {
-    fn read<T: Voxel>(&self, mut file: Source) -> Result<Vec<T>, VolumeError> {
+    /// Reads the samples that one file has.
+    fn read<T: Voxel>(&self, mut file: Source, samples: &Samples) -> Result<Vec<T>, VolumeError> {
         file.skip_lines(self.line_skip)?;
-        let mut stream = if self.gzip { Stream::gzip(file)? } else { Stream::raw(file)? };
-        let before_the_end = |left: u64| left.saturating_sub(self.samples.bytes());
+        if matches!(self.encoding, Encoding::Text | Encoding::Hex) {
+            file.skip(self.byte_skip.unwrap_or_default())?;
+        }
+        let mut stream = match self.encoding {
+            Encoding::Raw => Stream::raw(file)?,
+            Encoding::Gzip => Stream::gzip(file)?,
+            Encoding::Bzip2 => Stream::bzip2(file),
+            Encoding::Text => return Stream::text(file, samples.kind, TextEnd::File)?.samples(samples, false),
+            Encoding::Hex => return Stream::hex(file)?.samples(samples, false),
+        };
+        let before_the_end = |left: u64| left.saturating_sub(samples.bytes());
         stream.skip(self.byte_skip.unwrap_or_else(|| stream.exactly_left().map_or(0, before_the_end)))?;
         // What a compressed stream holds beyond the samples nobody can mean.
-        stream.samples(&self.samples, self.window && !self.gzip)
+        stream.samples(samples, self.window && self.encoding == Encoding::Raw)
     }
+}
+
+/// Whether the value of `data file` says that names follow.
+fn is_list(value: &str) -> bool {
+    value.split_whitespace().next() == Some("LIST")
 }
 
 /// Three vectors `(x,y,z)`, with or without space between them.

@@ -4,8 +4,9 @@ use std::path::Path;
 
 use glam::{DVec3, UVec3};
 
+use super::access::{Access, ReadOptions};
 use super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
-use super::source::{Source, invalid};
+use super::source::invalid;
 use super::{Encoding, Volume, VolumeError};
 
 /// What a raw file has no header to say.
@@ -26,13 +27,25 @@ impl Volume {
     ///
     /// # Errors
     /// If the file cannot be read, a dimension is 0, there are more than `u32::MAX` voxels, the file does not end where the samples
-    /// do, or a value is not finite (the error names the voxel).
+    /// do, they would take more memory than [`ReadOptions::memory`] allows by default, or no value is finite.
     pub fn open_raw(path: &Path, layout: &RawLayout) -> Result<Self, VolumeError> {
+        Self::open_raw_with(path, layout, &ReadOptions::default())
+    }
+
+    /// As [`Self::open_raw`], with a choice of the folder that the file must lie in and of the memory limit.
+    ///
+    /// # Errors
+    /// As [`Self::open_raw`], and if the file is not in the folder.
+    pub fn open_raw_with(path: &Path, layout: &RawLayout, options: &ReadOptions) -> Result<Self, VolumeError> {
+        Self::read_raw(path, layout, &Access::new(options)?)
+    }
+
+    pub(crate) fn read_raw(path: &Path, layout: &RawLayout, access: &Access) -> Result<Self, VolumeError> {
         let &RawLayout { dims, sample_type: kind, big_endian, offset } = layout;
         if dims_of(dims.to_array()).is_none() {
             return Err(invalid(path, "sizes", dims, SIZES));
         }
-        let mut stream = Stream::raw(Source::open(path)?)?;
+        let mut stream = Stream::raw(access.open(path)?)?;
         stream.skip(offset)?;
         let values = stream.samples(&Samples { kind, dims, big_endian, rescale: None, z_fastest: false }, false)?;
         let volume = Self::new(&path.display().to_string(), dims, DVec3::ONE, values)?;

@@ -6,16 +6,17 @@
 use std::collections::TryReserveError;
 use std::fmt::{self, Display, Formatter};
 use std::fs::File;
-#[cfg(feature = "metaimage")]
-use std::io::BufRead;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
+use bzip2::bufread::MultiBzDecoder;
 use flate2::bufread::MultiGzDecoder;
 #[cfg(feature = "metaimage")]
 use flate2::bufread::ZlibDecoder;
 use glam::{DVec3, UVec3, Vec3Swizzles};
 
+use super::access::Access;
+use super::numbers::{Numbers, TextEnd};
 use super::source::{CHUNK, Source, invalid, io_error};
 use super::{Grid, VolumeError};
 
@@ -36,7 +37,7 @@ pub(super) trait Voxel: Copy {
     fn of(sample: impl Sample) -> Option<Self>;
 }
 
-/// A value. Whether it is finite is the volume's to check.
+/// A value. Where it is not finite the volume has a hole.
 impl Voxel for f32 {
     const ALLOWED: &'static str = "numbers";
 
@@ -95,7 +96,6 @@ macro_rules! sample_types {
             }
 
             /// Appends the bytes, in the machine's order, of a sample that is written as text.
-            #[cfg(feature = "vtk")]
             pub(super) fn parse(self, text: &str, into: &mut Vec<u8>) -> Option<()> {
                 match self {
                     $(Self::$name => into.extend(text.parse::<$type>().ok()?.to_ne_bytes())),*
@@ -189,6 +189,19 @@ impl Samples {
         })
     }
 
+    /// Asks for the memory that their values take.
+    pub(super) fn reserve<T>(&self, path: &Path, access: &Access) -> Result<(), VolumeError> {
+        let [x, y, z] = self.dims.to_array();
+        // To turn axes takes room for a second order.
+        let copies = if self.z_fastest { 2 } else { 1 };
+        access.reserve(
+            path,
+            "data",
+            format!("{x} × {y} × {z} voxels"),
+            copies * u64::from(self.count()) * size_of::<T>() as u64,
+        )
+    }
+
     fn too_many(&self, path: &Path) -> impl Fn(TryReserveError) -> VolumeError {
         move |error| invalid(path, "data", format!("{} samples: {error}", self.count()), "fewer")
     }
@@ -215,6 +228,7 @@ pub(super) struct Stream {
     reader: Reader,
     /// How many bytes are left; of a compressed stream, no more than these.
     left: u64,
+    access: Access,
 }
 
 enum Reader {
@@ -226,14 +240,14 @@ enum Reader {
 impl Stream {
     /// The rest of a file as it is.
     pub(super) fn raw(mut file: Source) -> Result<Self, VolumeError> {
-        Ok(Self { left: file.left()?, path: file.path, reader: Reader::Raw(file.reader) })
+        Ok(Self { left: file.left()?, path: file.path, reader: Reader::Raw(file.reader), access: file.access })
     }
 
     /// The rest of a file, of one or more gzip members.
     pub(super) fn gzip(mut file: Source) -> Result<Self, VolumeError> {
         let left = file.left()?.saturating_mul(MAX_EXPANSION);
         let decoder = Box::new(MultiGzDecoder::new(file.reader));
-        Ok(Self { path: file.path, reader: Reader::Decoder(decoder, "whole and undamaged gzip members"), left })
+        Ok(Self::decoded(&file.path, decoder, "whole and undamaged gzip members", left, &file.access))
     }
 
     /// The rest of a file, one zlib stream.
@@ -241,13 +255,40 @@ impl Stream {
     pub(super) fn zlib(mut file: Source) -> Result<Self, VolumeError> {
         let left = file.left()?.saturating_mul(MAX_EXPANSION);
         let decoder = Box::new(Zlib(ZlibDecoder::new(file.reader)));
-        Ok(Self { path: file.path, reader: Reader::Decoder(decoder, "one whole and undamaged zlib stream"), left })
+        Ok(Self::decoded(&file.path, decoder, "one whole and undamaged zlib stream", left, &file.access))
+    }
+
+    /// The rest of a file, of one or more bzip2 streams. How much comes out of them is not limited by their size: only by what is asked
+    /// for.
+    pub(super) fn bzip2(file: Source) -> Self {
+        let decoder = Box::new(MultiBzDecoder::new(file.reader));
+        Self::decoded(&file.path, decoder, "whole and undamaged bzip2 streams", u64::MAX, &file.access)
+    }
+
+    /// The rest of a file, numbers as text, as bytes of samples in the machine's order.
+    pub(super) fn text(mut file: Source, kind: SampleType, end: TextEnd) -> Result<Self, VolumeError> {
+        // A digit and a space.
+        let left = (file.left()? / 2 + 1).saturating_mul(kind.bytes());
+        let decoder = Box::new(Numbers::new(file.reader, kind, end));
+        Ok(Self::decoded(&file.path, decoder, "numbers as text", left, &file.access))
+    }
+
+    /// The rest of a file, two hexadecimal digits for each byte.
+    pub(super) fn hex(mut file: Source) -> Result<Self, VolumeError> {
+        let left = file.left()? / 2;
+        let decoder = Box::new(Hex(file.reader));
+        Ok(Self::decoded(&file.path, decoder, "pairs of hexadecimal digits", left, &file.access))
     }
 
     /// What `reader` decodes from a file; `allowed` is what it takes, and no more than `left` bytes come out of it.
-    #[cfg(feature = "vtk")]
-    pub(super) fn decoded(path: &Path, reader: Box<dyn Read>, allowed: &'static str, left: u64) -> Self {
-        Self { path: path.to_owned(), reader: Reader::Decoder(reader, allowed), left }
+    pub(super) fn decoded(
+        path: &Path,
+        reader: Box<dyn Read>,
+        allowed: &'static str,
+        left: u64,
+        access: &Access,
+    ) -> Self {
+        Self { path: path.to_owned(), reader: Reader::Decoder(reader, allowed), left, access: access.clone() }
     }
 
     /// How many bytes are left, if the stream is not compressed.
@@ -292,6 +333,7 @@ impl Stream {
             }
             _ => {}
         }
+        samples.reserve::<T>(&self.path, &self.access)?;
         let values = self.read_samples(samples)?;
         // Reading on to the end is also what checks a compressed stream's last checksum.
         if matches!(self.reader, Reader::Decoder(..)) && self.read_up_to(1, &mut Vec::new())? > 0 {
@@ -337,6 +379,38 @@ impl Stream {
             (Reader::Decoder(_, allowed), None) => invalid(&self.path, "data", error, allowed),
             _ => io_error(&self.path)(error),
         }
+    }
+}
+
+/// Bytes written as hexadecimal digits, with any space between them.
+struct Hex<R>(R);
+
+impl<R: BufRead> Read for Hex<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let (mut written, mut high) = (0, None);
+        while written < buffer.len() {
+            let Some(&byte) = self.0.fill_buf()?.first() else {
+                match high {
+                    None => break,
+                    Some(_) => return Err(io::Error::other("a digit without a second one")),
+                }
+            };
+            self.0.consume(1);
+            if byte.is_ascii_whitespace() {
+                continue;
+            }
+            let Some(digit) = char::from(byte).to_digit(16) else {
+                return Err(io::Error::other(format!("\"{}\", no hexadecimal digit", byte.escape_ascii())));
+            };
+            match high.take() {
+                None => high = Some(digit << 4),
+                Some(high) => {
+                    buffer[written] = (high | digit) as u8;
+                    written += 1;
+                }
+            }
+        }
+        Ok(written)
     }
 }
 

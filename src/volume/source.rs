@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::VolumeError;
+use super::access::Access;
 
 /// No header line is longer than this, in bytes.
 const MAX_LINE: u64 = 64 << 10;
@@ -21,17 +22,19 @@ pub(super) struct Source {
     pub(super) path: PathBuf,
     bytes: u64,
     pub(super) reader: BufReader<File>,
+    pub(super) access: Access,
 }
 
 impl Source {
-    pub(super) fn open(path: &Path) -> Result<Self, VolumeError> {
+    /// Opens `path` by where it leads, `resolved`. [`Access::open`] does both.
+    pub(super) fn open(path: &Path, resolved: &Path, access: &Access) -> Result<Self, VolumeError> {
         // Asked before opening: to open a pipe would wait for its writer.
-        let metadata = fs::metadata(path).map_err(io_error(path))?;
+        let metadata = fs::metadata(resolved).map_err(io_error(path))?;
         if !metadata.is_file() {
             return Err(invalid(path, "file", "a folder, pipe or device", "a regular file"));
         }
-        let reader = BufReader::with_capacity(CHUNK as usize, File::open(path).map_err(io_error(path))?);
-        Ok(Self { path: path.to_owned(), bytes: metadata.len(), reader })
+        let reader = BufReader::with_capacity(CHUNK as usize, File::open(resolved).map_err(io_error(path))?);
+        Ok(Self { path: path.to_owned(), bytes: metadata.len(), reader, access: access.clone() })
     }
 
     /// How many bytes are left to read.
@@ -53,6 +56,23 @@ impl Source {
         let text = line.strip_suffix(b"\n").unwrap_or(&line);
         let text = text.strip_suffix(b"\r").unwrap_or(text);
         Ok((read > 0).then(|| String::from_utf8_lossy(text).into_owned()))
+    }
+
+    /// Skips bytes; if there are too few, all of them.
+    pub(super) fn skip(&mut self, bytes: u64) -> Result<(), VolumeError> {
+        let bytes = bytes.min(self.left()?);
+        self.reader.seek_relative(bytes as i64).map_err(io_error(&self.path))
+    }
+
+    /// The lines that are left of a header, without blank ones.
+    pub(super) fn lines(&mut self, budget: &mut u64) -> Result<Vec<String>, VolumeError> {
+        let mut lines = Vec::new();
+        while let Some(line) = self.line(budget)? {
+            if !line.trim().is_empty() {
+                lines.push(line.trim().to_owned());
+            }
+        }
+        Ok(lines)
     }
 
     pub(super) fn skip_lines(&mut self, lines: u64) -> Result<(), VolumeError> {

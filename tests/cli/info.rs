@@ -77,6 +77,24 @@ fn text_has_them_and_a_histogram() {
     assert!(info(&folder, "builtin:cube").contains("format       builtin\n"));
 }
 
+/// Holes are counted; all else is said of the finite samples.
+#[test]
+fn holes_are_counted_and_left_out() {
+    let folder = Folder::new();
+    let values: Vec<f32> = (0..10).map(|at| if at % 5 == 4 { f32::INFINITY } else { at as f32 }).collect();
+    folder.write_nrrd("a.nrrd", [5, 2, 1], [1.0; 3], &values);
+    let json: Value = serde_json::from_str(&info(&folder, "a.nrrd --json")).unwrap();
+    assert_eq!(json["holes"], 2);
+    assert_eq!([&json["min"], &json["max"], &json["mean"]], [0.0, 8.0, 4.0]);
+    assert_eq!([&json["percentiles"]["0.1"], &json["percentiles"]["99.9"]], [0.0, 8.0]);
+    let text = info(&folder, "a.nrrd");
+    assert!(text.contains("\nholes        2 samples are NaN or infinite\nrange        0 to 8, mean 4\n"), "{text}");
+    folder.write_nrrd("b.nrrd", [2, 1, 1], [1.0; 3], &[1.0, 2.0]);
+    let json: Value = serde_json::from_str(&info(&folder, "b.nrrd --json")).unwrap();
+    assert_eq!(json["holes"], 0);
+    assert!(!info(&folder, "b.nrrd").contains("holes"));
+}
+
 #[test]
 fn what_is_no_volume_is_bad_input() {
     let folder = Folder::new();

@@ -136,3 +136,32 @@ fn warnings_state_what_is_assumed() {
     }
     warned("slices", "slices: the slices' numbers go up by [1, 2]: taken as neighbours, none is left out");
 }
+
+/// Whatever is made of a volume with holes, the program says once how many there are; a volume of nothing else is bad input.
+#[test]
+fn holes_are_said_once() {
+    let folder = Folder::new();
+    let values: Vec<f32> = (0..60).map(|at| if at % 20 == 7 { f32::NAN } else { (at * 4) as f32 }).collect();
+    folder.write_nrrd("a.nrrd", [5, 4, 3], [1.0; 3], &values);
+    let note = "a.nrrd: 3 of 60 samples are NaN or infinite: these holes are not drawn";
+    for command in [
+        format!("render a.nrrd {SIZE} -o out.npy"),
+        format!("orbit a.nrrd {SIZE} --count 3 -o out-%d.npy"),
+        format!("sweep a.nrrd {SIZE} --set splatting.slab_width=1,2 -o out.npy"),
+        format!("bench a.nrrd {SIZE} --frames 1 --rotate 5"),
+        "info a.nrrd".to_owned(),
+    ] {
+        let run = folder.run(&command);
+        assert_eq!(run.code, Some(0), "{command}\n{}", run.stderr);
+        assert_eq!(run.stderr.matches(note).count(), 1, "{command}\n{}", run.stderr);
+        let quiet = folder.run(&format!("{command} --quiet"));
+        assert_eq!((quiet.code, quiet.stderr.contains("hole")), (Some(0), false), "{command}\n{}", quiet.stderr);
+    }
+    let (_, _, pixels) = folder.pixels(&format!("a.nrrd {SIZE} --backend reference"));
+    assert!(pixels.as_flattened().iter().all(|channel| channel.is_finite()));
+    folder.write_nrrd("b.nrrd", [2, 1, 1], [1.0; 3], &[f32::NAN, f32::NEG_INFINITY]);
+    for command in ["render b.nrrd -o b.png", "info b.nrrd"] {
+        folder.run(command).assert_failure(2, &["b.nrrd", "data", "NaN or infinite", "at least one finite sample"]);
+    }
+    assert!(!folder.names().contains("b.png"));
+}

@@ -7,6 +7,7 @@ mod bench;
 mod compare;
 mod errors;
 mod extremes;
+mod files;
 #[expect(dead_code, reason = "not every file needs all of it")]
 #[path = "../common/images.rs"]
 mod images;

@@ -5,6 +5,7 @@
 
 mod dicom;
 mod dispatch;
+mod holes;
 mod metaimage;
 mod nifti;
 mod npy;

@@ -67,16 +67,6 @@ fn wrong_sizes() {
 }
 
 #[test]
-fn non_finite_values_name_the_voxel() {
-    let folder = Folder::new();
-    let mut bytes = fs::read(fixture("float32-big-7.raw")).unwrap();
-    bytes[7 + 4 * 27..][..4].copy_from_slice(&f32::NAN.to_be_bytes());
-    fs::write(folder.0.path().join("a.raw"), &bytes).unwrap();
-    let scene = Scene::parse(&format!("[volume]\npath = 'a.raw'\n{KEYS}"), "", folder.0.path(), &[]).unwrap();
-    assert_refused(scene.load_volume(), "a.raw", "data", "NaN at voxel [2, 1, 1]", "finite values");
-}
-
-#[test]
 fn wrong_keys() {
     for (from, to, key, found, allowed) in [
         ("[5, 4, 3]", "[5, 4]", "volume.dims", "[5, 4]", "three positive integers"),

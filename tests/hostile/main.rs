@@ -154,8 +154,8 @@ fn mutate_files(random: &mut Random) -> Count {
 
 fn mutate_scenes(random: &mut Random) -> Count {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let readme = fs::read_to_string(root.join("README.md")).unwrap();
-    let commented = readme.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    let guide = fs::read_to_string(root.join("docs/guide/scene-files.md")).unwrap();
+    let commented = guide.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
     let mut scenes = vec![commented.to_owned(), commented.replace("\n# ", "\n")];
     let paper = fs::read_dir(root.join("assets/paper")).unwrap().map(|entry| entry.unwrap().path());
     let mut paths: Vec<PathBuf> = paper.filter(|path| path.extension().is_some_and(|toml| toml == "toml")).collect();

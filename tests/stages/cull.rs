@@ -77,6 +77,7 @@ impl<'a> Culling<'a> {
             frame: &init(device, &[frame], BufferUsages::UNIFORM),
             groups: &groups,
             values: &uploaded.view,
+            has_holes: values.iter().any(|value| value.is_nan()),
             labels: labels.as_ref().map(|labels| &labels.view),
             control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
             occluded: &targets.occluded,

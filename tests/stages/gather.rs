@@ -101,7 +101,7 @@ impl<'a> Fixture<'a> {
         let mode = GatherMode::of(
             &seen.scene.splatting,
             seen.view.perspective.is_some(),
-            false,
+            [false, volume.holes() > 0],
             RayMode::default(),
             bins.parts,
         );
@@ -319,10 +319,16 @@ fn frames() {
             let dims = UVec3::new(7, 10, 9);
             let points = random.pick(&[1, 4, 8, 9, 40]);
             let opacity = if compositing == Compositing::Xray { 0.01 } else { 0.6 };
-            let (volume, transfer) = noise(&mut random, dims, frame.1, opacity, points);
+            let (mut volume, transfer) = noise(&mut random, dims, frame.1, opacity, points);
             scene.transfer = transfer;
+            if random.bits().is_multiple_of(3) {
+                let sample = |&value: &f32| if random.bits().is_multiple_of(4) { f32::NAN } else { value };
+                let values = volume.values().iter().map(sample).collect();
+                volume = Volume::new("holes", dims, volume.spacing(), values).unwrap();
+            }
             let fixture = Fixture::new(&gpu, &stage, scene, volume);
             let (actual, expected) = (fixture.draw_all().acc, fixture.twin());
+            assert!(actual.iter().chain(&expected).all(|pixel| pixel.is_finite()));
             let errors: Vec<DVec4> =
                 actual.iter().zip(&expected).map(|(actual, expected)| *actual - *expected).collect();
             let worst = errors.iter().map(|error| error.abs().max_element()).fold(0.0, f64::max);

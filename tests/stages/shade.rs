@@ -14,7 +14,7 @@ use sheetsplat::internals::pass::cull::Cull;
 use sheetsplat::internals::reference::{Geometry, shading};
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::{Scene, TransferSettings};
-use sheetsplat::settings::{Compositing, Method};
+use sheetsplat::settings::{Camera, Compositing, Method, Projection};
 use sheetsplat::settings::{LabelTables, Ramp, TransferFunction};
 use sheetsplat::settings::{Light, Shading};
 use sheetsplat::volume::{Labels, Volume};
@@ -376,6 +376,32 @@ fn gradient_opacity_and_iso_ranges() {
     scene.transfer.gradient_opacity = Some(Ramp::new(vec![(5.0, 0.0), (30.0, 0.25), (90.0, 1.0)]).unwrap());
     scene.transfer.iso_ranges = Some(vec![[30.0, 90.0], [120.0, 240.0]]);
     check("gradient opacity", &noise(DIMS, DVec3::new(1.0, 2.0, 1.5)), &scene);
+}
+
+/// Beside holes, scattered and in a block, and between holes on all sides; orthographic and through an eye.
+#[test]
+fn gradients_beside_holes() {
+    let whole = noise(DIMS, DVec3::new(1.0, 2.0, 1.5));
+    let mut random = Random(9);
+    let mut is_hole = |name: &str, at: UVec3| match name {
+        "scattered" => random.bits().is_multiple_of(4),
+        "a block" => at.cmpge(DIMS / 3).all() && at.cmplt(2 * DIMS / 3).all(),
+        _ => at.element_sum().is_multiple_of(2),
+    };
+    for name in ["scattered", "a block", "alternating"] {
+        let sample = |(index, &value)| if is_hole(name, whole.grid().voxel_at(index)) { f32::NAN } else { value };
+        let values = (0..).zip(whole.values()).map(sample).collect();
+        let volume = Volume::new(name, DIMS, whole.spacing(), values).unwrap();
+        let mut scene = oblique();
+        scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.2), (30.0, 0.25), (90.0, 1.0)]).unwrap());
+        for compositing in [Compositing::Linear, Compositing::Exponential] {
+            scene.splatting.compositing = compositing;
+            check(name, &volume, &scene);
+        }
+        let projection = Projection::Perspective { fov_y: 60.0, distance: Some(25.0), near: Some(4.0) };
+        scene.camera = Camera { projection, ..scene.camera };
+        check(&format!("{name}, in perspective"), &volume, &scene);
+    }
 }
 
 #[test]

@@ -45,6 +45,7 @@ impl<'a> Stages<'a> {
             frame: &uniform,
             groups: &uniform,
             values: &VolumeTexture::upload(device, gpu.queue(), &[0.0]).unwrap().view,
+            has_holes: false,
             labels: None,
             control_points: &storage,
             occluded: &storage,

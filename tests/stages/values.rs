@@ -41,11 +41,16 @@ fn frame(values: ValueFormat) -> Frame {
 
 /// Uploads values in layers of such a side and lets a shader read them.
 fn seen(gpu: &Headless, values: &[f32], side: u32) -> Vec<f32> {
+    seen_by(gpu, READ, values, side)
+}
+
+/// The same with a shader of such a source.
+fn seen_by(gpu: &Headless, source: &str, values: &[f32], side: u32) -> Vec<f32> {
     let device = gpu.device();
     let uploaded = VolumeTexture::upload_folded(device, gpu.queue(), values, side);
     let frame = init(device, &[frame(uploaded.format)], BufferUsages::UNIFORM);
     let given = [frame.as_entire_binding(), BindingResource::TextureView(&uploaded.view)];
-    written(gpu, READ, &given, values.len() as u64)
+    written(gpu, source, &given, values.len() as u64)
 }
 
 /// In layers of every side: the format, and that the bits come back.
@@ -97,6 +102,29 @@ fn all_others_are_kept_as_they_are() {
     let mut random = Random(3);
     let anything = std::iter::repeat_with(|| f32::from_bits(random.bits() as u32)).filter(|value| value.is_finite());
     check("anything", &anything.take(5000).collect::<Vec<_>>(), ValueFormat::Bits);
+}
+
+/// The bits of holes come back too, and tell them from all other values: in the result they are marked.
+#[test]
+fn holes_are_told_by_their_bits() {
+    const MARK: u32 = 0xffc0_0001;
+    let gpu = gpu();
+    let mut random = Random(8);
+    let anything = std::iter::repeat_with(|| f32::from_bits(random.bits() as u32));
+    let values: Vec<f32> = anything.take(5000).chain([f32::MAX, f32::MIN, 0.0, -0.0, f32::NAN]).collect();
+    let volume = Volume::new("holes", UVec3::new(values.len() as u32, 1, 1), DVec3::ONE, values.clone()).unwrap();
+    assert!(volume.holes() > 20);
+    assert_eq!(ValueFormat::of(&[1.0, f32::NAN, 2.0]), ValueFormat::Bits);
+    let marked = READ.replace(
+        "bitcast<u32>(value_at(at))",
+        &format!("select(bitcast<u32>(value_at(at)), {MARK}u, is_hole(stored_at(at)))"),
+    );
+    assert_ne!(marked, READ);
+    let seen = seen_by(&gpu, &marked, volume.values(), SIDES[0]);
+    for (seen, value) in seen.into_iter().zip(values) {
+        let expected = if value.is_finite() { value.to_bits() } else { MARK };
+        assert_eq!(seen.to_bits(), expected, "{value}");
+    }
 }
 
 /// More values than are sent at a time: in layers of the least side the second begins, in others the first goes on.

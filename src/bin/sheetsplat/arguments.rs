@@ -1,5 +1,6 @@
 //! Arguments that several subcommands take.
 
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::ValueEnum;
@@ -12,6 +13,8 @@ use sheetsplat::stats::Stats;
 use sheetsplat::volume::{self, Orientation, Volume};
 
 use crate::failure::Failure;
+use crate::outputs::Outputs;
+use crate::reading::Reading;
 
 /// What to draw, and on which adapter.
 #[derive(clap::Args)]
@@ -26,6 +29,8 @@ pub(crate) struct Input {
     raw: Raw,
     #[command(flatten)]
     look: Look,
+    #[command(flatten)]
+    reading: Reading,
     /// The side of the patient to look at, where the volume's file says how the patient lies; in place of the scene's
     /// camera.direction and camera.up.
     #[arg(long, value_enum, value_name = "SIDE")]
@@ -47,7 +52,8 @@ struct Look {
     /// preset=NAME.
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Preset::ALL.map(|(name, _)| name)))]
     preset: Option<String>,
-    /// Colours over the values that show, in place of the scene's: short for --set transfer.colormap=NAME.
+    /// Colours over the values that show, or the palette of the volume's file, in place of the scene's: short for --set
+    /// transfer.colormap=NAME.
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Colormap::ALL.map(|(name, _)| name)))]
     colormap: Option<String>,
 }
@@ -127,16 +133,36 @@ impl Input {
         let sets = self.raw.sets().into_iter().chain(self.look.sets()).chain(sets.iter().cloned()).collect::<Vec<_>>();
         match self.name.strip_prefix("builtin:") {
             Some(name) => Scene::from_volume(VolumeSource::Builtin(name.to_owned()), &sets),
-            None if self.name.ends_with(".toml") => Scene::open(self.name.as_ref(), &sets),
+            None if self.is_scene_file() => Scene::open_with(self.name.as_ref(), &sets, &self.reading.options()),
             None => Scene::from_volume(VolumeSource::File(self.name.clone().into()), &sets),
         }
     }
 
-    /// Loads the scene's volume.
-    pub(crate) fn load_volume(&self, scene: &Scene) -> Result<Volume, Failure> {
+    fn is_scene_file(&self) -> bool {
+        Path::new(&self.name).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+    }
+
+    /// The files that the arguments and the scene name to be read. A header may name others.
+    pub(crate) fn files(&self, scene: &Scene) -> Vec<PathBuf> {
+        let scene_file = self.is_scene_file().then(|| self.name.clone().into());
+        let volume = match &scene.volume {
+            VolumeSource::File(path) | VolumeSource::Raw(path, _) => Some(path.clone()),
+            VolumeSource::Builtin(_) => None,
+        };
+        [scene_file, volume, scene.labels.clone()].into_iter().flatten().collect()
+    }
+
+    /// Loads the scene's volume, from files that are no outputs.
+    pub(crate) fn load_volume(&self, scene: &Scene, outputs: &Outputs) -> Result<Volume, Failure> {
         let start = Instant::now();
-        let volume = scene.load_volume().map_err(|error| self.failure(error))?;
+        let loaded = scene.load_volume_and_files(&self.reading.options());
+        let (volume, files) = loaded.map_err(|error| self.failure(error))?;
+        outputs.refuse(&files)?;
         log::info!("{}: {} voxels, loaded in {:.1?}", self.name, volume.grid().dims, start.elapsed());
+        let (holes, samples) = (volume.holes(), volume.values().len());
+        if holes > 0 {
+            log::warn!("{}: {holes} of {samples} samples are NaN or infinite: these holes are not drawn", self.name);
+        }
         if self.view.is_some() && volume.orientation().is_some_and(Orientation::is_mirrored) {
             let name = &self.name;
             log::warn!("{name}: --view: the axes are left-handed, so the image is a mirror image of the patient");

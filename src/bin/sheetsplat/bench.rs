@@ -8,6 +8,7 @@ use sheetsplat::stats::Stats;
 
 use crate::arguments::{Input, parse_degrees};
 use crate::failure::Failure;
+use crate::outputs::Outputs;
 use crate::stdout;
 
 #[derive(clap::Args)]
@@ -41,8 +42,9 @@ struct Report {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let input = &arguments.input;
     let mut scene = input.scene()?;
+    let outputs = Outputs::check(&[], true, &input.files(&scene))?;
     let start = Instant::now();
-    let volume = input.load_volume(&scene)?;
+    let volume = input.load_volume(&scene, &outputs)?;
     let load_ms = milliseconds_since(start);
     input.look_at(&volume, &mut scene)?;
 

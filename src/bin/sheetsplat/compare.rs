@@ -6,7 +6,7 @@ use sheetsplat::golden::{Comparison, ComparisonError, Picture, Tolerance};
 use sheetsplat::image::{Image, PngDepth};
 
 use crate::failure::Failure;
-use crate::stdout;
+use crate::outputs::{self, Outputs};
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  sheetsplat compare actual.png golden.png --difference difference.png")]
@@ -31,13 +31,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let tolerance = Tolerance::new(*tolerance, *outliers).map_err(|error| Failure::Input(error.to_string()))?;
     if let Some(path) = difference {
         Image::check_format(path)?;
-        if [actual, golden].contains(&path) {
-            let path = path.display();
-            return Err(Failure::Input(format!(
-                "--difference: found {path}, allowed: another file than those compared"
-            )));
-        }
     }
+    let named: Vec<_> = difference.iter().map(|path| ("--difference", path.as_path())).collect();
+    Outputs::check(&named, true, &[actual.clone(), golden.clone()])?;
     let open = |path: &Path| Picture::open(path).map_err(|error| Failure::Input(error.to_string()));
     let pictures = [open(actual)?, open(golden)?];
     let files = format!("{} and {}", actual.display(), golden.display());
@@ -46,8 +42,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         // Images of two sizes are good input: the answer is that they differ.
         if matches!(error, ComparisonError::Size { .. }) { Failure::Other(message) } else { Failure::Input(message) }
     })?;
+    let mut saved = Vec::new();
     if let Some(path) = difference {
-        comparison.difference_image().save(path, PngDepth::Eight)?;
+        saved.push((path.as_path(), comparison.difference_image().encode(path, PngDepth::Eight)?));
     }
     let mut report = format!("{comparison}\n");
     for (path, picture) in [actual, golden].into_iter().zip(&pictures) {
@@ -55,6 +52,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             report += &format!("{} made on: {made_on}\n", path.display());
         }
     }
-    stdout(report.as_bytes())?;
+    outputs::write(&saved, report.as_bytes())?;
     if comparison.passes() { Ok(()) } else { Err(Failure::Other(format!("{files} differ"))) }
 }

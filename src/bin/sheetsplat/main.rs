@@ -1,4 +1,5 @@
 //! The command line program.
+#![deny(clippy::print_stdout, clippy::print_stderr, reason = "they panic where a pipe is closed or a disk is full")]
 
 mod adapters;
 mod annotate;
@@ -9,8 +10,12 @@ mod compare;
 mod documents;
 mod failure;
 mod info;
+#[cfg(unix)]
+mod interrupt;
 mod orbit;
+mod outputs;
 mod progress;
+mod reading;
 mod render;
 mod sweep;
 #[cfg(feature = "viewer")]
@@ -81,6 +86,8 @@ fn main() -> ExitCode {
         (false, true) => "error,sheetsplat=info",
     };
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(filter)).init();
+    #[cfg(unix)]
+    interrupt::listen();
     let progress = !quiet && !verbose;
     let result = match command {
         Command::Render(arguments) => render::run(&arguments),
@@ -96,7 +103,7 @@ fn main() -> ExitCode {
         Command::View(arguments) => view::run(&arguments),
     };
     let Err(failure) = result else { return ExitCode::SUCCESS };
-    // `eprintln` would panic where nobody can be told.
+    // There may be nobody left to tell.
     let _ = writeln!(std::io::stderr(), "sheetsplat: {}", failure.message());
     match failure {
         Failure::Input(_) => ExitCode::from(2),

@@ -7,7 +7,7 @@ use std::time::Instant;
 use clap::ValueEnum;
 use sheetsplat::RenderError;
 use sheetsplat::headless::Rendering;
-use sheetsplat::image::{Image, aside};
+use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
 use sheetsplat::stats::Stats;
@@ -16,6 +16,7 @@ use sheetsplat::volume::Volume;
 use crate::annotate::Annotate;
 use crate::arguments::{Depth, Input, log_frame};
 use crate::failure::Failure;
+use crate::outputs::{self, Outputs};
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -61,8 +62,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let Arguments { input, output, stats: stats_file, save_scene, .. } = arguments;
     check_files(arguments)?;
     let mut scene = input.scene()?;
+    let mut named = vec![("--output", output.as_path())];
+    named.extend(stats_file.as_deref().map(|path| ("--stats", path)));
+    named.extend(save_scene.as_deref().map(|path| ("--save-scene", path)));
+    let outputs = Outputs::check(&named, arguments.profile, &input.files(&scene))?;
     let start = Instant::now();
-    let volume = input.load_volume(&scene)?;
+    let volume = input.load_volume(&scene, &outputs)?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
     input.look_at(&volume, &mut scene)?;
     scene.transfer.check_volume(&volume).map_err(|error| input.failure(RenderError::from(error)))?;
@@ -81,45 +86,31 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     stats.prepare_ms += explicit_ms;
     log_frame(&output.display().to_string(), &stats);
     overlay.draw(&mut image);
-    // Aside before the image is saved: either all files are there in the end or none.
-    let failed = |path: &Path, error: std::io::Error| Failure::Other(format!("{}: {error}", path.display()));
-    let mut files = Vec::new();
+    let mut files = vec![(output.as_path(), image.encode(output, arguments.depth.into())?)];
     if let Some(path) = stats_file {
         let json = serde_json::to_string_pretty(&stats).map_err(|error| Failure::Other(error.to_string()))?;
-        files.push((path, aside(path, (json + "\n").as_bytes()).map_err(|error| failed(path, error))?));
+        files.push((path, (json + "\n").into_bytes()));
     }
     if let Some(path) = save_scene {
-        let text = scene.to_toml(path.parent().unwrap_or(Path::new("")))?;
-        files.push((path, aside(path, text.as_bytes()).map_err(|error| failed(path, error))?));
+        files.push((path, scene.to_toml(path.parent().unwrap_or(Path::new("")))?.into_bytes()));
     }
-    image.save(output, arguments.depth.into())?;
     if arguments.profile && stats.stages_ms.is_empty() {
         log::warn!("--profile: found no timestamp queries on {}", stats.adapter);
     }
-    for (stage, ms) in &stats.stages_ms {
-        println!("{stage:10} {ms:10.3} ms");
-    }
-    for (path, file) in files {
-        file.persist(path).map_err(|error| failed(path, error.error))?;
-    }
-    Ok(())
+    // Empty without --profile.
+    let profile: String = stats.stages_ms.iter().map(|(stage, ms)| format!("{stage:10} {ms:10.3} ms\n")).collect();
+    outputs::write(&files, profile.as_bytes())
 }
 
-/// Checks the names of the files to be written.
+/// Checks the extensions of the files to be written.
 fn check_files(arguments: &Arguments) -> Result<(), Failure> {
-    let Arguments { output, stats, save_scene, .. } = arguments;
+    let Arguments { output, save_scene, .. } = arguments;
     Image::check_format(output)?;
     arguments.annotate.check_format(output)?;
-    let invalid = |option: &str, path: &Path, allowed: &str| {
-        Err(Failure::Input(format!("{option}: found {}, allowed: {allowed}", path.display())))
-    };
-    if let Some(path) = save_scene.as_ref().filter(|path| path.extension().is_none_or(|extension| extension != "toml"))
-    {
-        return invalid("--save-scene", path, "a file .toml");
-    }
-    match stats {
-        Some(path) if path == output || stats == save_scene => {
-            invalid("--stats", path, "another file than --output and --save-scene")
+    let is_toml = |path: &PathBuf| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
+    match save_scene {
+        Some(path) if !is_toml(path) => {
+            Err(Failure::Input(format!("--save-scene: found {}, allowed: a file .toml", path.display())))
         }
         _ => Ok(()),
     }

@@ -10,6 +10,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use glam::{DVec3, UVec3};
 use rayon::prelude::*;
 
+use super::access::{Access, ReadOptions};
 use super::{Grid, Labels, Volume, VolumeError};
 
 /// The volumes that [`volume`] knows.
@@ -26,8 +27,13 @@ const SIZES: std::ops::RangeInclusive<u32> = 2..=1024;
 /// that fills most of it.
 ///
 /// # Errors
-/// If the name is unknown or N is not a whole number from 2 to 1024.
+/// If the name is unknown, N is not a whole number from 2 to 1024, or the volume would take more memory than
+/// [`ReadOptions::memory`] allows by default.
 pub fn volume(name: &str) -> Result<Volume, VolumeError> {
+    read(name, &Access::new(&ReadOptions::default())?)
+}
+
+pub(crate) fn read(name: &str, access: &Access) -> Result<Volume, VolumeError> {
     let origin = format!("builtin:{name}");
     let invalid = |field: &str, found: &str, allowed: String| VolumeError::Invalid {
         origin: origin.clone(),
@@ -54,6 +60,13 @@ pub fn volume(name: &str) -> Result<Volume, VolumeError> {
     };
     let dims = UVec3::from(dims.map(|side| ((side * n + longest / 2) / longest).max(1)));
     let grid = Grid { dims, spacing: spacing * (f64::from(longest) / f64::from(n)) };
+    let bytes = match painted {
+        Painted::Values(_) => size_of::<f32>(),
+        Painted::Tissues(_) => size_of::<f32>() + size_of::<u16>(),
+    };
+    let [x, y, z] = dims.to_array();
+    let voxels = u64::from(dims.element_product());
+    access.reserve(origin.as_ref(), "size", format!("{x} × {y} × {z} voxels"), voxels * bytes as u64)?;
     let (values, labels) = match painted {
         Painted::Values(values) => (values(&grid), None),
         Painted::Tissues(painted) => {

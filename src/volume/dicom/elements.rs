@@ -8,7 +8,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::super::VolumeError;
-use super::super::source::{Source, invalid, io_error};
+use super::super::access::Access;
+use super::super::source::{invalid, io_error};
 use super::dataset::{Dataset, Tag, name, shown_tag, tags};
 
 const SEQUENCES: [Tag; 6] = [
@@ -57,8 +58,8 @@ pub(super) enum PixelData {
 
 impl Elements {
     /// Reads what is before the pixels; what is behind them is not looked at.
-    pub(super) fn read(path: &Path) -> Result<Self, VolumeError> {
-        let mut source = Source::open(path)?;
+    pub(super) fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
+        let mut source = access.open(path)?;
         let length = source.left()?;
         let mut parser = Parser {
             path: path.into(),

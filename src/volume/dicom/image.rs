@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::super::VolumeError;
+use super::super::access::Access;
 use super::super::samples::SampleType;
-use super::super::source::{Source, invalid, io_error};
+use super::super::source::{invalid, io_error};
 use super::codecs::Codec;
 use super::dataset::{Dataset, Tag, tags};
 use super::elements::{Elements, PixelData};
@@ -55,8 +56,8 @@ pub(super) struct Frame {
 
 impl Image {
     /// Reads what is before the pixels; `None` if the file is no image.
-    pub(super) fn open(path: &Path) -> Result<Option<Self>, VolumeError> {
-        let Elements { data, transfer_syntax, big_endian, pixels } = Elements::read(path)?;
+    pub(super) fn open(path: &Path, access: &Access) -> Result<Option<Self>, VolumeError> {
+        let Elements { data, transfer_syntax, big_endian, pixels } = Elements::read(path, access)?;
         let Some((tag, pixel_data)) = pixels else { return Ok(None) };
         if data.text(tags::MEDIA_SOP_CLASS).as_deref() == Some(DIRECTORY) {
             return Ok(None);
@@ -92,8 +93,8 @@ impl Image {
     }
 
     /// A frame's samples, in the machine's byte order.
-    pub(super) fn frame(&self, index: usize) -> Result<Vec<u8>, VolumeError> {
-        let mut file = Source::open(&self.path)?;
+    pub(super) fn frame(&self, index: usize, access: &Access) -> Result<Vec<u8>, VolumeError> {
+        let mut file = access.open(&self.path)?;
         let mut read = |at: u64, bytes: u64, into: &mut Vec<u8>| {
             file.reader.seek(SeekFrom::Start(at)).map_err(io_error(&self.path))?;
             let read = file.reader.by_ref().take(bytes).read_to_end(into).map_err(io_error(&self.path))?;

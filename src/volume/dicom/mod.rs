@@ -12,7 +12,6 @@ mod elements;
 mod image;
 mod series;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::DMat3;
@@ -21,40 +20,46 @@ use rayon::prelude::*;
 use self::image::Image;
 use self::series::Series;
 use super::VolumeError;
+use super::access::Access;
 use super::loaded::Loaded;
 use super::orientation::{Orientation, RAS_FROM_LPS};
 use super::samples::{SIZES, Samples, Voxel, dims_of};
 use super::source::invalid;
 
 /// Reads the frames of one file.
-pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
-    let Some(image) = Image::open(path)? else {
+pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+    let Some(image) = Image::open(path, access)? else {
         return Err(invalid(path, "PixelData", "no such element", "an image"));
     };
     if image.frames.len() == 1 {
         log::warn!("{}: one slice; a folder with all slices of a series is read as one volume", path.display());
     }
-    assemble(path, vec![image])
+    assemble(path, vec![image], access)
 }
 
 /// Reads the slices of a series, each in a file of its own.
-pub(super) fn read_folder<T: Voxel>(folder: &Path, files: &[PathBuf]) -> Result<Loaded<T>, VolumeError> {
-    let images: Result<Vec<_>, _> = files.par_iter().map(|path| Image::open(path)).collect();
+pub(super) fn read_folder<T: Voxel>(
+    folder: &Path,
+    files: &[PathBuf],
+    access: &Access,
+) -> Result<Loaded<T>, VolumeError> {
+    let images: Result<Vec<_>, _> = files.par_iter().map(|path| Image::open(path, access)).collect();
     let images: Vec<Image> = images?.into_iter().flatten().collect();
     series::check_one(folder, &images)?;
-    assemble(folder, images)
+    assemble(folder, images, access)
 }
 
-fn assemble<T: Voxel>(path: &Path, images: Vec<Image>) -> Result<Loaded<T>, VolumeError> {
+fn assemble<T: Voxel>(path: &Path, images: Vec<Image>, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let Series { slices, spacing, axes } = Series::of(path, &images)?;
     let first = &images[slices[0].image];
     let sizes = [u64::from(first.pixels.columns), u64::from(first.pixels.rows), slices.len() as u64];
     let dims = dims_of(sizes).ok_or_else(|| invalid(path, "Rows, Columns, slices", format!("{sizes:?}"), SIZES))?;
     let kind = first.pixels.kind;
+    Samples { kind, dims, big_endian: false, rescale: None, z_fastest: false }.reserve::<T>(path, access)?;
     let mut values = Vec::new();
     // As many at a time as there are threads: codecs take long.
     for slices in slices.chunks(rayon::current_num_threads()) {
-        let frames: Vec<_> = slices.par_iter().map(|slice| images[slice.image].frame(slice.frame)).collect();
+        let frames: Vec<_> = slices.par_iter().map(|slice| images[slice.image].frame(slice.frame, access)).collect();
         for (slice, frame) in slices.iter().zip(frames) {
             let image = &images[slice.image];
             let rescale = Some(slice.rescale).filter(|&rescale| rescale != [1.0, 0.0]);
@@ -66,13 +71,6 @@ fn assemble<T: Voxel>(path: &Path, images: Vec<Image>) -> Result<Loaded<T>, Volu
     values.shrink_to_fit();
     let origin = RAS_FROM_LPS * slices[0].position;
     let orientation = Some(Orientation { axes: DMat3::from_diagonal(RAS_FROM_LPS) * axes, origin });
-    Ok(Loaded {
-        dims,
-        kind,
-        spacing: Some(spacing),
-        unit: Some("mm".to_owned()),
-        orientation,
-        label_names: BTreeMap::new(),
-        values,
-    })
+    let unit = Some("mm".to_owned());
+    Ok(Loaded { spacing: Some(spacing), unit, orientation, ..Loaded::new(dims, kind, values) })
 }

@@ -46,7 +46,30 @@ fn find(file: &mut BufReader<File>, most: u64) -> io::Result<Option<(u16, u64)>>
     Ok(None)
 }
 
-fn number(file: &mut BufReader<File>, bytes: usize, big_endian: bool) -> io::Result<u64> {
+/// Where the entry of a tag with one value of 16 bits has the low byte of that, in the directory at `directory`.
+pub(super) fn low_byte_of(file: &mut (impl Read + Seek), directory: u64, tag: u16) -> io::Result<Option<u64>> {
+    /// The type of values of 16 bits.
+    const SHORT: u64 = 3;
+    let mut magic = [0; 4];
+    file.rewind()?;
+    file.read_exact(&mut magic)?;
+    let (big_endian, is_big) = (magic[0] == b'M', magic.contains(&43));
+    let (offset, count) = if is_big { (8, 8) } else { (4, 2) };
+    file.seek(SeekFrom::Start(directory))?;
+    for _ in 0..number(file, count, big_endian)? {
+        let found = number(file, 2, big_endian)?;
+        let kind = number(file, 2, big_endian)?;
+        let values = number(file, offset, big_endian)?;
+        let at = file.stream_position()?;
+        let _value_or_offset = number(file, offset, big_endian)?;
+        if (found, kind, values) == (tag.into(), SHORT, 1) {
+            return Ok(Some(at + u64::from(big_endian)));
+        }
+    }
+    Ok(None)
+}
+
+fn number(file: &mut impl Read, bytes: usize, big_endian: bool) -> io::Result<u64> {
     let mut number = [0; 8];
     file.read_exact(&mut number[..bytes])?;
     if big_endian {

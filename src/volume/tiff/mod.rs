@@ -5,11 +5,11 @@
 
 mod description;
 mod directory;
+mod overlay;
 mod pages;
 mod run;
 mod trial;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -17,28 +17,29 @@ use glam::DVec3;
 use self::description::Calibration;
 use self::pages::{Page, Pages};
 use super::VolumeError;
+use super::access::Access;
 use super::loaded::Loaded;
 use super::samples::{SIZES, Samples, Stream, Voxel, dims_of};
-use super::source::{Source, invalid};
+use super::source::invalid;
 
 /// Reads the pages of one file.
-pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
-    let mut pages = Pages::open(path)?;
+pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+    let mut pages = Pages::open(path, access)?;
     let calibration = Calibration::of(&mut pages)?;
     let mut slices = Slices::new(path, &pages, &calibration)?;
     if let Some(count) = calibration.slices.filter(|&count| count > 1 && !pages.has_more()) {
         // ImageJ writes what is too large for one TIFF so: one directory, and the slices one after the other.
         let offset = pages.contiguous()?;
         let samples = slices.samples(count)?;
-        let mut stream = Stream::raw(Source::open(path)?)?;
+        let mut stream = Stream::raw(access.open(path)?)?;
         stream.skip(offset)?;
         let samples = Samples { big_endian: pages.is_big_endian(), ..samples };
         slices.values = stream.samples(&samples, true)?;
         slices.count = count;
     } else {
-        slices.add(&mut pages)?;
+        slices.add(&mut pages, access)?;
         while pages.next()? {
-            slices.add(&mut pages)?;
+            slices.add(&mut pages, access)?;
         }
     }
     match calibration.slices {
@@ -50,10 +51,10 @@ pub(super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
 }
 
 /// Reads a folder of files of one page each, in this order.
-pub(super) fn read_folder<T: Voxel>(path: &Path, files: &[PathBuf]) -> Result<Loaded<T>, VolumeError> {
+pub(super) fn read_folder<T: Voxel>(path: &Path, files: &[PathBuf], access: &Access) -> Result<Loaded<T>, VolumeError> {
     let mut kinds: Vec<(Page, Vec<&PathBuf>)> = Vec::new();
     for file in files {
-        let pages = Pages::open(file)?;
+        let pages = Pages::open(file, access)?;
         if pages.has_more() {
             return Err(invalid(file, "pages", "more than one", "one, as files of a folder are slices"));
         }
@@ -68,12 +69,12 @@ pub(super) fn read_folder<T: Voxel>(path: &Path, files: &[PathBuf]) -> Result<Lo
         let found = shown.collect::<Vec<_>>().join(", ");
         return Err(invalid(path, "slices", found, "slices of one size and type"));
     };
-    let mut first = Pages::open(slices_of_one_kind[0])?;
+    let mut first = Pages::open(slices_of_one_kind[0], access)?;
     let calibration = Calibration::of(&mut first)?;
     let mut slices = Slices::new(path, &first, &calibration)?;
     run::check(path, files)?;
     for file in slices_of_one_kind {
-        slices.add(&mut Pages::open(file)?)?;
+        slices.add(&mut Pages::open(file, access)?, access)?;
     }
     slices.finish(&calibration)
 }
@@ -82,6 +83,8 @@ pub(super) fn read_folder<T: Voxel>(path: &Path, files: &[PathBuf]) -> Result<Lo
 struct Slices<'a, T> {
     path: &'a Path,
     page: Page,
+    /// Of the first page, unless another page has a different one.
+    palette: Option<Vec<[u8; 3]>>,
     rescale: Option<[f64; 2]>,
     count: u32,
     values: Vec<T>,
@@ -89,7 +92,8 @@ struct Slices<'a, T> {
 
 impl<'a, T: Voxel> Slices<'a, T> {
     fn new(path: &'a Path, pages: &Pages, calibration: &Calibration) -> Result<Self, VolumeError> {
-        Ok(Self { path, page: pages.page, rescale: calibration.rescale, count: 0, values: Vec::new() })
+        let (page, palette) = (pages.page, pages.palette.clone());
+        Ok(Self { path, page, palette, rescale: calibration.rescale, count: 0, values: Vec::new() })
     }
 
     fn samples(&self, count: u32) -> Result<Samples, VolumeError> {
@@ -100,12 +104,20 @@ impl<'a, T: Voxel> Slices<'a, T> {
         Ok(Samples { kind, dims, big_endian: cfg!(target_endian = "big"), rescale: self.rescale, z_fastest: false })
     }
 
-    fn add(&mut self, pages: &mut Pages) -> Result<(), VolumeError> {
+    fn add(&mut self, pages: &mut Pages, access: &Access) -> Result<(), VolumeError> {
         if pages.page != self.page {
             let allowed = format!("{}, as the first page", self.page);
             return Err(invalid(&pages.path, &pages.name(), pages.page, allowed));
         }
+        if self.palette.is_some() && pages.palette != self.palette {
+            log::warn!("{}: {} has another palette: no colour map is offered", pages.path.display(), pages.name());
+            self.palette = None;
+        }
         let samples = self.samples(self.count + 1)?;
+        if self.count == 0 {
+            access.reserve(&pages.path, &pages.name(), self.page, self.page.bytes())?;
+        }
+        self.samples(1)?.reserve::<T>(&pages.path, access)?;
         let bytes = pages.bytes()?;
         samples.append(&pages.path, &bytes, &mut self.values)?;
         self.count += 1;
@@ -123,14 +135,21 @@ impl<'a, T: Voxel> Slices<'a, T> {
             });
             DVec3::new(x, y, z)
         });
-        Ok(Loaded {
-            dims,
-            kind,
-            spacing,
-            unit: calibration.unit.clone(),
-            orientation: None,
-            label_names: BTreeMap::new(),
-            values: self.values,
-        })
+        let palette = self.palette.map(|colors| values_of(&colors, self.rescale)).filter(|palette| !palette.is_empty());
+        let unit = calibration.unit.clone();
+        Ok(Loaded { spacing, unit, palette, ..Loaded::new(dims, kind, self.values) })
     }
+}
+
+/// What colours the values of a palette's indices have, ascending by value.
+fn values_of(colors: &[[u8; 3]], rescale: Option<[f64; 2]>) -> Vec<(f64, DVec3)> {
+    let [slope, intercept] = rescale.unwrap_or([1.0, 0.0]);
+    let rgb = |color: [u8; 3]| DVec3::from(color.map(|channel| f64::from(channel) / 255.0));
+    // As f32, which values are.
+    let value = |index: usize| f64::from((index as f64 * slope + intercept) as f32);
+    let mut points: Vec<_> = colors.iter().enumerate().map(|(index, &color)| (value(index), rgb(color))).collect();
+    points.retain(|(value, _)| value.is_finite());
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    points.dedup_by_key(|point| point.0);
+    points
 }

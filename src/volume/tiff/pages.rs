@@ -1,7 +1,6 @@
 //! The pages of one file.
 
 use std::fmt::{self, Display, Formatter};
-use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
@@ -11,18 +10,25 @@ use ::tiff::tags::{ByteOrder, Tag};
 use ::tiff::{ColorType, TiffError};
 
 use super::super::VolumeError;
+use super::super::access::Access;
 use super::super::samples::SampleType;
-use super::super::source::{Source, invalid, io_error};
-use super::directory::{most_values, overlong_entry};
+use super::super::source::{invalid, io_error};
+use super::directory::{low_byte_of, most_values, overlong_entry};
+use super::overlay::Overlay;
 use super::trial::{self, is_suspicious};
 
 /// The values of the tags that count.
 const UNCOMPRESSED: u16 = 1;
 const REDUCED: u32 = 1;
 const WHITE_IS_ZERO: u16 = 0;
+const BLACK_IS_ZERO: u8 = 1;
+const PALETTE: u16 = 3;
 
 /// LZW's longest string is 4096 bytes, for a code of 12 bits; no other compression here expands by more.
 const MAX_EXPANSION: u64 = 4096;
+
+/// Colours of a palette for indices of 8 bits.
+const COLORS: usize = 256;
 
 /// Size and type of a page.
 #[derive(Clone, Copy, PartialEq)]
@@ -32,7 +38,7 @@ pub(super) struct Page {
 }
 
 impl Page {
-    fn bytes(self) -> u64 {
+    pub(super) fn bytes(self) -> u64 {
         let [width, height] = self.size.map(u64::from);
         // Two sizes of 32 bits: their product is one of 64.
         (width * height).saturating_mul(self.kind.bytes())
@@ -51,7 +57,9 @@ pub(super) struct Pages {
     pub(super) path: PathBuf,
     /// The page that it is at.
     pub(super) page: Page,
-    decoder: Decoder<BufReader<File>>,
+    /// Red, green and blue for each value, if the pixels are indices of a palette.
+    pub(super) palette: Option<Vec<[u8; 3]>>,
+    decoder: Decoder<Overlay>,
     /// The number of directories up to here.
     number: u32,
     /// Bytes of the file that no page so far has claimed.
@@ -63,8 +71,8 @@ pub(super) struct Pages {
 
 impl Pages {
     /// Opens a file at its first page.
-    pub(super) fn open(path: &Path) -> Result<Self, VolumeError> {
-        let mut file = Source::open(path)?;
+    pub(super) fn open(path: &Path, access: &Access) -> Result<Self, VolumeError> {
+        let mut file = access.open(path)?;
         let unclaimed = file.left()?;
         let mut reader = BufReader::new(file.reader.into_inner());
         let overlong = overlong_entry(&mut reader, unclaimed).map_err(io_error(path))?;
@@ -73,7 +81,7 @@ impl Pages {
             return Err(invalid(path, &format!("tag {tag}"), format!("{values} values"), allowed));
         }
         reader.rewind().map_err(io_error(path))?;
-        let decoder = Decoder::new(reader).map_err(failed(path, "page 1"))?;
+        let decoder = Decoder::new(Overlay::new(reader)).map_err(failed(path, "page 1"))?;
         // Memory for pages is not the decoder's, but that for the values of tags.
         let mut limits = Limits::default();
         limits.intermediate_buffer_size = usize::MAX;
@@ -81,6 +89,7 @@ impl Pages {
         let mut pages = Self {
             path: path.to_owned(),
             page: Page { size: [0; 2], kind: SampleType::U8 },
+            palette: None,
             decoder: decoder.with_limits(limits),
             number: 1,
             unclaimed,
@@ -159,17 +168,23 @@ impl Pages {
     /// Takes down what the page is, and refuses what is no grid of numbers, or more than the file can hold.
     fn describe(&mut self) -> Result<(), VolumeError> {
         let name = self.name();
+        self.palette = self.take_palette()?;
         let failed = failed(&self.path, &name);
         let (width, height) = self.decoder.dimensions().map_err(&failed)?;
         let color = self.decoder.colortype().map_err(&failed)?;
         let layout = self.decoder.image_buffer_layout().map_err(&failed)?;
         let kind = match (color, layout.sample_type) {
-            (ColorType::Gray(8 | 16 | 32 | 64), Some(sample_type)) => sample_type_of(sample_type),
+            (ColorType::Gray(8), Some(sample_type)) if self.palette.is_some() => Some(sample_type),
+            (ColorType::Gray(8 | 16 | 32 | 64), Some(sample_type)) if self.palette.is_none() => Some(sample_type),
             _ => None,
         };
-        let Some(kind) = kind else {
-            let found = format!("{color:?}, {:?}", layout.sample_format);
-            let allowed = "one integer of 8 to 64 bits or one float of 32 or 64 bits for each pixel";
+        let Some(kind) = kind.and_then(sample_type_of) else {
+            let found = match color {
+                ColorType::RGB(_) | ColorType::RGBA(_) => format!("RGB pages, {} samples a pixel", color.num_samples()),
+                _ if self.palette.is_some() => format!("indices of a palette, {color:?}"),
+                _ => format!("{color:?}, {:?}", layout.sample_format),
+            };
+            let allowed = "one sample a pixel: an integer of 8 to 64 bits, a float of 32 or 64 bits, or an index of 8 bits of a palette";
             return Err(invalid(&self.path, &name, found, allowed));
         };
         self.page = Page { size: [width, height], kind };
@@ -181,6 +196,31 @@ impl Pages {
         self.offsets = offsets.map_err(&failed)?.unwrap_or_default();
         self.counts = counts.map_err(&failed)?.unwrap_or_default();
         Ok(())
+    }
+
+    /// The page's palette. The decoder goes on as if the page said that its pixels are grey.
+    fn take_palette(&mut self) -> Result<Option<Vec<[u8; 3]>>, VolumeError> {
+        if self.unsigned::<u16>(Tag::PhotometricInterpretation)? != Some(PALETTE) {
+            return Ok(None);
+        }
+        let name = self.name();
+        let failed = failed(&self.path, &name);
+        let channels = self.decoder.find_tag_unsigned_vec::<u16>(Tag::ColorMap).map_err(&failed)?.unwrap_or_default();
+        let [red, green, blue] = [0, 1, 2].map(|channel| channels.chunks(COLORS).nth(channel).unwrap_or_default());
+        if channels.len() != 3 * COLORS {
+            let found = format!("{} numbers", channels.len());
+            return Err(invalid(&self.path, "ColorMap", found, format!("{} numbers, of 8-bit indices", 3 * COLORS)));
+        }
+        let directory = self.decoder.ifd_pointer().map_or(0, |pointer| pointer.0);
+        let tag = Tag::PhotometricInterpretation.to_u16();
+        let at = low_byte_of(self.decoder.inner(), directory, tag).map_err(io_error(&self.path))?;
+        let at = at.ok_or_else(|| invalid(&self.path, "PhotometricInterpretation", "no short", "a short"))?;
+        self.decoder.inner().replace(at, BLACK_IS_ZERO);
+        self.decoder.seek_to_image(self.number as usize - 1).map_err(&failed)?;
+        // Numbers of 16 bits, but some programs write numbers of 8 bits.
+        let shift = if channels.iter().all(|&number| number < 256) { 0 } else { 8 };
+        let colors = red.iter().zip(green).zip(blue);
+        Ok(Some(colors.map(|((&r, &g), &b)| [r, g, b].map(|number| (number >> shift) as u8)).collect()))
     }
 
     /// Refuses chunks that take up more than is left of the file, or promise more than is in them.
@@ -202,7 +242,7 @@ impl Pages {
             let (offset, count) = (self.offsets.get(chunk).copied().unwrap_or(u64::MAX), self.counts[chunk]);
             let mut holds = count.saturating_mul(expansion) >= bytes;
             if holds && method != UNCOMPRESSED && is_suspicious(count, bytes) {
-                let file = self.decoder.inner();
+                let file = &mut self.decoder.inner().file;
                 let code = file.seek(SeekFrom::Start(offset)).map(|_| file.take(count));
                 holds = code.and_then(|code| trial::holds(code, method, bytes)).map_err(io_error(&self.path))?;
             }

@@ -132,6 +132,13 @@ impl<R: Read> Blocks<R> {
     }
 }
 
+impl<R> Blocks<R> {
+    /// The bytes of the largest block.
+    pub(super) fn largest(&self) -> u64 {
+        self.sizes.as_slice().iter().map(|&[_, size]| size).max().unwrap_or_default()
+    }
+}
+
 impl<R: Read> Read for Blocks<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         while self.read == self.block.len() {

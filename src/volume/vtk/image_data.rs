@@ -1,7 +1,6 @@
 //! XML ImageData: one piece, its samples in the XML, as text or base64, or behind it, as base64 or as they are; in blocks of zlib or LZ4
 //! or in one.
 
-use std::collections::BTreeMap;
 use std::io::{self, BufRead, Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -10,14 +9,15 @@ use quick_xml::Reader;
 use quick_xml::events::Event;
 
 use super::super::VolumeError;
+use super::super::access::Access;
 use super::super::fields::Fields;
 use super::super::loaded::Loaded;
+use super::super::numbers::TextEnd;
 use super::super::orientation::unit_directions;
 use super::super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
-use super::super::source::{Source, invalid, io_error, number, three};
+use super::super::source::{invalid, io_error, number, three};
 use super::super::xml;
 use super::blocks::{Base64, Blocks, Compressor, HeaderType};
-use super::numbers::Numbers;
 use super::warn_of_choice;
 
 const TYPES: [(&str, SampleType); 10] = [
@@ -34,8 +34,8 @@ const TYPES: [(&str, SampleType); 10] = [
 ];
 
 /// Reads the array of one file.
-pub(in super::super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
-    let header = Header::read(path)?;
+pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+    let header = Header::read(path, access)?;
     let spacing = header.spacing()?;
     header.check_direction()?;
     let array = header.choose()?;
@@ -49,16 +49,8 @@ pub(in super::super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeE
         Some(_) => None,
     })?;
     let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
-    let values = header.open(path, array, &samples)?.samples(&samples, false)?;
-    Ok(Loaded {
-        dims,
-        kind,
-        spacing: Some(spacing),
-        unit: None,
-        orientation: None,
-        label_names: BTreeMap::new(),
-        values,
-    })
+    let values = header.open(path, access, array, &samples)?.samples(&samples, false)?;
+    Ok(Loaded { spacing: Some(spacing), ..Loaded::new(dims, kind, values) })
 }
 
 /// The elements that count, as their attributes.
@@ -81,8 +73,8 @@ struct Array {
 
 impl Header {
     /// Reads the XML, or what of it is before the appended data.
-    fn read(path: &Path) -> Result<Self, VolumeError> {
-        let mut reader = Reader::from_reader(Source::open(path)?.reader);
+    fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
+        let mut reader = Reader::from_reader(access.open(path)?.reader);
         let (mut file, mut image, mut piece) = (None, None, None);
         let (mut arrays, mut appended) = (Vec::new(), None);
         let mut section: Option<(bool, Option<String>)> = None;
@@ -190,16 +182,22 @@ impl Header {
     fn dims(&self, array: &Array) -> Result<UVec3, VolumeError> {
         let extent = extent(&self.image, "WholeExtent")?;
         let size = |axis: usize| {
-            let steps = extent[2 * axis + 1].checked_sub(extent[2 * axis])?;
+            let steps = extent[2 * axis + 1].checked_sub(extent[2 * axis]).filter(|&steps| steps >= 0)?;
             // A flat grid has cells all the same.
             if array.of_cells { Some(steps.max(1)) } else { steps.checked_add(1) }
         };
         let sizes = || dims_of([size(0)?, size(1)?, size(2)?]);
-        sizes().ok_or_else(|| self.image.invalid("WholeExtent", format!("{extent:?}"), SIZES))
+        sizes().ok_or_else(|| {
+            self.image.invalid(
+                "WholeExtent",
+                format!("{extent:?}"),
+                format!("a last point behind the first one, or the same, along x, y and z; {SIZES}"),
+            )
+        })
     }
 
     /// The array's bytes.
-    fn open(&self, path: &Path, array: &Array, samples: &Samples) -> Result<Stream, VolumeError> {
+    fn open(&self, path: &Path, access: &Access, array: &Array, samples: &Samples) -> Result<Stream, VolumeError> {
         let Array { fields, at, .. } = array;
         let (at, encoding) = match (fields.get("format"), &self.appended) {
             (Some("ascii"), _) => (*at, "ascii"),
@@ -217,20 +215,20 @@ impl Header {
                 return Err(fields.invalid("format", other.unwrap_or("none"), allowed));
             }
         };
-        let mut file = Source::open(path)?;
+        let mut file = access.open(path)?;
         file.reader.seek(SeekFrom::Start(at)).map_err(io_error(path))?;
         let left = file.left()?;
         let (reader, expansion): (Box<dyn Read>, u64) = match encoding {
-            // A digit and a space.
-            "ascii" => (Box::new(Numbers::new(file.reader, samples.kind, &[])), samples.kind.bytes().div_ceil(2)),
-            "base64" => self.unpacked(Base64::new(file.reader), samples)?,
-            _ => self.unpacked(file.reader, samples)?,
+            "ascii" => return Stream::text(file, samples.kind, TextEnd::Tag),
+            "base64" => self.unpacked(Base64::new(file.reader), samples, access)?,
+            _ => self.unpacked(file.reader, samples, access)?,
         };
         Ok(Stream::decoded(
             path,
             reader,
             "numbers, base64 or blocks as the header says",
             left.saturating_mul(expansion),
+            access,
         ))
     }
 
@@ -239,6 +237,7 @@ impl Header {
         &self,
         mut reader: impl Read + 'static,
         samples: &Samples,
+        access: &Access,
     ) -> Result<(Box<dyn Read>, u64), VolumeError> {
         let bytes = self.file.value("header_type", "UInt32 or UInt64", |text| match text {
             None | Some("UInt32") => Some(4),
@@ -256,6 +255,8 @@ impl Header {
         let damaged = |error| invalid(&self.file.path, "data", error, "as many bytes as the header says");
         if let Some(compressor) = compressor {
             let blocks = Blocks::new(reader, header, compressor, samples.bytes()).map_err(damaged)?;
+            let (path, block) = (&self.file.path, blocks.largest());
+            access.reserve(path, "data", format!("a block of {block} bytes"), block)?;
             return Ok((Box::new(blocks), compressor.max_expansion()));
         }
         let held = header.read(&mut reader).map_err(damaged)?;

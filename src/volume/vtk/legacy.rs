@@ -1,17 +1,17 @@
 //! The older files: a text header of keywords, then the samples as text or, big-endian, as they are.
 
-use std::collections::BTreeMap;
 use std::io::{self, BufRead, Read};
 use std::path::Path;
 
 use glam::{DVec3, UVec3};
 
 use super::super::VolumeError;
+use super::super::access::Access;
 use super::super::fields::Fields;
 use super::super::loaded::Loaded;
+use super::super::numbers::TextEnd;
 use super::super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
 use super::super::source::{MAX_HEADER, Source, invalid, io_error, number, shown, three};
-use super::numbers::Numbers;
 
 /// What may follow an array.
 const KEYWORDS: &[&str] = &[
@@ -32,36 +32,26 @@ const KEYWORDS: &[&str] = &[
 ];
 
 /// Reads the first array of single numbers in one file.
-pub(in super::super) fn read<T: Voxel>(path: &Path) -> Result<Loaded<T>, VolumeError> {
-    let mut header = Header::open(path)?;
+pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+    let mut header = Header::open(path, access)?;
     let array = header.find_array()?;
     let (dims, kind, spacing) = (header.dims(&array)?, array.kind, header.spacing()?);
     let Header { mut file, is_text, .. } = header;
     let big_endian = !is_text || cfg!(target_endian = "big");
     let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
-    let left = file.left()?;
     let stream = if is_text {
-        // A digit and a space.
-        let left = (left / 2 + 1).saturating_mul(kind.bytes());
-        Stream::decoded(path, Box::new(Numbers::new(file.reader, kind, KEYWORDS)), "numbers as text", left)
+        Stream::text(file, kind, TextEnd::Words(KEYWORDS))?
     } else {
-        check_rest(path, left, &samples)?;
+        check_rest(path, access, file.left()?, &samples)?;
         Stream::raw(file)?
     };
-    Ok(Loaded {
-        dims,
-        kind,
-        spacing,
-        unit: None,
-        orientation: None,
-        label_names: BTreeMap::new(),
-        values: stream.samples(&samples, true)?,
-    })
+    let loaded = Loaded::new(dims, kind, stream.samples(&samples, true)?);
+    Ok(Loaded { spacing, ..loaded })
 }
 
 /// Refuses a file in which something else than another array follows the samples, whose beginning has `left` bytes after it.
-fn check_rest(path: &Path, left: u64, samples: &Samples) -> Result<(), VolumeError> {
-    let mut stream = Stream::raw(Source::open(path)?)?;
+fn check_rest(path: &Path, access: &Access, left: u64, samples: &Samples) -> Result<(), VolumeError> {
+    let mut stream = Stream::raw(access.open(path)?)?;
     let all = stream.exactly_left().unwrap_or_default();
     stream.skip(all.saturating_sub(left).saturating_add(samples.bytes()))?;
     let rest = stream.bytes(stream.exactly_left().unwrap_or_default().min(4096))?;
@@ -90,8 +80,8 @@ struct Array {
 
 impl Header {
     /// Reads the first three lines.
-    fn open(path: &Path) -> Result<Self, VolumeError> {
-        let mut file = Source::open(path)?;
+    fn open(path: &Path, access: &Access) -> Result<Self, VolumeError> {
+        let mut file = access.open(path)?;
         let mut budget = MAX_HEADER;
         let mut line = || Ok(file.line(&mut budget)?.unwrap_or_default());
         let [magic, _title, encoding] = [line()?, line()?, line()?];

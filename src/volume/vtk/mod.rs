@@ -6,7 +6,6 @@
 mod blocks;
 mod image_data;
 mod legacy;
-mod numbers;
 
 pub(super) use image_data::read as read_image_data;
 pub(super) use legacy::read as read_legacy;

@@ -5,6 +5,7 @@ mod legend;
 mod round;
 mod scale_bar;
 
+use std::ffi::OsStr;
 use std::path::Path;
 
 use clap::ValueEnum;
@@ -62,7 +63,8 @@ impl Annotate {
 
     /// Checks that the output is to be looked at, and does not hold data.
     pub(crate) fn check_format(&self, output: &Path) -> Result<(), Failure> {
-        let is_data = output.extension().is_some_and(|extension| extension == "exr" || extension == "npy");
+        let is_data = |extension: &OsStr| ["exr", "npy"].iter().any(|data| extension.eq_ignore_ascii_case(data));
+        let is_data = output.extension().is_some_and(is_data);
         if is_data && !self.annotate.is_empty() {
             let found = output.display();
             return Err(Failure::Input(format!("--annotate: found {found}, allowed: PNG files and movies")));

@@ -11,6 +11,7 @@ use sheetsplat::volume::{Orientation, SampleType, Volume};
 
 use crate::arguments::Input;
 use crate::failure::Failure;
+use crate::outputs::Outputs;
 use crate::stdout;
 use statistics::{Histogram, extent_and_mean};
 
@@ -51,6 +52,8 @@ struct Info {
     r#type: String,
     spacing: [f64; 3],
     unit: Option<String>,
+    /// Voxels whose samples are NaN or infinite; what follows is that of the others.
+    holes: u64,
     min: f64,
     max: f64,
     mean: f64,
@@ -60,7 +63,9 @@ struct Info {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let input = &arguments.input;
-    let volume = input.load_volume(&input.scene()?)?;
+    let scene = input.scene()?;
+    let outputs = Outputs::check(&[], true, &input.files(&scene))?;
+    let volume = input.load_volume(&scene, &outputs)?;
     let [min, max, mean] = extent_and_mean(volume.values());
     let percentiles = quantiles(volume.values(), |_| true, PERCENTILES.map(|(percent, _)| percent / 100.0));
     let encoding = volume.encoding();
@@ -70,6 +75,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         r#type: encoding.map_or(SampleType::F32, |encoding| encoding.sample_type).to_string(),
         spacing: volume.spacing().to_array(),
         unit: volume.unit().map(str::to_owned),
+        holes: volume.holes(),
         min,
         max,
         mean,
@@ -98,6 +104,9 @@ fn described(info: &Info, volume: &Volume) -> String {
     let [x, y, z] = info.spacing.map(short);
     line("spacing", format!("{x} × {y} × {z} {}", info.unit.as_deref().unwrap_or("(no unit)")));
     line("orientation", volume.orientation().map_or("not given".to_owned(), orientation));
+    if info.holes > 0 {
+        line("holes", format!("{} samples are NaN or infinite", info.holes));
+    }
     line("range", format!("{} to {}, mean {}", short(info.min), short(info.max), short(info.mean)));
     for (&(_, name), &value) in PERCENTILES.iter().zip(&info.percentiles) {
         line(&format!("{name:>9} %"), short(value));

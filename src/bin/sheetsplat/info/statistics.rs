@@ -9,22 +9,23 @@ const CHUNK: usize = 1 << 20;
 /// Bins of a histogram.
 const BINS: usize = 256;
 
-/// The least and the largest value, and the mean, the same in every run.
+/// The least and the largest finite value, and the mean of those, the same in every run.
 pub(super) fn extent_and_mean(values: &[f32]) -> [f64; 3] {
     let of_chunk = |chunk: &[f32]| {
-        let start = [f64::INFINITY, f64::NEG_INFINITY, 0.0];
-        chunk.iter().fold(start, |[least, largest, sum], &value| {
+        let start = [f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0];
+        let finite = chunk.iter().filter(|value| !value.is_nan());
+        finite.fold(start, |[least, largest, sum, count], &value| {
             let value = f64::from(value);
-            [least.min(value), largest.max(value), sum + value]
+            [least.min(value), largest.max(value), sum + value, count + 1.0]
         })
     };
     // Collected, so that the sums are added in one order.
-    let chunks: Vec<[f64; 3]> = values.par_chunks(CHUNK).map(of_chunk).collect();
-    let [least, largest, sum] = chunks
+    let chunks: Vec<[f64; 4]> = values.par_chunks(CHUNK).map(of_chunk).collect();
+    let [least, largest, sum, count] = chunks
         .into_iter()
-        .reduce(|[a, b, c], [least, largest, sum]| [a.min(least), b.max(largest), c + sum])
+        .reduce(|[a, b, c, d], [least, largest, sum, count]| [a.min(least), b.max(largest), c + sum, d + count])
         .unwrap_or_default();
-    [least, largest, sum / values.len() as f64]
+    [least, largest, sum / count]
 }
 
 /// How often values occur from a value to a larger one; what is beyond is in the bins at the ends.
@@ -81,6 +82,7 @@ mod tests {
     #[test]
     fn extents_and_means() {
         assert_eq!(extent_and_mean(&[3.0, -1.0, 4.0]), [-1.0, 4.0, 2.0]);
+        assert_eq!(extent_and_mean(&[f32::NAN, 3.0, -1.0, f32::NAN, 4.0]), [-1.0, 4.0, 2.0]);
     }
 
     #[test]

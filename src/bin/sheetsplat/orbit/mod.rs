@@ -9,12 +9,15 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use sheetsplat::RenderError;
-use sheetsplat::image::{Image, aside};
+use sheetsplat::image::Image;
+use sheetsplat::image::output::Target;
 use sheetsplat::scene::Scene;
+use sheetsplat::volume::Volume;
 
-use crate::annotate::Annotate;
+use crate::annotate::{Annotate, Overlay};
 use crate::arguments::{Depth, Input, log_frame, parse_degrees};
 use crate::failure::Failure;
+use crate::outputs::{self, Outputs};
 use crate::progress::Progress;
 use movie::{Encoder, Format, Settings};
 use numbered::Pattern;
@@ -75,7 +78,7 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
     let format = if output == Path::new("-") { Some(Format::Y4m) } else { Format::of(output) };
     let scene = input.scene()?;
     if let Some(format) = format {
-        return movie(arguments, &scene, format, frames, progress);
+        return movie(arguments, scene, format, frames, progress);
     }
     let pattern = Pattern::parse(output).ok_or_else(|| {
         let allowed = "numbered images (frame-%04d.png, frame-####.png), a movie (.apng, .gif, .y4m), or -";
@@ -83,16 +86,24 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
     })?;
     Image::check_format(output)?;
     let wanted = frames.len();
+    let named = frames.clone().map(|frame| ("--output", pattern.path(frame)));
+    let outputs = Outputs::distinct(named, false)?;
+    outputs.refuse(&input.files(&scene))?;
     let frames: Vec<u32> = frames.filter(|&frame| *overwrite || !pattern.path(frame).exists()).collect();
     log::info!("{} of {wanted} frames are there already", wanted - frames.len());
-    draw(arguments, &scene, &frames, progress, |frame, image| {
+    frames.iter().try_for_each(|&frame| outputs::check_writable(&pattern.path(frame)))?;
+    if frames.is_empty() {
+        return Ok(());
+    }
+    let shown = Shown::load(arguments, scene, &outputs)?;
+    shown.draw(arguments, &frames, progress, |frame, image| {
         Ok(image.save(&pattern.path(frame), arguments.depth.into())?)
     })
 }
 
 fn movie(
     arguments: &Arguments,
-    scene: &Scene,
+    scene: Scene,
     format: Format,
     frames: Range<u32>,
     progress: bool,
@@ -108,48 +119,64 @@ fn movie(
     };
     format.check(&settings).map_err(|message| Failure::Input(format!("{}: {message}", input.name)))?;
     let frames: Vec<u32> = frames.collect();
+    let is_printed = output == Path::new("-");
+    let named = [("--output", output.as_path())];
+    let outputs = Outputs::check(if is_printed { &[] } else { &named }, is_printed, &input.files(&scene))?;
+    // Before anything is written: the files that were read are known then.
+    let shown = Shown::load(arguments, scene, &outputs)?;
     let encode = |to: &mut dyn Write, failed: &dyn Fn(io::Error) -> Failure| {
         let mut encoder = Encoder::new(format, &settings, &mut *to).map_err(failed)?;
-        draw(arguments, scene, &frames, progress, |_, image| encoder.add(image).map_err(failed))?;
+        shown.draw(arguments, &frames, progress, |_, image| encoder.add(image).map_err(failed))?;
         encoder.finish().and_then(|()| to.flush()).map_err(failed)
     };
-    if output == Path::new("-") {
+    if is_printed {
         return encode(&mut io::stdout().lock(), &|error| Failure::Other(format!("standard output: {error}")));
     }
-    let failed = |error: io::Error| Failure::Other(format!("{}: {error}", output.display()));
-    let file = aside(output, &[]).map_err(failed)?;
-    encode(&mut BufWriter::new(file.as_file()), &failed)?;
-    file.persist(output).map_err(|error| failed(error.error))?;
-    Ok(())
+    let failed = outputs::failed(output);
+    let mut file = Target::of(output).and_then(Target::create).map_err(&failed)?;
+    encode(&mut BufWriter::new(&mut file), &failed)?;
+    outputs::commit(vec![file])
 }
 
-/// Draws frames and hands them over, each as if it were the only one.
-fn draw(
-    arguments: &Arguments,
-    scene: &Scene,
-    frames: &[u32],
-    progress: bool,
-    mut take: impl FnMut(u32, &Image) -> Result<(), Failure>,
-) -> Result<(), Failure> {
-    if frames.is_empty() {
-        return Ok(());
+/// What is on every frame.
+struct Shown {
+    scene: Scene,
+    volume: Volume,
+    overlay: Overlay,
+}
+
+impl Shown {
+    fn load(arguments: &Arguments, mut scene: Scene, outputs: &Outputs) -> Result<Self, Failure> {
+        let Arguments { input, annotate, .. } = arguments;
+        let volume = input.load_volume(&scene, outputs)?;
+        input.look_at(&volume, &mut scene)?;
+        let overlay = annotate.overlay(&scene, &volume)?;
+        Ok(Self { scene, volume, overlay })
     }
-    let Arguments { input, annotate, turn, count, .. } = arguments;
-    let (volume, mut scene) = (input.load_volume(scene)?, scene.clone());
-    input.look_at(&volume, &mut scene)?;
-    let overlay = annotate.overlay(&scene, &volume)?;
-    let headless = input.headless(false)?;
-    let mut view = headless.view(volume, &scene).map_err(|error| input.failure(error))?;
-    let mut progress = Progress::new(frames.len(), progress);
-    for &frame in frames {
-        // From where the scene's camera is, whichever frame was drawn before.
-        let camera = scene.camera.turned(turn * f64::from(frame) / f64::from(*count));
-        view.set_camera(camera).map_err(|error| input.failure(RenderError::from(error)))?;
-        let mut rendering = headless.draw(&mut view).map_err(|error| input.failure(error))?;
-        overlay.draw(&mut rendering.image);
-        take(frame, &rendering.image)?;
-        log_frame(&format!("frame {frame}"), &rendering.stats);
-        progress.step();
+
+    /// Draws frames and hands them over, each as if it were the only one.
+    fn draw(
+        self,
+        arguments: &Arguments,
+        frames: &[u32],
+        progress: bool,
+        mut take: impl FnMut(u32, &Image) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let Arguments { input, turn, count, .. } = arguments;
+        let Self { scene, volume, overlay } = self;
+        let headless = input.headless(false)?;
+        let mut view = headless.view(volume, &scene).map_err(|error| input.failure(error))?;
+        let mut progress = Progress::new(frames.len(), progress);
+        for &frame in frames {
+            // From where the scene's camera is, whichever frame was drawn before.
+            let camera = scene.camera.turned(turn * f64::from(frame) / f64::from(*count));
+            view.set_camera(camera).map_err(|error| input.failure(RenderError::from(error)))?;
+            let mut rendering = headless.draw(&mut view).map_err(|error| input.failure(error))?;
+            overlay.draw(&mut rendering.image);
+            take(frame, &rendering.image)?;
+            log_frame(&format!("frame {frame}"), &rendering.stats);
+            progress.step();
+        }
+        Ok(())
     }
-    Ok(())
 }

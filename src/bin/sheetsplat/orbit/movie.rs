@@ -34,7 +34,7 @@ pub(super) enum Encoder<W: Write> {
 
 impl Format {
     pub(super) fn of(path: &Path) -> Option<Self> {
-        match path.extension()?.to_str()? {
+        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "apng" => Some(Self::Apng),
             "gif" => Some(Self::Gif),
             "y4m" => Some(Self::Y4m),

@@ -12,6 +12,7 @@ use sheetsplat::scene::Scene;
 use crate::annotate::Annotate;
 use crate::arguments::{Depth, Input, log_frame};
 use crate::failure::Failure;
+use crate::outputs::{self, Outputs};
 use crate::progress::Progress;
 use axis::{Axis, swept};
 use sheet::{Layout, Tile};
@@ -67,8 +68,10 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
         let allowed = format!("sheets of at most {LARGEST} pixels a side");
         Failure::Input(format!("{}: found {count} tiles in rows of {columns}, allowed: {allowed}", output.display()))
     })?;
-    let tiles = draw(arguments, scenes, progress)?;
-    Ok(layout.draw(&tiles).save(output, arguments.depth.into())?)
+    let inputs: Vec<_> = scenes.iter().flat_map(|(scene, _)| input.files(scene)).collect();
+    let outputs = Outputs::check(&[("--output", output)], false, &inputs)?;
+    let tiles = draw(arguments, scenes, &outputs, progress)?;
+    outputs::write(&[(output, layout.draw(&tiles).encode(output, arguments.depth.into())?)], &[])
 }
 
 fn check(axes: &[Axis], arguments: &Arguments) -> Result<(), Failure> {
@@ -110,7 +113,12 @@ fn combinations(axes: &[Axis]) -> Vec<Vec<String>> {
 }
 
 /// Draws every scene; a volume is loaded again only where another one is asked for.
-fn draw(arguments: &Arguments, scenes: Vec<(Scene, Vec<String>)>, progress: bool) -> Result<Vec<Tile>, Failure> {
+fn draw(
+    arguments: &Arguments,
+    scenes: Vec<(Scene, Vec<String>)>,
+    outputs: &Outputs,
+    progress: bool,
+) -> Result<Vec<Tile>, Failure> {
     let Arguments { input, annotate, .. } = arguments;
     let headless = input.headless(false)?;
     let mut progress = Progress::new(scenes.len(), progress);
@@ -121,7 +129,7 @@ fn draw(arguments: &Arguments, scenes: Vec<(Scene, Vec<String>)>, progress: bool
             |last: &Scene| (&last.volume, last.spacing, &last.labels) == (&scene.volume, scene.spacing, &scene.labels);
         let volume = match last {
             Some((last, volume)) if is_same(&last) => volume,
-            _ => Arc::new(input.load_volume(&scene)?),
+            _ => Arc::new(input.load_volume(&scene, outputs)?),
         };
         input.look_at(&volume, &mut scene)?;
         let overlay = annotate.overlay(&scene, &volume)?;

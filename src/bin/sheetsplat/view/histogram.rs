@@ -10,11 +10,11 @@ pub(super) struct Histogram {
 }
 
 impl Histogram {
-    /// Of values within a range that has an extent.
+    /// Of the finite values, within a range that has an extent.
     pub(super) fn new(values: &[f32], [lo, hi]: [f64; 2]) -> Self {
         let mut counts = [0_u64; BINS];
         let scale = BINS as f64 / (hi - lo);
-        for &value in values {
+        for &value in values.iter().filter(|value| !value.is_nan()) {
             counts[(((f64::from(value) - lo) * scale) as usize).min(BINS - 1)] += 1;
         }
         let logarithm = |count: u64| (count as f64).ln_1p();
@@ -23,8 +23,9 @@ impl Histogram {
     }
 }
 
-/// The least and the largest value.
+/// The least and the largest finite value.
 pub(super) fn extent(values: &[f32]) -> [f64; 2] {
+    // `f32::min` and `f32::max` leave out holes.
     let (lo, hi) = values.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), &v| (lo.min(v), hi.max(v)));
     [lo.into(), hi.into()]
 }
@@ -35,7 +36,7 @@ mod tests {
 
     #[test]
     fn bars_stand_where_the_values_are_and_grow_with_the_logarithm() {
-        let values: Vec<f32> = [vec![10.0; 999], vec![20.0; 9], vec![15.1; 99]].concat();
+        let values: Vec<f32> = [vec![f32::NAN; 9999], vec![10.0; 999], vec![20.0; 9], vec![15.1; 99]].concat();
         assert_eq!(extent(&values), [10.0, 20.0]);
         let Histogram { heights } = Histogram::new(&values, extent(&values));
         assert_eq!(heights.len(), BINS);

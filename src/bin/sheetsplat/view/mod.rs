@@ -20,6 +20,7 @@ use sheetsplat::image::Image;
 
 use crate::arguments::Input;
 use crate::failure::Failure;
+use crate::outputs::Outputs;
 use app::App;
 
 #[derive(clap::Args)]
@@ -53,7 +54,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         Image::check_format(path)?;
     }
     let mut scene = arguments.input.scene()?;
-    let volume = arguments.input.load_volume(&scene)?;
+    let named: Vec<_> = arguments.screenshot.iter().map(|path| ("--screenshot", path.as_path())).collect();
+    let outputs = Outputs::check(&named, false, &arguments.input.files(&scene))?;
+    let volume = arguments.input.load_volume(&scene, &outputs)?;
     arguments.input.look_at(&volume, &mut scene)?;
 
     let title = format!("{} - sheetsplat", arguments.input.name);

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use eframe::egui::{ColorImage, Rect};
-use sheetsplat::image::{Image, write_aside};
+use sheetsplat::image::{Image, output};
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::TransferFunction;
 use sheetsplat::volume::Volume;
@@ -13,7 +13,7 @@ use crate::failure::Failure;
 /// The first of `sheetsplat-1.png`, `sheetsplat-2.png`, …, or another extension, that is not in the current folder yet.
 pub(super) fn free_name(extension: &str) -> PathBuf {
     let mut names = (1_u32..).map(|number| PathBuf::from(format!("sheetsplat-{number}.{extension}")));
-    names.find(|name| !name.exists()).unwrap_or_default()
+    names.find(|name| name.symlink_metadata().is_err()).unwrap_or_default()
 }
 
 /// Saves a scene as it is shown, with another transfer function than it came with.
@@ -25,7 +25,7 @@ pub(super) fn save_scene(
 ) -> Result<(), Failure> {
     let scene = Scene { transfer: transfer.clone().into(), ..scene.clone() };
     let text = scene.explicit(volume).to_toml(path.parent().unwrap_or(Path::new("")))?;
-    write_aside(path, text.as_bytes()).map_err(|error| Failure::Other(format!("{}: {error}", path.display())))
+    output::write(path, text.as_bytes()).map_err(|error| Failure::Other(format!("{}: {error}", path.display())))
 }
 
 /// The pixels of the window, or of a part of it, given in pixels.

@@ -1,4 +1,10 @@
 // The sheets that a thread of the tile rasteriser holds, and how they are composited.
+//
+// Needs gather.wgsl: COMPOSITING, CUT, FIRST_HIT, ORDER, TILE_THREADS, cut.
+// Needs shared/compositing.wgsl: composite.
+// Needs shared/cut.wgsl: noted, shown.
+// Needs shared/frame.wgsl: FRONT_TO_BACK, MINIMUM, SURFACE, frame.
+// Needs shared/means.wgsl: Means, is_by_means, means.
 
 // The four sheets of a group at a thread's four pixels: red, green, blue and alpha columns.
 struct Sheets {

@@ -1,4 +1,6 @@
 // What the tile rasteriser is given and what it counts; `gpu::layout` documents the fields.
+//
+// Needs shared/tally.wgsl: Tally.
 struct Gather {
     along: array<vec4f, 4>,
     chord: array<vec4f, 2>,

@@ -1,5 +1,19 @@
 // The voxels that a subgroup of the tile rasteriser draws in a sheet group: which of those before stay, which come, their shading, and
 // their counts.
+//
+// Needs gather.wgsl: ECONOMIES, ORDER, PARALLELOGRAM, PASSES_PER_FIND, PASSES_PER_SHADING, PERSPECTIVE, SHEETS, bricks, color_ramp, drawn, first_px, gather, gathered, gradient_opacity_ramp, group, lane, lanes, opacity_ramp, open, passes, shallow.
+// Needs gather/kernel.wgsl: footprint_at.
+// Needs gather/queue.wgsl: WHOLE_SHIFT, enqueue, queue_amounts, queue_count, queue_first, queue_points, queue_size, queue_units.
+// Needs gather/ramps.wgsl: is_long, ramp_at.
+// Needs gather/region.wgsl: bounds_of, units_in_box, units_in_parallelogram.
+// Needs gather/walk.wgsl: Found, Sought, next_voxels.
+// Needs shared/brick.wgsl: BRICK_VOXELS, voxel_of.
+// Needs shared/frame.wgsl: BOX_SLACK, FRONT_TO_BACK, frame.
+// Needs shared/local_ray.wgsl: sections_on_screen.
+// Needs shared/project.wgsl: overlapped, project.
+// Needs shared/ramps.wgsl: LABELS, ramp, ramps_of.
+// Needs shared/shading.wgsl: lighting, shade.
+// Needs shared/volume.wgsl: gradient_at, index_of, value_at.
 
 // A group of sheets: its number, its first sheet, where that begins, and half the box around its footprints.
 struct SheetGroup {

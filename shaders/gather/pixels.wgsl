@@ -1,4 +1,9 @@
 // The pixels of a thread of the tile rasteriser, in the compositing buffer and among first hits.
+//
+// Needs gather.wgsl: CUT, acc, gather, gathered, part.
+// Needs gather/region.wgsl: unit_word.
+// Needs gather/sheets.wgsl: hits, shown_from, shown_to.
+// Needs shared/frame.wgsl: frame.
 
 // A thread's four pixels.
 struct Pixels {

@@ -1,4 +1,8 @@
 // Kernels as the tile rasteriser gathers them: in closed form, by polynomials instead of tables (eq. 3).
+//
+// Needs gather.wgsl: ECONOMIES, PERSPECTIVE, gather.
+// Needs shared/frame.wgsl: frame.
+// Needs shared/local_ray.wgsl: SectionMaps, local_ray, near_cut, section_maps.
 
 // A voxel's kernel as the pixels see it.
 struct Footprint {

@@ -1,5 +1,7 @@
 // The pixels of a tile that are not opaque (§6): a word for each of its four units, with the unit's rows in eight bits each. Units are
 // numbered row by row.
+//
+// Needs gather.wgsl: gather, lane, lanes.
 
 // Pixels across a tile.
 const TILE_WIDTH = 16u;

@@ -2,18 +2,29 @@
 
 use std::io::{self, BufRead, Read};
 
-use super::super::samples::SampleType;
+use super::samples::SampleType;
 
 /// No number is written with more bytes.
 const MAX_TOKEN: usize = 64;
 
-/// The numbers in a text, as the bytes of samples in the machine's byte order. The text ends at an XML tag, at one of the words that
-/// begin what may follow in the older files, or with the file.
+/// What ends a text of numbers besides the end of the file.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum TextEnd {
+    /// Nothing else.
+    File,
+    /// An XML tag.
+    #[cfg(feature = "vtk")]
+    Tag,
+    /// One of these words, which begin what may follow.
+    #[cfg(feature = "vtk")]
+    Words(&'static [&'static str]),
+}
+
+/// The numbers in a text, as the bytes of samples in the machine's byte order.
 pub(super) struct Numbers<R> {
     reader: R,
     kind: SampleType,
-    /// Words that end the text.
-    keywords: &'static [&'static str],
+    end: TextEnd,
     token: Vec<u8>,
     samples: Vec<u8>,
     /// How many bytes of `samples` are read.
@@ -22,8 +33,8 @@ pub(super) struct Numbers<R> {
 }
 
 impl<R: BufRead> Numbers<R> {
-    pub(super) fn new(reader: R, kind: SampleType, keywords: &'static [&'static str]) -> Self {
-        Self { reader, kind, keywords, token: Vec::new(), samples: Vec::new(), read: 0, has_ended: false }
+    pub(super) fn new(reader: R, kind: SampleType, end: TextEnd) -> Self {
+        Self { reader, kind, end, token: Vec::new(), samples: Vec::new(), read: 0, has_ended: false }
     }
 
     /// Turns what is in the reader's buffer into samples, but for a number that may go on.
@@ -44,7 +55,8 @@ impl<R: BufRead> Numbers<R> {
         let buffer = buffer.to_vec();
         for &byte in &buffer {
             match byte {
-                b'<' => self.has_ended = true,
+                #[cfg(feature = "vtk")]
+                b'<' if matches!(self.end, TextEnd::Tag) => self.has_ended = true,
                 byte if !byte.is_ascii_whitespace() => {
                     self.token.push(byte);
                     if self.token.len() > MAX_TOKEN {
@@ -69,10 +81,11 @@ impl<R: BufRead> Numbers<R> {
         }
         let text = str::from_utf8(&self.token).unwrap_or_default();
         if self.kind.parse(text, &mut self.samples).is_none() {
-            if !self.keywords.contains(&text) {
-                return Err(self.no_number());
+            match self.end {
+                #[cfg(feature = "vtk")]
+                TextEnd::Words(words) if words.contains(&text) => self.has_ended = true,
+                _ => return Err(self.no_number()),
             }
-            self.has_ended = true;
         }
         self.token.clear();
         Ok(())
@@ -94,7 +107,7 @@ impl<R: BufRead> Read for Numbers<R> {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "vtk"))]
 #[expect(clippy::unwrap_used, reason = "tests")]
 mod tests {
     use std::io::BufReader;
@@ -102,10 +115,11 @@ mod tests {
     use super::*;
 
     fn bytes(text: &str, kind: SampleType) -> io::Result<Vec<u8>> {
+        let end = if text.contains('<') { TextEnd::Tag } else { TextEnd::Words(&["METADATA"]) };
         let mut bytes = Vec::new();
         // A buffer that ends within numbers.
         let text = format!("{text}\n");
-        let mut numbers = Numbers::new(BufReader::with_capacity(3, text.as_bytes()), kind, &["METADATA"]);
+        let mut numbers = Numbers::new(BufReader::with_capacity(3, text.as_bytes()), kind, end);
         numbers.read_to_end(&mut bytes)?;
         Ok(bytes)
     }
@@ -122,7 +136,8 @@ mod tests {
 
     #[test]
     fn a_number_that_may_go_on_is_none() {
-        let message = Numbers::new("1 23".as_bytes(), SampleType::U8, &[]).read_to_end(&mut Vec::new()).unwrap_err();
+        let message =
+            Numbers::new("1 23".as_bytes(), SampleType::U8, TextEnd::File).read_to_end(&mut Vec::new()).unwrap_err();
         assert!(message.to_string().contains("the end of the file after a digit"), "{message}");
     }
 

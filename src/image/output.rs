@@ -1,0 +1,215 @@
+//! Files while they are written: a regular file appears whole or not at all, a pipe or a device is written to as it is.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File, Metadata, OpenOptions, Permissions};
+use std::io::{self, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use tempfile::TempPath;
+
+/// Symbolic links in a row, as on Linux.
+const MAX_LINKS: usize = 40;
+
+/// Temporary files by their own names, removed when they are dropped. The lock is held while one is created, renamed or removed, so
+/// that whoever holds it knows all of them.
+static TEMPORARY: Mutex<BTreeMap<PathBuf, TempPath>> = Mutex::new(BTreeMap::new());
+
+fn temporary() -> MutexGuard<'static, BTreeMap<PathBuf, TempPath>> {
+    TEMPORARY.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes the temporary files of all outputs. While the result lives, no output can be created or committed.
+pub fn remove_temporary() -> impl Sized {
+    let mut temporary = temporary();
+    temporary.clear();
+    temporary
+}
+
+/// What a path leads to, links followed.
+pub enum Target {
+    /// A regular file, or none yet, and the permissions of the one that is there.
+    Regular(PathBuf, Option<Permissions>),
+    /// A pipe or a device.
+    Stream(PathBuf),
+    /// What standard output or standard error is connected to.
+    Standard(File),
+}
+
+impl Target {
+    /// Finds out what a path leads to, without opening a pipe or a device.
+    ///
+    /// # Errors
+    /// If it leads to a folder, a socket, a file that may not be written, or into a folder that is not there.
+    pub fn of(path: &Path) -> io::Result<Self> {
+        let metadata = match fs::metadata(path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => {
+                let path = resolved(path)?;
+                fs::metadata(folder(&path))?;
+                return Ok(Self::Regular(path, None));
+            }
+            metadata => metadata?,
+        };
+        if metadata.is_dir() {
+            return Err(ErrorKind::IsADirectory.into());
+        }
+        if let Some(standard) = standard(&metadata)? {
+            return Ok(Self::Standard(standard));
+        }
+        if metadata.is_file() {
+            // A rename would replace it, whether it may be written or not.
+            OpenOptions::new().write(true).open(path)?;
+            return Ok(Self::Regular(fs::canonicalize(path)?, Some(metadata.permissions())));
+        }
+        if is_socket(&metadata) {
+            let message = "found a socket, allowed: a regular file, a pipe or a device";
+            return Err(io::Error::new(ErrorKind::InvalidInput, message));
+        }
+        Ok(Self::Stream(path.to_owned()))
+    }
+
+    /// Whether what is written is there at once, and cannot be taken back.
+    pub fn is_stream(&self) -> bool {
+        !matches!(self, Self::Regular(..))
+    }
+
+    /// Opens a pipe or a device, which may wait for its reader, or creates a temporary file beside a regular file.
+    ///
+    /// # Errors
+    /// What the operating system says.
+    pub fn create(self) -> io::Result<Output> {
+        match self {
+            Self::Regular(path, permissions) => Output::aside(path, permissions),
+            Self::Stream(path) => Ok(Output { file: OpenOptions::new().write(true).open(path)?, aside: None }),
+            Self::Standard(file) => Ok(Output { file, aside: None }),
+        }
+    }
+}
+
+/// A file that is being written.
+pub struct Output {
+    file: File,
+    aside: Option<Aside>,
+}
+
+/// A temporary file, and the path that it is to be renamed to.
+struct Aside {
+    temporary: PathBuf,
+    target: PathBuf,
+}
+
+impl Output {
+    fn aside(target: PathBuf, permissions: Option<Permissions>) -> io::Result<Self> {
+        let mut builder = tempfile::Builder::new();
+        // Temporary files are private by default; an image is as readable as any file the user makes, or as the one it replaces.
+        #[cfg(unix)]
+        builder.permissions(permissions.clone().unwrap_or(std::os::unix::fs::PermissionsExt::from_mode(0o666)));
+        let mut all = temporary();
+        let (file, path) = builder.prefix(".sheetsplat-").tempfile_in(folder(&target))?.into_parts();
+        let aside = Aside { temporary: path.to_path_buf(), target };
+        all.insert(aside.temporary.clone(), path);
+        drop(all);
+        let output = Self { file, aside: Some(aside) };
+        if let Some(permissions) = permissions {
+            // The process's mask may have taken some away.
+            output.file.set_permissions(permissions)?;
+        }
+        Ok(output)
+    }
+
+    /// Renames the temporary files of outputs, all that were written whole, to their own names.
+    ///
+    /// # Errors
+    /// What the operating system says of one of them; those after it are not renamed.
+    pub fn commit(outputs: Vec<Self>) -> Result<(), (PathBuf, io::Error)> {
+        let mut all = temporary();
+        for Aside { temporary, target } in outputs.iter().filter_map(|output| output.aside.as_ref()) {
+            if let Some(path) = all.remove(temporary) {
+                path.persist(target).map_err(|error| (target.clone(), error.error))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Write for Output {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Drop for Output {
+    /// Removes a temporary file that was not committed.
+    fn drop(&mut self) {
+        if let Some(aside) = &self.aside {
+            temporary().remove(&aside.temporary);
+        }
+    }
+}
+
+/// Writes a whole file.
+///
+/// # Errors
+/// What the operating system says.
+pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut output = Target::of(path)?.create()?;
+    output.write_all(bytes)?;
+    Output::commit(vec![output]).map_err(|(_, error)| error)
+}
+
+/// A path whose last part is no symbolic link, also where the link leads to nothing yet.
+///
+/// # Errors
+/// If there are too many links, or one cannot be read.
+pub fn resolved(path: &Path) -> io::Result<PathBuf> {
+    let mut path = path.to_owned();
+    for _ in 0..MAX_LINKS {
+        match fs::symlink_metadata(&path) {
+            Ok(metadata) if metadata.is_symlink() => path = folder(&path).join(fs::read_link(&path)?),
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
+            _ => return Ok(path),
+        }
+    }
+    Err(io::Error::other("too many symbolic links"))
+}
+
+/// The folder that a file is in.
+pub fn folder(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Standard output or standard error, if that is the file: a file that another program opened is written on where it stands, as
+/// `/dev/stdout` is meant.
+#[cfg(unix)]
+fn standard(metadata: &Metadata) -> io::Result<Option<File>> {
+    use std::os::fd::AsFd;
+    use std::os::unix::fs::MetadataExt;
+    let (output, error) = (io::stdout(), io::stderr());
+    for stream in [output.as_fd(), error.as_fd()] {
+        let file = File::from(stream.try_clone_to_owned()?);
+        let other = file.metadata()?;
+        if (other.dev(), other.ino()) == (metadata.dev(), metadata.ino()) {
+            return Ok(Some(file));
+        }
+    }
+    Ok(None)
+}
+
+#[cfg(not(unix))]
+fn standard(_: &Metadata) -> io::Result<Option<File>> {
+    Ok(None)
+}
+
+#[cfg(unix)]
+fn is_socket(metadata: &Metadata) -> bool {
+    std::os::unix::fs::FileTypeExt::is_socket(&metadata.file_type())
+}
+
+#[cfg(not(unix))]
+fn is_socket(_: &Metadata) -> bool {
+    false
+}

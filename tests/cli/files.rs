@@ -1,0 +1,399 @@
+//! The files that a run writes: never those it reads, whole or not at all, and nothing else.
+#![cfg(unix)]
+
+use std::fs::{File, OpenOptions, Permissions};
+use std::io::Read;
+use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt, symlink};
+use std::os::unix::net::UnixListener;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::process::{Child, ExitStatus, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use sheetsplat::image::{Image, PngDepth};
+
+use crate::*;
+
+/// The first thing that needs a device fails by this: what is refused before is refused in time.
+const NO_DEVICE: &str = "--adapter Voodoo";
+
+/// Files of every kind that a run may read.
+fn with_inputs() -> Folder {
+    let folder = Folder::new();
+    folder.write_nrrd("a.nrrd", [2, 2, 2], [1.0, 1.0, 1.0], &[0.0, 1.0, 2.0, 3.0, 3.0, 3.0, 0.0, 0.0]);
+    let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\ndata file: nrrd.raw\n";
+    folder.write("a.nhdr", header);
+    folder.write("nrrd.raw", [0, 1, 2, 3, 4, 5, 6, 7]);
+    let header = "NDims = 3\nDimSize = 2 2 2\nElementType = MET_UCHAR\nElementDataFile = meta.raw\n";
+    folder.write("a.mhd", header);
+    folder.write("meta.raw", [0, 1, 2, 3, 4, 5, 6, 7]);
+    let array = b"\x93NUMPY\x01\x00\x46\x00{'descr': '|u1', 'fortran_order': False, 'shape': (2, 2, 2)}";
+    let padding = [vec![b' '; 70 - (array.len() - 10) - 1], b"\n".to_vec()].concat();
+    for name in ["a.npy", "a-1.npy"] {
+        folder.write(name, [array.as_slice(), &padding, &[0, 1, 2, 3, 4, 5, 6, 7]].concat());
+    }
+    folder.write("scene.toml", "[volume]\npath = \"a.nrrd\"\nlabels = \"labels.nrrd\"\n");
+    fs::copy(folder.path("a.nrrd"), folder.path("labels.nrrd")).unwrap();
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
+    for series in ["slices", "series"] {
+        fs::create_dir(folder.path(series)).unwrap();
+        for entry in fs::read_dir(fixtures.join(series)).unwrap() {
+            let path = entry.unwrap().path();
+            fs::copy(&path, folder.path(series).join(path.file_name().unwrap())).unwrap();
+        }
+    }
+    for name in ["pair.hdr", "pair.img"] {
+        fs::copy(fixtures.join(name), folder.path(name)).unwrap();
+    }
+    let image = Image { width: 2, height: 2, pixels: vec![[0.5, 0.25, 0.125, 1.0]; 4] };
+    image.save(&folder.path("image.png"), PngDepth::Eight).unwrap();
+    symlink(".", folder.path("here")).unwrap();
+    folder
+}
+
+/// Refused for the sake of a file, which is as it was.
+fn assert_refused(folder: &Folder, arguments: &str, words: &[&str], kept: &str) {
+    let (before, names) = (folder.read(kept), folder.names());
+    folder.run(arguments).assert_failure(2, &[words, &["allowed: another file"]].concat());
+    assert_eq!(folder.read(kept), before, "{arguments}: {kept}");
+    assert_eq!(folder.names(), names, "{arguments}: files");
+}
+
+#[test]
+fn no_output_is_an_input() {
+    let folder = with_inputs();
+    for (arguments, option, input) in [
+        ("render a.npy -o a.npy", "--output", "a.npy"),
+        ("render a.npy -o here/here/a.npy", "--output", "a.npy"),
+        ("render a.nrrd -o a.png --stats here/a.nrrd", "--stats", "a.nrrd"),
+        ("render scene.toml -o a.png --save-scene scene.toml", "--save-scene", "scene.toml"),
+        ("render scene.toml -o a.png --stats a.nrrd", "--stats", "a.nrrd"),
+        ("render scene.toml -o a.png --stats labels.nrrd", "--stats", "labels.nrrd"),
+        ("render a.nrrd -o a.png --set volume.labels=labels.nrrd --stats labels.nrrd", "--stats", "labels.nrrd"),
+        ("render a.nhdr -o a.png --stats a.nhdr", "--stats", "a.nhdr"),
+        ("render a.nhdr -o a.png --stats nrrd.raw", "--stats", "nrrd.raw"),
+        ("render a.mhd -o a.png --stats meta.raw", "--stats", "meta.raw"),
+        ("render pair.hdr -o a.png --stats pair.img", "--stats", "pair.img"),
+        ("render pair.img -o a.png --stats pair.hdr", "--stats", "pair.hdr"),
+        ("render meta.raw --dims 2,2,2 --type uint8 -o a.png --stats meta.raw", "--stats", "meta.raw"),
+        ("render slices -o a.png --stats slices/z9.tif", "--stats", "slices/z9.tif"),
+        ("render series -o a.png --stats series/IM1", "--stats", "series/IM1"),
+        ("orbit a-1.npy -o a-%d.npy --overwrite", "--output", "a-1.npy"),
+        ("orbit a-1.npy -o a-%d.npy", "--output", "a-1.npy"),
+        ("sweep a.npy -o a.npy --set splatting.slab_width=1,2", "--output", "a.npy"),
+        ("sweep a.nrrd -o a.npy --set volume.path=a.nrrd,a.npy", "--output", "a.npy"),
+    ] {
+        assert_refused(&folder, &format!("{arguments} {NO_DEVICE}"), &[option, "the input", input], input);
+    }
+    assert_refused(&folder, "compare image.png image.png --difference here/image.png", &["--difference"], "image.png");
+    // What is beside the slices may be written.
+    folder.render("series -o series/a.png --set image={width=8,height=8}");
+    folder.render("series -o series/a.png --set image={width=8,height=8}");
+}
+
+#[test]
+fn an_input_by_another_name_is_no_output() {
+    let folder = with_inputs();
+    fs::hard_link(folder.path("a.nrrd"), folder.path("hard.gif")).unwrap();
+    fs::hard_link(folder.path("nrrd.raw"), folder.path("hard.png")).unwrap();
+    symlink("here/a.nrrd", folder.path("soft.apng")).unwrap();
+    symlink("image.png", folder.path("soft.png")).unwrap();
+    for (arguments, kept) in [
+        ("orbit a.nrrd -o hard.gif", "a.nrrd"),
+        ("orbit here/a.nrrd -o soft.apng", "a.nrrd"),
+        ("orbit scene.toml -o hard.gif", "a.nrrd"),
+        ("render a.nhdr -o hard.png", "nrrd.raw"),
+    ] {
+        assert_refused(&folder, &format!("{arguments} {NO_DEVICE}"), &["--output", "the input"], kept);
+    }
+    // One tile's volume is loaded after another.
+    let sweep = "sweep a.nrrd -o hard.png --set volume.path=a.nrrd,a.nhdr";
+    assert_refused(&folder, sweep, &["--output", "the input"], "nrrd.raw");
+    assert_refused(&folder, "compare image.png image.png --difference soft.png", &["--difference"], "image.png");
+}
+
+#[test]
+fn two_outputs_are_two_files() {
+    let folder = with_inputs();
+    folder.write("old.png", "old");
+    symlink("old.png", folder.path("soft")).unwrap();
+    symlink("new.png", folder.path("dangling")).unwrap();
+    for arguments in ["-o old.png --stats soft", "-o old.png --stats here/old.png", "-o new.png --stats dangling"] {
+        let words = ["--stats", "the file of --output"];
+        assert_refused(&folder, &format!("render a.nrrd {arguments} {NO_DEVICE}"), &words, "old.png");
+    }
+    let twice = "-o old.png --stats s.toml --save-scene here/s.toml";
+    let words = ["--save-scene", "s.toml", "the file of --stats"];
+    assert_refused(&folder, &format!("render a.nrrd {twice} {NO_DEVICE}"), &words, "old.png");
+    let frames = "orbit a.nrrd -o soft-%d.png --count 2 --overwrite";
+    symlink("soft-1.png", folder.path("soft-0.png")).unwrap();
+    assert_refused(&folder, &format!("{frames} {NO_DEVICE}"), &["--output", "soft-1.png"], "old.png");
+}
+
+/// Runs with standard output going to a file, whose end it is written to.
+fn run_into(folder: &Folder, file: &str, arguments: &str) -> (Option<i32>, String) {
+    let file = OpenOptions::new().append(true).create(true).open(folder.path(file)).unwrap();
+    let output = folder.command(arguments).stdout(file).output().unwrap();
+    (output.status.code(), String::from_utf8(output.stderr).unwrap())
+}
+
+#[test]
+fn standard_output_is_an_output() {
+    let folder = with_inputs();
+    for (arguments, input) in [
+        (format!("info a.nrrd {NO_DEVICE}"), "a.nrrd"),
+        (format!("bench scene.toml {NO_DEVICE}"), "labels.nrrd"),
+        ("orbit a.nhdr -o -".to_owned(), "nrrd.raw"),
+        (format!("render a.nrrd -o a.png --profile {NO_DEVICE}"), "a.nrrd"),
+        (format!("render a.nrrd -o image.png --profile {NO_DEVICE}"), "image.png"),
+        ("compare image.png image.png".to_owned(), "image.png"),
+    ] {
+        let (before, names) = (folder.read(input), folder.names());
+        let (code, stderr) = run_into(&folder, input, &arguments);
+        assert_eq!(code, Some(2), "{arguments}: {stderr}");
+        assert!(stderr.contains("standard output") && stderr.contains(input), "{arguments}: {stderr}");
+        assert_eq!(folder.read(input), before, "{arguments}");
+        assert_eq!(folder.names(), names, "{arguments}");
+    }
+    // What stands in a file already stays there. By a link of our own: who may replace /dev/stdout must not lose it to a bug.
+    folder.write("log", "before\n");
+    symlink("/proc/self/fd/1", folder.path("printed")).unwrap();
+    let (code, stderr) = run_into(&folder, "log", &format!("render {SMALL} -o a.png --stats printed"));
+    assert_eq!(code, Some(0), "{stderr}");
+    let log = String::from_utf8(folder.read("log")).unwrap();
+    let stats: Value = serde_json::from_str(log.strip_prefix("before\n").unwrap()).unwrap();
+    assert_eq!(stats["width"], 27);
+}
+
+#[test]
+fn pipes_and_devices_are_written_to() {
+    let folder = with_inputs();
+    symlink("/proc/self/fd/1", folder.path("printed")).unwrap();
+    let run = folder.run(&format!("render {SMALL} -o a.png --stats printed"));
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert_eq!(serde_json::from_str::<Value>(&run.stdout).unwrap()["width"], 27);
+    assert!(fs::symlink_metadata(folder.path("printed")).unwrap().is_symlink());
+    for (name, arguments) in [
+        ("pipe.npy", format!("render {SMALL} -o pipe.npy")),
+        ("pipe.png", "compare image.png image.png --difference pipe.png".to_owned()),
+        ("pipe.y4m", format!("orbit {SMALL} --count 3 --chroma 444 -o pipe.y4m")),
+    ] {
+        assert!(Command::new("mkfifo").arg(folder.path(name)).status().unwrap().success());
+        let path = folder.path(name);
+        let reader = thread::spawn(move || fs::read(path).unwrap());
+        let run = folder.run(&arguments);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        assert!(fs::symlink_metadata(folder.path(name)).unwrap().file_type().is_fifo(), "{name} was replaced");
+        let plain = arguments.replace("pipe", "plain");
+        assert_eq!(folder.run(&plain).code, Some(0));
+        assert_eq!(reader.join().unwrap(), folder.read(&name.replace("pipe", "plain")), "{name}");
+    }
+}
+
+#[test]
+fn sockets_are_refused() {
+    let folder = with_inputs();
+    let _listener = UnixListener::bind(folder.path("socket.png")).unwrap();
+    for arguments in
+        [&format!("render a.nrrd {NO_DEVICE} -o socket.png"), "compare image.png image.png --difference socket.png"]
+    {
+        folder.run(arguments).assert_failure(2, &["socket.png", "found a socket"]);
+    }
+    assert!(fs::symlink_metadata(folder.path("socket.png")).unwrap().file_type().is_socket());
+}
+
+#[test]
+fn links_stay_and_their_targets_are_replaced() {
+    let folder = with_inputs();
+    fs::create_dir(folder.path("there")).unwrap();
+    folder.write("there/old.png", "old");
+    symlink("there/old.png", folder.path("first.png")).unwrap();
+    symlink("first.png", folder.path("second.png")).unwrap();
+    symlink("there/new.png", folder.path("dangling.png")).unwrap();
+    for (link, target) in [("second.png", "there/old.png"), ("dangling.png", "there/new.png")] {
+        folder.run(&format!("compare image.png image.png --difference {link}"));
+        assert!(fs::symlink_metadata(folder.path(link)).unwrap().is_symlink(), "{link}");
+        assert!(!fs::symlink_metadata(folder.path(target)).unwrap().is_symlink(), "{target}");
+        assert_eq!(image::open(folder.path(target)).unwrap().to_rgba8().dimensions(), (2, 2), "{target}");
+    }
+    symlink("loop.png", folder.path("loop.png")).unwrap();
+    folder.run("compare image.png image.png --difference loop.png").assert_failure(1, &["loop.png", "symbolic link"]);
+}
+
+#[test]
+fn a_file_that_is_replaced_keeps_its_mode() {
+    let folder = with_inputs();
+    for mode in [0o600, 0o640, 0o666, 0o755] {
+        folder.write("out.png", "old");
+        fs::set_permissions(folder.path("out.png"), Permissions::from_mode(mode)).unwrap();
+        let run = folder.run("compare image.png image.png --difference out.png");
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        assert_ne!(folder.read("out.png"), b"old");
+        assert_eq!(fs::metadata(folder.path("out.png")).unwrap().mode() & 0o7777, mode, "{mode:o}");
+    }
+}
+
+/// A run by somebody who may write into the folder, but is not root, who may write everything.
+fn unprivileged(folder: &Folder, arguments: &str) -> Command {
+    fs::set_permissions(folder.path(""), Permissions::from_mode(0o777)).unwrap();
+    if fs::metadata(folder.path("")).unwrap().uid() != 0 {
+        return folder.command(arguments);
+    }
+    // Where others can reach it. By another process: a test that starts a program at that moment would hold the copy open.
+    let program = folder.path("sheetsplat");
+    assert!(Command::new("cp").arg(env!("CARGO_BIN_EXE_sheetsplat")).arg(&program).status().unwrap().success());
+    let mut command = Command::new(program);
+    command.env("WGPU_ADAPTER_NAME", "llvmpipe").args(arguments.split(' ')).current_dir(folder.path(""));
+    command.uid(65534).gid(65534);
+    command
+}
+
+#[test]
+fn a_file_that_may_not_be_written_stays() {
+    let folder = with_inputs();
+    folder.write("out.png", "precious");
+    fs::set_permissions(folder.path("out.png"), Permissions::from_mode(0o444)).unwrap();
+    for arguments in
+        ["compare image.png image.png --difference out.png", &format!("render a.nrrd -o out.png --stats s {NO_DEVICE}")]
+    {
+        let output = unprivileged(&folder, arguments).output().unwrap();
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{arguments}: {stderr}");
+        assert!(stderr.contains("out.png: Permission denied"), "{arguments}: {stderr}");
+        assert_eq!(folder.read("out.png"), b"precious", "{arguments}");
+    }
+}
+
+/// Everything or nothing, whichever cannot be written.
+#[test]
+fn what_cannot_be_printed_leaves_no_file() {
+    let folder = with_inputs();
+    let names = folder.names();
+    let full = || OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let outputs = "-o new.png --stats new.json --save-scene new.toml";
+    for arguments in [
+        format!("render {SMALL} --profile {outputs}"),
+        "compare image.png image.png --difference new.png".to_owned(),
+        "info a.nrrd".to_owned(),
+    ] {
+        let output = folder.command(&arguments).stdout(full()).output().unwrap();
+        assert_fails_to_print(output.status, &String::from_utf8(output.stderr).unwrap(), &arguments);
+        assert_eq!(folder.names(), names, "{arguments}, full");
+
+        let mut child = folder.command(&arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        assert_fails_to_print(output.status, &String::from_utf8(output.stderr).unwrap(), &arguments);
+        assert_eq!(folder.names(), names, "{arguments}, closed");
+    }
+}
+
+/// By somebody who cannot replace a device if it is taken for a file.
+#[test]
+fn a_full_device_leaves_no_file() {
+    let folder = with_inputs();
+    symlink("/dev/full", folder.path("full.png")).unwrap();
+    let arguments = format!("render {SMALL} -o full.png --stats new.json --save-scene new.toml");
+    let mut command = unprivileged(&folder, &arguments);
+    let names = folder.names();
+    let output = command.output().unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
+    assert!(stderr.contains("full.png: No space left"), "{stderr}");
+    assert_eq!(folder.names(), names);
+    assert!(fs::symlink_metadata(folder.path("full.png")).unwrap().is_symlink());
+}
+
+fn assert_fails_to_print(status: ExitStatus, stderr: &str, arguments: &str) {
+    assert_eq!(status.code(), Some(1), "{arguments}: {stderr}");
+    assert!(stderr.contains("standard output: "), "{arguments}: {stderr}");
+}
+
+/// Warnings and errors that nobody can read change nothing else.
+#[test]
+fn a_full_standard_error_is_no_error() {
+    let folder = with_inputs();
+    let full = || OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let status = |arguments: &str| folder.command(arguments).stderr(full()).status().unwrap().code();
+    assert_eq!(status(&format!("render {SMALL} -o out.png -v")), Some(0));
+    assert_eq!(status("render gone.nrrd -o out.png"), Some(2));
+    assert_eq!(status("render a.nrrd"), Some(2));
+}
+
+#[test]
+fn no_temporary_file_outlives_a_signal() {
+    for (signal, number) in [("INT", 2), ("TERM", 15), ("HUP", 1)] {
+        let folder = Folder::new();
+        let mut child = long_orbit(&folder, "").spawn().unwrap();
+        wait_for_temporary(&folder, &mut child);
+        send(signal, &child);
+        assert_eq!(child.wait().unwrap().signal(), Some(number), "ended by the signal itself");
+        assert_eq!(folder.names(), BTreeSet::new(), "{signal}");
+    }
+}
+
+#[test]
+fn signals_that_the_caller_ignores_are_ignored() {
+    let folder = Folder::new();
+    let mut child = long_orbit(&folder, "trap '' INT HUP; ").spawn().unwrap();
+    wait_for_temporary(&folder, &mut child);
+    send("INT", &child);
+    send("HUP", &child);
+    thread::sleep(Duration::from_millis(300));
+    assert!(child.try_wait().unwrap().is_none(), "still drawing");
+    send("TERM", &child);
+    assert_eq!(child.wait().unwrap().signal(), Some(15));
+    assert_eq!(folder.names(), BTreeSet::new());
+}
+
+/// Frames that nobody waits for, from a shell.
+fn long_orbit(folder: &Folder, before: &str) -> Command {
+    let mut command = Command::new("sh");
+    let program = env!("CARGO_BIN_EXE_sheetsplat");
+    let script = format!("{before}exec '{program}' orbit {SMALL} --count 1000000 -o turn.apng");
+    command.args(["-c", &script]).env("WGPU_ADAPTER_NAME", "llvmpipe").current_dir(folder.path(""));
+    command
+}
+
+fn wait_for_temporary(folder: &Folder, child: &mut Child) {
+    let start = Instant::now();
+    while folder.names().is_empty() {
+        assert!(child.try_wait().unwrap().is_none(), "ended by itself");
+        assert!(start.elapsed() < Duration::from_secs(120), "no temporary file");
+        thread::sleep(Duration::from_millis(20));
+    }
+    assert!(folder.names().iter().all(|name| name.starts_with(".sheetsplat-")), "{:?}", folder.names());
+}
+
+fn send(signal: &str, child: &Child) {
+    let status = Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap();
+    assert!(status.success());
+}
+
+#[test]
+fn extensions_are_of_either_case() {
+    let folder = with_inputs();
+    for name in ["A.PNG", "A.EXR", "A.NPY"] {
+        folder.render(&format!("{SMALL} -o {name} --save-scene S.TOML"));
+        assert_eq!(folder.run(&format!("compare {name} {name} --difference D.Png")).code, Some(0), "{name}");
+    }
+    folder.render("S.TOML -o B.PNG");
+    assert_eq!(folder.read("A.PNG"), folder.read("B.PNG"));
+    folder.run(&format!("render {SMALL} -o A.EXR --annotate scale")).assert_failure(2, &["--annotate", "A.EXR"]);
+    let mut start = [0; 4];
+    for (name, magic) in [("A.GIF", b"GIF8"), ("A.APNG", b"\x89PNG"), ("A.Y4M", b"YUV4")] {
+        folder.run(&format!("orbit {SMALL} --count 2 --chroma 444 -o {name}")).assert_success();
+        File::open(folder.path(name)).unwrap().read_exact(&mut start).unwrap();
+        assert_eq!(&start, magic, "{name}");
+    }
+    folder.run(&format!("orbit {SMALL} --count 2 -o F%d.PNG")).assert_success();
+    assert_eq!(folder.read("F0.PNG"), folder.read("A.PNG"));
+    // The data file of a pair goes by the case of its header.
+    for (from, to) in [("pair.hdr", "P.HDR"), ("pair.img", "P.IMG"), ("a.nrrd", "A.NRRD")] {
+        fs::copy(folder.path(from), folder.path(to)).unwrap();
+    }
+    let size = "--set image={width=16,height=12}";
+    for (lower, upper) in [("pair.hdr", "P.HDR"), ("pair.hdr", "P.IMG"), ("a.nrrd", "A.NRRD")] {
+        assert_eq!(folder.pixels(&format!("{upper} {size}")), folder.pixels(&format!("{lower} {size}")), "{upper}");
+    }
+}
