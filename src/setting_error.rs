@@ -178,16 +178,23 @@ impl fmt::Display for Interval {
         let noun = self.noun;
         match (self.min, self.max) {
             (Bound::Unbounded, Bound::Unbounded) => write!(f, "a finite number"),
-            (Bound::Included(min), Bound::Unbounded) => write!(f, "a finite number >= {}", short(min)),
-            (Bound::Excluded(min), Bound::Unbounded) => write!(f, "a finite number > {}", short(min)),
-            (Bound::Unbounded, Bound::Included(max)) => write!(f, "a finite number <= {}", short(max)),
-            (Bound::Unbounded, Bound::Excluded(max)) => write!(f, "a finite number < {}", short(max)),
-            (Bound::Included(min), Bound::Included(max)) => write!(f, "{noun} in [{}, {}]", short(min), short(max)),
-            (Bound::Included(min), Bound::Excluded(max)) => write!(f, "{noun} in [{}, {})", short(min), short(max)),
-            (Bound::Excluded(min), Bound::Included(max)) => write!(f, "{noun} in ({}, {}]", short(min), short(max)),
-            (Bound::Excluded(min), Bound::Excluded(max)) => write!(f, "{noun} in ({}, {})", short(min), short(max)),
+            (Bound::Included(min), Bound::Unbounded) => write!(f, "a finite number >= {}", brief(min)),
+            (Bound::Excluded(min), Bound::Unbounded) => write!(f, "a finite number > {}", brief(min)),
+            (Bound::Unbounded, Bound::Included(max)) => write!(f, "a finite number <= {}", brief(max)),
+            (Bound::Unbounded, Bound::Excluded(max)) => write!(f, "a finite number < {}", brief(max)),
+            (Bound::Included(min), Bound::Included(max)) => write!(f, "{noun} in [{}, {}]", brief(min), brief(max)),
+            (Bound::Included(min), Bound::Excluded(max)) => write!(f, "{noun} in [{}, {})", brief(min), brief(max)),
+            (Bound::Excluded(min), Bound::Included(max)) => write!(f, "{noun} in ({}, {}]", brief(min), brief(max)),
+            (Bound::Excluded(min), Bound::Excluded(max)) => write!(f, "{noun} in ({}, {})", brief(min), brief(max)),
         }
     }
+}
+
+/// A bound, to two digits if it takes many.
+fn brief(bound: f64) -> String {
+    const LONGEST: usize = 8;
+    let text = short(bound);
+    if text.len() <= LONGEST { text } else { format!("{bound:.1e}") }
 }
 
 /// A number as people write it.
@@ -243,5 +250,7 @@ mod tests {
         assert_eq!(error.to_string(), "camera.up: found [0, 0, 0], allowed: a vector other than [0, 0, 0]");
         let range = Interval::new(Bound::Included(1e-100), Bound::Excluded(0.05));
         assert_eq!(range.of("degrees").to_string(), "degrees in [1e-100, 0.05)");
+        let range = Interval::new(Bound::Included(5.119_999e-23), Bound::Unbounded);
+        assert_eq!(range.to_string(), "a finite number >= 5.1e-23");
     }
 }

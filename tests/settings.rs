@@ -39,6 +39,8 @@ fn perspective(scene: &mut Scene) -> [&mut f64; 3] {
     }
 }
 
+type Change = fn(&mut Scene);
+
 fn share(value: f64) -> Option<Ramp<f64>> {
     Some(Ramp::new(vec![(0.0, value)]).unwrap())
 }
@@ -235,7 +237,7 @@ fn what_does_not_go_together_has_the_same_key_everywhere() {
     let gpu = gpu();
     let volume = builtin::volume("head:16").unwrap();
     let mut view = gpu.view(volume.clone(), &scene()).unwrap();
-    let cases: [(&str, fn(&mut Scene)); 13] = [
+    let cases: [(&str, Change); 13] = [
         ("volume.spacing", |scene| scene.spacing = Some(DVec3::new(1.0, 1.0, 10001.0))),
         ("camera.direction", |scene| scene.camera.direction = DVec3::ZERO),
         ("camera.up", |scene| scene.camera.up = DVec3::ZERO),

@@ -323,7 +323,11 @@ fn typed(value: &Value) -> String {
 /// A value as TOML, on one line of bounded length.
 fn concise(value: &Value) -> String {
     const LONGEST: usize = 80;
-    let text = value.to_string().replace(['\n', '\r'], " ");
+    let text = match value {
+        // TOML's own way writes hundreds of zeros for such numbers.
+        Value::Float(number) if value.to_string().len() > 20 => format!("{number:e}"),
+        _ => value.to_string().replace(['\n', '\r'], " "),
+    };
     match text.char_indices().nth(LONGEST) {
         Some((end, _)) => format!("{}…", &text[..end]),
         None => text,
