@@ -150,8 +150,8 @@ fn what_no_renderer_can_do_is_2() {
             let arguments = format!("render good.nrrd -o out.png --backend {backend} {sets}");
             assert_fails(2, &arguments, &[&["good.nrrd"], words].concat());
         };
-        render("--set camera.height=1e-300", &["camera.height", "1e-300", "5.1e-23"]);
-        render("--set camera.height=1e300", &["camera.height", "1e300", "5.1e27"]);
+        render("--set camera.height=1e-300", &["camera.height", "1e-300", "5.12e-23"]);
+        render("--set camera.height=1e300", &["camera.height", "1e300", "5.12e27"]);
         let deep = "--set volume.spacing=[1,1e4,1] --set splatting.slab_width=0.05";
         render(deep, &["splatting.slab_width", "0.05", "65536 slabs"]);
         let perspective =
