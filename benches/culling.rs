@@ -31,7 +31,7 @@ fn main() {
         let mut view = headless.view(scene.load_volume().unwrap(), &scene).unwrap();
         let mut frame = |on: bool| {
             (scene.splatting.culling, scene.splatting.tiles) = (on, on);
-            view.set_splatting(scene.splatting);
+            view.set_splatting(scene.splatting).unwrap();
             common::timed(&headless, &mut view)
         };
         // The first frame compiles shaders.

@@ -22,7 +22,7 @@ fn main() {
     for round in 0..=rounds {
         for (view, times) in views.iter_mut().zip(&mut times) {
             // Another camera each time, so that buckets are part of the frame.
-            view.turn(1.0);
+            view.turn(1.0).unwrap();
             let (ms, stats) = common::timed(&headless, view);
             // The first round compiles shaders and allocates.
             if round > 0 {

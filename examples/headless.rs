@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let path = folder.join(name);
         rendering.image.save(&path, PngDepth::Eight)?;
         println!("{}: {} kernel sections drawn", path.display(), rendering.stats.counts.sections_rasterized);
-        view.turn(30.0);
+        view.turn(30.0)?;
     }
     Ok(())
 }

@@ -35,15 +35,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let volume = GpuVolume::new(&device, &queue, scene.load_volume()?)?;
     let mut view = SceneView::new(&device, &volume, &scene)?;
 
-    // When something has changed. What can fail is `prepare`.
-    view.set_camera(Camera::from_clip_from_world(clip_from_view * view_from_world, [320, 240])?);
+    // When something has changed. What is not allowed is refused here, what cannot be drawn by `prepare`.
+    view.set_camera(Camera::from_clip_from_world(clip_from_view * view_from_world, [320, 240])?)?;
     renderer.prepare(&device, &queue, &mut view)?;
     let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     renderer.record(&mut encoder, &mut view);
 
     // Every frame, also where nothing has changed: `present`, or `draw` in a pass of the application's.
     let at = Placement { origin: [40, 30], scissor: [0, 0, 640, 480] };
-    renderer.present(&mut encoder, &mut view, &target.create_view(&wgpu::TextureViewDescriptor::default()), at);
+    renderer.present(&mut encoder, &mut view, &target.create_view(&wgpu::TextureViewDescriptor::default()), at)?;
     queue.submit([encoder.finish()]);
     Ok(())
 }

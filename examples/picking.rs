@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut view = headless.view(scene.load_volume()?, &scene)?;
 
     // A pixel's first hit is where its opacity reaches one half.
-    view.set_first_hit(Some(0.5));
+    view.set_first_hit(Some(0.5))?;
     headless.draw(&mut view)?;
     match headless.pick(&view, pixel)? {
         Some(pick) => println!("pixel {pixel:?} shows the point {:.1} at depth {:.1}", pick.position, pick.depth),

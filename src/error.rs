@@ -3,23 +3,19 @@
 use wgpu::Device;
 
 use crate::gpu::fault::DeviceFault;
+use crate::setting_error::SettingError;
 
 /// Why a frame could not be prepared or read back.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
-    /// A scene value that is fine by itself asks of this volume what no renderer can do; or a host's matrix is no camera's.
-    #[error("{key}: found {found}, allowed: {allowed}")]
-    OutOfRange {
-        /// The scene key, or the parameter.
-        key: &'static str,
-        /// What the scene says or leads to.
-        found: String,
-        /// What would do.
-        allowed: String,
-    },
+    /// A setting that is not allowed, or that asks of this volume or device what no renderer can do; or a host's matrix or texture
+    /// that does not fit.
+    #[error(transparent)]
+    OutOfRange(#[from] SettingError),
     /// The frame needs more than a limit of the device allows.
     #[error("{what}: the device's {limit} is {actual}, required: {required}")]
+    #[non_exhaustive]
     Limit {
         /// What needs it (`image.width`, `image.height`, …).
         what: &'static str,
@@ -44,5 +40,5 @@ pub(crate) fn check_device(device: &Device, of: &Device, what: &str) -> Result<(
         return Ok(());
     }
     let (found, allowed) = (format!("another one than that of {what}"), format!("the device of {what}"));
-    Err(RenderError::OutOfRange { key: "device", found, allowed })
+    Err(SettingError::new("device", found, allowed).into())
 }

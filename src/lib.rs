@@ -40,7 +40,7 @@
 //! let scene = Scene::from_volume(VolumeSource::Builtin("head:48".to_owned()), &settings)?;
 //! let headless = Headless::new(&HeadlessOptions::default())?;
 //! let mut view = headless.view(scene.load_volume()?, &scene)?;
-//! view.set_first_hit(Some(0.5));
+//! view.set_first_hit(Some(0.5))?;
 //! headless.draw(&mut view)?;
 //! let pick = headless.pick(&view, [32, 32])?.expect("the head is in the middle");
 //! // The picked point lies on the cut face, to within one voxel, which is 5.3 units long.
@@ -117,6 +117,7 @@ mod rasterizer;
 mod reference;
 mod renderer;
 pub mod scene;
+mod setting_error;
 pub mod settings;
 pub mod stats;
 pub mod volume;
@@ -133,6 +134,7 @@ pub use renderer::pick::{PendingPick, Pick};
 pub use renderer::placement::Placement;
 pub use renderer::scene_view::{Prepared, SceneView};
 pub use scene::Scene;
+pub use setting_error::SettingError;
 pub use settings::Camera;
 pub use stats::Stats;
 pub use volume::Volume;

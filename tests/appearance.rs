@@ -238,7 +238,7 @@ fn the_labels_preset_colours_segments_too() {
     let volume = builtin::volume("head:24").unwrap();
     let text = "transfer.label=[{label = 2, opacity = [[0, 0.5]]}, {label = 0}]";
     let scene = builtin_scene("head:24", &["preset=labels", text]);
-    scene.transfer.check(&volume).unwrap();
+    scene.transfer.check_volume(&volume).unwrap();
     let transfer = scene.transfer.resolve(&volume);
     assert_eq!(transfer.tables(Some(5)).color.at(200.0), categories::color(5));
     // What a table of the scene's leaves out.
@@ -248,7 +248,7 @@ fn the_labels_preset_colours_segments_too() {
     assert!(!Preset::Labels.transfer(&volume).tables(Some(0)).visible);
 
     let message =
-        builtin_scene("cube:8", &["preset=labels"]).transfer.check(&row(&[0.5, 1.0])).unwrap_err().to_string();
+        builtin_scene("cube:8", &["preset=labels"]).transfer.check_volume(&row(&[0.5, 1.0])).unwrap_err().to_string();
     assert!(message.starts_with("preset: found labels for a volume that has none, allowed: values that"), "{message}");
     let labels = Labels {
         origin: "l".to_owned(),
@@ -258,7 +258,7 @@ fn the_labels_preset_colours_segments_too() {
         names: BTreeMap::new(),
     };
     let labelled = row(&[0.5, 1.0]).with_labels(labels).unwrap();
-    builtin_scene("cube:8", &["preset=labels"]).transfer.check(&labelled).unwrap();
+    builtin_scene("cube:8", &["preset=labels"]).transfer.check_volume(&labelled).unwrap();
 }
 
 #[test]

@@ -28,7 +28,7 @@ fn assert_bytes(volume: &Volume) {
 /// What is wrong with a name: the origin, the field, what was found and what is allowed.
 fn complaint(name: &str) -> [String; 4] {
     match builtin::volume(name).unwrap_err() {
-        VolumeError::Invalid { origin, field, found, allowed } => [origin, field, found, allowed],
+        VolumeError::Invalid { origin, field, found, allowed, .. } => [origin, field, found, allowed],
         error => panic!("{error}"),
     }
 }

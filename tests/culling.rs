@@ -6,7 +6,7 @@
 mod common;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::{Headless, HeadlessOptions, Rendering};
+use sheetsplat::headless::{Headless, Rendering};
 use sheetsplat::internals::reference;
 use sheetsplat::internals::reference::visibility::Test;
 use sheetsplat::scene::{Scene, VolumeSource};
@@ -25,7 +25,9 @@ use common::{FORMS, RASTERIZERS, Random, SPACINGS, camera, lavapipe, random_eye,
 const ROUNDING: f64 = 2e-5;
 
 fn headless(sheets_per_group: Option<u32>) -> Headless {
-    Headless::new(&HeadlessOptions { sheets_per_group, ..lavapipe() }).unwrap()
+    let mut options = lavapipe();
+    options.sheets_per_group = sheets_per_group;
+    Headless::new(&options).unwrap()
 }
 
 /// A volume and a view of it, orthographic or in perspective, with sheets parallel to the image or slices.
@@ -294,8 +296,8 @@ fn profiled_frames() {
     scene.camera = Camera::default();
     (scene.image.width, scene.image.height) = (40, 40);
     scene.splatting.slab_width = 0.05;
-    let devices = [false, true]
-        .map(|profile| Headless::new(&HeadlessOptions { sheets_per_group: Some(1), profile, ..lavapipe() }).unwrap());
+    let devices =
+        [false, true].map(|profile| Headless::new(&lavapipe().with_sheets_per_group(1).with_profile(profile)).unwrap());
     for (rasterizer, stages) in [
         (Rasterizer::Quads, &["composite", "cull", "resolve", "splat"][..]),
         (Rasterizer::Tiles, &["gather", "resolve"]),

@@ -12,8 +12,6 @@ use glam::{DVec3, UVec2, UVec3};
 use sheetsplat::settings::Clip;
 use sheetsplat::settings::Projection;
 
-use sheetsplat::Pick;
-use sheetsplat::SceneView;
 use sheetsplat::headless::{Headless, readback};
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference::{self, Host, ray_march};
@@ -22,6 +20,7 @@ use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Compositing, Method, Order, Rasterizer};
 use sheetsplat::stats::Counts;
 use sheetsplat::volume::{Grid, Volume, builtin};
+use sheetsplat::{Pick, RenderError, SceneView, SettingError};
 
 use common::compare::{assert_at_least, assert_at_most};
 use common::images::{BLACK, largest_difference, psnr};
@@ -132,8 +131,9 @@ fn cuts_are_those_of_the_twin() {
             let origin = [case % 4, case % 5];
             let planes = [0.01, 1000.0];
             scene_view
-                .set_surfaces(depths.as_ref().map(|depths| surfaces(&gpu, &view, unit, range, planes, depths, origin)));
-            scene_view.set_first_hit(first_hit);
+                .set_surfaces(depths.as_ref().map(|depths| surfaces(&gpu, &view, unit, range, planes, depths, origin)))
+                .unwrap();
+            scene_view.set_first_hit(first_hit).unwrap();
             let (image, hits, _) = draw(&gpu, &mut scene_view);
             let decibels = psnr(&image.pixels, &expected.image.pixels, BLACK, 0);
             assert_at_least(decibels, 68.0, format_args!("case {case}, {rasterizer:?}, {range:?} with {scene:?}"));
@@ -175,7 +175,9 @@ fn culling_keeps_its_guarantee() {
                 scene.splatting.culling = culling;
                 let mut scene_view = gpu.view(volume.clone(), &scene).unwrap();
                 let range = DepthRange::Reversed;
-                scene_view.set_surfaces(Some(surfaces(&gpu, &view, unit, range, [0.01, 1000.0], &depths, [0, 0])));
+                scene_view
+                    .set_surfaces(Some(surfaces(&gpu, &view, unit, range, [0.01, 1000.0], &depths, [0, 0])))
+                    .unwrap();
                 draw(&gpu, &mut scene_view)
             });
             let allowed = 1.0 - scene.splatting.opacity_threshold + 2e-5;
@@ -208,9 +210,9 @@ fn walls() {
             let mut scene_view = gpu.view(volume.clone(), &scene).unwrap();
             let wall = depth.map(|depth| vec![depth; 9000]);
             let planes = [middle - 60.0, middle + 90.0];
-            scene_view.set_surfaces(
-                wall.map(|wall| surfaces(&gpu, &view, unit, DepthRange::Standard, planes, &wall, [0, 0])),
-            );
+            scene_view
+                .set_surfaces(wall.map(|wall| surfaces(&gpu, &view, unit, DepthRange::Standard, planes, &wall, [0, 0])))
+                .unwrap();
             draw(&gpu, &mut scene_view)
         };
         let (none, behind, before, between) = (
@@ -287,7 +289,7 @@ fn moved_planes_are_fresh_ones() {
         let touched = view.set_clip(scene.clip.clone()).unwrap();
         if step % 5 == 4 {
             scene.splatting.radius = random.pick(&[1.4, 2.0, 3.0]);
-            view.set_splatting(scene.splatting);
+            view.set_splatting(scene.splatting).unwrap();
         }
         let changed = draw(&gpu, &mut view);
         let count = changed.2.voxels_in_range;
@@ -327,7 +329,7 @@ fn picks() {
         scene.splatting.rasterizer = rasterizer;
         scene.camera.projection = projection;
         let mut view = gpu.view(volume.clone(), &scene).unwrap();
-        view.set_first_hit(Some(0.5));
+        view.set_first_hit(Some(0.5)).unwrap();
         gpu.draw(&mut view).unwrap();
         let picked = gpu.pick(&view, [13, 6]).unwrap().unwrap();
         // Kernels reach half the opacity before the plate's middle, by less than a voxel.
@@ -341,7 +343,7 @@ fn picks() {
         // Nothing is as opaque as that beside the plate.
         scene.camera.center = Some(DVec3::new(100.0, 0.0, 0.0));
         let mut beside = gpu.view(volume.clone(), &scene).unwrap();
-        beside.set_first_hit(Some(0.5));
+        beside.set_first_hit(Some(0.5)).unwrap();
         gpu.draw(&mut beside).unwrap();
         assert_eq!(gpu.pick(&beside, [3, 3]).unwrap(), None);
         let error = gpu.pick(&beside, [21, 3]).unwrap_err().to_string();
@@ -358,10 +360,10 @@ fn what_does_not_fit_is_refused() {
     let unit = volume.grid().unit();
     let seen = view_of(&volume, &scene);
     let depths = vec![f64::INFINITY; 1200];
-    let refusal = |scene: &Scene, change: &dyn Fn(&mut SceneView)| {
+    let refusal = |scene: &Scene, change: &dyn Fn(&mut SceneView) -> Result<(), SettingError>| {
         let mut view = gpu.view(volume.clone(), scene).unwrap();
-        change(&mut view);
-        gpu.draw(&mut view).map(|rendering| rendering.stats).unwrap_err().to_string()
+        let changed = change(&mut view).map_err(RenderError::from);
+        changed.and_then(|()| gpu.draw(&mut view)).map(|rendering| rendering.stats).unwrap_err().to_string()
     };
     let good = surfaces(&gpu, &seen, unit, DepthRange::Standard, [-99.0, 99.0], &depths, [0, 0]);
     let assert_words = |message: &str, words: &[&str]| {
@@ -379,16 +381,16 @@ fn what_does_not_fit_is_refused() {
     broken.clip_from_world.x_axis.x = f64::NAN;
     let message = refusal(&scene, &|view| view.set_surfaces(Some(broken.clone())));
     assert_words(&message, &["surfaces.clip_from_world"]);
-    for opacity in [0.0, 0.96, f64::NAN] {
+    for (opacity, allowed) in [(0.0, "(0, 1]"), (f64::NAN, "(0, 1]"), (0.96, "at most 0.95, the opacity_threshold")] {
         let message = refusal(&scene, &|view| view.set_first_hit(Some(opacity)));
-        assert_words(&message, &["first_hit", "at most 0.95"]);
+        assert_words(&message, &["first_hit", allowed]);
     }
     let mut backwards = scene.clone();
     backwards.splatting.order = Order::BackToFront;
     assert_words(&refusal(&backwards, &|view| view.set_first_hit(Some(0.5))), &["splatting.order", "front-to-back"]);
     scene.splatting.method = Method::CompositeEverySample;
     scene.clip.planes = vec![[1.0, 0.0, 0.0, 0.0]];
-    assert_words(&refusal(&scene, &|_| ()), &["splatting.method", "composite-every-sample", "clip planes"]);
+    assert_words(&refusal(&scene, &|_| Ok(())), &["splatting.method", "composite-every-sample", "clip planes"]);
     scene.clip.planes = vec![[1.0, 0.0, 0.0, 0.0]; 7];
     assert_words(&gpu.view(volume.clone(), &scene).unwrap_err().to_string(), &["clip.planes", "7 planes"]);
 }

@@ -143,7 +143,7 @@ fn off_by_default_and_by_tiles_only() {
         scene.splatting.economies.resolution = 0.01;
         change(&mut scene);
         match gpu.render_volume(volume.clone(), &scene) {
-            Err(RenderError::OutOfRange { key, found, .. }) => (key, found),
+            Err(RenderError::OutOfRange(error)) => (error.key, error.found.to_string()),
             other => panic!("{:?}", other.map(|rendering| rendering.stats)),
         }
     };

@@ -38,7 +38,7 @@ fn a_lost_device_is_an_error_everywhere_and_another_one_renders() {
         scene.splatting.rasterizer = rasterizer;
         let gpu = gpu();
         let mut view = gpu.view(volume.clone(), &scene).unwrap();
-        view.set_first_hit(Some(0.1));
+        view.set_first_hit(Some(0.1)).unwrap();
         let before = gpu.draw(&mut view).unwrap().image;
         let mut prepared = gpu.view(volume.clone(), &scene).unwrap();
         gpu.renderer().prepare(gpu.device(), gpu.queue(), &mut prepared).unwrap();
@@ -60,7 +60,7 @@ fn a_lost_device_is_an_error_everywhere_and_another_one_renders() {
 
         let other = common::gpu();
         let mut view = other.view(volume, &scene).unwrap();
-        view.set_first_hit(Some(0.1));
+        view.set_first_hit(Some(0.1)).unwrap();
         assert!(other.draw(&mut view).unwrap().image == before);
     }
 }
@@ -71,7 +71,7 @@ fn what_is_on_another_device_is_an_error() {
     let [one, other] = [gpu(), gpu()];
     let mut view = one.view(volume, &scene).unwrap();
     let refused = |result: Result<(), RenderError>| match result {
-        Err(error @ RenderError::OutOfRange { key: "device", .. }) => error.to_string(),
+        Err(RenderError::OutOfRange(error)) if error.key == "device" => error.to_string(),
         result => panic!("{result:?}"),
     };
     let message = refused(other.draw(&mut view).map(|_| ()));
@@ -104,7 +104,7 @@ fn what_validation_finds_is_an_error_and_the_device_goes_on() {
     let shown = ViewGeometry::new(&grid, &scene.camera, &scene.splatting, [60, 50]).unwrap();
     let clip_from_world = clip_from_world(&shown, grid.unit(), DepthRange::Standard, [-50.0, 50.0]);
     let depth = depth.create_view(&TextureViewDescriptor::default());
-    view.set_surfaces(Some(Surfaces { depth, origin: [0; 2], clip_from_world }));
+    view.set_surfaces(Some(Surfaces { depth, origin: [0; 2], clip_from_world })).unwrap();
     for _ in 0..2 {
         match gpu.draw(&mut view) {
             Err(error @ RenderError::Device(DeviceFault::Validation(_))) => {
@@ -114,7 +114,7 @@ fn what_validation_finds_is_an_error_and_the_device_goes_on() {
             other => panic!("{other:?}"),
         }
     }
-    view.set_surfaces(None);
+    view.set_surfaces(None).unwrap();
     assert!(gpu.draw(&mut view).unwrap().image == before);
 }
 
@@ -128,7 +128,7 @@ fn too_large_an_image_is_out_of_memory_and_the_device_goes_on() {
     let before = gpu.draw(&mut view).unwrap();
     let small = scene.image;
     (scene.image.width, scene.image.height) = (16384, 16384);
-    view.set_image(scene.image);
+    view.set_image(scene.image).unwrap();
     for _ in 0..2 {
         match gpu.renderer().prepare(gpu.device(), gpu.queue(), &mut view) {
             Err(error @ RenderError::Device(DeviceFault::OutOfMemory(_))) => {
@@ -142,7 +142,7 @@ fn too_large_an_image_is_out_of_memory_and_the_device_goes_on() {
         }
         assert_eq!(view.gpu_bytes(), view.volume().gpu_bytes(), "no frame is kept");
     }
-    view.set_image(small);
+    view.set_image(small).unwrap();
     let after = gpu.draw(&mut view).unwrap();
     assert!(after.image == before.image);
     assert_eq!(after.stats.gpu_bytes, before.stats.gpu_bytes);

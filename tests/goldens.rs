@@ -188,7 +188,7 @@ fn pictures_look_like_their_goldens() {
             assert!(SCENES.iter().any(|scene| scene.0 == name), "{}: no scene \"{name}\"", Bless::VARIABLE);
         }
     }
-    let options = HeadlessOptions { adapter: Some("llvmpipe".to_owned()), ..HeadlessOptions::default() };
+    let options = HeadlessOptions::default().with_adapter("llvmpipe");
     let gpu = Headless::new(&options)
         .unwrap_or_else(|error| panic!(".ci/setup --lavapipe installs what is missing: {error}"));
     let failures = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("goldens");

@@ -232,7 +232,7 @@ fn lists_leave_holes_out() {
         (Some(vec![[150.0, 1e300]]), above(150.0)),
         (Some(vec![[-1e300, 1e300]]), finite),
     ] {
-        view.set_iso_ranges(iso_ranges.clone());
+        view.set_iso_ranges(iso_ranges.clone()).unwrap();
         let drawn = gpu.draw(&mut view).unwrap();
         assert_eq!(drawn.stats.counts.voxels_in_range, expected, "{iso_ranges:?}");
         let fresh = Scene { transfer: TransferSettings { iso_ranges, ..scene.transfer.clone() }, ..scene.clone() };

@@ -27,8 +27,9 @@ use common::images::{largest_difference, rms};
 use common::{COMPOSITINGS, F16, F32, gpu, scene, transfer};
 
 fn open(limits: Limits, features: Features, sheet_format: Option<TextureFormat>) -> Result<Headless, DeviceError> {
-    let requirements = Some(DeviceRequirements { features, limits });
-    Headless::new(&HeadlessOptions { requirements, sheet_format, ..common::lavapipe() })
+    let mut options = common::lavapipe().with_requirements(DeviceRequirements { features, limits });
+    options.sheet_format = sheet_format;
+    Headless::new(&options)
 }
 
 /// A small head, translucent, so that every sheet counts.
@@ -71,7 +72,7 @@ fn rgba32float_sheets_take_the_default_limits_too() {
     let gpu = open(Limits::default(), Features::FLOAT32_BLENDABLE, None).unwrap();
     assert_eq!(gpu.renderer().sheet_format(), TextureFormat::Rgba32Float);
     // The 32 bytes of colour attachments that every device allows are two of them.
-    let pairs = Headless::new(&HeadlessOptions { sheets_per_group: Some(2), ..common::lavapipe() }).unwrap();
+    let pairs = Headless::new(&common::lavapipe().with_sheets_per_group(2)).unwrap();
     let (volume, mut scene) = head();
     scene.splatting.rasterizer = Rasterizer::Quads;
     let renderings = [gpu, pairs].map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap());
@@ -95,7 +96,7 @@ fn attachments_limit_the_sheets_of_a_group() {
         gpu.render_volume(volume.clone(), &scene).unwrap().stats.counts
     };
     let fixed = |sheets: u32| {
-        let options = HeadlessOptions { sheets_per_group: Some(sheets), ..common::lavapipe() };
+        let options = common::lavapipe().with_sheets_per_group(sheets);
         Headless::new(&options).unwrap().render_volume(volume.clone(), &scene).unwrap().stats.counts
     };
     let of = [1, 2, 4].map(fixed);
@@ -178,7 +179,7 @@ fn assert_same_work(lists: &Counts, one: &Counts) {
 #[test]
 fn rgba32float_sheets_need_blending() {
     match open(Limits::default(), Features::empty(), Some(TextureFormat::Rgba32Float)) {
-        Err(error @ DeviceError::MissingFeatures { required, actual }) => {
+        Err(error @ DeviceError::MissingFeatures { required, actual, .. }) => {
             assert_eq!(required, Features::FLOAT32_BLENDABLE);
             assert!(!actual.contains(required));
             let message = error.to_string();
@@ -197,7 +198,7 @@ fn images_larger_than_a_texture_are_an_error() {
     for (size, key) in [((2049, 16), "image.width"), ((16, 3000), "image.height")] {
         (scene.image.width, scene.image.height) = size;
         match gpu.render_volume(volume.clone(), &scene) {
-            Err(error @ RenderError::Limit { what, limit, required, actual }) => {
+            Err(error @ RenderError::Limit { what, limit, required, actual, .. }) => {
                 let expected = (key, "max_texture_dimension_2d", u64::from(size.0.max(size.1)), 2048);
                 assert_eq!((what, limit, required, actual), expected);
                 let message = error.to_string();
@@ -239,7 +240,7 @@ fn a_row_of_tiles_larger_than_a_binding_is_an_error() {
     let (volume, mut scene) = head();
     (scene.image.width, scene.image.height) = (65, 16);
     match gpu.render_volume(volume.clone(), &scene) {
-        Err(RenderError::Limit { what, limit, required, actual }) => {
+        Err(RenderError::Limit { what, limit, required, actual, .. }) => {
             assert!(what.contains("image.width"), "{what}");
             assert_eq!((limit, required, actual), ("max_storage_buffer_binding_size", 65 * 32 * 16, 32 << 10));
         }
@@ -253,7 +254,7 @@ fn a_row_of_tiles_larger_than_a_binding_is_an_error() {
 fn an_unknown_adapter_is_an_error_that_names_those_there_are() {
     let there = Headless::new(&HeadlessOptions::default()).unwrap();
     let name = there.render_volume(head().0, &head().1).unwrap().stats.adapter;
-    match Headless::new(&HeadlessOptions { adapter: Some("no such GPU".to_owned()), ..HeadlessOptions::default() }) {
+    match Headless::new(&HeadlessOptions::default().with_adapter("no such GPU")) {
         Err(error @ DeviceError::NoAdapter { .. }) => {
             let message = error.to_string();
             assert!(message.contains("\"no such GPU\"") && message.contains(&name), "{message}");
@@ -262,7 +263,7 @@ fn an_unknown_adapter_is_an_error_that_names_those_there_are() {
     }
     // Any part of a name will do, in any case.
     let part = name[1..].to_uppercase();
-    Headless::new(&HeadlessOptions { adapter: Some(part), ..HeadlessOptions::default() }).unwrap();
+    Headless::new(&HeadlessOptions::default().with_adapter(part)).unwrap();
 }
 
 #[test]
@@ -321,10 +322,10 @@ fn limits_beyond_the_adapter_are_an_error_that_names_it() {
 /// Work and bytes are the same on the least device and the best.
 #[test]
 fn deterministic_options_leave_nothing_to_the_device() {
-    let requirements = Some(DeviceRequirements { features: Features::empty(), limits: Limits::default() });
-    let options = HeadlessOptions { adapter: common::lavapipe().adapter, ..HeadlessOptions::DETERMINISTIC };
+    let requirements = DeviceRequirements { features: Features::empty(), limits: Limits::default() };
+    let options = HeadlessOptions::DETERMINISTIC.with_adapter("llvmpipe");
     let (volume, scene) = head();
-    let renderings = [HeadlessOptions { requirements, ..options.clone() }, options]
+    let renderings = [options.clone().with_requirements(requirements), options]
         .map(|options| Headless::new(&options).unwrap().render_volume(volume.clone(), &scene).unwrap());
     assert_eq!(renderings[0].stats.counts, renderings[1].stats.counts);
     assert!(renderings[0].image == renderings[1].image);
@@ -339,9 +340,9 @@ fn masks_larger_than_a_binding_are_an_error() {
     let (volume, mut scene) = head();
     let mut view = gpu.view(volume, &scene).unwrap();
     (scene.image.width, scene.image.height) = (150, 16384);
-    view.set_image(scene.image);
+    view.set_image(scene.image).unwrap();
     match gpu.draw(&mut view) {
-        Err(RenderError::Limit { what, limit, required, actual }) => {
+        Err(RenderError::Limit { what, limit, required, actual, .. }) => {
             assert_eq!((what, limit), ("sheetsplat.opaque", "max_storage_buffer_binding_size"));
             // Five words hold a row.
             assert_eq!((required, actual), (5 * 4 * 16384, 76 << 10));
@@ -349,7 +350,7 @@ fn masks_larger_than_a_binding_are_an_error() {
         other => panic!("{other:?}"),
     }
     (scene.image.width, scene.image.height) = (150, 110);
-    view.set_image(scene.image);
+    view.set_image(scene.image).unwrap();
     gpu.draw(&mut view).unwrap();
 }
 

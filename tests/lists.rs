@@ -86,19 +86,19 @@ fn assert_changes_are_fresh(gpu: &Headless, rasterizer: Rasterizer) {
             0 => {
                 let lo = random.uniform(-20.0, 200.0);
                 let ranges = vec![[lo, lo + random.uniform(0.0, 60.0)], [random.uniform(0.0, 255.0), 300.0]];
-                view.set_iso_ranges(Some(ranges))
+                view.set_iso_ranges(Some(ranges)).unwrap()
             }
-            1 => view.set_iso_ranges(None),
+            1 => view.set_iso_ranges(None).unwrap(),
             2 => {
                 let start = random.uniform(0.0, 150.0);
                 let opacity = Ramp::new(vec![(start, 0.0), (start + 20.0, 0.7), (255.0, random.uniform(0.0, 1.0))]);
-                view.set_transfer_function(TransferFunction { opacity: opacity.unwrap(), ..old })
+                view.set_transfer_function(TransferFunction { opacity: opacity.unwrap(), ..old }).unwrap()
             }
             _ => {
                 let start = random.uniform(0.0, 8.0);
                 let ramp = Ramp::new(vec![(start, 0.0), (start + 3.0, 1.0)]).unwrap();
                 let gradient_opacity = (random.uniform(0.0, 1.0) < 0.7).then_some(ramp);
-                view.set_transfer_function(TransferFunction { gradient_opacity, ..old })
+                view.set_transfer_function(TransferFunction { gradient_opacity, ..old }).unwrap()
             }
         };
         let after = taking_part(&volume, view.volume().transfer());
@@ -139,23 +139,23 @@ fn changed_labels_are_fresh_ones() {
                 0 | 1 => view.set_label_visible(label, !tables.visible),
                 2 => {
                     transfer.labels.remove(&label);
-                    view.set_transfer_function(transfer)
+                    view.set_transfer_function(transfer).unwrap()
                 }
                 3 => {
                     tables.color = Some(Ramp::new(vec![(start, random.direction().abs())]).unwrap());
-                    view.set_transfer_function(transfer)
+                    view.set_transfer_function(transfer).unwrap()
                 }
                 4 => {
                     let points = vec![(start, 0.0), (start + 30.0, random.uniform(0.1, 1.0))];
                     tables.opacity = Some(Ramp::new(points).unwrap());
-                    view.set_transfer_function(transfer)
+                    view.set_transfer_function(transfer).unwrap()
                 }
                 5 => {
                     let points = vec![(start / 20.0, 0.0), (start / 20.0 + 3.0, 1.0)];
                     tables.gradient_opacity = Some(Ramp::new(points).unwrap());
-                    view.set_transfer_function(transfer)
+                    view.set_transfer_function(transfer).unwrap()
                 }
-                _ => view.set_iso_ranges((start < 50.0).then(|| vec![[2.0 * start, 250.0]])),
+                _ => view.set_iso_ranges((start < 50.0).then(|| vec![[2.0 * start, 250.0]])).unwrap(),
             };
             let after = taking_part(&volume, view.volume().transfer());
             let count = |was: bool, is: bool| {
@@ -196,7 +196,7 @@ fn a_change_of_a_label_touches_its_voxels() {
     // Hidden by its opacity instead.
     let mut transfer = view.volume().transfer().clone();
     transfer.labels.entry(7).or_default().opacity = Some(Ramp::new(vec![(0.0, 0.0)]).unwrap());
-    assert_eq!(view.set_transfer_function(transfer), Touched { left: of_label(7), ..Touched::default() });
+    assert_eq!(view.set_transfer_function(transfer).unwrap(), Touched { left: of_label(7), ..Touched::default() });
     assert_fresh(&gpu, &mut view, "eyes without opacity");
     // Colours and opacities of a label that is in view: shaded anew, and no more.
     for green in [0.2, 0.7] {
@@ -204,7 +204,7 @@ fn a_change_of_a_label_touches_its_voxels() {
         let tables = transfer.labels.entry(5).or_default();
         tables.color = Some(Ramp::new(vec![(0.0, DVec3::new(0.1, green, 0.1))]).unwrap());
         tables.opacity = Some(Ramp::new(vec![(60.0, 0.0), (140.0, green)]).unwrap());
-        assert_eq!(view.set_transfer_function(transfer), Touched::default());
+        assert_eq!(view.set_transfer_function(transfer).unwrap(), Touched::default());
         assert!(!prepare(&mut view), "colour and opacity of a label");
         assert_fresh(&gpu, &mut view, "colour and opacity of a label");
     }
@@ -225,7 +225,7 @@ fn a_turn_sorts_no_slices() {
     let mut view = gpu.view(volume, &scene).unwrap();
     let mut look = |direction: [f64; 3], projection: Option<Projection>| {
         let camera = camera(direction, 170.0);
-        view.set_camera(Camera { projection: projection.unwrap_or(camera.projection), ..camera });
+        view.set_camera(Camera { projection: projection.unwrap_or(camera.projection), ..camera }).unwrap();
         let bucketed = gpu.renderer().prepare(gpu.device(), gpu.queue(), &mut view).unwrap().bucketed;
         assert_fresh(&gpu, &mut view, &format!("{direction:?}"));
         bucketed
@@ -275,7 +275,7 @@ fn knobs_are_turned_at_run_time() {
             ("falloff 3", Splatting { falloff: 3.0, ..narrower }, false, has_table),
             ("as at first", first, true, has_table),
         ] {
-            view.set_splatting(splatting);
+            view.set_splatting(splatting).unwrap();
             let name = format!("{rasterizer:?}, {footprint:?}, {projection:?}: {name}");
             assert_eq!(prepare(&mut view), Prepared { bucketed, tabled }, "{name}");
             assert_fresh(&gpu, &mut view, &name);
@@ -297,7 +297,7 @@ fn every_compositing_is_a_fresh_one() {
             for at in 0..COMPOSITINGS.len() {
                 let [old, compositing] =
                     [view.scene().splatting.compositing, COMPOSITINGS[at * skip % COMPOSITINGS.len()]];
-                view.set_splatting(Splatting { compositing, ..view.scene().splatting });
+                view.set_splatting(Splatting { compositing, ..view.scene().splatting }).unwrap();
                 let name = format!("{rasterizer:?}: {old:?}, then {compositing:?}");
                 let prepared = gpu.renderer().prepare(gpu.device(), gpu.queue(), &mut view).unwrap();
                 assert_eq!(prepared.bucketed, looks_at_all(old) != looks_at_all(compositing), "{name}");
@@ -326,54 +326,55 @@ fn assert_costs(gpu: &Headless, rasterizer: Rasterizer) {
     assert!(prepare(&mut view), "the first frame has no buckets yet");
     assert!(!prepare(&mut view), "nothing changed");
 
-    view.set_light(Light::Direction(DVec3::new(1.0, 0.3, 2.0)));
+    view.set_light(Light::Direction(DVec3::new(1.0, 0.3, 2.0))).unwrap();
     assert!(!prepare(&mut view), "light");
     assert_fresh(gpu, &mut view, "light");
-    view.set_shading(sheetsplat::settings::Shading { ambient: 0.5, shininess: 3.0, ..scene.shading });
+    view.set_shading(sheetsplat::settings::Shading { ambient: 0.5, shininess: 3.0, ..scene.shading }).unwrap();
     assert!(!prepare(&mut view), "shading");
     assert_fresh(gpu, &mut view, "shading");
     let old = view.volume().transfer().clone();
     let color = Ramp::new(vec![(0.0, DVec3::new(1.0, 0.2, 0.1)), (200.0, DVec3::ONE)]).unwrap();
     // More control points than before, and other opacities above 0 for the same values.
     let opacity = Ramp::new(vec![(60.0, 0.0), (70.0, 0.1), (80.0, 0.4), (100.0, 0.2), (140.0, 0.9)]).unwrap();
-    let touched = view.set_transfer_function(TransferFunction { color, opacity, ..old });
+    let touched = view.set_transfer_function(TransferFunction { color, opacity, ..old }).unwrap();
     assert_eq!((touched.entered, touched.left), (0, 0));
     assert!(!prepare(&mut view), "colours and opacities");
     assert_fresh(gpu, &mut view, "colours and opacities");
     let mut splatting = scene.splatting;
     splatting.compositing = Compositing::Exponential;
     splatting.opacity_threshold = 0.8;
-    view.set_splatting(splatting);
+    view.set_splatting(splatting).unwrap();
     assert!(!prepare(&mut view), "compositing");
     assert_fresh(gpu, &mut view, "compositing");
-    view.set_splatting(sheetsplat::settings::Splatting { footprint: FootprintForm::Sections, ..splatting });
+    view.set_splatting(sheetsplat::settings::Splatting { footprint: FootprintForm::Sections, ..splatting }).unwrap();
     assert_fresh(gpu, &mut view, "footprint");
-    view.set_splatting(sheetsplat::settings::Splatting { radius: 1.4, ..splatting });
+    view.set_splatting(sheetsplat::settings::Splatting { radius: 1.4, ..splatting }).unwrap();
     assert!(prepare(&mut view), "radius");
     assert_fresh(gpu, &mut view, "radius");
 
-    view.turn(20.0);
+    view.turn(20.0).unwrap();
     assert!(prepare(&mut view), "camera");
     assert_fresh(gpu, &mut view, "camera");
-    view.set_image(sheetsplat::scene::ImageSettings { width: 130, height: 40, background: [0.1, 0.2, 0.3, 0.5] });
+    view.set_image(sheetsplat::scene::ImageSettings { width: 130, height: 40, background: [0.1, 0.2, 0.3, 0.5] })
+        .unwrap();
     assert_fresh(gpu, &mut view, "image");
-    let touched = view.set_iso_ranges(Some(vec![[100.0, 255.0]]));
+    let touched = view.set_iso_ranges(Some(vec![[100.0, 255.0]])).unwrap();
     assert!(touched.left > 0 && touched.entered == 0);
     assert!(prepare(&mut view), "bricks changed");
     assert_fresh(gpu, &mut view, "iso-range");
     // Prepared twice before it is drawn.
-    assert!(view.set_iso_ranges(Some(vec![[80.0, 255.0]])).entered > 0);
+    assert!(view.set_iso_ranges(Some(vec![[80.0, 255.0]])).unwrap().entered > 0);
     assert!(prepare(&mut view));
-    assert!(view.set_iso_ranges(Some(vec![[70.0, 255.0]])).entered > 0);
+    assert!(view.set_iso_ranges(Some(vec![[70.0, 255.0]])).unwrap().entered > 0);
     assert!(prepare(&mut view));
     assert_fresh(gpu, &mut view, "two iso-ranges");
     // Prepared, and then asked for more than the device allows.
-    assert!(view.set_iso_ranges(None).entered > 0);
+    assert!(view.set_iso_ranges(None).unwrap().entered > 0);
     assert!(prepare(&mut view));
     let image = view.scene().image;
-    view.set_image(sheetsplat::scene::ImageSettings { width: 1 << 20, ..image });
+    view.set_image(sheetsplat::scene::ImageSettings { width: 1 << 20, ..image }).unwrap();
     assert!(renderer.prepare(gpu.device(), gpu.queue(), &mut view).is_err());
-    view.set_image(image);
+    view.set_image(image).unwrap();
     assert_fresh(gpu, &mut view, "after an error");
 }
 
@@ -387,9 +388,9 @@ fn from_nothing() {
         scene.transfer.iso_ranges = Some(vec![[1e6, 2e6]]);
         let mut view = gpu.view(volume, &scene).unwrap();
         assert_fresh(&gpu, &mut view, "nothing");
-        assert!(view.set_iso_ranges(None).entered > 1000);
+        assert!(view.set_iso_ranges(None).unwrap().entered > 1000);
         assert_fresh(&gpu, &mut view, "everything");
-        view.set_iso_ranges(Some(Vec::new()));
+        view.set_iso_ranges(Some(vec![[1e6, 2e6]])).unwrap();
         assert_fresh(&gpu, &mut view, "nothing again");
     }
 }

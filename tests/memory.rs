@@ -5,7 +5,7 @@
 mod common;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::Headless;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::LabelTables;
 use sheetsplat::settings::Light;
@@ -40,7 +40,7 @@ fn memory_is_given_back() {
         scene.splatting.rasterizer = RASTERIZERS[number % 2];
         (scene.image.width, scene.image.height) = (20 + (number % 40) as u32 * 7, 200 - (number % 40) as u32 * 3);
         let mut view = gpu.view(volume, &scene).unwrap();
-        view.set_first_hit((number % 3 == 0).then_some(0.1));
+        view.set_first_hit((number % 3 == 0).then_some(0.1)).unwrap();
         gpu.draw(&mut view).unwrap();
         assert!(allocated(&gpu) >= view.gpu_bytes(), "it is really there");
         drop(view);
@@ -63,7 +63,7 @@ fn a_view_that_shrinks_gives_back() {
         let mut view = gpu.view(volume.clone(), &scene).unwrap();
         for number in 0..40 {
             (scene.image.width, scene.image.height) = if number % 2 == 0 { (400, 300) } else { (60, 50) };
-            view.set_image(scene.image);
+            view.set_image(scene.image).unwrap();
             gpu.draw(&mut view).unwrap();
             let mut fresh = gpu.view(volume.clone(), &scene).unwrap();
             gpu.draw(&mut fresh).unwrap();
@@ -109,7 +109,7 @@ fn a_volumes_bytes_are_known_before() {
 #[test]
 fn a_frames_bytes_are_known_before() {
     let [roomy, small] = [gpu(), gpu_with_small_bindings(64 << 10)];
-    let profiling = Headless::new(&HeadlessOptions { profile: true, ..lavapipe() }).unwrap();
+    let profiling = Headless::new(&lavapipe().with_profile(true)).unwrap();
     let (volume, base) = head(40);
     let mut scenes = Vec::new();
     for (rasterizer, footprint) in FORMS {
@@ -137,7 +137,7 @@ fn a_frames_bytes_are_known_before() {
             let case = format!("{name}: {method:?} {order:?} {rasterizer:?}");
             for first_hit in [None, Some(0.2)] {
                 let asks = method != Method::CompositeEverySample && order == Order::FrontToBack;
-                view.set_first_hit(first_hit.filter(|_| asks));
+                view.set_first_hit(first_hit.filter(|_| asks)).unwrap();
                 let before = view.gpu_bytes();
                 let estimate = gpu.renderer().estimate(&view);
                 assert_eq!(view.gpu_bytes(), before, "{case}: nothing is allocated");
@@ -159,7 +159,7 @@ fn a_frames_bytes_are_known_before() {
 fn fresh(gpu: &Headless, view: &SceneView) -> u64 {
     let volume = view.volume().gpu_volume();
     let mut fresh = SceneView::new(gpu.device(), volume, view.scene()).unwrap();
-    fresh.set_first_hit(view.first_hits().map(|_| 0.2));
+    fresh.set_first_hit(view.first_hits().map(|_| 0.2)).unwrap();
     gpu.renderer().prepare(gpu.device(), gpu.queue(), &mut fresh).unwrap();
     fresh.gpu_bytes()
 }
@@ -174,7 +174,7 @@ fn a_changed_views_bytes_are_known_before() {
         scene.splatting.rasterizer = rasterizer;
         let mut view = gpu.view(volume.clone(), &scene).unwrap();
         for range in [[99.0, 111.0], [50.0, 255.0], [90.0, 95.0], [40.0, 255.0]] {
-            view.set_iso_ranges(Some(vec![range]));
+            view.set_iso_ranges(Some(vec![range])).unwrap();
             let estimate = gpu.renderer().estimate(&view).unwrap();
             let mut again = scene.clone();
             again.transfer.iso_ranges = Some(vec![range]);
@@ -194,19 +194,19 @@ fn first_hits_stay_where_they_are() {
         let (volume, mut scene) = head(16);
         scene.splatting.rasterizer = rasterizer;
         let mut view = gpu.view(volume, &scene).unwrap();
-        view.set_first_hit(Some(0.1));
+        view.set_first_hit(Some(0.1)).unwrap();
         gpu.draw(&mut view).unwrap();
         let texture = view.first_hits().unwrap().clone();
         let (bytes, held) = (view.gpu_bytes(), allocated(&gpu));
         for _ in 0..5 {
-            view.set_light(Light::Direction(DVec3::X));
+            view.set_light(Light::Direction(DVec3::X)).unwrap();
             gpu.draw(&mut view).unwrap();
             assert!(*view.first_hits().unwrap() == texture, "{rasterizer:?}");
         }
         assert_eq!(view.gpu_bytes(), bytes);
         assert!(allocated(&gpu) <= held + 1024, "{rasterizer:?}");
         scene.image.width += 1;
-        view.set_image(scene.image);
+        view.set_image(scene.image).unwrap();
         gpu.renderer().prepare(gpu.device(), gpu.queue(), &mut view).unwrap();
         assert!(*view.first_hits().unwrap() != texture, "of another size");
     }

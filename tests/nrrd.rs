@@ -71,7 +71,9 @@ fn assert_plain(volume: &Volume) {
 fn assert_refused(result: Result<Volume, VolumeError>, file: &str, field: &str, found: &str, allowed: &str) {
     let error = result.expect_err("a volume");
     let message = error.to_string();
-    let VolumeError::Invalid { origin, field: at, found: what, allowed: instead } = error else { panic!("{message}") };
+    let VolumeError::Invalid { origin, field: at, found: what, allowed: instead, .. } = error else {
+        panic!("{message}")
+    };
     assert!(origin.ends_with(file), "{message}");
     assert_eq!(at, field, "{message}");
     assert!(what.contains(found), "found {found:?}: {message}");

@@ -6,7 +6,7 @@ mod common;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::RenderError;
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::Headless;
 use sheetsplat::internals::gpu::device::{DeviceRequirements, TILE_FEATURES};
 use sheetsplat::internals::gpu::targets::CompositingBuffer;
 use sheetsplat::scene::Scene;
@@ -28,8 +28,8 @@ fn head() -> (Volume, Scene) {
 
 /// A device with these features alone.
 fn open(features: Features) -> Headless {
-    let requirements = Some(DeviceRequirements { features, limits: Limits::default() });
-    Headless::new(&HeadlessOptions { requirements, ..lavapipe() }).unwrap()
+    let requirements = DeviceRequirements { features, limits: Limits::default() };
+    Headless::new(&lavapipe().with_requirements(requirements)).unwrap()
 }
 
 /// Which rasterizer a frame was drawn with.
@@ -38,9 +38,9 @@ fn drawn_by(gpu: &Headless, volume: &Volume, scene: &Scene) -> String {
 }
 
 /// The key that a refused scene's message names, and the message.
-fn refusal(gpu: &Headless, volume: &Volume, scene: &Scene) -> (&'static str, String) {
+fn refusal(gpu: &Headless, volume: &Volume, scene: &Scene) -> (String, String) {
     match gpu.render_volume(volume.clone(), scene) {
-        Err(error @ RenderError::OutOfRange { key, .. }) => (key, error.to_string()),
+        Err(RenderError::OutOfRange(error)) => (error.key.clone(), error.to_string()),
         other => panic!("{other:?}"),
     }
 }
@@ -89,8 +89,8 @@ fn what_insists_on_tiles_is_refused_without() {
     refused(&none, &tiles, &["\"tiles\"", "subgroups", "\"quads\""]);
     refused(&open(Features::SUBGROUP), &tiles, &["\"tiles\"", "barriers", "\"quads\""]);
     let limits = Limits { max_compute_workgroup_storage_size: 16383, ..Limits::default() };
-    let requirements = Some(DeviceRequirements { features: TILE_FEATURES, limits });
-    let little = Headless::new(&HeadlessOptions { requirements, ..lavapipe() }).unwrap();
+    let requirements = DeviceRequirements { features: TILE_FEATURES, limits };
+    let little = Headless::new(&lavapipe().with_requirements(requirements)).unwrap();
     refused(&little, &tiles, &["max_compute_workgroup_storage_size", "16383", "16384", "\"quads\""]);
     let parallelogram = with(|scene| scene.splatting.footprint_box = FootprintBox::Parallelogram);
     refused(&none, &parallelogram, &["\"tiles\"", "subgroups"]);
@@ -146,8 +146,8 @@ fn small_bindings_change_no_bit_of_tiles() {
     scene.splatting.rasterizer = Rasterizer::Tiles;
     let [full, small] = [Limits::default().max_storage_buffer_binding_size, 200 << 10].map(|bytes| {
         let limits = Limits { max_storage_buffer_binding_size: bytes, ..Limits::default() };
-        let requirements = Some(DeviceRequirements { features: TILE_FEATURES, limits });
-        Headless::new(&HeadlessOptions { requirements, ..lavapipe() }).unwrap()
+        let requirements = DeviceRequirements { features: TILE_FEATURES, limits };
+        Headless::new(&lavapipe().with_requirements(requirements)).unwrap()
     });
     assert_eq!(CompositingBuffer::bands(&small.device().limits(), [300, 200]).unwrap().len(), 7);
     for order in [Order::FrontToBack, Order::BackToFront] {

@@ -32,8 +32,10 @@ fn ramp_evaluation() {
     assert_eq!(Ramp::new(vec![(0.0, 0.25), (5e-324, 1.0)]).unwrap().at(0.0), 0.25);
 
     assert_eq!(Ramp::<f64>::new(vec![]), Err(RampError::Empty));
-    assert_eq!(Ramp::new(vec![(0.0, 0.0), (f64::NAN, 1.0)]), Err(RampError::NotFinite { index: 1 }));
-    assert_eq!(Ramp::new(vec![(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]), Err(RampError::NotIncreasing { index: 2 }));
+    let error = Ramp::new(vec![(0.0, 0.0), (f64::NAN, 1.0)]).unwrap_err();
+    assert!(matches!(error, RampError::NotFinite { index: 1, position, .. } if position.is_nan()), "{error}");
+    let error = Ramp::new(vec![(0.0, 0.0), (1.0, 0.0), (0.5, 1.0)]).unwrap_err();
+    assert!(matches!(error, RampError::NotIncreasing { index: 2, position: 0.5, before: 1.0, .. }), "{error}");
 }
 
 #[test]

@@ -28,7 +28,7 @@ fn largest_change(gpu: &Headless, volume: &Arc<Volume>, scene: &Scene) -> f64 {
         let (sine, cosine) = degrees.to_radians().sin_cos();
         camera.direction = DVec3::new(sine, 0.0, cosine);
         camera.up = DVec3::Y;
-        view.set_camera(camera);
+        view.set_camera(camera).unwrap();
         let image = gpu.draw(&mut view).unwrap().image;
         let sum: f64 = image.pixels.iter().flat_map(|pixel| pixel[..3].iter()).map(|&c| f64::from(c)).sum();
         sum / (3 * image.pixels.len()) as f64

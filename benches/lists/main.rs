@@ -33,27 +33,27 @@ type Change = (&'static str, fn(&mut SceneView, usize, &[f64]) -> Touched);
 
 const CHANGES: [Change; 7] = [
     ("light", |view, at, _| {
-        view.set_light(Light::Direction(DVec3::new(at as f64, 1.0, 2.0)));
+        view.set_light(Light::Direction(DVec3::new(at as f64, 1.0, 2.0))).unwrap();
         Touched::default()
     }),
     ("colour", |view, at, _| {
         let color = Ramp::new(vec![(0.0, DVec3::splat(at as f64 / 100.0)), (255.0, DVec3::ONE)]).unwrap();
-        view.set_transfer_function(TransferFunction { color, ..view.volume().transfer().clone() })
+        view.set_transfer_function(TransferFunction { color, ..view.volume().transfer().clone() }).unwrap()
     }),
     ("opacity, same support", |view, at, _| {
         let opacity = view.volume().transfer().opacity.points();
         let opacity = opacity.iter().map(|&(value, y)| (value, y * (1.0 - at as f64 / 1000.0))).collect();
         let opacity = Ramp::new(opacity).unwrap();
-        view.set_transfer_function(TransferFunction { opacity, ..view.volume().transfer().clone() })
+        view.set_transfer_function(TransferFunction { opacity, ..view.volume().transfer().clone() }).unwrap()
     }),
     ("gradient opacity", |view, at, _| {
         let gradient_opacity = Some(Ramp::new(vec![(at as f64, 0.0), (at as f64 + 20.0, 1.0)]).unwrap());
-        view.set_transfer_function(TransferFunction { gradient_opacity, ..view.volume().transfer().clone() })
+        view.set_transfer_function(TransferFunction { gradient_opacity, ..view.volume().transfer().clone() }).unwrap()
     }),
-    ("iso-range, by 1 %", |view, at, of| view.set_iso_ranges(Some(vec![[of[50 + at % 50], 1e9]]))),
-    ("iso-range, by half", |view, at, of| view.set_iso_ranges(Some(vec![[of[25 + 50 * (at % 2)], 1e9]]))),
+    ("iso-range, by 1 %", |view, at, of| view.set_iso_ranges(Some(vec![[of[50 + at % 50], 1e9]])).unwrap()),
+    ("iso-range, by half", |view, at, of| view.set_iso_ranges(Some(vec![[of[25 + 50 * (at % 2)], 1e9]])).unwrap()),
     ("camera", |view, _, _| {
-        view.turn(3.0);
+        view.turn(3.0).unwrap();
         Touched::default()
     }),
 ];

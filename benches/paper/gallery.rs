@@ -158,7 +158,7 @@ fn accelerations(headless: &Headless) -> String {
         let scene = open(scene_name, &SMALL);
         let mut view = headless.view(scene.load_volume().unwrap(), &scene).unwrap();
         let images = tables::accelerations(scene.splatting).map(|(_, splatting)| {
-            view.set_splatting(splatting);
+            view.set_splatting(splatting).unwrap();
             headless.draw(&mut view).unwrap().image
         });
         let names: Vec<String> = (1..=5).map(|column| format!("fig16-{scene_name}-{column}")).collect();
@@ -198,6 +198,7 @@ fn name(method: Method) -> &'static str {
         Method::ImageAligned => "image-aligned",
         Method::AxisAligned => "axis-aligned",
         Method::CompositeEverySample => "composite-every-sample",
+        other => unreachable!("{other:?}"),
     }
 }
 

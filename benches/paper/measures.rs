@@ -71,7 +71,7 @@ impl Turn {
         let frames = (90.0 / Self::STEP) as u32 + 1;
         let brightness = (0..frames)
             .map(|frame| {
-                view.set_camera(turned(&scene, f64::from(frame) * Self::STEP).camera);
+                view.set_camera(turned(&scene, f64::from(frame) * Self::STEP).camera).unwrap();
                 brightness(&headless.draw(&mut view).unwrap().image)
             })
             .collect();

@@ -166,7 +166,7 @@ pub(crate) fn economies(headless: &Headless, frames: usize, rows: &[Row]) {
         let images: Vec<_> = settings
             .iter()
             .map(|&settings| {
-                view.set_splatting(settings);
+                view.set_splatting(settings).unwrap();
                 headless.draw(&mut view).unwrap().image
             })
             .collect();
@@ -199,7 +199,7 @@ fn interleaved(headless: &Headless, view: &mut SceneView, settings: &[Splatting]
     let mut runs: Vec<Vec<(f64, Stats)>> = settings.iter().map(|_| Vec::new()).collect();
     for _ in 0..frames {
         for (settings, runs) in settings.iter().zip(&mut runs) {
-            view.set_splatting(*settings);
+            view.set_splatting(*settings).unwrap();
             runs.push(timed(headless, view));
         }
     }

@@ -8,6 +8,7 @@ use crate::volume::Volume;
 
 /// A named sequence of colours, to be laid over a range of values; or the palette of the volume's own file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Colormap {
     /// Dark violet over green to yellow, of even steps in lightness.
     Viridis,

@@ -13,6 +13,7 @@ use crate::volume::Volume;
 
 /// A kind of data, and what of it is to be seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Preset {
     /// CT: the skin, opaque.
     CtSkin,

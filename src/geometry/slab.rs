@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::error::RenderError;
+use crate::setting_error::SettingError;
 
 /// The most slabs that a volume may be cut into. 0.05 `unit`s wide, 1800³ voxels need fewer.
 pub const MAX_SLABS: u32 = 1 << 16;
@@ -49,15 +50,13 @@ impl SlabGrid {
     /// If it is not.
     pub fn check(&self, depth: f64, slab_width: f64) -> Result<(), RenderError> {
         let slabs = (2.0 * depth / self.width).ceil();
-        // Not `>`: the number may be none.
+        // Not `>`: the number may be NaN.
         if slabs <= f64::from(MAX_SLABS) {
             return Ok(());
         }
-        Err(RenderError::OutOfRange {
-            key: "splatting.slab_width",
-            found: format!("{slab_width} times the smallest spacing, so {slabs:e} slabs"),
-            allowed: format!("widths and spacings with at most {MAX_SLABS} slabs"),
-        })
+        let found = format!("{slab_width} times the smallest spacing, so {slabs:e} slabs");
+        let allowed = format!("widths and spacings with at most {MAX_SLABS} slabs");
+        Err(SettingError::new("splatting.slab_width", found, allowed).into())
     }
 }
 

@@ -5,6 +5,7 @@ use wgpu::{TextureUsages, TextureView};
 
 use crate::error::RenderError;
 use crate::geometry::view_geometry::{Rays, ViewGeometry};
+use crate::setting_error::{Interval, SettingError};
 use crate::volume::Grid;
 
 /// How far a host's projection may be from the camera's, pixels.
@@ -35,26 +36,38 @@ pub struct SurfaceDepths {
 }
 
 impl Surfaces {
-    /// Checks that the texture covers the image, and that its projection is the view's.
-    pub(crate) fn depths(&self, view: &ViewGeometry, grid: &Grid) -> Result<SurfaceDepths, RenderError> {
-        let refused = |key, found: String, allowed: String| Err(RenderError::OutOfRange { key, found, allowed });
+    /// Checks what types do not say; whether the projection is the camera's is found out when a frame is prepared.
+    ///
+    /// # Errors
+    /// If the texture holds no depths that can be read, one per pixel, or the matrix is not finite or has no inverse.
+    pub fn check(&self) -> Result<(), SettingError> {
+        const DEPTH: &str = "surfaces.depth";
+        const MATRIX: &str = "surfaces.clip_from_world";
         let texture = self.depth.texture();
-        let reached = [0, 1].map(|axis| u64::from(self.origin[axis]) + u64::from(view.size[axis]));
-        let format = texture.format();
-        if !format.has_depth_aspect() {
-            return refused("surfaces.depth", format!("{format:?}"), "a depth format".to_owned());
+        if !texture.format().has_depth_aspect() {
+            return Err(SettingError::new(DEPTH, format!("{:?}", texture.format()), "a depth format"));
         }
         if texture.sample_count() != 1 {
             let found = format!("{} samples per pixel", texture.sample_count());
-            return refused("surfaces.depth", found, "1: resolve it first".to_owned());
+            return Err(SettingError::new(DEPTH, found, "1: resolve it first"));
         }
         if !texture.usage().contains(TextureUsages::TEXTURE_BINDING) {
-            return refused(
-                "surfaces.depth",
-                format!("{:?}", texture.usage()),
-                "TEXTURE_BINDING among them".to_owned(),
-            );
+            let found = format!("{:?}", texture.usage());
+            return Err(SettingError::new(DEPTH, found, "TEXTURE_BINDING among them"));
         }
+        Interval::FINITE.check_each(MATRIX, &self.clip_from_world.to_cols_array())?;
+        if !self.clip_from_world.inverse().is_finite() {
+            let found = format!("{}, which has no inverse", self.clip_from_world);
+            return Err(SettingError::new(MATRIX, found, "projections of space onto the screen"));
+        }
+        Ok(())
+    }
+
+    /// Checks that the texture covers the image, and that its projection is the view's.
+    pub(crate) fn depths(&self, view: &ViewGeometry, grid: &Grid) -> Result<SurfaceDepths, RenderError> {
+        let refused = |key, found: String, allowed: String| Err(SettingError::new(key, found, allowed).into());
+        let texture = self.depth.texture();
+        let reached = [0, 1].map(|axis| u64::from(self.origin[axis]) + u64::from(view.size[axis]));
         if reached[0] > texture.width().into() || reached[1] > texture.height().into() {
             let found = format!("{}×{} texels", texture.width(), texture.height());
             return refused("surfaces.depth", found, format!("at least {}×{}", reached[0], reached[1]));

@@ -8,6 +8,7 @@ use glam::{DVec2, DVec3, DVec4, UVec3};
 use crate::error::RenderError;
 use crate::geometry::grid_warp::{self, FootprintMap};
 use crate::geometry::slab::{MAX_SLABS, SlabGrid};
+use crate::setting_error::SettingError;
 use crate::settings::camera::{Camera, Eye, ViewBasis};
 use crate::settings::splatting::{Method, Splatting};
 use crate::volume::Grid;
@@ -144,9 +145,8 @@ impl ViewGeometry {
             (Method::AxisAligned, _) => {
                 let (axis, sign) = slice_axis(basis.w);
                 if grid.dims[axis] > MAX_SLABS {
-                    let key = "splatting.method";
                     let found = format!("\"axis-aligned\", so {} slices", grid.dims[axis]);
-                    return Err(RenderError::OutOfRange { key, found, allowed: format!("at most {MAX_SLABS}") });
+                    return Err(SettingError::new("splatting.method", found, format!("at most {MAX_SLABS}")).into());
                 }
                 let mut row = DVec4::ZERO;
                 row[axis] = sign;

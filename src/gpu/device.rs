@@ -14,6 +14,7 @@ use crate::gpu::fault::DeviceFault;
 pub enum DeviceError {
     /// There is no adapter, or none with the requested name.
     #[error("no GPU adapter: required {required}, actual: {actual}{}", after(advice.as_deref()))]
+    #[non_exhaustive]
     NoAdapter {
         /// What was asked for.
         required: String,
@@ -24,6 +25,7 @@ pub enum DeviceError {
     },
     /// The adapter refused to make a device.
     #[error("adapter \"{adapter}\" gave no device: {source}")]
+    #[non_exhaustive]
     RequestDevice {
         /// The adapter's name.
         adapter: String,
@@ -32,6 +34,7 @@ pub enum DeviceError {
     },
     /// The device could not compile the renderer.
     #[error("adapter \"{adapter}\" cannot run the renderer: {fault}")]
+    #[non_exhaustive]
     Pipelines {
         /// The adapter's name.
         adapter: String,
@@ -40,6 +43,7 @@ pub enum DeviceError {
     },
     /// A feature is missing that the options ask for.
     #[error("device feature: required {required:?}, actual: {actual:?}")]
+    #[non_exhaustive]
     MissingFeatures {
         /// What is needed.
         required: Features,
@@ -51,6 +55,7 @@ pub enum DeviceError {
     Limits(Vec<InsufficientLimit>),
     /// An option of the renderer that this device, or any, cannot fulfil.
     #[error("{option}: found {found}, allowed: {allowed}")]
+    #[non_exhaustive]
     Unsupported {
         /// The field of [`RendererOptions`](crate::renderer::options::RendererOptions).
         option: &'static str,

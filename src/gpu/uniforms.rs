@@ -15,6 +15,7 @@ use crate::geometry::view_geometry::{Rays, ViewGeometry};
 use crate::lists::patch_bins::PatchBins;
 use crate::lists::quad_plan::FramePlan;
 use crate::scene::Scene;
+use crate::setting_error::scaled;
 use crate::settings::clip::HalfSpace;
 use crate::settings::shading::{Light, MIN_GRADIENT, Shading};
 use crate::settings::splatting::{Compositing, Order, Splatting};
@@ -35,7 +36,7 @@ pub fn frame(
     let to_eye = -view.basis.w;
     let to_light = match scene.shading.light {
         Light::Headlight => to_eye,
-        Light::Direction(direction) => direction.normalize(),
+        Light::Direction(direction) => scaled(direction).normalize(),
     };
     let Shading { enabled, ambient, diffuse, specular, shininess, .. } = scene.shading;
     let [r, g, b, a] = scene.image.background;

@@ -24,12 +24,14 @@ use crate::renderer::pick::Pick;
 use crate::renderer::placement::Placement;
 use crate::renderer::scene_view::SceneView;
 use crate::scene::{ImageSettings, Scene};
+use crate::setting_error::SettingError;
 use crate::settings::splatting::Rasterizer;
 use crate::stats::Stats;
 use crate::volume::Volume;
 
-/// How to choose and open a device.
+/// How to choose and open a device: [`Self::default`] or [`Self::DETERMINISTIC`], changed by the `with_` functions.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct HeadlessOptions {
     /// Part of the adapter's name, in any case; `None` prefers an adapter that can run the renderer, and a GPU to a software driver.
     pub adapter: Option<String>,
@@ -52,6 +54,36 @@ impl HeadlessOptions {
     const fn of(renderer: RendererOptions) -> Self {
         let RendererOptions { sheet_format, sheets_per_group, rasterizer, profile, .. } = renderer;
         Self { adapter: None, requirements: None, sheet_format, sheets_per_group, rasterizer, profile }
+    }
+
+    /// On the adapter with this in its name, in any case.
+    pub fn with_adapter(self, name: impl Into<String>) -> Self {
+        Self { adapter: Some(name.into()), ..self }
+    }
+
+    /// On a device with these features and limits.
+    pub fn with_requirements(self, requirements: DeviceRequirements) -> Self {
+        Self { requirements: Some(requirements), ..self }
+    }
+
+    /// With another format of the sheet buffer.
+    pub fn with_sheet_format(self, format: TextureFormat) -> Self {
+        Self { sheet_format: Some(format), ..self }
+    }
+
+    /// With another number of sheets drawn by one quad.
+    pub fn with_sheets_per_group(self, sheets: u32) -> Self {
+        Self { sheets_per_group: Some(sheets), ..self }
+    }
+
+    /// With another rasterizer for scenes that leave the choice.
+    pub fn with_rasterizer(self, rasterizer: Rasterizer) -> Self {
+        Self { rasterizer, ..self }
+    }
+
+    /// With every stage timed, or none.
+    pub fn with_profile(self, profile: bool) -> Self {
+        Self { profile, ..self }
     }
 }
 
@@ -130,6 +162,8 @@ impl Headless {
     /// # Errors
     /// If the volume cannot be loaded, the scene asks for what the device or the renderer cannot do, or the device fails.
     pub fn render(&self, scene: &Scene) -> Result<Rendering, Error> {
+        // Before a volume is loaded for nothing.
+        scene.check().map_err(RenderError::from)?;
         let start = Instant::now();
         let volume = scene.load_volume()?;
         let load_ms = milliseconds_since(start);
@@ -184,7 +218,7 @@ impl Headless {
             let Some(mut pending) = view.pick(&self.device, &mut encoder, pixel) else {
                 let ImageSettings { width, height, .. } = view.scene().image;
                 let allowed = format!("a pixel of {width}×{height}, in a frame with first hits");
-                return Err(RenderError::OutOfRange { key: "pick", found: format!("{pixel:?}"), allowed });
+                return Err(SettingError::new("pick", format!("{pixel:?}"), allowed).into());
             };
             self.queue.submit([encoder.finish()]);
             // Asks for it, and then it is there.
@@ -216,7 +250,7 @@ impl Headless {
         let mut encoder =
             self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.frame") });
         self.renderer.record(&mut encoder, scene_view);
-        self.renderer.present(&mut encoder, scene_view, &view, Placement::whole([width, height]));
+        self.renderer.present(&mut encoder, scene_view, &view, Placement::whole([width, height]))?;
         self.queue.submit([encoder.finish()]);
         let counts = scene_view.counts();
         let bytes = readback::texture(&self.device, &self.queue, &target)?;

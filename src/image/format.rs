@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 pub enum ImageError {
     /// The extension names no known format.
     #[error("{}: extension: found {found}, allowed: .png, .exr or .npy", path.display())]
+    #[non_exhaustive]
     Format {
         /// The file.
         path: PathBuf,
@@ -16,6 +17,7 @@ pub enum ImageError {
     },
     /// The file could not be read or written.
     #[error("{}: {source}", path.display())]
+    #[non_exhaustive]
     Io {
         /// The file.
         path: PathBuf,
@@ -24,6 +26,7 @@ pub enum ImageError {
     },
     /// The image could not be encoded.
     #[error("{}: {source}", path.display())]
+    #[non_exhaustive]
     Encode {
         /// The file.
         path: PathBuf,
@@ -32,6 +35,7 @@ pub enum ImageError {
     },
     /// The file is not what its extension says.
     #[error("{}: {source}", path.display())]
+    #[non_exhaustive]
     Decode {
         /// The file.
         path: PathBuf,
@@ -40,6 +44,7 @@ pub enum ImageError {
     },
     /// The file holds no image of four channels.
     #[error("{}: {what}: found {found}, allowed: {allowed}", path.display())]
+    #[non_exhaustive]
     Content {
         /// The file.
         path: PathBuf,

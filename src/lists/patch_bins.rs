@@ -10,6 +10,7 @@ use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::layout::Brick;
 use crate::lists::brick;
+use crate::setting_error::SettingError;
 use crate::settings::splatting::Order;
 
 /// Width and height of the rasteriser's patches, pixels.
@@ -104,11 +105,8 @@ pub struct TileCapacityError {
 
 impl From<TileCapacityError> for RenderError {
     fn from(TileCapacityError { what, required, actual }: TileCapacityError) -> Self {
-        Self::OutOfRange {
-            key: "splatting.rasterizer",
-            found: format!("\"tiles\" with {required} {what}"),
-            allowed: format!("at most {actual}, or \"quads\""),
-        }
+        let found = format!("\"tiles\" with {required} {what}");
+        SettingError::new("splatting.rasterizer", found, format!("at most {actual}, or \"quads\"")).into()
     }
 }
 

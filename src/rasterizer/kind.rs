@@ -6,8 +6,9 @@ use crate::error::RenderError;
 use crate::gpu::device::TILE_FEATURES;
 use crate::pass::composite::RayMode;
 use crate::pass::gather::WORKGROUP_BYTES;
+use crate::setting_error::SettingError;
 use crate::settings::splatting::{
-    Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting,
+    Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting, check_first_hit,
 };
 
 /// Threads that a subgroup may have.
@@ -32,12 +33,11 @@ impl RasterizerKind {
         let by_settings = obstacle_in_settings(splatting);
         let is_by_settings = by_settings.is_some();
         match (splatting.rasterizer, by_settings.or_else(|| obstacle_in_device(device))) {
-            (Rasterizer::Quads, _) if insists => Err(RenderError::OutOfRange {
-                key: "splatting.rasterizer",
-                found: "\"quads\" with splatting.footprint_box = \"parallelogram\", whole_below, beta or resolution"
-                    .to_owned(),
-                allowed: "\"tiles\" or \"auto\" with them".to_owned(),
-            }),
+            (Rasterizer::Quads, _) if insists => {
+                let found =
+                    "\"quads\" with splatting.footprint_box = \"parallelogram\", whole_below, beta or resolution";
+                Err(SettingError::new("splatting.rasterizer", found, "\"tiles\" or \"auto\" with them").into())
+            }
             (Rasterizer::Tiles | Rasterizer::Auto, Some(obstacle)) if insists => Err(obstacle),
             _ if splatting.method == Method::CompositeEverySample => Ok((Self::Samples, None)),
             (Rasterizer::Tiles | Rasterizer::Auto, None) => Ok((Self::Tiles, None)),
@@ -48,8 +48,7 @@ impl RasterizerKind {
 }
 
 fn refused_tiles(found: String, allowed: &str) -> Option<RenderError> {
-    let key = "splatting.rasterizer";
-    Some(RenderError::OutOfRange { key, found: format!("\"tiles\" with {found}"), allowed: allowed.to_owned() })
+    Some(SettingError::new("splatting.rasterizer", format!("\"tiles\" with {found}"), allowed).into())
 }
 
 /// Why some settings cannot be drawn by tiles; `None` if they can.
@@ -100,28 +99,23 @@ pub(crate) fn check_rays(
     first_hit: Option<f64>,
     [width, height]: [u32; 2],
 ) -> Result<(), RenderError> {
-    let refused = |key, found: String, allowed: String| Err(RenderError::OutOfRange { key, found, allowed });
+    let refused = |key, found: &str, allowed: &str| Err(SettingError::new(key, found, allowed).into());
     if splatting.method == Method::CompositeEverySample && rays != RayMode::default() {
-        let found = "\"composite-every-sample\" with clip planes, surfaces or first hits".to_owned();
-        return refused("splatting.method", found, "a method with sheets".to_owned());
+        let found = "\"composite-every-sample\" with clip planes, surfaces or first hits";
+        return refused("splatting.method", found, "a method with sheets");
     }
     let Some(opacity) = first_hit else { return Ok(()) };
     if splatting.compositing == Compositing::Minimum {
         let allowed = "another one: the least is known at the end of a ray";
-        return refused("splatting.compositing", "\"minimum\" with first hits".to_owned(), allowed.to_owned());
+        return refused("splatting.compositing", "\"minimum\" with first hits", allowed);
     }
-    let hides = splatting.culling && splatting.compositing.hides();
-    let most = if hides { splatting.opacity_threshold } else { 1.0 };
-    if !(opacity > 0.0 && opacity <= most) {
-        let allowed = format!("above 0, at most {most}{}", if hides { ", the opacity_threshold" } else { "" });
-        return refused("first_hit", opacity.to_string(), allowed);
+    check_first_hit(opacity)?;
+    if splatting.culling && splatting.compositing.hides() && opacity > splatting.opacity_threshold {
+        let allowed = format!("above 0, at most {}, the opacity_threshold", splatting.opacity_threshold);
+        return Err(SettingError::new("first_hit", opacity, allowed).into());
     }
     if splatting.order != Order::FrontToBack {
-        return refused(
-            "splatting.order",
-            "\"back-to-front\" with first hits".to_owned(),
-            "\"front-to-back\"".to_owned(),
-        );
+        return refused("splatting.order", "\"back-to-front\" with first hits", "\"front-to-back\"");
     }
     let limits = device.limits();
     let actual = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);

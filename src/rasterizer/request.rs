@@ -54,7 +54,6 @@ impl FrameRequest {
         rasterizer: Rasterizer,
     ) -> Result<Self, RenderError> {
         let splatting = settled(scene.splatting, rasterizer);
-        splatting.check()?;
         let (grid, size) = (volume.grid(), [scene.image.width, scene.image.height]);
         let seen = ViewGeometry::new(grid, camera, &splatting, size)?;
         let bands = CompositingBuffer::bands(&device.limits(), size)?;

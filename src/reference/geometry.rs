@@ -10,6 +10,7 @@ use crate::error::RenderError;
 use crate::geometry::kernel::Kernel;
 use crate::geometry::slab::SlabGrid;
 use crate::scene::Scene;
+use crate::setting_error::SettingError;
 use crate::settings::camera::{Camera, Eye, ViewBasis};
 use crate::settings::clip::HalfSpace;
 use crate::settings::splatting::{Economies, Method};
@@ -63,12 +64,11 @@ impl Geometry {
         let (width, height) = (scene.image.width, scene.image.height);
         for (key, found) in [("image.width", width), ("image.height", height)] {
             if found > MAX_SIZE {
-                let (found, allowed) = (found.to_string(), format!("at most {MAX_SIZE}"));
-                return Err(RenderError::OutOfRange { key, found, allowed });
+                return Err(SettingError::new(key, f64::from(found), format!("at most {MAX_SIZE}")).into());
             }
         }
-        scene.clip.check()?;
-        scene.splatting.check()?;
+        scene.check()?;
+        grid.check()?;
         let (camera, splatting) = (&scene.camera, &scene.splatting);
         let (basis, aspect) = (camera.basis(), grid.aspect());
         let eye = camera.eye(grid, splatting.radius, height)?;

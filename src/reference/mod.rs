@@ -24,7 +24,8 @@ use crate::geometry::kernel::Kernel;
 use crate::image::Image;
 use crate::lists::quad_plan::tile_grid;
 use crate::scene::Scene;
-use crate::settings::splatting::{Compositing, Method, Order};
+use crate::setting_error::SettingError;
+use crate::settings::splatting::{Compositing, Method, Order, check_first_hit};
 use crate::settings::transfer_function::TransferFunction;
 use crate::stats::Counts;
 use crate::volume::Volume;
@@ -75,6 +76,7 @@ impl Frame {
     fn new(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Self, RenderError> {
         let scene = &scene.framed(volume, transfer);
         let geometry = Geometry::new(volume.grid(), scene)?;
+        transfer.check()?;
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
         let voxels = shading::taking_part(volume, transfer, &geometry);
         let splats = shading::splats(&voxels, volume, transfer, scene, &geometry);
@@ -107,6 +109,23 @@ pub struct Host<'a> {
     pub surfaces: Option<&'a [f64]>,
     /// The opacity whose depth is asked for.
     pub first_hit: Option<f64>,
+}
+
+impl Host<'_> {
+    /// Checks that surfaces have a depth for every pixel, and the opacity asked for, as [`SceneView`](crate::SceneView) does.
+    fn check(&self, scene: &Scene) -> Result<(), SettingError> {
+        let pixels = scene.image.width as usize * scene.image.height as usize;
+        if let Some(depths) = self.surfaces {
+            if depths.len() != pixels {
+                let found = format!("{} depths", depths.len());
+                return Err(SettingError::new("surfaces", found, format!("{pixels}, one for every pixel")));
+            }
+            if let Some(at) = depths.iter().position(|depth| depth.is_nan()) {
+                return Err(SettingError::new(format!("surfaces[{at}]"), depths[at], "a number, or infinity"));
+            }
+        }
+        self.first_hit.map_or(Ok(()), check_first_hit)
+    }
 }
 
 /// What [`render`] draws: all there is. Voxels composited one by one make a section each, and neither sheets nor tiles.
@@ -179,6 +198,7 @@ pub fn render_for(
     test: Option<visibility::Test>,
 ) -> Result<Culled, RenderError> {
     let frame = Frame::new(volume, transfer, scene)?;
+    host.check(scene)?;
     let (compositing, order) = (scene.splatting.compositing, scene.splatting.order);
     let test = test.filter(|_| order == Order::FrontToBack && compositing.hides());
     // What is kept of a surface that is not reached yet is none.

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::Geometry;
 use crate::scene::Scene;
+use crate::setting_error::scaled;
 use crate::settings::shading::{Light, Shading};
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::TransferFunction;
@@ -91,7 +92,7 @@ pub fn color(shading: &Shading, color: DVec3, gradient: DVec3, to_eye: DVec3) ->
     let normal = if gradient.length() < 1e-12 { DVec3::ZERO } else { -gradient.normalize() };
     let to_light = match shading.light {
         Light::Headlight => to_eye,
-        Light::Direction(direction) => direction.normalize(),
+        Light::Direction(direction) => scaled(direction).normalize(),
     };
     let half = to_light + to_eye;
     let half = if half.length() < 1e-12 { DVec3::ZERO } else { half.normalize() };

@@ -1,5 +1,5 @@
 //! The renderer a host embeds: it owns pipelines, never a device, and neither submits nor waits. Every frame it prepares, which can
-//! fail, records, and presents, which cannot.
+//! fail, records, and presents, which cannot but for a place outside of the target.
 
 pub(crate) mod options;
 pub(crate) mod pick;
@@ -32,6 +32,7 @@ use crate::renderer::options::RendererOptions;
 use crate::renderer::placement::Placement;
 use crate::renderer::prepared_frame::{Drawing, FirstHits, PreparedFrame, PreviousFrame};
 use crate::renderer::scene_view::{Prepared, SceneView};
+use crate::setting_error::SettingError;
 use crate::settings::splatting::Rasterizer;
 use crate::stats::Staging;
 
@@ -324,9 +325,20 @@ impl Renderer {
 
     /// Records a pass of its own that draws the view's image into a target, which keeps what the image does not cover; nothing, if
     /// the view was never prepared. The renderer must have been made for the target's format and sample count and for no depth
-    /// attachment, and the scissor must lie in the target; what is wrong with them, wgpu reports.
-    pub fn present(&self, encoder: &mut CommandEncoder, view: &mut SceneView, target: &TextureView, at: Placement) {
-        let Some(frame) = &mut view.frame else { return };
+    /// attachment; what is wrong with those, wgpu reports.
+    ///
+    /// # Errors
+    /// If the scissor does not lie in the target; then nothing is recorded.
+    pub fn present(
+        &self,
+        encoder: &mut CommandEncoder,
+        view: &mut SceneView,
+        target: &TextureView,
+        at: Placement,
+    ) -> Result<(), SettingError> {
+        let texture = target.texture();
+        at.check([texture.width(), texture.height()])?;
+        let Some(frame) = &mut view.frame else { return Ok(()) };
         // Whoever waits for the counts has them, and their buffer.
         let timer = frame.timer.as_mut().filter(|timer| frame.staging.is_some() && timer.has_room());
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -345,10 +357,11 @@ impl Renderer {
         if let (Some(timer), Some(staging)) = (&frame.timer, &mut frame.staging) {
             staging.stages = timer.copy(encoder, &staging.buffer, staging.timestamps);
         }
+        Ok(())
     }
 
     /// Draws the view's image in a pass of the host's, whose attachments must be of the formats and the sample count that the
-    /// renderer was made for; what is wrong with them, wgpu reports. Draws nothing, if the view was never prepared. Changes the pass's
+    /// renderer was made for, and which the scissor must lie in ([`Placement::check`]); what is wrong with them, wgpu reports. Draws nothing, if the view was never prepared. Changes the pass's
     /// pipeline, bind group 0, viewport and scissor rectangle. A view may also be drawn by other renderers of its device than the
     /// one that recorded it, and as often as the host likes.
     pub fn draw(&self, pass: &mut RenderPass<'_>, view: &SceneView, at: Placement) {

@@ -5,8 +5,9 @@ use wgpu::{BlendState, Device, Features, TextureFormat, TextureFormatFeatureFlag
 use crate::gpu::device::DeviceError;
 use crate::settings::splatting::Rasterizer;
 
-/// What a renderer is made for.
+/// What a renderer is made for: [`Self::for_target`] or [`Self::DETERMINISTIC`], changed by the `with_` functions.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct RendererOptions {
     /// Format of the sheet buffer, `Rgba32Float` or `Rgba16Float`; `None` takes the better one that the device blends.
     pub sheet_format: Option<TextureFormat>,
@@ -31,6 +32,7 @@ pub struct RendererOptions {
 
 /// What becomes of what is in the target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Blend {
     /// The image, premultiplied, goes over it: `image + (1 - image.a)·target`, of the numbers that the target holds, so where those are
     /// linear light that is blended. With an opaque background it is the image.
@@ -66,6 +68,51 @@ impl RendererOptions {
         blend: Blend::Replace,
         ..Self::for_target(TextureFormat::Rgba32Float)
     };
+
+    /// With another format of the sheet buffer.
+    pub const fn with_sheet_format(self, format: TextureFormat) -> Self {
+        Self { sheet_format: Some(format), ..self }
+    }
+
+    /// With another number of sheets drawn by one quad.
+    pub const fn with_sheets_per_group(self, sheets: u32) -> Self {
+        Self { sheets_per_group: Some(sheets), ..self }
+    }
+
+    /// With another rasterizer for scenes that leave the choice.
+    pub const fn with_rasterizer(self, rasterizer: Rasterizer) -> Self {
+        Self { rasterizer, ..self }
+    }
+
+    /// With every stage timed, or none.
+    pub const fn with_profile(self, profile: bool) -> Self {
+        Self { profile, ..self }
+    }
+
+    /// With another format of the targets.
+    pub const fn with_target_format(self, target_format: TextureFormat) -> Self {
+        Self { target_format, ..self }
+    }
+
+    /// With another way to treat what is in the target.
+    pub const fn with_blend(self, blend: Blend) -> Self {
+        Self { blend, ..self }
+    }
+
+    /// With targets that hold linear light, or display-referred colours, whatever their format says.
+    pub const fn with_linear(self, linear: bool) -> Self {
+        Self { linear: Some(linear), ..self }
+    }
+
+    /// With a depth attachment in the passes drawn in.
+    pub const fn with_depth_format(self, format: TextureFormat) -> Self {
+        Self { depth_format: Some(format), ..self }
+    }
+
+    /// With another number of samples per pixel.
+    pub const fn with_sample_count(self, sample_count: u32) -> Self {
+        Self { sample_count, ..self }
+    }
 
     /// Whether images are decoded to linear light.
     pub(crate) fn is_linear(&self) -> bool {

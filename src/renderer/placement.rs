@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use crate::setting_error::SettingError;
+
 /// Where in a target an image goes. Pixels, from the target's upper left corner, right and down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Placement {
@@ -15,6 +17,19 @@ impl Placement {
     /// The image in the upper left corner of a target of the given width and height, all of which it may change.
     pub const fn whole([width, height]: [u32; 2]) -> Self {
         Self { origin: [0, 0], scissor: [0, 0, width, height] }
+    }
+
+    /// Checks that the scissor lies in a target of the given width and height.
+    ///
+    /// # Errors
+    /// If it does not.
+    pub fn check(&self, target: [u32; 2]) -> Result<(), SettingError> {
+        let [x, y, width, height] = self.scissor.map(u64::from);
+        if x + width <= target[0].into() && y + height <= target[1].into() {
+            return Ok(());
+        }
+        let allowed = format!("[x, y, width, height] within the target's {}×{}", target[0], target[1]);
+        Err(SettingError::new("placement.scissor", &self.scissor.map(f64::from)[..], allowed))
     }
 
     /// The part of the target that some rows of an image `width` pixels wide cover: x, y, width and height; `None` if they cover
@@ -38,6 +53,16 @@ fn overlap(origin: i32, image: Range<u32>, start: u32, length: u32) -> Option<(u
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn scissors_lie_in_the_target() {
+        let check = |scissor| Placement { origin: [-5, i32::MAX], scissor }.check([100, 80]);
+        assert_eq!([[0, 0, 100, 80], [99, 79, 1, 1], [100, 80, 0, 0]].map(check), [const { Ok(()) }; 3]);
+        for scissor in [[0, 0, 101, 80], [0, 1, 100, 80], [u32::MAX, 0, u32::MAX, 1]] {
+            let message = check(scissor).expect_err("it reaches beyond").to_string();
+            assert!(message.starts_with("placement.scissor: found [") && message.ends_with("100×80"), "{message}");
+        }
+    }
 
     #[test]
     fn what_rows_cover() {

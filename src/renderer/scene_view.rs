@@ -13,16 +13,18 @@ pub use crate::rasterizer::Prepared;
 use crate::renderer::pick::PendingPick;
 use crate::renderer::prepared_frame::PreparedFrame;
 use crate::scene::{ImageSettings, Scene};
+use crate::setting_error::{Interval, SettingError};
 use crate::settings::camera::Camera;
 use crate::settings::clip::Clip;
 use crate::settings::framing::Extent;
 use crate::settings::shading::{Light, Shading};
-use crate::settings::splatting::Splatting;
-use crate::settings::transfer_function::TransferFunction;
+use crate::settings::splatting::{Splatting, check_first_hit};
+use crate::settings::transfer_function::{TransferFunction, check_iso_ranges};
 use crate::stats::PendingCounts;
 
 /// A view of a volume: camera, image, transfer function, shading and splatting settings, and the last frame's buffers. Setters
-/// take effect with the next [`Renderer::prepare`](crate::renderer::Renderer::prepare).
+/// take effect with the next [`Renderer::prepare`](crate::renderer::Renderer::prepare). A setter that is given what is not allowed says
+/// which field it is, as reading a scene file does, and changes nothing.
 #[derive(Debug)]
 pub struct SceneView {
     pub(crate) volume: ClassifiedVolume,
@@ -39,12 +41,12 @@ impl SceneView {
     /// volume is not looked at.
     ///
     /// # Errors
-    /// If the volume has no labels and the scene has tables or a preset for some, or if the scene's clip planes are none; if the volume is on
-    /// another device, or the device fails.
+    /// If a setting is not allowed ([`Scene::check`]), or the volume has no labels and the scene has tables or a preset for some; if the volume
+    /// is on another device, or the device fails.
     pub fn new(device: &Device, volume: &GpuVolume, scene: &Scene) -> Result<Self, RenderError> {
         check_device(device, volume.device(), "the volume")?;
-        scene.transfer.check(volume.volume())?;
-        scene.clip.check()?;
+        scene.check()?;
+        scene.transfer.check_volume(volume.volume())?;
         let transfer = scene.transfer.resolve(volume.volume());
         let clipped = scene.clip.voxels(volume.volume().grid(), scene.splatting.radius);
         let volume = scoped(device, || ClassifiedVolume::new(device, volume, transfer, clipped))?;
@@ -76,13 +78,21 @@ impl SceneView {
 
     /// Changes colours, opacities, gradient opacity, iso-ranges or the labels' tables. What keeps its opacity above 0 is shaded anew and nothing more;
     /// see [`ClassifiedVolume::set_transfer_function`].
-    pub fn set_transfer_function(&mut self, transfer: TransferFunction) -> Touched {
-        self.volume.set_transfer_function(transfer)
+    ///
+    /// # Errors
+    /// If a setting is not allowed; then nothing changes.
+    pub fn set_transfer_function(&mut self, transfer: TransferFunction) -> Result<Touched, SettingError> {
+        transfer.check()?;
+        Ok(self.volume.set_transfer_function(transfer))
     }
 
     /// Changes the iso-ranges alone; touches only voxels that enter or leave.
-    pub fn set_iso_ranges(&mut self, iso_ranges: Option<Vec<[f64; 2]>>) -> Touched {
-        self.volume.set_iso_ranges(iso_ranges)
+    ///
+    /// # Errors
+    /// If there are some but not one, or one is not finite or reversed; then nothing changes.
+    pub fn set_iso_ranges(&mut self, iso_ranges: Option<Vec<[f64; 2]>>) -> Result<Touched, SettingError> {
+        check_iso_ranges(iso_ranges.as_deref())?;
+        Ok(self.volume.set_iso_ranges(iso_ranges))
     }
 
     /// Shows or hides the voxels of a label of a segmented volume; touches only those.
@@ -91,35 +101,53 @@ impl SceneView {
     }
 
     /// Changes the camera: bricks are sorted into buckets again.
-    pub fn set_camera(&mut self, camera: Camera) {
+    ///
+    /// # Errors
+    /// If a setting is not allowed; then nothing changes.
+    pub fn set_camera(&mut self, camera: Camera) -> Result<(), SettingError> {
+        camera.check()?;
         self.scene.camera = camera;
+        Ok(())
     }
 
     /// Moves the light: voxels are shaded anew. A direction has any length but 0 and points to the light.
-    pub fn set_light(&mut self, light: Light) {
-        self.scene.shading.light = light;
+    ///
+    /// # Errors
+    /// If the direction is 0 or not finite; then nothing changes.
+    pub fn set_light(&mut self, light: Light) -> Result<(), SettingError> {
+        self.set_shading(Shading { light, ..self.scene.shading })
     }
 
     /// Changes the material: voxels are shaded anew.
-    pub fn set_shading(&mut self, shading: Shading) {
+    ///
+    /// # Errors
+    /// If a setting is not allowed; then nothing changes.
+    pub fn set_shading(&mut self, shading: Shading) -> Result<(), SettingError> {
+        shading.check()?;
         self.scene.shading = shading;
+        Ok(())
     }
 
     /// Changes the splatting settings. Another slab width or kernel sorts bricks into buckets again, another kernel also makes
     /// another footprint table; where planes clip, voxels enter or leave with another radius.
-    pub fn set_splatting(&mut self, splatting: Splatting) {
+    ///
+    /// # Errors
+    /// If a setting is not allowed; then nothing changes.
+    pub fn set_splatting(&mut self, splatting: Splatting) -> Result<(), SettingError> {
+        splatting.check()?;
         let Scene { clip, splatting: old, .. } = &self.scene;
         if !clip.is_empty() && splatting.radius != old.radius {
             self.volume.set_clip(clip.voxels(self.volume.grid(), splatting.radius));
         }
         self.scene.splatting = splatting;
+        Ok(())
     }
 
     /// Changes what is cut away. Touches only voxels that enter or leave.
     ///
     /// # Errors
-    /// If there are too many planes, or some are none; then nothing changes.
-    pub fn set_clip(&mut self, clip: Clip) -> Result<Touched, RenderError> {
+    /// If there are too many planes, or a plane or the box is invalid; then nothing changes.
+    pub fn set_clip(&mut self, clip: Clip) -> Result<Touched, SettingError> {
         clip.check()?;
         let clipped = clip.voxels(self.volume.grid(), self.scene.splatting.radius);
         self.scene.clip = clip;
@@ -129,16 +157,26 @@ impl SceneView {
     /// Opaque surfaces of the host, `None` for none: in front of them the volume shows, behind them it does not, and voxels there are
     /// culled as behind opaque ones (§6). Where a surface lies in a slab, it cuts the slab's sheet in proportion, as clip planes do
     /// ([`Clip`](crate::settings::Clip)). The texture must hold what it is to hold when the frame is submitted.
-    pub fn set_surfaces(&mut self, surfaces: Option<Surfaces>) {
+    ///
+    /// # Errors
+    /// If [`Surfaces::check`] refuses them; then nothing changes.
+    pub fn set_surfaces(&mut self, surfaces: Option<Surfaces>) -> Result<(), SettingError> {
+        surfaces.as_ref().map_or(Ok(()), Surfaces::check)?;
         self.surfaces = surfaces;
+        Ok(())
     }
 
     /// Asks for the depth at which every pixel's opacity reaches a value, above 0 and at most 1; `None` for none. Front to back only, and
     /// with culling at most [`Splatting::opacity_threshold`]; not for [`Compositing::Minimum`](crate::settings::splatting::Compositing::Minimum), and
     /// whatever the value that of the surface for [`Compositing::Surface`](crate::settings::splatting::Compositing::Surface). See
     /// [`Self::first_hits`] and [`Self::pick`].
-    pub fn set_first_hit(&mut self, opacity: Option<f64>) {
+    ///
+    /// # Errors
+    /// If the value is not in (0, 1]; then nothing changes.
+    pub fn set_first_hit(&mut self, opacity: Option<f64>) -> Result<(), SettingError> {
+        opacity.map_or(Ok(()), check_first_hit)?;
         self.first_hit = opacity;
+        Ok(())
     }
 
     /// The depths of first hits, a `R32Float` texture of the image's size (to sample or copy), once they have been asked for and a frame
@@ -158,13 +196,22 @@ impl SceneView {
     }
 
     /// Changes the image's size, for which all buffers of that size are allocated again, or its background, which costs nothing.
-    pub fn set_image(&mut self, image: ImageSettings) {
+    ///
+    /// # Errors
+    /// If a setting is not allowed; then nothing changes.
+    pub fn set_image(&mut self, image: ImageSettings) -> Result<(), SettingError> {
+        image.check()?;
         self.scene.image = image;
+        Ok(())
     }
 
     /// Turns the camera about its `up` by an angle in degrees, by the right hand.
-    pub fn turn(&mut self, degrees: f64) {
-        self.scene.camera = self.scene.camera.turned(degrees);
+    ///
+    /// # Errors
+    /// If the angle is not finite; then nothing changes.
+    pub fn turn(&mut self, degrees: f64) -> Result<(), SettingError> {
+        Interval::FINITE.check("degrees", degrees)?;
+        self.set_camera(self.scene.camera.turned(degrees))
     }
 
     /// How the prepared frame is drawn: `"quads"` or `"tiles"`.

@@ -1,5 +1,6 @@
 //! Scenes: what to show and how, from a scene file, from `--set` overrides, or from a volume alone (SPEC §7).
 
+mod check;
 mod names;
 mod reader;
 mod tables;
@@ -12,8 +13,8 @@ use glam::DVec3;
 use toml::Table;
 
 use crate::appearance::{Colormap, Preset};
-use crate::error::RenderError;
 use crate::lists::extent;
+use crate::setting_error::Allowed;
 use crate::settings::camera::{Camera, Fit};
 use crate::settings::clip::Clip;
 use crate::settings::framing::Extent;
@@ -29,6 +30,7 @@ use reader::{OVERRIDE, Origins, Section, apply_override};
 pub enum SceneError {
     /// The scene file could not be opened or read.
     #[error("{}: {source}", path.display())]
+    #[non_exhaustive]
     Io {
         /// The scene file.
         path: PathBuf,
@@ -37,6 +39,7 @@ pub enum SceneError {
     },
     /// The scene file is not TOML.
     #[error("{origin}: {message}")]
+    #[non_exhaustive]
     Syntax {
         /// The scene file.
         origin: String,
@@ -45,15 +48,16 @@ pub enum SceneError {
     },
     /// A key is unknown or missing, or its value is of the wrong type or out of range.
     #[error("{origin}: {key}: found {found}, allowed: {allowed}")]
+    #[non_exhaustive]
     Invalid {
         /// The scene file, or `--set` where the value came from an override.
         origin: String,
         /// The full key, elements counted from 0: `camera.up`, `transfer.opacity[2]`.
         key: String,
-        /// What was found there.
+        /// What was found there, as it is written.
         found: String,
         /// What would have been accepted.
-        allowed: String,
+        allowed: Allowed,
     },
 }
 
@@ -62,7 +66,7 @@ impl From<VolumeError> for SceneError {
         match error {
             VolumeError::Io { path, source } => Self::Io { path, source },
             VolumeError::Invalid { origin, field, found, allowed } => {
-                Self::Invalid { origin, key: field, found, allowed }
+                Self::Invalid { origin, key: field, found, allowed: allowed.into() }
             }
         }
     }
@@ -162,28 +166,6 @@ impl TransferSettings {
             (None, None) => {}
         }
         transfer
-    }
-
-    /// Checks that a volume has what the settings are for.
-    ///
-    /// # Errors
-    /// If it has no labels and there are tables for some, or the preset for labels, or if it has no palette and the colour map is that.
-    pub fn check(&self, volume: &Volume) -> Result<(), RenderError> {
-        let invalid = |key, found: &str, allowed: &str| {
-            Err(RenderError::OutOfRange { key, found: found.to_owned(), allowed: allowed.to_owned() })
-        };
-        if !self.labels.is_empty() && volume.labels().is_none() {
-            return invalid("transfer.label", "tables for a volume without labels", "none, or labels in the volume");
-        }
-        if self.colormap == Some(Colormap::File) && volume.palette().is_none() {
-            let allowed = "another colour map, or a TIFF file whose pixels are indices of a palette";
-            return invalid("transfer.colormap", "file, for a volume without a palette", allowed);
-        }
-        if self.preset.is_some_and(|preset| !preset.suits(volume)) {
-            let allowed = "values that are whole numbers from 0 to 65535, or labels in the volume";
-            return invalid("preset", "labels for a volume that has none", allowed);
-        }
-        Ok(())
     }
 }
 
@@ -378,7 +360,7 @@ impl Scene {
         let is_bare = !["transfer", "camera"].iter().any(|table| root.contains_key(*table));
         let fit = if is_bare { Fit::Object } else { Fit::Volume };
         let overridden = sets.iter().map(|set| apply_override(&mut root, set)).collect::<Result<_, _>>()?;
-        let origins = Origins { file: origin, overridden };
+        let origins = Origins { file: origin, overridden, written: root.clone() };
         let mut root = Section::root(&origins, root);
         let [volume, camera, image, clip, transfer, shading, splatting] = [
             root.section("volume")?,

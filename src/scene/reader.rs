@@ -5,7 +5,8 @@ use std::ops::{Add, Mul};
 use glam::UVec3;
 use toml::{Table, Value};
 
-use super::SceneError;
+use super::{ImageSettings, SceneError};
+use crate::setting_error::{Allowed, Found, Interval, SettingError};
 use crate::settings::transfer_function::{Ramp, RampError};
 use crate::volume::{SIZES, dims_of};
 
@@ -18,7 +19,7 @@ pub(super) fn apply_override(root: &mut Table, argument: &str) -> Result<String,
         origin: OVERRIDE.to_owned(),
         key: key.to_owned(),
         found: found.to_owned(),
-        allowed: allowed.to_owned(),
+        allowed: allowed.into(),
     };
     let usage = "table.key=value, as in splatting.slab_width=2.0";
     let Some((key, text)) = argument.split_once('=') else { return Err(misused(argument, "no \"=\"", usage)) };
@@ -57,6 +58,8 @@ pub(super) struct Origins<'a> {
     pub(super) file: &'a str,
     /// The keys given by `--set`.
     pub(super) overridden: Vec<String>,
+    /// The whole file with what was set.
+    pub(super) written: Table,
 }
 
 impl Origins<'_> {
@@ -67,7 +70,7 @@ impl Origins<'_> {
         key: &str,
         related: &[&str],
         found: impl Into<String>,
-        allowed: impl Into<String>,
+        allowed: impl Into<Allowed>,
     ) -> SceneError {
         let is_overridden = |key: &str| self.overridden.iter().any(|set| is_within(key, set));
         let any_overridden = is_overridden(key) || related.iter().any(|key| is_overridden(key));
@@ -77,6 +80,33 @@ impl Origins<'_> {
             found: found.into(),
             allowed: allowed.into(),
         }
+    }
+
+    /// The error for settings that their type's check refused, with the value as it is written.
+    pub(super) fn refused(&self, error: SettingError) -> SceneError {
+        let SettingError { key, found, allowed } = error;
+        let related: &[&str] = match &key[..] {
+            "camera.up" => &["camera.direction"],
+            "splatting.compositing" => &["preset", "splatting.method", "splatting.order"],
+            _ => &[],
+        };
+        let found = match (found, self.written_at(&key)) {
+            // In words, where it takes several keys to say what is wrong.
+            (Found::Text(text), _) if !related.is_empty() => text,
+            (_, Some(value)) => concise(value),
+            (found, None) => found.to_string(),
+        };
+        self.invalid(&key, related, found, allowed)
+    }
+
+    /// The value of a key, such as `transfer.opacity[2][1]`.
+    fn written_at(&self, key: &str) -> Option<&Value> {
+        let mut names = key.split(['.', '[']);
+        let first = self.written.get(names.next()?)?;
+        names.try_fold(first, |value, name| match name.strip_suffix(']') {
+            Some(index) => value.get(index.parse::<usize>().ok()?),
+            None => value.get(name),
+        })
     }
 }
 
@@ -89,7 +119,7 @@ fn is_within(key: &str, ancestor: &str) -> bool {
 pub(super) struct Section<'a> {
     pub(super) origins: &'a Origins<'a>,
     /// Its full key; empty for the root.
-    name: String,
+    pub(super) name: String,
     table: Table,
     /// The keys asked for so far.
     known: Vec<&'static str>,
@@ -151,19 +181,8 @@ impl<'a> Section<'a> {
     }
 }
 
-/// Which numbers are allowed, beyond being finite.
-#[derive(Clone, Copy)]
-pub(super) struct Bounds {
-    /// For error messages, after "allowed: ".
-    pub(super) text: &'static str,
-    pub(super) contain: fn(f64) -> bool,
-}
-
 /// The labels of a segmented volume.
 pub(super) const LABEL: &str = "an integer from 0 to 65535";
-
-/// Any finite number.
-pub(super) const FINITE: Bounds = Bounds { text: "a finite number", contain: |_| true };
 
 /// A value with its full key.
 pub(super) struct Entry<'a> {
@@ -174,12 +193,12 @@ pub(super) struct Entry<'a> {
 
 impl<'a> Entry<'a> {
     /// The error for a value that is not allowed.
-    pub(super) fn refused(&self, allowed: impl Into<String>) -> SceneError {
+    pub(super) fn refused(&self, allowed: impl Into<Allowed>) -> SceneError {
         self.origins.invalid(&self.key, &[], concise(&self.value), allowed)
     }
 
     /// The error for a value of the wrong type.
-    pub(super) fn mistyped(&self, allowed: impl Into<String>) -> SceneError {
+    pub(super) fn mistyped(&self, allowed: impl Into<Allowed>) -> SceneError {
         self.origins.invalid(&self.key, &[], typed(&self.value), allowed)
     }
 
@@ -207,9 +226,9 @@ impl<'a> Entry<'a> {
 
     /// A number of pixels.
     pub(super) fn pixels(&self) -> Result<u32, SceneError> {
-        let allowed = "an integer from 1 to the device's texture limit";
+        let allowed = ImageSettings::PIXELS;
         let integer = self.value.as_integer().ok_or_else(|| self.mistyped(allowed))?;
-        u32::try_from(integer).ok().filter(|&pixels| pixels > 0).ok_or_else(|| self.refused(allowed))
+        u32::try_from(integer).map_err(|_| self.refused(allowed))
     }
 
     /// Voxels along x, y and z.
@@ -232,23 +251,22 @@ impl<'a> Entry<'a> {
         u16::try_from(integer).map_err(|_| self.refused(LABEL))
     }
 
-    /// A number, written as a float or as an integer.
-    pub(super) fn number(&self, bounds: Bounds) -> Result<f64, SceneError> {
-        let number = match self.value {
-            Value::Integer(integer) => integer as f64,
-            Value::Float(float) => float,
-            _ => return Err(self.mistyped(bounds.text)),
-        };
-        let is_allowed = number.is_finite() && (bounds.contain)(number);
-        if is_allowed { Ok(number) } else { Err(self.refused(bounds.text)) }
+    /// A number, written as a float or as an integer. Whether it lies in the range that the key allows is for the settings' own check to
+    /// say.
+    pub(super) fn number(&self, range: Interval) -> Result<f64, SceneError> {
+        match self.value {
+            Value::Integer(integer) => Ok(integer as f64),
+            Value::Float(float) => Ok(float),
+            _ => Err(self.mistyped(range)),
+        }
     }
 
     /// N numbers.
-    pub(super) fn numbers<const N: usize>(&self, bounds: Bounds) -> Result<[f64; N], SceneError> {
+    pub(super) fn numbers<const N: usize>(&self, range: Interval) -> Result<[f64; N], SceneError> {
         let mut numbers = [0.0; N];
-        let items: [Entry; N] = self.array(&format!("{N} numbers, each {}", bounds.text))?;
+        let items: [Entry; N] = self.array(&format!("{N} numbers, each {range}"))?;
         for (number, item) in numbers.iter_mut().zip(items) {
-            *number = item.number(bounds)?;
+            *number = item.number(range)?;
         }
         Ok(numbers)
     }
@@ -282,11 +300,15 @@ impl<'a> Entry<'a> {
         let items = self.items(&allowed)?;
         let points = items.iter().map(|item| {
             let [at, value] = item.array(point)?;
-            Ok((at.number(FINITE)?, read(&value)?))
+            Ok((at.number(Interval::FINITE)?, read(&value)?))
         });
         Ramp::new(points.collect::<Result<_, SceneError>>()?).map_err(|error| match error {
             RampError::Empty => self.refused(allowed),
-            RampError::NotFinite { index } | RampError::NotIncreasing { index } => {
+            RampError::NotFinite { index, position } => {
+                let key = format!("{}[{index}][0]", self.key);
+                self.origins.refused(SettingError::new(key, position, Interval::FINITE))
+            }
+            RampError::NotIncreasing { index, .. } => {
                 items[index].refused("points whose first number is above that of the point before")
             }
         })
@@ -301,7 +323,11 @@ fn typed(value: &Value) -> String {
 /// A value as TOML, on one line of bounded length.
 fn concise(value: &Value) -> String {
     const LONGEST: usize = 80;
-    let text = value.to_string().replace(['\n', '\r'], " ");
+    let text = match value {
+        // TOML's own way writes hundreds of zeros for such numbers.
+        Value::Float(number) if value.to_string().len() > 20 => format!("{number:e}"),
+        _ => value.to_string().replace(['\n', '\r'], " "),
+    };
     match text.char_indices().nth(LONGEST) {
         Some((end, _)) => format!("{}…", &text[..end]),
         None => text,

@@ -6,24 +6,16 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::names::{BOXES, COMPOSITINGS, ENDIANS, FITS, FORMS, METHODS, ORDERS, RASTERIZERS};
-use super::reader::{Bounds, Entry, FINITE, LABEL, Section};
+use super::reader::{Entry, LABEL, Section};
 use super::{ImageSettings, SceneError, TransferSettings, VolumeSource};
 use crate::appearance::Colormap;
-use crate::settings::camera::{Camera, Fit, Projection};
+use crate::setting_error::Interval;
+use crate::settings::camera::{Camera, FOV_Y, Fit, Projection};
 use crate::settings::clip::{Clip, MAX_PLANES};
 use crate::settings::shading::{Light, Shading};
-use crate::settings::splatting::{Compositing, Splatting};
+use crate::settings::splatting::{Compositing, FALLOFF, RADIUS, SLAB_WIDTH, Splatting};
 use crate::settings::transfer_function::{LabelTables, Ramp};
-use crate::volume::{RawLayout, SampleType};
-
-const POSITIVE: Bounds = Bounds { text: "a finite number > 0", contain: |x| x > 0.0 };
-const NOT_NEGATIVE: Bounds = Bounds { text: "a finite number >= 0", contain: |x| x >= 0.0 };
-const SHARE: Bounds = Bounds { text: "a number in [0, 1]", contain: |x| (0.0..=1.0).contains(&x) };
-const THRESHOLD: Bounds = Bounds { text: "a number in (0, 1]", contain: |x| x > 0.0 && x <= 1.0 };
-const FOV: Bounds = Bounds { text: "degrees in (0, 180)", contain: |x| x > 0.0 && x < 180.0 };
-const RADIUS: Bounds = Bounds { text: "a number in [1, 4]", contain: |x| (1.0..=4.0).contains(&x) };
-const FALLOFF: Bounds = Bounds { text: "a number in (0, 16]", contain: |x| x > 0.0 && x <= 16.0 };
-const SLAB_WIDTH: Bounds = Bounds { text: "a number in [0.05, 8]", contain: |x| (0.05..=8.0).contains(&x) };
+use crate::volume::{RawLayout, SPACING, SampleType, check_spacing};
 
 /// `[volume]`.
 pub(super) struct VolumeSettings {
@@ -41,12 +33,15 @@ pub(super) fn volume(
     let (mut path, mut builtin, mut spacing, mut labels) = (None, None, None, None);
     section.read("path", &mut path, |entry| entry.text("a volume file's path").map(Some))?;
     section.read("builtin", &mut builtin, |entry| entry.text("a builtin volume's name").map(Some))?;
-    section.read("spacing", &mut spacing, |entry| entry.numbers(POSITIVE).map(|s| Some(DVec3::from_array(s))))?;
+    section.read("spacing", &mut spacing, |entry| entry.numbers(SPACING).map(|s| Some(DVec3::from_array(s))))?;
     section
         .read("labels", &mut labels, |entry| entry.text("a label file's path").map(|path| Some(folder.join(path))))?;
     let raw = raw_layout(&mut section)?;
     let origins = section.origins;
     section.finish()?;
+    if let Some(spacing) = spacing {
+        check_spacing("volume.spacing", spacing).map_err(|error| origins.refused(error))?;
+    }
     let refused = |found| origins.invalid("volume", &[], found, "either volume.path or volume.builtin");
     let source = match (path, builtin) {
         (Some(path), None) => VolumeSource::File(folder.join(path)),
@@ -95,31 +90,22 @@ pub(super) fn camera(mut section: Section, fit: Fit) -> Result<Camera, SceneErro
     let (mut height, mut fov_y, mut distance, mut near) = (None, 30.0, None, None);
     let projections = [("orthographic", false), ("perspective", true)];
     section.read("projection", &mut is_perspective, |entry| entry.choice(&projections))?;
-    section.read("direction", &mut camera.direction, direction)?;
-    section.read("up", &mut camera.up, direction)?;
-    section.read("center", &mut camera.center, |entry| {
-        entry.numbers(FINITE).map(|center| Some(DVec3::from_array(center)))
-    })?;
+    section.read("direction", &mut camera.direction, vector)?;
+    section.read("up", &mut camera.up, vector)?;
+    section.read("center", &mut camera.center, |entry| vector(entry).map(Some))?;
     section.read("fit", &mut camera.fit, |entry| entry.choice(FITS))?;
-    section.read("height", &mut height, |entry| entry.number(POSITIVE).map(Some))?;
-    section.read("fov_y", &mut fov_y, |entry| entry.number(FOV))?;
-    section.read("distance", &mut distance, |entry| entry.number(POSITIVE).map(Some))?;
-    section.read("near", &mut near, |entry| entry.number(POSITIVE).map(Some))?;
+    section.read("height", &mut height, |entry| entry.number(Interval::POSITIVE).map(Some))?;
+    section.read("fov_y", &mut fov_y, |entry| entry.number(FOV_Y))?;
+    section.read("distance", &mut distance, |entry| entry.number(Interval::POSITIVE).map(Some))?;
+    section.read("near", &mut near, |entry| entry.number(Interval::POSITIVE).map(Some))?;
     let origins = section.origins;
     section.finish()?;
-    camera.projection = if is_perspective {
-        Projection::Perspective { fov_y, distance, near }
-    } else {
-        Projection::Orthographic { height }
-    };
-    let sine = camera.direction.normalize().cross(camera.up.normalize()).length();
-    if sine < 1e-9 {
-        return Err(origins.invalid(
-            "camera.up",
-            &["camera.direction"],
-            format!("{} with direction {}", camera.up, camera.direction),
-            "a vector not parallel to camera.direction",
-        ));
+    let perspective = Projection::Perspective { fov_y, distance, near };
+    let orthographic = Projection::Orthographic { height };
+    let [used, unused] = if is_perspective { [perspective, orthographic] } else { [orthographic, perspective] };
+    for projection in [unused, used] {
+        camera.projection = projection;
+        camera.check().map_err(|error| origins.refused(error))?;
     }
     Ok(camera)
 }
@@ -129,8 +115,10 @@ pub(super) fn image(mut section: Section) -> Result<ImageSettings, SceneError> {
     let mut image = ImageSettings::default();
     section.read("width", &mut image.width, Entry::pixels)?;
     section.read("height", &mut image.height, Entry::pixels)?;
-    section.read("background", &mut image.background, |entry| entry.numbers(SHARE))?;
+    section.read("background", &mut image.background, |entry| entry.numbers(Interval::SHARE))?;
+    let origins = section.origins;
     section.finish()?;
+    image.check().map_err(|error| origins.refused(error))?;
     Ok(image)
 }
 
@@ -139,33 +127,23 @@ pub(super) fn clip(mut section: Section) -> Result<Clip, SceneError> {
     let mut clip = Clip::default();
     section.read("planes", &mut clip.planes, planes)?;
     section.read("crop", &mut clip.crop, |entry| crop(entry).map(Some))?;
+    let origins = section.origins;
     section.finish()?;
+    clip.check().map_err(|error| origins.refused(error))?;
     Ok(clip)
 }
 
-/// At most so many planes.
+/// Planes.
 fn planes(entry: &Entry) -> Result<Vec<[f64; 4]>, SceneError> {
     let items = entry.items(&format!("an array of at most {MAX_PLANES} [nx, ny, nz, d]"))?;
-    if items.len() > MAX_PLANES {
-        return Err(entry.refused(format!("at most {MAX_PLANES} planes")));
-    }
-    let plane = |item: &Entry| {
-        let plane = item.numbers(FINITE)?;
-        let clip = Clip { planes: vec![plane], crop: None };
-        clip.check().map_err(|_| item.refused("[nx, ny, nz, d] with a normal other than 0"))?;
-        Ok(plane)
-    };
-    items.iter().map(plane).collect()
+    items.iter().map(|item| item.numbers(Interval::FINITE)).collect()
 }
 
 /// Two corners.
 fn crop(entry: &Entry) -> Result<[DVec3; 2], SceneError> {
     let allowed = "[[x, y, z], [x, y, z]], each number of the first below that of the second";
     let [low, high] = entry.array(allowed)?;
-    let crop = [DVec3::from_array(low.numbers(FINITE)?), DVec3::from_array(high.numbers(FINITE)?)];
-    let clip = Clip { planes: Vec::new(), crop: Some(crop) };
-    clip.check().map_err(|_| entry.refused(allowed))?;
-    Ok(crop)
+    Ok([vector(&low)?, vector(&high)?])
 }
 
 /// `[transfer]`.
@@ -178,6 +156,7 @@ pub(super) fn transfer(mut section: Section) -> Result<TransferSettings, SceneEr
     section.read("colormap", &mut transfer.colormap, |entry| entry.choice(&Colormap::ALL).map(Some))?;
     let origins = section.origins;
     section.finish()?;
+    transfer.check().map_err(|error| origins.refused(error))?;
     if transfer.color.is_some() && transfer.colormap.is_some() {
         return Err(origins.invalid(
             "transfer",
@@ -196,8 +175,8 @@ fn ramps(
     opacity: &mut Option<Ramp<f64>>,
     gradient_opacity: &mut Option<Ramp<f64>>,
 ) -> Result<(), SceneError> {
-    let rgb = |entry: &Entry| entry.numbers(SHARE).map(DVec3::from_array);
-    let share = |entry: &Entry| entry.number(SHARE);
+    let rgb = |entry: &Entry| entry.numbers(Interval::SHARE).map(DVec3::from_array);
+    let share = |entry: &Entry| entry.number(Interval::SHARE);
     section.read("color", color, |entry| entry.ramp("[value, [r, g, b]]", rgb).map(Some))?;
     section.read("opacity", opacity, |entry| entry.ramp("[value, opacity]", share).map(Some))?;
     let point = "[gradient magnitude, factor]";
@@ -209,6 +188,7 @@ fn labels(entry: &Entry) -> Result<BTreeMap<u16, LabelTables>, SceneError> {
     let mut labels = BTreeMap::new();
     for item in entry.items("tables [[transfer.label]]")? {
         let mut section = item.section("a table [[transfer.label]]")?;
+        let (origins, key) = (section.origins, section.name.clone());
         let label = section.require("label", LABEL, |entry| match entry.label()? {
             label if labels.contains_key(&label) => Err(entry.refused("a label that no table before has")),
             label => Ok(label),
@@ -217,6 +197,7 @@ fn labels(entry: &Entry) -> Result<BTreeMap<u16, LabelTables>, SceneError> {
         section.read("visible", &mut tables.visible, Entry::boolean)?;
         ramps(&mut section, &mut tables.color, &mut tables.opacity, &mut tables.gradient_opacity)?;
         section.finish()?;
+        tables.check(&key).map_err(|error| origins.refused(error))?;
         labels.insert(label, tables);
     }
     Ok(labels)
@@ -226,11 +207,13 @@ fn labels(entry: &Entry) -> Result<BTreeMap<u16, LabelTables>, SceneError> {
 pub(super) fn shading(mut section: Section, mut shading: Shading) -> Result<Shading, SceneError> {
     section.read("enabled", &mut shading.enabled, Entry::boolean)?;
     section.read("light", &mut shading.light, light)?;
-    section.read("ambient", &mut shading.ambient, |entry| entry.number(NOT_NEGATIVE))?;
-    section.read("diffuse", &mut shading.diffuse, |entry| entry.number(NOT_NEGATIVE))?;
-    section.read("specular", &mut shading.specular, |entry| entry.number(NOT_NEGATIVE))?;
-    section.read("shininess", &mut shading.shininess, |entry| entry.number(POSITIVE))?;
+    section.read("ambient", &mut shading.ambient, |entry| entry.number(Interval::NOT_NEGATIVE))?;
+    section.read("diffuse", &mut shading.diffuse, |entry| entry.number(Interval::NOT_NEGATIVE))?;
+    section.read("specular", &mut shading.specular, |entry| entry.number(Interval::NOT_NEGATIVE))?;
+    section.read("shininess", &mut shading.shininess, |entry| entry.number(Interval::POSITIVE))?;
+    let origins = section.origins;
     section.finish()?;
+    shading.check().map_err(|error| origins.refused(error))?;
     Ok(shading)
 }
 
@@ -244,27 +227,23 @@ pub(super) fn splatting(mut section: Section, compositing: Compositing) -> Resul
     section.read("footprint", &mut splatting.footprint, |entry| entry.choice(FORMS))?;
     section.read("compositing", &mut splatting.compositing, |entry| entry.choice(COMPOSITINGS))?;
     section.read("order", &mut splatting.order, |entry| entry.choice(ORDERS))?;
-    section.read("opacity_threshold", &mut splatting.opacity_threshold, |entry| entry.number(THRESHOLD))?;
+    section.read("opacity_threshold", &mut splatting.opacity_threshold, |entry| entry.number(Interval::THRESHOLD))?;
     section.read("culling", &mut splatting.culling, Entry::boolean)?;
     section.read("tiles", &mut splatting.tiles, Entry::boolean)?;
     section.read("rasterizer", &mut splatting.rasterizer, |entry| entry.choice(RASTERIZERS))?;
     section.read("footprint_box", &mut splatting.footprint_box, |entry| entry.choice(BOXES))?;
-    section.read("whole_below", &mut splatting.economies.whole_below, |entry| entry.number(SHARE))?;
-    section.read("beta", &mut splatting.economies.beta, |entry| entry.number(THRESHOLD))?;
-    section.read("resolution", &mut splatting.economies.resolution, |entry| entry.number(SHARE))?;
+    section.read("whole_below", &mut splatting.economies.whole_below, |entry| entry.number(Interval::SHARE))?;
+    section.read("beta", &mut splatting.economies.beta, |entry| entry.number(Interval::THRESHOLD))?;
+    section.read("resolution", &mut splatting.economies.resolution, |entry| entry.number(Interval::SHARE))?;
+    let origins = section.origins;
     section.finish()?;
+    splatting.check().map_err(|error| origins.refused(error))?;
     Ok(splatting)
 }
 
-/// A vector of which only the direction counts. Its length is kept, unless the length's square, or that of a product of
-/// two such vectors, would leave the range of `f64`.
-fn direction(entry: &Entry) -> Result<DVec3, SceneError> {
-    let vector = DVec3::from_array(entry.numbers(FINITE)?);
-    let largest = vector.abs().max_element();
-    if largest == 0.0 {
-        return Err(entry.refused("a vector other than [0, 0, 0]"));
-    }
-    Ok(if (1e-60..1e60).contains(&largest) { vector } else { vector / largest })
+/// Three numbers.
+fn vector(entry: &Entry) -> Result<DVec3, SceneError> {
+    entry.numbers(Interval::FINITE).map(DVec3::from_array)
 }
 
 /// `"headlight"` or a direction.
@@ -273,20 +252,13 @@ fn light(entry: &Entry) -> Result<Light, SceneError> {
     match entry.value.as_str() {
         Some("headlight") => Ok(Light::Headlight),
         Some(_) => Err(entry.refused(allowed)),
-        None if entry.value.is_array() => direction(entry).map(Light::Direction),
+        None if entry.value.is_array() => vector(entry).map(Light::Direction),
         None => Err(entry.mistyped(allowed)),
     }
 }
 
-/// One or more closed intervals.
+/// Closed intervals.
 fn iso_ranges(entry: &Entry) -> Result<Vec<[f64; 2]>, SceneError> {
     let items = entry.items("an array of one or more [lo, hi]")?;
-    if items.is_empty() {
-        return Err(entry.refused("an array of one or more [lo, hi]"));
-    }
-    let range = |item: &Entry| {
-        let range = item.numbers(FINITE)?;
-        if range[0] <= range[1] { Ok(range) } else { Err(item.refused("[lo, hi] with lo <= hi")) }
-    };
-    items.iter().map(range).collect()
+    items.iter().map(|item| item.numbers(Interval::FINITE)).collect()
 }

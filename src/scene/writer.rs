@@ -215,7 +215,7 @@ fn within(folder: &Path, path: &Path, key: &str) -> Result<String, SceneError> {
 
 /// The error for what cannot be written.
 fn invalid(key: &str, found: String, allowed: &str) -> SceneError {
-    SceneError::Invalid { origin: "scene".to_owned(), key: key.to_owned(), found, allowed: allowed.to_owned() }
+    SceneError::Invalid { origin: "scene".to_owned(), key: key.to_owned(), found, allowed: allowed.into() }
 }
 
 /// The way from a folder to a file; where they have nothing in common, or are not there, the file's absolute path.

@@ -1,12 +1,21 @@
 //! Cameras: where the image plane stands, and which pixel a world point falls on (SPEC §2).
 
+use std::ops::Bound;
+
 use glam::{DMat3, DVec3};
 
 use crate::error::RenderError;
+use crate::setting_error::{Interval, SettingError, check_direction, scaled};
 use crate::volume::Grid;
 
 /// The least and the largest pixel, in the volume's smallest spacings.
 const PIXELS: std::ops::RangeInclusive<f64> = 1e-25..=1e25;
+
+/// Opening angles.
+pub(crate) const FOV_Y: Interval = Interval::new(Bound::Excluded(0.0), Bound::Excluded(180.0)).of("degrees");
+
+/// Up and direction are parallel where the sine of their angle is below this.
+const PARALLEL: f64 = 1e-9;
 
 /// How the volume is projected.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,10 +74,34 @@ impl Default for Camera {
 }
 
 impl Camera {
+    /// Checks what types do not say.
+    ///
+    /// # Errors
+    /// If a number is not finite or out of its range, a vector is 0, or `up` is parallel to `direction`.
+    pub fn check(&self) -> Result<(), SettingError> {
+        match self.projection {
+            Projection::Orthographic { height } => Interval::POSITIVE.check_given("camera.height", height)?,
+            Projection::Perspective { fov_y, distance, near } => {
+                FOV_Y.check("camera.fov_y", fov_y)?;
+                Interval::POSITIVE.check_given("camera.distance", distance)?;
+                Interval::POSITIVE.check_given("camera.near", near)?;
+            }
+        }
+        let Self { direction, up, center, .. } = *self;
+        check_direction("camera.direction", direction)?;
+        check_direction("camera.up", up)?;
+        Interval::FINITE.check_each("camera.center", &center.unwrap_or_default().to_array())?;
+        if scaled(direction).normalize().cross(scaled(up).normalize()).length() < PARALLEL {
+            let found = format!("{up} with direction {direction}");
+            return Err(SettingError::new("camera.up", found, "a vector not parallel to camera.direction"));
+        }
+        Ok(())
+    }
+
     /// The viewing coordinate system u (screen right), v (screen up), w (into the scene), orthonormal (§4.2).
     pub fn basis(&self) -> ViewBasis {
-        let w = self.direction.normalize();
-        let u = w.cross(self.up).normalize();
+        let w = scaled(self.direction).normalize();
+        let u = w.cross(scaled(self.up)).normalize();
         ViewBasis { u, v: u.cross(w), w }
     }
 
@@ -88,8 +121,8 @@ impl Camera {
 
     /// The camera turned about its `up` by an angle in degrees, by the right hand; `center` stays.
     pub fn turned(self, degrees: f64) -> Self {
-        let rotation = DMat3::from_axis_angle(self.up.normalize(), degrees.to_radians());
-        Self { direction: rotation * self.direction, ..self }
+        let rotation = DMat3::from_axis_angle(scaled(self.up).normalize(), degrees.to_radians());
+        Self { direction: rotation * scaled(self.direction), ..self }
     }
 
     /// Size of a pixel in `unit`s (SPEC §2) for an image `height_world` world units and `height` pixels high.
@@ -102,11 +135,8 @@ impl Camera {
         if PIXELS.contains(&pix) {
             return Ok(pix);
         }
-        Err(RenderError::OutOfRange {
-            key: "camera.height",
-            found: format!("{height_world:e}"),
-            allowed: format!("{:.1e} to {:.1e}", PIXELS.start() * image_units, PIXELS.end() * image_units),
-        })
+        let allowed = within(PIXELS.start() * image_units, PIXELS.end() * image_units);
+        Err(SettingError::new("camera.height", height_world, allowed).into())
     }
 
     /// World units over the image's height for an orthographic camera: as given, or so that the volume's sphere
@@ -151,15 +181,20 @@ impl Camera {
         let eye = Eye { position, distance, near, pixel_per_depth };
         let (least, largest) = (PIXELS.start() / pixel_per_depth, PIXELS.end() / pixel_per_depth);
         let farthest = position.length() + sphere / unit;
-        let (key, found, allowed) = if !(least..=largest).contains(&eye.near) {
-            ("camera.near", eye.near * unit, format!("{:.1e} to {:.1e}", least * unit, largest * unit))
-        } else if farthest.is_nan() || farthest > largest {
-            ("camera.distance", distance * unit, format!("an eye at most {:.1e} from the volume's end", largest * unit))
-        } else {
-            return Ok(Some(eye));
-        };
-        Err(RenderError::OutOfRange { key, found: format!("{found:e}"), allowed })
+        if !(least..=largest).contains(&eye.near) {
+            let allowed = within(least * unit, largest * unit);
+            return Err(SettingError::new("camera.near", eye.near * unit, allowed).into());
+        }
+        if farthest.is_nan() || farthest > largest {
+            let allowed = format!("an eye at most {:.1e} from the volume's end", largest * unit);
+            return Err(SettingError::new("camera.distance", distance * unit, allowed).into());
+        }
+        Ok(Some(eye))
     }
+}
+
+fn within(min: f64, max: f64) -> Interval {
+    Interval::new(Bound::Included(min), Bound::Included(max))
 }
 
 /// A perspective camera's eye (SPEC §2). Lengths are `unit`s, depths are along w.
@@ -191,11 +226,9 @@ impl Eye {
         if last <= f64::from(i32::MAX) * 0.99 {
             return Ok(());
         }
-        Err(RenderError::OutOfRange {
-            key: "camera.distance",
-            found: format!("{:e}, so {last:e} slabs before the volume", self.distance * grid.unit()),
-            allowed: format!("eyes and slab widths with at most {} slabs between eye and volume", i32::MAX),
-        })
+        let found = format!("{:e}, so {last:e} slabs before the volume", self.distance * grid.unit());
+        let allowed = format!("eyes and slab widths with at most {} slabs between eye and volume", i32::MAX);
+        Err(SettingError::new("camera.distance", found, allowed).into())
     }
 }
 

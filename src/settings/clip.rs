@@ -13,7 +13,7 @@ use std::ops::Range;
 
 use glam::{DVec3, DVec4, UVec3};
 
-use crate::error::RenderError;
+use crate::setting_error::{Interval, SettingError};
 use crate::volume::Grid;
 
 /// The most planes, beside a crop box.
@@ -47,23 +47,27 @@ impl Clip {
     ///
     /// # Errors
     /// If there are too many planes, a normal is 0, a number is not finite, or a box has no volume.
-    pub fn check(&self) -> Result<(), RenderError> {
-        let refused = |key, found: String, allowed: String| Err(RenderError::OutOfRange { key, found, allowed });
+    pub fn check(&self) -> Result<(), SettingError> {
         if self.planes.len() > MAX_PLANES {
-            return refused("clip.planes", format!("{} planes", self.planes.len()), format!("at most {MAX_PLANES}"));
+            let found = format!("{} planes", self.planes.len());
+            return Err(SettingError::new("clip.planes", found, format!("at most {MAX_PLANES} planes")));
         }
-        let is_plane = |plane: &&[f64; 4]| normalized(plane).is_some();
-        if let Some(plane) = self.planes.iter().find(|plane| !is_plane(plane)) {
-            let allowed = "[nx, ny, nz, d], finite, with a normal other than 0";
-            return refused("clip.planes", format!("{plane:?}"), allowed.to_owned());
-        }
-        match self.crop {
-            Some([low, high]) if !(low.is_finite() && high.is_finite() && low.cmplt(high).all()) => {
-                let allowed = "[[x, y, z], [x, y, z]], finite, each number of the first below that of the second";
-                refused("clip.crop", format!("{:?}", [low.to_array(), high.to_array()]), allowed.to_owned())
+        for (at, plane) in self.planes.iter().enumerate() {
+            let key = format!("clip.planes[{at}]");
+            Interval::FINITE.check_each(&key, plane)?;
+            if normalized(plane).is_none() {
+                return Err(SettingError::new(key, &plane[..], "[nx, ny, nz, d] with a normal other than 0"));
             }
-            _ => Ok(()),
         }
+        let Some([low, high]) = self.crop else { return Ok(()) };
+        Interval::FINITE.check_each("clip.crop[0]", &low.to_array())?;
+        Interval::FINITE.check_each("clip.crop[1]", &high.to_array())?;
+        if !low.cmplt(high).all() {
+            let found = format!("[{low}, {high}]");
+            let allowed = "[[x, y, z], [x, y, z]], each number of the first below that of the second";
+            return Err(SettingError::new("clip.crop", found, allowed));
+        }
+        Ok(())
     }
 
     /// The half spaces whose common part is kept.
@@ -188,11 +192,11 @@ mod tests {
         crop(DVec3::ZERO, DVec3::ONE).check().unwrap();
         for (clip, words) in [
             (planes(&[[1.0, 0.0, 0.0, 0.0]; 7]), ["clip.planes", "7 planes", "at most 6"]),
-            (planes(&[[0.0, 0.0, 0.0, 1.0]]), ["clip.planes", "[0.0, 0.0, 0.0, 1.0]", "other than 0"]),
-            (planes(&[[f64::NAN, 0.0, 0.0, 1.0]]), ["clip.planes", "NaN", "finite"]),
-            (planes(&[[1.0, 0.0, 0.0, f64::INFINITY]]), ["clip.planes", "inf", "finite"]),
-            (crop(DVec3::ONE, DVec3::new(2.0, 1.0, 2.0)), ["clip.crop", "[2.0, 1.0, 2.0]", "below"]),
-            (crop(DVec3::NAN, DVec3::ONE), ["clip.crop", "NaN", "finite"]),
+            (planes(&[[0.0, 0.0, 0.0, 1.0]]), ["clip.planes[0]", "[0, 0, 0, 1]", "other than 0"]),
+            (planes(&[[f64::NAN, 0.0, 0.0, 1.0]]), ["clip.planes[0][0]", "NaN", "finite"]),
+            (planes(&[[1.0, 0.0, 0.0, f64::INFINITY]]), ["clip.planes[0][3]", "inf", "finite"]),
+            (crop(DVec3::ONE, DVec3::new(2.0, 1.0, 2.0)), ["clip.crop", "[2, 1, 2]", "below"]),
+            (crop(DVec3::NAN, DVec3::ONE), ["clip.crop[0][0]", "NaN", "finite"]),
         ] {
             let message = clip.check().unwrap_err().to_string();
             words.iter().for_each(|word| assert!(message.contains(word), "no {word:?} in {message}"));

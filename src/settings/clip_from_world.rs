@@ -3,6 +3,7 @@
 use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 
 use crate::error::RenderError;
+use crate::setting_error::SettingError;
 use crate::settings::camera::{Camera, Fit, Projection};
 
 /// How far lengths may differ, or cosines be from 0, relative: more than matrices that were multiplied in f32 are rounded by, and
@@ -132,5 +133,5 @@ fn singular() -> RenderError {
 }
 
 fn refused(found: String, allowed: &str) -> RenderError {
-    RenderError::OutOfRange { key: "clip_from_world", found, allowed: allowed.to_owned() }
+    SettingError::new("clip_from_world", found, allowed).into()
 }

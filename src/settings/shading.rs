@@ -2,11 +2,14 @@
 
 use glam::DVec3;
 
+use crate::setting_error::{Interval, SettingError, check_direction};
+
 /// Below this length (value per world unit) a gradient has no direction (SPEC §3).
 pub const MIN_GRADIENT: f64 = 1e-12;
 
 /// Where the light comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Light {
     /// From the eye.
     Headlight,
@@ -34,5 +37,23 @@ pub struct Shading {
 impl Default for Shading {
     fn default() -> Self {
         Self { enabled: true, ambient: 0.2, diffuse: 0.7, specular: 0.2, shininess: 20.0, light: Light::Headlight }
+    }
+}
+
+impl Shading {
+    /// Checks what types do not say.
+    ///
+    /// # Errors
+    /// If a number is not finite or out of its range, or the light's direction is 0.
+    pub fn check(&self) -> Result<(), SettingError> {
+        let Self { enabled: _, ambient, diffuse, specular, shininess, light } = *self;
+        Interval::NOT_NEGATIVE.check("shading.ambient", ambient)?;
+        Interval::NOT_NEGATIVE.check("shading.diffuse", diffuse)?;
+        Interval::NOT_NEGATIVE.check("shading.specular", specular)?;
+        Interval::POSITIVE.check("shading.shininess", shininess)?;
+        match light {
+            Light::Headlight => Ok(()),
+            Light::Direction(direction) => check_direction("shading.light", direction),
+        }
     }
 }

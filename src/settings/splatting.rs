@@ -1,9 +1,24 @@
 //! Splatting settings (SPEC §§4–6): kernel, slabs, compositing, early splat elimination.
 
-use crate::error::RenderError;
+use std::ops::Bound::{Excluded, Included};
+
+use crate::setting_error::{Interval, SettingError};
+
+/// Kernel radii, grid units.
+pub(crate) const RADIUS: Interval = Interval::new(Included(1.0), Included(4.0));
+/// Gaussian exponents of kernels.
+pub(crate) const FALLOFF: Interval = Interval::new(Excluded(0.0), Included(16.0));
+/// Widths of slabs, `unit`s.
+pub(crate) const SLAB_WIDTH: Interval = Interval::new(Included(0.05), Included(8.0));
+
+/// Checks an opacity whose depth is asked for: one that a ray can reach.
+pub(crate) fn check_first_hit(opacity: f64) -> Result<(), SettingError> {
+    Interval::THRESHOLD.check("first_hit", opacity)
+}
 
 /// Which voxels share a sheet buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Method {
     /// Kernel sections between planes parallel to the image (§3.2).
     ImageAligned,
@@ -29,6 +44,7 @@ pub enum FootprintForm {
 /// to the next), so the mean opacity per unit length, and colour times that. What a cut leaves of a slab counts by its share of the slab, but for
 /// [`Self::Minimum`]. They need sheets, so a method other than [`Method::CompositeEverySample`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Compositing {
     /// The paper's: opacities add up within a sheet, at most to 1.
     Linear,
@@ -79,6 +95,7 @@ pub enum Order {
 
 /// How kernel sections get to the pixels. The same image to rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Rasterizer {
     /// By tiles where device, view and footprint form allow it, else by quads.
     Auto,
@@ -155,15 +172,20 @@ pub struct Splatting {
 }
 
 impl Splatting {
-    /// Checks that the settings go together, whatever the device and the rasterizer.
+    /// Checks what types do not say, whatever the device and the rasterizer.
     ///
     /// # Errors
-    /// If means are asked for where there are no sheets, or surfaces back to front.
-    pub fn check(&self) -> Result<(), RenderError> {
-        let refused = |found: String, allowed: &str| {
-            let (key, allowed) = ("splatting.compositing", allowed.to_owned());
-            Err(RenderError::OutOfRange { key, found, allowed })
-        };
+    /// If a number is not finite or out of its range, means are asked for where there are no sheets, or surfaces back to front.
+    pub fn check(&self) -> Result<(), SettingError> {
+        RADIUS.check("splatting.radius", self.radius)?;
+        FALLOFF.check("splatting.falloff", self.falloff)?;
+        SLAB_WIDTH.check("splatting.slab_width", self.slab_width)?;
+        Interval::THRESHOLD.check("splatting.opacity_threshold", self.opacity_threshold)?;
+        let Economies { whole_below, beta, resolution } = self.economies;
+        Interval::SHARE.check("splatting.whole_below", whole_below)?;
+        Interval::THRESHOLD.check("splatting.beta", beta)?;
+        Interval::SHARE.check("splatting.resolution", resolution)?;
+        let refused = |found: String, allowed: &str| Err(SettingError::new("splatting.compositing", found, allowed));
         let name = format!("{:?}", self.compositing).to_lowercase();
         if self.compositing.is_by_means() && self.method == Method::CompositeEverySample {
             let found = format!("\"{name}\" with splatting.method = \"composite-every-sample\"");

@@ -5,24 +5,36 @@ use std::ops::{Add, Mul};
 
 use glam::DVec3;
 
+use crate::setting_error::{Interval, SettingError};
+
 /// Why control points make no [`Ramp`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RampError {
     /// There are none.
     #[error("no control points, allowed: at least one")]
     Empty,
     /// A position is infinite or not a number.
-    #[error("the position of control point {index} is not finite")]
+    #[error("control point {index}: found the position {position:?}, allowed: a finite number")]
+    #[non_exhaustive]
     NotFinite {
         /// Which one, from 0.
         index: usize,
+        /// The position.
+        position: f64,
     },
     /// A position is not above the one before it.
-    #[error("the position of control point {index} is not above the one before it")]
+    #[error(
+        "control point {index}: found the position {position:?}, allowed: above {before:?}, that of the point before"
+    )]
+    #[non_exhaustive]
     NotIncreasing {
         /// Which one, from 0, so at least 1.
         index: usize,
+        /// Its position.
+        position: f64,
+        /// The position of the point before.
+        before: f64,
     },
 }
 
@@ -43,10 +55,10 @@ impl<T: Copy + Add<Output = T> + Mul<f64, Output = T>> Ramp<T> {
             return Err(RampError::Empty);
         }
         if let Some(index) = points.iter().position(|(position, _)| !position.is_finite()) {
-            return Err(RampError::NotFinite { index });
+            return Err(RampError::NotFinite { index, position: points[index].0 });
         }
-        if let Some(before) = points.windows(2).position(|pair| pair[1].0 <= pair[0].0) {
-            return Err(RampError::NotIncreasing { index: before + 1 });
+        if let Some(at) = points.windows(2).position(|pair| pair[1].0 <= pair[0].0) {
+            return Err(RampError::NotIncreasing { index: at + 1, position: points[at + 1].0, before: points[at].0 });
         }
         Ok(Self { points })
     }
@@ -85,7 +97,7 @@ pub struct TransferFunction {
     pub opacity: Ramp<f64>,
     /// A factor in [0, 1] over gradient magnitudes (value per world unit); `None` is 1 everywhere.
     pub gradient_opacity: Option<Ramp<f64>>,
-    /// Closed intervals `[lo, hi]` of the values that take part; `None` is all of them.
+    /// Closed intervals `[lo, hi]` of the values that take part, at least one; `None` is all of them.
     pub iso_ranges: Option<Vec<[f64; 2]>>,
     /// Of a segmented volume the tables of single labels. Labels without any go by the ramps above. They mean nothing for other
     /// volumes.
@@ -112,6 +124,14 @@ impl Default for LabelTables {
 }
 
 impl LabelTables {
+    /// Checks what types do not say; `key` names the tables in errors, as `transfer.label[0]` does.
+    ///
+    /// # Errors
+    /// If a colour, opacity or factor is not in [0, 1].
+    pub fn check(&self, key: &str) -> Result<(), SettingError> {
+        check_ramps(key, self.color.as_ref(), self.opacity.as_ref(), self.gradient_opacity.as_ref())
+    }
+
     /// Whether voxels that take part look otherwise than without them; else only who takes part is another.
     pub fn matter_to_shading(&self) -> bool {
         self.visible && (self.color.is_some() || self.opacity.is_some() || self.gradient_opacity.is_some())
@@ -149,7 +169,58 @@ impl Tables<'_> {
     }
 }
 
+/// Checks that the values of a table's ramps are in [0, 1]; ramps themselves see to their positions.
+pub(crate) fn check_ramps(
+    table: &str,
+    color: Option<&Ramp<DVec3>>,
+    opacity: Option<&Ramp<f64>>,
+    gradient_opacity: Option<&Ramp<f64>>,
+) -> Result<(), SettingError> {
+    for (at, (_, rgb)) in color.iter().flat_map(|ramp| ramp.points()).enumerate() {
+        Interval::SHARE.check_each(&format!("{table}.color[{at}][1]"), &rgb.to_array())?;
+    }
+    for (name, ramp) in [("opacity", opacity), ("gradient_opacity", gradient_opacity)] {
+        for (at, &(_, share)) in ramp.iter().flat_map(|ramp| ramp.points()).enumerate() {
+            Interval::SHARE.check(&format!("{table}.{name}[{at}][1]"), share)?;
+        }
+    }
+    Ok(())
+}
+
+/// Checks the tables of labels.
+pub(crate) fn check_labels(labels: &BTreeMap<u16, LabelTables>) -> Result<(), SettingError> {
+    labels.iter().try_for_each(|(label, tables)| tables.check(&format!("transfer.label[{label}]")))
+}
+
+/// Checks that there is an interval, if some are given, and that intervals are finite and not reversed.
+pub(crate) fn check_iso_ranges(iso_ranges: Option<&[[f64; 2]]>) -> Result<(), SettingError> {
+    const KEY: &str = "transfer.iso_ranges";
+    let Some(ranges) = iso_ranges else { return Ok(()) };
+    if ranges.is_empty() {
+        return Err(SettingError::new(KEY, "[]", "an array of one or more [lo, hi]"));
+    }
+    for (at, range) in ranges.iter().enumerate() {
+        let key = format!("{KEY}[{at}]");
+        Interval::FINITE.check_each(&key, range)?;
+        if range[0] > range[1] {
+            return Err(SettingError::new(key, &range[..], "[lo, hi] with lo <= hi"));
+        }
+    }
+    Ok(())
+}
+
 impl TransferFunction {
+    /// Checks what types do not say.
+    ///
+    /// # Errors
+    /// If a colour, opacity or factor is not in [0, 1], also in a label's tables, there are iso-ranges but not one, or one is not finite or
+    /// reversed.
+    pub fn check(&self) -> Result<(), SettingError> {
+        check_ramps("transfer", Some(&self.color), Some(&self.opacity), self.gradient_opacity.as_ref())?;
+        check_iso_ranges(self.iso_ranges.as_deref())?;
+        check_labels(&self.labels)
+    }
+
     /// Colour and opacity by value, and nothing else.
     pub(crate) fn by_value(color: Ramp<DVec3>, opacity: Ramp<f64>) -> Self {
         Self { color, opacity, gradient_opacity: None, iso_ranges: None, labels: BTreeMap::new() }

@@ -1,6 +1,26 @@
 //! Rectilinear grids: extent and spacing, without values.
 
+use std::ops::Bound::Included;
+
 use glam::{DVec3, UVec3};
+
+use crate::setting_error::{Interval, SettingError};
+
+/// World units from voxel to voxel: squares and products of such lengths stay within `f64`.
+pub(crate) const SPACING: Interval = Interval::new(Included(1e-100), Included(1e100));
+
+/// The largest ratio of two spacings, so that warped voxels stay within `f32`.
+const MAX_ASPECT: f64 = 1e4;
+
+/// Checks the spacing under a key.
+pub(crate) fn check_spacing(key: &str, spacing: DVec3) -> Result<(), SettingError> {
+    SPACING.check_each(key, &spacing.to_array())?;
+    if spacing.max_element() / spacing.min_element() > MAX_ASPECT {
+        let allowed = format!("three numbers, none above {MAX_ASPECT} times another");
+        return Err(SettingError::new(key, spacing, allowed));
+    }
+    Ok(())
+}
 
 /// A rectilinear grid (SPEC §2), its centre at the world's origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,6 +32,20 @@ pub struct Grid {
 }
 
 impl Grid {
+    /// Checks what types do not say, as making a [`Volume`](crate::Volume) does.
+    ///
+    /// # Errors
+    /// If a dimension is 0, there are more than `u32::MAX` voxels, or a spacing is not within [1e-100, 1e100] or is more than 10⁴ times
+    /// another.
+    pub fn check(&self) -> Result<(), SettingError> {
+        let count = self.dims.to_array().iter().try_fold(1_u32, |product, &n| product.checked_mul(n));
+        if count.is_none_or(|count| count == 0) {
+            let allowed = "three sizes of at least 1, at most 4294967295 voxels";
+            return Err(SettingError::new("sizes", self.dims.as_dvec3(), allowed));
+        }
+        check_spacing("spacing", self.spacing)
+    }
+
     /// The voxel at a position in memory (x fastest).
     pub fn voxel_at(&self, index: u32) -> UVec3 {
         let (x, rest) = (index % self.dims.x, index / self.dims.x);

@@ -47,6 +47,7 @@ use rayon::prelude::*;
 pub(crate) use access::Access;
 pub use access::ReadOptions;
 pub use grid::Grid;
+pub(crate) use grid::{SPACING, check_spacing};
 pub use labels::Labels;
 use loaded::Loaded;
 pub use orientation::{Orientation, PatientSide};
@@ -54,8 +55,7 @@ pub use raw::RawLayout;
 pub use samples::SampleType;
 pub(crate) use samples::{SIZES, dims_of};
 
-/// The largest ratio of two spacings.
-const MAX_ASPECT: f64 = 1e4;
+use crate::setting_error::SettingError;
 
 /// Why a volume could not be loaded. Every message names the file (or builtin), the field, what was found and what is
 /// allowed.
@@ -64,6 +64,7 @@ const MAX_ASPECT: f64 = 1e4;
 pub enum VolumeError {
     /// The file could not be opened or read.
     #[error("{}: {source}", path.display())]
+    #[non_exhaustive]
     Io {
         /// The file.
         path: PathBuf,
@@ -72,6 +73,7 @@ pub enum VolumeError {
     },
     /// A header field, or the data it promises, is wrong.
     #[error("{origin}: {field}: found {found}, allowed: {allowed}")]
+    #[non_exhaustive]
     Invalid {
         /// The file, or `builtin:NAME`.
         origin: String,
@@ -91,6 +93,11 @@ pub struct Encoding {
     pub format: &'static str,
     /// The type of its samples, before slope and intercept.
     pub sample_type: SampleType,
+}
+
+/// A grid that is not allowed.
+fn refused(origin: &str, error: SettingError) -> VolumeError {
+    invalid(origin, &error.key, error.found.to_string(), error.allowed.to_string())
 }
 
 fn invalid(origin: &str, field: &str, found: String, allowed: String) -> VolumeError {
@@ -134,10 +141,9 @@ impl Volume {
     /// dimensions, a spacing is not within [1e-100, 1e100] or 10⁴ times another, or no value is finite.
     pub fn new(origin: &str, dims: UVec3, spacing: DVec3, mut values: Vec<f32>) -> Result<Self, VolumeError> {
         let invalid = |field: &str, found: String, allowed: &str| invalid(origin, field, found, allowed.to_owned());
-        let count = dims.to_array().iter().try_fold(1_u32, |product, &n| product.checked_mul(n));
-        let Some(count) = count.filter(|&count| count > 0) else {
-            return Err(invalid("sizes", format!("{dims}"), "three sizes of at least 1, at most 4294967295 voxels"));
-        };
+        let grid = Grid { dims, spacing };
+        grid.check().map_err(|error| refused(origin, error))?;
+        let count = dims.element_product();
         if values.len() != count as usize {
             return Err(invalid("data", format!("{} values", values.len()), &format!("{count} values")));
         }
@@ -145,9 +151,8 @@ impl Volume {
         if holes == u64::from(count) {
             return Err(invalid("data", "only NaN or infinite samples".to_owned(), "at least one finite sample"));
         }
-        let grid = Grid { dims, spacing: DVec3::ONE };
         let label_names = BTreeMap::new();
-        let volume = Self {
+        Ok(Self {
             grid,
             values,
             holes,
@@ -157,8 +162,7 @@ impl Volume {
             unit: None,
             encoding: None,
             palette: None,
-        };
-        volume.with_spacing(origin, spacing)
+        })
     }
 
     /// The same values at another spacing (world units per voxel step).
@@ -166,12 +170,7 @@ impl Volume {
     /// # Errors
     /// If a spacing is not within [1e-100, 1e100] or is more than 10⁴ times another.
     pub fn with_spacing(mut self, origin: &str, spacing: DVec3) -> Result<Self, VolumeError> {
-        let (least, largest) = (spacing.min_element(), spacing.max_element());
-        // Squares and products of such lengths stay within `f64`, and warped voxels within `f32`.
-        if !(spacing.is_finite() && least >= 1e-100 && largest <= 1e100 && largest / least <= MAX_ASPECT) {
-            let allowed = format!("three numbers from 1e-100 to 1e100, none above {MAX_ASPECT} times another");
-            return Err(invalid(origin, "spacing", format!("{:?}", spacing.to_array()), allowed));
-        }
+        check_spacing("spacing", spacing).map_err(|error| refused(origin, error))?;
         self.grid.spacing = spacing;
         Ok(self)
     }

@@ -78,6 +78,7 @@ macro_rules! sample_types {
     ($($name:ident: $type:ty = $text:literal),*) => {
         /// The type of the samples in a file. Shown as scenes name it: `int8`, `float32`.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[non_exhaustive]
         pub enum SampleType {
             $(#[doc = concat!("`", stringify!($type), "`")] $name),*
         }

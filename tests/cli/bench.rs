@@ -80,6 +80,9 @@ fn bench_of_bad_input_is_2() {
     assert_fails(2, "bench good.nrrd --frames -1", &["-1"]);
     assert_fails(2, "bench good.nrrd --frames many", &["--frames", "many"]);
     assert_fails(2, "bench good.nrrd --rotate round", &["--rotate", "round"]);
+    for angle in ["nan", "inf", "-inf"] {
+        assert_fails(2, &format!("bench good.nrrd --rotate={angle}"), &["--rotate", angle, "a finite number"]);
+    }
     assert_fails(2, "bench good.nrrd -o out.png", &["-o"]);
     assert_fails(2, "bench gone.nrrd", &["gone.nrrd", "No such file"]);
     assert_fails(2, "bench missing.toml", &["missing.toml", "No such file"]);

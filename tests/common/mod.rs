@@ -50,23 +50,20 @@ pub(crate) const FORMS: [(Rasterizer, FootprintForm); 3] = [
 
 /// Mesa's software driver: the tests compare images on it, so that they mean the same on every machine.
 pub(crate) fn lavapipe() -> HeadlessOptions {
-    HeadlessOptions { adapter: Some("llvmpipe".to_owned()), ..HeadlessOptions::default() }
+    HeadlessOptions::default().with_adapter("llvmpipe")
 }
 
 /// A device as the program opens it, with f32 sheets. Without any GPU or software driver the test fails.
 pub(crate) fn gpu() -> Headless {
-    let options = HeadlessOptions { sheet_format: Some(TextureFormat::Rgba32Float), ..lavapipe() };
+    let options = lavapipe().with_sheet_format(TextureFormat::Rgba32Float);
     Headless::new(&options).unwrap_or_else(|error| panic!("these tests need Mesa's lavapipe: {error}"))
 }
 
 /// A device with WebGPU's default limits, but for storage bindings of at most so many bytes.
 pub(crate) fn gpu_with_small_bindings(bytes: u64) -> Headless {
     let limits = Limits { max_storage_buffer_binding_size: bytes, ..Limits::default() };
-    let options = HeadlessOptions {
-        requirements: Some(DeviceRequirements { features: Features::FLOAT32_BLENDABLE, limits }),
-        sheet_format: Some(TextureFormat::Rgba32Float),
-        ..lavapipe()
-    };
+    let requirements = DeviceRequirements { features: Features::FLOAT32_BLENDABLE, limits };
+    let options = lavapipe().with_requirements(requirements).with_sheet_format(TextureFormat::Rgba32Float);
     Headless::new(&options).unwrap_or_else(|error| panic!("these tests need Mesa's lavapipe: {error}"))
 }
 

@@ -86,7 +86,7 @@ fn wrong_keys() {
         let error = parse(&KEYS.replace(from, to)).unwrap_err();
         let SceneError::Invalid { key: at, found: what, allowed: instead, .. } = &error else { panic!("{error}") };
         assert_eq!(at, key, "{error}");
-        assert!(what.contains(found) && instead.contains(allowed), "{error}");
+        assert!(what.contains(found) && instead.to_string().contains(allowed), "{error}");
     }
     let builtin = Scene::parse(&format!("[volume]\nbuiltin = 'cube'\n{KEYS}"), "", Path::new(""), &[]).unwrap_err();
     assert!(builtin.to_string().contains("volume.dims: found a volume that is no file"), "{builtin}");

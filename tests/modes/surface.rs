@@ -33,7 +33,7 @@ fn the_surface_of_a_step() {
             scene.camera.projection = projection.unwrap_or(scene.camera.projection);
             (scene.splatting.rasterizer, scene.splatting.slab_width) = (rasterizer, width);
             let mut view = gpu.view(volume, &scene).unwrap();
-            view.set_first_hit(Some(0.7));
+            view.set_first_hit(Some(0.7)).unwrap();
             let image = gpu.draw(&mut view).unwrap().image;
             for (at, pixel) in image.pixels.iter().enumerate() {
                 let color = COLOR.map(|channel| channel as f32);

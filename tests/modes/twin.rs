@@ -30,12 +30,12 @@ fn wall(view: &ViewGeometry) -> Vec<f64> {
 fn draw(gpu: &Headless, volume: &Volume, scene: &Scene, first_hit: Option<f64>, walls: bool) -> (Image, Vec<f64>) {
     let unit = volume.grid().unit();
     let mut view = gpu.view(volume.clone(), scene).unwrap();
-    view.set_first_hit(first_hit);
+    view.set_first_hit(first_hit).unwrap();
     if walls {
         let seen = view_of(volume, scene);
         let depths = wall(&seen);
         let range = DepthRange::Standard;
-        view.set_surfaces(Some(surfaces(gpu, &seen, unit, range, [0.01, 1000.0], &depths, [1, 2])));
+        view.set_surfaces(Some(surfaces(gpu, &seen, unit, range, [0.01, 1000.0], &depths, [1, 2]))).unwrap();
     }
     let image = gpu.draw(&mut view).unwrap().image;
     let hits = view.first_hits().map_or(Vec::new(), |texture| {
@@ -142,12 +142,14 @@ fn what_does_not_go_together_is_refused() {
     let gpu = gpu();
     let volume = builtin::volume("head:24").unwrap();
     let refusal = |scene: &Scene, first_hit: Option<f64>| {
-        let mut view = gpu.view(volume.clone(), scene).unwrap();
-        view.set_first_hit(first_hit);
-        match gpu.draw(&mut view) {
-            Err(RenderError::OutOfRange { key, found, allowed }) => {
-                assert_eq!(key, "splatting.compositing");
-                format!("{found}, allowed: {allowed}")
+        let rendered = gpu.view(volume.clone(), scene).and_then(|mut view| {
+            view.set_first_hit(first_hit)?;
+            gpu.draw(&mut view)
+        });
+        match rendered {
+            Err(RenderError::OutOfRange(error)) => {
+                assert_eq!(error.key, "splatting.compositing");
+                error.to_string()
             }
             other => panic!("{:?}", other.map(|rendering| rendering.stats)),
         }

@@ -53,6 +53,7 @@ impl<'a> KernelInView<'a> {
             Method::ImageAligned => (f64::from(from_eye) + view.slabs.origin) as f32,
             Method::AxisAligned => slice as f32,
             Method::CompositeEverySample => 0.0,
+            other => unreachable!("{other:?}"),
         };
         let r = eye.map_or(geometry.basis.w, |eye| {
             let slope = (center - geometry.size / 2.0) * eye.pixel_per_depth;
@@ -77,6 +78,7 @@ impl<'a> KernelInView<'a> {
             Method::ImageAligned => self.seen.geometry.slabs(&self.twin, self.seen.kernel.radius()),
             Method::AxisAligned => self.slice..self.slice + 1,
             Method::CompositeEverySample => 0..1,
+            other => unreachable!("{other:?}"),
         }
     }
 

@@ -20,7 +20,7 @@ const BACKGROUNDS: [[f64; 4]; 5] =
 
 fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
     let (device, queue) = (gpu.device(), gpu.queue());
-    let options = RendererOptions { blend: Blend::Replace, ..RendererOptions::for_target(TextureFormat::Rgba32Float) };
+    let options = RendererOptions::for_target(TextureFormat::Rgba32Float).with_blend(Blend::Replace);
     let stage = Resolve::new(device, &options);
     let mut random = Random(9);
     let cut = CompositingBuffer::bands(&device.limits(), size).unwrap();

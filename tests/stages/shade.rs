@@ -101,6 +101,7 @@ fn highlight_cosine(volume: &Volume, index: u32, scene: &Scene, geometry: &Geome
     let to_light = match scene.shading.light {
         Light::Headlight => to_eye,
         Light::Direction(direction) => direction.normalize(),
+        other => unreachable!("{other:?}"),
     };
     let normal = volume.gradient(voxel).normalize_or_zero();
     let sum = to_light + to_eye;

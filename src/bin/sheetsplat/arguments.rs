@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use clap::ValueEnum;
 use clap::builder::PossibleValuesParser;
+use sheetsplat::RenderError;
 use sheetsplat::appearance::{Colormap, Preset};
 use sheetsplat::headless::{Error, Headless, HeadlessOptions};
 use sheetsplat::image::PngDepth;
@@ -38,6 +39,11 @@ pub(crate) struct Input {
     /// Part of the name of the adapter to use.
     #[arg(long, value_name = "NAME", env = "WGPU_ADAPTER_NAME")]
     pub(crate) adapter: Option<String>,
+}
+
+/// Degrees: a finite number.
+pub(crate) fn parse_degrees(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|turn: &f64| turn.is_finite()).ok_or_else(|| "allowed: a finite number".to_owned())
 }
 
 /// Appearance by name; short for --set of the scene's keys, and before them.
@@ -175,7 +181,7 @@ impl Input {
     ) -> Result<Scene, Failure> {
         let mut scene = scene.clone();
         self.look_at(volume, &mut scene)?;
-        scene.transfer.check(volume).map_err(|error| self.failure(error))?;
+        scene.transfer.check_volume(volume).map_err(|error| self.failure(RenderError::from(error)))?;
         Ok(explicit(&scene, volume))
     }
 
@@ -193,7 +199,8 @@ impl Input {
     }
 
     pub(crate) fn headless(&self, profile: bool) -> Result<Headless, Failure> {
-        let options = HeadlessOptions { adapter: self.adapter.clone(), profile, ..HeadlessOptions::default() };
+        let mut options = HeadlessOptions::default().with_profile(profile);
+        options.adapter = self.adapter.clone();
         let start = Instant::now();
         let headless = Headless::new(&options).map_err(|error| Failure::Other(error.to_string()))?;
         log::info!("renderer ready after {:.1?}", start.elapsed());

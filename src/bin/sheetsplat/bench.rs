@@ -3,10 +3,11 @@
 use std::time::Instant;
 
 use serde::Serialize;
+use sheetsplat::RenderError;
 use sheetsplat::scene::Scene;
 use sheetsplat::stats::Stats;
 
-use crate::arguments::Input;
+use crate::arguments::{Input, parse_degrees};
 use crate::failure::Failure;
 use crate::outputs::Outputs;
 use crate::stdout;
@@ -20,7 +21,7 @@ pub(crate) struct Arguments {
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
     frames: u32,
     /// Degrees to turn about the camera's up before each of them.
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, value_parser = parse_degrees)]
     rotate: f64,
     /// Time every stage on the GPU, where the adapter has timestamp queries: stages_ms in the statistics.
     #[arg(long)]
@@ -56,7 +57,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 
     let mut times = Vec::new();
     for _ in 0..arguments.frames {
-        view.turn(arguments.rotate);
+        view.turn(arguments.rotate).map_err(|error| input.failure(RenderError::from(error)))?;
         let start = Instant::now();
         last = headless.draw(&mut view).map_err(|error| input.failure(error))?.stats;
         times.push(milliseconds_since(start));

@@ -25,7 +25,7 @@ impl Failure {
     pub(crate) fn of(error: Error, input: &str) -> Self {
         match error {
             Error::Scene(_) | Error::Volume(_) => Self::Input(error.to_string()),
-            Error::Render(RenderError::OutOfRange { .. } | RenderError::Limit { .. }) => {
+            Error::Render(RenderError::OutOfRange(_) | RenderError::Limit { .. }) => {
                 Self::Input(format!("{input}: {error}"))
             }
             _ => Self::Other(error.to_string()),

@@ -135,12 +135,14 @@ fn walls_cut_as_clip_planes_do() {
     let mut view = host.view(&seen());
     let (target, depth) = draw_wall(&host);
     let is_wall: Vec<bool> = pixels(&host.read(&target)).iter().map(|pixel| pixel[3] > 0.0).collect();
-    view.set_surfaces(Some(Surfaces { depth, origin: [0, 0], clip_from_world: clip_from_world() }));
-    view.set_first_hit(Some(0.5));
+    view.set_surfaces(Some(Surfaces { depth, origin: [0, 0], clip_from_world: clip_from_world() })).unwrap();
+    view.set_first_hit(Some(0.5)).unwrap();
     renderer.prepare(&host.device, &host.queue, &mut view).unwrap();
     let mut encoder = host.encoder();
     renderer.record(&mut encoder, &mut view);
-    renderer.present(&mut encoder, &mut view, &target.create_view(&Default::default()), Placement::whole(SIZE));
+    renderer
+        .present(&mut encoder, &mut view, &target.create_view(&Default::default()), Placement::whole(SIZE))
+        .unwrap();
     host.submit(encoder);
     let actual = pixels(&host.read(&target));
 

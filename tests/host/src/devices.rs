@@ -10,7 +10,7 @@ use crate::{Host, OPAQUE, TRANSPARENT, pixels, scene};
 const F32: TextureFormat = TextureFormat::Rgba32Float;
 
 fn replacing(format: TextureFormat) -> RendererOptions {
-    RendererOptions { blend: Blend::Replace, ..RendererOptions::for_target(format) }
+    RendererOptions::for_target(format).with_blend(Blend::Replace)
 }
 
 /// Of what the least devices can do, and those that can do all, the images agree; with every method and rasterizer.
@@ -99,10 +99,10 @@ fn merging_takes_the_better_of_both() {
 fn options_that_cannot_be_had_are_named() {
     let host = Host::with(Features::empty(), Limits::default());
     let of = RendererOptions::for_target;
-    let depth = |format| RendererOptions { depth_format: Some(format), ..of(TextureFormat::Rgba8Unorm) };
-    let samples = |sample_count, format| RendererOptions { sample_count, ..replacing(format) };
-    let sheets = |sheets| RendererOptions { sheets_per_group: Some(sheets), ..of(TextureFormat::Rgba8Unorm) };
-    let sheet_format = |format| RendererOptions { sheet_format: Some(format), ..of(TextureFormat::Rgba8Unorm) };
+    let depth = |format| of(TextureFormat::Rgba8Unorm).with_depth_format(format);
+    let samples = |sample_count, format| replacing(format).with_sample_count(sample_count);
+    let sheets = |sheets| of(TextureFormat::Rgba8Unorm).with_sheets_per_group(sheets);
+    let sheet_format = |format| of(TextureFormat::Rgba8Unorm).with_sheet_format(format);
     for (options, option, found) in [
         (of(TextureFormat::Rgba8Uint), "target_format", "Rgba8Uint"),
         (of(TextureFormat::Bc7RgbaUnorm), "target_format", "Bc7RgbaUnorm"),

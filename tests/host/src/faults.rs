@@ -32,7 +32,7 @@ fn what_a_host_submits_in_a_scope_is_its_validation_error() {
     let target = host.target(F32, size(&view), 1).create_view(&TextureViewDescriptor::default());
     let submitted = scoped(&host.device, || {
         let mut encoder = host.encoder();
-        renderer.present(&mut encoder, &mut view, &target, Placement::whole([90, 70]));
+        renderer.present(&mut encoder, &mut view, &target, Placement::whole([90, 70])).unwrap();
         host.submit(encoder);
     });
     assert!(matches!(submitted, Err(DeviceFault::Validation(_))), "{submitted:?}");
@@ -55,7 +55,7 @@ fn a_lost_device_is_lost_to_its_host() {
         let mut encoder = host.encoder();
         renderer.record(&mut encoder, &mut view);
         let target = target.create_view(&TextureViewDescriptor::default());
-        renderer.present(&mut encoder, &mut view, &target, Placement::whole([90, 70]));
+        renderer.present(&mut encoder, &mut view, &target, Placement::whole([90, 70])).unwrap();
         host.submit(encoder);
     });
     assert_eq!(submitted, Err(DeviceFault::Lost));

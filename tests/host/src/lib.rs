@@ -115,7 +115,7 @@ impl Host {
         let mut encoder = self.encoder();
         renderer.record(&mut encoder, view);
         let at = Placement::whole(size(view));
-        renderer.present(&mut encoder, view, &target.create_view(&wgpu::TextureViewDescriptor::default()), at);
+        renderer.present(&mut encoder, view, &target.create_view(&wgpu::TextureViewDescriptor::default()), at).unwrap();
         self.submit(encoder);
         self.read(&target)
     }
@@ -168,7 +168,7 @@ const TRANSPARENT: &str = "[0, 0, 0, 0]";
 
 /// The image as the library renders it by itself.
 fn headless(scene: &Scene) -> Vec<[f32; 4]> {
-    let options = HeadlessOptions { adapter: Some("llvmpipe".to_owned()), ..HeadlessOptions::default() };
+    let options = HeadlessOptions::default().with_adapter("llvmpipe");
     Headless::new(&options).unwrap().render(scene).unwrap().image.pixels
 }
 

@@ -39,7 +39,7 @@ fn the_image_goes_over_what_is_there() {
     renderer.prepare(&host.device, &host.queue, &mut view).unwrap();
     let mut encoder = host.encoder();
     renderer.record(&mut encoder, &mut view);
-    renderer.present(&mut encoder, &mut view, &view_of(&target), Placement::whole([width, height]));
+    renderer.present(&mut encoder, &mut view, &view_of(&target), Placement::whole([width, height])).unwrap();
     host.submit(encoder);
     let image = headless(&scene(TRANSPARENT));
     let translucent = image.iter().filter(|pixel| (0.1..0.9).contains(&pixel[3])).count();
@@ -54,7 +54,7 @@ fn the_image_goes_over_what_is_there() {
 fn images_go_anywhere_and_nothing_else_changes() {
     let limits = wgpu::Limits { max_storage_buffer_binding_size: 1 << 16, ..wgpu::Limits::default() };
     for host in [Host::new(), Host::with(wgpu::Features::FLOAT32_BLENDABLE, limits)] {
-        let options = RendererOptions { blend: Blend::Replace, ..RendererOptions::for_target(F32) };
+        let options = RendererOptions::for_target(F32).with_blend(Blend::Replace);
         let renderer = host.renderer(options);
         let mut view = host.view(&scene(OPAQUE));
         let [width, height] = size(&view).map(i64::from);
@@ -68,7 +68,7 @@ fn images_go_anywhere_and_nothing_else_changes() {
                 let target = host.filled(F32, large, bytemuck::cast_slice(&there));
                 let mut encoder = host.encoder();
                 // The image is still there: it need not be recorded again.
-                renderer.present(&mut encoder, &mut view, &view_of(&target), Placement { origin, scissor });
+                renderer.present(&mut encoder, &mut view, &view_of(&target), Placement { origin, scissor }).unwrap();
                 host.submit(encoder);
                 let actual = pixels(&host.read(&target));
                 let [x, y, w, h] = scissor.map(i64::from);
@@ -152,7 +152,8 @@ fn in_the_hosts_pass_with_depth_and_samples() {
     let format = TextureFormat::Rgba16Float;
     let image = headless(&scene(TRANSPARENT));
     for (sample_count, depth) in [(1, None), (1, Some(DEPTH)), (4, None), (4, Some(DEPTH))] {
-        let options = RendererOptions { sample_count, depth_format: depth, ..RendererOptions::for_target(format) };
+        let mut options = RendererOptions::for_target(format).with_sample_count(sample_count);
+        options.depth_format = depth;
         let renderer = host.renderer(options);
         let view = recorded(&host, &renderer, TRANSPARENT);
         let pass = Pass { host: &host, size: [100, 80], sample_count, depth };

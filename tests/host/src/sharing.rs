@@ -9,7 +9,7 @@ const F32: TextureFormat = TextureFormat::Rgba32Float;
 const BYTES: TextureFormat = TextureFormat::Rgba8Unorm;
 
 fn replacing(format: TextureFormat) -> RendererOptions {
-    RendererOptions { blend: Blend::Replace, ..RendererOptions::for_target(format) }
+    RendererOptions::for_target(format).with_blend(Blend::Replace)
 }
 
 fn bytes(image: &[[f32; 4]]) -> Vec<u8> {
@@ -44,7 +44,7 @@ fn a_volume_is_uploaded_once() {
     assert!(pixels(&host.render(&renderers[0], F32, first)) == images[0]);
     assert_within_one(&host.render(&renderers[1], BYTES, second), &bytes(&images[1]));
     // The views change each their own transfer function.
-    first.set_iso_ranges(Some(vec![[150.0, 255.0]]));
+    first.set_iso_ranges(Some(vec![[150.0, 255.0]])).unwrap();
     assert!(pixels(&host.render(&renderers[0], F32, first)) != images[0]);
     assert_within_one(&host.render(&renderers[1], BYTES, second), &bytes(&images[1]));
 }
@@ -54,12 +54,8 @@ fn a_volume_is_uploaded_once() {
 fn a_view_serves_several_renderers() {
     let host = Host::new();
     let quads = |format, sheet_format, sheets| {
-        host.renderer(RendererOptions {
-            rasterizer: sheetsplat::settings::Rasterizer::Quads,
-            sheet_format: Some(sheet_format),
-            sheets_per_group: Some(sheets),
-            ..replacing(format)
-        })
+        let options = replacing(format).with_rasterizer(sheetsplat::settings::Rasterizer::Quads);
+        host.renderer(options.with_sheet_format(sheet_format).with_sheets_per_group(sheets))
     };
     let renderers = [quads(F32, F32, 4), quads(BYTES, TextureFormat::Rgba16Float, 2)];
     let mut view = host.view(&scene(OPAQUE));
@@ -67,7 +63,7 @@ fn a_view_serves_several_renderers() {
     let target = host.target(BYTES, size(&view), 1);
     let mut encoder = host.encoder();
     let to = target.create_view(&wgpu::TextureViewDescriptor::default());
-    renderers[1].present(&mut encoder, &mut view, &to, Placement::whole([90, 70]));
+    renderers[1].present(&mut encoder, &mut view, &to, Placement::whole([90, 70])).unwrap();
     host.submit(encoder);
     assert_within_one(&host.read(&target), &bytes(&alone));
     for _ in 0..2 {
@@ -87,7 +83,7 @@ fn views_change_their_size() {
     let mut held = Vec::new();
     for size in [[90, 70], [200, 150], [1, 1], [33, 64], [90, 70]] {
         [scene.image.width, scene.image.height] = size;
-        view.set_image(scene.image);
+        view.set_image(scene.image).unwrap();
         assert!(pixels(&host.render(&renderer, F32, &mut view)) == headless(&scene), "{size:?}");
         held.push(view.gpu_bytes());
     }
@@ -103,13 +99,13 @@ fn what_cannot_be_prepared_leaves_the_last_image() {
     let before = host.render(&renderer, F32, &mut view);
     let mut image = view.scene().image;
     image.width = 1_000_000;
-    view.set_image(image);
+    view.set_image(image).unwrap();
     let error = renderer.prepare(&host.device, &host.queue, &mut view).unwrap_err().to_string();
     assert!(error.contains("image.width") && error.contains("1000000"), "{error}");
     let target = host.target(F32, [90, 70], 1);
     let mut encoder = host.encoder();
     let to = target.create_view(&wgpu::TextureViewDescriptor::default());
-    renderer.present(&mut encoder, &mut view, &to, Placement::whole([90, 70]));
+    renderer.present(&mut encoder, &mut view, &to, Placement::whole([90, 70])).unwrap();
     host.submit(encoder);
     assert!(host.read(&target) == before);
 }
@@ -125,7 +121,7 @@ fn what_was_never_prepared_draws_nothing() {
     let mut encoder = host.encoder();
     renderer.record(&mut encoder, &mut view);
     let to = target.create_view(&wgpu::TextureViewDescriptor::default());
-    renderer.present(&mut encoder, &mut view, &to, Placement::whole([90, 70]));
+    renderer.present(&mut encoder, &mut view, &to, Placement::whole([90, 70])).unwrap();
     host.submit(encoder);
     assert!(host.read(&target) == there);
 }
@@ -148,7 +144,7 @@ fn everything_may_be_dropped() {
             renderer.prepare(&host.device, &host.queue, &mut view).unwrap();
             let mut encoder = host.encoder();
             renderer.record(&mut encoder, &mut view);
-            renderer.present(&mut encoder, &mut view, &to, Placement::whole([90, 70]));
+            renderer.present(&mut encoder, &mut view, &to, Placement::whole([90, 70])).unwrap();
             assert!(ours() > 5, "{} allocations", ours());
             encoder
         });
@@ -164,7 +160,7 @@ fn everything_may_be_dropped() {
 #[test]
 fn counts_come_while_the_image_is_presented() {
     let host = Host::new();
-    let renderer = host.renderer(RendererOptions { profile: true, ..replacing(F32) });
+    let renderer = host.renderer(replacing(F32).with_profile(true));
     let target = host.target(F32, [90, 70], 1);
     let to = target.create_view(&wgpu::TextureViewDescriptor::default());
     let mut view = host.view(&scene(OPAQUE));
@@ -173,13 +169,13 @@ fn counts_come_while_the_image_is_presented() {
         let mut encoder = host.encoder();
         renderer.record(&mut encoder, &mut view);
         for _ in 0..presents {
-            renderer.present(&mut encoder, &mut view, &to, Placement::whole([90, 70]));
+            renderer.present(&mut encoder, &mut view, &to, Placement::whole([90, 70])).unwrap();
         }
         host.submit(encoder);
         let counts = view.counts().unwrap();
         assert!(view.counts().is_none(), "once per frame");
         let mut encoder = host.encoder();
-        renderer.present(&mut encoder, &mut view, &to, Placement::whole([90, 70]));
+        renderer.present(&mut encoder, &mut view, &to, Placement::whole([90, 70])).unwrap();
         host.submit(encoder);
         host.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
         let (counts, times) = counts.try_get().unwrap().unwrap();

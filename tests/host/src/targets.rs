@@ -10,7 +10,7 @@ use crate::{F16, Host, OPAQUE, f16, headless, pixels, scene};
 const TINTED: &str = "[0.9, 0.4, 0.1, 0.5]";
 
 fn replacing(format: TextureFormat) -> RendererOptions {
-    RendererOptions { blend: Blend::Replace, ..RendererOptions::for_target(format) }
+    RendererOptions::for_target(format).with_blend(Blend::Replace)
 }
 
 fn render(host: &Host, options: RendererOptions, background: &str) -> Vec<u8> {
@@ -65,7 +65,7 @@ fn f16_targets_round() {
     let host = Host::new();
     let expected = headless(&scene(TINTED));
     for is_linear in [false, true] {
-        let options = RendererOptions { linear: Some(is_linear), ..replacing(TextureFormat::Rgba16Float) };
+        let options = replacing(TextureFormat::Rgba16Float).with_linear(is_linear);
         let actual: Vec<[u16; 4]> = bytemuck::pod_collect_to_vec(&render(&host, options, TINTED));
         for (actual, &expected) in actual.iter().zip(&expected) {
             let expected = if is_linear { linear(expected) } else { expected.map(f64::from) };

@@ -29,11 +29,11 @@ pub(super) fn plate(scene: &Scene, volume: &Volume, transfer: &TransferFunction)
     // Where one value is what a pixel shows, its opacity is brightness.
     let is_projection = match scene.splatting.compositing {
         Compositing::Maximum | Compositing::Minimum => true,
-        Compositing::Linear | Compositing::Exponential | Compositing::Surface => false,
         Compositing::Xray | Compositing::Average => {
             let found = "splatting.compositing = \"xray\" or \"average\", which add colours up";
             return refused(found, "any other compositing");
         }
+        _ => false,
     };
     if volume.labels().is_none() && categories::is_label_map(volume) {
         return refused("a volume of labels", "values that are amounts, or legend");

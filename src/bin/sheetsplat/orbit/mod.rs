@@ -8,13 +8,14 @@ use std::io::{self, BufWriter, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use sheetsplat::RenderError;
 use sheetsplat::image::Image;
 use sheetsplat::image::output::Target;
 use sheetsplat::scene::Scene;
 use sheetsplat::volume::Volume;
 
 use crate::annotate::{Annotate, Overlay};
-use crate::arguments::{Depth, Input, check_scene_file, log_frame, scene_file};
+use crate::arguments::{Depth, Input, check_scene_file, log_frame, parse_degrees, scene_file};
 use crate::failure::Failure;
 use crate::outputs::{self, Outputs};
 use crate::progress::Progress;
@@ -37,7 +38,7 @@ pub(crate) struct Arguments {
     #[arg(short, long, value_name = "FILES")]
     output: PathBuf,
     /// Degrees that all frames turn by, about the camera's up, by the right hand. The last frame is one step before the end.
-    #[arg(long, value_name = "DEGREES", default_value_t = 360.0, allow_negative_numbers = true, value_parser = parse_turn)]
+    #[arg(long, value_name = "DEGREES", default_value_t = 360.0, allow_negative_numbers = true, value_parser = parse_degrees)]
     turn: f64,
     /// Frames in all.
     #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..))]
@@ -61,11 +62,6 @@ pub(crate) struct Arguments {
     /// Colour resolution of YUV4MPEG2: halved both ways, for which width and height must be even, or full.
     #[arg(long, value_enum, default_value = "420")]
     chroma: Chroma,
-}
-
-/// A finite number.
-fn parse_turn(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|turn: &f64| turn.is_finite()).ok_or_else(|| "allowed: a finite number".to_owned())
 }
 
 /// `A..B`, not empty.
@@ -184,7 +180,8 @@ impl Shown {
         let mut progress = Progress::new(frames.len(), progress);
         for &frame in frames {
             // From where the scene's camera is, whichever frame was drawn before.
-            view.set_camera(scene.camera.turned(turn * f64::from(frame) / f64::from(*count)));
+            let camera = scene.camera.turned(turn * f64::from(frame) / f64::from(*count));
+            view.set_camera(camera).map_err(|error| input.failure(RenderError::from(error)))?;
             let mut rendering = headless.draw(&mut view).map_err(|error| input.failure(error))?;
             overlay.draw(&mut rendering.image);
             take(frame, &rendering.image)?;

@@ -59,7 +59,7 @@ impl Guest {
     pub(super) fn new(host: &RenderState, volume: Volume, scene: &Scene, input: &str) -> Result<Self, Failure> {
         let RenderState { adapter, device, queue, .. } = host;
         let info = adapter.get_info();
-        let options = RendererOptions { blend: Blend::Replace, ..RendererOptions::for_target(FORMAT) };
+        let options = RendererOptions::for_target(FORMAT).with_blend(Blend::Replace);
         let renderer = Renderer::new(device, queue, &options).map_err(|error| Failure::Other(error.to_string()))?;
         let volume = GpuVolume::new(device, queue, volume);
         let view = volume.and_then(|volume| SceneView::new(device, &volume, scene));
@@ -109,12 +109,12 @@ impl Guest {
         let Self { view, renderer, .. } = self;
         let RenderState { device, queue, .. } = &self.host;
         if transfer != view.volume().transfer() {
-            view.set_transfer_function(transfer.clone());
+            view.set_transfer_function(transfer.clone())?;
         }
-        view.set_camera(scene.camera);
-        view.set_image(scene.image);
-        view.set_shading(scene.shading);
-        view.set_splatting(scene.splatting);
+        view.set_camera(scene.camera)?;
+        view.set_image(scene.image)?;
+        view.set_shading(scene.shading)?;
+        view.set_splatting(scene.splatting)?;
         renderer.prepare(device, queue, view)?;
         self.stats.prepare_ms = start.elapsed().as_secs_f64() * 1e3;
 
@@ -125,7 +125,7 @@ impl Guest {
             device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.frame") });
         renderer.record(&mut encoder, view);
         let at = Placement::whole([scene.image.width, scene.image.height]);
-        renderer.present(&mut encoder, view, &target, at);
+        renderer.present(&mut encoder, view, &target, at)?;
         queue.submit([encoder.finish()]);
         let counts = view.counts();
         device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| RenderError::Readback(error.to_string()))?;
