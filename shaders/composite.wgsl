@@ -8,7 +8,7 @@
 // The opacity buffer, cut off at the threshold: one bit per pixel, set from `opacity_threshold` on.
 @group(0) @binding(5) var<storage, read_write> opaque: array<u32>;
 @group(0) @binding(6) var<storage, read_write> opaque_tiles: array<u32>;
-@group(0) @binding(7) var<uniform> group: Group;
+@group(0) @binding(7) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(8) var<uniform> cut: Cut;
 @group(0) @binding(9) var surfaces: texture_depth_2d;
 // Of every pixel the sheet depth of its first hit, as bits; 0 is none.
@@ -55,7 +55,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
         return;
     }
     let layers = textureNumLayers(sheets);
-    let is_after_gap = last_groups[tile] + 1u != group.number;
+    let is_after_gap = last_groups[tile] + 1u != sheet_group.number;
     for (var row = local.y; row < TILE; row += ROWS) {
         let pixel = corner + vec2u(local.x, row);
         // Pixels off the image count as opaque.
@@ -78,7 +78,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
             for (var i = 0u; i < layers; i += 1u) {
                 let layer = select(layers - 1u - i, i, frame.order == FRONT_TO_BACK);
                 var sheet = textureLoad(sheets, pixel, layer, 0);
-                let near = group.near + f32(layer) * frame.slab_width;
+                let near = sheet_group.near + f32(layer) * frame.slab_width;
                 let part = vec2f(max(ray.x, near), min(ray.y, near + frame.slab_width));
                 if CUT && COMPOSITING != MINIMUM {
                     sheet *= max(part.y - part.x, 0.0) / frame.slab_width;
@@ -101,7 +101,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
             }
             acc[slot] = image;
             // What lies behind a cut is as hidden as what lies behind opaque voxels.
-            let is_cut = CUT && ray.y <= group.near + f32(layers) * frame.slab_width;
+            let is_cut = CUT && ray.y <= sheet_group.near + f32(layers) * frame.slab_width;
             is_opaque = image.a >= frame.opacity_threshold || is_cut;
         }
         if is_opaque {
@@ -120,7 +120,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
                 all_opaque &= atomicLoad(&opaque_rows[row]);
             }
             opaque_tiles[tile] = select(0u, 1u, all_opaque == 0xffffffffu);
-            last_groups[tile] = group.number;
+            last_groups[tile] = sheet_group.number;
         }
     }
 }

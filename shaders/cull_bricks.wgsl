@@ -1,7 +1,7 @@
 // Which bricks a sheet group visits (§6): those that reach into the group and are not behind opaque pixels alone. One
 // workgroup, so that the visits keep the order of the bricks: the same frame gives the same bytes.
 
-@group(0) @binding(1) var<uniform> group: Group;
+@group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(2) var<storage, read> bricks: array<Brick>;
 // Bricks by their first sheet group.
 @group(0) @binding(3) var<storage, read> order: array<u32>;
@@ -18,9 +18,9 @@ override SHEETS: u32 = 4u;
 // Whether all pixels are opaque in the footprints' boxes around centres from low to high.
 fn is_behind(low: vec2f, high: vec2f) -> bool {
     let last = vec2f(frame.size - 1u);
-    let margin = group.half_box + BOX_SLACK;
+    let margin = sheet_group.half_box + BOX_SLACK;
     let first_pixel = vec2u(clamp(ceil(low - margin - 0.5), vec2f(0.0), last));
-    let end = vec2u(clamp(floor(high + margin - 0.5) - vec2f(group.box_filter), vec2f(0.0), last));
+    let end = vec2u(clamp(floor(high + margin - 0.5) - vec2f(sheet_group.box_filter), vec2f(0.0), last));
     let last_pixel = max(first_pixel, end);
     let words = tile_grid(frame.size).x;
     for (var word = first_pixel.x / TILE; word <= last_pixel.x / TILE; word += 1u) {
@@ -54,8 +54,8 @@ fn is_visited(at: u32) -> bool {
     // Rounding must not lose a voxel that touches by a hair.
     let slack = 1e-3;
     let depth_reach = spread.z + frame.reach + slack;
-    let far = group.near + f32(SHEETS) * frame.slab_width;
-    if p.z + depth_reach <= group.near || p.z - depth_reach >= far {
+    let far = sheet_group.near + f32(SHEETS) * frame.slab_width;
+    if p.z + depth_reach <= sheet_group.near || p.z - depth_reach >= far {
         return false;
     }
     let farthest = p.w + spread.w;
@@ -67,10 +67,10 @@ fn is_visited(at: u32) -> bool {
     let high_h = p.xy + spread.xy;
     let low = min(low_h / nearest, low_h / farthest) + 0.5 * vec2f(frame.size) - slack;
     let high = max(high_h / nearest, high_h / farthest) + 0.5 * vec2f(frame.size) + slack;
-    if any(high + group.half_box < vec2f(0.5)) || any(low - group.half_box > vec2f(frame.size) - 0.5) {
+    if any(high + sheet_group.half_box < vec2f(0.5)) || any(low - sheet_group.half_box > vec2f(frame.size) - 0.5) {
         return false;
     }
-    return group.culling == 0u || !is_behind(low, high);
+    return sheet_group.culling == 0u || !is_behind(low, high);
 }
 
 @compute @workgroup_size(256)
@@ -78,14 +78,14 @@ fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) wor
     start(workgroup.z);
     // Every thread takes a run of bricks, at most 32 at a time: their answers fit a word.
     var total = 0u;
-    for (var base = 0u; base < group.brick_count; base += WORKGROUP_SIZE * 32u) {
-        let rest = min(group.brick_count - base, WORKGROUP_SIZE * 32u);
+    for (var base = 0u; base < sheet_group.brick_count; base += WORKGROUP_SIZE * 32u) {
+        let rest = min(sheet_group.brick_count - base, WORKGROUP_SIZE * 32u);
         let run = (rest + WORKGROUP_SIZE - 1u) / WORKGROUP_SIZE;
         let first = min(thread * run, rest);
         let end = min(first + run, rest);
         var visited = 0u;
         for (var i = first; i < end; i += 1u) {
-            if is_visited(order[group.first_brick + base + i]) {
+            if is_visited(order[sheet_group.first_brick + base + i]) {
                 visited |= 1u << (i - first);
             }
         }
@@ -93,7 +93,7 @@ fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) wor
         var slot = total + sum_up_to(thread, vec2u(own, 0u)).x - own;
         for (var i = first; i < end; i += 1u) {
             if (visited & (1u << (i - first))) != 0u {
-                let at = order[group.first_brick + base + i];
+                let at = order[sheet_group.first_brick + base + i];
                 visits[slot] = Visit(vec2u(0u), vec2u(0u), at, 0u);
                 slot += 1u;
             }
@@ -103,7 +103,7 @@ fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) wor
     }
     if thread == 0u {
         args = indirect(total);
-        atomicAdd(&culled.tally.bricks_tested, group.brick_count);
+        atomicAdd(&culled.tally.bricks_tested, sheet_group.brick_count);
         atomicAdd(&culled.tally.bricks_visited, total);
     }
 }

@@ -1,6 +1,6 @@
 // Which voxels of the visited bricks a sheet group draws (§6). One workgroup per visited brick, one thread per place for a voxel.
 
-@group(0) @binding(1) var<uniform> group: Group;
+@group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(2) var<storage, read> bricks: array<Brick>;
 @group(0) @binding(3) var<storage, read> occluded: array<u32>;
 @group(0) @binding(4) var<storage, read_write> visits: array<Visit>;
@@ -25,9 +25,9 @@ fn is_occluded(x: u32, y: u32) -> bool {
 // good: it holds all of the box that is on the image.
 fn is_hidden(center_px: vec2f) -> bool {
     let last = vec2f(frame.size - 1u);
-    let margin = group.half_box + BOX_SLACK;
+    let margin = sheet_group.half_box + BOX_SLACK;
     let first = vec2u(clamp(ceil(center_px - margin - 0.5), vec2f(0.0), last));
-    let end = max(first, vec2u(clamp(floor(center_px + margin - 0.5) - vec2f(group.box_filter), vec2f(0.0), last)));
+    let end = max(first, vec2u(clamp(floor(center_px + margin - 0.5) - vec2f(sheet_group.box_filter), vec2f(0.0), last)));
     return is_occluded(first.x, first.y) && is_occluded(end.x, first.y)
         && is_occluded(first.x, end.y) && is_occluded(end.x, end.y);
 }
@@ -35,8 +35,8 @@ fn is_hidden(center_px: vec2f) -> bool {
 // Marks the tiles that the footprint's box overlaps.
 fn mark_tiles(center_px: vec2f) {
     let last = vec2f(frame.size - 1u);
-    let first_tile = vec2u(clamp(center_px - group.half_box - 0.5, vec2f(0.0), last)) / TILE;
-    let last_tile = vec2u(clamp(center_px + group.half_box, vec2f(0.0), last)) / TILE;
+    let first_tile = vec2u(clamp(center_px - sheet_group.half_box - 0.5, vec2f(0.0), last)) / TILE;
+    let last_tile = vec2u(clamp(center_px + sheet_group.half_box, vec2f(0.0), last)) / TILE;
     let columns = tile_grid(frame.size).x;
     for (var y = first_tile.y; y <= last_tile.y; y += 1u) {
         for (var x = first_tile.x; x <= last_tile.x; x += 1u) {
@@ -63,15 +63,15 @@ fn main(@builtin(local_invocation_index) slot: u32, @builtin(workgroup_id) workg
     if (brick.present[word] & ~state.hidden[word] & bit) != 0u {
         let p = project(voxel_of(brick, slot));
         let center_px = p.xy;
-        let on_screen = all(center_px + group.half_box >= vec2f(0.5))
-            && all(center_px - group.half_box <= vec2f(frame.size) - 0.5);
+        let on_screen = all(center_px + sheet_group.half_box >= vec2f(0.5))
+            && all(center_px - sheet_group.half_box <= vec2f(frame.size) - 0.5);
         // The sheets of this group that the kernel overlaps, with more than the depths' rounding errors: what ends at a plane
         // does not reach the sheet behind it. The first voxel is about as deep as any.
-        let error = 2e-7 * (frame.radius + abs(frame.screen_from_voxel[2].w) + abs(group.near));
-        let depths = (overlapped(p, error, frame.near > 0.0) - group.near) / frame.slab_width;
+        let error = 2e-7 * (frame.radius + abs(frame.screen_from_voxel[2].w) + abs(sheet_group.near));
+        let depths = (overlapped(p, error, frame.near > 0.0) - sheet_group.near) / frame.slab_width;
         let first_sheet = max(floor(depths.x), 0.0);
         let end_sheet = min(ceil(depths.y), f32(SHEETS));
-        let is_drawn = on_screen && !(group.culling != 0u && is_hidden(center_px));
+        let is_drawn = on_screen && !(sheet_group.culling != 0u && is_hidden(center_px));
         // Front to back boxes only shrink: what is off the screen or hidden stays so. Back to front, where nothing is hidden, they grow.
         if !is_drawn && frame.order == FRONT_TO_BACK {
             atomicOr(&hidden_now[word], bit);
@@ -82,7 +82,7 @@ fn main(@builtin(local_invocation_index) slot: u32, @builtin(workgroup_id) workg
         let is_beside = sections > 0u && frame.near > 0.0 && any(abs(center_px - 0.5 * vec2f(frame.size)) > 0.5 * vec2f(frame.size));
         for (var once = is_beside; once; once = false) {
             let ray = local_ray(center_px);
-            let planes = sheet_planes(ray, p.z, p.w, group.near);
+            let planes = sheet_planes(ray, p.z, p.w, sheet_group.near);
             let maps = section_maps(ray, p.w, planes.near, planes.far);
             sections = sections_on_screen(center_px, ray.axis, maps, vec2f(first_sheet, end_sheet));
         }

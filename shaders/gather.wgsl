@@ -1,15 +1,17 @@
-// The tile rasteriser: draws tiles front to back without sheet buffers in memory. A subgroup keeps the sheets of a group for its
+// The tile rasterizer: draws patches front to back without sheet buffers in memory. A subgroup keeps the sheets of a group for its
 // pixels in registers, gathers the kernel sections that fall on them (§3.2), composites them (eq. 2), and skips what lies behind
 // its opaque pixels (§6). Subgroups share nothing, so barriers are among a subgroup's threads, and sums have one order whatever else runs.
 //
-// Threads hold four pixels each, one below the other, in units of 8×4 pixels; a tile has four units, and a subgroup of 8 to 32 threads
-// goes round them, one, two or all at a time. What it knows of voxels serves all rounds. Software drivers execute what an `if` leaves
-// out but not a loop without iterations, hence some loops that run at most once.
+// Threads hold four pixels each, one below the other, in blocks of 8×4 pixels; a patch has four blocks, and a subgroup of 8 to 32 threads
+// goes round them, one, two or all at a time. What it knows of voxels serves all rounds.
+//
+// One-shot loops: software drivers execute both sides of an `if` under a mask, but skip a loop that has no iterations. Work that is often left out
+// therefore stands in `for (var x = condition; x; x = false)`, a loop that runs at most once.
 
 @group(0) @binding(1) var<uniform> gathers: array<Gather, 1>;
-@group(0) @binding(2) var<uniform> part: Part;
+@group(0) @binding(2) var<uniform> patch_range: PatchRange;
 @group(0) @binding(3) var<storage, read> bricks: array<Brick>;
-// Where every sheet group of every tile starts in `entries`.
+// Where every sheet group of every patch starts in `entries`.
 @group(0) @binding(4) var<storage, read> starts: array<u32>;
 // Bricks' numbers.
 @group(0) @binding(5) var<storage, read> entries: array<u32>;
@@ -41,8 +43,8 @@ override FIRST_HIT: bool = false;
 
 // Threads of a workgroup: those of the largest subgroup.
 override THREADS: u32 = 32u;
-// Workgroups that a tile is divided among: more than one only where there is too much behind it.
-override PARTS: u32 = 1u;
+// Workgroups that a patch is divided among: more than one only where there is too much behind it.
+override WORKGROUPS_PER_PATCH: u32 = 1u;
 
 var<private> gather: Gather;
 
@@ -50,14 +52,14 @@ var<private> gather: Gather;
 var<private> lane: u32;
 var<private> lanes: u32;
 
-// The tile: where the centre of its first pixel is, and of the pixels that the subgroup goes round those that are not opaque, and those
+// The patch: where the centre of its first pixel is, and of the pixels that the subgroup goes round those that are not opaque, and those
 // that have not reached β.
 var<private> first_px: vec2f;
 var<private> open: vec4u;
 var<private> shallow: vec4u;
 
 // The group that is drawn.
-var<private> group: SheetGroup;
+var<private> sheet_group: GatheredGroup;
 
 // Passes through loops, bricks visited, and voxels and sections drawn.
 var<private> passes: u32;
@@ -68,12 +70,12 @@ var<private> color_ramp: Ramp;
 var<private> opacity_ramp: Ramp;
 var<private> gradient_opacity_ramp: Ramp;
 
-// Sheets of a group.
+// Sheets of a sheet_group.
 const SHEETS = 4u;
 
-// Threads that hold a tile, and units of it.
-const TILE_THREADS = 32u;
-const UNITS = 4u;
+// Threads that hold a patch, and blocks of it.
+const PATCH_THREADS = 32u;
+const BLOCKS = 4u;
 
 // Passes through loops that are not counted where they are made. The pass that finds a loop at its end is one, and in that pass one
 // through every loop inside; loops that run at most once take two.
@@ -98,8 +100,8 @@ fn counts_gaps() -> bool {
     return COMPOSITING == MINIMUM || COMPOSITING == SURFACE;
 }
 
-// Adds the sections of the queue's voxels that some units see to the sheets of a thread's pixels in them. Whether there are any.
-fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, units: u32) -> bool {
+// Adds the sections of the queue's voxels that some blocks see to the sheets of a thread's pixels in them. Whether there are any.
+fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> bool {
     var is_added = false;
     for (var base = 0u; base < queue_count; base += BATCH) {
         passes += PASSES_PER_BATCH;
@@ -108,8 +110,8 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, units: u32) -> bo
         var seen = vec2u(0u);
         for (var i = 0u; i < batch_count; i += 2u * lanes) {
             passes += 1u;
-            seen |= bits_from(i, ballot(is_queued_for(units, base + i + lane)));
-            seen |= bits_from(i + lanes, ballot(is_queued_for(units, base + i + lanes + lane)));
+            seen |= bits_from(i, ballot(is_queued_for(blocks, base + i + lane)));
+            seen |= bits_from(i + lanes, ballot(is_queued_for(blocks, base + i + lanes + lane)));
         }
         let ones = countOneBits(seen);
         let seen_count = ones.x + ones.y;
@@ -119,9 +121,9 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, units: u32) -> bo
             let amount = select(vec4f(0.0), queue_amounts[slot], i + lane < seen_count);
             var whole = -1.0;
             if ECONOMIES {
-                whole = f32(queue_units[slot] >> WHOLE_SHIFT) - 1.0;
+                whole = f32(queue_blocks[slot] >> WHOLE_SHIFT) - 1.0;
             }
-            let own = footprint_at(bitcast<vec4f>(queue_points[slot]), group.near, whole, amount);
+            let own = footprint_at(bitcast<vec4f>(queue_points[slot]), sheet_group.near, whole, amount);
             // Every lane adds all voxels' sections at its own pixels, two voxels at a time.
             let count = min(seen_count - i, lanes);
             passes += PASSES_PER_ADDITION + (count + 1u) / 2u;
@@ -158,31 +160,162 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, units: u32) -> bo
     return is_added;
 }
 
-fn draw(tile: u32, first_thread: u32, thread: u32) {
+// What the subgroup has drawn of a patch: which of its pixels are open after the group, and of which blocks sheets hold something.
+struct Progress {
+    open: vec4u,
+    shallow: vec4u,
+    begun: u32,
+}
+
+// What became of a group: whether the queue held all of its voxels at once, and whether there were any.
+struct GroupOutcome {
+    is_whole: bool,
+    has_drawn: bool,
+}
+
+// The lanes take their shares of the ramps' control points.
+fn hold_ramps() {
     color_ramp = ramp_of(0u, frame.ramps.x);
     opacity_ramp = ramp_of(frame.ramps.x, frame.ramps.y);
     gradient_opacity_ramp = ramp_of(frame.ramps.y, frame.ramps.z);
-    let columns = (frame.size.x + TILE_WIDTH - 1u) / TILE_WIDTH;
-    let corner = vec2u(tile % columns, tile / columns) * vec2u(TILE_WIDTH, TILE_HEIGHT);
-    first_px = vec2f(corner) + 0.5;
-    empty_queue(thread);
+}
 
-    // The units that the subgroup goes round.
-    var own_units = 0u;
-    let end_thread = first_thread + TILE_THREADS / PARTS;
-    for (var round = first_thread; round < end_thread; round += THREADS) {
+// Finds the open pixels among those of the threads from `threads.x` to the one before `threads.y`. Returns their blocks, one bit each.
+fn find_open_pixels(corner: vec2u, threads: vec2u, thread: u32) -> u32 {
+    var own_blocks = 0u;
+    for (var round = threads.x; round < threads.y; round += THREADS) {
         let pixels = pixels_of(corner, round + thread);
         look(pixels.column, pixels.rows);
         let opacity = transpose(load_image(pixels))[3];
-        own_units |= subgroupOr(1u << pixels.unit);
-        open = with_units(open, pixels.unit, open_word(pixels, opacity, -FAR));
+        own_blocks |= subgroupOr(1u << pixels.block);
+        open = with_blocks(open, pixels.block, open_word(pixels, opacity, -FAR));
         if ECONOMIES {
-            shallow = with_units(shallow, pixels.unit, shallow_word(pixels, opacity));
+            shallow = with_blocks(shallow, pixels.block, shallow_word(pixels, opacity));
         }
     }
+    return own_blocks;
+}
 
-    let first_bin = tile * gather.groups;
-    let reached = gather.reached + tile * UNITS + firstTrailingBit(own_units);
+// The `at`-th group in the order of compositing becomes the one that is drawn.
+fn begin_group(at: u32) {
+    let number = select(gather.groups - 1u - at, at, ORDER == FRONT_TO_BACK);
+    let first_sheet = f32(number * SHEETS);
+    let near = gather.near + first_sheet * frame.slab_width;
+    sheet_group = GatheredGroup(number, first_sheet, near, half_boxes[number]);
+}
+
+// Composites a thread's sheets, whole now, into its pixels.
+fn composite_pixels(pixels: Pixels, sheets: Sheets, progress: ptr<function, Progress>) {
+    passes += passes_per_look();
+    look(pixels.column, pixels.rows);
+    if FIRST_HIT {
+        load_hits(pixels);
+    }
+    let image = composite_group(load_image(pixels), sheets, sheet_group.near);
+    store_image(pixels, image);
+    if FIRST_HIT {
+        store_hits(pixels);
+    }
+    let opacity = transpose(image)[3];
+    let far = sheet_group.near + f32(SHEETS) * frame.slab_width;
+    (*progress).open = with_blocks((*progress).open, pixels.block, open_word(pixels, opacity, far));
+    if ECONOMIES {
+        (*progress).shallow = with_blocks((*progress).shallow, pixels.block, shallow_word(pixels, opacity));
+    }
+}
+
+// Adds the sections of the queue's voxels to the sheets of all pixels, round by round. With the last voxels of the group, `is_last`, the sheets
+// are composited; before, they wait in the workgroup's memory.
+fn draw_queue(corner: vec2u, threads: vec2u, thread: u32, is_last: bool, progress: ptr<function, Progress>) {
+    for (var round = threads.x; round < threads.y; round += THREADS) {
+        passes += PASSES_PER_ROUND;
+        let pixels = pixels_of(corner, round + thread);
+        let blocks = subgroupOr(1u << pixels.block);
+        var has_begun = ((*progress).begun & blocks) != 0u;
+        var sheets = Sheets();
+        for (; has_begun; has_begun = false) {
+            sheets = saved_sheets(round + thread);
+        }
+        let is_added = add_sections(&sheets, pixels, blocks);
+        if is_added {
+            (*progress).begun |= blocks;
+        }
+        for (var is_left = is_added && !is_last; is_left; is_left = false) {
+            save_sheets(round + thread, sheets);
+        }
+        let is_due = is_last && (((*progress).begun & blocks) != 0u || counts_gaps());
+        for (var is_done = is_due; is_done; is_done = false) {
+            composite_pixels(pixels, sheets, progress);
+        }
+    }
+}
+
+// Draws the group: as often as voxels fill the queue, finds and shades them, and adds their sections.
+fn draw_group(corner: vec2u, threads: vec2u, thread: u32, is_kept: bool) -> GroupOutcome {
+    let search = search_bounds(is_kept);
+    var progress = Progress(open, shallow, 0u);
+    var outcome = GroupOutcome(true, COMPOSITING == MINIMUM);
+    var first_new = queue_count;
+    loop {
+        passes += PASSES_PER_FILL;
+        find_voxels(search, is_kept);
+        subgroupBarrier();
+        shade_voxels(first_new);
+        subgroupBarrier();
+        let is_last = is_walked();
+        outcome.has_drawn |= queue_count > 0u;
+        draw_queue(corner, threads, thread, is_last, &progress);
+        subgroupBarrier();
+        if is_last {
+            break;
+        }
+        outcome.is_whole = false;
+        queue_count = 0u;
+        first_new = 0u;
+    }
+    open = progress.open;
+    shallow = progress.shallow;
+    return outcome;
+}
+
+// Notes that the `at`-th group was composited in the 32×32 tile of a pixel, once for all of the tile's patches.
+fn count_composited(at: u32, pixel: vec2u) {
+    let tiles = tile_grid(frame.size);
+    let number = (at * tiles.y + pixel.y / TILE) * tiles.x + pixel.x / TILE;
+    let bit = 1u << (number % 32u);
+    if (atomicOr(&gathered.words[gather.composited + number / 32u], bit) & bit) == 0u {
+        atomicAdd(&gathered.words[at], 1u);
+    }
+}
+
+// Leaves to the next dispatch at which group the subgroup goes on, and adds its counts to the frame's.
+fn finish(at: u32, reached: u32) {
+    let all_counts = subgroupAdd(drawn);
+    if lane == 0u {
+        // Where all is opaque nothing is left to do.
+        let is_done = at == gather.groups || all(open == vec4u(0u));
+        atomicStore(&gathered.words[reached], select(at, gather.groups, is_done));
+        if !is_done {
+            next = indirect((patch_range.end_patch - patch_range.first_patch) * WORKGROUPS_PER_PATCH);
+        }
+        atomicAdd(&gathered.tally.voxels_shaded, all_counts.x);
+        atomicAdd(&gathered.tally.sections_rasterized, all_counts.y);
+        atomicAdd(&gathered.tally.bricks_visited, bricks_visited);
+    }
+}
+
+// Draws a patch's groups in the order of compositing, from the one that the dispatch before has left, until all pixels are opaque.
+fn draw(number: u32, first_thread: u32, thread: u32) {
+    hold_ramps();
+    let columns = (frame.size.x + PATCH_WIDTH - 1u) / PATCH_WIDTH;
+    let corner = vec2u(number % columns, number / columns) * vec2u(PATCH_WIDTH, PATCH_HEIGHT);
+    first_px = vec2f(corner) + 0.5;
+    empty_queue(thread);
+    let threads = vec2u(first_thread, first_thread + PATCH_THREADS / WORKGROUPS_PER_PATCH);
+    let own_blocks = find_open_pixels(corner, threads, thread);
+
+    let first_bin = number * gather.groups;
+    let reached = gather.reached + number * BLOCKS + firstTrailingBit(own_blocks);
     var at = atomicLoad(&gathered.words[reached]);
     var end = starts[first_bin + at];
     // Whether the queue holds all voxels of the group before.
@@ -199,102 +332,21 @@ fn draw(tile: u32, first_thread: u32, thread: u32) {
             is_kept = false;
             continue;
         }
-        let number = select(gather.groups - 1u - at, at, ORDER == FRONT_TO_BACK);
-        let first_sheet = f32(number * SHEETS);
-        let near = gather.near + first_sheet * frame.slab_width;
-        let far = near + f32(SHEETS) * frame.slab_width;
-        group = SheetGroup(number, first_sheet, near, half_boxes[number]);
+        begin_group(at);
         if !is_kept {
             queue_count = 0u;
         }
         keep_voxels();
-        let sought = sought_here(is_kept);
         walk(first_entry, end);
-        var first_new = queue_count;
-        var open_after = open;
-        var shallow_after = shallow;
-        var has_drawn = COMPOSITING == MINIMUM;
-        // The units of which some of the group has been added.
-        var begun = 0u;
-        var is_whole_group = true;
-        loop {
-            passes += PASSES_PER_FILL;
-            find_voxels(sought, is_kept);
-            subgroupBarrier();
-            shade_voxels(first_new);
-            subgroupBarrier();
-            let is_last = is_walked();
-            has_drawn |= queue_count > 0u;
-            for (var round = first_thread; round < end_thread; round += THREADS) {
-                passes += PASSES_PER_ROUND;
-                let pixels = pixels_of(corner, round + thread);
-                let units = subgroupOr(1u << pixels.unit);
-                var has_begun = (begun & units) != 0u;
-                // While voxels wait for the queue, sheets are in the workgroup's memory.
-                var sheets = Sheets();
-                for (; has_begun; has_begun = false) {
-                    sheets = saved_sheets(round + thread);
-                }
-                let is_added = add_sections(&sheets, pixels, units);
-                if is_added {
-                    begun |= units;
-                }
-                for (var is_left = is_added && !is_last; is_left; is_left = false) {
-                    save_sheets(round + thread, sheets);
-                }
-                for (var is_done = is_last && ((begun & units) != 0u || counts_gaps()); is_done; is_done = false) {
-                    passes += passes_per_look();
-                    look(pixels.column, pixels.rows);
-                    if FIRST_HIT {
-                        load_hits(pixels);
-                    }
-                    let image = composite_group(load_image(pixels), sheets, near);
-                    store_image(pixels, image);
-                    if FIRST_HIT {
-                        store_hits(pixels);
-                    }
-                    let opacity = transpose(image)[3];
-                    open_after = with_units(open_after, pixels.unit, open_word(pixels, opacity, far));
-                    if ECONOMIES {
-                        shallow_after = with_units(shallow_after, pixels.unit, shallow_word(pixels, opacity));
-                    }
-                }
-            }
-            subgroupBarrier();
-            if is_last {
-                break;
-            }
-            is_whole_group = false;
-            queue_count = 0u;
-            first_new = 0u;
-        }
-        open = open_after;
-        shallow = shallow_after;
-        is_kept = is_whole_group && !may_appear();
-        for (; has_drawn; has_drawn = false) {
+        let outcome = draw_group(corner, threads, thread, is_kept);
+        is_kept = outcome.is_whole && !may_appear();
+        for (var has_drawn = outcome.has_drawn; has_drawn; has_drawn = false) {
             if lane == 0u {
-                let tiles = tile_grid(frame.size);
-                let number = (at * tiles.y + corner.y / TILE) * tiles.x + corner.x / TILE;
-                let bit = 1u << (number % 32u);
-                if (atomicOr(&gathered.words[gather.composited + number / 32u], bit) & bit) == 0u {
-                    atomicAdd(&gathered.words[at], 1u);
-                }
+                count_composited(at, corner);
             }
         }
     }
-
-    let all_counts = subgroupAdd(drawn);
-    if lane == 0u {
-        // Where all is opaque nothing is left to do.
-        let is_done = at == gather.groups || all(open == vec4u(0u));
-        atomicStore(&gathered.words[reached], select(at, gather.groups, is_done));
-        if !is_done {
-            next = indirect((part.end_tile - part.first_tile) * PARTS);
-        }
-        atomicAdd(&gathered.tally.voxels_shaded, all_counts.x);
-        atomicAdd(&gathered.tally.sections_rasterized, all_counts.y);
-        atomicAdd(&gathered.tally.bricks_visited, bricks_visited);
-    }
+    finish(at, reached);
 }
 
 @compute @workgroup_size(THREADS)
@@ -308,19 +360,19 @@ fn main(
     lane = subgroup_invocation_id;
     start(workgroup.z);
     gather = gathers[zero];
-    let number = unfold(workgroup);
-    let tile = part.first_tile + number / PARTS;
-    let first_thread = number % PARTS * (TILE_THREADS / PARTS);
+    let at_workgroup = unfold(workgroup);
+    let number = patch_range.first_patch + at_workgroup / WORKGROUPS_PER_PATCH;
+    let first_thread = at_workgroup % WORKGROUPS_PER_PATCH * (PATCH_THREADS / WORKGROUPS_PER_PATCH);
     var is_left = false;
-    if tile < part.end_tile {
-        let first_bin = tile * gather.groups;
-        let unit = firstTrailingBit(subgroupOr(1u << ((first_thread + thread) / 8u)));
-        let at = atomicLoad(&gathered.words[gather.reached + tile * UNITS + unit]);
-        // Groups without bricks count for the least, also behind the last brick of the tile.
+    if number < patch_range.end_patch {
+        let first_bin = number * gather.groups;
+        let block = firstTrailingBit(subgroupOr(1u << ((first_thread + thread) / 8u)));
+        let at = atomicLoad(&gathered.words[gather.reached + number * BLOCKS + block]);
+        // Groups without bricks count for the least, also behind the last brick of the patch.
         let first = select(at, 0u, COMPOSITING == MINIMUM && at < gather.groups);
         is_left = starts[first_bin + first] < starts[first_bin + gather.groups];
     }
     for (; is_left; is_left = false) {
-        draw(tile, first_thread, thread);
+        draw(number, first_thread, thread);
     }
 }

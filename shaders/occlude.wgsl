@@ -3,7 +3,7 @@
 // without rounding, and on bits. In perspective every group has its box, and boxes shrink on the way back: what a larger box in front
 // has left in a tile holds for the smaller one, too. One workgroup per tile, one thread per row of 32 pixels.
 
-@group(0) @binding(1) var<uniform> group: Group;
+@group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(2) var<storage, read> occluding: TileList;
 @group(0) @binding(3) var<storage, read> source: array<u32>;
 @group(0) @binding(4) var<storage, read_write> result: array<u32>;
@@ -35,7 +35,7 @@ fn columns(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) 
     }
     let words = tile_grid(frame.size).x;
     var all = 0xffffffffu;
-    let last = min(word.y + group.box_filter.y, frame.size.y - 1u);
+    let last = min(word.y + sheet_group.box_filter.y, frame.size.y - 1u);
     for (var y = word.y; y <= last; y += 1u) {
         all &= source[y * words + word.x];
     }
@@ -60,7 +60,7 @@ fn rows(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) wor
         return;
     }
     var all = row_word(word.y, word.x);
-    for (var step = 1u; step <= group.box_filter.x; step += 1u) {
+    for (var step = 1u; step <= sheet_group.box_filter.x; step += 1u) {
         let x = word.x + step / 32u;
         let part = step % 32u;
         var from_right = row_word(word.y, x) >> part;

@@ -1,7 +1,7 @@
 // Draws the kernel sections of a group of sheets as footprint quads, one quad per voxel, added up in the group's sheet
 // buffers (§3.2). All footprints lie on the screen alike.
 
-// All that the fragments of a quad share comes from its vertices: on software rasterisers an interpolated constant costs a
+// All that the fragments of a quad share comes from its vertices: on software rasterizers an interpolated constant costs a
 // fraction of a uniform.
 struct Quad {
     @builtin(position) position: vec4f,
@@ -26,7 +26,7 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
     // The last instance may have fewer quads: the others repeat the last one, without area.
     let quad = instance * QUADS + vertex / 4u;
     let splat = splats[instances[min(quad, args.count - 1u)]];
-    let t0 = (group.near - splat.depth) * frame.kernel_per_depth;
+    let t0 = (sheet_group.near - splat.depth) * frame.kernel_per_depth;
     let t1 = t0 + f32(SHEETS) * frame.section_width;
     let extent = quad_extent(t0, t1);
 
@@ -70,7 +70,7 @@ fn sections_summed_area(footprint: vec2f, quad: Quad) -> vec4f {
 }
 
 fn sections(quad: Quad) -> vec4f {
-    // From the pixel's centre, not an interpolated coordinate: the rasteriser snaps corners to a coarse grid.
+    // From the pixel's centre, not an interpolated coordinate: the rasterizer snaps corners to a coarse grid.
     let offset = quad.position.xy - quad.center_px;
     let footprint = quad.footprint_from_pixels.xy * offset.x + quad.footprint_from_pixels.zw * offset.y;
     if !SECTIONS {

@@ -1,6 +1,6 @@
 // Which tiles a sheet group composites, and around which the occlusion buffer changes (§6). One workgroup.
 
-@group(0) @binding(1) var<uniform> group: Group;
+@group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(2) var<storage, read_write> culled: Culled;
 // 1 for tiles whose pixels are all opaque: no splat changes them any more.
 @group(0) @binding(3) var<storage, read> opaque_tiles: array<u32>;
@@ -21,7 +21,7 @@ fn is_composited(tile: u32) -> bool {
 
 // Whether the box filter that starts at some pixel of a tile, to the right and down, reaches into a composited tile.
 fn is_near_composited(at: vec2u, grid: vec2u) -> bool {
-    let margin = (group.box_filter + TILE - 1u) / TILE;
+    let margin = (sheet_group.box_filter + TILE - 1u) / TILE;
     let high = min(at + margin, grid - 1u);
     for (var y = at.y; y <= high.y; y += 1u) {
         for (var x = at.x; x <= high.x; x += 1u) {
@@ -59,6 +59,6 @@ fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) wor
     if thread == 0u {
         composited.args = indirect(atomicLoad(&composited_count));
         occluding.args = indirect(atomicLoad(&occluding_count));
-        counts[group.index] = atomicLoad(&composited_count);
+        counts[sheet_group.index] = atomicLoad(&composited_count);
     }
 }

@@ -146,7 +146,7 @@ pub use {glam, wgpu};
 #[doc(hidden)]
 pub mod internals {
     pub use crate::geometry::{footprint, grid_warp, kernel, means, slab, view_geometry};
-    pub use crate::lists::{brick, bucket, classify, iso_range, quad_plan, tile_bins, value_list};
+    pub use crate::lists::{brick, bucket, classify, iso_range, patch_bins, quad_plan, value_list};
     pub use crate::settings::camera::{Eye, ViewBasis};
     pub use crate::settings::clip::ClippedVoxels;
     pub use crate::settings::shading::MIN_GRADIENT;
@@ -154,8 +154,8 @@ pub mod internals {
     /// What the passes share.
     pub mod gpu {
         pub use crate::gpu::{
-            bindings, brick_lists, classified_volume, device, footprint_texture, layout, render_pipeline, shaders,
-            targets, timer, uniforms, volume_texture,
+            bindings, brick_lists, classified_volume, device, footprint_texture, gathered_layout, layout,
+            render_pipeline, shaders, targets, timer, uniforms, volume_texture,
         };
     }
 

@@ -10,11 +10,13 @@ use sheetsplat::headless::{Headless, Rendering};
 use sheetsplat::internals::reference;
 use sheetsplat::internals::reference::visibility::Test;
 use sheetsplat::scene::{Scene, VolumeSource};
+use sheetsplat::settings::Camera;
 use sheetsplat::settings::Projection;
 use sheetsplat::settings::Ramp;
 use sheetsplat::settings::{Compositing, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
 use sheetsplat::volume::{Volume, builtin};
 
+use common::compare::assert_at_most;
 use common::images::largest_difference;
 use common::{FORMS, RASTERIZERS, Random, SPACINGS, camera, lavapipe, random_eye, random_volume, scene, transfer};
 
@@ -39,7 +41,7 @@ fn random_case(random: &mut Random) -> (Volume, Scene) {
         1 => {
             // Close by: the object reaches beyond every edge of the image.
             scene.camera.projection = Projection::Orthographic { height: Some(12.0) };
-            scene.camera.center = random.within(DVec3::splat(-4.0), DVec3::splat(4.0));
+            scene.camera.center = Some(random.within(DVec3::splat(-4.0), DVec3::splat(4.0)));
         }
         _ => scene.camera = random_eye(random, volume.grid()),
     }
@@ -80,7 +82,7 @@ fn culling_keeps_its_guarantee() {
             });
             let allowed = 1.0 - scene.splatting.opacity_threshold + ROUNDING;
             let difference = largest_difference(&with.image, &without.image);
-            assert!(difference <= allowed, "case {case}: {difference} > {allowed} with {scene:?}");
+            assert_at_most(difference, allowed, format_args!("case {case} with {scene:?}"));
             let [with, without] = [with, without].map(|rendering| rendering.stats.counts.sections_rasterized);
             assert!(with <= without, "case {case}: {with} sections, {without} without culling, with {scene:?}");
             *culled += usize::from(with < without);
@@ -120,7 +122,7 @@ fn groups_change_nothing_but_rounding() {
         let [one, two, four] = [0, 1, 2].map(|at| render(&renderers[at], &volume, &scene));
         for (few, many) in [(&one, &two), (&two, &four)] {
             let difference = largest_difference(&few.image, &many.image);
-            assert!(difference <= ROUNDING, "case {case}: {difference}");
+            assert_at_most(difference, 1e-6, format_args!("case {case}"));
             let [few, many] = [few, many].map(|rendering| rendering.stats.counts);
             assert_eq!(few.sections_rasterized, many.sections_rasterized, "case {case}");
             assert!(few.quads >= many.quads);
@@ -207,13 +209,14 @@ fn the_parallelogram_hides_more() {
 fn the_papers_simpler_tests() {
     let volume = builtin::volume("head:48").unwrap();
     let mut scene = Scene::new(VolumeSource::Builtin("head:48".to_owned()));
+    scene.camera = Camera::default();
     (scene.image.width, scene.image.height) = (96, 96);
     scene.camera.projection = Projection::Orthographic { height: Some(172.0) };
     let transfer = scene.transfer.resolve(&volume);
     let image = |test| reference::render_culled(&volume, &transfer, &scene, test).unwrap().image;
     let all = image(None);
     let allowed = 1.0 - scene.splatting.opacity_threshold;
-    assert!(largest_difference(&all, &image(Some(Test::Box))) <= allowed);
+    assert_at_most(largest_difference(&all, &image(Some(Test::Box))), allowed, "by the box");
     let by_center = largest_difference(&all, &image(Some(Test::Center)));
     assert!(by_center > 2.0 * allowed, "the centre's pixel alone is off by {by_center} only");
 }
@@ -232,6 +235,7 @@ fn what_the_rectangle_costs() {
     ] {
         let volume = volume.clone().with_spacing("head", DVec3::from(spacing)).unwrap();
         let mut scene = Scene::new(VolumeSource::Builtin("head:40".to_owned()));
+        scene.camera = Camera::default();
         scene.camera.direction = DVec3::from(direction);
         scene.camera.up = DVec3::new(0.3, 0.1, 1.0);
         (scene.image.width, scene.image.height) = (120, 120);
@@ -239,8 +243,8 @@ fn what_the_rectangle_costs() {
         let render = |test| reference::render_culled(&volume, &transfer, &scene, test).unwrap();
         let [all, rectangle, parallelogram] = [None, Some(Test::Box), Some(Test::Parallelogram)].map(render);
         let allowed = 1.0 - scene.splatting.opacity_threshold;
-        assert!(largest_difference(&all.image, &rectangle.image) <= allowed);
-        assert!(largest_difference(&all.image, &parallelogram.image) <= allowed);
+        assert_at_most(largest_difference(&all.image, &rectangle.image), allowed, format_args!("{spacing:?}"));
+        assert_at_most(largest_difference(&all.image, &parallelogram.image), allowed, format_args!("{spacing:?}"));
         let cost = rectangle.sections as f64 / parallelogram.sections as f64;
         println!("{spacing:?} along {direction:?}: the rectangle lets through {cost:.3} times the sections");
         assert!(cost > 0.95);
@@ -262,6 +266,7 @@ fn tiles_and_the_bounding_box() {
     };
     let areas = |voxels: &[UVec3]| {
         let mut scene = Scene::new(VolumeSource::Builtin("cube".to_owned()));
+        scene.camera = Camera::default();
         scene.camera.direction = DVec3::Y;
         scene.camera.projection = Projection::Orthographic { height: Some(100.0) };
         (scene.image.width, scene.image.height) = (200, 200);
@@ -288,6 +293,7 @@ fn tiles_and_the_bounding_box() {
 fn profiled_frames() {
     let volume = builtin::volume("head:64").unwrap();
     let mut scene = Scene::new(VolumeSource::Builtin("head:64".to_owned()));
+    scene.camera = Camera::default();
     (scene.image.width, scene.image.height) = (40, 40);
     scene.splatting.slab_width = 0.05;
     let devices =

@@ -16,6 +16,7 @@ use sheetsplat::settings::{Camera, Projection};
 use sheetsplat::settings::{Compositing, Economies, FootprintForm, Method, Order, Rasterizer};
 use sheetsplat::volume::{Volume, builtin};
 
+use common::compare::{self, assert_at_least, assert_at_most};
 use common::images::{largest_difference, rms};
 use common::{Random, camera, gpu, scene, transfer};
 
@@ -45,7 +46,7 @@ fn twin(volume: &Volume, scene: &Scene) -> Image {
 }
 
 fn decibels(a: &Image, b: &Image) -> f64 {
-    -20.0 * rms(a, b).log10()
+    compare::decibels(rms(a, b))
 }
 
 fn eye() -> Projection {
@@ -79,14 +80,13 @@ fn the_twin_economises_alike() {
                 let what = format!("{name}, {:?}, {economies:?}", scene.splatting);
                 // Where a footprint ends it drops to 0: rounding may take a pixel on the rim in or out.
                 let worst = largest_difference(&ours.image, &expected);
-                assert!(
-                    worst < 1e-3 + economies.resolution && decibels(&ours.image, &expected) > 75.0,
-                    "{worst}: {what}"
-                );
+                assert_at_most(worst, 2e-4 + economies.resolution / 8.0, &what);
+                assert_at_least(decibels(&ours.image, &expected), 104.0, &what);
                 let drawn = ours.stats.counts.sections_rasterized;
                 assert!(drawn > 0 && drawn < everything, "{drawn} of {everything} sections: {what}");
                 if projection == orthographic && compositing == Compositing::Linear {
-                    assert!(largest_difference(&expected, &plain) > 1e-4, "nothing was saved: {what}");
+                    let saved = largest_difference(&expected, &plain);
+                    assert_at_least(saved, 4.5e-3, format_args!("nothing was saved: {what}"));
                 }
             }
         }
@@ -113,7 +113,8 @@ fn beta_keeps_its_bound() {
                 scene.splatting.economies.beta = beta;
                 let economic = render(&gpu, &volume, &scene);
                 let worst = largest_difference(&economic.image, &plain.image);
-                assert!(worst <= 1.0 - beta + 2e-5, "{name}, {projection:?}, {compositing:?}, β {beta}: {worst}");
+                let what = format_args!("{name}, {projection:?}, {compositing:?}, β {beta}");
+                assert_at_most(worst, 1.0 - beta + 2e-5, what);
                 let fewer = economic.stats.counts.sections_rasterized;
                 assert!(
                     fewer <= sections,

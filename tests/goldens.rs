@@ -194,7 +194,8 @@ fn pictures_look_like_their_goldens() {
     let failures = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("goldens");
     let mut complaints = Vec::new();
     for (name, volume, settings) in SCENES {
-        let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
+        let settings: Vec<String> =
+            settings.iter().chain(&["camera.fit=volume"]).map(|&setting| setting.to_owned()).collect();
         let mut scene = Scene::from_volume(VolumeSource::Builtin(volume.to_owned()), &settings).unwrap();
         scene.splatting.opacity_threshold = OPACITY_THRESHOLD;
         for rasterizer in [Rasterizer::Quads, Rasterizer::Tiles] {

@@ -11,7 +11,6 @@ use std::sync::Arc;
 use glam::{DVec3, UVec3};
 use sheetsplat::RenderError;
 use sheetsplat::headless::Headless;
-use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::Projection;
@@ -19,6 +18,8 @@ use sheetsplat::settings::{Compositing, Method, Order, Rasterizer};
 use sheetsplat::settings::{LabelTables, Ramp, TransferFunction};
 use sheetsplat::volume::{Labels, Volume, VolumeError, builtin};
 
+use common::compare::{assert_at_least, assert_at_most};
+use common::images::largest_difference;
 use common::{Random, camera, gpu, scene, transfer};
 
 /// A folder with a volume of 2×3×2 voxels, 1×1×2.5 apart, and a label file beside it.
@@ -212,13 +213,6 @@ fn tables(labels: &[u16]) -> impl Iterator<Item = (u16, LabelTables)> {
     labels.iter().copied().zip(all)
 }
 
-/// The largest error of any channel.
-fn largest_error(actual: &Image, expected: &Image) -> f64 {
-    assert_eq!(actual.pixels.len(), expected.pixels.len());
-    let errors = actual.pixels.as_flattened().iter().zip(expected.pixels.as_flattened());
-    errors.map(|(a, b)| (f64::from(*a) - f64::from(*b)).abs()).fold(0.0, f64::max)
-}
-
 /// Draws a scene by both rasterizers without culling and with it, and compares with the twin.
 fn check(gpu: &Headless, name: &str, volume: &Volume, scene: &Scene) {
     let transfer = scene.transfer.resolve(volume);
@@ -226,7 +220,7 @@ fn check(gpu: &Headless, name: &str, volume: &Volume, scene: &Scene) {
     let counts = reference::count(volume, &transfer, scene).unwrap();
     let plain = TransferFunction { labels: BTreeMap::new(), ..transfer };
     let plain = reference::render(volume, &plain, scene).unwrap();
-    assert!(largest_error(&plain, &expected) > 0.1, "{name}: without labels it looks the same");
+    assert_at_least(largest_difference(&plain, &expected), 0.1, format_args!("{name}: without labels"));
     for rasterizer in [Rasterizer::Quads, Rasterizer::Tiles] {
         let mut scene = scene.clone();
         scene.splatting.rasterizer = rasterizer;
@@ -235,13 +229,12 @@ fn check(gpu: &Headless, name: &str, volume: &Volume, scene: &Scene) {
         let drawn = gpu.render_volume(volume.clone(), &scene).unwrap();
         assert_eq!(drawn.stats.counts.voxels_in_range, counts.voxels_in_range, "{name}");
         // Quads keep a voxel's amounts as f16, tiles as f32.
-        let error = largest_error(&drawn.image, &expected);
-        let allowed = if rasterizer == Rasterizer::Quads { 1e-3 } else { 1e-4 };
-        assert!(error < allowed, "{name}: differs by {error}");
+        let allowed = if rasterizer == Rasterizer::Quads { 4.8e-4 } else { 4.8e-5 };
+        assert_at_most(largest_difference(&drawn.image, &expected), allowed, &name);
         scene.splatting.culling = true;
         let culled = gpu.render_volume(volume.clone(), &scene).unwrap();
-        let error = largest_error(&culled.image, &drawn.image);
-        assert!(error < 1.0 - scene.splatting.opacity_threshold + 1e-4, "{name}: culling changes by {error}");
+        let allowed = 1.0 - scene.splatting.opacity_threshold + 1e-4;
+        assert_at_most(largest_difference(&culled.image, &drawn.image), allowed, format_args!("{name}: culling"));
     }
 }
 
@@ -302,8 +295,7 @@ fn labels_of_every_sample_are_the_twins() {
     scene.splatting.method = Method::CompositeEverySample;
     let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
     let drawn = gpu.render_volume(volume, &scene).unwrap();
-    let error = largest_error(&drawn.image, &expected);
-    assert!(error < 1e-3, "differs by {error}");
+    assert_at_most(largest_difference(&drawn.image, &expected), 2.5e-4, "every sample");
 }
 
 /// More voxels than a layer of the texture holds, with labels where the next one begins.
@@ -320,7 +312,7 @@ fn labels_in_several_layers() {
     let volume = volume.with_labels(labels).unwrap();
     let mut scene = scene(64, 48);
     scene.camera = camera([0.02, 0.5, -0.9], 30.0);
-    scene.camera.center = volume.grid().world_position(place);
+    scene.camera.center = Some(volume.grid().world_position(place));
     scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(100.0, 0.0), (150.0, 0.2)]);
     scene.transfer.labels = tables(&[1, 2, 3]).collect();
     scene.transfer.iso_ranges = Some(vec![[100.0, 300.0]]);

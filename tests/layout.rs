@@ -6,7 +6,8 @@ use std::mem::offset_of;
 use naga::proc::Layouter;
 use naga::{AddressSpace, Handle, Module, Type, TypeInner};
 use sheetsplat::internals::gpu::layout::{
-    Band, Brick, BrickState, Culled, Cut, Frame, Gather, Gathered, Group, Indirect, Part, Splat, Tally, TileList, Visit,
+    Band, Brick, BrickState, Culled, Cut, Frame, Gather, Gathered, Indirect, PatchRange, SheetGroup, Splat, Tally,
+    TileList, Visit,
 };
 use sheetsplat::internals::gpu::shaders;
 
@@ -108,7 +109,7 @@ fn shared() -> [Layout; 15] {
             padding_0,
             padding_1
         }),
-        layout!(Group { half_box, box_filter, culling, near, first_brick, brick_count, index, number }),
+        layout!(SheetGroup { half_box, box_filter, culling, near, first_brick, brick_count, index, number }),
         layout!(Brick { present, x, y, z, extent }),
         layout!(BrickState { hidden, shaded }),
         layout!(Visit { drawn, fresh, brick, padding }),
@@ -150,7 +151,7 @@ fn shared() -> [Layout; 15] {
             search_passes,
             hits
         }),
-        layout!(Part { first_row, first_tile, end_tile }),
+        layout!(PatchRange { first_row, first_patch, end_patch }),
         layout!(Gathered { tally, words }).goes_on(),
     ]
 }

@@ -2,10 +2,12 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+#[path = "common/shared.rs"]
+mod shared;
+
 use std::fs;
 use std::io::Write;
-use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::path::PathBuf;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -13,6 +15,8 @@ use glam::{DMat3, DVec3, UVec3};
 use sheetsplat::Camera;
 use sheetsplat::volume::{Orientation, PatientSide, Volume, VolumeError};
 use tempfile::TempDir;
+
+use shared::shared;
 
 /// Header of a 2×3×4 volume of `uint8`; the tests replace or add lines.
 const PLAIN: &str = "NRRD0005\ntype: uint8\ndimension: 3\nsizes: 2 3 4\nencoding: raw\n";
@@ -274,9 +278,9 @@ fn space_directions() {
 
     let skewed = |cosine: f64| format!("(1,0,0) ({cosine},1,0) (0,0,1)");
     assert_eq!(spacing(&skewed(0.9e-4)).y, 1.0_f64.hypot(0.9e-4));
-    for skew in [1.1e-4, -1.1e-4, 0.5, 1e9] {
-        let allowed = "orthogonal axes, cosines of at most 0.0001";
-        assert_refused(open(&skewed(skew)), "volume.nrrd", "space directions", "not orthogonal", allowed);
+    for skew in [6.0, -1e9] {
+        let allowed = "each less than 80° from a right angle";
+        assert_refused(open(&skewed(skew)), "volume.nrrd", "space directions", "from a right angle", allowed);
     }
     let allowed = "three vectors (x,y,z) of positive finite length";
     for wrong in [
@@ -498,7 +502,6 @@ fn damaged_data() {
 #[test]
 fn promises_of_more_than_the_file_holds_cost_nothing() {
     let folder = Folder::new();
-    let start = Instant::now();
     for (sizes, field) in [
         ("60000 60000 60000", "sizes"),
         ("4294967295 4294967295 4294967295", "sizes"),
@@ -512,7 +515,6 @@ fn promises_of_more_than_the_file_holds_cost_nothing() {
             assert_refused(refused, "volume.nrrd", field, "", if field == "data" { "samples of 8" } else { "voxels" });
         }
     }
-    assert!(start.elapsed() < Duration::from_secs(5));
 }
 
 /// One valid file of each kind: the header's length, and the whole.
@@ -580,19 +582,15 @@ fn mutated_files_are_volumes_or_errors() {
 }
 
 #[test]
-fn measured_volumes() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
-    if !folder.is_dir() {
-        println!("skipped: no {}", folder.display());
-        return;
-    }
+#[ignore = "needs the shared data: SHEETSPLAT_SHARED=FOLDER"]
+fn shared_volumes() {
     let micrometres = DVec3::new(0.022_491_86, 0.022_491_86, 0.125);
     for (name, dims, spacing, range) in [
         ("ct-head.nrrd", [256, 256, 113], DVec3::new(1.0, 1.0, 2.0), [0.0, 3272.0]),
         ("colin27-t1.nrrd", [181, 217, 181], DVec3::ONE, [0.0, 254.0]),
         ("beads-confocal.nrrd", [150, 150, 41], micrometres, [1.0, 156.0]),
     ] {
-        let volume = Volume::open(&folder.join(name)).unwrap();
+        let volume = Volume::open(&shared(&format!("data/{name}"))).unwrap();
         assert_eq!(volume.dims(), UVec3::from_array(dims), "{name}");
         assert!((volume.spacing() - spacing).abs().max_element() < 1e-8, "{name}: {}", volume.spacing());
         let least = volume.values().iter().copied().fold(f32::INFINITY, f32::min);

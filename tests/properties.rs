@@ -15,6 +15,7 @@ use sheetsplat::settings::Projection;
 use sheetsplat::settings::{Compositing, Order, Rasterizer};
 use sheetsplat::volume::{Volume, builtin};
 
+use common::compare::{assert_at_most, largest};
 use common::images::largest_difference;
 use common::{COMPOSITINGS, F16, F32, FORMS, RASTERIZERS, Random, camera, gpu, scene, transfer};
 
@@ -47,7 +48,7 @@ fn empty_volume_is_exactly_the_background() {
     excluded.iso_ranges = Some(vec![[1000.0, 2000.0]]);
     let elsewhere = DVec3::new(1e4, 0.0, 0.0);
     for (transfer, center) in [(transparent, DVec3::ZERO), (excluded, DVec3::ZERO), (visible, elsewhere)] {
-        (scene.transfer, scene.camera.center) = (transfer, center);
+        (scene.transfer, scene.camera.center) = (transfer, Some(center));
         for (compositing, order) in
             COMPOSITINGS.into_iter().flat_map(|c| [Order::FrontToBack, Order::BackToFront].map(|order| (c, order)))
         {
@@ -146,19 +147,19 @@ impl UniformSlab {
         for (i, alpha) in (0..).zip(alpha(&image)) {
             let depth = -(-alpha).ln_1p();
             // The kernel's ripple: a Gaussian of falloff 2 leaves 2·exp(-π²/2) = 1.4 % per axis of a cubic lattice.
-            assert!((depth / expected - 1.0).abs() < 0.04, "{direction} pixel {i}: {depth}, not {expected}");
+            assert_at_most((depth / expected - 1.0).abs(), 0.04, format_args!("{direction} pixel {i}"));
             let weight = hann(i % SIZE) * hann(i / SIZE);
             weights += weight;
             mean_alpha += weight * alpha;
             mean_depth += weight * depth;
         }
-        // A thousandth is what the issue asks for; amounts are stored as f16, which may take up half of it.
+        // Amounts are stored as f16, whose roundings have either sign.
         let (alpha, depth) = (mean_alpha / weights, mean_depth / weights);
         let expected_alpha = 1.0 - (-expected).exp();
         let name =
             format!("axis {}, spacing {}, direction {direction}, slab width {slab_width}", self.axis, self.spacing);
-        assert!((alpha / expected_alpha - 1.0).abs() < 1e-3, "{name}: alpha {alpha}, not {expected_alpha}");
-        assert!((depth / expected - 1.0).abs() < 1e-3, "{name}: depth {depth}, not {expected}");
+        assert_at_most((alpha / expected_alpha - 1.0).abs(), 1.4e-4, format_args!("{name}: alpha"));
+        assert_at_most((depth / expected - 1.0).abs(), 1e-4, format_args!("{name}: depth"));
     }
 }
 
@@ -208,12 +209,11 @@ fn exponential_alpha_does_not_depend_on_the_slab_width() {
             // before it, and two roundings per sheet.
             let step = 2.0_f64.powi(-19);
             let finest = slab_width.min(1.0);
-            let tolerance = 2.0 * step / finest + 4.0 * F32 * sheets as f64;
-            let worst = alpha(&image).iter().zip(&reference).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            assert!(
-                worst < tolerance,
-                "{rasterizer:?} {slab_width}, spacing {spacing}: {worst}, not below {tolerance}"
-            );
+            let all = 2.0 * step / finest + 4.0 * F32 * sheets as f64;
+            // They have either sign, and are never all there at once.
+            let tolerance = 0.15 * all;
+            let worst = largest(alpha(&image).iter().zip(&reference).map(|(a, b)| a - b));
+            assert_at_most(worst, tolerance, format_args!("{rasterizer:?} {slab_width}, spacing {spacing}"));
         }
     }
 }
@@ -237,9 +237,9 @@ fn back_to_front_equals_front_to_back() {
         scene.splatting.order = Order::BackToFront;
         let (back_to_front, _) = render(&gpu, &volume, &scene);
         let difference = largest_difference(&front_to_back, &back_to_front);
-        // Per sheet a subtraction, a product and a sum of numbers up to 1, in either order.
-        let tolerance = 6.0 * F32 * sheets as f64;
-        assert!(difference < tolerance, "{compositing:?} {form:?} {projection:?}: {difference}, not below {tolerance}");
+        // Per sheet a subtraction, a product and a sum of numbers up to 1, in either order, whose roundings have either sign.
+        let tolerance = 0.8 * F32 * sheets as f64;
+        assert_at_most(difference, tolerance, format_args!("{compositing:?} {form:?} {projection:?}"));
     }
 }
 
@@ -287,10 +287,9 @@ fn constant_colour_is_constant_colour_times_alpha() {
                 let alpha = f64::from(pixel[3]);
                 for (channel, color) in pixel.iter().zip(color) {
                     let tolerance = rounding * color * alpha + 4.0 * F32 * sheets as f64;
-                    assert!(
-                        (f64::from(*channel) - color * alpha).abs() <= tolerance,
-                        "{rasterizer:?} {compositing:?} slab width {slab_width} pixel {i}: {pixel:?}"
-                    );
+                    let what =
+                        format_args!("{rasterizer:?} {compositing:?} slab width {slab_width} pixel {i}: {pixel:?}");
+                    assert_at_most((f64::from(*channel) - color * alpha).abs(), tolerance, what);
                 }
             }
         }

@@ -1,15 +1,20 @@
 //! Scene files, `--set` overrides and their errors; transfer functions, given and chosen.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+#[path = "common/shared.rs"]
+mod shared;
+
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use sheetsplat::scene::{ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use sheetsplat::settings::Clip;
-use sheetsplat::settings::{Camera, Projection};
+use sheetsplat::settings::{Camera, Fit, Projection};
 use sheetsplat::settings::{Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
 use sheetsplat::settings::{LabelTables, Ramp};
 use sheetsplat::settings::{Light, Shading};
+
+use shared::shared;
 
 const MINIMAL: &str = "[volume]\npath = 'a.nrrd'\n";
 
@@ -27,7 +32,7 @@ fn defaults() {
     let scene = parse(MINIMAL, &[]).unwrap();
     assert_eq!(scene, Scene::new(file("folder/a.nrrd")));
     assert_eq!((scene.spacing, &scene.labels), (None, &None));
-    assert_eq!(scene.camera, Camera::default());
+    assert_eq!(scene.camera, Camera { fit: Fit::Object, ..Camera::default() });
     assert_eq!(scene.image, ImageSettings { width: 512, height: 512, background: [0.0, 0.0, 0.0, 1.0] });
     assert_eq!(scene.transfer, TransferSettings::default());
     assert_eq!(scene.shading, Shading::default());
@@ -37,6 +42,33 @@ fn defaults() {
         parse(MINIMAL, &["camera.projection=perspective"]).unwrap().camera.projection,
         Projection::Perspective { fov_y: 30.0, distance: None, near: None }
     );
+}
+
+#[test]
+fn what_the_file_says_of_looks_decides_what_a_camera_fits() {
+    let volume = "volume.builtin = 'head:24'\n";
+    let camera = "[camera]\ndirection = [1, 0, 0]";
+    let sets = ["preset=ct-bone", "transfer.colormap=magma", "camera.direction=[1,0,0]", "transfer={opacity=[[9,1]]}"];
+    for (keys, sets, fit) in [
+        ("", &[][..], Fit::Object),
+        // Whatever else is set.
+        ("", &sets, Fit::Object),
+        ("preset = 'ct-skin'\nimage.width = 9\nclip.planes = [[1, 0, 0, 0]]", &[], Fit::Object),
+        ("[camera]", &[], Fit::Volume),
+        (camera, &["camera={height=9}"], Fit::Volume),
+        ("[transfer]\niso_ranges = [[1, 2]]", &sets[..3], Fit::Volume),
+        ("transfer.opacity = [[0, 0.5]]", &[], Fit::Volume),
+        // Unless it is said.
+        ("camera.fit = 'object'\ntransfer.opacity = [[0, 0.5]]", &[], Fit::Object),
+        (camera, &["camera.fit=object"], Fit::Object),
+        ("", &["camera.fit=volume"], Fit::Volume),
+    ] {
+        assert_eq!(parse(&format!("{volume}{keys}"), sets).unwrap().camera.fit, fit, "{keys} {sets:?}");
+        if keys.is_empty() {
+            let sets: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
+            assert_eq!(Scene::from_volume(file("a.nrrd"), &sets).unwrap().camera.fit, fit, "{sets:?}");
+        }
+    }
 }
 
 #[test]
@@ -51,6 +83,7 @@ fn every_key() {
         direction = [1, 0.5, 0]
         up = [0, 0, -2]
         center = [1, -2, 3.5]
+        fit = "object"
         height = 7
         fov_y = 45
         distance = 400.0
@@ -109,7 +142,8 @@ fn every_key() {
             projection: Projection::Perspective { fov_y: 45.0, distance: Some(400.0), near: Some(2.0) },
             direction: DVec3::new(1.0, 0.5, 0.0),
             up: DVec3::new(0.0, 0.0, -2.0),
-            center: DVec3::new(1.0, -2.0, 3.5),
+            center: Some(DVec3::new(1.0, -2.0, 3.5)),
+            fit: Fit::Object,
         },
         image: ImageSettings { width: 1, height: 300, background: [1.0, 0.5, 0.0, 0.25] },
         clip: Clip {
@@ -197,6 +231,8 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
     ("camera.up", "[0, 0, 1, 0]", "camera.up", "[0, 0, 1, 0]", "3 numbers, each a finite number"),
     ("camera.center", "[0, -inf, 0]", "camera.center[1]", "-inf", "a finite number"),
     ("camera.center", "[true, 0, 0]", "camera.center[0]", "true (boolean)", "a finite number"),
+    ("camera.fit", "'head'", "camera.fit", "\"head\"", "\"volume\" or \"object\""),
+    ("camera.fit", "1", "camera.fit", "1 (integer)", "\"volume\" or \"object\""),
     ("camera.height", "0", "camera.height", "0", "a finite number > 0"),
     ("camera.height", "-1.5", "camera.height", "-1.5", "a finite number > 0"),
     ("camera.height", "'tall'", "camera.height", "\"tall\" (string)", "a finite number > 0"),
@@ -210,7 +246,7 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
         "1",
         "camera.hight",
         "an unknown key",
-        "projection, direction, up, center, height, fov_y, distance",
+        "projection, direction, up, center, fit, height, fov_y, distance",
     ),
     ("image.width", "0", "image.width", "0", "an integer from 1 to the device's texture limit"),
     ("image.width", "-5", "image.width", "-5", "an integer from 1"),
@@ -543,11 +579,12 @@ fn scene_files() {
 }
 
 #[test]
+#[ignore = "needs the shared data: SHEETSPLAT_SHARED=FOLDER"]
 fn shared_scenes() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
-    let Ok(entries) = folder.read_dir() else { return };
-    for path in entries.map(|entry| entry.unwrap().path()).filter(|path| path.extension().is_some_and(|e| e == "toml"))
-    {
+    let entries = shared("scenes").read_dir().unwrap().map(|entry| entry.unwrap().path());
+    let scenes: Vec<_> = entries.filter(|path| path.extension().is_some_and(|e| e == "toml")).collect();
+    assert!(!scenes.is_empty());
+    for path in scenes {
         let scene = Scene::open(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
         let VolumeSource::File(volume) = scene.volume else { panic!("{} has no file", path.display()) };
         assert!(volume.is_file(), "{}", volume.display());

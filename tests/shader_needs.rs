@@ -1,6 +1,5 @@
 //! The files of the tile rasterizer's shader say on top what they need from which other file, and the list is right. WGSL has no imports:
 //! a file is read by itself only if it says where its names come from.
-#![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::collections::{BTreeMap, BTreeSet};
 

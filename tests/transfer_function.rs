@@ -1,6 +1,9 @@
 //! Ramps, what opacities mean, and transfer functions chosen for volumes without one.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+#[path = "common/shared.rs"]
+mod shared;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -8,6 +11,8 @@ use glam::{DVec3, UVec3};
 use sheetsplat::scene::{Scene, TransferSettings};
 use sheetsplat::settings::{Ramp, RampError, TransferFunction};
 use sheetsplat::volume::Volume;
+
+use shared::shared;
 
 #[test]
 fn ramp_evaluation() {
@@ -133,8 +138,8 @@ fn chosen_for_noisy_data() {
 }
 
 #[test]
-fn chosen_for_measured_volumes() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+#[ignore = "needs the shared data: SHEETSPLAT_SHARED=FOLDER"]
+fn shared_volumes_have_surfaces() {
     let surfaces = [
         ("quarter-head", 400.0..700.0),
         ("ct-head", 400.0..700.0),
@@ -142,10 +147,7 @@ fn chosen_for_measured_volumes() {
         ("beads-confocal", 8.0..20.0),
     ];
     for (name, expected) in surfaces {
-        let path = folder.join(name).with_extension("nrrd");
-        if !path.is_file() {
-            continue;
-        }
+        let path = shared(&format!("data/{name}.nrrd"));
         let threshold = surface(&TransferFunction::from_histogram(&Volume::open(&path).unwrap()));
         assert!(expected.contains(&threshold), "{name}: {threshold}");
     }

@@ -13,6 +13,7 @@ use sheetsplat::settings::{Method, Order, Rasterizer};
 use sheetsplat::stats::Counts;
 use sheetsplat::volume::Volume;
 
+use common::compare::{assert_at_least, assert_at_most};
 use common::images::{BLACK, largest_difference, psnr};
 use common::{BY_AMOUNTS, F32, RASTERIZERS, Random, SPACINGS, gpu, random_eye, random_volume, scene, transfer};
 
@@ -69,11 +70,11 @@ fn any_view_is_that_of_the_twin() {
             let decibels = psnr(&forwards.image.pixels, &expected.pixels, BLACK, 0);
             let worst = &mut worst[at][scene.splatting.method as usize];
             *worst = worst.min(decibels);
-            assert!(decibels >= 75.0, "case {case}, {rasterizer:?}: {decibels:.1} dB with {scene:?}");
-            // Per sheet a subtraction, a product and a sum of numbers up to 1, in either order.
-            let allowed = 6.0 * F32 * counts.sheets as f64;
+            assert_at_least(decibels, 75.0, format_args!("case {case}, {rasterizer:?} with {scene:?}"));
+            // Per sheet a subtraction, a product and a sum of numbers up to 1, in either order, whose roundings have either sign.
+            let allowed = 1.5 * F32 * counts.sheets as f64;
             let difference = largest_difference(&forwards.image, &backwards.image);
-            assert!(difference <= allowed, "case {case}, {rasterizer:?}: {difference} > {allowed} with {scene:?}");
+            assert_at_most(difference, allowed, format_args!("case {case}, {rasterizer:?} with {scene:?}"));
         }
     }
     println!("image-aligned in perspective and axis-aligned, at least: {worst:.1?} dB by {RASTERIZERS:?}");

@@ -6,6 +6,7 @@ use std::time::Instant;
 use sheetsplat::SceneView;
 use sheetsplat::headless::Headless;
 use sheetsplat::scene::{Scene, VolumeSource};
+use sheetsplat::settings::Camera;
 use sheetsplat::stats::Stats;
 
 /// A number that may come first, and the names after it.
@@ -21,10 +22,15 @@ pub(crate) fn arguments(default: usize) -> (usize, Vec<String>) {
 /// A scene file, a volume file, or a builtin volume.
 pub(crate) fn open(name: &str) -> Scene {
     match name.strip_prefix("builtin:") {
-        Some(builtin) => Scene::new(VolumeSource::Builtin(builtin.to_owned())),
+        Some(builtin) => whole(VolumeSource::Builtin(builtin.to_owned())),
         None if name.ends_with(".toml") => Scene::open(Path::new(name), &[]).unwrap(),
-        None => Scene::new(VolumeSource::File(name.into())),
+        None => whole(VolumeSource::File(name.into())),
     }
+}
+
+/// The whole volume, as in the scene files that results are compared with.
+fn whole(volume: VolumeSource) -> Scene {
+    Scene { camera: Camera::default(), ..Scene::new(volume) }
 }
 
 /// What a table calls it.

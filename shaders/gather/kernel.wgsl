@@ -1,4 +1,4 @@
-// Kernels as the tile rasteriser gathers them: in closed form, by polynomials instead of tables (eq. 3).
+// Kernels as the tile rasterizer gathers them: in closed form, by polynomials instead of tables (eq. 3).
 //
 // Needs gather.wgsl: ECONOMIES, PERSPECTIVE, gather.
 // Needs shared/frame.wgsl: frame.

@@ -1,14 +1,14 @@
-// The pixels of a thread of the tile rasteriser, in the compositing buffer and among first hits.
+// The pixels of a thread of the tile rasterizer, in the compositing buffer and among first hits.
 //
-// Needs gather.wgsl: CUT, acc, gather, gathered, part.
-// Needs gather/region.wgsl: unit_word.
+// Needs gather.wgsl: CUT, acc, gather, gathered, patch_range.
+// Needs gather/region.wgsl: block_word.
 // Needs gather/sheets.wgsl: hits, shown_from, shown_to.
 // Needs shared/frame.wgsl: frame.
 
 // A thread's four pixels.
 struct Pixels {
-    // Of the tile's.
-    unit: u32,
+    // Of the patch's.
+    block: u32,
     first: vec2u,
     // Centres.
     column: f32,
@@ -19,11 +19,11 @@ struct Pixels {
 }
 
 fn pixels_of(corner: vec2u, thread: u32) -> Pixels {
-    let unit = thread / 8u;
-    let first = corner + vec2u((unit & 1u) * 8u + thread % 8u, (unit >> 1u) * 4u);
+    let block = thread / 8u;
+    let first = corner + vec2u((block & 1u) * 8u + thread % 8u, (block >> 1u) * 4u);
     let is_inside = vec4<bool>(first.x < frame.size.x) & (vec4u(first.y) + vec4u(0u, 1u, 2u, 3u) < vec4u(frame.size.y));
-    let slot = (first.y - part.first_row) * frame.size.x + first.x;
-    return Pixels(unit, first, f32(first.x) + 0.5, f32(first.y) + vec4f(0.5, 1.5, 2.5, 3.5), slot, is_inside);
+    let slot = (first.y - patch_range.first_row) * frame.size.x + first.x;
+    return Pixels(block, first, f32(first.x) + 0.5, f32(first.y) + vec4f(0.5, 1.5, 2.5, 3.5), slot, is_inside);
 }
 
 fn load_image(pixels: Pixels) -> mat4x4f {
@@ -78,10 +78,10 @@ fn open_word(pixels: Pixels, opacity: vec4f, depth: f32) -> u32 {
         is_open &= shown_from < shown_to;
         is_open &= vec4<bool>(frame.culling == 0u) | (shown_to > vec4f(depth));
     }
-    return unit_word(is_open);
+    return block_word(is_open);
 }
 
 // Which have not reached β.
 fn shallow_word(pixels: Pixels, opacity: vec4f) -> u32 {
-    return unit_word(pixels.is_inside & (opacity < vec4f(gather.beta)));
+    return block_word(pixels.is_inside & (opacity < vec4f(gather.beta)));
 }

@@ -1,5 +1,5 @@
-// The voxels that a subgroup draws in a sheet group: found once for all pixels of a tile, shaded once, and kept for as long as their
-// kernels reach into the next group. They are in the workgroup's memory, of which every subgroup has a part of its own.
+// The voxels that a subgroup draws in a sheet group: found once for all pixels of a patch, shaded once, and kept for as long as their
+// kernels reach into the next sheet group. They are in the workgroup's memory, of which every subgroup has a part of its own.
 //
 // Needs gather.wgsl: THREADS, lane, lanes.
 // Needs gather/bits.wgsl: ballot.
@@ -11,8 +11,8 @@ override QUEUE: u32 = 224u;
 // it adds: (C·m, m).
 var<workgroup> queue_points: array<vec4u, QUEUE>;
 var<workgroup> queue_amounts: array<vec4f, QUEUE>;
-// The units whose pixels it is drawn to, one bit each, and from bit `WHOLE_SHIFT` on one more than the sheet that takes it as a whole.
-var<workgroup> queue_units: array<u32, QUEUE>;
+// The blocks whose pixels it is drawn to, one bit each, and from bit `WHOLE_SHIFT` on one more than the sheet that takes it as a whole.
+var<workgroup> queue_blocks: array<u32, QUEUE>;
 
 const WHOLE_SHIFT = 8u;
 
@@ -33,18 +33,18 @@ fn before(lanes_in: u32) -> u32 {
 }
 
 // Puts some lanes' voxels at its end. Returns where.
-fn enqueue(is_in: bool, voxel: u32, point: vec4f, units: u32) -> u32 {
+fn enqueue(is_in: bool, voxel: u32, point: vec4f, blocks: u32) -> u32 {
     let lanes_in = ballot(is_in);
     let slot = queue_first + queue_count + before(lanes_in);
     if is_in {
         queue_points[slot] = vec4u(bitcast<vec3u>(point.xyz), voxel);
-        queue_units[slot] = units;
+        queue_blocks[slot] = blocks;
     }
     queue_count += countOneBits(lanes_in);
     return slot;
 }
 
-// Whether there is an n-th voxel, and some of a subgroup's units see it.
-fn is_queued_for(units: u32, n: u32) -> bool {
-    return n < queue_count && (queue_units[queue_first + min(n, queue_count - 1u)] & units) != 0u;
+// Whether there is an n-th voxel, and some of a subgroup's blocks see it.
+fn is_queued_for(blocks: u32, n: u32) -> bool {
+    return n < queue_count && (queue_blocks[queue_first + min(n, queue_count - 1u)] & blocks) != 0u;
 }

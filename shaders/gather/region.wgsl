@@ -1,16 +1,16 @@
-// The pixels of a tile that are not opaque (§6): a word for each of its four units, with the unit's rows in eight bits each. Units are
+// The pixels of a patch that are not opaque (§6): a word for each of its four blocks, with the block's rows in eight bits each. Blocks are
 // numbered row by row.
 //
 // Needs gather.wgsl: gather, lane, lanes.
 
-// Pixels across a tile.
-const TILE_WIDTH = 16u;
+// Pixels across a patch.
+const PATCH_WIDTH = 16u;
 
-// Pixels down a tile.
-const TILE_HEIGHT = 8u;
+// Pixels down a patch.
+const PATCH_HEIGHT = 8u;
 
-// The word of a thread's unit, given which of its own four pixels are in it.
-fn unit_word(is_in: vec4<bool>) -> u32 {
+// The word of a thread's block, given which of its own four pixels are in it.
+fn block_word(is_in: vec4<bool>) -> u32 {
     let rows = vec4u(1u, 1u << 8u, 1u << 16u, 1u << 24u) << vec4u(lane % 8u);
     let bits = select(vec4u(0u), rows, is_in);
     var word = bits.x | bits.y | bits.z | bits.w;
@@ -19,19 +19,19 @@ fn unit_word(is_in: vec4<bool>) -> u32 {
     return word | subgroupShuffleXor(word, 4u);
 }
 
-// Some units' words anew: those of the unit that a thread holds, and of the others in its subgroup.
-fn with_units(words: vec4u, unit: u32, word: u32) -> vec4u {
+// Some blocks' words anew: those of the block that a thread holds, and of the others in its subgroup.
+fn with_blocks(words: vec4u, block: u32, word: u32) -> vec4u {
     var result = words;
     for (var i = 0u; i < lanes; i += 8u) {
-        result = select(result, vec4u(subgroupShuffle(word, i)), vec4u(0u, 1u, 2u, 3u) == vec4u(subgroupShuffle(unit, i)));
+        result = select(result, vec4u(subgroupShuffle(word, i)), vec4u(0u, 1u, 2u, 3u) == vec4u(subgroupShuffle(block, i)));
     }
     return result;
 }
 
-// The units' bits.
-const UNIT_BITS = vec4u(1u, 2u, 4u, 8u);
+// The blocks' bits.
+const BLOCK_BITS = vec4u(1u, 2u, 4u, 8u);
 
-// Bounds of a tile's pixels, seen from the first.
+// Bounds of a patch's pixels, seen from the first.
 struct Bounds {
     low: vec2f,
     high: vec2f,
@@ -49,45 +49,45 @@ fn bounds_of(words: vec4u) -> Bounds {
     );
 }
 
-// The columns in which a unit has a pixel, one bit each.
+// The columns in which a block has a pixel, one bit each.
 fn columns_of(word: u32) -> u32 {
     let two = word | word >> 16u;
     return (two | two >> 8u) & 255u;
 }
 
-// The units, one bit each, in which the box around a footprint holds one of some pixels. Its centre is seen from the tile's first pixel.
-fn units_in_box(words: vec4u, center: vec2f, half_box: vec2f) -> u32 {
-    let rows = run(vec4f(center.y), half_box.y, f32(TILE_HEIGHT)).x;
+// The blocks, one bit each, in which the box around a footprint holds one of some pixels. Its centre is seen from the patch's first pixel.
+fn blocks_in_box(words: vec4u, center: vec2f, half_box: vec2f) -> u32 {
+    let rows = run(vec4f(center.y), half_box.y, f32(PATCH_HEIGHT)).x;
     // One bit in the bytes of the rows that the box reaches.
     let bytes = ((vec2u(rows) >> vec2u(0u, 4u)) & vec2u(15u)) * 0x204081u & vec2u(0x01010101u);
-    let columns = run(vec4f(center.x), half_box.x, f32(TILE_WIDTH)).x;
+    let columns = run(vec4f(center.x), half_box.x, f32(PATCH_WIDTH)).x;
     let halves = vec2u(columns & 255u, columns >> 8u);
-    return units_with(words, vec4u(bytes.x * halves, bytes.y * halves));
+    return blocks_with(words, vec4u(bytes.x * halves, bytes.y * halves));
 }
 
 // The same for what the box and the parallelogram of Fig. 13 have in common: its sides follow the shear of eq. 9, and its corners reach
 // out of the box.
-fn units_in_parallelogram(words: vec4u, center: vec2f, half_box: vec2f, half_width: f32) -> u32 {
-    let rows = run(vec4f(center.y), half_box.y, f32(TILE_HEIGHT)).x;
-    let columns = run(vec4f(center.x), half_box.x, f32(TILE_WIDTH)).x;
-    let box = row_of_units(rows, columns, 0u, center, half_width) | row_of_units(rows, columns, 1u, center, half_width) << vec4u(8u)
-        | row_of_units(rows, columns, 2u, center, half_width) << vec4u(16u)
-        | row_of_units(rows, columns, 3u, center, half_width) << vec4u(24u);
-    return units_with(words, box);
+fn blocks_in_parallelogram(words: vec4u, center: vec2f, half_box: vec2f, half_width: f32) -> u32 {
+    let rows = run(vec4f(center.y), half_box.y, f32(PATCH_HEIGHT)).x;
+    let columns = run(vec4f(center.x), half_box.x, f32(PATCH_WIDTH)).x;
+    let box = row_of_blocks(rows, columns, 0u, center, half_width) | row_of_blocks(rows, columns, 1u, center, half_width) << vec4u(8u)
+        | row_of_blocks(rows, columns, 2u, center, half_width) << vec4u(16u)
+        | row_of_blocks(rows, columns, 3u, center, half_width) << vec4u(24u);
+    return blocks_with(words, box);
 }
 
-// The parallelogram's pixels in a row of every unit, of those in some rows and columns.
-fn row_of_units(rows: u32, columns: u32, row: u32, center: vec2f, half_width: f32) -> vec4u {
+// The parallelogram's pixels in a row of every block, of those in some rows and columns.
+fn row_of_blocks(rows: u32, columns: u32, row: u32, center: vec2f, half_width: f32) -> vec4u {
     let row_of = vec4u(row, row, row + 4u, row + 4u);
-    let across = run(center.x + gather.shear * (vec4f(row_of) - center.y), half_width, f32(TILE_WIDTH)) & vec4u(columns);
+    let across = run(center.x + gather.shear * (vec4f(row_of) - center.y), half_width, f32(PATCH_WIDTH)) & vec4u(columns);
     let is_reached = (vec4u(rows) >> row_of & vec4u(1u)) != vec4u(0u);
     return select(vec4u(0u), across >> vec4u(0u, 8u, 0u, 8u) & vec4u(255u), is_reached);
 }
 
-// The units, one bit each, in which two sets of pixels have one in common.
-fn units_with(words: vec4u, others: vec4u) -> u32 {
-    let units = select(vec4u(0u), UNIT_BITS, (words & others) != vec4u(0u));
-    return units.x | units.y | units.z | units.w;
+// The blocks, one bit each, in which two sets of pixels have one in common.
+fn blocks_with(words: vec4u, others: vec4u) -> u32 {
+    let blocks = select(vec4u(0u), BLOCK_BITS, (words & others) != vec4u(0u));
+    return blocks.x | blocks.y | blocks.z | blocks.w;
 }
 
 // The pixels of a row or column, one bit each, within a distance of a point.

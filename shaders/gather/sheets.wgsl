@@ -1,6 +1,6 @@
-// The sheets that a thread of the tile rasteriser holds, and how they are composited.
+// The sheets that a thread of the tile rasterizer holds, and how they are composited.
 //
-// Needs gather.wgsl: COMPOSITING, CUT, FIRST_HIT, ORDER, TILE_THREADS, cut.
+// Needs gather.wgsl: COMPOSITING, CUT, FIRST_HIT, ORDER, PATCH_THREADS, cut.
 // Needs shared/compositing.wgsl: composite.
 // Needs shared/cut.wgsl: noted, shown.
 // Needs shared/frame.wgsl: FRONT_TO_BACK, MINIMUM, SURFACE, frame.
@@ -14,8 +14,8 @@ struct Sheets {
     fourth: mat4x4f,
 }
 
-// The sheets of all of a tile's threads, while some of a group's voxels wait for the queue: 16 columns each.
-var<workgroup> saved: array<vec4f, 16u * TILE_THREADS>;
+// The sheets of all of a patch's threads, while some of a group's voxels wait for the queue: 16 columns each.
+var<workgroup> saved: array<vec4f, 16u * PATCH_THREADS>;
 
 fn save_sheets(thread: u32, sheets: Sheets) {
     save_sheet(thread, 0u, sheets.first);
@@ -25,11 +25,11 @@ fn save_sheets(thread: u32, sheets: Sheets) {
 }
 
 fn save_sheet(thread: u32, column: u32, sheet: mat4x4f) {
-    let first = column * TILE_THREADS + thread;
+    let first = column * PATCH_THREADS + thread;
     saved[first] = sheet[0];
-    saved[first + TILE_THREADS] = sheet[1];
-    saved[first + 2u * TILE_THREADS] = sheet[2];
-    saved[first + 3u * TILE_THREADS] = sheet[3];
+    saved[first + PATCH_THREADS] = sheet[1];
+    saved[first + 2u * PATCH_THREADS] = sheet[2];
+    saved[first + 3u * PATCH_THREADS] = sheet[3];
 }
 
 fn saved_sheets(thread: u32) -> Sheets {
@@ -37,12 +37,12 @@ fn saved_sheets(thread: u32) -> Sheets {
 }
 
 fn saved_sheet(thread: u32, column: u32) -> mat4x4f {
-    let first = column * TILE_THREADS + thread;
+    let first = column * PATCH_THREADS + thread;
     return mat4x4f(
         saved[first],
-        saved[first + TILE_THREADS],
-        saved[first + 2u * TILE_THREADS],
-        saved[first + 3u * TILE_THREADS],
+        saved[first + PATCH_THREADS],
+        saved[first + 2u * PATCH_THREADS],
+        saved[first + 3u * PATCH_THREADS],
     );
 }
 

@@ -1,4 +1,4 @@
-// What the tile rasteriser is given and what it counts; `gpu::layout` documents the fields.
+// What the tile rasterizer is given and what it counts; `gpu::layout` documents the fields.
 //
 // Needs shared/tally.wgsl: Tally.
 struct Gather {
@@ -26,10 +26,10 @@ struct Gather {
     hits: u32,
 }
 
-struct Part {
+struct PatchRange {
     first_row: u32,
-    first_tile: u32,
-    end_tile: u32,
+    first_patch: u32,
+    end_patch: u32,
 }
 
 struct Gathered {

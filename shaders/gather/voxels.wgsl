@@ -1,12 +1,12 @@
-// The voxels that a subgroup of the tile rasteriser draws in a sheet group: which of those before stay, which come, their shading, and
+// The voxels that a subgroup of the tile rasterizer draws in a sheet group: which of those before stay, which come, their shading, and
 // their counts.
 //
-// Needs gather.wgsl: ECONOMIES, ORDER, PARALLELOGRAM, PASSES_PER_FIND, PASSES_PER_SHADING, PERSPECTIVE, SHEETS, bricks, color_ramp, drawn, first_px, gather, gathered, gradient_opacity_ramp, group, lane, lanes, opacity_ramp, open, passes, shallow.
+// Needs gather.wgsl: ECONOMIES, ORDER, PARALLELOGRAM, PASSES_PER_FIND, PASSES_PER_SHADING, PERSPECTIVE, SHEETS, bricks, color_ramp, drawn, first_px, gather, gathered, gradient_opacity_ramp, lane, lanes, opacity_ramp, open, passes, shallow, sheet_group.
 // Needs gather/kernel.wgsl: footprint_at.
-// Needs gather/queue.wgsl: WHOLE_SHIFT, enqueue, queue_amounts, queue_count, queue_first, queue_points, queue_size, queue_units.
+// Needs gather/queue.wgsl: WHOLE_SHIFT, enqueue, queue_amounts, queue_blocks, queue_count, queue_first, queue_points, queue_size.
 // Needs gather/ramps.wgsl: is_long, ramp_at.
-// Needs gather/region.wgsl: bounds_of, units_in_box, units_in_parallelogram.
-// Needs gather/walk.wgsl: Found, Sought, next_voxels.
+// Needs gather/region.wgsl: blocks_in_box, blocks_in_parallelogram, bounds_of.
+// Needs gather/walk.wgsl: Found, SearchBounds, next_voxels.
 // Needs shared/brick.wgsl: BRICK_VOXELS, voxel_of.
 // Needs shared/frame.wgsl: BOX_SLACK, FRONT_TO_BACK, frame.
 // Needs shared/local_ray.wgsl: sections_on_screen.
@@ -16,7 +16,7 @@
 // Needs shared/volume.wgsl: gradient_at, index_of, value_at.
 
 // A group of sheets: its number, its first sheet, where that begins, and half the box around its footprints.
-struct SheetGroup {
+struct GatheredGroup {
     number: u32,
     first_sheet: f32,
     near: f32,
@@ -29,9 +29,9 @@ fn overlapped_sheets(p: vec4f) -> vec2f {
     return vec2f(floor(sheets.x), ceil(sheets.y));
 }
 
-// Those of them that are in the group.
+// Those of them that are in the sheet_group.
 fn sheets_here(sheets: vec2f) -> vec2f {
-    return clamp(sheets, vec2f(group.first_sheet), vec2f(group.first_sheet + f32(SHEETS)));
+    return clamp(sheets, vec2f(sheet_group.first_sheet), vec2f(sheet_group.first_sheet + f32(SHEETS)));
 }
 
 // The first of the groups that a kernel overlaps, in the order in which they are drawn.
@@ -40,13 +40,13 @@ fn first_group(sheets: vec2f) -> f32 {
     return floor(sheet / f32(SHEETS));
 }
 
-// The units in which the box around a footprint, or a part of its extent, holds one of some pixels.
-fn units_seen(words: vec4u, center: vec2f, half_box: vec2f, part: f32) -> u32 {
+// The blocks in which the box around a footprint, or a part of its extent, holds one of some pixels.
+fn blocks_seen(words: vec4u, center: vec2f, half_box: vec2f, part: f32) -> u32 {
     let half = half_box * part + BOX_SLACK;
     if PARALLELOGRAM {
-        return units_in_parallelogram(words, center, half, gather.half_width * part + BOX_SLACK);
+        return blocks_in_parallelogram(words, center, half, gather.half_width * part + BOX_SLACK);
     }
-    return units_in_box(words, center, half);
+    return blocks_in_box(words, center, half);
 }
 
 // The extent of a kernel's sections in the group as a part of the kernel's: that of the section next to the kernel's centre.
@@ -54,8 +54,8 @@ fn extent_here(p: vec4f) -> f32 {
     if PERSPECTIVE || ECONOMIES {
         return 1.0;
     }
-    let far = group.near + f32(SHEETS) * frame.slab_width;
-    let beside = max(max(group.near - p.z, p.z - far), 0.0) * frame.kernel_per_depth / frame.support;
+    let far = sheet_group.near + f32(SHEETS) * frame.slab_width;
+    let beside = max(max(sheet_group.near - p.z, p.z - far), 0.0) * frame.kernel_per_depth / frame.support;
     return sqrt(max(1.0 - beside * beside, 0.0));
 }
 
@@ -65,21 +65,21 @@ fn may_appear() -> bool {
 }
 
 // Where voxels are whose kernels reach the group, or start in it, and whose boxes reach open pixels.
-fn sought_here(is_start: bool) -> Sought {
+fn search_bounds(is_start: bool) -> SearchBounds {
     let bounds = bounds_of(open);
     let offset = first_px - 0.5 * vec2f(frame.size);
-    let margin = group.half_box + BOX_SLACK;
-    let far = group.near + f32(SHEETS) * frame.slab_width;
+    let margin = sheet_group.half_box + BOX_SLACK;
+    let far = sheet_group.near + f32(SHEETS) * frame.slab_width;
     let reach = frame.reach + gather.depth_error;
     let least_reach = select(frame.reach, 0.0, frame.kernel_per_depth == 0.0) - 2.0 * gather.depth_error;
-    var depths = vec2f(group.near - reach, far + reach);
+    var depths = vec2f(sheet_group.near - reach, far + reach);
     if is_start && ORDER == FRONT_TO_BACK {
-        depths.x = group.near + least_reach;
+        depths.x = sheet_group.near + least_reach;
     }
     if is_start && ORDER != FRONT_TO_BACK {
         depths.y = far - least_reach;
     }
-    return Sought(vec3f(bounds.low - margin + offset, depths.x), vec3f(bounds.high + margin + offset, depths.y));
+    return SearchBounds(vec3f(bounds.low - margin + offset, depths.x), vec3f(bounds.high + margin + offset, depths.y));
 }
 
 // Of the voxels of the group before those stay in the queue that reach into this one and are seen there.
@@ -104,30 +104,30 @@ fn keep_voxels() {
 }
 
 // Finds as many voxels as there is room for in the queue: all that reach into the group, or those that start in it.
-fn find_voxels(sought: Sought, is_start: bool) {
+fn find_voxels(search: SearchBounds, is_start: bool) {
     while queue_count + lanes <= queue_size {
         passes += PASSES_PER_FIND;
         var found: Found;
-        let count = next_voxels(sought, &found);
+        let count = next_voxels(search, &found);
         if count == 0u {
             break;
         }
         let p = project(found.at);
         let sheets = overlapped_sheets(p);
-        let is_sought = !is_start || first_group(sheets) == f32(group.number);
-        _ = enqueue(lane < count && is_drawn_here(p, sheets) && is_sought, found.voxel, p, units_here(p));
+        let is_searched_for = !is_start || first_group(sheets) == f32(sheet_group.number);
+        _ = enqueue(lane < count && is_drawn_here(p, sheets) && is_searched_for, found.voxel, p, units_here(p));
     }
 }
 
 // Whether a kernel reaches into the group, and its box holds an open pixel.
 fn is_drawn_here(p: vec4f, sheets: vec2f) -> bool {
     let here = sheets_here(sheets);
-    return here.x < here.y && units_seen(open, p.xy - first_px, group.half_box, 1.0) != 0u;
+    return here.x < here.y && blocks_seen(open, p.xy - first_px, sheet_group.half_box, 1.0) != 0u;
 }
 
-// The units that a kernel's sections in the group reach.
+// The blocks that a kernel's sections in the group reach.
 fn units_here(p: vec4f) -> u32 {
-    return units_seen(open, p.xy - first_px, group.half_box, extent_here(p));
+    return blocks_seen(open, p.xy - first_px, sheet_group.half_box, extent_here(p));
 }
 
 // Shades the voxels in the queue from one on.
@@ -142,27 +142,27 @@ fn shade_voxels(first: u32) {
         let p = project(at);
         let shaded = shaded(at, p);
         let sheets = overlapped_sheets(p);
-        var units = queue_units[slot];
+        var blocks = queue_blocks[slot];
         if ECONOMIES {
-            units = economic_units(shaded, p, sheets);
+            blocks = economic_units(shaded, p, sheets);
         }
         if is_in {
             queue_amounts[slot] = shaded.amount;
-            queue_units[slot] = units;
+            queue_blocks[slot] = blocks;
             if PERSPECTIVE {
                 queue_points[slot].w = bitcast<u32>(p.w);
             }
         }
-        if is_in && (!ECONOMIES || units != 0u) {
-            count_drawn(voxel, p, sheets, units >> WHOLE_SHIFT != 0u);
+        if is_in && (!ECONOMIES || blocks != 0u) {
+            count_drawn(voxel, p, sheets, blocks >> WHOLE_SHIFT != 0u);
         }
     }
 }
 
-// The units that a voxel is drawn to among §8's economies, and the sheet of the group that takes it as a whole.
+// The blocks that a voxel is drawn to among §8's economies, and the sheet of the group that takes it as a whole.
 fn economic_units(shaded: Shaded, p: vec4f, sheets: vec2f) -> u32 {
     let center = p.xy - first_px;
-    let is_deep = units_seen(shallow, center, group.half_box, 1.0) == 0u;
+    let is_deep = blocks_seen(shallow, center, sheet_group.half_box, 1.0) == 0u;
     let is_whole = is_deep || shaded.alpha < gather.whole_below;
     var whole = -1.0;
     var is_here = true;
@@ -170,17 +170,17 @@ fn economic_units(shaded: Shaded, p: vec4f, sheets: vec2f) -> u32 {
         let last_of_first = floor(max(sheets.x, 0.0) / f32(SHEETS)) * f32(SHEETS) + f32(SHEETS - 1u);
         let center_sheet = floor((p.z - gather.near) / frame.slab_width);
         let sheet = clamp(center_sheet, sheets.x, sheets.y - 1.0);
-        whole = select(sheet, min(sheet, last_of_first), is_deep) - group.first_sheet;
+        whole = select(sheet, min(sheet, last_of_first), is_deep) - sheet_group.first_sheet;
         is_here = whole >= 0.0 && whole < f32(SHEETS);
     }
-    let rims = footprint_at(p, group.near, whole, shaded.amount).rim;
+    let rims = footprint_at(p, sheet_group.near, whole, shaded.amount).rim;
     let rim = max(max(rims.x, rims.y), max(rims.z, rims.w));
     let part = sqrt(clamp(rim, 0.0, frame.support * frame.support)) / frame.support;
-    let units = select(0u, units_seen(open, center, group.half_box, part), is_here && rim > 0.0);
-    return select(0u, units | select(0u, (1u + u32(max(whole, 0.0))) << WHOLE_SHIFT, is_whole), units != 0u);
+    let blocks = select(0u, blocks_seen(open, center, sheet_group.half_box, part), is_here && rim > 0.0);
+    return select(0u, blocks | select(0u, (1u + u32(max(whole, 0.0))) << WHOLE_SHIFT, is_whole), blocks != 0u);
 }
 
-// A voxel's color and what it adds per unit length, `(C·m, m)`, and its opacity.
+// A voxel's color and what it adds per block length, `(C·m, m)`, and its opacity.
 struct Shaded {
     amount: vec4f,
     alpha: f32,
@@ -216,10 +216,10 @@ fn shaded(voxel: vec3u, p: vec4f) -> Shaded {
     return Shaded(vec4f(color * m, m), alpha);
 }
 
-// Counts a voxel that is drawn into the group, and its sections there, if no other tile has: as one if it is drawn as a whole.
+// Counts a voxel that is drawn into the group, and its sections there, if no other patch has: as one if it is drawn as a whole.
 fn count_drawn(voxel: u32, p: vec4f, sheets: vec2f, is_whole: bool) {
     // Of the groups that the kernel reaches into, counted from the nearest; a whole one is drawn once.
-    let nth = select(group.number - u32(max(sheets.x, 0.0)) / SHEETS, 0u, is_whole);
+    let nth = select(sheet_group.number - u32(max(sheets.x, 0.0)) / SHEETS, 0u, is_whole);
     let word = nth * gather.bricks * 2u + voxel / 32u;
     let bit = 1u << (voxel % 32u);
     if (atomicOr(&gathered.words[gather.drawn + word], bit) & bit) != 0u {
@@ -228,8 +228,8 @@ fn count_drawn(voxel: u32, p: vec4f, sheets: vec2f, is_whole: bool) {
     let here = sheets_here(sheets);
     var sections = u32(here.y - here.x);
     if PERSPECTIVE {
-        let footprint = footprint_at(p, group.near, -1.0, vec4f(0.0));
-        sections = sections_on_screen(p.xy, footprint.axis, footprint.maps, here - group.first_sheet);
+        let footprint = footprint_at(p, sheet_group.near, -1.0, vec4f(0.0));
+        sections = sections_on_screen(p.xy, footprint.axis, footprint.maps, here - sheet_group.first_sheet);
     }
     sections = select(sections, min(sections, 1u), is_whole);
     drawn += vec2u(select(0u, 1u, nth == 0u && sections > 0u), sections);

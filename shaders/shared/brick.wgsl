@@ -22,7 +22,7 @@ struct Visit {
     padding: u32,
 }
 
-struct Group {
+struct SheetGroup {
     half_box: vec2f,
     box_filter: vec2u,
     culling: u32,
@@ -47,7 +47,7 @@ const FOLD = 32768u;
 const BRICK_VOXELS = 64u;
 
 // Quads drawn by one instance: vertices are worked on an instance at a time, and four of them would leave a software
-// rasteriser's vectors half empty.
+// rasterizer's vectors half empty.
 const QUADS = 16u;
 
 // Voxels shaded by one workgroup.

@@ -1,7 +1,7 @@
 // Kernel footprints from their stored forms (§§3.2, 3.3.1), and the quads that they are drawn with: what `splat` and
 // `splat_perspective` share.
 
-@group(0) @binding(1) var<uniform> group: Group;
+@group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(2) var<storage, read> splats: array<Splat>;
 @group(0) @binding(3) var<storage, read> instances: array<u32>;
 @group(0) @binding(4) var<storage, read> args: Indirect;
@@ -15,7 +15,7 @@ override SHEETS: u32 = 4u;
 // Beyond this many pixels from the image's corner a footprint's own corners are not drawn at.
 const FAR_PX = 65536.0;
 
-// What a quad reaches beyond its sections, grid units. A grid unit is at least a pixel, and the rasteriser snaps corners to
+// What a quad reaches beyond its sections, grid units. A grid unit is at least a pixel, and the rasterizer snaps corners to
 // 1/256 of one: without a margin it would lose pixels just inside the rim, where a wide kernel is not yet 0.
 const MARGIN = 1.0 / 64.0;
 
@@ -67,7 +67,7 @@ fn side_of(vertex: u32) -> vec2f {
 fn clip_corner(center_px: vec2f, offset: vec2f, side: vec2f, half_box: vec2f) -> vec4f {
     let size = vec2f(frame.size);
     var corner_px = center_px + offset;
-    // Corners far off the screen cost the rasteriser its precision: such a footprint's box is cut off near the screen.
+    // Corners far off the screen cost the rasterizer its precision: such a footprint's box is cut off near the screen.
     let farthest = abs(center_px) + half_box;
     if max(farthest.x, farthest.y) > FAR_PX {
         corner_px = clamp(center_px + side * half_box, vec2f(-1.0), size + 1.0);

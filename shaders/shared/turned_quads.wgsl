@@ -32,7 +32,7 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
     let splat = splats[instances[min(quad, args.count - 1u)]];
     let center_px = vec2f(splat.x_px, splat.y_px);
     let ray = local_ray(center_px);
-    let planes = sheet_planes(ray, splat.depth, splat.from_eye, group.near);
+    let planes = sheet_planes(ray, splat.depth, splat.from_eye, sheet_group.near);
     let near = planes.near;
     let far = planes.far;
     let maps = section_maps(ray, splat.from_eye, near, far);

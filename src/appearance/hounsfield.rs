@@ -13,6 +13,17 @@ const SIGNED_BELOW: f64 = -100.0;
 /// The greatest values of unsigned 12-bit scanners, with room for metal; beyond, values have been scaled.
 const UNSIGNED_GREATEST: std::ops::RangeInclusive<f64> = 1500.0..=8191.0;
 
+/// What is added to values that may be Hounsfield units: 0 where one in a thousand is below -100; else 1024 where the greatest lies within
+/// 1500 to 8191.
+pub(super) fn offset_of(values: &[f32]) -> Option<f64> {
+    // A filter's undershoot is no unit.
+    let [least, greatest] = quantiles(values, |_| true, [0.001, 1.0]).unwrap_or_default().map(f64::from);
+    match least < SIGNED_BELOW {
+        true => Some(0.0),
+        false => UNSIGNED_GREATEST.contains(&greatest).then_some(OFFSET),
+    }
+}
+
 /// Values over Hounsfield units, a straight line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Hounsfield {
@@ -26,13 +37,8 @@ impl Hounsfield {
     /// Units as they are where one value in a thousand is below -100; else stored with 1024 added where the greatest lies within 1500
     /// to 8191. For all else what is around the object is taken for air (-1000), and the object's faintest eighth for water (0).
     pub(super) fn of(values: &[f32]) -> Self {
-        // A filter's undershoot is no unit.
-        let [least, greatest] = quantiles(values, |_| true, [0.001, 1.0]).unwrap_or_default().map(f64::from);
-        if least < SIGNED_BELOW {
-            return Self { water: 0.0, per_unit: 1.0 };
-        }
-        if UNSIGNED_GREATEST.contains(&greatest) {
-            return Self { water: OFFSET, per_unit: 1.0 };
+        if let Some(water) = offset_of(values) {
+            return Self { water, per_unit: 1.0 };
         }
         match Object::find(values) {
             Some(Object { background, faint, .. }) => Self { water: faint, per_unit: (faint - background) / -AIR },

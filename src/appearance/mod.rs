@@ -7,6 +7,7 @@ mod object;
 mod padding;
 mod preset;
 mod quantile;
+mod suggestion;
 mod xray;
 
 use glam::DVec3;

@@ -122,7 +122,7 @@ impl ViewGeometry {
         let row = |row: DVec3, at_center: f64| row.extend(at_center - row.dot(grid.center()));
         // What is at the image's middle, and where pixels are one `unit`.
         let (origin, scale) = match &eye {
-            None => (camera.center / grid.unit(), 1.0 / pix),
+            None => (camera.middle() / grid.unit(), 1.0 / pix),
             Some(eye) => (eye.position, 1.0 / eye.pixel_per_depth),
         };
         let along_w = basis.w * aspect;
@@ -172,7 +172,7 @@ impl ViewGeometry {
             slabs,
             reach,
             kernel_per_depth,
-            center: camera.center / grid.unit(),
+            center: camera.middle() / grid.unit(),
             pix,
             footprint: FootprintMap::new(&warped, pix),
             lambda,

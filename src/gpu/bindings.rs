@@ -51,28 +51,28 @@ pub fn texture_of_integers(stages: ShaderStages, view_dimension: TextureViewDime
 }
 
 /// A buffer to be.
-pub type Wanted = BufferDescriptor<'static>;
+pub type BufferSpec = BufferDescriptor<'static>;
 
 /// A buffer of so many bytes.
-pub fn wanted(label: &'static str, size: u64, usage: BufferUsages) -> Wanted {
+pub fn buffer_spec(label: &'static str, size: u64, usage: BufferUsages) -> BufferSpec {
     BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false }
 }
 
 /// A buffer for contents of so many bytes.
-pub fn wanted_for(label: &'static str, bytes: u64, usage: BufferUsages) -> Wanted {
+pub fn content_spec(label: &'static str, bytes: u64, usage: BufferUsages) -> BufferSpec {
     // Of one element at least: bindings may not be empty.
-    wanted(label, bytes.max(8), usage | BufferUsages::COPY_DST)
+    buffer_spec(label, bytes.max(8), usage | BufferUsages::COPY_DST)
 }
 
 /// Bytes of some buffers.
 ///
 /// # Errors
 /// If the device's buffers, or its bindings to them, may not be as large as one of them.
-pub fn sizes(limits: &Limits, buffers: &[Wanted]) -> Result<u64, RenderError> {
+pub fn sizes(limits: &Limits, buffers: &[BufferSpec]) -> Result<u64, RenderError> {
     buffers.iter().map(|buffer| check(limits, buffer)).sum()
 }
 
-fn check(limits: &Limits, &Wanted { label, size, usage, .. }: &Wanted) -> Result<u64, RenderError> {
+fn check(limits: &Limits, &BufferSpec { label, size, usage, .. }: &BufferSpec) -> Result<u64, RenderError> {
     let (limit, actual) = match usage.contains(BufferUsages::STORAGE) {
         true if limits.max_storage_buffer_binding_size < limits.max_buffer_size => {
             ("max_storage_buffer_binding_size", limits.max_storage_buffer_binding_size)
@@ -85,14 +85,14 @@ fn check(limits: &Limits, &Wanted { label, size, usage, .. }: &Wanted) -> Result
     Ok(size)
 }
 
-/// A buffer of at least the wanted size: the previous one if it is large enough, and at most 4 times too large.
+/// A buffer of at least the spec size: the previous one if it is large enough, and at most 4 times too large.
 ///
 /// # Errors
 /// If the device's buffers, or its bindings to them, may not be that large.
-pub fn grown(device: &Device, previous: Option<Buffer>, wanted: &Wanted) -> Result<Buffer, RenderError> {
-    let size = check(&device.limits(), wanted)?;
-    let fits = |buffer: &Buffer| (size..=4 * size).contains(&buffer.size()) && buffer.usage().contains(wanted.usage);
-    Ok(previous.filter(fits).unwrap_or_else(|| device.create_buffer(wanted)))
+pub fn grown(device: &Device, previous: Option<Buffer>, spec: &BufferSpec) -> Result<Buffer, RenderError> {
+    let size = check(&device.limits(), spec)?;
+    let fits = |buffer: &Buffer| (size..=4 * size).contains(&buffer.size()) && buffer.usage().contains(spec.usage);
+    Ok(previous.filter(fits).unwrap_or_else(|| device.create_buffer(spec)))
 }
 
 /// A buffer with these contents, the old one if it has the right size.
@@ -107,7 +107,7 @@ pub fn filled(
     bytes: &[u8],
     usage: BufferUsages,
 ) -> Result<Buffer, RenderError> {
-    written(device, queue, old, &wanted_for(label, bytes.len() as u64, usage), bytes)
+    written(device, queue, old, &content_spec(label, bytes.len() as u64, usage), bytes)
 }
 
 /// The same with the buffer described.
@@ -118,10 +118,10 @@ pub fn written(
     device: &Device,
     queue: &Queue,
     old: Option<Buffer>,
-    wanted: &Wanted,
+    spec: &BufferSpec,
     bytes: &[u8],
 ) -> Result<Buffer, RenderError> {
-    let buffer = grown(device, old, wanted)?;
+    let buffer = grown(device, old, spec)?;
     queue.write_buffer(&buffer, 0, bytes);
     Ok(buffer)
 }

@@ -13,13 +13,15 @@ use crate::gpu::fault::DeviceFault;
 #[non_exhaustive]
 pub enum DeviceError {
     /// There is no adapter, or none with the requested name.
-    #[error("no GPU adapter: required {required}, actual: {actual}")]
+    #[error("no GPU adapter: required {required}, actual: {actual}{}", after(advice.as_deref()))]
     #[non_exhaustive]
     NoAdapter {
         /// What was asked for.
         required: String,
         /// What there is.
         actual: String,
+        /// What to install, where there is no adapter at all.
+        advice: Option<String>,
     },
     /// The adapter refused to make a device.
     #[error("adapter \"{adapter}\" gave no device: {source}")]
@@ -80,6 +82,11 @@ impl fmt::Display for InsufficientLimit {
         let Self { limit, required, actual } = self;
         write!(f, "{limit}: required {required}, actual: {actual}")
     }
+}
+
+/// Advice after what is wrong.
+fn after(advice: Option<&str>) -> String {
+    advice.map_or(String::new(), |advice| format!("; {advice}"))
 }
 
 fn list(limits: &[InsufficientLimit]) -> String {

@@ -107,7 +107,7 @@ pub struct Frame {
 /// One sheet group and one list's bricks that may reach into it.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Group {
+pub struct SheetGroup {
     /// Half the screen box around its footprints, pixels.
     pub half_box: [f32; 2],
     /// The occlusion buffer's box filter reads a pixel and so many to the right of it and below.
@@ -296,10 +296,9 @@ pub struct Gather {
     pub groups: u32,
     /// Bricks of the volume.
     pub bricks: u32,
-    /// Where in [`Gathered`]'s words the bits of drawn voxels start: for every group of those that a kernel reaches into a bit per
-    /// place.
+    /// This and the next three: see [`GatheredLayout`](super::gathered_layout::GatheredLayout), also for `hits`.
     pub drawn: u32,
-    /// Where the bits of composited tiles start: for every group a bit per 32×32 tile.
+    /// The first word of the bits of composited tiles.
     pub composited: u32,
     /// Of the parallelogram of Fig. 13: pixels that its sides move right on every row down.
     pub shear: f32,
@@ -311,9 +310,9 @@ pub struct Gather {
     pub beta: f32,
     /// A whole kernel's integral through its centre, over what a footprint must add to a sheet's alpha.
     pub peak: f32,
-    /// Where in [`Gathered`]'s words it is written, for every unit of every tile, at which group its subgroup goes on.
+    /// The first word of where subgroups go on.
     pub reached: u32,
-    /// Passes through loops that a thread may take in one dispatch; see [`tile_bins`](crate::lists::tile_bins).
+    /// Passes through loops that a thread may take in one dispatch; see [`patch_bins`](crate::lists::patch_bins).
     pub most_passes: u32,
     /// Those of a group at most, bricks not counted.
     pub passes_per_group: u32,
@@ -321,23 +320,23 @@ pub struct Gather {
     pub passes_per_brick: u32,
     /// Those to look up a voxel's control points in memory at most.
     pub search_passes: u32,
-    /// Where in [`Gathered`]'s words first hits are written, for every pixel.
+    /// The first word of first hits.
     pub hits: u32,
 }
 
-/// The tiles that a dispatch draws.
+/// The patches that a dispatch draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Part {
+pub struct PatchRange {
     /// First row of pixels of the compositing buffer that is bound.
     pub first_row: u32,
-    /// The first tile.
-    pub first_tile: u32,
-    /// The tile after the last.
-    pub end_tile: u32,
+    /// The first patch.
+    pub first_patch: u32,
+    /// The patch after the last.
+    pub end_patch: u32,
 }
 
-/// What the tile rasterizer counts. Then, in words: how many 32×32 tiles every group composited, and bits as [`Gather`] says.
+/// The tile rasterizer's results; [`GatheredLayout`](super::gathered_layout::GatheredLayout) says where they lie among the words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Gathered {

@@ -6,6 +6,7 @@ pub mod classified_volume;
 pub mod device;
 pub(crate) mod fault;
 pub mod footprint_texture;
+pub mod gathered_layout;
 pub(crate) mod gpu_volume;
 pub mod layout;
 pub mod render_pipeline;

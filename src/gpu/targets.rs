@@ -5,7 +5,7 @@ use wgpu::{
     TextureViewDimension,
 };
 
-use super::bindings::{Wanted, grown, sizes, uploaded, wanted};
+use super::bindings::{BufferSpec, buffer_spec, grown, sizes, uploaded};
 use super::layout::Band;
 use crate::error::RenderError;
 use crate::lists::quad_plan::{TILE, tile_grid};
@@ -34,7 +34,7 @@ pub struct Targets {
     pub occluded: Buffer,
     /// A word per tile: 1 where all its pixels are opaque.
     pub opaque_tiles: Buffer,
-    /// A word per tile: [`Group::number`](super::layout::Group::number) of the group that it was composited for last, 0 of none.
+    /// A word per tile: [`SheetGroup::number`](super::layout::SheetGroup::number) of the group that it was composited for last, 0 of none.
     pub last_groups: Buffer,
 }
 
@@ -180,11 +180,11 @@ impl Targets {
 }
 
 /// The buffers of [`Targets`], in its order.
-fn masks(size: [u32; 2]) -> [Wanted; 5] {
+fn masks(size: [u32; 2]) -> [BufferSpec; 5] {
     let [columns, rows] = tile_grid(size);
     let mask = |label, words: u32| {
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-        wanted(label, u64::from(words) * 4, usage)
+        buffer_spec(label, u64::from(words) * 4, usage)
     };
     [
         mask("sheetsplat.opaque", columns * size[1]),

@@ -4,15 +4,16 @@ use std::ops::{Add, Mul, Range};
 
 use glam::{DMat2, DVec2, DVec3, DVec4};
 
-use super::layout::{Cut, Frame, Gather, Gathered, Group};
+use super::gathered_layout::GatheredLayout;
+use super::layout::{Cut, Frame, Gather, SheetGroup};
 use super::volume_texture::ValueFormat;
 use crate::geometry::grid_warp::{self, FootprintMap};
 use crate::geometry::kernel::Kernel;
 use crate::geometry::means::RayBox;
 use crate::geometry::surfaces::SurfaceDepths;
 use crate::geometry::view_geometry::{Rays, ViewGeometry};
-use crate::lists::quad_plan::{FramePlan, tile_grid};
-use crate::lists::tile_bins::{self, TileBins};
+use crate::lists::patch_bins::PatchBins;
+use crate::lists::quad_plan::FramePlan;
 use crate::scene::Scene;
 use crate::setting_error::scaled;
 use crate::settings::clip::HalfSpace;
@@ -90,8 +91,14 @@ pub fn frame(
     }
 }
 
-/// What the tile rasterizer's threads share, over a volume of so many `bricks`.
-pub fn gather(view: &ViewGeometry, kernel: &Kernel, splatting: &Splatting, bins: &TileBins, bricks: u32) -> Gather {
+/// What the tile rasterizer's threads share. Its results go where `results` says.
+pub fn gather(
+    view: &ViewGeometry,
+    kernel: &Kernel,
+    splatting: &Splatting,
+    bins: &PatchBins,
+    results: &GatheredLayout,
+) -> Gather {
     let economies = splatting.economies;
     // What is behind a surface is culled; nothing else is behind anything.
     let has_beta = hides(splatting) && splatting.compositing != Compositing::Surface && economies.beta < 1.0;
@@ -101,9 +108,6 @@ pub fn gather(view: &ViewGeometry, kernel: &Kernel, splatting: &Splatting, bins:
     let FootprintMap { footprint_from_pixels, .. } = view.footprint;
     let (x, y) = (footprint_from_pixels.x_axis, footprint_from_pixels.y_axis);
     let (shear, half_width) = view.footprint.parallelogram(kernel.support());
-    let composited = bins.groups + 2 * bricks * groups_per_kernel(view);
-    let [columns, rows] = tile_grid(view.size);
-    let reached = composited + (columns * rows * bins.groups).div_ceil(32);
     Gather {
         along: bytemuck::cast(kernel.cumulative_polynomial::<16>(1.0).map(|x| x as f32)),
         chord: bytemuck::cast(kernel.cumulative_polynomial::<8>(CHORD_SPAN).map(|x| x as f32)),
@@ -114,26 +118,22 @@ pub fn gather(view: &ViewGeometry, kernel: &Kernel, splatting: &Splatting, bins:
         // Relative to the depths of the volume's corners, of which the first voxel is one.
         depth_error: (2e-7 * (kernel.radius() + 2.0 * view.screen_from_voxel[2].w.abs())) as f32,
         groups: bins.groups,
-        bricks,
-        drawn: bins.groups,
-        composited,
+        bricks: results.bricks,
+        drawn: results.drawn,
+        composited: results.composited,
         shear: shear as f32,
         half_width: half_width as f32,
         whole_below: economies.whole_below as f32,
         beta: if has_beta { economies.beta as f32 } else { f32::MAX },
         peak: (whole / economies.resolution).min(f32::MAX.into()) as f32,
-        reached,
+        reached: results.reached,
         most_passes: bins.passes.most,
         passes_per_group: bins.passes.per_group,
         passes_per_brick: bins.passes.per_brick,
         search_passes: bins.passes.search,
-        // Its byte can be a binding's first.
-        hits: (reached + bins.tiles * tile_bins::UNITS + WORDS_BEFORE).next_multiple_of(64) - WORDS_BEFORE,
+        hits: results.hits,
     }
 }
-
-/// Words of [`Gathered`] that are not counted.
-const WORDS_BEFORE: u32 = (std::mem::offset_of!(Gathered, words) / 4) as u32;
 
 /// What clip planes and a host's surfaces leave of rays, and the box of a volume that compositing by means looks at.
 pub fn cut(
@@ -182,21 +182,16 @@ pub fn cut(
 /// peak.
 const CHORD_SPAN: f64 = 0.45;
 
-/// The most groups of the tile rasterizer that a kernel reaches into.
-fn groups_per_kernel(view: &ViewGeometry) -> u32 {
-    (2.0 * view.reach / (f64::from(tile_bins::SHEETS) * view.slabs.width)).ceil() as u32 + 1
-}
-
-/// One [`Group`] every `stride` bytes: group after group, and of every group list after list.
+/// One [`SheetGroup`] every `stride` bytes: group after group, and of every group list after list.
 pub fn groups(plan: &FramePlan, kernel: &Kernel, splatting: &Splatting, stride: usize) -> Vec<u8> {
     let mut bytes = Vec::new();
     let first_slab = plan.groups.iter().map(|group| group.first_slab).min().unwrap_or(0);
     for (index, group) in (0..).zip(&plan.groups) {
         let number = (group.first_slab - first_slab) as u32 / plan.sheets + 1;
-        let uniform = Group { number, ..self::group(&plan.view, kernel, splatting, group.planes.clone()) };
+        let uniform = SheetGroup { number, ..self::group(&plan.view, kernel, splatting, group.planes.clone()) };
         for bricks in &group.bricks {
             let count = bricks.end - bricks.start;
-            let uniform = Group { first_brick: bricks.start, brick_count: count, index, ..uniform };
+            let uniform = SheetGroup { first_brick: bricks.start, brick_count: count, index, ..uniform };
             bytes.extend_from_slice(bytemuck::bytes_of(&uniform));
             bytes.resize(bytes.len().next_multiple_of(stride), 0);
         }
@@ -206,9 +201,9 @@ pub fn groups(plan: &FramePlan, kernel: &Kernel, splatting: &Splatting, stride: 
 }
 
 /// The group of sheets between two planes of sheet depth, without bricks.
-pub fn group(view: &ViewGeometry, kernel: &Kernel, splatting: &Splatting, planes: Range<f64>) -> Group {
+pub fn group(view: &ViewGeometry, kernel: &Kernel, splatting: &Splatting, planes: Range<f64>) -> SheetGroup {
     let half_box = view.half_box(kernel.support(), planes.clone());
-    Group {
+    SheetGroup {
         half_box: in_f32_pixels(half_box),
         // A footprint's box holds that many pixel centres and one more, or one less.
         box_filter: ((2.0 * half_box.min(DVec2::splat(MAX_HALF_BOX))).floor() - 1.0).as_uvec2().to_array(),

@@ -4,7 +4,8 @@ use std::sync::OnceLock;
 
 use wgpu::{Adapter, AdapterInfo, Backends, DeviceType, Instance, InstanceDescriptor, InstanceFlags};
 
-use crate::gpu::device::DeviceError;
+use super::driver;
+use crate::gpu::device::{DeviceError, DeviceRequirements, InsufficientLimit};
 
 /// The instance of a program of its own: the drivers that can run the renderer, and what the environment says.
 pub fn instance_descriptor() -> InstanceDescriptor {
@@ -28,24 +29,113 @@ pub fn driver_name(info: &AdapterInfo) -> String {
     format!("{} {}", info.driver, info.driver_info).trim().to_owned()
 }
 
-/// The adapter with `name` in its name, in any case, or the most capable one: a GPU before a software driver.
+/// What counts when an adapter is chosen.
+#[derive(Clone, Debug, PartialEq)]
+struct Candidate {
+    name: String,
+    device_type: DeviceType,
+    /// The limits that rule it out.
+    insufficient: Vec<InsufficientLimit>,
+}
+
+/// The adapter with `name` in its name, in any case, or the most capable one: one that can run the renderer before one that cannot, and
+/// a GPU before a software driver. Where a software driver stands in for a GPU that will not do, that is logged.
 ///
 /// # Errors
 /// If there is none.
 pub fn choose_adapter(adapters: &[Adapter], name: Option<&str>) -> Result<Adapter, DeviceError> {
-    let names: Vec<String> = adapters.iter().map(|adapter| adapter.get_info().name).collect();
-    let wanted = |adapter: &&Adapter| {
-        name.is_none_or(|name| adapter.get_info().name.to_lowercase().contains(&name.to_lowercase()))
+    let candidate = |adapter: &Adapter| {
+        let AdapterInfo { name, device_type, .. } = adapter.get_info();
+        let insufficient = DeviceRequirements::insufficient(&DeviceRequirements::for_adapter(adapter).limits);
+        Candidate { name, device_type, insufficient }
     };
-    let rank = |adapter: &&Adapter| match adapter.get_info().device_type {
+    let candidates: Vec<Candidate> = adapters.iter().map(candidate).collect();
+    match choose(&candidates, name) {
+        Some((at, passed_over)) => {
+            if let Some(note) = passed_over.map(|gpu| note(&candidates[gpu], &candidates[at])) {
+                log::warn!("{note}");
+            }
+            Ok(adapters[at].clone())
+        }
+        None => {
+            let names: Vec<&str> = candidates.iter().map(|candidate| candidate.name.as_str()).collect();
+            Err(DeviceError::NoAdapter {
+                required: name
+                    .map_or("any Vulkan, Metal or DirectX 12 adapter".to_owned(), |name| format!("\"{name}\"")),
+                actual: if names.is_empty() { "none".to_owned() } else { names.join(", ") },
+                advice: names.is_empty().then(driver::advice),
+            })
+        }
+    }
+}
+
+/// Which of some adapters is taken, and in place of which GPU, if that is a software driver only because the GPU will not do.
+fn choose(candidates: &[Candidate], name: Option<&str>) -> Option<(usize, Option<usize>)> {
+    let is_named =
+        |at: &usize| name.is_none_or(|name| candidates[*at].name.to_lowercase().contains(&name.to_lowercase()));
+    let rank = |at: usize| match candidates[at].device_type {
         DeviceType::DiscreteGpu => 0,
         DeviceType::IntegratedGpu => 1,
         DeviceType::VirtualGpu => 2,
         DeviceType::Cpu => 3,
         DeviceType::Other => 4,
     };
-    adapters.iter().filter(wanted).min_by_key(rank).cloned().ok_or_else(|| DeviceError::NoAdapter {
-        required: name.map_or("any Vulkan, Metal or DirectX 12 adapter".to_owned(), |name| format!("\"{name}\"")),
-        actual: if names.is_empty() { "none".to_owned() } else { names.join(", ") },
-    })
+    let named = || (0..candidates.len()).filter(is_named);
+    let chosen = named().min_by_key(|&at| (!candidates[at].insufficient.is_empty(), rank(at)))?;
+    let is_software = candidates[chosen].device_type == DeviceType::Cpu;
+    let best = named().min_by_key(|&at| rank(at)).filter(|&best| is_software && best != chosen);
+    Some((chosen, best))
+}
+
+/// Why a software driver draws though there is a GPU.
+fn note(gpu: &Candidate, chosen: &Candidate) -> String {
+    let missing: Vec<String> = gpu.insufficient.iter().map(ToString::to_string).collect();
+    format!(
+        "{} cannot run the renderer ({}): {}, a software driver, is used",
+        gpu.name,
+        missing.join("; "),
+        chosen.name
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn candidate(name: &str, device_type: DeviceType, is_sufficient: bool) -> Candidate {
+        let limit = InsufficientLimit { limit: "max_buffer_size", required: 9, actual: 5 };
+        let insufficient = if is_sufficient { Vec::new() } else { vec![limit] };
+        Candidate { name: name.to_owned(), device_type, insufficient }
+    }
+
+    #[test]
+    fn a_gpu_that_will_do_comes_first() {
+        let card = candidate("GeForce", DeviceType::DiscreteGpu, true);
+        let chip = candidate("Intel", DeviceType::IntegratedGpu, true);
+        let software = candidate("llvmpipe (LLVM 15)", DeviceType::Cpu, true);
+        let all = [software.clone(), chip, card];
+        assert_eq!(choose(&all, None), Some((2, None)));
+        assert_eq!(choose(&all[..2], None), Some((1, None)));
+        assert_eq!(choose(&all[..1], None), Some((0, None)));
+        assert_eq!(choose(&all, Some("LLVMpipe")), Some((0, None)));
+        assert_eq!(choose(&all, Some("radeon")), None);
+        assert_eq!(choose(&[], None), None);
+    }
+
+    #[test]
+    fn a_gpu_that_will_not_do_is_passed_over() {
+        let old_card = candidate("Old Card", DeviceType::DiscreteGpu, false);
+        let chip = candidate("Intel", DeviceType::IntegratedGpu, true);
+        let software = candidate("llvmpipe", DeviceType::Cpu, true);
+        // Another GPU needs no note.
+        assert_eq!(choose(&[old_card.clone(), software.clone(), chip], None), Some((2, None)));
+        assert_eq!(choose(&[software.clone(), old_card.clone()], None), Some((0, Some(1))));
+        let expected = "Old Card cannot run the renderer (max_buffer_size: required 9, actual: 5): llvmpipe, a software driver, is used";
+        assert_eq!(note(&old_card, &software), expected);
+        // Who names it learns why it will not do when it is opened.
+        assert_eq!(choose(&[software.clone(), old_card.clone()], Some("card")), Some((1, None)));
+        // A software driver that will not do, either, is no better.
+        let weak = candidate("llvmpipe", DeviceType::Cpu, false);
+        assert_eq!(choose(&[weak, old_card], None), Some((1, None)));
+    }
 }

@@ -1,6 +1,7 @@
 //! Rendering without a host: an own device, and images in memory. The only part that creates devices, submits and waits.
 
 pub mod device;
+mod driver;
 mod error;
 pub mod readback;
 
@@ -32,7 +33,7 @@ use crate::volume::Volume;
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct HeadlessOptions {
-    /// Part of the adapter's name, in any case; `None` prefers a GPU to a software driver.
+    /// Part of the adapter's name, in any case; `None` prefers an adapter that can run the renderer, and a GPU to a software driver.
     pub adapter: Option<String>,
     /// Features and limits to request; `None` takes what [`DeviceRequirements::for_adapter`] says.
     pub requirements: Option<DeviceRequirements>,

@@ -48,8 +48,8 @@ pub enum ImageError {
     Content {
         /// The file.
         path: PathBuf,
-        /// What of it (`shape`, …).
-        what: &'static str,
+        /// The part of it that does not fit (`shape`, `descr`, `size`).
+        what: String,
         /// What the file says.
         found: String,
         /// What would do.

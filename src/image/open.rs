@@ -1,64 +1,100 @@
-//! Opening images.
+//! Opening images: input like any other, of which no more is believed than its bytes can hold.
 
+use std::io::Cursor;
 use std::path::Path;
 
+use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+
 use super::{Format, Image, ImageError};
+use crate::volume::{Access, ReadOptions, VolumeError, npy};
+
+/// No byte of a PNG or EXR file becomes more bytes: of what these compress by, deflate compresses best.
+const MAX_EXPANSION: u64 = 1032;
 
 impl Image {
     /// Opens an image by the file's extension: `.png` of any type, `.exr`, or `.npy` as [`Image::save`] writes it (f32 of
-    /// shape height × width × 4). Where a file has no alpha, the image is opaque.
+    /// shape height × width × 4, in either order). Where a file has no alpha, the image is opaque.
     ///
     /// # Errors
     /// If the extension is unknown, or the file cannot be read or holds no such image.
     pub fn open(path: &Path) -> Result<Self, ImageError> {
-        let format = Format::of(path)?;
-        let bytes = std::fs::read(path).map_err(|source| ImageError::Io { path: path.to_owned(), source })?;
-        match format {
+        match Format::of(path)? {
             Format::Png => {
-                let mut image = Self::decode(path, &bytes, ::image::ImageFormat::Png)?;
+                let mut image = Self::decode(path, ImageFormat::Png)?;
                 for pixel in &mut image.pixels {
                     let [r, g, b, a] = *pixel;
                     *pixel = [r * a, g * a, b * a, a];
                 }
                 Ok(image)
             }
-            Format::Exr => Self::decode(path, &bytes, ::image::ImageFormat::OpenExr),
-            Format::Npy => Self::decode_npy(path, &bytes),
+            Format::Exr => Self::decode(path, ImageFormat::OpenExr),
+            Format::Npy => Self::decode_npy(path),
         }
     }
 
     /// Channels as the file has them, 0 to 1 where they are integers.
-    fn decode(path: &Path, bytes: &[u8], format: ::image::ImageFormat) -> Result<Self, ImageError> {
-        let image = ::image::load_from_memory_with_format(bytes, format)
-            .map_err(|source| ImageError::Decode { path: path.to_owned(), source: source.into() })?
-            .into_rgba32f();
-        let (width, height) = image.dimensions();
+    fn decode(path: &Path, format: ImageFormat) -> Result<Self, ImageError> {
+        let failed = |source: ::image::ImageError| ImageError::Decode { path: path.to_owned(), source: source.into() };
+        let bytes = read(path)?;
+        let decoder = ImageReader::with_format(Cursor::new(&bytes), format).into_decoder().map_err(failed)?;
+        let (width, height) = decoder.dimensions();
+        let most = 8 * MAX_EXPANSION * bytes.len() as u64 / min_bits_per_pixel(format, &bytes);
+        if u64::from(width) * u64::from(height) > most {
+            let found = format!("{width} × {height} pixels in {} bytes", bytes.len());
+            return Err(content(path, "size", found, format!("at most {most} pixels")));
+        }
+        Limits::default().reserve(decoder.total_bytes()).map_err(failed)?;
+        let image = DynamicImage::from_decoder(decoder).map_err(failed)?.into_rgba32f();
         Ok(Self { width, height, pixels: image.into_raw().as_chunks().0.to_vec() })
     }
 
-    fn decode_npy(path: &Path, bytes: &[u8]) -> Result<Self, ImageError> {
-        let content = |what, found: String, allowed: &str| ImageError::Content {
-            path: path.to_owned(),
-            what,
-            found,
-            allowed: allowed.to_owned(),
-        };
-        let failed = |source: std::io::Error| ImageError::Decode { path: path.to_owned(), source: source.into() };
-        let file = npyz::NpyFile::new(bytes).map_err(failed)?;
-        let found = format!("{:?}", file.shape());
-        let wrong_shape = || content("shape", found, "[height, width, 4]");
-        let &[height, width, 4] = file.shape() else { return Err(wrong_shape()) };
-        let (Ok(width), Ok(height)) = (u32::try_from(width), u32::try_from(height)) else { return Err(wrong_shape()) };
-        if file.order() != npyz::Order::C {
-            return Err(content("fortran_order", "True".to_owned(), "False"));
+    /// An array of rows of pixels of channels, which the reader of volumes takes for slices of rows of voxels.
+    fn decode_npy(path: &Path) -> Result<Self, ImageError> {
+        let read = || npy::read::<f32>(path, &Access::new(&ReadOptions::default())?);
+        let array = read().map_err(|error| match error {
+            VolumeError::Io { path, source, .. } => ImageError::Io { path, source },
+            VolumeError::Invalid { field, found, allowed, .. } => content(path, &field, found, allowed),
+        })?;
+        let [channels, width, height] = array.dims.to_array();
+        if channels != 4 {
+            let found = format!("({height}, {width}, {channels})");
+            return Err(content(path, "shape", found, "(height, width, 4)".to_owned()));
         }
-        let descr = file.dtype().descr();
-        let channels: npyz::NpyReader<f32, _> = file.data().map_err(|_| content("descr", descr, "'<f4' or '>f4'"))?;
-        let channels = channels.collect::<Result<Vec<_>, _>>().map_err(failed)?;
-        // The shape's product may have wrapped around.
-        if channels.len() as u64 / 4 != u64::from(width) * u64::from(height) {
-            return Err(content("data", format!("{} values", channels.len()), "height · width · 4"));
+        if array.kind != crate::volume::SampleType::F32 {
+            return Err(content(path, "descr", array.kind.to_string(), "float32".to_owned()));
         }
-        Ok(Self { width, height, pixels: channels.as_chunks().0.to_vec() })
+        Ok(Self { width, height, pixels: array.values.as_chunks().0.to_vec() })
     }
+}
+
+/// How many bits a pixel takes up at least before it is compressed: of a PNG as its first chunk says, whose fields have fixed places, of an
+/// EXR those of three half floats.
+fn min_bits_per_pixel(format: ImageFormat, bytes: &[u8]) -> u64 {
+    if format != ImageFormat::Png {
+        return 3 * 16;
+    }
+    let Some(&[depth, color]) = bytes.get(24..26) else { return 1 };
+    let channels = match color {
+        2 => 3,
+        4 => 2,
+        6 => 4,
+        // Grey, or a palette's index.
+        _ => 1,
+    };
+    u64::from(depth.max(1)) * channels
+}
+
+/// The bytes of a regular file: a pipe or a device may have no end.
+fn read(path: &Path) -> Result<Vec<u8>, ImageError> {
+    let failed = |source| ImageError::Io { path: path.to_owned(), source };
+    // Asked before opening: to open a pipe would wait for its writer.
+    if !std::fs::metadata(path).map_err(failed)?.is_file() {
+        let found = "a directory, pipe or device".to_owned();
+        return Err(content(path, "file", found, "a regular file".to_owned()));
+    }
+    std::fs::read(path).map_err(failed)
+}
+
+fn content(path: &Path, what: &str, found: String, allowed: String) -> ImageError {
+    ImageError::Content { path: path.to_owned(), what: what.to_owned(), found, allowed }
 }

@@ -4,7 +4,8 @@
 pub mod brick;
 pub mod bucket;
 pub mod classify;
+pub(crate) mod extent;
 pub mod iso_range;
+pub mod patch_bins;
 pub mod quad_plan;
-pub mod tile_bins;
 pub mod value_list;

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use wgpu::{BindGroup, Buffer, ComputePass, Device, ShaderStages, TextureView, TextureViewDimension};
 
 use crate::gpu::bindings::{ComputeStage, at_offset, depth_texture, storage, texture, uniform};
-use crate::gpu::layout::{Band, Cut, Frame, Group, TileList};
+use crate::gpu::layout::{Band, Cut, Frame, SheetGroup, TileList};
 use crate::gpu::shaders;
 use crate::gpu::targets::{BandBuffer, Targets};
 use crate::settings::splatting::Compositing;
@@ -49,7 +49,7 @@ pub struct CutBuffers<'a> {
 pub struct CompositeBuffers<'a> {
     /// One [`Frame`].
     pub frame: &'a Buffer,
-    /// One [`Group`] at every dynamic offset.
+    /// One [`SheetGroup`] at every dynamic offset.
     pub groups: &'a Buffer,
     /// The sheet buffers.
     pub sheets: &'a TextureView,
@@ -80,7 +80,7 @@ impl Composite {
                 ("composited", storage::<TileList>(stage, true)),
                 ("opaque", storage::<u32>(stage, false)),
                 ("opaque_tiles", storage::<u32>(stage, false)),
-                ("group", uniform::<Group>(stage, true)),
+                ("sheet_group", uniform::<SheetGroup>(stage, true)),
                 ("cut", uniform::<Cut>(stage, false)),
                 ("surfaces", depth_texture(stage)),
                 ("hits", storage::<u32>(stage, false)),
@@ -112,7 +112,7 @@ impl Composite {
             ("composited", tiles.as_entire_binding()),
             ("opaque", targets.opaque.as_entire_binding()),
             ("opaque_tiles", targets.opaque_tiles.as_entire_binding()),
-            ("group", at_offset::<Group>(groups)),
+            ("sheet_group", at_offset::<SheetGroup>(groups)),
             ("cut", cut.uniform.as_entire_binding()),
             ("surfaces", wgpu::BindingResource::TextureView(cut.surfaces)),
             ("hits", hits.as_entire_binding()),

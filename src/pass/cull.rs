@@ -4,9 +4,9 @@
 use wgpu::{BindGroup, Buffer, BufferUsages, ComputePass, Device, ShaderStages, TextureView};
 
 use crate::error::RenderError;
-use crate::gpu::bindings::{ComputeStage, Wanted, at_offset, grown, storage, uniform, wanted};
+use crate::gpu::bindings::{BufferSpec, ComputeStage, at_offset, buffer_spec, grown, storage, uniform};
 use crate::gpu::brick_lists::BrickBuffer;
-use crate::gpu::layout::{Brick, BrickState, Culled, Frame, Group, Indirect, Splat, Visit};
+use crate::gpu::layout::{Brick, BrickState, Culled, Frame, Indirect, SheetGroup, Splat, Visit};
 use crate::gpu::shaders;
 use crate::lists::brick::BRICK_VOXELS;
 use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};
@@ -44,7 +44,7 @@ pub struct CullList {
 pub struct CullBuffers<'a> {
     /// One [`Frame`].
     pub frame: &'a Buffer,
-    /// One [`Group`] at every dynamic offset.
+    /// One [`SheetGroup`] at every dynamic offset.
     pub groups: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
@@ -67,7 +67,7 @@ impl Cull {
         let sheets = [("SHEETS", f64::from(sheets))];
         let bricks = [
             ("frames", uniform::<Frame>(stage, false)),
-            ("group", uniform::<Group>(stage, true)),
+            ("sheet_group", uniform::<SheetGroup>(stage, true)),
             ("bricks", storage::<Brick>(stage, true)),
             ("order", storage::<u32>(stage, true)),
             ("states", storage::<BrickState>(stage, true)),
@@ -78,7 +78,7 @@ impl Cull {
         ];
         let voxels = [
             ("frames", uniform::<Frame>(stage, false)),
-            ("group", uniform::<Group>(stage, true)),
+            ("sheet_group", uniform::<SheetGroup>(stage, true)),
             ("bricks", storage::<Brick>(stage, true)),
             ("occluded", storage::<u32>(stage, true)),
             ("visits", storage::<Visit>(stage, false)),
@@ -105,9 +105,9 @@ impl Cull {
 
     /// A list's buffers, in [`CullList`]'s order: for so many bricks, of which no group looks at more than `most_bricks`, with at most
     /// `most_voxels` voxels.
-    pub fn wanted(bricks: usize, (most_bricks, most_voxels): (u32, u32)) -> [Wanted; 8] {
+    pub fn buffer_specs(bricks: usize, (most_bricks, most_voxels): (u32, u32)) -> [BufferSpec; 8] {
         let buffer = |label, count: usize, record: usize, usage| {
-            wanted(label, (count.max(1) * record) as u64, BufferUsages::STORAGE | usage)
+            buffer_spec(label, (count.max(1) * record) as u64, BufferUsages::STORAGE | usage)
         };
         let (none, indirect) = (BufferUsages::empty(), BufferUsages::INDIRECT);
         let (most_bricks, most_voxels) = (most_bricks as usize, most_voxels as usize);
@@ -125,7 +125,7 @@ impl Cull {
     }
 
     /// Allocates a list's buffers, or takes those of the `previous` frame. `order` is the list's bricks by first group; `most` is what
-    /// [`Self::wanted`] says.
+    /// [`Self::buffer_specs`] says.
     ///
     /// # Errors
     /// If the device's buffers may not be that large.
@@ -139,17 +139,17 @@ impl Cull {
         previous: Option<CullList>,
     ) -> Result<CullList, RenderError> {
         let mut old = previous.map_or_else(Vec::new, CullList::buffers).into_iter();
-        let buffers = Self::wanted(list.brick_count(), most).map(|wanted| grown(device, old.next(), &wanted));
+        let buffers = Self::buffer_specs(list.brick_count(), most).map(|spec| grown(device, old.next(), &spec));
         let [states, splats, instances, draw_args, visits, visit_args, fresh, fresh_args] = buffers;
         let (states, splats, instances, draw_args) = (states?, splats?, instances?, draw_args?);
         let (visits, visit_args, fresh, fresh_args) = (visits?, visit_args?, fresh?, fresh_args?);
 
         let CullBuffers { frame, groups, occluded, culled, .. } = shared;
-        let (frame, group) = (frame.as_entire_binding(), at_offset::<Group>(groups));
+        let (frame, group) = (frame.as_entire_binding(), at_offset::<SheetGroup>(groups));
         let whole = Buffer::as_entire_binding;
         let bricks = [
             ("frames", frame.clone()),
-            ("group", group.clone()),
+            ("sheet_group", group.clone()),
             ("bricks", whole(&list.buffer)),
             ("order", whole(order)),
             ("states", whole(&states)),
@@ -160,7 +160,7 @@ impl Cull {
         ];
         let voxels = [
             ("frames", frame.clone()),
-            ("group", group),
+            ("sheet_group", group),
             ("bricks", whole(&list.buffer)),
             ("occluded", whole(occluded)),
             ("visits", whole(&visits)),

@@ -1,4 +1,4 @@
-//! Draws whole tiles front to back: the tile rasterizer's one stage, which culls, splats and composites (§6).
+//! Draws patches front to back: the tile rasterizer's one stage, which culls, splats and composites (§6).
 
 use std::sync::OnceLock;
 
@@ -8,11 +8,13 @@ use wgpu::{
 };
 
 use super::composite::{CutBuffers, RayMode};
-use crate::gpu::bindings::{ComputeStage, at_offset, depth_texture, storage, texture_of_integers, uniform, wanted};
-use crate::gpu::layout::{Brick, Cut, Frame, Gather as GatherUniform, Gathered, Indirect, Part};
+use crate::gpu::bindings::{
+    ComputeStage, at_offset, buffer_spec, depth_texture, storage, texture_of_integers, uniform,
+};
+use crate::gpu::layout::{Brick, Cut, Frame, Gather as GatherUniform, Gathered, Indirect, PatchRange};
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
-use crate::lists::tile_bins::{SHEETS, TILE};
+use crate::lists::patch_bins::{PATCH, SHEETS};
 use crate::settings::splatting::{Compositing, Economies, FootprintBox, Order, Splatting};
 
 /// The stage's pipelines; each is compiled when it is first asked for.
@@ -34,19 +36,25 @@ pub struct GatherMode {
     labels: bool,
     holes: bool,
     rays: RayMode,
-    /// Whether tiles are divided.
+    /// Whether the blocks of a patch are divided among workgroups.
     divided: bool,
 }
 
 impl GatherMode {
     /// The mode that splatting settings ask for, with or without an eye, of a volume with or without labels that have ramps of their own
-    /// and with or without holes; each tile in so many parts.
-    pub fn of(splatting: &Splatting, perspective: bool, [labels, holes]: [bool; 2], rays: RayMode, parts: u32) -> Self {
+    /// and with or without holes; each patch drawn by so many workgroups.
+    pub fn of(
+        splatting: &Splatting,
+        perspective: bool,
+        [labels, holes]: [bool; 2],
+        rays: RayMode,
+        workgroups: u32,
+    ) -> Self {
         let Splatting { compositing, order, footprint_box, economies, .. } = *splatting;
         let economies = economies != Economies::default();
         // Every voxel has its own parallelogram there.
         let footprint_box = if perspective { FootprintBox::Rectangle } else { footprint_box };
-        Self { compositing, order, footprint_box, perspective, economies, labels, holes, rays, divided: parts > 1 }
+        Self { compositing, order, footprint_box, perspective, economies, labels, holes, rays, divided: workgroups > 1 }
     }
 }
 
@@ -57,13 +65,13 @@ pub struct GatherBuffers<'a> {
     pub frame: &'a Buffer,
     /// One [`GatherUniform`].
     pub gather: &'a Buffer,
-    /// One [`Part`] at every dynamic offset.
-    pub parts: &'a Buffer,
+    /// One [`PatchRange`] at every dynamic offset.
+    pub patch_ranges: &'a Buffer,
     /// `[Brick]`.
     pub bricks: &'a Buffer,
-    /// [`TileBins::starts`](crate::lists::tile_bins::TileBins::starts).
+    /// [`PatchBins::starts`](crate::lists::patch_bins::PatchBins::starts).
     pub starts: &'a Buffer,
-    /// [`TileBins::entries`](crate::lists::tile_bins::TileBins::entries).
+    /// [`PatchBins::entries`](crate::lists::patch_bins::PatchBins::entries).
     pub entries: &'a Buffer,
     /// Control points of the ramps.
     pub control_points: &'a Buffer,
@@ -73,7 +81,7 @@ pub struct GatherBuffers<'a> {
     pub labels: Option<&'a TextureView>,
     /// [`Gathered`].
     pub gathered: &'a Buffer,
-    /// [`TileBins::half_boxes`](crate::lists::tile_bins::TileBins::half_boxes), `[[f32; 2]]`.
+    /// [`PatchBins::half_boxes`](crate::lists::patch_bins::PatchBins::half_boxes), `[[f32; 2]]`.
     pub half_boxes: &'a Buffer,
     /// What cuts rays.
     pub cut: CutBuffers<'a>,
@@ -101,7 +109,7 @@ impl Gather {
             let slots = [
                 ("frames", uniform::<Frame>(stage, false)),
                 ("gathers", uniform::<GatherUniform>(stage, false)),
-                ("part", uniform::<Part>(stage, true)),
+                ("patch_range", uniform::<PatchRange>(stage, true)),
                 ("bricks", storage::<Brick>(stage, true)),
                 ("starts", storage::<u32>(stage, true)),
                 ("entries", storage::<u32>(stage, true)),
@@ -118,7 +126,7 @@ impl Gather {
             let constants = [
                 ("THREADS", f64::from(device.adapter_info().subgroup_max_size)),
                 ("QUEUE", f64::from(queue(device))),
-                ("PARTS", f64::from(parts(device, mode))),
+                ("WORKGROUPS_PER_PATCH", f64::from(workgroups_per_patch(device, mode))),
                 ("COMPOSITING", f64::from(mode.compositing as u32)),
                 ("ORDER", f64::from(mode.order as u32)),
                 ("PERSPECTIVE", f64::from(u8::from(mode.perspective))),
@@ -143,10 +151,10 @@ impl Gather {
         dispatches: u32,
     ) -> GatherBand {
         let usage = BufferUsages::STORAGE | BufferUsages::INDIRECT | BufferUsages::COPY_DST;
-        let descriptor = wanted("sheetsplat.next", NEXT_BYTES, usage);
+        let descriptor = buffer_spec("sheetsplat.next", NEXT_BYTES, usage);
         let next: Vec<Buffer> = (0..dispatches).map(|_| device.create_buffer(&descriptor)).collect();
         let groups = next.iter().map(|next| self.bind_one(device, mode, buffers, acc, next)).collect();
-        GatherBand { mode, groups, next, parts: parts(device, mode) }
+        GatherBand { mode, groups, next, workgroups_per_patch: workgroups_per_patch(device, mode) }
     }
 
     fn bind_one(
@@ -157,14 +165,15 @@ impl Gather {
         acc: &Buffer,
         next: &Buffer,
     ) -> BindGroup {
-        let GatherBuffers { frame, gather, parts, bricks, starts, entries, control_points, values, labels, .. } =
-            buffers;
+        let GatherBuffers {
+            frame, gather, patch_ranges, bricks, starts, entries, control_points, values, labels, ..
+        } = buffers;
         let labels = labels.unwrap_or_else(|| &self.no_labels.get_or_init(|| VolumeTexture::no_labels(device)).view);
         let whole = Buffer::as_entire_binding;
         let resources = [
             ("frames", whole(frame)),
             ("gathers", whole(gather)),
-            ("part", at_offset::<Part>(parts)),
+            ("patch_range", at_offset::<PatchRange>(patch_ranges)),
             ("bricks", whole(bricks)),
             ("starts", whole(starts)),
             ("entries", whole(entries)),
@@ -181,10 +190,10 @@ impl Gather {
         self.compiled(device, mode).bind(device, &resources)
     }
 
-    /// Draws so many tiles of the part at `offset`. The band must have been cleared.
-    pub fn record(&self, pass: &mut ComputePass<'_>, band: &GatherBand, offset: u32, tiles: u32) {
+    /// Draws so many patches of the range at `offset`. The band must have been cleared.
+    pub fn record(&self, pass: &mut ComputePass<'_>, band: &GatherBand, offset: u32, patches: u32) {
         let (Some(stage), Some(first)) = (self.stage(band.mode).get(), band.groups.first()) else { return };
-        stage.dispatch(pass, first, &[offset], tiles * band.parts);
+        stage.dispatch(pass, first, &[offset], patches * band.workgroups_per_patch);
         for (group, args) in band.groups[1..].iter().zip(&band.next) {
             stage.dispatch_indirect(pass, group, &[offset], args);
         }
@@ -194,17 +203,17 @@ impl Gather {
 /// Bytes of memory for a workgroup that the stage asks for.
 pub const WORKGROUP_BYTES: u32 = 16384;
 
-/// Workgroups that a tile is divided among: one for every round of its threads, or one for all.
-fn parts(device: &Device, mode: GatherMode) -> u32 {
+/// Workgroups that a patch is divided among: one for every round of its threads, or one for all.
+fn workgroups_per_patch(device: &Device, mode: GatherMode) -> u32 {
     // Threads hold four pixels.
-    if mode.divided { TILE[0] * TILE[1] / 4 / device.adapter_info().subgroup_max_size } else { 1 }
+    if mode.divided { PATCH[0] * PATCH[1] / 4 / device.adapter_info().subgroup_max_size } else { 1 }
 }
 
-/// Voxels in a workgroup's queue: as many as there is room for beside the sheets of its tile's pixels. On a GPU more than that asks for
+/// Voxels in a workgroup's queue: as many as there is room for beside the sheets of its patch's pixels. On a GPU more than that asks for
 /// would keep workgroups from running side by side.
 fn queue(device: &Device) -> u32 {
-    const SHEETS_BYTES: u32 = TILE[0] * TILE[1] * SHEETS * size_of::<[f32; 4]>() as u32;
-    // Point, amount and units.
+    const SHEETS_BYTES: u32 = PATCH[0] * PATCH[1] * SHEETS * size_of::<[f32; 4]>() as u32;
+    // Point, amount and blocks.
     const VOXEL_BYTES: u32 = 36;
     let bytes = match device.adapter_info().device_type {
         DeviceType::Cpu => device.limits().max_compute_workgroup_storage_size.min(2 * WORKGROUP_BYTES),
@@ -220,11 +229,11 @@ const NEXT_BYTES: u64 = size_of::<Indirect>() as u64;
 #[derive(Debug)]
 pub struct GatherBand {
     mode: GatherMode,
-    /// Workgroups for each tile.
-    parts: u32,
+    /// Workgroups for each patch.
+    workgroups_per_patch: u32,
     /// One for every dispatch.
     groups: Vec<BindGroup>,
-    /// [`Indirect`]: what each leaves to the next, all tiles or nothing.
+    /// [`Indirect`]: what each leaves to the next, all patches or nothing.
     next: Vec<Buffer>,
 }
 

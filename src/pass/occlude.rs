@@ -3,7 +3,7 @@
 use wgpu::{BindGroup, Buffer, ComputePass, Device, ShaderStages};
 
 use crate::gpu::bindings::{ComputeStage, at_offset, storage, uniform};
-use crate::gpu::layout::{Frame, Group, TileList};
+use crate::gpu::layout::{Frame, SheetGroup, TileList};
 use crate::gpu::shaders;
 use crate::gpu::targets::Targets;
 
@@ -20,7 +20,7 @@ impl Occlude {
         let stage = ShaderStages::COMPUTE;
         let slots = [
             ("frames", uniform::<Frame>(stage, false)),
-            ("group", uniform::<Group>(stage, true)),
+            ("sheet_group", uniform::<SheetGroup>(stage, true)),
             ("occluding", storage::<TileList>(stage, true)),
             ("source", storage::<u32>(stage, true)),
             ("result", storage::<u32>(stage, false)),
@@ -29,7 +29,7 @@ impl Occlude {
         Self { columns: compile("columns"), rows: compile("rows") }
     }
 
-    /// Binds the opacity buffer and its two convolutions, with a frame and `[Group]`; `tiles` is the list of tiles to compute anew.
+    /// Binds the opacity buffer and its two convolutions, with a frame and `[SheetGroup]`; `tiles` is the list of tiles to compute anew.
     pub fn bind(
         &self,
         device: &Device,
@@ -41,7 +41,7 @@ impl Occlude {
             let whole = Buffer::as_entire_binding;
             let resources = [
                 ("frames", whole(frame)),
-                ("group", at_offset::<Group>(groups)),
+                ("sheet_group", at_offset::<SheetGroup>(groups)),
                 ("occluding", whole(tiles)),
                 ("source", whole(source)),
                 ("result", whole(result)),

@@ -10,7 +10,7 @@ use super::splat::{added_to, quad_indices, sheets_of_a_group, splat_slots};
 use crate::geometry::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
 use crate::gpu::bindings::{Bindings, at_offset};
 use crate::gpu::footprint_texture::FootprintTexture;
-use crate::gpu::layout::{Group, QUADS};
+use crate::gpu::layout::{QUADS, SheetGroup};
 use crate::gpu::render_pipeline::render_pipeline;
 use crate::gpu::shaders;
 use crate::settings::splatting::{Compositing, FootprintForm};
@@ -39,7 +39,7 @@ pub struct SampleMode {
 pub struct SampleBuffers<'a> {
     /// One [`Frame`](crate::gpu::layout::Frame).
     pub frame: &'a Buffer,
-    /// One [`Group`], of one sheet that all kernels are in.
+    /// One [`SheetGroup`], of one sheet that all kernels are in.
     pub group: &'a Buffer,
     /// `[Splat]`.
     pub splats: &'a Buffer,
@@ -82,7 +82,7 @@ impl Sample {
         let SampleBuffers { frame, group, splats, order, args, footprints } = buffers;
         let resources = [
             ("frames", frame.as_entire_binding()),
-            ("group", at_offset::<Group>(group)),
+            ("sheet_group", at_offset::<SheetGroup>(group)),
             ("splats", splats.as_entire_binding()),
             ("instances", order.as_entire_binding()),
             ("args", args.as_entire_binding()),

@@ -11,7 +11,7 @@ use wgpu::{
 use crate::geometry::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
 use crate::gpu::bindings::{Bindings, Slot, at_offset, storage, texture, uniform, uploaded};
 use crate::gpu::footprint_texture::FootprintTexture;
-use crate::gpu::layout::{Frame, Group, Indirect, QUADS, Splat as SplatRecord, TileList};
+use crate::gpu::layout::{Frame, Indirect, QUADS, SheetGroup, Splat as SplatRecord, TileList};
 use crate::gpu::render_pipeline::{Attachments, render_pipeline};
 use crate::gpu::shaders;
 use crate::pass::cull::CullList;
@@ -98,7 +98,7 @@ impl Splat {
         self.pipeline(device, mode);
     }
 
-    /// Binds one list's splats. `groups` holds a [`Group`] at every dynamic offset that will be drawn.
+    /// Binds one list's splats. `groups` holds a [`SheetGroup`] at every dynamic offset that will be drawn.
     pub fn bind(
         &self,
         device: &Device,
@@ -109,7 +109,7 @@ impl Splat {
     ) -> BindGroup {
         let resources = [
             ("frames", frame.as_entire_binding()),
-            ("group", at_offset::<Group>(groups)),
+            ("sheet_group", at_offset::<SheetGroup>(groups)),
             ("splats", list.splats.as_entire_binding()),
             ("instances", list.instances.as_entire_binding()),
             ("args", list.draw_args.as_entire_binding()),
@@ -165,7 +165,7 @@ pub(super) fn splat_slots() -> [(&'static str, Slot); 6] {
     let both = ShaderStages::VERTEX_FRAGMENT;
     [
         ("frames", uniform::<Frame>(both, false)),
-        ("group", uniform::<Group>(ShaderStages::VERTEX, true)),
+        ("sheet_group", uniform::<SheetGroup>(ShaderStages::VERTEX, true)),
         ("splats", storage::<SplatRecord>(ShaderStages::VERTEX, true)),
         ("instances", storage::<u32>(ShaderStages::VERTEX, true)),
         ("args", storage::<Indirect>(ShaderStages::VERTEX, true)),

@@ -3,8 +3,8 @@
 use wgpu::{BindGroup, Buffer, BufferUsages, ComputePass, Device, ShaderStages};
 
 use crate::error::RenderError;
-use crate::gpu::bindings::{ComputeStage, Wanted, at_offset, grown, storage, uniform, wanted};
-use crate::gpu::layout::{Culled, Frame, Group, TileList};
+use crate::gpu::bindings::{BufferSpec, ComputeStage, at_offset, buffer_spec, grown, storage, uniform};
+use crate::gpu::layout::{Culled, Frame, SheetGroup, TileList};
 use crate::gpu::shaders;
 use crate::gpu::targets::Targets;
 
@@ -32,7 +32,7 @@ impl Tiles {
         let stage = ShaderStages::COMPUTE;
         let slots = [
             ("frames", uniform::<Frame>(stage, false)),
-            ("group", uniform::<Group>(stage, true)),
+            ("sheet_group", uniform::<SheetGroup>(stage, true)),
             ("culled", storage::<Culled>(stage, false)),
             ("opaque_tiles", storage::<u32>(stage, true)),
             ("composited", storage::<TileList>(stage, false)),
@@ -43,14 +43,14 @@ impl Tiles {
     }
 
     /// The buffers for so many tiles and groups, in [`TileLists`]' order.
-    pub fn wanted(tiles: u32, group_count: usize) -> [Wanted; 3] {
+    pub fn buffer_specs(tiles: u32, group_count: usize) -> [BufferSpec; 3] {
         let list_bytes = size_of::<TileList>() as u64 + u64::from(tiles) * 4;
         let (storage, indirect) = (BufferUsages::STORAGE, BufferUsages::STORAGE | BufferUsages::INDIRECT);
         let count_bytes = group_count.max(1) as u64 * 4;
         [
-            wanted("sheetsplat.composited_tiles", list_bytes, indirect),
-            wanted("sheetsplat.occluding_tiles", list_bytes, indirect),
-            wanted("sheetsplat.tile_counts", count_bytes, storage | BufferUsages::COPY_SRC),
+            buffer_spec("sheetsplat.composited_tiles", list_bytes, indirect),
+            buffer_spec("sheetsplat.occluding_tiles", list_bytes, indirect),
+            buffer_spec("sheetsplat.tile_counts", count_bytes, storage | BufferUsages::COPY_SRC),
         ]
     }
 
@@ -68,13 +68,13 @@ impl Tiles {
     ) -> Result<TileLists, RenderError> {
         let [old_composited, old_occluding, old_counts] =
             previous.map_or([None, None, None], |old| [old.composited, old.occluding, old.counts].map(Some));
-        let [composited, occluding, counts] = Self::wanted(targets.tiles(), group_count);
+        let [composited, occluding, counts] = Self::buffer_specs(targets.tiles(), group_count);
         let composited = grown(device, old_composited, &composited)?;
         let occluding = grown(device, old_occluding, &occluding)?;
         let counts = grown(device, old_counts, &counts)?;
         let resources = [
             ("frames", frame.as_entire_binding()),
-            ("group", at_offset::<Group>(groups)),
+            ("sheet_group", at_offset::<SheetGroup>(groups)),
             ("culled", culled.as_entire_binding()),
             ("opaque_tiles", targets.opaque_tiles.as_entire_binding()),
             ("composited", composited.as_entire_binding()),

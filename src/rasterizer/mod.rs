@@ -1,11 +1,11 @@
 //! The ways from bricks to the compositing buffer. Each holds its stages' pipelines, prepares its part of a frame, and
 //! records it.
 
+pub(crate) mod kind;
 pub(crate) mod quads;
 pub(crate) mod request;
 pub(crate) mod samples;
 pub(crate) mod tiles;
-pub(crate) mod way;
 
 use wgpu::{Buffer, BufferUsages, ComputePassDescriptor, Device, Queue};
 
@@ -32,7 +32,7 @@ pub struct Prepared {
 
 /// What a rasterizer prepares a frame from.
 #[derive(Clone, Copy)]
-pub(crate) struct Given<'a> {
+pub(crate) struct FrameInputs<'a> {
     pub(crate) device: &'a Device,
     pub(crate) queue: &'a Queue,
     pub(crate) volume: &'a ClassifiedVolume,
@@ -47,7 +47,7 @@ pub(crate) struct Given<'a> {
 
 /// What a rasterizer's part of a frame takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Needs {
+pub(crate) struct FrameEstimate {
     /// Bytes of GPU memory.
     pub(crate) bytes: u64,
     /// Sheet groups.
@@ -56,7 +56,7 @@ pub(crate) struct Needs {
     pub(crate) passes: usize,
 }
 
-impl Given<'_> {
+impl FrameInputs<'_> {
     /// See [`filled`].
     fn filled(
         &self,
@@ -79,8 +79,8 @@ pub(crate) struct Footprints {
 
 impl Footprints {
     /// The old table if it will do. Also whether it had to make one.
-    pub(crate) fn renewed(old: Option<Self>, given: Given<'_>) -> (Self, bool) {
-        let FrameRequest { splatting, kernel, view, .. } = given.request;
+    pub(crate) fn renewed(old: Option<Self>, inputs: FrameInputs<'_>) -> (Self, bool) {
+        let FrameRequest { splatting, kernel, view, .. } = inputs.request;
         let (form, kernel) = (splatting.footprint, *kernel);
         // The summed-area form serves every width (§3.3.1).
         let width = view.section_width();
@@ -90,7 +90,7 @@ impl Footprints {
             return (old, false);
         }
         let table = FootprintTable::new(form, &kernel, width);
-        (Self { texture: FootprintTexture::upload(given.device, given.queue, &table), kernel, width: of }, true)
+        (Self { texture: FootprintTexture::upload(inputs.device, inputs.queue, &table), kernel, width: of }, true)
     }
 }
 

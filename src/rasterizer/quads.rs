@@ -4,12 +4,12 @@ use std::ops::Range;
 
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Limits, TextureFormat, TextureView};
 
-use super::{Footprints, Given, Needs, Prepared, compute};
+use super::{Footprints, FrameEstimate, FrameInputs, Prepared, compute};
 use crate::error::RenderError;
 use crate::geometry::footprint::FootprintTable;
-use crate::gpu::bindings::{Wanted, grown, sizes, uploaded, wanted, wanted_for};
+use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, uploaded};
 use crate::gpu::classified_volume::ClassifiedVolume;
-use crate::gpu::layout::{Brick, Group, Tally};
+use crate::gpu::layout::{Brick, SheetGroup, Tally};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
@@ -100,12 +100,12 @@ impl QuadRasterizer {
     /// If the device's buffers may not be that large.
     pub(crate) fn prepare(
         &self,
-        given: Given<'_>,
+        inputs: FrameInputs<'_>,
         previous: Option<QuadFrame>,
     ) -> Result<(QuadFrame, Prepared), RenderError> {
-        let Given { device, volume, request, frame, control_points, compositing, .. } = given;
+        let FrameInputs { device, volume, request, frame, control_points, compositing, .. } = inputs;
         let FrameRequest { view, splatting, kernel, covered, rays, .. } = request;
-        let old = Old::of(previous);
+        let old = PreviousBuffers::of(previous);
         let targets = old.targets.filter(|old| old.size == view.size);
         let targets = match targets {
             Some(targets) => targets,
@@ -124,10 +124,10 @@ impl QuadRasterizer {
         };
         planned.plan.view = *view;
         let plan = &planned.plan;
-        let (footprints, tabled) = Footprints::renewed(old.footprints, given);
+        let (footprints, tabled) = Footprints::renewed(old.footprints, inputs);
         let group_stride = group_stride(&device.limits());
         let group_bytes = uniforms::groups(plan, kernel, splatting, group_stride);
-        let groups = given.filled(old.groups, "sheetsplat.groups", &group_bytes, BufferUsages::UNIFORM)?;
+        let groups = inputs.filled(old.groups, "sheetsplat.groups", &group_bytes, BufferUsages::UNIFORM)?;
         let [wanted_culled, wanted_hits] = counts_and_hits(request);
         let culled = grown(device, old.culled, &wanted_culled)?;
 
@@ -161,7 +161,7 @@ impl QuadRasterizer {
             sheets: &sheets,
             tiles,
             targets: &targets,
-            cut: given.cut,
+            cut: inputs.cut,
             hits: &hits,
         };
         let composite_mode = CompositeMode { compositing: splatting.compositing, rays: *rays };
@@ -198,21 +198,21 @@ impl QuadRasterizer {
         request: &FrameRequest,
         lists: &[&[Brick]],
         (sheet_format, sheets): (TextureFormat, u32),
-    ) -> Result<Needs, RenderError> {
+    ) -> Result<FrameEstimate, RenderError> {
         let FrameRequest { view, kernel, splatting, covered, .. } = request;
         let plan = FramePlan::new(lists.iter().copied(), *view, sheets, splatting.order, covered.clone());
         let most = most_of(lists.iter().copied(), &plan);
         let group_bytes = uniforms::groups(&plan, kernel, splatting, group_stride(limits)).len() as u64;
         let [columns, rows] = tile_grid(view.size);
-        let mut buffers = vec![wanted_for("sheetsplat.groups", group_bytes, BufferUsages::UNIFORM)];
+        let mut buffers = vec![content_spec("sheetsplat.groups", group_bytes, BufferUsages::UNIFORM)];
         buffers.extend(counts_and_hits(request));
-        buffers.extend(Tiles::wanted(columns * rows, plan.groups.len()));
+        buffers.extend(Tiles::buffer_specs(columns * rows, plan.groups.len()));
         for ((bricks, order), most) in lists.iter().zip(&plan.orders).zip(most) {
-            buffers.push(wanted("sheetsplat.order", order_bytes(order).len() as u64, BufferUsages::STORAGE));
-            buffers.extend(Cull::wanted(bricks.len(), most));
+            buffers.push(buffer_spec("sheetsplat.order", order_bytes(order).len() as u64, BufferUsages::STORAGE));
+            buffers.extend(Cull::buffer_specs(bricks.len(), most));
         }
         let targets = Targets::estimate(limits, view.size, sheet_format, sheets)?;
-        Ok(Needs {
+        Ok(FrameEstimate {
             bytes: sizes(limits, &buffers)? + targets + FootprintTable::bytes(splatting.footprint),
             groups: plan.groups.len(),
             passes: passes(&plan),
@@ -308,7 +308,7 @@ impl Planned {
 
 /// What of the previous frame may be taken over.
 #[derive(Default)]
-struct Old {
+struct PreviousBuffers {
     planned: Vec<Planned>,
     targets: Option<Targets>,
     footprints: Option<Footprints>,
@@ -319,7 +319,7 @@ struct Old {
     lists: Vec<PreparedList>,
 }
 
-impl Old {
+impl PreviousBuffers {
     fn of(frame: Option<QuadFrame>) -> Self {
         let Some(frame) = frame else { return Self::default() };
         Self {
@@ -342,15 +342,18 @@ fn passes(plan: &FramePlan) -> usize {
 
 /// Bytes from one group to the next.
 fn group_stride(limits: &Limits) -> usize {
-    size_of::<Group>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize)
+    size_of::<SheetGroup>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize)
 }
 
 /// The buffers of what culling counts, and of first hits.
-fn counts_and_hits(request: &FrameRequest) -> [Wanted; 2] {
+fn counts_and_hits(request: &FrameRequest) -> [BufferSpec; 2] {
     let [columns, rows] = tile_grid(request.view.size);
     let culled_bytes = size_of::<Tally>() as u64 + u64::from(columns * rows) * 4;
     let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
-    [wanted("sheetsplat.culled", culled_bytes, usage), wanted("sheetsplat.hits", request.hit_bytes().max(4), usage)]
+    [
+        buffer_spec("sheetsplat.culled", culled_bytes, usage),
+        buffer_spec("sheetsplat.hits", request.hit_bytes().max(4), usage),
+    ]
 }
 
 /// A list's bricks in bucket order; bindings may not be empty.

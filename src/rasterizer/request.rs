@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use wgpu::Device;
 
-use super::way::{Way, check_rays, insists_on_tiles};
+use super::kind::{RasterizerKind, check_rays, insists_on_tiles};
 use crate::error::RenderError;
 use crate::geometry::kernel::Kernel;
 use crate::geometry::means;
@@ -16,6 +16,7 @@ use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::uniforms::Ramps;
 use crate::pass::composite::RayMode;
 use crate::scene::Scene;
+use crate::settings::camera::Camera;
 use crate::settings::splatting::{Rasterizer, Splatting};
 
 /// A frame of a view.
@@ -33,24 +34,28 @@ pub(crate) struct FrameRequest {
     pub(crate) first_hit: Option<f64>,
     /// A host's surfaces, and the texel that is the image's first.
     pub(crate) surfaces: Option<(SurfaceDepths, [u32; 2])>,
-    pub(crate) way: Way,
+    pub(crate) kind: RasterizerKind,
+    /// Why the device does not draw by tiles.
+    pub(crate) fallback: Option<RenderError>,
     /// Those of the compositing buffer.
     pub(crate) bands: Vec<Band>,
 }
 
 impl FrameRequest {
+    /// The camera is the scene's with what it leaves to an object filled in.
+    ///
     /// # Errors
     /// If the scene asks for something not implemented, or for more than the device's limits allow.
     pub(crate) fn new(
         device: &Device,
         volume: &ClassifiedVolume,
-        scene: &Scene,
+        (scene, camera): (&Scene, &Camera),
         (surfaces, first_hit): (Option<&Surfaces>, Option<f64>),
         rasterizer: Rasterizer,
     ) -> Result<Self, RenderError> {
         let splatting = settled(scene.splatting, rasterizer);
         let (grid, size) = (volume.grid(), [scene.image.width, scene.image.height]);
-        let seen = ViewGeometry::new(grid, &scene.camera, &splatting, size)?;
+        let seen = ViewGeometry::new(grid, camera, &splatting, size)?;
         let bands = CompositingBuffer::bands(&device.limits(), size)?;
         let rays = RayMode { cut: surfaces.is_some() || !scene.clip.is_empty(), first_hit: first_hit.is_some() };
         check_rays(device, &splatting, rays, first_hit, size)?;
@@ -58,8 +63,10 @@ impl FrameRequest {
             Some(surfaces) => Some((surfaces.depths(&seen, grid)?, surfaces.origin)),
             None => None,
         };
+        let (kind, fallback) = RasterizerKind::of(device, &splatting)?;
         Ok(Self {
-            way: Way::of(device, &splatting)?,
+            kind,
+            fallback,
             covered: means::covered(&seen, grid, &splatting),
             kernel: Kernel::new(splatting.radius, splatting.falloff),
             ramps: Ramps::new(volume.transfer()),

@@ -5,12 +5,12 @@ use glam::{DVec2, UVec3};
 use rayon::prelude::*;
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Limits, TextureFormat, TextureView};
 
-use super::{Footprints, Given, Needs, Prepared, compute};
+use super::{Footprints, FrameEstimate, FrameInputs, Prepared, compute};
 use crate::error::RenderError;
 use crate::geometry::footprint::FootprintTable;
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::gpu::bindings::{Wanted, grown, sizes, wanted, wanted_for, written};
-use crate::gpu::layout::{Brick, FOLD, Group, Indirect, QUADS, Splat, Tally};
+use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, written};
+use crate::gpu::layout::{Brick, FOLD, Indirect, QUADS, SheetGroup, Splat, Tally};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
@@ -86,10 +86,10 @@ impl SampleRasterizer {
     /// If the voxels need more than one binding.
     pub(crate) fn prepare(
         &self,
-        given: Given<'_>,
+        inputs: FrameInputs<'_>,
         previous: Option<SampleFrame>,
     ) -> Result<(SampleFrame, Prepared), RenderError> {
-        let Given { device, volume, request, .. } = given;
+        let FrameInputs { device, volume, request, .. } = inputs;
         let FrameRequest { view, kernel, splatting, .. } = request;
         let bricks = volume.lists.all();
         let splat_bytes = splat_bytes(&device.limits(), bricks.len())?;
@@ -103,19 +103,19 @@ impl SampleRasterizer {
             Some(sorted) => (sorted, false),
             None => (Sorted::new(request, volume.grid(), bricks, volume.revision), true),
         };
-        let (footprints, tabled) = Footprints::renewed(old_footprints, given);
+        let (footprints, tabled) = Footprints::renewed(old_footprints, inputs);
         let targets = Targets::new(device, view.size, self.format, 1)?;
-        let buffers = Buffers::new(given, &sorted.places, splat_bytes)?;
+        let buffers = Buffers::new(inputs, &sorted.places, splat_bytes)?;
 
         let shade_group = self.shade.bind(
             device,
             ShadeBuffers {
-                frame: given.frame,
+                frame: inputs.frame,
                 bricks: volume.lists.lists.first().map_or(&buffers.splats, |list| &list.buffer),
                 values: volume.values(),
                 has_holes: volume.has_holes(),
                 labels: volume.labels(),
-                control_points: given.control_points,
+                control_points: inputs.control_points,
                 places: &buffers.order,
                 args: &buffers.args,
                 splats: &buffers.splats,
@@ -126,7 +126,7 @@ impl SampleRasterizer {
             device,
             mode,
             SampleBuffers {
-                frame: given.frame,
+                frame: inputs.frame,
                 group: &buffers.group,
                 splats: &buffers.splats,
                 order: &buffers.order,
@@ -136,17 +136,17 @@ impl SampleRasterizer {
         );
         let sheets = targets.sheets_view();
         let composite_buffers = CompositeBuffers {
-            frame: given.frame,
+            frame: inputs.frame,
             groups: &buffers.group,
             sheets: &sheets,
             tiles: &buffers.tiles,
             targets: &targets,
-            cut: given.cut,
+            cut: inputs.cut,
             hits: &buffers.no_hits,
         };
         let composite = |band| self.composite.bind(device, SUM, composite_buffers, band);
         let frame = SampleFrame {
-            composite_groups: given.compositing.bands.iter().map(composite).collect(),
+            composite_groups: inputs.compositing.bands.iter().map(composite).collect(),
             target: targets.sheet_view(0),
             sorted,
             targets,
@@ -168,13 +168,13 @@ impl SampleRasterizer {
         request: &FrameRequest,
         (grid, bricks): (&Grid, &[Brick]),
         sheet_format: TextureFormat,
-    ) -> Result<Needs, RenderError> {
+    ) -> Result<FrameEstimate, RenderError> {
         let splat_bytes = splat_bytes(limits, bricks.len())?;
         let voxels = Sorted::new(request, grid, bricks, 0).places.len();
-        let buffers = sizes(limits, &Buffers::wanted(request.view.size, voxels, splat_bytes))?;
+        let buffers = sizes(limits, &Buffers::buffer_specs(request.view.size, voxels, splat_bytes))?;
         let targets = Targets::estimate(limits, request.view.size, sheet_format, 1)?;
         let bytes = buffers + targets + FootprintTable::bytes(request.splatting.footprint);
-        Ok(Needs { bytes, groups: 0, passes: SampleFrame::PASSES })
+        Ok(FrameEstimate { bytes, groups: 0, passes: SampleFrame::PASSES })
     }
 
     /// Draws the frame.
@@ -245,23 +245,23 @@ impl Sorted {
 
 impl Buffers {
     /// For so many voxels on an image, in their order.
-    fn wanted(size: [u32; 2], voxels: usize, splat_bytes: u64) -> [Wanted; 7] {
+    fn buffer_specs(size: [u32; 2], voxels: usize, splat_bytes: u64) -> [BufferSpec; 7] {
         let (storage, indirect) = (BufferUsages::STORAGE, BufferUsages::STORAGE | BufferUsages::INDIRECT);
         let [columns, rows] = tile_grid(size);
-        let one = |label, bytes: usize, usage| wanted_for(label, bytes as u64, usage);
+        let one = |label, bytes: usize, usage| content_spec(label, bytes as u64, usage);
         [
             one("sheetsplat.order", 4 * voxels, storage),
             one("sheetsplat.args", size_of::<Indirect>(), indirect),
-            one("sheetsplat.group", size_of::<Group>(), BufferUsages::UNIFORM),
-            wanted("sheetsplat.splats", splat_bytes.max(size_of::<Splat>() as u64), storage),
+            one("sheetsplat.group", size_of::<SheetGroup>(), BufferUsages::UNIFORM),
+            buffer_spec("sheetsplat.splats", splat_bytes.max(size_of::<Splat>() as u64), storage),
             one("sheetsplat.tiles", size_of::<Indirect>() + 4 * (columns * rows) as usize, indirect),
             one("sheetsplat.counts", size_of::<Tally>(), BufferUsages::COPY_SRC),
             one("sheetsplat.no_hits", 4, storage),
         ]
     }
 
-    fn new(given: Given<'_>, places: &[u32], splat_bytes: u64) -> Result<Self, RenderError> {
-        let Given { device, queue, request, .. } = given;
+    fn new(inputs: FrameInputs<'_>, places: &[u32], splat_bytes: u64) -> Result<Self, RenderError> {
+        let FrameInputs { device, queue, request, .. } = inputs;
         let FrameRequest { view, kernel, splatting, .. } = request;
         let count = places.len() as u32;
         let [columns, rows] = tile_grid(view.size);
@@ -269,8 +269,9 @@ impl Buffers {
         tile_words.extend((0..columns * rows).flat_map(u32::to_ne_bytes));
         let tally =
             Tally { voxels_shaded: count, sections_rasterized: count, quads: count, ..bytemuck::Zeroable::zeroed() };
-        let [order, args, group, splats, tiles, counts, no_hits] = Self::wanted(view.size, places.len(), splat_bytes);
-        let filled = |wanted: Wanted, bytes: &[u8]| written(device, queue, None, &wanted, bytes);
+        let [order, args, group, splats, tiles, counts, no_hits] =
+            Self::buffer_specs(view.size, places.len(), splat_bytes);
+        let filled = |spec: BufferSpec, bytes: &[u8]| written(device, queue, None, &spec, bytes);
         Ok(Self {
             order: filled(order, bytemuck::cast_slice(places))?,
             args: filled(args, bytemuck::bytes_of(&workgroups(count, 64)))?,

@@ -82,7 +82,7 @@ impl Geometry {
             basis,
             size: DVec2::new(f64::from(width), f64::from(height)),
             grid: *grid,
-            center: camera.center / grid.unit(),
+            center: camera.middle() / grid.unit(),
             eye,
             method: splatting.method,
             economies: splatting.economies,

@@ -45,7 +45,7 @@ pub fn pixels(
     scene: &Scene,
     pixels: &[UVec2],
 ) -> Result<Vec<[f32; 4]>, RenderError> {
-    let mut exponential = scene.clone();
+    let mut exponential = scene.framed(volume, transfer);
     exponential.splatting.compositing = Compositing::Exponential;
     let geometry = Geometry::new(volume.grid(), &exponential)?;
     let field = Field::new(volume, transfer, &exponential, &geometry);
@@ -228,7 +228,7 @@ mod tests {
                     Projection::Perspective { near: Some(_), .. } => -1.0,
                     _ => -2.0,
                 };
-                scene.camera = Camera { projection, direction, up, center: DVec3::ZERO };
+                scene.camera = Camera { projection, direction, up, center: Some(DVec3::ZERO), ..Camera::default() };
                 let alpha = render(&volume, &transfer, &scene).unwrap().pixels[0][3];
                 let amount = -(1.0_f64 - 0.6).ln() * kernel.section(0.0, near, 2.0) * stretch;
                 assert!(

@@ -7,12 +7,12 @@ pub(crate) mod placement;
 pub(crate) mod prepared_frame;
 pub(crate) mod scene_view;
 
-use std::sync::OnceLock;
+use std::sync::{Once, OnceLock};
 
 use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Queue, RenderPass, TextureFormat, TextureView};
 
 use crate::error::{RenderError, check_device};
-use crate::gpu::bindings::{Wanted, grown, sizes, wanted, wanted_for, written};
+use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, written};
 use crate::gpu::device::{self, DeviceError, DeviceRequirements};
 use crate::gpu::fault::scoped;
 use crate::gpu::layout::{Cut, Frame, Tally};
@@ -22,15 +22,15 @@ use crate::gpu::uniforms;
 use crate::pass::composite::CutBuffers;
 use crate::pass::first_hit::FirstHit;
 use crate::pass::resolve::Resolve;
-use crate::rasterizer::Given;
+use crate::rasterizer::FrameInputs;
+use crate::rasterizer::kind::{RasterizerKind, insists_on_tiles};
 use crate::rasterizer::quads::QuadRasterizer;
 use crate::rasterizer::request::FrameRequest;
 use crate::rasterizer::samples::SampleRasterizer;
 use crate::rasterizer::tiles::TileRasterizer;
-use crate::rasterizer::way::{Way, insists_on_tiles};
 use crate::renderer::options::RendererOptions;
 use crate::renderer::placement::Placement;
-use crate::renderer::prepared_frame::{Drawing, FirstHits, Kept, PreparedFrame};
+use crate::renderer::prepared_frame::{Drawing, FirstHits, PreparedFrame, PreviousFrame};
 use crate::renderer::scene_view::{Prepared, SceneView};
 use crate::setting_error::SettingError;
 use crate::settings::splatting::Rasterizer;
@@ -54,6 +54,8 @@ pub struct Renderer {
     first_hit: OnceLock<FirstHit>,
     /// Stands for a host's depth where there is none.
     no_surfaces: OnceLock<TextureView>,
+    /// Whether it was logged that tiles will not do.
+    fell_back: Once,
 }
 
 impl Renderer {
@@ -82,6 +84,7 @@ impl Renderer {
             resolve,
             first_hit: OnceLock::new(),
             no_surfaces: OnceLock::new(),
+            fell_back: Once::new(),
         })
     }
 
@@ -122,19 +125,19 @@ impl Renderer {
         let settled = view.volume.lists.settled(&limits);
         let lists = settled.lists();
         let by_label = view.volume.shades_by_label();
-        let tiles = match request.way {
-            Way::Tiles => {
+        let tiles = match request.kind {
+            RasterizerKind::Tiles => {
                 let bricks = (settled.all(), lists.len());
                 match TileRasterizer::estimate(&limits, &request, bricks, by_label) {
                     Err(error) if insists_on_tiles(&request.splatting) => return Err(error),
                     needs => needs.ok(),
                 }
             }
-            Way::Quads | Way::Samples => None,
+            RasterizerKind::Quads | RasterizerKind::Samples => None,
         };
-        let needs = match (tiles, request.way) {
+        let needs = match (tiles, request.kind) {
             (Some(needs), _) => needs,
-            (None, Way::Samples) => {
+            (None, RasterizerKind::Samples) => {
                 let bricks = (view.volume.grid(), settled.all());
                 SampleRasterizer::estimate(&limits, &request, bricks, self.sheet_format)?
             }
@@ -156,21 +159,28 @@ impl Renderer {
 
     fn request(&self, view: &SceneView) -> Result<FrameRequest, RenderError> {
         let SceneView { volume, scene, surfaces, first_hit, .. } = view;
-        FrameRequest::new(&self.device, volume, scene, (surfaces.as_ref(), *first_hit), self.rasterizer)
+        FrameRequest::new(
+            &self.device,
+            volume,
+            (scene, &view.camera()),
+            (surfaces.as_ref(), *first_hit),
+            self.rasterizer,
+        )
     }
 
     fn prepare_unscoped(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
         // What can fail comes before anything is taken from the last frame.
-        let request = self.request(view)?;
+        let mut request = self.request(view)?;
         let SceneView { volume, scene, surfaces, frame, .. } = view;
+        let fallback = request.fallback.take();
         volume.flush(device, queue)?;
         let sheets = (self.sheet_format, self.sheets);
-        let kept = Kept::of(frame.take(), sheets, &request.view);
+        let kept = PreviousFrame::of(frame.take(), sheets, &request.view);
         let FrameRequest { view: seen, kernel, ramps, rays, .. } = &request;
         let size = seen.size;
         let grid = *volume.grid();
         let compositing = kept.compositing.unwrap_or_else(|| CompositingBuffer::new(device, size, &request.bands));
-        let write = |old, wanted: &Wanted, bytes: &[u8]| written(device, queue, old, wanted, bytes);
+        let write = |old, spec: &BufferSpec, bytes: &[u8]| written(device, queue, old, spec, bytes);
         let points = bytemuck::cast_slice(&ramps.points);
         let control_points = write(kept.control_points, &control_points(&request), points)?;
         let frame_values = uniforms::frame(seen, kernel, (&grid, volume.gpu_volume().value_format()), ramps, scene);
@@ -185,7 +195,7 @@ impl Renderer {
             },
         };
 
-        let given = Given {
+        let inputs = FrameInputs {
             device,
             queue,
             volume,
@@ -196,7 +206,13 @@ impl Renderer {
             cut: cut_buffers,
         };
         let was = kept.drawing.as_ref().map(Drawing::rasterizer);
-        let (drawing, prepared) = self.draw_with(given, kept.drawing)?;
+        let (drawing, prepared, too_much) = self.draw_with(inputs, kept.drawing)?;
+        let fallback = fallback.or(too_much);
+        if let Some(reason) = &fallback {
+            self.fell_back.call_once(|| {
+                log::warn!("drawn by quads, which may take longer than by tiles: {reason}");
+            });
+        }
         let totals = kept.totals.filter(|_| !prepared.bucketed && was == Some(drawing.rasterizer()));
 
         let first_hits = drawing.first_hits().filter(|_| rays.first_hit).map(|words| {
@@ -220,6 +236,7 @@ impl Renderer {
             resolve_groups: compositing.bands.iter().map(|band| self.resolve.bind(device, &uniform, band)).collect(),
             view: *seen,
             drawing,
+            fallback,
             compositing,
             uniform,
             control_points,
@@ -232,8 +249,12 @@ impl Renderer {
         Ok(prepared)
     }
 
-    /// Prepares a rasterizer's part: by tiles, unless the view does not fit them and the scene does not insist.
-    fn draw_with(&self, given: Given<'_>, previous: Option<Drawing>) -> Result<(Drawing, Prepared), RenderError> {
+    /// Prepares a rasterizer's part: by tiles, unless the view does not fit them and the scene does not insist. Then the error is why.
+    fn draw_with(
+        &self,
+        inputs: FrameInputs<'_>,
+        previous: Option<Drawing>,
+    ) -> Result<(Drawing, Prepared, Option<RenderError>), RenderError> {
         let (mut old_quads, mut old_tiles, mut old_samples) = (None, None, None);
         match previous {
             Some(Drawing::Quads(frame)) => old_quads = Some(*frame),
@@ -241,20 +262,21 @@ impl Renderer {
             Some(Drawing::Samples(frame)) => old_samples = Some(*frame),
             None => {}
         }
-        let FrameRequest { way, splatting, .. } = given.request;
-        if *way == Way::Samples {
-            let (frame, prepared) = self.samples(given.device).prepare(given, old_samples)?;
-            return Ok((Drawing::Samples(Box::new(frame)), prepared));
+        let FrameRequest { kind, splatting, .. } = inputs.request;
+        if *kind == RasterizerKind::Samples {
+            let (frame, prepared) = self.samples(inputs.device).prepare(inputs, old_samples)?;
+            return Ok((Drawing::Samples(Box::new(frame)), prepared, None));
         }
-        if *way == Way::Tiles {
-            match self.tiles.prepare(given, old_tiles) {
-                Ok((frame, prepared)) => return Ok((Drawing::Tiles(Box::new(frame)), prepared)),
+        let mut fallback = None;
+        if *kind == RasterizerKind::Tiles {
+            match self.tiles.prepare(inputs, old_tiles) {
+                Ok((frame, prepared)) => return Ok((Drawing::Tiles(Box::new(frame)), prepared, None)),
                 Err(error) if insists_on_tiles(splatting) => return Err(error),
-                Err(_) => {}
+                Err(error) => fallback = Some(error),
             }
         }
-        let (frame, prepared) = self.quads(given.device).prepare(given, old_quads)?;
-        Ok((Drawing::Quads(Box::new(frame)), prepared))
+        let (frame, prepared) = self.quads(inputs.device).prepare(inputs, old_quads)?;
+        Ok((Drawing::Quads(Box::new(frame)), prepared, fallback))
     }
 
     fn samples(&self, device: &Device) -> &SampleRasterizer {
@@ -355,17 +377,17 @@ impl Renderer {
     }
 }
 
-fn frame_uniform() -> Wanted {
-    wanted_for("sheetsplat.frame", size_of::<Frame>() as u64, BufferUsages::UNIFORM)
+fn frame_uniform() -> BufferSpec {
+    content_spec("sheetsplat.frame", size_of::<Frame>() as u64, BufferUsages::UNIFORM)
 }
 
-fn cut_uniform() -> Wanted {
-    wanted_for("sheetsplat.cut", size_of::<Cut>() as u64, BufferUsages::UNIFORM)
+fn cut_uniform() -> BufferSpec {
+    content_spec("sheetsplat.cut", size_of::<Cut>() as u64, BufferUsages::UNIFORM)
 }
 
-fn control_points(request: &FrameRequest) -> Wanted {
+fn control_points(request: &FrameRequest) -> BufferSpec {
     let bytes = size_of_val(&request.ramps.points[..]) as u64;
-    wanted_for("sheetsplat.control_points", bytes, BufferUsages::STORAGE)
+    content_spec("sheetsplat.control_points", bytes, BufferUsages::STORAGE)
 }
 
 /// Where counts of so many sheet groups end, bytes.
@@ -374,7 +396,7 @@ fn timestamps_at(groups: usize) -> u64 {
 }
 
 /// For counts, and behind them the timestamps of so many passes, if they are timed.
-fn staging(timestamps: u64, timed: bool, passes: usize) -> Wanted {
+fn staging(timestamps: u64, timed: bool, passes: usize) -> BufferSpec {
     let bytes = timestamps + if timed { passes as u64 * PASS_BYTES } else { 0 };
-    wanted("sheetsplat.counts", bytes, BufferUsages::COPY_DST | BufferUsages::MAP_READ)
+    buffer_spec("sheetsplat.counts", bytes, BufferUsages::COPY_DST | BufferUsages::MAP_READ)
 }

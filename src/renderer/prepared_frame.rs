@@ -2,6 +2,7 @@
 
 use wgpu::{BindGroup, Buffer, CommandEncoder, Texture, TextureFormat, TextureView};
 
+use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
@@ -17,6 +18,8 @@ pub(crate) struct PreparedFrame {
     pub(crate) sheets: (TextureFormat, u32),
     pub(crate) view: ViewGeometry,
     pub(crate) drawing: Drawing,
+    /// Why it is drawn by quads, where tiles were to draw it if they could.
+    pub(crate) fallback: Option<RenderError>,
     pub(crate) compositing: CompositingBuffer,
     pub(crate) uniform: Buffer,
     pub(crate) control_points: Buffer,
@@ -51,7 +54,7 @@ pub(crate) enum Drawing {
 
 /// What of a view's last frame the next one may take over.
 #[derive(Debug, Default)]
-pub(crate) struct Kept {
+pub(crate) struct PreviousFrame {
     pub(crate) drawing: Option<Drawing>,
     pub(crate) compositing: Option<CompositingBuffer>,
     pub(crate) uniform: Option<Buffer>,
@@ -64,7 +67,7 @@ pub(crate) struct Kept {
     pub(crate) staging: Option<Buffer>,
 }
 
-impl Kept {
+impl PreviousFrame {
     /// For a frame of `view`, drawn into sheets of such a format and number.
     pub(crate) fn of(frame: Option<PreparedFrame>, sheets: (TextureFormat, u32), view: &ViewGeometry) -> Self {
         let Some(old) = frame else { return Self::default() };

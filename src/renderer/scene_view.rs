@@ -1,5 +1,7 @@
 //! What is shown and how, and what the next frame can keep of the last one: every setter says what it costs (§5.1).
 
+use std::sync::OnceLock;
+
 use wgpu::{CommandEncoder, Device, Texture};
 
 use crate::error::{RenderError, check_device};
@@ -14,6 +16,7 @@ use crate::scene::{ImageSettings, Scene};
 use crate::setting_error::{Interval, SettingError};
 use crate::settings::camera::Camera;
 use crate::settings::clip::Clip;
+use crate::settings::framing::Extent;
 use crate::settings::shading::{Light, Shading};
 use crate::settings::splatting::{Splatting, check_first_hit};
 use crate::settings::transfer_function::{TransferFunction, check_iso_ranges};
@@ -29,6 +32,8 @@ pub struct SceneView {
     pub(crate) surfaces: Option<Surfaces>,
     pub(crate) first_hit: Option<f64>,
     pub(crate) frame: Option<PreparedFrame>,
+    /// What the camera shows by default, once it was asked for.
+    pub(crate) extent: OnceLock<Option<Extent>>,
 }
 
 impl SceneView {
@@ -45,12 +50,25 @@ impl SceneView {
         let transfer = scene.transfer.resolve(volume.volume());
         let clipped = scene.clip.voxels(volume.volume().grid(), scene.splatting.radius);
         let volume = scoped(device, || ClassifiedVolume::new(device, volume, transfer, clipped))?;
-        Ok(Self { volume, scene: scene.clone(), surfaces: None, first_hit: None, frame: None })
+        Ok(Self { volume, scene: scene.clone(), surfaces: None, first_hit: None, frame: None, extent: OnceLock::new() })
     }
 
     /// The settings. Its `volume` and `transfer` are those that the view was made with.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// The camera of the next frame: the scene's, and if that fits an object ([`Fit::Object`](crate::settings::Fit::Object)), with its open
+    /// values chosen for its direction and the image's size. The object's box ([`Scene::extent`]) is found once, with the first frame that
+    /// needs it, so that the picture stays where it is while the transfer function changes. A camera that is to turn and keep its distance
+    /// is that of [`Scene::explicit_all_around`].
+    pub fn camera(&self) -> Camera {
+        let Scene { camera, image, .. } = &self.scene;
+        if !camera.needs_object() {
+            return *camera;
+        }
+        let extent = self.extent.get_or_init(|| self.scene.extent(self.volume.volume(), self.volume.transfer()));
+        extent.map_or(*camera, |extent| extent.fit(camera, [image.width, image.height]))
     }
 
     /// The volume under the current transfer function.
@@ -199,6 +217,12 @@ impl SceneView {
     /// How the prepared frame is drawn: `"quads"` or `"tiles"`.
     pub fn rasterizer(&self) -> Option<&'static str> {
         self.frame.as_ref().map(|frame| frame.drawing.rasterizer())
+    }
+
+    /// Why the prepared frame is drawn by quads though the scene and the renderer leave the choice: what the device lacks, or what of the
+    /// frame is too much for tiles. `None` if it is drawn by tiles, or the settings rule these out. A renderer logs its first reason.
+    pub fn fallback(&self) -> Option<&RenderError> {
+        self.frame.as_ref()?.fallback.as_ref()
     }
 
     /// Bytes of GPU memory that the view holds, with the volume's, which other views may share: without those it is that less

@@ -13,9 +13,11 @@ use glam::DVec3;
 use toml::Table;
 
 use crate::appearance::{Colormap, Preset};
+use crate::lists::extent;
 use crate::setting_error::Allowed;
-use crate::settings::camera::Camera;
+use crate::settings::camera::{Camera, Fit};
 use crate::settings::clip::Clip;
+use crate::settings::framing::Extent;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::Splatting;
 use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
@@ -201,7 +203,7 @@ impl Scene {
             volume,
             spacing: None,
             labels: None,
-            camera: Camera::default(),
+            camera: Camera { fit: Fit::Object, ..Camera::default() },
             image: ImageSettings::default(),
             clip: Clip::default(),
             transfer: TransferSettings::default(),
@@ -301,13 +303,49 @@ impl Scene {
         Ok((volume, access.files()))
     }
 
-    /// The same scene with what it leaves to the volume filled in: transfer function, and how much the camera shows. It renders the same
+    /// The same scene with what it leaves to the volume filled in: transfer function, and what the camera shows. It renders the same
     /// image; preset and colour map are in what they led to.
     pub fn explicit(&self, volume: &Volume) -> Self {
-        let transfer = self.transfer.resolve(volume).into();
+        self.explicit_by(volume, Extent::fit)
+    }
+
+    /// As [`Self::explicit`], but a camera that fits an object ([`Fit::Object`]) stands so that the object stays in the image, and of one
+    /// size, wherever the camera turns: for movies and for cameras that follow a pointer.
+    pub fn explicit_all_around(&self, volume: &Volume) -> Self {
+        self.explicit_by(volume, Extent::fit_all_around)
+    }
+
+    fn explicit_by(&self, volume: &Volume, fit: impl Fn(&Extent, &Camera, [u32; 2]) -> Camera) -> Self {
+        let transfer = self.transfer.resolve(volume);
         let ImageSettings { width, height, .. } = self.image;
-        let camera = self.camera.explicit(volume.grid(), self.splatting.radius, width, height);
-        Self { camera, transfer, ..self.clone() }
+        let camera =
+            self.extent(volume, &transfer).map_or(self.camera, |extent| fit(&extent, &self.camera, [width, height]));
+        let camera = camera.explicit(volume.grid(), self.splatting.radius, width, height);
+        Self { camera, transfer: transfer.into(), ..self.clone() }
+    }
+
+    /// What a camera with open values is to show under a transfer function, which is [`TransferSettings::resolve`]'s if the scene is to
+    /// choose one: the box around the kernels of the voxels that take part and are not cut away; of a transfer function whose opacity was
+    /// chosen, without the outermost 0.1 % of them at either end of each axis, as a few specks of noise are no object. `None` if the camera
+    /// needs no such box, or no voxel takes part.
+    pub fn extent(&self, volume: &Volume, transfer: &TransferFunction) -> Option<Extent> {
+        /// Of the voxels, at either end of each axis.
+        const SPECKS: f64 = 0.001;
+        if !self.camera.needs_object() {
+            return None;
+        }
+        let (grid, radius) = (volume.grid(), self.splatting.radius);
+        let specks = if self.transfer.opacity.is_none() { SPECKS } else { 0.0 };
+        let voxels = extent::of_voxels(volume, transfer, &self.clip.voxels(grid, radius), specks)?;
+        Some(Extent::of_voxels(grid, voxels, radius))
+    }
+
+    /// The scene with a camera that leaves nothing to the object.
+    pub(crate) fn framed(&self, volume: &Volume, transfer: &TransferFunction) -> Self {
+        let ImageSettings { width, height, .. } = self.image;
+        let extent = self.extent(volume, transfer);
+        let camera = extent.map_or(self.camera, |extent| extent.fit(&self.camera, [width, height]));
+        Self { camera, ..self.clone() }
     }
 
     /// `source` is for scenes whose tables name no volume.
@@ -318,6 +356,9 @@ impl Scene {
         source: Option<VolumeSource>,
         sets: &[String],
     ) -> Result<Self, SceneError> {
+        // Who says nothing of looks wants to see what there is; overrides of single values do not change that.
+        let is_bare = !["transfer", "camera"].iter().any(|table| root.contains_key(*table));
+        let fit = if is_bare { Fit::Object } else { Fit::Volume };
         let overridden = sets.iter().map(|set| apply_override(&mut root, set)).collect::<Result<_, _>>()?;
         let origins = Origins { file: origin, overridden, written: root.clone() };
         let mut root = Section::root(&origins, root);
@@ -340,7 +381,7 @@ impl Scene {
             volume: source,
             spacing,
             labels,
-            camera: tables::camera(camera)?,
+            camera: tables::camera(camera, fit)?,
             image: tables::image(image)?,
             clip: tables::clip(clip)?,
             transfer: TransferSettings { preset, ..tables::transfer(transfer)? },

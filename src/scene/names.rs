@@ -1,7 +1,9 @@
 //! What scene files call a setting's choices.
 
+use crate::settings::camera::Fit;
 use crate::settings::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer};
 
+pub(super) const FITS: &[(&str, Fit)] = &[("volume", Fit::Volume), ("object", Fit::Object)];
 pub(super) const METHODS: &[(&str, Method)] = &[
     ("image-aligned", Method::ImageAligned),
     ("axis-aligned", Method::AxisAligned),

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::names::{BOXES, COMPOSITINGS, ENDIANS, FORMS, METHODS, ORDERS, RASTERIZERS};
+use super::names::{BOXES, COMPOSITINGS, ENDIANS, FITS, FORMS, METHODS, ORDERS, RASTERIZERS};
 use super::reader::{Entry, LABEL, Section};
 use super::{ImageSettings, SceneError, TransferSettings, VolumeSource};
 use crate::appearance::Colormap;
 use crate::setting_error::Interval;
-use crate::settings::camera::{Camera, FOV_Y, Projection};
+use crate::settings::camera::{Camera, FOV_Y, Fit, Projection};
 use crate::settings::clip::{Clip, MAX_PLANES};
 use crate::settings::shading::{Light, Shading};
 use crate::settings::splatting::{Compositing, FALLOFF, RADIUS, SLAB_WIDTH, Splatting};
@@ -83,16 +83,17 @@ fn raw_layout(section: &mut Section) -> Result<Option<RawLayout>, SceneError> {
 }
 
 /// `[camera]`. Keys of the projection that is not in use are checked and have no effect, so that overriding
-/// `projection` alone works.
-pub(super) fn camera(mut section: Section) -> Result<Camera, SceneError> {
-    let mut camera = Camera::default();
+/// `projection` alone works. `fit` is the default's.
+pub(super) fn camera(mut section: Section, fit: Fit) -> Result<Camera, SceneError> {
+    let mut camera = Camera { fit, ..Camera::default() };
     let mut is_perspective = false;
     let (mut height, mut fov_y, mut distance, mut near) = (None, 30.0, None, None);
     let projections = [("orthographic", false), ("perspective", true)];
     section.read("projection", &mut is_perspective, |entry| entry.choice(&projections))?;
     section.read("direction", &mut camera.direction, vector)?;
     section.read("up", &mut camera.up, vector)?;
-    section.read("center", &mut camera.center, vector)?;
+    section.read("center", &mut camera.center, |entry| vector(entry).map(Some))?;
+    section.read("fit", &mut camera.fit, |entry| entry.choice(FITS))?;
     section.read("height", &mut height, |entry| entry.number(Interval::POSITIVE).map(Some))?;
     section.read("fov_y", &mut fov_y, |entry| entry.number(FOV_Y))?;
     section.read("distance", &mut distance, |entry| entry.number(Interval::POSITIVE).map(Some))?;

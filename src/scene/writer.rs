@@ -6,7 +6,7 @@ use std::path::{Component, Path, PathBuf};
 use glam::DVec3;
 use toml::Value;
 
-use super::names::{BOXES, COMPOSITINGS, FORMS, METHODS, ORDERS, RASTERIZERS, name_of};
+use super::names::{BOXES, COMPOSITINGS, FITS, FORMS, METHODS, ORDERS, RASTERIZERS, name_of};
 use super::{ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use crate::appearance::{Colormap, Preset};
 use crate::settings::camera::{Camera, Projection};
@@ -119,7 +119,7 @@ fn numbers(numbers: impl IntoIterator<Item = f64>) -> Value {
 }
 
 fn write_camera(text: &mut Text, camera: &Camera) {
-    let Camera { projection, direction, up, center } = camera;
+    let Camera { projection, direction, up, center, fit } = camera;
     text.table("camera");
     match *projection {
         Projection::Orthographic { height } => {
@@ -135,7 +135,8 @@ fn write_camera(text: &mut Text, camera: &Camera) {
     }
     text.line("direction", vector(*direction));
     text.line("up", vector(*up));
-    text.line("center", vector(*center));
+    text.given("center", center.map(vector));
+    text.line("fit", name_of(FITS, *fit));
 }
 
 fn write_image(text: &mut Text, image: &ImageSettings) {

@@ -22,18 +22,29 @@ const PARALLEL: f64 = 1e-9;
 pub enum Projection {
     /// Parallel rays.
     Orthographic {
-        /// World units over the image's height; `None` shows the whole volume.
+        /// World units over the image's height; `None` shows what [`Camera::fit`] says.
         height: Option<f64>,
     },
     /// Rays through an eye point.
     Perspective {
         /// Opening angle over the image's height, degrees, in (0, 180).
         fov_y: f64,
-        /// World units from the eye to `center`; `None` shows the whole volume.
+        /// World units from the eye to `center`; `None` shows what [`Camera::fit`] says.
         distance: Option<f64>,
         /// World units from the eye to the near plane; `None` is one `unit` (the smallest voxel spacing).
         near: Option<f64>,
     },
+}
+
+/// What a camera shows that leaves its centre, its height or its distance open.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Fit {
+    /// The whole volume, whatever is visible of it.
+    #[default]
+    Volume,
+    /// What is visible: the box of the voxels that take part. Which box that is, [`Scene::explicit`](crate::Scene::explicit) finds out.
+    Object,
 }
 
 /// A camera in world units.
@@ -45,8 +56,10 @@ pub struct Camera {
     pub direction: DVec3,
     /// What is up on the screen; not parallel to `direction`.
     pub up: DVec3,
-    /// The world point at the image's centre.
-    pub center: DVec3,
+    /// The world point at the image's centre; `None` is the middle of what [`Self::fit`] says.
+    pub center: Option<DVec3>,
+    /// What the values that are open show.
+    pub fit: Fit,
 }
 
 impl Default for Camera {
@@ -55,7 +68,8 @@ impl Default for Camera {
             projection: Projection::Orthographic { height: None },
             direction: DVec3::Y,
             up: DVec3::Z,
-            center: DVec3::ZERO,
+            center: None,
+            fit: Fit::Volume,
         }
     }
 }
@@ -77,7 +91,9 @@ impl Camera {
         let Self { direction, up, center, .. } = *self;
         check_direction("camera.direction", direction)?;
         check_direction("camera.up", up)?;
-        Interval::FINITE.check_each("camera.center", &center.to_array())?;
+        if let Some(center) = center {
+            Interval::FINITE.check_each("camera.center", &center.to_array())?;
+        }
         if scaled(direction).normalize().cross(scaled(up).normalize()).length() < PARALLEL {
             let found = format!("{up} with direction {direction}");
             return Err(SettingError::new("camera.up", found, "a vector not parallel to camera.direction"));
@@ -90,6 +106,20 @@ impl Camera {
         let w = scaled(self.direction).normalize();
         let u = w.cross(scaled(self.up)).normalize();
         ViewBasis { u, v: u.cross(w), w }
+    }
+
+    /// The world point at the image's centre: as given, or the volume's centre.
+    pub fn middle(&self) -> DVec3 {
+        self.center.unwrap_or_default()
+    }
+
+    /// Whether a value is open that an object's box decides ([`Extent::fit`](crate::settings::Extent::fit)).
+    pub fn needs_object(&self) -> bool {
+        let is_open = match self.projection {
+            Projection::Orthographic { height } => height.is_none(),
+            Projection::Perspective { distance, .. } => distance.is_none(),
+        };
+        self.fit == Fit::Object && (is_open || self.center.is_none())
     }
 
     /// The camera turned about its `up` by an angle in degrees, by the right hand; `center` stays.
@@ -128,7 +158,8 @@ impl Camera {
         Some([fov_y, distance.unwrap_or(whole), near.unwrap_or(grid.unit())])
     }
 
-    /// The same camera with all of its projection given: what it shows of this volume by default it shows of any.
+    /// The same camera with its centre and all of its projection given, what is open by the whole volume: what it shows of this volume by
+    /// default it shows of any.
     pub fn explicit(&self, grid: &Grid, kernel_radius: f64, width: u32, height: u32) -> Self {
         let projection = match self.perspective(grid, kernel_radius) {
             Some([fov_y, distance, near]) => {
@@ -136,7 +167,7 @@ impl Camera {
             }
             None => Projection::Orthographic { height: self.orthographic_height(grid, kernel_radius, width, height) },
         };
-        Self { projection, ..*self }
+        Self { projection, center: Some(self.middle()), ..*self }
     }
 
     /// The eye of a perspective camera over an image `height` pixels high; `None` for an orthographic one. The default distance
@@ -148,7 +179,7 @@ impl Camera {
         let Some([fov_y, distance, near]) = self.perspective(grid, kernel_radius) else { return Ok(None) };
         let (unit, sphere) = (grid.unit(), grid.bounding_radius(kernel_radius));
         let [distance, near] = [distance, near].map(|world| world / unit);
-        let position = self.center / unit - distance * self.basis().w;
+        let position = self.middle() / unit - distance * self.basis().w;
         let pixel_per_depth = 2.0 * (fov_y.to_radians() / 2.0).tan() / f64::from(height);
         let eye = Eye { position, distance, near, pixel_per_depth };
         let (least, largest) = (PIXELS.start() / pixel_per_depth, PIXELS.end() / pixel_per_depth);

@@ -4,7 +4,7 @@ use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 
 use crate::error::RenderError;
 use crate::setting_error::SettingError;
-use crate::settings::camera::{Camera, Projection};
+use crate::settings::camera::{Camera, Fit, Projection};
 
 /// How far lengths may differ, or cosines be from 0, relative: more than matrices that were multiplied in f32 are rounded by, and
 /// less than a screen shows.
@@ -37,8 +37,8 @@ impl Camera {
                 perspective([x, y, z, w].map(|row| row / scale), pixels)?
             }
         };
-        let Self { direction, up, center, .. } = camera;
-        match [direction, up, center].iter().all(|v| v.is_finite()) {
+        let Self { direction, up, .. } = camera;
+        match [direction, up, camera.middle()].iter().all(|v| v.is_finite()) {
             true => Ok(camera),
             false => Err(singular()),
         }
@@ -52,7 +52,13 @@ fn orthographic([x, y]: [DVec4; 2], pixels: DVec2) -> Result<Camera, RenderError
     // The nearest point of the central ray.
     let center = -(right * (x.w / right.length_squared()) + up * (y.w / up.length_squared()));
     let projection = Projection::Orthographic { height: Some(2.0 / up.length()) };
-    Ok(Camera { projection, direction: up.cross(right).normalize(), up: up.normalize(), center })
+    Ok(Camera {
+        projection,
+        direction: up.cross(right).normalize(),
+        up: up.normalize(),
+        center: Some(center),
+        fit: Fit::Volume,
+    })
 }
 
 /// From all rows, where w is the depth from the eye.
@@ -95,7 +101,13 @@ fn perspective([x, y, z, w]: [DVec4; 4], pixels: DVec2) -> Result<Camera, Render
         distance: Some(distance),
         near: Some(near),
     };
-    Ok(Camera { projection, direction: ahead, up: up.normalize(), center: eye + distance * ahead })
+    Ok(Camera {
+        projection,
+        direction: ahead,
+        up: up.normalize(),
+        center: Some(eye + distance * ahead),
+        fit: Fit::Volume,
+    })
 }
 
 /// Checks that pixels are square.

@@ -9,13 +9,15 @@
 pub(crate) mod camera;
 pub(crate) mod clip;
 mod clip_from_world;
+pub(crate) mod framing;
 pub(crate) mod shading;
 pub(crate) mod splatting;
 pub(crate) mod transfer_function;
 
 pub use crate::setting_error::{Allowed, Found, Interval};
-pub use camera::{Camera, Projection};
+pub use camera::{Camera, Fit, Projection};
 pub use clip::{Clip, HalfSpace, MAX_PLANES};
+pub use framing::Extent;
 pub use shading::{Light, Shading};
 pub use splatting::{Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
 pub use transfer_function::{LabelTables, Ramp, RampError, Tables, TransferFunction};

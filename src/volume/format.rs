@@ -37,8 +37,10 @@ macro_rules! reader {
     }};
 }
 
+const DICOM: &str = "DICOM";
+
 /// Formats that have a slice in every file of a folder.
-const SLICES: [&str; 2] = ["TIFF", "DICOM"];
+const SLICES: [&str; 2] = ["TIFF", DICOM];
 
 fn formats<T: Voxel>() -> Vec<Format<T>> {
     vec![
@@ -57,6 +59,14 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
                     || matches!(head.get(4..8), Some(b"n+2\0" | b"ni2\0"))
             },
             read: reader!("nifti", super::nifti::read),
+            read_folder: None,
+        },
+        Format {
+            name: "MGH",
+            extensions: &[".mgh", ".mgz", ".mgh.gz"],
+            // It begins with its version, 1, and may be gzipped.
+            is_magic: |_| false,
+            read: reader!("mgh", super::mgh::read),
             read_folder: None,
         },
         Format {
@@ -88,7 +98,7 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             read_folder: reader!("tiff", super::tiff::read_folder).ok(),
         },
         Format {
-            name: "DICOM",
+            name: DICOM,
             extensions: &[".dcm"],
             is_magic: |head| head.get(128..132) == Some(b"DICM"),
             read: reader!("dicom", super::dicom::read),
@@ -119,10 +129,8 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static s
     if access.resolve(file)?.is_dir() {
         return read_folder(path, access, &formats);
     }
-    let name = file.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let head = folder::head(file, access)?;
-    let is_named = |format: &&Format<T>| format.extensions.iter().any(|extension| name.ends_with(extension));
-    let format = formats.iter().find(|format| (format.is_magic)(&head)).or_else(|| formats.iter().find(is_named));
+    let format = format_of(&formats, file, &head).map(|(format, _)| format);
     let found = match format {
         Some(Format { name, read: Ok(read), .. }) => return Ok((name, read(path, access)?)),
         Some(Format { name, read: Err(feature), .. }) => needs(name, feature),
@@ -143,6 +151,27 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static s
     Err(invalid(path, "format", found, allowed))
 }
 
+/// A file's format, and whether its first bytes tell that.
+fn format_of<'a, T>(formats: &'a [Format<T>], path: &Path, head: &[u8]) -> Option<(&'a Format<T>, bool)> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let is_named = |format: &Format<T>| format.extensions.iter().any(|extension| name.ends_with(extension));
+    let named = formats.iter().find(|format| is_named(format));
+    // Bytes that may mean something else count only where no name speaks against it.
+    let is_bare = |format: &Format<T>| {
+        format.name == DICOM && is_bare_dicom(head) && named.is_none_or(|named| named.name == DICOM)
+    };
+    let by_head = |format: &&Format<T>| (format.is_magic)(head) || is_bare(format);
+    formats.iter().find(by_head).map(|format| (format, true)).or(named.map(|format| (format, false)))
+}
+
+/// Whether a file begins as DICOM files do that lack the 128 bytes and "DICM" before the elements: with one of group 2 or 8, and its
+/// type, or else its length, which is even.
+pub(super) fn is_bare_dicom(head: &[u8]) -> bool {
+    let &[group @ (2 | 8), 0, 0..=0x70, 0, a, b, c, d, ..] = head else { return false };
+    let has_type = a.is_ascii_uppercase() && b.is_ascii_uppercase();
+    has_type || group == 8 && a % 2 == 0 && [b, c, d] == [0; 3]
+}
+
 fn read_folder<T: Voxel>(
     path: &Path,
     access: &Access,
@@ -151,14 +180,32 @@ fn read_folder<T: Voxel>(
     let mut slices: Vec<(&Format<T>, Vec<PathBuf>)> = Vec::new();
     let files = folder::files(path, access)?;
     let count = files.len();
+    let is_of_slices = |format: &Format<T>| SLICES.contains(&format.name);
+    let mut left_out = Vec::new();
     for file in files {
         let head = folder::head(&file, access)?;
-        let of_slices = |format: &&Format<T>| SLICES.contains(&format.name) && (format.is_magic)(&head);
-        let Some(format) = formats.iter().find(of_slices) else { continue };
+        let format = match format_of(formats, &file, &head) {
+            Some((format, true)) if is_of_slices(format) => format,
+            other => {
+                let name = file.file_name().unwrap_or_default().to_string_lossy();
+                // Slices often have names without an extension, or end with a number.
+                let extension = file.extension().unwrap_or_default().to_string_lossy();
+                let may_be_slice = !name.starts_with('.') && extension.bytes().all(|byte| byte.is_ascii_digit());
+                if other.map_or(may_be_slice, |(format, _)| is_of_slices(format)) {
+                    left_out.push(name.into_owned());
+                }
+                continue;
+            }
+        };
         match slices.iter_mut().find(|(other, _)| other.name == format.name) {
             Some((_, files)) => files.push(file),
             None => slices.push((format, vec![file])),
         }
+    }
+    if !left_out.is_empty() && !slices.is_empty() {
+        let (path, count, names) = (path.display(), left_out.len(), &left_out[..left_out.len().min(8)].join(", "));
+        let more = if count > 8 { ", …" } else { "" };
+        log::warn!("{path}: {count} files do not begin as slices do and are left out: {names}{more}");
     }
     let found = match slices.as_slice() {
         [] => format!("{count} files, no slices among them"),

@@ -8,10 +8,10 @@ use super::Orientation;
 use super::samples::SampleType;
 
 /// What is in a file of values or of labels.
-pub(super) struct Loaded<T> {
-    pub(super) dims: UVec3,
+pub(crate) struct Loaded<T> {
+    pub(crate) dims: UVec3,
     /// Of the samples that the values come from.
-    pub(super) kind: SampleType,
+    pub(crate) kind: SampleType,
     /// If the file gives one.
     pub(super) spacing: Option<DVec3>,
     /// What the spacing is in, if the file says so.
@@ -23,7 +23,7 @@ pub(super) struct Loaded<T> {
     /// What the values are called, where they are labels.
     pub(super) label_names: BTreeMap<u16, String>,
     /// X fastest, as many as there are voxels.
-    pub(super) values: Vec<T>,
+    pub(crate) values: Vec<T>,
 }
 
 impl<T> Loaded<T> {

@@ -14,10 +14,12 @@ mod loaded;
 mod memory;
 #[cfg(feature = "metaimage")]
 mod metaimage;
+#[cfg(feature = "mgh")]
+mod mgh;
 #[cfg(feature = "nifti")]
 mod nifti;
-#[cfg(feature = "npy")]
-mod npy;
+#[cfg(any(feature = "codecs", feature = "npy"))]
+pub(crate) mod npy;
 #[cfg(feature = "npy")]
 mod npz;
 mod nrrd;
@@ -25,6 +27,7 @@ mod numbers;
 mod orientation;
 mod raw;
 mod samples;
+mod shear;
 mod source;
 #[cfg(feature = "tiff")]
 mod tiff;
@@ -173,7 +176,7 @@ impl Volume {
     }
 
     /// Reads a volume file. Its format is told by its first bytes, or else by the extension: NRRD (`.nrrd`, `.nhdr`), and, each
-    /// with the feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MetaImage (`.mha`, `.mhd`), NPY (`.npy`, and its
+    /// with the feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MGH (`.mgh`, `.mgz`), MetaImage (`.mha`, `.mhd`), NPY (`.npy`, and its
     /// archives `.npz`: their one array, or the one named as in `file.npz:name`), TIFF
     /// (`.tif`, `.tiff`), DICOM (`.dcm`) and VTK (`.vti`, `.vtk`). Or a folder of slices: TIFF files of one page, or DICOM files of one
     /// series.

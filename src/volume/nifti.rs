@@ -2,7 +2,8 @@
 //! each of them gzipped or not.
 //!
 //! Spacing and orientation are those of the sform if there is one, else those of the qform, else only `pixdim` counts. The file
-//! must end where the samples end.
+//! must end where the samples end. Where headers in use break the standard's rules, they are read as nibabel and ITK read them. Of
+//! complex samples the magnitude is the value.
 
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
@@ -12,8 +13,9 @@ use glam::{DMat3, DQuat, DVec3, UVec3};
 use super::VolumeError;
 use super::access::Access;
 use super::loaded::Loaded;
-use super::orientation::{Orientation, lengths_and_directions, orthogonal};
+use super::orientation::Orientation;
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
+use super::shear::{self, Lattice};
 use super::source::{invalid, io_error};
 
 /// Numbers of the format's data types, and bits of each.
@@ -30,14 +32,21 @@ const TYPES: [(i64, SampleType); 10] = [
     (1280, SampleType::U64),
 ];
 
+/// Complex data types, and the type of either part.
+const COMPLEX_TYPES: [(i64, SampleType); 2] = [(32, SampleType::F32), (1792, SampleType::F64)];
+
+/// The fields of the sform.
+const SFORM: &str = "srow_x, srow_y, srow_z";
+
 /// Reads a file, or the two files of a pair by the name of either.
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let header_path = sibling(path, ".img", ".hdr").unwrap_or_else(|| path.to_owned());
     let mut stream = open(&header_path, access)?;
     let header = Header::read(&header_path, &mut stream)?;
     let (dims, vox_offset) = (header.dims()?, header.vox_offset()?);
-    let (kind, rescale) = (header.sample_type()?, header.rescale()?);
-    let (spacing, orientation) = header.spacing_and_orientation()?;
+    let (kind, is_complex) = header.sample_type()?;
+    let rescale = header.rescale()?;
+    let (lattice, orientation) = header.lattice_and_orientation()?;
     if header.is_pair {
         let Some(data) = sibling(&header_path, ".hdr", ".img") else {
             return Err(header.invalid(
@@ -50,9 +59,37 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     }
     stream.skip(vox_offset)?;
     let samples = Samples { kind, dims, big_endian: header.big_endian, rescale, z_fastest: false };
-    let (spacing, unit) = (Some(spacing), header.unit());
-    let loaded = Loaded::new(dims, kind, stream.samples(&samples, false)?);
-    Ok(Loaded { spacing, unit, orientation, ..loaded })
+    let values = if is_complex {
+        log::warn!("{}: the samples are complex: the values are their magnitudes", path.display());
+        magnitudes(&header, &samples, stream, access)?
+    } else {
+        stream.samples(&samples, false)?
+    };
+    let (spacing, unit) = (Some(lattice.spacing), header.unit());
+    let loaded = Loaded { spacing, unit, orientation, ..Loaded::new(dims, kind, values) };
+    lattice.straighten(path, SFORM, loaded, access)
+}
+
+/// The magnitudes of complex samples, each a real and an imaginary part. Slope and intercept count before: those of the parts, and
+/// the intercept of the real one.
+fn magnitudes<T: Voxel>(
+    header: &Header,
+    samples: &Samples,
+    stream: Stream,
+    access: &Access,
+) -> Result<Vec<T>, VolumeError> {
+    let UVec3 { x, y, z } = samples.dims;
+    let dims = dims_of([2 * u64::from(x), y.into(), z.into()])
+        .ok_or_else(|| header.invalid("dim", samples.dims, "at most 2147483647 complex voxels"))?;
+    let parts: Vec<f32> = stream.samples(&Samples { dims, rescale: None, ..*samples }, false)?;
+    let [slope, intercept] = samples.rescale.unwrap_or([1.0, 0.0]);
+    samples.reserve::<T>(&header.path, access)?;
+    let mut values = Vec::new();
+    for &[real, imaginary] in parts.as_chunks().0 {
+        let magnitude = (f64::from(real) * slope + intercept).hypot(f64::from(imaginary) * slope);
+        values.push(T::of(magnitude).ok_or_else(|| header.invalid("data", magnitude, T::ALLOWED))?);
+    }
+    Ok(values)
 }
 
 /// The rest of a file's name where it ends with `from`, or with that and `.gz`; with `to` instead. All of them are in upper case if
@@ -208,16 +245,21 @@ impl Header {
         })
     }
 
-    fn sample_type(&self) -> Result<SampleType, VolumeError> {
-        let Some(&(_, kind)) = TYPES.iter().find(|(code, _)| *code == self.datatype) else {
-            let allowed = TYPES.map(|(code, kind)| format!("{code} ({kind})")).join(", ");
-            return Err(self.invalid("datatype", self.datatype, allowed));
+    /// The type of the samples or of their parts, and whether they have a real and an imaginary one.
+    fn sample_type(&self) -> Result<(SampleType, bool), VolumeError> {
+        let of =
+            |types: &[(i64, SampleType)]| types.iter().find(|(code, _)| *code == self.datatype).map(|&(_, kind)| kind);
+        let complex = of(&COMPLEX_TYPES);
+        let Some(kind) = complex.or_else(|| of(&TYPES)) else {
+            let real = TYPES.map(|(code, kind)| format!("{code} ({kind})")).join(", ");
+            let complex = COMPLEX_TYPES.map(|(code, kind)| format!("{code} (complex of {kind})")).join(", ");
+            return Err(self.invalid("datatype", self.datatype, format!("{real}, {complex}")));
         };
-        let bits = 8 * kind.bytes() as i64;
+        let bits = 8 * kind.bytes() as i64 * if complex.is_some() { 2 } else { 1 };
         if self.bitpix != bits {
             return Err(self.invalid("bitpix", self.bitpix, format!("{bits}, as datatype {} has", self.datatype)));
         }
-        Ok(kind)
+        Ok((kind, complex.is_some()))
     }
 
     /// Bytes between the header, or the beginning of the other file, and the samples.
@@ -232,14 +274,17 @@ impl Header {
         Ok(offset as u64 - before)
     }
 
-    /// A slope of 0 stands for none.
+    /// A slope of 0 stands for no scaling, and so does one that is not finite: then the intercept has no meaning either.
     fn rescale(&self) -> Result<Option<[f64; 2]>, VolumeError> {
         let [slope, intercept] = self.slope_and_intercept;
-        match [("scl_slope", slope), ("scl_inter", intercept)].iter().find(|(_, value)| !value.is_finite()) {
-            Some((field, value)) => Err(self.invalid(field, value, "a finite number")),
-            None if slope == 0.0 || [slope, intercept] == [1.0, 0.0] => Ok(None),
-            None => Ok(Some([slope, intercept])),
+        if slope == 0.0 || !slope.is_finite() || [slope, intercept] == [1.0, 0.0] {
+            return Ok(None);
         }
+        if !intercept.is_finite() {
+            let allowed = format!("a finite number, as the slope is {slope}");
+            return Err(self.invalid("scl_inter", intercept, allowed));
+        }
+        Ok(Some([slope, intercept]))
     }
 
     fn unit(&self) -> Option<String> {
@@ -253,25 +298,36 @@ impl Header {
         Some(name.to_owned())
     }
 
-    fn spacing_and_orientation(&self) -> Result<(DVec3, Option<Orientation>), VolumeError> {
+    fn lattice_and_orientation(&self) -> Result<(Lattice, Option<Orientation>), VolumeError> {
         if self.sform_code > 0 {
-            let column = |i: usize| DVec3::from_array(self.srows.map(|row| row[i]));
-            let lengths_and_axes = lengths_and_directions([column(0), column(1), column(2)]);
-            let (spacing, axes) =
-                lengths_and_axes.map_err(|found| self.invalid("srow_x, srow_y, srow_z", found, orthogonal()))?;
-            return Ok((
-                spacing,
-                Some(Orientation { axes, origin: self.origin("srow_x, srow_y, srow_z", column(3))? }),
-            ));
+            let [x, y, z, first] = [0, 1, 2, 3].map(|i| DVec3::from_array(self.srows.map(|row| row[i])));
+            let lattice = Lattice::of([x, y, z]).map_err(|found| self.invalid(SFORM, found, shear::allowed()))?;
+            let origin = self.origin(SFORM, first)?;
+            return Ok((lattice, Some(Orientation { axes: lattice.axes, origin })));
         }
-        let [qfac, spacing @ ..] = self.pixdim;
-        if !spacing.iter().all(|&spacing| spacing > 0.0 && spacing.is_finite()) {
-            return Err(self.invalid("pixdim", format!("{spacing:?}"), "three positive finite numbers"));
-        }
-        let spacing = DVec3::from_array(spacing);
+        let spacing = self.spacing()?;
         if self.qform_code <= 0 {
-            return Ok((spacing, None));
+            return Ok((Lattice::straight(spacing, DMat3::IDENTITY), None));
         }
+        let axes = self.qform_axes()?;
+        let origin = self.origin("qoffset_x, qoffset_y, qoffset_z", self.qoffset)?;
+        Ok((Lattice::straight(spacing, axes), Some(Orientation { axes, origin })))
+    }
+
+    /// `pixdim`: nibabel and ITK read zeros as 1, and negative numbers without their sign.
+    fn spacing(&self) -> Result<DVec3, VolumeError> {
+        let [_, written @ ..] = self.pixdim;
+        if !written.iter().all(|spacing| spacing.is_finite()) {
+            return Err(self.invalid("pixdim", format!("{written:?}"), "three finite numbers"));
+        }
+        let spacing = written.map(|spacing| if spacing == 0.0 { 1.0 } else { spacing.abs() });
+        if spacing != written {
+            log::warn!("{}: pixdim: {written:?} is no spacing: taken to be {spacing:?}", self.path.display());
+        }
+        Ok(DVec3::from_array(spacing))
+    }
+
+    fn qform_axes(&self) -> Result<DMat3, VolumeError> {
         let squares = self.quatern_bcd.length_squared();
         // Written as `f32`, a half turn's may be a little above 1.
         if squares.is_nan() || squares > 1.0 + 1e-5 {
@@ -279,10 +335,8 @@ impl Header {
             return Err(self.invalid("quatern_b, quatern_c, quatern_d", self.quatern_bcd, allowed));
         }
         let rotation = DQuat::from_vec4(self.quatern_bcd.extend((1.0 - squares).max(0.0).sqrt())).normalize();
-        let handedness = DVec3::new(1.0, 1.0, if qfac < 0.0 { -1.0 } else { 1.0 });
-        let axes = DMat3::from_quat(rotation) * DMat3::from_diagonal(handedness);
-        let origin = self.origin("qoffset_x, qoffset_y, qoffset_z", self.qoffset)?;
-        Ok((spacing, Some(Orientation { axes, origin })))
+        let handedness = DVec3::new(1.0, 1.0, if self.pixdim[0] < 0.0 { -1.0 } else { 1.0 });
+        Ok(DMat3::from_quat(rotation) * DMat3::from_diagonal(handedness))
     }
 
     fn origin(&self, field: &str, origin: DVec3) -> Result<DVec3, VolumeError> {

@@ -27,7 +27,7 @@ const TYPES: [(&str, SampleType); 10] = [
 ];
 
 /// Reads the array of one file.
-pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+pub(crate) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     read_array(path, Stream::raw(access.open(path)?)?)
 }
 

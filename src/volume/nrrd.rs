@@ -15,17 +15,21 @@ use super::data_files::DataFiles;
 use super::fields::Fields;
 use super::loaded::Loaded;
 use super::numbers::TextEnd;
-use super::orientation::{Orientation, RAS_FROM_LPS, lengths_and_directions, orthogonal};
+use super::orientation::{Orientation, RAS_FROM_LPS};
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
+use super::shear::{self, Lattice};
 use super::source::{MAX_HEADER, Source, invalid, io_error, lower, number, shown, three, vector};
 use super::unit;
+
+/// The field that may say that axes are not at right angles.
+const DIRECTIONS: &str = "space directions";
 
 /// Reads one NRRD file, or the detached header and the data file it names.
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let mut file = access.open(path)?;
     let header = Header::read(&mut file)?;
     let dims = header.dims()?;
-    let (spacing, orientation) = header.spacing_and_orientation()?;
+    let (lattice, orientation) = header.lattice_and_orientation()?;
     let layout = header.layout(dims)?;
     let values = match header.data_files()? {
         Some(files) => {
@@ -35,7 +39,12 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     };
     let unit = header.unit();
     let loaded = Loaded::new(dims, layout.samples.kind, values);
-    Ok(Loaded { spacing, unit, orientation, label_names: header.label_names(), ..loaded })
+    let spacing = lattice.map(|lattice| lattice.spacing);
+    let loaded = Loaded { spacing, unit, orientation, label_names: header.label_names(), ..loaded };
+    match lattice {
+        Some(lattice) => lattice.straighten(path, DIRECTIONS, loaded, access),
+        None => Ok(loaded),
+    }
 }
 
 /// The fields of a header, under the format's first spelling of their names, its pairs of keys and values, and the names of the files in
@@ -104,22 +113,22 @@ impl Header {
         })
     }
 
-    fn spacing_and_orientation(&self) -> Result<(Option<DVec3>, Option<Orientation>), VolumeError> {
-        match (self.0.get("spacings"), self.0.get("space directions")) {
+    fn lattice_and_orientation(&self) -> Result<(Option<Lattice>, Option<Orientation>), VolumeError> {
+        match (self.0.get("spacings"), self.0.get(DIRECTIONS)) {
             (None, None) => Ok((None, None)),
             (None, Some(_)) => {
-                let (spacing, axes) = self.directions()?;
-                Ok((Some(spacing), self.orientation(axes)?))
+                let lattice = self.directions()?;
+                Ok((Some(lattice), self.orientation(lattice.axes)?))
             }
             (Some(_), None) => self.0.value("spacings", "three positive finite numbers", |text| {
                 let spacings = three(text?.split_whitespace().map(number))?;
-                spacings.iter().all(|&spacing| spacing > 0.0).then_some((Some(DVec3::from_array(spacings)), None))
+                let lattice = Lattice::straight(DVec3::from_array(spacings), DMat3::IDENTITY);
+                spacings.iter().all(|&spacing| spacing > 0.0).then_some((Some(lattice), None))
             }),
-            (Some(_), Some(_)) => Err(self.0.invalid(
-                "space directions",
-                "`spacings` as well",
-                "one of `spacings` and `space directions`",
-            )),
+            (Some(_), Some(_)) => {
+                let allowed = "one of `spacings` and `space directions`";
+                Err(self.0.invalid(DIRECTIONS, "`spacings` as well", allowed))
+            }
         }
     }
 
@@ -138,15 +147,14 @@ impl Header {
         self.1.iter().filter_map(label).collect()
     }
 
-    /// Lengths and directions of the axis vectors of `space directions`.
-    fn directions(&self) -> Result<(DVec3, DMat3), VolumeError> {
-        let name = "space directions";
-        let axes =
-            self.0.value(name, "three vectors (x,y,z) of positive finite length, none of them `none`", |text| {
-                let axes = vectors(text?)?;
-                axes.iter().all(|axis| axis.length() > 0.0 && axis.length().is_finite()).then_some(axes)
-            })?;
-        lengths_and_directions(axes).map_err(|found| self.0.invalid(name, found, orthogonal()))
+    /// The lattice of the axis vectors of `space directions`.
+    fn directions(&self) -> Result<Lattice, VolumeError> {
+        let allowed = "three vectors (x,y,z) of positive finite length, none of them `none`";
+        let axes = self.0.value(DIRECTIONS, allowed, |text| {
+            let axes = vectors(text?)?;
+            axes.iter().all(|axis| axis.length() > 0.0 && axis.length().is_finite()).then_some(axes)
+        })?;
+        Lattice::of(axes).map_err(|found| self.0.invalid(DIRECTIONS, found, shear::allowed()))
     }
 
     /// How axes of these directions lie in a patient; other spaces than a patient's have no such thing.

@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::{Volume, VolumeError, invalid};
 
 /// Largest cosine between two axes that still counts as a right angle.
-const MAX_COSINE: f64 = 1e-4;
+pub(super) const MAX_COSINE: f64 = 1e-4;
 
 /// Largest error of a direction's length.
 #[cfg(any(feature = "metaimage", feature = "vtk"))]
@@ -123,6 +123,7 @@ pub(super) fn unit_directions(axes: [DVec3; 3]) -> Result<DMat3, (String, String
 }
 
 /// What [`lengths_and_directions`] takes.
+#[cfg(any(feature = "dicom", feature = "metaimage", feature = "vtk"))]
 pub(super) fn orthogonal() -> String {
     format!("orthogonal axes, cosines of at most {MAX_COSINE}")
 }

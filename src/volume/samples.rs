@@ -24,36 +24,53 @@ use super::{Grid, VolumeError};
 pub(super) const MAX_EXPANSION: u64 = 1032;
 
 /// A number as a file has it.
-pub(super) trait Sample: Copy {
+pub(crate) trait Sample: Copy {
     fn to_f32(self) -> f32;
     fn to_f64(self) -> f64;
 }
 
 /// What samples become.
-pub(super) trait Voxel: Copy {
+pub(crate) trait Voxel: Copy + Send + Sync {
     const ALLOWED: &'static str;
+
+    /// A voxel that the file has no sample for.
+    const HOLE: Self;
 
     /// `None` if the sample is not allowed.
     fn of(sample: impl Sample) -> Option<Self>;
+
+    /// What lies between this and another one, `part` of the way there.
+    fn between(self, other: Self, part: f64) -> Self;
 }
 
 /// A value. Where it is not finite the volume has a hole.
 impl Voxel for f32 {
     const ALLOWED: &'static str = "numbers";
+    const HOLE: Self = Self::NAN;
 
     fn of(sample: impl Sample) -> Option<Self> {
         Some(sample.to_f32())
+    }
+
+    fn between(self, other: Self, part: f64) -> Self {
+        (f64::from(self) * (1.0 - part) + f64::from(other) * part) as Self
     }
 }
 
 /// A label.
 impl Voxel for u16 {
     const ALLOWED: &'static str = "labels, whole numbers from 0 to 65535";
+    const HOLE: Self = 0;
 
     fn of(sample: impl Sample) -> Option<Self> {
         let sample = sample.to_f64();
         let label = sample as Self;
         (f64::from(label) == sample).then_some(label)
+    }
+
+    /// The nearer one.
+    fn between(self, other: Self, part: f64) -> Self {
+        if part < 0.5 { self } else { other }
     }
 }
 
@@ -310,7 +327,7 @@ impl Stream {
     }
 
     /// So many bytes of a header.
-    #[cfg(any(feature = "nifti", feature = "npy", feature = "vtk"))]
+    #[cfg(any(feature = "codecs", feature = "mgh", feature = "nifti", feature = "npy", feature = "vtk"))]
     pub(super) fn bytes(&mut self, bytes: u64) -> Result<Vec<u8>, VolumeError> {
         let mut header = Vec::new();
         let read = self.read_up_to(bytes, &mut header)?;
@@ -336,8 +353,13 @@ impl Stream {
         samples.reserve::<T>(&self.path, &self.access)?;
         let values = self.read_samples(samples)?;
         // Reading on to the end is also what checks a compressed stream's last checksum.
-        if matches!(self.reader, Reader::Decoder(..)) && self.read_up_to(1, &mut Vec::new())? > 0 {
-            return Err(samples.mismatch(&self.path, format!("more than {expected}")));
+        if let Reader::Decoder(reader, _) = &mut self.reader {
+            let rest = if window { u64::MAX } else { 1 };
+            let rest =
+                io::copy(&mut reader.by_ref().take(rest), &mut io::sink()).map_err(|error| self.damage(error))?;
+            if rest > 0 && !window {
+                return Err(samples.mismatch(&self.path, format!("more than {expected}")));
+            }
         }
         Ok(values)
     }

@@ -29,7 +29,7 @@ fn bench_prints_one_line_of_json() {
         assert_eq!(keys(&report), expected);
         let ms = |key: &str| {
             let milliseconds = report[key].as_f64().unwrap();
-            assert!((0.0..600_000.0).contains(&milliseconds), "{key}: {milliseconds}");
+            assert!(milliseconds.is_finite() && milliseconds >= 0.0, "{key}: {milliseconds}");
             milliseconds
         };
         let [min, median, max] = ["min_frame_ms", "median_frame_ms", "max_frame_ms"].map(ms);

@@ -127,9 +127,25 @@ fn bad_usage_and_input_are_2_and_leave_nothing() {
         bytes.splice(at..at + from.len(), to.bytes());
         folder.write(name, bytes);
     };
+    with_header("flat.npy", "(1, 2, 4", "(2, 2, 2");
+    with_header("empty.npy", "(1, 2, 4", "(0, 2, 4");
+    with_header("huge.npy", "(1, 2, 4, ), }      ", "(20000, 50000, 4), }");
     with_header("f8.npy", "<f4", "<f8");
-    with_header("flat.npy", "(1, 2, 4", "(2, 1, 3");
-    with_header("fortran.npy", "False", "True ");
+    folder.write("f8.npy", [folder.read("f8.npy"), vec![0; 32]].concat());
+    // What two small files say of their size is made 100 000 × 100 000: in the PNG's first chunk, whose checksum goes with it, and in the
+    // EXR's two windows, which its decoder finds at odds with the length of its table of chunks.
+    let mut png = folder.read("a.png");
+    png[16..24].copy_from_slice(&[100_000_u32.to_be_bytes(); 2].concat());
+    let mut crc = flate2::Crc::new();
+    crc.update(&png[12..29]);
+    png[29..33].copy_from_slice(&crc.sum().to_be_bytes());
+    folder.write("huge.png", png);
+    let mut exr = folder.read("good.exr");
+    let [small, huge] = [[0_i32, 0, 1, 0], [0, 0, 99_999, 99_999]].map(|window| window.map(i32::to_le_bytes).concat());
+    let windows: Vec<usize> = (0..exr.len() - 16).filter(|&at| exr[at..at + 16] == small).collect();
+    assert_eq!(windows.len(), 2);
+    windows.into_iter().for_each(|at| exr[at..at + 16].copy_from_slice(&huge));
+    folder.write("huge.exr", exr);
     fs::create_dir(folder.path("folder.png")).unwrap();
     let before = folder.names();
     for (arguments, words) in [
@@ -148,9 +164,12 @@ fn bad_usage_and_input_are_2_and_leave_nothing() {
         ("a.png short.png", &["short.png"]),
         ("short.exr good.exr", &["short.exr"]),
         ("short.npy good.npy", &["short.npy"]),
-        ("f8.npy good.npy", &["f8.npy", "descr", "<f8", "<f4"]),
-        ("flat.npy good.npy", &["flat.npy", "shape", "[2, 1, 3]", "[height, width, 4]"]),
-        ("fortran.npy good.npy", &["fortran.npy", "fortran_order", "True", "False"]),
+        ("f8.npy good.npy", &["f8.npy", "descr", "float64", "float32"]),
+        ("flat.npy good.npy", &["flat.npy", "shape", "(2, 2, 2)", "(height, width, 4)"]),
+        ("empty.npy good.npy", &["empty.npy", "shape", "(0, 2, 4", "three positive integers"]),
+        ("huge.npy good.npy", &["huge.npy", "data", "32 bytes", "16000000000 bytes"]),
+        ("huge.png good.npy", &["huge.png", "size", "100000 × 100000 pixels in", "at most"]),
+        ("huge.exr good.npy", &["huge.exr", "OpenExr"]),
         ("nan.npy good.npy --difference d.png", &["nan.npy", "the actual image", "NaN", "x 1, y 0"]),
         ("good.exr nan.npy", &["nan.npy", "the golden image", "NaN", "finite"]),
     ] {
@@ -159,4 +178,25 @@ fn bad_usage_and_input_are_2_and_leave_nothing() {
     }
     folder.run("compare a.png b.png --difference no/d.png").assert_failure(1, &["no/d.png", "No such file"]);
     folder.run("compare a.png b.png --difference folder.png").assert_failure(1, &["folder.png", "directory"]);
+}
+
+/// An array may be in either order; other programs write other ones.
+#[test]
+fn npy_of_any_order_and_length() {
+    let folder = Folder::new();
+    let pixel = |at: u16| [0, 1, 2, 3].map(|channel| f32::from(4 * at + channel) / 64.0);
+    let image = Image { width: 3, height: 5, pixels: (0..15).map(pixel).collect() };
+    image.save(&folder.path("a.npy"), PngDepth::Eight).unwrap();
+    let header = |order: &str| {
+        let text = format!("{{'descr': '>f4', 'fortran_order': {order}, 'shape': (5, 3, 4)}}\n");
+        [b"\x93NUMPY\x02\0", &(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat()
+    };
+    let value = |y: usize, x: usize, channel: usize| image.pixels[y * 3 + x][channel].to_be_bytes();
+    let fortran = (0..60).flat_map(|at| value(at % 5, at / 5 % 3, at / 15));
+    folder.write("f.npy", header("True").into_iter().chain(fortran).collect::<Vec<u8>>());
+    let c = (0..60).flat_map(|at| value(at / 12, at / 4 % 3, at % 4));
+    folder.write("c.npy", header("False").into_iter().chain(c).collect::<Vec<u8>>());
+    for name in ["a.npy", "f.npy", "c.npy"] {
+        assert_eq!(Image::open(&folder.path(name)).unwrap(), image, "{name}");
+    }
 }

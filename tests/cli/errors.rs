@@ -172,3 +172,14 @@ fn a_device_that_fails_is_1() {
     let arguments = format!("render good.nrrd -o out.png --adapter llvmpipe {set}");
     assert_fails(1, &arguments, &["the device is out of memory", "sheetsplat.sheets"]);
 }
+
+/// Where the loader finds no driver.
+#[cfg(target_os = "linux")]
+#[test]
+fn without_a_driver_the_error_says_what_to_install() {
+    let folder = Folder::new();
+    let nowhere = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"].map(|variable| (variable, "/nonexistent.json"));
+    let run = folder.run_with(&nowhere, "", "render builtin:cube:8 -o a.png");
+    run.assert_failure(1, &["no GPU adapter", "actual: none", "install", "lavapipe"]);
+    assert!(folder.names().is_empty());
+}

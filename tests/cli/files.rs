@@ -386,8 +386,9 @@ fn extensions_are_of_either_case() {
         File::open(folder.path(name)).unwrap().read_exact(&mut start).unwrap();
         assert_eq!(&start, magic, "{name}");
     }
-    folder.run(&format!("orbit {SMALL} --count 2 -o F%d.PNG")).assert_success();
-    assert_eq!(folder.read("F0.PNG"), folder.read("A.PNG"));
+    folder.run(&format!("orbit {SMALL} --count 2 -o F%d.PNG --save-scene O.TOML")).assert_success();
+    folder.render("O.TOML -o O.PNG");
+    assert_eq!(folder.read("F0.PNG"), folder.read("O.PNG"));
     // The data file of a pair goes by the case of its header.
     for (from, to) in [("pair.hdr", "P.HDR"), ("pair.img", "P.IMG"), ("a.nrrd", "A.NRRD")] {
         fs::copy(folder.path(from), folder.path(to)).unwrap();

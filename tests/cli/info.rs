@@ -50,6 +50,48 @@ fn json_has_the_files_facts() {
 }
 
 #[test]
+fn frames_are_those_that_render_chooses_and_presets_fit_the_kind_of_data() {
+    let folder = Folder::new();
+    // A block of 4 × 6 × 8 voxels from voxel (3, 2, 1) on, in air.
+    let inside = |[x, y, z]: [usize; 3]| (3..7).contains(&x) && (2..8).contains(&y) && (1..9).contains(&z);
+    let voxels = (0..12 * 12 * 12).map(|at| inside([at % 12, at / 12 % 12, at / 144]));
+    let values: Vec<f32> = voxels.clone().map(|inside| if inside { 90.0 } else { 0.0 }).collect();
+    folder.write_nrrd("block.nrrd", [12; 3], [2.0, 1.0, 0.5], &values);
+    let json =
+        |arguments: &str| -> Value { serde_json::from_str(&info(&folder, &format!("{arguments} --json"))).unwrap() };
+    let block = json("block.nrrd");
+    assert_eq!(block["frame"]["center"], serde_json::json!([-2.0, -1.0, -0.5]));
+    // Along y: 3 spacings and two kernels of 2 grid units are 14 wide, 7 and 4 of them 5.5 high.
+    assert_eq!(block["frame"]["height"], 14.0 / 0.9);
+    assert_eq!([&block["frame"]["distance"], &block["preset"]], [&Value::Null; 2]);
+    let text = info(&folder, "block.nrrd");
+    assert!(text.contains("frame        center -2, -1, -0.5, height 15.5556 (no unit)\n"), "{text}");
+    assert!(text.contains("preset       none fits: the values decide\n"), "{text}");
+    folder.render("block.nrrd -o block.png --set image.width=20 --set image.height=20 --save-scene block.toml");
+    let saved: toml::Table = String::from_utf8(folder.read("block.toml")).unwrap().parse().unwrap();
+    assert_eq!(saved["camera"]["height"].as_float(), block["frame"]["height"].as_f64());
+    let eye = json("block.nrrd --set camera.projection=perspective");
+    assert!(eye["frame"]["distance"].as_f64().unwrap() > 14.0 && eye["frame"]["height"].is_null(), "{eye}");
+
+    // A body of soft tissue with some bone, in Hounsfield units, signed and not.
+    let tissue = |at: usize| if at.is_multiple_of(20) { 700.0 } else { 40.0 + (at % 7) as f32 };
+    let body = |offset: f32| -> Vec<f32> {
+        voxels.clone().enumerate().map(|(at, inside)| offset + if inside { tissue(at) } else { -1000.0 }).collect()
+    };
+    folder.write_nrrd("ct.nrrd", [12; 3], [1.0; 3], &body(0.0));
+    folder.write_nrrd("unsigned.nrrd", [12; 3], [1.0; 3], &body(1024.0));
+    for name in ["ct.nrrd", "unsigned.nrrd"] {
+        assert_eq!(json(name)["preset"], "ct-bone", "{name}");
+    }
+    let soft: Vec<f32> = body(0.0).iter().map(|&value| value.min(60.0)).collect();
+    folder.write_nrrd("soft.nrrd", [12; 3], [1.0; 3], &soft);
+    assert_eq!(json("soft.nrrd")["preset"], "ct-skin");
+    let labels: Vec<f32> = (0..1728_usize).map(|at| (at % 12 / 3 * 7) as f32).collect();
+    folder.write_nrrd("labels.nrrd", [12; 3], [1.0; 3], &labels);
+    assert_eq!(json("labels.nrrd")["preset"], "labels");
+}
+
+#[test]
 fn text_has_them_and_a_histogram() {
     let folder = Folder::new();
     let text = info(&folder, &fixture("series"));

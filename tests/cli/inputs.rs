@@ -45,12 +45,12 @@ fn views_are_the_anatomys() {
 fn every_subcommand_takes_views() {
     let folder = with_patients();
     let orbit = |name: &str, arguments: &str| {
-        folder.run(&format!("orbit {arguments} {SIZE} --count 3 -o {name}-%d.npy")).assert_success();
+        folder.run(&format!("orbit {arguments} {SIZE} {WHOLE} --count 3 -o {name}-%d.npy")).assert_success();
         [0, 1, 2].map(|frame| folder.read_npy(&format!("{name}-{frame}.npy")))
     };
     let frames = orbit("view", "lying.nrrd --view front");
     assert_eq!(frames, orbit("camera", &format!("nowhere.nrrd {FRONT}")));
-    assert_eq!(frames[0], folder.pixels(&format!("lying.nrrd {SIZE} --view front")));
+    assert_eq!(frames[0], folder.pixels(&format!("lying.nrrd {SIZE} {WHOLE} --view front")));
 
     let swept = "--set splatting.slab_width=1,2";
     let sweep = |arguments: &str| {
@@ -75,7 +75,7 @@ fn raw_files_are_what_the_arguments_say() {
     let values: Vec<f32> = (0..60).map(|i| (i * 4) as f32).collect();
     folder.write_nrrd("a.nrrd", [5, 4, 3], [1.0, 1.0, 2.0], &values);
     folder.write("a.raw", values.iter().flat_map(|&value| (value as u16).to_be_bytes()).collect::<Vec<u8>>());
-    let size = SIZE;
+    let size = format!("{SIZE} {WHOLE}");
     let plain = folder.pixels(&format!("a.nrrd {size}"));
     let raw = format!("a.raw {size} --type uint16 --endian big --spacing 1,1,2");
     assert_eq!(folder.pixels(&format!("{raw} --dims 5,4,3")), plain);

@@ -4,6 +4,44 @@ use crate::*;
 
 const HEAD: &str = "builtin:head:32 --set image.width=60 --set image.height=50 --set camera.direction=[0.5,0.8,-0.2]";
 
+/// Rows and columns of an image from the first to the last that are not black.
+fn lit(folder: &Folder, arguments: &str) -> [usize; 4] {
+    let (width, height, pixels) = folder.pixels(arguments);
+    let is_lit = |x: usize, y: usize| pixels[x + y * width][..3].iter().any(|&channel| channel > 0.02);
+    let columns: Vec<usize> = (0..width).filter(|&x| (0..height).any(|y| is_lit(x, y))).collect();
+    let rows: Vec<usize> = (0..height).filter(|&y| (0..width).any(|x| is_lit(x, y))).collect();
+    [columns[0], columns[columns.len() - 1], rows[0], rows[rows.len() - 1]]
+}
+
+#[test]
+fn without_a_scene_file_the_object_fills_the_image() {
+    let folder = Folder::new();
+    let size = "--set image={width=100,height=80}";
+    for set in [
+        "--set image.background=[0,0,0,1]",
+        "--set camera.projection=perspective",
+        "--preset mr-head",
+        "--set camera.direction=[1,0.4,0.1]",
+    ] {
+        let [left, right, top, bottom] = lit(&folder, &format!("builtin:head:40 {size} {set}"));
+        let (wide, high) = (right + 1 - left, bottom + 1 - top);
+        // 0.9 of an axis less the kernels' faint rims, and in perspective what is behind the box's front.
+        assert!((54..=73).contains(&high) && wide <= 91, "{set}: {wide} × {high}");
+        assert!(
+            left.abs_diff(99 - right) <= 6 && top.abs_diff(79 - bottom) <= 6,
+            "{set}: {left} {right} {top} {bottom}"
+        );
+    }
+    // A scene file that says how to look at it, or what it looks like, frames the volume, whose diagonal is twice as long.
+    for keys in ["[camera]", "[transfer]\niso_ranges = [[0, 300]]"] {
+        folder.write("a.toml", format!("volume.builtin = 'head:40'\n{keys}"));
+        let [_, _, top, bottom] = lit(&folder, &format!("a.toml {size}"));
+        assert!(bottom - top < 50, "{keys}: {top} {bottom}");
+        let [_, _, top, bottom] = lit(&folder, &format!("a.toml {size} --set camera.fit=object"));
+        assert!(bottom - top >= 55, "{keys}: {top} {bottom}");
+    }
+}
+
 #[test]
 fn presets_and_colour_maps_are_short_for_settings() {
     let folder = Folder::new();
@@ -22,8 +60,8 @@ fn presets_and_colour_maps_are_short_for_settings() {
     }
     assert_eq!(images.len(), 4, "all differ");
     // By other subcommands too, and of many values at once.
-    folder.run(&format!("orbit {HEAD} --preset ct-bone --count 1 -o %d.npy")).assert_success();
-    folder.render(&format!("{HEAD} --preset ct-bone -o bone.npy"));
+    folder.run(&format!("orbit {HEAD} {WHOLE} --preset ct-bone --count 1 -o %d.npy")).assert_success();
+    folder.render(&format!("{HEAD} {WHOLE} --preset ct-bone -o bone.npy"));
     assert_eq!(folder.read("0.npy"), folder.read("bone.npy"));
     folder.run(&format!("sweep {HEAD} --set preset=ct-bone,xray --colormap hot -o sheet.png")).assert_success();
     assert!(image::open(folder.path("sheet.png")).unwrap().width() > 120);

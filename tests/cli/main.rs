@@ -4,13 +4,13 @@
 
 mod annotations;
 mod bench;
+#[expect(dead_code, reason = "not every file needs all of it")]
+#[path = "../common/mod.rs"]
+mod common;
 mod compare;
 mod errors;
 mod extremes;
 mod files;
-#[expect(dead_code, reason = "not every file needs all of it")]
-#[path = "../common/images.rs"]
-mod images;
 mod info;
 mod inputs;
 mod looks;
@@ -29,7 +29,12 @@ use std::process::Command;
 use glam::DVec3;
 use serde_json::Value;
 
-use images::{BLACK, psnr};
+use common::compare::{assert_at_least, assert_at_most};
+use common::images::{BLACK, psnr};
+use common::shared::shared;
+
+/// A camera that does not follow what is visible, so that it is the same for one picture and for many.
+const WHOLE: &str = "--set camera.fit=volume";
 
 /// A temporary folder, which is also the program's current directory.
 struct Folder(tempfile::TempDir);

@@ -7,7 +7,7 @@ use crate::*;
 
 /// Frames that all differ from one another.
 const TURNING: &str = "builtin:marschner-lobb:12 --set image.width=28 --set image.height=20 \
-                       --set transfer.opacity=[[60,0],[200,0.6]] --set camera={direction=[0.3,0.9,-0.2],up=[0.1,0,1]}";
+                       --set transfer.opacity=[[60,0],[200,0.6]] --set camera={direction=[0.3,0.9,-0.2],up=[0.1,0,1],fit='volume'}";
 
 impl Folder {
     fn orbit(&self, arguments: &str) {
@@ -50,17 +50,19 @@ fn frames_are_the_same_however_they_are_shared_out() {
 #[test]
 fn the_camera_turns_by_the_right_hand_and_ends_a_step_early() {
     let folder = Folder::new();
-    let from = |direction: &str| folder.pixels(&format!("{SMALL} --set camera.direction={direction}"));
-    folder.orbit(&format!("{SMALL} --set camera.direction=[0,1,0] --count 4 -o %d.npy"));
+    let from = |direction: &str| folder.pixels(&format!("{SMALL} {WHOLE} --set camera.direction={direction}"));
+    folder.orbit(&format!("{SMALL} {WHOLE} --set camera.direction=[0,1,0] --count 4 -o %d.npy"));
     assert_eq!(folder.names(), set(&["0.npy", "1.npy", "2.npy", "3.npy"]));
     for (frame, direction) in ["[0,1,0]", "[-1,0,0]", "[0,-1,0]", "[1,0,0]"].into_iter().enumerate() {
         let (.., turned) = folder.read_npy(&format!("{frame}.npy"));
         let decibels = psnr(&turned, &from(direction).2, BLACK, 50);
-        assert!(decibels > 80.0, "frame {frame}: {decibels:.1} dB");
+        assert_at_least(decibels, 120.0, format_args!("frame {frame}"));
     }
-    folder.orbit(&format!("{SMALL} --set camera.direction=[0,1,0] --turn -180 --count 2 --frames 1..2 -o back-%d.npy"));
+    folder.orbit(&format!(
+        "{SMALL} {WHOLE} --set camera.direction=[0,1,0] --turn -180 --count 2 --frames 1..2 -o back-%d.npy"
+    ));
     let (.., turned) = folder.read_npy("back-1.npy");
-    assert!(psnr(&turned, &from("[1,0,0]").2, BLACK, 50) > 80.0);
+    assert_at_least(psnr(&turned, &from("[1,0,0]").2, BLACK, 50), 120.0, "turned back");
 }
 
 #[test]
@@ -127,7 +129,7 @@ fn a_gif_is_over_black_and_keeps_time() {
             .collect();
         let over_black: Vec<[f32; 4]> = still.iter().map(|&[r, g, b, _]| [r, g, b, 1.0]).collect();
         let decibels = psnr(&shown, &over_black, [0.0; 4], 50);
-        assert!(decibels > 30.0, "frame {}: {decibels:.1} dB", delays.len());
+        assert_at_least(decibels, 53.0, format_args!("frame {}", delays.len()));
         delays.push(frame.delay);
     }
     // Hundredths of a second: six frames last 20.
@@ -186,4 +188,40 @@ fn bad_usage_and_input_are_2_and_leave_nothing() {
     }
     folder.run(&format!("orbit {TURNING} -o out.apng --adapter nonesuch")).assert_failure(1, &["nonesuch", "llvmpipe"]);
     assert_eq!(folder.names(), BTreeSet::new());
+}
+
+#[test]
+fn a_saved_scene_renders_the_frames_bytes() {
+    let folder = Folder::new();
+    let small = "--set image={width=60,height=40}";
+    for sets in ["--preset ct-skin", "--set camera.projection=perspective", WHOLE] {
+        folder
+            .run(&format!("orbit builtin:head:32 {small} {sets} -o f%d.png --count 4 --overwrite --save-scene s.toml"))
+            .assert_success();
+        folder.run("render s.toml -o first.png").assert_success();
+        assert!(folder.read("first.png") == folder.read("f0.png"), "{sets}");
+        // A quarter about z, by the right hand, from y.
+        let direction = "--set camera.direction=[-1,6.123233995736766e-17,0]";
+        folder.run(&format!("render s.toml {direction} -o second.png")).assert_success();
+        assert!(folder.read("second.png") == folder.read("f1.png"), "{sets}");
+        let text = String::from_utf8(folder.read("s.toml")).unwrap();
+        let camera = text.parse::<toml::Table>().unwrap()["camera"].clone();
+        assert!(
+            camera.get("center").is_some() && (camera.get("height").or(camera.get("distance"))).is_some(),
+            "{text}"
+        );
+    }
+    // All frames are there already, and the scene is not.
+    folder.run(&format!("orbit builtin:head:32 {small} -o f%d.png --count 4 --save-scene again.toml")).assert_success();
+    assert!(folder.path("again.toml").exists());
+    folder
+        .run("orbit builtin:cube:8 -o f%d.png --save-scene s.json")
+        .assert_failure(2, &["--save-scene", "s.json", ".toml"]);
+    // The scene that is read is not written.
+    let before = folder.read("s.toml");
+    for output in ["f%d.png", "f.gif"] {
+        let run = folder.run(&format!("orbit s.toml --count 4 -o {output} --save-scene ./s.toml"));
+        run.assert_failure(2, &["--save-scene", "s.toml"]);
+    }
+    assert!(folder.read("s.toml") == before && !folder.path("f.gif").exists());
 }

@@ -75,7 +75,7 @@ fn assert_stats_of_a_single_voxel(folder: &Folder, rasterizer: &str, name: &str,
     assert!(count(&stats, "tiles_composited") <= tiles * sheets);
     for key in ["load_ms", "prepare_ms", "frame_ms"] {
         let milliseconds = stats[key].as_f64().unwrap();
-        assert!((0.0..600_000.0).contains(&milliseconds), "{key}: {milliseconds}");
+        assert!(milliseconds.is_finite() && milliseconds >= 0.0, "{key}: {milliseconds}");
     }
     assert!(count(&stats, "gpu_bytes") > 40 * 70 * least_bytes, "{stats:#}");
     assert_eq!(stats["rasterizer"], name);
@@ -95,7 +95,7 @@ fn assert_stats_of_a_single_voxel(folder: &Folder, rasterizer: &str, name: &str,
     assert_counts("none takes part", &stats, &none.map(|key| (key, 0)));
 
     // Off the screen: counted, not drawn.
-    let stats = folder.stats(&format!("one.nrrd {haze} --set camera.center=[1000,0,0]"));
+    let stats = folder.stats(&format!("one.nrrd {haze} {WHOLE} --set camera.center=[1000,0,0]"));
     let expected = [("voxels_in_range", 1), ("sections_total", 4), ("sections_rasterized", 0), ("sheets", 4)];
     assert_counts("off the screen", &stats, &expected);
 }

@@ -1,6 +1,8 @@
 //! What the tests share.
 
+pub(crate) mod compare;
 pub(crate) mod images;
+pub(crate) mod shared;
 pub(crate) mod surfaces;
 
 use glam::{DVec3, DVec4, UVec3};
@@ -70,10 +72,10 @@ pub(crate) fn pixels(bytes: &[u8]) -> Vec<DVec4> {
     bytemuck::pod_collect_to_vec::<_, [f32; 4]>(bytes).iter().map(|pixel| DVec4::from(pixel.map(f64::from))).collect()
 }
 
-/// A scene for a volume that the test brings itself.
+/// A scene for a volume that the test brings itself, all of which it shows.
 pub(crate) fn scene(width: u32, height: u32) -> Scene {
     let image = ImageSettings { width, height, ..ImageSettings::default() };
-    Scene { image, ..Scene::new(VolumeSource::Builtin("cube".to_owned())) }
+    Scene { image, camera: Camera::default(), ..Scene::new(VolumeSource::Builtin("cube".to_owned())) }
 }
 
 /// An orthographic camera that shows `height` world units.
@@ -115,7 +117,13 @@ pub(crate) fn random_eye(random: &mut Random, grid: &Grid) -> Camera {
     let distance = (center - position).length();
     let near = random.pick(&[None, Some(0.3 * grid.unit()), Some(2.5 * grid.unit()), Some(0.5 * distance)]);
     let projection = Projection::Perspective { fov_y: random.uniform(10.0, 110.0), distance: Some(distance), near };
-    Camera { projection, direction: center - position, up: random.direction(), center }
+    Camera {
+        projection,
+        direction: center - position,
+        up: random.direction(),
+        center: Some(center),
+        ..Camera::default()
+    }
 }
 
 /// Control points of a colour and an opacity ramp.

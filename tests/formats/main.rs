@@ -7,18 +7,26 @@ mod dicom;
 mod dispatch;
 mod holes;
 mod metaimage;
+mod mgh;
 mod nifti;
 mod npy;
 mod raw;
+#[path = "../common/shared.rs"]
+mod shared;
+mod shear;
 mod tiff;
 mod vtk;
 
+use std::cell::RefCell;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Once;
 
 use glam::{DMat3, DVec3, UVec3};
 use sheetsplat::volume::{Orientation, Volume, VolumeError};
 use tempfile::TempDir;
+
+use shared::shared;
 
 /// Of every fixture.
 const DIMS: UVec3 = UVec3::new(5, 4, 3);
@@ -80,6 +88,42 @@ impl Folder {
         fs::write(&path, bytes).unwrap();
         Volume::open(&path)
     }
+}
+
+thread_local! {
+    /// What readers warned of on a test's thread.
+    static WARNINGS: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) };
+}
+
+struct Logger;
+
+impl log::Log for Logger {
+    fn enabled(&self, _: &log::Metadata<'_>) -> bool {
+        true
+    }
+
+    fn log(&self, record: &log::Record<'_>) {
+        WARNINGS.with_borrow_mut(|warnings| warnings.push(record.args().to_string()));
+    }
+
+    fn flush(&self) {}
+}
+
+/// What something returns, and what readers warn of meanwhile.
+fn warned<T>(run: impl FnOnce() -> T) -> (T, Vec<String>) {
+    static START: Once = Once::new();
+    START.call_once(|| {
+        log::set_logger(&Logger).unwrap();
+        log::set_max_level(log::LevelFilter::Warn);
+    });
+    WARNINGS.take();
+    (run(), WARNINGS.take())
+}
+
+/// Asserts that readers warn once, and with what words.
+#[track_caller]
+fn assert_warned(warnings: &[String], words: &str) {
+    assert!(matches!(warnings, [warning] if warning.contains(words)), "{words:?}: {warnings:?}");
 }
 
 /// A fixture's bytes with some replaced.

@@ -1,7 +1,5 @@
 //! MetaImage, as ITK writes it.
 
-use std::time::{Duration, Instant};
-
 use crate::*;
 
 const RAS_FROM_LPS: DVec3 = DVec3::new(-1.0, -1.0, 1.0);
@@ -144,10 +142,8 @@ fn damage() {
 
 #[test]
 fn promises_of_more_than_the_file_holds_cost_nothing() {
-    let start = Instant::now();
     let large = PLAIN.replace("5 4 3", "1600 1600 1600");
     assert_refused(local(&large, &data()), "a.mha", "data", "120 bytes", "samples of 2");
     let large = large.replace("NDims", "CompressedData = True\nNDims");
     assert_refused(local(&large, &data()), "a.mha", "data", "at most", "samples of 2");
-    assert!(start.elapsed() < Duration::from_secs(5));
 }

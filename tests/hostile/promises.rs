@@ -36,6 +36,16 @@ pub(crate) fn are_refused(folder: &Path) {
         files.push((format!("{}.dcm", syntax.trim_end_matches('\0')), dicom(syntax, &jpeg())));
         files.push(("zeros.dcm".to_owned(), dicom(syntax, &zeros)));
     }
+    // The beginning of a lossless JPEG 2000 image of 30000 × 30000 samples.
+    let codestream = jpeg_2000();
+    for code in [&codestream, &zeros] {
+        files.push(("jpeg2000.dcm".to_owned(), dicom("1.2.840.10008.1.2.4.90", code)));
+    }
+    for code in [&stored, &zeros, &noise] {
+        files.push(("deflated.dcm".to_owned(), [&dicom_head("1.2.840.10008.1.2.1.99")[..], code].concat()));
+    }
+    files.push(("gzip.mgz".to_owned(), gzip.clone()));
+    files.push(("short.mgh".to_owned(), mgh([1000, 1000, 1000])));
     for (name, bytes) in files {
         let path = folder.join(&name);
         fs::write(&path, &bytes).unwrap();
@@ -90,6 +100,34 @@ fn jpeg() -> Vec<u8> {
     bytes
 }
 
+/// What a DICOM file begins with.
+fn dicom_head(syntax: &str) -> Vec<u8> {
+    let length = (syntax.len() as u16).to_le_bytes();
+    [&[0; 128], &b"DICM\x02\0\x10\0UI"[..], &length, syntax.as_bytes()].concat()
+}
+
+fn jpeg_2000() -> Vec<u8> {
+    let side = 30000_u32.to_be_bytes();
+    let zero = [0; 4];
+    let size =
+        [&[0xff, 0x4f, 0xff, 0x51, 0, 41, 0, 0], &side[..], &side, &zero, &zero, &side, &side, &zero, &zero].concat();
+    let component = [0, 1, 15, 1, 1];
+    let style = [0xff, 0x52, 0, 12, 0, 0, 0, 1, 0, 5, 4, 4, 0, 1];
+    let steps = [&[0xff, 0x5c, 0, 19, 0x40][..], &[0x80; 16]].concat();
+    let tile = [0xff, 0x90, 0, 10, 0, 0, 0, 0, 0, 0, 0, 1, 0xff, 0x93];
+    let mut bytes = [&size[..], &component, &style, &steps, &tile].concat();
+    bytes.resize(CODE, 0);
+    bytes
+}
+
+/// A header of so many samples of 16 bits, and nothing else.
+fn mgh(sizes: [u32; 3]) -> Vec<u8> {
+    let numbers = [1, sizes[0], sizes[1], sizes[2], 1, 4, 0].map(u32::to_be_bytes).concat();
+    let mut bytes = numbers;
+    bytes.resize(284, 0);
+    bytes
+}
+
 /// A frame of 30000 × 30000 samples of 16 bits in one fragment.
 fn dicom(syntax: &str, code: &[u8]) -> Vec<u8> {
     let element = |group: u16, element: u16, kind: &[u8], value: &[u8]| {
@@ -98,8 +136,7 @@ fn dicom(syntax: &str, code: &[u8]) -> Vec<u8> {
     };
     let number = |number: u16| number.to_le_bytes();
     let parts = [
-        [&[0; 128], &b"DICM"[..]].concat(),
-        element(2, 0x10, b"UI", syntax.as_bytes()),
+        dicom_head(syntax),
         element(0x20, 0x32, b"DS", b"0\\0\\0 "),
         element(0x20, 0x37, b"DS", b"1\\0\\0\\0\\1\\0 "),
         element(0x28, 0x04, b"CS", b"MONOCHROME2 "),

@@ -6,6 +6,7 @@ use sheetsplat::settings::Compositing;
 use sheetsplat::settings::Projection;
 use sheetsplat::volume::builtin;
 
+use crate::common::compare::assert_at_most;
 use crate::common::{BY_MEANS, FORMS, RASTERIZERS, Random, gpu, lavapipe, scene};
 use crate::{OUTLIERS, random_case, render, share_off};
 
@@ -30,7 +31,7 @@ fn surfaces_cull_and_the_others_do_not() {
                 render(&gpu, &volume, &scene)
             });
             let share = share_off(&with.0.pixels, &without.0.pixels, 1e-4);
-            assert!(share <= OUTLIERS, "{compositing:?}, {rasterizer:?}, {footprint:?}: {share} of the pixels");
+            assert_at_most(share, OUTLIERS, format_args!("{compositing:?}, {rasterizer:?}, {footprint:?}: pixels"));
             let [with, without] = [with, without].map(|(_, counts)| counts.sections_rasterized);
             match compositing {
                 Compositing::Surface => assert!(with < without * 2 / 3, "{rasterizer:?}: {with} of {without}"),
@@ -60,7 +61,7 @@ fn tiles_and_groups_change_nothing() {
         let [one, two, four] = [0, 1, 2].map(|at| render(&renderers[at], &volume, &scene).0);
         for few in [one, two] {
             let share = share_off(&few.pixels, &four.pixels, 1e-4);
-            assert!(share <= 5.0 * OUTLIERS, "case {case}: {share} of the pixels with {scene:?}");
+            assert_at_most(share, OUTLIERS, format_args!("case {case}: pixels with {scene:?}"));
         }
     }
 }

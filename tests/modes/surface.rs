@@ -7,6 +7,7 @@ use sheetsplat::settings::Compositing;
 use sheetsplat::settings::Projection;
 use sheetsplat::volume::{Volume, builtin};
 
+use crate::common::compare::{self, assert_at_least};
 use crate::common::{RASTERIZERS, camera, gpu, scene, transfer};
 use crate::{COLOR, constant, render};
 
@@ -110,14 +111,13 @@ fn a_surface_has_no_rings() {
                 scene.splatting.slab_width = width;
                 render(&gpu, &volume, &scene).0.pixels
             });
-            let (mut squares, mut count) = (0.0, 0);
-            for (a, b) in wide.iter().zip(&thin).filter(|(a, b)| a[3] == 1.0 && b[3] == 1.0) {
-                squares += (0..3).map(|channel| f64::from(a[channel] - b[channel]).powi(2)).sum::<f64>();
-                count += 3;
-            }
-            let decibels = -10.0 * (squares / f64::from(count)).log10();
-            println!("{name}, {rasterizer:?}: {decibels:.1} dB over {count} colours");
-            assert!(count > 3000 && decibels > least, "{name}, {rasterizer:?}: {decibels:.1} dB");
+            let opaque = wide.iter().zip(&thin).filter(|(a, b)| a[3] == 1.0 && b[3] == 1.0);
+            let errors: Vec<f64> =
+                opaque.flat_map(|(a, b)| (0..3).map(|i| f64::from(a[i]) - f64::from(b[i]))).collect();
+            let decibels = compare::decibels(compare::root_mean_square(errors.iter().copied()));
+            println!("{name}, {rasterizer:?}: {decibels:.1} dB over {} colours", errors.len());
+            assert!(errors.len() > 3000, "{name}, {rasterizer:?}: {} colours", errors.len());
+            assert_at_least(decibels, least, format_args!("{name}, {rasterizer:?}"));
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, DVec4};
 use sheetsplat::headless::{Headless, readback};
-use sheetsplat::internals::gpu::layout::Group;
+use sheetsplat::internals::gpu::layout::SheetGroup;
 use sheetsplat::internals::gpu::targets::{BandBuffer, CompositingBuffer, Targets};
 use sheetsplat::internals::pass::composite::{Composite, CompositeBuffers, CompositeMode, RayMode};
 use sheetsplat::internals::quad_plan::{TILE, tile_grid};
@@ -11,6 +11,7 @@ use sheetsplat::internals::reference::composite::composite;
 use sheetsplat::settings::{Compositing, Order};
 use sheetsplat::wgpu::{self, BufferUsages};
 
+use crate::common::compare::{apart, assert_at_most};
 use crate::common::{BY_AMOUNTS, F32, Random, gpu, gpu_with_small_bindings};
 use crate::{Uncut, compute, contents, frame, init, tile_list};
 
@@ -47,7 +48,7 @@ fn tolerance(compositing: Compositing, alpha: f64, most: f64) -> f64 {
         Compositing::Exponential => alpha.powi(6) / 720.0,
         _ => 0.0,
     };
-    exp_error + 10.0 * F32 * most
+    exp_error + 5.0 * F32 * most
 }
 
 /// One case: sheets over a compositing buffer.
@@ -106,7 +107,7 @@ impl Case {
         });
         let tiles = tile_list(device, &self.tiles);
         let uncut = Uncut::new(device);
-        let words = |usage| init(device, &[0_u32; size_of::<Group>() / 4], usage);
+        let words = |usage| init(device, &[0_u32; size_of::<SheetGroup>() / 4], usage);
         let buffers = CompositeBuffers {
             frame: &frame,
             groups: &words(BufferUsages::UNIFORM),
@@ -156,12 +157,8 @@ impl Case {
             let most = expected.max_element().max(1.0);
             // The errors of sheets add up: none makes those before it larger.
             let tolerance: f64 = alphas().map(|alpha| tolerance(compositing, alpha, most)).sum();
-            assert!(
-                (*actual - *expected).abs().max_element() <= tolerance,
-                "{name}, pixel {x} {y}: sheets {:?}, acc {:?}: {actual}, not {expected} ± {tolerance}",
-                alphas().collect::<Vec<_>>(),
-                self.acc[i],
-            );
+            let what = format_args!("{name}, pixel {x} {y} over {:?}: {actual}, not {expected}", self.acc[i]);
+            assert_at_most(apart(*actual, *expected), tolerance, what);
         }
         // The masks say exactly what the compositing buffer holds; off the image all is opaque.
         let is_opaque = |x: u32, y: u32| {

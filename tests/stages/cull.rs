@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3, DVec4, UVec3};
 use sheetsplat::headless::Headless;
 use sheetsplat::internals::brick::{self, BRICK_VOXELS};
 use sheetsplat::internals::gpu::brick_lists::BrickLists;
-use sheetsplat::internals::gpu::layout::{self, Brick, BrickState, Frame, Group, Indirect, Tally};
+use sheetsplat::internals::gpu::layout::{self, Brick, BrickState, Frame, Indirect, SheetGroup, Tally};
 use sheetsplat::internals::gpu::targets::Targets;
 use sheetsplat::internals::gpu::uniforms::{self, Ramps};
 use sheetsplat::internals::gpu::volume_texture::VolumeTexture;
@@ -35,7 +35,7 @@ pub(crate) struct Culling<'a> {
     pub(crate) frame: Frame,
     pub(crate) plan: FramePlan,
     /// The uniform of every group of the plan.
-    groups: Vec<Group>,
+    groups: Vec<SheetGroup>,
     /// Of every place of every brick the index into the volume, [`ABSENT`] without a voxel.
     pub(crate) indices: Vec<u32>,
     pub(crate) bricks: Vec<Brick>,
@@ -127,8 +127,8 @@ impl<'a> Culling<'a> {
 }
 
 /// The uniform at the start of some bytes.
-fn uniform(bytes: &[u8]) -> Group {
-    bytemuck::pod_read_unaligned(&bytes[..size_of::<Group>()])
+fn uniform(bytes: &[u8]) -> SheetGroup {
+    bytemuck::pod_read_unaligned(&bytes[..size_of::<SheetGroup>()])
 }
 
 /// A place without a voxel.
@@ -176,7 +176,7 @@ impl Decisions {
     }
 
     /// The first and the last pixel from which the box filter covers the footprints' boxes around centres from `low` to `high`.
-    fn filter(&mut self, size: [u32; 2], group: &Group, low: DVec2, high: DVec2) -> [[u32; 2]; 2] {
+    fn filter(&mut self, size: [u32; 2], group: &SheetGroup, low: DVec2, high: DVec2) -> [[u32; 2]; 2] {
         // Pixel centres are at half-integers; the shader's slack.
         let margin = half_box(group) + 0.01;
         let (low, high) = ((low - margin - 0.5).to_array(), (high + margin - 0.5).to_array());
@@ -193,7 +193,7 @@ impl Decisions {
     }
 }
 
-fn half_box(group: &Group) -> DVec2 {
+fn half_box(group: &SheetGroup) -> DVec2 {
     DVec2::from(group.half_box.map(f64::from))
 }
 
@@ -263,7 +263,7 @@ struct Rules<'a> {
     sheets: u32,
     bricks: &'a [Brick],
     indices: &'a [u32],
-    groups: &'a [Group],
+    groups: &'a [SheetGroup],
     /// The list's bricks in bucket order.
     order: &'a [u32],
     /// Voxels, by index into the volume, that f32 arithmetic may treat otherwise.
@@ -280,7 +280,7 @@ impl Rules<'_> {
     }
 
     /// Whether any pixel of the image lies in the box around `low..high` widened by the footprint.
-    fn is_on_screen(&self, decisions: &mut Decisions, group: &Group, low: DVec2, high: DVec2) -> bool {
+    fn is_on_screen(&self, decisions: &mut Decisions, group: &SheetGroup, low: DVec2, high: DVec2) -> bool {
         let (low, high) = (low - half_box(group), high + half_box(group));
         let size = self.frame.size.map(f64::from);
         // All four, so that every unsure one is noted.
@@ -294,7 +294,7 @@ impl Rules<'_> {
         decisions: &mut Decisions,
         brick: &Brick,
         hidden: u64,
-        group: &Group,
+        group: &SheetGroup,
         occluded: &Occluded,
     ) -> bool {
         if brick::present(brick) & !hidden == 0 {
@@ -366,7 +366,7 @@ impl Rules<'_> {
     }
 
     /// How many sections of a voxel the group draws, by the twin: those with a footprint whose own box holds a pixel.
-    fn sections(&self, decisions: &mut Decisions, voxel: UVec3, group: &Group) -> u32 {
+    fn sections(&self, decisions: &mut Decisions, voxel: UVec3, group: &SheetGroup) -> u32 {
         let Geometry { method, eye, .. } = self.geometry;
         if eye.is_some_and(|eye| !decisions.at_least(self.geometry.depth(voxel), eye.near, EPSILON)) {
             return 0;
@@ -403,7 +403,7 @@ impl Rules<'_> {
         decisions: &mut Decisions,
         (brick, slot, id): (u32, u32, u32),
         voxel: UVec3,
-        group: &Group,
+        group: &SheetGroup,
         occluded: &Occluded,
         so_far: &mut Expected,
     ) {

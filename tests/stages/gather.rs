@@ -5,15 +5,16 @@ use sheetsplat::headless::Headless;
 use sheetsplat::internals::ClippedVoxels;
 use sheetsplat::internals::brick::{self, BrickList};
 use sheetsplat::internals::classify::classify;
-use sheetsplat::internals::gpu::layout::{Gathered, Part, Tally};
+use sheetsplat::internals::gpu::gathered_layout::GatheredLayout;
+use sheetsplat::internals::gpu::layout::{Gathered, PatchRange, Tally};
 use sheetsplat::internals::gpu::uniforms::{self, Ramps};
 use sheetsplat::internals::gpu::volume_texture::{SIDES, VolumeTexture};
 use sheetsplat::internals::means;
 use sheetsplat::internals::pass::composite::{CutBuffers, RayMode};
 use sheetsplat::internals::pass::gather::{Gather, GatherBuffers, GatherMode};
+use sheetsplat::internals::patch_bins::{self, BLOCKS, Passes, PatchBins, SHEETS};
 use sheetsplat::internals::reference;
 use sheetsplat::internals::reference::footprint::Footprint;
-use sheetsplat::internals::tile_bins::{self, Passes, SHEETS, TileBins, UNITS};
 use sheetsplat::scene::{Scene, TransferSettings};
 use sheetsplat::settings::Light;
 use sheetsplat::settings::Projection;
@@ -22,6 +23,7 @@ use sheetsplat::settings::{Ramp, TransferFunction};
 use sheetsplat::volume::{Grid, Volume};
 use sheetsplat::wgpu::BufferUsages;
 
+use crate::common::compare::{apart, assert_at_most, largest, root_mean_square};
 use crate::common::{BY_AMOUNTS, Random, camera, gpu, pixels, scene, transfer};
 use crate::section::{AMOUNT, KERNELS, Seen, VIEWS, view_scene};
 use crate::{Uncut, at_offsets, compute, contents, init};
@@ -55,14 +57,14 @@ impl<'a> Fixture<'a> {
         Self { gpu, stage, seen: Seen::new(volume.grid(), scene), volume, transfer, bricks }
     }
 
-    fn bins(&self) -> TileBins {
+    fn bins(&self) -> PatchBins {
         let Seen { view, kernel, scene: Scene { splatting, .. }, .. } = &self.seen;
         let covered = means::covered(view, self.volume.grid(), splatting);
-        TileBins::new(self.bricks.bricks(), view, splatting.order, covered, kernel.support(), 0, u64::MAX).unwrap()
+        PatchBins::new(self.bricks.bricks(), view, splatting.order, covered, kernel.support(), 0, u64::MAX).unwrap()
     }
 
     /// Draws over `acc`, in bands of at most so many rows. The nearest group begins at `near`, where that is given.
-    fn draw(&self, bins: &TileBins, near: Option<f32>, acc: &[DVec4], band_rows: u32) -> Drawn {
+    fn draw(&self, bins: &PatchBins, near: Option<f32>, acc: &[DVec4], band_rows: u32) -> Drawn {
         let Self { gpu, stage, seen, volume, bricks, .. } = self;
         let (device, size) = (gpu.device(), seen.view.size);
         let bricks = bricks.bricks();
@@ -71,17 +73,18 @@ impl<'a> Fixture<'a> {
         let values = VolumeTexture::upload_folded(device, gpu.queue(), volume.values(), side);
         let grid = (volume.grid(), values.format);
         let frame = uniforms::frame(&seen.view, &seen.kernel, grid, &ramps, &seen.scene);
-        let mut gather = uniforms::gather(&seen.view, &seen.kernel, &seen.scene.splatting, bins, bricks.len() as u32);
+        let results = GatheredLayout::new(&seen.view, bins, bricks.len() as u32);
+        let mut gather = uniforms::gather(&seen.view, &seen.kernel, &seen.scene.splatting, bins, &results);
         gather.near = near.unwrap_or(gather.near);
-        let ([columns, _], tile_rows) = (tile_bins::grid(size), tile_bins::TILE[1]);
+        let ([columns, _], tile_rows) = (patch_bins::grid(size), patch_bins::PATCH[1]);
         let bands: Vec<(u32, u32)> =
             (0..size[1]).step_by(band_rows as usize).map(|first| (first, band_rows.min(size[1] - first))).collect();
-        let parts: Vec<Part> = bands
+        let ranges: Vec<PatchRange> = bands
             .iter()
-            .map(|&(first_row, rows)| Part {
+            .map(|&(first_row, rows)| PatchRange {
                 first_row,
-                first_tile: first_row / tile_rows * columns,
-                end_tile: (first_row / tile_rows + rows.div_ceil(tile_rows)) * columns,
+                first_patch: first_row / tile_rows * columns,
+                end_patch: (first_row / tile_rows + rows.div_ceil(tile_rows)) * columns,
             })
             .collect();
         let accs: Vec<_> = bands
@@ -93,9 +96,9 @@ impl<'a> Fixture<'a> {
             })
             .collect();
         let storage = |words: &[u32]| init(device, words, BufferUsages::STORAGE);
-        let words = gather.reached + bins.tiles * UNITS;
+        let words = gather.reached + bins.patches * BLOCKS;
         let gathered = storage(&vec![0; size_of::<Gathered>() / 4 + words as usize]);
-        let (parts_buffer, stride) = at_offsets(device, &parts);
+        let (ranges_buffer, stride) = at_offsets(device, &ranges);
         let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|half| half.as_vec2().to_array()).collect();
         let (uncut, cut) = (Uncut::new(device), uniforms::cut(&seen.view, volume.grid(), &seen.scene, None, None));
         let mode = GatherMode::of(
@@ -103,12 +106,12 @@ impl<'a> Fixture<'a> {
             seen.view.perspective.is_some(),
             [false, volume.holes() > 0],
             RayMode::default(),
-            bins.parts,
+            bins.workgroups,
         );
         let buffers = GatherBuffers {
             frame: &init(device, &[frame], BufferUsages::UNIFORM),
             gather: &init(device, &[gather], BufferUsages::UNIFORM),
-            parts: &parts_buffer,
+            patch_ranges: &ranges_buffer,
             bricks: &init(device, bricks, BufferUsages::STORAGE),
             starts: &storage(&bins.starts),
             entries: &storage(&bins.entries),
@@ -121,8 +124,8 @@ impl<'a> Fixture<'a> {
         };
         let bound: Vec<_> = accs.iter().map(|acc| stage.bind(device, mode, buffers, acc, bins.dispatches)).collect();
         compute(gpu, |pass| {
-            for (at, part) in parts.iter().enumerate() {
-                let tiles = part.end_tile - part.first_tile;
+            for (at, range) in ranges.iter().enumerate() {
+                let tiles = range.end_patch - range.first_patch;
                 stage.record(pass, &bound[at], at as u32 * stride, tiles);
             }
         });
@@ -170,7 +173,7 @@ fn look_at(scene: &mut Scene, grid: &Grid, voxel: UVec3, at: DVec2) {
     let seen = Seen::new(grid, scene.clone());
     let offset = (at - seen.geometry.size / 2.0) * seen.geometry.pix * grid.unit();
     let basis = seen.view.basis;
-    scene.camera.center = grid.world_position(voxel) - offset.x * basis.u + offset.y * basis.v;
+    scene.camera.center = Some(grid.world_position(voxel) - offset.x * basis.u + offset.y * basis.v);
 }
 
 /// Four sheets at a time, added up, so that a first sheet alone, the first two, and so on fall among them: against the same precision
@@ -206,15 +209,15 @@ fn sections() {
                 // What f32 makes of the near plane.
                 let depth = f64::from(first) * view.slabs.width - (f64::from(near) - f64::from(z));
                 let splat = reference::Splat { depth, ..splat };
-                let tiles = tile_bins::grid(view.size).iter().product::<u32>();
-                let bins = TileBins {
+                let tiles = patch_bins::grid(view.size).iter().product::<u32>();
+                let bins = PatchBins {
                     first_slab: first,
-                    tiles,
+                    patches: tiles,
                     groups: 1,
                     starts: (0..=tiles).collect(),
                     entries: vec![0; tiles as usize],
                     half_boxes: vec![view.half_box(kernel.support(), 0.0..1.0)],
-                    parts: 1,
+                    workgroups: 1,
                     passes: fixture.bins().passes,
                     dispatches: 1,
                 };
@@ -278,7 +281,7 @@ fn frame_scene((direction, spacing, units_per_pixel, [width, height]): Frame, ra
     let unit = spacing.into_iter().fold(f64::INFINITY, f64::min);
     scene.camera = camera(direction, units_per_pixel * unit * f64::from(height));
     scene.camera.up = DVec3::new(0.2, 0.3, 1.0);
-    scene.camera.center = DVec3::from_array([(); 3].map(|()| random.uniform(-2.0, 2.0)));
+    scene.camera.center = Some(DVec3::from_array([(); 3].map(|()| random.uniform(-2.0, 2.0))));
     scene
 }
 
@@ -328,15 +331,12 @@ fn frames() {
             }
             let fixture = Fixture::new(&gpu, &stage, scene, volume);
             let (actual, expected) = (fixture.draw_all().acc, fixture.twin());
-            assert!(actual.iter().chain(&expected).all(|pixel| pixel.is_finite()));
-            let errors: Vec<DVec4> =
-                actual.iter().zip(&expected).map(|(actual, expected)| *actual - *expected).collect();
-            let worst = errors.iter().map(|error| error.abs().max_element()).fold(0.0, f64::max);
-            let mean_square =
-                errors.iter().map(|error| error.length_squared()).sum::<f64>() / (4 * errors.len()) as f64;
+            let errors: Vec<f64> =
+                actual.iter().zip(&expected).flat_map(|(actual, expected)| (*actual - *expected).to_array()).collect();
             // Every kernel errs by less than 5e-6 of its peak, and mostly near its rim: too few of them meet in a pixel for more.
             let what = format!("{:?}, {:?}", fixture.seen.scene, fixture.seen.kernel);
-            assert!(worst < 1e-4 && mean_square < 1e-10, "{worst}, mean square {mean_square}: {what}");
+            assert_at_most(largest(errors.iter().copied()), 4e-5, &what);
+            assert_at_most(root_mean_square(errors), 5e-6, &what);
             lit += expected.iter().filter(|pixel| (0.01..0.99).contains(&pixel.w)).count();
         }
     }
@@ -374,15 +374,15 @@ fn dispatches_and_bands_change_no_more_than_rounding() {
         let dispatches = bins.groups;
         for (most, rows) in [(one_group + 1000, u32::MAX), (one_group, 32), (bins.passes.most, 64)] {
             let passes = Passes { most, ..bins.passes };
-            let first = TileBins { passes, dispatches: 1, ..bins.clone() };
+            let first = PatchBins { passes, dispatches: 1, ..bins.clone() };
             let is_same = |drawn: &Drawn| {
                 // Voxels are added in another order where a dispatch finds anew what it could have kept.
                 let pairs = drawn.acc.iter().zip(&whole.acc);
-                pairs.map(|(a, b)| (a - b).abs().max_element()).fold(0.0, f64::max) < 1e-5
+                largest(pairs.map(|(a, b)| apart(*a, *b))) < 1e-5
             };
             let is_cut = !is_same(&fixture.draw(&first, None, &fixture.empty(), rows));
             assert_eq!(is_cut, most < bins.passes.most, "one dispatch of {most} passes");
-            let parts = fixture.draw(&TileBins { dispatches, ..first }, None, &fixture.empty(), rows);
+            let parts = fixture.draw(&PatchBins { dispatches, ..first }, None, &fixture.empty(), rows);
             // What is behind opaque pixels alone is not even fetched, or fetched in another dispatch.
             let tally = Tally { bricks_visited: whole.tally.bricks_visited, ..parts.tally };
             assert!(is_same(&parts), "{compositing:?}, {order:?}, {rows} rows");
@@ -408,7 +408,7 @@ fn the_least_is_looked_for_behind_all_bricks() {
     let bricks = bins.starts.windows(2).map(|group| group[1] - group[0]).max().unwrap();
     let passes = Passes { most: bins.passes.per_group + bricks * bins.passes.per_brick, ..bins.passes };
     let middle = |dispatches| {
-        let bins = TileBins { passes, dispatches, ..bins.clone() };
+        let bins = PatchBins { passes, dispatches, ..bins.clone() };
         fixture.draw(&bins, None, &fixture.empty(), u32::MAX).acc[8 * 17 + 8]
     };
     // What is not there is kept as 2, less opacity.
@@ -433,9 +433,8 @@ fn more_voxels_than_the_queue_holds() {
         // The queue has room for a few hundred voxels; two thirds of all are drawn.
         assert!(bricks * 64 > 3000 || slab_width < 1.0, "{bricks} bricks");
         let (actual, expected) = (fixture.draw(&bins, None, &fixture.empty(), u32::MAX).acc, fixture.twin());
-        let errors = actual.iter().zip(&expected).map(|(actual, expected)| (*actual - *expected).abs().max_element());
-        let worst = errors.fold(0.0, f64::max);
-        assert!(worst < 1e-4, "{worst} at slab width {slab_width}");
+        let errors = actual.iter().zip(&expected).map(|(actual, expected)| apart(*actual, *expected));
+        assert_at_most(largest(errors), 1e-5, format_args!("slab width {slab_width}"));
         assert!(expected.iter().any(|pixel| pixel.w > 0.1));
     }
 }

@@ -10,13 +10,13 @@ mod gather;
 mod kernel_in_view;
 mod means;
 mod occlude;
+mod patch_bins;
 mod plan;
 mod resolve;
 mod sample;
 mod section;
 mod shade;
 mod splat;
-mod tile_bins;
 mod tiles;
 mod values;
 

@@ -8,7 +8,7 @@ use bytemuck::Zeroable;
 use glam::{DVec3, UVec3};
 use sheetsplat::headless::Headless;
 use sheetsplat::internals::brick::BrickList;
-use sheetsplat::internals::gpu::layout::Group;
+use sheetsplat::internals::gpu::layout::SheetGroup;
 use sheetsplat::internals::gpu::targets::Targets;
 use sheetsplat::internals::gpu::uniforms;
 use sheetsplat::internals::kernel::Kernel;
@@ -131,8 +131,8 @@ impl Fixture<'_> {
         let frame = frame(|scene| (scene.image.width, scene.image.height) = mask.size.into());
         let frame = init(device, &[frame], BufferUsages::UNIFORM);
         // Not at the first offset.
-        let group = Group { box_filter: self.reach, ..Group::zeroed() };
-        let (group, offset) = at_offsets(device, &[Group::zeroed(), group]);
+        let group = SheetGroup { box_filter: self.reach, ..SheetGroup::zeroed() };
+        let (group, offset) = at_offsets(device, &[SheetGroup::zeroed(), group]);
         // As the composite stage leaves it: off the image all is opaque.
         self.gpu.queue().write_buffer(&self.targets.opaque, 0, bytemuck::cast_slice(&mask.words(true)));
         let tiles = tile_list(device, tiles);

@@ -11,6 +11,7 @@ use sheetsplat::settings::Compositing;
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
 use sheetsplat::{Blend, RendererOptions};
 
+use crate::common::compare::{apart, assert_at_most};
 use crate::common::{COMPOSITINGS, F32, Random, gpu, gpu_with_small_bindings, pixels};
 use crate::{frame, init};
 
@@ -86,11 +87,8 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
             assert_eq!(actual.len(), expected.pixels.len());
             for (i, (actual, expected)) in actual.iter().zip(&expected.pixels).enumerate() {
                 // The background's product, one minus alpha, a product and a sum of numbers up to 1: a rounding each.
-                assert!(
-                    (*actual - *expected).abs().max_element() <= 4.0 * F32,
-                    "{compositing:?} {background:?} pixel {i}: acc {}: {actual}, not {expected}",
-                    acc.pixels[i]
-                );
+                let over = format_args!("{compositing:?} {background:?} pixel {i}: acc {}", acc.pixels[i]);
+                assert_at_most(apart(*actual, *expected), 4.0 * F32, format_args!("{over}: {actual}, not {expected}"));
             }
         }
     }

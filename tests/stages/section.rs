@@ -10,6 +10,7 @@ use sheetsplat::scene::Scene;
 use sheetsplat::settings::FootprintForm;
 use sheetsplat::volume::Grid;
 
+use crate::common::compare::{apart, assert_at_most};
 use crate::common::{F32, camera, scene};
 
 /// `(C·m, m)` of the splats that are drawn.
@@ -126,6 +127,7 @@ impl Seen {
     }
 
     /// `tolerance` is that of a kernel of amount 1, before the amplitude.
+    #[track_caller]
     pub(crate) fn assert_close(
         &self,
         sheet: &[DVec4],
@@ -135,14 +137,10 @@ impl Seen {
     ) {
         assert_eq!(sheet.len(), expected.len());
         for (pixel, (actual, expected)) in sheet.iter().zip(expected).enumerate() {
-            let error = (*actual - *expected).abs().max_element() / self.amplitude();
-            assert!(
-                error <= tolerance(pixel),
-                "{what}, {:?}, {:?}, pixel {pixel}: {actual}, not {expected} ± {}",
-                self.kernel,
-                self.view,
-                tolerance(pixel)
-            );
+            let error = apart(*actual, *expected) / self.amplitude();
+            let (Self { kernel, view, .. }, tolerance) = (self, tolerance(pixel));
+            let what = format_args!("{what}, {kernel:?}, {view:?}, pixel {pixel}: {actual}, not {expected}");
+            assert_at_most(error, tolerance, what);
         }
     }
 }

@@ -22,6 +22,7 @@ use sheetsplat::settings::{FootprintForm, Method};
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
 
+use crate::common::compare::{apart, assert_at_most, largest};
 use crate::common::{F32, Random, gpu, pixels};
 use crate::kernel_in_view::{KernelInView, random_view};
 use crate::section::{AMOUNT, AMOUNT_BA, AMOUNT_RG, KERNELS, Seen, VIEWS, view_scene};
@@ -144,7 +145,7 @@ impl<'a> Fixture<'a> {
         let device = self.gpu.device();
         let near = self.view.slabs.plane(first_slab) as f32;
         // Not at the first offset.
-        let of = |near| layout::Group { near, ..layout::Group::zeroed() };
+        let of = |near| layout::SheetGroup { near, ..layout::SheetGroup::zeroed() };
         let (groups, offset) = at_offsets(device, &[of(1e9), of(near)]);
         let args = init(device, &[indirect(instances.len() as u32)], BufferUsages::INDIRECT | BufferUsages::STORAGE);
         let tiles = tile_list(device, tiles);
@@ -224,7 +225,8 @@ fn summed_area_sections() {
     let mut lit = 0;
     for_random_sections(FootprintForm::SummedArea, &[0.25, 1.0, 3.7], |fixture, splat, k, sheet| {
         let expected = fixture.twin(&[*splat], k);
-        let tolerance = fixture.tolerance(splat, k);
+        // A thousandth is what SPEC §4 allows; the table is four times as good.
+        let tolerance = fixture.tolerance(splat, k) / 4.0;
         fixture.assert_close(sheet, &expected, |_| tolerance, &format!("{splat:?} in slab {k}"));
         lit += expected.iter().filter(|pixel| pixel.w > 0.0).count();
     });
@@ -300,7 +302,7 @@ fn any_eye_and_slices() {
                         (None, FootprintForm::Sections) => continue,
                     };
                     let Some(section) = section else {
-                        let most = sheet.iter().map(|pixel| pixel.w).fold(0.0, f64::max);
+                        let most = largest(sheet.iter().map(|pixel| pixel.w));
                         let is_none = form == FootprintForm::Sections || most <= kernel.rounding(k);
                         assert!(
                             is_none,
@@ -310,14 +312,9 @@ fn any_eye_and_slices() {
                         continue;
                     };
                     kernel.draw(&section, k, |pixel, expected, tolerance| {
-                        let error = (sheet[pixel] - expected).abs().max_element();
-                        assert!(
-                            error <= tolerance,
-                            "{section:?} in sheet {k}, {:?}, {:?}, pixel {pixel}: {}, not {expected} ± {tolerance}",
-                            fixture.kernel,
-                            fixture.scene,
-                            sheet[pixel],
-                        );
+                        let (error, Seen { kernel, scene, .. }) = (apart(sheet[pixel], expected), &fixture.seen);
+                        let what = format_args!("{section:?} in sheet {k}, {kernel:?}, {scene:?}, pixel {pixel}");
+                        assert_at_most(error, tolerance, what);
                         worst = worst.max(error / tolerance.max(1e-300));
                         lit += usize::from(expected.w > 0.0);
                     });
@@ -357,7 +354,9 @@ fn pixels_just_inside_the_rim_are_drawn() {
                 let expected = fixture.twin(&[fixture.twin_of(&splat)], 0)[pixel].w;
                 assert!(expected > 0.01 * fixture.whole(), "{expected} is not worth testing");
                 match form {
-                    FootprintForm::SummedArea => assert!((actual - expected).abs() < 1e-3 * fixture.whole()),
+                    FootprintForm::SummedArea => {
+                        assert_at_most((actual - expected).abs(), 4e-6 * fixture.whole(), "just inside the rim");
+                    }
                     // Bilinear between the last texel inside and 0 on the rim.
                     FootprintForm::Sections => assert!(actual > 0.0 && actual < expected, "{actual} {expected}"),
                 }
@@ -423,11 +422,11 @@ fn sections_sum_to_the_footprint_and_the_footprint_to_one() {
             let sampled = whole.iter().sum::<DVec4>() * pixel_area;
             // The kernel's own: at 4 and more pixels per grid unit a Gaussian's sum over pixels is its integral, and the
             // jump of at most h(radius) = 0.02·h(0) at the rim adds little.
-            assert!((sampled - AMOUNT).abs().max_element() < 1e-3, "{kernel:?} {view:?}: {sampled}");
+            assert_at_most(apart(sampled, AMOUNT), 1e-3, format_args!("{kernel:?} {view:?}: {sampled}"));
             let total = sum.iter().sum::<DVec4>() * pixel_area;
             // Over the footprint the GPU errs by less than the tolerance times its effective area, π/falloff.
             let error = tolerance * std::f64::consts::PI / fixture.kernel.falloff();
-            assert!((total - sampled).abs().max_element() < error, "{form:?} {kernel:?} {view:?}: {total}");
+            assert_at_most(apart(total, sampled), error, format_args!("{form:?} {kernel:?} {view:?}: {total}"));
         }
     }
 }
@@ -449,12 +448,13 @@ fn instances_add_up() {
         assert_eq!(sheets.len(), stage.sheets as usize);
         for (k, sheet) in sheets {
             let expected = fixture.twin(&twins, k);
-            let most = expected.iter().map(|pixel| pixel.w).fold(0.0, f64::max);
+            let most = largest(expected.iter().map(|pixel| pixel.w));
             assert!(most > fixture.whole(), "{most}: splats overlap");
             let tolerance = |pixel: usize| {
                 let here = twins.iter().filter(|twin| fixture.rho(twin, pixel) <= 2.0);
                 // Each has its own error, and the sum so far is rounded when it is added.
-                here.map(|twin| fixture.tolerance(twin, k) + F32 * most).sum()
+                // These have either sign, and mostly are far below what one may have.
+                here.map(|twin| fixture.tolerance(twin, k) / 100.0 + F32 * most).sum()
             };
             fixture.assert_close(&sheet, &expected, tolerance, "many splats");
         }
@@ -507,8 +507,8 @@ fn listed_tiles_are_zeroed_and_no_others() {
                             assert_eq!(*actual, DVec4::splat(stale(at).into()), "{name}");
                         } else {
                             // Every addition is rounded to what an f32 of that size can hold.
-                            let error = (*actual - clean - f64::from(stale(at))).abs().max_element();
-                            assert!(error < 40.0 * 65536.0 * F32, "{name}: {actual}");
+                            let error = apart(*actual - f64::from(stale(at)), clean);
+                            assert_at_most(error, 4.0 * 65536.0 * F32, name);
                         }
                     }
                 }

@@ -2,7 +2,7 @@
 
 use bytemuck::Zeroable;
 use sheetsplat::headless::Headless;
-use sheetsplat::internals::gpu::layout::{Frame, Group, Indirect, Tally};
+use sheetsplat::internals::gpu::layout::{Frame, Indirect, SheetGroup, Tally};
 use sheetsplat::internals::gpu::targets::Targets;
 use sheetsplat::internals::pass::tiles::Tiles;
 use sheetsplat::internals::quad_plan::{TILE, tile_grid};
@@ -88,8 +88,8 @@ impl Case {
             ..frame(|scene| (scene.image.width, scene.image.height) = self.size.into())
         };
         let frame = init(device, &[frame], BufferUsages::UNIFORM);
-        let uniforms: Vec<Group> =
-            (0..GROUPS).map(|index| Group { box_filter: self.reach, index, ..Group::zeroed() }).collect();
+        let uniforms: Vec<SheetGroup> =
+            (0..GROUPS).map(|index| SheetGroup { box_filter: self.reach, index, ..SheetGroup::zeroed() }).collect();
         let (groups, stride) = at_offsets(device, &uniforms);
         let lists = stage.prepare(device, [&frame, &groups, &culled], &targets, GROUPS as usize, None).unwrap();
         compute(gpu, |pass| stage.record(pass, &lists, group * stride));

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use clap::ValueEnum;
 use clap::builder::PossibleValuesParser;
+use sheetsplat::RenderError;
 use sheetsplat::appearance::{Colormap, Preset};
 use sheetsplat::headless::{Error, Headless, HeadlessOptions};
 use sheetsplat::image::PngDepth;
@@ -170,6 +171,20 @@ impl Input {
         Ok(volume)
     }
 
+    /// The scene as it is to be drawn, with nothing left to the volume: what is saved is what is drawn. `explicit` is
+    /// [`Scene::explicit`], or for cameras that turn [`Scene::explicit_all_around`].
+    pub(crate) fn settled(
+        &self,
+        volume: &Volume,
+        scene: &Scene,
+        explicit: impl Fn(&Scene, &Volume) -> Scene,
+    ) -> Result<Scene, Failure> {
+        let mut scene = scene.clone();
+        self.look_at(volume, &mut scene)?;
+        scene.transfer.check_volume(volume).map_err(|error| self.failure(RenderError::from(error)))?;
+        Ok(explicit(&scene, volume))
+    }
+
     /// Turns the scene's camera to the side of the patient that --view says.
     pub(crate) fn look_at(&self, volume: &Volume, scene: &mut Scene) -> Result<(), Failure> {
         let (Some(view), name) = (self.view, &self.name) else { return Ok(()) };
@@ -218,4 +233,17 @@ impl From<Depth> for PngDepth {
 pub(crate) fn log_frame(what: &str, stats: &Stats) {
     let Stats { adapter, rasterizer, prepare_ms, frame_ms, .. } = stats;
     log::info!("{what}: {:.1} ms by {rasterizer} on {adapter}", prepare_ms + frame_ms);
+}
+
+/// Checks the name of a scene file to be written.
+pub(crate) fn check_scene_file(path: &Path) -> Result<(), Failure> {
+    match path.extension() {
+        Some(extension) if extension.eq_ignore_ascii_case("toml") => Ok(()),
+        _ => Err(Failure::Input(format!("--save-scene: found {}, allowed: a file .toml", path.display()))),
+    }
+}
+
+/// The scene file that a path is to hold.
+pub(crate) fn scene_file(scene: &Scene, path: &Path) -> Result<Vec<u8>, Failure> {
+    Ok(scene.to_toml(path.parent().unwrap_or(Path::new("")))?.into_bytes())
 }

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 use sheetsplat::RenderError;
+use sheetsplat::scene::Scene;
 use sheetsplat::stats::Stats;
 
 use crate::arguments::{Input, parse_degrees};
@@ -41,12 +42,12 @@ struct Report {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let input = &arguments.input;
-    let mut scene = input.scene()?;
+    let scene = input.scene()?;
     let outputs = Outputs::check(&[], true, &input.files(&scene))?;
     let start = Instant::now();
     let volume = input.load_volume(&scene, &outputs)?;
     let load_ms = milliseconds_since(start);
-    input.look_at(&volume, &mut scene)?;
+    let scene = input.settled(&volume, &scene, Scene::explicit_all_around)?;
 
     let start = Instant::now();
     let headless = input.headless(arguments.profile)?;

@@ -1,6 +1,6 @@
 //! `sheetsplat render`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -14,7 +14,7 @@ use sheetsplat::stats::Stats;
 use sheetsplat::volume::Volume;
 
 use crate::annotate::Annotate;
-use crate::arguments::{Depth, Input, log_frame};
+use crate::arguments::{Depth, Input, check_scene_file, log_frame, scene_file};
 use crate::failure::Failure;
 use crate::outputs::{self, Outputs};
 
@@ -61,7 +61,7 @@ enum Backend {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let Arguments { input, output, stats: stats_file, save_scene, .. } = arguments;
     check_files(arguments)?;
-    let mut scene = input.scene()?;
+    let scene = input.scene()?;
     let mut named = vec![("--output", output.as_path())];
     named.extend(stats_file.as_deref().map(|path| ("--stats", path)));
     named.extend(save_scene.as_deref().map(|path| ("--save-scene", path)));
@@ -69,11 +69,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
     let volume = input.load_volume(&scene, &outputs)?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
-    input.look_at(&volume, &mut scene)?;
-    scene.transfer.check_volume(&volume).map_err(|error| input.failure(RenderError::from(error)))?;
     let start = Instant::now();
-    // What is saved is what is rendered.
-    let scene = scene.explicit(&volume);
+    let scene = input.settled(&volume, &scene, Scene::explicit)?;
     let explicit_ms = start.elapsed().as_secs_f64() * 1e3;
     let overlay = arguments.annotate.overlay(&scene, &volume)?;
     let volume = Arc::new(volume);
@@ -92,7 +89,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         files.push((path, (json + "\n").into_bytes()));
     }
     if let Some(path) = save_scene {
-        files.push((path, scene.to_toml(path.parent().unwrap_or(Path::new("")))?.into_bytes()));
+        files.push((path, scene_file(&scene, path)?));
     }
     if arguments.profile && stats.stages_ms.is_empty() {
         log::warn!("--profile: found no timestamp queries on {}", stats.adapter);
@@ -107,13 +104,7 @@ fn check_files(arguments: &Arguments) -> Result<(), Failure> {
     let Arguments { output, save_scene, .. } = arguments;
     Image::check_format(output)?;
     arguments.annotate.check_format(output)?;
-    let is_toml = |path: &PathBuf| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
-    match save_scene {
-        Some(path) if !is_toml(path) => {
-            Err(Failure::Input(format!("--save-scene: found {}, allowed: a file .toml", path.display())))
-        }
-        _ => Ok(()),
-    }
+    save_scene.as_deref().map_or(Ok(()), check_scene_file)
 }
 
 fn render_reference(volume: &Volume, scene: &Scene) -> Result<Rendering, RenderError> {

@@ -1,5 +1,6 @@
 //! Frames as codecs have them.
 
+use hayro_jpeg2000::{DecodeSettings, DecoderContext, Image};
 use jpeg_decoder::{Decoder, PixelFormat};
 
 use super::super::samples::MAX_EXPANSION;
@@ -10,22 +11,35 @@ pub(super) enum Codec {
     None,
     Rle,
     Jpeg,
+    Jpeg2000,
 }
+
+/// What a frame may take up, in bytes, however short its code is. JPEG 2000 spends next to nothing on a slice that is all air.
+const SMALL: u64 = 1 << 20;
 
 impl Codec {
     /// By the transfer syntax.
-    pub(super) fn of(transfer_syntax: &str) -> Option<Self> {
-        Some(match transfer_syntax.strip_prefix("1.2.840.10008.1.2")? {
-            "" | ".1" | ".2" => Self::None,
-            ".5" => Self::Rle,
+    ///
+    /// # Errors
+    /// The transfer syntax, by name if it is a known one.
+    pub(super) fn of(transfer_syntax: &str) -> Result<Self, String> {
+        let name = match transfer_syntax.strip_prefix("1.2.840.10008.1.2").unwrap_or("none") {
+            "" | ".1" | ".1.99" | ".2" => return Ok(Self::None),
+            ".5" => return Ok(Self::Rle),
             // Baseline, extended, and lossless ones.
-            ".4.50" | ".4.51" | ".4.57" | ".4.70" => Self::Jpeg,
-            _ => return None,
-        })
+            ".4.50" | ".4.51" | ".4.57" | ".4.70" => return Ok(Self::Jpeg),
+            ".4.90" | ".4.91" => return Ok(Self::Jpeg2000),
+            ".4.80" | ".4.81" => " (JPEG-LS)",
+            ".4.92" | ".4.93" => " (JPEG 2000 of several components)",
+            ".4.201" | ".4.202" | ".4.203" => " (High-Throughput JPEG 2000)",
+            other if other.starts_with(".4.10") => " (a video)",
+            _ => "",
+        };
+        Err(format!("{transfer_syntax}{name}"))
     }
 
     /// What [`Self::of`] takes.
-    pub(super) const ALLOWED: &str = "1.2.840.10008.1.2 with nothing or .1, .2 (uncompressed), .5 (RLE), .4.50, .4.51, .4.57, .4.70 (JPEG) behind it";
+    pub(super) const ALLOWED: &str = "1.2.840.10008.1.2 with nothing or .1, .2 (uncompressed), .1.99 (deflated), .5 (RLE), .4.50, .4.51, .4.57, .4.70 (JPEG), .4.90, .4.91 (JPEG 2000) behind it";
 
     /// A frame of so many columns, rows and bytes per sample, in the machine's byte order.
     ///
@@ -33,13 +47,16 @@ impl Codec {
     /// What it is instead.
     pub(super) fn decode(self, code: Vec<u8>, [columns, rows]: [u16; 2], sample: usize) -> Result<Vec<u8>, String> {
         let pixels = usize::from(columns) * usize::from(rows);
-        if (code.len() as u64).saturating_mul(MAX_EXPANSION) < (pixels * sample) as u64 {
+        let bytes = (pixels * sample) as u64;
+        let is_small = self == Self::Jpeg2000 && bytes <= SMALL;
+        if (code.len() as u64).saturating_mul(MAX_EXPANSION) < bytes && !is_small {
             return Err(format!("{} bytes of code for {pixels} pixels", code.len()));
         }
         match self {
             Self::None => Ok(code),
             Self::Rle => rle(&code, pixels, sample),
             Self::Jpeg => jpeg(&code, [columns, rows], sample),
+            Self::Jpeg2000 => jpeg_2000(&code, [columns, rows], sample),
         }
     }
 }
@@ -111,6 +128,39 @@ fn jpeg(code: &[u8], size: [u16; 2], sample: usize) -> Result<Vec<u8>, String> {
         return Err(format!("{} × {} samples of {bytes} bytes", info.width, info.height));
     }
     decoder.decode().map_err(|error| error.to_string())
+}
+
+/// A codestream of one component.
+fn jpeg_2000(code: &[u8], size: [u16; 2], sample: usize) -> Result<Vec<u8>, String> {
+    // The decoder does not tell the sign of samples: the codestream's first segment does.
+    let &[0xff, 0x4f, 0xff, 0x51, ref segment @ ..] = code else { return Err("no codestream".to_owned()) };
+    let Some(&[0, 1, depth]) = segment.get(36..39) else { return Err("several components".to_owned()) };
+    let (is_signed, bits) = (depth & 0x80 != 0, u32::from(depth & 0x7f) + 1);
+    if bits > 16 || bits as usize > 8 * sample {
+        return Err(format!("samples of {bits} bits"));
+    }
+    let settings = DecodeSettings { strict: true, ..DecodeSettings::default() };
+    let image = Image::new(code, &settings).map_err(|error| error.to_string())?;
+    if [image.width(), image.height()] != size.map(u32::from) {
+        return Err(format!("{} × {} samples", image.width(), image.height()));
+    }
+    let mut context = DecoderContext::default();
+    let decoded = image.decode(&mut context).map_err(|error| error.to_string())?;
+    let [component] = decoded.components() else { return Err("several components".to_owned()) };
+    // The decoder gives signed samples, too, as counted from the smallest one. Lossy ones may lie beyond.
+    let least = if is_signed { 1 << (bits - 1) } else { 0 };
+    let largest = ((1_i32 << bits) - 1) as f32;
+    let numbers = component.samples().iter().map(|value| value.round().clamp(0.0, largest) as i32 - least);
+    let mut bytes = Vec::with_capacity(component.samples().len() * sample);
+    for number in numbers {
+        let number = number.to_le_bytes();
+        bytes.extend_from_slice(&number[..sample]);
+        if cfg!(target_endian = "big") {
+            let first = bytes.len() - sample;
+            bytes[first..].reverse();
+        }
+    }
+    Ok(bytes)
 }
 
 #[cfg(test)]

@@ -2,14 +2,14 @@
 //!
 //! Lengths are checked against the file before anything is kept, and what is not needed is skipped.
 
-use std::fs::File;
-use std::io::{BufReader, Read};
 use std::path::Path;
 use std::sync::Arc;
 
 use super::super::VolumeError;
 use super::super::access::Access;
-use super::super::source::{invalid, io_error};
+use super::super::format::is_bare_dicom;
+use super::super::source::invalid;
+use super::bytes::Bytes;
 use super::dataset::{Dataset, Tag, name, shown_tag, tags};
 
 const SEQUENCES: [Tag; 6] = [
@@ -25,6 +25,9 @@ const PIXELS: [Tag; 3] = [tags::FLOAT_PIXEL_DATA, tags::DOUBLE_PIXEL_DATA, tags:
 const ITEM: Tag = 0xfffe_e000;
 const ITEM_END: Tag = 0xfffe_e00d;
 const SEQUENCE_END: Tag = 0xfffe_e0dd;
+/// The transfer syntax of files that are deflated behind the elements that say so.
+const DEFLATED: &str = "1.2.840.10008.1.2.1.99";
+
 /// The length of what ends by a delimiter.
 const UNDEFINED: u32 = u32::MAX;
 
@@ -41,6 +44,8 @@ pub(super) struct Elements {
     pub(super) transfer_syntax: String,
     pub(super) big_endian: bool,
     pub(super) pixels: Option<(Tag, PixelData)>,
+    /// What comes next; in a deflated file, which has no places to go back to, native pixels.
+    pub(super) rest: Bytes,
 }
 
 /// Where pixels are in the file.
@@ -59,59 +64,63 @@ pub(super) enum PixelData {
 impl Elements {
     /// Reads what is before the pixels; what is behind them is not looked at.
     pub(super) fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
-        let mut source = access.open(path)?;
-        let length = source.left()?;
+        let (head, bytes) = Bytes::open(access.open(path)?)?;
         let mut parser = Parser {
             path: path.into(),
-            reader: source.reader,
-            at: 0,
-            length,
+            bytes,
             begun: None,
             implicit: false,
             big_endian: false,
             items: 0,
             pixels: None,
         };
-        let (_, magic) = (parser.bytes::<128>()?, parser.bytes::<4>()?);
-        if magic != *b"DICM" {
-            return Err(invalid(path, "magic", format!("\"{}\"", magic.escape_ascii()), "DICM after 128 bytes"));
+        let magic = head.get(128..132);
+        if magic == Some(b"DICM") {
+            parser.bytes.skip(132)?;
+        } else if !is_bare_dicom(&head) {
+            let magic = magic.map_or("the end of the file".to_owned(), |magic| format!("\"{}\"", magic.escape_ascii()));
+            return Err(invalid(path, "magic", magic, "DICM after 128 bytes, or elements from the first byte on"));
         }
         let mut meta = parser.empty();
-        while parser.at < length {
-            let tag = parser.bytes::<4>()?;
+        while !parser.bytes.is_at_end()? {
+            let tag = parser.bytes.take::<4>()?;
             parser.begun = Some(tag);
             // Whichever order the rest is in: this part is little-endian.
             if tag[..2] != [2, 0] {
                 break;
             }
             let header = parser.header()?;
-            parser.value(&header, length, &mut meta)?;
+            parser.value(&header, u64::MAX, &mut meta)?;
         }
-        let transfer_syntax = meta
-            .text(tags::TRANSFER_SYNTAX)
-            .ok_or_else(|| meta.missing(tags::TRANSFER_SYNTAX, "how the file is encoded"))?;
+        let transfer_syntax = match meta.text(tags::TRANSFER_SYNTAX) {
+            Some(syntax) => syntax,
+            // Without these elements the file has the default encoding, or, where elements say their types, the other one.
+            None if head.starts_with(&[8, 0]) => {
+                let is_explicit = head.get(4..6).is_some_and(|kind| kind.iter().all(u8::is_ascii_uppercase));
+                if is_explicit { "1.2.840.10008.1.2.1" } else { "1.2.840.10008.1.2" }.to_owned()
+            }
+            None => return Err(meta.missing(tags::TRANSFER_SYNTAX, "how the file is encoded")),
+        };
         (parser.implicit, parser.big_endian) = match transfer_syntax.as_str() {
             "1.2.840.10008.1.2" => (true, false),
             "1.2.840.10008.1.2.2" => (false, true),
-            "1.2.840.10008.1.2.1.99" => {
-                let allowed = "encodings that do not compress the whole file";
-                return Err(meta.invalid(tags::TRANSFER_SYNTAX, &transfer_syntax, allowed));
-            }
             _ => (false, false),
         };
-        let mut data = parser.elements(length, 0)?;
+        if transfer_syntax == DEFLATED {
+            let begun = parser.begun.take();
+            parser.bytes = parser.bytes.inflated(begun.as_ref().map_or(&[], |begun| begun))?;
+        }
+        let mut data = parser.elements(u64::MAX, 0)?;
         data.values.extend(meta.values);
-        Ok(Self { data, transfer_syntax, big_endian: parser.big_endian, pixels: parser.pixels })
+        let Parser { big_endian, pixels, bytes, .. } = parser;
+        Ok(Self { data, transfer_syntax, big_endian, pixels, rest: bytes })
     }
 }
 
 struct Parser {
     path: Arc<Path>,
-    reader: BufReader<File>,
-    /// Where the reader is, but for `begun`.
-    at: u64,
-    /// Of the file.
-    length: u64,
+    /// What is behind `begun`.
+    bytes: Bytes,
     /// The tag of the next element, if it is read already.
     begun: Option<[u8; 4]>,
     implicit: bool,
@@ -136,33 +145,18 @@ impl Parser {
         Dataset::new(self.path.clone(), self.big_endian)
     }
 
-    fn bytes<const N: usize>(&mut self) -> Result<[u8; N], VolumeError> {
-        let mut bytes = [0; N];
-        if self.length - self.at < N as u64 {
-            return Err(invalid(&self.path, "elements", "the end of the file", "whole elements"));
-        }
-        self.reader.read_exact(&mut bytes).map_err(io_error(&self.path))?;
-        self.at += N as u64;
-        Ok(bytes)
-    }
-
     fn u16(&mut self) -> Result<u16, VolumeError> {
-        let bytes = self.bytes()?;
+        let bytes = self.bytes.take()?;
         Ok(if self.big_endian { u16::from_be_bytes(bytes) } else { u16::from_le_bytes(bytes) })
     }
 
     fn u32(&mut self) -> Result<u32, VolumeError> {
-        let bytes = self.bytes()?;
+        let bytes = self.bytes.take()?;
         Ok(if self.big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) })
     }
 
-    fn skip(&mut self, bytes: u64) -> Result<(), VolumeError> {
-        self.at += bytes;
-        self.reader.seek_relative(bytes as i64).map_err(io_error(&self.path))
-    }
-
     fn header(&mut self) -> Result<Header, VolumeError> {
-        let [a, b, c, d] = self.begun.take().map_or_else(|| self.bytes(), Ok)?;
+        let [a, b, c, d] = self.begun.take().map_or_else(|| self.bytes.take(), Ok)?;
         let tag = if self.big_endian { [a, b, c, d] } else { [b, a, d, c] };
         let tag = Tag::from_be_bytes(tag);
         let mut header = Header { tag, is_sequence: false, is_unknown: false, in_words: false, length: 0 };
@@ -172,7 +166,7 @@ impl Parser {
             header.length = self.u32()?;
             return Ok(header);
         }
-        let kind = self.bytes::<2>()?;
+        let kind = self.bytes.take::<2>()?;
         if !kind.iter().all(u8::is_ascii_uppercase) {
             let found = format!("the type \"{}\"", kind.escape_ascii());
             return Err(invalid(&self.path, &shown_tag(tag), found, "a type of two letters"));
@@ -182,7 +176,7 @@ impl Parser {
         header.in_words = kind == *b"OW";
         let is_long = [b"OB", b"OD", b"OF", b"OL", b"OV", b"OW", b"SQ", b"SV", b"UC", b"UN", b"UR", b"UT", b"UV"];
         header.length = if is_long.contains(&&kind) {
-            self.bytes::<2>()?;
+            self.bytes.take::<2>()?;
             self.u32()?
         } else {
             self.u16()?.into()
@@ -201,7 +195,7 @@ impl Parser {
                 format!("{MAX_DEPTH} of them"),
             ));
         }
-        while self.at < end || self.begun.is_some() {
+        while self.begun.is_some() || self.bytes.at() < end && !self.bytes.is_at_end()? {
             let header = self.header()?;
             if header.tag == ITEM_END && depth > 0 {
                 break;
@@ -224,17 +218,16 @@ impl Parser {
         let &Header { tag, length, .. } = header;
         self.check_length(header, end)?;
         if name(tag).is_none() || length > MAX_VALUE {
-            return self.skip(length.into());
+            return self.bytes.skip(length.into());
         }
         let mut value = vec![0; length as usize];
-        self.reader.read_exact(&mut value).map_err(io_error(&self.path))?;
-        self.at += u64::from(length);
+        self.bytes.read(&mut value)?;
         data.values.insert(tag, value);
         Ok(())
     }
 
     fn check_length(&self, header: &Header, end: u64) -> Result<(), VolumeError> {
-        let left = end.min(self.length).saturating_sub(self.at);
+        let left = end.saturating_sub(self.bytes.at()).min(self.bytes.at_most());
         if u64::from(header.length) <= left {
             return Ok(());
         }
@@ -251,15 +244,15 @@ impl Parser {
         } else {
             self.check_length(header, end)?;
             if !is_kept {
-                return self.skip(length.into());
+                return self.bytes.skip(length.into());
             }
-            self.at + u64::from(length)
+            self.bytes.at() + u64::from(length)
         };
         // Of unknown type, a sequence is encoded as if no element said its type.
         let implicit = self.implicit;
         self.implicit |= header.is_unknown;
         let mut items = Vec::new();
-        while self.at < end {
+        while self.bytes.at() < end {
             let item = self.header()?;
             match item.tag {
                 SEQUENCE_END => break,
@@ -270,7 +263,7 @@ impl Parser {
                 end
             } else {
                 self.check_length(&item, end)?;
-                self.at + u64::from(item.length)
+                self.bytes.at() + u64::from(item.length)
             };
             let item = self.elements(item_end, depth + 1)?;
             if is_kept {
@@ -291,8 +284,8 @@ impl Parser {
 
     fn pixels(&mut self, header: &Header) -> Result<PixelData, VolumeError> {
         if header.length != UNDEFINED {
-            self.check_length(header, self.length)?;
-            let (at, bytes) = (self.at, header.length.into());
+            self.check_length(header, u64::MAX)?;
+            let (at, bytes) = (self.bytes.at(), header.length.into());
             return Ok(PixelData::Native { at, bytes, in_words: header.in_words });
         }
         let mut fragments = Vec::new();
@@ -303,9 +296,9 @@ impl Parser {
                 ITEM => {}
                 other => return Err(invalid(&self.path, &shown_tag(header.tag), shown_tag(other), "fragments")),
             }
-            self.check_length(&item, self.length)?;
-            fragments.push([self.at, item.length.into()]);
-            self.skip(item.length.into())?;
+            self.check_length(&item, u64::MAX)?;
+            fragments.push([self.bytes.at(), item.length.into()]);
+            self.bytes.skip(item.length.into())?;
         }
         // The first one is the table of offsets.
         fragments.drain(..fragments.len().min(1));

@@ -26,6 +26,8 @@ pub(super) struct Image {
     pub(super) frames: Vec<Frame>,
     codec: Codec,
     data: PixelData,
+    /// All native pixels, of a deflated file.
+    inflated: Option<Vec<u8>>,
 }
 
 /// Of every frame of an image.
@@ -37,6 +39,8 @@ pub(super) struct Pixels {
     /// How many of a sample's bits count, from the lowest one.
     bits: u16,
     big_endian: bool,
+    /// Whether the smallest sample is white.
+    is_inverted: bool,
 }
 
 /// Where a frame lies, in LPS and millimetres.
@@ -57,13 +61,13 @@ pub(super) struct Frame {
 impl Image {
     /// Reads what is before the pixels; `None` if the file is no image.
     pub(super) fn open(path: &Path, access: &Access) -> Result<Option<Self>, VolumeError> {
-        let Elements { data, transfer_syntax, big_endian, pixels } = Elements::read(path, access)?;
+        let Elements { data, transfer_syntax, big_endian, pixels, mut rest } = Elements::read(path, access)?;
         let Some((tag, pixel_data)) = pixels else { return Ok(None) };
         if data.text(tags::MEDIA_SOP_CLASS).as_deref() == Some(DIRECTORY) {
             return Ok(None);
         }
-        let codec = Codec::of(&transfer_syntax)
-            .ok_or_else(|| data.invalid(tags::TRANSFER_SYNTAX, &transfer_syntax, Codec::ALLOWED))?;
+        let codec =
+            Codec::of(&transfer_syntax).map_err(|found| data.invalid(tags::TRANSFER_SYNTAX, found, Codec::ALLOWED))?;
         let pixels = Pixels::of(&data, tag, big_endian)?;
         if let PixelData::Native { in_words: true, .. } = pixel_data
             && big_endian
@@ -77,6 +81,14 @@ impl Image {
         }
         let count = count as usize;
         pixels.check(&data, tag, &pixel_data, count, codec)?;
+        let frames = frames(&data, count)?;
+        let inflated = match &pixel_data {
+            PixelData::Native { bytes, .. } if rest.is_inflated() => {
+                access.reserve(path, "PixelData", format!("{count} inflated frames"), *bytes)?;
+                Some(rest.read_up_to(*bytes)?)
+            }
+            _ => None,
+        };
         Ok(Some(Self {
             path: path.to_owned(),
             series: data.text(tags::SERIES).unwrap_or_default(),
@@ -85,47 +97,58 @@ impl Image {
                 .filter_map(|tag| data.text(tag))
                 .collect::<Vec<_>>()
                 .join(" "),
-            frames: frames(&data, count)?,
+            frames,
             pixels,
             codec,
             data: pixel_data,
+            inflated,
         }))
     }
 
     /// A frame's samples, in the machine's byte order.
     pub(super) fn frame(&self, index: usize, access: &Access) -> Result<Vec<u8>, VolumeError> {
-        let mut file = access.open(&self.path)?;
-        let mut read = |at: u64, bytes: u64, into: &mut Vec<u8>| {
-            file.reader.seek(SeekFrom::Start(at)).map_err(io_error(&self.path))?;
-            let read = file.reader.by_ref().take(bytes).read_to_end(into).map_err(io_error(&self.path))?;
-            if read as u64 == bytes {
-                return Ok(());
+        let Pixels { columns, rows, kind, .. } = self.pixels;
+        let size = self.pixels.bytes();
+        let mut bytes = match (&self.data, &self.inflated) {
+            (PixelData::Native { .. }, Some(all)) => {
+                let of_frame = all.chunks(size as usize).nth(index).unwrap_or_default();
+                self.check_read(of_frame.len(), size)?;
+                of_frame.to_vec()
             }
-            Err(invalid(&self.path, "PixelData", format!("{read} bytes of a frame"), format!("{bytes} bytes")))
-        };
-        let mut bytes = Vec::new();
-        match &self.data {
-            PixelData::Native { at, .. } => {
-                let size = self.pixels.bytes();
-                read(at + index as u64 * size, size, &mut bytes)?;
-                if self.pixels.big_endian != cfg!(target_endian = "big") {
-                    bytes.chunks_exact_mut(self.pixels.kind.bytes() as usize).for_each(<[u8]>::reverse);
-                }
-            }
-            PixelData::Fragments(fragments) => {
+            (&PixelData::Native { at, .. }, None) => self.read(&[[at + index as u64 * size, size]], access)?,
+            (PixelData::Fragments(fragments), _) => {
                 // A single frame may be in several of them.
                 let of_frame = if self.frames.len() == 1 { fragments } else { &fragments[index..=index] };
-                for &[at, length] in of_frame {
-                    read(at, length, &mut bytes)?;
-                }
-                let Pixels { columns, rows, kind, .. } = self.pixels;
-                bytes = self.codec.decode(bytes, [columns, rows], kind.bytes() as usize).map_err(|found| {
+                let code = self.read(of_frame, access)?;
+                self.codec.decode(code, [columns, rows], kind.bytes() as usize).map_err(|found| {
                     invalid(&self.path, "PixelData", found, format!("a frame of {columns} × {rows} {kind}"))
-                })?;
+                })?
             }
+        };
+        if self.codec == Codec::None && self.pixels.big_endian != cfg!(target_endian = "big") {
+            bytes.chunks_exact_mut(kind.bytes() as usize).for_each(<[u8]>::reverse);
         }
-        self.pixels.clear_unused_bits(&mut bytes);
+        self.pixels.make_numbers(&mut bytes);
         Ok(bytes)
+    }
+
+    /// The bytes of some stretches of the file, each given by its first byte and its length.
+    fn read(&self, stretches: &[[u64; 2]], access: &Access) -> Result<Vec<u8>, VolumeError> {
+        let mut file = access.open(&self.path)?;
+        let mut all = Vec::new();
+        for &[at, bytes] in stretches {
+            file.reader.seek(SeekFrom::Start(at)).map_err(io_error(&self.path))?;
+            let read = file.reader.by_ref().take(bytes).read_to_end(&mut all).map_err(io_error(&self.path))?;
+            self.check_read(read, bytes)?;
+        }
+        Ok(all)
+    }
+
+    fn check_read(&self, read: usize, bytes: u64) -> Result<(), VolumeError> {
+        if read as u64 == bytes {
+            return Ok(());
+        }
+        Err(invalid(&self.path, "PixelData", format!("{read} bytes of a frame"), format!("{bytes} bytes")))
     }
 }
 
@@ -143,9 +166,15 @@ impl Pixels {
             return Err(data.invalid(tags::SAMPLES_PER_PIXEL, samples, "1"));
         }
         let photometric = data.text(tags::PHOTOMETRIC).unwrap_or_default();
-        if !photometric.starts_with("MONOCHROME") {
-            return Err(data.invalid(tags::PHOTOMETRIC, photometric, "MONOCHROME1 or MONOCHROME2"));
-        }
+        let is_inverted = match photometric.as_str() {
+            // Of floats nobody knows what white is.
+            "MONOCHROME1" if tag == tags::PIXEL_DATA => true,
+            "MONOCHROME2" => false,
+            _ => {
+                let allowed = "MONOCHROME2, or, of whole numbers, MONOCHROME1";
+                return Err(data.invalid(tags::PHOTOMETRIC, photometric, allowed));
+            }
+        };
         let allocated = required(tags::BITS_ALLOCATED)?;
         let is_signed = data.unsigned(tags::PIXEL_REPRESENTATION)?.unwrap_or(0) == 1;
         let kind = match (tag, allocated, is_signed) {
@@ -160,7 +189,7 @@ impl Pixels {
             _ => return Err(data.invalid(tags::BITS_ALLOCATED, allocated, "8, 16 or 32, of floats 32 or 64")),
         };
         if tag != tags::PIXEL_DATA {
-            return Ok(Self { columns, rows, kind, bits: allocated, big_endian });
+            return Ok(Self { columns, rows, kind, bits: allocated, big_endian, is_inverted });
         }
         let bits = data.unsigned(tags::BITS_STORED)?.unwrap_or(allocated);
         if !(1..=allocated).contains(&bits) {
@@ -170,7 +199,7 @@ impl Pixels {
         if high != bits - 1 {
             return Err(data.invalid(tags::HIGH_BIT, high, format!("{}, the highest of {bits}", bits - 1)));
         }
-        Ok(Self { columns, rows, kind, bits, big_endian })
+        Ok(Self { columns, rows, kind, bits, big_endian, is_inverted })
     }
 
     /// Of a frame.
@@ -210,26 +239,29 @@ impl Pixels {
         }
     }
 
-    /// Sets the bits above those that count to what the number means; other things may be there.
-    fn clear_unused_bits(&self, bytes: &mut [u8]) {
+    /// Inverts samples whose smallest is white, and sets the bits above those that count, where other things may be, to what the number
+    /// means.
+    fn make_numbers(&self, bytes: &mut [u8]) {
         let shift = 8 * self.kind.bytes() as u32 - u32::from(self.bits);
-        if shift == 0 {
+        if shift == 0 && !self.is_inverted {
             return;
         }
-        macro_rules! clear {
-            ($type:ty) => {
+        macro_rules! make {
+            ($type:ty) => {{
+                // Without its sign, or with it, an inverted number is the one of all other bits.
+                let inverse = if self.is_inverted { !0 } else { 0 };
                 for sample in bytes.as_chunks_mut().0 {
-                    *sample = (<$type>::from_ne_bytes(*sample) << shift >> shift).to_ne_bytes();
+                    *sample = ((<$type>::from_ne_bytes(*sample) ^ inverse) << shift >> shift).to_ne_bytes();
                 }
-            };
+            }};
         }
         match self.kind {
-            SampleType::U8 => clear!(u8),
-            SampleType::I8 => clear!(i8),
-            SampleType::U16 => clear!(u16),
-            SampleType::I16 => clear!(i16),
-            SampleType::U32 => clear!(u32),
-            SampleType::I32 => clear!(i32),
+            SampleType::U8 => make!(u8),
+            SampleType::I8 => make!(i8),
+            SampleType::U16 => make!(u16),
+            SampleType::I16 => make!(i16),
+            SampleType::U32 => make!(u32),
+            SampleType::I32 => make!(i32),
             SampleType::U64 | SampleType::I64 | SampleType::F32 | SampleType::F64 => {}
         }
     }

@@ -1,11 +1,12 @@
 //! DICOM: a folder with the slices of one series, or one file of one or more frames.
 //!
-//! Slices are ordered, and spaced, by where they lie along their normal. They must lie on a rectilinear grid. Values are after each
-//! slice's own rescale slope and intercept.
+//! Slices are ordered, and spaced, by where they lie along their normal, and must lie on one line; if that leaves the normal, the
+//! volume is sheared, as by a tilted gantry. Values are after each slice's own rescale slope and intercept.
 //!
 //! Files are parsed here, not by `dicom-object` and `dicom-pixeldata`: these allocate whatever length an element states, recurse as
 //! deep as sequences nest, and index past the end of damaged frames.
 
+mod bytes;
 mod codecs;
 mod dataset;
 mod elements;
@@ -50,7 +51,7 @@ pub(super) fn read_folder<T: Voxel>(
 }
 
 fn assemble<T: Voxel>(path: &Path, images: Vec<Image>, access: &Access) -> Result<Loaded<T>, VolumeError> {
-    let Series { slices, spacing, axes } = Series::of(path, &images)?;
+    let Series { slices, lattice } = Series::of(path, &images)?;
     let first = &images[slices[0].image];
     let sizes = [u64::from(first.pixels.columns), u64::from(first.pixels.rows), slices.len() as u64];
     let dims = dims_of(sizes).ok_or_else(|| invalid(path, "Rows, Columns, slices", format!("{sizes:?}"), SIZES))?;
@@ -70,7 +71,8 @@ fn assemble<T: Voxel>(path: &Path, images: Vec<Image>, access: &Access) -> Resul
     }
     values.shrink_to_fit();
     let origin = RAS_FROM_LPS * slices[0].position;
-    let orientation = Some(Orientation { axes: DMat3::from_diagonal(RAS_FROM_LPS) * axes, origin });
-    let unit = Some("mm".to_owned());
-    Ok(Loaded { spacing: Some(spacing), unit, orientation, ..Loaded::new(dims, kind, values) })
+    let orientation = Some(Orientation { axes: DMat3::from_diagonal(RAS_FROM_LPS) * lattice.axes, origin });
+    let (spacing, unit) = (Some(lattice.spacing), Some("mm".to_owned()));
+    let loaded = Loaded { spacing, unit, orientation, ..Loaded::new(dims, kind, values) };
+    lattice.straighten(path, series::POSITION, loaded, access)
 }

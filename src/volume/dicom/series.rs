@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 use super::super::VolumeError;
 use super::super::orientation::{lengths_and_directions, orthogonal};
+use super::super::shear::{self, Lattice};
 use super::super::source::invalid;
 use super::image::{Frame, Image};
 
@@ -14,10 +15,15 @@ use super::image::{Frame, Image};
 const SAME: f64 = 1e-4;
 /// The part of a step that positions may be off without a word.
 const EVEN: f64 = 0.01;
-/// The part of a pixel that slices may be off sideways.
-const STRAIGHT: f64 = 0.05;
+/// The part of a pixel that slices may be off their line sideways.
+const STRAIGHT: f64 = 0.5;
+/// The part of a pixel that slices may be off their line without a word.
+const EXACT: f64 = 0.01;
 /// Steps larger than this many usual ones are gaps.
 const GAP: f64 = 1.5;
+
+/// The element that says where a slice lies.
+pub(super) const POSITION: &str = "ImagePositionPatient";
 
 /// Refuses files of several series, and lists these.
 pub(super) fn check_one(folder: &Path, images: &[Image]) -> Result<(), VolumeError> {
@@ -48,9 +54,8 @@ pub(super) struct Slice {
 /// All frames of a volume, along its z axis.
 pub(super) struct Series {
     pub(super) slices: Vec<Slice>,
-    pub(super) spacing: DVec3,
-    /// The directions of x, y and z, in LPS.
-    pub(super) axes: DMat3,
+    /// In LPS.
+    pub(super) lattice: Lattice,
 }
 
 impl Series {
@@ -91,22 +96,44 @@ impl Series {
                 let [one, next] = [&slices[at], &slices[at + 1]].map(name);
                 let found = format!("{step:.4} mm between {one} and {next}, {usual:.4} mm between others");
                 let allowed = "slices at even distances, one at each place";
-                return Err(invalid(path, "ImagePositionPatient", found, allowed));
+                return Err(invalid(path, POSITION, found, allowed));
             }
         };
-        // How far slices are off the line through the first one, along the normal.
+        let spacing = DVec3::new(x, y, z);
         let sideways = |slice: &Slice| {
             let offset = slice.position - slices[0].position;
-            (offset - offset.dot(axes.z_axis) * axes.z_axis).length()
+            offset - offset.dot(axes.z_axis) * axes.z_axis
         };
-        if let Some(slice) = slices.iter().max_by(|a, b| sideways(a).total_cmp(&sideways(b)))
-            && sideways(slice) > STRAIGHT * x.min(y)
-        {
-            let found =
-                format!("a sheared stack, {} being {:.4} mm off (a tilted gantry?)", name(slice), sideways(slice));
-            return Err(invalid(path, "ImagePositionPatient", found, "slices straight above one another"));
+        // The slice that is farthest off a line from the first slice on, which leaves the normal by `drift` from slice to slice.
+        let farthest = |drift: DVec3| {
+            let off = |(i, slice)| ((sideways(slice) - i as f64 * drift).length(), slice);
+            slices.iter().enumerate().map(off).fold((0.0, &slices[0]), |a, b| if b.0 > a.0 { b } else { a })
+        };
+        let pixel = x.min(y);
+        let (mut off, mut slice) = farthest(DVec3::ZERO);
+        let mut lattice = Lattice::straight(spacing, axes);
+        if off > STRAIGHT * pixel {
+            // A tilted gantry, if at all: the line is through the first and the last slice.
+            let last = slices.len() - 1;
+            let drift = sideways(&slices[last]) / last as f64;
+            (off, slice) = farthest(drift);
+            if off > STRAIGHT * pixel {
+                let found = format!("{}, {off:.4} mm off the line through the first and the last slice", name(slice));
+                return Err(invalid(
+                    path,
+                    POSITION,
+                    found,
+                    format!("slices on one line, to half a pixel of {pixel} mm"),
+                ));
+            }
+            let steps = [x * axes.x_axis, y * axes.y_axis, z * axes.z_axis + drift];
+            lattice = Lattice::of(steps).map_err(|found| invalid(path, POSITION, found, shear::allowed()))?;
         }
-        Ok(Self { slices, spacing: DVec3::new(x, y, z), axes })
+        if off > EXACT * pixel {
+            let (path, name) = (path.display(), name(slice));
+            log::warn!("{path}: slices are not quite on one line: {name} is {off:.4} mm off, the largest error");
+        }
+        Ok(Self { slices, lattice })
     }
 }
 

@@ -45,7 +45,7 @@ pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<L
         check_rest(path, access, file.left()?, &samples)?;
         Stream::raw(file)?
     };
-    let loaded = Loaded::new(dims, kind, stream.samples(&samples, true)?);
+    let loaded = Loaded::new(dims, kind, stream.samples(&samples, !is_text)?);
     Ok(Loaded { spacing, ..loaded })
 }
 

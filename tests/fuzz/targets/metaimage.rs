@@ -1,5 +1,3 @@
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    sheetsplat_fuzz::volume("volume.mha", bytes, sheetsplat::Volume::open);
-});
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| sheetsplat_fuzz::run("metaimage", bytes));

@@ -1,5 +1,3 @@
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    sheetsplat_fuzz::volume("volume.nii", bytes, sheetsplat::Volume::open);
-});
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| sheetsplat_fuzz::run("nifti", bytes));

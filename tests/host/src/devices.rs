@@ -4,6 +4,7 @@ use sheetsplat::internals::gpu::device::{DeviceError, InsufficientLimit, TILE_FE
 use sheetsplat::{Blend, DeviceRequirements, Renderer, RendererOptions};
 use wgpu::{Features, Limits, TextureFormat};
 
+use crate::compare::{assert_at_most, largest};
 use crate::{Host, OPAQUE, TRANSPARENT, pixels, scene};
 
 const F32: TextureFormat = TextureFormat::Rgba32Float;
@@ -38,9 +39,9 @@ fn the_least_device_and_webgpus_defaults_do() {
                     pixels(&host.render(&renderer, F32, &mut host.view(&scene)))
                 });
                 let channels = images[0].as_flattened().iter().zip(images[1].as_flattened());
-                let most = channels.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+                let most = largest(channels.map(|(a, b)| f64::from(*a) - f64::from(*b)));
                 // Sheets are f16 ones there.
-                assert!(most < 0.02, "{key} {value} {features:?}: {most}");
+                assert_at_most(most, 0.02, format_args!("{key} {value} {features:?}"));
             }
         }
     }

@@ -2,6 +2,9 @@
 #![cfg(test)]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+#[expect(dead_code, reason = "the host needs few of them")]
+#[path = "../../common/compare.rs"]
+mod compare;
 mod dependencies;
 mod depth;
 mod devices;

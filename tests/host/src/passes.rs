@@ -3,6 +3,7 @@
 use sheetsplat::{Blend, Placement, RendererOptions, SceneView};
 use wgpu::{Color, LoadOp, Operations, StoreOp, Texture, TextureFormat, TextureView};
 
+use crate::compare::{assert_at_most, largest};
 use crate::{F16, Host, OPAQUE, TRANSPARENT, f16, headless, pixels, scene, size};
 
 const F32: TextureFormat = TextureFormat::Rgba32Float;
@@ -21,9 +22,10 @@ fn over(image: [f32; 4], target: [f32; 4]) -> [f32; 4] {
     [0, 1, 2, 3].map(|channel| image[channel] + (1.0 - image[3]) * target[channel])
 }
 
+#[track_caller]
 fn assert_near(actual: [f32; 4], expected: [f32; 4], tolerance: f32, what: &str) {
-    let near = actual.into_iter().zip(expected).all(|(actual, expected)| (actual - expected).abs() <= tolerance);
-    assert!(near, "{what}: {actual:?}, not {expected:?}");
+    let error = largest(actual.into_iter().zip(expected).map(|(a, b)| f64::from(a) - f64::from(b)));
+    assert_at_most(error, tolerance.into(), format_args!("{what}: {actual:?}, not {expected:?}"));
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use sheetsplat::{Blend, RendererOptions};
 use wgpu::TextureFormat;
 
+use crate::compare::assert_at_most;
 use crate::{F16, Host, OPAQUE, f16, headless, pixels, scene};
 
 /// Half-transparent: every pixel's colour is premultiplied by something else.
@@ -52,7 +53,8 @@ fn unorm_targets_round() {
         for (actual, expected) in actual.as_chunks::<4>().0.iter().zip(&expected) {
             for (at, channel) in order.into_iter().enumerate() {
                 let exact = f64::from(expected[channel]).min(1.0) * 255.0;
-                assert!((f64::from(actual[at]) - exact).abs() < 0.501, "{format:?}: {actual:?}, not {expected:?}");
+                let error = (f64::from(actual[at]) - exact).abs();
+                assert_at_most(error, 0.501, format_args!("{format:?}: {actual:?}, not {expected:?}"));
             }
         }
     }
@@ -70,7 +72,8 @@ fn f16_targets_round() {
             for (actual, expected) in actual.map(f16).into_iter().zip(expected) {
                 // And what a power costs in f32.
                 let allowed = expected * (F16 + 1e-5) + 1e-7;
-                assert!((actual - expected).abs() <= allowed, "linear {is_linear}: {actual}, not {expected}");
+                let what = format_args!("linear {is_linear}: {actual}, not {expected}");
+                assert_at_most((actual - expected).abs(), allowed, what);
             }
         }
     }
@@ -88,7 +91,8 @@ fn srgb_targets_show_the_same_bytes() {
         for (actual, expected) in actual.as_chunks::<4>().0.iter().zip(&expected) {
             for (at, channel) in order.into_iter().enumerate() {
                 let exact = f64::from(expected[channel]).min(1.0) * 255.0;
-                assert!((f64::from(actual[at]) - exact).abs() < SRGB_STEPS, "{format:?}: {actual:?}, not {expected:?}");
+                let error = (f64::from(actual[at]) - exact).abs();
+                assert_at_most(error, SRGB_STEPS, format_args!("{format:?}: {actual:?}, not {expected:?}"));
             }
         }
     }

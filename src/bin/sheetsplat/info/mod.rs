@@ -6,7 +6,9 @@ use std::fmt::Write;
 
 use glam::DVec3;
 use serde::{Serialize, Serializer};
-use sheetsplat::appearance::quantiles;
+use sheetsplat::appearance::{Preset, quantiles};
+use sheetsplat::scene::Scene;
+use sheetsplat::settings::{Camera, Projection};
 use sheetsplat::volume::{Orientation, SampleType, Volume};
 
 use crate::arguments::Input;
@@ -59,6 +61,29 @@ struct Info {
     mean: f64,
     #[serde(serialize_with = "as_map")]
     percentiles: [f64; PERCENTILES.len()],
+    frame: Frame,
+    /// The preset that fits, if one does.
+    preset: Option<&'static str>,
+}
+
+/// What the camera shows: world units, from the volume's centre.
+#[derive(Serialize)]
+struct Frame {
+    center: [f64; 3],
+    /// Over the image's height; `None` in perspective.
+    height: Option<f64>,
+    /// From the eye to the centre; `None` unless in perspective.
+    distance: Option<f64>,
+}
+
+impl Frame {
+    fn of(camera: &Camera) -> Self {
+        let center = camera.middle().to_array();
+        match camera.projection {
+            Projection::Orthographic { height } => Self { center, height, distance: None },
+            Projection::Perspective { distance, .. } => Self { center, height: None, distance },
+        }
+    }
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -66,6 +91,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let scene = input.scene()?;
     let outputs = Outputs::check(&[], true, &input.files(&scene))?;
     let volume = input.load_volume(&scene, &outputs)?;
+    let scene = input.settled(&volume, &scene, Scene::explicit)?;
+    let suggested = Preset::suggested(&volume);
     let [min, max, mean] = extent_and_mean(volume.values());
     let percentiles = quantiles(volume.values(), |_| true, PERCENTILES.map(|(percent, _)| percent / 100.0));
     let encoding = volume.encoding();
@@ -80,6 +107,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         max,
         mean,
         percentiles: percentiles.unwrap_or_default().map(f64::from),
+        frame: Frame::of(&scene.camera),
+        preset: Preset::ALL.iter().find(|(_, preset)| suggested == Some(*preset)).map(|(name, _)| *name),
     };
     let text = if arguments.json {
         serde_json::to_string(&info).map_err(|error| Failure::Other(error.to_string()))? + "\n"
@@ -108,6 +137,14 @@ fn described(info: &Info, volume: &Volume) -> String {
         line("holes", format!("{} samples are NaN or infinite", info.holes));
     }
     line("range", format!("{} to {}, mean {}", short(info.min), short(info.max), short(info.mean)));
+    let [x, y, z] = info.frame.center.map(short);
+    let (name, length) = match info.frame.distance {
+        Some(distance) => ("distance", Some(distance)),
+        None => ("height", info.frame.height),
+    };
+    let length = length.map_or(String::new(), |length| format!(", {name} {}", short(length)));
+    line("frame", format!("center {x}, {y}, {z}{length} {}", info.unit.as_deref().unwrap_or("(no unit)")));
+    line("preset", info.preset.unwrap_or("none fits: the values decide").to_owned());
     for (&(_, name), &value) in PERCENTILES.iter().zip(&info.percentiles) {
         line(&format!("{name:>9} %"), short(value));
     }

@@ -15,7 +15,7 @@ use sheetsplat::scene::Scene;
 use sheetsplat::volume::Volume;
 
 use crate::annotate::{Annotate, Overlay};
-use crate::arguments::{Depth, Input, log_frame, parse_degrees};
+use crate::arguments::{Depth, Input, check_scene_file, log_frame, parse_degrees, scene_file};
 use crate::failure::Failure;
 use crate::outputs::{self, Outputs};
 use crate::progress::Progress;
@@ -46,6 +46,10 @@ pub(crate) struct Arguments {
     /// Draw only these of all frames, counted from 0, without B: parts of a movie can be drawn anywhere and at any time.
     #[arg(long, value_name = "A..B", value_parser = parse_frames)]
     frames: Option<Range<u32>>,
+    /// Write the scene as a scene file, with what presets, colour maps and the volume made of it: `render` draws the first frame from it,
+    /// and with camera.direction turned any other.
+    #[arg(long, value_name = "FILE")]
+    save_scene: Option<PathBuf>,
     /// Draw numbered images again that are there.
     #[arg(long)]
     overwrite: bool,
@@ -75,6 +79,9 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
         return Err(Failure::Input(format!("--frames: found {start}..{end}, allowed: within 0..{count} (--count)")));
     }
     arguments.annotate.check_format(output)?;
+    if let Some(path) = &arguments.save_scene {
+        check_scene_file(path)?;
+    }
     let format = if output == Path::new("-") { Some(Format::Y4m) } else { Format::of(output) };
     let scene = input.scene()?;
     if let Some(format) = format {
@@ -86,13 +93,15 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
     })?;
     Image::check_format(output)?;
     let wanted = frames.len();
-    let named = frames.clone().map(|frame| ("--output", pattern.path(frame)));
+    let scene_file = arguments.save_scene.iter().map(|path| ("--save-scene", path.clone()));
+    let named = frames.clone().map(|frame| ("--output", pattern.path(frame))).chain(scene_file);
     let outputs = Outputs::distinct(named, false)?;
     outputs.refuse(&input.files(&scene))?;
     let frames: Vec<u32> = frames.filter(|&frame| *overwrite || !pattern.path(frame).exists()).collect();
     log::info!("{} of {wanted} frames are there already", wanted - frames.len());
     frames.iter().try_for_each(|&frame| outputs::check_writable(&pattern.path(frame)))?;
-    if frames.is_empty() {
+    arguments.save_scene.iter().try_for_each(|path| outputs::check_writable(path))?;
+    if frames.is_empty() && arguments.save_scene.is_none() {
         return Ok(());
     }
     let shown = Shown::load(arguments, scene, &outputs)?;
@@ -120,8 +129,10 @@ fn movie(
     format.check(&settings).map_err(|message| Failure::Input(format!("{}: {message}", input.name)))?;
     let frames: Vec<u32> = frames.collect();
     let is_printed = output == Path::new("-");
-    let named = [("--output", output.as_path())];
-    let outputs = Outputs::check(if is_printed { &[] } else { &named }, is_printed, &input.files(&scene))?;
+    let output_file = (!is_printed).then_some(("--output", output.as_path()));
+    let scene_file = arguments.save_scene.as_deref().map(|path| ("--save-scene", path));
+    let named: Vec<_> = output_file.into_iter().chain(scene_file).collect();
+    let outputs = Outputs::check(&named, is_printed, &input.files(&scene))?;
     // Before anything is written: the files that were read are known then.
     let shown = Shown::load(arguments, scene, &outputs)?;
     let encode = |to: &mut dyn Write, failed: &dyn Fn(io::Error) -> Failure| {
@@ -146,10 +157,10 @@ struct Shown {
 }
 
 impl Shown {
-    fn load(arguments: &Arguments, mut scene: Scene, outputs: &Outputs) -> Result<Self, Failure> {
+    fn load(arguments: &Arguments, scene: Scene, outputs: &Outputs) -> Result<Self, Failure> {
         let Arguments { input, annotate, .. } = arguments;
         let volume = input.load_volume(&scene, outputs)?;
-        input.look_at(&volume, &mut scene)?;
+        let scene = input.settled(&volume, &scene, Scene::explicit_all_around)?;
         let overlay = annotate.overlay(&scene, &volume)?;
         Ok(Self { scene, volume, overlay })
     }
@@ -162,7 +173,7 @@ impl Shown {
         progress: bool,
         mut take: impl FnMut(u32, &Image) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        let Arguments { input, turn, count, .. } = arguments;
+        let Arguments { input, turn, count, save_scene, .. } = arguments;
         let Self { scene, volume, overlay } = self;
         let headless = input.headless(false)?;
         let mut view = headless.view(volume, &scene).map_err(|error| input.failure(error))?;
@@ -177,6 +188,9 @@ impl Shown {
             log_frame(&format!("frame {frame}"), &rendering.stats);
             progress.step();
         }
-        Ok(())
+        match save_scene {
+            Some(path) => outputs::write(&[(path, scene_file(&scene, path)?)], &[]),
+            None => Ok(()),
+        }
     }
 }

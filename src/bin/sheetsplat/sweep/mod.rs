@@ -124,14 +124,14 @@ fn draw(
     let mut progress = Progress::new(scenes.len(), progress);
     let mut last: Option<(Scene, Arc<_>)> = None;
     let mut tiles = Vec::new();
-    for (mut scene, label) in scenes {
+    for (scene, label) in scenes {
         let is_same =
             |last: &Scene| (&last.volume, last.spacing, &last.labels) == (&scene.volume, scene.spacing, &scene.labels);
         let volume = match last {
             Some((last, volume)) if is_same(&last) => volume,
             _ => Arc::new(input.load_volume(&scene, outputs)?),
         };
-        input.look_at(&volume, &mut scene)?;
+        let scene = input.settled(&volume, &scene, Scene::explicit)?;
         let overlay = annotate.overlay(&scene, &volume)?;
         let mut rendering = headless.render_volume(volume.clone(), &scene).map_err(|error| input.failure(error))?;
         log_frame(&label.join(", "), &rendering.stats);

@@ -13,8 +13,7 @@ use eframe::egui::{
 use glam::DVec2;
 use sheetsplat::image::PngDepth;
 use sheetsplat::scene::{ImageSettings, Scene};
-use sheetsplat::settings::Camera;
-use sheetsplat::settings::TransferFunction;
+use sheetsplat::settings::{Camera, Extent, TransferFunction};
 use sheetsplat::volume::Volume;
 
 use super::editor::Editor;
@@ -42,6 +41,8 @@ pub(super) struct App {
     transfer: TransferFunction,
     /// The camera that the scene came with.
     home: Camera,
+    /// What a camera with open values shows.
+    object: Option<Extent>,
     editor: Editor,
     histogram: Histogram,
     guest: Guest,
@@ -78,12 +79,14 @@ impl App {
         let Some(host) = &context.wgpu_render_state else {
             return Err(Failure::Other("the window has no wgpu device".to_owned()));
         };
+        let object = scene.extent(&volume, &scene.transfer.resolve(&volume));
         let guest = Guest::new(host, volume, &scene, &arguments.input.name)?;
         let values = guest.volume().values();
         let editor = Editor::new(guest.transfer(), extent(values));
         Ok(Self {
             input: arguments.input.name.clone(),
             home: scene.camera,
+            object,
             transfer: guest.transfer().clone(),
             histogram: Histogram::new(values, editor.range()),
             editor,
@@ -138,16 +141,24 @@ impl App {
         }
     }
 
+    /// The camera over an image of `size` pixels: what it leaves open shows the object whole from everywhere.
+    fn camera(&self, size: [u32; 2]) -> Camera {
+        let camera = &self.scene.camera;
+        self.object.map_or(*camera, |object| object.fit_all_around(camera, size))
+    }
+
     /// Orbit, zoom and pan. Returns whether the picture is being changed by the pointer.
     fn navigate(&mut self, ui: &Ui, response: &Response) -> bool {
         let points = response.rect.size();
         let size = [points.x.max(1.0) as u32, points.y.max(1.0) as u32];
+        let shown = self.camera(size);
         let (camera, radius) = (&mut self.scene.camera, self.scene.splatting.radius);
-        let height = navigation::height(camera, self.guest.grid(), radius, size);
+        let height = navigation::height(&shown, self.guest.grid(), radius, size);
         let moved = DVec2::new(response.drag_delta().x.into(), response.drag_delta().y.into()) / f64::from(size[1]);
         let pans = ui.input(|input| input.modifiers.shift) || !response.dragged_by(PointerButton::Primary);
         if moved != DVec2::ZERO {
             if pans {
+                camera.center = shown.center;
                 navigation::pan(camera, moved * height);
             } else {
                 navigation::orbit(camera, moved * TURN);
@@ -182,7 +193,8 @@ impl App {
         let [width, height] = [rect.width(), rect.height()].map(|points| ((points * scale).round() as u32).max(1));
         let [width, height] = [width, height].map(|pixels| pixels.div_ceil(pixel));
         self.scene.image = ImageSettings { width, height, ..self.scene.image };
-        let result = self.guest.show(&self.scene, &self.transfer);
+        let shown = Scene { camera: self.camera([width, height]), ..self.scene.clone() };
+        let result = self.guest.show(&shown, &self.transfer);
         let drawn = matches!(result, Ok(true));
         match result {
             Ok(true) => {
@@ -219,8 +231,9 @@ impl App {
     fn save_scene(&mut self) {
         let path = screenshot::free_name("toml");
         let size = self.picture.size();
-        let image = ImageSettings { width: size.x.round() as u32, height: size.y.round() as u32, ..self.scene.image };
-        let scene = Scene { image, ..self.scene.clone() };
+        let [width, height] = [size.x.round() as u32, size.y.round() as u32];
+        let image = ImageSettings { width, height, ..self.scene.image };
+        let scene = Scene { image, camera: self.camera([width, height]), ..self.scene.clone() };
         let result = screenshot::save_scene(&scene, &self.transfer, self.guest.volume(), &path);
         self.saved = saved(&path, &result);
     }

@@ -53,7 +53,7 @@ pub(super) fn zoom(camera: &mut Camera, grid: &Grid, height: f64, factor: f64) {
 /// Moves the centre, so that what is at its depth follows a pointer that moves right and down by some world units.
 pub(super) fn pan(camera: &mut Camera, moved: DVec2) {
     let basis = camera.basis();
-    camera.center += basis.v * moved.y - basis.u * moved.x;
+    camera.center = Some(camera.middle() + basis.v * moved.y - basis.u * moved.x);
 }
 
 #[cfg(test)]
@@ -67,7 +67,7 @@ mod tests {
     /// Where a world point is on the screen, right and up of the centre.
     fn on_screen(camera: &Camera, point: DVec3) -> DVec2 {
         let basis = camera.basis();
-        DVec2::new((point - camera.center).dot(basis.u), (point - camera.center).dot(basis.v))
+        DVec2::new((point - camera.middle()).dot(basis.u), (point - camera.middle()).dot(basis.v))
     }
 
     #[test]
@@ -75,8 +75,8 @@ mod tests {
         for (direction, up) in
             [(DVec3::Y, DVec3::Z), (DVec3::new(0.3, 0.9, -0.2), DVec3::Z), (DVec3::X, DVec3::new(0.1, 2.0, 0.3))]
         {
-            let camera = Camera { direction, up, center: DVec3::new(1.0, 2.0, 3.0), ..Camera::default() };
-            let front = camera.center - direction.normalize();
+            let camera = Camera { direction, up, center: Some(DVec3::new(1.0, 2.0, 3.0)), ..Camera::default() };
+            let front = camera.middle() - direction.normalize();
             for (degrees, way) in [(DVec2::X, DVec2::X), (-DVec2::X, -DVec2::X), (DVec2::Y, -DVec2::Y)] {
                 let mut turned = camera;
                 orbit(&mut turned, 3.0 * degrees);

@@ -8,6 +8,7 @@ use sheetsplat::scene::Scene;
 use sheetsplat::settings::TransferFunction;
 use sheetsplat::volume::Volume;
 
+use crate::arguments::scene_file;
 use crate::failure::Failure;
 
 /// The first of `sheetsplat-1.png`, `sheetsplat-2.png`, …, or another extension, that is not in the current folder yet.
@@ -24,8 +25,8 @@ pub(super) fn save_scene(
     path: &Path,
 ) -> Result<(), Failure> {
     let scene = Scene { transfer: transfer.clone().into(), ..scene.clone() };
-    let text = scene.explicit(volume).to_toml(path.parent().unwrap_or(Path::new("")))?;
-    output::write(path, text.as_bytes()).map_err(|error| Failure::Other(format!("{}: {error}", path.display())))
+    let text = scene_file(&scene.explicit(volume), path)?;
+    output::write(path, &text).map_err(|error| Failure::Other(format!("{}: {error}", path.display())))
 }
 
 /// The pixels of the window, or of a part of it, given in pixels.

@@ -16,58 +16,67 @@ pub(super) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;
 
 /// How to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Way {
+pub(crate) enum RasterizerKind {
     Quads,
     /// If the view fits.
     Tiles,
     Samples,
 }
 
-impl Way {
-    /// That of some settings.
+impl RasterizerKind {
+    /// That of some settings, and if it is quads only because of the device, why.
     ///
     /// # Errors
     /// If they insist on what the device or the other settings do not allow.
-    pub(crate) fn of(device: &Device, splatting: &Splatting) -> Result<Self, RenderError> {
+    pub(crate) fn of(device: &Device, splatting: &Splatting) -> Result<(Self, Option<RenderError>), RenderError> {
         let insists = insists_on_tiles(splatting);
-        match (splatting.rasterizer, obstacle_to_tiles(device, splatting)) {
+        let by_settings = obstacle_in_settings(splatting);
+        let is_by_settings = by_settings.is_some();
+        match (splatting.rasterizer, by_settings.or_else(|| obstacle_in_device(device))) {
             (Rasterizer::Quads, _) if insists => {
                 let found =
                     "\"quads\" with splatting.footprint_box = \"parallelogram\", whole_below, beta or resolution";
                 Err(SettingError::new("splatting.rasterizer", found, "\"tiles\" or \"auto\" with them").into())
             }
             (Rasterizer::Tiles | Rasterizer::Auto, Some(obstacle)) if insists => Err(obstacle),
-            _ if splatting.method == Method::CompositeEverySample => Ok(Self::Samples),
-            (Rasterizer::Tiles | Rasterizer::Auto, None) => Ok(Self::Tiles),
-            _ => Ok(Self::Quads),
+            _ if splatting.method == Method::CompositeEverySample => Ok((Self::Samples, None)),
+            (Rasterizer::Tiles | Rasterizer::Auto, None) => Ok((Self::Tiles, None)),
+            (Rasterizer::Auto, Some(obstacle)) if !is_by_settings => Ok((Self::Quads, Some(obstacle))),
+            _ => Ok((Self::Quads, None)),
         }
     }
 }
 
-/// Why a device or some settings cannot be drawn by tiles; `None` if they can.
-fn obstacle_to_tiles(device: &Device, splatting: &Splatting) -> Option<RenderError> {
-    let refused = |found: String, allowed: &'static str| {
-        Some(SettingError::new("splatting.rasterizer", format!("\"tiles\" with {found}"), allowed).into())
-    };
+fn refused_tiles(found: String, allowed: &str) -> Option<RenderError> {
+    Some(SettingError::new("splatting.rasterizer", format!("\"tiles\" with {found}"), allowed).into())
+}
+
+/// Why some settings cannot be drawn by tiles; `None` if they can.
+fn obstacle_in_settings(splatting: &Splatting) -> Option<RenderError> {
     if splatting.method == Method::CompositeEverySample {
         let found = "splatting.method = \"composite-every-sample\"".to_owned();
-        return refused(found, "\"image-aligned\" or \"axis-aligned\" with it, or \"quads\"");
+        return refused_tiles(found, "\"image-aligned\" or \"axis-aligned\" with it, or \"quads\"");
     }
     if splatting.footprint != FootprintForm::SummedArea {
-        return refused("splatting.footprint = \"sections\"".to_owned(), "\"summed-area\" with it, or \"quads\"");
+        return refused_tiles("splatting.footprint = \"sections\"".to_owned(), "\"summed-area\" with it, or \"quads\"");
     }
+    None
+}
+
+/// Why a device cannot draw by tiles; `None` if it can.
+fn obstacle_in_device(device: &Device) -> Option<RenderError> {
     if !device.features().contains(TILE_FEATURES) {
-        return refused("a device without subgroups, or barriers for them".to_owned(), "\"quads\"");
+        return refused_tiles("a device without subgroups, or barriers for them".to_owned(), "\"quads\"");
     }
     let info = device.adapter_info();
     let sizes = [info.subgroup_min_size, info.subgroup_max_size];
     if sizes.iter().any(|size| !SUBGROUP_SIZES.contains(size)) {
         let found = format!("subgroups of {} to {} threads", sizes[0], sizes[1]);
-        return refused(found, "subgroups of 8 to 32 threads, or \"quads\"");
+        return refused_tiles(found, "subgroups of 8 to 32 threads, or \"quads\"");
     }
     let bytes = device.limits().max_compute_workgroup_storage_size;
     if bytes < WORKGROUP_BYTES {
-        return refused(format!("max_compute_workgroup_storage_size of {bytes}"), "at least 16384, or \"quads\"");
+        return refused_tiles(format!("max_compute_workgroup_storage_size of {bytes}"), "at least 16384, or \"quads\"");
     }
     None
 }

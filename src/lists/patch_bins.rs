@@ -1,4 +1,4 @@
-//! Which bricks every sheet group of every tile looks at: the buckets (§5.1) of the tile rasteriser, which walks a tile's
+//! Which bricks every sheet group of every patch looks at: the buckets (§5.1) of the tile rasteriser, which walks a patch's
 //! groups front to back.
 
 use std::ops::Range;
@@ -13,11 +13,11 @@ use crate::lists::brick;
 use crate::setting_error::SettingError;
 use crate::settings::splatting::Order;
 
-/// Width and height of the rasteriser's tiles, pixels.
-pub const TILE: [u32; 2] = [16, 8];
+/// Width and height of the rasteriser's patches, pixels.
+pub const PATCH: [u32; 2] = [16, 8];
 
-/// Units of a tile: rounds in which the smallest subgroup draws it.
-pub const UNITS: u32 = 4;
+/// Units of a patch: rounds in which the smallest subgroup draws it.
+pub const BLOCKS: u32 = 4;
 
 /// Sheets of a group.
 pub const SHEETS: u32 = 4;
@@ -30,21 +30,21 @@ const MAX_BRICKS: usize = 1 << 26;
 /// for what comes before and after: to look at every pixel's ray first of all.
 const MAX_PASSES: u32 = 64900;
 
-/// Passes of a group at most besides, with 8 threads in a subgroup, and of each unit.
+/// Passes of a group at most besides, with 8 threads in a subgroup, and of each block.
 const PASSES_PER_GROUP: u32 = 60;
-const PASSES_PER_UNIT: u32 = 40;
+const PASSES_PER_BLOCK: u32 = 40;
 
 /// Passes of a brick at most, with 8 threads in a subgroup: 8 to fetch and visit it, 76 to find its voxels, 56 to shade them, 8 to keep
 /// them, and 10 where the queue is full.
 const PASSES_PER_BRICK: u32 = 158;
 
-/// Passes to add a brick's voxels to a unit.
+/// Passes to add a brick's voxels to a block.
 const PASSES_PER_ADDITION: u32 = 56;
 
 /// Times that a brick's voxels are shaded side by side.
 const SHADED_PER_BRICK: u32 = 8;
 
-/// Passes to look at how a unit's rays are cut, or along which way means are taken, where that is asked for.
+/// Passes to look at how a block's rays are cut, or along which way means are taken, where that is asked for.
 const PASSES_PER_LOOK: u32 = 140;
 
 /// Passes that a thread may take, and takes at most.
@@ -61,40 +61,40 @@ pub struct Passes {
 }
 
 impl Passes {
-    /// Those of a view whose voxels take at most `search` passes to look up their control points in memory, for so many of a tile's units.
-    pub fn new(search: u32, units: u32) -> Self {
-        let per_group = PASSES_PER_GROUP + units * (PASSES_PER_UNIT + PASSES_PER_LOOK);
-        let per_brick = PASSES_PER_BRICK + units * PASSES_PER_ADDITION + SHADED_PER_BRICK * search;
+    /// Those of a view whose voxels take at most `search` passes to look up their control points in memory, for so many of a patch's blocks.
+    pub fn new(search: u32, blocks: u32) -> Self {
+        let per_group = PASSES_PER_GROUP + blocks * (PASSES_PER_BLOCK + PASSES_PER_LOOK);
+        let per_brick = PASSES_PER_BRICK + blocks * PASSES_PER_ADDITION + SHADED_PER_BRICK * search;
         Self { most: MAX_PASSES, per_group, per_brick, search }
     }
 }
 
-/// Bricks by tile and sheet group.
+/// Bricks by patch and sheet group.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TileBins {
+pub struct PatchBins {
     /// The first slab of the nearest group.
     pub first_slab: i32,
-    /// Number of tiles.
-    pub tiles: u32,
-    /// Sheet groups of every tile.
+    /// Number of patches.
+    pub patches: u32,
+    /// Sheet groups of every patch.
     pub groups: u32,
-    /// Where every tile's groups start in `entries`, in the order they are composited in, tile after tile; at last the end.
+    /// Where every patch's groups start in `entries`, in the order they are composited in, patch after patch; at last the end.
     pub starts: Vec<u32>,
     /// Numbers of bricks.
     pub entries: Vec<u32>,
     /// For every group, nearest first, half the screen box around its footprints, pixels.
     pub half_boxes: Vec<DVec2>,
-    /// Workgroups that a tile is divided among: its units, if there is too much behind one for all of them together.
-    pub parts: u32,
+    /// Workgroups that a patch is divided among: its blocks, if there is too much behind one for all of them together.
+    pub workgroups: u32,
     /// What bounds a dispatch.
     pub passes: Passes,
-    /// Dispatches that are enough for every tile.
+    /// Dispatches that are enough for every patch.
     pub dispatches: u32,
 }
 
-/// Why a view cannot be drawn by tiles.
+/// Why a view cannot be drawn by patches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Unfit {
+pub struct TileCapacityError {
     /// What there is too much of.
     pub what: &'static str,
     /// How much there is.
@@ -103,8 +103,8 @@ pub struct Unfit {
     pub actual: u64,
 }
 
-impl From<Unfit> for RenderError {
-    fn from(Unfit { what, required, actual }: Unfit) -> Self {
+impl From<TileCapacityError> for RenderError {
+    fn from(TileCapacityError { what, required, actual }: TileCapacityError) -> Self {
         let found = format!("\"tiles\" with {required} {what}");
         SettingError::new("splatting.rasterizer", found, format!("at most {actual}, or \"quads\"")).into()
     }
@@ -124,13 +124,13 @@ struct Pixels {
     last: [u32; 2],
 }
 
-impl TileBins {
-    /// Sorts bricks by the tiles and groups they may touch, with kernels of the radius `support`. The sheet depths `covered` are in some
+impl PatchBins {
+    /// Sorts bricks by the patches and groups they may touch, with kernels of the radius `support`. The sheet depths `covered` are in some
     /// group even where they hold nothing. To look up a voxel's control points in memory takes at most `search` passes through loops.
     /// Neither list may have more than `most_words` words.
     ///
     /// # Errors
-    /// If there are more bricks, or more of them behind a tile, than the rasteriser can take.
+    /// If there are more bricks, or more of them behind a patch, than the rasteriser can take.
     pub fn new(
         bricks: &[Brick],
         view: &ViewGeometry,
@@ -139,9 +139,9 @@ impl TileBins {
         support: f64,
         search: u32,
         most_words: u64,
-    ) -> Result<Self, Unfit> {
+    ) -> Result<Self, TileCapacityError> {
         let check = |what, required: u64, actual: u64| {
-            if required <= actual { Ok(()) } else { Err(Unfit { what, required, actual }) }
+            if required <= actual { Ok(()) } else { Err(TileCapacityError { what, required, actual }) }
         };
         check("bricks", bricks.len() as u64, MAX_BRICKS as u64)?;
         let placed = place(bricks, view);
@@ -153,7 +153,7 @@ impl TileBins {
         let groups = (end_group - first_group) as u32;
         let [columns, rows] = grid(view.size);
         let bins = u64::from(columns) * u64::from(rows) * u64::from(groups);
-        check("tiles times sheet groups", bins, most_words - 1)?;
+        check("patches times sheet groups", bins, most_words - 1)?;
 
         let half_boxes: Vec<DVec2> = (first_group..end_group)
             .map(|group| view.half_box(support, planes.plane(group)..planes.plane(group + 1)))
@@ -164,7 +164,7 @@ impl TileBins {
         let strips = (0..rows).into_par_iter().step_by(strip_rows as usize);
         let strips: Vec<_> = strips.map(|first| sort.counted(first..(first + strip_rows).min(rows))).collect();
         let total = strips.iter().map(|strip| strip.entries).sum();
-        check("bricks' parts in tiles and sheet groups", total, most_words)?;
+        check("bricks' workgroups in patches and sheet groups", total, most_words)?;
         let mut starts = Vec::with_capacity(bins as usize + 1);
         let mut next = 0;
         for count in strips.iter().flat_map(|strip| &strip.counts) {
@@ -174,29 +174,29 @@ impl TileBins {
         starts.push(next);
         let entries: Vec<_> = strips.par_iter().map(|strip| sort.sorted(strip)).collect();
         let entries = entries.concat();
-        let of_parts = |parts| {
-            let passes = Passes::new(search, UNITS / parts);
-            dispatches(&starts, groups as usize, &passes).map(|dispatches| (parts, passes, dispatches))
+        let of_workgroups = |workgroups| {
+            let passes = Passes::new(search, BLOCKS / workgroups);
+            dispatches(&starts, groups as usize, &passes).map(|dispatches| (workgroups, passes, dispatches))
         };
-        let (parts, passes, dispatches) = of_parts(1).or_else(|_| of_parts(UNITS))?;
+        let (workgroups, passes, dispatches) = of_workgroups(1).or_else(|_| of_workgroups(BLOCKS))?;
         Ok(Self {
             first_slab: first_group * SHEETS as i32,
-            tiles: columns * rows,
+            patches: columns * rows,
             groups,
             starts,
             entries,
             half_boxes,
-            parts,
+            workgroups,
             passes,
             dispatches,
         })
     }
 }
 
-/// Strips of tiles that a thread sorts the bricks of, one after the other.
+/// Strips of patches that a thread sorts the bricks of, one after the other.
 const STRIPS_PER_THREAD: u32 = 2;
 
-/// A counting sort of bricks, in strips of rows of tiles: these have bins that are next to each other.
+/// A counting sort of bricks, in strips of rows of patches: these have bins that are next to each other.
 struct Sort<'a> {
     placed: &'a [Placed],
     half_boxes: &'a [DVec2],
@@ -205,7 +205,7 @@ struct Sort<'a> {
     size: [u32; 2],
 }
 
-/// Some rows of tiles, and how many bricks their bins hold.
+/// Some rows of patches, and how many bricks their bins hold.
 struct Strip {
     rows: Range<u32>,
     counts: Vec<u32>,
@@ -213,11 +213,11 @@ struct Strip {
 }
 
 impl Sort<'_> {
-    /// Calls `visit` with every brick's number and each of its bins, of those of some rows of tiles.
+    /// Calls `visit` with every brick's number and each of its bins, of those of some rows of patches.
     fn visit(&self, rows: &Range<u32>, mut visit: impl FnMut(u32, usize)) {
         let ([columns, _], groups) = (grid(self.size), self.half_boxes.len());
         let farthest = self.half_boxes.iter().fold(0.0_f64, |farthest, half_box| farthest.max(half_box.y)) + SLACK;
-        let (top, bottom) = (f64::from(rows.start * TILE[1]) - farthest, f64::from(rows.end * TILE[1]) + farthest);
+        let (top, bottom) = (f64::from(rows.start * PATCH[1]) - farthest, f64::from(rows.end * PATCH[1]) + farthest);
         for brick in self.placed.iter().filter(|brick| brick.high.y >= top && brick.low.y <= bottom) {
             let mut touched: Option<(DVec2, Option<Pixels>)> = None;
             for group in brick.groups.clone() {
@@ -233,8 +233,8 @@ impl Sort<'_> {
                     _ => touched.insert((half_box, brick.pixels(half_box, self.size))),
                 };
                 let Some(Pixels { first, last }) = pixels else { continue };
-                for y in (first[1] / TILE[1]).max(rows.start)..(last[1] / TILE[1] + 1).min(rows.end) {
-                    for x in first[0] / TILE[0]..=last[0] / TILE[0] {
+                for y in (first[1] / PATCH[1]).max(rows.start)..(last[1] / PATCH[1] + 1).min(rows.end) {
+                    for x in first[0] / PATCH[0]..=last[0] / PATCH[0] {
                         visit(brick.number, ((y - rows.start) * columns + x) as usize * groups + at);
                     }
                 }
@@ -308,21 +308,21 @@ fn place(bricks: &[Brick], view: &ViewGeometry) -> Vec<Placed> {
     placed
 }
 
-/// Columns and rows of tiles of an image.
+/// Columns and rows of patches of an image.
 pub fn grid(size: [u32; 2]) -> [u32; 2] {
-    [size[0].div_ceil(TILE[0]), size[1].div_ceil(TILE[1])]
+    [size[0].div_ceil(PATCH[0]), size[1].div_ceil(PATCH[1])]
 }
 
-/// Dispatches that are enough for every tile: in each it takes groups until one might be too much.
-fn dispatches(starts: &[u32], groups: usize, passes: &Passes) -> Result<u32, Unfit> {
+/// Dispatches that are enough for every patch: in each it takes groups until one might be too much.
+fn dispatches(starts: &[u32], groups: usize, passes: &Passes) -> Result<u32, TileCapacityError> {
     let most_bricks = passes.most.saturating_sub(passes.per_group) / passes.per_brick;
-    let of_tile = |first: usize| {
+    let of_patch = |first: usize| {
         let (mut dispatches, mut taken) = (1, 0);
         for group in starts[first..=first + groups].windows(2) {
             let bricks = group[1] - group[0];
             if bricks > most_bricks {
-                let (what, required) = ("bricks behind a tile in one sheet group", bricks.into());
-                return Err(Unfit { what, required, actual: most_bricks.into() });
+                let (what, required) = ("bricks behind a patch in one sheet group", bricks.into());
+                return Err(TileCapacityError { what, required, actual: most_bricks.into() });
             }
             let of_group = passes.per_group + bricks * passes.per_brick;
             if taken + of_group > passes.most {
@@ -333,6 +333,6 @@ fn dispatches(starts: &[u32], groups: usize, passes: &Passes) -> Result<u32, Unf
         }
         Ok(dispatches)
     };
-    let tiles = (0..starts.len() - 1).into_par_iter().step_by(groups.max(1));
-    tiles.map(of_tile).try_reduce(|| 0, |a, b| Ok(a.max(b)))
+    let patches = (0..starts.len() - 1).into_par_iter().step_by(groups.max(1));
+    patches.map(of_patch).try_reduce(|| 0, |a, b| Ok(a.max(b)))
 }

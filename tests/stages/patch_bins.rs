@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 use glam::{DVec2, DVec4, UVec3};
 use sheetsplat::internals::brick::{self, BrickList};
 use sheetsplat::internals::kernel::Kernel;
+use sheetsplat::internals::patch_bins::{self, PATCH, PatchBins, SHEETS, TileCapacityError};
 use sheetsplat::internals::reference::{self, Geometry};
-use sheetsplat::internals::tile_bins::{self, SHEETS, TILE, TileBins, Unfit};
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::Order;
@@ -48,10 +48,10 @@ impl Case {
         Kernel::new(self.scene.splatting.radius, self.scene.splatting.falloff)
     }
 
-    fn bins(&self, most_words: u64) -> Result<TileBins, Unfit> {
+    fn bins(&self, most_words: u64) -> Result<PatchBins, TileCapacityError> {
         let Scene { camera, splatting, image, .. } = &self.scene;
         let view = ViewGeometry::new(&self.grid, camera, splatting, [image.width, image.height]).unwrap();
-        TileBins::new(self.bricks.bricks(), &view, splatting.order, 0.0..0.0, self.kernel().support(), 0, most_words)
+        PatchBins::new(self.bricks.bricks(), &view, splatting.order, 0.0..0.0, self.kernel().support(), 0, most_words)
     }
 
     /// What the kernels need: group, tile, brick.
@@ -70,7 +70,7 @@ impl Case {
                     let (low, high) = (low.max(DVec2::ZERO), high.min(last));
                     if low.cmple(high).all() {
                         let [low, high] = [low, high].map(|pixel| pixel.as_uvec2().to_array());
-                        let tiles = |axis: usize| low[axis] / TILE[axis]..=high[axis] / TILE[axis];
+                        let tiles = |axis: usize| low[axis] / PATCH[axis]..=high[axis] / PATCH[axis];
                         let group = k.div_euclid(SHEETS as i32);
                         needed.extend(tiles(1).flat_map(|y| tiles(0).map(move |x| (group, [x, y], number))));
                     }
@@ -81,8 +81,8 @@ impl Case {
     }
 
     /// What the bins hold.
-    fn held(&self, bins: &TileBins) -> BTreeSet<(i32, [u32; 2], u32)> {
-        let [columns, _] = tile_bins::grid([self.scene.image.width, self.scene.image.height]);
+    fn held(&self, bins: &PatchBins) -> BTreeSet<(i32, [u32; 2], u32)> {
+        let [columns, _] = patch_bins::grid([self.scene.image.width, self.scene.image.height]);
         let first_group = bins.first_slab.div_euclid(SHEETS as i32);
         let mut held = BTreeSet::new();
         for (bin, bounds) in bins.starts.windows(2).enumerate() {
@@ -151,7 +151,7 @@ fn what_does_not_fit_is_named() {
     let [starts, entries] = [&bins.starts, &bins.entries].map(|list| list.len() as u64);
     assert!(starts < entries);
     assert_eq!(case.bins(entries).as_ref(), Ok(&bins), "just enough room");
-    let unfit = |what, required, actual| Err(Unfit { what, required, actual });
+    let unfit = |what, required, actual| Err(TileCapacityError { what, required, actual });
     assert_eq!(case.bins(entries - 1), unfit("bricks' parts in tiles and sheet groups", entries, entries - 1));
     assert_eq!(case.bins(starts - 1), unfit("tiles times sheet groups", starts - 1, starts - 2));
 
@@ -160,7 +160,9 @@ fn what_does_not_fit_is_named() {
     case.bricks = BrickList::new(&case.grid, &(0..56 * 56 * 56).collect::<Vec<_>>());
     (case.scene.image.width, case.scene.image.height) = (2, 2);
     (case.scene.splatting.slab_width, case.scene.camera) = (8.0, camera([0.0, 1.0, 0.0], 60.0));
-    let Err(Unfit { what: "bricks behind a tile in one sheet group", required, actual }) = case.bins(u64::MAX) else {
+    let Err(TileCapacityError { what: "bricks behind a patch in one sheet group", required, actual }) =
+        case.bins(u64::MAX)
+    else {
         panic!("all bricks fit");
     };
     assert!(actual < required && required <= 2744, "{required} {actual}");

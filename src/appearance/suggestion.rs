@@ -1,0 +1,70 @@
+//! Which preset fits a volume, where its values and its file tell.
+
+use rayon::prelude::*;
+
+use super::categories;
+use super::hounsfield::offset_of;
+use super::object::Object;
+use super::preset::Preset;
+use super::quantile::quantiles;
+use crate::volume::Volume;
+
+/// Hounsfield units of air, of soft tissue, and of all that is denser than lungs.
+const AIR: [f64; 2] = [-1100.0, -850.0];
+const SOFT_TISSUE: [f64; 2] = [-150.0, 150.0];
+const BODY: [f64; 2] = [-500.0, f64::INFINITY];
+const BONE: [f64; 2] = [300.0, f64::INFINITY];
+
+/// Sides of a box that a head fits in, mm.
+const HEAD: std::ops::RangeInclusive<f64> = 100.0..=300.0;
+
+impl Preset {
+    /// The preset that fits a volume, by what its values and its file tell; `None` where these do not tell, and
+    /// [`TransferFunction::from_histogram`](crate::settings::TransferFunction::from_histogram) is the best there is.
+    ///
+    /// - `labels`: a label map ([`categories::is_label_map`]).
+    /// - `confocal`: lengths in µm or nm.
+    /// - `ct-bone`, or without bone `ct-skin`: Hounsfield units, as they are or with 1024 added: air around tissue, most of which is soft.
+    /// - `mr-head`: a file of 100 to 300 mm (or of no unit) a side, with no negative values, three tenths or more of which is object.
+    pub fn suggested(volume: &Volume) -> Option<Self> {
+        if categories::is_label_map(volume) {
+            return Some(Self::Labels);
+        }
+        if volume.unit().is_some_and(|unit| ["µm", "nm"].contains(&unit)) {
+            return Some(Self::Confocal);
+        }
+        let values = volume.values();
+        if let Some(offset) = offset_of(values)
+            && let Some(has_bone) = is_ct(values, offset)
+        {
+            return Some(if has_bone { Self::CtBone } else { Self::CtSkin });
+        }
+        is_head(volume).then_some(Self::MrHead)
+    }
+}
+
+/// Whether values less an offset are Hounsfield units of a body in air, and then whether there is bone.
+fn is_ct(values: &[f32], offset: f64) -> Option<bool> {
+    let count = |[low, high]: [f64; 2]| {
+        let is_in = |value: &&f32| (low..=high).contains(&(f64::from(**value) - offset));
+        values.par_iter().filter(is_in).count() as f64
+    };
+    let body = count(BODY);
+    // Of other measured values, those of MR for one, no span of 300 holds half.
+    let is_ct = count(AIR) >= 0.02 * values.len() as f64 && count(SOFT_TISSUE) >= body / 2.0 && body > 0.0;
+    is_ct.then(|| count(BONE) >= 0.01 * body)
+}
+
+fn is_head(volume: &Volume) -> bool {
+    let values = volume.values();
+    let size = volume.dims().as_dvec3() * volume.spacing();
+    let may_be_mm = volume.unit().is_none_or(|unit| unit == "mm") && volume.encoding().is_some();
+    let is_positive = || quantiles(values, |_| true, [0.0]).is_some_and(|[least]| least >= 0.0);
+    may_be_mm
+        && size.to_array().iter().all(|side| HEAD.contains(side))
+        && is_positive()
+        && Object::find(values).is_some_and(|object| {
+            let threshold = object.threshold() as f32;
+            values.par_iter().filter(|&&value| value > threshold).count() * 10 >= values.len() * 3
+        })
+}

@@ -1,0 +1,121 @@
+//! Where in a volume the voxels lie that take part.
+
+use glam::UVec3;
+use rayon::prelude::*;
+
+use super::classify::takes_part;
+use super::iso_range::ValueSet;
+use crate::settings::clip::ClippedVoxels;
+use crate::settings::transfer_function::TransferFunction;
+use crate::volume::Volume;
+
+/// The first and the last voxel along each axis of those that take part, without the outermost ones: along each axis and at either end at
+/// most a share of `specks` of them. `None` if no voxel takes part.
+pub(crate) fn of_voxels(
+    volume: &Volume,
+    transfer: &TransferFunction,
+    clipped: &ClippedVoxels,
+    specks: f64,
+) -> Option<[UVec3; 2]> {
+    let dims = volume.dims();
+    let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
+    let set = ValueSet::of(transfer);
+    let needs_more = !transfer.labels.is_empty() || transfer.gradient_opacity.is_some();
+    // Voxels by x and by y, over the slices that a thread takes, and all those of every slice.
+    let zeros = || (vec![0_u64; nx], vec![0_u64; ny], vec![0_u64; nz]);
+    let counted = (0..dims.z).into_par_iter().fold(zeros, |(mut xs, mut ys, mut zs), z| {
+        for y in 0..dims.y {
+            let row = dims.x * (y + dims.y * z);
+            let mut in_row = 0;
+            for x in clipped.in_row(y, z, dims.x) {
+                let index = row + x;
+                let is_shown = match needs_more {
+                    true => takes_part(volume, transfer, index),
+                    false => set.contains(volume.values()[index as usize]),
+                };
+                xs[x as usize] += u64::from(is_shown);
+                in_row += u64::from(is_shown);
+            }
+            ys[y as usize] += in_row;
+            zs[z as usize] += in_row;
+        }
+        (xs, ys, zs)
+    });
+    let (xs, ys, zs) = counted.reduce(zeros, |a, b| (sums(a.0, &b.0), sums(a.1, &b.1), sums(a.2, &b.2)));
+    let [x, y, z] = [xs, ys, zs].map(|counts| ends(&counts, specks));
+    let ([x, y], z) = ([x?, y?], z?);
+    Some([0, 1].map(|end| UVec3::new(x[end], y[end], z[end])))
+}
+
+fn sums(mut a: Vec<u64>, b: &[u64]) -> Vec<u64> {
+    a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+    a
+}
+
+/// Where, from either end, more than a share of what is counted has been passed.
+fn ends(counts: &[u64], share: f64) -> Option<[u32; 2]> {
+    let most = share * counts.iter().sum::<u64>() as f64;
+    let is_end = |passed: &mut u64, &count: &u64| {
+        *passed += count;
+        Some(*passed > 0 && *passed as f64 > most)
+    };
+    let first = counts.iter().scan(0, is_end).position(|is_end| is_end)?;
+    let from_last = counts.iter().rev().scan(0, is_end).position(|is_end| is_end)?;
+    Some([first as u32, (counts.len() - 1 - from_last) as u32])
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::settings::clip::Clip;
+    use crate::settings::transfer_function::Ramp;
+
+    const DIMS: UVec3 = UVec3::new(30, 20, 25);
+
+    /// A block of `[first, last]` with the value 100, and single voxels with the value 100 besides.
+    fn volume([first, last]: [UVec3; 2], specks: &[UVec3]) -> Volume {
+        let is_in = |voxel: UVec3| voxel.cmpge(first).all() && voxel.cmple(last).all();
+        let voxels =
+            (0..DIMS.z).flat_map(|z| (0..DIMS.y).flat_map(move |y| (0..DIMS.x).map(move |x| UVec3::new(x, y, z))));
+        let value = |voxel| if is_in(voxel) || specks.contains(&voxel) { 100.0 } else { 0.0 };
+        Volume::new("block", DIMS, DVec3::ONE, voxels.map(value).collect()).unwrap()
+    }
+
+    fn transfer() -> TransferFunction {
+        let opacity = Ramp::new(vec![(50.0, 0.0), (60.0, 1.0)]).unwrap();
+        TransferFunction::by_value(Ramp::new(vec![(0.0, DVec3::ONE)]).unwrap(), opacity)
+    }
+
+    #[test]
+    fn specks_count_only_as_long_as_they_are_many() {
+        let block = [UVec3::new(4, 3, 6), UVec3::new(20, 13, 16)];
+        let specks = [UVec3::new(1, 19, 0), UVec3::new(29, 0, 24)];
+        let volume = volume(block, &specks);
+        let of = |share| of_voxels(&volume, &transfer(), &ClippedVoxels::default(), share);
+        // 17·11·11 + 2 = 2059 voxels, of which 0.1 % are two: one speck is left out at either end.
+        assert_eq!(of(0.001), Some(block));
+        assert_eq!(of(0.0004), Some([UVec3::new(1, 0, 0), UVec3::new(29, 19, 24)]));
+        assert_eq!(of(0.0), Some([UVec3::new(1, 0, 0), UVec3::new(29, 19, 24)]));
+    }
+
+    #[test]
+    fn cuts_iso_ranges_and_gradients_rule_voxels_out() {
+        let block = [UVec3::new(4, 3, 6), UVec3::new(20, 13, 16)];
+        let volume = volume(block, &[]);
+        let of = |transfer: &TransferFunction, clip: Clip| {
+            of_voxels(&volume, transfer, &clip.voxels(volume.grid(), 2.0), 0.0)
+        };
+        assert_eq!(of(&transfer(), Clip::default()), Some(block));
+        // x ≥ 0 keeps the kernels of voxels from 14.5 - 2 on.
+        let clip = Clip { planes: vec![[1.0, 0.0, 0.0, 0.0]], ..Clip::default() };
+        assert_eq!(of(&transfer(), clip), Some([UVec3::new(13, 3, 6), block[1]]));
+        let nothing = TransferFunction { iso_ranges: Some(vec![[200.0, 300.0]]), ..transfer() };
+        assert_eq!(of(&nothing, Clip::default()), None);
+        let flat = Ramp::new(vec![(0.0, 1.0), (10.0, 0.0)]).unwrap();
+        let inner = TransferFunction { gradient_opacity: Some(flat), ..transfer() };
+        assert_eq!(of(&inner, Clip::default()), Some([block[0] + 1, block[1] - 1]));
+    }
+}

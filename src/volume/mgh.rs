@@ -1,0 +1,89 @@
+//! MGH files, as FreeSurfer writes them, plain (`.mgh`) or gzipped (`.mgz`): a binary header of 284 bytes, big-endian, then the
+//! samples. What follows these, parameters of the scan and a history, has no bearing on the volume.
+
+use std::io::BufRead;
+use std::path::Path;
+
+use glam::{DMat3, DVec3};
+
+use super::VolumeError;
+use super::access::Access;
+use super::loaded::Loaded;
+use super::orientation::Orientation;
+use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
+use super::shear::{self, Lattice};
+use super::source::{invalid, io_error};
+
+/// Bytes before the samples.
+const HEADER: u64 = 284;
+
+/// Numbers of the format's data types.
+const TYPES: [(i32, SampleType); 4] =
+    [(0, SampleType::U8), (1, SampleType::I32), (3, SampleType::F32), (4, SampleType::I16)];
+
+/// The fields of the directions.
+const DIRECTIONS: &str = "x_ras, y_ras, z_ras";
+
+/// Reads a file with one frame.
+pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+    let mut file = access.open(path)?;
+    let is_gzip = file.reader.fill_buf().map_err(io_error(path))?.starts_with(&[0x1f, 0x8b]);
+    let mut stream = if is_gzip { Stream::gzip(file)? } else { Stream::raw(file)? };
+    let header = Header(stream.bytes(HEADER)?);
+    if header.i32(0) != 1 {
+        return Err(invalid(path, "version", header.i32(0), "1"));
+    }
+    let sizes = [4, 8, 12].map(|at| header.i32(at));
+    let dims = dims_of(sizes).ok_or_else(|| invalid(path, "width, height, depth", format!("{sizes:?}"), SIZES))?;
+    if header.i32(16) != 1 {
+        return Err(invalid(path, "nframes", header.i32(16), "1: a volume of one frame"));
+    }
+    let code = header.i32(20);
+    let Some(&(_, kind)) = TYPES.iter().find(|(known, _)| *known == code) else {
+        let allowed = TYPES.map(|(code, kind)| format!("{code} ({kind})")).join(", ");
+        return Err(invalid(path, "type", code, allowed));
+    };
+    let [spacing, x, y, z, center] = header.geometry();
+    let numbers = [("spacing", spacing), (DIRECTIONS, x + y + z), ("c_ras", center)];
+    if let Some((field, numbers)) = numbers.into_iter().find(|(_, numbers)| !numbers.is_finite()) {
+        return Err(invalid(path, field, numbers, "finite numbers"));
+    }
+    if spacing.min_element() <= 0.0 {
+        return Err(invalid(path, "spacing", spacing, "three positive numbers"));
+    }
+    let steps = [x * spacing.x, y * spacing.y, z * spacing.z];
+    let lattice = Lattice::of(steps).map_err(|found| invalid(path, DIRECTIONS, found, shear::allowed()))?;
+    // The centre is that of voxel `dims / 2`, half a voxel beyond the middle of the centres.
+    let origin = center - DMat3::from_cols(steps[0], steps[1], steps[2]) * (dims.as_dvec3() / 2.0);
+    let samples = Samples { kind, dims, big_endian: true, rescale: None, z_fastest: false };
+    let orientation = Some(Orientation { axes: lattice.axes, origin });
+    let (spacing, unit) = (Some(lattice.spacing), Some("mm".to_owned()));
+    let loaded = Loaded { spacing, unit, orientation, ..Loaded::new(dims, kind, stream.samples(&samples, true)?) };
+    lattice.straighten(path, DIRECTIONS, loaded, access)
+}
+
+/// A header's bytes.
+struct Header(Vec<u8>);
+
+impl Header {
+    fn bytes<const N: usize>(&self, at: usize) -> [u8; N] {
+        std::array::from_fn(|i| self.0[at + i])
+    }
+
+    fn i32(&self, at: usize) -> i32 {
+        i32::from_be_bytes(self.bytes(at))
+    }
+
+    fn vector(&self, at: usize) -> DVec3 {
+        DVec3::from_array(std::array::from_fn(|i| f32::from_be_bytes(self.bytes(at + 4 * i)).into()))
+    }
+
+    /// Spacing, directions of x, y and z, and centre, in RAS and millimetres. Without `goodRASFlag` these are FreeSurfer's
+    /// defaults: coronal slices, 1 mm apart.
+    fn geometry(&self) -> [DVec3; 5] {
+        match i16::from_be_bytes(self.bytes(28)) {
+            1.. => [30, 42, 54, 66, 78].map(|at| self.vector(at)),
+            _ => [DVec3::ONE, DVec3::NEG_X, DVec3::NEG_Z, DVec3::Y, DVec3::ZERO],
+        }
+    }
+}

@@ -1,0 +1,381 @@
+//! Sheared volumes: axes that are not at right angles, as a tilted gantry or an affine registration leaves them. They are resampled to
+//! an orthogonal grid as they are read.
+//!
+//! The orthogonal axes come from the sheared ones by Gram and Schmidt, starting with the two that are nearest to a right angle. The
+//! third axis then keeps its planes, and every sample moves only within its plane: in a CT scan with a tilted gantry, within its slice.
+//! So one bilinear interpolation per voxel resamples any shear.
+
+use std::path::Path;
+
+use glam::{DMat3, DVec3, UVec3};
+use rayon::prelude::*;
+
+use super::VolumeError;
+use super::access::Access;
+use super::loaded::Loaded;
+use super::orientation::{MAX_COSINE, lengths_and_directions};
+use super::samples::{Voxel, dims_of};
+use super::source::invalid;
+
+/// The largest angle, in degrees, between an axis and where a right angle would have it. Flatter volumes are damaged headers.
+const MAX_DEGREES: f64 = 80.0;
+
+/// How many times as many voxels as the file the orthogonal grid may have. Beyond this nearly all of them are holes.
+const MAX_GROWTH: u64 = 16;
+
+/// Positions that are nearer to a sample than this, in voxels, are the sample's own: what is left is rounding.
+const SAME_PLACE: f64 = 1e-5;
+
+/// The axes that [`Lattice::of`] accepts.
+pub(super) fn allowed() -> String {
+    format!("three axes of positive finite length, each less than {MAX_DEGREES}° from a right angle with the others")
+}
+
+/// The lattice that a file's voxels lie on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lattice {
+    /// From voxel to voxel along the orthogonal axes.
+    pub(super) spacing: DVec3,
+    /// The directions of the orthogonal axes, column by column.
+    pub(super) axes: DMat3,
+    /// What is left to undo in the values.
+    shear: Option<Shear>,
+}
+
+/// How samples lie askew on the orthogonal axes.
+#[derive(Clone, Copy, Debug)]
+struct Shear {
+    /// The axes in the order of the orthogonalisation: the first one keeps its direction, the first two keep their plane.
+    order: [usize; 3],
+    /// How far a step along the second axis leads along the first, in voxels.
+    second: f64,
+    /// How far a step along the third axis leads along the first and the second.
+    third: [f64; 2],
+    /// The largest angle between an axis and its orthogonal one.
+    degrees: f64,
+}
+
+impl Lattice {
+    /// A lattice with axes that are orthogonal already.
+    pub(super) fn straight(spacing: DVec3, axes: DMat3) -> Self {
+        Self { spacing, axes, shear: None }
+    }
+
+    /// The lattice of the vectors from voxel to voxel along the three axes.
+    ///
+    /// # Errors
+    /// What they are instead of [`allowed`].
+    pub(super) fn of(steps: [DVec3; 3]) -> Result<Self, String> {
+        if let Ok((spacing, axes)) = lengths_and_directions(steps) {
+            return Ok(Self::straight(spacing, axes));
+        }
+        let lengths = steps.map(DVec3::length);
+        if !lengths.iter().all(|&length| length > 0.0 && length.is_finite()) {
+            return Err(format!("axes of the lengths {lengths:?}"));
+        }
+        let cosine = |a: usize, b: usize| {
+            let cosine = (steps[a] / lengths[a]).dot(steps[b] / lengths[b]).abs();
+            if cosine <= MAX_COSINE { 0.0 } else { cosine }
+        };
+        // Of several right angles, that of x and y, so that a series of slices keeps its slices.
+        let orders = [[0, 1, 2], [0, 2, 1], [1, 2, 0]];
+        let order = orders.into_iter().min_by(|&[a, b, _], &[c, d, _]| cosine(a, b).total_cmp(&cosine(c, d)));
+        let order @ [a, b, c] = order.unwrap_or([0, 1, 2]);
+        // A part of a step along another axis, unless it is within what counts as a right angle.
+        let along = |step: usize, direction: DVec3| {
+            let part = steps[step].dot(direction);
+            if part.abs() <= MAX_COSINE * lengths[step] { 0.0 } else { part }
+        };
+        let x = steps[a] / lengths[a];
+        let b_along_x = along(b, x);
+        let (y, b_length) = split(steps[b] - steps[b].dot(x) * x);
+        let (c_along_x, c_along_y) = (along(c, x), along(c, y));
+        let (z, c_length) = split(steps[c] - steps[c].dot(x) * x - steps[c].dot(y) * y);
+        let angle = |orthogonal: f64, length: f64| (orthogonal / length).clamp(0.0, 1.0).acos().to_degrees();
+        let degrees = angle(b_length, lengths[b]).max(angle(c_length, lengths[c]));
+        if degrees.is_nan() || degrees > MAX_DEGREES {
+            return Err(format!("axes at {degrees:.2}° from a right angle"));
+        }
+        let (mut spacing, mut axes) = (DVec3::ZERO, DMat3::ZERO);
+        for (axis, direction, length) in [(a, x, lengths[a]), (b, y, b_length), (c, z, c_length)] {
+            *axes.col_mut(axis) = direction;
+            spacing[axis] = length;
+        }
+        let third = [c_along_x / lengths[a], c_along_y / b_length];
+        let shear = Shear { order, second: b_along_x / lengths[a], third, degrees };
+        Ok(Self { spacing, axes, shear: Some(shear) })
+    }
+
+    /// What was read from the lattice, with its samples on the orthogonal axes. Voxels that lie in no sample's cell are holes.
+    ///
+    /// # Errors
+    /// If the orthogonal grid has too many voxels. `field` is where the file says how its axes lie.
+    pub(super) fn straighten<T: Voxel>(
+        &self,
+        path: &Path,
+        field: &str,
+        loaded: Loaded<T>,
+        access: &Access,
+    ) -> Result<Loaded<T>, VolumeError> {
+        let Some(shear) = self.shear else { return Ok(loaded) };
+        let ranges = shear.ranges(loaded.dims);
+        let sizes = ranges.map(|[first, last]| last - first + 1.0);
+        let voxels = u64::from(loaded.dims.element_product());
+        let dims = dims_of(sizes.map(|size| size as u64))
+            .filter(|dims| u64::from(dims.element_product()) <= MAX_GROWTH.saturating_mul(voxels));
+        let degrees = shear.degrees;
+        let too_many = |found: String| {
+            let allowed = format!("a shear that needs at most {MAX_GROWTH} times the file's {voxels} voxels");
+            invalid(path, field, format!("axes sheared by {degrees:.2}°, {found}"), allowed)
+        };
+        let Some(dims) = dims else { return Err(too_many(format!("an orthogonal grid of {sizes:?} voxels"))) };
+        let bytes = u64::from(dims.element_product()) * size_of::<T>() as u64;
+        access.reserve(path, field, format!("an orthogonal grid of {dims} voxels"), bytes)?;
+        let mut values = Vec::new();
+        let reserved = values.try_reserve_exact(dims.element_product() as usize);
+        reserved.map_err(|error| too_many(format!("an orthogonal grid of {dims} voxels: {error}")))?;
+        log::warn!(
+            "{}: sheared by {degrees:.2}°: resampled to an orthogonal grid of {dims} voxels, with holes beside the samples",
+            path.display()
+        );
+        let first = DVec3::from_array(ranges.map(|[first, _]| first));
+        values.resize(dims.element_product() as usize, T::HOLE);
+        let source = Samples { dims: loaded.dims, values: &loaded.values };
+        let rows = values.par_chunks_mut(dims.x as usize).enumerate();
+        rows.for_each(|(row, values)| {
+            let (y, z) = (row as u32 % dims.y, row as u32 / dims.y);
+            for (x, value) in values.iter_mut().enumerate() {
+                let place = shear.in_source(UVec3::new(x as u32, y, z).as_dvec3() + first);
+                *value = source.at(place, shear.order).unwrap_or(T::HOLE);
+            }
+        });
+        let mut orientation = loaded.orientation;
+        if let Some(orientation) = &mut orientation {
+            orientation.origin += orientation.axes * (first * self.spacing);
+        }
+        Ok(Loaded { dims, orientation, values, ..loaded })
+    }
+}
+
+/// Direction and length of a vector.
+fn split(vector: DVec3) -> (DVec3, f64) {
+    let length = vector.length();
+    (vector / length, length)
+}
+
+impl Shear {
+    /// The first and the last voxel, along each axis of the orthogonal grid, that lie in some sample's cell; voxel 0 is where sample 0
+    /// is.
+    fn ranges(&self, dims: UVec3) -> [[f64; 2]; 3] {
+        let [a, b, c] = self.order;
+        let last = dims.as_dvec3() - 1.0;
+        // What an axis adds at its first and last place, in ascending order.
+        let span =
+            |step: f64, [first, last]: [f64; 2]| [(step * first).min(step * last), (step * first).max(step * last)];
+        let cells = |axis: usize| [-0.5, last[axis] + 0.5];
+        let planes = [0.0, last[c]];
+        let sum = |spans: &[[f64; 2]]| {
+            let [low, high] = [0, 1].map(|end| spans.iter().map(|span| span[end]).sum::<f64>());
+            [(low - SAME_PLACE).ceil(), (high + SAME_PLACE).floor()]
+        };
+        let mut ranges = [[0.0; 2]; 3];
+        ranges[a] = sum(&[cells(a), span(self.second, cells(b)), span(self.third[0], planes)]);
+        ranges[b] = sum(&[cells(b), span(self.third[1], planes)]);
+        ranges[c] = planes;
+        ranges
+    }
+
+    /// Where a place on the orthogonal grid lies among the samples.
+    fn in_source(&self, place: DVec3) -> DVec3 {
+        let [a, b, c] = self.order;
+        let mut source = place;
+        source[b] -= place[c] * self.third[1];
+        source[a] -= source[b] * self.second + place[c] * self.third[0];
+        source
+    }
+}
+
+/// Samples on their own lattice.
+struct Samples<'a, T> {
+    dims: UVec3,
+    values: &'a [T],
+}
+
+impl<T: Voxel> Samples<'_, T> {
+    /// The value at a place that is a whole number along the third of some axes; `None` in no sample's cell.
+    fn at(&self, place: DVec3, [a, b, c]: [usize; 3]) -> Option<T> {
+        let strides = [1, self.dims.x as usize, self.dims.x as usize * self.dims.y as usize];
+        let plane = &self.values[place[c] as usize * strides[c]..];
+        let (i, i_part) = cell(place[a], self.dims[a])?;
+        let (j, j_part) = cell(place[b], self.dims[b])?;
+        let sample = |i: usize, j: usize| plane[i * strides[a] + j * strides[b]];
+        let row = |j: usize| match i_part {
+            0.0 => sample(i, j),
+            part => sample(i, j).between(sample(i + 1, j), part),
+        };
+        Some(match j_part {
+            0.0 => row(j),
+            part => row(j).between(row(j + 1), part),
+        })
+    }
+}
+
+/// The sample at or before a place on an axis with so many samples, and the part of the way to the next one, 0 at the last. The outer
+/// halves of the outermost cells count as their samples' own places; `None` beyond.
+fn cell(place: f64, samples: u32) -> Option<(usize, f64)> {
+    let last = f64::from(samples - 1);
+    if !(-0.5 - SAME_PLACE..=last + 0.5 + SAME_PLACE).contains(&place) {
+        return None;
+    }
+    let near = place.round();
+    let place = if (place - near).abs() < SAME_PLACE { near } else { place }.clamp(0.0, last);
+    Some((place as usize, place.fract()))
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use super::super::ReadOptions;
+    use super::super::orientation::Orientation;
+    use super::super::samples::SampleType;
+    use super::*;
+
+    fn loaded<T>(dims: UVec3, lattice: &Lattice, origin: DVec3, values: Vec<T>) -> Loaded<T> {
+        let orientation = Some(Orientation { axes: lattice.axes, origin });
+        Loaded { spacing: Some(lattice.spacing), orientation, ..Loaded::new(dims, SampleType::F32, values) }
+    }
+
+    fn straighten<T: Voxel>(dims: UVec3, steps: [DVec3; 3], values: Vec<T>) -> Loaded<T> {
+        let lattice = Lattice::of(steps).unwrap();
+        let access = Access::new(&ReadOptions::default()).unwrap();
+        lattice.straighten(Path::new("here"), "axes", loaded(dims, &lattice, DVec3::ZERO, values), &access).unwrap()
+    }
+
+    /// The places of a grid's voxels, x fastest.
+    fn places(dims: UVec3) -> impl Iterator<Item = DVec3> {
+        let [x, y, z] = dims.to_array();
+        (0..z).flat_map(move |z| (0..y).flat_map(move |y| (0..x).map(move |x| UVec3::new(x, y, z).as_dvec3())))
+    }
+
+    #[test]
+    fn right_angles_stay_as_they_are() {
+        let steps = [DVec3::new(0.0, 2.0, 0.0), DVec3::new(3.0, 0.0, 0.0002), DVec3::new(0.0, 0.0, 4.0)];
+        let result = straighten(UVec3::new(2, 1, 1), steps, vec![1.0_f32, 2.0]);
+        assert_eq!((result.dims, result.values), (UVec3::new(2, 1, 1), vec![1.0, 2.0]));
+    }
+
+    /// Slices that a tilted gantry moves by one row each, and by half a row.
+    #[test]
+    fn slices_move_within_their_planes() {
+        let dims = UVec3::new(1, 2, 3);
+        let values = || (0..6).map(|i| (10 * (i / 2) + i % 2) as f32).collect::<Vec<_>>();
+        let hole = f32::NAN;
+        let tilted = |shift: f64| [DVec3::X, 2.0 * DVec3::Y, DVec3::new(0.0, 2.0 * shift, 4.0)];
+        let whole = straighten(dims, tilted(1.0), values());
+        assert_eq!((whole.dims, whole.spacing), (UVec3::new(1, 4, 3), Some(DVec3::new(1.0, 2.0, 4.0))));
+        let expected = [0.0, 1.0, hole, hole, hole, 10.0, 11.0, hole, hole, hole, 20.0, 21.0];
+        assert!(whole.values.iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()), "{:?}", whole.values);
+        // The other way the first voxel is no longer sample 0.
+        let back = straighten(dims, tilted(-1.0), values());
+        assert_eq!(back.orientation.unwrap().origin, DVec3::new(0.0, -4.0, 0.0));
+        let expected = [hole, hole, 0.0, 1.0, hole, 10.0, 11.0, hole, 20.0, 21.0, hole, hole];
+        assert!(back.values.iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()), "{:?}", back.values);
+        let half = straighten(dims, tilted(0.5), values());
+        assert_eq!(half.dims, UVec3::new(1, 3, 3));
+        // Half a row off, the outer halves of the outermost cells have their samples' values.
+        let expected = [0.0, 1.0, hole, 10.0, 10.5, 11.0, hole, 20.0, 21.0];
+        assert!(half.values.iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()), "{:?}", half.values);
+    }
+
+    /// A field that is linear in the patient is the same field afterwards, whichever axes are sheared.
+    #[test]
+    fn linear_fields_stay() {
+        let dims = UVec3::new(6, 7, 8);
+        let straight = [DVec3::new(0.6, 0.8, 0.0), DVec3::new(-1.6, 1.2, 0.0), DVec3::new(0.0, 0.0, 3.0)];
+        let field = |place: DVec3| place.dot(DVec3::new(1.0, -2.0, 0.5)) + 100.0;
+        let skews = [(0, 1, 0.3), (1, 0, -0.2), (2, 0, 0.5), (2, 1, -0.4), (0, 2, 0.15)];
+        for mask in 1_u32..32 {
+            let mut steps = straight;
+            for (number, (step, other, part)) in skews.into_iter().enumerate() {
+                if mask >> number & 1 == 1 {
+                    steps[step] += part * straight[other];
+                }
+            }
+            let position = |place: DVec3| steps[0] * place.x + steps[1] * place.y + steps[2] * place.z;
+            let values = places(dims).map(|place| field(position(place)) as f32).collect();
+            let result = straighten(dims, steps, values);
+            let Orientation { axes, origin } = result.orientation.unwrap();
+            let spacing = result.spacing.unwrap();
+            assert!((axes.transpose() * axes).abs_diff_eq(DMat3::IDENTITY, 1e-12), "{mask}");
+            let inverse = DMat3::from_cols(steps[0], steps[1], steps[2]).inverse();
+            let (mut compared, mut held) = (0, 0);
+            for (place, &value) in places(result.dims).zip(&result.values) {
+                let at = origin + axes * (spacing * place);
+                let source = inverse * at;
+                let distance = (source - source.clamp(DVec3::ZERO, dims.as_dvec3() - 1.0)).abs().max_element();
+                if (distance - 0.5).abs() > 1e-4 {
+                    assert_eq!(value.is_nan(), distance > 0.5, "{mask}: {value} at {source}");
+                }
+                held += u32::from(value.is_finite());
+                if distance < 1e-9 {
+                    assert!((f64::from(value) - field(at)).abs() < 1e-4, "{mask}: {value} at {source}");
+                    compared += 1;
+                }
+            }
+            // Cells and voxels are of one size, so about as many voxels as samples have a value.
+            let samples = dims.element_product();
+            assert!(2 * compared > samples && held.abs_diff(samples) < samples / 4, "{mask}: {compared}, {held}");
+        }
+    }
+
+    #[test]
+    fn the_axis_between_right_angles_moves() {
+        let angle = 20_f64.to_radians();
+        for sheared in 0..3 {
+            let mut steps = [DVec3::X, DVec3::Y, DVec3::Z];
+            steps[sheared] = angle.cos() * steps[sheared] + angle.sin() / 2_f64.sqrt() * (DVec3::ONE - steps[sheared]);
+            let shear = Lattice::of(steps).unwrap().shear.unwrap();
+            assert_eq!(shear.order[2], sheared);
+            assert!((shear.degrees - 20.0).abs() < 1e-9, "{}", shear.degrees);
+        }
+        // Of two axes the later one moves.
+        let skew = [DVec3::X, DVec3::new(0.5, 3.0, 0.0), DVec3::Z];
+        assert_eq!(Lattice::of(skew).unwrap().shear.unwrap().order, [0, 2, 1]);
+    }
+
+    #[test]
+    fn labels_are_the_nearest_ones_and_holes_spread() {
+        let steps = [DVec3::X, DVec3::Y, DVec3::new(0.25, 0.0, 1.0)];
+        let labels = straighten(UVec3::new(3, 1, 3), steps, vec![1_u16, 2, 3, 4, 5, 6, 7, 8, 9]);
+        assert_eq!((labels.dims.x, labels.values), (4, vec![1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 9]));
+        let values = straighten(UVec3::new(3, 1, 2), steps, vec![1.0, 2.0, 3.0, 4.0, 5.0, f32::NAN]);
+        let found: Vec<bool> = values.values.iter().map(|value| value.is_nan()).collect();
+        assert_eq!(found, [false, false, false, false, false, true]);
+    }
+
+    #[test]
+    fn what_is_refused() {
+        let refused = |steps: [DVec3; 3], found: &str| {
+            let error = Lattice::of(steps).unwrap_err();
+            assert!(error.contains(found), "{error}");
+        };
+        refused([DVec3::X, DVec3::Y, DVec3::new(1.0, 1.0, 0.0)], "axes at 90.00° from a right angle");
+        refused([DVec3::X, DVec3::X, DVec3::Z], "from a right angle");
+        refused([DVec3::X, DVec3::Y, DVec3::ZERO], "axes of the lengths [1.0, 1.0, 0.0]");
+        refused([DVec3::X, DVec3::Y, DVec3::splat(f64::NAN)], "NaN");
+        // Fine columns, and slices far apart: a grid of mostly holes.
+        let lattice = Lattice::of([1e-3 * DVec3::X, DVec3::Y, DVec3::new(1.0, 0.0, 1.0)]).unwrap();
+        let refused = |lattice: Lattice, options: ReadOptions| {
+            let loaded = loaded(UVec3::new(2, 1, 9), &lattice, DVec3::ZERO, vec![0.0_f32; 18]);
+            let access = Access::new(&options).unwrap();
+            lattice.straighten(Path::new("here"), "axes", loaded, &access).err().unwrap().to_string()
+        };
+        let error = refused(lattice, ReadOptions::default());
+        let expected = "here: axes: found axes sheared by 45.00°, an orthogonal grid of [8002.0, 1.0, 9.0] voxels";
+        assert!(error.starts_with(expected), "{error}");
+        // And one that takes too much memory.
+        let lattice = Lattice::of([DVec3::X, DVec3::Y, DVec3::new(1.0, 0.0, 1.0)]).unwrap();
+        let error = refused(lattice, ReadOptions::default().with_memory(100));
+        assert!(error.contains("[10, 1, 9] voxels, which take 360 bytes of memory, allowed: at most"), "{error}");
+    }
+}

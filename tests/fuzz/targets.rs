@@ -1,0 +1,87 @@
+//! What is fuzzed: a function for every kind of input, which a bad one must not make panic. Included by the libFuzzer targets, and by
+//! `tests/fuzzing.rs`, which needs no libFuzzer.
+
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+use std::{env, fs, process};
+
+use sheetsplat::Scene;
+use sheetsplat::golden::Picture;
+use sheetsplat::volume::{RawLayout, SampleType, Volume, VolumeError};
+
+/// What takes an input, by its name.
+pub(crate) const TARGETS: [(&str, fn(&[u8])); 15] = [
+    ("nrrd", |bytes| volume("volume.nrrd", bytes, Volume::open)),
+    ("nifti", |bytes| volume("volume.nii", bytes, Volume::open)),
+    ("metaimage", |bytes| volume("volume.mha", bytes, Volume::open)),
+    ("mgh", |bytes| volume("volume.mgh", bytes, Volume::open)),
+    ("npz", |bytes| volume("volume.npz", bytes, Volume::open)),
+    ("npy", |bytes| volume("volume.npy", bytes, Volume::open)),
+    ("raw", raw),
+    ("tiff", |bytes| volume("volume.tif", bytes, Volume::open)),
+    ("dicom", |bytes| volume("volume.dcm", bytes, Volume::open)),
+    ("vti", |bytes| volume("volume.vti", bytes, Volume::open)),
+    ("vtk", |bytes| volume("volume.vtk", bytes, Volume::open)),
+    ("png-image", |bytes| image("image.png", bytes)),
+    ("exr-image", |bytes| image("image.exr", bytes)),
+    ("npy-image", |bytes| image("image.npy", bytes)),
+    ("scene", scene),
+];
+
+static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| {
+    let folder = env::temp_dir().join(format!("sheetsplat-fuzz-{}", process::id()));
+    fs::create_dir_all(&folder).expect("a folder for temporary files");
+    folder
+});
+
+/// Removes the temporary files of this process.
+pub(crate) fn clean_up() {
+    _ = fs::remove_dir_all(&*FOLDER);
+}
+
+/// Writes bytes to a file of this name.
+fn file(name: &str, bytes: &[u8]) -> PathBuf {
+    let path = FOLDER.join(name);
+    // Written over, a file may be waited for until it is on the disk; a new one is not.
+    _ = fs::remove_file(&path);
+    fs::write(&path, bytes).expect("a temporary file");
+    path
+}
+
+/// Opens bytes as a file of this name: a whole volume or an error.
+fn volume(name: &str, bytes: &[u8], open: impl Fn(&Path) -> Result<Volume, VolumeError>) {
+    if let Ok(volume) = open(&file(name, bytes)) {
+        assert_eq!(volume.values().len(), volume.dims().element_product() as usize);
+        let holes = volume.values().iter().filter(|value| value.is_nan()).count() as u64;
+        assert!(holes == volume.holes() && holes < volume.values().len() as u64);
+        assert!(!volume.values().iter().any(|value| value.is_infinite()));
+    }
+}
+
+/// The first bytes say what the others are.
+fn raw(bytes: &[u8]) {
+    let Some(([x, y, z, kind, offset], samples)) = bytes.split_first_chunk() else { return };
+    let kinds = [SampleType::I8, SampleType::U16, SampleType::I32, SampleType::F32, SampleType::F64, SampleType::U64];
+    let layout = RawLayout {
+        dims: [*x, *y, *z].map(u32::from).into(),
+        sample_type: kinds[usize::from(*kind) % kinds.len()],
+        big_endian: kind & 0x80 != 0,
+        offset: (*offset).into(),
+    };
+    volume("volume.raw", samples, |path| Volume::open_raw(path, &layout));
+}
+
+/// As `compare` and goldens read images.
+fn image(name: &str, bytes: &[u8]) {
+    if let Ok(Picture { image, .. }) = Picture::open(&file(name, bytes)) {
+        assert_eq!(image.pixels.len(), image.width as usize * image.height as usize);
+    }
+}
+
+/// A line of override, then a scene.
+fn scene(bytes: &[u8]) {
+    let text = String::from_utf8_lossy(bytes);
+    let (set, scene) = text.split_once('\0').unwrap_or(("", &text));
+    let sets = if set.is_empty() { vec![] } else { vec![set.to_owned()] };
+    _ = Scene::parse(scene, "a scene", Path::new("."), &sets);
+}
