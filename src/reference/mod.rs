@@ -74,9 +74,11 @@ struct Frame {
 
 impl Frame {
     fn new(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Self, RenderError> {
+        // Before a camera is placed by what is visible.
+        scene.check()?;
+        transfer.check()?;
         let scene = &scene.framed(volume, transfer);
         let geometry = Geometry::new(volume.grid(), scene)?;
-        transfer.check()?;
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
         let voxels = shading::taking_part(volume, transfer, &geometry);
         let splats = shading::splats(&voxels, volume, transfer, scene, &geometry);

@@ -38,6 +38,7 @@ pub enum Projection {
 
 /// What a camera shows that leaves its centre, its height or its distance open.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Fit {
     /// The whole volume, whatever is visible of it.
     #[default]
@@ -90,7 +91,9 @@ impl Camera {
         let Self { direction, up, center, .. } = *self;
         check_direction("camera.direction", direction)?;
         check_direction("camera.up", up)?;
-        Interval::FINITE.check_each("camera.center", &center.unwrap_or_default().to_array())?;
+        if let Some(center) = center {
+            Interval::FINITE.check_each("camera.center", &center.to_array())?;
+        }
         if scaled(direction).normalize().cross(scaled(up).normalize()).length() < PARALLEL {
             let found = format!("{up} with direction {direction}");
             return Err(SettingError::new("camera.up", found, "a vector not parallel to camera.direction"));

@@ -9,8 +9,11 @@ use sheetsplat::Scene;
 use sheetsplat::golden::Picture;
 use sheetsplat::volume::{RawLayout, SampleType, Volume, VolumeError};
 
+/// What a target does with an input.
+pub(crate) type Target = fn(&[u8]);
+
 /// What takes an input, by its name.
-pub(crate) const TARGETS: [(&str, fn(&[u8])); 15] = [
+pub(crate) const TARGETS: [(&str, Target); 15] = [
     ("nrrd", |bytes| volume("volume.nrrd", bytes, Volume::open)),
     ("nifti", |bytes| volume("volume.nii", bytes, Volume::open)),
     ("metaimage", |bytes| volume("volume.mha", bytes, Volume::open)),
