@@ -16,7 +16,7 @@ use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::uniforms::Ramps;
 use crate::pass::composite::RayMode;
 use crate::scene::Scene;
-use crate::settings::splatting::{Rasterizer, Splatting};
+use crate::settings::splatting::{Classification, Rasterizer, Splatting};
 
 /// A frame of a view.
 #[derive(Debug)]
@@ -50,6 +50,11 @@ impl FrameRequest {
     ) -> Result<Self, RenderError> {
         let splatting = settled(scene.splatting, rasterizer);
         splatting.check()?;
+        if splatting.classification == Classification::After {
+            let (key, found) = ("splatting.classification", "\"after\" on the GPU".to_owned());
+            let allowed = "\"before\", or the reference backend".to_owned();
+            return Err(RenderError::OutOfRange { key, found, allowed });
+        }
         let (grid, size) = (volume.grid(), [scene.image.width, scene.image.height]);
         let seen = ViewGeometry::new(grid, &scene.camera, &splatting, size)?;
         let bands = CompositingBuffer::bands(&device.limits(), size)?;

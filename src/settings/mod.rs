@@ -10,6 +10,8 @@ pub(crate) mod transfer_function;
 
 pub use camera::{Camera, Projection};
 pub use clip::{Clip, HalfSpace, MAX_PLANES};
-pub use shading::{Light, Shading};
-pub use splatting::{Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
+pub use shading::{Gradient, Light, Shading};
+pub use splatting::{
+    Classification, Compositing, Economies, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer, Splatting,
+};
 pub use transfer_function::{LabelTables, Ramp, RampError, Tables, TransferFunction};

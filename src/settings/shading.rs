@@ -14,6 +14,15 @@ pub enum Light {
     Direction(DVec3),
 }
 
+/// Which gradient the normals are of for [`Classification::After`](super::Classification::After).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gradient {
+    /// The voxels' central differences, interpolated like the values.
+    Differences,
+    /// The derivative of the reconstructed field: sharper, but it shows the noise of a scan.
+    Kernel,
+}
+
 /// Two-sided Phong shading with white highlights, computed in the unwarped space (§4.2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shading {
@@ -29,10 +38,20 @@ pub struct Shading {
     pub shininess: f64,
     /// Where the light comes from.
     pub light: Light,
+    /// Which gradient is used; without effect for [`Classification::Before`](super::Classification::Before).
+    pub gradient: Gradient,
 }
 
 impl Default for Shading {
     fn default() -> Self {
-        Self { enabled: true, ambient: 0.2, diffuse: 0.7, specular: 0.2, shininess: 20.0, light: Light::Headlight }
+        Self {
+            enabled: true,
+            ambient: 0.2,
+            diffuse: 0.7,
+            specular: 0.2,
+            shininess: 20.0,
+            light: Light::Headlight,
+            gradient: Gradient::Differences,
+        }
     }
 }
