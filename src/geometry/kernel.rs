@@ -93,7 +93,9 @@ impl Kernel {
         let weights: Vec<([usize; 3], f64)> = cube(reach + 1)
             .map(|offset| (offset, offset.map(|d| (d * d) as f64).iter().sum::<f64>()))
             .filter(|(_, squared)| *squared < self.radius * self.radius)
-            .map(|(offset, squared)| (offset, (-self.falloff * squared).exp() * offset.map(count).iter().product::<f64>()))
+            .map(|(offset, squared)| {
+                (offset, (-self.falloff * squared).exp() * offset.map(count).iter().product::<f64>())
+            })
             .collect();
         let response = |frequency: [usize; 3]| {
             let term = |&([x, y, z], weight): &([usize; 3], f64)| {

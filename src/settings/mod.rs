@@ -12,6 +12,7 @@ pub use camera::{Camera, Projection};
 pub use clip::{Clip, HalfSpace, MAX_PLANES};
 pub use shading::{Gradient, Light, Shading};
 pub use splatting::{
-    Classification, Compositing, Economies, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer, Splatting,
+    Classification, Compositing, Economies, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer,
+    Splatting,
 };
 pub use transfer_function::{LabelTables, Ramp, RampError, Tables, TransferFunction};
