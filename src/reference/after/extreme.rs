@@ -15,7 +15,7 @@ struct Point {
 
 /// The pixel that its chosen value gives. Its first hit is the chosen point, or for `average` the stretch's middle, if the opacity asked for
 /// is reached there.
-pub fn composite(pixel: &Pixel) -> Composited {
+pub(super) fn composite(pixel: &Pixel) -> Composited {
     let (scene, stretch) = (pixel.frame().scene, pixel.stretch());
     let compositing = scene.splatting.compositing;
     let chosen = match compositing {

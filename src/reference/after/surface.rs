@@ -20,7 +20,7 @@ const SAMPLES: u32 = 32;
 const HALVINGS: u32 = 50;
 
 /// The pixel that its first surface gives.
-pub fn composite(pixel: &Pixel) -> Composited {
+pub(super) fn composite(pixel: &Pixel) -> Composited {
     let mut near = None;
     for (first, k) in (0..).zip(pixel.slabs()) {
         if first == 0 {
