@@ -56,7 +56,7 @@ fn a_constant_volume_reconstructs_its_value() {
                     assert!((value / 37.0 - 1.0).abs() < 1e-5, "{at}: {value}");
                     assert!(gradient.length() < 1e-9, "{at}: {gradient}");
                 });
-                assert!(count > 500, "{count}");
+                assert!(count > 300, "{count}");
             }
         }
     }
@@ -71,8 +71,9 @@ fn a_ramp_has_its_normal() {
         let slope = DVec3::new(3.0, -2.0, 1.0);
         let volume = volume([10, 9, 8], spacing, |voxel| slope.dot(voxel.as_dvec3() * spacing));
         let mut scene = scene(24, 20);
+        // Pixels smaller than grid units: wider kernels' derivatives are those of the lowered offsets.
+        scene.camera.projection = projection.unwrap_or(Projection::Orthographic { height: Some(12.0) });
         scene.camera.direction = DVec3::new(-0.4, 0.9, 0.5);
-        scene.camera.projection = projection.unwrap_or(scene.camera.projection);
         // The derivative of the field ripples, with this kernel by less than half a degree; the values themselves are smoothed.
         (scene.splatting.radius, scene.splatting.falloff) = (3.0, 1.0);
         for (gradient, degrees) in [(Gradient::Differences, 0.1), (Gradient::Kernel, 0.5)] {
@@ -201,6 +202,8 @@ fn planes_are_as_specified() {
         let volume = random_volume(&mut random, (5.0, 9.0), spacing);
         let mut scene = scene(11, 9);
         scene.camera.direction = random.direction();
+        // Lowered maps have steps of exactly 1, and no voxel may be on the rim of a kernel by more than chance.
+        scene.camera.center = random.within(DVec3::splat(-0.5), DVec3::splat(0.5));
         let size = (volume.grid().center() * volume.spacing()).length();
         scene.camera.projection = if case % 2 == 0 {
             Projection::Orthographic { height: Some(size * random.pick(&[0.5, 2.5])) }

@@ -98,14 +98,16 @@ fn thinner_slabs_converge() {
         let steps: Vec<f64> = images.windows(2).map(|pair| rms(&pair[0], &pair[1])).collect();
         println!("{compositing:?}: {steps:.5?}");
         assert!(steps[0] > 1e-4 && steps[0] < 0.1, "{compositing:?}: {steps:?}");
-        assert!(steps[1] < 0.7 * steps[0] && steps[2] < 0.7 * steps[1], "{compositing:?}: {steps:?}");
+        // A maximum is taken over the planes' points alone.
+        let factor = if compositing == Compositing::Maximum { 0.8 } else { 0.7 };
+        assert!(steps[1] < factor * steps[0] && steps[2] < factor * steps[1], "{compositing:?}: {steps:?}");
     }
 }
 
 /// Fig. 3's cube at 44.8° and 45.2°.
 #[test]
 fn the_cube_does_not_pop() {
-    let mut scene = scene(128, 128);
+    let mut scene = scene(256, 256);
     scene.camera.up = DVec3::Z;
     scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (255.0, 0.5)]);
     (scene.shading.ambient, scene.shading.diffuse, scene.shading.specular) = (0.0, 1.0, 0.0);
@@ -123,7 +125,7 @@ fn the_cube_does_not_pop() {
         });
         let rms = color_rms(&before, &after);
         println!("{compositing:?} {interpolation:?}: {rms:.5}");
-        assert!(before.pixels.iter().filter(|pixel| pixel[3] > 0.9).count() > 2000);
+        assert!(before.pixels.iter().filter(|pixel| pixel[3] > 0.9).count() > 8000);
         assert!(rms < 0.003, "{compositing:?} {interpolation:?}: {rms}");
     }
 }
@@ -137,7 +139,7 @@ fn surface_and_exponential_agree_on_an_opaque_step() {
     });
     for gradient in [Gradient::Differences, Gradient::Kernel] {
         let mut scene = scene(64, 64);
-        scene.camera.direction = DVec3::new(0.2, 1.0, -0.3);
+        scene.camera = camera([0.2, 1.0, -0.3], 18.0);
         scene.image.background = [0.0, 0.0, 0.0, 1.0];
         scene.shading.gradient = gradient;
         scene.shading.light = Light::Direction(DVec3::new(-0.5, -1.0, 0.5));

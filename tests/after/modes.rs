@@ -27,7 +27,7 @@ fn maximum_average_and_minimum_are_in_order() {
         assert!(max[3] >= mean[3] && mean[3] >= min[3], "{max:?} {mean:?} {min:?}");
         parted += usize::from(max[3] > mean[3] + 0.1 && mean[3] > min[3] + 0.05);
     }
-    assert!(parted > 300, "{parted}");
+    assert!(parted > 80, "{parted}");
 }
 
 /// A ramp along the ray: the ends and the middle of the cells' box, as far as planes reach them.
@@ -167,13 +167,14 @@ fn peaks_keep_their_amount() {
     let (volume, mut scene) = ramp();
     scene.camera = camera([0.0, 1.0, 0.0], 3.0);
     scene.splatting.compositing = Compositing::Xray;
+    // Without ripple, so that the ramp is straight.
+    (scene.splatting.radius, scene.splatting.falloff) = (3.0, 1.0);
     // A triangle of height 1 and width 0.1 over the value, which grows by 1 along each unit of the ray.
     scene.transfer.opacity = Some(Ramp::new(vec![(11.32, 0.0), (11.37, 1.0), (11.42, 0.0)]).unwrap());
     for width in [0.3, 1.0, 2.7] {
         scene.splatting.slab_width = width;
         let alpha = f64::from(render(&volume, &scene).pixels[4][3]);
-        // The kernel's ripple bends the ramp by some percent.
-        assert!((alpha - 0.05).abs() < 0.005, "{width}: {alpha}");
+        assert!((alpha - 0.05).abs() < 0.0005, "{width}: {alpha}");
     }
     // An iso-range as wide cuts a piece of the ramp out.
     scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.5)]).unwrap());
@@ -181,6 +182,6 @@ fn peaks_keep_their_amount() {
     for width in [0.3, 1.0, 2.7] {
         scene.splatting.slab_width = width;
         let alpha = f64::from(render(&volume, &scene).pixels[4][3]);
-        assert!((alpha - 0.05).abs() < 0.005, "{width}: {alpha}");
+        assert!((alpha - 0.05).abs() < 0.0005, "{width}: {alpha}");
     }
 }

@@ -66,13 +66,16 @@ impl SlabIntegral {
     }
 }
 
-/// Whether any value from f0 to f1 has an opacity, of those that more than a single one shares.
+/// Whether any value from f0 to f1 has an opacity, a single one in an iso-range of its own too.
 pub fn is_visible(tables: &Tables, [f0, f1]: [f64; 2]) -> bool {
     let at = |t: f64| f0 + (f1 - f0) * t;
-    let shows = |piece: &[f64]| {
-        tables.in_iso_range(at((piece[0] + piece[1]) / 2.0)) && piece.iter().any(|&t| tables.opacity.at(at(t)) > 0.0)
+    let alpha = |t: f64| tables.opacity.at(at(t));
+    let knots = knots(tables, [f0, f1]);
+    let shows_inside = |piece: &[f64]| {
+        tables.in_iso_range(at((piece[0] + piece[1]) / 2.0)) && alpha(piece[0]).max(alpha(piece[1])) > 0.0
     };
-    tables.visible && knots(tables, [f0, f1]).windows(2).any(shows)
+    let shows_at = |&t: &f64| tables.in_iso_range(at(t)) && alpha(t) > 0.0;
+    tables.visible && (knots.iter().any(shows_at) || knots.windows(2).any(shows_inside))
 }
 
 /// Where α or C has a kink or m a step on the way from f0 to f1: increasing from 0 to 1.
