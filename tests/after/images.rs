@@ -4,7 +4,7 @@ use glam::{DVec3, UVec3};
 use sheetsplat::internals::reference::after::Frame;
 use sheetsplat::internals::reference::{self, Host};
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Compositing, Gradient, Interpolation, Light, Ramp};
+use sheetsplat::settings::{Compositing, Interpolation, Light, Ramp};
 use sheetsplat::volume::{Volume, builtin};
 
 use crate::common::images::{BLACK, color_rms, psnr, rms};
@@ -104,29 +104,41 @@ fn thinner_slabs_converge() {
     }
 }
 
-/// Fig. 3's cube at 44.8° and 45.2°.
+/// Fig. 3's cube from 44.8° to 45.2°. By its voxels' values it hardly changes. Its lit faces do: normals have no length, so where kernels end the
+/// light goes out at once, and the bright edge in front moves by two thirds of a pixel; but no more than at other angles, by a tenth of what
+/// axis-aligned sheets do there, and less with thinner slabs.
 #[test]
 fn the_cube_does_not_pop() {
-    let mut scene = scene(256, 256);
-    scene.camera.up = DVec3::Z;
-    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (255.0, 0.5)]);
-    (scene.shading.ambient, scene.shading.diffuse, scene.shading.specular) = (0.0, 1.0, 0.0);
     let volume = builtin::volume("cube").unwrap();
     for (compositing, interpolation) in [
         (Compositing::Linear, Interpolation::Smooth),
         (Compositing::Exponential, Interpolation::Smooth),
         (Compositing::Exponential, Interpolation::Exact),
     ] {
+        let mut scene = scene(256, 256);
+        scene.camera.up = DVec3::Z;
+        scene.transfer = transfer(&[(0.0, [0.0, 0.5, 1.0]), (255.0, [1.0; 3])], &[(0.0, 0.0), (255.0, 0.5)]);
+        (scene.shading.ambient, scene.shading.diffuse, scene.shading.specular) = (0.0, 1.0, 0.0);
         (scene.splatting.compositing, scene.splatting.interpolation) = (compositing, interpolation);
-        let [before, after] = [44.8_f64, 45.2].map(|degrees| {
-            let (sine, cosine) = degrees.to_radians().sin_cos();
-            scene.camera.direction = DVec3::new(sine, cosine, 0.0);
-            render(&volume, &scene)
-        });
-        let rms = color_rms(&before, &after);
-        println!("{compositing:?} {interpolation:?}: {rms:.5}");
-        assert!(before.pixels.iter().filter(|pixel| pixel[3] > 0.9).count() > 8000);
-        assert!(rms < 0.003, "{compositing:?} {interpolation:?}: {rms}");
+        let turned = |scene: &Scene, from: f64| {
+            let [before, after] = [from, from + 0.4].map(|degrees: f64| {
+                let (sine, cosine) = degrees.to_radians().sin_cos();
+                let mut scene = scene.clone();
+                scene.camera.direction = DVec3::new(sine, cosine, 0.0);
+                render(&volume, &scene)
+            });
+            assert!(before.pixels.iter().filter(|pixel| pixel[3] > 0.9).count() > 8000);
+            color_rms(&before, &after)
+        };
+        let [lit, lit_elsewhere] = [44.8, 43.3].map(|from| turned(&scene, from));
+        scene.splatting.slab_width = 0.25;
+        let thin = turned(&scene, 44.8);
+        scene.splatting.slab_width = 1.0;
+        scene.shading.enabled = false;
+        let unlit = turned(&scene, 44.8);
+        println!("{compositing:?} {interpolation:?}: {lit:.5}, {lit_elsewhere:.5}, thin {thin:.5}, unlit {unlit:.5}");
+        assert!(unlit < 0.003, "{compositing:?} {interpolation:?}: {unlit}");
+        assert!(lit < 0.006 && lit < 1.1 * lit_elsewhere && thin < 0.8 * lit, "{lit} {lit_elsewhere} {thin}");
     }
 }
 
@@ -137,21 +149,20 @@ fn surface_and_exponential_agree_on_an_opaque_step() {
         let p = voxel.as_dvec3() - 9.5;
         if p.length() < 7.3 { 100.0 } else { 0.0 }
     });
-    for gradient in [Gradient::Differences, Gradient::Kernel] {
+    for slab_width in [0.25, 0.125] {
         let mut scene = scene(64, 64);
         scene.camera = camera([0.2, 1.0, -0.3], 18.0);
         scene.image.background = [0.0, 0.0, 0.0, 1.0];
-        scene.shading.gradient = gradient;
         scene.shading.light = Light::Direction(DVec3::new(-0.5, -1.0, 0.5));
         scene.transfer = transfer(&[(0.0, [0.9, 0.5, 0.2])], &[(49.9, 0.0), (50.1, 1.0)]);
-        scene.splatting.slab_width = 0.25;
+        scene.splatting.slab_width = slab_width;
         let [surface, exponential] = [Compositing::Surface, Compositing::Exponential].map(|compositing| {
             scene.splatting.compositing = compositing;
             render(&volume, &scene)
         });
         let decibels = psnr(&surface.pixels, &exponential.pixels, BLACK, 1000);
-        println!("{gradient:?}: {decibels:.1} dB");
-        assert!(decibels > 40.0, "{gradient:?}: {decibels}");
+        println!("slab width {slab_width}: {decibels:.1} dB");
+        assert!(decibels > 40.0, "slab width {slab_width}: {decibels}");
     }
 }
 
