@@ -42,8 +42,10 @@ pub fn exact(grid: &Grid, values: &[f64], radius: f64, falloff: f64) -> Result<V
         let at_voxels = residual.iter().zip(&weights).filter(|(_, weight)| **weight > 0.0);
         at_voxels.map(|(residual, weight)| (residual / weight).abs()).fold(0.0, f64::max)
     };
+    // Of holes alone there is no range.
+    let tolerance = TOLERANCE * (max - min).max(0.0);
     for _ in 0..MAX_STEPS {
-        if error(&residual) <= TOLERANCE * (max - min) {
+        if error(&residual) <= tolerance {
             let c = c.iter().zip(&is_hole).map(|(c, &is_hole)| if is_hole { f64::NAN } else { c + middle });
             return Ok(c.collect());
         }
@@ -103,5 +105,43 @@ impl Taps {
             sums.iter_mut().zip(&is_hole[row * nx..]).filter(|(_, is_hole)| **is_hole).for_each(|(sum, _)| *sum = 0.0);
         });
         sums
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use glam::{DVec3, UVec3};
+
+    use super::*;
+
+    /// Around holes, too, which are in none of the sums.
+    #[test]
+    fn fields_have_the_values_at_voxels() {
+        let grid = Grid { dims: UVec3::new(6, 5, 4), spacing: DVec3::ONE };
+        let value = |index: u32| match index * 7919 % 31 {
+            3 | 17 => f64::NAN,
+            rest => 1e6 + f64::from(rest * rest),
+        };
+        let values: Vec<f64> = (0..120).map(value).collect();
+        let coefficients = exact(&grid, &values, 2.0, 1.0).unwrap();
+        for (j, expected) in (0..).zip(&values) {
+            assert_eq!(coefficients[j as usize].is_nan(), expected.is_nan());
+            let (mut sum, mut weights) = (0.0, 0.0);
+            for (i, coefficient) in (0..).zip(&coefficients).filter(|(_, coefficient)| !coefficient.is_nan()) {
+                let squared = grid.voxel_at(i).as_dvec3().distance_squared(grid.voxel_at(j).as_dvec3());
+                let weight = if squared < 4.0 { (-squared).exp() } else { 0.0 };
+                sum += weight * coefficient;
+                weights += weight;
+            }
+            assert!(expected.is_nan() || (sum / weights - expected).abs() < 1e-5, "{j}: {sum} / {weights}, {expected}");
+        }
+    }
+
+    #[test]
+    fn constants_and_volumes_of_holes_alone() {
+        let grid = Grid { dims: UVec3::new(3, 3, 3), spacing: DVec3::ONE };
+        assert!(exact(&grid, &[5.0; 27], 2.0, 2.0).unwrap().iter().all(|&c| (c - 5.0).abs() < 1e-12));
+        assert!(exact(&grid, &[f64::NAN; 27], 2.0, 2.0).unwrap().iter().all(|c| c.is_nan()));
     }
 }
