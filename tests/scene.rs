@@ -361,7 +361,13 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
     ("splatting.whole_below", "1.5", "splatting.whole_below", "1.5", "a number in [0, 1]"),
     ("splatting.beta", "0", "splatting.beta", "0", "a number in (0, 1]"),
     ("splatting.resolution", "-0.1", "splatting.resolution", "-0.1", "a number in [0, 1]"),
-    ("splatting.tile", "true", "splatting.tile", "an unknown key", "method, radius, falloff, slab_width, footprint"),
+    (
+        "splatting.tile",
+        "true",
+        "splatting.tile",
+        "an unknown key",
+        "method, radius, falloff, slab_width, classification, interpolation, footprint",
+    ),
 ];
 
 #[test]

@@ -105,17 +105,15 @@ fn thinner_slabs_converge() {
 }
 
 /// Fig. 3's cube from 44.8° to 45.2°. By its voxels' values it hardly changes. Its lit faces do: normals have no length, so where kernels end the
-/// light goes out at once, and the bright edge in front moves by two thirds of a pixel; but no more than at other angles, by a tenth of what
+/// light goes out at once, and the bright edge in front moves; but no more than at other angles, by a tenth of what
 /// axis-aligned sheets do there, and less with thinner slabs.
 #[test]
 fn the_cube_does_not_pop() {
     let volume = builtin::volume("cube").unwrap();
-    for (compositing, interpolation) in [
-        (Compositing::Linear, Interpolation::Smooth),
-        (Compositing::Exponential, Interpolation::Smooth),
-        (Compositing::Exponential, Interpolation::Exact),
-    ] {
-        let mut scene = scene(256, 256);
+    for (compositing, interpolation) in
+        [(Compositing::Linear, Interpolation::Smooth), (Compositing::Exponential, Interpolation::Exact)]
+    {
+        let mut scene = scene(128, 128);
         scene.camera.up = DVec3::Z;
         scene.transfer = transfer(&[(0.0, [0.0, 0.5, 1.0]), (255.0, [1.0; 3])], &[(0.0, 0.0), (255.0, 0.5)]);
         (scene.shading.ambient, scene.shading.diffuse, scene.shading.specular) = (0.0, 1.0, 0.0);
@@ -127,7 +125,7 @@ fn the_cube_does_not_pop() {
                 scene.camera.direction = DVec3::new(sine, cosine, 0.0);
                 render(&volume, &scene)
             });
-            assert!(before.pixels.iter().filter(|pixel| pixel[3] > 0.9).count() > 8000);
+            assert!(before.pixels.iter().filter(|pixel| pixel[3] > 0.9).count() > 2000);
             color_rms(&before, &after)
         };
         let [lit, lit_elsewhere] = [44.8, 43.3].map(|from| turned(&scene, from));
