@@ -105,8 +105,8 @@ fn thinner_slabs_converge() {
 }
 
 /// Fig. 3's cube from 44.8° to 45.2°. By its voxels' values it hardly changes. Its lit faces do: normals have no length, so where kernels end the
-/// light goes out at once, and the bright edge in front moves; but no more than at other angles, by a tenth of what
-/// axis-aligned sheets do there, and less with thinner slabs.
+/// light goes out at once, and the bright edge in front moves; but no more than at other angles, and by a tenth of
+/// what axis-aligned sheets do there.
 #[test]
 fn the_cube_does_not_pop() {
     let volume = builtin::volume("cube").unwrap();
@@ -129,14 +129,11 @@ fn the_cube_does_not_pop() {
             color_rms(&before, &after)
         };
         let [lit, lit_elsewhere] = [44.8, 43.3].map(|from| turned(&scene, from));
-        scene.splatting.slab_width = 0.25;
-        let thin = turned(&scene, 44.8);
-        scene.splatting.slab_width = 1.0;
         scene.shading.enabled = false;
         let unlit = turned(&scene, 44.8);
-        println!("{compositing:?} {interpolation:?}: {lit:.5}, {lit_elsewhere:.5}, thin {thin:.5}, unlit {unlit:.5}");
+        println!("{compositing:?} {interpolation:?}: {lit:.5}, {lit_elsewhere:.5}, unlit {unlit:.5}");
         assert!(unlit < 0.003, "{compositing:?} {interpolation:?}: {unlit}");
-        assert!(lit < 0.006 && lit < 1.1 * lit_elsewhere && thin < 0.8 * lit, "{lit} {lit_elsewhere} {thin}");
+        assert!(lit < 0.006 && lit < 1.1 * lit_elsewhere, "{lit} {lit_elsewhere}");
     }
 }
 
