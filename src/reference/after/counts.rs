@@ -3,7 +3,7 @@
 //! A brick of 4×4×4 voxels may be drawn if the values around it can meet an opacity: the coefficients of all voxels within two kernel radii, as the
 //! low-pass rule widens them, and a slab. A slab needs both of its planes, and each of them all of its voxels.
 
-use glam::{DVec3, UVec3};
+use glam::{DVec3, UVec2, UVec3};
 use rayon::prelude::*;
 
 use super::Frame;
@@ -68,7 +68,7 @@ pub(super) fn count_in(frame: &Frame) -> Counts {
 fn reach(frame: &Frame) -> DVec3 {
     let geometry = &frame.geometry;
     let last = geometry.size.as_uvec2() - 1;
-    let corners = [last.with_x(0), last.with_y(0), last, last - last].map(|corner| frame.pixel(corner));
+    let corners = [last.with_x(0), last.with_y(0), last, UVec2::ZERO].map(|corner| frame.pixel(corner));
     let slab = corners.iter().map(Pixel::step).reduce(DVec3::max).unwrap_or_default();
     // Where pixels are largest kernels are widest.
     let farthest = match &geometry.eye {

@@ -124,10 +124,8 @@ impl<'a> Pixel<'a> {
 
     /// The tables of the voxel whose cell holds a place.
     pub fn tables(&self, sheet: f64) -> Tables<'a> {
-        let label = match self.frame.volume.labels() {
-            Some(labels) => Some(labels[nearest(&self.frame.geometry.grid, self.at(sheet)) as usize]),
-            None => None,
-        };
+        let cell = || nearest(&self.frame.geometry.grid, self.at(sheet)) as usize;
+        let label = self.frame.volume.labels().map(|labels| labels[cell()]);
         self.frame.transfer.tables(label)
     }
 
