@@ -10,6 +10,7 @@ use glam::DVec3;
 use sheetsplat::scene::{ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use sheetsplat::settings::Clip;
 use sheetsplat::settings::{Camera, Fit, Projection};
+use sheetsplat::settings::{Classification, Gradient, Interpolation};
 use sheetsplat::settings::{Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
 use sheetsplat::settings::{LabelTables, Ramp};
 use sheetsplat::settings::{Light, Shading};
@@ -116,10 +117,13 @@ fn every_key() {
         diffuse = 0.5
         specular = 3
         shininess = 0.5
+        gradient = "kernel"
         [splatting]
         method = "axis-aligned"
         radius = 1
         falloff = 16
+        classification = "after"
+        interpolation = "exact"
         slab_width = 0.05
         footprint = "sections"
         compositing = "exponential"
@@ -177,11 +181,14 @@ fn every_key() {
             specular: 3.0,
             shininess: 0.5,
             light: Light::Direction(DVec3::new(0.0, 0.0, 2.0)),
+            gradient: Gradient::Kernel,
         },
         splatting: Splatting {
             method: Method::AxisAligned,
             radius: 1.0,
             falloff: 16.0,
+            classification: Classification::After,
+            interpolation: Interpolation::Exact,
             slab_width: 0.05,
             footprint: FootprintForm::Sections,
             compositing: Compositing::Exponential,
@@ -360,6 +367,11 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
     ("splatting.falloff", "16.5", "splatting.falloff", "16.5", "a number in (0, 16]"),
     ("splatting.slab_width", "0.04", "splatting.slab_width", "0.04", "a number in [0.05, 8]"),
     ("splatting.slab_width", "9", "splatting.slab_width", "9", "a number in [0.05, 8]"),
+    ("shading.gradient", "'sobel'", "shading.gradient", "\"sobel\"", "\"differences\" or \"kernel\""),
+    ("shading.gradient", "2", "shading.gradient", "2 (integer)", "\"differences\" or \"kernel\""),
+    ("splatting.classification", "'never'", "splatting.classification", "\"never\"", "\"before\" or \"after\""),
+    ("splatting.classification", "true", "splatting.classification", "true (boolean)", "\"before\" or \"after\""),
+    ("splatting.interpolation", "'cubic'", "splatting.interpolation", "\"cubic\"", "\"smooth\" or \"exact\""),
     ("splatting.footprint", "'gauss'", "splatting.footprint", "\"gauss\"", "\"summed-area\" or \"sections\""),
     (
         "splatting.compositing",
@@ -385,7 +397,13 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
     ("splatting.whole_below", "1.5", "splatting.whole_below", "1.5", "a number in [0, 1]"),
     ("splatting.beta", "0", "splatting.beta", "0", "a number in (0, 1]"),
     ("splatting.resolution", "-0.1", "splatting.resolution", "-0.1", "a number in [0, 1]"),
-    ("splatting.tile", "true", "splatting.tile", "an unknown key", "method, radius, falloff, slab_width, footprint"),
+    (
+        "splatting.tile",
+        "true",
+        "splatting.tile",
+        "an unknown key",
+        "method, radius, falloff, slab_width, classification, interpolation, footprint",
+    ),
 ];
 
 #[test]

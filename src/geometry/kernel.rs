@@ -79,6 +79,34 @@ impl Kernel {
         sum
     }
 
+    /// The minimum of the discrete kernel's Fourier transform over its maximum: the transform of `exp(-falloff·r²)` at the grid offsets
+    /// with `r < radius`. What is left of the highest frequencies when samples are convolved with the kernel; sampled at multiples of π/16.
+    pub fn min_discrete_response(&self) -> f64 {
+        const STEPS: usize = 16;
+        let reach = self.radius.ceil() as usize;
+        let cosines: Vec<Vec<f64>> = (0..=STEPS)
+            .map(|step| (0..=reach).map(|offset| (PI * (step * offset) as f64 / STEPS as f64).cos()).collect())
+            .collect();
+        // Offsets come in pairs ±d along each axis.
+        let count = |offset: usize| if offset == 0 { 1.0 } else { 2.0 };
+        let cube = |n: usize| (0..n).flat_map(move |x| (0..n).flat_map(move |y| (0..n).map(move |z| [x, y, z])));
+        let weights: Vec<([usize; 3], f64)> = cube(reach + 1)
+            .map(|offset| (offset, offset.map(|d| (d * d) as f64).iter().sum::<f64>()))
+            .filter(|(_, squared)| *squared < self.radius * self.radius)
+            .map(|(offset, squared)| {
+                (offset, (-self.falloff * squared).exp() * offset.map(count).iter().product::<f64>())
+            })
+            .collect();
+        let response = |frequency: [usize; 3]| {
+            let term = |&([x, y, z], weight): &([usize; 3], f64)| {
+                weight * cosines[frequency[0]][x] * cosines[frequency[1]][y] * cosines[frequency[2]][z]
+            };
+            weights.iter().map(term).sum::<f64>()
+        };
+        let min = cube(STEPS + 1).filter(|f| f.is_sorted()).map(response).fold(f64::INFINITY, f64::min);
+        min / response([0; 3])
+    }
+
     /// Half the length of the chord that the kernel's ball cuts from a ray at distance √`rho_squared`.
     pub fn half_chord(&self, rho_squared: f64) -> f64 {
         (self.radius * self.radius - rho_squared).max(0.0).sqrt()

@@ -16,8 +16,9 @@ use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::uniforms::Ramps;
 use crate::pass::composite::RayMode;
 use crate::scene::Scene;
+use crate::setting_error::SettingError;
 use crate::settings::camera::Camera;
-use crate::settings::splatting::{Rasterizer, Splatting};
+use crate::settings::splatting::{Classification, Rasterizer, Splatting};
 
 /// A frame of a view.
 #[derive(Debug)]
@@ -54,6 +55,11 @@ impl FrameRequest {
         rasterizer: Rasterizer,
     ) -> Result<Self, RenderError> {
         let splatting = settled(scene.splatting, rasterizer);
+        splatting.check()?;
+        if splatting.classification == Classification::After {
+            let (found, allowed) = ("\"after\" on the GPU", "\"before\", or the reference backend");
+            return Err(SettingError::new("splatting.classification", found, allowed).into());
+        }
         let (grid, size) = (volume.grid(), [scene.image.width, scene.image.height]);
         let seen = ViewGeometry::new(grid, camera, &splatting, size)?;
         let bands = CompositingBuffer::bands(&device.limits(), size)?;

@@ -87,7 +87,7 @@ impl Means {
 }
 
 /// A box around the volume's centre, of half its extent.
-fn centered_box(geometry: &Geometry, half_steps: DVec3) -> [HalfSpace; 6] {
+pub(super) fn centered_box(geometry: &Geometry, half_steps: DVec3) -> [HalfSpace; 6] {
     let half = half_steps * geometry.grid.aspect();
     let [x, y, z] = DVec3::AXES;
     [x, y, z, -x, -y, -z].map(|normal| HalfSpace { normal, offset: normal.abs().dot(half) })

@@ -1,6 +1,7 @@
 //! The f64 CPU twin of every GPU stage, in SPEC's direct form: plain, independent of the tables, the bucket sort and the
 //! matrices of eqs. 4–11, and slow. Tests compare every stage with it; `sheetsplat render --backend reference` shows it.
 
+pub mod after;
 pub mod composite;
 pub mod cut;
 mod first_hit;
@@ -25,7 +26,7 @@ use crate::image::Image;
 use crate::lists::quad_plan::tile_grid;
 use crate::scene::Scene;
 use crate::setting_error::SettingError;
-use crate::settings::splatting::{Compositing, Method, Order, check_first_hit};
+use crate::settings::splatting::{Classification, Compositing, Method, Order, check_first_hit};
 use crate::settings::transfer_function::TransferFunction;
 use crate::stats::Counts;
 use crate::volume::Volume;
@@ -135,6 +136,9 @@ impl Host<'_> {
 /// # Errors
 /// If the scene asks for more than can be computed.
 pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Counts, RenderError> {
+    if scene.splatting.classification == Classification::After {
+        return after::count(volume, transfer, scene);
+    }
     let frame = Frame::new(volume, transfer, scene)?;
     let buckets = frame.buckets();
     let sections = match scene.splatting.method {
@@ -199,6 +203,9 @@ pub fn render_for(
     scene: &Scene,
     test: Option<visibility::Test>,
 ) -> Result<Culled, RenderError> {
+    if scene.splatting.classification == Classification::After {
+        return after::render_for(host, volume, transfer, scene);
+    }
     let frame = Frame::new(volume, transfer, scene)?;
     host.check(scene)?;
     let (compositing, order) = (scene.splatting.compositing, scene.splatting.order);

@@ -19,7 +19,7 @@ use crate::settings::camera::{Camera, Fit};
 use crate::settings::clip::Clip;
 use crate::settings::framing::Extent;
 use crate::settings::shading::Shading;
-use crate::settings::splatting::Splatting;
+use crate::settings::splatting::{Classification, Splatting};
 use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
 use crate::volume::{Access, Labels, RawLayout, ReadOptions, Volume, VolumeError, builtin};
 use reader::{OVERRIDE, Origins, Section, apply_override};
@@ -392,6 +392,10 @@ impl Scene {
             let allowed = "none, or volume.labels, or volume.builtin = \"head\" or \"tomato\"";
             let related = ["volume.path", "volume.builtin", "volume.labels"];
             return Err(origins.invalid("transfer.label", &related, "tables for a volume without labels", allowed));
+        }
+        if scene.transfer.preset == Some(Preset::Labels) && scene.splatting.classification == Classification::After {
+            let (key, found) = ("splatting.classification", "\"after\" with preset = \"labels\"");
+            return Err(origins.invalid(key, &["preset"], found, "\"before\" with it"));
         }
         Ok(scene)
     }

@@ -1,7 +1,10 @@
 //! What scene files call a setting's choices.
 
 use crate::settings::camera::Fit;
-use crate::settings::splatting::{Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer};
+use crate::settings::shading::Gradient;
+use crate::settings::splatting::{
+    Classification, Compositing, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer,
+};
 
 pub(super) const FITS: &[(&str, Fit)] = &[("volume", Fit::Volume), ("object", Fit::Object)];
 pub(super) const METHODS: &[(&str, Method)] = &[
@@ -9,6 +12,12 @@ pub(super) const METHODS: &[(&str, Method)] = &[
     ("axis-aligned", Method::AxisAligned),
     ("composite-every-sample", Method::CompositeEverySample),
 ];
+pub(super) const CLASSIFICATIONS: &[(&str, Classification)] =
+    &[("before", Classification::Before), ("after", Classification::After)];
+pub(super) const INTERPOLATIONS: &[(&str, Interpolation)] =
+    &[("smooth", Interpolation::Smooth), ("exact", Interpolation::Exact)];
+pub(super) const GRADIENTS: &[(&str, Gradient)] =
+    &[("differences", Gradient::Differences), ("kernel", Gradient::Kernel)];
 pub(super) const FORMS: &[(&str, FootprintForm)] =
     &[("summed-area", FootprintForm::SummedArea), ("sections", FootprintForm::Sections)];
 pub(super) const COMPOSITINGS: &[(&str, Compositing)] = &[

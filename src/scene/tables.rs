@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::names::{BOXES, COMPOSITINGS, ENDIANS, FITS, FORMS, METHODS, ORDERS, RASTERIZERS};
+use super::names::{
+    BOXES, CLASSIFICATIONS, COMPOSITINGS, ENDIANS, FITS, FORMS, GRADIENTS, INTERPOLATIONS, METHODS, ORDERS, RASTERIZERS,
+};
 use super::reader::{Entry, LABEL, Section};
 use super::{ImageSettings, SceneError, TransferSettings, VolumeSource};
 use crate::appearance::Colormap;
@@ -211,6 +213,7 @@ pub(super) fn shading(mut section: Section, mut shading: Shading) -> Result<Shad
     section.read("diffuse", &mut shading.diffuse, |entry| entry.number(Interval::NOT_NEGATIVE))?;
     section.read("specular", &mut shading.specular, |entry| entry.number(Interval::NOT_NEGATIVE))?;
     section.read("shininess", &mut shading.shininess, |entry| entry.number(Interval::POSITIVE))?;
+    section.read("gradient", &mut shading.gradient, |entry| entry.choice(GRADIENTS))?;
     let origins = section.origins;
     section.finish()?;
     shading.check().map_err(|error| origins.refused(error))?;
@@ -224,6 +227,8 @@ pub(super) fn splatting(mut section: Section, compositing: Compositing) -> Resul
     section.read("radius", &mut splatting.radius, |entry| entry.number(RADIUS))?;
     section.read("falloff", &mut splatting.falloff, |entry| entry.number(FALLOFF))?;
     section.read("slab_width", &mut splatting.slab_width, |entry| entry.number(SLAB_WIDTH))?;
+    section.read("classification", &mut splatting.classification, |entry| entry.choice(CLASSIFICATIONS))?;
+    section.read("interpolation", &mut splatting.interpolation, |entry| entry.choice(INTERPOLATIONS))?;
     section.read("footprint", &mut splatting.footprint, |entry| entry.choice(FORMS))?;
     section.read("compositing", &mut splatting.compositing, |entry| entry.choice(COMPOSITINGS))?;
     section.read("order", &mut splatting.order, |entry| entry.choice(ORDERS))?;

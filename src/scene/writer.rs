@@ -6,7 +6,9 @@ use std::path::{Component, Path, PathBuf};
 use glam::DVec3;
 use toml::Value;
 
-use super::names::{BOXES, COMPOSITINGS, FITS, FORMS, METHODS, ORDERS, RASTERIZERS, name_of};
+use super::names::{
+    BOXES, CLASSIFICATIONS, COMPOSITINGS, FITS, FORMS, GRADIENTS, INTERPOLATIONS, METHODS, ORDERS, RASTERIZERS, name_of,
+};
 use super::{ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use crate::appearance::{Colormap, Preset};
 use crate::settings::camera::{Camera, Projection};
@@ -172,7 +174,7 @@ fn write_transfer(text: &mut Text, transfer: &TransferSettings) {
 }
 
 fn write_shading(text: &mut Text, shading: &Shading) {
-    let Shading { enabled, ambient, diffuse, specular, shininess, light } = *shading;
+    let Shading { enabled, ambient, diffuse, specular, shininess, light, gradient } = *shading;
     text.table("shading");
     text.line("enabled", enabled);
     text.line("ambient", ambient);
@@ -183,17 +185,21 @@ fn write_shading(text: &mut Text, shading: &Shading) {
         Light::Headlight => text.line("light", "headlight"),
         Light::Direction(direction) => text.line("light", vector(direction)),
     }
+    text.line("gradient", name_of(GRADIENTS, gradient));
 }
 
 fn write_splatting(text: &mut Text, splatting: &Splatting) {
     let Splatting { method, radius, falloff, slab_width, footprint, compositing, order, .. } = *splatting;
     let Splatting { opacity_threshold, culling, tiles, rasterizer, footprint_box, economies, .. } = *splatting;
+    let Splatting { classification, interpolation, .. } = *splatting;
     let Economies { whole_below, beta, resolution } = economies;
     text.table("splatting");
     text.line("method", name_of(METHODS, method));
     text.line("radius", radius);
     text.line("falloff", falloff);
     text.line("slab_width", slab_width);
+    text.line("classification", name_of(CLASSIFICATIONS, classification));
+    text.line("interpolation", name_of(INTERPOLATIONS, interpolation));
     text.line("footprint", name_of(FORMS, footprint));
     text.line("compositing", name_of(COMPOSITINGS, compositing));
     text.line("order", name_of(ORDERS, order));

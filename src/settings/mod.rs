@@ -18,6 +18,9 @@ pub use crate::setting_error::{Allowed, Found, Interval};
 pub use camera::{Camera, Fit, Projection};
 pub use clip::{Clip, HalfSpace, MAX_PLANES};
 pub use framing::Extent;
-pub use shading::{Light, Shading};
-pub use splatting::{Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting};
+pub use shading::{Gradient, Light, Shading};
+pub use splatting::{
+    Classification, Compositing, Economies, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer,
+    Splatting,
+};
 pub use transfer_function::{LabelTables, Ramp, RampError, Tables, TransferFunction};

@@ -17,6 +17,15 @@ pub enum Light {
     Direction(DVec3),
 }
 
+/// Which gradient the normals are of for [`Classification::After`](super::Classification::After).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gradient {
+    /// The voxels' central differences, interpolated like the values.
+    Differences,
+    /// The derivative of the reconstructed field: sharper, but it shows the noise of a scan.
+    Kernel,
+}
+
 /// Two-sided Phong shading with white highlights, computed in the unwarped space (§4.2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shading {
@@ -32,11 +41,21 @@ pub struct Shading {
     pub shininess: f64,
     /// Where the light comes from.
     pub light: Light,
+    /// Which gradient is used; without effect for [`Classification::Before`](super::Classification::Before).
+    pub gradient: Gradient,
 }
 
 impl Default for Shading {
     fn default() -> Self {
-        Self { enabled: true, ambient: 0.2, diffuse: 0.7, specular: 0.2, shininess: 20.0, light: Light::Headlight }
+        Self {
+            enabled: true,
+            ambient: 0.2,
+            diffuse: 0.7,
+            specular: 0.2,
+            shininess: 20.0,
+            light: Light::Headlight,
+            gradient: Gradient::Differences,
+        }
     }
 }
 
@@ -46,7 +65,7 @@ impl Shading {
     /// # Errors
     /// If a number is not finite or out of its range, or the light's direction is 0.
     pub fn check(&self) -> Result<(), SettingError> {
-        let Self { enabled: _, ambient, diffuse, specular, shininess, light } = *self;
+        let Self { enabled: _, ambient, diffuse, specular, shininess, light, gradient: _ } = *self;
         Interval::NOT_NEGATIVE.check("shading.ambient", ambient)?;
         Interval::NOT_NEGATIVE.check("shading.diffuse", diffuse)?;
         Interval::NOT_NEGATIVE.check("shading.specular", specular)?;

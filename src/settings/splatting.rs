@@ -2,6 +2,7 @@
 
 use std::ops::Bound::{Excluded, Included};
 
+use crate::geometry::kernel::Kernel;
 use crate::setting_error::{Interval, SettingError};
 
 /// Kernel radii, grid units.
@@ -16,6 +17,13 @@ pub(crate) fn check_first_hit(opacity: f64) -> Result<(), SettingError> {
     Interval::THRESHOLD.check("first_hit", opacity)
 }
 
+/// The largest falloff with [`Classification::After`]: with more, no kernel reaches the middle between eight voxels.
+const MAX_FALLOFF_AFTER: f64 = 11.0;
+
+/// The least that the kernel's discrete transform may have of its maximum for [`Interpolation::Exact`]; below, coefficients would
+/// amplify noise without bound.
+const MIN_RESPONSE: f64 = 0.002;
+
 /// Which voxels share a sheet buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -26,6 +34,25 @@ pub enum Method {
     AxisAligned,
     /// None: every voxel is composited by itself, back to front (§3, Westover's first form).
     CompositeEverySample,
+}
+
+/// What is splatted, and so where transfer function and shading are applied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Classification {
+    /// Voxels are classified and shaded, and their colours are splatted (the paper, SPEC §§3–6).
+    Before,
+    /// Values and gradients are splatted onto the slab planes; what each pixel sees between two planes is classified and shaded there
+    /// (SPEC §9; Mueller, Möller, Crawfis, *Splatting without the blur*, Vis 1999). Image-aligned sheets only.
+    After,
+}
+
+/// How the kernel reconstructs values for [`Classification::After`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interpolation {
+    /// The kernel's weighted mean of the voxels' values, which smooths them.
+    Smooth,
+    /// The weighted mean of coefficients that are chosen so that every voxel has exactly its value.
+    Exact,
 }
 
 /// How kernel sections are stored.
@@ -146,6 +173,10 @@ pub struct Splatting {
     pub radius: f64,
     /// Gaussian exponent of the kernel, above 0, at most 16.
     pub falloff: f64,
+    /// Where transfer function and shading are applied.
+    pub classification: Classification,
+    /// How values between voxels are reconstructed; without effect for [`Classification::Before`].
+    pub interpolation: Interpolation,
     /// Slab width Δ in `unit`s of world length along a ray, 0.05 to 8.
     pub slab_width: f64,
     /// How kernel sections are stored.
@@ -175,7 +206,8 @@ impl Splatting {
     /// Checks what types do not say, whatever the device and the rasterizer.
     ///
     /// # Errors
-    /// If a number is not finite or out of its range, means are asked for where there are no sheets, or surfaces back to front.
+    /// If a number is not finite or out of its range, means are asked for where there are no sheets, surfaces back to front, or
+    /// classification after splatting with what excludes it (SPEC §9).
     pub fn check(&self) -> Result<(), SettingError> {
         RADIUS.check("splatting.radius", self.radius)?;
         FALLOFF.check("splatting.falloff", self.falloff)?;
@@ -195,6 +227,41 @@ impl Splatting {
             let found = format!("\"{name}\" with splatting.order = \"back-to-front\"");
             return refused(found, "\"front-to-back\" with it");
         }
+        match self.classification {
+            Classification::Before => Ok(()),
+            Classification::After => self.check_after(),
+        }
+    }
+
+    /// Checks what [`Classification::After`] asks of the other settings.
+    fn check_after(&self) -> Result<(), SettingError> {
+        let refused = |key: &str, found: String, allowed: &str| Err(SettingError::new(key, found, allowed));
+        let excluded = match (self.method, &self.economies) {
+            (Method::AxisAligned, _) => Some("splatting.method = \"axis-aligned\"".to_owned()),
+            (Method::CompositeEverySample, _) => Some("splatting.method = \"composite-every-sample\"".to_owned()),
+            (_, Economies { whole_below, .. }) if *whole_below > 0.0 => {
+                Some(format!("splatting.whole_below = {whole_below}"))
+            }
+            (_, Economies { beta, .. }) if *beta < 1.0 => Some(format!("splatting.beta = {beta}")),
+            (_, Economies { resolution, .. }) if *resolution > 0.0 => {
+                Some(format!("splatting.resolution = {resolution}"))
+            }
+            _ => None,
+        };
+        if let Some(setting) = excluded {
+            return refused("splatting.classification", format!("\"after\" with {setting}"), "\"before\" with it");
+        }
+        if self.falloff > MAX_FALLOFF_AFTER {
+            let found = format!("{} with splatting.classification = \"after\"", self.falloff);
+            return refused("splatting.falloff", found, &format!("at most {MAX_FALLOFF_AFTER} with it"));
+        }
+        let response = || Kernel::new(self.radius, self.falloff).min_discrete_response();
+        if self.interpolation == Interpolation::Exact && response() < MIN_RESPONSE {
+            let Self { radius, falloff, .. } = self;
+            let found = format!("\"exact\" with splatting.radius = {radius} and splatting.falloff = {falloff}");
+            let allowed = "\"smooth\" with them, or a larger falloff (0.95 and above at radius 2)";
+            return refused("splatting.interpolation", found, allowed);
+        }
         Ok(())
     }
 }
@@ -205,6 +272,8 @@ impl Default for Splatting {
             method: Method::ImageAligned,
             radius: 2.0,
             falloff: 2.0,
+            classification: Classification::Before,
+            interpolation: Interpolation::Smooth,
             slab_width: 1.0,
             footprint: FootprintForm::SummedArea,
             compositing: Compositing::Linear,

@@ -1,0 +1,141 @@
+//! What a frame is made of where classification comes after splatting (SPEC §§8, 9).
+//!
+//! A brick of 4×4×4 voxels may be drawn if the values around it can meet an opacity: the coefficients of all voxels within two kernel radii, as the
+//! low-pass rule widens them, and a slab. A slab needs both of its planes, and each of them all of its voxels.
+
+use glam::{DVec3, UVec2, UVec3};
+use rayon::prelude::*;
+
+use super::Frame;
+use super::pixel::Pixel;
+use super::slab_integral::is_visible;
+use crate::error::RenderError;
+use crate::lists::quad_plan::tile_grid;
+use crate::reference::Host;
+use crate::scene::Scene;
+use crate::settings::transfer_function::{Tables, TransferFunction};
+use crate::stats::Counts;
+use crate::volume::Volume;
+
+/// Side of a brick, voxels.
+const SIDE: u32 = 4;
+
+/// What [`super::render_for`] draws.
+///
+/// # Errors
+/// If the scene asks for more than can be computed.
+pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Counts, RenderError> {
+    Ok(count_in(&Frame::new(Host::default(), volume, transfer, scene)?))
+}
+
+/// The counts of a frame. No voxel is shaded, as colours are those of pixels.
+pub(super) fn count_in(frame: &Frame) -> Counts {
+    let geometry = &frame.geometry;
+    let grid = &geometry.grid;
+    let reach = reach(frame);
+    let tables = tables(frame);
+    let bricks = grid.dims.map(|n| n.div_ceil(SIDE));
+    let drawn: Vec<[UVec3; 2]> = (0..bricks.element_product())
+        .into_par_iter()
+        .map(|index| UVec3::new(index % bricks.x, index / bricks.x % bricks.y, index / bricks.x / bricks.y) * SIDE)
+        .map(|first| [first, (first + SIDE).min(grid.dims)])
+        .filter(|&[first, end]| values(frame, first, end, reach).is_some_and(|ends| meets_opacity(&tables, ends)))
+        .collect();
+    let voxels = |&[first, end]: &[UVec3; 2]| u64::from((end - first).element_product());
+    let sections = |&[first, end]: &[UVec3; 2]| {
+        let planes = |voxel| planes(frame, voxel);
+        (first.z..end.z)
+            .flat_map(|z| (first.y..end.y).flat_map(move |y| (first.x..end.x).map(move |x| UVec3::new(x, y, z))))
+            .map(planes)
+            .sum::<u64>()
+    };
+    let sheets = sheets(frame, &drawn);
+    let sections: u64 = drawn.par_iter().map(sections).sum();
+    let [columns, rows] = tile_grid([frame.scene.image.width, frame.scene.image.height]).map(u64::from);
+    Counts {
+        voxels_total: frame.volume.values().len() as u64,
+        voxels_in_range: drawn.iter().map(voxels).sum(),
+        sections_total: sections,
+        sections_rasterized: sections,
+        sheets,
+        tiles_total: columns * rows * sheets,
+        tiles_composited: columns * rows * sheets,
+        ..Counts::default()
+    }
+}
+
+/// How far from a brick voxels lie that bear on what it shows, in voxels along each axis.
+fn reach(frame: &Frame) -> DVec3 {
+    let geometry = &frame.geometry;
+    let last = geometry.size.as_uvec2() - 1;
+    let corners = [last.with_x(0), last.with_y(0), last, UVec2::ZERO].map(|corner| frame.pixel(corner));
+    let slab = corners.iter().map(Pixel::step).reduce(DVec3::max).unwrap_or_default();
+    // Where pixels are largest kernels are widest.
+    let farthest = match &geometry.eye {
+        None => 0.0,
+        Some(eye) => {
+            (eye.position.length() + (geometry.grid.center() * geometry.grid.aspect()).length()) / geometry.slab_width
+        }
+    };
+    let rule = frame.low_pass(farthest.ceil() as i32 + 1);
+    2.0 * rule.map_or(DVec3::ZERO, |rule| rule.half_box(geometry.radius)) + slab
+}
+
+/// The tables that voxels may go by.
+fn tables<'a>(frame: &Frame<'a>) -> Vec<Tables<'a>> {
+    let labels = frame.volume.labels().map(|_| frame.transfer.labels.keys()).into_iter().flatten();
+    let labels = labels.map(|&label| frame.transfer.tables(Some(label)));
+    labels.chain([frame.transfer.tables(None)]).collect()
+}
+
+/// The minimum and maximum of the coefficients within reach of a brick; `None` if there are only holes.
+fn values(frame: &Frame, first: UVec3, end: UVec3, reach: DVec3) -> Option<[f64; 2]> {
+    let dims = frame.volume.dims();
+    let low = (first.as_dvec3() - reach).ceil().max(DVec3::ZERO).as_uvec3();
+    let high = (end.as_dvec3() - 1.0 + reach).floor().min(dims.as_dvec3() - 1.0).as_uvec3();
+    let rows = (low.z..=high.z).flat_map(|z| (low.y..=high.y).map(move |y| dims.x * (y + dims.y * z)));
+    let coefficients = frame.field.coefficients();
+    let found = rows.flat_map(|row| &coefficients[(row + low.x) as usize..=(row + high.x) as usize]);
+    // Minima and maxima pass over NaN.
+    let ends = found.fold([f64::INFINITY, f64::NEG_INFINITY], |[min, max], &c| [min.min(c), max.max(c)]);
+    (ends[0] <= ends[1]).then_some(ends)
+}
+
+/// Whether any value between two has an opacity.
+fn meets_opacity(tables: &[Tables], ends: [f64; 2]) -> bool {
+    tables.iter().any(|tables| is_visible(tables, ends))
+}
+
+/// Planes nearer to a voxel than the kernel's radius, grid units.
+fn planes(frame: &Frame, voxel: UVec3) -> u64 {
+    let geometry = &frame.geometry;
+    let normal_length = if geometry.eye.is_some() { (geometry.basis.w * geometry.grid.aspect()).length() } else { 1.0 };
+    let (depth, reach) = (geometry.depth(voxel), geometry.radius * normal_length);
+    let first = ((depth - reach) / geometry.slab_width).floor() + 1.0;
+    let last = ((depth + reach) / geometry.slab_width).ceil() - 1.0;
+    // There is no value at the eye and behind it.
+    let first = if geometry.eye.is_some() { first.max(1.0) } else { first };
+    (last - first + 1.0).max(0.0) as u64
+}
+
+/// Slabs from the first to the last that the cells of some bricks reach.
+fn sheets(frame: &Frame, bricks: &[[UVec3; 2]]) -> u64 {
+    let geometry = &frame.geometry;
+    let aspect = geometry.grid.aspect();
+    let (normal, origin) = match &geometry.eye {
+        None => (geometry.ro / aspect, DVec3::ZERO),
+        Some(eye) => (geometry.basis.w, eye.position),
+    };
+    let depths = bricks.iter().map(|&[first, end]| {
+        let (first, end) = (first.as_dvec3() - 0.5, end.as_dvec3() - 0.5);
+        let middle = ((first + end) / 2.0 - geometry.grid.center()) * aspect;
+        let (middle, half) = (normal.dot(middle - origin), normal.abs().dot((end - first) / 2.0 * aspect));
+        (middle - half, middle + half)
+    });
+    let near = geometry.eye.map_or(f64::NEG_INFINITY, |eye| eye.near);
+    let ends = depths.reduce(|(near, far), (first, last)| (near.min(first), far.max(last)));
+    let count = |(first, last): (f64, f64)| {
+        ((last / geometry.slab_width).ceil() - (first.max(near) / geometry.slab_width).floor()).max(0.0) as u64
+    };
+    ends.map_or(0, count)
+}

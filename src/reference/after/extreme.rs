@@ -1,0 +1,74 @@
+//! `maximum`, `minimum` and `average` after splatting (SPEC §9): one value per pixel is chosen, and that is classified.
+
+use glam::{DVec3, DVec4};
+
+use super::pixel::{Composited, Pixel};
+use crate::reference::shading;
+use crate::settings::splatting::Compositing;
+
+/// A place on a pixel's ray, and the field there.
+struct Point {
+    sheet: f64,
+    value: f64,
+    gradient: DVec3,
+}
+
+/// The pixel that its chosen value gives. Its first hit is the chosen point, or for `average` the stretch's middle, if the opacity asked for
+/// is reached there.
+pub(super) fn composite(pixel: &Pixel) -> Composited {
+    let (scene, stretch) = (&pixel.frame().scene, pixel.stretch());
+    let compositing = scene.splatting.compositing;
+    let chosen = match compositing {
+        _ if stretch.is_empty() => None,
+        Compositing::Average => average(pixel),
+        _ => extreme(pixel, compositing == Compositing::Minimum),
+    };
+    let Some(Point { sheet, value, gradient }) = chosen else {
+        return Composited { color: DVec4::ZERO, first_hit: None };
+    };
+    let tables = pixel.tables(sheet);
+    let base = tables.color.at(value);
+    let color = if compositing == Compositing::Average {
+        let alpha = if tables.visible && tables.in_iso_range(value) { tables.opacity.at(value) } else { 0.0 };
+        base.extend(1.0) * alpha
+    } else {
+        let alpha = tables.alpha(value, gradient.length());
+        shading::color(&scene.shading, base, gradient, pixel.to_eye()).extend(1.0) * alpha
+    };
+    let first_hit = pixel.frame().host.first_hit.filter(|&opacity| color.w >= opacity).map(|_| sheet);
+    Composited { color, first_hit }
+}
+
+/// The planes' points within the stretch that have a value: plane and value.
+fn points<'a>(pixel: &'a Pixel) -> impl Iterator<Item = (i32, f64)> + 'a {
+    let planes = pixel.stretch().start.ceil() as i32..=pixel.stretch().end.floor() as i32;
+    planes.filter_map(|plane| pixel.value(plane).map(|value| (plane, value)))
+}
+
+/// The nearest of the greatest values, or of the least ones.
+fn extreme(pixel: &Pixel, is_minimum: bool) -> Option<Point> {
+    let nearest = |best: (i32, f64), other: (i32, f64)| {
+        let is_better = if is_minimum { other.1 < best.1 } else { other.1 > best.1 };
+        if is_better { other } else { best }
+    };
+    let Some((plane, value)) = points(pixel).reduce(nearest) else { return middle(pixel) };
+    Some(Point { sheet: plane.into(), value, gradient: pixel.gradient(plane) })
+}
+
+/// The mean value, in the stretch's middle.
+fn average(pixel: &Pixel) -> Option<Point> {
+    let (count, sum) = points(pixel).fold((0.0, 0.0), |(count, sum), (_, value)| (count + 1.0, sum + value));
+    if count == 0.0 {
+        return middle(pixel);
+    }
+    let stretch = pixel.stretch();
+    Some(Point { sheet: (stretch.start + stretch.end) / 2.0, value: sum / count, gradient: DVec3::ZERO })
+}
+
+/// Where the stretch holds no plane's value: the line of values of the slab that its middle lies in.
+fn middle(pixel: &Pixel) -> Option<Point> {
+    let sheet = (pixel.stretch().start + pixel.stretch().end) / 2.0;
+    let slab = pixel.slab(sheet.floor() as i32)?;
+    let (share, [f0, f1], [near, far]) = (sheet - sheet.floor(), slab.values, pixel.gradients(&slab));
+    Some(Point { sheet, value: f0 + (f1 - f0) * share, gradient: near.lerp(far, share) })
+}

@@ -1,0 +1,157 @@
+//! Classification after splatting, SPEC §9: values and gradients are splatted onto the slab planes, and what a pixel sees between two
+//! planes is classified and shaded there.
+//!
+//! The method is that of Mueller, Möller and Crawfis, *Splatting without the blur* (IEEE Visualization 1999), with the transfer function
+//! integrated between planes as Engel, Kraus and Ertl do for slices (*High-quality pre-integrated volume rendering using
+//! hardware-accelerated pixel shading*, Graphics Hardware 2001). In the order of the stages:
+//!
+//! - [`coefficients`]: `c = v` (`smooth`), or the c with `f(v_j) = v_j` at every voxel (`exact`).
+//! - [`field`]: `f = Σ c_i·g_i / N` with `g_i = exp(-falloff·|δ_i|²)`, `N = Σ g_i`, and `∇f`, on the slab planes ([`Frame::plane_field`]);
+//!   [`low_pass`] says how the kernel sees the offsets δ_i where pixels are large.
+//! - [`slab_integral`]: `m̄ = mean of m`, `C̄ = ∫m·C / ∫m`, `v̄ = ∫m·v / ∫m` over the values from plane to plane.
+//! - [`pixel`]: the sheet `(C·m̄, m̄)·ℓ` with C the C̄ shaded by the gradient at v̄, ℓ the length of the pixel's ray ([`Frame::slab_sheet`]);
+//!   its compositing; [`extreme`] and [`surface`] look at the values themselves.
+//!
+//! Everything is computed pixel by pixel from the voxels around a point, in f64 and without tables, lists or culling. Rays are a pixel's
+//! own; there is no approximation but rounding.
+
+pub mod coefficients;
+mod counts;
+mod extreme;
+pub mod field;
+pub mod low_pass;
+pub mod pixel;
+pub mod slab_integral;
+mod surface;
+
+use glam::{DVec3, UVec2};
+use rayon::prelude::*;
+
+use super::{Areas, Buffer, Culled, Geometry, Host, resolve};
+use crate::error::RenderError;
+use crate::scene::Scene;
+use crate::settings::splatting::Compositing;
+use crate::settings::transfer_function::TransferFunction;
+use crate::volume::Volume;
+
+pub use counts::count;
+pub use field::Field;
+use low_pass::LowPass;
+pub use pixel::{Composited, Pixel, Sample, Slab};
+
+/// A scene, ready to be drawn.
+#[derive(Debug)]
+pub struct Frame<'a> {
+    volume: &'a Volume,
+    transfer: &'a TransferFunction,
+    scene: Scene,
+    host: Host<'a>,
+    geometry: Geometry,
+    field: Field<'a>,
+}
+
+impl<'a> Frame<'a> {
+    /// # Errors
+    /// If the scene asks for more than can be computed.
+    pub fn new(
+        host: Host<'a>,
+        volume: &'a Volume,
+        transfer: &'a TransferFunction,
+        scene: &Scene,
+    ) -> Result<Self, RenderError> {
+        scene.check()?;
+        transfer.check()?;
+        host.check(scene)?;
+        let scene = scene.framed(volume, transfer);
+        let geometry = Geometry::new(volume.grid(), &scene)?;
+        let field = Field::new(volume, &scene)?;
+        Ok(Self { volume, transfer, scene, host, geometry, field })
+    }
+
+    /// The view.
+    pub fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    /// The field.
+    pub fn field(&self) -> &Field<'a> {
+        &self.field
+    }
+
+    /// The low-pass rule on a plane; `None` at the eye and behind it.
+    pub fn low_pass(&self, plane: i32) -> Option<LowPass> {
+        let geometry = &self.geometry;
+        let aspect = geometry.grid.aspect();
+        let (right, down) = (geometry.basis.u / aspect, -geometry.basis.v / aspect);
+        match &geometry.eye {
+            None => {
+                let in_plane = |step: DVec3| (step - step.dot(geometry.ro) * geometry.ro) * geometry.pix;
+                Some(LowPass::new(in_plane(right), in_plane(down)))
+            }
+            // Planes are parallel to the image, and so to the steps from pixel to pixel.
+            Some(eye) => {
+                let depth = f64::from(plane) * geometry.slab_width;
+                let pix = eye.pix(depth);
+                (depth > 0.0).then(|| LowPass::new(right * pix, down * pix))
+            }
+        }
+    }
+
+    /// A pixel, counted from the upper left.
+    pub fn pixel(&self, pixel: UVec2) -> Pixel<'_> {
+        Pixel::new(self, pixel)
+    }
+
+    /// The field where the rays of all pixels meet a plane, row by row; `None` where it has no value.
+    pub fn plane_field(&self, plane: i32) -> Vec<Option<Sample>> {
+        self.each_pixel(|pixel| pixel.sample(plane))
+    }
+
+    /// The sheet of a slab, for all pixels.
+    pub fn slab_sheet(&self, number: i32) -> Buffer {
+        let sheet = |pixel: Pixel| pixel.slab(number).map(|slab| pixel.sheet(&slab)).unwrap_or_default();
+        Buffer { width: self.geometry.size.x as usize, pixels: self.each_pixel(sheet) }
+    }
+
+    /// All pixels composited, row by row.
+    pub fn composite(&self) -> Vec<Composited> {
+        self.each_pixel(|pixel| pixel.composite())
+    }
+
+    fn each_pixel<T: Send>(&self, of: impl Fn(Pixel) -> T + Sync) -> Vec<T> {
+        let [width, height] = self.geometry.size.as_uvec2().to_array();
+        let pixels = (0..width * height).into_par_iter();
+        pixels.map(|at| of(self.pixel(UVec2::new(at % width, at / width)))).collect()
+    }
+}
+
+/// Renders a scene as [`super::render_for`] does. Nothing is culled, and the order of compositing makes no difference.
+///
+/// # Errors
+/// If the scene asks for more than can be computed.
+pub fn render_for(
+    host: Host<'_>,
+    volume: &Volume,
+    transfer: &TransferFunction,
+    scene: &Scene,
+) -> Result<Culled, RenderError> {
+    let frame = Frame::new(host, volume, transfer, scene)?;
+    let pixels = frame.composite();
+    let acc = Buffer { width: scene.image.width as usize, pixels: pixels.iter().map(|pixel| pixel.color).collect() };
+    // Sums are clamped; everything else is premultiplied RGBA already.
+    let resolved_as = match scene.splatting.compositing {
+        Compositing::Xray => Compositing::Xray,
+        _ => Compositing::Linear,
+    };
+    let image = resolve::resolve(&acc, resolved_as, scene.image.background).into_image();
+    let depth = |(at, pixel): (usize, &Composited)| {
+        let at = UVec2::new((at % acc.width) as u32, (at / acc.width) as u32);
+        pixel.first_hit.map_or(f64::INFINITY, |sheet| frame.pixel(at).depth(sheet))
+    };
+    let first_hits = match host.first_hit {
+        Some(_) => pixels.iter().enumerate().map(depth).collect(),
+        None => Vec::new(),
+    };
+    let sections = counts::count_in(&frame).sections_total;
+    Ok(Culled { image, sections, areas: Areas::default(), first_hits })
+}

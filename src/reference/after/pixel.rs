@@ -1,0 +1,219 @@
+//! What one pixel sees of the slabs: its ray, the fields on their planes, their sheets, and the composited pixel (SPEC §9).
+
+use std::ops::Range;
+
+use glam::{DVec3, DVec4, UVec2};
+
+use super::field::nearest;
+use super::slab_integral::SlabIntegral;
+use super::{Frame, extreme, surface};
+use crate::reference::composite::composite_pixel;
+use crate::reference::cut::{self, PixelRay};
+use crate::reference::means::centered_box;
+use crate::reference::shading;
+use crate::settings::splatting::{Compositing, Order};
+use crate::settings::transfer_function::Tables;
+
+/// Compositing ends early where a pixel can gain no more than this.
+const REST: f64 = 1e-12;
+
+/// The ray of a pixel's centre among the slab planes. Places on it are counted in sheets: slab k lies between the planes k and k + 1.
+#[derive(Debug)]
+pub struct Pixel<'a> {
+    frame: &'a Frame<'a>,
+    ray: PixelRay,
+    /// What of the ray lies in the box of voxel cells, beyond the near plane, within the cuts and before a host's surface; empty if nothing.
+    stretch: Range<f64>,
+    /// Length of the ray from plane to plane, `unit`s.
+    length_per_sheet: f64,
+}
+
+/// The field at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// f.
+    pub value: f64,
+    /// ∇f, per world unit.
+    pub gradient: DVec3,
+}
+
+/// The values that a pixel sees at the two planes of a slab.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slab {
+    /// k.
+    pub number: i32,
+    /// f0 and f1.
+    pub values: [f64; 2],
+    /// The planes whose values they are: where only one has a value it holds for both.
+    pub planes: [i32; 2],
+}
+
+impl Slab {
+    /// Slab k, from the values of its planes; `None` where neither has one.
+    pub fn new(number: i32, near: Option<f64>, far: Option<f64>) -> Option<Self> {
+        let (values, planes) = match (near, far) {
+            (Some(f0), Some(f1)) => ([f0, f1], [number, number + 1]),
+            (Some(f0), None) => ([f0; 2], [number; 2]),
+            (None, Some(f1)) => ([f1; 2], [number + 1; 2]),
+            (None, None) => return None,
+        };
+        Some(Self { number, values, planes })
+    }
+}
+
+/// A composited pixel, before the background.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Composited {
+    /// Premultiplied RGBA.
+    pub color: DVec4,
+    /// Where the opacity that a host asks for is reached, in sheets.
+    pub first_hit: Option<f64>,
+}
+
+impl<'a> Pixel<'a> {
+    /// A pixel, counted from the upper left.
+    pub fn new(frame: &'a Frame<'a>, pixel: UVec2) -> Self {
+        let geometry = &frame.geometry;
+        let ray = PixelRay::new(geometry, pixel);
+        let index = pixel.x + pixel.y * geometry.size.x as u32;
+        let cells = ray.inside(&centered_box(geometry, geometry.grid.center() + 0.5));
+        let shown = cut::shown(geometry, frame.host.surfaces, index);
+        let near = geometry.eye.map_or(f64::NEG_INFINITY, |eye| eye.near);
+        let (start, end) = (cells.start.max(shown.start).max(near), cells.end.min(shown.end));
+        let stretch = if start < end { ray.sheet(geometry, start)..ray.sheet(geometry, end) } else { 0.0..0.0 };
+        let depth_per_sheet = ray.depth(geometry, 1.0) - ray.depth(geometry, 0.0);
+        Self { frame, length_per_sheet: ray.along.length() * depth_per_sheet, ray, stretch }
+    }
+
+    /// The stretch of the ray that counts, in sheets.
+    pub fn stretch(&self) -> &Range<f64> {
+        &self.stretch
+    }
+
+    /// The slabs that the stretch reaches into.
+    pub fn slabs(&self) -> Range<i32> {
+        if self.stretch.is_empty() { 0..0 } else { self.stretch.start.floor() as i32..self.stretch.end.ceil() as i32 }
+    }
+
+    /// What of the stretch lies in a slab; empty if nothing.
+    pub fn shown(&self, slab: i32) -> Range<f64> {
+        self.stretch.start.max(f64::from(slab))..self.stretch.end.min(f64::from(slab) + 1.0)
+    }
+
+    /// A place on the ray in voxel coordinates.
+    pub fn at(&self, sheet: f64) -> DVec3 {
+        let geometry = &self.frame.geometry;
+        let position = self.ray.origin + self.ray.depth(geometry, sheet) * self.ray.along;
+        position / geometry.grid.aspect() + geometry.grid.center()
+    }
+
+    /// The unit vector towards the eye.
+    pub fn to_eye(&self) -> DVec3 {
+        -self.ray.along.normalize()
+    }
+
+    /// From plane to plane along the ray, voxels along each axis.
+    pub fn step(&self) -> DVec3 {
+        (self.at(1.0) - self.at(0.0)).abs()
+    }
+
+    /// The depth along w of a place, `unit`s from the eye (orthographic: from the camera's centre).
+    pub fn depth(&self, sheet: f64) -> f64 {
+        self.ray.depth(&self.frame.geometry, sheet)
+    }
+
+    /// The tables of the voxel whose cell holds a place.
+    pub fn tables(&self, sheet: f64) -> Tables<'a> {
+        let cell = || nearest(&self.frame.geometry.grid, self.at(sheet)) as usize;
+        let label = self.frame.volume.labels().map(|labels| labels[cell()]);
+        self.frame.transfer.tables(label)
+    }
+
+    /// The frame.
+    pub fn frame(&self) -> &'a Frame<'a> {
+        self.frame
+    }
+
+    /// f where the ray meets a plane.
+    pub fn value(&self, plane: i32) -> Option<f64> {
+        self.frame.field.value(self.at(plane.into()), &self.frame.low_pass(plane)?)
+    }
+
+    /// ∇f where the ray meets a plane that has a value there.
+    pub fn gradient(&self, plane: i32) -> DVec3 {
+        self.frame.low_pass(plane).map_or(DVec3::ZERO, |rule| self.frame.field.gradient(self.at(plane.into()), &rule))
+    }
+
+    /// f and ∇f where the ray meets a plane.
+    pub fn sample(&self, plane: i32) -> Option<Sample> {
+        self.value(plane).map(|value| Sample { value, gradient: self.gradient(plane) })
+    }
+
+    /// The values at the planes of a slab.
+    pub fn slab(&self, number: i32) -> Option<Slab> {
+        Slab::new(number, self.value(number), self.value(number + 1))
+    }
+
+    /// The gradients at the two planes of a slab.
+    pub fn gradients(&self, slab: &Slab) -> [DVec3; 2] {
+        let [near, far] = slab.planes;
+        let first = self.gradient(near);
+        [first, if near == far { first } else { self.gradient(far) }]
+    }
+
+    /// The sheet of a slab: `(C·m, m)·ℓ`.
+    pub fn sheet(&self, slab: &Slab) -> DVec4 {
+        let (scene, shown) = (&self.frame.scene, self.shown(slab.number));
+        if shown.is_empty() {
+            return DVec4::ZERO;
+        }
+        let tables = self.tables((shown.start + shown.end) / 2.0);
+        let Some(means) = SlabIntegral::new(&tables, scene.splatting.compositing, slab.values) else {
+            return DVec4::ZERO;
+        };
+        let (mut amount, mut color) = (means.amount, means.color);
+        if scene.shading.enabled || tables.gradient_opacity.is_some() {
+            let [near, far] = self.gradients(slab);
+            let gradient = near.lerp(far, means.share);
+            amount *= tables.gradient_opacity.map_or(1.0, |ramp| ramp.at(gradient.length()));
+            color = shading::color(&scene.shading, color, gradient, self.to_eye());
+        }
+        color.extend(1.0) * amount * (shown.end - shown.start) * self.length_per_sheet
+    }
+
+    /// All slabs as the scene composites them.
+    pub fn composite(&self) -> Composited {
+        match self.frame.scene.splatting.compositing {
+            Compositing::Linear | Compositing::Exponential | Compositing::Xray => self.composite_sheets(),
+            Compositing::Surface => surface::composite(self),
+            Compositing::Maximum | Compositing::Minimum | Compositing::Average => extreme::composite(self),
+        }
+    }
+
+    /// Front to back; the image is the same in the other order.
+    fn composite_sheets(&self) -> Composited {
+        let (compositing, wanted) = (self.frame.scene.splatting.compositing, self.frame.host.first_hit);
+        let mut pixel = Composited { color: DVec4::ZERO, first_hit: None };
+        let slabs = self.slabs();
+        let mut near = self.value(slabs.start);
+        for k in slabs {
+            let far = self.value(k + 1);
+            if let Some(slab) = Slab::new(k, near, far) {
+                let before = pixel.color.w;
+                composite_pixel(&mut pixel.color, self.sheet(&slab), compositing, Order::FrontToBack);
+                let after = pixel.color.w;
+                if let Some(opacity) = wanted.filter(|&opacity| pixel.first_hit.is_none() && after >= opacity) {
+                    let shown = self.shown(k);
+                    let share = if after > before { (opacity - before) / (after - before) } else { 0.0 };
+                    pixel.first_hit = Some(shown.start + (shown.end - shown.start) * share);
+                }
+            }
+            near = far;
+            let hit = wanted.is_none() || pixel.first_hit.is_some();
+            if compositing.hides() && hit && pixel.color.w >= 1.0 - REST {
+                break;
+            }
+        }
+        pixel
+    }
+}

@@ -1,0 +1,130 @@
+//! `surface` after splatting (SPEC §9): where along the ray `opacity·gradient_opacity` first reaches one half, the pixel is opaque and has
+//! that point's shaded colour. Values and gradients are linear from plane to plane.
+
+use std::cell::LazyCell;
+
+use glam::{DVec3, DVec4};
+
+use super::pixel::{Composited, Pixel, Slab};
+use super::slab_integral::knots;
+use crate::reference::shading;
+use crate::settings::transfer_function::Tables;
+
+/// The opacity of a surface.
+const HALF: f64 = 0.5;
+
+/// Samples of a stretch over which the values cross no control point, where the gradient's length bends the opacity.
+const SAMPLES: u32 = 32;
+
+/// Halvings of the stretch between two samples that holds the surface.
+const HALVINGS: u32 = 50;
+
+/// The pixel that its first surface gives.
+pub(super) fn composite(pixel: &Pixel) -> Composited {
+    let mut near = None;
+    for (first, k) in (0..).zip(pixel.slabs()) {
+        if first == 0 {
+            near = pixel.value(k);
+        }
+        let far = pixel.value(k + 1);
+        if let Some(found) = Slab::new(k, near, far).and_then(|slab| in_slab(pixel, &slab)) {
+            return found;
+        }
+        near = far;
+    }
+    Composited { color: DVec4::ZERO, first_hit: None }
+}
+
+/// The surface within a slab.
+fn in_slab(pixel: &Pixel, slab: &Slab) -> Option<Composited> {
+    let first = f64::from(slab.number);
+    let gradients = LazyCell::new(|| pixel.gradients(slab));
+    let gradient = |t: f64| gradients[0].lerp(gradients[1], t);
+    let [f0, f1] = slab.values;
+    for [start, end] in cells(pixel, slab.number) {
+        let tables = pixel.tables(first + (start + end) / 2.0);
+        let line = Line { tables, values: [f0 + (f1 - f0) * start, f0 + (f1 - f0) * end], start, end };
+        if let Some(t) = line.first_surface(&gradient) {
+            let scene = &pixel.frame().scene;
+            let base = tables.color.at(f0 + (f1 - f0) * t);
+            let color = shading::color(&scene.shading, base, gradient(t), pixel.to_eye()).extend(1.0);
+            return Some(Composited { color, first_hit: pixel.frame().host.first_hit.map(|_| first + t) });
+        }
+    }
+    None
+}
+
+/// What a pixel shows of a slab, from 0 at its near plane to 1 at its far plane, cut where the ray passes from one voxel's cell into
+/// another's if their labels may differ.
+fn cells(pixel: &Pixel, slab: i32) -> Vec<[f64; 2]> {
+    let (shown, first) = (pixel.shown(slab), f64::from(slab));
+    if shown.is_empty() {
+        return Vec::new();
+    }
+    let (start, end) = (shown.start - first, shown.end - first);
+    let mut cuts = vec![start, end];
+    if pixel.frame().volume.labels().is_some() {
+        let [from, to] = [start, end].map(|t| pixel.at(first + t) + 0.5);
+        for axis in 0..3 {
+            let (low, high) = (from[axis].min(to[axis]), from[axis].max(to[axis]));
+            let borders = low.floor() as i64 + 1..high.ceil() as i64;
+            let share = |border: i64| (border as f64 - from[axis]) / (to[axis] - from[axis]);
+            cuts.extend(borders.map(|border| start + (end - start) * share(border)));
+        }
+        cuts.sort_by(f64::total_cmp);
+    }
+    cuts.windows(2).map(|pair| [pair[0], pair[1]]).filter(|[start, end]| start < end).collect()
+}
+
+/// Values that run linearly over a part of a slab, where one set of tables holds.
+struct Line<'a> {
+    tables: Tables<'a>,
+    values: [f64; 2],
+    /// Where in the slab.
+    start: f64,
+    end: f64,
+}
+
+impl Line<'_> {
+    /// The first place in the slab with an opacity of one half.
+    fn first_surface(&self, gradient: &impl Fn(f64) -> DVec3) -> Option<f64> {
+        let tables = &self.tables;
+        let [f0, f1] = self.values;
+        let value = |s: f64| f0 + (f1 - f0) * s;
+        let place = |s: f64| self.start + (self.end - self.start) * s;
+        let knots = knots(tables, self.values);
+        // Gradients take opacity away only.
+        if !tables.visible || knots.iter().all(|&s| tables.opacity.at(value(s)) < HALF) {
+            return None;
+        }
+        let factor = |s: f64| tables.gradient_opacity.map_or(1.0, |ramp| ramp.at(gradient(place(s)).length()));
+        let samples = if tables.gradient_opacity.is_some() { SAMPLES } else { 1 };
+        for piece in knots.windows(2) {
+            let [low, high] = [piece[0], piece[1]];
+            // The ends of iso-ranges belong to them, so a piece's first point may show where the piece does not.
+            if self.shows_at(low, value(low), factor) {
+                return Some(place(low));
+            }
+            if !tables.in_iso_range(value((low + high) / 2.0)) {
+                continue;
+            }
+            let opacity = |s: f64| tables.opacity.at(value(s)) * factor(s);
+            let at = |sample: u32| low + (high - low) * f64::from(sample) / f64::from(samples);
+            if let Some(sample) = (1..=samples).find(|&sample| opacity(at(sample)) >= HALF) {
+                let (mut below, mut above) = (at(sample - 1), at(sample));
+                for _ in 0..HALVINGS {
+                    let middle = (below + above) / 2.0;
+                    if opacity(middle) >= HALF { above = middle } else { below = middle }
+                }
+                return Some(place(above));
+            }
+        }
+        self.shows_at(1.0, f1, factor).then(|| place(1.0))
+    }
+
+    /// Whether a point with this value has an opacity of one half.
+    fn shows_at(&self, s: f64, value: f64, factor: impl Fn(f64) -> f64) -> bool {
+        let opacity = self.tables.opacity.at(value);
+        opacity >= HALF && self.tables.in_iso_range(value) && opacity * factor(s) >= HALF
+    }
+}

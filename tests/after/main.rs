@@ -1,0 +1,43 @@
+//! The f64 twin of classification after splatting (SPEC §9): that it is what the specification says, and what must hold of its images
+//! whatever the volume.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+#[expect(dead_code, reason = "not every file needs all of it")]
+#[path = "../common/mod.rs"]
+mod common;
+mod field;
+mod images;
+mod modes;
+mod refusals;
+
+use glam::{DVec3, UVec3};
+use sheetsplat::image::Image;
+use sheetsplat::internals::reference;
+use sheetsplat::scene::Scene;
+use sheetsplat::settings::{Classification, Projection};
+use sheetsplat::volume::{Grid, Volume};
+
+/// A volume of a function of the voxel.
+pub(crate) fn volume(dims: [u32; 3], spacing: DVec3, value: impl Fn(UVec3) -> f64) -> Volume {
+    let grid = Grid { dims: UVec3::from(dims), spacing };
+    let values = (0..grid.dims.element_product()).map(|index| value(grid.voxel_at(index)) as f32).collect();
+    Volume::new("test", grid.dims, spacing, values).unwrap()
+}
+
+/// A scene that classifies after splatting.
+pub(crate) fn scene(width: u32, height: u32) -> Scene {
+    let mut scene = common::scene(width, height);
+    scene.splatting.classification = Classification::After;
+    scene.image.background = [0.0; 4];
+    scene.camera.up = DVec3::new(0.1, 0.2, 1.0);
+    scene
+}
+
+/// An eye so far away, world units.
+pub(crate) fn eye(distance: f64) -> Projection {
+    Projection::Perspective { fov_y: 25.0, distance: Some(distance), near: None }
+}
+
+pub(crate) fn render(volume: &Volume, scene: &Scene) -> Image {
+    reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap()
+}

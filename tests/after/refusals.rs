@@ -1,0 +1,72 @@
+//! What `after` excludes is refused by its key.
+
+use std::path::Path;
+
+use sheetsplat::RenderError;
+use sheetsplat::internals::reference;
+use sheetsplat::scene::Scene;
+use sheetsplat::settings::{Classification, Splatting};
+use sheetsplat::volume::builtin;
+
+use crate::common::gpu;
+
+fn parse(sets: &[&str]) -> Result<Scene, sheetsplat::scene::SceneError> {
+    let sets: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
+    Scene::parse("volume.builtin = 'head:16'", "scene.toml", Path::new(""), &sets)
+}
+
+#[test]
+fn what_excludes_after_is_named() {
+    let after = "splatting.classification=after";
+    for (sets, key, found, allowed) in [
+        (&["splatting.method=axis-aligned"][..], "classification", "method = \"axis-aligned\"", "\"before\" with it"),
+        (&["splatting.method=composite-every-sample"], "classification", "composite-every-sample", "\"before\""),
+        (&["splatting.whole_below=0.1"], "classification", "\"after\" with splatting.whole_below = 0.1", "\"before\""),
+        (&["splatting.beta=0.9"], "classification", "\"after\" with splatting.beta = 0.9", "\"before\""),
+        (&["splatting.resolution=0.01"], "classification", "\"after\" with splatting.resolution = 0.01", "\"before\""),
+        (&["splatting.falloff=11.5"], "falloff", "11.5 with splatting.classification", "at most 11"),
+        (
+            &["splatting.interpolation=exact", "splatting.falloff=0.94"],
+            "interpolation",
+            "\"exact\" with splatting.radius = 2 and splatting.falloff = 0.94",
+            "\"smooth\" with them, or a larger falloff",
+        ),
+    ] {
+        // By themselves they are fine.
+        parse(sets).unwrap().splatting.check().unwrap();
+        let text = parse(&[&[after], sets].concat()).unwrap_err().to_string();
+        assert!([key, found, allowed].iter().all(|words| text.contains(words)), "{sets:?}: {text}");
+        // Also where no scene file says so.
+        let mut scene = parse(sets).unwrap();
+        scene.splatting.classification = Classification::After;
+        let volume = scene.load_volume().unwrap();
+        let error = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap_err();
+        let RenderError::OutOfRange(error) = error else { panic!("{error}") };
+        let (at, was, may) = (error.key, error.found.to_string(), error.allowed.to_string());
+        assert_eq!(at, format!("splatting.{key}"), "{sets:?}");
+        assert!(was.contains(found) && may.contains(allowed), "{sets:?}: found {was}, allowed {may}");
+    }
+    for sets in [["splatting.falloff=11", "image.width=8"], ["splatting.interpolation=exact", "splatting.falloff=0.95"]]
+    {
+        parse(&[&[after], &sets[..]].concat()).unwrap().splatting.check().unwrap();
+    }
+}
+
+#[test]
+fn the_preset_labels_excludes_after() {
+    let error = parse(&["preset=labels", "splatting.classification=after"]).unwrap_err().to_string();
+    let expected =
+        "--set: splatting.classification: found \"after\" with preset = \"labels\", allowed: \"before\" with it";
+    assert_eq!(error, expected);
+    parse(&["preset=labels", "splatting.classification=before"]).unwrap();
+    parse(&["preset=labels"]).unwrap();
+    assert_eq!(Splatting::default().classification, Classification::Before);
+}
+
+/// Until it draws it.
+#[test]
+fn the_gpu_refuses_after() {
+    let scene = parse(&["splatting.classification=after"]).unwrap();
+    let error = gpu().render_volume(builtin::volume("head:16").unwrap(), &scene).unwrap_err().to_string();
+    assert!(error.contains("splatting.classification: found \"after\" on the GPU"), "{error}");
+}
