@@ -164,7 +164,7 @@ impl PatchBins {
         let strips = (0..rows).into_par_iter().step_by(strip_rows as usize);
         let strips: Vec<_> = strips.map(|first| sort.counted(first..(first + strip_rows).min(rows))).collect();
         let total = strips.iter().map(|strip| strip.entries).sum();
-        check("bricks' workgroups in patches and sheet groups", total, most_words)?;
+        check("bricks in patches and sheet groups", total, most_words)?;
         let mut starts = Vec::with_capacity(bins as usize + 1);
         let mut next = 0;
         for count in strips.iter().flat_map(|strip| &strip.counts) {
