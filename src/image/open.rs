@@ -126,3 +126,34 @@ fn read(path: &Path) -> Result<Vec<u8>, ImageError> {
 fn content(path: &Path, what: &str, found: String, allowed: String) -> ImageError {
     ImageError::Content { path: path.to_owned(), what: what.to_owned(), found, allowed }
 }
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use ::exr::prelude::*;
+
+    use super::{Image, ImageError};
+
+    /// A small image in tiles, whose header then claims tiles of 2¹³ × 2¹³ pixels.
+    #[test]
+    fn blocks_of_exr_files_are_no_larger_than_the_file_can_hold() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("tiles.exr");
+        let channels = SpecificChannels::rgba(|_: Vec2<usize>| (0.5_f32, 0.25_f32, 1.0_f32, 1.0_f32));
+        let blocks = Blocks::Tiles(Vec2(4, 4));
+        let encoding = Encoding { compression: Compression::ZIP16, blocks, line_order: LineOrder::Increasing };
+        let layer = Layer::new((4, 4), LayerAttributes::named("layer"), encoding, channels);
+        ::exr::prelude::Image::from_layer(layer).write().non_parallel().to_file(&path).unwrap();
+        assert_eq!(Image::open(&path).unwrap().pixels, [[0.5, 0.25, 1.0, 1.0]; 16]);
+
+        let mut bytes = std::fs::read(&path).unwrap();
+        // The attribute's name, its type, its size, and the tiles' width and height.
+        let attribute = b"tiles\0tiledesc\0";
+        let at = bytes.windows(attribute.len()).position(|window| window == attribute).unwrap() + attribute.len() + 4;
+        bytes[at..at + 4].copy_from_slice(&(1_u32 << 13).to_le_bytes());
+        bytes[at + 4..at + 8].copy_from_slice(&(1_u32 << 13).to_le_bytes());
+        std::fs::write(&path, bytes).unwrap();
+        let error = Image::open(&path).unwrap_err();
+        assert!(matches!(&error, ImageError::Content { found, .. } if found.starts_with("a block of ")), "{error}");
+    }
+}
