@@ -146,7 +146,7 @@ pub use {glam, wgpu};
 #[doc(hidden)]
 pub mod internals {
     pub use crate::geometry::{footprint, grid_warp, kernel, means, slab, view_geometry};
-    pub use crate::lists::{brick, bucket, classify, iso_range, patch_bins, quad_plan, value_list};
+    pub use crate::lists::{brick, bucket, classify, iso_range, matter, patch_bins, quad_plan, value_list};
     pub use crate::settings::camera::{Eye, ViewBasis};
     pub use crate::settings::clip::ClippedVoxels;
     pub use crate::settings::shading::MIN_GRADIENT;

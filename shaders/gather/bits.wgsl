@@ -1,6 +1,6 @@
 // Bits of masks, and what a subgroup's lanes hold together.
 //
-// Needs gather.wgsl: THREADS, lane.
+// Needs gather/patch.wgsl: THREADS, lane.
 
 // The lanes in which something holds, one bit each.
 fn ballot(holds: bool) -> u32 {

@@ -1,6 +1,6 @@
 // Kernels as the tile rasterizer gathers them: in closed form, by polynomials instead of tables (eq. 3).
 //
-// Needs gather.wgsl: ECONOMIES, PERSPECTIVE, gather.
+// Needs gather/patch.wgsl: ECONOMIES, PERSPECTIVE, gather.
 // Needs shared/frame.wgsl: frame.
 // Needs shared/local_ray.wgsl: SectionMaps, local_ray, near_cut, section_maps.
 

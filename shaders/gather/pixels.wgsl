@@ -1,6 +1,6 @@
 // The pixels of a thread of the tile rasterizer, in the compositing buffer and among first hits.
 //
-// Needs gather.wgsl: CUT, acc, gather, gathered, patch_range.
+// Needs gather/patch.wgsl: CUT, acc, gather, gathered, patch_range.
 // Needs gather/region.wgsl: block_word.
 // Needs gather/sheets.wgsl: hits, shown_from, shown_to.
 // Needs shared/frame.wgsl: frame.
@@ -8,6 +8,7 @@
 // A thread's four pixels.
 struct Pixels {
     // Of the patch's.
+    thread: u32,
     block: u32,
     first: vec2u,
     // Centres.
@@ -23,7 +24,7 @@ fn pixels_of(corner: vec2u, thread: u32) -> Pixels {
     let first = corner + vec2u((block & 1u) * 8u + thread % 8u, (block >> 1u) * 4u);
     let is_inside = vec4<bool>(first.x < frame.size.x) & (vec4u(first.y) + vec4u(0u, 1u, 2u, 3u) < vec4u(frame.size.y));
     let slot = (first.y - patch_range.first_row) * frame.size.x + first.x;
-    return Pixels(block, first, f32(first.x) + 0.5, f32(first.y) + vec4f(0.5, 1.5, 2.5, 3.5), slot, is_inside);
+    return Pixels(thread, block, first, f32(first.x) + 0.5, f32(first.y) + vec4f(0.5, 1.5, 2.5, 3.5), slot, is_inside);
 }
 
 fn load_image(pixels: Pixels) -> mat4x4f {
@@ -74,7 +75,7 @@ fn store_hits(pixels: Pixels) {
 // behind opaque voxels.
 fn open_word(pixels: Pixels, opacity: vec4f, depth: f32) -> u32 {
     var is_open = pixels.is_inside & (opacity < vec4f(select(3e38, frame.opacity_threshold, frame.culling != 0u)));
-    if CUT {
+    if looks_along_rays() {
         is_open &= shown_from < shown_to;
         is_open &= vec4<bool>(frame.culling == 0u) | (shown_to > vec4f(depth));
     }

@@ -1,7 +1,7 @@
 // The voxels that a subgroup draws in a sheet group: found once for all pixels of a patch, shaded once, and kept for as long as their
 // kernels reach into the next sheet group. They are in the workgroup's memory, of which every subgroup has a part of its own.
 //
-// Needs gather.wgsl: THREADS, lane, lanes.
+// Needs gather/patch.wgsl: THREADS, lane, lanes.
 // Needs gather/bits.wgsl: ballot.
 
 // Voxels in all parts; a multiple of 32.
@@ -47,4 +47,16 @@ fn enqueue(is_in: bool, voxel: u32, point: vec4f, blocks: u32) -> u32 {
 // Whether there is an n-th voxel, and some of a subgroup's blocks see it.
 fn is_queued_for(blocks: u32, n: u32) -> bool {
     return n < queue_count && (queue_blocks[queue_first + min(n, queue_count - 1u)] & blocks) != 0u;
+}
+
+// Those of the `BATCH` voxels from one on that some of a subgroup's blocks see, one bit each.
+fn seen_in_batch(blocks: u32, first: u32) -> vec2u {
+    let count = min(queue_count - first, BATCH);
+    var seen = vec2u(0u);
+    for (var i = 0u; i < count; i += 2u * lanes) {
+        passes += 1u;
+        seen |= bits_from(i, ballot(is_queued_for(blocks, first + i + lane)));
+        seen |= bits_from(i + lanes, ballot(is_queued_for(blocks, first + i + lanes + lane)));
+    }
+    return seen;
 }

@@ -1,6 +1,6 @@
 // Ramps whose first control points the lanes of a subgroup hold between them.
 //
-// Needs gather.wgsl: control_points, lane, lanes.
+// Needs gather/patch.wgsl: control_points, lane, lanes.
 // Needs shared/shading.wgsl: between.
 
 // One of the ramps: where its control points are, and the one of the first of them that this lane holds.

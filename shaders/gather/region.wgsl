@@ -1,7 +1,7 @@
 // The pixels of a patch that are not opaque (§6): a word for each of its four blocks, with the block's rows in eight bits each. Blocks are
 // numbered row by row.
 //
-// Needs gather.wgsl: gather, lane, lanes.
+// Needs gather/patch.wgsl: gather, lane, lanes.
 
 // Pixels across a patch.
 const PATCH_WIDTH = 16u;

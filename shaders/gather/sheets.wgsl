@@ -1,6 +1,6 @@
 // The sheets that a thread of the tile rasterizer holds, and how they are composited.
 //
-// Needs gather.wgsl: COMPOSITING, CUT, FIRST_HIT, ORDER, PATCH_THREADS, cut.
+// Needs gather/patch.wgsl: COMPOSITING, CUT, FIRST_HIT, ORDER, PATCH_THREADS, cut.
 // Needs shared/compositing.wgsl: composite.
 // Needs shared/cut.wgsl: noted, shown.
 // Needs shared/frame.wgsl: FRONT_TO_BACK, MINIMUM, SURFACE, frame.

@@ -1,7 +1,7 @@
 // The voxels that a subgroup of the tile rasterizer draws in a sheet group: which of those before stay, which come, their shading, and
 // their counts.
 //
-// Needs gather.wgsl: ECONOMIES, ORDER, PARALLELOGRAM, PASSES_PER_FIND, PASSES_PER_SHADING, PERSPECTIVE, SHEETS, bricks, color_ramp, drawn, first_px, gather, gathered, gradient_opacity_ramp, lane, lanes, opacity_ramp, open, passes, shallow, sheet_group.
+// Needs gather/patch.wgsl: ECONOMIES, ORDER, PARALLELOGRAM, PASSES_PER_FIND, PASSES_PER_SHADING, PERSPECTIVE, SHEETS, bricks, color_ramp, drawn, first_px, gather, gathered, gradient_opacity_ramp, lane, lanes, opacity_ramp, open, passes, shallow, sheet_group.
 // Needs gather/kernel.wgsl: footprint_at.
 // Needs gather/queue.wgsl: WHOLE_SHIFT, enqueue, queue_amounts, queue_blocks, queue_count, queue_first, queue_points, queue_size.
 // Needs gather/ramps.wgsl: is_long, ramp_at.
@@ -15,18 +15,13 @@
 // Needs shared/shading.wgsl: lighting, shade.
 // Needs shared/volume.wgsl: gradient_at, index_of, value_at.
 
-// A group of sheets: its number, its first sheet, where that begins, and half the box around its footprints.
+// A group of sheets: its number, its first sheet, where that begins, half the box around its footprints, and whether it is composited.
 struct GatheredGroup {
     number: u32,
     first_sheet: f32,
     near: f32,
     half_box: vec2f,
-}
-
-// The frame's sheets from the first that a kernel overlaps to the one after the last.
-fn overlapped_sheets(p: vec4f) -> vec2f {
-    let sheets = (overlapped(p, gather.depth_error, PERSPECTIVE) - gather.near) / frame.slab_width;
-    return vec2f(floor(sheets.x), ceil(sheets.y));
+    is_composited: bool,
 }
 
 // Those of them that are in the sheet group.
@@ -54,8 +49,9 @@ fn extent_here(p: vec4f) -> f32 {
     if PERSPECTIVE || ECONOMIES {
         return 1.0;
     }
+    let first = sheet_group.near + FIRST_PLANE * frame.slab_width;
     let far = sheet_group.near + f32(SHEETS) * frame.slab_width;
-    let beside = max(max(sheet_group.near - p.z, p.z - far), 0.0) * frame.kernel_per_depth / frame.support;
+    let beside = max(max(first - p.z, p.z - far), 0.0) * frame.kernel_per_depth / frame.support;
     return sqrt(max(1.0 - beside * beside, 0.0));
 }
 
@@ -72,7 +68,7 @@ fn search_bounds(is_start: bool) -> SearchBounds {
     let far = sheet_group.near + f32(SHEETS) * frame.slab_width;
     let reach = frame.reach + gather.depth_error;
     let least_reach = select(frame.reach, 0.0, frame.kernel_per_depth == 0.0) - 2.0 * gather.depth_error;
-    var depths = vec2f(sheet_group.near - reach, far + reach);
+    var depths = vec2f(sheet_group.near + FIRST_PLANE * frame.slab_width - reach, far + reach);
     if is_start && ORDER == FRONT_TO_BACK {
         depths.x = sheet_group.near + least_reach;
     }
@@ -112,7 +108,7 @@ fn find_voxels(search: SearchBounds, is_start: bool) {
         if count == 0u {
             break;
         }
-        let p = project(found.at);
+        let p = placed(found.at);
         let sheets = overlapped_sheets(p);
         let may_be_new = !is_start || first_group(sheets) == f32(sheet_group.number);
         _ = enqueue(lane < count && is_drawn_here(p, sheets) && may_be_new, found.voxel, p, blocks_here(p));
@@ -130,92 +126,6 @@ fn blocks_here(p: vec4f) -> u32 {
     return blocks_seen(open, p.xy - first_px, sheet_group.half_box, extent_here(p));
 }
 
-// Shades the voxels in the queue from one on.
-fn shade_voxels(first: u32) {
-    for (var i = first; i < queue_count; i += lanes) {
-        // Every lane shades its voxel.
-        passes += PASSES_PER_SHADING + gather.search_passes;
-        let is_in = i + lane < queue_count;
-        let slot = queue_first + min(i + lane, queue_count - 1u);
-        let voxel = queue_points[slot].w;
-        let at = voxel_of(bricks[voxel / BRICK_VOXELS], voxel % BRICK_VOXELS);
-        let p = project(at);
-        let shaded = shaded(at, p);
-        let sheets = overlapped_sheets(p);
-        var blocks = queue_blocks[slot];
-        if ECONOMIES {
-            blocks = economic_blocks(shaded, p, sheets);
-        }
-        if is_in {
-            queue_amounts[slot] = shaded.amount;
-            queue_blocks[slot] = blocks;
-            if PERSPECTIVE {
-                queue_points[slot].w = bitcast<u32>(p.w);
-            }
-        }
-        if is_in && (!ECONOMIES || blocks != 0u) {
-            count_drawn(voxel, p, sheets, blocks >> WHOLE_SHIFT != 0u);
-        }
-    }
-}
-
-// The blocks that a voxel is drawn to among §8's economies, and the sheet of the group that takes it as a whole.
-fn economic_blocks(shaded: Shaded, p: vec4f, sheets: vec2f) -> u32 {
-    let center = p.xy - first_px;
-    let is_deep = blocks_seen(shallow, center, sheet_group.half_box, 1.0) == 0u;
-    let is_whole = is_deep || shaded.alpha < gather.whole_below;
-    var whole = -1.0;
-    var is_here = true;
-    if is_whole {
-        let last_of_first = floor(max(sheets.x, 0.0) / f32(SHEETS)) * f32(SHEETS) + f32(SHEETS - 1u);
-        let center_sheet = floor((p.z - gather.near) / frame.slab_width);
-        let sheet = clamp(center_sheet, sheets.x, sheets.y - 1.0);
-        whole = select(sheet, min(sheet, last_of_first), is_deep) - sheet_group.first_sheet;
-        is_here = whole >= 0.0 && whole < f32(SHEETS);
-    }
-    let rims = footprint_at(p, sheet_group.near, whole, shaded.amount).rim;
-    let rim = max(max(rims.x, rims.y), max(rims.z, rims.w));
-    let part = sqrt(clamp(rim, 0.0, frame.support * frame.support)) / frame.support;
-    let blocks = select(0u, blocks_seen(open, center, sheet_group.half_box, part), is_here && rim > 0.0);
-    return select(0u, blocks | select(0u, (1u + u32(max(whole, 0.0))) << WHOLE_SHIFT, is_whole), blocks != 0u);
-}
-
-// A voxel's color and what it adds per block length, `(C·m, m)`, and its opacity.
-struct Shaded {
-    amount: vec4f,
-    alpha: f32,
-}
-
-fn shaded(voxel: vec3u, p: vec4f) -> Shaded {
-    let index = index_of(voxel);
-    let value = value_at(index);
-    let gradient = gradient_at(voxel);
-    var ramps = vec4u(0u, frame.ramps.xyz);
-    var color = vec3f(0.0);
-    var alpha = 0.0;
-    var is_searched = LABELS;
-    if LABELS {
-        ramps = ramps_of(index);
-    } else {
-        color = ramp_at(color_ramp, value);
-        alpha = ramp_at(opacity_ramp, value).x;
-        // Without a gradient opacity it is one point, which every lane holds.
-        var by_gradient = gradient_opacity_ramp.own.y;
-        for (var is_graded = ramps.w > ramps.z + 1u; is_graded; is_graded = false) {
-            by_gradient = ramp_at(gradient_opacity_ramp, gradient.magnitude).x;
-        }
-        alpha *= by_gradient;
-        is_searched = is_long(color_ramp) || is_long(opacity_ramp) || is_long(gradient_opacity_ramp);
-    }
-    for (; is_searched; is_searched = false) {
-        color = ramp(ramps.x, ramps.y, value);
-        alpha = ramp(ramps.y, ramps.z, value).x * ramp(ramps.z, ramps.w, gradient.magnitude).x;
-    }
-    let m = amount(alpha);
-    color = shade(color, gradient, lighting(p.xy, PERSPECTIVE));
-    return Shaded(vec4f(color * m, m), alpha);
-}
-
 // Counts a voxel that is drawn into the group, and its sections there, if no other patch has: as one if it is drawn as a whole.
 fn count_drawn(voxel: u32, p: vec4f, sheets: vec2f, is_whole: bool) {
     // Of the groups that the kernel reaches into, counted from the nearest; a whole one is drawn once.
@@ -225,12 +135,7 @@ fn count_drawn(voxel: u32, p: vec4f, sheets: vec2f, is_whole: bool) {
     if (atomicOr(&gathered.words[gather.drawn + word], bit) & bit) != 0u {
         return;
     }
-    let here = sheets_here(sheets);
-    var sections = u32(here.y - here.x);
-    if PERSPECTIVE {
-        let footprint = footprint_at(p, sheet_group.near, -1.0, vec4f(0.0));
-        sections = sections_on_screen(p.xy, footprint.axis, footprint.maps, here - sheet_group.first_sheet);
-    }
-    sections = select(sections, min(sections, 1u), is_whole);
+    let all = sections_here(p, sheets);
+    let sections = select(all, min(all, 1u), is_whole);
     drawn += vec2u(select(0u, 1u, nth == 0u && sections > 0u), sections);
 }

@@ -1,7 +1,7 @@
 // The walk through a sheet group's bricks behind a patch: their voxels whose kernels may reach the group and open pixels, as many at a
 // time as there are lanes.
 //
-// Needs gather.wgsl: PERSPECTIVE, bricks, bricks_visited, entries, lane, lanes, passes.
+// Needs gather/patch.wgsl: PERSPECTIVE, bricks, bricks_visited, entries, lane, lanes, passes.
 // Needs gather/bits.wgsl: ballot, nth_set_bit, together.
 // Needs shared/brick.wgsl: BRICK_VOXELS, in_brick.
 // Needs shared/frame.wgsl: frame.

@@ -113,12 +113,14 @@ pub const GATHER: Shader = shader!(
     "shared/brick",
     "shared/tally",
     "gather/uniforms",
+    "gather/patch",
     "gather/bits",
     "gather/region",
     "gather/queue",
     "gather/walk",
     "gather/pixels",
     "gather/voxels",
+    "gather/amounts",
     "gather/kernel",
     "gather/ramps",
     "shared/volume",
@@ -131,13 +133,39 @@ pub const GATHER: Shader = shader!(
     "shared/means",
     "gather/sheets"
 );
+/// The same with classification after splatting.
+pub const GATHER_PLANES: Shader = shader!(
+    "gather_planes",
+    "shared/frame",
+    "shared/brick",
+    "shared/tally",
+    "gather/uniforms",
+    "gather/patch",
+    "gather/bits",
+    "gather/region",
+    "gather/queue",
+    "gather/walk",
+    "gather/pixels",
+    "gather/voxels",
+    "gather/planes",
+    "gather/ramps",
+    "shared/volume",
+    "shared/project",
+    "shared/shading",
+    "shared/ramps",
+    "shared/compositing",
+    "shared/cut",
+    "shared/means",
+    "shared/slab_integral",
+    "gather/slabs"
+);
 /// Writes the depths of first hits.
 pub const FIRST_HIT: Shader = shader!("first_hit", "shared/frame", "shared/cut");
 /// Lays the result over the background.
 pub const RESOLVE: Shader = shader!("resolve", "shared/frame", "shared/band");
 
 /// Every shader, in the order of the data flow.
-pub const ALL: [Shader; 14] = [
+pub const ALL: [Shader; 15] = [
     CULL_BRICKS,
     CULL_VOXELS,
     COMPACT,
@@ -150,6 +178,7 @@ pub const ALL: [Shader; 14] = [
     COMPOSITE,
     OCCLUDE,
     GATHER,
+    GATHER_PLANES,
     FIRST_HIT,
     RESOLVE,
 ];
@@ -158,7 +187,7 @@ impl Shader {
     /// Whether its workgroups' memory must hold zeros at first. The tile rasterizer's memory is large, and it reads nothing there before
     /// it has written it.
     pub fn needs_zeroed_memory(&self) -> bool {
-        *self != GATHER
+        *self != GATHER && *self != GATHER_PLANES
     }
 
     /// Compiles the shader.

@@ -99,6 +99,14 @@ impl BrickList {
     }
 }
 
+/// The brick whose places begin at a voxel; `None` if none of them holds a voxel.
+pub fn of_places(origin: UVec3, present: u64) -> Option<Brick> {
+    let present = [present as u32, (present >> 32) as u32];
+    let mut brick = Brick { present, x: origin.x, y: origin.y, z: origin.z, extent: UNKNOWN };
+    fit(&mut brick);
+    (present != [0; 2]).then_some(brick)
+}
+
 /// Which places of a brick hold a voxel.
 pub fn present(brick: &Brick) -> u64 {
     u64::from(brick.present[0]) | u64::from(brick.present[1]) << 32

@@ -6,6 +6,7 @@ pub mod bucket;
 pub mod classify;
 pub(crate) mod extent;
 pub mod iso_range;
+pub mod matter;
 pub mod patch_bins;
 pub mod quad_plan;
 pub mod value_list;

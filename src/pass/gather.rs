@@ -15,7 +15,7 @@ use crate::gpu::layout::{Brick, Cut, Frame, Gather as GatherUniform, Gathered, I
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
 use crate::lists::patch_bins::{PATCH, SHEETS};
-use crate::settings::splatting::{Compositing, Economies, FootprintBox, Order, Splatting};
+use crate::settings::splatting::{Classification, Compositing, Economies, FootprintBox, Order, Splatting};
 
 /// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug)]
@@ -36,6 +36,8 @@ pub struct GatherMode {
     labels: bool,
     holes: bool,
     rays: RayMode,
+    /// Whether classification comes after splatting (SPEC §9).
+    after: bool,
     /// Whether the blocks of a patch are divided among workgroups.
     divided: bool,
 }
@@ -50,11 +52,14 @@ impl GatherMode {
         rays: RayMode,
         workgroups: u32,
     ) -> Self {
-        let Splatting { compositing, order, footprint_box, economies, .. } = *splatting;
+        let Splatting { compositing, order, footprint_box, economies, classification, .. } = *splatting;
+        let after = classification == Classification::After;
+        // There the order makes no difference to an image, and planes are handed on from front to back.
+        let order = if after { Order::FrontToBack } else { order };
         let economies = economies != Economies::default();
         // Every voxel has its own parallelogram there.
         let footprint_box = if perspective { FootprintBox::Rectangle } else { footprint_box };
-        Self { compositing, order, footprint_box, perspective, economies, labels, holes, rays, divided: workgroups > 1 }
+        Self { compositing, order, footprint_box, perspective, economies, labels, holes, rays, after, divided: workgroups > 1 }
     }
 }
 
@@ -89,16 +94,16 @@ pub struct GatherBuffers<'a> {
 
 impl Default for Gather {
     fn default() -> Self {
-        Self { stages: (0..Compositing::COUNT << 9).map(|_| OnceLock::new()).collect(), no_labels: OnceLock::new() }
+        Self { stages: (0..Compositing::COUNT << 10).map(|_| OnceLock::new()).collect(), no_labels: OnceLock::new() }
     }
 }
 
 impl Gather {
     fn stage(&self, mode: GatherMode) -> &OnceLock<ComputeStage> {
-        let GatherMode { compositing, order, footprint_box, perspective, economies, labels, holes, rays, divided } =
+        let GatherMode { compositing, order, footprint_box, perspective, economies, labels, holes, rays, after, divided } =
             mode;
         let [order, footprint_box] = [order as usize, footprint_box as usize];
-        let flags = [perspective, economies, labels, holes, rays.cut, rays.first_hit, divided].map(usize::from);
+        let flags = [perspective, economies, labels, holes, rays.cut, rays.first_hit, after, divided].map(usize::from);
         let bits = [order, footprint_box].into_iter().chain(flags);
         &self.stages[bits.fold(compositing as usize, |number, bit| 2 * number + bit)]
     }
@@ -125,7 +130,7 @@ impl Gather {
             ];
             let constants = [
                 ("THREADS", f64::from(device.adapter_info().subgroup_max_size)),
-                ("QUEUE", f64::from(queue(device))),
+                ("QUEUE", f64::from(queue(device, mode))),
                 ("WORKGROUPS_PER_PATCH", f64::from(workgroups_per_patch(device, mode))),
                 ("COMPOSITING", f64::from(mode.compositing as u32)),
                 ("ORDER", f64::from(mode.order as u32)),
@@ -137,7 +142,8 @@ impl Gather {
                 ("CUT", f64::from(u8::from(mode.rays.cut))),
                 ("FIRST_HIT", f64::from(u8::from(mode.rays.first_hit))),
             ];
-            ComputeStage::new(device, shaders::GATHER, "main", &slots, &constants)
+            let shader = if mode.after { shaders::GATHER_PLANES } else { shaders::GATHER };
+            ComputeStage::new(device, shader, "main", &slots, &constants)
         })
     }
 
@@ -211,15 +217,17 @@ fn workgroups_per_patch(device: &Device, mode: GatherMode) -> u32 {
 
 /// Voxels in a workgroup's queue: as many as there is room for beside the sheets of its patch's pixels. On a GPU more than that asks for
 /// would keep workgroups from running side by side.
-fn queue(device: &Device) -> u32 {
-    const SHEETS_BYTES: u32 = PATCH[0] * PATCH[1] * SHEETS * size_of::<[f32; 4]>() as u32;
+fn queue(device: &Device, mode: GatherMode) -> u32 {
+    // Of a pixel: four sheets of a colour, or the sums on four planes and the field on one that is handed on.
+    let floats = if mode.after { 5 * (SHEETS + 1) } else { 4 * SHEETS };
+    let sheets_bytes = PATCH[0] * PATCH[1] * floats * size_of::<f32>() as u32;
     // Point, amount and blocks.
     const VOXEL_BYTES: u32 = 36;
     let bytes = match device.adapter_info().device_type {
         DeviceType::Cpu => device.limits().max_compute_workgroup_storage_size.min(2 * WORKGROUP_BYTES),
         _ => WORKGROUP_BYTES,
     };
-    (bytes - SHEETS_BYTES) / VOXEL_BYTES / 32 * 32
+    (bytes - sheets_bytes) / VOXEL_BYTES / 32 * 32
 }
 
 /// Bytes of what a dispatch leaves to the next.

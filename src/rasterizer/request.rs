@@ -5,6 +5,8 @@ use std::ops::Range;
 use wgpu::Device;
 
 use super::kind::{RasterizerKind, check_rays, insists_on_tiles};
+use crate::after::normalization::Normalization;
+use crate::after::slab_integral;
 use crate::error::RenderError;
 use crate::geometry::kernel::Kernel;
 use crate::geometry::means;
@@ -16,7 +18,6 @@ use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::uniforms::Ramps;
 use crate::pass::composite::RayMode;
 use crate::scene::Scene;
-use crate::setting_error::SettingError;
 use crate::settings::camera::Camera;
 use crate::settings::splatting::{Classification, Rasterizer, Splatting};
 
@@ -56,10 +57,6 @@ impl FrameRequest {
     ) -> Result<Self, RenderError> {
         let splatting = settled(scene.splatting, rasterizer);
         splatting.check()?;
-        if splatting.classification == Classification::After {
-            let (found, allowed) = ("\"after\" on the GPU", "\"before\", or the reference backend");
-            return Err(SettingError::new("splatting.classification", found, allowed).into());
-        }
         let (grid, size) = (volume.grid(), [scene.image.width, scene.image.height]);
         let seen = ViewGeometry::new(grid, camera, &splatting, size)?;
         let bands = CompositingBuffer::bands(&device.limits(), size)?;
@@ -75,7 +72,7 @@ impl FrameRequest {
             fallback,
             covered: means::covered(&seen, grid, &splatting),
             kernel: Kernel::new(splatting.radius, splatting.falloff),
-            ramps: Ramps::new(volume.transfer()),
+            ramps: ramps(volume, &splatting),
             first_hit,
             view: seen,
             splatting,
@@ -94,6 +91,17 @@ impl FrameRequest {
     pub(crate) fn hit_bytes(&self) -> u64 {
         if self.rays.first_hit { 4 * self.pixels() } else { 0 }
     }
+}
+
+fn ramps(volume: &ClassifiedVolume, splatting: &Splatting) -> Ramps {
+    let ramps = Ramps::new(volume.transfer());
+    if splatting.classification == Classification::Before {
+        return ramps;
+    }
+    let values = volume.volume().values();
+    let Some(numbers) = Normalization::of(values.iter().copied()) else { return ramps };
+    let table = slab_integral::table(&volume.transfer().tables(None), splatting.compositing, &numbers);
+    ramps.with_integral(table, numbers)
 }
 
 /// The settings, with the renderer's rasterizer where they leave the choice.

@@ -8,15 +8,17 @@ use super::kind::SUBGROUP_SIZES;
 use super::{FrameEstimate, FrameInputs, Prepared};
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
+use crate::gpu::classified_volume::ClassifiedVolume;
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, written};
 use crate::gpu::gathered_layout::GatheredLayout;
 use crate::gpu::layout::{Brick, Gather as GatherUniform, PatchRange};
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
+use crate::lists::matter::Matter;
 use crate::lists::patch_bins::{self, PatchBins, SHEETS};
 use crate::pass::gather::{Gather, GatherBand, GatherBuffers, GatherMode};
 use crate::rasterizer::request::FrameRequest;
-use crate::settings::splatting::Order;
+use crate::settings::splatting::{Classification, Order, Splatting};
 use crate::stats::GroupSlabs;
 
 /// The stage.
@@ -29,6 +31,8 @@ pub(crate) struct TileRasterizer {
 #[derive(Debug)]
 pub(crate) struct TileFrame {
     binned: Binned,
+    /// The bricks of what matters, where not the volume's own are drawn.
+    matter: Option<(Matter, Vec<Brick>)>,
     uniform: Buffer,
     patch_ranges: Buffer,
     /// All bricks in one buffer, where the volume's own are in several.
@@ -71,22 +75,28 @@ impl TileRasterizer {
         let limits = device.limits();
         let mut old = PreviousBuffers::of(previous);
         let search = all_search_passes(request, volume.labels().is_some());
+        let order = drawn_order(splatting);
+        let matter = matter(request, volume, old.matter.take());
         let is_current = |old: &Binned| {
+            !matter.as_ref().is_some_and(|matter| matter.is_new) &&
             old.view == *view
-                && (old.order, old.revision, old.bins.passes.search) == (splatting.order, volume.revision, search)
+                && (old.order, old.revision, old.bins.passes.search) == (order, volume.revision, search)
                 && (old.support, &old.covered) == (kernel.support(), covered)
         };
         let (current, stale) = match old.binned.take() {
             Some(binned) if is_current(&binned) => (Some(binned), false),
             _ => (None, true),
         };
-        let bricks = volume.lists.all();
+        let (bricks, lists) = match &matter {
+            Some(matter) => (&matter.bricks[..], 0),
+            None => (volume.lists.all(), volume.lists.lists.len()),
+        };
         let binned = match current {
             Some(binned) => binned,
             None => Binned {
                 bins: bins(&limits, request, bricks, search)?,
                 view: *view,
-                order: splatting.order,
+                order,
                 covered: covered.clone(),
                 support: kernel.support(),
                 revision: volume.revision,
@@ -95,7 +105,7 @@ impl TileRasterizer {
         let bins = &binned.bins;
         let results = GatheredLayout::new(view, bins, bricks.len() as u32);
         let uniform = uniforms::gather(view, kernel, splatting, bins, &results);
-        let spec = BufferSpecs::new(&limits, request, (bins, &results), volume.lists.lists.len())?;
+        let spec = BufferSpecs::new(&limits, request, (bins, &results), lists)?;
         let write = |old, spec: &BufferSpec, bytes: &[u8]| written(device, queue, old, spec, bytes);
         let (starts, entries) = match (old.starts.take(), old.entries.take()) {
             (Some(starts), Some(entries)) if !stale => (starts, entries),
@@ -147,6 +157,7 @@ impl TileRasterizer {
         let bands = inputs.compositing.bands.iter().map(|band| bind(&band.acc)).collect();
         let frame = TileFrame {
             binned,
+            matter: matter.map(|matter| (matter.what, matter.bricks)),
             uniform,
             patch_ranges,
             bricks: own_bricks,
@@ -291,8 +302,37 @@ fn range_stride(limits: &Limits) -> usize {
 fn bins(limits: &Limits, request: &FrameRequest, bricks: &[Brick], search: u32) -> Result<PatchBins, RenderError> {
     let FrameRequest { view, splatting, kernel, covered, .. } = request;
     let most_words = binding(limits) / 4;
-    let (order, support) = (splatting.order, kernel.support());
+    let (order, support) = (drawn_order(splatting), kernel.support());
     Ok(PatchBins::new(bricks, view, order, covered.clone(), support, search, most_words)?)
+}
+
+/// The order in which groups are drawn. Planes are handed on from front to back; after splatting the order makes no difference to an image.
+fn drawn_order(splatting: &Splatting) -> Order {
+    match splatting.classification {
+        Classification::Before => splatting.order,
+        Classification::After => Order::FrontToBack,
+    }
+}
+
+/// What matters where classification comes after splatting.
+struct NewMatter {
+    what: Matter,
+    bricks: Vec<Brick>,
+    is_new: bool,
+}
+
+fn matter(request: &FrameRequest, volume: &ClassifiedVolume, old: Option<(Matter, Vec<Brick>)>) -> Option<NewMatter> {
+    if request.splatting.classification == Classification::Before {
+        return None;
+    }
+    let what = Matter::new(volume.transfer(), request.splatting.compositing, &request.view, volume.grid());
+    Some(match old {
+        Some((old, bricks)) if old == what => NewMatter { what, bricks, is_new: false },
+        _ => {
+            let bricks = what.bricks(volume.grid(), volume.volume().values());
+            NewMatter { what, bricks, is_new: true }
+        }
+    })
 }
 
 /// Passes through loops to look up a voxel's control points: all ramps are searched in memory if any is, as threads hold no more than one
@@ -312,6 +352,7 @@ fn search_passes(points: u32) -> u32 {
 #[derive(Default)]
 struct PreviousBuffers {
     binned: Option<Binned>,
+    matter: Option<(Matter, Vec<Brick>)>,
     uniform: Option<Buffer>,
     patch_ranges: Option<Buffer>,
     bricks: Option<Buffer>,
@@ -326,6 +367,7 @@ impl PreviousBuffers {
         let Some(frame) = frame else { return Self::default() };
         Self {
             binned: Some(frame.binned),
+            matter: frame.matter,
             uniform: Some(frame.uniform),
             patch_ranges: Some(frame.patch_ranges),
             bricks: frame.bricks,

@@ -1,0 +1,108 @@
+// What the voxels in a subgroup's queue add to sheets where they are classified and shaded before splatting (§3).
+//
+// The frame's sheets from the first that a kernel overlaps to the one after the last.
+fn overlapped_sheets(p: vec4f) -> vec2f {
+    let sheets = (overlapped(p, gather.depth_error, PERSPECTIVE) - gather.near) / frame.slab_width;
+    return vec2f(floor(sheets.x), ceil(sheets.y));
+}
+
+// How many of a kernel's sections in the group are drawn.
+fn sections_here(p: vec4f, sheets: vec2f) -> u32 {
+    let here = sheets_here(sheets);
+    if PERSPECTIVE {
+        let footprint = footprint_at(p, sheet_group.near, -1.0, vec4f(0.0));
+        return sections_on_screen(p.xy, footprint.axis, footprint.maps, here - sheet_group.first_sheet);
+    }
+    return u32(here.y - here.x);
+}
+
+// Where a voxel is seen.
+fn placed(voxel: vec3u) -> vec4f {
+    return project(voxel);
+}
+
+// Shades the voxels in the queue from one on.
+fn shade_voxels(first: u32) {
+    for (var i = first; i < queue_count; i += lanes) {
+        // Every lane shades its voxel.
+        passes += PASSES_PER_SHADING + gather.search_passes;
+        let is_in = i + lane < queue_count;
+        let slot = queue_first + min(i + lane, queue_count - 1u);
+        let voxel = queue_points[slot].w;
+        let at = voxel_of(bricks[voxel / BRICK_VOXELS], voxel % BRICK_VOXELS);
+        let p = project(at);
+        let shaded = shaded(at, p);
+        let sheets = overlapped_sheets(p);
+        var blocks = queue_blocks[slot];
+        if ECONOMIES {
+            blocks = economic_blocks(shaded, p, sheets);
+        }
+        if is_in {
+            queue_amounts[slot] = shaded.amount;
+            queue_blocks[slot] = blocks;
+            if PERSPECTIVE {
+                queue_points[slot].w = bitcast<u32>(p.w);
+            }
+        }
+        if is_in && (!ECONOMIES || blocks != 0u) {
+            count_drawn(voxel, p, sheets, blocks >> WHOLE_SHIFT != 0u);
+        }
+    }
+}
+
+// The blocks that a voxel is drawn to among §8's economies, and the sheet of the group that takes it as a whole.
+fn economic_blocks(shaded: Shaded, p: vec4f, sheets: vec2f) -> u32 {
+    let center = p.xy - first_px;
+    let is_deep = blocks_seen(shallow, center, sheet_group.half_box, 1.0) == 0u;
+    let is_whole = is_deep || shaded.alpha < gather.whole_below;
+    var whole = -1.0;
+    var is_here = true;
+    if is_whole {
+        let last_of_first = floor(max(sheets.x, 0.0) / f32(SHEETS)) * f32(SHEETS) + f32(SHEETS - 1u);
+        let center_sheet = floor((p.z - gather.near) / frame.slab_width);
+        let sheet = clamp(center_sheet, sheets.x, sheets.y - 1.0);
+        whole = select(sheet, min(sheet, last_of_first), is_deep) - sheet_group.first_sheet;
+        is_here = whole >= 0.0 && whole < f32(SHEETS);
+    }
+    let rims = footprint_at(p, sheet_group.near, whole, shaded.amount).rim;
+    let rim = max(max(rims.x, rims.y), max(rims.z, rims.w));
+    let part = sqrt(clamp(rim, 0.0, frame.support * frame.support)) / frame.support;
+    let blocks = select(0u, blocks_seen(open, center, sheet_group.half_box, part), is_here && rim > 0.0);
+    return select(0u, blocks | select(0u, (1u + u32(max(whole, 0.0))) << WHOLE_SHIFT, is_whole), blocks != 0u);
+}
+
+// A voxel's color and what it adds per block length, `(C·m, m)`, and its opacity.
+struct Shaded {
+    amount: vec4f,
+    alpha: f32,
+}
+
+fn shaded(voxel: vec3u, p: vec4f) -> Shaded {
+    let index = index_of(voxel);
+    let value = value_at(index);
+    let gradient = gradient_at(voxel);
+    var ramps = vec4u(0u, frame.ramps.xyz);
+    var color = vec3f(0.0);
+    var alpha = 0.0;
+    var is_searched = LABELS;
+    if LABELS {
+        ramps = ramps_of(index);
+    } else {
+        color = ramp_at(color_ramp, value);
+        alpha = ramp_at(opacity_ramp, value).x;
+        // Without a gradient opacity it is one point, which every lane holds.
+        var by_gradient = gradient_opacity_ramp.own.y;
+        for (var is_graded = ramps.w > ramps.z + 1u; is_graded; is_graded = false) {
+            by_gradient = ramp_at(gradient_opacity_ramp, gradient.magnitude).x;
+        }
+        alpha *= by_gradient;
+        is_searched = is_long(color_ramp) || is_long(opacity_ramp) || is_long(gradient_opacity_ramp);
+    }
+    for (; is_searched; is_searched = false) {
+        color = ramp(ramps.x, ramps.y, value);
+        alpha = ramp(ramps.y, ramps.z, value).x * ramp(ramps.z, ramps.w, gradient.magnitude).x;
+    }
+    let m = amount(alpha);
+    color = shade(color, gradient, lighting(p.xy, PERSPECTIVE));
+    return Shaded(vec4f(color * m, m), alpha);
+}

@@ -1,0 +1,291 @@
+// A patch of the tile rasterizer from front to back, whatever its sheets hold: its bindings, its groups one after the other, and the rounds in
+// which a subgroup goes through its pixels. The stage's own file says what a voxel adds to sheets, and what becomes of them.
+//
+@group(0) @binding(1) var<uniform> gathers: array<Gather, 1>;
+@group(0) @binding(2) var<uniform> patch_range: PatchRange;
+@group(0) @binding(3) var<storage, read> bricks: array<Brick>;
+// Where every sheet group of every patch starts in `entries`.
+@group(0) @binding(4) var<storage, read> starts: array<u32>;
+// Bricks' numbers.
+@group(0) @binding(5) var<storage, read> entries: array<u32>;
+// The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0); then the table of labels.
+@group(0) @binding(6) var<storage, read> control_points: array<vec4f>;
+@group(0) @binding(7) var values: texture_2d_array<u32>;
+@group(0) @binding(8) var<storage, read_write> acc: array<vec4f>;
+@group(0) @binding(9) var<storage, read_write> gathered: Gathered;
+// Of every group, nearest first, half the screen box around its footprints, pixels.
+@group(0) @binding(10) var<storage, read> half_boxes: array<vec2f>;
+@group(0) @binding(11) var labels: texture_2d_array<u32>;
+// The next dispatch: nothing, if no subgroup says otherwise.
+@group(0) @binding(12) var<storage, read_write> next: Indirect;
+@group(0) @binding(13) var<uniform> cut: Cut;
+@group(0) @binding(14) var surfaces: texture_depth_2d;
+
+// `frame.compositing` and `frame.order`.
+override COMPOSITING: u32 = 0u;
+override ORDER: u32 = 0u;
+// Whether voxels have rays of their own.
+override PERSPECTIVE: bool = false;
+// Whether a footprint's box is the parallelogram of Fig. 13, else its bounding rectangle.
+override PARALLELOGRAM: bool = false;
+// Whether any of §8's economies is asked for.
+override ECONOMIES: bool = false;
+// Whether anything is cut, and whether first hits are asked for.
+override CUT: bool = false;
+override FIRST_HIT: bool = false;
+
+// Threads of a workgroup: those of the largest subgroup.
+override THREADS: u32 = 32u;
+// Workgroups that a patch is divided among: more than one only where there is too much behind it.
+override WORKGROUPS_PER_PATCH: u32 = 1u;
+
+var<private> gather: Gather;
+
+// The subgroup.
+var<private> lane: u32;
+var<private> lanes: u32;
+
+// The patch: where the centre of its first pixel is, and of the pixels that the subgroup goes round those that are not opaque, and those
+// that have not reached β.
+var<private> first_px: vec2f;
+var<private> open: vec4u;
+var<private> shallow: vec4u;
+
+// The group that is drawn.
+var<private> sheet_group: GatheredGroup;
+// The first that this dispatch composites; those before it were, and are looked at once more.
+var<private> first_composited: u32;
+
+// Passes through loops, bricks visited, and voxels and sections drawn.
+var<private> passes: u32;
+var<private> bricks_visited: u32;
+var<private> drawn: vec2u;
+
+var<private> color_ramp: Ramp;
+var<private> opacity_ramp: Ramp;
+var<private> gradient_opacity_ramp: Ramp;
+
+// Sheets of a sheet group.
+const SHEETS = 4u;
+
+// Threads that hold a patch, and blocks of it.
+const PATCH_THREADS = 32u;
+const BLOCKS = 4u;
+
+// Passes through loops that are not counted where they are made. The pass that finds a loop at its end is one, and in that pass one
+// through every loop inside; loops that run at most once take two.
+const PASSES_PER_GROUP = 6u;
+const PASSES_PER_FILL = 36u;
+const PASSES_PER_FIND = 5u;
+const PASSES_PER_SHADING = 7u;
+const PASSES_PER_ROUND = 18u;
+const PASSES_PER_BATCH = 4u;
+const PASSES_PER_ADDITION = 2u;
+
+// To look at how four rays are cut, or along which way means are taken.
+fn passes_per_look() -> u32 {
+    return select(0u, 140u, looks_along_rays());
+}
+
+// Voxels of the queue that are looked through at a time, one bit each.
+const BATCH = 64u;
+
+// What the subgroup has drawn of a patch: which of its pixels are open after the group, and of which blocks sheets hold something.
+struct Progress {
+    open: vec4u,
+    shallow: vec4u,
+    begun: u32,
+}
+
+// What became of a group: whether the queue held all of its voxels at once, and whether there were any.
+struct GroupOutcome {
+    is_whole: bool,
+    has_drawn: bool,
+}
+
+// The lanes take their shares of the ramps' control points.
+fn hold_ramps() {
+    color_ramp = ramp_of(0u, frame.ramps.x);
+    opacity_ramp = ramp_of(frame.ramps.x, frame.ramps.y);
+    gradient_opacity_ramp = ramp_of(frame.ramps.y, frame.ramps.z);
+}
+
+// Finds the open pixels among those of the threads from `threads.x` to the one before `threads.y`. Returns their blocks, one bit each.
+fn find_open_pixels(corner: vec2u, threads: vec2u, thread: u32) -> u32 {
+    var own_blocks = 0u;
+    for (var round = threads.x; round < threads.y; round += THREADS) {
+        let pixels = pixels_of(corner, round + thread);
+        look(pixels.column, pixels.rows);
+        let opacity = transpose(load_image(pixels))[3];
+        own_blocks |= subgroupOr(1u << pixels.block);
+        open = with_blocks(open, pixels.block, open_word(pixels, opacity, -FAR));
+        if ECONOMIES {
+            shallow = with_blocks(shallow, pixels.block, shallow_word(pixels, opacity));
+        }
+    }
+    return own_blocks;
+}
+
+// The `at`-th group in the order of compositing becomes the one that is drawn.
+fn begin_group(at: u32) {
+    let number = select(gather.groups - 1u - at, at, ORDER == FRONT_TO_BACK);
+    let first_sheet = f32(number * SHEETS);
+    let near = gather.near + first_sheet * frame.slab_width;
+    sheet_group = GatheredGroup(number, first_sheet, near, half_boxes[number], at >= first_composited);
+}
+
+// Adds the sections of the queue's voxels to the sheets of all pixels, round by round. With the last voxels of the group, `is_last`, the sheets
+// are composited; before, they wait in the workgroup's memory.
+fn draw_queue(corner: vec2u, threads: vec2u, thread: u32, is_last: bool, progress: ptr<function, Progress>) {
+    for (var round = threads.x; round < threads.y; round += THREADS) {
+        passes += PASSES_PER_ROUND;
+        let pixels = pixels_of(corner, round + thread);
+        let blocks = subgroupOr(1u << pixels.block);
+        var has_begun = ((*progress).begun & blocks) != 0u;
+        var sheets = Sheets();
+        for (; has_begun; has_begun = false) {
+            sheets = saved_sheets(round + thread);
+        }
+        let is_added = add_sections(&sheets, pixels, blocks);
+        if is_added {
+            (*progress).begun |= blocks;
+        }
+        for (var is_left = is_added && !is_last; is_left; is_left = false) {
+            save_sheets(round + thread, sheets);
+        }
+        let is_due = is_last && (((*progress).begun & blocks) != 0u || is_due_without_voxels(blocks));
+        for (var is_done = is_due; is_done; is_done = false) {
+            composite_pixels(pixels, sheets, progress);
+        }
+    }
+}
+
+// Draws the group: as often as voxels fill the queue, finds and shades them, and adds their sections.
+fn draw_group(corner: vec2u, threads: vec2u, thread: u32, is_kept: bool) -> GroupOutcome {
+    let search = search_bounds(is_kept);
+    var progress = Progress(open, shallow, 0u);
+    var outcome = GroupOutcome(true, COMPOSITING == MINIMUM);
+    var first_new = queue_count;
+    loop {
+        passes += PASSES_PER_FILL;
+        find_voxels(search, is_kept);
+        subgroupBarrier();
+        shade_voxels(first_new);
+        subgroupBarrier();
+        let is_last = is_walked();
+        outcome.has_drawn |= queue_count > 0u;
+        draw_queue(corner, threads, thread, is_last, &progress);
+        subgroupBarrier();
+        if is_last {
+            break;
+        }
+        outcome.is_whole = false;
+        queue_count = 0u;
+        first_new = 0u;
+    }
+    open = progress.open;
+    shallow = progress.shallow;
+    return outcome;
+}
+
+// Notes that the `at`-th group was composited in the 32×32 tile of a pixel, once for all of the tile's patches.
+fn count_composited(at: u32, pixel: vec2u) {
+    let tiles = tile_grid(frame.size);
+    let number = (at * tiles.y + pixel.y / TILE) * tiles.x + pixel.x / TILE;
+    let bit = 1u << (number % 32u);
+    if (atomicOr(&gathered.words[gather.composited + number / 32u], bit) & bit) == 0u {
+        atomicAdd(&gathered.words[at], 1u);
+    }
+}
+
+// Leaves to the next dispatch at which group the subgroup goes on, and adds its counts to the frame's.
+fn finish(at: u32, reached: u32) {
+    let all_counts = subgroupAdd(drawn);
+    if lane == 0u {
+        // Where all is opaque nothing is left to do.
+        let is_done = at == gather.groups || all(open == vec4u(0u));
+        atomicStore(&gathered.words[reached], select(at, gather.groups, is_done));
+        if !is_done {
+            next = indirect((patch_range.end_patch - patch_range.first_patch) * WORKGROUPS_PER_PATCH);
+        }
+        atomicAdd(&gathered.tally.voxels_shaded, all_counts.x);
+        atomicAdd(&gathered.tally.sections_rasterized, all_counts.y);
+        atomicAdd(&gathered.tally.bricks_visited, bricks_visited);
+    }
+}
+
+// Draws a patch's groups in the order of compositing, from the one that the dispatch before has left, until all pixels are opaque.
+fn draw(number: u32, first_thread: u32, thread: u32) {
+    hold_ramps();
+    let columns = (frame.size.x + PATCH_WIDTH - 1u) / PATCH_WIDTH;
+    let corner = vec2u(number % columns, number / columns) * vec2u(PATCH_WIDTH, PATCH_HEIGHT);
+    first_px = vec2f(corner) + 0.5;
+    empty_queue(thread);
+    let threads = vec2u(first_thread, first_thread + PATCH_THREADS / WORKGROUPS_PER_PATCH);
+    let own_blocks = find_open_pixels(corner, threads, thread);
+
+    let first_bin = number * gather.groups;
+    let reached = gather.reached + number * BLOCKS + firstTrailingBit(own_blocks);
+    var at = atomicLoad(&gathered.words[reached]);
+    // What the groups before have left behind.
+    first_composited = at;
+    at -= min(at, GROUPS_LOOKED_BACK);
+    var end = starts[first_bin + at];
+    // Whether the queue holds all voxels of the group before.
+    var is_kept = false;
+    for (; at < gather.groups && any(open != vec4u(0u)); at += 1u) {
+        let first_entry = end;
+        end = starts[first_bin + at + 1u];
+        // A driver may end loops that go on for too long: what would take too many passes is left to the next dispatch.
+        if passes + gather.passes_per_group + (end - first_entry) * gather.passes_per_brick > gather.most_passes {
+            break;
+        }
+        passes += PASSES_PER_GROUP;
+        if first_entry == end && !counts_gaps() {
+            is_kept = false;
+            continue;
+        }
+        begin_group(at);
+        if !is_kept {
+            queue_count = 0u;
+        }
+        keep_voxels();
+        walk(first_entry, end);
+        let outcome = draw_group(corner, threads, thread, is_kept);
+        is_kept = outcome.is_whole && !may_appear();
+        for (var has_drawn = outcome.has_drawn && sheet_group.is_composited; has_drawn; has_drawn = false) {
+            if lane == 0u {
+                count_composited(at, corner);
+            }
+        }
+    }
+    finish(at, reached);
+}
+
+@compute @workgroup_size(THREADS)
+fn main(
+    @builtin(local_invocation_index) thread: u32,
+    @builtin(workgroup_id) workgroup: vec3u,
+    @builtin(subgroup_size) subgroup_size: u32,
+    @builtin(subgroup_invocation_id) subgroup_invocation_id: u32,
+) {
+    lanes = subgroup_size;
+    lane = subgroup_invocation_id;
+    start(workgroup.z);
+    gather = gathers[zero];
+    let at_workgroup = unfold(workgroup);
+    let number = patch_range.first_patch + at_workgroup / WORKGROUPS_PER_PATCH;
+    let first_thread = at_workgroup % WORKGROUPS_PER_PATCH * (PATCH_THREADS / WORKGROUPS_PER_PATCH);
+    var is_left = false;
+    if number < patch_range.end_patch {
+        let first_bin = number * gather.groups;
+        let block = firstTrailingBit(subgroupOr(1u << ((first_thread + thread) / 8u)));
+        let at = atomicLoad(&gathered.words[gather.reached + number * BLOCKS + block]);
+        // Groups without bricks count for the least, also behind the last brick of the patch.
+        let first = select(at, 0u, COMPOSITING == MINIMUM && at < gather.groups);
+        is_left = starts[first_bin + first] < starts[first_bin + gather.groups];
+    }
+    for (; is_left; is_left = false) {
+        draw(number, first_thread, thread);
+    }
+}

@@ -1,0 +1,121 @@
+// What a thread of the tile rasterizer makes of the fields on two planes: the slab between them, classified, shaded and composited (SPEC §9).
+//
+// Needs nothing yet.
+
+// Of a thread's four pixels the sheet depths from and to which their rays' stretches reach, the length of a ray by its sheet depth, and the
+// depths of first hits, as bits.
+var<private> shown_from: vec4f;
+var<private> shown_to: vec4f;
+var<private> length_per_depth: vec4f;
+var<private> hits: vec4u;
+
+// How the rays of a thread's four pixels, of one column, look at slabs.
+fn look(column: f32, rows: vec4f) {
+    for (var i = 0u; i < 4u; i += 1u) {
+        let point_px = vec2f(column, rows[i]);
+        let at = place_of(point_px);
+        var depths = in_box(at, cut.box_half.xyz);
+        if CUT {
+            depths = both(depths, shown_depths(point_px));
+        }
+        let sheets = sheet_depths(at, depths);
+        let slope = slope_of(point_px);
+        shown_from[i] = sheets.x;
+        shown_to[i] = sheets.y;
+        length_per_depth[i] = sqrt(1.0 + dot(slope, slope)) / abs(dot(cut.sheet_along.xyz, at));
+    }
+}
+
+// The field at one pixel.
+struct Sample {
+    has_value: bool,
+    value: f32,
+    gradient: vec3f,
+}
+
+fn sample_of(fields: Fields, i: u32) -> Sample {
+    return Sample(fields.has_value[i], fields.value[i], vec3f(fields.x[i], fields.y[i], fields.z[i]));
+}
+
+// A slab as one pixel sees it: where only one plane has a value, it holds for both.
+struct Slab {
+    near: Sample,
+    far: Sample,
+    has_value: bool,
+}
+
+fn slab_between(near: Sample, far: Sample) -> Slab {
+    var slab = Slab(near, far, near.has_value || far.has_value);
+    if !near.has_value {
+        slab.near = far;
+    }
+    if !far.has_value {
+        slab.far = near;
+    }
+    return slab;
+}
+
+// Whether a slab's values reach those that have an opacity.
+fn has_opacity(slab: Slab) -> bool {
+    let head = control_points[gather.integral];
+    return slab.has_value && max(slab.near.value, slab.far.value) >= head.z && min(slab.near.value, slab.far.value) <= head.w;
+}
+
+// The sheet of a slab of which a ray shows some length.
+fn sheet_of(slab: Slab, length: f32, point_px: vec2f) -> vec4f {
+    let means = slab_integral(gather.integral, slab.near.value, slab.far.value);
+    let gradient = gradient_of(mix(slab.near.gradient, slab.far.gradient, means.share));
+    let ramps = vec4u(0u, frame.ramps.xyz);
+    var m = means.amount;
+    for (var is_graded = ramps.w > ramps.z + 1u; is_graded; is_graded = false) {
+        m *= ramp(ramps.z, ramps.w, gradient.magnitude).x;
+    }
+    let a = m * length;
+    return vec4f(a * shade(means.color, gradient, lighting(point_px, PERSPECTIVE)), a);
+}
+
+// The sums on the `j`-th of the group's planes.
+fn sums_on(sheets: Sheets, j: u32) -> PlaneSums {
+    let is_odd = vec4<bool>((j & 1u) != 0u);
+    let is_back = vec4<bool>(j >= 2u);
+    return PlaneSums(
+        select(select(sheets.first.weight, sheets.second.weight, is_odd), select(sheets.third.weight, sheets.fourth.weight, is_odd), is_back),
+        select(select(sheets.first.value, sheets.second.value, is_odd), select(sheets.third.value, sheets.fourth.value, is_odd), is_back),
+        select(select(sheets.first.x, sheets.second.x, is_odd), select(sheets.third.x, sheets.fourth.x, is_odd), is_back),
+        select(select(sheets.first.y, sheets.second.y, is_odd), select(sheets.third.y, sheets.fourth.y, is_odd), is_back),
+        select(select(sheets.first.z, sheets.second.z, is_odd), select(sheets.third.z, sheets.fourth.z, is_odd), is_back),
+    );
+}
+
+// A group's slabs over what is there, at four pixels. The near plane's field is handed on from the group before, the last one's to the next.
+fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
+    var result = image;
+    var near = fields_handed_on(pixels.thread, (blocks_handed_on >> pixels.block & 1u) != 0u);
+    for (var j = 0u; j < SHEETS; j += 1u) {
+        let far = fields_of(sums_on(sheets, j));
+        let depth = sheet_group.near + f32(j) * frame.slab_width;
+        let from_depth = max(vec4f(depth), shown_from);
+        let to_depth = min(vec4f(depth + frame.slab_width), shown_to);
+        let is_seen = (from_depth < to_depth) & (near.has_value | far.has_value) & vec4<bool>(sheet_group.is_composited);
+        let lengths = max(to_depth - from_depth, vec4f(0.0)) * length_per_depth;
+        for (var i = 0u; i < 4u; i += 1u) {
+            let slab = slab_between(sample_of(near, i), sample_of(far, i));
+            for (var is_shown = is_seen[i] && has_opacity(slab); is_shown; is_shown = false) {
+                let before = result[i];
+                let after = composite(before, sheet_of(slab, lengths[i], vec2f(pixels.column, pixels.rows[i])), COMPOSITING, FRONT_TO_BACK);
+                result[i] = after;
+                if FIRST_HIT {
+                    let is_hit = before.a < cut.first_hit && after.a >= cut.first_hit;
+                    let share = (cut.first_hit - before.a) / (after.a - before.a);
+                    hits[i] = select(hits[i], noted(mix(from_depth[i], to_depth[i], share)), is_hit);
+                }
+            }
+        }
+        near = far;
+    }
+    hand_on(pixels.thread, near);
+    let blocks = 1u << pixels.block;
+    let has_values = subgroupOr(select(0u, blocks, any(near.has_value)));
+    blocks_handed_on = (blocks_handed_on & ~subgroupOr(blocks)) | has_values;
+    return result;
+}
