@@ -1,0 +1,4 @@
+//! Classification after splatting (SPEC §9) as plain data that no GPU is needed for: what every rasterizer draws values, gradients and slabs from.
+
+pub mod normalization;
+pub mod slab_integral;
