@@ -5,9 +5,10 @@ use std::ops::{Add, Mul, Range};
 use glam::{DMat2, DVec2, DVec3, DVec4};
 
 use super::gathered_layout::GatheredLayout;
-use super::layout::{Cut, Frame, Gather, SheetGroup};
+use super::layout::{Cut, Frame, Gather, Planes, SheetGroup};
 use super::volume_texture::ValueFormat;
 use crate::after::normalization::Normalization;
+use crate::after::plane_geometry::PlaneGeometry;
 use crate::after::slab_integral;
 use crate::geometry::grid_warp::{self, FootprintMap};
 use crate::geometry::kernel::Kernel;
@@ -176,6 +177,24 @@ pub fn cut(
         none: f32::INFINITY,
         plane_count: half_spaces.len() as u32,
         has_surfaces: surfaces.is_some().into(),
+    }
+}
+
+/// How kernels lie on slab planes, and the numbers that values stored so are splatted as (SPEC §9).
+pub fn planes(geometry: &PlaneGeometry, view: &ViewGeometry, values: ValueFormat, numbers: &Normalization) -> Planes {
+    let offset = match values {
+        ValueFormat::Offset8(least) | ValueFormat::Offset16(least) => f64::from(least),
+        ValueFormat::Bits => 0.0,
+    };
+    Planes {
+        axes: geometry.axes.map(|axis| axis.extend(0.0).as_vec4().to_array()),
+        step: geometry.step.extend(geometry.per_depth).as_vec4().to_array(),
+        screen_axis: geometry.screen_axis.as_vec2().to_array(),
+        per_pixel: geometry.per_pixel.as_vec2().to_array(),
+        origin: view.slabs.origin as f32,
+        value_bias: (offset - numbers.base) as f32,
+        value_scale: numbers.scale as f32,
+        per_number: numbers.scale.recip() as f32,
     }
 }
 

@@ -37,7 +37,7 @@ fn random_transfer(random: &mut Random, [min, max]: [f64; 2]) -> TransferFunctio
         color: Ramp::new(colors).unwrap(),
         opacity: Ramp::new(opacity).unwrap(),
         gradient_opacity: None,
-        iso_ranges: (random.bits() % 2 == 0).then_some(ranges),
+        iso_ranges: random.pick(&[false, true]).then_some(ranges),
         labels: BTreeMap::new(),
     }
 }
