@@ -4,6 +4,14 @@
 // A group's sheets are the sums on its four far planes. Its near plane is the group before's last, whose field is handed on. A dispatch that goes
 // on where another one has stopped looks at the group before once more, to have that.
 
+@group(0) @binding(15) var<uniform> planes: Planes;
+// The bits of every voxel's coefficient, a number; only read where `EXACT`.
+@group(0) @binding(16) var coefficients: texture_2d_array<u32>;
+
+// Whether coefficients are not the values themselves.
+override EXACT: bool = false;
+
+// The first of a group's planes is one slab behind its near plane.
 const FIRST_PLANE = 1.0;
 const GROUPS_LOOKED_BACK = 1u;
 
@@ -21,14 +29,35 @@ fn looks_along_rays() -> bool {
     return true;
 }
 
-// Where a voxel is seen.
+// Where a voxel is: pixels right of the image's middle and below it, both times the depth from the eye, and sheet depth.
 fn placed(voxel: vec3u) -> vec4f {
-    return project(voxel);
+    return homogeneous(vec4f(vec3f(voxel), 1.0));
+}
+
+// What of the screen a kernel reaches on the group's far planes. Between the first plane and the last one its nearest points move one way.
+fn screen_box(p: vec4f) -> ScreenBox {
+    let middle = 0.5 * vec2f(frame.size) - first_px;
+    if !PERSPECTIVE {
+        return ScreenBox(p.xy + middle, sheet_group.half_box);
+    }
+    let first = on_plane(p.xy, p.z, sheet_group.near + frame.slab_width).center_px - first_px;
+    let last = on_plane(p.xy, p.z, sheet_group.near + f32(SHEETS) * frame.slab_width).center_px - first_px;
+    return ScreenBox(0.5 * (first + last), 0.5 * abs(last - first) + sheet_group.half_box);
+}
+
+// Whether a kernel may be seen on some plane of the group.
+fn is_searched_in_perspective(search: SearchBounds, p: vec4f) -> bool {
+    let middle = 0.5 * vec2f(frame.size);
+    let first = on_plane(p.xy, p.z, sheet_group.near + frame.slab_width).center_px - middle;
+    let last = on_plane(p.xy, p.z, sheet_group.near + f32(SHEETS) * frame.slab_width).center_px - middle;
+    return all(max(first, last) >= search.low.xy) && all(min(first, last) <= search.high.xy)
+        && p.z >= search.low.z && p.z <= search.high.z;
 }
 
 // The frame's sheets from the first whose far plane a kernel reaches to the one after the last.
 fn overlapped_sheets(p: vec4f) -> vec2f {
-    let sheets = (overlapped(p, gather.depth_error, PERSPECTIVE) - gather.near) / frame.slab_width;
+    let reach = frame.support / planes.step.w - gather.depth_error;
+    let sheets = (p.z + vec2f(-reach, reach) - gather.near) / frame.slab_width;
     return vec2f(floor(sheets.x), ceil(sheets.y) - 1.0);
 }
 
@@ -36,6 +65,17 @@ fn overlapped_sheets(p: vec4f) -> vec2f {
 fn sections_here(p: vec4f, sheets: vec2f) -> u32 {
     let here = sheets_here(sheets);
     return u32(here.y - here.x);
+}
+
+// A voxel's coefficient, as a number.
+fn number_at(index: u32) -> f32 {
+    if EXACT {
+        let texel = texel_of(index, textureDimensions(coefficients).x);
+        return bitcast<f32>(textureLoad(coefficients, texel.xy, texel.z, 0).x);
+    }
+    let stored = stored_at(index);
+    let value = select(bitcast<f32>(stored), f32(stored), frame.whole_values != 0u);
+    return (value + planes.value_bias) * planes.value_scale;
 }
 
 // Looks up the values and differences of the voxels in the queue from one on.
@@ -46,59 +86,17 @@ fn shade_voxels(first: u32) {
         let slot = queue_first + min(i + lane, queue_count - 1u);
         let voxel = queue_points[slot].w;
         let at = voxel_of(bricks[voxel / BRICK_VOXELS], voxel % BRICK_VOXELS);
-        let number = (value_at(index_of(at)) - gather.number_base) * gather.number_scale;
-        let differences = half_differences(at);
+        let number = number_at(index_of(at));
+        var gradient = vec3f(0.0);
+        if !KERNEL_GRADIENT {
+            gradient = 2.0 * half_differences(at) * planes.value_scale;
+        }
         if is_in {
-            queue_amounts[slot] = vec4f(differences, number);
+            queue_amounts[slot] = vec4f(gradient, number);
             let p = placed(at);
             count_drawn(voxel, p, overlapped_sheets(p), false);
         }
     }
-}
-
-// A voxel as the pixels see it.
-struct PlaneKernel {
-    center_px: vec2f,
-    // The differences and the number, (d, c).
-    amount: vec4f,
-    // The Gaussian of the distances from the four planes, 0 without a voxel; and ρ² from which the kernel is 0 on each.
-    weights: vec4f,
-    cuts: vec4f,
-}
-
-fn kernel_at(point: vec4f, amount: vec4f, is_there: bool) -> PlaneKernel {
-    let distances = (sheet_group.near - point.z + vec4f(1.0, 2.0, 3.0, 4.0) * frame.slab_width) * frame.kernel_per_depth;
-    let squared = distances * distances;
-    let weights = select(vec4f(0.0), exp2(squared * gather.metric.w), vec4<bool>(is_there));
-    return PlaneKernel(point.xy, amount, weights, frame.support * frame.support - squared);
-}
-
-// What another lane holds.
-fn kernel_of(own: PlaneKernel, other: u32) -> PlaneKernel {
-    return PlaneKernel(
-        subgroupShuffle(own.center_px, other),
-        subgroupShuffle(own.amount, other),
-        subgroupShuffle(own.weights, other),
-        subgroupShuffle(own.cuts, other),
-    );
-}
-
-// How a voxel's kernel lies on a plane at four pixels: ρ², and the Gaussian of it.
-struct InPlane {
-    rho_squared: vec4f,
-    gaussian: vec4f,
-}
-
-fn in_plane(kernel: PlaneKernel, pixels: Pixels) -> InPlane {
-    let dx = pixels.column - kernel.center_px.x;
-    let dy = pixels.rows - kernel.center_px.y;
-    let rho_squared = dy * (gather.metric.z * dy + gather.metric.y * dx) + gather.metric.x * dx * dx;
-    return InPlane(rho_squared, exp2(rho_squared * gather.metric.w));
-}
-
-// The kernel on one of the planes.
-fn cut_off(at: InPlane, weight: f32, cut: f32) -> vec4f {
-    return select(vec4f(0.0), at.gaussian * weight, at.rho_squared < vec4f(cut));
 }
 
 // Adds the queue's voxels that some blocks see to the sums of a thread's pixels in them. Whether there are any.
@@ -119,16 +117,24 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> b
             for (var j = 0u; j < count; j += 2u) {
                 let a = kernel_of(own, j);
                 let b = kernel_of(own, j + 1u);
-                let at_a = in_plane(a, pixels);
-                let at_b = in_plane(b, pixels);
-                (*sheets).first = with_voxel((*sheets).first, cut_off(at_a, a.weights.x, a.cuts.x), a.amount);
-                (*sheets).first = with_voxel((*sheets).first, cut_off(at_b, b.weights.x, b.cuts.x), b.amount);
-                (*sheets).second = with_voxel((*sheets).second, cut_off(at_a, a.weights.y, a.cuts.y), a.amount);
-                (*sheets).second = with_voxel((*sheets).second, cut_off(at_b, b.weights.y, b.cuts.y), b.amount);
-                (*sheets).third = with_voxel((*sheets).third, cut_off(at_a, a.weights.z, a.cuts.z), a.amount);
-                (*sheets).third = with_voxel((*sheets).third, cut_off(at_b, b.weights.z, b.cuts.z), b.amount);
-                (*sheets).fourth = with_voxel((*sheets).fourth, cut_off(at_a, a.weights.w, a.cuts.w), a.amount);
-                (*sheets).fourth = with_voxel((*sheets).fourth, cut_off(at_b, b.weights.w, b.cuts.w), b.amount);
+                var at_a = in_plane(a, pixels, 0u);
+                var at_b = in_plane(b, pixels, 0u);
+                (*sheets).first = with_voxel(with_voxel((*sheets).first, a, at_a, 0u), b, at_b, 0u);
+                if PERSPECTIVE {
+                    at_a = in_plane(a, pixels, 1u);
+                    at_b = in_plane(b, pixels, 1u);
+                }
+                (*sheets).second = with_voxel(with_voxel((*sheets).second, a, at_a, 1u), b, at_b, 1u);
+                if PERSPECTIVE {
+                    at_a = in_plane(a, pixels, 2u);
+                    at_b = in_plane(b, pixels, 2u);
+                }
+                (*sheets).third = with_voxel(with_voxel((*sheets).third, a, at_a, 2u), b, at_b, 2u);
+                if PERSPECTIVE {
+                    at_a = in_plane(a, pixels, 3u);
+                    at_b = in_plane(b, pixels, 3u);
+                }
+                (*sheets).fourth = with_voxel(with_voxel((*sheets).fourth, a, at_a, 3u), b, at_b, 3u);
             }
         }
     }

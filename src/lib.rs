@@ -103,6 +103,7 @@
 //! that take part · *label* the number of the segment that a voxel of a segmented volume belongs to
 //! ([`Volume::labels`]) · *brick* 4×4×4 neighbouring voxels · *tile* a square of 32×32 pixels.
 
+mod after;
 pub mod appearance;
 mod error;
 mod geometry;
@@ -150,6 +151,11 @@ pub mod internals {
     pub use crate::settings::camera::{Eye, ViewBasis};
     pub use crate::settings::clip::ClippedVoxels;
     pub use crate::settings::shading::MIN_GRADIENT;
+
+    /// Classification after splatting.
+    pub mod after {
+        pub use crate::after::*;
+    }
 
     /// What the passes share.
     pub mod gpu {

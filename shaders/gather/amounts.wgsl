@@ -21,6 +21,17 @@ fn placed(voxel: vec3u) -> vec4f {
     return project(voxel);
 }
 
+// Where its footprint is on the screen.
+fn screen_box(p: vec4f) -> ScreenBox {
+    return ScreenBox(p.xy - first_px, sheet_group.half_box);
+}
+
+// Whether a voxel's footprint may be seen on the screen, and its kernel reaches the group.
+fn is_searched_in_perspective(search: SearchBounds, p: vec4f) -> bool {
+    let is_on_screen = all(p.xy >= search.low.xy * p.w) && all(p.xy <= search.high.xy * p.w);
+    return is_on_screen && p.z >= search.low.z && p.z <= search.high.z && p.w > frame.near;
+}
+
 // Shades the voxels in the queue from one on.
 fn shade_voxels(first: u32) {
     for (var i = first; i < queue_count; i += lanes) {
@@ -52,8 +63,8 @@ fn shade_voxels(first: u32) {
 
 // The blocks that a voxel is drawn to among §8's economies, and the sheet of the group that takes it as a whole.
 fn economic_blocks(shaded: Shaded, p: vec4f, sheets: vec2f) -> u32 {
-    let center = p.xy - first_px;
-    let is_deep = blocks_seen(shallow, center, sheet_group.half_box, 1.0) == 0u;
+    let box = screen_box(p);
+    let is_deep = blocks_seen(shallow, box, 1.0) == 0u;
     let is_whole = is_deep || shaded.alpha < gather.whole_below;
     var whole = -1.0;
     var is_here = true;
@@ -67,7 +78,7 @@ fn economic_blocks(shaded: Shaded, p: vec4f, sheets: vec2f) -> u32 {
     let rims = footprint_at(p, sheet_group.near, whole, shaded.amount).rim;
     let rim = max(max(rims.x, rims.y), max(rims.z, rims.w));
     let part = sqrt(clamp(rim, 0.0, frame.support * frame.support)) / frame.support;
-    let blocks = select(0u, blocks_seen(open, center, sheet_group.half_box, part), is_here && rim > 0.0);
+    let blocks = select(0u, blocks_seen(open, box, part), is_here && rim > 0.0);
     return select(0u, blocks | select(0u, (1u + u32(max(whole, 0.0))) << WHOLE_SHIFT, is_whole), blocks != 0u);
 }
 

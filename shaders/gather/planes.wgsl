@@ -2,13 +2,22 @@
 //
 // Needs nothing yet.
 
-// Sums over the voxels around a plane at a thread's four pixels: N = Σ g, Σ c·g, and Σ d·g with d the voxels' differences.
+// Whether gradients are the field's derivative, not the voxels' differences.
+override KERNEL_GRADIENT: bool = false;
+
+// Sums over the voxels around a plane at a thread's four pixels.
 struct PlaneSums {
+    // N = Σ g, and Σ c·g.
     weight: vec4f,
-    value: vec4f,
+    number: vec4f,
+    // Σ d·g with d the voxels' differences; of the kernel's gradient Σ c·g·δ along the planes' axes and their normal.
     x: vec4f,
     y: vec4f,
     z: vec4f,
+    // Of the kernel's gradient Σ g·δ.
+    offset_x: vec4f,
+    offset_y: vec4f,
+    offset_z: vec4f,
 }
 
 // Those on the far planes of a group's four slabs.
@@ -19,70 +28,185 @@ struct Sheets {
     fourth: PlaneSums,
 }
 
-// Columns of sums that a thread holds.
-const SAVED = 20u;
+// Sums that a pixel has on a plane, with the kernel's gradient 8; and those of all planes at all of a patch's threads.
+override SUMS: u32 = 5u;
+override SAVED: u32 = 640u;
 
 // The sums of all of a patch's threads, while some of a group's voxels wait for the queue.
-var<workgroup> saved: array<vec4f, SAVED * PATCH_THREADS>;
+var<workgroup> saved: array<vec4f, SAVED>;
 
 fn save_sheets(thread: u32, sheets: Sheets) {
     save_plane(thread, 0u, sheets.first);
-    save_plane(thread, 5u, sheets.second);
-    save_plane(thread, 10u, sheets.third);
-    save_plane(thread, 15u, sheets.fourth);
+    save_plane(thread, 1u, sheets.second);
+    save_plane(thread, 2u, sheets.third);
+    save_plane(thread, 3u, sheets.fourth);
 }
 
-fn save_plane(thread: u32, column: u32, sums: PlaneSums) {
-    let first = column * PATCH_THREADS + thread;
+fn save_plane(thread: u32, plane: u32, sums: PlaneSums) {
+    let first = plane * SUMS * PATCH_THREADS + thread;
     saved[first] = sums.weight;
-    saved[first + PATCH_THREADS] = sums.value;
+    saved[first + PATCH_THREADS] = sums.number;
     saved[first + 2u * PATCH_THREADS] = sums.x;
     saved[first + 3u * PATCH_THREADS] = sums.y;
     saved[first + 4u * PATCH_THREADS] = sums.z;
+    if KERNEL_GRADIENT {
+        saved[first + 5u * PATCH_THREADS] = sums.offset_x;
+        saved[first + 6u * PATCH_THREADS] = sums.offset_y;
+        saved[first + 7u * PATCH_THREADS] = sums.offset_z;
+    }
 }
 
 fn saved_sheets(thread: u32) -> Sheets {
-    return Sheets(saved_plane(thread, 0u), saved_plane(thread, 5u), saved_plane(thread, 10u), saved_plane(thread, 15u));
+    return Sheets(saved_plane(thread, 0u), saved_plane(thread, 1u), saved_plane(thread, 2u), saved_plane(thread, 3u));
 }
 
-fn saved_plane(thread: u32, column: u32) -> PlaneSums {
-    let first = column * PATCH_THREADS + thread;
-    return PlaneSums(
-        saved[first],
-        saved[first + PATCH_THREADS],
-        saved[first + 2u * PATCH_THREADS],
-        saved[first + 3u * PATCH_THREADS],
-        saved[first + 4u * PATCH_THREADS],
-    );
+fn saved_plane(thread: u32, plane: u32) -> PlaneSums {
+    let first = plane * SUMS * PATCH_THREADS + thread;
+    var sums: PlaneSums;
+    sums.weight = saved[first];
+    sums.number = saved[first + PATCH_THREADS];
+    sums.x = saved[first + 2u * PATCH_THREADS];
+    sums.y = saved[first + 3u * PATCH_THREADS];
+    sums.z = saved[first + 4u * PATCH_THREADS];
+    if KERNEL_GRADIENT {
+        sums.offset_x = saved[first + 5u * PATCH_THREADS];
+        sums.offset_y = saved[first + 6u * PATCH_THREADS];
+        sums.offset_z = saved[first + 7u * PATCH_THREADS];
+    }
+    return sums;
 }
 
-// Sums with a voxel of some differences and some number, (d, c), where it has these weights.
-fn with_voxel(sums: PlaneSums, weight: vec4f, amount: vec4f) -> PlaneSums {
-    return PlaneSums(
-        sums.weight + weight,
-        sums.value + weight * amount.w,
-        sums.x + weight * amount.x,
-        sums.y + weight * amount.y,
-        sums.z + weight * amount.z,
-    );
+// A voxel as the pixels see it on the four planes.
+struct PlaneKernel {
+    // Where its nearest points are seen; without an eye only the first, as all are the same.
+    center_x: vec4f,
+    center_y: vec4f,
+    // The gradient and the number, (d, c).
+    amount: vec4f,
+    // The planes' distances, grid units; their Gaussian, 0 without a voxel; and ρ² from which the kernel is 0 on each.
+    distances: vec4f,
+    weights: vec4f,
+    cuts: vec4f,
 }
 
-// The field on a plane at a thread's four pixels, with its gradient in the terms of `half_differences`.
+// The group's four far planes.
+fn far_planes() -> vec4f {
+    return sheet_group.near + vec4f(1.0, 2.0, 3.0, 4.0) * frame.slab_width;
+}
+
+// The depths from the eye of the group's four far planes; 1 without an eye.
+fn far_planes_from_eye() -> vec4f {
+    return select(vec4f(1.0), far_planes() - planes.origin, vec4<bool>(PERSPECTIVE));
+}
+
+fn kernel_at(point: vec4f, amount: vec4f, is_there: bool) -> PlaneKernel {
+    let distances = (far_planes() - point.z) * planes.step.w;
+    let squared = distances * distances;
+    let weights = select(vec4f(0.0), exp2(squared * gather.metric.w), vec4<bool>(is_there));
+    let cuts = frame.support * frame.support - squared;
+    let middle = 0.5 * vec2f(frame.size);
+    if PERSPECTIVE {
+        let per_depth = 1.0 / far_planes_from_eye();
+        let x = (point.x + distances * planes.step.x) * per_depth + middle.x;
+        let y = (point.y + distances * planes.step.y) * per_depth + middle.y;
+        return PlaneKernel(x, y, amount, distances, weights, cuts);
+    }
+    return PlaneKernel(vec4f(point.x + middle.x), vec4f(point.y + middle.y), amount, distances, weights, cuts);
+}
+
+// What another lane holds.
+fn kernel_of(own: PlaneKernel, other: u32) -> PlaneKernel {
+    var kernel: PlaneKernel;
+    kernel.amount = subgroupShuffle(own.amount, other);
+    kernel.weights = subgroupShuffle(own.weights, other);
+    kernel.cuts = subgroupShuffle(own.cuts, other);
+    if PERSPECTIVE {
+        kernel.center_x = subgroupShuffle(own.center_x, other);
+        kernel.center_y = subgroupShuffle(own.center_y, other);
+    } else {
+        kernel.center_x = vec4f(subgroupShuffle(own.center_x.x, other));
+        kernel.center_y = vec4f(subgroupShuffle(own.center_y.x, other));
+    }
+    if KERNEL_GRADIENT {
+        kernel.distances = subgroupShuffle(own.distances, other);
+    }
+    return kernel;
+}
+
+// How a voxel's kernel lies on a plane at four pixels: the offsets along the planes' axes, ρ², and the Gaussian of it.
+struct InPlane {
+    first: vec4f,
+    second: vec4f,
+    rho_squared: vec4f,
+    gaussian: vec4f,
+}
+
+fn in_plane(kernel: PlaneKernel, pixels: Pixels, plane: u32) -> InPlane {
+    let dx = pixels.column - kernel.center_x[plane];
+    let dy = pixels.rows - kernel.center_y[plane];
+    var at: InPlane;
+    if PERSPECTIVE || KERNEL_GRADIENT {
+        let from_eye = far_planes_from_eye()[plane];
+        let per_pixel = min(planes.per_pixel * from_eye, vec2f(1.0));
+        at.first = per_pixel.x * (planes.screen_axis.x * dx + planes.screen_axis.y * dy);
+        at.second = per_pixel.y * (planes.screen_axis.x * dy - planes.screen_axis.y * dx);
+        at.rho_squared = at.first * at.first + at.second * at.second;
+    } else {
+        at.rho_squared = dy * (gather.metric.z * dy + gather.metric.y * dx) + gather.metric.x * dx * dx;
+    }
+    at.gaussian = exp2(at.rho_squared * gather.metric.w);
+    return at;
+}
+
+// Sums on a plane with a voxel's.
+fn with_voxel(sums: PlaneSums, kernel: PlaneKernel, at: InPlane, plane: u32) -> PlaneSums {
+    let weight = select(vec4f(0.0), at.gaussian * kernel.weights[plane], at.rho_squared < vec4f(kernel.cuts[plane]));
+    let number = weight * kernel.amount.w;
+    var result = sums;
+    result.weight += weight;
+    result.number += number;
+    if KERNEL_GRADIENT {
+        result.x += number * at.first;
+        result.y += number * at.second;
+        result.z += number * kernel.distances[plane];
+        result.offset_x += weight * at.first;
+        result.offset_y += weight * at.second;
+        result.offset_z += weight * kernel.distances[plane];
+    } else {
+        result.x += weight * kernel.amount.x;
+        result.y += weight * kernel.amount.y;
+        result.z += weight * kernel.amount.z;
+    }
+    return result;
+}
+
+// The field on a plane at a thread's four pixels: numbers, and the gradient, numbers per `unit`.
 struct Fields {
     has_value: vec4<bool>,
-    value: vec4f,
+    number: vec4f,
     x: vec4f,
     y: vec4f,
     z: vec4f,
 }
 
-// Where the weights sum to less than this there is no value.
-const MIN_WEIGHT = 1e-3;
-
 fn fields_of(sums: PlaneSums) -> Fields {
     let has_value = sums.weight >= vec4f(MIN_WEIGHT);
     let per_weight = 1.0 / select(vec4f(1.0), sums.weight, has_value);
-    return Fields(has_value, sums.value * per_weight, sums.x * per_weight, sums.y * per_weight, sums.z * per_weight);
+    let number = sums.number * per_weight;
+    if !KERNEL_GRADIENT {
+        return Fields(has_value, number, sums.x * per_weight, sums.y * per_weight, sums.z * per_weight);
+    }
+    let scale = -2.0 * frame.falloff * per_weight;
+    let along = mat3x4f(
+        (sums.x - number * sums.offset_x) * scale,
+        (sums.y - number * sums.offset_y) * scale,
+        (sums.z - number * sums.offset_z) * scale,
+    );
+    // From the planes' axes to the grid's, and there to lengths of the world.
+    let x = vec3f(planes.axes[0].x, planes.axes[1].x, planes.axes[2].x) / frame.aspect.x;
+    let y = vec3f(planes.axes[0].y, planes.axes[1].y, planes.axes[2].y) / frame.aspect.y;
+    let z = vec3f(planes.axes[0].z, planes.axes[1].z, planes.axes[2].z) / frame.aspect.z;
+    return Fields(has_value, number, along * x, along * y, along * z);
 }
 
 // The far planes' fields of the group before.
@@ -93,7 +217,7 @@ var<private> blocks_handed_on: u32;
 
 fn hand_on(thread: u32, fields: Fields) {
     handed_on[thread] = select(vec4f(0.0), vec4f(1.0), fields.has_value);
-    handed_on[PATCH_THREADS + thread] = fields.value;
+    handed_on[PATCH_THREADS + thread] = fields.number;
     handed_on[2u * PATCH_THREADS + thread] = fields.x;
     handed_on[3u * PATCH_THREADS + thread] = fields.y;
     handed_on[4u * PATCH_THREADS + thread] = fields.z;

@@ -27,24 +27,24 @@ fn look(column: f32, rows: vec4f) {
 }
 
 // The field at one pixel.
-struct Sample {
+struct PixelField {
     has_value: bool,
-    value: f32,
+    number: f32,
     gradient: vec3f,
 }
 
-fn sample_of(fields: Fields, i: u32) -> Sample {
-    return Sample(fields.has_value[i], fields.value[i], vec3f(fields.x[i], fields.y[i], fields.z[i]));
+fn sample_of(fields: Fields, i: u32) -> PixelField {
+    return PixelField(fields.has_value[i], fields.number[i], vec3f(fields.x[i], fields.y[i], fields.z[i]));
 }
 
 // A slab as one pixel sees it: where only one plane has a value, it holds for both.
 struct Slab {
-    near: Sample,
-    far: Sample,
+    near: PixelField,
+    far: PixelField,
     has_value: bool,
 }
 
-fn slab_between(near: Sample, far: Sample) -> Slab {
+fn slab_between(near: PixelField, far: PixelField) -> Slab {
     var slab = Slab(near, far, near.has_value || far.has_value);
     if !near.has_value {
         slab.near = far;
@@ -56,16 +56,15 @@ fn slab_between(near: Sample, far: Sample) -> Slab {
 }
 
 // Whether a slab's values reach those that have an opacity.
-fn has_opacity(slab: Slab) -> bool {
-    let head = control_points[gather.integral];
-    return slab.has_value && max(slab.near.value, slab.far.value) >= head.z && min(slab.near.value, slab.far.value) <= head.w;
+fn has_opacity(slab: Slab, ramps: vec4u) -> bool {
+    let head = control_points[ramps.w];
+    return slab.has_value && max(slab.near.number, slab.far.number) >= head.z && min(slab.near.number, slab.far.number) <= head.w;
 }
 
 // The sheet of a slab of which a ray shows some length.
-fn sheet_of(slab: Slab, length: f32, point_px: vec2f) -> vec4f {
-    let means = slab_integral(gather.integral, slab.near.value, slab.far.value);
-    let gradient = gradient_of(mix(slab.near.gradient, slab.far.gradient, means.share));
-    let ramps = vec4u(0u, frame.ramps.xyz);
+fn sheet_of(slab: Slab, ramps: vec4u, length: f32, point_px: vec2f) -> vec4f {
+    let means = slab_integral(ramps.w, slab.near.number, slab.far.number);
+    let gradient = gradient_of(0.5 * planes.per_number * mix(slab.near.gradient, slab.far.gradient, means.share));
     var m = means.amount;
     for (var is_graded = ramps.w > ramps.z + 1u; is_graded; is_graded = false) {
         m *= ramp(ramps.z, ramps.w, gradient.magnitude).x;
@@ -74,17 +73,45 @@ fn sheet_of(slab: Slab, length: f32, point_px: vec2f) -> vec4f {
     return vec4f(a * shade(means.color, gradient, lighting(point_px, PERSPECTIVE)), a);
 }
 
+// The ramps of the voxel whose cell holds a pixel's point at a sheet depth.
+fn ramps_at(point_px: vec2f, sheet_depth: f32) -> vec4u {
+    if !LABELS {
+        return vec4u(0u, frame.ramps.xyz);
+    }
+    return ramps_of(nearest_index(voxel_at(place_of(point_px), sheet_depth)));
+}
+
+// A plane's field without values where the nearest voxel is a hole.
+fn without_holes(fields: Fields, pixels: Pixels, sheet_depth: f32) -> Fields {
+    var result = fields;
+    if HOLES {
+        for (var i = 0u; i < 4u; i += 1u) {
+            let place = voxel_at(place_of(vec2f(pixels.column, pixels.rows[i])), sheet_depth);
+            result.has_value[i] = result.has_value[i] && !is_hole(stored_at(nearest_index(place)));
+        }
+    }
+    return result;
+}
+
 // The sums on the `j`-th of the group's planes.
 fn sums_on(sheets: Sheets, j: u32) -> PlaneSums {
+    var sums: PlaneSums;
+    sums.weight = one_of(sheets.first.weight, sheets.second.weight, sheets.third.weight, sheets.fourth.weight, j);
+    sums.number = one_of(sheets.first.number, sheets.second.number, sheets.third.number, sheets.fourth.number, j);
+    sums.x = one_of(sheets.first.x, sheets.second.x, sheets.third.x, sheets.fourth.x, j);
+    sums.y = one_of(sheets.first.y, sheets.second.y, sheets.third.y, sheets.fourth.y, j);
+    sums.z = one_of(sheets.first.z, sheets.second.z, sheets.third.z, sheets.fourth.z, j);
+    if KERNEL_GRADIENT {
+        sums.offset_x = one_of(sheets.first.offset_x, sheets.second.offset_x, sheets.third.offset_x, sheets.fourth.offset_x, j);
+        sums.offset_y = one_of(sheets.first.offset_y, sheets.second.offset_y, sheets.third.offset_y, sheets.fourth.offset_y, j);
+        sums.offset_z = one_of(sheets.first.offset_z, sheets.second.offset_z, sheets.third.offset_z, sheets.fourth.offset_z, j);
+    }
+    return sums;
+}
+
+fn one_of(first: vec4f, second: vec4f, third: vec4f, fourth: vec4f, j: u32) -> vec4f {
     let is_odd = vec4<bool>((j & 1u) != 0u);
-    let is_back = vec4<bool>(j >= 2u);
-    return PlaneSums(
-        select(select(sheets.first.weight, sheets.second.weight, is_odd), select(sheets.third.weight, sheets.fourth.weight, is_odd), is_back),
-        select(select(sheets.first.value, sheets.second.value, is_odd), select(sheets.third.value, sheets.fourth.value, is_odd), is_back),
-        select(select(sheets.first.x, sheets.second.x, is_odd), select(sheets.third.x, sheets.fourth.x, is_odd), is_back),
-        select(select(sheets.first.y, sheets.second.y, is_odd), select(sheets.third.y, sheets.fourth.y, is_odd), is_back),
-        select(select(sheets.first.z, sheets.second.z, is_odd), select(sheets.third.z, sheets.fourth.z, is_odd), is_back),
-    );
+    return select(select(first, second, is_odd), select(third, fourth, is_odd), vec4<bool>(j >= 2u));
 }
 
 // A group's slabs over what is there, at four pixels. The near plane's field is handed on from the group before, the last one's to the next.
@@ -92,17 +119,19 @@ fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
     var result = image;
     var near = fields_handed_on(pixels.thread, (blocks_handed_on >> pixels.block & 1u) != 0u);
     for (var j = 0u; j < SHEETS; j += 1u) {
-        let far = fields_of(sums_on(sheets, j));
         let depth = sheet_group.near + f32(j) * frame.slab_width;
+        let far = without_holes(fields_of(sums_on(sheets, j)), pixels, depth + frame.slab_width);
         let from_depth = max(vec4f(depth), shown_from);
         let to_depth = min(vec4f(depth + frame.slab_width), shown_to);
         let is_seen = (from_depth < to_depth) & (near.has_value | far.has_value) & vec4<bool>(sheet_group.is_composited);
         let lengths = max(to_depth - from_depth, vec4f(0.0)) * length_per_depth;
         for (var i = 0u; i < 4u; i += 1u) {
             let slab = slab_between(sample_of(near, i), sample_of(far, i));
-            for (var is_shown = is_seen[i] && has_opacity(slab); is_shown; is_shown = false) {
+            let point_px = vec2f(pixels.column, pixels.rows[i]);
+            let ramps = ramps_at(point_px, 0.5 * (from_depth[i] + to_depth[i]));
+            for (var is_shown = is_seen[i] && has_opacity(slab, ramps); is_shown; is_shown = false) {
                 let before = result[i];
-                let after = composite(before, sheet_of(slab, lengths[i], vec2f(pixels.column, pixels.rows[i])), COMPOSITING, FRONT_TO_BACK);
+                let after = composite(before, sheet_of(slab, ramps, lengths[i], point_px), COMPOSITING, FRONT_TO_BACK);
                 result[i] = after;
                 if FIRST_HIT {
                     let is_hit = before.a < cut.first_hit && after.a >= cut.first_hit;

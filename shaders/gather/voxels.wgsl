@@ -35,13 +35,19 @@ fn first_group(sheets: vec2f) -> f32 {
     return floor(sheet / f32(SHEETS));
 }
 
+// The box around a footprint on the screen, seen from the patch's first pixel.
+struct ScreenBox {
+    center: vec2f,
+    half: vec2f,
+}
+
 // The blocks in which the box around a footprint, or a part of its extent, holds one of some pixels.
-fn blocks_seen(words: vec4u, center: vec2f, half_box: vec2f, part: f32) -> u32 {
-    let half = half_box * part + BOX_SLACK;
+fn blocks_seen(words: vec4u, box: ScreenBox, part: f32) -> u32 {
+    let half = box.half * part + BOX_SLACK;
     if PARALLELOGRAM {
-        return blocks_in_parallelogram(words, center, half, gather.half_width * part + BOX_SLACK);
+        return blocks_in_parallelogram(words, box.center, half, gather.half_width * part + BOX_SLACK);
     }
-    return blocks_in_box(words, center, half);
+    return blocks_in_box(words, box.center, half);
 }
 
 // The extent of a kernel's sections in the group as a part of the kernel's: that of the section next to the kernel's centre.
@@ -118,12 +124,12 @@ fn find_voxels(search: SearchBounds, is_start: bool) {
 // Whether a kernel reaches into the group, and its box holds an open pixel.
 fn is_drawn_here(p: vec4f, sheets: vec2f) -> bool {
     let here = sheets_here(sheets);
-    return here.x < here.y && blocks_seen(open, p.xy - first_px, sheet_group.half_box, 1.0) != 0u;
+    return here.x < here.y && blocks_seen(open, screen_box(p), 1.0) != 0u;
 }
 
 // The blocks that a kernel's sections in the group reach.
 fn blocks_here(p: vec4f) -> u32 {
-    return blocks_seen(open, p.xy - first_px, sheet_group.half_box, extent_here(p));
+    return blocks_seen(open, screen_box(p), extent_here(p));
 }
 
 // Counts a voxel that is drawn into the group, and its sections there, if no other patch has: as one if it is drawn as a whole.

@@ -15,8 +15,7 @@ struct SearchBounds {
 
 fn is_searched_for(search: SearchBounds, p: vec4f) -> bool {
     if PERSPECTIVE {
-        let is_on_screen = all(p.xy >= search.low.xy * p.w) && all(p.xy <= search.high.xy * p.w);
-        return is_on_screen && p.z >= search.low.z && p.z <= search.high.z && p.w > frame.near;
+        return is_searched_in_perspective(search, p);
     }
     return all(p.xyz >= search.low) && all(p.xyz <= search.high);
 }

@@ -4,6 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use wgpu::{Device, Queue, TextureView};
 
+use crate::after::normalization::Normalization;
 use crate::error::RenderError;
 use crate::gpu::fault::scoped;
 use crate::gpu::volume_texture::{ValueFormat, VolumeTexture};
@@ -24,6 +25,7 @@ struct Shared {
     /// Uploaded when tables first ask for labels.
     labels: OnceLock<VolumeTexture>,
     value_list: OnceLock<ValueList>,
+    numbers: OnceLock<Normalization>,
 }
 
 impl GpuVolume {
@@ -50,7 +52,8 @@ impl GpuVolume {
         let upload = || VolumeTexture::upload_in_chunks(device, queue, volume.values(), written);
         let values = scoped(device, upload)??;
         let (device, labels, value_list) = (device.clone(), OnceLock::new(), OnceLock::new());
-        Ok(Self { shared: Arc::new(Shared { device, volume, values, labels, value_list }) })
+        let numbers = OnceLock::new();
+        Ok(Self { shared: Arc::new(Shared { device, volume, values, labels, value_list, numbers }) })
     }
 
     /// What [`Self::gpu_bytes`] of a volume will be: as long as no view shades by label, and after that. Looks at all values.
@@ -79,6 +82,12 @@ impl GpuVolume {
     /// wait for it; a program with iso-ranges to move asks when it has loaded the volume.
     pub fn value_list(&self) -> &ValueList {
         self.shared.value_list.get_or_init(|| ValueList::new(self.shared.volume.values()))
+    }
+
+    /// The numbers that values are splatted as where classification comes after splatting; found when first asked for.
+    pub(crate) fn numbers(&self) -> Normalization {
+        let find = || Normalization::of(self.shared.volume.values().iter().copied());
+        *self.shared.numbers.get_or_init(|| find().unwrap_or(Normalization::new([0.0; 2])))
     }
 
     /// Bytes of GPU memory, however many views there are.

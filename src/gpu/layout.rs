@@ -163,6 +163,52 @@ pub struct Cut {
     pub has_surfaces: u32,
 }
 
+/// How kernels lie on slab planes, and what values are splatted as (SPEC §9): [`PlaneGeometry`](crate::after::plane_geometry::PlaneGeometry) and
+/// [`Normalization`](crate::after::normalization::Normalization).
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Planes {
+    /// Unit vectors in the grid: two within planes, and the planes' normal; w unused.
+    pub axes: [[f32; 4]; 3],
+    /// What a grid unit along the normal moves a voxel right and down, pixels times the depth from the eye, and away from the eye; and
+    /// the grid units along the normal that sheet depth 1 is.
+    pub step: [f32; 4],
+    /// The pixel offset of length 1 that the first axis belongs to.
+    pub screen_axis: [f32; 2],
+    /// Grid units that a pixel is along the first two axes; with an eye at depth 1 from it.
+    pub per_pixel: [f32; 2],
+    /// Sheet depth of plane 0, with an eye also the eye's.
+    pub origin: f32,
+    /// What is added to texels of values, or to values whose bits texels are, before they are scaled.
+    pub value_bias: f32,
+    /// Numbers to a value.
+    pub value_scale: f32,
+    /// Values to a number.
+    pub per_number: f32,
+}
+
+/// A voxel on its way to slab planes.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Sample {
+    /// Pixels right of the image's middle, times the depth from the eye.
+    pub x: f32,
+    /// Pixels below it, the same.
+    pub y: f32,
+    /// Sheet depth.
+    pub depth: f32,
+    /// Depth from the eye; 1 without one.
+    pub from_eye: f32,
+    /// Its coefficient, a number.
+    pub number: f32,
+    /// The values' central difference along x, numbers per `unit`.
+    pub gradient_x: f32,
+    /// Along y.
+    pub gradient_y: f32,
+    /// Along z.
+    pub gradient_z: f32,
+}
+
 /// 4×4×4 places for voxels, x fastest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]

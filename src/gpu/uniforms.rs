@@ -5,8 +5,11 @@ use std::ops::{Add, Mul, Range};
 use glam::{DMat2, DVec2, DVec3, DVec4};
 
 use super::gathered_layout::GatheredLayout;
-use super::layout::{Cut, Frame, Gather, SheetGroup};
+use super::layout::{Cut, Frame, Gather, Planes, SheetGroup};
 use super::volume_texture::ValueFormat;
+use crate::after::normalization::Normalization;
+use crate::after::plane_geometry::PlaneGeometry;
+use crate::after::slab_integral;
 use crate::geometry::grid_warp::{self, FootprintMap};
 use crate::geometry::kernel::Kernel;
 use crate::geometry::means::RayBox;
@@ -19,7 +22,7 @@ use crate::setting_error::scaled;
 use crate::settings::clip::HalfSpace;
 use crate::settings::shading::{Light, MIN_GRADIENT, Shading};
 use crate::settings::splatting::{Compositing, Order, Splatting};
-use crate::settings::transfer_function::{Ramp, Tables, TransferFunction};
+use crate::settings::transfer_function::{LabelTables, Ramp, Tables, TransferFunction};
 use crate::volume::Grid;
 
 /// What ambient, diffuse, specular and shininess are clamped to: beyond it no image changes any more, and `f32` ends.
@@ -177,6 +180,24 @@ pub fn cut(
     }
 }
 
+/// How kernels lie on slab planes, and the numbers that values stored so are splatted as (SPEC §9).
+pub fn planes(geometry: &PlaneGeometry, view: &ViewGeometry, values: ValueFormat, numbers: &Normalization) -> Planes {
+    let offset = match values {
+        ValueFormat::Offset8(least) | ValueFormat::Offset16(least) => f64::from(least),
+        ValueFormat::Bits => 0.0,
+    };
+    Planes {
+        axes: geometry.axes.map(|axis| axis.extend(0.0).as_vec4().to_array()),
+        step: geometry.step.extend(geometry.per_depth).as_vec4().to_array(),
+        screen_axis: geometry.screen_axis.as_vec2().to_array(),
+        per_pixel: geometry.per_pixel.as_vec2().to_array(),
+        origin: view.slabs.origin as f32,
+        value_bias: (offset - numbers.base) as f32,
+        value_scale: numbers.scale as f32,
+        per_number: numbers.scale.recip() as f32,
+    }
+}
+
 /// How much of the kernel's ball, from the middle out, the polynomial for chords is fitted to: where chords are long they cut sections
 /// that are small. Farther out they cut large ones only, and the Gaussian is small; the errors stay below 5e-6 of a whole footprint's
 /// peak.
@@ -245,8 +266,8 @@ fn half_vector(to_light: DVec3, to_eye: DVec3) -> DVec3 {
 /// A transfer function's control points, for the stages that shade.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ramps {
-    /// Value, then rgb or (ordinate, 0, 0); colour, opacity, gradient opacity, one after the other: first the main ones, then those
-    /// of labels. Then the table of labels.
+    /// Value, then rgb or (ordinate, 0, 0); colour, opacity, gradient opacity, one after the other, and after them the table of
+    /// their integrals ([`slab_integral`]) if there is one: first the main ones, then those of labels. Then the table of labels.
     pub points: Vec<[f32; 4]>,
     /// Where each of the main ramps ends.
     pub ends: [u32; 3],
@@ -260,18 +281,35 @@ pub struct Ramps {
 impl Ramps {
     /// All ramps of a transfer function; without a gradient opacity that one is 1 everywhere.
     pub fn new(transfer: &TransferFunction) -> Self {
+        Self::with(transfer, LabelTables::matter_to_shading, |_| Vec::new())
+    }
+
+    /// The same with tables of the ramps' integrals, for classification after splatting.
+    pub fn with_integrals(transfer: &TransferFunction, compositing: Compositing, numbers: &Normalization) -> Self {
+        Self::with(transfer, LabelTables::matter, |tables| slab_integral::table(tables, compositing, numbers))
+    }
+
+    fn with(
+        transfer: &TransferFunction,
+        matter: impl Fn(&LabelTables) -> bool,
+        integrals: impl Fn(&Tables) -> Vec<[f32; 4]>,
+    ) -> Self {
+        let append = |points: &mut Vec<[f32; 4]>, label| {
+            let tables = transfer.tables(label);
+            let bounds = append(points, &tables);
+            points.extend(integrals(&tables));
+            bounds
+        };
         let mut points = Vec::new();
-        let main @ [_, ends @ ..] = append(&mut points, &transfer.tables(None));
+        let main @ [_, ends @ ..] = append(&mut points, None);
         let mut all = vec![main];
-        let own: Vec<u16> = (transfer.labels.iter())
-            .filter(|(_, tables)| tables.matter_to_shading())
-            .map(|(&label, _)| label)
-            .collect();
+        let own: Vec<u16> =
+            (transfer.labels.iter()).filter(|(_, tables)| matter(tables)).map(|(&label, _)| label).collect();
         let mut label_table = 0..0;
         if let Some(&last) = own.last() {
             let mut table = vec![main; usize::from(last) + 2];
             for label in own {
-                table[usize::from(label)] = append(&mut points, &transfer.tables(Some(label)));
+                table[usize::from(label)] = append(&mut points, Some(label));
                 all.push(table[usize::from(label)]);
             }
             label_table = points.len() as u32..(points.len() + table.len()) as u32;

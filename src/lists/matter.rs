@@ -119,7 +119,12 @@ fn bricks(grid: &Grid, values: &[f32], matters: &[Class]) -> Vec<Brick> {
 }
 
 /// For every voxel what `choose` makes of those within reach, one axis after the other.
-fn box_filter(values: Vec<Class>, dims: UVec3, reach: UVec3, choose: impl Fn(Class, Class) -> Class + Sync) -> Vec<Class> {
+fn box_filter(
+    values: Vec<Class>,
+    dims: UVec3,
+    reach: UVec3,
+    choose: impl Fn(Class, Class) -> Class + Sync,
+) -> Vec<Class> {
     let [width, layer] = [dims.x as usize, (dims.x * dims.y) as usize];
     let choose_rows = |row: &mut [Class], other: &[Class]| {
         row.iter_mut().zip(other).for_each(|(value, &other)| *value = choose(*value, other));

@@ -6,6 +6,7 @@ use std::ops::Range;
 use glam::DVec2;
 use rayon::prelude::*;
 
+use crate::after::plane_geometry::PlaneGeometry;
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::layout::Brick;
@@ -126,7 +127,8 @@ struct Pixels {
 }
 
 impl PatchBins {
-    /// Sorts bricks by the patches and groups they may touch, with kernels of the radius `support`. The sheet depths `covered` are in some
+    /// Sorts bricks by the patches and groups they may touch, with kernels of the radius `support`, or with what of these is seen on `planes` where
+    /// classification comes after splatting. The sheet depths `covered` are in some
     /// group even where they hold nothing. To look up a voxel's control points in memory takes at most `search` passes through loops.
     /// Neither list may have more than `most_words` words.
     ///
@@ -134,7 +136,7 @@ impl PatchBins {
     /// If there are more bricks, or more of them behind a patch, than the rasterizer can take.
     pub fn new(
         bricks: &[Brick],
-        view: &ViewGeometry,
+        (view, planes): (&ViewGeometry, Option<&PlaneGeometry>),
         order: Order,
         covered: Range<f64>,
         support: f64,
@@ -145,9 +147,9 @@ impl PatchBins {
             if required <= actual { Ok(()) } else { Err(TileCapacityError { what, required, actual }) }
         };
         check("bricks", bricks.len() as u64, MAX_BRICKS as u64)?;
-        let placed = place(bricks, view);
-        let planes = view.slabs.groups(SHEETS);
-        let covered = planes.covered(covered);
+        let placed = place(bricks, view, planes);
+        let group_planes = view.slabs.groups(SHEETS);
+        let covered = group_planes.covered(covered);
         let all = || placed.iter().map(|brick| &brick.groups).chain(&covered);
         let first_group = all().map(|groups| groups.start).min().unwrap_or(0);
         let end_group = all().map(|groups| groups.end).max().unwrap_or(0);
@@ -157,7 +159,14 @@ impl PatchBins {
         check("patches times sheet groups", bins, most_words - 1)?;
 
         let half_boxes: Vec<DVec2> = (first_group..end_group)
-            .map(|group| view.half_box(support, planes.plane(group)..planes.plane(group + 1)))
+            .map(|group| match planes {
+                // Footprints are largest on the first of the group's planes.
+                Some(planes) => {
+                    let first = planes.from_eye(group_planes.plane(group) + view.slabs.width);
+                    planes.footprint_half_box(support, first)
+                }
+                None => view.half_box(support, group_planes.plane(group)..group_planes.plane(group + 1)),
+            })
             .collect();
 
         let sort = Sort { placed: &placed, half_boxes: &half_boxes, order, first_group, size: view.size };
@@ -286,13 +295,16 @@ impl Placed {
 }
 
 /// The bricks that are before the eye, in memory order whatever changes of iso-range came before: equal scenes add up in equal order.
-fn place(bricks: &[Brick], view: &ViewGeometry) -> Vec<Placed> {
+fn place(bricks: &[Brick], view: &ViewGeometry, planes: Option<&PlaneGeometry>) -> Vec<Placed> {
     let groups = view.slabs.groups(SHEETS);
     let mut placed: Vec<Placed> = (bricks.par_iter().enumerate())
         .filter(|(_, brick)| brick.present != [0; 2])
         .filter_map(|(number, brick)| {
             let (middle, half) = brick::bounds(brick);
-            let bounds = view.bounds(middle, half)?;
+            let bounds = match planes {
+                Some(planes) => planes.bounds(view, middle, half)?,
+                None => view.bounds(middle, half)?,
+            };
             let is_beyond_near = bounds.depths.start < bounds.depths.end;
             is_beyond_near.then(|| Placed {
                 number: number as u32,

@@ -11,11 +11,14 @@ use super::composite::{CutBuffers, RayMode};
 use crate::gpu::bindings::{
     ComputeStage, at_offset, buffer_spec, depth_texture, storage, texture_of_integers, uniform,
 };
-use crate::gpu::layout::{Brick, Cut, Frame, Gather as GatherUniform, Gathered, Indirect, PatchRange};
+use crate::gpu::layout::{Brick, Cut, Frame, Gather as GatherUniform, Gathered, Indirect, PatchRange, Planes};
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
 use crate::lists::patch_bins::{PATCH, SHEETS};
-use crate::settings::splatting::{Classification, Compositing, Economies, FootprintBox, Order, Splatting};
+use crate::settings::shading::Gradient;
+use crate::settings::splatting::{
+    Classification, Compositing, Economies, FootprintBox, Interpolation, Order, Splatting,
+};
 
 /// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug)]
@@ -38,6 +41,9 @@ pub struct GatherMode {
     rays: RayMode,
     /// Whether classification comes after splatting (SPEC §9).
     after: bool,
+    /// There whether gradients are the field's derivative, and whether coefficients are not the values.
+    kernel_gradient: bool,
+    exact: bool,
     /// Whether the blocks of a patch are divided among workgroups.
     divided: bool,
 }
@@ -46,20 +52,35 @@ impl GatherMode {
     /// The mode that splatting settings ask for, with or without an eye, of a volume with or without labels that have ramps of their own
     /// and with or without holes; `workgroups` is how many workgroups draw each patch.
     pub fn of(
-        splatting: &Splatting,
+        (splatting, gradient): (&Splatting, Gradient),
         perspective: bool,
         [labels, holes]: [bool; 2],
         rays: RayMode,
         workgroups: u32,
     ) -> Self {
         let Splatting { compositing, order, footprint_box, economies, classification, .. } = *splatting;
+        let kernel_gradient = classification == Classification::After && gradient == Gradient::Kernel;
+        let exact = classification == Classification::After && splatting.interpolation == Interpolation::Exact;
         let after = classification == Classification::After;
         // There the order makes no difference to an image, and planes are handed on from front to back.
         let order = if after { Order::FrontToBack } else { order };
         let economies = economies != Economies::default();
         // Every voxel has its own parallelogram there.
         let footprint_box = if perspective { FootprintBox::Rectangle } else { footprint_box };
-        Self { compositing, order, footprint_box, perspective, economies, labels, holes, rays, after, divided: workgroups > 1 }
+        Self {
+            compositing,
+            order,
+            footprint_box,
+            perspective,
+            economies,
+            labels,
+            holes,
+            rays,
+            after,
+            kernel_gradient,
+            exact,
+            divided: workgroups > 1,
+        }
     }
 }
 
@@ -70,6 +91,10 @@ pub struct GatherBuffers<'a> {
     pub frame: &'a Buffer,
     /// One [`GatherUniform`].
     pub gather: &'a Buffer,
+    /// One [`Planes`], read where classification comes after splatting.
+    pub planes: &'a Buffer,
+    /// The voxels' coefficients, where they are not the values (SPEC §9).
+    pub coefficients: Option<&'a TextureView>,
     /// One [`PatchRange`] at every dynamic offset.
     pub patch_ranges: &'a Buffer,
     /// `[Brick]`.
@@ -94,16 +119,18 @@ pub struct GatherBuffers<'a> {
 
 impl Default for Gather {
     fn default() -> Self {
-        Self { stages: (0..Compositing::COUNT << 10).map(|_| OnceLock::new()).collect(), no_labels: OnceLock::new() }
+        Self { stages: (0..Compositing::COUNT << 12).map(|_| OnceLock::new()).collect(), no_labels: OnceLock::new() }
     }
 }
 
 impl Gather {
     fn stage(&self, mode: GatherMode) -> &OnceLock<ComputeStage> {
-        let GatherMode { compositing, order, footprint_box, perspective, economies, labels, holes, rays, after, divided } =
-            mode;
+        let GatherMode { compositing, order, footprint_box, perspective, economies, labels, holes, rays, .. } = mode;
+        let GatherMode { after, kernel_gradient, exact, divided, .. } = mode;
         let [order, footprint_box] = [order as usize, footprint_box as usize];
-        let flags = [perspective, economies, labels, holes, rays.cut, rays.first_hit, after, divided].map(usize::from);
+        let flags =
+            [perspective, economies, labels, holes, rays.cut, rays.first_hit, after, kernel_gradient, exact, divided]
+                .map(usize::from);
         let bits = [order, footprint_box].into_iter().chain(flags);
         &self.stages[bits.fold(compositing as usize, |number, bit| 2 * number + bit)]
     }
@@ -111,7 +138,7 @@ impl Gather {
     fn compiled(&self, device: &Device, mode: GatherMode) -> &ComputeStage {
         self.stage(mode).get_or_init(|| {
             let stage = ShaderStages::COMPUTE;
-            let slots = [
+            let mut slots = vec![
                 ("frames", uniform::<Frame>(stage, false)),
                 ("gathers", uniform::<GatherUniform>(stage, false)),
                 ("patch_range", uniform::<PatchRange>(stage, true)),
@@ -128,6 +155,10 @@ impl Gather {
                 ("cut", uniform::<Cut>(stage, false)),
                 ("surfaces", depth_texture(stage)),
             ];
+            if mode.after {
+                slots.push(("planes", uniform::<Planes>(stage, false)));
+                slots.push(("coefficients", texture_of_integers(stage, TextureViewDimension::D2Array)));
+            }
             let constants = [
                 ("THREADS", f64::from(device.adapter_info().subgroup_max_size)),
                 ("QUEUE", f64::from(queue(device, mode))),
@@ -141,6 +172,10 @@ impl Gather {
                 ("HOLES", f64::from(u8::from(mode.holes))),
                 ("CUT", f64::from(u8::from(mode.rays.cut))),
                 ("FIRST_HIT", f64::from(u8::from(mode.rays.first_hit))),
+                ("KERNEL_GRADIENT", f64::from(u8::from(mode.kernel_gradient))),
+                ("EXACT", f64::from(u8::from(mode.exact))),
+                ("SUMS", f64::from(sums(mode))),
+                ("SAVED", f64::from(sums(mode) * SHEETS * PATCH[0] * PATCH[1] / 4)),
             ];
             let shader = if mode.after { shaders::GATHER_PLANES } else { shaders::GATHER };
             ComputeStage::new(device, shader, "main", &slots, &constants)
@@ -176,7 +211,7 @@ impl Gather {
         } = buffers;
         let labels = labels.unwrap_or_else(|| &self.no_labels.get_or_init(|| VolumeTexture::no_labels(device)).view);
         let whole = Buffer::as_entire_binding;
-        let resources = [
+        let mut resources = vec![
             ("frames", whole(frame)),
             ("gathers", whole(gather)),
             ("patch_range", at_offset::<PatchRange>(patch_ranges)),
@@ -193,6 +228,11 @@ impl Gather {
             ("cut", whole(buffers.cut.uniform)),
             ("surfaces", wgpu::BindingResource::TextureView(buffers.cut.surfaces)),
         ];
+        if mode.after {
+            resources.push(("planes", whole(buffers.planes)));
+            let coefficients = buffers.coefficients.unwrap_or(values);
+            resources.push(("coefficients", wgpu::BindingResource::TextureView(coefficients)));
+        }
         self.compiled(device, mode).bind(device, &resources)
     }
 
@@ -215,11 +255,16 @@ fn workgroups_per_patch(device: &Device, mode: GatherMode) -> u32 {
     if mode.divided { PATCH[0] * PATCH[1] / 4 / device.adapter_info().subgroup_max_size } else { 1 }
 }
 
+/// Sums that a pixel has on a slab plane (SPEC §9).
+fn sums(mode: GatherMode) -> u32 {
+    if mode.kernel_gradient { 8 } else { 5 }
+}
+
 /// Voxels in a workgroup's queue: as many as there is room for beside the sheets of its patch's pixels. On a GPU more than that asks for
 /// would keep workgroups from running side by side.
 fn queue(device: &Device, mode: GatherMode) -> u32 {
     // Of a pixel: four sheets of a colour, or the sums on four planes and the field on one that is handed on.
-    let floats = if mode.after { 5 * (SHEETS + 1) } else { 4 * SHEETS };
+    let floats = if mode.after { sums(mode) * SHEETS + 5 } else { 4 * SHEETS };
     let sheets_bytes = PATCH[0] * PATCH[1] * floats * size_of::<f32>() as u32;
     // Point, amount and blocks.
     const VOXEL_BYTES: u32 = 36;

@@ -6,7 +6,7 @@ use wgpu::Device;
 
 use super::kind::{RasterizerKind, check_rays, insists_on_tiles};
 use crate::after::normalization::Normalization;
-use crate::after::slab_integral;
+use crate::after::plane_geometry::PlaneGeometry;
 use crate::error::RenderError;
 use crate::geometry::kernel::Kernel;
 use crate::geometry::means;
@@ -19,6 +19,7 @@ use crate::gpu::uniforms::Ramps;
 use crate::pass::composite::RayMode;
 use crate::scene::Scene;
 use crate::settings::camera::Camera;
+use crate::settings::shading::Gradient;
 use crate::settings::splatting::{Classification, Rasterizer, Splatting};
 
 /// A frame of a view.
@@ -26,9 +27,12 @@ use crate::settings::splatting::{Classification, Rasterizer, Splatting};
 pub(crate) struct FrameRequest {
     /// With the renderer's rasterizer where the scene leaves the choice.
     pub(crate) splatting: Splatting,
+    pub(crate) gradient: Gradient,
     pub(crate) view: ViewGeometry,
     pub(crate) kernel: Kernel,
     pub(crate) ramps: Ramps,
+    /// How kernels lie on slab planes, and the numbers that values are splatted as, where classification comes after splatting.
+    pub(crate) planes: Option<(PlaneGeometry, Normalization)>,
     /// The sheet depths whose slabs count even where they hold nothing: [`means::covered`].
     pub(crate) covered: Range<f64>,
     pub(crate) rays: RayMode,
@@ -67,13 +71,22 @@ impl FrameRequest {
             None => None,
         };
         let (kind, fallback) = RasterizerKind::of(device, &splatting)?;
+        let planes = match splatting.classification {
+            Classification::Before => None,
+            Classification::After => Some((PlaneGeometry::new(&seen, grid), volume.gpu_volume().numbers())),
+        };
         Ok(Self {
             kind,
             fallback,
             covered: means::covered(&seen, grid, &splatting),
             kernel: Kernel::new(splatting.radius, splatting.falloff),
-            ramps: ramps(volume, &splatting),
+            ramps: match &planes {
+                Some((_, numbers)) => Ramps::with_integrals(volume.transfer(), splatting.compositing, numbers),
+                None => Ramps::new(volume.transfer()),
+            },
+            planes,
             first_hit,
+            gradient: scene.shading.gradient,
             view: seen,
             splatting,
             rays,
@@ -91,17 +104,6 @@ impl FrameRequest {
     pub(crate) fn hit_bytes(&self) -> u64 {
         if self.rays.first_hit { 4 * self.pixels() } else { 0 }
     }
-}
-
-fn ramps(volume: &ClassifiedVolume, splatting: &Splatting) -> Ramps {
-    let ramps = Ramps::new(volume.transfer());
-    if splatting.classification == Classification::Before {
-        return ramps;
-    }
-    let values = volume.volume().values();
-    let Some(numbers) = Normalization::of(values.iter().copied()) else { return ramps };
-    let table = slab_integral::table(&volume.transfer().tables(None), splatting.compositing, &numbers);
-    ramps.with_integral(table, numbers)
 }
 
 /// The settings, with the renderer's rasterizer where they leave the choice.

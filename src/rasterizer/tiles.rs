@@ -8,10 +8,10 @@ use super::kind::SUBGROUP_SIZES;
 use super::{FrameEstimate, FrameInputs, Prepared};
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::gpu::classified_volume::ClassifiedVolume;
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, written};
+use crate::gpu::classified_volume::ClassifiedVolume;
 use crate::gpu::gathered_layout::GatheredLayout;
-use crate::gpu::layout::{Brick, Gather as GatherUniform, PatchRange};
+use crate::gpu::layout::{Brick, Gather as GatherUniform, PatchRange, Planes};
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
 use crate::lists::matter::Matter;
@@ -34,6 +34,8 @@ pub(crate) struct TileFrame {
     /// The bricks of what matters, where not the volume's own are drawn.
     matter: Option<(Matter, Vec<Brick>)>,
     uniform: Buffer,
+    /// [`Planes`], unused where classification comes before splatting.
+    planes: Buffer,
     patch_ranges: Buffer,
     /// All bricks in one buffer, where the volume's own are in several.
     bricks: Option<Buffer>,
@@ -78,8 +80,8 @@ impl TileRasterizer {
         let order = drawn_order(splatting);
         let matter = matter(request, volume, old.matter.take());
         let is_current = |old: &Binned| {
-            !matter.as_ref().is_some_and(|matter| matter.is_new) &&
-            old.view == *view
+            !matter.as_ref().is_some_and(|matter| matter.is_new)
+                && old.view == *view
                 && (old.order, old.revision, old.bins.passes.search) == (order, volume.revision, search)
                 && (old.support, &old.covered) == (kernel.support(), covered)
         };
@@ -105,6 +107,10 @@ impl TileRasterizer {
         let bins = &binned.bins;
         let results = GatheredLayout::new(view, bins, bricks.len() as u32);
         let uniform = uniforms::gather(view, kernel, splatting, bins, &results);
+        let planes = match &request.planes {
+            Some((geometry, numbers)) => uniforms::planes(geometry, view, volume.gpu_volume().value_format(), numbers),
+            None => bytemuck::Zeroable::zeroed(),
+        };
         let spec = BufferSpecs::new(&limits, request, (bins, &results), lists)?;
         let write = |old, spec: &BufferSpec, bytes: &[u8]| written(device, queue, old, spec, bytes);
         let (starts, entries) = match (old.starts.take(), old.entries.take()) {
@@ -123,6 +129,7 @@ impl TileRasterizer {
         };
         let gathered = grown(device, old.gathered.take(), &spec.gathered)?;
         let uniform = write(old.uniform.take(), &spec.uniform, bytemuck::bytes_of(&uniform))?;
+        let planes = write(old.planes.take(), &spec.planes, bytemuck::bytes_of(&planes))?;
 
         let stride = range_stride(&limits);
         let (mut range_bytes, mut dispatches) = (Vec::new(), Vec::new());
@@ -138,16 +145,24 @@ impl TileRasterizer {
         let patch_ranges = write(old.patch_ranges.take(), &spec.patch_ranges, &range_bytes)?;
 
         let of_volume = [volume.labels().is_some(), volume.has_holes()];
-        let mode = GatherMode::of(splatting, view.perspective.is_some(), of_volume, *rays, bins.workgroups);
+        let mode = GatherMode::of(
+            (splatting, request.gradient),
+            view.perspective.is_some(),
+            of_volume,
+            *rays,
+            bins.workgroups,
+        );
         let buffers = GatherBuffers {
             frame: inputs.frame,
             gather: &uniform,
+            planes: &planes,
             patch_ranges: &patch_ranges,
             bricks: own_bricks.as_ref().unwrap_or_else(|| &volume.lists.lists[0].buffer),
             starts: &starts,
             entries: &entries,
             control_points: inputs.control_points,
             values: volume.values(),
+            coefficients: None,
             labels: volume.labels(),
             gathered: &gathered,
             half_boxes: &half_boxes,
@@ -159,6 +174,7 @@ impl TileRasterizer {
             binned,
             matter: matter.map(|matter| (matter.what, matter.bricks)),
             uniform,
+            planes,
             patch_ranges,
             bricks: own_bricks,
             starts,
@@ -185,9 +201,9 @@ impl TileRasterizer {
         let bins = bins(limits, request, bricks, all_search_passes(request, by_label))?;
         let results = GatheredLayout::new(&request.view, &bins, bricks.len() as u32);
         let spec = BufferSpecs::new(limits, request, (&bins, &results), lists)?;
-        let BufferSpecs { uniform, patch_ranges, starts, entries, gathered, half_boxes, bricks, .. } = spec;
+        let BufferSpecs { uniform, planes, patch_ranges, starts, entries, gathered, half_boxes, bricks, .. } = spec;
         let buffers: Vec<BufferSpec> =
-            [uniform, patch_ranges, starts, entries, gathered, half_boxes].into_iter().chain(bricks).collect();
+            [uniform, planes, patch_ranges, starts, entries, gathered, half_boxes].into_iter().chain(bricks).collect();
         let bands = request.bands.len() as u64 * GatherBand::estimate(bins.dispatches);
         let groups = bins.groups as usize;
         Ok(FrameEstimate { bytes: sizes(limits, &buffers)? + bands, groups, passes: TileFrame::PASSES })
@@ -231,9 +247,9 @@ impl TileFrame {
 
     /// Bytes of GPU memory.
     pub(crate) fn gpu_bytes(&self) -> u64 {
-        let Self { uniform, patch_ranges, starts, entries, gathered, half_boxes, bricks, .. } = self;
+        let Self { uniform, planes, patch_ranges, starts, entries, gathered, half_boxes, bricks, .. } = self;
         let bands: u64 = self.bands.iter().map(GatherBand::gpu_bytes).sum();
-        let buffers = [uniform, patch_ranges, starts, entries, gathered, half_boxes].into_iter().chain(bricks);
+        let buffers = [uniform, planes, patch_ranges, starts, entries, gathered, half_boxes].into_iter().chain(bricks);
         bands + buffers.map(Buffer::size).sum::<u64>()
     }
 }
@@ -241,6 +257,7 @@ impl TileFrame {
 /// The buffers of a frame, all but those of bands.
 struct BufferSpecs {
     uniform: BufferSpec,
+    planes: BufferSpec,
     patch_ranges: BufferSpec,
     starts: BufferSpec,
     entries: BufferSpec,
@@ -275,6 +292,7 @@ impl BufferSpecs {
         let range_bytes = (request.bands.len() * range_stride(limits)) as u64;
         Ok(Self {
             uniform: content_spec("sheetsplat.gather", size_of::<GatherUniform>() as u64, BufferUsages::UNIFORM),
+            planes: content_spec("sheetsplat.planes", size_of::<Planes>() as u64, BufferUsages::UNIFORM),
             patch_ranges: content_spec("sheetsplat.patch_ranges", range_bytes, BufferUsages::UNIFORM),
             starts: content_spec("sheetsplat.bin_starts", words(bins.starts.len()), storage),
             entries: content_spec("sheetsplat.bin_entries", words(bins.entries.len()), storage),
@@ -300,10 +318,11 @@ fn range_stride(limits: &Limits) -> usize {
 }
 
 fn bins(limits: &Limits, request: &FrameRequest, bricks: &[Brick], search: u32) -> Result<PatchBins, RenderError> {
-    let FrameRequest { view, splatting, kernel, covered, .. } = request;
+    let FrameRequest { view, splatting, kernel, covered, planes, .. } = request;
+    let planes = planes.as_ref().map(|(geometry, _)| geometry);
     let most_words = binding(limits) / 4;
     let (order, support) = (drawn_order(splatting), kernel.support());
-    Ok(PatchBins::new(bricks, view, order, covered.clone(), support, search, most_words)?)
+    Ok(PatchBins::new(bricks, (view, planes), order, covered.clone(), support, search, most_words)?)
 }
 
 /// The order in which groups are drawn. Planes are handed on from front to back; after splatting the order makes no difference to an image.
@@ -354,6 +373,7 @@ struct PreviousBuffers {
     binned: Option<Binned>,
     matter: Option<(Matter, Vec<Brick>)>,
     uniform: Option<Buffer>,
+    planes: Option<Buffer>,
     patch_ranges: Option<Buffer>,
     bricks: Option<Buffer>,
     starts: Option<Buffer>,
@@ -369,6 +389,7 @@ impl PreviousBuffers {
             binned: Some(frame.binned),
             matter: frame.matter,
             uniform: Some(frame.uniform),
+            planes: Some(frame.planes),
             patch_ranges: Some(frame.patch_ranges),
             bricks: frame.bricks,
             starts: Some(frame.starts),

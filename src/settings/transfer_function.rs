@@ -134,7 +134,12 @@ impl LabelTables {
 
     /// Whether voxels that take part look otherwise than without them; else only who takes part is another.
     pub fn matter_to_shading(&self) -> bool {
-        self.visible && (self.color.is_some() || self.opacity.is_some() || self.gradient_opacity.is_some())
+        self.visible && self.matter()
+    }
+
+    /// Whether they differ from those of labels without any. Classified after splatting (SPEC §9), invisible labels must be known, too.
+    pub fn matter(&self) -> bool {
+        !self.visible || self.color.is_some() || self.opacity.is_some() || self.gradient_opacity.is_some()
     }
 }
 

@@ -9,6 +9,7 @@ mod field;
 mod images;
 mod modes;
 mod refusals;
+mod slab_integral;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::image::Image;

@@ -60,7 +60,8 @@ impl<'a> Fixture<'a> {
     fn bins(&self) -> PatchBins {
         let Seen { view, kernel, scene: Scene { splatting, .. }, .. } = &self.seen;
         let covered = means::covered(view, self.volume.grid(), splatting);
-        PatchBins::new(self.bricks.bricks(), view, splatting.order, covered, kernel.support(), 0, u64::MAX).unwrap()
+        PatchBins::new(self.bricks.bricks(), (view, None), splatting.order, covered, kernel.support(), 0, u64::MAX)
+            .unwrap()
     }
 
     /// Draws over `acc`, in bands of at most so many rows. The nearest group begins at `near`, where that is given.
@@ -102,7 +103,7 @@ impl<'a> Fixture<'a> {
         let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|half| half.as_vec2().to_array()).collect();
         let (uncut, cut) = (Uncut::new(device), uniforms::cut(&seen.view, volume.grid(), &seen.scene, None, None));
         let mode = GatherMode::of(
-            &seen.scene.splatting,
+            (&seen.scene.splatting, seen.scene.shading.gradient),
             seen.view.perspective.is_some(),
             [false, volume.holes() > 0],
             RayMode::default(),
@@ -111,6 +112,9 @@ impl<'a> Fixture<'a> {
         let buffers = GatherBuffers {
             frame: &init(device, &[frame], BufferUsages::UNIFORM),
             gather: &init(device, &[gather], BufferUsages::UNIFORM),
+            // Unused.
+            planes: &init(device, &[gather], BufferUsages::UNIFORM),
+            coefficients: None,
             patch_ranges: &ranges_buffer,
             bricks: &init(device, bricks, BufferUsages::STORAGE),
             starts: &storage(&bins.starts),

@@ -51,7 +51,15 @@ impl Case {
     fn bins(&self, most_words: u64) -> Result<PatchBins, TileCapacityError> {
         let Scene { camera, splatting, image, .. } = &self.scene;
         let view = ViewGeometry::new(&self.grid, camera, splatting, [image.width, image.height]).unwrap();
-        PatchBins::new(self.bricks.bricks(), &view, splatting.order, 0.0..0.0, self.kernel().support(), 0, most_words)
+        PatchBins::new(
+            self.bricks.bricks(),
+            (&view, None),
+            splatting.order,
+            0.0..0.0,
+            self.kernel().support(),
+            0,
+            most_words,
+        )
     }
 
     /// What the kernels need: group, tile, brick.
