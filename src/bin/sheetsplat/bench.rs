@@ -5,7 +5,7 @@ use std::time::Instant;
 use serde::Serialize;
 use sheetsplat::stats::Stats;
 
-use crate::arguments::Input;
+use crate::arguments::{Backend, Drawing, Input};
 use crate::failure::Failure;
 use crate::outputs::Outputs;
 use crate::stdout;
@@ -21,6 +21,9 @@ pub(crate) struct Arguments {
     /// Degrees to turn about the camera's up before each of them.
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     rotate: f64,
+    /// The GPU, or the CPU's cores without a driver.
+    #[arg(long, value_enum, default_value = "gpu")]
+    backend: Backend,
     /// Time every stage on the GPU, where the adapter has timestamp queries: stages_ms in the statistics.
     #[arg(long)]
     profile: bool,
@@ -48,16 +51,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     input.look_at(&volume, &mut scene)?;
 
     let start = Instant::now();
-    let headless = input.headless(arguments.profile)?;
-    let mut view = headless.view(volume, &scene).map_err(|error| input.failure(error))?;
-    let mut last = headless.draw(&mut view).map_err(|error| input.failure(error))?.stats;
+    let mut drawing = Drawing::new(input, arguments.backend, arguments.profile, volume, &scene)?;
+    let mut last = drawing.draw().map_err(|error| input.failure(error))?.stats;
     let first_frame_ms = milliseconds_since(start);
 
     let mut times = Vec::new();
     for _ in 0..arguments.frames {
-        view.turn(arguments.rotate);
+        drawing.turn(arguments.rotate);
         let start = Instant::now();
-        last = headless.draw(&mut view).map_err(|error| input.failure(error))?.stats;
+        last = drawing.draw().map_err(|error| input.failure(error))?.stats;
         times.push(milliseconds_since(start));
     }
     times.sort_by(f64::total_cmp);
