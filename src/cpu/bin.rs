@@ -36,9 +36,8 @@ pub(super) fn tile_grid(size: [u32; 2]) -> [usize; 2] {
 /// The bricks that may be on the image, by first sheet and then in memory order.
 pub(super) fn place(bricks: &[Brick], projection: &Projection, support: f64) -> Vec<Placed> {
     let numbered = bricks.par_iter().enumerate();
-    let mut placed: Vec<Placed> = numbered
-        .filter_map(|(number, brick)| place_brick(number as u32, brick, projection, support))
-        .collect();
+    let mut placed: Vec<Placed> =
+        numbered.filter_map(|(number, brick)| place_brick(number as u32, brick, projection, support)).collect();
     placed.par_sort_unstable_by_key(|placed| (placed.first, placed.brick));
     placed
 }

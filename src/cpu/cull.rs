@@ -1,6 +1,7 @@
 //! Early splat elimination (§6, SPEC §6): which pixels of a tile are opaque, and whether any pixel of a footprint's box is not. The same
 //! decision as `shaders/cull_voxels.wgsl`; pixels outside of the tile are other tiles' to draw.
 
+use super::cut::TileCuts;
 use super::sheets::{COLUMNS, ROWS};
 
 /// Levels of rows joined: 1, 2, 4, … of them.
@@ -70,6 +71,15 @@ impl OpenMask {
         }
     }
 
+    /// Makes pixels opaque of which nothing shows.
+    pub(super) fn close_empty(&mut self, cuts: &TileCuts) {
+        for (row, [start, end]) in cuts.rows.iter().enumerate() {
+            let empty = (0..COLUMNS).filter(|&x| end[x] <= start[x]).fold(0, |bits, x| bits | 1 << x);
+            self.close(row, empty);
+        }
+        self.join();
+    }
+
     /// Whether all pixels are opaque.
     pub(super) fn is_closed(&self) -> bool {
         self.joined[LEVELS - 1][0] == 0
@@ -105,10 +115,10 @@ mod tests {
                 mask.close(row, if round < 4 { bits & bits >> 7 } else { bits | bits << 3 });
             }
             mask.join();
-            for (left, right, first, last) in
-                (0..200_usize).map(|i| (i % 30, (i * 7) % 32, (i * 3) % 32, (i * 5) % 32))
+            for (left, right, first, last) in (0..200_usize).map(|i| (i % 30, (i * 7) % 32, (i * 3) % 32, (i * 5) % 32))
             {
-                let pixels = Pixels { columns: [left.min(right), left.max(right)], rows: [first.min(last), first.max(last)] };
+                let pixels =
+                    Pixels { columns: [left.min(right), left.max(right)], rows: [first.min(last), first.max(last)] };
                 let is_open = |row: usize| (pixels.columns[0]..=pixels.columns[1]).any(|x| mask.row(row) >> x & 1 == 1);
                 let expected = (pixels.rows[0]..=pixels.rows[1]).any(is_open);
                 assert_eq!(mask.sees(&pixels), expected, "{round} {pixels:?}");

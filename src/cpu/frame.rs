@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::bin::{self, Placed};
 use super::composite::Compositor;
 use super::count::{Drawn, Tally};
+use super::cut::Cuts;
 use super::kernel::KernelTables;
 use super::project::Projection;
 use super::resolve::Resolver;
@@ -35,6 +36,7 @@ pub(super) struct Frame<'a> {
     pub(super) splatter: Splatter,
     pub(super) shader: Shader,
     pub(super) compositor: Compositor,
+    pub(super) cuts: Option<Cuts>,
     pub(super) drawn: Drawn,
     /// The low-pass rule's, where it is the same for all sections.
     pub(super) amplitude: f64,
@@ -62,6 +64,8 @@ impl<'a> Frame<'a> {
             kernel: KernelTables::new(&kernel),
             radius: splatting.radius as f32,
             metric: metric.map(|coefficient| coefficient as f32),
+            // A little less, for what f32 rounds.
+            row_metric: ((1.0 - 1e-5) * (metric[2] - metric[1] * metric[1] / (4.0 * metric[0])).max(0.0)) as f32,
             half_box: view.footprint.half_box(kernel.support()).to_array().map(|half| half as f32),
             pixel_per_depth: view.perspective.map(|perspective| perspective.eye.pixel_per_depth as f32),
         };
@@ -77,6 +81,7 @@ impl<'a> Frame<'a> {
             splatter,
             shader: Shader::new(&scene.shading, splatting.compositing),
             compositor,
+            cuts: Cuts::new(&scene.clip, &view, volume.grid()),
             drawn: Drawn::new(bricks.len(), &view),
             amplitude: if view.perspective.is_some() { 1.0 } else { view.footprint.amplitude },
             support: kernel.support(),
@@ -115,14 +120,7 @@ impl<'a> Frame<'a> {
     }
 
     /// Draws a row of tiles.
-    fn draw_strip(
-        &self,
-        level: Level,
-        placed: &[Placed],
-        row: usize,
-        columns: usize,
-        strip: &mut [[f32; 4]],
-    ) -> Tally {
+    fn draw_strip(&self, level: Level, placed: &[Placed], row: usize, columns: usize, strip: &mut [[f32; 4]]) -> Tally {
         let bins = bin::bin(placed, row, columns);
         let width = self.projection.view.size[0] as usize;
         let tiles = bins.par_iter().enumerate().map_init(
@@ -156,7 +154,8 @@ impl<'a> Frame<'a> {
     ) -> (Vec<[f32; 4]>, Tally) {
         let mut tally = Tally::default();
         let buffers = walk.draw(simd, origin, placed, bricks, &mut tally);
-        let pixel = |row: &[[f32; COLUMNS]; 4], x: usize| self.resolver.pixel([0, 1, 2, 3].map(|c| row[c][x]));
+        let pixel =
+            |row: &[[f32; COLUMNS]; 4], x: usize| self.resolver.pixel([row[0][x], row[1][x], row[2][x], row[3][x]]);
         let pixels = buffers.acc.iter().flat_map(|row| (0..COLUMNS).map(move |x| pixel(row, x)));
         (pixels.collect(), tally)
     }

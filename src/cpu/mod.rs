@@ -16,6 +16,7 @@ mod bin;
 mod composite;
 mod count;
 mod cull;
+mod cut;
 mod frame;
 mod kernel;
 mod project;

@@ -47,6 +47,8 @@ pub(super) struct Splatter {
     pub(super) radius: f32,
     /// Orthographic: ρ² of a pixel offset (dx, dy) is `x·dx² + y·dx·dy + z·dy²`.
     pub(super) metric: [f32; 3],
+    /// Orthographic: the least ρ² of a row is this times dy².
+    pub(super) row_metric: f32,
     /// Orthographic: half the box around footprints, pixels.
     pub(super) half_box: [f32; 2],
     /// In perspective the size of a pixel at depth 1, `unit`s.
@@ -58,6 +60,8 @@ pub(super) struct Sections {
     count: usize,
     /// `H(0, 0, t)` of eq. 3 at the planes between them.
     planes: [f32; LANES],
+    /// ρ² from which on a section has nothing.
+    extent: [f32; LANES],
     /// In perspective ρ² of a pixel along the footprint's axis and across it, and the low-pass rule's amplitude, by section.
     along: [f32; LANES],
     across: [f32; LANES],
@@ -75,6 +79,7 @@ impl Splatter {
         let mut sections = Sections {
             count,
             planes: [0.0; LANES],
+            extent: [0.0; LANES],
             along: [0.0; LANES],
             across: [0.0; LANES],
             amplitude: [0.0; LANES],
@@ -100,12 +105,14 @@ impl Splatter {
             let [x, y] = local.axis.map(|component| component * component);
             let width = (one / along * x + one / across * y).sqrt() * self.kernel.support;
             let height = (one / along * y + one / across * x).sqrt() * self.kernel.support;
-            let largest = |lanes: f32x8<S>| lanes.to_array()[..count].iter().fold(0.0_f32, |a, &b| if a > b { a } else { b });
+            let largest =
+                |lanes: f32x8<S>| lanes.to_array()[..count].iter().fold(0.0_f32, |a, &b| if a > b { a } else { b });
             half_box = [largest(width), largest(height)];
             (sections.along, sections.across) = (along.to_array(), across.to_array());
             sections.amplitude = amplitude.to_array();
         }
         sections.planes = self.kernel.along(simd, t).to_array();
+        sections.extent = self.kernel.extent(simd, t, t.slide::<1>(t)).to_array();
         sections.pixels = Pixels::within(splat.center, half_box);
         sections
     }
@@ -122,7 +129,9 @@ impl Splatter {
     ) {
         let Some(Pixels { columns: [left, right], rows: [first, last] }) = sections.pixels else { return };
         let slot = slot_of(splat.sheets[0]);
-        let colors = splat.amount.map(|channel| f32x8::splat(simd, channel));
+        let [red, green, blue, alpha] = splat.amount;
+        let splatted = |channel: f32| f32x8::splat(simd, channel);
+        let colors = [splatted(red), splatted(green), splatted(blue), splatted(alpha)];
         let mut written = 0_u64;
         for row in first..=last.min(ROWS - 1) {
             let open = open.row(row);
@@ -164,8 +173,17 @@ impl Splatter {
         let rho_squared = dx * (dx * xx + xy * dy) + yy * dy * dy;
         let rim = self.kernel.rim(simd, rho_squared);
         let in_plane = self.kernel.in_plane(simd, rho_squared);
-        let mut near = cut_by_rim(simd, sections.planes[0], rim);
-        for section in 0..sections.count {
+        // A row that passes a section by has nothing of it: sections' extents grow towards the kernel's centre.
+        let nearest = self.row_metric * dy * dy;
+        let (mut first, mut end) = (0, sections.count);
+        while first < end && sections.extent[first % LANES] <= nearest {
+            first += 1;
+        }
+        while first < end && sections.extent[(end - 1) % LANES] <= nearest {
+            end -= 1;
+        }
+        let mut near = cut_by_rim(simd, sections.planes[first % LANES], rim);
+        for section in first..end {
             let far = cut_by_rim(simd, sections.planes[(section + 1) % LANES], rim);
             add(simd, (far - near) * in_plane, colors, column, &mut target[(slot + section) % RING]);
             near = far;
@@ -219,7 +237,9 @@ fn add<S: Simd>(
 ) {
     let column = column.min(COLUMNS);
     for (channel, color) in sheet.iter_mut().zip(colors) {
-        let pixels = &mut channel[column..column + LANES];
-        (f32x8::from_slice(simd, pixels) + weights * color).store_slice(pixels);
+        // Not by `from_slice`, which goes through memory.
+        if let Some(pixels) = channel[column..].first_chunk_mut::<LANES>() {
+            *pixels = (f32x8::load_array_ref(simd, pixels) + weights * color).to_array();
+        }
     }
 }

@@ -46,12 +46,5 @@ pub(super) fn check(scene: &Scene) -> Result<(), RenderError> {
             return refused(key, found.to_string(), format!("{allowed}, {other}"));
         }
     }
-    if !scene.clip.planes.is_empty() {
-        let found = format!("{} planes", scene.clip.planes.len());
-        return refused("clip.planes", found, format!("none, {other}"));
-    }
-    if scene.clip.crop.is_some() {
-        return refused("clip.crop", "a box".to_owned(), format!("none, {other}"));
-    }
     Ok(())
 }

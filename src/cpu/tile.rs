@@ -69,6 +69,11 @@ impl<'a> TileWalk<'a> {
         let mut open = OpenMask::new((width - origin[0]).min(COLUMNS), (height - origin[1]).min(ROWS));
         let mut bricks = bricks.iter().map(|&at| &placed[at as usize]).peekable();
         let Some(mut sheet) = bricks.peek().map(|placed| placed.first) else { return &self.buffers };
+        let direction = self.frame.projection.direction;
+        let cuts = self.frame.cuts.as_ref().map(|cuts| cuts.of_tile(origin, direction * sheet));
+        if let Some(cuts) = cuts.as_ref().filter(|_| self.frame.compositor.threshold.is_some()) {
+            open.close_empty(cuts);
+        }
         loop {
             while let Some(placed) = bricks.next_if(|placed| placed.first <= sheet) {
                 tally.bricks_visited += u64::from(self.arrive(placed, sheet, origin, &open));
@@ -77,7 +82,8 @@ impl<'a> TileWalk<'a> {
             let slot = slot_of(sheet);
             if self.buffers.written[slot] != 0 {
                 tally.sheets_composited += 1;
-                self.frame.compositor.composite(simd, &mut self.buffers, slot, &mut open);
+                let cut = cuts.as_ref().map(|cuts| (cuts, cuts.begin(direction * sheet)));
+                self.frame.compositor.composite(simd, &mut self.buffers, slot, cut, &mut open);
                 if open.is_closed() {
                     break;
                 }

@@ -135,9 +135,7 @@ mod tests {
             assert!(worst(low, high, of, |x| -(-x).ln_1p()) < 4e-7, "{low} {high}");
         }
         for exponent in [0.01, 1.0, 20.0, 150.0] {
-            let of = |x: [f32; LANES]| {
-                dispatch!(level, simd => power(simd, f32x8::load_array(simd, x), exponent).to_array())
-            };
+            let of = |x: [f32; LANES]| dispatch!(level, simd => power(simd, f32x8::load_array(simd, x), exponent).to_array());
             let exact = |x: f64| x.powf(f64::from(exponent));
             assert!(worst(0.8, 1.0, of, exact) < 1e-6 * f64::from(exponent).max(1.0), "{exponent}");
             assert_eq!(of([0.0; LANES]), [0.0; LANES]);

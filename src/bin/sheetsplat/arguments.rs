@@ -12,8 +12,8 @@ use sheetsplat::image::PngDepth;
 use sheetsplat::scene::{Scene, SceneError, VolumeSource};
 use sheetsplat::settings::Camera;
 use sheetsplat::stats::Stats;
-use sheetsplat::{RenderError, SceneView};
 use sheetsplat::volume::{self, Orientation, Volume};
+use sheetsplat::{RenderError, SceneView};
 
 use crate::failure::Failure;
 use crate::outputs::Outputs;
