@@ -28,7 +28,7 @@ impl Pixels {
             let first = -floor(-(center[axis] - half[axis]));
             let last = floor(center[axis] + half[axis]);
             let (first, last) = (first.max(0), last.min(count as i32 - 1));
-            (first <= last).then(|| [first as usize, last as usize])
+            (first <= last).then_some([first as usize, last as usize])
         };
         Some(Self { columns: of_axis(0, COLUMNS)?, rows: of_axis(1, ROWS)? })
     }

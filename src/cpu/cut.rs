@@ -43,9 +43,10 @@ impl Cuts {
     pub(super) fn of_tile(&self, origin: [usize; 2], base: i32) -> TileCuts {
         let mut rows = vec![[[0.0; COLUMNS]; 2]; ROWS];
         for (y, row) in rows.iter_mut().enumerate() {
-            for x in 0..COLUMNS {
+            let [starts, ends] = row;
+            for (x, (start, end)) in starts.iter_mut().zip(ends).enumerate() {
                 let pixel = DVec2::new((origin[0] + x) as f64, (origin[1] + y) as f64) + 0.5;
-                [row[0][x], row[1][x]] = self.stretch(pixel - self.middle, base);
+                [*start, *end] = self.stretch(pixel - self.middle, base);
             }
         }
         TileCuts { base, rows }
