@@ -129,9 +129,6 @@ impl Splatter {
     ) {
         let Some(Pixels { columns: [left, right], rows: [first, last] }) = sections.pixels else { return };
         let slot = slot_of(splat.sheets[0]);
-        let [red, green, blue, alpha] = splat.amount;
-        let splatted = |channel: f32| f32x8::splat(simd, channel);
-        let colors = [splatted(red), splatted(green), splatted(blue), splatted(alpha)];
         let mut written = 0_u64;
         for row in first..=last.min(ROWS - 1) {
             let open = open.row(row);
@@ -142,8 +139,8 @@ impl Splatter {
                 if open & columns_between(column, end) != 0 {
                     written |= 1 << row;
                     match self.pixel_per_depth {
-                        None => self.draw_pixels(simd, splat, sections, colors, [column, row], slot, target),
-                        Some(_) => self.draw_local_pixels(simd, splat, sections, colors, [column, row], slot, target),
+                        None => self.draw_pixels(simd, splat, sections, [column, row], slot, target),
+                        Some(_) => self.draw_local_pixels(simd, splat, sections, [column, row], slot, target),
                     }
                 }
                 column += LANES;
@@ -156,13 +153,11 @@ impl Splatter {
 
     /// Eight pixels without perspective: all sections have one footprint.
     #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "the innermost loop")]
     fn draw_pixels<S: Simd>(
         &self,
         simd: S,
         splat: &Splat,
         sections: &Sections,
-        colors: [f32x8<S>; 4],
         [column, row]: [usize; 2],
         slot: usize,
         target: &mut SheetRow,
@@ -185,20 +180,18 @@ impl Splatter {
         let mut near = cut_by_rim(simd, sections.planes[first % LANES], rim);
         for section in first..end {
             let far = cut_by_rim(simd, sections.planes[(section + 1) % LANES], rim);
-            add(simd, (far - near) * in_plane, colors, column, &mut target[(slot + section) % RING]);
+            add((far - near) * in_plane, splat.amount, column, &mut target[(slot + section) % RING]);
             near = far;
         }
     }
 
     /// Eight pixels in perspective: every section has its own footprint, of the size that pixels have at its middle.
     #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "the innermost loop")]
     fn draw_local_pixels<S: Simd>(
         &self,
         simd: S,
         splat: &Splat,
         sections: &Sections,
-        colors: [f32x8<S>; 4],
         [column, row]: [usize; 2],
         slot: usize,
         target: &mut SheetRow,
@@ -215,7 +208,7 @@ impl Splatter {
             let in_plane = self.kernel.in_plane(simd, rho_squared) * sections.amplitude[section];
             let near = cut_by_rim(simd, sections.planes[section], rim);
             let far = cut_by_rim(simd, sections.planes[(section + 1) % LANES], rim);
-            add(simd, (far - near) * in_plane, colors, column, &mut target[(slot + section) % RING]);
+            add((far - near) * in_plane, splat.amount, column, &mut target[(slot + section) % RING]);
         }
     }
 }
@@ -228,18 +221,15 @@ fn cut_by_rim<S: Simd>(simd: S, plane: f32, rim: f32x8<S>) -> f32x8<S> {
 
 /// Adds a colour to eight pixels of a sheet, by weights.
 #[inline(always)]
-fn add<S: Simd>(
-    simd: S,
-    weights: f32x8<S>,
-    colors: [f32x8<S>; 4],
-    column: usize,
-    sheet: &mut [[f32; COLUMNS + LANES]; CHANNELS],
-) {
+fn add<S: Simd>(weights: f32x8<S>, colors: [f32; 4], column: usize, sheet: &mut [[f32; COLUMNS + LANES]; CHANNELS]) {
     let column = column.min(COLUMNS);
+    let weights = weights.to_array();
     for (channel, color) in sheet.iter_mut().zip(colors) {
-        // Not by `from_slice`, which goes through memory.
+        // Numbers one by one, which the compiler makes vectors of: loading one by `f32x8` goes through a copy on the stack.
         if let Some(pixels) = channel[column..].first_chunk_mut::<LANES>() {
-            *pixels = (f32x8::load_array_ref(simd, pixels) + weights * color).to_array();
+            for (pixel, weight) in pixels.iter_mut().zip(weights) {
+                *pixel += weight * color;
+            }
         }
     }
 }
