@@ -88,6 +88,11 @@ impl Origins<'_> {
         let related: &[&str] = match &key[..] {
             "camera.up" => &["camera.direction"],
             "splatting.compositing" => &["preset", "splatting.method", "splatting.order"],
+            "splatting.classification" => {
+                &["splatting.method", "splatting.whole_below", "splatting.beta", "splatting.resolution"]
+            }
+            "splatting.falloff" => &["splatting.classification"],
+            "splatting.interpolation" => &["splatting.classification", "splatting.radius", "splatting.falloff"],
             _ => &[],
         };
         let found = match (found, self.written_at(&key)) {
