@@ -70,7 +70,7 @@ var<private> color_ramp: Ramp;
 var<private> opacity_ramp: Ramp;
 var<private> gradient_opacity_ramp: Ramp;
 
-// Sheets of a sheet_group.
+// Sheets of a sheet group.
 const SHEETS = 4u;
 
 // Threads that hold a patch, and blocks of it.

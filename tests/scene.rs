@@ -122,7 +122,7 @@ fn every_key() {
         method = "axis-aligned"
         radius = 1
         falloff = 16
-        classification = "after"
+        classification = "before"
         interpolation = "exact"
         slab_width = 0.05
         footprint = "sections"
@@ -187,7 +187,7 @@ fn every_key() {
             method: Method::AxisAligned,
             radius: 1.0,
             falloff: 16.0,
-            classification: Classification::After,
+            classification: Classification::Before,
             interpolation: Interpolation::Exact,
             slab_width: 0.05,
             footprint: FootprintForm::Sections,
@@ -210,6 +210,9 @@ fn every_key() {
         let scene = parse(MINIMAL, &[&format!("splatting.rasterizer={name}")]).unwrap();
         assert_eq!(scene.splatting.rasterizer, rasterizer);
     }
+    // What goes with neither axis-aligned sheets nor a label's preset.
+    let after = parse("volume.path = 'a.nrrd'", &["splatting.classification=after"]).unwrap();
+    assert_eq!(after.splatting.classification, Classification::After);
     let scene = parse(text, &["splatting.method=composite-every-sample"]).unwrap();
     assert_eq!(scene.splatting.method, Method::CompositeEverySample);
     assert_eq!(parse(MINIMAL, &["shading.light=headlight"]).unwrap().shading.light, Light::Headlight);

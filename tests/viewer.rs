@@ -10,7 +10,7 @@ use image::{Rgba, RgbaImage};
 const WINDOW: [u32; 2] = [900, 600];
 const PANEL: u32 = 330;
 
-const SCENE: &str = "builtin:head:48 --set camera.direction=[0.55,0.8,-0.12] --set image.background=[0,0,0.4,1]";
+const SCENE: &str = "builtin:head:48 --set camera.fit=volume --set camera.direction=[0.55,0.8,-0.12] --set image.background=[0,0,0.4,1]";
 
 fn sheetsplat(folder: &Path, arguments: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_sheetsplat"));

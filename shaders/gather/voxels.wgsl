@@ -29,7 +29,7 @@ fn overlapped_sheets(p: vec4f) -> vec2f {
     return vec2f(floor(sheets.x), ceil(sheets.y));
 }
 
-// Those of them that are in the sheet_group.
+// Those of them that are in the sheet group.
 fn sheets_here(sheets: vec2f) -> vec2f {
     return clamp(sheets, vec2f(sheet_group.first_sheet), vec2f(sheet_group.first_sheet + f32(SHEETS)));
 }
@@ -95,7 +95,7 @@ fn keep_voxels() {
         let sheets = overlapped_sheets(p);
         let is_in = i + lane < count && is_drawn_here(p, sheets);
         subgroupBarrier();
-        let kept_slot = enqueue(is_in, point.w, p, units_here(p));
+        let kept_slot = enqueue(is_in, point.w, p, blocks_here(p));
         if is_in {
             queue_amounts[kept_slot] = amount;
             count_drawn(point.w, p, sheets, false);
@@ -114,8 +114,8 @@ fn find_voxels(search: SearchBounds, is_start: bool) {
         }
         let p = project(found.at);
         let sheets = overlapped_sheets(p);
-        let is_searched_for = !is_start || first_group(sheets) == f32(sheet_group.number);
-        _ = enqueue(lane < count && is_drawn_here(p, sheets) && is_searched_for, found.voxel, p, units_here(p));
+        let may_be_new = !is_start || first_group(sheets) == f32(sheet_group.number);
+        _ = enqueue(lane < count && is_drawn_here(p, sheets) && may_be_new, found.voxel, p, blocks_here(p));
     }
 }
 
@@ -126,7 +126,7 @@ fn is_drawn_here(p: vec4f, sheets: vec2f) -> bool {
 }
 
 // The blocks that a kernel's sections in the group reach.
-fn units_here(p: vec4f) -> u32 {
+fn blocks_here(p: vec4f) -> u32 {
     return blocks_seen(open, p.xy - first_px, sheet_group.half_box, extent_here(p));
 }
 
@@ -144,7 +144,7 @@ fn shade_voxels(first: u32) {
         let sheets = overlapped_sheets(p);
         var blocks = queue_blocks[slot];
         if ECONOMIES {
-            blocks = economic_units(shaded, p, sheets);
+            blocks = economic_blocks(shaded, p, sheets);
         }
         if is_in {
             queue_amounts[slot] = shaded.amount;
@@ -160,7 +160,7 @@ fn shade_voxels(first: u32) {
 }
 
 // The blocks that a voxel is drawn to among §8's economies, and the sheet of the group that takes it as a whole.
-fn economic_units(shaded: Shaded, p: vec4f, sheets: vec2f) -> u32 {
+fn economic_blocks(shaded: Shaded, p: vec4f, sheets: vec2f) -> u32 {
     let center = p.xy - first_px;
     let is_deep = blocks_seen(shallow, center, sheet_group.half_box, 1.0) == 0u;
     let is_whole = is_deep || shaded.alpha < gather.whole_below;

@@ -3,6 +3,8 @@
 use std::io::Cursor;
 use std::path::Path;
 
+use ::exr::meta::BlockDescription;
+use ::exr::meta::header::Header;
 use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
 use super::{Format, Image, ImageError};
@@ -36,6 +38,9 @@ impl Image {
     fn decode(path: &Path, format: ImageFormat) -> Result<Self, ImageError> {
         let failed = |source: ::image::ImageError| ImageError::Decode { path: path.to_owned(), source: source.into() };
         let bytes = read(path)?;
+        if format == ImageFormat::OpenExr {
+            check_blocks(path, &bytes)?;
+        }
         let decoder = ImageReader::with_format(Cursor::new(&bytes), format).into_decoder().map_err(failed)?;
         let (width, height) = decoder.dimensions();
         let most = 8 * MAX_EXPANSION * bytes.len() as u64 / min_bits_per_pixel(format, &bytes);
@@ -64,6 +69,29 @@ impl Image {
             return Err(content(path, "descr", array.kind.to_string(), "float32".to_owned()));
         }
         Ok(Self { width, height, pixels: array.values.as_chunks().0.to_vec() })
+    }
+}
+
+/// Checks that no block of an EXR file claims to be larger than the file's bytes can become: decoders make room for a whole block first.
+fn check_blocks(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
+    let failed = |source: ::exr::error::Error| ImageError::Decode { path: path.to_owned(), source: source.into() };
+    let most = u128::from(MAX_EXPANSION) * bytes.len() as u128;
+    let block_bytes = |header: &Header| {
+        let pixels = match header.blocks {
+            BlockDescription::Tiles(tiles) => tiles.tile_size.width() as u128 * tiles.tile_size.height() as u128,
+            BlockDescription::ScanLines => {
+                header.compression.scan_lines_per_block() as u128 * header.layer_size.width() as u128
+            }
+        };
+        header.channels.bytes_per_pixel as u128 * pixels
+    };
+    let headers = ::exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(failed)?.headers;
+    match headers.iter().map(block_bytes).max() {
+        Some(block) if block > most => {
+            let found = format!("a block of {block} bytes in {} bytes", bytes.len());
+            Err(content(path, "size", found, format!("at most {most} bytes")))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -97,4 +125,35 @@ fn read(path: &Path) -> Result<Vec<u8>, ImageError> {
 
 fn content(path: &Path, what: &str, found: String, allowed: String) -> ImageError {
     ImageError::Content { path: path.to_owned(), what: what.to_owned(), found, allowed }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use ::exr::prelude::*;
+
+    use super::{Image, ImageError};
+
+    /// A small image in tiles, whose header then claims tiles of 2¹³ × 2¹³ pixels.
+    #[test]
+    fn blocks_of_exr_files_are_no_larger_than_the_file_can_hold() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("tiles.exr");
+        let channels = SpecificChannels::rgba(|_: Vec2<usize>| (0.5_f32, 0.25_f32, 1.0_f32, 1.0_f32));
+        let blocks = Blocks::Tiles(Vec2(4, 4));
+        let encoding = Encoding { compression: Compression::ZIP16, blocks, line_order: LineOrder::Increasing };
+        let layer = Layer::new((4, 4), LayerAttributes::named("layer"), encoding, channels);
+        ::exr::prelude::Image::from_layer(layer).write().non_parallel().to_file(&path).unwrap();
+        assert_eq!(Image::open(&path).unwrap().pixels, [[0.5, 0.25, 1.0, 1.0]; 16]);
+
+        let mut bytes = std::fs::read(&path).unwrap();
+        // The attribute's name, its type, its size, and the tiles' width and height.
+        let attribute = b"tiles\0tiledesc\0";
+        let at = bytes.windows(attribute.len()).position(|window| window == attribute).unwrap() + attribute.len() + 4;
+        bytes[at..at + 4].copy_from_slice(&(1_u32 << 13).to_le_bytes());
+        bytes[at + 4..at + 8].copy_from_slice(&(1_u32 << 13).to_le_bytes());
+        std::fs::write(&path, bytes).unwrap();
+        let error = Image::open(&path).unwrap_err();
+        assert!(matches!(&error, ImageError::Content { found, .. } if found.starts_with("a block of ")), "{error}");
+    }
 }

@@ -1,4 +1,4 @@
-//! Which bricks every sheet group of every patch looks at: the buckets (§5.1) of the tile rasteriser, which walks a patch's
+//! Which bricks every sheet group of every patch looks at: the buckets (§5.1) of the tile rasterizer, which walks a patch's
 //! groups front to back.
 
 use std::ops::Range;
@@ -13,10 +13,10 @@ use crate::lists::brick;
 use crate::setting_error::SettingError;
 use crate::settings::splatting::Order;
 
-/// Width and height of the rasteriser's patches, pixels.
+/// Width and height of the rasterizer's patches, pixels.
 pub const PATCH: [u32; 2] = [16, 8];
 
-/// Units of a patch: rounds in which the smallest subgroup draws it.
+/// Blocks of 8×4 pixels in a patch, which the smallest subgroup draws in as many rounds.
 pub const BLOCKS: u32 = 4;
 
 /// Sheets of a group.
@@ -25,16 +25,16 @@ pub const SHEETS: u32 = 4;
 /// The most bricks: their numbers share a word with a place in the brick.
 const MAX_BRICKS: usize = 1 << 26;
 
-/// Passes through all its loops that a thread may take in one dispatch: llvmpipe ends loops after 65535. The pass that finds a loop
-/// at its end counts, and in that pass one through every loop inside. Threads count them, and go on in the next dispatch. What is left is
-/// for what comes before and after: to look at every pixel's ray first of all.
+/// The maximum number of passes through loops that a thread takes in one dispatch: llvmpipe ends a thread's loops after 65 535 passes. Every loop
+/// costs one extra pass for its exit check, and so do the loops nested in it. Threads count their passes and continue in the next
+/// dispatch. The remainder is for the work before the first group, which looks at every pixel's ray, and after the last.
 const MAX_PASSES: u32 = 64900;
 
-/// Passes of a group at most besides, with 8 threads in a subgroup, and of each block.
+/// The maximum number of passes that a group takes beside its bricks, and that each of its blocks adds, with 8 threads in a subgroup.
 const PASSES_PER_GROUP: u32 = 60;
 const PASSES_PER_BLOCK: u32 = 40;
 
-/// Passes of a brick at most, with 8 threads in a subgroup: 8 to fetch and visit it, 76 to find its voxels, 56 to shade them, 8 to keep
+/// The maximum number of passes that a brick takes, with 8 threads in a subgroup: 8 to fetch and visit it, 76 to find its voxels, 56 to shade them, 8 to keep
 /// them, and 10 where the queue is full.
 const PASSES_PER_BRICK: u32 = 158;
 
@@ -47,7 +47,7 @@ const SHADED_PER_BRICK: u32 = 8;
 /// Passes to look at how a block's rays are cut, or along which way means are taken, where that is asked for.
 const PASSES_PER_LOOK: u32 = 140;
 
-/// Passes that a thread may take, and takes at most.
+/// The passes through loops that a thread may take, and the maxima that its work takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Passes {
     /// In one dispatch.
@@ -61,7 +61,8 @@ pub struct Passes {
 }
 
 impl Passes {
-    /// Those of a view whose voxels take at most `search` passes to look up their control points in memory, for so many of a patch's blocks.
+    /// The passes of a view in which a workgroup draws `blocks` blocks of a patch, and looking up a voxel's control points in memory takes at
+    /// most `search` passes.
     pub fn new(search: u32, blocks: u32) -> Self {
         let per_group = PASSES_PER_GROUP + blocks * (PASSES_PER_BLOCK + PASSES_PER_LOOK);
         let per_brick = PASSES_PER_BRICK + blocks * PASSES_PER_ADDITION + SHADED_PER_BRICK * search;
@@ -92,7 +93,7 @@ pub struct PatchBins {
     pub dispatches: u32,
 }
 
-/// Why a view cannot be drawn by patches.
+/// What makes a view too large for the tile rasterizer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TileCapacityError {
     /// What there is too much of.
@@ -130,7 +131,7 @@ impl PatchBins {
     /// Neither list may have more than `most_words` words.
     ///
     /// # Errors
-    /// If there are more bricks, or more of them behind a patch, than the rasteriser can take.
+    /// If there are more bricks, or more of them behind a patch, than the rasterizer can take.
     pub fn new(
         bricks: &[Brick],
         view: &ViewGeometry,
@@ -164,7 +165,7 @@ impl PatchBins {
         let strips = (0..rows).into_par_iter().step_by(strip_rows as usize);
         let strips: Vec<_> = strips.map(|first| sort.counted(first..(first + strip_rows).min(rows))).collect();
         let total = strips.iter().map(|strip| strip.entries).sum();
-        check("bricks' workgroups in patches and sheet groups", total, most_words)?;
+        check("bricks in patches and sheet groups", total, most_words)?;
         let mut starts = Vec::with_capacity(bins as usize + 1);
         let mut next = 0;
         for count in strips.iter().flat_map(|strip| &strip.counts) {
@@ -193,7 +194,7 @@ impl PatchBins {
     }
 }
 
-/// Strips of patches that a thread sorts the bricks of, one after the other.
+/// How many strips of patches each thread sorts, one after the other.
 const STRIPS_PER_THREAD: u32 = 2;
 
 /// A counting sort of bricks, in strips of rows of patches: these have bins that are next to each other.

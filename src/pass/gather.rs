@@ -42,7 +42,7 @@ pub struct GatherMode {
 
 impl GatherMode {
     /// The mode that splatting settings ask for, with or without an eye, of a volume with or without labels that have ramps of their own
-    /// and with or without holes; each patch drawn by so many workgroups.
+    /// and with or without holes; `workgroups` is how many workgroups draw each patch.
     pub fn of(
         splatting: &Splatting,
         perspective: bool,
@@ -190,7 +190,7 @@ impl Gather {
         self.compiled(device, mode).bind(device, &resources)
     }
 
-    /// Draws so many patches of the range at `offset`. The band must have been cleared.
+    /// Draws the first `patches` patches of the range at `offset`. The band must have been cleared.
     pub fn record(&self, pass: &mut ComputePass<'_>, band: &GatherBand, offset: u32, patches: u32) {
         let (Some(stage), Some(first)) = (self.stage(band.mode).get(), band.groups.first()) else { return };
         stage.dispatch(pass, first, &[offset], patches * band.workgroups_per_patch);

@@ -240,7 +240,7 @@ struct BufferSpecs {
 }
 
 impl BufferSpecs {
-    /// For bricks that lie in so many lists.
+    /// The buffers for a view of a volume whose bricks are divided among `lists` lists.
     fn new(
         limits: &Limits,
         request: &FrameRequest,

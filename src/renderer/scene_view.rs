@@ -219,8 +219,9 @@ impl SceneView {
         self.frame.as_ref().map(|frame| frame.drawing.rasterizer())
     }
 
-    /// Why the prepared frame is drawn by quads though the scene and the renderer leave the choice: what the device lacks, or what of the
-    /// frame is too much for tiles. `None` if it is drawn by tiles, or the settings rule these out. A renderer logs its first reason.
+    /// Why the prepared frame is drawn by quads although the scene and the renderer leave the choice: a feature that the device lacks, or a
+    /// limit of the tile rasterizer that the frame exceeds. `None` if the frame is drawn by tiles, or if the settings exclude tiles. A renderer
+    /// logs the first reason that it meets.
     pub fn fallback(&self) -> Option<&RenderError> {
         self.frame.as_ref()?.fallback.as_ref()
     }

@@ -222,7 +222,7 @@ fn damaged(file: &Source) -> VolumeError {
     invalid(&file.path, "archive", "a directory that leads out of the file, or to other bytes", "a whole ZIP archive")
 }
 
-/// A number of so many bytes, little-endian.
+/// The unsigned little-endian integer in `size` bytes from `at` on.
 fn number(bytes: &[u8], at: usize, size: usize) -> u64 {
     bytes[at..at + size].iter().rev().fold(0, |number, &byte| number << 8 | u64::from(byte))
 }

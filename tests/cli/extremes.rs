@@ -115,7 +115,7 @@ fn the_smallest_and_the_narrowest() {
     for (volume, width, height) in
         [("one", 1, 1), ("ball", 1, 1), ("ball", 1, 200), ("ball", 8192, 1), ("ball", 1, 8192), ("one", 3, 5)]
     {
-        let render = format!("{volume}.nrrd --set image={{width={width},height={height}}}");
+        let render = format!("{volume}.nrrd --set image={{width={width},height={height}}} {WHOLE}");
         let (.., reference) = folder.pixels(&format!("{render} --backend reference"));
         assert!(reference.iter().any(|pixel| pixel[0] > 0.0), "{render} is black");
         for rasterizer in RASTERIZERS {

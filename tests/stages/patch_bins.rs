@@ -152,8 +152,8 @@ fn what_does_not_fit_is_named() {
     assert!(starts < entries);
     assert_eq!(case.bins(entries).as_ref(), Ok(&bins), "just enough room");
     let unfit = |what, required, actual| Err(TileCapacityError { what, required, actual });
-    assert_eq!(case.bins(entries - 1), unfit("bricks' parts in tiles and sheet groups", entries, entries - 1));
-    assert_eq!(case.bins(starts - 1), unfit("tiles times sheet groups", starts - 1, starts - 2));
+    assert_eq!(case.bins(entries - 1), unfit("bricks in patches and sheet groups", entries, entries - 1));
+    assert_eq!(case.bins(starts - 1), unfit("patches times sheet groups", starts - 1, starts - 2));
 
     // 2744 bricks behind two pixels, in four sheets.
     case.grid.dims = UVec3::splat(56);

@@ -10,7 +10,7 @@
 //!   [`low_pass`] says how the kernel sees the offsets δ_i where pixels are large.
 //! - [`slab_integral`]: `m̄ = mean of m`, `C̄ = ∫m·C / ∫m`, `v̄ = ∫m·v / ∫m` over the values from plane to plane.
 //! - [`pixel`]: the sheet `(C·m̄, m̄)·ℓ` with C the C̄ shaded by the gradient at v̄, ℓ the length of the pixel's ray ([`Frame::slab_sheet`]);
-//!   its compositing; [`extreme`] and [`surface`] look at the values themselves.
+//!   its compositing; `extreme` and `surface` look at the values themselves.
 //!
 //! Everything is computed pixel by pixel from the voxels around a point, in f64 and without tables, lists or culling. Rays are a pixel's
 //! own; there is no approximation but rounding.

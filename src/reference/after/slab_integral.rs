@@ -5,7 +5,7 @@
 //! `m̄ = ∫m dt`, `C̄ = ∫m·C dt / ∫m dt`, and `(v̄ - f0)/(f1 - f0) = ∫m·t dt / ∫m dt`, which is safe where f0 and f1 are nearly or quite equal.
 //!
 //! Between control points, ends of iso-ranges and where α reaches its cap, α and C are linear and the integrands are smooth, so each such
-//! piece has its own quadrature. Gauss's with [`NODES`] is exact for the products of linear functions. The logarithm of `exponential`
+//! piece has its own quadrature. Gauss's with `NODES` nodes is exact for the products of linear functions. The logarithm of `exponential`
 //! grows without bound towards `1 - α = 0`: pieces over which `1 - α` falls to less than half are cut where it has halved, and there
 //! the quadrature errs by less than 1e-12.
 

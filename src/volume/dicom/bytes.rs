@@ -16,7 +16,7 @@ pub(super) struct Bytes {
     reader: Reader,
     /// How many bytes were before.
     at: u64,
-    /// How many are left at most; exactly so many unless they are inflated.
+    /// The maximum number of bytes that are left; the exact number unless the file is deflated.
     left: u64,
 }
 
