@@ -62,8 +62,8 @@ fn head() -> (Volume, Scene) {
 /// Any view, orthographic or in perspective, of any settings that this backend draws.
 fn random_case(random: &mut Random) -> (Volume, Scene) {
     let spacing = random.pick(&SPACINGS);
-    let volume = random_volume(random, (9.0, 25.0), spacing);
-    let mut scene = scene(random.uniform(33.0, 123.0) as u32, random.uniform(33.0, 123.0) as u32);
+    let volume = random_volume(random, (9.0, 19.0), spacing);
+    let mut scene = scene(random.uniform(33.0, 90.0) as u32, random.uniform(33.0, 90.0) as u32);
     scene.camera.direction = random.direction();
     scene.camera.up = random.direction();
     match random.bits() % 5 {
@@ -170,7 +170,7 @@ fn random_scenes_against_the_twin() {
     let mut random = Random(18);
     let mut shows = 0;
     let mut worst = f64::INFINITY;
-    for case in 0..120 {
+    for case in 0..80 {
         let (volume, mut scene) = random_case(&mut random);
         scene.splatting.culling = false;
         let expected = twin(&volume, &scene);
@@ -180,7 +180,7 @@ fn random_scenes_against_the_twin() {
         worst = worst.min(psnr);
     }
     println!("worst: {worst:.1} dB");
-    assert!(shows > 60, "only {shows} cases show anything");
+    assert!(shows > 40, "only {shows} cases show anything");
 }
 
 #[test]

@@ -112,7 +112,10 @@ mod tests {
         for round in 0..40 {
             for row in 0..ROWS {
                 bits = bits.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-                mask.close(row, if round < 4 { bits & bits >> 7 } else { bits | bits << 3 });
+                // The generator's low bits repeat after a few rows.
+                let mixed = (bits ^ bits >> 16).wrapping_mul(0x9e37_79b9);
+                let mixed = mixed ^ mixed >> 15;
+                mask.close(row, if round < 4 { mixed & mixed >> 7 } else { mixed | mixed << 3 });
             }
             mask.join();
             for (left, right, first, last) in (0..200_usize).map(|i| (i % 30, (i * 7) % 32, (i * 3) % 32, (i * 5) % 32))
