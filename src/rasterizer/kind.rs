@@ -34,8 +34,10 @@ impl RasterizerKind {
         let is_by_settings = by_settings.is_some();
         match (splatting.rasterizer, by_settings.or_else(|| obstacle_in_device(device))) {
             (Rasterizer::Quads, _) if insists => {
-                let setting = splatting.experimental.in_use();
-                let setting = setting.unwrap_or_else(|| "splatting.footprint_box = \"parallelogram\"".to_owned());
+                let setting = match splatting.experimental.in_use() {
+                    Some(economy) => economy.to_string(),
+                    None => "splatting.footprint_box = \"parallelogram\"".to_owned(),
+                };
                 let found = format!("\"quads\" with {setting}");
                 Err(SettingError::new("splatting.rasterizer", found, "\"tiles\" or \"auto\" with it").into())
             }

@@ -1,5 +1,7 @@
 //! The economies that the paper proposes as future work (§8): `[splatting.experimental]` of a scene file. They hardly pay.
 
+use std::fmt::{self, Display, Formatter};
+
 use crate::setting_error::{Interval, SettingError};
 
 /// The keys, each with the key that it had before it was experimental.
@@ -40,15 +42,30 @@ impl Economies {
         Ok(())
     }
 
-    /// The first of them that is on, as a scene file states it; `None` if all are off.
-    pub(crate) fn in_use(&self) -> Option<String> {
+    /// The first of them that is on; `None` if all are off.
+    pub(crate) fn in_use(&self) -> Option<EconomyInUse> {
         let off = Self::default().values();
         let used = self.values().into_iter().zip(off).find(|(value, off)| value != off);
-        used.map(|((key, value), _)| format!("{key} = {value}"))
+        used.map(|((key, value), (_, off))| EconomyInUse { key, value, off })
     }
 
     fn values(&self) -> [(&'static str, f64); 3] {
         let [whole_below, beta, resolution] = KEYS.map(|(key, _)| key);
         [(whole_below, self.whole_below), (beta, self.beta), (resolution, self.resolution)]
+    }
+}
+
+/// An economy that is on; displayed as a scene file states it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EconomyInUse {
+    pub(crate) key: &'static str,
+    pub(crate) value: f64,
+    /// The value that turns it off.
+    pub(crate) off: f64,
+}
+
+impl Display for EconomyInUse {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "{} = {}", self.key, self.value)
     }
 }

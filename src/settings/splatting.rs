@@ -216,7 +216,7 @@ impl Splatting {
         let excluded = match self.method {
             Method::AxisAligned => Some("splatting.method = \"axis-aligned\"".to_owned()),
             Method::CompositeEverySample => Some("splatting.method = \"composite-every-sample\"".to_owned()),
-            Method::ImageAligned => self.experimental.in_use(),
+            Method::ImageAligned => self.experimental.in_use().map(|economy| economy.to_string()),
         };
         if let Some(setting) = excluded {
             return refused("splatting.classification", format!("\"after\" with {setting}"), "\"before\" with it");
