@@ -38,10 +38,7 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> b
         for (var i = 0u; i < seen_count; i += lanes) {
             let slot = queue_first + base + nth_set_bit(seen, min(i + lane, seen_count - 1u));
             let amount = select(vec4f(0.0), queue_amounts[slot], i + lane < seen_count);
-            var whole = -1.0;
-            if ECONOMIES {
-                whole = f32(queue_blocks[slot] >> WHOLE_SHIFT) - 1.0;
-            }
+            let whole = whole_sheet(queue_blocks[slot]);
             let own = footprint_at(bitcast<vec4f>(queue_points[slot]), sheet_group.near, whole, amount);
             // Every lane adds all voxels' sections at its own pixels, two voxels at a time.
             let count = min(seen_count - i, lanes);
@@ -94,7 +91,5 @@ fn composite_pixels(pixels: Pixels, sheets: Sheets, progress: ptr<function, Prog
     let opacity = transpose(image)[3];
     let far = sheet_group.near + f32(SHEETS) * frame.slab_width;
     (*progress).open = with_blocks((*progress).open, pixels.block, open_word(pixels, opacity, far));
-    if ECONOMIES {
-        (*progress).shallow = with_blocks((*progress).shallow, pixels.block, shallow_word(pixels, opacity));
-    }
+    (*progress).shallow = shallow_after((*progress).shallow, pixels, opacity);
 }

@@ -15,6 +15,14 @@ override EXACT: bool = false;
 const FIRST_PLANE = 1.0;
 const GROUPS_LOOKED_BACK = 1u;
 
+// §8's economies are for colours that are splatted.
+const ECONOMIES = false;
+var<private> shallow: vec4u;
+
+fn shallow_after(words: vec4u, pixels: Pixels, opacity: vec4f) -> vec4u {
+    return words;
+}
+
 fn counts_gaps() -> bool {
     return false;
 }

@@ -105,6 +105,7 @@
 
 mod after;
 pub mod appearance;
+pub mod cpu;
 mod error;
 mod geometry;
 #[cfg(feature = "golden")]

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use sheetsplat::internals::gpu::shaders;
+use sheetsplat::internals::gpu::shaders::{self, Shader};
 
 /// A file's text without comments.
 fn code(text: &str) -> String {
@@ -64,8 +64,8 @@ fn own(code: &str) -> BTreeSet<&str> {
 }
 
 /// The names that each file of the shader needs, by the file that declares them.
-fn needs() -> BTreeMap<&'static str, BTreeMap<&'static str, BTreeSet<String>>> {
-    let codes: Vec<(&str, String)> = shaders::GATHER.files.iter().map(|&(path, text)| (path, code(text))).collect();
+fn needs(shader: &Shader) -> BTreeMap<&'static str, BTreeMap<&'static str, BTreeSet<String>>> {
+    let codes: Vec<(&str, String)> = shader.files.iter().map(|&(path, text)| (path, code(text))).collect();
     let mut all = BTreeMap::new();
     for (path, text) in &codes {
         let (here, own) = (declared(text), own(text));
@@ -86,10 +86,21 @@ fn needs() -> BTreeMap<&'static str, BTreeMap<&'static str, BTreeSet<String>>> {
 
 #[test]
 fn every_file_of_the_tile_rasterizer_lists_what_it_needs() {
-    let needs = needs();
+    // A file of both stages needs what it needs in either.
+    let stages = [shaders::GATHER, shaders::GATHER_PLANES];
+    let mut needs: BTreeMap<&str, BTreeMap<&str, BTreeSet<String>>> = BTreeMap::new();
+    let mut texts: BTreeMap<&str, &str> = BTreeMap::new();
+    for stage in &stages {
+        texts.extend(stage.files.iter().copied());
+        for (path, others) in self::needs(stage) {
+            for (other, names) in others {
+                needs.entry(path).or_default().entry(other).or_default().extend(names);
+            }
+        }
+    }
     let mut failures = Vec::new();
-    for &(path, text) in shaders::GATHER.files.iter().filter(|(path, _)| path.starts_with("gather/")) {
-        let expected: Vec<String> = (needs[path].iter())
+    for (path, text) in texts.into_iter().filter(|(path, _)| path.starts_with("gather/")) {
+        let expected: Vec<String> = (needs.entry(path).or_default().iter())
             .map(|(other, names)| {
                 format!("// Needs {other}: {}.", names.iter().cloned().collect::<Vec<_>>().join(", "))
             })
@@ -104,9 +115,9 @@ fn every_file_of_the_tile_rasterizer_lists_what_it_needs() {
 
 #[test]
 fn needs_are_found() {
-    let needs = needs();
+    let needs = needs(&shaders::GATHER);
     assert!(needs["gather/queue.wgsl"]["gather/bits.wgsl"].contains("ballot"), "{:?}", needs["gather/queue.wgsl"]);
-    assert!(needs["gather/walk.wgsl"]["gather.wgsl"].contains("lanes"), "{:?}", needs["gather/walk.wgsl"]);
+    assert!(needs["gather/walk.wgsl"]["gather/patch.wgsl"].contains("lanes"), "{:?}", needs["gather/walk.wgsl"]);
     assert!(needs["gather/walk.wgsl"].len() > 3, "{:?}", needs["gather/walk.wgsl"]);
     let text = "@group(0) @binding(1) var<storage, read> bricks: array<Brick>;\nfn f(a: u32) -> u32 {\n    let b = a;\n    return b + c.x;\n}";
     assert_eq!(declared(text), BTreeSet::from(["bricks", "f"]));

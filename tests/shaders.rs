@@ -12,7 +12,7 @@ use sheetsplat::internals::gpu::shaders::{self, Shader};
 const WEBGPU_CORE: Capabilities = Capabilities::SHADER_FLOAT16_IN_FLOAT32;
 
 /// The one stage that asks for more, subgroups; frames are drawn without it where the device has none.
-const WITH_SUBGROUPS: Shader = shaders::GATHER;
+const WITH_SUBGROUPS: [Shader; 2] = [shaders::GATHER, shaders::GATHER_PLANES];
 
 fn validated(shader: &Shader) -> Result<(Module, ModuleInfo), String> {
     let failed = |line: Option<u32>, message: String| {
@@ -24,7 +24,7 @@ fn validated(shader: &Shader) -> Result<(Module, ModuleInfo), String> {
         failed(line, error.emit_to_string_with_path(shader.source, shader.stage))
     })?;
     let of_subgroups = Capabilities::SUBGROUP | Capabilities::SUBGROUP_BARRIER;
-    let subgroups = if *shader == WITH_SUBGROUPS { of_subgroups } else { Capabilities::empty() };
+    let subgroups = if WITH_SUBGROUPS.contains(shader) { of_subgroups } else { Capabilities::empty() };
     let info = Validator::new(ValidationFlags::all(), WEBGPU_CORE | subgroups).validate(&module).map_err(|error| {
         let line = error.location(shader.source).map(|location| location.line_number);
         failed(line, error.emit_to_string_with_path(shader.source, shader.stage))

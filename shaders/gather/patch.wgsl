@@ -28,8 +28,6 @@ override ORDER: u32 = 0u;
 override PERSPECTIVE: bool = false;
 // Whether a footprint's box is the parallelogram of Fig. 13, else its bounding rectangle.
 override PARALLELOGRAM: bool = false;
-// Whether any of §8's economies is asked for.
-override ECONOMIES: bool = false;
 // Whether anything is cut, and whether first hits are asked for.
 override CUT: bool = false;
 override FIRST_HIT: bool = false;
@@ -45,11 +43,9 @@ var<private> gather: Gather;
 var<private> lane: u32;
 var<private> lanes: u32;
 
-// The patch: where the centre of its first pixel is, and of the pixels that the subgroup goes round those that are not opaque, and those
-// that have not reached β.
+// The patch: where the centre of its first pixel is, and of the pixels that the subgroup goes round those that are not opaque.
 var<private> first_px: vec2f;
 var<private> open: vec4u;
-var<private> shallow: vec4u;
 
 // The group that is drawn.
 var<private> sheet_group: GatheredGroup;
@@ -119,9 +115,7 @@ fn find_open_pixels(corner: vec2u, threads: vec2u, thread: u32) -> u32 {
         let opacity = transpose(load_image(pixels))[3];
         own_blocks |= subgroupOr(1u << pixels.block);
         open = with_blocks(open, pixels.block, open_word(pixels, opacity, -FAR));
-        if ECONOMIES {
-            shallow = with_blocks(shallow, pixels.block, shallow_word(pixels, opacity));
-        }
+        shallow = shallow_after(shallow, pixels, opacity);
     }
     return own_blocks;
 }

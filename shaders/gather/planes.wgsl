@@ -1,6 +1,6 @@
 // The sums that a thread of the tile rasterizer gathers on the four planes behind a group's slabs, and the field that they make (SPEC §9).
 //
-// Needs nothing yet.
+// Needs shared/frame.wgsl: frame.
 
 // Whether gradients are the field's derivative, not the voxels' differences.
 override KERNEL_GRADIENT: bool = false;

@@ -1,6 +1,6 @@
 // What a thread of the tile rasterizer makes of the fields on two planes: the slab between them, classified, shaded and composited (SPEC §9).
 //
-// Needs nothing yet.
+// Needs shared/frame.wgsl: frame.
 
 // Of a thread's four pixels the sheet depths from and to which their rays' stretches reach, the length of a ray by its sheet depth, and the
 // depths of first hits, as bits.

@@ -14,6 +14,7 @@ use crate::lists::iso_range::ValueSet;
 use crate::lists::quad_plan::{Overlaps, tile_grid};
 use crate::lists::value_list::ValueList;
 use crate::settings::clip::ClippedVoxels;
+use crate::settings::splatting::Classification;
 use crate::settings::transfer_function::{LabelTables, Ramp, Tables, TransferFunction};
 use crate::stats::{Counts, GroupSlabs, Totals};
 use crate::volume::{Grid, Volume};
@@ -56,8 +57,14 @@ impl ClassifiedVolume {
     ///
     /// # Errors
     /// If the volume's labels need more than the device allows.
-    pub(crate) fn flush(&mut self, device: &Device, queue: &Queue) -> Result<(), RenderError> {
-        if self.shades_by_label() {
+    pub(crate) fn flush(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        classification: Classification,
+    ) -> Result<(), RenderError> {
+        let is_after = classification == Classification::After;
+        if self.shades_by_label() || is_after && self.classifies_by_label() {
             self.volume.upload_labels(device, queue)?;
         }
         self.lists.flush(device, queue);
@@ -77,6 +84,11 @@ impl ClassifiedVolume {
     /// The labels on the GPU, if shading asks for them.
     pub(crate) fn labels(&self) -> Option<&TextureView> {
         self.volume.labels().filter(|_| self.shades_by_label())
+    }
+
+    /// Whether classification after splatting asks for labels: it must know those of invisible voxels, too.
+    pub(crate) fn classifies_by_label(&self) -> bool {
+        self.transfer.labels.values().any(LabelTables::matter)
     }
 
     /// Whether shading asks for labels.

@@ -168,6 +168,7 @@ pub const GATHER: Shader = shader!(
     "gather/voxels",
     "gather/amounts",
     "gather/kernel",
+    "gather/economies",
     "gather/ramps",
     "shared/volume",
     "shared/project",

@@ -16,9 +16,7 @@ use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
 use crate::lists::patch_bins::{PATCH, SHEETS};
 use crate::settings::shading::Gradient;
-use crate::settings::splatting::{
-    Classification, Compositing, Economies, FootprintBox, Interpolation, Order, Splatting,
-};
+use crate::settings::splatting::{Classification, Compositing, FootprintBox, Interpolation, Order, Splatting};
 
 /// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug)]
@@ -58,13 +56,13 @@ impl GatherMode {
         rays: RayMode,
         workgroups: u32,
     ) -> Self {
-        let Splatting { compositing, order, footprint_box, economies, classification, .. } = *splatting;
-        let kernel_gradient = classification == Classification::After && gradient == Gradient::Kernel;
-        let exact = classification == Classification::After && splatting.interpolation == Interpolation::Exact;
+        let Splatting { compositing, order, footprint_box, experimental, classification, .. } = *splatting;
         let after = classification == Classification::After;
+        let kernel_gradient = after && gradient == Gradient::Kernel;
+        let exact = after && splatting.interpolation == Interpolation::Exact;
         // There the order makes no difference to an image, and planes are handed on from front to back.
         let order = if after { Order::FrontToBack } else { order };
-        let economies = economies != Economies::default();
+        let economies = experimental.in_use().is_some();
         // Every voxel has its own parallelogram there.
         let footprint_box = if perspective { FootprintBox::Rectangle } else { footprint_box };
         Self {
@@ -159,24 +157,29 @@ impl Gather {
                 slots.push(("planes", uniform::<Planes>(stage, false)));
                 slots.push(("coefficients", texture_of_integers(stage, TextureViewDimension::D2Array)));
             }
-            let constants = [
+            let mut constants = vec![
                 ("THREADS", f64::from(device.adapter_info().subgroup_max_size)),
                 ("QUEUE", f64::from(queue(device, mode))),
                 ("WORKGROUPS_PER_PATCH", f64::from(workgroups_per_patch(device, mode))),
                 ("COMPOSITING", f64::from(mode.compositing as u32)),
                 ("ORDER", f64::from(mode.order as u32)),
                 ("PERSPECTIVE", f64::from(u8::from(mode.perspective))),
-                ("ECONOMIES", f64::from(u8::from(mode.economies))),
                 ("PARALLELOGRAM", f64::from(mode.footprint_box as u32)),
                 ("LABELS", f64::from(u8::from(mode.labels))),
                 ("HOLES", f64::from(u8::from(mode.holes))),
                 ("CUT", f64::from(u8::from(mode.rays.cut))),
                 ("FIRST_HIT", f64::from(u8::from(mode.rays.first_hit))),
-                ("KERNEL_GRADIENT", f64::from(u8::from(mode.kernel_gradient))),
-                ("EXACT", f64::from(u8::from(mode.exact))),
-                ("SUMS", f64::from(sums(mode))),
-                ("SAVED", f64::from(sums(mode) * SHEETS * PATCH[0] * PATCH[1] / 4)),
             ];
+            if mode.after {
+                constants.extend([
+                    ("KERNEL_GRADIENT", f64::from(u8::from(mode.kernel_gradient))),
+                    ("EXACT", f64::from(u8::from(mode.exact))),
+                    ("SUMS", f64::from(sums(mode))),
+                    ("SAVED", f64::from(sums(mode) * SHEETS * PATCH[0] * PATCH[1] / 4)),
+                ]);
+            } else {
+                constants.push(("ECONOMIES", f64::from(u8::from(mode.economies))));
+            }
             let shader = if mode.after { shaders::GATHER_PLANES } else { shaders::GATHER };
             ComputeStage::new(device, shader, "main", &slots, &constants)
         })
@@ -260,19 +263,30 @@ fn sums(mode: GatherMode) -> u32 {
     if mode.kernel_gradient { 8 } else { 5 }
 }
 
-/// Voxels in a workgroup's queue: as many as there is room for beside the sheets of its patch's pixels. On a GPU more than that asks for
-/// would keep workgroups from running side by side.
-fn queue(device: &Device, mode: GatherMode) -> u32 {
-    // Of a pixel: four sheets of a colour, or the sums on four planes and the field on one that is handed on.
+/// Bytes of a workgroup's memory that its pixels take, for a patch: four sheets of a colour, or the sums on four planes and the field that is handed on from
+/// one.
+fn pixel_bytes(mode: GatherMode) -> u32 {
     let floats = if mode.after { sums(mode) * SHEETS + 5 } else { 4 * SHEETS };
-    let sheets_bytes = PATCH[0] * PATCH[1] * floats * size_of::<f32>() as u32;
-    // Point, amount and blocks.
-    const VOXEL_BYTES: u32 = 36;
+    PATCH[0] * PATCH[1] * floats * size_of::<f32>() as u32
+}
+
+/// Bytes of a voxel in the queue: point, amount and blocks.
+const VOXEL_BYTES: u32 = 36;
+
+/// Bytes of a workgroup's memory that a mode needs: with its pixels a voxel for each of the most threads that a subgroup may have, twice.
+pub fn least_workgroup_bytes(mode: GatherMode) -> u32 {
+    pixel_bytes(mode) + 64 * VOXEL_BYTES
+}
+
+/// Voxels in a workgroup's queue: as many as there is room for beside its patch's pixels. On a GPU more than [`WORKGROUP_BYTES`] would keep workgroups from
+/// running side by side.
+fn queue(device: &Device, mode: GatherMode) -> u32 {
+    let most = device.limits().max_compute_workgroup_storage_size.min(2 * WORKGROUP_BYTES);
     let bytes = match device.adapter_info().device_type {
-        DeviceType::Cpu => device.limits().max_compute_workgroup_storage_size.min(2 * WORKGROUP_BYTES),
-        _ => WORKGROUP_BYTES,
+        DeviceType::Cpu => most,
+        _ => WORKGROUP_BYTES.max(least_workgroup_bytes(mode)),
     };
-    (bytes - sheets_bytes) / VOXEL_BYTES / 32 * 32
+    (bytes - pixel_bytes(mode)) / VOXEL_BYTES / 32 * 32
 }
 
 /// Bytes of what a dispatch leaves to the next.

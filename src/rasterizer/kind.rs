@@ -8,7 +8,8 @@ use crate::pass::composite::RayMode;
 use crate::pass::gather::WORKGROUP_BYTES;
 use crate::setting_error::SettingError;
 use crate::settings::splatting::{
-    Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting, check_first_hit,
+    Classification, Compositing, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer, Splatting,
+    check_first_hit,
 };
 
 /// Threads that a subgroup may have.
@@ -29,14 +30,20 @@ impl RasterizerKind {
     /// # Errors
     /// If they insist on what the device or the other settings do not allow.
     pub(crate) fn of(device: &Device, splatting: &Splatting) -> Result<(Self, Option<RenderError>), RenderError> {
+        if splatting.classification == Classification::After {
+            return Ok((Self::after(device, splatting)?, None));
+        }
         let insists = insists_on_tiles(splatting);
         let by_settings = obstacle_in_settings(splatting);
         let is_by_settings = by_settings.is_some();
         match (splatting.rasterizer, by_settings.or_else(|| obstacle_in_device(device))) {
             (Rasterizer::Quads, _) if insists => {
-                let found =
-                    "\"quads\" with splatting.footprint_box = \"parallelogram\", whole_below, beta or resolution";
-                Err(SettingError::new("splatting.rasterizer", found, "\"tiles\" or \"auto\" with them").into())
+                let setting = match splatting.experimental.in_use() {
+                    Some(economy) => economy.to_string(),
+                    None => "splatting.footprint_box = \"parallelogram\"".to_owned(),
+                };
+                let found = format!("\"quads\" with {setting}");
+                Err(SettingError::new("splatting.rasterizer", found, "\"tiles\" or \"auto\" with it").into())
             }
             (Rasterizer::Tiles | Rasterizer::Auto, Some(obstacle)) if insists => Err(obstacle),
             _ if splatting.method == Method::CompositeEverySample => Ok((Self::Samples, None)),
@@ -44,6 +51,27 @@ impl RasterizerKind {
             (Rasterizer::Auto, Some(obstacle)) if !is_by_settings => Ok((Self::Quads, Some(obstacle))),
             _ => Ok((Self::Quads, None)),
         }
+    }
+}
+
+impl RasterizerKind {
+    /// Tiles alone draw what is classified after splatting.
+    fn after(device: &Device, splatting: &Splatting) -> Result<Self, RenderError> {
+        let refused = |found: &str| {
+            let found = format!("\"after\" with {found} on the GPU");
+            Err(SettingError::new("splatting.classification", found, "\"before\" with it, or the reference backend")
+                .into())
+        };
+        if splatting.rasterizer == Rasterizer::Quads {
+            return refused("splatting.rasterizer = \"quads\"");
+        }
+        if splatting.compositing.is_by_means() {
+            return refused("splatting.compositing = \"maximum\", \"minimum\", \"average\" or \"surface\"");
+        }
+        if splatting.interpolation == Interpolation::Exact {
+            return refused("splatting.interpolation = \"exact\"");
+        }
+        obstacle_in_device(device).map_or(Ok(Self::Tiles), Err)
     }
 }
 
@@ -84,8 +112,9 @@ fn obstacle_in_device(device: &Device) -> Option<RenderError> {
 /// Whether quads will not do.
 pub(crate) fn insists_on_tiles(splatting: &Splatting) -> bool {
     splatting.rasterizer == Rasterizer::Tiles
+        || splatting.classification == Classification::After
         || splatting.footprint_box == FootprintBox::Parallelogram
-        || splatting.economies != Economies::default()
+        || splatting.experimental.in_use().is_some()
 }
 
 /// Checks that the settings allow what of rays is looked at.

@@ -16,8 +16,9 @@ use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
 use crate::lists::matter::Matter;
 use crate::lists::patch_bins::{self, PatchBins, SHEETS};
-use crate::pass::gather::{Gather, GatherBand, GatherBuffers, GatherMode};
+use crate::pass::gather::{self, Gather, GatherBand, GatherBuffers, GatherMode};
 use crate::rasterizer::request::FrameRequest;
+use crate::setting_error::SettingError;
 use crate::settings::splatting::{Classification, Order, Splatting};
 use crate::stats::GroupSlabs;
 
@@ -144,7 +145,11 @@ impl TileRasterizer {
         }
         let patch_ranges = write(old.patch_ranges.take(), &spec.patch_ranges, &range_bytes)?;
 
-        let of_volume = [volume.labels().is_some(), volume.has_holes()];
+        let labels = match splatting.classification {
+            Classification::Before => volume.labels(),
+            Classification::After => volume.gpu_volume().labels().filter(|_| volume.classifies_by_label()),
+        };
+        let of_volume = [labels.is_some(), volume.has_holes()];
         let mode = GatherMode::of(
             (splatting, request.gradient),
             view.perspective.is_some(),
@@ -152,6 +157,18 @@ impl TileRasterizer {
             *rays,
             bins.workgroups,
         );
+        let (least, actual) = (gather::least_workgroup_bytes(mode), limits.max_compute_workgroup_storage_size);
+        if least > actual {
+            let found = format!(
+                "\"tiles\" with shading.gradient = \"kernel\" and a max_compute_workgroup_storage_size of {actual}"
+            );
+            return Err(SettingError::new(
+                "splatting.rasterizer",
+                found,
+                format!("at least {least}, or \"differences\""),
+            )
+            .into());
+        }
         let buffers = GatherBuffers {
             frame: inputs.frame,
             gather: &uniform,
@@ -163,7 +180,7 @@ impl TileRasterizer {
             control_points: inputs.control_points,
             values: volume.values(),
             coefficients: None,
-            labels: volume.labels(),
+            labels,
             gathered: &gathered,
             half_boxes: &half_boxes,
             cut: inputs.cut,
@@ -344,7 +361,7 @@ fn matter(request: &FrameRequest, volume: &ClassifiedVolume, old: Option<(Matter
     if request.splatting.classification == Classification::Before {
         return None;
     }
-    let what = Matter::new(volume.transfer(), request.splatting.compositing, &request.view, volume.grid());
+    let what = Matter::new(volume.transfer(), &request.splatting, &request.view, volume.grid());
     Some(match old {
         Some((old, bricks)) if old == what => NewMatter { what, bricks, is_new: false },
         _ => {

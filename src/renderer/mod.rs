@@ -173,7 +173,7 @@ impl Renderer {
         let mut request = self.request(view)?;
         let SceneView { volume, scene, surfaces, frame, .. } = view;
         let fallback = request.fallback.take();
-        volume.flush(device, queue)?;
+        volume.flush(device, queue, request.splatting.classification)?;
         let sheets = (self.sheet_format, self.sheets);
         let kept = PreviousFrame::of(frame.take(), sheets, &request.view);
         let FrameRequest { view: seen, kernel, ramps, rays, .. } = &request;

@@ -2,6 +2,7 @@
 
 use std::ops::Bound::{Excluded, Included};
 
+use super::economies::Economies;
 use crate::geometry::kernel::Kernel;
 use crate::setting_error::{Interval, SettingError};
 
@@ -143,27 +144,6 @@ pub enum FootprintBox {
     Parallelogram,
 }
 
-/// Ways to draw less where it hardly shows (§8, the paper's future work). By tiles only.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Economies {
-    /// Voxels with an opacity per unit length below this are projected as whole kernels, into the sheet that their centre lies in.
-    /// 0 for none.
-    pub whole_below: f64,
-    /// β-acceleration: where everything within a kernel's box has this opacity by then, the kernel is projected whole, into the first
-    /// group of sheets that it reaches. Changes no channel by more than `1 - beta`. Front to back only, and none for
-    /// [`Compositing::Surface`]; 1 for off.
-    pub beta: f64,
-    /// A footprint ends where it adds less than this to its sheet's alpha. 0 for the whole kernel.
-    pub resolution: f64,
-}
-
-impl Default for Economies {
-    /// None.
-    fn default() -> Self {
-        Self { whole_below: 0.0, beta: 1.0, resolution: 0.0 }
-    }
-}
-
 /// All splatting settings of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Splatting {
@@ -198,8 +178,8 @@ pub struct Splatting {
     pub rasterizer: Rasterizer,
     /// What early splat elimination tests.
     pub footprint_box: FootprintBox,
-    /// What is left out where it hardly shows.
-    pub economies: Economies,
+    /// What is left out where it hardly shows: off by default.
+    pub experimental: Economies,
 }
 
 impl Splatting {
@@ -213,10 +193,7 @@ impl Splatting {
         FALLOFF.check("splatting.falloff", self.falloff)?;
         SLAB_WIDTH.check("splatting.slab_width", self.slab_width)?;
         Interval::THRESHOLD.check("splatting.opacity_threshold", self.opacity_threshold)?;
-        let Economies { whole_below, beta, resolution } = self.economies;
-        Interval::SHARE.check("splatting.whole_below", whole_below)?;
-        Interval::THRESHOLD.check("splatting.beta", beta)?;
-        Interval::SHARE.check("splatting.resolution", resolution)?;
+        self.experimental.check()?;
         let refused = |found: String, allowed: &str| Err(SettingError::new("splatting.compositing", found, allowed));
         let name = format!("{:?}", self.compositing).to_lowercase();
         if self.compositing.is_by_means() && self.method == Method::CompositeEverySample {
@@ -236,17 +213,10 @@ impl Splatting {
     /// Checks what [`Classification::After`] asks of the other settings.
     fn check_after(&self) -> Result<(), SettingError> {
         let refused = |key: &str, found: String, allowed: &str| Err(SettingError::new(key, found, allowed));
-        let excluded = match (self.method, &self.economies) {
-            (Method::AxisAligned, _) => Some("splatting.method = \"axis-aligned\"".to_owned()),
-            (Method::CompositeEverySample, _) => Some("splatting.method = \"composite-every-sample\"".to_owned()),
-            (_, Economies { whole_below, .. }) if *whole_below > 0.0 => {
-                Some(format!("splatting.whole_below = {whole_below}"))
-            }
-            (_, Economies { beta, .. }) if *beta < 1.0 => Some(format!("splatting.beta = {beta}")),
-            (_, Economies { resolution, .. }) if *resolution > 0.0 => {
-                Some(format!("splatting.resolution = {resolution}"))
-            }
-            _ => None,
+        let excluded = match self.method {
+            Method::AxisAligned => Some("splatting.method = \"axis-aligned\"".to_owned()),
+            Method::CompositeEverySample => Some("splatting.method = \"composite-every-sample\"".to_owned()),
+            Method::ImageAligned => self.experimental.in_use().map(|economy| economy.to_string()),
         };
         if let Some(setting) = excluded {
             return refused("splatting.classification", format!("\"after\" with {setting}"), "\"before\" with it");
@@ -283,7 +253,7 @@ impl Default for Splatting {
             tiles: true,
             rasterizer: Rasterizer::Auto,
             footprint_box: FootprintBox::Rectangle,
-            economies: Economies::default(),
+            experimental: Economies::default(),
         }
     }
 }

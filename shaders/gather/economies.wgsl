@@ -1,0 +1,106 @@
+// §8's economies, which draw less where it hardly shows: voxels projected whole instead of in sections, for their low opacity or since
+// they lie behind β, and footprints that end where they add too little. Without them every function here gives back what it is given.
+//
+// Needs gather/patch.wgsl: PERSPECTIVE, SHEETS, first_px, gather, open, sheet_group.
+// Needs gather/kernel.wgsl: footprint_at.
+// Needs gather/pixels.wgsl: Pixels.
+// Needs gather/region.wgsl: block_word, with_blocks.
+// Needs gather/voxels.wgsl: Shaded, blocks_seen.
+// Needs shared/frame.wgsl: frame.
+// Needs shared/local_ray.wgsl: SectionMaps.
+
+// Whether any of the economies is asked for.
+override ECONOMIES: bool = false;
+
+// Sheet depths beyond every kernel's reach.
+const WHOLE = 1e6;
+
+// In the queue's words of blocks: from this bit on one more than the sheet that takes a voxel as a whole.
+const WHOLE_SHIFT = 8u;
+
+// Of the pixels that the subgroup goes round those that have not reached β.
+var<private> shallow: vec4u;
+
+// Which of the subgroup's pixels have not reached β, once a thread's pixels have some opacity.
+fn shallow_after(words: vec4u, pixels: Pixels, opacity: vec4f) -> vec4u {
+    if ECONOMIES {
+        return with_blocks(words, pixels.block, block_word(pixels.is_inside & (opacity < vec4f(gather.beta))));
+    }
+    return words;
+}
+
+// The sheet of the group that takes a voxel of the queue as a whole; negative if it is drawn in sections.
+fn whole_sheet(blocks: u32) -> f32 {
+    if ECONOMIES {
+        return f32(blocks >> WHOLE_SHIFT) - 1.0;
+    }
+    return -1.0;
+}
+
+// The blocks that a voxel is drawn to, of those that see it, and the sheet that takes it as a whole.
+fn economic_blocks(blocks: u32, shaded: Shaded, p: vec4f, sheets: vec2f) -> u32 {
+    if !ECONOMIES {
+        return blocks;
+    }
+    let box = screen_box(p);
+    let is_deep = blocks_seen(shallow, box, 1.0) == 0u;
+    let is_whole = is_deep || shaded.alpha < gather.whole_below;
+    var whole = -1.0;
+    var is_here = true;
+    if is_whole {
+        let last_of_first = floor(max(sheets.x, 0.0) / f32(SHEETS)) * f32(SHEETS) + f32(SHEETS - 1u);
+        let center_sheet = floor((p.z - gather.near) / frame.slab_width);
+        let sheet = clamp(center_sheet, sheets.x, sheets.y - 1.0);
+        whole = select(sheet, min(sheet, last_of_first), is_deep) - sheet_group.first_sheet;
+        is_here = whole >= 0.0 && whole < f32(SHEETS);
+    }
+    let rims = footprint_at(p, sheet_group.near, whole, shaded.amount).rim;
+    let rim = max(max(rims.x, rims.y), max(rims.z, rims.w));
+    let part = sqrt(clamp(rim, 0.0, frame.support * frame.support)) / frame.support;
+    let seen = select(0u, blocks_seen(open, box, part), is_here && rim > 0.0);
+    return select(0u, seen | select(0u, (1u + u32(max(whole, 0.0))) << WHOLE_SHIFT, is_whole), seen != 0u);
+}
+
+// Whether a voxel with such blocks is drawn at all.
+fn is_worthwhile(blocks: u32) -> bool {
+    return !ECONOMIES || blocks != 0u;
+}
+
+// Where the planes of a group cut a kernel: the first, and the four after it, by their distance from the voxel.
+struct KernelPlanes {
+    first: f32,
+    others: vec4f,
+}
+
+// The planes that leave all of a kernel to the sheet `whole`: as far as a kernel reaches, on either side of the sheet.
+fn economic_planes(planes: KernelPlanes, whole: f32) -> KernelPlanes {
+    if ECONOMIES && whole >= 0.0 {
+        return KernelPlanes(-WHOLE, select(vec4f(-WHOLE), vec4f(WHOLE), vec4f(1.0, 2.0, 3.0, 4.0) > vec4f(whole)));
+    }
+    return planes;
+}
+
+// ρ² from which a footprint adds too little, by sheet.
+fn economic_rim(amount: f32, maps: SectionMaps) -> vec4f {
+    if ECONOMIES {
+        let amplitude = select(vec4f(1.0), maps.amplitude, PERSPECTIVE);
+        return log(amount * amplitude * gather.peak) / frame.falloff;
+    }
+    return vec4f(0.0);
+}
+
+// What another lane holds of it.
+fn rim_of(own: vec4f, other: u32) -> vec4f {
+    if ECONOMIES {
+        return subgroupShuffle(own, other);
+    }
+    return own;
+}
+
+// The Gaussian of ρ², up to the footprint's rim.
+fn within_rim(in_plane: vec4f, rho_squared: vec4f, rim: f32) -> vec4f {
+    if ECONOMIES {
+        return select(vec4f(0.0), in_plane, rho_squared < vec4f(rim));
+    }
+    return in_plane;
+}
