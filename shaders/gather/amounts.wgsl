@@ -1,6 +1,21 @@
 // What the voxels in a subgroup's queue add to sheets where they are classified and shaded before splatting (§3).
 //
 // The frame's sheets from the first that a kernel overlaps to the one after the last.
+//
+// Needs gather/economies.wgsl: economic_blocks, is_worthwhile, whole_sheet.
+// Needs gather/kernel.wgsl: footprint_at.
+// Needs gather/patch.wgsl: PASSES_PER_SHADING, PERSPECTIVE, bricks, color_ramp, first_px, gather, gradient_opacity_ramp, lane, lanes, opacity_ramp, passes, sheet_group.
+// Needs gather/queue.wgsl: queue_amounts, queue_blocks, queue_count, queue_first, queue_points.
+// Needs gather/ramps.wgsl: is_long, ramp_at.
+// Needs gather/voxels.wgsl: ScreenBox, count_drawn, sheets_here.
+// Needs gather/walk.wgsl: SearchBounds.
+// Needs shared/brick.wgsl: BRICK_VOXELS, voxel_of.
+// Needs shared/frame.wgsl: frame.
+// Needs shared/local_ray.wgsl: sections_on_screen.
+// Needs shared/project.wgsl: overlapped, project.
+// Needs shared/ramps.wgsl: LABELS, ramp, ramps_of.
+// Needs shared/shading.wgsl: lighting, shade.
+// Needs shared/volume.wgsl: gradient_at, index_of, value_at.
 fn overlapped_sheets(p: vec4f) -> vec2f {
     let sheets = (overlapped(p, gather.depth_error, PERSPECTIVE) - gather.near) / frame.slab_width;
     return vec2f(floor(sheets.x), ceil(sheets.y));

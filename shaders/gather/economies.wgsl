@@ -1,11 +1,12 @@
 // §8's economies, which draw less where it hardly shows: voxels projected whole instead of in sections, for their low opacity or since
 // they lie behind β, and footprints that end where they add too little. Without them every function here gives back what it is given.
 //
-// Needs gather/patch.wgsl: PERSPECTIVE, SHEETS, first_px, gather, open, sheet_group.
+// Needs gather/amounts.wgsl: Shaded, screen_box.
 // Needs gather/kernel.wgsl: footprint_at.
+// Needs gather/patch.wgsl: PERSPECTIVE, SHEETS, gather, open, sheet_group.
 // Needs gather/pixels.wgsl: Pixels.
 // Needs gather/region.wgsl: block_word, with_blocks.
-// Needs gather/voxels.wgsl: Shaded, blocks_seen.
+// Needs gather/voxels.wgsl: blocks_seen.
 // Needs shared/frame.wgsl: frame.
 // Needs shared/local_ray.wgsl: SectionMaps.
 

@@ -1,7 +1,7 @@
 // Kernels as the tile rasterizer gathers them: in closed form, by polynomials instead of tables (eq. 3).
 //
-// Needs gather/patch.wgsl: PERSPECTIVE, gather.
 // Needs gather/economies.wgsl: KernelPlanes, economic_planes, economic_rim, rim_of, within_rim.
+// Needs gather/patch.wgsl: PERSPECTIVE, gather.
 // Needs shared/frame.wgsl: frame.
 // Needs shared/local_ray.wgsl: SectionMaps, local_ray, near_cut, section_maps.
 

@@ -1,6 +1,23 @@
 // A patch of the tile rasterizer from front to back, whatever its sheets hold: its bindings, its groups one after the other, and the rounds in
 // which a subgroup goes through its pixels. The stage's own file says what a voxel adds to sheets, and what becomes of them.
 //
+// Needs gather.wgsl: GROUPS_LOOKED_BACK, add_sections, composite_pixels, counts_gaps, is_due_without_voxels, looks_along_rays.
+// Needs gather/amounts.wgsl: shade_voxels.
+// Needs gather/economies.wgsl: shallow_after.
+// Needs gather/pixels.wgsl: load_image, open_word, pixels_of.
+// Needs gather/planes.wgsl: Sheets, save_sheets, saved_sheets.
+// Needs gather/queue.wgsl: empty_queue, queue_count.
+// Needs gather/ramps.wgsl: Ramp, ramp_of.
+// Needs gather/region.wgsl: PATCH_HEIGHT, PATCH_WIDTH, with_blocks.
+// Needs gather/sheets.wgsl: Sheets, look, save_sheets, saved_sheets.
+// Needs gather/slabs.wgsl: look.
+// Needs gather/uniforms.wgsl: Gather, Gathered, PatchRange.
+// Needs gather/voxels.wgsl: GatheredGroup, find_voxels, keep_voxels, may_appear, search_bounds.
+// Needs gather/walk.wgsl: is_walked, walk.
+// Needs gather_planes.wgsl: GROUPS_LOOKED_BACK, add_sections, composite_pixels, counts_gaps, is_due_without_voxels, looks_along_rays, shade_voxels, shallow_after.
+// Needs shared/brick.wgsl: Brick, Indirect, indirect, unfold.
+// Needs shared/cut.wgsl: Cut, FAR.
+// Needs shared/frame.wgsl: FRONT_TO_BACK, MINIMUM, TILE, frame, start, tile_grid, zero.
 @group(0) @binding(1) var<uniform> gathers: array<Gather, 1>;
 @group(0) @binding(2) var<uniform> patch_range: PatchRange;
 @group(0) @binding(3) var<storage, read> bricks: array<Brick>;

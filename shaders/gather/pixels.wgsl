@@ -1,8 +1,11 @@
 // The pixels of a thread of the tile rasterizer, in the compositing buffer and among first hits.
 //
-// Needs gather/patch.wgsl: CUT, acc, gather, gathered, patch_range.
+// Needs gather.wgsl: looks_along_rays.
+// Needs gather/patch.wgsl: acc, gather, gathered, patch_range.
 // Needs gather/region.wgsl: block_word.
 // Needs gather/sheets.wgsl: hits, shown_from, shown_to.
+// Needs gather/slabs.wgsl: hits, shown_from, shown_to.
+// Needs gather_planes.wgsl: looks_along_rays.
 // Needs shared/frame.wgsl: frame.
 
 // A thread's four pixels.

@@ -1,6 +1,10 @@
 // The sums that a thread of the tile rasterizer gathers on the four planes behind a group's slabs, and the field that they make (SPEC §9).
 //
+// Needs gather/patch.wgsl: PATCH_THREADS, PERSPECTIVE, gather, sheet_group.
+// Needs gather/pixels.wgsl: Pixels.
+// Needs gather_planes.wgsl: planes.
 // Needs shared/frame.wgsl: frame.
+// Needs shared/planes.wgsl: MIN_WEIGHT.
 
 // Whether gradients are the field's derivative, not the voxels' differences.
 override KERNEL_GRADIENT: bool = false;

@@ -1,8 +1,8 @@
 // The voxels that a subgroup draws in a sheet group: found once for all pixels of a patch, shaded once, and kept for as long as their
 // kernels reach into the next sheet group. They are in the workgroup's memory, of which every subgroup has a part of its own.
 //
-// Needs gather/patch.wgsl: THREADS, lane, lanes.
-// Needs gather/bits.wgsl: ballot.
+// Needs gather/bits.wgsl: ballot, bits_from.
+// Needs gather/patch.wgsl: BATCH, THREADS, lane, lanes, passes.
 
 // Voxels in all parts; a multiple of 32.
 override QUEUE: u32 = 224u;

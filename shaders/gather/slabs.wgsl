@@ -1,6 +1,19 @@
 // What a thread of the tile rasterizer makes of the fields on two planes: the slab between them, classified, shaded and composited (SPEC §9).
 //
-// Needs shared/frame.wgsl: frame.
+// Needs gather/patch.wgsl: COMPOSITING, CUT, FIRST_HIT, PERSPECTIVE, SHEETS, control_points, cut, sheet_group.
+// Needs gather/pixels.wgsl: Pixels.
+// Needs gather/planes.wgsl: Fields, KERNEL_GRADIENT, PlaneSums, Sheets, blocks_handed_on, fields_handed_on, fields_of, hand_on.
+// Needs gather_planes.wgsl: planes.
+// Needs shared/cells.wgsl: nearest_index, voxel_at.
+// Needs shared/compositing.wgsl: composite.
+// Needs shared/cut.wgsl: noted, place_of, sheet_depths, shown_depths.
+// Needs shared/frame.wgsl: FRONT_TO_BACK, frame.
+// Needs shared/means.wgsl: both, in_box.
+// Needs shared/project.wgsl: slope_of.
+// Needs shared/ramps.wgsl: LABELS, ramp, ramps_of.
+// Needs shared/shading.wgsl: lighting, shade.
+// Needs shared/slab_integral.wgsl: slab_integral.
+// Needs shared/volume.wgsl: HOLES, gradient_of, is_hole, stored_at.
 
 // Of a thread's four pixels the sheet depths from and to which their rays' stretches reach, the length of a ray by its sheet depth, and the
 // depths of first hits, as bits.

@@ -1,19 +1,15 @@
 // The voxels that a subgroup of the tile rasterizer draws in a sheet group: which of those before stay, which come, their shading, and
 // their counts.
 //
-// Needs gather/patch.wgsl: ECONOMIES, ORDER, PARALLELOGRAM, PASSES_PER_FIND, PASSES_PER_SHADING, PERSPECTIVE, SHEETS, bricks, color_ramp, drawn, first_px, gather, gathered, gradient_opacity_ramp, lane, lanes, opacity_ramp, open, passes, shallow, sheet_group.
-// Needs gather/kernel.wgsl: footprint_at.
-// Needs gather/queue.wgsl: WHOLE_SHIFT, enqueue, queue_amounts, queue_blocks, queue_count, queue_first, queue_points, queue_size.
-// Needs gather/ramps.wgsl: is_long, ramp_at.
+// Needs gather.wgsl: FIRST_PLANE.
+// Needs gather/amounts.wgsl: overlapped_sheets, placed, screen_box, sections_here.
+// Needs gather/economies.wgsl: ECONOMIES.
+// Needs gather/patch.wgsl: ORDER, PARALLELOGRAM, PASSES_PER_FIND, PERSPECTIVE, SHEETS, drawn, first_px, gather, gathered, lane, lanes, open, passes, sheet_group.
+// Needs gather/queue.wgsl: enqueue, queue_amounts, queue_count, queue_first, queue_points, queue_size.
 // Needs gather/region.wgsl: blocks_in_box, blocks_in_parallelogram, bounds_of.
 // Needs gather/walk.wgsl: Found, SearchBounds, next_voxels.
-// Needs shared/brick.wgsl: BRICK_VOXELS, voxel_of.
+// Needs gather_planes.wgsl: ECONOMIES, FIRST_PLANE, overlapped_sheets, placed, screen_box, sections_here.
 // Needs shared/frame.wgsl: BOX_SLACK, FRONT_TO_BACK, frame.
-// Needs shared/local_ray.wgsl: sections_on_screen.
-// Needs shared/project.wgsl: overlapped, project.
-// Needs shared/ramps.wgsl: LABELS, ramp, ramps_of.
-// Needs shared/shading.wgsl: lighting, shade.
-// Needs shared/volume.wgsl: gradient_at, index_of, value_at.
 
 // A group of sheets: its number, its first sheet, where that begins, half the box around its footprints, and whether it is composited.
 struct GatheredGroup {

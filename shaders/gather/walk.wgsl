@@ -1,8 +1,10 @@
 // The walk through a sheet group's bricks behind a patch: their voxels whose kernels may reach the group and open pixels, as many at a
 // time as there are lanes.
 //
-// Needs gather/patch.wgsl: PERSPECTIVE, bricks, bricks_visited, entries, lane, lanes, passes.
+// Needs gather/amounts.wgsl: is_searched_in_perspective.
 // Needs gather/bits.wgsl: ballot, nth_set_bit, together.
+// Needs gather/patch.wgsl: PERSPECTIVE, bricks, bricks_visited, entries, lane, lanes, passes.
+// Needs gather_planes.wgsl: is_searched_in_perspective.
 // Needs shared/brick.wgsl: BRICK_VOXELS, in_brick.
 // Needs shared/frame.wgsl: frame.
 // Needs shared/project.wgsl: homogeneous.
