@@ -7,6 +7,7 @@
 //!                   splat      all sections of a voxel, eight pixels at a time
 //!                   composite  one sheet, once every voxel before it is drawn
 //!        ─ resolve ─→ image
+//!        ─ first_hit ─→ the depths at which an opacity was reached, if they are asked for
 //! ```
 //!
 //! Stages are those of the GPU, by the same names. The same scene gives the same bytes on every machine (SPEC §12): pixels are `f32` by IEEE
@@ -17,9 +18,12 @@ mod composite;
 mod count;
 mod cull;
 mod cut;
+mod first_hit;
 mod frame;
 mod kernel;
+mod means;
 mod project;
+mod ray;
 mod resolve;
 mod shade;
 mod sheets;
@@ -34,16 +38,19 @@ use std::time::Instant;
 use fearless_simd::Level;
 
 use crate::error::RenderError;
+use crate::geometry::view_geometry::ViewGeometry;
 use crate::headless::Rendering;
 use crate::lists::brick::BrickList;
 use crate::lists::classify::classify;
+use crate::renderer::pick::Pick;
 use crate::scene::{ImageSettings, Scene};
 use crate::setting_error::{Interval, SettingError};
 use crate::settings::camera::Camera;
+use crate::settings::splatting::check_first_hit;
 use crate::settings::transfer_function::TransferFunction;
 use crate::stats::Stats;
 use crate::volume::Volume;
-use frame::Frame;
+use frame::{Drawing, Frame};
 
 /// A view of a volume, drawn on the CPU.
 #[derive(Clone, Debug)]
@@ -53,6 +60,9 @@ pub struct CpuRenderer {
     transfer: TransferFunction,
     bricks: BrickList,
     level: Level,
+    first_hit: Option<f64>,
+    /// The last frame's first hits, and what it was seen by.
+    hits: Option<(ViewGeometry, Vec<f32>)>,
 }
 
 impl CpuRenderer {
@@ -68,7 +78,7 @@ impl CpuRenderer {
         let transfer = scene.transfer.resolve(&volume);
         let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
         let bricks = BrickList::new(volume.grid(), &classify(&volume, &transfer, &clipped));
-        Ok(Self { volume, scene: scene.clone(), transfer, bricks, level: Level::new() })
+        Ok(Self { volume, scene: scene.clone(), transfer, bricks, level: Level::new(), first_hit: None, hits: None })
     }
 
     /// The settings.
@@ -95,15 +105,55 @@ impl CpuRenderer {
         self.set_camera(self.scene.camera.turned(degrees))
     }
 
+    /// Asks for the depth at which every pixel's opacity reaches a value, above 0 and at most 1; `None` for none. Front to back only, and
+    /// with culling at most [`Splatting::opacity_threshold`](crate::settings::Splatting::opacity_threshold); not for
+    /// [`Compositing::Minimum`](crate::settings::Compositing::Minimum), and whatever the value that of the surface for
+    /// [`Compositing::Surface`](crate::settings::Compositing::Surface). See [`Self::first_hits`] and [`Self::pick`].
+    ///
+    /// # Errors
+    /// If the value is not in (0, 1]; then nothing changes.
+    pub fn set_first_hit(&mut self, opacity: Option<f64>) -> Result<(), SettingError> {
+        opacity.map_or(Ok(()), check_first_hit)?;
+        self.first_hit = opacity;
+        Ok(())
+    }
+
+    /// The last frame's first hits, row by row, if they were asked for: depths in world units along the camera's direction, from the eye,
+    /// orthographic from the plane through [`Camera::center`]; infinite where the opacity is not reached. Within a sheet opacity is taken to
+    /// grow evenly.
+    pub fn first_hits(&self) -> Option<&[f32]> {
+        self.hits.as_ref().map(|(_, hits)| hits.as_slice())
+    }
+
+    /// What the last frame shows first at a pixel, counted from the upper left; `None` where the opacity of [`Self::set_first_hit`] is not
+    /// reached.
+    ///
+    /// # Errors
+    /// If the frame has no first hits, or the pixel is off the image.
+    pub fn pick(&self, pixel: [u32; 2]) -> Result<Option<Pick>, SettingError> {
+        let depth_at = |(view, hits): &(ViewGeometry, Vec<f32>)| {
+            let [width, height] = view.size;
+            let is_inside = pixel[0] < width && pixel[1] < height;
+            is_inside.then(|| (*view, hits[(pixel[1] * width + pixel[0]) as usize]))
+        };
+        let Some((view, depth)) = self.hits.as_ref().and_then(depth_at) else {
+            return Err(Pick::missing(pixel, &self.scene.image));
+        };
+        Ok(depth.is_finite().then(|| Pick::at(&view, &self.volume, pixel, depth.into())))
+    }
+
     /// Draws a frame on the threads of the current rayon pool. Their number never changes a bit of the image.
     ///
     /// # Errors
     /// If the scene asks for more than can be computed.
-    pub fn draw(&self) -> Result<Rendering, RenderError> {
+    pub fn draw(&mut self) -> Result<Rendering, RenderError> {
         let start = Instant::now();
+        let splatting = &self.scene.splatting;
+        splatting.check_rays(!self.scene.clip.is_empty(), self.first_hit)?;
         let scene = self.scene.framed(&self.volume, &self.transfer);
-        let frame = Frame::new(&self.volume, &self.transfer, self.bricks.bricks(), &scene)?;
-        let (image, counts) = frame.draw(self.level);
+        let frame = Frame::new(&self.volume, &self.transfer, self.bricks.bricks(), &scene, self.first_hit)?;
+        let Drawing { image, counts, first_hits } = frame.draw(self.level);
+        self.hits = self.first_hit.map(|_| (frame.projection.view, first_hits));
         let ImageSettings { width, height, .. } = self.scene.image;
         let stats = Stats {
             adapter: "CPU".to_owned(),
@@ -126,7 +176,7 @@ impl CpuRenderer {
 /// If the scene asks for what this backend does not draw, or for what the volume does not have.
 pub fn render(volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Rendering, RenderError> {
     let start = Instant::now();
-    let renderer = CpuRenderer::new(volume, scene)?;
+    let mut renderer = CpuRenderer::new(volume, scene)?;
     let prepare_ms = milliseconds_since(start);
     let mut rendering = renderer.draw()?;
     rendering.stats.prepare_ms = prepare_ms;

@@ -24,7 +24,6 @@ use crate::renderer::pick::Pick;
 use crate::renderer::placement::Placement;
 use crate::renderer::scene_view::SceneView;
 use crate::scene::{ImageSettings, Scene};
-use crate::setting_error::SettingError;
 use crate::settings::splatting::Rasterizer;
 use crate::stats::Stats;
 use crate::volume::Volume;
@@ -216,9 +215,7 @@ impl Headless {
             let descriptor = wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.pick") };
             let mut encoder = self.device.create_command_encoder(&descriptor);
             let Some(mut pending) = view.pick(&self.device, &mut encoder, pixel) else {
-                let ImageSettings { width, height, .. } = view.scene().image;
-                let allowed = format!("a pixel of {width}×{height}, in a frame with first hits");
-                return Err(SettingError::new("pick", format!("{pixel:?}"), allowed).into());
+                return Err(Pick::missing(pixel, &view.scene().image).into());
             };
             self.queue.submit([encoder.finish()]);
             // Asks for it, and then it is there.

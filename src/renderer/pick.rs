@@ -8,6 +8,8 @@ use wgpu::{Buffer, BufferAsyncError, BufferDescriptor, BufferUsages, CommandEnco
 
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
+use crate::scene::ImageSettings;
+use crate::setting_error::SettingError;
 use crate::volume::Volume;
 
 /// A point of a volume.
@@ -23,6 +25,30 @@ pub struct Pick {
     pub value: f32,
     /// That voxel's label, in a segmented volume.
     pub label: Option<u16>,
+}
+
+impl Pick {
+    /// The point at a depth of a pixel's ray.
+    pub(crate) fn at(view: &ViewGeometry, volume: &Volume, pixel: [u32; 2], depth: f64) -> Self {
+        let grid = volume.grid();
+        let place = DVec2::from(pixel.map(f64::from)) + 0.5 - DVec2::from(view.size.map(f64::from)) / 2.0;
+        let position = view.rays().at(place, depth / grid.unit()) * grid.unit();
+        let last = grid.dims.as_dvec3() - 1.0;
+        let voxel = (position / grid.spacing + grid.center()).round().clamp(DVec3::ZERO, last).as_uvec3();
+        let index = grid.index_of(voxel);
+        let (value, label) = (volume.values()[index as usize], volume.label(index));
+        Self { position, depth, voxel, value, label }
+    }
+
+    /// Why there is none.
+    pub(crate) fn missing(pixel: [u32; 2], image: &ImageSettings) -> SettingError {
+        let ImageSettings { width, height, .. } = image;
+        SettingError::new(
+            "pick",
+            format!("{pixel:?}"),
+            format!("a pixel of {width}×{height}, in a frame with first hits"),
+        )
+    }
 }
 
 /// A pick on its way from the GPU.
@@ -83,19 +109,7 @@ impl PendingPick {
         Some(result.map_err(|error| failed(error.to_string())).and_then(|()| {
             let bytes = self.staging.get_mapped_range(..).map_err(|error| failed(error.to_string()))?;
             let depth: f32 = bytemuck::pod_read_unaligned(&bytes[..4]);
-            Ok(depth.is_finite().then(|| self.at(depth.into())))
+            Ok(depth.is_finite().then(|| Pick::at(&self.view, &self.volume, self.pixel, depth.into())))
         }))
-    }
-
-    /// The point at a depth.
-    fn at(&self, depth: f64) -> Pick {
-        let grid = self.volume.grid();
-        let place = DVec2::from(self.pixel.map(f64::from)) + 0.5 - DVec2::from(self.view.size.map(f64::from)) / 2.0;
-        let position = self.view.rays().at(place, depth / grid.unit()) * grid.unit();
-        let last = grid.dims.as_dvec3() - 1.0;
-        let voxel = (position / grid.spacing + grid.center()).round().clamp(DVec3::ZERO, last).as_uvec3();
-        let index = grid.index_of(voxel);
-        let (value, label) = (self.volume.values()[index as usize], self.volume.label(index));
-        Pick { position, depth, voxel, value, label }
     }
 }
