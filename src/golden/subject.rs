@@ -9,6 +9,7 @@ use super::file;
 use crate::headless::Rendering;
 use crate::headless::device::driver_name;
 use crate::image::{Image, ImageError};
+use crate::volume::ReadOptions;
 
 /// The adapter and driver that made an image.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -103,7 +104,15 @@ impl Picture {
     /// # Errors
     /// As [`Image::open`].
     pub fn open(path: &Path) -> Result<Self, ImageError> {
-        Ok(Self { image: Image::open(path)?, made_on: file::made_on(path) })
+        Self::open_with(path, &ReadOptions::default())
+    }
+
+    /// [`Picture::open`] under a folder that reading is confined to, or a memory limit.
+    ///
+    /// # Errors
+    /// As [`Image::open_with`].
+    pub fn open_with(path: &Path, options: &ReadOptions) -> Result<Self, ImageError> {
+        Ok(Self { image: Image::open_with(path, options)?, made_on: file::made_on(path) })
     }
 }
 

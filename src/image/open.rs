@@ -5,7 +5,7 @@ use std::path::Path;
 
 use ::exr::meta::BlockDescription;
 use ::exr::meta::header::Header;
-use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use super::{Format, Image, ImageError};
 use crate::volume::{Access, ReadOptions, VolumeError, npy};
@@ -18,26 +18,37 @@ impl Image {
     /// shape height × width × 4, in either order). Where a file has no alpha, the image is opaque.
     ///
     /// # Errors
-    /// If the extension is unknown, or the file cannot be read or holds no such image.
+    /// If the extension is unknown, or the file cannot be read or holds no such image, or the image takes more memory than volumes may by
+    /// default.
     pub fn open(path: &Path) -> Result<Self, ImageError> {
-        match Format::of(path)? {
+        Self::open_with(path, &ReadOptions::default())
+    }
+
+    /// [`Image::open`] under a folder that reading is confined to, or a memory limit.
+    ///
+    /// # Errors
+    /// Those of [`Image::open`], or if the options do not allow it.
+    pub fn open_with(path: &Path, options: &ReadOptions) -> Result<Self, ImageError> {
+        let format = Format::of(path)?;
+        let access = Access::new(options).map_err(of_volume)?;
+        match format {
             Format::Png => {
-                let mut image = Self::decode(path, ImageFormat::Png)?;
+                let mut image = Self::decode(path, ImageFormat::Png, &access)?;
                 for pixel in &mut image.pixels {
                     let [r, g, b, a] = *pixel;
                     *pixel = [r * a, g * a, b * a, a];
                 }
                 Ok(image)
             }
-            Format::Exr => Self::decode(path, ImageFormat::OpenExr),
-            Format::Npy => Self::decode_npy(path),
+            Format::Exr => Self::decode(path, ImageFormat::OpenExr, &access),
+            Format::Npy => Self::decode_npy(path, &access),
         }
     }
 
     /// Channels as the file has them, 0 to 1 where they are integers.
-    fn decode(path: &Path, format: ImageFormat) -> Result<Self, ImageError> {
+    fn decode(path: &Path, format: ImageFormat, access: &Access) -> Result<Self, ImageError> {
         let failed = |source: ::image::ImageError| ImageError::Decode { path: path.to_owned(), source: source.into() };
-        let bytes = read(path)?;
+        let bytes = read(path, access)?;
         if format == ImageFormat::OpenExr {
             check_blocks(path, &bytes)?;
         }
@@ -48,18 +59,17 @@ impl Image {
             let found = format!("{width} × {height} pixels in {} bytes", bytes.len());
             return Err(content(path, "size", found, format!("at most {most} pixels")));
         }
-        Limits::default().reserve(decoder.total_bytes()).map_err(failed)?;
+        let pixels = u64::from(width) * u64::from(height);
+        // As the file has them, and as floats.
+        let memory = decoder.total_bytes().saturating_add(pixels.saturating_mul(size_of::<[f32; 4]>() as u64));
+        access.reserve(path, "size", format_args!("{width} × {height} pixels"), memory).map_err(of_volume)?;
         let image = DynamicImage::from_decoder(decoder).map_err(failed)?.into_rgba32f();
         Ok(Self { width, height, pixels: image.into_raw().as_chunks().0.to_vec() })
     }
 
     /// An array of rows of pixels of channels, which the reader of volumes takes for slices of rows of voxels.
-    fn decode_npy(path: &Path) -> Result<Self, ImageError> {
-        let read = || npy::read::<f32>(path, &Access::new(&ReadOptions::default())?);
-        let array = read().map_err(|error| match error {
-            VolumeError::Io { path, source, .. } => ImageError::Io { path, source },
-            VolumeError::Invalid { field, found, allowed, .. } => content(path, &field, found, allowed),
-        })?;
+    fn decode_npy(path: &Path, access: &Access) -> Result<Self, ImageError> {
+        let array = npy::read::<f32>(path, access).map_err(of_volume)?;
         let [channels, width, height] = array.dims.to_array();
         if channels != 4 {
             let found = format!("({height}, {width}, {channels})");
@@ -113,7 +123,8 @@ fn min_bits_per_pixel(format: ImageFormat, bytes: &[u8]) -> u64 {
 }
 
 /// The bytes of a regular file: a pipe or a device may have no end.
-fn read(path: &Path) -> Result<Vec<u8>, ImageError> {
+fn read(path: &Path, access: &Access) -> Result<Vec<u8>, ImageError> {
+    let path = &*access.resolve(path).map_err(of_volume)?;
     let failed = |source| ImageError::Io { path: path.to_owned(), source };
     // Asked before opening: to open a pipe would wait for its writer.
     if !std::fs::metadata(path).map_err(failed)?.is_file() {
@@ -121,6 +132,14 @@ fn read(path: &Path) -> Result<Vec<u8>, ImageError> {
         return Err(content(path, "file", found, "a regular file".to_owned()));
     }
     std::fs::read(path).map_err(failed)
+}
+
+/// An error of what images share with volumes.
+fn of_volume(error: VolumeError) -> ImageError {
+    match error {
+        VolumeError::Io { path, source, .. } => ImageError::Io { path, source },
+        VolumeError::Invalid { origin, field, found, allowed } => content(Path::new(&origin), &field, found, allowed),
+    }
 }
 
 fn content(path: &Path, what: &str, found: String, allowed: String) -> ImageError {

@@ -117,18 +117,51 @@ impl Output {
         Ok(output)
     }
 
-    /// Renames the temporary files of outputs, all that were written whole, to their own names.
+    /// Renames the temporary files of outputs, all of which were written whole, to their own names: all of them or none.
     ///
     /// # Errors
-    /// What the operating system says of one of them; those after it are not renamed.
+    /// The path of an output that cannot be renamed, and what the operating system says of it. The outputs renamed before it are
+    /// undone: files that they replaced are back.
     pub fn commit(outputs: Vec<Self>) -> Result<(), (PathBuf, io::Error)> {
         let mut all = temporary();
+        let mut renamed = Vec::new();
         for Aside { temporary, target } in outputs.iter().filter_map(|output| output.aside.as_ref()) {
-            if let Some(path) = all.remove(temporary) {
-                path.persist(target).map_err(|error| (target.clone(), error.error))?;
+            let Some(path) = all.remove(temporary) else { continue };
+            // A single rename either happens or does not.
+            let replaced = if outputs.len() > 1 { Replaced::keep(target) } else { Ok(Replaced::default()) };
+            match replaced.and_then(|replaced| path.persist(target).map(|()| replaced).map_err(|error| error.error)) {
+                Ok(replaced) => renamed.push((target, replaced)),
+                Err(error) => {
+                    renamed.into_iter().for_each(|(renamed, replaced)| replaced.put_back(renamed));
+                    return Err((target.clone(), error));
+                }
             }
         }
         Ok(())
+    }
+}
+
+/// What was at a path before an output took its place: a second name of that file, or nothing.
+#[derive(Default)]
+struct Replaced(Option<TempPath>);
+
+impl Replaced {
+    fn keep(target: &Path) -> io::Result<Self> {
+        if !fs::exists(target)? {
+            return Ok(Self(None));
+        }
+        // Some file systems have no links.
+        let second = |path: &Path| fs::hard_link(target, path).or_else(|_| fs::copy(target, path).map(|_| ()));
+        let kept = tempfile::Builder::new().prefix(".sheetsplat-").make_in(folder(target), second)?;
+        Ok(Self(Some(kept.into_temp_path())))
+    }
+
+    /// Undoes a rename as far as the operating system lets it: the error that made it necessary is the one to report.
+    fn put_back(self, target: &Path) {
+        let _ = match self.0 {
+            Some(kept) => kept.persist(target).map_err(io::Error::from),
+            None => fs::remove_file(target),
+        };
     }
 }
 
@@ -212,4 +245,36 @@ fn is_socket(metadata: &Metadata) -> bool {
 #[cfg(not(unix))]
 fn is_socket(_: &Metadata) -> bool {
     false
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use super::*;
+
+    /// The third output becomes a folder after it was checked; a rename onto it fails.
+    #[test]
+    fn where_one_output_fails_those_before_it_are_undone() {
+        let folder = tempfile::tempdir().unwrap();
+        let [old, new, bad] = ["old", "new", "bad"].map(|name| folder.path().join(name));
+        fs::write(&old, "before").unwrap();
+        let written = |path: &PathBuf| {
+            let mut output = Target::of(path).unwrap().create().unwrap();
+            output.write_all(b"after").unwrap();
+            output
+        };
+        let outputs: Vec<_> = [&old, &new, &bad].map(written).into();
+        fs::create_dir(&bad).unwrap();
+        let (path, _) = Output::commit(outputs).unwrap_err();
+        assert_eq!(path, bad);
+        assert_eq!(fs::read_to_string(&old).unwrap(), "before");
+        let mut names: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        names.sort();
+        assert_eq!(names, ["bad", "old"]);
+
+        fs::remove_dir(&bad).unwrap();
+        Output::commit([&old, &new, &bad].map(written).into()).unwrap();
+        assert!([&old, &new, &bad].iter().all(|path| fs::read_to_string(path).unwrap() == "after"));
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
+    }
 }

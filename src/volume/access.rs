@@ -111,7 +111,7 @@ impl Access {
     ///
     /// # Errors
     /// If that is more than is left of the limit.
-    pub(super) fn reserve(&self, path: &Path, field: &str, found: impl Display, bytes: u64) -> Result<(), VolumeError> {
+    pub(crate) fn reserve(&self, path: &Path, field: &str, found: impl Display, bytes: u64) -> Result<(), VolumeError> {
         let Inner { limit, reserved, .. } = &*self.0;
         let add = |reserved: u64| reserved.checked_add(bytes).filter(|sum| sum <= limit);
         let Err(before) = reserved.fetch_update(Ordering::Relaxed, Ordering::Relaxed, add) else { return Ok(()) };

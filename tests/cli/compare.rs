@@ -155,6 +155,8 @@ fn bad_usage_and_input_are_2_and_leave_nothing() {
         ("a.png b.png --outliers 0.02", &["outliers", "0.02", "0 to 0.01"]),
         ("a.png b.png --outliers nan", &["outliers", "NaN", "0 to 0.01"]),
         ("a.png b.png --difference d.gif", &["d.gif", ".gif", ".png"]),
+        ("a.png b.png --memory 100", &["a.png", "size", "memory limit of 100 bytes"]),
+        ("a.png b.png --confine folder.png", &["a.png", "reading is confined"]),
         ("a.png b.png --difference a.png", &["--difference", "a.png", "another file"]),
         ("gone.png b.png --difference d.png", &["gone.png", "No such file"]),
         ("a.png gone.png --difference d.png", &["gone.png", "No such file"]),

@@ -106,9 +106,9 @@ fn an_input_by_another_name_is_no_output() {
     ] {
         assert_refused(&folder, &format!("{arguments} {NO_DEVICE}"), &["--output", "the input"], kept);
     }
-    // One tile's volume is loaded after another.
-    let sweep = "sweep a.nrrd -o hard.png --set volume.path=a.nrrd,a.nhdr";
-    assert_refused(&folder, sweep, &["--output", "the input"], "nrrd.raw");
+    // The header of a later tile's volume names it.
+    let sweep = format!("sweep a.nrrd -o hard.png --set volume.path=a.nrrd,a.nhdr {NO_DEVICE}");
+    assert_refused(&folder, &sweep, &["--output", "the input"], "nrrd.raw");
     assert_refused(&folder, "compare image.png image.png --difference soft.png", &["--difference"], "image.png");
 }
 

@@ -158,9 +158,7 @@ impl Input {
     /// Loads the scene's volume, from files that are no outputs.
     pub(crate) fn load_volume(&self, scene: &Scene, outputs: &Outputs) -> Result<Volume, Failure> {
         let start = Instant::now();
-        let loaded = scene.load_volume_and_files(&self.reading.options());
-        let (volume, files) = loaded.map_err(|error| self.failure(error))?;
-        outputs.refuse(&files)?;
+        let volume = self.read_volume(scene, outputs)?;
         log::info!("{}: {} voxels, loaded in {:.1?}", self.name, volume.grid().dims, start.elapsed());
         let (holes, samples) = (volume.holes(), volume.values().len());
         if holes > 0 {
@@ -170,6 +168,14 @@ impl Input {
             let name = &self.name;
             log::warn!("{name}: --view: the axes are left-handed, so the image is a mirror image of the patient");
         }
+        Ok(volume)
+    }
+
+    /// Reads a volume without a word about it.
+    pub(crate) fn read_volume(&self, scene: &Scene, outputs: &Outputs) -> Result<Volume, Failure> {
+        let loaded = scene.load_volume_and_files(&self.reading.options());
+        let (volume, files) = loaded.map_err(|error| self.failure(error))?;
+        outputs.refuse(&files)?;
         Ok(volume)
     }
 

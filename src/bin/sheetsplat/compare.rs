@@ -7,6 +7,7 @@ use sheetsplat::image::{Image, PngDepth};
 
 use crate::failure::Failure;
 use crate::outputs::{self, Outputs};
+use crate::reading::Reading;
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  sheetsplat compare actual.png golden.png --difference difference.png")]
@@ -24,17 +25,20 @@ pub(crate) struct Arguments {
     /// Save an image of where they differ: black to grey within the tolerance, red to yellow beyond it.
     #[arg(long, value_name = "FILE")]
     difference: Option<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let Arguments { actual, golden, tolerance, outliers, difference } = arguments;
+    let Arguments { actual, golden, tolerance, outliers, difference, reading } = arguments;
     let tolerance = Tolerance::new(*tolerance, *outliers).map_err(|error| Failure::Input(error.to_string()))?;
     if let Some(path) = difference {
         Image::check_format(path)?;
     }
     let named: Vec<_> = difference.iter().map(|path| ("--difference", path.as_path())).collect();
     Outputs::check(&named, true, &[actual.clone(), golden.clone()])?;
-    let open = |path: &Path| Picture::open(path).map_err(|error| Failure::Input(error.to_string()));
+    let options = reading.options();
+    let open = |path: &Path| Picture::open_with(path, &options).map_err(|error| Failure::Input(error.to_string()));
     let pictures = [open(actual)?, open(golden)?];
     let files = format!("{} and {}", actual.display(), golden.display());
     let comparison = Comparison::new(&pictures[0].image, &pictures[1].image, tolerance).map_err(|error| {

@@ -10,7 +10,6 @@ mod compare;
 mod documents;
 mod failure;
 mod info;
-#[cfg(unix)]
 mod interrupt;
 mod orbit;
 mod outputs;
@@ -86,7 +85,6 @@ fn main() -> ExitCode {
         (false, true) => "error,sheetsplat=info",
     };
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(filter)).init();
-    #[cfg(unix)]
     interrupt::listen();
     let progress = !quiet && !verbose;
     let result = match command {

@@ -9,7 +9,7 @@ pub(crate) struct Reading {
     /// Read no file outside this folder, after links are followed: neither the input nor what it names.
     #[arg(long, value_name = "DIR")]
     confine: Option<PathBuf>,
-    /// Memory that the volume and its labels may take, such as 2GiB; by default three quarters of what the machine, or the process's
+    /// Memory that the volume and its labels, or each image, may take, such as 2GiB; by default three quarters of what the machine, or the process's
     /// control group, has.
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     memory: Option<u64>,

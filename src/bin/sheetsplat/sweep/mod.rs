@@ -70,6 +70,7 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
     })?;
     let inputs: Vec<_> = scenes.iter().flat_map(|(scene, _)| input.files(scene)).collect();
     let outputs = Outputs::check(&[("--output", output)], false, &inputs)?;
+    check_volumes(input, &scenes, &outputs)?;
     let tiles = draw(arguments, scenes, &outputs, progress)?;
     outputs::write(&[(output, layout.draw(&tiles).encode(output, arguments.depth.into())?)], &[])
 }
@@ -112,6 +113,21 @@ fn combinations(axes: &[Axis]) -> Vec<Vec<String>> {
     all
 }
 
+/// Reads every volume once where there are several: a bad one is found, and the data files of headers are known, before anything is
+/// drawn.
+fn check_volumes(input: &Input, scenes: &[(Scene, Vec<String>)], outputs: &Outputs) -> Result<(), Failure> {
+    for (at, (scene, _)) in scenes.iter().enumerate().skip(1) {
+        if !scenes[..at].iter().any(|(earlier, _)| has_same_volume(earlier, scene)) {
+            input.read_volume(scene, outputs)?;
+        }
+    }
+    Ok(())
+}
+
+fn has_same_volume(a: &Scene, b: &Scene) -> bool {
+    (&a.volume, a.spacing, &a.labels) == (&b.volume, b.spacing, &b.labels)
+}
+
 /// Draws every scene; a volume is loaded again only where another one is asked for.
 fn draw(
     arguments: &Arguments,
@@ -125,10 +141,8 @@ fn draw(
     let mut last: Option<(Scene, Arc<_>)> = None;
     let mut tiles = Vec::new();
     for (scene, label) in scenes {
-        let is_same =
-            |last: &Scene| (&last.volume, last.spacing, &last.labels) == (&scene.volume, scene.spacing, &scene.labels);
         let volume = match last {
-            Some((last, volume)) if is_same(&last) => volume,
+            Some((last, volume)) if has_same_volume(&last, &scene) => volume,
             _ => Arc::new(input.load_volume(&scene, outputs)?),
         };
         let scene = input.settled(&volume, &scene, Scene::explicit)?;
