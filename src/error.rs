@@ -1,7 +1,9 @@
 //! Errors of the renderer. Loading errors live with the volume and the scene, and all of them together with [`headless`](crate::headless).
 
+#[cfg(feature = "gpu")]
 use wgpu::Device;
 
+#[cfg(feature = "gpu")]
 use crate::gpu::fault::DeviceFault;
 use crate::setting_error::SettingError;
 
@@ -27,6 +29,7 @@ pub enum RenderError {
         actual: u64,
     },
     /// The device failed: it is lost, or out of memory, or found a mistake.
+    #[cfg(feature = "gpu")]
     #[error(transparent)]
     Device(#[from] DeviceFault),
     /// What was drawn did not come back.
@@ -35,6 +38,7 @@ pub enum RenderError {
 }
 
 /// Checks that something is on the device that is to work with it: wgpu may panic if not.
+#[cfg(feature = "gpu")]
 pub(crate) fn check_device(device: &Device, of: &Device, what: &str) -> Result<(), RenderError> {
     if device == of {
         return Ok(());

@@ -27,6 +27,7 @@ mod ray;
 mod resolve;
 mod shade;
 mod sheets;
+mod simd;
 mod splat;
 mod support;
 mod tile;
@@ -38,11 +39,10 @@ use std::time::Instant;
 use fearless_simd::Level;
 
 use crate::error::RenderError;
-use crate::geometry::view_geometry::ViewGeometry;
-use crate::headless::Rendering;
+use crate::headless::{Backend, Rendering};
 use crate::lists::brick::BrickList;
 use crate::lists::classify::classify;
-use crate::renderer::pick::Pick;
+use crate::pick::{FirstHits, Pick};
 use crate::scene::{ImageSettings, Scene};
 use crate::setting_error::{Interval, SettingError};
 use crate::settings::camera::Camera;
@@ -51,6 +51,7 @@ use crate::settings::transfer_function::TransferFunction;
 use crate::stats::Stats;
 use crate::volume::Volume;
 use frame::{Drawing, Frame};
+pub use simd::Simd;
 
 /// A view of a volume, drawn on the CPU.
 #[derive(Clone, Debug)]
@@ -59,10 +60,11 @@ pub struct CpuRenderer {
     scene: Scene,
     transfer: TransferFunction,
     bricks: BrickList,
+    simd: Simd,
     level: Level,
     first_hit: Option<f64>,
-    /// The last frame's first hits, and what it was seen by.
-    hits: Option<(ViewGeometry, Vec<f32>)>,
+    /// The last frame's.
+    hits: Option<FirstHits>,
 }
 
 impl CpuRenderer {
@@ -74,16 +76,28 @@ impl CpuRenderer {
         let volume = volume.into();
         scene.check()?;
         scene.transfer.check_volume(&volume)?;
-        support::check(scene)?;
+        check(scene)?;
+        let (simd, level) = simd::chosen()?;
         let transfer = scene.transfer.resolve(&volume);
         let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
         let bricks = BrickList::new(volume.grid(), &classify(&volume, &transfer, &clipped));
-        Ok(Self { volume, scene: scene.clone(), transfer, bricks, level: Level::new(), first_hit: None, hits: None })
+        Ok(Self { volume, scene: scene.clone(), transfer, bricks, simd, level, first_hit: None, hits: None })
     }
 
     /// The settings.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// Draws by an instruction set other than the best one, or than that which the environment variable `SHEETSPLAT_SIMD` names. No bit of an
+    /// image changes.
+    ///
+    /// # Errors
+    /// If machine or build lacks it; then nothing changes.
+    pub fn set_simd(&mut self, simd: Simd) -> Result<(), SettingError> {
+        self.level = simd.checked()?;
+        self.simd = simd;
+        Ok(())
     }
 
     /// Changes the camera.
@@ -122,7 +136,7 @@ impl CpuRenderer {
     /// orthographic from the plane through [`Camera::center`]; infinite where the opacity is not reached. Within a sheet opacity is taken to
     /// grow evenly.
     pub fn first_hits(&self) -> Option<&[f32]> {
-        self.hits.as_ref().map(|(_, hits)| hits.as_slice())
+        self.hits.as_ref().map(|hits| hits.depths.as_slice())
     }
 
     /// What the last frame shows first at a pixel, counted from the upper left; `None` where the opacity of [`Self::set_first_hit`] is not
@@ -131,15 +145,7 @@ impl CpuRenderer {
     /// # Errors
     /// If the frame has no first hits, or the pixel is off the image.
     pub fn pick(&self, pixel: [u32; 2]) -> Result<Option<Pick>, SettingError> {
-        let depth_at = |(view, hits): &(ViewGeometry, Vec<f32>)| {
-            let [width, height] = view.size;
-            let is_inside = pixel[0] < width && pixel[1] < height;
-            is_inside.then(|| (*view, hits[(pixel[1] * width + pixel[0]) as usize]))
-        };
-        let Some((view, depth)) = self.hits.as_ref().and_then(depth_at) else {
-            return Err(Pick::missing(pixel, &self.scene.image));
-        };
-        Ok(depth.is_finite().then(|| Pick::at(&view, &self.volume, pixel, depth.into())))
+        FirstHits::pick(self.hits.as_ref(), &self.volume, pixel, &self.scene.image)
     }
 
     /// Draws a frame on the threads of the current rayon pool. Their number never changes a bit of the image.
@@ -153,13 +159,14 @@ impl CpuRenderer {
         let scene = self.scene.framed(&self.volume, &self.transfer);
         let frame = Frame::new(&self.volume, &self.transfer, self.bricks.bricks(), &scene, self.first_hit)?;
         let Drawing { image, counts, first_hits } = frame.draw(self.level);
-        self.hits = self.first_hit.map(|_| (frame.projection.view, first_hits));
+        self.hits = self.first_hit.map(|_| FirstHits { view: frame.projection.view, depths: first_hits });
         let ImageSettings { width, height, .. } = self.scene.image;
         let stats = Stats {
             adapter: "CPU".to_owned(),
-            driver: format!("{:?}", self.level).split('(').next().unwrap_or_default().to_lowercase(),
-            backend: "cpu".to_owned(),
-            rasterizer: "cpu".to_owned(),
+            driver: self.simd.name().to_owned(),
+            backend: Backend::Cpu.name().to_owned(),
+            api: "none".to_owned(),
+            rasterizer: Backend::Cpu.name().to_owned(),
             width,
             height,
             counts,
@@ -168,6 +175,14 @@ impl CpuRenderer {
         };
         Ok(Rendering { image, stats })
     }
+}
+
+/// Checks that this backend draws all that a scene asks for, as far as that is known without the volume.
+///
+/// # Errors
+/// If it does not: what it does not draw yet, or an image that is too large.
+pub fn check(scene: &Scene) -> Result<(), RenderError> {
+    support::check(scene)
 }
 
 /// Renders a volume that is in memory. The scene's own volume is not looked at.

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3, UVec3};
 
 use crate::geometry::slab;
 use crate::geometry::view_geometry::{Perspective, ViewGeometry};
-use crate::gpu::layout::Brick;
+use crate::lists::brick::Brick;
 use crate::lists::brick::{self, BRICK_VOXELS};
 use crate::settings::splatting::Order;
 use crate::volume::Grid;

@@ -3,6 +3,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
+pub use crate::lists::brick::Brick;
+
 /// A projected and shaded voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -161,22 +163,6 @@ pub struct Cut {
     pub plane_count: u32,
     /// 1 with surfaces, 0 without.
     pub has_surfaces: u32,
-}
-
-/// 4×4×4 places for voxels, x fastest.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-#[repr(C)]
-pub struct Brick {
-    /// Which of the places hold a voxel that takes part, one bit each.
-    pub present: [u32; 2],
-    /// Least x of its voxels.
-    pub x: u32,
-    /// Least y.
-    pub y: u32,
-    /// Least z.
-    pub z: u32,
-    /// Greatest minus least x, y and z, in bytes 0, 1 and 2.
-    pub extent: u32,
 }
 
 /// What a frame has found out about a brick: one bit per voxel.

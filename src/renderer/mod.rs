@@ -1,6 +1,7 @@
 //! The renderer a host embeds: it owns pipelines, never a device, and neither submits nor waits. Every frame it prepares, which can
 //! fail, records, and presents, which cannot but for a place outside of the target.
 
+pub(crate) mod counts;
 pub(crate) mod options;
 pub(crate) mod pick;
 pub(crate) mod placement;
@@ -28,13 +29,13 @@ use crate::rasterizer::quads::QuadRasterizer;
 use crate::rasterizer::request::FrameRequest;
 use crate::rasterizer::samples::SampleRasterizer;
 use crate::rasterizer::tiles::TileRasterizer;
+use crate::renderer::counts::Staging;
 use crate::renderer::options::RendererOptions;
 use crate::renderer::placement::Placement;
 use crate::renderer::prepared_frame::{Drawing, FirstHits, PreparedFrame, PreviousFrame};
 use crate::renderer::scene_view::{Prepared, SceneView};
 use crate::setting_error::SettingError;
 use crate::settings::splatting::Rasterizer;
-use crate::stats::Staging;
 
 /// The pipelines of every stage, for one device. Volumes and frames are separate and can be many.
 #[derive(Debug)]

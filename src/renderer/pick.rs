@@ -1,55 +1,14 @@
-//! Picking: what a pixel shows first.
+//! Picking on the GPU: what a pixel shows first.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
-use glam::{DVec2, DVec3, UVec3};
 use wgpu::{Buffer, BufferAsyncError, BufferDescriptor, BufferUsages, CommandEncoder, Device, MapMode, Texture};
 
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::scene::ImageSettings;
-use crate::setting_error::SettingError;
+use crate::pick::Pick;
 use crate::volume::Volume;
-
-/// A point of a volume.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pick {
-    /// Where, in world units from the volume's centre.
-    pub position: DVec3,
-    /// Its depth along the camera's direction, world units from the eye; orthographic from the camera's centre.
-    pub depth: f64,
-    /// The nearest voxel.
-    pub voxel: UVec3,
-    /// That voxel's value, NaN in a hole.
-    pub value: f32,
-    /// That voxel's label, in a segmented volume.
-    pub label: Option<u16>,
-}
-
-impl Pick {
-    /// The point at a depth of a pixel's ray.
-    pub(crate) fn at(view: &ViewGeometry, volume: &Volume, pixel: [u32; 2], depth: f64) -> Self {
-        let grid = volume.grid();
-        let place = DVec2::from(pixel.map(f64::from)) + 0.5 - DVec2::from(view.size.map(f64::from)) / 2.0;
-        let position = view.rays().at(place, depth / grid.unit()) * grid.unit();
-        let last = grid.dims.as_dvec3() - 1.0;
-        let voxel = (position / grid.spacing + grid.center()).round().clamp(DVec3::ZERO, last).as_uvec3();
-        let index = grid.index_of(voxel);
-        let (value, label) = (volume.values()[index as usize], volume.label(index));
-        Self { position, depth, voxel, value, label }
-    }
-
-    /// Why there is none.
-    pub(crate) fn missing(pixel: [u32; 2], image: &ImageSettings) -> SettingError {
-        let ImageSettings { width, height, .. } = image;
-        SettingError::new(
-            "pick",
-            format!("{pixel:?}"),
-            format!("a pixel of {width}×{height}, in a frame with first hits"),
-        )
-    }
-}
 
 /// A pick on its way from the GPU.
 #[derive(Debug)]

@@ -9,7 +9,7 @@ use crate::gpu::timer::Timer;
 use crate::rasterizer::quads::QuadFrame;
 use crate::rasterizer::samples::SampleFrame;
 use crate::rasterizer::tiles::TileFrame;
-use crate::stats::{GroupSlabs, Staging, Totals};
+use crate::renderer::counts::{GroupSlabs, Staging, Totals};
 
 /// A frame whose buffers are all allocated and filled: recording it cannot fail.
 #[derive(Debug)]

@@ -10,16 +10,16 @@ mod modes;
 mod picks;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::cpu;
+use sheetsplat::cpu::{self, CpuRenderer, Simd};
 use sheetsplat::headless::Rendering;
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Classification, Clip, Economies, Light, Method, Order, Projection, Ramp};
+use sheetsplat::settings::{Classification, Clip, Compositing, Economies, Light, Method, Order, Projection, Ramp};
 use sheetsplat::volume::{Volume, builtin};
 
 use common::images::largest_difference;
-use common::{BY_AMOUNTS, Random, SPACINGS, camera, random_eye, random_volume, scene, transfer};
+use common::{BY_AMOUNTS, COMPOSITINGS, Random, SPACINGS, camera, random_eye, random_volume, scene, transfer};
 
 /// PSNR that is asked for, dB (SPEC §12 asks for 80).
 pub(crate) const REQUIRED: f64 = 100.0;
@@ -236,6 +236,41 @@ fn threads_change_no_bit() {
             assert_eq!(bits(&one.image), bits(&other.image), "case {case}");
             assert_eq!(one.stats.counts, other.stats.counts, "case {case}");
         }
+    }
+}
+
+#[test]
+fn instruction_sets_change_no_bit() {
+    let levels = Simd::available();
+    println!("{levels:?}");
+    assert!(levels.len() >= 2, "only {levels:?}");
+    let mut random = Random(21);
+    for case in 0..24 {
+        let (volume, mut scene) = random_case(&mut random);
+        if scene.splatting.method != Method::CompositeEverySample {
+            scene.splatting.compositing = COMPOSITINGS[case % COMPOSITINGS.len()];
+        }
+        if scene.splatting.compositing == Compositing::Surface {
+            scene.splatting.order = Order::FrontToBack;
+        }
+        let mut renderer = CpuRenderer::new(volume, &scene).unwrap();
+        let drawn: Vec<_> = levels
+            .iter()
+            .map(|level| {
+                renderer.set_simd(*level).unwrap();
+                let Rendering { image, stats } = renderer.draw().unwrap();
+                assert_eq!(stats.driver, level.name());
+                (bits(&image), stats.counts)
+            })
+            .collect();
+        for (level, other) in levels.iter().zip(&drawn).skip(1) {
+            assert!(*other == drawn[0], "case {case}: {level:?} differs from {:?} with {scene:?}", levels[0]);
+        }
+    }
+    for missing in Simd::ALL.into_iter().filter(|level| !levels.contains(level)) {
+        let (volume, scene) = head();
+        let message = CpuRenderer::new(volume, &scene).unwrap().set_simd(missing).unwrap_err().to_string();
+        assert!(message.contains("SHEETSPLAT_SIMD") && message.contains(missing.name()), "{message}");
     }
 }
 
