@@ -278,7 +278,7 @@ fn folders_hold_files_without_preamble_too() {
     fs::write(folder.path().join("3.dcm"), b"\x00\x05\x16\x07").unwrap();
     fs::write(folder.path().join("notes.txt"), b"notes").unwrap();
     let (again, warnings) = warned(|| Volume::open(folder.path()).unwrap());
-    assert_warned(&warnings, "3 files do not begin as slices do and are left out: 1.2.840, 3.dcm, IM9");
+    assert_warned(&warnings, "3 files are not slices and are left out: 1.2.840, 3.dcm, IM9");
     assert_eq!(again.values(), volume.values());
 }
 
@@ -303,7 +303,7 @@ fn wrong_elements() {
         assert_refused(Folder::new().open("a.dcm", &slice.bytes()), "a.dcm", field, found, allowed);
     };
     let slice = || Slice::at(1.0);
-    refused(slice().with(POSITION, ""), "ImagePositionPatient", "no such element", "where the image lies");
+    refused(slice().with(POSITION, ""), "ImagePositionPatient", "no such element", "the image's position in the patient");
     refused(slice().with(POSITION, "1\\2"), "ImagePositionPatient", "1\\\\2", "finite numbers, 3 of them");
     refused(slice().with(ORIENTATION, "1\\0\\0\\0\\1\\x"), "ImageOrientationPatient", "x", "6 of them");
     refused(slice().with(ORIENTATION, "0\\0\\0\\0\\1\\0"), "ImageOrientationPatient", "lengths [0.0", "orthogonal");
