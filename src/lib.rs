@@ -104,6 +104,7 @@
 //! ([`Volume::labels`]) · *brick* 4×4×4 neighbouring voxels · *tile* a square of 32×32 pixels.
 
 pub mod appearance;
+pub mod cpu;
 mod error;
 mod geometry;
 #[cfg(feature = "golden")]

@@ -90,7 +90,7 @@ impl FootprintMap {
         // Right singular vectors and squared singular values are the eigensystem of MᵀM.
         let gram = pixels_from_footprint.transpose() * pixels_from_footprint;
         let (a, b, c) = (gram.x_axis.x, gram.x_axis.y, gram.y_axis.y);
-        let right = DMat2::from_angle(0.5 * (2.0 * b).atan2(a - c));
+        let right = DMat2::from_angle(0.5 * libm::atan2(2.0 * b, a - c));
         let singular = DVec2::new(
             (pixels_from_footprint * right.x_axis).length(),
             (pixels_from_footprint * right.y_axis).length(),

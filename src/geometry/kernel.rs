@@ -36,13 +36,13 @@ impl Kernel {
 
     /// `h(r)`.
     pub fn value(&self, r: f64) -> f64 {
-        if r <= self.radius { self.kappa * (-self.falloff * r * r).exp() } else { 0.0 }
+        if r <= self.radius { self.kappa * libm::exp(-self.falloff * r * r) } else { 0.0 }
     }
 
     /// `H(x, y, z)` of eq. 3 with `rho_squared = x² + y²`, of the Gaussian without its truncation; odd in z.
     pub fn cumulative(&self, rho_squared: f64, z: f64) -> f64 {
         let root = self.falloff.sqrt();
-        self.kappa * (-self.falloff * rho_squared).exp() * (PI.sqrt() / 2.0) * libm::erf(root * z) / root
+        self.kappa * libm::exp(-self.falloff * rho_squared) * (PI.sqrt() / 2.0) * libm::erf(root * z) / root
     }
 
     /// What of `H(x, y, z)` is missing to the kernel's support: `H(x, y, support) - H(x, y, z)`, to full relative precision
@@ -50,14 +50,14 @@ impl Kernel {
     pub fn cumulative_beyond(&self, rho_squared: f64, z: f64) -> f64 {
         let root = self.falloff.sqrt();
         let beyond = libm::erfc(root * z) - libm::erfc(root * self.support());
-        self.kappa * (-self.falloff * rho_squared).exp() * (PI.sqrt() / 2.0) * beyond / root
+        self.kappa * libm::exp(-self.falloff * rho_squared) * (PI.sqrt() / 2.0) * beyond / root
     }
 
     /// Coefficients of a polynomial in z, the z⁰ one first, that is `H(0, 0, t) / t` for t² from `(1 - span)·support²`, where z is
     /// -1, to `support²`, where it is 1.
     pub fn cumulative_polynomial<const N: usize>(&self, span: f64) -> [f64; N] {
         let count = N as f64;
-        let nodes: [f64; N] = std::array::from_fn(|i| (PI * (i as f64 + 0.5) / count).cos());
+        let nodes: [f64; N] = std::array::from_fn(|i| libm::cos(PI * (i as f64 + 0.5) / count));
         let at_nodes = nodes.map(|z| {
             let t = self.support() * (1.0 - span * (1.0 - z) / 2.0).sqrt();
             self.cumulative(0.0, t) / t
@@ -68,7 +68,7 @@ impl Kernel {
         let mut sum = [0.0; N];
         for n in 0..N {
             let weight = if n == 0 { 1.0 } else { 2.0 } / count;
-            let chebyshev = |z: f64| (n as f64 * z.acos()).cos();
+            let chebyshev = |z: f64| libm::cos(n as f64 * libm::acos(z));
             let coefficient: f64 = nodes.iter().zip(at_nodes).map(|(&z, f)| f * chebyshev(z)).sum::<f64>() * weight;
             sum.iter_mut().zip(current).for_each(|(sum, power)| *sum += coefficient * power);
             // T₁ = z, then Tₙ₊₁ = 2z·Tₙ - Tₙ₋₁.
@@ -128,7 +128,7 @@ impl Kernel {
 fn radial_moment(radius: f64, falloff: f64) -> f64 {
     let x = falloff * radius * radius;
     if x < 1.0 {
-        let mut power = radius.powi(3);
+        let mut power = radius * radius * radius;
         let mut sum = 0.0;
         for n in 0..24 {
             let n = f64::from(n);
@@ -137,7 +137,7 @@ fn radial_moment(radius: f64, falloff: f64) -> f64 {
         }
         sum
     } else {
-        PI.sqrt() * libm::erf(x.sqrt()) / (4.0 * falloff.powf(1.5)) - radius * (-x).exp() / (2.0 * falloff)
+        PI.sqrt() * libm::erf(x.sqrt()) / (4.0 * falloff * falloff.sqrt()) - radius * libm::exp(-x) / (2.0 * falloff)
     }
 }
 

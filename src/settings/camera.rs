@@ -154,7 +154,7 @@ impl Camera {
     /// between the image's upper and lower edge, and one [`Grid::unit`]. `None` for an orthographic camera.
     fn perspective(&self, grid: &Grid, kernel_radius: f64) -> Option<[f64; 3]> {
         let Projection::Perspective { fov_y, distance, near } = self.projection else { return None };
-        let whole = grid.bounding_radius(kernel_radius) / (fov_y.to_radians() / 2.0).sin();
+        let whole = grid.bounding_radius(kernel_radius) / libm::sin(fov_y.to_radians() / 2.0);
         Some([fov_y, distance.unwrap_or(whole), near.unwrap_or(grid.unit())])
     }
 
@@ -180,7 +180,7 @@ impl Camera {
         let (unit, sphere) = (grid.unit(), grid.bounding_radius(kernel_radius));
         let [distance, near] = [distance, near].map(|world| world / unit);
         let position = self.middle() / unit - distance * self.basis().w;
-        let pixel_per_depth = 2.0 * (fov_y.to_radians() / 2.0).tan() / f64::from(height);
+        let pixel_per_depth = 2.0 * libm::tan(fov_y.to_radians() / 2.0) / f64::from(height);
         let eye = Eye { position, distance, near, pixel_per_depth };
         let (least, largest) = (PIXELS.start() / pixel_per_depth, PIXELS.end() / pixel_per_depth);
         let farthest = position.length() + sphere / unit;

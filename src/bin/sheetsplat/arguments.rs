@@ -5,13 +5,15 @@ use std::time::Instant;
 
 use clap::ValueEnum;
 use clap::builder::PossibleValuesParser;
-use sheetsplat::RenderError;
 use sheetsplat::appearance::{Colormap, Preset};
-use sheetsplat::headless::{Error, Headless, HeadlessOptions};
+use sheetsplat::cpu::CpuRenderer;
+use sheetsplat::headless::{Error, Headless, HeadlessOptions, Rendering};
 use sheetsplat::image::PngDepth;
 use sheetsplat::scene::{Scene, SceneError, VolumeSource};
+use sheetsplat::settings::Camera;
 use sheetsplat::stats::Stats;
 use sheetsplat::volume::{self, Orientation, Volume};
+use sheetsplat::{RenderError, SceneView, SettingError};
 
 use crate::failure::Failure;
 use crate::outputs::Outputs;
@@ -215,6 +217,64 @@ impl Input {
 
     pub(crate) fn failure(&self, error: impl Into<Error>) -> Failure {
         Failure::of(error.into(), &self.name)
+    }
+}
+
+/// What draws many frames of one scene.
+#[derive(Clone, Copy, Default, ValueEnum)]
+pub(crate) enum Backend {
+    #[default]
+    Gpu,
+    Cpu,
+}
+
+/// A scene's view, to be drawn from many directions.
+pub(crate) enum Drawing {
+    Gpu(Box<(Headless, SceneView)>),
+    Cpu(Box<CpuRenderer>),
+}
+
+impl Drawing {
+    /// Opens a device or none, and classifies the volume.
+    pub(crate) fn new(
+        input: &Input,
+        backend: Backend,
+        profile: bool,
+        volume: Volume,
+        scene: &Scene,
+    ) -> Result<Self, Failure> {
+        match backend {
+            Backend::Cpu => {
+                let renderer = CpuRenderer::new(volume, scene).map_err(|error| input.failure(error))?;
+                Ok(Self::Cpu(Box::new(renderer)))
+            }
+            Backend::Gpu => {
+                let headless = input.headless(profile)?;
+                let view = headless.view(volume, scene).map_err(|error| input.failure(error))?;
+                Ok(Self::Gpu(Box::new((headless, view))))
+            }
+        }
+    }
+
+    pub(crate) fn set_camera(&mut self, camera: Camera) -> Result<(), SettingError> {
+        match self {
+            Self::Gpu(gpu) => gpu.1.set_camera(camera),
+            Self::Cpu(renderer) => renderer.set_camera(camera),
+        }
+    }
+
+    pub(crate) fn turn(&mut self, degrees: f64) -> Result<(), SettingError> {
+        match self {
+            Self::Gpu(gpu) => gpu.1.turn(degrees),
+            Self::Cpu(renderer) => renderer.turn(degrees),
+        }
+    }
+
+    pub(crate) fn draw(&mut self) -> Result<Rendering, RenderError> {
+        match self {
+            Self::Gpu(gpu) => gpu.0.draw(&mut gpu.1),
+            Self::Cpu(renderer) => renderer.draw(),
+        }
     }
 }
 

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use clap::ValueEnum;
 use sheetsplat::RenderError;
+use sheetsplat::cpu;
 use sheetsplat::headless::Rendering;
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
@@ -44,7 +45,7 @@ pub(crate) struct Arguments {
     save_scene: Option<PathBuf>,
     #[command(flatten)]
     annotate: Annotate,
-    /// The GPU, or the slow f64 evaluation on the CPU that it is tested against.
+    /// The GPU, the CPU's cores without a driver, or the slow f64 evaluation that both are tested against.
     #[arg(long, value_enum, default_value = "gpu")]
     backend: Backend,
     /// Time every stage on the GPU, if the adapter has timestamp queries: stages_ms in the statistics, and printed.
@@ -55,6 +56,7 @@ pub(crate) struct Arguments {
 #[derive(Clone, Copy, ValueEnum)]
 enum Backend {
     Gpu,
+    Cpu,
     Reference,
 }
 
@@ -76,6 +78,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let volume = Arc::new(volume);
     let rendering = match arguments.backend {
         Backend::Gpu => input.headless(arguments.profile)?.render_volume(volume, &scene),
+        Backend::Cpu => cpu::render(volume, &scene),
         Backend::Reference => render_reference(&volume, &scene),
     };
     let Rendering { mut image, mut stats } = rendering.map_err(|error| input.failure(error))?;
