@@ -36,7 +36,9 @@ pub struct Comparison {
 #[non_exhaustive]
 pub enum ComparisonError {
     /// The image has no pixels, or their number is not width × height.
-    #[error("the {which} image: found {found} pixels for {width}×{height}, allowed: width × height pixels, at least one")]
+    #[error(
+        "the {which} image: found {found} pixels for {width}×{height}, allowed: width × height pixels, at least one"
+    )]
     Pixels {
         /// `actual` or `golden`.
         which: &'static str,

@@ -303,7 +303,12 @@ fn wrong_elements() {
         assert_refused(Folder::new().open("a.dcm", &slice.bytes()), "a.dcm", field, found, allowed);
     };
     let slice = || Slice::at(1.0);
-    refused(slice().with(POSITION, ""), "ImagePositionPatient", "no such element", "the image's position in the patient");
+    refused(
+        slice().with(POSITION, ""),
+        "ImagePositionPatient",
+        "no such element",
+        "the image's position in the patient",
+    );
     refused(slice().with(POSITION, "1\\2"), "ImagePositionPatient", "1\\\\2", "finite numbers, 3 of them");
     refused(slice().with(ORIENTATION, "1\\0\\0\\0\\1\\x"), "ImageOrientationPatient", "x", "6 of them");
     refused(slice().with(ORIENTATION, "0\\0\\0\\0\\1\\0"), "ImageOrientationPatient", "lengths [0.0", "orthogonal");
