@@ -1,5 +1,5 @@
-//! The f64 CPU twin of every GPU stage, in SPEC's direct form: plain, independent of the tables, the bucket sort and the
-//! matrices of eqs. 4–11, and slow. Tests compare every stage with it; `sheetsplat render --backend reference` shows it.
+//! The f64 evaluation of every GPU stage, as the specification states it: plain and slow, without the tables, the bucket sort and the
+//! matrices of eqs. 4–11. Tests compare every stage with it; `sheetsplat render --backend reference` shows its images.
 
 pub mod after;
 pub mod composite;
@@ -39,12 +39,12 @@ pub use shading::Splat;
 pub use splat::Section;
 pub use visibility::Areas;
 
-/// An f64 image of premultiplied RGBA, row 0 at the top.
+/// An f64 image of premultiplied RGBA, with row 0 at the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Buffer {
     /// Pixels per row.
     pub width: usize,
-    /// Row by row.
+    /// The pixels, row by row.
     pub pixels: Vec<DVec4>,
 }
 
@@ -54,7 +54,7 @@ impl Buffer {
         Self { width: width as usize, pixels: vec![DVec4::ZERO; width as usize * height as usize] }
     }
 
-    /// As an image of f32.
+    /// Converts the buffer to an f32 image.
     pub fn into_image(self) -> Image {
         Image {
             width: self.width as u32,
@@ -68,14 +68,14 @@ impl Buffer {
 struct Frame {
     geometry: Geometry,
     kernel: Kernel,
-    /// The voxels that take part, their positions in memory.
+    /// The indices in memory of the voxels that take part.
     voxels: Vec<u32>,
     splats: Vec<Splat>,
 }
 
 impl Frame {
     fn new(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Self, RenderError> {
-        // Before a camera is placed by what is visible.
+        // The settings are checked before the camera is framed, which needs valid ones.
         scene.check()?;
         transfer.check()?;
         let scene = &scene.framed(volume, transfer);
@@ -90,7 +90,7 @@ impl Frame {
         sheets::buckets(&self.voxels, &self.splats, &self.geometry, &self.kernel)
     }
 
-    /// What of some splats, by index, falls into a sheet.
+    /// The sections of some splats, given by index, in a sheet.
     fn sections(&self, indices: &[u32], sheet: i32) -> Vec<Section> {
         let section = |&index: &u32| self.geometry.section(&self.splats[index as usize], sheet, &self.kernel);
         indices.par_iter().filter_map(section).collect()
@@ -100,7 +100,7 @@ impl Frame {
 /// Renders the scene's camera, image, shading and splatting settings over a volume, with nothing culled.
 ///
 /// # Errors
-/// If the scene asks for more than can be computed.
+/// If the scene needs more than can be computed.
 pub fn render(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Image, RenderError> {
     render_culled(volume, transfer, scene, None).map(|culled| culled.image)
 }
@@ -108,14 +108,14 @@ pub fn render(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Re
 /// What a host adds to a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Host<'a> {
-    /// For every pixel the depth along w of an opaque surface, `unit`s from the eye (orthographic: from the camera's centre).
+    /// For every pixel the depth along w of an opaque surface, in `unit`s from the eye (orthographic: from the camera's centre).
     pub surfaces: Option<&'a [f64]>,
-    /// The opacity whose depth is asked for.
+    /// The opacity whose depth is requested.
     pub first_hit: Option<f64>,
 }
 
 impl Host<'_> {
-    /// Checks that surfaces have a depth for every pixel, and the opacity asked for, as [`SceneView`](crate::SceneView) does.
+    /// Checks that there is a surface depth for every pixel, and the requested opacity, as [`SceneView`](crate::SceneView) does.
     fn check(&self, scene: &Scene) -> Result<(), SettingError> {
         let pixels = scene.image.width as usize * scene.image.height as usize;
         if let Some(depths) = self.surfaces {
@@ -131,10 +131,10 @@ impl Host<'_> {
     }
 }
 
-/// What [`render`] draws: all there is. Voxels composited one by one make a section each, and neither sheets nor tiles.
+/// The counts of what [`render`] draws. Voxels composited one by one count as one section each, and have neither sheets nor tiles.
 ///
 /// # Errors
-/// If the scene asks for more than can be computed.
+/// If the scene needs more than can be computed.
 pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Counts, RenderError> {
     if scene.splatting.classification == Classification::After {
         return after::count(volume, transfer, scene);
@@ -164,17 +164,17 @@ pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Res
     })
 }
 
-/// An image with early splat elimination, and what was drawn.
+/// An image with early splat elimination, and counts of what was drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Culled {
     /// The image.
     pub image: Image,
     /// Voxel–sheet pairs that passed the test.
     pub sections: u64,
-    /// Where they fell.
+    /// The areas they covered.
     pub areas: Areas,
-    /// For every pixel the depth along w at which the opacity asked for is reached, in `unit`s as those of surfaces; infinite where it
-    /// is not. Within a sheet opacity is taken to grow evenly. Empty if nothing was asked.
+    /// For every pixel the depth along w at which the requested opacity is reached, in `unit`s like the depths of surfaces; infinite where it
+    /// is not reached. Within a sheet opacity grows linearly. Empty if none was requested.
     pub first_hits: Vec<f64>,
 }
 
@@ -182,7 +182,7 @@ pub struct Culled {
 /// front, where nothing hides ([`Compositing::hides`]), and where voxels are composited one by one.
 ///
 /// # Errors
-/// If the scene asks for more than can be computed.
+/// If the scene needs more than can be computed.
 pub fn render_culled(
     volume: &Volume,
     transfer: &TransferFunction,
@@ -192,10 +192,10 @@ pub fn render_culled(
     render_for(Host::default(), volume, transfer, scene, test)
 }
 
-/// The same between a host's surfaces. Voxels composited one by one know nothing of them, nor of clip planes.
+/// Like [`render_culled`], between a host's surfaces. Voxels composited one by one ignore surfaces and clip planes.
 ///
 /// # Errors
-/// If the scene asks for more than can be computed.
+/// If the scene needs more than can be computed.
 pub fn render_for(
     host: Host<'_>,
     volume: &Volume,
@@ -210,7 +210,7 @@ pub fn render_for(
     host.check(scene)?;
     let (compositing, order) = (scene.splatting.compositing, scene.splatting.order);
     let test = test.filter(|_| order == Order::FrontToBack && compositing.hides());
-    // What is kept of a surface that is not reached yet is none.
+    // While no surface has been reached, alpha is below one half; a surface itself is opaque.
     let threshold = if compositing == Compositing::Surface { 1.0 } else { scene.splatting.opacity_threshold };
     let support = frame.kernel.support();
     let is_cut = host.surfaces.is_some() || !scene.clip.is_empty();
@@ -232,7 +232,7 @@ pub fn render_for(
     }
     let mut buckets = frame.buckets();
     if let Some(means) = &means {
-        // Sheets without anything are sheets.
+        // Empty sheets between the first and the last count as sheets.
         let touched = buckets.first_key_value().zip(buckets.last_key_value()).map(|(first, last)| *first.0..last.0 + 1);
         for k in touched.into_iter().chain([means.sheets()]).flatten() {
             buckets.entry(k).or_default();
@@ -253,7 +253,7 @@ pub fn render_for(
         areas.add(&in_sheet, frame.geometry.size, support);
         let mut sheet = Buffer::new(scene.image.width, scene.image.height);
         splat::draw(&in_sheet, &frame.kernel, &mut sheet, |pixel, amount| *pixel += amount);
-        // The least mean is that of what there is.
+        // A cut does not lower the mean of a slab's visible part, which is what `Minimum` looks for.
         if let Some(cuts) = cuts.as_ref().filter(|_| compositing != Compositing::Minimum) {
             cuts.apply(&mut sheet, k);
         }
