@@ -35,8 +35,6 @@ override ORDER: u32 = 0u;
 override PERSPECTIVE: bool = false;
 // Whether a footprint's box is the parallelogram of Fig. 13, else its bounding rectangle.
 override PARALLELOGRAM: bool = false;
-// Whether any of §8's economies is asked for.
-override ECONOMIES: bool = false;
 // Whether anything is cut, and whether first hits are asked for.
 override CUT: bool = false;
 override FIRST_HIT: bool = false;
@@ -52,11 +50,9 @@ var<private> gather: Gather;
 var<private> lane: u32;
 var<private> lanes: u32;
 
-// The patch: where the centre of its first pixel is, and of the pixels that the subgroup goes round those that are not opaque, and those
-// that have not reached β.
+// The patch: where the centre of its first pixel is, and of the pixels that the subgroup goes round those that are not opaque.
 var<private> first_px: vec2f;
 var<private> open: vec4u;
-var<private> shallow: vec4u;
 
 // The group that is drawn.
 var<private> sheet_group: GatheredGroup;
@@ -119,10 +115,7 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> b
         for (var i = 0u; i < seen_count; i += lanes) {
             let slot = queue_first + base + nth_set_bit(seen, min(i + lane, seen_count - 1u));
             let amount = select(vec4f(0.0), queue_amounts[slot], i + lane < seen_count);
-            var whole = -1.0;
-            if ECONOMIES {
-                whole = f32(queue_blocks[slot] >> WHOLE_SHIFT) - 1.0;
-            }
+            let whole = whole_sheet(queue_blocks[slot]);
             let own = footprint_at(bitcast<vec4f>(queue_points[slot]), sheet_group.near, whole, amount);
             // Every lane adds all voxels' sections at its own pixels, two voxels at a time.
             let count = min(seen_count - i, lanes);
@@ -189,9 +182,7 @@ fn find_open_pixels(corner: vec2u, threads: vec2u, thread: u32) -> u32 {
         let opacity = transpose(load_image(pixels))[3];
         own_blocks |= subgroupOr(1u << pixels.block);
         open = with_blocks(open, pixels.block, open_word(pixels, opacity, -FAR));
-        if ECONOMIES {
-            shallow = with_blocks(shallow, pixels.block, shallow_word(pixels, opacity));
-        }
+        shallow = shallow_after(shallow, pixels, opacity);
     }
     return own_blocks;
 }
@@ -219,9 +210,7 @@ fn composite_pixels(pixels: Pixels, sheets: Sheets, progress: ptr<function, Prog
     let opacity = transpose(image)[3];
     let far = sheet_group.near + f32(SHEETS) * frame.slab_width;
     (*progress).open = with_blocks((*progress).open, pixels.block, open_word(pixels, opacity, far));
-    if ECONOMIES {
-        (*progress).shallow = with_blocks((*progress).shallow, pixels.block, shallow_word(pixels, opacity));
-    }
+    (*progress).shallow = shallow_after((*progress).shallow, pixels, opacity);
 }
 
 // Adds the sections of the queue's voxels to the sheets of all pixels, round by round. With the last voxels of the group, `is_last`, the sheets

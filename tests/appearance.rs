@@ -415,7 +415,7 @@ fn many_scenes() -> Vec<Scene> {
             "cube:12",
             &[
                 image,
-                "splatting={rasterizer='tiles',footprint_box='parallelogram',whole_below=0.1,beta=0.5,resolution=0.001}",
+                "splatting={rasterizer='tiles',footprint_box='parallelogram',experimental={whole_below=0.1,beta=0.5,resolution=0.001}}",
             ],
         ),
         builtin_scene(

@@ -276,7 +276,7 @@ fn what_is_not_drawn_yet_is_refused_by_name() {
     refused(&|scene| scene.splatting.compositing = Compositing::Maximum, ["splatting.compositing", "\"maximum\""]);
     refused(&|scene| scene.splatting.compositing = Compositing::Surface, ["splatting.compositing", "\"surface\""]);
     let economies = Economies { beta: 0.5, ..Economies::default() };
-    refused(&|scene| scene.splatting.economies = economies, ["splatting.beta", "0.5"]);
+    refused(&|scene| scene.splatting.experimental = economies, ["splatting.experimental.beta", "0.5"]);
     refused(&|scene| scene.image.width = 40_000, ["image.width", "40000"]);
 }
 

@@ -133,6 +133,7 @@ fn every_key() {
         tiles = false
         rasterizer = "tiles"
         footprint_box = "parallelogram"
+        [splatting.experimental]
         whole_below = 0.25
         beta = 0.75
         resolution = 0.001
@@ -198,7 +199,7 @@ fn every_key() {
             tiles: false,
             rasterizer: Rasterizer::Tiles,
             footprint_box: FootprintBox::Parallelogram,
-            economies: Economies { whole_below: 0.25, beta: 0.75, resolution: 0.001 },
+            experimental: Economies { whole_below: 0.25, beta: 0.75, resolution: 0.001 },
         },
     };
     assert_eq!(scene, expected);
@@ -397,9 +398,20 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
         "\"square\"",
         "\"rectangle\" or \"parallelogram\"",
     ),
-    ("splatting.whole_below", "1.5", "splatting.whole_below", "1.5", "a number in [0, 1]"),
-    ("splatting.beta", "0", "splatting.beta", "0", "a number in (0, 1]"),
-    ("splatting.resolution", "-0.1", "splatting.resolution", "-0.1", "a number in [0, 1]"),
+    ("splatting.experimental.whole_below", "1.5", "splatting.experimental.whole_below", "1.5", "a number in [0, 1]"),
+    ("splatting.experimental.beta", "0", "splatting.experimental.beta", "0", "a number in (0, 1]"),
+    ("splatting.experimental.resolution", "-0.1", "splatting.experimental.resolution", "-0.1", "a number in [0, 1]"),
+    (
+        "splatting.experimental.alpha",
+        "1",
+        "splatting.experimental.alpha",
+        "an unknown key",
+        "whole_below, beta, resolution",
+    ),
+    ("splatting.experimental", "1", "splatting.experimental", "1 (integer)", "a table"),
+    ("splatting.whole_below", "0", "splatting.whole_below", "the former name", "splatting.experimental.whole_below"),
+    ("splatting.beta", "0.5", "splatting.beta", "the former name", "splatting.experimental.beta"),
+    ("splatting.resolution", "'x'", "splatting.resolution", "the former name", "splatting.experimental.resolution"),
     (
         "splatting.tile",
         "true",
@@ -512,7 +524,11 @@ fn refused_overrides() {
         ("=1", format!("=1: found an empty key, {usage}")),
         (".radius=1", format!(".radius=1: found an empty key, {usage}")),
         ("splatting.=1", format!("splatting.=1: found an empty key, {usage}")),
-        ("camera.up.x=1", format!("camera.up.x: found a key of more than two parts, {usage}")),
+        ("camera.up.x=1", "camera.up: found { x = 1 } (table), allowed: 3 numbers, each a finite number".to_owned()),
+        (
+            "splatting.radius.min.x=1",
+            "splatting.radius: found { min = { x = 1 } } (table), allowed: a number".to_owned(),
+        ),
         ("camera=1", "camera: found 1 (integer), allowed: a table".to_owned()),
         ("camera={ up = [1, 1] }", "camera.up: found [1, 1], allowed: 3 numbers, each a finite number".to_owned()),
         ("zoom=1", "zoom: found an unknown key, allowed: volume, camera".to_owned()),

@@ -126,9 +126,19 @@ const FIELDS: &[Field] = &[
     field("splatting.falloff", |scene, x| scene.splatting.falloff = x, &[0.01, 16.0], &[0.0, -1.0, 16.001]),
     field("splatting.slab_width", |scene, x| scene.splatting.slab_width = x, &[0.05, 8.0], &[0.0, 0.049, 8.001]),
     field("splatting.opacity_threshold", |scene, x| scene.splatting.opacity_threshold = x, &[1e-9, 1.0], THRESHOLD),
-    field("splatting.whole_below", |scene, x| scene.splatting.economies.whole_below = x, &[0.0, 1.0], SHARE),
-    field("splatting.beta", |scene, x| scene.splatting.economies.beta = x, &[1e-9, 1.0], THRESHOLD),
-    field("splatting.resolution", |scene, x| scene.splatting.economies.resolution = x, &[0.0, 1.0], SHARE),
+    field(
+        "splatting.experimental.whole_below",
+        |scene, x| scene.splatting.experimental.whole_below = x,
+        &[0.0, 1.0],
+        SHARE,
+    ),
+    field("splatting.experimental.beta", |scene, x| scene.splatting.experimental.beta = x, &[1e-9, 1.0], THRESHOLD),
+    field(
+        "splatting.experimental.resolution",
+        |scene, x| scene.splatting.experimental.resolution = x,
+        &[0.0, 1.0],
+        SHARE,
+    ),
 ];
 
 impl Field {

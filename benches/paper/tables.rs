@@ -161,7 +161,8 @@ pub(crate) fn economies(headless: &Headless, frames: usize, rows: &[Row]) {
     for row in rows.iter().filter(|row| row.table_2.is_some()) {
         let mut view = headless.view(row.scene.load_volume().unwrap(), &row.scene).unwrap();
         let default = Splatting { rasterizer: Rasterizer::Tiles, ..row.scene.splatting };
-        let settings: Vec<Splatting> = economies.iter().map(|&economies| Splatting { economies, ..default }).collect();
+        let settings: Vec<Splatting> =
+            economies.iter().map(|&economies| Splatting { experimental: economies, ..default }).collect();
         let runs = interleaved(headless, &mut view, &settings, frames);
         let images: Vec<_> = settings
             .iter()

@@ -1,6 +1,7 @@
 // Kernels as the tile rasterizer gathers them: in closed form, by polynomials instead of tables (eq. 3).
 //
-// Needs gather.wgsl: ECONOMIES, PERSPECTIVE, gather.
+// Needs gather.wgsl: PERSPECTIVE, gather.
+// Needs gather/economies.wgsl: Planes, economic_planes, economic_rim, rim_of, within_rim.
 // Needs shared/frame.wgsl: frame.
 // Needs shared/local_ray.wgsl: SectionMaps, local_ray, near_cut, section_maps.
 
@@ -15,7 +16,7 @@ struct Footprint {
     // In perspective, how its sections' footprints lie on the screen.
     axis: vec2f,
     maps: SectionMaps,
-    // Among the economies: ρ² from which a footprint adds too little, by sheet.
+    // See `economic_rim`.
     rim: vec4f,
 }
 
@@ -83,11 +84,7 @@ fn cut_by_rim(plane: f32, rim: vec4i) -> vec4f {
 
 // The Gaussian of ρ², up to the footprint's rim.
 fn in_plane_at(rho_squared: vec4f, footprint_rim: f32) -> vec4f {
-    let in_plane = exp2(rho_squared * gather.metric.w);
-    if ECONOMIES {
-        return select(vec4f(0.0), in_plane, rho_squared < vec4f(footprint_rim));
-    }
-    return in_plane;
+    return within_rim(exp2(rho_squared * gather.metric.w), rho_squared, footprint_rim);
 }
 
 // H(0, 0, t) where the chord of the kernel's ball ends.
@@ -114,9 +111,7 @@ fn footprint_of(own: Footprint, other: u32) -> Footprint {
         footprint.maps.across = subgroupShuffle(own.maps.across, other);
         footprint.maps.amplitude = subgroupShuffle(own.maps.amplitude, other);
     }
-    if ECONOMIES {
-        footprint.rim = subgroupShuffle(own.rim, other);
-    }
+    footprint.rim = rim_of(own.rim, other);
     return footprint;
 }
 
@@ -124,36 +119,25 @@ fn footprint_of(own: Footprint, other: u32) -> Footprint {
 fn footprint_at(p: vec4f, near: f32, whole: f32, amount: vec4f) -> Footprint {
     var footprint: Footprint;
     footprint.center_px = p.xy;
-    var first_step = near - p.z;
-    var steps = near - p.z + vec4f(1.0, 2.0, 3.0, 4.0) * frame.slab_width;
-    if ECONOMIES && whole >= 0.0 {
-        // As far as a kernel reaches, on either side of the sheet.
-        first_step = -WHOLE;
-        steps = select(vec4f(-WHOLE), vec4f(WHOLE), vec4f(1.0, 2.0, 3.0, 4.0) > vec4f(whole));
-    }
+    let sections = Planes(near - p.z, near - p.z + vec4f(1.0, 2.0, 3.0, 4.0) * frame.slab_width);
+    let steps = economic_planes(sections, whole);
     if PERSPECTIVE {
         let ray = local_ray(p.xy);
         let per_depth = select(frame.kernel_per_depth, ray.kernel_per_depth, frame.kernel_per_depth == 0.0);
         let cut = near_cut(ray, p.w);
-        let first = max(first_step * per_depth, cut);
-        let planes = max(steps * per_depth, vec4f(cut));
+        let first = max(steps.first * per_depth, cut);
+        let planes = max(steps.others * per_depth, vec4f(cut));
         footprint.amount = amount * ray.per_lambda;
         footprint.first_plane = along(first);
         footprint.planes = vec4f(along(planes.x), along(planes.y), along(planes.z), along(planes.w));
         footprint.axis = ray.axis;
         footprint.maps = section_maps(ray, p.w, vec4f(first, planes.xyz), planes);
     } else {
-        let planes = steps * frame.kernel_per_depth;
+        let planes = steps.others * frame.kernel_per_depth;
         footprint.amount = amount * frame.amplitude;
-        footprint.first_plane = along(first_step * frame.kernel_per_depth);
+        footprint.first_plane = along(steps.first * frame.kernel_per_depth);
         footprint.planes = vec4f(along(planes.x), along(planes.y), along(planes.z), along(planes.w));
     }
-    if ECONOMIES {
-        let amplitude = select(vec4f(1.0), footprint.maps.amplitude, PERSPECTIVE);
-        footprint.rim = log(footprint.amount.a * amplitude * gather.peak) / frame.falloff;
-    }
+    footprint.rim = economic_rim(footprint.amount.a, footprint.maps);
     return footprint;
 }
-
-// Sheet depths beyond every kernel's reach.
-const WHOLE = 1e6;

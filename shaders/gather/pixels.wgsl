@@ -80,8 +80,3 @@ fn open_word(pixels: Pixels, opacity: vec4f, depth: f32) -> u32 {
     }
     return block_word(is_open);
 }
-
-// Which have not reached β.
-fn shallow_word(pixels: Pixels, opacity: vec4f) -> u32 {
-    return block_word(pixels.is_inside & (opacity < vec4f(gather.beta)));
-}

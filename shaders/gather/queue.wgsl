@@ -11,10 +11,8 @@ override QUEUE: u32 = 224u;
 // it adds: (C·m, m).
 var<workgroup> queue_points: array<vec4u, QUEUE>;
 var<workgroup> queue_amounts: array<vec4f, QUEUE>;
-// The blocks whose pixels it is drawn to, one bit each, and from bit `WHOLE_SHIFT` on one more than the sheet that takes it as a whole.
+// The blocks whose pixels it is drawn to, one bit each; see also `WHOLE_SHIFT`.
 var<workgroup> queue_blocks: array<u32, QUEUE>;
-
-const WHOLE_SHIFT = 8u;
 
 // The subgroup's part.
 var<private> queue_first: u32;

@@ -1,9 +1,10 @@
 // The voxels that a subgroup of the tile rasterizer draws in a sheet group: which of those before stay, which come, their shading, and
 // their counts.
 //
-// Needs gather.wgsl: ECONOMIES, ORDER, PARALLELOGRAM, PASSES_PER_FIND, PASSES_PER_SHADING, PERSPECTIVE, SHEETS, bricks, color_ramp, drawn, first_px, gather, gathered, gradient_opacity_ramp, lane, lanes, opacity_ramp, open, passes, shallow, sheet_group.
+// Needs gather.wgsl: ORDER, PARALLELOGRAM, PASSES_PER_FIND, PASSES_PER_SHADING, PERSPECTIVE, SHEETS, bricks, color_ramp, drawn, first_px, gather, gathered, gradient_opacity_ramp, lane, lanes, opacity_ramp, open, passes, sheet_group.
+// Needs gather/economies.wgsl: ECONOMIES, economic_blocks, is_worthwhile, whole_sheet.
 // Needs gather/kernel.wgsl: footprint_at.
-// Needs gather/queue.wgsl: WHOLE_SHIFT, enqueue, queue_amounts, queue_blocks, queue_count, queue_first, queue_points, queue_size.
+// Needs gather/queue.wgsl: enqueue, queue_amounts, queue_blocks, queue_count, queue_first, queue_points, queue_size.
 // Needs gather/ramps.wgsl: is_long, ramp_at.
 // Needs gather/region.wgsl: blocks_in_box, blocks_in_parallelogram, bounds_of.
 // Needs gather/walk.wgsl: Found, SearchBounds, next_voxels.
@@ -142,10 +143,7 @@ fn shade_voxels(first: u32) {
         let p = project(at);
         let shaded = shaded(at, p);
         let sheets = overlapped_sheets(p);
-        var blocks = queue_blocks[slot];
-        if ECONOMIES {
-            blocks = economic_blocks(shaded, p, sheets);
-        }
+        let blocks = economic_blocks(queue_blocks[slot], shaded, p, sheets);
         if is_in {
             queue_amounts[slot] = shaded.amount;
             queue_blocks[slot] = blocks;
@@ -153,31 +151,10 @@ fn shade_voxels(first: u32) {
                 queue_points[slot].w = bitcast<u32>(p.w);
             }
         }
-        if is_in && (!ECONOMIES || blocks != 0u) {
-            count_drawn(voxel, p, sheets, blocks >> WHOLE_SHIFT != 0u);
+        if is_in && is_worthwhile(blocks) {
+            count_drawn(voxel, p, sheets, whole_sheet(blocks) >= 0.0);
         }
     }
-}
-
-// The blocks that a voxel is drawn to among §8's economies, and the sheet of the group that takes it as a whole.
-fn economic_blocks(shaded: Shaded, p: vec4f, sheets: vec2f) -> u32 {
-    let center = p.xy - first_px;
-    let is_deep = blocks_seen(shallow, center, sheet_group.half_box, 1.0) == 0u;
-    let is_whole = is_deep || shaded.alpha < gather.whole_below;
-    var whole = -1.0;
-    var is_here = true;
-    if is_whole {
-        let last_of_first = floor(max(sheets.x, 0.0) / f32(SHEETS)) * f32(SHEETS) + f32(SHEETS - 1u);
-        let center_sheet = floor((p.z - gather.near) / frame.slab_width);
-        let sheet = clamp(center_sheet, sheets.x, sheets.y - 1.0);
-        whole = select(sheet, min(sheet, last_of_first), is_deep) - sheet_group.first_sheet;
-        is_here = whole >= 0.0 && whole < f32(SHEETS);
-    }
-    let rims = footprint_at(p, sheet_group.near, whole, shaded.amount).rim;
-    let rim = max(max(rims.x, rims.y), max(rims.z, rims.w));
-    let part = sqrt(clamp(rim, 0.0, frame.support * frame.support)) / frame.support;
-    let blocks = select(0u, blocks_seen(open, center, sheet_group.half_box, part), is_here && rim > 0.0);
-    return select(0u, blocks | select(0u, (1u + u32(max(whole, 0.0))) << WHOLE_SHIFT, is_whole), blocks != 0u);
 }
 
 // A voxel's color and what it adds per block length, `(C·m, m)`, and its opacity.

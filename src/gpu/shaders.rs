@@ -120,6 +120,7 @@ pub const GATHER: Shader = shader!(
     "gather/pixels",
     "gather/voxels",
     "gather/kernel",
+    "gather/economies",
     "gather/ramps",
     "shared/volume",
     "shared/project",

@@ -99,7 +99,7 @@ pub fn gather(
     bins: &PatchBins,
     results: &GatheredLayout,
 ) -> Gather {
-    let economies = splatting.economies;
+    let economies = splatting.experimental;
     // What is behind a surface is culled; nothing else is behind anything.
     let has_beta = hides(splatting) && splatting.compositing != Compositing::Surface && economies.beta < 1.0;
     let whole = kernel.section(0.0, -kernel.radius(), kernel.radius());

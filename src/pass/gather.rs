@@ -15,7 +15,7 @@ use crate::gpu::layout::{Brick, Cut, Frame, Gather as GatherUniform, Gathered, I
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
 use crate::lists::patch_bins::{PATCH, SHEETS};
-use crate::settings::splatting::{Compositing, Economies, FootprintBox, Order, Splatting};
+use crate::settings::splatting::{Compositing, FootprintBox, Order, Splatting};
 
 /// The stage's pipelines; each is compiled when it is first asked for.
 #[derive(Debug)]
@@ -50,8 +50,8 @@ impl GatherMode {
         rays: RayMode,
         workgroups: u32,
     ) -> Self {
-        let Splatting { compositing, order, footprint_box, economies, .. } = *splatting;
-        let economies = economies != Economies::default();
+        let Splatting { compositing, order, footprint_box, experimental, .. } = *splatting;
+        let economies = experimental.in_use().is_some();
         // Every voxel has its own parallelogram there.
         let footprint_box = if perspective { FootprintBox::Rectangle } else { footprint_box };
         Self { compositing, order, footprint_box, perspective, economies, labels, holes, rays, divided: workgroups > 1 }

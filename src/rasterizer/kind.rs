@@ -8,7 +8,7 @@ use crate::pass::composite::RayMode;
 use crate::pass::gather::WORKGROUP_BYTES;
 use crate::setting_error::SettingError;
 use crate::settings::splatting::{
-    Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting, check_first_hit,
+    Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting, check_first_hit,
 };
 
 /// Threads that a subgroup may have.
@@ -34,9 +34,12 @@ impl RasterizerKind {
         let is_by_settings = by_settings.is_some();
         match (splatting.rasterizer, by_settings.or_else(|| obstacle_in_device(device))) {
             (Rasterizer::Quads, _) if insists => {
-                let found =
-                    "\"quads\" with splatting.footprint_box = \"parallelogram\", whole_below, beta or resolution";
-                Err(SettingError::new("splatting.rasterizer", found, "\"tiles\" or \"auto\" with them").into())
+                let setting = match splatting.experimental.in_use() {
+                    Some(economy) => economy.to_string(),
+                    None => "splatting.footprint_box = \"parallelogram\"".to_owned(),
+                };
+                let found = format!("\"quads\" with {setting}");
+                Err(SettingError::new("splatting.rasterizer", found, "\"tiles\" or \"auto\" with it").into())
             }
             (Rasterizer::Tiles | Rasterizer::Auto, Some(obstacle)) if insists => Err(obstacle),
             _ if splatting.method == Method::CompositeEverySample => Ok((Self::Samples, None)),
@@ -85,7 +88,7 @@ fn obstacle_in_device(device: &Device) -> Option<RenderError> {
 pub(crate) fn insists_on_tiles(splatting: &Splatting) -> bool {
     splatting.rasterizer == Rasterizer::Tiles
         || splatting.footprint_box == FootprintBox::Parallelogram
-        || splatting.economies != Economies::default()
+        || splatting.experimental.in_use().is_some()
 }
 
 /// Checks that the settings allow what of rays is looked at.

@@ -13,7 +13,8 @@ use crate::scene::Scene;
 use crate::setting_error::SettingError;
 use crate::settings::camera::{Camera, Eye, ViewBasis};
 use crate::settings::clip::HalfSpace;
-use crate::settings::splatting::{Economies, Method};
+use crate::settings::economies::Economies;
+use crate::settings::splatting::Method;
 use crate::volume::Grid;
 
 /// The maximum image size in pixels along a side, as on the largest GPUs.
@@ -85,7 +86,7 @@ impl Geometry {
             center: camera.middle() / grid.unit(),
             eye,
             method: splatting.method,
-            economies: splatting.economies,
+            economies: splatting.experimental,
             pix,
             ro: ray.ro,
             lambda: ray.lambda,

@@ -7,6 +7,7 @@ use toml::{Table, Value};
 
 use super::{ImageSettings, SceneError};
 use crate::setting_error::{Allowed, Found, Interval, SettingError};
+use crate::settings::economies::KEYS;
 use crate::settings::transfer_function::{Ramp, RampError};
 use crate::volume::{SIZES, dims_of};
 
@@ -25,30 +26,32 @@ pub(super) fn apply_override(root: &mut Table, argument: &str) -> Result<String,
     let Some((key, text)) = argument.split_once('=') else { return Err(misused(argument, "no \"=\"", usage)) };
     let (key, text) = (key.trim(), text.trim());
     let value = text.parse().unwrap_or_else(|_| Value::String(text.to_owned()));
-    match *key.split('.').collect::<Vec<_>>() {
-        ref names if names.contains(&"") => return Err(misused(argument, "an empty key", usage)),
-        [name] => _ = root.insert(name.to_owned(), value),
-        [table, name] => match root.entry(table).or_insert_with(|| Value::Table(Table::new())) {
-            Value::Table(section) => {
-                // The two keys name the same thing, so the last one wins.
-                match key {
-                    "volume.path" => _ = section.remove("builtin"),
-                    "volume.builtin" => {
-                        section.retain(|name, _| !["path", "dims", "type", "endian", "offset"].contains(&name));
-                    }
-                    "transfer.color" => _ = section.remove("colormap"),
-                    "transfer.colormap" => _ = section.remove("color"),
-                    _ => {}
-                }
-                section.insert(name.to_owned(), value);
-            }
-            other => {
-                return Err(misused(key, &format!("{table} = {}", typed(other)), &format!("{table} to be a table")));
-            }
-        },
-        // Scene files have only two levels, so no table fits a longer key.
-        _ => return Err(misused(key, "a key of more than two parts", usage)),
+    if key.split('.').any(str::is_empty) {
+        return Err(misused(argument, "an empty key", usage));
     }
+    let (tables, name) = key.rsplit_once('.').map_or((None, key), |(tables, name)| (Some(tables), name));
+    let mut section = root;
+    let mut path = String::new();
+    for table in tables.into_iter().flat_map(|tables| tables.split('.')) {
+        path = if path.is_empty() { table.to_owned() } else { format!("{path}.{table}") };
+        section = match section.entry(table).or_insert_with(|| Value::Table(Table::new())) {
+            Value::Table(section) => section,
+            other => {
+                return Err(misused(key, &format!("{path} = {}", typed(other)), &format!("{path} to be a table")));
+            }
+        };
+    }
+    // The two keys name the same thing, so the last one wins.
+    match key {
+        "volume.path" => _ = section.remove("builtin"),
+        "volume.builtin" => {
+            section.retain(|name, _| !["path", "dims", "type", "endian", "offset"].contains(&name));
+        }
+        "transfer.color" => _ = section.remove("colormap"),
+        "transfer.colormap" => _ = section.remove("color"),
+        _ => {}
+    }
+    section.insert(name.to_owned(), value);
     Ok(key.to_owned())
 }
 
@@ -82,6 +85,11 @@ impl Origins<'_> {
         }
     }
 
+    /// The overrides of a table's keys. They also create the table if the file has none: `colour.red` adds a table `colour`.
+    fn overrides_within(&self, table: &str) -> Vec<&str> {
+        self.overridden.iter().filter(|set| is_within(set, table)).map(String::as_str).collect()
+    }
+
     /// The error for settings that their type's check refused, quoting the value as written.
     pub(super) fn refused(&self, error: SettingError) -> SceneError {
         let SettingError { key, found, allowed } = error;
@@ -89,7 +97,8 @@ impl Origins<'_> {
             "camera.up" => &["camera.direction"],
             "splatting.compositing" => &["preset", "splatting.method", "splatting.order"],
             "splatting.classification" => {
-                &["splatting.method", "splatting.whole_below", "splatting.beta", "splatting.resolution"]
+                let [whole_below, beta, resolution] = KEYS.map(|(key, _)| key);
+                &["splatting.method", whole_below, beta, resolution]
             }
             "splatting.falloff" => &["splatting.classification"],
             "splatting.interpolation" => &["splatting.classification", "splatting.radius", "splatting.falloff"],
@@ -136,9 +145,9 @@ impl<'a> Section<'a> {
         Self { origins, name: String::new(), table, known: Vec::new() }
     }
 
-    /// The table under a key of the root; empty if missing.
+    /// The table under a key; empty if missing.
     pub(super) fn section(&mut self, name: &'static str) -> Result<Self, SceneError> {
-        let empty = Self { origins: self.origins, name: name.to_owned(), table: Table::new(), known: Vec::new() };
+        let empty = Self { origins: self.origins, name: self.key(name), table: Table::new(), known: Vec::new() };
         let mut section = empty;
         self.read(name, &mut section, |entry| entry.section("a table"))?;
         Ok(section)
@@ -170,14 +179,19 @@ impl<'a> Section<'a> {
         value.ok_or_else(|| self.origins.invalid(&self.key(name), &[], "no such key", allowed))
     }
 
+    /// Refuses a former key, naming the key that replaced it.
+    pub(super) fn moved(&self, former: &str, key: &str) -> Result<(), SceneError> {
+        if !self.table.contains_key(former) {
+            return Ok(());
+        }
+        Err(self.origins.invalid(&self.key(former), &[], "the former name of a setting", key))
+    }
+
     /// Refuses the keys that were not requested.
     pub(super) fn finish(self) -> Result<(), SceneError> {
         let Some(name) = self.table.keys().next() else { return Ok(()) };
         let key = self.key(&name.escape_debug().to_string());
-        // An override of `colour.red` adds a table `colour`.
-        let related: Vec<_> =
-            self.origins.overridden.iter().filter(|set| is_within(set, &key)).map(String::as_str).collect();
-        Err(self.origins.invalid(&key, &related, "an unknown key", self.known.join(", ")))
+        Err(self.origins.invalid(&key, &self.origins.overrides_within(&key), "an unknown key", self.known.join(", ")))
     }
 
     /// The full name of a key.
@@ -204,7 +218,7 @@ impl<'a> Entry<'a> {
 
     /// The error for a value of the wrong type.
     pub(super) fn mistyped(&self, allowed: impl Into<Allowed>) -> SceneError {
-        self.origins.invalid(&self.key, &[], typed(&self.value), allowed)
+        self.origins.invalid(&self.key, &self.origins.overrides_within(&self.key), typed(&self.value), allowed)
     }
 
     /// The value as a table.

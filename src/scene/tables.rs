@@ -14,6 +14,7 @@ use crate::appearance::Colormap;
 use crate::setting_error::Interval;
 use crate::settings::camera::{Camera, FOV_Y, Fit, Projection};
 use crate::settings::clip::{Clip, MAX_PLANES};
+use crate::settings::economies::{Economies, KEYS};
 use crate::settings::shading::{Light, Shading};
 use crate::settings::splatting::{Compositing, FALLOFF, RADIUS, SLAB_WIDTH, Splatting};
 use crate::settings::transfer_function::{LabelTables, Ramp};
@@ -237,13 +238,24 @@ pub(super) fn splatting(mut section: Section, compositing: Compositing) -> Resul
     section.read("tiles", &mut splatting.tiles, Entry::boolean)?;
     section.read("rasterizer", &mut splatting.rasterizer, |entry| entry.choice(RASTERIZERS))?;
     section.read("footprint_box", &mut splatting.footprint_box, |entry| entry.choice(BOXES))?;
-    section.read("whole_below", &mut splatting.economies.whole_below, |entry| entry.number(Interval::SHARE))?;
-    section.read("beta", &mut splatting.economies.beta, |entry| entry.number(Interval::THRESHOLD))?;
-    section.read("resolution", &mut splatting.economies.resolution, |entry| entry.number(Interval::SHARE))?;
+    splatting.experimental = economies(section.section("experimental")?)?;
+    for (key, former) in KEYS {
+        section.moved(former, key)?;
+    }
     let origins = section.origins;
     section.finish()?;
     splatting.check().map_err(|error| origins.refused(error))?;
     Ok(splatting)
+}
+
+/// `[splatting.experimental]`.
+fn economies(mut section: Section) -> Result<Economies, SceneError> {
+    let mut economies = Economies::default();
+    section.read("whole_below", &mut economies.whole_below, |entry| entry.number(Interval::SHARE))?;
+    section.read("beta", &mut economies.beta, |entry| entry.number(Interval::THRESHOLD))?;
+    section.read("resolution", &mut economies.resolution, |entry| entry.number(Interval::SHARE))?;
+    section.finish()?;
+    Ok(economies)
 }
 
 /// Reads a vector of three numbers.

@@ -13,8 +13,9 @@ use super::{ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use crate::appearance::{Colormap, Preset};
 use crate::settings::camera::{Camera, Projection};
 use crate::settings::clip::Clip;
+use crate::settings::economies::Economies;
 use crate::settings::shading::{Light, Shading};
-use crate::settings::splatting::{Economies, Splatting};
+use crate::settings::splatting::Splatting;
 use crate::settings::transfer_function::Ramp;
 use crate::volume::RawLayout;
 
@@ -190,9 +191,9 @@ fn write_shading(text: &mut Text, shading: &Shading) {
 
 fn write_splatting(text: &mut Text, splatting: &Splatting) {
     let Splatting { method, radius, falloff, slab_width, footprint, compositing, order, .. } = *splatting;
-    let Splatting { opacity_threshold, culling, tiles, rasterizer, footprint_box, economies, .. } = *splatting;
+    let Splatting { opacity_threshold, culling, tiles, rasterizer, footprint_box, experimental, .. } = *splatting;
     let Splatting { classification, interpolation, .. } = *splatting;
-    let Economies { whole_below, beta, resolution } = economies;
+    let Economies { whole_below, beta, resolution } = experimental;
     text.table("splatting");
     text.line("method", name_of(METHODS, method));
     text.line("radius", radius);
@@ -208,6 +209,7 @@ fn write_splatting(text: &mut Text, splatting: &Splatting) {
     text.line("tiles", tiles);
     text.line("rasterizer", name_of(RASTERIZERS, rasterizer));
     text.line("footprint_box", name_of(BOXES, footprint_box));
+    text.table("splatting.experimental");
     text.line("whole_below", whole_below);
     text.line("beta", beta);
     text.line("resolution", resolution);

@@ -8,6 +8,7 @@
 pub(crate) mod camera;
 pub(crate) mod clip;
 mod clip_from_world;
+pub(crate) mod economies;
 pub(crate) mod framing;
 pub(crate) mod shading;
 pub(crate) mod splatting;
@@ -16,10 +17,10 @@ pub(crate) mod transfer_function;
 pub use crate::setting_error::{Allowed, Found, Interval};
 pub use camera::{Camera, Fit, Projection};
 pub use clip::{Clip, HalfSpace, MAX_PLANES};
+pub use economies::Economies;
 pub use framing::Extent;
 pub use shading::{Gradient, Light, Shading};
 pub use splatting::{
-    Classification, Compositing, Economies, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer,
-    Splatting,
+    Classification, Compositing, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer, Splatting,
 };
 pub use transfer_function::{LabelTables, Ramp, RampError, Tables, TransferFunction};

@@ -2,6 +2,7 @@
 
 use std::ops::Bound::{Excluded, Included};
 
+use super::economies::Economies;
 use crate::geometry::kernel::Kernel;
 use crate::setting_error::{Interval, SettingError};
 
@@ -142,27 +143,6 @@ pub enum FootprintBox {
     Parallelogram,
 }
 
-/// Economies: ways to draw less where it is hardly visible (§8, the paper's future work). Tiles only.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Economies {
-    /// Voxels with an opacity per unit length below this are projected as whole kernels, into the sheet that contains their centre. 0 turns
-    /// this off.
-    pub whole_below: f64,
-    /// β-acceleration: where every pixel in a kernel's box has reached this opacity, the kernel is projected whole, into the first group of
-    /// sheets that it reaches. No channel changes by more than `1 - beta`. Front to back only, and not for [`Compositing::Surface`]; 1 turns
-    /// this off.
-    pub beta: f64,
-    /// A footprint ends where it adds less than this to its sheet's alpha. 0 keeps the whole kernel.
-    pub resolution: f64,
-}
-
-impl Default for Economies {
-    /// All economies off.
-    fn default() -> Self {
-        Self { whole_below: 0.0, beta: 1.0, resolution: 0.0 }
-    }
-}
-
 /// All splatting settings of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Splatting {
@@ -197,8 +177,8 @@ pub struct Splatting {
     pub rasterizer: Rasterizer,
     /// The pixels that early splat elimination tests.
     pub footprint_box: FootprintBox,
-    /// Economies where they are hardly visible.
-    pub economies: Economies,
+    /// Economies where they are hardly visible; off by default.
+    pub experimental: Economies,
 }
 
 impl Splatting {
@@ -212,10 +192,7 @@ impl Splatting {
         FALLOFF.check("splatting.falloff", self.falloff)?;
         SLAB_WIDTH.check("splatting.slab_width", self.slab_width)?;
         Interval::THRESHOLD.check("splatting.opacity_threshold", self.opacity_threshold)?;
-        let Economies { whole_below, beta, resolution } = self.economies;
-        Interval::SHARE.check("splatting.whole_below", whole_below)?;
-        Interval::THRESHOLD.check("splatting.beta", beta)?;
-        Interval::SHARE.check("splatting.resolution", resolution)?;
+        self.experimental.check()?;
         let refused = |found: String, allowed: &str| Err(SettingError::new("splatting.compositing", found, allowed));
         let name = format!("{:?}", self.compositing).to_lowercase();
         if self.compositing.is_by_means() && self.method == Method::CompositeEverySample {
@@ -235,17 +212,10 @@ impl Splatting {
     /// Checks that the other settings go with [`Classification::After`].
     fn check_after(&self) -> Result<(), SettingError> {
         let refused = |key: &str, found: String, allowed: &str| Err(SettingError::new(key, found, allowed));
-        let excluded = match (self.method, &self.economies) {
-            (Method::AxisAligned, _) => Some("splatting.method = \"axis-aligned\"".to_owned()),
-            (Method::CompositeEverySample, _) => Some("splatting.method = \"composite-every-sample\"".to_owned()),
-            (_, Economies { whole_below, .. }) if *whole_below > 0.0 => {
-                Some(format!("splatting.whole_below = {whole_below}"))
-            }
-            (_, Economies { beta, .. }) if *beta < 1.0 => Some(format!("splatting.beta = {beta}")),
-            (_, Economies { resolution, .. }) if *resolution > 0.0 => {
-                Some(format!("splatting.resolution = {resolution}"))
-            }
-            _ => None,
+        let excluded = match self.method {
+            Method::AxisAligned => Some("splatting.method = \"axis-aligned\"".to_owned()),
+            Method::CompositeEverySample => Some("splatting.method = \"composite-every-sample\"".to_owned()),
+            Method::ImageAligned => self.experimental.in_use().map(|economy| economy.to_string()),
         };
         if let Some(setting) = excluded {
             return refused("splatting.classification", format!("\"after\" with {setting}"), "\"before\" with it");
@@ -282,7 +252,7 @@ impl Default for Splatting {
             tiles: true,
             rasterizer: Rasterizer::Auto,
             footprint_box: FootprintBox::Rectangle,
-            economies: Economies::default(),
+            experimental: Economies::default(),
         }
     }
 }

@@ -21,9 +21,24 @@ fn what_excludes_after_is_named() {
     for (sets, key, found, allowed) in [
         (&["splatting.method=axis-aligned"][..], "classification", "method = \"axis-aligned\"", "\"before\" with it"),
         (&["splatting.method=composite-every-sample"], "classification", "composite-every-sample", "\"before\""),
-        (&["splatting.whole_below=0.1"], "classification", "\"after\" with splatting.whole_below = 0.1", "\"before\""),
-        (&["splatting.beta=0.9"], "classification", "\"after\" with splatting.beta = 0.9", "\"before\""),
-        (&["splatting.resolution=0.01"], "classification", "\"after\" with splatting.resolution = 0.01", "\"before\""),
+        (
+            &["splatting.experimental.whole_below=0.1"],
+            "classification",
+            "\"after\" with splatting.experimental.whole_below = 0.1",
+            "\"before\"",
+        ),
+        (
+            &["splatting.experimental.beta=0.9"],
+            "classification",
+            "\"after\" with splatting.experimental.beta = 0.9",
+            "\"before\"",
+        ),
+        (
+            &["splatting.experimental.resolution=0.01"],
+            "classification",
+            "\"after\" with splatting.experimental.resolution = 0.01",
+            "\"before\"",
+        ),
         (&["splatting.falloff=11.5"], "falloff", "11.5 with splatting.classification", "at most 11"),
         (
             &["splatting.interpolation=exact", "splatting.falloff=0.94"],

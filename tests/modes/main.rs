@@ -7,7 +7,7 @@ mod along_rays;
 #[expect(dead_code, reason = "not every file needs all of it")]
 #[path = "../common/mod.rs"]
 mod common;
-mod economies;
+mod culling;
 mod surface;
 mod twin;
 
