@@ -188,7 +188,12 @@ impl Parser {
     fn elements(&mut self, end: u64, depth: u32) -> Result<Dataset, VolumeError> {
         let mut data = self.empty();
         if depth > MAX_DEPTH {
-            return Err(invalid(&self.path, "elements", "sequences nested deeper", format!("{MAX_DEPTH} of them")));
+            return Err(invalid(
+                &self.path,
+                "elements",
+                "sequences nested deeper",
+                format!("at most {MAX_DEPTH} levels"),
+            ));
         }
         while self.begun.is_some() || self.bytes.at() < end && !self.bytes.is_at_end()? {
             let header = self.header()?;
