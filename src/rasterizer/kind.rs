@@ -1,4 +1,4 @@
-//! Which rasterizer draws a view, and what it does not draw.
+//! The choice of the rasterizer for a view, and what each one refuses.
 
 use wgpu::Device;
 
@@ -11,23 +11,23 @@ use crate::settings::splatting::{
     Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting, check_first_hit,
 };
 
-/// Threads that a subgroup may have.
+/// The subgroup sizes that tiles support.
 pub(super) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;
 
-/// How to draw.
+/// The rasterizer of a view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RasterizerKind {
     Quads,
-    /// If the view fits.
+    /// Tiles, if the view fits.
     Tiles,
     Samples,
 }
 
 impl RasterizerKind {
-    /// That of some settings, and if it is quads only because of the device, why.
+    /// The rasterizer for some settings; if it is quads only because of the device, also the reason.
     ///
     /// # Errors
-    /// If they insist on what the device or the other settings do not allow.
+    /// If the settings require what the device or the other settings do not allow.
     pub(crate) fn of(device: &Device, splatting: &Splatting) -> Result<(Self, Option<RenderError>), RenderError> {
         let insists = insists_on_tiles(splatting);
         let by_settings = obstacle_in_settings(splatting);
@@ -54,7 +54,7 @@ fn refused_tiles(found: String, allowed: &str) -> Option<RenderError> {
     Some(SettingError::new("splatting.rasterizer", format!("\"tiles\" with {found}"), allowed).into())
 }
 
-/// Why some settings cannot be drawn by tiles; `None` if they can.
+/// Why tiles do not support some settings; `None` if they do.
 fn obstacle_in_settings(splatting: &Splatting) -> Option<RenderError> {
     if splatting.method == Method::CompositeEverySample {
         let found = "splatting.method = \"composite-every-sample\"".to_owned();
@@ -66,7 +66,7 @@ fn obstacle_in_settings(splatting: &Splatting) -> Option<RenderError> {
     None
 }
 
-/// Why a device cannot draw by tiles; `None` if it can.
+/// Why a device does not support tiles; `None` if it does.
 fn obstacle_in_device(device: &Device) -> Option<RenderError> {
     if !device.features().contains(TILE_FEATURES) {
         return refused_tiles("a device without subgroups, or barriers for them".to_owned(), "\"quads\"");
@@ -84,17 +84,17 @@ fn obstacle_in_device(device: &Device) -> Option<RenderError> {
     None
 }
 
-/// Whether quads will not do.
+/// Whether the settings rule quads out.
 pub(crate) fn insists_on_tiles(splatting: &Splatting) -> bool {
     splatting.rasterizer == Rasterizer::Tiles
         || splatting.footprint_box == FootprintBox::Parallelogram
         || splatting.experimental.in_use().is_some()
 }
 
-/// Checks that the settings allow what of rays is looked at.
+/// Checks that the settings support cuts and first hits.
 ///
 /// # Errors
-/// If they do not, or first hits are more than a binding.
+/// If they do not, or first hits exceed a binding.
 pub(crate) fn check_rays(
     device: &Device,
     splatting: &Splatting,
@@ -109,7 +109,7 @@ pub(crate) fn check_rays(
     }
     let Some(opacity) = first_hit else { return Ok(()) };
     if splatting.compositing == Compositing::Minimum {
-        let allowed = "another one: the least is known at the end of a ray";
+        let allowed = "another compositing: the minimum is known only at the end of a ray";
         return refused("splatting.compositing", "\"minimum\" with first hits", allowed);
     }
     check_first_hit(opacity)?;
