@@ -249,7 +249,10 @@ fn the_labels_preset_colours_segments_too() {
 
     let message =
         builtin_scene("cube:8", &["preset=labels"]).transfer.check_volume(&row(&[0.5, 1.0])).unwrap_err().to_string();
-    assert!(message.starts_with("preset: found labels for a volume that has none, allowed: values that"), "{message}");
+    assert!(
+        message.starts_with("preset: found labels, for a volume without labels, allowed: values that"),
+        "{message}"
+    );
     let labels = Labels {
         origin: "l".to_owned(),
         dims: UVec3::new(2, 1, 1),

@@ -75,7 +75,7 @@ fn what_is_on_another_device_is_an_error() {
         result => panic!("{result:?}"),
     };
     let message = refused(other.draw(&mut view).map(|_| ()));
-    assert_eq!(message, "device: found another one than that of the view, allowed: the device of the view");
+    assert_eq!(message, "device: found another device than that of the view, allowed: the device of the view");
     let volume = view.volume().gpu_volume().clone();
     assert!(refused(SceneView::new(other.device(), &volume, &scene).map(|_| ())).contains("the volume"));
     let prepared = other.renderer().prepare(one.device(), one.queue(), &mut view).map(|_| ());

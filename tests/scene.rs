@@ -322,7 +322,7 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
         "[{label = 1}, {label = 1}]",
         "transfer.label[1].label",
         "1",
-        "a label that no table before has",
+        "a label that no earlier table has",
     ),
     ("transfer.label", "[{label = 1, visible = 0}]", "transfer.label[0].visible", "0 (integer)", "true or false"),
     (
@@ -469,7 +469,7 @@ fn label_tables_need_labels() {
     let refused = |text: &str, sets: &[&str], origin: &str| {
         let message = parse(text, sets).unwrap_err().to_string();
         let expected = "transfer.label: found tables for a volume without labels, \
-                        allowed: none, or volume.labels, or volume.builtin = \"head\" or \"tomato\"";
+                        allowed: no such tables, or volume.labels, or volume.builtin = \"head\" or \"tomato\"";
         assert_eq!(message, format!("{origin}: {expected}"));
     };
     refused(&format!("{text}builtin = 'cube'"), &[], "scene.toml");

@@ -1,4 +1,4 @@
-//! Which rasterizer draws a view, and what it does not draw.
+//! The choice of the rasterizer for a view, and what each one refuses.
 
 use wgpu::Device;
 
@@ -11,14 +11,14 @@ use crate::settings::splatting::{
     Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting, check_first_hit,
 };
 
-/// Threads that a subgroup may have.
+/// The subgroup sizes that tiles support.
 pub(super) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;
 
-/// What draws a frame: the outcome of the choices that a scene and a renderer state as [`Rasterizer`].
+/// The rasterizer of a frame, which follows from the [`Rasterizer`] that the scene and the renderer name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RasterizerKind {
     Quads,
-    /// If the view fits; if it does not, it is an error where tiles are insisted on, else quads draw it.
+    /// Tiles, if the view fits. A view that does not fit is an error if tiles are insisted on; otherwise quads draw it.
     Tiles {
         insisted: bool,
     },
@@ -26,11 +26,11 @@ pub(crate) enum RasterizerKind {
 }
 
 impl RasterizerKind {
-    /// That of some settings, and if it is quads only because of the device, why. `preferred` is the renderer's choice, for settings that
-    /// leave it.
+    /// The rasterizer for some settings; if it is quads only because of the device, also the reason. `preferred` is the renderer's choice,
+    /// for settings that do not name one.
     ///
     /// # Errors
-    /// If the settings insist on what the device or other settings do not allow.
+    /// If the settings require what the device or the other settings do not allow.
     pub(crate) fn of(
         device: &Device,
         splatting: &Splatting,
@@ -67,7 +67,7 @@ fn refused_tiles(found: String, allowed: &str) -> Option<RenderError> {
     Some(SettingError::new("splatting.rasterizer", format!("\"tiles\" with {found}"), allowed).into())
 }
 
-/// Why some settings cannot be drawn by tiles; `None` if they can.
+/// Why tiles do not support some settings; `None` if they do.
 fn obstacle_in_settings(splatting: &Splatting) -> Option<RenderError> {
     if splatting.method == Method::CompositeEverySample {
         let found = "splatting.method = \"composite-every-sample\"".to_owned();
@@ -79,7 +79,7 @@ fn obstacle_in_settings(splatting: &Splatting) -> Option<RenderError> {
     None
 }
 
-/// Why a device cannot draw by tiles; `None` if it can.
+/// Why a device does not support tiles; `None` if it does.
 fn obstacle_in_device(device: &Device) -> Option<RenderError> {
     if !device.features().contains(TILE_FEATURES) {
         return refused_tiles("a device without subgroups, or barriers for them".to_owned(), "\"quads\"");
@@ -97,10 +97,10 @@ fn obstacle_in_device(device: &Device) -> Option<RenderError> {
     None
 }
 
-/// Checks that the settings allow what of rays is looked at.
+/// Checks that the settings support cuts and first hits.
 ///
 /// # Errors
-/// If they do not, or first hits are more than a binding.
+/// If they do not, or first hits exceed a binding.
 pub(crate) fn check_rays(
     device: &Device,
     splatting: &Splatting,
@@ -115,7 +115,7 @@ pub(crate) fn check_rays(
     }
     let Some(opacity) = first_hit else { return Ok(()) };
     if splatting.compositing == Compositing::Minimum {
-        let allowed = "another one: the least is known at the end of a ray";
+        let allowed = "another compositing: the minimum is known only at the end of a ray";
         return refused("splatting.compositing", "\"minimum\" with first hits", allowed);
     }
     check_first_hit(opacity)?;

@@ -24,7 +24,7 @@ use crate::rasterizer::request::FrameRequest;
 use crate::settings::splatting::Order;
 use crate::stats::GroupSlabs;
 
-/// The stages.
+/// The rasterizer's stages.
 #[derive(Debug)]
 pub(crate) struct QuadRasterizer {
     sheet_format: TextureFormat,
@@ -36,11 +36,11 @@ pub(crate) struct QuadRasterizer {
     occlude: Occlude,
 }
 
-/// A frame's part that is the quad rasterizer's.
+/// The quad rasterizer's part of a frame.
 #[derive(Debug)]
 pub(crate) struct QuadFrame {
     planned: Planned,
-    /// Axis-aligned, one for each of the other axes that views have looked along (§3.1): turning back sorts nothing.
+    /// For axis-aligned sheets, one for each other axis that views have looked along (§3.1), so that turning back needs no sorting.
     other_axes: Vec<Planned>,
     targets: Targets,
     footprints: Footprints,
@@ -53,13 +53,13 @@ pub(crate) struct QuadFrame {
     splat_mode: SplatMode,
     clear_group: BindGroup,
     composite_mode: CompositeMode,
-    /// First hits, `[u32]`, one per pixel; of one, if they are not asked for.
+    /// First hits, `[u32]`, one per pixel, or a single one if they are not requested.
     hits: Buffer,
     composite_groups: Vec<BindGroup>,
     occlude_groups: [BindGroup; 2],
 }
 
-/// What only changes with the view, or with the bricks: the buckets.
+/// The buckets, which change only with the view or the bricks.
 #[derive(Debug)]
 struct Planned {
     plan: FramePlan,
@@ -70,7 +70,7 @@ struct Planned {
     revision: u64,
     /// For every list its bricks in bucket order, `[u32]`.
     orders: Vec<Buffer>,
-    /// For every list the most bricks and voxels that any group can visit.
+    /// For every list the maximum number of bricks and voxels that a group visits.
     most: Vec<(u32, u32)>,
 }
 
@@ -94,10 +94,10 @@ impl QuadRasterizer {
         }
     }
 
-    /// Buckets bricks if need be, and allocates what does not fit any more.
+    /// Sorts bricks into buckets if necessary, and allocates buffers that no longer fit.
     ///
     /// # Errors
-    /// If the device's buffers may not be that large.
+    /// If they exceed the device's maximum size of buffers.
     pub(crate) fn prepare(
         &self,
         inputs: FrameInputs<'_>,
@@ -152,7 +152,7 @@ impl QuadRasterizer {
         Ok((frame, Prepared { bucketed, tabled }))
     }
 
-    /// Every list's part of culling and of splatting.
+    /// Prepares culling and splatting for every list of bricks.
     fn prepare_lists(
         &self,
         inputs: FrameInputs<'_>,
@@ -183,7 +183,7 @@ impl QuadRasterizer {
             .collect()
     }
 
-    /// Binds composite to every band of the compositing buffer.
+    /// Binds the stage composite to every band of the compositing buffer.
     fn bind_bands(
         &self,
         inputs: FrameInputs<'_>,
@@ -197,10 +197,10 @@ impl QuadRasterizer {
         compositing.bands.iter().map(|band| self.composite.bind(device, mode, buffers, band)).collect()
     }
 
-    /// What a new frame of these lists of bricks will take, with groups of `sheets` sheets.
+    /// The resources that a new frame of these lists of bricks needs, with groups of `sheets` sheets.
     ///
     /// # Errors
-    /// Those of [`Self::prepare`].
+    /// As for [`Self::prepare`].
     pub(crate) fn estimate(
         limits: &Limits,
         request: &FrameRequest,
@@ -263,12 +263,12 @@ impl QuadRasterizer {
 }
 
 impl QuadFrame {
-    /// Passes of the frame: every group has three.
+    /// The number of the frame's passes: three per group.
     pub(crate) fn passes(&self) -> usize {
         passes(&self.planned.plan)
     }
 
-    /// Its groups' slabs.
+    /// The groups' slabs.
     pub(crate) fn group_slabs(&self) -> GroupSlabs {
         let FramePlan { groups, sheets, .. } = &self.planned.plan;
         GroupSlabs { firsts: groups.iter().map(|group| group.first_slab).collect(), sheets: *sheets }
@@ -281,7 +281,7 @@ impl QuadFrame {
         encoder.copy_buffer_to_buffer(&self.tile_lists.counts, 0, staging, tally, tiles);
     }
 
-    /// The words of first hits, and where in their buffer they start, bytes.
+    /// The buffer with the words of first hits, and their byte offset in it.
     pub(crate) fn first_hits(&self) -> (&Buffer, u64) {
         (&self.hits, 0)
     }
@@ -301,7 +301,8 @@ impl QuadFrame {
 }
 
 impl Planned {
-    /// What is planned for the view, of `old` if that will do; what of it will do for another axis; and whether bricks had to be sorted.
+    /// The plan for the view, taken from `old` if one is still valid there; the plans that stay valid for other axes; and whether the
+    /// plan is new.
     fn renewed(inputs: FrameInputs<'_>, old: Vec<Self>, sheets: u32) -> (Self, Vec<Self>, bool) {
         let FrameInputs { device, volume, request, .. } = inputs;
         let FrameRequest { view, splatting, covered, .. } = request;
@@ -332,7 +333,7 @@ impl Planned {
     }
 }
 
-/// What of the previous frame may be taken over.
+/// The buffers of the previous frame that may be reused.
 #[derive(Default)]
 struct PreviousBuffers {
     planned: Vec<Planned>,
@@ -361,17 +362,17 @@ impl PreviousBuffers {
     }
 }
 
-/// Timed ones: every group has three.
+/// The number of timed passes: three per group.
 fn passes(plan: &FramePlan) -> usize {
     3 * plan.groups.len()
 }
 
-/// Bytes from one group to the next.
+/// The stride between groups in bytes.
 fn group_stride(limits: &Limits) -> usize {
     size_of::<SheetGroup>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize)
 }
 
-/// The buffers of what culling counts, and of first hits.
+/// The buffers for culling's counts and for first hits.
 fn counts_and_hits(request: &FrameRequest) -> [BufferSpec; 2] {
     let [columns, rows] = tile_grid(request.view.size);
     let culled_bytes = size_of::<Tally>() as u64 + u64::from(columns * rows) * 4;
@@ -382,12 +383,12 @@ fn counts_and_hits(request: &FrameRequest) -> [BufferSpec; 2] {
     ]
 }
 
-/// A list's bricks in bucket order; bindings may not be empty.
+/// A list's bricks in bucket order. Bindings may not be empty.
 fn order_bytes(order: &[u32]) -> &[u8] {
     if order.is_empty() { &[0; 4] } else { bytemuck::cast_slice(order) }
 }
 
-/// For every list the most bricks and voxels that any group can visit.
+/// For every list the maximum number of bricks and voxels that a group visits.
 fn most_of<'a>(lists: impl Iterator<Item = &'a [Brick]>, plan: &FramePlan) -> Vec<(u32, u32)> {
     let of_list = |(at, (bricks, order)): (usize, (&[Brick], &Vec<u32>))| {
         let voxels = |&brick: &u32| brick::present(&bricks[brick as usize]).count_ones();
@@ -399,7 +400,7 @@ fn most_of<'a>(lists: impl Iterator<Item = &'a [Brick]>, plan: &FramePlan) -> Ve
     lists.zip(&plan.orders).enumerate().map(of_list).collect()
 }
 
-/// The most bricks and voxels that any group can visit, from the voxel counts of every group's bricks.
+/// The maximum number of bricks and voxels that a group visits, from the voxel counts of every group's bricks.
 fn most<C: ExactSizeIterator<Item = u32>>(groups: impl Iterator<Item = C>) -> (u32, u32) {
     groups.fold((0, 0), |(bricks, voxels), counts| (bricks.max(counts.len() as u32), voxels.max(counts.sum())))
 }

@@ -1,4 +1,4 @@
-//! What a frame asks for: everything about it that is known before anything is allocated, and can be refused.
+//! A frame request: everything about a frame that is known, and can be refused, before anything is allocated.
 
 use std::ops::Range;
 
@@ -27,25 +27,25 @@ pub(crate) struct FrameRequest {
     pub(crate) view: ViewGeometry,
     pub(crate) kernel: Kernel,
     pub(crate) ramps: Ramps,
-    /// The sheet depths whose slabs count even where they hold nothing: [`means::covered`].
+    /// The sheet depths whose slabs count even if they are empty: [`means::covered`].
     pub(crate) covered: Range<f64>,
     pub(crate) rays: RayMode,
     /// The opacity of first hits.
     pub(crate) first_hit: Option<f64>,
-    /// A host's surfaces, and the texel that is the image's first.
+    /// A host's surfaces, and the texel of the image's first pixel.
     pub(crate) surfaces: Option<(SurfaceDepths, [u32; 2])>,
     pub(crate) kind: RasterizerKind,
     /// Why the device does not draw by tiles.
     pub(crate) fallback: Option<RenderError>,
-    /// Those of the compositing buffer.
+    /// The bands of the compositing buffer.
     pub(crate) bands: Vec<Band>,
 }
 
 impl FrameRequest {
-    /// The camera is the scene's with what it leaves to an object filled in.
+    /// Makes the request. The camera is the scene's with all values that depend on an object filled in.
     ///
     /// # Errors
-    /// If the scene asks for something not implemented, or for more than the device's limits allow.
+    /// If the scene needs something that is not implemented or that exceeds the device's limits.
     pub(crate) fn new(
         device: &Device,
         volume: &ClassifiedVolume,
@@ -84,12 +84,12 @@ impl FrameRequest {
         })
     }
 
-    /// Pixels of the image.
+    /// The number of pixels in the image.
     pub(crate) fn pixels(&self) -> u64 {
         self.view.size.map(u64::from).iter().product()
     }
 
-    /// Bytes of first hits, a word or a depth per pixel; none, if they are not asked for.
+    /// The size of first hits in bytes, one word or depth per pixel; 0 if they are not requested.
     pub(crate) fn hit_bytes(&self) -> u64 {
         if self.rays.first_hit { 4 * self.pixels() } else { 0 }
     }

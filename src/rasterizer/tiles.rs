@@ -1,4 +1,4 @@
-//! The tile rasterizer: one compute stage draws every tile front to back, its sheets in registers.
+//! The tile rasterizer: one compute stage draws every tile front to back with its sheets in registers.
 
 use std::ops::Range;
 
@@ -19,24 +19,24 @@ use crate::rasterizer::request::FrameRequest;
 use crate::settings::splatting::Order;
 use crate::stats::GroupSlabs;
 
-/// The stage.
+/// The rasterizer's stage.
 #[derive(Debug, Default)]
 pub(crate) struct TileRasterizer {
     gather: Gather,
 }
 
-/// A frame's part that is the tile rasterizer's.
+/// The tile rasterizer's part of a frame.
 #[derive(Debug)]
 pub(crate) struct TileFrame {
     binned: Binned,
     buffers: TileBuffers<Buffer>,
     results: GatheredLayout,
-    /// For every band of the compositing buffer its number, and the offset of its part and its tiles.
+    /// For every dispatch its band's index, and the offset and number of its patches.
     dispatches: Vec<(usize, u32, u32)>,
     bands: Vec<GatherBand>,
 }
 
-/// What only changes with the view or the bricks.
+/// The bins, which change only with the view or the bricks.
 #[derive(Debug)]
 struct Binned {
     bins: PatchBins,
@@ -44,16 +44,16 @@ struct Binned {
     order: Order,
     /// [`means::covered`](crate::geometry::means::covered).
     covered: Range<f64>,
-    /// Of the kernel; it changes the footprints' boxes.
+    /// The kernel's support, which determines the footprints' boxes.
     support: f64,
     revision: u64,
 }
 
 impl TileRasterizer {
-    /// Bins bricks if need be, and allocates what does not fit any more. Sections need no table here.
+    /// Sorts bricks into bins if necessary, and allocates buffers that no longer fit. Sections need no table here.
     ///
     /// # Errors
-    /// If there is too much behind a tile, or more bricks than a binding holds.
+    /// If too much lies behind a tile, or the bricks exceed a binding.
     pub(crate) fn prepare(
         &self,
         inputs: FrameInputs<'_>,
@@ -97,10 +97,10 @@ impl TileRasterizer {
         inputs.compositing.bands.iter().map(|band| bind(&band.acc)).collect()
     }
 
-    /// What a new frame of these bricks, in so many lists, will take.
+    /// The resources that a new frame of these bricks, in `lists` lists, needs.
     ///
     /// # Errors
-    /// Those of [`Self::prepare`].
+    /// As for [`Self::prepare`].
     pub(crate) fn estimate(
         limits: &Limits,
         request: &FrameRequest,
@@ -127,10 +127,10 @@ impl TileRasterizer {
 }
 
 impl TileFrame {
-    /// Passes of a frame.
+    /// The number of a frame's passes.
     pub(crate) const PASSES: usize = 1;
 
-    /// Its groups' slabs.
+    /// The groups' slabs.
     pub(crate) fn group_slabs(&self) -> GroupSlabs {
         let bins = &self.binned.bins;
         let firsts = (0..bins.groups as i32).map(|group| bins.first_slab + group * SHEETS as i32);
@@ -146,7 +146,7 @@ impl TileFrame {
         encoder.copy_buffer_to_buffer(&self.buffers.gathered, 0, staging, 0, self.results.count_bytes());
     }
 
-    /// The words of first hits, and where in their buffer they start, bytes.
+    /// The buffer with the words of first hits, and their byte offset in it.
     pub(crate) fn first_hits(&self) -> (&Buffer, u64) {
         (&self.buffers.gathered, self.results.hits_byte())
     }
@@ -159,7 +159,7 @@ impl TileFrame {
 }
 
 impl Binned {
-    /// The old one if it will do. Also whether a new one had to be made.
+    /// The old bins if they are still valid, or else new ones; also whether they are new.
     fn renewed(
         limits: &Limits,
         inputs: FrameInputs<'_>,
@@ -189,7 +189,7 @@ impl Binned {
     }
 }
 
-/// The buffers of a frame, all but those of bands: what describes them, or the buffers themselves.
+/// A frame's buffers, except those of bands: their specs, or the buffers themselves.
 #[derive(Debug)]
 struct TileBuffers<B> {
     uniform: B,
@@ -198,7 +198,7 @@ struct TileBuffers<B> {
     entries: B,
     gathered: B,
     half_boxes: B,
-    /// All bricks in one buffer, where the volume's own are in several, or in none.
+    /// All bricks in one buffer, if the volume's own are in several, or in none.
     bricks: Option<B>,
 }
 
@@ -215,7 +215,7 @@ impl<B> TileBuffers<B> {
 }
 
 impl TileBuffers<Buffer> {
-    /// The buffers with what a frame needs in them; where bins are not new, what depends on them alone is still there.
+    /// Fills the buffers for a frame. Buffers that depend only on the bins are kept unless the bins are new.
     fn filled(
         inputs: FrameInputs<'_>,
         spec: TileBuffers<BufferSpec>,
@@ -248,7 +248,7 @@ impl TileBuffers<Buffer> {
 }
 
 impl TileBuffers<BufferSpec> {
-    /// The buffers for a view of a volume whose bricks are divided among `lists` lists.
+    /// The specs for a view of a volume whose bricks are divided among `lists` lists.
     fn specs(
         limits: &Limits,
         request: &FrameRequest,
@@ -286,12 +286,12 @@ impl TileBuffers<BufferSpec> {
     }
 }
 
-/// Bytes that a storage binding may have.
+/// The maximum size of a storage binding in bytes.
 fn binding(limits: &Limits) -> u64 {
     limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
 }
 
-/// For every band of the compositing buffer its patches, as a uniform; and its number, the uniform's offset and the number of patches.
+/// The patches of every band of the compositing buffer, as uniforms, and the frame's dispatches.
 fn patch_ranges(limits: &Limits, request: &FrameRequest) -> (Vec<u8>, Vec<(usize, u32, u32)>) {
     let stride = range_stride(limits);
     let (mut bytes, mut dispatches) = (Vec::new(), Vec::new());
@@ -307,7 +307,7 @@ fn patch_ranges(limits: &Limits, request: &FrameRequest) -> (Vec<u8>, Vec<(usize
     (bytes, dispatches)
 }
 
-/// Bytes from one part to the next.
+/// The stride between parts in bytes.
 fn range_stride(limits: &Limits) -> usize {
     size_of::<PatchRange>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize)
 }
@@ -319,7 +319,7 @@ fn bins(limits: &Limits, request: &FrameRequest, bricks: &[Brick], search: u32) 
     Ok(PatchBins::new(bricks, view, order, covered.clone(), support, search, most_words)?)
 }
 
-/// Passes through loops to look up a voxel's control points: all ramps are searched in memory if any is, as threads hold no more than one
+/// The passes through loops to look up a voxel's control points: all ramps are searched in memory if any is, because threads hold at most one
 /// point each.
 fn all_search_passes(request: &FrameRequest, by_label: bool) -> u32 {
     let lengths = request.ramps.lengths();
@@ -327,12 +327,12 @@ fn all_search_passes(request: &FrameRequest, by_label: bool) -> u32 {
     if in_memory { 1 + lengths.iter().map(|&points| search_passes(points)).sum::<u32>() } else { 0 }
 }
 
-/// Passes through loops that a binary search among so many control points takes.
+/// The passes through loops of a binary search among `points` control points.
 fn search_passes(points: u32) -> u32 {
     points.ilog2() + 2
 }
 
-/// The buffers of the previous frame, each of which may be taken over by itself.
+/// The buffers of the previous frame, each of which may be reused.
 #[derive(Default)]
 struct PreviousBuffers {
     uniform: Option<Buffer>,

@@ -23,14 +23,14 @@ use crate::volume::Volume;
 struct Frame {
     geometry: Geometry,
     kernel: Kernel,
-    /// The voxels that take part, their positions in memory.
+    /// The indices in memory of the voxels that take part.
     voxels: Vec<u32>,
     splats: Vec<Splat>,
 }
 
 impl Frame {
     fn new(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Self, RenderError> {
-        // Before a camera is placed by what is visible.
+        // The settings are checked before the camera is framed, which needs valid ones.
         scene.check()?;
         transfer.check()?;
         let scene = &scene.framed(volume, transfer);
@@ -45,7 +45,7 @@ impl Frame {
         sheets::buckets(&self.voxels, &self.splats, &self.geometry, &self.kernel)
     }
 
-    /// What of some splats, by index, falls into a sheet.
+    /// The sections of some splats, given by index, in a sheet.
     fn sections(&self, indices: &[u32], sheet: i32) -> Vec<Section> {
         let section = |&index: &u32| self.geometry.section(&self.splats[index as usize], sheet, &self.kernel);
         indices.par_iter().filter_map(section).collect()
@@ -104,18 +104,18 @@ pub(super) fn render_for(
     Ok(Culled { image, sections, areas, first_hits })
 }
 
-/// A frame as far as it is drawn.
+/// A frame while it is drawn.
 struct Picture<'a> {
     frame: &'a Frame,
     compositing: Compositing,
     order: Order,
-    /// What culls, if anything does, and from which opacity on a pixel is opaque.
+    /// The culling test, if anything is culled, and the opacity from which a pixel counts as opaque.
     test: Option<(Test, f64)>,
-    /// What clip planes and surfaces leave of rays, if there are any.
+    /// The cuts by clip planes and surfaces, if there are any.
     cuts: Option<Cuts>,
-    /// For compositings by means.
+    /// The weights of sheets, for compositings by means.
     means: Option<Means>,
-    /// If they are asked for.
+    /// First hits, if they are requested.
     first_hits: Option<FirstHits>,
     /// The compositing buffer.
     acc: Buffer,
@@ -127,7 +127,7 @@ impl<'a> Picture<'a> {
     /// An empty picture.
     fn new(frame: &'a Frame, scene: &Scene, host: Host<'_>, test: Option<Test>) -> Self {
         let (compositing, order) = (scene.splatting.compositing, scene.splatting.order);
-        // While no surface has been reached, nothing is opaque.
+        // While no surface has been reached, alpha is below one half; a surface itself is opaque.
         let threshold = if compositing == Compositing::Surface { 1.0 } else { scene.splatting.opacity_threshold };
         let test = test.filter(|_| order == Order::FrontToBack && compositing.hides());
         let is_cut = host.surfaces.is_some() || !scene.clip.is_empty();
@@ -159,7 +159,7 @@ impl<'a> Picture<'a> {
         splat::draw(&kernels, &frame.kernel, &mut self.acc, over);
     }
 
-    /// The splats of every sheet, in the order of compositing. For compositings by means, sheets without splats are sheets, too.
+    /// The splats of every sheet, in the order of compositing. For compositings by means, empty sheets count as well.
     fn buckets(&self) -> Vec<(i32, Vec<u32>)> {
         let mut buckets = self.frame.buckets();
         if let Some(means) = &self.means {
@@ -175,7 +175,7 @@ impl<'a> Picture<'a> {
         }
     }
 
-    /// The sections of sheet k that pass the test (§6), counted.
+    /// Counts and returns the sections of sheet k that pass the test (§6).
     fn cull(&mut self, sections: Vec<Section>, k: i32) -> Vec<Section> {
         let support = self.frame.kernel.support();
         let visible = match self.test {
@@ -190,11 +190,11 @@ impl<'a> Picture<'a> {
         visible
     }
 
-    /// Sheet k: the sum of its sections (§5), what a cut leaves of it, and its mean where means count.
+    /// Sheet k: the sum of its sections (§5), cut, and turned into means where the compositing needs them.
     fn splat(&self, sections: &[Section], k: i32) -> Buffer {
         let mut sheet = Buffer { width: self.acc.width, pixels: vec![DVec4::ZERO; self.acc.pixels.len()] };
         splat::draw(sections, &self.frame.kernel, &mut sheet, |pixel, amount| *pixel += amount);
-        // The least mean is that of what there is.
+        // A cut does not lower the mean of a slab's visible part, which is what `Minimum` looks for.
         if let Some(cuts) = self.cuts.as_ref().filter(|_| self.compositing != Compositing::Minimum) {
             cuts.apply(&mut sheet, k);
         }

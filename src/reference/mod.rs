@@ -1,5 +1,5 @@
-//! The f64 CPU twin of every GPU stage, in SPEC's direct form: plain, independent of the tables, the bucket sort and the
-//! matrices of eqs. 4–11, and slow. Tests compare every stage with it; `sheetsplat render --backend reference` shows it.
+//! The f64 evaluation of every GPU stage, as the specification states it: plain and slow, without the tables, the bucket sort and the
+//! matrices of eqs. 4–11. Tests compare every stage with it; `sheetsplat render --backend reference` shows its images.
 
 pub mod after;
 mod before;
@@ -34,12 +34,12 @@ pub use shading::Splat;
 pub use splat::Section;
 pub use visibility::Areas;
 
-/// An f64 image of premultiplied RGBA, row 0 at the top.
+/// An f64 image of premultiplied RGBA, with row 0 at the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Buffer {
     /// Pixels per row.
     pub width: usize,
-    /// Row by row.
+    /// The pixels, row by row.
     pub pixels: Vec<DVec4>,
 }
 
@@ -49,7 +49,7 @@ impl Buffer {
         Self { width: width as usize, pixels: vec![DVec4::ZERO; width as usize * height as usize] }
     }
 
-    /// As an image of f32.
+    /// Converts the buffer to an f32 image.
     pub fn into_image(self) -> Image {
         Image {
             width: self.width as u32,
@@ -62,7 +62,7 @@ impl Buffer {
 /// Renders the scene's camera, image, shading and splatting settings over a volume, with nothing culled.
 ///
 /// # Errors
-/// If the scene asks for more than can be computed.
+/// If the scene needs more than can be computed.
 pub fn render(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Image, RenderError> {
     render_culled(volume, transfer, scene, None).map(|culled| culled.image)
 }
@@ -70,14 +70,14 @@ pub fn render(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Re
 /// What a host adds to a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Host<'a> {
-    /// For every pixel the depth along w of an opaque surface, `unit`s from the eye (orthographic: from the camera's centre).
+    /// For every pixel the depth along w of an opaque surface, in `unit`s from the eye (orthographic: from the camera's centre).
     pub surfaces: Option<&'a [f64]>,
-    /// The opacity whose depth is asked for.
+    /// The opacity whose depth is requested.
     pub first_hit: Option<f64>,
 }
 
 impl Host<'_> {
-    /// Checks that surfaces have a depth for every pixel, and the opacity asked for, as [`SceneView`](crate::SceneView) does.
+    /// Checks that there is a surface depth for every pixel, and the requested opacity, as [`SceneView`](crate::SceneView) does.
     fn check(&self, scene: &Scene) -> Result<(), SettingError> {
         let pixels = scene.image.width as usize * scene.image.height as usize;
         if let Some(depths) = self.surfaces {
@@ -93,10 +93,10 @@ impl Host<'_> {
     }
 }
 
-/// What [`render`] draws: all there is. Voxels composited one by one make a section each, and neither sheets nor tiles.
+/// The counts of what [`render`] draws. Voxels composited one by one count as one section each, and have neither sheets nor tiles.
 ///
 /// # Errors
-/// If the scene asks for more than can be computed.
+/// If the scene needs more than can be computed.
 pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Counts, RenderError> {
     if scene.splatting.classification == Classification::After {
         return after::count(volume, transfer, scene);
@@ -104,17 +104,17 @@ pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Res
     before::count(volume, transfer, scene)
 }
 
-/// An image with early splat elimination, and what was drawn.
+/// An image with early splat elimination, and counts of what was drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Culled {
     /// The image.
     pub image: Image,
     /// Voxel–sheet pairs that passed the test.
     pub sections: u64,
-    /// Where they fell.
+    /// The areas they covered.
     pub areas: Areas,
-    /// For every pixel the depth along w at which the opacity asked for is reached, in `unit`s as those of surfaces; infinite where it
-    /// is not. Within a sheet opacity is taken to grow evenly. Empty if nothing was asked.
+    /// For every pixel the depth along w at which the requested opacity is reached, in `unit`s like the depths of surfaces; infinite where it
+    /// is not reached. Within a sheet opacity grows linearly. Empty if none was requested.
     pub first_hits: Vec<f64>,
 }
 
@@ -122,7 +122,7 @@ pub struct Culled {
 /// front, where nothing hides ([`Compositing::hides`](crate::settings::Compositing::hides)), and where voxels are composited one by one.
 ///
 /// # Errors
-/// If the scene asks for more than can be computed.
+/// If the scene needs more than can be computed.
 pub fn render_culled(
     volume: &Volume,
     transfer: &TransferFunction,
@@ -132,10 +132,10 @@ pub fn render_culled(
     render_for(Host::default(), volume, transfer, scene, test)
 }
 
-/// The same between a host's surfaces. Voxels composited one by one know nothing of them, nor of clip planes.
+/// Like [`render_culled`], between a host's surfaces. Voxels composited one by one ignore surfaces and clip planes.
 ///
 /// # Errors
-/// If the scene asks for more than can be computed.
+/// If the scene needs more than can be computed.
 pub fn render_for(
     host: Host<'_>,
     volume: &Volume,

@@ -66,7 +66,7 @@ fn frames_are_those_that_render_chooses_and_presets_fit_the_kind_of_data() {
     assert_eq!([&block["frame"]["distance"], &block["preset"]], [&Value::Null; 2]);
     let text = info(&folder, "block.nrrd");
     assert!(text.contains("frame        center -2, -1, -0.5, height 15.5556 (no unit)\n"), "{text}");
-    assert!(text.contains("preset       none fits: the values decide\n"), "{text}");
+    assert!(text.contains("preset       none fits; the transfer function follows the values\n"), "{text}");
     folder.render("block.nrrd -o block.png --set image.width=20 --set image.height=20 --save-scene block.toml");
     let saved: toml::Table = String::from_utf8(folder.read("block.toml")).unwrap().parse().unwrap();
     assert_eq!(saved["camera"]["height"].as_float(), block["frame"]["height"].as_f64());

@@ -134,7 +134,7 @@ fn warnings_state_what_is_assumed() {
         let from = fixtures.join(format!("slices/z{from}.tif"));
         fs::copy(from, folder.path(&format!("slices/z{to}.tif"))).unwrap();
     }
-    warned("slices", "slices: the slices' numbers go up by [1, 2]: taken as neighbours, none is left out");
+    warned("slices", "slices: the slices' numbers go up by [1, 2]: they are treated as neighbours");
 }
 
 /// Whatever is made of a volume with holes, the program says once how many there are; a volume of nothing else is bad input.

@@ -186,7 +186,7 @@ fn spacings_that_are_none() {
             file[80..84].copy_from_slice(&written.to_le_bytes());
             let (volume, warnings) = warned(|| folder.open("a.nii", &file).unwrap());
             assert_eq!(volume.spacing(), SPACING.with_x(read));
-            assert_warned(&warnings, &format!("a.nii: pixdim: [{written:?}, 2.0, 3.0] is no spacing"));
+            assert_warned(&warnings, &format!("a.nii: pixdim: [{written:?}, 2.0, 3.0] is not a spacing"));
             if qform == 1 {
                 assert_near(volume.orientation().unwrap().axes.x_axis, rotation().x_axis);
                 assert_near(volume.orientation().unwrap().origin, ORIGIN);

@@ -28,7 +28,7 @@ fn wrong_names() {
         "file.npz:name",
     );
     let nameless = Volume::open(&named("two.npz", "value"));
-    assert_refused(nameless, "two.npz:value", "arrays", "\"zeros\", \"values\"", "one that is called \"value\"");
+    assert_refused(nameless, "two.npz:value", "arrays", "\"zeros\", \"values\"", "an array called \"value\"");
     assert_refused(Volume::open(&named("two.npz", "zeros")), "two.npz:zeros", "shape", "(7,)", "three dimensions");
     let missing = Volume::open(&named("three.npz", "values"));
     assert!(matches!(missing, Err(VolumeError::Io { path, .. }) if path.ends_with("three.npz")));
@@ -57,7 +57,7 @@ fn damaged_archives() {
     let values = "values.npy";
     refused(&entry("one.npz", 8, &[1]), values, "an encrypted file", "not encrypted");
     refused(&entry("one.npz", 10, &[12]), values, "compression 12", "stored (0) or deflated (8)");
-    refused(&entry("one.npz", 16, &[1, 2, 3, 4]), "data", "another checksum", "undamaged");
+    refused(&entry("one.npz", 16, &[1, 2, 3, 4]), "data", "a checksum that differs from", "undamaged");
     refused(&entry("one.npz", 42, &[1]), "archive", "to other bytes", "a whole ZIP archive");
     refused(&entry("one.npz", 42, &[0xff; 4]), "archive", "out of the file", "a whole ZIP archive");
     refused(&entry("one.npz", 20, &[0, 0, 1, 0]), "archive", "out of the file", "a whole ZIP archive");

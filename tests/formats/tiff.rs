@@ -95,7 +95,7 @@ fn what_image_j_says() {
     let frames = folder.open("a.tif", &with_text("imagej.tif", "slices=3", "frames=3")).unwrap();
     assert_eq!((frames.values(), frames.spacing()), (values().as_slice(), SPACING));
     refused("zunit=mm\nspacing=3\nunit=um", "unit, yunit, zunit", "um, unit's, mm", "one unit for all");
-    refused("spacing=0\nunit=um", "spacing", "0", "a finite number but 0");
+    refused("spacing=0\nunit=um", "spacing", "0", "a finite number other than 0");
     refused("cf=0\nc0=-32768\nc1=x\nunit=um", "c1", "x", "a finite number");
     let fewer = folder.open("a.tif", &with_text("imagej.tif", "images=3", "images=4"));
     assert_refused(fewer, "a.tif", "pages", "3", "4, as the description says");
@@ -175,7 +175,7 @@ fn slices_that_do_not_fit() {
     let found = "1 of 5 × 4 int16 (1.tif, …), 1 of 5 × 3 int16 (2.tif, …)";
     assert_refused(Volume::open(path), folder_name, "slices", found, "one size and type");
     fs::write(path.join("2.tif"), fs::read(fixture("plain.tif")).unwrap()).unwrap();
-    assert_refused(Volume::open(path), "2.tif", "pages", "more than one", "one, as files of a folder are slices");
+    assert_refused(Volume::open(path), "2.tif", "pages", "more than one", "one page per file in a folder of slices");
 }
 
 #[test]
