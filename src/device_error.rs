@@ -7,7 +7,7 @@ use crate::gpu::fault::DeviceFault;
 #[cfg(feature = "gpu")]
 use wgpu::Features;
 
-/// Why no device could be used.
+/// Why no device could be opened or used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DeviceError {
@@ -15,11 +15,11 @@ pub enum DeviceError {
     #[error("no GPU adapter: required {required}, actual: {actual}{}", after(advice.as_deref()))]
     #[non_exhaustive]
     NoAdapter {
-        /// What was asked for.
+        /// The requested adapter.
         required: String,
-        /// What there is.
+        /// The adapters that exist.
         actual: String,
-        /// What to install, where there is no adapter at all.
+        /// Which driver to install, if there is no adapter.
         advice: Option<String>,
     },
     /// The adapter refused to make a device.
@@ -29,7 +29,7 @@ pub enum DeviceError {
     RequestDevice {
         /// The adapter's name.
         adapter: String,
-        /// What wgpu said.
+        /// wgpu's error.
         source: wgpu::RequestDeviceError,
     },
     /// The device could not compile the renderer.
@@ -39,7 +39,7 @@ pub enum DeviceError {
     Pipelines {
         /// The adapter's name.
         adapter: String,
-        /// What the device reported.
+        /// The device's error.
         fault: DeviceFault,
     },
     /// A feature is missing that the options ask for.
@@ -47,9 +47,9 @@ pub enum DeviceError {
     #[error("device feature: required {required:?}, actual: {actual:?}")]
     #[non_exhaustive]
     MissingFeatures {
-        /// What is needed.
+        /// The features that are needed.
         required: Features,
-        /// What the device has.
+        /// The features of the device.
         actual: Features,
     },
     /// A backend that is not compiled in.
@@ -62,27 +62,27 @@ pub enum DeviceError {
     /// Limits that are not enough for any frame.
     #[error("device limits: {}", list(.0))]
     Limits(Vec<InsufficientLimit>),
-    /// An option of the renderer that this device, or any, cannot fulfil.
+    /// An option of the renderer is not supported by this device, or by any.
     #[error("{option}: found {found}, allowed: {allowed}")]
     #[non_exhaustive]
     Unsupported {
         /// The field of `RendererOptions`.
         option: &'static str,
-        /// What it is.
+        /// The option's value.
         found: String,
-        /// What would do on this device.
+        /// The values that this device supports.
         allowed: String,
     },
 }
 
-/// A limit of a device that is not enough.
+/// A limit of a device that is insufficient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InsufficientLimit {
-    /// wgpu's name of the limit.
+    /// The limit's name in wgpu.
     pub limit: &'static str,
-    /// What is needed: at least that much, of `min_…` limits at most.
+    /// The required value: a minimum, or a maximum for `min_…` limits.
     pub required: u64,
-    /// What the device has.
+    /// The device's value.
     pub actual: u64,
 }
 
@@ -93,7 +93,7 @@ impl fmt::Display for InsufficientLimit {
     }
 }
 
-/// Advice after what is wrong.
+/// The advice as a suffix of the message.
 fn after(advice: Option<&str>) -> String {
     advice.map_or(String::new(), |advice| format!("; {advice}"))
 }

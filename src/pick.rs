@@ -1,4 +1,4 @@
-//! Picking: what a pixel shows first.
+//! Picking: the first point that is visible at a pixel.
 
 use glam::{DVec2, DVec3, UVec3};
 
@@ -10,15 +10,15 @@ use crate::volume::Volume;
 /// A point of a volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pick {
-    /// Where, in world units from the volume's centre.
+    /// The position in world units from the volume's centre.
     pub position: DVec3,
-    /// Its depth along the camera's direction, world units from the eye; orthographic from the camera's centre.
+    /// The depth along the camera's direction in world units, from the eye or, orthographic, from the camera's centre.
     pub depth: f64,
     /// The nearest voxel.
     pub voxel: UVec3,
     /// That voxel's value, NaN in a hole.
     pub value: f32,
-    /// That voxel's label, in a segmented volume.
+    /// That voxel's label, if the volume is segmented.
     pub label: Option<u16>,
 }
 

@@ -1,4 +1,4 @@
-//! What a frame cost, counted as in Table 4.
+//! The statistics of a frame, with the counts of Table 4.
 
 use std::collections::BTreeMap;
 
@@ -7,10 +7,10 @@ use serde::Serialize;
 #[cfg(feature = "gpu")]
 pub use crate::renderer::counts::{GroupSlabs, PendingCounts, Totals};
 
-/// Milliseconds by stage.
+/// Milliseconds per stage.
 pub type StageTimes = BTreeMap<&'static str, f64>;
 
-/// Counts and times of one frame (SPEC §8). As JSON: the field names as keys.
+/// Counts and times of one frame (SPEC §8). The field names are the keys in JSON.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Stats {
     /// The GPU, or `CPU` for the other backends.
@@ -23,17 +23,17 @@ pub struct Stats {
     pub api: String,
     /// Pixels per row.
     pub width: u32,
-    /// Rows.
+    /// The number of rows.
     pub height: u32,
     /// The frame's counts.
     #[serde(flatten)]
     pub counts: Counts,
     /// `quads` or `tiles`; for other backends their name.
     pub rasterizer: String,
-    /// Of a renderer that profiles, on a device with timestamp queries: the GPU's milliseconds by stage.
+    /// GPU milliseconds per stage, from a renderer that profiles on a device with timestamp queries.
     #[serde(skip_serializing_if = "StageTimes::is_empty")]
     pub stages_ms: StageTimes,
-    /// Bytes of GPU memory that the frame holds.
+    /// Bytes of GPU memory that the frame uses.
     pub gpu_bytes: u64,
     /// Milliseconds to load or make the volume.
     pub load_ms: f64,
@@ -43,30 +43,30 @@ pub struct Stats {
     pub frame_ms: f64,
 }
 
-/// What a frame is made of (Table 4).
+/// The counts of a frame (Table 4).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
-    /// Voxels of the volume.
+    /// Voxels in the volume.
     pub voxels_total: u64,
     /// Voxels that take part (SPEC §3).
     pub voxels_in_range: u64,
-    /// Voxels whose colour was computed for this frame. Tiles compute it again for every tile that a voxel is drawn in, and where more
-    /// is behind a tile than it remembers for every group; it counts once.
+    /// Voxels whose colour was computed for this frame. Each counts once, although the tile rasterizer computes it again for every tile,
+    /// and for every group where more lies behind a tile than it remembers.
     pub voxels_shaded: u64,
-    /// Voxel–slab overlaps of positive length, wherever they fall on the screen.
+    /// Voxel–slab overlaps of positive length, anywhere on or off the screen.
     pub sections_total: u64,
-    /// Those of them that were drawn.
+    /// The sections that were drawn.
     pub sections_rasterized: u64,
     /// Slabs from the first to the last that any kernel touches.
     pub sheets: u64,
-    /// 32×32 tiles of the image times sheets.
+    /// The number of 32×32 tiles in the image times the number of sheets.
     pub tiles_total: u64,
-    /// Those of them that were composited.
+    /// The tiles that were composited.
     pub tiles_composited: u64,
-    /// Quads drawn, each for one voxel and a group of sheets; 0 by tiles.
+    /// Quads drawn, each for one voxel and a group of sheets; 0 for the tile rasterizer.
     pub quads: u64,
-    /// Tests of a brick against a sheet group; 0 by tiles, which test voxels.
+    /// Tests of a brick against a sheet group; 0 for the tile rasterizer, which tests voxels.
     pub bricks_tested: u64,
-    /// Those of them whose voxels were looked at; by tiles for every tile and group anew.
+    /// Bricks whose voxels were visited; by the tile rasterizer again for every tile and group.
     pub bricks_visited: u64,
 }

@@ -3,7 +3,7 @@
 use crate::error::RenderError;
 use crate::scene::Scene;
 use crate::setting_error::SettingError;
-use crate::settings::splatting::{Classification, Economies};
+use crate::settings::splatting::Classification;
 
 /// The largest image, pixels along a side.
 const MAX_SIZE: u32 = 32_768;
@@ -24,16 +24,8 @@ pub(super) fn check(scene: &Scene) -> Result<(), RenderError> {
     if splatting.classification == Classification::After {
         return refused("splatting.classification", "\"after\"".to_owned(), format!("\"before\", {other}"));
     }
-    let Economies { whole_below, beta, resolution } = splatting.economies;
-    let none = Economies::default();
-    for (key, found, allowed) in [
-        ("splatting.whole_below", whole_below, none.whole_below),
-        ("splatting.beta", beta, none.beta),
-        ("splatting.resolution", resolution, none.resolution),
-    ] {
-        if found != allowed {
-            return refused(key, found.to_string(), format!("{allowed}, {other}"));
-        }
+    if let Some(economy) = splatting.experimental.in_use() {
+        return refused(economy.key, economy.value.to_string(), format!("{}, {other}", economy.off));
     }
     Ok(())
 }

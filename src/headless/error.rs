@@ -1,4 +1,4 @@
-//! All errors together.
+//! All errors of headless rendering in one type.
 
 use crate::device_error::DeviceError;
 use crate::error::RenderError;

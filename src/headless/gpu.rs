@@ -39,7 +39,7 @@ impl GpuHeadless {
     /// Opens a device and compiles the renderer, whatever backend the options name.
     ///
     /// # Errors
-    /// If there is no such adapter, it gives no device, or the device cannot run the renderer.
+    /// If there is no such adapter, it cannot open a device, or the device cannot run the renderer.
     pub fn new(options: &HeadlessOptions) -> Result<Self, DeviceError> {
         let adapter = choose_adapter(options.adapter.as_deref())?;
         let requirements = options.requirements.clone().unwrap_or_else(|| DeviceRequirements::for_adapter(&adapter));
@@ -80,9 +80,9 @@ impl GpuHeadless {
     /// Loads the scene's volume and renders it.
     ///
     /// # Errors
-    /// If the volume cannot be loaded, the scene asks for what the device or the renderer cannot do, or the device fails.
+    /// If the volume cannot be loaded, the scene needs more than the device or the renderer can do, or the device fails.
     pub fn render(&self, scene: &Scene) -> Result<Rendering, Error> {
-        // Before a volume is loaded for nothing.
+        // An invalid scene is refused before its volume is loaded.
         scene.check().map_err(RenderError::from)?;
         let start = Instant::now();
         let volume = scene.load_volume()?;
@@ -92,10 +92,10 @@ impl GpuHeadless {
         Ok(rendering)
     }
 
-    /// Renders a volume that is already in memory. The scene's own volume is not looked at.
+    /// Renders a volume that is already in memory. The scene's own volume is ignored.
     ///
     /// # Errors
-    /// If the scene asks for what the device or the renderer cannot do, or the device fails.
+    /// If the scene needs more than the device or the renderer can do, or the device fails.
     pub fn render_volume(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Rendering, RenderError> {
         let start = Instant::now();
         let mut view = self.view(volume, scene)?;
@@ -105,12 +105,12 @@ impl GpuHeadless {
         Ok(rendering)
     }
 
-    /// A view of a volume as a scene sets it up, for any number of frames and changes. The scene's own volume is not looked at.
+    /// A view of a volume with a scene's settings, for any number of frames and changes. The scene's own volume is ignored.
     ///
     /// # Errors
     /// If the volume is larger than the device's textures, or the device fails.
     pub fn view(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<SceneView, RenderError> {
-        // Else wgpu's copies of the whole volume stay until the first frame.
+        // Without a submission wgpu would keep its copies of the volume until the first frame.
         let submit = || {
             self.queue.submit([]);
         };
@@ -121,16 +121,16 @@ impl GpuHeadless {
     /// Draws one frame of a view and reads it back.
     ///
     /// # Errors
-    /// If the scene asks for what the device or the renderer cannot do, or the device fails.
+    /// If the view needs more than the device or the renderer can do, or the device fails.
     pub fn draw(&self, view: &mut SceneView) -> Result<Rendering, RenderError> {
         scoped(&self.device, || self.draw_unscoped(view))?
     }
 
-    /// What the last drawn frame of a view shows first at a pixel, counted from the upper left; `None` where the opacity of
-    /// [`SceneView::set_first_hit`] is not reached.
+    /// The first hit at a pixel of the last frame drawn, with pixels counted from the upper left; `None` where the ray does not reach the
+    /// opacity of [`SceneView::set_first_hit`].
     ///
     /// # Errors
-    /// If the frame has no first hits, the pixel is off the image, or the device fails.
+    /// If the frame has no first hits, the pixel lies outside the image, or the device fails.
     pub fn pick(&self, view: &SceneView, pixel: [u32; 2]) -> Result<Option<Pick>, RenderError> {
         scoped(&self.device, || {
             let descriptor = wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.pick") };
@@ -139,7 +139,7 @@ impl GpuHeadless {
                 return Err(Pick::missing(pixel, &view.scene().image).into());
             };
             self.queue.submit([encoder.finish()]);
-            // Asks for it, and then it is there.
+            // The first call requests the pick; after waiting it has arrived.
             let early = pending.try_get();
             wait(&self.device)?;
             let missing = || Err(RenderError::Readback("the pick did not arrive".to_owned()));
@@ -175,7 +175,7 @@ impl GpuHeadless {
         let frame_ms = milliseconds_since(start);
 
         let info = self.adapter.get_info();
-        // The image came later than the counts.
+        // The image arrived after the counts.
         let missing = || Err(RenderError::Readback("the frame's counts did not arrive".to_owned()));
         let (counts, stages_ms) = counts.and_then(|counts| counts.try_get()).unwrap_or_else(missing)?;
         Ok(Rendering {
@@ -201,12 +201,12 @@ impl GpuHeadless {
 
 impl Drop for GpuHeadless {
     fn drop(&mut self) {
-        // A software driver's threads must not outlive the process's memory.
+        // A software driver's threads must end before the process's memory is freed.
         let _ = wait(&self.device);
     }
 }
 
-/// Waits for all that was submitted.
+/// Waits until everything submitted is done.
 ///
 /// # Errors
 /// If the device is lost.

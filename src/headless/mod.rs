@@ -52,12 +52,12 @@ enum Drawer {
     Reference,
 }
 
-/// An image and what it cost.
+/// An image with its statistics.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rendering {
     /// The image, over the scene's background.
     pub image: Image,
-    /// Counts and times.
+    /// Its counts and times.
     pub stats: Stats,
 }
 
@@ -106,7 +106,7 @@ impl Headless {
     /// # Errors
     /// If the volume cannot be loaded, the scene asks for what the backend cannot do, or the device fails.
     pub fn render(&self, scene: &Scene) -> Result<Rendering, Error> {
-        // Before a volume is loaded for nothing.
+        // An invalid scene is refused before its volume is loaded.
         scene.check().map_err(RenderError::from)?;
         let start = Instant::now();
         let volume = scene.load_volume()?;
@@ -116,7 +116,7 @@ impl Headless {
         Ok(rendering)
     }
 
-    /// Renders a volume that is already in memory. The scene's own volume is not looked at.
+    /// Renders a volume that is already in memory. The scene's own volume is ignored.
     ///
     /// # Errors
     /// If the scene asks for what the backend cannot do, or the device fails.

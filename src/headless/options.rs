@@ -49,7 +49,7 @@ impl HeadlessOptions {
         Self { backend, ..self }
     }
 
-    /// On the adapter with this in its name, in any case.
+    /// These options with the adapter that has this in its name, ignoring case.
     pub fn with_adapter(self, name: impl Into<String>) -> Self {
         Self { adapter: Some(name.into()), ..self }
     }
@@ -66,17 +66,17 @@ impl HeadlessOptions {
         Self { sheet_format: Some(format), ..self }
     }
 
-    /// With another number of sheets drawn by one quad.
+    /// These options with another number of sheets that one quad draws.
     pub fn with_sheets_per_group(self, sheets: u32) -> Self {
         Self { sheets_per_group: Some(sheets), ..self }
     }
 
-    /// With another rasterizer for scenes that leave the choice.
+    /// These options with another rasterizer for scenes that do not name one.
     pub fn with_rasterizer(self, rasterizer: Rasterizer) -> Self {
         Self { rasterizer, ..self }
     }
 
-    /// With every stage timed, or none.
+    /// These options with every stage timed, or no stage.
     pub fn with_profile(self, profile: bool) -> Self {
         Self { profile, ..self }
     }

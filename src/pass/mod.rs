@@ -1,7 +1,7 @@
-//! The GPU's stages, one per file, in the order of the data flow: per group of sheets
-//! cull bricks → cull voxels → compact → shade → tiles → splat → composite → occlude, at the end resolve (Fig. 12), and first hits if asked for.
+//! The GPU's stages, one per file, in the order of the data flow. For every group of sheets: cull bricks → cull voxels → compact → shade →
+//! tiles → splat → composite → occlude; at the end resolve (Fig. 12), and first hits if requested.
 //!
-//! Each holds its pipeline, makes its bind group, and records itself; none allocates, submits or waits while recording.
+//! Each stage holds its pipeline, makes its bind group, and records itself; none allocates, submits or waits while recording.
 
 pub mod composite;
 pub mod cull;

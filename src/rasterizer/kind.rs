@@ -1,4 +1,4 @@
-//! Which rasterizer draws a view, and what it does not draw.
+//! The choice of the rasterizer for a view, and what each one refuses.
 
 use wgpu::Device;
 
@@ -7,38 +7,54 @@ use crate::gpu::device::TILE_FEATURES;
 use crate::pass::composite::RayMode;
 use crate::pass::gather::WORKGROUP_BYTES;
 use crate::setting_error::SettingError;
-use crate::settings::splatting::{Economies, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
+use crate::settings::splatting::{FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
 
-/// Threads that a subgroup may have.
+/// The subgroup sizes that tiles support.
 pub(super) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;
 
-/// How to draw.
+/// The rasterizer of a frame, which follows from the [`Rasterizer`] that the scene and the renderer name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RasterizerKind {
     Quads,
-    /// If the view fits.
-    Tiles,
+    /// Tiles, if the view fits. A view that does not fit is an error if tiles are insisted on; otherwise quads draw it.
+    Tiles {
+        insisted: bool,
+    },
     Samples,
 }
 
 impl RasterizerKind {
-    /// That of some settings, and if it is quads only because of the device, why.
+    /// The rasterizer for some settings; if it is quads only because of the device, also the reason. `preferred` is the renderer's choice,
+    /// for settings that do not name one.
     ///
     /// # Errors
-    /// If they insist on what the device or the other settings do not allow.
-    pub(crate) fn of(device: &Device, splatting: &Splatting) -> Result<(Self, Option<RenderError>), RenderError> {
-        let insists = insists_on_tiles(splatting);
+    /// If the settings require what the device or the other settings do not allow.
+    pub(crate) fn of(
+        device: &Device,
+        splatting: &Splatting,
+        preferred: Rasterizer,
+    ) -> Result<(Self, Option<RenderError>), RenderError> {
+        let needs_tiles =
+            splatting.footprint_box == FootprintBox::Parallelogram || splatting.experimental.in_use().is_some();
+        let choice = match splatting.rasterizer {
+            Rasterizer::Auto if !needs_tiles => preferred,
+            choice => choice,
+        };
+        let insisted = needs_tiles || choice == Rasterizer::Tiles;
         let by_settings = obstacle_in_settings(splatting);
         let is_by_settings = by_settings.is_some();
-        match (splatting.rasterizer, by_settings.or_else(|| obstacle_in_device(device))) {
-            (Rasterizer::Quads, _) if insists => {
-                let found =
-                    "\"quads\" with splatting.footprint_box = \"parallelogram\", whole_below, beta or resolution";
-                Err(SettingError::new("splatting.rasterizer", found, "\"tiles\" or \"auto\" with them").into())
+        match (choice, by_settings.or_else(|| obstacle_in_device(device))) {
+            (Rasterizer::Quads, _) if needs_tiles => {
+                let setting = match splatting.experimental.in_use() {
+                    Some(economy) => economy.to_string(),
+                    None => "splatting.footprint_box = \"parallelogram\"".to_owned(),
+                };
+                let found = format!("\"quads\" with {setting}");
+                Err(SettingError::new("splatting.rasterizer", found, "\"tiles\" or \"auto\" with it").into())
             }
-            (Rasterizer::Tiles | Rasterizer::Auto, Some(obstacle)) if insists => Err(obstacle),
+            (Rasterizer::Tiles | Rasterizer::Auto, Some(obstacle)) if insisted => Err(obstacle),
             _ if splatting.method == Method::CompositeEverySample => Ok((Self::Samples, None)),
-            (Rasterizer::Tiles | Rasterizer::Auto, None) => Ok((Self::Tiles, None)),
+            (Rasterizer::Tiles | Rasterizer::Auto, None) => Ok((Self::Tiles { insisted }, None)),
             (Rasterizer::Auto, Some(obstacle)) if !is_by_settings => Ok((Self::Quads, Some(obstacle))),
             _ => Ok((Self::Quads, None)),
         }
@@ -49,7 +65,7 @@ fn refused_tiles(found: String, allowed: &str) -> Option<RenderError> {
     Some(SettingError::new("splatting.rasterizer", format!("\"tiles\" with {found}"), allowed).into())
 }
 
-/// Why some settings cannot be drawn by tiles; `None` if they can.
+/// Why tiles do not support some settings; `None` if they do.
 fn obstacle_in_settings(splatting: &Splatting) -> Option<RenderError> {
     if splatting.method == Method::CompositeEverySample {
         let found = "splatting.method = \"composite-every-sample\"".to_owned();
@@ -61,7 +77,7 @@ fn obstacle_in_settings(splatting: &Splatting) -> Option<RenderError> {
     None
 }
 
-/// Why a device cannot draw by tiles; `None` if it can.
+/// Why a device does not support tiles; `None` if it does.
 fn obstacle_in_device(device: &Device) -> Option<RenderError> {
     if !device.features().contains(TILE_FEATURES) {
         return refused_tiles("a device without subgroups, or barriers for them".to_owned(), "\"quads\"");
@@ -79,17 +95,10 @@ fn obstacle_in_device(device: &Device) -> Option<RenderError> {
     None
 }
 
-/// Whether quads will not do.
-pub(crate) fn insists_on_tiles(splatting: &Splatting) -> bool {
-    splatting.rasterizer == Rasterizer::Tiles
-        || splatting.footprint_box == FootprintBox::Parallelogram
-        || splatting.economies != Economies::default()
-}
-
-/// Checks that the settings allow what of rays is looked at.
+/// Checks that the settings support cuts and first hits.
 ///
 /// # Errors
-/// If they do not, or first hits are more than a binding.
+/// If they do not, or first hits exceed a binding.
 pub(crate) fn check_rays(
     device: &Device,
     splatting: &Splatting,

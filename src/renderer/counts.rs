@@ -12,23 +12,23 @@ use crate::stats::{Counts, StageTimes};
 /// The slabs that a frame's sheet groups consist of.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GroupSlabs {
-    /// Every group's first slab, in the order groups are composited in.
+    /// Every group's first slab, in compositing order.
     pub firsts: Vec<i32>,
-    /// Sheets of a group.
+    /// The number of sheets in a group.
     pub sheets: u32,
 }
 
-/// What of a frame's counts is known before it is drawn.
+/// The counts of a frame that are known before it is drawn.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Totals {
-    /// The totals; 0 for what only the GPU knows.
+    /// The totals; 0 for counts that only the GPU knows.
     pub counts: Counts,
-    /// Of every sheet group how many of its sheets any kernel touches.
+    /// For every sheet group, the number of its sheets that any kernel touches.
     pub group_sheets: Vec<u64>,
 }
 
 impl Totals {
-    /// A drawn frame's counts, from what it left on the GPU: its tally, and the tiles composited by every group.
+    /// The counts of a drawn frame, from its tally and the number of tiles that each group composited.
     pub fn count(&self, tally: &Tally, tiles: &[u32]) -> Counts {
         Counts {
             voxels_shaded: tally.voxels_shaded.into(),
@@ -47,18 +47,19 @@ impl Totals {
     }
 }
 
-/// A frame's counts: a [`Tally`](crate::gpu::layout::Tally), for every group the tiles it composited, `[u32]`, and timestamps from `timestamps` on.
+/// A frame's counts in GPU memory: a [`Tally`](crate::gpu::layout::Tally), the number of composited tiles per group (`[u32]`), and
+/// timestamps from `timestamps` on.
 #[derive(Debug)]
 pub(crate) struct Staging {
     pub(crate) buffer: Buffer,
     pub(crate) timestamps: u64,
-    /// The stage of every pass that was timed.
+    /// The stages of the timed passes.
     pub(crate) stages: Vec<&'static str>,
-    /// Nanoseconds of a timestamp's tick.
+    /// Nanoseconds per timestamp tick.
     pub(crate) period: f32,
 }
 
-/// A frame's counts on their way from the GPU.
+/// A frame's counts that are being read back from the GPU.
 #[derive(Debug)]
 pub struct PendingCounts {
     totals: Totals,
@@ -67,21 +68,21 @@ pub struct PendingCounts {
 }
 
 impl PendingCounts {
-    /// Asks for the contents of `staging`, once what was submitted is done.
+    /// Requests the contents of `staging` once the submitted work is done.
     pub(crate) fn new(totals: Totals, staging: Staging) -> Self {
         let (sender, arrival) = channel();
         staging.buffer.map_async(wgpu::MapMode::Read, .., move |result| {
-            // Whoever gave up asking does not care.
+            // The receiver may have been dropped.
             let _ = sender.send(result);
         });
         Self { totals, staging, arrival }
     }
 
-    /// The counts, if the device was polled after the frame was done, and of a renderer that profiles also the GPU's milliseconds
-    /// by stage. Never waits, and gives them once.
+    /// The counts, and from a renderer that profiles the GPU's milliseconds per stage, if the device was polled after the frame was done.
+    /// Never waits, and returns them once.
     ///
     /// # Errors
-    /// If the device was lost meanwhile.
+    /// If the device was lost in the meantime.
     pub fn try_get(&self) -> Option<Result<(Counts, StageTimes), RenderError>> {
         let failed = |reason: String| RenderError::Readback(reason);
         let result = self.arrival.try_recv().ok()?;

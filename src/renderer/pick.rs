@@ -48,18 +48,19 @@ impl PendingPick {
         Self { staging, view: *view, pixel, volume: volume.clone(), arrival: None }
     }
 
-    /// What was picked, once the encoder was submitted, what it does is done, and the device was polled; the first call after
-    /// submitting asks for it, so that there are two of them at least. `None` until then. Never waits. Inside there is `None` where the
+    /// The picked point, once the encoder was submitted, its work is done, and the device was polled. The first call after submitting requests
+    /// it, so at least two calls are needed; until the point has arrived they return `None`. Never waits. The inner `None` means that the
+    /// opacity is not reached.
     /// opacity is not reached.
     ///
     /// # Errors
-    /// If the device was lost meanwhile.
+    /// If the device was lost in the meantime.
     pub fn try_get(&mut self) -> Option<Result<Option<Pick>, RenderError>> {
         let failed = |reason: String| RenderError::Readback(reason);
         let arrival = self.arrival.get_or_insert_with(|| {
             let (sender, arrival) = channel();
             self.staging.map_async(MapMode::Read, .., move |result| {
-                // Whoever gave up asking does not care.
+                // The receiver may have been dropped.
                 let _ = sender.send(result);
             });
             arrival

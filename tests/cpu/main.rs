@@ -341,7 +341,7 @@ fn what_is_not_drawn_yet_is_refused_by_name() {
         ["splatting.method", "clip planes"],
     );
     let economies = Economies { beta: 0.5, ..Economies::default() };
-    refused(&|scene| scene.splatting.economies = economies, ["splatting.beta", "0.5"]);
+    refused(&|scene| scene.splatting.experimental = economies, ["splatting.experimental.beta", "0.5"]);
     refused(&|scene| scene.image.width = 40_000, ["image.width", "40000"]);
 }
 

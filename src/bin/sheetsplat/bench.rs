@@ -20,7 +20,7 @@ pub(crate) struct Arguments {
     /// Frames to time after the first one.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
     frames: u32,
-    /// Degrees to turn about the camera's up before each of them.
+    /// Degrees to turn about the camera's up vector before each of them.
     #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, value_parser = parse_degrees)]
     rotate: f64,
     /// Time every stage on the GPU, where the adapter has timestamp queries: stages_ms in the statistics.
@@ -28,7 +28,7 @@ pub(crate) struct Arguments {
     profile: bool,
 }
 
-/// What is printed: times in milliseconds, and the last frame's stats.
+/// The printed report: times in milliseconds, and the last frame's statistics.
 #[derive(Serialize)]
 struct Report {
     first_frame_ms: f64,
@@ -76,7 +76,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     stdout((json + "\n").as_bytes())
 }
 
-/// The process's largest resident set so far, where the system tells it.
+/// The process's largest resident set so far, if the system reports it.
 fn peak_rss_mib() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -34,7 +34,7 @@ pub(crate) struct Arguments {
     /// Write counts and times as JSON.
     #[arg(long, value_name = "FILE")]
     stats: Option<PathBuf>,
-    /// Write the whole scene that was rendered as a scene file: with what presets, colour maps and the volume made of it.
+    /// Write the complete scene that was rendered as a scene file, with everything that presets, colour maps and the volume determined.
     #[arg(long, value_name = "FILE")]
     save_scene: Option<PathBuf>,
     #[command(flatten)]
@@ -77,7 +77,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.profile && stats.stages_ms.is_empty() {
         log::warn!("--profile: found no timestamp queries on {}", stats.adapter);
     }
-    // Empty without --profile.
+    // The map is empty without --profile.
     let profile: String = stats.stages_ms.iter().map(|(stage, ms)| format!("{stage:10} {ms:10.3} ms\n")).collect();
     outputs::write(&files, profile.as_bytes())
 }
