@@ -148,3 +148,30 @@ fn licences_and_sources_are_allowed() {
     }
     assert_eq!(used, exceptions.keys().copied().collect(), "exceptions for crates that are not there");
 }
+
+/// Tests that render on the processor compile neither wgpu nor naga, nor the program's crates.
+#[test]
+fn the_native_backend_needs_no_wgpu() {
+    let cargo = Command::new(env!("CARGO"))
+        .args([
+            "tree",
+            "--locked",
+            "--edges",
+            "normal",
+            "--prefix",
+            "none",
+            "--no-default-features",
+            "--features",
+            "cpu,golden",
+        ])
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .unwrap();
+    assert!(cargo.status.success(), "{}", String::from_utf8_lossy(&cargo.stderr));
+    let tree = String::from_utf8(cargo.stdout).unwrap();
+    let names: BTreeSet<&str> = tree.lines().filter_map(|line| line.split(' ').next()).collect();
+    assert!(names.contains("fearless_simd") && names.contains("png"), "{names:?}");
+    for name in ["wgpu", "wgpu-core", "wgpu-hal", "naga", "pollster", "clap", "ash"] {
+        assert!(!names.contains(name), "{name} is compiled");
+    }
+}

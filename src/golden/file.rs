@@ -34,7 +34,9 @@ fn encode([width, height]: [u32; 2], pixels: &[[u8; 4]], made_on: Option<&MadeOn
     encoder.set_filter(png::Filter::Adaptive);
     if let Some(MadeOn { adapter, driver }) = made_on {
         encoder.add_itxt_chunk(ADAPTER.to_owned(), adapter.clone())?;
-        encoder.add_itxt_chunk(DRIVER.to_owned(), driver.clone())?;
+        if !driver.is_empty() {
+            encoder.add_itxt_chunk(DRIVER.to_owned(), driver.clone())?;
+        }
     }
     let mut writer = encoder.write_header()?;
     let channels: Vec<u8> = if opaque {
@@ -54,5 +56,5 @@ pub(super) fn made_on(path: &Path) -> Option<MadeOn> {
         let chunks = &reader.info().utf8_text;
         chunks.iter().find(|chunk| chunk.keyword == keyword && !chunk.compressed)?.get_text().ok()
     };
-    Some(MadeOn { adapter: text(ADAPTER)?, driver: text(DRIVER)? })
+    Some(MadeOn { adapter: text(ADAPTER)?, driver: text(DRIVER).unwrap_or_default() })
 }

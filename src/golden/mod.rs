@@ -37,6 +37,24 @@
 //! # }
 //! ```
 //!
+//! # The native backend
+//!
+//! [`cpu`](crate::headless::Backend::Cpu) gives the same bytes on every machine. So a picture and a golden that were both made by it must be equal to the last
+//! bit, unless the test allows a tolerance:
+//!
+//! ```no_run
+//! use sheetsplat::assert_golden;
+//! use sheetsplat::headless::{Backend, Headless, HeadlessOptions};
+//! # use sheetsplat::scene::{Scene, VolumeSource};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let scene = Scene::from_volume(VolumeSource::Builtin("head:48".to_owned()), &[])?;
+//! let headless = Headless::new(&HeadlessOptions::default().with_backend(Backend::Cpu))?;
+//! assert_golden!("head", headless.render(&scene)?);
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! # Blessing
 //!
 //! `SHEETSPLAT_BLESS=all cargo test`, or the names of goldens separated by commas, makes an image the golden if it fails or has no
@@ -84,10 +102,13 @@ use crate::image::{Image, ImageError, PngDepth, output};
 #[macro_export]
 macro_rules! assert_golden {
     ($name:expr, $image:expr $(,)?) => {
-        $crate::assert_golden!($name, $image, $crate::golden::Tolerance::default())
+        $crate::assert_golden!(@ $name, $image, |golden| golden)
     };
     ($name:expr, $image:expr, $tolerance:expr $(,)?) => {
-        match $crate::golden!($name).and_then(|golden| golden.tolerance($tolerance).check(&$image)) {
+        $crate::assert_golden!(@ $name, $image, |golden: $crate::golden::Golden| golden.tolerance($tolerance))
+    };
+    (@ $name:expr, $image:expr, $change:expr) => {
+        match $crate::golden!($name).map($change).and_then(|golden| golden.check(&$image)) {
             Ok($crate::golden::Outcome::Passed(_)) => {}
             Ok($crate::golden::Outcome::Blessed(path)) => println!("blessed {}", path.display()),
             Err(error) => panic!("{error}"),
@@ -117,7 +138,8 @@ pub struct Golden {
     name: String,
     folder: PathBuf,
     failures: PathBuf,
-    tolerance: Tolerance,
+    /// If the test says one.
+    tolerance: Option<Tolerance>,
     bless: Option<Bless>,
 }
 
@@ -141,7 +163,7 @@ impl Golden {
             name: name.to_owned(),
             folder: folder.into(),
             failures: failures.into(),
-            tolerance: Tolerance::default(),
+            tolerance: None,
             bless: None,
         })
     }
@@ -155,10 +177,11 @@ impl Golden {
         Self::new(name, site.goldens()?, site.failures())
     }
 
-    /// Replaces the default tolerance.
+    /// Replaces the default tolerance, which is [`Tolerance::EXACT`] if the native backend made both image and golden, and else
+    /// [`Tolerance::default`].
     #[must_use]
     pub fn tolerance(self, tolerance: Tolerance) -> Self {
-        Self { tolerance, ..self }
+        Self { tolerance: Some(tolerance), ..self }
     }
 
     /// Puts the files of failures into another folder, for several images that share a golden.
@@ -225,7 +248,9 @@ impl Golden {
             error => failure(Reason::Unreadable(error), None),
         })?;
         let same = MadeOn::same(golden.made_on.as_ref(), made_on);
-        let tolerance = if same { self.tolerance } else { Tolerance::WIDEST };
+        let is_exact = made_on.is_some_and(MadeOn::is_exact);
+        let default = if is_exact { Tolerance::EXACT } else { Tolerance::default() };
+        let tolerance = if same { self.tolerance.unwrap_or(default) } else { Tolerance::WIDEST };
         match Comparison::new(actual, &golden.image, tolerance) {
             Ok(comparison) if comparison.passes() => Ok(comparison),
             Ok(comparison) => Err(failure(Reason::Differs(comparison), golden.made_on)),

@@ -7,22 +7,33 @@ use std::path::Path;
 use wgpu::AdapterInfo;
 
 use super::file;
-use crate::headless::Rendering;
 #[cfg(feature = "gpu")]
 use crate::headless::device::driver_name;
+use crate::headless::{Backend, Rendering};
 use crate::image::{Image, ImageError};
+use crate::stats::Stats;
 use crate::volume::ReadOptions;
 
 /// The adapter and driver that made an image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MadeOn {
-    /// The adapter's name.
+    /// The adapter's name, or `cpu backend`, `reference backend`.
     pub adapter: String,
     /// Its driver's name and version.
     pub driver: String,
 }
 
 impl MadeOn {
+    /// An image of a backend that needs no adapter.
+    fn by(backend: &str) -> Self {
+        Self { adapter: format!("{backend} backend"), driver: String::new() }
+    }
+
+    /// Whether such an image is the same on every machine.
+    pub(super) fn is_exact(&self) -> bool {
+        *self == Self::by(Backend::Cpu.name())
+    }
+
     /// Whether two images were made on the same adapter, with any driver: the part of an adapter's name that Mesa puts in parentheses
     /// describes the driver. Two images of unknown origin count as made on the same adapter.
     pub fn same(one: Option<&Self>, other: Option<&Self>) -> bool {
@@ -40,7 +51,10 @@ impl From<&AdapterInfo> for MadeOn {
 
 impl Display for MadeOn {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}, driver {}", self.adapter, self.driver)
+        match self.driver.as_str() {
+            "" => f.write_str(&self.adapter),
+            driver => write!(f, "{}, driver {driver}", self.adapter),
+        }
     }
 }
 
@@ -68,7 +82,12 @@ impl Subject for Rendering {
     }
 
     fn made_on(&self) -> Option<MadeOn> {
-        Some(MadeOn { adapter: self.stats.adapter.clone(), driver: self.stats.driver.clone() })
+        let Stats { adapter, driver, backend, .. } = &self.stats;
+        let is_named = [Backend::Cpu, Backend::Reference].iter().any(|named| named.name() == backend);
+        Some(match is_named {
+            true => MadeOn::by(backend),
+            false => MadeOn { adapter: adapter.clone(), driver: driver.clone() },
+        })
     }
 }
 

@@ -29,6 +29,9 @@ impl Default for Tolerance {
 }
 
 impl Tolerance {
+    /// None: every pixel is equal.
+    pub const EXACT: Self = Self { per_channel: 0, outliers: 0.0 };
+
     /// The widest tolerance: 16 of 255, and one pixel in 100. It applies if the golden was made on another adapter: culling with the
     /// default `opacity_threshold` alone may change a channel by 13.
     pub const WIDEST: Self = Self { per_channel: 16, outliers: 0.01 };

@@ -13,7 +13,9 @@ use std::path::{Path, PathBuf};
 
 use sheetsplat::assert_golden;
 use sheetsplat::golden::{Bless, Failure, Golden, GoldenError, MadeOn, Outcome, Picture, Reason, Subject, Tolerance};
+use sheetsplat::headless::Rendering;
 use sheetsplat::image::Image;
+use sheetsplat::stats::Stats;
 
 /// A picture of 20×10 opaque pixels with a gradient.
 fn gradient() -> Image {
@@ -202,6 +204,26 @@ fn a_golden_that_is_no_image_fails() {
 
 const MESA_15: &str = "llvmpipe (LLVM 15.0.6, 256 bits)";
 const MESA_19: &str = "llvmpipe (LLVM 19.1.7, 512 bits)";
+
+/// A picture of the native backend is exactly its golden, unless the test allows a tolerance; and says what made it.
+#[test]
+fn the_native_backend_is_compared_exactly() {
+    let folder = Folder::new();
+    let rendering = |image: Image, backend: &str| {
+        let (adapter, driver) = ("CPU".to_owned(), "avx2".to_owned());
+        Rendering { image, stats: Stats { backend: backend.to_owned(), adapter, driver, ..Stats::default() } }
+    };
+    let golden = folder.with("head", &rendering(gradient(), "cpu"));
+    golden.check(&rendering(gradient(), "cpu")).unwrap();
+    let error = golden.check(&rendering(bluer(1, 1), "cpu")).unwrap_err().to_string();
+    for words in ["differ by more than 0 of 255", "cpu backend"] {
+        assert!(error.contains(words), "no {words:?} in {error}");
+    }
+    assert!(!error.contains("avx2"), "{error}");
+    golden.clone().tolerance(Tolerance::new(1, 0.0).unwrap()).check(&rendering(bluer(1, 1), "cpu")).unwrap();
+    // Another backend is another adapter.
+    golden.check(&rendering(bluer(15, 1), "reference")).unwrap();
+}
 
 #[test]
 fn another_adapter_is_compared_with_the_widest_tolerance() {
