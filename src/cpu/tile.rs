@@ -130,12 +130,17 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Composites a sheet.
-    #[inline(always)]
     fn composite<S: Simd>(&mut self, simd: S, sheet: i32) {
-        let Self { frame, open, rays, buffers, tally, .. } = self;
-        let begin = rays.begin(frame.projection.direction * sheet);
-        let is_composited = frame.compositor.composite(simd, buffers, slot_of(sheet), (rays, begin), open);
-        tally.sheets_composited += u64::from(is_composited && frame.touched.contains(&sheet));
+        // One function of it for every instruction set, wherever it is called.
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let Self { frame, open, rays, buffers, tally, .. } = self;
+                let begin = rays.begin(frame.projection.direction * sheet);
+                let is_composited = frame.compositor.composite(simd, buffers, slot_of(sheet), (rays, begin), open);
+                tally.sheets_composited += u64::from(is_composited && frame.touched.contains(&sheet));
+            },
+        );
     }
 
     /// Lets a brick's voxels wait for their first sheets, unless the brick is hidden; whether it is not.
@@ -222,42 +227,52 @@ impl<'a> TileWalk<'a> {
         }
     }
 
-    #[inline(always)]
     fn draw_batch<S: Simd>(&mut self, simd: S, batch: &mut Batch) {
-        let amounts = self.frame.shader.shade(simd, &batch.unshaded);
-        for lane in 0..std::mem::take(&mut batch.count) {
-            if let Some(splat) = &mut batch.splats[lane] {
-                splat.amount = amounts.map(|lanes| lanes[lane]);
-            }
-            if let Some(splat) = batch.splats[lane] {
-                self.draw_splat(simd, &splat);
-            }
-        }
+        // One function of it for every instruction set, wherever it is called.
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let amounts = self.frame.shader.shade(simd, &batch.unshaded);
+                for lane in 0..std::mem::take(&mut batch.count) {
+                    if let Some(splat) = &mut batch.splats[lane] {
+                        splat.amount = amounts.map(|lanes| lanes[lane]);
+                    }
+                    if let Some(splat) = batch.splats[lane] {
+                        self.draw_splat(simd, &splat);
+                    }
+                }
+            },
+        );
     }
 
     /// Draws a voxel's next sections, if they are seen, and keeps it if there are more.
-    #[inline(always)]
     fn draw_splat<S: Simd>(&mut self, simd: S, splat: &Splat) {
-        let splatter = &self.frame.splatter;
-        let sections = splatter.sections(simd, splat);
-        let [first, end] = splat.sheets;
-        let next = end.min(first + SECTIONS as i32);
-        if sections.pixels.is_some_and(|pixels| self.open.sees(&pixels)) {
-            splatter.draw(simd, splat, &sections, &self.open, &mut self.buffers);
-            self.frame.drawn.splat(splat.voxel, splat.drawn, (next - first) as u64, &mut self.tally);
-            if self.frame.is_each {
-                self.composite(simd, first);
-            }
-        }
-        if next < end {
-            self.continued[slot_of(next)].push(Splat {
-                sheets: [next, end],
-                first_plane: splat.first_plane + splat.step * SECTIONS as f32,
-                drawn: splat.drawn + 1,
-                ..*splat
-            });
-            self.pending += 1;
-        }
+        // One function of it for every instruction set, wherever it is called.
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let splatter = &self.frame.splatter;
+                let sections = splatter.sections(simd, splat);
+                let [first, end] = splat.sheets;
+                let next = end.min(first + SECTIONS as i32);
+                if sections.pixels.is_some_and(|pixels| self.open.sees(&pixels)) {
+                    splatter.draw(simd, splat, &sections, &self.open, &mut self.buffers);
+                    self.frame.drawn.splat(splat.voxel, splat.drawn, (next - first) as u64, &mut self.tally);
+                    if self.frame.is_each {
+                        self.composite(simd, first);
+                    }
+                }
+                if next < end {
+                    self.continued[slot_of(next)].push(Splat {
+                        sheets: [next, end],
+                        first_plane: splat.first_plane + splat.step * SECTIONS as f32,
+                        drawn: splat.drawn + 1,
+                        ..*splat
+                    });
+                    self.pending += 1;
+                }
+            },
+        );
     }
 }
 
