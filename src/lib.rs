@@ -167,7 +167,9 @@ pub mod internals {
 
     /// The GPU's stages.
     pub mod pass {
-        pub use crate::pass::{composite, cull, first_hit, gather, occlude, resolve, sample, shade, splat, tiles};
+        pub use crate::pass::{
+            classify, composite, cull, field, first_hit, gather, occlude, resolve, sample, shade, splat, tiles, values,
+        };
     }
 
     /// The f64 twins of the stages.

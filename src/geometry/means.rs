@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::settings::splatting::{Compositing, Splatting};
+use crate::settings::splatting::{Classification, Compositing, Splatting};
 use crate::volume::Grid;
 
 /// A box around the volume's centre.
@@ -18,11 +18,11 @@ pub struct RayBox {
 }
 
 impl RayBox {
-    /// That of [`Compositing::Minimum`], where kernels are complete, or of [`Compositing::Average`], all voxels; the others look at
-    /// none.
+    /// That of [`Compositing::Minimum`], where kernels are complete, or all cells, of [`Compositing::Average`] and with
+    /// [`Classification::After`]; the others look at none.
     pub fn new(view: &ViewGeometry, grid: &Grid, splatting: &Splatting) -> Self {
         let (centers, near) = (grid.center(), view.perspective.map_or(f64::NEG_INFINITY, |it| it.eye.near));
-        if splatting.compositing != Compositing::Minimum {
+        if splatting.compositing != Compositing::Minimum || splatting.classification == Classification::After {
             return Self { half: centers + 0.5, nearest: near };
         }
         // The farthest that a kernel reaches in depth from a voxel before the near plane.
@@ -34,7 +34,7 @@ impl RayBox {
 /// The sheet depths whose slabs count even where they hold nothing, empty for none: those that some ray counts for
 /// [`Compositing::Minimum`].
 pub fn covered(view: &ViewGeometry, grid: &Grid, splatting: &Splatting) -> Range<f64> {
-    if splatting.compositing != Compositing::Minimum {
+    if splatting.compositing != Compositing::Minimum || splatting.classification == Classification::After {
         return 0.0..0.0;
     }
     let RayBox { half, nearest } = RayBox::new(view, grid, splatting);

@@ -187,26 +187,22 @@ pub struct Planes {
     pub per_number: f32,
 }
 
-/// A voxel on its way to slab planes.
+/// A voxel on its way to slab planes, as large as a [`Splat`].
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Sample {
+pub struct FieldVoxel {
     /// Pixels right of the image's middle, times the depth from the eye.
     pub x: f32,
     /// Pixels below it, the same.
     pub y: f32,
     /// Sheet depth.
     pub depth: f32,
-    /// Depth from the eye; 1 without one.
-    pub from_eye: f32,
     /// Its coefficient, a number.
     pub number: f32,
-    /// The values' central difference along x, numbers per `unit`.
-    pub gradient_x: f32,
-    /// Along y.
-    pub gradient_y: f32,
-    /// Along z.
-    pub gradient_z: f32,
+    /// The values' central differences, numbers per `unit`, along x and y: two `snorm16`.
+    pub gradient_xy: u32,
+    /// Along z, the same, and 256 more than the exponent that the three are scaled by.
+    pub gradient_z: u32,
 }
 
 /// 4×4×4 places for voxels, x fastest.

@@ -205,11 +205,21 @@ const CHORD_SPAN: f64 = 0.45;
 
 /// One [`SheetGroup`] every `stride` bytes: group after group, and of every group list after list.
 pub fn groups(plan: &FramePlan, kernel: &Kernel, splatting: &Splatting, stride: usize) -> Vec<u8> {
+    groups_of(plan, stride, |planes| group(&plan.view, kernel, splatting, planes))
+}
+
+/// The same where groups are single planes (SPEC §9).
+pub fn plane_groups(plan: &FramePlan, geometry: &PlaneGeometry, splatting: &Splatting, stride: usize) -> Vec<u8> {
+    let half_box = |plane| geometry.half_box_px(plane, plan.view.size);
+    groups_of(plan, stride, |planes| group_of(half_box(planes.start), splatting, planes.start))
+}
+
+fn groups_of(plan: &FramePlan, stride: usize, of: impl Fn(Range<f64>) -> SheetGroup) -> Vec<u8> {
     let mut bytes = Vec::new();
     let first_slab = plan.groups.iter().map(|group| group.first_slab).min().unwrap_or(0);
     for (index, group) in (0..).zip(&plan.groups) {
         let number = (group.first_slab - first_slab) as u32 / plan.sheets + 1;
-        let uniform = SheetGroup { number, ..self::group(&plan.view, kernel, splatting, group.planes.clone()) };
+        let uniform = SheetGroup { number, ..of(group.planes.clone()) };
         for bricks in &group.bricks {
             let count = bricks.end - bricks.start;
             let uniform = SheetGroup { first_brick: bricks.start, brick_count: count, index, ..uniform };
@@ -223,13 +233,17 @@ pub fn groups(plan: &FramePlan, kernel: &Kernel, splatting: &Splatting, stride: 
 
 /// The group of sheets between two planes of sheet depth, without bricks.
 pub fn group(view: &ViewGeometry, kernel: &Kernel, splatting: &Splatting, planes: Range<f64>) -> SheetGroup {
-    let half_box = view.half_box(kernel.support(), planes.clone());
+    group_of(view.half_box(kernel.support(), planes.clone()), splatting, planes.start)
+}
+
+/// A group from `near` on whose footprints' boxes have this half, pixels.
+fn group_of(half_box: DVec2, splatting: &Splatting, near: f64) -> SheetGroup {
     SheetGroup {
         half_box: in_f32_pixels(half_box),
         // A footprint's box holds that many pixel centres and one more, or one less.
         box_filter: ((2.0 * half_box.min(DVec2::splat(MAX_HALF_BOX))).floor() - 1.0).as_uvec2().to_array(),
         culling: u32::from(splatting.culling && hides(splatting) && half_box.max_element() <= MAX_HALF_BOX),
-        near: planes.start as f32,
+        near: near as f32,
         first_brick: 0,
         brick_count: 0,
         index: 0,

@@ -8,7 +8,8 @@ use crate::pass::composite::RayMode;
 use crate::pass::gather::WORKGROUP_BYTES;
 use crate::setting_error::SettingError;
 use crate::settings::splatting::{
-    Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting, check_first_hit,
+    Classification, Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting,
+    check_first_hit,
 };
 
 /// Threads that a subgroup may have.
@@ -53,6 +54,10 @@ fn refused_tiles(found: String, allowed: &str) -> Option<RenderError> {
 
 /// Why some settings cannot be drawn by tiles; `None` if they can.
 fn obstacle_in_settings(splatting: &Splatting) -> Option<RenderError> {
+    if splatting.classification == Classification::After {
+        let found = "splatting.classification = \"after\"".to_owned();
+        return refused_tiles(found, "\"before\" with it, or \"quads\"");
+    }
     if splatting.method == Method::CompositeEverySample {
         let found = "splatting.method = \"composite-every-sample\"".to_owned();
         return refused_tiles(found, "\"image-aligned\" or \"axis-aligned\" with it, or \"quads\"");

@@ -7,6 +7,7 @@ use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Limits, Text
 use super::{Footprints, FrameEstimate, FrameInputs, Prepared, compute};
 use crate::error::RenderError;
 use crate::geometry::footprint::FootprintTable;
+use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, uploaded};
 use crate::gpu::classified_volume::ClassifiedVolume;
 use crate::gpu::layout::{Brick, SheetGroup, Tally};
@@ -61,17 +62,17 @@ pub(crate) struct QuadFrame {
 
 /// What only changes with the view, or with the bricks: the buckets.
 #[derive(Debug)]
-struct Planned {
-    plan: FramePlan,
+pub(super) struct Planned {
+    pub(super) plan: FramePlan,
     order: Order,
     /// [`means::covered`](crate::geometry::means::covered).
     covered: Range<f64>,
     /// [`ClassifiedVolume::revision`].
     revision: u64,
     /// For every list its bricks in bucket order, `[u32]`.
-    orders: Vec<Buffer>,
+    pub(super) orders: Vec<Buffer>,
     /// For every list the most bricks and voxels that any group can visit.
-    most: Vec<(u32, u32)>,
+    pub(super) most: Vec<(u32, u32)>,
 }
 
 #[derive(Debug)]
@@ -113,14 +114,14 @@ impl QuadRasterizer {
         };
         let mut other_axes = old.planned;
         other_axes.retain(|old| {
-            (old.order, old.revision, &old.covered) == (splatting.order, volume.revision, covered)
+            old.is_of(volume, splatting.order, covered)
                 && (old.plan.view.has_depths_of(view) || old.plan.view.is_by_slices())
         });
         let current = other_axes.iter().position(|old| old.plan.view.has_depths_of(view));
         let bucketed = current.is_none();
         let mut planned = match current {
             Some(at) => other_axes.swap_remove(at),
-            None => Planned::new(device, volume, request, self.sheets),
+            None => Planned::new(device, volume, (view, splatting.order, covered), self.sheets),
         };
         planned.plan.view = *view;
         let plan = &planned.plan;
@@ -140,6 +141,7 @@ impl QuadRasterizer {
             control_points,
             occluded: &targets.occluded,
             culled: &culled,
+            planes: None,
         };
         let mut old_lists = old.lists.into_iter();
         let lists: Vec<PreparedList> = (volume.lists.lists.iter().zip(&planned.orders).zip(&planned.most))
@@ -293,16 +295,25 @@ impl QuadFrame {
 }
 
 impl Planned {
-    fn new(device: &Device, volume: &ClassifiedVolume, request: &FrameRequest, sheets: u32) -> Self {
-        let FrameRequest { view, splatting, covered, .. } = request;
-        let (order, covered) = (splatting.order, covered.clone());
+    pub(super) fn new(
+        device: &Device,
+        volume: &ClassifiedVolume,
+        (view, order, covered): (&ViewGeometry, Order, &Range<f64>),
+        sheets: u32,
+    ) -> Self {
         let plan = FramePlan::new(volume.lists.bricks(), *view, sheets, order, covered.clone());
         let most = most_of(volume.lists.bricks(), &plan);
         let upload = |order: &Vec<u32>| {
             let bytes = order_bytes(order);
             uploaded(device, "sheetsplat.order", bytes, bytes.len() as u64, BufferUsages::STORAGE)
         };
-        Self { order, covered, revision: volume.revision, orders: plan.orders.iter().map(upload).collect(), most, plan }
+        let orders = plan.orders.iter().map(upload).collect();
+        Self { order, covered: covered.clone(), revision: volume.revision, orders, most, plan }
+    }
+
+    /// Whether another frame of a volume can go by it.
+    pub(super) fn is_of(&self, volume: &ClassifiedVolume, order: Order, covered: &Range<f64>) -> bool {
+        (self.order, self.revision, &self.covered) == (order, volume.revision, covered)
     }
 }
 
@@ -341,12 +352,12 @@ fn passes(plan: &FramePlan) -> usize {
 }
 
 /// Bytes from one group to the next.
-fn group_stride(limits: &Limits) -> usize {
+pub(super) fn group_stride(limits: &Limits) -> usize {
     size_of::<SheetGroup>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize)
 }
 
 /// The buffers of what culling counts, and of first hits.
-fn counts_and_hits(request: &FrameRequest) -> [BufferSpec; 2] {
+pub(super) fn counts_and_hits(request: &FrameRequest) -> [BufferSpec; 2] {
     let [columns, rows] = tile_grid(request.view.size);
     let culled_bytes = size_of::<Tally>() as u64 + u64::from(columns * rows) * 4;
     let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
@@ -357,12 +368,12 @@ fn counts_and_hits(request: &FrameRequest) -> [BufferSpec; 2] {
 }
 
 /// A list's bricks in bucket order; bindings may not be empty.
-fn order_bytes(order: &[u32]) -> &[u8] {
+pub(super) fn order_bytes(order: &[u32]) -> &[u8] {
     if order.is_empty() { &[0; 4] } else { bytemuck::cast_slice(order) }
 }
 
 /// For every list the most bricks and voxels that any group can visit.
-fn most_of<'a>(lists: impl Iterator<Item = &'a [Brick]>, plan: &FramePlan) -> Vec<(u32, u32)> {
+pub(super) fn most_of<'a>(lists: impl Iterator<Item = &'a [Brick]>, plan: &FramePlan) -> Vec<(u32, u32)> {
     let of_list = |(at, (bricks, order)): (usize, (&[Brick], &Vec<u32>))| {
         let voxels = |&brick: &u32| brick::present(&bricks[brick as usize]).count_ones();
         most(plan.groups.iter().map(|group| {

@@ -18,7 +18,7 @@ pub enum Light {
 }
 
 /// Which gradient the normals are of for [`Classification::After`](super::Classification::After).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Gradient {
     /// The voxels' central differences, interpolated like the values.
     Differences,

@@ -70,7 +70,7 @@ pub enum FootprintForm {
 /// a sheet at a pixel is what it holds there over the length of the pixel's ray within its slab, in `unit`s (axis-aligned: from one slice
 /// to the next), so the mean opacity per unit length, and colour times that. What a cut leaves of a slab counts by its share of the slab, but for
 /// [`Self::Minimum`]. They need sheets, so a method other than [`Method::CompositeEverySample`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Compositing {
     /// The paper's: opacities add up within a sheet, at most to 1.

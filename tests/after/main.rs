@@ -6,6 +6,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod field;
+mod gpu;
 mod images;
 mod modes;
 mod refusals;
