@@ -1,4 +1,4 @@
-// Which voxels of the visited bricks a sheet group draws (§6). One workgroup per visited brick, one thread per place for a voxel.
+// Finds the voxels of the visited bricks that a sheet group draws (§6). One workgroup per visited brick, one thread per slot.
 
 @group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(2) var<storage, read> bricks: array<Brick>;
@@ -16,15 +16,15 @@ var<workgroup> hidden_now: array<atomic<u32>, 2>;
 var<workgroup> drawn_now: array<atomic<u32>, 2>;
 var<workgroup> sections_now: atomic<u32>;
 
-// Whether the box filter that starts at a pixel finds opaque pixels alone.
+// Whether the box filter that starts at a pixel finds only opaque pixels.
 fn is_occluded(x: u32, y: u32) -> bool {
     let word = occluded[y * tile_grid(frame.size).x + x / TILE];
     return (word & (1u << (x % TILE))) != 0u;
 }
 
-// Whether every pixel of the footprint's box is opaque: depending on where the centre lies in its pixel, the box is as large as
-// the filter or a pixel larger, which the filter then covers from its corners. Off the image the nearest filter on it is as
-// good: it holds all of the box that is on the image.
+// Whether every pixel of the footprint's box is opaque. Depending on where in its pixel the centre lies, the box is as large as the filter, or a
+// pixel larger, in which case the filters at its corners cover it. Off the image the nearest filter on it serves as well, because it
+// contains the part of the box that is on the image.
 fn is_hidden(center_px: vec2f) -> bool {
     let last = vec2f(frame.size - 1u);
     let margin = sheet_group.half_box + BOX_SLACK;
@@ -72,8 +72,8 @@ fn main(@builtin(local_invocation_index) slot: u32, @builtin(workgroup_id) workg
         let is_close = PLANE && frame.near > 0.0 && p.w <= CLOSE * frame.reach;
         let on_screen = is_close || all(center_px + sheet_group.half_box >= vec2f(0.5))
             && all(center_px - sheet_group.half_box <= vec2f(frame.size) - 0.5);
-        // The sheets of this group that the kernel overlaps, with more than the depths' rounding errors: what ends at a plane
-        // does not reach the sheet behind it. The first voxel is about as deep as any.
+        // The sheets of this group that the kernel overlaps by more than the rounding errors of depths: a kernel that ends at a plane does not
+        // reach the sheet behind it. The first voxel's depth is about as large as any.
         let error = 2e-7 * (frame.radius + abs(frame.screen_from_voxel[2].w) + abs(sheet_group.near));
         var reached = overlapped(p, error, frame.near > 0.0);
         if PLANE {
@@ -87,13 +87,12 @@ fn main(@builtin(local_invocation_index) slot: u32, @builtin(workgroup_id) workg
             end_sheet = select(0.0, 1.0, depths.x < 0.0 && depths.y > 0.0);
         }
         let is_drawn = on_screen && (is_close || !(sheet_group.culling != 0u && is_hidden(center_px)));
-        // Front to back boxes only shrink: what is off the screen or hidden stays so. Back to front, where nothing is hidden, they grow.
+        // Front to back, boxes only shrink: what is off the screen or hidden stays so. Back to front, where nothing is hidden, they grow.
         if !is_drawn && frame.order == FRONT_TO_BACK {
             atomicOr(&hidden_now[word], bit);
         }
         var sections = select(0u, u32(end_sheet - first_sheet), is_drawn && first_sheet < end_sheet);
-        // In perspective the group's box may reach onto the screen where no section's own does. (Software drivers execute an `if`
-        // whether or not, but no loop.)
+        // In perspective the group's box may reach onto the screen where no section's own does. (A one-shot loop, see gather.wgsl.)
         let is_beside = !PLANE && sections > 0u && frame.near > 0.0 && any(abs(center_px - 0.5 * vec2f(frame.size)) > 0.5 * vec2f(frame.size));
         for (var once = is_beside; once; once = false) {
             let ray = local_ray(center_px);

@@ -1,4 +1,4 @@
-//! The NRRD reader: every type and layout, every error, and files that are damaged or lie.
+//! The NRRD reader: every type and layout, every error, and files that are damaged or contradict themselves.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -18,7 +18,7 @@ use tempfile::TempDir;
 
 use shared::shared;
 
-/// Header of a 2×3×4 volume of `uint8`; the tests replace or add lines.
+/// The header of a 2×3×4 volume of `uint8`; the tests replace or add lines.
 const PLAIN: &str = "NRRD0005\ntype: uint8\ndimension: 3\nsizes: 2 3 4\nencoding: raw\n";
 
 fn gzip(bytes: &[u8]) -> Vec<u8> {
@@ -41,13 +41,13 @@ impl Folder {
 
     fn write(&self, name: &str, parts: &[&[u8]]) -> PathBuf {
         let path = self.0.path().join(name);
-        // Written over, a file may be waited for until it is on the disk; a new one is not.
+        // Overwriting a file may wait for the disk; creating a new one does not.
         _ = fs::remove_file(&path);
         fs::write(&path, parts.concat()).unwrap();
         path
     }
 
-    /// Opens an attached file of this header, a blank line, and these data.
+    /// Opens an attached file of this header, a blank line, and the data.
     fn attached(&self, header: &str, data: &[u8]) -> Result<Volume, VolumeError> {
         Volume::open(&self.write("volume.nrrd", &[header.as_bytes(), b"\n", data]))
     }
@@ -210,7 +210,7 @@ fn detached() {
     let header = format!("{PLAIN}data file: deep/50 % of it\n");
     assert_plain(&folder.detached(&header, &[]).unwrap());
 
-    // A header without the field is followed by its data, whatever the file is called.
+    // In a header without the data file field, the data follows, whatever the file's name.
     assert_plain(&Volume::open(&folder.write("whole.nhdr", &[PLAIN.as_bytes(), b"\n", &bytes()])).unwrap());
 }
 
@@ -329,7 +329,7 @@ fn orientation() {
             assert_eq!(open(name, "").unwrap().orientation().unwrap().origin, DVec3::ZERO);
         }
     }
-    // Spaces that are not a patient's.
+    // Spaces other than a patient's have no orientation.
     assert_eq!(open("scanner-xyz", "").unwrap().orientation(), None);
     assert_eq!(
         folder.attached(&format!("{PLAIN}space: RAS\nspacings: 1 1 1\n"), &bytes()).unwrap().orientation(),
@@ -360,7 +360,7 @@ fn anatomical_views() {
     ] {
         assert_eq!(orientation.direction_and_up(view), expected, "{view:?}");
     }
-    // Who faces the patient has the patient's left on the right.
+    // Seen from the front, the patient's left is on the right.
     let [direction, up] = orientation.direction_and_up(PatientSide::Front);
     assert_eq!(Camera { direction, up, ..Camera::default() }.basis().u, left);
 }
@@ -422,7 +422,7 @@ fn skips() {
         assert_refused(zipped(&format!("byte skip: {skip}\n"), &gzip(&lines)), "data.raw", "data", "bytes", "24");
     }
     assert_refused(detached("byte skip: -1\n", &bytes()[1..]), "data.raw", "data", "23 bytes", "24");
-    // An attached header does not count as data.
+    // An attached header is not counted as data.
     let short = folder.attached(&format!("{PLAIN}byte skip: -1\n"), &bytes()[1..]);
     assert_refused(short, "volume.nrrd", "data", "23 bytes", "24");
 }
@@ -474,7 +474,7 @@ fn endless_headers() {
     assert_refused(open(&[b"NRRD0005\n", &comments]), "volume.nrrd", "header", "more", "1048576 bytes in all");
     assert_refused(open(&[PLAIN.as_bytes()]), "volume.nrrd", "header", "the end of the file", "a blank line");
 
-    // A long but legal line is kept short in the message.
+    // A long but legal line is shortened in the message.
     let line = format!("{PLAIN}endian: {}\n", "é".repeat(30_000));
     let message = folder.attached(&line, &bytes()).expect_err("a volume").to_string();
     assert!(message.contains("éé") && message.chars().count() < 500, "{message}");
@@ -560,7 +560,7 @@ fn mutated_files_are_volumes_or_errors() {
     for (header, whole) in valid_files() {
         for round in 0..1500 {
             let mut mutant = whole.clone();
-            // Half of them spare the data, where a damaged stream would hide what the header does.
+            // Half of the mutants spare the data, where damage to a stream would hide the header's effect.
             let reach = if round % 2 == 0 { header } else { whole.len() };
             for _ in 0..=random(3) {
                 let at = random(reach.min(mutant.len()));
@@ -582,7 +582,7 @@ fn mutated_files_are_volumes_or_errors() {
             }
         }
     }
-    // Neither harmless nor hopeless: a mutant of a sample's value, or of a comment, is still a file.
+    // The mutants are neither harmless nor hopeless: a file with a changed sample or comment is still valid.
     assert!((100..2900).contains(&volumes), "{volumes}");
 }
 

@@ -1,4 +1,4 @@
-//! Scene files, `--set` overrides and their errors; transfer functions, given and chosen.
+//! Scene files, `--set` overrides and their errors; transfer functions, stated and chosen.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[path = "common/shared.rs"]
@@ -46,7 +46,7 @@ fn defaults() {
 }
 
 #[test]
-fn what_the_file_says_of_looks_decides_what_a_camera_fits() {
+fn the_default_fit_depends_on_the_files_tables() {
     let volume = "volume.builtin = 'head:24'\n";
     let camera = "[camera]\ndirection = [1, 0, 0]";
     let sets = ["preset=ct-bone", "transfer.colormap=magma", "camera.direction=[1,0,0]", "transfer={opacity=[[9,1]]}"];
@@ -59,7 +59,7 @@ fn what_the_file_says_of_looks_decides_what_a_camera_fits() {
         (camera, &["camera={height=9}"], Fit::Volume),
         ("[transfer]\niso_ranges = [[1, 2]]", &sets[..3], Fit::Volume),
         ("transfer.opacity = [[0, 0.5]]", &[], Fit::Volume),
-        // Unless it is said.
+        // Unless it is stated.
         ("camera.fit = 'object'\ntransfer.opacity = [[0, 0.5]]", &[], Fit::Object),
         (camera, &["camera.fit=object"], Fit::Object),
         ("", &["camera.fit=volume"], Fit::Volume),
@@ -133,6 +133,7 @@ fn every_key() {
         tiles = false
         rasterizer = "tiles"
         footprint_box = "parallelogram"
+        [splatting.experimental]
         whole_below = 0.25
         beta = 0.75
         resolution = 0.001
@@ -198,7 +199,7 @@ fn every_key() {
             tiles: false,
             rasterizer: Rasterizer::Tiles,
             footprint_box: FootprintBox::Parallelogram,
-            economies: Economies { whole_below: 0.25, beta: 0.75, resolution: 0.001 },
+            experimental: Economies { whole_below: 0.25, beta: 0.75, resolution: 0.001 },
         },
     };
     assert_eq!(scene, expected);
@@ -210,7 +211,7 @@ fn every_key() {
         let scene = parse(MINIMAL, &[&format!("splatting.rasterizer={name}")]).unwrap();
         assert_eq!(scene.splatting.rasterizer, rasterizer);
     }
-    // What goes with neither axis-aligned sheets nor a label's preset.
+    // A setting that excludes axis-aligned sheets and the preset for labels.
     let after = parse("volume.path = 'a.nrrd'", &["splatting.classification=after"]).unwrap();
     assert_eq!(after.splatting.classification, Classification::After);
     let scene = parse(text, &["splatting.method=composite-every-sample"]).unwrap();
@@ -218,7 +219,7 @@ fn every_key() {
     assert_eq!(parse(MINIMAL, &["shading.light=headlight"]).unwrap().shading.light, Light::Headlight);
 }
 
-/// A key, a value that is not allowed, and what the error must contain: key, found, allowed.
+/// A key, an invalid value, and what the error must contain: key, found, allowed.
 const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
     ("volume.path", "5", "volume.path", "5 (integer)", "a volume file's path"),
     ("volume.builtin", "true", "volume.builtin", "true (boolean)", "a builtin volume's name"),
@@ -321,7 +322,7 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
         "[{label = 1}, {label = 1}]",
         "transfer.label[1].label",
         "1",
-        "a label that no table before has",
+        "a label that no earlier table has",
     ),
     ("transfer.label", "[{label = 1, visible = 0}]", "transfer.label[0].visible", "0 (integer)", "true or false"),
     (
@@ -339,7 +340,7 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
         "an unknown key",
         "label, visible, color, opacity, gradient_opacity",
     ),
-    // Of a volume without labels.
+    // The volume has no labels.
     ("transfer.label", "[{label = 1}]", "transfer.label", "tables for a volume without labels", "volume.labels"),
     ("shading.enabled", "1", "shading.enabled", "1 (integer)", "true or false"),
     ("shading.light", "'sun'", "shading.light", "\"sun\"", "\"headlight\" or [x, y, z]"),
@@ -397,9 +398,20 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
         "\"square\"",
         "\"rectangle\" or \"parallelogram\"",
     ),
-    ("splatting.whole_below", "1.5", "splatting.whole_below", "1.5", "a number in [0, 1]"),
-    ("splatting.beta", "0", "splatting.beta", "0", "a number in (0, 1]"),
-    ("splatting.resolution", "-0.1", "splatting.resolution", "-0.1", "a number in [0, 1]"),
+    ("splatting.experimental.whole_below", "1.5", "splatting.experimental.whole_below", "1.5", "a number in [0, 1]"),
+    ("splatting.experimental.beta", "0", "splatting.experimental.beta", "0", "a number in (0, 1]"),
+    ("splatting.experimental.resolution", "-0.1", "splatting.experimental.resolution", "-0.1", "a number in [0, 1]"),
+    (
+        "splatting.experimental.alpha",
+        "1",
+        "splatting.experimental.alpha",
+        "an unknown key",
+        "whole_below, beta, resolution",
+    ),
+    ("splatting.experimental", "1", "splatting.experimental", "1 (integer)", "a table"),
+    ("splatting.whole_below", "0", "splatting.whole_below", "the former name", "splatting.experimental.whole_below"),
+    ("splatting.beta", "0.5", "splatting.beta", "the former name", "splatting.experimental.beta"),
+    ("splatting.resolution", "'x'", "splatting.resolution", "the former name", "splatting.experimental.resolution"),
     (
         "splatting.tile",
         "true",
@@ -419,7 +431,7 @@ fn refused_values_are_named_with_their_origin() {
             assert!(left.contains(found), "{key} = {value}: {message}");
             assert!(right.contains(allowed), "{key} = {value}: {message}");
         };
-        // As a file of its own, where a volume is missing unless the key is about one.
+        // As a scene file of its own, which lacks a volume unless the key is about one.
         let volume = if key.starts_with("volume") { "" } else { "volume.path = 'a.nrrd'\n" };
         check(parse(&format!("{volume}{key} = {value}"), &[]), "scene.toml");
         check(parse(MINIMAL, &[&format!("{key}={value}")]), "--set");
@@ -457,14 +469,14 @@ fn label_tables_need_labels() {
     let refused = |text: &str, sets: &[&str], origin: &str| {
         let message = parse(text, sets).unwrap_err().to_string();
         let expected = "transfer.label: found tables for a volume without labels, \
-                        allowed: none, or volume.labels, or volume.builtin = \"head\" or \"tomato\"";
+                        allowed: no such tables, or volume.labels, or volume.builtin = \"head\" or \"tomato\"";
         assert_eq!(message, format!("{origin}: {expected}"));
     };
     refused(&format!("{text}builtin = 'cube'"), &[], "scene.toml");
     refused(&format!("{text}builtin = 'head'"), &["volume.builtin=nerve:40"], "--set");
     refused(MINIMAL, &["transfer.label=[{label=1}]"], "--set");
     parse(MINIMAL, &["transfer.label=[{label=1}]", "volume.labels=b.nrrd"]).unwrap();
-    // What is wrong is the name, which the volume's own error explains.
+    // The name is wrong, which the volume's own error explains.
     parse(&format!("{text}builtin = 'skull'"), &[]).unwrap();
 }
 
@@ -481,7 +493,7 @@ fn overrides() {
     let scene = parse(text, &["splatting.slab_width=2.0", "splatting.slab_width = 4", "image.width=64"]).unwrap();
     assert_eq!((scene.splatting.slab_width, scene.splatting.radius, scene.image.width), (4.0, 3.0, 64));
 
-    // An override repairs a bad value, and has the last word on the volume.
+    // An override replaces an invalid value, and decides which volume is used.
     assert!(parse(text, &["splatting.radius=9"]).is_err());
     assert!(parse(&text.replace('3', "9"), &["splatting.radius=2"]).is_ok());
     assert_eq!(parse(text, &["volume.path=x y.nrrd"]).unwrap().volume, file("folder/x y.nrrd"));
@@ -512,7 +524,11 @@ fn refused_overrides() {
         ("=1", format!("=1: found an empty key, {usage}")),
         (".radius=1", format!(".radius=1: found an empty key, {usage}")),
         ("splatting.=1", format!("splatting.=1: found an empty key, {usage}")),
-        ("camera.up.x=1", format!("camera.up.x: found a key of more than two parts, {usage}")),
+        ("camera.up.x=1", "camera.up: found { x = 1 } (table), allowed: 3 numbers, each a finite number".to_owned()),
+        (
+            "splatting.radius.min.x=1",
+            "splatting.radius: found { min = { x = 1 } } (table), allowed: a number".to_owned(),
+        ),
         ("camera=1", "camera: found 1 (integer), allowed: a table".to_owned()),
         ("camera={ up = [1, 1] }", "camera.up: found [1, 1], allowed: 3 numbers, each a finite number".to_owned()),
         ("zoom=1", "zoom: found an unknown key, allowed: volume, camera".to_owned()),
@@ -529,7 +545,7 @@ fn refused_overrides() {
     let message = parse("volume.path = 'a'\ncamera = 5", &["camera.up=[0, 0, 1]"]).unwrap_err().to_string();
     assert_eq!(message, "--set: camera.up: found camera = 5 (integer), allowed: camera to be a table");
 
-    // An override elsewhere in the table does not take the blame.
+    // An override of another key in the table is not named as the origin.
     let message = parse("[volume]\nspacing = [0, 1, 1]\npath = 'a'", &["volume.path=b"]).unwrap_err().to_string();
     assert!(message.starts_with("scene.toml: volume.spacing[0]: found 0"), "{message}");
     let message = parse("", &["volume.spacing=[1, 1, 1]"]).unwrap_err().to_string();
@@ -555,7 +571,7 @@ fn directions_of_any_length() {
     }
 }
 
-/// What a label's table leaves out is the main one's.
+/// Keys that a label's table omits are the main table's.
 #[test]
 fn tables_of_labels() {
     let scene = "[volume]\nbuiltin = 'head:8'\n[transfer]\ncolor = [[0, [1, 1, 1]]]\nopacity = [[0, 0.5]]\n\

@@ -1,21 +1,22 @@
-// Kernels as the tile rasterizer gathers them: in closed form, by polynomials instead of tables (eq. 3).
+// Kernels in the tile rasterizer's closed form: polynomials instead of tables (eq. 3).
 //
-// Needs gather.wgsl: ECONOMIES, PERSPECTIVE, gather.
+// Needs gather.wgsl: PERSPECTIVE, gather.
+// Needs gather/economies.wgsl: Planes, economic_planes, economic_rim, rim_of, within_rim.
 // Needs shared/frame.wgsl: frame.
 // Needs shared/local_ray.wgsl: SectionMaps, local_ray, near_cut, section_maps.
 
-// A voxel's kernel as the pixels see it.
+// A voxel's kernel in the sheets of a group.
 struct Footprint {
     center_px: vec2f,
-    // `(C·m, m)` times the low-pass amplitude over λ; 0 without a voxel.
+    // `(C·m, m)` times the low-pass amplitude, divided by λ; 0 without a voxel.
     amount: vec4f,
     // H(0, 0, t) of eq. 3 at the group's first plane and at the four after it.
     first_plane: f32,
     planes: vec4f,
-    // In perspective, how its sections' footprints lie on the screen.
+    // In perspective, the maps from its sections' footprints to the screen.
     axis: vec2f,
     maps: SectionMaps,
-    // Among the economies: ρ² from which a footprint adds too little, by sheet.
+    // See `economic_rim`.
     rim: vec4f,
 }
 
@@ -38,7 +39,7 @@ fn cubic(c: vec4f, z: f32, squared: f32) -> f32 {
     return c.x + z * c.y + squared * (c.z + z * c.w);
 }
 
-// Where a column's four pixels lie in a footprint.
+// The positions of a column's four pixels in a footprint.
 struct Offsets {
     dx: f32,
     dy: vec4f,
@@ -48,10 +49,10 @@ fn offsets_in(footprint: Footprint, column: f32, rows: vec4f) -> Offsets {
     return Offsets(column - footprint.center_px.x, rows - footprint.center_px.y);
 }
 
-// How four pixels see a kernel in a sheet: H(a, b, t) of eq. 3 is H(0, 0, t) times the Gaussian of ρ² = a² + b², and t ends where the chord
-// of the kernel's ball does.
+// A kernel in a sheet at four pixels: H(a, b, t) of eq. 3 is H(0, 0, t) times the Gaussian of ρ² = a² + b², and t ends where the chord of the
+// kernel's ball does.
 struct Chords {
-    // H(0, 0, t) where they end, as bits, which numbers from 0 on may be compared by.
+    // H(0, 0, t) at the chord's end, as bits: the bits of numbers that are not negative compare like the numbers.
     rim: vec4i,
     in_plane: vec4f,
 }
@@ -69,12 +70,12 @@ fn chords(footprint: Footprint, at: Offsets, sheet: u32) -> Chords {
     return Chords(bitcast<vec4i>(rim_at(rho_squared)), in_plane_at(rho_squared, footprint.rim.x));
 }
 
-// A section between two planes: two entries of eq. 3 subtracted.
+// A section between two planes: the difference of two entries of eq. 3.
 fn section(near: f32, far: f32, chords: Chords) -> vec4f {
     return (cut_by_rim(far, chords.rim) - cut_by_rim(near, chords.rim)) * chords.in_plane;
 }
 
-// H(0, 0, t) at a plane, or at the rim on its side. Integers' least takes a driver half as long as numbers', which may be none.
+// H(0, 0, t) at a plane, or at the rim on its side. Integer `min` costs a driver half of float `min`, which must handle NaN.
 fn cut_by_rim(plane: f32, rim: vec4i) -> vec4f {
     let bits = bitcast<i32>(plane);
     let sign = bits & i32(0x80000000u);
@@ -83,11 +84,7 @@ fn cut_by_rim(plane: f32, rim: vec4i) -> vec4f {
 
 // The Gaussian of ρ², up to the footprint's rim.
 fn in_plane_at(rho_squared: vec4f, footprint_rim: f32) -> vec4f {
-    let in_plane = exp2(rho_squared * gather.metric.w);
-    if ECONOMIES {
-        return select(vec4f(0.0), in_plane, rho_squared < vec4f(footprint_rim));
-    }
-    return in_plane;
+    return within_rim(exp2(rho_squared * gather.metric.w), rho_squared, footprint_rim);
 }
 
 // H(0, 0, t) where the chord of the kernel's ball ends.
@@ -101,7 +98,7 @@ fn rim_at(rho_squared: vec4f) -> vec4f {
     return sqrt(chord_squared) * (low + z_squared * z_squared * high);
 }
 
-// What another lane holds.
+// Another lane's footprint.
 fn footprint_of(own: Footprint, other: u32) -> Footprint {
     var footprint: Footprint;
     footprint.center_px = subgroupShuffle(own.center_px, other);
@@ -114,46 +111,33 @@ fn footprint_of(own: Footprint, other: u32) -> Footprint {
         footprint.maps.across = subgroupShuffle(own.maps.across, other);
         footprint.maps.amplitude = subgroupShuffle(own.maps.amplitude, other);
     }
-    if ECONOMIES {
-        footprint.rim = subgroupShuffle(own.rim, other);
-    }
+    footprint.rim = rim_of(own.rim, other);
     return footprint;
 }
 
-// What a voxel at p adds to the group whose first sheet starts at `near`, in sections or, into the sheet `whole` of them, as a whole.
+// The footprint of a voxel at p in the group whose first sheet starts at `near`, in sections or, into the sheet `whole`, as a whole.
 fn footprint_at(p: vec4f, near: f32, whole: f32, amount: vec4f) -> Footprint {
     var footprint: Footprint;
     footprint.center_px = p.xy;
-    var first_step = near - p.z;
-    var steps = near - p.z + vec4f(1.0, 2.0, 3.0, 4.0) * frame.slab_width;
-    if ECONOMIES && whole >= 0.0 {
-        // As far as a kernel reaches, on either side of the sheet.
-        first_step = -WHOLE;
-        steps = select(vec4f(-WHOLE), vec4f(WHOLE), vec4f(1.0, 2.0, 3.0, 4.0) > vec4f(whole));
-    }
+    let sections = Planes(near - p.z, near - p.z + vec4f(1.0, 2.0, 3.0, 4.0) * frame.slab_width);
+    let steps = economic_planes(sections, whole);
     if PERSPECTIVE {
         let ray = local_ray(p.xy);
         let per_depth = select(frame.kernel_per_depth, ray.kernel_per_depth, frame.kernel_per_depth == 0.0);
         let cut = near_cut(ray, p.w);
-        let first = max(first_step * per_depth, cut);
-        let planes = max(steps * per_depth, vec4f(cut));
+        let first = max(steps.first * per_depth, cut);
+        let planes = max(steps.others * per_depth, vec4f(cut));
         footprint.amount = amount * ray.per_lambda;
         footprint.first_plane = along(first);
         footprint.planes = vec4f(along(planes.x), along(planes.y), along(planes.z), along(planes.w));
         footprint.axis = ray.axis;
         footprint.maps = section_maps(ray, p.w, vec4f(first, planes.xyz), planes);
     } else {
-        let planes = steps * frame.kernel_per_depth;
+        let planes = steps.others * frame.kernel_per_depth;
         footprint.amount = amount * frame.amplitude;
-        footprint.first_plane = along(first_step * frame.kernel_per_depth);
+        footprint.first_plane = along(steps.first * frame.kernel_per_depth);
         footprint.planes = vec4f(along(planes.x), along(planes.y), along(planes.z), along(planes.w));
     }
-    if ECONOMIES {
-        let amplitude = select(vec4f(1.0), footprint.maps.amplitude, PERSPECTIVE);
-        footprint.rim = log(footprint.amount.a * amplitude * gather.peak) / frame.falloff;
-    }
+    footprint.rim = economic_rim(footprint.amount.a, footprint.maps);
     return footprint;
 }
-
-// Sheet depths beyond every kernel's reach.
-const WHOLE = 1e6;

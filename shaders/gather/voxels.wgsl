@@ -1,9 +1,10 @@
-// The voxels that a subgroup of the tile rasterizer draws in a sheet group: which of those before stay, which come, their shading, and
+// The voxels that a subgroup of the tile rasterizer draws in a sheet group: which of the previous ones stay, which are added, their shading, and
 // their counts.
 //
-// Needs gather.wgsl: ECONOMIES, ORDER, PARALLELOGRAM, PASSES_PER_FIND, PASSES_PER_SHADING, PERSPECTIVE, SHEETS, bricks, color_ramp, drawn, first_px, gather, gathered, gradient_opacity_ramp, lane, lanes, opacity_ramp, open, passes, shallow, sheet_group.
+// Needs gather.wgsl: ORDER, PARALLELOGRAM, PASSES_PER_FIND, PASSES_PER_SHADING, PERSPECTIVE, SHEETS, bricks, color_ramp, drawn, first_px, gather, gathered, gradient_opacity_ramp, lane, lanes, opacity_ramp, open, passes, sheet_group.
+// Needs gather/economies.wgsl: ECONOMIES, economic_blocks, is_worthwhile, whole_sheet.
 // Needs gather/kernel.wgsl: footprint_at.
-// Needs gather/queue.wgsl: WHOLE_SHIFT, enqueue, queue_amounts, queue_blocks, queue_count, queue_first, queue_points, queue_size.
+// Needs gather/queue.wgsl: enqueue, queue_amounts, queue_blocks, queue_count, queue_first, queue_points, queue_size.
 // Needs gather/ramps.wgsl: is_long, ramp_at.
 // Needs gather/region.wgsl: blocks_in_box, blocks_in_parallelogram, bounds_of.
 // Needs gather/walk.wgsl: Found, SearchBounds, next_voxels.
@@ -15,7 +16,7 @@
 // Needs shared/shading.wgsl: lighting, shade.
 // Needs shared/volume.wgsl: gradient_at, index_of, value_at.
 
-// A group of sheets: its number, its first sheet, where that begins, and half the box around its footprints.
+// A group of sheets: its number, its first sheet, the depth where that begins, and half the box around its footprints.
 struct GatheredGroup {
     number: u32,
     first_sheet: f32,
@@ -23,24 +24,24 @@ struct GatheredGroup {
     half_box: vec2f,
 }
 
-// The frame's sheets from the first that a kernel overlaps to the one after the last.
+// The range of the frame's sheets that a kernel overlaps, from the first to the one after the last.
 fn overlapped_sheets(p: vec4f) -> vec2f {
     let sheets = (overlapped(p, gather.depth_error, PERSPECTIVE) - gather.near) / frame.slab_width;
     return vec2f(floor(sheets.x), ceil(sheets.y));
 }
 
-// Those of them that are in the sheet group.
+// The part of that range in the sheet group.
 fn sheets_here(sheets: vec2f) -> vec2f {
     return clamp(sheets, vec2f(sheet_group.first_sheet), vec2f(sheet_group.first_sheet + f32(SHEETS)));
 }
 
-// The first of the groups that a kernel overlaps, in the order in which they are drawn.
+// The first group, in drawing order, that a kernel overlaps.
 fn first_group(sheets: vec2f) -> f32 {
     let sheet = select(min(sheets.y, f32(gather.groups * SHEETS)) - 1.0, max(sheets.x, 0.0), ORDER == FRONT_TO_BACK);
     return floor(sheet / f32(SHEETS));
 }
 
-// The blocks in which the box around a footprint, or a part of its extent, holds one of some pixels.
+// A mask of the blocks in which the box around a footprint, scaled by `part`, contains a pixel of the mask.
 fn blocks_seen(words: vec4u, center: vec2f, half_box: vec2f, part: f32) -> u32 {
     let half = half_box * part + BOX_SLACK;
     if PARALLELOGRAM {
@@ -49,7 +50,7 @@ fn blocks_seen(words: vec4u, center: vec2f, half_box: vec2f, part: f32) -> u32 {
     return blocks_in_box(words, center, half);
 }
 
-// The extent of a kernel's sections in the group as a part of the kernel's: that of the section next to the kernel's centre.
+// The extent of a kernel's sections in the group, relative to the kernel's: that of the section nearest to the kernel's centre.
 fn extent_here(p: vec4f) -> f32 {
     if PERSPECTIVE || ECONOMIES {
         return 1.0;
@@ -59,12 +60,12 @@ fn extent_here(p: vec4f) -> f32 {
     return sqrt(max(1.0 - beside * beside, 0.0));
 }
 
-// Whether a voxel that is not seen in one group may be seen in the next: there boxes around footprints are of another size.
+// Whether a voxel that is not seen in one group may be seen in the next, because boxes around footprints have another size there.
 fn may_appear() -> bool {
     return PERSPECTIVE || ECONOMIES;
 }
 
-// Where voxels are whose kernels reach the group, or start in it, and whose boxes reach open pixels.
+// The bounds of voxels whose kernels reach the group, or start in it, and whose boxes reach open pixels.
 fn search_bounds(is_start: bool) -> SearchBounds {
     let bounds = bounds_of(open);
     let offset = first_px - 0.5 * vec2f(frame.size);
@@ -82,7 +83,7 @@ fn search_bounds(is_start: bool) -> SearchBounds {
     return SearchBounds(vec3f(bounds.low - margin + offset, depths.x), vec3f(bounds.high + margin + offset, depths.y));
 }
 
-// Of the voxels of the group before those stay in the queue that reach into this one and are seen there.
+// Keeps the previous group's voxels in the queue that reach into this group and are seen in it.
 fn keep_voxels() {
     let count = queue_count;
     queue_count = 0u;
@@ -103,7 +104,7 @@ fn keep_voxels() {
     }
 }
 
-// Finds as many voxels as there is room for in the queue: all that reach into the group, or those that start in it.
+// Fills the queue with voxels: all that reach into the group, or those that start in it.
 fn find_voxels(search: SearchBounds, is_start: bool) {
     while queue_count + lanes <= queue_size {
         passes += PASSES_PER_FIND;
@@ -119,7 +120,7 @@ fn find_voxels(search: SearchBounds, is_start: bool) {
     }
 }
 
-// Whether a kernel reaches into the group, and its box holds an open pixel.
+// Whether a kernel reaches into the group and its box contains an open pixel.
 fn is_drawn_here(p: vec4f, sheets: vec2f) -> bool {
     let here = sheets_here(sheets);
     return here.x < here.y && blocks_seen(open, p.xy - first_px, sheet_group.half_box, 1.0) != 0u;
@@ -130,10 +131,10 @@ fn blocks_here(p: vec4f) -> u32 {
     return blocks_seen(open, p.xy - first_px, sheet_group.half_box, extent_here(p));
 }
 
-// Shades the voxels in the queue from one on.
+// Shades the voxels of the queue from `first` on.
 fn shade_voxels(first: u32) {
     for (var i = first; i < queue_count; i += lanes) {
-        // Every lane shades its voxel.
+        // Every lane shades its own voxel.
         passes += PASSES_PER_SHADING + gather.search_passes;
         let is_in = i + lane < queue_count;
         let slot = queue_first + min(i + lane, queue_count - 1u);
@@ -142,10 +143,7 @@ fn shade_voxels(first: u32) {
         let p = project(at);
         let shaded = shaded(at, p);
         let sheets = overlapped_sheets(p);
-        var blocks = queue_blocks[slot];
-        if ECONOMIES {
-            blocks = economic_blocks(shaded, p, sheets);
-        }
+        let blocks = economic_blocks(queue_blocks[slot], shaded, p, sheets);
         if is_in {
             queue_amounts[slot] = shaded.amount;
             queue_blocks[slot] = blocks;
@@ -153,34 +151,13 @@ fn shade_voxels(first: u32) {
                 queue_points[slot].w = bitcast<u32>(p.w);
             }
         }
-        if is_in && (!ECONOMIES || blocks != 0u) {
-            count_drawn(voxel, p, sheets, blocks >> WHOLE_SHIFT != 0u);
+        if is_in && is_worthwhile(blocks) {
+            count_drawn(voxel, p, sheets, whole_sheet(blocks) >= 0.0);
         }
     }
 }
 
-// The blocks that a voxel is drawn to among §8's economies, and the sheet of the group that takes it as a whole.
-fn economic_blocks(shaded: Shaded, p: vec4f, sheets: vec2f) -> u32 {
-    let center = p.xy - first_px;
-    let is_deep = blocks_seen(shallow, center, sheet_group.half_box, 1.0) == 0u;
-    let is_whole = is_deep || shaded.alpha < gather.whole_below;
-    var whole = -1.0;
-    var is_here = true;
-    if is_whole {
-        let last_of_first = floor(max(sheets.x, 0.0) / f32(SHEETS)) * f32(SHEETS) + f32(SHEETS - 1u);
-        let center_sheet = floor((p.z - gather.near) / frame.slab_width);
-        let sheet = clamp(center_sheet, sheets.x, sheets.y - 1.0);
-        whole = select(sheet, min(sheet, last_of_first), is_deep) - sheet_group.first_sheet;
-        is_here = whole >= 0.0 && whole < f32(SHEETS);
-    }
-    let rims = footprint_at(p, sheet_group.near, whole, shaded.amount).rim;
-    let rim = max(max(rims.x, rims.y), max(rims.z, rims.w));
-    let part = sqrt(clamp(rim, 0.0, frame.support * frame.support)) / frame.support;
-    let blocks = select(0u, blocks_seen(open, center, sheet_group.half_box, part), is_here && rim > 0.0);
-    return select(0u, blocks | select(0u, (1u + u32(max(whole, 0.0))) << WHOLE_SHIFT, is_whole), blocks != 0u);
-}
-
-// A voxel's color and what it adds per block length, `(C·m, m)`, and its opacity.
+// A voxel's colour and amount per unit length, `(C·m, m)`, and its opacity.
 struct Shaded {
     amount: vec4f,
     alpha: f32,
@@ -199,7 +176,7 @@ fn shaded(voxel: vec3u, p: vec4f) -> Shaded {
     } else {
         color = ramp_at(color_ramp, value);
         alpha = ramp_at(opacity_ramp, value).x;
-        // Without a gradient opacity it is one point, which every lane holds.
+        // Without gradient opacity the ramp is a single point, which every lane holds.
         var by_gradient = gradient_opacity_ramp.own.y;
         for (var is_graded = ramps.w > ramps.z + 1u; is_graded; is_graded = false) {
             by_gradient = ramp_at(gradient_opacity_ramp, gradient.magnitude).x;
@@ -216,9 +193,10 @@ fn shaded(voxel: vec3u, p: vec4f) -> Shaded {
     return Shaded(vec4f(color * m, m), alpha);
 }
 
-// Counts a voxel that is drawn into the group, and its sections there, if no other patch has: as one if it is drawn as a whole.
+// Counts a voxel that is drawn into the group, and its sections there, unless another patch has counted it. A voxel drawn whole counts as one
+// section.
 fn count_drawn(voxel: u32, p: vec4f, sheets: vec2f, is_whole: bool) {
-    // Of the groups that the kernel reaches into, counted from the nearest; a whole one is drawn once.
+    // The group's index among those that the kernel reaches, counted from the nearest; a whole kernel is drawn once.
     let nth = select(sheet_group.number - u32(max(sheets.x, 0.0)) / SHEETS, 0u, is_whole);
     let word = nth * gather.bricks * 2u + voxel / 32u;
     let bit = 1u << (voxel % 32u);

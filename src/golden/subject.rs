@@ -1,4 +1,4 @@
-//! What is compared with a golden.
+//! What can be compared with a golden.
 
 use std::fmt::{Display, Formatter};
 use std::path::Path;
@@ -9,6 +9,7 @@ use super::file;
 use crate::headless::Rendering;
 use crate::headless::device::driver_name;
 use crate::image::{Image, ImageError};
+use crate::volume::ReadOptions;
 
 /// The adapter and driver that made an image.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,8 +21,8 @@ pub struct MadeOn {
 }
 
 impl MadeOn {
-    /// Whether two images were made on the same adapter, with whatever driver: what Mesa puts in parentheses behind an
-    /// adapter's name is about the driver. Two images that know of none count as made alike.
+    /// Whether two images were made on the same adapter, with any driver: the part of an adapter's name that Mesa puts in parentheses
+    /// describes the driver. Two images of unknown origin count as made on the same adapter.
     pub fn same(one: Option<&Self>, other: Option<&Self>) -> bool {
         let name = |made_on: &Self| made_on.adapter.split(" (").next().map(str::to_owned);
         one.map(name) == other.map(name)
@@ -40,13 +41,13 @@ impl Display for MadeOn {
     }
 }
 
-/// An image, and what it was made on if that is known: a [`Rendering`], an [`Image`] with the information of the adapter
-/// that a host made it on, or an image alone.
+/// An image, and the adapter that made it if known: a [`Rendering`], an [`Image`] with the information of a host's adapter, or an image
+/// alone.
 pub trait Subject {
     /// The image.
     fn image(&self) -> &Image;
 
-    /// What it was made on; unknown unless a type says so.
+    /// The adapter and driver that made it, if known.
     fn made_on(&self) -> Option<MadeOn> {
         None
     }
@@ -88,12 +89,12 @@ impl<T: Subject + ?Sized> Subject for &T {
     }
 }
 
-/// An image file, and what it says it was made on. Goldens say so, in the text of the PNG.
+/// An image file, with the adapter and driver that made it if the file names them, as goldens do in the PNG's texts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// The image.
     pub image: Image,
-    /// What it was made on, if the file says so.
+    /// The adapter and driver that made it, if the file names them.
     pub made_on: Option<MadeOn>,
 }
 
@@ -101,9 +102,17 @@ impl Picture {
     /// Opens an image file of any format of [`Image::open`].
     ///
     /// # Errors
-    /// As [`Image::open`].
+    /// As for [`Image::open`].
     pub fn open(path: &Path) -> Result<Self, ImageError> {
-        Ok(Self { image: Image::open(path)?, made_on: file::made_on(path) })
+        Self::open_with(path, &ReadOptions::default())
+    }
+
+    /// Like [`Picture::open`], with a folder that files must lie in and a memory limit.
+    ///
+    /// # Errors
+    /// As for [`Image::open_with`].
+    pub fn open_with(path: &Path, options: &ReadOptions) -> Result<Self, ImageError> {
+        Ok(Self { image: Image::open_with(path, options)?, made_on: file::made_on(path) })
     }
 }
 

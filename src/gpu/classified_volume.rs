@@ -1,4 +1,4 @@
-//! A volume under a transfer function, on the GPU: its values, the voxels that take part (§5.1), and how those change.
+//! A volume under a transfer function on the GPU: its values, the voxels that take part (§5.1), and their changes.
 
 use std::sync::Arc;
 
@@ -29,7 +29,7 @@ pub struct ClassifiedVolume {
     transfer: TransferFunction,
     clipped: ClippedVoxels,
     pub(crate) lists: BrickLists,
-    /// Counts changes of the lists.
+    /// A counter of changes to the lists.
     pub(crate) revision: u64,
     classification: Classification,
     /// With [`Classification::After`] which bricks the lists hold, once a frame asked for them.
@@ -65,20 +65,20 @@ impl PartialEq for BrickNeeds {
     }
 }
 
-/// What a change of transfer function or iso-ranges touched.
+/// The effect of a change of transfer function or iso-ranges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Touched {
-    /// Voxels that take part now and did not before.
+    /// The number of voxels that newly take part.
     pub entered: u64,
-    /// Voxels that took part before and do not now.
+    /// The number of voxels that no longer take part.
     pub left: u64,
-    /// Whether all bricks must be uploaded again, as there is no room for those that came.
+    /// Whether all bricks must be uploaded again, because there is no room for the added ones.
     pub rebuilt: bool,
 }
 
 impl ClassifiedVolume {
-    /// Uploads the bricks of the voxels that take part (SPEC §3) to the volume's device; classified after splatting, the first frame does. Of a volume that is not
-    /// segmented the labels' tables are left out.
+    /// Uploads the bricks of the voxels that take part (SPEC §3) to the volume's device; with [`Classification::After`] the first frame does. The labels' tables are ignored
+    /// if the volume is not segmented.
     pub fn new(
         device: &Device,
         volume: &GpuVolume,
@@ -138,10 +138,10 @@ impl ClassifiedVolume {
         }
     }
 
-    /// Brings the GPU up to date.
+    /// Uploads what has changed.
     ///
     /// # Errors
-    /// If the volume's labels need more than the device allows.
+    /// If the volume's labels exceed the device's limits.
     pub(crate) fn flush(&mut self, device: &Device, queue: &Queue) -> Result<(), RenderError> {
         if self.shades_by_label() {
             self.volume.upload_labels(device, queue)?;
@@ -160,12 +160,12 @@ impl ClassifiedVolume {
         self.volume().holes() > 0
     }
 
-    /// The labels on the GPU, if shading asks for them.
+    /// The labels on the GPU, if shading needs them.
     pub(crate) fn labels(&self) -> Option<&TextureView> {
         self.volume.labels().filter(|_| self.shades_by_label())
     }
 
-    /// Whether shading asks for labels.
+    /// Whether shading needs labels.
     pub(crate) fn shades_by_label(&self) -> bool {
         let matter = match self.classification {
             Classification::Before => LabelTables::matter_to_shading,
@@ -184,7 +184,7 @@ impl ClassifiedVolume {
         &self.volume
     }
 
-    /// Where the voxels are.
+    /// The volume's grid.
     pub fn grid(&self) -> &Grid {
         self.volume().grid()
     }
@@ -199,9 +199,9 @@ impl ClassifiedVolume {
         self.volume.value_list()
     }
 
-    /// Changes colours, opacities, gradient opacity, iso-ranges or the labels' tables (§5.1). Only voxels that enter or leave are
-    /// touched: those whose values gain or lose their opacity, found by binary search. Where a gradient opacity changes, all that are
-    /// in range must be looked at. Of a volume that is not segmented the labels' tables are left out.
+    /// Changes colours, opacities, gradient opacity, iso-ranges or the labels' tables (§5.1). Only voxels that enter or leave are touched: those
+    /// whose values become visible or transparent, found by binary search. If the gradient opacity changes, all voxels in range must be
+    /// examined. The labels' tables are ignored if the volume is not segmented.
     pub fn set_transfer_function(&mut self, mut transfer: TransferFunction) -> Touched {
         if self.volume().labels().is_none() {
             transfer.labels.clear();
@@ -214,7 +214,7 @@ impl ClassifiedVolume {
         let mut labels: Vec<Option<u16>> = labels.chain([None]).collect();
         labels.sort_unstable();
         labels.dedup();
-        // Some have another label, and are looked at in vain.
+        // Voxels with other labels are examined too, without effect.
         let changed = (labels.into_iter())
             .map(|label| changed_values(&self.transfer.tables(label), &transfer.tables(label)))
             .fold(ValueSet::default(), |all, values| all.union(&values));
@@ -222,7 +222,7 @@ impl ClassifiedVolume {
             Vec::new()
         } else {
             let mut candidates = self.value_list().within(self.volume().values(), &changed);
-            // In memory order, where neighbours share cache lines.
+            // In memory order neighbours share cache lines.
             candidates.par_sort_unstable();
             candidates
         };
@@ -231,7 +231,7 @@ impl ClassifiedVolume {
         self.look_at(candidates)
     }
 
-    /// Changes which voxels are clipped; touches only voxels that enter or leave.
+    /// Changes which voxels are clipped; touches only those that enter or leave.
     pub fn set_clip(&mut self, clipped: ClippedVoxels) -> Touched {
         if self.classification == Classification::After {
             // Planes outside of a cut bear on slabs inside.
@@ -241,7 +241,7 @@ impl ClassifiedVolume {
         let volume = self.volume();
         let candidates = in_rows(volume, |y, z, row| {
             let [old, new] = [&self.clipped, &clipped].map(|clipped| clipped.in_row(y, z, volume.dims().x));
-            // Either may be empty, anywhere.
+            // Either range may be empty, anywhere.
             let changed =
                 (old.start.min(new.start)..old.end.max(new.end)).filter(|x| old.contains(x) != new.contains(x));
             changed.map(|x| row + x).collect()
@@ -271,7 +271,7 @@ impl ClassifiedVolume {
         Touched { entered: entering.len() as u64, left: leaving.len() as u64, rebuilt: !self.lists.has_room() }
     }
 
-    /// Lets those of some voxels, in memory order, enter and leave that must.
+    /// Decides for some voxels, in memory order, whether they enter or leave.
     fn look_at(&mut self, candidates: Vec<u32>) -> Touched {
         let (volume, transfer, clipped, lists) = (&**self.volume(), &self.transfer, &self.clipped, &self.lists);
         let takes_part =
@@ -282,13 +282,13 @@ impl ClassifiedVolume {
         self.change(&entering, &leaving)
     }
 
-    /// Changes the iso-ranges alone: closed intervals `[lo, hi]` of the values that take part, `None` for all. Touches what
-    /// [`Self::set_transfer_function`] does.
+    /// Changes only the iso-ranges: closed intervals `[lo, hi]` of the values that take part, `None` for all. Touches the same voxels as
+    /// [`Self::set_transfer_function`].
     pub fn set_iso_ranges(&mut self, iso_ranges: Option<Vec<[f64; 2]>>) -> Touched {
         self.set_transfer_function(TransferFunction { iso_ranges, ..self.transfer.clone() })
     }
 
-    /// Shows or hides the voxels of a label. Touches what [`Self::set_transfer_function`] does; nothing in a volume that is not
+    /// Shows or hides the voxels of a label. Touches the same voxels as [`Self::set_transfer_function`], and none if the volume is not
     /// segmented.
     pub fn set_label_visible(&mut self, label: u16, visible: bool) -> Touched {
         let mut transfer = self.transfer.clone();
@@ -296,19 +296,19 @@ impl ClassifiedVolume {
         self.set_transfer_function(transfer)
     }
 
-    /// Bytes of GPU memory that the volume will hold once prepared.
+    /// Bytes of GPU memory that the volume will use once prepared.
     pub(crate) fn estimate(&self) -> Result<u64, RenderError> {
         let [values, both] = self.volume.needs()?;
         let has_labels = self.shades_by_label() || self.volume.labels().is_some();
         Ok(if has_labels { both } else { values })
     }
 
-    /// Bytes of GPU memory, with the volume's, which other views may share ([`GpuVolume::gpu_bytes`]).
+    /// Bytes of GPU memory, including the volume's, which other views may share ([`GpuVolume::gpu_bytes`]).
     pub fn gpu_bytes(&self) -> u64 {
         self.volume.gpu_bytes() + self.lists.gpu_bytes()
     }
 
-    /// What of a frame's counts (Table 4) is known before it is drawn.
+    /// The counts of a frame (Table 4) that are known before it is drawn.
     pub fn totals(&self, view: &ViewGeometry, groups: &GroupSlabs) -> Totals {
         let of_bricks = match self.classification {
             Classification::Before => Overlaps::count,
@@ -316,7 +316,7 @@ impl ClassifiedVolume {
         };
         let overlaps = self.lists.bricks().map(|bricks| of_bricks(bricks, view));
         let Overlaps { voxels, sections, slabs } = overlaps.fold(Overlaps::default(), Overlaps::and);
-        // A group's first or last sheets can lie outside of what any kernel touches.
+        // Some sheets of the first or last group may lie outside every kernel.
         let sheets_of = |first: i32| {
             (first + groups.sheets as i32).min(slabs.end).saturating_sub(first.max(slabs.start)).max(0) as u64
         };

@@ -1,4 +1,4 @@
-//! A volume on the GPU, shared by any number of views and renderers of one device.
+//! A volume on the GPU, shared by any number of views and renderers on one device.
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -13,7 +13,7 @@ use crate::gpu::volume_texture::{ValueFormat, VolumeTexture};
 use crate::lists::value_list::ValueList;
 use crate::volume::Volume;
 
-/// A volume and its textures on a device. A clone is the same volume: nothing is uploaded twice.
+/// A volume and its textures on a device. Clones share the textures.
 #[derive(Clone, Debug)]
 pub struct GpuVolume {
     shared: Arc<Shared>,
@@ -24,7 +24,7 @@ struct Shared {
     device: Device,
     volume: Arc<Volume>,
     values: VolumeTexture,
-    /// Uploaded when tables first ask for labels.
+    /// The labels, uploaded when tables first need them.
     labels: OnceLock<VolumeTexture>,
     value_list: OnceLock<ValueList>,
     /// Of the values; `None` if all are holes.
@@ -47,8 +47,8 @@ pub(crate) struct Coefficients {
 }
 
 impl GpuVolume {
-    /// Uploads a volume's values: 4 bytes a voxel, or 1 or 2 where they are whole numbers in a range of 256 or 65536. Labels, 2 bytes a
-    /// voxel, follow when a view first has tables for some.
+    /// Uploads a volume's values: 4 bytes per voxel, or 1 or 2 if they are whole numbers in a range of 256 or 65536. Labels, 2 bytes per voxel,
+    /// follow when a view first has tables for them.
     ///
     /// # Errors
     /// If the volume needs more layers than the device's textures have, or the device fails.
@@ -56,10 +56,10 @@ impl GpuVolume {
         Self::new_in_chunks(device, queue, volume, &|| {})
     }
 
-    /// The same for a caller that submits every chunk of values that was written. The queue keeps its own copies of them until then.
+    /// Like [`Self::new`], for a caller that submits after every chunk of values; until then the queue keeps its own copies of them.
     ///
     /// # Errors
-    /// See [`Self::new`].
+    /// As for [`Self::new`].
     pub(crate) fn new_in_chunks(
         device: &Device,
         queue: &Queue,
@@ -75,7 +75,7 @@ impl GpuVolume {
         Ok(Self { shared: Arc::new(shared) })
     }
 
-    /// What [`Self::gpu_bytes`] of a volume will be: as long as no view shades by label, and after that. Looks at all values.
+    /// What [`Self::gpu_bytes`] of a volume will be, before and after a view shades by label. Examines all values.
     ///
     /// # Errors
     /// If the volume needs more layers than the device's textures have.
@@ -84,10 +84,10 @@ impl GpuVolume {
         estimate(device, values.len(), ValueFormat::of(values))
     }
 
-    /// The same of this volume.
+    /// [`Self::estimate`] for this volume.
     ///
     /// # Errors
-    /// See [`Self::estimate`].
+    /// As for [`Self::estimate`].
     pub(crate) fn needs(&self) -> Result<[u64; 2], RenderError> {
         estimate(&self.shared.device, self.shared.volume.values().len(), self.value_format())
     }
@@ -97,13 +97,13 @@ impl GpuVolume {
         &self.shared.volume
     }
 
-    /// The voxels sorted by value (Table 1), once for all views. Sorted when first asked for, so that a single frame need not
-    /// wait for it; a program with iso-ranges to move asks when it has loaded the volume.
+    /// The voxels sorted by value (Table 1), once for all views. They are sorted on the first call, so that a single frame need not wait for it;
+    /// a program that will move iso-ranges calls it when it has loaded the volume.
     pub fn value_list(&self) -> &ValueList {
         self.shared.value_list.get_or_init(|| ValueList::new(self.shared.volume.values()))
     }
 
-    /// Bytes of GPU memory, however many views there are.
+    /// Bytes of GPU memory, independent of the number of views.
     pub fn gpu_bytes(&self) -> u64 {
         let textures = [Some(&self.shared.values), self.shared.labels.get()];
         let coefficients =
@@ -111,12 +111,12 @@ impl GpuVolume {
         textures.into_iter().flatten().map(|texture| texture.gpu_bytes).sum::<u64>() + coefficients.unwrap_or(0)
     }
 
-    /// The device that it is on.
+    /// The volume's device.
     pub(crate) fn device(&self) -> &Device {
         &self.shared.device
     }
 
-    /// What the values' texels mean.
+    /// The format of the values' texels.
     pub(crate) fn value_format(&self) -> ValueFormat {
         self.shared.values.format
     }
@@ -159,15 +159,15 @@ impl GpuVolume {
         Ok(found)
     }
 
-    /// Uploads the labels, if there are any and they are not there yet.
+    /// Uploads the labels, if there are any and they are not uploaded yet.
     ///
     /// # Errors
     /// If they need more layers than the device's textures have, or the device fails.
     pub(crate) fn upload_labels(&self, device: &Device, queue: &Queue) -> Result<(), RenderError> {
         if let (None, Some(labels)) = (self.shared.labels.get(), self.shared.volume.labels()) {
-            // Those that there was no memory for are not kept.
+            // Labels whose allocation failed are not kept.
             let labels = scoped(device, || VolumeTexture::upload_labels(device, queue, labels))??;
-            // Another thread may have been first: its are the same.
+            // Another thread may have been first; its labels are the same.
             let _ = self.shared.labels.set(labels);
         }
         Ok(())

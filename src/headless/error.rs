@@ -1,4 +1,4 @@
-//! All errors together.
+//! All errors of headless rendering in one type.
 
 use crate::error::RenderError;
 use crate::gpu::device::DeviceError;

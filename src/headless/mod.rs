@@ -1,4 +1,4 @@
-//! Rendering without a host: an own device, and images in memory. The only part that creates devices, submits and waits.
+//! Rendering without a host, on a device of its own, into images in memory. Only this module creates devices, submits and waits.
 
 pub mod device;
 mod driver;
@@ -33,22 +33,22 @@ use crate::volume::Volume;
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct HeadlessOptions {
-    /// Part of the adapter's name, in any case; `None` prefers an adapter that can run the renderer, and a GPU to a software driver.
+    /// Part of the adapter's name, ignoring case. `None` prefers an adapter that can run the renderer, and a GPU to a software driver.
     pub adapter: Option<String>,
-    /// Features and limits to request; `None` takes what [`DeviceRequirements::for_adapter`] says.
+    /// The features and limits to request; `None` means those of [`DeviceRequirements::for_adapter`].
     pub requirements: Option<DeviceRequirements>,
-    /// Format of the sheet buffer; see [`RendererOptions`].
+    /// The format of the sheet buffer; see [`RendererOptions`].
     pub sheet_format: Option<TextureFormat>,
-    /// Sheets drawn by one quad; see [`RendererOptions`].
+    /// The number of sheets that one quad draws; see [`RendererOptions`].
     pub sheets_per_group: Option<u32>,
-    /// What scenes that leave the choice are drawn by; see [`RendererOptions`].
+    /// The rasterizer for scenes that do not name one; see [`RendererOptions`].
     pub rasterizer: Rasterizer,
-    /// Times every stage; see [`RendererOptions`].
+    /// Whether every stage is timed; see [`RendererOptions`].
     pub profile: bool,
 }
 
 impl HeadlessOptions {
-    /// The most capable adapter, and on it what [`RendererOptions::DETERMINISTIC`] promises.
+    /// The most capable adapter with [`RendererOptions::DETERMINISTIC`].
     pub const DETERMINISTIC: Self = Self::of(RendererOptions::DETERMINISTIC);
 
     const fn of(renderer: RendererOptions) -> Self {
@@ -56,38 +56,38 @@ impl HeadlessOptions {
         Self { adapter: None, requirements: None, sheet_format, sheets_per_group, rasterizer, profile }
     }
 
-    /// On the adapter with this in its name, in any case.
+    /// These options with the adapter that has this in its name, ignoring case.
     pub fn with_adapter(self, name: impl Into<String>) -> Self {
         Self { adapter: Some(name.into()), ..self }
     }
 
-    /// On a device with these features and limits.
+    /// These options with a device that has these features and limits.
     pub fn with_requirements(self, requirements: DeviceRequirements) -> Self {
         Self { requirements: Some(requirements), ..self }
     }
 
-    /// With another format of the sheet buffer.
+    /// These options with another format of the sheet buffer.
     pub fn with_sheet_format(self, format: TextureFormat) -> Self {
         Self { sheet_format: Some(format), ..self }
     }
 
-    /// With another number of sheets drawn by one quad.
+    /// These options with another number of sheets that one quad draws.
     pub fn with_sheets_per_group(self, sheets: u32) -> Self {
         Self { sheets_per_group: Some(sheets), ..self }
     }
 
-    /// With another rasterizer for scenes that leave the choice.
+    /// These options with another rasterizer for scenes that do not name one.
     pub fn with_rasterizer(self, rasterizer: Rasterizer) -> Self {
         Self { rasterizer, ..self }
     }
 
-    /// With every stage timed, or none.
+    /// These options with every stage timed, or no stage.
     pub fn with_profile(self, profile: bool) -> Self {
         Self { profile, ..self }
     }
 }
 
-/// The most capable adapter, and all that it can do.
+/// The most capable adapter with all its features.
 impl Default for HeadlessOptions {
     fn default() -> Self {
         Self::of(RendererOptions::for_target(FORMAT))
@@ -97,7 +97,7 @@ impl Default for HeadlessOptions {
 /// The target's format.
 const FORMAT: TextureFormat = TextureFormat::Rgba32Float;
 
-/// A device of its own and a renderer on it.
+/// A device and a renderer on it, without a host.
 #[derive(Debug)]
 pub struct Headless {
     adapter: Adapter,
@@ -106,12 +106,12 @@ pub struct Headless {
     renderer: Renderer,
 }
 
-/// An image and what it cost.
+/// An image with its statistics.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rendering {
     /// The image, over the scene's background.
     pub image: Image,
-    /// Counts and times.
+    /// Its counts and times.
     pub stats: Stats,
 }
 
@@ -119,7 +119,7 @@ impl Headless {
     /// Opens a device and compiles the renderer.
     ///
     /// # Errors
-    /// If there is no such adapter, it gives no device, or the device cannot run the renderer.
+    /// If there is no such adapter, it cannot open a device, or the device cannot run the renderer.
     pub fn new(options: &HeadlessOptions) -> Result<Self, DeviceError> {
         let adapter = choose_adapter(options.adapter.as_deref())?;
         let requirements = options.requirements.clone().unwrap_or_else(|| DeviceRequirements::for_adapter(&adapter));
@@ -160,9 +160,9 @@ impl Headless {
     /// Loads the scene's volume and renders it.
     ///
     /// # Errors
-    /// If the volume cannot be loaded, the scene asks for what the device or the renderer cannot do, or the device fails.
+    /// If the volume cannot be loaded, the scene needs more than the device or the renderer can do, or the device fails.
     pub fn render(&self, scene: &Scene) -> Result<Rendering, Error> {
-        // Before a volume is loaded for nothing.
+        // An invalid scene is refused before its volume is loaded.
         scene.check().map_err(RenderError::from)?;
         let start = Instant::now();
         let volume = scene.load_volume()?;
@@ -172,10 +172,10 @@ impl Headless {
         Ok(rendering)
     }
 
-    /// Renders a volume that is already in memory. The scene's own volume is not looked at.
+    /// Renders a volume that is already in memory. The scene's own volume is ignored.
     ///
     /// # Errors
-    /// If the scene asks for what the device or the renderer cannot do, or the device fails.
+    /// If the scene needs more than the device or the renderer can do, or the device fails.
     pub fn render_volume(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Rendering, RenderError> {
         let start = Instant::now();
         let mut view = self.view(volume, scene)?;
@@ -185,12 +185,12 @@ impl Headless {
         Ok(rendering)
     }
 
-    /// A view of a volume as a scene sets it up, for any number of frames and changes. The scene's own volume is not looked at.
+    /// A view of a volume with a scene's settings, for any number of frames and changes. The scene's own volume is ignored.
     ///
     /// # Errors
     /// If the volume is larger than the device's textures, or the device fails.
     pub fn view(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<SceneView, RenderError> {
-        // Else wgpu's copies of the whole volume stay until the first frame.
+        // Without a submission wgpu would keep its copies of the volume until the first frame.
         let submit = || {
             self.queue.submit([]);
         };
@@ -201,16 +201,16 @@ impl Headless {
     /// Draws one frame of a view and reads it back.
     ///
     /// # Errors
-    /// If the scene asks for what the device or the renderer cannot do, or the device fails.
+    /// If the view needs more than the device or the renderer can do, or the device fails.
     pub fn draw(&self, view: &mut SceneView) -> Result<Rendering, RenderError> {
         scoped(&self.device, || self.draw_unscoped(view))?
     }
 
-    /// What the last drawn frame of a view shows first at a pixel, counted from the upper left; `None` where the opacity of
-    /// [`SceneView::set_first_hit`] is not reached.
+    /// The first hit at a pixel of the last frame drawn, with pixels counted from the upper left; `None` where the ray does not reach the
+    /// opacity of [`SceneView::set_first_hit`].
     ///
     /// # Errors
-    /// If the frame has no first hits, the pixel is off the image, or the device fails.
+    /// If the frame has no first hits, the pixel lies outside the image, or the device fails.
     pub fn pick(&self, view: &SceneView, pixel: [u32; 2]) -> Result<Option<Pick>, RenderError> {
         scoped(&self.device, || {
             let descriptor = wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.pick") };
@@ -221,7 +221,7 @@ impl Headless {
                 return Err(SettingError::new("pick", format!("{pixel:?}"), allowed).into());
             };
             self.queue.submit([encoder.finish()]);
-            // Asks for it, and then it is there.
+            // The first call requests the pick; after waiting it has arrived.
             let early = pending.try_get();
             wait(&self.device)?;
             let missing = || Err(RenderError::Readback("the pick did not arrive".to_owned()));
@@ -257,7 +257,7 @@ impl Headless {
         let frame_ms = milliseconds_since(start);
 
         let info = self.adapter.get_info();
-        // The image came later than the counts.
+        // The image arrived after the counts.
         let missing = || Err(RenderError::Readback("the frame's counts did not arrive".to_owned()));
         let (counts, stages_ms) = counts.and_then(|counts| counts.try_get()).unwrap_or_else(missing)?;
         Ok(Rendering {
@@ -282,17 +282,17 @@ impl Headless {
 
 impl Drop for Headless {
     fn drop(&mut self) {
-        // A software driver's threads must not outlive the process's memory.
+        // A software driver's threads must end before the process's memory is freed.
         let _ = wait(&self.device);
     }
 }
 
-/// Waits for all that was submitted.
+/// Waits until everything submitted is done.
 ///
 /// # Errors
 /// If the device is lost.
 fn wait(device: &Device) -> Result<(), RenderError> {
-    // wgpu panics where the driver loses the device meanwhile.
+    // wgpu panics if the driver loses the device during the wait.
     match catch_unwind(AssertUnwindSafe(|| device.poll(wgpu::PollType::wait_indefinitely()))) {
         Ok(Ok(_)) => Ok(()),
         Ok(Err(error)) => Err(RenderError::Readback(error.to_string())),

@@ -1,43 +1,54 @@
-//! Opening images: input like any other, of which no more is believed than its bytes can hold.
+//! Opening images. Like any input, a file is trusted only as far as its bytes can hold what it claims.
 
 use std::io::Cursor;
 use std::path::Path;
 
 use ::exr::meta::BlockDescription;
 use ::exr::meta::header::Header;
-use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use super::{Format, Image, ImageError};
 use crate::volume::{Access, ReadOptions, VolumeError, npy};
 
-/// No byte of a PNG or EXR file becomes more bytes: of what these compress by, deflate compresses best.
+/// The maximum expansion of a byte in a PNG or EXR file: deflate's, the best compression that they use.
 const MAX_EXPANSION: u64 = 1032;
 
 impl Image {
-    /// Opens an image by the file's extension: `.png` of any type, `.exr`, or `.npy` as [`Image::save`] writes it (f32 of
-    /// shape height × width × 4, in either order). Where a file has no alpha, the image is opaque.
+    /// Opens an image by the file's extension: `.png` of any type, `.exr`, or `.npy` as [`Image::save`] writes it (f32, shape
+    /// height × width × 4, in either order). Without alpha in the file, the image is opaque.
     ///
     /// # Errors
-    /// If the extension is unknown, or the file cannot be read or holds no such image.
+    /// If the extension is unknown, the file cannot be read or holds no such image, or the image needs more memory than
+    /// [`ReadOptions::memory`] allows by default.
     pub fn open(path: &Path) -> Result<Self, ImageError> {
-        match Format::of(path)? {
+        Self::open_with(path, &ReadOptions::default())
+    }
+
+    /// Like [`Image::open`], with a folder that files must lie in and a memory limit.
+    ///
+    /// # Errors
+    /// As for [`Image::open`], and if the options do not allow it.
+    pub fn open_with(path: &Path, options: &ReadOptions) -> Result<Self, ImageError> {
+        let format = Format::of(path)?;
+        let access = Access::new(options).map_err(of_volume)?;
+        match format {
             Format::Png => {
-                let mut image = Self::decode(path, ImageFormat::Png)?;
+                let mut image = Self::decode(path, ImageFormat::Png, &access)?;
                 for pixel in &mut image.pixels {
                     let [r, g, b, a] = *pixel;
                     *pixel = [r * a, g * a, b * a, a];
                 }
                 Ok(image)
             }
-            Format::Exr => Self::decode(path, ImageFormat::OpenExr),
-            Format::Npy => Self::decode_npy(path),
+            Format::Exr => Self::decode(path, ImageFormat::OpenExr, &access),
+            Format::Npy => Self::decode_npy(path, &access),
         }
     }
 
-    /// Channels as the file has them, 0 to 1 where they are integers.
-    fn decode(path: &Path, format: ImageFormat) -> Result<Self, ImageError> {
+    /// Decodes the file's channels; integers become numbers from 0 to 1.
+    fn decode(path: &Path, format: ImageFormat, access: &Access) -> Result<Self, ImageError> {
         let failed = |source: ::image::ImageError| ImageError::Decode { path: path.to_owned(), source: source.into() };
-        let bytes = read(path)?;
+        let bytes = read(path, access)?;
         if format == ImageFormat::OpenExr {
             check_blocks(path, &bytes)?;
         }
@@ -48,18 +59,17 @@ impl Image {
             let found = format!("{width} × {height} pixels in {} bytes", bytes.len());
             return Err(content(path, "size", found, format!("at most {most} pixels")));
         }
-        Limits::default().reserve(decoder.total_bytes()).map_err(failed)?;
+        let pixels = u64::from(width) * u64::from(height);
+        // Two copies: as in the file, and as floats.
+        let memory = decoder.total_bytes().saturating_add(pixels.saturating_mul(size_of::<[f32; 4]>() as u64));
+        access.reserve(path, "size", format_args!("{width} × {height} pixels"), memory).map_err(of_volume)?;
         let image = DynamicImage::from_decoder(decoder).map_err(failed)?.into_rgba32f();
         Ok(Self { width, height, pixels: image.into_raw().as_chunks().0.to_vec() })
     }
 
-    /// An array of rows of pixels of channels, which the reader of volumes takes for slices of rows of voxels.
-    fn decode_npy(path: &Path) -> Result<Self, ImageError> {
-        let read = || npy::read::<f32>(path, &Access::new(&ReadOptions::default())?);
-        let array = read().map_err(|error| match error {
-            VolumeError::Io { path, source, .. } => ImageError::Io { path, source },
-            VolumeError::Invalid { field, found, allowed, .. } => content(path, &field, found, allowed),
-        })?;
+    /// An array of rows of pixels of channels, read by the volume reader as slices of rows of voxels.
+    fn decode_npy(path: &Path, access: &Access) -> Result<Self, ImageError> {
+        let array = npy::read::<f32>(path, access).map_err(of_volume)?;
         let [channels, width, height] = array.dims.to_array();
         if channels != 4 {
             let found = format!("({height}, {width}, {channels})");
@@ -72,7 +82,7 @@ impl Image {
     }
 }
 
-/// Checks that no block of an EXR file claims to be larger than the file's bytes can become: decoders make room for a whole block first.
+/// Checks that no block of an EXR file claims more than the file's bytes can hold: decoders allocate a whole block first.
 fn check_blocks(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
     let failed = |source: ::exr::error::Error| ImageError::Decode { path: path.to_owned(), source: source.into() };
     let most = u128::from(MAX_EXPANSION) * bytes.len() as u128;
@@ -95,8 +105,8 @@ fn check_blocks(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
     }
 }
 
-/// How many bits a pixel takes up at least before it is compressed: of a PNG as its first chunk says, whose fields have fixed places, of an
-/// EXR those of three half floats.
+/// The minimum number of bits per pixel before compression: for a PNG by its first chunk, whose fields have fixed places; for an EXR
+/// three half floats.
 fn min_bits_per_pixel(format: ImageFormat, bytes: &[u8]) -> u64 {
     if format != ImageFormat::Png {
         return 3 * 16;
@@ -106,21 +116,30 @@ fn min_bits_per_pixel(format: ImageFormat, bytes: &[u8]) -> u64 {
         2 => 3,
         4 => 2,
         6 => 4,
-        // Grey, or a palette's index.
+        // Grey or palette indices.
         _ => 1,
     };
     u64::from(depth.max(1)) * channels
 }
 
-/// The bytes of a regular file: a pipe or a device may have no end.
-fn read(path: &Path) -> Result<Vec<u8>, ImageError> {
+/// The bytes of a regular file; a pipe or a device might never end.
+fn read(path: &Path, access: &Access) -> Result<Vec<u8>, ImageError> {
+    let path = &*access.resolve(path).map_err(of_volume)?;
     let failed = |source| ImageError::Io { path: path.to_owned(), source };
-    // Asked before opening: to open a pipe would wait for its writer.
+    // The kind of file is checked before opening, because opening a pipe would wait for its writer.
     if !std::fs::metadata(path).map_err(failed)?.is_file() {
         let found = "a directory, pipe or device".to_owned();
         return Err(content(path, "file", found, "a regular file".to_owned()));
     }
     std::fs::read(path).map_err(failed)
+}
+
+/// The image error for an error of the volume reader.
+fn of_volume(error: VolumeError) -> ImageError {
+    match error {
+        VolumeError::Io { path, source, .. } => ImageError::Io { path, source },
+        VolumeError::Invalid { origin, field, found, allowed } => content(Path::new(&origin), &field, found, allowed),
+    }
 }
 
 fn content(path: &Path, what: &str, found: String, allowed: String) -> ImageError {
@@ -134,7 +153,7 @@ mod tests {
 
     use super::{Image, ImageError};
 
-    /// A small image in tiles, whose header then claims tiles of 2¹³ × 2¹³ pixels.
+    /// A small tiled image whose header is changed to claim tiles of 2¹³ × 2¹³ pixels.
     #[test]
     fn blocks_of_exr_files_are_no_larger_than_the_file_can_hold() {
         let folder = tempfile::tempdir().unwrap();

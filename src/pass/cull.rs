@@ -1,5 +1,5 @@
-//! Early splat elimination (§6): which bricks a sheet group visits, which of their voxels it draws, those voxels in a row,
-//! and the shading of those that were not shaded before.
+//! Early splat elimination (§6): the bricks that a sheet group visits, the voxels of these that it draws, their list without gaps, and the
+//! shading of those that were not shaded before.
 
 use wgpu::{BindGroup, Buffer, BufferUsages, ComputePass, Device, ShaderStages, TextureView};
 
@@ -31,13 +31,13 @@ enum VoxelStage {
 /// One list's buffers and bind groups.
 #[derive(Debug)]
 pub struct CullList {
-    /// `[BrickState]`, zero at the start of a frame.
+    /// `[BrickState]`, zeroed at the start of a frame.
     pub states: Buffer,
-    /// `[Splat]`, or for planes `[FieldVoxel]`, one per place of the list, written when its voxel is first drawn.
+    /// `[Splat]`, or for planes `[FieldVoxel]`, one per slot of the list, written when its voxel is first drawn.
     pub splats: Buffer,
     /// `[u32]`: the splats that the current group draws.
     pub instances: Buffer,
-    /// [`Indirect`]: how many they are.
+    /// [`Indirect`]: the number of instances.
     pub draw_args: Buffer,
     visits: Buffer,
     visit_args: Buffer,
@@ -54,7 +54,7 @@ enum VoxelGroup {
     Values(ValuesGroup),
 }
 
-/// What all lists share.
+/// The buffers that all lists share.
 #[derive(Clone, Copy, Debug)]
 pub struct CullBuffers<'a> {
     /// One [`Frame`].
@@ -63,11 +63,11 @@ pub struct CullBuffers<'a> {
     pub groups: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
-    /// Whether any of them is a hole.
+    /// Whether any value is a hole.
     pub has_holes: bool,
-    /// Its labels, if any of them has ramps of its own.
+    /// The volume's labels, if any label has its own ramps.
     pub labels: Option<&'a TextureView>,
-    /// Control points of the ramps.
+    /// The control points of the ramps.
     pub control_points: &'a Buffer,
     /// The occlusion buffer.
     pub occluded: &'a Buffer,
@@ -130,7 +130,7 @@ impl Cull {
         }
     }
 
-    /// A list's buffers, in [`CullList`]'s order: for so many bricks, of which no group looks at more than `most_bricks`, with at most
+    /// The specs of a list's buffers, in [`CullList`]'s order, for `bricks` bricks of which a group visits at most `most_bricks`, with at most
     /// `most_voxels` voxels.
     pub fn buffer_specs(bricks: usize, (most_bricks, most_voxels): (u32, u32)) -> [BufferSpec; 8] {
         let buffer = |label, count: usize, record: usize, usage| {
@@ -151,11 +151,11 @@ impl Cull {
         ]
     }
 
-    /// Allocates a list's buffers, or takes those of the `previous` frame. `order` is the list's bricks by first group; `most` is what
-    /// [`Self::buffer_specs`] says.
+    /// Allocates a list's buffers, or reuses those of the `previous` frame. `order` is the list's bricks by first group; `most` is as in
+    /// [`Self::buffer_specs`].
     ///
     /// # Errors
-    /// If the device's buffers may not be that large.
+    /// If they exceed the device's maximum size of buffers.
     pub fn prepare(
         &self,
         device: &Device,
@@ -252,7 +252,7 @@ impl Cull {
         Ok(list)
     }
 
-    /// Decides what the group at `offset` draws of a list.
+    /// Determines what the group at `offset` draws of a list.
     pub fn record(&self, pass: &mut ComputePass<'_>, list: &CullList, offset: u32) {
         let [bricks, voxels, compact] = &list.groups;
         self.bricks.dispatch(pass, bricks, &[offset], 1);

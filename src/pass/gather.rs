@@ -1,4 +1,4 @@
-//! Draws patches front to back: the tile rasterizer's one stage, which culls, splats and composites (§6).
+//! Draws patches front to back: the single stage of the tile rasterizer, which culls, splats and composites (§6).
 
 use std::sync::OnceLock;
 
@@ -15,17 +15,17 @@ use crate::gpu::layout::{Brick, Cut, Frame, Gather as GatherUniform, Gathered, I
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
 use crate::lists::patch_bins::{PATCH, SHEETS};
-use crate::settings::splatting::{Compositing, Economies, FootprintBox, Order, Splatting};
+use crate::settings::splatting::{Compositing, FootprintBox, Order, Splatting};
 
-/// The stage's pipelines; each is compiled when it is first asked for.
+/// The stage's pipelines, each compiled when it is first needed.
 #[derive(Debug)]
 pub struct Gather {
-    /// By compositing, and by the other parts of a mode, one bit each.
+    /// Indexed by compositing, and by one bit for each other property of the mode.
     stages: Vec<OnceLock<ComputeStage>>,
     no_labels: OnceLock<VolumeTexture>,
 }
 
-/// What a pipeline is compiled for.
+/// The mode that a pipeline is compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GatherMode {
     compositing: Compositing,
@@ -50,15 +50,15 @@ impl GatherMode {
         rays: RayMode,
         workgroups: u32,
     ) -> Self {
-        let Splatting { compositing, order, footprint_box, economies, .. } = *splatting;
-        let economies = economies != Economies::default();
-        // Every voxel has its own parallelogram there.
+        let Splatting { compositing, order, footprint_box, experimental, .. } = *splatting;
+        let economies = experimental.in_use().is_some();
+        // In perspective every voxel has its own parallelogram.
         let footprint_box = if perspective { FootprintBox::Rectangle } else { footprint_box };
         Self { compositing, order, footprint_box, perspective, economies, labels, holes, rays, divided: workgroups > 1 }
     }
 }
 
-/// Buffers of the stage.
+/// The stage's buffers.
 #[derive(Clone, Copy, Debug)]
 pub struct GatherBuffers<'a> {
     /// One [`Frame`].
@@ -73,17 +73,17 @@ pub struct GatherBuffers<'a> {
     pub starts: &'a Buffer,
     /// [`PatchBins::entries`](crate::lists::patch_bins::PatchBins::entries).
     pub entries: &'a Buffer,
-    /// Control points of the ramps.
+    /// The control points of the ramps.
     pub control_points: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
-    /// Its labels, for a mode that asks for them.
+    /// The volume's labels, for a mode that needs them.
     pub labels: Option<&'a TextureView>,
     /// [`Gathered`].
     pub gathered: &'a Buffer,
     /// [`PatchBins::half_boxes`](crate::lists::patch_bins::PatchBins::half_boxes), `[[f32; 2]]`.
     pub half_boxes: &'a Buffer,
-    /// What cuts rays.
+    /// The buffers for cutting rays.
     pub cut: CutBuffers<'a>,
 }
 
@@ -141,7 +141,7 @@ impl Gather {
         })
     }
 
-    /// Binds a band of the compositing buffer, `[vec4f]`, for one mode and so many dispatches.
+    /// Binds a band of the compositing buffer, `[vec4f]`, for one mode and a number of dispatches.
     pub fn bind(
         &self,
         device: &Device,
@@ -222,28 +222,28 @@ fn queue(device: &Device) -> u32 {
     (bytes - SHEETS_BYTES) / VOXEL_BYTES / 32 * 32
 }
 
-/// Bytes of what a dispatch leaves to the next.
+/// The size in bytes of the arguments that a dispatch leaves for the next.
 const NEXT_BYTES: u64 = size_of::<Indirect>() as u64;
 
-/// A band, bound.
+/// A band with its bind groups.
 #[derive(Debug)]
 pub struct GatherBand {
     mode: GatherMode,
-    /// Workgroups for each patch.
+    /// The number of workgroups per patch.
     workgroups_per_patch: u32,
-    /// One for every dispatch.
+    /// One bind group for every dispatch.
     groups: Vec<BindGroup>,
-    /// [`Indirect`]: what each leaves to the next, all patches or nothing.
+    /// [`Indirect`]: the arguments that each dispatch leaves for the next, for all patches or none.
     next: Vec<Buffer>,
 }
 
 impl GatherBand {
-    /// Makes it ready for a frame.
+    /// Clears the band for a frame.
     pub fn clear(&self, encoder: &mut CommandEncoder) {
         self.next.iter().for_each(|args| encoder.clear_buffer(args, 0, None));
     }
 
-    /// Bytes of GPU memory that one takes with so many dispatches.
+    /// Bytes of GPU memory that a band uses with this many dispatches.
     pub fn estimate(dispatches: u32) -> u64 {
         u64::from(dispatches) * NEXT_BYTES
     }

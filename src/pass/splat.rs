@@ -1,5 +1,5 @@
-//! Draws a group's kernel sections as instanced footprint quads, added up in the sheet buffers (§3.2): one quad per voxel,
-//! one colour target per sheet.
+//! Draws a group's kernel sections as instanced footprint quads that add up in the sheet buffers (§3.2): one quad per voxel, one colour
+//! target per sheet.
 
 use std::sync::OnceLock;
 
@@ -17,7 +17,7 @@ use crate::gpu::shaders;
 use crate::pass::cull::CullList;
 use crate::settings::splatting::FootprintForm;
 
-/// The stage's pipelines: zeroing tiles, and those that draw.
+/// The stage's pipelines: one that zeroes tiles, and those that draw.
 #[derive(Debug)]
 pub struct Splat {
     clear_bindings: Bindings,
@@ -25,18 +25,18 @@ pub struct Splat {
     bindings: Bindings,
     format: TextureFormat,
     sheets: u32,
-    /// By footprint form, without and with an eye; each is compiled when it is first asked for.
+    /// Indexed by footprint form, without and with an eye; each is compiled when it is first needed.
     splat: [[OnceLock<RenderPipeline>; 2]; 2],
-    /// Two triangles for each of an instance's quads.
+    /// Two triangles for each quad of an instance.
     indices: Buffer,
 }
 
-/// What a pipeline is compiled for.
+/// The mode that a pipeline is compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SplatMode {
     /// How sections are stored.
     pub form: FootprintForm,
-    /// Whether voxels have rays of their own.
+    /// Whether every voxel has its own ray.
     pub perspective: bool,
 }
 
@@ -82,7 +82,7 @@ impl Splat {
         self.clear_bindings.bind(device, &resources)
     }
 
-    /// Compiles what a mode needs.
+    /// Compiles the pipeline for a mode.
     pub fn prepare(&self, device: &Device, mode: SplatMode) {
         self.pipeline(device, mode);
     }
@@ -107,8 +107,8 @@ impl Splat {
         self.bindings.bind(device, &resources)
     }
 
-    /// Zeroes the listed tiles of the sheet buffers, then adds the given lists' sections of a group: of every list its bind
-    /// group, the group's offset, and the arguments of its draw.
+    /// Zeroes the listed tiles of the sheet buffers, then adds the given lists' sections of a group: for every list its bind group, the group's
+    /// offset, and the arguments of its draw.
     pub fn record<'a>(
         &self,
         encoder: &mut CommandEncoder,
@@ -177,7 +177,7 @@ pub(super) fn record_quads<'a>(
     }
 }
 
-/// What the shaders that draw quads declare.
+/// The bindings of the shaders that draw quads.
 pub(super) fn splat_slots() -> [(&'static str, Slot); 6] {
     let both = ShaderStages::VERTEX_FRAGMENT;
     [
@@ -190,7 +190,7 @@ pub(super) fn splat_slots() -> [(&'static str, Slot); 6] {
     ]
 }
 
-/// Blending that adds what is drawn to a part of what is there.
+/// Blending that adds the drawn colour to the target's, multiplied by a factor.
 pub(super) fn added_to(there: wgpu::BlendFactor) -> wgpu::BlendState {
     let component = wgpu::BlendComponent {
         src_factor: wgpu::BlendFactor::One,

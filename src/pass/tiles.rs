@@ -1,4 +1,4 @@
-//! Tiles (§6): where a sheet group composites, and around which tiles the occlusion buffer changes.
+//! Tiles (§6): where a sheet group composites, and where the occlusion buffer changes.
 
 use wgpu::{BindGroup, Buffer, BufferUsages, ComputePass, Device, ShaderStages};
 
@@ -19,9 +19,9 @@ pub struct Tiles {
 pub struct TileLists {
     /// Tiles to composite.
     pub composited: Buffer,
-    /// Tiles of the occlusion buffer to compute anew.
+    /// Tiles of the occlusion buffer to compute again.
     pub occluding: Buffer,
-    /// `[u32]`: tiles composited by every group.
+    /// `[u32]`: the number of tiles that every group composited.
     pub counts: Buffer,
     group: BindGroup,
 }
@@ -53,7 +53,7 @@ impl Tiles {
         Self { stage: ComputeStage::new(device, shaders::TILES, "main", &slots, &constants) }
     }
 
-    /// The buffers for so many tiles and groups, in [`TileLists`]' order.
+    /// The specs for `tiles` tiles and `group_count` groups, in [`TileLists`]' order.
     pub fn buffer_specs(tiles: u32, group_count: usize) -> [BufferSpec; 3] {
         let list_bytes = size_of::<TileList>() as u64 + u64::from(tiles) * 4;
         let (storage, indirect) = (BufferUsages::STORAGE, BufferUsages::STORAGE | BufferUsages::INDIRECT);
@@ -65,10 +65,10 @@ impl Tiles {
         ]
     }
 
-    /// Allocates the lists for a frame of `group_count` groups, or takes those of the `previous` frame.
+    /// Allocates the lists for a frame of `group_count` groups, or reuses those of the `previous` frame.
     ///
     /// # Errors
-    /// If the device's buffers may not be that large.
+    /// If they exceed the device's maximum size of buffers.
     pub fn prepare(
         &self,
         device: &Device,

@@ -99,11 +99,7 @@ impl FieldRasterizer {
             None => Targets::new(device, view.size, self.sheet_format, field::SHEETS)?,
         };
         let covered = covered(volume.lists.bricks(), after);
-        let fits = |old: &Planned| old.is_of(volume, order, &covered) && old.plan.view.has_depths_of(view);
-        let current = old.planned.filter(fits);
-        let bucketed = current.is_none();
-        let mut planned = current.unwrap_or_else(|| Planned::new(device, volume, (view, order, &covered), 1));
-        planned.plan.view = *view;
+        let (planned, _, bucketed) = Planned::renewed(inputs, (view, &covered), old.planned, 1);
         let plan = &planned.plan;
         let numbers = uniforms::planes(&after.planes, view, volume.gpu_volume().value_format(), &after.numbers);
         let bytes = bytemuck::bytes_of(&numbers);
@@ -299,7 +295,7 @@ impl FieldFrame {
 /// What of the previous frame may be taken over.
 #[derive(Default)]
 struct PreviousBuffers {
-    planned: Option<Planned>,
+    planned: Vec<Planned>,
     targets: Option<Targets>,
     planes: Option<Buffer>,
     groups: Option<Buffer>,
@@ -314,7 +310,7 @@ impl PreviousBuffers {
     fn of(frame: Option<FieldFrame>) -> Self {
         let Some(frame) = frame else { return Self::default() };
         Self {
-            planned: Some(frame.planned),
+            planned: vec![frame.planned],
             targets: Some(frame.targets),
             planes: Some(frame.planes),
             groups: Some(frame.groups),

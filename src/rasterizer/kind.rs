@@ -1,4 +1,4 @@
-//! Which rasterizer draws a view, and what it does not draw.
+//! The choice of the rasterizer for a view, and what each one refuses.
 
 use wgpu::Device;
 
@@ -8,40 +8,55 @@ use crate::pass::composite::RayMode;
 use crate::pass::gather::WORKGROUP_BYTES;
 use crate::setting_error::SettingError;
 use crate::settings::splatting::{
-    Classification, Compositing, Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting,
-    check_first_hit,
+    Classification, Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting, check_first_hit,
 };
 
-/// Threads that a subgroup may have.
+/// The subgroup sizes that tiles support.
 pub(super) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;
 
-/// How to draw.
+/// The rasterizer of a frame, which follows from the [`Rasterizer`] that the scene and the renderer name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RasterizerKind {
     Quads,
-    /// If the view fits.
-    Tiles,
+    /// Tiles, if the view fits. A view that does not fit is an error if tiles are insisted on; otherwise quads draw it.
+    Tiles {
+        insisted: bool,
+    },
     Samples,
 }
 
 impl RasterizerKind {
-    /// That of some settings, and if it is quads only because of the device, why.
+    /// The rasterizer for some settings; if it is quads only because of the device, also the reason. `preferred` is the renderer's choice,
+    /// for settings that do not name one.
     ///
     /// # Errors
-    /// If they insist on what the device or the other settings do not allow.
-    pub(crate) fn of(device: &Device, splatting: &Splatting) -> Result<(Self, Option<RenderError>), RenderError> {
-        let insists = insists_on_tiles(splatting);
+    /// If the settings require what the device or the other settings do not allow.
+    pub(crate) fn of(
+        device: &Device,
+        splatting: &Splatting,
+        preferred: Rasterizer,
+    ) -> Result<(Self, Option<RenderError>), RenderError> {
+        let needs_tiles =
+            splatting.footprint_box == FootprintBox::Parallelogram || splatting.experimental.in_use().is_some();
+        let choice = match splatting.rasterizer {
+            Rasterizer::Auto if !needs_tiles => preferred,
+            choice => choice,
+        };
+        let insisted = needs_tiles || choice == Rasterizer::Tiles;
         let by_settings = obstacle_in_settings(splatting);
         let is_by_settings = by_settings.is_some();
-        match (splatting.rasterizer, by_settings.or_else(|| obstacle_in_device(device))) {
-            (Rasterizer::Quads, _) if insists => {
-                let found =
-                    "\"quads\" with splatting.footprint_box = \"parallelogram\", whole_below, beta or resolution";
-                Err(SettingError::new("splatting.rasterizer", found, "\"tiles\" or \"auto\" with them").into())
+        match (choice, by_settings.or_else(|| obstacle_in_device(device))) {
+            (Rasterizer::Quads, _) if needs_tiles => {
+                let setting = match splatting.experimental.in_use() {
+                    Some(economy) => economy.to_string(),
+                    None => "splatting.footprint_box = \"parallelogram\"".to_owned(),
+                };
+                let found = format!("\"quads\" with {setting}");
+                Err(SettingError::new("splatting.rasterizer", found, "\"tiles\" or \"auto\" with it").into())
             }
-            (Rasterizer::Tiles | Rasterizer::Auto, Some(obstacle)) if insists => Err(obstacle),
+            (Rasterizer::Tiles | Rasterizer::Auto, Some(obstacle)) if insisted => Err(obstacle),
             _ if splatting.method == Method::CompositeEverySample => Ok((Self::Samples, None)),
-            (Rasterizer::Tiles | Rasterizer::Auto, None) => Ok((Self::Tiles, None)),
+            (Rasterizer::Tiles | Rasterizer::Auto, None) => Ok((Self::Tiles { insisted }, None)),
             (Rasterizer::Auto, Some(obstacle)) if !is_by_settings => Ok((Self::Quads, Some(obstacle))),
             _ => Ok((Self::Quads, None)),
         }
@@ -52,7 +67,7 @@ fn refused_tiles(found: String, allowed: &str) -> Option<RenderError> {
     Some(SettingError::new("splatting.rasterizer", format!("\"tiles\" with {found}"), allowed).into())
 }
 
-/// Why some settings cannot be drawn by tiles; `None` if they can.
+/// Why tiles do not support some settings; `None` if they do.
 fn obstacle_in_settings(splatting: &Splatting) -> Option<RenderError> {
     if splatting.classification == Classification::After {
         let found = "splatting.classification = \"after\"".to_owned();
@@ -68,7 +83,7 @@ fn obstacle_in_settings(splatting: &Splatting) -> Option<RenderError> {
     None
 }
 
-/// Why a device cannot draw by tiles; `None` if it can.
+/// Why a device does not support tiles; `None` if it does.
 fn obstacle_in_device(device: &Device) -> Option<RenderError> {
     if !device.features().contains(TILE_FEATURES) {
         return refused_tiles("a device without subgroups, or barriers for them".to_owned(), "\"quads\"");
@@ -86,17 +101,10 @@ fn obstacle_in_device(device: &Device) -> Option<RenderError> {
     None
 }
 
-/// Whether quads will not do.
-pub(crate) fn insists_on_tiles(splatting: &Splatting) -> bool {
-    splatting.rasterizer == Rasterizer::Tiles
-        || splatting.footprint_box == FootprintBox::Parallelogram
-        || splatting.economies != Economies::default()
-}
-
-/// Checks that the settings allow what of rays is looked at.
+/// Checks that the settings support cuts and first hits.
 ///
 /// # Errors
-/// If they do not, or first hits are more than a binding.
+/// If they do not, or first hits exceed a binding.
 pub(crate) fn check_rays(
     device: &Device,
     splatting: &Splatting,
@@ -111,7 +119,7 @@ pub(crate) fn check_rays(
     }
     let Some(opacity) = first_hit else { return Ok(()) };
     if splatting.compositing == Compositing::Minimum {
-        let allowed = "another one: the least is known at the end of a ray";
+        let allowed = "another compositing: the minimum is known only at the end of a ray";
         return refused("splatting.compositing", "\"minimum\" with first hits", allowed);
     }
     check_first_hit(opacity)?;

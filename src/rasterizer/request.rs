@@ -1,10 +1,10 @@
-//! What a frame asks for: everything about it that is known before anything is allocated, and can be refused.
+//! A frame request: everything about a frame that is known, and can be refused, before anything is allocated.
 
 use std::ops::Range;
 
 use wgpu::Device;
 
-use super::kind::{RasterizerKind, check_rays, insists_on_tiles};
+use super::kind::{RasterizerKind, check_rays};
 use crate::after::normalization::Normalization;
 use crate::after::plane_geometry::PlaneGeometry;
 use crate::error::RenderError;
@@ -26,22 +26,21 @@ use crate::settings::splatting::{Classification, Interpolation, Rasterizer, Spla
 /// A frame of a view.
 #[derive(Debug)]
 pub(crate) struct FrameRequest {
-    /// With the renderer's rasterizer where the scene leaves the choice.
     pub(crate) splatting: Splatting,
     pub(crate) view: ViewGeometry,
     pub(crate) kernel: Kernel,
     pub(crate) ramps: Ramps,
-    /// The sheet depths whose slabs count even where they hold nothing: [`means::covered`].
+    /// The sheet depths whose slabs count even if they are empty: [`means::covered`].
     pub(crate) covered: Range<f64>,
     pub(crate) rays: RayMode,
     /// The opacity of first hits.
     pub(crate) first_hit: Option<f64>,
-    /// A host's surfaces, and the texel that is the image's first.
+    /// A host's surfaces, and the texel of the image's first pixel.
     pub(crate) surfaces: Option<(SurfaceDepths, [u32; 2])>,
     pub(crate) kind: RasterizerKind,
     /// Why the device does not draw by tiles.
     pub(crate) fallback: Option<RenderError>,
-    /// Those of the compositing buffer.
+    /// The bands of the compositing buffer.
     pub(crate) bands: Vec<Band>,
     /// Of classification after splatting.
     pub(crate) after: Option<After>,
@@ -84,10 +83,10 @@ impl After {
 }
 
 impl FrameRequest {
-    /// The camera is the scene's with what it leaves to an object filled in.
+    /// Makes the request. The camera is the scene's with all values that depend on an object filled in.
     ///
     /// # Errors
-    /// If the scene asks for something not implemented, or for more than the device's limits allow.
+    /// If the scene needs something that is not implemented or that exceeds the device's limits.
     pub(crate) fn new(
         device: &Device,
         volume: &ClassifiedVolume,
@@ -95,7 +94,7 @@ impl FrameRequest {
         (surfaces, first_hit): (Option<&Surfaces>, Option<f64>),
         rasterizer: Rasterizer,
     ) -> Result<Self, RenderError> {
-        let splatting = settled(scene.splatting, rasterizer);
+        let splatting = scene.splatting;
         splatting.check()?;
         let (grid, size) = (volume.grid(), [scene.image.width, scene.image.height]);
         let seen = ViewGeometry::new(grid, camera, &splatting, size)?;
@@ -106,7 +105,7 @@ impl FrameRequest {
             Some(surfaces) => Some((surfaces.depths(&seen, grid)?, surfaces.origin)),
             None => None,
         };
-        let (kind, fallback) = RasterizerKind::of(device, &splatting)?;
+        let (kind, fallback) = RasterizerKind::of(device, &splatting, rasterizer)?;
         let after = match splatting.classification {
             Classification::Before => None,
             Classification::After => Some(After::new(volume, scene, &seen)?),
@@ -136,19 +135,13 @@ impl FrameRequest {
         self.after.as_ref().map_or(&self.view, |after| &after.view)
     }
 
-    /// Pixels of the image.
+    /// The number of pixels in the image.
     pub(crate) fn pixels(&self) -> u64 {
         self.view.size.map(u64::from).iter().product()
     }
 
-    /// Bytes of first hits, a word or a depth per pixel; none, if they are not asked for.
+    /// The size of first hits in bytes, one word or depth per pixel; 0 if they are not requested.
     pub(crate) fn hit_bytes(&self) -> u64 {
         if self.rays.first_hit { 4 * self.pixels() } else { 0 }
     }
-}
-
-/// The settings, with the renderer's rasterizer where they leave the choice.
-fn settled(splatting: Splatting, rasterizer: Rasterizer) -> Splatting {
-    let is_open = splatting.rasterizer == Rasterizer::Auto && !insists_on_tiles(&splatting);
-    Splatting { rasterizer: if is_open { rasterizer } else { splatting.rasterizer }, ..splatting }
 }

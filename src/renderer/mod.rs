@@ -1,5 +1,5 @@
-//! The renderer a host embeds: it owns pipelines, never a device, and neither submits nor waits. Every frame it prepares, which can
-//! fail, records, and presents, which cannot but for a place outside of the target.
+//! The renderer that a host embeds. It owns pipelines, but no device, and neither submits nor waits. It prepares every frame, which can fail,
+//! records it, and presents it, which fails only for a scissor outside the target.
 
 pub(crate) mod options;
 pub(crate) mod pick;
@@ -24,7 +24,7 @@ use crate::pass::first_hit::FirstHit;
 use crate::pass::resolve::Resolve;
 use crate::rasterizer::FrameInputs;
 use crate::rasterizer::fields::FieldRasterizer;
-use crate::rasterizer::kind::{RasterizerKind, insists_on_tiles};
+use crate::rasterizer::kind::RasterizerKind;
 use crate::rasterizer::quads::QuadRasterizer;
 use crate::rasterizer::request::FrameRequest;
 use crate::rasterizer::samples::SampleRasterizer;
@@ -37,7 +37,7 @@ use crate::setting_error::SettingError;
 use crate::settings::splatting::Rasterizer;
 use crate::stats::Staging;
 
-/// The pipelines of every stage, for one device. Volumes and frames are separate and can be many.
+/// The pipelines of every stage, for one device. Any number of volumes and frames can share it.
 #[derive(Debug)]
 pub struct Renderer {
     device: Device,
@@ -45,26 +45,26 @@ pub struct Renderer {
     sheets: u32,
     rasterizer: Rasterizer,
     profile: bool,
-    /// Nanoseconds of a timestamp's tick.
+    /// Nanoseconds per timestamp tick.
     period: f32,
-    /// Compiled when first needed.
+    /// The quad rasterizer, compiled when first needed.
     quads: OnceLock<QuadRasterizer>,
     fields: OnceLock<FieldRasterizer>,
     samples: OnceLock<SampleRasterizer>,
     tiles: TileRasterizer,
     resolve: Resolve,
     first_hit: OnceLock<FirstHit>,
-    /// Stands for a host's depth where there is none.
+    /// A substitute for a host's depth texture where there is none.
     no_surfaces: OnceLock<TextureView>,
-    /// Whether it was logged that tiles will not do.
+    /// Whether the fallback from tiles was logged.
     fell_back: Once,
 }
 
 impl Renderer {
-    /// Compiles what every frame needs; a rasterizer's stages are compiled with the first frame that it draws.
+    /// Compiles what every frame needs. A rasterizer's stages are compiled with the first frame that it draws.
     ///
     /// # Errors
-    /// If limits of the device are not enough, or it cannot do what the options ask for, or fails.
+    /// If the device's limits are insufficient, the device does not support the options, or it fails.
     pub fn new(device: &Device, queue: &Queue, options: &RendererOptions) -> Result<Self, DeviceError> {
         DeviceRequirements::check(device)?;
         let sheet_format = device::sheet_format(device, options.sheet_format)?;
@@ -91,36 +91,36 @@ impl Renderer {
         })
     }
 
-    /// Format of the sheet buffer.
+    /// The format of the sheet buffer.
     pub fn sheet_format(&self) -> TextureFormat {
         self.sheet_format
     }
 
-    /// Does what the view's changes since its last frame ask for, and no more: buckets if the camera, the slabs or the bricks
-    /// changed (§5.1), buffers if they are too small. A change of colours, opacities or light writes a few hundred bytes.
+    /// Prepares the view's next frame, recomputing only what changed since the last one: buckets if the camera, the slabs or the bricks changed
+    /// (§5.1), buffers if they are too small. A change of colours, opacities or light writes a few hundred bytes.
     ///
     /// # Errors
-    /// If the scene asks for something not implemented, or for more than the device's limits allow, or the device fails. What is found
-    /// before anything is allocated leaves the view's last frame. After anything else, and a failure of the device always, the view has no
-    /// frame, and is not drawn until it is prepared again: after
-    /// [`OutOfMemory`](crate::gpu::fault::DeviceFault::OutOfMemory) with less, after any other by a new renderer.
+    /// If the scene needs something that is not implemented or that exceeds the device's limits, or if the device fails. An error found before
+    /// anything is allocated leaves the view's last frame. After any other error, and after every failure of the device, the view has no
+    /// frame and is not drawn until it is prepared again: after
+    /// [`OutOfMemory`](crate::gpu::fault::DeviceFault::OutOfMemory) with smaller settings, after any other failure by a new renderer.
     pub fn prepare(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
         check_device(device, &self.device, "the renderer")?;
         check_device(device, view.volume.gpu_volume().device(), "the view")?;
         scoped(device, || self.prepare_unscoped(device, queue, view)).unwrap_or_else(|fault| {
-            // What there was no memory for is not valid.
+            // Objects allocated without memory are invalid.
             view.frame = None;
             view.volume.lists.forget();
             Err(fault.into())
         })
     }
 
-    /// Bytes of GPU memory that a new view with these settings will hold once prepared, [`SceneView::gpu_bytes`], exactly; nothing is
-    /// allocated, and [`Self::prepare`] will refuse for limits' sake what this refuses. Sorts bricks into buckets as a first frame does.
-    /// What the volume itself takes, and whether to upload it, [`GpuVolume::estimate`](crate::gpu::gpu_volume::GpuVolume::estimate) says.
+    /// The exact number of bytes of GPU memory that a new view with these settings will use once prepared ([`SceneView::gpu_bytes`]). Nothing is
+    /// allocated; bricks are sorted into buckets as for a first frame. [`Self::prepare`] refuses for limits' sake exactly what this refuses.
+    /// [`GpuVolume::estimate`](crate::gpu::gpu_volume::GpuVolume::estimate) states the volume's own memory before it is uploaded.
     ///
     /// # Errors
-    /// If the scene asks for something not implemented, or for more than the device's limits allow.
+    /// If the scene needs something that is not implemented or that exceeds the device's limits.
     pub fn estimate(&self, view: &SceneView) -> Result<u64, RenderError> {
         check_device(view.volume.gpu_volume().device(), &self.device, "the renderer")?;
         let request = self.request(view)?;
@@ -130,10 +130,10 @@ impl Renderer {
         let lists = settled.lists();
         let by_label = view.volume.shades_by_label();
         let tiles = match request.kind {
-            RasterizerKind::Tiles => {
+            RasterizerKind::Tiles { insisted } => {
                 let bricks = (settled.all(), lists.len());
                 match TileRasterizer::estimate(&limits, &request, bricks, by_label) {
-                    Err(error) if insists_on_tiles(&request.splatting) => return Err(error),
+                    Err(error) if insisted => return Err(error),
                     needs => needs.ok(),
                 }
             }
@@ -174,7 +174,7 @@ impl Renderer {
     }
 
     fn prepare_unscoped(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
-        // What can fail comes before anything is taken from the last frame.
+        // Everything that can fail comes before anything is taken from the last frame.
         let mut request = self.request(view)?;
         let SceneView { volume, scene, surfaces, frame, .. } = view;
         let fallback = request.fallback.take();
@@ -231,7 +231,7 @@ impl Renderer {
             FirstHits { group: stage.bind(device, &uniform, cut_buffers, words), texture, view }
         });
 
-        // The rasterizer's passes, and resolve.
+        // The rasterizer's passes, plus resolve.
         let passes = drawing.passes() + 1;
         let timer = if self.profile { Timer::new(device, passes) } else { None };
         let timestamps = timestamps_at(drawing.group_slabs().firsts.len());
@@ -258,7 +258,8 @@ impl Renderer {
         Ok(prepared)
     }
 
-    /// Prepares a rasterizer's part: by tiles, unless the view does not fit them and the scene does not insist. Then the error is why.
+    /// Prepares a rasterizer's part: tiles, or quads if the view does not fit tiles and the scene does not require them. The error then says
+    /// why.
     fn draw_with(
         &self,
         inputs: FrameInputs<'_>,
@@ -272,16 +273,16 @@ impl Renderer {
             Some(Drawing::Samples(frame)) => old_samples = Some(*frame),
             None => {}
         }
-        let FrameRequest { kind, splatting, .. } = inputs.request;
-        if *kind == RasterizerKind::Samples {
+        let kind = inputs.request.kind;
+        if kind == RasterizerKind::Samples {
             let (frame, prepared) = self.samples(inputs.device).prepare(inputs, old_samples)?;
             return Ok((Drawing::Samples(Box::new(frame)), prepared, None));
         }
         let mut fallback = None;
-        if *kind == RasterizerKind::Tiles {
+        if let RasterizerKind::Tiles { insisted } = kind {
             match self.tiles.prepare(inputs, old_tiles) {
                 Ok((frame, prepared)) => return Ok((Drawing::Tiles(Box::new(frame)), prepared, None)),
-                Err(error) if insists_on_tiles(splatting) => return Err(error),
+                Err(error) if insisted => return Err(error),
                 Err(error) => fallback = Some(error),
             }
         }
@@ -305,9 +306,9 @@ impl Renderer {
         self.quads.get_or_init(|| QuadRasterizer::new(device, self.sheet_format, self.sheets))
     }
 
-    /// Records the drawing of the view's prepared frame into the view's own buffers, from where [`Self::present`] and [`Self::draw`]
-    /// take it, in this encoder or later ones; nothing, if the view was never prepared. The renderer must be the one that prepared it, and
-    /// what is recorded must be submitted before the view is prepared again.
+    /// Records the drawing of the view's prepared frame into the view's own buffers, which [`Self::present`] and [`Self::draw`] read in this
+    /// encoder or later ones. Does nothing if the view was never prepared. The renderer must be the one that prepared the view, and the
+    /// commands must be submitted before the view is prepared again.
     pub fn record(&self, encoder: &mut CommandEncoder, view: &mut SceneView) {
         let Some(frame) = &mut view.frame else { return };
         let PreparedFrame { drawing, compositing, timer, .. } = frame;
@@ -346,12 +347,12 @@ impl Renderer {
         }
     }
 
-    /// Records a pass of its own that draws the view's image into a target, which keeps what the image does not cover; nothing, if
-    /// the view was never prepared. The renderer must have been made for the target's format and sample count and for no depth
-    /// attachment; what is wrong with those, wgpu reports.
+    /// Records a pass that draws the view's image into a target, which is kept where the image does not cover it. Does nothing if the view was
+    /// never prepared. The renderer must have been made for the target's format and sample count and for no depth attachment; wgpu
+    /// reports a mismatch.
     ///
     /// # Errors
-    /// If the scissor does not lie in the target; then nothing is recorded.
+    /// If the scissor does not lie in the target. Nothing is recorded then.
     pub fn present(
         &self,
         encoder: &mut CommandEncoder,
@@ -362,7 +363,7 @@ impl Renderer {
         let texture = target.texture();
         at.check([texture.width(), texture.height()])?;
         let Some(frame) = &mut view.frame else { return Ok(()) };
-        // Whoever waits for the counts has them, and their buffer.
+        // Once the counts have been requested, their buffer must not be written.
         let timer = frame.timer.as_mut().filter(|timer| frame.staging.is_some() && timer.has_room());
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("sheetsplat.resolve"),
@@ -383,10 +384,10 @@ impl Renderer {
         Ok(())
     }
 
-    /// Draws the view's image in a pass of the host's, whose attachments must be of the formats and the sample count that the
-    /// renderer was made for, and which the scissor must lie in ([`Placement::check`]); what is wrong with them, wgpu reports. Draws nothing, if the view was never prepared. Changes the pass's
-    /// pipeline, bind group 0, viewport and scissor rectangle. A view may also be drawn by other renderers of its device than the
-    /// one that recorded it, and as often as the host likes.
+    /// Draws the view's image in a host's pass. Its attachments must have the formats and the sample count that the renderer was made for, and
+    /// must contain the scissor ([`Placement::check`]); wgpu reports a mismatch. Does nothing if the view was never prepared. Changes the
+    /// pass's pipeline, bind group 0, viewport and scissor rectangle. Other renderers on the same device may also draw the view, any number
+    /// of times.
     pub fn draw(&self, pass: &mut RenderPass<'_>, view: &SceneView, at: Placement) {
         if let Some(frame) = &view.frame {
             self.draw_frame(pass, frame, at);
@@ -413,12 +414,12 @@ fn control_points(request: &FrameRequest) -> BufferSpec {
     content_spec("sheetsplat.control_points", bytes, BufferUsages::STORAGE)
 }
 
-/// Where counts of so many sheet groups end, bytes.
+/// The byte offset of the timestamps behind the counts of `groups` sheet groups.
 fn timestamps_at(groups: usize) -> u64 {
     (size_of::<Tally>() as u64 + groups as u64 * 4).next_multiple_of(8)
 }
 
-/// For counts, and behind them the timestamps of so many passes, if they are timed.
+/// The buffer for counts, followed by the timestamps of `passes` passes if they are timed.
 fn staging(timestamps: u64, timed: bool, passes: usize) -> BufferSpec {
     let bytes = timestamps + if timed { passes as u64 * PASS_BYTES } else { 0 };
     buffer_spec("sheetsplat.counts", bytes, BufferUsages::COPY_DST | BufferUsages::MAP_READ)

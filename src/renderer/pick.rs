@@ -1,4 +1,4 @@
-//! Picking: what a pixel shows first.
+//! Picking: the first point that is visible at a pixel.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
@@ -13,19 +13,19 @@ use crate::volume::Volume;
 /// A point of a volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pick {
-    /// Where, in world units from the volume's centre.
+    /// The position in world units from the volume's centre.
     pub position: DVec3,
-    /// Its depth along the camera's direction, world units from the eye; orthographic from the camera's centre.
+    /// The depth along the camera's direction in world units, from the eye or, orthographic, from the camera's centre.
     pub depth: f64,
     /// The nearest voxel.
     pub voxel: UVec3,
     /// That voxel's value, NaN in a hole.
     pub value: f32,
-    /// That voxel's label, in a segmented volume.
+    /// That voxel's label, if the volume is segmented.
     pub label: Option<u16>,
 }
 
-/// A pick on its way from the GPU.
+/// A pick that is being read back from the GPU.
 #[derive(Debug)]
 pub struct PendingPick {
     staging: Buffer,
@@ -63,18 +63,19 @@ impl PendingPick {
         Self { staging, view: *view, pixel, volume: volume.clone(), arrival: None }
     }
 
-    /// What was picked, once the encoder was submitted, what it does is done, and the device was polled; the first call after
-    /// submitting asks for it, so that there are two of them at least. `None` until then. Never waits. Inside there is `None` where the
+    /// The picked point, once the encoder was submitted, its work is done, and the device was polled. The first call after submitting requests
+    /// it, so at least two calls are needed; until the point has arrived they return `None`. Never waits. The inner `None` means that the
+    /// opacity is not reached.
     /// opacity is not reached.
     ///
     /// # Errors
-    /// If the device was lost meanwhile.
+    /// If the device was lost in the meantime.
     pub fn try_get(&mut self) -> Option<Result<Option<Pick>, RenderError>> {
         let failed = |reason: String| RenderError::Readback(reason);
         let arrival = self.arrival.get_or_insert_with(|| {
             let (sender, arrival) = channel();
             self.staging.map_async(MapMode::Read, .., move |result| {
-                // Whoever gave up asking does not care.
+                // The receiver may have been dropped.
                 let _ = sender.send(result);
             });
             arrival

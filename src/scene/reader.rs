@@ -1,4 +1,4 @@
-//! Typed access to a scene's TOML tables. Every error names origin, full key, what was found and what is allowed.
+//! Typed access to a scene's TOML tables. Every error names the origin, the full key, what was found and what is allowed.
 
 use std::ops::{Add, Mul};
 
@@ -7,10 +7,11 @@ use toml::{Table, Value};
 
 use super::{ImageSettings, SceneError};
 use crate::setting_error::{Allowed, Found, Interval, SettingError};
+use crate::settings::economies::KEYS;
 use crate::settings::transfer_function::{Ramp, RampError};
 use crate::volume::{SIZES, dims_of};
 
-/// The origin of what was set on the command line.
+/// The origin of values set on the command line.
 pub(super) const OVERRIDE: &str = "--set";
 
 /// Applies one `--set` argument, `table.key=value` or `table=value`, and returns its key.
@@ -25,46 +26,48 @@ pub(super) fn apply_override(root: &mut Table, argument: &str) -> Result<String,
     let Some((key, text)) = argument.split_once('=') else { return Err(misused(argument, "no \"=\"", usage)) };
     let (key, text) = (key.trim(), text.trim());
     let value = text.parse().unwrap_or_else(|_| Value::String(text.to_owned()));
-    match *key.split('.').collect::<Vec<_>>() {
-        ref names if names.contains(&"") => return Err(misused(argument, "an empty key", usage)),
-        [name] => _ = root.insert(name.to_owned(), value),
-        [table, name] => match root.entry(table).or_insert_with(|| Value::Table(Table::new())) {
-            Value::Table(section) => {
-                // They are two names of one thing: the last one given counts.
-                match key {
-                    "volume.path" => _ = section.remove("builtin"),
-                    "volume.builtin" => {
-                        section.retain(|name, _| !["path", "dims", "type", "endian", "offset"].contains(&name));
-                    }
-                    "transfer.color" => _ = section.remove("colormap"),
-                    "transfer.colormap" => _ = section.remove("color"),
-                    _ => {}
-                }
-                section.insert(name.to_owned(), value);
-            }
-            other => {
-                return Err(misused(key, &format!("{table} = {}", typed(other)), &format!("{table} to be a table")));
-            }
-        },
-        // The file format nests no deeper, so there is no table to put it in.
-        _ => return Err(misused(key, "a key of more than two parts", usage)),
+    if key.split('.').any(str::is_empty) {
+        return Err(misused(argument, "an empty key", usage));
     }
+    let (tables, name) = key.rsplit_once('.').map_or((None, key), |(tables, name)| (Some(tables), name));
+    let mut section = root;
+    let mut path = String::new();
+    for table in tables.into_iter().flat_map(|tables| tables.split('.')) {
+        path = if path.is_empty() { table.to_owned() } else { format!("{path}.{table}") };
+        section = match section.entry(table).or_insert_with(|| Value::Table(Table::new())) {
+            Value::Table(section) => section,
+            other => {
+                return Err(misused(key, &format!("{path} = {}", typed(other)), &format!("{path} to be a table")));
+            }
+        };
+    }
+    // The two keys name the same thing, so the last one wins.
+    match key {
+        "volume.path" => _ = section.remove("builtin"),
+        "volume.builtin" => {
+            section.retain(|name, _| !["path", "dims", "type", "endian", "offset"].contains(&name));
+        }
+        "transfer.color" => _ = section.remove("colormap"),
+        "transfer.colormap" => _ = section.remove("color"),
+        _ => {}
+    }
+    section.insert(name.to_owned(), value);
     Ok(key.to_owned())
 }
 
-/// Tells where a key's value came from.
+/// The origin of each key's value.
 pub(super) struct Origins<'a> {
     /// The scene file.
     pub(super) file: &'a str,
     /// The keys given by `--set`.
     pub(super) overridden: Vec<String>,
-    /// The whole file with what was set.
+    /// The file's tables with the overrides applied.
     pub(super) written: Table,
 }
 
 impl Origins<'_> {
-    /// An error about the value of `key`. It came from the command line if that key did, or one of the `related` keys
-    /// that it must fit together with.
+    /// The error for the value of `key`. Its origin is the command line if that key, or one of the `related` keys that it must be
+    /// consistent with, was overridden.
     pub(super) fn invalid(
         &self,
         key: &str,
@@ -82,21 +85,27 @@ impl Origins<'_> {
         }
     }
 
-    /// The error for settings that their type's check refused, with the value as it is written.
+    /// The overrides of a table's keys. They also create the table if the file has none: `colour.red` adds a table `colour`.
+    fn overrides_within(&self, table: &str) -> Vec<&str> {
+        self.overridden.iter().filter(|set| is_within(set, table)).map(String::as_str).collect()
+    }
+
+    /// The error for settings that their type's check refused, quoting the value as written.
     pub(super) fn refused(&self, error: SettingError) -> SceneError {
         let SettingError { key, found, allowed } = error;
         let related: &[&str] = match &key[..] {
             "camera.up" => &["camera.direction"],
             "splatting.compositing" => &["preset", "splatting.method", "splatting.order"],
             "splatting.classification" => {
-                &["splatting.method", "splatting.whole_below", "splatting.beta", "splatting.resolution"]
+                let [whole_below, beta, resolution] = KEYS.map(|(key, _)| key);
+                &["splatting.method", whole_below, beta, resolution]
             }
             "splatting.falloff" => &["splatting.classification"],
             "splatting.interpolation" => &["splatting.classification", "splatting.radius", "splatting.falloff"],
             _ => &[],
         };
         let found = match (found, self.written_at(&key)) {
-            // In words, where it takes several keys to say what is wrong.
+            // An error about several keys is described in words.
             (Found::Text(text), _) if !related.is_empty() => text,
             (_, Some(value)) => concise(value),
             (found, None) => found.to_string(),
@@ -120,13 +129,13 @@ fn is_within(key: &str, ancestor: &str) -> bool {
     key.strip_prefix(ancestor).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
 }
 
-/// A table whose keys are taken out one by one; what is left at the end nobody knows.
+/// A table whose keys are taken out one by one; those left at the end are unknown.
 pub(super) struct Section<'a> {
     pub(super) origins: &'a Origins<'a>,
-    /// Its full key; empty for the root.
+    /// The table's full key; empty for the root.
     pub(super) name: String,
     table: Table,
-    /// The keys asked for so far.
+    /// The keys requested so far.
     known: Vec<&'static str>,
 }
 
@@ -136,15 +145,15 @@ impl<'a> Section<'a> {
         Self { origins, name: String::new(), table, known: Vec::new() }
     }
 
-    /// The table under a key of the root; empty if missing.
+    /// The table under a key; empty if missing.
     pub(super) fn section(&mut self, name: &'static str) -> Result<Self, SceneError> {
-        let empty = Self { origins: self.origins, name: name.to_owned(), table: Table::new(), known: Vec::new() };
+        let empty = Self { origins: self.origins, name: self.key(name), table: Table::new(), known: Vec::new() };
         let mut section = empty;
         self.read(name, &mut section, |entry| entry.section("a table"))?;
         Ok(section)
     }
 
-    /// Replaces `into` by the value of a key, if it is there.
+    /// Stores the value of a key in `into`, if the key is present.
     pub(super) fn read<T>(
         &mut self,
         name: &'static str,
@@ -158,7 +167,7 @@ impl<'a> Section<'a> {
         Ok(())
     }
 
-    /// The value of a key that must be there.
+    /// The value of a required key.
     pub(super) fn require<T>(
         &mut self,
         name: &'static str,
@@ -170,14 +179,19 @@ impl<'a> Section<'a> {
         value.ok_or_else(|| self.origins.invalid(&self.key(name), &[], "no such key", allowed))
     }
 
-    /// Refuses the keys that nobody asked for.
+    /// Refuses a former key, naming the key that replaced it.
+    pub(super) fn moved(&self, former: &str, key: &str) -> Result<(), SceneError> {
+        if !self.table.contains_key(former) {
+            return Ok(());
+        }
+        Err(self.origins.invalid(&self.key(former), &[], "the former name of a setting", key))
+    }
+
+    /// Refuses the keys that were not requested.
     pub(super) fn finish(self) -> Result<(), SceneError> {
         let Some(name) = self.table.keys().next() else { return Ok(()) };
         let key = self.key(&name.escape_debug().to_string());
-        // An override of `colour.red` adds a table `colour`.
-        let related: Vec<_> =
-            self.origins.overridden.iter().filter(|set| is_within(set, &key)).map(String::as_str).collect();
-        Err(self.origins.invalid(&key, &related, "an unknown key", self.known.join(", ")))
+        Err(self.origins.invalid(&key, &self.origins.overrides_within(&key), "an unknown key", self.known.join(", ")))
     }
 
     /// The full name of a key.
@@ -186,10 +200,10 @@ impl<'a> Section<'a> {
     }
 }
 
-/// The labels of a segmented volume.
+/// The allowed labels, for errors.
 pub(super) const LABEL: &str = "an integer from 0 to 65535";
 
-/// A value with its full key.
+/// A value and its full key.
 pub(super) struct Entry<'a> {
     origins: &'a Origins<'a>,
     key: String,
@@ -197,17 +211,17 @@ pub(super) struct Entry<'a> {
 }
 
 impl<'a> Entry<'a> {
-    /// The error for a value that is not allowed.
+    /// The error for a value that is out of range.
     pub(super) fn refused(&self, allowed: impl Into<Allowed>) -> SceneError {
         self.origins.invalid(&self.key, &[], concise(&self.value), allowed)
     }
 
     /// The error for a value of the wrong type.
     pub(super) fn mistyped(&self, allowed: impl Into<Allowed>) -> SceneError {
-        self.origins.invalid(&self.key, &[], typed(&self.value), allowed)
+        self.origins.invalid(&self.key, &self.origins.overrides_within(&self.key), typed(&self.value), allowed)
     }
 
-    /// A table.
+    /// The value as a table.
     pub(super) fn section(&self, allowed: &str) -> Result<Section<'a>, SceneError> {
         let table = self.value.as_table().ok_or_else(|| self.mistyped(allowed))?.clone();
         Ok(Section { origins: self.origins, name: self.key.clone(), table, known: Vec::new() })
@@ -221,7 +235,7 @@ impl<'a> Entry<'a> {
         self.value.as_str().map(str::to_owned).ok_or_else(|| self.mistyped(allowed))
     }
 
-    /// One of several names.
+    /// A choice by its name.
     pub(super) fn choice<T: Copy>(&self, choices: &[(&str, T)]) -> Result<T, SceneError> {
         let allowed = || choices.iter().map(|(name, _)| format!("{name:?}")).collect::<Vec<_>>().join(" or ");
         let text = self.value.as_str().ok_or_else(|| self.mistyped(allowed()))?;
@@ -236,7 +250,7 @@ impl<'a> Entry<'a> {
         u32::try_from(integer).map_err(|_| self.refused(allowed))
     }
 
-    /// Voxels along x, y and z.
+    /// The number of voxels along x, y and z.
     pub(super) fn dims(&self) -> Result<UVec3, SceneError> {
         let sizes = self.array::<3>(SIZES)?.map(|size| size.value.as_integer().ok_or_else(|| size.mistyped(SIZES)));
         let [x, y, z] = sizes;
@@ -256,8 +270,7 @@ impl<'a> Entry<'a> {
         u16::try_from(integer).map_err(|_| self.refused(LABEL))
     }
 
-    /// A number, written as a float or as an integer. Whether it lies in the range that the key allows is for the settings' own check to
-    /// say.
+    /// A number, written as a float or an integer. The settings' own check tests its range.
     pub(super) fn number(&self, range: Interval) -> Result<f64, SceneError> {
         match self.value {
             Value::Integer(integer) => Ok(integer as f64),
@@ -266,7 +279,7 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// N numbers.
+    /// An array of N numbers.
     pub(super) fn numbers<const N: usize>(&self, range: Interval) -> Result<[f64; N], SceneError> {
         let mut numbers = [0.0; N];
         let items: [Entry; N] = self.array(&format!("{N} numbers, each {range}"))?;
@@ -292,7 +305,7 @@ impl<'a> Entry<'a> {
         Ok(values.iter().enumerate().map(item).collect())
     }
 
-    /// Control points `[position, value]`; `point` shows one.
+    /// Control points `[position, value]`; `point` is an example for errors.
     pub(super) fn ramp<T>(
         &self,
         point: &str,
@@ -329,7 +342,7 @@ fn typed(value: &Value) -> String {
 fn concise(value: &Value) -> String {
     const LONGEST: usize = 80;
     let text = match value {
-        // TOML's own way writes hundreds of zeros for such numbers.
+        // TOML's own format would write hundreds of zeros for such numbers.
         Value::Float(number) if value.to_string().len() > 20 => format!("{number:e}"),
         _ => value.to_string().replace(['\n', '\r'], " "),
     };

@@ -1,14 +1,14 @@
-//! The settings of a picture, as plain data: what a scene file states, or a host sets in code. The ranges and defaults are those of
-//! the scene file: each type's `check` states them, and whatever takes settings calls it.
+//! The settings of a picture as plain data, as a scene file states them or a host sets them in code. Their ranges and defaults are those
+//! of scene files: each type's `check` states them, and everything that accepts settings calls it.
 //!
-//! These structs are not `non_exhaustive`, so that a host can make them as scenes are written: what it says, and
-//! `..Default::default()` for the rest. Later versions add fields, with defaults that draw what was drawn before; code that names every
-//! field has to name those too. Enums that are likely to grow are
-//! `non_exhaustive`; those of two ways that exclude each other, such as [`Order`], are not.
+//! These structs are not `non_exhaustive`, so that a host can construct them like a scene file: some fields, and `..Default::default()`
+//! for the rest. Later versions add fields whose defaults do not change the image; code that names every field must then name those
+//! too. Enums that are likely to grow are `non_exhaustive`; those with two complementary variants, such as [`Order`], are not.
 
 pub(crate) mod camera;
 pub(crate) mod clip;
 mod clip_from_world;
+pub(crate) mod economies;
 pub(crate) mod framing;
 pub(crate) mod shading;
 pub(crate) mod splatting;
@@ -17,10 +17,10 @@ pub(crate) mod transfer_function;
 pub use crate::setting_error::{Allowed, Found, Interval};
 pub use camera::{Camera, Fit, Projection};
 pub use clip::{Clip, HalfSpace, MAX_PLANES};
+pub use economies::Economies;
 pub use framing::Extent;
 pub use shading::{Gradient, Light, Shading};
 pub use splatting::{
-    Classification, Compositing, Economies, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer,
-    Splatting,
+    Classification, Compositing, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer, Splatting,
 };
 pub use transfer_function::{LabelTables, Ramp, RampError, Tables, TransferFunction};

@@ -52,10 +52,13 @@ fn images_are_the_twins() {
     }
 }
 
+/// Another setting of a scene.
+type Change = fn(&mut Scene);
+
 /// Thin and thick slabs, minified voxels, the other order, gradient opacity, iso-ranges, cuts.
 #[test]
 fn settings_are_the_twins() {
-    let cases: [(&str, fn(&mut Scene)); 8] = [
+    let cases: [(&str, Change); 8] = [
         ("thin", |scene| scene.splatting.slab_width = 0.3),
         ("thick", |scene| scene.splatting.slab_width = 3.0),
         ("minified", |scene| scene.camera = camera([0.4, 0.9, -0.3], 120.0)),

@@ -1,4 +1,4 @@
-//! What `after` excludes is refused by its key.
+//! Settings that exclude `after` are refused by their keys.
 
 use std::path::Path;
 
@@ -16,14 +16,29 @@ fn parse(sets: &[&str]) -> Result<Scene, sheetsplat::scene::SceneError> {
 }
 
 #[test]
-fn what_excludes_after_is_named() {
+fn settings_that_exclude_after_are_named() {
     let after = "splatting.classification=after";
     for (sets, key, found, allowed) in [
         (&["splatting.method=axis-aligned"][..], "classification", "method = \"axis-aligned\"", "\"before\" with it"),
         (&["splatting.method=composite-every-sample"], "classification", "composite-every-sample", "\"before\""),
-        (&["splatting.whole_below=0.1"], "classification", "\"after\" with splatting.whole_below = 0.1", "\"before\""),
-        (&["splatting.beta=0.9"], "classification", "\"after\" with splatting.beta = 0.9", "\"before\""),
-        (&["splatting.resolution=0.01"], "classification", "\"after\" with splatting.resolution = 0.01", "\"before\""),
+        (
+            &["splatting.experimental.whole_below=0.1"],
+            "classification",
+            "\"after\" with splatting.experimental.whole_below = 0.1",
+            "\"before\"",
+        ),
+        (
+            &["splatting.experimental.beta=0.9"],
+            "classification",
+            "\"after\" with splatting.experimental.beta = 0.9",
+            "\"before\"",
+        ),
+        (
+            &["splatting.experimental.resolution=0.01"],
+            "classification",
+            "\"after\" with splatting.experimental.resolution = 0.01",
+            "\"before\"",
+        ),
         (&["splatting.falloff=11.5"], "falloff", "11.5 with splatting.classification", "at most 11"),
         (
             &["splatting.interpolation=exact", "splatting.falloff=0.94"],
@@ -32,11 +47,11 @@ fn what_excludes_after_is_named() {
             "\"smooth\" with them, or a larger falloff",
         ),
     ] {
-        // By themselves they are fine.
+        // Without `after` they are valid.
         parse(sets).unwrap().splatting.check().unwrap();
         let text = parse(&[&[after], sets].concat()).unwrap_err().to_string();
         assert!([key, found, allowed].iter().all(|words| text.contains(words)), "{sets:?}: {text}");
-        // Also where no scene file says so.
+        // They are refused without a scene file, too.
         let mut scene = parse(sets).unwrap();
         scene.splatting.classification = Classification::After;
         let volume = scene.load_volume().unwrap();
@@ -63,7 +78,7 @@ fn the_preset_labels_excludes_after() {
     assert_eq!(Splatting::default().classification, Classification::Before);
 }
 
-/// Until it draws them.
+/// The GPU does not draw them with `after` yet.
 #[test]
 fn the_gpu_refuses_projections() {
     let volume = builtin::volume("head:16").unwrap();

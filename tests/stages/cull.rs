@@ -1,6 +1,5 @@
-//! `shaders/cull_bricks.wgsl`, `shaders/cull_voxels.wgsl` and `shaders/compact.wgsl` against a plain evaluation of their rules
-//! (§6): what a sheet group draws, in which order, and what is known of every brick afterwards. What the drawn voxels look
-//! like is `shade.rs`'s.
+//! `shaders/cull_bricks.wgsl`, `shaders/cull_voxels.wgsl` and `shaders/compact.wgsl` against a plain evaluation of their rules (§6): what a
+//! sheet group draws, in which order, and the state of every brick afterwards. `shade.rs` tests the appearance of drawn voxels.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -27,7 +26,7 @@ use crate::common::{F32, Random, SPACINGS, camera, gpu, random_eye, scene};
 use crate::shade::place_error;
 use crate::{compute, contents, indirect, init};
 
-/// The stages with one list of bricks and what they read and write.
+/// The stages with one list of bricks and the buffers that they read and write.
 pub(crate) struct Culling<'a> {
     gpu: &'a Headless,
     stage: &'a Cull,
@@ -36,7 +35,7 @@ pub(crate) struct Culling<'a> {
     pub(crate) plan: FramePlan,
     /// The uniform of every group of the plan.
     groups: Vec<SheetGroup>,
-    /// Of every place of every brick the index into the volume, [`ABSENT`] without a voxel.
+    /// For every slot of every brick the voxel's index in the volume, or [`ABSENT`].
     pub(crate) indices: Vec<u32>,
     pub(crate) bricks: Vec<Brick>,
     pub(crate) list: CullList,
@@ -46,7 +45,7 @@ pub(crate) struct Culling<'a> {
 }
 
 impl<'a> Culling<'a> {
-    /// Of voxels in memory order, of a grid with these values and labels.
+    /// The stages for voxels in memory order, in a grid with these values and labels.
     pub(crate) fn new(
         gpu: &'a Headless,
         (stage, sheets): (&'a Cull, u32),
@@ -115,7 +114,7 @@ impl<'a> Culling<'a> {
         compute(self.gpu, |pass| self.stage.record(pass, &self.list, group as u32 * self.stride));
     }
 
-    /// What is known of a brick's voxels, bit by bit: hidden, shaded.
+    /// The state of each brick's voxels as bits: hidden, shaded.
     pub(crate) fn states(&self) -> Vec<(u64, u64)> {
         let bits = |words: [u32; 2]| u64::from(words[0]) | u64::from(words[1]) << 32;
         let states: Vec<BrickState> = contents(self.gpu, &self.list.states);
@@ -127,12 +126,12 @@ impl<'a> Culling<'a> {
     }
 }
 
-/// The uniform at the start of some bytes.
+/// The uniform at the start of `bytes`.
 fn uniform(bytes: &[u8]) -> SheetGroup {
     bytemuck::pod_read_unaligned(&bytes[..size_of::<SheetGroup>()])
 }
 
-/// A place without a voxel.
+/// A slot without a voxel.
 const ABSENT: u32 = u32::MAX;
 
 fn indices(grid: &Grid, brick: &Brick) -> [u32; BRICK_VOXELS as usize] {
@@ -143,14 +142,14 @@ fn indices(grid: &Grid, brick: &Brick) -> [u32; BRICK_VOXELS as usize] {
     indices
 }
 
-/// Beyond what f32 arithmetic moves pixel coordinates and depths of these tests by: sums of numbers below 600. Close to an eye pixel
+/// An upper bound on the f32 errors of pixel coordinates and depths in these tests: sums of numbers below 600. Close to an eye pixel
 /// coordinates are large, and so are their errors.
 const EPSILON: f64 = 5e-4;
 
-/// Decisions that f32 arithmetic cannot make otherwise; those that it can are noted.
+/// Decisions that f32 arithmetic makes like f64; those that it may make differently are noted.
 struct Decisions {
     unsure: bool,
-    /// What f32 arithmetic may move pixel coordinates by.
+    /// The f32 error of pixel coordinates.
     pixels: f64,
 }
 
@@ -176,9 +175,9 @@ impl Decisions {
         last as u32 - self.floor(last - x, last, self.pixels)
     }
 
-    /// The first and the last pixel from which the box filter covers the footprints' boxes around centres from `low` to `high`.
+    /// The first and last pixel from which the box filter covers the boxes of footprints with centres from `low` to `high`.
     fn filter(&mut self, size: [u32; 2], group: &SheetGroup, low: DVec2, high: DVec2) -> [[u32; 2]; 2] {
-        // Pixel centres are at half-integers; the shader's slack.
+        // Pixel centres are at half-integers; the shader adds its slack.
         let margin = half_box(group) + 0.01;
         let (low, high) = ((low - margin - 0.5).to_array(), (high + margin - 0.5).to_array());
         let axes = [0, 1].map(|axis| {
@@ -198,7 +197,7 @@ fn half_box(group: &SheetGroup) -> DVec2 {
     DVec2::from(group.half_box.map(f64::from))
 }
 
-/// Hidden boxes: an image's occlusion buffer.
+/// An image's occlusion buffer, as a set of hidden boxes.
 #[derive(Clone)]
 struct Occluded {
     size: [u32; 2],
@@ -241,19 +240,19 @@ impl Occluded {
     }
 }
 
-/// What the rules say, from the start of a frame on.
+/// The expected results, accumulated from the start of a frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Expected {
     /// The list's voxels that the last group draws, in order.
     drawn: Vec<u32>,
     /// Hidden and shaded voxels by brick.
     states: Vec<(u64, u64)>,
-    /// Voxels shaded, sections, quads, bricks tested and visited.
+    /// The numbers of voxels shaded, sections, quads, bricks tested and bricks visited.
     counts: [u32; 5],
     tiles: BTreeSet<u32>,
 }
 
-/// A frame's rules: §6 as the shaders' comments put it.
+/// A frame's rules: those of §6, as in the shaders' comments.
 struct Rules<'a> {
     grid: &'a Grid,
     frame: &'a Frame,
@@ -267,12 +266,12 @@ struct Rules<'a> {
     groups: &'a [SheetGroup],
     /// The list's bricks in bucket order.
     order: &'a [u32],
-    /// Voxels, by index into the volume, that f32 arithmetic may treat otherwise.
+    /// Voxels, by index in the volume, that f32 arithmetic may treat differently.
     unsure: BTreeSet<u32>,
 }
 
 impl Rules<'_> {
-    /// A voxel's pixel coordinates, sheet depth, and depth from the eye; nearer than the near plane as if it were on it.
+    /// A voxel's pixel coordinates, sheet depth, and depth from the eye; a voxel nearer than the near plane is projected as if it were on it.
     fn project(&self, p: DVec3) -> DVec4 {
         let [x, y, depth, from_eye] =
             self.frame.screen_from_voxel.map(|row| DVec4::from(row.map(f64::from)).dot(p.extend(1.0)));
@@ -284,7 +283,7 @@ impl Rules<'_> {
     fn is_on_screen(&self, decisions: &mut Decisions, group: &SheetGroup, low: DVec2, high: DVec2) -> bool {
         let (low, high) = (low - half_box(group), high + half_box(group));
         let size = self.frame.size.map(f64::from);
-        // All four, so that every unsure one is noted.
+        // All four sides are tested, so that every uncertain one is noted.
         let sides = [(high.x, 0.5), (high.y, 0.5), (size[0] - 0.5, low.x), (size[1] - 0.5, low.y)]
             .map(|(a, b)| decisions.at_least(a, b, decisions.pixels));
         sides.into_iter().all(|side| side)
@@ -304,7 +303,7 @@ impl Rules<'_> {
         let (middle, half) = brick::bounds(brick);
         let [_, _, depth, from_eye] = self.view.screen_from_voxel.map(|row| row.dot(middle.extend(1.0)));
         let [_, _, spread, thickness] = self.view.screen_from_voxel.map(|row| row.truncate().abs().dot(half));
-        // The shader's slack.
+        // The shader adds this slack.
         let reach = spread + f64::from(self.frame.reach) + 1e-3;
         let near = f64::from(group.near);
         let far = near + f64::from(self.sheets) * f64::from(self.frame.slab_width);
@@ -327,7 +326,7 @@ impl Rules<'_> {
         !all_occluded(0.0)
     }
 
-    /// What a group draws after what was expected so far.
+    /// Adds what a group draws to the results expected so far.
     fn cull(&mut self, group: usize, occluded: &Occluded, so_far: &mut Expected) {
         so_far.drawn.clear();
         let group = &self.groups[group];
@@ -338,7 +337,7 @@ impl Rules<'_> {
             let mut decisions = Decisions::new(self.pixel_error(corner.as_dvec3()));
             let visits = self.visits(&mut decisions, &brick, so_far.states[at as usize].0, group, occluded);
             if decisions.unsure {
-                // Not by a hair: a box, which has its slack, without any of its voxels.
+                // The brick reaches the group only barely: its box, which has slack, does, but perhaps none of its voxels.
                 self.unsure.extend(indices(self.grid, &brick).into_iter().filter(|&index| index != ABSENT));
             }
             if !visits {
@@ -359,14 +358,14 @@ impl Rules<'_> {
         so_far.counts[2] += so_far.drawn.len() as u32;
     }
 
-    /// What f32 arithmetic may move the pixel coordinates by of a voxel, or of what is around it: at the near plane at most so much.
+    /// The f32 error of a voxel's pixel coordinates, or of its surroundings; bounded by that at the near plane.
     fn pixel_error(&self, p: DVec3) -> f64 {
         let nearest = self.view.screen_from_voxel[3].dot(p.extend(1.0)).abs().max(self.frame.near.into());
         let [x, y] = [0, 1].map(|row| (self.view.screen_from_voxel[row] * p.extend(1.0)).abs().element_sum());
         if self.geometry.eye.is_some() { 16.0 * F32 * x.max(y) / nearest } else { 0.0 }
     }
 
-    /// How many sections of a voxel the group draws, by the twin: those with a footprint whose own box holds a pixel.
+    /// The number of a voxel's sections that the group draws, by the f64 evaluation: those with a footprint whose own box contains a pixel.
     fn sections(&self, decisions: &mut Decisions, voxel: UVec3, group: &SheetGroup) -> u32 {
         let Geometry { method, eye, .. } = self.geometry;
         if eye.is_some_and(|eye| !decisions.at_least(self.geometry.depth(voxel), eye.near, EPSILON)) {
@@ -429,7 +428,7 @@ impl Rules<'_> {
         so_far.counts[1] += sections;
         so_far.counts[0] += u32::from(state.1 >> slot & 1 == 0);
         state.1 |= 1 << slot;
-        // Every tile with a pixel whose centre is in the footprint's box, and at most one row or column of tiles more.
+        // Every tile with a pixel whose centre is in the footprint's box, plus at most one more row or column of tiles.
         let low = decisions.pixel(center - half_box(group) - 0.5, size).map(|pixel| pixel / TILE);
         let high = decisions.pixel(center + half_box(group), size).map(|pixel| pixel / TILE);
         let columns = tile_grid(size)[0];
@@ -445,7 +444,7 @@ struct Case {
     sheets: u32,
 }
 
-/// How often something happened in a run, so that a test can ask for it.
+/// Counts of events in a run, so that a test can require them.
 #[derive(Debug, Default)]
 struct Seen {
     most_bricks: u32,
@@ -468,11 +467,11 @@ impl Case {
         }
     }
 
-    /// Draws the groups of the plan in order, under the given occlusion buffers by turns, and checks all that is left behind.
+    /// Draws the groups of the plan in order, with the given occlusion buffers in turn, and checks all results.
     fn check(mut self, gpu: &Headless, stage: &Cull, masks: &[Occluded]) -> Seen {
         let transfer = Self::transfer();
         let values = vec![1.0; self.grid.dims.element_product() as usize];
-        // Voxels that f32 arithmetic may decide otherwise about are left out, which changes their bricks.
+        // Voxels whose decisions may differ in f32 are removed, which changes their bricks.
         for _ in 0..30 {
             let volume = (&self.grid, &values[..], None);
             let culling = Culling::new(gpu, (stage, self.sheets), volume, &self.voxels, &transfer, &self.scene);
@@ -561,7 +560,7 @@ impl Case {
     }
 }
 
-/// Occlusion buffers that hide something, nothing (what was hidden stays so), something else, everything, and nothing again.
+/// Occlusion buffers that hide something, nothing (hidden voxels stay hidden), something else, everything, and nothing again.
 fn masks(random: &mut Random, size: [u32; 2]) -> Vec<Occluded> {
     let [some, others] = [(); 2].map(|()| Occluded::random(random, size));
     vec![
@@ -574,7 +573,7 @@ fn masks(random: &mut Random, size: [u32; 2]) -> Vec<Occluded> {
     ]
 }
 
-/// A dense volume with holes, of bricks of up to 64 voxels.
+/// A dense volume with gaps, in bricks of up to 64 voxels.
 fn dense(random: &mut Random, sheets: u32, culling: bool) -> Case {
     let grid = Grid { dims: UVec3::new(14, 11, 17), spacing: DVec3::new(1.0, 1.0, 1.3) };
     let holes = random.uniform(0.0, 0.6);
@@ -612,8 +611,8 @@ fn dense_bricks() {
     assert!(all.without_visits > 10 && all.with_some > 30, "{all:?}");
 }
 
-/// Boxes that differ from group to group, bricks and kernels that the near plane cuts, and kernels on the screen by their group's box
-/// alone; slices. Also back to front, where nothing is hidden.
+/// Boxes that differ between groups, bricks and kernels that the near plane cuts, kernels that only their group's box puts onto the screen, and
+/// slices. Also back to front, where nothing is hidden.
 #[test]
 fn any_eye_and_slices() {
     let gpu = gpu();
@@ -643,7 +642,7 @@ fn any_eye_and_slices() {
     assert!(all.without_visits > 10 && all.with_some > 30, "{all:?}");
 }
 
-/// Without culling nobody looks at the occlusion buffer: only what is off the screen is left out.
+/// Without culling the occlusion buffer is not used: only what lies off the screen is left out.
 #[test]
 fn culling_off() {
     let gpu = gpu();
@@ -657,14 +656,14 @@ fn culling_off() {
     }
 }
 
-/// More bricks than threads, and more than threads and bits of a word: every thread's run is long, and there are several.
+/// More bricks than threads, and more than threads times the bits of a word, so that every thread has several long runs.
 #[test]
 fn many_bricks() {
     let gpu = gpu();
     let mut random = Random(33);
     for (sheets, side, height, least) in [(4, 370, 170.0, 256 * 32), (1, 370, 260.0, 256), (2, 150, 170.0, 256)] {
         let stage = Cull::new(gpu.device(), sheets);
-        // Bricks beside each other, a voxel or two in each.
+        // Adjacent bricks with one or two voxels each.
         let grid = Grid { dims: UVec3::new(side, 6, side), spacing: DVec3::ONE };
         let mut chosen = BTreeSet::new();
         for z in (0..side).step_by(4) {

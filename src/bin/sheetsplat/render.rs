@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use clap::ValueEnum;
 use sheetsplat::RenderError;
+use sheetsplat::cpu;
 use sheetsplat::headless::Rendering;
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
@@ -39,15 +40,15 @@ pub(crate) struct Arguments {
     /// Write counts and times as JSON.
     #[arg(long, value_name = "FILE")]
     stats: Option<PathBuf>,
-    /// Write the whole scene that was rendered as a scene file: with what presets, colour maps and the volume made of it.
+    /// Write the complete scene that was rendered as a scene file, with everything that presets, colour maps and the volume determined.
     #[arg(long, value_name = "FILE")]
     save_scene: Option<PathBuf>,
     #[command(flatten)]
     annotate: Annotate,
-    /// The GPU, or the slow f64 evaluation on the CPU that it is tested against.
+    /// The GPU, the CPU's cores without a driver, or the slow f64 evaluation that both are tested against.
     #[arg(long, value_enum, default_value = "gpu")]
     backend: Backend,
-    /// Time every stage on the GPU, where the adapter has timestamp queries: stages_ms in the statistics, and printed.
+    /// Time every stage on the GPU, if the adapter has timestamp queries: stages_ms in the statistics, and printed.
     #[arg(long)]
     profile: bool,
 }
@@ -55,6 +56,7 @@ pub(crate) struct Arguments {
 #[derive(Clone, Copy, ValueEnum)]
 enum Backend {
     Gpu,
+    Cpu,
     Reference,
 }
 
@@ -76,6 +78,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let volume = Arc::new(volume);
     let rendering = match arguments.backend {
         Backend::Gpu => input.headless(arguments.profile)?.render_volume(volume, &scene),
+        Backend::Cpu => cpu::render(volume, &scene),
         Backend::Reference => render_reference(&volume, &scene),
     };
     let Rendering { mut image, mut stats } = rendering.map_err(|error| input.failure(error))?;
@@ -94,7 +97,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.profile && stats.stages_ms.is_empty() {
         log::warn!("--profile: found no timestamp queries on {}", stats.adapter);
     }
-    // Empty without --profile.
+    // The map is empty without --profile.
     let profile: String = stats.stages_ms.iter().map(|(stage, ms)| format!("{stage:10} {ms:10.3} ms\n")).collect();
     outputs::write(&files, profile.as_bytes())
 }

@@ -31,18 +31,18 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
-    /// Size of the window, in points (pixels, unless the display is scaled).
+    /// Size of the window in points (pixels, unless the display is scaled).
     #[arg(long, value_name = "WxH", default_value = "1280x800", value_parser = parse_size)]
     size: [u16; 2],
-    /// Save the window's first complete frame, and close it: .png, .exr or .npy.
+    /// Save the window's first complete frame and close the window: .png, .exr or .npy.
     #[arg(long, value_name = "FILE")]
     screenshot: Option<PathBuf>,
 }
 
-/// How it ended, if not by the user closing the window.
+/// The result, unless the user closed the window.
 type Outcome = Rc<RefCell<Option<Result<(), Failure>>>>;
 
-/// `WxH`.
+/// Parses `WxH`.
 fn parse_size(text: &str) -> Result<[u16; 2], String> {
     let parse = |side: &str| side.parse::<u16>().ok().filter(|side| (100..=16384).contains(side));
     let sides = text.split_once('x').and_then(|(width, height)| Some([parse(width)?, parse(height)?]));
@@ -67,7 +67,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let options = NativeOptions {
         viewport,
         wgpu_options: guest::device_options(arguments.input.adapter.clone()),
-        // Pictures are shown, and saved, as they are.
+        // Pictures are shown, and saved, without changes.
         dithering: false,
         ..NativeOptions::default()
     };

@@ -1,0 +1,75 @@
+//! Bricks by tile and first sheet: the buckets (§5.1) of the native backend.
+
+use std::ops::Range;
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::project::Projection;
+use super::sheets::{COLUMNS, ROWS};
+use crate::gpu::layout::Brick;
+use crate::lists::brick;
+
+/// Pixels around footprints' boxes, and a part of them, for what f32 rounds.
+const SLACK: f64 = 0.02;
+const RELATIVE_SLACK: f64 = 1e-5;
+
+/// A brick in a view.
+#[derive(Clone, Debug)]
+pub(super) struct Placed {
+    /// Its number in the list of bricks.
+    pub(super) brick: u32,
+    /// The first sheet that its kernels may reach.
+    pub(super) first: i32,
+    /// Half the box that holds the box around any of its footprints, pixels.
+    pub(super) half_box: [f32; 2],
+    /// Pixels that footprints may touch: first and last column and row of tiles.
+    columns: [usize; 2],
+    rows: [usize; 2],
+}
+
+/// Columns and rows of tiles of an image.
+pub(super) fn tile_grid(size: [u32; 2]) -> [usize; 2] {
+    [(size[0] as usize).div_ceil(COLUMNS), (size[1] as usize).div_ceil(ROWS)]
+}
+
+/// The bricks that may be on the image, by first sheet and then in memory order.
+pub(super) fn place(bricks: &[Brick], projection: &Projection, support: f64) -> Vec<Placed> {
+    let numbered = bricks.par_iter().enumerate();
+    let mut placed: Vec<Placed> =
+        numbered.filter_map(|(number, brick)| place_brick(number as u32, brick, projection, support)).collect();
+    placed.par_sort_unstable_by_key(|placed| (placed.first, placed.brick));
+    placed
+}
+
+fn place_brick(number: u32, brick: &Brick, projection: &Projection, support: f64) -> Option<Placed> {
+    let view = &projection.view;
+    let (middle, half) = brick::bounds(brick);
+    let bounds = view.bounds(middle, half)?;
+    let Range { start, end } = bounds.depths;
+    if start >= end {
+        return None;
+    }
+    let half_box = view.half_box(support, start..end) * (1.0 + RELATIVE_SLACK) + SLACK;
+    let tiles = |axis: usize, side: usize| {
+        let low = (bounds.low - half_box - 0.5)[axis].max(0.0);
+        let high = (bounds.high + half_box - 0.5)[axis].min(f64::from(view.size[axis]) - 1.0);
+        // Pixels' centres are at whole numbers here: from the next to the last.
+        (low <= high).then(|| [low as usize / side, high as usize / side])
+    };
+    let (columns, rows) = (tiles(0, COLUMNS)?, tiles(1, ROWS)?);
+    let first = projection.sheets_of(&view.slabs.touched(start, end)).start;
+    let DVec2 { x, y } = half_box;
+    Some(Placed { brick: number, first, half_box: [x as f32, y as f32], columns, rows })
+}
+
+/// The bricks of every tile of a row of tiles, as indices into the list of placed bricks.
+pub(super) fn bin(placed: &[Placed], row: usize, columns: usize) -> Vec<Vec<u32>> {
+    let mut tiles = vec![Vec::new(); columns];
+    for (at, placed) in placed.iter().enumerate() {
+        if placed.rows[0] <= row && row <= placed.rows[1] {
+            tiles[placed.columns[0]..=placed.columns[1]].iter_mut().for_each(|tile| tile.push(at as u32));
+        }
+    }
+    tiles
+}

@@ -1,0 +1,142 @@
+//! Early splat elimination (§6, SPEC §6): which pixels of a tile are opaque, and whether any pixel of a footprint's box is not. The same
+//! decision as `shaders/cull_voxels.wgsl`; pixels outside of the tile are other tiles' to draw.
+
+use super::cut::TileCuts;
+use super::sheets::{COLUMNS, ROWS};
+
+/// Levels of rows joined: 1, 2, 4, … of them.
+const LEVELS: usize = ROWS.ilog2() as usize + 1;
+
+/// The pixels of a tile that are not opaque yet.
+#[derive(Clone, Debug)]
+pub(super) struct OpenMask {
+    /// `joined[l][y]`: for every column whether any of 2^l rows from y on has an open pixel.
+    joined: [[u32; ROWS]; LEVELS],
+}
+
+/// The pixels of a tile whose centres lie within a box: first and last column and row. Never empty.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Pixels {
+    pub(super) columns: [usize; 2],
+    pub(super) rows: [usize; 2],
+}
+
+impl Pixels {
+    /// Those within a box around a point, given by its place among pixel centres, and half its extent.
+    pub(super) fn within(center: [f32; 2], half: [f32; 2]) -> Option<Self> {
+        let of_axis = |axis: usize, count: usize| {
+            let first = -floor(-(center[axis] - half[axis]));
+            let last = floor(center[axis] + half[axis]);
+            let (first, last) = (first.max(0), last.min(count as i32 - 1));
+            (first <= last).then_some([first as usize, last as usize])
+        };
+        Some(Self { columns: of_axis(0, COLUMNS)?, rows: of_axis(1, ROWS)? })
+    }
+}
+
+/// The largest integer that is not above a number, without the system's `floor`.
+fn floor(x: f32) -> i32 {
+    let truncated = x as i32;
+    truncated.saturating_sub(i32::from(truncated as f32 > x))
+}
+
+impl OpenMask {
+    /// The first columns and rows of a tile.
+    pub(super) fn new(columns: usize, rows: usize) -> Self {
+        let bits = u32::MAX >> (COLUMNS - columns);
+        let mut mask = Self { joined: [[0; ROWS]; LEVELS] };
+        mask.joined[0][..rows].fill(bits);
+        mask.join();
+        mask
+    }
+
+    /// Whether the columns of a row that have a bit are open.
+    pub(super) fn row(&self, row: usize) -> u32 {
+        self.joined[0][row]
+    }
+
+    /// Makes pixels of a row opaque. Others know of it after [`Self::join`].
+    pub(super) fn close(&mut self, row: usize, opaque: u32) {
+        self.joined[0][row] &= !opaque;
+    }
+
+    /// Joins rows again.
+    pub(super) fn join(&mut self) {
+        for level in 1..LEVELS {
+            let step = 1 << (level - 1);
+            for row in 0..ROWS {
+                let below = if row + step < ROWS { self.joined[level - 1][row + step] } else { 0 };
+                self.joined[level][row] = self.joined[level - 1][row] | below;
+            }
+        }
+    }
+
+    /// Makes pixels opaque of which nothing shows.
+    pub(super) fn close_empty(&mut self, cuts: &TileCuts) {
+        for (row, [start, end]) in cuts.rows.iter().enumerate() {
+            let empty = (0..COLUMNS).filter(|&x| end[x] <= start[x]).fold(0, |bits, x| bits | 1 << x);
+            self.close(row, empty);
+        }
+        self.join();
+    }
+
+    /// Whether all pixels are opaque.
+    pub(super) fn is_closed(&self) -> bool {
+        self.joined[LEVELS - 1][0] == 0
+    }
+
+    /// Whether any pixel of a box is open.
+    #[inline(always)]
+    pub(super) fn sees(&self, pixels: &Pixels) -> bool {
+        let Pixels { columns: [left, right], rows: [first, last] } = *pixels;
+        let level = (last + 1 - first).ilog2() as usize;
+        let open = self.joined[level][first] | self.joined[level][last + 1 - (1 << level)];
+        open & columns_between(left, right) != 0
+    }
+}
+
+/// The bits of columns from one to another, both included.
+#[inline(always)]
+pub(super) fn columns_between(first: usize, last: usize) -> u32 {
+    u32::MAX << first & u32::MAX >> (COLUMNS - 1 - last)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_is_seen_while_any_of_its_pixels_is_open() {
+        let mut mask = OpenMask::new(30, 25);
+        let mut bits = 12_345_u32;
+        for round in 0..40 {
+            for row in 0..ROWS {
+                bits = bits.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+                // The generator's low bits repeat after a few rows.
+                let mixed = (bits ^ bits >> 16).wrapping_mul(0x9e37_79b9);
+                let mixed = mixed ^ mixed >> 15;
+                mask.close(row, if round < 4 { mixed & mixed >> 7 } else { mixed | mixed << 3 });
+            }
+            mask.join();
+            for (left, right, first, last) in (0..200_usize).map(|i| (i % 30, (i * 7) % 32, (i * 3) % 32, (i * 5) % 32))
+            {
+                let pixels =
+                    Pixels { columns: [left.min(right), left.max(right)], rows: [first.min(last), first.max(last)] };
+                let is_open = |row: usize| (pixels.columns[0]..=pixels.columns[1]).any(|x| mask.row(row) >> x & 1 == 1);
+                let expected = (pixels.rows[0]..=pixels.rows[1]).any(is_open);
+                assert_eq!(mask.sees(&pixels), expected, "{round} {pixels:?}");
+            }
+        }
+        assert!(mask.is_closed());
+    }
+
+    #[test]
+    fn pixels_are_those_whose_centers_are_within() {
+        let within = |x: f32, y: f32, half: f32| Pixels::within([x, y], [half, half]);
+        assert_eq!(within(3.5, 4.0, 1.0), Some(Pixels { columns: [3, 4], rows: [3, 5] }));
+        assert_eq!(within(-1.5, 4.0, 2.0), Some(Pixels { columns: [0, 0], rows: [2, 6] }));
+        assert_eq!(within(-1.5, 4.0, 1.0), None);
+        assert_eq!(within(3.5, 4.0, 0.4), None);
+        assert_eq!(within(31.0, 40.0, f32::INFINITY), Some(Pixels { columns: [0, 31], rows: [0, 31] }));
+    }
+}

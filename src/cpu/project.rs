@@ -1,0 +1,206 @@
+//! Where voxels are in a view, in f64: pixel coordinates, sheet depth, which slabs their kernels reach (SPEC §5); and how a kernel lies on
+//! the screen. Every voxel of a brick is at the brick's first place and an offset that depends on its place alone.
+
+use std::ops::Range;
+
+use glam::{DVec2, DVec3, UVec3};
+
+use crate::geometry::slab;
+use crate::geometry::view_geometry::{Perspective, ViewGeometry};
+use crate::gpu::layout::Brick;
+use crate::lists::brick::{self, BRICK_VOXELS};
+use crate::settings::splatting::Order;
+
+/// Where a voxel is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// Pixel coordinates times `from_eye`, from the image's middle.
+    x: f64,
+    y: f64,
+    /// Sheet depth, in slabs from plane 0.
+    pub(super) depth: f64,
+    /// The depth from the eye, `unit`s; 1 without one.
+    pub(super) from_eye: f64,
+}
+
+impl Place {
+    fn plus(self, other: Self) -> Self {
+        let Self { x, y, depth, from_eye } = other;
+        Self { x: self.x + x, y: self.y + y, depth: self.depth + depth, from_eye: self.from_eye + from_eye }
+    }
+}
+
+/// How a kernel is seen along its voxel's ray: all that its sections have in common.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lens {
+    /// Grid units along the kernel's ray to a slab's width.
+    pub(super) per_slab: f64,
+    /// 1/λ.
+    pub(super) per_lambda: f64,
+    /// The unit vector to the eye.
+    pub(super) to_eye: DVec3,
+    /// Of views with an eye.
+    pub(super) local: Option<Local>,
+}
+
+/// How footprints lie on the screen in perspective (§3.3.2).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Local {
+    /// The unit vector on the screen along one axis of the footprint's ellipse.
+    pub(super) axis: DVec2,
+    /// ρ² of one `unit` along that axis, and across it.
+    pub(super) metric: DVec2,
+    /// `(r·w)/λ`: the depth that one grid unit along the ray gains, `unit`s.
+    pub(super) depth_per_warped: f64,
+    /// Where the near plane cuts the kernel, grid units from its centre.
+    pub(super) cut: f64,
+}
+
+/// A frame's projection.
+#[derive(Clone, Debug)]
+pub(super) struct Projection {
+    pub(super) view: ViewGeometry,
+    /// 1, or -1 where sheets are numbered from the farthest on: in the order in which they are composited.
+    pub(super) direction: i32,
+    places: Vec<Place>,
+}
+
+impl Projection {
+    pub(super) fn new(view: ViewGeometry, order: Order) -> Self {
+        let direction = if order == Order::FrontToBack { 1 } else { -1 };
+        let mut projection = Self { view, direction, places: Vec::new() };
+        projection.places = (0..BRICK_VOXELS).map(|slot| projection.offset(brick::in_brick(slot).as_dvec3())).collect();
+        projection
+    }
+
+    fn offset(&self, voxels: DVec3) -> Place {
+        let [x, y, depth, from_eye] = self.view.screen_from_voxel.map(|row| row.truncate().dot(voxels));
+        Place { x, y, depth: depth / self.view.slabs.width, from_eye }
+    }
+
+    /// Where a brick's first place is.
+    pub(super) fn of_brick(&self, brick: &Brick) -> Place {
+        let rows = self.view.screen_from_voxel;
+        let [x, y, depth, from_eye] = rows.map(|row| row.dot(brick::origin(brick).as_dvec3().extend(1.0)));
+        Place { x, y, depth: (depth - self.view.slabs.origin) / self.view.slabs.width, from_eye }
+    }
+
+    /// Where one of a brick's voxels is.
+    pub(super) fn of_voxel(&self, brick: Place, slot: u32) -> Place {
+        brick.plus(self.places[slot as usize])
+    }
+
+    /// Pixel coordinates of a voxel before the eye.
+    pub(super) fn pixel(&self, place: Place) -> DVec2 {
+        let middle = DVec2::from(self.view.size.map(f64::from)) / 2.0;
+        match self.view.perspective {
+            None => DVec2::new(place.x, place.y) + middle,
+            Some(_) => DVec2::new(place.x, place.y) / place.from_eye + middle,
+        }
+    }
+
+    /// The sheets that a voxel's kernel overlaps, in the order in which they are composited; none before the near plane.
+    pub(super) fn sheets(&self, place: Place, voxel: UVec3) -> Range<i32> {
+        let Some(Perspective { eye, eye_voxel, .. }) = &self.view.perspective else {
+            let reach = self.view.reach / self.view.slabs.width;
+            return self.numbered(place.depth - reach, place.depth + reach);
+        };
+        if place.from_eye <= eye.near {
+            return 0..0;
+        }
+        // (r·w)/λ is the depth over the distance in voxels.
+        let reach = self.view.radius * place.from_eye / (voxel.as_dvec3() - eye_voxel).length();
+        let width = self.view.slabs.width;
+        self.numbered(place.depth - reach.min(place.from_eye - eye.near) / width, place.depth + reach / width)
+    }
+
+    /// Slabs between two depths by more than rounding errors ([`slab::ROUNDING`]), as sheets.
+    fn numbered(&self, first: f64, end: f64) -> Range<i32> {
+        let (first, end) = (floor(first + slab::ROUNDING), -floor(-(end - slab::ROUNDING)));
+        if self.direction > 0 { first..end } else { 1 - end..1 - first }
+    }
+
+    /// Those that a range of slabs is.
+    pub(super) fn sheets_of(&self, slabs: &Range<i32>) -> Range<i32> {
+        if self.direction > 0 { slabs.clone() } else { 1 - slabs.end..1 - slabs.start }
+    }
+
+    /// How a voxel's kernel is seen.
+    pub(super) fn lens(&self, place: Place, voxel: UVec3) -> Lens {
+        let view = &self.view;
+        let Some(Perspective { eye, eye_voxel, aspect, .. }) = &view.perspective else {
+            return Lens {
+                per_slab: view.slabs.width,
+                per_lambda: 1.0 / view.lambda,
+                to_eye: -view.basis.w,
+                local: None,
+            };
+        };
+        // In voxels and in `unit`s: the warped ray and the ray.
+        let warped = voxel.as_dvec3() - eye_voxel;
+        let ray = warped * *aspect;
+        let (distance_warped, distance) = (warped.length(), ray.length());
+        let ro = warped / distance_warped;
+        let per_depth = distance_warped / place.from_eye;
+        // Footprint coordinates are offsets parallel to the image, warped, without what is along the ray: crossed with its direction.
+        let right = (view.basis.u / *aspect).cross(ro);
+        let down = (-view.basis.v / *aspect).cross(ro);
+        let axis = principal_axis(right.length_squared() - down.length_squared(), 2.0 * right.dot(down));
+        let along = axis.x * right + axis.y * down;
+        let across = axis.x * down - axis.y * right;
+        let local = Local {
+            axis,
+            metric: DVec2::new(along.length_squared(), across.length_squared()),
+            depth_per_warped: 1.0 / per_depth,
+            cut: (eye.near - place.from_eye) * per_depth,
+        };
+        Lens {
+            per_slab: view.slabs.width * per_depth,
+            per_lambda: distance / distance_warped,
+            to_eye: -ray / distance,
+            local: Some(local),
+        }
+    }
+}
+
+/// The unit vector along the larger axis of a quadratic form, at half the angle of (`difference`, `product`).
+fn principal_axis(difference: f64, product: f64) -> DVec2 {
+    let size = DVec2::new(difference, product).length();
+    if size == 0.0 {
+        return DVec2::X;
+    }
+    // Whichever of the half angle's cosine and sine does not cancel gives the other.
+    let larger = ((1.0 + difference.abs() / size) / 2.0).sqrt();
+    let smaller = product / (2.0 * size * larger);
+    if difference >= 0.0 { DVec2::new(larger, smaller) } else { DVec2::new(smaller, larger) }
+}
+
+/// The largest integer that is not above a number, without the system's `floor`.
+pub(super) fn floor(x: f64) -> i32 {
+    let truncated = x as i32;
+    truncated.saturating_sub(i32::from(f64::from(truncated) > x))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn floors() {
+        for x in [-3.0, -2.5, -0.1, 0.0, 0.9, 7.0, 1e6 + 0.5] {
+            assert_eq!(f64::from(floor(x)), x.floor(), "{x}");
+        }
+    }
+
+    #[test]
+    fn a_principal_axis_is_at_half_the_angle() {
+        for step in 0..360 {
+            let angle = f64::from(step).to_radians();
+            let axis = principal_axis(3.0 * angle.cos(), 3.0 * angle.sin());
+            assert!((axis.length() - 1.0).abs() < 1e-12, "{step}");
+            let doubled = DVec2::new(axis.x * axis.x - axis.y * axis.y, 2.0 * axis.x * axis.y);
+            assert!(doubled.abs_diff_eq(DVec2::from_angle(angle), 1e-12), "{step}: {axis}");
+        }
+        assert_eq!(principal_axis(0.0, 0.0), DVec2::X);
+    }
+}

@@ -1,0 +1,28 @@
+//! The compositing buffer over the background, SPEC §5; the same as `shaders/resolve.wgsl`.
+
+use crate::settings::splatting::Compositing;
+
+/// How compositing buffers become images.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Resolver {
+    compositing: Compositing,
+    /// Premultiplied.
+    background: [f32; 4],
+}
+
+impl Resolver {
+    /// The background has straight alpha.
+    pub(super) fn new(compositing: Compositing, background: [f64; 4]) -> Self {
+        let [r, g, b, a] = background;
+        Self { compositing, background: [r * a, g * a, b * a, a].map(|channel| channel as f32) }
+    }
+
+    /// Premultiplied in, premultiplied out.
+    pub(super) fn pixel(&self, acc: [f32; 4]) -> [f32; 4] {
+        let image = match self.compositing {
+            Compositing::Xray => acc.map(|channel| channel.min(1.0)),
+            _ => acc,
+        };
+        std::array::from_fn(|channel| image[channel] + (1.0 - image[3]) * self.background[channel])
+    }
+}

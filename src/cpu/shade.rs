@@ -1,0 +1,121 @@
+//! Shading (SPEC §3) of eight voxels at a time, once for every tile that a voxel is seen in; the same as `shaders/shade.wgsl`.
+
+use fearless_simd::f32x8;
+use fearless_simd::prelude::*;
+use glam::{DVec3, UVec3};
+
+use super::vector::{LANES, optical_depth, power};
+use crate::settings::shading::{Light, MIN_GRADIENT, Shading};
+use crate::settings::splatting::Compositing;
+use crate::settings::transfer_function::TransferFunction;
+use crate::volume::Volume;
+
+/// Up to eight voxels that are to be shaded, by lanes.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Unshaded {
+    color: [[f32; LANES]; 3],
+    /// α, the opacity per unit length.
+    alpha: [f32; LANES],
+    normal: [[f32; LANES]; 3],
+    to_eye: [[f32; LANES]; 3],
+    /// What amounts are multiplied by.
+    scale: [f32; LANES],
+}
+
+impl Unshaded {
+    /// Puts a voxel into a lane: looks its colour and opacity up, and where its gradient points.
+    pub(super) fn set(
+        &mut self,
+        lane: usize,
+        volume: &Volume,
+        transfer: &TransferFunction,
+        voxel: UVec3,
+        to_eye: DVec3,
+        scale: f64,
+    ) {
+        let index = volume.grid().index_of(voxel);
+        let value = f64::from(volume.values()[index as usize]);
+        let tables = transfer.tables(volume.label(index));
+        let gradient = volume.gradient(voxel);
+        let magnitude = gradient.length();
+        let normal = if magnitude < MIN_GRADIENT { DVec3::ZERO } else { gradient / -magnitude };
+        self.alpha[lane] = tables.alpha(value, magnitude) as f32;
+        self.scale[lane] = scale as f32;
+        let color = tables.color.at(value);
+        for axis in 0..3 {
+            self.color[axis][lane] = color[axis] as f32;
+            self.normal[axis][lane] = normal[axis] as f32;
+            self.to_eye[axis][lane] = to_eye[axis] as f32;
+        }
+    }
+}
+
+/// A frame's light, material and compositing.
+#[derive(Clone, Debug)]
+pub(super) struct Shader {
+    is_enabled: bool,
+    /// To the light; `None` for a headlight.
+    to_light: Option<[f32; 3]>,
+    ambient: f32,
+    diffuse: f32,
+    specular: f32,
+    shininess: f32,
+    is_optical_depth: bool,
+}
+
+impl Shader {
+    pub(super) fn new(shading: &Shading, compositing: Compositing) -> Self {
+        Self {
+            is_enabled: shading.enabled,
+            to_light: match shading.light {
+                Light::Headlight => None,
+                Light::Direction(direction) => Some(direction.normalize().as_vec3().to_array()),
+            },
+            ambient: shading.ambient as f32,
+            diffuse: shading.diffuse as f32,
+            specular: shading.specular as f32,
+            shininess: shading.shininess as f32,
+            is_optical_depth: compositing == Compositing::Exponential,
+        }
+    }
+
+    /// `(C·m, m)` times the scale of every lane's voxel.
+    #[inline(always)]
+    pub(super) fn shade<S: Simd>(&self, simd: S, voxels: &Unshaded) -> [[f32; LANES]; 4] {
+        let load = |lanes: &[f32; LANES]| f32x8::load_array_ref(simd, lanes);
+        let alpha = load(&voxels.alpha);
+        let amount = match self.is_optical_depth {
+            true => optical_depth(simd, alpha.min(f32x8::splat(simd, 0.9999))),
+            false => alpha,
+        } * load(&voxels.scale);
+        let mut color = voxels.color.each_ref().map(load);
+        if self.is_enabled {
+            let (diffuse, highlight) = self.lighting(simd, voxels);
+            color = color.map(|channel| {
+                let lit = channel * (diffuse + self.ambient) + highlight;
+                lit.max(f32x8::splat(simd, 0.0)).min(f32x8::splat(simd, 1.0))
+            });
+        }
+        let [red, green, blue] = color.map(|channel| (channel * amount).to_array());
+        [red, green, blue, amount.to_array()]
+    }
+
+    /// Both terms that need light: two-sided, 0 without a normal.
+    #[inline(always)]
+    fn lighting<S: Simd>(&self, simd: S, voxels: &Unshaded) -> (f32x8<S>, f32x8<S>) {
+        let load = |lanes: &[f32; LANES]| f32x8::load_array_ref(simd, lanes);
+        let (normal, to_eye) = (voxels.normal.each_ref().map(load), voxels.to_eye.each_ref().map(load));
+        let to_light = self.to_light.map_or(to_eye, |light| light.map(|component| f32x8::splat(simd, component)));
+        let dot = |a: [f32x8<S>; 3], b: [f32x8<S>; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let half = [0, 1, 2].map(|axis| to_light[axis] + to_eye[axis]);
+        let squared = dot(half, half);
+        // Light from straight behind has no half vector.
+        let has_half = squared.simd_gt(f32x8::splat(simd, 1e-12));
+        let zero = f32x8::splat(simd, 0.0);
+        let length = has_half.select(squared, f32x8::splat(simd, 1.0)).sqrt();
+        let cosine = has_half.select(dot(normal, half).abs() / length, zero);
+        let diffuse = dot(normal, to_light).abs() * self.diffuse;
+        let highlight = if self.specular > 0.0 { power(simd, cosine, self.shininess) * self.specular } else { zero };
+        (diffuse, highlight)
+    }
+}

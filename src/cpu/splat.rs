@@ -1,0 +1,235 @@
+//! Kernel sections added to a tile's sheet buffers (SPEC §5), a row of eight pixels at a time and every section of a voxel for them; the same
+//! sums as `shaders/splat.wgsl`. Each pixel's additions come in the order in which voxels do, whatever the vectors' width.
+
+use fearless_simd::f32x8;
+use fearless_simd::prelude::*;
+
+use super::cull::{OpenMask, Pixels, columns_between};
+use super::kernel::KernelTables;
+use super::sheets::{Buffers, CHANNELS, COLUMNS, RING, ROWS, SECTIONS, SheetRow, slot_of};
+use super::vector::{LANES, iota};
+
+/// A voxel as a tile's pixels see it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Splat {
+    /// Its place among pixel centres: the tile's first is at 0, 0.
+    pub(super) center: [f32; 2],
+    /// `(C·m, m)` over λ, and the low-pass amplitude where it is the same for all sections.
+    pub(super) amount: [f32; 4],
+    /// The first sheet that is still to be drawn, in the order in which sheets are composited, and the end.
+    pub(super) sheets: [i32; 2],
+    /// From the voxel to the plane where that begins, grid units along its ray.
+    pub(super) first_plane: f32,
+    /// From plane to plane.
+    pub(super) step: f32,
+    /// The voxel: its brick's number and its place there.
+    pub(super) voxel: [u32; 2],
+    /// Sheets that have been drawn, in units of [`SECTIONS`].
+    pub(super) drawn: u32,
+    /// In perspective.
+    pub(super) local: LocalFootprint,
+}
+
+/// How a kernel lies on the screen in perspective: as [`Local`](super::project::Local), in f32.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct LocalFootprint {
+    pub(super) axis: [f32; 2],
+    pub(super) metric: [f32; 2],
+    pub(super) depth_per_warped: f32,
+    pub(super) from_eye: f32,
+    pub(super) cut: f32,
+}
+
+/// What all splats of a frame have in common.
+#[derive(Clone, Debug)]
+pub(super) struct Splatter {
+    pub(super) kernel: KernelTables,
+    pub(super) radius: f32,
+    /// Orthographic: ρ² of a pixel offset (dx, dy) is `x·dx² + y·dx·dy + z·dy²`.
+    pub(super) metric: [f32; 3],
+    /// Orthographic: the least ρ² of a row is this times dy².
+    pub(super) row_metric: f32,
+    /// Orthographic: half the box around footprints, pixels.
+    pub(super) half_box: [f32; 2],
+    /// In perspective the size of a pixel at depth 1, `unit`s.
+    pub(super) pixel_per_depth: Option<f32>,
+}
+
+/// The sections of a splat in up to [`SECTIONS`] sheets.
+pub(super) struct Sections {
+    count: usize,
+    /// `H(0, 0, t)` of eq. 3 at the planes between them.
+    planes: [f32; LANES],
+    /// ρ² from which on a section has nothing.
+    extent: [f32; LANES],
+    /// In perspective ρ² of a pixel along the footprint's axis and across it, and the low-pass rule's amplitude, by section.
+    along: [f32; LANES],
+    across: [f32; LANES],
+    amplitude: [f32; LANES],
+    /// The pixels that any of them reaches; `None` for no pixel of the tile.
+    pub(super) pixels: Option<Pixels>,
+}
+
+impl Splatter {
+    /// The sections that are to be drawn next.
+    #[inline(always)]
+    pub(super) fn sections<S: Simd>(&self, simd: S, splat: &Splat) -> Sections {
+        let count = ((splat.sheets[1] - splat.sheets[0]) as usize).min(SECTIONS);
+        let mut t = iota(simd) * splat.step + splat.first_plane;
+        let mut sections = Sections {
+            count,
+            planes: [0.0; LANES],
+            extent: [0.0; LANES],
+            along: [0.0; LANES],
+            across: [0.0; LANES],
+            amplitude: [0.0; LANES],
+            pixels: None,
+        };
+        let mut half_box = self.half_box;
+        if let Some(pixel_per_depth) = self.pixel_per_depth {
+            let local = &splat.local;
+            t = t.max(f32x8::splat(simd, local.cut));
+            let radius = f32x8::splat(simd, self.radius);
+            let within = t.max(-radius).min(radius);
+            // Of sections that are to be drawn: the last lane's far plane does not matter.
+            let middle = (within + within.slide::<1>(within)) * 0.5;
+            let pix = (middle * local.depth_per_warped + local.from_eye) * pixel_per_depth;
+            let squared = pix * pix;
+            let (along, across) = (squared * local.metric[0], squared * local.metric[1]);
+            // The low-pass rule: at least a pixel for a grid unit.
+            let one = f32x8::splat(simd, 1.0);
+            let amplitude = one / (along.max(one) * across.max(one)).sqrt();
+            // Above 0, for pixels whose squares are too small.
+            let least = f32x8::splat(simd, 1e-30);
+            let (along, across) = (along.min(one).max(least), across.min(one).max(least));
+            let [x, y] = local.axis.map(|component| component * component);
+            let width = (one / along * x + one / across * y).sqrt() * self.kernel.support;
+            let height = (one / along * y + one / across * x).sqrt() * self.kernel.support;
+            let largest =
+                |lanes: f32x8<S>| lanes.to_array()[..count].iter().fold(0.0_f32, |a, &b| if a > b { a } else { b });
+            half_box = [largest(width), largest(height)];
+            (sections.along, sections.across) = (along.to_array(), across.to_array());
+            sections.amplitude = amplitude.to_array();
+        }
+        sections.planes = self.kernel.along(simd, t).to_array();
+        sections.extent = self.kernel.extent(simd, t, t.slide::<1>(t)).to_array();
+        sections.pixels = Pixels::within(splat.center, half_box);
+        sections
+    }
+
+    /// Adds sections to a tile's sheets.
+    #[inline(always)]
+    pub(super) fn draw<S: Simd>(
+        &self,
+        simd: S,
+        splat: &Splat,
+        sections: &Sections,
+        open: &OpenMask,
+        buffers: &mut Buffers,
+    ) {
+        let Some(Pixels { columns: [left, right], rows: [first, last] }) = sections.pixels else { return };
+        let slot = slot_of(splat.sheets[0]);
+        let mut written = 0_u64;
+        for row in first..=last.min(ROWS - 1) {
+            let open = open.row(row);
+            let target = &mut buffers.sheets[row];
+            let mut column = left;
+            while column <= right {
+                let end = (column + LANES - 1).min(COLUMNS - 1);
+                if open & columns_between(column, end) != 0 {
+                    written |= 1 << row;
+                    match self.pixel_per_depth {
+                        None => self.draw_pixels(simd, splat, sections, [column, row], slot, target),
+                        Some(_) => self.draw_local_pixels(simd, splat, sections, [column, row], slot, target),
+                    }
+                }
+                column += LANES;
+            }
+        }
+        for section in 0..sections.count {
+            buffers.written[(slot + section) % RING] |= written;
+        }
+    }
+
+    /// Eight pixels without perspective: all sections have one footprint.
+    #[inline(always)]
+    fn draw_pixels<S: Simd>(
+        &self,
+        simd: S,
+        splat: &Splat,
+        sections: &Sections,
+        [column, row]: [usize; 2],
+        slot: usize,
+        target: &mut SheetRow,
+    ) {
+        let dy = row as f32 - splat.center[1];
+        let dx = iota(simd) + (column as f32 - splat.center[0]);
+        let [xx, xy, yy] = self.metric;
+        let rho_squared = dx * (dx * xx + xy * dy) + yy * dy * dy;
+        let rim = self.kernel.rim(simd, rho_squared);
+        let in_plane = self.kernel.in_plane(simd, rho_squared);
+        // A row that passes a section by has nothing of it: sections' extents grow towards the kernel's centre.
+        let nearest = self.row_metric * dy * dy;
+        let (mut first, mut end) = (0, sections.count);
+        while first < end && sections.extent[first % LANES] <= nearest {
+            first += 1;
+        }
+        while first < end && sections.extent[(end - 1) % LANES] <= nearest {
+            end -= 1;
+        }
+        let mut near = cut_by_rim(simd, sections.planes[first % LANES], rim);
+        for section in first..end {
+            let far = cut_by_rim(simd, sections.planes[(section + 1) % LANES], rim);
+            add((far - near) * in_plane, splat.amount, column, &mut target[(slot + section) % RING]);
+            near = far;
+        }
+    }
+
+    /// Eight pixels in perspective: every section has its own footprint, of the size that pixels have at its middle.
+    #[inline(always)]
+    fn draw_local_pixels<S: Simd>(
+        &self,
+        simd: S,
+        splat: &Splat,
+        sections: &Sections,
+        [column, row]: [usize; 2],
+        slot: usize,
+        target: &mut SheetRow,
+    ) {
+        let dy = row as f32 - splat.center[1];
+        let dx = iota(simd) + (column as f32 - splat.center[0]);
+        let [x, y] = splat.local.axis;
+        let along = dx * x + dy * y;
+        let across = dx * -y + dy * x;
+        let (along, across) = (along * along, across * across);
+        for section in 0..sections.count {
+            let rho_squared = along * sections.along[section] + across * sections.across[section];
+            let rim = self.kernel.rim(simd, rho_squared);
+            let in_plane = self.kernel.in_plane(simd, rho_squared) * sections.amplitude[section];
+            let near = cut_by_rim(simd, sections.planes[section], rim);
+            let far = cut_by_rim(simd, sections.planes[(section + 1) % LANES], rim);
+            add((far - near) * in_plane, splat.amount, column, &mut target[(slot + section) % RING]);
+        }
+    }
+}
+
+/// `H(0, 0, t)` at a plane, or at the rim on its side.
+#[inline(always)]
+fn cut_by_rim<S: Simd>(simd: S, plane: f32, rim: f32x8<S>) -> f32x8<S> {
+    f32x8::splat(simd, plane).max(-rim).min(rim)
+}
+
+/// Adds a colour to eight pixels of a sheet, by weights.
+#[inline(always)]
+fn add<S: Simd>(weights: f32x8<S>, colors: [f32; 4], column: usize, sheet: &mut [[f32; COLUMNS + LANES]; CHANNELS]) {
+    let column = column.min(COLUMNS);
+    let weights = weights.to_array();
+    for (channel, color) in sheet.iter_mut().zip(colors) {
+        // Numbers one by one, which the compiler makes vectors of: loading one by `f32x8` goes through a copy on the stack.
+        if let Some(pixels) = channel[column..].first_chunk_mut::<LANES>() {
+            for (pixel, weight) in pixels.iter_mut().zip(weights) {
+                *pixel += weight * color;
+            }
+        }
+    }
+}

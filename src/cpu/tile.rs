@@ -1,0 +1,254 @@
+//! One tile of the image, front to back: bricks arrive with the first sheet that they may reach, every voxel waits for its own first sheet,
+//! is tested for being hidden there, shaded, and drawn into all the sheets that its kernel reaches; then that sheet is composited.
+
+use std::collections::VecDeque;
+
+use fearless_simd::Simd;
+use glam::DVec2;
+
+use super::bin::Placed;
+use super::count::Tally;
+use super::cull::{OpenMask, Pixels};
+use super::frame::Frame;
+use super::project::Place;
+use super::shade::Unshaded;
+use super::sheets::{Buffers, COLUMNS, RING, ROWS, SECTIONS, slot_of};
+use super::splat::{LocalFootprint, Splat};
+use super::vector::LANES;
+use crate::lists::brick;
+
+/// A brick that has arrived.
+struct Arrived {
+    brick: u32,
+    place: Place,
+    half_box: [f32; 2],
+}
+
+/// A voxel that waits for its first sheet: which of the bricks that arrived, and its place there.
+type Waiting = (u32, u8);
+
+/// What a thread draws tiles with, one after the other.
+pub(super) struct TileWalk<'a> {
+    frame: &'a Frame<'a>,
+    buffers: Buffers,
+    arrived: Vec<Arrived>,
+    /// By sheet, from the current one on.
+    waiting: VecDeque<Vec<Waiting>>,
+    /// Voxels with more sections than are drawn at a time, by the slot of the sheet that is their next.
+    continued: [Vec<Splat>; RING],
+    /// Emptied lists.
+    spare: Vec<Vec<Waiting>>,
+    pending: usize,
+}
+
+impl<'a> TileWalk<'a> {
+    pub(super) fn new(frame: &'a Frame<'a>) -> Self {
+        Self {
+            frame,
+            buffers: Buffers::new(),
+            arrived: Vec::new(),
+            waiting: VecDeque::new(),
+            continued: std::array::from_fn(|_| Vec::new()),
+            spare: Vec::new(),
+            pending: 0,
+        }
+    }
+
+    /// Draws a tile, given its first pixel and its bricks by first sheet; the compositing buffer.
+    #[inline(always)]
+    pub(super) fn draw<S: Simd>(
+        &mut self,
+        simd: S,
+        origin: [usize; 2],
+        placed: &[Placed],
+        bricks: &[u32],
+        tally: &mut Tally,
+    ) -> &Buffers {
+        self.reset();
+        let [width, height] = self.frame.projection.view.size.map(|side| side as usize);
+        let mut open = OpenMask::new((width - origin[0]).min(COLUMNS), (height - origin[1]).min(ROWS));
+        let mut bricks = bricks.iter().map(|&at| &placed[at as usize]).peekable();
+        let Some(mut sheet) = bricks.peek().map(|placed| placed.first) else { return &self.buffers };
+        let direction = self.frame.projection.direction;
+        let cuts = self.frame.cuts.as_ref().map(|cuts| cuts.of_tile(origin, direction * sheet));
+        if let Some(cuts) = cuts.as_ref().filter(|_| self.frame.compositor.threshold.is_some()) {
+            open.close_empty(cuts);
+        }
+        loop {
+            while let Some(placed) = bricks.next_if(|placed| placed.first <= sheet) {
+                tally.bricks_visited += u64::from(self.arrive(placed, sheet, origin, &open));
+            }
+            self.start(simd, sheet, origin, &open, tally);
+            let slot = slot_of(sheet);
+            if self.buffers.written[slot] != 0 {
+                tally.sheets_composited += 1;
+                let cut = cuts.as_ref().map(|cuts| (cuts, cuts.begin(direction * sheet)));
+                self.frame.compositor.composite(simd, &mut self.buffers, slot, cut, &mut open);
+                if open.is_closed() {
+                    break;
+                }
+            }
+            let is_idle = self.pending == 0 && self.buffers.written == [0; RING];
+            sheet = match bricks.peek() {
+                Some(placed) if is_idle => placed.first,
+                None if is_idle => break,
+                _ => sheet + 1,
+            };
+        }
+        &self.buffers
+    }
+
+    fn reset(&mut self) {
+        self.buffers.clear();
+        self.arrived.clear();
+        self.spare.extend(self.waiting.drain(..));
+        self.continued.iter_mut().for_each(Vec::clear);
+        self.pending = 0;
+    }
+
+    /// Lets a brick's voxels wait for their first sheets, unless the brick is hidden; whether it is not.
+    fn arrive(&mut self, placed: &Placed, sheet: i32, origin: [usize; 2], open: &OpenMask) -> bool {
+        let projection = &self.frame.projection;
+        let brick = &self.frame.bricks[placed.brick as usize];
+        if !self.sees_brick(placed, origin, open) {
+            return false;
+        }
+        let place = projection.of_brick(brick);
+        let number = self.arrived.len() as u32;
+        self.arrived.push(Arrived { brick: placed.brick, place, half_box: placed.half_box });
+        for (slot, voxel) in brick::voxels(brick) {
+            let sheets = projection.sheets(projection.of_voxel(place, slot), voxel);
+            if sheets.is_empty() {
+                continue;
+            }
+            let ahead = (sheets.start - sheet).max(0) as usize;
+            while self.waiting.len() <= ahead {
+                self.waiting.push_back(self.spare.pop().map_or_else(Vec::new, cleared));
+            }
+            self.waiting[ahead].push((number, slot as u8));
+            self.pending += 1;
+        }
+        true
+    }
+
+    /// Whether any pixel is open that a brick's footprints may touch.
+    fn sees_brick(&self, placed: &Placed, origin: [usize; 2], open: &OpenMask) -> bool {
+        let (middle, half) = brick::bounds(&self.frame.bricks[placed.brick as usize]);
+        let Some(bounds) = self.frame.projection.view.bounds(middle, half) else { return false };
+        let origin = DVec2::new(origin[0] as f64, origin[1] as f64) + 0.5;
+        let (center, half) = ((bounds.low + bounds.high) / 2.0 - origin, (bounds.high - bounds.low) / 2.0);
+        let [x, y] = placed.half_box;
+        let half = [half.x as f32 + x, half.y as f32 + y];
+        Pixels::within([center.x as f32, center.y as f32], half).is_some_and(|pixels| open.sees(&pixels))
+    }
+
+    /// Draws what starts in a sheet, or goes on there.
+    #[inline(always)]
+    fn start<S: Simd>(&mut self, simd: S, sheet: i32, origin: [usize; 2], open: &OpenMask, tally: &mut Tally) {
+        let continued = std::mem::take(&mut self.continued[slot_of(sheet)]);
+        self.pending -= continued.len();
+        for splat in &continued {
+            self.draw_splat(simd, splat, open, tally);
+        }
+        let Some(starting) = self.waiting.pop_front() else { return };
+        self.pending -= starting.len();
+        let mut batch = Batch::default();
+        for &(number, slot) in &starting {
+            let arrived = &self.arrived[number as usize];
+            let place = self.frame.projection.of_voxel(arrived.place, slot.into());
+            let pixel = self.frame.projection.pixel(place);
+            let center = [pixel.x - origin[0] as f64 - 0.5, pixel.y - origin[1] as f64 - 0.5].map(|at| at as f32);
+            // In perspective a bound of all of its sections' boxes.
+            if !Pixels::within(center, arrived.half_box).is_some_and(|pixels| open.sees(&pixels)) {
+                continue;
+            }
+            self.frame.drawn.shade([arrived.brick, slot.into()], tally);
+            batch.add(self.frame, [arrived.brick, slot.into()], place, center, sheet);
+            if batch.count == LANES {
+                self.draw_batch(simd, &mut batch, open, tally);
+            }
+        }
+        self.draw_batch(simd, &mut batch, open, tally);
+        self.spare.push(starting);
+    }
+
+    #[inline(always)]
+    fn draw_batch<S: Simd>(&mut self, simd: S, batch: &mut Batch, open: &OpenMask, tally: &mut Tally) {
+        let amounts = self.frame.shader.shade(simd, &batch.unshaded);
+        for lane in 0..std::mem::take(&mut batch.count) {
+            if let Some(splat) = &mut batch.splats[lane] {
+                splat.amount = amounts.map(|lanes| lanes[lane]);
+            }
+            if let Some(splat) = batch.splats[lane] {
+                self.draw_splat(simd, &splat, open, tally);
+            }
+        }
+    }
+
+    /// Draws a voxel's next sections, if they are seen, and keeps it if there are more.
+    #[inline(always)]
+    fn draw_splat<S: Simd>(&mut self, simd: S, splat: &Splat, open: &OpenMask, tally: &mut Tally) {
+        let splatter = &self.frame.splatter;
+        let sections = splatter.sections(simd, splat);
+        let [first, end] = splat.sheets;
+        let next = end.min(first + SECTIONS as i32);
+        if sections.pixels.is_some_and(|pixels| open.sees(&pixels)) {
+            splatter.draw(simd, splat, &sections, open, &mut self.buffers);
+            self.frame.drawn.splat(splat.voxel, splat.drawn, (next - first) as u64, tally);
+        }
+        if next < end {
+            self.continued[slot_of(next)].push(Splat {
+                sheets: [next, end],
+                first_plane: splat.first_plane + splat.step * SECTIONS as f32,
+                drawn: splat.drawn + 1,
+                ..*splat
+            });
+            self.pending += 1;
+        }
+    }
+}
+
+fn cleared(mut list: Vec<Waiting>) -> Vec<Waiting> {
+    list.clear();
+    list
+}
+
+/// Voxels that are shaded together.
+#[derive(Default)]
+struct Batch {
+    count: usize,
+    unshaded: Unshaded,
+    splats: [Option<Splat>; LANES],
+}
+
+impl Batch {
+    fn add(&mut self, frame: &Frame, [brick, slot]: [u32; 2], place: Place, center: [f32; 2], sheet: i32) {
+        let projection = &frame.projection;
+        let voxel = brick::origin(&frame.bricks[brick as usize]) + brick::in_brick(slot);
+        let lens = projection.lens(place, voxel);
+        let sheets = projection.sheets(place, voxel);
+        // Back to front, planes are met in the other order: sections are then less than 0, and so is what they are multiplied by.
+        let direction = f64::from(projection.direction);
+        let plane = direction * f64::from(sheet) + if projection.direction > 0 { 0.0 } else { 1.0 };
+        let scale = direction * lens.per_lambda * frame.amplitude;
+        self.unshaded.set(self.count, frame.volume, frame.transfer, voxel, lens.to_eye, scale);
+        let local = lens.local.map(|local| LocalFootprint {
+            axis: local.axis.to_array().map(|component| component as f32),
+            metric: local.metric.to_array().map(|component| component as f32),
+            depth_per_warped: local.depth_per_warped as f32,
+            from_eye: place.from_eye as f32,
+            cut: local.cut as f32,
+        });
+        self.splats[self.count] = Some(Splat {
+            center,
+            amount: [0.0; 4],
+            sheets: [sheet, sheets.end],
+            first_plane: ((plane - place.depth) * lens.per_slab) as f32,
+            step: (direction * lens.per_slab) as f32,
+            voxel: [brick, slot],
+            drawn: 0,
+            local: local.unwrap_or_default(),
+        });
+        self.count += 1;
+    }
+}
