@@ -14,6 +14,8 @@
 
 // The number of sheets in a group.
 override SHEETS: u32 = 4u;
+// Whether a group is not sheets, but the plane at its near end (SPEC §9).
+override PLANE: bool = false;
 
 // Whether all pixels are opaque in the boxes of footprints with centres from low to high.
 fn is_behind(low: vec2f, high: vec2f) -> bool {
@@ -54,9 +56,12 @@ fn is_visited(at: u32) -> bool {
     // Rounding must not lose a voxel that barely touches.
     let slack = 1e-3;
     let depth_reach = spread.z + frame.reach + slack;
-    let far = sheet_group.near + f32(SHEETS) * frame.slab_width;
+    let far = sheet_group.near + select(f32(SHEETS) * frame.slab_width, 0.0, PLANE);
     if p.z + depth_reach <= sheet_group.near || p.z - depth_reach >= far {
         return false;
+    }
+    if PLANE && frame.near > 0.0 && p.w - spread.w <= CLOSE * frame.reach {
+        return true;
     }
     let farthest = p.w + spread.w;
     if farthest <= frame.near {

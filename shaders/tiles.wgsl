@@ -8,6 +8,11 @@
 @group(0) @binding(5) var<storage, read_write> occluding: TileList;
 // The number of tiles that every group composited.
 @group(0) @binding(6) var<storage, read_write> counts: array<u32>;
+// For every tile the number of the group that it was composited for last.
+@group(0) @binding(7) var<storage, read> last_groups: array<u32>;
+
+// Whether a group is a plane (SPEC §9): where it has no value, the plane before it still stands for both.
+override PLANE: bool = false;
 
 const WORKGROUP_SIZE = 256u;
 
@@ -15,7 +20,9 @@ var<workgroup> composited_count: atomic<u32>;
 var<workgroup> occluding_count: atomic<u32>;
 
 fn is_composited(tile: u32) -> bool {
-    let touched = frame.tiles == 0u || atomicLoad(&culled.tiles[tile]) != 0u;
+    let before = select(sheet_group.number + 1u, sheet_group.number - 1u, frame.order == FRONT_TO_BACK);
+    let is_behind_value = PLANE && last_groups[tile] != 0u && last_groups[tile] == before;
+    let touched = frame.tiles == 0u || atomicLoad(&culled.tiles[tile]) != 0u || is_behind_value;
     return touched && (frame.culling == 0u || opaque_tiles[tile] == 0u);
 }
 

@@ -102,6 +102,7 @@
 //! that take part · *label* the number of the segment that a voxel of a segmented volume belongs to
 //! ([`Volume::labels`]) · *brick* 4×4×4 neighbouring voxels · *tile* a square of 32×32 pixels.
 
+mod after;
 pub mod appearance;
 #[cfg(feature = "cpu")]
 pub mod cpu;
@@ -171,7 +172,12 @@ pub mod internals {
     pub use crate::settings::clip::ClippedVoxels;
     pub use crate::settings::shading::MIN_GRADIENT;
 
-    /// What the passes share.
+    /// Classification after splatting.
+    pub mod after {
+        pub use crate::after::*;
+    }
+
+    /// The passes' common parts.
     #[cfg(feature = "gpu")]
     pub mod gpu {
         pub use crate::gpu::{
@@ -183,7 +189,9 @@ pub mod internals {
     /// The GPU's stages.
     #[cfg(feature = "gpu")]
     pub mod pass {
-        pub use crate::pass::{composite, cull, first_hit, gather, occlude, resolve, sample, shade, splat, tiles};
+        pub use crate::pass::{
+            classify, composite, cull, field, first_hit, gather, occlude, resolve, sample, shade, splat, tiles, values,
+        };
     }
 
     /// The f64 evaluations of the stages.

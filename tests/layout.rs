@@ -6,8 +6,8 @@ use std::mem::offset_of;
 use naga::proc::Layouter;
 use naga::{AddressSpace, Handle, Module, Type, TypeInner};
 use sheetsplat::internals::gpu::layout::{
-    Band, Brick, BrickState, Culled, Cut, Frame, Gather, Gathered, Indirect, PatchRange, SheetGroup, Splat, Tally,
-    TileList, Visit,
+    Band, Brick, BrickState, Culled, Cut, FieldVoxel, Frame, Gather, Gathered, Indirect, PatchRange, Planes,
+    SheetGroup, Splat, Tally, TileList, Visit,
 };
 use sheetsplat::internals::gpu::shaders;
 
@@ -50,7 +50,7 @@ macro_rules! layout {
     }};
 }
 
-fn shared() -> [Layout; 15] {
+fn shared() -> [Layout; 17] {
     [
         layout!(Splat { x_px, y_px, depth, from_eye, rg, ba }),
         layout!(Cut {
@@ -110,6 +110,8 @@ fn shared() -> [Layout; 15] {
             padding_1
         }),
         layout!(SheetGroup { half_box, box_filter, culling, near, first_brick, brick_count, index, number }),
+        layout!(Planes { axes, step, screen_axis, per_pixel, origin, value_bias, value_scale, per_number }),
+        layout!(FieldVoxel { x, y, depth, number, gradient_xy, gradient_z }),
         layout!(Brick { present, x, y, z, extent }),
         layout!(BrickState { hidden, shaded }),
         layout!(Visit { drawn, fresh, brick, padding }),

@@ -49,6 +49,9 @@ const BRICK_VOXELS = 64u;
 // rasterizer's vectors half empty.
 const QUADS = 16u;
 
+// What is that many times a kernel's reach from the eye, or behind it, has no place on the screen, but may bear on planes before it.
+const CLOSE = 1.001;
+
 // The number of voxels shaded by one workgroup.
 const SHADE_WORKGROUP = 64u;
 

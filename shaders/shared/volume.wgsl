@@ -52,15 +52,24 @@ fn half_difference(index: u32, stride: u32, at: u32, count: u32, scale: f32) -> 
     return difference * select(2.0 * scale, scale, before + after == 2u);
 }
 
-// Central differences in the unwarped space (§4.2, SPEC §3).
-fn gradient_at(voxel: vec3u) -> Gradient {
+// Half of the central differences in the unwarped space (§4.2, SPEC §3), value per `unit`.
+fn half_differences(voxel: vec3u) -> vec3f {
     let index = index_of(voxel);
     let row = frame.dims.x;
-    let g = vec3f(
+    return vec3f(
         half_difference(index, 1u, voxel.x, frame.dims.x, frame.gradient.x),
         half_difference(index, row, voxel.y, frame.dims.y, frame.gradient.y),
         half_difference(index, row * frame.dims.y, voxel.z, frame.dims.z, frame.gradient.z),
     );
+}
+
+// The gradient that a voxel's central differences are.
+fn gradient_at(voxel: vec3u) -> Gradient {
+    return gradient_of(half_differences(voxel));
+}
+
+// A gradient given by its half, value per `unit`.
+fn gradient_of(g: vec3f) -> Gradient {
     // Scaled first, because squares leave the range of f32 long before the gradient does.
     let largest = max(max(abs(g.x), abs(g.y)), abs(g.z));
     let direction = g / select(1.0, largest, largest > 0.0);

@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::settings::splatting::{Compositing, Splatting};
+use crate::settings::splatting::{Classification, Compositing, Splatting};
 use crate::volume::Grid;
 
 /// A box around the volume's centre.
@@ -18,11 +18,11 @@ pub struct RayBox {
 }
 
 impl RayBox {
-    /// The box for [`Compositing::Minimum`], in which kernels are complete, or for [`Compositing::Average`], with all voxels; the other modes
-    /// do not use it.
+    /// The box for [`Compositing::Minimum`], in which kernels are complete, or for [`Compositing::Average`] and
+    /// [`Classification::After`], with all voxels; the other modes do not use it.
     pub fn new(view: &ViewGeometry, grid: &Grid, splatting: &Splatting) -> Self {
         let (centers, near) = (grid.center(), view.perspective.map_or(f64::NEG_INFINITY, |it| it.eye.near));
-        if splatting.compositing != Compositing::Minimum {
+        if splatting.compositing != Compositing::Minimum || splatting.classification == Classification::After {
             return Self { half: centers + 0.5, nearest: near };
         }
         // The maximum depth by which a kernel reaches beyond a voxel at the near plane.
@@ -34,7 +34,7 @@ impl RayBox {
 /// The sheet depths whose slabs count for [`Compositing::Minimum`] even if they are empty: those on some ray's stretch. Empty for the
 /// other modes.
 pub fn covered(view: &ViewGeometry, grid: &Grid, splatting: &Splatting) -> Range<f64> {
-    if splatting.compositing != Compositing::Minimum {
+    if splatting.compositing != Compositing::Minimum || splatting.classification == Classification::After {
         return 0.0..0.0;
     }
     let RayBox { half, nearest } = RayBox::new(view, grid, splatting);

@@ -52,9 +52,7 @@ impl BrickLists {
 
     /// The lists that [`Self::upload`] would make of these bricks.
     pub fn settled(&self, limits: &wgpu::Limits) -> SettledBricks {
-        let bricks = self.bricks.compacted();
-        let (ranges, capacity) = split(limits, bricks.bricks().len());
-        SettledBricks { ranges: ranges.collect(), capacity, bricks }
+        SettledBricks::of(limits, self.bricks.compacted())
     }
 
     /// The bricks of every list.
@@ -83,6 +81,14 @@ impl BrickLists {
             }
             _ => State::Full,
         };
+    }
+
+    /// Takes the bricks of other voxels instead; the next [`Self::flush`] uploads them all.
+    pub fn replace(&mut self, grid: &Grid, voxels: &[u32]) {
+        self.bricks = BrickList::new(grid, voxels);
+        self.lists.truncate(1);
+        self.lists.iter_mut().for_each(|list| list.range = 0..self.bricks.bricks().len());
+        self.state = State::Full;
     }
 
     /// Whether there is room for the added bricks; otherwise all will be uploaded again.
@@ -135,6 +141,12 @@ pub struct SettledBricks {
 }
 
 impl SettledBricks {
+    /// The lists that some bricks are divided among.
+    pub fn of(limits: &wgpu::Limits, bricks: BrickList) -> Self {
+        let (ranges, capacity) = split(limits, bricks.bricks().len());
+        Self { ranges: ranges.collect(), capacity, bricks }
+    }
+
     /// The bricks of every list.
     pub fn lists(&self) -> Vec<&[Brick]> {
         self.ranges.iter().map(|range| &self.bricks.bricks()[range.clone()]).collect()

@@ -2,18 +2,22 @@
 
 use std::sync::Arc;
 
+use glam::UVec3;
 use rayon::prelude::*;
-use wgpu::{Device, Queue, TextureView};
+use wgpu::{Device, Limits, Queue, TextureView};
 
+use crate::after::brick_ranges::BrickRanges;
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::gpu::brick_lists::BrickLists;
-use crate::gpu::gpu_volume::GpuVolume;
+use crate::gpu::brick_lists::{BrickLists, SettledBricks};
+use crate::gpu::gpu_volume::{Coefficients, GpuVolume};
+use crate::lists::brick::BrickList;
 use crate::lists::classify::{classify, in_rows, takes_part};
 use crate::lists::iso_range::ValueSet;
 use crate::lists::quad_plan::{Overlaps, tile_grid};
 use crate::lists::value_list::ValueList;
 use crate::settings::clip::ClippedVoxels;
+use crate::settings::splatting::Classification;
 use crate::settings::transfer_function::{LabelTables, Ramp, Tables, TransferFunction};
 use crate::stats::{Counts, GroupSlabs, Totals};
 use crate::volume::{Grid, Volume};
@@ -27,6 +31,38 @@ pub struct ClassifiedVolume {
     pub(crate) lists: BrickLists,
     /// A counter of changes to the lists.
     pub(crate) revision: u64,
+    classification: Classification,
+    /// With [`Classification::After`] which bricks the lists hold, once a frame asked for them.
+    shown: Option<ShownBricks>,
+}
+
+/// The bricks that may be drawn where values are classified after splatting (SPEC §9).
+#[derive(Debug)]
+struct ShownBricks {
+    /// What they were found for.
+    needs: BrickNeeds,
+    ranges: BrickRanges,
+    /// Whether each brick of the grid is drawn.
+    are_shown: Vec<bool>,
+}
+
+/// What decides, beside the transfer function, which bricks may be drawn.
+#[derive(Clone, Debug)]
+pub(crate) struct BrickNeeds {
+    /// How far from a brick voxels bear on what it shows.
+    pub(crate) reach: UVec3,
+    /// Where they are not the values.
+    pub(crate) coefficients: Option<Arc<Coefficients>>,
+}
+
+impl PartialEq for BrickNeeds {
+    fn eq(&self, other: &Self) -> bool {
+        let same = match (&self.coefficients, &other.coefficients) {
+            (Some(own), Some(others)) => Arc::ptr_eq(own, others),
+            (own, others) => own.is_none() && others.is_none(),
+        };
+        self.reach == other.reach && same
+    }
 }
 
 /// The effect of a change of transfer function or iso-ranges.
@@ -41,15 +77,65 @@ pub struct Touched {
 }
 
 impl ClassifiedVolume {
-    /// Uploads the bricks of the voxels that take part (SPEC §3) to the volume's device. The labels' tables are ignored if the volume is not
-    /// segmented.
-    pub fn new(device: &Device, volume: &GpuVolume, mut transfer: TransferFunction, clipped: ClippedVoxels) -> Self {
+    /// Uploads the bricks of the voxels that take part (SPEC §3) to the volume's device; with [`Classification::After`] the first frame does. The labels' tables are ignored
+    /// if the volume is not segmented.
+    pub fn new(
+        device: &Device,
+        volume: &GpuVolume,
+        mut transfer: TransferFunction,
+        clipped: ClippedVoxels,
+        classification: Classification,
+    ) -> Self {
         let voxels = volume.volume();
         if voxels.labels().is_none() {
             transfer.labels.clear();
         }
-        let lists = BrickLists::upload(device, voxels.grid(), &classify(voxels, &transfer, &clipped));
-        Self { volume: volume.clone(), transfer, clipped, lists, revision: 0 }
+        let taking_part = match classification {
+            Classification::Before => classify(voxels, &transfer, &clipped),
+            Classification::After => Vec::new(),
+        };
+        let lists = BrickLists::upload(device, voxels.grid(), &taking_part);
+        Self { volume: volume.clone(), transfer, clipped, lists, revision: 0, classification, shown: None }
+    }
+
+    /// Changes what is listed: voxels that take part, or bricks around which values meet an opacity, which the next frame finds.
+    pub(crate) fn set_classification(&mut self, classification: Classification) {
+        if classification == self.classification {
+            return;
+        }
+        let voxels = match classification {
+            Classification::Before => classify(self.volume(), &self.transfer, &self.clipped),
+            Classification::After => Vec::new(),
+        };
+        let grid = *self.grid();
+        self.lists.replace(&grid, &voxels);
+        self.revision += 1;
+        (self.classification, self.shown) = (classification, None);
+    }
+
+    /// Lists the bricks that a frame may draw. A changed transfer function tests bricks anew; their values are looked at only where what a
+    /// frame needs is new.
+    pub(crate) fn show(&mut self, needs: &BrickNeeds) {
+        if self.shown.as_ref().is_some_and(|shown| shown.needs == *needs) {
+            return;
+        }
+        let shown = ShownBricks::new(self.volume(), &self.transfer, needs);
+        let voxels = shown.voxels(self.volume());
+        let grid = *self.grid();
+        self.lists.replace(&grid, &voxels);
+        self.revision += 1;
+        self.shown = Some(shown);
+    }
+
+    /// What [`Self::show`] would list, in lists.
+    pub(crate) fn settled_for(&self, limits: &Limits, needs: Option<&BrickNeeds>) -> SettledBricks {
+        match needs {
+            Some(needs) if self.shown.as_ref().is_none_or(|shown| shown.needs != *needs) => {
+                let shown = ShownBricks::new(self.volume(), &self.transfer, needs);
+                SettledBricks::of(limits, BrickList::new(self.grid(), &shown.voxels(self.volume())))
+            }
+            _ => self.lists.settled(limits),
+        }
     }
 
     /// Uploads what has changed.
@@ -81,7 +167,11 @@ impl ClassifiedVolume {
 
     /// Whether shading needs labels.
     pub(crate) fn shades_by_label(&self) -> bool {
-        self.transfer.labels.values().any(LabelTables::matter_to_shading)
+        let matter = match self.classification {
+            Classification::Before => LabelTables::matter_to_shading,
+            Classification::After => LabelTables::matter,
+        };
+        self.transfer.labels.values().any(matter)
     }
 
     /// The volume.
@@ -116,6 +206,10 @@ impl ClassifiedVolume {
         if self.volume().labels().is_none() {
             transfer.labels.clear();
         }
+        if self.classification == Classification::After {
+            self.transfer = transfer;
+            return self.look_at_bricks();
+        }
         let labels = self.transfer.labels.keys().chain(transfer.labels.keys()).copied().map(Some);
         let mut labels: Vec<Option<u16>> = labels.chain([None]).collect();
         labels.sort_unstable();
@@ -139,6 +233,11 @@ impl ClassifiedVolume {
 
     /// Changes which voxels are clipped; touches only those that enter or leave.
     pub fn set_clip(&mut self, clipped: ClippedVoxels) -> Touched {
+        if self.classification == Classification::After {
+            // Planes outside of a cut bear on slabs inside.
+            self.clipped = clipped;
+            return Touched::default();
+        }
         let volume = self.volume();
         let candidates = in_rows(volume, |y, z, row| {
             let [old, new] = [&self.clipped, &clipped].map(|clipped| clipped.in_row(y, z, volume.dims().x));
@@ -151,6 +250,27 @@ impl ClassifiedVolume {
         self.look_at(candidates)
     }
 
+    /// Lets bricks enter and leave that must.
+    fn look_at_bricks(&mut self) -> Touched {
+        let Some(mut shown) = self.shown.take() else { return Touched::default() };
+        let volume = Arc::clone(self.volume());
+        let new = shown.ranges.shown(&volume, &self.transfer);
+        let old = std::mem::replace(&mut shown.are_shown, new);
+        let new = &shown.are_shown;
+        let entering = shown.ranges.voxels(&volume, |brick| new[brick] && !old[brick]);
+        let leaving = shown.ranges.voxels(&volume, |brick| old[brick] && !new[brick]);
+        self.shown = Some(shown);
+        self.change(&entering, &leaving)
+    }
+
+    fn change(&mut self, entering: &[u32], leaving: &[u32]) -> Touched {
+        if !entering.is_empty() || !leaving.is_empty() {
+            self.lists.change(entering, leaving);
+            self.revision += 1;
+        }
+        Touched { entered: entering.len() as u64, left: leaving.len() as u64, rebuilt: !self.lists.has_room() }
+    }
+
     /// Decides for some voxels, in memory order, whether they enter or leave.
     fn look_at(&mut self, candidates: Vec<u32>) -> Touched {
         let (volume, transfer, clipped, lists) = (&**self.volume(), &self.transfer, &self.clipped, &self.lists);
@@ -159,11 +279,7 @@ impl ClassifiedVolume {
         let (entering, leaving): (Vec<u32>, Vec<u32>) = (candidates.into_par_iter())
             .filter(|&index| takes_part(index) != lists.contains(index))
             .partition(|&index| !lists.contains(index));
-        if !entering.is_empty() || !leaving.is_empty() {
-            self.lists.change(&entering, &leaving);
-            self.revision += 1;
-        }
-        Touched { entered: entering.len() as u64, left: leaving.len() as u64, rebuilt: !self.lists.has_room() }
+        self.change(&entering, &leaving)
     }
 
     /// Changes only the iso-ranges: closed intervals `[lo, hi]` of the values that take part, `None` for all. Touches the same voxels as
@@ -194,7 +310,11 @@ impl ClassifiedVolume {
 
     /// The counts of a frame (Table 4) that are known before it is drawn.
     pub fn totals(&self, view: &ViewGeometry, groups: &GroupSlabs) -> Totals {
-        let overlaps = self.lists.bricks().map(|bricks| Overlaps::count(bricks, view));
+        let of_bricks = match self.classification {
+            Classification::Before => Overlaps::count,
+            Classification::After => Overlaps::count_planes,
+        };
+        let overlaps = self.lists.bricks().map(|bricks| of_bricks(bricks, view));
         let Overlaps { voxels, sections, slabs } = overlaps.fold(Overlaps::default(), Overlaps::and);
         // Some sheets of the first or last group may lie outside every kernel.
         let sheets_of = |first: i32| {
@@ -212,6 +332,18 @@ impl ClassifiedVolume {
             ..Counts::default()
         };
         Totals { counts, group_sheets: groups.firsts.iter().map(|&first| sheets_of(first)).collect() }
+    }
+}
+
+impl ShownBricks {
+    fn new(volume: &Volume, transfer: &TransferFunction, needs: &BrickNeeds) -> Self {
+        let coefficients = needs.coefficients.as_ref().map_or(volume.values(), |exact| &exact.values);
+        let ranges = BrickRanges::new(volume.grid(), coefficients, needs.reach);
+        Self { needs: needs.clone(), are_shown: ranges.shown(volume, transfer), ranges }
+    }
+
+    fn voxels(&self, volume: &Volume) -> Vec<u32> {
+        self.ranges.voxels(volume, |brick| self.are_shown[brick])
     }
 }
 

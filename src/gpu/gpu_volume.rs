@@ -1,9 +1,12 @@
 //! A volume on the GPU, shared by any number of views and renderers on one device.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use rayon::prelude::*;
 use wgpu::{Device, Queue, TextureView};
 
+use crate::after::coefficients;
+use crate::after::normalization::Normalization;
 use crate::error::RenderError;
 use crate::gpu::fault::scoped;
 use crate::gpu::volume_texture::{ValueFormat, VolumeTexture};
@@ -24,6 +27,23 @@ struct Shared {
     /// The labels, uploaded when tables first need them.
     labels: OnceLock<VolumeTexture>,
     value_list: OnceLock<ValueList>,
+    /// Of the values; `None` if all are holes.
+    numbers: OnceLock<Option<Normalization>>,
+    /// Those of the kernel that was last asked for.
+    coefficients: Mutex<Option<Arc<Coefficients>>>,
+}
+
+/// Coefficients that interpolate the values: [`coefficients::exact`].
+#[derive(Debug)]
+pub(crate) struct Coefficients {
+    /// The kernel's radius and falloff.
+    kernel: (f64, f64),
+    /// As values; NaN at holes.
+    pub(crate) values: Vec<f32>,
+    /// What they are splatted as.
+    pub(crate) numbers: Normalization,
+    /// Uploaded with the first frame.
+    texture: OnceLock<VolumeTexture>,
 }
 
 impl GpuVolume {
@@ -50,7 +70,9 @@ impl GpuVolume {
         let upload = || VolumeTexture::upload_in_chunks(device, queue, volume.values(), written);
         let values = scoped(device, upload)??;
         let (device, labels, value_list) = (device.clone(), OnceLock::new(), OnceLock::new());
-        Ok(Self { shared: Arc::new(Shared { device, volume, values, labels, value_list }) })
+        let (numbers, coefficients) = (OnceLock::new(), Mutex::default());
+        let shared = Shared { device, volume, values, labels, value_list, numbers, coefficients };
+        Ok(Self { shared: Arc::new(shared) })
     }
 
     /// What [`Self::gpu_bytes`] of a volume will be, before and after a view shades by label. Examines all values.
@@ -84,7 +106,9 @@ impl GpuVolume {
     /// Bytes of GPU memory, independent of the number of views.
     pub fn gpu_bytes(&self) -> u64 {
         let textures = [Some(&self.shared.values), self.shared.labels.get()];
-        textures.into_iter().flatten().map(|texture| texture.gpu_bytes).sum()
+        let coefficients =
+            self.last_coefficients().and_then(|last| last.texture.get().map(|texture| texture.gpu_bytes));
+        textures.into_iter().flatten().map(|texture| texture.gpu_bytes).sum::<u64>() + coefficients.unwrap_or(0)
     }
 
     /// The volume's device.
@@ -107,6 +131,34 @@ impl GpuVolume {
         self.shared.labels.get().map(|labels| &labels.view)
     }
 
+    /// What the values are splatted as where they are classified afterwards (SPEC §9).
+    pub(crate) fn numbers(&self) -> Normalization {
+        let of_values = || Normalization::of(self.shared.volume.values().iter().copied());
+        self.shared.numbers.get_or_init(of_values).unwrap_or(Normalization::new([0.0; 2]))
+    }
+
+    fn last_coefficients(&self) -> Option<Arc<Coefficients>> {
+        self.shared.coefficients.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// The coefficients for a kernel's radius and falloff, found when first asked for; those of the kernel before are forgotten.
+    ///
+    /// # Errors
+    /// If there are none: [`coefficients::exact`].
+    pub(crate) fn coefficients(&self, kernel: (f64, f64)) -> Result<Arc<Coefficients>, RenderError> {
+        if let Some(last) = self.last_coefficients().filter(|last| last.kernel == kernel) {
+            return Ok(last);
+        }
+        let volume = &self.shared.volume;
+        let values = coefficients::exact(volume.grid(), volume.values(), kernel, &|share| {
+            log::info!("coefficients of splatting.interpolation = \"exact\": {:.0} %", 100.0 * share);
+        })?;
+        let numbers = Normalization::of(values.iter().copied()).unwrap_or(Normalization::new([0.0; 2]));
+        let found = Arc::new(Coefficients { kernel, values, numbers, texture: OnceLock::new() });
+        *self.shared.coefficients.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(&found));
+        Ok(found)
+    }
+
     /// Uploads the labels, if there are any and they are not uploaded yet.
     ///
     /// # Errors
@@ -119,6 +171,23 @@ impl GpuVolume {
             let _ = self.shared.labels.set(labels);
         }
         Ok(())
+    }
+}
+
+impl Coefficients {
+    /// The bits of the numbers on the GPU, `R32Uint`.
+    ///
+    /// # Errors
+    /// If they need more layers than the device's textures have, or the device fails.
+    pub(crate) fn texture(&self, device: &Device, queue: &Queue) -> Result<&TextureView, RenderError> {
+        if self.texture.get().is_none() {
+            let numbers: Vec<f32> = self.values.par_iter().map(|&c| self.numbers.apply(f64::from(c)) as f32).collect();
+            let uploaded = scoped(device, || VolumeTexture::upload_bits(device, queue, &numbers))??;
+            // Another thread may have been first: its are the same.
+            let _ = self.texture.set(uploaded);
+        }
+        let missing = || RenderError::Readback("the coefficients' texture is gone".to_owned());
+        self.texture.get().map(|texture| &texture.view).ok_or_else(missing)
     }
 }
 

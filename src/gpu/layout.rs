@@ -166,7 +166,49 @@ pub struct Cut {
     pub has_surfaces: u32,
 }
 
-/// What a frame has found out about a brick: one bit per voxel.
+/// How kernels lie on slab planes, and what values are splatted as (SPEC §9): [`PlaneGeometry`](crate::after::plane_geometry::PlaneGeometry) and
+/// [`Normalization`](crate::after::normalization::Normalization).
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Planes {
+    /// Unit vectors in the grid: two within planes, and the planes' normal; w unused.
+    pub axes: [[f32; 4]; 3],
+    /// What a grid unit along the normal moves a voxel right and down, pixels times the depth from the eye, and away from the eye; and
+    /// the grid units along the normal that sheet depth 1 is.
+    pub step: [f32; 4],
+    /// The pixel offset of length 1 that the first axis belongs to.
+    pub screen_axis: [f32; 2],
+    /// Grid units that a pixel is along the first two axes; with an eye at depth 1 from it.
+    pub per_pixel: [f32; 2],
+    /// Sheet depth of plane 0, with an eye also the eye's.
+    pub origin: f32,
+    /// What is added to texels of values, or to values whose bits texels are, before they are scaled.
+    pub value_bias: f32,
+    /// Numbers to a value.
+    pub value_scale: f32,
+    /// Values to a number.
+    pub per_number: f32,
+}
+
+/// A voxel on its way to slab planes, as large as a [`Splat`].
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct FieldVoxel {
+    /// Pixels right of the image's middle, times the depth from the eye.
+    pub x: f32,
+    /// Pixels below it, the same.
+    pub y: f32,
+    /// Sheet depth.
+    pub depth: f32,
+    /// Its coefficient, a number.
+    pub number: f32,
+    /// The values' central differences, numbers per `unit`, along x and y: two `snorm16`.
+    pub gradient_xy: u32,
+    /// Along z, the same, and 256 more than the exponent that the three are scaled by.
+    pub gradient_z: u32,
+}
+
+/// The state of a brick within a frame, with one bit per voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct BrickState {

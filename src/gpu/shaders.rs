@@ -66,8 +66,15 @@ pub const TILES: Shader =
 /// Zeroes the sheet buffers in these tiles.
 pub const CLEAR: Shader = shader!("clear", "shared/frame", "shared/brick", "shared/tile_list", "shared/sheets");
 /// Draws footprints into the sheet buffers.
-pub const SPLAT: Shader =
-    shader!("splat", "shared/frame", "shared/brick", "shared/splat", "shared/sheets", "shared/footprints");
+pub const SPLAT: Shader = shader!(
+    "splat",
+    "shared/frame",
+    "shared/brick",
+    "shared/splat",
+    "shared/sheets",
+    "shared/corners",
+    "shared/footprints"
+);
 /// Draws footprints in perspective into the sheet buffers.
 pub const SPLAT_PERSPECTIVE: Shader = shader!(
     "splat_perspective",
@@ -75,6 +82,7 @@ pub const SPLAT_PERSPECTIVE: Shader = shader!(
     "shared/brick",
     "shared/splat",
     "shared/sheets",
+    "shared/corners",
     "shared/footprints",
     "shared/project",
     "shared/local_ray",
@@ -87,6 +95,7 @@ pub const SAMPLE: Shader = shader!(
     "shared/brick",
     "shared/splat",
     "shared/sheets",
+    "shared/corners",
     "shared/footprints",
     "shared/project",
     "shared/local_ray",
@@ -103,6 +112,43 @@ pub const COMPOSITE: Shader = shader!(
     "shared/compositing",
     "shared/cut",
     "shared/means"
+);
+/// Finds the values and gradients of voxels that are drawn onto slab planes.
+pub const VALUES: Shader = shader!(
+    "values",
+    "shared/frame",
+    "shared/brick",
+    "shared/volume",
+    "shared/project",
+    "shared/field_voxel",
+    "shared/planes"
+);
+/// Draws them onto a slab plane.
+pub const FIELD: Shader = shader!(
+    "field",
+    "shared/frame",
+    "shared/brick",
+    "shared/field_voxel",
+    "shared/planes",
+    "shared/sheets",
+    "shared/corners"
+);
+/// Classifies, shades and composites slabs between planes.
+pub const CLASSIFY: Shader = shader!(
+    "classify",
+    "shared/frame",
+    "shared/brick",
+    "shared/band",
+    "shared/tile_list",
+    "shared/compositing",
+    "shared/cut",
+    "shared/means",
+    "shared/planes",
+    "shared/project",
+    "shared/volume",
+    "shared/shading",
+    "shared/ramps",
+    "shared/slab_integral"
 );
 /// Computes the occlusion buffer.
 pub const OCCLUDE: Shader = shader!("occlude", "shared/frame", "shared/brick", "shared/tile_list");
@@ -138,7 +184,7 @@ pub const FIRST_HIT: Shader = shader!("first_hit", "shared/frame", "shared/cut")
 pub const RESOLVE: Shader = shader!("resolve", "shared/frame", "shared/band");
 
 /// Every shader, in the order of the data flow.
-pub const ALL: [Shader; 14] = [
+pub const ALL: [Shader; 17] = [
     CULL_BRICKS,
     CULL_VOXELS,
     COMPACT,
@@ -149,6 +195,9 @@ pub const ALL: [Shader; 14] = [
     SPLAT_PERSPECTIVE,
     SAMPLE,
     COMPOSITE,
+    VALUES,
+    FIELD,
+    CLASSIFY,
     OCCLUDE,
     GATHER,
     FIRST_HIT,

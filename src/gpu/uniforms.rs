@@ -5,8 +5,11 @@ use std::ops::{Add, Mul, Range};
 use glam::{DMat2, DVec2, DVec3, DVec4};
 
 use super::gathered_layout::GatheredLayout;
-use super::layout::{Cut, Frame, Gather, SheetGroup};
+use super::layout::{Cut, Frame, Gather, Planes, SheetGroup};
 use super::volume_texture::ValueFormat;
+use crate::after::normalization::Normalization;
+use crate::after::plane_geometry::PlaneGeometry;
+use crate::after::slab_integral;
 use crate::geometry::grid_warp::{self, FootprintMap};
 use crate::geometry::kernel::Kernel;
 use crate::geometry::means::RayBox;
@@ -19,7 +22,7 @@ use crate::setting_error::scaled;
 use crate::settings::clip::HalfSpace;
 use crate::settings::shading::{Light, MIN_GRADIENT, Shading};
 use crate::settings::splatting::{Compositing, Order, Splatting};
-use crate::settings::transfer_function::{Ramp, Tables, TransferFunction};
+use crate::settings::transfer_function::{LabelTables, Ramp, Tables, TransferFunction};
 use crate::volume::Grid;
 
 /// The cap of ambient, diffuse, specular and shininess, beyond which images no longer change. It avoids infinities in `f32`.
@@ -177,17 +180,45 @@ pub fn cut(
     }
 }
 
+/// How kernels lie on slab planes, and the numbers that values stored so are splatted as (SPEC §9).
+pub fn planes(geometry: &PlaneGeometry, view: &ViewGeometry, values: ValueFormat, numbers: &Normalization) -> Planes {
+    let offset = match values {
+        ValueFormat::Offset8(least) | ValueFormat::Offset16(least) => f64::from(least),
+        ValueFormat::Bits => 0.0,
+    };
+    Planes {
+        axes: geometry.axes.map(|axis| axis.extend(0.0).as_vec4().to_array()),
+        step: geometry.step.extend(geometry.per_depth).as_vec4().to_array(),
+        screen_axis: geometry.screen_axis.as_vec2().to_array(),
+        per_pixel: geometry.per_pixel.as_vec2().to_array(),
+        origin: view.slabs.origin as f32,
+        value_bias: (offset - numbers.base) as f32,
+        value_scale: numbers.scale as f32,
+        per_number: numbers.scale.recip() as f32,
+    }
+}
+
 /// The fraction of the kernel's ball, from the middle out, for which the polynomial for chords is fitted: where chords are long, they cut
 /// small sections. Farther out they cut only large ones, and the Gaussian is small; errors stay below 5e-6 of a whole footprint's peak.
 const CHORD_SPAN: f64 = 0.45;
 
 /// One [`SheetGroup`] every `stride` bytes: group after group, and for every group list after list.
 pub fn groups(plan: &FramePlan, kernel: &Kernel, splatting: &Splatting, stride: usize) -> Vec<u8> {
+    groups_of(plan, stride, |planes| group(&plan.view, kernel, splatting, planes))
+}
+
+/// The same where groups are single planes (SPEC §9).
+pub fn plane_groups(plan: &FramePlan, geometry: &PlaneGeometry, splatting: &Splatting, stride: usize) -> Vec<u8> {
+    let half_box = |plane| geometry.half_box_px(plane, plan.view.size);
+    groups_of(plan, stride, |planes| group_of(half_box(planes.start), splatting, planes.start))
+}
+
+fn groups_of(plan: &FramePlan, stride: usize, of: impl Fn(Range<f64>) -> SheetGroup) -> Vec<u8> {
     let mut bytes = Vec::new();
     let first_slab = plan.groups.iter().map(|group| group.first_slab).min().unwrap_or(0);
     for (index, group) in (0..).zip(&plan.groups) {
         let number = (group.first_slab - first_slab) as u32 / plan.sheets + 1;
-        let uniform = SheetGroup { number, ..self::group(&plan.view, kernel, splatting, group.planes.clone()) };
+        let uniform = SheetGroup { number, ..of(group.planes.clone()) };
         for bricks in &group.bricks {
             let count = bricks.end - bricks.start;
             let uniform = SheetGroup { first_brick: bricks.start, brick_count: count, index, ..uniform };
@@ -201,13 +232,17 @@ pub fn groups(plan: &FramePlan, kernel: &Kernel, splatting: &Splatting, stride: 
 
 /// The group of sheets between two planes of sheet depth, without bricks.
 pub fn group(view: &ViewGeometry, kernel: &Kernel, splatting: &Splatting, planes: Range<f64>) -> SheetGroup {
-    let half_box = view.half_box(kernel.support(), planes.clone());
+    group_of(view.half_box(kernel.support(), planes.clone()), splatting, planes.start)
+}
+
+/// A group from `near` on whose footprints' boxes have this half, pixels.
+fn group_of(half_box: DVec2, splatting: &Splatting, near: f64) -> SheetGroup {
     SheetGroup {
         half_box: in_f32_pixels(half_box),
         // A footprint's box contains this many pixel centres, plus or minus one.
         box_filter: ((2.0 * half_box.min(DVec2::splat(MAX_HALF_BOX))).floor() - 1.0).as_uvec2().to_array(),
         culling: u32::from(splatting.culling && hides(splatting) && half_box.max_element() <= MAX_HALF_BOX),
-        near: planes.start as f32,
+        near: near as f32,
         first_brick: 0,
         brick_count: 0,
         index: 0,
@@ -244,8 +279,8 @@ fn half_vector(to_light: DVec3, to_eye: DVec3) -> DVec3 {
 /// A transfer function's control points, for the stages that shade.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ramps {
-    /// The value, then rgb or (ordinate, 0, 0); colour, opacity and gradient opacity in turn: first the main ramps, then those of labels. The
-    /// table of labels follows.
+    /// The value, then rgb or (ordinate, 0, 0); colour, opacity and gradient opacity in turn, and after them the table of their integrals
+    /// ([`slab_integral`]) if there is one: first the main ramps, then those of labels. The table of labels follows.
     pub points: Vec<[f32; 4]>,
     /// The end of each of the main ramps.
     pub ends: [u32; 3],
@@ -259,18 +294,35 @@ pub struct Ramps {
 impl Ramps {
     /// All ramps of a transfer function; a missing gradient opacity is 1 everywhere.
     pub fn new(transfer: &TransferFunction) -> Self {
+        Self::with(transfer, LabelTables::matter_to_shading, |_| Vec::new())
+    }
+
+    /// The same with tables of the ramps' integrals, for classification after splatting.
+    pub fn with_integrals(transfer: &TransferFunction, compositing: Compositing, numbers: &Normalization) -> Self {
+        Self::with(transfer, LabelTables::matter, |tables| slab_integral::table(tables, compositing, numbers))
+    }
+
+    fn with(
+        transfer: &TransferFunction,
+        matter: impl Fn(&LabelTables) -> bool,
+        integrals: impl Fn(&Tables) -> Vec<[f32; 4]>,
+    ) -> Self {
+        let append = |points: &mut Vec<[f32; 4]>, label| {
+            let tables = transfer.tables(label);
+            let bounds = append(points, &tables);
+            points.extend(integrals(&tables));
+            bounds
+        };
         let mut points = Vec::new();
-        let main @ [_, ends @ ..] = append(&mut points, &transfer.tables(None));
+        let main @ [_, ends @ ..] = append(&mut points, None);
         let mut all = vec![main];
-        let own: Vec<u16> = (transfer.labels.iter())
-            .filter(|(_, tables)| tables.matter_to_shading())
-            .map(|(&label, _)| label)
-            .collect();
+        let own: Vec<u16> =
+            (transfer.labels.iter()).filter(|(_, tables)| matter(tables)).map(|(&label, _)| label).collect();
         let mut label_table = 0..0;
         if let Some(&last) = own.last() {
             let mut table = vec![main; usize::from(last) + 2];
             for label in own {
-                table[usize::from(label)] = append(&mut points, &transfer.tables(Some(label)));
+                table[usize::from(label)] = append(&mut points, Some(label));
                 all.push(table[usize::from(label)]);
             }
             label_table = points.len() as u32..(points.len() + table.len()) as u32;

@@ -97,6 +97,18 @@ impl VolumeTexture {
         Ok(Self::fold(device, queue, values, side, written))
     }
 
+    /// Uploads the bits of as many numbers as the volume has values.
+    ///
+    /// # Errors
+    /// See [`Self::upload`].
+    pub fn upload_bits(device: &Device, queue: &Queue, numbers: &[f32]) -> Result<Self, RenderError> {
+        let side = side(&device.limits(), "the volume's coefficients", numbers.len() as u64)?;
+        let size = folded(numbers.len() as u64, side);
+        let (texture, uploaded) = Self::new(device, "sheetsplat.coefficients", ValueFormat::Bits, size);
+        fill(queue, &texture, numbers, f32::to_bits, &|| {});
+        Ok(uploaded)
+    }
+
     /// Like [`Self::upload`], with layers of a given side, necessary or not.
     pub fn upload_folded(device: &Device, queue: &Queue, values: &[f32], side: u32) -> Self {
         Self::fold(device, queue, values, side, &|| {})

@@ -125,6 +125,34 @@ impl Overlaps {
             .reduce(Self::default, Self::and)
     }
 
+    /// The planes of values that voxels' kernels meet, where classification comes after splatting (SPEC §9), and the slabs that the cells
+    /// of bricks lie in.
+    pub fn count_planes(bricks: &[Brick], view: &ViewGeometry) -> Self {
+        let row = view.screen_from_voxel[2];
+        let in_slabs = |depth: f64| (depth - view.slabs.origin) / view.slabs.width;
+        let reach = view.reach / view.slabs.width;
+        // There is no value at the eye and behind it.
+        let first_plane = if view.perspective.is_some() { 1.0 } else { f64::NEG_INFINITY };
+        let nearest = view.perspective.map_or(f64::NEG_INFINITY, |seen| seen.eye.near / view.slabs.width);
+        let of_brick = |brick: &Brick| {
+            let planes = brick::voxels(brick).map(|(_, voxel)| {
+                let depth = in_slabs(row.dot(voxel.as_dvec3().extend(1.0)));
+                let first = ((depth - reach + slab::ROUNDING).floor() + 1.0).max(first_plane);
+                ((depth + reach - slab::ROUNDING).ceil() - first).max(0.0) as u64
+            });
+            let (middle, half) = brick::bounds(brick);
+            let middle = in_slabs(row.dot(middle.extend(1.0)));
+            let spread = row.truncate().abs().dot(half + 0.5) / view.slabs.width;
+            let first = (middle - spread).max(nearest);
+            Self {
+                voxels: brick::present(brick).count_ones().into(),
+                sections: planes.sum(),
+                slabs: first.floor() as i32..((middle + spread).ceil() as i32).max(first.floor() as i32),
+            }
+        };
+        bricks.par_iter().map(of_brick).reduce(Self::default, Self::and)
+    }
+
     /// The counts of two lists of bricks together.
     pub fn and(self, other: Self) -> Self {
         match [self.voxels, other.voxels] {

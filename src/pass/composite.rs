@@ -18,7 +18,7 @@ pub struct Composite {
 }
 
 /// The mode that a pipeline is compiled for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct CompositeMode {
     /// How sheets are composited.
     pub compositing: Compositing,
@@ -27,7 +27,7 @@ pub struct CompositeMode {
 }
 
 /// Which properties of pixels' rays a compositing stage needs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct RayMode {
     /// Whether clip planes or a host's surfaces cut them.
     pub cut: bool,

@@ -10,6 +10,7 @@ use crate::gpu::layout::{Brick, BrickState, Culled, Frame, Indirect, SheetGroup,
 use crate::gpu::shaders;
 use crate::lists::brick::BRICK_VOXELS;
 use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};
+use crate::pass::values::{PlaneBuffers, Values, ValuesBuffers, ValuesGroup};
 
 /// The four stages' pipelines.
 #[derive(Debug)]
@@ -17,7 +18,14 @@ pub struct Cull {
     bricks: ComputeStage,
     voxels: ComputeStage,
     compact: ComputeStage,
-    shade: Shade,
+    prepared: VoxelStage,
+}
+
+/// What becomes of voxels that are drawn for the first time.
+#[derive(Debug)]
+enum VoxelStage {
+    Shade(Shade),
+    Values(Values),
 }
 
 /// One list's buffers and bind groups.
@@ -25,7 +33,7 @@ pub struct Cull {
 pub struct CullList {
     /// `[BrickState]`, zeroed at the start of a frame.
     pub states: Buffer,
-    /// `[Splat]`, one per slot of the list, written when its voxel is first drawn.
+    /// `[Splat]`, or for planes `[FieldVoxel]`, one per slot of the list, written when its voxel is first drawn.
     pub splats: Buffer,
     /// `[u32]`: the splats that the current group draws.
     pub instances: Buffer,
@@ -36,7 +44,14 @@ pub struct CullList {
     fresh: Buffer,
     fresh_args: Buffer,
     groups: [BindGroup; 3],
-    shade_group: ShadeGroup,
+    prepared_group: VoxelGroup,
+}
+
+/// Bound buffers of a [`VoxelStage`].
+#[derive(Debug)]
+enum VoxelGroup {
+    Shade(ShadeGroup),
+    Values(ValuesGroup),
 }
 
 /// The buffers that all lists share.
@@ -58,13 +73,25 @@ pub struct CullBuffers<'a> {
     pub occluded: &'a Buffer,
     /// One [`Culled`].
     pub culled: &'a Buffer,
+    /// What voxels are drawn onto planes by; for stages of planes.
+    pub planes: Option<PlaneBuffers<'a>>,
 }
 
 impl Cull {
     /// Compiles the stages for groups of `sheets` sheets.
     pub fn new(device: &Device, sheets: u32) -> Self {
+        Self::compiled(device, sheets, VoxelStage::Shade(Shade::new(device)))
+    }
+
+    /// Compiles the stages for groups that are single planes (SPEC §9).
+    pub fn of_planes(device: &Device) -> Self {
+        Self::compiled(device, 1, VoxelStage::Values(Values::default()))
+    }
+
+    fn compiled(device: &Device, sheets: u32, prepared: VoxelStage) -> Self {
         let stage = ShaderStages::COMPUTE;
-        let sheets = [("SHEETS", f64::from(sheets))];
+        let is_plane = matches!(prepared, VoxelStage::Values(_));
+        let sheets = [("SHEETS", f64::from(sheets)), ("PLANE", f64::from(u8::from(is_plane)))];
         let bricks = [
             ("frames", uniform::<Frame>(stage, false)),
             ("sheet_group", uniform::<SheetGroup>(stage, true)),
@@ -99,7 +126,7 @@ impl Cull {
             bricks: ComputeStage::new(device, shaders::CULL_BRICKS, "main", &bricks, &sheets),
             voxels: ComputeStage::new(device, shaders::CULL_VOXELS, "main", &voxels, &sheets),
             compact: ComputeStage::new(device, shaders::COMPACT, "main", &compact, &[]),
-            shade: Shade::new(device),
+            prepared,
         }
     }
 
@@ -177,20 +204,37 @@ impl Cull {
             ("fresh_args", whole(&fresh_args)),
             ("culled", whole(culled)),
         ];
-        let shade_group = self.shade.bind(
-            device,
-            ShadeBuffers {
-                frame: shared.frame,
-                bricks: &list.buffer,
-                values: shared.values,
-                has_holes: shared.has_holes,
-                labels: shared.labels,
-                control_points: shared.control_points,
-                places: &fresh,
-                args: &fresh_args,
-                splats: &splats,
-            },
-        );
+        let prepared_group = match &self.prepared {
+            VoxelStage::Shade(shade) => VoxelGroup::Shade(shade.bind(
+                device,
+                ShadeBuffers {
+                    frame: shared.frame,
+                    bricks: &list.buffer,
+                    values: shared.values,
+                    has_holes: shared.has_holes,
+                    labels: shared.labels,
+                    control_points: shared.control_points,
+                    places: &fresh,
+                    args: &fresh_args,
+                    splats: &splats,
+                },
+            )),
+            VoxelStage::Values(values) => {
+                // Stages of planes have planes.
+                let Some(planes) = shared.planes else { unreachable!() };
+                let buffers = ValuesBuffers {
+                    frame: shared.frame,
+                    bricks: &list.buffer,
+                    values: shared.values,
+                    has_holes: shared.has_holes,
+                    planes,
+                    places: &fresh,
+                    args: &fresh_args,
+                    voxels: &splats,
+                };
+                VoxelGroup::Values(values.bind(device, buffers))
+            }
+        };
         let groups =
             [self.bricks.bind(device, &bricks), self.voxels.bind(device, &voxels), self.compact.bind(device, &compact)];
         let list = CullList {
@@ -203,7 +247,7 @@ impl Cull {
             fresh,
             fresh_args,
             groups,
-            shade_group,
+            prepared_group,
         };
         Ok(list)
     }
@@ -214,7 +258,11 @@ impl Cull {
         self.bricks.dispatch(pass, bricks, &[offset], 1);
         self.voxels.dispatch_indirect(pass, voxels, &[offset], &list.visit_args);
         self.compact.dispatch(pass, compact, &[], 1);
-        self.shade.record(pass, &list.shade_group, &list.fresh_args);
+        match (&self.prepared, &list.prepared_group) {
+            (VoxelStage::Shade(shade), VoxelGroup::Shade(group)) => shade.record(pass, group, &list.fresh_args),
+            (VoxelStage::Values(values), VoxelGroup::Values(group)) => values.record(pass, group, &list.fresh_args),
+            _ => {}
+        }
     }
 }
 

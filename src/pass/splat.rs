@@ -43,20 +43,9 @@ pub struct SplatMode {
 impl Splat {
     /// Compiles the stage for groups of `sheets` sheets, 1, 2 or 4, in the given format.
     pub fn new(device: &Device, format: TextureFormat, sheets: u32) -> Self {
-        let clear_slots = [
-            ("frames", uniform::<Frame>(ShaderStages::VERTEX, false)),
-            ("composited", storage::<TileList>(ShaderStages::VERTEX, true)),
-        ];
-        let clear_bindings = Bindings::new(device, shaders::CLEAR, &clear_slots);
-        let entry = format!("fragment_{sheets}");
+        let clear_bindings = clear_bindings(device);
         Self {
-            clear: render_pipeline(
-                device,
-                (shaders::CLEAR, ["vertex", &entry]),
-                &clear_bindings.pipeline_layout,
-                &sheets_of_a_group(format, sheets, None),
-                &[],
-            ),
+            clear: clear_pipeline(device, &clear_bindings, format, sheets),
             clear_bindings,
             bindings: Bindings::new(device, shaders::SPLAT, &splat_slots()),
             format,
@@ -129,34 +118,62 @@ impl Splat {
         clear: (&BindGroup, &Buffer),
         lists: impl IntoIterator<Item = (&'a BindGroup, u32, &'a Buffer)>,
     ) {
-        let targets: Vec<_> = sheets
-            .iter()
-            .map(|view| {
-                Some(wgpu::RenderPassColorAttachment {
-                    view,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
-                })
-            })
-            .collect();
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("sheetsplat.splat"),
-            color_attachments: &targets,
-            timestamp_writes,
-            ..wgpu::RenderPassDescriptor::default()
-        });
-        let draw = std::mem::offset_of!(Indirect, draw) as u64;
-        pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint16);
-        pass.set_pipeline(&self.clear);
-        pass.set_bind_group(0, clear.0, &[]);
-        pass.draw_indexed_indirect(clear.1, draw);
         let Some(splat) = self.cell(mode).get() else { return };
-        pass.set_pipeline(splat);
-        for (group, offset, args) in lists {
-            pass.set_bind_group(0, group, &[offset]);
-            pass.draw_indexed_indirect(args, draw);
-        }
+        let pass = ("sheetsplat.splat", timestamp_writes, sheets, &self.indices);
+        record_quads(encoder, pass, (&self.clear, clear.0, clear.1), splat, lists);
+    }
+}
+
+/// The layout of what zeroes tiles.
+pub(super) fn clear_bindings(device: &Device) -> Bindings {
+    let slots = [
+        ("frames", uniform::<Frame>(ShaderStages::VERTEX, false)),
+        ("composited", storage::<TileList>(ShaderStages::VERTEX, true)),
+    ];
+    Bindings::new(device, shaders::CLEAR, &slots)
+}
+
+/// What zeroes tiles of so many sheet buffers.
+pub(super) fn clear_pipeline(
+    device: &Device,
+    bindings: &Bindings,
+    format: TextureFormat,
+    sheets: u32,
+) -> RenderPipeline {
+    let entry = format!("fragment_{sheets}");
+    let attachments = sheets_of_a_group(format, sheets, None);
+    render_pipeline(device, (shaders::CLEAR, ["vertex", &entry]), &bindings.pipeline_layout, &attachments, &[])
+}
+
+/// Records a pass, given by its label, its times, its targets and the quads' indices, that zeroes tiles, given by pipeline, bind group and list, and draws
+/// lists of quads.
+pub(super) fn record_quads<'a>(
+    encoder: &mut CommandEncoder,
+    (label, timestamp_writes, sheets, indices): (&str, Option<RenderPassTimestampWrites<'_>>, &[TextureView], &Buffer),
+    (clear, clear_group, tiles): (&RenderPipeline, &BindGroup, &Buffer),
+    pipeline: &RenderPipeline,
+    lists: impl IntoIterator<Item = (&'a BindGroup, u32, &'a Buffer)>,
+) {
+    let target = |view| {
+        let ops = wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store };
+        Some(wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops })
+    };
+    let targets: Vec<_> = sheets.iter().map(target).collect();
+    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some(label),
+        color_attachments: &targets,
+        timestamp_writes,
+        ..wgpu::RenderPassDescriptor::default()
+    });
+    let draw = std::mem::offset_of!(Indirect, draw) as u64;
+    pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint16);
+    pass.set_pipeline(clear);
+    pass.set_bind_group(0, clear_group, &[]);
+    pass.draw_indexed_indirect(tiles, draw);
+    pass.set_pipeline(pipeline);
+    for (group, offset, args) in lists {
+        pass.set_bind_group(0, group, &[offset]);
+        pass.draw_indexed_indirect(args, draw);
     }
 }
 

@@ -29,6 +29,15 @@ pub struct TileLists {
 impl Tiles {
     /// Compiles the stage.
     pub fn new(device: &Device) -> Self {
+        Self::compiled(device, false)
+    }
+
+    /// The same for groups that are single planes (SPEC §9).
+    pub fn of_planes(device: &Device) -> Self {
+        Self::compiled(device, true)
+    }
+
+    fn compiled(device: &Device, planes: bool) -> Self {
         let stage = ShaderStages::COMPUTE;
         let slots = [
             ("frames", uniform::<Frame>(stage, false)),
@@ -38,8 +47,10 @@ impl Tiles {
             ("composited", storage::<TileList>(stage, false)),
             ("occluding", storage::<TileList>(stage, false)),
             ("counts", storage::<u32>(stage, false)),
+            ("last_groups", storage::<u32>(stage, true)),
         ];
-        Self { stage: ComputeStage::new(device, shaders::TILES, "main", &slots, &[]) }
+        let constants = [("PLANE", f64::from(u8::from(planes)))];
+        Self { stage: ComputeStage::new(device, shaders::TILES, "main", &slots, &constants) }
     }
 
     /// The specs for `tiles` tiles and `group_count` groups, in [`TileLists`]' order.
@@ -80,6 +91,7 @@ impl Tiles {
             ("composited", composited.as_entire_binding()),
             ("occluding", occluding.as_entire_binding()),
             ("counts", counts.as_entire_binding()),
+            ("last_groups", targets.last_groups.as_entire_binding()),
         ];
         let group = self.stage.bind(device, &resources);
         Ok(TileLists { composited, occluding, counts, group })

@@ -7,7 +7,7 @@ use crate::gpu::device::TILE_FEATURES;
 use crate::pass::composite::RayMode;
 use crate::pass::gather::WORKGROUP_BYTES;
 use crate::setting_error::SettingError;
-use crate::settings::splatting::{FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
+use crate::settings::splatting::{Classification, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
 
 /// The subgroup sizes that tiles support.
 pub(super) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;
@@ -67,6 +67,10 @@ fn refused_tiles(found: String, allowed: &str) -> Option<RenderError> {
 
 /// Why tiles do not support some settings; `None` if they do.
 fn obstacle_in_settings(splatting: &Splatting) -> Option<RenderError> {
+    if splatting.classification == Classification::After {
+        let found = "splatting.classification = \"after\"".to_owned();
+        return refused_tiles(found, "\"before\" with it, or \"quads\"");
+    }
     if splatting.method == Method::CompositeEverySample {
         let found = "splatting.method = \"composite-every-sample\"".to_owned();
         return refused_tiles(found, "\"image-aligned\" or \"axis-aligned\" with it, or \"quads\"");

@@ -7,6 +7,7 @@ use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Limits, Text
 use super::{Footprints, FrameEstimate, FrameInputs, Prepared, compute};
 use crate::error::RenderError;
 use crate::geometry::footprint::FootprintTable;
+use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, uploaded};
 use crate::gpu::classified_volume::ClassifiedVolume;
 use crate::gpu::layout::{Brick, SheetGroup, Tally};
@@ -61,17 +62,17 @@ pub(crate) struct QuadFrame {
 
 /// The buckets, which change only with the view or the bricks.
 #[derive(Debug)]
-struct Planned {
-    plan: FramePlan,
+pub(super) struct Planned {
+    pub(super) plan: FramePlan,
     order: Order,
     /// [`means::covered`](crate::geometry::means::covered).
     covered: Range<f64>,
     /// [`ClassifiedVolume::revision`].
     revision: u64,
     /// For every list its bricks in bucket order, `[u32]`.
-    orders: Vec<Buffer>,
+    pub(super) orders: Vec<Buffer>,
     /// For every list the maximum number of bricks and voxels that a group visits.
-    most: Vec<(u32, u32)>,
+    pub(super) most: Vec<(u32, u32)>,
 }
 
 #[derive(Debug)]
@@ -110,7 +111,8 @@ impl QuadRasterizer {
             Some(targets) => targets,
             None => Targets::new(device, view.size, self.sheet_format, self.sheets)?,
         };
-        let (planned, other_axes, bucketed) = Planned::renewed(inputs, old.planned, self.sheets);
+        let shown = (view, &request.covered);
+        let (planned, other_axes, bucketed) = Planned::renewed(inputs, shown, old.planned, self.sheets);
         let (footprints, tabled) = Footprints::renewed(old.footprints, inputs);
         let group_stride = group_stride(&device.limits());
         let group_bytes = uniforms::groups(&planned.plan, kernel, splatting, group_stride);
@@ -171,6 +173,7 @@ impl QuadRasterizer {
             control_points,
             occluded,
             culled,
+            planes: None,
         };
         let mut old = old.into_iter();
         (volume.lists.lists.iter().zip(&planned.orders).zip(&planned.most))
@@ -301,35 +304,48 @@ impl QuadFrame {
 }
 
 impl Planned {
-    /// The plan for the view, taken from `old` if one is still valid there; the plans that stay valid for other axes; and whether the
-    /// plan is new.
-    fn renewed(inputs: FrameInputs<'_>, old: Vec<Self>, sheets: u32) -> (Self, Vec<Self>, bool) {
+    /// The plan for a view in which these sheet depths count, taken from `old` if one is still valid there; the plans that stay valid for
+    /// other axes; and whether the plan is new.
+    pub(super) fn renewed(
+        inputs: FrameInputs<'_>,
+        (view, covered): (&ViewGeometry, &Range<f64>),
+        old: Vec<Self>,
+        sheets: u32,
+    ) -> (Self, Vec<Self>, bool) {
         let FrameInputs { device, volume, request, .. } = inputs;
-        let FrameRequest { view, splatting, covered, .. } = request;
+        let order = request.splatting.order;
         let mut usable = old;
         usable.retain(|old| {
-            (old.order, old.revision, &old.covered) == (splatting.order, volume.revision, covered)
-                && (old.plan.view.has_depths_of(view) || old.plan.view.is_by_slices())
+            old.is_of(volume, order, covered) && (old.plan.view.has_depths_of(view) || old.plan.view.is_by_slices())
         });
         let current = usable.iter().position(|old| old.plan.view.has_depths_of(view));
         let mut planned = match current {
             Some(at) => usable.swap_remove(at),
-            None => Self::new(device, volume, request, sheets),
+            None => Self::new(device, volume, (view, order, covered), sheets),
         };
         planned.plan.view = *view;
         (planned, usable, current.is_none())
     }
 
-    fn new(device: &Device, volume: &ClassifiedVolume, request: &FrameRequest, sheets: u32) -> Self {
-        let FrameRequest { view, splatting, covered, .. } = request;
-        let (order, covered) = (splatting.order, covered.clone());
+    fn new(
+        device: &Device,
+        volume: &ClassifiedVolume,
+        (view, order, covered): (&ViewGeometry, Order, &Range<f64>),
+        sheets: u32,
+    ) -> Self {
         let plan = FramePlan::new(volume.lists.bricks(), *view, sheets, order, covered.clone());
         let most = most_of(volume.lists.bricks(), &plan);
         let upload = |order: &Vec<u32>| {
             let bytes = order_bytes(order);
             uploaded(device, "sheetsplat.order", bytes, bytes.len() as u64, BufferUsages::STORAGE)
         };
-        Self { order, covered, revision: volume.revision, orders: plan.orders.iter().map(upload).collect(), most, plan }
+        let orders = plan.orders.iter().map(upload).collect();
+        Self { order, covered: covered.clone(), revision: volume.revision, orders, most, plan }
+    }
+
+    /// Whether another frame of a volume can go by it.
+    fn is_of(&self, volume: &ClassifiedVolume, order: Order, covered: &Range<f64>) -> bool {
+        (self.order, self.revision, &self.covered) == (order, volume.revision, covered)
     }
 }
 
@@ -368,12 +384,12 @@ fn passes(plan: &FramePlan) -> usize {
 }
 
 /// The stride between groups in bytes.
-fn group_stride(limits: &Limits) -> usize {
+pub(super) fn group_stride(limits: &Limits) -> usize {
     size_of::<SheetGroup>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize)
 }
 
 /// The buffers for culling's counts and for first hits.
-fn counts_and_hits(request: &FrameRequest) -> [BufferSpec; 2] {
+pub(super) fn counts_and_hits(request: &FrameRequest) -> [BufferSpec; 2] {
     let [columns, rows] = tile_grid(request.view.size);
     let culled_bytes = size_of::<Tally>() as u64 + u64::from(columns * rows) * 4;
     let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
@@ -384,12 +400,12 @@ fn counts_and_hits(request: &FrameRequest) -> [BufferSpec; 2] {
 }
 
 /// A list's bricks in bucket order. Bindings may not be empty.
-fn order_bytes(order: &[u32]) -> &[u8] {
+pub(super) fn order_bytes(order: &[u32]) -> &[u8] {
     if order.is_empty() { &[0; 4] } else { bytemuck::cast_slice(order) }
 }
 
 /// For every list the maximum number of bricks and voxels that a group visits.
-fn most_of<'a>(lists: impl Iterator<Item = &'a [Brick]>, plan: &FramePlan) -> Vec<(u32, u32)> {
+pub(super) fn most_of<'a>(lists: impl Iterator<Item = &'a [Brick]>, plan: &FramePlan) -> Vec<(u32, u32)> {
     let of_list = |(at, (bricks, order)): (usize, (&[Brick], &Vec<u32>))| {
         let voxels = |&brick: &u32| brick::present(&bricks[brick as usize]).count_ones();
         most(plan.groups.iter().map(|group| {

@@ -5,12 +5,14 @@ use std::ops::Range;
 use wgpu::Device;
 
 use super::kind::{RasterizerKind, check_rays};
+use crate::after::normalization::Normalization;
+use crate::after::plane_geometry::PlaneGeometry;
 use crate::error::RenderError;
 use crate::geometry::kernel::Kernel;
 use crate::geometry::means;
 use crate::geometry::surfaces::{SurfaceDepths, Surfaces};
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::gpu::classified_volume::ClassifiedVolume;
+use crate::gpu::classified_volume::{BrickNeeds, ClassifiedVolume};
 use crate::gpu::layout::Band;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::uniforms::Ramps;
@@ -18,7 +20,8 @@ use crate::pass::composite::RayMode;
 use crate::scene::Scene;
 use crate::setting_error::SettingError;
 use crate::settings::camera::Camera;
-use crate::settings::splatting::{Classification, Rasterizer, Splatting};
+use crate::settings::shading::Gradient;
+use crate::settings::splatting::{Classification, Interpolation, Rasterizer, Splatting};
 
 /// A frame of a view.
 #[derive(Debug)]
@@ -39,6 +42,44 @@ pub(crate) struct FrameRequest {
     pub(crate) fallback: Option<RenderError>,
     /// The bands of the compositing buffer.
     pub(crate) bands: Vec<Band>,
+    /// Of classification after splatting.
+    pub(crate) after: Option<After>,
+}
+
+/// What a frame asks for whose values are classified after splatting (SPEC §9).
+#[derive(Debug)]
+pub(crate) struct After {
+    /// The view, with the plane that the slab of its near plane begins at for a near plane.
+    pub(crate) view: ViewGeometry,
+    pub(crate) planes: PlaneGeometry,
+    pub(crate) numbers: Normalization,
+    pub(crate) needs: BrickNeeds,
+    pub(crate) gradient: Gradient,
+}
+
+impl After {
+    fn new(volume: &ClassifiedVolume, scene: &Scene, seen: &ViewGeometry) -> Result<Self, RenderError> {
+        let splatting = &scene.splatting;
+        if splatting.compositing.is_by_means() {
+            let (found, allowed) =
+                ("a projection or \"surface\" with classification = \"after\" on the GPU", "another one");
+            return Err(SettingError::new("splatting.compositing", found, allowed).into());
+        }
+        let planes = PlaneGeometry::new(seen, volume.grid());
+        let coefficients = match splatting.interpolation {
+            Interpolation::Smooth => None,
+            Interpolation::Exact => Some(volume.gpu_volume().coefficients((splatting.radius, splatting.falloff))?),
+        };
+        let numbers = coefficients.as_ref().map_or_else(|| volume.gpu_volume().numbers(), |exact| exact.numbers);
+        let mut view = *seen;
+        if let Some(perspective) = &mut view.perspective {
+            // There is no plane at the eye.
+            let slab = (perspective.eye.near / seen.slabs.width).floor();
+            perspective.eye.near = if slab >= 1.0 { slab } else { 0.5 } * seen.slabs.width;
+        }
+        let needs = BrickNeeds { reach: planes.reach(seen), coefficients };
+        Ok(Self { view, planes, numbers, needs, gradient: scene.shading.gradient })
+    }
 }
 
 impl FrameRequest {
@@ -55,10 +96,6 @@ impl FrameRequest {
     ) -> Result<Self, RenderError> {
         let splatting = scene.splatting;
         splatting.check()?;
-        if splatting.classification == Classification::After {
-            let (found, allowed) = ("\"after\" on the GPU", "\"before\", or the reference backend");
-            return Err(SettingError::new("splatting.classification", found, allowed).into());
-        }
         let (grid, size) = (volume.grid(), [scene.image.width, scene.image.height]);
         let seen = ViewGeometry::new(grid, camera, &splatting, size)?;
         let bands = CompositingBuffer::bands(&device.limits(), size)?;
@@ -69,12 +106,21 @@ impl FrameRequest {
             None => None,
         };
         let (kind, fallback) = RasterizerKind::of(device, &splatting, rasterizer)?;
+        let after = match splatting.classification {
+            Classification::Before => None,
+            Classification::After => Some(After::new(volume, scene, &seen)?),
+        };
+        let ramps = match &after {
+            None => Ramps::new(volume.transfer()),
+            Some(after) => Ramps::with_integrals(volume.transfer(), splatting.compositing, &after.numbers),
+        };
         Ok(Self {
+            after,
             kind,
             fallback,
             covered: means::covered(&seen, grid, &splatting),
             kernel: Kernel::new(splatting.radius, splatting.falloff),
-            ramps: Ramps::new(volume.transfer()),
+            ramps,
             first_hit,
             view: seen,
             splatting,
@@ -82,6 +128,11 @@ impl FrameRequest {
             surfaces,
             bands,
         })
+    }
+
+    /// The view that stages know, whose near plane is where they begin.
+    pub(crate) fn stage_view(&self) -> &ViewGeometry {
+        self.after.as_ref().map_or(&self.view, |after| &after.view)
     }
 
     /// The number of pixels in the image.

@@ -24,6 +24,7 @@ use crate::pass::composite::CutBuffers;
 use crate::pass::first_hit::FirstHit;
 use crate::pass::resolve::Resolve;
 use crate::rasterizer::FrameInputs;
+use crate::rasterizer::fields::FieldRasterizer;
 use crate::rasterizer::kind::RasterizerKind;
 use crate::rasterizer::quads::QuadRasterizer;
 use crate::rasterizer::request::FrameRequest;
@@ -49,6 +50,7 @@ pub struct Renderer {
     period: f32,
     /// The quad rasterizer, compiled when first needed.
     quads: OnceLock<QuadRasterizer>,
+    fields: OnceLock<FieldRasterizer>,
     samples: OnceLock<SampleRasterizer>,
     tiles: TileRasterizer,
     resolve: Resolve,
@@ -80,6 +82,7 @@ impl Renderer {
             profile: options.profile,
             period: queue.get_timestamp_period(),
             quads: OnceLock::new(),
+            fields: OnceLock::new(),
             samples: OnceLock::new(),
             tiles: TileRasterizer::default(),
             resolve,
@@ -123,7 +126,8 @@ impl Renderer {
         check_device(view.volume.gpu_volume().device(), &self.device, "the renderer")?;
         let request = self.request(view)?;
         let limits = self.device.limits();
-        let settled = view.volume.lists.settled(&limits);
+        let needs = request.after.as_ref().map(|after| &after.needs);
+        let settled = view.volume.settled_for(&limits, needs);
         let lists = settled.lists();
         let by_label = view.volume.shades_by_label();
         let tiles = match request.kind {
@@ -136,13 +140,14 @@ impl Renderer {
             }
             RasterizerKind::Quads | RasterizerKind::Samples => None,
         };
-        let needs = match (tiles, request.kind) {
-            (Some(needs), _) => needs,
-            (None, RasterizerKind::Samples) => {
+        let needs = match (tiles, request.kind, &request.after) {
+            (Some(needs), ..) => needs,
+            (None, RasterizerKind::Samples, _) => {
                 let bricks = (view.volume.grid(), settled.all());
                 SampleRasterizer::estimate(&limits, &request, bricks, self.sheet_format)?
             }
-            (None, _) => QuadRasterizer::estimate(&limits, &request, &lists, (self.sheet_format, self.sheets))?,
+            (None, _, Some(after)) => FieldRasterizer::estimate(&limits, &request, after, &lists, self.sheet_format)?,
+            (None, _, None) => QuadRasterizer::estimate(&limits, &request, &lists, (self.sheet_format, self.sheets))?,
         };
         let passes = needs.passes + 1;
         let timer = if self.profile { Timer::estimate(&self.device, passes) } else { None };
@@ -174,6 +179,9 @@ impl Renderer {
         let mut request = self.request(view)?;
         let SceneView { volume, scene, surfaces, frame, .. } = view;
         let fallback = request.fallback.take();
+        if let Some(after) = &request.after {
+            volume.show(&after.needs);
+        }
         volume.flush(device, queue)?;
         let sheets = (self.sheet_format, self.sheets);
         let kept = PreviousFrame::of(frame.take(), sheets, &request.view);
@@ -184,7 +192,8 @@ impl Renderer {
         let write = |old, spec: &BufferSpec, bytes: &[u8]| written(device, queue, old, spec, bytes);
         let points = bytemuck::cast_slice(&ramps.points);
         let control_points = write(kept.control_points, &control_points(&request), points)?;
-        let frame_values = uniforms::frame(seen, kernel, (&grid, volume.gpu_volume().value_format()), ramps, scene);
+        let frame_values =
+            uniforms::frame(request.stage_view(), kernel, (&grid, volume.gpu_volume().value_format()), ramps, scene);
         let uniform = write(kept.uniform, &frame_uniform(), bytemuck::bytes_of(&frame_values))?;
         let cut_values = uniforms::cut(seen, &grid, scene, request.surfaces, request.first_hit);
         let cut = write(kept.cut, &cut_uniform(), bytemuck::bytes_of(&cut_values))?;
@@ -257,9 +266,10 @@ impl Renderer {
         inputs: FrameInputs<'_>,
         previous: Option<Drawing>,
     ) -> Result<(Drawing, Prepared, Option<RenderError>), RenderError> {
-        let (mut old_quads, mut old_tiles, mut old_samples) = (None, None, None);
+        let (mut old_quads, mut old_tiles, mut old_samples, mut old_fields) = (None, None, None, None);
         match previous {
             Some(Drawing::Quads(frame)) => old_quads = Some(*frame),
+            Some(Drawing::Fields(frame)) => old_fields = Some(*frame),
             Some(Drawing::Tiles(frame)) => old_tiles = Some(*frame),
             Some(Drawing::Samples(frame)) => old_samples = Some(*frame),
             None => {}
@@ -277,12 +287,20 @@ impl Renderer {
                 Err(error) => fallback = Some(error),
             }
         }
+        if let Some(after) = &inputs.request.after {
+            let (frame, prepared) = self.fields(inputs.device).prepare(inputs, after, old_fields)?;
+            return Ok((Drawing::Fields(Box::new(frame)), prepared, fallback));
+        }
         let (frame, prepared) = self.quads(inputs.device).prepare(inputs, old_quads)?;
         Ok((Drawing::Quads(Box::new(frame)), prepared, fallback))
     }
 
     fn samples(&self, device: &Device) -> &SampleRasterizer {
         self.samples.get_or_init(|| SampleRasterizer::new(device, self.sheet_format))
+    }
+
+    fn fields(&self, device: &Device) -> &FieldRasterizer {
+        self.fields.get_or_init(|| FieldRasterizer::new(device, self.sheet_format))
     }
 
     fn quads(&self, device: &Device) -> &QuadRasterizer {
@@ -303,6 +321,11 @@ impl Renderer {
         }
         match drawing {
             Drawing::Tiles(tiles) => self.tiles.record(encoder, timer, tiles),
+            Drawing::Fields(fields) => {
+                if let Some(rasterizer) = self.fields.get() {
+                    rasterizer.record(encoder, timer, fields);
+                }
+            }
             Drawing::Samples(samples) => {
                 if let Some(rasterizer) = self.samples.get() {
                     rasterizer.record(encoder, timer, samples);

@@ -6,6 +6,7 @@ use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
+use crate::rasterizer::fields::FieldFrame;
 use crate::rasterizer::quads::QuadFrame;
 use crate::rasterizer::samples::SampleFrame;
 use crate::rasterizer::tiles::TileFrame;
@@ -48,6 +49,7 @@ pub(crate) struct FirstHits {
 #[derive(Debug)]
 pub(crate) enum Drawing {
     Quads(Box<QuadFrame>),
+    Fields(Box<FieldFrame>),
     Tiles(Box<TileFrame>),
     Samples(Box<SampleFrame>),
 }
@@ -98,6 +100,7 @@ impl Drawing {
     pub(crate) fn passes(&self) -> usize {
         match self {
             Self::Quads(frame) => frame.passes(),
+            Self::Fields(frame) => frame.passes(),
             Self::Tiles(_) => TileFrame::PASSES,
             Self::Samples(_) => SampleFrame::PASSES,
         }
@@ -107,6 +110,7 @@ impl Drawing {
     pub(crate) fn group_slabs(&self) -> GroupSlabs {
         match self {
             Self::Quads(frame) => frame.group_slabs(),
+            Self::Fields(frame) => frame.group_slabs(),
             Self::Tiles(frame) => frame.group_slabs(),
             Self::Samples(frame) => frame.group_slabs(),
         }
@@ -116,6 +120,7 @@ impl Drawing {
     pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer) {
         match self {
             Self::Quads(frame) => frame.copy_counts(encoder, staging),
+            Self::Fields(frame) => frame.copy_counts(encoder, staging),
             Self::Tiles(frame) => frame.copy_counts(encoder, staging),
             Self::Samples(frame) => frame.copy_counts(encoder, staging),
         }
@@ -125,6 +130,7 @@ impl Drawing {
     pub(crate) fn first_hits(&self) -> Option<(&Buffer, u64)> {
         match self {
             Self::Quads(frame) => Some(frame.first_hits()),
+            Self::Fields(frame) => Some(frame.first_hits()),
             Self::Tiles(frame) => Some(frame.first_hits()),
             Self::Samples(_) => None,
         }
@@ -134,6 +140,7 @@ impl Drawing {
     pub(crate) fn gpu_bytes(&self) -> u64 {
         match self {
             Self::Quads(frame) => frame.gpu_bytes(),
+            Self::Fields(frame) => frame.gpu_bytes(),
             Self::Tiles(frame) => frame.gpu_bytes(),
             Self::Samples(frame) => frame.gpu_bytes(),
         }
@@ -142,7 +149,7 @@ impl Drawing {
     /// `"quads"` or `"tiles"`.
     pub(crate) fn rasterizer(&self) -> &'static str {
         match self {
-            Self::Quads(_) | Self::Samples(_) => "quads",
+            Self::Quads(_) | Self::Fields(_) | Self::Samples(_) => "quads",
             Self::Tiles(_) => "tiles",
         }
     }

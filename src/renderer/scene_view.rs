@@ -49,7 +49,8 @@ impl SceneView {
         scene.transfer.check_volume(volume.volume())?;
         let transfer = scene.transfer.resolve(volume.volume());
         let clipped = scene.clip.voxels(volume.volume().grid(), scene.splatting.radius);
-        let volume = scoped(device, || ClassifiedVolume::new(device, volume, transfer, clipped))?;
+        let classification = scene.splatting.classification;
+        let volume = scoped(device, || ClassifiedVolume::new(device, volume, transfer, clipped, classification))?;
         Ok(Self { volume, scene: scene.clone(), surfaces: None, first_hit: None, frame: None, extent: OnceLock::new() })
     }
 
@@ -139,6 +140,7 @@ impl SceneView {
         if !clip.is_empty() && splatting.radius != old.radius {
             self.volume.set_clip(clip.voxels(self.volume.grid(), splatting.radius));
         }
+        self.volume.set_classification(splatting.classification);
         self.scene.splatting = splatting;
         Ok(())
     }

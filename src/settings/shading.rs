@@ -18,7 +18,7 @@ pub enum Light {
 }
 
 /// The gradient from which [`Classification::After`](super::Classification::After) takes normals.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Gradient {
     /// The voxels' central differences, interpolated like the values.
     Differences,

@@ -71,7 +71,7 @@ pub enum FootprintForm {
 /// mean at a pixel is its content there divided by the length of the pixel's ray within its slab, in `unit`s (axis-aligned: from one
 /// slice to the next). The mean holds the mean opacity per unit length, and the colour times that. If a cut leaves only part of a slab,
 /// its mean counts in proportion, except for [`Self::Minimum`]. Means need sheets, so any method except [`Method::CompositeEverySample`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Compositing {
     /// The paper's rule: opacities add up within a sheet, to at most 1.

@@ -133,7 +133,12 @@ impl LabelTables {
 
     /// Whether these tables change the appearance of voxels; otherwise they only decide which voxels take part.
     pub fn matter_to_shading(&self) -> bool {
-        self.visible && (self.color.is_some() || self.opacity.is_some() || self.gradient_opacity.is_some())
+        self.visible && self.matter()
+    }
+
+    /// Whether they differ from those of labels without any. Classified after splatting (SPEC §9), invisible labels must be known, too.
+    pub fn matter(&self) -> bool {
+        !self.visible || self.color.is_some() || self.opacity.is_some() || self.gradient_opacity.is_some()
     }
 }
 

@@ -6,9 +6,11 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod field;
+mod gpu;
 mod images;
 mod modes;
 mod refusals;
+mod slab_integral;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::image::Image;

@@ -78,10 +78,14 @@ fn the_preset_labels_excludes_after() {
     assert_eq!(Splatting::default().classification, Classification::Before);
 }
 
-/// The GPU does not draw `after` yet.
+/// The GPU does not draw them with `after` yet.
 #[test]
-fn the_gpu_refuses_after() {
-    let scene = parse(&["splatting.classification=after"]).unwrap();
-    let error = gpu().render_volume(builtin::volume("head:16").unwrap(), &scene).unwrap_err().to_string();
-    assert!(error.contains("splatting.classification: found \"after\" on the GPU"), "{error}");
+fn the_gpu_refuses_projections() {
+    let volume = builtin::volume("head:16").unwrap();
+    for compositing in ["maximum", "minimum", "average", "surface"] {
+        let compositing = format!("splatting.compositing={compositing}");
+        let scene = parse(&["splatting.classification=after", &compositing]).unwrap();
+        let error = gpu().render_volume(volume.clone(), &scene).unwrap_err().to_string();
+        assert!(error.contains("splatting.compositing: found a projection or \"surface\""), "{error}");
+    }
 }

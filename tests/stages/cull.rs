@@ -81,6 +81,7 @@ impl<'a> Culling<'a> {
             control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
             occluded: &targets.occluded,
             culled: &culled,
+            planes: None,
         };
         let order = init(device, &plan.orders[0], BufferUsages::STORAGE);
         let counts = |group: &sheetsplat::internals::quad_plan::GroupPlan| {

@@ -51,6 +51,7 @@ impl<'a> Stages<'a> {
             control_points: &storage,
             occluded: &storage,
             culled: &storage,
+            planes: None,
         };
         let grid = Grid { dims: UVec3::ONE, spacing: DVec3::ONE };
         let lists = BrickLists::upload(device, &grid, &[0]);

@@ -1,0 +1,67 @@
+// Draws voxels onto a slab plane, one quad per voxel, added up in two sheet buffers: the sums that the field and its gradient are made of (SPEC §9;
+// Mueller, Möller, Crawfis 1999).
+
+@group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
+@group(0) @binding(2) var<storage, read> voxels: array<FieldVoxel>;
+@group(0) @binding(3) var<storage, read> instances: array<u32>;
+@group(0) @binding(4) var<storage, read> args: Indirect;
+@group(0) @binding(5) var<uniform> planes: Planes;
+
+// Whether gradients are the field's derivative, not the voxels' differences.
+override KERNEL_GRADIENT: bool = false;
+
+struct Quad {
+    @builtin(position) position: vec4f,
+    @location(0) @interpolate(flat) center_px: vec2f,
+    // Two rows: from pixel offsets to grid units along the planes' axes.
+    @location(1) @interpolate(flat) rows: vec4f,
+    @location(2) @interpolate(flat) number: f32,
+    // The gradient, and the plane's distance from the voxel.
+    @location(3) @interpolate(flat) gradient: vec4f,
+    // -falloff, and the radius squared.
+    @location(4) @interpolate(flat) kernel: vec2f,
+}
+
+@vertex
+fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Quad {
+    start(vertex >> 31u);
+    // The last instance may have fewer quads: the others repeat the last one, without area.
+    let quad = instance * QUADS + vertex / 4u;
+    let voxel = voxels[instances[min(quad, args.count - 1u)]];
+    let lies = on_plane(vec2f(voxel.x, voxel.y), voxel.depth, sheet_group.near);
+    let extent = sqrt(max(frame.radius * frame.radius - lies.distance * lies.distance, 0.0));
+    let reach = (extent + MARGIN) / lies.per_pixel;
+    let side = side_of(vertex);
+    let axis = planes.screen_axis;
+    let a = axis * reach.x;
+    let b = vec2f(-axis.y, axis.x) * reach.y;
+    let corner = clip_corner(lies.center_px, a * side.x + b * side.y, side, abs(a) + abs(b));
+    let position = select(NOWHERE, corner, extent > 0.0 && quad < args.count);
+    return Quad(
+        position,
+        lies.center_px,
+        vec4f(axis * lies.per_pixel.x, vec2f(-axis.y, axis.x) * lies.per_pixel.y),
+        voxel.number,
+        vec4f(unpacked(voxel.gradient_xy, voxel.gradient_z), lies.distance),
+        vec2f(-frame.falloff, frame.radius * frame.radius),
+    );
+}
+
+// (N, Σ c·g, Σ dx·g, Σ dy·g) and (Σ dz·g, 0, 0, 0), or of the kernel's derivative, with (a, b, t) from the voxel to the point,
+// (N, Σ c·g, Σ g·a, Σ g·b) and (Σ g·t, Σ c·g·a, Σ c·g·b, Σ c·g·t).
+@fragment
+fn fragment(quad: Quad) -> Two {
+    start(u32(quad.position.z));
+    // From the pixel's centre, not an interpolated coordinate: the rasterizer snaps corners to a coarse grid.
+    let offset = quad.position.xy - quad.center_px;
+    let place = vec3f(dot(quad.rows.xy, offset), dot(quad.rows.zw, offset), quad.gradient.w);
+    let squared = dot(place, place);
+    let weight = select(0.0, exp(quad.kernel.x * squared), squared < quad.kernel.y);
+    let both = weight * vec2f(1.0, quad.number);
+    if KERNEL_GRADIENT {
+        let moment = weight * place;
+        return Two(vec4f(both, moment.xy), vec4f(moment.z, moment * quad.number));
+    }
+    let gradient = weight * quad.gradient.xyz;
+    return Two(vec4f(both, gradient.xy), vec4f(gradient.z, 0.0, 0.0, 0.0));
+}

@@ -1,0 +1,52 @@
+// How kernels lie on slab planes, and what values are splatted as (SPEC §9); `gpu::layout::Planes` documents the fields. A stage that includes this declares
+// `planes: Planes`.
+struct Planes {
+    axes: array<vec4f, 3>,
+    step: vec4f,
+    screen_axis: vec2f,
+    per_pixel: vec2f,
+    origin: f32,
+    value_bias: f32,
+    value_scale: f32,
+    per_number: f32,
+}
+
+// Below this sum of weights there is no value.
+const MIN_WEIGHT = 1e-3;
+
+// Stands for the number of a point without a value: all numbers are at most 4.
+const NO_NUMBER = 1e30;
+
+// How a voxel's kernel lies on a plane.
+struct OnPlane {
+    // Where its nearest point is seen.
+    center_px: vec2f,
+    // From there, grid units along the two axes that a pixel offset along and across the screen's axis is; lowered to at most 1.
+    per_pixel: vec2f,
+    // The plane's distance from the voxel, grid units, positive behind it.
+    distance: f32,
+}
+
+// The depth from the eye of a plane; 1 without an eye.
+fn plane_from_eye(plane: f32) -> f32 {
+    return select(1.0, plane - planes.origin, frame.near > 0.0);
+}
+
+// A voxel is given by its pixel offset from the image's middle times its depth from the eye, and its sheet depth.
+fn on_plane(offset: vec2f, depth: f32, plane: f32) -> OnPlane {
+    let from_eye = plane_from_eye(plane);
+    let distance = (plane - depth) * planes.step.w;
+    let center = (offset + distance * planes.step.xy) / from_eye + 0.5 * vec2f(frame.size);
+    return OnPlane(center, min(planes.per_pixel * from_eye, vec2f(1.0)), distance);
+}
+
+// The offset from a voxel to what a pixel sees of the plane: grid units along the two axes. `from_center` are pixels.
+fn within_plane(lies: OnPlane, from_center: vec2f) -> vec2f {
+    let axis = planes.screen_axis;
+    return lies.per_pixel * vec2f(dot(axis, from_center), axis.x * from_center.y - axis.y * from_center.x);
+}
+
+// A vector given along the planes' axes and normal, in the grid.
+fn in_grid(v: vec3f) -> vec3f {
+    return v.x * planes.axes[0].xyz + v.y * planes.axes[1].xyz + v.z * planes.axes[2].xyz;
+}

@@ -1,0 +1,95 @@
+// The transfer function integrated from value to value (SPEC §9; Engel, Kraus, Ertl 2001), from a table that `after::slab_integral` makes and describes. A
+// stage that includes this declares `control_points` and includes `shading`. Values are numbers as `after::normalization` scales them.
+
+// What the transfer function makes of a slab's values.
+struct SlabIntegral {
+    // The mean amount per unit length, without gradient opacity; 0 if no value has an opacity.
+    amount: f32,
+    // Where the mean value lies on the way from the first value to the last.
+    share: f32,
+    color: vec3f,
+}
+
+// Entries of a cell, and of a sum.
+const CELL = 3u;
+const SUM = 2u;
+
+// Where the two Gauss nodes of an interval lie, from its middle, by its length.
+const NODE = 0.28867513;
+
+// The cell that a number lies in.
+fn cell_of(table: u32, bins: f32, domain: vec4f, x: f32) -> u32 {
+    let bin = u32(clamp((x - domain.x) * domain.y, 0.0, bins - 1.0));
+    let ends = vec2u(control_points[table + 2u + bin].xy);
+    let cells = table + 2u + u32(bins);
+    var first = ends.x;
+    var last = ends.y;
+    while first < last {
+        let middle = (first + last + 1u) / 2u;
+        let is_before = control_points[cells + CELL * middle].x <= x;
+        first = select(first, middle, is_before);
+        last = select(middle - 1u, last, is_before);
+    }
+    return first;
+}
+
+// The means of m·C and m over the part of a cell between two numbers. `cell` is its first entry.
+fn mean_of_part(cell: u32, low: f32, high: f32, origin: f32) -> array<vec4f, 2> {
+    let start = control_points[cell];
+    let color = control_points[cell + 1u].rgb;
+    let rise = control_points[cell + 2u].rgb;
+    let x = low + (high - low) * vec2f(0.5 - NODE, 0.5 + NODE);
+    let u = clamp((x - start.x) * start.y, vec2f(0.0), vec2f(1.0));
+    let alpha = start.z + start.w * u;
+    let m = 0.5 * vec2f(amount(alpha.x), amount(alpha.y));
+    let sum = m.x + m.y;
+    return array(vec4f(color * sum + rise * dot(m, u), sum), vec4f(dot(m, x - origin), 0.0, 0.0, 0.0));
+}
+
+// The means over the numbers from f0 to f1, by the table that starts at an entry of the control points.
+fn slab_integral(table: u32, f0: f32, f1: f32) -> SlabIntegral {
+    let head = control_points[table];
+    let domain = control_points[table + 1u];
+    let low = clamp(min(f0, f1), domain.x, domain.z);
+    let high = clamp(max(f0, f1), domain.x, domain.z);
+    if high < head.z || low > head.w {
+        return SlabIntegral(0.0, 0.5, vec3f(0.0));
+    }
+    let cells = table + 2u + u32(head.y);
+    let first = cell_of(table, head.y, domain, low);
+    let last = cell_of(table, head.y, domain, high);
+    let size = high - low;
+    let is_one = first == last;
+    let near_end = select(control_points[cells + CELL * first + 1u].w, high, is_one);
+    let near = mean_of_part(cells + CELL * first, low, near_end, low);
+    let near_weight = select((near_end - low) / size, 1.0, is_one);
+    var color_and_amount = near[0] * near_weight;
+    var moment = near[1].x * near_weight;
+    if !is_one {
+        let start = control_points[cells + CELL * last].x;
+        let far = mean_of_part(cells + CELL * last, start, high, low);
+        let far_weight = (high - start) / size;
+        color_and_amount += far[0] * far_weight;
+        moment += far[1].x * far_weight;
+        if last > first + 1u {
+            // Whole cells: two sums from the middle of the least block that holds them all, or one of a single cell.
+            let a = first + 1u;
+            let b = last - 1u;
+            let level = firstLeadingBit(max(a ^ b, 1u));
+            let sums = cells + u32(head.x) * (CELL + SUM * level);
+            let before = control_points[sums + SUM * a];
+            let before_color = control_points[sums + SUM * a + 1u].rgb;
+            let after = select(control_points[sums + SUM * b], vec4f(0.0), a == b);
+            let after_color = select(control_points[sums + SUM * b + 1u].rgb, vec3f(0.0), a == b);
+            let total = before.x + after.x;
+            color_and_amount += vec4f(before_color + after_color, total) / size;
+            moment += (total * (before.z - low) + before.y + after.y) / size;
+        }
+    }
+    if color_and_amount.a <= 0.0 {
+        return SlabIntegral(0.0, 0.5, vec3f(0.0));
+    }
+    let along = clamp(moment / color_and_amount.a / select(1.0, size, size > 0.0), 0.0, 1.0);
+    let share = select(select(1.0 - along, along, f0 <= f1), 0.5, size == 0.0);
+    return SlabIntegral(color_and_amount.a, share, color_and_amount.rgb / color_and_amount.a);
+}

@@ -1,0 +1,39 @@
+// Projects the voxels that are drawn onto slab planes for the first time, and finds their numbers and gradients, so once each (SPEC §9).
+
+@group(0) @binding(1) var<storage, read> bricks: array<Brick>;
+@group(0) @binding(2) var values: texture_2d_array<u32>;
+// The bits of every voxel's coefficient, a number; only read where `EXACT`.
+@group(0) @binding(3) var coefficients: texture_2d_array<u32>;
+// Places: 64 times the brick's number, and the place in the brick.
+@group(0) @binding(4) var<storage, read> fresh: array<u32>;
+@group(0) @binding(5) var<storage, read> args: Indirect;
+@group(0) @binding(6) var<storage, read_write> voxels: array<FieldVoxel>;
+@group(0) @binding(7) var<uniform> planes: Planes;
+
+// Whether coefficients are not the values themselves.
+override EXACT: bool = false;
+
+fn number_at(index: u32) -> f32 {
+    if EXACT {
+        let texel = texel_of(index, textureDimensions(coefficients).x);
+        return bitcast<f32>(textureLoad(coefficients, texel.xy, texel.z, 0).x);
+    }
+    let stored = stored_at(index);
+    let value = select(bitcast<f32>(stored), f32(stored), frame.whole_values != 0u);
+    return (value + planes.value_bias) * planes.value_scale;
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
+    start(workgroup.z);
+    let at = unfold(workgroup) * SHADE_WORKGROUP + thread;
+    if at >= args.count {
+        return;
+    }
+    let id = fresh[at];
+    let voxel = voxel_of(bricks[id / BRICK_VOXELS], id % BRICK_VOXELS);
+    let p = homogeneous(vec4f(vec3f(voxel), 1.0));
+    let gradient = 2.0 * half_differences(voxel) * planes.value_scale;
+    let bits = packed(gradient);
+    voxels[id] = FieldVoxel(p.x, p.y, p.z, number_at(index_of(voxel)), bits.x, bits.y);
+}
