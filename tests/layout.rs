@@ -6,7 +6,7 @@ use std::mem::offset_of;
 use naga::proc::Layouter;
 use naga::{AddressSpace, Handle, Module, Type, TypeInner};
 use sheetsplat::internals::gpu::layout::{
-    Band, Brick, BrickState, Culled, Cut, FieldVoxel, Frame, Gather, Gathered, Indirect, PatchRange, FieldPlanes,
+    Band, Brick, BrickState, Culled, Cut, FieldPlanes, FieldVoxel, Frame, Gather, Gathered, Indirect, PatchRange,
     SheetGroup, Splat, Tally, TileList, Visit,
 };
 use sheetsplat::internals::gpu::shaders;

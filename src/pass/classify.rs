@@ -7,7 +7,7 @@ use wgpu::{BindGroup, Buffer, ComputePass, Device, ShaderStages, TextureView, Te
 
 use super::composite::{CompositeBuffers, CompositeMode};
 use crate::gpu::bindings::{ComputeStage, at_offset, depth_texture, storage, texture, texture_of_integers, uniform};
-use crate::gpu::layout::{Band, Cut, Frame, FieldPlanes, SheetGroup, TileList};
+use crate::gpu::layout::{Band, Cut, FieldPlanes, Frame, SheetGroup, TileList};
 use crate::gpu::shaders;
 use crate::gpu::targets::BandBuffer;
 use crate::gpu::volume_texture::VolumeTexture;

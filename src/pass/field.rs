@@ -9,7 +9,7 @@ use wgpu::{
 
 use super::splat::{added_to, clear_bindings, clear_pipeline, quad_indices, record_quads, sheets_of_a_group};
 use crate::gpu::bindings::{Bindings, at_offset, storage, uniform};
-use crate::gpu::layout::{FieldVoxel, Frame, Indirect, FieldPlanes, SheetGroup};
+use crate::gpu::layout::{FieldPlanes, FieldVoxel, Frame, Indirect, SheetGroup};
 use crate::gpu::render_pipeline::render_pipeline;
 use crate::gpu::shaders;
 use crate::pass::cull::CullList;

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use wgpu::{BindGroup, BindingResource, Buffer, ComputePass, Device, ShaderStages, TextureView, TextureViewDimension};
 
 use crate::gpu::bindings::{ComputeStage, storage, texture_of_integers, uniform};
-use crate::gpu::layout::{Brick, FieldVoxel, Frame, Indirect, FieldPlanes};
+use crate::gpu::layout::{Brick, FieldPlanes, FieldVoxel, Frame, Indirect};
 use crate::gpu::shaders;
 
 /// The stage's pipelines: without and with coefficients of their own, without and with holes. Each is compiled when it is first asked for.
