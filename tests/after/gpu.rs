@@ -120,3 +120,17 @@ fn holes_and_labels_are_the_twins() {
     scene.transfer.labels = [(1, own), (2, LabelTables { visible: false, ..LabelTables::default() })].into();
     assert_at_least(accuracy(&labelled, &scene), 60.0, "labels");
 }
+
+/// What a frame will take is known before it is prepared.
+#[test]
+fn memory_is_estimated() {
+    let gpu = gpu();
+    for (interpolation, falloff) in [(Interpolation::Smooth, 2.0), (Interpolation::Exact, 1.0)] {
+        let (volume, mut scene) = head([1.0, 1.0, 1.0]);
+        (scene.splatting.interpolation, scene.splatting.falloff) = (interpolation, falloff);
+        let mut view = gpu.view(volume, &scene).unwrap();
+        let estimated = gpu.renderer().estimate(&view).unwrap();
+        gpu.draw(&mut view).unwrap();
+        assert_eq!(view.gpu_bytes(), estimated, "{interpolation:?}");
+    }
+}
