@@ -9,7 +9,7 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::{GpuHeadless, HeadlessOptions};
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::Projection;
 
@@ -18,7 +18,7 @@ const SIDE_ON: &str = "builtin:nerve, side-on";
 fn main() {
     let (pairs, scenes) = common::arguments(7);
     let scenes = if scenes.is_empty() { default_scenes() } else { scenes };
-    let headless = Headless::new(&HeadlessOptions::default()).unwrap();
+    let headless = GpuHeadless::new(&HeadlessOptions::default()).unwrap();
     println!("| scene | without, ms | µs per section | with, ms | ratio | sections drawn | quads |");
     println!("|---|---|---|---|---|---|---|");
     let mut last = None;

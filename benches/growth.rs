@@ -7,11 +7,11 @@
 #[expect(dead_code, reason = "not every bench needs all of it")]
 mod common;
 
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::{GpuHeadless, HeadlessOptions};
 
 fn main() {
     let (rounds, _) = common::arguments(7);
-    let headless = Headless::new(&HeadlessOptions::default()).unwrap();
+    let headless = GpuHeadless::new(&HeadlessOptions::default()).unwrap();
     let names = [64, 128, 256, 512].map(|side| format!("builtin:head:{side}"));
     let mut views = names.each_ref().map(|name| {
         let scene = common::open(name);

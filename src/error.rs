@@ -1,7 +1,9 @@
 //! Errors of the renderer. The errors of loading are defined beside volumes and scenes; [`headless`](crate::headless) unites them all.
 
+#[cfg(feature = "gpu")]
 use wgpu::Device;
 
+#[cfg(feature = "gpu")]
 use crate::gpu::fault::DeviceFault;
 use crate::setting_error::SettingError;
 
@@ -25,7 +27,8 @@ pub enum RenderError {
         /// The amount that the device allows.
         actual: u64,
     },
-    /// The device was lost, ran out of memory, or reported a validation error.
+    /// The device failed: it is lost, or out of memory, or found a mistake.
+    #[cfg(feature = "gpu")]
     #[error(transparent)]
     Device(#[from] DeviceFault),
     /// The result of drawing could not be read back.
@@ -33,7 +36,8 @@ pub enum RenderError {
     Readback(String),
 }
 
-/// Checks that an object belongs to the device it will be used with, because wgpu may panic otherwise.
+/// Checks that something is on the device that is to work with it: wgpu may panic if not.
+#[cfg(feature = "gpu")]
 pub(crate) fn check_device(device: &Device, of: &Device, what: &str) -> Result<(), RenderError> {
     if device == of {
         return Ok(());

@@ -104,18 +104,25 @@
 
 mod after;
 pub mod appearance;
+#[cfg(feature = "cpu")]
 pub mod cpu;
+mod device_error;
 mod error;
 mod geometry;
 #[cfg(feature = "golden")]
 pub mod golden;
+#[cfg(feature = "gpu")]
 mod gpu;
 pub mod headless;
 pub mod image;
 mod lists;
+#[cfg(feature = "gpu")]
 mod pass;
+mod pick;
+#[cfg(feature = "gpu")]
 mod rasterizer;
 mod reference;
+#[cfg(feature = "gpu")]
 mod renderer;
 pub mod scene;
 mod setting_error;
@@ -123,24 +130,37 @@ pub mod settings;
 pub mod stats;
 pub mod volume;
 
+pub use device_error::{DeviceError, InsufficientLimit};
 pub use error::RenderError;
+#[cfg(feature = "gpu")]
 pub use geometry::surfaces::{SurfaceDepths, Surfaces};
-pub use gpu::device::{DeviceError, DeviceRequirements, InsufficientLimit};
+#[cfg(feature = "gpu")]
+pub use gpu::device::DeviceRequirements;
+#[cfg(feature = "gpu")]
 pub use gpu::fault::{DeviceFault, scoped};
+#[cfg(feature = "gpu")]
 pub use gpu::gpu_volume::GpuVolume;
 pub use image::Image;
+pub use pick::Pick;
+#[cfg(feature = "gpu")]
 pub use renderer::Renderer;
+#[cfg(feature = "gpu")]
 pub use renderer::options::{Blend, RendererOptions};
-pub use renderer::pick::{PendingPick, Pick};
+#[cfg(feature = "gpu")]
+pub use renderer::pick::PendingPick;
+#[cfg(feature = "gpu")]
 pub use renderer::placement::Placement;
+#[cfg(feature = "gpu")]
 pub use renderer::scene_view::{Prepared, SceneView};
 pub use scene::Scene;
 pub use setting_error::SettingError;
 pub use settings::Camera;
 pub use stats::Stats;
 pub use volume::Volume;
-// The libraries whose types appear in this crate's signatures.
-pub use {glam, wgpu};
+// The libraries whose types stand in this one's signatures.
+pub use glam;
+#[cfg(feature = "gpu")]
+pub use wgpu;
 
 /// The stages and lists by themselves, for this project's own tests and benches. Nothing here is part of the public interface; it changes
 /// without notice.
@@ -158,6 +178,7 @@ pub mod internals {
     }
 
     /// The passes' common parts.
+    #[cfg(feature = "gpu")]
     pub mod gpu {
         pub use crate::gpu::{
             bindings, brick_lists, classified_volume, device, footprint_texture, gathered_layout, layout,
@@ -166,6 +187,7 @@ pub mod internals {
     }
 
     /// The GPU's stages.
+    #[cfg(feature = "gpu")]
     pub mod pass {
         pub use crate::pass::{
             classify, composite, cull, field, first_hit, gather, occlude, resolve, sample, shade, splat, tiles, values,
@@ -179,7 +201,7 @@ pub mod internals {
 }
 
 /// The code in the README and the guide, run as doc tests.
-#[cfg(all(doctest, feature = "golden"))]
+#[cfg(all(doctest, feature = "golden", feature = "gpu"))]
 mod guide {
     #[doc = include_str!("../README.md")]
     struct Readme;

@@ -6,7 +6,7 @@
 mod common;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::{Headless, Rendering};
+use sheetsplat::headless::{GpuHeadless, Rendering};
 use sheetsplat::internals::reference;
 use sheetsplat::internals::reference::visibility::Test;
 use sheetsplat::scene::{Scene, VolumeSource};
@@ -24,10 +24,10 @@ use common::{FORMS, RASTERIZERS, Random, SPACINGS, camera, lavapipe, random_eye,
 /// of at most 1 differ by some 1e-5.
 const ROUNDING: f64 = 2e-5;
 
-fn headless(sheets_per_group: Option<u32>) -> Headless {
+fn headless(sheets_per_group: Option<u32>) -> GpuHeadless {
     let mut options = lavapipe();
     options.sheets_per_group = sheets_per_group;
-    Headless::new(&options).unwrap()
+    GpuHeadless::new(&options).unwrap()
 }
 
 /// A volume and a view of it, orthographic or in perspective, with sheets parallel to the image or slices.
@@ -56,7 +56,7 @@ fn random_case(random: &mut Random) -> (Volume, Scene) {
     (volume, scene)
 }
 
-fn render(headless: &Headless, volume: &Volume, scene: &Scene) -> Rendering {
+fn render(headless: &GpuHeadless, volume: &Volume, scene: &Scene) -> Rendering {
     headless.render_volume(volume.clone(), scene).unwrap()
 }
 
@@ -295,8 +295,8 @@ fn profiled_frames() {
     scene.camera = Camera::default();
     (scene.image.width, scene.image.height) = (40, 40);
     scene.splatting.slab_width = 0.05;
-    let devices =
-        [false, true].map(|profile| Headless::new(&lavapipe().with_sheets_per_group(1).with_profile(profile)).unwrap());
+    let devices = [false, true]
+        .map(|profile| GpuHeadless::new(&lavapipe().with_sheets_per_group(1).with_profile(profile)).unwrap());
     for (rasterizer, stages) in [
         (Rasterizer::Quads, &["composite", "cull", "resolve", "splat"][..]),
         (Rasterizer::Tiles, &["gather", "resolve"]),

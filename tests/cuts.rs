@@ -12,7 +12,7 @@ use glam::{DVec3, UVec2, UVec3};
 use sheetsplat::settings::Clip;
 use sheetsplat::settings::Projection;
 
-use sheetsplat::headless::{Headless, readback};
+use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference::{self, Host, ray_march};
 use sheetsplat::internals::view_geometry::ViewGeometry;
@@ -87,7 +87,7 @@ fn view_of(volume: &Volume, scene: &Scene) -> ViewGeometry {
 }
 
 /// Draws a frame, with its first hits in `unit`s if requested.
-fn draw(gpu: &Headless, view: &mut SceneView) -> (Image, Vec<f64>, Counts) {
+fn draw(gpu: &GpuHeadless, view: &mut SceneView) -> (Image, Vec<f64>, Counts) {
     let rendering = gpu.draw(view).unwrap();
     let unit = view.volume().grid().unit();
     let hits = view.first_hits().map_or(Vec::new(), |texture| {

@@ -8,7 +8,7 @@ mod common;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::RenderError;
-use sheetsplat::headless::{Headless, Rendering};
+use sheetsplat::headless::{GpuHeadless, Rendering};
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
@@ -37,7 +37,7 @@ fn cases() -> Vec<(&'static str, Volume, Scene)> {
     vec![("noise", noise, scene), ("tomato", tomato, of_tomato)]
 }
 
-fn render(gpu: &Headless, volume: &Volume, scene: &Scene) -> Rendering {
+fn render(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> Rendering {
     gpu.render_volume(volume.clone(), scene).unwrap()
 }
 

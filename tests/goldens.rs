@@ -10,7 +10,7 @@ use std::path::Path;
 
 use sheetsplat::golden;
 use sheetsplat::golden::{Bless, Picture, Tolerance};
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::{GpuHeadless, HeadlessOptions};
 use sheetsplat::scene::{Scene, VolumeSource};
 use sheetsplat::settings::{FootprintForm, Rasterizer};
 
@@ -188,7 +188,7 @@ fn pictures_look_like_their_goldens() {
         }
     }
     let options = HeadlessOptions::default().with_adapter("llvmpipe");
-    let gpu = Headless::new(&options)
+    let gpu = GpuHeadless::new(&options)
         .unwrap_or_else(|error| panic!(".ci/setup --lavapipe installs what is missing: {error}"));
     let failures = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("goldens");
     let mut complaints = Vec::new();

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::appearance::{Preset, categories, shown_range};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::{Scene, TransferSettings};
@@ -66,7 +66,7 @@ fn assert_finite(image: &Image, what: &str) {
 }
 
 /// The PSNR in dB of a frame against the f64 evaluation, over the pixels that show anything.
-fn decibels(gpu: &Headless, volume: &Volume, scene: &Scene, what: &str) -> f64 {
+fn decibels(gpu: &GpuHeadless, volume: &Volume, scene: &Scene, what: &str) -> f64 {
     let expected = reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap();
     let actual = gpu.render_volume(volume.clone(), scene).unwrap().image;
     assert_finite(&expected, what);

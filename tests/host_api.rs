@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use sheetsplat::DeviceError;
 use sheetsplat::PendingPick;
 use sheetsplat::Surfaces;
-use sheetsplat::headless::{Headless, Rendering};
+use sheetsplat::headless::{GpuHeadless, Rendering};
 use sheetsplat::image::Image;
 use sheetsplat::settings::Clip;
 use sheetsplat::stats::{PendingCounts, Stats};
@@ -33,7 +33,7 @@ const _: () = {
     is_send_and_sync::<Volume>();
     is_send_and_sync::<Image>();
     is_send_and_sync::<Stats>();
-    is_send_and_sync::<Headless>();
+    is_send_and_sync::<GpuHeadless>();
     is_send_and_sync::<Rendering>();
     is_send_and_sync::<sheetsplat::headless::Error>();
     // One thread at a time asks for it.

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::RenderError;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::Projection;
@@ -213,7 +213,7 @@ fn tables(labels: &[u16]) -> impl Iterator<Item = (u16, LabelTables)> {
 }
 
 /// Draws a scene by both rasterizers, with and without culling, and compares with the f64 evaluation.
-fn check(gpu: &Headless, name: &str, volume: &Volume, scene: &Scene) {
+fn check(gpu: &GpuHeadless, name: &str, volume: &Volume, scene: &Scene) {
     let transfer = scene.transfer.resolve(volume);
     let expected = reference::render(volume, &transfer, scene).unwrap();
     let counts = reference::count(volume, &transfer, scene).unwrap();

@@ -6,7 +6,7 @@ mod common;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::RenderError;
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::{GpuHeadless, HeadlessOptions};
 use sheetsplat::internals::ClippedVoxels;
 use sheetsplat::internals::brick::BrickList;
 use sheetsplat::internals::classify::classify;
@@ -26,10 +26,10 @@ use common::compare::{self, assert_at_least, assert_at_most};
 use common::images::{largest_difference, rms};
 use common::{COMPOSITINGS, F16, F32, gpu, scene, transfer};
 
-fn open(limits: Limits, features: Features, sheet_format: Option<TextureFormat>) -> Result<Headless, DeviceError> {
+fn open(limits: Limits, features: Features, sheet_format: Option<TextureFormat>) -> Result<GpuHeadless, DeviceError> {
     let mut options = common::lavapipe().with_requirements(DeviceRequirements { features, limits });
     options.sheet_format = sheet_format;
-    Headless::new(&options)
+    GpuHeadless::new(&options)
 }
 
 /// A small translucent head, so that every sheet counts.
@@ -72,7 +72,7 @@ fn rgba32float_sheets_take_the_default_limits_too() {
     let gpu = open(Limits::default(), Features::FLOAT32_BLENDABLE, None).unwrap();
     assert_eq!(gpu.renderer().sheet_format(), TextureFormat::Rgba32Float);
     // Every device allows 32 bytes of colour attachments, which are two such sheets.
-    let pairs = Headless::new(&common::lavapipe().with_sheets_per_group(2)).unwrap();
+    let pairs = GpuHeadless::new(&common::lavapipe().with_sheets_per_group(2)).unwrap();
     let (volume, mut scene) = head();
     scene.splatting.rasterizer = Rasterizer::Quads;
     let renderings = [gpu, pairs].map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap());
@@ -97,7 +97,7 @@ fn attachments_limit_the_sheets_of_a_group() {
     };
     let fixed = |sheets: u32| {
         let options = common::lavapipe().with_sheets_per_group(sheets);
-        Headless::new(&options).unwrap().render_volume(volume.clone(), &scene).unwrap().stats.counts
+        GpuHeadless::new(&options).unwrap().render_volume(volume.clone(), &scene).unwrap().stats.counts
     };
     let of = [1, 2, 4].map(fixed);
     assert!(of[0].quads > of[1].quads && of[1].quads > of[2].quads, "{of:?}");
@@ -252,9 +252,9 @@ fn a_row_of_tiles_larger_than_a_binding_is_an_error() {
 
 #[test]
 fn an_unknown_adapter_is_an_error_that_names_those_there_are() {
-    let there = Headless::new(&HeadlessOptions::default()).unwrap();
+    let there = GpuHeadless::new(&HeadlessOptions::default()).unwrap();
     let name = there.render_volume(head().0, &head().1).unwrap().stats.adapter;
-    match Headless::new(&HeadlessOptions::default().with_adapter("no such GPU")) {
+    match GpuHeadless::new(&HeadlessOptions::default().with_adapter("no such GPU")) {
         Err(error @ DeviceError::NoAdapter { .. }) => {
             let message = error.to_string();
             assert!(message.contains("\"no such GPU\"") && message.contains(&name), "{message}");
@@ -263,7 +263,7 @@ fn an_unknown_adapter_is_an_error_that_names_those_there_are() {
     }
     // Any part of a name selects it, ignoring case.
     let part = name[1..].to_uppercase();
-    Headless::new(&HeadlessOptions::default().with_adapter(part)).unwrap();
+    GpuHeadless::new(&HeadlessOptions::default().with_adapter(part)).unwrap();
 }
 
 #[test]
@@ -326,7 +326,7 @@ fn deterministic_options_do_not_depend_on_the_device() {
     let options = HeadlessOptions::DETERMINISTIC.with_adapter("llvmpipe");
     let (volume, scene) = head();
     let renderings = [options.clone().with_requirements(requirements), options]
-        .map(|options| Headless::new(&options).unwrap().render_volume(volume.clone(), &scene).unwrap());
+        .map(|options| GpuHeadless::new(&options).unwrap().render_volume(volume.clone(), &scene).unwrap());
     assert_eq!(renderings[0].stats.counts, renderings[1].stats.counts);
     assert!(renderings[0].image == renderings[1].image);
     assert!(renderings[0].image != gpu().render_volume(volume, &scene).unwrap().image, "gpu() draws by tiles, in f32");

@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use sheetsplat::Renderer;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::gpu::classified_volume::Touched;
 use sheetsplat::internals::iso_range::{ValueSet, ordinal};
 use sheetsplat::internals::value_list::ValueList;
@@ -47,7 +47,7 @@ fn taking_part(volume: &Volume, transfer: &TransferFunction) -> Vec<bool> {
         .collect()
 }
 
-fn assert_fresh(gpu: &Headless, view: &mut SceneView, name: &str) {
+fn assert_fresh(gpu: &GpuHeadless, view: &mut SceneView, name: &str) {
     let drawn = gpu.draw(view).unwrap();
     let scene = Scene { transfer: view.volume().transfer().clone().into(), ..view.scene().clone() };
     let fresh = gpu.render_volume(view.volume().volume().clone(), &scene).unwrap();
@@ -70,7 +70,7 @@ fn a_changed_view_is_a_fresh_one() {
     }
 }
 
-fn assert_changes_are_fresh(gpu: &Headless, rasterizer: Rasterizer) {
+fn assert_changes_are_fresh(gpu: &GpuHeadless, rasterizer: Rasterizer) {
     let (volume, mut scene) = head();
     scene.splatting.rasterizer = rasterizer;
     // Few voxels at first, so that the lists must grow later.
@@ -317,7 +317,7 @@ fn a_change_recomputes_only_what_depends_on_it() {
     }
 }
 
-fn assert_costs(gpu: &Headless, rasterizer: Rasterizer) {
+fn assert_costs(gpu: &GpuHeadless, rasterizer: Rasterizer) {
     let renderer: &Renderer = gpu.renderer();
     let (volume, mut scene) = head();
     scene.splatting.rasterizer = rasterizer;

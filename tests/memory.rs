@@ -5,7 +5,7 @@
 mod common;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::LabelTables;
 use sheetsplat::settings::Light;
@@ -24,7 +24,7 @@ fn head(size: u32) -> (Volume, Scene) {
 }
 
 /// The bytes that wgpu has allocated, once the device is idle.
-fn allocated(gpu: &Headless) -> u64 {
+fn allocated(gpu: &GpuHeadless) -> u64 {
     gpu.device().poll(PollType::wait_indefinitely()).unwrap();
     gpu.device().generate_allocator_report().unwrap().total_allocated_bytes
 }
@@ -109,7 +109,7 @@ fn a_volumes_bytes_are_known_before() {
 #[test]
 fn a_frames_bytes_are_known_before() {
     let [roomy, small] = [gpu(), gpu_with_small_bindings(64 << 10)];
-    let profiling = Headless::new(&lavapipe().with_profile(true)).unwrap();
+    let profiling = GpuHeadless::new(&lavapipe().with_profile(true)).unwrap();
     let (volume, base) = head(40);
     let mut scenes = Vec::new();
     for (rasterizer, footprint) in FORMS {
@@ -156,7 +156,7 @@ fn a_frames_bytes_are_known_before() {
 }
 
 /// The memory of a new view with the same settings.
-fn fresh(gpu: &Headless, view: &SceneView) -> u64 {
+fn fresh(gpu: &GpuHeadless, view: &SceneView) -> u64 {
     let volume = view.volume().gpu_volume();
     let mut fresh = SceneView::new(gpu.device(), volume, view.scene()).unwrap();
     fresh.set_first_hit(view.first_hits().map(|_| 0.2)).unwrap();

@@ -7,7 +7,7 @@ mod common;
 use std::f64::consts::TAU;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::image::Image;
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
@@ -19,7 +19,7 @@ use common::compare::{assert_at_most, largest};
 use common::images::largest_difference;
 use common::{COMPOSITINGS, F16, F32, FORMS, RASTERIZERS, Random, camera, gpu, scene, transfer};
 
-fn render(gpu: &Headless, volume: &Volume, scene: &Scene) -> (Image, u64) {
+fn render(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> (Image, u64) {
     let rendering = gpu.render_volume(volume.clone(), scene).unwrap();
     (rendering.image, rendering.stats.counts.sheets)
 }
@@ -124,7 +124,7 @@ impl UniformSlab {
         }
     }
 
-    fn check(&self, gpu: &Headless, rasterizer: Rasterizer, direction: DVec3, slab_width: f64) {
+    fn check(&self, gpu: &GpuHeadless, rasterizer: Rasterizer, direction: DVec3, slab_width: f64) {
         const SIZE: u32 = 48;
         let volume = self.volume();
         let mut scene = scene(SIZE, SIZE);
@@ -253,7 +253,7 @@ fn every_run_gives_the_same_bytes() {
     for ((compositing, projection), form) in cases.flat_map(|case| FORMS.map(|form| (case, form))) {
         (scene.splatting.compositing, scene.camera.projection) = (compositing, projection);
         (scene.splatting.rasterizer, scene.splatting.footprint) = form;
-        let bytes = |gpu: &Headless| {
+        let bytes = |gpu: &GpuHeadless| {
             let (image, _) = render(gpu, &volume, &scene);
             bytemuck::cast_slice::<_, u8>(image.pixels.as_flattened()).to_vec()
         };

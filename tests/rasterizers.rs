@@ -6,7 +6,7 @@ mod common;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::RenderError;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::gpu::device::{DeviceRequirements, TILE_FEATURES};
 use sheetsplat::internals::gpu::targets::CompositingBuffer;
 use sheetsplat::scene::Scene;
@@ -27,18 +27,18 @@ fn head() -> (Volume, Scene) {
 }
 
 /// A device with only these features.
-fn open(features: Features) -> Headless {
+fn open(features: Features) -> GpuHeadless {
     let requirements = DeviceRequirements { features, limits: Limits::default() };
-    Headless::new(&lavapipe().with_requirements(requirements)).unwrap()
+    GpuHeadless::new(&lavapipe().with_requirements(requirements)).unwrap()
 }
 
 /// The rasterizer that drew a frame.
-fn drawn_by(gpu: &Headless, volume: &Volume, scene: &Scene) -> String {
+fn drawn_by(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> String {
     gpu.render_volume(volume.clone(), scene).unwrap().stats.rasterizer
 }
 
 /// The key in a refused scene's message, and the message.
-fn refusal(gpu: &Headless, volume: &Volume, scene: &Scene) -> (String, String) {
+fn refusal(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> (String, String) {
     match gpu.render_volume(volume.clone(), scene) {
         Err(RenderError::OutOfRange(error)) => (error.key.clone(), error.to_string()),
         other => panic!("{other:?}"),
@@ -75,7 +75,7 @@ fn auto_chooses_tiles_where_they_are_supported() {
 #[test]
 fn settings_that_require_tiles_are_refused_without_them() {
     let [subgroups, none] = [TILE_FEATURES, Features::empty()].map(open);
-    let refused = |gpu: &Headless, (volume, scene): &(Volume, Scene), words: &[&str]| {
+    let refused = |gpu: &GpuHeadless, (volume, scene): &(Volume, Scene), words: &[&str]| {
         let (key, message) = refusal(gpu, volume, scene);
         assert_eq!(key, "splatting.rasterizer", "{message}");
         words.iter().for_each(|word| assert!(message.contains(word), "no {word:?} in {message}"));
@@ -90,7 +90,7 @@ fn settings_that_require_tiles_are_refused_without_them() {
     refused(&open(Features::SUBGROUP), &tiles, &["\"tiles\"", "barriers", "\"quads\""]);
     let limits = Limits { max_compute_workgroup_storage_size: 16383, ..Limits::default() };
     let requirements = DeviceRequirements { features: TILE_FEATURES, limits };
-    let little = Headless::new(&lavapipe().with_requirements(requirements)).unwrap();
+    let little = GpuHeadless::new(&lavapipe().with_requirements(requirements)).unwrap();
     refused(&little, &tiles, &["max_compute_workgroup_storage_size", "16383", "16384", "\"quads\""]);
     let parallelogram = with(|scene| scene.splatting.footprint_box = FootprintBox::Parallelogram);
     refused(&none, &parallelogram, &["\"tiles\"", "subgroups"]);
@@ -147,7 +147,7 @@ fn small_bindings_change_no_bit_of_tiles() {
     let [full, small] = [Limits::default().max_storage_buffer_binding_size, 200 << 10].map(|bytes| {
         let limits = Limits { max_storage_buffer_binding_size: bytes, ..Limits::default() };
         let requirements = DeviceRequirements { features: TILE_FEATURES, limits };
-        Headless::new(&lavapipe().with_requirements(requirements)).unwrap()
+        GpuHeadless::new(&lavapipe().with_requirements(requirements)).unwrap()
     });
     assert_eq!(CompositingBuffer::bands(&small.device().limits(), [300, 200]).unwrap().len(), 7);
     for order in [Order::FrontToBack, Order::BackToFront] {

@@ -9,7 +9,7 @@ mod common;
 use std::sync::Arc;
 
 use glam::DVec3;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::Method;
 use sheetsplat::volume::{Volume, builtin};
@@ -22,7 +22,7 @@ const ANGLES: [f64; 8] = [0.0, 15.0, 30.0, 44.5, 45.0, 60.0, 75.0, 89.5];
 const STEP: f64 = 0.5;
 
 /// The largest change of the image's mean brightness over a step.
-fn largest_change(gpu: &Headless, volume: &Arc<Volume>, scene: &Scene) -> f64 {
+fn largest_change(gpu: &GpuHeadless, volume: &Arc<Volume>, scene: &Scene) -> f64 {
     let mut view = gpu.view(volume.clone(), scene).unwrap();
     let mut brightness = |degrees: f64| {
         let mut camera = scene.camera;

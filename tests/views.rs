@@ -5,7 +5,7 @@
 #[expect(dead_code, reason = "not every file needs all of it")]
 mod common;
 
-use sheetsplat::headless::{Headless, Rendering};
+use sheetsplat::headless::{GpuHeadless, Rendering};
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::Light;
@@ -41,7 +41,7 @@ fn random_case(random: &mut Random) -> (Volume, Scene) {
     (volume, scene)
 }
 
-fn render(gpu: &Headless, volume: &Volume, scene: &Scene, rasterizer: Rasterizer, order: Order) -> Rendering {
+fn render(gpu: &GpuHeadless, volume: &Volume, scene: &Scene, rasterizer: Rasterizer, order: Order) -> Rendering {
     let mut scene = scene.clone();
     (scene.splatting.rasterizer, scene.splatting.order) = (rasterizer, order);
     gpu.render_volume(volume.clone(), &scene).unwrap()

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use sheetsplat::SceneView;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::scene::{Scene, VolumeSource};
 use sheetsplat::settings::Camera;
 use sheetsplat::stats::Stats;
@@ -39,7 +39,7 @@ pub(crate) fn label(name: &str) -> String {
 }
 
 /// Draws a frame and returns the milliseconds from planning to read-back, and its statistics.
-pub(crate) fn timed(headless: &Headless, view: &mut SceneView) -> (f64, Stats) {
+pub(crate) fn timed(headless: &GpuHeadless, view: &mut SceneView) -> (f64, Stats) {
     let start = Instant::now();
     let stats = headless.draw(view).unwrap().stats;
     (start.elapsed().as_secs_f64() * 1e3, stats)

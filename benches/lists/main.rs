@@ -17,7 +17,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 use sheetsplat::SceneView;
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::{GpuHeadless, HeadlessOptions};
 use sheetsplat::internals::gpu::classified_volume::Touched;
 use sheetsplat::internals::iso_range::ValueSet;
 use sheetsplat::internals::value_list::ValueList;
@@ -60,13 +60,13 @@ const CHANGES: [Change; 7] = [
 fn main() {
     let (pairs, scenes) = common::arguments(7);
     let scenes = if scenes.is_empty() { default_scenes() } else { scenes };
-    let headless = Headless::new(&HeadlessOptions::default()).unwrap();
+    let headless = GpuHeadless::new(&HeadlessOptions::default()).unwrap();
     for name in &scenes {
         bench(&headless, &common::open(name), &common::label(name), pairs);
     }
 }
 
-fn bench(headless: &Headless, scene: &Scene, name: &str, pairs: usize) {
+fn bench(headless: &GpuHeadless, scene: &Scene, name: &str, pairs: usize) {
     let volume = Arc::new(scene.load_volume().unwrap());
     let start = Instant::now();
     let list = ValueList::new(volume.values());
@@ -135,7 +135,7 @@ fn bench(headless: &Headless, scene: &Scene, name: &str, pairs: usize) {
 }
 
 /// Prepares a frame, and submits the resulting writes.
-fn prepare(headless: &Headless, view: &mut SceneView) {
+fn prepare(headless: &GpuHeadless, view: &mut SceneView) {
     headless.renderer().prepare(headless.device(), headless.queue(), view).unwrap();
     headless.queue().submit([]);
     headless.device().poll(sheetsplat::wgpu::PollType::wait_indefinitely()).unwrap();

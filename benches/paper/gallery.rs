@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{Rgb, RgbImage};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Method, Splatting};
@@ -22,7 +22,7 @@ const SIZE: [&str; 2] = ["image.width=240", "image.height=240"];
 const SMALL: [&str; 2] = ["image.width=200", "image.height=200"];
 
 /// Makes every picture, with captions from its measurements.
-pub(crate) fn make(headless: &Headless) {
+pub(crate) fn make(headless: &GpuHeadless) {
     let parts = [cube(headless), turns(headless), views(headless), accelerations(headless), anisotropy(headless)];
     let head = "# The paper's figures\n\n\
         `cargo bench --bench paper -- gallery` makes this page and its pictures from the scenes in this folder. The objects are the builtin ones, not the\n\
@@ -32,7 +32,7 @@ pub(crate) fn make(headless: &Headless) {
 }
 
 /// Figs. 3 and 6.
-fn cube(headless: &Headless) -> String {
+fn cube(headless: &GpuHeadless) -> String {
     const ANGLES: [f64; 2] = [44.8, 45.2];
     let mut text = "## Figs. 3 and 6: a cube before and after 45°\n\n| | 44.8° | 45.2° |\n|---|---|---|\n".to_owned();
     let scene = open("cube", &[]);
@@ -65,7 +65,7 @@ fn cube(headless: &Headless) -> String {
 }
 
 /// Fig. 14, and the brightness of all frames in between.
-fn turns(headless: &Headless) -> String {
+fn turns(headless: &GpuHeadless) -> String {
     const ANGLES: [f64; 3] = [41.0, 44.0, 47.0];
     let mut text = "## Fig. 14: turning the nerve cell\n\n| | 41° | 44° | 47° |\n|---|---|---|---|\n".to_owned();
     let translucent = open("nerve", &[SIZE[0], SIZE[1], "transfer.opacity=[[30,0],[90,0.2]]"]);
@@ -97,7 +97,7 @@ fn turns(headless: &Headless) -> String {
 }
 
 /// The curve of one turn, and its largest changes.
-fn curve(headless: &Headless, object: &str, volume: &Arc<Volume>, scene: &Scene) -> String {
+fn curve(headless: &GpuHeadless, object: &str, volume: &Arc<Volume>, scene: &Scene) -> String {
     let turns = METHODS.map(|method| Turn::new(headless, volume, scene, method));
     let top = turns.iter().flat_map(|turn| &turn.brightness).fold(0.0, |top: f64, &b| top.max(b)) * 1.05;
     let file = format!("turn-{object}");
@@ -127,7 +127,7 @@ fn curve(headless: &Headless, object: &str, volume: &Arc<Volume>, scene: &Scene)
 }
 
 /// Fig. 15.
-fn views(headless: &Headless) -> String {
+fn views(headless: &GpuHeadless) -> String {
     let mut text =
         "## Fig. 15: semi-transparent objects, and the nerve cell\n\n| | | | |\n|---|---|---|---|\n".to_owned();
     let scenes = ["glass-head", "transparent-head", "tomato", "nerve"];
@@ -148,7 +148,7 @@ fn views(headless: &Headless) -> String {
 }
 
 /// Fig. 16.
-fn accelerations(headless: &Headless) -> String {
+fn accelerations(headless: &GpuHeadless) -> String {
     let columns = tables::accelerations(Splatting::default()).map(|(name, _)| name);
     let mut text = format!(
         "## Fig. 16: the effect of accelerations on the image\n\n| {} |\n|---|---|---|---|---|\n",
@@ -172,7 +172,7 @@ fn accelerations(headless: &Headless) -> String {
 }
 
 /// §4.2.
-fn anisotropy(headless: &Headless) -> String {
+fn anisotropy(headless: &GpuHeadless) -> String {
     let volume = Arc::new(ball());
     let mut text = "## §4.2: a ball on a grid of 1:1:5\n\nIts value is constant and it is not shaded, so it should look the same from all directions.\n\n".to_owned();
     text += &curve(headless, "ball", &volume, &open("ball", &[]));

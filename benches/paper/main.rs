@@ -16,7 +16,7 @@ mod plot;
 mod scenes;
 mod tables;
 
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::{GpuHeadless, HeadlessOptions};
 
 const TABLES: [&str; 3] = ["tables-2-and-4", "table-3", "economies"];
 const GALLERY: &str = "gallery";
@@ -29,7 +29,7 @@ fn main() {
         parts = TABLES.to_vec();
     }
     let rows = scenes::rows(&wanted);
-    let headless = Headless::new(&HeadlessOptions::default()).unwrap();
+    let headless = GpuHeadless::new(&HeadlessOptions::default()).unwrap();
     for part in parts {
         match part {
             "tables-2-and-4" => tables::tables_2_and_4(&headless, frames, &rows),

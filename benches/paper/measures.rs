@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{DVec3, UVec3, dvec3};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
@@ -63,7 +63,7 @@ impl Turn {
     /// The side of an image in pixels.
     pub(crate) const SIDE: u32 = 256;
 
-    pub(crate) fn new(headless: &Headless, volume: &Arc<Volume>, scene: &Scene, method: Method) -> Self {
+    pub(crate) fn new(headless: &GpuHeadless, volume: &Arc<Volume>, scene: &Scene, method: Method) -> Self {
         let mut scene = scene.clone();
         (scene.image.width, scene.image.height) = (Self::SIDE, Self::SIDE);
         scene.splatting.method = method;

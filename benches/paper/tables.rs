@@ -1,7 +1,7 @@
 //! Tables 2 to 4, and a table of the economies of §8.
 
 use sheetsplat::SceneView;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::settings::{Economies, Method, Order, Rasterizer, Splatting};
 use sheetsplat::stats::{Counts, Stats};
 
@@ -29,7 +29,7 @@ fn ratios(&[all, all_axis_aligned, visible, tiled, axis_aligned]: &[f64; 5]) -> 
     [all / all_axis_aligned, all / visible, all / tiled, tiled / axis_aligned]
 }
 
-pub(crate) fn tables_2_and_4(headless: &Headless, frames: usize, rows: &[Row]) {
+pub(crate) fn tables_2_and_4(headless: &GpuHeadless, frames: usize, rows: &[Row]) {
     let (mut shares, mut times, mut counts) = (String::new(), String::new(), String::new());
     for row in rows {
         let mut view = headless.view(row.scene.load_volume().unwrap(), &row.scene).unwrap();
@@ -126,7 +126,7 @@ pub(crate) fn accelerations(default: Splatting) -> [(&'static str, Splatting); 5
     ]
 }
 
-pub(crate) fn table_3(headless: &Headless, frames: usize, rows: &[Row]) {
+pub(crate) fn table_3(headless: &GpuHeadless, frames: usize, rows: &[Row]) {
     let columns = accelerations(Splatting::default()).map(|(name, _)| name);
     let speedups = |seconds: &[f64; 5]| seconds.map(|other| seconds[0] / other);
     let (mut shares, mut times) = (String::new(), String::new());
@@ -149,7 +149,7 @@ pub(crate) fn table_3(headless: &Headless, frames: usize, rows: &[Row]) {
 }
 
 /// The paper's future work: the error against the image without economies, sections, and time.
-pub(crate) fn economies(headless: &Headless, frames: usize, rows: &[Row]) {
+pub(crate) fn economies(headless: &GpuHeadless, frames: usize, rows: &[Row]) {
     let none = Economies::default();
     let whole = [0.005, 0.02, 0.1]
         .map(|whole_below| (format!("whole_below = {whole_below}"), Economies { whole_below, ..none }));
@@ -197,7 +197,12 @@ fn print(title: &str, columns: &[&str], rows: &str) {
 
 /// The median time in milliseconds of frames with each of some settings. Settings are drawn in turn, so that other work on the machine
 /// affects all alike.
-fn interleaved(headless: &Headless, view: &mut SceneView, settings: &[Splatting], frames: usize) -> Vec<(f64, Stats)> {
+fn interleaved(
+    headless: &GpuHeadless,
+    view: &mut SceneView,
+    settings: &[Splatting],
+    frames: usize,
+) -> Vec<(f64, Stats)> {
     let mut runs: Vec<Vec<(f64, Stats)>> = settings.iter().map(|_| Vec::new()).collect();
     for _ in 0..frames {
         for (settings, runs) in settings.iter().zip(&mut runs) {

@@ -7,8 +7,8 @@ use rayon::prelude::*;
 
 use super::project::Projection;
 use super::sheets::{COLUMNS, ROWS};
-use crate::gpu::layout::Brick;
 use crate::lists::brick;
+use crate::lists::brick::Brick;
 
 /// Pixels around footprints' boxes, and a part of them, for what f32 rounds.
 const SLACK: f64 = 0.02;

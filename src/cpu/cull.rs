@@ -1,7 +1,6 @@
 //! Early splat elimination (§6, SPEC §6): which pixels of a tile are opaque, and whether any pixel of a footprint's box is not. The same
 //! decision as `shaders/cull_voxels.wgsl`; pixels outside of the tile are other tiles' to draw.
 
-use super::cut::TileCuts;
 use super::sheets::{COLUMNS, ROWS};
 
 /// Levels of rows joined: 1, 2, 4, … of them.
@@ -72,8 +71,8 @@ impl OpenMask {
     }
 
     /// Makes pixels opaque of which nothing shows.
-    pub(super) fn close_empty(&mut self, cuts: &TileCuts) {
-        for (row, [start, end]) in cuts.rows.iter().enumerate() {
+    pub(super) fn close_empty(&mut self, shown: &[[[f32; COLUMNS]; 2]]) {
+        for (row, [start, end]) in shown.iter().enumerate() {
             let empty = (0..COLUMNS).filter(|&x| end[x] <= start[x]).fold(0, |bits, x| bits | 1 << x);
             self.close(row, empty);
         }

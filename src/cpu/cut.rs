@@ -1,84 +1,95 @@
-//! What clip planes and the crop box leave of a pixel's ray, and so of its sheets; the same as `shaders/shared/cut.wgsl`.
+//! What clip planes and the crop box leave of pixels' rays, and how those look at sheets; the same as `shaders/shared/cut.wgsl`.
 
-use glam::{DVec2, DVec4};
+use std::ops::Range;
 
+use super::means::Means;
+use super::ray::{PixelRay, PixelRays};
 use super::sheets::{COLUMNS, ROWS};
-use crate::geometry::slab::SlabGrid;
-use crate::geometry::view_geometry::{Rays, ViewGeometry};
-use crate::settings::clip::{Clip, HalfSpace};
+use crate::geometry::view_geometry::ViewGeometry;
+use crate::scene::Scene;
+use crate::settings::clip::HalfSpace;
 use crate::volume::Grid;
 
-/// What is kept of all pixels' rays.
+/// A number for every pixel of a tile, by row.
+type PixelValues = Vec<[f32; COLUMNS]>;
+
+/// How a frame's pixels look at sheets.
 #[derive(Clone, Debug)]
-pub(super) struct Cuts {
-    half_spaces: Vec<HalfSpace>,
-    rays: Rays,
-    /// The sheet depth of a position.
-    depth: DVec4,
-    slabs: SlabGrid,
-    middle: DVec2,
+pub(super) struct RayMode {
+    pub(super) rays: PixelRays,
+    /// What is kept, where anything is cut away.
+    kept: Option<Vec<HalfSpace>>,
+    means: Option<Means>,
 }
 
-/// Of every pixel of a tile the stretch of its ray that shows, in slabs from a certain one on; empty where nothing shows.
-#[derive(Clone, Debug)]
-pub(super) struct TileCuts {
+/// How the pixels of a tile look at sheets, by row; slabs are counted from `base` on.
+#[derive(Clone, Debug, Default)]
+pub(super) struct TileRays {
     base: i32,
-    /// By row: where the stretches of its pixels start and end.
-    pub(super) rows: Vec<[[f32; COLUMNS]; 2]>,
+    /// Where the stretches of rays that show start and end, where anything is cut away; empty where nothing shows.
+    pub(super) shown: Option<Vec<[[f32; COLUMNS]; 2]>>,
+    /// What sheets are multiplied by to be means.
+    pub(super) weights: Option<PixelValues>,
+    /// From where to where the middles of slabs lie that count, where not all do.
+    pub(super) counted: Option<Vec<[[f32; COLUMNS]; 2]>>,
 }
 
-impl Cuts {
-    /// `None` where nothing is cut away.
-    pub(super) fn new(clip: &Clip, view: &ViewGeometry, grid: &Grid) -> Option<Self> {
-        (!clip.is_empty()).then(|| Self {
-            half_spaces: clip.half_spaces(grid),
-            rays: view.rays(),
-            depth: view.sheet_depth_row(grid.aspect(), grid.center()),
-            slabs: view.slabs,
-            middle: DVec2::from(view.size.map(f64::from)) / 2.0,
-        })
+impl RayMode {
+    pub(super) fn new(scene: &Scene, view: &ViewGeometry, grid: &Grid) -> Self {
+        let compositing = scene.splatting.compositing;
+        Self {
+            rays: PixelRays::new(view, grid),
+            kept: (!scene.clip.is_empty()).then(|| scene.clip.half_spaces(grid)),
+            means: compositing.is_by_means().then(|| Means::new(view, grid, &scene.splatting)),
+        }
     }
 
-    /// The stretches of a tile's pixels, given its first pixel, in slabs from `base` on.
-    pub(super) fn of_tile(&self, origin: [usize; 2], base: i32) -> TileCuts {
-        let mut rows = vec![[[0.0; COLUMNS]; 2]; ROWS];
-        for (y, row) in rows.iter_mut().enumerate() {
-            let [starts, ends] = row;
-            for (x, (start, end)) in starts.iter_mut().zip(ends).enumerate() {
-                let pixel = DVec2::new((origin[0] + x) as f64, (origin[1] + y) as f64) + 0.5;
-                [*start, *end] = self.stretch(pixel - self.middle, base);
-            }
-        }
-        TileCuts { base, rows }
+    /// The depths at which a ray shows something.
+    fn shown(&self, ray: &PixelRay) -> Range<f64> {
+        ray.inside(self.kept.as_deref().unwrap_or_default())
     }
 
-    fn stretch(&self, place: DVec2, base: i32) -> [f32; 2] {
-        let origin = self.rays.at(place, 0.0);
-        let along = self.rays.at(place, 1.0) - origin;
-        let (mut start, mut end) = (f64::NEG_INFINITY, f64::INFINITY);
-        for HalfSpace { normal, offset } in &self.half_spaces {
-            let (at_origin, slope) = (normal.dot(origin) + offset, normal.dot(along));
-            if slope > 0.0 {
-                start = start.max(-at_origin / slope);
-            } else if slope < 0.0 {
-                end = end.min(-at_origin / slope);
-            } else if at_origin < 0.0 {
-                end = f64::NEG_INFINITY;
-            }
+    /// How the pixels of a tile look at sheets, given its first pixel.
+    pub(super) fn of_tile(&self, origin: [usize; 2], base: i32) -> TileRays {
+        let from_base = |slabs: [f64; 2]| slabs.map(|slab| (slab - f64::from(base)) as f32);
+        let ends = |of: &dyn Fn(&PixelRay) -> [f64; 2]| {
+            let mut rows = vec![[[0.0; COLUMNS]; 2]; ROWS];
+            self.each_pixel(origin, |ray, [x, y]| [rows[y][0][x], rows[y][1][x]] = from_base(of(ray)));
+            rows
+        };
+        let weights = self.means.as_ref().map(|means| {
+            let mut rows = vec![[0.0; COLUMNS]; ROWS];
+            self.each_pixel(origin, |ray, [x, y]| rows[y][x] = means.weight(ray, self.shown(ray)) as f32);
+            rows
+        });
+        let nothing = [0.0, f64::NEG_INFINITY];
+        TileRays {
+            base,
+            shown: self.kept.is_some().then(|| ends(&|ray| ray.slabs(self.shown(ray)).unwrap_or(nothing))),
+            weights,
+            counted: self
+                .means
+                .as_ref()
+                .filter(|means| means.is_choosy())
+                .map(|means| ends(&|ray| means.counted(ray, self.shown(ray)))),
         }
-        if start >= end {
-            return [0.0, f32::NEG_INFINITY];
+    }
+
+    fn each_pixel(&self, origin: [usize; 2], mut then: impl FnMut(&PixelRay, [usize; 2])) {
+        for (y, x) in (0..ROWS).flat_map(|y| (0..COLUMNS).map(move |x| (y, x))) {
+            then(&self.rays.of([origin[0] + x, origin[1] + y]), [x, y]);
         }
-        // Sheets are parallel to the image: their numbers grow with depth.
-        let at_origin = (self.depth.dot(origin.extend(1.0)) - self.slabs.origin) / self.slabs.width;
-        let slope = self.depth.truncate().dot(along) / self.slabs.width;
-        [start, end].map(|depth| (at_origin - f64::from(base) + slope * depth) as f32)
     }
 }
 
-impl TileCuts {
+impl TileRays {
     /// Where a slab begins, in the terms of the stretches.
     pub(super) fn begin(&self, slab: i32) -> f32 {
         (slab - self.base) as f32
+    }
+
+    /// The place among slabs that is meant by a number in the terms of the stretches.
+    pub(super) fn slab(&self, at: f32) -> f64 {
+        f64::from(self.base) + f64::from(at)
     }
 }

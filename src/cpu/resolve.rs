@@ -20,7 +20,9 @@ impl Resolver {
     /// Premultiplied in, premultiplied out.
     pub(super) fn pixel(&self, acc: [f32; 4]) -> [f32; 4] {
         let image = match self.compositing {
-            Compositing::Xray => acc.map(|channel| channel.min(1.0)),
+            Compositing::Xray | Compositing::Average => acc.map(|channel| channel.min(1.0)),
+            Compositing::Minimum if acc[3] > 0.0 => [acc[0], acc[1], acc[2], 2.0 - acc[3]],
+            Compositing::Surface if acc[3] < 1.0 => [0.0; 4],
             _ => acc,
         };
         std::array::from_fn(|channel| image[channel] + (1.0 - image[3]) * self.background[channel])

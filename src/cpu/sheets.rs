@@ -25,8 +25,12 @@ pub(super) struct Buffers {
     pub(super) sheets: Vec<SheetRow>,
     /// For every slot the rows that hold anything.
     pub(super) written: [u64; RING],
+    /// The rows whose compositing buffer may hold a surface that is not reached yet.
+    pub(super) kept: u64,
     /// The compositing buffer, row by row.
     pub(super) acc: Vec<[[f32; COLUMNS]; CHANNELS]>,
+    /// Where the opacity asked for is reached, row by row, in slabs as [`TileRays`](super::cut::TileRays) counts them; infinite where it is not.
+    pub(super) hits: Vec<[f32; COLUMNS]>,
 }
 
 impl Buffers {
@@ -35,7 +39,9 @@ impl Buffers {
         Self {
             sheets: vec![[[[0.0; STRIDE]; CHANNELS]; RING]; ROWS],
             written: [0; RING],
+            kept: 0,
             acc: vec![[[0.0; COLUMNS]; CHANNELS]; ROWS],
+            hits: vec![[f32::INFINITY; COLUMNS]; ROWS],
         }
     }
 
@@ -48,7 +54,9 @@ impl Buffers {
                 self.sheets[row][slot] = [[0.0; STRIDE]; CHANNELS];
             }
         }
+        self.kept = 0;
         self.acc.fill([[0.0; COLUMNS]; CHANNELS]);
+        self.hits.fill([f32::INFINITY; COLUMNS]);
     }
 }
 

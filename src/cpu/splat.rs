@@ -53,6 +53,8 @@ pub(super) struct Splatter {
     pub(super) half_box: [f32; 2],
     /// In perspective the size of a pixel at depth 1, `unit`s.
     pub(super) pixel_per_depth: Option<f32>,
+    /// Whether sheets hold whole kernels, with the footprint that they have at the voxel's depth.
+    pub(super) is_whole: bool,
 }
 
 /// The sections of a splat in up to [`SECTIONS`] sheets.
@@ -92,7 +94,10 @@ impl Splatter {
             let radius = f32x8::splat(simd, self.radius);
             let within = t.max(-radius).min(radius);
             // Of sections that are to be drawn: the last lane's far plane does not matter.
-            let middle = (within + within.slide::<1>(within)) * 0.5;
+            let middle = match self.is_whole {
+                true => f32x8::splat(simd, 0.0),
+                false => (within + within.slide::<1>(within)) * 0.5,
+            };
             let pix = (middle * local.depth_per_warped + local.from_eye) * pixel_per_depth;
             let squared = pix * pix;
             let (along, across) = (squared * local.metric[0], squared * local.metric[1]);

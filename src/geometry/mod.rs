@@ -6,5 +6,6 @@ pub mod grid_warp;
 pub mod kernel;
 pub mod means;
 pub mod slab;
+#[cfg(feature = "gpu")]
 pub(crate) mod surfaces;
 pub mod view_geometry;

@@ -3,10 +3,12 @@
 use std::fmt::{Display, Formatter};
 use std::path::Path;
 
+#[cfg(feature = "gpu")]
 use wgpu::AdapterInfo;
 
 use super::file;
 use crate::headless::Rendering;
+#[cfg(feature = "gpu")]
 use crate::headless::device::driver_name;
 use crate::image::{Image, ImageError};
 use crate::volume::ReadOptions;
@@ -29,6 +31,7 @@ impl MadeOn {
     }
 }
 
+#[cfg(feature = "gpu")]
 impl From<&AdapterInfo> for MadeOn {
     fn from(info: &AdapterInfo) -> Self {
         Self { adapter: info.name.clone(), driver: driver_name(info) }
@@ -69,6 +72,7 @@ impl Subject for Rendering {
     }
 }
 
+#[cfg(feature = "gpu")]
 impl Subject for (&Image, &AdapterInfo) {
     fn image(&self) -> &Image {
         self.0

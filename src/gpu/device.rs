@@ -1,97 +1,10 @@
 //! The device's features and limits: what the renderer requires, and what it uses if available.
 
-use std::fmt;
-
 use wgpu::{Adapter, Device, DeviceDescriptor, Features, Limits, TextureFormat};
 
 use super::layout::FOLD;
 use super::volume_texture;
-use crate::gpu::fault::DeviceFault;
-
-/// Why no device could be opened or used.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum DeviceError {
-    /// There is no adapter, or none with the requested name.
-    #[error("no GPU adapter: required {required}, actual: {actual}{}", after(advice.as_deref()))]
-    #[non_exhaustive]
-    NoAdapter {
-        /// The requested adapter.
-        required: String,
-        /// The adapters that exist.
-        actual: String,
-        /// Which driver to install, if there is no adapter.
-        advice: Option<String>,
-    },
-    /// The adapter could not open a device.
-    #[error("adapter \"{adapter}\" gave no device: {source}")]
-    #[non_exhaustive]
-    RequestDevice {
-        /// The adapter's name.
-        adapter: String,
-        /// wgpu's error.
-        source: wgpu::RequestDeviceError,
-    },
-    /// The device could not compile the renderer.
-    #[error("adapter \"{adapter}\" cannot run the renderer: {fault}")]
-    #[non_exhaustive]
-    Pipelines {
-        /// The adapter's name.
-        adapter: String,
-        /// The device's error.
-        fault: DeviceFault,
-    },
-    /// A feature that the options need is missing.
-    #[error("device feature: required {required:?}, actual: {actual:?}")]
-    #[non_exhaustive]
-    MissingFeatures {
-        /// The features that are needed.
-        required: Features,
-        /// The features of the device.
-        actual: Features,
-    },
-    /// Limits are too low for any frame.
-    #[error("device limits: {}", list(.0))]
-    Limits(Vec<InsufficientLimit>),
-    /// An option of the renderer is not supported by this device, or by any.
-    #[error("{option}: found {found}, allowed: {allowed}")]
-    #[non_exhaustive]
-    Unsupported {
-        /// The field of [`RendererOptions`](crate::renderer::options::RendererOptions).
-        option: &'static str,
-        /// The option's value.
-        found: String,
-        /// The values that this device supports.
-        allowed: String,
-    },
-}
-
-/// A limit of a device that is insufficient.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct InsufficientLimit {
-    /// The limit's name in wgpu.
-    pub limit: &'static str,
-    /// The required value: a minimum, or a maximum for `min_…` limits.
-    pub required: u64,
-    /// The device's value.
-    pub actual: u64,
-}
-
-impl fmt::Display for InsufficientLimit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { limit, required, actual } = self;
-        write!(f, "{limit}: required {required}, actual: {actual}")
-    }
-}
-
-/// The advice as a suffix of the message.
-fn after(advice: Option<&str>) -> String {
-    advice.map_or(String::new(), |advice| format!("; {advice}"))
-}
-
-fn list(limits: &[InsufficientLimit]) -> String {
-    limits.iter().map(InsufficientLimit::to_string).collect::<Vec<_>>().join("; ")
-}
+pub use crate::device_error::{DeviceError, InsufficientLimit};
 
 /// Features that the renderer uses if the device has them. It requires none of them.
 pub const WANTED_FEATURES: Features = Features::FLOAT32_BLENDABLE.union(Features::TIMESTAMP_QUERY).union(TILE_FEATURES);

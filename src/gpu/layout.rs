@@ -2,6 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
+pub use crate::lists::brick::Brick;
+
 /// A projected and shaded voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -204,22 +206,6 @@ pub struct FieldVoxel {
     pub gradient_xy: u32,
     /// Along z, the same, and 256 more than the exponent that the three are scaled by.
     pub gradient_z: u32,
-}
-
-/// 4×4×4 slots for voxels, x fastest.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-#[repr(C)]
-pub struct Brick {
-    /// A mask of the slots that hold a voxel that takes part.
-    pub present: [u32; 2],
-    /// The minimum x of its voxels.
-    pub x: u32,
-    /// The minimum y of its voxels.
-    pub y: u32,
-    /// The minimum z of its voxels.
-    pub z: u32,
-    /// The maximum minus the minimum of x, y and z, in bytes 0, 1 and 2.
-    pub extent: u32,
 }
 
 /// The state of a brick within a frame, with one bit per voxel.

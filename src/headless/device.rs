@@ -24,7 +24,15 @@ pub fn adapters() -> Vec<Adapter> {
     pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY))
 }
 
-/// The name of an adapter's driver, with its version if known.
+/// Whether there is a GPU that can run the renderer, and not only a software driver.
+pub fn has_gpu() -> bool {
+    adapters().iter().any(|adapter| {
+        let is_software = adapter.get_info().device_type == DeviceType::Cpu;
+        !is_software && DeviceRequirements::insufficient(&DeviceRequirements::for_adapter(adapter).limits).is_empty()
+    })
+}
+
+/// An adapter's driver, and its version where it tells.
 pub fn driver_name(info: &AdapterInfo) -> String {
     format!("{} {}", info.driver, info.driver_info).trim().to_owned()
 }

@@ -80,7 +80,7 @@ fn read(device: &Device, staging: &Buffer, use_bytes: impl FnOnce(&[u8])) -> Res
         // The receiver is gone only if polling failed, and that error is returned.
         let _ = sender.send(result);
     });
-    super::wait(device)?;
+    super::gpu::wait(device)?;
     let mapped = receiver.recv().map_err(|error| failed(error.to_string()))?;
     mapped.map_err(|error| failed(error.to_string()))?;
     use_bytes(&staging.get_mapped_range(..).map_err(|error| failed(error.to_string()))?);

@@ -1,9 +1,9 @@
 //! Bricks: 4×4×4 neighbouring voxels that are tested for visibility together (§6). Each voxel has a fixed slot in its brick, so that voxels
 //! enter and leave without moving others.
 
+use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, UVec3};
 
-use crate::gpu::layout::Brick;
 use crate::volume::Grid;
 
 /// The side of a brick in voxels.
@@ -12,7 +12,23 @@ const SIDE: u32 = 4;
 /// The number of slots in a brick.
 pub const BRICK_VOXELS: u32 = SIDE * SIDE * SIDE;
 
-/// The bricks of a volume that hold voxels, or once did.
+/// 4×4×4 places for voxels, x fastest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Brick {
+    /// Which of the places hold a voxel that takes part, one bit each.
+    pub present: [u32; 2],
+    /// Least x of its voxels.
+    pub x: u32,
+    /// Least y.
+    pub y: u32,
+    /// Least z.
+    pub z: u32,
+    /// Greatest minus least x, y and z, in bytes 0, 1 and 2.
+    pub extent: u32,
+}
+
+/// The bricks of a volume that hold voxels, or held some.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BrickList {
     grid: Grid,

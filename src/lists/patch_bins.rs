@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::gpu::layout::Brick;
 use crate::lists::brick;
+use crate::lists::brick::Brick;
 use crate::setting_error::SettingError;
 use crate::settings::splatting::Order;
 

@@ -7,8 +7,8 @@ use rayon::prelude::*;
 
 use crate::geometry::slab;
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::gpu::layout::Brick;
 use crate::lists::brick;
+use crate::lists::brick::Brick;
 use crate::lists::bucket::Buckets;
 use crate::settings::splatting::Order;
 

@@ -7,9 +7,7 @@ use crate::gpu::device::TILE_FEATURES;
 use crate::pass::composite::RayMode;
 use crate::pass::gather::WORKGROUP_BYTES;
 use crate::setting_error::SettingError;
-use crate::settings::splatting::{
-    Classification, Compositing, FootprintBox, FootprintForm, Method, Order, Rasterizer, Splatting, check_first_hit,
-};
+use crate::settings::splatting::{Classification, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
 
 /// The subgroup sizes that tiles support.
 pub(super) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;
@@ -112,23 +110,9 @@ pub(crate) fn check_rays(
     first_hit: Option<f64>,
     [width, height]: [u32; 2],
 ) -> Result<(), RenderError> {
-    let refused = |key, found: &str, allowed: &str| Err(SettingError::new(key, found, allowed).into());
-    if splatting.method == Method::CompositeEverySample && rays != RayMode::default() {
-        let found = "\"composite-every-sample\" with clip planes, surfaces or first hits";
-        return refused("splatting.method", found, "a method with sheets");
-    }
-    let Some(opacity) = first_hit else { return Ok(()) };
-    if splatting.compositing == Compositing::Minimum {
-        let allowed = "another compositing: the minimum is known only at the end of a ray";
-        return refused("splatting.compositing", "\"minimum\" with first hits", allowed);
-    }
-    check_first_hit(opacity)?;
-    if splatting.culling && splatting.compositing.hides() && opacity > splatting.opacity_threshold {
-        let allowed = format!("above 0, at most {}, the opacity_threshold", splatting.opacity_threshold);
-        return Err(SettingError::new("first_hit", opacity, allowed).into());
-    }
-    if splatting.order != Order::FrontToBack {
-        return refused("splatting.order", "\"back-to-front\" with first hits", "\"front-to-back\"");
+    splatting.check_rays(rays.cut, first_hit)?;
+    if first_hit.is_none() {
+        return Ok(());
     }
     let limits = device.limits();
     let actual = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);

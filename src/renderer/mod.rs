@@ -1,6 +1,7 @@
 //! The renderer that a host embeds. It owns pipelines, but no device, and neither submits nor waits. It prepares every frame, which can fail,
 //! records it, and presents it, which fails only for a scissor outside the target.
 
+pub(crate) mod counts;
 pub(crate) mod options;
 pub(crate) mod pick;
 pub(crate) mod placement;
@@ -30,13 +31,13 @@ use crate::rasterizer::quads::QuadRasterizer;
 use crate::rasterizer::request::FrameRequest;
 use crate::rasterizer::samples::SampleRasterizer;
 use crate::rasterizer::tiles::TileRasterizer;
+use crate::renderer::counts::Staging;
 use crate::renderer::options::RendererOptions;
 use crate::renderer::placement::Placement;
 use crate::renderer::prepared_frame::{Drawing, FirstHits, PreparedFrame, PreviousFrame};
 use crate::renderer::scene_view::{Prepared, SceneView};
 use crate::setting_error::SettingError;
 use crate::settings::splatting::Rasterizer;
-use crate::stats::Staging;
 
 /// The pipelines of every stage, for one device. Any number of volumes and frames can share it.
 #[derive(Debug)]

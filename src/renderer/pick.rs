@@ -1,31 +1,16 @@
-//! Picking: the first point that is visible at a pixel.
+//! Picking on the GPU: what a pixel shows first.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
-use glam::{DVec2, DVec3, UVec3};
 use wgpu::{Buffer, BufferAsyncError, BufferDescriptor, BufferUsages, CommandEncoder, Device, MapMode, Texture};
 
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
+use crate::pick::Pick;
 use crate::volume::Volume;
 
-/// A point of a volume.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pick {
-    /// The position in world units from the volume's centre.
-    pub position: DVec3,
-    /// The depth along the camera's direction in world units, from the eye or, orthographic, from the camera's centre.
-    pub depth: f64,
-    /// The nearest voxel.
-    pub voxel: UVec3,
-    /// That voxel's value, NaN in a hole.
-    pub value: f32,
-    /// That voxel's label, if the volume is segmented.
-    pub label: Option<u16>,
-}
-
-/// A pick that is being read back from the GPU.
+/// A pick on its way from the GPU.
 #[derive(Debug)]
 pub struct PendingPick {
     staging: Buffer,
@@ -84,19 +69,7 @@ impl PendingPick {
         Some(result.map_err(|error| failed(error.to_string())).and_then(|()| {
             let bytes = self.staging.get_mapped_range(..).map_err(|error| failed(error.to_string()))?;
             let depth: f32 = bytemuck::pod_read_unaligned(&bytes[..4]);
-            Ok(depth.is_finite().then(|| self.at(depth.into())))
+            Ok(depth.is_finite().then(|| Pick::at(&self.view, &self.volume, self.pixel, depth.into())))
         }))
-    }
-
-    /// The point at a depth.
-    fn at(&self, depth: f64) -> Pick {
-        let grid = self.volume.grid();
-        let place = DVec2::from(self.pixel.map(f64::from)) + 0.5 - DVec2::from(self.view.size.map(f64::from)) / 2.0;
-        let position = self.view.rays().at(place, depth / grid.unit()) * grid.unit();
-        let last = grid.dims.as_dvec3() - 1.0;
-        let voxel = (position / grid.spacing + grid.center()).round().clamp(DVec3::ZERO, last).as_uvec3();
-        let index = grid.index_of(voxel);
-        let (value, label) = (self.volume.values()[index as usize], self.volume.label(index));
-        Pick { position, depth, voxel, value, label }
     }
 }

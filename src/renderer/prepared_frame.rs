@@ -10,7 +10,7 @@ use crate::rasterizer::fields::FieldFrame;
 use crate::rasterizer::quads::QuadFrame;
 use crate::rasterizer::samples::SampleFrame;
 use crate::rasterizer::tiles::TileFrame;
-use crate::stats::{GroupSlabs, Staging, Totals};
+use crate::renderer::counts::{GroupSlabs, Staging, Totals};
 
 /// A frame whose buffers are all allocated and filled, so that recording it cannot fail.
 #[derive(Debug)]

@@ -209,7 +209,33 @@ impl Splatting {
         }
     }
 
-    /// Checks that the other settings go with [`Classification::After`].
+    /// Checks that the settings allow what of rays is looked at: whether anything is cut, and the opacity whose depth is asked for.
+    ///
+    /// # Errors
+    /// If they do not.
+    pub(crate) fn check_rays(&self, is_cut: bool, first_hit: Option<f64>) -> Result<(), SettingError> {
+        let refused = |key, found: &str, allowed: &str| Err(SettingError::new(key, found, allowed));
+        if self.method == Method::CompositeEverySample && (is_cut || first_hit.is_some()) {
+            let found = "\"composite-every-sample\" with clip planes, surfaces or first hits";
+            return refused("splatting.method", found, "a method with sheets");
+        }
+        let Some(opacity) = first_hit else { return Ok(()) };
+        if self.compositing == Compositing::Minimum {
+            let allowed = "another compositing: the minimum is known only at the end of a ray";
+            return refused("splatting.compositing", "\"minimum\" with first hits", allowed);
+        }
+        check_first_hit(opacity)?;
+        if self.culling && self.compositing.hides() && opacity > self.opacity_threshold {
+            let allowed = format!("above 0, at most {}, the opacity_threshold", self.opacity_threshold);
+            return Err(SettingError::new("first_hit", opacity, allowed));
+        }
+        if self.order != Order::FrontToBack {
+            return refused("splatting.order", "\"back-to-front\" with first hits", "\"front-to-back\"");
+        }
+        Ok(())
+    }
+
+    /// Checks what [`Classification::After`] asks of the other settings.
     fn check_after(&self) -> Result<(), SettingError> {
         let refused = |key: &str, found: String, allowed: &str| Err(SettingError::new(key, found, allowed));
         let excluded = match self.method {

@@ -36,7 +36,11 @@ fn bad_usage_is_2() {
     assert_fails(2, "render -o out.png", &["required"]);
     assert_fails(2, "paint good.nrrd -o out.png", &["paint", "--help"]);
     assert_fails(2, "render good.nrrd -o out.png --depth 12", &["--depth", "12", "8", "16"]);
-    assert_fails(2, "render good.nrrd -o out.png --backend cuda", &["--backend", "cuda", "gpu", "reference"]);
+    assert_fails(
+        2,
+        "render good.nrrd -o out.png --backend cuda",
+        &["--backend", "cuda", "auto", "gpu", "cpu", "reference"],
+    );
     assert_fails(2, "render good.nrrd -o out.png --frames 3", &["--frames"]);
     assert_fails(2, "render good.nrrd -o out.gif", &["out.gif", "\".gif\"", ".png", ".exr", ".npy"]);
     assert_fails(2, "render good.nrrd -o out", &["out: ", "none", ".png"]);

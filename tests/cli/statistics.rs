@@ -2,9 +2,10 @@
 
 use crate::*;
 
-/// The keys of SPEC §8, and those that the program adds; no others.
-pub(crate) const STATS_KEYS: [&str; 21] = [
+/// The keys of SPEC §8, and what the program counts besides; no more and no less.
+pub(crate) const STATS_KEYS: [&str; 22] = [
     "adapter",
+    "api",
     "backend",
     "bricks_tested",
     "bricks_visited",
@@ -79,9 +80,10 @@ fn assert_stats_of_a_single_voxel(folder: &Folder, rasterizer: &str, name: &str,
     }
     assert!(count(&stats, "gpu_bytes") > 40 * 70 * least_bytes, "{stats:#}");
     assert_eq!(stats["rasterizer"], name);
-    for key in ["adapter", "driver", "backend"] {
+    for key in ["adapter", "driver", "api"] {
         assert!(!stats[key].as_str().unwrap().is_empty(), "{key}");
     }
+    assert_eq!(stats["backend"], "gpu");
 
     // Half a spacing off the planes there is a fifth slab. The voxel's neighbour does not take part.
     folder.write_nrrd("two.nrrd", [1, 2, 1], [1.0, 1.0, 1.0], &[1.0, 9.0]);

@@ -7,7 +7,7 @@ pub(crate) mod surfaces;
 
 use glam::{DVec3, DVec4, UVec3};
 use sheetsplat::DeviceRequirements;
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::{GpuHeadless, HeadlessOptions};
 use sheetsplat::scene::{ImageSettings, Scene, TransferSettings, VolumeSource};
 use sheetsplat::settings::Ramp;
 use sheetsplat::settings::{Camera, Projection};
@@ -54,17 +54,17 @@ pub(crate) fn lavapipe() -> HeadlessOptions {
 }
 
 /// A device as the program opens it, with f32 sheets. The test fails without a GPU or software driver.
-pub(crate) fn gpu() -> Headless {
+pub(crate) fn gpu() -> GpuHeadless {
     let options = lavapipe().with_sheet_format(TextureFormat::Rgba32Float);
-    Headless::new(&options).unwrap_or_else(|error| panic!("these tests need Mesa's lavapipe: {error}"))
+    GpuHeadless::new(&options).unwrap_or_else(|error| panic!("these tests need Mesa's lavapipe: {error}"))
 }
 
 /// A device with WebGPU's default limits, except that storage bindings have at most `bytes` bytes.
-pub(crate) fn gpu_with_small_bindings(bytes: u64) -> Headless {
+pub(crate) fn gpu_with_small_bindings(bytes: u64) -> GpuHeadless {
     let limits = Limits { max_storage_buffer_binding_size: bytes, ..Limits::default() };
     let requirements = DeviceRequirements { features: Features::FLOAT32_BLENDABLE, limits };
     let options = lavapipe().with_requirements(requirements).with_sheet_format(TextureFormat::Rgba32Float);
-    Headless::new(&options).unwrap_or_else(|error| panic!("these tests need Mesa's lavapipe: {error}"))
+    GpuHeadless::new(&options).unwrap_or_else(|error| panic!("these tests need Mesa's lavapipe: {error}"))
 }
 
 /// Four f32 per pixel, as read back.

@@ -2,7 +2,7 @@
 
 use glam::{DMat4, DVec3, DVec4};
 use sheetsplat::Surfaces;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::wgpu::util::DeviceExt;
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
@@ -58,7 +58,7 @@ pub(crate) fn clip_from_world(view: &ViewGeometry, unit: f64, range: DepthRange,
 
 /// A texture that holds the depths (`unit`s along w, infinite without a surface) of an image's pixels from `origin` on, with its matrix.
 pub(crate) fn surfaces(
-    gpu: &Headless,
+    gpu: &GpuHeadless,
     view: &ViewGeometry,
     unit: f64,
     range: DepthRange,
@@ -89,7 +89,7 @@ pub(crate) fn surfaces(
 }
 
 /// A depth texture that holds these values, row by row.
-fn depth_texture(gpu: &Headless, [width, height]: [u32; 2], values: &[f32]) -> wgpu::TextureView {
+fn depth_texture(gpu: &GpuHeadless, [width, height]: [u32; 2], values: &[f32]) -> wgpu::TextureView {
     let device = gpu.device();
     let texture = device.create_texture(&wgpu::TextureDescriptor {
         label: Some("host.depth"),

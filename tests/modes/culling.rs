@@ -1,7 +1,7 @@
 //! Culling, tiles and groups (SPEC §6) change only the cost.
 
 use glam::DVec3;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::settings::Compositing;
 use sheetsplat::settings::Projection;
 use sheetsplat::volume::builtin;
@@ -44,7 +44,7 @@ fn surfaces_cull_and_the_others_do_not() {
 /// The image does not depend on how sheets are grouped and which tiles are composited.
 #[test]
 fn tiles_and_groups_change_nothing() {
-    let renderers = [1, 2, 4].map(|n| Headless::new(&lavapipe().with_sheets_per_group(n)).unwrap());
+    let renderers = [1, 2, 4].map(|n| GpuHeadless::new(&lavapipe().with_sheets_per_group(n)).unwrap());
     let mut random = Random(91);
     for (case, compositing) in (0..12).zip(BY_MEANS.into_iter().cycle()) {
         let (volume, mut scene) = random_case(&mut random);

@@ -12,7 +12,7 @@ mod surface;
 mod twin;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::image::Image;
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
@@ -69,7 +69,7 @@ pub(crate) fn view_of(volume: &Volume, scene: &Scene) -> ViewGeometry {
     ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, [scene.image.width, scene.image.height]).unwrap()
 }
 
-pub(crate) fn render(gpu: &Headless, volume: &Volume, scene: &Scene) -> (Image, Counts) {
+pub(crate) fn render(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> (Image, Counts) {
     let rendering = gpu.render_volume(volume.clone(), scene).unwrap();
     (rendering.image, rendering.stats.counts)
 }

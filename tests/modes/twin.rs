@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use sheetsplat::RenderError;
-use sheetsplat::headless::{Headless, readback};
+use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference::{self, Host};
 use sheetsplat::internals::view_geometry::ViewGeometry;
@@ -27,7 +27,7 @@ fn wall(view: &ViewGeometry) -> Vec<f64> {
 }
 
 /// Draws a frame, with its first hits in `unit`s if requested.
-fn draw(gpu: &Headless, volume: &Volume, scene: &Scene, first_hit: Option<f64>, walls: bool) -> (Image, Vec<f64>) {
+fn draw(gpu: &GpuHeadless, volume: &Volume, scene: &Scene, first_hit: Option<f64>, walls: bool) -> (Image, Vec<f64>) {
     let unit = volume.grid().unit();
     let mut view = gpu.view(volume.clone(), scene).unwrap();
     view.set_first_hit(first_hit).unwrap();

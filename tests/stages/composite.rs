@@ -1,7 +1,7 @@
 //! `shaders/composite.wgsl` against `reference::composite`: random sheets over random compositing buffers, in some tiles.
 
 use glam::{DVec3, DVec4};
-use sheetsplat::headless::{Headless, readback};
+use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::internals::gpu::layout::SheetGroup;
 use sheetsplat::internals::gpu::targets::{BandBuffer, CompositingBuffer, Targets};
 use sheetsplat::internals::pass::composite::{Composite, CompositeBuffers, CompositeMode, RayMode};
@@ -74,7 +74,7 @@ struct Outcome {
 }
 
 impl Case {
-    fn run(&self, gpu: &Headless, stage: &Composite, bands: usize) -> Outcome {
+    fn run(&self, gpu: &GpuHeadless, stage: &Composite, bands: usize) -> Outcome {
         let (device, queue) = (gpu.device(), gpu.queue());
         let Self { size, compositing, order, threshold, .. } = *self;
         let layers = self.sheets.len() as u32;
@@ -182,7 +182,7 @@ impl Case {
     }
 }
 
-fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
+fn check(gpu: &GpuHeadless, size: [u32; 2], bands: usize) {
     let stage = Composite::default();
     let mut random = Random(u64::from(size[0]));
     let [columns, rows] = tile_grid(size);

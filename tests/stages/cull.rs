@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DVec2, DVec3, DVec4, UVec3};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::brick::{self, BRICK_VOXELS};
 use sheetsplat::internals::gpu::brick_lists::BrickLists;
 use sheetsplat::internals::gpu::layout::{self, Brick, BrickState, Frame, Indirect, SheetGroup, Tally};
@@ -28,7 +28,7 @@ use crate::{compute, contents, indirect, init};
 
 /// The stages with one list of bricks and the buffers that they read and write.
 pub(crate) struct Culling<'a> {
-    gpu: &'a Headless,
+    gpu: &'a GpuHeadless,
     stage: &'a Cull,
     pub(crate) view: ViewGeometry,
     pub(crate) frame: Frame,
@@ -47,7 +47,7 @@ pub(crate) struct Culling<'a> {
 impl<'a> Culling<'a> {
     /// The stages for voxels in memory order, in a grid with these values and labels.
     pub(crate) fn new(
-        gpu: &'a Headless,
+        gpu: &'a GpuHeadless,
         (stage, sheets): (&'a Cull, u32),
         (grid, values, labels): (&Grid, &[f32], Option<&[u16]>),
         voxels: &[u32],
@@ -468,7 +468,7 @@ impl Case {
     }
 
     /// Draws the groups of the plan in order, with the given occlusion buffers in turn, and checks all results.
-    fn check(mut self, gpu: &Headless, stage: &Cull, masks: &[Occluded]) -> Seen {
+    fn check(mut self, gpu: &GpuHeadless, stage: &Cull, masks: &[Occluded]) -> Seen {
         let transfer = Self::transfer();
         let values = vec![1.0; self.grid.dims.element_product() as usize];
         // Voxels whose decisions may differ in f32 are removed, which changes their bricks.

@@ -1,7 +1,7 @@
 //! `shaders/gather.wgsl` against the f64 evaluation: sections of single kernels, frames of random volumes, and hidden voxels.
 
 use glam::{DVec2, DVec3, DVec4, UVec3};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::ClippedVoxels;
 use sheetsplat::internals::brick::{self, BrickList};
 use sheetsplat::internals::classify::classify;
@@ -30,7 +30,7 @@ use crate::{Uncut, at_offsets, compute, contents, init};
 
 /// A scene over a volume, on the GPU and in the f64 evaluation.
 struct Fixture<'a> {
-    gpu: &'a Headless,
+    gpu: &'a GpuHeadless,
     stage: &'a Gather,
     seen: Seen,
     volume: Volume,
@@ -50,7 +50,7 @@ struct Drawn {
 }
 
 impl<'a> Fixture<'a> {
-    fn new(gpu: &'a Headless, stage: &'a Gather, scene: Scene, volume: Volume) -> Self {
+    fn new(gpu: &'a GpuHeadless, stage: &'a Gather, scene: Scene, volume: Volume) -> Self {
         let transfer = scene.transfer.resolve(&volume);
         let voxels = classify(&volume, &transfer, &ClippedVoxels::default());
         let bricks = BrickList::new(volume.grid(), &voxels);

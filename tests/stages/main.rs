@@ -23,7 +23,7 @@ mod values;
 use std::collections::BTreeMap;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::{Headless, readback};
+use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::internals::gpu::layout::{Cut, Frame, Indirect, QUADS, TileList};
 use sheetsplat::internals::gpu::targets::no_surfaces;
 use sheetsplat::internals::gpu::uniforms::{self, Ramps};
@@ -117,7 +117,7 @@ fn tile_list(device: &Device, tiles: &[u32]) -> Buffer {
 }
 
 /// The contents of a buffer without the usage for copying: a shader copies it.
-fn contents<T: bytemuck::Pod>(gpu: &Headless, buffer: &Buffer) -> Vec<T> {
+fn contents<T: bytemuck::Pod>(gpu: &GpuHeadless, buffer: &Buffer) -> Vec<T> {
     const COPY: &str = "
         @group(0) @binding(0) var<storage, read> source: array<u32>;
         @group(0) @binding(1) var<storage, read_write> result: array<u32>;
@@ -131,7 +131,7 @@ fn contents<T: bytemuck::Pod>(gpu: &Headless, buffer: &Buffer) -> Vec<T> {
 
 /// The words that the `main` of a WGSL source writes into the binding after the given ones; its workgroups have 64 threads, with at most 32768
 /// workgroups in a row.
-fn written<T: bytemuck::Pod>(gpu: &Headless, source: &str, given: &[BindingResource<'_>], words: u64) -> Vec<T> {
+fn written<T: bytemuck::Pod>(gpu: &GpuHeadless, source: &str, given: &[BindingResource<'_>], words: u64) -> Vec<T> {
     let device = gpu.device();
     let result = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("written"),
@@ -169,7 +169,7 @@ fn written<T: bytemuck::Pod>(gpu: &Headless, source: &str, given: &[BindingResou
 }
 
 /// Submits a compute pass.
-fn compute(gpu: &Headless, record: impl FnOnce(&mut wgpu::ComputePass<'_>)) {
+fn compute(gpu: &GpuHeadless, record: impl FnOnce(&mut wgpu::ComputePass<'_>)) {
     let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     record(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
     gpu.queue().submit([encoder.finish()]);

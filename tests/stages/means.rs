@@ -3,7 +3,7 @@
 
 use bytemuck::Zeroable;
 use glam::{DVec3, DVec4, UVec3};
-use sheetsplat::headless::{Headless, readback};
+use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::internals::gpu::layout::SheetGroup;
 use sheetsplat::internals::gpu::targets::{CompositingBuffer, Targets};
 use sheetsplat::internals::gpu::uniforms;
@@ -70,7 +70,7 @@ fn random_sheet(random: &mut Random, seen: &Seen) -> Vec<[f32; 4]> {
 
 /// Composites groups one after the other, each given by its first slab and the pixels of its sheets, nearest first.
 fn composited(
-    gpu: &Headless,
+    gpu: &GpuHeadless,
     stage: &Composite,
     (grid, seen): (&Grid, &Seen),
     groups: &[(i32, Vec<[f32; 4]>)],

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use bytemuck::Zeroable;
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::brick::BrickList;
 use sheetsplat::internals::gpu::layout::SheetGroup;
 use sheetsplat::internals::gpu::targets::Targets;
@@ -118,7 +118,7 @@ impl Mask {
 }
 
 struct Fixture<'a> {
-    gpu: &'a Headless,
+    gpu: &'a GpuHeadless,
     stage: &'a Occlude,
     reach: [u32; 2],
     targets: Targets,

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, DVec4};
 use sheetsplat::Placement;
-use sheetsplat::headless::{Headless, readback};
+use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::internals::gpu::{layout, targets::CompositingBuffer};
 use sheetsplat::internals::pass::resolve::Resolve;
 use sheetsplat::internals::reference::Buffer;
@@ -18,7 +18,7 @@ use crate::{frame, init};
 const BACKGROUNDS: [[f64; 4]; 5] =
     [[0.0, 0.0, 0.0, 1.0], [0.2, 0.9, 0.4, 1.0], [0.7, 0.5, 0.3, 0.0], [0.1, 1.0, 0.6, 0.5], [1.0, 1.0, 1.0, 1.0]];
 
-fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
+fn check(gpu: &GpuHeadless, size: [u32; 2], bands: usize) {
     let (device, queue) = (gpu.device(), gpu.queue());
     let options = RendererOptions::for_target(TextureFormat::Rgba32Float).with_blend(Blend::Replace);
     let stage = Resolve::new(device, &options);

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3, DVec4, UVec3};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::ClippedVoxels;
 use sheetsplat::internals::brick;
 use sheetsplat::internals::classify::classify;
@@ -127,7 +127,7 @@ fn check(name: &str, volume: &Volume, scene: &Scene) {
 }
 
 /// Like [`check`]; returns the number of shaded voxels.
-fn shaded(gpu: &Headless, name: &str, volume: &Volume, scene: &Scene) -> usize {
+fn shaded(gpu: &GpuHeadless, name: &str, volume: &Volume, scene: &Scene) -> usize {
     let transfer = scene.transfer.resolve(volume);
     let mut scene = scene.clone();
     scene.splatting.culling = false;

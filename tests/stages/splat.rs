@@ -7,7 +7,7 @@ use std::ops::Deref;
 
 use bytemuck::Zeroable;
 use glam::{DVec2, DVec3, DVec4, UVec3};
-use sheetsplat::headless::{Headless, readback};
+use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::internals::footprint::{FootprintTable, SECTION_SIZE, SECTIONS, section_extent, section_spacing};
 use sheetsplat::internals::gpu::brick_lists::BrickLists;
 use sheetsplat::internals::gpu::footprint_texture::FootprintTexture;
@@ -30,14 +30,14 @@ use crate::{at_offsets, frame_over, indirect, init, tile_list};
 
 /// The stage for groups of `sheets` sheets, and a list to draw, with what the culling stages write.
 struct Stages<'a> {
-    gpu: &'a Headless,
+    gpu: &'a GpuHeadless,
     sheets: u32,
     splat: Stage,
     list: RefCell<CullList>,
 }
 
 impl<'a> Stages<'a> {
-    fn new(gpu: &'a Headless, sheets: u32) -> Self {
+    fn new(gpu: &'a GpuHeadless, sheets: u32) -> Self {
         let device = gpu.device();
         let any = |usage| init(device, &[0_u8; 1024], usage);
         let storage = any(BufferUsages::STORAGE);
@@ -63,7 +63,7 @@ impl<'a> Stages<'a> {
 
 /// One view of one kernel, on the GPU and in the f64 evaluation.
 struct Fixture<'a> {
-    gpu: &'a Headless,
+    gpu: &'a GpuHeadless,
     stage: &'a Stages<'a>,
     seen: Seen,
     frame: wgpu::Buffer,

@@ -1,7 +1,7 @@
 //! `shaders/tiles.wgsl` against a plain evaluation of its rules: exact lists, arguments and counts.
 
 use bytemuck::Zeroable;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::gpu::layout::{Frame, Indirect, SheetGroup, Tally};
 use sheetsplat::internals::gpu::targets::Targets;
 use sheetsplat::internals::pass::tiles::Tiles;
@@ -72,7 +72,7 @@ impl Case {
             .collect()
     }
 
-    fn check(&self, gpu: &Headless, stage: &Tiles, group: u32) {
+    fn check(&self, gpu: &GpuHeadless, stage: &Tiles, group: u32) {
         const GROUPS: u32 = 5;
         let device = gpu.device();
         let targets = Targets::new(device, self.size, TextureFormat::Rgba32Float, 1).unwrap();

@@ -1,7 +1,7 @@
 //! A volume's values as stages read them (`shaders/shared/volume.wgsl`): each is exact to the last bit, in any format.
 
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::gpu::layout::Frame;
 use sheetsplat::internals::gpu::uniforms::{self, Ramps};
 use sheetsplat::internals::gpu::volume_texture::{SIDES, ValueFormat, VolumeTexture};
@@ -40,12 +40,12 @@ fn frame(values: ValueFormat) -> Frame {
 }
 
 /// Uploads values in layers of this side and lets a shader read them.
-fn seen(gpu: &Headless, values: &[f32], side: u32) -> Vec<f32> {
+fn seen(gpu: &GpuHeadless, values: &[f32], side: u32) -> Vec<f32> {
     seen_by(gpu, READ, values, side)
 }
 
 /// The same with this shader source.
-fn seen_by(gpu: &Headless, source: &str, values: &[f32], side: u32) -> Vec<f32> {
+fn seen_by(gpu: &GpuHeadless, source: &str, values: &[f32], side: u32) -> Vec<f32> {
     let device = gpu.device();
     let uploaded = VolumeTexture::upload_folded(device, gpu.queue(), values, side);
     let frame = init(device, &[frame(uploaded.format)], BufferUsages::UNIFORM);

@@ -4,16 +4,14 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::ValueEnum;
-use clap::builder::PossibleValuesParser;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use sheetsplat::RenderError;
 use sheetsplat::appearance::{Colormap, Preset};
-use sheetsplat::cpu::CpuRenderer;
-use sheetsplat::headless::{Error, Headless, HeadlessOptions, Rendering};
+use sheetsplat::headless::{Backend, Error, Headless, HeadlessOptions};
 use sheetsplat::image::PngDepth;
 use sheetsplat::scene::{Scene, SceneError, VolumeSource};
-use sheetsplat::settings::Camera;
 use sheetsplat::stats::Stats;
 use sheetsplat::volume::{self, Orientation, Volume};
-use sheetsplat::{RenderError, SceneView, SettingError};
 
 use crate::failure::Failure;
 use crate::outputs::Outputs;
@@ -38,6 +36,13 @@ pub(crate) struct Input {
     /// and camera.up.
     #[arg(long, value_enum, value_name = "SIDE")]
     pub(crate) view: Option<View>,
+    /// What draws: a GPU by its driver, the CPU's cores without one, the slow f64 evaluation that both are tested against, or a GPU if there is
+    /// one and else the CPU. --adapter, --profile and a scene's rasterizer mean the GPU.
+    #[arg(
+        long, value_name = "BACKEND", env = "SHEETSPLAT_BACKEND", default_value = "auto",
+        value_parser = PossibleValuesParser::new(Backend::ALL.map(Backend::name)).try_map(|name| name.parse::<Backend>()),
+    )]
+    pub(crate) backend: Backend,
     /// Part of the name of the adapter to use.
     #[arg(long, value_name = "NAME", env = "WGPU_ADAPTER_NAME")]
     pub(crate) adapter: Option<String>,
@@ -206,75 +211,22 @@ impl Input {
         Ok(())
     }
 
-    pub(crate) fn headless(&self, profile: bool) -> Result<Headless, Failure> {
-        let mut options = HeadlessOptions::default().with_profile(profile);
+    /// What draws some scenes.
+    pub(crate) fn headless<'a>(
+        &self,
+        profile: bool,
+        scenes: impl IntoIterator<Item = &'a Scene>,
+    ) -> Result<Headless, Failure> {
+        let mut options = HeadlessOptions::default().with_profile(profile).with_backend(self.backend);
         options.adapter = self.adapter.clone();
         let start = Instant::now();
-        let headless = Headless::new(&options).map_err(|error| Failure::Other(error.to_string()))?;
-        log::info!("renderer ready after {:.1?}", start.elapsed());
+        let headless = Headless::for_scenes(&options, scenes).map_err(|error| Failure::Other(error.to_string()))?;
+        log::info!("{} renderer ready after {:.1?}", headless.backend(), start.elapsed());
         Ok(headless)
     }
 
     pub(crate) fn failure(&self, error: impl Into<Error>) -> Failure {
         Failure::of(error.into(), &self.name)
-    }
-}
-
-/// What draws many frames of one scene.
-#[derive(Clone, Copy, Default, ValueEnum)]
-pub(crate) enum Backend {
-    #[default]
-    Gpu,
-    Cpu,
-}
-
-/// A scene's view, to be drawn from many directions.
-pub(crate) enum Drawing {
-    Gpu(Box<(Headless, SceneView)>),
-    Cpu(Box<CpuRenderer>),
-}
-
-impl Drawing {
-    /// Opens a device or none, and classifies the volume.
-    pub(crate) fn new(
-        input: &Input,
-        backend: Backend,
-        profile: bool,
-        volume: Volume,
-        scene: &Scene,
-    ) -> Result<Self, Failure> {
-        match backend {
-            Backend::Cpu => {
-                let renderer = CpuRenderer::new(volume, scene).map_err(|error| input.failure(error))?;
-                Ok(Self::Cpu(Box::new(renderer)))
-            }
-            Backend::Gpu => {
-                let headless = input.headless(profile)?;
-                let view = headless.view(volume, scene).map_err(|error| input.failure(error))?;
-                Ok(Self::Gpu(Box::new((headless, view))))
-            }
-        }
-    }
-
-    pub(crate) fn set_camera(&mut self, camera: Camera) -> Result<(), SettingError> {
-        match self {
-            Self::Gpu(gpu) => gpu.1.set_camera(camera),
-            Self::Cpu(renderer) => renderer.set_camera(camera),
-        }
-    }
-
-    pub(crate) fn turn(&mut self, degrees: f64) -> Result<(), SettingError> {
-        match self {
-            Self::Gpu(gpu) => gpu.1.turn(degrees),
-            Self::Cpu(renderer) => renderer.turn(degrees),
-        }
-    }
-
-    pub(crate) fn draw(&mut self) -> Result<Rendering, RenderError> {
-        match self {
-            Self::Gpu(gpu) => gpu.0.draw(&mut gpu.1),
-            Self::Cpu(renderer) => renderer.draw(),
-        }
     }
 }
 

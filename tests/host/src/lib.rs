@@ -16,7 +16,7 @@ mod targets;
 
 use std::path::Path;
 
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::{GpuHeadless, HeadlessOptions};
 use sheetsplat::{DeviceRequirements, GpuVolume, Placement, Renderer, RendererOptions, Scene, SceneView};
 use wgpu::{Adapter, Device, DeviceDescriptor, Features, Limits, Queue, Texture, TextureFormat, TextureUsages};
 
@@ -169,7 +169,7 @@ const TRANSPARENT: &str = "[0, 0, 0, 0]";
 /// The image that headless rendering gives.
 fn headless(scene: &Scene) -> Vec<[f32; 4]> {
     let options = HeadlessOptions::default().with_adapter("llvmpipe");
-    Headless::new(&options).unwrap().render(scene).unwrap().image.pixels
+    GpuHeadless::new(&options).unwrap().render(scene).unwrap().image.pixels
 }
 
 fn pixels(bytes: &[u8]) -> Vec<[f32; 4]> {

@@ -15,7 +15,7 @@ use sheetsplat::scene::Scene;
 use sheetsplat::volume::Volume;
 
 use crate::annotate::{Annotate, Overlay};
-use crate::arguments::{Backend, Depth, Drawing, Input, check_scene_file, log_frame, parse_degrees, scene_file};
+use crate::arguments::{Depth, Input, check_scene_file, log_frame, parse_degrees, scene_file};
 use crate::failure::Failure;
 use crate::outputs::{self, Outputs};
 use crate::progress::Progress;
@@ -62,9 +62,6 @@ pub(crate) struct Arguments {
     /// Chroma resolution of YUV4MPEG2: halved in both directions, which needs an even width and height, or full.
     #[arg(long, value_enum, default_value = "420")]
     chroma: Chroma,
-    /// The GPU, or the CPU's cores without a driver.
-    #[arg(long, value_enum, default_value = "gpu")]
-    backend: Backend,
 }
 
 /// Parses `A..B`, which must not be empty.
@@ -178,13 +175,14 @@ impl Shown {
     ) -> Result<(), Failure> {
         let Arguments { input, turn, count, save_scene, .. } = arguments;
         let Self { scene, volume, overlay } = self;
-        let mut drawing = Drawing::new(input, arguments.backend, false, volume, &scene)?;
+        let headless = input.headless(false, [&scene])?;
+        let mut view = headless.view(volume, &scene).map_err(|error| input.failure(error))?;
         let mut progress = Progress::new(frames.len(), progress);
         for &frame in frames {
             // The angle is relative to the scene's camera, independent of the previous frame.
             let camera = scene.camera.turned(turn * f64::from(frame) / f64::from(*count));
-            drawing.set_camera(camera).map_err(|error| input.failure(RenderError::from(error)))?;
-            let mut rendering = drawing.draw().map_err(|error| input.failure(error))?;
+            view.set_camera(camera).map_err(|error| input.failure(RenderError::from(error)))?;
+            let mut rendering = headless.draw(&mut view).map_err(|error| input.failure(error))?;
             overlay.draw(&mut rendering.image);
             take(frame, &rendering.image)?;
             log_frame(&format!("frame {frame}"), &rendering.stats);

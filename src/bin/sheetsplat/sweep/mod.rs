@@ -136,7 +136,7 @@ fn draw(
     progress: bool,
 ) -> Result<Vec<Tile>, Failure> {
     let Arguments { input, annotate, .. } = arguments;
-    let headless = input.headless(false)?;
+    let headless = input.headless(false, scenes.iter().map(|(scene, _)| scene))?;
     let mut progress = Progress::new(scenes.len(), progress);
     let mut last: Option<(Scene, Arc<_>)> = None;
     let mut tiles = Vec::new();

@@ -6,7 +6,7 @@ use std::time::Instant;
 use eframe::egui::TextureId;
 use eframe::egui_wgpu::{self, RenderState, WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
 use sheetsplat::RenderError;
-use sheetsplat::headless::device;
+use sheetsplat::headless::{Backend, device};
 use sheetsplat::scoped;
 use sheetsplat::settings::TransferFunction;
 use sheetsplat::stats::Stats;
@@ -64,7 +64,12 @@ impl Guest {
         let volume = GpuVolume::new(device, queue, volume);
         let view = volume.and_then(|volume| SceneView::new(device, &volume, scene));
         let view = view.map_err(|error| Failure::of(error.into(), input))?;
-        let stats = Stats { adapter: info.name, backend: info.backend.to_str().to_owned(), ..Stats::default() };
+        let stats = Stats {
+            adapter: info.name,
+            backend: Backend::Gpu.name().to_owned(),
+            api: info.backend.to_str().to_owned(),
+            ..Stats::default()
+        };
         Ok(Self { host: host.clone(), renderer, view, picture: None, stats })
     }
 

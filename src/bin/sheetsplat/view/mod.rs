@@ -16,6 +16,7 @@ use std::rc::Rc;
 
 use eframe::NativeOptions;
 use eframe::egui::{IconData, ViewportBuilder};
+use sheetsplat::headless::Backend;
 use sheetsplat::image::Image;
 
 use crate::arguments::Input;
@@ -52,6 +53,10 @@ fn parse_size(text: &str) -> Result<[u16; 2], String> {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.screenshot {
         Image::check_format(path)?;
+    }
+    let backend = arguments.input.backend;
+    if !matches!(backend, Backend::Auto | Backend::Gpu) {
+        return Err(Failure::Input(format!("--backend: found {backend}, allowed: gpu or auto for a window")));
     }
     let mut scene = arguments.input.scene()?;
     let named: Vec<_> = arguments.screenshot.iter().map(|path| ("--screenshot", path.as_path())).collect();

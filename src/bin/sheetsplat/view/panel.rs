@@ -81,7 +81,7 @@ pub(super) fn stats(ui: &mut Ui, stats: &Stats) {
         ("sheets", counts.sheets.to_string()),
         ("rasterizer", stats.rasterizer.clone()),
         ("GPU memory", format!("{:.1} MiB", stats.gpu_bytes as f64 / 1024.0 / 1024.0)),
-        ("adapter", format!("{}, {}", stats.adapter, stats.backend)),
+        ("adapter", format!("{}, {}", stats.adapter, stats.api)),
     ];
     Grid::new("statistics").num_columns(2).show(ui, |ui| {
         for (name, value) in rows {
