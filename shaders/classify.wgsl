@@ -17,7 +17,7 @@
 @group(0) @binding(12) var<storage, read> control_points: array<vec4f>;
 @group(0) @binding(13) var labels: texture_2d_array<u32>;
 @group(0) @binding(14) var values: texture_2d_array<u32>;
-@group(0) @binding(15) var<uniform> planes: Planes;
+@group(0) @binding(15) var<uniform> planes: FieldPlanes;
 // Of every pixel what the plane before has: its number, and its gradient, numbers per `unit`. Then what `is_by_means` keeps.
 @group(0) @binding(16) var<storage, read_write> carried: array<vec4f>;
 

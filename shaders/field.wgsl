@@ -5,7 +5,7 @@
 @group(0) @binding(2) var<storage, read> voxels: array<FieldVoxel>;
 @group(0) @binding(3) var<storage, read> instances: array<u32>;
 @group(0) @binding(4) var<storage, read> args: Indirect;
-@group(0) @binding(5) var<uniform> planes: Planes;
+@group(0) @binding(5) var<uniform> planes: FieldPlanes;
 
 // Whether gradients are the field's derivative, not the voxels' differences.
 override KERNEL_GRADIENT: bool = false;

@@ -8,7 +8,7 @@
 @group(0) @binding(4) var<storage, read> fresh: array<u32>;
 @group(0) @binding(5) var<storage, read> args: Indirect;
 @group(0) @binding(6) var<storage, read_write> voxels: array<FieldVoxel>;
-@group(0) @binding(7) var<uniform> planes: Planes;
+@group(0) @binding(7) var<uniform> planes: FieldPlanes;
 
 // Whether coefficients are not the values themselves.
 override EXACT: bool = false;

@@ -6,7 +6,7 @@ use std::mem::offset_of;
 use naga::proc::Layouter;
 use naga::{AddressSpace, Handle, Module, Type, TypeInner};
 use sheetsplat::internals::gpu::layout::{
-    Band, Brick, BrickState, Culled, Cut, FieldVoxel, Frame, Gather, Gathered, Indirect, PatchRange, Planes,
+    Band, Brick, BrickState, Culled, Cut, FieldPlanes, FieldVoxel, Frame, Gather, Gathered, Indirect, PatchRange,
     SheetGroup, Splat, Tally, TileList, Visit,
 };
 use sheetsplat::internals::gpu::shaders;
@@ -110,7 +110,7 @@ fn shared() -> [Layout; 17] {
             padding_1
         }),
         layout!(SheetGroup { half_box, box_filter, culling, near, first_brick, brick_count, index, number }),
-        layout!(Planes { axes, step, screen_axis, per_pixel, origin, value_bias, value_scale, per_number }),
+        layout!(FieldPlanes { axes, step, screen_axis, per_pixel, origin, value_bias, value_scale, per_number }),
         layout!(FieldVoxel { x, y, depth, number, gradient_xy, gradient_z }),
         layout!(Brick { present, x, y, z, extent }),
         layout!(BrickState { hidden, shaded }),

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use rayon::prelude::*;
-use wgpu::{Device, Queue, TextureView};
+use wgpu::{Device, Limits, Queue, TextureView};
 
 use crate::after::coefficients;
 use crate::after::normalization::Normalization;
@@ -175,6 +175,14 @@ impl GpuVolume {
 }
 
 impl Coefficients {
+    /// Bytes of GPU memory that they will take.
+    ///
+    /// # Errors
+    /// If they need more layers than textures may have.
+    pub(crate) fn estimate(&self, limits: &Limits) -> Result<u64, RenderError> {
+        Ok(VolumeTexture::estimate(limits, self.values.len() as u64, ValueFormat::Bits)?[0])
+    }
+
     /// The bits of the numbers on the GPU, `R32Uint`.
     ///
     /// # Errors

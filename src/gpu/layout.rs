@@ -170,7 +170,7 @@ pub struct Cut {
 /// [`Normalization`](crate::after::normalization::Normalization).
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Planes {
+pub struct FieldPlanes {
     /// Unit vectors in the grid: two within planes, and the planes' normal; w unused.
     pub axes: [[f32; 4]; 3],
     /// What a grid unit along the normal moves a voxel right and down, pixels times the depth from the eye, and away from the eye; and

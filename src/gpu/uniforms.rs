@@ -5,7 +5,7 @@ use std::ops::{Add, Mul, Range};
 use glam::{DMat2, DVec2, DVec3, DVec4};
 
 use super::gathered_layout::GatheredLayout;
-use super::layout::{Cut, Frame, Gather, Planes, SheetGroup};
+use super::layout::{Cut, FieldPlanes, Frame, Gather, SheetGroup};
 use super::volume_texture::ValueFormat;
 use crate::after::normalization::Normalization;
 use crate::after::plane_geometry::PlaneGeometry;
@@ -181,12 +181,17 @@ pub fn cut(
 }
 
 /// How kernels lie on slab planes, and the numbers that values stored so are splatted as (SPEC §9).
-pub fn planes(geometry: &PlaneGeometry, view: &ViewGeometry, values: ValueFormat, numbers: &Normalization) -> Planes {
+pub fn planes(
+    geometry: &PlaneGeometry,
+    view: &ViewGeometry,
+    values: ValueFormat,
+    numbers: &Normalization,
+) -> FieldPlanes {
     let offset = match values {
         ValueFormat::Offset8(least) | ValueFormat::Offset16(least) => f64::from(least),
         ValueFormat::Bits => 0.0,
     };
-    Planes {
+    FieldPlanes {
         axes: geometry.axes.map(|axis| axis.extend(0.0).as_vec4().to_array()),
         step: geometry.step.extend(geometry.per_depth).as_vec4().to_array(),
         screen_axis: geometry.screen_axis.as_vec2().to_array(),

@@ -7,7 +7,7 @@ use wgpu::{BindGroup, Buffer, ComputePass, Device, ShaderStages, TextureView, Te
 
 use super::composite::{CompositeBuffers, CompositeMode};
 use crate::gpu::bindings::{ComputeStage, at_offset, depth_texture, storage, texture, texture_of_integers, uniform};
-use crate::gpu::layout::{Band, Cut, Frame, Planes, SheetGroup, TileList};
+use crate::gpu::layout::{Band, Cut, FieldPlanes, Frame, SheetGroup, TileList};
 use crate::gpu::shaders;
 use crate::gpu::targets::BandBuffer;
 use crate::gpu::volume_texture::VolumeTexture;
@@ -40,7 +40,7 @@ pub struct ClassifyBuffers<'a> {
     pub composite: CompositeBuffers<'a>,
     /// Control points of the ramps, and the tables of their integrals.
     pub control_points: &'a Buffer,
-    /// One [`Planes`].
+    /// One [`FieldPlanes`].
     pub planes: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
@@ -130,7 +130,7 @@ fn compile(device: &Device, mode: ClassifyMode) -> ComputeStage {
         ("control_points", storage::<[f32; 4]>(stage, true)),
         ("labels", texture_of_integers(stage, TextureViewDimension::D2Array)),
         ("values", texture_of_integers(stage, TextureViewDimension::D2Array)),
-        ("planes", uniform::<Planes>(stage, false)),
+        ("planes", uniform::<FieldPlanes>(stage, false)),
         ("carried", storage::<[f32; 4]>(stage, false)),
     ];
     let flag = |is_set| f64::from(u8::from(is_set));

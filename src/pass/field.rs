@@ -9,7 +9,7 @@ use wgpu::{
 
 use super::splat::{added_to, clear_bindings, clear_pipeline, quad_indices, record_quads, sheets_of_a_group};
 use crate::gpu::bindings::{Bindings, at_offset, storage, uniform};
-use crate::gpu::layout::{FieldVoxel, Frame, Indirect, Planes, SheetGroup};
+use crate::gpu::layout::{FieldPlanes, FieldVoxel, Frame, Indirect, SheetGroup};
 use crate::gpu::render_pipeline::render_pipeline;
 use crate::gpu::shaders;
 use crate::pass::cull::CullList;
@@ -39,7 +39,7 @@ impl Field {
             ("voxels", storage::<FieldVoxel>(ShaderStages::VERTEX, true)),
             ("instances", storage::<u32>(ShaderStages::VERTEX, true)),
             ("args", storage::<Indirect>(ShaderStages::VERTEX, true)),
-            ("planes", uniform::<Planes>(ShaderStages::VERTEX, false)),
+            ("planes", uniform::<FieldPlanes>(ShaderStages::VERTEX, false)),
         ];
         let clear_bindings = clear_bindings(device);
         Self {

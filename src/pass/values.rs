@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use wgpu::{BindGroup, BindingResource, Buffer, ComputePass, Device, ShaderStages, TextureView, TextureViewDimension};
 
 use crate::gpu::bindings::{ComputeStage, storage, texture_of_integers, uniform};
-use crate::gpu::layout::{Brick, FieldVoxel, Frame, Indirect, Planes};
+use crate::gpu::layout::{Brick, FieldPlanes, FieldVoxel, Frame, Indirect};
 use crate::gpu::shaders;
 
 /// The stage's pipelines: without and with coefficients of their own, without and with holes. Each is compiled when it is first asked for.
@@ -17,7 +17,7 @@ pub struct Values {
 /// What voxels are drawn onto planes by.
 #[derive(Clone, Copy, Debug)]
 pub struct PlaneBuffers<'a> {
-    /// One [`Planes`].
+    /// One [`FieldPlanes`].
     pub planes: &'a Buffer,
     /// The bits of all coefficients, where they are not the values.
     pub coefficients: Option<&'a TextureView>,
@@ -91,7 +91,7 @@ fn compile(device: &Device, is_exact: bool, has_holes: bool) -> ComputeStage {
         ("fresh", storage::<u32>(stage, true)),
         ("args", storage::<Indirect>(stage, true)),
         ("voxels", storage::<FieldVoxel>(stage, false)),
-        ("planes", uniform::<Planes>(stage, false)),
+        ("planes", uniform::<FieldPlanes>(stage, false)),
     ];
     let constants = [("EXACT", f64::from(u8::from(is_exact))), ("HOLES", f64::from(u8::from(has_holes)))];
     ComputeStage::new(device, shaders::VALUES, "main", &slots, &constants)

@@ -9,7 +9,7 @@ use super::quads::{Planned, counts_and_hits, group_stride, most_of, order_bytes}
 use super::{FrameEstimate, FrameInputs, Prepared, compute};
 use crate::error::RenderError;
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes};
-use crate::gpu::layout::{Brick, Planes, Tally};
+use crate::gpu::layout::{Brick, FieldPlanes, Tally};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
@@ -209,7 +209,7 @@ impl FieldRasterizer {
         let [columns, rows] = tile_grid(size);
         let mut buffers = vec![
             content_spec("sheetsplat.groups", group_bytes, BufferUsages::UNIFORM),
-            content_spec("sheetsplat.planes", size_of::<Planes>() as u64, BufferUsages::UNIFORM),
+            content_spec("sheetsplat.planes", size_of::<FieldPlanes>() as u64, BufferUsages::UNIFORM),
         ];
         buffers.extend(counts_and_hits(request));
         buffers.extend(Tiles::buffer_specs(columns * rows, plan.groups.len()));

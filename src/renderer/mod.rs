@@ -14,6 +14,7 @@ use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Queue, RenderPass, Text
 
 use crate::error::{RenderError, check_device};
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, written};
+use crate::gpu::classified_volume::BrickNeeds;
 use crate::gpu::device::{self, DeviceError, DeviceRequirements};
 use crate::gpu::fault::scoped;
 use crate::gpu::layout::{Cut, Frame, Tally};
@@ -126,8 +127,7 @@ impl Renderer {
         check_device(view.volume.gpu_volume().device(), &self.device, "the renderer")?;
         let request = self.request(view)?;
         let limits = self.device.limits();
-        let needs = request.after.as_ref().map(|after| &after.needs);
-        let settled = view.volume.settled_for(&limits, needs);
+        let settled = view.volume.settled_for(&limits, needs_of(&request));
         let lists = settled.lists();
         let by_label = view.volume.shades_by_label();
         let tiles = match request.kind {
@@ -157,7 +157,11 @@ impl Renderer {
             cut_uniform(),
             staging(timestamps_at(needs.groups), timer.is_some(), passes),
         ];
-        let volume = view.volume.estimate()? + settled.gpu_bytes();
+        let coefficients = match needs_of(&request) {
+            Some(BrickNeeds { coefficients: Some(exact), .. }) => exact.estimate(&limits)?,
+            _ => 0,
+        };
+        let volume = view.volume.estimate()? + settled.gpu_bytes() + coefficients;
         let compositing = CompositingBuffer::estimate(request.view.size, request.bands.len());
         let counts = timer.unwrap_or(0) + sizes(&limits, &buffers)?;
         Ok(volume + compositing + needs.bytes + request.hit_bytes() + counts)
@@ -400,6 +404,11 @@ impl Renderer {
         let bands = compositing.bands.iter().map(|band| band.band);
         self.resolve.draw(pass, compositing.size, resolve_groups.iter().zip(bands), at);
     }
+}
+
+/// What decides which bricks a frame draws whose values are classified after splatting.
+fn needs_of(request: &FrameRequest) -> Option<&BrickNeeds> {
+    request.after.as_ref().map(|after| &after.needs)
 }
 
 fn frame_uniform() -> BufferSpec {

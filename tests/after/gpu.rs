@@ -1,12 +1,14 @@
 //! Images of the GPU against the twin.
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Compositing, Gradient, Interpolation, Order, Rasterizer};
-use sheetsplat::volume::{Volume, builtin};
+use sheetsplat::settings::{Compositing, Gradient, Interpolation, LabelTables, Order, Ramp, Rasterizer};
+use sheetsplat::volume::{Labels, Volume, builtin};
 
-use crate::common::compare::{assert_at_least, decibels};
-use crate::common::images::rms;
+use crate::common::compare::{assert_at_least, assert_at_most, decibels};
+use crate::common::images::{largest_difference, rms};
 use crate::common::{camera, gpu, transfer};
 use crate::{eye, render, scene};
 
@@ -78,5 +80,57 @@ fn settings_are_the_twins() {
             println!("{name} {projection:?}: {measured:.1} dB");
             assert_at_least(measured, 60.0, name);
         }
+    }
+}
+
+/// With culling no channel differs by more than 1 - T, and something is left out.
+#[test]
+fn culling_keeps_its_promise() {
+    for projection in [None, Some(eye(600.0))] {
+        // Large enough for much to be hidden.
+        let (volume, mut scene) = (builtin::volume("head:48").unwrap(), head([1.0, 1.0, 1.0]).1);
+        scene.camera = camera([0.4, 0.9, -0.3], 300.0);
+        scene.splatting.compositing = Compositing::Exponential;
+        scene.splatting.opacity_threshold = 0.9;
+        scene.transfer = transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (60.0, 0.9)]);
+        scene.camera.projection = projection.unwrap_or(scene.camera.projection);
+        let whole = gpu().render_volume(volume.clone(), &scene).unwrap();
+        scene.splatting.culling = true;
+        let culled = gpu().render_volume(volume, &scene).unwrap();
+        let farthest = largest_difference(&whole.image, &culled.image);
+        assert_at_most(farthest, 0.1 + 1e-5, format_args!("{projection:?}"));
+        let [all, drawn] = [whole, culled].map(|rendering| rendering.stats.counts.sections_rasterized);
+        assert!(drawn < all * 9 / 10, "{drawn} of {all}");
+    }
+}
+
+/// Values that are holes, and labels with tables of their own, one of them invisible.
+#[test]
+fn holes_and_labels_are_the_twins() {
+    let (volume, mut scene) = head([1.0, 1.0, 1.5]);
+    let hollow = (0..).zip(volume.values()).map(|(at, &v)| if at % 97 < 3 { f32::NAN } else { v }).collect();
+    let hollow = Volume::new("hollow", volume.dims(), volume.grid().spacing, hollow).unwrap();
+    assert_at_least(accuracy(&hollow, &scene), 60.0, "holes");
+    let values = (0..).zip(volume.values()).map(|(at, _)| (at / 9 % 4) as u16).collect();
+    let (dims, origin) = (volume.dims(), "labels".to_owned());
+    let labels = Labels { origin, dims, spacing: None, values, names: BTreeMap::new() };
+    let labelled = volume.with_labels(labels).unwrap();
+    let own =
+        LabelTables { opacity: Some(Ramp::new(vec![(20.0, 0.0), (90.0, 0.7)]).unwrap()), ..LabelTables::default() };
+    scene.transfer.labels = [(1, own), (2, LabelTables { visible: false, ..LabelTables::default() })].into();
+    assert_at_least(accuracy(&labelled, &scene), 60.0, "labels");
+}
+
+/// What a frame will take is known before it is prepared.
+#[test]
+fn memory_is_estimated() {
+    let gpu = gpu();
+    for (interpolation, falloff) in [(Interpolation::Smooth, 2.0), (Interpolation::Exact, 1.0)] {
+        let (volume, mut scene) = head([1.0, 1.0, 1.0]);
+        (scene.splatting.interpolation, scene.splatting.falloff) = (interpolation, falloff);
+        let mut view = gpu.view(volume, &scene).unwrap();
+        let estimated = gpu.renderer().estimate(&view).unwrap();
+        gpu.draw(&mut view).unwrap();
+        assert_eq!(view.gpu_bytes(), estimated, "{interpolation:?}");
     }
 }
