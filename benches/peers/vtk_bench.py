@@ -47,7 +47,7 @@ def load(scene, folder):
     image.SetDimensions(*map(int, values.shape))
     image.SetSpacing(*spacing)
     image.SetOrigin(*(-(np.array(values.shape) - 1) / 2 * spacing))
-    # VTK wants x fastest.
+    # In VTK, x is fastest.
     image.GetPointData().SetScalars(numpy_to_vtk(np.ascontiguousarray(values.T).ravel(), deep=True))
     return image, float(spacing.min())
 
@@ -90,7 +90,7 @@ def caster(options, image, unit):
         mapper = vtk.vtkFixedPointVolumeRayCastMapper()
         mapper.SetNumberOfThreads(options.threads)
         mapper.SetInteractiveSampleDistance(options.step * unit)
-    # No shortcuts: one ray a pixel, one sample a step.
+    # No shortcuts: one ray per pixel, one sample per step.
     mapper.AutoAdjustSampleDistancesOff()
     mapper.SetImageSampleDistance(1.0)
     mapper.SetSampleDistance(options.step * unit)
@@ -163,7 +163,7 @@ def peak_rss_mib():
 
 def main():
     options = arguments()
-    # A cache on disk would hide what a first frame costs.
+    # A cache on disk would hide the cost of a first frame.
     os.environ.setdefault("MESA_SHADER_CACHE_DISABLE", "true")
     start = time.perf_counter()
     import vtkmodules.all as vtk
