@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
 """Renders one of our scene files with VTK, without a window, and prints its times as one line of JSON.
 
-It serves to compare sheetsplat with VTK's two volume ray casters on the same machine:
+It compares sheetsplat with VTK's two volume ray casters on the same machine:
 
     apt-get install -y libegl1 libgl1-mesa-dri libosmesa6
     python3 -m venv venv && venv/bin/pip install vtk==9.7.2 numpy pynrrd pillow
     venv/bin/python vtk_bench.py SCENE.toml --mapper gpu
 
-`--mapper gpu` is vtkOpenGLGPUVolumeRayCastMapper, on whatever OpenGL the machine has (llvmpipe where there is no GPU); `--mapper cpu` is
+`--mapper gpu` is vtkOpenGLGPUVolumeRayCastMapper, on the machine's OpenGL (llvmpipe without a GPU); `--mapper cpu` is
 vtkFixedPointVolumeRayCastMapper. Every frame turns the camera as `sheetsplat bench --rotate` does, and is finished and read back before the clock stops.
-Opacities are per smallest voxel spacing, as ours are. Run both programs alternately: machines get slower and faster.
+Opacities are per smallest voxel spacing, like ours. Run both programs alternately, because a machine's speed varies.
 """
 
 import argparse
@@ -126,7 +126,7 @@ class Stage:
         self.camera = scene["camera"]
 
     def draw(self, degrees):
-        """One frame, turned about `up` by the right hand, read back as rows from the top."""
+        """One frame, turned right-handed about `up`, read back as rows from the top."""
         import numpy as np
         from vtkmodules.util.numpy_support import vtk_to_numpy
 
