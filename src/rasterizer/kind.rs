@@ -14,26 +14,39 @@ use crate::settings::splatting::{
 /// The subgroup sizes that tiles support.
 pub(super) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;
 
-/// The rasterizer of a view.
+/// The rasterizer of a frame, which follows from the [`Rasterizer`] that the scene and the renderer name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RasterizerKind {
     Quads,
-    /// Tiles, if the view fits.
-    Tiles,
+    /// Tiles, if the view fits. A view that does not fit is an error if tiles are insisted on; otherwise quads draw it.
+    Tiles {
+        insisted: bool,
+    },
     Samples,
 }
 
 impl RasterizerKind {
-    /// The rasterizer for some settings; if it is quads only because of the device, also the reason.
+    /// The rasterizer for some settings; if it is quads only because of the device, also the reason. `preferred` is the renderer's choice,
+    /// for settings that do not name one.
     ///
     /// # Errors
     /// If the settings require what the device or the other settings do not allow.
-    pub(crate) fn of(device: &Device, splatting: &Splatting) -> Result<(Self, Option<RenderError>), RenderError> {
-        let insists = insists_on_tiles(splatting);
+    pub(crate) fn of(
+        device: &Device,
+        splatting: &Splatting,
+        preferred: Rasterizer,
+    ) -> Result<(Self, Option<RenderError>), RenderError> {
+        let needs_tiles =
+            splatting.footprint_box == FootprintBox::Parallelogram || splatting.experimental.in_use().is_some();
+        let choice = match splatting.rasterizer {
+            Rasterizer::Auto if !needs_tiles => preferred,
+            choice => choice,
+        };
+        let insisted = needs_tiles || choice == Rasterizer::Tiles;
         let by_settings = obstacle_in_settings(splatting);
         let is_by_settings = by_settings.is_some();
-        match (splatting.rasterizer, by_settings.or_else(|| obstacle_in_device(device))) {
-            (Rasterizer::Quads, _) if insists => {
+        match (choice, by_settings.or_else(|| obstacle_in_device(device))) {
+            (Rasterizer::Quads, _) if needs_tiles => {
                 let setting = match splatting.experimental.in_use() {
                     Some(economy) => economy.to_string(),
                     None => "splatting.footprint_box = \"parallelogram\"".to_owned(),
@@ -41,9 +54,9 @@ impl RasterizerKind {
                 let found = format!("\"quads\" with {setting}");
                 Err(SettingError::new("splatting.rasterizer", found, "\"tiles\" or \"auto\" with it").into())
             }
-            (Rasterizer::Tiles | Rasterizer::Auto, Some(obstacle)) if insists => Err(obstacle),
+            (Rasterizer::Tiles | Rasterizer::Auto, Some(obstacle)) if insisted => Err(obstacle),
             _ if splatting.method == Method::CompositeEverySample => Ok((Self::Samples, None)),
-            (Rasterizer::Tiles | Rasterizer::Auto, None) => Ok((Self::Tiles, None)),
+            (Rasterizer::Tiles | Rasterizer::Auto, None) => Ok((Self::Tiles { insisted }, None)),
             (Rasterizer::Auto, Some(obstacle)) if !is_by_settings => Ok((Self::Quads, Some(obstacle))),
             _ => Ok((Self::Quads, None)),
         }
@@ -82,13 +95,6 @@ fn obstacle_in_device(device: &Device) -> Option<RenderError> {
         return refused_tiles(format!("max_compute_workgroup_storage_size of {bytes}"), "at least 16384, or \"quads\"");
     }
     None
-}
-
-/// Whether the settings rule quads out.
-pub(crate) fn insists_on_tiles(splatting: &Splatting) -> bool {
-    splatting.rasterizer == Rasterizer::Tiles
-        || splatting.footprint_box == FootprintBox::Parallelogram
-        || splatting.experimental.in_use().is_some()
 }
 
 /// Checks that the settings support cuts and first hits.

@@ -103,76 +103,39 @@ impl QuadRasterizer {
         inputs: FrameInputs<'_>,
         previous: Option<QuadFrame>,
     ) -> Result<(QuadFrame, Prepared), RenderError> {
-        let FrameInputs { device, volume, request, frame, control_points, compositing, .. } = inputs;
-        let FrameRequest { view, splatting, kernel, covered, rays, .. } = request;
+        let FrameInputs { device, request, frame, .. } = inputs;
+        let FrameRequest { view, splatting, kernel, rays, .. } = request;
         let old = PreviousBuffers::of(previous);
-        let targets = old.targets.filter(|old| old.size == view.size);
-        let targets = match targets {
+        let targets = match old.targets.filter(|old| old.size == view.size) {
             Some(targets) => targets,
             None => Targets::new(device, view.size, self.sheet_format, self.sheets)?,
         };
-        let mut other_axes = old.planned;
-        other_axes.retain(|old| {
-            (old.order, old.revision, &old.covered) == (splatting.order, volume.revision, covered)
-                && (old.plan.view.has_depths_of(view) || old.plan.view.is_by_slices())
-        });
-        let current = other_axes.iter().position(|old| old.plan.view.has_depths_of(view));
-        let bucketed = current.is_none();
-        let mut planned = match current {
-            Some(at) => other_axes.swap_remove(at),
-            None => Planned::new(device, volume, request, self.sheets),
-        };
-        planned.plan.view = *view;
-        let plan = &planned.plan;
+        let (planned, other_axes, bucketed) = Planned::renewed(inputs, old.planned, self.sheets);
         let (footprints, tabled) = Footprints::renewed(old.footprints, inputs);
         let group_stride = group_stride(&device.limits());
-        let group_bytes = uniforms::groups(plan, kernel, splatting, group_stride);
+        let group_bytes = uniforms::groups(&planned.plan, kernel, splatting, group_stride);
         let groups = inputs.filled(old.groups, "sheetsplat.groups", &group_bytes, BufferUsages::UNIFORM)?;
-        let [wanted_culled, wanted_hits] = counts_and_hits(request);
-        let culled = grown(device, old.culled, &wanted_culled)?;
-
-        let shared = CullBuffers {
-            frame,
-            groups: &groups,
-            values: volume.values(),
-            has_holes: volume.has_holes(),
-            labels: volume.labels(),
-            control_points,
-            occluded: &targets.occluded,
-            culled: &culled,
-        };
-        let mut old_lists = old.lists.into_iter();
-        let lists: Vec<PreparedList> = (volume.lists.lists.iter().zip(&planned.orders).zip(&planned.most))
-            .map(|((list, order), &most)| {
-                let previous = old_lists.next().map(|old| old.cull);
-                let cull = self.cull.prepare(device, shared, list, order, most, previous)?;
-                let splat_group = self.splat.bind(device, frame, &groups, &cull, &footprints.texture);
-                Ok(PreparedList { cull, splat_group })
-            })
-            .collect::<Result<_, RenderError>>()?;
-        let buffers = [frame, &groups, &culled];
-        let tile_lists = self.tiles.prepare(device, buffers, &targets, plan.groups.len(), old.tile_lists)?;
-        let tiles = &tile_lists.composited;
-        let sheets = targets.sheets_view();
-        let hits = grown(device, old.hits, &wanted_hits)?;
-        let buffers = CompositeBuffers {
-            frame,
-            groups: &groups,
-            sheets: &sheets,
-            tiles,
-            targets: &targets,
-            cut: inputs.cut,
-            hits: &hits,
-        };
+        let [culled_spec, hits_spec] = counts_and_hits(request);
+        let culled = grown(device, old.culled, &culled_spec)?;
+        let hits = grown(device, old.hits, &hits_spec)?;
+        let lists =
+            self.prepare_lists(inputs, &planned, [&groups, &targets.occluded, &culled], &footprints, old.lists)?;
+        let group_count = planned.plan.groups.len();
+        let tile_lists =
+            self.tiles.prepare(device, [frame, &groups, &culled], &targets, group_count, old.tile_lists)?;
         let composite_mode = CompositeMode { compositing: splatting.compositing, rays: *rays };
-        let composite = |band| self.composite.bind(device, composite_mode, buffers, band);
         let splat_mode = SplatMode { form: splatting.footprint, perspective: view.perspective.is_some() };
         self.splat.prepare(device, splat_mode);
         let frame = QuadFrame {
             splat_mode,
-            clear_group: self.splat.bind_clear(device, frame, tiles),
+            clear_group: self.splat.bind_clear(device, frame, &tile_lists.composited),
             composite_mode,
-            composite_groups: compositing.bands.iter().map(composite).collect(),
+            composite_groups: self.bind_bands(
+                inputs,
+                composite_mode,
+                [&groups, &tile_lists.composited, &hits],
+                &targets,
+            ),
             occlude_groups: self.occlude.bind(device, [frame, &groups], &tile_lists.occluding, &targets),
             sheet_views: (0..self.sheets).map(|layer| targets.sheet_view(layer)).collect(),
             group_stride: group_stride as u32,
@@ -187,6 +150,51 @@ impl QuadRasterizer {
             hits,
         };
         Ok((frame, Prepared { bucketed, tabled }))
+    }
+
+    /// Prepares culling and splatting for every list of bricks.
+    fn prepare_lists(
+        &self,
+        inputs: FrameInputs<'_>,
+        planned: &Planned,
+        [groups, occluded, culled]: [&Buffer; 3],
+        footprints: &Footprints,
+        old: Vec<PreparedList>,
+    ) -> Result<Vec<PreparedList>, RenderError> {
+        let FrameInputs { device, volume, frame, control_points, .. } = inputs;
+        let buffers = CullBuffers {
+            frame,
+            groups,
+            values: volume.values(),
+            has_holes: volume.has_holes(),
+            labels: volume.labels(),
+            control_points,
+            occluded,
+            culled,
+        };
+        let mut old = old.into_iter();
+        (volume.lists.lists.iter().zip(&planned.orders).zip(&planned.most))
+            .map(|((list, order), &most)| {
+                let previous = old.next().map(|old| old.cull);
+                let cull = self.cull.prepare(device, buffers, list, order, most, previous)?;
+                let splat_group = self.splat.bind(device, frame, groups, &cull, &footprints.texture);
+                Ok(PreparedList { cull, splat_group })
+            })
+            .collect()
+    }
+
+    /// Binds the stage composite to every band of the compositing buffer.
+    fn bind_bands(
+        &self,
+        inputs: FrameInputs<'_>,
+        mode: CompositeMode,
+        [groups, tiles, hits]: [&Buffer; 3],
+        targets: &Targets,
+    ) -> Vec<BindGroup> {
+        let FrameInputs { device, frame, compositing, cut, .. } = inputs;
+        let sheets = &targets.sheets_view();
+        let buffers = CompositeBuffers { frame, groups, sheets, tiles, targets, cut, hits };
+        compositing.bands.iter().map(|band| self.composite.bind(device, mode, buffers, band)).collect()
     }
 
     /// The resources that a new frame of these lists of bricks needs, with groups of `sheets` sheets.
@@ -293,6 +301,25 @@ impl QuadFrame {
 }
 
 impl Planned {
+    /// The plan for the view, taken from `old` if one is still valid there; the plans that stay valid for other axes; and whether the
+    /// plan is new.
+    fn renewed(inputs: FrameInputs<'_>, old: Vec<Self>, sheets: u32) -> (Self, Vec<Self>, bool) {
+        let FrameInputs { device, volume, request, .. } = inputs;
+        let FrameRequest { view, splatting, covered, .. } = request;
+        let mut usable = old;
+        usable.retain(|old| {
+            (old.order, old.revision, &old.covered) == (splatting.order, volume.revision, covered)
+                && (old.plan.view.has_depths_of(view) || old.plan.view.is_by_slices())
+        });
+        let current = usable.iter().position(|old| old.plan.view.has_depths_of(view));
+        let mut planned = match current {
+            Some(at) => usable.swap_remove(at),
+            None => Self::new(device, volume, request, sheets),
+        };
+        planned.plan.view = *view;
+        (planned, usable, current.is_none())
+    }
+
     fn new(device: &Device, volume: &ClassifiedVolume, request: &FrameRequest, sheets: u32) -> Self {
         let FrameRequest { view, splatting, covered, .. } = request;
         let (order, covered) = (splatting.order, covered.clone());

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use wgpu::Device;
 
-use super::kind::{RasterizerKind, check_rays, insists_on_tiles};
+use super::kind::{RasterizerKind, check_rays};
 use crate::error::RenderError;
 use crate::geometry::kernel::Kernel;
 use crate::geometry::means;
@@ -23,7 +23,6 @@ use crate::settings::splatting::{Classification, Rasterizer, Splatting};
 /// A frame of a view.
 #[derive(Debug)]
 pub(crate) struct FrameRequest {
-    /// The settings, with the renderer's rasterizer where the scene does not name one.
     pub(crate) splatting: Splatting,
     pub(crate) view: ViewGeometry,
     pub(crate) kernel: Kernel,
@@ -54,7 +53,7 @@ impl FrameRequest {
         (surfaces, first_hit): (Option<&Surfaces>, Option<f64>),
         rasterizer: Rasterizer,
     ) -> Result<Self, RenderError> {
-        let splatting = settled(scene.splatting, rasterizer);
+        let splatting = scene.splatting;
         splatting.check()?;
         if splatting.classification == Classification::After {
             let (found, allowed) = ("\"after\" on the GPU", "\"before\", or the reference backend");
@@ -69,7 +68,7 @@ impl FrameRequest {
             Some(surfaces) => Some((surfaces.depths(&seen, grid)?, surfaces.origin)),
             None => None,
         };
-        let (kind, fallback) = RasterizerKind::of(device, &splatting)?;
+        let (kind, fallback) = RasterizerKind::of(device, &splatting, rasterizer)?;
         Ok(Self {
             kind,
             fallback,
@@ -94,10 +93,4 @@ impl FrameRequest {
     pub(crate) fn hit_bytes(&self) -> u64 {
         if self.rays.first_hit { 4 * self.pixels() } else { 0 }
     }
-}
-
-/// The settings, with the renderer's rasterizer where they do not name one.
-fn settled(splatting: Splatting, rasterizer: Rasterizer) -> Splatting {
-    let is_open = splatting.rasterizer == Rasterizer::Auto && !insists_on_tiles(&splatting);
-    Splatting { rasterizer: if is_open { rasterizer } else { splatting.rasterizer }, ..splatting }
 }

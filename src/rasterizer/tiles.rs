@@ -29,15 +29,8 @@ pub(crate) struct TileRasterizer {
 #[derive(Debug)]
 pub(crate) struct TileFrame {
     binned: Binned,
-    uniform: Buffer,
-    patch_ranges: Buffer,
-    /// All bricks in one buffer, if the volume's own are in several.
-    bricks: Option<Buffer>,
-    starts: Buffer,
-    entries: Buffer,
-    gathered: Buffer,
+    buffers: TileBuffers<Buffer>,
     results: GatheredLayout,
-    half_boxes: Buffer,
     /// For every dispatch its band's index, and the offset and number of its patches.
     dispatches: Vec<(usize, u32, u32)>,
     bands: Vec<GatherBand>,
@@ -66,99 +59,42 @@ impl TileRasterizer {
         inputs: FrameInputs<'_>,
         previous: Option<TileFrame>,
     ) -> Result<(TileFrame, Prepared), RenderError> {
-        let FrameInputs { device, queue, volume, request, .. } = inputs;
-        let FrameRequest { splatting, view, kernel, covered, rays, .. } = request;
+        let FrameInputs { device, volume, request, .. } = inputs;
         let limits = device.limits();
-        let mut old = PreviousBuffers::of(previous);
-        let search = all_search_passes(request, volume.labels().is_some());
-        let is_current = |old: &Binned| {
-            old.view == *view
-                && (old.order, old.revision, old.bins.passes.search) == (splatting.order, volume.revision, search)
-                && (old.support, &old.covered) == (kernel.support(), covered)
-        };
-        let (current, stale) = match old.binned.take() {
-            Some(binned) if is_current(&binned) => (Some(binned), false),
-            _ => (None, true),
-        };
+        let (old_binned, old_buffers) = previous.map(|old| (old.binned, old.buffers)).unzip();
         let bricks = volume.lists.all();
-        let binned = match current {
-            Some(binned) => binned,
-            None => Binned {
-                bins: bins(&limits, request, bricks, search)?,
-                view: *view,
-                order: splatting.order,
-                covered: covered.clone(),
-                support: kernel.support(),
-                revision: volume.revision,
-            },
-        };
-        let bins = &binned.bins;
-        let results = GatheredLayout::new(view, bins, bricks.len() as u32);
-        let uniform = uniforms::gather(view, kernel, splatting, bins, &results);
-        let spec = BufferSpecs::new(&limits, request, (bins, &results), volume.lists.lists.len())?;
-        let write = |old, spec: &BufferSpec, bytes: &[u8]| written(device, queue, old, spec, bytes);
-        let (starts, entries) = match (old.starts.take(), old.entries.take()) {
-            (Some(starts), Some(entries)) if !stale => (starts, entries),
-            (starts, entries) => (
-                write(starts, &spec.starts, bytemuck::cast_slice(&bins.starts))?,
-                write(entries, &spec.entries, bytemuck::cast_slice(&bins.entries))?,
-            ),
-        };
-        let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|&pixels| uniforms::in_f32_pixels(pixels)).collect();
-        let half_boxes = write(old.half_boxes.take(), &spec.half_boxes, bytemuck::cast_slice(&half_boxes))?;
-        let own_bricks = match (spec.bricks, old.bricks.take()) {
-            (None, _) => None,
-            (_, Some(bricks)) if !stale => Some(bricks),
-            (Some(spec), old) => Some(write(old, &spec, bytemuck::cast_slice(bricks))?),
-        };
-        let gathered = grown(device, old.gathered.take(), &spec.gathered)?;
-        let uniform = write(old.uniform.take(), &spec.uniform, bytemuck::bytes_of(&uniform))?;
+        let (binned, is_new) = Binned::renewed(&limits, inputs, bricks, old_binned)?;
+        let results = GatheredLayout::new(&request.view, &binned.bins, bricks.len() as u32);
+        let spec = TileBuffers::specs(&limits, request, (&binned.bins, &results), volume.lists.lists.len())?;
+        let (range_bytes, dispatches) = patch_ranges(&limits, request);
+        let contents = (&binned.bins, &results, &range_bytes[..]);
+        let buffers = TileBuffers::filled(inputs, spec, contents, bricks, (old_buffers, is_new))?;
+        let bands = self.bind(inputs, &binned.bins, &buffers);
+        Ok((TileFrame { binned, buffers, results, dispatches, bands }, Prepared { bucketed: is_new, tabled: false }))
+    }
 
-        let stride = range_stride(&limits);
-        let (mut range_bytes, mut dispatches) = (Vec::new(), Vec::new());
-        let [columns, _] = patch_bins::grid(view.size);
-        for (at, band) in request.bands.iter().enumerate() {
-            let first_patch = band.first_row / patch_bins::PATCH[1] * columns;
-            let patches = band.rows.div_ceil(patch_bins::PATCH[1]) * columns;
-            let range = PatchRange { first_row: band.first_row, first_patch, end_patch: first_patch + patches };
-            dispatches.push((at, range_bytes.len() as u32, patches));
-            range_bytes.extend_from_slice(bytemuck::bytes_of(&range));
-            range_bytes.resize(range_bytes.len().next_multiple_of(stride), 0);
-        }
-        let patch_ranges = write(old.patch_ranges.take(), &spec.patch_ranges, &range_bytes)?;
-
+    /// Binds the stage to every band of the compositing buffer.
+    fn bind(&self, inputs: FrameInputs<'_>, bins: &PatchBins, own: &TileBuffers<Buffer>) -> Vec<GatherBand> {
+        let FrameInputs { device, volume, request, .. } = inputs;
+        let FrameRequest { splatting, view, rays, .. } = request;
         let of_volume = [volume.labels().is_some(), volume.has_holes()];
         let mode = GatherMode::of(splatting, view.perspective.is_some(), of_volume, *rays, bins.workgroups);
         let buffers = GatherBuffers {
             frame: inputs.frame,
-            gather: &uniform,
-            patch_ranges: &patch_ranges,
-            bricks: own_bricks.as_ref().unwrap_or_else(|| &volume.lists.lists[0].buffer),
-            starts: &starts,
-            entries: &entries,
+            gather: &own.uniform,
+            patch_ranges: &own.patch_ranges,
+            bricks: own.bricks.as_ref().unwrap_or_else(|| &volume.lists.lists[0].buffer),
+            starts: &own.starts,
+            entries: &own.entries,
             control_points: inputs.control_points,
             values: volume.values(),
             labels: volume.labels(),
-            gathered: &gathered,
-            half_boxes: &half_boxes,
+            gathered: &own.gathered,
+            half_boxes: &own.half_boxes,
             cut: inputs.cut,
         };
         let bind = |acc| self.gather.bind(device, mode, buffers, acc, bins.dispatches);
-        let bands = inputs.compositing.bands.iter().map(|band| bind(&band.acc)).collect();
-        let frame = TileFrame {
-            binned,
-            uniform,
-            patch_ranges,
-            bricks: own_bricks,
-            starts,
-            entries,
-            gathered,
-            results,
-            half_boxes,
-            dispatches,
-            bands,
-        };
-        Ok((frame, Prepared { bucketed: stale, tabled: false }))
+        inputs.compositing.bands.iter().map(|band| bind(&band.acc)).collect()
     }
 
     /// The resources that a new frame of these bricks, in `lists` lists, needs.
@@ -173,10 +109,7 @@ impl TileRasterizer {
     ) -> Result<FrameEstimate, RenderError> {
         let bins = bins(limits, request, bricks, all_search_passes(request, by_label))?;
         let results = GatheredLayout::new(&request.view, &bins, bricks.len() as u32);
-        let spec = BufferSpecs::new(limits, request, (&bins, &results), lists)?;
-        let BufferSpecs { uniform, patch_ranges, starts, entries, gathered, half_boxes, bricks, .. } = spec;
-        let buffers: Vec<BufferSpec> =
-            [uniform, patch_ranges, starts, entries, gathered, half_boxes].into_iter().chain(bricks).collect();
+        let buffers: Vec<BufferSpec> = TileBuffers::specs(limits, request, (&bins, &results), lists)?.all().collect();
         let bands = request.bands.len() as u64 * GatherBand::estimate(bins.dispatches);
         let groups = bins.groups as usize;
         Ok(FrameEstimate { bytes: sizes(limits, &buffers)? + bands, groups, passes: TileFrame::PASSES })
@@ -184,7 +117,7 @@ impl TileRasterizer {
 
     /// Draws the frame.
     pub(crate) fn record(&self, encoder: &mut CommandEncoder, timer: &mut Option<Timer>, frame: &TileFrame) {
-        encoder.clear_buffer(&frame.gathered, 0, None);
+        encoder.clear_buffer(&frame.buffers.gathered, 0, None);
         frame.bands.iter().for_each(|band| band.clear(encoder));
         let mut pass = encoder.begin_compute_pass(&super::compute("sheetsplat.gather", timer, "gather"));
         for &(band, offset, patches) in &frame.dispatches {
@@ -210,38 +143,113 @@ impl TileFrame {
 
     /// Copies the frame's counts to the start of `staging`.
     pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer) {
-        encoder.copy_buffer_to_buffer(&self.gathered, 0, staging, 0, self.results.count_bytes());
+        encoder.copy_buffer_to_buffer(&self.buffers.gathered, 0, staging, 0, self.results.count_bytes());
     }
 
     /// The buffer with the words of first hits, and their byte offset in it.
     pub(crate) fn first_hits(&self) -> (&Buffer, u64) {
-        (&self.gathered, self.results.hits_byte())
+        (&self.buffers.gathered, self.results.hits_byte())
     }
 
     /// Bytes of GPU memory.
     pub(crate) fn gpu_bytes(&self) -> u64 {
-        let Self { uniform, patch_ranges, starts, entries, gathered, half_boxes, bricks, .. } = self;
         let bands: u64 = self.bands.iter().map(GatherBand::gpu_bytes).sum();
-        let buffers = [uniform, patch_ranges, starts, entries, gathered, half_boxes].into_iter().chain(bricks);
-        bands + buffers.map(Buffer::size).sum::<u64>()
+        bands + self.buffers.each_ref().all().map(Buffer::size).sum::<u64>()
     }
 }
 
-/// The specs of a frame's buffers, except those of bands.
-struct BufferSpecs {
-    uniform: BufferSpec,
-    patch_ranges: BufferSpec,
-    starts: BufferSpec,
-    entries: BufferSpec,
-    gathered: BufferSpec,
-    half_boxes: BufferSpec,
-    /// The copied bricks, if the volume's own are in several buffers, or in none.
-    bricks: Option<BufferSpec>,
+impl Binned {
+    /// The old bins if they are still valid, or else new ones; also whether they are new.
+    fn renewed(
+        limits: &Limits,
+        inputs: FrameInputs<'_>,
+        bricks: &[Brick],
+        old: Option<Self>,
+    ) -> Result<(Self, bool), RenderError> {
+        let FrameInputs { volume, request, .. } = inputs;
+        let FrameRequest { splatting, view, kernel, covered, .. } = request;
+        let search = all_search_passes(request, volume.labels().is_some());
+        let is_current = |old: &Self| {
+            old.view == *view
+                && (old.order, old.revision, old.bins.passes.search) == (splatting.order, volume.revision, search)
+                && (old.support, &old.covered) == (kernel.support(), covered)
+        };
+        if let Some(old) = old.filter(is_current) {
+            return Ok((old, false));
+        }
+        let binned = Self {
+            bins: bins(limits, request, bricks, search)?,
+            view: *view,
+            order: splatting.order,
+            covered: covered.clone(),
+            support: kernel.support(),
+            revision: volume.revision,
+        };
+        Ok((binned, true))
+    }
 }
 
-impl BufferSpecs {
-    /// The buffers for a view of a volume whose bricks are divided among `lists` lists.
-    fn new(
+/// A frame's buffers, except those of bands: their specs, or the buffers themselves.
+#[derive(Debug)]
+struct TileBuffers<B> {
+    uniform: B,
+    patch_ranges: B,
+    starts: B,
+    entries: B,
+    gathered: B,
+    half_boxes: B,
+    /// All bricks in one buffer, if the volume's own are in several, or in none.
+    bricks: Option<B>,
+}
+
+impl<B> TileBuffers<B> {
+    fn all(self) -> impl Iterator<Item = B> {
+        let Self { uniform, patch_ranges, starts, entries, gathered, half_boxes, bricks } = self;
+        [uniform, patch_ranges, starts, entries, gathered, half_boxes].into_iter().chain(bricks)
+    }
+
+    fn each_ref(&self) -> TileBuffers<&B> {
+        let Self { uniform, patch_ranges, starts, entries, gathered, half_boxes, bricks } = self;
+        TileBuffers { uniform, patch_ranges, starts, entries, gathered, half_boxes, bricks: bricks.as_ref() }
+    }
+}
+
+impl TileBuffers<Buffer> {
+    /// Fills the buffers for a frame. Buffers that depend only on the bins are kept unless the bins are new.
+    fn filled(
+        inputs: FrameInputs<'_>,
+        spec: TileBuffers<BufferSpec>,
+        (bins, results, range_bytes): (&PatchBins, &GatheredLayout, &[u8]),
+        bricks: &[Brick],
+        (old, is_new): (Option<Self>, bool),
+    ) -> Result<Self, RenderError> {
+        let FrameInputs { device, queue, request, .. } = inputs;
+        let write = |old, spec: &BufferSpec, bytes: &[u8]| written(device, queue, old, spec, bytes);
+        let rewrite = |old: Option<Buffer>, spec: &BufferSpec, bytes: &[u8]| match old {
+            Some(current) if !is_new => Ok(current),
+            old => write(old, spec, bytes),
+        };
+        let uniform = uniforms::gather(&request.view, &request.kernel, &request.splatting, bins, results);
+        let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|&pixels| uniforms::in_f32_pixels(pixels)).collect();
+        let old = PreviousBuffers::of(old);
+        Ok(Self {
+            starts: rewrite(old.starts, &spec.starts, bytemuck::cast_slice(&bins.starts))?,
+            entries: rewrite(old.entries, &spec.entries, bytemuck::cast_slice(&bins.entries))?,
+            half_boxes: write(old.half_boxes, &spec.half_boxes, bytemuck::cast_slice(&half_boxes))?,
+            bricks: match spec.bricks {
+                Some(spec) => Some(rewrite(old.bricks, &spec, bytemuck::cast_slice(bricks))?),
+                None => None,
+            },
+            gathered: grown(device, old.gathered, &spec.gathered)?,
+            uniform: write(old.uniform, &spec.uniform, bytemuck::bytes_of(&uniform))?,
+            patch_ranges: write(old.patch_ranges, &spec.patch_ranges, range_bytes)?,
+        })
+    }
+}
+
+impl TileBuffers<BufferSpec> {
+    /// The specs for a view of a volume whose bricks are divided among `lists` lists.
+    fn specs(
         limits: &Limits,
         request: &FrameRequest,
         (bins, results): (&PatchBins, &GatheredLayout),
@@ -283,6 +291,22 @@ fn binding(limits: &Limits) -> u64 {
     limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
 }
 
+/// The patches of every band of the compositing buffer, as uniforms, and the frame's dispatches.
+fn patch_ranges(limits: &Limits, request: &FrameRequest) -> (Vec<u8>, Vec<(usize, u32, u32)>) {
+    let stride = range_stride(limits);
+    let (mut bytes, mut dispatches) = (Vec::new(), Vec::new());
+    let [columns, _] = patch_bins::grid(request.view.size);
+    for (at, band) in request.bands.iter().enumerate() {
+        let first_patch = band.first_row / patch_bins::PATCH[1] * columns;
+        let patches = band.rows.div_ceil(patch_bins::PATCH[1]) * columns;
+        let range = PatchRange { first_row: band.first_row, first_patch, end_patch: first_patch + patches };
+        dispatches.push((at, bytes.len() as u32, patches));
+        bytes.extend_from_slice(bytemuck::bytes_of(&range));
+        bytes.resize(bytes.len().next_multiple_of(stride), 0);
+    }
+    (bytes, dispatches)
+}
+
 /// The stride between parts in bytes.
 fn range_stride(limits: &Limits) -> usize {
     size_of::<PatchRange>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize)
@@ -308,31 +332,31 @@ fn search_passes(points: u32) -> u32 {
     points.ilog2() + 2
 }
 
-/// The buffers of the previous frame that may be reused.
+/// The buffers of the previous frame, each of which may be reused.
 #[derive(Default)]
 struct PreviousBuffers {
-    binned: Option<Binned>,
     uniform: Option<Buffer>,
     patch_ranges: Option<Buffer>,
-    bricks: Option<Buffer>,
     starts: Option<Buffer>,
     entries: Option<Buffer>,
     gathered: Option<Buffer>,
     half_boxes: Option<Buffer>,
+    bricks: Option<Buffer>,
 }
 
 impl PreviousBuffers {
-    fn of(frame: Option<TileFrame>) -> Self {
-        let Some(frame) = frame else { return Self::default() };
+    fn of(old: Option<TileBuffers<Buffer>>) -> Self {
+        let Some(TileBuffers { uniform, patch_ranges, starts, entries, gathered, half_boxes, bricks }) = old else {
+            return Self::default();
+        };
         Self {
-            binned: Some(frame.binned),
-            uniform: Some(frame.uniform),
-            patch_ranges: Some(frame.patch_ranges),
-            bricks: frame.bricks,
-            starts: Some(frame.starts),
-            entries: Some(frame.entries),
-            gathered: Some(frame.gathered),
-            half_boxes: Some(frame.half_boxes),
+            uniform: Some(uniform),
+            patch_ranges: Some(patch_ranges),
+            starts: Some(starts),
+            entries: Some(entries),
+            gathered: Some(gathered),
+            half_boxes: Some(half_boxes),
+            bricks,
         }
     }
 }

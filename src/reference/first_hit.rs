@@ -15,11 +15,10 @@ pub(super) struct FirstHits {
 }
 
 impl FirstHits {
-    /// An empty list if no opacity is requested; otherwise no pixel has reached it yet.
-    pub(super) fn new(opacity: Option<f64>, compositing: Compositing, geometry: &Geometry) -> Self {
+    /// No pixel has reached the opacity yet.
+    pub(super) fn new(opacity: f64, compositing: Compositing, geometry: &Geometry) -> Self {
         let pixels = (geometry.size.x * geometry.size.y) as usize;
-        let sheets = vec![None; if opacity.is_some() { pixels } else { 0 }];
-        Self { opacity: opacity.unwrap_or(0.0), compositing, sheets }
+        Self { opacity, compositing, sheets: vec![None; pixels] }
     }
 
     /// Notes the pixels in which one sheet raised the opacity to the value: the position is interpolated linearly within the sheet's visible

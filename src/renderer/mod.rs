@@ -23,7 +23,7 @@ use crate::pass::composite::CutBuffers;
 use crate::pass::first_hit::FirstHit;
 use crate::pass::resolve::Resolve;
 use crate::rasterizer::FrameInputs;
-use crate::rasterizer::kind::{RasterizerKind, insists_on_tiles};
+use crate::rasterizer::kind::RasterizerKind;
 use crate::rasterizer::quads::QuadRasterizer;
 use crate::rasterizer::request::FrameRequest;
 use crate::rasterizer::samples::SampleRasterizer;
@@ -126,10 +126,10 @@ impl Renderer {
         let lists = settled.lists();
         let by_label = view.volume.shades_by_label();
         let tiles = match request.kind {
-            RasterizerKind::Tiles => {
+            RasterizerKind::Tiles { insisted } => {
                 let bricks = (settled.all(), lists.len());
                 match TileRasterizer::estimate(&limits, &request, bricks, by_label) {
-                    Err(error) if insists_on_tiles(&request.splatting) => return Err(error),
+                    Err(error) if insisted => return Err(error),
                     needs => needs.ok(),
                 }
             }
@@ -263,16 +263,16 @@ impl Renderer {
             Some(Drawing::Samples(frame)) => old_samples = Some(*frame),
             None => {}
         }
-        let FrameRequest { kind, splatting, .. } = inputs.request;
-        if *kind == RasterizerKind::Samples {
+        let kind = inputs.request.kind;
+        if kind == RasterizerKind::Samples {
             let (frame, prepared) = self.samples(inputs.device).prepare(inputs, old_samples)?;
             return Ok((Drawing::Samples(Box::new(frame)), prepared, None));
         }
         let mut fallback = None;
-        if *kind == RasterizerKind::Tiles {
+        if let RasterizerKind::Tiles { insisted } = kind {
             match self.tiles.prepare(inputs, old_tiles) {
                 Ok((frame, prepared)) => return Ok((Drawing::Tiles(Box::new(frame)), prepared, None)),
-                Err(error) if insists_on_tiles(splatting) => return Err(error),
+                Err(error) if insisted => return Err(error),
                 Err(error) => fallback = Some(error),
             }
         }
