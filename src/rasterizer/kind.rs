@@ -16,7 +16,7 @@ pub(super) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RasterizerKind {
     Quads,
-    /// Tiles, if the view fits. A view that does not fit is an error if tiles are insisted on; otherwise quads draw it.
+    /// Tiles, if the view fits. A view that does not fit is an error if tiles are required; otherwise quads draw it.
     Tiles {
         insisted: bool,
     },

@@ -118,7 +118,7 @@ fn bad_usage_and_input_are_2_and_leave_nothing() {
         ),
         ("-o s.png --set splatting.radius=1,2,9", &["--set", "splatting.radius", "9", "[1, 4]"]),
         ("-o s.png --set splatting.radius=1,", &["--set", "splatting.radius", "\"\""]),
-        ("-o s.png --set splatting.radius=1,2 --set splatting.radius=3", &["--set", "splatting.radius", "once more"]),
+        ("-o s.png --set splatting.radius=1,2 --set splatting.radius=3", &["--set", "splatting.radius", "found again"]),
         ("-o s.png --set nonesuch.key=1,2", &["nonesuch"]),
         ("-o s.png --set splatting.radius=1,2 --set splatting.falloff=1,2 --columns 2", &["--columns", "2", "one"]),
         ("-o s.png --set splatting.radius=1,2 --columns 0", &["--columns", "0"]),

@@ -36,10 +36,10 @@ pub(super) fn plate(scene: &Scene, volume: &Volume, transfer: &TransferFunction)
         _ => false,
     };
     if volume.labels().is_none() && categories::is_label_map(volume) {
-        return refused("a volume of labels", "values that are amounts, or legend");
+        return refused("a volume of labels", "values that are not labels, or --annotate legend");
     }
     let Some([lo, hi]) = shown_range(volume, transfer) else {
-        return refused("no voxel with an opacity above 0", "volumes that show something");
+        return refused("no voxel with an opacity above 0", "visible voxels");
     };
     let height = (scene.image.height / 2).clamp(HEIGHTS[0], HEIGHTS[1]);
     // Half a line is left between numbers.

@@ -80,7 +80,7 @@ fn entries(volume: &Volume, transfer: &TransferFunction) -> Result<Vec<Entry>, F
         },
     };
     if entries.is_empty() {
-        return refused("no label with a colour of its own", "some, as with --preset labels");
+        return refused("no label with a colour of its own", "labels with colours, as with --preset labels");
     }
     Ok(entries)
 }

@@ -86,11 +86,13 @@ fn check(axes: &[Axis], arguments: &Arguments) -> Result<(), Failure> {
         // A later override would make the label wrong.
         let mut later = arguments.input.sets[at + 1..].iter().filter_map(|set| set.split_once('='));
         if later.any(|(later, _)| later.trim() == key) {
-            let allowed = "before its several values only";
-            return Err(Failure::Input(format!("--set: {key}: found once more, allowed: {allowed}")));
+            let allowed = "only before them";
+            return Err(Failure::Input(format!(
+                "--set: {key}: found again after its several values, allowed: {allowed}"
+            )));
         }
         if arguments.input.view.is_some() && ["camera", "camera.direction", "camera.up"].contains(&key.as_str()) {
-            return Err(Failure::Input(format!("--view: found with several values of {key}, allowed: without them")));
+            return Err(Failure::Input(format!("--view: found with several values of {key}, allowed: a single value")));
         }
     }
     if let (Some(columns), 2) = (arguments.columns, axes.len()) {
