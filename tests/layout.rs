@@ -1,4 +1,4 @@
-//! Every struct that Rust and WGSL share has the same members at the same places in both. Needs no GPU.
+//! Every struct shared by Rust and WGSL has the same members at the same offsets in both. Needs no GPU.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::mem::offset_of;
@@ -16,12 +16,12 @@ struct Layout {
     name: &'static str,
     size: usize,
     members: Vec<(&'static str, usize, usize)>,
-    /// The member that goes on to the end of its buffer, an array of `u32`.
+    /// The member that continues to the end of its buffer, an array of `u32`.
     tail: Option<&'static str>,
 }
 
 impl Layout {
-    /// A struct whose last member is the first of an array that goes on; WGSL, too, counts one of them.
+    /// Marks a struct whose last member is the first element of an array that continues; WGSL counts one element too.
     fn goes_on(self) -> Self {
         Self { tail: self.members.last().map(|last| last.0), ..self }
     }
@@ -34,7 +34,7 @@ fn size_of_member<S, M>(_: fn(&S) -> &M) -> usize {
 
 macro_rules! layout {
     ($name:ident { $($member:ident),* $(,)? }) => {{
-        // Without `..`: a member that is missing here does not compile.
+        // Without `..`, a missing member does not compile.
         fn all_members($name { $($member: _),* }: $name) {}
         let _ = all_members;
         Layout {
@@ -164,7 +164,7 @@ fn find<'a>(module: &'a Module, name: &str) -> Option<(Handle<Type>, &'a Type)> 
     module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name))
 }
 
-/// Whether a type is an array that goes on to the end of its buffer, of `u32` without gaps.
+/// Whether a type is an array of `u32` without gaps that continues to the end of its buffer.
 fn is_endless(module: &Module, ty: Handle<Type>) -> bool {
     match module.types[ty].inner {
         TypeInner::Array { base, size: naga::ArraySize::Dynamic, stride } => {
@@ -206,8 +206,8 @@ fn members_and_sizes_agree() {
             if tail != layout.tail {
                 failures.push(format!("{stage}: {}: goes on with {tail:?}, Rust: {:?}", layout.name, layout.tail));
             }
-            // The size WGSL rounds a struct up to is also the smallest binding that holds one, and, as it is a multiple of
-            // the alignment, the stride of an array of them.
+            // The size to which WGSL rounds a struct up is also the size of the smallest binding that holds one, and, being a multiple of the
+            // alignment, the stride of an array of them.
             let stride = layouter[handle].to_stride() as usize;
             if (*span as usize, stride) != (layout.size, layout.size) {
                 let (name, size) = (layout.name, layout.size);

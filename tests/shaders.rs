@@ -1,4 +1,4 @@
-//! The shaders parse, validate as WebGPU core, all but one, and need no more than WebGPU's default limits. Needs no GPU.
+//! The shaders parse, validate as WebGPU core (except one), and need no more than WebGPU's default limits. Needs no GPU.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::collections::BTreeSet;
@@ -8,10 +8,10 @@ use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, Module, ShaderStage, TypeInner};
 use sheetsplat::internals::gpu::shaders::{self, Shader};
 
-/// What WebGPU core has beyond naga's least: `pack2x16float` and its inverse, which WGSL always has.
+/// The capabilities of WebGPU core beyond naga's minimum: `pack2x16float` and its inverse, which WGSL always has.
 const WEBGPU_CORE: Capabilities = Capabilities::SHADER_FLOAT16_IN_FLOAT32;
 
-/// The one stage that asks for more, subgroups; frames are drawn without it where the device has none.
+/// The only stage that needs more, subgroups; on devices without them other stages draw frames.
 const WITH_SUBGROUPS: Shader = shaders::GATHER;
 
 fn validated(shader: &Shader) -> Result<(Module, ModuleInfo), String> {
@@ -50,7 +50,7 @@ fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
     found
 }
 
-/// All that went wrong, not only the first.
+/// Asserts that nothing failed, and reports all failures, not only the first.
 fn assert_none(failures: &[String]) {
     assert!(failures.is_empty(), "{} failures:\n{}", failures.len(), failures.join("\n"));
 }
@@ -81,7 +81,7 @@ fn errors_name_the_file_and_the_line() {
     );
     for shader in &shaders::ALL {
         assert_eq!(shader.files.iter().map(|&(_, text)| text).collect::<String>(), shader.source);
-        // Every file ends with a line of its own, else lines would be counted wrongly.
+        // Every file ends with a line break, or else lines would be counted wrongly.
         assert!(shader.files.iter().all(|(_, text)| text.ends_with('\n')), "{}", shader.stage);
     }
 }
@@ -100,8 +100,8 @@ fn every_file_is_used() {
     assert_eq!(stages.len(), shaders::ALL.len(), "every stage has a name of its own");
 }
 
-/// One file of `src/pass` uses a shader; it names entry points and overrides in words that only the shader can check. (That
-/// the shader has all that the file names is checked where the pipelines are made.)
+/// A shader is used by one file of `src/pass`, whose names of entry points and overrides only the shader can check. (Creating the pipelines
+/// checks that the shader has all that the file names.)
 #[test]
 fn entry_points_and_overrides_are_those_of_the_passes() {
     let passes = files(&root().join("src/pass"), "rs");
@@ -128,7 +128,7 @@ fn entry_points_and_overrides_are_those_of_the_passes() {
                 failures.push(format!("{}: the pass does not use {}", shader.stage, entry.name));
             }
         }
-        // Bindings go by name, when a layout is made and when resources are bound.
+        // Bindings are matched by name, when a layout is made and when resources are bound.
         for (_, global) in module.global_variables.iter() {
             let (Some(binding), Some(name)) = (&global.binding, &global.name) else { continue };
             if shader.binding(name) != Some(binding.binding) {
@@ -157,7 +157,7 @@ fn bindings_stay_within_default_limits() {
     for shader in &shaders::ALL {
         let (module, _) = validated(shader).unwrap();
         let globals = || module.global_variables.iter().map(|(_, global)| global);
-        // A layout may show every binding to every stage, so all of them count for each.
+        // A layout may make every binding visible to every stage, so all of them count for each.
         let count =
             |counts: &dyn Fn(&naga::GlobalVariable) -> bool| globals().filter(|global| counts(global)).count() as u32;
         let inner = |global: &naga::GlobalVariable| module.types[global.ty].inner.clone();
@@ -248,7 +248,7 @@ fn entry_points_stay_within_default_limits() {
     assert_none(&failures);
 }
 
-/// An entry point's workgroup size with the values the shader itself gives its overrides; the passes set the same.
+/// An entry point's workgroup size with the shader's own values of its overrides; the passes set the same.
 fn workgroup_size(module: &Module, entry: &naga::EntryPoint) -> [u32; 3] {
     let mut size = entry.workgroup_size;
     for (side, overridden) in size.iter_mut().zip(entry.workgroup_size_overrides.into_iter().flatten()) {

@@ -141,7 +141,7 @@ impl Gather {
         })
     }
 
-    /// Binds a band of the compositing buffer, `[vec4f]`, for one mode and so many dispatches.
+    /// Binds a band of the compositing buffer, `[vec4f]`, for one mode and a number of dispatches.
     pub fn bind(
         &self,
         device: &Device,
@@ -243,7 +243,7 @@ impl GatherBand {
         self.next.iter().for_each(|args| encoder.clear_buffer(args, 0, None));
     }
 
-    /// Bytes of GPU memory that one takes with so many dispatches.
+    /// Bytes of GPU memory that a band uses with this many dispatches.
     pub fn estimate(dispatches: u32) -> u64 {
         u64::from(dispatches) * NEXT_BYTES
     }

@@ -1,4 +1,4 @@
-//! What `after` excludes is refused by its key.
+//! Settings that exclude `after` are refused by their keys.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ fn parse(sets: &[&str]) -> Result<Scene, sheetsplat::scene::SceneError> {
 }
 
 #[test]
-fn what_excludes_after_is_named() {
+fn settings_that_exclude_after_are_named() {
     let after = "splatting.classification=after";
     for (sets, key, found, allowed) in [
         (&["splatting.method=axis-aligned"][..], "classification", "method = \"axis-aligned\"", "\"before\" with it"),
@@ -47,11 +47,11 @@ fn what_excludes_after_is_named() {
             "\"smooth\" with them, or a larger falloff",
         ),
     ] {
-        // By themselves they are fine.
+        // Without `after` they are valid.
         parse(sets).unwrap().splatting.check().unwrap();
         let text = parse(&[&[after], sets].concat()).unwrap_err().to_string();
         assert!([key, found, allowed].iter().all(|words| text.contains(words)), "{sets:?}: {text}");
-        // Also where no scene file says so.
+        // They are refused without a scene file, too.
         let mut scene = parse(sets).unwrap();
         scene.splatting.classification = Classification::After;
         let volume = scene.load_volume().unwrap();
@@ -78,7 +78,7 @@ fn the_preset_labels_excludes_after() {
     assert_eq!(Splatting::default().classification, Classification::Before);
 }
 
-/// Until it draws it.
+/// The GPU does not draw `after` yet.
 #[test]
 fn the_gpu_refuses_after() {
     let scene = parse(&["splatting.classification=after"]).unwrap();

@@ -26,7 +26,7 @@ impl Folder {
         image::open(self.path(name)).unwrap().into_rgba8()
     }
 
-    /// What `render` gives, which must be the tile whose upper left corner is there.
+    /// Asserts that the tile with this upper left corner equals the image that `render` gives.
     fn assert_tile(&self, sheet: &RgbaImage, corner: [u32; 2], arguments: &str) {
         self.render(&format!("{arguments} -o tile.png"));
         let tile = self.image("tile.png");
@@ -35,12 +35,12 @@ impl Folder {
     }
 }
 
-/// The part of a sheet that has the label of a tile in it.
+/// The part of a sheet that contains a tile's label.
 fn label(sheet: &RgbaImage, [x, y]: [u32; 2], lines: u32) -> RgbaImage {
     image::imageops::crop_imm(sheet, x, y, WIDTH, lines * LINE).to_image()
 }
 
-/// Whether something is written there, light on dark.
+/// Whether the part contains text, light on dark.
 fn is_written(label: &RgbaImage) -> bool {
     let light = label.pixels().filter(|pixel| pixel.0[0] > 150).count();
     light > 40 && light < label.pixels().len() / 5

@@ -33,7 +33,7 @@ fn wrong_names() {
     let missing = Volume::open(&named("three.npz", "values"));
     assert!(matches!(missing, Err(VolumeError::Io { path, .. }) if path.ends_with("three.npz")));
     let other = Folder::new().open("a.npz", &replaced("one.npz", "values.npy", "values.txt"));
-    // The directory is at the end, so what was replaced counts for nothing.
+    // The directory is at the end, so the replaced bytes before it do not count.
     assert_eq!(other.unwrap().values(), values());
     let text = fs::read(fixture("one.npz")).unwrap();
     let at = text.windows(10).rposition(|window| window == b"values.npy").unwrap();
@@ -41,7 +41,7 @@ fn wrong_names() {
     assert_refused(other, "a.npz", "arrays", "0 arrays", "one array");
 }
 
-/// A file with other bytes in the directory's entry of its last member, from this place on.
+/// A file with some bytes of its last member's directory entry replaced, from this offset on.
 fn entry(name: &str, at: usize, bytes: &[u8]) -> Vec<u8> {
     let whole = fs::read(fixture(name)).unwrap();
     let entry = whole.windows(4).rposition(|window| window == b"PK\x01\x02").unwrap();

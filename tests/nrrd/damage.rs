@@ -15,7 +15,7 @@ fn endless_headers() {
     assert_refused(open(&[b"NRRD0005\n", &comments]), "volume.nrrd", "header", "more", "1048576 bytes in all");
     assert_refused(open(&[PLAIN.as_bytes()]), "volume.nrrd", "header", "the end of the file", "a blank line");
 
-    // A long but legal line is kept short in the message.
+    // A long but legal line is shortened in the message.
     let line = format!("{PLAIN}endian: {}\n", "é".repeat(30_000));
     let message = folder.attached(&line, &bytes()).expect_err("a volume").to_string();
     assert!(message.contains("éé") && message.chars().count() < 500, "{message}");
@@ -101,7 +101,7 @@ fn mutated_files_are_volumes_or_errors() {
     for (header, whole) in valid_files() {
         for round in 0..1500 {
             let mut mutant = whole.clone();
-            // Half of them spare the data, where a damaged stream would hide what the header does.
+            // Half of the mutants spare the data, where damage to a stream would hide the header's effect.
             let reach = if round % 2 == 0 { header } else { whole.len() };
             for _ in 0..=random(3) {
                 let at = random(reach.min(mutant.len()));
@@ -123,6 +123,6 @@ fn mutated_files_are_volumes_or_errors() {
             }
         }
     }
-    // Neither harmless nor hopeless: a mutant of a sample's value, or of a comment, is still a file.
+    // The mutants are neither harmless nor hopeless: a file with a changed sample or comment is still valid.
     assert!((100..2900).contains(&volumes), "{volumes}");
 }

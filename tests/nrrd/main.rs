@@ -1,4 +1,4 @@
-//! The NRRD reader: every type and layout, every error, and files that are damaged or lie.
+//! The NRRD reader: every type and layout, every error, and files that are damaged or contradict themselves.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -19,7 +19,7 @@ use tempfile::TempDir;
 
 use shared::shared;
 
-/// Header of a 2×3×4 volume of `uint8`; the tests replace or add lines.
+/// The header of a 2×3×4 volume of `uint8`; the tests replace or add lines.
 const PLAIN: &str = "NRRD0005\ntype: uint8\ndimension: 3\nsizes: 2 3 4\nencoding: raw\n";
 
 fn gzip(bytes: &[u8]) -> Vec<u8> {
@@ -42,13 +42,13 @@ impl Folder {
 
     fn write(&self, name: &str, parts: &[&[u8]]) -> PathBuf {
         let path = self.0.path().join(name);
-        // Written over, a file may be waited for until it is on the disk; a new one is not.
+        // Overwriting a file may wait for the disk; creating a new one does not.
         _ = fs::remove_file(&path);
         fs::write(&path, parts.concat()).unwrap();
         path
     }
 
-    /// Opens an attached file of this header, a blank line, and these data.
+    /// Opens an attached file of this header, a blank line, and the data.
     fn attached(&self, header: &str, data: &[u8]) -> Result<Volume, VolumeError> {
         Volume::open(&self.write("volume.nrrd", &[header.as_bytes(), b"\n", data]))
     }
@@ -211,7 +211,7 @@ fn detached() {
     let header = format!("{PLAIN}data file: deep/50 % of it\n");
     assert_plain(&folder.detached(&header, &[]).unwrap());
 
-    // A header without the field is followed by its data, whatever the file is called.
+    // In a header without the data file field, the data follows, whatever the file's name.
     assert_plain(&Volume::open(&folder.write("whole.nhdr", &[PLAIN.as_bytes(), b"\n", &bytes()])).unwrap());
 }
 
@@ -282,7 +282,7 @@ fn skips() {
         assert_refused(zipped(&format!("byte skip: {skip}\n"), &gzip(&lines)), "data.raw", "data", "bytes", "24");
     }
     assert_refused(detached("byte skip: -1\n", &bytes()[1..]), "data.raw", "data", "23 bytes", "24");
-    // An attached header does not count as data.
+    // An attached header is not counted as data.
     let short = folder.attached(&format!("{PLAIN}byte skip: -1\n"), &bytes()[1..]);
     assert_refused(short, "volume.nrrd", "data", "23 bytes", "24");
 }

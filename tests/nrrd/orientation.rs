@@ -98,7 +98,7 @@ fn orientation() {
             assert_eq!(open(name, "").unwrap().orientation().unwrap().origin, DVec3::ZERO);
         }
     }
-    // Spaces that are not a patient's.
+    // Spaces other than a patient's have no orientation.
     assert_eq!(open("scanner-xyz", "").unwrap().orientation(), None);
     assert_eq!(
         folder.attached(&format!("{PLAIN}space: RAS\nspacings: 1 1 1\n"), &bytes()).unwrap().orientation(),
@@ -129,7 +129,7 @@ fn anatomical_views() {
     ] {
         assert_eq!(orientation.direction_and_up(view), expected, "{view:?}");
     }
-    // Who faces the patient has the patient's left on the right.
+    // Seen from the front, the patient's left is on the right.
     let [direction, up] = orientation.direction_and_up(PatientSide::Front);
     assert_eq!(Camera { direction, up, ..Camera::default() }.basis().u, left);
 }

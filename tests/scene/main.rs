@@ -1,4 +1,4 @@
-//! Scene files, `--set` overrides and their errors; transfer functions, given and chosen.
+//! Scene files, `--set` overrides and their errors; transfer functions, stated and chosen.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod refusals;
@@ -45,7 +45,7 @@ fn defaults() {
 }
 
 #[test]
-fn what_the_file_says_of_looks_decides_what_a_camera_fits() {
+fn the_default_fit_depends_on_the_files_tables() {
     let volume = "volume.builtin = 'head:24'\n";
     let camera = "[camera]\ndirection = [1, 0, 0]";
     let sets = ["preset=ct-bone", "transfer.colormap=magma", "camera.direction=[1,0,0]", "transfer={opacity=[[9,1]]}"];
@@ -58,7 +58,7 @@ fn what_the_file_says_of_looks_decides_what_a_camera_fits() {
         (camera, &["camera={height=9}"], Fit::Volume),
         ("[transfer]\niso_ranges = [[1, 2]]", &sets[..3], Fit::Volume),
         ("transfer.opacity = [[0, 0.5]]", &[], Fit::Volume),
-        // Unless it is said.
+        // Unless it is stated.
         ("camera.fit = 'object'\ntransfer.opacity = [[0, 0.5]]", &[], Fit::Object),
         (camera, &["camera.fit=object"], Fit::Object),
         ("", &["camera.fit=volume"], Fit::Volume),
@@ -210,7 +210,7 @@ fn every_key() {
         let scene = parse(MINIMAL, &[&format!("splatting.rasterizer={name}")]).unwrap();
         assert_eq!(scene.splatting.rasterizer, rasterizer);
     }
-    // What goes with neither axis-aligned sheets nor a label's preset.
+    // A setting that excludes axis-aligned sheets and the preset for labels.
     let after = parse("volume.path = 'a.nrrd'", &["splatting.classification=after"]).unwrap();
     assert_eq!(after.splatting.classification, Classification::After);
     let scene = parse(text, &["splatting.method=composite-every-sample"]).unwrap();
@@ -224,7 +224,7 @@ fn overrides() {
     let scene = parse(text, &["splatting.slab_width=2.0", "splatting.slab_width = 4", "image.width=64"]).unwrap();
     assert_eq!((scene.splatting.slab_width, scene.splatting.radius, scene.image.width), (4.0, 3.0, 64));
 
-    // An override repairs a bad value, and has the last word on the volume.
+    // An override replaces an invalid value, and decides which volume is used.
     assert!(parse(text, &["splatting.radius=9"]).is_err());
     assert!(parse(&text.replace('3', "9"), &["splatting.radius=2"]).is_ok());
     assert_eq!(parse(text, &["volume.path=x y.nrrd"]).unwrap().volume, file("folder/x y.nrrd"));
@@ -265,7 +265,7 @@ fn directions_of_any_length() {
     }
 }
 
-/// What a label's table leaves out is the main one's.
+/// Keys that a label's table omits are the main table's.
 #[test]
 fn tables_of_labels() {
     let scene = "[volume]\nbuiltin = 'head:8'\n[transfer]\ncolor = [[0, [1, 1, 1]]]\nopacity = [[0, 0.5]]\n\

@@ -4,7 +4,7 @@ use sheetsplat::scene::{Scene, SceneError};
 
 use super::{MINIMAL, file, parse};
 
-/// A key, a value that is not allowed, and what the error must contain: key, found, allowed.
+/// A key, an invalid value, and what the error must contain: key, found, allowed.
 const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
     ("volume.path", "5", "volume.path", "5 (integer)", "a volume file's path"),
     ("volume.builtin", "true", "volume.builtin", "true (boolean)", "a builtin volume's name"),
@@ -125,7 +125,7 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
         "an unknown key",
         "label, visible, color, opacity, gradient_opacity",
     ),
-    // Of a volume without labels.
+    // The volume has no labels.
     ("transfer.label", "[{label = 1}]", "transfer.label", "tables for a volume without labels", "volume.labels"),
     ("shading.enabled", "1", "shading.enabled", "1 (integer)", "true or false"),
     ("shading.light", "'sun'", "shading.light", "\"sun\"", "\"headlight\" or [x, y, z]"),
@@ -216,7 +216,7 @@ fn refused_values_are_named_with_their_origin() {
             assert!(left.contains(found), "{key} = {value}: {message}");
             assert!(right.contains(allowed), "{key} = {value}: {message}");
         };
-        // As a file of its own, where a volume is missing unless the key is about one.
+        // As a scene file of its own, which lacks a volume unless the key is about one.
         let volume = if key.starts_with("volume") { "" } else { "volume.path = 'a.nrrd'\n" };
         check(parse(&format!("{volume}{key} = {value}"), &[]), "scene.toml");
         check(parse(MINIMAL, &[&format!("{key}={value}")]), "--set");
@@ -261,7 +261,7 @@ fn label_tables_need_labels() {
     refused(&format!("{text}builtin = 'head'"), &["volume.builtin=nerve:40"], "--set");
     refused(MINIMAL, &["transfer.label=[{label=1}]"], "--set");
     parse(MINIMAL, &["transfer.label=[{label=1}]", "volume.labels=b.nrrd"]).unwrap();
-    // What is wrong is the name, which the volume's own error explains.
+    // The name is wrong, which the volume's own error explains.
     parse(&format!("{text}builtin = 'skull'"), &[]).unwrap();
 }
 
@@ -302,7 +302,7 @@ fn refused_overrides() {
     let message = parse("volume.path = 'a'\ncamera = 5", &["camera.up=[0, 0, 1]"]).unwrap_err().to_string();
     assert_eq!(message, "--set: camera.up: found camera = 5 (integer), allowed: camera to be a table");
 
-    // An override elsewhere in the table does not take the blame.
+    // An override of another key in the table is not named as the origin.
     let message = parse("[volume]\nspacing = [0, 1, 1]\npath = 'a'", &["volume.path=b"]).unwrap_err().to_string();
     assert!(message.starts_with("scene.toml: volume.spacing[0]: found 0"), "{message}");
     let message = parse("", &["volume.spacing=[1, 1, 1]"]).unwrap_err().to_string();

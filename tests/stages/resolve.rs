@@ -39,10 +39,10 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
     let view = target.create_view(&wgpu::TextureViewDescriptor::default());
     for compositing in COMPOSITINGS {
         for background in BACKGROUNDS {
-            // Sums pass 1; the others cannot. Some pixels are empty, some opaque.
+            // Sums exceed 1; the other modes cannot. Some pixels are empty, some opaque.
             let most = match compositing {
                 Compositing::Xray | Compositing::Average => 3.0,
-                // Two less the opacity.
+                // Two minus the opacity.
                 Compositing::Minimum => 2.0,
                 _ => 1.0,
             };
@@ -86,7 +86,7 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
             let expected = resolve(&acc, compositing, background);
             assert_eq!(actual.len(), expected.pixels.len());
             for (i, (actual, expected)) in actual.iter().zip(&expected.pixels).enumerate() {
-                // The background's product, one minus alpha, a product and a sum of numbers up to 1: a rounding each.
+                // One rounding each for the background's product, one minus alpha, a product, and a sum of numbers up to 1.
                 let over = format_args!("{compositing:?} {background:?} pixel {i}: acc {}", acc.pixels[i]);
                 assert_at_most(apart(*actual, *expected), 4.0 * F32, format_args!("{over}: {actual}, not {expected}"));
             }
@@ -101,6 +101,6 @@ fn over_every_kind_of_background() {
 
 #[test]
 fn several_bands() {
-    // Rows of 61 pixels: 33 of them fit a binding, and a band is whole tiles.
+    // Rows have 61 pixels: 33 of them fit a binding, and a band consists of whole tiles.
     check(&gpu_with_small_bindings(32768), [61, 137], 5);
 }

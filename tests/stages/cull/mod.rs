@@ -1,6 +1,5 @@
-//! `shaders/cull_bricks.wgsl`, `shaders/cull_voxels.wgsl` and `shaders/compact.wgsl` against a plain evaluation of their rules
-//! (§6): what a sheet group draws, in which order, and what is known of every brick afterwards. What the drawn voxels look
-//! like is `shade.rs`'s.
+//! `shaders/cull_bricks.wgsl`, `shaders/cull_voxels.wgsl` and `shaders/compact.wgsl` against a plain evaluation of their rules (§6): what a
+//! sheet group draws, in which order, and the state of every brick afterwards. `shade.rs` tests the appearance of drawn voxels.
 
 mod rules;
 
@@ -29,7 +28,7 @@ use crate::shade::place_error;
 use crate::{compute, contents, indirect, init};
 use rules::{Expected, Occluded, Rules};
 
-/// The stages with one list of bricks and what they read and write.
+/// The stages with one list of bricks and the buffers that they read and write.
 pub(crate) struct Culling<'a> {
     gpu: &'a Headless,
     stage: &'a Cull,
@@ -38,7 +37,7 @@ pub(crate) struct Culling<'a> {
     pub(crate) plan: FramePlan,
     /// The uniform of every group of the plan.
     groups: Vec<SheetGroup>,
-    /// Of every place of every brick the index into the volume, [`ABSENT`] without a voxel.
+    /// For every slot of every brick the voxel's index in the volume, or [`ABSENT`].
     pub(crate) indices: Vec<u32>,
     pub(crate) bricks: Vec<Brick>,
     pub(crate) list: CullList,
@@ -48,7 +47,7 @@ pub(crate) struct Culling<'a> {
 }
 
 impl<'a> Culling<'a> {
-    /// Of voxels in memory order, of a grid with these values and labels.
+    /// The stages for voxels in memory order, in a grid with these values and labels.
     pub(crate) fn new(
         gpu: &'a Headless,
         (stage, sheets): (&'a Cull, u32),
@@ -116,7 +115,7 @@ impl<'a> Culling<'a> {
         compute(self.gpu, |pass| self.stage.record(pass, &self.list, group as u32 * self.stride));
     }
 
-    /// What is known of a brick's voxels, bit by bit: hidden, shaded.
+    /// The state of each brick's voxels as bits: hidden, shaded.
     pub(crate) fn states(&self) -> Vec<(u64, u64)> {
         let bits = |words: [u32; 2]| u64::from(words[0]) | u64::from(words[1]) << 32;
         let states: Vec<BrickState> = contents(self.gpu, &self.list.states);
@@ -128,12 +127,12 @@ impl<'a> Culling<'a> {
     }
 }
 
-/// The uniform at the start of some bytes.
+/// The uniform at the start of `bytes`.
 fn uniform(bytes: &[u8]) -> SheetGroup {
     bytemuck::pod_read_unaligned(&bytes[..size_of::<SheetGroup>()])
 }
 
-/// A place without a voxel.
+/// A slot without a voxel.
 const ABSENT: u32 = u32::MAX;
 
 fn indices(grid: &Grid, brick: &Brick) -> [u32; BRICK_VOXELS as usize] {
@@ -152,7 +151,7 @@ struct Case {
     sheets: u32,
 }
 
-/// How often something happened in a run, so that a test can ask for it.
+/// Counts of events in a run, so that a test can require them.
 #[derive(Debug, Default)]
 struct Seen {
     most_bricks: u32,
@@ -175,11 +174,11 @@ impl Case {
         }
     }
 
-    /// Draws the groups of the plan in order, under the given occlusion buffers by turns, and checks all that is left behind.
+    /// Draws the groups of the plan in order, with the given occlusion buffers in turn, and checks all results.
     fn check(mut self, gpu: &Headless, stage: &Cull, masks: &[Occluded]) -> Seen {
         let transfer = Self::transfer();
         let values = vec![1.0; self.grid.dims.element_product() as usize];
-        // Voxels that f32 arithmetic may decide otherwise about are left out, which changes their bricks.
+        // Voxels whose decisions may differ in f32 are removed, which changes their bricks.
         for _ in 0..30 {
             let volume = (&self.grid, &values[..], None);
             let culling = Culling::new(gpu, (stage, self.sheets), volume, &self.voxels, &transfer, &self.scene);
@@ -268,7 +267,7 @@ impl Case {
     }
 }
 
-/// Occlusion buffers that hide something, nothing (what was hidden stays so), something else, everything, and nothing again.
+/// Occlusion buffers that hide something, nothing (hidden voxels stay hidden), something else, everything, and nothing again.
 fn masks(random: &mut Random, size: [u32; 2]) -> Vec<Occluded> {
     let [some, others] = [(); 2].map(|()| Occluded::random(random, size));
     vec![
@@ -281,7 +280,7 @@ fn masks(random: &mut Random, size: [u32; 2]) -> Vec<Occluded> {
     ]
 }
 
-/// A dense volume with holes, of bricks of up to 64 voxels.
+/// A dense volume with gaps, in bricks of up to 64 voxels.
 fn dense(random: &mut Random, sheets: u32, culling: bool) -> Case {
     let grid = Grid { dims: UVec3::new(14, 11, 17), spacing: DVec3::new(1.0, 1.0, 1.3) };
     let holes = random.uniform(0.0, 0.6);
@@ -319,8 +318,8 @@ fn dense_bricks() {
     assert!(all.without_visits > 10 && all.with_some > 30, "{all:?}");
 }
 
-/// Boxes that differ from group to group, bricks and kernels that the near plane cuts, and kernels on the screen by their group's box
-/// alone; slices. Also back to front, where nothing is hidden.
+/// Boxes that differ between groups, bricks and kernels that the near plane cuts, kernels that only their group's box puts onto the screen, and
+/// slices. Also back to front, where nothing is hidden.
 #[test]
 fn any_eye_and_slices() {
     let gpu = gpu();
@@ -350,7 +349,7 @@ fn any_eye_and_slices() {
     assert!(all.without_visits > 10 && all.with_some > 30, "{all:?}");
 }
 
-/// Without culling nobody looks at the occlusion buffer: only what is off the screen is left out.
+/// Without culling the occlusion buffer is not used: only what lies off the screen is left out.
 #[test]
 fn culling_off() {
     let gpu = gpu();
@@ -364,14 +363,14 @@ fn culling_off() {
     }
 }
 
-/// More bricks than threads, and more than threads and bits of a word: every thread's run is long, and there are several.
+/// More bricks than threads, and more than threads times the bits of a word, so that every thread has several long runs.
 #[test]
 fn many_bricks() {
     let gpu = gpu();
     let mut random = Random(33);
     for (sheets, side, height, least) in [(4, 370, 170.0, 256 * 32), (1, 370, 260.0, 256), (2, 150, 170.0, 256)] {
         let stage = Cull::new(gpu.device(), sheets);
-        // Bricks beside each other, a voxel or two in each.
+        // Adjacent bricks with one or two voxels each.
         let grid = Grid { dims: UVec3::new(side, 6, side), spacing: DVec3::ONE };
         let mut chosen = BTreeSet::new();
         for z in (0..side).step_by(4) {

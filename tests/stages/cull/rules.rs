@@ -15,14 +15,14 @@ use sheetsplat::volume::Grid;
 use super::{ABSENT, indices};
 use crate::common::{F32, Random};
 
-/// Beyond what f32 arithmetic moves pixel coordinates and depths of these tests by: sums of numbers below 600. Close to an eye pixel
+/// An upper bound on the f32 errors of pixel coordinates and depths in these tests: sums of numbers below 600. Close to an eye pixel
 /// coordinates are large, and so are their errors.
 const EPSILON: f64 = 5e-4;
 
-/// Decisions that f32 arithmetic cannot make otherwise; those that it can are noted.
+/// Decisions that f32 arithmetic makes like f64; those that it may make differently are noted.
 struct Decisions {
     unsure: bool,
-    /// What f32 arithmetic may move pixel coordinates by.
+    /// The f32 error of pixel coordinates.
     pixels: f64,
 }
 
@@ -48,9 +48,9 @@ impl Decisions {
         last as u32 - self.floor(last - x, last, self.pixels)
     }
 
-    /// The first and the last pixel from which the box filter covers the footprints' boxes around centres from `low` to `high`.
+    /// The first and last pixel from which the box filter covers the boxes of footprints with centres from `low` to `high`.
     fn filter(&mut self, size: [u32; 2], group: &SheetGroup, low: DVec2, high: DVec2) -> [[u32; 2]; 2] {
-        // Pixel centres are at half-integers; the shader's slack.
+        // Pixel centres are at half-integers; the shader adds its slack.
         let margin = half_box(group) + 0.01;
         let (low, high) = ((low - margin - 0.5).to_array(), (high + margin - 0.5).to_array());
         let axes = [0, 1].map(|axis| {
@@ -70,7 +70,7 @@ fn half_box(group: &SheetGroup) -> DVec2 {
     DVec2::from(group.half_box.map(f64::from))
 }
 
-/// Hidden boxes: an image's occlusion buffer.
+/// An image's occlusion buffer, as a set of hidden boxes.
 #[derive(Clone)]
 pub(super) struct Occluded {
     pub(super) size: [u32; 2],
@@ -113,19 +113,19 @@ impl Occluded {
     }
 }
 
-/// What the rules say, from the start of a frame on.
+/// The expected results, accumulated from the start of a frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Expected {
     /// The list's voxels that the last group draws, in order.
     pub(super) drawn: Vec<u32>,
     /// Hidden and shaded voxels by brick.
     pub(super) states: Vec<(u64, u64)>,
-    /// Voxels shaded, sections, quads, bricks tested and visited.
+    /// The numbers of voxels shaded, sections, quads, bricks tested and bricks visited.
     pub(super) counts: [u32; 5],
     pub(super) tiles: BTreeSet<u32>,
 }
 
-/// A frame's rules: §6 as the shaders' comments put it.
+/// A frame's rules: those of §6, as in the shaders' comments.
 pub(super) struct Rules<'a> {
     pub(super) grid: &'a Grid,
     pub(super) frame: &'a Frame,
@@ -139,12 +139,12 @@ pub(super) struct Rules<'a> {
     pub(super) groups: &'a [SheetGroup],
     /// The list's bricks in bucket order.
     pub(super) order: &'a [u32],
-    /// Voxels, by index into the volume, that f32 arithmetic may treat otherwise.
+    /// Voxels, by index in the volume, that f32 arithmetic may treat differently.
     pub(super) unsure: BTreeSet<u32>,
 }
 
 impl Rules<'_> {
-    /// A voxel's pixel coordinates, sheet depth, and depth from the eye; nearer than the near plane as if it were on it.
+    /// A voxel's pixel coordinates, sheet depth, and depth from the eye; a voxel nearer than the near plane is projected as if it were on it.
     fn project(&self, p: DVec3) -> DVec4 {
         let [x, y, depth, from_eye] =
             self.frame.screen_from_voxel.map(|row| DVec4::from(row.map(f64::from)).dot(p.extend(1.0)));
@@ -156,7 +156,7 @@ impl Rules<'_> {
     fn is_on_screen(&self, decisions: &mut Decisions, group: &SheetGroup, low: DVec2, high: DVec2) -> bool {
         let (low, high) = (low - half_box(group), high + half_box(group));
         let size = self.frame.size.map(f64::from);
-        // All four, so that every unsure one is noted.
+        // All four sides are tested, so that every uncertain one is noted.
         let sides = [(high.x, 0.5), (high.y, 0.5), (size[0] - 0.5, low.x), (size[1] - 0.5, low.y)]
             .map(|(a, b)| decisions.at_least(a, b, decisions.pixels));
         sides.into_iter().all(|side| side)
@@ -176,7 +176,7 @@ impl Rules<'_> {
         let (middle, half) = brick::bounds(brick);
         let [_, _, depth, from_eye] = self.view.screen_from_voxel.map(|row| row.dot(middle.extend(1.0)));
         let [_, _, spread, thickness] = self.view.screen_from_voxel.map(|row| row.truncate().abs().dot(half));
-        // The shader's slack.
+        // The shader adds this slack.
         let reach = spread + f64::from(self.frame.reach) + 1e-3;
         let near = f64::from(group.near);
         let far = near + f64::from(self.sheets) * f64::from(self.frame.slab_width);
@@ -199,7 +199,7 @@ impl Rules<'_> {
         !all_occluded(0.0)
     }
 
-    /// What a group draws after what was expected so far.
+    /// Adds what a group draws to the results expected so far.
     pub(super) fn cull(&mut self, group: usize, occluded: &Occluded, so_far: &mut Expected) {
         so_far.drawn.clear();
         let group = &self.groups[group];
@@ -210,7 +210,7 @@ impl Rules<'_> {
             let mut decisions = Decisions::new(self.pixel_error(corner.as_dvec3()));
             let visits = self.visits(&mut decisions, &brick, so_far.states[at as usize].0, group, occluded);
             if decisions.unsure {
-                // Not by a hair: a box, which has its slack, without any of its voxels.
+                // The brick reaches the group only barely: its box, which has slack, does, but perhaps none of its voxels.
                 self.unsure.extend(indices(self.grid, &brick).into_iter().filter(|&index| index != ABSENT));
             }
             if !visits {
@@ -231,14 +231,14 @@ impl Rules<'_> {
         so_far.counts[2] += so_far.drawn.len() as u32;
     }
 
-    /// What f32 arithmetic may move the pixel coordinates by of a voxel, or of what is around it: at the near plane at most so much.
+    /// The f32 error of a voxel's pixel coordinates, or of its surroundings; bounded by that at the near plane.
     fn pixel_error(&self, p: DVec3) -> f64 {
         let nearest = self.view.screen_from_voxel[3].dot(p.extend(1.0)).abs().max(self.frame.near.into());
         let [x, y] = [0, 1].map(|row| (self.view.screen_from_voxel[row] * p.extend(1.0)).abs().element_sum());
         if self.geometry.eye.is_some() { 16.0 * F32 * x.max(y) / nearest } else { 0.0 }
     }
 
-    /// How many sections of a voxel the group draws, by the twin: those with a footprint whose own box holds a pixel.
+    /// The number of a voxel's sections that the group draws, by the f64 evaluation: those with a footprint whose own box contains a pixel.
     fn sections(&self, decisions: &mut Decisions, voxel: UVec3, group: &SheetGroup) -> u32 {
         let Geometry { method, eye, .. } = self.geometry;
         if eye.is_some_and(|eye| !decisions.at_least(self.geometry.depth(voxel), eye.near, EPSILON)) {
@@ -301,7 +301,7 @@ impl Rules<'_> {
         so_far.counts[1] += sections;
         so_far.counts[0] += u32::from(state.1 >> slot & 1 == 0);
         state.1 |= 1 << slot;
-        // Every tile with a pixel whose centre is in the footprint's box, and at most one row or column of tiles more.
+        // Every tile with a pixel whose centre is in the footprint's box, plus at most one more row or column of tiles.
         let low = decisions.pixel(center - half_box(group) - 0.5, size).map(|pixel| pixel / TILE);
         let high = decisions.pixel(center + half_box(group), size).map(|pixel| pixel / TILE);
         let columns = tile_grid(size)[0];

@@ -15,8 +15,8 @@ use crate::common::compare::{apart, assert_at_most, largest, root_mean_square};
 use crate::common::{BY_AMOUNTS, Random, camera, gpu, scene, transfer};
 use crate::section::{KERNELS, Seen};
 
-/// Values of a small volume with noise everywhere, transparent in places, with its transfer function: ramps that a thread holds,
-/// or others with more points than that.
+/// Values of a small volume with noise everywhere and transparent places, with its transfer function: with as many control points as
+/// threads hold, or more.
 fn noise(random: &mut Random, dims: UVec3, spacing: [f64; 3], opacity: f64, points: u32) -> (Volume, TransferSettings) {
     let values = (0..dims.element_product()).map(|_| random.uniform(0.0, 255.0) as f32).collect();
     let volume = Volume::new("noise", dims, DVec3::from(spacing), values).unwrap();
@@ -31,8 +31,7 @@ fn noise(random: &mut Random, dims: UVec3, spacing: [f64; 3], opacity: f64, poin
 /// Direction, spacing, `unit`s per pixel, and image size.
 type Frame = ([f64; 3], [f64; 3], f64, [u32; 2]);
 
-/// Along an axis and oblique, anisotropic, magnified and minified, with parts off
-/// the screen, and sizes that are no multiples of a tile's.
+/// Along an axis and oblique, anisotropic, magnified and minified, partly off the screen, and of sizes that are not multiples of a tile's.
 const FRAMES: [Frame; 8] = [
     ([0.0, 1.0, 0.0], [1.0, 1.0, 1.0], 0.25, [70, 45]),
     ([-0.3, -0.9, 0.2], [1.0, 1.0, 1.0], 0.5, [33, 50]),
@@ -54,7 +53,7 @@ fn frame_scene((direction, spacing, units_per_pixel, [width, height]): Frame, ra
     scene
 }
 
-/// An eye that sees a frame's plane of the middle at the frame's scale, before the volume or in it.
+/// An eye that sees the frame's middle plane at the frame's scale, in front of the volume or in it.
 fn eye((_, spacing, units_per_pixel, [_, height]): Frame, random: &mut Random) -> Projection {
     let unit = spacing.into_iter().fold(f64::INFINITY, f64::min);
     let distance = random.uniform(6.0, 40.0);
@@ -102,7 +101,7 @@ fn frames() {
             let (actual, expected) = (fixture.draw_all().acc, fixture.twin());
             let errors: Vec<f64> =
                 actual.iter().zip(&expected).flat_map(|(actual, expected)| (*actual - *expected).to_array()).collect();
-            // Every kernel errs by less than 5e-6 of its peak, and mostly near its rim: too few of them meet in a pixel for more.
+            // Every kernel errs by less than 5e-6 of its peak, mostly near its rim, so the errors of few kernels coincide in a pixel.
             let what = format!("{:?}, {:?}", fixture.seen.scene, fixture.seen.kernel);
             assert_at_most(largest(errors.iter().copied()), 4e-5, &what);
             assert_at_most(root_mean_square(errors), 5e-6, &what);
@@ -112,7 +111,7 @@ fn frames() {
     assert!(lit > 20_000, "only {lit} pixels were compared");
 }
 
-/// However groups are shared among dispatches, and rows among bindings: the same work, the same bytes.
+/// However groups are divided among dispatches and rows among bindings, the work and the bytes are the same.
 #[test]
 fn dispatches_and_bands_change_no_more_than_rounding() {
     let (gpu, stage) = (gpu(), Gather::default());
@@ -125,7 +124,7 @@ fn dispatches_and_bands_change_no_more_than_rounding() {
         (Compositing::Minimum, Order::BackToFront),
     ] {
         let (volume, transfer) = noise(&mut random, UVec3::new(17, 30, 21), [1.0, 1.0, 2.0], 0.9, 4);
-        // Opaque enough for surfaces.
+        // The voxels are opaque enough for surfaces.
         let transfer = TransferSettings { gradient_opacity: None, ..transfer };
         let mut scene = Scene { transfer, camera: camera([0.3, 0.9, -0.2], 40.0), ..scene(101, 77) };
         (scene.splatting.order, scene.splatting.opacity_threshold) = (order, 0.8);
@@ -136,23 +135,23 @@ fn dispatches_and_bands_change_no_more_than_rounding() {
         let whole = fixture.draw(&bins, None, &fixture.empty(), u32::MAX);
         assert!(whole.acc.iter().any(|pixel| pixel.w > 0.9));
         assert!(whole.tally.sections_rasterized > 10_000, "{:?}", whole.tally);
-        // What no group exceeds.
+        // The maximum number of bricks in a group.
         let bricks = bins.starts.windows(2).map(|group| group[1] - group[0]).max().unwrap();
         let one_group = bins.passes.per_group + bricks * bins.passes.per_brick;
-        // Enough for all, if each takes one group.
+        // This suffices for all groups if each dispatch processes one.
         let dispatches = bins.groups;
         for (most, rows) in [(one_group + 1000, u32::MAX), (one_group, 32), (bins.passes.most, 64)] {
             let passes = Passes { most, ..bins.passes };
             let first = PatchBins { passes, dispatches: 1, ..bins.clone() };
             let is_same = |drawn: &Drawn| {
-                // Voxels are added in another order where a dispatch finds anew what it could have kept.
+                // Voxels are added in another order if a dispatch finds again what it could have kept.
                 let pairs = drawn.acc.iter().zip(&whole.acc);
                 largest(pairs.map(|(a, b)| apart(*a, *b))) < 1e-5
             };
             let is_cut = !is_same(&fixture.draw(&first, None, &fixture.empty(), rows));
             assert_eq!(is_cut, most < bins.passes.most, "one dispatch of {most} passes");
             let parts = fixture.draw(&PatchBins { dispatches, ..first }, None, &fixture.empty(), rows);
-            // What is behind opaque pixels alone is not even fetched, or fetched in another dispatch.
+            // Bricks entirely behind opaque pixels are not fetched, or in another dispatch.
             let tally = Tally { bricks_visited: whole.tally.bricks_visited, ..parts.tally };
             assert!(is_same(&parts), "{compositing:?}, {order:?}, {rows} rows");
             let acc = whole.acc.clone();
@@ -161,14 +160,14 @@ fn dispatches_and_bands_change_no_more_than_rounding() {
     }
 }
 
-/// The least opacity is 0 where there is nothing behind the last brick, also if a dispatch ends there.
+/// The minimum opacity is 0 where the ray is empty behind the last brick, even if a dispatch ends there.
 #[test]
-fn the_least_is_looked_for_behind_all_bricks() {
+fn the_minimum_extends_behind_all_bricks() {
     let (gpu, stage) = (gpu(), Gather::default());
     let dims = UVec3::new(12, 60, 12);
     let value = |index: u32| if (4..8).contains(&(index / dims.x % dims.y)) { 1.0 } else { 0.0 };
     let volume = Volume::new("front", dims, DVec3::ONE, (0..dims.element_product()).map(value).collect()).unwrap();
-    // One pixel in the middle sees it all, so that a group takes about as many passes as it may.
+    // One pixel in the middle sees all voxels, so that a group needs about the maximum number of passes.
     let mut scene = Scene { camera: camera([0.0, 1.0, 0.0], 200.0), ..scene(17, 17) };
     scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (1.0, 0.5)]);
     scene.splatting.compositing = Compositing::Minimum;
@@ -180,14 +179,14 @@ fn the_least_is_looked_for_behind_all_bricks() {
         let bins = PatchBins { passes, dispatches, ..bins.clone() };
         fixture.draw(&bins, None, &fixture.empty(), u32::MAX).acc[8 * 17 + 8]
     };
-    // What is not there is kept as 2, less opacity.
+    // Empty means 2 minus an opacity of 0.
     let nothing = DVec4::W * 2.0;
     assert_eq!(middle(bins.groups), nothing);
-    // The dispatch that draws the last brick has seen nothing else, where it takes that many passes: by 8 threads.
+    // With 8 threads the dispatch that draws the last brick needs all its passes for that.
     assert!((1..bins.groups).any(|dispatches| middle(dispatches) != nothing));
 }
 
-/// More voxels behind a tile and in a sheet group than a workgroup has room for, so that sheets wait for the rest of them.
+/// More voxels are behind a tile and in a sheet group than fit in the workgroup's queue, so sheets wait for the rest.
 #[test]
 fn more_voxels_than_the_queue_holds() {
     let (gpu, stage) = (gpu(), Gather::default());
@@ -199,7 +198,7 @@ fn more_voxels_than_the_queue_holds() {
         let fixture = Fixture::new(&gpu, &stage, scene, volume);
         let bins = fixture.bins();
         let bricks = bins.starts.windows(2).map(|bin| bin[1] - bin[0]).max().unwrap();
-        // The queue has room for a few hundred voxels; two thirds of all are drawn.
+        // The queue holds a few hundred voxels; two thirds of all voxels are drawn.
         assert!(bricks * 64 > 3000 || slab_width < 1.0, "{bricks} bricks");
         let (actual, expected) = (fixture.draw(&bins, None, &fixture.empty(), u32::MAX).acc, fixture.twin());
         let errors = actual.iter().zip(&expected).map(|(actual, expected)| apart(*actual, *expected));
@@ -208,8 +207,8 @@ fn more_voxels_than_the_queue_holds() {
     }
 }
 
-/// A mask of opaque pixels, drawn over: a voxel is drawn if and only if a pixel is not opaque whose centre lies in its footprint's box.
-/// Of a parallelogram what is outside the rectangle need not count.
+/// Draws over a mask of opaque pixels: a voxel is drawn if and only if its footprint's box contains the centre of an open pixel. Pixels of the
+/// parallelogram outside the rectangle need not count.
 #[test]
 fn hidden_behind_what_is_there() {
     let (gpu, stage) = (gpu(), Gather::default());
@@ -220,7 +219,7 @@ fn hidden_behind_what_is_there() {
             let mut scene = frame_scene(frame, &mut random);
             scene.splatting.footprint_box = footprint_box;
             scene.splatting.radius = random.uniform(1.0, 3.0);
-            // So faint that nothing becomes opaque meanwhile.
+            // The voxels are so faint that nothing becomes opaque.
             scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 1e-6)]);
             let values = vec![1.0; 8 * 9 * 7];
             let volume = Volume::new("dense", UVec3::new(8, 9, 7), DVec3::from(frame.1), values).unwrap();
@@ -236,7 +235,7 @@ fn hidden_behind_what_is_there() {
             let half_box = geometry.half_box(kernel.support());
             let sheared = Footprint::new(geometry.footprint_from_pixels).sheared_from_pixels();
             let half_width = kernel.support() / sheared.x_axis.x;
-            // Whether the box, so many pixels larger, holds the centre of an open pixel.
+            // Whether the box, enlarged by `slack` pixels, contains the centre of an open pixel.
             let is_open = |center: DVec2, slack: f64, also_outside: bool| {
                 open.iter().any(|&[x, y]| {
                     let d = DVec2::new(x.into(), y.into()) + 0.5 - center;
@@ -251,7 +250,7 @@ fn hidden_behind_what_is_there() {
             };
             for (at, brick) in fixture.bricks.bricks().iter().enumerate() {
                 for (slot, voxel) in brick::voxels(brick) {
-                    // In the first group that the kernel reaches into.
+                    // The bit in the first group that the kernel reaches.
                     let is_drawn = drawn[at * 2 + slot as usize / 32] >> (slot % 32) & 1 == 1;
                     let center = geometry.pixel(voxel);
                     let what = || format!("{voxel} at {center}, {footprint_box:?}, {frame:?}, {kernel:?}");

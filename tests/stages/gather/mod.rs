@@ -1,4 +1,4 @@
-//! `shaders/gather.wgsl` against the f64 twin: sections of single kernels, frames of random volumes, and which voxels are hidden.
+//! `shaders/gather.wgsl` against the f64 evaluation: sections of single kernels, frames of random volumes, and hidden voxels.
 
 mod frames;
 
@@ -23,7 +23,7 @@ use crate::common::{Random, gpu, pixels, transfer};
 use crate::section::{AMOUNT, KERNELS, Seen, VIEWS, view_scene};
 use crate::{Uncut, at_offsets, compute, contents, init};
 
-/// A scene over a volume, on the GPU and in the twin.
+/// A scene over a volume, on the GPU and in the f64 evaluation.
 struct Fixture<'a> {
     gpu: &'a Headless,
     stage: &'a Gather,
@@ -33,14 +33,14 @@ struct Fixture<'a> {
     bricks: BrickList,
 }
 
-/// What the stage leaves behind.
+/// The results of the stage.
 #[derive(Debug, PartialEq)]
 struct Drawn {
     acc: Vec<DVec4>,
     tally: Tally,
-    /// 32×32 tiles that every group composited.
+    /// The 32×32 tiles that every group composited.
     tiles: Vec<u32>,
-    /// For every group of those that a kernel reaches into a bit per place: two words per brick.
+    /// For every group of those that a kernel reaches, one bit per slot: two words per brick.
     drawn: Vec<u32>,
 }
 
@@ -58,7 +58,7 @@ impl<'a> Fixture<'a> {
         PatchBins::new(self.bricks.bricks(), view, splatting.order, covered, kernel.support(), 0, u64::MAX).unwrap()
     }
 
-    /// Draws over `acc`, in bands of at most so many rows. The nearest group begins at `near`, where that is given.
+    /// Draws over `acc`, in bands of at most `band_rows` rows. The nearest group begins at `near`, if stated.
     fn draw(&self, bins: &PatchBins, near: Option<f32>, acc: &[DVec4], band_rows: u32) -> Drawn {
         let Self { gpu, stage, seen, volume, bricks, .. } = self;
         let (device, size) = (gpu.device(), seen.view.size);
@@ -135,7 +135,7 @@ impl<'a> Fixture<'a> {
         }
     }
 
-    /// Draws everything over nothing.
+    /// Draws the whole image over an empty buffer.
     fn draw_all(&self) -> Drawn {
         let bins = self.bins();
         self.draw(&bins, None, &self.empty(), u32::MAX)
@@ -145,7 +145,7 @@ impl<'a> Fixture<'a> {
         vec![DVec4::ZERO; self.seen.view.size.map(|pixels| pixels as usize).iter().product()]
     }
 
-    /// The twin's compositing buffer, with nothing culled.
+    /// The f64 compositing buffer, with nothing culled.
     fn twin(&self) -> Vec<DVec4> {
         let mut scene = self.seen.scene.clone();
         scene.image.background = [0.0; 4];
@@ -154,7 +154,7 @@ impl<'a> Fixture<'a> {
     }
 }
 
-/// A voxel at one corner of a volume: of all voxels its place on the screen is known to the last bit.
+/// A voxel at a corner of a volume, whose position on the screen is known to the last bit.
 fn one_voxel(spacing: [f64; 3]) -> (Volume, TransferSettings) {
     let mut values = vec![0.0; 729];
     values[0] = 1.0;
@@ -163,7 +163,7 @@ fn one_voxel(spacing: [f64; 3]) -> (Volume, TransferSettings) {
     (volume, transfer(&[(0.0, color)], &[(0.0, 0.0), (1.0, AMOUNT.w)]))
 }
 
-/// Moves a scene's camera so that a voxel falls on a point of the screen.
+/// Moves a scene's camera so that a voxel is at a point of the screen.
 fn look_at(scene: &mut Scene, grid: &Grid, voxel: UVec3, at: DVec2) {
     let seen = Seen::new(grid, scene.clone());
     let offset = (at - seen.geometry.size / 2.0) * seen.geometry.pix * grid.unit();
@@ -171,8 +171,7 @@ fn look_at(scene: &mut Scene, grid: &Grid, voxel: UVec3, at: DVec2) {
     scene.camera.center = Some(grid.world_position(voxel) - offset.x * basis.u + offset.y * basis.v);
 }
 
-/// Four sheets at a time, added up, so that a first sheet alone, the first two, and so on fall among them: against the same precision
-/// as the quads'.
+/// Four sheets at a time are added up, including only the first sheet, only the first two, and so on, to the same precision as for quads.
 #[test]
 fn sections() {
     let (gpu, stage) = (gpu(), Gather::default());
@@ -189,7 +188,7 @@ fn sections() {
             let fixture = Fixture::new(&gpu, &stage, scene, volume);
             let Seen { view, kernel, .. } = &fixture.seen;
 
-            // The twin's splat is where f32 puts the voxel, at any depth.
+            // The f64 splat is at the f32 position of the voxel, at any depth.
             let [x, y, z, _] = view.screen_from_voxel.map(|row| row.w as f32);
             let splat = reference::Splat {
                 center: DVec2::new((x + 35.0).into(), (y + 22.5).into()),
@@ -201,7 +200,7 @@ fn sections() {
             let first = random.uniform(f64::from(touched.start) - 4.0, f64::from(touched.end)) as i32;
             for first in [touched.start - 3, touched.start - 2, first] {
                 let near = (f64::from(first) * view.slabs.width - splat.depth + f64::from(z)) as f32;
-                // What f32 makes of the near plane.
+                // The near plane as rounded to f32.
                 let depth = f64::from(first) * view.slabs.width - (f64::from(near) - f64::from(z));
                 let splat = reference::Splat { depth, ..splat };
                 let tiles = patch_bins::grid(view.size).iter().product::<u32>();

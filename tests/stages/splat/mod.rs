@@ -30,7 +30,7 @@ use crate::kernel_in_view::{KernelInView, random_view};
 use crate::section::{AMOUNT, AMOUNT_BA, AMOUNT_RG, KERNELS, Seen, VIEWS, view_scene};
 use crate::{at_offsets, frame_over, indirect, init, tile_list};
 
-/// The stage for groups of so many sheets, and a list to draw, of which it takes what the culling stages wrote.
+/// The stage for groups of `sheets` sheets, and a list to draw, with what the culling stages write.
 struct Stages<'a> {
     gpu: &'a Headless,
     sheets: u32,
@@ -62,7 +62,7 @@ impl<'a> Stages<'a> {
     }
 }
 
-/// One view of one kernel, on the GPU and in the twin.
+/// One view of one kernel, on the GPU and in the f64 evaluation.
 struct Fixture<'a> {
     gpu: &'a Headless,
     stage: &'a Stages<'a>,
@@ -120,8 +120,8 @@ impl<'a> Fixture<'a> {
         }
     }
 
-    /// The sheet buffers of the groups that hold some slabs, by slab, with some of the splats, in whatever order. Whatever
-    /// the sheet buffers held before is gone.
+    /// The sheet buffers, by slab, of the groups that contain some slabs, with some of the splats, in any order. The previous content of
+    /// the sheet buffers is lost.
     fn draw(&self, splats: &[layout::Splat], instances: &[u32], slabs: &[i32]) -> BTreeMap<i32, Sheet> {
         let mut sheets = BTreeMap::new();
         for &k in slabs {
@@ -138,7 +138,7 @@ impl<'a> Fixture<'a> {
         k - k.rem_euclid(self.stage.sheets as i32)
     }
 
-    /// What the summed-area form may err by in a section.
+    /// The error bound of the summed-area form in a section.
     fn tolerance(&self, splat: &reference::Splat, k: i32) -> f64 {
         self.summed_area_tolerance(splat, self.first_of_group(k), k)
     }
@@ -146,7 +146,7 @@ impl<'a> Fixture<'a> {
     fn draw_group(&self, splats: &[layout::Splat], instances: &[u32], first_slab: i32, tiles: &[u32]) -> Vec<Sheet> {
         let device = self.gpu.device();
         let near = self.view.slabs.plane(first_slab) as f32;
-        // Not at the first offset.
+        // The group is not at the first offset.
         let of = |near| layout::SheetGroup { near, ..layout::SheetGroup::zeroed() };
         let (groups, offset) = at_offsets(device, &[of(1e9), of(near)]);
         let args = init(device, &[indirect(instances.len() as u32)], BufferUsages::INDIRECT | BufferUsages::STORAGE);
@@ -155,7 +155,7 @@ impl<'a> Fixture<'a> {
         let group = {
             let mut list = self.stage.list.borrow_mut();
             list.splats = init(device, splats, BufferUsages::STORAGE);
-            // One more than is drawn.
+            // One more instance than is drawn.
             let instances: Vec<u32> = instances.iter().copied().chain([0]).collect();
             list.instances = init(device, &instances, BufferUsages::STORAGE);
             list.draw_args = args.clone();
@@ -173,7 +173,7 @@ impl<'a> Fixture<'a> {
         self.sheets.iter().map(read).collect()
     }
 
-    /// A splat for the twin: the record's f32 coordinates are taken as they are, so only the stage's own errors count.
+    /// A splat for the f64 evaluation with the record's f32 coordinates, so that only the stage's own errors count.
     fn twin_of(&self, splat: &layout::Splat) -> reference::Splat {
         let layout::Splat { x_px, y_px, depth, rg, ba, .. } = *splat;
         assert_eq!((rg, ba), (AMOUNT_RG, AMOUNT_BA));
@@ -195,11 +195,11 @@ impl<'a> Fixture<'a> {
     }
 }
 
-/// Sheets of a group.
+/// The numbers of sheets in a group.
 const GROUPS: [u32; 3] = [1, 2, 4];
 
-/// Calls `check` with random splats of every kernel and view, one at a time, and each slab that they touch or that shares a
-/// group with one: fixture, splat, slab, sheet buffer.
+/// Calls `check` with random splats of every kernel and view, one at a time, and each slab that they touch or that shares a group with one:
+/// fixture, splat, slab, sheet buffer.
 fn for_random_sections(
     form: FootprintForm,
     widths: &[f64],
@@ -227,7 +227,7 @@ fn summed_area_sections() {
     let mut lit = 0;
     for_random_sections(FootprintForm::SummedArea, &[0.25, 1.0, 3.7], |fixture, splat, k, sheet| {
         let expected = fixture.twin(&[*splat], k);
-        // A thousandth is what SPEC §4 allows; the table is four times as good.
+        // SPEC §4 allows a thousandth; the table is four times as accurate.
         let tolerance = fixture.tolerance(splat, k) / 4.0;
         fixture.assert_close(sheet, &expected, |_| tolerance, &format!("{splat:?} in slab {k}"));
         lit += expected.iter().filter(|pixel| pixel.w > 0.0).count();
@@ -235,8 +235,8 @@ fn summed_area_sections() {
     assert!(lit > 100_000, "only {lit} pixels were compared");
 }
 
-/// The nearest of the 128 stored sections is that of a splat moved by up to half their spacing: against that one only the
-/// bilinear interpolation between the texels of its quadrant counts.
+/// The nearest of the 128 stored sections is that of a splat displaced by up to half their spacing: compared with that one, only the bilinear
+/// interpolation between the texels of its quadrant counts.
 #[test]
 fn stored_sections() {
     let mut lit = 0;
@@ -247,7 +247,7 @@ fn stored_sections() {
         let spacing = section_spacing(kernel, view.slabs.width);
         let layer = (middle.abs() / spacing).round();
         if (middle.abs() / spacing - layer).abs() > 0.499 {
-            // Half way between two sections either one is the nearest, and f32 decides.
+            // Half way between two sections f32 decides which one is the nearest.
             return;
         }
         let stored =
@@ -260,16 +260,16 @@ fn stored_sections() {
         let diagonal = 2.0_f64.sqrt() * texel;
         let section = |rho: f64| kernel.section(rho.max(0.0).powi(2), t0, t1);
         let tolerance = |pixel: usize| {
-            // A section falls off from its centre, so the cell's corners are between its values a diagonal away.
+            // A section falls off from its centre, so the values at a cell's corners lie between its values a diagonal away.
             let rho = fixture.rho(splat, pixel);
             let monotone = (section(rho - diagonal) - section(rho)).max(section(rho) - section(rho + diagonal));
-            // Where the slab's planes and not the ball end the section, it is a Gaussian in both directions: its second
-            // derivatives are at most 2·falloff of the peak, bilinear interpolation errs by texel²/8 of their sum.
+            // Where the slab's planes end the section, not the ball, it is a Gaussian in both directions: its second derivatives are at
+            // most 2·falloff of the peak, and bilinear interpolation errs by texel²/8 of their sum.
             let chord = kernel.half_chord((rho + diagonal).powi(2));
             let smooth = t0.abs().max(t1.abs()) < chord;
             let interpolation =
                 if smooth { monotone.min(kernel.falloff() * texel * texel / 2.0 * section(0.0)) } else { monotone };
-            // The kernel's support leaves out 2⁻²⁴; the rest is f32.
+            // The kernel's support leaves out 2⁻²⁴; the rest is the error of f32.
             interpolation + 8.0 * F32 * fixture.whole()
         };
         fixture.assert_close(sheet, &expected, tolerance, &format!("{splat:?} in slab {k}"));
@@ -278,7 +278,7 @@ fn stored_sections() {
     assert!(lit > 100_000, "only {lit} pixels were compared");
 }
 
-/// Kernels that each have their own ray, cut off by the near plane or not, in slabs, and in slices also without an eye.
+/// Kernels with a ray each, cut by the near plane or not, in slabs and in slices, the latter also without an eye.
 #[test]
 fn any_eye_and_slices() {
     let gpu = gpu();
@@ -300,7 +300,7 @@ fn any_eye_and_slices() {
                     let section = match (kernel.section(k), form) {
                         (Some(section), FootprintForm::Sections) => kernel.stored(section, k),
                         (section, FootprintForm::SummedArea) => section,
-                        // Stored sections are as thick as those of the central ray: they may reach into sheets that the kernel does not.
+                        // Stored sections have the thickness of the central ray's, so they may reach into sheets that the kernel does not.
                         (None, FootprintForm::Sections) => continue,
                     };
                     let Some(section) = section else {
@@ -331,8 +331,8 @@ fn any_eye_and_slices() {
     }
 }
 
-/// Pixel centres just inside the rim, where it touches the quad's sides, of a kernel that is not small there: the
-/// rasteriser, which snaps corners to 1/256 pixel, must not lose them.
+/// Pixel centres just inside the rim, where it touches the quad's sides, of a kernel that is not small there: the rasterizer, which snaps
+/// corners to 1/256 pixel, must not lose them.
 #[test]
 fn pixels_just_inside_the_rim_are_drawn() {
     let gpu = gpu();
@@ -352,14 +352,14 @@ fn pixels_just_inside_the_rim_are_drawn() {
                 let sheet = &fixture.draw(&[splat], &[0], &[0])[&0];
                 let pixel = 20 * 70 + 30;
                 let actual = sheet[pixel].w;
-                // The chord is √(1 - ρ²) to each side, the kernel's value there κ·exp(-0.1).
+                // The chord is √(1 - ρ²) to each side, and the kernel's value there κ·exp(-0.1).
                 let expected = fixture.twin(&[fixture.twin_of(&splat)], 0)[pixel].w;
                 assert!(expected > 0.01 * fixture.whole(), "{expected} is not worth testing");
                 match form {
                     FootprintForm::SummedArea => {
                         assert_at_most((actual - expected).abs(), 4e-6 * fixture.whole(), "just inside the rim");
                     }
-                    // Bilinear between the last texel inside and 0 on the rim.
+                    // Interpolated between the last texel inside and 0 on the rim.
                     FootprintForm::Sections => assert!(actual > 0.0 && actual < expected, "{actual} {expected}"),
                 }
             }

@@ -12,8 +12,8 @@ use crate::common::compare::{apart, assert_at_most, largest};
 use crate::common::{F32, Random, gpu};
 use crate::section::{AMOUNT, VIEWS, view_scene};
 
-/// `ρ`-wise: all slabs' sheet buffers added up are the kernel's whole footprint. Pixel-wise: that footprint adds up to
-/// the kernel's integral, 1.
+/// As a function of ρ, all slabs' sheet buffers add up to the kernel's whole footprint. Over pixels, that footprint adds up to the kernel's
+/// integral, 1.
 #[test]
 fn sections_sum_to_the_footprint_and_the_footprint_to_one() {
     let gpu = gpu();
@@ -24,7 +24,7 @@ fn sections_sum_to_the_footprint_and_the_footprint_to_one() {
         ([0.3, 0.9, -0.2], [1.0, 1.0, 1.0], 0.15),
         ([0.6, 0.5, 0.6], [1.0, 1.0, 2.0], 0.21),
     ];
-    // None that is far from 0 at its rim: there the sum over pixels is no longer close to the integral.
+    // Kernels far from 0 at their rims are left out: for them the sum over pixels is not close to the integral.
     let kernels = [(2.0, 2.0), (1.4, 2.0), (4.0, 2.0), (3.0, 0.8)];
     for (kernel, view) in kernels.into_iter().flat_map(|kernel| views.map(|view| (kernel, view))) {
         for (form, (width, stage)) in [FootprintForm::SummedArea, FootprintForm::Sections]
@@ -44,15 +44,15 @@ fn sections_sum_to_the_footprint_and_the_footprint_to_one() {
                 (0..sheets[&slabs[0]].len()).map(|i| sheets.values().map(|sheet| sheet[i]).sum()).collect();
 
             let tolerance = match form {
-                // The planes between slabs cancel but for rounding, of them and of the table entries; what is left is
-                // the step to the nearest texel in the plane, u⁴/24 of the peak, at most 3e-5 for any kernel.
+                // The planes between slabs cancel except for the rounding of them and of the table entries. The rest is the step to the
+                // nearest texel in the plane, u⁴/24 of the peak, at most 3e-5 for any kernel.
                 FootprintForm::SummedArea => {
                     let plane_error = 4.0 * F32 * (twin.depth.abs() + kernel.0);
                     let per_plane = 4.0 * F32 * fixture.whole() + plane_error * fixture.kernel.value(0.0);
                     3e-5 * fixture.whole() + slabs.len() as f64 * per_plane
                 }
-                // Each section is taken up to half a spacing beside its place. The sum of what that changes is the
-                // kernel's variation, up and down again, over half a spacing; bilinear interpolation as above.
+                // Each section is up to half a spacing beside its position. The sum of these changes is the kernel's variation, up and down
+                // again, over half a spacing; bilinear interpolation errs as above.
                 FootprintForm::Sections => {
                     let spacing = section_spacing(&fixture.kernel, fixture.view.slabs.width);
                     let texel = fixture.kernel.support() / f64::from(SECTION_SIZE - 1);
@@ -67,8 +67,8 @@ fn sections_sum_to_the_footprint_and_the_footprint_to_one() {
 
             let pixel_area = fixture.geometry.footprint_from_pixels.determinant().abs() / fixture.amplitude();
             let sampled = whole.iter().sum::<DVec4>() * pixel_area;
-            // The kernel's own: at 4 and more pixels per grid unit a Gaussian's sum over pixels is its integral, and the
-            // jump of at most h(radius) = 0.02·h(0) at the rim adds little.
+            // The kernel's own error: at 4 and more pixels per grid unit a Gaussian's sum over pixels is its integral, and the jump of at
+            // most h(radius) = 0.02·h(0) at the rim adds little.
             assert_at_most(apart(sampled, AMOUNT), 1e-3, format_args!("{kernel:?} {view:?}: {sampled}"));
             let total = sum.iter().sum::<DVec4>() * pixel_area;
             // Over the footprint the GPU errs by less than the tolerance times its effective area, π/falloff.
@@ -78,7 +78,7 @@ fn sections_sum_to_the_footprint_and_the_footprint_to_one() {
     }
 }
 
-/// Splats that overlap add up, and only the instances that are drawn.
+/// Overlapping splats add up, and only the instances that are drawn count.
 #[test]
 fn instances_add_up() {
     let gpu = gpu();
@@ -99,8 +99,8 @@ fn instances_add_up() {
             assert!(most > fixture.whole(), "{most}: splats overlap");
             let tolerance = |pixel: usize| {
                 let here = twins.iter().filter(|twin| fixture.rho(twin, pixel) <= 2.0);
-                // Each has its own error, and the sum so far is rounded when it is added.
-                // These have either sign, and mostly are far below what one may have.
+                // Each has its own error, and the sum so far is rounded at each addition. These errors have either sign and are mostly far
+                // below their bounds.
                 here.map(|twin| fixture.tolerance(twin, k) / 100.0 + F32 * most).sum()
             };
             fixture.assert_close(&sheet, &expected, tolerance, "many splats");
@@ -108,8 +108,8 @@ fn instances_add_up() {
     }
 }
 
-/// Listed tiles are zeroed before anything is drawn; what others hold is not touched, but added to by footprints that reach
-/// there: the tiles stage lists those.
+/// Listed tiles are zeroed before anything is drawn; others are not zeroed, but footprints that reach there are added. The tiles stage
+/// lists all tiles that are drawn to.
 #[test]
 fn listed_tiles_are_zeroed_and_no_others() {
     let gpu = gpu();
@@ -120,7 +120,7 @@ fn listed_tiles_are_zeroed_and_no_others() {
         FootprintForm::SummedArea,
     ]) {
         let mut scene = view_scene(VIEWS[0], (2.0, 2.0), 1.0, form);
-        // Neither a multiple of 32.
+        // Neither is a multiple of 32.
         (scene.image.width, scene.image.height) = (150, 77);
         let fixture = Fixture::new(stage, scene, VIEWS[0].1);
         let splats: Vec<_> = (0..40)
@@ -131,7 +131,7 @@ fn listed_tiles_are_zeroed_and_no_others() {
         let tile_of = |pixel: usize| (pixel / 150 / TILE as usize * columns + pixel % 150 / TILE as usize) as u32;
         let clean = fixture.draw_group(&splats, &all, 0, &fixture.tiles);
         assert!(clean.iter().all(|sheet| sheet.iter().any(|pixel| pixel.w > 0.0)));
-        // Each sheet holds something else; a power of two, so that sums with it say what was added.
+        // Each sheet has another content: a power of two, so that sums with it show what was added.
         let stale = |sheet: usize| (sheet as f32 - 2.5) * 16384.0;
         for listed in [vec![], vec![7], vec![0, 4, 9, 10, 14, 11], (0..15).rev().collect::<Vec<u32>>()] {
             for instances in [&all[..0], &all[..]] {
@@ -153,7 +153,7 @@ fn listed_tiles_are_zeroed_and_no_others() {
                         } else if clean == DVec4::ZERO {
                             assert_eq!(*actual, DVec4::splat(stale(at).into()), "{name}");
                         } else {
-                            // Every addition is rounded to what an f32 of that size can hold.
+                            // Every addition is rounded to the precision of an f32 of that size.
                             let error = apart(*actual - f64::from(stale(at)), clean);
                             assert_at_most(error, 4.0 * 65536.0 * F32, name);
                         }
