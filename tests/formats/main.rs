@@ -1,4 +1,4 @@
-//! Readers of all formats (NRRD also in `tests/nrrd.rs`): files that other programs wrote (`tests/fixtures/make.py`), voxel for voxel, and
+//! Readers of all formats (NRRD also in `tests/nrrd/`): files that other programs wrote (`tests/fixtures/make.py`), voxel for voxel, and
 //! files that are damaged or contradict themselves.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
