@@ -1,8 +1,8 @@
-//! The compositing buffer over the background, SPEC §5; the same as `shaders/resolve.wgsl`.
+//! Compositing over the background (SPEC §5), as in `shaders/resolve.wgsl`.
 
 use crate::settings::splatting::Compositing;
 
-/// How compositing buffers become images.
+/// Turns compositing buffers into images.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Resolver {
     compositing: Compositing,
@@ -17,7 +17,7 @@ impl Resolver {
         Self { compositing, background: [r * a, g * a, b * a, a].map(|channel| channel as f32) }
     }
 
-    /// Premultiplied in, premultiplied out.
+    /// A pixel over the background, premultiplied like its argument.
     pub(super) fn pixel(&self, acc: [f32; 4]) -> [f32; 4] {
         let image = match self.compositing {
             Compositing::Xray | Compositing::Average => acc.map(|channel| channel.min(1.0)),
