@@ -1,8 +1,7 @@
-//! What early splat elimination and tiles save (§6, Table 2): the same frame with and without, in interleaved pairs.
+//! The savings of early splat elimination and tiles (§6, Table 2): the same frame with and without, in interleaved pairs.
 //!
-//! `cargo bench --bench culling -- [PAIRS] [SCENE]…` takes scene files, volume files or builtin volumes; without any, builtin
-//! ones, the nerve side-on (Table 2's worst case), and the scenes and the neuron beside the checkout where they are. Scenes in
-//! perspective are left out.
+//! `cargo bench --bench culling -- [PAIRS] [SCENE]…` takes scene files, volume files or builtin volumes. The default is builtin ones, the nerve
+//! side-on (Table 2's worst case), and the scenes and the neuron beside the checkout, if they exist. Scenes in perspective are left out.
 
 #![expect(clippy::unwrap_used, reason = "a bench")]
 
@@ -10,7 +9,7 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::{GpuHeadless, HeadlessOptions};
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::Projection;
 
@@ -19,7 +18,7 @@ const SIDE_ON: &str = "builtin:nerve, side-on";
 fn main() {
     let (pairs, scenes) = common::arguments(7);
     let scenes = if scenes.is_empty() { default_scenes() } else { scenes };
-    let headless = Headless::new(&HeadlessOptions::default()).unwrap();
+    let headless = GpuHeadless::new(&HeadlessOptions::default()).unwrap();
     println!("| scene | without, ms | µs per section | with, ms | ratio | sections drawn | quads |");
     println!("|---|---|---|---|---|---|---|");
     let mut last = None;

@@ -3,7 +3,7 @@
 
     python3 benches/fetch.py [FOLDER]
 
-FOLDER is `../shared` beside the checkout if nothing else is said. Volumes become NRRD files in FOLDER/data, scenes FOLDER/scenes/NAME.toml. Every volume's samples
+The default FOLDER is `../shared` beside the checkout. Volumes become NRRD files in FOLDER/data, scenes FOLDER/scenes/NAME.toml. Every volume's samples
 are checked against the digest of those that were measured. benches/fetch.md says where the volumes come from, and their licences. Only Python's own library is needed.
 """
 

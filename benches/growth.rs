@@ -1,17 +1,17 @@
-//! How frame time grows with the volume (§6): the builtin head at 64, 128, 256 and 512 voxels, opaque, in the same image.
+//! The growth of frame time with the volume (§6): the opaque builtin head at 64, 128, 256 and 512 voxels, in the same image.
 //!
-//! `cargo bench --bench growth -- [ROUNDS]`; every round draws each of them once.
+//! `cargo bench --bench growth -- [ROUNDS]` draws each of them once per round.
 
 #![expect(clippy::unwrap_used, reason = "a bench")]
 
 #[expect(dead_code, reason = "not every bench needs all of it")]
 mod common;
 
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::{GpuHeadless, HeadlessOptions};
 
 fn main() {
     let (rounds, _) = common::arguments(7);
-    let headless = Headless::new(&HeadlessOptions::default()).unwrap();
+    let headless = GpuHeadless::new(&HeadlessOptions::default()).unwrap();
     let names = [64, 128, 256, 512].map(|side| format!("builtin:head:{side}"));
     let mut views = names.each_ref().map(|name| {
         let scene = common::open(name);
@@ -21,7 +21,7 @@ fn main() {
     let mut last = None;
     for round in 0..=rounds {
         for (view, times) in views.iter_mut().zip(&mut times) {
-            // Another camera each time, so that buckets are part of the frame.
+            // The camera changes each time, so that buckets are part of the frame.
             view.turn(1.0).unwrap();
             let (ms, stats) = common::timed(&headless, view);
             // The first round compiles shaders and allocates.
@@ -31,7 +31,7 @@ fn main() {
             last = Some(stats);
         }
     }
-    println!("| volume | voxels in range | sections drawn | quads | ms per frame | of the one before |");
+    println!("| volume | voxels in range | sections drawn | quads | ms per frame | relative to the previous line |");
     println!("|---|---|---|---|---|---|");
     let mut before: Option<f64> = None;
     for (name, times) in names.iter().zip(times) {

@@ -1,6 +1,6 @@
-//! The paper's visibility tests and areas (§6), counted in the f64 twin, sheet by sheet: sections that pass the test of the centre's
-//! pixel (Fig. 11a), of the parallelogram (Fig. 13) and of its rectangle; and pixels composited within the bounding box of the voxels'
-//! centres, within tiles, and convolved within tiles whose counters exceed the threshold.
+//! The paper's visibility tests and areas (§6), counted by the f64 evaluation, sheet by sheet: sections that pass the test of the centre's pixel
+//! (Fig. 11a), of the parallelogram (Fig. 13) and of its rectangle; and pixels composited within the bounding box of the voxels' centres, within
+//! tiles, and convolved within tiles whose counters exceed the threshold.
 //!
 //! `cargo bench --bench visibility -- [SIDE] [SCENE]…` takes the image's side in pixels, and scene files or builtin volumes.
 

@@ -1,4 +1,4 @@
-//! Renders two volumes with the same settings and says how far the pictures are apart.
+//! Renders two volumes with the same settings and prints the difference between the pictures.
 //!
 //! `cargo run --release --example compare_volumes -- [FIRST SECOND]`
 
@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let headless = Headless::new(&HeadlessOptions::default())?;
 
     let first = Scene::from_volume(source(0, "head:64"), &settings)?;
-    // The transfer function that was chosen for the first volume serves both.
+    // Both use the transfer function that is chosen for the first volume.
     let first = first.explicit(&first.load_volume()?);
     let second = Scene { volume: source(1, "head:48"), ..first.clone() };
     let [first, second] = [headless.render(&first)?, headless.render(&second)?];

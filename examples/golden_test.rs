@@ -1,4 +1,4 @@
-//! A test by a golden image, as it would stand in a project's `tests/` folder.
+//! A test with a golden image, like one in a project's `tests/` folder.
 //!
 //! `SHEETSPLAT_BLESS=all cargo run --release --example golden_test` makes the golden, and every later run compares with it.
 

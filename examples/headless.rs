@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scene = Scene::parse(text, "headless", Path::new("."), &[])?;
     let headless = Headless::new(&HeadlessOptions::default())?;
 
-    // A view keeps what the next picture can use; only the camera changes here.
+    // A view keeps what the next picture can reuse; only the camera changes here.
     let mut view = headless.view(scene.load_volume()?, &scene)?;
     for name in ["first.png", "turned.png"] {
         let rendering = headless.draw(&mut view)?;

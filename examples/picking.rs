@@ -1,4 +1,4 @@
-//! Asks which point of a volume a pixel shows.
+//! Finds the point of a volume that is visible at a pixel.
 //!
 //! `cargo run --release --example picking -- [X Y]`
 

@@ -17,7 +17,7 @@
 @group(0) @binding(12) var<storage, read> control_points: array<vec4f>;
 @group(0) @binding(13) var labels: texture_2d_array<u32>;
 @group(0) @binding(14) var values: texture_2d_array<u32>;
-@group(0) @binding(15) var<uniform> planes: Planes;
+@group(0) @binding(15) var<uniform> planes: FieldPlanes;
 // Of every pixel what the plane before has: its number, and its gradient, numbers per `unit`. Then what `is_by_means` keeps.
 @group(0) @binding(16) var<storage, read_write> carried: array<vec4f>;
 
@@ -29,7 +29,7 @@ override FIRST_HIT: bool = false;
 // Whether gradients are the field's derivative.
 override KERNEL_GRADIENT: bool = false;
 
-const ROWS = 8u;
+const WORKGROUP_ROWS = 8u;
 
 var<workgroup> opaque_rows: array<atomic<u32>, TILE>;
 var<workgroup> is_carried: atomic<u32>;
@@ -113,7 +113,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
     // The slab's planes.
     let near = select(sheet_group.near, sheet_group.near - frame.slab_width, is_front_to_back);
     let far = near + frame.slab_width;
-    for (var row = local.y; row < TILE; row += ROWS) {
+    for (var row = local.y; row < TILE; row += WORKGROUP_ROWS) {
         let pixel = corner + vec2u(local.x, row);
         // Pixels off the image count as opaque.
         var is_opaque = true;
@@ -135,8 +135,9 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
             let ray = sheet_depths(at, depths);
             // By what the ray's stretch is less than the slab, so that inside nothing is rounded.
             let missing = max(ray.x - near, 0.0) + max(far - ray.y, 0.0);
-            let share = 1.0 - missing / frame.slab_width;
-            if share > 0.0 && min(drawn.x, before.x) != NO_NUMBER {
+            let share = max(1.0 - missing / frame.slab_width, 0.0);
+            // No `if` depends on the ray alone, for the reason that `start` gives.
+            if min(drawn.x, before.x) != NO_NUMBER {
                 // If only one plane has a value it stands for both.
                 let own = select(drawn, before, drawn.x == NO_NUMBER);
                 let other = select(before, drawn, before.x == NO_NUMBER);
@@ -148,14 +149,12 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
                 let slope = select(vec2f(0.0), frame.pixel_per_depth * at.xy, frame.near > 0.0);
                 let per_sheet = sqrt(1.0 + dot(slope, slope)) / dot(cut.sheet_along.xyz, at);
                 let sheet = vec4f(seen.color, 1.0) * (seen.amount * share * frame.slab_width * per_sheet);
-                if sheet.a > 0.0 {
-                    let opacity = image.a;
-                    image = composite(image, sheet, COMPOSITING, frame.order);
-                    acc[slot] = image;
-                    if FIRST_HIT && opacity < cut.first_hit && image.a >= cut.first_hit {
-                        let reached = (cut.first_hit - opacity) / (image.a - opacity);
-                        hits[pixel.y * frame.size.x + pixel.x] = noted(mix(part.x, part.y, reached));
-                    }
+                let opacity = image.a;
+                image = select(image, composite(image, sheet, COMPOSITING, frame.order), sheet.a > 0.0);
+                acc[slot] = image;
+                if FIRST_HIT && opacity < cut.first_hit && image.a >= cut.first_hit {
+                    let reached = (cut.first_hit - opacity) / (image.a - opacity);
+                    hits[pixel.y * frame.size.x + pixel.x] = noted(mix(part.x, part.y, reached));
                 }
             }
             // What lies behind a cut is as hidden as what lies behind opaque voxels.

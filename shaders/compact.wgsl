@@ -1,5 +1,5 @@
-// The voxels that a sheet group draws, and those of them that are drawn for the first time, each in the order of the visits.
-// One workgroup: every thread writes a run of visits.
+// Lists the voxels that a sheet group draws, and those of them that are drawn for the first time, without gaps and in the order of the visits.
+// One workgroup, in which every thread writes a run of visits.
 
 @group(0) @binding(0) var<storage, read> visits: array<Visit>;
 @group(0) @binding(1) var<storage, read> visit_args: Indirect;
@@ -24,7 +24,7 @@ fn main(@builtin(local_invocation_index) thread: u32) {
     for (var i = first; i < end; i += 1u) {
         own += vec2u(count_bits(visits[i].drawn), count_bits(visits[i].fresh));
     }
-    // Drawn and fresh voxels before the thread's run.
+    // The numbers of drawn and fresh voxels before the thread's run.
     var slot = sum_up_to(thread, own) - own;
     for (var i = first; i < end; i += 1u) {
         for (var word = 0u; word < 2u; word += 1u) {

@@ -1,32 +1,32 @@
-// Composites a group of sheet buffers into the compositing buffer (eq. 2, front to back by default; SPEC §5), in the tiles
-// that received splats, and notes which pixels are opaque (§6). One workgroup per tile.
+// Composites a group of sheet buffers into the compositing buffer (eq. 2, front to back by default; SPEC §5), in the tiles that received
+// splats, and marks opaque pixels (§6). One workgroup per tile.
 
 @group(0) @binding(1) var<uniform> band: Band;
 @group(0) @binding(2) var sheets: texture_2d_array<f32>;
 @group(0) @binding(3) var<storage, read_write> acc: array<vec4f>;
 @group(0) @binding(4) var<storage, read> composited: TileList;
-// The opacity buffer, cut off at the threshold: one bit per pixel, set from `opacity_threshold` on.
+// The opacity buffer, clamped to the threshold: one bit per pixel, set from `opacity_threshold` on.
 @group(0) @binding(5) var<storage, read_write> opaque: array<u32>;
 @group(0) @binding(6) var<storage, read_write> opaque_tiles: array<u32>;
 @group(0) @binding(7) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(8) var<uniform> cut: Cut;
 @group(0) @binding(9) var surfaces: texture_depth_2d;
-// Of every pixel the sheet depth of its first hit, as bits; 0 is none.
+// For every pixel the bits of its first hit's sheet depth; 0 where the opacity has not been reached.
 @group(0) @binding(10) var<storage, read_write> hits: array<u32>;
-// For every tile the number of the group that it was composited for last.
+// For every tile the number of the last group that composited it.
 @group(0) @binding(11) var<storage, read_write> last_groups: array<u32>;
 
 // `frame.compositing`.
 override COMPOSITING: u32 = 0u;
-// Whether anything is cut, and whether first hits are asked for.
+// Whether anything is cut, and whether first hits are requested.
 override CUT: bool = false;
 override FIRST_HIT: bool = false;
 
-const ROWS = 8u;
+const WORKGROUP_ROWS = 8u;
 
 var<workgroup> opaque_rows: array<atomic<u32>, TILE>;
 
-// Whether a sheet changes what is there.
+// Whether a sheet changes the image.
 fn counts(opacity: f32, middle: f32, counted: vec2f) -> bool {
     switch COMPOSITING {
         case MINIMUM: {
@@ -56,7 +56,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
     }
     let layers = textureNumLayers(sheets);
     let is_after_gap = last_groups[tile] + 1u != sheet_group.number;
-    for (var row = local.y; row < TILE; row += ROWS) {
+    for (var row = local.y; row < TILE; row += WORKGROUP_ROWS) {
         let pixel = corner + vec2u(local.x, row);
         // Pixels off the image count as opaque.
         var is_opaque = true;
@@ -64,7 +64,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
             let slot = (pixel.y - band.first_row) * frame.size.x + pixel.x;
             var image = acc[slot];
             if COMPOSITING == SURFACE && is_after_gap && image.a < 1.0 {
-                // What is kept of a surface that is not reached is of another sheet than the one right before, which holds nothing.
+                // The stored mean must be that of the previous sheet. If that sheet was empty here, the stored one is older and does not count.
                 image = vec4f(0.0);
             }
             var ray = vec2f(-FAR, FAR);
@@ -100,7 +100,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
                 }
             }
             acc[slot] = image;
-            // What lies behind a cut is as hidden as what lies behind opaque voxels.
+            // Whatever lies behind a cut is hidden, as behind opaque voxels.
             let is_cut = CUT && ray.y <= sheet_group.near + f32(layers) * frame.slab_width;
             is_opaque = image.a >= frame.opacity_threshold || is_cut;
         }

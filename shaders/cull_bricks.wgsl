@@ -1,21 +1,23 @@
-// Which bricks a sheet group visits (§6): those that reach into the group and are not behind opaque pixels alone. One
-// workgroup, so that the visits keep the order of the bricks: the same frame gives the same bytes.
+// Finds the bricks that a sheet group visits (§6): those that reach into the group and are not entirely behind opaque pixels. One workgroup,
+// so that the visits keep the order of the bricks: the same frame gives the same bytes.
 
 @group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(2) var<storage, read> bricks: array<Brick>;
 // Bricks by their first sheet group.
 @group(0) @binding(3) var<storage, read> order: array<u32>;
 @group(0) @binding(4) var<storage, read> states: array<BrickState>;
-// The occlusion buffer: a bit is set where the box filter that starts at a pixel finds opaque pixels alone.
+// The occlusion buffer: a bit is set where the box filter that starts at a pixel finds only opaque pixels.
 @group(0) @binding(5) var<storage, read> occluded: array<u32>;
 @group(0) @binding(6) var<storage, read_write> visits: array<Visit>;
 @group(0) @binding(7) var<storage, read_write> args: Indirect;
 @group(0) @binding(8) var<storage, read_write> culled: Culled;
 
-// The sheets of a group.
+// The number of sheets in a group.
 override SHEETS: u32 = 4u;
+// Whether a group is not sheets, but the plane at its near end (SPEC §9).
+override PLANE: bool = false;
 
-// Whether all pixels are opaque in the footprints' boxes around centres from low to high.
+// Whether all pixels are opaque in the boxes of footprints with centres from low to high.
 fn is_behind(low: vec2f, high: vec2f) -> bool {
     let last = vec2f(frame.size - 1u);
     let margin = sheet_group.half_box + BOX_SLACK;
@@ -51,12 +53,15 @@ fn is_visited(at: u32) -> bool {
         dot(abs(rows[2].xyz), half_extent),
         dot(abs(rows[3].xyz), half_extent),
     );
-    // Rounding must not lose a voxel that touches by a hair.
+    // Rounding must not lose a voxel that barely touches.
     let slack = 1e-3;
     let depth_reach = spread.z + frame.reach + slack;
-    let far = sheet_group.near + f32(SHEETS) * frame.slab_width;
+    let far = sheet_group.near + select(f32(SHEETS) * frame.slab_width, 0.0, PLANE);
     if p.z + depth_reach <= sheet_group.near || p.z - depth_reach >= far {
         return false;
+    }
+    if PLANE && frame.near > 0.0 && p.w - spread.w <= CLOSE * frame.reach {
+        return true;
     }
     let farthest = p.w + spread.w;
     if farthest <= frame.near {
@@ -76,7 +81,7 @@ fn is_visited(at: u32) -> bool {
 @compute @workgroup_size(256)
 fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
     start(workgroup.z);
-    // Every thread takes a run of bricks, at most 32 at a time: their answers fit a word.
+    // Every thread tests a run of bricks, at most 32 at a time, so that the results fit a word.
     var total = 0u;
     for (var base = 0u; base < sheet_group.brick_count; base += WORKGROUP_SIZE * 32u) {
         let rest = min(sheet_group.brick_count - base, WORKGROUP_SIZE * 32u);

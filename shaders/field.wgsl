@@ -2,10 +2,10 @@
 // Mueller, Möller, Crawfis 1999).
 
 @group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
-@group(0) @binding(2) var<storage, read> samples: array<Sample>;
+@group(0) @binding(2) var<storage, read> voxels: array<FieldVoxel>;
 @group(0) @binding(3) var<storage, read> instances: array<u32>;
 @group(0) @binding(4) var<storage, read> args: Indirect;
-@group(0) @binding(5) var<uniform> planes: Planes;
+@group(0) @binding(5) var<uniform> planes: FieldPlanes;
 
 // Whether gradients are the field's derivative, not the voxels' differences.
 override KERNEL_GRADIENT: bool = false;
@@ -27,8 +27,8 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
     start(vertex >> 31u);
     // The last instance may have fewer quads: the others repeat the last one, without area.
     let quad = instance * QUADS + vertex / 4u;
-    let sample = samples[instances[min(quad, args.count - 1u)]];
-    let lies = on_plane(vec2f(sample.x, sample.y), sample.depth, sheet_group.near);
+    let voxel = voxels[instances[min(quad, args.count - 1u)]];
+    let lies = on_plane(vec2f(voxel.x, voxel.y), voxel.depth, sheet_group.near);
     let extent = sqrt(max(frame.radius * frame.radius - lies.distance * lies.distance, 0.0));
     let reach = (extent + MARGIN) / lies.per_pixel;
     let side = side_of(vertex);
@@ -41,8 +41,8 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
         position,
         lies.center_px,
         vec4f(axis * lies.per_pixel.x, vec2f(-axis.y, axis.x) * lies.per_pixel.y),
-        sample.number,
-        vec4f(sample.gradient_x, sample.gradient_y, sample.gradient_z, lies.distance),
+        voxel.number,
+        vec4f(unpacked(voxel.gradient_xy, voxel.gradient_z), lies.distance),
         vec2f(-frame.falloff, frame.radius * frame.radius),
     );
 }

@@ -1,11 +1,11 @@
-// The depth at which opacity has reached a value (a first hit): world units along the view direction, from the eye; orthographic from
-// the plane through the camera's centre.
+// The depth at which the opacity has reached a value (a first hit), in world units along the view direction, from the eye or, orthographic,
+// from the plane through the camera's centre.
 
 @group(0) @binding(1) var<uniform> cut: Cut;
 @group(0) @binding(2) var surfaces: texture_depth_2d;
 @group(0) @binding(3) var<storage, read> hits: array<u32>;
 
-// One triangle that covers the screen.
+// A triangle that covers the screen.
 @vertex
 fn vertex(@builtin(vertex_index) corner: u32) -> @builtin(position) vec4f {
     return vec4f(select(-1.0, 3.0, corner == 1u), select(-1.0, 3.0, corner == 2u), 0.0, 1.0);

@@ -1,18 +1,18 @@
 // The tile rasterizer: draws patches front to back without sheet buffers in memory. A subgroup keeps the sheets of a group for its
 // pixels in registers, gathers the kernel sections that fall on them (§3.2), composites them (eq. 2), and skips what lies behind
-// its opaque pixels (§6). Subgroups share nothing, so barriers are among a subgroup's threads, and sums have one order whatever else runs.
+// its opaque pixels (§6). Subgroups share nothing, so barriers are among a subgroup's threads, and the order of sums is fixed.
 //
-// Threads hold four pixels each, one below the other, in blocks of 8×4 pixels; a patch has four blocks, and a subgroup of 8 to 32 threads
-// goes round them, one, two or all at a time. What it knows of voxels serves all rounds.
+// Threads hold four pixels each, one below the other, in blocks of 8×4 pixels. A patch has four blocks; a subgroup of 8 to 32 threads draws one,
+// two or all of them at a time, in rounds. What it knows about voxels serves all rounds.
 //
-// One-shot loops: software drivers execute both sides of an `if` under a mask, but skip a loop that has no iterations. Work that is often left out
+// One-shot loops: software drivers execute both sides of an `if` under a mask, but skip a loop without iterations. Work that is often skipped
 // therefore stands in `for (var x = condition; x; x = false)`, a loop that runs at most once.
 
 // A kernel's sections begin at a group's near plane, and nothing is handed on from group to group.
 const FIRST_PLANE = 0.0;
 const GROUPS_LOOKED_BACK = 0u;
 
-// Whether groups without voxels are composited all the same.
+// Whether groups without voxels are composited too.
 fn counts_gaps() -> bool {
     return COMPOSITING == MINIMUM || COMPOSITING == SURFACE;
 }
@@ -26,7 +26,7 @@ fn is_due_without_voxels(blocks: u32) -> bool {
     return counts_gaps();
 }
 
-// Adds the sections of the queue's voxels that some blocks see to the sheets of a thread's pixels in them. Whether there are any.
+// Adds the sections of the queue's voxels that some blocks see to the sheets of a thread's pixels in them. Returns whether there were any.
 fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> bool {
     var is_added = false;
     for (var base = 0u; base < queue_count; base += BATCH) {
@@ -40,7 +40,7 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> b
             let amount = select(vec4f(0.0), queue_amounts[slot], i + lane < seen_count);
             let whole = whole_sheet(queue_blocks[slot]);
             let own = footprint_at(bitcast<vec4f>(queue_points[slot]), sheet_group.near, whole, amount);
-            // Every lane adds all voxels' sections at its own pixels, two voxels at a time.
+            // Every lane adds the sections of all voxels at its own pixels, two voxels at a time.
             let count = min(seen_count - i, lanes);
             passes += PASSES_PER_ADDITION + (count + 1u) / 2u;
             for (var j = 0u; j < count; j += 2u) {
@@ -76,7 +76,7 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> b
     return is_added;
 }
 
-// Composites a thread's sheets, whole now, into its pixels.
+// Composites a thread's complete sheets into its pixels.
 fn composite_pixels(pixels: Pixels, sheets: Sheets, progress: ptr<function, Progress>) {
     passes += passes_per_look();
     look(pixels.column, pixels.rows);

@@ -4,7 +4,7 @@
 // A group's sheets are the sums on its four far planes. Its near plane is the group before's last, whose field is handed on. A dispatch that goes
 // on where another one has stopped looks at the group before once more, to have that.
 
-@group(0) @binding(15) var<uniform> planes: Planes;
+@group(0) @binding(15) var<uniform> planes: FieldPlanes;
 // The bits of every voxel's coefficient, a number; only read where `EXACT`.
 @group(0) @binding(16) var coefficients: texture_2d_array<u32>;
 

@@ -1,7 +1,7 @@
-// The occlusion buffer (§6): the opacity buffer convolved with a box of the footprint's size, separably. The paper averages
-// opacities cut off at the threshold and compares with it; whether all pixels of a box are opaque is the same decision
-// without rounding, and on bits. In perspective every group has its box, and boxes shrink on the way back: what a larger box in front
-// has left in a tile holds for the smaller one, too. One workgroup per tile, one thread per row of 32 pixels.
+// The occlusion buffer (§6): the opacity buffer convolved separably with a box of the footprint's size. The paper averages opacities clamped to
+// the threshold and compares with it; testing whether all pixels of a box are opaque is the same decision without rounding, on bits. In
+// perspective every group has its own box, and boxes shrink towards the back: the result of a larger box in front stays valid for a smaller
+// one in tiles that are not computed again. One workgroup per tile, one thread per row of 32 pixels.
 
 @group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(2) var<storage, read> occluding: TileList;
@@ -25,7 +25,7 @@ fn word_of(workgroup: vec3u, thread: u32) -> Word {
     return Word(tile % words, y, y < frame.size.y);
 }
 
-// Down the columns, from every pixel on; rows off the image count as opaque.
+// Convolves along the columns, downwards from every pixel; rows off the image count as opaque.
 @compute @workgroup_size(32)
 fn columns(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
     start(workgroup.z);
@@ -42,7 +42,7 @@ fn columns(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) 
     result[word.y * words + word.x] = all;
 }
 
-// A row's word, all opaque off the image.
+// A row's word; all opaque off the image.
 fn row_word(y: u32, x: u32) -> u32 {
     let words = tile_grid(frame.size).x;
     if x >= words {
@@ -51,7 +51,7 @@ fn row_word(y: u32, x: u32) -> u32 {
     return source[y * words + x];
 }
 
-// Along the rows, from every pixel on.
+// Convolves along the rows, to the right from every pixel.
 @compute @workgroup_size(32)
 fn rows(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
     start(workgroup.z);

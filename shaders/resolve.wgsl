@@ -1,4 +1,4 @@
-// Lays the compositing buffer over the background (SPEC §5): premultiplied in, premultiplied out.
+// Composites the compositing buffer over the background (SPEC §5), with premultiplied input and output.
 
 @group(0) @binding(1) var<uniform> band: Band;
 @group(0) @binding(2) var<storage, read> acc: array<vec4f>;
@@ -8,12 +8,12 @@ override LINEAR_LIGHT: bool;
 
 struct Corner {
     @builtin(position) position: vec4f,
-    // The target's pixel that the image's upper left one goes to.
+    // The target's pixel for the image's upper left pixel.
     @location(0) @interpolate(flat) origin: vec2i,
 }
 
-// One triangle that covers the viewport, which is the image; a scissor limits it to the band. The instance's number is the origin,
-// see `pass::resolve`.
+// A triangle that covers the viewport, which is the image; a scissor limits it to the band. The instance index encodes the origin, see
+// `pass::resolve`.
 @vertex
 fn vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) instance: u32) -> Corner {
     let position = vec4f(select(-1.0, 3.0, corner == 1u), select(-1.0, 3.0, corner == 2u), 0.0, 1.0);

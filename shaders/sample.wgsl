@@ -1,4 +1,4 @@
-// Draws whole kernels one by one, each composited by itself as a sheet with nothing else in it would be (§3, composite-every-sample).
+// Draws whole kernels one by one, each composited like a sheet that contains nothing else (§3, composite-every-sample).
 
 @fragment
 fn fragment(quad: Quad) -> One {

@@ -1,11 +1,11 @@
-// Projects and shades the voxels that are drawn for the first time, so once each (Fig. 12). SPEC §3 for classification and
-// shading. Only here does a voxel need its gradient: most are hidden, and never do (§6).
+// Projects and shades the voxels that are drawn for the first time, so each only once (Fig. 12). SPEC §3 defines classification and shading. Only
+// here does a voxel need its gradient; most voxels are hidden and never do (§6).
 
 @group(0) @binding(1) var<storage, read> bricks: array<Brick>;
 @group(0) @binding(2) var values: texture_2d_array<u32>;
 // The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0); then the table of labels.
 @group(0) @binding(3) var<storage, read> control_points: array<vec4f>;
-// Places: 64 times the brick's number, and the place in the brick.
+// Places: 64 times the brick's index, plus the slot.
 @group(0) @binding(4) var<storage, read> fresh: array<u32>;
 @group(0) @binding(5) var<storage, read> args: Indirect;
 @group(0) @binding(6) var<storage, read_write> splats: array<Splat>;

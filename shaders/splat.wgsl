@@ -1,29 +1,29 @@
-// Draws the kernel sections of a group of sheets as footprint quads, one quad per voxel, added up in the group's sheet
-// buffers (§3.2). All footprints lie on the screen alike.
+// Draws the kernel sections of a group of sheets as footprint quads that add up in the group's sheet buffers (§3.2), one quad per voxel. All
+// footprints have the same shape on the screen.
 
-// All that the fragments of a quad share comes from its vertices: on software rasterizers an interpolated constant costs a
+// The vertices of a quad provide everything that its fragments share, because on software rasterizers an interpolated constant costs a
 // fraction of a uniform.
 struct Quad {
     @builtin(position) position: vec4f,
     @location(0) @interpolate(flat) center_px: vec2f,
-    // Pixel offset → footprint coordinates, in texels of the summed-area table or in grid units.
+    // Maps a pixel offset to footprint coordinates, in texels of the summed-area table or in grid units.
     @location(1) @interpolate(flat) footprint_from_pixels: vec4f,
     @location(2) @interpolate(flat) amount: vec4f,
-    // Summed-area: what of H(0, 0, z) is left beyond the group's first plane, with the plane's sign.
-    // Sections: the plane, seen from the kernel's centre.
+    // Summed-area: the rest of H(0, 0, z) beyond the group's first plane, with the plane's sign.
+    // Sections: the plane's position relative to the kernel's centre.
     @location(3) @interpolate(flat) first: f32,
     // Summed-area: the same for the next four planes.
     @location(4) @interpolate(flat) next: vec4f,
-    // Summed-area: all of H(0, 0, z) on both sides of the centre, for the sheet that the centre lies in.
+    // Summed-area: the whole H(0, 0, z) on both sides of the centre, for the sheet that contains the centre.
     @location(5) @interpolate(flat) whole: vec4f,
-    // Summed-area: falloff times the square of the layers' distance.
+    // Summed-area: falloff times the squared distance of layers.
     @location(6) @interpolate(flat) falloff: f32,
 }
 
 @vertex
 fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Quad {
     start(vertex >> 31u);
-    // The last instance may have fewer quads: the others repeat the last one, without area.
+    // The last instance may have fewer quads: the others repeat the last one without area.
     let quad = instance * QUADS + vertex / 4u;
     let splat = splats[instances[min(quad, args.count - 1u)]];
     let t0 = (sheet_group.near - splat.depth) * frame.kernel_per_depth;
@@ -37,7 +37,7 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
     let corner = clip_corner(center_px, frame.pixels_from_footprint * (side * reach), side, half_box);
     // A kernel that does not reach this group becomes a quad without area.
     let position = select(NOWHERE, corner, extent > 0.0 && quad < args.count);
-    // The amplitude only here: under a strong minification it leaves the range of f16.
+    // The amplitude is applied here because under strong minification it leaves the range of f16.
     let amount = vec4f(unpack2x16float(splat.rg), unpack2x16float(splat.ba)) * frame.amplitude;
     let map = frame.footprint_from_pixels;
     if SECTIONS {
@@ -59,9 +59,9 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
     );
 }
 
-// Two entries of eq. 3 subtracted, for every sheet of the group; neighbours share an entry. H(a, b, z) is H(0, 0, z) times
-// what the table says of (a, b). An entry is counted from the rim on its side of the centre: a slab that just reaches into
-// the kernel has few digits to lose.
+// The differences of two entries of eq. 3 for every sheet of the group; neighbouring sheets share an entry. H(a, b, z) is H(0, 0, z) times
+// the table's value at (a, b). An entry is counted from the rim on its side of the centre, because a slab that barely reaches into the
+// kernel has few digits to lose.
 fn sections_summed_area(footprint: vec2f, quad: Quad) -> vec4f {
     let least = beyond_chord(footprint, quad.falloff);
     let first = cut_by_ball(vec4f(quad.first), least).x;
@@ -70,7 +70,7 @@ fn sections_summed_area(footprint: vec2f, quad: Quad) -> vec4f {
 }
 
 fn sections(quad: Quad) -> vec4f {
-    // From the pixel's centre, not an interpolated coordinate: the rasterizer snaps corners to a coarse grid.
+    // The offset is measured from the pixel's centre, not interpolated: the rasterizer snaps corners to a coarse grid.
     let offset = quad.position.xy - quad.center_px;
     let footprint = quad.footprint_from_pixels.xy * offset.x + quad.footprint_from_pixels.zw * offset.y;
     if !SECTIONS {

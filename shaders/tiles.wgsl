@@ -1,13 +1,18 @@
-// Which tiles a sheet group composites, and around which the occlusion buffer changes (§6). One workgroup.
+// Finds the tiles that a sheet group composites, and those in which the occlusion buffer changes (§6). One workgroup.
 
 @group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(2) var<storage, read_write> culled: Culled;
-// 1 for tiles whose pixels are all opaque: no splat changes them any more.
+// 1 for tiles whose pixels are all opaque, which splats no longer change.
 @group(0) @binding(3) var<storage, read> opaque_tiles: array<u32>;
 @group(0) @binding(4) var<storage, read_write> composited: TileList;
 @group(0) @binding(5) var<storage, read_write> occluding: TileList;
-// Tiles composited by every group.
+// The number of tiles that every group composited.
 @group(0) @binding(6) var<storage, read_write> counts: array<u32>;
+// For every tile the number of the group that it was composited for last.
+@group(0) @binding(7) var<storage, read> last_groups: array<u32>;
+
+// Whether a group is a plane (SPEC §9): where it has no value, the plane before it still stands for both.
+override PLANE: bool = false;
 
 const WORKGROUP_SIZE = 256u;
 
@@ -15,7 +20,9 @@ var<workgroup> composited_count: atomic<u32>;
 var<workgroup> occluding_count: atomic<u32>;
 
 fn is_composited(tile: u32) -> bool {
-    let touched = frame.tiles == 0u || atomicLoad(&culled.tiles[tile]) != 0u;
+    let before = select(sheet_group.number + 1u, sheet_group.number - 1u, frame.order == FRONT_TO_BACK);
+    let is_behind_value = PLANE && last_groups[tile] != 0u && last_groups[tile] == before;
+    let touched = frame.tiles == 0u || atomicLoad(&culled.tiles[tile]) != 0u || is_behind_value;
     return touched && (frame.culling == 0u || opaque_tiles[tile] == 0u);
 }
 
@@ -38,7 +45,7 @@ fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) wor
     start(workgroup.z);
     let grid = tile_grid(frame.size);
     let count = grid.x * grid.y;
-    // The lists' order does not matter: tiles do not overlap.
+    // The order of the lists does not matter, because tiles do not overlap.
     for (var tile = thread; tile < count; tile += WORKGROUP_SIZE) {
         if is_composited(tile) {
             composited.tiles[atomicAdd(&composited_count, 1u)] = tile;

@@ -7,8 +7,8 @@
 // Places: 64 times the brick's number, and the place in the brick.
 @group(0) @binding(4) var<storage, read> fresh: array<u32>;
 @group(0) @binding(5) var<storage, read> args: Indirect;
-@group(0) @binding(6) var<storage, read_write> samples: array<Sample>;
-@group(0) @binding(7) var<uniform> planes: Planes;
+@group(0) @binding(6) var<storage, read_write> voxels: array<FieldVoxel>;
+@group(0) @binding(7) var<uniform> planes: FieldPlanes;
 
 // Whether coefficients are not the values themselves.
 override EXACT: bool = false;
@@ -34,5 +34,6 @@ fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) wor
     let voxel = voxel_of(bricks[id / BRICK_VOXELS], id % BRICK_VOXELS);
     let p = homogeneous(vec4f(vec3f(voxel), 1.0));
     let gradient = 2.0 * half_differences(voxel) * planes.value_scale;
-    samples[id] = Sample(p.x, p.y, p.z, p.w, number_at(index_of(voxel)), gradient.x, gradient.y, gradient.z);
+    let bits = packed(gradient);
+    voxels[id] = FieldVoxel(p.x, p.y, p.z, number_at(index_of(voxel)), bits.x, bits.y);
 }

@@ -2,12 +2,11 @@
 //!
 //! The method is that of Mueller, Shareef, Huang and Crawfis, *High-Quality Splatting on Rectilinear Grids with Efficient
 //! Culling of Occluded Voxels* (IEEE TVCG 5(2), 1999). Sections (§), equations, tables and figures in these docs are those of
-//! that paper; "SPEC" is this project's specification of what an image must be, \[17\] is the paper's reference on
-//! antialiasing.
+//! that paper. "SPEC" is this project's specification of images, and \[17\] is the paper's reference on antialiasing.
 //!
 //! # A picture of a file
 //!
-//! [`headless`] opens a GPU device of its own, without a window. A [`Scene`] says what is drawn and how; [`Scene::parse`] reads the
+//! [`headless`] opens a GPU device of its own, without a window. A [`Scene`] states what is drawn and how; [`Scene::parse`] reads a
 //! scene file's text, and [`Scene::from_volume`] makes a scene with the defaults for one volume.
 //!
 //! ```
@@ -27,8 +26,8 @@
 //!
 //! # Many pictures of one volume
 //!
-//! A [`SceneView`] keeps what the next frame can use (§5): its setters say what each change costs. It also answers which point of the
-//! volume a pixel shows:
+//! A [`SceneView`] keeps what the next frame can reuse (§5); its setters state the cost of each change. It can also find the point of the
+//! volume at a pixel:
 //!
 //! ```
 //! use sheetsplat::Scene;
@@ -52,45 +51,45 @@
 //! # On a host's device
 //!
 //! An application that owns a wgpu device uses the types at the crate's root. The host owns instance, adapter, device, queue, encoder and
-//! target; nothing outside [`headless`] opens a device, submits, or waits.
+//! target; only [`headless`] opens a device, submits, or waits.
 //!
 //! | type | what the host does with it |
 //! |---|---|
-//! | [`DeviceRequirements`] | asks for what the renderer needs when it opens the device |
+//! | [`DeviceRequirements`] | requests what the renderer needs when it opens the device |
 //! | [`Renderer`], [`RendererOptions`] | makes the pipelines, once for each kind of target |
 //! | [`Volume`], [`GpuVolume`] | loads a volume and puts it on the GPU, shared by all views |
-//! | [`Scene`], [`SceneView`] | says what is shown of a volume, and changes it |
+//! | [`Scene`], [`SceneView`] | states what is shown of a volume, and changes it |
 //! | [`Renderer::prepare`] | allocates and writes buffers; this can fail |
-//! | [`Renderer::record`] | encodes all stages but the last into the host's encoder |
+//! | [`Renderer::record`] | encodes all stages except the last into the host's encoder |
 //! | [`Renderer::present`], [`Renderer::draw`] | encodes the last stage, in a pass of its own or of the host's, at a [`Placement`] |
 //!
-//! A host with a scene around the volume makes the camera from its own matrices ([`Camera::from_clip_from_world`]) and hands over its
-//! depth texture ([`SceneView::set_surfaces`]): what lies behind its surfaces is neither shown nor drawn. In turn it may ask for the depth
+//! A host with a scene around the volume makes the camera from its own matrices ([`Camera::from_clip_from_world`]) and passes its
+//! depth texture ([`SceneView::set_surfaces`]): what lies behind its surfaces is neither visible nor drawn. It may also request the depth
 //! at which the volume reaches an opacity ([`SceneView::set_first_hit`]), as a texture or for single pixels ([`SceneView::pick`]).
-//! [`Clip`](settings::Clip) planes and a crop box cut the volume open. The README has a whole frame on a host's device.
+//! [`Clip`](settings::Clip) planes and a crop box cut the volume open. `docs/guide/library.md` has a whole frame on a host's device.
 //!
 //! # The stages
 //!
 //! ```text
-//! volume file → Volume ─ classify → the values, and which voxels of which bricks take part, on the GPU
-//!                      ─ appearance → what the scene leaves open, such as the transfer function
-//! scene file  → Scene  ─ the view's geometry → which bricks every group of sheets looks at (plain data)
+//! volume file → Volume ─ classify → on the GPU: the values, and for each brick which of its voxels take part
+//!                      ─ appearance → what the scene does not state, such as the transfer function
+//! scene file  → Scene  ─ the view's geometry → the bricks that every group of sheets visits (plain data)
 //!
 //! the tile rasterizer, one compute stage:
 //!   gather   draws every tile front to back with a group's sheets in registers: culls, shades, adds kernel sections, composites
 //! the quad rasterizer, for every group of sheets:
-//!   cull     finds the bricks, then the voxels that are not hidden; each voxel is shaded once, and only visible voxels need gradients
+//!   cull     finds the bricks, then the voxels, that are not hidden; each visible voxel is shaded once, which needs its gradient
 //!   tiles    marks where the group's splats fall
 //!   splat    adds every voxel's kernel sections to the group's sheet buffers, one quad per voxel
-//!   composite  lays the sheets over the compositing buffer and marks the pixels that have become opaque
-//!   occlude  fills the occlusion buffer: where a whole footprint is behind opaque pixels
+//!   composite  composites the sheets into the compositing buffer and marks the pixels that have become opaque
+//!   occlude  fills the occlusion buffer: where a whole footprint lies behind opaque pixels
 //! at the end:
-//!   resolve  lays the result over the background, into the host's target
-//!   first_hit  writes the depths at which an opacity was reached, if the host asked for them
+//!   resolve  composites the result over the background, into the host's target
+//!   first_hit  writes the depths at which an opacity was reached, if the host requested them
 //! ```
 //!
-//! Both rasterizers draw the same image up to rounding ([`Rasterizer`](settings::Rasterizer)). Every stage has a plain f64 twin, which
-//! tests compare with it.
+//! Both rasterizers draw the same image up to rounding ([`Rasterizer`](settings::Rasterizer)). Tests compare every stage with a plain f64
+//! evaluation.
 //!
 //! # Glossary
 //!
@@ -105,18 +104,25 @@
 
 mod after;
 pub mod appearance;
+#[cfg(feature = "cpu")]
 pub mod cpu;
+mod device_error;
 mod error;
 mod geometry;
 #[cfg(feature = "golden")]
 pub mod golden;
+#[cfg(feature = "gpu")]
 mod gpu;
 pub mod headless;
 pub mod image;
 mod lists;
+#[cfg(feature = "gpu")]
 mod pass;
+mod pick;
+#[cfg(feature = "gpu")]
 mod rasterizer;
 mod reference;
+#[cfg(feature = "gpu")]
 mod renderer;
 pub mod scene;
 mod setting_error;
@@ -124,16 +130,27 @@ pub mod settings;
 pub mod stats;
 pub mod volume;
 
+pub use device_error::{DeviceError, InsufficientLimit};
 pub use error::RenderError;
+#[cfg(feature = "gpu")]
 pub use geometry::surfaces::{SurfaceDepths, Surfaces};
-pub use gpu::device::{DeviceError, DeviceRequirements, InsufficientLimit};
+#[cfg(feature = "gpu")]
+pub use gpu::device::DeviceRequirements;
+#[cfg(feature = "gpu")]
 pub use gpu::fault::{DeviceFault, scoped};
+#[cfg(feature = "gpu")]
 pub use gpu::gpu_volume::GpuVolume;
 pub use image::Image;
+pub use pick::Pick;
+#[cfg(feature = "gpu")]
 pub use renderer::Renderer;
+#[cfg(feature = "gpu")]
 pub use renderer::options::{Blend, RendererOptions};
-pub use renderer::pick::{PendingPick, Pick};
+#[cfg(feature = "gpu")]
+pub use renderer::pick::PendingPick;
+#[cfg(feature = "gpu")]
 pub use renderer::placement::Placement;
+#[cfg(feature = "gpu")]
 pub use renderer::scene_view::{Prepared, SceneView};
 pub use scene::Scene;
 pub use setting_error::SettingError;
@@ -141,14 +158,16 @@ pub use settings::Camera;
 pub use stats::Stats;
 pub use volume::Volume;
 // The libraries whose types stand in this one's signatures.
-pub use {glam, wgpu};
+pub use glam;
+#[cfg(feature = "gpu")]
+pub use wgpu;
 
-/// The stages and lists by themselves, for this project's own tests and benches. Nothing in here is part of the public interface: it
-/// changes without notice.
+/// The stages and lists by themselves, for this project's own tests and benches. Nothing here is part of the public interface; it changes
+/// without notice.
 #[doc(hidden)]
 pub mod internals {
     pub use crate::geometry::{footprint, grid_warp, kernel, means, slab, view_geometry};
-    pub use crate::lists::{brick, bucket, classify, iso_range, matter, patch_bins, quad_plan, value_list};
+    pub use crate::lists::{brick, bucket, classify, iso_range, patch_bins, quad_plan, value_list};
     pub use crate::settings::camera::{Eye, ViewBasis};
     pub use crate::settings::clip::ClippedVoxels;
     pub use crate::settings::shading::MIN_GRADIENT;
@@ -158,7 +177,8 @@ pub mod internals {
         pub use crate::after::*;
     }
 
-    /// What the passes share.
+    /// The passes' common parts.
+    #[cfg(feature = "gpu")]
     pub mod gpu {
         pub use crate::gpu::{
             bindings, brick_lists, classified_volume, device, footprint_texture, gathered_layout, layout,
@@ -167,18 +187,21 @@ pub mod internals {
     }
 
     /// The GPU's stages.
+    #[cfg(feature = "gpu")]
     pub mod pass {
-        pub use crate::pass::{composite, cull, first_hit, gather, occlude, resolve, sample, shade, splat, tiles};
+        pub use crate::pass::{
+            classify, composite, cull, field, first_hit, gather, occlude, resolve, sample, shade, splat, tiles, values,
+        };
     }
 
-    /// The f64 twins of the stages.
+    /// The f64 evaluations of the stages.
     pub mod reference {
         pub use crate::reference::*;
     }
 }
 
 /// The code in the README and the guide, run as doc tests.
-#[cfg(all(doctest, feature = "golden"))]
+#[cfg(all(doctest, feature = "golden", feature = "gpu"))]
 mod guide {
     #[doc = include_str!("../README.md")]
     struct Readme;

@@ -1,22 +1,22 @@
-//! Settings that are not allowed: which one, what was found, and what would have been accepted. Every settings type
-//! has a `check` that states its ranges, once; the scene file's reader, a view's setters and the f64 twin all call it.
+//! The error for invalid settings: which setting, what was found, and what is allowed. Every settings type has a `check` that states its
+//! ranges once; the scene reader, a view's setters and the f64 reference all call it.
 
 use std::fmt;
 use std::ops::{Bound, RangeBounds};
 
 use glam::DVec3;
 
-/// A setting that is not allowed.
+/// A setting with an invalid value.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{key}: found {found}, allowed: {allowed}")]
 #[non_exhaustive]
 pub struct SettingError {
-    /// The scene file's key, elements counted from 0: `camera.up`, `transfer.opacity[2][1]`; or the parameter, if scene files have no key
-    /// for it. The tables of a label have its number in place of their place in the file: `transfer.label[7].opacity`.
+    /// The scene file's key, with elements counted from 0 (`camera.up`, `transfer.opacity[2][1]`), or the name of a parameter that scene
+    /// files do not have. The tables of labels have the label's number as their index: `transfer.label[7].opacity`.
     pub key: String,
-    /// What was found there.
+    /// What was found.
     pub found: Found,
-    /// What would have been accepted.
+    /// What is allowed.
     pub allowed: Allowed,
 }
 
@@ -26,7 +26,7 @@ impl SettingError {
     }
 }
 
-/// What was found in place of what is allowed.
+/// The value that was found.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Found {
@@ -81,7 +81,7 @@ impl From<String> for Found {
     }
 }
 
-/// What a setting may be.
+/// The values that are allowed.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Allowed {
@@ -126,7 +126,7 @@ pub struct Interval {
     pub min: Bound<f64>,
     /// The upper bound.
     pub max: Bound<f64>,
-    /// What the numbers are, for messages: `a number`, `degrees`.
+    /// The noun for the numbers in messages: `a number`, `degrees`.
     noun: &'static str,
 }
 
@@ -135,21 +135,21 @@ impl Interval {
     pub(crate) const FINITE: Self = Self::new(Bound::Unbounded, Bound::Unbounded);
     pub(crate) const POSITIVE: Self = Self::new(Bound::Excluded(0.0), Bound::Unbounded);
     pub(crate) const NOT_NEGATIVE: Self = Self::new(Bound::Included(0.0), Bound::Unbounded);
-    /// Opacities and colours.
+    /// The range of opacities and colours.
     pub(crate) const SHARE: Self = Self::new(Bound::Included(0.0), Bound::Included(1.0));
-    /// Opacities that have to be reached.
+    /// The range of opacity thresholds.
     pub(crate) const THRESHOLD: Self = Self::new(Bound::Excluded(0.0), Bound::Included(1.0));
 
     pub(crate) const fn new(min: Bound<f64>, max: Bound<f64>) -> Self {
         Self { min, max, noun: "a number" }
     }
 
-    /// The same range of numbers that are called something else.
+    /// The same range with another noun.
     pub(crate) const fn of(self, noun: &'static str) -> Self {
         Self { noun, ..self }
     }
 
-    /// Whether a number lies in the range; NaN and infinite ones never do.
+    /// Whether a number lies in the range; NaN and infinite numbers never do.
     pub fn contains(&self, number: f64) -> bool {
         number.is_finite() && (self.min, self.max).contains(&number)
     }
@@ -159,12 +159,12 @@ impl Interval {
         if self.contains(number) { Ok(()) } else { Err(SettingError::new(key, number, self)) }
     }
 
-    /// Checks the number under a key, if there is one.
+    /// Checks the number under a key, if it is present.
     pub(crate) fn check_given(self, key: &str, number: Option<f64>) -> Result<(), SettingError> {
         number.map_or(Ok(()), |number| self.check(key, number))
     }
 
-    /// Checks each of the numbers under a key.
+    /// Checks each number in the array under a key.
     pub(crate) fn check_each(self, key: &str, numbers: &[f64]) -> Result<(), SettingError> {
         match numbers.iter().position(|&number| !self.contains(number)) {
             Some(at) => Err(SettingError::new(format!("{key}[{at}]"), numbers[at], self)),
@@ -190,14 +190,14 @@ impl fmt::Display for Interval {
     }
 }
 
-/// A bound, to two digits if it takes many.
+/// A bound, rounded to two digits if it has many.
 fn brief(bound: f64) -> String {
     const LONGEST: usize = 8;
     let text = short(bound);
     if text.len() <= LONGEST { text } else { format!("{bound:.1e}") }
 }
 
-/// A number as people write it.
+/// A number in its shortest usual notation.
 fn short(number: f64) -> String {
     let text = format!("{number:?}");
     match text.strip_suffix(".0") {
@@ -206,7 +206,7 @@ fn short(number: f64) -> String {
     }
 }
 
-/// Checks a vector of which only the direction counts.
+/// Checks a vector of which only the direction matters.
 pub(crate) fn check_direction(key: &str, vector: DVec3) -> Result<(), SettingError> {
     Interval::FINITE.check_each(key, &vector.to_array())?;
     if vector == DVec3::ZERO {
@@ -215,8 +215,8 @@ pub(crate) fn check_direction(key: &str, vector: DVec3) -> Result<(), SettingErr
     Ok(())
 }
 
-/// A vector of the same direction whose length's square, and that of a product of two such vectors, is in the range of `f64`: the vector
-/// itself if it is.
+/// A vector of the same direction, scaled if necessary so that its squared length, and that of a product of two such vectors, is in the
+/// range of `f64`.
 pub(crate) fn scaled(vector: DVec3) -> DVec3 {
     let largest = vector.abs().max_element();
     if (1e-60..1e60).contains(&largest) { vector } else { vector / largest }

@@ -1,12 +1,12 @@
-//! Whole frames against the f64 twin: PSNR and the largest single error, over slab widths, radii, spacings, directions and
-//! compositings. `cargo test --release --test accuracy -- --nocapture` prints what was measured as a table.
+//! Whole frames against the f64 evaluation: PSNR and the largest single error, over slab widths, radii, spacings, directions and
+//! compositings. `cargo test --release --test accuracy -- --nocapture` prints the measurements as a table.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
 mod common;
 
 use glam::DVec3;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::reference;
 use sheetsplat::settings::{Compositing, FootprintForm, Rasterizer};
 use sheetsplat::volume::builtin;
@@ -16,8 +16,8 @@ use common::compare::assert_at_least;
 use common::images::{largest_difference, psnr};
 use common::{camera, scene, transfer};
 
-/// What a sheet is made of and drawn into, and the PSNR that is asked for at every spacing, dB. Tiles have their sheets in registers, and
-/// amounts that are not rounded to f16.
+/// The rasterizer, the footprint form, the sheet format, and the PSNR in dB that is required at every spacing. Tiles have their sheets in
+/// registers, and amounts that are not rounded to f16.
 const VARIANTS: [(&str, Rasterizer, FootprintForm, TextureFormat, [f64; SPACINGS.len()]); 4] = [
     ("summed-area, tiles", Rasterizer::Tiles, FootprintForm::SummedArea, TextureFormat::Rgba32Float, [111.0; 4]),
     ("summed-area, Rgba32Float", Rasterizer::Quads, FootprintForm::SummedArea, TextureFormat::Rgba32Float, [88.0; 4]),
@@ -42,7 +42,7 @@ const DIRECTIONS: [[f64; 3]; 3] = [[0.0, 1.0, 0.0], [0.3, 0.8, -0.5], [-0.7, 0.2
 const RADII: [f64; 2] = [1.4, 2.0];
 const SLAB_WIDTHS: [f64; 4] = [0.5, 1.0, 2.0, 3.0];
 
-/// The worst of some images.
+/// The worst results of some images.
 #[derive(Clone, Copy, Debug)]
 struct Worst {
     psnr: f64,
@@ -52,20 +52,20 @@ struct Worst {
 impl Worst {
     const NONE: Self = Self { psnr: f64::INFINITY, error: 0.0 };
 
-    /// Neither is NaN: the helpers that measure them assert that.
+    /// Neither number is NaN: the helpers that measure them assert that.
     fn and(self, other: Self) -> Self {
         Self { psnr: self.psnr.min(other.psnr), error: self.error.max(other.error) }
     }
 }
 
 #[test]
-fn psnr_against_the_twin() {
+fn psnr_against_the_reference() {
     let devices =
-        VARIANTS.map(|(_, _, _, format, _)| Headless::new(&common::lavapipe().with_sheet_format(format)).unwrap());
+        VARIANTS.map(|(_, _, _, format, _)| GpuHeadless::new(&common::lavapipe().with_sheet_format(format)).unwrap());
     let head = builtin::volume("head:24").unwrap();
-    // A translucent skin and a denser skull, shaded: gradients of many lengths and sums of many sheets.
+    // A translucent skin and a denser skull, shaded, give gradients of many lengths and sums of many sheets.
     let mut scene = scene(96, 80);
-    // The twin culls nothing; what culling may change is `tests/culling.rs`'s.
+    // The reference culls nothing; `tests/culling.rs` tests what culling may change.
     scene.splatting.culling = false;
     scene.transfer = transfer(
         &[(40.0, [0.9, 0.6, 0.4]), (120.0, [0.8, 0.3, 0.2]), (220.0, [1.0, 1.0, 0.9])],

@@ -1,4 +1,4 @@
-//! What volumes look like where nobody says so: presets, colour maps, labels, and scenes written out.
+//! Appearance chosen for volumes: presets, colour maps, labels, and scenes written out.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
@@ -67,7 +67,7 @@ fn unknown_names_are_refused_with_all_that_there_are() {
     refused("transfer.colormap", &Colormap::ALL.map(|(name, _)| name));
 }
 
-/// Hounsfield units of air, fat, muscle, cancellous and compact bone, in shares of a head's.
+/// Hounsfield units of air, fat, muscle, cancellous and compact bone, in the proportions of a head.
 fn head_in_units() -> Vec<f64> {
     let mut random = Random(11);
     let shares = [(1100, -1000.0), (90, -90.0), (600, 45.0), (120, 420.0), (90, 1200.0)];
@@ -75,7 +75,7 @@ fn head_in_units() -> Vec<f64> {
     shares.into_iter().flat_map(tissue).map(|units| units + random.uniform(-15.0, 15.0)).collect()
 }
 
-/// What is opaque at places of the head: air, muscle and compact bone.
+/// Whether a preset shows air, muscle and compact bone of the head.
 fn opaque(preset: Preset, values: &[f32]) -> [bool; 3] {
     let transfer = preset.transfer(&row(values));
     [100, 1500, 1850].map(|at| transfer.alpha(values[at].into(), 0.0) > 0.4)
@@ -96,7 +96,7 @@ fn ct_presets_find_the_same_tissues_however_units_are_stored() {
         assert_eq!(opaque(Preset::CtBone, &values), [false, false, true], "{name}");
         assert_eq!(opaque(Preset::CtVessels, &values), [false, false, true], "{name}");
     }
-    // Exactly, where they are as they are, and with 1024 added.
+    // Plain units and units with 1024 added are recognised exactly.
     let surface = |values: Vec<f32>| Preset::CtBone.transfer(&row(&values)).opacity.points()[0].0;
     assert_eq!(surface(stored(f64::round)), 150.0);
     assert_eq!(surface(stored(|units| (units + 1024.0).round())), 1174.0);
@@ -125,7 +125,7 @@ fn padding_and_hot_pixels_do_not_move_the_surface() {
     assert!((surface(&values) - plain).abs() < 0.02, "{} {plain}", surface(&values));
 }
 
-/// A block of labels: 3 and 5 side by side in a box of 0, and 4 in a corner.
+/// A volume of labels: 3 and 5 side by side in a box of 0, and 4 in a corner.
 fn three_five() -> Volume {
     let dims = UVec3::new(28, 20, 20);
     let label = |index: u32| {
@@ -154,7 +154,7 @@ fn label_maps_are_told_from_images() {
             assert!(!categories::is_label_map(&volume), "{name}:{size}");
         }
     }
-    // The labels of those that have some, as values.
+    // The labels of segmented volumes, as values.
     for name in ["head:64", "tomato:64"] {
         let volume = builtin::volume(name).unwrap();
         let values = volume.labels().unwrap().iter().map(|&label| f32::from(label)).collect();
@@ -163,7 +163,7 @@ fn label_maps_are_told_from_images() {
             "{name}"
         );
     }
-    // A dim image: few values, but each beside any other. And what is not whole.
+    // A dim image has few values, but each is next to any other. Values that are not whole are no labels either.
     let mut random = Random(3);
     let dims = UVec3::splat(20);
     let noise = (0..8000).map(|_| random.uniform(0.0, 4.0).floor() as f32).collect();
@@ -205,7 +205,7 @@ fn labels_have_colours_of_their_own() {
     assert_eq!((transfer.alpha(0.0, 0.0), transfer.alpha(3.0, 0.0)), (0.0, 0.9));
 }
 
-/// Where 3 meets 5, all colours are mixtures of the two; nothing is of 4's.
+/// Where 3 meets 5, all colours are mixtures of the two, without the colour of 4.
 #[test]
 fn the_border_of_two_labels_has_no_third_colour() {
     let gpu = gpu();
@@ -241,7 +241,7 @@ fn the_labels_preset_colours_segments_too() {
     scene.transfer.check_volume(&volume).unwrap();
     let transfer = scene.transfer.resolve(&volume);
     assert_eq!(transfer.tables(Some(5)).color.at(200.0), categories::color(5));
-    // What a table of the scene's leaves out.
+    // The preset fills in what a table of the scene omits.
     assert_eq!(transfer.tables(Some(2)).opacity, &Ramp::new(vec![(0.0, 0.5)]).unwrap());
     assert_eq!(transfer.tables(Some(2)).color.at(1.0), categories::color(2));
     assert!(transfer.tables(Some(0)).visible);
@@ -249,7 +249,10 @@ fn the_labels_preset_colours_segments_too() {
 
     let message =
         builtin_scene("cube:8", &["preset=labels"]).transfer.check_volume(&row(&[0.5, 1.0])).unwrap_err().to_string();
-    assert!(message.starts_with("preset: found labels for a volume that has none, allowed: values that"), "{message}");
+    assert!(
+        message.starts_with("preset: found labels, for a volume without labels, allowed: values that"),
+        "{message}"
+    );
     let labels = Labels {
         origin: "l".to_owned(),
         dims: UVec3::new(2, 1, 1),
@@ -272,10 +275,10 @@ fn a_colour_map_spans_what_shows_and_keeps_the_opacity() {
     };
     let transfer = resolved("viridis");
     assert_eq!(transfer.opacity, Ramp::new(vec![(199.5, 0.0), (250.0, 0.5)]).unwrap());
-    // 200 to 799 show, half a hundredth of them beyond each end.
+    // 200 to 799 are visible, half a percent of them beyond each end.
     assert_eq!(shown_range(&volume, &transfer), Some([203.0, 796.0]));
     let rgb = |r: u32, g: u32, b: u32| DVec3::new(r.into(), g.into(), b.into()) / 255.0;
-    // As they are published.
+    // The colours as published.
     for (map, low, middle, high) in [
         ("viridis", rgb(68, 1, 84), rgb(33, 145, 140), rgb(253, 231, 37)),
         ("magma", rgb(0, 0, 4), rgb(183, 55, 121), rgb(252, 253, 191)),
@@ -328,7 +331,7 @@ fn an_xray_along_an_axis_reaches_white_and_no_more() {
     }
 }
 
-/// A bright ball behind a dim wall: the brightest value along the ray shows, whatever is in front of it.
+/// A bright ball behind a dim wall: the maximum along the ray shows through anything in front of it.
 #[test]
 fn a_mip_shows_the_brightest_value() {
     let gpu = gpu();
@@ -360,7 +363,7 @@ fn every_preset_shows_something_of_every_builtin() {
             let scene = builtin_scene(name, &[&format!("preset={preset}"), "image.width=64", "image.height=64"]);
             let rendering = gpu.render(&scene).unwrap();
             let lit = rendering.image.pixels.iter().filter(|pixel| pixel[..3].iter().any(|&c| c > 0.1)).count();
-            // Vessels are few where there is no contrast agent, and thin branches faint where all is added up.
+            // Without contrast agent few vessels are visible, and thin branches are faint in a sum.
             let least = match kind {
                 Preset::CtVessels => 20,
                 Preset::Xray => 40,
@@ -371,7 +374,7 @@ fn every_preset_shows_something_of_every_builtin() {
     }
 }
 
-/// Scenes with every kind of thing in them.
+/// Scenes that together use every kind of setting.
 fn many_scenes() -> Vec<Scene> {
     let image = "image={width=41,height=33,background=[0.1,0.2,0.3,0.5]}";
     let mut scenes = vec![
@@ -432,7 +435,7 @@ fn many_scenes() -> Vec<Scene> {
     scenes.push(from_file);
     scenes.extend(Preset::ALL.map(|(name, _)| builtin_scene("head:24", &[image, &format!("preset={name}")])));
     scenes.extend(
-        // A builtin volume has no file, so no palette.
+        // A builtin volume has no file, and so no palette.
         Colormap::ALL[..8]
             .iter()
             .map(|(name, _)| builtin_scene("nerve:40", &[image, &format!("transfer.colormap={name}")])),
@@ -482,10 +485,10 @@ fn paths_are_written_as_they_are_found_from_the_folder() {
     }
     let mut scene = Scene::new(VolumeSource::File(root.join("a/../data/v.nrrd")));
     scene.labels = Some(root.join("a/b/l.nrrd"));
-    // Absolute ones stay.
+    // Absolute paths stay.
     let read = |text: &str, folder: &Path| Scene::parse(text, "scene.toml", folder, &[]).unwrap();
     assert_eq!(read(&scene.to_toml(&root.join("a")).unwrap(), Path::new("x")), scene);
-    // Relative ones lead to the same files.
+    // Relative paths lead to the same files.
     let here = std::env::current_dir().unwrap();
     let up: std::path::PathBuf = here.components().skip(1).map(|_| "..").collect();
     scene.volume = VolumeSource::File(up.join(root.join("data/v.nrrd").strip_prefix("/").unwrap()));

@@ -1,4 +1,4 @@
-//! The procedural volumes: sizes, scaling, determinism and what is in them.
+//! The procedural volumes: sizes, scaling, determinism and contents.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -25,7 +25,7 @@ fn assert_bytes(volume: &Volume) {
     assert!(volume.values().iter().all(|value| (0.0..=255.0).contains(value) && value.fract() == 0.0));
 }
 
-/// What is wrong with a name: the origin, the field, what was found and what is allowed.
+/// The parts of the error about a name: the origin, the field, what was found and what is allowed.
 fn complaint(name: &str) -> [String; 4] {
     match builtin::volume(name).unwrap_err() {
         VolumeError::Invalid { origin, field, found, allowed, .. } => [origin, field, found, allowed],
@@ -63,7 +63,7 @@ fn scaling_keeps_the_extent() {
             assert_eq!(volume.dims().max_element(), n, "{name}:{n}");
             for (axis, extent) in extent.into_iter().enumerate() {
                 let (voxels, wanted) = (f64::from(volume.dims()[axis]), extent / volume.spacing()[axis]);
-                // At least one voxel, however thin.
+                // Every dimension has at least one voxel.
                 assert!((voxels - wanted.max(1.0)).abs() <= 0.5 + 1e-9, "{name}:{n}: {voxels} voxels for {wanted}");
             }
         }
@@ -108,12 +108,12 @@ fn head_has_its_tissues() {
         let found = fraction(&head, value - 8.0, value + 8.0);
         assert!(found > low && found < 0.1, "{tissue} {found}");
     }
-    // Before the forehead, and one sample of what is deep inside.
+    // A sample in front of the forehead, and one in each of the inner tissues.
     assert_eq!(at(&head, [0.0, -75.0, 30.0]), 0.0);
     assert_eq!(at(&head, [21.0, -48.6, 3.8]), 245.0, "eye");
     assert_eq!(at(&head, [11.4, 17.8, 33.0]), 40.0, "ventricle");
     assert_eq!(at(&head, [0.0, 0.0, -72.0]), 0.0, "windpipe");
-    // The face looks towards -y: of the skin in the middle plane, the tip of the nose is foremost.
+    // The face looks towards -y: in the middle plane the tip of the nose is the foremost skin.
     let y_of_first = |z: f64| {
         let found = (0..256).map(|y| f64::from(y) - 127.5).find(|&y| at(&head, [0.0, y, z]) > 45.0);
         found.unwrap()
@@ -134,10 +134,10 @@ fn head_is_symmetric() {
     }
 }
 
-/// What a label means, and the values of its tissue where there is nothing else.
+/// A label's name, and the values inside its tissue.
 type Tissue = (&'static str, &'static [f32]);
 
-/// The builtin volumes that are segmented, and their tissues by label.
+/// The segmented builtin volumes, and their tissues by label.
 const TISSUES: [(&str, &[Tissue]); 2] = [
     (
         "head",
@@ -165,7 +165,7 @@ const TISSUES: [(&str, &[Tissue]); 2] = [
     ),
 ];
 
-/// Every label is there and names its tissue: it lies wherever a voxel and its neighbours have that tissue's value.
+/// Every label exists and names its tissue: it covers every voxel that, like its neighbours, has that tissue's value.
 #[test]
 fn labels_are_the_tissues() {
     for (name, tissues) in TISSUES {
@@ -196,7 +196,7 @@ fn labels_are_the_tissues() {
     assert_eq!(builtin::labels("skull"), None);
 }
 
-/// From outside, in rows along y above the face, where no bone is near: the skin begins where it fills half of a voxel.
+/// In rows along y from outside, above the face, where no bone is near, the skin begins where it fills half a voxel.
 #[test]
 fn a_label_begins_half_way() {
     let head = volume("head");
@@ -224,7 +224,7 @@ fn nerve_is_sparse() {
     let cell = 1.0 - fraction(&nerve, 0.0, 0.0);
     assert!((0.01..0.05).contains(&cell), "cell {cell}");
     assert_eq!(at(&nerve, [-20.0, -10.0, 0.0]), 250.0, "cell body");
-    // Dendrites everywhere around the cell body, and darker than it.
+    // Dendrites surround the cell body and are darker than it.
     let dims = nerve.dims();
     let mut brightest = [0.0_f32; 8];
     for index in 0..dims.element_product() {
@@ -266,7 +266,7 @@ fn marschner_lobb_is_its_formula() {
         let expected = 255.0 * (1.0 - (FRAC_PI_2 * z).sin() + 0.25 * (1.0 + ripple)) / 2.5;
         assert!((f64::from(volume.value(voxel.into())) - expected).abs() < 1e-4, "{voxel:?}");
     }
-    // Not rounded to whole numbers.
+    // Values are not rounded to whole numbers.
     assert!(volume.values().iter().filter(|value| value.fract() != 0.0).count() > volume.values().len() / 2);
 }
 

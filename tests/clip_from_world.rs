@@ -16,7 +16,7 @@ use common::Random;
 const SIZE: [u32; 2] = [1920, 1080];
 const ASPECT: f64 = 1920.0 / 1080.0;
 
-/// Where a host's viewport has a point, and its clip space's w.
+/// The pixel of a point in a host's viewport, and its w in clip space.
 fn pixel(clip_from_world: &DMat4, point: DVec3) -> (DVec2, f64) {
     let clip = *clip_from_world * point.extend(1.0);
     let ndc = clip.truncate().truncate() / clip.w;
@@ -30,7 +30,7 @@ fn near(camera: &Camera) -> Option<f64> {
     }
 }
 
-/// A host's look at a volume that is turned, moved and scaled in its scene; and the scale.
+/// A host's view of a volume that is rotated, moved and scaled in its scene; and the scale.
 fn random_placed(random: &mut Random) -> (DMat4, DMat4, f64) {
     let scale = random.uniform(0.2, 5.0);
     let rotation = DQuat::from_axis_angle(random.direction(), random.uniform(0.0, 6.0));
@@ -61,7 +61,7 @@ fn points_fall_on_the_hosts_pixels() {
             (proj::orthographic(-right, right, -top, top, f, n), None),
         ];
         for (projection, n) in projections {
-            // Homogeneous: any factor is the same mapping.
+            // Matrices are homogeneous: any factor gives the same mapping.
             let clip_from_world = projection * view * world * random.uniform(0.5, 2.0);
             let camera = Camera::from_clip_from_world(clip_from_world, SIZE).unwrap();
             let plane = n.map(|n| n / scale);
@@ -86,7 +86,7 @@ fn points_fall_on_the_hosts_pixels() {
     assert!(points > 30_000, "{points} points, {before} before the eye or far off");
 }
 
-/// What f32 leaves of a matrix is still a camera, and to a fraction of a pixel the same.
+/// A matrix rounded to f32 still gives a camera, which is the same to a fraction of a pixel.
 #[test]
 fn matrices_in_f32_are_cameras_too() {
     let mut random = Random(32);
@@ -110,7 +110,7 @@ fn matrices_in_f32_are_cameras_too() {
 }
 
 #[test]
-fn what_is_no_camera_says_what_it_is() {
+fn other_mappings_are_refused_by_kind() {
     let view = view::look_at_mat4(DVec3::new(30.0, 80.0, 20.0), DVec3::ZERO, DVec3::Z);
     let perspective = proj::perspective(0.6, ASPECT, 0.5, 500.0);
     let orthographic = proj::orthographic(-40.0 * ASPECT, 40.0 * ASPECT, -40.0, 40.0, 0.5, 500.0);
@@ -139,7 +139,7 @@ fn what_is_no_camera_says_what_it_is() {
         assert!(error.starts_with("clip_from_world: found ") && error.contains(found), "{found}: {error}");
         assert!(error.contains(", allowed: "), "{error}");
     }
-    // Off centre, but not by more than f32 rounds.
+    // Off centre by less than the rounding errors of f32.
     let hardly = DMat4::from_translation(DVec3::new(1e-7, 0.0, 0.0));
     Camera::from_clip_from_world(hardly * perspective * view, SIZE).unwrap();
     let error = Camera::from_clip_from_world(perspective * view, [1920, 0]).unwrap_err().to_string();

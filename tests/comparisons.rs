@@ -1,4 +1,4 @@
-//! The comparisons that other tests rely on fail where they must: for NaN, for a black image, and for an image that is one pixel off.
+//! The comparisons that other tests rely on fail when they must: for NaN, for a black image, and for an image that is one pixel off.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
@@ -15,10 +15,11 @@ use common::compare::{apart, assert_at_least, assert_at_most, decibels, largest,
 use common::images::{BLACK, color_rms, largest_difference, psnr, rms};
 use common::{scene, transfer};
 
-/// The lowest PSNR that any test asks of two renderings with the same slabs, dB, and the largest difference of any channel that any allows.
+/// The lowest PSNR in dB that any test requires of two renderings with the same slabs, and the largest difference of a channel that any test
+/// allows.
 const WEAKEST: (f64, f64) = (34.0, 0.05);
 
-/// A translucent head, shaded, by the f64 twin.
+/// A translucent, shaded head by the f64 evaluation.
 fn head() -> Image {
     let volume = builtin::volume("head:32").unwrap();
     let mut scene = scene(96, 80);
@@ -38,7 +39,7 @@ fn with_one(value: f32) -> Image {
     image
 }
 
-/// The head one pixel to the right, or further down.
+/// The head one pixel farther to the right or down.
 fn shifted(by: usize) -> Image {
     let mut image = head();
     image.pixels.rotate_right(by);
@@ -50,7 +51,7 @@ fn fails<T>(what: &str, compare: impl FnOnce() -> T + UnwindSafe) {
 }
 
 #[test]
-fn what_is_not_finite_is_never_close() {
+fn numbers_that_are_not_finite_are_never_close() {
     for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         for broken in [filled(value), with_one(value)] {
             for (actual, expected) in [(broken.clone(), head()), (head(), broken.clone()), (broken.clone(), broken)] {
@@ -112,7 +113,7 @@ fn a_black_and_a_shifted_image_pass_no_test() {
         fails(name, || assert_at_least(decibels, least, ""));
         fails(name, || assert_at_most(difference, most, ""));
     }
-    // Images of nothing are not compared where something must be seen.
+    // Empty images are not compared where something must be visible.
     let nothing = [BLACK; 100];
     assert_eq!(psnr(&nothing, &nothing, BLACK, 0), f64::INFINITY);
     fails("nothing", move || psnr(&nothing, &nothing, BLACK, 1));

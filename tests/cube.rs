@@ -1,5 +1,5 @@
-//! Figs. 3 and 6: a cube seen at 44.8° and 45.2°, where axis-aligned sheets change their axis and image-aligned ones hardly change.
-//! `cargo test --release --test cube -- --nocapture` prints what was measured.
+//! Figs. 3 and 6: a cube seen at 44.8° and 45.2°, between which axis-aligned sheets change their axis and image-aligned ones hardly change.
+//! `cargo test --release --test cube -- --nocapture` prints the measurements.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
@@ -19,7 +19,7 @@ use common::{gpu, scene, transfer};
 
 const SIZE: u32 = 256;
 
-/// Opacity 0.5 per unit, and nothing but diffuse light on both faces.
+/// Opacity 0.5 per unit, with only diffuse light on both faces.
 fn cube() -> (Volume, Scene) {
     let mut scene = scene(SIZE, SIZE);
     scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (255.0, 0.5)]);
@@ -27,7 +27,7 @@ fn cube() -> (Volume, Scene) {
     (builtin::volume("cube").unwrap(), scene)
 }
 
-/// The mean red of a face, away from its edges: it reaches 22 units to a side and 16 up and down.
+/// The mean red of a face away from its edges; the face extends 22 units to a side and 16 up and down.
 fn face(image: &Image, side: f64, pixels_per_unit: f64) -> f64 {
     let reds = image.pixels.iter().zip(0..).filter_map(|(pixel, at)| {
         let x = side * (f64::from(at % SIZE) - 127.5) / pixels_per_unit;
@@ -38,7 +38,7 @@ fn face(image: &Image, side: f64, pixels_per_unit: f64) -> f64 {
     sum / count
 }
 
-/// The difference of the two views, and how much brighter the face is that looks a little more towards the light.
+/// The difference between the two views, and the brightness ratio of the face that looks slightly more towards the light.
 struct Turned {
     rms: f64,
     ratio: f64,
@@ -73,7 +73,7 @@ fn the_cube_does_not_pop() {
     };
     let twin =
         |volume: &Volume, scene: &Scene| reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap();
-    // The faces look 44.8° and 45.2° away from the light.
+    // The faces are turned 44.8° and 45.2° from the light.
     let cosines = 44.8_f64.to_radians().cos() / 45.2_f64.to_radians().cos();
     let (volume, mut scene) = cube();
     let by_all = |scene: &Scene| {
@@ -85,7 +85,7 @@ fn the_cube_does_not_pop() {
     };
     for (name, Turned { rms, ratio }) in by_all(&scene) {
         assert_at_most(rms, 0.003, name);
-        // Along the flatter of two rays more of the lit layer lies before the dark inside, which takes off some of the ratio.
+        // Along the flatter of two rays more of the lit layer lies before the dark inside, which reduces the ratio slightly.
         assert!(1.0 < ratio && ratio < cosines, "{name}: {ratio}");
     }
     scene.splatting.method = Method::AxisAligned;
@@ -99,7 +99,7 @@ fn the_cube_does_not_pop() {
         assert_at_most(rms, 0.00165, name);
         assert!(1.0027 < ratio && ratio < cosines, "{name}: {ratio}");
     }
-    // A lit layer that hides all behind it.
+    // A lit layer that hides everything behind it.
     scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0), (255.0, 1.0)]).unwrap());
     for (name, Turned { ratio, .. }) in by_all(&scene) {
         assert_at_most((ratio / cosines - 1.0).abs(), 0.0006, name);

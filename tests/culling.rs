@@ -1,4 +1,4 @@
-//! Early splat elimination, tiles and sheet groups (SPEC §6): they change what a frame costs, not what it shows.
+//! Early splat elimination, tiles and sheet groups (SPEC §6): they change the cost of a frame, not the image.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -6,7 +6,7 @@
 mod common;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::{Headless, Rendering};
+use sheetsplat::headless::{GpuHeadless, Rendering};
 use sheetsplat::internals::reference;
 use sheetsplat::internals::reference::visibility::Test;
 use sheetsplat::scene::{Scene, VolumeSource};
@@ -20,14 +20,14 @@ use common::compare::assert_at_most;
 use common::images::largest_difference;
 use common::{FORMS, RASTERIZERS, Random, SPACINGS, camera, lavapipe, random_eye, random_volume, scene, transfer};
 
-/// What f32 and f16 arithmetic may differ by between two ways to the same image: amounts are f16, but the same ones; sums of
-/// a few hundred f32 terms of at most 1 differ by some 1e-5.
+/// The rounding errors of f32 and f16 between two ways to the same image: amounts are the same f16 numbers; sums of a few hundred f32 terms
+/// of at most 1 differ by some 1e-5.
 const ROUNDING: f64 = 2e-5;
 
-fn headless(sheets_per_group: Option<u32>) -> Headless {
+fn headless(sheets_per_group: Option<u32>) -> GpuHeadless {
     let mut options = lavapipe();
     options.sheets_per_group = sheets_per_group;
-    Headless::new(&options).unwrap()
+    GpuHeadless::new(&options).unwrap()
 }
 
 /// A volume and a view of it, orthographic or in perspective, with sheets parallel to the image or slices.
@@ -39,7 +39,7 @@ fn random_case(random: &mut Random) -> (Volume, Scene) {
     match random.bits() % 4 {
         0 => {}
         1 => {
-            // Close by: the object reaches beyond every edge of the image.
+            // Close by: the object extends beyond every edge of the image.
             scene.camera.projection = Projection::Orthographic { height: Some(12.0) };
             scene.camera.center = Some(random.within(DVec3::splat(-4.0), DVec3::splat(4.0)));
         }
@@ -56,11 +56,11 @@ fn random_case(random: &mut Random) -> (Volume, Scene) {
     (volume, scene)
 }
 
-fn render(headless: &Headless, volume: &Volume, scene: &Scene) -> Rendering {
+fn render(headless: &GpuHeadless, volume: &Volume, scene: &Scene) -> Rendering {
     headless.render_volume(volume.clone(), scene).unwrap()
 }
 
-/// How voxels are drawn, and how they are tested for being hidden.
+/// The ways to draw voxels, and to test whether they are hidden.
 fn ways() -> impl Iterator<Item = (Rasterizer, FootprintForm, FootprintBox)> {
     let parallelogram = (Rasterizer::Tiles, FootprintForm::SummedArea, FootprintBox::Parallelogram);
     FORMS.into_iter().map(|(rasterizer, form)| (rasterizer, form, FootprintBox::Rectangle)).chain([parallelogram])
@@ -117,7 +117,7 @@ fn groups_change_nothing_but_rounding() {
         let (volume, mut scene) = random_case(&mut random);
         scene.splatting.culling = false;
         scene.splatting.rasterizer = Rasterizer::Quads;
-        // Of two stored sections that are equally near f32 picks one.
+        // For two stored sections that are equally near, f32 decides.
         scene.splatting.footprint = FootprintForm::SummedArea;
         let [one, two, four] = [0, 1, 2].map(|at| render(&renderers[at], &volume, &scene));
         for (few, many) in [(&one, &two), (&two, &four)] {
@@ -149,9 +149,9 @@ fn culled_frames_are_byte_identical() {
     }
 }
 
-/// The GPU lets through what the exact test of every section's own box lets through, and little more: the sheets of a group are tested
-/// at once, in perspective with one box for all. Where slices are slanted before an eye, that is the box of their nearest corner, far larger
-/// than most.
+/// The GPU draws what the exact test of every section's own box lets through, and little more: the sheets of a group are tested at once, in
+/// perspective with one box for all. For slices that are slanted in perspective this is the box of their nearest corner, which is far
+/// larger than most.
 #[test]
 fn culling_is_nearly_exact() {
     let headless = headless(None);
@@ -177,7 +177,7 @@ fn culling_is_nearly_exact() {
     }
 }
 
-/// Fig. 13: around a footprint the parallelogram holds no more pixels than matter, and fewer than the rectangle where the grid is
+/// Fig. 13: the parallelogram around a footprint contains only pixels that matter, and fewer than the rectangle where the grid is
 /// anisotropic and seen obliquely.
 #[test]
 fn the_parallelogram_hides_more() {
@@ -204,7 +204,7 @@ fn the_parallelogram_hides_more() {
     }
 }
 
-/// Fig. 10's test costs nothing visible, Fig. 11a's shows errors.
+/// Fig. 10's test has no visible effect; Fig. 11a's shows errors.
 #[test]
 fn the_papers_simpler_tests() {
     let volume = builtin::volume("head:48").unwrap();
@@ -221,8 +221,8 @@ fn the_papers_simpler_tests() {
     assert!(by_center > 2.0 * allowed, "the centre's pixel alone is off by {by_center} only");
 }
 
-/// Fig. 13: what the rectangle costs. Ours bounds the footprint, not the parallelogram around it, so that it can be the tighter of
-/// the two by a little. Both keep the guarantee.
+/// Fig. 13: the cost of the rectangle. Ours bounds the footprint, not the parallelogram around it, so it can be slightly the tighter of the
+/// two. Both keep the guarantee.
 #[test]
 fn what_the_rectangle_costs() {
     let volume = builtin::volume("head:40").unwrap();
@@ -254,8 +254,7 @@ fn what_the_rectangle_costs() {
     assert!(costs.iter().any(|&cost| cost > 1.01), "{costs:?}");
 }
 
-/// The paper's bounding box suits what is in one place, its tiles what is dispersed, and its counters say how few splats a tile
-/// has seen.
+/// The paper's bounding box suits compact objects, its tiles dispersed ones, and its counters bound how opaque a tile can be.
 #[test]
 fn tiles_and_the_bounding_box() {
     let volume = |voxels: &[UVec3]| {
@@ -274,13 +273,13 @@ fn tiles_and_the_bounding_box() {
         let volume = volume(voxels);
         reference::render_culled(&volume, &scene.transfer.resolve(&volume), &scene, Some(Test::Box)).unwrap().areas
     };
-    // Two pixels a voxel: the footprint reaches 4 pixels from its centre. In the middle of a tile; four slabs.
+    // At two pixels per voxel the footprint reaches 4 pixels from its centre. It lies in the middle of a tile, in four slabs.
     let inside = UVec3::new(8, 1, 91);
     let one = areas(&[inside]);
     assert_eq!((one.bounding_box, one.tiles, one.counted_tiles), (4 * 8 * 8, 4 * 32 * 32, 0));
     let two = areas(&[inside, UVec3::new(88, 1, 11)]);
     assert_eq!((two.bounding_box, two.tiles, two.counted_tiles), (4 * 168 * 168, 2 * 4 * 32 * 32, 0));
-    // A tile of 32×32 pixels needs 13 splats of 9×9. Sheet by sheet it has seen 16 voxels more.
+    // A tile of 32×32 pixels needs 13 splats of 9×9. Sheet by sheet, it receives 16 more voxels.
     let block: Vec<UVec3> = (0..16).map(|i| UVec3::new(7 + i % 4, 1, 90 + i / 4)).collect();
     let many = areas(&block);
     assert_eq!((many.tiles, many.counted_tiles), (4 * 32 * 32, 4 * 32 * 32));
@@ -288,7 +287,7 @@ fn tiles_and_the_bounding_box() {
     assert_eq!((few.tiles, few.counted_tiles), (4 * 32 * 32, 32 * 32));
 }
 
-/// Timing changes no image, and there are times for every stage, also where a frame has more passes than a query set has queries.
+/// Timing does not change the image, and every stage has a time, even if a frame has more passes than a query set has queries.
 #[test]
 fn profiled_frames() {
     let volume = builtin::volume("head:64").unwrap();
@@ -296,8 +295,8 @@ fn profiled_frames() {
     scene.camera = Camera::default();
     (scene.image.width, scene.image.height) = (40, 40);
     scene.splatting.slab_width = 0.05;
-    let devices =
-        [false, true].map(|profile| Headless::new(&lavapipe().with_sheets_per_group(1).with_profile(profile)).unwrap());
+    let devices = [false, true]
+        .map(|profile| GpuHeadless::new(&lavapipe().with_sheets_per_group(1).with_profile(profile)).unwrap());
     for (rasterizer, stages) in [
         (Rasterizer::Quads, &["composite", "cull", "resolve", "splat"][..]),
         (Rasterizer::Tiles, &["gather", "resolve"]),

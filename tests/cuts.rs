@@ -1,6 +1,6 @@
-//! Clip planes, a host's surfaces, and first hits (SPEC is silent; `clip`, `surfaces`): by each rasterizer against the f64 twin, with
-//! culling, against a ray march, and what lists and errors make of them. `cargo test --release --test cuts -- --nocapture` prints what
-//! was measured.
+//! Clip planes, a host's surfaces, and first hits (SPEC is silent; `clip`, `surfaces`): each rasterizer against the f64 evaluation, with
+//! culling, against a ray march, with changing lists, and with errors. `cargo test --release --test cuts -- --nocapture` prints the
+//! measurements.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
@@ -12,7 +12,7 @@ use glam::{DVec3, UVec2, UVec3};
 use sheetsplat::settings::Clip;
 use sheetsplat::settings::Projection;
 
-use sheetsplat::headless::{Headless, readback};
+use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference::{self, Host, ray_march};
 use sheetsplat::internals::view_geometry::ViewGeometry;
@@ -46,13 +46,13 @@ fn random_case(random: &mut Random) -> (Volume, Scene) {
     (volume, scene)
 }
 
-/// Up to six planes through the volume, and now and then a box.
+/// Up to six planes through the volume, and sometimes a box.
 fn random_clip(random: &mut Random, grid: &Grid) -> Clip {
     let half = grid.center() * grid.spacing;
     let plane = |random: &mut Random| {
         let normal = random.direction() * random.uniform(0.1, 5.0);
         let through = random.within(-half, half) * 0.6;
-        // The side that the centre is on, mostly.
+        // The plane mostly keeps the side with the centre.
         let d = -normal.dot(through);
         let sign = if d < 0.0 && !random.bits().is_multiple_of(4) { -1.0 } else { 1.0 };
         [normal.x * sign, normal.y * sign, normal.z * sign, d * sign]
@@ -66,7 +66,7 @@ fn random_clip(random: &mut Random, grid: &Grid) -> Clip {
     Clip { planes, crop }
 }
 
-/// Depths of a host's wavy surface around the volume's middle, with holes.
+/// The depths of a host's wavy surface around the volume's middle, with gaps.
 fn random_surface(random: &mut Random, view: &ViewGeometry, unit: f64) -> Vec<f64> {
     let middle = view.rays().depth_of(DVec3::ZERO);
     let size = UVec2::from(view.size);
@@ -86,8 +86,8 @@ fn view_of(volume: &Volume, scene: &Scene) -> ViewGeometry {
     ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, size).unwrap()
 }
 
-/// Draws a frame, with its first hits in `unit`s if they were asked for.
-fn draw(gpu: &Headless, view: &mut SceneView) -> (Image, Vec<f64>, Counts) {
+/// Draws a frame, with its first hits in `unit`s if requested.
+fn draw(gpu: &GpuHeadless, view: &mut SceneView) -> (Image, Vec<f64>, Counts) {
     let rendering = gpu.draw(view).unwrap();
     let unit = view.volume().grid().unit();
     let hits = view.first_hits().map_or(Vec::new(), |texture| {
@@ -98,7 +98,7 @@ fn draw(gpu: &Headless, view: &mut SceneView) -> (Image, Vec<f64>, Counts) {
 }
 
 #[test]
-fn cuts_are_those_of_the_twin() {
+fn cuts_equal_the_reference() {
     let gpu = gpu();
     let mut random = Random(1905);
     let mut worst = [f64::INFINITY; 2];
@@ -106,7 +106,7 @@ fn cuts_are_those_of_the_twin() {
     for case in 0..40 {
         let (volume, mut scene) = random_case(&mut random);
         scene.splatting.culling = false;
-        // As few pipelines as show everything.
+        // The number of pipelines is kept small.
         scene.splatting.order = if scene.splatting.compositing == Compositing::Exponential {
             Order::BackToFront
         } else {
@@ -140,7 +140,7 @@ fn cuts_are_those_of_the_twin() {
             *worst = worst.min(decibels);
             assert_eq!(hits.len(), expected.first_hits.len());
             let is_close = |(hit, expected): &(&f64, &f64)| {
-                // Infinite where nothing is hit.
+                // The depth is infinite where nothing is hit.
                 hit == expected || (**hit - **expected).abs() / expected.abs().max(10.0) <= 1e-3
             };
             let off = hits.len() - hits.iter().zip(&expected.first_hits).filter(is_close).count();
@@ -155,7 +155,7 @@ fn cuts_are_those_of_the_twin() {
     assert!(changed > 20, "cuts show in {changed} cases only");
 }
 
-/// What lies behind a cut is culled as what lies behind opaque voxels.
+/// Voxels behind a cut are culled like voxels behind opaque ones.
 #[test]
 fn culling_keeps_its_guarantee() {
     let gpu = gpu();
@@ -191,7 +191,7 @@ fn culling_keeps_its_guarantee() {
     assert!(fewer.iter().all(|&fewer| fewer > 11), "culling culls in {fewer:?} of 24 cases");
 }
 
-/// A wall in front of everything hides everything, and costs next to nothing; one behind it all changes nothing.
+/// A wall in front of everything hides everything and costs almost nothing; a wall behind everything changes nothing.
 #[test]
 fn walls() {
     let gpu = gpu();
@@ -226,14 +226,14 @@ fn walls() {
         let [hidden, cut, all] = [&before, &between, &none].map(|(_, _, counts)| counts.sections_rasterized);
         assert!(hidden < all / 10, "{rasterizer:?}: {hidden} sections behind a wall, {all} without");
         assert!(cut <= all);
-        // Through the face.
+        // The wall runs through the face.
         let difference = largest_difference(&between.0, &none.0);
         println!("{rasterizer:?}: {hidden}, {cut}, {all} sections, difference {difference}");
         assert_at_least(difference, 0.5, format_args!("{rasterizer:?}, {projection:?}"));
     }
 }
 
-/// A clipped field is what a ray march through the kept part gathers.
+/// A clipped field equals a ray march through the part that is kept.
 #[test]
 fn cuts_are_exact_along_rays() {
     let gpu = gpu();
@@ -273,7 +273,7 @@ fn cuts_are_exact_along_rays() {
     }
 }
 
-/// A plane that moves is a fresh view, and only voxels that enter or leave are touched.
+/// After a plane has moved, the view equals a fresh one, and only voxels that enter or leave were touched.
 #[test]
 fn moved_planes_are_fresh_ones() {
     let gpu = gpu();
@@ -300,20 +300,20 @@ fn moved_planes_are_fresh_ones() {
         let fresh = draw(&gpu, &mut gpu.view(volume.clone(), &scene).unwrap());
         assert_eq!(changed, fresh, "step {step}: {:?}", scene.clip);
     }
-    // Half a head: what is left.
+    // Half a head is left.
     let touched = view.set_clip(Clip { planes: vec![[0.0, 1.0, 0.0, 0.0]], crop: None }).unwrap();
     let again = view.set_clip(Clip { planes: vec![[0.0, 7.0, 0.0, 0.0]], crop: None }).unwrap();
     assert!(touched.entered + touched.left > 0);
     assert_eq!((again.entered, again.left), (0, 0), "the same plane");
 }
 
-/// What is under the cursor.
+/// Picks find the point under the cursor.
 #[test]
 fn picks() {
     let gpu = gpu();
     let mut values = vec![0.0_f32; 21 * 21 * 21];
     let grid = Grid { dims: UVec3::splat(21), spacing: DVec3::new(1.0, 2.0, 1.0) };
-    // A plate at y = 12, with values that count up along x.
+    // A plate at y = 12, with values that increase along x.
     for (x, z) in (0..21).flat_map(|x| (0..21).map(move |z| (x, z))) {
         values[grid.index_of(UVec3::new(x, 12, z)) as usize] = 100.0 + x as f32;
     }
@@ -332,15 +332,15 @@ fn picks() {
         view.set_first_hit(Some(0.5)).unwrap();
         gpu.draw(&mut view).unwrap();
         let picked = gpu.pick(&view, [13, 6]).unwrap().unwrap();
-        // Kernels reach half the opacity before the plate's middle, by less than a voxel.
+        // The opacity reaches one half before the plate's middle, by less than a voxel.
         assert!((depth - 2.0..depth).contains(&picked.depth), "{projection:?}: {picked:?}, not {depth}");
-        // Orthographic the pixel is the voxel's; in perspective the plate is 21 units across at 10.5 units.
+        // Orthographic, pixels and voxels coincide; in perspective the plate is 21 units across at a depth of 10.5 units.
         assert_eq!((picked.voxel, picked.value), (UVec3::new(13, 12, 14), 113.0), "{projection:?}: {picked:?}");
         let plate = DVec3::new(3.0, 4.0, 4.0);
         assert!((picked.position - plate).abs().cmple(DVec3::new(0.6, 2.0, 0.6)).all(), "{picked:?}");
         let Pick { label, .. } = picked;
         assert_eq!(label, None);
-        // Nothing is as opaque as that beside the plate.
+        // Beside the plate the opacity is not reached.
         scene.camera.center = Some(DVec3::new(100.0, 0.0, 0.0));
         let mut beside = gpu.view(volume.clone(), &scene).unwrap();
         beside.set_first_hit(Some(0.5)).unwrap();
@@ -353,7 +353,7 @@ fn picks() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused() {
+fn unsuitable_surfaces_are_refused() {
     let gpu = gpu();
     let volume = Arc::new(builtin::volume("head:24").unwrap());
     let mut scene = scene(40, 30);

@@ -1,4 +1,4 @@
-//! What the crates that are compiled in demand: licences and sources that `deny.toml` allows, and the compiler that they need.
+//! The requirements of compiled crates: licences and sources that `deny.toml` allows, and the compiler version.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -7,7 +7,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// `cargo metadata`: the packages, and the graph that they are resolved to.
+/// The output of `cargo metadata`: the packages and their resolved graph.
 fn metadata(arguments: &[&str]) -> Value {
     let cargo = Command::new(env!("CARGO"))
         .args(["metadata", "--locked", "--format-version", "1"])
@@ -23,7 +23,7 @@ fn text<'a>(value: &'a Value, key: &str) -> &'a str {
     value[key].as_str().unwrap_or_default()
 }
 
-/// Packages by what identifies them.
+/// Packages by their identifiers.
 fn packages(metadata: &Value) -> BTreeMap<&str, &Value> {
     metadata["packages"].as_array().unwrap().iter().map(|package| (text(package, "id"), package)).collect()
 }
@@ -34,10 +34,9 @@ fn version(text: &str) -> Vec<u32> {
     parts
 }
 
-/// The stated `rust-version` is the highest of all dependencies with the default features: neither a promise that they break, nor more
-/// than they need.
+/// The stated `rust-version` is the highest of all dependencies with the default features: neither too low a promise, nor higher than needed.
 #[test]
-fn the_stated_compiler_is_the_one_that_dependencies_need() {
+fn the_stated_compiler_is_that_of_the_dependencies() {
     let metadata = metadata(&[]);
     let packages = packages(&metadata);
     let nodes = metadata["resolve"]["nodes"].as_array().unwrap();
@@ -62,7 +61,7 @@ fn the_stated_compiler_is_the_one_that_dependencies_need() {
     assert_eq!(version(stated), version(most_version), "{name} needs Rust {most_version}, Cargo.toml says {stated}");
 }
 
-/// Whether an SPDX expression holds if exactly some licences are allowed. `/` is an old way to write `OR`.
+/// Whether an SPDX expression is satisfied by the allowed licences. `/` is an old notation for `OR`.
 fn is_allowed(expression: &str, allowed: &dyn Fn(&str) -> bool) -> bool {
     let spaced = expression.replace('/', " OR ").replace('(', " ( ").replace(')', " ) ");
     let mut words = spaced.split_whitespace().peekable();
@@ -115,7 +114,7 @@ fn expressions_of_licences() {
     }
 }
 
-/// `cargo deny` checks more, where it is installed; this much is checked everywhere.
+/// `cargo deny` checks more where it is installed; this part is checked everywhere.
 #[test]
 fn licences_and_sources_are_allowed() {
     let policy = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("deny.toml")).unwrap();
@@ -148,4 +147,31 @@ fn licences_and_sources_are_allowed() {
         used.extend(exceptions.contains_key(name).then_some(name));
     }
     assert_eq!(used, exceptions.keys().copied().collect(), "exceptions for crates that are not there");
+}
+
+/// Tests that render on the processor compile neither wgpu nor naga, nor the program's crates.
+#[test]
+fn the_native_backend_needs_no_wgpu() {
+    let cargo = Command::new(env!("CARGO"))
+        .args([
+            "tree",
+            "--locked",
+            "--edges",
+            "normal",
+            "--prefix",
+            "none",
+            "--no-default-features",
+            "--features",
+            "cpu,golden",
+        ])
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .unwrap();
+    assert!(cargo.status.success(), "{}", String::from_utf8_lossy(&cargo.stderr));
+    let tree = String::from_utf8(cargo.stdout).unwrap();
+    let names: BTreeSet<&str> = tree.lines().filter_map(|line| line.split(' ').next()).collect();
+    assert!(names.contains("fearless_simd") && names.contains("png"), "{names:?}");
+    for name in ["wgpu", "wgpu-core", "wgpu-hal", "naga", "pollster", "clap", "ash"] {
+        assert!(!names.contains(name), "{name} is compiled");
+    }
 }

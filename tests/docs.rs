@@ -1,4 +1,4 @@
-//! The documents hang together: every link leads somewhere, every reference to the specification has a section there, and the README stays short.
+//! Consistency of the documents: every link has a target, every reference to the specification has a section, and the README is short.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::collections::BTreeSet;
@@ -8,7 +8,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The files with one of some extensions in the folders of the repository that people read.
+/// The files with one of some extensions in the repository.
 fn files(extensions: &[&str]) -> Vec<PathBuf> {
     fn collect(folder: &Path, extensions: &[&str], found: &mut Vec<PathBuf>) {
         for entry in std::fs::read_dir(folder).unwrap() {
@@ -29,7 +29,7 @@ fn files(extensions: &[&str]) -> Vec<PathBuf> {
     found
 }
 
-/// The targets of a document's links, code blocks aside.
+/// The targets of a document's links, outside code blocks.
 fn links(text: &str) -> Vec<String> {
     let mut is_code = false;
     let mut found = Vec::new();
@@ -45,7 +45,7 @@ fn links(text: &str) -> Vec<String> {
     found
 }
 
-/// A heading's anchor, as forges make it.
+/// A heading's anchor on a forge.
 fn anchor(heading: &str) -> String {
     let kept = heading.trim().to_lowercase();
     kept.chars()
@@ -94,7 +94,7 @@ fn every_reference_to_the_specification_has_a_section_there() {
     for file in files(&["rs", "wgsl"]).iter().filter(|file| !file.ends_with("tests/docs.rs")) {
         let text = std::fs::read_to_string(file).unwrap();
         for rest in text.split("SPEC §").skip(1) {
-            // Also "SPEC §§4–6".
+            // This also covers "SPEC §§4–6".
             let digits: String = rest.trim_start_matches('§').chars().take_while(char::is_ascii_digit).collect();
             references += 1;
             if !digits.parse().is_ok_and(|section: u32| sections.contains(&section)) {
@@ -130,4 +130,28 @@ fn files_that_the_documents_name_exist() {
 fn the_readme_is_short() {
     let text = std::fs::read_to_string(root().join("README.md")).unwrap();
     assert!(text.lines().count() <= 200, "{} lines", text.lines().count());
+}
+
+/// A file that a reader can keep in mind.
+#[test]
+fn no_source_file_has_more_than_500_lines() {
+    let lines = |path: &PathBuf| std::fs::read_to_string(path).unwrap().lines().count();
+    let files = files(&["rs", "wgsl"]);
+    assert!(files.len() > 200, "{}", files.len());
+    let long: Vec<_> = files.iter().filter(|path| lines(path) > 500).collect();
+    assert!(long.is_empty(), "{long:?}");
+}
+
+/// `benches/history.md` describes the keys.
+#[test]
+fn every_line_of_the_history_is_a_figure() {
+    let text = std::fs::read_to_string(root().join("benches/history.jsonl")).unwrap();
+    assert!(text.lines().count() > 0);
+    for line in text.lines() {
+        let figure: serde_json::Map<String, serde_json::Value> = serde_json::from_str(line).unwrap();
+        let found: BTreeSet<&str> = figure.keys().map(String::as_str).collect();
+        let expected = ["date", "commit", "machine", "scene", "program", "settings", "quantity", "value"];
+        assert_eq!(found, BTreeSet::from(expected), "{line}");
+        assert!(figure["value"].as_f64().is_some_and(|value| value > 0.0 && value.is_finite()), "{line}");
+    }
 }

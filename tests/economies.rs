@@ -1,5 +1,5 @@
-//! §8's economies: what `whole_below` and `resolution` leave out is what the f64 twin leaves out, and what `beta` changes stays within
-//! its bound. Off by default, and refused where they cannot be had.
+//! The economies of §8: `whole_below` and `resolution` omit the same as the f64 evaluation, and the change by `beta` stays within its
+//! bound. They are off by default, and refused where they are not supported.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -8,7 +8,7 @@ mod common;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::RenderError;
-use sheetsplat::headless::{Headless, Rendering};
+use sheetsplat::headless::{GpuHeadless, Rendering};
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
@@ -37,7 +37,7 @@ fn cases() -> Vec<(&'static str, Volume, Scene)> {
     vec![("noise", noise, scene), ("tomato", tomato, of_tomato)]
 }
 
-fn render(gpu: &Headless, volume: &Volume, scene: &Scene) -> Rendering {
+fn render(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> Rendering {
     gpu.render_volume(volume.clone(), scene).unwrap()
 }
 
@@ -78,7 +78,7 @@ fn the_twin_economises_alike() {
                 scene.splatting.experimental = economies;
                 let (ours, expected) = (render(&gpu, &volume, &scene), twin(&volume, &scene));
                 let what = format!("{name}, {:?}, {economies:?}", scene.splatting);
-                // Where a footprint ends it drops to 0: rounding may take a pixel on the rim in or out.
+                // A footprint drops to 0 at its rim, so rounding may include or exclude a pixel there.
                 let worst = largest_difference(&ours.image, &expected);
                 assert_at_most(worst, 2e-4 + economies.resolution / 8.0, &what);
                 assert_at_least(decibels(&ours.image, &expected), 104.0, &what);
@@ -93,7 +93,7 @@ fn the_twin_economises_alike() {
     }
 }
 
-/// Voxels behind β in a pixel matter to it by no more than 1 - β; all that is projected whole is behind β wherever it is drawn.
+/// Voxels behind β change a pixel by at most 1 - β, and whatever is projected whole lies behind β wherever it is drawn.
 #[test]
 fn beta_keeps_its_bound() {
     let gpu = gpu();
@@ -124,7 +124,7 @@ fn beta_keeps_its_bound() {
                 sections = fewer;
             }
         }
-        // Nothing is behind anything.
+        // Nothing is hidden.
         scene.splatting.compositing = Compositing::Xray;
         let with = render(&gpu, &volume, &scene).image;
         scene.splatting.experimental = NONE;

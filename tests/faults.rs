@@ -1,4 +1,4 @@
-//! Devices that fail while they render without a host: typed errors, and what works afterwards.
+//! Devices that fail while they render without a host: typed errors, and what still works afterwards.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
@@ -66,7 +66,7 @@ fn a_lost_device_is_an_error_everywhere_and_another_one_renders() {
 }
 
 #[test]
-fn what_is_on_another_device_is_an_error() {
+fn objects_of_another_device_are_an_error() {
     let (volume, scene) = head();
     let [one, other] = [gpu(), gpu()];
     let mut view = one.view(volume, &scene).unwrap();
@@ -75,7 +75,7 @@ fn what_is_on_another_device_is_an_error() {
         result => panic!("{result:?}"),
     };
     let message = refused(other.draw(&mut view).map(|_| ()));
-    assert_eq!(message, "device: found another one than that of the view, allowed: the device of the view");
+    assert_eq!(message, "device: found another device than that of the view, allowed: the device of the view");
     let volume = view.volume().gpu_volume().clone();
     assert!(refused(SceneView::new(other.device(), &volume, &scene).map(|_| ())).contains("the volume"));
     let prepared = other.renderer().prepare(one.device(), one.queue(), &mut view).map(|_| ());
@@ -83,9 +83,9 @@ fn what_is_on_another_device_is_an_error() {
     one.draw(&mut view).unwrap();
 }
 
-/// A depth texture without its depth aspect alone, which only the device knows.
+/// A depth texture view that is not restricted to the depth aspect, which only the device detects.
 #[test]
-fn what_validation_finds_is_an_error_and_the_device_goes_on() {
+fn validation_errors_are_returned_and_the_device_goes_on() {
     let (volume, scene) = head();
     let gpu = gpu();
     let mut view = gpu.view(volume, &scene).unwrap();
@@ -118,7 +118,7 @@ fn what_validation_finds_is_an_error_and_the_device_goes_on() {
     assert!(gpu.draw(&mut view).unwrap().image == before);
 }
 
-/// The driver's own textures are not that large. Nothing of that size is ever written.
+/// The driver's textures cannot be that large. Nothing of that size is written.
 #[test]
 fn too_large_an_image_is_out_of_memory_and_the_device_goes_on() {
     let (volume, mut scene) = head();
@@ -148,7 +148,7 @@ fn too_large_an_image_is_out_of_memory_and_the_device_goes_on() {
     assert_eq!(after.stats.gpu_bytes, before.stats.gpu_bytes);
 }
 
-/// What a device cannot compile: a host's shader in the library's scope. The device goes on.
+/// The device cannot compile a host's shader in the library's error scope. It continues to work.
 #[test]
 fn a_shader_that_does_not_compile_is_an_error_and_the_device_goes_on() {
     let gpu = gpu();

@@ -1,4 +1,4 @@
-//! The fuzz targets without libFuzzer, for a while: see `tests/fuzz/README.md`.
+//! The fuzz targets without libFuzzer, for a limited time: see `tests/fuzz/README.md`.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[path = "hostile/mutate.rs"]
@@ -14,7 +14,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use mutate::{Random, mutant};
 use targets::TARGETS;
 
-/// Inputs per target where no time is set.
+/// The number of inputs per target if no time is set.
 const INPUTS: usize = 300;
 
 fn number(variable: &str) -> Option<u64> {
@@ -22,7 +22,7 @@ fn number(variable: &str) -> Option<u64> {
     Some(text.parse().unwrap_or_else(|error| panic!("{variable}: found {text:?}, allowed: a whole number: {error}")))
 }
 
-/// A target's inputs to begin with: its corpus, and the volumes in the fixtures that have its extension.
+/// A target's initial inputs: its corpus, and the fixture volumes with its extension.
 fn seeds(target: &str) -> Vec<Vec<u8>> {
     let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
     let files = |folder: &Path| -> Vec<_> {

@@ -1,9 +1,8 @@
 //! Small pictures of the builtin volumes by each rasterizer, compared with those in `tests/goldens`.
 //!
-//! They are made on Mesa's lavapipe, and compared there only. It draws the same picture in every run, but differs between
-//! processors by up to 3 of 255 (approximate reciprocals): so much is tolerated, and a few outliers. What a failing
-//! picture looks like, and where it differs, is left in `target/goldens`. `SHEETSPLAT_BLESS=all`, or the names of scenes
-//! with commas between them, rewrites the goldens that fail, and only those.
+//! They are made, and compared, only on Mesa's lavapipe. It draws the same picture in every run, but differs between processors by up to 3 of
+//! 255 because of approximate reciprocals; this and a few outliers are tolerated. A failing picture and its differences are left in
+//! `target/goldens`. `SHEETSPLAT_BLESS=all`, or the names of scenes separated by commas, rewrites the goldens that fail, and only those.
 #![cfg(feature = "golden")]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -11,20 +10,20 @@ use std::path::Path;
 
 use sheetsplat::golden;
 use sheetsplat::golden::{Bless, Picture, Tolerance};
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::{GpuHeadless, HeadlessOptions};
 use sheetsplat::scene::{Scene, VolumeSource};
 use sheetsplat::settings::{FootprintForm, Rasterizer};
 
-/// Steps of 255 that a channel may differ by.
+/// The steps of 255 by which a channel may differ.
 const TOLERANCE: u8 = 3;
-/// Share of the pixels that may have a channel that differs by more.
+/// The fraction of the pixels that may differ by more.
 const OUTLIERS: f64 = 0.001;
-/// Rasterizers find voxels to be hidden at different sheets, which may change the picture by one minus this: too little to see.
+/// Rasterizers find voxels hidden at different sheets, which may change the picture by one minus this: too little to see.
 const OPACITY_THRESHOLD: f64 = 0.999;
-/// Bytes that a golden may have.
+/// The maximum size of a golden in bytes.
 const MAX_BYTES: u64 = 64 << 10;
 
-/// Name, builtin volume, and the settings that differ from the defaults.
+/// The scenes: name, builtin volume, and the settings that differ from the defaults.
 const SCENES: [(&str, &str, &[&str]); 17] = [
     ("head", "head:72", &["image={width=160,height=160}", "camera={direction=[0.5,0.85,-0.2],height=170.0}"]),
     (
@@ -189,7 +188,7 @@ fn pictures_look_like_their_goldens() {
         }
     }
     let options = HeadlessOptions::default().with_adapter("llvmpipe");
-    let gpu = Headless::new(&options)
+    let gpu = GpuHeadless::new(&options)
         .unwrap_or_else(|error| panic!(".ci/setup --lavapipe installs what is missing: {error}"));
     let failures = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("goldens");
     let mut complaints = Vec::new();
@@ -224,7 +223,7 @@ fn every_golden_is_of_a_scene_small_and_made_on_lavapipe() {
         assert!(paths.contains(&path), "{shown} is of no scene");
         let bytes = std::fs::metadata(&path).unwrap().len();
         assert!(bytes <= MAX_BYTES, "{shown} has {bytes} bytes, allowed: {MAX_BYTES}");
-        // Of a golden that does not say so, the widest tolerance would hold.
+        // A golden that names no adapter would be compared with the widest tolerance.
         let made_on = Picture::open(&path).unwrap().made_on;
         assert!(made_on.as_ref().is_some_and(|it| it.adapter.starts_with("llvmpipe")), "{shown}: made on {made_on:?}");
     }

@@ -1,5 +1,5 @@
-//! Holes, voxels whose samples are NaN or infinite (SPEC §3): gradients, lists, statistics, and whole images.
-//! `cargo test --release --test holes -- --nocapture` prints what was measured.
+//! Holes, which are voxels whose samples are NaN or infinite (SPEC §3): gradients, lists, statistics, and whole images.
+//! `cargo test --release --test holes -- --nocapture` prints the measurements.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::appearance::{Preset, categories, shown_range};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::{Scene, TransferSettings};
@@ -19,7 +19,7 @@ use sheetsplat::volume::{Labels, Volume, builtin};
 use common::images::{BLACK, psnr};
 use common::{COMPOSITINGS, RASTERIZERS, Random, camera, gpu, random_volume, scene, transfer};
 
-/// What a sample of a hole may be.
+/// The possible samples of a hole.
 const HOLES: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
 
 /// The same volume with holes in it.
@@ -30,7 +30,7 @@ fn punched(volume: &Volume, mut is_hole: impl FnMut(UVec3) -> bool) -> Volume {
     Volume::new("holes", grid.dims, grid.spacing, values).unwrap()
 }
 
-/// Balls in noise with holes: scattered, a block of them, at all borders, and all around single voxels.
+/// Balls in noise with holes: scattered, in a block, at all borders, and all around single voxels.
 fn volumes(random: &mut Random, spacing: [f64; 3]) -> [(&'static str, Volume); 4] {
     let whole = random_volume(random, (14.0, 20.0), spacing);
     let dims = whole.dims();
@@ -41,7 +41,7 @@ fn volumes(random: &mut Random, spacing: [f64; 3]) -> [(&'static str, Volume); 4
     [("scattered", scattered), ("a block", block), ("borders", borders), ("alone", alone)]
 }
 
-/// Everything that takes part is seen, shaded, and more or less by its gradient.
+/// All voxels that take part are visible, shaded, and modulated by their gradients.
 fn translucent(camera: Camera) -> Scene {
     let mut scene = Scene { camera, ..scene(61, 47) };
     scene.transfer = TransferSettings {
@@ -52,7 +52,7 @@ fn translucent(camera: Camera) -> Scene {
     scene
 }
 
-/// Beside it, near it, and in it.
+/// Cameras beside the volume, near it, and in it.
 fn cameras() -> [Camera; 3] {
     let perspective = |distance, near| Camera {
         projection: Projection::Perspective { fov_y: 50.0, distance: Some(distance), near: Some(near) },
@@ -65,8 +65,8 @@ fn assert_finite(image: &Image, what: &str) {
     assert!(image.pixels.as_flattened().iter().all(|channel| channel.is_finite()), "{what}: a channel is not finite");
 }
 
-/// The PSNR of a frame against the twin's, dB, over the pixels that show anything.
-fn decibels(gpu: &Headless, volume: &Volume, scene: &Scene, what: &str) -> f64 {
+/// The PSNR in dB of a frame against the f64 evaluation, over the pixels that show anything.
+fn decibels(gpu: &GpuHeadless, volume: &Volume, scene: &Scene, what: &str) -> f64 {
     let expected = reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap();
     let actual = gpu.render_volume(volume.clone(), scene).unwrap().image;
     assert_finite(&expected, what);
@@ -97,7 +97,7 @@ fn gradients_are_one_sided_beside_holes() {
     assert_eq!(gradient(&[[1, 1, 1]]), DVec3::ZERO, "that of a hole");
 }
 
-/// By another way to the same number: the finite ones of a voxel and its neighbours on an axis, the last less the first.
+/// The same number computed differently: among the finite values of a voxel and its neighbours on an axis, the last minus the first.
 #[test]
 fn gradients_of_any_volume_are_finite_neighbours_differences() {
     let mut random = Random(5);
@@ -139,9 +139,9 @@ fn volumes_with_holes_compare() {
     assert_eq!(message, "a: data: found only NaN or infinite samples, allowed: at least one finite sample");
 }
 
-/// Compositing by amounts, both projections, all methods.
+/// Compositing by amounts, with both projections and all methods.
 #[test]
-fn rasterizers_draw_what_the_twin_draws() {
+fn rasterizers_equal_the_reference() {
     let gpu = gpu();
     let mut random = Random(17);
     let mut worst = [f64::INFINITY; 3];
@@ -172,7 +172,7 @@ fn rasterizers_draw_what_the_twin_draws() {
     println!("quads, tiles, samples: {worst:.1?} dB at worst");
 }
 
-/// Where nothing depends on gradients, a hole is as good as a hidden voxel: the same bytes, by all compositings, culled too.
+/// Where nothing depends on gradients, a hole equals a hidden voxel: the bytes are the same for all compositings, with culling too.
 #[test]
 fn a_hole_is_a_hidden_voxel() {
     let gpu = gpu();
@@ -191,7 +191,7 @@ fn a_hole_is_a_hidden_voxel() {
         for (compositing, camera) in COMPOSITINGS.into_iter().zip(cameras().into_iter().cycle()) {
             let mut scene = translucent(camera);
             (scene.splatting.culling, scene.splatting.compositing) = (true, compositing);
-            // Opaque enough for surfaces.
+            // The voxels are opaque enough for surfaces.
             scene.transfer =
                 transfer(&[(0.0, [0.1, 0.3, 0.9]), (200.0, [1.0, 0.8, 0.6])], &[(0.0, 0.02), (250.0, 0.9)]);
             scene.shading.enabled = false;
@@ -217,7 +217,7 @@ fn a_hole_is_a_hidden_voxel() {
     assert_eq!(shown, 2 * 2 * COMPOSITINGS.len());
 }
 
-/// A view that is changed shows what a fresh one shows: no hole enters, whatever values take part.
+/// A changed view equals a fresh one: no hole enters, whatever values take part.
 #[test]
 fn lists_leave_holes_out() {
     let gpu = gpu();
@@ -244,7 +244,7 @@ fn lists_leave_holes_out() {
     assert_eq!(list.bytes(), 4 * (finite - background));
 }
 
-/// What is chosen for a volume is what is chosen for its finite samples: layers of holes before and behind it change nothing.
+/// The appearance chosen for a volume is that for its finite samples: layers of holes before and behind it change nothing.
 #[test]
 fn appearance_is_that_of_the_finite_samples() {
     let padded = |volume: &Volume| {
@@ -280,7 +280,7 @@ fn appearance_is_that_of_the_finite_samples() {
     }
 }
 
-/// Regions with holes scattered in them are still a label map.
+/// Regions with scattered holes are still a label map.
 #[test]
 fn holes_are_no_labels_and_no_borders() {
     let values = (0..24 * 24 * 24).map(|at: u32| {

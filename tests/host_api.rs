@@ -1,4 +1,4 @@
-//! What hosts build on: types that may go to other threads, and a library that leaves submitting and waiting to them.
+//! What hosts rely on: types that can move to other threads, and a library that leaves submitting and waiting to them.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::fs;
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use sheetsplat::DeviceError;
 use sheetsplat::PendingPick;
 use sheetsplat::Surfaces;
-use sheetsplat::headless::{Headless, Rendering};
+use sheetsplat::headless::{GpuHeadless, Rendering};
 use sheetsplat::image::Image;
 use sheetsplat::settings::Clip;
 use sheetsplat::stats::{PendingCounts, Stats};
@@ -15,7 +15,7 @@ use sheetsplat::{
     Camera, DeviceRequirements, GpuVolume, Placement, Renderer, RendererOptions, Scene, SceneView, Volume,
 };
 
-/// Compiles, or does not.
+/// This compiles only if the types are `Send` and `Sync`.
 const _: () = {
     const fn is_send_and_sync<T: Send + Sync>() {}
     const fn is_send<T: Send>() {}
@@ -33,15 +33,15 @@ const _: () = {
     is_send_and_sync::<Volume>();
     is_send_and_sync::<Image>();
     is_send_and_sync::<Stats>();
-    is_send_and_sync::<Headless>();
+    is_send_and_sync::<GpuHeadless>();
     is_send_and_sync::<Rendering>();
     is_send_and_sync::<sheetsplat::headless::Error>();
-    // It is asked by one.
+    // One thread at a time asks for it.
     is_send::<PendingCounts>();
     is_send::<PendingPick>();
 };
 
-/// What only `headless` does: own a device, submit, and wait.
+/// What only `headless` does: open a device, submit, and wait.
 const ITS_OWN: [&str; 9] = [
     ".submit(",
     ".poll(",

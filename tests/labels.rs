@@ -1,5 +1,4 @@
-//! Segmented volumes: label files and what is wrong with them, and whole frames of labels with tables of their own against the f64
-//! twin, by both rasterizers.
+//! Segmented volumes: valid and invalid label files, and whole frames with tables for labels against the f64 evaluation, by both rasterizers.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
@@ -10,7 +9,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::RenderError;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::Projection;
@@ -73,7 +72,7 @@ fn labels_of_every_type() {
     }
     check!(i8, "int8"; u8, "uint8"; i16, "int16"; u16, "uint16"; i32, "int32"; u32, "uint32"; i64, "int64"; u64, "uint64";
            f32, "float"; f64, "double");
-    // The largest, in types that hold it.
+    // The maximum label, in types that can hold it.
     folder.write("labels.nrrd", "type: ushort\nsizes: 2 3 2", &[0xff; 24]);
     let volume = folder.load(PATH).unwrap();
     assert_eq!((volume.label(0), volume.label(11)), (Some(65535), Some(65535)));
@@ -82,11 +81,11 @@ fn labels_of_every_type() {
 }
 
 #[test]
-fn what_is_no_label_is_named_with_its_voxel() {
+fn an_invalid_label_is_named_with_its_voxel() {
     let folder = Folder::new();
     let allowed = "labels, whole numbers from 0 to 65535";
     let refused = |name: &str, good: &[u8], bad: &[u8], shown: &str| {
-        // The eighth voxel.
+        // The eighth voxel is invalid.
         let data = [good.repeat(7), bad.to_vec(), good.repeat(4)].concat();
         folder.write("labels.nrrd", &format!("type: {name}\nsizes: 2 3 2"), &data);
         folder.assert_refused(PATH, "data", &format!("{shown} at voxel [1, 0, 1]"), allowed);
@@ -98,7 +97,7 @@ fn what_is_no_label_is_named_with_its_voxel() {
     refused("uint64", &1_u64.to_le_bytes(), &(1_u64 << 40).to_le_bytes(), "1099511627776");
     refused("float", &1_f32.to_le_bytes(), &2.5_f32.to_le_bytes(), "2.5");
     refused("float", &1_f32.to_le_bytes(), &f32::NAN.to_le_bytes(), "NaN");
-    // Not a whole number, though the nearest f32 is.
+    // The number is not whole, although its nearest f32 is.
     refused("double", &1_f64.to_le_bytes(), &3.000_000_000_1_f64.to_le_bytes(), "3.0000000001");
 }
 
@@ -111,7 +110,7 @@ fn labels_of_another_grid_are_refused() {
     folder.assert_refused(PATH, "sizes", "[2, 3, 1]", "[2, 3, 2], the volume's");
     folder.assert_refused("builtin = 'head:16'", "sizes", "[2, 3, 1]", "[16, 16, 10], the volume's");
 
-    // Their spacing counts if they state one, up to how it was written, and unless the scene has another for both files.
+    // The label file's spacing counts if it states one, up to rounding, unless the scene's spacing replaces both.
     let with_spacing =
         |fields: &str| folder.write("labels.nrrd", &format!("type: uint8\nsizes: 2 3 2{fields}"), &[3; 12]);
     for same in
@@ -169,7 +168,7 @@ fn a_label_file_replaces_the_builtin_labels() {
     assert_eq!(folder.load("builtin = 'cube:8'").unwrap().labels(), Some(&[5; 512][..]));
 }
 
-/// A volume of noise in blocks of labels, some of them so small that neighbours differ.
+/// A volume of noise in blocks of labels, some of which are so small that neighbours differ.
 fn segmented(labels: &[u16], spacing: [f64; 3]) -> Volume {
     let dims = UVec3::new(15, 13, 14);
     let mut random = Random(4);
@@ -196,7 +195,7 @@ fn rgb(color: [f64; 3]) -> Option<Ramp<DVec3>> {
     ramp(&[(0.0, DVec3::from(color)), (255.0, DVec3::from(color) / 2.0)])
 }
 
-/// Every way in which a label can differ from the main table.
+/// Tables that differ from the main one in every possible way.
 fn tables(labels: &[u16]) -> impl Iterator<Item = (u16, LabelTables)> {
     let none = LabelTables::default;
     let gradients = [(10.0, 0.0), (20.0, 0.3), (60.0, 1.0)];
@@ -213,8 +212,8 @@ fn tables(labels: &[u16]) -> impl Iterator<Item = (u16, LabelTables)> {
     labels.iter().copied().zip(all)
 }
 
-/// Draws a scene by both rasterizers without culling and with it, and compares with the twin.
-fn check(gpu: &Headless, name: &str, volume: &Volume, scene: &Scene) {
+/// Draws a scene by both rasterizers, with and without culling, and compares with the f64 evaluation.
+fn check(gpu: &GpuHeadless, name: &str, volume: &Volume, scene: &Scene) {
     let transfer = scene.transfer.resolve(volume);
     let expected = reference::render(volume, &transfer, scene).unwrap();
     let counts = reference::count(volume, &transfer, scene).unwrap();
@@ -228,7 +227,7 @@ fn check(gpu: &Headless, name: &str, volume: &Volume, scene: &Scene) {
         scene.splatting.culling = false;
         let drawn = gpu.render_volume(volume.clone(), &scene).unwrap();
         assert_eq!(drawn.stats.counts.voxels_in_range, counts.voxels_in_range, "{name}");
-        // Quads keep a voxel's amounts as f16, tiles as f32.
+        // Quads store a voxel's amounts as f16, tiles as f32.
         let allowed = if rasterizer == Rasterizer::Quads { 4.8e-4 } else { 4.8e-5 };
         assert_at_most(largest_difference(&drawn.image, &expected), allowed, &name);
         scene.splatting.culling = true;
@@ -239,9 +238,9 @@ fn check(gpu: &Headless, name: &str, volume: &Volume, scene: &Scene) {
 }
 
 #[test]
-fn frames_of_labels_are_the_twins() {
+fn frames_of_labels_equal_the_reference() {
     let gpu = gpu();
-    // The last one has no table; the greatest label there is.
+    // The last label has no table; 65535 is the maximum label.
     for labels in [[0, 1, 2, 3, 4, 5, 6, 7], [9, 65535, 300, 12, 65534, 20, 40000, 1]] {
         for (spacing, compositing, order) in [
             ([1.0, 1.0, 1.0], Compositing::Linear, Order::FrontToBack),
@@ -260,7 +259,7 @@ fn frames_of_labels_are_the_twins() {
             scene.splatting.compositing = compositing;
             scene.splatting.order = order;
             check(&gpu, &format!("{labels:?} {spacing:?} {compositing:?}"), &volume, &scene);
-            // The main table's gradient opacity for those that have none of their own, and iso-ranges for all.
+            // Labels without gradient opacity use the main table's; iso-ranges apply to all.
             scene.transfer.gradient_opacity = ramp(&[(5.0, 0.2), (40.0, 1.0)]);
             scene.transfer.iso_ranges = Some(vec![[30.0, 90.0], [120.0, 230.0]]);
             check(&gpu, &format!("{labels:?} {spacing:?} {compositing:?}, all tables"), &volume, &scene);
@@ -268,9 +267,9 @@ fn frames_of_labels_are_the_twins() {
     }
 }
 
-/// The same with an eye.
+/// The same in perspective.
 #[test]
-fn labels_in_perspective_are_the_twins() {
+fn labels_in_perspective_equal_the_reference() {
     let gpu = gpu();
     let labels = [0, 1, 2, 3, 4, 5, 6, 7];
     let mut scene = scene(61, 53);
@@ -282,9 +281,9 @@ fn labels_in_perspective_are_the_twins() {
     check(&gpu, "perspective", &segmented(&labels, [1.0, 1.0, 1.6]), &scene);
 }
 
-/// The same drawn kernel by kernel, which shades as quads do.
+/// The same with every kernel composited by itself, which shades as quads do.
 #[test]
-fn labels_of_every_sample_are_the_twins() {
+fn labels_of_every_sample_equal_the_reference() {
     let gpu = gpu();
     let labels = [0, 1, 2, 3, 4, 5, 6, 7];
     let volume = segmented(&labels, [1.0, 1.0, 1.6]);
@@ -298,7 +297,7 @@ fn labels_of_every_sample_are_the_twins() {
     assert_at_most(largest_difference(&drawn.image, &expected), 2.5e-4, "every sample");
 }
 
-/// More voxels than a layer of the texture holds, with labels where the next one begins.
+/// The volume has more voxels than a layer of the texture, with labels where the next one begins.
 #[test]
 fn labels_in_several_layers() {
     let gpu = gpu();
@@ -319,7 +318,7 @@ fn labels_in_several_layers() {
     check(&gpu, "several layers", &volume, &scene);
 }
 
-/// Tables that only hide leave nothing for shading to ask: the labels stay on the CPU.
+/// If tables only hide voxels, shading needs no labels, and they stay on the CPU.
 #[test]
 fn hiding_a_label_needs_no_texture() {
     let gpu = gpu();
@@ -346,12 +345,12 @@ fn tables_without_labels_are_an_error() {
     scene.transfer.labels = tables(&[1]).collect();
     let error = gpu.render_volume(builtin::volume("cube:8").unwrap(), &scene).unwrap_err();
     assert!(matches!(&error, RenderError::OutOfRange(error) if error.key == "transfer.label"), "{error}");
-    // A label that no voxel has is none: one transfer function serves many volumes.
+    // A label that no voxel has is ignored, because one transfer function serves many volumes.
     scene.transfer.labels = tables(&[77]).collect();
     gpu.render_volume(builtin::volume("head:8").unwrap(), &scene).unwrap();
 }
 
-/// As 3D Slicer writes segmentations.
+/// 3D Slicer writes the names of segments.
 #[test]
 fn names_of_segments_are_read() {
     let folder = Folder::new();
@@ -360,7 +359,7 @@ fn names_of_segments_are_read() {
     folder.write("labels.nrrd", &format!("type: uint8\nsizes: 2 3 2\n{segments}"), &[5; 12]);
     let names = BTreeMap::from([(5, "left lung: lower".to_owned())]);
     assert_eq!(folder.load(PATH).unwrap().label_names(), &names);
-    // Of a volume whose values are labels; so they are even if there is but one.
+    // A volume whose values are labels has names, too, even if there is only one.
     let volume = Volume::open(&folder.0.path().join("labels.nrrd")).unwrap();
     assert_eq!(volume.label_names(), &names);
     assert!(sheetsplat::appearance::categories::is_label_map(&volume));

@@ -1,4 +1,4 @@
-//! Every struct that Rust and WGSL share has the same members at the same places in both. Needs no GPU.
+//! Every struct shared by Rust and WGSL has the same members at the same offsets in both. Needs no GPU.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::mem::offset_of;
@@ -6,8 +6,8 @@ use std::mem::offset_of;
 use naga::proc::Layouter;
 use naga::{AddressSpace, Handle, Module, Type, TypeInner};
 use sheetsplat::internals::gpu::layout::{
-    Band, Brick, BrickState, Culled, Cut, Frame, Gather, Gathered, Indirect, PatchRange, Planes, Sample, SheetGroup,
-    Splat, Tally, TileList, Visit,
+    Band, Brick, BrickState, Culled, Cut, FieldPlanes, FieldVoxel, Frame, Gather, Gathered, Indirect, PatchRange,
+    SheetGroup, Splat, Tally, TileList, Visit,
 };
 use sheetsplat::internals::gpu::shaders;
 
@@ -16,12 +16,12 @@ struct Layout {
     name: &'static str,
     size: usize,
     members: Vec<(&'static str, usize, usize)>,
-    /// The member that goes on to the end of its buffer, an array of `u32`.
+    /// The member that continues to the end of its buffer, an array of `u32`.
     tail: Option<&'static str>,
 }
 
 impl Layout {
-    /// A struct whose last member is the first of an array that goes on; WGSL, too, counts one of them.
+    /// Marks a struct whose last member is the first element of an array that continues; WGSL counts one element too.
     fn goes_on(self) -> Self {
         Self { tail: self.members.last().map(|last| last.0), ..self }
     }
@@ -34,7 +34,7 @@ fn size_of_member<S, M>(_: fn(&S) -> &M) -> usize {
 
 macro_rules! layout {
     ($name:ident { $($member:ident),* $(,)? }) => {{
-        // Without `..`: a member that is missing here does not compile.
+        // Without `..`, a missing member does not compile.
         fn all_members($name { $($member: _),* }: $name) {}
         let _ = all_members;
         Layout {
@@ -110,8 +110,8 @@ fn shared() -> [Layout; 17] {
             padding_1
         }),
         layout!(SheetGroup { half_box, box_filter, culling, near, first_brick, brick_count, index, number }),
-        layout!(Planes { axes, step, screen_axis, per_pixel, origin, value_bias, value_scale, per_number }),
-        layout!(Sample { x, y, depth, from_eye, number, gradient_x, gradient_y, gradient_z }),
+        layout!(FieldPlanes { axes, step, screen_axis, per_pixel, origin, value_bias, value_scale, per_number }),
+        layout!(FieldVoxel { x, y, depth, number, gradient_xy, gradient_z }),
         layout!(Brick { present, x, y, z, extent }),
         layout!(BrickState { hidden, shaded }),
         layout!(Visit { drawn, fresh, brick, padding }),
@@ -166,7 +166,7 @@ fn find<'a>(module: &'a Module, name: &str) -> Option<(Handle<Type>, &'a Type)> 
     module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name))
 }
 
-/// Whether a type is an array that goes on to the end of its buffer, of `u32` without gaps.
+/// Whether a type is an array of `u32` without gaps that continues to the end of its buffer.
 fn is_endless(module: &Module, ty: Handle<Type>) -> bool {
     match module.types[ty].inner {
         TypeInner::Array { base, size: naga::ArraySize::Dynamic, stride } => {
@@ -208,8 +208,8 @@ fn members_and_sizes_agree() {
             if tail != layout.tail {
                 failures.push(format!("{stage}: {}: goes on with {tail:?}, Rust: {:?}", layout.name, layout.tail));
             }
-            // The size WGSL rounds a struct up to is also the smallest binding that holds one, and, as it is a multiple of
-            // the alignment, the stride of an array of them.
+            // The size to which WGSL rounds a struct up is also the size of the smallest binding that holds one, and, being a multiple of the
+            // alignment, the stride of an array of them.
             let stride = layouter[handle].to_stride() as usize;
             if (*span as usize, stride) != (layout.size, layout.size) {
                 let (name, size) = (layout.name, layout.size);

@@ -1,4 +1,4 @@
-//! Lists (§5.1): a view that was changed shows what a fresh one shows, bit for bit, and a change touches what it must alone.
+//! Lists (§5.1): a changed view shows bit for bit what a fresh one shows, and a change touches only what depends on it.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use sheetsplat::Renderer;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::gpu::classified_volume::Touched;
 use sheetsplat::internals::iso_range::{ValueSet, ordinal};
 use sheetsplat::internals::value_list::ValueList;
@@ -36,7 +36,7 @@ fn head() -> (Arc<Volume>, Scene) {
     (Arc::new(builtin::volume("head:48").unwrap()), scene)
 }
 
-/// The voxels that take part, by a scan.
+/// The voxels that take part, determined by a scan.
 fn taking_part(volume: &Volume, transfer: &TransferFunction) -> Vec<bool> {
     (0..)
         .zip(volume.values())
@@ -47,18 +47,19 @@ fn taking_part(volume: &Volume, transfer: &TransferFunction) -> Vec<bool> {
         .collect()
 }
 
-fn assert_fresh(gpu: &Headless, view: &mut SceneView, name: &str) {
+fn assert_fresh(gpu: &GpuHeadless, view: &mut SceneView, name: &str) {
     let drawn = gpu.draw(view).unwrap();
     let scene = Scene { transfer: view.volume().transfer().clone().into(), ..view.scene().clone() };
     let fresh = gpu.render_volume(view.volume().volume().clone(), &scene).unwrap();
     assert!(drawn.image == fresh.image, "{name}: the image is not that of a fresh view");
     let counts = |rendering: &sheetsplat::headless::Rendering| {
-        let counts = rendering.stats.counts;
-        // Bricks that became empty are tested in vain.
-        sheetsplat::stats::Counts { bricks_tested: 0, ..counts }
+        let mut counts = rendering.stats.counts;
+        // Bricks that became empty are tested without effect.
+        counts.bricks_tested = 0;
+        counts
     };
     assert_eq!(counts(&drawn), counts(&fresh), "{name}");
-    // And the same again.
+    // The next frame is the same.
     assert!(gpu.draw(view).unwrap().image == drawn.image, "{name}: the next frame differs");
 }
 
@@ -70,10 +71,10 @@ fn a_changed_view_is_a_fresh_one() {
     }
 }
 
-fn assert_changes_are_fresh(gpu: &Headless, rasterizer: Rasterizer) {
+fn assert_changes_are_fresh(gpu: &GpuHeadless, rasterizer: Rasterizer) {
     let (volume, mut scene) = head();
     scene.splatting.rasterizer = rasterizer;
-    // Few voxels at first, so that room is made later.
+    // Few voxels at first, so that the lists must grow later.
     scene.transfer.iso_ranges = Some(vec![[200.0, 255.0]]);
     let mut view = gpu.view(volume.clone(), &scene).unwrap();
     assert_fresh(gpu, &mut view, "first");
@@ -109,7 +110,7 @@ fn assert_changes_are_fresh(gpu: &Headless, rasterizer: Rasterizer) {
         entered += touched.entered;
         left += touched.left;
         rebuilt += u64::from(touched.rebuilt);
-        // Not every change is drawn.
+        // Only some changes are drawn.
         if random.uniform(0.0, 1.0) < 0.75 || touched.rebuilt {
             assert_fresh(gpu, &mut view, &format!("{rasterizer:?}, step {step}"));
         }
@@ -118,7 +119,7 @@ fn assert_changes_are_fresh(gpu: &Headless, rasterizer: Rasterizer) {
     assert!((1..20).contains(&rebuilt), "{rebuilt} of 40 changes needed more room");
 }
 
-/// A change of labels' tables or visibility is the fresh view's, too, whoever rasterizes.
+/// After changes of labels' tables or visibility, too, a view equals a fresh one, with each rasterizer.
 #[test]
 fn changed_labels_are_fresh_ones() {
     let gpu = gpu();
@@ -165,7 +166,7 @@ fn changed_labels_are_fresh_ones() {
             assert_eq!((touched.entered, touched.left), (count(false, true), count(true, false)), "{name}");
             entered += touched.entered;
             left += touched.left;
-            // Not every change is drawn.
+            // Only some changes are drawn.
             if random.uniform(0.0, 1.0) < 0.75 {
                 assert_fresh(&gpu, &mut view, &name);
             }
@@ -174,7 +175,7 @@ fn changed_labels_are_fresh_ones() {
     }
 }
 
-/// What a change of a label touches: its own voxels, and none if who takes part stays the same.
+/// A change of a label touches only its own voxels, and none if the same voxels take part.
 #[test]
 fn a_change_of_a_label_touches_its_voxels() {
     let gpu = gpu();
@@ -198,7 +199,7 @@ fn a_change_of_a_label_touches_its_voxels() {
     transfer.labels.entry(7).or_default().opacity = Some(Ramp::new(vec![(0.0, 0.0)]).unwrap());
     assert_eq!(view.set_transfer_function(transfer).unwrap(), Touched { left: of_label(7), ..Touched::default() });
     assert_fresh(&gpu, &mut view, "eyes without opacity");
-    // Colours and opacities of a label that is in view: shaded anew, and no more.
+    // Colours and opacities of a visible label: its voxels are only shaded again.
     for green in [0.2, 0.7] {
         let mut transfer = view.volume().transfer().clone();
         let tables = transfer.labels.entry(5).or_default();
@@ -208,14 +209,14 @@ fn a_change_of_a_label_touches_its_voxels() {
         assert!(!prepare(&mut view), "colour and opacity of a label");
         assert_fresh(&gpu, &mut view, "colour and opacity of a label");
     }
-    // A volume that is not segmented has nothing to hide.
+    // A volume that is not segmented has no labels to hide.
     let cube = Arc::new(builtin::volume("cube:16").unwrap());
     let mut view = gpu.view(cube, &scene).unwrap();
     assert_eq!(view.set_label_visible(0, false), Touched::default());
     assert_fresh(&gpu, &mut view, "no labels");
 }
 
-/// Axis-aligned slices are the same from many directions (§3.1): every axis is sorted once, and a new view sorts nothing.
+/// Axis-aligned slices are the same for many directions (§3.1): every axis is sorted once, and a new view along it sorts nothing.
 #[test]
 fn a_turn_sorts_no_slices() {
     let gpu = gpu();
@@ -242,10 +243,10 @@ fn a_turn_sorts_no_slices() {
     assert!(!look([0.0, 0.001, -1.0], None), "and -z");
 }
 
-/// Table 3's knobs, at run time: the image is a fresh view's, and what makes footprints is made anew for another kernel, by sections
-/// also for another slab width, and never for a threshold (§3.3.1).
+/// Table 3's parameters, changed at run time: the image equals a fresh view's, and the footprint table is made again for another kernel, in the
+/// sections form also for another slab width, and never for a threshold (§3.3.1).
 #[test]
-fn knobs_are_turned_at_run_time() {
+fn parameters_change_at_run_time() {
     let gpu = gpu();
     let (volume, mut scene) = head();
     let prepare = |view: &mut SceneView| gpu.renderer().prepare(gpu.device(), gpu.queue(), view).unwrap();
@@ -283,7 +284,7 @@ fn knobs_are_turned_at_run_time() {
     }
 }
 
-/// From any compositing to any other. Buckets stay, but for the least: it looks at what is empty, too.
+/// Any compositing can change to any other. Buckets stay, except for `minimum`, for which empty sheets count too.
 #[test]
 fn every_compositing_is_a_fresh_one() {
     let gpu = gpu();
@@ -307,17 +308,17 @@ fn every_compositing_is_a_fresh_one() {
     }
 }
 
-/// What each setter costs: buckets only for cameras, slabs and bricks; voxels only for those that enter and leave.
+/// The cost of each setter: buckets only for cameras, slabs and bricks; voxels only for those that enter and leave.
 #[test]
-fn a_change_costs_what_it_must() {
+fn a_change_recomputes_only_what_depends_on_it() {
     let gpu = gpu();
-    // What is not for tiles is drawn by quads meanwhile, or always.
+    // What tiles do not support is drawn by quads, temporarily or always.
     for rasterizer in [Rasterizer::Auto, Rasterizer::Quads] {
         assert_costs(&gpu, rasterizer);
     }
 }
 
-fn assert_costs(gpu: &Headless, rasterizer: Rasterizer) {
+fn assert_costs(gpu: &GpuHeadless, rasterizer: Rasterizer) {
     let renderer: &Renderer = gpu.renderer();
     let (volume, mut scene) = head();
     scene.splatting.rasterizer = rasterizer;
@@ -362,13 +363,13 @@ fn assert_costs(gpu: &Headless, rasterizer: Rasterizer) {
     assert!(touched.left > 0 && touched.entered == 0);
     assert!(prepare(&mut view), "bricks changed");
     assert_fresh(gpu, &mut view, "iso-range");
-    // Prepared twice before it is drawn.
+    // The view is prepared twice before it is drawn.
     assert!(view.set_iso_ranges(Some(vec![[80.0, 255.0]])).unwrap().entered > 0);
     assert!(prepare(&mut view));
     assert!(view.set_iso_ranges(Some(vec![[70.0, 255.0]])).unwrap().entered > 0);
     assert!(prepare(&mut view));
     assert_fresh(gpu, &mut view, "two iso-ranges");
-    // Prepared, and then asked for more than the device allows.
+    // The view is prepared, and then needs more than the device allows.
     assert!(view.set_iso_ranges(None).unwrap().entered > 0);
     assert!(prepare(&mut view));
     let image = view.scene().image;
@@ -378,7 +379,7 @@ fn assert_costs(gpu: &Headless, rasterizer: Rasterizer) {
     assert_fresh(gpu, &mut view, "after an error");
 }
 
-/// A view that starts with nothing to show.
+/// A view that is empty at first.
 #[test]
 fn from_nothing() {
     let gpu = gpu();
@@ -395,7 +396,7 @@ fn from_nothing() {
     }
 }
 
-/// The least value takes part only where the transfer function says so: those voxels are not in the sorted list.
+/// The minimum value takes part only if the transfer function says so, because its voxels are not in the sorted list.
 #[test]
 fn the_value_list_leaves_out_the_background() {
     let gpu = gpu();

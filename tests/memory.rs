@@ -1,11 +1,11 @@
-//! GPU memory: what is reported, and that it is given back.
+//! GPU memory: what is reported, and that it is freed.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
 mod common;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::LabelTables;
 use sheetsplat::settings::Light;
@@ -23,15 +23,15 @@ fn head(size: u32) -> (Volume, Scene) {
     (builtin::volume(&format!("head:{size}")).unwrap(), scene)
 }
 
-/// Bytes that wgpu has allocated, once nothing is under way.
-fn allocated(gpu: &Headless) -> u64 {
+/// The bytes that wgpu has allocated, once the device is idle.
+fn allocated(gpu: &GpuHeadless) -> u64 {
     gpu.device().poll(PollType::wait_indefinitely()).unwrap();
     gpu.device().generate_allocator_report().unwrap().total_allocated_bytes
 }
 
 /// 200 renders on one device, of 5 volumes and 40 sizes, by both rasterizers.
 #[test]
-fn memory_is_given_back() {
+fn memory_is_freed() {
     let gpu = gpu();
     let volumes = [8, 12, 16, 20, 24].map(head);
     let mut held = Vec::new();
@@ -46,15 +46,15 @@ fn memory_is_given_back() {
         drop(view);
         held.push(allocated(&gpu));
     }
-    // What pipelines have stays, and a few hundred bytes of wgpu's own come and go; any buffer of a frame's image is larger.
+    // Pipelines stay, and a few hundred bytes of wgpu's own vary; any buffer of a frame's image is larger.
     let most = held[..10].iter().max().unwrap() + 1024;
     assert!(held[10..].iter().all(|&bytes| bytes <= most), "{held:?}");
     assert!(most < 1 << 20, "{held:?}");
 }
 
-/// A view that grows and shrinks holds at most 4 times what a new one does, and gives all of it back.
+/// A view that grows and shrinks uses at most 4 times what a new one uses, and frees all of it.
 #[test]
-fn a_view_that_shrinks_gives_back() {
+fn a_view_that_shrinks_frees_memory() {
     let gpu = gpu();
     for rasterizer in RASTERIZERS {
         let (volume, mut scene) = head(16);
@@ -75,7 +75,7 @@ fn a_view_that_shrinks_gives_back() {
     }
 }
 
-/// Exactly: of volumes of a part of a row, a row, several, and several layers, whose values take a byte each, two, or four.
+/// The estimate is exact for volumes of part of a row, a row, several, and several layers, with values of one, two or four bytes.
 #[test]
 fn a_volumes_bytes_are_known_before() {
     let gpu = gpu();
@@ -92,7 +92,7 @@ fn a_volumes_bytes_are_known_before() {
             assert_eq!(estimate, rows * 2048 * bytes, "{dims}");
         }
     }
-    // With labels, of whose tables some matter to shading.
+    // With labels, some of whose tables matter to shading.
     let (volume, mut scene) = head(20);
     let [values, both] = GpuVolume::estimate(gpu.device(), &volume).unwrap();
     let mut view = gpu.view(volume.clone(), &scene).unwrap();
@@ -105,11 +105,11 @@ fn a_volumes_bytes_are_known_before() {
     assert_eq!(view.volume().gpu_volume().gpu_bytes(), both);
 }
 
-/// Exactly, before anything of a frame is allocated: whatever draws, of several brick lists and bands of rows, too.
+/// The estimate is exact before anything of a frame is allocated, for each rasterizer, several brick lists and bands of rows.
 #[test]
 fn a_frames_bytes_are_known_before() {
     let [roomy, small] = [gpu(), gpu_with_small_bindings(64 << 10)];
-    let profiling = Headless::new(&lavapipe().with_profile(true)).unwrap();
+    let profiling = GpuHeadless::new(&lavapipe().with_profile(true)).unwrap();
     let (volume, base) = head(40);
     let mut scenes = Vec::new();
     for (rasterizer, footprint) in FORMS {
@@ -155,8 +155,8 @@ fn a_frames_bytes_are_known_before() {
     }
 }
 
-/// What a new view with the same settings holds.
-fn fresh(gpu: &Headless, view: &SceneView) -> u64 {
+/// The memory of a new view with the same settings.
+fn fresh(gpu: &GpuHeadless, view: &SceneView) -> u64 {
     let volume = view.volume().gpu_volume();
     let mut fresh = SceneView::new(gpu.device(), volume, view.scene()).unwrap();
     fresh.set_first_hit(view.first_hits().map(|_| 0.2)).unwrap();
@@ -164,7 +164,7 @@ fn fresh(gpu: &Headless, view: &SceneView) -> u64 {
     fresh.gpu_bytes()
 }
 
-/// After changes that leave room, or none, for the bricks that came.
+/// After changes with and without room for the added bricks.
 #[test]
 fn a_changed_views_bytes_are_known_before() {
     let gpu = gpu();
@@ -186,7 +186,7 @@ fn a_changed_views_bytes_are_known_before() {
     }
 }
 
-/// A host may bind the texture of first hits once, and the frames that follow keep no more than that.
+/// A host can bind the texture of first hits once; later frames keep it, and nothing more.
 #[test]
 fn first_hits_stay_where_they_are() {
     let gpu = gpu();

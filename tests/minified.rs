@@ -1,5 +1,5 @@
-//! Minified views (the low-pass rule of SPEC §5): at a quarter of its size a view is the full-size view, box-filtered.
-//! `cargo test --release --test minified -- --nocapture` prints what was measured.
+//! Minified views (the low-pass rule of SPEC §5): at a quarter of its size a view equals the box-filtered full-size view.
+//! `cargo test --release --test minified -- --nocapture` prints the measurements.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
@@ -23,7 +23,7 @@ use common::{camera, gpu, scene, transfer};
 
 const FACTOR: u32 = 4;
 
-/// The mean of so many pixels across and down.
+/// The image after a box filter.
 fn box_filtered(image: &Image) -> Image {
     let (width, height) = (image.width / FACTOR, image.height / FACTOR);
     let pixel = |at: u32| {
@@ -43,12 +43,12 @@ fn minified(scene: &Scene) -> Scene {
     small
 }
 
-/// Decibels over the colours of all pixels.
+/// The PSNR in dB over the colours of all pixels.
 fn decibels(a: &Image, b: &Image) -> f64 {
     compare::decibels(color_rms(a, b))
 }
 
-/// Decibels by rasterizer between a view at a quarter of its size and the box-filtered one; also the latter.
+/// The PSNR in dB by rasterizer between a view at a quarter of its size and the box-filtered one; also the latter.
 fn by_rasterizer(volume: &Arc<Volume>, scene: &Scene) -> ([f64; 2], Image) {
     let gpu = gpu();
     let render = |scene: &Scene| gpu.render_volume(volume.clone(), scene).unwrap().image;
@@ -61,7 +61,7 @@ fn by_rasterizer(volume: &Arc<Volume>, scene: &Scene) -> ([f64; 2], Image) {
     (by_both, filtered)
 }
 
-/// The twin's image of an orthographic view without the low-pass rule: footprints as small as they come.
+/// The f64 image of an orthographic view without the low-pass rule, with footprints of any size.
 fn without_low_pass(volume: &Volume, scene: &Scene) -> Image {
     let transfer = scene.transfer.resolve(volume);
     let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
@@ -79,8 +79,8 @@ fn without_low_pass(volume: &Volume, scene: &Scene) -> Image {
     resolve::resolve(&acc, scene.splatting.compositing, scene.image.background).into_image()
 }
 
-/// What is finer than a pixel is what the rule is for: without it a pixel shows what lies behind its centre. (Solid objects look more like
-/// the filtered image without it, as the rule blurs a little more than a box.)
+/// The rule is for structures finer than a pixel: without it a pixel shows whatever lies behind its centre. (Solid objects are closer to
+/// the filtered image without it, because the rule blurs slightly more than a box.)
 #[test]
 fn fine_structures() {
     let volume = Arc::new(builtin::volume("nerve:160").unwrap());
@@ -96,7 +96,7 @@ fn fine_structures() {
     }
 }
 
-/// A solid head, and a translucent one.
+/// A solid head and a translucent one.
 #[test]
 fn heads() {
     let volume = Arc::new(builtin::volume("head:96").unwrap());
@@ -117,7 +117,7 @@ fn heads() {
 fn shared_ct_heads() {
     for (name, least) in [("ct-head-opaque", 34.0), ("ct-head-semi", 40.0)] {
         let mut scene = Scene::open(&shared(&format!("scenes/{name}.toml")), &[]).unwrap();
-        // What culling may change is another matter.
+        // Culling would change the image within its bound.
         scene.splatting.culling = false;
         let volume = Arc::new(scene.load_volume().unwrap());
         let (by_both, filtered) = by_rasterizer(&volume, &scene);

@@ -1,4 +1,4 @@
-//! What must hold of every image, whatever the volume: tested on whole frames.
+//! Properties that every image must have, whatever the volume, tested on whole frames.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
@@ -7,7 +7,7 @@ mod common;
 use std::f64::consts::TAU;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::image::Image;
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
@@ -19,7 +19,7 @@ use common::compare::{assert_at_most, largest};
 use common::images::largest_difference;
 use common::{COMPOSITINGS, F16, F32, FORMS, RASTERIZERS, Random, camera, gpu, scene, transfer};
 
-fn render(gpu: &Headless, volume: &Volume, scene: &Scene) -> (Image, u64) {
+fn render(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> (Image, u64) {
     let rendering = gpu.render_volume(volume.clone(), scene).unwrap();
     (rendering.image, rendering.stats.counts.sheets)
 }
@@ -73,25 +73,25 @@ fn empty_volume_is_exactly_the_background() {
     }
 }
 
-/// A uniform slab, `layers` voxels thick along one axis and wide along the others, cut from space by sampling: every ray
-/// near its middle runs through `layers` times the spacing, over the cosine, of the same stuff.
+/// A uniform slab, `layers` voxels thick along one axis and wide along the others, cut out of space by sampling: every ray near its middle runs
+/// through `layers` times the spacing, divided by the cosine, of the same material.
 struct UniformSlab {
     axis: usize,
     layers: u32,
-    /// World units, the smallest of them 1: world lengths are `unit`s.
+    /// World units, the smallest of them 1, so that world lengths are in `unit`s.
     spacing: DVec3,
 }
 
 impl UniformSlab {
-    /// Voxels along the other axes: enough to look at the middle without seeing the borders.
+    /// The number of voxels along the other axes, enough for the middle of the image to show no borders.
     const WIDTH: u32 = 88;
-    /// Opacity per unit length, and what it amounts to.
+    /// The opacity per unit length, and the amount that it corresponds to.
     const OPACITY: f64 = 0.07;
 
     fn volume(&self) -> Volume {
         let mut dims = UVec3::splat(Self::WIDTH);
         dims[self.axis] = self.layers;
-        // Wide borders in world units need fewer voxels where those are far apart.
+        // Where voxels are far apart, fewer of them make borders of the same width.
         for axis in (0..3).filter(|&axis| axis != self.axis) {
             dims[axis] = (f64::from(Self::WIDTH) / self.spacing[axis]).ceil() as u32 + 8;
         }
@@ -124,7 +124,7 @@ impl UniformSlab {
         }
     }
 
-    fn check(&self, gpu: &Headless, rasterizer: Rasterizer, direction: DVec3, slab_width: f64) {
+    fn check(&self, gpu: &GpuHeadless, rasterizer: Rasterizer, direction: DVec3, slab_width: f64) {
         const SIZE: u32 = 48;
         let volume = self.volume();
         let mut scene = scene(SIZE, SIZE);
@@ -141,7 +141,7 @@ impl UniformSlab {
         let (image, _) = render(gpu, &volume, &scene);
 
         let expected = self.depth(direction);
-        // The mean over lattice periods: a window without edges hears nothing of ripples that fit it a few times.
+        // The mean over whole periods of the lattice: a window without edges suppresses ripples that fit into it several times.
         let hann = |i: u32| 1.0 - (TAU * (f64::from(i) + 0.5) / f64::from(SIZE)).cos();
         let (mut weights, mut mean_alpha, mut mean_depth) = (0.0, 0.0, 0.0);
         for (i, alpha) in (0..).zip(alpha(&image)) {
@@ -153,7 +153,7 @@ impl UniformSlab {
             mean_alpha += weight * alpha;
             mean_depth += weight * depth;
         }
-        // Amounts are stored as f16, whose roundings have either sign.
+        // Amounts are rounded to f16 in either direction.
         let (alpha, depth) = (mean_alpha / weights, mean_depth / weights);
         let expected_alpha = 1.0 - (-expected).exp();
         let name =
@@ -172,7 +172,7 @@ fn uniform_slab_opacity_is_that_of_its_thickness() {
         {
             let slab = UniformSlab { axis, layers: 4, spacing };
             for slab_width in [1.0, 1.0, 1.0, 0.5, 1.7] {
-                // Anywhere, but not so flat along the slab that its borders come into sight.
+                // Any direction that is not so flat along the slab that its borders become visible.
                 let direction = loop {
                     let direction = random.direction();
                     if direction[axis].abs() > 0.75 {
@@ -204,13 +204,13 @@ fn exponential_alpha_does_not_depend_on_the_slab_width() {
         for slab_width in [0.25, 0.37, 0.5, 2.0, 3.1, 4.0] {
             scene.splatting.slab_width = slab_width;
             let (image, sheets) = render(&gpu, &volume, &scene);
-            // Planes and depths are f32, below 32 here: the far plane of a slab and the near plane of the next one
-            // leave a gap, or overlap, by up to a step of 2⁻¹⁹. One plane per slab width, each attenuated by what lies
-            // before it, and two roundings per sheet.
+            // Planes and depths are f32, below 32 here, so the far plane of a slab and the near plane of the next one leave a gap, or
+            // overlap, by up to a step of 2⁻¹⁹. There is one plane per slab width, each attenuated by what lies before it, and two
+            // roundings per sheet.
             let step = 2.0_f64.powi(-19);
             let finest = slab_width.min(1.0);
             let all = 2.0 * step / finest + 4.0 * F32 * sheets as f64;
-            // They have either sign, and are never all there at once.
+            // The errors have either sign and never occur all at once.
             let tolerance = 0.15 * all;
             let worst = largest(alpha(&image).iter().zip(&reference).map(|(a, b)| a - b));
             assert_at_most(worst, tolerance, format_args!("{rasterizer:?} {slab_width}, spacing {spacing}"));
@@ -224,7 +224,7 @@ fn back_to_front_equals_front_to_back() {
     let (volume, mut scene) = head();
     // Nothing is culled back to front.
     scene.splatting.culling = false;
-    // Close by in perspective: footprints of nearer sections reach onto the screen where farther ones do not.
+    // Close by in perspective, footprints of nearer sections reach onto the screen where farther ones do not.
     let close = Projection::Perspective { fov_y: 50.0, distance: Some(45.0), near: None };
     let projections = [scene.camera.projection, close];
     let both_ways = COMPOSITINGS.into_iter().filter(|&compositing| compositing != Compositing::Surface);
@@ -237,7 +237,7 @@ fn back_to_front_equals_front_to_back() {
         scene.splatting.order = Order::BackToFront;
         let (back_to_front, _) = render(&gpu, &volume, &scene);
         let difference = largest_difference(&front_to_back, &back_to_front);
-        // Per sheet a subtraction, a product and a sum of numbers up to 1, in either order, whose roundings have either sign.
+        // Each sheet adds a subtraction, a product and a sum of numbers up to 1, in either order, whose roundings have either sign.
         let tolerance = 0.8 * F32 * sheets as f64;
         assert_at_most(difference, tolerance, format_args!("{compositing:?} {form:?} {projection:?}"));
     }
@@ -253,7 +253,7 @@ fn every_run_gives_the_same_bytes() {
     for ((compositing, projection), form) in cases.flat_map(|case| FORMS.map(|form| (case, form))) {
         (scene.splatting.compositing, scene.camera.projection) = (compositing, projection);
         (scene.splatting.rasterizer, scene.splatting.footprint) = form;
-        let bytes = |gpu: &Headless| {
+        let bytes = |gpu: &GpuHeadless| {
             let (image, _) = render(gpu, &volume, &scene);
             bytemuck::cast_slice::<_, u8>(image.pixels.as_flattened()).to_vec()
         };
@@ -277,7 +277,7 @@ fn constant_colour_is_constant_colour_times_alpha() {
         .flat_map(|rasterizer| [Compositing::Linear, Compositing::Exponential].map(|how| (rasterizer, how)))
     {
         (scene.splatting.rasterizer, scene.splatting.compositing) = (rasterizer, compositing);
-        // Quads round amount and amount times colour to f16 each; sheets and their sum are f32.
+        // Quads round the amount and the amount times colour to f16; sheets and their sum are f32.
         let rounding = if rasterizer == Rasterizer::Quads { 2.0 * F16 } else { 0.0 };
         for slab_width in [0.5, 1.0, 3.0] {
             scene.splatting.slab_width = slab_width;

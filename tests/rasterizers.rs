@@ -1,4 +1,4 @@
-//! The rasterizers against each other, and which of them draws what: `splatting.rasterizer` and `splatting.footprint_box`.
+//! The rasterizers compared with each other, and the choice between them: `splatting.rasterizer` and `splatting.footprint_box`.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
@@ -6,7 +6,7 @@ mod common;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::RenderError;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::gpu::device::{DeviceRequirements, TILE_FEATURES};
 use sheetsplat::internals::gpu::targets::CompositingBuffer;
 use sheetsplat::scene::Scene;
@@ -26,26 +26,26 @@ fn head() -> (Volume, Scene) {
     (builtin::volume("head:32").unwrap(), scene)
 }
 
-/// A device with these features alone.
-fn open(features: Features) -> Headless {
+/// A device with only these features.
+fn open(features: Features) -> GpuHeadless {
     let requirements = DeviceRequirements { features, limits: Limits::default() };
-    Headless::new(&lavapipe().with_requirements(requirements)).unwrap()
+    GpuHeadless::new(&lavapipe().with_requirements(requirements)).unwrap()
 }
 
-/// Which rasterizer a frame was drawn with.
-fn drawn_by(gpu: &Headless, volume: &Volume, scene: &Scene) -> String {
+/// The rasterizer that drew a frame.
+fn drawn_by(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> String {
     gpu.render_volume(volume.clone(), scene).unwrap().stats.rasterizer
 }
 
-/// The key that a refused scene's message names, and the message.
-fn refusal(gpu: &Headless, volume: &Volume, scene: &Scene) -> (String, String) {
+/// The key in a refused scene's message, and the message.
+fn refusal(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> (String, String) {
     match gpu.render_volume(volume.clone(), scene) {
         Err(RenderError::OutOfRange(error)) => (error.key.clone(), error.to_string()),
         other => panic!("{other:?}"),
     }
 }
 
-/// More than there may be behind a tile: 2744 bricks in two pixels, and in four sheets.
+/// More than the tile rasterizer supports behind a tile: 2744 bricks in two pixels and four sheets.
 fn crowded() -> (Volume, Scene) {
     let mut scene = scene(2, 2);
     scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.001)]);
@@ -55,7 +55,7 @@ fn crowded() -> (Volume, Scene) {
 }
 
 #[test]
-fn auto_takes_tiles_where_they_can_be_had() {
+fn auto_chooses_tiles_where_they_are_supported() {
     let [subgroups, none] = [TILE_FEATURES, Features::empty()].map(open);
     let (volume, mut scene) = head();
     assert_eq!(scene.splatting.rasterizer, Rasterizer::Auto, "the default");
@@ -73,9 +73,9 @@ fn auto_takes_tiles_where_they_can_be_had() {
 }
 
 #[test]
-fn what_insists_on_tiles_is_refused_without() {
+fn settings_that_require_tiles_are_refused_without_them() {
     let [subgroups, none] = [TILE_FEATURES, Features::empty()].map(open);
-    let refused = |gpu: &Headless, (volume, scene): &(Volume, Scene), words: &[&str]| {
+    let refused = |gpu: &GpuHeadless, (volume, scene): &(Volume, Scene), words: &[&str]| {
         let (key, message) = refusal(gpu, volume, scene);
         assert_eq!(key, "splatting.rasterizer", "{message}");
         words.iter().for_each(|word| assert!(message.contains(word), "no {word:?} in {message}"));
@@ -90,7 +90,7 @@ fn what_insists_on_tiles_is_refused_without() {
     refused(&open(Features::SUBGROUP), &tiles, &["\"tiles\"", "barriers", "\"quads\""]);
     let limits = Limits { max_compute_workgroup_storage_size: 16383, ..Limits::default() };
     let requirements = DeviceRequirements { features: TILE_FEATURES, limits };
-    let little = Headless::new(&lavapipe().with_requirements(requirements)).unwrap();
+    let little = GpuHeadless::new(&lavapipe().with_requirements(requirements)).unwrap();
     refused(&little, &tiles, &["max_compute_workgroup_storage_size", "16383", "16384", "\"quads\""]);
     let parallelogram = with(|scene| scene.splatting.footprint_box = FootprintBox::Parallelogram);
     refused(&none, &parallelogram, &["\"tiles\"", "subgroups"]);
@@ -108,14 +108,14 @@ fn what_insists_on_tiles_is_refused_without() {
     refused(&subgroups, &(volume, scene), &["bricks behind a patch", "\"quads\""]);
 }
 
-/// With nothing culled, and amounts that quads round to f16.
+/// Nothing is culled, and quads round amounts to f16.
 #[test]
 fn rasterizers_agree() {
     let gpu = gpu();
     let (volume, mut scene) = head();
     scene.splatting.culling = false;
     let mut random = Random(61);
-    // Sums that are divided by their own alpha keep the least of what was not rounded.
+    // Sums that are divided by their own alpha keep the fewest exact digits.
     for (compositing, required) in BY_AMOUNTS.into_iter().zip([80.0, 88.0, 92.0]).cycle().take(24) {
         scene.splatting.compositing = compositing;
         scene.splatting.order = random.pick(&[Order::FrontToBack, Order::BackToFront]);
@@ -138,7 +138,7 @@ fn rasterizers_agree() {
     }
 }
 
-/// Bindings that hold few rows of the image, and few bricks: the image is drawn band by band, from a list of all bricks.
+/// Bindings hold only a few rows of the image and a few bricks, so the image is drawn band by band from a list of all bricks.
 #[test]
 fn small_bindings_change_no_bit_of_tiles() {
     let (volume, mut scene) = head();
@@ -147,7 +147,7 @@ fn small_bindings_change_no_bit_of_tiles() {
     let [full, small] = [Limits::default().max_storage_buffer_binding_size, 200 << 10].map(|bytes| {
         let limits = Limits { max_storage_buffer_binding_size: bytes, ..Limits::default() };
         let requirements = DeviceRequirements { features: TILE_FEATURES, limits };
-        Headless::new(&lavapipe().with_requirements(requirements)).unwrap()
+        GpuHeadless::new(&lavapipe().with_requirements(requirements)).unwrap()
     });
     assert_eq!(CompositingBuffer::bands(&small.device().limits(), [300, 200]).unwrap().len(), 7);
     for order in [Order::FrontToBack, Order::BackToFront] {
@@ -191,7 +191,7 @@ fn a_fallback_to_quads_says_why_once() {
     for (features, scene, reason) in [
         (Features::empty(), scene.clone(), Some("subgroups")),
         (TILE_FEATURES, scene.clone(), None),
-        // The settings ask for quads.
+        // The settings require quads.
         (Features::empty(), sections(scene), None),
     ] {
         let gpu = open(features);

@@ -1,5 +1,5 @@
-//! Images against a dense ray march of the same pre-shaded field (`reference::ray_march`): the f64 twin's, and the GPU's by each
-//! rasterizer. `cargo test --release --test ray_march -- --nocapture` prints what was measured.
+//! Images against a dense ray march of the same pre-shaded field (`reference::ray_march`): those of the f64 evaluation, and the GPU's by each
+//! rasterizer. `cargo test --release --test ray_march -- --nocapture` prints the measurements.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
@@ -20,7 +20,7 @@ use common::images::{BLACK, psnr};
 use common::shared::shared;
 use common::{camera, gpu, scene, transfer};
 
-/// Some pixels of an image, as the march sees them.
+/// Some pixels of an image by the ray march.
 struct Marched {
     at: Vec<UVec2>,
     pixels: Vec<[f32; 4]>,
@@ -47,7 +47,7 @@ fn twin(volume: &Volume, scene: &Scene) -> Image {
     reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap()
 }
 
-/// Asserts that the twin and the GPU come as close to the march as required, dB.
+/// Asserts that the f64 evaluation and the GPU come as close to the march as required, in dB.
 fn assert_close(name: &str, volume: Volume, mut scene: Scene, stride: u32, required: f64) {
     let volume = Arc::new(volume);
     let marched = Marched::new(&volume, &scene, stride);
@@ -64,7 +64,8 @@ fn assert_close(name: &str, volume: Volume, mut scene: Scene, stride: u32, requi
     all.iter().for_each(|&decibels| assert_at_least(decibels, required, name));
 }
 
-/// The nerve at fov 30, an image large enough that a grid unit covers a pixel at the far end, so that no low-pass rule sets in.
+/// The nerve with a field of view of 30°, in an image so large that a grid unit covers a pixel at the far end and the low-pass rule has no
+/// effect.
 #[test]
 fn nerve() {
     let mut scene = scene(288, 288);
@@ -95,7 +96,7 @@ fn shared_quarter_head() {
     assert_close("quarter-head-perspective", volume, scene, 1, 45.0);
 }
 
-/// Orthographic, slabs and march are the same field, so what is left is the slab width: it goes with its square.
+/// Orthographic, slabs and march have the same field, so the error is that of the slab width and proportional to its square.
 #[test]
 fn thin_slabs() {
     let volume = builtin::volume("head:32").unwrap().with_spacing("head", DVec3::new(1.0, 1.0, 3.0)).unwrap();

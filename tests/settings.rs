@@ -1,5 +1,5 @@
-//! Settings that are not allowed: every field at every bad value, through a scene file, a setter, and a scene made in code, is an error that
-//! names the same key; the values at the ends of the ranges draw finite images.
+//! Invalid settings: every field at every invalid value, through a scene file, a setter, and a scene made in code, is an error that names
+//! the same key; the values at the ends of the ranges draw finite images.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
@@ -23,7 +23,7 @@ const NAN: f64 = f64::NAN;
 const INF: f64 = f64::INFINITY;
 const NOT_FINITE: [f64; 3] = [NAN, INF, -INF];
 
-/// A scene whose volume has labels and whose ramps are all given.
+/// A scene whose volume has labels and whose ramps are all stated.
 fn scene() -> Scene {
     let text = "[volume]\nbuiltin = 'head:16'\n[image]\nwidth = 24\nheight = 18\n[transfer]\ncolor = [[0, [1, 1, 1]]]\n\
                 opacity = [[0, 0], [90, 0.5]]\ngradient_opacity = [[0, 1]]\niso_ranges = [[1, 300]]\n\
@@ -45,8 +45,8 @@ fn share(value: f64) -> Option<Ramp<f64>> {
     Some(Ramp::new(vec![(0.0, value)]).unwrap())
 }
 
-/// A number of a scene: its key, how it is set in code, the values at the ends of its range, and values just beyond. Those that are not finite
-/// are never allowed.
+/// A number of a scene: its key, how it is set in code, the values at the ends of its range, and values just beyond. Values that are not
+/// finite are never allowed.
 struct Field {
     key: &'static str,
     set: fn(&mut Scene, f64),
@@ -157,14 +157,14 @@ impl Field {
         scene
     }
 
-    /// The scene as a file, which `Scene::to_toml` writes whatever it holds.
+    /// The scene read back from the file that `Scene::to_toml` writes, whatever the value.
     fn parsed(&self, value: f64) -> Result<Scene, SceneError> {
         let text = self.with(value).to_toml(Path::new("")).unwrap();
         Scene::parse(&text, "scene.toml", Path::new(""), &[])
     }
 }
 
-/// Everything of a scene, by the setters.
+/// Sets everything in a scene through the setters.
 fn set_all(view: &mut SceneView, scene: &Scene, transfer: &TransferFunction) -> Result<(), SettingError> {
     view.set_camera(scene.camera)?;
     view.set_image(scene.image)?;
@@ -176,7 +176,7 @@ fn set_all(view: &mut SceneView, scene: &Scene, transfer: &TransferFunction) -> 
 }
 
 #[test]
-fn what_is_not_allowed_has_the_same_key_everywhere() {
+fn invalid_values_have_the_same_key_everywhere() {
     let gpu = gpu();
     let volume = scene().load_volume().unwrap();
     let transfer = scene().transfer.resolve(&volume);
@@ -206,7 +206,7 @@ fn what_is_not_allowed_has_the_same_key_everywhere() {
                 Err(Error::Render(error)) => refused(Err(error)),
                 other => panic!("{key} = {value}: {:?}", other.map(|rendering| rendering.stats)),
             }
-            // The volume's spacing is the volume's, and no view's.
+            // Spacing belongs to the volume, not to a view.
             if scene.spacing.is_none() {
                 let transfer = scene.transfer.resolve(&volume);
                 refused(set_all(&mut view, &scene, &transfer).map_err(RenderError::from));
@@ -241,9 +241,9 @@ fn the_ends_of_ranges_are_allowed_and_drawn() {
     }
 }
 
-/// What a scene's numbers are one by one, and not together.
+/// Values that are allowed one by one, but not together.
 #[test]
-fn what_does_not_go_together_has_the_same_key_everywhere() {
+fn settings_that_exclude_each_other_have_the_same_key_everywhere() {
     let gpu = gpu();
     let volume = builtin::volume("head:16").unwrap();
     let mut view = gpu.view(volume.clone(), &scene()).unwrap();
@@ -287,9 +287,9 @@ fn what_does_not_go_together_has_the_same_key_everywhere() {
     }
 }
 
-/// What a view is asked for that no scene file says.
+/// Settings of a view that scene files do not have.
 #[test]
-fn what_only_a_host_sets_is_checked() {
+fn settings_only_hosts_have_are_checked() {
     let gpu = gpu();
     let volume = builtin::volume("head:16").unwrap();
     let mut view = gpu.view(volume.clone(), &scene()).unwrap();
@@ -349,7 +349,7 @@ fn grids_are_checked() {
     Volume::new("made", one, DVec3::new(1e-100, 1e-96, 1e-99), vec![0.0]).unwrap();
 }
 
-/// A host reads bounds as numbers, and may set what it was told.
+/// A host reads bounds as numbers, and may set values at them.
 #[test]
 fn errors_carry_numbers() {
     let camera = Camera { projection: Projection::Orthographic { height: Some(-2.0) }, ..Camera::default() };

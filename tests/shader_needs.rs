@@ -1,5 +1,5 @@
-//! The files of the tile rasterizer's shader say on top what they need from which other file, and the list is right. WGSL has no imports:
-//! a file is read by itself only if it says where its names come from.
+//! The files of the tile rasterizer's shader list at the top what they need from which other file, and the lists are correct. WGSL has no
+//! imports, so a file can be read by itself only if it says where its names come from.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -28,7 +28,7 @@ fn words(code: &str) -> Vec<(char, &str)> {
     found
 }
 
-/// What a file declares for others: functions, structs, constants, overrides and variables outside of functions.
+/// What a file declares for others: functions, structs, constants, overrides and variables outside functions.
 fn declared(code: &str) -> BTreeSet<&str> {
     let at_top = code.lines().filter(|line| !line.starts_with([' ', '}', '\t']));
     let mut found = BTreeSet::new();

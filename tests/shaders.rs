@@ -1,17 +1,17 @@
-//! The shaders parse, validate as WebGPU core, all but one, and need no more than WebGPU's default limits. Needs no GPU.
+//! The shaders parse, validate as WebGPU core (except one), and need no more than WebGPU's default limits. Needs no GPU.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
-use naga::{AddressSpace, Module, ShaderStage, TypeInner};
+use naga::{AddressSpace, Expression, Literal, Module, ShaderStage, TypeInner};
 use sheetsplat::internals::gpu::shaders::{self, Shader};
 
-/// What WebGPU core has beyond naga's least: `pack2x16float` and its inverse, which WGSL always has.
+/// The capabilities of WebGPU core beyond naga's minimum: `pack2x16float` and its inverse, which WGSL always has.
 const WEBGPU_CORE: Capabilities = Capabilities::SHADER_FLOAT16_IN_FLOAT32;
 
-/// The one stage that asks for more, subgroups; frames are drawn without it where the device has none.
+/// The only stages that need more, subgroups; on devices without them other stages draw frames.
 const WITH_SUBGROUPS: [Shader; 2] = [shaders::GATHER, shaders::GATHER_PLANES];
 
 fn validated(shader: &Shader) -> Result<(Module, ModuleInfo), String> {
@@ -50,7 +50,7 @@ fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
     found
 }
 
-/// All that went wrong, not only the first.
+/// Asserts that nothing failed, and reports all failures, not only the first.
 fn assert_none(failures: &[String]) {
     assert!(failures.is_empty(), "{} failures:\n{}", failures.len(), failures.join("\n"));
 }
@@ -81,7 +81,7 @@ fn errors_name_the_file_and_the_line() {
     );
     for shader in &shaders::ALL {
         assert_eq!(shader.files.iter().map(|&(_, text)| text).collect::<String>(), shader.source);
-        // Every file ends with a line of its own, else lines would be counted wrongly.
+        // Every file ends with a line break, or else lines would be counted wrongly.
         assert!(shader.files.iter().all(|(_, text)| text.ends_with('\n')), "{}", shader.stage);
     }
 }
@@ -100,8 +100,8 @@ fn every_file_is_used() {
     assert_eq!(stages.len(), shaders::ALL.len(), "every stage has a name of its own");
 }
 
-/// One file of `src/pass` uses a shader; it names entry points and overrides in words that only the shader can check. (That
-/// the shader has all that the file names is checked where the pipelines are made.)
+/// A shader is used by one file of `src/pass`, whose names of entry points and overrides only the shader can check. (Creating the pipelines
+/// checks that the shader has all that the file names.)
 #[test]
 fn entry_points_and_overrides_are_those_of_the_passes() {
     let passes = files(&root().join("src/pass"), "rs");
@@ -128,7 +128,7 @@ fn entry_points_and_overrides_are_those_of_the_passes() {
                 failures.push(format!("{}: the pass does not use {}", shader.stage, entry.name));
             }
         }
-        // Bindings go by name, when a layout is made and when resources are bound.
+        // Bindings are matched by name, when a layout is made and when resources are bound.
         for (_, global) in module.global_variables.iter() {
             let (Some(binding), Some(name)) = (&global.binding, &global.name) else { continue };
             if shader.binding(name) != Some(binding.binding) {
@@ -157,7 +157,7 @@ fn bindings_stay_within_default_limits() {
     for shader in &shaders::ALL {
         let (module, _) = validated(shader).unwrap();
         let globals = || module.global_variables.iter().map(|(_, global)| global);
-        // A layout may show every binding to every stage, so all of them count for each.
+        // A layout may make every binding visible to every stage, so all of them count for each.
         let count =
             |counts: &dyn Fn(&naga::GlobalVariable) -> bool| globals().filter(|global| counts(global)).count() as u32;
         let inner = |global: &naga::GlobalVariable| module.types[global.ty].inner.clone();
@@ -248,7 +248,7 @@ fn entry_points_stay_within_default_limits() {
     assert_none(&failures);
 }
 
-/// An entry point's workgroup size with the values the shader itself gives its overrides; the passes set the same.
+/// An entry point's workgroup size with the shader's own values of its overrides; the passes set the same.
 fn workgroup_size(module: &Module, entry: &naga::EntryPoint) -> [u32; 3] {
     let mut size = entry.workgroup_size;
     for (side, overridden) in size.iter_mut().zip(entry.workgroup_size_overrides.into_iter().flatten()) {
@@ -274,4 +274,77 @@ fn location_count(module: &Module, ty: naga::Handle<naga::Type>) -> u32 {
         }
         _ => 1,
     }
+}
+
+/// The value of a constant's expression: literals and constants of the same file, multiplied and divided.
+fn evaluated(expression: &str, known: &BTreeMap<String, f64>) -> Option<f64> {
+    let operand = |text: &str| {
+        let text = text.trim().replace('_', "");
+        text.parse().ok().or_else(|| known.get(text.as_str()).copied())
+    };
+    let mut value = 1.0;
+    for factor in expression.split('*') {
+        let mut parts = factor.split('/').map(operand);
+        value *= parts.next()??;
+        for divisor in parts {
+            value /= divisor?;
+        }
+    }
+    Some(value)
+}
+
+/// The numbers that Rust text declares as constants, by name.
+fn constants(text: &str) -> BTreeMap<String, f64> {
+    let mut known = BTreeMap::new();
+    for line in text.lines() {
+        let Some((_, declaration)) = line.split_once("const ") else { continue };
+        let Some((name, rest)) = declaration.split_once(": ") else { continue };
+        let Some((_, expression)) = rest.trim_end_matches(';').split_once(" = ") else { continue };
+        if let Some(value) = evaluated(expression, &known) {
+            known.insert(name.to_owned(), value);
+        }
+    }
+    known
+}
+
+#[test]
+fn constants_of_rust_are_found() {
+    let text = "const SIDE: u32 = 4;\npub(super) const VOXELS: u32 = SIDE * SIDE * 1_0;\nconst F: f64 = 1.0 / 64.0;\nconst G: X = f(2);";
+    let expected = [("SIDE", 4.0), ("VOXELS", 160.0), ("F", 1.0 / 64.0)];
+    assert_eq!(constants(text), expected.map(|(name, value)| (name.to_owned(), value)).into());
+}
+
+/// A constant's name means one number in Rust and WGSL, in every file of both.
+#[test]
+fn constants_with_one_name_have_one_value() {
+    let mut found: BTreeMap<String, BTreeMap<String, f64>> = BTreeMap::new();
+    for file in files(&root().join("src"), "rs").into_iter().filter(|file| !file.starts_with(root().join("src/bin"))) {
+        for (name, value) in constants(&std::fs::read_to_string(&file).unwrap()) {
+            found.entry(name).or_default().insert(file.display().to_string(), value);
+        }
+    }
+    let mut compared = 0;
+    let mut failures = Vec::new();
+    for shader in &shaders::ALL {
+        let (module, _) = validated(shader).unwrap();
+        for (_, constant) in module.constants.iter() {
+            let Some(name) = &constant.name else { continue };
+            let value = match module.global_expressions[constant.init] {
+                Expression::Literal(Literal::U32(value)) => f64::from(value),
+                Expression::Literal(Literal::F32(value)) => f64::from(value),
+                _ => continue,
+            };
+            for (file, &other) in found.get(name).into_iter().flatten() {
+                compared += 1;
+                // WGSL rounds to f32.
+                if f64::from(other as f32) != value {
+                    failures.push(format!("{name}: {value} in {}, {other} in {file}", shader.stage));
+                }
+            }
+        }
+    }
+    failures.sort();
+    failures.dedup();
+    assert_none(&failures);
+    assert!(compared > 20, "{compared}");
 }

@@ -1,4 +1,4 @@
-//! Ramps, what opacities mean, and transfer functions chosen for volumes without one.
+//! Ramps, the meaning of opacities, and transfer functions chosen for volumes without one.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[path = "common/shared.rs"]
@@ -60,7 +60,7 @@ fn volume(values: Vec<f32>) -> Volume {
     Volume::new("test", UVec3::new(values.len() as u32, 1, 1), DVec3::ONE, values).unwrap()
 }
 
-/// The chosen transfer function, after checks that hold for every volume.
+/// The chosen transfer function, after checks that apply to every volume.
 fn chosen(values: Vec<f32>) -> TransferFunction {
     let volume = volume(values);
     let transfer = TransferFunction::from_histogram(&volume);
@@ -76,20 +76,20 @@ fn chosen(values: Vec<f32>) -> TransferFunction {
     transfer
 }
 
-/// Where the chosen opacity is half its greatest.
+/// The value at which the chosen opacity is half its maximum.
 fn surface(transfer: &TransferFunction) -> f64 {
     let points = transfer.opacity.points();
     (points[0].0 + points[1].0) / 2.0
 }
 
-/// Volumes with an object: of `count` values, one in `period` lies at `object`, the others at `background`.
+/// Volumes with an object: of `count` values, one in `period` is `object`, and the others are `background`.
 fn two_valued(background: f32, object: f32, count: usize, period: usize) -> Vec<f32> {
     (0..count).map(|at| if at % period == 0 { object } else { background }).collect()
 }
 
 #[test]
 fn chosen_for_two_values() {
-    // Including one step of f32, the smallest and the greatest range, and sparse objects.
+    // Including one step of f32, the smallest and the largest range, and sparse objects.
     let next = f32::from_bits(1.0_f32.to_bits() + 1);
     let pairs =
         [(0.0, 1.0), (1.0, next), (1e-12, 2e-12), (0.0, f32::from_bits(1)), (-1e30, 1e30), (f32::MIN, f32::MAX)];
@@ -114,7 +114,7 @@ fn chosen_for_a_constant() {
 
 #[test]
 fn chosen_for_noisy_data() {
-    // Background 0 to 19, a faint fifth of the object from 80, the rest from 130; and the same far from the origin.
+    // Background 0 to 19, a faint fifth of the object from 80 on, the rest from 130 on; and the same far from 0.
     let noisy = |at: usize| {
         let noise = (at * 7919 % 20) as f32;
         noise
@@ -129,7 +129,7 @@ fn chosen_for_noisy_data() {
     let threshold = surface(&chosen((0..20_000).map(|at| noisy(at) * 1e27 - 1e30).collect()));
     assert!((-0.96e30..-0.945e30).contains(&threshold), "{threshold}");
 
-    // A cleared background, 99.5 % of the voxels, around values from 20 to 255: even the faintest of them show.
+    // A cleared background, 99.5 % of the voxels, around values from 20 to 255: even the faintest of these are visible.
     let sparse = |at: usize| if at.is_multiple_of(200) { (20 + at / 200 * 37 % 236) as f32 } else { 0.0 };
     let transfer = chosen((0..100_000).map(sparse).collect());
     assert!(transfer.alpha(0.0, 0.0) == 0.0 && transfer.alpha(35.0, 0.0) == 0.9);
@@ -159,7 +159,7 @@ fn settings(table: &str) -> TransferSettings {
 }
 
 #[test]
-fn what_is_missing_is_chosen() {
+fn missing_tables_are_chosen() {
     let volume = volume(two_valued(0.0, 100.0, 100, 3));
     let chosen = TransferFunction::from_histogram(&volume);
     assert_eq!(TransferSettings::default().resolve(&volume), chosen);

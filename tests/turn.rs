@@ -1,5 +1,6 @@
-//! Fig. 14: a nerve cell of 1:1:5 turns past 45°, where axis-aligned sheets change their axis and its brightness jumps; image-aligned
-//! sheets turn with it. `cargo test --test turn -- --nocapture` prints what was measured; `cargo bench --bench paper` draws the curves.
+//! Fig. 14: a nerve cell with spacing 1:1:5 turns past 45°, where axis-aligned sheets change their axis and its brightness jumps;
+//! image-aligned sheets turn with it. `cargo test --test turn -- --nocapture` prints the measurements; `cargo bench --bench paper` draws
+//! the curves.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
@@ -8,7 +9,7 @@ mod common;
 use std::sync::Arc;
 
 use glam::DVec3;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::Method;
 use sheetsplat::volume::{Volume, builtin};
@@ -16,12 +17,12 @@ use sheetsplat::volume::{Volume, builtin};
 use common::compare::{assert_at_least, largest};
 use common::{gpu, scene, transfer};
 
-/// Pairs of angles half a degree apart, from head-on to side-on, and the two around 45°.
+/// The first of pairs of angles half a degree apart, from head-on to side-on, and the two around 45°.
 const ANGLES: [f64; 8] = [0.0, 15.0, 30.0, 44.5, 45.0, 60.0, 75.0, 89.5];
 const STEP: f64 = 0.5;
 
 /// The largest change of the image's mean brightness over a step.
-fn largest_change(gpu: &Headless, volume: &Arc<Volume>, scene: &Scene) -> f64 {
+fn largest_change(gpu: &GpuHeadless, volume: &Arc<Volume>, scene: &Scene) -> f64 {
     let mut view = gpu.view(volume.clone(), scene).unwrap();
     let mut brightness = |degrees: f64| {
         let mut camera = scene.camera;

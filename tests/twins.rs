@@ -1,5 +1,5 @@
-//! The f64 twin by itself: what must hold of its perspective, its axis-aligned sheets and its composite-every-sample.
-//! `cargo test --release --test twins -- --nocapture` prints what was measured.
+//! The f64 evaluation by itself: properties of its perspective, its axis-aligned sheets and its composite-every-sample.
+//! `cargo test --release --test twins -- --nocapture` prints the measurements.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
@@ -30,7 +30,7 @@ fn perspective(direction: [f64; 3], fov_y: f64, distance: f64, near: Option<f64>
     Camera { projection, ..camera(direction, 1.0) }
 }
 
-/// Differences of all channels.
+/// The differences of all channels.
 fn errors(a: &Image, b: &Image) -> Vec<f64> {
     assert_eq!(a.pixels.len(), b.pixels.len());
     a.pixels.as_flattened().iter().zip(b.pixels.as_flattened()).map(|(a, b)| f64::from(a - b)).collect()
@@ -43,8 +43,8 @@ fn head() -> (Volume, Scene) {
     (builtin::volume("head:32").unwrap(), scene)
 }
 
-/// An eye that moves away while its angle narrows sees what an orthographic camera sees: the difference halves when the distance doubles.
-/// On anisotropic grids slabs lie at other angles in perspective (SPEC §5), which leaves what does not depend on them.
+/// An eye that moves away while its angle narrows approaches an orthographic camera: the difference halves when the distance doubles. On
+/// anisotropic grids slabs have other angles in perspective (SPEC §5), so only what does not depend on them is compared.
 #[test]
 fn a_far_eye_is_orthographic() {
     const HEIGHT: f64 = 60.0;
@@ -63,7 +63,7 @@ fn a_far_eye_is_orthographic() {
             let orthographic = render(&volume, &scene);
             let differences = [1024.0, 2048.0, 4096.0].map(|distance: f64| {
                 let fov_y = 2.0 * (HEIGHT / 2.0 / distance).atan().to_degrees();
-                // Whole numbers of slabs between eye and centre: the planes are the same.
+                // A whole number of slabs lies between eye and centre, so the planes are the same.
                 scene.camera = perspective([0.4, 0.9, -0.3], fov_y, distance, None);
                 rms(&orthographic, &render(&volume, &scene))
             });
@@ -78,8 +78,8 @@ fn a_far_eye_is_orthographic() {
     }
 }
 
-/// What a block of one opacity absorbs along the central ray is that of its thickness, whatever spacing, slab width and obliquity; a
-/// wide kernel leaves no ripple.
+/// The absorption of a uniform block along the central ray depends on its thickness, for any spacing, slab width and obliquity; a wide
+/// kernel has no ripple.
 #[test]
 fn a_blocks_opacity_is_that_of_its_thickness() {
     const LAYERS: u32 = 5;
@@ -132,7 +132,7 @@ fn a_headlight_shines_from_the_eye() {
     }
 }
 
-/// Minified, a kernel keeps what it adds to the image: per section, at its own depth (low-pass rule).
+/// In a minified view a kernel keeps its total amount, per section at its own depth (low-pass rule).
 #[test]
 fn minified_kernels_keep_their_amount() {
     let mut values = vec![0.0; 125];
@@ -144,20 +144,20 @@ fn minified_kernels_keep_their_amount() {
             scene.camera = perspective(direction, 90.0, 20.0, None);
             scene.image.background = [0.0; 4];
             scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (1.0, 0.02)]);
-            // Wide enough that it does not matter where the pixels' centres fall.
+            // The kernels are so wide that the positions of pixel centres do not matter.
             (scene.splatting.radius, scene.splatting.falloff) = (4.0, 1.0);
             scene.splatting.method = method;
             scene.splatting.compositing = Compositing::Xray;
             let alpha: f64 = render(&volume, &scene).pixels.iter().map(|pixel| f64::from(pixel[3])).sum();
             alpha / f64::from(size).powi(2)
         };
-        // Two grid units to a pixel, and one to 13.
+        // Two grid units per pixel, and one per 13 pixels.
         let (minified, magnified) = (total(20), total(521));
         assert_at_most((minified / magnified - 1.0).abs(), 2.7e-4, format_args!("{method:?} {direction:?}"));
     }
 }
 
-/// Whole kernels or sections: along a slice axis both add up to the same opacity, and to the same colour where the volume is smooth.
+/// Whole kernels or sections: along a slice axis both add up to the same opacity, and to the same colour in smooth volumes.
 #[test]
 fn axis_aligned_equals_image_aligned_along_an_axis() {
     let dims = UVec3::splat(24);
@@ -189,11 +189,11 @@ fn axis_aligned_equals_image_aligned_along_an_axis() {
     }
 }
 
-/// Seen along -x the slices' order is the other way round; an order the wrong way shows.
+/// Seen along -x the order of slices is reversed; the wrong order would be visible.
 #[test]
 fn slices_are_ordered_along_w() {
     let (nx, ny, nz) = (12, 16, 16);
-    // Red at low x, blue at high x.
+    // Red at low x, and blue at high x.
     let values = (0..nx * ny * nz).map(|at| (at % nx) as f32).collect();
     let volume = Volume::new("two", UVec3::new(nx, ny, nz), DVec3::ONE, values).unwrap();
     for (x, method) in [1.0, -1.0].into_iter().flat_map(|x| METHODS.map(|method| (x, method))) {
@@ -230,7 +230,7 @@ fn back_to_front_equals_front_to_back() {
             by_method.push(forwards);
         }
     }
-    // The methods are not the same, but for sums.
+    // The methods differ, except for sums.
     let [image_aligned, axis_aligned, every_sample] = [0, 6, 12].map(|at| &by_method[at..at + 6]);
     for (a, b) in [(image_aligned, axis_aligned), (axis_aligned, every_sample), (image_aligned, every_sample)] {
         let differences: Vec<f64> = (0..4).map(|at| largest_difference(&a[at], &b[at])).collect();
@@ -240,7 +240,7 @@ fn back_to_front_equals_front_to_back() {
     }
 }
 
-/// Voxels composited one by one are not added up first: two in one place along the ray, opacity by opacity.
+/// Voxels composited one by one are not added up first: two along a ray are composited one after the other.
 #[test]
 fn every_sample_is_composited_by_itself() {
     let volume = Volume::new("two", UVec3::new(1, 2, 1), DVec3::ONE, vec![1.0, 2.0]).unwrap();
@@ -261,7 +261,7 @@ fn every_sample_is_composited_by_itself() {
     }
 }
 
-/// Early splat elimination keeps its guarantee in perspective, with sections' own boxes, and for slices.
+/// Early splat elimination keeps its guarantee in perspective, with each section's own box, and for slices.
 #[test]
 fn culling_in_perspective_and_by_slices() {
     let volume = builtin::volume("head:40").unwrap();
@@ -291,7 +291,7 @@ fn culling_in_perspective_and_by_slices() {
     }
 }
 
-/// The near plane through one kernel: what lies before it is gone, and all of it once the voxel does.
+/// The near plane cuts through one kernel: the part before it disappears, and all of it once the voxel lies before it.
 #[test]
 fn the_near_plane_cuts_kernels() {
     let mut values = vec![0.0; 27];
@@ -314,7 +314,7 @@ fn the_near_plane_cuts_kernels() {
             let counts = reference::count(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
             assert_eq!(counts.voxels_in_range, u64::from(before > 0.0));
             if method == Method::ImageAligned {
-                // Slabs of width 1 from the eye on; the voxel is at 10.
+                // Slabs of width 1 start at the eye; the voxel is at 10.
                 let first = (10.0 - before).max(10.0 - 2.0 * stretch).floor();
                 let sections = if before > 0.0 { 10.0 + 2.0 * stretch - first } else { 0.0 };
                 assert_eq!(counts.sections_total as f64, sections, "{before}");
@@ -323,9 +323,9 @@ fn the_near_plane_cuts_kernels() {
     }
 }
 
-/// Any eye, any angle: every number stays one.
+/// For any eye and any angle, no number becomes NaN.
 #[test]
-fn no_view_breaks_down() {
+fn every_view_is_finite() {
     let mut random = Random(11);
     let (volume, mut scene) = head();
     (scene.image.width, scene.image.height) = (24, 20);

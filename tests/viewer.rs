@@ -1,4 +1,4 @@
-//! `sheetsplat view` as a user starts it. Needs an X11 display, as of `xvfb-run`, and a GPU or lavapipe.
+//! `sheetsplat view` as a user starts it. Needs an X11 display, such as that of `xvfb-run`, and a GPU or lavapipe.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 
 use image::{Rgba, RgbaImage};
 
-/// Of the window in these tests; the panel is at its right.
+/// The size of the window; the panel is at its right.
 const WINDOW: [u32; 2] = [900, 600];
 const PANEL: u32 = 330;
 
@@ -37,7 +37,7 @@ fn open(folder: &Path, name: &str) -> RgbaImage {
     image::open(folder.join(name)).unwrap().into_rgba8()
 }
 
-/// Largest difference of any channel.
+/// The largest difference of any channel.
 fn difference(a: &Rgba<u8>, b: &Rgba<u8>) -> u8 {
     a.0.iter().zip(b.0).map(|(a, b)| a.abs_diff(b)).max().unwrap()
 }
@@ -50,7 +50,7 @@ fn the_window_shows_the_rendering_and_the_panel() {
     let window = open(folder.path(), "window.png");
     assert_eq!(window.dimensions(), (width, height));
 
-    // The picture is what `render` makes of as many pixels.
+    // The picture equals what `render` makes with the same number of pixels.
     let picture = width - PANEL;
     let size = format!("--set image.width={picture} --set image.height={height}");
     succeeds(sheetsplat(folder.path(), &format!("render {SCENE} {size} -o image.png")));
@@ -76,7 +76,7 @@ fn the_window_shows_the_rendering_and_the_panel() {
 }
 
 #[test]
-fn what_cannot_be_shown_ends_with_a_message() {
+fn failures_end_with_a_message() {
     let folder = tempfile::tempdir().unwrap();
     let fails = |code, arguments: &str, words: &[&str]| assert_fails(sheetsplat(folder.path(), arguments), code, words);
     fails(2, "view builtin:head:16 --size 900", &["--size", "900", "WxH", "100 to 16384"]);

@@ -1,11 +1,11 @@
-//! Views in perspective and sheets along the slices (SPEC §§2, 3.1, 5): whole frames by each rasterizer against the f64 twin, with
-//! eyes outside, beside and inside the volume. `cargo test --release --test views -- --nocapture` prints what was measured.
+//! Views in perspective and sheets along the slices (SPEC §§2, 3.1, 5): whole frames by each rasterizer against the f64 evaluation, with
+//! eyes outside, beside and inside the volume. `cargo test --release --test views -- --nocapture` prints the measurements.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
 mod common;
 
-use sheetsplat::headless::{Headless, Rendering};
+use sheetsplat::headless::{GpuHeadless, Rendering};
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::Light;
@@ -17,7 +17,7 @@ use common::compare::{assert_at_least, assert_at_most};
 use common::images::{BLACK, largest_difference, psnr};
 use common::{BY_AMOUNTS, F32, RASTERIZERS, Random, SPACINGS, gpu, random_eye, random_volume, scene, transfer};
 
-/// Any view in perspective, and any along the slices, of which some are orthographic.
+/// Any view in perspective, or any view of slices, some of them orthographic.
 fn random_case(random: &mut Random) -> (Volume, Scene) {
     let spacing = random.pick(&SPACINGS);
     let volume = random_volume(random, (5.0, 14.0), spacing);
@@ -36,22 +36,22 @@ fn random_case(random: &mut Random) -> (Volume, Scene) {
     scene.splatting.compositing = random.pick(&BY_AMOUNTS);
     scene.splatting.slab_width = random.pick(&[0.5, 1.0, 2.0, 3.0]);
     scene.splatting.radius = random.pick(&[1.4, 2.0, 2.7]);
-    // The twin culls nothing.
+    // The reference culls nothing.
     scene.splatting.culling = false;
     (volume, scene)
 }
 
-fn render(gpu: &Headless, volume: &Volume, scene: &Scene, rasterizer: Rasterizer, order: Order) -> Rendering {
+fn render(gpu: &GpuHeadless, volume: &Volume, scene: &Scene, rasterizer: Rasterizer, order: Order) -> Rendering {
     let mut scene = scene.clone();
     (scene.splatting.rasterizer, scene.splatting.order) = (rasterizer, order);
     gpu.render_volume(volume.clone(), &scene).unwrap()
 }
 
 #[test]
-fn any_view_is_that_of_the_twin() {
+fn any_view_equals_the_reference() {
     let gpu = gpu();
     let mut random = Random(1998);
-    // Decibels by rasterizer and method.
+    // The PSNR in dB by rasterizer and method.
     let mut worst = [[f64::INFINITY; 2]; 2];
     let mut seen = 0;
     for case in 0..24 {
@@ -71,7 +71,7 @@ fn any_view_is_that_of_the_twin() {
             let worst = &mut worst[at][scene.splatting.method as usize];
             *worst = worst.min(decibels);
             assert_at_least(decibels, 75.0, format_args!("case {case}, {rasterizer:?} with {scene:?}"));
-            // Per sheet a subtraction, a product and a sum of numbers up to 1, in either order, whose roundings have either sign.
+            // Each sheet adds a subtraction, a product and a sum of numbers up to 1, in either order, whose roundings have either sign.
             let allowed = 1.5 * F32 * counts.sheets as f64;
             let difference = largest_difference(&forwards.image, &backwards.image);
             assert_at_most(difference, allowed, format_args!("case {case}, {rasterizer:?} with {scene:?}"));

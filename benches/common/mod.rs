@@ -1,15 +1,15 @@
-//! What the benches share: their arguments, scenes by name, times and medians.
+//! Helpers of the benches: arguments, scenes by name, times and medians.
 
 use std::path::Path;
 use std::time::Instant;
 
 use sheetsplat::SceneView;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::scene::{Scene, VolumeSource};
 use sheetsplat::settings::Camera;
 use sheetsplat::stats::Stats;
 
-/// A number that may come first, and the names after it.
+/// The optional number that comes first, and the names after it.
 pub(crate) fn arguments(default: usize) -> (usize, Vec<String>) {
     // Cargo passes --bench.
     let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
@@ -28,24 +28,24 @@ pub(crate) fn open(name: &str) -> Scene {
     }
 }
 
-/// The whole volume, as in the scene files that results are compared with.
+/// The whole volume is framed, as in the scene files that results are compared with.
 fn whole(volume: VolumeSource) -> Scene {
     Scene { camera: Camera::default(), ..Scene::new(volume) }
 }
 
-/// What a table calls it.
+/// A scene's name in tables.
 pub(crate) fn label(name: &str) -> String {
     Path::new(name).file_stem().unwrap().display().to_string()
 }
 
-/// Draws a frame: the milliseconds from planning to read-back, and what it consisted of.
-pub(crate) fn timed(headless: &Headless, view: &mut SceneView) -> (f64, Stats) {
+/// Draws a frame and returns the milliseconds from planning to read-back, and its statistics.
+pub(crate) fn timed(headless: &GpuHeadless, view: &mut SceneView) -> (f64, Stats) {
     let start = Instant::now();
     let stats = headless.draw(view).unwrap().stats;
     (start.elapsed().as_secs_f64() * 1e3, stats)
 }
 
-/// Of some runs the one with the median time.
+/// The run with the median time.
 pub(crate) fn median<T>(runs: impl IntoIterator<Item = (f64, T)>) -> (f64, T) {
     let mut runs: Vec<(f64, T)> = runs.into_iter().collect();
     runs.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -1,8 +1,8 @@
-//! What a change costs (§5.1): voxels touched and time of every setter, against making the view anew; and the iso-range's binary
-//! search, and the lists' memory beside Table 1's claim.
+//! The cost of changes (§5.1): touched voxels and time of every setter, compared with making the view again; the iso-range's binary search;
+//! and the lists' memory compared with Table 1's claim.
 //!
-//! `cargo bench --bench lists -- [PAIRS] [SCENE]…` takes scene files or builtin volumes; without any, the bonsai and the CT head
-//! where they are, else builtin ones.
+//! `cargo bench --bench lists -- [PAIRS] [SCENE]…` takes scene files or builtin volumes. The default is the bonsai and the CT head if they
+//! exist, or else builtin ones.
 
 #![expect(clippy::unwrap_used, reason = "a bench")]
 
@@ -17,7 +17,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 use sheetsplat::SceneView;
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::{GpuHeadless, HeadlessOptions};
 use sheetsplat::internals::gpu::classified_volume::Touched;
 use sheetsplat::internals::iso_range::ValueSet;
 use sheetsplat::internals::value_list::ValueList;
@@ -27,8 +27,7 @@ use sheetsplat::settings::{Ramp, TransferFunction};
 
 use crate::slice_lists::SliceLists;
 
-/// A change by name. The number of the repetition makes it another one each time; of the scene's voxels the value is given that so
-/// many percent do not exceed.
+/// A change with its name. The number of the repetition makes it differ each time; the last argument holds percentiles of the scene's values.
 type Change = (&'static str, fn(&mut SceneView, usize, &[f64]) -> Touched);
 
 const CHANGES: [Change; 7] = [
@@ -61,20 +60,20 @@ const CHANGES: [Change; 7] = [
 fn main() {
     let (pairs, scenes) = common::arguments(7);
     let scenes = if scenes.is_empty() { default_scenes() } else { scenes };
-    let headless = Headless::new(&HeadlessOptions::default()).unwrap();
+    let headless = GpuHeadless::new(&HeadlessOptions::default()).unwrap();
     for name in &scenes {
         bench(&headless, &common::open(name), &common::label(name), pairs);
     }
 }
 
-fn bench(headless: &Headless, scene: &Scene, name: &str, pairs: usize) {
+fn bench(headless: &GpuHeadless, scene: &Scene, name: &str, pairs: usize) {
     let volume = Arc::new(scene.load_volume().unwrap());
     let start = Instant::now();
     let list = ValueList::new(volume.values());
     let sort_ms = milliseconds(start);
     let share = list.bytes() as f64 / size_of_val(volume.values()) as f64;
     println!(
-        "\n{name}: sorted by value once in {sort_ms:.0} ms; the list takes {:.0} % of the volume's memory.",
+        "\n{name}: sorting by value, once, took {sort_ms:.0} ms; the list takes {:.0} % of the volume's memory.",
         100.0 * share
     );
 
@@ -87,7 +86,7 @@ fn bench(headless: &Headless, scene: &Scene, name: &str, pairs: usize) {
     }));
     println!("Extracting the scene's iso-range, {} voxels: {:.2} ms.\n", search.1, search.0);
 
-    // Slice by slice, as [8] has it for axis-aligned sheets.
+    // Slice by slice, as in [8] for axis-aligned sheets.
     let start = Instant::now();
     let slices = SliceLists::new(volume.values(), volume.grid(), 2);
     let sort_ms = milliseconds(start);
@@ -104,13 +103,13 @@ fn bench(headless: &Headless, scene: &Scene, name: &str, pairs: usize) {
     values.sort_by(f64::total_cmp);
     let of: Vec<f64> = (0..=100).map(|percent| values[(values.len() - 1) * percent / 100]).collect();
 
-    println!("| change | voxels entered | left | change and prepare, ms | making the view anew, ms | ratio |");
+    println!("| change | voxels entering | leaving | change and prepare, ms | making the view again, ms | ratio |");
     println!("|---|---|---|---|---|---|");
     for (what, change) in CHANGES {
         let mut view = headless.view(volume.clone(), scene).unwrap();
         view.volume().value_list();
         prepare(headless, &mut view);
-        // The first change may find too little room.
+        // The first change may have to make room.
         change(&mut view, 0, &of);
         prepare(headless, &mut view);
         let mut touched = Touched::default();
@@ -135,8 +134,8 @@ fn bench(headless: &Headless, scene: &Scene, name: &str, pairs: usize) {
     }
 }
 
-/// Prepares a frame, and hands the device what that takes.
-fn prepare(headless: &Headless, view: &mut SceneView) {
+/// Prepares a frame, and submits the resulting writes.
+fn prepare(headless: &GpuHeadless, view: &mut SceneView) {
     headless.renderer().prepare(headless.device(), headless.queue(), view).unwrap();
     headless.queue().submit([]);
     headless.device().poll(sheetsplat::wgpu::PollType::wait_indefinitely()).unwrap();

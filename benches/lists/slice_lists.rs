@@ -1,5 +1,5 @@
-//! Every volume slice's voxels sorted by value: how iso-voxels are found for axis-aligned sheets in \[8\] (§7). The
-//! renderer itself finds the voxels that take part with one list of the whole volume, for every direction; this bench compares the two.
+//! Sorted voxels for every slice of a volume: the way to find iso-voxels for axis-aligned sheets in \[8\] (§7). The renderer itself uses
+//! one list of the whole volume for every direction; this bench compares the two.
 
 use std::ops::Range;
 
@@ -47,7 +47,7 @@ impl SliceLists {
         set.ranges().iter().map(move |&Range { start: first, end }| &sorted[start(first)..start(end)])
     }
 
-    /// Number of slices.
+    /// The number of slices.
     pub(crate) fn len(&self) -> usize {
         self.slices.len()
     }

@@ -1,11 +1,11 @@
-//! `assets/paper`: the paper's figures, with captions that state what was measured in them.
+//! `assets/paper`: the paper's figures, with captions that state measurements.
 
 use std::fmt::Write;
 use std::sync::Arc;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{Rgb, RgbImage};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Method, Splatting};
@@ -15,24 +15,24 @@ use crate::measures::{METHODS, Turn, ball, difference, right_over_left, rms, war
 use crate::scenes::{folder, neuron, open, turned};
 use crate::{plot, tables};
 
-/// Bytes that a picture may have.
+/// The maximum size of a picture in bytes.
 const MAX_BYTES: usize = 64 << 10;
 
 const SIZE: [&str; 2] = ["image.width=240", "image.height=240"];
 const SMALL: [&str; 2] = ["image.width=200", "image.height=200"];
 
-/// Makes every picture, and the captions from what was measured in them.
-pub(crate) fn make(headless: &Headless) {
+/// Makes every picture, with captions from its measurements.
+pub(crate) fn make(headless: &GpuHeadless) {
     let parts = [cube(headless), turns(headless), views(headless), accelerations(headless), anisotropy(headless)];
     let head = "# The paper's figures\n\n\
-        Made, captions too, by `cargo bench --bench paper -- gallery` from the scenes in this folder. The objects are the builtin ones, not the\n\
-        paper's; cameras have a headlight, and what a caption does not name is at its default. `sheetsplat render assets/paper/tomato.toml -o\n\
+        `cargo bench --bench paper -- gallery` makes this page and its pictures from the scenes in this folder. The objects are the builtin ones, not the\n\
+        paper's; cameras have a headlight, and settings that a caption does not name have their defaults. `sheetsplat render assets/paper/tomato.toml -o\n\
         tomato.png` draws one of the scenes at its full size.\n\n";
     std::fs::write(folder().join("README.md"), head.to_owned() + parts.join("\n").trim_end() + "\n").unwrap();
 }
 
 /// Figs. 3 and 6.
-fn cube(headless: &Headless) -> String {
+fn cube(headless: &GpuHeadless) -> String {
     const ANGLES: [f64; 2] = [44.8, 45.2];
     let mut text = "## Figs. 3 and 6: a cube before and after 45°\n\n| | 44.8° | 45.2° |\n|---|---|---|\n".to_owned();
     let scene = open("cube", &[]);
@@ -59,13 +59,13 @@ fn cube(headless: &Headless) -> String {
     }
     let [before, after] = ANGLES.map(|angle| angle.to_radians().cos());
     text + &format!(
-        "\nOpacity 0.5 per unit, diffuse light alone. A lit plane would be {:.4} times as bright as its neighbour.\n\n{measured}",
+        "\nThe opacity is 0.5 per unit, with only diffuse light. A lit plane would be {:.4} times as bright as its neighbour.\n\n{measured}",
         before / after
     )
 }
 
-/// Fig. 14, and the brightness of all frames between.
-fn turns(headless: &Headless) -> String {
+/// Fig. 14, and the brightness of all frames in between.
+fn turns(headless: &GpuHeadless) -> String {
     const ANGLES: [f64; 3] = [41.0, 44.0, 47.0];
     let mut text = "## Fig. 14: turning the nerve cell\n\n| | 41° | 44° | 47° |\n|---|---|---|---|\n".to_owned();
     let translucent = open("nerve", &[SIZE[0], SIZE[1], "transfer.opacity=[[30,0],[90,0.2]]"]);
@@ -80,10 +80,10 @@ fn turns(headless: &Headless) -> String {
     }
     let _ = writeln!(
         text,
-        "\nOf opacity 0.2 per unit. From head-on, along z, at 0° towards side-on, along x, at 90°: at 45° other slices become the axis-aligned\n\
-        sheets. Curves are the mean brightness of {0}×{0} pixels, 0° to 90° in steps of 0.5°, from 0; blue image-aligned, red axis-aligned; grid\n\
-        lines every 15° and at quarters of the upper end. A pop is how much more a frame differs from one neighbour than from the other. The\n\
-        neuron is a measured cell, its slices taken to be 5 voxels apart.\n",
+        "\nThe cell has an opacity of 0.2 per unit and turns from head-on, along z, at 0° to side-on, along x, at 90°. At 45° the axis-aligned sheets\n\
+        change to other slices. Curves show the mean brightness of {0}×{0} pixels from 0° to 90° in steps of 0.5°, from 0 upwards, blue image-aligned\n\
+        and red axis-aligned, with grid lines every 15° and at quarters of the upper end. A pop is how much more a frame differs from one neighbour\n\
+        than from the other. The neuron is a measured cell, whose slices are assumed to be 5 voxels apart.\n",
         Turn::SIDE
     );
     let neuron = neuron().map(|neuron| ("neuron", Arc::new(neuron.load_volume().unwrap()), neuron));
@@ -93,11 +93,11 @@ fn turns(headless: &Headless) -> String {
         text += &curve(headless, object, &volume, &translucent);
         text += &curve(headless, &format!("{object}-opaque"), &volume, &scene);
     }
-    text + "Of opacity 0.9 little pops: a sheet's opacity ends at 1, whatever kernels it holds.\n"
+    text + "At opacity 0.9 little pops: a sheet's opacity is clamped to 1, whatever kernels it holds.\n"
 }
 
-/// The curve of one turn, and its largest jumps.
-fn curve(headless: &Headless, object: &str, volume: &Arc<Volume>, scene: &Scene) -> String {
+/// The curve of one turn, and its largest changes.
+fn curve(headless: &GpuHeadless, object: &str, volume: &Arc<Volume>, scene: &Scene) -> String {
     let turns = METHODS.map(|method| Turn::new(headless, volume, scene, method));
     let top = turns.iter().flat_map(|turn| &turn.brightness).fold(0.0, |top: f64, &b| top.max(b)) * 1.05;
     let file = format!("turn-{object}");
@@ -127,7 +127,7 @@ fn curve(headless: &Headless, object: &str, volume: &Arc<Volume>, scene: &Scene)
 }
 
 /// Fig. 15.
-fn views(headless: &Headless) -> String {
+fn views(headless: &GpuHeadless) -> String {
     let mut text =
         "## Fig. 15: semi-transparent objects, and the nerve cell\n\n| | | | |\n|---|---|---|---|\n".to_owned();
     let scenes = ["glass-head", "transparent-head", "tomato", "nerve"];
@@ -148,10 +148,10 @@ fn views(headless: &Headless) -> String {
 }
 
 /// Fig. 16.
-fn accelerations(headless: &Headless) -> String {
+fn accelerations(headless: &GpuHeadless) -> String {
     let columns = tables::accelerations(Splatting::default()).map(|(name, _)| name);
     let mut text = format!(
-        "## Fig. 16: what accelerations do to the image\n\n| {} |\n|---|---|---|---|---|\n",
+        "## Fig. 16: the effect of accelerations on the image\n\n| {} |\n|---|---|---|---|---|\n",
         columns.join(" | ")
     );
     for scene_name in ["tomato", "opaque-head", "nerve"] {
@@ -172,19 +172,19 @@ fn accelerations(headless: &Headless) -> String {
 }
 
 /// §4.2.
-fn anisotropy(headless: &Headless) -> String {
+fn anisotropy(headless: &GpuHeadless) -> String {
     let volume = Arc::new(ball());
-    let mut text = "## §4.2: a ball on a grid of 1:1:5\n\nIts value is constant and it is not shaded: it should look the same from everywhere.\n\n".to_owned();
+    let mut text = "## §4.2: a ball on a grid of 1:1:5\n\nIts value is constant and it is not shaded, so it should look the same from all directions.\n\n".to_owned();
     text += &curve(headless, "ball", &volume, &open("ball", &[]));
-    text += "That the warped footprint of a whole kernel is the ellipsoid's, to 1e-6, is a test in `src/reference/footprint.rs`. What becomes of the\n\
-        ball's x-ray image if slices are interpolated to 1:1:1 instead, in the f64 twin: rms and largest difference, as shares of its largest\n\
-        value. The Gaussian is the one that makes the ellipsoid out of the round kernel.\n\n\
+    text += "A test in `src/reference/footprint.rs` shows that the warped footprint of a whole kernel is the ellipsoid's, to 1e-6. The table shows how the\n\
+        ball's X-ray image changes if slices are interpolated to 1:1:1 instead, by the f64 evaluation: rms and largest difference, relative to its\n\
+        maximum. The Gaussian is the one that turns the round kernel into the ellipsoid.\n\n\
         | | interpolated by that Gaussian | linearly |\n|---|---|---|\n";
     for degrees in [0.0, 30.0, 60.0, 90.0] {
         let cells = warp_or_slices(degrees).map(|(rms, largest)| format!("{rms:.1e}, {largest:.1e}"));
         let _ = writeln!(text, "| {degrees}° | {} |", cells.join(" | "));
     }
-    text + "\nSide-on, rows of round kernels stand one behind the other: what differs is their ripple from slice to slice, 2·exp(-π²/2) or 1.4 %.\n"
+    text + "\nSide-on, rows of round kernels lie one behind the other; the difference is their ripple from slice to slice, 2·exp(-π²/2) or 1.4 %.\n"
 }
 
 fn with_method(scene: &Scene, method: Method) -> Scene {
@@ -202,13 +202,13 @@ fn name(method: Method) -> &'static str {
     }
 }
 
-/// A table's row of pictures.
+/// A row of pictures in a table.
 fn row(label: &str, names: &[String]) -> String {
     let cells: Vec<String> = names.iter().map(|name| format!("![{name}]({name}.png)")).collect();
     format!("| {label} | {} |\n", cells.join(" | "))
 }
 
-/// Over a black background, which all scenes have, colours are premultiplied and straight at once.
+/// All scenes have a black background, over which premultiplied colours equal straight ones.
 fn picture(image: &Image) -> RgbImage {
     RgbImage::from_fn(image.width, image.height, |x, y| {
         let [r, g, b, _] = image.pixels[(y * image.width + x) as usize];
@@ -216,7 +216,7 @@ fn picture(image: &Image) -> RgbImage {
     })
 }
 
-/// As small as PNG allows.
+/// Saves a PNG, compressed as far as possible.
 fn save(name: &str, picture: &RgbImage) {
     let mut bytes = Vec::new();
     let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Best, FilterType::Adaptive);

@@ -1,9 +1,9 @@
-//! The paper's results (§7) again: Tables 2, 3 and 4 in its own rows and columns, with its figures beside ours; what the economies of
-//! its §8 save and cost; and its pictures.
+//! The paper's results (§7): Tables 2, 3 and 4 with its rows and columns, and its figures beside ours; the savings and costs of the
+//! economies of its §8; and its pictures.
 //!
-//! `cargo bench --bench paper -- [FRAMES] [PART]… [ROW]…` prints `tables-2-and-4`, `table-3` and `economies`, or those of them that are
-//! named, with all rows or those that are named; times are medians of so many frames, settings by turns. The part `gallery` makes
-//! everything in `assets/paper` but the scenes, and is only made when named: `cargo bench --bench paper -- gallery`.
+//! `cargo bench --bench paper -- [FRAMES] [PART]… [ROW]…` prints `tables-2-and-4`, `table-3` and `economies`, or only the named ones, with
+//! all rows or only the named ones; times are medians over FRAMES frames, with settings in turn. The part `gallery` makes everything in
+//! `assets/paper` except the scenes, and only when named: `cargo bench --bench paper -- gallery`.
 
 #![expect(clippy::unwrap_used, reason = "a bench")]
 
@@ -16,7 +16,7 @@ mod plot;
 mod scenes;
 mod tables;
 
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::{GpuHeadless, HeadlessOptions};
 
 const TABLES: [&str; 3] = ["tables-2-and-4", "table-3", "economies"];
 const GALLERY: &str = "gallery";
@@ -29,7 +29,7 @@ fn main() {
         parts = TABLES.to_vec();
     }
     let rows = scenes::rows(&wanted);
-    let headless = Headless::new(&HeadlessOptions::default()).unwrap();
+    let headless = GpuHeadless::new(&HeadlessOptions::default()).unwrap();
     for part in parts {
         match part {
             "tables-2-and-4" => tables::tables_2_and_4(&headless, frames, &rows),

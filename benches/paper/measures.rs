@@ -1,9 +1,9 @@
-//! What the captions and tables state of images.
+//! Measurements of images for captions and tables.
 
 use std::sync::Arc;
 
 use glam::{DVec3, UVec3, dvec3};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
@@ -12,10 +12,10 @@ use sheetsplat::volume::Volume;
 
 use crate::scenes::{open, turned};
 
-/// Image- and axis-aligned.
+/// Image-aligned and axis-aligned.
 pub(crate) const METHODS: [Method; 2] = [Method::ImageAligned, Method::AxisAligned];
 
-/// PSNR and largest difference of premultiplied RGBA, peak 1, over the pixels where either image shows something before black.
+/// PSNR and largest difference of premultiplied RGBA with peak 1, over the pixels where either image differs from black.
 pub(crate) fn difference(actual: &Image, expected: &Image) -> (f64, f64) {
     const BLACK: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
     let shown = actual.pixels.iter().zip(&expected.pixels).filter(|(a, b)| **a != BLACK || **b != BLACK);
@@ -24,20 +24,20 @@ pub(crate) fn difference(actual: &Image, expected: &Image) -> (f64, f64) {
     (-10.0 * mean_square.log10(), errors.iter().fold(0.0, |most: f64, error| most.max(error.abs())))
 }
 
-/// Mean of red, green and blue over all pixels.
+/// The mean of red, green and blue over all pixels.
 pub(crate) fn brightness(image: &Image) -> f64 {
     let sum: f64 = image.pixels.iter().flat_map(|pixel| &pixel[..3]).map(|&channel| f64::from(channel)).sum();
     sum / (3 * image.pixels.len()) as f64
 }
 
-/// Root mean square of the difference in red, green and blue over all pixels.
+/// The root mean square of the differences in red, green and blue over all pixels.
 pub(crate) fn rms(a: &Image, b: &Image) -> f64 {
     let squares = a.pixels.iter().zip(&b.pixels).flat_map(|(a, b)| (0..3).map(|i| f64::from(a[i] - b[i]).powi(2)));
     (squares.sum::<f64>() / (3 * a.pixels.len()) as f64).sqrt()
 }
 
-/// Brightness of the right face of a cube over that of its left one, away from their edges: the mean over pixels so far from the
-/// image's middle, as shares of its height.
+/// The brightness of a cube's right face divided by that of its left one, away from their edges: means over pixels at these distances from
+/// the image's middle, as fractions of its height.
 pub(crate) fn right_over_left(image: &Image) -> f64 {
     let side = f64::from(image.height);
     let face = |sign: f64| {
@@ -52,18 +52,18 @@ pub(crate) fn right_over_left(image: &Image) -> f64 {
     face(1.0) / face(-1.0)
 }
 
-/// A turn from 0° to 90° and the brightness of its frames.
+/// A turn from 0° to 90°, with the brightness of its frames.
 pub(crate) struct Turn {
     pub(crate) brightness: Vec<f64>,
 }
 
 impl Turn {
-    /// Degrees between frames.
+    /// The degrees between frames.
     const STEP: f64 = 0.5;
-    /// Pixels a side.
+    /// The side of an image in pixels.
     pub(crate) const SIDE: u32 = 256;
 
-    pub(crate) fn new(headless: &Headless, volume: &Arc<Volume>, scene: &Scene, method: Method) -> Self {
+    pub(crate) fn new(headless: &GpuHeadless, volume: &Arc<Volume>, scene: &Scene, method: Method) -> Self {
         let mut scene = scene.clone();
         (scene.image.width, scene.image.height) = (Self::SIDE, Self::SIDE);
         scene.splatting.method = method;
@@ -88,22 +88,22 @@ impl Turn {
         self.brightness.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max)
     }
 
-    /// The largest pop and its angle: how much more a frame differs from one of its neighbours than from the other. What changes steadily, as
-    /// the light falls otherwise and other parts are hidden, counts for nothing.
+    /// The largest pop and its angle. A pop is the difference between a frame's distances to its two neighbours, which excludes steady
+    /// changes, such as those of the light and of what is hidden.
     pub(crate) fn largest_pop(&self) -> (f64, f64) {
         let pops = self.brightness.windows(3).map(|three| (three[0] - 2.0 * three[1] + three[2]).abs());
         let (at, most) = pops.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
         (most, (at + 1) as f64 * Self::STEP)
     }
 
-    /// The brightest frame over the darkest one.
+    /// The brightness of the brightest frame divided by that of the darkest one.
     pub(crate) fn spread(&self) -> f64 {
         let (least, most) = (self.brightness.iter()).fold((f64::MAX, 0.0_f64), |(lo, hi), &b| (lo.min(b), hi.max(b)));
         most / least
     }
 }
 
-/// A ball of constant value on a grid of 1:1:5, unshaded: nothing of it changes in a turn.
+/// A ball of constant value on a grid of 1:1:5, unshaded, which should not change in a turn.
 pub(crate) fn ball() -> Volume {
     let (dims, spacing) = (UVec3::new(65, 65, 13), dvec3(1.0, 1.0, 5.0));
     sampled(dims, spacing, |p| 255.0 * (0.5 + (24.0 - p.length()) / 5.0).clamp(0.0, 1.0))
@@ -116,10 +116,11 @@ fn sampled(dims: UVec3, spacing: DVec3, value: impl Fn(DVec3) -> f64) -> Volume 
     Volume::new("bench", dims, spacing, values).unwrap()
 }
 
-/// How an x-ray image of a 1:1:5 volume changes if its slices are interpolated to 1:1:1 instead of warped (§4.2): rms and largest
-/// difference, of the image's largest value, in the f64 twin. First with the Gaussian that makes the two kernels one, then linearly.
+/// The change of an X-ray image of a 1:1:5 volume if its slices are interpolated to 1:1:1 instead of warped (§4.2): rms and largest
+/// difference relative to the image's maximum, by the f64 evaluation. First with the Gaussian that makes the two kernels one, then
+/// linearly.
 pub(crate) fn warp_or_slices(degrees: f64) -> [(f64, f64); 2] {
-    /// Slices added at both ends, so that the interpolation ends within the volume.
+    /// The number of slices added at both ends, so that the interpolation ends within the volume.
     const MARGIN: u32 = 3;
     let thick = ball();
     let dims = thick.dims();
@@ -132,7 +133,7 @@ pub(crate) fn warp_or_slices(degrees: f64) -> [(f64, f64); 2] {
             (0..dims.z).map(|z| slice(z) * weight(p.z / 5.0 - (f64::from(z) - center.z))).sum()
         })
     };
-    // The kernel's Gaussian is exp(-2·r²), of variance 1/4 voxels; five times as long its variance is 25/4 units, of which the
+    // The kernel's Gaussian is exp(-2·r²), with a variance of 1/4 voxels; five times as long, its variance is 25/4 units, of which the
     // interpolation contributes what the round kernel lacks: 24/4, or 6/25 slices.
     let variance: f64 = 6.0 / 25.0;
     let gaussian = |t: f64| (-t * t / (2.0 * variance)).exp() / (std::f64::consts::TAU * variance).sqrt();

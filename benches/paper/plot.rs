@@ -1,4 +1,4 @@
-//! Curves over angles as small pictures: no text, what the axes say is for captions.
+//! Curves over angles as small pictures without text; captions describe the axes.
 
 use image::{Rgb, RgbImage};
 
@@ -6,10 +6,10 @@ const SIZE: [u32; 2] = [480, 240];
 const MARGIN: u32 = 12;
 const BLACK: Rgb<u8> = Rgb([0, 0, 0]);
 const GREY: Rgb<u8> = Rgb([220, 220, 220]);
-/// Of the first curve and the second.
+/// The colours of the first and the second curve.
 pub(crate) const COLORS: [Rgb<u8>; 2] = [Rgb([0, 90, 200]), Rgb([220, 60, 0])];
 
-/// Curves over the same turn of 0° to 90°, from 0 at the bottom to `top`: grid lines at every 15° and at quarters of `top`.
+/// Two curves over a turn from 0° to 90°, with values from 0 at the bottom to `top`, and grid lines every 15° and at quarters of `top`.
 pub(crate) fn curves(curves: [&[f64]; 2], top: f64) -> RgbImage {
     let mut picture = RgbImage::from_pixel(SIZE[0], SIZE[1], Rgb([255, 255, 255]));
     let [width, height] = SIZE.map(|side| f64::from(side - 2 * MARGIN));
@@ -27,7 +27,7 @@ pub(crate) fn curves(curves: [&[f64]; 2], top: f64) -> RgbImage {
     picture
 }
 
-/// Two pixels wide.
+/// Draws a line that is two pixels wide.
 fn line(picture: &mut RgbImage, [from, to]: [[f64; 2]; 2], color: Rgb<u8>) {
     let steps = (0..2).map(|i| (to[i] - from[i]).abs()).fold(1.0, f64::max).ceil();
     for step in 0..=steps as u32 {

@@ -1,34 +1,34 @@
-//! The scenes of tables and pictures: `assets/paper/NAME.toml`, and the measured volumes where they are.
+//! The scenes of tables and pictures: `assets/paper/NAME.toml`, and the measured volumes if they exist.
 
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
 use sheetsplat::scene::{Scene, VolumeSource};
 
-/// Down the x axis, from which the nerve is seen in the tables.
+/// The view along the x axis, from which the tables show the nerve.
 const SIDE_ON: &str = "camera.direction=[1,0,0]";
 
-/// Of slices five times as far apart as their voxels; the file does not say.
+/// The neuron's spacing, five times as large between slices; its file does not state it.
 const NEURON_SPACING: DVec3 = DVec3::new(1.0, 1.0, 5.0);
 
-/// Pictures, captions and scenes.
+/// The folder of pictures, captions and scenes.
 pub(crate) fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/paper")
 }
 
-/// A scene of the folder, with some settings changed.
+/// A scene in the folder, with some settings changed.
 pub(crate) fn open(name: &str, sets: &[&str]) -> Scene {
     let sets: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
     Scene::open(&folder().join(name).with_extension("toml"), &sets).unwrap()
 }
 
-/// A measured volume or its scene, if it is there.
+/// A measured volume or its scene, if it exists.
 fn shared(path: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared").join(path);
     path.exists().then_some(path)
 }
 
-/// The nerve's scene with a measured cell in it, if it is there.
+/// The nerve's scene with a measured cell in it, if that exists.
 pub(crate) fn neuron() -> Option<Scene> {
     let scene = open("nerve", &[]);
     shared("data/neuron.nrrd").map(|path| Scene {
@@ -38,7 +38,7 @@ pub(crate) fn neuron() -> Option<Scene> {
     })
 }
 
-/// A scene whose camera turned about its `up` by some degrees, by the right hand.
+/// A scene whose camera is turned right-handed about its `up` by some degrees.
 pub(crate) fn turned(scene: &Scene, degrees: f64) -> Scene {
     let mut scene = scene.clone();
     let rotation = DMat3::from_axis_angle(scene.camera.up.normalize(), degrees.to_radians());
@@ -46,19 +46,19 @@ pub(crate) fn turned(scene: &Scene, degrees: f64) -> Scene {
     scene
 }
 
-/// A row of the tables: a scene, and the paper's figures for one of the same kind.
+/// A row of the tables: a scene, and the paper's figures for a scene of the same kind.
 pub(crate) struct Row {
     pub(crate) name: &'static str,
     pub(crate) scene: Scene,
-    /// Seconds in the columns of Table 2.
+    /// The seconds in the columns of Table 2.
     pub(crate) table_2: Option<[f64; 5]>,
-    /// Seconds in the columns of Table 3, which has some of the rows.
+    /// The seconds in the columns of Table 3, which has some of the rows.
     pub(crate) table_3: Option<[f64; 5]>,
     /// The columns of Table 4.
     pub(crate) table_4: Option<[&'static str; 8]>,
 }
 
-/// The paper's rows, and measured heads where they are; those of them that are wanted, without names all.
+/// The paper's rows, and measured heads if they exist; only the wanted ones, if any are named.
 pub(crate) fn rows(wanted: &[&str]) -> Vec<Row> {
     let row = |name, scene, table_2, table_3, table_4| Row {
         name,
@@ -104,7 +104,7 @@ pub(crate) fn rows(wanted: &[&str]) -> Vec<Row> {
             ["4.2 M", "1.3 M", "30 %", "672 k", "51 %", "6.7 M", "2.5 M", "37 %"],
         ),
     ];
-    // Four sections a kernel, as the paper's Table 4 has them there: its slabs were as far apart as slices.
+    // Four sections per kernel, as in the paper's Table 4, whose slabs were as far apart as slices.
     let coarse = open("nerve", &["splatting.slab_width=5.0"]);
     rows.push(Row {
         name: "nerve head-on, slab width=5.0",

@@ -1,7 +1,7 @@
 //! Tables 2 to 4, and a table of the economies of §8.
 
 use sheetsplat::SceneView;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::settings::{Economies, Method, Order, Rasterizer, Splatting};
 use sheetsplat::stats::{Counts, Stats};
 
@@ -9,7 +9,7 @@ use crate::common::{median, timed};
 use crate::measures::difference;
 use crate::scenes::Row;
 
-/// Table 2's columns by quads, which is the paper's way, and its last two by tiles: sheets, order, visibility test, tiles.
+/// Table 2's columns by quads, as in the paper, and its last two by tiles: sheets, order, visibility test, tiles.
 const TABLE_2: [(Method, Order, bool, bool, Rasterizer); 7] = [
     (Method::ImageAligned, Order::BackToFront, false, false, Rasterizer::Quads),
     (Method::AxisAligned, Order::BackToFront, false, false, Rasterizer::Quads),
@@ -23,12 +23,13 @@ const TABLE_2: [(Method, Order, bool, bool, Rasterizer); 7] = [
 /// The column of [`TABLE_2`] that Table 4 counts.
 const COUNTED: usize = 3;
 
-/// What the paper concludes from Table 2's columns: its two ratios, and what visibility test and tiles make of the image-aligned time.
+/// The ratios that the paper derives from Table 2's columns: its two ratios, and the effects of visibility test and tiles on the
+/// image-aligned time.
 fn ratios(&[all, all_axis_aligned, visible, tiled, axis_aligned]: &[f64; 5]) -> [f64; 4] {
     [all / all_axis_aligned, all / visible, all / tiled, tiled / axis_aligned]
 }
 
-pub(crate) fn tables_2_and_4(headless: &Headless, frames: usize, rows: &[Row]) {
+pub(crate) fn tables_2_and_4(headless: &GpuHeadless, frames: usize, rows: &[Row]) {
     let (mut shares, mut times, mut counts) = (String::new(), String::new(), String::new());
     for row in rows {
         let mut view = headless.view(row.scene.load_volume().unwrap(), &row.scene).unwrap();
@@ -51,7 +52,7 @@ pub(crate) fn tables_2_and_4(headless: &Headless, frames: usize, rows: &[Row]) {
         counts += &table_4(row.name, &runs[COUNTED].1.counts, row.table_4);
     }
     print(
-        "Table 2, ratios; ours (the paper's). By quads, as in the paper, but for the last column: by the tile rasterizer, the default.",
+        "Table 2, ratios; ours (the paper's). By quads, as in the paper, except the last column, which is by the tile rasterizer, the default.",
         &[
             "back-to-front: img./axis-align.",
             "img.-align.: + vis. test saves",
@@ -87,7 +88,7 @@ pub(crate) fn tables_2_and_4(headless: &Headless, frames: usize, rows: &[Row]) {
     print("Table 4; ours (the paper's). By quads.", &columns, &counts);
 }
 
-/// A row of Table 4: percentages are of the quantity to the left of theirs.
+/// A row of Table 4. Percentages refer to the quantity to their left.
 fn table_4(name: &str, counts: &Counts, paper: Option<[&str; 8]>) -> String {
     let &Counts { voxels_total, voxels_in_range, voxels_shaded, sections_total, sections_rasterized, .. } = counts;
     let percent = |part: u64, whole: u64| format!("{:.0} %", 100.0 * part as f64 / whole as f64);
@@ -106,7 +107,7 @@ fn table_4(name: &str, counts: &Counts, paper: Option<[&str; 8]>) -> String {
     format!("| {name} | {} |\n", cells.join(" | "))
 }
 
-/// As Table 4 writes numbers.
+/// A number in Table 4's notation.
 fn magnitude(count: u64) -> String {
     match count {
         1_000_000.. => format!("{:.1} M", count as f64 / 1e6),
@@ -114,7 +115,7 @@ fn magnitude(count: u64) -> String {
     }
 }
 
-/// Table 3's columns: what they are called, and the settings.
+/// Table 3's columns: their names and settings.
 pub(crate) fn accelerations(default: Splatting) -> [(&'static str, Splatting); 5] {
     [
         ("default", default),
@@ -125,11 +126,11 @@ pub(crate) fn accelerations(default: Splatting) -> [(&'static str, Splatting); 5
     ]
 }
 
-pub(crate) fn table_3(headless: &Headless, frames: usize, rows: &[Row]) {
+pub(crate) fn table_3(headless: &GpuHeadless, frames: usize, rows: &[Row]) {
     let columns = accelerations(Splatting::default()).map(|(name, _)| name);
     let speedups = |seconds: &[f64; 5]| seconds.map(|other| seconds[0] / other);
     let (mut shares, mut times) = (String::new(), String::new());
-    // The slab width is among what changes.
+    // Columns change the slab width, so rows have the default settings.
     let at_default = |row: &&Row| row.scene.splatting == Splatting::default();
     for row in rows.iter().filter(at_default).filter(|row| row.table_3.is_some() || row.table_2.is_none()) {
         let mut view = headless.view(row.scene.load_volume().unwrap(), &row.scene).unwrap();
@@ -147,8 +148,8 @@ pub(crate) fn table_3(headless: &Headless, frames: usize, rows: &[Row]) {
     print("Table 3, seconds; ours (the paper's).", &columns, &times);
 }
 
-/// The paper's future work: error against the image without, sections, and time.
-pub(crate) fn economies(headless: &Headless, frames: usize, rows: &[Row]) {
+/// The paper's future work: the error against the image without economies, sections, and time.
+pub(crate) fn economies(headless: &GpuHeadless, frames: usize, rows: &[Row]) {
     let none = Economies::default();
     let whole = [0.005, 0.02, 0.1]
         .map(|whole_below| (format!("whole_below = {whole_below}"), Economies { whole_below, ..none }));
@@ -184,19 +185,24 @@ pub(crate) fn economies(headless: &Headless, frames: usize, rows: &[Row]) {
     }
     print(
         "Economies (§8), by the tile rasterizer; against the image without.",
-        &["PSNR, dB", "largest error", "sections drawn, of those without", "speedup"],
+        &["PSNR, dB", "largest error", "sections drawn, relative to those without", "speedup"],
         &cells,
     );
 }
 
-/// A table whose rows are written already.
+/// Prints a table whose rows are already formatted.
 fn print(title: &str, columns: &[&str], rows: &str) {
     println!("\n{title}\n\n| | {} |\n|{}\n{}", columns.join(" | "), "---|".repeat(columns.len() + 1), rows.trim_end());
 }
 
-/// Draws frames with each of some settings by turns, so that whatever else the machine does troubles all alike: the median time of
-/// each in milliseconds.
-fn interleaved(headless: &Headless, view: &mut SceneView, settings: &[Splatting], frames: usize) -> Vec<(f64, Stats)> {
+/// The median time in milliseconds of frames with each of some settings. Settings are drawn in turn, so that other work on the machine
+/// affects all alike.
+fn interleaved(
+    headless: &GpuHeadless,
+    view: &mut SceneView,
+    settings: &[Splatting],
+    frames: usize,
+) -> Vec<(f64, Stats)> {
     let mut runs: Vec<Vec<(f64, Stats)>> = settings.iter().map(|_| Vec::new()).collect();
     for _ in 0..frames {
         for (settings, runs) in settings.iter().zip(&mut runs) {

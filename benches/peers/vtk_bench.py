@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
 """Renders one of our scene files with VTK, without a window, and prints its times as one line of JSON.
 
-It serves to compare sheetsplat with VTK's two volume ray casters on the same machine:
+It compares sheetsplat with VTK's two volume ray casters on the same machine:
 
     apt-get install -y libegl1 libgl1-mesa-dri libosmesa6
     python3 -m venv venv && venv/bin/pip install vtk==9.7.2 numpy pynrrd pillow
     venv/bin/python vtk_bench.py SCENE.toml --mapper gpu
 
-`--mapper gpu` is vtkOpenGLGPUVolumeRayCastMapper, on whatever OpenGL the machine has (llvmpipe where there is no GPU); `--mapper cpu` is
+`--mapper gpu` is vtkOpenGLGPUVolumeRayCastMapper, on the machine's OpenGL (llvmpipe without a GPU); `--mapper cpu` is
 vtkFixedPointVolumeRayCastMapper. Every frame turns the camera as `sheetsplat bench --rotate` does, and is finished and read back before the clock stops.
-Opacities are per smallest voxel spacing, as ours are. Run both programs alternately: machines get slower and faster.
+Opacities are per smallest voxel spacing, like ours. Run both programs alternately, because a machine's speed varies.
 """
 
 import argparse
@@ -47,7 +47,7 @@ def load(scene, folder):
     image.SetDimensions(*map(int, values.shape))
     image.SetSpacing(*spacing)
     image.SetOrigin(*(-(np.array(values.shape) - 1) / 2 * spacing))
-    # VTK wants x fastest.
+    # In VTK, x is fastest.
     image.GetPointData().SetScalars(numpy_to_vtk(np.ascontiguousarray(values.T).ravel(), deep=True))
     return image, float(spacing.min())
 
@@ -90,7 +90,7 @@ def caster(options, image, unit):
         mapper = vtk.vtkFixedPointVolumeRayCastMapper()
         mapper.SetNumberOfThreads(options.threads)
         mapper.SetInteractiveSampleDistance(options.step * unit)
-    # No shortcuts: one ray a pixel, one sample a step.
+    # No shortcuts: one ray per pixel, one sample per step.
     mapper.AutoAdjustSampleDistancesOff()
     mapper.SetImageSampleDistance(1.0)
     mapper.SetSampleDistance(options.step * unit)
@@ -126,7 +126,7 @@ class Stage:
         self.camera = scene["camera"]
 
     def draw(self, degrees):
-        """One frame, turned about `up` by the right hand, read back as rows from the top."""
+        """One frame, turned right-handed about `up`, read back as rows from the top."""
         import numpy as np
         from vtkmodules.util.numpy_support import vtk_to_numpy
 
@@ -163,7 +163,7 @@ def peak_rss_mib():
 
 def main():
     options = arguments()
-    # A cache on disk would hide what a first frame costs.
+    # A cache on disk would hide the cost of a first frame.
     os.environ.setdefault("MESA_SHADER_CACHE_DISABLE", "true")
     start = time.perf_counter()
     import vtkmodules.all as vtk

@@ -47,10 +47,10 @@ fn is_searched_in_perspective(search: SearchBounds, p: vec4f) -> bool {
     return is_on_screen && p.z >= search.low.z && p.z <= search.high.z && p.w > frame.near;
 }
 
-// Shades the voxels in the queue from one on.
+// Shades the voxels of the queue from `first` on.
 fn shade_voxels(first: u32) {
     for (var i = first; i < queue_count; i += lanes) {
-        // Every lane shades its voxel.
+        // Every lane shades its own voxel.
         passes += PASSES_PER_SHADING + gather.search_passes;
         let is_in = i + lane < queue_count;
         let slot = queue_first + min(i + lane, queue_count - 1u);
@@ -73,7 +73,7 @@ fn shade_voxels(first: u32) {
     }
 }
 
-// A voxel's color and what it adds per block length, `(C·m, m)`, and its opacity.
+// A voxel's colour and amount per unit length, `(C·m, m)`, and its opacity.
 struct Shaded {
     amount: vec4f,
     alpha: f32,
@@ -92,7 +92,7 @@ fn shaded(voxel: vec3u, p: vec4f) -> Shaded {
     } else {
         color = ramp_at(color_ramp, value);
         alpha = ramp_at(opacity_ramp, value).x;
-        // Without a gradient opacity it is one point, which every lane holds.
+        // Without gradient opacity the ramp is a single point, which every lane holds.
         var by_gradient = gradient_opacity_ramp.own.y;
         for (var is_graded = ramps.w > ramps.z + 1u; is_graded; is_graded = false) {
             by_gradient = ramp_at(gradient_opacity_ramp, gradient.magnitude).x;

@@ -10,19 +10,19 @@
 // Needs shared/frame.wgsl: frame.
 // Needs shared/local_ray.wgsl: SectionMaps.
 
-// Whether any of the economies is asked for.
+// Whether any economy is on.
 override ECONOMIES: bool = false;
 
 // Sheet depths beyond every kernel's reach.
 const WHOLE = 1e6;
 
-// In the queue's words of blocks: from this bit on one more than the sheet that takes a voxel as a whole.
+// In the queue's words of blocks, the bits from this one on hold one more than the sheet into which a voxel is projected whole.
 const WHOLE_SHIFT = 8u;
 
-// Of the pixels that the subgroup goes round those that have not reached β.
+// A mask of the subgroup's pixels, over all its rounds, that have not reached β.
 var<private> shallow: vec4u;
 
-// Which of the subgroup's pixels have not reached β, once a thread's pixels have some opacity.
+// That mask after a thread's pixels have reached some opacity.
 fn shallow_after(words: vec4u, pixels: Pixels, opacity: vec4f) -> vec4u {
     if ECONOMIES {
         return with_blocks(words, pixels.block, block_word(pixels.is_inside & (opacity < vec4f(gather.beta))));
@@ -30,7 +30,7 @@ fn shallow_after(words: vec4u, pixels: Pixels, opacity: vec4f) -> vec4u {
     return words;
 }
 
-// The sheet of the group that takes a voxel of the queue as a whole; negative if it is drawn in sections.
+// The sheet of the group into which a voxel of the queue is projected whole; negative if it is drawn in sections.
 fn whole_sheet(blocks: u32) -> f32 {
     if ECONOMIES {
         return f32(blocks >> WHOLE_SHIFT) - 1.0;
@@ -38,7 +38,7 @@ fn whole_sheet(blocks: u32) -> f32 {
     return -1.0;
 }
 
-// The blocks that a voxel is drawn to, of those that see it, and the sheet that takes it as a whole.
+// The blocks that a voxel is drawn to, of those that see it, combined with the sheet into which it is projected whole.
 fn economic_blocks(blocks: u32, shaded: Shaded, p: vec4f, sheets: vec2f) -> u32 {
     if !ECONOMIES {
         return blocks;
@@ -62,7 +62,7 @@ fn economic_blocks(blocks: u32, shaded: Shaded, p: vec4f, sheets: vec2f) -> u32 
     return select(0u, seen | select(0u, (1u + u32(max(whole, 0.0))) << WHOLE_SHIFT, is_whole), seen != 0u);
 }
 
-// Whether a voxel with such blocks is drawn at all.
+// Whether a voxel with these blocks is drawn at all.
 fn is_worthwhile(blocks: u32) -> bool {
     return !ECONOMIES || blocks != 0u;
 }
@@ -81,7 +81,7 @@ fn economic_planes(planes: KernelPlanes, whole: f32) -> KernelPlanes {
     return planes;
 }
 
-// ρ² from which a footprint adds too little, by sheet.
+// The ρ² from which on a footprint adds too little, for each sheet.
 fn economic_rim(amount: f32, maps: SectionMaps) -> vec4f {
     if ECONOMIES {
         let amplitude = select(vec4f(1.0), maps.amplitude, PERSPECTIVE);
@@ -90,7 +90,7 @@ fn economic_rim(amount: f32, maps: SectionMaps) -> vec4f {
     return vec4f(0.0);
 }
 
-// What another lane holds of it.
+// Another lane's rim.
 fn rim_of(own: vec4f, other: u32) -> vec4f {
     if ECONOMIES {
         return subgroupShuffle(own, other);

@@ -5,15 +5,15 @@
 // Needs shared/frame.wgsl: frame.
 // Needs shared/local_ray.wgsl: SectionMaps, local_ray, near_cut, section_maps.
 
-// A voxel's kernel as the pixels see it.
+// A voxel's kernel in the sheets of a group.
 struct Footprint {
     center_px: vec2f,
-    // `(C·m, m)` times the low-pass amplitude over λ; 0 without a voxel.
+    // `(C·m, m)` times the low-pass amplitude, divided by λ; 0 without a voxel.
     amount: vec4f,
     // H(0, 0, t) of eq. 3 at the group's first plane and at the four after it.
     first_plane: f32,
     planes: vec4f,
-    // In perspective, how its sections' footprints lie on the screen.
+    // In perspective, the maps from its sections' footprints to the screen.
     axis: vec2f,
     maps: SectionMaps,
     // See `economic_rim`.
@@ -39,7 +39,7 @@ fn cubic(c: vec4f, z: f32, squared: f32) -> f32 {
     return c.x + z * c.y + squared * (c.z + z * c.w);
 }
 
-// Where a column's four pixels lie in a footprint.
+// The positions of a column's four pixels in a footprint.
 struct Offsets {
     dx: f32,
     dy: vec4f,
@@ -49,10 +49,10 @@ fn offsets_in(footprint: Footprint, column: f32, rows: vec4f) -> Offsets {
     return Offsets(column - footprint.center_px.x, rows - footprint.center_px.y);
 }
 
-// How four pixels see a kernel in a sheet: H(a, b, t) of eq. 3 is H(0, 0, t) times the Gaussian of ρ² = a² + b², and t ends where the chord
-// of the kernel's ball does.
+// A kernel in a sheet at four pixels: H(a, b, t) of eq. 3 is H(0, 0, t) times the Gaussian of ρ² = a² + b², and t ends where the chord of the
+// kernel's ball does.
 struct Chords {
-    // H(0, 0, t) where they end, as bits, which numbers from 0 on may be compared by.
+    // H(0, 0, t) at the chord's end, as bits: the bits of numbers that are not negative compare like the numbers.
     rim: vec4i,
     in_plane: vec4f,
 }
@@ -70,12 +70,12 @@ fn chords(footprint: Footprint, at: Offsets, sheet: u32) -> Chords {
     return Chords(bitcast<vec4i>(rim_at(rho_squared)), in_plane_at(rho_squared, footprint.rim.x));
 }
 
-// A section between two planes: two entries of eq. 3 subtracted.
+// A section between two planes: the difference of two entries of eq. 3.
 fn section(near: f32, far: f32, chords: Chords) -> vec4f {
     return (cut_by_rim(far, chords.rim) - cut_by_rim(near, chords.rim)) * chords.in_plane;
 }
 
-// H(0, 0, t) at a plane, or at the rim on its side. Integers' least takes a driver half as long as numbers', which may be none.
+// H(0, 0, t) at a plane, or at the rim on its side. Integer `min` costs a driver half of float `min`, which must handle NaN.
 fn cut_by_rim(plane: f32, rim: vec4i) -> vec4f {
     let bits = bitcast<i32>(plane);
     let sign = bits & i32(0x80000000u);
@@ -98,7 +98,7 @@ fn rim_at(rho_squared: vec4f) -> vec4f {
     return sqrt(chord_squared) * (low + z_squared * z_squared * high);
 }
 
-// What another lane holds.
+// Another lane's footprint.
 fn footprint_of(own: Footprint, other: u32) -> Footprint {
     var footprint: Footprint;
     footprint.center_px = subgroupShuffle(own.center_px, other);
@@ -115,7 +115,7 @@ fn footprint_of(own: Footprint, other: u32) -> Footprint {
     return footprint;
 }
 
-// What a voxel at p adds to the group whose first sheet starts at `near`, in sections or, into the sheet `whole` of them, as a whole.
+// The footprint of a voxel at p in the group whose first sheet starts at `near`, in sections or, into the sheet `whole`, as a whole.
 fn footprint_at(p: vec4f, near: f32, whole: f32, amount: vec4f) -> Footprint {
     var footprint: Footprint;
     footprint.center_px = p.xy;

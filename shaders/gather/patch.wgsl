@@ -21,19 +21,19 @@
 @group(0) @binding(1) var<uniform> gathers: array<Gather, 1>;
 @group(0) @binding(2) var<uniform> patch_range: PatchRange;
 @group(0) @binding(3) var<storage, read> bricks: array<Brick>;
-// Where every sheet group of every patch starts in `entries`.
+// The start in `entries` of every sheet group of every patch.
 @group(0) @binding(4) var<storage, read> starts: array<u32>;
-// Bricks' numbers.
+// Indices of bricks.
 @group(0) @binding(5) var<storage, read> entries: array<u32>;
 // The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0); then the table of labels.
 @group(0) @binding(6) var<storage, read> control_points: array<vec4f>;
 @group(0) @binding(7) var values: texture_2d_array<u32>;
 @group(0) @binding(8) var<storage, read_write> acc: array<vec4f>;
 @group(0) @binding(9) var<storage, read_write> gathered: Gathered;
-// Of every group, nearest first, half the screen box around its footprints, pixels.
+// For every group, nearest first, half the screen box in pixels around its footprints.
 @group(0) @binding(10) var<storage, read> half_boxes: array<vec2f>;
 @group(0) @binding(11) var labels: texture_2d_array<u32>;
-// The next dispatch: nothing, if no subgroup says otherwise.
+// The arguments of the next dispatch, which is empty unless a subgroup has left work for it.
 @group(0) @binding(12) var<storage, read_write> next: Indirect;
 @group(0) @binding(13) var<uniform> cut: Cut;
 @group(0) @binding(14) var surfaces: texture_depth_2d;
@@ -41,17 +41,17 @@
 // `frame.compositing` and `frame.order`.
 override COMPOSITING: u32 = 0u;
 override ORDER: u32 = 0u;
-// Whether voxels have rays of their own.
+// Whether every voxel has its own ray.
 override PERSPECTIVE: bool = false;
 // Whether a footprint's box is the parallelogram of Fig. 13, else its bounding rectangle.
 override PARALLELOGRAM: bool = false;
-// Whether anything is cut, and whether first hits are asked for.
+// Whether anything is cut, and whether first hits are requested.
 override CUT: bool = false;
 override FIRST_HIT: bool = false;
 
-// Threads of a workgroup: those of the largest subgroup.
+// The number of threads in a workgroup: those of the largest subgroup.
 override THREADS: u32 = 32u;
-// Workgroups that a patch is divided among: more than one only where there is too much behind it.
+// The number of workgroups per patch: more than one only if too much lies behind it.
 override WORKGROUPS_PER_PATCH: u32 = 1u;
 
 var<private> gather: Gather;
@@ -60,16 +60,16 @@ var<private> gather: Gather;
 var<private> lane: u32;
 var<private> lanes: u32;
 
-// The patch: where the centre of its first pixel is, and of the pixels that the subgroup goes round those that are not opaque.
+// The patch: the centre of its first pixel, and a mask of the subgroup's pixels, over all its rounds, that are not opaque.
 var<private> first_px: vec2f;
 var<private> open: vec4u;
 
-// The group that is drawn.
+// The group that is being drawn.
 var<private> sheet_group: GatheredGroup;
 // The first that this dispatch composites; those before it were, and are looked at once more.
 var<private> first_composited: u32;
 
-// Passes through loops, bricks visited, and voxels and sections drawn.
+// Counts of passes through loops, bricks visited, and voxels and sections drawn.
 var<private> passes: u32;
 var<private> bricks_visited: u32;
 var<private> drawn: vec2u;
@@ -78,15 +78,15 @@ var<private> color_ramp: Ramp;
 var<private> opacity_ramp: Ramp;
 var<private> gradient_opacity_ramp: Ramp;
 
-// Sheets of a sheet group.
+// The number of sheets in a sheet group.
 const SHEETS = 4u;
 
-// Threads that hold a patch, and blocks of it.
+// The number of threads that hold a patch, and of its blocks.
 const PATCH_THREADS = 32u;
 const BLOCKS = 4u;
 
-// Passes through loops that are not counted where they are made. The pass that finds a loop at its end is one, and in that pass one
-// through every loop inside; loops that run at most once take two.
+// Passes through loops that are not counted where they occur. Every loop costs one extra pass for its exit check, and so do the loops nested
+// in it; one-shot loops cost two.
 const PASSES_PER_GROUP = 6u;
 const PASSES_PER_FILL = 36u;
 const PASSES_PER_FIND = 5u;
@@ -95,35 +95,35 @@ const PASSES_PER_ROUND = 18u;
 const PASSES_PER_BATCH = 4u;
 const PASSES_PER_ADDITION = 2u;
 
-// To look at how four rays are cut, or along which way means are taken.
+// The passes that determine how four rays are cut, or over which stretch means count.
 fn passes_per_look() -> u32 {
     return select(0u, 140u, looks_along_rays());
 }
 
-// Voxels of the queue that are looked through at a time, one bit each.
+// The number of voxels of the queue that are tested at a time, one bit each.
 const BATCH = 64u;
 
-// What the subgroup has drawn of a patch: which of its pixels are open after the group, and of which blocks sheets hold something.
+// The progress in a patch: a mask of its pixels that stay open after the group, and a mask of blocks whose sheets are not empty.
 struct Progress {
     open: vec4u,
     shallow: vec4u,
     begun: u32,
 }
 
-// What became of a group: whether the queue held all of its voxels at once, and whether there were any.
+// The outcome of a group: whether the queue held all of its voxels at once, and whether it had any.
 struct GroupOutcome {
     is_whole: bool,
     has_drawn: bool,
 }
 
-// The lanes take their shares of the ramps' control points.
+// Distributes the ramps' control points among the lanes.
 fn hold_ramps() {
     color_ramp = ramp_of(0u, frame.ramps.x);
     opacity_ramp = ramp_of(frame.ramps.x, frame.ramps.y);
     gradient_opacity_ramp = ramp_of(frame.ramps.y, frame.ramps.z);
 }
 
-// Finds the open pixels among those of the threads from `threads.x` to the one before `threads.y`. Returns their blocks, one bit each.
+// Finds the open pixels of the threads from `threads.x` to the one before `threads.y`. Returns a mask of their blocks.
 fn find_open_pixels(corner: vec2u, threads: vec2u, thread: u32) -> u32 {
     var own_blocks = 0u;
     for (var round = threads.x; round < threads.y; round += THREADS) {
@@ -137,7 +137,7 @@ fn find_open_pixels(corner: vec2u, threads: vec2u, thread: u32) -> u32 {
     return own_blocks;
 }
 
-// The `at`-th group in the order of compositing becomes the one that is drawn.
+// Makes the `at`-th group in compositing order the current one.
 fn begin_group(at: u32) {
     let number = select(gather.groups - 1u - at, at, ORDER == FRONT_TO_BACK);
     let first_sheet = f32(number * SHEETS);
@@ -145,8 +145,8 @@ fn begin_group(at: u32) {
     sheet_group = GatheredGroup(number, first_sheet, near, half_boxes[number], at >= first_composited);
 }
 
-// Adds the sections of the queue's voxels to the sheets of all pixels, round by round. With the last voxels of the group, `is_last`, the sheets
-// are composited; before, they wait in the workgroup's memory.
+// Adds the sections of the queue's voxels to the sheets of all pixels, round by round. After the last voxels of the group (`is_last`) the sheets
+// are composited; before, they wait in workgroup memory.
 fn draw_queue(corner: vec2u, threads: vec2u, thread: u32, is_last: bool, progress: ptr<function, Progress>) {
     for (var round = threads.x; round < threads.y; round += THREADS) {
         passes += PASSES_PER_ROUND;
@@ -171,7 +171,7 @@ fn draw_queue(corner: vec2u, threads: vec2u, thread: u32, is_last: bool, progres
     }
 }
 
-// Draws the group: as often as voxels fill the queue, finds and shades them, and adds their sections.
+// Draws the group: finds and shades voxels and adds their sections, once for every filling of the queue.
 fn draw_group(corner: vec2u, threads: vec2u, thread: u32, is_kept: bool) -> GroupOutcome {
     let search = search_bounds(is_kept);
     var progress = Progress(open, shallow, 0u);
@@ -199,7 +199,7 @@ fn draw_group(corner: vec2u, threads: vec2u, thread: u32, is_kept: bool) -> Grou
     return outcome;
 }
 
-// Notes that the `at`-th group was composited in the 32×32 tile of a pixel, once for all of the tile's patches.
+// Counts the `at`-th group as composited in the 32×32 tile of a pixel, once for all of the tile's patches.
 fn count_composited(at: u32, pixel: vec2u) {
     let tiles = tile_grid(frame.size);
     let number = (at * tiles.y + pixel.y / TILE) * tiles.x + pixel.x / TILE;
@@ -209,11 +209,11 @@ fn count_composited(at: u32, pixel: vec2u) {
     }
 }
 
-// Leaves to the next dispatch at which group the subgroup goes on, and adds its counts to the frame's.
+// Stores the group at which the next dispatch continues, and adds the subgroup's counts to the frame's.
 fn finish(at: u32, reached: u32) {
     let all_counts = subgroupAdd(drawn);
     if lane == 0u {
-        // Where all is opaque nothing is left to do.
+        // Where all pixels are opaque nothing is left to do.
         let is_done = at == gather.groups || all(open == vec4u(0u));
         atomicStore(&gathered.words[reached], select(at, gather.groups, is_done));
         if !is_done {
@@ -225,7 +225,7 @@ fn finish(at: u32, reached: u32) {
     }
 }
 
-// Draws a patch's groups in the order of compositing, from the one that the dispatch before has left, until all pixels are opaque.
+// Draws a patch's groups in compositing order, from where the previous dispatch stopped, until all pixels are opaque.
 fn draw(number: u32, first_thread: u32, thread: u32) {
     hold_ramps();
     let columns = (frame.size.x + PATCH_WIDTH - 1u) / PATCH_WIDTH;
@@ -242,12 +242,12 @@ fn draw(number: u32, first_thread: u32, thread: u32) {
     first_composited = at;
     at -= min(at, GROUPS_LOOKED_BACK);
     var end = starts[first_bin + at];
-    // Whether the queue holds all voxels of the group before.
+    // Whether the queue holds all voxels of the previous group.
     var is_kept = false;
     for (; at < gather.groups && any(open != vec4u(0u)); at += 1u) {
         let first_entry = end;
         end = starts[first_bin + at + 1u];
-        // A driver may end loops that go on for too long: what would take too many passes is left to the next dispatch.
+        // A driver may end long loops, so work that would need too many passes is left to the next dispatch.
         if passes + gather.passes_per_group + (end - first_entry) * gather.passes_per_brick > gather.most_passes {
             break;
         }
@@ -292,7 +292,7 @@ fn main(
         let first_bin = number * gather.groups;
         let block = firstTrailingBit(subgroupOr(1u << ((first_thread + thread) / 8u)));
         let at = atomicLoad(&gathered.words[gather.reached + number * BLOCKS + block]);
-        // Groups without bricks count for the least, also behind the last brick of the patch.
+        // For `minimum`, empty groups count too, even behind the last brick of the patch.
         let first = select(at, 0u, COMPOSITING == MINIMUM && at < gather.groups);
         is_left = starts[first_bin + first] < starts[first_bin + gather.groups];
     }

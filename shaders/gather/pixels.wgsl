@@ -14,10 +14,10 @@ struct Pixels {
     thread: u32,
     block: u32,
     first: vec2u,
-    // Centres.
+    // The pixels' centres.
     column: f32,
     rows: vec4f,
-    // In the compositing buffer.
+    // The first pixel's index in the compositing buffer.
     slot: u32,
     is_inside: vec4<bool>,
 }
@@ -74,8 +74,8 @@ fn store_hits(pixels: Pixels) {
     }
 }
 
-// Which of a thread's pixels are not opaque. Pixels off the image count as opaque, and what lies behind a cut is as hidden as what lies
-// behind opaque voxels.
+// A mask of a thread's pixels that are not opaque. Pixels off the image count as opaque, and whatever lies behind a cut is hidden, as behind opaque
+// voxels.
 fn open_word(pixels: Pixels, opacity: vec4f, depth: f32) -> u32 {
     var is_open = pixels.is_inside & (opacity < vec4f(select(3e38, frame.opacity_threshold, frame.culling != 0u)));
     if looks_along_rays() {

@@ -4,17 +4,16 @@
 // Needs gather/bits.wgsl: ballot, bits_from.
 // Needs gather/patch.wgsl: BATCH, THREADS, lane, lanes, passes.
 
-// Voxels in all parts; a multiple of 32.
-override QUEUE: u32 = 224u;
+// The number of voxels in all parts; a multiple of 32.
+override QUEUE: u32 = 96u;
 
-// Each voxel's screen coordinates as of `project`, as bits, with its brick and place in it instead of the depth from the eye; and what
-// it adds: (C·m, m).
+// Each voxel's screen coordinates from `project` as bits, with its brick and slot in place of the depth from the eye; and its amount (C·m, m).
 var<workgroup> queue_points: array<vec4u, QUEUE>;
 var<workgroup> queue_amounts: array<vec4f, QUEUE>;
-// The blocks whose pixels it is drawn to, one bit each; see also `WHOLE_SHIFT`.
+// A mask of the blocks to whose pixels the voxel is drawn; see also `WHOLE_SHIFT`.
 var<workgroup> queue_blocks: array<u32, QUEUE>;
 
-// The subgroup's part.
+// The start of the subgroup's part.
 var<private> queue_first: u32;
 var<private> queue_size: u32;
 var<private> queue_count: u32;
@@ -25,12 +24,12 @@ fn empty_queue(thread: u32) {
     queue_count = 0u;
 }
 
-// How many of a subgroup's lanes before this one are in a ballot.
+// The number of a ballot's lanes before this one.
 fn before(lanes_in: u32) -> u32 {
     return countOneBits(lanes_in & ((1u << lane) - 1u));
 }
 
-// Puts some lanes' voxels at its end. Returns where.
+// Appends the voxels of some lanes. Returns this lane's position.
 fn enqueue(is_in: bool, voxel: u32, point: vec4f, blocks: u32) -> u32 {
     let lanes_in = ballot(is_in);
     let slot = queue_first + queue_count + before(lanes_in);
@@ -42,7 +41,7 @@ fn enqueue(is_in: bool, voxel: u32, point: vec4f, blocks: u32) -> u32 {
     return slot;
 }
 
-// Whether there is an n-th voxel, and some of a subgroup's blocks see it.
+// Whether there is an n-th voxel that some of the given blocks see.
 fn is_queued_for(blocks: u32, n: u32) -> bool {
     return n < queue_count && (queue_blocks[queue_first + min(n, queue_count - 1u)] & blocks) != 0u;
 }

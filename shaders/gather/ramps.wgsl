@@ -3,17 +3,17 @@
 // Needs gather/patch.wgsl: control_points, lane, lanes.
 // Needs shared/shading.wgsl: between.
 
-// One of the ramps: where its control points are, and the one of the first of them that this lane holds.
+// A ramp: the range of its control points, and this lane's share of the first of them.
 struct Ramp {
     first: u32,
     end: u32,
     own: vec4f,
 }
 
-// Piecewise linear between the control points, of which there are no more than lanes, clamped outside.
+// Piecewise linear between the control points, at most one per lane, and clamped outside.
 fn ramp_at(held: Ramp, value: f32) -> vec3f {
     let count = held.end - held.first;
-    // How many points are at or below the value.
+    // The number of points at or below the value.
     var below = 0u;
     below += select(0u, 16u, lanes >= 32u && is_below(held, below + 15u, value));
     below += select(0u, 8u, lanes >= 16u && is_below(held, below + 7u, value));

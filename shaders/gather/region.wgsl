@@ -3,13 +3,13 @@
 //
 // Needs gather/patch.wgsl: gather, lane, lanes.
 
-// Pixels across a patch.
+// The width of a patch in pixels.
 const PATCH_WIDTH = 16u;
 
-// Pixels down a patch.
+// The height of a patch in pixels.
 const PATCH_HEIGHT = 8u;
 
-// The word of a thread's block, given which of its own four pixels are in it.
+// The word of a thread's block, given which of its own four pixels are in the mask.
 fn block_word(is_in: vec4<bool>) -> u32 {
     let rows = vec4u(1u, 1u << 8u, 1u << 16u, 1u << 24u) << vec4u(lane % 8u);
     let bits = select(vec4u(0u), rows, is_in);
@@ -19,7 +19,7 @@ fn block_word(is_in: vec4<bool>) -> u32 {
     return word | subgroupShuffleXor(word, 4u);
 }
 
-// Some blocks' words anew: those of the block that a thread holds, and of the others in its subgroup.
+// The words with those of a thread's block, and of the other blocks in its subgroup, replaced.
 fn with_blocks(words: vec4u, block: u32, word: u32) -> vec4u {
     var result = words;
     for (var i = 0u; i < lanes; i += 8u) {
@@ -31,7 +31,7 @@ fn with_blocks(words: vec4u, block: u32, word: u32) -> vec4u {
 // The blocks' bits.
 const BLOCK_BITS = vec4u(1u, 2u, 4u, 8u);
 
-// Bounds of a patch's pixels, seen from the first.
+// Bounds of a patch's pixels, relative to the first.
 struct Bounds {
     low: vec2f,
     high: vec2f,
@@ -49,24 +49,24 @@ fn bounds_of(words: vec4u) -> Bounds {
     );
 }
 
-// The columns in which a block has a pixel, one bit each.
+// A mask of the columns in which a block has a pixel.
 fn columns_of(word: u32) -> u32 {
     let two = word | word >> 16u;
     return (two | two >> 8u) & 255u;
 }
 
-// The blocks, one bit each, in which the box around a footprint holds one of some pixels. Its centre is seen from the patch's first pixel.
+// A mask of the blocks in which the box around a footprint contains a pixel of the mask. Its centre is relative to the patch's first pixel.
 fn blocks_in_box(words: vec4u, center: vec2f, half_box: vec2f) -> u32 {
     let rows = run(vec4f(center.y), half_box.y, f32(PATCH_HEIGHT)).x;
-    // One bit in the bytes of the rows that the box reaches.
+    // A bit in the byte of every row that the box reaches.
     let bytes = ((vec2u(rows) >> vec2u(0u, 4u)) & vec2u(15u)) * 0x204081u & vec2u(0x01010101u);
     let columns = run(vec4f(center.x), half_box.x, f32(PATCH_WIDTH)).x;
     let halves = vec2u(columns & 255u, columns >> 8u);
     return blocks_with(words, vec4u(bytes.x * halves, bytes.y * halves));
 }
 
-// The same for what the box and the parallelogram of Fig. 13 have in common: its sides follow the shear of eq. 9, and its corners reach
-// out of the box.
+// The same for the intersection of the box and the parallelogram of Fig. 13, whose sides follow the shear of eq. 9, and whose corners reach out of
+// the box.
 fn blocks_in_parallelogram(words: vec4u, center: vec2f, half_box: vec2f, half_width: f32) -> u32 {
     let rows = run(vec4f(center.y), half_box.y, f32(PATCH_HEIGHT)).x;
     let columns = run(vec4f(center.x), half_box.x, f32(PATCH_WIDTH)).x;
@@ -76,7 +76,7 @@ fn blocks_in_parallelogram(words: vec4u, center: vec2f, half_box: vec2f, half_wi
     return blocks_with(words, box);
 }
 
-// The parallelogram's pixels in a row of every block, of those in some rows and columns.
+// The pixels of the parallelogram in one row of every block, within some rows and columns.
 fn row_of_blocks(rows: u32, columns: u32, row: u32, center: vec2f, half_width: f32) -> vec4u {
     let row_of = vec4u(row, row, row + 4u, row + 4u);
     let across = run(center.x + gather.shear * (vec4f(row_of) - center.y), half_width, f32(PATCH_WIDTH)) & vec4u(columns);
@@ -84,13 +84,13 @@ fn row_of_blocks(rows: u32, columns: u32, row: u32, center: vec2f, half_width: f
     return select(vec4u(0u), across >> vec4u(0u, 8u, 0u, 8u) & vec4u(255u), is_reached);
 }
 
-// The blocks, one bit each, in which two sets of pixels have one in common.
+// A mask of the blocks in which two sets of pixels intersect.
 fn blocks_with(words: vec4u, others: vec4u) -> u32 {
     let blocks = select(vec4u(0u), BLOCK_BITS, (words & others) != vec4u(0u));
     return blocks.x | blocks.y | blocks.z | blocks.w;
 }
 
-// The pixels of a row or column, one bit each, within a distance of a point.
+// A mask of the pixels of a row or column within a distance of a point.
 fn run(center: vec4f, distance: f32, count: f32) -> vec4u {
     let first = vec4u(clamp(ceil(center - distance), vec4f(0.0), vec4f(count)));
     let end = vec4u(clamp(floor(center + distance) + 1.0, vec4f(0.0), vec4f(count)));

@@ -14,7 +14,7 @@ struct Sheets {
     fourth: mat4x4f,
 }
 
-// The sheets of all of a patch's threads, while some of a group's voxels wait for the queue: 16 columns each.
+// The sheets of all of a patch's threads, stored while some of a group's voxels still wait for the queue: 16 columns each.
 var<workgroup> saved: array<vec4f, 16u * PATCH_THREADS>;
 
 fn save_sheets(thread: u32, sheets: Sheets) {
@@ -46,22 +46,22 @@ fn saved_sheet(thread: u32, column: u32) -> mat4x4f {
     );
 }
 
-// What a voxel adds to a sheet at four pixels.
+// The contribution of a voxel to a sheet at four pixels.
 fn added(section: vec4f, amount: vec4f) -> mat4x4f {
     return mat4x4f(section * amount.x, section * amount.y, section * amount.z, section * amount.w);
 }
 
-// Of a thread's four pixels the sheet depths from and to which their rays show something, and those of first hits, as bits.
+// For a thread's four pixels, the range of visible sheet depths on their rays, and the bits of first hits.
 var<private> shown_from: vec4f;
 var<private> shown_to: vec4f;
 var<private> hits: vec4u;
 
-// How these pixels look at their sheets, see `Means`.
+// The weights of sheets at these pixels, see `Means`.
 var<private> weights: vec4f;
 var<private> counted_from: vec4f;
 var<private> counted_to: vec4f;
 
-// How the rays of a thread's four pixels, of one column, look at sheets.
+// Determines the cuts and weights for the rays of a thread's four pixels, which are in one column.
 fn look(column: f32, rows: vec4f) {
     if CUT {
         let across = array<vec2f, 4>(
@@ -86,7 +86,7 @@ fn look(column: f32, rows: vec4f) {
     }
 }
 
-// Of four pixels some from one image, some from another.
+// Four pixels, selected from two images.
 fn chosen(otherwise: mat4x4f, here: mat4x4f, is_here: vec4<bool>) -> mat4x4f {
     return mat4x4f(
         select(otherwise[0], here[0], is_here.x),
@@ -96,7 +96,7 @@ fn chosen(otherwise: mat4x4f, here: mat4x4f, is_here: vec4<bool>) -> mat4x4f {
     );
 }
 
-// A sheet over or under what is there, at four pixels; its slab begins at a sheet depth.
+// Composites a sheet over or under the image at four pixels; its slab begins at the sheet depth `near`.
 fn composite_sheet(image: mat4x4f, sheet: mat4x4f, near: f32) -> mat4x4f {
     var pixels = transpose(sheet);
     var first = vec4f(near);
@@ -132,7 +132,7 @@ fn composite_sheet(image: mat4x4f, sheet: mat4x4f, near: f32) -> mat4x4f {
         var sheet_depths = mix(first, last, (cut.first_hit - before) / (after - before));
         if COMPOSITING == SURFACE {
             is_hit = (before < vec4f(1.0)) & (after >= vec4f(1.0));
-            // As `crossing`, from the middle of the slab before.
+            // As in `crossing`, from the middle of the previous slab.
             let opacity = transpose(pixels)[3];
             sheet_depths = near + ((0.5 - before) / (opacity - before) - 0.5) * frame.slab_width;
             if CUT {
@@ -145,7 +145,7 @@ fn composite_sheet(image: mat4x4f, sheet: mat4x4f, near: f32) -> mat4x4f {
     return result;
 }
 
-// A group's sheets over or under what is there; the first begins at a sheet depth.
+// Composites a group's sheets over or under the image; the first begins at the sheet depth `near`.
 fn composite_group(image: mat4x4f, sheets: Sheets, near: f32) -> mat4x4f {
     let width = frame.slab_width;
     var result = image;

@@ -1,4 +1,4 @@
-// What the tile rasterizer is given and what it counts; `gpu::layout` documents the fields.
+// The tile rasterizer's uniforms and counts; `gpu::layout` documents the fields.
 //
 // Needs shared/tally.wgsl: Tally.
 struct Gather {

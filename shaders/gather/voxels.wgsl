@@ -20,12 +20,12 @@ struct GatheredGroup {
     is_composited: bool,
 }
 
-// Those of them that are in the sheet group.
+// The part of that range in the sheet group.
 fn sheets_here(sheets: vec2f) -> vec2f {
     return clamp(sheets, vec2f(sheet_group.first_sheet), vec2f(sheet_group.first_sheet + f32(SHEETS)));
 }
 
-// The first of the groups that a kernel overlaps, in the order in which they are drawn.
+// The first group, in drawing order, that a kernel overlaps.
 fn first_group(sheets: vec2f) -> f32 {
     let sheet = select(min(sheets.y, f32(gather.groups * SHEETS)) - 1.0, max(sheets.x, 0.0), ORDER == FRONT_TO_BACK);
     return floor(sheet / f32(SHEETS));
@@ -46,7 +46,7 @@ fn blocks_seen(words: vec4u, box: ScreenBox, part: f32) -> u32 {
     return blocks_in_box(words, box.center, half);
 }
 
-// The extent of a kernel's sections in the group as a part of the kernel's: that of the section next to the kernel's centre.
+// The extent of a kernel's sections in the group, relative to the kernel's: that of the section nearest to the kernel's centre.
 fn extent_here(p: vec4f) -> f32 {
     if PERSPECTIVE || ECONOMIES {
         return 1.0;
@@ -57,12 +57,12 @@ fn extent_here(p: vec4f) -> f32 {
     return sqrt(max(1.0 - beside * beside, 0.0));
 }
 
-// Whether a voxel that is not seen in one group may be seen in the next: there boxes around footprints are of another size.
+// Whether a voxel that is not seen in one group may be seen in the next, because boxes around footprints have another size there.
 fn may_appear() -> bool {
     return PERSPECTIVE || ECONOMIES;
 }
 
-// Where voxels are whose kernels reach the group, or start in it, and whose boxes reach open pixels.
+// The bounds of voxels whose kernels reach the group, or start in it, and whose boxes reach open pixels.
 fn search_bounds(is_start: bool) -> SearchBounds {
     let bounds = bounds_of(open);
     let offset = first_px - 0.5 * vec2f(frame.size);
@@ -80,7 +80,7 @@ fn search_bounds(is_start: bool) -> SearchBounds {
     return SearchBounds(vec3f(bounds.low - margin + offset, depths.x), vec3f(bounds.high + margin + offset, depths.y));
 }
 
-// Of the voxels of the group before those stay in the queue that reach into this one and are seen there.
+// Keeps the previous group's voxels in the queue that reach into this group and are seen in it.
 fn keep_voxels() {
     let count = queue_count;
     queue_count = 0u;
@@ -101,7 +101,7 @@ fn keep_voxels() {
     }
 }
 
-// Finds as many voxels as there is room for in the queue: all that reach into the group, or those that start in it.
+// Fills the queue with voxels: all that reach into the group, or those that start in it.
 fn find_voxels(search: SearchBounds, is_start: bool) {
     while queue_count + lanes <= queue_size {
         passes += PASSES_PER_FIND;
@@ -117,7 +117,7 @@ fn find_voxels(search: SearchBounds, is_start: bool) {
     }
 }
 
-// Whether a kernel reaches into the group, and its box holds an open pixel.
+// Whether a kernel reaches into the group and its box contains an open pixel.
 fn is_drawn_here(p: vec4f, sheets: vec2f) -> bool {
     let here = sheets_here(sheets);
     return here.x < here.y && blocks_seen(open, screen_box(p), 1.0) != 0u;
@@ -128,9 +128,10 @@ fn blocks_here(p: vec4f) -> u32 {
     return blocks_seen(open, screen_box(p), extent_here(p));
 }
 
-// Counts a voxel that is drawn into the group, and its sections there, if no other patch has: as one if it is drawn as a whole.
+// Counts a voxel that is drawn into the group, and its sections there, unless another patch has counted it. A voxel drawn whole counts as one
+// section.
 fn count_drawn(voxel: u32, p: vec4f, sheets: vec2f, is_whole: bool) {
-    // Of the groups that the kernel reaches into, counted from the nearest; a whole one is drawn once.
+    // The group's index among those that the kernel reaches, counted from the nearest; a whole kernel is drawn once.
     let nth = select(sheet_group.number - u32(max(sheets.x, 0.0)) / SHEETS, 0u, is_whole);
     let word = nth * gather.bricks * 2u + voxel / 32u;
     let bit = 1u << (voxel % 32u);

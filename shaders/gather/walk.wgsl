@@ -9,7 +9,7 @@
 // Needs shared/frame.wgsl: frame.
 // Needs shared/project.wgsl: homogeneous.
 
-// What voxels are looked for: homogeneous pixel coordinates seen from the image's middle, and sheet depths.
+// The bounds of a search: homogeneous pixel coordinates relative to the image's middle, and sheet depths.
 struct SearchBounds {
     low: vec3f,
     high: vec3f,
@@ -22,17 +22,17 @@ fn is_searched_for(search: SearchBounds, p: vec4f) -> bool {
     return all(p.xyz >= search.low) && all(p.xyz <= search.high);
 }
 
-// Where the walk is.
+// The state of the walk.
 struct Walk {
-    // The entries that are not fetched yet.
+    // The entries that have not been fetched yet.
     next: u32,
     end: u32,
-    // Bricks are fetched one per lane: the brick's number, corner and voxels, and, one bit per lane, which of them are to be visited.
+    // Bricks are fetched one per lane: the brick's index, corner and voxels, and a mask of the lanes whose bricks must be visited.
     to_visit: u32,
     fetched: u32,
     fetched_corner: vec3u,
     fetched_present: vec2u,
-    // The brick that is visited, which of its voxels match the search, and how many of those have been found.
+    // The visited brick, its voxels that match the search, and the number of those that have been found.
     brick: u32,
     corner: vec3u,
     matching_voxels: vec2u,
@@ -54,7 +54,7 @@ fn is_walked() -> bool {
     return walk_state.next >= walk_state.end && walk_state.to_visit == 0u && walk_state.found_count == walk_state.matching_count;
 }
 
-// Fetches as many bricks as there are lanes.
+// Fetches one brick per lane.
 fn fetch_bricks(search: SearchBounds) {
     passes += 1u;
     walk_state.fetched = entries[min(walk_state.next + lane, walk_state.end - 1u)];
@@ -65,7 +65,7 @@ fn fetch_bricks(search: SearchBounds) {
     if !PERSPECTIVE {
         let middle = homogeneous(vec4f(vec3f(walk_state.fetched_corner) + 1.5, 1.0)).xyz;
         let rows = frame.screen_from_voxel;
-        // A little more than half the brick: its voxels are looked at with more care.
+        // A little more than half the brick, because its voxels are tested more exactly.
         let half = 1.501 * vec3f(dot(abs(rows[0].xyz), vec3f(1.0)), dot(abs(rows[1].xyz), vec3f(1.0)), dot(abs(rows[2].xyz), vec3f(1.0)));
         may_hold &= all(middle + half >= search.low) && all(middle - half <= search.high);
     }
@@ -73,7 +73,7 @@ fn fetch_bricks(search: SearchBounds) {
     walk_state.next += lanes;
 }
 
-// Goes on to the next brick that was fetched.
+// Goes to the next fetched brick.
 fn visit_brick(search: SearchBounds) {
     let next = firstTrailingBit(walk_state.to_visit);
     walk_state.to_visit &= walk_state.to_visit - 1u;
@@ -82,7 +82,7 @@ fn visit_brick(search: SearchBounds) {
     let present = subgroupShuffle(walk_state.fetched_present, next);
     bricks_visited += 1u;
 
-    // Every lane tests a run of the brick's places, two at a time.
+    // Every lane tests a run of the brick's slots, two at a time.
     let run = BRICK_VOXELS / lanes;
     let first = homogeneous(vec4f(vec3f(walk_state.corner + in_brick(lane * run)), 1.0));
     let across = homogeneous(vec4f(1.0, 0.0, 0.0, 0.0));
@@ -104,12 +104,12 @@ fn visit_brick(search: SearchBounds) {
 
 // A lane's voxel.
 struct Found {
-    // Brick and place, as in the queue.
+    // Brick and slot, as in the queue.
     voxel: u32,
     at: vec3u,
 }
 
-// Finds voxels for as many lanes as there are voxels left. Returns for how many.
+// Finds a voxel for each lane, as long as there are any. Returns their number.
 fn next_voxels(search: SearchBounds, found: ptr<function, Found>) -> u32 {
     var count = 0u;
     while count < lanes {

@@ -1,4 +1,4 @@
-// Rows of the image whose compositing buffer is one binding; `gpu::layout::Band` documents the fields.
+// The rows of the image whose compositing buffer is one binding; `gpu::layout::Band` documents the fields.
 struct Band {
     first_row: u32,
     rows: u32,

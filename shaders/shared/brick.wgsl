@@ -1,5 +1,4 @@
-// Bricks of 64 places for voxels, and what the passes of a sheet group say to each other about them.
-// `gpu::layout` documents the fields.
+// Bricks with 64 slots for voxels, and the data about them that the passes of a sheet group exchange. `gpu::layout` documents the fields.
 struct Brick {
     present: vec2u,
     x: u32,
@@ -14,7 +13,7 @@ struct BrickState {
     shaded: vec2u,
 }
 
-// A brick that a sheet group visits, which of its voxels are drawn, and which of those for the first time.
+// A brick that a sheet group visits, with the voxels that are drawn, and those that are drawn for the first time.
 struct Visit {
     drawn: vec2u,
     fresh: vec2u,
@@ -33,7 +32,7 @@ struct SheetGroup {
     number: u32,
 }
 
-// What the GPU decides about the size of a draw or dispatch.
+// The size of a draw or dispatch, determined on the GPU.
 struct Indirect {
     draw: array<u32, 5>,
     dispatch: array<u32, 3>,
@@ -43,17 +42,20 @@ struct Indirect {
 // Dispatches of more than this many workgroups are folded into two dimensions.
 const FOLD = 32768u;
 
-// Places for voxels in a brick.
+// The number of slots in a brick.
 const BRICK_VOXELS = 64u;
 
-// Quads drawn by one instance: vertices are worked on an instance at a time, and four of them would leave a software
+// The number of quads drawn by one instance: vertices are processed an instance at a time, and four of them would leave a software
 // rasterizer's vectors half empty.
 const QUADS = 16u;
 
-// Voxels shaded by one workgroup.
+// What is that many times a kernel's reach from the eye, or behind it, has no place on the screen, but may bear on planes before it.
+const CLOSE = 1.001;
+
+// The number of voxels shaded by one workgroup.
 const SHADE_WORKGROUP = 64u;
 
-// Arguments for `count` things, of which a workgroup takes `each`.
+// Arguments for `count` items, of which a workgroup processes `each`.
 fn indirect_workgroups(count: u32, each: u32) -> Indirect {
     let workgroups = (count + each - 1u) / each;
     return Indirect(
@@ -71,7 +73,7 @@ fn unfold(workgroup: vec3u) -> u32 {
     return workgroup.x + workgroup.y * FOLD;
 }
 
-// Where in the volume a place of a brick is: places run over the aligned 4×4×4 voxels that a brick's least voxel lies in.
+// The position in the volume of a brick's slot: slots are those of the aligned 4×4×4 voxels that contain the brick's minimum.
 fn voxel_of(brick: Brick, slot: u32) -> vec3u {
     let origin = vec3u(brick.x, brick.y, brick.z) & vec3u(~3u);
     return origin + in_brick(slot);

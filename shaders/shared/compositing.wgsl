@@ -1,6 +1,6 @@
 // Compositing of one sheet (eq. 2, SPEC §5).
 
-// (1 - exp(-a)) / a, 1 at 0. The difference loses a small a's digits in f32; there the series is exact.
+// (1 - exp(-a)) / a, and 1 at 0. The difference cancels in f32 for small a, where the series is exact.
 fn absorbed(a: f32) -> f32 {
     if a < 0.0625 {
         return 1.0 - a * (0.5 - a * (1.0 / 6.0 - a * (1.0 / 24.0 - a / 120.0)));
@@ -8,13 +8,13 @@ fn absorbed(a: f32) -> f32 {
     return (1.0 - exp(-a)) / a;
 }
 
-// Where from the middle of a slab to that of the next one the mean opacity is one half.
+// The position between the middles of a slab and the next one at which the mean opacity is one half.
 fn crossing(before: f32, opacity: f32) -> f32 {
     return (0.5 - before) / (opacity - before);
 }
 
-// A sheet, or its mean, over or under what is there. `MINIMUM` keeps 2 less the opacity, so that 0 is what nothing counts for; `SURFACE`
-// the mean of the last sheet, until it is opaque.
+// Composites a sheet, or its mean, over or under the image. `MINIMUM` stores 2 minus the opacity, so that 0 means that nothing has counted;
+// `SURFACE` stores the mean of the last sheet until the pixel is opaque.
 fn composite(behind: vec4f, sheet: vec4f, compositing: u32, order: u32) -> vec4f {
     var s = sheet;
     switch compositing {
@@ -27,7 +27,7 @@ fn composite(behind: vec4f, sheet: vec4f, compositing: u32, order: u32) -> vec4f
         case MAXIMUM, MINIMUM: {
             s = vec4f(s.rgb / max(s.a, 1.0), min(s.a, 1.0));
             s.a = select(s.a, 2.0 - s.a, compositing == MINIMUM);
-            // Of equal ones the nearer.
+            // The nearer of equal ones is kept.
             let is_taken = s.a > behind.a || order != FRONT_TO_BACK && s.a == behind.a;
             return select(behind, s, is_taken);
         }

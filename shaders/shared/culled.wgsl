@@ -1,4 +1,4 @@
-// Counts of a frame, and the tiles that the current sheet group draws into; `gpu::layout::Culled` documents the fields.
+// The counts of a frame, and the tiles that the current sheet group draws into; `gpu::layout::Culled` documents the fields.
 struct Culled {
     tally: Tally,
     tiles: array<atomic<u32>>,

@@ -1,5 +1,5 @@
-// What clip planes and a host's surfaces leave of a pixel's ray, and the volume's box; `gpu::layout::Cut` documents the fields. A
-// stage that includes this declares `cut: Cut` and `surfaces: texture_depth_2d`.
+// Cuts of a pixel's ray by clip planes and a host's surfaces, and the volume's box; `gpu::layout::Cut` documents the fields. A stage that
+// includes this declares `cut: Cut` and `surfaces: texture_depth_2d`.
 struct Cut {
     sheet_at: vec4f,
     sheet_along: vec4f,
@@ -18,22 +18,22 @@ struct Cut {
     has_surfaces: u32,
 }
 
-// Beyond every depth.
+// A number beyond every depth.
 const FAR = 1e30;
 
-// Planes that there is room for.
+// The maximum number of planes.
 const MOST_PLANES = 12u;
 
-// A point of the image as rays go by it.
+// The position on the image that identifies a ray.
 fn place_of(point_px: vec2f) -> vec3f {
     return vec3f(point_px - 0.5 * vec2f(frame.size), 1.0);
 }
 
-// The depths along w at which the ray through a point of the image shows something, from and to.
+// The range of depths along w that are visible on the ray through a point of the image.
 fn shown_depths(point_px: vec2f) -> vec2f {
     let at = place_of(point_px);
     var depths = vec2f(-FAR, FAR);
-    // Neither a loop's end nor an `if` depends on a uniform, for the reason that `start` gives.
+    // Neither a loop's end nor an `if` may depend on a uniform, for the reason given at `start`.
     for (var i = 0u; i < MOST_PLANES; i += 1u) {
         let distance = dot(cut.planes[2u * i].xyz, at);
         let slope = dot(cut.planes[2u * i + 1u].xyz, at);
@@ -51,16 +51,16 @@ fn shown_depths(point_px: vec2f) -> vec2f {
     return depths;
 }
 
-// The sheet depths of a ray's depths; from beyond to, if those are.
+// A range of depths on a ray, converted to sheet depths; an empty range stays reversed.
 fn sheet_depths(at: vec3f, depths: vec2f) -> vec2f {
     let slope = dot(cut.sheet_along.xyz, at);
     let ends = dot(cut.sheet_at.xyz, at) + slope * depths;
-    // Sheets are counted along w: a ray wide off the axis may meet slices the other way round, or stay in one.
+    // Sheets are counted along w. A ray far off the axis may meet slices in reverse order, or stay within one.
     let sheets = select(vec2f(min(ends.x, ends.y), max(ends.x, ends.y)), vec2f(-FAR, FAR), slope == 0.0);
     return select(vec2f(FAR, -FAR), sheets, depths.x < depths.y);
 }
 
-// The sheet depths at which the ray through a point of the image shows something, from and to; from beyond to, if nowhere.
+// The range of sheet depths that are visible on the ray through a point of the image; reversed if it is empty.
 fn shown(point_px: vec2f) -> vec2f {
     return sheet_depths(place_of(point_px), shown_depths(point_px));
 }
@@ -71,7 +71,7 @@ fn depth_along_ray(point_px: vec2f, sheet_depth: f32) -> f32 {
     return (sheet_depth - dot(cut.sheet_at.xyz, at)) / dot(cut.sheet_along.xyz, at);
 }
 
-// A first hit in a word; 0 is none.
+// The word that stores a first hit at a sheet depth. It is never 0, which stands for a pixel without a first hit.
 fn noted(sheet_depth: f32) -> u32 {
     return bitcast<u32>(select(sheet_depth, 1e-30, sheet_depth == 0.0));
 }

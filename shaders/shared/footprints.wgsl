@@ -1,5 +1,4 @@
-// Kernel footprints from their stored forms (§§3.2, 3.3.1), and the quads that they are drawn with: what `splat` and
-// `splat_perspective` share.
+// Kernel footprints from their stored forms (§§3.2, 3.3.1), and the quads with which they are drawn, for `splat` and `splat_perspective`.
 
 @group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(2) var<storage, read> splats: array<Splat>;
@@ -9,26 +8,26 @@
 
 // True for the 128 pre-integrated sections (§3.2), false for the summed-area form (§3.3.1, eq. 3).
 override SECTIONS: bool = false;
-// Sheets of a group: 1, 2 or 4.
+// The number of sheets in a group: 1, 2 or 4.
 override SHEETS: u32 = 4u;
 
-// The summed-area table: texels along a side of its quadrant, and layers, from the centre to the support.
+// The summed-area table: the texels along a side of its quadrant, and the number of layers from the centre to the support.
 override PLANE_TEXELS: f32 = 32.0;
 override LAYERS: f32 = 64.0;
 
-// Distance between the middles of neighbouring stored sections.
+// The distance between the middles of neighbouring stored sections.
 fn section_spacing() -> f32 {
     return (frame.radius + 0.5 * frame.section_width) / f32(textureNumLayers(footprints));
 }
 
-// Where the section between t0 and t1 ends, seen from the ray through the kernel's centre.
+// The extent of the section between t0 and t1, measured from the ray through the kernel's centre.
 fn section_extent(t0: f32, t1: f32) -> f32 {
     let nearest = select(min(abs(t0), abs(t1)), 0.0, t0 * t1 <= 0.0);
     return sqrt(max(frame.support * frame.support - nearest * nearest, 0.0));
 }
 
-// What of eq. 3's H(0, 0, z) is left beyond a depth z ≥ 0 counted in layers: from the nearest layer, along which the derivative
-// h falls off with exp(-falloff·z²). The series of its integral makes a coarse table accurate.
+// The rest of eq. 3's H(0, 0, z) beyond a depth z ≥ 0 counted in layers, from the nearest layer, in which the derivative h falls off with
+// exp(-falloff·z²). The series of its integral makes a coarse table accurate.
 fn beyond(z: f32, falloff: f32) -> f32 {
     let layer = round(z);
     let entry = textureLoad(footprints, vec2u(0u), u32(layer), 0).xy;
@@ -38,7 +37,7 @@ fn beyond(z: f32, falloff: f32) -> f32 {
     return entry.x - entry.y * d * h;
 }
 
-// The same beyond a plane on either side of the centre, with the plane's sign; never 0, which has none.
+// The same beyond a plane on either side of the centre, with the plane's sign; never 0, because 0 has no sign.
 fn beyond_plane(t: f32, falloff: f32) -> f32 {
     let left = beyond(min(abs(t) / frame.support, 1.0) * (LAYERS - 1.0), falloff);
     return select(max(left, 1e-30), -max(left, 1e-30), t < 0.0);
@@ -46,13 +45,13 @@ fn beyond_plane(t: f32, falloff: f32) -> f32 {
 
 // The extent of a quad's sections, between t0 and t1.
 fn quad_extent(t0: f32, t1: f32) -> f32 {
-    // A stored section may be half a spacing nearer than the one asked for.
+    // A stored section may be half a spacing nearer than the requested one.
     let slack = select(0.0, 0.5 * section_spacing(), SECTIONS);
     return section_extent(t0 - slack, t1 + slack);
 }
 
-// The nearest of the stored sections, given its slab's middle seen from the kernel's centre; bilinear between the four nearest texels
-// of its quadrant.
+// The nearest of the stored sections, given the position of its slab's middle relative to the kernel's centre, interpolated bilinearly between
+// the four nearest texels of its quadrant.
 fn section_pre_integrated(footprint: vec2f, slab_middle: f32) -> f32 {
     let layer = round(abs(slab_middle) / section_spacing());
     let middle = layer * section_spacing();
@@ -71,8 +70,8 @@ fn section_pre_integrated(footprint: vec2f, slab_middle: f32) -> f32 {
     return mix(top, bottom, t.y);
 }
 
-// What H(0, 0, z) of eq. 3 is multiplied by at a footprint coordinate counted in texels. In the plane h falls off with
-// exp(-falloff·(a² + b²)): the nearest texel, and the step from there.
+// The factor for H(0, 0, z) of eq. 3 at a footprint coordinate counted in texels. In the plane h falls off with exp(-falloff·(a² + b²)): the
+// nearest texel, extrapolated from there.
 fn in_plane(footprint: vec2f, falloff: f32) -> f32 {
     let last = PLANE_TEXELS - 1.0;
     let texel = min(round(abs(footprint)), vec2f(last));
@@ -81,14 +80,14 @@ fn in_plane(footprint: vec2f, falloff: f32) -> f32 {
     return textureLoad(footprints, vec2u(texel), 0, 0).y * (1.0 + u * (1.0 + u * (0.5 + u / 6.0)));
 }
 
-// What of H(0, 0, z) is left beyond the ball, where z ends at the chord.
+// The rest of H(0, 0, z) beyond the ball, where z ends at the chord.
 fn beyond_chord(footprint: vec2f, falloff: f32) -> f32 {
     let last = PLANE_TEXELS - 1.0;
     let chord = sqrt(max(last * last - dot(footprint, footprint), 0.0)) * ((LAYERS - 1.0) / last);
     return beyond(chord, falloff);
 }
 
-// What is left beyond planes, with their signs, if that is at least `least`: what is left falls with the planes' distance.
+// The rests beyond planes, with their signs, raised in magnitude to at least `least`: the rest decreases with the planes' distance.
 fn cut_by_ball(beyond: vec4f, least: f32) -> vec4f {
     return select(-max(-beyond, vec4f(least)), max(beyond, vec4f(least)), beyond > vec4f(0.0));
 }
@@ -99,7 +98,7 @@ fn layer_falloff() -> f32 {
     return frame.falloff * layer * layer;
 }
 
-// The same as `beyond_plane` for four planes.
+// `beyond_plane` for four planes.
 fn beyond_planes(t: vec4f, falloff: f32) -> vec4f {
     return vec4f(
         beyond_plane(t.x, falloff),

@@ -1,4 +1,4 @@
-// What is constant over a frame; `gpu::layout::Frame` documents the fields.
+// The constants of a frame; `gpu::layout::Frame` documents the fields.
 struct Frame {
     screen_from_voxel: array<vec4f, 4>,
     right: vec4f,
@@ -43,9 +43,9 @@ struct Frame {
 var<private> frame: Frame;
 var<private> zero: u32;
 
-// Every entry point's first step, with a 0 that no driver can know to be one, such as its workgroup's z. Lavapipe puts into a stage the
-// values of uniforms that decide an `if` or end a loop, and compiles it anew with each draw; of a place unknown to it, it takes them as
-// they come. And read here, they are read once: in a loop each costs it a gather.
+// The first step of every entry point, called with a 0 that no driver can prove to be 0, such as its workgroup's z. Lavapipe inserts the values of
+// uniforms that decide an `if` or end a loop into a stage, and compiles it again for each draw; values read at an unknown index are left
+// alone. Reading them here also reads them once: in a loop each read costs it a gather.
 fn start(unknown_zero: u32) {
     zero = unknown_zero;
     frame = frames[unknown_zero];
@@ -65,7 +65,7 @@ const BACK_TO_FRONT = 1u;
 // The slack with which footprints' boxes are rounded to pixels, for the rounding errors of f32 coordinates.
 const BOX_SLACK = 0.01;
 
-// Side of a tile in pixels: one word of an opacity mask per row of a tile (§6).
+// The side of a tile in pixels: one word of an opacity mask per row of a tile (§6).
 const TILE = 32u;
 
 fn tile_grid(size: vec2u) -> vec2u {

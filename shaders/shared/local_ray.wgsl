@@ -1,16 +1,16 @@
-// How a voxel's kernel lies on the screen in perspective, where every voxel has its own ray (§3.3.2, end of §4.2).
+// The map from a voxel's kernel to the screen in perspective, where every voxel has its own ray (§3.3.2, end of §4.2).
 struct LocalRay {
-    // Grid units of the kernel per depth along the ray: λ/(r·w).
+    // Grid units of the kernel per unit of depth along the ray: λ/(r·w).
     kernel_per_depth: f32,
     // 1/λ
     per_lambda: f32,
     // The unit vector on the screen along one axis of the footprint's ellipse.
     axis: vec2f,
-    // ρ² of one `unit` along that axis, and across it.
+    // ρ² of one `unit` along that axis and across it.
     metric: vec2f,
 }
 
-// Footprint coordinates are offsets parallel to the image, warped, without what is along the ray: crossed with its direction ro.
+// Footprint coordinates are warped offsets parallel to the image without their component along the ray, so their cross product with ro.
 fn local_ray(px: vec2f) -> LocalRay {
     let ray = warped_ray(px);
     let size = length(ray);
@@ -29,7 +29,7 @@ fn local_ray(px: vec2f) -> LocalRay {
     return LocalRay(size, per_lambda, axis, vec2f(dot(along, along), dot(across, across)));
 }
 
-// How the footprints of a kernel's sections in up to four sheets lie on the screen: ρ² of a pixel along the axis and across it, and the low-pass rule's
+// The maps of a kernel's sections in up to four sheets to the screen: ρ² of a pixel along the axis and across it, and the low-pass rule's
 // amplitude.
 struct SectionMaps {
     along: vec4f,
@@ -37,8 +37,8 @@ struct SectionMaps {
     amplitude: vec4f,
 }
 
-// The sections between planes at `near` and `far`, seen from the kernel's centre at the depth `from_eye`. Pixels have the size that
-// they have at the section's middle; where sheets are slices, at the kernel's centre.
+// The maps of the sections between planes at `near` and `far`, relative to the kernel's centre at the depth `from_eye`. The size of pixels is
+// that at the section's middle, or at the kernel's centre if sheets are slices.
 fn section_maps(ray: LocalRay, from_eye: f32, near: vec4f, far: vec4f) -> SectionMaps {
     let first = max(near, vec4f(-frame.radius));
     let last = max(min(far, vec4f(frame.radius)), first);
@@ -46,16 +46,16 @@ fn section_maps(ray: LocalRay, from_eye: f32, near: vec4f, far: vec4f) -> Sectio
     let pix = (from_eye + middle / ray.kernel_per_depth) * frame.pixel_per_depth;
     let along = ray.metric.x * pix * pix;
     let across = ray.metric.y * pix * pix;
-    // The low-pass rule: at least a pixel for a grid unit.
+    // The low-pass rule: at least one pixel per grid unit.
     let amplitude = inverseSqrt(max(along, vec4f(1.0)) * max(across, vec4f(1.0)));
     return SectionMaps(min(along, vec4f(1.0)), min(across, vec4f(1.0)), amplitude);
 }
 
-// The near and far planes of up to four sheets, seen from a kernel's centre along its ray; none before the near plane.
+// The near and far planes of up to four sheets along a kernel's ray, relative to its centre; clipped at the near plane.
 struct SheetPlanes {
     near: vec4f,
     far: vec4f,
-    // From one to the other, where the near plane does not cut.
+    // The distance between the planes, without the near plane's cut.
     thickness: f32,
 }
 
@@ -69,13 +69,13 @@ fn sheet_planes(ray: LocalRay, depth: f32, from_eye: f32, near: f32) -> SheetPla
     return SheetPlanes(near_planes, far_planes, frame.slab_width * per_depth);
 }
 
-// Where the near plane cuts a kernel, seen from its centre; without an eye nowhere.
+// The position at which the near plane cuts a kernel, relative to its centre; far away without an eye.
 fn near_cut(ray: LocalRay, from_eye: f32) -> f32 {
     return select(-1e9, (frame.near - from_eye) * ray.kernel_per_depth, frame.near > 0.0);
 }
 
-// How many of a group's sections in the sheets from `sheets.x` to the one before `sheets.y` have a footprint whose own box holds a
-// pixel: the group's box is larger.
+// The number of a group's sections, in the sheets from `sheets.x` to the one before `sheets.y`, whose own boxes contain a pixel: the group's box
+// is larger.
 fn sections_on_screen(center_px: vec2f, axis: vec2f, maps: SectionMaps, sheets: vec2f) -> u32 {
     let squared = axis * axis;
     let x = frame.support * sqrt(squared.x / maps.along + squared.y / maps.across);

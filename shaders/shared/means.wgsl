@@ -1,23 +1,23 @@
-// The means of sheets along pixels' rays, for the compositings that look at them; `splatting::Compositing` defines them. A stage that
-// includes this declares `COMPOSITING`, and what `cut` asks for.
+// The means of sheets along pixels' rays, for the compositing modes that use them; `splatting::Compositing` defines them. A stage that includes
+// this declares `COMPOSITING`, and what `cut` needs.
 
-// How a pixel looks at its sheets.
+// The weight of a pixel's sheets, and which of them count.
 struct Means {
-    // What they are multiplied by.
+    // The factor for sheets.
     weight: f32,
-    // The sheet depths from and to which the middles of slabs lie that count.
+    // The range of sheet depths of the middles of slabs that count.
     counted: vec2f,
 }
 
-// By how much slabs' middles may lie outside, in slabs, and rays miss a box of voxel centres, in grid steps: in views along an axis
-// rounding would decide.
+// The tolerance for slabs' middles, in slabs, and for rays beside a box of voxel centres, in grid steps: in views along an axis rounding would
+// decide otherwise.
 const HAIR = 0.01;
 
 fn is_by_means() -> bool {
     return COMPOSITING >= MAXIMUM;
 }
 
-// The depths along w at which a ray is in the box of half the given extents, grid steps; from beyond to, if nowhere.
+// The range of depths along w in which a ray lies in the box with this half size in grid steps; reversed if it is empty.
 fn in_box(at: vec3f, half: vec3f) -> vec2f {
     var depths = vec2f(cut.box_half.w, FAR);
     for (var axis = 0u; axis < 3u; axis += 1u) {
@@ -32,11 +32,11 @@ fn in_box(at: vec3f, half: vec3f) -> vec2f {
     return depths;
 }
 
-// How the pixel at a point of the image looks at its sheets.
+// The weight of sheets for the pixel at a point of the image.
 fn means(point_px: vec2f) -> Means {
     let at = place_of(point_px);
     let offset = select(0.0, frame.pixel_per_depth, frame.near > 0.0) * at.xy;
-    // The ray's length by its depth along w.
+    // The ray's length per unit of depth along w.
     let stretch = sqrt(1.0 + dot(offset, offset));
     if COMPOSITING == AVERAGE {
         let within = both(in_box(at, cut.box_half.xyz), shown_depths(point_px));
@@ -57,7 +57,7 @@ fn means(point_px: vec2f) -> Means {
     return Means(weight, select(vec2f(FAR, -FAR), counted + vec2f(-hair, hair), within.x < within.y));
 }
 
-// What two stretches have in common.
+// The intersection of two ranges.
 fn both(a: vec2f, b: vec2f) -> vec2f {
     return vec2f(max(a.x, b.x), min(a.y, b.y));
 }

@@ -1,6 +1,6 @@
-// How kernels lie on slab planes, and what values are splatted as (SPEC §9); `gpu::layout::Planes` documents the fields. A stage that includes this declares
-// `planes: Planes`.
-struct Planes {
+// How kernels lie on slab planes, and what values are splatted as (SPEC §9); `gpu::layout::FieldPlanes` documents the fields. A stage that includes this declares
+// `planes: FieldPlanes`.
+struct FieldPlanes {
     axes: array<vec4f, 3>,
     step: vec4f,
     screen_axis: vec2f,

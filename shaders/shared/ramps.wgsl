@@ -1,10 +1,10 @@
-// The control points of all ramps, searched in memory, and which of them a voxel goes by (SPEC §3). The stage declares
-// `control_points`, and `labels`, a texture array that `gpu::volume_texture` folds.
+// The control points of all ramps, searched in memory, and the ramps of a voxel (SPEC §3). The stage declares `control_points`, and `labels`, a
+// texture array that `gpu::volume_texture` folds.
 
-// Whether any label has ramps of its own.
+// Whether any label has its own ramps.
 override LABELS: bool = false;
 
-// Where a voxel's ramps start, and the ends of those for colour, opacity and gradient opacity.
+// The start of a voxel's ramps, and the ends of those for colour, opacity and gradient opacity.
 fn ramps_of(index: u32) -> vec4u {
     if !LABELS {
         return vec4u(0u, frame.ramps.xyz);

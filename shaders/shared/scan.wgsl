@@ -1,9 +1,9 @@
-// Sums over a workgroup's threads in their order: what lets them write side by side and keep that order.
+// Prefix sums over a workgroup's threads, with which threads write lists in a fixed order without gaps.
 const WORKGROUP_SIZE = 256u;
 
 var<workgroup> ends: array<vec2u, 256>;
 
-// What the threads up to and with this one hold. All threads must call it; afterwards `ends` has every thread's.
+// The sum over the threads up to and including this one. All threads must call it; afterwards `ends` holds every thread's sum.
 fn sum_up_to(thread: u32, own: vec2u) -> vec2u {
     ends[thread] = own;
     workgroupBarrier();

@@ -1,8 +1,8 @@
 // Classification and shading (SPEC §3).
 
-// On the line between two control points.
+// The value on the line between two control points.
 fn between(a: vec4f, b: vec4f, value: f32) -> vec3f {
-    // Halves, as points may be more than the largest f32 apart.
+    // Halved, because points may be more than the largest f32 apart.
     let t = select(0.0, (0.5 * value - 0.5 * a.x) / (0.5 * b.x - 0.5 * a.x), a.x < b.x);
     return mix(a.yzw, b.yzw, t);
 }
@@ -12,7 +12,7 @@ fn amount(alpha: f32) -> f32 {
     if frame.compositing != EXPONENTIAL {
         return alpha;
     }
-    // 1 - α loses a small α's digits in f32; there the series of -ln(1-α) is exact.
+    // 1 - α cancels in f32 for small α, where the series of -ln(1-α) is exact.
     if alpha < 0.0625 {
         return alpha * (1.0 + alpha * (0.5 + alpha * (1.0 / 3.0 + alpha * (0.25 + alpha * 0.2))));
     }
@@ -25,7 +25,7 @@ struct Lighting {
     half_vector: vec3f,
 }
 
-// In perspective the eye, and a light that is at it, is elsewhere for every voxel.
+// In perspective the direction to the eye, and to a light at it, differs between voxels.
 fn lighting(px: vec2f, in_perspective: bool) -> Lighting {
     if !in_perspective {
         return Lighting(frame.light.xyz, frame.half_vector.xyz);

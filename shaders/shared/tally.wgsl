@@ -1,4 +1,4 @@
-// Counts of a frame; `gpu::layout::Tally` documents the fields.
+// The counts of a frame; `gpu::layout::Tally` documents the fields.
 struct Tally {
     voxels_shaded: atomic<u32>,
     sections_rasterized: atomic<u32>,

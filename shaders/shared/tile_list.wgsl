@@ -1,4 +1,4 @@
-// Some tiles, and the sizes of a draw or dispatch over them; `gpu::layout::TileList` documents the fields.
+// A list of tiles, and the size of a draw or dispatch over them; `gpu::layout::TileList` documents the fields.
 struct TileList {
     args: Indirect,
     tiles: array<u32>,

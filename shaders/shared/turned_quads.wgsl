@@ -1,27 +1,26 @@
-// Footprint quads of kernels that are each turned to their own ray, every section mapped at its own depth (§3.3.2, end of §4.2): what
-// `splat_perspective` and `sample` share.
+// Footprint quads of kernels that are each turned to their own ray, with every section mapped at its own depth (§3.3.2, end of §4.2), for
+// `splat_perspective` and `sample`.
 
-// What the fragments of a quad share.
+// The data that the fragments of a quad share.
 struct Quad {
     @builtin(position) position: vec4f,
     @location(0) @interpolate(flat) center_px: vec2f,
     // The unit vector on the screen along one axis of the footprints' ellipses.
     @location(1) @interpolate(flat) axis: vec2f,
-    // For every sheet what a pixel along the axis is in footprint coordinates, and across it: texels of the summed-area table or
-    // grid units.
+    // For every sheet the footprint coordinates of a pixel along the axis and across it, in texels of the summed-area table or in grid units.
     @location(2) @interpolate(flat) along: vec4f,
     @location(3) @interpolate(flat) across: vec4f,
     @location(4) @interpolate(flat) amount: vec4f,
     // For every sheet the low-pass rule's amplitude.
     @location(5) @interpolate(flat) amplitude: vec4f,
-    // Summed-area: what of H(0, 0, z) is left beyond the sheets' near planes, with the planes' signs.
-    // Sections: the slabs' middles, seen from the kernel's centre.
+    // Summed-area: the rest of H(0, 0, z) beyond the sheets' near planes, with the planes' signs.
+    // Sections: the positions of the slabs' middles relative to the kernel's centre.
     @location(6) @interpolate(flat) near: vec4f,
     // Summed-area: the same beyond the far planes.
     @location(7) @interpolate(flat) far: vec4f,
-    // Summed-area: all of H(0, 0, z) on both sides of the centre, for the sheet that the centre lies in.
+    // Summed-area: the whole H(0, 0, z) on both sides of the centre, for the sheet that contains the centre.
     @location(8) @interpolate(flat) whole: vec4f,
-    // Summed-area: falloff times the square of the layers' distance.
+    // Summed-area: falloff times the squared distance of layers.
     @location(9) @interpolate(flat) falloff: f32,
 }
 
@@ -48,7 +47,7 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
     let position = select(NOWHERE, corner, extent > 0.0 && near.x < far[SHEETS - 1u] && quad < args.count);
     let amount = vec4f(unpack2x16float(splat.rg), unpack2x16float(splat.ba)) * ray.per_lambda;
     if SECTIONS {
-        // Stored sections are whole: the near plane leaves out those before it.
+        // Stored sections are whole, so those entirely before the near plane are left out.
         let middle = select(vec4f(1e9), far - 0.5 * planes.thickness, far > near);
         return Quad(position, center_px, ray.axis, along, across, amount, maps.amplitude, middle, vec4f(0.0), vec4f(0.0), 0.0);
     }
@@ -70,7 +69,7 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
     );
 }
 
-// The smallest that any sheet of the group has.
+// The minimum over the sheets of the group.
 fn min_of(sheets: vec4f) -> f32 {
     var least = sheets.x;
     for (var i = 1u; i < SHEETS; i += 1u) {

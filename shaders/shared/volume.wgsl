@@ -16,30 +16,30 @@ fn value_of(stored: u32) -> f32 {
     return select(bitcast<f32>(stored), f32(stored) + frame.value_offset, frame.whole_values != 0u);
 }
 
-// Whether stored bits are a hole's, NaN. Compilers may assume that no float is NaN, so only the bits can tell.
+// Whether the stored bits are NaN, a hole. Compilers may assume that no float is NaN, so the bits are tested.
 fn is_hole(stored: u32) -> bool {
     return (stored & 0x7f800000u) == 0x7f800000u;
 }
 
-// Column, row and layer of a voxel's texel in layers of a power of two a side.
+// The column, row and layer of a voxel's texel in layers whose side is a power of two.
 fn texel_of(index: u32, side: u32) -> vec3u {
     let row = index >> firstTrailingBit(side);
     return vec3u(index & (side - 1u), row & (side - 1u), row >> firstTrailingBit(side));
 }
 
-// Index of a voxel in the volume, x fastest.
+// The index of a voxel in the volume, x fastest.
 fn index_of(voxel: vec3u) -> u32 {
     return voxel.x + frame.dims.x * (voxel.y + frame.dims.y * voxel.z);
 }
 
 struct Gradient {
-    // -g/|g|, 0 without a direction.
+    // -g/|g|; 0 if the gradient has no direction.
     normal: vec3f,
-    // |g|, value per world unit; 0 without a direction.
+    // |g| in value per world unit; 0 if the gradient has no direction.
     magnitude: f32,
 }
 
-// Half the difference along an axis, value per `unit`; one-sided at the border and beside a hole, 0 without a neighbour.
+// Half the difference along an axis in value per `unit`; one-sided at the border and beside a hole, 0 without a neighbour.
 fn half_difference(index: u32, stride: u32, at: u32, count: u32, scale: f32) -> f32 {
     var before = min(at, 1u);
     var after = min(count - 1u - at, 1u);
@@ -47,7 +47,7 @@ fn half_difference(index: u32, stride: u32, at: u32, count: u32, scale: f32) -> 
         before = select(before, 0u, is_hole(stored_at(index - before * stride)));
         after = select(after, 0u, is_hole(stored_at(index + after * stride)));
     }
-    // Halves, as values may be more than the largest f32 apart.
+    // Halved, because values may be more than the largest f32 apart.
     let difference = 0.5 * value_at(index + after * stride) - 0.5 * value_at(index - before * stride);
     return difference * select(2.0 * scale, scale, before + after == 2u);
 }
@@ -70,11 +70,11 @@ fn gradient_at(voxel: vec3u) -> Gradient {
 
 // A gradient given by its half, value per `unit`.
 fn gradient_of(g: vec3f) -> Gradient {
-    // Squares leave the range of f32 long before the gradient does.
+    // Scaled first, because squares leave the range of f32 long before the gradient does.
     let largest = max(max(abs(g.x), abs(g.y)), abs(g.z));
     let direction = g / select(1.0, largest, largest > 0.0);
     let size = length(direction);
-    // In this order the product leaves the range of f32 where the magnitude does, and nowhere else.
+    // Multiplied in this order, the product leaves the range of f32 only if the magnitude does.
     let magnitude = (largest * frame.per_unit) * (2.0 * size * frame.per_unit);
     if magnitude < frame.gradient.w {
         return Gradient(vec3f(0.0), 0.0);

@@ -1,4 +1,4 @@
-//! Label maps: volumes whose values are labels, not amounts. Every label has a colour of its own, 0 is not shown.
+//! Label maps: volumes whose values are labels, not amounts. Every label has its own colour, and 0 is hidden.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -10,10 +10,10 @@ use super::quantile::histogram;
 use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
 use crate::volume::Volume;
 
-/// Opacity of every label but 0.
+/// The opacity of every label except 0.
 const OPACITY: f64 = 0.9;
 
-/// Each of some labels once, ascending.
+/// The distinct labels, ascending.
 pub fn distinct(labels: &[u16]) -> Vec<u16> {
     let mut present = vec![false; 1 << 16];
     for &label in labels {
@@ -22,12 +22,12 @@ pub fn distinct(labels: &[u16]) -> Vec<u16> {
     (0..=u16::MAX).filter(|&label| present[usize::from(label)]).collect()
 }
 
-/// The values of a volume but its holes, each once, ascending, if all of them are labels: whole numbers from 0 to 65535.
+/// The distinct values of a volume, ascending, if all of them except holes are labels: whole numbers from 0 to 65535.
 pub fn values(volume: &Volume) -> Option<Vec<u16>> {
     counts(volume).map(|counts| counts.into_iter().map(|(label, _)| label).collect())
 }
 
-/// The values of a volume if all of them are labels, ascending, and how many voxels have them.
+/// The labels of [`values`], each with its number of voxels.
 fn counts(volume: &Volume) -> Option<Vec<(u16, u64)>> {
     let values = volume.values();
     if !values.par_iter().all(|&value| f32::from(value as u16) == value || value.is_nan()) {
@@ -37,10 +37,10 @@ fn counts(volume: &Volume) -> Option<Vec<(u16, u64)>> {
     Some((0..=u16::MAX).zip(counts).filter(|&(_, count)| count > 0).collect())
 }
 
-/// Whether a volume's values look like labels and not like amounts: at least three labels, in regions with sharp borders. Of the voxels
-/// whose neighbours on an axis differ, at most a third has a value that neither has, where in images most do; and of neighbours that are
-/// not background at least half are alike. A mask of two values is not meant: it has a surface, like any object. Where a file names its
-/// labels, they are labels in any case.
+/// Whether a volume's values look like labels rather than amounts: at least three labels, in regions with sharp borders. Of the voxels
+/// whose neighbours on an axis differ, at most a third have a value that differs from both; in images most do. Of the pairs of
+/// neighbours that are not background, at least half are equal. A mask of two values does not count: it has a surface, like any object.
+/// If the file names its labels, the volume is a label map in any case.
 pub fn is_label_map(volume: &Volume) -> bool {
     let Some(counts) = counts(volume) else { return false };
     if volume.labels().is_none() && !volume.label_names().is_empty() {
@@ -49,26 +49,26 @@ pub fn is_label_map(volume: &Volume) -> bool {
     if counts.len() < 3 {
         return false;
     }
-    // Of several that are the commonest the least.
+    // The lowest of the most frequent values.
     let background = counts.iter().rev().max_by_key(|(_, count)| count).map_or(0.0, |&(label, _)| f32::from(label));
     Borders::of(volume, background).are_sharp()
 }
 
-/// Rows that are looked at, and the distance between them.
+/// The maximum number of rows that are examined, and their distance.
 const MOST_ROWS: u64 = 8192;
 const PRIME: u64 = 1_000_003;
 
-/// How values change from voxel to voxel along the axes.
+/// Counts of how values change between neighbours along the axes.
 #[derive(Clone, Copy, Default)]
 struct Borders {
-    /// Voxels between two different values, and those that have a third one.
+    /// Voxels between two different values, and those of them that have a third value.
     between: [u64; 2],
-    /// Pairs of neighbours not both of which are background, and equal ones.
+    /// Pairs of neighbours that are not both background, and the equal ones among them.
     pairs: [u64; 2],
 }
 
 impl Borders {
-    /// Of as many rows of voxels as tell it.
+    /// Counts in a sample of the volume's rows.
     fn of(volume: &Volume, background: f32) -> Self {
         let (dims, values) = (volume.dims(), volume.values());
         let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
@@ -100,7 +100,7 @@ impl Borders {
             }
             borders
         };
-        // A prime apart, so that they lie everywhere.
+        // The distance is prime, so that the rows are spread over the volume.
         let rows = (ny * nz) as u64;
         let place = |at: u64| if rows > MOST_ROWS { at * PRIME % rows } else { at };
         let looked_at = (0..rows.min(MOST_ROWS)).into_par_iter().map(|at| place(at) as usize);
@@ -117,19 +117,19 @@ impl Borders {
     }
 }
 
-/// A label's colour, red, green and blue in [0, 1], the same in every volume. Hue and lightness go in steps of the plastic number's powers,
-/// which fill a square as evenly as the golden ratio's fill a line, so that the first labels, however many, differ as they can.
+/// A label's colour (red, green and blue in [0, 1]), the same in every volume. Hue and lightness advance by powers of the plastic
+/// number, which fill a square as evenly as those of the golden ratio fill a line, so that any number of first labels differ well.
 pub fn color(label: u16) -> DVec3 {
     const PLASTIC: f64 = 1.324_717_957_244_746;
     const LIGHTNESS: [f64; 2] = [0.52, 0.9];
     let step = |start: f64, size: f64| (start + f64::from(label) * size).fract();
     let hue = TAU * step(0.85, 1.0 / PLASTIC);
     let lightness = LIGHTNESS[0] + (LIGHTNESS[1] - LIGHTNESS[0]) * step(0.2, 1.0 / (PLASTIC * PLASTIC));
-    // Three digits are as good, and easier to read in a scene file.
+    // Three digits suffice and are easier to read in a scene file.
     (oklch(lightness, 0.15, hue) * 1e3).round() / 1e3
 }
 
-/// A label map's transfer function. A label's colour is at its number, so that no voxel has one in between.
+/// A label map's transfer function. Each colour is at its label's number, so no voxel has a colour in between.
 pub fn transfer(labels: &[u16]) -> TransferFunction {
     let shown: Vec<_> =
         labels.iter().filter(|&&label| label > 0).map(|&label| (f64::from(label), color(label))).collect();
@@ -137,7 +137,7 @@ pub fn transfer(labels: &[u16]) -> TransferFunction {
     TransferFunction::by_value(Ramp::through(shown), Ramp::through(vec![(0.0, 0.0), (1.0, OPACITY)]))
 }
 
-/// Tables with the same colours for the labels of a segmented volume; its opacities go by its values. Label 0 is hidden.
+/// Tables with the same colours for the labels of a segmented volume, whose opacities depend on its values. Label 0 is hidden.
 pub fn tables(labels: &[u16]) -> BTreeMap<u16, LabelTables> {
     let table = |label: u16| {
         let color = Some(Ramp::through(vec![(0.0, color(label))]));
@@ -146,7 +146,7 @@ pub fn tables(labels: &[u16]) -> BTreeMap<u16, LabelTables> {
     distinct(labels).into_iter().map(|label| (label, table(label))).collect()
 }
 
-/// An sRGB colour from lightness, chroma and hue of Ottosson's Oklab, less colourful where the gamut ends.
+/// The sRGB colour for lightness, chroma and hue in Ottosson's Oklab, with less chroma if it is outside the gamut.
 fn oklch(lightness: f64, chroma: f64, hue: f64) -> DVec3 {
     let rgb = |chroma: f64| {
         let (a, b) = (chroma * libm::cos(hue), chroma * libm::sin(hue));

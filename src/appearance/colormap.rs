@@ -6,17 +6,17 @@ use super::shown_range;
 use crate::settings::transfer_function::{Ramp, TransferFunction};
 use crate::volume::Volume;
 
-/// A named sequence of colours, to be laid over a range of values; or the palette of the volume's own file.
+/// A named sequence of colours to spread over a range of values, or the palette of the volume's own file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Colormap {
-    /// Dark violet over green to yellow, of even steps in lightness.
+    /// Dark violet over green to yellow, in even steps of lightness.
     Viridis,
-    /// Black over purple to pale yellow, of even steps in lightness.
+    /// Black over purple to pale yellow, in even steps of lightness.
     Magma,
-    /// Black over red to pale yellow, of even steps in lightness.
+    /// Black over red to pale yellow, in even steps of lightness.
     Inferno,
-    /// Blue over pink to yellow, of even steps in lightness.
+    /// Blue over pink to yellow, in even steps of lightness.
     Plasma,
     /// Black to white.
     Gray,
@@ -26,11 +26,11 @@ pub enum Colormap {
     Turbo,
     /// Blue over light grey to red.
     Coolwarm,
-    /// The colours that the volume's file gives to its values ([`Volume::palette`]).
+    /// The colours that the volume's file assigns to its values ([`Volume::palette`]).
     File,
 }
 
-// Fitted to matplotlib's maps of these names (CC0; turbo's is Google's), which they meet within 6 of 255 in every channel.
+// Fitted to matplotlib's maps of these names (CC0; turbo is Google's), with an error of at most 6 of 255 in every channel.
 const VIRIDIS: &[u32] = &[
     0x440154, 0x481867, 0x472c79, 0x41408a, 0x3a5288, 0x32628a, 0x2b728b, 0x25818a, 0x219089, 0x1e9f85, 0x27ad7d,
     0x3dbc70, 0x5cc867, 0x81d348, 0xaadc36, 0xd5e216, 0xfde725,
@@ -62,7 +62,7 @@ const COOLWARM: &[u32] = &[
 ];
 
 impl Colormap {
-    /// All of them, with the names that scene files use.
+    /// All colour maps with their names in scene files.
     pub const ALL: [(&'static str, Self); 9] = [
         ("viridis", Self::Viridis),
         ("magma", Self::Magma),
@@ -75,7 +75,7 @@ impl Colormap {
         ("file", Self::File),
     ];
 
-    /// Colours at even distances, `0xrrggbb`; `None` for the file's.
+    /// Evenly spaced colours, `0xrrggbb`; `None` for the file's palette.
     fn colors(self) -> Option<&'static [u32]> {
         Some(match self {
             Self::Viridis => VIRIDIS,
@@ -90,8 +90,7 @@ impl Colormap {
         })
     }
 
-    /// The map for a volume: over the values that it shows ([`shown_range`]), or the palette as its file has it. `None` for the palette
-    /// of a file that has none.
+    /// The map for a volume, over the values that it shows ([`shown_range`]), or the palette of its file; `None` if that has no palette.
     pub fn of(self, volume: &Volume, transfer: &TransferFunction) -> Option<Ramp<DVec3>> {
         match self.colors() {
             Some(colors) => Some(over(colors, shown_range(volume, transfer).unwrap_or_default())),
@@ -100,14 +99,14 @@ impl Colormap {
     }
 }
 
-/// Colours at even distances over values from `lo` to `hi`; over a single value the last colour.
+/// Evenly spaced colours over values from `lo` to `hi`; the last colour if these are equal.
 fn over(colors: &[u32], [lo, hi]: [f64; 2]) -> Ramp<DVec3> {
     let last = (colors.len() - 1) as f64;
-    // Halves: the range may be larger than the largest f64.
+    // Halves are used because the range may exceed the largest f64.
     let place = |at: usize| 2.0 * (lo / 2.0 + (hi / 2.0 - lo / 2.0) * (at as f64 / last));
     let rgb = |color: u32| DVec3::from([16, 8, 0].map(|shift| f64::from(color >> shift & 0xff) / 255.0));
     let mut points: Vec<_> = colors.iter().enumerate().map(|(at, &color)| (place(at), rgb(color))).collect();
-    // Values are f32, so that only equal ends leave no room.
+    // Values are f32, so only equal ends coincide.
     points.dedup_by(|later, earlier| {
         let is_same = later.0 <= earlier.0;
         if is_same {

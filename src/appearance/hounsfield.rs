@@ -1,22 +1,22 @@
-//! Which values of a CT volume are which Hounsfield units.
+//! The relation between a CT volume's values and Hounsfield units.
 
 use super::object::Object;
 use super::padding::AIR;
 use super::quantile::quantiles;
 
-/// What is added to Hounsfield units where they are kept as unsigned numbers.
+/// The offset of Hounsfield units that are stored as unsigned numbers.
 const OFFSET: f64 = 1024.0;
 
-/// Volumes with values below this have Hounsfield units.
+/// Volumes with values below this hold Hounsfield units.
 const SIGNED_BELOW: f64 = -100.0;
 
-/// The greatest values of unsigned 12-bit scanners, with room for metal; beyond, values have been scaled.
+/// The range of maxima of unsigned 12-bit scanners, with room for metal. Larger values have been scaled.
 const UNSIGNED_GREATEST: std::ops::RangeInclusive<f64> = 1500.0..=8191.0;
 
-/// What is added to values that may be Hounsfield units: 0 where one in a thousand is below -100; else 1024 where the greatest lies within
-/// 1500 to 8191.
+/// The offset of values that may be Hounsfield units: 0 if one in a thousand is below -100, or else 1024 if the maximum lies within 1500
+/// to 8191.
 pub(super) fn offset_of(values: &[f32]) -> Option<f64> {
-    // A filter's undershoot is no unit.
+    // A quantile is used because a filter's undershoot may lie below the units.
     let [least, greatest] = quantiles(values, |_| true, [0.001, 1.0]).unwrap_or_default().map(f64::from);
     match least < SIGNED_BELOW {
         true => Some(0.0),
@@ -24,18 +24,18 @@ pub(super) fn offset_of(values: &[f32]) -> Option<f64> {
     }
 }
 
-/// Values over Hounsfield units, a straight line.
+/// Values as a linear function of Hounsfield units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Hounsfield {
     /// The value at 0 units, water.
     water: f64,
-    /// What one unit more adds, above 0.
+    /// The value's increase per unit, above 0.
     per_unit: f64,
 }
 
 impl Hounsfield {
-    /// Units as they are where one value in a thousand is below -100; else stored with 1024 added where the greatest lies within 1500
-    /// to 8191. For all else what is around the object is taken for air (-1000), and the object's faintest eighth for water (0).
+    /// Values with an offset (see [`offset_of`]), or else a fit: the background is assumed to be air (-1000), and the object's faintest
+    /// eighth water (0).
     pub(super) fn of(values: &[f32]) -> Self {
         if let Some(water) = offset_of(values) {
             return Self { water, per_unit: 1.0 };
@@ -46,7 +46,7 @@ impl Hounsfield {
         }
     }
 
-    /// The value of a number of units.
+    /// The value at a number of units.
     pub(super) fn value(&self, units: f64) -> f64 {
         self.water + self.per_unit * units
     }

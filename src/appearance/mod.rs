@@ -1,4 +1,4 @@
-//! Appearance chosen for a volume: what it looks like where nobody says so, presets, colour maps, and the colours of labels.
+//! Appearance chosen for a volume: the default, presets, colour maps, and the colours of labels.
 
 pub mod categories;
 mod colormap;
@@ -22,16 +22,16 @@ use crate::volume::Volume;
 use object::Object;
 
 impl TransferFunction {
-    /// A transfer function for volumes that come without one: a nearly opaque surface around what stands out from the
-    /// background, skin-coloured, whitening towards high values. A constant volume becomes a grey haze. Label maps
-    /// ([`categories::is_label_map`]) have the colours of [`categories`] instead.
+    /// A transfer function for volumes that come without one: a nearly opaque surface around what stands out from the background,
+    /// skin-coloured and whiter towards high values. A constant volume becomes a grey haze. Label maps ([`categories::is_label_map`]) get
+    /// the colours of [`categories`].
     pub fn from_histogram(volume: &Volume) -> Self {
         let labels = categories::is_label_map(volume).then(|| categories::values(volume)).flatten();
         labels.map_or_else(|| surface(volume), |labels| categories::transfer(&labels))
     }
 }
 
-/// [`TransferFunction::from_histogram`] where values are no labels.
+/// [`TransferFunction::from_histogram`] for values that are not labels.
 fn surface(volume: &Volume) -> TransferFunction {
     match Object::find(volume.values()) {
         Some(object) => {
@@ -43,14 +43,13 @@ fn surface(volume: &Volume) -> TransferFunction {
     }
 }
 
-/// A grey haze, for volumes whose values are all the same.
+/// A grey haze, for constant volumes.
 fn constant(opacity: f64) -> TransferFunction {
     TransferFunction::by_value(Ramp::through(vec![(0.0, DVec3::splat(0.7))]), Ramp::through(vec![(0.0, opacity)]))
 }
 
-/// The values that a volume shows under a transfer function: of those with an opacity above 0, and in an iso-range, from the 0.5 % to the
-/// 99.5 % quantile. What few voxels have beyond would take most of a colour map. `None` if nothing shows. Labels' own tables are not
-/// looked at.
+/// The range of values that a volume shows under a transfer function: the 0.5 % and 99.5 % quantiles of those with an opacity above 0 in
+/// an iso-range, so that outliers do not use up most of a colour map. `None` if nothing shows. Tables of labels are ignored.
 pub fn shown_range(volume: &Volume, transfer: &TransferFunction) -> Option<[f64; 2]> {
     const TAIL: f64 = 0.005;
     let shown = ValueSet::of(transfer);

@@ -1,4 +1,4 @@
-//! What tells an object in a volume from what is around it.
+//! Separates an object in a volume from its background.
 
 use rayon::prelude::*;
 
@@ -8,25 +8,25 @@ use crate::settings::transfer_function::Ramp;
 
 const BINS: usize = 256;
 
-/// Values that one thread counts at a time.
+/// The number of values that one thread counts at a time.
 const CHUNK: usize = 1 << 18;
 
-/// Share of the values at either end that the histogram does not reach to: hot pixels, and what else stands far apart.
+/// The fraction of values at either end that the histogram leaves out, such as hot pixels.
 const TAIL: f64 = 0.0005;
 
-/// What a histogram tells about the object in a volume; `background < faint <= bright`.
+/// The levels of the object in a volume, from the histogram: `background < faint <= bright`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Object {
     /// The background's mean value.
     pub(super) background: f64,
-    /// What the object's faintest eighth is below.
+    /// The upper bound of the object's faintest eighth.
     pub(super) faint: f64,
-    /// What only the object's brightest eighth exceeds.
+    /// The lower bound of the object's brightest eighth.
     pub(super) bright: f64,
 }
 
 impl Object {
-    /// Of the finite values. `None` if all of them are the same.
+    /// The levels for the finite values; `None` if these are all equal.
     pub(super) fn find(values: &[f32]) -> Option<Self> {
         let [lo, hi] = ends(values)?;
         let (start, range) = (f64::from(lo), f64::from(hi) - f64::from(lo));
@@ -34,7 +34,7 @@ impl Object {
         let counted = values.par_chunks(CHUNK).map(|chunk| {
             let (mut counts, mut least_count) = ([0.0; BINS], 0.0);
             for &value in chunk.iter().filter(|value| !value.is_nan()) {
-                // What is below the first bin counts there.
+                // Values below the first bin count in it.
                 counts[(bin(value) as usize).min(BINS - 1)] += 1.0;
                 least_count += if value <= lo { 1.0 } else { 0.0 };
             }
@@ -46,7 +46,7 @@ impl Object {
         );
         let value_of = |bin: f64| start + (bin + 0.5) / BINS as f64 * range;
 
-        // Sparse data, such as a labelled cell: its background was cleared already, all the rest is object.
+        // In sparse data, such as a labelled cell, the background has been cleared and all the rest is object.
         let (background, first) = if least_count > 0.99 * counts.iter().sum::<f64>() {
             counts[0] -= least_count;
             (start, 0)
@@ -68,9 +68,9 @@ impl Object {
         Some(Self { background, faint: quantile(0.125), bright: quantile(0.875) })
     }
 
-    /// The value of the object's surface. Otsu's threshold tells object from background. It lies half way between their
-    /// means, though, where faint parts (skin, leaves, thin branches) are lost; where object meets background, samples mix
-    /// the two, so the surface is put half way between the background's mean and the object's faintest eighth.
+    /// The value at the object's surface. Otsu's threshold separates object from background, but lies half way between their means, which
+    /// loses faint parts (skin, leaves, thin branches). Samples at the border mix both, so the surface is put half way between the
+    /// background's mean and the object's faintest eighth.
     pub(super) fn threshold(&self) -> f64 {
         (self.background + self.faint) / 2.0
     }
@@ -78,30 +78,30 @@ impl Object {
     /// An opacity that rises at the surface.
     pub(super) fn surface(&self, opacity: f64) -> Ramp<f64> {
         let threshold = self.threshold();
-        // Soft enough that the surface shows no voxel steps, and always clear of the background.
+        // Soft enough to hide voxel steps, but always clear of the background.
         let half_width = (threshold - self.background) / 3.0;
         Ramp::through(vec![(threshold - half_width, 0.0), (threshold + half_width, opacity)])
     }
 }
 
-/// What the histogram reaches from and to; `None` if all values are the same.
+/// The range of the histogram; `None` if all values are equal.
 fn ends(values: &[f32]) -> Option<[f32; 2]> {
-    // `f32::min` and `f32::max` leave out holes.
+    // `f32::min` and `f32::max` ignore holes (NaN).
     let widen = |(lo, hi): (f32, f32), (a, b): (f32, f32)| (lo.min(a), hi.max(b));
     let extent = values.par_iter().map(|&value| (value, value));
     let (least, greatest) = extent.reduce(|| (f32::INFINITY, f32::NEG_INFINITY), widen);
     if least >= greatest {
         return None;
     }
-    // Of the others: a cleared background may be all but the whole volume.
+    // The maximum is excluded, because a cleared background may be nearly the whole volume.
     let [lo] = quantiles(values, |value| value < greatest, [TAIL])?;
     let [hi] = quantiles(values, |value| value > least, [1.0 - TAIL])?;
     let lo = if is_padded(values, least) { lo.max(AIR as f32) } else { lo };
     Some(if lo < hi { [lo, hi] } else { [least, greatest] })
 }
 
-/// The first bin of the upper class when the variance between the two classes is the greatest (Otsu 1979). Neither the
-/// first bin nor the last one may be empty.
+/// The first bin of the upper class for which the variance between two classes is maximal (Otsu 1979). The first and the last bin must
+/// not be empty.
 fn otsu_split(counts: &[f64]) -> usize {
     let (total_count, total_sum) = count_and_sum(counts);
     let (mut count, mut sum) = (0.0, 0.0);

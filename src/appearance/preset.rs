@@ -1,4 +1,4 @@
-//! Presets: a transfer function for a kind of data, with the shading and compositing that go with it.
+//! Presets: a transfer function for a kind of data, with matching shading and compositing.
 
 use glam::DVec3;
 
@@ -11,33 +11,33 @@ use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::{Ramp, TransferFunction};
 use crate::volume::Volume;
 
-/// A kind of data, and what of it is to be seen.
+/// A kind of data, and which part of it is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Preset {
-    /// CT: the skin, opaque.
+    /// CT: opaque skin.
     CtSkin,
-    /// CT: bone alone, opaque.
+    /// CT: opaque bone only.
     CtBone,
-    /// CT with a contrast agent: vessels red, bone behind and among them.
+    /// CT with a contrast agent: red vessels, with bone.
     CtVessels,
-    /// MR of a head: the skin; where a cut opens it, tissues differ.
+    /// MR of a head: the skin; a cut shows different tissues.
     MrHead,
-    /// A summed projection, of any data.
+    /// A summed projection of any data.
     Xray,
-    /// A maximum intensity projection, of any data.
+    /// A maximum intensity projection of any data.
     Mip,
-    /// Fluorescence: what glows above the background, unshaded.
+    /// Fluorescence: values above the background, unshaded.
     Confocal,
-    /// Labels: a colour for each; see [`categories`].
+    /// Labels: one colour each; see [`categories`].
     Labels,
 }
 
-/// Control points: Hounsfield units and what is there.
+/// Control points at Hounsfield units.
 type Points<T> = [(f64, T)];
 
 impl Preset {
-    /// All of them, with the names that scene files use.
+    /// All presets with their names in scene files.
     pub const ALL: [(&'static str, Self); 8] = [
         ("ct-skin", Self::CtSkin),
         ("ct-bone", Self::CtBone),
@@ -58,7 +58,7 @@ impl Preset {
             Self::MrHead => Shading { ambient: 0.4, diffuse: 0.6, specular: 0.1, ..shading },
             Self::CtBone | Self::CtVessels => Shading { specular: 0.35, shininess: 40.0, ..shading },
             Self::Xray | Self::Mip | Self::Confocal => Shading { enabled: false, ..shading },
-            // Inside of a label there is no gradient, and all light is ambient.
+            // Inside a label the gradient is 0, so all light is ambient.
             Self::Labels => Shading { ambient: 0.4, diffuse: 0.6, specular: 0.1, ..shading },
         }
     }
@@ -72,10 +72,10 @@ impl Preset {
         }
     }
 
-    /// The transfer function for a volume. Those of CT are in Hounsfield units: the values as they are where one in a thousand is below
-    /// -100; else, where the greatest lies within 1500 to 8191, 1024 is taken to have been added; for all else the background
-    /// (what Otsu's threshold finds) is taken for air, -1000, and the faintest eighth of the rest for water, 0. Where
-    /// [`Self::Labels`] finds no labels, it is as [`TransferFunction::from_histogram`].
+    /// The transfer function for a volume. Those for CT are in Hounsfield units: the values themselves if one in a thousand is below -100;
+    /// or else the values less 1024 if the maximum lies within 1500 to 8191; or else a scale on which the background (by Otsu's threshold)
+    /// is air, -1000, and the faintest eighth of the rest is water, 0. Without labels in the volume, [`Self::Labels`] gives
+    /// [`TransferFunction::from_histogram`].
     pub fn transfer(self, volume: &Volume) -> TransferFunction {
         let values = volume.values();
         match self {
@@ -107,7 +107,7 @@ impl Preset {
         }
     }
 
-    /// Whether a volume is what the preset is for: all volumes but those without labels, for [`Self::Labels`].
+    /// Whether the preset is applicable to a volume: always, except [`Self::Labels`] to a volume without labels.
     pub fn suits(self, volume: &Volume) -> bool {
         self != Self::Labels || volume.labels().is_some() || categories::values(volume).is_some()
     }
@@ -123,7 +123,7 @@ fn ct(values: &[f32], color: &Points<[f64; 3]>, opacity: &Points<f64>) -> Transf
 fn mr_head(object: &Object) -> TransferFunction {
     let Object { faint, bright, .. } = *object;
     let threshold = object.threshold();
-    // Even where values rise towards the skin, so that it shows no grain.
+    // Even where values rise towards the skin, so that no grain shows.
     let color = vec![
         (threshold, DVec3::new(0.78, 0.56, 0.46)),
         (faint, DVec3::new(0.82, 0.6, 0.5)),
@@ -132,7 +132,7 @@ fn mr_head(object: &Object) -> TransferFunction {
     TransferFunction::by_value(Ramp::through(color), object.surface(0.9))
 }
 
-/// White, brighter from the background to what few voxels exceed.
+/// White, with an opacity that rises from the background to a value that few voxels exceed.
 fn mip(values: &[f32], object: &Object) -> TransferFunction {
     const TAIL: f64 = 0.0005;
     let background = object.background;

@@ -1,20 +1,20 @@
-//! Histograms, and quantiles, exact and without sorting.
+//! Histograms, and exact quantiles without sorting.
 
 use rayon::prelude::*;
 
 use crate::lists::iso_range::{of_ordinal, ordinal};
 
-/// Values that one thread counts at a time.
+/// The number of values that one thread counts at a time.
 const CHUNK: usize = 1 << 20;
 
-/// Of the values that count, those that have a share, in [0, 1], of the others before them when they are sorted; `None` if none
-/// count. Holes do not.
+/// The quantiles of the values for which the predicate holds, at the given fractions in [0, 1]; `None` if it holds for none. Holes are
+/// ignored.
 pub fn quantiles<const N: usize>(
     values: &[f32],
     counts: impl Fn(f32) -> bool + Sync,
     shares: [f64; N],
 ) -> Option<[f32; N]> {
-    // Two digits of 16 bits: first how many values have which upper one, then the lower ones of those that have a wanted one.
+    // A value has two digits of 16 bits. The first pass counts the upper digits, the second the lower ones below the wanted upper digits.
     let digits = |value: f32| ((ordinal(value) >> 16) as usize, (ordinal(value) & 0xffff) as usize);
     let upper = histogram(values, 1 << 16, |value| counts(value).then(|| digits(value).0));
     let last = upper.iter().sum::<u64>().checked_sub(1)?;
@@ -34,7 +34,7 @@ pub fn quantiles<const N: usize>(
     }))
 }
 
-/// How many values are in which of some bins; `None` is in no bin, and neither are holes (NaN).
+/// The number of values in each bin. Values for which `bin` is `None`, and holes (NaN), are in no bin.
 pub fn histogram(values: &[f32], bins: usize, bin: impl Fn(f32) -> Option<usize> + Sync) -> Vec<u64> {
     let zeros = || vec![0_u64; bins];
     let counted = values.par_chunks(CHUNK).fold(zeros, |mut counts, chunk| {
@@ -46,7 +46,7 @@ pub fn histogram(values: &[f32], bins: usize, bin: impl Fn(f32) -> Option<usize>
     counted.reduce(zeros, |a, b| a.iter().zip(b).map(|(a, b)| a + b).collect())
 }
 
-/// The bin of the value of a rank, and its rank in there.
+/// The bin that contains the value of a rank, and the rank within that bin.
 fn bin_at(counts: &[u64], mut rank: u64) -> (usize, u64) {
     for (bin, &count) in counts.iter().enumerate() {
         if rank < count {
@@ -75,7 +75,7 @@ mod tests {
         assert_eq!(quantiles(&values, |value| value > 5.0, [1.0, 0.0]), Some([f32::MAX, positive[0]]));
         assert_eq!(quantiles(&values, |_| false, [0.5]), None);
         assert_eq!(quantiles(&[], |_| true, [0.5]), None);
-        // Of the finite values alone.
+        // Only finite values count.
         assert_eq!(
             quantiles(&[f32::NAN, 3.0, f32::NAN, 1.0, 2.0, f32::NAN], |_| true, [0.0, 0.5, 1.0]),
             Some([1.0, 2.0, 3.0])

@@ -1,4 +1,4 @@
-//! Which preset fits a volume, where its values and its file tell.
+//! The preset that fits a volume, judged by its values and its file.
 
 use rayon::prelude::*;
 
@@ -9,23 +9,23 @@ use super::preset::Preset;
 use super::quantile::quantiles;
 use crate::volume::Volume;
 
-/// Hounsfield units of air, of soft tissue, and of all that is denser than lungs.
+/// Hounsfield units of air, of soft tissue, and of everything denser than lungs.
 const AIR: [f64; 2] = [-1100.0, -850.0];
 const SOFT_TISSUE: [f64; 2] = [-150.0, 150.0];
 const BODY: [f64; 2] = [-500.0, f64::INFINITY];
 const BONE: [f64; 2] = [300.0, f64::INFINITY];
 
-/// Sides of a box that a head fits in, mm.
+/// The sides of a box around a head in mm.
 const HEAD: std::ops::RangeInclusive<f64> = 100.0..=300.0;
 
 impl Preset {
-    /// The preset that fits a volume, by what its values and its file tell; `None` where these do not tell, and
-    /// [`TransferFunction::from_histogram`](crate::settings::TransferFunction::from_histogram) is the best there is.
+    /// The preset that fits a volume, judged by its values and its file; `None` if these do not tell, in which case
+    /// [`TransferFunction::from_histogram`](crate::settings::TransferFunction::from_histogram) is the best choice.
     ///
     /// - `labels`: a label map ([`categories::is_label_map`]).
     /// - `confocal`: lengths in µm or nm.
-    /// - `ct-bone`, or without bone `ct-skin`: Hounsfield units, as they are or with 1024 added: air around tissue, most of which is soft.
-    /// - `mr-head`: a file of 100 to 300 mm (or of no unit) a side, with no negative values, three tenths or more of which is object.
+    /// - `ct-bone`, or without bone `ct-skin`: Hounsfield units, plain or with 1024 added: air around tissue, most of which is soft.
+    /// - `mr-head`: sides of 100 to 300 mm (or without unit), no negative values, and an object in at least three tenths of the voxels.
     pub fn suggested(volume: &Volume) -> Option<Self> {
         if categories::is_label_map(volume) {
             return Some(Self::Labels);
@@ -43,14 +43,14 @@ impl Preset {
     }
 }
 
-/// Whether values less an offset are Hounsfield units of a body in air, and then whether there is bone.
+/// Whether values minus an offset are Hounsfield units of a body in air (`None` if not), and if so, whether there is bone.
 fn is_ct(values: &[f32], offset: f64) -> Option<bool> {
     let count = |[low, high]: [f64; 2]| {
         let is_in = |value: &&f32| (low..=high).contains(&(f64::from(**value) - offset));
         values.par_iter().filter(is_in).count() as f64
     };
     let body = count(BODY);
-    // Of other measured values, those of MR for one, no span of 300 holds half.
+    // In other measured data, such as MR, no range of 300 units contains half of the body's values.
     let is_ct = count(AIR) >= 0.02 * values.len() as f64 && count(SOFT_TISSUE) >= body / 2.0 && body > 0.0;
     is_ct.then(|| count(BONE) >= 0.01 * body)
 }

@@ -1,4 +1,4 @@
-//! Opacities for summed projections.
+//! Opacity for summed projections.
 
 use glam::DVec3;
 
@@ -8,11 +8,11 @@ use super::quantile::quantiles;
 use crate::settings::transfer_function::{Ramp, TransferFunction};
 use crate::volume::{Grid, Volume};
 
-/// Share of the rays that are as bright as there is, or would be brighter.
+/// The fraction of rays that reach full brightness.
 const SATURATED: f64 = 0.01;
 
-/// White, with an opacity in proportion to the value above that of the background, such that along the volume's axes the brightest rays
-/// just reach 1.
+/// White, with an opacity proportional to the value above the background's, such that the brightest rays along the volume's axes just
+/// reach 1.
 pub(super) fn transfer(volume: &Volume) -> TransferFunction {
     let values = volume.values();
     let Some(Object { background, .. }) = Object::find(values) else {
@@ -27,15 +27,14 @@ pub(super) fn transfer(volume: &Volume) -> TransferFunction {
     TransferFunction::by_value(color, Ramp::through(vec![(background, 0.0), (top, opacity)]))
 }
 
-/// Of all rays along the three axes through voxels the integral of what values are above the background, lengths in
-/// [`Grid::unit`]s.
+/// For all axis-parallel rays through voxels, the integral of the values above the background, with lengths in [`Grid::unit`]s.
 fn ray_sums(grid: &Grid, values: &[f32], background: f64) -> Vec<f32> {
     let [nx, ny, nz] = grid.dims.to_array().map(|n| n as usize);
     let mut sums = [vec![0.0; ny * nz], vec![0.0; nx * nz], vec![0.0; nx * ny]];
     for (row, values) in values.chunks_exact(nx).enumerate() {
         let (y, z) = (row % ny, row / ny);
         for (x, &value) in values.iter().enumerate() {
-            // 0 in a hole: `f64::max` leaves out NaN.
+            // 0 in a hole, because `f64::max` ignores NaN.
             let above = (f64::from(value) - background).max(0.0);
             for (sums, at) in sums.iter_mut().zip([row, x + nx * z, x + nx * y]) {
                 sums[at] += above;

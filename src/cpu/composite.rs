@@ -4,48 +4,64 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
 use super::cull::OpenMask;
-use super::cut::TileCuts;
-use super::sheets::{Buffers, CHANNELS, COLUMNS, STRIDE};
+use super::cut::TileRays;
+use super::sheets::{Buffers, CHANNELS, COLUMNS, ROWS, STRIDE};
 use super::vector::{LANES, saturation};
 use crate::settings::splatting::{Compositing, Order};
 
-/// How sheets meet the compositing buffer.
+/// Red, green, blue and opacity of eight pixels.
+type Pixels<S> = [f32x8<S>; CHANNELS];
+
+/// The rule by which sheets are composited into the compositing buffer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Compositor {
     pub(super) compositing: Compositing,
     pub(super) order: Order,
-    /// The opacity from which a pixel is opaque, where opaque pixels hide what is behind them.
+    /// The opacity threshold of opaque pixels; `None` if nothing is culled.
     pub(super) threshold: Option<f32>,
+    /// The opacity whose depth is requested.
+    pub(super) first_hit: Option<f32>,
+}
+
+/// The position of a row of a sheet that begins at `begin`.
+struct SheetPlace<'a> {
+    rays: &'a TileRays,
+    row: usize,
+    begin: f32,
 }
 
 impl Compositor {
-    /// Composites the sheet of a slot, clears it, and closes the pixels that became opaque.
+    /// Composites the sheet of a slot, which begins at `begin`, clears it, and closes the pixels that became opaque; whether there was
+    /// anything to composite.
     #[inline(always)]
     pub(super) fn composite<S: Simd>(
         &self,
         simd: S,
         buffers: &mut Buffers,
         slot: usize,
-        cut: Option<(&TileCuts, f32)>,
+        (rays, begin): (&TileRays, f32),
         open: &mut OpenMask,
-    ) {
-        let Buffers { sheets, written, acc } = buffers;
-        let mut rows = std::mem::take(&mut written[slot]);
+    ) -> bool {
+        let Buffers { sheets, written, kept, acc, hits } = buffers;
+        let filled = std::mem::take(&mut written[slot]);
+        let mut rows = match self.compositing {
+            // While no surface has been reached, the compositing buffer holds the previous sheet.
+            Compositing::Surface => filled | std::mem::replace(kept, filled),
+            // Empty pixels count too.
+            Compositing::Minimum => u64::MAX >> (u64::BITS as usize - ROWS),
+            _ => filled,
+        };
+        let is_composited = rows != 0;
         let mut has_closed = false;
         while rows != 0 {
             let row = rows.trailing_zeros() as usize;
             rows &= rows - 1;
             let sheet = &mut sheets[row][slot];
-            let mut opaque = match cut {
-                None => self.row(simd, &mut acc[row], sheet),
-                Some((cuts, begin)) => {
-                    let ended = cut_row(simd, &cuts.rows[row], begin, sheet);
-                    let opaque = self.row(simd, &mut acc[row], sheet);
-                    opaque | if self.threshold.is_some() { ended } else { 0 }
-                }
-            };
-            opaque &= open.row(row);
-            *sheet = [[0.0; STRIDE]; CHANNELS];
+            let hits = self.first_hit.and(hits.get_mut(row));
+            let opaque = self.row(simd, &mut acc[row], sheet, SheetPlace { rays, row, begin }, hits) & open.row(row);
+            if filled >> row & 1 == 1 {
+                *sheet = [[0.0; STRIDE]; CHANNELS];
+            }
             if opaque != 0 {
                 open.close(row, opaque);
                 has_closed = true;
@@ -54,80 +70,152 @@ impl Compositor {
         if has_closed {
             open.join();
         }
+        is_composited
     }
 
-    /// Composites a row; which of its pixels are opaque, if that matters.
+    /// Composites a row. Returns the bits of its opaque pixels, or 0 if nothing is culled.
     #[inline(always)]
-    fn row<S: Simd>(&self, simd: S, acc: &mut [[f32; COLUMNS]; CHANNELS], sheet: &[[f32; STRIDE]; CHANNELS]) -> u32 {
+    fn row<S: Simd>(
+        &self,
+        simd: S,
+        acc: &mut [[f32; COLUMNS]; CHANNELS],
+        sheet: &[[f32; STRIDE]; CHANNELS],
+        SheetPlace { rays, row, begin }: SheetPlace<'_>,
+        mut hits: Option<&mut [f32; COLUMNS]>,
+    ) -> u32 {
+        let splat = |number: f32| f32x8::splat(simd, number);
         let mut opaque = 0;
         for at in (0..COLUMNS).step_by(LANES) {
-            let after = self.pixels(simd, load_pixels(simd, acc, at), load_pixels(simd, sheet, at));
+            let load = |row: &[f32; COLUMNS]| f32x8::from_slice(simd, &row[at..at + LANES]);
+            let mut pixels = load_pixels(simd, sheet, at);
+            let mut stretch = [splat(f32::NEG_INFINITY), splat(f32::INFINITY)];
+            let mut closed = 0;
+            if let Some(shown) = &rays.shown {
+                stretch = [load(&shown[row][0]), load(&shown[row][1])];
+                closed = stretch[1].simd_le(splat(begin + 1.0)).to_bitmask() as u32;
+                if self.compositing != Compositing::Minimum {
+                    let [start, end] = within_slab(simd, stretch, begin);
+                    pixels = scaled(pixels, (end - start).max(splat(0.0)));
+                }
+            }
+            if let Some(weights) = &rays.weights {
+                pixels = scaled(pixels, load(&weights[row]));
+            }
+            let before = load_pixels(simd, acc, at);
+            let mut after = self.pixels(simd, before, pixels);
+            if let Some(counted) = &rays.counted {
+                let middle = splat(begin + 0.5);
+                let counts = load(&counted[row][0]).simd_le(middle) & middle.simd_le(load(&counted[row][1]));
+                after = std::array::from_fn(|channel| counts.select(after[channel], before[channel]));
+            }
             for (channel, after) in acc.iter_mut().zip(after) {
                 after.store_slice(&mut channel[at..at + LANES]);
             }
+            if let Some(hits) = hits.as_deref_mut() {
+                let opacities = [before[3], pixels[3], after[3]];
+                let hit = self.hit(simd, load(hits), opacities, stretch, begin);
+                hit.store_slice(&mut hits[at..at + LANES]);
+            }
             if let Some(threshold) = self.threshold {
-                let is_opaque = after[3].simd_ge(f32x8::splat(simd, threshold));
-                opaque |= (is_opaque.to_bitmask() as u32) << at;
+                opaque |= (after[3].simd_ge(splat(threshold)).to_bitmask() as u32 | closed) << at;
             }
         }
         opaque
     }
 
-    /// Composites eight pixels.
+    /// Composites eight pixels. By means ([`Compositing`]): for the minimum the compositing buffer keeps 2 less the opacity, and 0 where
+    /// nothing counted; for a surface that is not reached the mean of the last sheet.
     #[inline(always)]
-    fn pixels<S: Simd>(&self, simd: S, acc: [f32x8<S>; 4], sheet: [f32x8<S>; 4]) -> [f32x8<S>; 4] {
-        let one = f32x8::splat(simd, 1.0);
+    fn pixels<S: Simd>(&self, simd: S, acc: Pixels<S>, sheet: Pixels<S>) -> Pixels<S> {
+        let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
         let sheet = match self.compositing {
             Compositing::Linear => scaled(sheet, one / sheet[3].max(one)),
             Compositing::Exponential => scaled(sheet, saturation(simd, sheet[3])),
             _ => sheet,
         };
-        // What rounding leaves beyond full opacity must not count against anything.
-        let zero = f32x8::splat(simd, 0.0);
         match (self.compositing, self.order) {
-            (Compositing::Xray, _) => sum(acc, sheet),
+            (Compositing::Xray | Compositing::Average, _) => sum(acc, sheet),
+            (Compositing::Maximum, _) => self.kept(acc, sheet, sheet[3].min(one), one),
+            (Compositing::Minimum, _) => {
+                let opacity = f32x8::splat(simd, 2.0) - sheet[3].min(one);
+                self.kept(acc, sheet, opacity, one)
+            }
+            (Compositing::Surface, _) => {
+                let share = crossing(acc[3], sheet[3]);
+                let there: Pixels<S> =
+                    std::array::from_fn(|channel| acc[channel] + (sheet[channel] - acc[channel]) * share);
+                let reached = [there[0] / there[3], there[1] / there[3], there[2] / there[3], one];
+                let (is_reached, is_below) = (acc[3].simd_ge(one), sheet[3].simd_lt(f32x8::splat(simd, 0.5)));
+                let now = |channel: usize| is_below.select(sheet[channel], reached[channel]);
+                std::array::from_fn(|channel| is_reached.select(acc[channel], now(channel)))
+            }
+            // Opacity beyond 1 is a rounding error and must not hide another sheet.
             (_, Order::FrontToBack) => sum(acc, scaled(sheet, (one - acc[3]).max(zero))),
             (_, Order::BackToFront) => sum(sheet, scaled(acc, (one - sheet[3]).max(zero))),
         }
     }
-}
 
-/// Leaves of a row of a sheet, which begins at `begin`, what shows of it; the pixels of which nothing behind it shows.
-#[inline(always)]
-fn cut_row<S: Simd>(
-    simd: S,
-    [start, end]: &[[f32; COLUMNS]; 2],
-    begin: f32,
-    sheet: &mut [[f32; STRIDE]; CHANNELS],
-) -> u32 {
-    let mut ended = 0;
-    for at in (0..COLUMNS).step_by(LANES) {
-        let start = f32x8::from_slice(simd, &start[at..at + LANES]);
-        let end = f32x8::from_slice(simd, &end[at..at + LANES]);
-        let far = f32x8::splat(simd, begin + 1.0);
-        let share = (end.min(far) - start.max(f32x8::splat(simd, begin))).max(f32x8::splat(simd, 0.0));
-        for channel in sheet.iter_mut() {
-            let pixels = &mut channel[at..at + LANES];
-            (f32x8::from_slice(simd, pixels) * share).store_slice(pixels);
-        }
-        ended |= (end.simd_le(far).to_bitmask() as u32) << at;
+    /// Keeps a sheet where its opacity is larger, or equal and nearer. Opacities above 1 count as equal.
+    #[inline(always)]
+    fn kept<S: Simd>(&self, acc: Pixels<S>, sheet: Pixels<S>, opacity: f32x8<S>, one: f32x8<S>) -> Pixels<S> {
+        let passes = match self.order {
+            Order::FrontToBack => opacity.simd_gt(acc[3]),
+            Order::BackToFront => opacity.simd_ge(acc[3]),
+        };
+        let scale = one / sheet[3].max(one);
+        let color = [sheet[0] * scale, sheet[1] * scale, sheet[2] * scale, opacity];
+        std::array::from_fn(|channel| passes.select(color[channel], acc[channel]))
     }
-    ended
+
+    /// Notes where the requested opacity is reached for pixels that reach it in this sheet, as `shaders/composite.wgsl` does.
+    #[inline(always)]
+    fn hit<S: Simd>(
+        &self,
+        simd: S,
+        hit: f32x8<S>,
+        [before, sheet, after]: [f32x8<S>; 3],
+        stretch: [f32x8<S>; 2],
+        begin: f32,
+    ) -> f32x8<S> {
+        let is_surface = self.compositing == Compositing::Surface;
+        let opacity = f32x8::splat(simd, if is_surface { 1.0 } else { self.first_hit.unwrap_or(1.0) });
+        let is_here = before.simd_lt(opacity) & after.simd_ge(opacity);
+        let at = if is_surface {
+            // Counted from the middle of the previous slab.
+            (crossing(before, sheet) + (begin - 0.5)).max(stretch[0]).min(stretch[1])
+        } else {
+            let [start, end] = within_slab(simd, stretch, begin);
+            start + (end - start) * ((opacity - before) / (after - before))
+        };
+        is_here.select(at, hit)
+    }
+}
+
+/// The length of the part of a stretch that lies in the slab beginning at `begin`.
+#[inline(always)]
+fn within_slab<S: Simd>(simd: S, [start, end]: [f32x8<S>; 2], begin: f32) -> [f32x8<S>; 2] {
+    [start.max(f32x8::splat(simd, begin)), end.min(f32x8::splat(simd, begin + 1.0))]
+}
+
+/// Where between the middles of a slab and of the next one their means' opacity is one half, if it grows evenly.
+#[inline(always)]
+fn crossing<S: Simd>(before: f32x8<S>, mean: f32x8<S>) -> f32x8<S> {
+    (0.5 - before) / (mean - before)
 }
 
 #[inline(always)]
-fn load_pixels<S: Simd, const N: usize>(simd: S, row: &[[f32; N]; CHANNELS], at: usize) -> [f32x8<S>; 4] {
+fn load_pixels<S: Simd, const N: usize>(simd: S, row: &[[f32; N]; CHANNELS], at: usize) -> Pixels<S> {
     let [red, green, blue, alpha] = row;
     let load = |channel: &[f32; N]| f32x8::from_slice(simd, &channel[at..at + LANES]);
     [load(red), load(green), load(blue), load(alpha)]
 }
 
 #[inline(always)]
-fn scaled<S: Simd>([red, green, blue, alpha]: [f32x8<S>; 4], by: f32x8<S>) -> [f32x8<S>; 4] {
+fn scaled<S: Simd>([red, green, blue, alpha]: Pixels<S>, by: f32x8<S>) -> Pixels<S> {
     [red * by, green * by, blue * by, alpha * by]
 }
 
 #[inline(always)]
-fn sum<S: Simd>(a: [f32x8<S>; 4], b: [f32x8<S>; 4]) -> [f32x8<S>; 4] {
+fn sum<S: Simd>(a: Pixels<S>, b: Pixels<S>) -> Pixels<S> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
 }

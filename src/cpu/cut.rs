@@ -1,84 +1,95 @@
-//! What clip planes and the crop box leave of a pixel's ray, and so of its sheets; the same as `shaders/shared/cut.wgsl`.
+//! The parts of pixels' rays that clip planes and the crop box leave, and how rays meet sheets, as in `shaders/shared/cut.wgsl`.
 
-use glam::{DVec2, DVec4};
+use std::ops::Range;
 
+use super::means::Means;
+use super::ray::{PixelRay, PixelRays};
 use super::sheets::{COLUMNS, ROWS};
-use crate::geometry::slab::SlabGrid;
-use crate::geometry::view_geometry::{Rays, ViewGeometry};
-use crate::settings::clip::{Clip, HalfSpace};
+use crate::geometry::view_geometry::ViewGeometry;
+use crate::scene::Scene;
+use crate::settings::clip::HalfSpace;
 use crate::volume::Grid;
 
-/// What is kept of all pixels' rays.
+/// A number for every pixel of a tile, by row.
+type PixelValues = Vec<[f32; COLUMNS]>;
+
+/// How the rays of a frame's pixels meet sheets.
 #[derive(Clone, Debug)]
-pub(super) struct Cuts {
-    half_spaces: Vec<HalfSpace>,
-    rays: Rays,
-    /// The sheet depth of a position.
-    depth: DVec4,
-    slabs: SlabGrid,
-    middle: DVec2,
+pub(super) struct RayMode {
+    pub(super) rays: PixelRays,
+    /// The half spaces that are kept; `None` if nothing is cut.
+    kept: Option<Vec<HalfSpace>>,
+    means: Option<Means>,
 }
 
-/// Of every pixel of a tile the stretch of its ray that shows, in slabs from a certain one on; empty where nothing shows.
-#[derive(Clone, Debug)]
-pub(super) struct TileCuts {
+/// How the rays of a tile's pixels meet sheets, by row. Slabs are counted from `base`.
+#[derive(Clone, Debug, Default)]
+pub(super) struct TileRays {
     base: i32,
-    /// By row: where the stretches of its pixels start and end.
-    pub(super) rows: Vec<[[f32; COLUMNS]; 2]>,
+    /// The start and end of each ray's visible stretch, empty if the ray shows nothing; `None` if nothing is cut.
+    pub(super) shown: Option<Vec<[[f32; COLUMNS]; 2]>>,
+    /// The factors that turn sheets into means; `None` if they are not needed.
+    pub(super) weights: Option<PixelValues>,
+    /// The range of the middles of slabs that count; `None` if all do.
+    pub(super) counted: Option<Vec<[[f32; COLUMNS]; 2]>>,
 }
 
-impl Cuts {
-    /// `None` where nothing is cut away.
-    pub(super) fn new(clip: &Clip, view: &ViewGeometry, grid: &Grid) -> Option<Self> {
-        (!clip.is_empty()).then(|| Self {
-            half_spaces: clip.half_spaces(grid),
-            rays: view.rays(),
-            depth: view.sheet_depth_row(grid.aspect(), grid.center()),
-            slabs: view.slabs,
-            middle: DVec2::from(view.size.map(f64::from)) / 2.0,
-        })
+impl RayMode {
+    pub(super) fn new(scene: &Scene, view: &ViewGeometry, grid: &Grid) -> Self {
+        let compositing = scene.splatting.compositing;
+        Self {
+            rays: PixelRays::new(view, grid),
+            kept: (!scene.clip.is_empty()).then(|| scene.clip.half_spaces(grid)),
+            means: compositing.is_by_means().then(|| Means::new(view, grid, &scene.splatting)),
+        }
     }
 
-    /// The stretches of a tile's pixels, given its first pixel, in slabs from `base` on.
-    pub(super) fn of_tile(&self, origin: [usize; 2], base: i32) -> TileCuts {
-        let mut rows = vec![[[0.0; COLUMNS]; 2]; ROWS];
-        for (y, row) in rows.iter_mut().enumerate() {
-            let [starts, ends] = row;
-            for (x, (start, end)) in starts.iter_mut().zip(ends).enumerate() {
-                let pixel = DVec2::new((origin[0] + x) as f64, (origin[1] + y) as f64) + 0.5;
-                [*start, *end] = self.stretch(pixel - self.middle, base);
-            }
-        }
-        TileCuts { base, rows }
+    /// The range of depths at which a ray shows something.
+    fn shown(&self, ray: &PixelRay) -> Range<f64> {
+        ray.inside(self.kept.as_deref().unwrap_or_default())
     }
 
-    fn stretch(&self, place: DVec2, base: i32) -> [f32; 2] {
-        let origin = self.rays.at(place, 0.0);
-        let along = self.rays.at(place, 1.0) - origin;
-        let (mut start, mut end) = (f64::NEG_INFINITY, f64::INFINITY);
-        for HalfSpace { normal, offset } in &self.half_spaces {
-            let (at_origin, slope) = (normal.dot(origin) + offset, normal.dot(along));
-            if slope > 0.0 {
-                start = start.max(-at_origin / slope);
-            } else if slope < 0.0 {
-                end = end.min(-at_origin / slope);
-            } else if at_origin < 0.0 {
-                end = f64::NEG_INFINITY;
-            }
+    /// How the rays of a tile's pixels meet sheets; `origin` is the tile's first pixel.
+    pub(super) fn of_tile(&self, origin: [usize; 2], base: i32) -> TileRays {
+        let from_base = |slabs: [f64; 2]| slabs.map(|slab| (slab - f64::from(base)) as f32);
+        let ends = |of: &dyn Fn(&PixelRay) -> [f64; 2]| {
+            let mut rows = vec![[[0.0; COLUMNS]; 2]; ROWS];
+            self.each_pixel(origin, |ray, [x, y]| [rows[y][0][x], rows[y][1][x]] = from_base(of(ray)));
+            rows
+        };
+        let weights = self.means.as_ref().map(|means| {
+            let mut rows = vec![[0.0; COLUMNS]; ROWS];
+            self.each_pixel(origin, |ray, [x, y]| rows[y][x] = means.weight(ray, self.shown(ray)) as f32);
+            rows
+        });
+        let nothing = [0.0, f64::NEG_INFINITY];
+        TileRays {
+            base,
+            shown: self.kept.is_some().then(|| ends(&|ray| ray.slabs(self.shown(ray)).unwrap_or(nothing))),
+            weights,
+            counted: self
+                .means
+                .as_ref()
+                .filter(|means| means.is_choosy())
+                .map(|means| ends(&|ray| means.counted(ray, self.shown(ray)))),
         }
-        if start >= end {
-            return [0.0, f32::NEG_INFINITY];
+    }
+
+    fn each_pixel(&self, origin: [usize; 2], mut then: impl FnMut(&PixelRay, [usize; 2])) {
+        for (y, x) in (0..ROWS).flat_map(|y| (0..COLUMNS).map(move |x| (y, x))) {
+            then(&self.rays.of([origin[0] + x, origin[1] + y]), [x, y]);
         }
-        // Sheets are parallel to the image: their numbers grow with depth.
-        let at_origin = (self.depth.dot(origin.extend(1.0)) - self.slabs.origin) / self.slabs.width;
-        let slope = self.depth.truncate().dot(along) / self.slabs.width;
-        [start, end].map(|depth| (at_origin - f64::from(base) + slope * depth) as f32)
     }
 }
 
-impl TileCuts {
+impl TileRays {
     /// Where a slab begins, in the terms of the stretches.
     pub(super) fn begin(&self, slab: i32) -> f32 {
         (slab - self.base) as f32
+    }
+
+    /// The place among slabs that is meant by a number in the terms of the stretches.
+    pub(super) fn slab(&self, at: f32) -> f64 {
+        f64::from(self.base) + f64::from(at)
     }
 }

@@ -1,4 +1,6 @@
-//! What a frame's tiles share, and the frame: rows of tiles on all cores.
+//! A frame: the data that its tiles share, and its rows of tiles drawn on all cores.
+
+use std::ops::Range;
 
 use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
@@ -6,7 +8,8 @@ use rayon::prelude::*;
 use super::bin::{self, Placed};
 use super::composite::Compositor;
 use super::count::{Drawn, Tally};
-use super::cut::Cuts;
+use super::cut::RayMode;
+use super::first_hit;
 use super::kernel::KernelTables;
 use super::project::Projection;
 use super::resolve::Resolver;
@@ -16,17 +19,18 @@ use super::splat::Splatter;
 use super::tile::TileWalk;
 use crate::error::RenderError;
 use crate::geometry::kernel::Kernel;
+use crate::geometry::means;
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::gpu::layout::Brick;
 use crate::image::Image;
+use crate::lists::brick::Brick;
 use crate::lists::quad_plan::Overlaps;
 use crate::scene::Scene;
-use crate::settings::splatting::Order;
+use crate::settings::splatting::{Compositing, Method, Order};
 use crate::settings::transfer_function::TransferFunction;
 use crate::stats::Counts;
 use crate::volume::Volume;
 
-/// Everything that decides a tile.
+/// The data that all tiles of a frame share.
 #[derive(Debug)]
 pub(super) struct Frame<'a> {
     pub(super) volume: &'a Volume,
@@ -36,12 +40,29 @@ pub(super) struct Frame<'a> {
     pub(super) splatter: Splatter,
     pub(super) shader: Shader,
     pub(super) compositor: Compositor,
-    pub(super) cuts: Option<Cuts>,
+    pub(super) rays: RayMode,
     pub(super) drawn: Drawn,
-    /// The low-pass rule's, where it is the same for all sections.
+    /// True if voxels are composited one by one.
+    pub(super) is_each: bool,
+    /// The sheets that count even where they are empty.
+    pub(super) counted: Range<i32>,
+    /// The sheets from the first to the last that any kernel touches.
+    pub(super) touched: Range<i32>,
+    /// The amplitude of the low-pass rule if it is the same for all sections, else 1.
     pub(super) amplitude: f64,
     support: f64,
     resolver: Resolver,
+    overlaps: Overlaps,
+}
+
+/// A drawn frame.
+#[derive(Clone, Debug)]
+pub(super) struct Drawing {
+    pub(super) image: Image,
+    pub(super) counts: Counts,
+    /// For every pixel the depth at which the opacity asked for is reached, world units along the camera's direction; infinite where it is
+    /// not. Empty if none is asked for.
+    pub(super) first_hits: Vec<f32>,
 }
 
 impl<'a> Frame<'a> {
@@ -52,28 +73,38 @@ impl<'a> Frame<'a> {
         transfer: &'a TransferFunction,
         bricks: &'a [Brick],
         scene: &Scene,
+        first_hit: Option<f64>,
     ) -> Result<Self, RenderError> {
         let (splatting, image) = (&scene.splatting, &scene.image);
-        let view = ViewGeometry::new(volume.grid(), &scene.camera, splatting, [image.width, image.height])?;
+        let grid = volume.grid();
+        let view = ViewGeometry::new(grid, &scene.camera, splatting, [image.width, image.height])?;
         let kernel = Kernel::new(splatting.radius, splatting.falloff);
         let from_pixels = view.footprint.footprint_from_pixels;
         let (right, down) = (from_pixels.x_axis, from_pixels.y_axis);
         let metric = [right.length_squared(), 2.0 * right.dot(down), down.length_squared()];
-        let hides = splatting.culling && splatting.compositing.hides() && splatting.order == Order::FrontToBack;
+        let is_each = splatting.method == Method::CompositeEverySample;
+        let can_hide = splatting.compositing.hides() && splatting.order == Order::FrontToBack && !is_each;
+        // While no surface has been reached, the compositing buffer holds a mean, not an opacity: only a surface, whose opacity is 1, hides anything.
+        let threshold = if splatting.compositing == Compositing::Surface { 1.0 } else { splatting.opacity_threshold };
         let splatter = Splatter {
             kernel: KernelTables::new(&kernel),
             radius: splatting.radius as f32,
             metric: metric.map(|coefficient| coefficient as f32),
-            // A little less, for what f32 rounds.
+            // Slightly smaller, because f32 rounds.
             row_metric: ((1.0 - 1e-5) * (metric[2] - metric[1] * metric[1] / (4.0 * metric[0])).max(0.0)) as f32,
             half_box: view.footprint.half_box(kernel.support()).to_array().map(|half| half as f32),
             pixel_per_depth: view.perspective.map(|perspective| perspective.eye.pixel_per_depth as f32),
+            is_whole: splatting.method != Method::ImageAligned,
         };
         let compositor = Compositor {
             compositing: splatting.compositing,
             order: splatting.order,
-            threshold: hides.then_some(splatting.opacity_threshold as f32),
+            threshold: (splatting.culling && can_hide).then_some(threshold as f32),
+            first_hit: first_hit.map(|opacity| opacity as f32),
         };
+        let overlaps = Overlaps::count(bricks, &view);
+        let covered = view.slabs.covered(means::covered(&view, grid, splatting));
+        let projection = Projection::new(view, splatting.order);
         Ok(Self {
             volume,
             transfer,
@@ -81,46 +112,62 @@ impl<'a> Frame<'a> {
             splatter,
             shader: Shader::new(&scene.shading, splatting.compositing),
             compositor,
-            cuts: Cuts::new(&scene.clip, &view, volume.grid()),
+            rays: RayMode::new(scene, &view, grid),
             drawn: Drawn::new(bricks.len(), &view),
+            is_each,
+            counted: covered.map_or(i32::MIN..i32::MIN, |slabs| projection.sheets_of(&slabs)),
+            touched: projection.sheets_of(&overlaps.slabs),
             amplitude: if view.perspective.is_some() { 1.0 } else { view.footprint.amplitude },
             support: kernel.support(),
             resolver: Resolver::new(splatting.compositing, image.background),
-            projection: Projection::new(view, splatting.order),
+            overlaps,
+            projection,
         })
     }
 
     /// Draws all tiles.
-    pub(super) fn draw(&self, level: Level) -> (Image, Counts) {
+    pub(super) fn draw(&self, level: Level) -> Drawing {
         let [width, height] = self.projection.view.size;
         let placed = bin::place(self.bricks, &self.projection, self.support);
         let [columns, rows] = bin::tile_grid([width, height]);
-        let mut pixels = vec![[0.0; 4]; width as usize * height as usize];
-        let strips = pixels.par_chunks_mut(width as usize * ROWS).enumerate();
+        let count = width as usize * height as usize;
+        let mut pixels = vec![[0.0; 4]; count];
+        let mut first_hits = vec![f32::INFINITY; if self.compositor.first_hit.is_some() { count } else { 0 }];
+        let in_strip = width as usize * ROWS;
+        let mut hits = first_hits.chunks_mut(in_strip);
+        let strips: Vec<_> = pixels.chunks_mut(in_strip).map(|pixels| (pixels, hits.next())).collect();
+        let strips = strips.into_par_iter().enumerate();
         let tallies = strips.map(|(row, strip)| self.draw_strip(level, &placed, row, columns, strip));
         let tally = tallies.reduce(Tally::default, |mut sum, tally| {
             sum += tally;
             sum
         });
-        let Overlaps { voxels, sections, slabs } = Overlaps::count(self.bricks, &self.projection.view);
-        let sheets = slabs.len() as u64;
+        // There are no sheets where voxels are composited one by one.
+        let sheets = if self.is_each { 0 } else { self.touched.len() as u64 };
         let counts = Counts {
             voxels_total: self.volume.values().len() as u64,
-            voxels_in_range: voxels,
+            voxels_in_range: self.overlaps.voxels,
             voxels_shaded: tally.voxels_shaded,
-            sections_total: sections,
+            sections_total: self.overlaps.sections,
             sections_rasterized: tally.sections,
             sheets,
             tiles_total: (columns * rows) as u64 * sheets,
-            tiles_composited: tally.sheets_composited,
+            tiles_composited: if self.is_each { 0 } else { tally.sheets_composited },
             bricks_visited: tally.bricks_visited,
             ..Counts::default()
         };
-        (Image { width, height, pixels }, counts)
+        Drawing { image: Image { width, height, pixels }, counts, first_hits }
     }
 
     /// Draws a row of tiles.
-    fn draw_strip(&self, level: Level, placed: &[Placed], row: usize, columns: usize, strip: &mut [[f32; 4]]) -> Tally {
+    fn draw_strip(
+        &self,
+        level: Level,
+        placed: &[Placed],
+        row: usize,
+        columns: usize,
+        (pixels, mut hits): (&mut [[f32; 4]], Option<&mut [f32]>),
+    ) -> Tally {
         let bins = bin::bin(placed, row, columns);
         let width = self.projection.view.size[0] as usize;
         let tiles = bins.par_iter().enumerate().map_init(
@@ -131,18 +178,17 @@ impl<'a> Frame<'a> {
             },
         );
         let mut tally = Tally::default();
-        for (column, (pixels, tile_tally)) in tiles.collect::<Vec<_>>().into_iter().enumerate() {
-            tally += tile_tally;
-            for (line, pixels) in strip.chunks_mut(width).zip(pixels.chunks(COLUMNS)) {
-                let line = &mut line[column * COLUMNS..];
-                let count = line.len().min(COLUMNS);
-                line[..count].copy_from_slice(&pixels[..count]);
+        for (column, tile) in tiles.collect::<Vec<_>>().into_iter().enumerate() {
+            tally += tile.tally;
+            copy_tile(&tile.pixels, column, width, pixels);
+            if let Some(hits) = &mut hits {
+                copy_tile(&tile.first_hits, column, width, hits);
             }
         }
         tally
     }
 
-    /// The pixels of a tile, all of its rows and columns.
+    /// Draws a tile, including rows and columns outside the image.
     #[inline(always)]
     fn draw_tile<S: Simd>(
         &self,
@@ -151,12 +197,32 @@ impl<'a> Frame<'a> {
         origin: [usize; 2],
         placed: &[Placed],
         bricks: &[u32],
-    ) -> (Vec<[f32; 4]>, Tally) {
-        let mut tally = Tally::default();
-        let buffers = walk.draw(simd, origin, placed, bricks, &mut tally);
+    ) -> Tile {
+        let (buffers, rays, tally) = walk.draw(simd, origin, placed, bricks);
         let pixel =
             |row: &[[f32; COLUMNS]; 4], x: usize| self.resolver.pixel([row[0][x], row[1][x], row[2][x], row[3][x]]);
-        let pixels = buffers.acc.iter().flat_map(|row| (0..COLUMNS).map(move |x| pixel(row, x)));
-        (pixels.collect(), tally)
+        let pixels = buffers.acc.iter().flat_map(|row| (0..COLUMNS).map(move |x| pixel(row, x))).collect();
+        let first_hits = match self.compositor.first_hit {
+            None => Vec::new(),
+            Some(_) => first_hit::depths(buffers, rays, &self.rays.rays, origin, self.volume.grid().unit()),
+        };
+        Tile { pixels, first_hits, tally }
+    }
+}
+
+/// The pixels of a tile, row by row.
+struct Tile {
+    pixels: Vec<[f32; 4]>,
+    /// Empty if no first hits are requested.
+    first_hits: Vec<f32>,
+    tally: Tally,
+}
+
+/// Copies the part of a tile that lies on the image to its column of a row of tiles.
+fn copy_tile<T: Copy>(tile: &[T], column: usize, width: usize, strip: &mut [T]) {
+    for (line, tile) in strip.chunks_mut(width).zip(tile.chunks(COLUMNS)) {
+        let line = &mut line[column * COLUMNS..];
+        let count = line.len().min(COLUMNS);
+        line[..count].copy_from_slice(&tile[..count]);
     }
 }

@@ -2,11 +2,12 @@
 //!
 //! ```text
 //! bricks ─ bin ─→ every tile of 32×32 pixels, its sheets front to back in a ring of eight:
-//!                   cull       what opaque pixels hide, brick by brick, then voxel by voxel
+//!                   cull       bricks, then voxels, that opaque pixels hide
 //!                   shade      eight visible voxels at a time
 //!                   splat      all sections of a voxel, eight pixels at a time
-//!                   composite  one sheet, once every voxel before it is drawn
+//!                   composite  a sheet, once every voxel that reaches it is drawn
 //!        ─ resolve ─→ image
+//!        ─ first_hit ─→ the depths at which an opacity was reached, if requested
 //! ```
 //!
 //! Stages are those of the GPU, by the same names. The same scene gives the same bytes on every machine (SPEC §12): pixels are `f32` by IEEE
@@ -17,12 +18,16 @@ mod composite;
 mod count;
 mod cull;
 mod cut;
+mod first_hit;
 mod frame;
 mod kernel;
+mod means;
 mod project;
+mod ray;
 mod resolve;
 mod shade;
 mod sheets;
+mod simd;
 mod splat;
 mod support;
 mod tile;
@@ -34,16 +39,19 @@ use std::time::Instant;
 use fearless_simd::Level;
 
 use crate::error::RenderError;
-use crate::headless::Rendering;
+use crate::headless::{Backend, Rendering};
 use crate::lists::brick::BrickList;
 use crate::lists::classify::classify;
+use crate::pick::{FirstHits, Pick};
 use crate::scene::{ImageSettings, Scene};
 use crate::setting_error::{Interval, SettingError};
 use crate::settings::camera::Camera;
+use crate::settings::splatting::check_first_hit;
 use crate::settings::transfer_function::TransferFunction;
 use crate::stats::Stats;
 use crate::volume::Volume;
-use frame::Frame;
+use frame::{Drawing, Frame};
+pub use simd::Simd;
 
 /// A view of a volume, drawn on the CPU.
 #[derive(Clone, Debug)]
@@ -52,28 +60,44 @@ pub struct CpuRenderer {
     scene: Scene,
     transfer: TransferFunction,
     bricks: BrickList,
+    simd: Simd,
     level: Level,
+    first_hit: Option<f64>,
+    /// The last frame's first hits.
+    hits: Option<FirstHits>,
 }
 
 impl CpuRenderer {
-    /// Classifies a volume's voxels under a scene's transfer function. The scene's own volume is not looked at.
+    /// Classifies a volume's voxels under a scene's transfer function. The scene's own volume is ignored.
     ///
     /// # Errors
-    /// If the scene asks for what this backend does not draw, or for what the volume does not have.
+    /// If this backend does not support a setting of the scene, or the volume lacks what the scene needs, such as labels.
     pub fn new(volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Self, RenderError> {
         let volume = volume.into();
         scene.check()?;
         scene.transfer.check_volume(&volume)?;
-        support::check(scene)?;
+        check(scene)?;
+        let (simd, level) = simd::chosen()?;
         let transfer = scene.transfer.resolve(&volume);
         let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
         let bricks = BrickList::new(volume.grid(), &classify(&volume, &transfer, &clipped));
-        Ok(Self { volume, scene: scene.clone(), transfer, bricks, level: Level::new() })
+        Ok(Self { volume, scene: scene.clone(), transfer, bricks, simd, level, first_hit: None, hits: None })
     }
 
     /// The settings.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// Draws by an instruction set other than the best one, or than that which the environment variable `SHEETSPLAT_SIMD` names. No bit of an
+    /// image changes.
+    ///
+    /// # Errors
+    /// If the machine or the build lacks it; then nothing changes.
+    pub fn set_simd(&mut self, simd: Simd) -> Result<(), SettingError> {
+        self.level = simd.checked()?;
+        self.simd = simd;
+        Ok(())
     }
 
     /// Changes the camera.
@@ -95,21 +119,54 @@ impl CpuRenderer {
         self.set_camera(self.scene.camera.turned(degrees))
     }
 
+    /// Asks for the depth at which every pixel's opacity reaches a value, above 0 and at most 1; `None` for none. Front to back only, and
+    /// with culling at most [`Splatting::opacity_threshold`](crate::settings::Splatting::opacity_threshold); not for
+    /// [`Compositing::Minimum`](crate::settings::Compositing::Minimum), and whatever the value that of the surface for
+    /// [`Compositing::Surface`](crate::settings::Compositing::Surface). See [`Self::first_hits`] and [`Self::pick`].
+    ///
+    /// # Errors
+    /// If the value is not in (0, 1]; then nothing changes.
+    pub fn set_first_hit(&mut self, opacity: Option<f64>) -> Result<(), SettingError> {
+        opacity.map_or(Ok(()), check_first_hit)?;
+        self.first_hit = opacity;
+        Ok(())
+    }
+
+    /// The last frame's first hits, row by row, if they were asked for: depths in world units along the camera's direction, from the eye,
+    /// orthographic from the plane through [`Camera::center`]; infinite where the opacity is not reached. Within a sheet opacity is taken to
+    /// grow evenly.
+    pub fn first_hits(&self) -> Option<&[f32]> {
+        self.hits.as_ref().map(|hits| hits.depths.as_slice())
+    }
+
+    /// The point that the last frame shows first at a pixel, counted from the upper left; `None` where the opacity of [`Self::set_first_hit`] is not
+    /// reached.
+    ///
+    /// # Errors
+    /// If the frame has no first hits, or the pixel is off the image.
+    pub fn pick(&self, pixel: [u32; 2]) -> Result<Option<Pick>, SettingError> {
+        FirstHits::pick(self.hits.as_ref(), &self.volume, pixel, &self.scene.image)
+    }
+
     /// Draws a frame on the threads of the current rayon pool. Their number never changes a bit of the image.
     ///
     /// # Errors
-    /// If the scene asks for more than can be computed.
-    pub fn draw(&self) -> Result<Rendering, RenderError> {
+    /// If the scene exceeds a limit, such as the number of slabs.
+    pub fn draw(&mut self) -> Result<Rendering, RenderError> {
         let start = Instant::now();
+        let splatting = &self.scene.splatting;
+        splatting.check_rays(!self.scene.clip.is_empty(), self.first_hit)?;
         let scene = self.scene.framed(&self.volume, &self.transfer);
-        let frame = Frame::new(&self.volume, &self.transfer, self.bricks.bricks(), &scene)?;
-        let (image, counts) = frame.draw(self.level);
+        let frame = Frame::new(&self.volume, &self.transfer, self.bricks.bricks(), &scene, self.first_hit)?;
+        let Drawing { image, counts, first_hits } = frame.draw(self.level);
+        self.hits = self.first_hit.map(|_| FirstHits { view: frame.projection.view, depths: first_hits });
         let ImageSettings { width, height, .. } = self.scene.image;
         let stats = Stats {
             adapter: "CPU".to_owned(),
-            driver: format!("{:?}", self.level).split('(').next().unwrap_or_default().to_lowercase(),
-            backend: "cpu".to_owned(),
-            rasterizer: "cpu".to_owned(),
+            driver: self.simd.name().to_owned(),
+            backend: Backend::Cpu.name().to_owned(),
+            api: "none".to_owned(),
+            rasterizer: Backend::Cpu.name().to_owned(),
             width,
             height,
             counts,
@@ -120,13 +177,21 @@ impl CpuRenderer {
     }
 }
 
-/// Renders a volume that is in memory. The scene's own volume is not looked at.
+/// Checks, as far as possible without the volume, that this backend supports all settings of a scene.
 ///
 /// # Errors
-/// If the scene asks for what this backend does not draw, or for what the volume does not have.
+/// If it does not support a setting, or the image is too large.
+pub fn check(scene: &Scene) -> Result<(), RenderError> {
+    support::check(scene)
+}
+
+/// Renders a volume that is in memory. The scene's own volume is ignored.
+///
+/// # Errors
+/// If this backend does not support a setting of the scene, or the volume lacks what the scene needs, such as labels.
 pub fn render(volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Rendering, RenderError> {
     let start = Instant::now();
-    let renderer = CpuRenderer::new(volume, scene)?;
+    let mut renderer = CpuRenderer::new(volume, scene)?;
     let prepare_ms = milliseconds_since(start);
     let mut rendering = renderer.draw()?;
     rendering.stats.prepare_ms = prepare_ms;

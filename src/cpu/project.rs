@@ -7,9 +7,10 @@ use glam::{DVec2, DVec3, UVec3};
 
 use crate::geometry::slab;
 use crate::geometry::view_geometry::{Perspective, ViewGeometry};
-use crate::gpu::layout::Brick;
+use crate::lists::brick::Brick;
 use crate::lists::brick::{self, BRICK_VOXELS};
 use crate::settings::splatting::Order;
+use crate::volume::Grid;
 
 /// Where a voxel is.
 #[derive(Clone, Copy, Debug)]
@@ -101,12 +102,18 @@ impl Projection {
 
     /// The sheets that a voxel's kernel overlaps, in the order in which they are composited; none before the near plane.
     pub(super) fn sheets(&self, place: Place, voxel: UVec3) -> Range<i32> {
-        let Some(Perspective { eye, eye_voxel, .. }) = &self.view.perspective else {
+        let by_slab = || {
             let reach = self.view.reach / self.view.slabs.width;
-            return self.numbered(place.depth - reach, place.depth + reach);
+            self.numbered(place.depth - reach, place.depth + reach)
+        };
+        let Some(Perspective { eye, eye_voxel, is_image_aligned, .. }) = &self.view.perspective else {
+            return by_slab();
         };
         if place.from_eye <= eye.near {
             return 0..0;
+        }
+        if !is_image_aligned {
+            return by_slab();
         }
         // (r·w)/λ is the depth over the distance in voxels.
         let reach = self.view.radius * place.from_eye / (voxel.as_dvec3() - eye_voxel).length();
@@ -125,16 +132,21 @@ impl Projection {
         if self.direction > 0 { slabs.clone() } else { 1 - slabs.end..1 - slabs.start }
     }
 
+    /// What voxels are sorted by that are composited one by one: their depth along w. Depths that differ by less than rounding errors may
+    /// (2⁻²⁰ `unit`s) are equal.
+    pub(super) fn depth_key(&self, grid: &Grid, voxel: UVec3) -> i64 {
+        let from = self.view.perspective.map_or(self.view.center, |perspective| perspective.eye.position);
+        let depth = (grid.world_position(voxel) / grid.unit() - from).dot(self.view.basis.w);
+        (depth * f64::from(1 << 20)).round() as i64
+    }
+
     /// How a voxel's kernel is seen.
     pub(super) fn lens(&self, place: Place, voxel: UVec3) -> Lens {
         let view = &self.view;
-        let Some(Perspective { eye, eye_voxel, aspect, .. }) = &view.perspective else {
-            return Lens {
-                per_slab: view.slabs.width,
-                per_lambda: 1.0 / view.lambda,
-                to_eye: -view.basis.w,
-                local: None,
-            };
+        // Slices hold whole kernels.
+        let whole = view.slabs.width * view.kernel_per_depth;
+        let Some(Perspective { eye, eye_voxel, aspect, is_image_aligned, .. }) = &view.perspective else {
+            return Lens { per_slab: whole, per_lambda: 1.0 / view.lambda, to_eye: -view.basis.w, local: None };
         };
         // In voxels and in `unit`s: the warped ray and the ray.
         let warped = voxel.as_dvec3() - eye_voxel;
@@ -155,7 +167,7 @@ impl Projection {
             cut: (eye.near - place.from_eye) * per_depth,
         };
         Lens {
-            per_slab: view.slabs.width * per_depth,
+            per_slab: if *is_image_aligned { view.slabs.width * per_depth } else { whole },
             per_lambda: distance / distance_warped,
             to_eye: -ray / distance,
             local: Some(local),

@@ -1,8 +1,8 @@
-//! The compositing buffer over the background, SPEC §5; the same as `shaders/resolve.wgsl`.
+//! Compositing over the background (SPEC §5), as in `shaders/resolve.wgsl`.
 
 use crate::settings::splatting::Compositing;
 
-/// How compositing buffers become images.
+/// Turns compositing buffers into images.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Resolver {
     compositing: Compositing,
@@ -17,10 +17,12 @@ impl Resolver {
         Self { compositing, background: [r * a, g * a, b * a, a].map(|channel| channel as f32) }
     }
 
-    /// Premultiplied in, premultiplied out.
+    /// A pixel over the background, premultiplied like its argument.
     pub(super) fn pixel(&self, acc: [f32; 4]) -> [f32; 4] {
         let image = match self.compositing {
-            Compositing::Xray => acc.map(|channel| channel.min(1.0)),
+            Compositing::Xray | Compositing::Average => acc.map(|channel| channel.min(1.0)),
+            Compositing::Minimum if acc[3] > 0.0 => [acc[0], acc[1], acc[2], 2.0 - acc[3]],
+            Compositing::Surface if acc[3] < 1.0 => [0.0; 4],
             _ => acc,
         };
         std::array::from_fn(|channel| image[channel] + (1.0 - image[3]) * self.background[channel])

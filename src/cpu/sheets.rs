@@ -6,11 +6,11 @@ use super::vector::LANES;
 pub(super) const COLUMNS: usize = 32;
 /// Rows of a tile.
 pub(super) const ROWS: usize = 32;
-/// Numbers along a row of a sheet: a vector that starts within the tile may end outside.
+/// Numbers along a row of a sheet, with room for a vector that starts within the tile and ends outside.
 pub(super) const STRIDE: usize = COLUMNS + LANES;
-/// Sheets that are open at a time: sheet s is in slot s mod 8.
+/// Sheets that are open at a time. Sheet s is in slot s mod 8.
 pub(super) const RING: usize = 8;
-/// Sheets that a voxel is drawn into at a time: their planes are a vector.
+/// Sheets that a voxel is drawn into at a time, such that their planes fill a vector.
 pub(super) const SECTIONS: usize = LANES - 1;
 /// Red, green, blue, opacity.
 pub(super) const CHANNELS: usize = 4;
@@ -23,10 +23,14 @@ pub(super) type SheetRow = [[[f32; STRIDE]; CHANNELS]; RING];
 pub(super) struct Buffers {
     /// Sheet buffers, row by row.
     pub(super) sheets: Vec<SheetRow>,
-    /// For every slot the rows that hold anything.
+    /// For every slot, the bits of the rows that are not empty.
     pub(super) written: [u64; RING],
+    /// The rows whose compositing buffer may hold a surface that is not reached yet.
+    pub(super) kept: u64,
     /// The compositing buffer, row by row.
     pub(super) acc: Vec<[[f32; COLUMNS]; CHANNELS]>,
+    /// Where the opacity asked for is reached, row by row, in slabs as [`TileRays`](super::cut::TileRays) counts them; infinite where it is not.
+    pub(super) hits: Vec<[f32; COLUMNS]>,
 }
 
 impl Buffers {
@@ -35,11 +39,13 @@ impl Buffers {
         Self {
             sheets: vec![[[[0.0; STRIDE]; CHANNELS]; RING]; ROWS],
             written: [0; RING],
+            kept: 0,
             acc: vec![[[0.0; COLUMNS]; CHANNELS]; ROWS],
+            hits: vec![[f32::INFINITY; COLUMNS]; ROWS],
         }
     }
 
-    /// For the next tile. Sheets are zero again once they have been composited; after an early end some are not.
+    /// Clears the buffers for the next tile. Composited sheets are already zero; after an early end some are not.
     pub(super) fn clear(&mut self) {
         for slot in 0..RING {
             while self.written[slot] != 0 {
@@ -48,7 +54,9 @@ impl Buffers {
                 self.sheets[row][slot] = [[0.0; STRIDE]; CHANNELS];
             }
         }
+        self.kept = 0;
         self.acc.fill([[0.0; COLUMNS]; CHANNELS]);
+        self.hits.fill([f32::INFINITY; COLUMNS]);
     }
 }
 

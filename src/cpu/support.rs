@@ -1,17 +1,17 @@
-//! What the native backend does not draw yet: an error, never a wrong picture.
+//! Settings that the native backend does not support yet are errors, never wrong pictures.
 
 use crate::error::RenderError;
 use crate::scene::Scene;
 use crate::setting_error::SettingError;
-use crate::settings::splatting::{Classification, Compositing, Method};
+use crate::settings::splatting::Classification;
 
 /// The largest image, pixels along a side.
 const MAX_SIZE: u32 = 32_768;
 
-/// Checks that all that a scene asks for can be drawn.
+/// Checks that all settings of a scene are supported.
 ///
 /// # Errors
-/// If it cannot.
+/// If one is not.
 pub(super) fn check(scene: &Scene) -> Result<(), RenderError> {
     let refused = |key: &str, found: String, allowed: String| Err(SettingError::new(key, found, allowed).into());
     for (key, found) in [("image.width", scene.image.width), ("image.height", scene.image.height)] {
@@ -22,26 +22,7 @@ pub(super) fn check(scene: &Scene) -> Result<(), RenderError> {
     let splatting = &scene.splatting;
     let other = "or another backend than \"cpu\"";
     if splatting.classification == Classification::After {
-        return refused(
-            "splatting.classification",
-            "\"after\"".to_owned(),
-            "\"before\", or the reference backend".to_owned(),
-        );
-    }
-    match splatting.method {
-        Method::ImageAligned => {}
-        Method::AxisAligned => {
-            return refused("splatting.method", "\"axis-aligned\"".to_owned(), format!("\"image-aligned\", {other}"));
-        }
-        Method::CompositeEverySample => {
-            let found = "\"composite-every-sample\"".to_owned();
-            return refused("splatting.method", found, format!("\"image-aligned\", {other}"));
-        }
-    }
-    if !matches!(splatting.compositing, Compositing::Linear | Compositing::Exponential | Compositing::Xray) {
-        let found = format!("\"{}\"", format!("{:?}", splatting.compositing).to_lowercase());
-        let allowed = format!("\"linear\", \"exponential\", \"xray\", {other}");
-        return refused("splatting.compositing", found, allowed);
+        return refused("splatting.classification", "\"after\"".to_owned(), format!("\"before\", {other}"));
     }
     if let Some(economy) = splatting.experimental.in_use() {
         return refused(economy.key, economy.value.to_string(), format!("{}, {other}", economy.off));

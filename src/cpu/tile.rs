@@ -1,7 +1,10 @@
 //! One tile of the image, front to back: bricks arrive with the first sheet that they may reach, every voxel waits for its own first sheet,
-//! is tested for being hidden there, shaded, and drawn into all the sheets that its kernel reaches; then that sheet is composited.
+//! is tested for being hidden there, shaded, and drawn into all the sheets that its kernel reaches; then that sheet is composited. Where voxels
+//! are composited one by one there is one sheet, composited after each of them.
 
 use std::collections::VecDeque;
+use std::iter::Peekable;
+use std::ops::Range;
 
 use fearless_simd::Simd;
 use glam::DVec2;
@@ -9,8 +12,9 @@ use glam::DVec2;
 use super::bin::Placed;
 use super::count::Tally;
 use super::cull::{OpenMask, Pixels};
+use super::cut::TileRays;
 use super::frame::Frame;
-use super::project::Place;
+use super::project::{Place, Projection};
 use super::shade::Unshaded;
 use super::sheets::{Buffers, COLUMNS, RING, ROWS, SECTIONS, slot_of};
 use super::splat::{LocalFootprint, Splat};
@@ -24,37 +28,46 @@ struct Arrived {
     half_box: [f32; 2],
 }
 
-/// A voxel that waits for its first sheet: which of the bricks that arrived, and its place there.
+/// A voxel that waits for its first sheet: the index of its brick among those that have arrived, and its slot there.
 type Waiting = (u32, u8);
 
-/// What a thread draws tiles with, one after the other.
+/// The state with which a thread draws one tile after another.
 pub(super) struct TileWalk<'a> {
     frame: &'a Frame<'a>,
+    /// The tile's first pixel.
+    origin: [usize; 2],
+    open: OpenMask,
+    rays: TileRays,
     buffers: Buffers,
     arrived: Vec<Arrived>,
-    /// By sheet, from the current one on.
+    /// The waiting voxels by sheet, from the current one.
     waiting: VecDeque<Vec<Waiting>>,
-    /// Voxels with more sections than are drawn at a time, by the slot of the sheet that is their next.
+    /// Voxels with more sections than are drawn at a time, by the slot of their next sheet.
     continued: [Vec<Splat>; RING],
-    /// Emptied lists.
+    /// Empty lists to be used again.
     spare: Vec<Vec<Waiting>>,
     pending: usize,
+    tally: Tally,
 }
 
 impl<'a> TileWalk<'a> {
     pub(super) fn new(frame: &'a Frame<'a>) -> Self {
         Self {
             frame,
+            origin: [0; 2],
+            open: OpenMask::new(COLUMNS, ROWS),
+            rays: TileRays::default(),
             buffers: Buffers::new(),
             arrived: Vec::new(),
             waiting: VecDeque::new(),
             continued: std::array::from_fn(|_| Vec::new()),
             spare: Vec::new(),
             pending: 0,
+            tally: Tally::default(),
         }
     }
 
-    /// Draws a tile, given its first pixel and its bricks by first sheet; the compositing buffer.
+    /// Draws a tile, given its first pixel and its bricks by first sheet: what its buffers hold then, and how its pixels look at sheets.
     #[inline(always)]
     pub(super) fn draw<S: Simd>(
         &mut self,
@@ -62,55 +75,79 @@ impl<'a> TileWalk<'a> {
         origin: [usize; 2],
         placed: &[Placed],
         bricks: &[u32],
-        tally: &mut Tally,
-    ) -> &Buffers {
-        self.reset();
-        let [width, height] = self.frame.projection.view.size.map(|side| side as usize);
-        let mut open = OpenMask::new((width - origin[0]).min(COLUMNS), (height - origin[1]).min(ROWS));
+    ) -> (&Buffers, &TileRays, Tally) {
         let mut bricks = bricks.iter().map(|&at| &placed[at as usize]).peekable();
-        let Some(mut sheet) = bricks.peek().map(|placed| placed.first) else { return &self.buffers };
-        let direction = self.frame.projection.direction;
-        let cuts = self.frame.cuts.as_ref().map(|cuts| cuts.of_tile(origin, direction * sheet));
-        if let Some(cuts) = cuts.as_ref().filter(|_| self.frame.compositor.threshold.is_some()) {
-            open.close_empty(cuts);
+        let first = bricks.peek().map(|placed| placed.first);
+        self.reset(origin, first.unwrap_or(0));
+        if let Some(first) = first {
+            self.walk(simd, first, &mut bricks);
         }
-        loop {
-            while let Some(placed) = bricks.next_if(|placed| placed.first <= sheet) {
-                tally.bricks_visited += u64::from(self.arrive(placed, sheet, origin, &open));
-            }
-            self.start(simd, sheet, origin, &open, tally);
-            let slot = slot_of(sheet);
-            if self.buffers.written[slot] != 0 {
-                tally.sheets_composited += 1;
-                let cut = cuts.as_ref().map(|cuts| (cuts, cuts.begin(direction * sheet)));
-                self.frame.compositor.composite(simd, &mut self.buffers, slot, cut, &mut open);
-                if open.is_closed() {
-                    break;
-                }
-            }
-            let is_idle = self.pending == 0 && self.buffers.written == [0; RING];
-            sheet = match bricks.peek() {
-                Some(placed) if is_idle => placed.first,
-                None if is_idle => break,
-                _ => sheet + 1,
-            };
-        }
-        &self.buffers
+        (&self.buffers, &self.rays, self.tally)
     }
 
-    fn reset(&mut self) {
+    /// Clears the state for a tile whose walk begins with this sheet.
+    fn reset(&mut self, origin: [usize; 2], sheet: i32) {
+        let Projection { view, direction, .. } = &self.frame.projection;
+        let [width, height] = view.size.map(|side| side as usize);
+        self.origin = origin;
+        self.open = OpenMask::new((width - origin[0]).min(COLUMNS), (height - origin[1]).min(ROWS));
+        self.rays = self.frame.rays.of_tile(origin, direction * sheet);
+        if let (Some(shown), Some(_)) = (&self.rays.shown, self.frame.compositor.threshold) {
+            self.open.close_empty(shown);
+        }
         self.buffers.clear();
         self.arrived.clear();
         self.spare.extend(self.waiting.drain(..));
         self.continued.iter_mut().for_each(Vec::clear);
         self.pending = 0;
+        self.tally = Tally::default();
+    }
+
+    #[inline(always)]
+    fn walk<'b, S: Simd>(&mut self, simd: S, first: i32, bricks: &mut Peekable<impl Iterator<Item = &'b Placed>>) {
+        // Empty sheets are composited where they count.
+        let Range { start, end } = self.frame.counted.clone();
+        let mut sheet = if start < end { first.min(start) } else { first };
+        loop {
+            while let Some(placed) = bricks.next_if(|placed| placed.first <= sheet) {
+                self.tally.bricks_visited += u64::from(self.arrive(placed, sheet));
+            }
+            self.start(simd, sheet);
+            if !self.frame.is_each {
+                self.composite(simd, sheet);
+            }
+            if self.open.is_closed() {
+                break;
+            }
+            let Buffers { written, kept, .. } = &self.buffers;
+            let is_idle = self.pending == 0 && *written == [0; RING] && *kept == 0 && sheet + 1 >= end;
+            sheet = match bricks.peek() {
+                Some(placed) if is_idle => placed.first.max(sheet + 1),
+                None if is_idle => break,
+                _ => sheet + 1,
+            };
+        }
+    }
+
+    /// Composites a sheet.
+    fn composite<S: Simd>(&mut self, simd: S, sheet: i32) {
+        // One function for every instruction set, instead of a copy at every call.
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let Self { frame, open, rays, buffers, tally, .. } = self;
+                let begin = rays.begin(frame.projection.direction * sheet);
+                let is_composited = frame.compositor.composite(simd, buffers, slot_of(sheet), (rays, begin), open);
+                tally.sheets_composited += u64::from(is_composited && frame.touched.contains(&sheet));
+            },
+        );
     }
 
     /// Lets a brick's voxels wait for their first sheets, unless the brick is hidden; whether it is not.
-    fn arrive(&mut self, placed: &Placed, sheet: i32, origin: [usize; 2], open: &OpenMask) -> bool {
+    fn arrive(&mut self, placed: &Placed, sheet: i32) -> bool {
         let projection = &self.frame.projection;
         let brick = &self.frame.bricks[placed.brick as usize];
-        if !self.sees_brick(placed, origin, open) {
+        if !self.sees_brick(placed) {
             return false;
         }
         let place = projection.of_brick(brick);
@@ -132,79 +169,110 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Whether any pixel is open that a brick's footprints may touch.
-    fn sees_brick(&self, placed: &Placed, origin: [usize; 2], open: &OpenMask) -> bool {
+    fn sees_brick(&self, placed: &Placed) -> bool {
         let (middle, half) = brick::bounds(&self.frame.bricks[placed.brick as usize]);
         let Some(bounds) = self.frame.projection.view.bounds(middle, half) else { return false };
-        let origin = DVec2::new(origin[0] as f64, origin[1] as f64) + 0.5;
+        let origin = DVec2::new(self.origin[0] as f64, self.origin[1] as f64) + 0.5;
         let (center, half) = ((bounds.low + bounds.high) / 2.0 - origin, (bounds.high - bounds.low) / 2.0);
         let [x, y] = placed.half_box;
         let half = [half.x as f32 + x, half.y as f32 + y];
-        Pixels::within([center.x as f32, center.y as f32], half).is_some_and(|pixels| open.sees(&pixels))
+        Pixels::within([center.x as f32, center.y as f32], half).is_some_and(|pixels| self.open.sees(&pixels))
     }
 
-    /// Draws what starts in a sheet, or goes on there.
+    /// Draws the voxels that start or continue in a sheet.
     #[inline(always)]
-    fn start<S: Simd>(&mut self, simd: S, sheet: i32, origin: [usize; 2], open: &OpenMask, tally: &mut Tally) {
+    fn start<S: Simd>(&mut self, simd: S, sheet: i32) {
         let continued = std::mem::take(&mut self.continued[slot_of(sheet)]);
         self.pending -= continued.len();
         for splat in &continued {
-            self.draw_splat(simd, splat, open, tally);
+            self.draw_splat(simd, splat);
         }
-        let Some(starting) = self.waiting.pop_front() else { return };
+        let Some(mut starting) = self.waiting.pop_front() else { return };
         self.pending -= starting.len();
+        if self.frame.is_each {
+            self.sort_by_depth(&mut starting);
+        }
         let mut batch = Batch::default();
         for &(number, slot) in &starting {
             let arrived = &self.arrived[number as usize];
             let place = self.frame.projection.of_voxel(arrived.place, slot.into());
             let pixel = self.frame.projection.pixel(place);
-            let center = [pixel.x - origin[0] as f64 - 0.5, pixel.y - origin[1] as f64 - 0.5].map(|at| at as f32);
-            // In perspective a bound of all of its sections' boxes.
-            if !Pixels::within(center, arrived.half_box).is_some_and(|pixels| open.sees(&pixels)) {
+            let center =
+                [pixel.x - self.origin[0] as f64 - 0.5, pixel.y - self.origin[1] as f64 - 0.5].map(|at| at as f32);
+            // In perspective this bounds the boxes of all its sections.
+            if !Pixels::within(center, arrived.half_box).is_some_and(|pixels| self.open.sees(&pixels)) {
                 continue;
             }
-            self.frame.drawn.shade([arrived.brick, slot.into()], tally);
+            self.frame.drawn.shade([arrived.brick, slot.into()], &mut self.tally);
             batch.add(self.frame, [arrived.brick, slot.into()], place, center, sheet);
             if batch.count == LANES {
-                self.draw_batch(simd, &mut batch, open, tally);
+                self.draw_batch(simd, &mut batch);
             }
         }
-        self.draw_batch(simd, &mut batch, open, tally);
+        self.draw_batch(simd, &mut batch);
         self.spare.push(starting);
     }
 
-    #[inline(always)]
-    fn draw_batch<S: Simd>(&mut self, simd: S, batch: &mut Batch, open: &OpenMask, tally: &mut Tally) {
-        let amounts = self.frame.shader.shade(simd, &batch.unshaded);
-        for lane in 0..std::mem::take(&mut batch.count) {
-            if let Some(splat) = &mut batch.splats[lane] {
-                splat.amount = amounts.map(|lanes| lanes[lane]);
-            }
-            if let Some(splat) = batch.splats[lane] {
-                self.draw_splat(simd, &splat, open, tally);
-            }
+    /// Sorts voxels that are composited one by one: by depth, equal ones by their position in memory.
+    fn sort_by_depth(&self, voxels: &mut [Waiting]) {
+        let Frame { projection, volume, bricks, .. } = self.frame;
+        let grid = volume.grid();
+        voxels.sort_by_cached_key(|&(number, slot)| {
+            let brick = &bricks[self.arrived[number as usize].brick as usize];
+            let voxel = brick::origin(brick) + brick::in_brick(slot.into());
+            (projection.depth_key(grid, voxel), grid.index_of(voxel))
+        });
+        if projection.direction < 0 {
+            voxels.reverse();
         }
     }
 
+    fn draw_batch<S: Simd>(&mut self, simd: S, batch: &mut Batch) {
+        // One function for every instruction set, instead of a copy at every call.
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let amounts = self.frame.shader.shade(simd, &batch.unshaded);
+                for lane in 0..std::mem::take(&mut batch.count) {
+                    if let Some(splat) = &mut batch.splats[lane] {
+                        splat.amount = amounts.map(|lanes| lanes[lane]);
+                    }
+                    if let Some(splat) = batch.splats[lane] {
+                        self.draw_splat(simd, &splat);
+                    }
+                }
+            },
+        );
+    }
+
     /// Draws a voxel's next sections, if they are seen, and keeps it if there are more.
-    #[inline(always)]
-    fn draw_splat<S: Simd>(&mut self, simd: S, splat: &Splat, open: &OpenMask, tally: &mut Tally) {
-        let splatter = &self.frame.splatter;
-        let sections = splatter.sections(simd, splat);
-        let [first, end] = splat.sheets;
-        let next = end.min(first + SECTIONS as i32);
-        if sections.pixels.is_some_and(|pixels| open.sees(&pixels)) {
-            splatter.draw(simd, splat, &sections, open, &mut self.buffers);
-            self.frame.drawn.splat(splat.voxel, splat.drawn, (next - first) as u64, tally);
-        }
-        if next < end {
-            self.continued[slot_of(next)].push(Splat {
-                sheets: [next, end],
-                first_plane: splat.first_plane + splat.step * SECTIONS as f32,
-                drawn: splat.drawn + 1,
-                ..*splat
-            });
-            self.pending += 1;
-        }
+    fn draw_splat<S: Simd>(&mut self, simd: S, splat: &Splat) {
+        // One function for every instruction set, instead of a copy at every call.
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let splatter = &self.frame.splatter;
+                let sections = splatter.sections(simd, splat);
+                let [first, end] = splat.sheets;
+                let next = end.min(first + SECTIONS as i32);
+                if sections.pixels.is_some_and(|pixels| self.open.sees(&pixels)) {
+                    splatter.draw(simd, splat, &sections, &self.open, &mut self.buffers);
+                    self.frame.drawn.splat(splat.voxel, splat.drawn, (next - first) as u64, &mut self.tally);
+                    if self.frame.is_each {
+                        self.composite(simd, first);
+                    }
+                }
+                if next < end {
+                    self.continued[slot_of(next)].push(Splat {
+                        sheets: [next, end],
+                        first_plane: splat.first_plane + splat.step * SECTIONS as f32,
+                        drawn: splat.drawn + 1,
+                        ..*splat
+                    });
+                    self.pending += 1;
+                }
+            },
+        );
     }
 }
 
@@ -213,7 +281,7 @@ fn cleared(mut list: Vec<Waiting>) -> Vec<Waiting> {
     list
 }
 
-/// Voxels that are shaded together.
+/// Up to eight voxels that are shaded together.
 #[derive(Default)]
 struct Batch {
     count: usize,
@@ -227,7 +295,7 @@ impl Batch {
         let voxel = brick::origin(&frame.bricks[brick as usize]) + brick::in_brick(slot);
         let lens = projection.lens(place, voxel);
         let sheets = projection.sheets(place, voxel);
-        // Back to front, planes are met in the other order: sections are then less than 0, and so is what they are multiplied by.
+        // Back to front, planes come in the opposite order, so that sections and their factors are both negative.
         let direction = f64::from(projection.direction);
         let plane = direction * f64::from(sheet) + if projection.direction > 0 { 0.0 } else { 1.0 };
         let scale = direction * lens.per_lambda * frame.amplitude;

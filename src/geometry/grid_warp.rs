@@ -1,5 +1,5 @@
-//! Grid warping (§4): the rectilinear grid becomes a cubic one, the viewing system is warped with it, and rotate, shear
-//! and scale bring the warped volume onto an orthonormal image grid. One function per equation.
+//! Grid warping (§4): the rectilinear grid becomes cubic, the viewing system is warped with it, and rotation, shear and scaling map the
+//! warped volume onto an orthonormal image grid. There is one function per equation.
 //!
 //! Rows of a matrix are the paper's rows: `m.row(0)` is the first. Lengths are `unit`s (SPEC §2).
 
@@ -17,8 +17,8 @@ pub fn m_view_warped(basis: &ViewBasis, ar: DVec3) -> DMat3 {
     m_view(basis) * DMat3::from_diagonal(ar.recip())
 }
 
-/// The unit normal of the slabs, `w^wo = w^w / |w^w|` (text above eq. 6), and `λw = |w^w|`: how much shorter a step along
-/// the viewing direction is in the warped grid (end of §4.2).
+/// The unit normal of the slabs, `w^wo = w^w / |w^w|` (text above eq. 6), and `λw = |w^w|`, the factor by which a step along the viewing
+/// direction is shorter in the warped grid (end of §4.2).
 pub fn w_wo(warped: &DMat3) -> (DVec3, f64) {
     let w_w = warped.row(2);
     (w_w.normalize(), w_w.length())
@@ -32,7 +32,7 @@ pub fn v_wo(warped: &DMat3) -> DVec3 {
 
 /// Eq. 7: the rotation with rows u^wo = v^wo × w^wo, v^wo, w^wo.
 ///
-/// With a left-handed u, v, w (u right, v up, w into the screen) u^wo points left; eq. 10 undoes it.
+/// With a left-handed u, v, w (u right, v up, w into the screen) u^wo points left, which eq. 10 undoes.
 pub fn m_view_wo(warped: &DMat3) -> DMat3 {
     let (w_wo, _) = w_wo(warped);
     let v_wo = v_wo(warped);
@@ -46,7 +46,7 @@ pub fn wp(warped: &DMat3) -> (DVec3, DVec3) {
     (project(warped.row(0)), project(warped.row(1)))
 }
 
-/// Eq. 9, with the minus sign that the print lacks: the shear that makes u^wp and v^wp orthogonal.
+/// Eq. 9, with the minus sign that is missing in print: the shear that makes u^wp and v^wp orthogonal.
 pub fn m_shear(warped: &DMat3) -> DMat3 {
     let (u_wp, _) = wp(warped);
     let rotation = m_view_wo(warped);
@@ -54,7 +54,7 @@ pub fn m_shear(warped: &DMat3) -> DMat3 {
     DMat3::from_cols(DVec3::new(1.0, -u_y / u_x, 0.0), DVec3::Y, DVec3::Z)
 }
 
-/// Eq. 10, without its stray 1: `diag(1/u_x, 1/|v|, 1)` back to unit image vectors.
+/// Eq. 10 without its stray 1: `diag(1/u_x, 1/|v|, 1)`, which restores unit image vectors.
 pub fn m_scale(warped: &DMat3) -> DMat3 {
     let (u_wp, v_wp) = wp(warped);
     let u_x = u_wp.dot(m_view_wo(warped).row(0));
@@ -66,28 +66,28 @@ pub fn m_vol(warped: &DMat3) -> DMat3 {
     m_scale(warped) * m_shear(warped) * m_view_wo(warped)
 }
 
-/// How a footprint lies on the screen: the shear and scale of eqs. 9 and 10 in pixels, with \[17\]'s low-pass rule.
+/// The map between footprints and the screen: the shear and scale of eqs. 9 and 10 in pixels, with the low-pass rule of \[17\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FootprintMap {
-    /// Footprint coordinates (grid units along u^wo, v^wo) to a pixel offset (x right, y down).
+    /// Maps footprint coordinates (grid units along u^wo, v^wo) to a pixel offset (x right, y down).
     pub pixels_from_footprint: DMat2,
     /// Its inverse.
     pub footprint_from_pixels: DMat2,
-    /// What the low-pass rule multiplies amplitudes by, at most 1.
+    /// The factor of the low-pass rule for amplitudes, at most 1.
     pub amplitude: f64,
 }
 
 impl FootprintMap {
-    /// The map for a view whose rows are warped by eq. 5, `pix` units per pixel.
+    /// The map for a view whose rows are warped by eq. 5, with pixels of `pix` units.
     pub fn new(warped: &DMat3, pix: f64) -> Self {
         let units_from_footprint = DMat2::from_mat3(m_scale(warped) * m_shear(warped));
         let pixels_from_units = DMat2::from_diagonal(DVec2::new(1.0 / pix, -1.0 / pix));
         Self::low_pass(pixels_from_units * units_from_footprint)
     }
 
-    /// The low-pass rule: singular values below 1 pixel per grid unit are raised to 1, the amplitude falls in proportion.
+    /// The low-pass rule: singular values below 1 pixel per grid unit are raised to 1, and the amplitude falls in proportion.
     pub fn low_pass(pixels_from_footprint: DMat2) -> Self {
-        // Right singular vectors and squared singular values are the eigensystem of MᵀM.
+        // The eigensystem of MᵀM gives the right singular vectors and the squared singular values.
         let gram = pixels_from_footprint.transpose() * pixels_from_footprint;
         let (a, b, c) = (gram.x_axis.x, gram.x_axis.y, gram.y_axis.y);
         let right = DMat2::from_angle(0.5 * libm::atan2(2.0 * b, a - c));
@@ -101,15 +101,15 @@ impl FootprintMap {
         Self { pixels_from_footprint: map, footprint_from_pixels: map.inverse(), amplitude }
     }
 
-    /// The parallelogram around a footprint of the given radius (grid units) whose upper and lower sides are pixel rows (Fig. 13), as high
-    /// as the box: how many pixels its other sides move right on every row down, and half its width, pixels.
+    /// The parallelogram around a footprint of the given radius (grid units) whose upper and lower sides are pixel rows (Fig. 13), as high as
+    /// the box: the shift of its other sides per row downwards, and half its width, both in pixels.
     pub fn parallelogram(&self, radius: f64) -> (f64, f64) {
-        // In footprint coordinates turned so that pixel rows follow the first axis, the second is the same all along a row.
+        // The footprint coordinates are rotated so that pixel rows follow the first axis; the second is then constant along a row.
         let DMat2 { x_axis: along_rows, y_axis } = self.footprint_from_pixels;
         (-along_rows.dot(y_axis) / along_rows.length_squared(), radius / along_rows.length())
     }
 
-    /// Half the width and height, in pixels, of the screen box around a footprint of the given radius (grid units).
+    /// Half the width and height in pixels of the screen box around a footprint of the given radius (grid units).
     pub fn half_box(&self, radius: f64) -> DVec2 {
         radius * DVec2::new(self.pixels_from_footprint.row(0).length(), self.pixels_from_footprint.row(1).length())
     }
@@ -129,7 +129,7 @@ mod tests {
             .collect()
     }
 
-    /// SPEC §5's direct form: the quadratic form |footprint coordinates|² of a pixel offset.
+    /// SPEC §5's direct form: |footprint coordinates|² as a quadratic form of a pixel offset.
     fn direct_form(basis: &ViewBasis, ar: DVec3, pix: f64, offset: DVec2) -> f64 {
         let ro = (basis.w / ar).normalize();
         let q = (offset.x * basis.u - offset.y * basis.v) * pix / ar;

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 /// A truncated Gaussian `h(r) = κ·exp(-falloff·r²)` for `r ≤ radius`, radially symmetric in the warped grid.
 ///
-/// Lengths are grid units. κ makes the integral of h over its ball equal 1.
+/// Lengths are in grid units. κ makes the integral of h over its ball equal 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kernel {
     radius: f64,
@@ -13,23 +13,22 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// A kernel of the given radius (grid units) and Gaussian exponent, both above 0.
+    /// A kernel with the given radius (grid units) and Gaussian exponent, both above 0.
     pub fn new(radius: f64, falloff: f64) -> Self {
         Self { radius, falloff, kappa: 1.0 / (4.0 * PI * radial_moment(radius, falloff)) }
     }
 
-    /// Radius of the kernel, grid units.
+    /// The kernel's radius in grid units.
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// Exponent of the Gaussian.
+    /// The Gaussian's exponent.
     pub fn falloff(&self) -> f64 {
         self.falloff
     }
 
-    /// The radius beyond which nothing an f32 buffer could hold is left: `radius`, or less where the Gaussian has
-    /// fallen below 2⁻²⁴ of its peak.
+    /// The radius beyond which the kernel is too small for an f32 buffer: `radius`, or less where the Gaussian falls below 2⁻²⁴ of its peak.
     pub fn support(&self) -> f64 {
         self.radius.min((24.0 * std::f64::consts::LN_2 / self.falloff).sqrt())
     }
@@ -39,22 +38,22 @@ impl Kernel {
         if r <= self.radius { self.kappa * libm::exp(-self.falloff * r * r) } else { 0.0 }
     }
 
-    /// `H(x, y, z)` of eq. 3 with `rho_squared = x² + y²`, of the Gaussian without its truncation; odd in z.
+    /// `H(x, y, z)` of eq. 3 with `rho_squared = x² + y²`, for the Gaussian without truncation; odd in z.
     pub fn cumulative(&self, rho_squared: f64, z: f64) -> f64 {
         let root = self.falloff.sqrt();
         self.kappa * libm::exp(-self.falloff * rho_squared) * (PI.sqrt() / 2.0) * libm::erf(root * z) / root
     }
 
-    /// What of `H(x, y, z)` is missing to the kernel's support: `H(x, y, support) - H(x, y, z)`, to full relative precision
-    /// however little that is. For `0 ≤ z ≤ support`.
+    /// The rest of `H(x, y, z)` up to the kernel's support, `H(x, y, support) - H(x, y, z)`, to full relative precision even if it is tiny.
+    /// `z` must lie in [0, support].
     pub fn cumulative_beyond(&self, rho_squared: f64, z: f64) -> f64 {
         let root = self.falloff.sqrt();
         let beyond = libm::erfc(root * z) - libm::erfc(root * self.support());
         self.kappa * libm::exp(-self.falloff * rho_squared) * (PI.sqrt() / 2.0) * beyond / root
     }
 
-    /// Coefficients of a polynomial in z, the z⁰ one first, that is `H(0, 0, t) / t` for t² from `(1 - span)·support²`, where z is
-    /// -1, to `support²`, where it is 1.
+    /// The coefficients, z⁰ first, of a polynomial in z that approximates `H(0, 0, t) / t` for t² from `(1 - span)·support²`, where z is -1,
+    /// to `support²`, where z is 1.
     pub fn cumulative_polynomial<const N: usize>(&self, span: f64) -> [f64; N] {
         let count = N as f64;
         let nodes: [f64; N] = std::array::from_fn(|i| libm::cos(PI * (i as f64 + 0.5) / count));
@@ -62,7 +61,7 @@ impl Kernel {
             let t = self.support() * (1.0 - span * (1.0 - z) / 2.0).sqrt();
             self.cumulative(0.0, t) / t
         });
-        // Chebyshev polynomials: the current one and the one before, as coefficients of powers of z.
+        // The current and the previous Chebyshev polynomial, as coefficients of powers of z.
         let (mut before, mut current) = ([0.0; N], [0.0; N]);
         current[0] = 1.0;
         let mut sum = [0.0; N];
@@ -79,8 +78,8 @@ impl Kernel {
         sum
     }
 
-    /// The minimum of the discrete kernel's Fourier transform over its maximum: the transform of `exp(-falloff·r²)` at the grid offsets
-    /// with `r < radius`. What is left of the highest frequencies when samples are convolved with the kernel; sampled at multiples of π/16.
+    /// The minimum of the discrete kernel's Fourier transform relative to its maximum: the transform of `exp(-falloff·r²)` at the grid offsets
+    /// with `r < radius`, sampled at multiples of π/16. This fraction of the highest frequencies survives convolution with the kernel.
     pub fn min_discrete_response(&self) -> f64 {
         const STEPS: usize = 16;
         let reach = self.radius.ceil() as usize;
@@ -112,8 +111,8 @@ impl Kernel {
         (self.radius * self.radius - rho_squared).max(0.0).sqrt()
     }
 
-    /// `S(a, b; t0, t1)`, the kernel section between the depths `t0 ≤ t1` along a ray that passes the centre at
-    /// distance √`rho_squared`, as two entries of eq. 3 subtracted. The ball's truncation is the clamp to the chord.
+    /// `S(a, b; t0, t1)`, the kernel section between the depths `t0 ≤ t1` along a ray that passes the centre at distance √`rho_squared`: the
+    /// difference of two entries of eq. 3. Clamping to the chord applies the ball's truncation.
     pub fn section(&self, rho_squared: f64, t0: f64, t1: f64) -> f64 {
         let chord = self.half_chord(rho_squared);
         let (near, far) = (t0.clamp(-chord, chord), t1.clamp(-chord, chord));
@@ -124,7 +123,7 @@ impl Kernel {
     }
 }
 
-/// `∫₀ᴿ r²·exp(-f·r²) dr`. The closed form cancels where `f·R²` is small; there the series converges fast.
+/// `∫₀ᴿ r²·exp(-f·r²) dr`. The closed form cancels where `f·R²` is small; a series converges fast there.
 fn radial_moment(radius: f64, falloff: f64) -> f64 {
     let x = falloff * radius * radius;
     if x < 1.0 {
@@ -193,7 +192,7 @@ mod tests {
                 worst.max((found - kernel.cumulative(0.0, t)).abs() / whole)
             })
         }
-        // To what f32 holds of a whole footprint.
+        // To f32's precision of a whole footprint.
         for (radius, falloff) in KERNELS.into_iter().chain([(4.0, 0.1), (4.0, 2.0), (2.0, 16.0)]) {
             let kernel = Kernel::new(radius, falloff);
             assert!(

@@ -1,4 +1,4 @@
-//! Where along rays the means of sheets count ([`Compositing::is_by_means`]).
+//! The stretch of each ray over which means of sheets count ([`Compositing::is_by_means`]).
 
 use std::ops::Range;
 
@@ -11,28 +11,28 @@ use crate::volume::Grid;
 /// A box around the volume's centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayBox {
-    /// Half its extent, grid steps.
+    /// Half its size in grid steps.
     pub half: DVec3,
-    /// The depth along w from which on a ray is looked at, `unit`s from the eye; without one minus infinity.
+    /// The minimum depth along w that counts, in `unit`s from the eye; minus infinity without an eye.
     pub nearest: f64,
 }
 
 impl RayBox {
-    /// That of [`Compositing::Minimum`], where kernels are complete, or of [`Compositing::Average`], all voxels; the others look at
-    /// none.
+    /// The box for [`Compositing::Minimum`], in which kernels are complete, or for [`Compositing::Average`] and
+    /// [`Classification::After`], with all voxels; the other modes do not use it.
     pub fn new(view: &ViewGeometry, grid: &Grid, splatting: &Splatting) -> Self {
         let (centers, near) = (grid.center(), view.perspective.map_or(f64::NEG_INFINITY, |it| it.eye.near));
         if splatting.compositing != Compositing::Minimum || splatting.classification == Classification::After {
             return Self { half: centers + 0.5, nearest: near };
         }
-        // The farthest that a kernel reaches in depth from a voxel before the near plane.
+        // The maximum depth by which a kernel reaches beyond a voxel at the near plane.
         let reach = splatting.radius * (view.basis.w * grid.aspect()).length();
         Self { half: (centers - splatting.radius).max(centers / 2.0), nearest: near + reach }
     }
 }
 
-/// The sheet depths whose slabs count even where they hold nothing, empty for none: those that some ray counts for
-/// [`Compositing::Minimum`].
+/// The sheet depths whose slabs count for [`Compositing::Minimum`] even if they are empty: those on some ray's stretch. Empty for the
+/// other modes.
 pub fn covered(view: &ViewGeometry, grid: &Grid, splatting: &Splatting) -> Range<f64> {
     if splatting.compositing != Compositing::Minimum || splatting.classification == Classification::After {
         return 0.0..0.0;
@@ -44,7 +44,7 @@ pub fn covered(view: &ViewGeometry, grid: &Grid, splatting: &Splatting) -> Range
         Some(perspective) if perspective.is_image_aligned => (middle - spread).max(view.slabs.origin + nearest),
         _ => middle - spread,
     };
-    // Of stretches shorter than a slab the slabs around their middles count.
+    // For a stretch shorter than a slab, the slab around its middle counts.
     let margin = view.slabs.width / 2.0;
     if start <= middle + spread { start - margin..middle + spread + margin } else { 0.0..0.0 }
 }

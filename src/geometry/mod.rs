@@ -1,10 +1,11 @@
-//! Where voxels, kernels and slabs lie (§§3 and 4): the kernel and its footprints, the warped grid, the slabs of a view, and what
-//! bounds a pixel's ray. Everything here is plain arithmetic in f64, without a GPU.
+//! The geometry of voxels, kernels and slabs (§§3 and 4): the kernel and its footprints, the warped grid, the slabs of a view, and the
+//! limits of a pixel's ray. All of it is plain arithmetic in f64, without a GPU.
 
 pub mod footprint;
 pub mod grid_warp;
 pub mod kernel;
 pub mod means;
 pub mod slab;
+#[cfg(feature = "gpu")]
 pub(crate) mod surfaces;
 pub mod view_geometry;

@@ -1,56 +1,56 @@
-//! The slab grid: which slabs a kernel touches (§3.2, SPEC §5).
+//! The slab grid, which tells the slabs that a kernel touches (§3.2, SPEC §5).
 
 use std::ops::Range;
 
 use crate::error::RenderError;
 use crate::setting_error::SettingError;
 
-/// The most slabs that a volume may be cut into. 0.05 `unit`s wide, 1800³ voxels need fewer.
+/// The maximum number of slabs in a volume. 1800³ voxels need fewer with slabs 0.05 `unit`s wide.
 pub const MAX_SLABS: u32 = 1 << 16;
 
-/// Slabs by which a kernel must at least overlap one: rounding errors do not count.
+/// The minimum overlap of a kernel with a slab, in slab widths; anything less is a rounding error.
 pub const ROUNDING: f64 = 1e-9;
 
-/// Parallel planes `width` apart in terms of a view's sheet depth. Slab k lies between the planes k and k + 1.
+/// Parallel planes at distances of `width` in a view's sheet depth. Slab k lies between planes k and k + 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlabGrid {
-    /// Sheet depth of plane 0.
+    /// The sheet depth of plane 0.
     pub origin: f64,
-    /// Slab width.
+    /// The width of a slab.
     pub width: f64,
 }
 
 impl SlabGrid {
-    /// Sheet depth of plane k.
+    /// The sheet depth of plane k.
     pub fn plane(&self, k: i32) -> f64 {
         self.origin + f64::from(k) * self.width
     }
 
-    /// The grid of groups of so many slabs, group 0 from slab 0 on.
+    /// The grid of groups of `sheets` slabs, in which group 0 begins at slab 0.
     pub fn groups(&self, sheets: u32) -> Self {
         Self { width: self.width * f64::from(sheets), ..*self }
     }
 
-    /// The slabs that the depths between two overlap with positive length: with more than rounding errors, so that a kernel that
-    /// ends at a plane does not reach the slab behind it.
+    /// The slabs that the depths from `first` to `end` overlap by more than rounding errors, so that a kernel that ends at a plane does not
+    /// reach the slab behind it.
     pub fn touched(&self, first: f64, end: f64) -> Range<i32> {
         let first = ((first - self.origin) / self.width + ROUNDING).floor();
         let end = ((end - self.origin) / self.width - ROUNDING).ceil();
         first as i32..end as i32
     }
 
-    /// The slabs that these depths overlap; `None` if there are none.
+    /// The slabs that these depths overlap; `None` if the range is empty.
     pub fn covered(&self, depths: Range<f64>) -> Option<Range<i32>> {
         (depths.start < depths.end).then(|| self.touched(depths.start, depths.end))
     }
 
-    /// Checks that a volume which reaches `depth` from its centre, kernels included, is cut into at most [`MAX_SLABS`].
+    /// Checks that a volume that reaches `depth` from its centre, kernels included, has at most [`MAX_SLABS`] slabs.
     ///
     /// # Errors
-    /// If it is not.
+    /// If it has more.
     pub fn check(&self, depth: f64, slab_width: f64) -> Result<(), RenderError> {
         let slabs = (2.0 * depth / self.width).ceil();
-        // Not `>`: the number may be NaN.
+        // Not `>`, because the number may be NaN.
         if slabs <= f64::from(MAX_SLABS) {
             return Ok(());
         }
@@ -73,7 +73,7 @@ mod tests {
         assert_eq!(touched(-7.0), -9..-5);
         assert_eq!(SlabGrid { origin: 0.0, width: 8.0 }.touched(2.0, 6.0), 0..1);
         assert_eq!(SlabGrid { origin: -0.5, width: 1.0 }.touched(2.75, 3.25), 3..4);
-        // Not quite 3 in f64.
+        // In f64 the sum is a little off 3.
         assert_eq!(touched(3.0 * 0.8 + 0.6), 1..5);
         assert_eq!(touched(0.1 + 0.2 + 2.7), 1..5);
     }

@@ -1,4 +1,4 @@
-//! Opaque surfaces of a host, in front of which a volume shows and behind which it does not.
+//! A host's opaque surfaces, which hide the part of a volume behind them.
 
 use glam::{DMat4, DVec2, DVec3, DVec4};
 use wgpu::{TextureUsages, TextureView};
@@ -8,38 +8,38 @@ use crate::geometry::view_geometry::{Rays, ViewGeometry};
 use crate::setting_error::{Interval, SettingError};
 use crate::volume::Grid;
 
-/// How far a host's projection may be from the camera's, pixels.
+/// The maximum distance in pixels between positions projected by the host and by the camera.
 const AGREEMENT: f64 = 0.02;
 
-/// A host's depth texture, and the projection that it was drawn with.
+/// A host's depth texture, and the projection it was drawn with.
 #[derive(Clone, Debug)]
 pub struct Surfaces {
-    /// A view of the depth aspect alone of a texture with [`TextureUsages::TEXTURE_BINDING`] and one sample per pixel. Where it holds
-    /// what the far plane has (1, reversed 0) there is no surface.
+    /// A view of only the depth aspect of a texture that has [`TextureUsages::TEXTURE_BINDING`] and one sample per pixel. The far plane's
+    /// depth (1, or 0 if reversed) means that there is no surface.
     pub depth: TextureView,
-    /// The texel, from the left and from above, that is the image's first.
+    /// The texel, counted from the left and from above, of the image's first pixel.
     pub origin: [u32; 2],
-    /// From world coordinates, whose origin is the volume's centre, to wgpu's clip space: what the host multiplied projection, view
-    /// and the volume's place in the host's world to. It must show what the camera shows, over the image's pixels.
+    /// Maps world coordinates, whose origin is the volume's centre, to wgpu's clip space: the product of the host's projection, its view
+    /// and the volume's transformation. It must agree with the camera over the image's pixels.
     pub clip_from_world: DMat4,
 }
 
-/// How depth follows from a pixel's place (x right of the image's middle, y below it, pixels) and what the texture holds there.
+/// The depth of a surface as a function of a pixel's position (x right of the image's middle, y below it, in pixels) and the texture's value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceDepths {
-    /// The product with (x, y, value, 1), over that of `w`, is the depth along w, `unit`s.
+    /// The depth along w in `unit`s is the product of this row with (x, y, value, 1) divided by that of `w`.
     pub depth: DVec4,
-    /// See there.
+    /// The row for the divisor of `depth`.
     pub w: DVec4,
-    /// The value where there is no surface.
+    /// The texture's value where there is no surface.
     pub none: f64,
 }
 
 impl Surfaces {
-    /// Checks what types do not say; whether the projection is the camera's is found out when a frame is prepared.
+    /// Checks the texture and the matrix. Whether the projection is the camera's is checked when a frame is prepared.
     ///
     /// # Errors
-    /// If the texture holds no depths that can be read, one per pixel, or the matrix is not finite or has no inverse.
+    /// If the texture does not have one readable depth per pixel, or the matrix is not finite or not invertible.
     pub fn check(&self) -> Result<(), SettingError> {
         const DEPTH: &str = "surfaces.depth";
         const MATRIX: &str = "surfaces.clip_from_world";
@@ -63,7 +63,7 @@ impl Surfaces {
         Ok(())
     }
 
-    /// Checks that the texture covers the image, and that its projection is the view's.
+    /// Checks that the texture covers the image and that its projection is the view's.
     pub(crate) fn depths(&self, view: &ViewGeometry, grid: &Grid) -> Result<SurfaceDepths, RenderError> {
         let refused = |key, found: String, allowed: String| Err(SettingError::new(key, found, allowed).into());
         let texture = self.depth.texture();
@@ -81,11 +81,12 @@ impl Surfaces {
         Ok(self.by_value(view, &rays, grid.unit()))
     }
 
-    /// By how many pixels the host's projection is off, at most, of points at the volume's near end, its middle and its far end.
+    /// The maximum distance in pixels between the projections by the host and by the camera, of points at the volume's near end, middle and
+    /// far end.
     fn disagreement(&self, view: &ViewGeometry, rays: &Rays, grid: &Grid) -> f64 {
         let half = DVec2::from(view.size.map(f64::from)) / 2.0;
         let (middle, half_depth) = (rays.depth_of(DVec3::ZERO), (grid.center() * grid.aspect()).length() + 1.0);
-        // In front of an eye.
+        // The nearest point must lie in front of the eye.
         let least = if view.perspective.is_some() { 0.1 * (middle.abs() + half_depth) } else { f64::NEG_INFINITY };
         let depths = [middle - half_depth, middle, middle + half_depth].map(|depth| depth.max(least));
         let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (0.1, -0.3)];
@@ -103,14 +104,14 @@ impl Surfaces {
         let [x, y, z, w] = [0, 1, 2, 3].map(|row| world_from_clip.row(row));
         let ahead = view.basis.w / unit;
         let depth = x * ahead.x + y * ahead.y + z * ahead.z - w * view.basis.w.dot(rays.origin[2]);
-        // From pixels to normalized device coordinates.
+        // Converts pixels to normalized device coordinates.
         let [width, height] = view.size.map(f64::from);
         let scale = DVec4::new(2.0 / width, -2.0 / height, 1.0, 1.0);
         let (depth, w) = (depth * scale, w * scale);
         let at = |value: f64| {
             let ndc = DVec4::new(0.0, 0.0, value, 1.0);
             let (depth, w) = (depth.dot(ndc), w.dot(ndc));
-            // A far plane at infinity.
+            // The far plane may be at infinity.
             if w.abs() < 1e-12 * depth.abs() { f64::INFINITY } else { depth / w }
         };
         SurfaceDepths { depth, w, none: if at(0.0) > at(1.0) { 0.0 } else { 1.0 } }

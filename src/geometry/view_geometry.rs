@@ -1,5 +1,5 @@
-//! A view of a volume in the terms of SPEC §5: where voxels fall on the screen, how footprints lie there, and how sheets cut the
-//! grid. Lengths are `unit`s (SPEC §2).
+//! The geometry of a view in the terms of SPEC §5: where voxels project to, the shape of their footprints, and how sheets cut the grid.
+//! Lengths are in `unit`s (SPEC §2).
 
 use std::ops::Range;
 
@@ -13,74 +13,74 @@ use crate::settings::camera::{Camera, Eye, ViewBasis};
 use crate::settings::splatting::{Method, Splatting};
 use crate::volume::Grid;
 
-/// How far from its slice, in slices, an axis-aligned voxel reaches: into no other, whatever the rounding.
+/// The reach of an axis-aligned voxel in slices: small enough that rounding never takes it into another slice.
 const SLICE_REACH: f64 = 0.25;
 
-/// Slabs around slices.
+/// Slabs centred on slices.
 const SLICES: SlabGrid = SlabGrid { origin: -0.5, width: 1.0 };
 
-/// A view.
+/// The geometry of a view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewGeometry {
     /// The viewing coordinate system in world space.
     pub basis: ViewBasis,
-    /// Pixels: width, height.
+    /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Rows that map voxel indices (i, j, k, 1) to pixels right of the image's middle and below it, both times the fourth; to sheet
-    /// depth; and to the depth from the eye, 1 without one.
+    /// Rows whose products with voxel indices (i, j, k, 1) give the pixels right of the image's middle and below it, both multiplied by the
+    /// fourth product; the sheet depth; and the depth from the eye (1 without an eye).
     ///
-    /// Sheet depth is what [`ViewGeometry::slabs`] are planes of. Image-aligned it is orthographic the depth in the warped grid, in perspective
-    /// the depth in `unit`s, both from the volume's centre; axis-aligned it is the slice, counted along w;
-    /// where every voxel is composited by itself, 0.
+    /// [`ViewGeometry::slabs`] are slabs of sheet depth. For image-aligned sheets, sheet depth is the depth in the warped grid if
+    /// orthographic, or the depth in `unit`s in perspective, both from the volume's centre; for axis-aligned ones it is the slice, counted
+    /// along w. It is 0 if every voxel is composited by itself.
     pub screen_from_voxel: [DVec4; 4],
     /// The slabs.
     pub slabs: SlabGrid,
-    /// How far a kernel reaches at most, in sheet depth.
+    /// The maximum reach of a kernel in sheet depth.
     pub reach: f64,
-    /// Grid units of a kernel to one of sheet depth: 1, or so many that a slice holds all of it. Image-aligned in perspective every
-    /// voxel has its own.
+    /// Grid units of a kernel per unit of sheet depth: 1, or enough for a slice to hold the whole kernel. For image-aligned sheets in
+    /// perspective it differs between voxels.
     pub kernel_per_depth: f64,
-    /// [`Camera::center`], `unit`s.
+    /// [`Camera::center`] in `unit`s.
     pub center: DVec3,
-    /// Size of a pixel, `unit`s; in perspective at [`Camera::center`].
+    /// The size of a pixel in `unit`s; in perspective, at [`Camera::center`].
     pub pix: f64,
-    /// How a footprint lies on the screen; in perspective that of the central ray at [`Camera::center`].
+    /// The map from footprints to the screen; in perspective, for the central ray at [`Camera::center`].
     pub footprint: FootprintMap,
-    /// `λ` of the central ray: warped length of one `unit` along it.
+    /// `λ` of the central ray: the warped length of one `unit` along it.
     pub lambda: f64,
-    /// Of a view with an eye.
+    /// The additional geometry of a view in perspective.
     pub perspective: Option<Perspective>,
-    /// The kernel's radius, grid units.
+    /// The kernel's radius in grid units.
     pub radius: f64,
 }
 
-/// What a view with an eye has beside the others.
+/// The additional geometry of a view in perspective.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Perspective {
-    /// The eye, from the volume's centre.
+    /// The eye, relative to the volume's centre.
     pub eye: Eye,
-    /// The same in voxel indices.
+    /// The eye's position in voxel indices.
     pub eye_voxel: DVec3,
-    /// Grid aspect.
+    /// The grid aspect.
     pub aspect: DVec3,
-    /// The last voxel.
+    /// The indices of the last voxel.
     pub last: DVec3,
     /// Whether planes of constant sheet depth are parallel to the image.
     pub is_image_aligned: bool,
 }
 
-/// The rays of pixels: positions in `unit`s from the volume's centre, by a pixel's place (x right of the image's middle, y below it,
-/// pixels) and the depth along w from the eye, orthographic from the camera's centre.
+/// The rays of pixels. A position in `unit`s from the volume's centre is a function of a pixel's position (x right of the image's middle,
+/// y below it, in pixels) and the depth along w from the eye, or from the camera's centre if orthographic.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rays {
-    /// Where the depth is 0: per pixel right, per pixel down, and at the image's middle.
+    /// The position at depth 0: its change per pixel right, its change per pixel down, and its value at the image's middle.
     pub origin: [DVec3; 3],
-    /// By one `unit` of depth: the same.
+    /// The same three for the change of position per `unit` of depth.
     pub along: [DVec3; 3],
 }
 
 impl Rays {
-    /// The position on a pixel's ray at a depth.
+    /// The position at a depth on a pixel's ray.
     pub fn at(&self, place: DVec2, depth: f64) -> DVec3 {
         let of = |[right, down, middle]: [DVec3; 3]| right * place.x + down * place.y + middle;
         of(self.origin) + of(self.along) * depth
@@ -95,18 +95,17 @@ impl Rays {
 /// The bounds of some voxels in a view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bounds {
-    /// Least pixel coordinates.
+    /// The minimum pixel coordinates.
     pub low: DVec2,
-    /// Greatest.
+    /// The maximum pixel coordinates.
     pub high: DVec2,
-    /// Least and greatest sheet depth that their kernels reach.
+    /// The minimum and maximum sheet depth that their kernels reach.
     pub depths: Range<f64>,
 }
 
 impl ViewGeometry {
     /// # Errors
-    /// If pixels are too small or too large for `f32`, or there are more than
-    /// [`MAX_SLABS`].
+    /// If pixels are too small or too large for `f32`, or there are more than [`MAX_SLABS`] slabs.
     pub fn new(grid: &Grid, camera: &Camera, splatting: &Splatting, size: [u32; 2]) -> Result<Self, RenderError> {
         let [width, height] = size;
         let (basis, aspect, radius) = (camera.basis(), grid.aspect(), splatting.radius);
@@ -115,12 +114,12 @@ impl ViewGeometry {
             (None, Some(height_world)) => Camera::pixel_size(height_world, grid, height)?,
             (eye, _) => eye.map_or(1.0, |eye| eye.pix(eye.distance)),
         };
-        // In units of voxels the warped grid is the voxel index grid, so eq. 11 applies to (i, j, k) - centre directly.
+        // The warped grid in units of voxels is the voxel index grid, so eq. 11 applies to (i, j, k) - centre directly.
         let warped = grid_warp::m_view_warped(&basis, aspect);
         let m_vol = grid_warp::m_vol(&warped);
         let (w_wo, lambda) = grid_warp::w_wo(&warped);
         let row = |row: DVec3, at_center: f64| row.extend(at_center - row.dot(grid.center()));
-        // What is at the image's middle, and where pixels are one `unit`.
+        // The point at the image's middle, and the pixels per `unit` there.
         let (origin, scale) = match &eye {
             None => (camera.middle() / grid.unit(), 1.0 / pix),
             Some(eye) => (eye.position, 1.0 / eye.pixel_per_depth),
@@ -134,13 +133,13 @@ impl ViewGeometry {
             }
             (Method::ImageAligned, Some(eye)) => {
                 let slabs = SlabGrid { origin: eye.position.dot(basis.w), width: splatting.slab_width };
-                // A kernel reaches `radius·(r·w)/λ` from its voxel: at most this, for rays along w·ar².
+                // A kernel reaches `radius·(r·w)/λ` from its voxel. The maximum is for rays along w·ar².
                 let reach = radius * along_w.length();
                 slabs.check(basis.w.abs().dot(grid.center() * aspect) + reach, splatting.slab_width)?;
                 eye.check_slabs(grid, splatting.slab_width)?;
                 (slabs, row(along_w, 0.0), reach, 1.0)
             }
-            // One by one: no sheet before or behind another.
+            // Every voxel is composited by itself, so sheets have no order.
             (Method::CompositeEverySample, _) => (SLICES, DVec4::ZERO, SLICE_REACH, 2.0 * radius),
             (Method::AxisAligned, _) => {
                 let (axis, sign) = slice_axis(basis.w);
@@ -181,7 +180,7 @@ impl ViewGeometry {
         })
     }
 
-    /// The rays of its pixels.
+    /// The rays of the view's pixels.
     pub fn rays(&self) -> Rays {
         let ViewBasis { u, v, w } = self.basis;
         match &self.perspective {
@@ -193,18 +192,18 @@ impl ViewGeometry {
         }
     }
 
-    /// The sheet depth of positions in `unit`s from the volume's centre: the product of this row with (x, y, z, 1).
+    /// A row whose product with (x, y, z, 1) is the sheet depth of a position in `unit`s from the volume's centre.
     pub fn sheet_depth_row(&self, aspect: DVec3, center: DVec3) -> DVec4 {
         let row = self.screen_from_voxel[2];
         (row.truncate() / aspect).extend(row.dot(center.extend(1.0)))
     }
 
-    /// The middle of the image, pixels.
+    /// The middle of the image in pixels.
     fn middle(&self) -> DVec2 {
         DVec2::from(self.size.map(f64::from)) / 2.0
     }
 
-    /// Width of the sections that are stored (§3.2), grid units; in perspective the central ray's. Slices hold whole kernels.
+    /// The width of stored sections (§3.2) in grid units, for the central ray in perspective. Slices hold whole kernels.
     pub fn section_width(&self) -> f64 {
         match &self.perspective {
             Some(Perspective { is_image_aligned: true, .. }) => self.slabs.width * self.lambda,
@@ -212,14 +211,14 @@ impl ViewGeometry {
         }
     }
 
-    /// A voxel's pixel coordinates (x right, y down) and its sheet depth. It must lie before the eye.
+    /// A voxel's pixel coordinates (x right, y down) and its sheet depth. The voxel must lie in front of the eye.
     pub fn project(&self, voxel: UVec3) -> DVec3 {
         let p = voxel.as_dvec3().extend(1.0);
         let [x, y, depth, from_eye] = self.screen_from_voxel.map(|row| row.dot(p));
         (DVec2::new(x, y) / from_eye + self.middle()).extend(depth)
     }
 
-    /// The slabs that a voxel's kernel overlaps; none before the near plane.
+    /// The slabs that a voxel's kernel overlaps; empty before the near plane.
     pub fn touched(&self, voxel: UVec3) -> Range<i32> {
         let p = voxel.as_dvec3();
         let depth = self.screen_from_voxel[2].dot(p.extend(1.0));
@@ -233,12 +232,12 @@ impl ViewGeometry {
         if !is_image_aligned {
             return self.slabs.touched(depth - self.reach, depth + self.reach);
         }
-        // (r·w)/λ is the depth over the distance in voxels.
+        // (r·w)/λ is the depth divided by the distance in voxels.
         let reach = self.radius * from_eye / (p - eye_voxel).length();
         self.slabs.touched(depth - reach.min(from_eye - eye.near), depth + reach)
     }
 
-    /// The bounds of a box of voxels, given its middle and half its extent in voxel indices; `None` before the near plane.
+    /// The bounds of a box of voxels with the given middle and half size in voxel indices; `None` before the near plane.
     pub fn bounds(&self, middle: DVec3, half: DVec3) -> Option<Bounds> {
         let rows = self.screen_from_voxel;
         let [x, y, _, from_eye] = rows.map(|row| row.dot(middle.extend(1.0)));
@@ -253,8 +252,8 @@ impl ViewGeometry {
         })
     }
 
-    /// The sheet depths that the kernels of a box of voxels reach, given its middle and half its extent in voxel indices; where sheets
-    /// are parallel to the image those beyond the near plane, empty if there are none.
+    /// The sheet depths that the kernels of a box of voxels reach, given its middle and half size in voxel indices. Where sheets are parallel
+    /// to the image, only depths beyond the near plane count; the range is empty if the kernels reach no such depth.
     pub fn depths(&self, middle: DVec3, half: DVec3) -> Range<f64> {
         let [_, _, depth, from_eye] = self.screen_from_voxel.map(|row| row.dot(middle.extend(1.0)));
         let [_, _, spread, thickness] = self.screen_from_voxel.map(|row| row.truncate().abs().dot(half));
@@ -266,27 +265,27 @@ impl ViewGeometry {
         (depth - spread - reach).max(self.slabs.origin + eye.near)..depth + spread + reach
     }
 
-    /// Whether the kernels of all voxels reach the same sheet depths in another view: axis-aligned, in all that look along the same
-    /// axis (§3.1).
+    /// Whether the kernels of all voxels reach the same sheet depths in another view. For axis-aligned sheets this holds for all views along
+    /// the same axis (§3.1).
     pub fn has_depths_of(&self, other: &Self) -> bool {
         let eye = |view: &Self| view.perspective.filter(|perspective| perspective.is_image_aligned);
         let depths = |view: &Self| (view.screen_from_voxel[2], view.slabs, view.reach, view.radius);
         depths(self) == depths(other) && eye(self) == eye(other)
     }
 
-    /// Whether sheets are volume slices, the same from many directions.
+    /// Whether sheets are volume slices, which are the same for many directions.
     pub fn is_by_slices(&self) -> bool {
         self.slabs == SLICES
     }
 
-    /// Half the screen box, pixels, around the footprints of a radius (grid units) that kernels leave on the screen between two planes
-    /// of sheet depth (§6). In perspective a bound of all of them; infinite where they may reach over the whole screen.
+    /// Half the screen box in pixels around the footprints, of a radius in grid units, that kernels leave on the screen between two planes of
+    /// sheet depth (§6). In perspective it bounds all of them; it is infinite where they may cover the whole screen.
     pub fn half_box(&self, support: f64, planes: Range<f64>) -> DVec2 {
         let Some(Perspective { eye, aspect, .. }) = &self.perspective else {
             return self.footprint.half_box(support);
         };
         let nearest = self.nearest_from_eye(planes).max(eye.near);
-        // Half the image, and a pixel for every grid unit of a footprint that the low-pass rule widens.
+        // Half the image, plus a pixel for every grid unit of a footprint that the low-pass rule widens.
         let half = (self.middle() + support) * eye.pixel_per_depth;
         let w = self.basis.w * aspect;
         let half_box = |axis: DVec3, half: f64| {
@@ -295,23 +294,23 @@ impl ViewGeometry {
             if spare < 1e-6 {
                 return f64::INFINITY;
             }
-            // A footprint is an ellipsoid's shadow along its ray of slope s, which reaches as far as the ellipsoid along `axis - s·w`.
-            // The steepest ray is that of the farthest voxel that reaches the image.
+            // A footprint is the shadow of an ellipsoid along its ray of slope s, which reaches as far as the ellipsoid along `axis - s·w`. The
+            // steepest ray belongs to the farthest voxel that reaches the image.
             let s = (half + support * axis.length() / nearest) / spare;
             let pixels = support * (axis - s * w).length().max((axis + s * w).length()) / eye.pix(nearest);
-            // The low-pass rule adds at most what the ellipse's axes lack of `support`: an ellipsoid is a `unit` thick at least. Together they
-            // are largest where pixels are smallest, so boxes shrink on the way back.
+            // The low-pass rule adds at most what the ellipse's axes lack of `support`; an ellipsoid is at least a `unit` thick. The sum is
+            // largest where pixels are smallest, so boxes shrink towards the back.
             let thinnest = eye.pix(nearest).recip().min(1.0);
             pixels.hypot(support * (1.0 - thinnest * thinnest).sqrt())
         };
         DVec2::new(half_box(self.basis.u, half.x), half_box(self.basis.v, half.y))
     }
 
-    /// The least depth from the eye at which sections between two planes of sheet depth are projected.
+    /// The minimum depth from the eye at which sections between two planes of sheet depth are projected.
     fn nearest_from_eye(&self, planes: Range<f64>) -> f64 {
         match &self.perspective {
             Some(Perspective { is_image_aligned: true, .. }) | None => planes.start - self.slabs.origin,
-            // Those of whole slices.
+            // The minimum over whole slices.
             Some(Perspective { last, .. }) => {
                 let slice = self.screen_from_voxel[2].truncate();
                 let within = |plane: f64| (plane * slice).clamp(DVec3::ZERO, *last);
@@ -327,7 +326,7 @@ impl ViewGeometry {
     }
 }
 
-/// The axis with the largest |w| component (§3.1; ties: x, then y, then z), and whether slices are counted up or down along it.
+/// The axis with the largest |w| component (§3.1; ties: x, then y, then z), and whether slices count up or down along it.
 fn slice_axis(w: DVec3) -> (usize, f64) {
     let size = w.abs();
     let axis = if size.x >= size.y && size.x >= size.z {

@@ -1,37 +1,38 @@
-//! Which goldens may be rewritten.
+//! The choice of goldens that may be rewritten.
 
 use std::collections::BTreeSet;
 
 use super::GoldenError;
 
-/// Which goldens are rewritten if they fail.
+/// The goldens that are rewritten if their image fails.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Bless {
-    /// None.
+    /// No golden.
     #[default]
     None,
-    /// All.
+    /// Every golden.
     All,
-    /// Those of these names.
+    /// The goldens with these names.
     Names(BTreeSet<String>),
 }
 
 impl Bless {
-    /// The environment variable: `all`, or names with commas between them. Unset or empty, it blesses none.
+    /// The environment variable: `all`, or names separated by commas. Unset or empty, it blesses no golden.
     pub const VARIABLE: &str = "SHEETSPLAT_BLESS";
 
-    /// What the environment variable says.
+    /// Reads the environment variable.
     ///
     /// # Errors
-    /// If it holds what is no name of a golden.
+    /// If it holds anything that is not the name of a golden.
     pub fn from_env() -> Result<Self, GoldenError> {
         Self::parse(&std::env::var_os(Self::VARIABLE).unwrap_or_default().to_string_lossy())
     }
 
-    /// Reads what the environment variable may hold.
+    /// Parses the environment variable's text.
     ///
     /// # Errors
-    /// As [`Bless::from_env`].
+    /// As for [`Bless::from_env`].
     pub fn parse(text: &str) -> Result<Self, GoldenError> {
         let names: BTreeSet<&str> = text.split(',').map(str::trim).filter(|name| !name.is_empty()).collect();
         if names.contains(ALL) {
@@ -43,7 +44,7 @@ impl Bless {
         Ok(if names.is_empty() { Self::None } else { Self::Names(names.into_iter().map(str::to_owned).collect()) })
     }
 
-    /// Whether the golden of this name is rewritten if it fails.
+    /// Whether the golden with this name is rewritten if its image fails.
     pub fn contains(&self, name: &str) -> bool {
         match self {
             Self::None => false,
@@ -55,7 +56,7 @@ impl Bless {
 
 const ALL: &str = "all";
 
-/// Names are parts of file names on every system, and can be told from `all` and from one another in a list.
+/// Checks that a name can be part of a file name on every system, and differs from `all` in a list.
 pub(super) fn check_name(name: &str) -> Result<(), GoldenError> {
     let allowed = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
     if name.is_empty() || name.starts_with('.') || name == ALL || !name.chars().all(allowed) {

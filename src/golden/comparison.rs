@@ -1,33 +1,33 @@
-//! What two images differ in.
+//! The differences between two images.
 
 use std::fmt::{Display, Formatter};
 
 use super::Tolerance;
 use crate::image::Image;
 
-/// What two images of one size differ in, and whether a tolerance allows it. Displayed, it is a report of several lines.
+/// The differences between two images of equal size, and whether a tolerance allows them. Its display is a report of several lines.
 ///
-/// Compared are channels of 8 bits, as a PNG has them, but premultiplied with alpha: so colour counts as much as it shows, and
-/// not at all where a pixel is transparent. Of opaque images these are the file's own channels.
+/// Channels are compared as 8-bit numbers, as in a PNG, but premultiplied by alpha, so that the colour of a transparent pixel does
+/// not count. For opaque images these are the PNG's own channels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     /// Pixels per row.
     pub width: u32,
     /// Number of rows.
     pub height: u32,
-    /// The largest difference of each channel, RGBA, 0 to 255.
+    /// The largest difference in each channel, RGBA, 0 to 255.
     pub max: [u8; 4],
-    /// x and y of the pixel that differs most; the first of them if there are several.
+    /// x and y of the pixel with the largest difference; the first one of several.
     pub worst: [u32; 2],
-    /// The mean difference of a channel, 0 to 255. Alpha is counted unless both images are opaque.
+    /// The mean difference per channel, 0 to 255. Alpha counts unless both images are opaque.
     pub mean: f64,
-    /// Peak signal-to-noise ratio in dB over the same channels, infinite for equal images.
+    /// The peak signal-to-noise ratio in dB over the same channels; infinite for equal images.
     pub psnr_db: f64,
-    /// Pixels with a channel that differs by more than the tolerance.
+    /// The number of pixels in which a channel differs by more than the tolerance.
     pub outliers: u64,
-    /// What is allowed.
+    /// The tolerance.
     pub tolerance: Tolerance,
-    /// Of every pixel the largest difference of its channels.
+    /// Each pixel's largest difference in any channel.
     differences: Vec<u8>,
 }
 
@@ -35,19 +35,21 @@ pub struct Comparison {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ComparisonError {
-    /// An image without pixels, or whose pixels are not as many as its size says.
-    #[error("the {which} image: found {found} pixels for {width}×{height}, allowed: as many, and at least one")]
+    /// The image has no pixels, or their number is not width × height.
+    #[error(
+        "the {which} image: found {found} pixels for {width}×{height}, allowed: width × height pixels, at least one"
+    )]
     Pixels {
         /// `actual` or `golden`.
         which: &'static str,
-        /// Pixels per row, as it says.
+        /// The stated number of pixels per row.
         width: u32,
-        /// Number of rows, as it says.
+        /// The stated number of rows.
         height: u32,
-        /// Pixels that there are.
+        /// The number of pixels.
         found: usize,
     },
-    /// A channel that is no number.
+    /// A channel is NaN or infinite.
     #[error("the {which} image: found {found} at x {x}, y {y}, allowed: finite numbers")]
     NotFinite {
         /// `actual` or `golden`.
@@ -70,13 +72,13 @@ pub enum ComparisonError {
 }
 
 impl Comparison {
-    /// Differences that a report counts the pixels beyond.
+    /// The thresholds for which a report counts the pixels that differ by more.
     pub const SWEEP: [u8; 9] = [0, 1, 2, 3, 5, 10, 20, 50, 100];
 
     /// Compares two images.
     ///
     /// # Errors
-    /// If they differ in size, or either has no pixels, not those of its size, or other than finite numbers.
+    /// If the images differ in size, or one of them has no pixels, not width × height pixels, or a channel that is not finite.
     pub fn new(actual: &Image, golden: &Image, tolerance: Tolerance) -> Result<Self, ComparisonError> {
         let (width, height) = (actual.width, actual.height);
         let [actual_pixels, golden_pixels] = [eight_bit(actual, "actual")?, eight_bit(golden, "golden")?];
@@ -114,18 +116,17 @@ impl Comparison {
         Ok(comparison)
     }
 
-    /// Whether the tolerance allows what they differ in.
+    /// Whether the tolerance allows the differences.
     pub fn passes(&self) -> bool {
         self.share(self.outliers) <= self.tolerance.outliers()
     }
 
-    /// Pixels with a channel that differs by more than `threshold`.
+    /// The number of pixels in which a channel differs by more than `threshold`.
     pub fn beyond(&self, threshold: u8) -> u64 {
         self.differences.iter().filter(|&&difference| difference > threshold).count() as u64
     }
 
-    /// An opaque image of where they differ: black where they do not, grey within the tolerance (20 times as bright as
-    /// the difference), red to yellow beyond it.
+    /// An opaque image of the differences: black for none, grey within the tolerance (20 times the difference), red to yellow beyond it.
     pub fn difference_image(&self) -> Image {
         let pixel = |&difference: &u8| {
             let shade = f32::from(difference.saturating_mul(20)) / 255.0;
@@ -166,10 +167,10 @@ impl Display for Comparison {
     }
 }
 
-/// The pixels as a PNG has them: 8 bits, straight alpha.
+/// The pixels as in a PNG: 8 bits, straight alpha.
 ///
 /// # Errors
-/// If there are none, too few or too many, or one is not finite.
+/// If there are no pixels, not width × height pixels, or one is not finite.
 pub(super) fn eight_bit(image: &Image, which: &'static str) -> Result<Vec<[u8; 4]>, ComparisonError> {
     let &Image { width, height, ref pixels } = image;
     if pixels.is_empty() || pixels.len() as u64 != u64::from(width) * u64::from(height) {

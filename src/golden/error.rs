@@ -1,4 +1,4 @@
-//! Why an image does not pass.
+//! Errors of comparisons with goldens.
 
 use std::fmt::{Display, Formatter};
 use std::path::PathBuf;
@@ -6,23 +6,23 @@ use std::path::PathBuf;
 use super::{Bless, Comparison, ComparisonError, LaxTolerance, MadeOn};
 use crate::image::ImageError;
 
-/// Why an image was not compared with its golden, or does not look like it.
+/// Why an image was not compared with its golden, or differs from it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GoldenError {
-    /// The golden's name is none.
+    /// The golden's name is invalid.
     #[error("golden: found name {found:?}, allowed: letters, digits, \"-\", \"_\" and, not first, \".\"; not \"all\"")]
     Name {
         /// The name.
         found: String,
     },
-    /// The environment variable names no goldens.
+    /// The environment variable is invalid.
     #[error("{variable}: {0}", variable = Bless::VARIABLE)]
     Bless(Box<GoldenError>),
-    /// The tolerance is too wide.
+    /// The tolerance exceeds the widest one.
     #[error(transparent)]
     Lax(#[from] LaxTolerance),
-    /// The test's source file is not where it was compiled.
+    /// The test's source file is not where it was when compiled.
     #[error("{file}: not found in {} nor above it; Golden::new takes the folder of the goldens", manifest_dir.display())]
     Source {
         /// The file.
@@ -30,7 +30,7 @@ pub enum GoldenError {
         /// The package's folder.
         manifest_dir: PathBuf,
     },
-    /// The image itself is none.
+    /// The image itself is invalid.
     #[error("golden \"{name}\": {source}")]
     Subject {
         /// The golden's name.
@@ -38,33 +38,34 @@ pub enum GoldenError {
         /// What is wrong with it.
         source: ComparisonError,
     },
-    /// A golden could not be written, or what an earlier failure left could not be removed.
+    /// A golden could not be written, or the files of an earlier failure could not be removed.
     #[error(transparent)]
     File(#[from] ImageError),
-    /// The image does not look like its golden.
+    /// The image differs from its golden.
     #[error(transparent)]
     Failure(#[from] Box<Failure>),
 }
 
-/// An image that does not pass. Displayed, it is a report of several lines.
+/// An image that failed. Its display is a report of several lines.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub struct Failure {
     /// The golden's name.
     pub name: String,
     /// The golden's file.
     pub golden: PathBuf,
-    /// What the golden was made on, if it says so.
+    /// The adapter and driver that made the golden, if its file names them.
     pub golden_made_on: Option<MadeOn>,
-    /// What the image was made on, if known.
+    /// The adapter and driver that made the image, if known.
     pub actual_made_on: Option<MadeOn>,
-    /// Why it does not pass.
+    /// Why the image failed.
     pub reason: Reason,
-    /// The folder with `NAME-actual.png`, `NAME-report.txt` and, of images of one size, `NAME-difference.png`; or why they
-    /// could not be left there.
+    /// The folder with `NAME-actual.png`, `NAME-report.txt` and, for images of equal size, `NAME-difference.png`; or the error that
+    /// prevented writing them.
     pub left_in: Result<PathBuf, ImageError>,
 }
 
-/// Why an image does not pass.
+/// Why an image failed.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum Reason {
@@ -72,9 +73,9 @@ pub enum Reason {
     Missing,
     /// The golden cannot be read.
     Unreadable(ImageError),
-    /// The golden is no image of the same size.
+    /// The golden and the image cannot be compared.
     Incomparable(ComparisonError),
-    /// They differ by more than is allowed.
+    /// They differ by more than the tolerance.
     Differs(Comparison),
 }
 
@@ -87,14 +88,14 @@ impl Display for Failure {
             None => "an unknown adapter".to_owned(),
         };
         match &self.reason {
-            Reason::Missing => writeln!(f, "golden \"{name}\": {golden}: there is none")?,
+            Reason::Missing => writeln!(f, "golden \"{name}\": {golden} does not exist")?,
             Reason::Unreadable(error) => writeln!(f, "golden \"{name}\": {error}")?,
             Reason::Incomparable(error) => writeln!(f, "golden \"{name}\": {golden}: {error}")?,
             Reason::Differs(comparison) => {
                 writeln!(f, "golden \"{name}\": {golden}: the actual image differs")?;
                 writeln!(f, "{comparison}")?;
                 if !MadeOn::same(self.golden_made_on.as_ref(), self.actual_made_on.as_ref()) {
-                    writeln!(f, "compared with the widest tolerance, as the adapters are not the same")?;
+                    writeln!(f, "compared with the widest tolerance, because the adapters differ")?;
                 }
                 writeln!(f, "golden made on: {}", made_on(&self.golden_made_on))?;
             }

@@ -1,4 +1,4 @@
-//! Goldens as files: PNGs as small as can be, with the adapter and driver as text.
+//! Golden files: PNGs compressed as far as possible, with the adapter and driver in text chunks.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -10,7 +10,7 @@ use crate::image::{ImageError, output};
 const ADAPTER: &str = "Adapter";
 const DRIVER: &str = "Driver";
 
-/// Writes pixels of 8 bits with straight alpha, aside and then renamed, into a folder that is made if there is none.
+/// Writes 8-bit pixels with straight alpha to a temporary file that is then renamed. Creates the folder if it does not exist.
 pub(super) fn write(
     path: &Path,
     [width, height]: [u32; 2],
@@ -34,7 +34,9 @@ fn encode([width, height]: [u32; 2], pixels: &[[u8; 4]], made_on: Option<&MadeOn
     encoder.set_filter(png::Filter::Adaptive);
     if let Some(MadeOn { adapter, driver }) = made_on {
         encoder.add_itxt_chunk(ADAPTER.to_owned(), adapter.clone())?;
-        encoder.add_itxt_chunk(DRIVER.to_owned(), driver.clone())?;
+        if !driver.is_empty() {
+            encoder.add_itxt_chunk(DRIVER.to_owned(), driver.clone())?;
+        }
     }
     let mut writer = encoder.write_header()?;
     let channels: Vec<u8> = if opaque {
@@ -47,12 +49,12 @@ fn encode([width, height]: [u32; 2], pixels: &[[u8; 4]], made_on: Option<&MadeOn
     Ok(bytes)
 }
 
-/// What a file says it was made on; nothing unless it is a PNG with such a text.
+/// The adapter and driver in a file's text chunks; `None` if it is not a PNG or has no such chunks.
 pub(super) fn made_on(path: &Path) -> Option<MadeOn> {
     let reader = png::Decoder::new(BufReader::new(File::open(path).ok()?)).read_info().ok()?;
     let text = |keyword: &str| {
         let chunks = &reader.info().utf8_text;
         chunks.iter().find(|chunk| chunk.keyword == keyword && !chunk.compressed)?.get_text().ok()
     };
-    Some(MadeOn { adapter: text(ADAPTER)?, driver: text(DRIVER)? })
+    Some(MadeOn { adapter: text(ADAPTER)?, driver: text(DRIVER).unwrap_or_default() })
 }

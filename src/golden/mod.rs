@@ -1,4 +1,4 @@
-//! Golden images for tests: pictures that were looked at once, and that later ones must look like.
+//! Golden images for tests: pictures that somebody has checked once, with which later pictures are compared.
 //!
 //! [`assert_golden!`](crate::assert_golden) compares an image with `goldens/NAME.png` in the folder of the test's source file:
 //!
@@ -13,13 +13,13 @@
 //! # let scene = Scene::from_volume(VolumeSource::Builtin("head:48".to_owned()), &[])?;
 //! let rendering = headless.render(&scene)?;
 //! assert_golden!("head", rendering);
-//! // With a tolerance of its own: 4 of 255 per channel, and one pixel in 1000 that may differ by more.
+//! // With its own tolerance: 4 of 255 per channel, and one pixel in 1000 may differ by more.
 //! assert_golden!("head", rendering, Tolerance::new(4, 0.001)?);
 //! # Ok(())
 //! # }
 //! ```
 //!
-//! [`golden!`](crate::golden!) is the same as a value, for what else can be set, and [`Golden::check`] gives a result instead of
+//! [`golden!`](crate::golden!) gives the golden as a value on which more can be set, and [`Golden::check`] returns a result instead of
 //! panicking. [`Comparison`] alone compares any two images:
 //!
 //! ```
@@ -37,21 +37,39 @@
 //! # }
 //! ```
 //!
+//! # The native backend
+//!
+//! [`cpu`](crate::headless::Backend::Cpu) gives the same bytes on every machine. So a picture and a golden that were both made by it must be equal to the last
+//! bit, unless the test allows a tolerance:
+//!
+//! ```no_run
+//! use sheetsplat::assert_golden;
+//! use sheetsplat::headless::{Backend, Headless, HeadlessOptions};
+//! # use sheetsplat::scene::{Scene, VolumeSource};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let scene = Scene::from_volume(VolumeSource::Builtin("head:48".to_owned()), &[])?;
+//! let headless = Headless::new(&HeadlessOptions::default().with_backend(Backend::Cpu))?;
+//! assert_golden!("head", headless.render(&scene)?);
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! # Blessing
 //!
-//! `SHEETSPLAT_BLESS=all cargo test`, or the names of goldens with commas between them, makes an image the golden where there is
-//! none or the image fails. Goldens that pass are left as they are, to the byte. Look at what changed before you commit it.
+//! `SHEETSPLAT_BLESS=all cargo test`, or the names of goldens separated by commas, makes an image the golden if it fails or has no
+//! golden yet. Goldens that pass are not touched. Look at what changed before you commit it.
 //!
 //! # Failures
 //!
-//! What fails is left under `target/goldens`, in a folder named like the test's source file: the actual image, an image of where it
-//! differs, and a report. A later success removes them.
+//! A failed image is left under `target/goldens`, in a folder named like the test's source file, with an image of the differences and
+//! a report. A later success removes these files.
 //!
 //! # Adapters
 //!
-//! A [`Rendering`](crate::headless::Rendering) says what it was made on, and so does its golden, in texts `Adapter` and `Driver` of
-//! the PNG; reports name both. On another adapter than the golden's an image is compared with [`Tolerance::WIDEST`], whatever the
-//! test says: GPUs round differently. So is an image that does not say what it was made on with a golden that does.
+//! A [`Rendering`](crate::headless::Rendering) knows the adapter and driver that made it. So does its golden, in the PNG's texts
+//! `Adapter` and `Driver`; reports name both. If the adapters differ, [`Tolerance::WIDEST`] replaces the test's tolerance, because GPUs
+//! round differently. The same holds for an image of unknown origin and a golden that names its adapter.
 
 mod bless;
 mod comparison;
@@ -74,28 +92,37 @@ pub use tolerance::{LaxTolerance, Tolerance};
 
 use crate::image::{Image, ImageError, PngDepth, output};
 
-/// Asserts that an image looks like its golden, `goldens/NAME.png` in the folder of the source file.
+/// Asserts that an image matches its golden, `goldens/NAME.png` in the folder of the source file.
 ///
 /// `assert_golden!(name, image)`, or `assert_golden!(name, image, tolerance)`, where `image` is a [`Subject`](crate::golden::Subject)
 /// or a reference to one. See [`golden`](mod@crate::golden).
 ///
 /// # Panics
-/// With a report, if it does not look like it, or for any other [`GoldenError`](crate::golden::GoldenError).
+/// If the image differs, with a report, or on any other [`GoldenError`](crate::golden::GoldenError).
 #[macro_export]
 macro_rules! assert_golden {
     ($name:expr, $image:expr $(,)?) => {
-        $crate::assert_golden!($name, $image, $crate::golden::Tolerance::default())
+        $crate::assert_golden!(@ $name, $image, None)
     };
     ($name:expr, $image:expr, $tolerance:expr $(,)?) => {
-        match $crate::golden!($name).and_then(|golden| golden.tolerance($tolerance).check(&$image)) {
+        $crate::assert_golden!(@ $name, $image, Some($tolerance))
+    };
+    (@ $name:expr, $image:expr, $tolerance:expr) => {{
+        // Outside of closures, so that the expressions may use `?`.
+        let (image, tolerance): (_, Option<$crate::golden::Tolerance>) = (&$image, $tolerance);
+        let compare = |golden: $crate::golden::Golden| match tolerance {
+            Some(tolerance) => golden.tolerance(tolerance).check(image),
+            None => golden.check(image),
+        };
+        match $crate::golden!($name).and_then(compare) {
             Ok($crate::golden::Outcome::Passed(_)) => {}
             Ok($crate::golden::Outcome::Blessed(path)) => println!("blessed {}", path.display()),
             Err(error) => panic!("{error}"),
         }
-    };
+    }};
 }
 
-/// The golden that [`assert_golden!`](crate::assert_golden) would compare with here: a
+/// The golden with which [`assert_golden!`](crate::assert_golden) would compare here: a
 /// `Result<`[`Golden`](crate::golden::Golden)`, `[`GoldenError`](crate::golden::GoldenError)`>`.
 #[macro_export]
 macro_rules! golden {
@@ -111,63 +138,65 @@ macro_rules! golden {
     };
 }
 
-/// A golden, and how images are compared with it.
+/// A golden, and the settings for comparisons with it.
 #[derive(Clone, Debug)]
 pub struct Golden {
     name: String,
     folder: PathBuf,
     failures: PathBuf,
-    tolerance: Tolerance,
+    /// If the test says one.
+    tolerance: Option<Tolerance>,
     bless: Option<Bless>,
 }
 
-/// What became of an image that was checked.
+/// The result of a successful check.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// It looks like its golden.
+    /// The image matches its golden.
     Passed(Comparison),
-    /// It is now the golden, this file.
+    /// The image has become the golden, this file.
     Blessed(PathBuf),
 }
 
 impl Golden {
-    /// The golden `folder/NAME.png`; what fails is left in the folder `failures`.
+    /// The golden `folder/NAME.png`. The files of failures go into the folder `failures`.
     ///
     /// # Errors
-    /// If the name has other characters than letters, digits, `-`, `_` and `.`, begins with `.`, is empty, or is `all`.
+    /// If the name has characters other than letters, digits, `-`, `_` and `.`, begins with `.`, is empty, or is `all`.
     pub fn new(name: &str, folder: impl Into<PathBuf>, failures: impl Into<PathBuf>) -> Result<Self, GoldenError> {
         bless::check_name(name)?;
         Ok(Self {
             name: name.to_owned(),
             folder: folder.into(),
             failures: failures.into(),
-            tolerance: Tolerance::default(),
+            tolerance: None,
             bless: None,
         })
     }
 
-    /// What [`golden!`](crate::golden!) calls.
+    /// The function behind [`golden!`](crate::golden!).
     ///
     /// # Errors
-    /// As [`Golden::new`], and if the source file is gone.
+    /// As for [`Golden::new`], and if the source file does not exist.
     #[doc(hidden)]
     pub fn beside(name: &str, site: Site<'_>) -> Result<Self, GoldenError> {
         Self::new(name, site.goldens()?, site.failures())
     }
 
-    /// Allows another tolerance than the default.
+    /// Replaces the default tolerance, which is [`Tolerance::EXACT`] if the native backend made both image and golden, and else
+    /// [`Tolerance::default`].
     #[must_use]
     pub fn tolerance(self, tolerance: Tolerance) -> Self {
-        Self { tolerance, ..self }
+        Self { tolerance: Some(tolerance), ..self }
     }
 
-    /// Leaves what fails in another folder: for several images that have one golden.
+    /// Puts the files of failures into another folder, for several images that share a golden.
     #[must_use]
     pub fn failures(self, folder: impl Into<PathBuf>) -> Self {
         Self { failures: folder.into(), ..self }
     }
 
-    /// Blesses by this, not by the environment variable.
+    /// Sets which goldens are blessed, in place of the environment variable.
     #[must_use]
     pub fn bless(self, bless: Bless) -> Self {
         Self { bless: Some(bless), ..self }
@@ -178,10 +207,10 @@ impl Golden {
         self.folder.join(format!("{}.png", self.name))
     }
 
-    /// Compares an image with the golden, and makes it the golden if it fails and is blessed.
+    /// Compares an image with the golden. If it fails and the golden is blessed, the image becomes the golden.
     ///
     /// # Errors
-    /// If it fails, with what is left of it, or is no image at all, or a file cannot be written.
+    /// If the image fails and the golden is not blessed, if the image is invalid, or if a file cannot be written.
     pub fn check(&self, subject: &impl Subject) -> Result<Outcome, GoldenError> {
         let bless = self.bless.clone().map_or_else(Bless::from_env, Ok)?;
         let (image, made_on) = (subject.image(), subject.made_on());
@@ -199,7 +228,7 @@ impl Golden {
                 Ok(Outcome::Blessed(self.path()))
             }
             Err(mut failure) => {
-                // What cannot be left must not hide why the image fails.
+                // An error in writing these files must not hide why the image fails.
                 let left =
                     self.clear().and_then(|()| write(self.left("actual.png"))).and_then(|()| self.leave(&failure));
                 failure.left_in = left.map(|()| self.failures.clone());
@@ -208,7 +237,7 @@ impl Golden {
         }
     }
 
-    /// The comparison if it passes, else a failure that has left nothing yet.
+    /// The comparison if it passes, or else a failure that has not written any files yet.
     fn compare(&self, actual: &Image, made_on: Option<&MadeOn>) -> Result<Comparison, Box<Failure>> {
         let failure = |reason, golden_made_on| {
             Box::new(Failure {
@@ -225,7 +254,9 @@ impl Golden {
             error => failure(Reason::Unreadable(error), None),
         })?;
         let same = MadeOn::same(golden.made_on.as_ref(), made_on);
-        let tolerance = if same { self.tolerance } else { Tolerance::WIDEST };
+        let is_exact = made_on.is_some_and(MadeOn::is_exact);
+        let default = if is_exact { Tolerance::EXACT } else { Tolerance::default() };
+        let tolerance = if same { self.tolerance.unwrap_or(default) } else { Tolerance::WIDEST };
         match Comparison::new(actual, &golden.image, tolerance) {
             Ok(comparison) if comparison.passes() => Ok(comparison),
             Ok(comparison) => Err(failure(Reason::Differs(comparison), golden.made_on)),
@@ -233,12 +264,12 @@ impl Golden {
         }
     }
 
-    /// A file that a failure leaves.
+    /// The path of one of a failure's files.
     fn left(&self, what: &str) -> PathBuf {
         self.failures.join(format!("{}-{what}", self.name))
     }
 
-    /// Leaves a report, and where the image differs.
+    /// Writes the report and the image of the differences.
     fn leave(&self, failure: &Failure) -> Result<(), ImageError> {
         if let Reason::Differs(comparison) = &failure.reason {
             comparison.difference_image().save(&self.left("difference.png"), PngDepth::Eight)?;
@@ -247,7 +278,7 @@ impl Golden {
         output::write(&path, format!("{failure}\n").as_bytes()).map_err(|source| ImageError::Io { path, source })
     }
 
-    /// Removes what an earlier failure left.
+    /// Removes the files of an earlier failure.
     fn clear(&self) -> Result<(), ImageError> {
         for path in ["actual.png", "difference.png", "report.txt"].map(|what| self.left(what)) {
             match std::fs::remove_file(&path) {

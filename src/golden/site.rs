@@ -1,10 +1,10 @@
-//! Where a test's goldens are, and where it leaves what fails.
+//! The folders of a test's goldens and of its failures.
 
 use std::path::{Component, Path, PathBuf};
 
 use super::GoldenError;
 
-/// A place in the source of a test, as its compiler knew it.
+/// A place in a test's source, as known to the compiler.
 #[derive(Clone, Copy, Debug)]
 pub struct Site<'a> {
     /// `CARGO_MANIFEST_DIR`: the folder of the package.
@@ -18,7 +18,7 @@ pub struct Site<'a> {
 impl Site<'_> {
     /// The folder `goldens` beside the source file.
     pub(super) fn goldens(&self) -> Result<PathBuf, GoldenError> {
-        // Absolute paths stay what they are when joined.
+        // Joining an absolute path replaces the folder.
         let ancestors = Path::new(self.manifest_dir).ancestors();
         let source = ancestors.map(|folder| folder.join(self.file)).find(|source| source.is_file());
         source
@@ -26,7 +26,7 @@ impl Site<'_> {
             .ok_or_else(|| GoldenError::Source { file: self.file.to_owned(), manifest_dir: self.manifest_dir.into() })
     }
 
-    /// A folder of the source file's own in `target/goldens`.
+    /// The source file's own folder in `target/goldens`.
     pub(super) fn failures(&self) -> PathBuf {
         let file = Path::new(self.file).with_extension("");
         let inside = file.components().filter(|component| matches!(component, Component::Normal(_)));
@@ -35,7 +35,7 @@ impl Site<'_> {
 
     fn target(&self) -> PathBuf {
         let beside_tmp = self.target_tmpdir.and_then(|tmpdir| Path::new(tmpdir).parent()).map(Path::to_owned);
-        // Unit tests are below the target folder, in which Cargo leaves this file.
+        // Unit tests run below the target folder, in which Cargo puts this file.
         let above_program = || {
             let program = std::env::current_exe().ok()?;
             program.ancestors().find(|folder| folder.join("CACHEDIR.TAG").is_file()).map(Path::to_owned)

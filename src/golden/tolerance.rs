@@ -1,24 +1,24 @@
 //! How much an image may differ from its golden.
 
-/// Steps of 255 that a channel may differ by, and the share of the pixels that may differ by more: the outliers.
+/// The steps of 255 by which a channel may differ, and the fraction of pixels that may differ by more: the outliers.
 ///
-/// The default allows for the rounding of processors and driver versions, 3 steps, and no outlier. Where an early
-/// decision can flip, at a silhouette or a voxel that is just hidden, 0.001 is room for a few.
+/// The default, 3 steps and no outlier, allows for the rounding of processors and driver versions. Where an early decision can flip, at
+/// a silhouette or a voxel that is barely hidden, a fraction of 0.001 allows for a few outliers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
     per_channel: u8,
     outliers: f64,
 }
 
-/// A tolerance that would let pass what can be seen.
+/// A tolerance that would allow visible differences.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("{what}: found {found}, allowed: 0 to {allowed}")]
 pub struct LaxTolerance {
-    /// Which of the two numbers.
+    /// The quantity that is too large.
     pub what: &'static str,
-    /// What it is.
+    /// Its value.
     pub found: f64,
-    /// What it may be at most.
+    /// Its maximum.
     pub allowed: f64,
 }
 
@@ -29,14 +29,17 @@ impl Default for Tolerance {
 }
 
 impl Tolerance {
-    /// The widest there is: 16 of 255, and one pixel in 100. On another adapter than the golden's this one holds: culling with
-    /// the default `opacity_threshold` may itself change a channel by 13.
+    /// None: every pixel is equal.
+    pub const EXACT: Self = Self { per_channel: 0, outliers: 0.0 };
+
+    /// The widest tolerance: 16 of 255, and one pixel in 100. It applies if the golden was made on another adapter: culling with the
+    /// default `opacity_threshold` alone may change a channel by 13.
     pub const WIDEST: Self = Self { per_channel: 16, outliers: 0.01 };
 
-    /// A tolerance of `per_channel` steps of 255 (0 to 16) with a share of `outliers` (0 to 0.01) among the pixels.
+    /// A tolerance of `per_channel` steps of 255 (0 to 16) with a fraction of outliers (0 to 0.01) among the pixels.
     ///
     /// # Errors
-    /// If either is beyond that of [`Tolerance::WIDEST`]: a test that passes then would say little.
+    /// If either exceeds [`Tolerance::WIDEST`]: a test that passes then would say little.
     pub fn new(per_channel: u8, outliers: f64) -> Result<Self, LaxTolerance> {
         let widest = Self::WIDEST;
         if per_channel > widest.per_channel {
@@ -49,12 +52,12 @@ impl Tolerance {
         Ok(Self { per_channel, outliers })
     }
 
-    /// Steps of 255 that a channel may differ by.
+    /// The steps of 255 by which a channel may differ.
     pub fn per_channel(self) -> u8 {
         self.per_channel
     }
 
-    /// The share of the pixels that may have a channel that differs by more.
+    /// The fraction of pixels that may differ by more.
     pub fn outliers(self) -> f64 {
         self.outliers
     }

@@ -1,4 +1,4 @@
-//! Bind group layouts and bind groups in few words.
+//! Shorthand for bind group layouts, bind groups and buffers.
 
 use wgpu::{
     BindGroup, BindGroupLayout, BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
@@ -10,7 +10,7 @@ use super::layout::{FOLD, Indirect};
 use super::shaders::Shader;
 use crate::error::RenderError;
 
-/// The stages that see a binding, and its type.
+/// The shader stages that see a binding, and its type.
 pub type Slot = (ShaderStages, BindingType);
 
 /// A uniform buffer that holds one `T`, at a dynamic offset if `dynamic`.
@@ -32,7 +32,7 @@ pub fn at_offset<T>(buffer: &Buffer) -> BindingResource<'_> {
     BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size })
 }
 
-/// A float texture that is read texel by texel, so that its format need not be filterable.
+/// A float texture that is read texel by texel, so its format need not be filterable.
 pub fn texture(stages: ShaderStages, view_dimension: TextureViewDimension) -> Slot {
     let sample_type = TextureSampleType::Float { filterable: false };
     (stages, BindingType::Texture { sample_type, view_dimension, multisampled: false })
@@ -44,30 +44,30 @@ pub fn depth_texture(stages: ShaderStages) -> Slot {
     (stages, BindingType::Texture { sample_type: TextureSampleType::Depth, view_dimension, multisampled: false })
 }
 
-/// A texture of whole numbers.
+/// A texture of integers.
 pub fn texture_of_integers(stages: ShaderStages, view_dimension: TextureViewDimension) -> Slot {
     let sample_type = TextureSampleType::Uint;
     (stages, BindingType::Texture { sample_type, view_dimension, multisampled: false })
 }
 
-/// A buffer to be.
+/// The description of a buffer that is not allocated yet.
 pub type BufferSpec = BufferDescriptor<'static>;
 
-/// A buffer of so many bytes.
+/// A buffer of `size` bytes.
 pub fn buffer_spec(label: &'static str, size: u64, usage: BufferUsages) -> BufferSpec {
     BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false }
 }
 
-/// A buffer for contents of so many bytes.
+/// A buffer for a content of `bytes` bytes.
 pub fn content_spec(label: &'static str, bytes: u64, usage: BufferUsages) -> BufferSpec {
-    // Of one element at least: bindings may not be empty.
+    // It has at least one element, because bindings may not be empty.
     buffer_spec(label, bytes.max(8), usage | BufferUsages::COPY_DST)
 }
 
-/// Bytes of some buffers.
+/// The total size of some buffers in bytes.
 ///
 /// # Errors
-/// If the device's buffers, or its bindings to them, may not be as large as one of them.
+/// If one of them exceeds the device's maximum size of buffers or bindings.
 pub fn sizes(limits: &Limits, buffers: &[BufferSpec]) -> Result<u64, RenderError> {
     buffers.iter().map(|buffer| check(limits, buffer)).sum()
 }
@@ -85,20 +85,20 @@ fn check(limits: &Limits, &BufferSpec { label, size, usage, .. }: &BufferSpec) -
     Ok(size)
 }
 
-/// A buffer of at least the spec size: the previous one if it is large enough, and at most 4 times too large.
+/// A buffer of at least the spec's size: the previous one if it is large enough but at most 4 times too large.
 ///
 /// # Errors
-/// If the device's buffers, or its bindings to them, may not be that large.
+/// If it exceeds the device's maximum size of buffers or bindings.
 pub fn grown(device: &Device, previous: Option<Buffer>, spec: &BufferSpec) -> Result<Buffer, RenderError> {
     let size = check(&device.limits(), spec)?;
     let fits = |buffer: &Buffer| (size..=4 * size).contains(&buffer.size()) && buffer.usage().contains(spec.usage);
     Ok(previous.filter(fits).unwrap_or_else(|| device.create_buffer(spec)))
 }
 
-/// A buffer with these contents, the old one if it has the right size.
+/// A buffer with this content; the old one is reused if it has the right size.
 ///
 /// # Errors
-/// If the device's buffers may not be that large.
+/// If it exceeds the device's maximum size of buffers.
 pub fn filled(
     device: &Device,
     queue: &Queue,
@@ -110,10 +110,10 @@ pub fn filled(
     written(device, queue, old, &content_spec(label, bytes.len() as u64, usage), bytes)
 }
 
-/// The same with the buffer described.
+/// Like [`filled`], with the buffer described by a spec.
 ///
 /// # Errors
-/// See [`filled`].
+/// As for [`filled`].
 pub fn written(
     device: &Device,
     queue: &Queue,
@@ -126,7 +126,7 @@ pub fn written(
     Ok(buffer)
 }
 
-/// A new buffer of `size` bytes that starts with these, of which there is one at least. Where the device gives none, its error scope says
+/// A new buffer of `size` bytes that starts with `bytes`, which must not be empty. If the device cannot allocate it, an error scope says
 /// why, and nothing is written.
 pub fn uploaded(device: &Device, label: &str, bytes: &[u8], size: u64, usage: BufferUsages) -> Buffer {
     let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: true };
@@ -139,18 +139,18 @@ pub fn uploaded(device: &Device, label: &str, bytes: &[u8], size: u64, usage: Bu
     buffer
 }
 
-/// The layout of a shader's bind group 0. Bindings go by the names of the shader's variables, so that no two can be mistaken for each other.
+/// The layout of a shader's bind group 0. Bindings are matched by the names of the shader's variables, so that two cannot be confused.
 #[derive(Debug)]
 pub struct Bindings {
     label: String,
     numbers: Vec<(&'static str, u32)>,
     layout: BindGroupLayout,
-    /// The layout of pipelines that have this group alone.
+    /// The layout of pipelines with only this group.
     pub pipeline_layout: PipelineLayout,
 }
 
 impl Bindings {
-    /// A layout with these slots. A name that the shader does not declare gives a layout that the device refuses.
+    /// A layout with these slots. If the shader does not declare a name, the device refuses the layout.
     pub fn new(device: &Device, shader: Shader, slots: &[(&'static str, Slot)]) -> Self {
         let label = format!("sheetsplat.{}", shader.stage);
         let numbers: Vec<_> = slots.iter().map(|&(name, _)| (name, shader.binding(name).unwrap_or(u32::MAX))).collect();
@@ -187,7 +187,7 @@ impl Bindings {
     }
 }
 
-/// A compute shader with its one bind group's layout.
+/// A compute shader and the layout of its bind group.
 #[derive(Debug)]
 pub struct ComputeStage {
     bindings: Bindings,
@@ -223,14 +223,14 @@ impl ComputeStage {
         self.bindings.bind(device, resources)
     }
 
-    /// Dispatches a fixed number of workgroups, folded as [`Indirect`] says.
+    /// Dispatches a fixed number of workgroups, folded as in [`Indirect`].
     pub fn dispatch(&self, pass: &mut ComputePass<'_>, group: &BindGroup, offsets: &[u32], workgroups: u32) {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, group, offsets);
         pass.dispatch_workgroups(workgroups.min(FOLD), workgroups.div_ceil(FOLD), 1);
     }
 
-    /// Dispatches as many workgroups as an [`Indirect`] says.
+    /// Dispatches the number of workgroups in an [`Indirect`].
     pub fn dispatch_indirect(&self, pass: &mut ComputePass<'_>, group: &BindGroup, offsets: &[u32], args: &Buffer) {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, group, offsets);

@@ -1,4 +1,4 @@
-//! The bricks on the GPU (Table 1's iso-voxel arrays), split where what is kept of each would pass the device's limit.
+//! The bricks on the GPU (Table 1's iso-voxel arrays), split into lists where their records would exceed the device's limits.
 
 use std::ops::Range;
 
@@ -12,27 +12,27 @@ use crate::volume::Grid;
 /// The bricks of all voxels that take part, in lists whose records each fit one storage binding.
 #[derive(Debug)]
 pub struct BrickLists {
-    /// The lists; their order does not matter, sheets add up.
+    /// The lists. Their order does not matter, because sheets add up.
     pub lists: Vec<BrickBuffer>,
     /// The bricks of all lists.
     bricks: BrickList,
     state: State,
 }
 
-/// How the buffers differ from the bricks.
+/// Whether the buffers are up to date.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Current,
-    /// Bricks have changed or come.
+    /// Bricks have changed or were added.
     Changed,
-    /// More bricks have come than there is room for.
+    /// More bricks were added than the buffers have room for.
     Full,
 }
 
 /// One list's bricks on the GPU.
 #[derive(Debug)]
 pub struct BrickBuffer {
-    /// Which of [`BrickLists::bricks`] they are.
+    /// The indices of the bricks in [`BrickLists::bricks`].
     range: Range<usize>,
     /// `[Brick]`, with room for more.
     pub buffer: Buffer,
@@ -50,14 +50,12 @@ impl BrickLists {
         Self { lists, bricks, state: State::Current }
     }
 
-    /// What [`Self::upload`] would make of these bricks.
+    /// The lists that [`Self::upload`] would make of these bricks.
     pub fn settled(&self, limits: &wgpu::Limits) -> SettledBricks {
-        let bricks = self.bricks.compacted();
-        let (ranges, capacity) = split(limits, bricks.bricks().len());
-        SettledBricks { ranges: ranges.collect(), capacity, bricks }
+        SettledBricks::of(limits, self.bricks.compacted())
     }
 
-    /// Bricks of every list.
+    /// The bricks of every list.
     pub fn bricks(&self) -> impl Iterator<Item = &[Brick]> {
         self.lists.iter().map(|list| &self.bricks.bricks()[list.range.clone()])
     }
@@ -72,7 +70,7 @@ impl BrickLists {
         self.bricks.contains(voxel)
     }
 
-    /// Lets voxels enter and leave; nothing reaches the GPU before [`Self::flush`].
+    /// Adds and removes voxels; nothing is uploaded before [`Self::flush`].
     pub fn change(&mut self, entering: &[u32], leaving: &[u32]) {
         self.bricks.change(entering, leaving);
         let count = self.bricks.bricks().len();
@@ -85,17 +83,25 @@ impl BrickLists {
         };
     }
 
-    /// Whether there is room for the bricks that came; else all will be uploaded again.
+    /// Takes the bricks of other voxels instead; the next [`Self::flush`] uploads them all.
+    pub fn replace(&mut self, grid: &Grid, voxels: &[u32]) {
+        self.bricks = BrickList::new(grid, voxels);
+        self.lists.truncate(1);
+        self.lists.iter_mut().for_each(|list| list.range = 0..self.bricks.bricks().len());
+        self.state = State::Full;
+    }
+
+    /// Whether there is room for the added bricks; otherwise all will be uploaded again.
     pub fn has_room(&self) -> bool {
         self.state != State::Full
     }
 
-    /// Uploads all of them again with the next [`Self::flush`]: the device's may be lost.
+    /// Makes the next [`Self::flush`] upload everything again, because the buffers may have been lost.
     pub fn forget(&mut self) {
         self.state = State::Full;
     }
 
-    /// Brings the GPU up to date.
+    /// Uploads what has changed.
     pub fn flush(&mut self, device: &Device, queue: &Queue) {
         match self.state {
             State::Current => {}
@@ -110,7 +116,7 @@ impl BrickLists {
         self.state = State::Current;
     }
 
-    /// Number of voxels in all lists.
+    /// The number of voxels in all lists.
     pub fn len(&self) -> u64 {
         self.bricks.bricks().iter().map(|brick| u64::from(brick::present(brick).count_ones())).sum()
     }
@@ -120,13 +126,13 @@ impl BrickLists {
         self.len() == 0
     }
 
-    /// Bytes of GPU memory.
+    /// The size of the buffers in bytes.
     pub fn gpu_bytes(&self) -> u64 {
         self.lists.iter().map(|list| list.buffer.size()).sum()
     }
 }
 
-/// Bricks in lists, before they are uploaded.
+/// Bricks divided into lists, before they are uploaded.
 #[derive(Debug)]
 pub struct SettledBricks {
     bricks: BrickList,
@@ -135,7 +141,13 @@ pub struct SettledBricks {
 }
 
 impl SettledBricks {
-    /// Bricks of every list.
+    /// The lists that some bricks are divided among.
+    pub fn of(limits: &wgpu::Limits, bricks: BrickList) -> Self {
+        let (ranges, capacity) = split(limits, bricks.bricks().len());
+        Self { ranges: ranges.collect(), capacity, bricks }
+    }
+
+    /// The bricks of every list.
     pub fn lists(&self) -> Vec<&[Brick]> {
         self.ranges.iter().map(|range| &self.bricks.bricks()[range.clone()]).collect()
     }
@@ -145,7 +157,7 @@ impl SettledBricks {
         self.bricks.bricks()
     }
 
-    /// Bytes of GPU memory.
+    /// The size of the buffers in bytes.
     pub fn gpu_bytes(&self) -> u64 {
         (self.ranges.len() * self.capacity * size_of::<Brick>()) as u64
     }
@@ -160,28 +172,29 @@ impl BrickBuffer {
         Self { range, buffer }
     }
 
-    /// Bricks that it has room for.
+    /// The number of bricks that the buffer has room for.
     fn capacity(&self) -> usize {
         self.buffer.size() as usize / size_of::<Brick>()
     }
 
-    /// Number of its bricks.
+    /// The number of its bricks.
     pub fn brick_count(&self) -> usize {
         self.range.len()
     }
 }
 
-/// What lists may take of a binding where the device allows more: WebGPU's default. Where a list ends decides in which order a
-/// sheet's footprints are added, and so their sum's last bit, which is the same on all devices that have the default.
+/// The maximum size of a list's binding, even if the device allows more: WebGPU's default. The boundaries of lists determine the order in
+/// which a sheet's footprints are added, and so the last bit of their sum, which is thus the same on all devices with at least the
+/// default.
 const MOST_BYTES: u64 = 128 << 20;
 
-/// The lists of so many bricks, and what each has room for: for bricks that come later, too.
+/// The lists of `count` bricks, and the capacity of each, which leaves room for more bricks.
 fn split(limits: &wgpu::Limits, count: usize) -> (impl Iterator<Item = Range<usize>> + use<>, usize) {
     let capacity = max_list_length(limits).min(count + count / 8 + 16);
     ((0..count).step_by(capacity).map(move |first| first..count.min(first + capacity)), capacity)
 }
 
-/// The most bricks of a list: all records of its bricks, and of their places for voxels, must fit one binding.
+/// The maximum number of bricks in a list, such that every record of its bricks and slots fits one binding.
 fn max_list_length(limits: &wgpu::Limits) -> usize {
     let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).min(MOST_BYTES);
     let records =

@@ -1,14 +1,17 @@
-//! A volume under a transfer function, on the GPU: its values, the voxels that take part (§5.1), and how those change.
+//! A volume under a transfer function on the GPU: its values, the voxels that take part (§5.1), and their changes.
 
 use std::sync::Arc;
 
+use glam::UVec3;
 use rayon::prelude::*;
-use wgpu::{Device, Queue, TextureView};
+use wgpu::{Device, Limits, Queue, TextureView};
 
+use crate::after::brick_ranges::BrickRanges;
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::gpu::brick_lists::BrickLists;
-use crate::gpu::gpu_volume::GpuVolume;
+use crate::gpu::brick_lists::{BrickLists, SettledBricks};
+use crate::gpu::gpu_volume::{Coefficients, GpuVolume};
+use crate::lists::brick::BrickList;
 use crate::lists::classify::{classify, in_rows, takes_part};
 use crate::lists::iso_range::ValueSet;
 use crate::lists::quad_plan::{Overlaps, tile_grid};
@@ -26,45 +29,121 @@ pub struct ClassifiedVolume {
     transfer: TransferFunction,
     clipped: ClippedVoxels,
     pub(crate) lists: BrickLists,
-    /// Counts changes of the lists.
+    /// A counter of changes to the lists.
     pub(crate) revision: u64,
+    classification: Classification,
+    /// With [`Classification::After`] which bricks the lists hold, once a frame asked for them.
+    shown: Option<ShownBricks>,
 }
 
-/// What a change of transfer function or iso-ranges touched.
+/// The bricks that may be drawn where values are classified after splatting (SPEC §9).
+#[derive(Debug)]
+struct ShownBricks {
+    /// What they were found for.
+    needs: BrickNeeds,
+    ranges: BrickRanges,
+    /// Whether each brick of the grid is drawn.
+    are_shown: Vec<bool>,
+}
+
+/// What decides, beside the transfer function, which bricks may be drawn.
+#[derive(Clone, Debug)]
+pub(crate) struct BrickNeeds {
+    /// How far from a brick voxels bear on what it shows.
+    pub(crate) reach: UVec3,
+    /// Where they are not the values.
+    pub(crate) coefficients: Option<Arc<Coefficients>>,
+}
+
+impl PartialEq for BrickNeeds {
+    fn eq(&self, other: &Self) -> bool {
+        let same = match (&self.coefficients, &other.coefficients) {
+            (Some(own), Some(others)) => Arc::ptr_eq(own, others),
+            (own, others) => own.is_none() && others.is_none(),
+        };
+        self.reach == other.reach && same
+    }
+}
+
+/// The effect of a change of transfer function or iso-ranges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Touched {
-    /// Voxels that take part now and did not before.
+    /// The number of voxels that newly take part.
     pub entered: u64,
-    /// Voxels that took part before and do not now.
+    /// The number of voxels that no longer take part.
     pub left: u64,
-    /// Whether all bricks must be uploaded again, as there is no room for those that came.
+    /// Whether all bricks must be uploaded again, because there is no room for the added ones.
     pub rebuilt: bool,
 }
 
 impl ClassifiedVolume {
-    /// Uploads the bricks of the voxels that take part (SPEC §3) to the volume's device. Of a volume that is not segmented the
-    /// labels' tables are left out.
-    pub fn new(device: &Device, volume: &GpuVolume, mut transfer: TransferFunction, clipped: ClippedVoxels) -> Self {
+    /// Uploads the bricks of the voxels that take part (SPEC §3) to the volume's device; with [`Classification::After`] the first frame does. The labels' tables are ignored
+    /// if the volume is not segmented.
+    pub fn new(
+        device: &Device,
+        volume: &GpuVolume,
+        mut transfer: TransferFunction,
+        clipped: ClippedVoxels,
+        classification: Classification,
+    ) -> Self {
         let voxels = volume.volume();
         if voxels.labels().is_none() {
             transfer.labels.clear();
         }
-        let lists = BrickLists::upload(device, voxels.grid(), &classify(voxels, &transfer, &clipped));
-        Self { volume: volume.clone(), transfer, clipped, lists, revision: 0 }
+        let taking_part = match classification {
+            Classification::Before => classify(voxels, &transfer, &clipped),
+            Classification::After => Vec::new(),
+        };
+        let lists = BrickLists::upload(device, voxels.grid(), &taking_part);
+        Self { volume: volume.clone(), transfer, clipped, lists, revision: 0, classification, shown: None }
     }
 
-    /// Brings the GPU up to date.
+    /// Changes what is listed: voxels that take part, or bricks around which values meet an opacity, which the next frame finds.
+    pub(crate) fn set_classification(&mut self, classification: Classification) {
+        if classification == self.classification {
+            return;
+        }
+        let voxels = match classification {
+            Classification::Before => classify(self.volume(), &self.transfer, &self.clipped),
+            Classification::After => Vec::new(),
+        };
+        let grid = *self.grid();
+        self.lists.replace(&grid, &voxels);
+        self.revision += 1;
+        (self.classification, self.shown) = (classification, None);
+    }
+
+    /// Lists the bricks that a frame may draw. A changed transfer function tests bricks anew; their values are looked at only where what a
+    /// frame needs is new.
+    pub(crate) fn show(&mut self, needs: &BrickNeeds) {
+        if self.shown.as_ref().is_some_and(|shown| shown.needs == *needs) {
+            return;
+        }
+        let shown = ShownBricks::new(self.volume(), &self.transfer, needs);
+        let voxels = shown.voxels(self.volume());
+        let grid = *self.grid();
+        self.lists.replace(&grid, &voxels);
+        self.revision += 1;
+        self.shown = Some(shown);
+    }
+
+    /// What [`Self::show`] would list, in lists.
+    pub(crate) fn settled_for(&self, limits: &Limits, needs: Option<&BrickNeeds>) -> SettledBricks {
+        match needs {
+            Some(needs) if self.shown.as_ref().is_none_or(|shown| shown.needs != *needs) => {
+                let shown = ShownBricks::new(self.volume(), &self.transfer, needs);
+                SettledBricks::of(limits, BrickList::new(self.grid(), &shown.voxels(self.volume())))
+            }
+            _ => self.lists.settled(limits),
+        }
+    }
+
+    /// Uploads what has changed.
     ///
     /// # Errors
-    /// If the volume's labels need more than the device allows.
-    pub(crate) fn flush(
-        &mut self,
-        device: &Device,
-        queue: &Queue,
-        classification: Classification,
-    ) -> Result<(), RenderError> {
-        let is_after = classification == Classification::After;
-        if self.shades_by_label() || is_after && self.classifies_by_label() {
+    /// If the volume's labels exceed the device's limits.
+    pub(crate) fn flush(&mut self, device: &Device, queue: &Queue) -> Result<(), RenderError> {
+        if self.shades_by_label() {
             self.volume.upload_labels(device, queue)?;
         }
         self.lists.flush(device, queue);
@@ -81,19 +160,18 @@ impl ClassifiedVolume {
         self.volume().holes() > 0
     }
 
-    /// The labels on the GPU, if shading asks for them.
+    /// The labels on the GPU, if shading needs them.
     pub(crate) fn labels(&self) -> Option<&TextureView> {
         self.volume.labels().filter(|_| self.shades_by_label())
     }
 
-    /// Whether classification after splatting asks for labels: it must know those of invisible voxels, too.
-    pub(crate) fn classifies_by_label(&self) -> bool {
-        self.transfer.labels.values().any(LabelTables::matter)
-    }
-
-    /// Whether shading asks for labels.
+    /// Whether shading needs labels.
     pub(crate) fn shades_by_label(&self) -> bool {
-        self.transfer.labels.values().any(LabelTables::matter_to_shading)
+        let matter = match self.classification {
+            Classification::Before => LabelTables::matter_to_shading,
+            Classification::After => LabelTables::matter,
+        };
+        self.transfer.labels.values().any(matter)
     }
 
     /// The volume.
@@ -106,7 +184,7 @@ impl ClassifiedVolume {
         &self.volume
     }
 
-    /// Where the voxels are.
+    /// The volume's grid.
     pub fn grid(&self) -> &Grid {
         self.volume().grid()
     }
@@ -121,18 +199,22 @@ impl ClassifiedVolume {
         self.volume.value_list()
     }
 
-    /// Changes colours, opacities, gradient opacity, iso-ranges or the labels' tables (§5.1). Only voxels that enter or leave are
-    /// touched: those whose values gain or lose their opacity, found by binary search. Where a gradient opacity changes, all that are
-    /// in range must be looked at. Of a volume that is not segmented the labels' tables are left out.
+    /// Changes colours, opacities, gradient opacity, iso-ranges or the labels' tables (§5.1). Only voxels that enter or leave are touched: those
+    /// whose values become visible or transparent, found by binary search. If the gradient opacity changes, all voxels in range must be
+    /// examined. The labels' tables are ignored if the volume is not segmented.
     pub fn set_transfer_function(&mut self, mut transfer: TransferFunction) -> Touched {
         if self.volume().labels().is_none() {
             transfer.labels.clear();
+        }
+        if self.classification == Classification::After {
+            self.transfer = transfer;
+            return self.look_at_bricks();
         }
         let labels = self.transfer.labels.keys().chain(transfer.labels.keys()).copied().map(Some);
         let mut labels: Vec<Option<u16>> = labels.chain([None]).collect();
         labels.sort_unstable();
         labels.dedup();
-        // Some have another label, and are looked at in vain.
+        // Voxels with other labels are examined too, without effect.
         let changed = (labels.into_iter())
             .map(|label| changed_values(&self.transfer.tables(label), &transfer.tables(label)))
             .fold(ValueSet::default(), |all, values| all.union(&values));
@@ -140,7 +222,7 @@ impl ClassifiedVolume {
             Vec::new()
         } else {
             let mut candidates = self.value_list().within(self.volume().values(), &changed);
-            // In memory order, where neighbours share cache lines.
+            // In memory order neighbours share cache lines.
             candidates.par_sort_unstable();
             candidates
         };
@@ -149,12 +231,17 @@ impl ClassifiedVolume {
         self.look_at(candidates)
     }
 
-    /// Changes which voxels are clipped; touches only voxels that enter or leave.
+    /// Changes which voxels are clipped; touches only those that enter or leave.
     pub fn set_clip(&mut self, clipped: ClippedVoxels) -> Touched {
+        if self.classification == Classification::After {
+            // Planes outside of a cut bear on slabs inside.
+            self.clipped = clipped;
+            return Touched::default();
+        }
         let volume = self.volume();
         let candidates = in_rows(volume, |y, z, row| {
             let [old, new] = [&self.clipped, &clipped].map(|clipped| clipped.in_row(y, z, volume.dims().x));
-            // Either may be empty, anywhere.
+            // Either range may be empty, anywhere.
             let changed =
                 (old.start.min(new.start)..old.end.max(new.end)).filter(|x| old.contains(x) != new.contains(x));
             changed.map(|x| row + x).collect()
@@ -163,7 +250,28 @@ impl ClassifiedVolume {
         self.look_at(candidates)
     }
 
-    /// Lets those of some voxels, in memory order, enter and leave that must.
+    /// Lets bricks enter and leave that must.
+    fn look_at_bricks(&mut self) -> Touched {
+        let Some(mut shown) = self.shown.take() else { return Touched::default() };
+        let volume = Arc::clone(self.volume());
+        let new = shown.ranges.shown(&volume, &self.transfer);
+        let old = std::mem::replace(&mut shown.are_shown, new);
+        let new = &shown.are_shown;
+        let entering = shown.ranges.voxels(&volume, |brick| new[brick] && !old[brick]);
+        let leaving = shown.ranges.voxels(&volume, |brick| old[brick] && !new[brick]);
+        self.shown = Some(shown);
+        self.change(&entering, &leaving)
+    }
+
+    fn change(&mut self, entering: &[u32], leaving: &[u32]) -> Touched {
+        if !entering.is_empty() || !leaving.is_empty() {
+            self.lists.change(entering, leaving);
+            self.revision += 1;
+        }
+        Touched { entered: entering.len() as u64, left: leaving.len() as u64, rebuilt: !self.lists.has_room() }
+    }
+
+    /// Decides for some voxels, in memory order, whether they enter or leave.
     fn look_at(&mut self, candidates: Vec<u32>) -> Touched {
         let (volume, transfer, clipped, lists) = (&**self.volume(), &self.transfer, &self.clipped, &self.lists);
         let takes_part =
@@ -171,20 +279,16 @@ impl ClassifiedVolume {
         let (entering, leaving): (Vec<u32>, Vec<u32>) = (candidates.into_par_iter())
             .filter(|&index| takes_part(index) != lists.contains(index))
             .partition(|&index| !lists.contains(index));
-        if !entering.is_empty() || !leaving.is_empty() {
-            self.lists.change(&entering, &leaving);
-            self.revision += 1;
-        }
-        Touched { entered: entering.len() as u64, left: leaving.len() as u64, rebuilt: !self.lists.has_room() }
+        self.change(&entering, &leaving)
     }
 
-    /// Changes the iso-ranges alone: closed intervals `[lo, hi]` of the values that take part, `None` for all. Touches what
-    /// [`Self::set_transfer_function`] does.
+    /// Changes only the iso-ranges: closed intervals `[lo, hi]` of the values that take part, `None` for all. Touches the same voxels as
+    /// [`Self::set_transfer_function`].
     pub fn set_iso_ranges(&mut self, iso_ranges: Option<Vec<[f64; 2]>>) -> Touched {
         self.set_transfer_function(TransferFunction { iso_ranges, ..self.transfer.clone() })
     }
 
-    /// Shows or hides the voxels of a label. Touches what [`Self::set_transfer_function`] does; nothing in a volume that is not
+    /// Shows or hides the voxels of a label. Touches the same voxels as [`Self::set_transfer_function`], and none if the volume is not
     /// segmented.
     pub fn set_label_visible(&mut self, label: u16, visible: bool) -> Touched {
         let mut transfer = self.transfer.clone();
@@ -192,23 +296,27 @@ impl ClassifiedVolume {
         self.set_transfer_function(transfer)
     }
 
-    /// Bytes of GPU memory that the volume will hold once prepared.
+    /// Bytes of GPU memory that the volume will use once prepared.
     pub(crate) fn estimate(&self) -> Result<u64, RenderError> {
         let [values, both] = self.volume.needs()?;
         let has_labels = self.shades_by_label() || self.volume.labels().is_some();
         Ok(if has_labels { both } else { values })
     }
 
-    /// Bytes of GPU memory, with the volume's, which other views may share ([`GpuVolume::gpu_bytes`]).
+    /// Bytes of GPU memory, including the volume's, which other views may share ([`GpuVolume::gpu_bytes`]).
     pub fn gpu_bytes(&self) -> u64 {
         self.volume.gpu_bytes() + self.lists.gpu_bytes()
     }
 
-    /// What of a frame's counts (Table 4) is known before it is drawn.
+    /// The counts of a frame (Table 4) that are known before it is drawn.
     pub fn totals(&self, view: &ViewGeometry, groups: &GroupSlabs) -> Totals {
-        let overlaps = self.lists.bricks().map(|bricks| Overlaps::count(bricks, view));
+        let of_bricks = match self.classification {
+            Classification::Before => Overlaps::count,
+            Classification::After => Overlaps::count_planes,
+        };
+        let overlaps = self.lists.bricks().map(|bricks| of_bricks(bricks, view));
         let Overlaps { voxels, sections, slabs } = overlaps.fold(Overlaps::default(), Overlaps::and);
-        // A group's first or last sheets can lie outside of what any kernel touches.
+        // Some sheets of the first or last group may lie outside every kernel.
         let sheets_of = |first: i32| {
             (first + groups.sheets as i32).min(slabs.end).saturating_sub(first.max(slabs.start)).max(0) as u64
         };
@@ -224,6 +332,18 @@ impl ClassifiedVolume {
             ..Counts::default()
         };
         Totals { counts, group_sheets: groups.firsts.iter().map(|&first| sheets_of(first)).collect() }
+    }
+}
+
+impl ShownBricks {
+    fn new(volume: &Volume, transfer: &TransferFunction, needs: &BrickNeeds) -> Self {
+        let coefficients = needs.coefficients.as_ref().map_or(volume.values(), |exact| &exact.values);
+        let ranges = BrickRanges::new(volume.grid(), coefficients, needs.reach);
+        Self { needs: needs.clone(), are_shown: ranges.shown(volume, transfer), ranges }
+    }
+
+    fn voxels(&self, volume: &Volume) -> Vec<u32> {
+        self.ranges.voxels(volume, |brick| self.are_shown[brick])
     }
 }
 

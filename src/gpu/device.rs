@@ -1,115 +1,28 @@
-//! What the renderer needs of a device, and what it makes of one that has more.
-
-use std::fmt;
+//! The device's features and limits: what the renderer requires, and what it uses if available.
 
 use wgpu::{Adapter, Device, DeviceDescriptor, Features, Limits, TextureFormat};
 
 use super::layout::FOLD;
 use super::volume_texture;
-use crate::gpu::fault::DeviceFault;
+pub use crate::device_error::{DeviceError, InsufficientLimit};
 
-/// Why no device could be used.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum DeviceError {
-    /// There is no adapter, or none with the requested name.
-    #[error("no GPU adapter: required {required}, actual: {actual}{}", after(advice.as_deref()))]
-    #[non_exhaustive]
-    NoAdapter {
-        /// What was asked for.
-        required: String,
-        /// What there is.
-        actual: String,
-        /// What to install, where there is no adapter at all.
-        advice: Option<String>,
-    },
-    /// The adapter refused to make a device.
-    #[error("adapter \"{adapter}\" gave no device: {source}")]
-    #[non_exhaustive]
-    RequestDevice {
-        /// The adapter's name.
-        adapter: String,
-        /// What wgpu said.
-        source: wgpu::RequestDeviceError,
-    },
-    /// The device could not compile the renderer.
-    #[error("adapter \"{adapter}\" cannot run the renderer: {fault}")]
-    #[non_exhaustive]
-    Pipelines {
-        /// The adapter's name.
-        adapter: String,
-        /// What the device reported.
-        fault: DeviceFault,
-    },
-    /// A feature is missing that the options ask for.
-    #[error("device feature: required {required:?}, actual: {actual:?}")]
-    #[non_exhaustive]
-    MissingFeatures {
-        /// What is needed.
-        required: Features,
-        /// What the device has.
-        actual: Features,
-    },
-    /// Limits that are not enough for any frame.
-    #[error("device limits: {}", list(.0))]
-    Limits(Vec<InsufficientLimit>),
-    /// An option of the renderer that this device, or any, cannot fulfil.
-    #[error("{option}: found {found}, allowed: {allowed}")]
-    #[non_exhaustive]
-    Unsupported {
-        /// The field of [`RendererOptions`](crate::renderer::options::RendererOptions).
-        option: &'static str,
-        /// What it is.
-        found: String,
-        /// What would do on this device.
-        allowed: String,
-    },
-}
-
-/// A limit of a device that is not enough.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct InsufficientLimit {
-    /// wgpu's name of the limit.
-    pub limit: &'static str,
-    /// What is needed: at least that much, of `min_…` limits at most.
-    pub required: u64,
-    /// What the device has.
-    pub actual: u64,
-}
-
-impl fmt::Display for InsufficientLimit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { limit, required, actual } = self;
-        write!(f, "{limit}: required {required}, actual: {actual}")
-    }
-}
-
-/// Advice after what is wrong.
-fn after(advice: Option<&str>) -> String {
-    advice.map_or(String::new(), |advice| format!("; {advice}"))
-}
-
-fn list(limits: &[InsufficientLimit]) -> String {
-    limits.iter().map(InsufficientLimit::to_string).collect::<Vec<_>>().join("; ")
-}
-
-/// Features that the renderer uses where a device has them. None is required.
+/// Features that the renderer uses if the device has them. It requires none of them.
 pub const WANTED_FEATURES: Features = Features::FLOAT32_BLENDABLE.union(Features::TIMESTAMP_QUERY).union(TILE_FEATURES);
 
-/// Features that the tile rasterizer cannot do without.
+/// Features that the tile rasterizer requires.
 pub const TILE_FEATURES: Features = Features::SUBGROUP.union(Features::SUBGROUP_BARRIER);
 
 /// Features and limits of a device.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeviceRequirements {
-    /// Features to request.
+    /// The features to request.
     pub features: Features,
-    /// Limits to request.
+    /// The limits to request.
     pub limits: Limits,
 }
 
 impl DeviceRequirements {
-    /// What no frame can do without: less than WebGPU's defaults. What an image or a volume needs beyond it, they say when they are
+    /// The minimum for any frame, which is less than WebGPU's defaults. Further requirements of an image or a volume are checked when it is
     /// prepared.
     pub const LEAST: Self = Self {
         features: Features::empty(),
@@ -127,13 +40,13 @@ impl DeviceRequirements {
             max_compute_workgroup_size_y: 8,
             max_compute_workgroup_size_z: 1,
             max_compute_workgroups_per_dimension: FOLD,
-            // Everything else is no more than WebGL 2 has, without compute shaders and storage buffers.
+            // All other limits are at most those of WebGL 2, without compute shaders and storage buffers.
             ..Limits::downlevel_webgl2_defaults()
         },
     };
 
-    /// What to request from this adapter, to render as well as it can: WebGPU's default limits, raised where the adapter allows
-    /// larger images and volumes, and lowered where it has less. Whether that is enough, [`Self::check`] says.
+    /// The features and limits to request from an adapter for the best rendering: WebGPU's default limits, raised where the adapter allows larger
+    /// images and volumes, and lowered where it has less. [`Self::check`] tells whether that suffices.
     pub fn for_adapter(adapter: &Adapter) -> Self {
         let available = adapter.limits();
         let limits = Limits {
@@ -142,29 +55,29 @@ impl DeviceRequirements {
             max_buffer_size: available.max_buffer_size,
             max_compute_workgroup_storage_size: available.max_compute_workgroup_storage_size,
             max_storage_buffer_binding_size: available.max_storage_buffer_binding_size,
-            // Four sheets of RGBA32F.
+            // Four sheets of `Rgba32Float`.
             max_color_attachment_bytes_per_sample: 64,
             ..Limits::default()
         };
         Self { features: adapter.features() & WANTED_FEATURES, limits: limits.or_worse_values_from(&available) }
     }
 
-    /// Adds these features to a host's descriptor, and takes the better of each limit.
+    /// Adds the features to a host's descriptor, and sets each limit to the better of both.
     pub fn merge_into(&self, descriptor: &mut DeviceDescriptor<'_>) {
         descriptor.required_features |= self.features;
         descriptor.required_limits = descriptor.required_limits.clone().or_better_values_from(&self.limits);
     }
 
-    /// Checks that a device can run every pass: that it has [`Self::LEAST`].
+    /// Checks that a device can run every pass: that it has at least [`Self::LEAST`].
     ///
     /// # Errors
-    /// [`DeviceError::Limits`] with every limit that is not enough, what is required, and what the device has.
+    /// [`DeviceError::Limits`] with every insufficient limit, the required value and the device's value.
     pub fn check(device: &Device) -> Result<(), DeviceError> {
         let insufficient = Self::insufficient(&device.limits());
         if insufficient.is_empty() { Ok(()) } else { Err(DeviceError::Limits(insufficient)) }
     }
 
-    /// Every limit that is less than [`Self::LEAST`] asks for.
+    /// Every limit that is worse than in [`Self::LEAST`].
     pub fn insufficient(limits: &Limits) -> Vec<InsufficientLimit> {
         let mut insufficient = Vec::new();
         Self::LEAST.limits.check_limits_with_fail_fn(limits, false, |limit, required, actual| {
@@ -174,10 +87,10 @@ impl DeviceRequirements {
     }
 }
 
-/// How many sheets one quad draws into: `wanted` if given, else as many colour attachments as the device allows, up to 4.
+/// The number of sheets that one quad draws: `wanted` if stated, or else as many as the device's colour attachments allow, up to 4.
 ///
 /// # Errors
-/// If `wanted` is not 1, 2 or 4, or more than the device allows.
+/// If `wanted` is not 1, 2 or 4, or the device does not allow it.
 pub fn sheets_per_group(device: &Device, format: TextureFormat, wanted: Option<u32>) -> Result<u32, DeviceError> {
     let limits = device.limits();
     let bytes = format.target_pixel_byte_cost().unwrap_or(16);
@@ -193,10 +106,10 @@ pub fn sheets_per_group(device: &Device, format: TextureFormat, wanted: Option<u
     Err(DeviceError::Unsupported { option: "sheets_per_group", found: sheets.to_string(), allowed })
 }
 
-/// The format of sheet buffers: `wanted` if given, else `Rgba32Float` where that can be blended, else `Rgba16Float`.
+/// The format of sheet buffers: `wanted` if stated, or else `Rgba32Float` if the device can blend that, or else `Rgba16Float`.
 ///
 /// # Errors
-/// If `wanted` is `Rgba32Float` and the device cannot blend it, or is none of the two.
+/// If `wanted` is neither of these two, or the device cannot blend it.
 pub fn sheet_format(device: &Device, wanted: Option<TextureFormat>) -> Result<TextureFormat, DeviceError> {
     let blends_f32 = device.features().contains(Features::FLOAT32_BLENDABLE);
     match wanted {

@@ -1,4 +1,4 @@
-//! What a device reports when it fails, as an error of whoever asked for the work.
+//! Failures of a device, returned as errors of the call that caused them.
 
 use std::future::Future;
 use std::pin::pin;
@@ -8,20 +8,20 @@ use wgpu::{BufferDescriptor, BufferUsages, Device, ErrorFilter};
 
 use crate::gpu::shaders::{self, Shader};
 
-/// A failure that the device reported. Messages are one line.
+/// A failure that the device reported. Messages have one line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DeviceFault {
-    /// Memory ran out: less of it may still be had, of the same device.
+    /// Memory ran out. The same device may still provide smaller amounts.
     #[error("the device is out of memory: {0}")]
     OutOfMemory(String),
-    /// wgpu's validation found a mistake, of this library's or in what a host gave it.
+    /// wgpu's validation found a mistake in this library or in a host's arguments.
     #[error("device error: {0}")]
     Validation(String),
-    /// The driver failed, as where it cannot compile a shader.
+    /// The driver failed, for example to compile a shader.
     #[error("internal device error: {0}")]
     Internal(String),
-    /// The device does nothing any more. Another one, with volumes and a renderer of its own, may.
+    /// The device has stopped working. A new one, with new volumes and a new renderer, may work.
     #[error("the device is lost")]
     Lost,
 }
@@ -48,14 +48,14 @@ impl From<wgpu::Error> for DeviceFault {
     }
 }
 
-/// Does some work with a device in error scopes of its own, and never waits. A host does so what only the device can refuse: recording,
-/// submitting, making its own targets. What takes a device in this library and can fail has such scopes already.
+/// Does some work with a device in its own error scopes, and never waits. A host uses it where only the device can refuse the work: for
+/// recording, submitting, and creating its targets. Everything in this library that accepts a device and can fail already has such scopes.
 ///
-/// In a browser errors arrive later: there the work is done without scopes of its own, and what fails arrives in those of the host.
+/// In browsers errors arrive later, so the work is done without scopes of its own, and errors arrive in the host's scopes.
 ///
 /// # Errors
-/// What the device reported meanwhile, whatever the work gave: that it is lost, or else that memory ran out, or else the first of the
-/// other reports.
+/// The error that the device reported during the work, whatever its result: that it is lost, or else that memory ran out, or else the first
+/// of the other errors.
 pub fn scoped<T>(device: &Device, work: impl FnOnce() -> T) -> Result<T, DeviceFault> {
     if cfg!(target_family = "wasm") {
         return Ok(work());
@@ -64,8 +64,8 @@ pub fn scoped<T>(device: &Device, work: impl FnOnce() -> T) -> Result<T, DeviceF
         .map(|filter| device.push_error_scope(filter));
     let result = work();
     let is_lost = is_lost(device);
-    // Scopes are a stack: the last pushed is the first popped. All must be popped even after an error. What memory was too little for is
-    // not valid, so that there are other errors, too.
+    // Scopes are a stack: the last pushed is the first popped. All must be popped even after an error. Objects that could not be allocated
+    // are invalid, so running out of memory causes further errors.
     let errors: Vec<_> = scopes.into_iter().rev().map(|scope| now(scope.pop())).collect();
     match errors.into_iter().flatten().next() {
         _ if is_lost => Err(DeviceFault::Lost),
@@ -74,8 +74,8 @@ pub fn scoped<T>(device: &Device, work: impl FnOnce() -> T) -> Result<T, DeviceF
     }
 }
 
-/// Whether the device is lost, which no error scope says, only a callback, and that one is the host's. But then buffers cannot be written,
-/// though nothing is wrong with them.
+/// Whether the device is lost. Error scopes do not tell, and the callback that does belongs to the host; but a lost device cannot write to
+/// valid buffers.
 fn is_lost(device: &Device) -> bool {
     let scopes = [ErrorFilter::Internal, ErrorFilter::OutOfMemory].map(|filter| device.push_error_scope(filter));
     let buffer = device.create_buffer(&BufferDescriptor {
@@ -89,7 +89,7 @@ fn is_lost(device: &Device) -> bool {
     !is_written && errors == 0
 }
 
-/// What a future that is ready gives; `None` of one that is not.
+/// The result of a future that is ready; `None` if it is not.
 fn now<T>(future: impl Future<Output = Option<T>>) -> Option<T> {
     match Future::poll(pin!(future), &mut Context::from_waker(Waker::noop())) {
         Poll::Ready(result) => result,

@@ -9,7 +9,7 @@ use crate::settings::splatting::FootprintForm;
 /// A footprint table on the GPU.
 #[derive(Debug)]
 pub struct FootprintTexture {
-    /// What the texels mean.
+    /// The form of the table.
     pub form: FootprintForm,
     /// All layers.
     pub view: TextureView,

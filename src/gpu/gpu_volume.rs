@@ -1,9 +1,11 @@
-//! A volume on the GPU, shared by any number of views and renderers of one device.
+//! A volume on the GPU, shared by any number of views and renderers on one device.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use wgpu::{Device, Queue, TextureView};
+use rayon::prelude::*;
+use wgpu::{Device, Limits, Queue, TextureView};
 
+use crate::after::coefficients;
 use crate::after::normalization::Normalization;
 use crate::error::RenderError;
 use crate::gpu::fault::scoped;
@@ -11,7 +13,7 @@ use crate::gpu::volume_texture::{ValueFormat, VolumeTexture};
 use crate::lists::value_list::ValueList;
 use crate::volume::Volume;
 
-/// A volume and its textures on a device. A clone is the same volume: nothing is uploaded twice.
+/// A volume and its textures on a device. Clones share the textures.
 #[derive(Clone, Debug)]
 pub struct GpuVolume {
     shared: Arc<Shared>,
@@ -22,15 +24,31 @@ struct Shared {
     device: Device,
     volume: Arc<Volume>,
     values: VolumeTexture,
-    /// Uploaded when tables first ask for labels.
+    /// The labels, uploaded when tables first need them.
     labels: OnceLock<VolumeTexture>,
     value_list: OnceLock<ValueList>,
-    numbers: OnceLock<Normalization>,
+    /// Of the values; `None` if all are holes.
+    numbers: OnceLock<Option<Normalization>>,
+    /// Those of the kernel that was last asked for.
+    coefficients: Mutex<Option<Arc<Coefficients>>>,
+}
+
+/// Coefficients that interpolate the values: [`coefficients::exact`].
+#[derive(Debug)]
+pub(crate) struct Coefficients {
+    /// The kernel's radius and falloff.
+    kernel: (f64, f64),
+    /// As values; NaN at holes.
+    pub(crate) values: Vec<f32>,
+    /// What they are splatted as.
+    pub(crate) numbers: Normalization,
+    /// Uploaded with the first frame.
+    texture: OnceLock<VolumeTexture>,
 }
 
 impl GpuVolume {
-    /// Uploads a volume's values: 4 bytes a voxel, or 1 or 2 where they are whole numbers in a range of 256 or 65536. Labels, 2 bytes a
-    /// voxel, follow when a view first has tables for some.
+    /// Uploads a volume's values: 4 bytes per voxel, or 1 or 2 if they are whole numbers in a range of 256 or 65536. Labels, 2 bytes per voxel,
+    /// follow when a view first has tables for them.
     ///
     /// # Errors
     /// If the volume needs more layers than the device's textures have, or the device fails.
@@ -38,10 +56,10 @@ impl GpuVolume {
         Self::new_in_chunks(device, queue, volume, &|| {})
     }
 
-    /// The same for a caller that submits every chunk of values that was written. The queue keeps its own copies of them until then.
+    /// Like [`Self::new`], for a caller that submits after every chunk of values; until then the queue keeps its own copies of them.
     ///
     /// # Errors
-    /// See [`Self::new`].
+    /// As for [`Self::new`].
     pub(crate) fn new_in_chunks(
         device: &Device,
         queue: &Queue,
@@ -52,11 +70,12 @@ impl GpuVolume {
         let upload = || VolumeTexture::upload_in_chunks(device, queue, volume.values(), written);
         let values = scoped(device, upload)??;
         let (device, labels, value_list) = (device.clone(), OnceLock::new(), OnceLock::new());
-        let numbers = OnceLock::new();
-        Ok(Self { shared: Arc::new(Shared { device, volume, values, labels, value_list, numbers }) })
+        let (numbers, coefficients) = (OnceLock::new(), Mutex::default());
+        let shared = Shared { device, volume, values, labels, value_list, numbers, coefficients };
+        Ok(Self { shared: Arc::new(shared) })
     }
 
-    /// What [`Self::gpu_bytes`] of a volume will be: as long as no view shades by label, and after that. Looks at all values.
+    /// What [`Self::gpu_bytes`] of a volume will be, before and after a view shades by label. Examines all values.
     ///
     /// # Errors
     /// If the volume needs more layers than the device's textures have.
@@ -65,10 +84,10 @@ impl GpuVolume {
         estimate(device, values.len(), ValueFormat::of(values))
     }
 
-    /// The same of this volume.
+    /// [`Self::estimate`] for this volume.
     ///
     /// # Errors
-    /// See [`Self::estimate`].
+    /// As for [`Self::estimate`].
     pub(crate) fn needs(&self) -> Result<[u64; 2], RenderError> {
         estimate(&self.shared.device, self.shared.volume.values().len(), self.value_format())
     }
@@ -78,30 +97,26 @@ impl GpuVolume {
         &self.shared.volume
     }
 
-    /// The voxels sorted by value (Table 1), once for all views. Sorted when first asked for, so that a single frame need not
-    /// wait for it; a program with iso-ranges to move asks when it has loaded the volume.
+    /// The voxels sorted by value (Table 1), once for all views. They are sorted on the first call, so that a single frame need not wait for it;
+    /// a program that will move iso-ranges calls it when it has loaded the volume.
     pub fn value_list(&self) -> &ValueList {
         self.shared.value_list.get_or_init(|| ValueList::new(self.shared.volume.values()))
     }
 
-    /// The numbers that values are splatted as where classification comes after splatting; found when first asked for.
-    pub(crate) fn numbers(&self) -> Normalization {
-        let find = || Normalization::of(self.shared.volume.values().iter().copied());
-        *self.shared.numbers.get_or_init(|| find().unwrap_or(Normalization::new([0.0; 2])))
-    }
-
-    /// Bytes of GPU memory, however many views there are.
+    /// Bytes of GPU memory, independent of the number of views.
     pub fn gpu_bytes(&self) -> u64 {
         let textures = [Some(&self.shared.values), self.shared.labels.get()];
-        textures.into_iter().flatten().map(|texture| texture.gpu_bytes).sum()
+        let coefficients =
+            self.last_coefficients().and_then(|last| last.texture.get().map(|texture| texture.gpu_bytes));
+        textures.into_iter().flatten().map(|texture| texture.gpu_bytes).sum::<u64>() + coefficients.unwrap_or(0)
     }
 
-    /// The device that it is on.
+    /// The volume's device.
     pub(crate) fn device(&self) -> &Device {
         &self.shared.device
     }
 
-    /// What the values' texels mean.
+    /// The format of the values' texels.
     pub(crate) fn value_format(&self) -> ValueFormat {
         self.shared.values.format
     }
@@ -116,18 +131,71 @@ impl GpuVolume {
         self.shared.labels.get().map(|labels| &labels.view)
     }
 
-    /// Uploads the labels, if there are any and they are not there yet.
+    /// What the values are splatted as where they are classified afterwards (SPEC §9).
+    pub(crate) fn numbers(&self) -> Normalization {
+        let of_values = || Normalization::of(self.shared.volume.values().iter().copied());
+        self.shared.numbers.get_or_init(of_values).unwrap_or(Normalization::new([0.0; 2]))
+    }
+
+    fn last_coefficients(&self) -> Option<Arc<Coefficients>> {
+        self.shared.coefficients.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// The coefficients for a kernel's radius and falloff, computed at the first request. Those of the previous kernel are dropped.
+    ///
+    /// # Errors
+    /// If no coefficients interpolate the values: those of [`coefficients::exact`].
+    pub(crate) fn coefficients(&self, kernel: (f64, f64)) -> Result<Arc<Coefficients>, RenderError> {
+        if let Some(last) = self.last_coefficients().filter(|last| last.kernel == kernel) {
+            return Ok(last);
+        }
+        let volume = &self.shared.volume;
+        let values = coefficients::exact(volume.grid(), volume.values(), kernel, &|share| {
+            log::info!("coefficients of splatting.interpolation = \"exact\": {:.0} %", 100.0 * share);
+        })?;
+        let numbers = Normalization::of(values.iter().copied()).unwrap_or(Normalization::new([0.0; 2]));
+        let found = Arc::new(Coefficients { kernel, values, numbers, texture: OnceLock::new() });
+        *self.shared.coefficients.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(&found));
+        Ok(found)
+    }
+
+    /// Uploads the labels, if there are any and they are not uploaded yet.
     ///
     /// # Errors
     /// If they need more layers than the device's textures have, or the device fails.
     pub(crate) fn upload_labels(&self, device: &Device, queue: &Queue) -> Result<(), RenderError> {
         if let (None, Some(labels)) = (self.shared.labels.get(), self.shared.volume.labels()) {
-            // Those that there was no memory for are not kept.
+            // Labels whose allocation failed are not kept.
             let labels = scoped(device, || VolumeTexture::upload_labels(device, queue, labels))??;
-            // Another thread may have been first: its are the same.
+            // Another thread may have been first; its labels are the same.
             let _ = self.shared.labels.set(labels);
         }
         Ok(())
+    }
+}
+
+impl Coefficients {
+    /// Bytes of GPU memory that they will take.
+    ///
+    /// # Errors
+    /// If they need more layers than textures may have.
+    pub(crate) fn estimate(&self, limits: &Limits) -> Result<u64, RenderError> {
+        Ok(VolumeTexture::estimate(limits, self.values.len() as u64, ValueFormat::Bits)?[0])
+    }
+
+    /// The bits of the numbers on the GPU, `R32Uint`.
+    ///
+    /// # Errors
+    /// If they need more layers than the device's textures have, or the device fails.
+    pub(crate) fn texture(&self, device: &Device, queue: &Queue) -> Result<&TextureView, RenderError> {
+        if self.texture.get().is_none() {
+            let numbers: Vec<f32> = self.values.par_iter().map(|&c| self.numbers.apply(f64::from(c)) as f32).collect();
+            let uploaded = scoped(device, || VolumeTexture::upload_bits(device, queue, &numbers))??;
+            // Another thread may have been first: its are the same.
+            let _ = self.texture.set(uploaded);
+        }
+        let missing = || RenderError::Readback("the coefficients' texture is gone".to_owned());
+        self.texture.get().map(|texture| &texture.view).ok_or_else(missing)
     }
 }
 

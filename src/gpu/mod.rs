@@ -1,4 +1,4 @@
-//! What the passes share: the device's capabilities, memory layouts, shader sources, targets.
+//! The passes' common parts: the device's capabilities, memory layouts, shader sources, targets.
 
 pub mod bindings;
 pub mod brick_lists;

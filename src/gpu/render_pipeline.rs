@@ -1,28 +1,28 @@
-//! Render pipelines without vertex buffers in few words.
+//! Shorthand for render pipelines without vertex buffers.
 
 use wgpu::{ColorTargetState, DepthStencilState, Device, MultisampleState, PipelineLayout, RenderPipeline};
 
 use super::shaders::Shader;
 
-/// What a pipeline draws into.
+/// The attachments that a pipeline draws into.
 #[derive(Clone, Debug)]
 pub struct Attachments {
     /// Formats and blending.
     pub colors: Vec<Option<ColorTargetState>>,
     /// The pass's depth attachment.
     pub depth: Option<DepthStencilState>,
-    /// Samples per pixel.
+    /// The number of samples per pixel.
     pub samples: u32,
 }
 
 impl Attachments {
-    /// Colours alone, one sample per pixel.
+    /// Only colours, with one sample per pixel.
     pub fn colors(colors: impl IntoIterator<Item = ColorTargetState>) -> Self {
         Self { colors: colors.into_iter().map(Some).collect(), depth: None, samples: 1 }
     }
 }
 
-/// Compiles triangles of a shader's vertex and fragment entry points, with pipeline constants.
+/// Compiles a pipeline that draws triangles with a shader's vertex and fragment entry points and pipeline constants.
 pub fn render_pipeline(
     device: &Device,
     (shader, [vertex, fragment]): (Shader, [&str; 2]),

@@ -1,13 +1,13 @@
 //! Shader sources: every stage's own file, preceded by the files that it shares with others.
 
-/// A stage's name, its complete WGSL source, and the files that the source was put together from.
+/// A stage's name, its complete WGSL source, and the files that the source was assembled from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shader {
-    /// The stage's word, which is also its file's name.
+    /// The stage's name, which is also its file's name.
     pub stage: &'static str,
     /// WGSL.
     pub source: &'static str,
-    /// The parts of the source in their order: each file's path below `shaders/`, and its text.
+    /// The parts of the source in order: each file's path below `shaders/`, and its text.
     pub files: &'static [(&'static str, &'static str)],
 }
 
@@ -47,7 +47,7 @@ pub const CULL_VOXELS: Shader = shader!(
     "shared/project",
     "shared/local_ray"
 );
-/// Puts the voxels that are drawn in a row.
+/// Lists the voxels that are drawn without gaps.
 pub const COMPACT: Shader = shader!("compact", "shared/brick", "shared/tally", "shared/culled", "shared/scan");
 /// Shades the voxels that were not shaded before.
 pub const SHADE: Shader = shader!(
@@ -120,7 +120,7 @@ pub const VALUES: Shader = shader!(
     "shared/brick",
     "shared/volume",
     "shared/project",
-    "shared/sample",
+    "shared/field_voxel",
     "shared/planes"
 );
 /// Draws them onto a slab plane.
@@ -128,7 +128,7 @@ pub const FIELD: Shader = shader!(
     "field",
     "shared/frame",
     "shared/brick",
-    "shared/sample",
+    "shared/field_voxel",
     "shared/planes",
     "shared/sheets",
     "shared/corners"
@@ -210,7 +210,7 @@ pub const GATHER_PLANES: Shader = shader!(
 );
 /// Writes the depths of first hits.
 pub const FIRST_HIT: Shader = shader!("first_hit", "shared/frame", "shared/cut");
-/// Lays the result over the background.
+/// Composites the result over the background.
 pub const RESOLVE: Shader = shader!("resolve", "shared/frame", "shared/band");
 
 /// Every shader, in the order of the data flow.
@@ -236,8 +236,7 @@ pub const ALL: [Shader; 18] = [
 ];
 
 impl Shader {
-    /// Whether its workgroups' memory must hold zeros at first. The tile rasterizer's memory is large, and it reads nothing there before
-    /// it has written it.
+    /// Whether workgroup memory must be zeroed. The tile rasterizer's memory is large, and it writes everything before reading it.
     pub fn needs_zeroed_memory(&self) -> bool {
         *self != GATHER && *self != GATHER_PLANES
     }
@@ -250,8 +249,8 @@ impl Shader {
         })
     }
 
-    /// The file below `shaders/` that a line of the source comes from, and the line's number in that file. Lines count from 1, as in
-    /// compilers' messages.
+    /// The file below `shaders/` that a line of the source comes from, and the line's number in that file. Lines count from 1, as in compilers'
+    /// messages.
     pub fn origin(&self, line: u32) -> (&'static str, u32) {
         let mut first = 1;
         for &(path, text) in self.files {

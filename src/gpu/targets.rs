@@ -1,4 +1,4 @@
-//! What depends on the image's size alone: compositing buffer, sheet buffers, opacity and occlusion buffers.
+//! Buffers that depend only on the image's size: the compositing buffer, sheet buffers, opacity and occlusion buffers.
 
 use wgpu::{
     Buffer, BufferUsages, Device, Limits, Texture, TextureFormat, TextureUsages, TextureView, TextureViewDescriptor,
@@ -13,28 +13,28 @@ use crate::lists::quad_plan::{TILE, tile_grid};
 /// The compositing buffer.
 #[derive(Debug)]
 pub struct CompositingBuffer {
-    /// Width and height, pixels.
+    /// Width and height in pixels.
     pub size: [u32; 2],
     /// Bands of rows that each fit one storage binding.
     pub bands: Vec<BandBuffer>,
 }
 
-/// What quads are drawn into and tested against.
+/// The buffers that quads are drawn into and tested against.
 #[derive(Debug)]
 pub struct Targets {
-    /// Width and height, pixels.
+    /// Width and height in pixels.
     pub size: [u32; 2],
     /// The sheet buffers of a group, one per layer.
     pub sheets: Texture,
-    /// The opacity buffer cut off at the threshold: a bit per pixel, 32 pixels of a row per word.
+    /// The opacity buffer clamped to the threshold: one bit per pixel, 32 pixels of a row per word.
     pub opaque: Buffer,
-    /// The opacity buffer eroded down the columns, half way to the occlusion buffer.
+    /// The opacity buffer eroded along the columns, half way to the occlusion buffer.
     pub opaque_columns: Buffer,
     /// The occlusion buffer (§6).
     pub occluded: Buffer,
     /// A word per tile: 1 where all its pixels are opaque.
     pub opaque_tiles: Buffer,
-    /// A word per tile: [`SheetGroup::number`](super::layout::SheetGroup::number) of the group that it was composited for last, 0 of none.
+    /// One word per tile: [`SheetGroup::number`](super::layout::SheetGroup::number) of the last group that composited it, or 0.
     pub last_groups: Buffer,
 }
 
@@ -49,14 +49,14 @@ pub struct BandBuffer {
     pub acc: Buffer,
 }
 
-/// Bytes of a pixel in the compositing buffer.
+/// The size of a pixel in the compositing buffer in bytes.
 const ACC_BYTES: u64 = 16;
 
 impl CompositingBuffer {
     /// The bands of an image, as few as the limits allow.
     ///
     /// # Errors
-    /// If the image is larger than textures may be, or 32 rows of it than a binding.
+    /// If the image exceeds the maximum texture size, or 32 of its rows exceed a binding.
     pub fn bands(limits: &Limits, size: [u32; 2]) -> Result<Vec<Band>, RenderError> {
         let limit = |what, limit, required: u64, actual: u64| {
             if required > actual { Err(RenderError::Limit { what, limit, required, actual }) } else { Ok(()) }
@@ -67,7 +67,7 @@ impl CompositingBuffer {
         let texture = limits.max_texture_dimension_2d.into();
         limit("image.width", "max_texture_dimension_2d", width.into(), texture)?;
         limit("image.height", "max_texture_dimension_2d", height.into(), texture)?;
-        // Bands end where tiles end.
+        // Bands end at tile boundaries.
         limit("32 rows of image.width", "max_storage_buffer_binding_size", row_bytes * u64::from(TILE), binding)?;
 
         let rows_per_band = (binding / row_bytes / u64::from(TILE)).min(height.div_ceil(TILE).into()) as u32 * TILE;
@@ -80,7 +80,7 @@ impl CompositingBuffer {
         Self { size, bands: bands.iter().map(|&band| BandBuffer::new(device, size[0], band)).collect() }
     }
 
-    /// Bytes of GPU memory that so many bands take.
+    /// The size in bytes of `bands` bands.
     pub fn estimate([width, height]: [u32; 2], bands: usize) -> u64 {
         (bands * size_of::<Band>()) as u64 + u64::from(width) * u64::from(height) * ACC_BYTES
     }
@@ -92,10 +92,10 @@ impl CompositingBuffer {
 }
 
 impl Targets {
-    /// Targets for groups of `sheets` sheets. A compositing buffer of that size must have been possible.
+    /// Targets for groups of `sheets` sheets. The compositing buffer of that size must have been allocated successfully.
     ///
     /// # Errors
-    /// If a bit per pixel is more than a binding.
+    /// If one bit per pixel exceeds a binding.
     pub fn new(device: &Device, size: [u32; 2], sheet_format: TextureFormat, sheets: u32) -> Result<Self, RenderError> {
         let [width, height] = size;
         let sheet_buffers = || {
@@ -126,10 +126,10 @@ impl Targets {
         })
     }
 
-    /// Bytes of GPU memory that such targets take.
+    /// The size of these targets in bytes.
     ///
     /// # Errors
-    /// If a bit per pixel is more than a binding.
+    /// If one bit per pixel exceeds a binding.
     pub fn estimate(
         limits: &Limits,
         size: [u32; 2],
@@ -141,7 +141,7 @@ impl Targets {
         Ok(texels * texel + sizes(limits, &masks(size))?)
     }
 
-    /// Number of tiles.
+    /// The number of tiles.
     pub fn tiles(&self) -> u32 {
         tile_grid(self.size).iter().product()
     }
@@ -164,7 +164,7 @@ impl Targets {
         })
     }
 
-    /// What is zero at the start of a frame.
+    /// The buffers that are zeroed at the start of a frame.
     pub fn masks(&self) -> [&Buffer; 5] {
         let Self { opaque, opaque_columns, occluded, opaque_tiles, last_groups, .. } = self;
         [opaque, opaque_columns, occluded, opaque_tiles, last_groups]
@@ -195,7 +195,7 @@ fn masks(size: [u32; 2]) -> [BufferSpec; 5] {
     ]
 }
 
-/// A depth texture that nobody reads: stands for a host's where there is none.
+/// A depth texture that is never read, used where the host has none.
 pub fn no_surfaces(device: &Device) -> TextureView {
     let texture = device.create_texture(&wgpu::TextureDescriptor {
         label: Some("sheetsplat.no_surfaces"),

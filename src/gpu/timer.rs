@@ -1,4 +1,4 @@
-//! GPU time per stage, from timestamp queries at the ends of every pass.
+//! GPU time per stage, from timestamp queries at the beginning and end of every pass.
 
 use std::collections::BTreeMap;
 
@@ -7,10 +7,10 @@ use wgpu::{
     RenderPassTimestampWrites,
 };
 
-/// Passes timed by one query set.
+/// The number of passes timed by one query set.
 const PASSES_PER_SET: usize = wgpu::QUERY_SET_MAX_QUERIES as usize / 2;
 
-/// Bytes of a pass's two timestamps.
+/// The size of a pass's two timestamps in bytes.
 pub const PASS_BYTES: u64 = 2 * wgpu::QUERY_SIZE as u64;
 
 /// The timestamps of a frame.
@@ -52,12 +52,12 @@ impl Timer {
         has_queries.then(|| passes.next_multiple_of(PASSES_PER_SET) as u64 * PASS_BYTES)
     }
 
-    /// Bytes of GPU memory, without those of the queries, which drivers do not tell.
+    /// Bytes of GPU memory, without that of the queries, which drivers do not report.
     pub fn gpu_bytes(&self) -> u64 {
         self.results.size()
     }
 
-    /// Starts a frame anew.
+    /// Starts a new frame.
     pub fn restart(&mut self) {
         self.stages.clear();
     }
@@ -93,7 +93,7 @@ impl Timer {
         }
     }
 
-    /// Copies the frame's timestamps so far to `staging` from `offset` on. The stages, pass by pass.
+    /// Copies the frame's timestamps so far to `staging` from `offset` on, and returns the stage of each pass.
     pub fn copy(&self, encoder: &mut CommandEncoder, staging: &Buffer, offset: u64) -> Vec<&'static str> {
         let stages = self.stages.clone();
         for (at, (set, passes)) in self.sets.iter().zip(stages.chunks(PASSES_PER_SET)).enumerate() {
@@ -105,7 +105,7 @@ impl Timer {
     }
 }
 
-/// Milliseconds by stage, from the timestamps of its passes; `period` is a tick's nanoseconds.
+/// Milliseconds per stage, from the timestamps of its passes; `period` is the nanoseconds per tick.
 pub fn stage_ms(stages: &[&'static str], timestamps: &[[u64; 2]], period: f32) -> BTreeMap<&'static str, f64> {
     let mut sums = BTreeMap::new();
     for (&stage, &[begin, end]) in stages.iter().zip(timestamps) {

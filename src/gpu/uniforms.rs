@@ -5,7 +5,7 @@ use std::ops::{Add, Mul, Range};
 use glam::{DMat2, DVec2, DVec3, DVec4};
 
 use super::gathered_layout::GatheredLayout;
-use super::layout::{Cut, Frame, Gather, Planes, SheetGroup};
+use super::layout::{Cut, FieldPlanes, Frame, Gather, SheetGroup};
 use super::volume_texture::ValueFormat;
 use crate::after::normalization::Normalization;
 use crate::after::plane_geometry::PlaneGeometry;
@@ -25,10 +25,10 @@ use crate::settings::splatting::{Compositing, Order, Splatting};
 use crate::settings::transfer_function::{LabelTables, Ramp, Tables, TransferFunction};
 use crate::volume::Grid;
 
-/// What ambient, diffuse, specular and shininess are clamped to: beyond it no image changes any more, and `f32` ends.
+/// The cap of ambient, diffuse, specular and shininess, beyond which images no longer change. It avoids infinities in `f32`.
 const MAX_SHADING: f64 = 1e30;
 
-/// What is constant over a frame of a volume with such a grid, whose values are stored so.
+/// The constants of a frame, for a volume with this grid and format of values.
 pub fn frame(
     view: &ViewGeometry,
     kernel: &Kernel,
@@ -79,7 +79,7 @@ pub fn frame(
         compositing: scene.splatting.compositing as u32,
         order: scene.splatting.order as u32,
         culling: u32::from(scene.splatting.culling && hides(&scene.splatting)),
-        // What is empty counts for the least.
+        // For `Minimum`, empty tiles count too.
         tiles: u32::from(scene.splatting.tiles && scene.splatting.compositing != Compositing::Minimum),
         per_unit: grid.unit().recip().sqrt().min(f32::MAX.into()) as f32,
         headlight: u32::from(scene.shading.light == Light::Headlight),
@@ -94,7 +94,7 @@ pub fn frame(
     }
 }
 
-/// What the tile rasterizer's threads share. Its results go where `results` says.
+/// The constants of the tile rasterizer. `results` is the layout of its results.
 pub fn gather(
     view: &ViewGeometry,
     kernel: &Kernel,
@@ -103,7 +103,7 @@ pub fn gather(
     results: &GatheredLayout,
 ) -> Gather {
     let economies = splatting.experimental;
-    // What is behind a surface is culled; nothing else is behind anything.
+    // Only what lies behind a surface is culled.
     let has_beta = hides(splatting) && splatting.compositing != Compositing::Surface && economies.beta < 1.0;
     let whole = kernel.section(0.0, -kernel.radius(), kernel.radius());
     let support_squared = kernel.support().powi(2);
@@ -138,7 +138,7 @@ pub fn gather(
     }
 }
 
-/// What clip planes and a host's surfaces leave of rays, and the box of a volume that compositing by means looks at.
+/// The cuts of rays by clip planes and a host's surfaces, and the box that compositing by means uses.
 pub fn cut(
     view: &ViewGeometry,
     grid: &Grid,
@@ -181,12 +181,17 @@ pub fn cut(
 }
 
 /// How kernels lie on slab planes, and the numbers that values stored so are splatted as (SPEC §9).
-pub fn planes(geometry: &PlaneGeometry, view: &ViewGeometry, values: ValueFormat, numbers: &Normalization) -> Planes {
+pub fn planes(
+    geometry: &PlaneGeometry,
+    view: &ViewGeometry,
+    values: ValueFormat,
+    numbers: &Normalization,
+) -> FieldPlanes {
     let offset = match values {
         ValueFormat::Offset8(least) | ValueFormat::Offset16(least) => f64::from(least),
         ValueFormat::Bits => 0.0,
     };
-    Planes {
+    FieldPlanes {
         axes: geometry.axes.map(|axis| axis.extend(0.0).as_vec4().to_array()),
         step: geometry.step.extend(geometry.per_depth).as_vec4().to_array(),
         screen_axis: geometry.screen_axis.as_vec2().to_array(),
@@ -198,18 +203,27 @@ pub fn planes(geometry: &PlaneGeometry, view: &ViewGeometry, values: ValueFormat
     }
 }
 
-/// How much of the kernel's ball, from the middle out, the polynomial for chords is fitted to: where chords are long they cut sections
-/// that are small. Farther out they cut large ones only, and the Gaussian is small; the errors stay below 5e-6 of a whole footprint's
-/// peak.
+/// The fraction of the kernel's ball, from the middle out, for which the polynomial for chords is fitted: where chords are long, they cut
+/// small sections. Farther out they cut only large ones, and the Gaussian is small; errors stay below 5e-6 of a whole footprint's peak.
 const CHORD_SPAN: f64 = 0.45;
 
-/// One [`SheetGroup`] every `stride` bytes: group after group, and of every group list after list.
+/// One [`SheetGroup`] every `stride` bytes: group after group, and for every group list after list.
 pub fn groups(plan: &FramePlan, kernel: &Kernel, splatting: &Splatting, stride: usize) -> Vec<u8> {
+    groups_of(plan, stride, |planes| group(&plan.view, kernel, splatting, planes))
+}
+
+/// The same where groups are single planes (SPEC §9).
+pub fn plane_groups(plan: &FramePlan, geometry: &PlaneGeometry, splatting: &Splatting, stride: usize) -> Vec<u8> {
+    let half_box = |plane| geometry.half_box_px(plane, plan.view.size);
+    groups_of(plan, stride, |planes| group_of(half_box(planes.start), splatting, planes.start))
+}
+
+fn groups_of(plan: &FramePlan, stride: usize, of: impl Fn(Range<f64>) -> SheetGroup) -> Vec<u8> {
     let mut bytes = Vec::new();
     let first_slab = plan.groups.iter().map(|group| group.first_slab).min().unwrap_or(0);
     for (index, group) in (0..).zip(&plan.groups) {
         let number = (group.first_slab - first_slab) as u32 / plan.sheets + 1;
-        let uniform = SheetGroup { number, ..self::group(&plan.view, kernel, splatting, group.planes.clone()) };
+        let uniform = SheetGroup { number, ..of(group.planes.clone()) };
         for bricks in &group.bricks {
             let count = bricks.end - bricks.start;
             let uniform = SheetGroup { first_brick: bricks.start, brick_count: count, index, ..uniform };
@@ -223,13 +237,17 @@ pub fn groups(plan: &FramePlan, kernel: &Kernel, splatting: &Splatting, stride: 
 
 /// The group of sheets between two planes of sheet depth, without bricks.
 pub fn group(view: &ViewGeometry, kernel: &Kernel, splatting: &Splatting, planes: Range<f64>) -> SheetGroup {
-    let half_box = view.half_box(kernel.support(), planes.clone());
+    group_of(view.half_box(kernel.support(), planes.clone()), splatting, planes.start)
+}
+
+/// A group from `near` on whose footprints' boxes have this half, pixels.
+fn group_of(half_box: DVec2, splatting: &Splatting, near: f64) -> SheetGroup {
     SheetGroup {
         half_box: in_f32_pixels(half_box),
-        // A footprint's box holds that many pixel centres and one more, or one less.
+        // A footprint's box contains this many pixel centres, plus or minus one.
         box_filter: ((2.0 * half_box.min(DVec2::splat(MAX_HALF_BOX))).floor() - 1.0).as_uvec2().to_array(),
         culling: u32::from(splatting.culling && hides(splatting) && half_box.max_element() <= MAX_HALF_BOX),
-        near: planes.start as f32,
+        near: near as f32,
         first_brick: 0,
         brick_count: 0,
         index: 0,
@@ -237,26 +255,26 @@ pub fn group(view: &ViewGeometry, kernel: &Kernel, splatting: &Splatting, planes
     }
 }
 
-/// Half a box, pixels, in f32; where it is infinite a number larger than that of any orthographic view, whose pixels are 1e-25
-/// `unit`s at least.
+/// Half a box in pixels as f32. An infinite one becomes a number larger than in any orthographic view, whose pixels measure at least 1e-25
+/// `unit`s.
 pub fn in_f32_pixels(half_box: DVec2) -> [f32; 2] {
     half_box.min(DVec2::splat(1e30)).as_vec2().to_array()
 }
 
-/// Half the largest box that is tested, pixels. Few footprints larger than that fit the screen, and hardly one is ever hidden.
+/// Half the largest box that is tested, in pixels. Few larger footprints fit the screen, and they are hardly ever hidden.
 const MAX_HALF_BOX: f64 = 256.0;
 
-/// Whether what is drawn hides what comes later (SPEC §5): front to back, and nothing to look through.
+/// Whether what is drawn hides what comes later (SPEC §5): front to back, with a compositing that hides.
 fn hides(splatting: &Splatting) -> bool {
     splatting.order == Order::FrontToBack && splatting.compositing.hides()
 }
 
-/// From which opacity on pixels are opaque. What is kept of a surface that is not reached yet is none.
+/// The opacity from which pixels count as opaque. While no surface has been reached, alpha is below one half; a surface itself is opaque.
 fn opacity_threshold(splatting: &Splatting) -> f64 {
     if splatting.compositing == Compositing::Surface { 1.0 } else { splatting.opacity_threshold }
 }
 
-/// `hv = normalize(l + c)`, 0 where they cancel (SPEC §3).
+/// `hv = normalize(l + c)`; 0 where they cancel (SPEC §3).
 fn half_vector(to_light: DVec3, to_eye: DVec3) -> DVec3 {
     let sum = to_light + to_eye;
     // Opposite unit vectors add up to rounding noise, not to 0.
@@ -266,20 +284,20 @@ fn half_vector(to_light: DVec3, to_eye: DVec3) -> DVec3 {
 /// A transfer function's control points, for the stages that shade.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ramps {
-    /// Value, then rgb or (ordinate, 0, 0); colour, opacity, gradient opacity, one after the other, and after them the table of
-    /// their integrals ([`slab_integral`]) if there is one: first the main ones, then those of labels. Then the table of labels.
+    /// The value, then rgb or (ordinate, 0, 0); colour, opacity and gradient opacity in turn, and after them the table of their integrals
+    /// ([`slab_integral`]) if there is one: first the main ramps, then those of labels. The table of labels follows.
     pub points: Vec<[f32; 4]>,
-    /// Where each of the main ramps ends.
+    /// The end of each of the main ramps.
     pub ends: [u32; 3],
-    /// Where in `points` there is for every label where its ramps start and where each of them ends, as numbers that `f32` counts
-    /// exactly. The last one is the main ramps', and serves all greater labels. Empty if no label has ramps of its own.
+    /// The part of `points` that holds for every label the start of its ramps and the end of each, as numbers that are exact in `f32`. The last
+    /// entry is the main ramps', and serves all greater labels. Empty if no label has its own ramps.
     pub label_table: Range<u32>,
-    /// The most control points of each ramp.
+    /// The maximum number of control points in each ramp.
     lengths: [u32; 3],
 }
 
 impl Ramps {
-    /// All ramps of a transfer function; without a gradient opacity that one is 1 everywhere.
+    /// All ramps of a transfer function; a missing gradient opacity is 1 everywhere.
     pub fn new(transfer: &TransferFunction) -> Self {
         Self::with(transfer, LabelTables::matter_to_shading, |_| Vec::new())
     }
@@ -319,13 +337,13 @@ impl Ramps {
         Self { points, ends, label_table, lengths }
     }
 
-    /// The most control points of each ramp, of all labels.
+    /// The maximum number of control points in each ramp, over all labels.
     pub fn lengths(&self) -> [u32; 3] {
         self.lengths
     }
 }
 
-/// Appends the control points of a label's ramps; where they start, and where each of them ends.
+/// Appends the control points of a label's ramps. Returns their start, and the end of each.
 fn append(points: &mut Vec<[f32; 4]>, tables: &Tables) -> [u32; 4] {
     let mut bounds = [points.len() as u32; 4];
     let scalar = |(at, y): (f64, f64)| DVec4::new(at, y, 0.0, 0.0);
@@ -340,7 +358,7 @@ fn append(points: &mut Vec<[f32; 4]>, tables: &Tables) -> [u32; 4] {
     bounds
 }
 
-/// A ramp's control points, cut off where `f32` ends, as values do.
+/// A ramp's control points, clipped to the range of `f32`, like values.
 fn in_f32<T>(ramp: &Ramp<T>) -> Vec<(f64, T)>
 where
     T: Copy + Add<Output = T> + Mul<f64, Output = T>,

@@ -1,6 +1,5 @@
-//! The volume's values and labels on the GPU, as texture arrays: unlike a buffer's, their size is not limited by what one binding
-//! may hold. Layers have 2048 texels a side, or 4096 or 8192 where a volume would need more layers than the device has: with WebGPU's
-//! default limits there is room for any.
+//! The volume's values and labels on the GPU, as texture arrays, whose size is not limited by one binding. Layers have 2048 texels a side, or
+//! 4096 or 8192 if a volume would need more layers than the device has; with WebGPU's default limits 2048 suffice.
 
 use rayon::prelude::*;
 use wgpu::{
@@ -9,29 +8,29 @@ use wgpu::{
 
 use crate::error::RenderError;
 
-/// The least of [`SIDES`].
+/// The smallest of [`SIDES`].
 pub const LEAST_SIDE: u32 = 2048;
 
-/// Texels that a layer may have along both sides.
+/// The possible sides of a layer in texels.
 pub const SIDES: [u32; 3] = [LEAST_SIDE, 4096, 8192];
 
-/// How values are stored: in as few bits as give each of them back to the last one.
+/// How values are stored: in as few bits as reproduce each of them exactly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ValueFormat {
-    /// `R8Uint`: a whole number, less the volume's least, this one.
+    /// `R8Uint`: a whole number minus the volume's minimum, which this is.
     Offset8(f32),
-    /// `R16Uint`: the same.
+    /// `R16Uint`: the same with 16 bits.
     Offset16(f32),
-    /// `R32Uint`: the bits of the `f32`; those of a hole are NaN's.
+    /// `R32Uint`: the bits of the `f32`; NaN for a hole.
     Bits,
 }
 
 impl ValueFormat {
-    /// The shortest that holds these values. Looks at all of them.
+    /// The format with the fewest bits for these values. Examines all of them.
     pub fn of(values: &[f32]) -> Self {
         let ranges = values.par_chunks(1 << 16).map(whole_range);
         let range = ranges.try_reduce(|| [i32::MAX, i32::MIN], |a, b| Some([a[0].min(b[0]), a[1].max(b[1])]));
-        // Up to there `f32` counts every whole number, so that neither the difference nor the sum is rounded.
+        // Up to this limit `f32` represents every whole number, so neither the difference nor the sum is rounded.
         let range = range.filter(|ends| ends.iter().all(|end| end.unsigned_abs() <= 1 << 24));
         match range.map(|[least, greatest]| (least as f32, greatest - least)) {
             Some((least, 0..=0xff)) => Self::Offset8(least),
@@ -49,10 +48,10 @@ impl ValueFormat {
     }
 }
 
-/// Labels are what their texels are.
+/// The format of labels, whose texels are the labels themselves.
 const LABELS: ValueFormat = ValueFormat::Offset16(0.0);
 
-/// Least and greatest of some values, if all are whole numbers. `-0.0` is none: from a whole number only `0.0` comes back.
+/// The minimum and maximum of some values, if all are whole numbers. `-0.0` does not count, because a whole number would restore `0.0`.
 fn whole_range(values: &[f32]) -> Option<[i32; 2]> {
     let (mut least, mut greatest, mut are_whole) = (i32::MAX, i32::MIN, true);
     for &value in values {
@@ -63,20 +62,20 @@ fn whole_range(values: &[f32]) -> Option<[i32; 2]> {
     are_whole.then_some([least, greatest])
 }
 
-/// One number per voxel, x fastest, folded into rows and layers of a power of two, the side: that of voxel i is texel i mod side of row
-/// ⌊i/side⌋, as `shaders/shared/volume.wgsl` unfolds it.
+/// One number per voxel, x fastest, folded into square layers whose side is a power of two: voxel i is texel i mod side of row ⌊i/side⌋.
+/// `shaders/shared/volume.wgsl` unfolds it.
 #[derive(Debug)]
 pub struct VolumeTexture {
     /// All layers.
     pub view: TextureView,
-    /// What its texels mean.
+    /// The format of its texels.
     pub format: ValueFormat,
     /// Bytes of GPU memory.
     pub gpu_bytes: u64,
 }
 
 impl VolumeTexture {
-    /// Uploads a volume's values, as [`ValueFormat`] says.
+    /// Uploads a volume's values in the format that [`ValueFormat`] chooses.
     ///
     /// # Errors
     /// If they need more layers than the device's textures have.
@@ -84,10 +83,10 @@ impl VolumeTexture {
         Self::upload_in_chunks(device, queue, values, &|| {})
     }
 
-    /// The same for a caller that wants to know of every chunk that was written.
+    /// Like [`Self::upload`], for a caller that is notified of every chunk that was written.
     ///
     /// # Errors
-    /// See [`Self::upload`].
+    /// As for [`Self::upload`].
     pub fn upload_in_chunks(
         device: &Device,
         queue: &Queue,
@@ -98,7 +97,19 @@ impl VolumeTexture {
         Ok(Self::fold(device, queue, values, side, written))
     }
 
-    /// The same with layers of a given side, whether they need it or not.
+    /// Uploads the bits of as many numbers as the volume has values.
+    ///
+    /// # Errors
+    /// See [`Self::upload`].
+    pub fn upload_bits(device: &Device, queue: &Queue, numbers: &[f32]) -> Result<Self, RenderError> {
+        let side = side(&device.limits(), "the volume's coefficients", numbers.len() as u64)?;
+        let size = folded(numbers.len() as u64, side);
+        let (texture, uploaded) = Self::new(device, "sheetsplat.coefficients", ValueFormat::Bits, size);
+        fill(queue, &texture, numbers, f32::to_bits, &|| {});
+        Ok(uploaded)
+    }
+
+    /// Like [`Self::upload`], with layers of a given side, necessary or not.
     pub fn upload_folded(device: &Device, queue: &Queue, values: &[f32], side: u32) -> Self {
         Self::fold(device, queue, values, side, &|| {})
     }
@@ -125,7 +136,7 @@ impl VolumeTexture {
         Ok(uploaded)
     }
 
-    /// Bytes of GPU memory that so many values of a format will take, and as many labels.
+    /// The sizes in bytes of `voxels` values in a format, and of as many labels.
     ///
     /// # Errors
     /// If they need more layers than textures may have.
@@ -134,7 +145,7 @@ impl VolumeTexture {
         Ok([format, LABELS].map(|format| bytes(format, folded(voxels, side))))
     }
 
-    /// A texture of one label, for stages of volumes that have none.
+    /// A texture of one label, for volumes without labels.
     pub fn no_labels(device: &Device) -> Self {
         Self::new(device, "sheetsplat.no_labels", LABELS, [1; 3]).1
     }
@@ -164,10 +175,10 @@ impl VolumeTexture {
     }
 }
 
-/// Values that are converted and sent at a time: whole rows of a layer, whatever its side.
+/// The number of values converted and sent at a time: whole rows of a layer, whatever its side.
 const CHUNK: usize = (LEAST_SIDE * LEAST_SIDE) as usize;
 
-/// Writes a texel for every value, chunk by chunk: there is never a second volume in memory, but for the queue's own copies of what is
+/// Writes a texel for every value, chunk by chunk. There is never a second volume in memory, except for the queue's own copies of what is
 /// not submitted yet.
 fn fill<V: Copy, T: bytemuck::NoUninit>(
     queue: &Queue,
@@ -207,10 +218,10 @@ fn fill<V: Copy, T: bytemuck::NoUninit>(
     }
 }
 
-/// The least side with which so many voxels have layers enough.
+/// The smallest side with which the device has enough layers for `voxels` voxels.
 ///
 /// # Errors
-/// If none has.
+/// If no side suffices.
 pub fn side(limits: &Limits, what: &'static str, voxels: u64) -> Result<u32, RenderError> {
     let mut required = 0;
     for side in SIDES.into_iter().filter(|&side| side <= limits.max_texture_dimension_2d) {
@@ -224,7 +235,7 @@ pub fn side(limits: &Limits, what: &'static str, voxels: u64) -> Result<u32, Ren
     Err(RenderError::Limit { what, limit, required, actual })
 }
 
-/// Width, height and layers for one number per voxel.
+/// Width, height and number of layers for one number per voxel.
 fn folded(voxels: u64, side: u32) -> [u32; 3] {
     let rows = voxels.div_ceil(side.into()) as u32;
     [side, rows.min(side), rows.div_ceil(side)]

@@ -1,4 +1,4 @@
-//! How a program without a host opens its device: what the command line and a window of its own share.
+//! How a program without a host opens its device; the command line and a program's own window share this.
 
 use std::sync::OnceLock;
 
@@ -7,10 +7,10 @@ use wgpu::{Adapter, AdapterInfo, Backends, DeviceType, Instance, InstanceDescrip
 use super::driver;
 use crate::gpu::device::{DeviceError, DeviceRequirements, InsufficientLimit};
 
-/// The instance of a program of its own: the drivers that can run the renderer, and what the environment says.
+/// The instance for a program without a host: the drivers that can run the renderer, with the environment's overrides.
 pub fn instance_descriptor() -> InstanceDescriptor {
     let mut descriptor = InstanceDescriptor::new_without_display_handle_from_env();
-    // Our own arguments need no validating dispatch before every indirect call.
+    // Validation adds a dispatch before every indirect call; our own arguments need none.
     descriptor.flags -= InstanceFlags::VALIDATION_INDIRECT_CALL;
     descriptor.backends &= Backends::PRIMARY;
     descriptor
@@ -18,10 +18,18 @@ pub fn instance_descriptor() -> InstanceDescriptor {
 
 /// The adapters of [`instance_descriptor`]'s instance.
 pub fn adapters() -> Vec<Adapter> {
-    // One for all, as only within an instance devices can be told from one another.
+    // There is a single instance, because devices can be told apart only within an instance.
     static INSTANCE: OnceLock<Instance> = OnceLock::new();
     let instance = INSTANCE.get_or_init(|| Instance::new(instance_descriptor()));
     pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY))
+}
+
+/// Whether there is a GPU that can run the renderer, and not only a software driver.
+pub fn has_gpu() -> bool {
+    adapters().iter().any(|adapter| {
+        let is_software = adapter.get_info().device_type == DeviceType::Cpu;
+        !is_software && DeviceRequirements::insufficient(&DeviceRequirements::for_adapter(adapter).limits).is_empty()
+    })
 }
 
 /// An adapter's driver, and its version where it tells.
@@ -29,20 +37,20 @@ pub fn driver_name(info: &AdapterInfo) -> String {
     format!("{} {}", info.driver, info.driver_info).trim().to_owned()
 }
 
-/// What counts when an adapter is chosen.
+/// The properties by which an adapter is chosen.
 #[derive(Clone, Debug, PartialEq)]
 struct Candidate {
     name: String,
     device_type: DeviceType,
-    /// The limits that rule it out.
+    /// The limits that make it unusable.
     insufficient: Vec<InsufficientLimit>,
 }
 
-/// The adapter with `name` in its name, in any case, or the most capable one: one that can run the renderer before one that cannot, and
-/// a GPU before a software driver. Where a software driver stands in for a GPU that will not do, that is logged.
+/// The adapter with `name` in its name, ignoring case, or the most capable one: an adapter that can run the renderer before one that
+/// cannot, and a GPU before a software driver. If a software driver replaces a GPU that cannot run the renderer, this is logged.
 ///
 /// # Errors
-/// If there is none.
+/// If there is no such adapter.
 pub fn choose_adapter(adapters: &[Adapter], name: Option<&str>) -> Result<Adapter, DeviceError> {
     let candidate = |adapter: &Adapter| {
         let AdapterInfo { name, device_type, .. } = adapter.get_info();
@@ -69,7 +77,7 @@ pub fn choose_adapter(adapters: &[Adapter], name: Option<&str>) -> Result<Adapte
     }
 }
 
-/// Which of some adapters is taken, and in place of which GPU, if that is a software driver only because the GPU will not do.
+/// The index of the chosen adapter, and that of the unusable GPU that it replaces if it is a software driver.
 fn choose(candidates: &[Candidate], name: Option<&str>) -> Option<(usize, Option<usize>)> {
     let is_named =
         |at: &usize| name.is_none_or(|name| candidates[*at].name.to_lowercase().contains(&name.to_lowercase()));
@@ -87,7 +95,7 @@ fn choose(candidates: &[Candidate], name: Option<&str>) -> Option<(usize, Option
     Some((chosen, best))
 }
 
-/// Why a software driver draws though there is a GPU.
+/// Why a software driver is used although there is a GPU.
 fn note(gpu: &Candidate, chosen: &Candidate) -> String {
     let missing: Vec<String> = gpu.insufficient.iter().map(ToString::to_string).collect();
     format!(
@@ -127,14 +135,14 @@ mod tests {
         let old_card = candidate("Old Card", DeviceType::DiscreteGpu, false);
         let chip = candidate("Intel", DeviceType::IntegratedGpu, true);
         let software = candidate("llvmpipe", DeviceType::Cpu, true);
-        // Another GPU needs no note.
+        // If another GPU is usable there is no note.
         assert_eq!(choose(&[old_card.clone(), software.clone(), chip], None), Some((2, None)));
         assert_eq!(choose(&[software.clone(), old_card.clone()], None), Some((0, Some(1))));
         let expected = "Old Card cannot run the renderer (max_buffer_size: required 9, actual: 5): llvmpipe, a software driver, is used";
         assert_eq!(note(&old_card, &software), expected);
-        // Who names it learns why it will not do when it is opened.
+        // An adapter chosen by name is tested when it is opened.
         assert_eq!(choose(&[software.clone(), old_card.clone()], Some("card")), Some((1, None)));
-        // A software driver that will not do, either, is no better.
+        // A software driver that is unusable too does not replace the GPU.
         let weak = candidate("llvmpipe", DeviceType::Cpu, false);
         assert_eq!(choose(&[weak, old_card], None), Some((1, None)));
     }

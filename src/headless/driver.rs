@@ -1,14 +1,14 @@
-//! Which package brings a driver, for those who have none.
+//! Advice on which package installs a driver.
 
-/// What to install on this machine.
+/// The advice for this machine.
 pub(super) fn advice() -> String {
-    // Where systemd is not, only the second is there.
+    // Systems without systemd have only the second file.
     let paths = ["/etc/os-release", "/usr/lib/os-release"];
     let os_release = paths.iter().find_map(|path| std::fs::read_to_string(path).ok());
     advice_for(std::env::consts::OS, &os_release.unwrap_or_default())
 }
 
-/// Names of distributions in os-release(5), and the command that installs Mesa's drivers, lavapipe among them, and the Vulkan loader.
+/// Distributions by their names in os-release(5), and the command that installs Mesa's drivers, including lavapipe, and the Vulkan loader.
 const DISTRIBUTIONS: [(&[&str], &str); 5] = [
     (&["debian", "ubuntu"], "apt install mesa-vulkan-drivers libvulkan1"),
     (&["fedora", "rhel", "centos"], "dnf install mesa-vulkan-drivers vulkan-loader"),
@@ -17,10 +17,10 @@ const DISTRIBUTIONS: [(&[&str], &str); 5] = [
     (&["alpine"], "apk add mesa-vulkan-swrast vulkan-loader"),
 ];
 
-/// What to install on an operating system, which on Linux its os-release(5) file tells.
+/// The advice for an operating system; on Linux its os-release(5) file names the distribution.
 fn advice_for(os: &str, os_release: &str) -> String {
     match os {
-        "macos" => "macOS brings its driver, Metal, with it: nothing can be installed".to_owned(),
+        "macos" => "macOS includes its driver, Metal: there is nothing to install".to_owned(),
         "windows" => "install the driver of the GPU's maker, which brings DirectX 12 and Vulkan".to_owned(),
         "linux" => {
             let names = names(os_release);
@@ -35,7 +35,7 @@ fn advice_for(os: &str, os_release: &str) -> String {
     }
 }
 
-/// What a distribution calls itself, and then those that it is like.
+/// A distribution's ID, followed by those of the distributions it is like.
 fn names(os_release: &str) -> Vec<String> {
     let value = |key: &str| {
         let mut values = os_release.lines().filter_map(|line| line.trim().strip_prefix(key)?.strip_prefix('='));
@@ -67,7 +67,7 @@ mod tests {
             let advice = advice_for("linux", os_release);
             assert!(advice.contains(packages), "{os_release:?}: {advice}");
         }
-        // No distribution counts elsewhere.
+        // Other systems have no distributions.
         assert!(advice_for("macos", "ID=debian").contains("Metal"));
         assert!(advice_for("windows", "").contains("driver of the GPU's maker"));
         assert!(advice_for("freebsd", "ID=freebsd").contains("Vulkan loader"));

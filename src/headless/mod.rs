@@ -1,308 +1,205 @@
-//! Rendering without a host: an own device, and images in memory. The only part that creates devices, submits and waits.
+//! Rendering without a host, to images in memory. A [`Backend`] draws them: the GPU, the processor or the f64 evaluation.
 
+mod backend;
+#[cfg(feature = "gpu")]
 pub mod device;
+#[cfg(feature = "gpu")]
 mod driver;
 mod error;
+#[cfg(feature = "gpu")]
+mod gpu;
+mod options;
+#[cfg(feature = "gpu")]
 pub mod readback;
+mod reference;
+mod view;
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Instant;
 
-use wgpu::{Adapter, Device, Queue, TextureFormat};
-
-use self::device::driver_name;
+pub use self::backend::Backend;
 pub use self::error::Error;
+#[cfg(feature = "gpu")]
+pub use self::gpu::GpuHeadless;
+pub use self::options::HeadlessOptions;
+use self::reference::ReferenceView;
+pub use self::view::HeadlessView;
+use self::view::ViewBackend;
+#[cfg(feature = "cpu")]
+use crate::cpu::CpuRenderer;
+use crate::device_error::DeviceError;
 use crate::error::RenderError;
-use crate::gpu::device::{DeviceError, DeviceRequirements};
-use crate::gpu::fault::{DeviceFault, scoped};
-use crate::gpu::gpu_volume::GpuVolume;
 use crate::image::Image;
-use crate::renderer::Renderer;
-use crate::renderer::options::{Blend, RendererOptions};
-use crate::renderer::pick::Pick;
-use crate::renderer::placement::Placement;
-use crate::renderer::scene_view::SceneView;
-use crate::scene::{ImageSettings, Scene};
+use crate::pick::Pick;
+use crate::scene::Scene;
+#[cfg(any(feature = "gpu", feature = "cpu"))]
 use crate::setting_error::SettingError;
-use crate::settings::splatting::Rasterizer;
 use crate::stats::Stats;
 use crate::volume::Volume;
 
-/// How to choose and open a device: [`Self::default`] or [`Self::DETERMINISTIC`], changed by the `with_` functions.
-#[derive(Clone, Debug)]
-#[non_exhaustive]
-pub struct HeadlessOptions {
-    /// Part of the adapter's name, in any case; `None` prefers an adapter that can run the renderer, and a GPU to a software driver.
-    pub adapter: Option<String>,
-    /// Features and limits to request; `None` takes what [`DeviceRequirements::for_adapter`] says.
-    pub requirements: Option<DeviceRequirements>,
-    /// Format of the sheet buffer; see [`RendererOptions`].
-    pub sheet_format: Option<TextureFormat>,
-    /// Sheets drawn by one quad; see [`RendererOptions`].
-    pub sheets_per_group: Option<u32>,
-    /// What scenes that leave the choice are drawn by; see [`RendererOptions`].
-    pub rasterizer: Rasterizer,
-    /// Times every stage; see [`RendererOptions`].
-    pub profile: bool,
-}
-
-impl HeadlessOptions {
-    /// The most capable adapter, and on it what [`RendererOptions::DETERMINISTIC`] promises.
-    pub const DETERMINISTIC: Self = Self::of(RendererOptions::DETERMINISTIC);
-
-    const fn of(renderer: RendererOptions) -> Self {
-        let RendererOptions { sheet_format, sheets_per_group, rasterizer, profile, .. } = renderer;
-        Self { adapter: None, requirements: None, sheet_format, sheets_per_group, rasterizer, profile }
-    }
-
-    /// On the adapter with this in its name, in any case.
-    pub fn with_adapter(self, name: impl Into<String>) -> Self {
-        Self { adapter: Some(name.into()), ..self }
-    }
-
-    /// On a device with these features and limits.
-    pub fn with_requirements(self, requirements: DeviceRequirements) -> Self {
-        Self { requirements: Some(requirements), ..self }
-    }
-
-    /// With another format of the sheet buffer.
-    pub fn with_sheet_format(self, format: TextureFormat) -> Self {
-        Self { sheet_format: Some(format), ..self }
-    }
-
-    /// With another number of sheets drawn by one quad.
-    pub fn with_sheets_per_group(self, sheets: u32) -> Self {
-        Self { sheets_per_group: Some(sheets), ..self }
-    }
-
-    /// With another rasterizer for scenes that leave the choice.
-    pub fn with_rasterizer(self, rasterizer: Rasterizer) -> Self {
-        Self { rasterizer, ..self }
-    }
-
-    /// With every stage timed, or none.
-    pub fn with_profile(self, profile: bool) -> Self {
-        Self { profile, ..self }
-    }
-}
-
-/// The most capable adapter, and all that it can do.
-impl Default for HeadlessOptions {
-    fn default() -> Self {
-        Self::of(RendererOptions::for_target(FORMAT))
-    }
-}
-
-/// The target's format.
-const FORMAT: TextureFormat = TextureFormat::Rgba32Float;
-
-/// A device of its own and a renderer on it.
+/// Renders with one backend. On the GPU it opens its own device; on the CPU it needs no driver.
 #[derive(Debug)]
 pub struct Headless {
-    adapter: Adapter,
-    device: Device,
-    queue: Queue,
-    renderer: Renderer,
+    drawer: Drawer,
 }
 
-/// An image and what it cost.
+#[derive(Debug)]
+enum Drawer {
+    #[cfg(feature = "gpu")]
+    Gpu(Box<GpuHeadless>),
+    #[cfg(feature = "cpu")]
+    Cpu,
+    Reference,
+}
+
+/// An image with its statistics.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rendering {
     /// The image, over the scene's background.
     pub image: Image,
-    /// Counts and times.
+    /// Its counts and times.
     pub stats: Stats,
 }
 
 impl Headless {
-    /// Opens a device and compiles the renderer.
+    /// Chooses a backend; for the GPU opens a device and compiles the renderer.
     ///
     /// # Errors
-    /// If there is no such adapter, it gives no device, or the device cannot run the renderer.
+    /// If the backend is not compiled in. With the GPU: if there is no such adapter, it opens no device, or the device cannot run the renderer.
     pub fn new(options: &HeadlessOptions) -> Result<Self, DeviceError> {
-        let adapter = choose_adapter(options.adapter.as_deref())?;
-        let requirements = options.requirements.clone().unwrap_or_else(|| DeviceRequirements::for_adapter(&adapter));
-        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
-            label: Some("sheetsplat"),
-            required_features: requirements.features,
-            required_limits: requirements.limits,
-            ..wgpu::DeviceDescriptor::default()
-        }))
-        .map_err(|source| DeviceError::RequestDevice { adapter: adapter.get_info().name, source })?;
-        let renderer_options = RendererOptions {
-            sheet_format: options.sheet_format,
-            sheets_per_group: options.sheets_per_group,
-            rasterizer: options.rasterizer,
-            profile: options.profile,
-            blend: Blend::Replace,
-            ..RendererOptions::for_target(FORMAT)
+        Self::for_scenes(options, [])
+    }
+
+    /// As [`Self::new`], for scenes that are known: [`Backend::Auto`] takes the GPU if one of them names a rasterizer, or uses a setting that
+    /// the CPU backend does not draw.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn for_scenes<'a>(
+        options: &HeadlessOptions,
+        scenes: impl IntoIterator<Item = &'a Scene>,
+    ) -> Result<Self, DeviceError> {
+        let drawer = match Backend::resolved(options, scenes) {
+            #[cfg(feature = "gpu")]
+            Backend::Gpu => Drawer::Gpu(Box::new(GpuHeadless::new(options)?)),
+            #[cfg(feature = "cpu")]
+            Backend::Cpu => Drawer::Cpu,
+            Backend::Reference => Drawer::Reference,
+            backend => return Err(DeviceError::MissingBackend { backend: backend.name() }),
         };
-        let renderer = Renderer::new(&device, &queue, &renderer_options)?;
-        Ok(Self { adapter, device, queue, renderer })
+        Ok(Self { drawer })
     }
 
-    /// The device.
-    pub fn device(&self) -> &Device {
-        &self.device
-    }
-
-    /// The device's queue.
-    pub fn queue(&self) -> &Queue {
-        &self.queue
-    }
-
-    /// The renderer; its target format is `Rgba32Float`.
-    pub fn renderer(&self) -> &Renderer {
-        &self.renderer
+    /// The backend that draws; never [`Backend::Auto`].
+    pub fn backend(&self) -> Backend {
+        match self.drawer {
+            #[cfg(feature = "gpu")]
+            Drawer::Gpu(_) => Backend::Gpu,
+            #[cfg(feature = "cpu")]
+            Drawer::Cpu => Backend::Cpu,
+            Drawer::Reference => Backend::Reference,
+        }
     }
 
     /// Loads the scene's volume and renders it.
     ///
     /// # Errors
-    /// If the volume cannot be loaded, the scene asks for what the device or the renderer cannot do, or the device fails.
+    /// If the volume cannot be loaded, the backend cannot draw one of the scene's settings, or the device fails.
     pub fn render(&self, scene: &Scene) -> Result<Rendering, Error> {
-        // Before a volume is loaded for nothing.
-        scene.check().map_err(RenderError::from)?;
-        let start = Instant::now();
-        let volume = scene.load_volume()?;
-        let load_ms = milliseconds_since(start);
-        let mut rendering = self.render_volume(volume, scene)?;
-        rendering.stats.load_ms = load_ms;
-        Ok(rendering)
+        load_and_render(scene, |volume| self.render_volume(volume, scene))
     }
 
-    /// Renders a volume that is already in memory. The scene's own volume is not looked at.
+    /// Renders a volume that is already in memory. The scene's own volume is ignored.
     ///
     /// # Errors
-    /// If the scene asks for what the device or the renderer cannot do, or the device fails.
+    /// If the backend cannot draw one of the scene's settings, or the device fails.
     pub fn render_volume(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Rendering, RenderError> {
-        let start = Instant::now();
-        let mut view = self.view(volume, scene)?;
-        let classify_ms = milliseconds_since(start);
-        let mut rendering = self.draw(&mut view)?;
-        rendering.stats.prepare_ms += classify_ms;
-        Ok(rendering)
+        view_and_draw(|| self.view(volume, scene), |view| self.draw(view))
     }
 
-    /// A view of a volume as a scene sets it up, for any number of frames and changes. The scene's own volume is not looked at.
+    /// A view of a volume with a scene's settings, for any number of frames. The scene's own volume is ignored.
     ///
     /// # Errors
-    /// If the volume is larger than the device's textures, or the device fails.
-    pub fn view(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<SceneView, RenderError> {
-        // Else wgpu's copies of the whole volume stay until the first frame.
-        let submit = || {
-            self.queue.submit([]);
-        };
-        let volume = GpuVolume::new_in_chunks(&self.device, &self.queue, volume, &submit)?;
-        SceneView::new(&self.device, &volume, scene)
+    /// If the backend cannot draw one of the scene's settings, the volume is larger than the device's textures, or the device fails.
+    pub fn view(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<HeadlessView, RenderError> {
+        Ok(HeadlessView::new(match &self.drawer {
+            #[cfg(feature = "gpu")]
+            Drawer::Gpu(gpu) => ViewBackend::Gpu(Box::new(gpu.view(volume, scene)?)),
+            #[cfg(feature = "cpu")]
+            Drawer::Cpu => ViewBackend::Cpu(Box::new(CpuRenderer::new(volume, scene)?)),
+            Drawer::Reference => ViewBackend::Reference(Box::new(ReferenceView::new(volume, scene)?)),
+        }))
     }
 
-    /// Draws one frame of a view and reads it back.
+    /// Draws one frame of a view.
     ///
     /// # Errors
-    /// If the scene asks for what the device or the renderer cannot do, or the device fails.
-    pub fn draw(&self, view: &mut SceneView) -> Result<Rendering, RenderError> {
-        scoped(&self.device, || self.draw_unscoped(view))?
+    /// If the backend cannot draw one of the scene's settings, the device fails, or another backend made the view.
+    pub fn draw(&self, view: &mut HeadlessView) -> Result<Rendering, RenderError> {
+        match (&self.drawer, view.backend_mut()) {
+            #[cfg(feature = "gpu")]
+            (Drawer::Gpu(gpu), ViewBackend::Gpu(view)) => gpu.draw(view),
+            #[cfg(feature = "cpu")]
+            (Drawer::Cpu, ViewBackend::Cpu(view)) => view.draw(),
+            (Drawer::Reference, ViewBackend::Reference(view)) => view.draw(),
+            #[cfg(any(feature = "gpu", feature = "cpu"))]
+            (_, other) => Err(self.refuse(other.backend()).into()),
+        }
     }
 
-    /// What the last drawn frame of a view shows first at a pixel, counted from the upper left; `None` where the opacity of
-    /// [`SceneView::set_first_hit`] is not reached.
+    /// The first voxel that the last drawn frame of a view shows at a pixel, counted from the upper left; `None` where the pixel does not reach
+    /// the opacity of [`HeadlessView::set_first_hit`].
     ///
     /// # Errors
-    /// If the frame has no first hits, the pixel is off the image, or the device fails.
-    pub fn pick(&self, view: &SceneView, pixel: [u32; 2]) -> Result<Option<Pick>, RenderError> {
-        scoped(&self.device, || {
-            let descriptor = wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.pick") };
-            let mut encoder = self.device.create_command_encoder(&descriptor);
-            let Some(mut pending) = view.pick(&self.device, &mut encoder, pixel) else {
-                let ImageSettings { width, height, .. } = view.scene().image;
-                let allowed = format!("a pixel of {width}×{height}, in a frame with first hits");
-                return Err(SettingError::new("pick", format!("{pixel:?}"), allowed).into());
-            };
-            self.queue.submit([encoder.finish()]);
-            // Asks for it, and then it is there.
-            let early = pending.try_get();
-            wait(&self.device)?;
-            let missing = || Err(RenderError::Readback("the pick did not arrive".to_owned()));
-            early.or_else(|| pending.try_get()).unwrap_or_else(missing)
-        })?
+    /// If the frame has no first hits, the pixel lies outside the image, the device fails, or another backend made the view.
+    pub fn pick(&self, view: &HeadlessView, pixel: [u32; 2]) -> Result<Option<Pick>, RenderError> {
+        match (&self.drawer, view.backend_ref()) {
+            #[cfg(feature = "gpu")]
+            (Drawer::Gpu(gpu), ViewBackend::Gpu(view)) => gpu.pick(view, pixel),
+            #[cfg(feature = "cpu")]
+            (Drawer::Cpu, ViewBackend::Cpu(view)) => Ok(view.pick(pixel)?),
+            (Drawer::Reference, ViewBackend::Reference(view)) => Ok(view.pick(pixel)?),
+            #[cfg(any(feature = "gpu", feature = "cpu"))]
+            (_, other) => Err(self.refuse(other.backend()).into()),
+        }
     }
 
-    fn draw_unscoped(&self, scene_view: &mut SceneView) -> Result<Rendering, RenderError> {
-        let start = Instant::now();
-        self.renderer.prepare(&self.device, &self.queue, scene_view)?;
-        let prepare_ms = milliseconds_since(start);
-
-        let start = Instant::now();
-        let ImageSettings { width, height, .. } = scene_view.scene().image;
-        let target = self.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("sheetsplat.target"),
-            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: FORMAT,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
-        let view = target.create_view(&wgpu::TextureViewDescriptor::default());
-        let mut encoder =
-            self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.frame") });
-        self.renderer.record(&mut encoder, scene_view);
-        self.renderer.present(&mut encoder, scene_view, &view, Placement::whole([width, height]))?;
-        self.queue.submit([encoder.finish()]);
-        let counts = scene_view.counts();
-        let bytes = readback::texture(&self.device, &self.queue, &target)?;
-        let frame_ms = milliseconds_since(start);
-
-        let info = self.adapter.get_info();
-        // The image came later than the counts.
-        let missing = || Err(RenderError::Readback("the frame's counts did not arrive".to_owned()));
-        let (counts, stages_ms) = counts.and_then(|counts| counts.try_get()).unwrap_or_else(missing)?;
-        Ok(Rendering {
-            image: Image { width, height, pixels: bytemuck::pod_collect_to_vec(&bytes) },
-            stats: Stats {
-                driver: driver_name(&info),
-                adapter: info.name,
-                backend: info.backend.to_str().to_owned(),
-                width,
-                height,
-                counts,
-                rasterizer: scene_view.rasterizer().unwrap_or_default().to_owned(),
-                stages_ms,
-                gpu_bytes: scene_view.gpu_bytes() + target.width() as u64 * u64::from(height) * 16,
-                load_ms: 0.0,
-                prepare_ms,
-                frame_ms,
-            },
-        })
+    #[cfg(any(feature = "gpu", feature = "cpu"))]
+    fn refuse(&self, found: Backend) -> SettingError {
+        SettingError::new(
+            "view",
+            format!("one of the {found} backend"),
+            format!("one of the {} backend", self.backend()),
+        )
     }
 }
 
-impl Drop for Headless {
-    fn drop(&mut self) {
-        // A software driver's threads must not outlive the process's memory.
-        let _ = wait(&self.device);
-    }
+/// Loads a scene's volume and renders it by `render_volume`; the statistics hold the time of loading.
+fn load_and_render(
+    scene: &Scene,
+    render_volume: impl FnOnce(Volume) -> Result<Rendering, RenderError>,
+) -> Result<Rendering, Error> {
+    // An invalid scene is refused before its volume is loaded.
+    scene.check().map_err(RenderError::from)?;
+    let start = Instant::now();
+    let volume = scene.load_volume()?;
+    let load_ms = milliseconds_since(start);
+    let mut rendering = render_volume(volume)?;
+    rendering.stats.load_ms = load_ms;
+    Ok(rendering)
 }
 
-/// Waits for all that was submitted.
-///
-/// # Errors
-/// If the device is lost.
-fn wait(device: &Device) -> Result<(), RenderError> {
-    // wgpu panics where the driver loses the device meanwhile.
-    match catch_unwind(AssertUnwindSafe(|| device.poll(wgpu::PollType::wait_indefinitely()))) {
-        Ok(Ok(_)) => Ok(()),
-        Ok(Err(error)) => Err(RenderError::Readback(error.to_string())),
-        Err(_) => Err(DeviceFault::Lost.into()),
-    }
-}
-
-/// The adapter with `name` in its name, or the most capable one: a GPU before a software driver.
-fn choose_adapter(name: Option<&str>) -> Result<Adapter, DeviceError> {
-    device::choose_adapter(&device::adapters(), name)
+/// Sets up a view and draws its first frame; the statistics count the set-up as preparation.
+fn view_and_draw<View>(
+    view: impl FnOnce() -> Result<View, RenderError>,
+    draw: impl FnOnce(&mut View) -> Result<Rendering, RenderError>,
+) -> Result<Rendering, RenderError> {
+    let start = Instant::now();
+    let mut view = view()?;
+    let classify_ms = milliseconds_since(start);
+    let mut rendering = draw(&mut view)?;
+    rendering.stats.prepare_ms += classify_ms;
+    Ok(rendering)
 }
 
 fn milliseconds_since(start: Instant) -> f64 {

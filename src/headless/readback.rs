@@ -1,10 +1,10 @@
-//! Reading buffers and textures back. Blocks.
+//! Blocking readback of buffers and textures.
 
 use wgpu::{Buffer, BufferUsages, Device, Queue, Texture};
 
 use crate::error::RenderError;
 
-/// The bytes of a buffer made with `COPY_SRC`.
+/// The bytes of a buffer that has the usage `COPY_SRC`.
 ///
 /// # Errors
 /// If the device is lost.
@@ -19,8 +19,8 @@ pub fn buffer(device: &Device, queue: &Queue, source: &Buffer) -> Result<Vec<u8>
     Ok(bytes)
 }
 
-/// The texels of a 2D texture made with `COPY_SRC`, row by row without padding, in as many copies as the device's largest
-/// buffer asks for.
+/// The texels of a 2D texture that has the usage `COPY_SRC`, row by row without padding. It is copied in as many pieces as the device's
+/// maximum buffer size requires.
 ///
 /// # Errors
 /// If the device is lost.
@@ -72,15 +72,15 @@ fn staging(device: &Device, size: u64) -> Buffer {
     })
 }
 
-/// Waits for the GPU, lends the buffer's bytes to `use_bytes`, and unmaps it.
+/// Waits for the GPU, passes the buffer's bytes to `use_bytes`, and unmaps it.
 fn read(device: &Device, staging: &Buffer, use_bytes: impl FnOnce(&[u8])) -> Result<(), RenderError> {
     let failed = |reason: String| RenderError::Readback(reason);
     let (sender, receiver) = std::sync::mpsc::channel();
     staging.map_async(wgpu::MapMode::Read, .., move |result| {
-        // The receiver is gone only if polling failed, which is the error that counts.
+        // The receiver is gone only if polling failed, and that error is returned.
         let _ = sender.send(result);
     });
-    super::wait(device)?;
+    super::gpu::wait(device)?;
     let mapped = receiver.recv().map_err(|error| failed(error.to_string()))?;
     mapped.map_err(|error| failed(error.to_string()))?;
     use_bytes(&staging.get_mapped_range(..).map_err(|error| failed(error.to_string()))?);

@@ -1,4 +1,4 @@
-//! File formats, and what can be wrong with a file.
+//! Image formats and errors.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
-    /// The extension names no known format.
+    /// The extension is unknown.
     #[error("{}: extension: found {found}, allowed: .png, .exr or .npy", path.display())]
     #[non_exhaustive]
     Format {
@@ -21,7 +21,7 @@ pub enum ImageError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// The operating system's error.
         source: std::io::Error,
     },
     /// The image could not be encoded.
@@ -30,34 +30,34 @@ pub enum ImageError {
     Encode {
         /// The file.
         path: PathBuf,
-        /// What the encoder said.
+        /// The encoder's error.
         source: ::image::ImageError,
     },
-    /// The file is not what its extension says.
+    /// The file cannot be decoded as the format of its extension.
     #[error("{}: {source}", path.display())]
     #[non_exhaustive]
     Decode {
         /// The file.
         path: PathBuf,
-        /// What the decoder said.
+        /// The decoder's error.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
-    /// The file holds no image of four channels.
+    /// The file does not hold an image that can be read.
     #[error("{}: {what}: found {found}, allowed: {allowed}", path.display())]
     #[non_exhaustive]
     Content {
         /// The file.
         path: PathBuf,
-        /// The part of it that does not fit (`shape`, `descr`, `size`).
+        /// The part of it that is wrong (`shape`, `descr`, `size`).
         what: String,
-        /// What the file says.
+        /// What was found.
         found: String,
-        /// What would do.
+        /// What is allowed.
         allowed: String,
     },
 }
 
-/// File formats by extension, in upper or lower case.
+/// File formats by extension, ignoring case.
 pub(super) enum Format {
     Png,
     Exr,

@@ -1,4 +1,4 @@
-//! Rendered images and the files they are saved as.
+//! Rendered images and their files.
 
 #[cfg(feature = "codecs")]
 mod format;
@@ -17,7 +17,7 @@ pub use format::ImageError;
 #[cfg(feature = "codecs")]
 pub use save::PngDepth;
 
-/// An image of f32 premultiplied RGBA, row 0 at the top. Colours are display-referred (SPEC §3).
+/// An image of f32 premultiplied RGBA, with row 0 at the top. Colours are display-referred (SPEC §3).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     /// Pixels per row.

@@ -1,4 +1,4 @@
-//! Opening images: input like any other, of which no more is believed than its bytes can hold.
+//! Opening images. Like any input, a file is trusted only as far as its bytes can hold what it claims.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -10,24 +10,24 @@ use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use super::{Format, Image, ImageError};
 use crate::volume::{Access, ReadOptions, VolumeError, npy};
 
-/// No byte of a PNG or EXR file becomes more bytes: of what these compress by, deflate compresses best.
+/// The maximum expansion of a byte in a PNG or EXR file: deflate's, the best compression that they use.
 const MAX_EXPANSION: u64 = 1032;
 
 impl Image {
-    /// Opens an image by the file's extension: `.png` of any type, `.exr`, or `.npy` as [`Image::save`] writes it (f32 of
-    /// shape height × width × 4, in either order). Where a file has no alpha, the image is opaque.
+    /// Opens an image by the file's extension: `.png` of any type, `.exr`, or `.npy` as [`Image::save`] writes it (f32, shape
+    /// height × width × 4, in either order). Without alpha in the file, the image is opaque.
     ///
     /// # Errors
-    /// If the extension is unknown, or the file cannot be read or holds no such image, or the image takes more memory than volumes may by
-    /// default.
+    /// If the extension is unknown, the file cannot be read or holds no such image, or the image needs more memory than
+    /// [`ReadOptions::memory`] allows by default.
     pub fn open(path: &Path) -> Result<Self, ImageError> {
         Self::open_with(path, &ReadOptions::default())
     }
 
-    /// [`Image::open`] under a folder that reading is confined to, or a memory limit.
+    /// Like [`Image::open`], with a folder that files must lie in and a memory limit.
     ///
     /// # Errors
-    /// Those of [`Image::open`], or if the options do not allow it.
+    /// As for [`Image::open`], and if the options do not allow it.
     pub fn open_with(path: &Path, options: &ReadOptions) -> Result<Self, ImageError> {
         let format = Format::of(path)?;
         let access = Access::new(options).map_err(of_volume)?;
@@ -45,7 +45,7 @@ impl Image {
         }
     }
 
-    /// Channels as the file has them, 0 to 1 where they are integers.
+    /// Decodes the file's channels; integers become numbers from 0 to 1.
     fn decode(path: &Path, format: ImageFormat, access: &Access) -> Result<Self, ImageError> {
         let failed = |source: ::image::ImageError| ImageError::Decode { path: path.to_owned(), source: source.into() };
         let bytes = read(path, access)?;
@@ -60,14 +60,14 @@ impl Image {
             return Err(content(path, "size", found, format!("at most {most} pixels")));
         }
         let pixels = u64::from(width) * u64::from(height);
-        // As the file has them, and as floats.
+        // Two copies: as in the file, and as floats.
         let memory = decoder.total_bytes().saturating_add(pixels.saturating_mul(size_of::<[f32; 4]>() as u64));
         access.reserve(path, "size", format_args!("{width} × {height} pixels"), memory).map_err(of_volume)?;
         let image = DynamicImage::from_decoder(decoder).map_err(failed)?.into_rgba32f();
         Ok(Self { width, height, pixels: image.into_raw().as_chunks().0.to_vec() })
     }
 
-    /// An array of rows of pixels of channels, which the reader of volumes takes for slices of rows of voxels.
+    /// An array of rows of pixels of channels, read by the volume reader as slices of rows of voxels.
     fn decode_npy(path: &Path, access: &Access) -> Result<Self, ImageError> {
         let array = npy::read::<f32>(path, access).map_err(of_volume)?;
         let [channels, width, height] = array.dims.to_array();
@@ -82,7 +82,7 @@ impl Image {
     }
 }
 
-/// Checks that no block of an EXR file claims to be larger than the file's bytes can become: decoders make room for a whole block first.
+/// Checks that no block of an EXR file claims more than the file's bytes can hold: decoders allocate a whole block first.
 fn check_blocks(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
     let failed = |source: ::exr::error::Error| ImageError::Decode { path: path.to_owned(), source: source.into() };
     let most = u128::from(MAX_EXPANSION) * bytes.len() as u128;
@@ -105,8 +105,8 @@ fn check_blocks(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
     }
 }
 
-/// How many bits a pixel takes up at least before it is compressed: of a PNG as its first chunk says, whose fields have fixed places, of an
-/// EXR those of three half floats.
+/// The minimum number of bits per pixel before compression: for a PNG by its first chunk, whose fields have fixed places; for an EXR
+/// three half floats.
 fn min_bits_per_pixel(format: ImageFormat, bytes: &[u8]) -> u64 {
     if format != ImageFormat::Png {
         return 3 * 16;
@@ -116,17 +116,17 @@ fn min_bits_per_pixel(format: ImageFormat, bytes: &[u8]) -> u64 {
         2 => 3,
         4 => 2,
         6 => 4,
-        // Grey, or a palette's index.
+        // Grey or palette indices.
         _ => 1,
     };
     u64::from(depth.max(1)) * channels
 }
 
-/// The bytes of a regular file: a pipe or a device may have no end.
+/// The bytes of a regular file; a pipe or a device might never end.
 fn read(path: &Path, access: &Access) -> Result<Vec<u8>, ImageError> {
     let path = &*access.resolve(path).map_err(of_volume)?;
     let failed = |source| ImageError::Io { path: path.to_owned(), source };
-    // Asked before opening: to open a pipe would wait for its writer.
+    // The kind of file is checked before opening, because opening a pipe would wait for its writer.
     if !std::fs::metadata(path).map_err(failed)?.is_file() {
         let found = "a directory, pipe or device".to_owned();
         return Err(content(path, "file", found, "a regular file".to_owned()));
@@ -134,7 +134,7 @@ fn read(path: &Path, access: &Access) -> Result<Vec<u8>, ImageError> {
     std::fs::read(path).map_err(failed)
 }
 
-/// An error of what images share with volumes.
+/// The image error for an error of the volume reader.
 fn of_volume(error: VolumeError) -> ImageError {
     match error {
         VolumeError::Io { path, source, .. } => ImageError::Io { path, source },
@@ -153,7 +153,7 @@ mod tests {
 
     use super::{Image, ImageError};
 
-    /// A small image in tiles, whose header then claims tiles of 2¹³ × 2¹³ pixels.
+    /// A small tiled image whose header is changed to claim tiles of 2¹³ × 2¹³ pixels.
     #[test]
     fn blocks_of_exr_files_are_no_larger_than_the_file_can_hold() {
         let folder = tempfile::tempdir().unwrap();

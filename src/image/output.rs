@@ -1,4 +1,4 @@
-//! Files while they are written: a regular file appears whole or not at all, a pipe or a device is written to as it is.
+//! Output files: a regular file appears whole or not at all; pipes and devices are written directly.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, Metadata, OpenOptions, Permissions};
@@ -8,11 +8,11 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::TempPath;
 
-/// Symbolic links in a row, as on Linux.
+/// The maximum number of chained symbolic links, as on Linux.
 const MAX_LINKS: usize = 40;
 
-/// Temporary files by their own names, removed when they are dropped. The lock is held while one is created, renamed or removed, so
-/// that whoever holds it knows all of them.
+/// The temporary files by name, which are removed when dropped. The lock is held while one is created, renamed or removed, so the
+/// holder of the lock sees all of them.
 static TEMPORARY: Mutex<BTreeMap<PathBuf, TempPath>> = Mutex::new(BTreeMap::new());
 
 fn temporary() -> MutexGuard<'static, BTreeMap<PathBuf, TempPath>> {
@@ -26,9 +26,9 @@ pub fn remove_temporary() -> impl Sized {
     temporary
 }
 
-/// What a path leads to, links followed.
+/// What a path leads to once links are followed.
 pub enum Target {
-    /// A regular file, or none yet, and the permissions of the one that is there.
+    /// A regular file, and its permissions if it exists.
     Regular(PathBuf, Option<Permissions>),
     /// A pipe or a device.
     Stream(PathBuf),
@@ -37,10 +37,10 @@ pub enum Target {
 }
 
 impl Target {
-    /// Finds out what a path leads to, without opening a pipe or a device.
+    /// Determines what a path leads to, without opening a pipe or a device.
     ///
     /// # Errors
-    /// If it leads to a folder, a socket, a file that may not be written, or into a folder that is not there.
+    /// If it leads to a folder, a socket, a file without write permission, or into a folder that does not exist.
     pub fn of(path: &Path) -> io::Result<Self> {
         let metadata = match fs::metadata(path) {
             Err(error) if error.kind() == ErrorKind::NotFound => {
@@ -57,7 +57,7 @@ impl Target {
             return Ok(Self::Standard(standard));
         }
         if metadata.is_file() {
-            // A rename would replace it, whether it may be written or not.
+            // A rename would replace the file even without permission to write it.
             OpenOptions::new().write(true).open(path)?;
             return Ok(Self::Regular(fs::canonicalize(path)?, Some(metadata.permissions())));
         }
@@ -68,7 +68,7 @@ impl Target {
         Ok(Self::Stream(path.to_owned()))
     }
 
-    /// Whether what is written is there at once, and cannot be taken back.
+    /// Whether what is written becomes visible immediately and cannot be undone.
     pub fn is_stream(&self) -> bool {
         !matches!(self, Self::Regular(..))
     }
@@ -76,7 +76,7 @@ impl Target {
     /// Opens a pipe or a device, which may wait for its reader, or creates a temporary file beside a regular file.
     ///
     /// # Errors
-    /// What the operating system says.
+    /// The operating system's error.
     pub fn create(self) -> io::Result<Output> {
         match self {
             Self::Regular(path, permissions) => Output::aside(path, permissions),
@@ -92,7 +92,7 @@ pub struct Output {
     aside: Option<Aside>,
 }
 
-/// A temporary file, and the path that it is to be renamed to.
+/// A temporary file and the path that it will be renamed to.
 struct Aside {
     temporary: PathBuf,
     target: PathBuf,
@@ -111,23 +111,23 @@ impl Output {
         drop(all);
         let output = Self { file, aside: Some(aside) };
         if let Some(permissions) = permissions {
-            // The process's mask may have taken some away.
+            // The process's umask may have removed some permissions.
             output.file.set_permissions(permissions)?;
         }
         Ok(output)
     }
 
-    /// Renames the temporary files of outputs, all of which were written whole, to their own names: all of them or none.
+    /// Renames the temporary files of completely written outputs to their own names: all of them or none.
     ///
     /// # Errors
-    /// The path of an output that cannot be renamed, and what the operating system says of it. The outputs renamed before it are
-    /// undone: files that they replaced are back.
+    /// The path of an output that cannot be renamed, and the operating system's error. The renames before it are undone, which restores
+    /// the files they replaced.
     pub fn commit(outputs: Vec<Self>) -> Result<(), (PathBuf, io::Error)> {
         let mut all = temporary();
         let mut renamed = Vec::new();
         for Aside { temporary, target } in outputs.iter().filter_map(|output| output.aside.as_ref()) {
             let Some(path) = all.remove(temporary) else { continue };
-            // A single rename either happens or does not.
+            // A single rename is atomic.
             let replaced = if outputs.len() > 1 { Replaced::keep(target) } else { Ok(Replaced::default()) };
             match replaced.and_then(|replaced| path.persist(target).map(|()| replaced).map_err(|error| error.error)) {
                 Ok(replaced) => renamed.push((target, replaced)),
@@ -141,7 +141,7 @@ impl Output {
     }
 }
 
-/// What was at a path before an output took its place: a second name of that file, or nothing.
+/// The file at a path before an output replaced it, kept under a second name, if there was one.
 #[derive(Default)]
 struct Replaced(Option<TempPath>);
 
@@ -150,13 +150,13 @@ impl Replaced {
         if !fs::exists(target)? {
             return Ok(Self(None));
         }
-        // Some file systems have no links.
+        // Some file systems do not support links.
         let second = |path: &Path| fs::hard_link(target, path).or_else(|_| fs::copy(target, path).map(|_| ()));
         let kept = tempfile::Builder::new().prefix(".sheetsplat-").make_in(folder(target), second)?;
         Ok(Self(Some(kept.into_temp_path())))
     }
 
-    /// Undoes a rename as far as the operating system lets it: the error that made it necessary is the one to report.
+    /// Undoes a rename as far as possible. An error here is not reported, because the one that made it necessary is.
     fn put_back(self, target: &Path) {
         let _ = match self.0 {
             Some(kept) => kept.persist(target).map_err(io::Error::from),
@@ -187,14 +187,14 @@ impl Drop for Output {
 /// Writes a whole file.
 ///
 /// # Errors
-/// What the operating system says.
+/// The operating system's error.
 pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut output = Target::of(path)?.create()?;
     output.write_all(bytes)?;
     Output::commit(vec![output]).map_err(|(_, error)| error)
 }
 
-/// A path whose last part is no symbolic link, also where the link leads to nothing yet.
+/// The path with symbolic links in its last part followed, even if they lead to a file that does not exist.
 ///
 /// # Errors
 /// If there are too many links, or one cannot be read.
@@ -210,13 +210,13 @@ pub fn resolved(path: &Path) -> io::Result<PathBuf> {
     Err(io::Error::other("too many symbolic links"))
 }
 
-/// The folder that a file is in.
+/// The folder of a file.
 pub fn folder(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Standard output or standard error, if that is the file: a file that another program opened is written on where it stands, as
-/// `/dev/stdout` is meant.
+/// Standard output or standard error, if that is the same file. A file that another program opened is written from its current position,
+/// which is what `/dev/stdout` means.
 #[cfg(unix)]
 fn standard(metadata: &Metadata) -> io::Result<Option<File>> {
     use std::os::fd::AsFd;
@@ -252,7 +252,7 @@ fn is_socket(_: &Metadata) -> bool {
 mod tests {
     use super::*;
 
-    /// The third output becomes a folder after it was checked; a rename onto it fails.
+    /// The third output's target becomes a folder after it was checked, so that a rename onto it fails.
     #[test]
     fn where_one_output_fails_those_before_it_are_undone() {
         let folder = tempfile::tempdir().unwrap();

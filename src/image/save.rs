@@ -15,17 +15,17 @@ pub enum PngDepth {
 }
 
 impl Image {
-    /// Checks that [`Image::save`] knows the extension of a file, so that a long render does not end in vain.
+    /// Checks that [`Image::save`] knows the extension of a file, before a long render.
     ///
     /// # Errors
-    /// If it does not.
+    /// If the extension is unknown.
     pub fn check_format(path: &Path) -> Result<(), ImageError> {
         Format::of(path).map(|_| ())
     }
 
-    /// Saves the image by the file's extension: `.png` (straight alpha, `depth` bits), `.exr` or `.npy` (f32
-    /// premultiplied RGBA; NPY has shape height × width × 4). A regular file is written aside, then renamed, and keeps the permissions
-    /// of the one it replaces; symbolic links are followed, pipes and devices written to.
+    /// Saves the image by the file's extension: `.png` (straight alpha, `depth` bits), or `.exr` or `.npy` (f32 premultiplied RGBA; NPY has
+    /// shape height × width × 4). A regular file is written to a temporary file that is then renamed, with the permissions of the file it
+    /// replaces. Symbolic links are followed; pipes and devices are written directly.
     ///
     /// # Errors
     /// If the extension is unknown or the file cannot be written.
@@ -76,7 +76,7 @@ impl Image {
         }
     }
 
-    /// Every pixel with straight alpha, its channels rounded to steps of 1/`full`; black where nothing is to be seen.
+    /// Each pixel with straight alpha, its channels rounded to steps of 1/`full`; black where alpha is 0.
     pub fn straight_channels(&self, full: u16) -> impl Iterator<Item = [u16; 4]> {
         let full = f32::from(full);
         self.pixels.iter().map(move |&[r, g, b, a]| {

@@ -1,33 +1,49 @@
-//! Bricks: 4×4×4 neighbouring voxels that are tested for visibility together (§6). Each voxel has its place in its brick, so that
-//! voxels enter and leave without moving others.
+//! Bricks: 4×4×4 neighbouring voxels that are tested for visibility together (§6). Each voxel has a fixed slot in its brick, so that voxels
+//! enter and leave without moving others.
 
+use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, UVec3};
 
-use crate::gpu::layout::Brick;
 use crate::volume::Grid;
 
-/// Side of a brick, voxels.
+/// The side of a brick in voxels.
 const SIDE: u32 = 4;
 
-/// Places for voxels in a brick.
+/// The number of slots in a brick.
 pub const BRICK_VOXELS: u32 = SIDE * SIDE * SIDE;
+
+/// 4×4×4 places for voxels, x fastest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Brick {
+    /// Which of the places hold a voxel that takes part, one bit each.
+    pub present: [u32; 2],
+    /// Least x of its voxels.
+    pub x: u32,
+    /// Least y.
+    pub y: u32,
+    /// Least z.
+    pub z: u32,
+    /// Greatest minus least x, y and z, in bytes 0, 1 and 2.
+    pub extent: u32,
+}
 
 /// The bricks of a volume that hold voxels, or held some.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BrickList {
     grid: Grid,
-    /// Number in `bricks` of every brick of the grid, or `NONE`.
+    /// For every brick of the grid its index in `bricks`, or `NONE`.
     numbers: Vec<u32>,
     bricks: Vec<Brick>,
 }
 
 const NONE: u32 = u32::MAX;
 
-/// The extent of a brick whose box is to be fitted again.
+/// The extent of a brick whose box must be fitted again.
 const UNKNOWN: u32 = u32::MAX;
 
 impl BrickList {
-    /// The bricks of some voxels, given as indices into the volume. Bricks come in memory order.
+    /// The bricks of some voxels, given as indices into the volume. Bricks are in memory order.
     pub fn new(grid: &Grid, voxels: &[u32]) -> Self {
         let count = bricks_per_axis(grid).element_product() as usize;
         let mut list = Self { grid: *grid, numbers: vec![NONE; count], bricks: Vec::new() };
@@ -40,7 +56,7 @@ impl BrickList {
         &self.bricks
     }
 
-    /// A voxel's place: the number of its brick times [`BRICK_VOXELS`], and where in the brick. `None` without a brick.
+    /// A voxel's place: the index of its brick times [`BRICK_VOXELS`], plus its slot. `None` if it has no brick.
     pub fn place(&self, voxel: u32) -> Option<u32> {
         let number = self.numbers[brick_of(&self.grid, voxel) as usize];
         (number != NONE).then(|| number * BRICK_VOXELS + slot_of(&self.grid, voxel))
@@ -52,7 +68,7 @@ impl BrickList {
             .is_some_and(|place| present(&self.bricks[(place / BRICK_VOXELS) as usize]) >> (place % 64) & 1 == 1)
     }
 
-    /// Puts voxels in, in new bricks if need be, and takes others out. Bricks stay, though they may be empty.
+    /// Adds voxels, in new bricks if necessary, and removes others. Bricks stay, even if they become empty.
     pub fn change(&mut self, entering: &[u32], leaving: &[u32]) {
         for &voxel in entering {
             let brick = brick_of(&self.grid, voxel);
@@ -68,11 +84,11 @@ impl BrickList {
             brick.present[word] &= !bit;
             brick.extent = UNKNOWN;
         }
-        // Once each: many voxels of a brick may have changed.
+        // Each brick is fitted once, although many of its voxels may have changed.
         self.bricks.iter_mut().filter(|brick| brick.extent == UNKNOWN).for_each(fit);
     }
 
-    /// The same without empty bricks, in memory order: what [`Self::new`] makes of the voxels.
+    /// The list without empty bricks, in memory order, as [`Self::new`] makes it from the voxels.
     pub fn compacted(&self) -> Self {
         let mut list = Self { grid: self.grid, numbers: vec![NONE; self.numbers.len()], bricks: Vec::new() };
         for (new, &old) in list.numbers.iter_mut().zip(&self.numbers) {
@@ -84,13 +100,13 @@ impl BrickList {
         list
     }
 
-    /// A voxel's brick, which there must be, and its bit there.
+    /// A voxel's brick, which must exist, and the voxel's bit in it.
     fn bit(&mut self, voxel: u32) -> (&mut Brick, usize, u32) {
         let (number, slot) = (self.numbers[brick_of(&self.grid, voxel) as usize], slot_of(&self.grid, voxel));
         (&mut self.bricks[number as usize], slot as usize / 32, 1 << (slot % 32))
     }
 
-    /// Adds a brick of the grid, without voxels.
+    /// Adds an empty brick of the grid.
     fn add(&mut self, brick: u32) {
         let across = bricks_per_axis(&self.grid);
         let at = SIDE * UVec3::new(brick % across.x, brick / across.x % across.y, brick / (across.x * across.y));
@@ -99,42 +115,34 @@ impl BrickList {
     }
 }
 
-/// The brick whose places begin at a voxel; `None` if none of them holds a voxel.
-pub fn of_places(origin: UVec3, present: u64) -> Option<Brick> {
-    let present = [present as u32, (present >> 32) as u32];
-    let mut brick = Brick { present, x: origin.x, y: origin.y, z: origin.z, extent: UNKNOWN };
-    fit(&mut brick);
-    (present != [0; 2]).then_some(brick)
-}
-
-/// Which places of a brick hold a voxel.
+/// A mask of a brick's occupied slots.
 pub fn present(brick: &Brick) -> u64 {
     u64::from(brick.present[0]) | u64::from(brick.present[1]) << 32
 }
 
-/// The voxels of a brick: place in the brick, and where in the volume.
+/// The voxels of a brick: the slot and the position in the volume.
 pub fn voxels(brick: &Brick) -> impl Iterator<Item = (u32, UVec3)> {
     let (bits, origin) = (present(brick), origin(brick));
     (0..BRICK_VOXELS).filter(move |slot| bits >> slot & 1 == 1).map(move |slot| (slot, origin + in_brick(slot)))
 }
 
-/// Where in the volume a brick's first place is.
+/// The position of a brick's first slot in the volume.
 pub fn origin(brick: &Brick) -> UVec3 {
     UVec3::new(brick.x, brick.y, brick.z) / SIDE * SIDE
 }
 
-/// The box of a brick's voxels: its middle and half its extent, voxels.
+/// The box of a brick's voxels: its middle and half its size in voxels.
 pub fn bounds(brick: &Brick) -> (DVec3, DVec3) {
     let half = UVec3::new(brick.extent & 0xff, brick.extent >> 8 & 0xff, brick.extent >> 16).as_dvec3() / 2.0;
     (UVec3::new(brick.x, brick.y, brick.z).as_dvec3() + half, half)
 }
 
-/// Memory order of bricks, whatever the order in which they were added.
+/// A key that sorts bricks in memory order, whatever the order in which they were added.
 pub fn position(brick: &Brick) -> [u32; 3] {
     [brick.z / SIDE, brick.y / SIDE, brick.x / SIDE]
 }
 
-/// Where in a brick a place is.
+/// The position of a slot within its brick.
 pub fn in_brick(slot: u32) -> UVec3 {
     UVec3::new(slot % SIDE, slot / SIDE % SIDE, slot / (SIDE * SIDE))
 }
@@ -143,13 +151,13 @@ fn bricks_per_axis(grid: &Grid) -> UVec3 {
     grid.dims.map(|n| n.div_ceil(SIDE))
 }
 
-/// Number of a voxel's brick in the grid of bricks.
+/// The index of a voxel's brick in the grid of bricks.
 fn brick_of(grid: &Grid, voxel: u32) -> u32 {
     let (at, across) = (grid.voxel_at(voxel) / SIDE, bricks_per_axis(grid));
     at.x + across.x * (at.y + across.y * at.z)
 }
 
-/// A voxel's place in its brick.
+/// A voxel's slot in its brick.
 fn slot_of(grid: &Grid, voxel: u32) -> u32 {
     let at = grid.voxel_at(voxel) % SIDE;
     at.x + SIDE * (at.y + SIDE * at.z)
@@ -157,7 +165,7 @@ fn slot_of(grid: &Grid, voxel: u32) -> u32 {
 
 /// Fits a brick's box tightly around its voxels.
 fn fit(brick: &mut Brick) {
-    // The places of the first layer across x, y and z; the others follow bit by bit, row by row, slice by slice.
+    // Masks of the first layer across x, y and z; shifts by a bit, a row or a slice give the others.
     const LAYERS: [(u64, u32); 3] = [(0x1111_1111_1111_1111, 1), (0x000f_000f_000f_000f, SIDE), (0xffff, SIDE * SIDE)];
     let bits = present(brick);
     if bits == 0 {

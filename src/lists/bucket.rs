@@ -1,24 +1,23 @@
-//! Buckets (§5.1): which things touch which slab, without storing a thing twice.
+//! Buckets (§5.1): the items that touch each slab, with every item stored once.
 //!
-//! Things (bricks of voxels) are sorted by the first slab (sheet group) they touch. None touches more than `reach` slabs, so
-//! those that touch slab k lie between the first whose first slab is k - reach + 1 and the last whose first slab is k: one
-//! contiguous range.
+//! Items (bricks of voxels) are sorted by the first slab (sheet group) they touch. No item touches more than `reach` slabs, so the items
+//! that touch slab k are a contiguous range: from the first whose first slab is k - reach + 1 to the last whose first slab is k.
 
 use std::ops::Range;
 
 /// The buckets of one list.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Buckets {
-    /// Indices into the list, sorted by first slab; within one slab in list order.
+    /// Indices into the list, sorted by first slab; within a slab in list order.
     pub order: Vec<u32>,
-    /// `starts[i]..starts[i + 1]` of `order` are the things whose first slab is `base + i`.
+    /// `starts[i]..starts[i + 1]` of `order` are the items whose first slab is `base + i`.
     starts: Vec<u32>,
     base: i32,
     reach: i32,
 }
 
 impl Buckets {
-    /// Counting sort of things by the first of the slabs they touch.
+    /// Sorts items by the first slab they touch, with a counting sort.
     pub fn sort(touched: &[Range<i32>]) -> Self {
         let base = touched.iter().map(|slabs| slabs.start).min().unwrap_or(0);
         let end = touched.iter().map(|slabs| slabs.start + 1).max().unwrap_or(base);
@@ -40,13 +39,13 @@ impl Buckets {
         Self { order, starts, base, reach }
     }
 
-    /// The slabs that anything can touch.
+    /// The slabs that any item can touch.
     pub fn range(&self) -> Option<Range<i32>> {
         let last = self.base + self.starts.len() as i32 - 2;
         (!self.order.is_empty()).then(|| self.base..last + self.reach)
     }
 
-    /// The range of `order` that holds everything that touches slab `k`.
+    /// The range of `order` that holds every item that touches slab `k`.
     pub fn touching(&self, k: i32) -> Range<u32> {
         let start = |slab: i32| self.starts[(slab - self.base).clamp(0, self.starts.len() as i32 - 1) as usize];
         start(k - self.reach + 1)..start(k + 1)

@@ -1,4 +1,4 @@
-//! Classification (SPEC §3): which voxels take part. What they look like is decided when they are shaded.
+//! Classification (SPEC §3): which voxels take part. Shading determines their appearance.
 
 use rayon::prelude::*;
 
@@ -6,7 +6,7 @@ use crate::settings::clip::ClippedVoxels;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::Volume;
 
-/// Indices of the voxels that take part, in memory order, x fastest.
+/// The indices of the voxels that take part, in memory order.
 pub fn classify(volume: &Volume, transfer: &TransferFunction, clipped: &ClippedVoxels) -> Vec<u32> {
     in_rows(volume, |y, z, row| {
         let inside = clipped.in_row(y, z, volume.dims().x);
@@ -14,7 +14,7 @@ pub fn classify(volume: &Volume, transfer: &TransferFunction, clipped: &ClippedV
     })
 }
 
-/// What a function picks from every row of voxels along x, given its y, its z and the index of its first voxel, in memory order.
+/// Concatenates what `pick` selects from every row of voxels along x, given its y, its z and the index of its first voxel, in memory order.
 pub fn in_rows(volume: &Volume, pick: impl Fn(u32, u32, u32) -> Vec<u32> + Sync) -> Vec<u32> {
     let dims = volume.dims();
     let row = |row: u32| pick(row % dims.y, row / dims.y, row * dims.x);
@@ -22,11 +22,11 @@ pub fn in_rows(volume: &Volume, pick: impl Fn(u32, u32, u32) -> Vec<u32> + Sync)
     rows.concat()
 }
 
-/// Whether a voxel that is not clipped takes part: no hole, visible, inside an iso-range and with an opacity above 0.
+/// Whether a voxel that is not clipped takes part: it is not a hole, visible, inside an iso-range, and has an opacity above 0.
 pub fn takes_part(volume: &Volume, transfer: &TransferFunction, index: u32) -> bool {
     let value = f64::from(volume.values()[index as usize]);
     let tables = transfer.tables(volume.label(index));
-    // Most voxels are ruled out by their value, and without a gradient opacity nothing else counts: spare them the gradient.
+    // Most voxels are excluded by their value, and without gradient opacity the value decides: the gradient is computed only if needed.
     let may_take_part =
         !value.is_nan() && tables.visible && tables.opacity.at(value) > 0.0 && tables.in_iso_range(value);
     may_take_part

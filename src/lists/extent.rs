@@ -1,4 +1,4 @@
-//! Where in a volume the voxels lie that take part.
+//! The extent of the voxels that take part.
 
 use glam::UVec3;
 use rayon::prelude::*;
@@ -9,8 +9,8 @@ use crate::settings::clip::ClippedVoxels;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::Volume;
 
-/// The first and the last voxel along each axis of those that take part, without the outermost ones: along each axis and at either end at
-/// most a share of `specks` of them. `None` if no voxel takes part.
+/// The first and last position along each axis of the voxels that take part, ignoring at either end at most the fraction `specks` of
+/// them. `None` if no voxel takes part.
 pub(crate) fn of_voxels(
     volume: &Volume,
     transfer: &TransferFunction,
@@ -21,7 +21,7 @@ pub(crate) fn of_voxels(
     let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
     let set = ValueSet::of(transfer);
     let needs_more = !transfer.labels.is_empty() || transfer.gradient_opacity.is_some();
-    // Voxels by x and by y, over the slices that a thread takes, and all those of every slice.
+    // Counts of voxels by x and by y over the slices of a thread, and for every slice.
     let zeros = || (vec![0_u64; nx], vec![0_u64; ny], vec![0_u64; nz]);
     let counted = (0..dims.z).into_par_iter().fold(zeros, |(mut xs, mut ys, mut zs), z| {
         for y in 0..dims.y {
@@ -52,7 +52,7 @@ fn sums(mut a: Vec<u64>, b: &[u64]) -> Vec<u64> {
     a
 }
 
-/// Where, from either end, more than a share of what is counted has been passed.
+/// The positions at which, counted from either end, more than a fraction of all counts has been passed.
 fn ends(counts: &[u64], share: f64) -> Option<[u32; 2]> {
     let most = share * counts.iter().sum::<u64>() as f64;
     let is_end = |passed: &mut u64, &count: &u64| {
@@ -75,7 +75,7 @@ mod tests {
 
     const DIMS: UVec3 = UVec3::new(30, 20, 25);
 
-    /// A block of `[first, last]` with the value 100, and single voxels with the value 100 besides.
+    /// A volume with the value 100 in the block `[first, last]` and in some single voxels.
     fn volume([first, last]: [UVec3; 2], specks: &[UVec3]) -> Volume {
         let is_in = |voxel: UVec3| voxel.cmpge(first).all() && voxel.cmple(last).all();
         let voxels =
@@ -95,7 +95,7 @@ mod tests {
         let specks = [UVec3::new(1, 19, 0), UVec3::new(29, 0, 24)];
         let volume = volume(block, &specks);
         let of = |share| of_voxels(&volume, &transfer(), &ClippedVoxels::default(), share);
-        // 17·11·11 + 2 = 2059 voxels, of which 0.1 % are two: one speck is left out at either end.
+        // Of 17·11·11 + 2 = 2059 voxels, 0.1 % are two: one speck is ignored at either end.
         assert_eq!(of(0.001), Some(block));
         assert_eq!(of(0.0004), Some([UVec3::new(1, 0, 0), UVec3::new(29, 19, 24)]));
         assert_eq!(of(0.0), Some([UVec3::new(1, 0, 0), UVec3::new(29, 19, 24)]));

@@ -1,52 +1,50 @@
-//! Iso-ranges as sets of `f32` values (§5): what a transfer function lets take part, and how two of them differ.
+//! Iso-ranges as sets of `f32` values (§5): the values that can take part under a transfer function, and the difference of two sets.
 //!
-//! Every finite `f32` has an ordinal that orders as the values do, so that intervals with open and closed ends are all half-open
-//! ranges of whole numbers.
+//! Every finite `f32` has an ordinal that sorts like the value, so intervals with open or closed ends are half-open ranges of integers.
 
 use std::ops::Range;
 
 use crate::settings::transfer_function::{Ramp, Tables, TransferFunction};
 
-/// A set of values: ranges of ordinals, ascending, disjoint and not adjacent.
+/// A set of values: ranges of ordinals that are ascending, disjoint and not adjacent.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ValueSet {
     ranges: Vec<Range<u32>>,
 }
 
-/// Where a value stands among all `f32`; the two zeros are one.
+/// The position of a value among all `f32`; both zeros have the same.
 pub fn ordinal(value: f32) -> u32 {
     let bits = (value + 0.0).to_bits();
     if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
 }
 
-/// The value of an [`ordinal`].
+/// The value with an [`ordinal`].
 pub fn of_ordinal(ordinal: u32) -> f32 {
     f32::from_bits(if ordinal >> 31 == 1 { ordinal & !(1 << 31) } else { !ordinal })
 }
 
-/// Above the ordinals of all finite values; that of a hole is larger.
+/// Above the ordinals of all finite values, and below that of a hole.
 const END: u32 = f32::INFINITY.to_bits() | 1 << 31;
 
-/// Ordinal of the first `f32` that is at least `x`.
+/// The ordinal of the smallest `f32` that is at least `x`.
 fn at_least(x: f64) -> u32 {
     let nearest = x as f32;
     ordinal(if f64::from(nearest) < x { nearest.next_up() } else { nearest })
 }
 
-/// Ordinal of the first `f32` above `x`.
+/// The ordinal of the smallest `f32` above `x`.
 fn above(x: f64) -> u32 {
     let nearest = x as f32;
     ordinal(if f64::from(nearest) <= x { nearest.next_up() } else { nearest })
 }
 
 impl ValueSet {
-    /// The values that can take part under a transfer function (SPEC §3) without a label: in an iso-range, and with an opacity
-    /// above 0.
+    /// The values that can take part under a transfer function (SPEC §3) without labels: in an iso-range, and with an opacity above 0.
     pub fn of(transfer: &TransferFunction) -> Self {
         Self::of_tables(&transfer.tables(None))
     }
 
-    /// The values that can take part under the tables of a label.
+    /// The values that can take part under a label's tables.
     pub fn of_tables(tables: &Tables) -> Self {
         if !tables.visible {
             return Self::default();
@@ -60,13 +58,13 @@ impl ValueSet {
         }
     }
 
-    /// Where a ramp with ordinates of at least 0 is above 0.
+    /// Where a ramp that is nowhere negative is above 0.
     fn support(ramp: &Ramp<f64>) -> Self {
         let points = ramp.points();
         let mut ranges = Vec::new();
         for (at, &(x, y)) in points.iter().enumerate() {
             let before = at.checked_sub(1).map(|before| points[before]);
-            // Between this point and the one before it, clamped beyond the first.
+            // The interval from the previous point to this one, clamped before the first.
             if y > 0.0 || before.is_some_and(|(_, y)| y > 0.0) {
                 ranges.push(before.map_or(0, |(x, _)| above(x))..at_least(x));
             }
@@ -103,9 +101,9 @@ impl ValueSet {
         Self::of_ranges([self.ranges.clone(), other.ranges.clone()].concat())
     }
 
-    /// The values in one of the two sets alone.
+    /// The values in exactly one of the two sets.
     pub fn symmetric_difference(&self, other: &Self) -> Self {
-        // What is left of both between the common parts.
+        // The rest of both between their common parts.
         let common = self.intersection(other);
         let starts = common.ranges.iter().map(|range| range.end);
         let ends = common.ranges.iter().map(|range| range.start);

@@ -1,5 +1,5 @@
-//! Which bricks every sheet group of every patch looks at: the buckets (§5.1) of the tile rasterizer, which walks a patch's
-//! groups front to back.
+//! The bricks that every sheet group of every patch visits: the buckets (§5.1) of the tile rasterizer, which walks a patch's groups
+//! front to back.
 
 use std::ops::Range;
 
@@ -9,55 +9,55 @@ use rayon::prelude::*;
 use crate::after::plane_geometry::PlaneGeometry;
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::gpu::layout::Brick;
 use crate::lists::brick;
+use crate::lists::brick::Brick;
 use crate::setting_error::SettingError;
 use crate::settings::splatting::Order;
 
-/// Width and height of the rasterizer's patches, pixels.
+/// The width and height of the rasterizer's patches in pixels.
 pub const PATCH: [u32; 2] = [16, 8];
 
-/// Blocks of 8×4 pixels in a patch, which the smallest subgroup draws in as many rounds.
+/// The number of 8×4 pixel blocks in a patch, which the smallest subgroup draws in as many rounds.
 pub const BLOCKS: u32 = 4;
 
-/// Sheets of a group.
+/// The number of sheets in a group.
 pub const SHEETS: u32 = 4;
 
-/// The most bricks: their numbers share a word with a place in the brick.
+/// The maximum number of bricks: a brick's index shares a word with a slot.
 const MAX_BRICKS: usize = 1 << 26;
 
-/// The maximum number of passes through loops that a thread takes in one dispatch: llvmpipe ends a thread's loops after 65 535 passes. Every loop
-/// costs one extra pass for its exit check, and so do the loops nested in it. Threads count their passes and continue in the next
-/// dispatch. The remainder is for the work before the first group, which looks at every pixel's ray, and after the last.
+/// The maximum number of passes through loops that a thread takes in one dispatch: llvmpipe ends a thread's loops after 65 535 passes. Every
+/// loop costs one extra pass for its exit check, and so do the loops nested in it. Threads count their passes and continue in the next
+/// dispatch. The difference is left for the work before the first group, which examines every pixel's ray, and after the last.
 const MAX_PASSES: u32 = 64900;
 
-/// The maximum number of passes that a group takes beside its bricks, and that each of its blocks adds, with 8 threads in a subgroup.
-const PASSES_PER_GROUP: u32 = 60;
-const PASSES_PER_BLOCK: u32 = 40;
+/// The maximum number of passes of a group without its bricks, and the additional passes per block, for subgroups of 8 threads.
+const MAX_PASSES_OF_GROUP: u32 = 60;
+const MAX_PASSES_OF_BLOCK: u32 = 40;
 
-/// The maximum number of passes that a brick takes, with 8 threads in a subgroup: 8 to fetch and visit it, 76 to find its voxels, 56 to shade them, 8 to keep
-/// them, and 10 where the queue is full.
-const PASSES_PER_BRICK: u32 = 158;
+/// The maximum number of passes of a brick, for subgroups of 8 threads: 8 to fetch and visit it, 76 to find its voxels, 56 to shade them,
+/// 8 to keep them, and 10 where the queue is full.
+const MAX_PASSES_OF_BRICK: u32 = 158;
 
-/// Passes to add a brick's voxels to a block.
-const PASSES_PER_ADDITION: u32 = 56;
+/// The number of passes that add a brick's voxels to a block.
+const MAX_PASSES_OF_ADDITION: u32 = 56;
 
-/// Times that a brick's voxels are shaded side by side.
+/// The number of times that a brick's voxels are shaded in parallel.
 const SHADED_PER_BRICK: u32 = 8;
 
-/// Passes to look at how a block's rays are cut, or along which way means are taken, where that is asked for.
-const PASSES_PER_LOOK: u32 = 140;
+/// The number of passes that determine how a block's rays are cut, or over which stretch means count, if needed.
+const MAX_PASSES_OF_LOOK: u32 = 140;
 
-/// The passes through loops that a thread may take, and the maxima that its work takes.
+/// The maximum number of passes through loops per thread, and the maxima for each kind of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Passes {
-    /// In one dispatch.
+    /// The passes in one dispatch.
     pub most: u32,
-    /// For a group, bricks not counted.
+    /// The passes of a group without its bricks.
     pub per_group: u32,
-    /// For a brick.
+    /// The passes of a brick.
     pub per_brick: u32,
-    /// To look up a voxel's control points in memory.
+    /// The passes to look up a voxel's control points in memory.
     pub search: u32,
 }
 
@@ -65,8 +65,8 @@ impl Passes {
     /// The passes of a view in which a workgroup draws `blocks` blocks of a patch, and looking up a voxel's control points in memory takes at
     /// most `search` passes.
     pub fn new(search: u32, blocks: u32) -> Self {
-        let per_group = PASSES_PER_GROUP + blocks * (PASSES_PER_BLOCK + PASSES_PER_LOOK);
-        let per_brick = PASSES_PER_BRICK + blocks * PASSES_PER_ADDITION + SHADED_PER_BRICK * search;
+        let per_group = MAX_PASSES_OF_GROUP + blocks * (MAX_PASSES_OF_BLOCK + MAX_PASSES_OF_LOOK);
+        let per_brick = MAX_PASSES_OF_BRICK + blocks * MAX_PASSES_OF_ADDITION + SHADED_PER_BRICK * search;
         Self { most: MAX_PASSES, per_group, per_brick, search }
     }
 }
@@ -76,32 +76,32 @@ impl Passes {
 pub struct PatchBins {
     /// The first slab of the nearest group.
     pub first_slab: i32,
-    /// Number of patches.
+    /// The number of patches.
     pub patches: u32,
-    /// Sheet groups of every patch.
+    /// The number of sheet groups of every patch.
     pub groups: u32,
-    /// Where every patch's groups start in `entries`, in the order they are composited in, patch after patch; at last the end.
+    /// The start in `entries` of every patch's groups, in compositing order, patch after patch; finally the end.
     pub starts: Vec<u32>,
-    /// Numbers of bricks.
+    /// Indices of bricks.
     pub entries: Vec<u32>,
-    /// For every group, nearest first, half the screen box around its footprints, pixels.
+    /// For every group, nearest first, half the screen box in pixels around its footprints.
     pub half_boxes: Vec<DVec2>,
-    /// Workgroups that a patch is divided among: its blocks, if there is too much behind one for all of them together.
+    /// The number of workgroups per patch: one, or one per block if too much lies behind some patch.
     pub workgroups: u32,
-    /// What bounds a dispatch.
+    /// The limits on a dispatch.
     pub passes: Passes,
-    /// Dispatches that are enough for every patch.
+    /// A number of dispatches that suffices for every patch.
     pub dispatches: u32,
 }
 
-/// What makes a view too large for the tile rasterizer.
+/// The quantity that makes a view too large for the tile rasterizer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TileCapacityError {
-    /// What there is too much of.
+    /// The name of the quantity.
     pub what: &'static str,
-    /// How much there is.
+    /// Its value.
     pub required: u64,
-    /// How much there may be.
+    /// Its maximum.
     pub actual: u64,
 }
 
@@ -112,7 +112,7 @@ impl From<TileCapacityError> for RenderError {
     }
 }
 
-/// Where a brick's voxels are: bounds of their pixel coordinates, and the groups that their kernels may reach.
+/// A brick's position in the view: bounds of its voxels' pixel coordinates, and the groups that their kernels may reach.
 struct Placed {
     number: u32,
     low: DVec2,
@@ -120,20 +120,19 @@ struct Placed {
     groups: Range<i32>,
 }
 
-/// Pixels that footprints may touch, both ends inclusive.
+/// The pixels that footprints may touch, both ends inclusive.
 struct Pixels {
     first: [u32; 2],
     last: [u32; 2],
 }
 
 impl PatchBins {
-    /// Sorts bricks by the patches and groups they may touch, with kernels of the radius `support`, or with what of these is seen on `planes` where
-    /// classification comes after splatting. The sheet depths `covered` are in some
-    /// group even where they hold nothing. To look up a voxel's control points in memory takes at most `search` passes through loops.
-    /// Neither list may have more than `most_words` words.
+    /// Sorts bricks by the patches and groups they may touch, with kernels of the radius `support`. With `planes` (SPEC §9) it is a brick's
+    /// planes that count, and its footprints on them. The sheet depths `covered` belong to some group even if they are empty. Looking up a
+    /// voxel's control points in memory takes at most `search` passes through loops. Neither list may have more than `most_words` words.
     ///
     /// # Errors
-    /// If there are more bricks, or more of them behind a patch, than the rasterizer can take.
+    /// If there are more bricks in total, or behind a patch, than the rasterizer supports.
     pub fn new(
         bricks: &[Brick],
         (view, planes): (&ViewGeometry, Option<&PlaneGeometry>),
@@ -203,10 +202,10 @@ impl PatchBins {
     }
 }
 
-/// How many strips of patches each thread sorts, one after the other.
+/// The number of strips of patches that each thread sorts in turn.
 const STRIPS_PER_THREAD: u32 = 2;
 
-/// A counting sort of bricks, in strips of rows of patches: these have bins that are next to each other.
+/// A counting sort of bricks in strips of rows of patches, whose bins are contiguous.
 struct Sort<'a> {
     placed: &'a [Placed],
     half_boxes: &'a [DVec2],
@@ -215,7 +214,7 @@ struct Sort<'a> {
     size: [u32; 2],
 }
 
-/// Some rows of patches, and how many bricks their bins hold.
+/// Some rows of patches, and the number of bricks in each of their bins.
 struct Strip {
     rows: Range<u32>,
     counts: Vec<u32>,
@@ -223,7 +222,7 @@ struct Strip {
 }
 
 impl Sort<'_> {
-    /// Calls `visit` with every brick's number and each of its bins, of those of some rows of patches.
+    /// Calls `visit` with the index of every brick and each of its bins, within some rows of patches.
     fn visit(&self, rows: &Range<u32>, mut visit: impl FnMut(u32, usize)) {
         let ([columns, _], groups) = (grid(self.size), self.half_boxes.len());
         let farthest = self.half_boxes.iter().fold(0.0_f64, |farthest, half_box| farthest.max(half_box.y)) + SLACK;
@@ -237,7 +236,7 @@ impl Sort<'_> {
                     Order::BackToFront => groups - 1 - nth,
                 };
                 let half_box = self.half_boxes[nth];
-                // Without perspective groups have one size of box.
+                // Without perspective all groups have the same box.
                 let (_, pixels) = match &touched {
                     Some(touched) if touched.0 == half_box => touched,
                     _ => touched.insert((half_box, brick.pixels(half_box, self.size))),
@@ -263,7 +262,7 @@ impl Sort<'_> {
         Strip { rows, counts, entries }
     }
 
-    /// The entries of a strip's bins, one bin after the other.
+    /// The entries of a strip's bins, bin after bin.
     fn sorted(&self, strip: &Strip) -> Vec<u32> {
         let mut end = 0;
         let starts = strip.counts.iter().map(|count| {
@@ -280,11 +279,11 @@ impl Sort<'_> {
     }
 }
 
-/// Pixels around footprints' boxes, for rounding errors: more than the shader rounds with.
+/// A margin in pixels around footprints' boxes, larger than the shader's rounding errors.
 const SLACK: f64 = 0.02;
 
 impl Placed {
-    /// Pixels that footprints may touch which reach so far around voxels.
+    /// The pixels touched by footprints that reach `half_box` around the voxels.
     fn pixels(&self, half_box: DVec2, size: [u32; 2]) -> Option<Pixels> {
         let reach = half_box + SLACK;
         let first = (self.low - reach - 0.5).ceil().max(DVec2::ZERO);
@@ -294,7 +293,7 @@ impl Placed {
     }
 }
 
-/// The bricks that are before the eye, in memory order whatever changes of iso-range came before: equal scenes add up in equal order.
+/// The bricks in front of the eye, in memory order, so that equal scenes add up in equal order after any history of changes.
 fn place(bricks: &[Brick], view: &ViewGeometry, planes: Option<&PlaneGeometry>) -> Vec<Placed> {
     let groups = view.slabs.groups(SHEETS);
     let mut placed: Vec<Placed> = (bricks.par_iter().enumerate())
@@ -321,12 +320,12 @@ fn place(bricks: &[Brick], view: &ViewGeometry, planes: Option<&PlaneGeometry>) 
     placed
 }
 
-/// Columns and rows of patches of an image.
+/// The number of columns and rows of patches in an image.
 pub fn grid(size: [u32; 2]) -> [u32; 2] {
     [size[0].div_ceil(PATCH[0]), size[1].div_ceil(PATCH[1])]
 }
 
-/// Dispatches that are enough for every patch: in each it takes groups until one might be too much.
+/// A number of dispatches that suffices for every patch: each processes groups until the next one might exceed the passes.
 fn dispatches(starts: &[u32], groups: usize, passes: &Passes) -> Result<u32, TileCapacityError> {
     let most_bricks = passes.most.saturating_sub(passes.per_group) / passes.per_brick;
     let of_patch = |first: usize| {

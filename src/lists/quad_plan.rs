@@ -1,4 +1,4 @@
-//! The frame plan: everything a frame's passes need, as plain data made without a GPU.
+//! The frame plan: everything that a frame's passes need, as plain data made without a GPU.
 
 use std::ops::Range;
 
@@ -7,46 +7,46 @@ use rayon::prelude::*;
 
 use crate::geometry::slab;
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::gpu::layout::Brick;
 use crate::lists::brick;
+use crate::lists::brick::Brick;
 use crate::lists::bucket::Buckets;
 use crate::settings::splatting::Order;
 
-/// Side of a tile, pixels (§6).
+/// The side of a tile in pixels (§6).
 pub const TILE: u32 = 32;
 
-/// Tiles across and down an image.
+/// The number of tiles across and down an image.
 pub fn tile_grid(size: [u32; 2]) -> [u32; 2] {
     size.map(|pixels| pixels.div_ceil(TILE))
 }
 
-/// A frame: which bricks every sheet group looks at, in the order the groups are composited.
+/// The plan of a frame: the bricks that every sheet group visits, in compositing order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FramePlan {
-    /// The view; that of another frame's plan will do where [`ViewGeometry::has_depths_of`] says so.
+    /// The view, or another one for which [`ViewGeometry::has_depths_of`] holds.
     pub view: ViewGeometry,
-    /// Sheets of a group.
+    /// The number of sheets in a group.
     pub sheets: u32,
-    /// For every list its bricks, sorted by first group.
+    /// For every list, its bricks sorted by first group.
     pub orders: Vec<Vec<u32>>,
-    /// The groups that any brick may reach into, and those that count without.
+    /// The groups that a brick may reach, and those that count even if they are empty.
     pub groups: Vec<GroupPlan>,
 }
 
 /// One sheet group.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GroupPlan {
-    /// Its first slab.
+    /// The group's first slab.
     pub first_slab: i32,
-    /// Sheet depths of its near and far plane.
+    /// The sheet depths of its near and far plane.
     pub planes: Range<f64>,
-    /// For every list the range of its bricks that can reach into the group.
+    /// For every list, the range of its bricks that may reach into the group.
     pub bricks: Vec<Range<u32>>,
 }
 
 impl FramePlan {
-    /// Buckets the bricks of every list (§5.1), in groups of `sheets` sheets. The sheet depths `covered` count even where they hold
-    /// nothing.
+    /// Sorts the bricks of every list into buckets (§5.1) of groups of `sheets` sheets. The sheet depths `covered` count even if they are
+    /// empty.
     pub fn new<'a>(
         lists: impl IntoIterator<Item = &'a [Brick]>,
         view: ViewGeometry,
@@ -54,12 +54,12 @@ impl FramePlan {
         order: Order,
         covered: Range<f64>,
     ) -> Self {
-        // A group is a thick slab.
+        // A group is treated as a thick slab.
         let groups = view.slabs.groups(sheets);
         let buckets: Vec<Buckets> = lists
             .into_iter()
             .map(|bricks| {
-                // In memory order, whatever changes of iso-range came before: equal scenes add up in equal order.
+                // Bricks are in memory order, so that equal scenes add up in equal order after any history of changes.
                 let mut in_memory: Vec<u32> = (0..bricks.len() as u32).collect();
                 let position = |&at: &u32| brick::position(&bricks[at as usize]);
                 if !in_memory.is_sorted_by_key(position) {
@@ -98,19 +98,19 @@ impl FramePlan {
     }
 }
 
-/// What the voxels of some bricks overlap.
+/// Counts of the overlaps between voxels and slabs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Overlaps {
-    /// Voxels that overlap any slab: in perspective those beyond the near plane.
+    /// Voxels that overlap any slab; in perspective, those beyond the near plane.
     pub voxels: u64,
-    /// Voxel–slab overlaps of positive length, wherever they fall on the screen.
+    /// Voxel–slab overlaps of positive length, on or off the screen.
     pub sections: u64,
-    /// From the first to the last slab.
+    /// The slabs from the first to the last.
     pub slabs: Range<i32>,
 }
 
 impl Overlaps {
-    /// Those of some bricks.
+    /// Counts the overlaps of the voxels in some bricks.
     pub fn count(bricks: &[Brick], view: &ViewGeometry) -> Self {
         let bricks = bricks.par_iter();
         if view.perspective.is_none() {
@@ -125,7 +125,35 @@ impl Overlaps {
             .reduce(Self::default, Self::and)
     }
 
-    /// Those of two lists of bricks.
+    /// The planes of values that voxels' kernels meet, where classification comes after splatting (SPEC §9), and the slabs that the cells
+    /// of bricks lie in.
+    pub fn count_planes(bricks: &[Brick], view: &ViewGeometry) -> Self {
+        let row = view.screen_from_voxel[2];
+        let in_slabs = |depth: f64| (depth - view.slabs.origin) / view.slabs.width;
+        let reach = view.reach / view.slabs.width;
+        // There is no value at the eye and behind it.
+        let first_plane = if view.perspective.is_some() { 1.0 } else { f64::NEG_INFINITY };
+        let nearest = view.perspective.map_or(f64::NEG_INFINITY, |seen| seen.eye.near / view.slabs.width);
+        let of_brick = |brick: &Brick| {
+            let planes = brick::voxels(brick).map(|(_, voxel)| {
+                let depth = in_slabs(row.dot(voxel.as_dvec3().extend(1.0)));
+                let first = ((depth - reach + slab::ROUNDING).floor() + 1.0).max(first_plane);
+                ((depth + reach - slab::ROUNDING).ceil() - first).max(0.0) as u64
+            });
+            let (middle, half) = brick::bounds(brick);
+            let middle = in_slabs(row.dot(middle.extend(1.0)));
+            let spread = row.truncate().abs().dot(half + 0.5) / view.slabs.width;
+            let first = (middle - spread).max(nearest);
+            Self {
+                voxels: brick::present(brick).count_ones().into(),
+                sections: planes.sum(),
+                slabs: first.floor() as i32..((middle + spread).ceil() as i32).max(first.floor() as i32),
+            }
+        };
+        bricks.par_iter().map(of_brick).reduce(Self::default, Self::and)
+    }
+
+    /// The counts of two lists of bricks together.
     pub fn and(self, other: Self) -> Self {
         match [self.voxels, other.voxels] {
             [0, _] => other,
@@ -139,14 +167,14 @@ impl Overlaps {
     }
 }
 
-/// Sheet depths without perspective, in slabs: those of a brick's places are the brick's and the place's. Frames are counted as often
-/// as they are drawn, hence sums instead of [`ViewGeometry::touched`] for every voxel.
+/// Sheet depths in slabs, without perspective: a voxel's is the sum of its brick's and its slot's. Every new view counts all voxels, so
+/// these sums replace [`ViewGeometry::touched`].
 struct PlaceDepths {
-    /// Of a voxel and 1.
+    /// The row for a voxel and 1.
     depth: DVec4,
-    /// Of places, from the brick's first.
+    /// The depths of slots relative to the brick's first.
     places: [f64; brick::BRICK_VOXELS as usize],
-    /// Of a kernel.
+    /// The reach of a kernel.
     reach: f64,
 }
 
@@ -175,7 +203,7 @@ impl PlaceDepths {
     }
 }
 
-/// The largest integer that is not above a slab's number: the numbers' range lets it do without the system's `floor`.
+/// The largest integer up to a slab's number. The range of these numbers makes the system's `floor` unnecessary.
 fn floor(slab: f64) -> i32 {
     const ABOVE_0: i32 = 2 * slab::MAX_SLABS as i32;
     (slab + f64::from(ABOVE_0)) as i32 - ABOVE_0

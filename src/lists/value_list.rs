@@ -1,4 +1,4 @@
-//! Table 1's list of relevant voxels, sorted by value once: any iso-range is then one or two binary searches away (§5.1).
+//! Table 1's list of relevant voxels, sorted once by value, so that one or two binary searches find any iso-range (§5.1).
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::lists::iso_range::{ValueSet, ordinal};
 
-/// The relevant voxels of a volume, all but those of the least value and the holes, sorted by value and then by index.
+/// The relevant voxels of a volume, which exclude holes and voxels of the minimum value, sorted by value and then by index.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ValueList {
     least: u32,
@@ -26,7 +26,7 @@ impl ValueList {
         Self { least, voxels: keyed.par_iter().map(|&key| key as u32).collect() }
     }
 
-    /// The voxels whose values are in a set, range by range. Those of the least value are looked for in the volume.
+    /// The voxels whose values are in a set, range by range. Voxels of the minimum value are searched for in the volume.
     pub fn within(&self, values: &[f32], set: &ValueSet) -> Vec<u32> {
         let mut found = Vec::new();
         for range in set.ranges() {
@@ -45,7 +45,7 @@ impl ValueList {
         &self.voxels[start(range.start)..start(range.end)]
     }
 
-    /// Bytes of memory.
+    /// The size of the list in bytes.
     pub fn bytes(&self) -> u64 {
         (self.voxels.len() * size_of::<u32>()) as u64
     }

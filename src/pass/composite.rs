@@ -1,4 +1,4 @@
-//! Composites a group of sheet buffers into the compositing buffer (eq. 2) and notes opaque pixels.
+//! Composites a group of sheet buffers into the compositing buffer (eq. 2) and marks opaque pixels.
 
 use std::sync::OnceLock;
 
@@ -10,24 +10,24 @@ use crate::gpu::shaders;
 use crate::gpu::targets::{BandBuffer, Targets};
 use crate::settings::splatting::Compositing;
 
-/// The stage's pipelines; each is compiled when it is first asked for.
+/// The stage's pipelines, each compiled when it is first needed.
 #[derive(Debug, Default)]
 pub struct Composite {
-    /// By compositing, and by the other parts of a mode, one bit each.
+    /// Indexed by compositing, and by one bit for each other property of the mode.
     stages: [OnceLock<ComputeStage>; Compositing::COUNT << 2],
 }
 
-/// What a pipeline is compiled for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The mode that a pipeline is compiled for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct CompositeMode {
     /// How sheets are composited.
     pub compositing: Compositing,
-    /// What of pixels' rays is looked at.
+    /// Which properties of rays count.
     pub rays: RayMode,
 }
 
-/// What of pixels' rays a stage that composites looks at.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// Which properties of pixels' rays a compositing stage needs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct RayMode {
     /// Whether clip planes or a host's surfaces cut them.
     pub cut: bool,
@@ -35,16 +35,16 @@ pub struct RayMode {
     pub first_hit: bool,
 }
 
-/// What cuts rays.
+/// The buffers for cutting rays.
 #[derive(Clone, Copy, Debug)]
 pub struct CutBuffers<'a> {
     /// One [`Cut`].
     pub uniform: &'a Buffer,
-    /// A host's depth, or any depth texture.
+    /// A host's depth texture; any depth texture if the host gives no surfaces.
     pub surfaces: &'a TextureView,
 }
 
-/// Buffers of the stage.
+/// The stage's buffers.
 #[derive(Clone, Copy, Debug)]
 pub struct CompositeBuffers<'a> {
     /// One [`Frame`].
@@ -57,7 +57,7 @@ pub struct CompositeBuffers<'a> {
     pub tiles: &'a Buffer,
     /// Opacity buffers.
     pub targets: &'a Targets,
-    /// What cuts rays.
+    /// The buffers for cutting rays.
     pub cut: CutBuffers<'a>,
     /// First hits, `[u32]`.
     pub hits: &'a Buffer,
@@ -121,7 +121,7 @@ impl Composite {
         self.compiled(device, mode).bind(device, &resources)
     }
 
-    /// Composites the listed tiles of every band, of the group at `offset`.
+    /// Composites the listed tiles of every band for the group at `offset`.
     pub fn record(
         &self,
         pass: &mut ComputePass<'_>,

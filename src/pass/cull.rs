@@ -1,5 +1,5 @@
-//! Early splat elimination (§6): which bricks a sheet group visits, which of their voxels it draws, those voxels in a row,
-//! and the shading of those that were not shaded before.
+//! Early splat elimination (§6): the bricks that a sheet group visits, the voxels of these that it draws, their list without gaps, and the
+//! shading of those that were not shaded before.
 
 use wgpu::{BindGroup, Buffer, BufferUsages, ComputePass, Device, ShaderStages, TextureView};
 
@@ -10,6 +10,7 @@ use crate::gpu::layout::{Brick, BrickState, Culled, Frame, Indirect, SheetGroup,
 use crate::gpu::shaders;
 use crate::lists::brick::BRICK_VOXELS;
 use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};
+use crate::pass::values::{PlaneBuffers, Values, ValuesBuffers, ValuesGroup};
 
 /// The four stages' pipelines.
 #[derive(Debug)]
@@ -17,29 +18,43 @@ pub struct Cull {
     bricks: ComputeStage,
     voxels: ComputeStage,
     compact: ComputeStage,
-    shade: Shade,
+    prepared: VoxelStage,
+}
+
+/// What becomes of voxels that are drawn for the first time.
+#[derive(Debug)]
+enum VoxelStage {
+    Shade(Shade),
+    Values(Values),
 }
 
 /// One list's buffers and bind groups.
 #[derive(Debug)]
 pub struct CullList {
-    /// `[BrickState]`, zero at the start of a frame.
+    /// `[BrickState]`, zeroed at the start of a frame.
     pub states: Buffer,
-    /// `[Splat]`, one per place of the list, written when its voxel is first drawn.
+    /// `[Splat]`, or for planes `[FieldVoxel]`, one per slot of the list, written when its voxel is first drawn.
     pub splats: Buffer,
     /// `[u32]`: the splats that the current group draws.
     pub instances: Buffer,
-    /// [`Indirect`]: how many they are.
+    /// [`Indirect`]: the number of instances.
     pub draw_args: Buffer,
     visits: Buffer,
     visit_args: Buffer,
     fresh: Buffer,
     fresh_args: Buffer,
     groups: [BindGroup; 3],
-    shade_group: ShadeGroup,
+    prepared_group: VoxelGroup,
 }
 
-/// What all lists share.
+/// Bound buffers of a [`VoxelStage`].
+#[derive(Debug)]
+enum VoxelGroup {
+    Shade(ShadeGroup),
+    Values(ValuesGroup),
+}
+
+/// The buffers that all lists share.
 #[derive(Clone, Copy, Debug)]
 pub struct CullBuffers<'a> {
     /// One [`Frame`].
@@ -48,23 +63,35 @@ pub struct CullBuffers<'a> {
     pub groups: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
-    /// Whether any of them is a hole.
+    /// Whether any value is a hole.
     pub has_holes: bool,
-    /// Its labels, if any of them has ramps of its own.
+    /// The volume's labels, if any label has its own ramps.
     pub labels: Option<&'a TextureView>,
-    /// Control points of the ramps.
+    /// The control points of the ramps.
     pub control_points: &'a Buffer,
     /// The occlusion buffer.
     pub occluded: &'a Buffer,
     /// One [`Culled`].
     pub culled: &'a Buffer,
+    /// What voxels are drawn onto planes by; for stages of planes.
+    pub planes: Option<PlaneBuffers<'a>>,
 }
 
 impl Cull {
     /// Compiles the stages for groups of `sheets` sheets.
     pub fn new(device: &Device, sheets: u32) -> Self {
+        Self::compiled(device, sheets, VoxelStage::Shade(Shade::new(device)))
+    }
+
+    /// Compiles the stages for groups that are single planes (SPEC §9).
+    pub fn of_planes(device: &Device) -> Self {
+        Self::compiled(device, 1, VoxelStage::Values(Values::default()))
+    }
+
+    fn compiled(device: &Device, sheets: u32, prepared: VoxelStage) -> Self {
         let stage = ShaderStages::COMPUTE;
-        let sheets = [("SHEETS", f64::from(sheets))];
+        let is_plane = matches!(prepared, VoxelStage::Values(_));
+        let sheets = [("SHEETS", f64::from(sheets)), ("PLANE", f64::from(u8::from(is_plane)))];
         let bricks = [
             ("frames", uniform::<Frame>(stage, false)),
             ("sheet_group", uniform::<SheetGroup>(stage, true)),
@@ -99,11 +126,11 @@ impl Cull {
             bricks: ComputeStage::new(device, shaders::CULL_BRICKS, "main", &bricks, &sheets),
             voxels: ComputeStage::new(device, shaders::CULL_VOXELS, "main", &voxels, &sheets),
             compact: ComputeStage::new(device, shaders::COMPACT, "main", &compact, &[]),
-            shade: Shade::new(device),
+            prepared,
         }
     }
 
-    /// A list's buffers, in [`CullList`]'s order: for so many bricks, of which no group looks at more than `most_bricks`, with at most
+    /// The specs of a list's buffers, in [`CullList`]'s order, for `bricks` bricks of which a group visits at most `most_bricks`, with at most
     /// `most_voxels` voxels.
     pub fn buffer_specs(bricks: usize, (most_bricks, most_voxels): (u32, u32)) -> [BufferSpec; 8] {
         let buffer = |label, count: usize, record: usize, usage| {
@@ -124,11 +151,11 @@ impl Cull {
         ]
     }
 
-    /// Allocates a list's buffers, or takes those of the `previous` frame. `order` is the list's bricks by first group; `most` is what
-    /// [`Self::buffer_specs`] says.
+    /// Allocates a list's buffers, or reuses those of the `previous` frame. `order` is the list's bricks by first group; `most` is as in
+    /// [`Self::buffer_specs`].
     ///
     /// # Errors
-    /// If the device's buffers may not be that large.
+    /// If they exceed the device's maximum size of buffers.
     pub fn prepare(
         &self,
         device: &Device,
@@ -177,20 +204,37 @@ impl Cull {
             ("fresh_args", whole(&fresh_args)),
             ("culled", whole(culled)),
         ];
-        let shade_group = self.shade.bind(
-            device,
-            ShadeBuffers {
-                frame: shared.frame,
-                bricks: &list.buffer,
-                values: shared.values,
-                has_holes: shared.has_holes,
-                labels: shared.labels,
-                control_points: shared.control_points,
-                places: &fresh,
-                args: &fresh_args,
-                splats: &splats,
-            },
-        );
+        let prepared_group = match &self.prepared {
+            VoxelStage::Shade(shade) => VoxelGroup::Shade(shade.bind(
+                device,
+                ShadeBuffers {
+                    frame: shared.frame,
+                    bricks: &list.buffer,
+                    values: shared.values,
+                    has_holes: shared.has_holes,
+                    labels: shared.labels,
+                    control_points: shared.control_points,
+                    places: &fresh,
+                    args: &fresh_args,
+                    splats: &splats,
+                },
+            )),
+            VoxelStage::Values(values) => {
+                // Stages of planes have planes.
+                let Some(planes) = shared.planes else { unreachable!() };
+                let buffers = ValuesBuffers {
+                    frame: shared.frame,
+                    bricks: &list.buffer,
+                    values: shared.values,
+                    has_holes: shared.has_holes,
+                    planes,
+                    places: &fresh,
+                    args: &fresh_args,
+                    voxels: &splats,
+                };
+                VoxelGroup::Values(values.bind(device, buffers))
+            }
+        };
         let groups =
             [self.bricks.bind(device, &bricks), self.voxels.bind(device, &voxels), self.compact.bind(device, &compact)];
         let list = CullList {
@@ -203,18 +247,22 @@ impl Cull {
             fresh,
             fresh_args,
             groups,
-            shade_group,
+            prepared_group,
         };
         Ok(list)
     }
 
-    /// Decides what the group at `offset` draws of a list.
+    /// Determines what the group at `offset` draws of a list.
     pub fn record(&self, pass: &mut ComputePass<'_>, list: &CullList, offset: u32) {
         let [bricks, voxels, compact] = &list.groups;
         self.bricks.dispatch(pass, bricks, &[offset], 1);
         self.voxels.dispatch_indirect(pass, voxels, &[offset], &list.visit_args);
         self.compact.dispatch(pass, compact, &[], 1);
-        self.shade.record(pass, &list.shade_group, &list.fresh_args);
+        match (&self.prepared, &list.prepared_group) {
+            (VoxelStage::Shade(shade), VoxelGroup::Shade(group)) => shade.record(pass, group, &list.fresh_args),
+            (VoxelStage::Values(values), VoxelGroup::Values(group)) => values.record(pass, group, &list.fresh_args),
+            _ => {}
+        }
     }
 }
 

@@ -11,7 +11,7 @@ use crate::gpu::layout::{Cut, Frame};
 use crate::gpu::render_pipeline::{Attachments, render_pipeline};
 use crate::gpu::shaders;
 
-/// Depths, one per pixel.
+/// The format of depths, one per pixel.
 pub const FORMAT: TextureFormat = TextureFormat::R32Float;
 
 /// The stage's pipeline.
@@ -52,7 +52,7 @@ impl FirstHit {
         })
     }
 
-    /// Binds the words of first hits, which start so many bytes into their buffer.
+    /// Binds the words of first hits, which start at a byte offset in their buffer.
     pub fn bind(
         &self,
         device: &Device,
@@ -69,7 +69,7 @@ impl FirstHit {
         self.bindings.bind(device, &resources)
     }
 
-    /// Overwrites the texture.
+    /// Overwrites the whole texture.
     pub fn record(&self, encoder: &mut CommandEncoder, group: &BindGroup, target: &TextureView) {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("sheetsplat.first_hit"),

@@ -1,6 +1,7 @@
-//! Draws patches front to back: the tile rasterizer's one stage, which culls, splats and composites (§6).
+//! Draws patches front to back: the single stage of the tile rasterizer, which culls, splats and composites (§6).
 
-use std::sync::OnceLock;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use wgpu::{
     BindGroup, Buffer, BufferUsages, CommandEncoder, ComputePass, Device, DeviceType, ShaderStages, TextureView,
@@ -8,26 +9,26 @@ use wgpu::{
 };
 
 use super::composite::{CutBuffers, RayMode};
+use super::values::PlaneBuffers;
 use crate::gpu::bindings::{
     ComputeStage, at_offset, buffer_spec, depth_texture, storage, texture_of_integers, uniform,
 };
-use crate::gpu::layout::{Brick, Cut, Frame, Gather as GatherUniform, Gathered, Indirect, PatchRange, Planes};
+use crate::gpu::layout::{Brick, Cut, FieldPlanes, Frame, Gather as GatherUniform, Gathered, Indirect, PatchRange};
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
 use crate::lists::patch_bins::{PATCH, SHEETS};
 use crate::settings::shading::Gradient;
-use crate::settings::splatting::{Classification, Compositing, FootprintBox, Interpolation, Order, Splatting};
+use crate::settings::splatting::{Classification, Compositing, FootprintBox, Order, Splatting};
 
-/// The stage's pipelines; each is compiled when it is first asked for.
-#[derive(Debug)]
+/// The stage's pipelines, each compiled when it is first needed.
+#[derive(Debug, Default)]
 pub struct Gather {
-    /// By compositing, and by the other parts of a mode, one bit each.
-    stages: Vec<OnceLock<ComputeStage>>,
+    stages: Mutex<HashMap<GatherMode, Arc<ComputeStage>>>,
     no_labels: OnceLock<VolumeTexture>,
 }
 
-/// What a pipeline is compiled for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The mode that a pipeline is compiled for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct GatherMode {
     compositing: Compositing,
     order: Order,
@@ -37,62 +38,58 @@ pub struct GatherMode {
     labels: bool,
     holes: bool,
     rays: RayMode,
-    /// Whether classification comes after splatting (SPEC §9).
-    after: bool,
-    /// There whether gradients are the field's derivative, and whether coefficients are not the values.
-    kernel_gradient: bool,
-    exact: bool,
+    /// How values are gathered on slab planes; `None` if colours are.
+    planes: Option<PlaneMode>,
     /// Whether the blocks of a patch are divided among workgroups.
     divided: bool,
+}
+
+/// The order in which groups are drawn. A plane is handed on from front to back, and after splatting the order does not change an image (SPEC §9).
+pub fn drawn_order(splatting: &Splatting) -> Order {
+    match splatting.classification {
+        Classification::Before => splatting.order,
+        Classification::After => Order::FrontToBack,
+    }
+}
+
+/// What is gathered on slab planes (SPEC §9).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct PlaneMode {
+    /// The gradients.
+    pub gradient: Gradient,
+    /// Whether coefficients differ from the values.
+    pub exact: bool,
 }
 
 impl GatherMode {
     /// The mode that splatting settings ask for, with or without an eye, of a volume with or without labels that have ramps of their own
     /// and with or without holes; `workgroups` is how many workgroups draw each patch.
     pub fn of(
-        (splatting, gradient): (&Splatting, Gradient),
+        splatting: &Splatting,
+        planes: Option<PlaneMode>,
         perspective: bool,
         [labels, holes]: [bool; 2],
         rays: RayMode,
         workgroups: u32,
     ) -> Self {
-        let Splatting { compositing, order, footprint_box, experimental, classification, .. } = *splatting;
-        let after = classification == Classification::After;
-        let kernel_gradient = after && gradient == Gradient::Kernel;
-        let exact = after && splatting.interpolation == Interpolation::Exact;
-        // There the order makes no difference to an image, and planes are handed on from front to back.
-        let order = if after { Order::FrontToBack } else { order };
-        let economies = experimental.in_use().is_some();
-        // Every voxel has its own parallelogram there.
+        let Splatting { compositing, footprint_box, experimental, .. } = *splatting;
+        let (order, economies) = (drawn_order(splatting), experimental.in_use().is_some());
+        // In perspective every voxel has its own parallelogram.
         let footprint_box = if perspective { FootprintBox::Rectangle } else { footprint_box };
-        Self {
-            compositing,
-            order,
-            footprint_box,
-            perspective,
-            economies,
-            labels,
-            holes,
-            rays,
-            after,
-            kernel_gradient,
-            exact,
-            divided: workgroups > 1,
-        }
+        let divided = workgroups > 1;
+        Self { compositing, order, footprint_box, perspective, economies, labels, holes, rays, planes, divided }
     }
 }
 
-/// Buffers of the stage.
+/// The stage's buffers.
 #[derive(Clone, Copy, Debug)]
 pub struct GatherBuffers<'a> {
     /// One [`Frame`].
     pub frame: &'a Buffer,
     /// One [`GatherUniform`].
     pub gather: &'a Buffer,
-    /// One [`Planes`], read where classification comes after splatting.
-    pub planes: &'a Buffer,
-    /// The voxels' coefficients, where they are not the values (SPEC §9).
-    pub coefficients: Option<&'a TextureView>,
+    /// The planes, if values are gathered on them (SPEC §9).
+    pub planes: Option<PlaneBuffers<'a>>,
     /// One [`PatchRange`] at every dynamic offset.
     pub patch_ranges: &'a Buffer,
     /// `[Brick]`.
@@ -101,91 +98,27 @@ pub struct GatherBuffers<'a> {
     pub starts: &'a Buffer,
     /// [`PatchBins::entries`](crate::lists::patch_bins::PatchBins::entries).
     pub entries: &'a Buffer,
-    /// Control points of the ramps.
+    /// The control points of the ramps.
     pub control_points: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
-    /// Its labels, for a mode that asks for them.
+    /// The volume's labels, for a mode that needs them.
     pub labels: Option<&'a TextureView>,
     /// [`Gathered`].
     pub gathered: &'a Buffer,
     /// [`PatchBins::half_boxes`](crate::lists::patch_bins::PatchBins::half_boxes), `[[f32; 2]]`.
     pub half_boxes: &'a Buffer,
-    /// What cuts rays.
+    /// The buffers for cutting rays.
     pub cut: CutBuffers<'a>,
 }
 
-impl Default for Gather {
-    fn default() -> Self {
-        Self { stages: (0..Compositing::COUNT << 12).map(|_| OnceLock::new()).collect(), no_labels: OnceLock::new() }
-    }
-}
-
 impl Gather {
-    fn stage(&self, mode: GatherMode) -> &OnceLock<ComputeStage> {
-        let GatherMode { compositing, order, footprint_box, perspective, economies, labels, holes, rays, .. } = mode;
-        let GatherMode { after, kernel_gradient, exact, divided, .. } = mode;
-        let [order, footprint_box] = [order as usize, footprint_box as usize];
-        let flags =
-            [perspective, economies, labels, holes, rays.cut, rays.first_hit, after, kernel_gradient, exact, divided]
-                .map(usize::from);
-        let bits = [order, footprint_box].into_iter().chain(flags);
-        &self.stages[bits.fold(compositing as usize, |number, bit| 2 * number + bit)]
+    fn compiled(&self, device: &Device, mode: GatherMode) -> Arc<ComputeStage> {
+        let mut stages = self.stages.lock().unwrap_or_else(PoisonError::into_inner);
+        Arc::clone(stages.entry(mode).or_insert_with(|| Arc::new(compile(device, mode))))
     }
 
-    fn compiled(&self, device: &Device, mode: GatherMode) -> &ComputeStage {
-        self.stage(mode).get_or_init(|| {
-            let stage = ShaderStages::COMPUTE;
-            let mut slots = vec![
-                ("frames", uniform::<Frame>(stage, false)),
-                ("gathers", uniform::<GatherUniform>(stage, false)),
-                ("patch_range", uniform::<PatchRange>(stage, true)),
-                ("bricks", storage::<Brick>(stage, true)),
-                ("starts", storage::<u32>(stage, true)),
-                ("entries", storage::<u32>(stage, true)),
-                ("control_points", storage::<[f32; 4]>(stage, true)),
-                ("values", texture_of_integers(stage, TextureViewDimension::D2Array)),
-                ("acc", storage::<[f32; 4]>(stage, false)),
-                ("gathered", storage::<Gathered>(stage, false)),
-                ("half_boxes", storage::<[f32; 2]>(stage, true)),
-                ("labels", texture_of_integers(stage, TextureViewDimension::D2Array)),
-                ("next", storage::<Indirect>(stage, false)),
-                ("cut", uniform::<Cut>(stage, false)),
-                ("surfaces", depth_texture(stage)),
-            ];
-            if mode.after {
-                slots.push(("planes", uniform::<Planes>(stage, false)));
-                slots.push(("coefficients", texture_of_integers(stage, TextureViewDimension::D2Array)));
-            }
-            let mut constants = vec![
-                ("THREADS", f64::from(device.adapter_info().subgroup_max_size)),
-                ("QUEUE", f64::from(queue(device, mode))),
-                ("WORKGROUPS_PER_PATCH", f64::from(workgroups_per_patch(device, mode))),
-                ("COMPOSITING", f64::from(mode.compositing as u32)),
-                ("ORDER", f64::from(mode.order as u32)),
-                ("PERSPECTIVE", f64::from(u8::from(mode.perspective))),
-                ("PARALLELOGRAM", f64::from(mode.footprint_box as u32)),
-                ("LABELS", f64::from(u8::from(mode.labels))),
-                ("HOLES", f64::from(u8::from(mode.holes))),
-                ("CUT", f64::from(u8::from(mode.rays.cut))),
-                ("FIRST_HIT", f64::from(u8::from(mode.rays.first_hit))),
-            ];
-            if mode.after {
-                constants.extend([
-                    ("KERNEL_GRADIENT", f64::from(u8::from(mode.kernel_gradient))),
-                    ("EXACT", f64::from(u8::from(mode.exact))),
-                    ("SUMS", f64::from(sums(mode))),
-                    ("SAVED", f64::from(sums(mode) * SHEETS * PATCH[0] * PATCH[1] / 4)),
-                ]);
-            } else {
-                constants.push(("ECONOMIES", f64::from(u8::from(mode.economies))));
-            }
-            let shader = if mode.after { shaders::GATHER_PLANES } else { shaders::GATHER };
-            ComputeStage::new(device, shader, "main", &slots, &constants)
-        })
-    }
-
-    /// Binds a band of the compositing buffer, `[vec4f]`, for one mode and so many dispatches.
+    /// Binds a band of the compositing buffer, `[vec4f]`, for one mode and a number of dispatches.
     pub fn bind(
         &self,
         device: &Device,
@@ -197,14 +130,15 @@ impl Gather {
         let usage = BufferUsages::STORAGE | BufferUsages::INDIRECT | BufferUsages::COPY_DST;
         let descriptor = buffer_spec("sheetsplat.next", NEXT_BYTES, usage);
         let next: Vec<Buffer> = (0..dispatches).map(|_| device.create_buffer(&descriptor)).collect();
-        let groups = next.iter().map(|next| self.bind_one(device, mode, buffers, acc, next)).collect();
-        GatherBand { mode, groups, next, workgroups_per_patch: workgroups_per_patch(device, mode) }
+        let stage = self.compiled(device, mode);
+        let groups = next.iter().map(|next| self.bind_one(device, &stage, buffers, acc, next)).collect();
+        GatherBand { stage, groups, next, workgroups_per_patch: workgroups_per_patch(device, mode) }
     }
 
     fn bind_one(
         &self,
         device: &Device,
-        mode: GatherMode,
+        stage: &ComputeStage,
         buffers: GatherBuffers<'_>,
         acc: &Buffer,
         next: &Buffer,
@@ -231,22 +165,76 @@ impl Gather {
             ("cut", whole(buffers.cut.uniform)),
             ("surfaces", wgpu::BindingResource::TextureView(buffers.cut.surfaces)),
         ];
-        if mode.after {
-            resources.push(("planes", whole(buffers.planes)));
-            let coefficients = buffers.coefficients.unwrap_or(values);
-            resources.push(("coefficients", wgpu::BindingResource::TextureView(coefficients)));
+        if let Some(PlaneBuffers { planes, coefficients }) = buffers.planes {
+            resources.push(("planes", whole(planes)));
+            resources.push(("coefficients", wgpu::BindingResource::TextureView(coefficients.unwrap_or(values))));
         }
-        self.compiled(device, mode).bind(device, &resources)
+        stage.bind(device, &resources)
     }
 
     /// Draws the first `patches` patches of the range at `offset`. The band must have been cleared.
     pub fn record(&self, pass: &mut ComputePass<'_>, band: &GatherBand, offset: u32, patches: u32) {
-        let (Some(stage), Some(first)) = (self.stage(band.mode).get(), band.groups.first()) else { return };
+        let (stage, Some(first)) = (&band.stage, band.groups.first()) else { return };
         stage.dispatch(pass, first, &[offset], patches * band.workgroups_per_patch);
         for (group, args) in band.groups[1..].iter().zip(&band.next) {
             stage.dispatch_indirect(pass, group, &[offset], args);
         }
     }
+}
+
+fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
+    let stage = ShaderStages::COMPUTE;
+    let mut slots = vec![
+        ("frames", uniform::<Frame>(stage, false)),
+        ("gathers", uniform::<GatherUniform>(stage, false)),
+        ("patch_range", uniform::<PatchRange>(stage, true)),
+        ("bricks", storage::<Brick>(stage, true)),
+        ("starts", storage::<u32>(stage, true)),
+        ("entries", storage::<u32>(stage, true)),
+        ("control_points", storage::<[f32; 4]>(stage, true)),
+        ("values", texture_of_integers(stage, TextureViewDimension::D2Array)),
+        ("acc", storage::<[f32; 4]>(stage, false)),
+        ("gathered", storage::<Gathered>(stage, false)),
+        ("half_boxes", storage::<[f32; 2]>(stage, true)),
+        ("labels", texture_of_integers(stage, TextureViewDimension::D2Array)),
+        ("next", storage::<Indirect>(stage, false)),
+        ("cut", uniform::<Cut>(stage, false)),
+        ("surfaces", depth_texture(stage)),
+    ];
+    if mode.planes.is_some() {
+        slots.push(("planes", uniform::<FieldPlanes>(stage, false)));
+        slots.push(("coefficients", texture_of_integers(stage, TextureViewDimension::D2Array)));
+    }
+    let mut constants = vec![
+        ("THREADS", f64::from(device.adapter_info().subgroup_max_size)),
+        ("QUEUE", f64::from(queue(device, mode))),
+        ("WORKGROUPS_PER_PATCH", f64::from(workgroups_per_patch(device, mode))),
+        ("COMPOSITING", f64::from(mode.compositing as u32)),
+        ("ORDER", f64::from(mode.order as u32)),
+        ("PERSPECTIVE", f64::from(u8::from(mode.perspective))),
+        ("PARALLELOGRAM", f64::from(mode.footprint_box as u32)),
+        ("LABELS", f64::from(u8::from(mode.labels))),
+        ("HOLES", f64::from(u8::from(mode.holes))),
+        ("CUT", f64::from(u8::from(mode.rays.cut))),
+        ("FIRST_HIT", f64::from(u8::from(mode.rays.first_hit))),
+    ];
+    let flag = |is_set| f64::from(u8::from(is_set));
+    let shader = match mode.planes {
+        Some(PlaneMode { gradient, exact }) => {
+            constants.extend([
+                ("KERNEL_GRADIENT", flag(gradient == Gradient::Kernel)),
+                ("EXACT", flag(exact)),
+                ("SUMS", f64::from(sums(gradient))),
+                ("SAVED", f64::from(sums(gradient) * SHEETS * PATCH[0] * PATCH[1] / 4)),
+            ]);
+            shaders::GATHER_PLANES
+        }
+        None => {
+            constants.push(("ECONOMIES", flag(mode.economies)));
+            shaders::GATHER
+        }
+    };
+    ComputeStage::new(device, shader, "main", &slots, &constants)
 }
 
 /// Bytes of memory for a workgroup that the stage asks for.
@@ -258,59 +246,60 @@ fn workgroups_per_patch(device: &Device, mode: GatherMode) -> u32 {
     if mode.divided { PATCH[0] * PATCH[1] / 4 / device.adapter_info().subgroup_max_size } else { 1 }
 }
 
-/// Sums that a pixel has on a slab plane (SPEC §9).
-fn sums(mode: GatherMode) -> u32 {
-    if mode.kernel_gradient { 8 } else { 5 }
+/// The number of sums of a pixel on a slab plane (SPEC §9).
+fn sums(gradient: Gradient) -> u32 {
+    match gradient {
+        Gradient::Differences => 5,
+        Gradient::Kernel => 8,
+    }
 }
 
-/// Bytes of a workgroup's memory that its pixels take, for a patch: four sheets of a colour, or the sums on four planes and the field that is handed on from
-/// one.
-fn pixel_bytes(mode: GatherMode) -> u32 {
-    let floats = if mode.after { sums(mode) * SHEETS + 5 } else { 4 * SHEETS };
+/// The workgroup memory in bytes of a patch's pixels: four sheets of a colour, or the sums on four planes and the field that is handed on from one.
+fn pixel_bytes(planes: Option<PlaneMode>) -> u32 {
+    let floats = planes.map_or(4 * SHEETS, |planes| sums(planes.gradient) * SHEETS + 5);
     PATCH[0] * PATCH[1] * floats * size_of::<f32>() as u32
 }
 
-/// Bytes of a voxel in the queue: point, amount and blocks.
+/// The bytes of a voxel in the queue: point, amount and blocks.
 const VOXEL_BYTES: u32 = 36;
 
-/// Bytes of a workgroup's memory that a mode needs: with its pixels a voxel for each of the most threads that a subgroup may have, twice.
-pub fn least_workgroup_bytes(mode: GatherMode) -> u32 {
-    pixel_bytes(mode) + 64 * VOXEL_BYTES
+/// The minimum workgroup memory in bytes: that of the pixels, and of a queue of two voxels for each thread of the largest subgroup.
+pub fn min_workgroup_bytes(planes: Option<PlaneMode>) -> u32 {
+    pixel_bytes(planes) + 64 * VOXEL_BYTES
 }
 
-/// Voxels in a workgroup's queue: as many as there is room for beside its patch's pixels. On a GPU more than [`WORKGROUP_BYTES`] would keep workgroups from
-/// running side by side.
+/// The number of voxels in a workgroup's queue, which has the memory that the patch's pixels leave. On a GPU more than [`WORKGROUP_BYTES`] would
+/// keep workgroups from running side by side.
 fn queue(device: &Device, mode: GatherMode) -> u32 {
-    let most = device.limits().max_compute_workgroup_storage_size.min(2 * WORKGROUP_BYTES);
     let bytes = match device.adapter_info().device_type {
-        DeviceType::Cpu => most,
-        _ => WORKGROUP_BYTES.max(least_workgroup_bytes(mode)),
+        DeviceType::Cpu => device.limits().max_compute_workgroup_storage_size.min(2 * WORKGROUP_BYTES),
+        _ => WORKGROUP_BYTES.max(min_workgroup_bytes(mode.planes)),
     };
-    (bytes - pixel_bytes(mode)) / VOXEL_BYTES / 32 * 32
+    (bytes - pixel_bytes(mode.planes)) / VOXEL_BYTES / 32 * 32
 }
 
-/// Bytes of what a dispatch leaves to the next.
+/// The size in bytes of the arguments that a dispatch leaves for the next.
 const NEXT_BYTES: u64 = size_of::<Indirect>() as u64;
 
-/// A band, bound.
+/// A band with its bind groups.
 #[derive(Debug)]
 pub struct GatherBand {
-    mode: GatherMode,
-    /// Workgroups for each patch.
+    stage: Arc<ComputeStage>,
+    /// The number of workgroups per patch.
     workgroups_per_patch: u32,
-    /// One for every dispatch.
+    /// One bind group for every dispatch.
     groups: Vec<BindGroup>,
-    /// [`Indirect`]: what each leaves to the next, all patches or nothing.
+    /// [`Indirect`]: the arguments that each dispatch leaves for the next, for all patches or none.
     next: Vec<Buffer>,
 }
 
 impl GatherBand {
-    /// Makes it ready for a frame.
+    /// Clears the band for a frame.
     pub fn clear(&self, encoder: &mut CommandEncoder) {
         self.next.iter().for_each(|args| encoder.clear_buffer(args, 0, None));
     }
 
-    /// Bytes of GPU memory that one takes with so many dispatches.
+    /// Bytes of GPU memory that a band uses with this many dispatches.
     pub fn estimate(dispatches: u32) -> u64 {
         u64::from(dispatches) * NEXT_BYTES
     }

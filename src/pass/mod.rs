@@ -1,10 +1,13 @@
-//! The GPU's stages, one per file, in the order of the data flow: per group of sheets
-//! cull bricks → cull voxels → compact → shade → tiles → splat → composite → occlude, at the end resolve (Fig. 12), and first hits if asked for.
+//! The GPU's stages, one per file, in the order of the data flow. For every group of sheets: cull bricks → cull voxels → compact → shade →
+//! tiles → splat → composite → occlude; at the end resolve (Fig. 12), and first hits if requested. Where classification comes
+//! after splatting (SPEC §9), values, field and classify replace shade, splat and composite.
 //!
-//! Each holds its pipeline, makes its bind group, and records itself; none allocates, submits or waits while recording.
+//! Each stage holds its pipeline, makes its bind group, and records itself; none allocates, submits or waits while recording.
 
+pub mod classify;
 pub mod composite;
 pub mod cull;
+pub mod field;
 pub mod first_hit;
 pub mod gather;
 pub mod occlude;
@@ -13,3 +16,4 @@ pub mod sample;
 pub mod shade;
 pub mod splat;
 pub mod tiles;
+pub mod values;

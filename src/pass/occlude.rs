@@ -1,4 +1,4 @@
-//! The occlusion buffer (§6): the cut-off opacity buffer under a separable box filter of the footprint's size.
+//! The occlusion buffer (§6): the clamped opacity buffer under a separable box filter of the footprint's size.
 
 use wgpu::{BindGroup, Buffer, ComputePass, Device, ShaderStages};
 
@@ -29,7 +29,7 @@ impl Occlude {
         Self { columns: compile("columns"), rows: compile("rows") }
     }
 
-    /// Binds the opacity buffer and its two convolutions, with a frame and `[SheetGroup]`; `tiles` is the list of tiles to compute anew.
+    /// Binds the opacity buffer and its two convolutions, with a frame and `[SheetGroup]`; `tiles` is the list of tiles to compute again.
     pub fn bind(
         &self,
         device: &Device,

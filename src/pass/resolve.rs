@@ -1,4 +1,4 @@
-//! Lays the compositing buffer over the background, into the host's target.
+//! Composites the compositing buffer over the background, into the host's target.
 
 use wgpu::{BindGroup, Buffer, Device, RenderPass, RenderPipeline, ShaderStages};
 
@@ -17,12 +17,11 @@ pub struct Resolve {
     pipeline: RenderPipeline,
 }
 
-/// What is added to both numbers of an origin, so that they are not negative, as `shaders/resolve.wgsl` takes it away again.
-/// No texture is wider than 32768 pixels.
+/// A bias that makes both numbers of an origin non-negative; `shaders/resolve.wgsl` subtracts it. No texture is wider than 32768 pixels.
 const ORIGIN_BIAS: i32 = 32767;
 
 impl Resolve {
-    /// Compiles the stage for targets of the kind that the options say.
+    /// Compiles the stage for targets with these options.
     pub fn new(device: &Device, options: &RendererOptions) -> Self {
         let stage = ShaderStages::FRAGMENT;
         let slots = [
@@ -37,7 +36,7 @@ impl Resolve {
                 blend: options.blend_state(),
                 write_mask: wgpu::ColorWrites::ALL,
             })],
-            // The pass has a depth attachment, and nothing is done with it.
+            // The pass may have a depth attachment, which is neither tested nor written.
             depth: options.depth_format.map(|format| wgpu::DepthStencilState {
                 format,
                 depth_write_enabled: Some(false),
@@ -60,8 +59,8 @@ impl Resolve {
         self.bindings.bind(device, &resources)
     }
 
-    /// Draws an image of the given width and height, band by band, where it is to go. Leaves its pipeline, bind group 0, viewport and
-    /// scissor rectangle in the pass.
+    /// Draws an image of the given width and height, band by band, at its placement. Changes the pass's pipeline, bind group 0, viewport and
+    /// scissor rectangle.
     pub fn draw<'a>(
         &self,
         pass: &mut RenderPass<'_>,
@@ -79,8 +78,8 @@ impl Resolve {
             pass.set_bind_group(0, group, &[]);
             pass.set_viewport(origin[0] as f32, origin[1] as f32, width as f32, height as f32, 0.0, 1.0);
             pass.set_scissor_rect(x, y, covered_width, covered_height);
-            // The instance's number is the one that a draw has without a buffer to write or a feature to ask for. Origins that do not
-            // fit are those of scissors outside of the target, which wgpu refuses.
+            // The instance index passes the origin, because that needs neither a buffer nor a feature. Origins that do not fit belong to scissors
+            // outside the target, which wgpu refuses.
             let [x, y] = origin.map(|at| at.wrapping_add(ORIGIN_BIAS) as u32 & 0xffff);
             let instance = x | y << 16;
             pass.draw(0..3, instance..instance.saturating_add(1));

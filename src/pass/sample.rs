@@ -15,17 +15,17 @@ use crate::gpu::render_pipeline::render_pipeline;
 use crate::gpu::shaders;
 use crate::settings::splatting::{Compositing, FootprintForm};
 
-/// The stage's pipelines; each is compiled when it is first asked for.
+/// The stage's pipelines, each compiled when it is first needed.
 #[derive(Debug)]
 pub struct Sample {
     bindings: Bindings,
     format: TextureFormat,
-    /// By footprint form, and by whether samples are composited or summed up.
+    /// Indexed by footprint form, and by whether samples are composited or summed.
     pipelines: [[OnceLock<RenderPipeline>; 2]; 2],
     indices: Buffer,
 }
 
-/// What a pipeline is compiled for.
+/// The mode that a pipeline is compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SampleMode {
     /// How footprints are stored.
@@ -34,25 +34,25 @@ pub struct SampleMode {
     pub compositing: Compositing,
 }
 
-/// Buffers of the stage.
+/// The stage's buffers.
 #[derive(Clone, Copy, Debug)]
 pub struct SampleBuffers<'a> {
     /// One [`Frame`](crate::gpu::layout::Frame).
     pub frame: &'a Buffer,
-    /// One [`SheetGroup`], of one sheet that all kernels are in.
+    /// One [`SheetGroup`] of a single sheet that contains all kernels.
     pub group: &'a Buffer,
     /// `[Splat]`.
     pub splats: &'a Buffer,
-    /// `[u32]`: which of them are drawn, from back to front.
+    /// `[u32]`: the splats that are drawn, from back to front.
     pub order: &'a Buffer,
-    /// [`Indirect`](crate::gpu::layout::Indirect): how many they are.
+    /// [`Indirect`](crate::gpu::layout::Indirect): the number of splats.
     pub args: &'a Buffer,
     /// The kernel's footprints.
     pub footprints: &'a FootprintTexture,
 }
 
 impl Sample {
-    /// The stage for a buffer of the given format, nothing compiled.
+    /// The stage for a buffer of the given format, with nothing compiled yet.
     pub fn new(device: &Device, format: TextureFormat) -> Self {
         let bindings = Bindings::new(device, shaders::SAMPLE, &splat_slots());
         Self { bindings, format, pipelines: Default::default(), indices: quad_indices(device) }
@@ -62,7 +62,7 @@ impl Sample {
         &self.pipelines[mode.form as usize][usize::from(mode.compositing == Compositing::Xray)]
     }
 
-    /// Compiles what a mode needs, and binds buffers.
+    /// Compiles the pipeline for a mode, and binds buffers.
     pub fn bind(&self, device: &Device, mode: SampleMode, buffers: SampleBuffers<'_>) -> BindGroup {
         self.pipeline(mode).get_or_init(|| {
             let over = added_to(match mode.compositing {

@@ -1,4 +1,4 @@
-//! Projects and shades voxels, those of a list of places (Fig. 12).
+//! Projects and shades the voxels in a list of places (Fig. 12).
 
 use std::sync::OnceLock;
 
@@ -9,15 +9,15 @@ use crate::gpu::layout::{Brick, Frame, Indirect, Splat};
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
 
-/// The stage's pipelines: without and with labels that have ramps of their own, without and with holes. Each is compiled when it is first
-/// asked for.
+/// The stage's pipelines, without and with labels that have their own ramps, without and with holes. Each is compiled when it is first
+/// needed.
 #[derive(Debug)]
 pub struct Shade {
     stages: [[OnceLock<ComputeStage>; 2]; 2],
     no_labels: VolumeTexture,
 }
 
-/// What the stage reads and writes.
+/// The buffers that the stage reads and writes.
 #[derive(Clone, Copy, Debug)]
 pub struct ShadeBuffers<'a> {
     /// One [`Frame`].
@@ -26,21 +26,21 @@ pub struct ShadeBuffers<'a> {
     pub bricks: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
-    /// Whether any of them is a hole.
+    /// Whether any value is a hole.
     pub has_holes: bool,
-    /// Its labels, if any of them has ramps of its own.
+    /// The volume's labels, if any label has its own ramps.
     pub labels: Option<&'a TextureView>,
-    /// Control points of the ramps.
+    /// The control points of the ramps.
     pub control_points: &'a Buffer,
     /// `[u32]`: the places.
     pub places: &'a Buffer,
-    /// [`Indirect`]: how many they are.
+    /// [`Indirect`]: the number of places.
     pub args: &'a Buffer,
-    /// `[Splat]`, one per place of the list; those of the places are written.
+    /// `[Splat]`, one per slot of the list; those of the places are written.
     pub splats: &'a Buffer,
 }
 
-/// Bound buffers.
+/// The bound buffers.
 #[derive(Debug)]
 pub struct ShadeGroup {
     group: BindGroup,
@@ -49,7 +49,7 @@ pub struct ShadeGroup {
 }
 
 impl Shade {
-    /// The stage, nothing compiled.
+    /// The stage, with nothing compiled yet.
     pub fn new(device: &Device) -> Self {
         Self { stages: Default::default(), no_labels: VolumeTexture::no_labels(device) }
     }
@@ -74,7 +74,7 @@ impl Shade {
         ShadeGroup { group: stage.bind(device, &resources), has_labels, has_holes }
     }
 
-    /// Shades as many voxels as `args` says.
+    /// Shades the number of voxels in `args`.
     pub fn record(&self, pass: &mut ComputePass<'_>, bound: &ShadeGroup, args: &Buffer) {
         if let Some(stage) = self.stages[usize::from(bound.has_labels)][usize::from(bound.has_holes)].get() {
             stage.dispatch_indirect(pass, &bound.group, &[], args);

@@ -1,5 +1,5 @@
-//! Draws a group's kernel sections as instanced footprint quads, added up in the sheet buffers (§3.2): one quad per voxel,
-//! one colour target per sheet.
+//! Draws a group's kernel sections as instanced footprint quads that add up in the sheet buffers (§3.2): one quad per voxel, one colour
+//! target per sheet.
 
 use std::sync::OnceLock;
 
@@ -17,7 +17,7 @@ use crate::gpu::shaders;
 use crate::pass::cull::CullList;
 use crate::settings::splatting::FootprintForm;
 
-/// The stage's pipelines: zeroing tiles, and those that draw.
+/// The stage's pipelines: one that zeroes tiles, and those that draw.
 #[derive(Debug)]
 pub struct Splat {
     clear_bindings: Bindings,
@@ -25,38 +25,27 @@ pub struct Splat {
     bindings: Bindings,
     format: TextureFormat,
     sheets: u32,
-    /// By footprint form, without and with an eye; each is compiled when it is first asked for.
+    /// Indexed by footprint form, without and with an eye; each is compiled when it is first needed.
     splat: [[OnceLock<RenderPipeline>; 2]; 2],
-    /// Two triangles for each of an instance's quads.
+    /// Two triangles for each quad of an instance.
     indices: Buffer,
 }
 
-/// What a pipeline is compiled for.
+/// The mode that a pipeline is compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SplatMode {
     /// How sections are stored.
     pub form: FootprintForm,
-    /// Whether voxels have rays of their own.
+    /// Whether every voxel has its own ray.
     pub perspective: bool,
 }
 
 impl Splat {
     /// Compiles the stage for groups of `sheets` sheets, 1, 2 or 4, in the given format.
     pub fn new(device: &Device, format: TextureFormat, sheets: u32) -> Self {
-        let clear_slots = [
-            ("frames", uniform::<Frame>(ShaderStages::VERTEX, false)),
-            ("composited", storage::<TileList>(ShaderStages::VERTEX, true)),
-        ];
-        let clear_bindings = Bindings::new(device, shaders::CLEAR, &clear_slots);
-        let entry = format!("fragment_{sheets}");
+        let clear_bindings = clear_bindings(device);
         Self {
-            clear: render_pipeline(
-                device,
-                (shaders::CLEAR, ["vertex", &entry]),
-                &clear_bindings.pipeline_layout,
-                &sheets_of_a_group(format, sheets, None),
-                &[],
-            ),
+            clear: clear_pipeline(device, &clear_bindings, format, sheets),
             clear_bindings,
             bindings: Bindings::new(device, shaders::SPLAT, &splat_slots()),
             format,
@@ -93,7 +82,7 @@ impl Splat {
         self.clear_bindings.bind(device, &resources)
     }
 
-    /// Compiles what a mode needs.
+    /// Compiles the pipeline for a mode.
     pub fn prepare(&self, device: &Device, mode: SplatMode) {
         self.pipeline(device, mode);
     }
@@ -118,8 +107,8 @@ impl Splat {
         self.bindings.bind(device, &resources)
     }
 
-    /// Zeroes the listed tiles of the sheet buffers, then adds the given lists' sections of a group: of every list its bind
-    /// group, the group's offset, and the arguments of its draw.
+    /// Zeroes the listed tiles of the sheet buffers, then adds the given lists' sections of a group: for every list its bind group, the group's
+    /// offset, and the arguments of its draw.
     pub fn record<'a>(
         &self,
         encoder: &mut CommandEncoder,
@@ -129,38 +118,66 @@ impl Splat {
         clear: (&BindGroup, &Buffer),
         lists: impl IntoIterator<Item = (&'a BindGroup, u32, &'a Buffer)>,
     ) {
-        let targets: Vec<_> = sheets
-            .iter()
-            .map(|view| {
-                Some(wgpu::RenderPassColorAttachment {
-                    view,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
-                })
-            })
-            .collect();
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("sheetsplat.splat"),
-            color_attachments: &targets,
-            timestamp_writes,
-            ..wgpu::RenderPassDescriptor::default()
-        });
-        let draw = std::mem::offset_of!(Indirect, draw) as u64;
-        pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint16);
-        pass.set_pipeline(&self.clear);
-        pass.set_bind_group(0, clear.0, &[]);
-        pass.draw_indexed_indirect(clear.1, draw);
         let Some(splat) = self.cell(mode).get() else { return };
-        pass.set_pipeline(splat);
-        for (group, offset, args) in lists {
-            pass.set_bind_group(0, group, &[offset]);
-            pass.draw_indexed_indirect(args, draw);
-        }
+        let pass = ("sheetsplat.splat", timestamp_writes, sheets, &self.indices);
+        record_quads(encoder, pass, (&self.clear, clear.0, clear.1), splat, lists);
     }
 }
 
-/// What the shaders that draw quads declare.
+/// The layout of what zeroes tiles.
+pub(super) fn clear_bindings(device: &Device) -> Bindings {
+    let slots = [
+        ("frames", uniform::<Frame>(ShaderStages::VERTEX, false)),
+        ("composited", storage::<TileList>(ShaderStages::VERTEX, true)),
+    ];
+    Bindings::new(device, shaders::CLEAR, &slots)
+}
+
+/// The pipeline that clears the marked tiles of the sheet buffers; `sheets` is their number.
+pub(super) fn clear_pipeline(
+    device: &Device,
+    bindings: &Bindings,
+    format: TextureFormat,
+    sheets: u32,
+) -> RenderPipeline {
+    let entry = format!("fragment_{sheets}");
+    let attachments = sheets_of_a_group(format, sheets, None);
+    render_pipeline(device, (shaders::CLEAR, ["vertex", &entry]), &bindings.pipeline_layout, &attachments, &[])
+}
+
+/// Records a pass, given by its label, its times, its targets and the quads' indices, that zeroes tiles, given by pipeline, bind group and list, and draws
+/// lists of quads.
+pub(super) fn record_quads<'a>(
+    encoder: &mut CommandEncoder,
+    (label, timestamp_writes, sheets, indices): (&str, Option<RenderPassTimestampWrites<'_>>, &[TextureView], &Buffer),
+    (clear, clear_group, tiles): (&RenderPipeline, &BindGroup, &Buffer),
+    pipeline: &RenderPipeline,
+    lists: impl IntoIterator<Item = (&'a BindGroup, u32, &'a Buffer)>,
+) {
+    let target = |view| {
+        let ops = wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store };
+        Some(wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops })
+    };
+    let targets: Vec<_> = sheets.iter().map(target).collect();
+    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some(label),
+        color_attachments: &targets,
+        timestamp_writes,
+        ..wgpu::RenderPassDescriptor::default()
+    });
+    let draw = std::mem::offset_of!(Indirect, draw) as u64;
+    pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint16);
+    pass.set_pipeline(clear);
+    pass.set_bind_group(0, clear_group, &[]);
+    pass.draw_indexed_indirect(tiles, draw);
+    pass.set_pipeline(pipeline);
+    for (group, offset, args) in lists {
+        pass.set_bind_group(0, group, &[offset]);
+        pass.draw_indexed_indirect(args, draw);
+    }
+}
+
+/// The bindings of the shaders that draw quads.
 pub(super) fn splat_slots() -> [(&'static str, Slot); 6] {
     let both = ShaderStages::VERTEX_FRAGMENT;
     [
@@ -173,7 +190,7 @@ pub(super) fn splat_slots() -> [(&'static str, Slot); 6] {
     ]
 }
 
-/// Blending that adds what is drawn to a part of what is there.
+/// Blending that adds the drawn colour to the target's, multiplied by a factor.
 pub(super) fn added_to(there: wgpu::BlendFactor) -> wgpu::BlendState {
     let component = wgpu::BlendComponent {
         src_factor: wgpu::BlendFactor::One,

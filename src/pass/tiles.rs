@@ -1,4 +1,4 @@
-//! Tiles (§6): where a sheet group composites, and around which tiles the occlusion buffer changes.
+//! Tiles (§6): where a sheet group composites, and where the occlusion buffer changes.
 
 use wgpu::{BindGroup, Buffer, BufferUsages, ComputePass, Device, ShaderStages};
 
@@ -19,9 +19,9 @@ pub struct Tiles {
 pub struct TileLists {
     /// Tiles to composite.
     pub composited: Buffer,
-    /// Tiles of the occlusion buffer to compute anew.
+    /// Tiles of the occlusion buffer to compute again.
     pub occluding: Buffer,
-    /// `[u32]`: tiles composited by every group.
+    /// `[u32]`: the number of tiles that every group composited.
     pub counts: Buffer,
     group: BindGroup,
 }
@@ -29,6 +29,15 @@ pub struct TileLists {
 impl Tiles {
     /// Compiles the stage.
     pub fn new(device: &Device) -> Self {
+        Self::compiled(device, false)
+    }
+
+    /// The same for groups that are single planes (SPEC §9).
+    pub fn of_planes(device: &Device) -> Self {
+        Self::compiled(device, true)
+    }
+
+    fn compiled(device: &Device, planes: bool) -> Self {
         let stage = ShaderStages::COMPUTE;
         let slots = [
             ("frames", uniform::<Frame>(stage, false)),
@@ -38,11 +47,13 @@ impl Tiles {
             ("composited", storage::<TileList>(stage, false)),
             ("occluding", storage::<TileList>(stage, false)),
             ("counts", storage::<u32>(stage, false)),
+            ("last_groups", storage::<u32>(stage, true)),
         ];
-        Self { stage: ComputeStage::new(device, shaders::TILES, "main", &slots, &[]) }
+        let constants = [("PLANE", f64::from(u8::from(planes)))];
+        Self { stage: ComputeStage::new(device, shaders::TILES, "main", &slots, &constants) }
     }
 
-    /// The buffers for so many tiles and groups, in [`TileLists`]' order.
+    /// The specs for `tiles` tiles and `group_count` groups, in [`TileLists`]' order.
     pub fn buffer_specs(tiles: u32, group_count: usize) -> [BufferSpec; 3] {
         let list_bytes = size_of::<TileList>() as u64 + u64::from(tiles) * 4;
         let (storage, indirect) = (BufferUsages::STORAGE, BufferUsages::STORAGE | BufferUsages::INDIRECT);
@@ -54,10 +65,10 @@ impl Tiles {
         ]
     }
 
-    /// Allocates the lists for a frame of `group_count` groups, or takes those of the `previous` frame.
+    /// Allocates the lists for a frame of `group_count` groups, or reuses those of the `previous` frame.
     ///
     /// # Errors
-    /// If the device's buffers may not be that large.
+    /// If they exceed the device's maximum size of buffers.
     pub fn prepare(
         &self,
         device: &Device,
@@ -80,6 +91,7 @@ impl Tiles {
             ("composited", composited.as_entire_binding()),
             ("occluding", occluding.as_entire_binding()),
             ("counts", counts.as_entire_binding()),
+            ("last_groups", targets.last_groups.as_entire_binding()),
         ];
         let group = self.stage.bind(device, &resources);
         Ok(TileLists { composited, occluding, counts, group })

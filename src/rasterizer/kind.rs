@@ -1,4 +1,4 @@
-//! Which rasterizer draws a view, and what it does not draw.
+//! The choice of the rasterizer for a view, and what each one refuses.
 
 use wgpu::Device;
 
@@ -7,37 +7,44 @@ use crate::gpu::device::TILE_FEATURES;
 use crate::pass::composite::RayMode;
 use crate::pass::gather::WORKGROUP_BYTES;
 use crate::setting_error::SettingError;
-use crate::settings::splatting::{
-    Classification, Compositing, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer, Splatting,
-    check_first_hit,
-};
+use crate::settings::splatting::{Classification, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
 
-/// Threads that a subgroup may have.
+/// The subgroup sizes that tiles support.
 pub(super) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;
 
-/// How to draw.
+/// The rasterizer of a frame, which follows from the [`Rasterizer`] that the scene and the renderer name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RasterizerKind {
     Quads,
-    /// If the view fits.
-    Tiles,
+    /// Tiles, if the view fits. A view that does not fit is an error if tiles are required; otherwise quads draw it.
+    Tiles {
+        insisted: bool,
+    },
     Samples,
 }
 
 impl RasterizerKind {
-    /// That of some settings, and if it is quads only because of the device, why.
+    /// The rasterizer for some settings; if it is quads only because of the device, also the reason. `preferred` is the renderer's choice,
+    /// for settings that do not name one.
     ///
     /// # Errors
-    /// If they insist on what the device or the other settings do not allow.
-    pub(crate) fn of(device: &Device, splatting: &Splatting) -> Result<(Self, Option<RenderError>), RenderError> {
-        if splatting.classification == Classification::After {
-            return Ok((Self::after(device, splatting)?, None));
-        }
-        let insists = insists_on_tiles(splatting);
+    /// If the settings require what the device or the other settings do not allow.
+    pub(crate) fn of(
+        device: &Device,
+        splatting: &Splatting,
+        preferred: Rasterizer,
+    ) -> Result<(Self, Option<RenderError>), RenderError> {
+        let needs_tiles =
+            splatting.footprint_box == FootprintBox::Parallelogram || splatting.experimental.in_use().is_some();
+        let choice = match splatting.rasterizer {
+            Rasterizer::Auto if !needs_tiles => preferred,
+            choice => choice,
+        };
+        let insisted = needs_tiles || choice == Rasterizer::Tiles;
         let by_settings = obstacle_in_settings(splatting);
         let is_by_settings = by_settings.is_some();
-        match (splatting.rasterizer, by_settings.or_else(|| obstacle_in_device(device))) {
-            (Rasterizer::Quads, _) if insists => {
+        match (choice, by_settings.or_else(|| obstacle_in_device(device))) {
+            (Rasterizer::Quads, _) if needs_tiles => {
                 let setting = match splatting.experimental.in_use() {
                     Some(economy) => economy.to_string(),
                     None => "splatting.footprint_box = \"parallelogram\"".to_owned(),
@@ -45,33 +52,12 @@ impl RasterizerKind {
                 let found = format!("\"quads\" with {setting}");
                 Err(SettingError::new("splatting.rasterizer", found, "\"tiles\" or \"auto\" with it").into())
             }
-            (Rasterizer::Tiles | Rasterizer::Auto, Some(obstacle)) if insists => Err(obstacle),
+            (Rasterizer::Tiles | Rasterizer::Auto, Some(obstacle)) if insisted => Err(obstacle),
             _ if splatting.method == Method::CompositeEverySample => Ok((Self::Samples, None)),
-            (Rasterizer::Tiles | Rasterizer::Auto, None) => Ok((Self::Tiles, None)),
+            (Rasterizer::Tiles | Rasterizer::Auto, None) => Ok((Self::Tiles { insisted }, None)),
             (Rasterizer::Auto, Some(obstacle)) if !is_by_settings => Ok((Self::Quads, Some(obstacle))),
             _ => Ok((Self::Quads, None)),
         }
-    }
-}
-
-impl RasterizerKind {
-    /// Tiles alone draw what is classified after splatting.
-    fn after(device: &Device, splatting: &Splatting) -> Result<Self, RenderError> {
-        let refused = |found: &str| {
-            let found = format!("\"after\" with {found} on the GPU");
-            Err(SettingError::new("splatting.classification", found, "\"before\" with it, or the reference backend")
-                .into())
-        };
-        if splatting.rasterizer == Rasterizer::Quads {
-            return refused("splatting.rasterizer = \"quads\"");
-        }
-        if splatting.compositing.is_by_means() {
-            return refused("splatting.compositing = \"maximum\", \"minimum\", \"average\" or \"surface\"");
-        }
-        if splatting.interpolation == Interpolation::Exact {
-            return refused("splatting.interpolation = \"exact\"");
-        }
-        obstacle_in_device(device).map_or(Ok(Self::Tiles), Err)
     }
 }
 
@@ -79,8 +65,12 @@ fn refused_tiles(found: String, allowed: &str) -> Option<RenderError> {
     Some(SettingError::new("splatting.rasterizer", format!("\"tiles\" with {found}"), allowed).into())
 }
 
-/// Why some settings cannot be drawn by tiles; `None` if they can.
+/// Why tiles do not support some settings; `None` if they do.
 fn obstacle_in_settings(splatting: &Splatting) -> Option<RenderError> {
+    if splatting.classification == Classification::After && splatting.compositing.is_by_means() {
+        let found = "splatting.classification = \"after\" and a projection or \"surface\"".to_owned();
+        return refused_tiles(found, "another splatting.compositing, \"before\" with it, or \"quads\"");
+    }
     if splatting.method == Method::CompositeEverySample {
         let found = "splatting.method = \"composite-every-sample\"".to_owned();
         return refused_tiles(found, "\"image-aligned\" or \"axis-aligned\" with it, or \"quads\"");
@@ -91,7 +81,7 @@ fn obstacle_in_settings(splatting: &Splatting) -> Option<RenderError> {
     None
 }
 
-/// Why a device cannot draw by tiles; `None` if it can.
+/// Why a device does not support tiles; `None` if it does.
 fn obstacle_in_device(device: &Device) -> Option<RenderError> {
     if !device.features().contains(TILE_FEATURES) {
         return refused_tiles("a device without subgroups, or barriers for them".to_owned(), "\"quads\"");
@@ -109,18 +99,10 @@ fn obstacle_in_device(device: &Device) -> Option<RenderError> {
     None
 }
 
-/// Whether quads will not do.
-pub(crate) fn insists_on_tiles(splatting: &Splatting) -> bool {
-    splatting.rasterizer == Rasterizer::Tiles
-        || splatting.classification == Classification::After
-        || splatting.footprint_box == FootprintBox::Parallelogram
-        || splatting.experimental.in_use().is_some()
-}
-
-/// Checks that the settings allow what of rays is looked at.
+/// Checks that the settings support cuts and first hits.
 ///
 /// # Errors
-/// If they do not, or first hits are more than a binding.
+/// If they do not, or first hits exceed a binding.
 pub(crate) fn check_rays(
     device: &Device,
     splatting: &Splatting,
@@ -128,23 +110,9 @@ pub(crate) fn check_rays(
     first_hit: Option<f64>,
     [width, height]: [u32; 2],
 ) -> Result<(), RenderError> {
-    let refused = |key, found: &str, allowed: &str| Err(SettingError::new(key, found, allowed).into());
-    if splatting.method == Method::CompositeEverySample && rays != RayMode::default() {
-        let found = "\"composite-every-sample\" with clip planes, surfaces or first hits";
-        return refused("splatting.method", found, "a method with sheets");
-    }
-    let Some(opacity) = first_hit else { return Ok(()) };
-    if splatting.compositing == Compositing::Minimum {
-        let allowed = "another one: the least is known at the end of a ray";
-        return refused("splatting.compositing", "\"minimum\" with first hits", allowed);
-    }
-    check_first_hit(opacity)?;
-    if splatting.culling && splatting.compositing.hides() && opacity > splatting.opacity_threshold {
-        let allowed = format!("above 0, at most {}, the opacity_threshold", splatting.opacity_threshold);
-        return Err(SettingError::new("first_hit", opacity, allowed).into());
-    }
-    if splatting.order != Order::FrontToBack {
-        return refused("splatting.order", "\"back-to-front\" with first hits", "\"front-to-back\"");
+    splatting.check_rays(rays.cut, first_hit)?;
+    if first_hit.is_none() {
+        return Ok(());
     }
     let limits = device.limits();
     let actual = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);

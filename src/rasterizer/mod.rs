@@ -1,6 +1,7 @@
-//! The ways from bricks to the compositing buffer. Each holds its stages' pipelines, prepares its part of a frame, and
+//! The rasterizers, which draw bricks into the compositing buffer. Each holds its stages' pipelines, prepares its part of a frame, and
 //! records it.
 
+pub(crate) mod fields;
 pub(crate) mod kind;
 pub(crate) mod quads;
 pub(crate) mod request;
@@ -21,16 +22,16 @@ use crate::pass::composite::CutBuffers;
 use crate::rasterizer::request::FrameRequest;
 use crate::settings::splatting::FootprintForm;
 
-/// What [`Renderer::prepare`](crate::renderer::Renderer::prepare) had to do.
+/// The work that [`Renderer::prepare`](crate::renderer::Renderer::prepare) did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Prepared {
     /// Whether bricks were sorted into buckets.
     pub bucketed: bool,
-    /// Whether a footprint table was made: for another kernel, or by sections for another slab width (§3.3.1).
+    /// Whether a footprint table was made: for another kernel, or for another slab width in the sections form (§3.3.1).
     pub tabled: bool,
 }
 
-/// What a rasterizer prepares a frame from.
+/// The inputs from which a rasterizer prepares a frame.
 #[derive(Clone, Copy)]
 pub(crate) struct FrameInputs<'a> {
     pub(crate) device: &'a Device,
@@ -39,25 +40,25 @@ pub(crate) struct FrameInputs<'a> {
     pub(crate) request: &'a FrameRequest,
     /// One [`Frame`](crate::gpu::layout::Frame).
     pub(crate) frame: &'a Buffer,
-    /// Control points of the ramps.
+    /// The control points of the ramps.
     pub(crate) control_points: &'a Buffer,
     pub(crate) compositing: &'a CompositingBuffer,
     pub(crate) cut: CutBuffers<'a>,
 }
 
-/// What a rasterizer's part of a frame takes.
+/// The resources that a rasterizer's part of a frame needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FrameEstimate {
     /// Bytes of GPU memory.
     pub(crate) bytes: u64,
-    /// Sheet groups.
+    /// The number of sheet groups.
     pub(crate) groups: usize,
-    /// Passes that are timed.
+    /// The number of timed passes.
     pub(crate) passes: usize,
 }
 
 impl FrameInputs<'_> {
-    /// See [`filled`].
+    /// As [`filled`](bindings::filled).
     fn filled(
         &self,
         old: Option<Buffer>,
@@ -69,7 +70,7 @@ impl FrameInputs<'_> {
     }
 }
 
-/// A table, and what it is for: the kernel, and the slab width that the sections form depends on.
+/// A footprint table, with the kernel and, for the sections form, the slab width that it was made for.
 #[derive(Debug)]
 pub(crate) struct Footprints {
     pub(crate) texture: FootprintTexture,
@@ -78,7 +79,7 @@ pub(crate) struct Footprints {
 }
 
 impl Footprints {
-    /// The old table if it will do. Also whether it had to make one.
+    /// The old table if it is still valid, or else a new one; also whether it is new.
     pub(crate) fn renewed(old: Option<Self>, inputs: FrameInputs<'_>) -> (Self, bool) {
         let FrameRequest { splatting, kernel, view, .. } = inputs.request;
         let (form, kernel) = (splatting.footprint, *kernel);
@@ -94,7 +95,7 @@ impl Footprints {
     }
 }
 
-/// A compute pass that is timed if anything is.
+/// A compute pass, which is timed if there is a timer.
 pub(crate) fn compute<'a>(
     label: &'a str,
     timer: &'a mut Option<Timer>,

@@ -7,6 +7,7 @@ use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Limits, Text
 use super::{Footprints, FrameEstimate, FrameInputs, Prepared, compute};
 use crate::error::RenderError;
 use crate::geometry::footprint::FootprintTable;
+use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, uploaded};
 use crate::gpu::classified_volume::ClassifiedVolume;
 use crate::gpu::layout::{Brick, SheetGroup, Tally};
@@ -24,7 +25,7 @@ use crate::rasterizer::request::FrameRequest;
 use crate::settings::splatting::Order;
 use crate::stats::GroupSlabs;
 
-/// The stages.
+/// The rasterizer's stages.
 #[derive(Debug)]
 pub(crate) struct QuadRasterizer {
     sheet_format: TextureFormat,
@@ -36,11 +37,11 @@ pub(crate) struct QuadRasterizer {
     occlude: Occlude,
 }
 
-/// A frame's part that is the quad rasterizer's.
+/// The quad rasterizer's part of a frame.
 #[derive(Debug)]
 pub(crate) struct QuadFrame {
     planned: Planned,
-    /// Axis-aligned, one for each of the other axes that views have looked along (§3.1): turning back sorts nothing.
+    /// For axis-aligned sheets, one for each other axis that views have looked along (§3.1), so that turning back needs no sorting.
     other_axes: Vec<Planned>,
     targets: Targets,
     footprints: Footprints,
@@ -53,25 +54,25 @@ pub(crate) struct QuadFrame {
     splat_mode: SplatMode,
     clear_group: BindGroup,
     composite_mode: CompositeMode,
-    /// First hits, `[u32]`, one per pixel; of one, if they are not asked for.
+    /// First hits, `[u32]`, one per pixel, or a single one if they are not requested.
     hits: Buffer,
     composite_groups: Vec<BindGroup>,
     occlude_groups: [BindGroup; 2],
 }
 
-/// What only changes with the view, or with the bricks: the buckets.
+/// The buckets, which change only with the view or the bricks.
 #[derive(Debug)]
-struct Planned {
-    plan: FramePlan,
+pub(super) struct Planned {
+    pub(super) plan: FramePlan,
     order: Order,
     /// [`means::covered`](crate::geometry::means::covered).
     covered: Range<f64>,
     /// [`ClassifiedVolume::revision`].
     revision: u64,
     /// For every list its bricks in bucket order, `[u32]`.
-    orders: Vec<Buffer>,
-    /// For every list the most bricks and voxels that any group can visit.
-    most: Vec<(u32, u32)>,
+    pub(super) orders: Vec<Buffer>,
+    /// For every list the maximum number of bricks and voxels that a group visits.
+    pub(super) most: Vec<(u32, u32)>,
 }
 
 #[derive(Debug)]
@@ -94,85 +95,49 @@ impl QuadRasterizer {
         }
     }
 
-    /// Buckets bricks if need be, and allocates what does not fit any more.
+    /// Sorts bricks into buckets if necessary, and allocates buffers that no longer fit.
     ///
     /// # Errors
-    /// If the device's buffers may not be that large.
+    /// If they exceed the device's maximum size of buffers.
     pub(crate) fn prepare(
         &self,
         inputs: FrameInputs<'_>,
         previous: Option<QuadFrame>,
     ) -> Result<(QuadFrame, Prepared), RenderError> {
-        let FrameInputs { device, volume, request, frame, control_points, compositing, .. } = inputs;
-        let FrameRequest { view, splatting, kernel, covered, rays, .. } = request;
+        let FrameInputs { device, request, frame, .. } = inputs;
+        let FrameRequest { view, splatting, kernel, rays, .. } = request;
         let old = PreviousBuffers::of(previous);
-        let targets = old.targets.filter(|old| old.size == view.size);
-        let targets = match targets {
+        let targets = match old.targets.filter(|old| old.size == view.size) {
             Some(targets) => targets,
             None => Targets::new(device, view.size, self.sheet_format, self.sheets)?,
         };
-        let mut other_axes = old.planned;
-        other_axes.retain(|old| {
-            (old.order, old.revision, &old.covered) == (splatting.order, volume.revision, covered)
-                && (old.plan.view.has_depths_of(view) || old.plan.view.is_by_slices())
-        });
-        let current = other_axes.iter().position(|old| old.plan.view.has_depths_of(view));
-        let bucketed = current.is_none();
-        let mut planned = match current {
-            Some(at) => other_axes.swap_remove(at),
-            None => Planned::new(device, volume, request, self.sheets),
-        };
-        planned.plan.view = *view;
-        let plan = &planned.plan;
+        let shown = (view, &request.covered);
+        let (planned, other_axes, bucketed) = Planned::renewed(inputs, shown, old.planned, self.sheets);
         let (footprints, tabled) = Footprints::renewed(old.footprints, inputs);
         let group_stride = group_stride(&device.limits());
-        let group_bytes = uniforms::groups(plan, kernel, splatting, group_stride);
+        let group_bytes = uniforms::groups(&planned.plan, kernel, splatting, group_stride);
         let groups = inputs.filled(old.groups, "sheetsplat.groups", &group_bytes, BufferUsages::UNIFORM)?;
-        let [wanted_culled, wanted_hits] = counts_and_hits(request);
-        let culled = grown(device, old.culled, &wanted_culled)?;
-
-        let shared = CullBuffers {
-            frame,
-            groups: &groups,
-            values: volume.values(),
-            has_holes: volume.has_holes(),
-            labels: volume.labels(),
-            control_points,
-            occluded: &targets.occluded,
-            culled: &culled,
-        };
-        let mut old_lists = old.lists.into_iter();
-        let lists: Vec<PreparedList> = (volume.lists.lists.iter().zip(&planned.orders).zip(&planned.most))
-            .map(|((list, order), &most)| {
-                let previous = old_lists.next().map(|old| old.cull);
-                let cull = self.cull.prepare(device, shared, list, order, most, previous)?;
-                let splat_group = self.splat.bind(device, frame, &groups, &cull, &footprints.texture);
-                Ok(PreparedList { cull, splat_group })
-            })
-            .collect::<Result<_, RenderError>>()?;
-        let buffers = [frame, &groups, &culled];
-        let tile_lists = self.tiles.prepare(device, buffers, &targets, plan.groups.len(), old.tile_lists)?;
-        let tiles = &tile_lists.composited;
-        let sheets = targets.sheets_view();
-        let hits = grown(device, old.hits, &wanted_hits)?;
-        let buffers = CompositeBuffers {
-            frame,
-            groups: &groups,
-            sheets: &sheets,
-            tiles,
-            targets: &targets,
-            cut: inputs.cut,
-            hits: &hits,
-        };
+        let [culled_spec, hits_spec] = counts_and_hits(request);
+        let culled = grown(device, old.culled, &culled_spec)?;
+        let hits = grown(device, old.hits, &hits_spec)?;
+        let lists =
+            self.prepare_lists(inputs, &planned, [&groups, &targets.occluded, &culled], &footprints, old.lists)?;
+        let group_count = planned.plan.groups.len();
+        let tile_lists =
+            self.tiles.prepare(device, [frame, &groups, &culled], &targets, group_count, old.tile_lists)?;
         let composite_mode = CompositeMode { compositing: splatting.compositing, rays: *rays };
-        let composite = |band| self.composite.bind(device, composite_mode, buffers, band);
         let splat_mode = SplatMode { form: splatting.footprint, perspective: view.perspective.is_some() };
         self.splat.prepare(device, splat_mode);
         let frame = QuadFrame {
             splat_mode,
-            clear_group: self.splat.bind_clear(device, frame, tiles),
+            clear_group: self.splat.bind_clear(device, frame, &tile_lists.composited),
             composite_mode,
-            composite_groups: compositing.bands.iter().map(composite).collect(),
+            composite_groups: self.bind_bands(
+                inputs,
+                composite_mode,
+                [&groups, &tile_lists.composited, &hits],
+                &targets,
+            ),
             occlude_groups: self.occlude.bind(device, [frame, &groups], &tile_lists.occluding, &targets),
             sheet_views: (0..self.sheets).map(|layer| targets.sheet_view(layer)).collect(),
             group_stride: group_stride as u32,
@@ -189,10 +154,56 @@ impl QuadRasterizer {
         Ok((frame, Prepared { bucketed, tabled }))
     }
 
-    /// What a new frame of these lists of bricks will take, with groups of `sheets` sheets.
+    /// Prepares culling and splatting for every list of bricks.
+    fn prepare_lists(
+        &self,
+        inputs: FrameInputs<'_>,
+        planned: &Planned,
+        [groups, occluded, culled]: [&Buffer; 3],
+        footprints: &Footprints,
+        old: Vec<PreparedList>,
+    ) -> Result<Vec<PreparedList>, RenderError> {
+        let FrameInputs { device, volume, frame, control_points, .. } = inputs;
+        let buffers = CullBuffers {
+            frame,
+            groups,
+            values: volume.values(),
+            has_holes: volume.has_holes(),
+            labels: volume.labels(),
+            control_points,
+            occluded,
+            culled,
+            planes: None,
+        };
+        let mut old = old.into_iter();
+        (volume.lists.lists.iter().zip(&planned.orders).zip(&planned.most))
+            .map(|((list, order), &most)| {
+                let previous = old.next().map(|old| old.cull);
+                let cull = self.cull.prepare(device, buffers, list, order, most, previous)?;
+                let splat_group = self.splat.bind(device, frame, groups, &cull, &footprints.texture);
+                Ok(PreparedList { cull, splat_group })
+            })
+            .collect()
+    }
+
+    /// Binds the stage composite to every band of the compositing buffer.
+    fn bind_bands(
+        &self,
+        inputs: FrameInputs<'_>,
+        mode: CompositeMode,
+        [groups, tiles, hits]: [&Buffer; 3],
+        targets: &Targets,
+    ) -> Vec<BindGroup> {
+        let FrameInputs { device, frame, compositing, cut, .. } = inputs;
+        let sheets = &targets.sheets_view();
+        let buffers = CompositeBuffers { frame, groups, sheets, tiles, targets, cut, hits };
+        compositing.bands.iter().map(|band| self.composite.bind(device, mode, buffers, band)).collect()
+    }
+
+    /// The resources that a new frame of these lists of bricks needs, with groups of `sheets` sheets.
     ///
     /// # Errors
-    /// Those of [`Self::prepare`].
+    /// As for [`Self::prepare`].
     pub(crate) fn estimate(
         limits: &Limits,
         request: &FrameRequest,
@@ -255,12 +266,12 @@ impl QuadRasterizer {
 }
 
 impl QuadFrame {
-    /// Passes of the frame: every group has three.
+    /// The number of the frame's passes: three per group.
     pub(crate) fn passes(&self) -> usize {
         passes(&self.planned.plan)
     }
 
-    /// Its groups' slabs.
+    /// The groups' slabs.
     pub(crate) fn group_slabs(&self) -> GroupSlabs {
         let FramePlan { groups, sheets, .. } = &self.planned.plan;
         GroupSlabs { firsts: groups.iter().map(|group| group.first_slab).collect(), sheets: *sheets }
@@ -273,7 +284,7 @@ impl QuadFrame {
         encoder.copy_buffer_to_buffer(&self.tile_lists.counts, 0, staging, tally, tiles);
     }
 
-    /// The words of first hits, and where in their buffer they start, bytes.
+    /// The buffer with the words of first hits, and their byte offset in it.
     pub(crate) fn first_hits(&self) -> (&Buffer, u64) {
         (&self.hits, 0)
     }
@@ -293,20 +304,52 @@ impl QuadFrame {
 }
 
 impl Planned {
-    fn new(device: &Device, volume: &ClassifiedVolume, request: &FrameRequest, sheets: u32) -> Self {
-        let FrameRequest { view, splatting, covered, .. } = request;
-        let (order, covered) = (splatting.order, covered.clone());
+    /// The plan for a view in which these sheet depths count, taken from `old` if one is still valid there; the plans that stay valid for
+    /// other axes; and whether the plan is new.
+    pub(super) fn renewed(
+        inputs: FrameInputs<'_>,
+        (view, covered): (&ViewGeometry, &Range<f64>),
+        old: Vec<Self>,
+        sheets: u32,
+    ) -> (Self, Vec<Self>, bool) {
+        let FrameInputs { device, volume, request, .. } = inputs;
+        let order = request.splatting.order;
+        let mut usable = old;
+        usable.retain(|old| {
+            old.is_of(volume, order, covered) && (old.plan.view.has_depths_of(view) || old.plan.view.is_by_slices())
+        });
+        let current = usable.iter().position(|old| old.plan.view.has_depths_of(view));
+        let mut planned = match current {
+            Some(at) => usable.swap_remove(at),
+            None => Self::new(device, volume, (view, order, covered), sheets),
+        };
+        planned.plan.view = *view;
+        (planned, usable, current.is_none())
+    }
+
+    fn new(
+        device: &Device,
+        volume: &ClassifiedVolume,
+        (view, order, covered): (&ViewGeometry, Order, &Range<f64>),
+        sheets: u32,
+    ) -> Self {
         let plan = FramePlan::new(volume.lists.bricks(), *view, sheets, order, covered.clone());
         let most = most_of(volume.lists.bricks(), &plan);
         let upload = |order: &Vec<u32>| {
             let bytes = order_bytes(order);
             uploaded(device, "sheetsplat.order", bytes, bytes.len() as u64, BufferUsages::STORAGE)
         };
-        Self { order, covered, revision: volume.revision, orders: plan.orders.iter().map(upload).collect(), most, plan }
+        let orders = plan.orders.iter().map(upload).collect();
+        Self { order, covered: covered.clone(), revision: volume.revision, orders, most, plan }
+    }
+
+    /// Whether another frame of a volume can go by it.
+    fn is_of(&self, volume: &ClassifiedVolume, order: Order, covered: &Range<f64>) -> bool {
+        (self.order, self.revision, &self.covered) == (order, volume.revision, covered)
     }
 }
 
-/// What of the previous frame may be taken over.
+/// The buffers of the previous frame that may be reused.
 #[derive(Default)]
 struct PreviousBuffers {
     planned: Vec<Planned>,
@@ -335,18 +378,18 @@ impl PreviousBuffers {
     }
 }
 
-/// Timed ones: every group has three.
+/// The number of timed passes: three per group.
 fn passes(plan: &FramePlan) -> usize {
     3 * plan.groups.len()
 }
 
-/// Bytes from one group to the next.
-fn group_stride(limits: &Limits) -> usize {
+/// The stride between groups in bytes.
+pub(super) fn group_stride(limits: &Limits) -> usize {
     size_of::<SheetGroup>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize)
 }
 
-/// The buffers of what culling counts, and of first hits.
-fn counts_and_hits(request: &FrameRequest) -> [BufferSpec; 2] {
+/// The buffers for culling's counts and for first hits.
+pub(super) fn counts_and_hits(request: &FrameRequest) -> [BufferSpec; 2] {
     let [columns, rows] = tile_grid(request.view.size);
     let culled_bytes = size_of::<Tally>() as u64 + u64::from(columns * rows) * 4;
     let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
@@ -356,13 +399,13 @@ fn counts_and_hits(request: &FrameRequest) -> [BufferSpec; 2] {
     ]
 }
 
-/// A list's bricks in bucket order; bindings may not be empty.
-fn order_bytes(order: &[u32]) -> &[u8] {
+/// A list's bricks in bucket order. Bindings may not be empty.
+pub(super) fn order_bytes(order: &[u32]) -> &[u8] {
     if order.is_empty() { &[0; 4] } else { bytemuck::cast_slice(order) }
 }
 
-/// For every list the most bricks and voxels that any group can visit.
-fn most_of<'a>(lists: impl Iterator<Item = &'a [Brick]>, plan: &FramePlan) -> Vec<(u32, u32)> {
+/// For every list the maximum number of bricks and voxels that a group visits.
+pub(super) fn most_of<'a>(lists: impl Iterator<Item = &'a [Brick]>, plan: &FramePlan) -> Vec<(u32, u32)> {
     let of_list = |(at, (bricks, order)): (usize, (&[Brick], &Vec<u32>))| {
         let voxels = |&brick: &u32| brick::present(&bricks[brick as usize]).count_ones();
         most(plan.groups.iter().map(|group| {
@@ -373,7 +416,7 @@ fn most_of<'a>(lists: impl Iterator<Item = &'a [Brick]>, plan: &FramePlan) -> Ve
     lists.zip(&plan.orders).enumerate().map(of_list).collect()
 }
 
-/// The most bricks and voxels that any group can visit, from the voxel counts of every group's bricks.
+/// The maximum number of bricks and voxels that a group visits, from the voxel counts of every group's bricks.
 fn most<C: ExactSizeIterator<Item = u32>>(groups: impl Iterator<Item = C>) -> (u32, u32) {
     groups.fold((0, 0), |(bricks, voxels), counts| (bricks.max(counts.len() as u32), voxels.max(counts.sum())))
 }

@@ -1,10 +1,10 @@
-//! What a frame asks for: everything about it that is known before anything is allocated, and can be refused.
+//! A frame request: everything about a frame that is known, and can be refused, before anything is allocated.
 
 use std::ops::Range;
 
 use wgpu::Device;
 
-use super::kind::{RasterizerKind, check_rays, insists_on_tiles};
+use super::kind::{RasterizerKind, check_rays};
 use crate::after::normalization::Normalization;
 use crate::after::plane_geometry::PlaneGeometry;
 use crate::error::RenderError;
@@ -12,46 +12,81 @@ use crate::geometry::kernel::Kernel;
 use crate::geometry::means;
 use crate::geometry::surfaces::{SurfaceDepths, Surfaces};
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::gpu::classified_volume::ClassifiedVolume;
+use crate::gpu::classified_volume::{BrickNeeds, ClassifiedVolume};
 use crate::gpu::layout::Band;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::uniforms::Ramps;
 use crate::pass::composite::RayMode;
 use crate::scene::Scene;
+use crate::setting_error::SettingError;
 use crate::settings::camera::Camera;
 use crate::settings::shading::Gradient;
-use crate::settings::splatting::{Classification, Rasterizer, Splatting};
+use crate::settings::splatting::{Classification, Interpolation, Rasterizer, Splatting};
 
 /// A frame of a view.
 #[derive(Debug)]
 pub(crate) struct FrameRequest {
-    /// With the renderer's rasterizer where the scene leaves the choice.
     pub(crate) splatting: Splatting,
-    pub(crate) gradient: Gradient,
     pub(crate) view: ViewGeometry,
     pub(crate) kernel: Kernel,
     pub(crate) ramps: Ramps,
-    /// How kernels lie on slab planes, and the numbers that values are splatted as, where classification comes after splatting.
-    pub(crate) planes: Option<(PlaneGeometry, Normalization)>,
-    /// The sheet depths whose slabs count even where they hold nothing: [`means::covered`].
+    /// The sheet depths whose slabs count even if they are empty: [`means::covered`].
     pub(crate) covered: Range<f64>,
     pub(crate) rays: RayMode,
     /// The opacity of first hits.
     pub(crate) first_hit: Option<f64>,
-    /// A host's surfaces, and the texel that is the image's first.
+    /// A host's surfaces, and the texel of the image's first pixel.
     pub(crate) surfaces: Option<(SurfaceDepths, [u32; 2])>,
     pub(crate) kind: RasterizerKind,
     /// Why the device does not draw by tiles.
     pub(crate) fallback: Option<RenderError>,
-    /// Those of the compositing buffer.
+    /// The bands of the compositing buffer.
     pub(crate) bands: Vec<Band>,
+    /// Of classification after splatting.
+    pub(crate) after: Option<After>,
+}
+
+/// What a frame asks for whose values are classified after splatting (SPEC §9).
+#[derive(Debug)]
+pub(crate) struct After {
+    /// The view, with the plane that the slab of its near plane begins at for a near plane.
+    pub(crate) view: ViewGeometry,
+    pub(crate) planes: PlaneGeometry,
+    pub(crate) numbers: Normalization,
+    pub(crate) needs: BrickNeeds,
+    pub(crate) gradient: Gradient,
+}
+
+impl After {
+    fn new(volume: &ClassifiedVolume, scene: &Scene, seen: &ViewGeometry) -> Result<Self, RenderError> {
+        let splatting = &scene.splatting;
+        if splatting.compositing.is_by_means() {
+            let (found, allowed) =
+                ("a projection or \"surface\" with classification = \"after\" on the GPU", "another one");
+            return Err(SettingError::new("splatting.compositing", found, allowed).into());
+        }
+        let planes = PlaneGeometry::new(seen, volume.grid());
+        let coefficients = match splatting.interpolation {
+            Interpolation::Smooth => None,
+            Interpolation::Exact => Some(volume.gpu_volume().coefficients((splatting.radius, splatting.falloff))?),
+        };
+        let numbers = coefficients.as_ref().map_or_else(|| volume.gpu_volume().numbers(), |exact| exact.numbers);
+        let mut view = *seen;
+        if let Some(perspective) = &mut view.perspective {
+            // There is no plane at the eye.
+            let slab = (perspective.eye.near / seen.slabs.width).floor();
+            perspective.eye.near = if slab >= 1.0 { slab } else { 0.5 } * seen.slabs.width;
+        }
+        let needs = BrickNeeds { reach: planes.reach(seen), coefficients };
+        Ok(Self { view, planes, numbers, needs, gradient: scene.shading.gradient })
+    }
 }
 
 impl FrameRequest {
-    /// The camera is the scene's with what it leaves to an object filled in.
+    /// Makes the request. The camera is the scene's with all values that depend on an object filled in.
     ///
     /// # Errors
-    /// If the scene asks for something not implemented, or for more than the device's limits allow.
+    /// If the scene needs something that is not implemented or that exceeds the device's limits.
     pub(crate) fn new(
         device: &Device,
         volume: &ClassifiedVolume,
@@ -59,7 +94,7 @@ impl FrameRequest {
         (surfaces, first_hit): (Option<&Surfaces>, Option<f64>),
         rasterizer: Rasterizer,
     ) -> Result<Self, RenderError> {
-        let splatting = settled(scene.splatting, rasterizer);
+        let splatting = scene.splatting;
         splatting.check()?;
         let (grid, size) = (volume.grid(), [scene.image.width, scene.image.height]);
         let seen = ViewGeometry::new(grid, camera, &splatting, size)?;
@@ -70,23 +105,23 @@ impl FrameRequest {
             Some(surfaces) => Some((surfaces.depths(&seen, grid)?, surfaces.origin)),
             None => None,
         };
-        let (kind, fallback) = RasterizerKind::of(device, &splatting)?;
-        let planes = match splatting.classification {
+        let (kind, fallback) = RasterizerKind::of(device, &splatting, rasterizer)?;
+        let after = match splatting.classification {
             Classification::Before => None,
-            Classification::After => Some((PlaneGeometry::new(&seen, grid), volume.gpu_volume().numbers())),
+            Classification::After => Some(After::new(volume, scene, &seen)?),
+        };
+        let ramps = match &after {
+            None => Ramps::new(volume.transfer()),
+            Some(after) => Ramps::with_integrals(volume.transfer(), splatting.compositing, &after.numbers),
         };
         Ok(Self {
+            after,
             kind,
             fallback,
             covered: means::covered(&seen, grid, &splatting),
             kernel: Kernel::new(splatting.radius, splatting.falloff),
-            ramps: match &planes {
-                Some((_, numbers)) => Ramps::with_integrals(volume.transfer(), splatting.compositing, numbers),
-                None => Ramps::new(volume.transfer()),
-            },
-            planes,
+            ramps,
             first_hit,
-            gradient: scene.shading.gradient,
             view: seen,
             splatting,
             rays,
@@ -95,19 +130,18 @@ impl FrameRequest {
         })
     }
 
-    /// Pixels of the image.
+    /// The view that stages know, whose near plane is where they begin.
+    pub(crate) fn stage_view(&self) -> &ViewGeometry {
+        self.after.as_ref().map_or(&self.view, |after| &after.view)
+    }
+
+    /// The number of pixels in the image.
     pub(crate) fn pixels(&self) -> u64 {
         self.view.size.map(u64::from).iter().product()
     }
 
-    /// Bytes of first hits, a word or a depth per pixel; none, if they are not asked for.
+    /// The size of first hits in bytes, one word or depth per pixel; 0 if they are not requested.
     pub(crate) fn hit_bytes(&self) -> u64 {
         if self.rays.first_hit { 4 * self.pixels() } else { 0 }
     }
-}
-
-/// The settings, with the renderer's rasterizer where they leave the choice.
-fn settled(splatting: Splatting, rasterizer: Rasterizer) -> Splatting {
-    let is_open = splatting.rasterizer == Rasterizer::Auto && !insists_on_tiles(&splatting);
-    Splatting { rasterizer: if is_open { rasterizer } else { splatting.rasterizer }, ..splatting }
 }

@@ -1,5 +1,5 @@
-//! Composite-every-sample (§3, Westover's first form): every voxel is a whole kernel, composited by itself, back to front. For
-//! comparison; it bleeds colours of what is hidden, as the paper says.
+//! Composite-every-sample (§3, Westover's first form): every voxel is a whole kernel, composited by itself, back to front. It is for comparison:
+//! colours of hidden voxels bleed, as the paper says.
 
 use glam::{DVec2, UVec3};
 use rayon::prelude::*;
@@ -27,11 +27,11 @@ use crate::volume::Grid;
 /// Planes around all kernels, in the sheet depth of such views.
 const PLANES: std::ops::Range<f64> = -0.5..0.5;
 
-/// How the one buffer goes into the compositing buffer: its samples are composited already.
+/// The mode that adds the single buffer, whose samples are composited already, to the compositing buffer.
 const SUM: CompositeMode =
     CompositeMode { compositing: Compositing::Xray, rays: RayMode { cut: false, first_hit: false } };
 
-/// The stages.
+/// The rasterizer's stages.
 #[derive(Debug)]
 pub(crate) struct SampleRasterizer {
     format: TextureFormat,
@@ -40,7 +40,7 @@ pub(crate) struct SampleRasterizer {
     composite: Composite,
 }
 
-/// A frame's part.
+/// The rasterizer's part of a frame.
 #[derive(Debug)]
 pub(crate) struct SampleFrame {
     sorted: Sorted,
@@ -54,13 +54,13 @@ pub(crate) struct SampleFrame {
     composite_groups: Vec<BindGroup>,
 }
 
-/// What only changes with the view, or with the bricks.
+/// The sorted voxels, which change only with the view or the bricks.
 #[derive(Debug)]
 struct Sorted {
     view: ViewGeometry,
     support: f64,
     revision: u64,
-    /// Places of the voxels on the screen, farthest first.
+    /// The places of voxels on the screen, farthest first.
     places: Vec<u32>,
 }
 
@@ -80,10 +80,10 @@ impl SampleRasterizer {
         Self { format, shade: Shade::new(device), sample: Sample::new(device, format), composite: Composite::default() }
     }
 
-    /// Sorts voxels if need be.
+    /// Sorts voxels if necessary.
     ///
     /// # Errors
-    /// If the voxels need more than one binding.
+    /// If the voxels exceed one binding.
     pub(crate) fn prepare(
         &self,
         inputs: FrameInputs<'_>,
@@ -159,10 +159,10 @@ impl SampleRasterizer {
         Ok((frame, Prepared { bucketed, tabled }))
     }
 
-    /// What a new frame of these bricks will take.
+    /// The resources that a new frame of these bricks needs.
     ///
     /// # Errors
-    /// Those of [`Self::prepare`].
+    /// As for [`Self::prepare`].
     pub(crate) fn estimate(
         limits: &Limits,
         request: &FrameRequest,
@@ -192,10 +192,10 @@ impl SampleRasterizer {
 }
 
 impl SampleFrame {
-    /// Passes of a frame.
+    /// The number of a frame's passes.
     pub(crate) const PASSES: usize = 3;
 
-    /// None: there are no sheets.
+    /// No groups, because there are no sheets.
     pub(crate) fn group_slabs(&self) -> GroupSlabs {
         GroupSlabs { firsts: Vec::new(), sheets: 1 }
     }
@@ -215,11 +215,11 @@ impl SampleFrame {
 }
 
 impl Sorted {
-    /// Sorts by depth along w, equal ones in memory order.
+    /// Sorts by depth along w, and in memory order where depths are equal.
     fn new(request: &FrameRequest, grid: &Grid, bricks: &[Brick], revision: u64) -> Self {
         let FrameRequest { view, kernel, .. } = request;
         let along_w = view.basis.w * grid.aspect();
-        // Depths that differ by less than rounding errors may are equal.
+        // Depths that differ by less than rounding errors may count as equal.
         let depth =
             |voxel: UVec3| ((voxel.as_dvec3() - grid.center()).dot(along_w) * f64::from(1 << 20)).round() as i64;
         let half_box = view.half_box(kernel.support(), PLANES);
@@ -244,7 +244,7 @@ impl Sorted {
 }
 
 impl Buffers {
-    /// For so many voxels on an image, in their order.
+    /// The specs for `voxels` voxels in an image, in their order.
     fn buffer_specs(size: [u32; 2], voxels: usize, splat_bytes: u64) -> [BufferSpec; 7] {
         let (storage, indirect) = (BufferUsages::STORAGE, BufferUsages::STORAGE | BufferUsages::INDIRECT);
         let [columns, rows] = tile_grid(size);
@@ -284,7 +284,7 @@ impl Buffers {
     }
 }
 
-/// Bytes of the splats of so many bricks.
+/// The size in bytes of the splats of `bricks` bricks.
 fn splat_bytes(limits: &Limits, bricks: usize) -> Result<u64, RenderError> {
     let actual = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
     let required = bricks as u64 * u64::from(BRICK_VOXELS) * size_of::<Splat>() as u64;
@@ -295,7 +295,7 @@ fn splat_bytes(limits: &Limits, bricks: usize) -> Result<u64, RenderError> {
     Ok(required)
 }
 
-/// Arguments for `count` things, of which a workgroup takes `each`.
+/// Arguments for `count` items, of which a workgroup processes `each`.
 fn workgroups(count: u32, each: u32) -> Indirect {
     let workgroups = count.div_ceil(each);
     Indirect {

@@ -1,214 +1,122 @@
-//! The tile rasterizer: one compute stage draws every tile front to back, its sheets in registers.
+//! The tile rasterizer: one compute stage draws every tile front to back with its sheets in registers.
 
 use std::ops::Range;
 
-use wgpu::{Buffer, BufferUsages, CommandEncoder, Limits};
+use wgpu::{Buffer, BufferUsages, CommandEncoder, Limits, TextureView};
 
 use super::kind::SUBGROUP_SIZES;
 use super::{FrameEstimate, FrameInputs, Prepared};
+use crate::after::plane_geometry::PlaneGeometry;
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, written};
-use crate::gpu::classified_volume::ClassifiedVolume;
 use crate::gpu::gathered_layout::GatheredLayout;
-use crate::gpu::layout::{Brick, Gather as GatherUniform, PatchRange, Planes};
+use crate::gpu::layout::{Brick, FieldPlanes, Gather as GatherUniform, PatchRange};
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
-use crate::lists::matter::Matter;
 use crate::lists::patch_bins::{self, PatchBins, SHEETS};
-use crate::pass::gather::{self, Gather, GatherBand, GatherBuffers, GatherMode};
-use crate::rasterizer::request::FrameRequest;
-use crate::setting_error::SettingError;
-use crate::settings::splatting::{Classification, Order, Splatting};
+use crate::pass::gather::{self, Gather, GatherBand, GatherBuffers, GatherMode, PlaneMode, drawn_order};
+use crate::pass::values::PlaneBuffers;
+use crate::rasterizer::request::{After, FrameRequest};
+use crate::settings::splatting::Order;
 use crate::stats::GroupSlabs;
 
-/// The stage.
+/// The rasterizer's stage.
 #[derive(Debug, Default)]
 pub(crate) struct TileRasterizer {
     gather: Gather,
 }
 
-/// A frame's part that is the tile rasterizer's.
+/// The tile rasterizer's part of a frame.
 #[derive(Debug)]
 pub(crate) struct TileFrame {
     binned: Binned,
-    /// The bricks of what matters, where not the volume's own are drawn.
-    matter: Option<(Matter, Vec<Brick>)>,
-    uniform: Buffer,
-    /// [`Planes`], unused where classification comes before splatting.
-    planes: Buffer,
-    patch_ranges: Buffer,
-    /// All bricks in one buffer, where the volume's own are in several.
-    bricks: Option<Buffer>,
-    starts: Buffer,
-    entries: Buffer,
-    gathered: Buffer,
+    buffers: TileBuffers<Buffer>,
     results: GatheredLayout,
-    half_boxes: Buffer,
-    /// For every band of the compositing buffer its number, and the offset of its part and its tiles.
+    /// For every dispatch its band's index, and the offset and number of its patches.
     dispatches: Vec<(usize, u32, u32)>,
     bands: Vec<GatherBand>,
 }
 
-/// What only changes with the view or the bricks.
+/// The bins, which change only with the view or the bricks.
 #[derive(Debug)]
 struct Binned {
     bins: PatchBins,
     view: ViewGeometry,
     order: Order,
+    /// The planes on which values are gathered (SPEC §9).
+    planes: Option<PlaneGeometry>,
     /// [`means::covered`](crate::geometry::means::covered).
     covered: Range<f64>,
-    /// Of the kernel; it changes the footprints' boxes.
+    /// The kernel's support, which determines the footprints' boxes.
     support: f64,
     revision: u64,
 }
 
 impl TileRasterizer {
-    /// Bins bricks if need be, and allocates what does not fit any more. Sections need no table here.
+    /// Sorts bricks into bins if necessary, and allocates buffers that no longer fit. Sections need no table here.
     ///
     /// # Errors
-    /// If there is too much behind a tile, or more bricks than a binding holds.
+    /// If too much lies behind a tile, or the bricks exceed a binding.
     pub(crate) fn prepare(
         &self,
         inputs: FrameInputs<'_>,
         previous: Option<TileFrame>,
     ) -> Result<(TileFrame, Prepared), RenderError> {
         let FrameInputs { device, queue, volume, request, .. } = inputs;
-        let FrameRequest { splatting, view, kernel, covered, rays, .. } = request;
         let limits = device.limits();
-        let mut old = PreviousBuffers::of(previous);
-        let search = all_search_passes(request, volume.labels().is_some());
-        let order = drawn_order(splatting);
-        let matter = matter(request, volume, old.matter.take());
-        let is_current = |old: &Binned| {
-            !matter.as_ref().is_some_and(|matter| matter.is_new)
-                && old.view == *view
-                && (old.order, old.revision, old.bins.passes.search) == (order, volume.revision, search)
-                && (old.support, &old.covered) == (kernel.support(), covered)
+        let (old_binned, old_buffers) = previous.map(|old| (old.binned, old.buffers)).unzip();
+        let bricks = volume.lists.all();
+        let (binned, is_new) = Binned::renewed(&limits, inputs, bricks, old_binned)?;
+        let results = GatheredLayout::new(&request.view, &binned.bins, bricks.len() as u32);
+        let spec = TileBuffers::specs(&limits, request, (&binned.bins, &results), volume.lists.lists.len())?;
+        let (range_bytes, dispatches) = patch_ranges(&limits, request);
+        let contents = (&binned.bins, &results, &range_bytes[..]);
+        let buffers = TileBuffers::filled(inputs, spec, contents, bricks, (old_buffers, is_new))?;
+        let coefficients = match request.after.as_ref().and_then(|after| after.needs.coefficients.as_ref()) {
+            Some(exact) => Some(exact.texture(device, queue)?),
+            None => None,
         };
-        let (current, stale) = match old.binned.take() {
-            Some(binned) if is_current(&binned) => (Some(binned), false),
-            _ => (None, true),
-        };
-        let (bricks, lists) = match &matter {
-            Some(matter) => (&matter.bricks[..], 0),
-            None => (volume.lists.all(), volume.lists.lists.len()),
-        };
-        let binned = match current {
-            Some(binned) => binned,
-            None => Binned {
-                bins: bins(&limits, request, bricks, search)?,
-                view: *view,
-                order,
-                covered: covered.clone(),
-                support: kernel.support(),
-                revision: volume.revision,
-            },
-        };
-        let bins = &binned.bins;
-        let results = GatheredLayout::new(view, bins, bricks.len() as u32);
-        let uniform = uniforms::gather(view, kernel, splatting, bins, &results);
-        let planes = match &request.planes {
-            Some((geometry, numbers)) => uniforms::planes(geometry, view, volume.gpu_volume().value_format(), numbers),
-            None => bytemuck::Zeroable::zeroed(),
-        };
-        let spec = BufferSpecs::new(&limits, request, (bins, &results), lists)?;
-        let write = |old, spec: &BufferSpec, bytes: &[u8]| written(device, queue, old, spec, bytes);
-        let (starts, entries) = match (old.starts.take(), old.entries.take()) {
-            (Some(starts), Some(entries)) if !stale => (starts, entries),
-            (starts, entries) => (
-                write(starts, &spec.starts, bytemuck::cast_slice(&bins.starts))?,
-                write(entries, &spec.entries, bytemuck::cast_slice(&bins.entries))?,
-            ),
-        };
-        let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|&pixels| uniforms::in_f32_pixels(pixels)).collect();
-        let half_boxes = write(old.half_boxes.take(), &spec.half_boxes, bytemuck::cast_slice(&half_boxes))?;
-        let own_bricks = match (spec.bricks, old.bricks.take()) {
-            (None, _) => None,
-            (_, Some(bricks)) if !stale => Some(bricks),
-            (Some(spec), old) => Some(write(old, &spec, bytemuck::cast_slice(bricks))?),
-        };
-        let gathered = grown(device, old.gathered.take(), &spec.gathered)?;
-        let uniform = write(old.uniform.take(), &spec.uniform, bytemuck::bytes_of(&uniform))?;
-        let planes = write(old.planes.take(), &spec.planes, bytemuck::bytes_of(&planes))?;
+        let bands = self.bind(inputs, &binned.bins, &buffers, coefficients);
+        Ok((TileFrame { binned, buffers, results, dispatches, bands }, Prepared { bucketed: is_new, tabled: false }))
+    }
 
-        let stride = range_stride(&limits);
-        let (mut range_bytes, mut dispatches) = (Vec::new(), Vec::new());
-        let [columns, _] = patch_bins::grid(view.size);
-        for (at, band) in request.bands.iter().enumerate() {
-            let first_patch = band.first_row / patch_bins::PATCH[1] * columns;
-            let patches = band.rows.div_ceil(patch_bins::PATCH[1]) * columns;
-            let range = PatchRange { first_row: band.first_row, first_patch, end_patch: first_patch + patches };
-            dispatches.push((at, range_bytes.len() as u32, patches));
-            range_bytes.extend_from_slice(bytemuck::bytes_of(&range));
-            range_bytes.resize(range_bytes.len().next_multiple_of(stride), 0);
-        }
-        let patch_ranges = write(old.patch_ranges.take(), &spec.patch_ranges, &range_bytes)?;
-
-        let labels = match splatting.classification {
-            Classification::Before => volume.labels(),
-            Classification::After => volume.gpu_volume().labels().filter(|_| volume.classifies_by_label()),
-        };
-        let of_volume = [labels.is_some(), volume.has_holes()];
-        let mode = GatherMode::of(
-            (splatting, request.gradient),
-            view.perspective.is_some(),
-            of_volume,
-            *rays,
-            bins.workgroups,
-        );
-        let (least, actual) = (gather::least_workgroup_bytes(mode), limits.max_compute_workgroup_storage_size);
-        if least > actual {
-            let found = format!(
-                "\"tiles\" with shading.gradient = \"kernel\" and a max_compute_workgroup_storage_size of {actual}"
-            );
-            return Err(SettingError::new(
-                "splatting.rasterizer",
-                found,
-                format!("at least {least}, or \"differences\""),
-            )
-            .into());
-        }
+    /// Binds the stage to every band of the compositing buffer.
+    fn bind(
+        &self,
+        inputs: FrameInputs<'_>,
+        bins: &PatchBins,
+        own: &TileBuffers<Buffer>,
+        coefficients: Option<&TextureView>,
+    ) -> Vec<GatherBand> {
+        let FrameInputs { device, volume, request, .. } = inputs;
+        let FrameRequest { splatting, view, rays, .. } = request;
+        let of_volume = [volume.labels().is_some(), volume.has_holes()];
+        let planes = plane_mode(request);
+        let mode = GatherMode::of(splatting, planes, view.perspective.is_some(), of_volume, *rays, bins.workgroups);
         let buffers = GatherBuffers {
             frame: inputs.frame,
-            gather: &uniform,
-            planes: &planes,
-            patch_ranges: &patch_ranges,
-            bricks: own_bricks.as_ref().unwrap_or_else(|| &volume.lists.lists[0].buffer),
-            starts: &starts,
-            entries: &entries,
+            gather: &own.uniform,
+            planes: own.planes.as_ref().map(|planes| PlaneBuffers { planes, coefficients }),
+            patch_ranges: &own.patch_ranges,
+            bricks: own.bricks.as_ref().unwrap_or_else(|| &volume.lists.lists[0].buffer),
+            starts: &own.starts,
+            entries: &own.entries,
             control_points: inputs.control_points,
             values: volume.values(),
-            coefficients: None,
-            labels,
-            gathered: &gathered,
-            half_boxes: &half_boxes,
+            labels: volume.labels(),
+            gathered: &own.gathered,
+            half_boxes: &own.half_boxes,
             cut: inputs.cut,
         };
         let bind = |acc| self.gather.bind(device, mode, buffers, acc, bins.dispatches);
-        let bands = inputs.compositing.bands.iter().map(|band| bind(&band.acc)).collect();
-        let frame = TileFrame {
-            binned,
-            matter: matter.map(|matter| (matter.what, matter.bricks)),
-            uniform,
-            planes,
-            patch_ranges,
-            bricks: own_bricks,
-            starts,
-            entries,
-            gathered,
-            results,
-            half_boxes,
-            dispatches,
-            bands,
-        };
-        Ok((frame, Prepared { bucketed: stale, tabled: false }))
+        inputs.compositing.bands.iter().map(|band| bind(&band.acc)).collect()
     }
 
-    /// What a new frame of these bricks, in so many lists, will take.
+    /// The resources that a new frame of these bricks, in `lists` lists, needs.
     ///
     /// # Errors
-    /// Those of [`Self::prepare`].
+    /// As for [`Self::prepare`].
     pub(crate) fn estimate(
         limits: &Limits,
         request: &FrameRequest,
@@ -217,10 +125,7 @@ impl TileRasterizer {
     ) -> Result<FrameEstimate, RenderError> {
         let bins = bins(limits, request, bricks, all_search_passes(request, by_label))?;
         let results = GatheredLayout::new(&request.view, &bins, bricks.len() as u32);
-        let spec = BufferSpecs::new(limits, request, (&bins, &results), lists)?;
-        let BufferSpecs { uniform, planes, patch_ranges, starts, entries, gathered, half_boxes, bricks, .. } = spec;
-        let buffers: Vec<BufferSpec> =
-            [uniform, planes, patch_ranges, starts, entries, gathered, half_boxes].into_iter().chain(bricks).collect();
+        let buffers: Vec<BufferSpec> = TileBuffers::specs(limits, request, (&bins, &results), lists)?.all().collect();
         let bands = request.bands.len() as u64 * GatherBand::estimate(bins.dispatches);
         let groups = bins.groups as usize;
         Ok(FrameEstimate { bytes: sizes(limits, &buffers)? + bands, groups, passes: TileFrame::PASSES })
@@ -228,7 +133,7 @@ impl TileRasterizer {
 
     /// Draws the frame.
     pub(crate) fn record(&self, encoder: &mut CommandEncoder, timer: &mut Option<Timer>, frame: &TileFrame) {
-        encoder.clear_buffer(&frame.gathered, 0, None);
+        encoder.clear_buffer(&frame.buffers.gathered, 0, None);
         frame.bands.iter().for_each(|band| band.clear(encoder));
         let mut pass = encoder.begin_compute_pass(&super::compute("sheetsplat.gather", timer, "gather"));
         for &(band, offset, patches) in &frame.dispatches {
@@ -238,10 +143,10 @@ impl TileRasterizer {
 }
 
 impl TileFrame {
-    /// Passes of a frame.
+    /// The number of a frame's passes.
     pub(crate) const PASSES: usize = 1;
 
-    /// Its groups' slabs.
+    /// The groups' slabs.
     pub(crate) fn group_slabs(&self) -> GroupSlabs {
         let bins = &self.binned.bins;
         let firsts = (0..bins.groups as i32).map(|group| bins.first_slab + group * SHEETS as i32);
@@ -254,44 +159,132 @@ impl TileFrame {
 
     /// Copies the frame's counts to the start of `staging`.
     pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer) {
-        encoder.copy_buffer_to_buffer(&self.gathered, 0, staging, 0, self.results.count_bytes());
+        encoder.copy_buffer_to_buffer(&self.buffers.gathered, 0, staging, 0, self.results.count_bytes());
     }
 
-    /// The words of first hits, and where in their buffer they start, bytes.
+    /// The buffer with the words of first hits, and their byte offset in it.
     pub(crate) fn first_hits(&self) -> (&Buffer, u64) {
-        (&self.gathered, self.results.hits_byte())
+        (&self.buffers.gathered, self.results.hits_byte())
     }
 
     /// Bytes of GPU memory.
     pub(crate) fn gpu_bytes(&self) -> u64 {
-        let Self { uniform, planes, patch_ranges, starts, entries, gathered, half_boxes, bricks, .. } = self;
         let bands: u64 = self.bands.iter().map(GatherBand::gpu_bytes).sum();
-        let buffers = [uniform, planes, patch_ranges, starts, entries, gathered, half_boxes].into_iter().chain(bricks);
-        bands + buffers.map(Buffer::size).sum::<u64>()
+        bands + self.buffers.each_ref().all().map(Buffer::size).sum::<u64>()
     }
 }
 
-/// The buffers of a frame, all but those of bands.
-struct BufferSpecs {
-    uniform: BufferSpec,
-    planes: BufferSpec,
-    patch_ranges: BufferSpec,
-    starts: BufferSpec,
-    entries: BufferSpec,
-    gathered: BufferSpec,
-    half_boxes: BufferSpec,
-    /// If the volume's own are in several buffers, or in none.
-    bricks: Option<BufferSpec>,
+impl Binned {
+    /// The old bins if they are still valid, or else new ones; also whether they are new.
+    fn renewed(
+        limits: &Limits,
+        inputs: FrameInputs<'_>,
+        bricks: &[Brick],
+        old: Option<Self>,
+    ) -> Result<(Self, bool), RenderError> {
+        let FrameInputs { volume, request, .. } = inputs;
+        let FrameRequest { splatting, view, kernel, covered, .. } = request;
+        let search = all_search_passes(request, volume.labels().is_some());
+        let (order, planes) = (drawn_order(splatting), request.after.as_ref().map(|after| after.planes));
+        let is_current = |old: &Self| {
+            old.view == *view
+                && (old.order, old.revision, old.bins.passes.search) == (order, volume.revision, search)
+                && (old.support, &old.covered, old.planes) == (kernel.support(), covered, planes)
+        };
+        if let Some(old) = old.filter(is_current) {
+            return Ok((old, false));
+        }
+        let binned = Self {
+            bins: bins(limits, request, bricks, search)?,
+            view: *view,
+            order,
+            planes,
+            covered: covered.clone(),
+            support: kernel.support(),
+            revision: volume.revision,
+        };
+        Ok((binned, true))
+    }
 }
 
-impl BufferSpecs {
-    /// The buffers for a view of a volume whose bricks are divided among `lists` lists.
-    fn new(
+/// A frame's buffers, except those of bands: their specs, or the buffers themselves.
+#[derive(Debug)]
+struct TileBuffers<B> {
+    uniform: B,
+    /// [`FieldPlanes`], if values are gathered on planes.
+    planes: Option<B>,
+    patch_ranges: B,
+    starts: B,
+    entries: B,
+    gathered: B,
+    half_boxes: B,
+    /// All bricks in one buffer, if the volume's own are in several, or in none.
+    bricks: Option<B>,
+}
+
+impl<B> TileBuffers<B> {
+    fn all(self) -> impl Iterator<Item = B> {
+        let Self { uniform, planes, patch_ranges, starts, entries, gathered, half_boxes, bricks } = self;
+        [uniform, patch_ranges, starts, entries, gathered, half_boxes].into_iter().chain(planes).chain(bricks)
+    }
+
+    fn each_ref(&self) -> TileBuffers<&B> {
+        let Self { uniform, planes, patch_ranges, starts, entries, gathered, half_boxes, bricks } = self;
+        let (planes, bricks) = (planes.as_ref(), bricks.as_ref());
+        TileBuffers { uniform, planes, patch_ranges, starts, entries, gathered, half_boxes, bricks }
+    }
+}
+
+impl TileBuffers<Buffer> {
+    /// Fills the buffers for a frame. Buffers that depend only on the bins are kept unless the bins are new.
+    fn filled(
+        inputs: FrameInputs<'_>,
+        spec: TileBuffers<BufferSpec>,
+        (bins, results, range_bytes): (&PatchBins, &GatheredLayout, &[u8]),
+        bricks: &[Brick],
+        (old, is_new): (Option<Self>, bool),
+    ) -> Result<Self, RenderError> {
+        let FrameInputs { device, queue, request, .. } = inputs;
+        let write = |old, spec: &BufferSpec, bytes: &[u8]| written(device, queue, old, spec, bytes);
+        let rewrite = |old: Option<Buffer>, spec: &BufferSpec, bytes: &[u8]| match old {
+            Some(current) if !is_new => Ok(current),
+            old => write(old, spec, bytes),
+        };
+        let uniform = uniforms::gather(&request.view, &request.kernel, &request.splatting, bins, results);
+        let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|&pixels| uniforms::in_f32_pixels(pixels)).collect();
+        let old = PreviousBuffers::of(old);
+        Ok(Self {
+            starts: rewrite(old.starts, &spec.starts, bytemuck::cast_slice(&bins.starts))?,
+            entries: rewrite(old.entries, &spec.entries, bytemuck::cast_slice(&bins.entries))?,
+            half_boxes: write(old.half_boxes, &spec.half_boxes, bytemuck::cast_slice(&half_boxes))?,
+            bricks: match spec.bricks {
+                Some(spec) => Some(rewrite(old.bricks, &spec, bytemuck::cast_slice(bricks))?),
+                None => None,
+            },
+            gathered: grown(device, old.gathered, &spec.gathered)?,
+            uniform: write(old.uniform, &spec.uniform, bytemuck::bytes_of(&uniform))?,
+            planes: match (spec.planes, &request.after) {
+                (Some(spec), Some(After { planes, numbers, .. })) => {
+                    let format = inputs.volume.gpu_volume().value_format();
+                    let planes = uniforms::planes(planes, &request.view, format, numbers);
+                    Some(write(old.planes, &spec, bytemuck::bytes_of(&planes))?)
+                }
+                _ => None,
+            },
+            patch_ranges: write(old.patch_ranges, &spec.patch_ranges, range_bytes)?,
+        })
+    }
+}
+
+impl TileBuffers<BufferSpec> {
+    /// The specs for a view of a volume whose bricks are divided among `lists` lists.
+    fn specs(
         limits: &Limits,
         request: &FrameRequest,
         (bins, results): (&PatchBins, &GatheredLayout),
         lists: usize,
     ) -> Result<Self, RenderError> {
+        check_workgroup_memory(limits, request)?;
         let (binding, storage) = (binding(limits), BufferUsages::STORAGE);
         let within = |what, required: u64| {
             let (limit, actual) = ("max_storage_buffer_binding_size", binding);
@@ -309,7 +302,10 @@ impl BufferSpecs {
         let range_bytes = (request.bands.len() * range_stride(limits)) as u64;
         Ok(Self {
             uniform: content_spec("sheetsplat.gather", size_of::<GatherUniform>() as u64, BufferUsages::UNIFORM),
-            planes: content_spec("sheetsplat.planes", size_of::<Planes>() as u64, BufferUsages::UNIFORM),
+            planes: request
+                .after
+                .as_ref()
+                .map(|_| content_spec("sheetsplat.planes", size_of::<FieldPlanes>() as u64, BufferUsages::UNIFORM)),
             patch_ranges: content_spec("sheetsplat.patch_ranges", range_bytes, BufferUsages::UNIFORM),
             starts: content_spec("sheetsplat.bin_starts", words(bins.starts.len()), storage),
             entries: content_spec("sheetsplat.bin_entries", words(bins.entries.len()), storage),
@@ -324,54 +320,58 @@ impl BufferSpecs {
     }
 }
 
-/// Bytes that a storage binding may have.
+/// The maximum size of a storage binding in bytes.
 fn binding(limits: &Limits) -> u64 {
     limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
 }
 
-/// Bytes from one part to the next.
+/// The patches of every band of the compositing buffer, as uniforms, and the frame's dispatches.
+fn patch_ranges(limits: &Limits, request: &FrameRequest) -> (Vec<u8>, Vec<(usize, u32, u32)>) {
+    let stride = range_stride(limits);
+    let (mut bytes, mut dispatches) = (Vec::new(), Vec::new());
+    let [columns, _] = patch_bins::grid(request.view.size);
+    for (at, band) in request.bands.iter().enumerate() {
+        let first_patch = band.first_row / patch_bins::PATCH[1] * columns;
+        let patches = band.rows.div_ceil(patch_bins::PATCH[1]) * columns;
+        let range = PatchRange { first_row: band.first_row, first_patch, end_patch: first_patch + patches };
+        dispatches.push((at, bytes.len() as u32, patches));
+        bytes.extend_from_slice(bytemuck::bytes_of(&range));
+        bytes.resize(bytes.len().next_multiple_of(stride), 0);
+    }
+    (bytes, dispatches)
+}
+
+/// The stride between parts in bytes.
 fn range_stride(limits: &Limits) -> usize {
     size_of::<PatchRange>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize)
 }
 
 fn bins(limits: &Limits, request: &FrameRequest, bricks: &[Brick], search: u32) -> Result<PatchBins, RenderError> {
-    let FrameRequest { view, splatting, kernel, covered, planes, .. } = request;
-    let planes = planes.as_ref().map(|(geometry, _)| geometry);
+    let FrameRequest { view, splatting, kernel, covered, after, .. } = request;
+    let planes = after.as_ref().map(|after| &after.planes);
     let most_words = binding(limits) / 4;
     let (order, support) = (drawn_order(splatting), kernel.support());
     Ok(PatchBins::new(bricks, (view, planes), order, covered.clone(), support, search, most_words)?)
 }
 
-/// The order in which groups are drawn. Planes are handed on from front to back; after splatting the order makes no difference to an image.
-fn drawn_order(splatting: &Splatting) -> Order {
-    match splatting.classification {
-        Classification::Before => splatting.order,
-        Classification::After => Order::FrontToBack,
+/// What is gathered on planes, if classification comes after splatting.
+fn plane_mode(request: &FrameRequest) -> Option<PlaneMode> {
+    let After { gradient, needs, .. } = request.after.as_ref()?;
+    Some(PlaneMode { gradient: *gradient, exact: needs.coefficients.is_some() })
+}
+
+/// Checks that a patch's pixels fit into a workgroup's memory, of which sums with the kernel's gradient need most.
+fn check_workgroup_memory(limits: &Limits, request: &FrameRequest) -> Result<(), RenderError> {
+    let required = u64::from(gather::min_workgroup_bytes(plane_mode(request)));
+    let actual = u64::from(limits.max_compute_workgroup_storage_size);
+    if required > actual {
+        let (what, limit) = ("the tile rasterizer's sums", "max_compute_workgroup_storage_size");
+        return Err(RenderError::Limit { what, limit, required, actual });
     }
+    Ok(())
 }
 
-/// What matters where classification comes after splatting.
-struct NewMatter {
-    what: Matter,
-    bricks: Vec<Brick>,
-    is_new: bool,
-}
-
-fn matter(request: &FrameRequest, volume: &ClassifiedVolume, old: Option<(Matter, Vec<Brick>)>) -> Option<NewMatter> {
-    if request.splatting.classification == Classification::Before {
-        return None;
-    }
-    let what = Matter::new(volume.transfer(), &request.splatting, &request.view, volume.grid());
-    Some(match old {
-        Some((old, bricks)) if old == what => NewMatter { what, bricks, is_new: false },
-        _ => {
-            let bricks = what.bricks(volume.grid(), volume.volume().values());
-            NewMatter { what, bricks, is_new: true }
-        }
-    })
-}
-
-/// Passes through loops to look up a voxel's control points: all ramps are searched in memory if any is, as threads hold no more than one
+/// The passes through loops to look up a voxel's control points: all ramps are searched in memory if any is, because threads hold at most one
 /// point each.
 fn all_search_passes(request: &FrameRequest, by_label: bool) -> u32 {
     let lengths = request.ramps.lengths();
@@ -379,40 +379,39 @@ fn all_search_passes(request: &FrameRequest, by_label: bool) -> u32 {
     if in_memory { 1 + lengths.iter().map(|&points| search_passes(points)).sum::<u32>() } else { 0 }
 }
 
-/// Passes through loops that a binary search among so many control points takes.
+/// The passes through loops of a binary search among `points` control points.
 fn search_passes(points: u32) -> u32 {
     points.ilog2() + 2
 }
 
-/// What of the previous frame may be taken over.
+/// The buffers of the previous frame, each of which may be reused.
 #[derive(Default)]
 struct PreviousBuffers {
-    binned: Option<Binned>,
-    matter: Option<(Matter, Vec<Brick>)>,
     uniform: Option<Buffer>,
     planes: Option<Buffer>,
     patch_ranges: Option<Buffer>,
-    bricks: Option<Buffer>,
     starts: Option<Buffer>,
     entries: Option<Buffer>,
     gathered: Option<Buffer>,
     half_boxes: Option<Buffer>,
+    bricks: Option<Buffer>,
 }
 
 impl PreviousBuffers {
-    fn of(frame: Option<TileFrame>) -> Self {
-        let Some(frame) = frame else { return Self::default() };
+    fn of(old: Option<TileBuffers<Buffer>>) -> Self {
+        let Some(TileBuffers { uniform, planes, patch_ranges, starts, entries, gathered, half_boxes, bricks }) = old
+        else {
+            return Self::default();
+        };
         Self {
-            binned: Some(frame.binned),
-            matter: frame.matter,
-            uniform: Some(frame.uniform),
-            planes: Some(frame.planes),
-            patch_ranges: Some(frame.patch_ranges),
-            bricks: frame.bricks,
-            starts: Some(frame.starts),
-            entries: Some(frame.entries),
-            gathered: Some(frame.gathered),
-            half_boxes: Some(frame.half_boxes),
+            uniform: Some(uniform),
+            planes,
+            patch_ranges: Some(patch_ranges),
+            starts: Some(starts),
+            entries: Some(entries),
+            gathered: Some(gathered),
+            half_boxes: Some(half_boxes),
+            bricks,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Compositing of one sheet, eq. 2 and SPEC §5; the twin of `shaders/composite.wgsl`.
+//! Compositing of one sheet (eq. 2, SPEC §5): the f64 evaluation of `shaders/composite.wgsl`.
 
 use glam::DVec4;
 
@@ -12,10 +12,10 @@ pub fn composite(acc: &mut Buffer, sheet: &Buffer, compositing: Compositing, ord
     }
 }
 
-/// Composites what one sheet, or one voxel alone, has at a pixel; for compositing by means its mean.
+/// Composites one sheet's content, or a single voxel's, at a pixel; for compositing by means, the sheet's mean.
 ///
-/// For `Minimum` the compositing buffer keeps 2 less the opacity, and 0 where nothing counted; for `Surface` the mean of the last sheet
-/// while that is below one half.
+/// For `Minimum` the compositing buffer stores 2 minus the opacity, and 0 while nothing has counted; for `Surface` it stores the mean of the
+/// last sheet while that is below one half.
 pub fn composite_pixel(acc: &mut DVec4, sheet: DVec4, compositing: Compositing, order: Order) {
     let scale = match compositing {
         Compositing::Linear => 1.0 / sheet.w.max(1.0),
@@ -23,7 +23,7 @@ pub fn composite_pixel(acc: &mut DVec4, sheet: DVec4, compositing: Compositing, 
         _ => 1.0,
     };
     let sheet = sheet * scale;
-    // Of equal ones the nearer: scaled, all above 1 are equal to the last bit.
+    // The nearer of equal ones is kept: after scaling, all above 1 are equal to the last bit.
     let kept = |acc: DVec4, color: DVec4, opacity: f64| {
         let passes = opacity > acc.w || opacity == acc.w && order == Order::BackToFront;
         if passes { (color / color.w.max(1.0)).truncate().extend(opacity) } else { acc }
@@ -43,7 +43,7 @@ pub fn composite_pixel(acc: &mut DVec4, sheet: DVec4, compositing: Compositing, 
     };
 }
 
-/// Where between the middles of a slab and of the next one their means' opacity is one half, if it grows evenly.
+/// The position between the middles of a slab and the next one where the opacity, interpolated linearly, is one half.
 pub fn crossing(before: DVec4, mean: DVec4) -> f64 {
     (0.5 - before.w) / (mean.w - before.w)
 }

@@ -1,4 +1,4 @@
-//! At which depth a pixel's opacity reaches a value; the twin of `shaders/first_hit.wgsl`.
+//! The depth at which a pixel's opacity reaches a value: the f64 evaluation of `shaders/first_hit.wgsl`.
 
 use glam::UVec2;
 
@@ -7,7 +7,7 @@ use super::cut::PixelRay;
 use super::{Buffer, Cuts, Geometry};
 use crate::settings::splatting::Compositing;
 
-/// Of every pixel, row by row, where the opacity is reached, in sheets (number k fills `k..k + 1`).
+/// For every pixel, row by row, the position in sheets at which the opacity is reached (sheet k fills `k..k + 1`).
 pub(super) struct FirstHits {
     opacity: f64,
     compositing: Compositing,
@@ -15,15 +15,14 @@ pub(super) struct FirstHits {
 }
 
 impl FirstHits {
-    /// None yet; of no pixel, if no opacity is asked for.
-    pub(super) fn new(opacity: Option<f64>, compositing: Compositing, geometry: &Geometry) -> Self {
+    /// No pixel has reached the opacity yet.
+    pub(super) fn new(opacity: f64, compositing: Compositing, geometry: &Geometry) -> Self {
         let pixels = (geometry.size.x * geometry.size.y) as usize;
-        let sheets = vec![None; if opacity.is_some() { pixels } else { 0 }];
-        Self { opacity: opacity.unwrap_or(0.0), compositing, sheets }
+        Self { opacity, compositing, sheets: vec![None; pixels] }
     }
 
-    /// Notes the pixels whose opacity one sheet raised to the value: there, if it grows evenly over what shows of the sheet. A surface is
-    /// where it is.
+    /// Notes the pixels in which one sheet raised the opacity to the value: the position is interpolated linearly within the sheet's visible
+    /// part. For a surface it is the surface's own.
     pub(super) fn note(&mut self, before: &Buffer, sheet: &Buffer, after: &Buffer, number: i32, cuts: Option<&Cuts>) {
         let is_surface = self.compositing == Compositing::Surface;
         let opacity = if is_surface { 1.0 } else { self.opacity };
@@ -43,7 +42,7 @@ impl FirstHits {
         }
     }
 
-    /// Depths along w, `unit`s; infinite where the opacity is not reached.
+    /// The depths along w in `unit`s; infinite where the opacity is not reached.
     pub(super) fn depths(&self, geometry: &Geometry) -> Vec<f64> {
         let width = geometry.size.x as usize;
         let depth = |(pixel, sheet): (usize, &Option<f64>)| {

@@ -1,28 +1,28 @@
-//! How a footprint lies on the screen, SPEC §5, with the low-pass rule.
+//! Footprints on the screen (SPEC §5), with the low-pass rule.
 
 use glam::{DMat2, DVec2, DVec3};
 
 use crate::settings::camera::ViewBasis;
 
-/// A local ray, as the footprints of a kernel see it: SPEC §5's `λ` and `ro`.
+/// A local ray as the footprints of a kernel need it: `λ` and `ro` of SPEC §5.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// `λ = |rw|`: warped length of one `unit` along the ray.
+    /// `λ = |rw|`: the warped length of one `unit` along the ray.
     pub lambda: f64,
-    /// `(r·w)/λ`: the depth that one grid unit along the warped ray gains, `unit`s.
+    /// `(r·w)/λ`: the depth in `unit`s per grid unit along the warped ray.
     pub depth_per_warped: f64,
     /// `ro = rw/λ`.
     pub ro: DVec3,
-    /// Offset parallel to the image (`unit`s right, `unit`s down) → footprint coordinates.
+    /// Maps an offset parallel to the image (`unit`s right, `unit`s down) to footprint coordinates.
     pub footprint_from_units: DMat2,
 }
 
 impl Ray {
-    /// The ray along the unit vector `r` over a grid of this aspect.
+    /// The ray along the unit vector `r` in a grid of this aspect.
     pub fn new(r: DVec3, basis: &ViewBasis, aspect: DVec3) -> Self {
         let rw = r / aspect;
         let (ro, lambda) = (rw.normalize(), rw.length());
-        // Any orthonormal basis of the plane ⟂ ro will do: the kernel is symmetric.
+        // The kernel is symmetric, so any orthonormal basis of the plane ⟂ ro serves.
         let a = ro.any_orthonormal_vector();
         let b = ro.cross(a);
         let column = |q: DVec3| DVec2::new((q / aspect).dot(a), (q / aspect).dot(b));
@@ -30,7 +30,7 @@ impl Ray {
         Self { lambda, depth_per_warped: r.dot(basis.w) / lambda, ro, footprint_from_units }
     }
 
-    /// Where a pixel is so many `unit`s.
+    /// The footprint for pixels of `pix` `unit`s.
     pub fn footprint(&self, pix: f64) -> Footprint {
         Footprint::new(self.footprint_from_units * pix)
     }
@@ -39,7 +39,7 @@ impl Ray {
 /// A footprint on the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
-    /// Pixel offset → footprint coordinates, after the low-pass rule.
+    /// Maps a pixel offset to footprint coordinates, after the low-pass rule.
     pub from_pixels: DMat2,
     /// The low-pass rule's amplitude.
     pub amplitude: f64,
@@ -52,21 +52,21 @@ impl Footprint {
         Self { from_pixels: pixels_from_footprint.inverse(), amplitude }
     }
 
-    /// Half the width and height, in pixels, of the screen box around a footprint of the given radius (grid units).
+    /// Half the width and height in pixels of the screen box around a footprint of the given radius (grid units).
     pub fn half_box(&self, radius: f64) -> DVec2 {
         let pixels_from_footprint = self.from_pixels.inverse();
         radius * DVec2::new(pixels_from_footprint.row(0).length(), pixels_from_footprint.row(1).length())
     }
 
-    /// Pixel offset → footprint coordinates whose first axis is the screen's (eqs. 9, 10): the square around a footprint in these
-    /// coordinates is a parallelogram on the screen, with two sides along the pixel rows (Fig. 13).
+    /// Maps a pixel offset to footprint coordinates whose first axis is the screen's (eqs. 9, 10). The square around a footprint in these
+    /// coordinates is a parallelogram on the screen with two sides along the pixel rows (Fig. 13).
     pub fn sheared_from_pixels(&self) -> DMat2 {
         DMat2::from_angle(-self.from_pixels.x_axis.to_angle()) * self.from_pixels
     }
 }
 
-/// Raises singular values below 1 to 1; also the product of old/new. By the decomposition of a 2×2 matrix into rotation,
-/// `diag(q + r, q - r)` and rotation.
+/// Raises singular values below 1 to 1 and returns the product of old/new. The 2×2 matrix is decomposed into a rotation,
+/// `diag(q + r, q - r)` and a rotation.
 fn low_pass(m: DMat2) -> (DMat2, f64) {
     let [[a, c], [b, d]] = m.to_cols_array_2d();
     let (e, f, g, h) = ((a + d) / 2.0, (a - d) / 2.0, (c + b) / 2.0, (c - b) / 2.0);
@@ -97,10 +97,10 @@ mod tests {
         assert!((amplitude - 0.25).abs() < 1e-12);
     }
 
-    /// A whole kernel's footprint is that of Westover's ellipsoid (§4.2), which here is integrated along world rays, sample by sample.
+    /// The footprint of a whole kernel equals that of Westover's ellipsoid (§4.2), which is integrated here along world rays by sampling.
     #[test]
     fn the_warped_footprint_is_westovers_ellipsoid() {
-        // Wide enough that the cut-off at the radius does not disturb the sum.
+        // The kernel is wide enough that truncation at the radius does not affect the sum.
         let kernel = Kernel::new(4.0, 2.0);
         let step = 0.02;
         for aspect in [DVec3::ONE, DVec3::new(1.0, 1.0, 5.0), DVec3::new(3.2 / 1.5, 3.2 / 1.5, 1.0)] {

@@ -1,4 +1,4 @@
-//! SPEC §§2 and 5 as written: pixel coordinates, depths, slabs and slices, and where a voxel's kernel sections fall.
+//! The geometry of SPEC §§2 and 5 as written: pixel coordinates, depths, slabs and slices, and kernel sections.
 
 use std::ops::Range;
 
@@ -17,50 +17,50 @@ use crate::settings::economies::Economies;
 use crate::settings::splatting::Method;
 use crate::volume::Grid;
 
-/// The largest image, pixels along a side: what the largest GPUs allow.
+/// The maximum image size in pixels along a side, as on the largest GPUs.
 const MAX_SIZE: u32 = 32768;
 
 /// A view of a grid.
 ///
-/// Orthographic rays are all alike. In perspective `pix`, `ro`, `lambda`, `footprint_from_pixels` and `amplitude` are those of the
-/// central ray at the camera's `center`, and every voxel and section has its own: [`Geometry::section`].
+/// Orthographic rays are parallel. In perspective `pix`, `ro`, `lambda`, `footprint_from_pixels` and `amplitude` belong to the central ray
+/// at the camera's `center`, and every voxel and section has its own: [`Geometry::section`].
 #[derive(Clone, Debug)]
 pub struct Geometry {
     /// The viewing coordinate system.
     pub basis: ViewBasis,
-    /// Image size, pixels.
+    /// The image size in pixels.
     pub size: DVec2,
     /// The grid.
     pub grid: Grid,
-    /// World point at the image's centre, `unit`s.
+    /// The world point at the image's centre, in `unit`s.
     pub center: DVec3,
     /// The eye; `None` for an orthographic view.
     pub eye: Option<Eye>,
-    /// Which part of a kernel goes into which sheet.
+    /// The method, which decides which part of a kernel goes into which sheet.
     pub method: Method,
-    /// `unit`s per pixel.
+    /// The size of a pixel in `unit`s.
     pub pix: f64,
-    /// `ro = rw/λ`, orthographic also the slab normal `wo`.
+    /// `ro = rw/λ`; orthographic, it is also the slab normal `wo`.
     pub ro: DVec3,
     /// `λ = |rw|`.
     pub lambda: f64,
-    /// Ways to draw less (§8). Not the one that depends on what was drawn before: `beta`.
+    /// The economies (§8), except `beta`, which depends on what was drawn before.
     pub economies: Economies,
-    /// Slab width in terms of [`Geometry::depth`]: orthographic `Δ·λw`, perspective Δ.
+    /// The slab width in the units of [`Geometry::depth`]: orthographic `Δ·λw`, perspective Δ.
     pub slab_width: f64,
-    /// Pixel offset → footprint coordinates, after the low-pass rule.
+    /// Maps a pixel offset to footprint coordinates, after the low-pass rule.
     pub footprint_from_pixels: DMat2,
     /// The low-pass rule's amplitude.
     pub amplitude: f64,
-    /// What clip planes keep.
+    /// The half spaces that clip planes keep.
     pub clip: Vec<HalfSpace>,
-    /// The kernel's radius, grid units.
+    /// The kernel's radius in grid units.
     pub radius: f64,
 }
 
 impl Geometry {
     /// # Errors
-    /// If the scene asks for more than can be computed.
+    /// If the scene needs more than can be computed.
     pub fn new(grid: &Grid, scene: &Scene) -> Result<Self, RenderError> {
         let (width, height) = (scene.image.width, scene.image.height);
         for (key, found) in [("image.width", width), ("image.height", height)] {
@@ -102,7 +102,7 @@ impl Geometry {
         Ok(geometry)
     }
 
-    /// That slabs are few enough and have numbers.
+    /// Checks that the number of slabs and their indices are in range.
     fn check_slabs(&self, radius: f64, slab_width: f64) -> Result<(), RenderError> {
         let origin = 0.0;
         let Some(eye) = self.eye else {
@@ -110,24 +110,24 @@ impl Geometry {
             return slabs.check(self.ro.abs().dot(self.grid.center()) + radius, slab_width);
         };
         let half_extents = self.grid.center() * self.grid.aspect();
-        // A kernel reaches `radius·(r·w)/λ` units of depth from its voxel, at most this.
+        // A kernel reaches `radius·(r·w)/λ` units of depth from its voxel. This is the maximum.
         let reach = radius * (self.basis.w * self.grid.aspect()).length();
         SlabGrid { origin, width: slab_width }.check(self.basis.w.abs().dot(half_extents) + reach, slab_width)?;
         eye.check_slabs(&self.grid, slab_width)
     }
 
-    /// Position relative to the eye (orthographic: to the world point at the image's centre), `unit`s.
+    /// A voxel's position relative to the eye (orthographic: to the world point at the image's centre), in `unit`s.
     fn position(&self, voxel: UVec3) -> DVec3 {
         self.grid.world_position(voxel) / self.grid.unit() - self.eye.map_or(self.center, |eye| eye.position)
     }
 
-    /// Whether a voxel is beyond the near plane: its depth, not its distance (SPEC §2). With that every voxel that takes part
-    /// lies before the eye, `r·w > 0`, also those beside it.
+    /// Whether a voxel's depth, not its distance, is beyond the near plane (SPEC §2). Every voxel that takes part then lies in front of the
+    /// eye, `r·w > 0`, even if it is far to the side.
     pub fn is_beyond_near(&self, voxel: UVec3) -> bool {
         self.eye.is_none_or(|eye| self.position(voxel).dot(self.basis.w) > eye.near)
     }
 
-    /// Whether any of a voxel's kernel, a ball in the warped grid, is inside of all clip planes, each taken for itself.
+    /// Whether a voxel's kernel, a ball in the warped grid, reaches inside every clip plane taken by itself.
     pub fn is_inside(&self, voxel: UVec3) -> bool {
         let (p, aspect) = (self.grid.world_position(voxel) / self.grid.unit(), self.grid.aspect());
         let reaches = |HalfSpace { normal, offset }: &HalfSpace| {
@@ -136,12 +136,12 @@ impl Geometry {
         self.clip.iter().all(reaches)
     }
 
-    /// The local ray at a voxel, a unit vector: `w`, in perspective `normalize(p - e)`.
+    /// The local ray at a voxel, a unit vector: `w`, or in perspective `normalize(p - e)`.
     pub fn ray(&self, voxel: UVec3) -> DVec3 {
         if self.eye.is_some() { self.position(voxel).normalize() } else { self.basis.w }
     }
 
-    /// Half the width and height, in pixels, of the screen box around a footprint of the given radius (grid units).
+    /// Half the width and height in pixels of the screen box around a footprint of the given radius (grid units).
     pub fn half_box(&self, radius: f64) -> DVec2 {
         self.footprint().half_box(radius)
     }
@@ -150,15 +150,15 @@ impl Geometry {
         Footprint { from_pixels: self.footprint_from_pixels, amplitude: self.amplitude }
     }
 
-    /// Pixel coordinates of a voxel beyond the near plane.
+    /// The pixel coordinates of a voxel beyond the near plane.
     pub fn pixel(&self, voxel: UVec3) -> DVec2 {
         let p = self.position(voxel);
         let pix = self.eye.map_or(self.pix, |eye| eye.pix(p.dot(self.basis.w)));
         DVec2::new(self.size.x / 2.0 + self.basis.u.dot(p) / pix, self.size.y / 2.0 - self.basis.v.dot(p) / pix)
     }
 
-    /// Depth of a voxel, in the terms that slabs are in: orthographic in the warped grid, from the volume's centre; perspective in
-    /// `unit`s along w, from the eye.
+    /// A voxel's depth in the units of slabs: orthographic in the warped grid, from the volume's centre; perspective in `unit`s along w, from
+    /// the eye.
     pub fn depth(&self, voxel: UVec3) -> f64 {
         if self.eye.is_some() {
             return self.position(voxel).dot(self.basis.w);
@@ -166,22 +166,21 @@ impl Geometry {
         (self.grid.world_position(voxel) / self.grid.unit() / self.grid.aspect()).dot(self.ro)
     }
 
-    /// Depth of a voxel along w in the unwarped space, `unit`s: what voxels composited one by one are sorted by.
+    /// A voxel's depth along w in the unwarped space, in `unit`s, by which voxels composited one by one are sorted.
     pub fn depth_along_w(&self, voxel: UVec3) -> f64 {
         self.position(voxel).dot(self.basis.w)
     }
 
-    /// The slice that a voxel is in, of those along the axis with the largest |w| component (§3.1; ties: x, then y, then z), counted
-    /// along w.
+    /// The slice of a voxel along the axis with the largest |w| component (§3.1; ties: x, then y, then z), counted along w.
     ///
-    /// Perspective keeps this one order for the whole image. Where a ray runs against w along that axis it is the wrong one: only
-    /// rays at more than asin |w_axis|, so at least 35.3°, from the image's centre can do so.
+    /// In perspective this one order serves the whole image. It is wrong for a ray that runs against w along that axis, which only rays more
+    /// than asin |w_axis|, so at least 35.3°, from the image's centre can do.
     pub fn slice(&self, voxel: UVec3) -> i32 {
         let (axis, sign) = self.slice_axis();
         sign as i32 * voxel[axis] as i32
     }
 
-    /// That axis, and whether slices are counted up (1) or down (-1) along it.
+    /// The axis of slices, and whether they are counted up (1) or down (-1) along it.
     pub fn slice_axis(&self) -> (usize, f64) {
         let w = self.basis.w.abs();
         let axis = if w.x >= w.y && w.x >= w.z {
@@ -194,7 +193,7 @@ impl Geometry {
         (axis, if self.basis.w[axis] < 0.0 { -1.0 } else { 1.0 })
     }
 
-    /// What a voxel's `(C·m, m)` is multiplied by: `1/λ`, and the low-pass amplitude where it is the same for all sections.
+    /// The factor for a voxel's `(C·m, m)`: `1/λ`, times the low-pass amplitude where that is the same for all sections.
     pub fn scale(&self, voxel: UVec3) -> f64 {
         if self.eye.is_some() {
             (self.ray(voxel) / self.grid.aspect()).length().recip()
@@ -203,19 +202,19 @@ impl Geometry {
         }
     }
 
-    /// The local ray of a splat in perspective, from where it stands on the screen.
+    /// The local ray of a splat in perspective, from its position on the screen.
     fn local(&self, splat: &Splat, eye: &Eye) -> Ray {
         let offset = (splat.center - self.size / 2.0) * eye.pix(splat.depth);
         let p = offset.x * self.basis.u - offset.y * self.basis.v + splat.depth * self.basis.w;
         Ray::new(p.normalize(), &self.basis, self.grid.aspect())
     }
 
-    /// Whether a voxel is projected as a whole kernel for its low opacity (§8).
+    /// Whether a voxel is projected as a whole kernel because of its low opacity (§8).
     fn is_whole(&self, splat: &Splat) -> bool {
         splat.alpha < self.economies.whole_below
     }
 
-    /// The slabs that a kernel is drawn into: those that it overlaps, or that of its centre.
+    /// The slabs that a kernel is drawn into: those that it overlaps, or the one that contains its centre.
     pub fn drawn_slabs(&self, splat: &Splat, radius: f64) -> Range<i32> {
         let slabs = self.slabs(splat, radius);
         if !self.is_whole(splat) || slabs.is_empty() {
@@ -225,7 +224,7 @@ impl Geometry {
         slab..slab + 1
     }
 
-    /// The slabs that a kernel overlaps by more than rounding errors, nearer than the near plane not counted.
+    /// The slabs that a kernel overlaps by more than rounding errors, without the part nearer than the near plane.
     pub fn slabs(&self, splat: &Splat, radius: f64) -> Range<i32> {
         const ROUNDING: f64 = 1e-9;
         let (first, end) = match &self.eye {
@@ -239,19 +238,19 @@ impl Geometry {
         first..(end / self.slab_width - ROUNDING).ceil() as i32
     }
 
-    /// What of a splat falls into a sheet: between the planes of slab `sheet`, or the whole kernel where sheets are slices, and
-    /// nothing nearer than the near plane. `None` if that is nothing.
+    /// The part of a splat in a sheet: between the planes of slab `sheet`, or the whole kernel if sheets are slices, without anything nearer
+    /// than the near plane. `None` if it is empty.
     ///
     /// In perspective (§3.3.2, end of §4.2):
     ///
-    /// - The near plane cuts first, then the middle of what is left is taken. So a section's mid depth is never nearer than `near`, and
-    ///   `pix` there neither 0 nor negative, however far off the axis the voxel or however wide the view.
-    /// - Planes are cut across the kernel perpendicular to its own ray, where that ray meets them: `t` grows by `λ/(r·w)` per `unit`
-    ///   of depth. For a voxel far off the axis a slab is thick, and the whole kernel lies in one or two.
-    /// - All of a kernel is projected along its voxel's ray. That holds while the kernel is small against its distance to the eye. For
-    ///   voxels beside the eye, nearer in depth than the kernel reaches in the plane of the image, it does not: their footprints reach
-    ///   over the whole screen, whatever lies between. A near plane of a kernel's radius keeps such voxels out.
-    /// - Axis-aligned sheets take the kernel whole, `pix` at the voxel's depth; the near plane cuts those, too.
+    /// - The near plane cuts first, and then the middle of the rest is taken. So a section's mid depth is never nearer than `near`, and `pix`
+    ///   there is positive, however far off the axis the voxel or however wide the view.
+    /// - Planes cut the kernel perpendicular to its own ray, where that ray meets them: `t` grows by `λ/(r·w)` per `unit` of depth. For a
+    ///   voxel far off the axis a slab is thick, and the whole kernel lies in one or two.
+    /// - All of a kernel is projected along its voxel's ray, which is accurate while the kernel is small compared with its distance from the
+    ///   eye. It is not for voxels beside the eye that are nearer in depth than the kernel's reach in the image plane: their footprints cover
+    ///   the whole screen, whatever lies between. A near plane at a kernel's radius excludes such voxels.
+    /// - Axis-aligned sheets contain the whole kernel, with `pix` at the voxel's depth; the near plane cuts it too.
     pub fn section(&self, splat: &Splat, sheet: i32, kernel: &Kernel) -> Option<Section> {
         let (near, far) = match self.method {
             Method::ImageAligned if !self.is_whole(splat) => {

@@ -1,4 +1,4 @@
-//! How pixels look at sheets for the compositings by means ([`Compositing`]); the twin of `shaders/shared/means.wgsl`.
+//! The weights of sheets in compositing by means ([`Compositing`]): the f64 evaluation of `shaders/shared/means.wgsl`.
 
 use std::ops::{Range, RangeInclusive};
 
@@ -10,20 +10,20 @@ use super::{Buffer, Geometry};
 use crate::settings::clip::HalfSpace;
 use crate::settings::splatting::Compositing;
 
-/// By how much slabs' middles may lie outside, in slabs, and rays miss a box of voxel centres, in grid steps.
+/// The tolerance for slabs' middles, in slabs, and for rays beside a box of voxel centres, in grid steps.
 const HAIR: f64 = 0.01;
 
-/// Of every pixel, row by row, how it looks at sheets.
+/// For every pixel, row by row, the weight of sheets and which of them count.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Means {
-    /// What sheets are multiplied by.
+    /// The factor for sheets.
     weights: Vec<f64>,
-    /// From where to where middles lie of the slabs that count, in sheets (number k fills `k..k + 1`); for `Minimum` alone.
+    /// The range of middles of the slabs that count, in sheets (sheet k fills `k..k + 1`); only for `Minimum`.
     counted: Option<Vec<RangeInclusive<f64>>>,
 }
 
 impl Means {
-    /// Those of a compositing by means, over all that clip planes and opaque surfaces show; see [`Cuts::new`](super::Cuts::new).
+    /// The weights for compositing by means over what clip planes and opaque surfaces leave; see [`Cuts::new`](super::Cuts::new).
     pub fn new(geometry: &Geometry, compositing: Compositing, surfaces: Option<&[f64]>) -> Self {
         let width = geometry.size.x as u32;
         let pixels = 0..width * geometry.size.y as u32;
@@ -48,7 +48,7 @@ impl Means {
             let misses = in_box(at, centers + HAIR, near).is_empty() || depths.is_empty();
             if misses { 0.0 } else { 1.0 / ((depths.end - depths.start) * ray.along.length()) }
         };
-        // The farthest that a kernel reaches in depth from a voxel before the near plane.
+        // The maximum depth by which a kernel reaches beyond a voxel at the near plane.
         let reach = geometry.radius * (geometry.basis.w * geometry.grid.aspect()).length();
         let complete = (centers - geometry.radius).max(centers / 2.0) + HAIR;
         let counted = |at: u32| {
@@ -67,7 +67,7 @@ impl Means {
         }
     }
 
-    /// The sheets that count at any pixel, whether there is anything in them or not.
+    /// The sheets that count at any pixel, even if they are empty.
     pub fn sheets(&self) -> Range<i32> {
         let counted = || self.counted.iter().flatten().filter(|counted| !counted.is_empty());
         let first = counted().map(|counted| *counted.start()).fold(f64::INFINITY, f64::min);
@@ -75,7 +75,7 @@ impl Means {
         if first > last { 0..0 } else { (first - 0.5).ceil() as i32..(last + 0.5).floor() as i32 }
     }
 
-    /// Turns a sheet into its means.
+    /// Converts a sheet into its means.
     pub fn apply(&self, sheet: &mut Buffer) {
         sheet.pixels.iter_mut().zip(&self.weights).for_each(|(pixel, weight)| *pixel *= *weight);
     }
@@ -86,7 +86,7 @@ impl Means {
     }
 }
 
-/// A box around the volume's centre, of half its extent.
+/// A box around the volume's centre, given half its size.
 pub(super) fn centered_box(geometry: &Geometry, half_steps: DVec3) -> [HalfSpace; 6] {
     let half = half_steps * geometry.grid.aspect();
     let [x, y, z] = DVec3::AXES;

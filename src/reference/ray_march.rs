@@ -1,10 +1,10 @@
-//! The pre-shaded Gaussian field, marched ray by ray: what splatting approximates, without slabs, sheets or footprints.
+//! A ray march of the pre-shaded Gaussian field, which splatting approximates: without slabs, sheets or footprints.
 //!
-//! The field is `Σ (C·m, m)·h(distance in the warped grid)` over the voxels that take part, amounts per `unit` of length. It is sampled at
-//! the middle of steps of [`STEP`] `unit`s along the ray of a pixel's centre, from the near plane on, and each step is composited like an
-//! `exponential` sheet; other compositings of the scene have no meaning here and are not looked at.
+//! The field is `Σ (C·m, m)·h(distance in the warped grid)` over the voxels that take part, with amounts per `unit` of length. It is sampled
+//! at the middle of steps of [`STEP`] `unit`s along the ray of a pixel's centre, from the near plane on, and each step is composited like
+//! an `exponential` sheet. The scene's own compositing is ignored, because the other modes have no meaning here.
 //!
-//! Rays are points across, so there is no low-pass rule: compare where a grid unit covers a pixel or more.
+//! Rays have no width, so there is no low-pass rule: comparisons are valid where a grid unit covers at least a pixel.
 
 use glam::{DVec3, DVec4, IVec3, UVec2, UVec3};
 use rayon::prelude::*;
@@ -19,16 +19,16 @@ use crate::settings::splatting::{Compositing, Order};
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::{Grid, Volume};
 
-/// Length of a step, `unit`s.
+/// The length of a step in `unit`s.
 pub const STEP: f64 = 0.05;
 
-/// What a pixel may still gain when its ray ends early.
+/// A ray ends early when its pixel cannot change by more than this.
 const REST: f64 = 1e-7;
 
 /// Marches the rays of all pixels of a scene.
 ///
 /// # Errors
-/// If the scene asks for more than can be computed.
+/// If the scene needs more than can be computed.
 pub fn render(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Image, RenderError> {
     let (width, height) = (scene.image.width, scene.image.height);
     let all: Vec<UVec2> = (0..height).flat_map(|y| (0..width).map(move |x| UVec2::new(x, y))).collect();
@@ -54,13 +54,13 @@ pub fn pixels(
     Ok(resolve::resolve(&acc, Compositing::Exponential, scene.image.background).into_image().pixels)
 }
 
-/// The ray of a pixel's centre in voxel coordinates, by its length in `unit`s.
+/// The ray of a pixel's centre in voxel coordinates, as a function of its length in `unit`s.
 struct PixelRay {
     origin: DVec3,
     step: DVec3,
-    /// Where it begins: at the near plane, at a clip plane, or at minus infinity.
+    /// The start: at the near plane, at a clip plane, or at minus infinity.
     first: f64,
-    /// Where it ends: at a clip plane, or at infinity.
+    /// The end: at a clip plane, or at infinity.
     last: f64,
 }
 
@@ -76,7 +76,7 @@ impl PixelRay {
                 (eye.position, r, eye.near / r.dot(basis.w))
             }
         };
-        // Of depths along w to lengths.
+        // Converts depths along w to lengths.
         let per_depth = direction.dot(basis.w).recip();
         let inside = cut::PixelRay::new(geometry, pixel).inside(&geometry.clip);
         Self {
@@ -91,25 +91,25 @@ impl PixelRay {
         self.origin + length * self.step
     }
 
-    /// Where it is within a box, from the near plane on and inside of all clip planes.
+    /// The part of the ray within a box, from the near plane on and inside all clip planes.
     fn within(&self, low: DVec3, high: DVec3) -> (f64, f64) {
         (0..3).fold((self.first, self.last), |(first, last), axis| {
-            // A ray within the planes of an axis has infinities of two signs there, or none at all on one of them.
+            // A ray parallel to an axis's planes gives infinities of opposite signs inside them, or NaN on one of them.
             let at = [low, high].map(|plane| (plane[axis] - self.origin[axis]) / self.step[axis]);
             (first.max(at[0].min(at[1])), last.min(at[0].max(at[1])))
         })
     }
 }
 
-/// The field, and where it is not 0.
+/// The field, and the regions where it is not 0.
 struct Field {
     grid: Grid,
     kernel: Kernel,
-    /// `(C·m, m)` of the voxels that take part, after a 0 for all others.
+    /// `(C·m, m)` of the voxels that take part, preceded by a 0 for all others.
     emissions: Vec<DVec4>,
-    /// For every voxel its place there.
+    /// For every voxel its index in `emissions`.
     places: Vec<u32>,
-    /// Cubes of [`Self::CUBE`] voxel widths, from `-radius` on: whether any kernel reaches into them.
+    /// Cubes with sides of [`Self::CUBE`] voxels, from `-radius` on: whether any kernel reaches into them.
     cubes: UVec3,
     is_reached: Vec<bool>,
 }
@@ -141,7 +141,7 @@ impl Field {
         Self { grid, kernel, emissions, places, cubes, is_reached }
     }
 
-    /// Whether any kernel may reach a point, in voxel coordinates.
+    /// Whether any kernel may reach a point in voxel coordinates.
     fn is_reached(&self, at: DVec3) -> bool {
         let cube = ((at + self.kernel.radius()) / Self::CUBE).floor().as_ivec3();
         let inside = cube.cmpge(IVec3::ZERO).all() && cube.cmplt(self.cubes.as_ivec3()).all();
@@ -149,12 +149,12 @@ impl Field {
         inside && self.is_reached[(cube.x + self.cubes.x * (cube.y + self.cubes.y * cube.z)) as usize]
     }
 
-    /// The field at a point, in voxel coordinates.
+    /// The field at a point in voxel coordinates.
     fn at(&self, at: DVec3) -> DVec4 {
         let (radius, dims) = (self.kernel.radius(), self.grid.dims);
         let low = (at - radius).ceil().max(DVec3::ZERO).as_uvec3();
         let high = (at + radius).floor().min(dims.as_dvec3() - 1.0).as_ivec3();
-        // A Gaussian of a distance is the product of those of its components: at most nine voxels are within reach of an axis.
+        // A Gaussian of a distance is the product of the Gaussians of its components; at most nine voxels are within reach along an axis.
         let mut gaussians = [[(0.0, 0.0); 9]; 3];
         for axis in 0..3 {
             for (voxel, gaussian) in (low[axis]..).zip(&mut gaussians[axis]) {
@@ -178,12 +178,12 @@ impl Field {
         sum * self.kernel.value(0.0)
     }
 
-    /// What the compositing buffer holds at the end of a ray.
+    /// The compositing buffer's content at the end of a ray.
     fn march(&self, ray: &PixelRay) -> DVec4 {
         let reach = self.kernel.radius();
         let (first, last) = ray.within(DVec3::splat(-reach), self.grid.dims.as_dvec3() - 1.0 + reach);
         let mut acc = DVec4::ZERO;
-        // The negation: a ray along a face has no ends.
+        // Not `>=`, because the ends are NaN for a ray along a face.
         let steps = if first < last { ((last - first) / STEP).ceil() as u64 } else { 0 };
         for step in 0..steps {
             let at = ray.at(first + (step as f64 + 0.5) * STEP);
@@ -206,7 +206,7 @@ mod tests {
     use crate::settings::camera::{Camera, Projection};
     use crate::settings::transfer_function::Ramp;
 
-    /// One voxel: the field along a ray through its middle is the kernel itself, and what it adds up to is its footprint.
+    /// A single voxel: the field along a ray through its middle is the kernel, and its integral is the footprint.
     #[test]
     fn a_ray_gathers_the_kernel() {
         let mut values = vec![0.0; 27];
@@ -221,7 +221,7 @@ mod tests {
             for projection in [
                 Projection::Orthographic { height: Some(1.0) },
                 Projection::Perspective { fov_y: 10.0, distance: Some(20.0), near: None },
-                // The near plane through the kernel.
+                // The near plane cuts the kernel.
                 Projection::Perspective { fov_y: 10.0, distance: Some(20.0), near: Some(20.0 - stretch) },
             ] {
                 let near = match projection {

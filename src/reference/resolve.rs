@@ -1,11 +1,11 @@
-//! The compositing buffer over the background, SPEC §5; the twin of `shaders/resolve.wgsl`.
+//! The compositing buffer over the background (SPEC §5): the f64 evaluation of `shaders/resolve.wgsl`.
 
 use glam::{DVec3, DVec4};
 
 use super::Buffer;
 use crate::settings::splatting::Compositing;
 
-/// Premultiplied in, premultiplied out; the background has straight alpha.
+/// Composites premultiplied pixels over a background with straight alpha.
 pub fn resolve(acc: &Buffer, compositing: Compositing, background: [f64; 4]) -> Buffer {
     let [r, g, b, a] = background;
     let background = (DVec3::new(r, g, b) * a).extend(a);

@@ -1,4 +1,4 @@
-//! Classification and shading, SPEC §3; the twin of `shaders/shade.wgsl`.
+//! Classification and shading (SPEC §3): the f64 evaluation of `shaders/shade.wgsl`.
 
 use glam::{DVec2, DVec3, DVec4};
 use rayon::prelude::*;
@@ -14,17 +14,17 @@ use crate::volume::Volume;
 /// A projected and shaded voxel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Splat {
-    /// Pixel coordinates.
+    /// The pixel coordinates.
     pub center: DVec2,
     /// [`Geometry::depth`].
     pub depth: f64,
-    /// `(C·m, m)` over λ, times the low-pass amplitude where that is the same for all sections ([`Geometry::scale`]).
+    /// `(C·m, m)` divided by λ, times the low-pass amplitude where that is the same for all sections ([`Geometry::scale`]).
     pub amount: DVec4,
     /// α.
     pub alpha: f64,
 }
 
-/// The voxels that take part, in memory order: their positions in memory.
+/// The indices in memory of the voxels that take part, ascending.
 pub fn taking_part(volume: &Volume, transfer: &TransferFunction, geometry: &Geometry) -> Vec<u32> {
     let alpha = |&index: &u32| alpha(volume, transfer, index);
     let is_shown = |&index: &u32| {
@@ -40,7 +40,7 @@ pub fn shade(volume: &Volume, transfer: &TransferFunction, scene: &Scene, geomet
     splats(&taking_part(volume, transfer, geometry), volume, transfer, scene, geometry)
 }
 
-/// Projects and shades voxels, given by their positions in memory.
+/// Projects and shades voxels, given by their indices in memory.
 pub fn splats(
     voxels: &[u32],
     volume: &Volume,
@@ -69,7 +69,7 @@ pub fn emission(volume: &Volume, transfer: &TransferFunction, scene: &Scene, geo
 fn alpha(volume: &Volume, transfer: &TransferFunction, index: u32) -> f64 {
     let value = f64::from(volume.values()[index as usize]);
     let tables = transfer.tables(volume.label(index));
-    // Most voxels are ruled out by their value: spare them the gradient.
+    // Most voxels are excluded by their value, so the gradient is computed only if needed.
     if value.is_nan() || tables.opacity.at(value) <= 0.0 {
         return 0.0;
     }

@@ -1,4 +1,4 @@
-//! Which splats go into which sheet, and in which order the sheets come; the twin of `bucket.rs`.
+//! The assignment of splats to sheets, and the order of sheets: the f64 evaluation of `src/lists/bucket.rs`.
 
 use std::collections::BTreeMap;
 
@@ -6,10 +6,10 @@ use super::{Geometry, Splat};
 use crate::geometry::kernel::Kernel;
 use crate::settings::splatting::Method;
 
-/// Indices of splats for every sheet that has any, front to back: image-aligned by slab (§3.2), axis-aligned by slice (§3.1).
+/// For every sheet that has splats, their indices, front to back: image-aligned by slab (§3.2), axis-aligned by slice (§3.1).
 /// Composite-every-sample has no sheets.
 ///
-/// `voxels` are the splats' positions in memory.
+/// `voxels` are the splats' indices in memory.
 pub fn buckets(voxels: &[u32], splats: &[Splat], geometry: &Geometry, kernel: &Kernel) -> BTreeMap<i32, Vec<u32>> {
     let mut buckets = BTreeMap::<i32, Vec<u32>>::new();
     for ((&voxel, splat), index) in voxels.iter().zip(splats).zip(0..) {
@@ -26,12 +26,12 @@ pub fn buckets(voxels: &[u32], splats: &[Splat], geometry: &Geometry, kernel: &K
     buckets
 }
 
-/// The order in which voxels are composited one by one (§3, Westover's first form), nearest first: by depth along w, then by
-/// position in memory.
+/// The order in which voxels are composited one by one (§3, Westover's first form), nearest first: by depth along w, then by index in
+/// memory.
 ///
-/// In perspective, too, it is the depth along w and not the distance from the eye. Voxels whose footprints overlap lie nearly on one ray,
-/// where both sort alike; and so slabs, slices and voxels are all in one order, which a receding eye takes to the orthographic one.
-/// Depths that differ by less than rounding errors may (2⁻²⁰ units) are equal, so that those do not decide at 45°.
+/// The depth along w, not the distance from the eye, also counts in perspective. Voxels whose footprints overlap lie nearly on one ray,
+/// where both give the same order; and so slabs, slices and voxels share one order, which becomes the orthographic one as the eye recedes.
+/// Depths are rounded (to 2⁻²⁰ units), so that rounding errors do not decide the order at 45°.
 pub fn by_depth(voxels: &[u32], geometry: &Geometry) -> Vec<u32> {
     let depth = |&index: &u32| {
         let voxel = geometry.grid.voxel_at(voxels[index as usize]);

@@ -1,4 +1,4 @@
-//! Sheet buffers, SPEC §5; the twin of `shaders/splat.wgsl`.
+//! Sheet buffers (SPEC §5): the f64 evaluation of `shaders/splat.wgsl`.
 
 use glam::{DVec2, DVec4};
 use rayon::prelude::*;
@@ -10,30 +10,29 @@ use crate::geometry::kernel::Kernel;
 /// A kernel section, or a whole kernel, on the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Section {
-    /// Pixel coordinates of the voxel.
+    /// The voxel's pixel coordinates.
     pub center: DVec2,
-    /// How its footprint lies there.
+    /// The map from pixels to its footprint.
     pub footprint: Footprint,
-    /// Where it begins along the warped ray, from the voxel.
+    /// The section's start along the warped ray, relative to the voxel.
     pub t0: f64,
-    /// Where it ends.
+    /// The section's end.
     pub t1: f64,
-    /// `(C·m, m)` times the low-pass amplitude over λ.
+    /// `(C·m, m)` times the low-pass amplitude, divided by λ.
     pub amount: DVec4,
-    /// ρ² from which on it adds too little to be drawn (§8).
+    /// The ρ² from which on the section adds too little to be drawn (§8).
     pub rim: f64,
 }
 
 impl Section {
-    /// The pixels whose centres lie within the box around a footprint of the given radius: the first and the last. Pixel centres are
-    /// at half-integers.
+    /// The first and last pixel whose centres lie in the box around a footprint of the given radius. Pixel centres are at half-integers.
     pub fn pixels(&self, radius: f64) -> (DVec2, DVec2) {
         let half_box = self.footprint.half_box(radius);
         ((self.center - half_box - 0.5).ceil(), (self.center + half_box - 0.5).floor())
     }
 }
 
-/// The sheet buffer of sheet `k`: every pixel centre within every footprint, closed form.
+/// The sheet buffer of sheet `k`: every footprint at every pixel centre in it, in closed form.
 pub fn sheet(splats: &[Splat], k: i32, geometry: &Geometry, kernel: &Kernel) -> Buffer {
     let sections: Vec<Section> = splats.iter().filter_map(|splat| geometry.section(splat, k, kernel)).collect();
     let mut sheet = Buffer::new(geometry.size.x as u32, geometry.size.y as u32);
@@ -41,12 +40,12 @@ pub fn sheet(splats: &[Splat], k: i32, geometry: &Geometry, kernel: &Kernel) -> 
     sheet
 }
 
-/// Hands the amount of every section at every pixel to `blend`, section by section.
+/// Calls `blend` with the amount of every section at every pixel, section by section.
 pub fn draw(sections: &[Section], kernel: &Kernel, buffer: &mut Buffer, blend: impl Fn(&mut DVec4, DVec4) + Sync) {
     const ROWS: usize = 16;
     let width = buffer.width;
     let last = DVec2::new(width as f64, (buffer.pixels.len() / width) as f64) - 1.0;
-    // Which sections reach into which rows.
+    // The sections that reach into each band of rows.
     let mut bands = vec![Vec::new(); buffer.pixels.len().div_ceil(width * ROWS)];
     for (section, index) in sections.iter().zip(0_u32..) {
         let (low, high) = section.pixels(kernel.radius());

@@ -1,4 +1,4 @@
-//! Early splat elimination as the paper's simpler tests put it (§6), sheet by sheet: what the GPU's culling is held against.
+//! Early splat elimination by the paper's tests (§6), sheet by sheet, with which the GPU's culling is compared.
 
 use glam::{DMat2, DVec2};
 
@@ -6,28 +6,28 @@ use super::cut::Cuts;
 use super::{Buffer, Section};
 use crate::lists::quad_plan::TILE;
 
-/// When a voxel is culled.
+/// The test by which a voxel is culled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Test {
-    /// When the pixel that its centre falls on is opaque (Fig. 11a). Loses voxels that are partly visible.
+    /// The pixel that contains its centre is opaque (Fig. 11a). This loses voxels that are partly visible.
     Center,
-    /// When all pixels of its footprint's box are opaque (Fig. 10). Exact.
+    /// All pixels of its footprint's box are opaque (Fig. 10). This is exact.
     Box,
-    /// When all pixels of the parallelogram around its footprint are opaque (Fig. 13). Exact, and never tests more pixels than the
-    /// box; for spacing 1:1:1 the same.
+    /// All pixels of the parallelogram around its footprint are opaque (Fig. 13). This is exact and never tests more pixels than the box; for
+    /// spacing 1:1:1 it tests the same pixels.
     Parallelogram,
 }
 
-/// Which pixels are opaque, as sums over rectangles (a summed-area table of the mask). Pixels off the image are opaque.
+/// A mask of opaque pixels as a summed-area table. Pixels off the image are opaque.
 #[derive(Clone, Debug)]
 pub struct OpaqueMask {
     size: [usize; 2],
-    /// `sums[y][x]`: transparent pixels above row y and left of column x.
+    /// `sums[y][x]`: the number of transparent pixels above row y and left of column x.
     sums: Vec<u32>,
 }
 
 impl OpaqueMask {
-    /// The mask of a compositing buffer: alpha at least `threshold`, or that nothing shows from this sheet on.
+    /// The mask of a compositing buffer: pixels with alpha at least `threshold`, or in which everything from this sheet on is hidden.
     pub fn new(acc: &Buffer, threshold: f64, cuts: Option<(&Cuts, i32)>) -> Self {
         let is_cut = |pixel: usize| cuts.is_some_and(|(cuts, sheet)| cuts.ends_before(pixel, sheet));
         let size = [acc.width, acc.pixels.len() / acc.width];
@@ -44,7 +44,7 @@ impl OpaqueMask {
         Self { size, sums }
     }
 
-    /// Whether every pixel whose centre lies in the box is opaque.
+    /// Whether every pixel with its centre in the box is opaque.
     pub fn covers(&self, center: DVec2, half_box: DVec2) -> bool {
         let clamp = |at: f64, axis: usize| at.clamp(0.0, self.size[axis] as f64) as usize;
         let low = (center - half_box - 0.5).ceil();
@@ -54,9 +54,9 @@ impl OpaqueMask {
         x0 >= x1 || y0 >= y1 || sum(x1, y1) + sum(x0, y0) == sum(x0, y1) + sum(x1, y0)
     }
 
-    /// Whether every pixel is opaque whose centre lies in the parallelogram that `sheared` maps to a square of this half side.
+    /// Whether every pixel is opaque whose centre lies in the parallelogram that `sheared` maps to a square with this half side.
     pub fn covers_parallelogram(&self, center: DVec2, sheared: DMat2, half_side: f64) -> bool {
-        // Row by row: between the slanted sides. `sheared` maps the rows to its first axis.
+        // Row by row, between the slanted sides. `sheared` maps rows to its first axis.
         let half_height = half_side / sheared.y_axis.y.abs();
         let rows = (center.y - half_height - 0.5).ceil() as i64..=(center.y + half_height - 0.5).floor() as i64;
         rows.into_iter().all(|y| {
@@ -65,11 +65,10 @@ impl OpaqueMask {
         })
     }
 
-    /// The sections of a sheet that pass a test. In perspective every section is tested with its own box: what a box per slab may
-    /// not go beyond.
+    /// The sections of a sheet that pass a test. In perspective every section is tested with its own box, which a box per slab must contain.
     pub fn visible(&self, sections: &[Section], test: Test, support: f64) -> Vec<Section> {
         let is_hidden = |section: &Section| match test {
-            // The one pixel that the centre falls on.
+            // The single pixel that contains the centre.
             Test::Center => self.covers(section.center.floor() + 0.5, DVec2::splat(0.5)),
             Test::Box => self.covers(section.center, section.footprint.half_box(support)),
             Test::Parallelogram => {
@@ -80,31 +79,31 @@ impl OpaqueMask {
     }
 }
 
-/// Where sheets are composited and convolved, by the paper's ways to tell (§6), in pixels summed over the sheets.
+/// The pixels that are composited and convolved by the paper's different bounds (§6), summed over the sheets.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Areas {
-    /// The bounding box of the voxels' centres, as much larger as the largest footprint reaches.
+    /// The bounding box of the voxels' centres, enlarged by the reach of the largest footprint.
     pub bounding_box: u64,
     /// The tiles that footprints' boxes overlap.
     pub tiles: u64,
-    /// Those of them that have seen as many splats by then as a tile needs to become opaque: the counters' threshold, below
-    /// which nothing need be convolved.
+    /// The overlapped tiles that have received at least as many splats as a tile needs to become opaque: the counters' threshold, below which
+    /// no convolution is needed.
     pub counted_tiles: u64,
-    /// Splats of every tile so far.
+    /// The number of splats in every tile so far.
     counters: Vec<u32>,
-    /// The most pixels that a footprint's box had so far.
+    /// The maximum number of pixels in a footprint's box so far.
     largest_box: f64,
 }
 
 impl Areas {
-    /// Adds the areas of a sheet of these sections, in an image of this size.
+    /// Adds the areas of a sheet with these sections, in an image of this size.
     pub fn add(&mut self, sections: &[Section], size: DVec2, support: f64) {
         let tile = f64::from(TILE);
         let columns = (size.x / tile).ceil() as usize;
         self.counters.resize(columns * (size.y / tile).ceil() as usize, 0);
         let half_box = |section: &Section| section.footprint.half_box(support);
         let largest = sections.iter().map(half_box).reduce(DVec2::max).unwrap_or(DVec2::ZERO);
-        // The pixels whose centres lie between two points, first and end.
+        // The pixels whose centres lie between two points, as first and end.
         let pixels = |low: DVec2, high: DVec2| {
             let first = (low - 0.5).ceil().clamp(DVec2::ZERO, size);
             (first, ((high - 0.5).floor() + 1.0).clamp(first, size))
@@ -128,7 +127,7 @@ impl Areas {
                 }
             }
         }
-        // No splat makes more pixels opaque than its box has.
+        // A splat cannot make more pixels opaque than its box contains.
         self.largest_box = self.largest_box.max((2.0 * largest.x + 1.0) * (2.0 * largest.y + 1.0));
         let least = (tile * tile / self.largest_box).ceil();
         for (at, _) in touched.iter().enumerate().filter(|(_, touched)| **touched) {

@@ -1,6 +1,7 @@
-//! The renderer a host embeds: it owns pipelines, never a device, and neither submits nor waits. Every frame it prepares, which can
-//! fail, records, and presents, which cannot but for a place outside of the target.
+//! The renderer that a host embeds. It owns pipelines, but no device, and neither submits nor waits. It prepares every frame, which can fail,
+//! records it, and presents it, which fails only for a scissor outside the target.
 
+pub(crate) mod counts;
 pub(crate) mod options;
 pub(crate) mod pick;
 pub(crate) mod placement;
@@ -13,6 +14,7 @@ use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Queue, RenderPass, Text
 
 use crate::error::{RenderError, check_device};
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, written};
+use crate::gpu::classified_volume::BrickNeeds;
 use crate::gpu::device::{self, DeviceError, DeviceRequirements};
 use crate::gpu::fault::scoped;
 use crate::gpu::layout::{Cut, Frame, Tally};
@@ -23,20 +25,21 @@ use crate::pass::composite::CutBuffers;
 use crate::pass::first_hit::FirstHit;
 use crate::pass::resolve::Resolve;
 use crate::rasterizer::FrameInputs;
-use crate::rasterizer::kind::{RasterizerKind, insists_on_tiles};
+use crate::rasterizer::fields::FieldRasterizer;
+use crate::rasterizer::kind::RasterizerKind;
 use crate::rasterizer::quads::QuadRasterizer;
 use crate::rasterizer::request::FrameRequest;
 use crate::rasterizer::samples::SampleRasterizer;
 use crate::rasterizer::tiles::TileRasterizer;
+use crate::renderer::counts::Staging;
 use crate::renderer::options::RendererOptions;
 use crate::renderer::placement::Placement;
 use crate::renderer::prepared_frame::{Drawing, FirstHits, PreparedFrame, PreviousFrame};
 use crate::renderer::scene_view::{Prepared, SceneView};
 use crate::setting_error::SettingError;
 use crate::settings::splatting::Rasterizer;
-use crate::stats::Staging;
 
-/// The pipelines of every stage, for one device. Volumes and frames are separate and can be many.
+/// The pipelines of every stage, for one device. Any number of volumes and frames can share it.
 #[derive(Debug)]
 pub struct Renderer {
     device: Device,
@@ -44,25 +47,26 @@ pub struct Renderer {
     sheets: u32,
     rasterizer: Rasterizer,
     profile: bool,
-    /// Nanoseconds of a timestamp's tick.
+    /// Nanoseconds per timestamp tick.
     period: f32,
-    /// Compiled when first needed.
+    /// The quad rasterizer, compiled when first needed.
     quads: OnceLock<QuadRasterizer>,
+    fields: OnceLock<FieldRasterizer>,
     samples: OnceLock<SampleRasterizer>,
     tiles: TileRasterizer,
     resolve: Resolve,
     first_hit: OnceLock<FirstHit>,
-    /// Stands for a host's depth where there is none.
+    /// A depth texture of one texel, bound where the host gives no surfaces.
     no_surfaces: OnceLock<TextureView>,
-    /// Whether it was logged that tiles will not do.
+    /// Whether the fallback from tiles was logged.
     fell_back: Once,
 }
 
 impl Renderer {
-    /// Compiles what every frame needs; a rasterizer's stages are compiled with the first frame that it draws.
+    /// Compiles what every frame needs. A rasterizer's stages are compiled with the first frame that it draws.
     ///
     /// # Errors
-    /// If limits of the device are not enough, or it cannot do what the options ask for, or fails.
+    /// If the device's limits are insufficient, the device does not support the options, or it fails.
     pub fn new(device: &Device, queue: &Queue, options: &RendererOptions) -> Result<Self, DeviceError> {
         DeviceRequirements::check(device)?;
         let sheet_format = device::sheet_format(device, options.sheet_format)?;
@@ -79,6 +83,7 @@ impl Renderer {
             profile: options.profile,
             period: queue.get_timestamp_period(),
             quads: OnceLock::new(),
+            fields: OnceLock::new(),
             samples: OnceLock::new(),
             tiles: TileRasterizer::default(),
             resolve,
@@ -88,60 +93,61 @@ impl Renderer {
         })
     }
 
-    /// Format of the sheet buffer.
+    /// The format of the sheet buffer.
     pub fn sheet_format(&self) -> TextureFormat {
         self.sheet_format
     }
 
-    /// Does what the view's changes since its last frame ask for, and no more: buckets if the camera, the slabs or the bricks
-    /// changed (§5.1), buffers if they are too small. A change of colours, opacities or light writes a few hundred bytes.
+    /// Prepares the view's next frame, recomputing only what changed since the last one: buckets if the camera, the slabs or the bricks changed
+    /// (§5.1), buffers if they are too small. A change of colours, opacities or light writes a few hundred bytes.
     ///
     /// # Errors
-    /// If the scene asks for something not implemented, or for more than the device's limits allow, or the device fails. What is found
-    /// before anything is allocated leaves the view's last frame. After anything else, and a failure of the device always, the view has no
-    /// frame, and is not drawn until it is prepared again: after
-    /// [`OutOfMemory`](crate::gpu::fault::DeviceFault::OutOfMemory) with less, after any other by a new renderer.
+    /// If the scene needs something that is not implemented or that exceeds the device's limits, or if the device fails. An error found before
+    /// anything is allocated leaves the view's last frame. After any other error, and after every failure of the device, the view has no
+    /// frame and is not drawn until it is prepared again: after
+    /// [`OutOfMemory`](crate::gpu::fault::DeviceFault::OutOfMemory) with smaller settings, after any other failure by a new renderer.
     pub fn prepare(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
         check_device(device, &self.device, "the renderer")?;
         check_device(device, view.volume.gpu_volume().device(), "the view")?;
         scoped(device, || self.prepare_unscoped(device, queue, view)).unwrap_or_else(|fault| {
-            // What there was no memory for is not valid.
+            // Objects allocated without memory are invalid.
             view.frame = None;
             view.volume.lists.forget();
             Err(fault.into())
         })
     }
 
-    /// Bytes of GPU memory that a new view with these settings will hold once prepared, [`SceneView::gpu_bytes`], exactly; nothing is
-    /// allocated, and [`Self::prepare`] will refuse for limits' sake what this refuses. Sorts bricks into buckets as a first frame does.
-    /// What the volume itself takes, and whether to upload it, [`GpuVolume::estimate`](crate::gpu::gpu_volume::GpuVolume::estimate) says.
+    /// The exact number of bytes of GPU memory that a new view with these settings will use once prepared ([`SceneView::gpu_bytes`]). Nothing is
+    /// allocated; bricks are sorted into buckets as for a first frame. [`Self::prepare`] refuses for limits' sake exactly what this refuses.
+    /// [`GpuVolume::estimate`](crate::gpu::gpu_volume::GpuVolume::estimate) states the volume's own memory before it is uploaded.
     ///
     /// # Errors
-    /// If the scene asks for something not implemented, or for more than the device's limits allow.
+    /// If the scene needs something that is not implemented or that exceeds the device's limits.
     pub fn estimate(&self, view: &SceneView) -> Result<u64, RenderError> {
         check_device(view.volume.gpu_volume().device(), &self.device, "the renderer")?;
         let request = self.request(view)?;
         let limits = self.device.limits();
-        let settled = view.volume.lists.settled(&limits);
+        let settled = view.volume.settled_for(&limits, needs_of(&request));
         let lists = settled.lists();
         let by_label = view.volume.shades_by_label();
         let tiles = match request.kind {
-            RasterizerKind::Tiles => {
+            RasterizerKind::Tiles { insisted } => {
                 let bricks = (settled.all(), lists.len());
                 match TileRasterizer::estimate(&limits, &request, bricks, by_label) {
-                    Err(error) if insists_on_tiles(&request.splatting) => return Err(error),
+                    Err(error) if insisted => return Err(error),
                     needs => needs.ok(),
                 }
             }
             RasterizerKind::Quads | RasterizerKind::Samples => None,
         };
-        let needs = match (tiles, request.kind) {
-            (Some(needs), _) => needs,
-            (None, RasterizerKind::Samples) => {
+        let needs = match (tiles, request.kind, &request.after) {
+            (Some(needs), ..) => needs,
+            (None, RasterizerKind::Samples, _) => {
                 let bricks = (view.volume.grid(), settled.all());
                 SampleRasterizer::estimate(&limits, &request, bricks, self.sheet_format)?
             }
-            (None, _) => QuadRasterizer::estimate(&limits, &request, &lists, (self.sheet_format, self.sheets))?,
+            (None, _, Some(after)) => FieldRasterizer::estimate(&limits, &request, after, &lists, self.sheet_format)?,
+            (None, _, None) => QuadRasterizer::estimate(&limits, &request, &lists, (self.sheet_format, self.sheets))?,
         };
         let passes = needs.passes + 1;
         let timer = if self.profile { Timer::estimate(&self.device, passes) } else { None };
@@ -151,7 +157,11 @@ impl Renderer {
             cut_uniform(),
             staging(timestamps_at(needs.groups), timer.is_some(), passes),
         ];
-        let volume = view.volume.estimate()? + settled.gpu_bytes();
+        let coefficients = match needs_of(&request) {
+            Some(BrickNeeds { coefficients: Some(exact), .. }) => exact.estimate(&limits)?,
+            _ => 0,
+        };
+        let volume = view.volume.estimate()? + settled.gpu_bytes() + coefficients;
         let compositing = CompositingBuffer::estimate(request.view.size, request.bands.len());
         let counts = timer.unwrap_or(0) + sizes(&limits, &buffers)?;
         Ok(volume + compositing + needs.bytes + request.hit_bytes() + counts)
@@ -169,11 +179,14 @@ impl Renderer {
     }
 
     fn prepare_unscoped(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
-        // What can fail comes before anything is taken from the last frame.
+        // Everything that can fail comes before anything is taken from the last frame.
         let mut request = self.request(view)?;
         let SceneView { volume, scene, surfaces, frame, .. } = view;
         let fallback = request.fallback.take();
-        volume.flush(device, queue, request.splatting.classification)?;
+        if let Some(after) = &request.after {
+            volume.show(&after.needs);
+        }
+        volume.flush(device, queue)?;
         let sheets = (self.sheet_format, self.sheets);
         let kept = PreviousFrame::of(frame.take(), sheets, &request.view);
         let FrameRequest { view: seen, kernel, ramps, rays, .. } = &request;
@@ -183,7 +196,8 @@ impl Renderer {
         let write = |old, spec: &BufferSpec, bytes: &[u8]| written(device, queue, old, spec, bytes);
         let points = bytemuck::cast_slice(&ramps.points);
         let control_points = write(kept.control_points, &control_points(&request), points)?;
-        let frame_values = uniforms::frame(seen, kernel, (&grid, volume.gpu_volume().value_format()), ramps, scene);
+        let frame_values =
+            uniforms::frame(request.stage_view(), kernel, (&grid, volume.gpu_volume().value_format()), ramps, scene);
         let uniform = write(kept.uniform, &frame_uniform(), bytemuck::bytes_of(&frame_values))?;
         let cut_values = uniforms::cut(seen, &grid, scene, request.surfaces, request.first_hit);
         let cut = write(kept.cut, &cut_uniform(), bytemuck::bytes_of(&cut_values))?;
@@ -222,7 +236,7 @@ impl Renderer {
             FirstHits { group: stage.bind(device, &uniform, cut_buffers, words), texture, view }
         });
 
-        // The rasterizer's passes, and resolve.
+        // The rasterizer's passes, plus resolve.
         let passes = drawing.passes() + 1;
         let timer = if self.profile { Timer::new(device, passes) } else { None };
         let timestamps = timestamps_at(drawing.group_slabs().firsts.len());
@@ -249,31 +263,37 @@ impl Renderer {
         Ok(prepared)
     }
 
-    /// Prepares a rasterizer's part: by tiles, unless the view does not fit them and the scene does not insist. Then the error is why.
+    /// Prepares a rasterizer's part: tiles, or quads if the view does not fit tiles and the scene does not require them. The error then says
+    /// why.
     fn draw_with(
         &self,
         inputs: FrameInputs<'_>,
         previous: Option<Drawing>,
     ) -> Result<(Drawing, Prepared, Option<RenderError>), RenderError> {
-        let (mut old_quads, mut old_tiles, mut old_samples) = (None, None, None);
+        let (mut old_quads, mut old_tiles, mut old_samples, mut old_fields) = (None, None, None, None);
         match previous {
             Some(Drawing::Quads(frame)) => old_quads = Some(*frame),
+            Some(Drawing::Fields(frame)) => old_fields = Some(*frame),
             Some(Drawing::Tiles(frame)) => old_tiles = Some(*frame),
             Some(Drawing::Samples(frame)) => old_samples = Some(*frame),
             None => {}
         }
-        let FrameRequest { kind, splatting, .. } = inputs.request;
-        if *kind == RasterizerKind::Samples {
+        let kind = inputs.request.kind;
+        if kind == RasterizerKind::Samples {
             let (frame, prepared) = self.samples(inputs.device).prepare(inputs, old_samples)?;
             return Ok((Drawing::Samples(Box::new(frame)), prepared, None));
         }
         let mut fallback = None;
-        if *kind == RasterizerKind::Tiles {
+        if let RasterizerKind::Tiles { insisted } = kind {
             match self.tiles.prepare(inputs, old_tiles) {
                 Ok((frame, prepared)) => return Ok((Drawing::Tiles(Box::new(frame)), prepared, None)),
-                Err(error) if insists_on_tiles(splatting) => return Err(error),
+                Err(error) if insisted => return Err(error),
                 Err(error) => fallback = Some(error),
             }
+        }
+        if let Some(after) = &inputs.request.after {
+            let (frame, prepared) = self.fields(inputs.device).prepare(inputs, after, old_fields)?;
+            return Ok((Drawing::Fields(Box::new(frame)), prepared, fallback));
         }
         let (frame, prepared) = self.quads(inputs.device).prepare(inputs, old_quads)?;
         Ok((Drawing::Quads(Box::new(frame)), prepared, fallback))
@@ -283,13 +303,17 @@ impl Renderer {
         self.samples.get_or_init(|| SampleRasterizer::new(device, self.sheet_format))
     }
 
+    fn fields(&self, device: &Device) -> &FieldRasterizer {
+        self.fields.get_or_init(|| FieldRasterizer::new(device, self.sheet_format))
+    }
+
     fn quads(&self, device: &Device) -> &QuadRasterizer {
         self.quads.get_or_init(|| QuadRasterizer::new(device, self.sheet_format, self.sheets))
     }
 
-    /// Records the drawing of the view's prepared frame into the view's own buffers, from where [`Self::present`] and [`Self::draw`]
-    /// take it, in this encoder or later ones; nothing, if the view was never prepared. The renderer must be the one that prepared it, and
-    /// what is recorded must be submitted before the view is prepared again.
+    /// Records the drawing of the view's prepared frame into the view's own buffers, which [`Self::present`] and [`Self::draw`] read in this
+    /// encoder or later ones. Does nothing if the view was never prepared. The renderer must be the one that prepared the view, and the
+    /// commands must be submitted before the view is prepared again.
     pub fn record(&self, encoder: &mut CommandEncoder, view: &mut SceneView) {
         let Some(frame) = &mut view.frame else { return };
         let PreparedFrame { drawing, compositing, timer, .. } = frame;
@@ -301,6 +325,11 @@ impl Renderer {
         }
         match drawing {
             Drawing::Tiles(tiles) => self.tiles.record(encoder, timer, tiles),
+            Drawing::Fields(fields) => {
+                if let Some(rasterizer) = self.fields.get() {
+                    rasterizer.record(encoder, timer, fields);
+                }
+            }
             Drawing::Samples(samples) => {
                 if let Some(rasterizer) = self.samples.get() {
                     rasterizer.record(encoder, timer, samples);
@@ -323,12 +352,12 @@ impl Renderer {
         }
     }
 
-    /// Records a pass of its own that draws the view's image into a target, which keeps what the image does not cover; nothing, if
-    /// the view was never prepared. The renderer must have been made for the target's format and sample count and for no depth
-    /// attachment; what is wrong with those, wgpu reports.
+    /// Records a pass that draws the view's image into a target, which is kept where the image does not cover it. Does nothing if the view was
+    /// never prepared. The renderer must have been made for the target's format and sample count and for no depth attachment; wgpu
+    /// reports a mismatch.
     ///
     /// # Errors
-    /// If the scissor does not lie in the target; then nothing is recorded.
+    /// If the scissor does not lie in the target. Nothing is recorded then.
     pub fn present(
         &self,
         encoder: &mut CommandEncoder,
@@ -339,7 +368,7 @@ impl Renderer {
         let texture = target.texture();
         at.check([texture.width(), texture.height()])?;
         let Some(frame) = &mut view.frame else { return Ok(()) };
-        // Whoever waits for the counts has them, and their buffer.
+        // Once the counts have been requested, their buffer must not be written.
         let timer = frame.timer.as_mut().filter(|timer| frame.staging.is_some() && timer.has_room());
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("sheetsplat.resolve"),
@@ -360,10 +389,10 @@ impl Renderer {
         Ok(())
     }
 
-    /// Draws the view's image in a pass of the host's, whose attachments must be of the formats and the sample count that the
-    /// renderer was made for, and which the scissor must lie in ([`Placement::check`]); what is wrong with them, wgpu reports. Draws nothing, if the view was never prepared. Changes the pass's
-    /// pipeline, bind group 0, viewport and scissor rectangle. A view may also be drawn by other renderers of its device than the
-    /// one that recorded it, and as often as the host likes.
+    /// Draws the view's image in a host's pass. Its attachments must have the formats and the sample count that the renderer was made for, and
+    /// must contain the scissor ([`Placement::check`]); wgpu reports a mismatch. Does nothing if the view was never prepared. Changes the
+    /// pass's pipeline, bind group 0, viewport and scissor rectangle. Other renderers on the same device may also draw the view, any number
+    /// of times.
     pub fn draw(&self, pass: &mut RenderPass<'_>, view: &SceneView, at: Placement) {
         if let Some(frame) = &view.frame {
             self.draw_frame(pass, frame, at);
@@ -375,6 +404,11 @@ impl Renderer {
         let bands = compositing.bands.iter().map(|band| band.band);
         self.resolve.draw(pass, compositing.size, resolve_groups.iter().zip(bands), at);
     }
+}
+
+/// What decides which bricks a frame draws whose values are classified after splatting.
+fn needs_of(request: &FrameRequest) -> Option<&BrickNeeds> {
+    request.after.as_ref().map(|after| &after.needs)
 }
 
 fn frame_uniform() -> BufferSpec {
@@ -390,12 +424,12 @@ fn control_points(request: &FrameRequest) -> BufferSpec {
     content_spec("sheetsplat.control_points", bytes, BufferUsages::STORAGE)
 }
 
-/// Where counts of so many sheet groups end, bytes.
+/// The byte offset of the timestamps behind the counts of `groups` sheet groups.
 fn timestamps_at(groups: usize) -> u64 {
     (size_of::<Tally>() as u64 + groups as u64 * 4).next_multiple_of(8)
 }
 
-/// For counts, and behind them the timestamps of so many passes, if they are timed.
+/// The buffer for counts, followed by the timestamps of `passes` passes if they are timed.
 fn staging(timestamps: u64, timed: bool, passes: usize) -> BufferSpec {
     let bytes = timestamps + if timed { passes as u64 * PASS_BYTES } else { 0 };
     buffer_spec("sheetsplat.counts", bytes, BufferUsages::COPY_DST | BufferUsages::MAP_READ)

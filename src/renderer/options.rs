@@ -1,48 +1,48 @@
-//! What a renderer is made for: how it draws, and what it draws into.
+//! Options of a renderer: how it draws, and into what kind of target.
 
 use wgpu::{BlendState, Device, Features, TextureFormat, TextureFormatFeatureFlags, TextureSampleType, TextureUsages};
 
 use crate::gpu::device::DeviceError;
 use crate::settings::splatting::Rasterizer;
 
-/// What a renderer is made for: [`Self::for_target`] or [`Self::DETERMINISTIC`], changed by the `with_` functions.
+/// Options of a renderer: [`Self::for_target`] or [`Self::DETERMINISTIC`], changed by the `with_` functions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct RendererOptions {
-    /// Format of the sheet buffer, `Rgba32Float` or `Rgba16Float`; `None` takes the better one that the device blends.
+    /// The format of the sheet buffer, `Rgba32Float` or `Rgba16Float`; `None` means the more precise one that the device can blend.
     pub sheet_format: Option<TextureFormat>,
-    /// Sheets drawn by one quad: 1, 2 or 4; `None` takes as many as the device's colour attachments allow.
+    /// The number of sheets that one quad draws: 1, 2 or 4; `None` means as many as the device's colour attachments allow.
     pub sheets_per_group: Option<u32>,
-    /// What scenes with `splatting.rasterizer = "auto"` are drawn by.
+    /// The rasterizer for scenes with `splatting.rasterizer = "auto"`.
     pub rasterizer: Rasterizer,
-    /// Times every stage, where the device has timestamp queries.
+    /// Whether every stage is timed, if the device has timestamp queries.
     pub profile: bool,
-    /// Format of the targets that images are presented in: any that can be rendered to and holds float or normalised numbers.
+    /// The format of the targets: any renderable format with float or normalised numbers.
     pub target_format: TextureFormat,
-    /// What becomes of what is there.
+    /// How images are combined with the target's content.
     pub blend: Blend,
-    /// Whether the target holds linear light. Colours are display-referred (SPEC §3); for such a target they are decoded by
-    /// sRGB's curve, so that an opaque image looks the same in every format. `None` is what the format says: sRGB formats hold linear light.
+    /// Whether the target holds linear light. Colours are display-referred (SPEC §3); for such a target they are decoded by sRGB's curve, so that
+    /// an opaque image looks the same in every format. `None` follows the format: sRGB formats hold linear light.
     pub linear: Option<bool>,
-    /// Format of the depth attachment of the passes drawn in. It is neither tested nor written.
+    /// The format of the depth attachment in the host's passes. It is neither tested nor written.
     pub depth_format: Option<TextureFormat>,
-    /// Samples per pixel of the targets. All of a pixel's get the same colour.
+    /// The number of samples per pixel in the targets. All samples of a pixel get the same colour.
     pub sample_count: u32,
 }
 
-/// What becomes of what is in the target.
+/// How an image is combined with the target's content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Blend {
-    /// The image, premultiplied, goes over it: `image + (1 - image.a)·target`, of the numbers that the target holds, so where those are
-    /// linear light that is blended. With an opaque background it is the image.
+    /// The premultiplied image is composited over it: `image + (1 - image.a)·target`, in the target's own numbers, so in linear light if it holds
+    /// that. With an opaque background the image replaces it.
     Over,
-    /// The image takes its place.
+    /// The image replaces it.
     Replace,
 }
 
 impl RendererOptions {
-    /// Draws as well as the device can, over what is in targets of a format.
+    /// Options that use everything the device supports and composite over the content of targets of a format.
     pub const fn for_target(format: TextureFormat) -> Self {
         Self {
             sheet_format: None,
@@ -57,10 +57,10 @@ impl RendererOptions {
         }
     }
 
-    /// Nothing is left to the device's abilities: on one adapter and driver a scene gives the same bytes on every device that has WebGPU's
-    /// default limits, whatever else it has. Sheets are `Rgba16Float`, 4 at once, and drawn by quads. Scenes that insist on tiles
-    /// are drawn by tiles, or are an error on a device that has no subgroups. Images are `Rgba32Float`, as they are; change
-    /// `target_format` and what follows it as the host needs.
+    /// Options under which the image does not depend on the device's limits and features: on one adapter and driver a scene gives the same bytes
+    /// on every device that has at least WebGPU's default limits. Sheets are `Rgba16Float`, 4 per quad, and drawn by quads. Scenes that
+    /// require tiles are drawn by tiles, or refused on a device without subgroups. The target format is `Rgba32Float`; a host may
+    /// change it and the fields after it.
     pub const DETERMINISTIC: Self = Self {
         sheet_format: Some(TextureFormat::Rgba16Float),
         sheets_per_group: Some(4),
@@ -69,47 +69,47 @@ impl RendererOptions {
         ..Self::for_target(TextureFormat::Rgba32Float)
     };
 
-    /// With another format of the sheet buffer.
+    /// These options with another format of the sheet buffer.
     pub const fn with_sheet_format(self, format: TextureFormat) -> Self {
         Self { sheet_format: Some(format), ..self }
     }
 
-    /// With another number of sheets drawn by one quad.
+    /// These options with another number of sheets that one quad draws.
     pub const fn with_sheets_per_group(self, sheets: u32) -> Self {
         Self { sheets_per_group: Some(sheets), ..self }
     }
 
-    /// With another rasterizer for scenes that leave the choice.
+    /// These options with another rasterizer for scenes that do not name one.
     pub const fn with_rasterizer(self, rasterizer: Rasterizer) -> Self {
         Self { rasterizer, ..self }
     }
 
-    /// With every stage timed, or none.
+    /// These options with every stage timed, or no stage.
     pub const fn with_profile(self, profile: bool) -> Self {
         Self { profile, ..self }
     }
 
-    /// With another format of the targets.
+    /// These options with another format of the targets.
     pub const fn with_target_format(self, target_format: TextureFormat) -> Self {
         Self { target_format, ..self }
     }
 
-    /// With another way to treat what is in the target.
+    /// These options with another way to combine images with the target's content.
     pub const fn with_blend(self, blend: Blend) -> Self {
         Self { blend, ..self }
     }
 
-    /// With targets that hold linear light, or display-referred colours, whatever their format says.
+    /// These options with targets that hold linear light, or display-referred colours, whatever their format implies.
     pub const fn with_linear(self, linear: bool) -> Self {
         Self { linear: Some(linear), ..self }
     }
 
-    /// With a depth attachment in the passes drawn in.
+    /// These options with a depth attachment in the host's passes.
     pub const fn with_depth_format(self, format: TextureFormat) -> Self {
         Self { depth_format: Some(format), ..self }
     }
 
-    /// With another number of samples per pixel.
+    /// These options with another number of samples per pixel.
     pub const fn with_sample_count(self, sample_count: u32) -> Self {
         Self { sample_count, ..self }
     }
@@ -127,11 +127,11 @@ impl RendererOptions {
         }
     }
 
-    /// Checks what concerns the target. Of a device with `TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES`, which does not say what its
-    /// adapter adds, only what none can do.
+    /// Checks the options about the target. A device with `TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES` does not report what its adapter supports, so
+    /// only what no device supports is refused there.
     ///
     /// # Errors
-    /// If the device cannot render to, or blend, targets or depth attachments of that kind.
+    /// If the device cannot render to, or blend, targets or depth attachments with these options.
     pub(crate) fn check_target(&self, device: &Device) -> Result<(), DeviceError> {
         let features = device.features();
         let refused =

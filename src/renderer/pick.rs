@@ -1,29 +1,14 @@
-//! Picking: what a pixel shows first.
+//! Picking on the GPU: what a pixel shows first.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
-use glam::{DVec2, DVec3, UVec3};
 use wgpu::{Buffer, BufferAsyncError, BufferDescriptor, BufferUsages, CommandEncoder, Device, MapMode, Texture};
 
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
+use crate::pick::Pick;
 use crate::volume::Volume;
-
-/// A point of a volume.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pick {
-    /// Where, in world units from the volume's centre.
-    pub position: DVec3,
-    /// Its depth along the camera's direction, world units from the eye; orthographic from the camera's centre.
-    pub depth: f64,
-    /// The nearest voxel.
-    pub voxel: UVec3,
-    /// That voxel's value, NaN in a hole.
-    pub value: f32,
-    /// That voxel's label, in a segmented volume.
-    pub label: Option<u16>,
-}
 
 /// A pick on its way from the GPU.
 #[derive(Debug)]
@@ -63,18 +48,19 @@ impl PendingPick {
         Self { staging, view: *view, pixel, volume: volume.clone(), arrival: None }
     }
 
-    /// What was picked, once the encoder was submitted, what it does is done, and the device was polled; the first call after
-    /// submitting asks for it, so that there are two of them at least. `None` until then. Never waits. Inside there is `None` where the
+    /// The picked point, once the encoder was submitted, its work is done, and the device was polled. The first call after submitting requests
+    /// it, so at least two calls are needed; until the point has arrived they return `None`. Never waits. The inner `None` means that the
+    /// opacity is not reached.
     /// opacity is not reached.
     ///
     /// # Errors
-    /// If the device was lost meanwhile.
+    /// If the device was lost in the meantime.
     pub fn try_get(&mut self) -> Option<Result<Option<Pick>, RenderError>> {
         let failed = |reason: String| RenderError::Readback(reason);
         let arrival = self.arrival.get_or_insert_with(|| {
             let (sender, arrival) = channel();
             self.staging.map_async(MapMode::Read, .., move |result| {
-                // Whoever gave up asking does not care.
+                // The receiver may have been dropped.
                 let _ = sender.send(result);
             });
             arrival
@@ -83,19 +69,7 @@ impl PendingPick {
         Some(result.map_err(|error| failed(error.to_string())).and_then(|()| {
             let bytes = self.staging.get_mapped_range(..).map_err(|error| failed(error.to_string()))?;
             let depth: f32 = bytemuck::pod_read_unaligned(&bytes[..4]);
-            Ok(depth.is_finite().then(|| self.at(depth.into())))
+            Ok(depth.is_finite().then(|| Pick::at(&self.view, &self.volume, self.pixel, depth.into())))
         }))
-    }
-
-    /// The point at a depth.
-    fn at(&self, depth: f64) -> Pick {
-        let grid = self.volume.grid();
-        let place = DVec2::from(self.pixel.map(f64::from)) + 0.5 - DVec2::from(self.view.size.map(f64::from)) / 2.0;
-        let position = self.view.rays().at(place, depth / grid.unit()) * grid.unit();
-        let last = grid.dims.as_dvec3() - 1.0;
-        let voxel = (position / grid.spacing + grid.center()).round().clamp(DVec3::ZERO, last).as_uvec3();
-        let index = grid.index_of(voxel);
-        let (value, label) = (self.volume.values()[index as usize], self.volume.label(index));
-        Pick { position, depth, voxel, value, label }
     }
 }

@@ -1,20 +1,20 @@
-//! Where in a target an image goes.
+//! The position of an image in a target.
 
 use std::ops::Range;
 
 use crate::setting_error::SettingError;
 
-/// Where in a target an image goes. Pixels, from the target's upper left corner, right and down.
+/// The position of an image in a target, in pixels right and down from the target's upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Placement {
-    /// Where the image's upper left pixel goes: anywhere, also outside of the target.
+    /// The position of the image's upper left pixel, which may lie outside the target.
     pub origin: [i32; 2],
-    /// The part of the target that may change: x, y, width and height. It must lie in the target.
+    /// The part of the target that may change: x, y, width and height. It must lie within the target.
     pub scissor: [u32; 4],
 }
 
 impl Placement {
-    /// The image in the upper left corner of a target of the given width and height, all of which it may change.
+    /// The image in the upper left corner of a target of the given width and height, which may change everywhere.
     pub const fn whole([width, height]: [u32; 2]) -> Self {
         Self { origin: [0, 0], scissor: [0, 0, width, height] }
     }
@@ -22,7 +22,7 @@ impl Placement {
     /// Checks that the scissor lies in a target of the given width and height.
     ///
     /// # Errors
-    /// If it does not.
+    /// If it does not lie within the target.
     pub fn check(&self, target: [u32; 2]) -> Result<(), SettingError> {
         let [x, y, width, height] = self.scissor.map(u64::from);
         if x + width <= target[0].into() && y + height <= target[1].into() {
@@ -32,8 +32,7 @@ impl Placement {
         Err(SettingError::new("placement.scissor", &self.scissor.map(f64::from)[..], allowed))
     }
 
-    /// The part of the target that some rows of an image `width` pixels wide cover: x, y, width and height; `None` if they cover
-    /// nothing.
+    /// The part of the target, as x, y, width and height, that some rows of an image `width` pixels wide cover; `None` if that is empty.
     pub(crate) fn covered(&self, width: u32, rows: Range<u32>) -> Option<[u32; 4]> {
         let [x, y, scissor_width, scissor_height] = self.scissor;
         let (x, width) = overlap(self.origin[0], 0..width, x, scissor_width)?;
@@ -42,7 +41,7 @@ impl Placement {
     }
 }
 
-/// Start and length of what `image` pixels from an origin on, and `length` pixels from `start` on, have in common.
+/// The start and length of the overlap between the `image` pixels from an origin on and the `length` pixels from `start` on.
 fn overlap(origin: i32, image: Range<u32>, start: u32, length: u32) -> Option<(u32, u32)> {
     let (origin, start, length) = (i64::from(origin), i64::from(start), i64::from(length));
     let first = start.max(origin + i64::from(image.start));

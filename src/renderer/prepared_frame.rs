@@ -1,4 +1,4 @@
-//! A prepared frame: the buffers that recording needs, and what of them the next frame can take over.
+//! A prepared frame: the buffers that recording needs, some of which the next frame can reuse.
 
 use wgpu::{BindGroup, Buffer, CommandEncoder, Texture, TextureFormat, TextureView};
 
@@ -6,32 +6,33 @@ use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
+use crate::rasterizer::fields::FieldFrame;
 use crate::rasterizer::quads::QuadFrame;
 use crate::rasterizer::samples::SampleFrame;
 use crate::rasterizer::tiles::TileFrame;
-use crate::stats::{GroupSlabs, Staging, Totals};
+use crate::renderer::counts::{GroupSlabs, Staging, Totals};
 
-/// A frame whose buffers are all allocated and filled: recording it cannot fail.
+/// A frame whose buffers are all allocated and filled, so that recording it cannot fail.
 #[derive(Debug)]
 pub(crate) struct PreparedFrame {
-    /// Format and number of the sheets of the renderer that prepared it.
+    /// The format and number of the sheets of the renderer that prepared it.
     pub(crate) sheets: (TextureFormat, u32),
     pub(crate) view: ViewGeometry,
     pub(crate) drawing: Drawing,
-    /// Why it is drawn by quads, where tiles were to draw it if they could.
+    /// Why it is drawn by quads although tiles were preferred.
     pub(crate) fallback: Option<RenderError>,
     pub(crate) compositing: CompositingBuffer,
     pub(crate) uniform: Buffer,
     pub(crate) control_points: Buffer,
     pub(crate) resolve_groups: Vec<BindGroup>,
-    /// What cuts rays.
+    /// The planes and surfaces that cut rays.
     pub(crate) cut: Buffer,
-    /// If they were asked for.
+    /// The depths of first hits, if requested.
     pub(crate) first_hits: Option<FirstHits>,
     pub(crate) timer: Option<Timer>,
-    /// Counted when first asked for.
+    /// The totals, counted when first requested.
     pub(crate) totals: Option<Totals>,
-    /// Where a recorded frame leaves its counts; gone when somebody waits for them.
+    /// The staging buffer for a recorded frame's counts; `None` once they have been requested.
     pub(crate) staging: Option<Staging>,
     pub(crate) gpu_bytes: u64,
 }
@@ -48,11 +49,12 @@ pub(crate) struct FirstHits {
 #[derive(Debug)]
 pub(crate) enum Drawing {
     Quads(Box<QuadFrame>),
+    Fields(Box<FieldFrame>),
     Tiles(Box<TileFrame>),
     Samples(Box<SampleFrame>),
 }
 
-/// What of a view's last frame the next one may take over.
+/// The parts of a view's last frame that the next one may reuse.
 #[derive(Debug, Default)]
 pub(crate) struct PreviousFrame {
     pub(crate) drawing: Option<Drawing>,
@@ -60,20 +62,20 @@ pub(crate) struct PreviousFrame {
     pub(crate) uniform: Option<Buffer>,
     pub(crate) control_points: Option<Buffer>,
     pub(crate) cut: Option<Buffer>,
-    /// So that a host that bound it need not bind it again.
+    /// The texture is kept so that a host that bound it need not bind it again.
     pub(crate) first_hits: Option<Texture>,
     pub(crate) totals: Option<Totals>,
-    /// If nobody waits for the counts in it.
+    /// The staging buffer, if nobody is waiting for its counts.
     pub(crate) staging: Option<Buffer>,
 }
 
 impl PreviousFrame {
-    /// For a frame of `view`, drawn into sheets of such a format and number.
+    /// The reusable parts for a frame of `view`, drawn into sheets of this format and number.
     pub(crate) fn of(frame: Option<PreparedFrame>, sheets: (TextureFormat, u32), view: &ViewGeometry) -> Self {
         let Some(old) = frame else { return Self::default() };
         let same_size = old.compositing.size == view.size;
         Self {
-            // That of another renderer may have other sheets.
+            // Another renderer may have used other sheets.
             drawing: (old.sheets == sheets).then_some(old.drawing),
             compositing: same_size.then_some(old.compositing),
             uniform: Some(old.uniform),
@@ -87,26 +89,28 @@ impl PreviousFrame {
 }
 
 impl PreparedFrame {
-    /// Bytes of GPU memory that the frame and its volume hold.
+    /// Bytes of GPU memory that the frame and its volume use.
     pub(crate) fn gpu_bytes(&self) -> u64 {
         self.gpu_bytes
     }
 }
 
 impl Drawing {
-    /// Passes that are timed.
+    /// The number of timed passes.
     pub(crate) fn passes(&self) -> usize {
         match self {
             Self::Quads(frame) => frame.passes(),
+            Self::Fields(frame) => frame.passes(),
             Self::Tiles(_) => TileFrame::PASSES,
             Self::Samples(_) => SampleFrame::PASSES,
         }
     }
 
-    /// The slabs of the sheet groups, in the order they are composited in.
+    /// The slabs of the sheet groups, in compositing order.
     pub(crate) fn group_slabs(&self) -> GroupSlabs {
         match self {
             Self::Quads(frame) => frame.group_slabs(),
+            Self::Fields(frame) => frame.group_slabs(),
             Self::Tiles(frame) => frame.group_slabs(),
             Self::Samples(frame) => frame.group_slabs(),
         }
@@ -116,15 +120,17 @@ impl Drawing {
     pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer) {
         match self {
             Self::Quads(frame) => frame.copy_counts(encoder, staging),
+            Self::Fields(frame) => frame.copy_counts(encoder, staging),
             Self::Tiles(frame) => frame.copy_counts(encoder, staging),
             Self::Samples(frame) => frame.copy_counts(encoder, staging),
         }
     }
 
-    /// The words of first hits, and where in their buffer they start, bytes; samples have none.
+    /// The buffer with the words of first hits, and their byte offset in it; samples have none.
     pub(crate) fn first_hits(&self) -> Option<(&Buffer, u64)> {
         match self {
             Self::Quads(frame) => Some(frame.first_hits()),
+            Self::Fields(frame) => Some(frame.first_hits()),
             Self::Tiles(frame) => Some(frame.first_hits()),
             Self::Samples(_) => None,
         }
@@ -134,6 +140,7 @@ impl Drawing {
     pub(crate) fn gpu_bytes(&self) -> u64 {
         match self {
             Self::Quads(frame) => frame.gpu_bytes(),
+            Self::Fields(frame) => frame.gpu_bytes(),
             Self::Tiles(frame) => frame.gpu_bytes(),
             Self::Samples(frame) => frame.gpu_bytes(),
         }
@@ -142,7 +149,7 @@ impl Drawing {
     /// `"quads"` or `"tiles"`.
     pub(crate) fn rasterizer(&self) -> &'static str {
         match self {
-            Self::Quads(_) | Self::Samples(_) => "quads",
+            Self::Quads(_) | Self::Fields(_) | Self::Samples(_) => "quads",
             Self::Tiles(_) => "tiles",
         }
     }

@@ -1,4 +1,4 @@
-//! What is shown and how, and what the next frame can keep of the last one: every setter says what it costs (§5.1).
+//! A view: what is shown and how, and what the next frame can reuse. Every setter states its cost (§5.1).
 
 use std::sync::OnceLock;
 
@@ -22,9 +22,9 @@ use crate::settings::splatting::{Splatting, check_first_hit};
 use crate::settings::transfer_function::{TransferFunction, check_iso_ranges};
 use crate::stats::PendingCounts;
 
-/// A view of a volume: camera, image, transfer function, shading and splatting settings, and the last frame's buffers. Setters
-/// take effect with the next [`Renderer::prepare`](crate::renderer::Renderer::prepare). A setter that is given what is not allowed says
-/// which field it is, as reading a scene file does, and changes nothing.
+/// A view of a volume: camera, image, transfer function, shading and splatting settings, and the last frame's buffers. Setters take effect
+/// with the next [`Renderer::prepare`](crate::renderer::Renderer::prepare). A setter that refuses a value names the field, as reading a
+/// scene file does, and changes nothing.
 #[derive(Debug)]
 pub struct SceneView {
     pub(crate) volume: ClassifiedVolume,
@@ -32,36 +32,37 @@ pub struct SceneView {
     pub(crate) surfaces: Option<Surfaces>,
     pub(crate) first_hit: Option<f64>,
     pub(crate) frame: Option<PreparedFrame>,
-    /// What the camera shows by default, once it was asked for.
+    /// The box that the camera frames by default, once it was needed.
     pub(crate) extent: OnceLock<Option<Extent>>,
 }
 
 impl SceneView {
-    /// Uploads the bricks of the voxels that take part under a scene's transfer function, to the volume's device. The scene's own
-    /// volume is not looked at.
+    /// Uploads the bricks of the voxels that take part under a scene's transfer function to the volume's device. The scene's own volume is
+    /// ignored.
     ///
     /// # Errors
-    /// If a setting is not allowed ([`Scene::check`]), or the volume has no labels and the scene has tables or a preset for some; if the volume
-    /// is on another device, or the device fails.
+    /// If a setting is invalid ([`Scene::check`]); if the scene has tables or a preset for labels and the volume has none; if the volume is on
+    /// another device; or if the device fails.
     pub fn new(device: &Device, volume: &GpuVolume, scene: &Scene) -> Result<Self, RenderError> {
         check_device(device, volume.device(), "the volume")?;
         scene.check()?;
         scene.transfer.check_volume(volume.volume())?;
         let transfer = scene.transfer.resolve(volume.volume());
         let clipped = scene.clip.voxels(volume.volume().grid(), scene.splatting.radius);
-        let volume = scoped(device, || ClassifiedVolume::new(device, volume, transfer, clipped))?;
+        let classification = scene.splatting.classification;
+        let volume = scoped(device, || ClassifiedVolume::new(device, volume, transfer, clipped, classification))?;
         Ok(Self { volume, scene: scene.clone(), surfaces: None, first_hit: None, frame: None, extent: OnceLock::new() })
     }
 
-    /// The settings. Its `volume` and `transfer` are those that the view was made with.
+    /// The settings. Its `volume` and `transfer` are those with which the view was made.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
     /// The camera of the next frame: the scene's, and if that fits an object ([`Fit::Object`](crate::settings::Fit::Object)), with its open
     /// values chosen for its direction and the image's size. The object's box ([`Scene::extent`]) is found once, with the first frame that
-    /// needs it, so that the picture stays where it is while the transfer function changes. A camera that is to turn and keep its distance
-    /// is that of [`Scene::explicit_all_around`].
+    /// needs it, so that the picture does not move when the transfer function changes. For a camera that turns at constant distance, use
+    /// [`Scene::explicit_all_around`].
     pub fn camera(&self) -> Camera {
         let Scene { camera, image, .. } = &self.scene;
         if !camera.needs_object() {
@@ -71,25 +72,25 @@ impl SceneView {
         extent.map_or(*camera, |extent| extent.fit(camera, [image.width, image.height]))
     }
 
-    /// The volume under the current transfer function.
+    /// The volume, classified by the current transfer function.
     pub fn volume(&self) -> &ClassifiedVolume {
         &self.volume
     }
 
-    /// Changes colours, opacities, gradient opacity, iso-ranges or the labels' tables. What keeps its opacity above 0 is shaded anew and nothing more;
+    /// Changes colours, opacities, gradient opacity, iso-ranges or the labels' tables. Voxels whose opacity stays above 0 are only shaded again;
     /// see [`ClassifiedVolume::set_transfer_function`].
     ///
     /// # Errors
-    /// If a setting is not allowed; then nothing changes.
+    /// If a setting is invalid; then nothing changes.
     pub fn set_transfer_function(&mut self, transfer: TransferFunction) -> Result<Touched, SettingError> {
         transfer.check()?;
         Ok(self.volume.set_transfer_function(transfer))
     }
 
-    /// Changes the iso-ranges alone; touches only voxels that enter or leave.
+    /// Changes only the iso-ranges; touches only voxels that enter or leave.
     ///
     /// # Errors
-    /// If there are some but not one, or one is not finite or reversed; then nothing changes.
+    /// If the list of iso-ranges is empty, or one is not finite or reversed; then nothing changes.
     pub fn set_iso_ranges(&mut self, iso_ranges: Option<Vec<[f64; 2]>>) -> Result<Touched, SettingError> {
         check_iso_ranges(iso_ranges.as_deref())?;
         Ok(self.volume.set_iso_ranges(iso_ranges))
@@ -103,14 +104,14 @@ impl SceneView {
     /// Changes the camera: bricks are sorted into buckets again.
     ///
     /// # Errors
-    /// If a setting is not allowed; then nothing changes.
+    /// If a setting is invalid; then nothing changes.
     pub fn set_camera(&mut self, camera: Camera) -> Result<(), SettingError> {
         camera.check()?;
         self.scene.camera = camera;
         Ok(())
     }
 
-    /// Moves the light: voxels are shaded anew. A direction has any length but 0 and points to the light.
+    /// Moves the light; voxels are shaded again. A direction points to the light and may have any length except 0.
     ///
     /// # Errors
     /// If the direction is 0 or not finite; then nothing changes.
@@ -118,27 +119,28 @@ impl SceneView {
         self.set_shading(Shading { light, ..self.scene.shading })
     }
 
-    /// Changes the material: voxels are shaded anew.
+    /// Changes the material; voxels are shaded again.
     ///
     /// # Errors
-    /// If a setting is not allowed; then nothing changes.
+    /// If a setting is invalid; then nothing changes.
     pub fn set_shading(&mut self, shading: Shading) -> Result<(), SettingError> {
         shading.check()?;
         self.scene.shading = shading;
         Ok(())
     }
 
-    /// Changes the splatting settings. Another slab width or kernel sorts bricks into buckets again, another kernel also makes
-    /// another footprint table; where planes clip, voxels enter or leave with another radius.
+    /// Changes the splatting settings. Another slab width or kernel sorts bricks into buckets again, and another kernel also makes another
+    /// footprint table. If planes clip the volume, another radius lets voxels enter or leave.
     ///
     /// # Errors
-    /// If a setting is not allowed; then nothing changes.
+    /// If a setting is invalid; then nothing changes.
     pub fn set_splatting(&mut self, splatting: Splatting) -> Result<(), SettingError> {
         splatting.check()?;
         let Scene { clip, splatting: old, .. } = &self.scene;
         if !clip.is_empty() && splatting.radius != old.radius {
             self.volume.set_clip(clip.voxels(self.volume.grid(), splatting.radius));
         }
+        self.volume.set_classification(splatting.classification);
         self.scene.splatting = splatting;
         Ok(())
     }
@@ -154,9 +156,9 @@ impl SceneView {
         Ok(self.volume.set_clip(clipped))
     }
 
-    /// Opaque surfaces of the host, `None` for none: in front of them the volume shows, behind them it does not, and voxels there are
-    /// culled as behind opaque ones (§6). Where a surface lies in a slab, it cuts the slab's sheet in proportion, as clip planes do
-    /// ([`Clip`](crate::settings::Clip)). The texture must hold what it is to hold when the frame is submitted.
+    /// Sets opaque surfaces of the host, or removes them with `None`. The volume is visible only in front of them, and voxels behind them are
+    /// culled as behind opaque ones (§6). A surface within a slab cuts the slab's sheet in proportion, as clip planes do
+    /// ([`Clip`](crate::settings::Clip)). The texture must have its content when the frame is submitted.
     ///
     /// # Errors
     /// If [`Surfaces::check`] refuses them; then nothing changes.
@@ -166,9 +168,9 @@ impl SceneView {
         Ok(())
     }
 
-    /// Asks for the depth at which every pixel's opacity reaches a value, above 0 and at most 1; `None` for none. Front to back only, and
-    /// with culling at most [`Splatting::opacity_threshold`]; not for [`Compositing::Minimum`](crate::settings::splatting::Compositing::Minimum), and
-    /// whatever the value that of the surface for [`Compositing::Surface`](crate::settings::splatting::Compositing::Surface). See
+    /// Requests the depth at which every pixel's opacity reaches a value above 0 and at most 1, or nothing with `None`. Front to back only, and
+    /// with culling at most [`Splatting::opacity_threshold`]. Not for [`Compositing::Minimum`](crate::settings::splatting::Compositing::Minimum);
+    /// for [`Compositing::Surface`](crate::settings::splatting::Compositing::Surface) it is the surface's depth for any value. See
     /// [`Self::first_hits`] and [`Self::pick`].
     ///
     /// # Errors
@@ -179,15 +181,15 @@ impl SceneView {
         Ok(())
     }
 
-    /// The depths of first hits, a `R32Float` texture of the image's size (to sample or copy), once they have been asked for and a frame
-    /// was prepared; recording the frame writes them. In world units along the camera's direction, from the eye, orthographic from the
-    /// plane through [`Camera::center`]; infinite where the opacity is not reached. Within a sheet opacity is taken to grow evenly.
+    /// The depths of first hits, an `R32Float` texture of the image's size (to sample or copy), if they were requested and a frame was
+    /// prepared; recording the frame writes them. They are in world units along the camera's direction, from the eye or, orthographic, from
+    /// the plane through [`Camera::center`], and infinite where the opacity is not reached. Within a sheet opacity grows linearly.
     pub fn first_hits(&self) -> Option<&Texture> {
         self.frame.as_ref()?.first_hits.as_ref().map(|hits| &hits.texture)
     }
 
     /// Records a copy of the first hit at a pixel, counted from the upper left: after [`Renderer::record`](crate::renderer::Renderer::record),
-    /// in the same encoder or a later one. `None` if none were asked for, or off the image. Allocates a few bytes.
+    /// in the same encoder or a later one. `None` if first hits were not requested or the pixel lies outside the image. Allocates a few bytes.
     pub fn pick(&self, device: &Device, encoder: &mut CommandEncoder, pixel: [u32; 2]) -> Option<PendingPick> {
         let frame = self.frame.as_ref()?;
         let hits = frame.first_hits.as_ref()?;
@@ -195,17 +197,17 @@ impl SceneView {
         is_inside.then(|| PendingPick::record(device, encoder, &hits.texture, pixel, &frame.view, self.volume.volume()))
     }
 
-    /// Changes the image's size, for which all buffers of that size are allocated again, or its background, which costs nothing.
+    /// Changes the image's size, which allocates all buffers of that size again, or its background, which costs nothing.
     ///
     /// # Errors
-    /// If a setting is not allowed; then nothing changes.
+    /// If a setting is invalid; then nothing changes.
     pub fn set_image(&mut self, image: ImageSettings) -> Result<(), SettingError> {
         image.check()?;
         self.scene.image = image;
         Ok(())
     }
 
-    /// Turns the camera about its `up` by an angle in degrees, by the right hand.
+    /// Turns the camera right-handed about its `up` by an angle in degrees.
     ///
     /// # Errors
     /// If the angle is not finite; then nothing changes.
@@ -214,27 +216,27 @@ impl SceneView {
         self.set_camera(self.scene.camera.turned(degrees))
     }
 
-    /// How the prepared frame is drawn: `"quads"` or `"tiles"`.
+    /// The prepared frame's rasterizer, `"quads"` or `"tiles"`.
     pub fn rasterizer(&self) -> Option<&'static str> {
         self.frame.as_ref().map(|frame| frame.drawing.rasterizer())
     }
 
-    /// Why the prepared frame is drawn by quads although the scene and the renderer leave the choice: a feature that the device lacks, or a
+    /// Why the prepared frame is drawn by quads although neither the scene nor the renderer requires them: a feature that the device lacks, or a
     /// limit of the tile rasterizer that the frame exceeds. `None` if the frame is drawn by tiles, or if the settings exclude tiles. A renderer
-    /// logs the first reason that it meets.
+    /// logs the first such reason.
     pub fn fallback(&self) -> Option<&RenderError> {
         self.frame.as_ref()?.fallback.as_ref()
     }
 
-    /// Bytes of GPU memory that the view holds, with the volume's, which other views may share: without those it is that less
-    /// [`GpuVolume::gpu_bytes`]. All of it is given back when view and volume are dropped and what was submitted is done. A buffer that
-    /// a frame needs no more than a part of is kept, at most 4 times as large as a new view's; textures always fit.
+    /// Bytes of GPU memory that the view uses, including its volume's, which other views may share; [`GpuVolume::gpu_bytes`] is the volume's
+    /// share. All of it is freed when view and volume are dropped and the submitted work is done. A buffer that is larger than a frame needs
+    /// is kept if it is at most 4 times as large as a new view's; textures always fit.
     pub fn gpu_bytes(&self) -> u64 {
         self.frame.as_ref().map_or(self.volume.gpu_bytes(), PreparedFrame::gpu_bytes)
     }
 
-    /// Asks for the counts of the frame that was last recorded and submitted; `None` without one. They arrive when the device is
-    /// polled after the frame is done; nothing waits. Once per frame.
+    /// Requests the counts of the frame that was last recorded and submitted, once per frame; `None` without such a frame. They arrive when the
+    /// device is polled after the frame is done; nothing waits.
     pub fn counts(&mut self) -> Option<PendingCounts> {
         let (volume, frame) = (&self.volume, self.frame.as_mut()?);
         let staging = frame.staging.take()?;

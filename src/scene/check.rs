@@ -1,4 +1,4 @@
-//! Checks of what a scene holds beside the settings' own types.
+//! Checks of scene settings that their types do not enforce.
 
 use super::{ImageSettings, Scene, TransferSettings};
 use crate::appearance::Colormap;
@@ -7,10 +7,10 @@ use crate::settings::transfer_function::{check_iso_ranges, check_labels, check_r
 use crate::volume::{Volume, check_spacing};
 
 impl ImageSettings {
-    /// What widths and heights may be.
+    /// The allowed widths and heights, for errors.
     pub(super) const PIXELS: &str = "an integer from 1 to the device's texture limit";
 
-    /// Checks what types do not say.
+    /// Checks that the values are in range.
     ///
     /// # Errors
     /// If width or height is 0, or the background is not in [0, 1].
@@ -25,25 +25,26 @@ impl ImageSettings {
 }
 
 impl TransferSettings {
-    /// Checks what types do not say.
+    /// Checks that the values are in range.
     ///
     /// # Errors
-    /// If a colour, opacity or factor is not in [0, 1], also in a label's tables, there are iso-ranges but not one, or one is not finite or
-    /// reversed.
+    /// If a colour, opacity or factor is not in [0, 1] (in labels' tables, too), the list of iso-ranges is empty, or an iso-range is
+    /// reversed or not finite.
     pub fn check(&self) -> Result<(), SettingError> {
         check_ramps("transfer", self.color.as_ref(), self.opacity.as_ref(), self.gradient_opacity.as_ref())?;
         check_iso_ranges(self.iso_ranges.as_deref())?;
         check_labels(&self.labels)
     }
 
-    /// Checks that a volume has what the settings are for.
+    /// Checks that the volume has the labels or palette that the settings need.
     ///
     /// # Errors
-    /// If it has no labels and there are tables for some, or the preset for labels, or if it has no palette and the colour map is that.
+    /// If there are tables for labels, or the preset `labels`, and the volume has no labels; or if the colour map is the file's and the
+    /// volume has no palette.
     pub fn check_volume(&self, volume: &Volume) -> Result<(), SettingError> {
         if !self.labels.is_empty() && volume.labels().is_none() {
             let found = "tables for a volume without labels";
-            return Err(SettingError::new("transfer.label", found, "none, or labels in the volume"));
+            return Err(SettingError::new("transfer.label", found, "no such tables, or a volume with labels"));
         }
         if self.colormap == Some(Colormap::File) && volume.palette().is_none() {
             let allowed = "another colour map, or a TIFF file whose pixels are indices of a palette";
@@ -51,17 +52,17 @@ impl TransferSettings {
         }
         if self.preset.is_some_and(|preset| !preset.suits(volume)) {
             let allowed = "values that are whole numbers from 0 to 65535, or labels in the volume";
-            return Err(SettingError::new("preset", "labels for a volume that has none", allowed));
+            return Err(SettingError::new("preset", "labels, for a volume without labels", allowed));
         }
         Ok(())
     }
 }
 
 impl Scene {
-    /// Checks all settings, as reading a scene file does. Whoever takes a scene calls it.
+    /// Checks all settings, as reading a scene file does. Every function that accepts a scene calls this.
     ///
     /// # Errors
-    /// If a setting is not allowed; what only the volume or the device can tell is found out when a frame is prepared.
+    /// If a setting is invalid. What depends on the volume or the device is checked when a frame is prepared.
     pub fn check(&self) -> Result<(), SettingError> {
         if let Some(spacing) = self.spacing {
             check_spacing("volume.spacing", spacing)?;

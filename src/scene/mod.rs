@@ -1,4 +1,4 @@
-//! Scenes: what to show and how, from a scene file, from `--set` overrides, or from a volume alone (SPEC §7).
+//! Scenes: what an image shows and how, from a scene file, from `--set` overrides, or from a volume alone (SPEC §7).
 
 mod check;
 mod names;
@@ -34,7 +34,7 @@ pub enum SceneError {
     Io {
         /// The scene file.
         path: PathBuf,
-        /// What the operating system said.
+        /// The operating system's error.
         source: std::io::Error,
     },
     /// The scene file is not TOML.
@@ -46,17 +46,17 @@ pub enum SceneError {
         /// What is wrong, with line and column.
         message: String,
     },
-    /// A key is unknown or missing, or its value is of the wrong type or out of range.
+    /// A key is unknown or missing, or its value has the wrong type or is out of range.
     #[error("{origin}: {key}: found {found}, allowed: {allowed}")]
     #[non_exhaustive]
     Invalid {
-        /// The scene file, or `--set` where the value came from an override.
+        /// The scene file, or `--set` if the value came from an override.
         origin: String,
-        /// The full key, elements counted from 0: `camera.up`, `transfer.opacity[2]`.
+        /// The full key, with elements counted from 0: `camera.up`, `transfer.opacity[2]`.
         key: String,
-        /// What was found there, as it is written.
+        /// What was found, as written.
         found: String,
-        /// What would have been accepted.
+        /// What is allowed.
         allowed: Allowed,
     },
 }
@@ -72,8 +72,9 @@ impl From<VolumeError> for SceneError {
     }
 }
 
-/// Where a scene's volume comes from.
+/// The source of a scene's volume.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum VolumeSource {
     /// A volume file.
     File(PathBuf),
@@ -83,12 +84,22 @@ pub enum VolumeSource {
     Builtin(String),
 }
 
-/// The image's size and what shows through it.
+impl VolumeSource {
+    /// The path of a volume file, with or without a header; `None` for a procedural volume.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::File(path) | Self::Raw(path, _) => Some(path),
+            Self::Builtin(_) => None,
+        }
+    }
+}
+
+/// The image's size and background.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageSettings {
-    /// Pixels, at least 1; the device's texture limit is the renderer's to check.
+    /// Pixels per row, at least 1. The renderer checks the device's texture limit.
     pub width: u32,
-    /// Pixels, at least 1; the device's texture limit is the renderer's to check.
+    /// The number of rows, at least 1. The renderer checks the device's texture limit.
     pub height: u32,
     /// Straight-alpha, display-referred RGBA in [0, 1].
     pub background: [f64; 4],
@@ -100,27 +111,27 @@ impl Default for ImageSettings {
     }
 }
 
-/// The transfer function as far as a scene gives it; what is missing is chosen once the volume is known.
+/// The transfer function as far as a scene states it; the rest is chosen once the volume is known.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TransferSettings {
-    /// What chooses what is missing; `None` is [`TransferFunction::from_histogram`].
+    /// The preset that chooses the rest; `None` means [`TransferFunction::from_histogram`].
     pub preset: Option<Preset>,
-    /// Colours over the values that show, where `color` is `None`.
+    /// The colour map over the visible values, used if `color` is `None`.
     pub colormap: Option<Colormap>,
-    /// Red, green and blue in [0, 1] over voxel values; `None` is chosen.
+    /// Red, green and blue in [0, 1] over voxel values; `None` is chosen from the volume.
     pub color: Option<Ramp<DVec3>>,
-    /// Opacity per unit length in [0, 1] over voxel values; `None` is chosen.
+    /// Opacity per unit length in [0, 1] over voxel values; `None` is chosen from the volume.
     pub opacity: Option<Ramp<f64>>,
-    /// A factor in [0, 1] over gradient magnitudes (value per world unit); `None` is 1 everywhere.
+    /// A factor in [0, 1] over gradient magnitudes (value per world unit); `None` means 1 everywhere.
     pub gradient_opacity: Option<Ramp<f64>>,
-    /// Closed intervals `[lo, hi]` of the values that take part; `None` is all of them.
+    /// Closed intervals `[lo, hi]` of the values that take part; `None` means all values.
     pub iso_ranges: Option<Vec<[f64; 2]>>,
-    /// Tables of single labels of a segmented volume; for others there may be none.
+    /// Tables for single labels of a segmented volume; empty for other volumes.
     pub labels: BTreeMap<u16, LabelTables>,
 }
 
 impl From<TransferFunction> for TransferSettings {
-    /// Nothing is left to choose.
+    /// Settings that state everything.
     fn from(transfer: TransferFunction) -> Self {
         let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels } = transfer;
         let (color, opacity) = (Some(color), Some(opacity));
@@ -129,9 +140,8 @@ impl From<TransferFunction> for TransferSettings {
 }
 
 impl TransferSettings {
-    /// The whole transfer function for a volume. Colours and opacities that are not given, those of labels too, are the preset's, or
-    /// [`TransferFunction::from_histogram`]'s, each for itself; a colour map is laid over the values that show
-    /// ([`Colormap::of`]).
+    /// The complete transfer function for a volume. Colours and opacities that are not stated (for labels, too) come from the preset or
+    /// from [`TransferFunction::from_histogram`], independently of each other. A colour map covers the visible values ([`Colormap::of`]).
     pub fn resolve(&self, volume: &Volume) -> TransferFunction {
         let chosen = || match self.preset {
             Some(preset) => preset.transfer(volume),
@@ -146,7 +156,7 @@ impl TransferSettings {
         if let Some(opacity) = &self.opacity {
             transfer.opacity = opacity.clone();
         }
-        // No preset gives any.
+        // Presets have no gradient opacity.
         transfer.gradient_opacity = self.gradient_opacity.clone();
         transfer.iso_ranges = self.iso_ranges.clone();
         for (&label, own) in &self.labels {
@@ -169,22 +179,22 @@ impl TransferSettings {
     }
 }
 
-/// Everything that decides an image but the device it is computed on.
+/// Everything that determines an image, except the device that computes it.
 ///
-/// The readers below take `--set` overrides, each `table.key=value` (or `table={…}` for a whole table). They apply in
-/// turn, over the file's values. The value is TOML, or a string if it does not parse as TOML. An override of
-/// `volume.path` also removes `volume.builtin`, and one of `volume.builtin` removes `volume.path` and what says how to read a raw file.
+/// The readers below accept `--set` overrides, each `table.key=value` (or `table={…}` for a whole table), applied in order over the
+/// file's values. The value is TOML, or a string if it does not parse as TOML. An override of `volume.path` also removes
+/// `volume.builtin`; one of `volume.builtin` removes `volume.path` and the layout of a raw file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
-    /// Where the volume comes from.
+    /// The source of the volume.
     pub volume: VolumeSource,
-    /// World units from voxel to voxel, each above 0, in place of the volume's own.
+    /// World units between neighbouring voxels, each above 0, in place of the volume's own spacing.
     pub spacing: Option<DVec3>,
-    /// A file with a label for every voxel, in place of the volume's own labels.
+    /// A file with one label per voxel, in place of the volume's own labels.
     pub labels: Option<PathBuf>,
     /// The camera.
     pub camera: Camera,
-    /// Image size and background.
+    /// The image's size and background.
     pub image: ImageSettings,
     /// What is cut away.
     pub clip: Clip,
@@ -197,7 +207,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// A scene that shows a volume with every setting at its default.
+    /// A scene of a volume with every setting at its default.
     pub fn new(volume: VolumeSource) -> Self {
         Self {
             volume,
@@ -221,11 +231,10 @@ impl Scene {
         Self::open_with(path, sets, &ReadOptions::default())
     }
 
-    /// As [`Self::open`], with a choice of the folder that the scene file must lie in. What it names is read by
-    /// [`Self::load_volume_with`].
+    /// Like [`Self::open`], with a folder that the scene file must lie in. [`Self::load_volume_with`] reads the files that the scene names.
     ///
     /// # Errors
-    /// As [`Self::open`], and if the scene file is not in the folder.
+    /// As for [`Self::open`], and if the scene file lies outside the folder.
     pub fn open_with(path: &Path, sets: &[String], options: &ReadOptions) -> Result<Self, SceneError> {
         let access = Access::new(options)?;
         let resolved = access.resolve(path)?;
@@ -234,8 +243,8 @@ impl Scene {
         Self::parse(&text, &path.display().to_string(), path.parent().unwrap_or(Path::new("")), sets)
     }
 
-    /// Reads a scene from text, as [`Self::open`] does from a file. `origin` names the text in errors; a relative
-    /// `volume.path` or `volume.labels` is relative to `folder`.
+    /// Parses a scene from text, as [`Self::open`] does from a file. `origin` names the text in errors; a relative `volume.path` or
+    /// `volume.labels` is relative to `folder`.
     ///
     /// # Errors
     /// If the text is not TOML, if a key is unknown, or if a value is not allowed.
@@ -247,8 +256,8 @@ impl Scene {
         Self::build(root, origin, folder, None, sets)
     }
 
-    /// A scene that shows a volume with every setting at its default but for the `--set` overrides. A `volume.path` or
-    /// `volume.labels` among those is relative to the current directory.
+    /// A scene of a volume with every setting at its default, except the `--set` overrides. A relative `volume.path` or `volume.labels` in
+    /// these is relative to the current directory.
     ///
     /// # Errors
     /// If an override's key is unknown or its value is not allowed.
@@ -256,31 +265,29 @@ impl Scene {
         Self::build(Table::new(), OVERRIDE, Path::new(""), Some(source), sets)
     }
 
-    /// Loads or computes the volume, at the scene's spacing if it gives one, and with the scene's labels, if it names some. The
-    /// label file's spacing must be the volume's, unless the scene's replaces both.
+    /// Loads or computes the volume, with the scene's spacing and labels if it states them. The label file's spacing must equal the
+    /// volume's, unless the scene's spacing replaces both.
     ///
     /// # Errors
-    /// If the volume or label file cannot be read, is of no known format or does not hold what its header promises, if the
-    /// labels do not fit the volume, if there is no such builtin volume, or if both would take more memory than
-    /// [`ReadOptions::memory`] allows by default.
+    /// If the volume or label file cannot be read, is of no known format or does not hold what its header promises, if the labels do not
+    /// fit the volume, if there is no such builtin volume, or if both need more memory than [`ReadOptions::memory`] allows by default.
     pub fn load_volume(&self) -> Result<Volume, VolumeError> {
         self.load_volume_with(&ReadOptions::default())
     }
 
-    /// As [`Self::load_volume`], with a choice of the folder that files must lie in and of the memory limit, which holds for values and
-    /// labels together.
+    /// Like [`Self::load_volume`], with a folder that files must lie in and a memory limit for values and labels together.
     ///
     /// # Errors
-    /// As [`Self::load_volume`], and if a file is not in the folder.
+    /// As for [`Self::load_volume`], and if a file lies outside the folder.
     pub fn load_volume_with(&self, options: &ReadOptions) -> Result<Volume, VolumeError> {
         self.load_volume_and_files(options).map(|(volume, _)| volume)
     }
 
-    /// As [`Self::load_volume_with`], and which files the volume and its labels were read from: slices in a folder and data files that a
-    /// header names too.
+    /// Like [`Self::load_volume_with`]. Also returns the files that the volume and its labels were read from, including slices in a folder
+    /// and data files that a header names.
     ///
     /// # Errors
-    /// As [`Self::load_volume_with`].
+    /// As for [`Self::load_volume_with`].
     pub fn load_volume_and_files(&self, options: &ReadOptions) -> Result<(Volume, Vec<PathBuf>), VolumeError> {
         let access = Access::new(options)?;
         let (volume, origin) = match &self.volume {
@@ -303,14 +310,14 @@ impl Scene {
         Ok((volume, access.files()))
     }
 
-    /// The same scene with what it leaves to the volume filled in: transfer function, and what the camera shows. It renders the same
-    /// image; preset and colour map are in what they led to.
+    /// The same scene with everything stated that depends on the volume: the transfer function and the camera's position. Preset and colour
+    /// map are replaced by their results. It renders the same image.
     pub fn explicit(&self, volume: &Volume) -> Self {
         self.explicit_by(volume, Extent::fit)
     }
 
-    /// As [`Self::explicit`], but a camera that fits an object ([`Fit::Object`]) stands so that the object stays in the image, and of one
-    /// size, wherever the camera turns: for movies and for cameras that follow a pointer.
+    /// Like [`Self::explicit`], but a camera that fits an object ([`Fit::Object`]) is placed so that the object stays in the image at
+    /// constant size in whichever direction the camera turns: for movies and for cameras that follow a pointer.
     pub fn explicit_all_around(&self, volume: &Volume) -> Self {
         self.explicit_by(volume, Extent::fit_all_around)
     }
@@ -324,12 +331,12 @@ impl Scene {
         Self { camera, transfer: transfer.into(), ..self.clone() }
     }
 
-    /// What a camera with open values is to show under a transfer function, which is [`TransferSettings::resolve`]'s if the scene is to
-    /// choose one: the box around the kernels of the voxels that take part and are not cut away; of a transfer function whose opacity was
-    /// chosen, without the outermost 0.1 % of them at either end of each axis, as a few specks of noise are no object. `None` if the camera
-    /// needs no such box, or no voxel takes part.
+    /// The box that a camera fits under a transfer function (for a scene that leaves it to the volume, that of
+    /// [`TransferSettings::resolve`]): the box around the kernels of all voxels that take part and are not cut away. If the opacity was
+    /// chosen automatically, the outermost 0.1 % of them at either end of each axis are ignored as noise. `None` if the camera needs no such
+    /// box, or no voxel takes part.
     pub fn extent(&self, volume: &Volume, transfer: &TransferFunction) -> Option<Extent> {
-        /// Of the voxels, at either end of each axis.
+        /// The ignored fraction of voxels at either end of each axis.
         const SPECKS: f64 = 0.001;
         if !self.camera.needs_object() {
             return None;
@@ -340,7 +347,7 @@ impl Scene {
         Some(Extent::of_voxels(grid, voxels, radius))
     }
 
-    /// The scene with a camera that leaves nothing to the object.
+    /// The scene with a camera that no longer depends on the object.
     pub(crate) fn framed(&self, volume: &Volume, transfer: &TransferFunction) -> Self {
         let ImageSettings { width, height, .. } = self.image;
         let extent = self.extent(volume, transfer);
@@ -348,7 +355,7 @@ impl Scene {
         Self { camera, ..self.clone() }
     }
 
-    /// `source` is for scenes whose tables name no volume.
+    /// `source` is the volume of a scene whose tables name none.
     fn build(
         mut root: Table,
         origin: &str,
@@ -356,7 +363,7 @@ impl Scene {
         source: Option<VolumeSource>,
         sets: &[String],
     ) -> Result<Self, SceneError> {
-        // Who says nothing of looks wants to see what there is; overrides of single values do not change that.
+        // Without these tables, the object is to be shown; overrides of single keys do not change that.
         let is_bare = !["transfer", "camera"].iter().any(|table| root.contains_key(*table));
         let fit = if is_bare { Fit::Object } else { Fit::Volume };
         let overridden = sets.iter().map(|set| apply_override(&mut root, set)).collect::<Result<_, _>>()?;
@@ -373,7 +380,7 @@ impl Scene {
         ];
         let mut preset = None;
         root.read("preset", &mut preset, |entry| entry.choice(&Preset::ALL).map(Some))?;
-        // Before any table is read: a misspelt table explains best why keys seem to be missing.
+        // Unknown tables are reported first: a misspelt table best explains why keys seem to be missing.
         root.finish()?;
         let compositing = preset.map_or(Splatting::default().compositing, Preset::compositing);
         let tables::VolumeSettings { source, spacing, labels } = tables::volume(volume, folder, source)?;
@@ -389,7 +396,7 @@ impl Scene {
             splatting: tables::splatting(splatting, compositing)?,
         };
         if !scene.transfer.labels.is_empty() && !scene.may_have_labels() {
-            let allowed = "none, or volume.labels, or volume.builtin = \"head\" or \"tomato\"";
+            let allowed = "no such tables, or volume.labels, or volume.builtin = \"head\" or \"tomato\"";
             let related = ["volume.path", "volume.builtin", "volume.labels"];
             return Err(origins.invalid("transfer.label", &related, "tables for a volume without labels", allowed));
         }
@@ -400,7 +407,7 @@ impl Scene {
         Ok(scene)
     }
 
-    /// Whether the volume is segmented; an unknown builtin volume might be.
+    /// Whether the volume can have labels; an unknown builtin volume might.
     fn may_have_labels(&self) -> bool {
         let has_none = match &self.volume {
             VolumeSource::File(_) | VolumeSource::Raw(..) => true,

@@ -1,4 +1,4 @@
-//! What scene files call a setting's choices.
+//! The names of choices in scene files.
 
 use crate::settings::camera::Fit;
 use crate::settings::shading::Gradient;
@@ -29,7 +29,7 @@ pub(super) const COMPOSITINGS: &[(&str, Compositing)] = &[
     ("average", Compositing::Average),
     ("surface", Compositing::Surface),
 ];
-/// Whether a sample's most significant byte comes first.
+/// Whether the most significant byte of a sample comes first.
 pub(super) const ENDIANS: &[(&str, bool)] = &[("little", false), ("big", true)];
 pub(super) const ORDERS: &[(&str, Order)] =
     &[("front-to-back", Order::FrontToBack), ("back-to-front", Order::BackToFront)];

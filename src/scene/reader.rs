@@ -1,4 +1,4 @@
-//! Typed access to a scene's TOML tables. Every error names origin, full key, what was found and what is allowed.
+//! Typed access to a scene's TOML tables. Every error names the origin, the full key, what was found and what is allowed.
 
 use std::ops::{Add, Mul};
 
@@ -11,7 +11,7 @@ use crate::settings::economies::KEYS;
 use crate::settings::transfer_function::{Ramp, RampError};
 use crate::volume::{SIZES, dims_of};
 
-/// The origin of what was set on the command line.
+/// The origin of values set on the command line.
 pub(super) const OVERRIDE: &str = "--set";
 
 /// Applies one `--set` argument, `table.key=value` or `table=value`, and returns its key.
@@ -41,7 +41,7 @@ pub(super) fn apply_override(root: &mut Table, argument: &str) -> Result<String,
             }
         };
     }
-    // They are two names of one thing: the last one given counts.
+    // The two keys name the same thing, so the last one wins.
     match key {
         "volume.path" => _ = section.remove("builtin"),
         "volume.builtin" => {
@@ -55,19 +55,19 @@ pub(super) fn apply_override(root: &mut Table, argument: &str) -> Result<String,
     Ok(key.to_owned())
 }
 
-/// Tells where a key's value came from.
+/// The origin of each key's value.
 pub(super) struct Origins<'a> {
     /// The scene file.
     pub(super) file: &'a str,
     /// The keys given by `--set`.
     pub(super) overridden: Vec<String>,
-    /// The whole file with what was set.
+    /// The file's tables with the overrides applied.
     pub(super) written: Table,
 }
 
 impl Origins<'_> {
-    /// An error about the value of `key`. It came from the command line if that key did, or one of the `related` keys
-    /// that it must fit together with.
+    /// The error for the value of `key`. Its origin is the command line if that key, or one of the `related` keys that it must be
+    /// consistent with, was overridden.
     pub(super) fn invalid(
         &self,
         key: &str,
@@ -85,12 +85,12 @@ impl Origins<'_> {
         }
     }
 
-    /// The overrides of a table's keys, which make the table where the file has none: `colour.red` adds a table `colour`.
+    /// The overrides of a table's keys. They also create the table if the file has none: `colour.red` adds a table `colour`.
     fn overrides_within(&self, table: &str) -> Vec<&str> {
         self.overridden.iter().filter(|set| is_within(set, table)).map(String::as_str).collect()
     }
 
-    /// The error for settings that their type's check refused, with the value as it is written.
+    /// The error for settings that their type's check refused, quoting the value as written.
     pub(super) fn refused(&self, error: SettingError) -> SceneError {
         let SettingError { key, found, allowed } = error;
         let related: &[&str] = match &key[..] {
@@ -105,7 +105,7 @@ impl Origins<'_> {
             _ => &[],
         };
         let found = match (found, self.written_at(&key)) {
-            // In words, where it takes several keys to say what is wrong.
+            // An error about several keys is described in words.
             (Found::Text(text), _) if !related.is_empty() => text,
             (_, Some(value)) => concise(value),
             (found, None) => found.to_string(),
@@ -129,13 +129,13 @@ fn is_within(key: &str, ancestor: &str) -> bool {
     key.strip_prefix(ancestor).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
 }
 
-/// A table whose keys are taken out one by one; what is left at the end nobody knows.
+/// A table whose keys are taken out one by one; those left at the end are unknown.
 pub(super) struct Section<'a> {
     pub(super) origins: &'a Origins<'a>,
-    /// Its full key; empty for the root.
+    /// The table's full key; empty for the root.
     pub(super) name: String,
     table: Table,
-    /// The keys asked for so far.
+    /// The keys requested so far.
     known: Vec<&'static str>,
 }
 
@@ -153,7 +153,7 @@ impl<'a> Section<'a> {
         Ok(section)
     }
 
-    /// Replaces `into` by the value of a key, if it is there.
+    /// Stores the value of a key in `into`, if the key is present.
     pub(super) fn read<T>(
         &mut self,
         name: &'static str,
@@ -167,7 +167,7 @@ impl<'a> Section<'a> {
         Ok(())
     }
 
-    /// The value of a key that must be there.
+    /// The value of a required key.
     pub(super) fn require<T>(
         &mut self,
         name: &'static str,
@@ -179,7 +179,7 @@ impl<'a> Section<'a> {
         value.ok_or_else(|| self.origins.invalid(&self.key(name), &[], "no such key", allowed))
     }
 
-    /// Refuses a former key with the name of the key that has taken its place.
+    /// Refuses a former key, naming the key that replaced it.
     pub(super) fn moved(&self, former: &str, key: &str) -> Result<(), SceneError> {
         if !self.table.contains_key(former) {
             return Ok(());
@@ -187,7 +187,7 @@ impl<'a> Section<'a> {
         Err(self.origins.invalid(&self.key(former), &[], "the former name of a setting", key))
     }
 
-    /// Refuses the keys that nobody asked for.
+    /// Refuses the keys that were not requested.
     pub(super) fn finish(self) -> Result<(), SceneError> {
         let Some(name) = self.table.keys().next() else { return Ok(()) };
         let key = self.key(&name.escape_debug().to_string());
@@ -200,10 +200,10 @@ impl<'a> Section<'a> {
     }
 }
 
-/// The labels of a segmented volume.
+/// The allowed labels, for errors.
 pub(super) const LABEL: &str = "an integer from 0 to 65535";
 
-/// A value with its full key.
+/// A value and its full key.
 pub(super) struct Entry<'a> {
     origins: &'a Origins<'a>,
     key: String,
@@ -211,7 +211,7 @@ pub(super) struct Entry<'a> {
 }
 
 impl<'a> Entry<'a> {
-    /// The error for a value that is not allowed.
+    /// The error for a value that is out of range.
     pub(super) fn refused(&self, allowed: impl Into<Allowed>) -> SceneError {
         self.origins.invalid(&self.key, &[], concise(&self.value), allowed)
     }
@@ -221,7 +221,7 @@ impl<'a> Entry<'a> {
         self.origins.invalid(&self.key, &self.origins.overrides_within(&self.key), typed(&self.value), allowed)
     }
 
-    /// A table.
+    /// The value as a table.
     pub(super) fn section(&self, allowed: &str) -> Result<Section<'a>, SceneError> {
         let table = self.value.as_table().ok_or_else(|| self.mistyped(allowed))?.clone();
         Ok(Section { origins: self.origins, name: self.key.clone(), table, known: Vec::new() })
@@ -235,7 +235,7 @@ impl<'a> Entry<'a> {
         self.value.as_str().map(str::to_owned).ok_or_else(|| self.mistyped(allowed))
     }
 
-    /// One of several names.
+    /// A choice by its name.
     pub(super) fn choice<T: Copy>(&self, choices: &[(&str, T)]) -> Result<T, SceneError> {
         let allowed = || choices.iter().map(|(name, _)| format!("{name:?}")).collect::<Vec<_>>().join(" or ");
         let text = self.value.as_str().ok_or_else(|| self.mistyped(allowed()))?;
@@ -250,7 +250,7 @@ impl<'a> Entry<'a> {
         u32::try_from(integer).map_err(|_| self.refused(allowed))
     }
 
-    /// Voxels along x, y and z.
+    /// The number of voxels along x, y and z.
     pub(super) fn dims(&self) -> Result<UVec3, SceneError> {
         let sizes = self.array::<3>(SIZES)?.map(|size| size.value.as_integer().ok_or_else(|| size.mistyped(SIZES)));
         let [x, y, z] = sizes;
@@ -270,8 +270,7 @@ impl<'a> Entry<'a> {
         u16::try_from(integer).map_err(|_| self.refused(LABEL))
     }
 
-    /// A number, written as a float or as an integer. Whether it lies in the range that the key allows is for the settings' own check to
-    /// say.
+    /// A number, written as a float or an integer. The settings' own check tests its range.
     pub(super) fn number(&self, range: Interval) -> Result<f64, SceneError> {
         match self.value {
             Value::Integer(integer) => Ok(integer as f64),
@@ -280,7 +279,7 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// N numbers.
+    /// An array of N numbers.
     pub(super) fn numbers<const N: usize>(&self, range: Interval) -> Result<[f64; N], SceneError> {
         let mut numbers = [0.0; N];
         let items: [Entry; N] = self.array(&format!("{N} numbers, each {range}"))?;
@@ -306,7 +305,7 @@ impl<'a> Entry<'a> {
         Ok(values.iter().enumerate().map(item).collect())
     }
 
-    /// Control points `[position, value]`; `point` shows one.
+    /// Control points `[position, value]`; `point` is an example for errors.
     pub(super) fn ramp<T>(
         &self,
         point: &str,
@@ -343,7 +342,7 @@ fn typed(value: &Value) -> String {
 fn concise(value: &Value) -> String {
     const LONGEST: usize = 80;
     let text = match value {
-        // TOML's own way writes hundreds of zeros for such numbers.
+        // TOML's own format would write hundreds of zeros for such numbers.
         Value::Float(number) if value.to_string().len() > 20 => format!("{number:e}"),
         _ => value.to_string().replace(['\n', '\r'], " "),
     };

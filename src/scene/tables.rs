@@ -27,7 +27,7 @@ pub(super) struct VolumeSettings {
     pub(super) labels: Option<PathBuf>,
 }
 
-/// `[volume]`: the source is `given` if the table names none.
+/// Reads `[volume]`; `given` is the source of a table that names none.
 pub(super) fn volume(
     mut section: Section,
     folder: &Path,
@@ -55,12 +55,12 @@ pub(super) fn volume(
     let source = match (source, raw) {
         (source, None) => source,
         (VolumeSource::File(path), Some(layout)) => VolumeSource::Raw(path, layout),
-        (_, Some(_)) => return Err(origins.invalid("volume.dims", &[], "a volume that is no file", "volume.path")),
+        (_, Some(_)) => return Err(origins.invalid("volume.dims", &[], "a volume that is not a file", "volume.path")),
     };
     Ok(VolumeSettings { source, spacing, labels })
 }
 
-/// What says how to read a raw file: `dims`, and then `type`, `endian` and `offset`.
+/// The layout of a raw file: `dims`, which requires `type`, `endian` and `offset`.
 fn raw_layout(section: &mut Section) -> Result<Option<RawLayout>, SceneError> {
     let (mut dims, mut sample_type, mut big_endian, mut offset) = (None, None, None, None);
     section.read("dims", &mut dims, |entry| entry.dims().map(Some))?;
@@ -70,7 +70,7 @@ fn raw_layout(section: &mut Section) -> Result<Option<RawLayout>, SceneError> {
     let missing = |key: &str, allowed: &str| section.origins.invalid(key, &["volume.dims"], "no such key", allowed);
     let Some(dims) = dims else {
         if sample_type.is_some() || big_endian.is_some() || offset.is_some() {
-            return Err(missing("volume.dims", "the sizes of a raw file, which has type, endian and offset"));
+            return Err(missing("volume.dims", "the sizes of a raw file, to which type, endian and offset belong"));
         }
         return Ok(None);
     };
@@ -85,8 +85,8 @@ fn raw_layout(section: &mut Section) -> Result<Option<RawLayout>, SceneError> {
     Ok(Some(RawLayout { dims, sample_type, big_endian, offset: offset.unwrap_or(0) }))
 }
 
-/// `[camera]`. Keys of the projection that is not in use are checked and have no effect, so that overriding
-/// `projection` alone works. `fit` is the default's.
+/// Reads `[camera]`. Keys of the other projection are checked but have no effect, so that overriding `projection` alone works. `fit` is
+/// the default.
 pub(super) fn camera(mut section: Section, fit: Fit) -> Result<Camera, SceneError> {
     let mut camera = Camera { fit, ..Camera::default() };
     let mut is_perspective = false;
@@ -113,7 +113,7 @@ pub(super) fn camera(mut section: Section, fit: Fit) -> Result<Camera, SceneErro
     Ok(camera)
 }
 
-/// `[image]`.
+/// Reads `[image]`.
 pub(super) fn image(mut section: Section) -> Result<ImageSettings, SceneError> {
     let mut image = ImageSettings::default();
     section.read("width", &mut image.width, Entry::pixels)?;
@@ -125,7 +125,7 @@ pub(super) fn image(mut section: Section) -> Result<ImageSettings, SceneError> {
     Ok(image)
 }
 
-/// `[clip]`.
+/// Reads `[clip]`.
 pub(super) fn clip(mut section: Section) -> Result<Clip, SceneError> {
     let mut clip = Clip::default();
     section.read("planes", &mut clip.planes, planes)?;
@@ -136,20 +136,20 @@ pub(super) fn clip(mut section: Section) -> Result<Clip, SceneError> {
     Ok(clip)
 }
 
-/// Planes.
+/// Reads a list of planes.
 fn planes(entry: &Entry) -> Result<Vec<[f64; 4]>, SceneError> {
     let items = entry.items(&format!("an array of at most {MAX_PLANES} [nx, ny, nz, d]"))?;
     items.iter().map(|item| item.numbers(Interval::FINITE)).collect()
 }
 
-/// Two corners.
+/// Reads the two corners of a box.
 fn crop(entry: &Entry) -> Result<[DVec3; 2], SceneError> {
     let allowed = "[[x, y, z], [x, y, z]], each number of the first below that of the second";
     let [low, high] = entry.array(allowed)?;
     Ok([vector(&low)?, vector(&high)?])
 }
 
-/// `[transfer]`.
+/// Reads `[transfer]`.
 pub(super) fn transfer(mut section: Section) -> Result<TransferSettings, SceneError> {
     let mut transfer = TransferSettings::default();
     let TransferSettings { color, opacity, gradient_opacity, .. } = &mut transfer;
@@ -171,7 +171,7 @@ pub(super) fn transfer(mut section: Section) -> Result<TransferSettings, SceneEr
     Ok(transfer)
 }
 
-/// The ramps that the main table and those of labels may give.
+/// Reads the ramps that the main table and the tables of labels may have.
 fn ramps(
     section: &mut Section,
     color: &mut Option<Ramp<DVec3>>,
@@ -186,14 +186,14 @@ fn ramps(
     section.read("gradient_opacity", gradient_opacity, |entry| entry.ramp(point, share).map(Some))
 }
 
-/// `[[transfer.label]]`.
+/// Reads `[[transfer.label]]`.
 fn labels(entry: &Entry) -> Result<BTreeMap<u16, LabelTables>, SceneError> {
     let mut labels = BTreeMap::new();
     for item in entry.items("tables [[transfer.label]]")? {
         let mut section = item.section("a table [[transfer.label]]")?;
         let (origins, key) = (section.origins, section.name.clone());
         let label = section.require("label", LABEL, |entry| match entry.label()? {
-            label if labels.contains_key(&label) => Err(entry.refused("a label that no table before has")),
+            label if labels.contains_key(&label) => Err(entry.refused("a label that no earlier table has")),
             label => Ok(label),
         })?;
         let mut tables = LabelTables::default();
@@ -206,7 +206,7 @@ fn labels(entry: &Entry) -> Result<BTreeMap<u16, LabelTables>, SceneError> {
     Ok(labels)
 }
 
-/// `[shading]`, over what a preset gives.
+/// Reads `[shading]` over a preset's values.
 pub(super) fn shading(mut section: Section, mut shading: Shading) -> Result<Shading, SceneError> {
     section.read("enabled", &mut shading.enabled, Entry::boolean)?;
     section.read("light", &mut shading.light, light)?;
@@ -221,7 +221,7 @@ pub(super) fn shading(mut section: Section, mut shading: Shading) -> Result<Shad
     Ok(shading)
 }
 
-/// `[splatting]`, over what a preset gives.
+/// Reads `[splatting]` over a preset's values.
 pub(super) fn splatting(mut section: Section, compositing: Compositing) -> Result<Splatting, SceneError> {
     let mut splatting = Splatting { compositing, ..Splatting::default() };
     section.read("method", &mut splatting.method, |entry| entry.choice(METHODS))?;
@@ -258,12 +258,12 @@ fn economies(mut section: Section) -> Result<Economies, SceneError> {
     Ok(economies)
 }
 
-/// Three numbers.
+/// Reads a vector of three numbers.
 fn vector(entry: &Entry) -> Result<DVec3, SceneError> {
     entry.numbers(Interval::FINITE).map(DVec3::from_array)
 }
 
-/// `"headlight"` or a direction.
+/// Reads `"headlight"` or a direction.
 fn light(entry: &Entry) -> Result<Light, SceneError> {
     let allowed = "\"headlight\" or [x, y, z]";
     match entry.value.as_str() {
@@ -274,7 +274,7 @@ fn light(entry: &Entry) -> Result<Light, SceneError> {
     }
 }
 
-/// Closed intervals.
+/// Reads closed intervals.
 fn iso_ranges(entry: &Entry) -> Result<Vec<[f64; 2]>, SceneError> {
     let items = entry.items("an array of one or more [lo, hi]")?;
     items.iter().map(|item| item.numbers(Interval::FINITE)).collect()

@@ -1,4 +1,4 @@
-//! Scenes as TOML: the inverse of `tables`.
+//! Writes scenes as TOML, the inverse of `tables`.
 
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
@@ -19,16 +19,16 @@ use crate::settings::splatting::Splatting;
 use crate::settings::transfer_function::Ramp;
 use crate::volume::RawLayout;
 
-/// More control points than this are written line by line.
+/// The maximum number of control points written on one line.
 const ON_ONE_LINE: usize = 3;
 
 impl Scene {
-    /// The scene as the text of a scene file that is to lie in `folder`, which must exist if the scene names files: relative paths become
-    /// relative to it. Read back from there ([`Self::open`]), it is the same scene. What the scene leaves to the volume is left out;
+    /// The scene as the text of a scene file in `folder`, which must exist if the scene names files: their paths are written relative to it
+    /// if they are relative. [`Self::open`] reads it back as the same scene. What the scene leaves to the volume is omitted;
     /// [`Self::explicit`] fills it in.
     ///
     /// # Errors
-    /// If the volume's path or that of its labels is not UTF-8, or its offset in a raw file is more than TOML can say.
+    /// If the path of the volume or of its labels is not UTF-8, or the offset in a raw file exceeds TOML's integers.
     pub fn to_toml(&self, folder: &Path) -> Result<String, SceneError> {
         let Self { volume, spacing, labels, camera, image, clip, transfer, shading, splatting } = self;
         let mut text = Text::default();
@@ -44,7 +44,7 @@ impl Scene {
                 text.line("dims", dims.to_array().map(i64::from).map(Value::from).to_vec());
                 text.line("type", sample_type.to_string());
                 text.line("endian", if big_endian { "big" } else { "little" });
-                let allowed = format!("at most {}, as TOML has no larger number", i64::MAX);
+                let allowed = format!("at most {}, the largest integer in TOML", i64::MAX);
                 let offset = i64::try_from(offset).map_err(|_| invalid("volume.offset", offset.to_string(), &allowed));
                 text.line("offset", offset?);
             }
@@ -83,7 +83,7 @@ impl Text {
         }
     }
 
-    /// `[position, value]` points.
+    /// Writes a ramp as `[position, value]` points.
     fn ramp<T>(&mut self, key: &str, ramp: Option<&Ramp<T>>, value: impl Fn(&T) -> Value)
     where
         T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f64, Output = T>,
@@ -215,21 +215,21 @@ fn write_splatting(text: &mut Text, splatting: &Splatting) {
     text.line("resolution", resolution);
 }
 
-/// A file's path as it is if absolute, else relative to a folder.
+/// A file's path: unchanged if absolute, or else relative to a folder.
 fn within(folder: &Path, path: &Path, key: &str) -> Result<String, SceneError> {
     let found = if path.is_absolute() { path.to_owned() } else { relative(folder, path) };
     found.to_str().map(str::to_owned).ok_or_else(|| invalid(key, found.display().to_string(), "a path in UTF-8"))
 }
 
-/// The error for what cannot be written.
+/// The error for a value that cannot be written.
 fn invalid(key: &str, found: String, allowed: &str) -> SceneError {
     SceneError::Invalid { origin: "scene".to_owned(), key: key.to_owned(), found, allowed: allowed.into() }
 }
 
-/// The way from a folder to a file; where they have nothing in common, or are not there, the file's absolute path.
+/// The path from a folder to a file; the file's absolute path if either does not exist or they share no root.
 fn relative(folder: &Path, path: &Path) -> PathBuf {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    // Of what they truly are: behind a link `..` is elsewhere.
+    // Links are resolved first, because `..` behind a link leads elsewhere.
     let (Ok(from), Ok(to)) = (folder.canonicalize(), path.canonicalize()) else {
         return std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     };

@@ -1,4 +1,4 @@
-//! Cameras: where the image plane stands, and which pixel a world point falls on (SPEC §2).
+//! Cameras: the position of the image plane, and the pixel of a world point (SPEC §2).
 
 use std::ops::Bound;
 
@@ -8,13 +8,13 @@ use crate::error::RenderError;
 use crate::setting_error::{Interval, SettingError, check_direction, scaled};
 use crate::volume::Grid;
 
-/// The least and the largest pixel, in the volume's smallest spacings.
+/// The range of pixel sizes, in the volume's smallest spacings.
 const PIXELS: std::ops::RangeInclusive<f64> = 1e-25..=1e25;
 
-/// Opening angles.
+/// The range of opening angles.
 pub(crate) const FOV_Y: Interval = Interval::new(Bound::Excluded(0.0), Bound::Excluded(180.0)).of("degrees");
 
-/// Up and direction are parallel where the sine of their angle is below this.
+/// Up and direction count as parallel if the sine of their angle is below this.
 const PARALLEL: f64 = 1e-9;
 
 /// How the volume is projected.
@@ -22,28 +22,28 @@ const PARALLEL: f64 = 1e-9;
 pub enum Projection {
     /// Parallel rays.
     Orthographic {
-        /// World units over the image's height; `None` shows what [`Camera::fit`] says.
+        /// World units over the image's height; `None` is determined by [`Camera::fit`].
         height: Option<f64>,
     },
     /// Rays through an eye point.
     Perspective {
-        /// Opening angle over the image's height, degrees, in (0, 180).
+        /// The opening angle over the image's height in degrees, in (0, 180).
         fov_y: f64,
-        /// World units from the eye to `center`; `None` shows what [`Camera::fit`] says.
+        /// World units from the eye to `center`; `None` is determined by [`Camera::fit`].
         distance: Option<f64>,
-        /// World units from the eye to the near plane; `None` is one `unit` (the smallest voxel spacing).
+        /// World units from the eye to the near plane; `None` means one `unit` (the smallest voxel spacing).
         near: Option<f64>,
     },
 }
 
-/// What a camera shows that leaves its centre, its height or its distance open.
+/// What a camera frames if its centre, height or distance is not stated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Fit {
-    /// The whole volume, whatever is visible of it.
+    /// The whole volume, visible or not.
     #[default]
     Volume,
-    /// What is visible: the box of the voxels that take part. Which box that is, [`Scene::explicit`](crate::Scene::explicit) finds out.
+    /// The visible object: the box of the voxels that take part, which [`Scene::explicit`](crate::Scene::explicit) determines.
     Object,
 }
 
@@ -52,13 +52,13 @@ pub enum Fit {
 pub struct Camera {
     /// Orthographic or perspective.
     pub projection: Projection,
-    /// From the eye into the scene; any length but 0.
+    /// The direction from the eye into the scene, of any length except 0.
     pub direction: DVec3,
-    /// What is up on the screen; not parallel to `direction`.
+    /// The direction that points up on the screen; not parallel to `direction`.
     pub up: DVec3,
-    /// The world point at the image's centre; `None` is the middle of what [`Self::fit`] says.
+    /// The world point at the image's centre; `None` means the middle of what [`Self::fit`] frames.
     pub center: Option<DVec3>,
-    /// What the values that are open show.
+    /// What determines the values that are not stated.
     pub fit: Fit,
 }
 
@@ -75,7 +75,7 @@ impl Default for Camera {
 }
 
 impl Camera {
-    /// Checks what types do not say.
+    /// Checks that the values are in range.
     ///
     /// # Errors
     /// If a number is not finite or out of its range, a vector is 0, or `up` is parallel to `direction`.
@@ -108,12 +108,12 @@ impl Camera {
         ViewBasis { u, v: u.cross(w), w }
     }
 
-    /// The world point at the image's centre: as given, or the volume's centre.
+    /// The world point at the image's centre: as stated, or the volume's centre.
     pub fn middle(&self) -> DVec3 {
         self.center.unwrap_or_default()
     }
 
-    /// Whether a value is open that an object's box decides ([`Extent::fit`](crate::settings::Extent::fit)).
+    /// Whether an object's box must determine a value ([`Extent::fit`](crate::settings::Extent::fit)).
     pub fn needs_object(&self) -> bool {
         let is_open = match self.projection {
             Projection::Orthographic { height } => height.is_none(),
@@ -122,16 +122,16 @@ impl Camera {
         self.fit == Fit::Object && (is_open || self.center.is_none())
     }
 
-    /// The camera turned about its `up` by an angle in degrees, by the right hand; `center` stays.
+    /// The camera turned right-handed about its `up` by an angle in degrees; `center` does not change.
     pub fn turned(self, degrees: f64) -> Self {
         let rotation = DMat3::from_axis_angle(scaled(self.up).normalize(), degrees.to_radians());
         Self { direction: rotation * scaled(self.direction), ..self }
     }
 
-    /// Size of a pixel in `unit`s (SPEC §2) for an image `height_world` world units and `height` pixels high.
+    /// The size of a pixel in `unit`s (SPEC §2) for an image that is `height_world` world units and `height` pixels high.
     ///
     /// # Errors
-    /// If coordinates in pixels of that size leave the range of `f32`.
+    /// If pixel coordinates leave the range of `f32` with pixels of that size.
     pub fn pixel_size(height_world: f64, grid: &Grid, height: u32) -> Result<f64, RenderError> {
         let image_units = f64::from(height) * grid.unit();
         let pix = height_world / image_units;
@@ -142,7 +142,7 @@ impl Camera {
         Err(SettingError::new("camera.height", height_world, allowed).into())
     }
 
-    /// World units over the image's height for an orthographic camera: as given, or so that the volume's sphere
+    /// World units over the image's height for an orthographic camera: as stated, or such that the volume's sphere
     /// ([`Grid::bounding_radius`]) fits the shorter image axis. `None` for a perspective camera.
     pub fn orthographic_height(&self, grid: &Grid, kernel_radius: f64, width: u32, height: u32) -> Option<f64> {
         let Projection::Orthographic { height: given } = self.projection else { return None };
@@ -150,7 +150,7 @@ impl Camera {
         Some(given.unwrap_or(whole * (f64::from(height) / f64::from(width)).max(1.0)))
     }
 
-    /// `fov_y`, `distance` and `near` of a perspective camera: as given, or so that the volume's sphere ([`Grid::bounding_radius`]) fits
+    /// `fov_y`, `distance` and `near` of a perspective camera: as stated, or such that the volume's sphere ([`Grid::bounding_radius`]) fits
     /// between the image's upper and lower edge, and one [`Grid::unit`]. `None` for an orthographic camera.
     fn perspective(&self, grid: &Grid, kernel_radius: f64) -> Option<[f64; 3]> {
         let Projection::Perspective { fov_y, distance, near } = self.projection else { return None };
@@ -158,8 +158,8 @@ impl Camera {
         Some([fov_y, distance.unwrap_or(whole), near.unwrap_or(grid.unit())])
     }
 
-    /// The same camera with its centre and all of its projection given, what is open by the whole volume: what it shows of this volume by
-    /// default it shows of any.
+    /// The same camera with its centre and projection stated, where necessary from the whole volume, so that it shows every volume as it shows
+    /// this one.
     pub fn explicit(&self, grid: &Grid, kernel_radius: f64, width: u32, height: u32) -> Self {
         let projection = match self.perspective(grid, kernel_radius) {
             Some([fov_y, distance, near]) => {
@@ -170,8 +170,8 @@ impl Camera {
         Self { projection, center: Some(self.middle()), ..*self }
     }
 
-    /// The eye of a perspective camera over an image `height` pixels high; `None` for an orthographic one. The default distance
-    /// shows the volume's sphere whole from top to bottom, whatever the image's width.
+    /// The eye of a perspective camera for an image `height` pixels high; `None` for an orthographic one. The default distance shows the
+    /// volume's sphere whole from top to bottom, whatever the image's width.
     ///
     /// # Errors
     /// If pixels at the near plane or at the far end of the volume are too small or too large for `f32`.
@@ -200,16 +200,16 @@ fn within(min: f64, max: f64) -> Interval {
     Interval::new(Bound::Included(min), Bound::Included(max))
 }
 
-/// A perspective camera's eye (SPEC §2). Lengths are `unit`s, depths are along w.
+/// A perspective camera's eye (SPEC §2). Lengths are in `unit`s, depths are along w.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eye {
-    /// Where it stands.
+    /// The position.
     pub position: DVec3,
-    /// Depth of [`Camera::center`].
+    /// The depth of [`Camera::center`].
     pub distance: f64,
-    /// Depth of the near plane.
+    /// The depth of the near plane.
     pub near: f64,
-    /// Size of a pixel at depth 1: `2·tan(fov_y/2)/H`.
+    /// The size of a pixel at depth 1: `2·tan(fov_y/2)/H`.
     pub pixel_per_depth: f64,
 }
 
@@ -219,10 +219,10 @@ impl Eye {
         depth * self.pixel_per_depth
     }
 
-    /// Checks that slabs have numbers: slab 0 begins at the eye.
+    /// Checks that the indices of slabs fit in 32 bits, with slab 0 at the eye.
     ///
     /// # Errors
-    /// If there are too many before the volume.
+    /// If there are too many slabs before the volume.
     pub fn check_slabs(&self, grid: &Grid, slab_width: f64) -> Result<(), RenderError> {
         let last = self.position.length() / slab_width;
         // The factor leaves room for the volume itself.
@@ -238,9 +238,9 @@ impl Eye {
 /// The orthonormal vectors of the viewing coordinate system, in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewBasis {
-    /// Screen right.
+    /// The direction right on the screen.
     pub u: DVec3,
-    /// Screen up.
+    /// The direction up on the screen.
     pub v: DVec3,
     /// The viewing direction.
     pub w: DVec3,

@@ -1,13 +1,11 @@
-//! Clipping: planes and a crop box that cut parts of a volume away, with all their kernels. The paper has none; every viewer
-//! does.
+//! Clipping: planes and a crop box that cut parts of a volume away, through kernels. The paper does not have it; every viewer does.
 //!
-//! What is cut is the field that the kernels make, ray by ray: of a pixel's ray a single stretch is inside of all planes, and a
-//! sheet counts there by the share of its slab that the stretch covers. Cuts are as fine as slabs, whatever their direction, and move
-//! without steps. Voxels whose kernels lie outside altogether do not take part.
+//! The field of the kernels is cut, ray by ray: a single stretch of a pixel's ray lies inside all planes, and a sheet counts there by the
+//! fraction of its slab that the stretch covers. Cuts are as fine as slabs in any direction, and move without steps. Voxels whose
+//! kernels lie entirely outside do not take part.
 //!
-//! A cut face shows what the plane lays open, with the colours that those voxels have inside: gradients are those of the whole volume. The
-//! face is not shaded by the plane's own normal. It is as soft as kernels are, and a voxel in front of the plane shows as far as its
-//! kernel reaches behind it.
+//! A cut face shows the opened inside in its own colours: gradients are those of the whole volume, and the plane's normal does not shade
+//! the face. The face is as soft as kernels: a voxel in front of the plane is visible as far as its kernel reaches behind it.
 
 use std::ops::Range;
 
@@ -16,24 +14,24 @@ use glam::{DVec3, DVec4, UVec3};
 use crate::setting_error::{Interval, SettingError};
 use crate::volume::Grid;
 
-/// The most planes, beside a crop box.
+/// The maximum number of planes, in addition to a crop box.
 pub const MAX_PLANES: usize = 6;
 
-/// What is cut away: nothing, unless planes or a box say so. A point is kept if it is inside of all of them.
+/// What is cut away; nothing by default. A point is kept if it lies inside all planes and the box.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Clip {
-    /// At most [`MAX_PLANES`]: `[nx, ny, nz, d]` keeps the world points p with `n·p + d ≥ 0`. Normals have any length but 0.
+    /// At most [`MAX_PLANES`] planes; `[nx, ny, nz, d]` keeps the world points p with `n·p + d ≥ 0`. Normals have any length except 0.
     pub planes: Vec<[f64; 4]>,
-    /// Corners of the box that is kept, the lesser one first, in world units.
+    /// The corners of the box that is kept, the lower one first, in world units.
     pub crop: Option<[DVec3; 2]>,
 }
 
-/// What lies on one side of a plane, in `unit`s (SPEC §2): `normal·p + offset ≥ 0`, with a normal of length 1.
+/// One side of a plane, in `unit`s (SPEC §2): `normal·p + offset ≥ 0`, with a normal of length 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfSpace {
-    /// Points to what is kept.
+    /// The normal, which points to the side that is kept.
     pub normal: DVec3,
-    /// Distance of the volume's centre from the plane, negative if it is cut away.
+    /// The distance of the volume's centre from the plane, negative if the centre is cut away.
     pub offset: f64,
 }
 
@@ -43,7 +41,7 @@ impl Clip {
         self.planes.is_empty() && self.crop.is_none()
     }
 
-    /// Checks what types do not say.
+    /// Checks that the values are in range.
     ///
     /// # Errors
     /// If there are too many planes, a normal is 0, a number is not finite, or a box has no volume.
@@ -70,7 +68,7 @@ impl Clip {
         Ok(())
     }
 
-    /// The half spaces whose common part is kept.
+    /// The half spaces whose intersection is kept.
     pub fn half_spaces(&self, grid: &Grid) -> Vec<HalfSpace> {
         let unit = grid.unit();
         let planes = self.planes.iter().filter_map(normalized);
@@ -80,10 +78,10 @@ impl Clip {
         planes.chain(crop).map(|(normal, offset)| HalfSpace { normal, offset: offset / unit }).collect()
     }
 
-    /// Which voxels may be seen: those whose kernels, of a radius in grid units, reach inside.
+    /// The voxels that may be visible: those whose kernels, with a radius in grid units, reach inside.
     pub fn voxels(&self, grid: &Grid, radius: f64) -> ClippedVoxels {
         let planes = self.half_spaces(grid).into_iter().map(|HalfSpace { normal, offset }| {
-            // In the warped grid, where kernels are balls, per grid unit.
+            // In the warped grid, where kernels are balls, in grid units.
             let warped = normal * grid.aspect();
             let row = warped.extend(offset - warped.dot(grid.center())) / warped.length();
             row + radius * DVec4::W
@@ -92,32 +90,32 @@ impl Clip {
     }
 }
 
-/// A plane with a normal of length 1; `None` if it has none.
+/// The plane with a normal of length 1; `None` if the normal is 0.
 fn normalized(plane: &[f64; 4]) -> Option<(DVec3, f64)> {
     let [x, y, z, d] = *plane;
     let normal = DVec3::new(x, y, z);
-    // Scaled first: squares leave the range of f64 long before the numbers do.
+    // Scaled first, because squares overflow f64 long before the numbers do.
     let largest = normal.abs().max_element();
     let length = largest * (normal / largest).length();
     let (normal, offset) = (normal / largest / (length / largest), d / length);
     (largest > 0.0 && normal.is_finite() && offset.is_finite()).then_some((normal, offset))
 }
 
-/// Which voxels have kernels that reach inside.
+/// The voxels whose kernels reach inside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ClippedVoxels {
-    /// Rows whose products with (i, j, k, 1) are all at least 0 there.
+    /// Rows whose products with (i, j, k, 1) are at least 0 for these voxels.
     planes: Vec<DVec4>,
 }
 
 impl ClippedVoxels {
-    /// Whether a voxel is one.
+    /// Whether a voxel is one of them.
     pub fn contain(&self, voxel: UVec3) -> bool {
         let voxel = voxel.as_dvec3().extend(1.0);
         self.planes.iter().all(|plane| plane.dot(voxel) >= 0.0)
     }
 
-    /// Those of a row of `length` voxels along x, all in one stretch.
+    /// The stretch of them in a row of `length` voxels along x.
     pub fn in_row(&self, y: u32, z: u32, length: u32) -> Range<u32> {
         if self.planes.is_empty() {
             return 0..length;
@@ -132,7 +130,7 @@ impl ClippedVoxels {
                 end = end.min(crossing + 1.0);
             }
         }
-        // As exact as the test of a voxel: the estimate may be one off.
+        // The estimate may be off by one, so the test of single voxels decides.
         let is_kept = |x: u32| self.contain(UVec3::new(x, y, z));
         let mut kept =
             (first - 1.0).clamp(0.0, f64::from(length)) as u32..(end + 1.0).clamp(0.0, f64::from(length)) as u32;
@@ -159,7 +157,7 @@ mod tests {
     fn a_crop_box_keeps_kernels_that_reach_in() {
         let crop = Some([DVec3::new(-1.0, -1e9, -1e9), DVec3::new(3.0, 1e9, 6.0)]);
         let voxels = Clip { crop, ..Clip::default() }.voxels(&grid(), 1.25);
-        // x: voxels are 2 apart, number 4 is the centre, and 1.25 of them are added on either side.
+        // Along x, voxels are 2 apart, number 4 is the centre, and kernels add 1.25 voxels on either side.
         let kept: Vec<u32> = (0..9).filter(|&x| voxels.contain(UVec3::new(x, 3, 2))).collect();
         assert_eq!(kept, [3, 4, 5, 6]);
         let kept: Vec<u32> = (0..5).filter(|&z| voxels.contain(UVec3::new(4, 3, z))).collect();

@@ -1,4 +1,4 @@
-//! Cameras from the matrices of a host.
+//! Cameras from a host's matrices.
 
 use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 
@@ -6,21 +6,21 @@ use crate::error::RenderError;
 use crate::setting_error::SettingError;
 use crate::settings::camera::{Camera, Fit, Projection};
 
-/// How far lengths may differ, or cosines be from 0, relative: more than matrices that were multiplied in f32 are rounded by, and
-/// less than a screen shows.
+/// The maximum relative difference of lengths, and the maximum cosine of right angles: more than the rounding errors of products in f32,
+/// and less than a screen shows.
 const TOLERANCE: f64 = 1e-5;
 
 impl Camera {
-    /// The camera that sees every point where a host does, whose `clip_from_world` maps the volume's coordinates (origin at its
-    /// centre, lengths like its spacing) to wgpu's clip space, for a viewport of `size` pixels: width, height. A host with a scene around the
-    /// volume multiplies by the volume's place in it, a rotation, translation and uniform scale.
+    /// The camera that agrees with a host whose `clip_from_world` maps the volume's coordinates (origin at its centre, lengths as in its
+    /// spacing) to wgpu's clip space, for a viewport of `size` pixels: width, height. If the volume is placed in the host's scene, the host
+    /// multiplies by that placement, a rotation, translation and uniform scale.
     ///
-    /// Perspective or orthographic, depths up or down (reversed z), a far plane or none. In perspective what lies before the near plane is
-    /// clipped, as the host does; there is no far plane, and an orthographic camera has no near one, either.
+    /// The mapping may be perspective or orthographic, with depths that increase or decrease (reversed z), with or without a far plane. In
+    /// perspective the volume is clipped at the host's near plane. There is no far plane, and orthographic cameras have no near plane.
     ///
     /// # Errors
-    /// [`RenderError::OutOfRange`] if it is another mapping: mirrored, sheared, scaled unevenly, off centre, with pixels that are not
-    /// square or a near plane that is not parallel to the image; or if `size` has a 0.
+    /// [`RenderError::OutOfRange`] for any other mapping: mirrored, sheared, scaled unevenly, off centre, with pixels that are not square or
+    /// a near plane that is not parallel to the image; or if a component of `size` is 0.
     pub fn from_clip_from_world(clip_from_world: DMat4, size: [u32; 2]) -> Result<Self, RenderError> {
         let pixels = DVec2::from(size.map(f64::from)) / 2.0;
         if pixels.min_element() == 0.0 {
@@ -45,11 +45,11 @@ impl Camera {
     }
 }
 
-/// From the rows of x and y, where w is 1.
+/// The camera by the rows of x and y, where w is 1.
 fn orthographic([x, y]: [DVec4; 2], pixels: DVec2) -> Result<Camera, RenderError> {
     let [right, up] = [x.truncate(), y.truncate()];
     check_screen(right, up, pixels)?;
-    // The nearest point of the central ray.
+    // The point of the central ray that is nearest to the volume's centre.
     let center = -(right * (x.w / right.length_squared()) + up * (y.w / up.length_squared()));
     let projection = Projection::Orthographic { height: Some(2.0 / up.length()) };
     Ok(Camera {
@@ -61,7 +61,7 @@ fn orthographic([x, y]: [DVec4; 2], pixels: DVec2) -> Result<Camera, RenderError
     })
 }
 
-/// From all rows, where w is the depth from the eye.
+/// The camera by all rows, where w is the depth from the eye.
 fn perspective([x, y, z, w]: [DVec4; 4], pixels: DVec2) -> Result<Camera, RenderError> {
     let [right, up, depth, ahead] = [x, y, z, w].map(DVec4::truncate);
     for (axis, off) in [("width", right.dot(ahead)), ("height", up.dot(ahead))] {
@@ -94,7 +94,7 @@ fn perspective([x, y, z, w]: [DVec4; 4], pixels: DVec2) -> Result<Camera, Render
     let Some(near) = near else {
         return Err(refused("no near plane".to_owned(), "clip space with depths from 0 to 1, or 1 to 0"));
     };
-    // The image's centre is beside the volume's, if that can be seen.
+    // The image's centre is the point of the central ray beside the volume's centre, if that is visible.
     let distance = (-eye.dot(ahead)).max(near);
     let projection = Projection::Perspective {
         fov_y: 2.0 * up.length().recip().atan().to_degrees(),

@@ -1,25 +1,25 @@
-//! The economies that the paper proposes as future work (§8): `[splatting.experimental]` of a scene file. They hardly pay.
+//! The economies that the paper proposes as future work (§8), a scene file's `[splatting.experimental]`. They hardly pay.
 
 use std::fmt::{self, Display, Formatter};
 
 use crate::setting_error::{Interval, SettingError};
 
-/// The keys, each with the key that it had before it was experimental.
+/// The keys, each with its former name in `[splatting]`.
 pub(crate) const KEYS: [(&str, &str); 3] = [
     ("splatting.experimental.whole_below", "whole_below"),
     ("splatting.experimental.beta", "beta"),
     ("splatting.experimental.resolution", "resolution"),
 ];
 
-/// Ways to draw less where it hardly shows (§8, the paper's future work). Only the tile rasterizer has them.
+/// Ways to draw less where it is hardly visible (§8, the paper's future work). Only the tile rasterizer has them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Economies {
-    /// Voxels with an opacity per unit length below this are projected as whole kernels, into the sheet that their centre lies in.
-    /// 0 is off.
+    /// Voxels with an opacity per unit length below this are projected as whole kernels, into the sheet that contains their centre. 0 turns
+    /// this off.
     pub whole_below: f64,
-    /// β-acceleration: where everything within a kernel's box has this opacity by then, the kernel is projected whole, into the first
-    /// group of sheets that it reaches. This changes no channel by more than `1 - beta`. It works front to back only, and not for
-    /// [`Compositing::Surface`](super::splatting::Compositing::Surface). 1 is off.
+    /// β-acceleration: where every pixel in a kernel's box has reached this opacity, the kernel is projected whole, into the first group of
+    /// sheets that it reaches. No channel changes by more than `1 - beta`. It works front to back only, and not for
+    /// [`Compositing::Surface`](super::splatting::Compositing::Surface). 1 turns this off.
     pub beta: f64,
     /// A footprint ends where it adds less than this to its sheet's alpha. 0 draws the whole kernel.
     pub resolution: f64,

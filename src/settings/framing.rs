@@ -1,19 +1,19 @@
-//! Where a camera stands that leaves it open: so far off that an object fills the image (SPEC §2, `camera.fit = "object"`).
+//! Framing: the position of a camera that leaves it open, such that an object fills the image (SPEC §2, `camera.fit = "object"`).
 
 use glam::DVec3;
 
 use crate::settings::camera::{Camera, Fit, Projection};
 use crate::volume::Grid;
 
-/// The share of the image's width or height that the object may take.
+/// The fraction of the image's width or height that the object fills.
 const SHARE: f64 = 0.9;
 
-/// An axis-aligned box around an object, world units. All sides are above 0.
+/// An axis-aligned box around an object in world units, with a size above 0 along each axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
-    /// The corner with the least coordinates.
+    /// The corner with the minimum coordinates.
     pub low: DVec3,
-    /// The corner with the greatest coordinates.
+    /// The corner with the maximum coordinates.
     pub high: DVec3,
 }
 
@@ -34,8 +34,8 @@ impl Extent {
         std::array::from_fn(|at| DVec3::select(glam::BVec3::new(at & 1 != 0, at & 2 != 0, at & 4 != 0), high, low))
     }
 
-    /// The camera with what it leaves open chosen such that the box fills an image of `size` pixels, seen in the camera's direction. A
-    /// camera that does not fit objects stays as it is.
+    /// The camera with its open values chosen such that the box fills an image of `size` pixels in the camera's direction. A camera that does
+    /// not fit an object is returned unchanged.
     pub fn fit(&self, camera: &Camera, size: [u32; 2]) -> Camera {
         let basis = camera.basis();
         let center = camera.center.unwrap_or(self.center());
@@ -45,12 +45,12 @@ impl Extent {
         let [width, height] = size.map(f64::from);
         let half_height = |q: DVec3| q.dot(basis.v).abs().max(q.dot(basis.u).abs() * height / width) / SHARE;
         self.filled(camera, &|| 2.0 * largest(&half_height), &|tangent| {
-            // A centre that is given may lie so far behind the box that the eye would have to stand behind the centre.
+            // A stated centre may lie so far behind the box that the eye would have to stand behind the centre.
             largest(&|q| half_height(q) / tangent - q.dot(basis.w)).max((self.high - self.low).min_element())
         })
     }
 
-    /// As [`Self::fit`], but by the sphere around the box: one choice for every direction, so that a camera that turns keeps its distance.
+    /// Like [`Self::fit`], but for the sphere around the box, whose size is the same in all directions: a turning camera keeps its distance.
     pub fn fit_all_around(&self, camera: &Camera, size: [u32; 2]) -> Camera {
         let radius = (self.high - self.low).length() / 2.0;
         let [width, height] = size.map(f64::from);
@@ -59,7 +59,7 @@ impl Extent {
         })
     }
 
-    /// The camera with its open values filled in; `distance` takes `tan(fov_y/2)`.
+    /// The camera with its open values filled in; `distance` is a function of `tan(fov_y/2)`.
     fn filled(&self, camera: &Camera, height: &dyn Fn() -> f64, distance: &dyn Fn(f64) -> f64) -> Camera {
         if camera.fit != Fit::Object {
             return *camera;
@@ -95,7 +95,7 @@ mod tests {
         directions.into_iter().flat_map(|way| projections.map(|projection| camera(way, projection))).collect()
     }
 
-    /// Where a point is in the image: from -1 at the left and lower edge to 1 at the right and upper one.
+    /// A point's position in the image: from -1 at the left and lower edge to 1 at the right and upper one.
     fn place(camera: &Camera, [width, height]: [u32; 2], point: DVec3) -> DVec2 {
         let basis = camera.basis();
         let q = point - camera.center.expect("a camera that was fitted has a centre");
@@ -110,7 +110,7 @@ mod tests {
         DVec2::new(q.dot(basis.u) * f64::from(height) / f64::from(width), q.dot(basis.v)) / half_height
     }
 
-    /// The greatest distance of a corner from the image's middle, in half widths or half heights.
+    /// The maximum distance of a corner from the image's middle, in half widths or half heights.
     fn reach(camera: &Camera, size: [u32; 2], extent: &Extent) -> f64 {
         extent.corners().map(|corner| place(camera, size, corner).abs().max_element()).into_iter().fold(0.0, f64::max)
     }
@@ -131,7 +131,7 @@ mod tests {
         for size in SIZES {
             let fitted: Vec<Camera> = cameras().iter().map(|camera| EXTENT.fit_all_around(camera, size)).collect();
             for (at, camera) in fitted.iter().enumerate() {
-                // The same for every direction.
+                // The projection is the same for every direction.
                 assert_eq!(camera.projection, fitted[at % 3].projection);
                 assert!(reach(camera, size, &EXTENT) <= SHARE + 1e-12, "{camera:?} {size:?}");
                 // The rays through the edges of nine tenths of the shorter axis touch the sphere.

@@ -1,10 +1,9 @@
-//! The settings of a picture, as plain data: what a scene file states, or a host sets in code. The ranges and defaults are those of
-//! the scene file: each type's `check` states them, and whatever takes settings calls it.
+//! The settings of a picture as plain data, as a scene file states them or a host sets them in code. Their ranges and defaults are those
+//! of scene files: each type's `check` states them, and everything that accepts settings calls it.
 //!
-//! These structs are not `non_exhaustive`, so that a host can make them as scenes are written: what it says, and
-//! `..Default::default()` for the rest. Later versions add fields, with defaults that draw what was drawn before; code that names every
-//! field has to name those too. Enums that are likely to grow are
-//! `non_exhaustive`; those of two ways that exclude each other, such as [`Order`], are not.
+//! These structs are not `non_exhaustive`, so that a host can construct them like a scene file: some fields, and `..Default::default()`
+//! for the rest. Later versions add fields whose defaults do not change the image; code that names every field must then name those
+//! too. Enums that are likely to grow are `non_exhaustive`; those with two complementary variants, such as [`Order`], are not.
 
 pub(crate) mod camera;
 pub(crate) mod clip;

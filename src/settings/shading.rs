@@ -1,47 +1,48 @@
-//! Shading settings (SPEC §3). The arithmetic itself is `shaders/shade.wgsl`, its twin `reference::shading`.
+//! Shading settings (SPEC §3). `shaders/shade.wgsl` computes the shading, `reference::shading` in f64.
 
 use glam::DVec3;
 
 use crate::setting_error::{Interval, SettingError, check_direction};
 
-/// Below this length (value per world unit) a gradient has no direction (SPEC §3).
+/// Gradients shorter than this (value per world unit) have no direction (SPEC §3).
 pub const MIN_GRADIENT: f64 = 1e-12;
 
-/// Where the light comes from.
+/// The direction of the light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Light {
     /// From the eye.
     Headlight,
-    /// From a fixed world direction, pointing to the light; any length but 0.
+    /// From a fixed world direction that points to the light, of any length except 0.
     Direction(DVec3),
 }
 
-/// Which gradient the normals are of for [`Classification::After`](super::Classification::After).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The gradient from which [`Classification::After`](super::Classification::After) takes normals.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Gradient {
     /// The voxels' central differences, interpolated like the values.
     Differences,
-    /// The derivative of the reconstructed field: sharper, but it shows the noise of a scan.
+    /// The derivative of the reconstructed field, which is sharper but shows a scan's noise.
     Kernel,
 }
 
 /// Two-sided Phong shading with white highlights, computed in the unwarped space (§4.2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shading {
-    /// Without shading a voxel keeps its transfer function colour.
+    /// Whether voxels are shaded; otherwise they keep their transfer function's colour.
     pub enabled: bool,
-    /// Share of the colour that needs no light, at least 0.
+    /// The fraction of the colour that needs no light, at least 0.
     pub ambient: f64,
-    /// Weight of the diffuse term, at least 0.
+    /// The weight of the diffuse term, at least 0.
     pub diffuse: f64,
-    /// Weight of the highlight, at least 0.
+    /// The weight of the highlight, at least 0.
     pub specular: f64,
-    /// Exponent of the highlight, above 0.
+    /// The exponent of the highlight, above 0.
     pub shininess: f64,
-    /// Where the light comes from.
+    /// The direction of the light.
     pub light: Light,
-    /// Which gradient is used; without effect for [`Classification::Before`](super::Classification::Before).
+    /// The gradient that is used; without effect for [`Classification::Before`](super::Classification::Before).
     pub gradient: Gradient,
 }
 
@@ -60,7 +61,7 @@ impl Default for Shading {
 }
 
 impl Shading {
-    /// Checks what types do not say.
+    /// Checks that the values are in range.
     ///
     /// # Errors
     /// If a number is not finite or out of its range, or the light's direction is 0.

@@ -6,22 +6,22 @@ use super::economies::Economies;
 use crate::geometry::kernel::Kernel;
 use crate::setting_error::{Interval, SettingError};
 
-/// Kernel radii, grid units.
+/// The range of kernel radii in grid units.
 pub(crate) const RADIUS: Interval = Interval::new(Included(1.0), Included(4.0));
-/// Gaussian exponents of kernels.
+/// The range of the kernel's Gaussian exponent.
 pub(crate) const FALLOFF: Interval = Interval::new(Excluded(0.0), Included(16.0));
-/// Widths of slabs, `unit`s.
+/// The range of slab widths in `unit`s.
 pub(crate) const SLAB_WIDTH: Interval = Interval::new(Included(0.05), Included(8.0));
 
-/// Checks an opacity whose depth is asked for: one that a ray can reach.
+/// Checks the opacity of a first hit, which a ray must be able to reach.
 pub(crate) fn check_first_hit(opacity: f64) -> Result<(), SettingError> {
     Interval::THRESHOLD.check("first_hit", opacity)
 }
 
-/// The largest falloff with [`Classification::After`]: with more, no kernel reaches the middle between eight voxels.
+/// The maximum falloff for [`Classification::After`]: beyond it, no kernel reaches the middle between eight voxels.
 const MAX_FALLOFF_AFTER: f64 = 11.0;
 
-/// The least that the kernel's discrete transform may have of its maximum for [`Interpolation::Exact`]; below, coefficients would
+/// The minimum of the kernel's discrete transform, relative to its maximum, for [`Interpolation::Exact`]; below it, coefficients would
 /// amplify noise without bound.
 const MIN_RESPONSE: f64 = 0.002;
 
@@ -31,14 +31,15 @@ const MIN_RESPONSE: f64 = 0.002;
 pub enum Method {
     /// Kernel sections between planes parallel to the image (§3.2).
     ImageAligned,
-    /// Whole kernels, the volume slices most parallel to the image (§3.1).
+    /// Whole kernels, with sheets along the volume slices most parallel to the image (§3.1).
     AxisAligned,
-    /// None: every voxel is composited by itself, back to front (§3, Westover's first form).
+    /// No sheets: every voxel is composited by itself, back to front (§3, Westover's first form).
     CompositeEverySample,
 }
 
-/// What is splatted, and so where transfer function and shading are applied.
+/// What is splatted, which determines where the transfer function and shading are applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Classification {
     /// Voxels are classified and shaded, and their colours are splatted (the paper, SPEC §§3–6).
     Before,
@@ -49,71 +50,70 @@ pub enum Classification {
 
 /// How the kernel reconstructs values for [`Classification::After`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Interpolation {
     /// The kernel's weighted mean of the voxels' values, which smooths them.
     Smooth,
-    /// The weighted mean of coefficients that are chosen so that every voxel has exactly its value.
+    /// The weighted mean of coefficients for which every voxel keeps its exact value.
     Exact,
 }
 
 /// How kernel sections are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FootprintForm {
-    /// 128 pre-integrated sections, the nearest one picked (§3.2).
+    /// 128 pre-integrated sections, of which the nearest is used (§3.2).
     Sections,
-    /// The cumulative kernel integral of eq. 3, two entries subtracted: any slab width (§3.3.1).
+    /// The cumulative kernel integral of eq. 3, of which two entries are subtracted, for any slab width (§3.3.1).
     SummedArea,
 }
 
-/// How a sheet's accumulated amount becomes colour and opacity; numbered as in the shaders.
+/// How a sheet's accumulated amount becomes colour and opacity. The numbers are those in the shaders.
 ///
-/// From [`Self::Maximum`] on it is sheets' means that count: amounts are opacities per unit length, as for [`Self::Linear`], and the mean of
-/// a sheet at a pixel is what it holds there over the length of the pixel's ray within its slab, in `unit`s (axis-aligned: from one slice
-/// to the next), so the mean opacity per unit length, and colour times that. What a cut leaves of a slab counts by its share of the slab, but for
-/// [`Self::Minimum`]. They need sheets, so a method other than [`Method::CompositeEverySample`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// From [`Self::Maximum`] on, the means of sheets count: amounts are opacities per unit length, as for [`Self::Linear`], and a sheet's
+/// mean at a pixel is its content there divided by the length of the pixel's ray within its slab, in `unit`s (axis-aligned: from one
+/// slice to the next). The mean holds the mean opacity per unit length, and the colour times that. If a cut leaves only part of a slab,
+/// its mean counts in proportion, except for [`Self::Minimum`]. Means need sheets, so any method except [`Method::CompositeEverySample`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Compositing {
-    /// The paper's: opacities add up within a sheet, at most to 1.
+    /// The paper's rule: opacities add up within a sheet, to at most 1.
     Linear,
-    /// Amounts are optical depths: a sheet's opacity is `1 - exp(-amount)`, whatever the slab width.
+    /// Amounts are optical depths: a sheet's opacity is `1 - exp(-amount)`, for any slab width.
     Exponential,
-    /// Summed projection, clamped to 1 at the end.
+    /// A summed projection, clamped to 1 at the end.
     Xray,
-    /// Maximum intensity: of the means along a ray the one of most opacity, the nearest of equal ones. Above 1 opacity is scaled to 1
-    /// first.
+    /// Maximum intensity: the mean with the highest opacity along a ray, the nearest of equal ones. An opacity above 1 is first scaled to 1.
     Maximum,
-    /// Minimum intensity: the one of least opacity, of the slabs whose middle on the ray lies where kernels are complete: in the box of
-    /// voxel centres, less the kernel's radius on every side but no more than a quarter of the box; in perspective also as far beyond the near plane
-    /// as kernels reach; and inside of all that cuts. Where that stretch is shorter than a slab, it is the slab around its middle. Nothing
-    /// where the ray misses it.
+    /// Minimum intensity: the mean with the lowest opacity, of the slabs whose middle on the ray lies where kernels are complete: inside all
+    /// cuts and in the box of voxel centres, reduced on every side by the kernel's radius but by at most a quarter of the box; in
+    /// perspective also beyond the near plane by the kernels' reach. If that stretch is shorter than a slab, the slab around its middle
+    /// counts. The pixel is empty where the ray misses it.
     Minimum,
-    /// The sum of sheets over the length of the ray in the volume, which is what the ray's part in the box of voxels (half a voxel
-    /// around their centres) shows, from the near plane on. Every channel is clamped to 1. Nothing where the ray misses the box of voxel
-    /// centres.
+    /// The sum of sheets divided by the length of the ray in the box of voxels (half a voxel around their centres), from the near plane on.
+    /// Every channel is clamped to 1. The pixel is empty where the ray misses the box of voxel centres.
     Average,
-    /// An iso-surface's look: opaque where the mean opacity first reaches one half, if it grows evenly from the middle of a slab to that of the
-    /// next, with the colour that the mean has there. Nothing in front of it counts. Front to back only.
+    /// An iso-surface: opaque where the mean opacity, interpolated linearly between the middles of slabs, first reaches one half, with the
+    /// mean's colour there. Nothing in front of it counts. Front to back only.
     Surface,
 }
 
 impl Compositing {
-    /// How many there are.
+    /// The number of variants.
     pub const COUNT: usize = 7;
 
-    /// Whether sheets' means count.
+    /// Whether the means of sheets count.
     pub fn is_by_means(self) -> bool {
         matches!(self, Self::Maximum | Self::Minimum | Self::Average | Self::Surface)
     }
 
-    /// Whether what is opaque hides what lies behind it: nothing else can be culled (§6).
+    /// Whether opaque pixels hide what lies behind them; otherwise nothing can be culled (§6).
     pub fn hides(self) -> bool {
         matches!(self, Self::Linear | Self::Exponential | Self::Surface)
     }
 }
 
-/// The order in which sheets meet the compositing buffer; numbered as in the shaders.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The order in which sheets are composited. The numbers are those in the shaders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Order {
     /// Nearest sheet first.
     FrontToBack,
@@ -121,73 +121,74 @@ pub enum Order {
     BackToFront,
 }
 
-/// How kernel sections get to the pixels. The same image to rounding.
+/// How kernel sections are drawn. The images agree up to rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Rasterizer {
-    /// By tiles where device, view and footprint form allow it, else by quads.
+    /// Tiles if the device, the view and the footprint form allow it, otherwise quads.
     Auto,
     /// Footprint quads, drawn into sheet buffers (§3.2).
     Quads,
-    /// Compute: every tile gathers its sections front to back. Needs [`TILE_FEATURES`](crate::gpu::device::TILE_FEATURES) with 8 to 32 threads, 16 KiB of
-    /// memory for a workgroup as WebGPU has by default, and the summed-area form.
+    /// A compute stage in which every tile gathers its sections front to back. It needs
+    /// [`TILE_FEATURES`](crate::gpu::device::TILE_FEATURES) with 8 to 32 threads, 16 KiB of workgroup memory (WebGPU's default), and the
+    /// summed-area form.
     Tiles,
 }
 
-/// What is tested for being opaque around a footprint (§6, Fig. 13).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The pixels around a footprint that are tested for opacity (§6, Fig. 13).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum FootprintBox {
     /// The bounding rectangle.
     Rectangle,
-    /// The parallelogram that the shear of eq. 9 makes of a square: less, where the grid is anisotropic and seen obliquely. By
-    /// tiles only, as its filter is not separable. In perspective, where every voxel has its own shear, the rectangle still.
+    /// The parallelogram that the shear of eq. 9 makes of a square, which is smaller if the grid is anisotropic and seen obliquely. Tiles
+    /// only, because its filter is not separable. In perspective, where every voxel has its own shear, the rectangle is used instead.
     Parallelogram,
 }
 
 /// All splatting settings of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Splatting {
-    /// Image-aligned or axis-aligned sheets, or none.
+    /// Which voxels share a sheet.
     pub method: Method,
-    /// Kernel radius in grid units, 1 to 4.
+    /// The kernel's radius in grid units, 1 to 4.
     pub radius: f64,
-    /// Gaussian exponent of the kernel, above 0, at most 16.
+    /// The kernel's Gaussian exponent, above 0 and at most 16.
     pub falloff: f64,
-    /// Where transfer function and shading are applied.
+    /// Where the transfer function and shading are applied.
     pub classification: Classification,
     /// How values between voxels are reconstructed; without effect for [`Classification::Before`].
     pub interpolation: Interpolation,
-    /// Slab width Δ in `unit`s of world length along a ray, 0.05 to 8.
+    /// The slab width Δ in `unit`s of world length along a ray, 0.05 to 8.
     pub slab_width: f64,
     /// How kernel sections are stored.
     pub footprint: FootprintForm,
     /// How sheets are composited.
     pub compositing: Compositing,
-    /// In which order sheets are composited.
+    /// The order in which sheets are composited.
     pub order: Order,
-    /// Opacity from which a pixel counts as opaque, above 0, at most 1 (§6): with culling no channel differs by more than
-    /// 1 minus this from the image without. For [`Compositing::Surface`] it is 1.
+    /// The opacity from which a pixel counts as opaque, above 0 and at most 1 (§6). With culling, no channel differs by more than 1 minus
+    /// this from the image without. [`Compositing::Surface`] uses 1.
     pub opacity_threshold: f64,
-    /// Early splat elimination (§6): splats behind opaque pixels alone are not drawn. Without effect back to front and where
-    /// nothing hides ([`Compositing::hides`]).
+    /// Early splat elimination (§6): splats entirely behind opaque pixels are not drawn. Without effect back to front, and where nothing
+    /// hides ([`Compositing::hides`]).
     pub culling: bool,
-    /// Composite only tiles that received splats (§6). Never changes the image. Without effect for [`Compositing::Minimum`], which looks at
-    /// what is empty, too.
+    /// Composite only tiles that received splats (§6), which never changes the image. Without effect for [`Compositing::Minimum`], for which
+    /// empty tiles count too.
     pub tiles: bool,
-    /// How kernel sections get to the pixels.
+    /// How kernel sections are drawn.
     pub rasterizer: Rasterizer,
-    /// What early splat elimination tests.
+    /// The pixels that early splat elimination tests.
     pub footprint_box: FootprintBox,
-    /// What is left out where it hardly shows: off by default.
+    /// Economies where they are hardly visible; off by default.
     pub experimental: Economies,
 }
 
 impl Splatting {
-    /// Checks what types do not say, whatever the device and the rasterizer.
+    /// Checks that the values are in range and go together, independently of the device and the rasterizer.
     ///
     /// # Errors
-    /// If a number is not finite or out of its range, means are asked for where there are no sheets, surfaces back to front, or
-    /// classification after splatting with what excludes it (SPEC §9).
+    /// If a number is not finite or out of its range, means are combined with a method without sheets, surfaces with back to front, or
+    /// classification after splatting with a setting that excludes it (SPEC §9).
     pub fn check(&self) -> Result<(), SettingError> {
         RADIUS.check("splatting.radius", self.radius)?;
         FALLOFF.check("splatting.falloff", self.falloff)?;
@@ -210,16 +211,47 @@ impl Splatting {
         }
     }
 
+    /// Checks that the settings allow what of rays is looked at: whether anything is cut, and the opacity whose depth is asked for.
+    ///
+    /// # Errors
+    /// If they do not.
+    pub(crate) fn check_rays(&self, is_cut: bool, first_hit: Option<f64>) -> Result<(), SettingError> {
+        let refused = |key, found: &str, allowed: &str| Err(SettingError::new(key, found, allowed));
+        if self.method == Method::CompositeEverySample && (is_cut || first_hit.is_some()) {
+            let found = "\"composite-every-sample\" with clip planes, surfaces or first hits";
+            return refused("splatting.method", found, "a method with sheets");
+        }
+        let Some(opacity) = first_hit else { return Ok(()) };
+        if self.compositing == Compositing::Minimum {
+            let allowed = "another compositing: the minimum is known only at the end of a ray";
+            return refused("splatting.compositing", "\"minimum\" with first hits", allowed);
+        }
+        check_first_hit(opacity)?;
+        if self.culling && self.compositing.hides() && opacity > self.opacity_threshold {
+            let allowed = format!("above 0, at most {}, the opacity_threshold", self.opacity_threshold);
+            return Err(SettingError::new("first_hit", opacity, allowed));
+        }
+        if self.order != Order::FrontToBack {
+            return refused("splatting.order", "\"back-to-front\" with first hits", "\"front-to-back\"");
+        }
+        Ok(())
+    }
+
     /// Checks what [`Classification::After`] asks of the other settings.
     fn check_after(&self) -> Result<(), SettingError> {
         let refused = |key: &str, found: String, allowed: &str| Err(SettingError::new(key, found, allowed));
-        let excluded = match self.method {
-            Method::AxisAligned => Some("splatting.method = \"axis-aligned\"".to_owned()),
-            Method::CompositeEverySample => Some("splatting.method = \"composite-every-sample\"".to_owned()),
-            Method::ImageAligned => self.experimental.in_use().map(|economy| economy.to_string()),
+        let by_method = match self.method {
+            Method::AxisAligned => Some("splatting.method = \"axis-aligned\""),
+            Method::CompositeEverySample => Some("splatting.method = \"composite-every-sample\""),
+            Method::ImageAligned => None,
         };
-        if let Some(setting) = excluded {
-            return refused("splatting.classification", format!("\"after\" with {setting}"), "\"before\" with it");
+        if let Some(method) = by_method {
+            let allowed = "\"before\" with it, or \"image-aligned\"";
+            return refused("splatting.classification", format!("\"after\" with {method}"), allowed);
+        }
+        if let Some(economy) = self.experimental.in_use() {
+            let allowed = format!("\"before\" with it, or {} = {}", economy.key, economy.off);
+            return refused("splatting.classification", format!("\"after\" with {economy}"), &allowed);
         }
         if self.falloff > MAX_FALLOFF_AFTER {
             let found = format!("{} with splatting.classification = \"after\"", self.falloff);

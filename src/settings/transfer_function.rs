@@ -1,4 +1,4 @@
-//! Transfer functions: from voxel values to colour and opacity (SPEC §3).
+//! Transfer functions, from voxel values to colour and opacity (SPEC §3).
 
 use std::collections::BTreeMap;
 use std::ops::{Add, Mul};
@@ -7,33 +7,33 @@ use glam::DVec3;
 
 use crate::setting_error::{Interval, SettingError};
 
-/// Why control points make no [`Ramp`].
+/// Why control points are not a valid [`Ramp`].
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RampError {
-    /// There are none.
+    /// There are no control points.
     #[error("no control points, allowed: at least one")]
     Empty,
-    /// A position is infinite or not a number.
+    /// A position is infinite or NaN.
     #[error("control point {index}: found the position {position:?}, allowed: a finite number")]
     #[non_exhaustive]
     NotFinite {
-        /// Which one, from 0.
+        /// The point's index.
         index: usize,
         /// The position.
         position: f64,
     },
-    /// A position is not above the one before it.
+    /// A position is not above the previous one.
     #[error(
         "control point {index}: found the position {position:?}, allowed: above {before:?}, that of the point before"
     )]
     #[non_exhaustive]
     NotIncreasing {
-        /// Which one, from 0, so at least 1.
+        /// The point's index, at least 1.
         index: usize,
         /// Its position.
         position: f64,
-        /// The position of the point before.
+        /// The previous point's position.
         before: f64,
     },
 }
@@ -41,7 +41,7 @@ pub enum RampError {
 /// A piecewise linear function through control points, constant before the first and after the last.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ramp<T> {
-    /// At least one; positions are finite and strictly increasing.
+    /// At least one point; positions are finite and strictly increasing.
     points: Vec<(f64, T)>,
 }
 
@@ -63,57 +63,56 @@ impl<T: Copy + Add<Output = T> + Mul<f64, Output = T>> Ramp<T> {
         Ok(Self { points })
     }
 
-    /// A ramp through points that are known to be as [`Self::new`] asks for.
+    /// A ramp through points that are known to satisfy [`Self::new`].
     pub(crate) fn through(points: Vec<(f64, T)>) -> Self {
         debug_assert!(!points.is_empty() && points.is_sorted_by(|a, b| a.0 < b.0));
         Self { points }
     }
 
-    /// The control points, by increasing position.
+    /// The control points, by ascending position.
     pub fn points(&self) -> &[(f64, T)] {
         &self.points
     }
 
-    /// The ramp's value at a position; at a control point exactly that point's.
+    /// The ramp's value at a position; at a control point it is exactly that point's value.
     pub fn at(&self, position: f64) -> T {
         let after = self.points.partition_point(|point| point.0 <= position);
         if after == 0 || after == self.points.len() {
             return self.points[after.saturating_sub(1)].1;
         }
         let ((x0, y0), (x1, y1)) = (self.points[after - 1], self.points[after]);
-        // Points more than f64::MAX apart have no finite distance, their halves do.
+        // Points more than f64::MAX apart have an infinite distance; half of it is finite.
         let scale = if (x1 - x0).is_finite() { 1.0 } else { 0.5 };
         let share = (position * scale - x0 * scale) / (x1 * scale - x0 * scale);
         y0 * (1.0 - share) + y1 * share
     }
 }
 
-/// What a voxel's value and gradient look like, and its label in a segmented volume.
+/// The appearance of a voxel by its value, its gradient and, in a segmented volume, its label.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TransferFunction {
     /// Red, green and blue in [0, 1] over voxel values.
     pub color: Ramp<DVec3>,
     /// Opacity per unit length in [0, 1] over voxel values.
     pub opacity: Ramp<f64>,
-    /// A factor in [0, 1] over gradient magnitudes (value per world unit); `None` is 1 everywhere.
+    /// A factor in [0, 1] over gradient magnitudes (value per world unit); `None` means 1 everywhere.
     pub gradient_opacity: Option<Ramp<f64>>,
-    /// Closed intervals `[lo, hi]` of the values that take part, at least one; `None` is all of them.
+    /// Closed intervals `[lo, hi]` of the values that take part, at least one; `None` means all values.
     pub iso_ranges: Option<Vec<[f64; 2]>>,
-    /// Of a segmented volume the tables of single labels. Labels without any go by the ramps above. They mean nothing for other
-    /// volumes.
+    /// Tables for single labels of a segmented volume. Labels without tables use the ramps above. Other volumes ignore them.
     pub labels: BTreeMap<u16, LabelTables>,
 }
 
-/// What a label's voxels look like instead.
+/// A label's own tables.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LabelTables {
-    /// Whether they take part at all.
+    /// Whether the label's voxels take part.
     pub visible: bool,
-    /// As [`TransferFunction::color`], which `None` stands for.
+    /// Replaces [`TransferFunction::color`]; `None` uses it.
     pub color: Option<Ramp<DVec3>>,
-    /// As [`TransferFunction::opacity`], which `None` stands for.
+    /// Replaces [`TransferFunction::opacity`]; `None` uses it.
     pub opacity: Option<Ramp<f64>>,
-    /// As [`TransferFunction::gradient_opacity`], which `None` stands for.
+    /// Replaces [`TransferFunction::gradient_opacity`]; `None` uses it.
     pub gradient_opacity: Option<Ramp<f64>>,
 }
 
@@ -124,7 +123,7 @@ impl Default for LabelTables {
 }
 
 impl LabelTables {
-    /// Checks what types do not say; `key` names the tables in errors, as `transfer.label[0]` does.
+    /// Checks that the values are in range; `key` names the tables in errors, such as `transfer.label[0]`.
     ///
     /// # Errors
     /// If a colour, opacity or factor is not in [0, 1].
@@ -132,7 +131,7 @@ impl LabelTables {
         check_ramps(key, self.color.as_ref(), self.opacity.as_ref(), self.gradient_opacity.as_ref())
     }
 
-    /// Whether voxels that take part look otherwise than without them; else only who takes part is another.
+    /// Whether these tables change the appearance of voxels; otherwise they only decide which voxels take part.
     pub fn matter_to_shading(&self) -> bool {
         self.visible && self.matter()
     }
@@ -143,18 +142,18 @@ impl LabelTables {
     }
 }
 
-/// The tables that voxels of one label go by, whether they are the label's own or not.
+/// The tables that apply to the voxels of one label, its own or the common ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tables<'a> {
-    /// Whether they take part at all.
+    /// Whether the label's voxels take part.
     pub visible: bool,
-    /// [`TransferFunction::color`].
+    /// The colour, as in [`TransferFunction::color`].
     pub color: &'a Ramp<DVec3>,
-    /// [`TransferFunction::opacity`].
+    /// The opacity, as in [`TransferFunction::opacity`].
     pub opacity: &'a Ramp<f64>,
-    /// [`TransferFunction::gradient_opacity`].
+    /// The gradient opacity, as in [`TransferFunction::gradient_opacity`].
     pub gradient_opacity: Option<&'a Ramp<f64>>,
-    /// [`TransferFunction::iso_ranges`], the same for all labels.
+    /// The iso-ranges of [`TransferFunction::iso_ranges`], the same for all labels.
     pub iso_ranges: Option<&'a [[f64; 2]]>,
 }
 
@@ -168,13 +167,13 @@ impl Tables<'_> {
         self.opacity.at(value) * factor
     }
 
-    /// Whether a voxel of this value takes part at all.
+    /// Whether a value lies in an iso-range.
     pub fn in_iso_range(&self, value: f64) -> bool {
         self.iso_ranges.is_none_or(|ranges| ranges.iter().any(|&[lo, hi]| lo <= value && value <= hi))
     }
 }
 
-/// Checks that the values of a table's ramps are in [0, 1]; ramps themselves see to their positions.
+/// Checks that the values of a table's ramps are in [0, 1]; `Ramp` itself checks their positions.
 pub(crate) fn check_ramps(
     table: &str,
     color: Option<&Ramp<DVec3>>,
@@ -197,7 +196,7 @@ pub(crate) fn check_labels(labels: &BTreeMap<u16, LabelTables>) -> Result<(), Se
     labels.iter().try_for_each(|(label, tables)| tables.check(&format!("transfer.label[{label}]")))
 }
 
-/// Checks that there is an interval, if some are given, and that intervals are finite and not reversed.
+/// Checks that the list of intervals, if stated, is not empty, and that intervals are finite and not reversed.
 pub(crate) fn check_iso_ranges(iso_ranges: Option<&[[f64; 2]]>) -> Result<(), SettingError> {
     const KEY: &str = "transfer.iso_ranges";
     let Some(ranges) = iso_ranges else { return Ok(()) };
@@ -215,23 +214,23 @@ pub(crate) fn check_iso_ranges(iso_ranges: Option<&[[f64; 2]]>) -> Result<(), Se
 }
 
 impl TransferFunction {
-    /// Checks what types do not say.
+    /// Checks that the values are in range.
     ///
     /// # Errors
-    /// If a colour, opacity or factor is not in [0, 1], also in a label's tables, there are iso-ranges but not one, or one is not finite or
-    /// reversed.
+    /// If a colour, opacity or factor is not in [0, 1] (in labels' tables, too), the list of iso-ranges is empty, or an iso-range is
+    /// reversed or not finite.
     pub fn check(&self) -> Result<(), SettingError> {
         check_ramps("transfer", Some(&self.color), Some(&self.opacity), self.gradient_opacity.as_ref())?;
         check_iso_ranges(self.iso_ranges.as_deref())?;
         check_labels(&self.labels)
     }
 
-    /// Colour and opacity by value, and nothing else.
+    /// A transfer function with only colour and opacity.
     pub(crate) fn by_value(color: Ramp<DVec3>, opacity: Ramp<f64>) -> Self {
         Self { color, opacity, gradient_opacity: None, iso_ranges: None, labels: BTreeMap::new() }
     }
 
-    /// The tables that voxels of a label go by; `None` for those of a volume that is not segmented.
+    /// The tables that apply to voxels of a label; `None` means those of a volume that is not segmented.
     pub fn tables(&self, label: Option<u16>) -> Tables<'_> {
         let own = label.and_then(|label| self.labels.get(&label));
         Tables {
@@ -248,7 +247,7 @@ impl TransferFunction {
         self.tables(None).alpha(value, gradient_magnitude)
     }
 
-    /// Whether a voxel of this value takes part at all.
+    /// Whether a value lies in an iso-range.
     pub fn in_iso_range(&self, value: f64) -> bool {
         self.tables(None).in_iso_range(value)
     }

@@ -1,4 +1,4 @@
-//! What reading may open, and how much memory it may take.
+//! Limits on reading: which files may be opened, and how much memory their values may use.
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -11,7 +11,7 @@ use super::VolumeError;
 use super::memory;
 use super::source::{Source, invalid, io_error};
 
-/// How volumes, labels and scenes are read. The default reads files wherever they are.
+/// Options for reading volumes, labels and scenes. By default files may lie anywhere.
 ///
 /// ```
 /// use sheetsplat::volume::ReadOptions;
@@ -21,26 +21,26 @@ use super::source::{Source, invalid, io_error};
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ReadOptions {
-    /// The folder that every file must lie in after links are followed; `None` allows any place.
+    /// The folder that every file must lie in once links are followed; `None` allows any place.
     pub confine: Option<PathBuf>,
-    /// How many bytes the values of a volume and its labels may take together; `None` stands for three quarters of the memory that
-    /// the machine has, or that the process's control group is allowed if that is less.
+    /// The maximum number of bytes for the values of a volume and its labels together. `None` means three quarters of the machine's
+    /// memory, or of what the process's control group may use if that is less.
     pub memory: Option<u64>,
 }
 
 impl ReadOptions {
-    /// The same options, but files must lie in this folder.
+    /// These options with files confined to this folder.
     pub fn confined_to(self, folder: impl Into<PathBuf>) -> Self {
         Self { confine: Some(folder.into()), ..self }
     }
 
-    /// The same options with another memory limit in bytes.
+    /// These options with another memory limit in bytes.
     pub fn with_memory(self, bytes: u64) -> Self {
         Self { memory: Some(bytes), ..self }
     }
 }
 
-/// [`ReadOptions`] while a volume, and perhaps its labels, are read. Clones share the memory limit.
+/// [`ReadOptions`] while a volume and its labels are read. Clones share the memory limit.
 #[derive(Clone)]
 pub(crate) struct Access(Arc<Inner>);
 
@@ -51,9 +51,9 @@ struct Inner {
     files: Mutex<BTreeSet<PathBuf>>,
 }
 
-/// The folder that files are confined to.
+/// The folder to which files are confined.
 struct Folder {
-    /// As the options name it, for errors.
+    /// The path in the options, for errors.
     named: PathBuf,
     canonical: PathBuf,
 }
@@ -69,14 +69,14 @@ impl Access {
         Ok(Self(Arc::new(Inner { folder, limit, reserved: AtomicU64::new(0), files: Mutex::default() })))
     }
 
-    /// The path to open for a file or folder, which has no links in it if reading is confined.
+    /// The path to open for a file or folder. If reading is confined, it has no links in it.
     ///
     /// # Errors
-    /// If reading is confined to a folder that the path leads out of, whether or not there is anything.
+    /// If reading is confined and the path leads out of the folder, whether or not the file exists.
     pub(crate) fn resolve<'a>(&self, path: &'a Path) -> Result<Cow<'a, Path>, VolumeError> {
         let Some(folder) = &self.0.folder else { return Ok(Cow::Borrowed(path)) };
         let resolved = path.canonicalize();
-        // Of what cannot be resolved nothing is told unless it would be in the folder.
+        // For a path outside the folder the error does not reveal whether the file exists.
         let place = match &resolved {
             Ok(resolved) => Some(resolved.clone()),
             Err(_) => {
@@ -97,20 +97,20 @@ impl Access {
         Ok(source)
     }
 
-    /// Opens a file only to find out what it is.
+    /// Opens a file only to determine its format.
     pub(super) fn open_to_look(&self, path: &Path) -> Result<Source, VolumeError> {
         Source::open(path, &self.resolve(path)?, self)
     }
 
-    /// The files that were opened so far, but for those only looked at.
+    /// The files opened so far, without those of which only the format was determined.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
         self.0.files.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect()
     }
 
-    /// Asks for memory before it is allocated: `bytes` of it, for what `found` says.
+    /// Reserves `bytes` of memory, before they are allocated, for what `found` describes.
     ///
     /// # Errors
-    /// If that is more than is left of the limit.
+    /// If fewer bytes are left of the limit.
     pub(crate) fn reserve(&self, path: &Path, field: &str, found: impl Display, bytes: u64) -> Result<(), VolumeError> {
         let Inner { limit, reserved, .. } = &*self.0;
         let add = |reserved: u64| reserved.checked_add(bytes).filter(|sum| sum <= limit);

@@ -1,4 +1,4 @@
-//! Files that a header names for its samples: one, a list, or a pattern with the numbers that it runs through.
+//! Data files that a header names: one, a list, or a numbered pattern.
 
 use std::path::{Path, PathBuf};
 
@@ -9,15 +9,15 @@ use super::access::Access;
 use super::samples::Samples;
 use super::source::{Source, invalid};
 
-/// No number in a file's name is wider.
+/// The maximum width of a number in a file's name.
 const MAX_WIDTH: usize = 20;
 
-/// The files, in the order of their samples.
+/// The data files, in the order of their samples.
 pub(super) struct DataFiles {
-    /// Where their names start from.
+    /// The folder that their names are relative to.
     folder: PathBuf,
     names: Names,
-    /// How many of the volume's axes each of them has whole: 1 for rows, 2 for slices, 3 for slabs of one or more slices.
+    /// The number of axes that one file covers completely: 1 for rows, 2 for slices, 3 for slabs of one or more slices.
     axes: usize,
 }
 
@@ -27,7 +27,7 @@ enum Names {
 }
 
 impl DataFiles {
-    /// One file with all the samples of the header at `header`.
+    /// One file with all samples of the header at `header`.
     pub(super) fn one(header: &Path, name: &str) -> Self {
         Self::listed(header, vec![name.to_owned()], 3)
     }
@@ -36,7 +36,7 @@ impl DataFiles {
         Self { folder: header.parent().unwrap_or(Path::new("")).to_owned(), names: Names::Listed(names), axes }
     }
 
-    /// A pattern, the first and last number, and the step between numbers, as text; `None` if they are not that.
+    /// A pattern, the first and last number and the step between numbers, as text; `None` if these do not parse.
     pub(super) fn numbered(header: &Path, [pattern, min, max, step]: [&str; 4], axes: usize) -> Option<Self> {
         let [min, max, step] = [min, max, step].map(|number| number.parse::<i64>().ok());
         let (min, max, step) = (min?, max?, step?);
@@ -46,7 +46,7 @@ impl DataFiles {
         Some(Self { names, ..Self::listed(header, Vec::new(), axes) })
     }
 
-    /// The samples of all files, each read by `read`; `field` is the header's that names them.
+    /// The samples of all files, each read by `read`. `field` is the header's field that names the files.
     pub(super) fn read<T: Clone>(
         &self,
         header: &Path,
@@ -67,7 +67,7 @@ impl DataFiles {
         for at in 0..count {
             let name = match &self.names {
                 Names::Listed(names) => names[at as usize].clone(),
-                // Within the first and the last number, which are of 64 bits.
+                // The number lies between the first and the last one, which have 64 bits.
                 Names::Numbered { pattern, min, step, .. } => {
                     pattern.name(min.wrapping_add(step.wrapping_mul(at as i64)))
                 }
@@ -82,10 +82,10 @@ impl DataFiles {
         Ok(values)
     }
 
-    /// What each of `count` files has of a volume.
+    /// The dimensions of the part of a volume in each of `count` files.
     ///
     /// # Errors
-    /// How many files are allowed.
+    /// The numbers of files that are allowed.
     fn part(&self, dims: UVec3, count: u64) -> Result<UVec3, String> {
         let UVec3 { x, y, z } = dims;
         let (part, expected) = match self.axes {
@@ -104,7 +104,7 @@ impl DataFiles {
     }
 }
 
-/// A name with one number in it, as C's `printf` writes that: `slice%03d.raw`.
+/// A name with one number in it, as C's `printf` formats it: `slice%03d.raw`.
 struct Pattern {
     before: String,
     after: String,
@@ -114,7 +114,7 @@ struct Pattern {
 
 impl Pattern {
     fn parse(text: &str) -> Option<Self> {
-        // A sign of its own for what `%%` stands for.
+        // `%%` gets a placeholder of its own.
         let text = text.replace("%%", "\0");
         let (before, number) = text.split_once('%')?;
         let end = number.find(|character: char| !character.is_ascii_digit())?;

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use super::VolumeError;
 use super::source::{invalid, shown};
 
-/// A header's fields, each of them at most once.
+/// A header's fields, each at most once.
 pub(super) struct Fields {
     pub(super) path: PathBuf,
     fields: BTreeMap<String, String>,
@@ -29,7 +29,7 @@ impl Fields {
         self.fields.get(name).map(String::as_str)
     }
 
-    /// A field as `parse` makes it from its text, or from the lack of it.
+    /// A field's value, which `parse` makes from its text, or from `None` if the field is missing.
     pub(super) fn value<T>(
         &self,
         name: &str,

@@ -15,7 +15,7 @@ pub(super) fn head(path: &Path, access: &Access) -> Result<Vec<u8>, VolumeError>
     Ok(head)
 }
 
-/// The files in a folder, not those in its folders, in the order that people count in.
+/// The files in a folder, without those of its subfolders, in natural order.
 pub(super) fn files(folder: &Path, access: &Access) -> Result<Vec<PathBuf>, VolumeError> {
     let mut files = Vec::new();
     for entry in fs::read_dir(access.resolve(folder)?).map_err(io_error(folder))? {
@@ -31,12 +31,12 @@ pub(super) fn files(folder: &Path, access: &Access) -> Result<Vec<PathBuf>, Volu
 /// A part of a name.
 #[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Part {
-    /// How many digits it has without leading zeros, which compares numbers of any size, and these digits.
+    /// The number of its digits without leading zeros, so that numbers of any size compare, and the digits.
     Number(usize, String),
     Text(String),
 }
 
-/// A name in parts that sort as people count: 2 before 10. Names of one key, as `01` and `1`, sort by the last part, the name.
+/// A name in parts that sort in natural order: 2 before 10. The last part is the name itself, which decides between `01` and `1`.
 pub(super) fn natural(name: &str) -> Vec<Part> {
     let mut parts = Vec::new();
     let mut rest = name;

@@ -1,4 +1,4 @@
-//! File formats: which one a file is of.
+//! File formats and how a file's format is determined.
 
 use std::path::{Path, PathBuf};
 
@@ -10,23 +10,23 @@ use super::{VolumeError, folder, nrrd};
 
 type Reader<T> = fn(&Path, &Access) -> Result<Loaded<T>, VolumeError>;
 
-/// Of a folder, and those of its files that are of the format.
+/// Reads a volume from a folder, given those of its files that are of the format.
 type FolderReader<T> = fn(&Path, &[PathBuf], &Access) -> Result<Loaded<T>, VolumeError>;
 
-/// A format, and what reads it.
+/// A format and its reader.
 struct Format<T> {
     name: &'static str,
-    /// What its files' names end with.
+    /// The extensions of its files.
     extensions: &'static [&'static str],
-    /// Whether a file that begins like this is surely of this format.
+    /// Whether a file that begins with these bytes is certainly of this format.
     is_magic: fn(&[u8]) -> bool,
-    /// Or the feature that it is compiled with.
+    /// The reader, or the feature that would compile it.
     read: Result<Reader<T>, &'static str>,
-    /// Where slices come one by one, in a folder.
+    /// The reader of a folder of slices, if the format has them.
     read_folder: Option<FolderReader<T>>,
 }
 
-/// A module's function, or the feature that it is compiled with.
+/// A module's reader, or the feature that would compile it.
 macro_rules! reader {
     ($feature:literal, $read:path) => {{
         #[cfg(feature = $feature)]
@@ -39,7 +39,7 @@ macro_rules! reader {
 
 const DICOM: &str = "DICOM";
 
-/// Formats that have a slice in every file of a folder.
+/// Formats with one slice per file of a folder.
 const SLICES: [&str; 2] = ["TIFF", DICOM];
 
 fn formats<T: Voxel>() -> Vec<Format<T>> {
@@ -64,7 +64,7 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
         Format {
             name: "MGH",
             extensions: &[".mgh", ".mgz", ".mgh.gz"],
-            // It begins with its version, 1, and may be gzipped.
+            // The file begins with its version, 1, and may be gzipped.
             is_magic: |_| false,
             read: reader!("mgh", super::mgh::read),
             read_folder: None,
@@ -121,8 +121,8 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
     ]
 }
 
-/// Reads a file, and says of which format it is: the format that its first bytes tell, else the one that its name tells. Reads a
-/// folder of slices, whose format the first bytes of all its files tell.
+/// Reads a file and returns the name of its format, determined by its first bytes or else by its name; or reads a folder of slices,
+/// whose format the first bytes of all its files determine.
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static str, Loaded<T>), VolumeError> {
     let formats = formats();
     let (file, _) = archive_and_array(path);
@@ -151,12 +151,12 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static s
     Err(invalid(path, "format", found, allowed))
 }
 
-/// A file's format, and whether its first bytes tell that.
+/// A file's format, and whether its first bytes determined it.
 fn format_of<'a, T>(formats: &'a [Format<T>], path: &Path, head: &[u8]) -> Option<(&'a Format<T>, bool)> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let is_named = |format: &Format<T>| format.extensions.iter().any(|extension| name.ends_with(extension));
     let named = formats.iter().find(|format| is_named(format));
-    // Bytes that may mean something else count only where no name speaks against it.
+    // Ambiguous first bytes count only if the name does not contradict them.
     let is_bare = |format: &Format<T>| {
         format.name == DICOM && is_bare_dicom(head) && named.is_none_or(|named| named.name == DICOM)
     };
@@ -164,8 +164,8 @@ fn format_of<'a, T>(formats: &'a [Format<T>], path: &Path, head: &[u8]) -> Optio
     formats.iter().find(by_head).map(|format| (format, true)).or(named.map(|format| (format, false)))
 }
 
-/// Whether a file begins as DICOM files do that lack the 128 bytes and "DICM" before the elements: with one of group 2 or 8, and its
-/// type, or else its length, which is even.
+/// Whether a file begins as DICOM files without the preamble of 128 bytes and "DICM" do: with an element of group 2 or 8, and its type
+/// or an even length.
 pub(super) fn is_bare_dicom(head: &[u8]) -> bool {
     let &[group @ (2 | 8), 0, 0..=0x70, 0, a, b, c, d, ..] = head else { return false };
     let has_type = a.is_ascii_uppercase() && b.is_ascii_uppercase();
@@ -188,7 +188,7 @@ fn read_folder<T: Voxel>(
             Some((format, true)) if is_of_slices(format) => format,
             other => {
                 let name = file.file_name().unwrap_or_default().to_string_lossy();
-                // Slices often have names without an extension, or end with a number.
+                // Slices often have names without an extension, or names that end with a number.
                 let extension = file.extension().unwrap_or_default().to_string_lossy();
                 let may_be_slice = !name.starts_with('.') && extension.bytes().all(|byte| byte.is_ascii_digit());
                 if other.map_or(may_be_slice, |(format, _)| is_of_slices(format)) {
@@ -205,7 +205,7 @@ fn read_folder<T: Voxel>(
     if !left_out.is_empty() && !slices.is_empty() {
         let (path, count, names) = (path.display(), left_out.len(), &left_out[..left_out.len().min(8)].join(", "));
         let more = if count > 8 { ", …" } else { "" };
-        log::warn!("{path}: {count} files do not begin as slices do and are left out: {names}{more}");
+        log::warn!("{path}: {count} files are not slices and are left out: {names}{more}");
     }
     let found = match slices.as_slice() {
         [] => format!("{count} files, no slices among them"),
@@ -220,7 +220,7 @@ fn read_folder<T: Voxel>(
     Err(invalid(path, "folder", found, allowed))
 }
 
-/// What is before the colon, and what is behind it, of a path such as `file.npz:name`; any other path is all before it.
+/// The parts of a path such as `file.npz:name` before and after the colon; any other path is the first part.
 pub(super) fn archive_and_array(path: &Path) -> (&Path, Option<&str>) {
     const EXTENSION: &str = ".npz:";
     let split = path.to_str().filter(|_| !path.exists()).and_then(|text| {

@@ -1,4 +1,4 @@
-//! Labels: which segment of a segmented volume every voxel belongs to.
+//! Labels: the segment that each voxel of a segmented volume belongs to.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,38 +11,38 @@ use super::format;
 use super::loaded::Loaded;
 use super::{Volume, VolumeError, invalid};
 
-/// Two spacings that differ by less than this, relative to the larger one, are one spacing that was written down twice.
+/// Spacings whose relative difference is less than this count as equal.
 const SAME_SPACING: f64 = 1e-4;
 
-/// A label for every voxel of a grid.
+/// One label per voxel of a grid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Labels {
-    /// Names them in errors: a file.
+    /// The name in errors: a file.
     pub origin: String,
-    /// Voxels along x, y and z.
+    /// The number of voxels along x, y and z.
     pub dims: UVec3,
-    /// World units from voxel to voxel, if they say so; else they go with any.
+    /// The distance between voxels in world units; `None` matches any volume's.
     pub spacing: Option<DVec3>,
     /// The labels, x fastest.
     pub values: Arc<[u16]>,
-    /// What they are called, as far as that is known.
+    /// The labels' names, where known.
     pub names: BTreeMap<u16, String>,
 }
 
 impl Labels {
-    /// Reads a label file, a volume file of any format that [`Volume::open`] reads, of whole numbers from 0 to 65535 of any type.
+    /// Reads a label file: a volume file of any format that [`Volume::open`] reads, with whole numbers from 0 to 65535 in any sample type.
     ///
     /// # Errors
-    /// If the file cannot be read, is of no known format, does not hold what its header promises, or has a sample that is no
+    /// If the file cannot be read, is of no known format, does not hold what its header promises, or has a sample that is not a
     /// label (the error names the voxel).
     pub fn open(path: &Path) -> Result<Self, VolumeError> {
         Self::open_with(path, &ReadOptions::default())
     }
 
-    /// As [`Self::open`], with a choice of the folder that files must lie in and of the memory limit.
+    /// Like [`Self::open`], with a folder that files must lie in and a memory limit.
     ///
     /// # Errors
-    /// As [`Self::open`], and if the file, or one that its header names, is not in the folder.
+    /// As for [`Self::open`], and if the file, or one that its header names, lies outside the folder.
     pub fn open_with(path: &Path, options: &ReadOptions) -> Result<Self, VolumeError> {
         Self::read(path, &Access::new(options)?)
     }
@@ -54,10 +54,10 @@ impl Labels {
 }
 
 impl Volume {
-    /// The same values with other labels.
+    /// The same volume with other labels.
     ///
     /// # Errors
-    /// If the labels are those of another grid.
+    /// If the labels' grid is another than the volume's.
     pub fn with_labels(mut self, labels: Labels) -> Result<Self, VolumeError> {
         let Labels { origin, dims, spacing, values, names } = labels;
         let shown = |spacing: DVec3| format!("{:?}", spacing.to_array());
@@ -85,12 +85,12 @@ impl Volume {
         self.labels.as_deref()
     }
 
-    /// What labels are called, as far as that is known: those of a segmented volume, or of one whose values are labels.
+    /// The names of labels, where known: of a segmented volume, or of one whose values are labels.
     pub fn label_names(&self) -> &BTreeMap<u16, String> {
         &self.label_names
     }
 
-    /// The label of a voxel, given as an index into the volume; `None` if the volume is not segmented.
+    /// The label of the voxel at an index in memory; `None` if the volume is not segmented.
     ///
     /// # Panics
     /// If the volume is segmented and the voxel lies outside it.

@@ -1,4 +1,4 @@
-//! What every reader gives.
+//! The result of every reader.
 
 use std::collections::BTreeMap;
 
@@ -7,27 +7,27 @@ use glam::{DVec3, UVec3};
 use super::Orientation;
 use super::samples::SampleType;
 
-/// What is in a file of values or of labels.
+/// The contents of a file of values or labels.
 pub(crate) struct Loaded<T> {
     pub(crate) dims: UVec3,
-    /// Of the samples that the values come from.
+    /// The type of the samples in the file.
     pub(crate) kind: SampleType,
-    /// If the file gives one.
+    /// World units between voxels, if the file states them.
     pub(super) spacing: Option<DVec3>,
-    /// What the spacing is in, if the file says so.
+    /// The unit of the spacing, if the file states it.
     pub(super) unit: Option<String>,
-    /// If the file gives one.
+    /// The orientation, if the file states it.
     pub(super) orientation: Option<Orientation>,
-    /// The colours that the file gives to values, ascending by value.
+    /// The colours that the file assigns to values, in ascending order of values.
     pub(super) palette: Option<Vec<(f64, DVec3)>>,
-    /// What the values are called, where they are labels.
+    /// The values' names, if they are labels.
     pub(super) label_names: BTreeMap<u16, String>,
-    /// X fastest, as many as there are voxels.
+    /// One value per voxel, x fastest.
     pub(crate) values: Vec<T>,
 }
 
 impl<T> Loaded<T> {
-    /// Values of which the file says nothing else.
+    /// Values about which the file states nothing else.
     pub(super) fn new(dims: UVec3, kind: SampleType, values: Vec<T>) -> Self {
         let label_names = BTreeMap::new();
         Self { dims, kind, spacing: None, unit: None, orientation: None, palette: None, label_names, values }

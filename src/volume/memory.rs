@@ -1,12 +1,12 @@
-//! How much memory there is.
+//! How much memory is available.
 
 use std::fs;
 use std::path::Path;
 
 use sysinfo::System;
 
-/// Three quarters of what the machine has or the process's control groups are allowed, whichever is less; where neither is known,
-/// there is no limit.
+/// Three quarters of the machine's memory or of what the process's control groups may use, whichever is less; no limit if neither is
+/// known.
 pub(super) fn default_limit() -> u64 {
     let mut system = System::new();
     system.refresh_memory();
@@ -16,19 +16,19 @@ pub(super) fn default_limit() -> u64 {
     machine.into_iter().chain(group).min().map_or(u64::MAX, |bytes| bytes / 4 * 3)
 }
 
-/// The smallest limit of some control groups, and of those that they are in; `groups` is what Linux has in `/proc/self/cgroup`, lines of
-/// `ID:CONTROLLERS:PATH`, `root` where groups are mounted.
+/// The smallest limit of some control groups and their ancestors. `groups` is the text of Linux's `/proc/self/cgroup`, lines of
+/// `ID:CONTROLLERS:PATH`; `root` is where groups are mounted.
 fn group_limit(groups: &str, root: &Path) -> Option<u64> {
     let limits = groups.lines().filter_map(|line| {
         let mut parts = line.splitn(3, ':').skip(1);
         let (controllers, group) = (parts.next()?, parts.next()?);
         let (folder, file) = match controllers {
-            // Version 2 has one tree of groups for all.
+            // Version 2 has a single tree of groups.
             "" => (root.to_owned(), "memory.max"),
             _ if controllers.split(',').any(|name| name == "memory") => (root.join("memory"), "memory.limit_in_bytes"),
             _ => return None,
         };
-        // Within a container the path may be that outside, so groups may be missing.
+        // Within a container the path may be the one outside it, so groups may be missing.
         let groups = Path::new(group.trim_start_matches('/')).ancestors();
         let limit = |group: &Path| fs::read_to_string(folder.join(group).join(file)).ok()?.trim().parse::<u64>().ok();
         groups.filter_map(limit).min()
@@ -60,7 +60,7 @@ mod tests {
         write("memory/docker/memory.limit_in_bytes", "1024\n");
         let both = "12:cpu:/docker\n3:memory,hugetlb:/docker\n0::/a/b\n";
         assert_eq!(limit(both), Some(1024));
-        // The path of a container is not there within it.
+        // Within a container the container's own path does not exist.
         write("memory/memory.limit_in_bytes", "512\n");
         assert_eq!(limit("3:memory:/elsewhere\n"), Some(512));
     }

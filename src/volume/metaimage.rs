@@ -1,7 +1,7 @@
-//! MetaImage files: a text header, then the samples, in the same file (`.mha`) or in one or more of their own (`.mhd`), as they are or as a
-//! zlib stream.
+//! MetaImage files: a text header, then the samples, raw or as a zlib stream, in the same file (`.mha`) or in one or more data files
+//! (`.mhd`).
 //!
-//! Directions and origins are LPS, as ITK means them. The file must end where the samples end.
+//! Directions and origins are in LPS, as in ITK. The file must end where the samples end.
 
 use std::path::Path;
 
@@ -41,11 +41,11 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     Ok(Loaded { spacing, unit, orientation, ..loaded })
 }
 
-/// The fields of a header, and the names of the files in a list at its end.
+/// The fields of a header, and the names of files in a list at its end.
 struct Header(Fields, Vec<String>);
 
 impl Header {
-    /// Reads the header and leaves `file` where the data of a local one begin.
+    /// Reads the header and leaves `file` where the data of a local one begins.
     fn read(file: &mut Source) -> Result<Self, VolumeError> {
         let mut fields = Fields::new(file.path.clone());
         let mut budget = MAX_HEADER;
@@ -63,7 +63,7 @@ impl Header {
         Err(fields.invalid("header", "the end of the file", "a last field ElementDataFile"))
     }
 
-    /// Refuses what is no volume of one number per voxel.
+    /// Refuses anything but a volume of one number per voxel.
     fn check_kind(&self) -> Result<(), VolumeError> {
         let is = |name: &str, expected: &str, default: &str| {
             let matches = |text: Option<&str>| (text.unwrap_or(default).eq_ignore_ascii_case(expected)).then_some(());
@@ -75,7 +75,7 @@ impl Header {
         is("BinaryData", "True", "True")
     }
 
-    /// `True` or `False`.
+    /// A field that is `True` or `False`.
     fn flag(&self, name: &str) -> Result<Option<bool>, VolumeError> {
         self.0.value(name, "True or False", |text| match text.map(str::to_ascii_lowercase).as_deref() {
             None => Some(None),
@@ -85,7 +85,7 @@ impl Header {
         })
     }
 
-    /// N numbers, under the first of a field's names that is there.
+    /// N numbers, from the first field with one of these names that is present.
     fn numbers<const N: usize>(&self, names: &[&str]) -> Result<Option<(String, [f64; N])>, VolumeError> {
         let Some(name) = names.iter().find(|name| self.0.get(name).is_some()) else { return Ok(None) };
         let numbers = self.0.value(name, &format!("finite numbers, {N} of them"), |text| {
@@ -123,7 +123,7 @@ impl Header {
         Ok(Some(DVec3::from_array(spacing)))
     }
 
-    /// Three numbers at a time are an axis of the volume.
+    /// The orientation; three numbers at a time are an axis of the volume.
     fn orientation(&self) -> Result<Option<Orientation>, VolumeError> {
         let Some((name, matrix)) = self.numbers(&["TransformMatrix", "Rotation", "Orientation"])? else {
             return Ok(None);
@@ -136,7 +136,7 @@ impl Header {
         Ok(Some(Orientation { axes: DMat3::from_diagonal(RAS_FROM_LPS) * axes, origin: RAS_FROM_LPS * origin }))
     }
 
-    /// How many bytes to skip in the data file; `None`: the samples end where it ends.
+    /// The number of bytes to skip in the data file; `None` if the samples end where the file ends.
     fn header_size(&self) -> Result<Option<u64>, VolumeError> {
         let is_compressed = self.flag("CompressedData")?.unwrap_or(false);
         self.0.value("HeaderSize", "a number of bytes, or -1 if the data are not compressed", |text| match text {
@@ -147,7 +147,7 @@ impl Header {
         })
     }
 
-    /// Where the samples are, if they are not in the header's own file.
+    /// The data files; `None` if the samples are in the header's own file.
     fn data_files(&self, samples: &Samples) -> Result<Option<DataFiles>, VolumeError> {
         let value = self.0.get("ElementDataFile").unwrap_or_default();
         let header = &self.0.path;
@@ -163,7 +163,7 @@ impl Header {
             &[pattern, min, max, step] if pattern.contains('%') => {
                 DataFiles::numbered(header, [pattern, min, max, step], 2)
             }
-            // From 1, as ITK has it.
+            // ITK counts from 1.
             [pattern] if pattern.contains('%') => {
                 DataFiles::numbered(header, [pattern, "1", &samples.dims.z.to_string(), "1"], 2)
             }
@@ -184,7 +184,7 @@ fn sample_type(name: &str) -> Option<SampleType> {
         "MET_UCHAR" => SampleType::U8,
         "MET_SHORT" => SampleType::I16,
         "MET_USHORT" => SampleType::U16,
-        // In files, though not in C, a long has 4 bytes.
+        // A long has 4 bytes in these files, whatever C says.
         "MET_INT" | "MET_LONG" => SampleType::I32,
         "MET_UINT" | "MET_ULONG" => SampleType::U32,
         "MET_LONG_LONG" => SampleType::I64,

@@ -1,5 +1,5 @@
-//! MGH files, as FreeSurfer writes them, plain (`.mgh`) or gzipped (`.mgz`): a binary header of 284 bytes, big-endian, then the
-//! samples. What follows these, parameters of the scan and a history, has no bearing on the volume.
+//! FreeSurfer's MGH files, plain (`.mgh`) or gzipped (`.mgz`): a big-endian binary header of 284 bytes, then the samples. Scan
+//! parameters and a history may follow; they do not affect the volume.
 
 use std::io::BufRead;
 use std::path::Path;
@@ -14,14 +14,14 @@ use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
 use super::shear::{self, Lattice};
 use super::source::{invalid, io_error};
 
-/// Bytes before the samples.
+/// The size of the header in bytes.
 const HEADER: u64 = 284;
 
-/// Numbers of the format's data types.
+/// The format's codes of data types.
 const TYPES: [(i32, SampleType); 4] =
     [(0, SampleType::U8), (1, SampleType::I32), (3, SampleType::F32), (4, SampleType::I16)];
 
-/// The fields of the directions.
+/// The fields with the directions.
 const DIRECTIONS: &str = "x_ras, y_ras, z_ras";
 
 /// Reads a file with one frame.
@@ -53,7 +53,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     }
     let steps = [x * spacing.x, y * spacing.y, z * spacing.z];
     let lattice = Lattice::of(steps).map_err(|found| invalid(path, DIRECTIONS, found, shear::allowed()))?;
-    // The centre is that of voxel `dims / 2`, half a voxel beyond the middle of the centres.
+    // The stated centre is the position of voxel `dims / 2`, half a voxel beyond the middle of the voxel centres.
     let origin = center - DMat3::from_cols(steps[0], steps[1], steps[2]) * (dims.as_dvec3() / 2.0);
     let samples = Samples { kind, dims, big_endian: true, rescale: None, z_fastest: false };
     let orientation = Some(Orientation { axes: lattice.axes, origin });
@@ -78,8 +78,8 @@ impl Header {
         DVec3::from_array(std::array::from_fn(|i| f32::from_be_bytes(self.bytes(at + 4 * i)).into()))
     }
 
-    /// Spacing, directions of x, y and z, and centre, in RAS and millimetres. Without `goodRASFlag` these are FreeSurfer's
-    /// defaults: coronal slices, 1 mm apart.
+    /// Spacing, directions of x, y and z, and centre, in RAS and millimetres. Without `goodRASFlag` these are FreeSurfer's defaults:
+    /// coronal slices, 1 mm apart.
     fn geometry(&self) -> [DVec3; 5] {
         match i16::from_be_bytes(self.bytes(28)) {
             1.. => [30, 42, 54, 66, 78].map(|at| self.vector(at)),

@@ -1,4 +1,4 @@
-//! Scalar volumes: extent, spacing and values, without any appearance.
+//! Scalar volumes: dimensions, spacing and values, without any appearance.
 
 mod access;
 pub mod builtin;
@@ -57,8 +57,7 @@ pub(crate) use samples::{SIZES, dims_of};
 
 use crate::setting_error::SettingError;
 
-/// Why a volume could not be loaded. Every message names the file (or builtin), the field, what was found and what is
-/// allowed.
+/// Why a volume could not be loaded. Every message names the file (or builtin), the field, what was found and what is allowed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VolumeError {
@@ -68,16 +67,16 @@ pub enum VolumeError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// The operating system's error.
         source: std::io::Error,
     },
-    /// A header field, or the data it promises, is wrong.
+    /// A header field, or the data it promises, is invalid.
     #[error("{origin}: {field}: found {found}, allowed: {allowed}")]
     #[non_exhaustive]
     Invalid {
         /// The file, or `builtin:NAME`.
         origin: String,
-        /// The header field or part of the file (`sizes`, `space directions`, `data`).
+        /// The header field or the part of the file (`sizes`, `space directions`, `data`).
         field: String,
         /// What was found there.
         found: String,
@@ -86,16 +85,16 @@ pub enum VolumeError {
     },
 }
 
-/// How a file holds a volume.
+/// How a file stores a volume.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Encoding {
     /// The format's name: `NRRD`, `NIfTI`, `raw`.
     pub format: &'static str,
-    /// The type of its samples, before slope and intercept.
+    /// The type of its samples, before slope and intercept are applied.
     pub sample_type: SampleType,
 }
 
-/// A grid that is not allowed.
+/// The error for an invalid grid.
 fn refused(origin: &str, error: SettingError) -> VolumeError {
     invalid(origin, &error.key, error.found.to_string(), error.allowed.to_string())
 }
@@ -107,12 +106,12 @@ fn invalid(origin: &str, field: &str, found: String, allowed: String) -> VolumeE
 /// A scalar volume on a rectilinear grid (SPEC §2): `dims` voxels, x fastest in memory, `spacing` world units apart.
 ///
 /// World axes are the volume's axes and the origin is the volume's centre. Values are finite `f32`, except in holes (SPEC §3), where
-/// they are NaN. A segmented volume has a label for every voxel besides; clones share them.
+/// they are NaN. A segmented volume also has a label per voxel. Clones share values and labels.
 #[derive(Clone, Debug)]
 pub struct Volume {
     grid: Grid,
     values: Vec<f32>,
-    /// How many of the values are NaN.
+    /// The number of NaN values.
     holes: u64,
     labels: Option<Arc<[u16]>>,
     label_names: BTreeMap<u16, String>,
@@ -123,7 +122,7 @@ pub struct Volume {
 }
 
 impl PartialEq for Volume {
-    /// Two holes are equal.
+    /// Two holes compare as equal.
     fn eq(&self, other: &Self) -> bool {
         let Self { grid, values, holes, labels, label_names, orientation, unit, encoding, palette } = other;
         let facts = (grid, holes, labels, label_names, orientation, unit, encoding, palette);
@@ -134,11 +133,11 @@ impl PartialEq for Volume {
 }
 
 impl Volume {
-    /// A volume from its values, x fastest. A value that is NaN or infinite is a hole (SPEC §3). `origin` names the volume in errors.
+    /// Makes a volume from its values, x fastest. A NaN or infinite value is a hole (SPEC §3). `origin` names the volume in errors.
     ///
     /// # Errors
-    /// If a dimension is 0, there are more than `u32::MAX` voxels, the number of values differs from the product of the
-    /// dimensions, a spacing is not within [1e-100, 1e100] or 10⁴ times another, or no value is finite.
+    /// If a dimension is 0, there are more than `u32::MAX` voxels, the number of values differs from the product of the dimensions, a
+    /// spacing is not within [1e-100, 1e100] or is more than 10⁴ times another, or no value is finite.
     pub fn new(origin: &str, dims: UVec3, spacing: DVec3, mut values: Vec<f32>) -> Result<Self, VolumeError> {
         let invalid = |field: &str, found: String, allowed: &str| invalid(origin, field, found, allowed.to_owned());
         let grid = Grid { dims, spacing };
@@ -165,7 +164,7 @@ impl Volume {
         })
     }
 
-    /// The same values at another spacing (world units per voxel step).
+    /// The same values with another spacing (world units between neighbouring voxels).
     ///
     /// # Errors
     /// If a spacing is not within [1e-100, 1e100] or is more than 10⁴ times another.
@@ -175,23 +174,23 @@ impl Volume {
         Ok(self)
     }
 
-    /// Reads a volume file. Its format is told by its first bytes, or else by the extension: NRRD (`.nrrd`, `.nhdr`), and, each
-    /// with the feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MGH (`.mgh`, `.mgz`), MetaImage (`.mha`, `.mhd`), NPY (`.npy`, and its
-    /// archives `.npz`: their one array, or the one named as in `file.npz:name`), TIFF
-    /// (`.tif`, `.tiff`), DICOM (`.dcm`) and VTK (`.vti`, `.vtk`). Or a folder of slices: TIFF files of one page, or DICOM files of one
+    /// Reads a volume file. Its first bytes determine the format, or else its extension: NRRD (`.nrrd`, `.nhdr`), and, each with the
+    /// feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MGH (`.mgh`, `.mgz`), MetaImage (`.mha`, `.mhd`), NPY
+    /// (`.npy`) and its archives (`.npz`: their only array, or the one named as in `file.npz:name`), TIFF (`.tif`, `.tiff`), DICOM
+    /// (`.dcm`) and VTK (`.vti`, `.vtk`). The path may also be a folder of slices: TIFF files of one page, or the DICOM files of one
     /// series.
     ///
     /// # Errors
-    /// If the file cannot be read, is of no format that is compiled in, does not hold what its header promises, or would take more memory
+    /// If the file cannot be read, is of no format that is compiled in, does not hold what its header promises, or needs more memory
     /// than [`ReadOptions::memory`] allows by default.
     pub fn open(path: &Path) -> Result<Self, VolumeError> {
         Self::open_with(path, &ReadOptions::default())
     }
 
-    /// As [`Self::open`], with a choice of the folder that files must lie in and of the memory limit.
+    /// Like [`Self::open`], with a folder that files must lie in and a memory limit.
     ///
     /// # Errors
-    /// As [`Self::open`], and if the file, or one that its header names, is not in the folder.
+    /// As for [`Self::open`], and if the file, or one that its header names, lies outside the folder.
     pub fn open_with(path: &Path, options: &ReadOptions) -> Result<Self, VolumeError> {
         Self::read(path, &Access::new(options)?)
     }
@@ -205,48 +204,47 @@ impl Volume {
         Self { unit, encoding, palette, label_names, ..volume }.with_orientation(&origin, orientation)
     }
 
-    /// Where the voxels are.
+    /// The grid of the voxels.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
 
-    /// Voxels along x, y and z.
+    /// The number of voxels along x, y and z.
     pub fn dims(&self) -> UVec3 {
         self.grid.dims
     }
 
-    /// World units from voxel to voxel along x, y and z.
+    /// The distance between neighbouring voxels along x, y and z, in world units.
     pub fn spacing(&self) -> DVec3 {
         self.grid.spacing
     }
 
-    /// What a world unit is, if the file says so: `mm`, `µm`, or what else stands there.
+    /// The name of the world unit, if the file states it: `mm`, `µm`, or whatever else it states.
     pub fn unit(&self) -> Option<&str> {
         self.unit.as_deref()
     }
 
-    /// How the file held the values; `None` if they come from no file.
+    /// How the file stored the values; `None` if they come from no file.
     pub fn encoding(&self) -> Option<Encoding> {
         self.encoding
     }
 
-    /// The colours, red, green and blue in [0, 1], that the file gives to values, ascending by value; `None` if it has no palette.
+    /// The colours (red, green and blue in [0, 1]) that the file assigns to values, in ascending order; `None` without a palette.
     pub fn palette(&self) -> Option<&[(f64, DVec3)]> {
         self.palette.as_deref()
     }
 
-    /// All values, x fastest, then y, then z. Those of holes are NaN.
+    /// All values, x fastest, then y, then z. Holes are NaN.
     pub fn values(&self) -> &[f32] {
         &self.values
     }
 
-    /// How many voxels are holes: their samples are NaN or infinite. They never take part in an image, nor in what is said of the
-    /// volume's values.
+    /// The number of holes: voxels whose samples are NaN or infinite. They appear in no image and no statistics.
     pub fn holes(&self) -> u64 {
         self.holes
     }
 
-    /// The value of one voxel, NaN in a hole.
+    /// The value of one voxel; NaN in a hole.
     ///
     /// # Panics
     /// If the voxel lies outside the volume.
@@ -256,8 +254,8 @@ impl Volume {
         self.values[(voxel.x + dims.x * (voxel.y + dims.y * voxel.z)) as usize]
     }
 
-    /// Gradient in value per world unit, estimated in the unwarped space (§4.2): central differences, one-sided at the
-    /// border and beside a hole, 0 along an axis without a neighbour on either side, and 0 in a hole.
+    /// The gradient in value per world unit, estimated in the unwarped space (§4.2) by central differences: one-sided at the border and
+    /// beside a hole, 0 along an axis without a neighbour on either side, and 0 in a hole.
     pub fn gradient(&self, voxel: UVec3) -> DVec3 {
         let Grid { dims, spacing } = self.grid;
         let strides = [1, dims.x as usize, dims.x as usize * dims.y as usize];
@@ -281,7 +279,7 @@ impl Volume {
     }
 }
 
-/// Makes holes of the values that are not finite; how many they are.
+/// Replaces values that are not finite by NaN and returns their number.
 fn punch_holes(values: &mut [f32]) -> u64 {
     let punch = |value: &mut f32| {
         let is_hole = !value.is_finite();

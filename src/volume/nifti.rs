@@ -1,9 +1,9 @@
-//! NIfTI-1 and NIfTI-2 files: a binary header, then the samples, in the same file (`.nii`) or in one of their own (`.hdr`, `.img`),
-//! each of them gzipped or not.
+//! NIfTI-1 and NIfTI-2 files: a binary header, then the samples in the same file (`.nii`) or in a second one (`.hdr`, `.img`), each
+//! gzipped or not.
 //!
-//! Spacing and orientation are those of the sform if there is one, else those of the qform, else only `pixdim` counts. The file
-//! must end where the samples end. Where headers in use break the standard's rules, they are read as nibabel and ITK read them. Of
-//! complex samples the magnitude is the value.
+//! The sform determines spacing and orientation, or else the qform; without either only `pixdim` counts. The file must end where the
+//! samples end. Headers that break the standard's rules are read as nibabel and ITK read them. The value of a complex sample is its
+//! magnitude.
 
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
 use super::shear::{self, Lattice};
 use super::source::{invalid, io_error};
 
-/// Numbers of the format's data types, and bits of each.
+/// The format's codes of data types, and the bits of each.
 const TYPES: [(i64, SampleType); 10] = [
     (2, SampleType::U8),
     (4, SampleType::I16),
@@ -32,13 +32,13 @@ const TYPES: [(i64, SampleType); 10] = [
     (1280, SampleType::U64),
 ];
 
-/// Complex data types, and the type of either part.
+/// Codes of complex data types, and the type of their parts.
 const COMPLEX_TYPES: [(i64, SampleType); 2] = [(32, SampleType::F32), (1792, SampleType::F64)];
 
-/// The fields of the sform.
+/// The fields with the sform.
 const SFORM: &str = "srow_x, srow_y, srow_z";
 
-/// Reads a file, or the two files of a pair by the name of either.
+/// Reads a single file, or a pair of files by the name of either.
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let header_path = sibling(path, ".img", ".hdr").unwrap_or_else(|| path.to_owned());
     let mut stream = open(&header_path, access)?;
@@ -70,8 +70,8 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     lattice.straighten(path, SFORM, loaded, access)
 }
 
-/// The magnitudes of complex samples, each a real and an imaginary part. Slope and intercept count before: those of the parts, and
-/// the intercept of the real one.
+/// The magnitudes of complex samples, each a real and an imaginary part. Slope and intercept are applied first: the slope to both
+/// parts, the intercept to the real part.
 fn magnitudes<T: Voxel>(
     header: &Header,
     samples: &Samples,
@@ -92,8 +92,8 @@ fn magnitudes<T: Voxel>(
     Ok(values)
 }
 
-/// The rest of a file's name where it ends with `from`, or with that and `.gz`; with `to` instead. All of them are in upper case if
-/// the name's end is.
+/// The file's name with the ending `from`, or `from` and `.gz`, replaced by `to`; `None` if it ends otherwise. The new ending is in
+/// upper case if the old one is.
 fn sibling(path: &Path, from: &str, to: &str) -> Option<PathBuf> {
     let name = path.file_name()?.to_str()?;
     [str::to_ascii_lowercase, str::to_ascii_uppercase].iter().find_map(|case| {
@@ -108,10 +108,10 @@ fn open(path: &Path, access: &Access) -> Result<Stream, VolumeError> {
     if is_gzip { Stream::gzip(file) } else { Stream::raw(file) }
 }
 
-/// The fields that count, as numbers of one type, whichever the version.
+/// The fields that count, with the same types in both versions.
 struct Header {
     path: PathBuf,
-    /// Bytes that the header takes up.
+    /// The size of the header in bytes.
     bytes: u64,
     big_endian: bool,
     is_pair: bool,
@@ -130,14 +130,14 @@ struct Header {
     srows: [[f64; 4]; 3],
 }
 
-/// The bytes of a header, by their place in it.
+/// A header's bytes, read by offset.
 struct Bytes {
     bytes: Vec<u8>,
     big_endian: bool,
 }
 
 impl Bytes {
-    /// Little-endian bytes of a number.
+    /// The bytes of a number, in little-endian order.
     fn at<const N: usize>(&self, at: usize) -> [u8; N] {
         let mut bytes = [0; N];
         bytes.copy_from_slice(&self.bytes[at..at + N]);
@@ -165,7 +165,7 @@ impl Bytes {
 }
 
 impl Header {
-    /// Reads the header and nothing more.
+    /// Reads only the header.
     fn read(path: &Path, stream: &mut Stream) -> Result<Self, VolumeError> {
         let mut bytes = stream.bytes(348)?;
         let size = bytes.first_chunk().map_or([0; 4], |&size| size);
@@ -245,7 +245,7 @@ impl Header {
         })
     }
 
-    /// The type of the samples or of their parts, and whether they have a real and an imaginary one.
+    /// The type of the samples or of their parts, and whether they are complex.
     fn sample_type(&self) -> Result<(SampleType, bool), VolumeError> {
         let of =
             |types: &[(i64, SampleType)]| types.iter().find(|(code, _)| *code == self.datatype).map(|&(_, kind)| kind);
@@ -262,10 +262,10 @@ impl Header {
         Ok((kind, complex.is_some()))
     }
 
-    /// Bytes between the header, or the beginning of the other file, and the samples.
+    /// The number of bytes between the header, or the beginning of the second file, and the samples.
     fn vox_offset(&self) -> Result<u64, VolumeError> {
         let before = if self.is_pair { 0 } else { self.bytes };
-        // A single file has four bytes after the header that announce extensions.
+        // In a single file four bytes after the header announce extensions.
         let least = if self.is_pair { 0 } else { before + 4 };
         let offset = self.vox_offset;
         if offset.fract() != 0.0 || !(least as f64..=i64::MAX as f64).contains(&offset) {
@@ -274,7 +274,7 @@ impl Header {
         Ok(offset as u64 - before)
     }
 
-    /// A slope of 0 stands for no scaling, and so does one that is not finite: then the intercept has no meaning either.
+    /// Slope and intercept; `None` if the slope is 0 or not finite, in which case neither applies.
     fn rescale(&self) -> Result<Option<[f64; 2]>, VolumeError> {
         let [slope, intercept] = self.slope_and_intercept;
         if slope == 0.0 || !slope.is_finite() || [slope, intercept] == [1.0, 0.0] {
@@ -288,7 +288,7 @@ impl Header {
     }
 
     fn unit(&self) -> Option<String> {
-        // The bits above are the unit of time.
+        // The higher bits are the unit of time.
         let name = match self.xyzt_units & 7 {
             1 => "m",
             2 => "mm",
@@ -314,7 +314,7 @@ impl Header {
         Ok((Lattice::straight(spacing, axes), Some(Orientation { axes, origin })))
     }
 
-    /// `pixdim`: nibabel and ITK read zeros as 1, and negative numbers without their sign.
+    /// The spacing by `pixdim`. As in nibabel and ITK, 0 is read as 1 and negative numbers by their magnitude.
     fn spacing(&self) -> Result<DVec3, VolumeError> {
         let [_, written @ ..] = self.pixdim;
         if !written.iter().all(|spacing| spacing.is_finite()) {
@@ -322,14 +322,14 @@ impl Header {
         }
         let spacing = written.map(|spacing| if spacing == 0.0 { 1.0 } else { spacing.abs() });
         if spacing != written {
-            log::warn!("{}: pixdim: {written:?} is no spacing: taken to be {spacing:?}", self.path.display());
+            log::warn!("{}: pixdim: {written:?} is not a spacing: using {spacing:?}", self.path.display());
         }
         Ok(DVec3::from_array(spacing))
     }
 
     fn qform_axes(&self) -> Result<DMat3, VolumeError> {
         let squares = self.quatern_bcd.length_squared();
-        // Written as `f32`, a half turn's may be a little above 1.
+        // Stored as `f32`, the squares of a half turn may add up to a little more than 1.
         if squares.is_nan() || squares > 1.0 + 1e-5 {
             let allowed = "three numbers whose squares add up to at most 1";
             return Err(self.invalid("quatern_b, quatern_c, quatern_d", self.quatern_bcd, allowed));

@@ -1,7 +1,7 @@
-//! NPY files of NumPy: a header of three fields, then the samples.
+//! NumPy's NPY files: a header of three fields, then the samples.
 //!
-//! An array's axes are z, y and x, whichever of them is fastest in memory. The header is read here, not by `npyz`: that allocates
-//! what a header's length says, multiplies sizes unchecked, and recurses into nested brackets.
+//! An array's axes are z, y and x, whichever is fastest in memory. The header is read here, not by `npyz`, which allocates whatever
+//! length a header states, multiplies sizes unchecked, and recurses into nested brackets.
 
 use std::path::Path;
 
@@ -57,7 +57,7 @@ fn header(path: &Path, stream: &mut Stream) -> Result<String, VolumeError> {
     Ok(String::from_utf8_lossy(&stream.bytes(length)?).into_owned())
 }
 
-/// `{'descr': '<f4', 'fortran_order': False, 'shape': (3, 4, 5), }`, the fields in any order.
+/// Parses `{'descr': '<f4', 'fortran_order': False, 'shape': (3, 4, 5), }`, whose fields come in any order.
 fn parse(path: &Path, header: &str) -> Result<Samples, VolumeError> {
     let field = |name: &str, allowed: &str| {
         let dict = header.trim().strip_prefix('{').and_then(|dict| dict.strip_suffix('}'));

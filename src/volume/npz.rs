@@ -1,7 +1,7 @@
-//! NPZ files of NumPy: ZIP archives of NPY files, stored or deflated.
+//! NumPy's NPZ files: ZIP archives of NPY files, stored or deflated.
 //!
-//! The archive's directory is read here: crates for it make room for as many files as the archive says it has, and all that is needed
-//! is where an array begins.
+//! The archive's directory is read here: crates for ZIP allocate as many entries as the archive claims to have, and only the place
+//! where an array begins is needed.
 
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -17,14 +17,14 @@ use super::npy;
 use super::samples::{MAX_EXPANSION, Stream, Voxel};
 use super::source::{Source, invalid, io_error, shown};
 
-/// The end of a directory without its comment, and the longest comment.
+/// The size of the directory's end record without its comment, and the maximum length of the comment.
 const END: u64 = 22;
 const MAX_COMMENT: u64 = 0xffff;
 
-/// Names shown in errors.
+/// The maximum number of names shown in an error.
 const SHOWN: usize = 12;
 
-/// Reads the one array of a file, or the one that the path names behind a colon: `file.npz:name`.
+/// Reads the only array of a file, or the one that the path names after a colon: `file.npz:name`.
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let (archive, wanted) = archive_and_array(path);
     let mut file = access.open(archive)?;
@@ -47,7 +47,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
         (Some(name), _) => members
             .iter()
             .find(|member| member.array_name() == name)
-            .ok_or_else(|| invalid(path, "arrays", names(), format!("one that is called {}", shown(name))))?,
+            .ok_or_else(|| invalid(path, "arrays", names(), format!("an array called {}", shown(name))))?,
     };
     npy::read_array(path, member.open(file)?)
 }
@@ -71,7 +71,7 @@ impl Directory {
         if files < 0xffff && at < 0xffff_ffff {
             return Ok(Self { at, files });
         }
-        // Of a large archive the numbers are in an end of their own, which is found by what is before the other one.
+        // A large archive keeps these numbers in a ZIP64 end record, whose locator precedes the ordinary one.
         let locator = (length - tail + end as u64).checked_sub(20).ok_or_else(|| damaged(file))?;
         let locator = bytes_at(file, locator, 20)?;
         let end = bytes_at(file, number(&locator, 8, 8), 56)?;
@@ -123,12 +123,12 @@ struct Member {
 }
 
 impl Member {
-    /// What NumPy calls it.
+    /// The name in NumPy.
     fn array_name(&self) -> &str {
         self.name.strip_suffix(".npy").unwrap_or(&self.name)
     }
 
-    /// Takes those numbers that are too large for 32 bits from where they are, if they are there.
+    /// Replaces numbers that are too large for 32 bits by those of the extra field, if it has them.
     fn widen(&mut self, mut extra: &[u8]) -> Option<()> {
         const WIDE: u64 = 1;
         while extra.len() >= 4 {
@@ -147,7 +147,7 @@ impl Member {
         Some(())
     }
 
-    /// The bytes of the file.
+    /// A stream of the file's bytes.
     fn open(&self, mut file: Source) -> Result<Stream, VolumeError> {
         const STORED: u64 = 0;
         const DEFLATED: u64 = 8;
@@ -180,7 +180,7 @@ impl Member {
     }
 }
 
-/// Bytes whose checksum is known.
+/// A reader that checks its bytes against a checksum.
 struct Checked<R> {
     reader: R,
     sum: Crc,
@@ -198,13 +198,13 @@ impl<R: Read> Read for Checked<R> {
         let read = self.reader.read(buffer)?;
         self.sum.update(&buffer[..read]);
         if read == 0 && !buffer.is_empty() && self.sum.sum() != self.expected {
-            return Err(io::Error::other("another checksum than the archive's"));
+            return Err(io::Error::other("a checksum that differs from the archive's"));
         }
         Ok(read)
     }
 }
 
-/// Some bytes of the file, which must be there.
+/// `bytes` bytes of the file from `at` on, all of which must exist.
 fn bytes_at(file: &mut Source, at: u64, bytes: u64) -> Result<Vec<u8>, VolumeError> {
     if at > i64::MAX as u64 {
         return Err(damaged(file));
@@ -222,7 +222,7 @@ fn damaged(file: &Source) -> VolumeError {
     invalid(&file.path, "archive", "a directory that leads out of the file, or to other bytes", "a whole ZIP archive")
 }
 
-/// The unsigned little-endian integer in `size` bytes from `at` on.
+/// The unsigned little-endian integer in the `size` bytes from `at` on.
 fn number(bytes: &[u8], at: usize, size: usize) -> u64 {
     bytes[at..at + size].iter().rev().fold(0, |number, &byte| number << 8 | u64::from(byte))
 }

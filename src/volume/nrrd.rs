@@ -1,7 +1,6 @@
-//! NRRD files: a text header, then the samples, in the same file or in one or more of their own.
+//! NRRD files: a text header, then the samples in the same file or in one or more data files.
 //!
-//! Axes are those of the array. The fields that describe what a sample means (`old min`, `kinds`, …) do not change the
-//! volume.
+//! Axes are the array's. Fields that describe the meaning of samples (`old min`, `kinds`, …) do not change the volume.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, Read};
@@ -21,7 +20,7 @@ use super::shear::{self, Lattice};
 use super::source::{MAX_HEADER, Source, invalid, io_error, lower, number, shown, three, vector};
 use super::unit;
 
-/// The field that may say that axes are not at right angles.
+/// The field with the axes, which need not be at right angles.
 const DIRECTIONS: &str = "space directions";
 
 /// Reads one NRRD file, or the detached header and the data file it names.
@@ -47,12 +46,11 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     }
 }
 
-/// The fields of a header, under the format's first spelling of their names, its pairs of keys and values, and the names of the files in
-/// a list at its end.
+/// The fields of a header under the first of their spellings, its key/value pairs, and the names of files in a list at its end.
 struct Header(Fields, BTreeMap<String, String>, Vec<String>);
 
 impl Header {
-    /// Reads the header and leaves `file` where the data of an attached one begin.
+    /// Reads the header and leaves `file` where attached data begins.
     fn read(file: &mut Source) -> Result<Self, VolumeError> {
         let mut magic = Vec::new();
         file.reader.by_ref().take(10).read_until(b'\n', &mut magic).map_err(io_error(&file.path))?;
@@ -83,8 +81,8 @@ impl Header {
         if line.starts_with('#') {
             return Ok(());
         }
-        // `key:=value` or `field: value`, whichever delimiter comes first: a value may hold the other. Some writers leave
-        // out the space.
+        // A line is `key:=value` or `field: value`, whichever delimiter comes first: a value may contain the other one. Some writers omit
+        // the space.
         let delimits =
             |&(at, _): &(usize, &str)| matches!(line.as_bytes().get(at + 1), Some(b'=' | b' ' | b'\t') | None);
         let Some((at, _)) = line.match_indices(':').find(delimits).or_else(|| line.match_indices(':').next()) else {
@@ -132,7 +130,7 @@ impl Header {
         }
     }
 
-    /// The unit of all axes, of the space or else of the array: three names in quotes.
+    /// The unit that all axes share, from the space or else from the array: three quoted names.
     fn unit(&self) -> Option<String> {
         let names = self.0.get("space units").or(self.0.get("units"))?.split('"').skip(1).step_by(2);
         unit::common(names)
@@ -147,7 +145,7 @@ impl Header {
         self.1.iter().filter_map(label).collect()
     }
 
-    /// The lattice of the axis vectors of `space directions`.
+    /// The lattice that `space directions` gives.
     fn directions(&self) -> Result<Lattice, VolumeError> {
         let allowed = "three vectors (x,y,z) of positive finite length, none of them `none`";
         let axes = self.0.value(DIRECTIONS, allowed, |text| {
@@ -157,7 +155,7 @@ impl Header {
         Lattice::of(axes).map_err(|found| self.0.invalid(DIRECTIONS, found, shear::allowed()))
     }
 
-    /// How axes of these directions lie in a patient; other spaces than a patient's have no such thing.
+    /// The orientation for axes with these directions; `None` in a space that is not a patient's.
     fn orientation(&self, axes: DMat3) -> Result<Option<Orientation>, VolumeError> {
         let ras_from_space = match self.0.get("space").map(lower).as_deref() {
             Some("right-anterior-superior" | "ras") => DVec3::ONE,
@@ -170,7 +168,7 @@ impl Header {
         Ok(Some(Orientation { axes, origin: ras_from_space * origin }))
     }
 
-    /// Where the samples are, if they are not in the header's own file.
+    /// The data files; `None` if the samples are in the header's own file.
     fn data_files(&self) -> Result<Option<DataFiles>, VolumeError> {
         let Some(value) = self.0.get("data file") else { return Ok(None) };
         let header = &self.0.path;
@@ -219,7 +217,7 @@ impl Header {
             })?;
         let skips = self.0.get("line skip").or(self.0.get("byte skip")).is_some();
         let window = skips && self.0.get("data file").is_some();
-        // Text becomes samples in the machine's order.
+        // Text is converted to samples in the machine's byte order.
         let big_endian = if encoding == Encoding::Text { cfg!(target_endian = "big") } else { big_endian };
         let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
         Ok(Layout { samples, encoding, line_skip, byte_skip, window })
@@ -255,20 +253,20 @@ enum Encoding {
     Hex,
 }
 
-/// How the samples lie in their file, or in each of their files.
+/// How the samples are stored in their file, or in each of their files.
 struct Layout {
-    /// All of them.
+    /// The samples of all files together.
     samples: Samples,
     encoding: Encoding,
     line_skip: u64,
-    /// `None`: the samples end where the file ends.
+    /// The number of bytes to skip; `None` if the samples end where the file ends.
     byte_skip: Option<u64>,
-    /// The header says where in a file of another format the samples begin, so something may follow them.
+    /// The header says where the samples begin in a file of another format, so more data may follow them.
     window: bool,
 }
 
 impl Layout {
-    /// Reads the samples that one file has.
+    /// Reads the samples in one file.
     fn read<T: Voxel>(&self, mut file: Source, samples: &Samples) -> Result<Vec<T>, VolumeError> {
         file.skip_lines(self.line_skip)?;
         if matches!(self.encoding, Encoding::Text | Encoding::Hex) {
@@ -283,17 +281,17 @@ impl Layout {
         };
         let before_the_end = |left: u64| left.saturating_sub(samples.bytes());
         stream.skip(self.byte_skip.unwrap_or_else(|| stream.exactly_left().map_or(0, before_the_end)))?;
-        // What a compressed stream holds beyond the samples nobody can mean.
+        // Beyond the samples a compressed stream must end.
         stream.samples(samples, self.window && self.encoding == Encoding::Raw)
     }
 }
 
-/// Whether the value of `data file` says that names follow.
+/// Whether the value of `data file` announces a list of names.
 fn is_list(value: &str) -> bool {
     value.split_whitespace().next() == Some("LIST")
 }
 
-/// Three vectors `(x,y,z)`, with or without space between them.
+/// Three vectors `(x,y,z)`, with or without spaces between them.
 fn vectors(text: &str) -> Option<[DVec3; 3]> {
     three(text.split_inclusive(')').map(vector))
 }

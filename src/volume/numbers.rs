@@ -4,30 +4,30 @@ use std::io::{self, BufRead, Read};
 
 use super::samples::SampleType;
 
-/// No number is written with more bytes.
+/// The maximum number of bytes in a number.
 const MAX_TOKEN: usize = 64;
 
-/// What ends a text of numbers besides the end of the file.
+/// What ends a text of numbers, besides the end of the file.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum TextEnd {
-    /// Nothing else.
+    /// Only the end of the file.
     File,
     /// An XML tag.
     #[cfg(feature = "vtk")]
     Tag,
-    /// One of these words, which begin what may follow.
+    /// One of these words, which begin the next section.
     #[cfg(feature = "vtk")]
     Words(&'static [&'static str]),
 }
 
-/// The numbers in a text, as the bytes of samples in the machine's byte order.
+/// Numbers in a text, read as the bytes of samples in the machine's byte order.
 pub(super) struct Numbers<R> {
     reader: R,
     kind: SampleType,
     end: TextEnd,
     token: Vec<u8>,
     samples: Vec<u8>,
-    /// How many bytes of `samples` are read.
+    /// The number of bytes of `samples` that are consumed.
     read: usize,
     has_ended: bool,
 }
@@ -37,7 +37,7 @@ impl<R: BufRead> Numbers<R> {
         Self { reader, kind, end, token: Vec::new(), samples: Vec::new(), read: 0, has_ended: false }
     }
 
-    /// Turns what is in the reader's buffer into samples, but for a number that may go on.
+    /// Converts the reader's buffer into samples, except a number at its end, which may continue.
     fn fill(&mut self) -> io::Result<()> {
         self.samples.clear();
         self.read = 0;
@@ -45,13 +45,13 @@ impl<R: BufRead> Numbers<R> {
         if buffer.is_empty() {
             self.has_ended = true;
             if !self.token.is_empty() {
-                // It may have been a longer one.
+                // The last number may have been cut off.
                 return Err(io::Error::other("the end of the file after a digit, not after a line"));
             }
             return Ok(());
         }
         let length = buffer.len();
-        // Taken out, so that tokens can be finished meanwhile.
+        // The buffer is copied, so that tokens can be finished in between.
         let buffer = buffer.to_vec();
         for &byte in &buffer {
             match byte {
@@ -117,7 +117,7 @@ mod tests {
     fn bytes(text: &str, kind: SampleType) -> io::Result<Vec<u8>> {
         let end = if text.contains('<') { TextEnd::Tag } else { TextEnd::Words(&["METADATA"]) };
         let mut bytes = Vec::new();
-        // A buffer that ends within numbers.
+        // A buffer that ends in the middle of numbers.
         let text = format!("{text}\n");
         let mut numbers = Numbers::new(BufReader::with_capacity(3, text.as_bytes()), kind, end);
         numbers.read_to_end(&mut bytes)?;

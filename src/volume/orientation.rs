@@ -4,28 +4,29 @@ use glam::{DMat3, DVec3};
 
 use super::{Volume, VolumeError, invalid};
 
-/// Largest cosine between two axes that still counts as a right angle.
+/// The maximum cosine of an angle that counts as a right angle.
 pub(super) const MAX_COSINE: f64 = 1e-4;
 
-/// Largest error of a direction's length.
+/// The maximum error of a direction's length.
 #[cfg(any(feature = "metaimage", feature = "vtk"))]
 const UNIT_LENGTH: f64 = 1e-4;
 
-/// LPS, as DICOM and MetaImage count, to RAS.
+/// Converts LPS, which DICOM and MetaImage use, to RAS.
 pub(super) const RAS_FROM_LPS: DVec3 = DVec3::new(-1.0, -1.0, 1.0);
 
-/// Where a volume's axes point in a patient, in RAS: +x to the patient's right, +y to the front (anterior), +z to the head (superior).
+/// Where a volume's axes point in a patient, in RAS: +x to the patient's right, +y to the front (anterior), +z to the head
+/// (superior).
 ///
-/// It is kept beside the grid and does not move it: world axes are the volume's own (SPEC §2).
+/// The orientation does not move the grid: world axes are the volume's own (SPEC §2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orientation {
-    /// Column by column the unit vectors along the volume's x, y and z, in RAS.
+    /// The unit vectors along the volume's x, y and z in RAS, one per column.
     pub axes: DMat3,
-    /// Voxel (0, 0, 0) in RAS, in world units; 0 where the file gives none.
+    /// The position of voxel (0, 0, 0) in RAS, in world units; 0 where the file states none.
     pub origin: DVec3,
 }
 
-/// The side of a patient that is looked at.
+/// The side from which a patient is seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PatientSide {
     /// The face; the head is up.
@@ -43,7 +44,7 @@ pub enum PatientSide {
 }
 
 impl Orientation {
-    /// `Camera::direction` and `Camera::up`, in world space, for a view of the patient.
+    /// `Camera::direction` and `Camera::up`, in world space, that show this side of the patient.
     pub fn direction_and_up(&self, view: PatientSide) -> [DVec3; 2] {
         let ras = match view {
             PatientSide::Front => [DVec3::NEG_Y, DVec3::Z],
@@ -57,22 +58,22 @@ impl Orientation {
         ras.map(|vector| self.axes.transpose() * vector)
     }
 
-    /// Whether the volume's axes are left-handed in the patient, so that every image of the volume is a mirror image.
+    /// Whether the volume's axes are left-handed in the patient, so that every image of the volume is mirrored.
     pub fn is_mirrored(&self) -> bool {
         self.axes.determinant() < 0.0
     }
 }
 
 impl Volume {
-    /// How the volume lies in a patient, if its file says so.
+    /// How the volume lies in a patient, if known.
     pub fn orientation(&self) -> Option<&Orientation> {
         self.orientation.as_ref()
     }
 
-    /// The same volume, lying otherwise, or nobody knows how. `origin` names it in errors.
+    /// The same volume with another orientation, or with an unknown one. `origin` names the volume in errors.
     ///
     /// # Errors
-    /// If the axes are not unit vectors at right angles (to 1 in 10⁴), or a number is not finite.
+    /// If the axes are not orthogonal unit vectors (to 1 in 10⁴), or a number is not finite.
     pub fn with_orientation(mut self, origin: &str, orientation: Option<Orientation>) -> Result<Self, VolumeError> {
         if let Some(Orientation { axes, origin: first }) = orientation {
             let excess = (axes.transpose() * axes - DMat3::IDENTITY).to_cols_array();
@@ -91,10 +92,10 @@ impl Volume {
     }
 }
 
-/// Lengths and directions of the vectors from voxel to voxel along the three axes.
+/// The lengths and directions of the vectors between neighbouring voxels along the three axes.
 ///
 /// # Errors
-/// What they are instead of orthogonal and of positive finite length.
+/// A description of the axes if they are not orthogonal or not of positive finite length.
 pub(super) fn lengths_and_directions(steps: [DVec3; 3]) -> Result<(DVec3, DMat3), String> {
     let lengths = steps.map(DVec3::length);
     if !lengths.iter().all(|&length| length > 0.0 && length.is_finite()) {
@@ -108,10 +109,10 @@ pub(super) fn lengths_and_directions(steps: [DVec3; 3]) -> Result<(DVec3, DMat3)
     Ok((DVec3::from_array(lengths), DMat3::from_cols(x, y, z)))
 }
 
-/// Directions of three vectors that are of length 1 already.
+/// The directions of three vectors that should have length 1 already.
 ///
 /// # Errors
-/// What they are instead, and what is allowed.
+/// A description of the axes, and what is allowed.
 #[cfg(any(feature = "metaimage", feature = "vtk"))]
 pub(super) fn unit_directions(axes: [DVec3; 3]) -> Result<DMat3, (String, String)> {
     let (lengths, directions) = lengths_and_directions(axes).map_err(|found| (found, orthogonal()))?;
@@ -122,7 +123,7 @@ pub(super) fn unit_directions(axes: [DVec3; 3]) -> Result<DMat3, (String, String
     Ok(directions)
 }
 
-/// What [`lengths_and_directions`] takes.
+/// What [`lengths_and_directions`] accepts, for errors.
 #[cfg(any(feature = "dicom", feature = "metaimage", feature = "vtk"))]
 pub(super) fn orthogonal() -> String {
     format!("orthogonal axes, cosines of at most {MAX_COSINE}")

@@ -1,4 +1,4 @@
-//! Raw files: samples without a header, so that somebody else has to say what they are.
+//! Raw files: samples without a header, whose layout the caller states.
 
 use std::path::Path;
 
@@ -9,33 +9,33 @@ use super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
 use super::source::invalid;
 use super::{Encoding, Volume, VolumeError};
 
-/// What a raw file has no header to say.
+/// The layout of a raw file, which has no header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RawLayout {
-    /// Voxels along x, y and z; x is fastest.
+    /// The number of voxels along x, y and z; x is fastest.
     pub dims: UVec3,
     /// The type of the samples.
     pub sample_type: SampleType,
-    /// Whether a sample's most significant byte comes first.
+    /// Whether the most significant byte of a sample comes first.
     pub big_endian: bool,
     /// Bytes before the first sample.
     pub offset: u64,
 }
 
 impl Volume {
-    /// Reads a file of samples without a header, whatever its name. Spacing is 1.
+    /// Reads a file of samples without a header, whatever its name. The spacing is 1.
     ///
     /// # Errors
-    /// If the file cannot be read, a dimension is 0, there are more than `u32::MAX` voxels, the file does not end where the samples
-    /// do, they would take more memory than [`ReadOptions::memory`] allows by default, or no value is finite.
+    /// If the file cannot be read, a dimension is 0, there are more than `u32::MAX` voxels, the file does not end where the samples end,
+    /// they need more memory than [`ReadOptions::memory`] allows by default, or no value is finite.
     pub fn open_raw(path: &Path, layout: &RawLayout) -> Result<Self, VolumeError> {
         Self::open_raw_with(path, layout, &ReadOptions::default())
     }
 
-    /// As [`Self::open_raw`], with a choice of the folder that the file must lie in and of the memory limit.
+    /// Like [`Self::open_raw`], with a folder that the file must lie in and a memory limit.
     ///
     /// # Errors
-    /// As [`Self::open_raw`], and if the file is not in the folder.
+    /// As for [`Self::open_raw`], and if the file lies outside the folder.
     pub fn open_raw_with(path: &Path, layout: &RawLayout, options: &ReadOptions) -> Result<Self, VolumeError> {
         Self::read_raw(path, layout, &Access::new(options)?)
     }

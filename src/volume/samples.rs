@@ -1,7 +1,7 @@
-//! Samples: the numbers of a file, which become values or labels as they are read.
+//! Samples: the numbers in a file, which become values or labels while they are read.
 //!
-//! Whatever a header promises is checked against what the file can hold before memory is asked for, and samples are converted as
-//! they are read, so a load needs little more than the values themselves.
+//! What a header promises is checked against what the file can hold before memory is allocated. Samples are converted as they are
+//! read, so that loading needs little more memory than the values.
 
 use std::collections::TryReserveError;
 use std::fmt::{self, Display, Formatter};
@@ -20,30 +20,30 @@ use super::numbers::{Numbers, TextEnd};
 use super::source::{CHUNK, Source, invalid, io_error};
 use super::{Grid, VolumeError};
 
-/// Deflate spends at least 2 bits on a match of at most 258 bytes, so no stream expands by more.
+/// Deflate spends at least 2 bits on a match of at most 258 bytes, so a stream expands at most by this factor.
 pub(super) const MAX_EXPANSION: u64 = 1032;
 
-/// A number as a file has it.
+/// A number as stored in a file.
 pub(crate) trait Sample: Copy {
     fn to_f32(self) -> f32;
     fn to_f64(self) -> f64;
 }
 
-/// What samples become.
+/// What samples are converted to: values or labels.
 pub(crate) trait Voxel: Copy + Send + Sync {
     const ALLOWED: &'static str;
 
-    /// A voxel that the file has no sample for.
+    /// A voxel without a sample in the file.
     const HOLE: Self;
 
-    /// `None` if the sample is not allowed.
+    /// The voxel for a sample; `None` if the sample is not allowed.
     fn of(sample: impl Sample) -> Option<Self>;
 
-    /// What lies between this and another one, `part` of the way there.
+    /// The voxel between this one and another, at the fraction `part` of the way.
     fn between(self, other: Self, part: f64) -> Self;
 }
 
-/// A value. Where it is not finite the volume has a hole.
+/// A value; one that is not finite makes a hole in the volume.
 impl Voxel for f32 {
     const ALLOWED: &'static str = "numbers";
     const HOLE: Self = Self::NAN;
@@ -68,7 +68,7 @@ impl Voxel for u16 {
         (f64::from(label) == sample).then_some(label)
     }
 
-    /// The nearer one.
+    /// The nearer of the two labels.
     fn between(self, other: Self, part: f64) -> Self {
         if part < 0.5 { self } else { other }
     }
@@ -76,7 +76,7 @@ impl Voxel for u16 {
 
 macro_rules! sample_types {
     ($($name:ident: $type:ty = $text:literal),*) => {
-        /// The type of the samples in a file. Shown as scenes name it: `int8`, `float32`.
+        /// The type of the samples in a file, displayed as in scene files: `int8`, `float32`.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[non_exhaustive]
         pub enum SampleType {
@@ -102,17 +102,17 @@ macro_rules! sample_types {
         })*
 
         impl SampleType {
-            /// All of them, by name.
+            /// All types by name.
             pub(crate) const NAMED: [(&'static str, Self); 10] = [$(($text, Self::$name)),*];
 
-            /// The size of one.
+            /// The size of a sample in bytes.
             pub(super) fn bytes(self) -> u64 {
                 match self {
                     $(Self::$name => size_of::<$type>() as u64),*
                 }
             }
 
-            /// Appends the bytes, in the machine's order, of a sample that is written as text.
+            /// Appends the bytes, in the machine's order, of a sample written as text.
             pub(super) fn parse(self, text: &str, into: &mut Vec<u8>) -> Option<()> {
                 match self {
                     $(Self::$name => into.extend(text.parse::<$type>().ok()?.to_ne_bytes())),*
@@ -120,7 +120,7 @@ macro_rules! sample_types {
                 Some(())
             }
 
-            /// Appends the samples in some bytes, a whole number of them. Stops at one that is not allowed, and gives it back.
+            /// Appends the samples in `bytes`, a whole number of them. Stops at a sample that is not allowed and returns it as the error.
             fn convert<T: Voxel>(self, layout: &Samples, bytes: &[u8], into: &mut Vec<T>) -> Result<(), f64> {
                 match self {
                     $(Self::$name => {
@@ -159,36 +159,36 @@ fn append<S: Sample, T: Voxel>(samples: impl Iterator<Item = S>, into: &mut Vec<
     Ok(())
 }
 
-/// What a header says of the samples: as many as the grid has voxels.
+/// What a header says about the samples, one per voxel of the grid.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Samples {
     pub(super) kind: SampleType,
     pub(super) dims: UVec3,
     pub(super) big_endian: bool,
-    /// Slope and intercept: a value is `sample · slope + intercept`.
+    /// Slope and intercept: the value is `sample · slope + intercept`.
     pub(super) rescale: Option<[f64; 2]>,
-    /// Whether z is fastest in the file, then y, then x, instead of x, then y, then z.
+    /// Whether z is fastest in the file, then y, then x, instead of x, y, z.
     pub(super) z_fastest: bool,
 }
 
 impl Samples {
-    /// What they take up, decompressed.
+    /// The size of the samples in bytes, decompressed.
     pub(super) fn bytes(&self) -> u64 {
         u64::from(self.count()) * self.kind.bytes()
     }
 
-    /// Readers have fitted the product in 32 bits: [`dims_of`].
+    /// The number of samples. Readers have checked by [`dims_of`] that it fits in 32 bits.
     fn count(&self) -> u32 {
         self.dims.element_product()
     }
 
-    /// The voxel that a sample is of, by its position in the file.
+    /// The voxel of the sample at an index in the file.
     fn voxel_at(&self, index: usize) -> UVec3 {
         let in_file = |dims| Grid { dims, spacing: DVec3::ONE }.voxel_at(index as u32);
         if self.z_fastest { in_file(self.dims.zyx()).zyx() } else { in_file(self.dims) }
     }
 
-    /// Samples in the order of the file, x fastest.
+    /// The file's samples reordered so that x is fastest.
     fn in_order<T: Copy>(&self, samples: Vec<T>) -> Vec<T> {
         if !self.z_fastest {
             return samples;
@@ -198,7 +198,7 @@ impl Samples {
         rows.flat_map(|first| (0..nx).map(move |x| first + nz * ny * x)).map(|at| samples[at]).collect()
     }
 
-    /// Appends what all the bytes of some samples are, `into` being the values before them.
+    /// Converts all of `bytes` and appends the voxels to `into`, which holds those before.
     pub(super) fn append<T: Voxel>(&self, path: &Path, bytes: &[u8], into: &mut Vec<T>) -> Result<(), VolumeError> {
         into.try_reserve(bytes.len() / self.kind.bytes() as usize).map_err(self.too_many(path))?;
         self.kind.convert(self, bytes, into).map_err(|sample| {
@@ -206,10 +206,10 @@ impl Samples {
         })
     }
 
-    /// Asks for the memory that their values take.
+    /// Reserves the memory for their values.
     pub(super) fn reserve<T>(&self, path: &Path, access: &Access) -> Result<(), VolumeError> {
         let [x, y, z] = self.dims.to_array();
-        // To turn axes takes room for a second order.
+        // Reordering the axes needs a second copy.
         let copies = if self.z_fastest { 2 } else { 1 };
         access.reserve(
             path,
@@ -229,28 +229,28 @@ impl Samples {
     }
 }
 
-/// Three sizes as a grid's, if each is at least 1 and there are not too many voxels.
+/// The dimensions of a grid, if each is at least 1 and the number of voxels fits in 32 bits.
 pub(crate) fn dims_of<N: TryInto<u32>>(sizes: [N; 3]) -> Option<UVec3> {
     let [Ok(x), Ok(y), Ok(z)] = sizes.map(TryInto::try_into) else { return None };
     let voxels = x.checked_mul(y)?.checked_mul(z)?;
     (voxels > 0).then_some(UVec3::new(x, y, z))
 }
 
-/// What [`dims_of`] takes.
+/// What [`dims_of`] accepts, for errors.
 pub(crate) const SIZES: &str = "three positive integers, at most 4294967295 voxels";
 
-/// What is left of a file, decompressed.
+/// The rest of a file, decompressed.
 pub(super) struct Stream {
     path: PathBuf,
     reader: Reader,
-    /// How many bytes are left; of a compressed stream, no more than these.
+    /// The number of bytes left; an upper bound if the stream is compressed.
     left: u64,
     access: Access,
 }
 
 enum Reader {
     Raw(BufReader<File>),
-    /// What it decodes, for errors.
+    /// A decoder, and what its input must be, for errors.
     Decoder(Box<dyn Read>, &'static str),
 }
 
@@ -260,14 +260,14 @@ impl Stream {
         Ok(Self { left: file.left()?, path: file.path, reader: Reader::Raw(file.reader), access: file.access })
     }
 
-    /// The rest of a file, of one or more gzip members.
+    /// The rest of a file, decompressed from one or more gzip members.
     pub(super) fn gzip(mut file: Source) -> Result<Self, VolumeError> {
         let left = file.left()?.saturating_mul(MAX_EXPANSION);
         let decoder = Box::new(MultiGzDecoder::new(file.reader));
         Ok(Self::decoded(&file.path, decoder, "whole and undamaged gzip members", left, &file.access))
     }
 
-    /// The rest of a file, one zlib stream.
+    /// The rest of a file, decompressed from one zlib stream.
     #[cfg(feature = "metaimage")]
     pub(super) fn zlib(mut file: Source) -> Result<Self, VolumeError> {
         let left = file.left()?.saturating_mul(MAX_EXPANSION);
@@ -275,29 +275,28 @@ impl Stream {
         Ok(Self::decoded(&file.path, decoder, "one whole and undamaged zlib stream", left, &file.access))
     }
 
-    /// The rest of a file, of one or more bzip2 streams. How much comes out of them is not limited by their size: only by what is asked
-    /// for.
+    /// The rest of a file, decompressed from one or more bzip2 streams. Their size does not bound the output; the number of samples does.
     pub(super) fn bzip2(file: Source) -> Self {
         let decoder = Box::new(MultiBzDecoder::new(file.reader));
         Self::decoded(&file.path, decoder, "whole and undamaged bzip2 streams", u64::MAX, &file.access)
     }
 
-    /// The rest of a file, numbers as text, as bytes of samples in the machine's order.
+    /// The rest of a file, numbers as text, read as samples in the machine's byte order.
     pub(super) fn text(mut file: Source, kind: SampleType, end: TextEnd) -> Result<Self, VolumeError> {
-        // A digit and a space.
+        // A number takes at least a digit and a space.
         let left = (file.left()? / 2 + 1).saturating_mul(kind.bytes());
         let decoder = Box::new(Numbers::new(file.reader, kind, end));
         Ok(Self::decoded(&file.path, decoder, "numbers as text", left, &file.access))
     }
 
-    /// The rest of a file, two hexadecimal digits for each byte.
+    /// The rest of a file, decoded from two hexadecimal digits per byte.
     pub(super) fn hex(mut file: Source) -> Result<Self, VolumeError> {
         let left = file.left()? / 2;
         let decoder = Box::new(Hex(file.reader));
         Ok(Self::decoded(&file.path, decoder, "pairs of hexadecimal digits", left, &file.access))
     }
 
-    /// What `reader` decodes from a file; `allowed` is what it takes, and no more than `left` bytes come out of it.
+    /// What `reader` decodes from a file, at most `left` bytes. `allowed` says what its input must be.
     pub(super) fn decoded(
         path: &Path,
         reader: Box<dyn Read>,
@@ -308,12 +307,12 @@ impl Stream {
         Self { path: path.to_owned(), reader: Reader::Decoder(reader, allowed), left, access: access.clone() }
     }
 
-    /// How many bytes are left, if the stream is not compressed.
+    /// The exact number of bytes left; `None` if the stream is compressed.
     pub(super) fn exactly_left(&self) -> Option<u64> {
         matches!(self.reader, Reader::Raw(_)).then_some(self.left)
     }
 
-    /// Skips bytes; if there are too few, all of them.
+    /// Skips `bytes` bytes, or all that are left if there are fewer.
     pub(super) fn skip(&mut self, bytes: u64) -> Result<(), VolumeError> {
         let bytes = bytes.min(self.left);
         self.left -= bytes;
@@ -326,7 +325,7 @@ impl Stream {
         }
     }
 
-    /// So many bytes of a header.
+    /// The next `bytes` bytes, of a header.
     #[cfg(any(feature = "codecs", feature = "mgh", feature = "nifti", feature = "npy", feature = "vtk"))]
     pub(super) fn bytes(&mut self, bytes: u64) -> Result<Vec<u8>, VolumeError> {
         let mut header = Vec::new();
@@ -338,7 +337,7 @@ impl Stream {
         Ok(header)
     }
 
-    /// The samples, and then nothing else unless it is a `window` into a file of which more may follow.
+    /// The samples. The stream must end after them, unless it is a `window` into a file in which more may follow.
     pub(super) fn samples<T: Voxel>(mut self, samples: &Samples, window: bool) -> Result<Vec<T>, VolumeError> {
         let expected = samples.bytes();
         match self.exactly_left() {
@@ -352,7 +351,7 @@ impl Stream {
         }
         samples.reserve::<T>(&self.path, &self.access)?;
         let values = self.read_samples(samples)?;
-        // Reading on to the end is also what checks a compressed stream's last checksum.
+        // Reading to the end also checks a compressed stream's last checksum.
         if let Reader::Decoder(reader, _) = &mut self.reader {
             let rest = if window { u64::MAX } else { 1 };
             let rest =
@@ -367,8 +366,7 @@ impl Stream {
     fn read_samples<T: Voxel>(&mut self, samples: &Samples) -> Result<Vec<T>, VolumeError> {
         let path = self.path.clone();
         let (mut values, mut chunk) = (Vec::new(), Vec::with_capacity(CHUNK as usize));
-        // What a compressed stream holds is not known yet: memory grows with what comes out of it. A file that is not
-        // compressed holds them all.
+        // An uncompressed file certainly holds all samples. What a compressed stream holds is unknown, so memory grows as it is decoded.
         let known = if self.exactly_left().is_some() { samples.count() as usize } else { 0 };
         values.try_reserve_exact(known).map_err(samples.too_many(&path))?;
         let mut left = samples.bytes();
@@ -386,7 +384,7 @@ impl Stream {
         Ok(samples.in_order(values))
     }
 
-    /// Appends so many bytes, fewer at the end.
+    /// Appends up to `bytes` bytes, fewer only at the end, and returns their number.
     fn read_up_to(&mut self, bytes: u64, into: &mut Vec<u8>) -> Result<u64, VolumeError> {
         let read = match &mut self.reader {
             Reader::Raw(reader) => reader.by_ref().take(bytes).read_to_end(into),
@@ -395,7 +393,7 @@ impl Stream {
         read.map(|read| read as u64).map_err(|error| self.damage(error))
     }
 
-    /// Decoders report damage as an I/O error, without the code that the operating system's own carry.
+    /// Tells damage from errors of the operating system: decoders report damage as an I/O error without an OS error code.
     fn damage(&self, error: io::Error) -> VolumeError {
         match (&self.reader, error.raw_os_error()) {
             (Reader::Decoder(_, allowed), None) => invalid(&self.path, "data", error, allowed),
@@ -404,7 +402,7 @@ impl Stream {
     }
 }
 
-/// Bytes written as hexadecimal digits, with any space between them.
+/// Bytes written as hexadecimal digits, with any white space between them.
 struct Hex<R>(R);
 
 impl<R: BufRead> Read for Hex<R> {
@@ -436,7 +434,7 @@ impl<R: BufRead> Read for Hex<R> {
     }
 }
 
-/// A zlib stream that nothing may follow.
+/// A zlib stream that must end the file.
 #[cfg(feature = "metaimage")]
 struct Zlib(ZlibDecoder<BufReader<File>>);
 

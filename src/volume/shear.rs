@@ -1,9 +1,9 @@
-//! Sheared volumes: axes that are not at right angles, as a tilted gantry or an affine registration leaves them. They are resampled to
-//! an orthogonal grid as they are read.
+//! Sheared volumes: axes that are not at right angles, as after a tilted gantry or an affine registration, are resampled to an
+//! orthogonal grid on reading.
 //!
-//! The orthogonal axes come from the sheared ones by Gram and Schmidt, starting with the two that are nearest to a right angle. The
-//! third axis then keeps its planes, and every sample moves only within its plane: in a CT scan with a tilted gantry, within its slice.
-//! So one bilinear interpolation per voxel resamples any shear.
+//! Gram–Schmidt orthogonalisation makes the axes, starting with the two that are nearest to a right angle. The third axis then keeps
+//! its planes, and each sample moves only within its plane: in a CT scan with a tilted gantry, within its slice. So one bilinear
+//! interpolation per voxel undoes any shear.
 
 use std::path::Path;
 
@@ -17,54 +17,54 @@ use super::orientation::{MAX_COSINE, lengths_and_directions};
 use super::samples::{Voxel, dims_of};
 use super::source::invalid;
 
-/// The largest angle, in degrees, between an axis and where a right angle would have it. Flatter volumes are damaged headers.
+/// The maximum angle in degrees between an axis and its orthogonal direction. Flatter volumes have damaged headers.
 const MAX_DEGREES: f64 = 80.0;
 
-/// How many times as many voxels as the file the orthogonal grid may have. Beyond this nearly all of them are holes.
+/// The maximum ratio of the orthogonal grid's voxels to the file's. Beyond it nearly all voxels are holes.
 const MAX_GROWTH: u64 = 16;
 
-/// Positions that are nearer to a sample than this, in voxels, are the sample's own: what is left is rounding.
+/// Positions closer to a sample than this, in voxels, are the sample's own: the difference is rounding.
 const SAME_PLACE: f64 = 1e-5;
 
-/// The axes that [`Lattice::of`] accepts.
+/// The axes that [`Lattice::of`] accepts, for errors.
 pub(super) fn allowed() -> String {
     format!("three axes of positive finite length, each less than {MAX_DEGREES}° from a right angle with the others")
 }
 
-/// The lattice that a file's voxels lie on.
+/// The lattice of a file's voxels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lattice {
-    /// From voxel to voxel along the orthogonal axes.
+    /// The distances between voxels along the orthogonal axes.
     pub(super) spacing: DVec3,
-    /// The directions of the orthogonal axes, column by column.
+    /// The directions of the orthogonal axes, one per column.
     pub(super) axes: DMat3,
-    /// What is left to undo in the values.
+    /// The shear that resampling must undo.
     shear: Option<Shear>,
 }
 
-/// How samples lie askew on the orthogonal axes.
+/// The offsets of sheared samples on the orthogonal axes.
 #[derive(Clone, Copy, Debug)]
 struct Shear {
-    /// The axes in the order of the orthogonalisation: the first one keeps its direction, the first two keep their plane.
+    /// The axes in the order of orthogonalisation: the first keeps its direction, the first two keep their plane.
     order: [usize; 3],
-    /// How far a step along the second axis leads along the first, in voxels.
+    /// The offset along the first axis for a step along the second, in voxels.
     second: f64,
-    /// How far a step along the third axis leads along the first and the second.
+    /// The offsets along the first and second axis for a step along the third, in voxels.
     third: [f64; 2],
-    /// The largest angle between an axis and its orthogonal one.
+    /// The maximum angle between an axis and its orthogonal direction, in degrees.
     degrees: f64,
 }
 
 impl Lattice {
-    /// A lattice with axes that are orthogonal already.
+    /// A lattice whose axes are orthogonal already.
     pub(super) fn straight(spacing: DVec3, axes: DMat3) -> Self {
         Self { spacing, axes, shear: None }
     }
 
-    /// The lattice of the vectors from voxel to voxel along the three axes.
+    /// The lattice with these vectors between neighbouring voxels along the three axes.
     ///
     /// # Errors
-    /// What they are instead of [`allowed`].
+    /// A description of the vectors if they are not [`allowed`].
     pub(super) fn of(steps: [DVec3; 3]) -> Result<Self, String> {
         if let Ok((spacing, axes)) = lengths_and_directions(steps) {
             return Ok(Self::straight(spacing, axes));
@@ -77,11 +77,11 @@ impl Lattice {
             let cosine = (steps[a] / lengths[a]).dot(steps[b] / lengths[b]).abs();
             if cosine <= MAX_COSINE { 0.0 } else { cosine }
         };
-        // Of several right angles, that of x and y, so that a series of slices keeps its slices.
+        // Of several right angles the one of x and y comes first, so that slices stay slices.
         let orders = [[0, 1, 2], [0, 2, 1], [1, 2, 0]];
         let order = orders.into_iter().min_by(|&[a, b, _], &[c, d, _]| cosine(a, b).total_cmp(&cosine(c, d)));
         let order @ [a, b, c] = order.unwrap_or([0, 1, 2]);
-        // A part of a step along another axis, unless it is within what counts as a right angle.
+        // The component of a step along another axis; 0 if the angle counts as right.
         let along = |step: usize, direction: DVec3| {
             let part = steps[step].dot(direction);
             if part.abs() <= MAX_COSINE * lengths[step] { 0.0 } else { part }
@@ -106,10 +106,10 @@ impl Lattice {
         Ok(Self { spacing, axes, shear: Some(shear) })
     }
 
-    /// What was read from the lattice, with its samples on the orthogonal axes. Voxels that lie in no sample's cell are holes.
+    /// The loaded samples, resampled to the orthogonal axes. Voxels outside every sample's cell are holes.
     ///
     /// # Errors
-    /// If the orthogonal grid has too many voxels. `field` is where the file says how its axes lie.
+    /// If the orthogonal grid has too many voxels. `field` is the file's field with the axes.
     pub(super) fn straighten<T: Voxel>(
         &self,
         path: &Path,
@@ -157,19 +157,18 @@ impl Lattice {
     }
 }
 
-/// Direction and length of a vector.
+/// The direction and length of a vector.
 fn split(vector: DVec3) -> (DVec3, f64) {
     let length = vector.length();
     (vector / length, length)
 }
 
 impl Shear {
-    /// The first and the last voxel, along each axis of the orthogonal grid, that lie in some sample's cell; voxel 0 is where sample 0
-    /// is.
+    /// The first and last voxel along each axis of the orthogonal grid that lie in a sample's cell. Voxel 0 is at sample 0.
     fn ranges(&self, dims: UVec3) -> [[f64; 2]; 3] {
         let [a, b, c] = self.order;
         let last = dims.as_dvec3() - 1.0;
-        // What an axis adds at its first and last place, in ascending order.
+        // An axis's contribution at its first and last sample, in ascending order.
         let span =
             |step: f64, [first, last]: [f64; 2]| [(step * first).min(step * last), (step * first).max(step * last)];
         let cells = |axis: usize| [-0.5, last[axis] + 0.5];
@@ -185,7 +184,7 @@ impl Shear {
         ranges
     }
 
-    /// Where a place on the orthogonal grid lies among the samples.
+    /// The position among the samples of a position on the orthogonal grid.
     fn in_source(&self, place: DVec3) -> DVec3 {
         let [a, b, c] = self.order;
         let mut source = place;
@@ -202,7 +201,7 @@ struct Samples<'a, T> {
 }
 
 impl<T: Voxel> Samples<'_, T> {
-    /// The value at a place that is a whole number along the third of some axes; `None` in no sample's cell.
+    /// The value at a position that is a whole number along the last of the given axes; `None` outside every sample's cell.
     fn at(&self, place: DVec3, [a, b, c]: [usize; 3]) -> Option<T> {
         let strides = [1, self.dims.x as usize, self.dims.x as usize * self.dims.y as usize];
         let plane = &self.values[place[c] as usize * strides[c]..];
@@ -220,8 +219,8 @@ impl<T: Voxel> Samples<'_, T> {
     }
 }
 
-/// The sample at or before a place on an axis with so many samples, and the part of the way to the next one, 0 at the last. The outer
-/// halves of the outermost cells count as their samples' own places; `None` beyond.
+/// The sample at or before a position on an axis of `samples` samples, and the fraction of the way to the next one (0 at the last).
+/// The outer halves of the outermost cells count as their samples' positions; beyond them the result is `None`.
 fn cell(place: f64, samples: u32) -> Option<(usize, f64)> {
     let last = f64::from(samples - 1);
     if !(-0.5 - SAME_PLACE..=last + 0.5 + SAME_PLACE).contains(&place) {
@@ -251,7 +250,7 @@ mod tests {
         lattice.straighten(Path::new("here"), "axes", loaded(dims, &lattice, DVec3::ZERO, values), &access).unwrap()
     }
 
-    /// The places of a grid's voxels, x fastest.
+    /// The positions of a grid's voxels, x fastest.
     fn places(dims: UVec3) -> impl Iterator<Item = DVec3> {
         let [x, y, z] = dims.to_array();
         (0..z).flat_map(move |z| (0..y).flat_map(move |y| (0..x).map(move |x| UVec3::new(x, y, z).as_dvec3())))
@@ -275,7 +274,7 @@ mod tests {
         assert_eq!((whole.dims, whole.spacing), (UVec3::new(1, 4, 3), Some(DVec3::new(1.0, 2.0, 4.0))));
         let expected = [0.0, 1.0, hole, hole, hole, 10.0, 11.0, hole, hole, hole, 20.0, 21.0];
         assert!(whole.values.iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()), "{:?}", whole.values);
-        // The other way the first voxel is no longer sample 0.
+        // Tilted the other way, the first voxel is no longer sample 0.
         let back = straighten(dims, tilted(-1.0), values());
         assert_eq!(back.orientation.unwrap().origin, DVec3::new(0.0, -4.0, 0.0));
         let expected = [hole, hole, 0.0, 1.0, hole, 10.0, 11.0, hole, 20.0, 21.0, hole, hole];
@@ -287,7 +286,7 @@ mod tests {
         assert!(half.values.iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()), "{:?}", half.values);
     }
 
-    /// A field that is linear in the patient is the same field afterwards, whichever axes are sheared.
+    /// A field that is linear in the patient stays the same field, whichever axes are sheared.
     #[test]
     fn linear_fields_stay() {
         let dims = UVec3::new(6, 7, 8);
@@ -322,7 +321,7 @@ mod tests {
                     compared += 1;
                 }
             }
-            // Cells and voxels are of one size, so about as many voxels as samples have a value.
+            // Cells and voxels have equal volume, so about as many voxels as samples have a value.
             let samples = dims.element_product();
             assert!(2 * compared > samples && held.abs_diff(samples) < samples / 4, "{mask}: {compared}, {held}");
         }
@@ -338,7 +337,7 @@ mod tests {
             assert_eq!(shear.order[2], sheared);
             assert!((shear.degrees - 20.0).abs() < 1e-9, "{}", shear.degrees);
         }
-        // Of two axes the later one moves.
+        // Of two sheared axes the later one moves.
         let skew = [DVec3::X, DVec3::new(0.5, 3.0, 0.0), DVec3::Z];
         assert_eq!(Lattice::of(skew).unwrap().shear.unwrap().order, [0, 2, 1]);
     }
@@ -363,7 +362,7 @@ mod tests {
         refused([DVec3::X, DVec3::X, DVec3::Z], "from a right angle");
         refused([DVec3::X, DVec3::Y, DVec3::ZERO], "axes of the lengths [1.0, 1.0, 0.0]");
         refused([DVec3::X, DVec3::Y, DVec3::splat(f64::NAN)], "NaN");
-        // Fine columns, and slices far apart: a grid of mostly holes.
+        // Fine columns and slices far apart give a grid of mostly holes.
         let lattice = Lattice::of([1e-3 * DVec3::X, DVec3::Y, DVec3::new(1.0, 0.0, 1.0)]).unwrap();
         let refused = |lattice: Lattice, options: ReadOptions| {
             let loaded = loaded(UVec3::new(2, 1, 9), &lattice, DVec3::ZERO, vec![0.0_f32; 18]);
@@ -373,7 +372,7 @@ mod tests {
         let error = refused(lattice, ReadOptions::default());
         let expected = "here: axes: found axes sheared by 45.00°, an orthogonal grid of [8002.0, 1.0, 9.0] voxels";
         assert!(error.starts_with(expected), "{error}");
-        // And one that takes too much memory.
+        // This grid needs too much memory.
         let lattice = Lattice::of([DVec3::X, DVec3::Y, DVec3::new(1.0, 0.0, 1.0)]).unwrap();
         let error = refused(lattice, ReadOptions::default().with_memory(100));
         assert!(error.contains("[10, 1, 9] voxels, which take 360 bytes of memory, allowed: at most"), "{error}");

@@ -1,4 +1,4 @@
-//! Files while they are read, and the words for what is wrong with them.
+//! Files that are being read, and the wording of errors about them.
 
 use std::fmt::Display;
 use std::fs::{self, File};
@@ -10,14 +10,14 @@ use glam::DVec3;
 use super::VolumeError;
 use super::access::Access;
 
-/// No header line is longer than this, in bytes.
+/// The maximum length of a header line in bytes.
 const MAX_LINE: u64 = 64 << 10;
-/// No header is longer than this, in bytes.
+/// The maximum length of a header in bytes.
 pub(super) const MAX_HEADER: u64 = 1 << 20;
-/// Files are read this many bytes at a time: a multiple of the size of every sample type.
+/// The number of bytes read at a time: a multiple of the size of every sample type.
 pub(super) const CHUNK: u64 = 64 << 10;
 
-/// One file while it is read.
+/// A file that is being read.
 pub(super) struct Source {
     pub(super) path: PathBuf,
     bytes: u64,
@@ -26,9 +26,9 @@ pub(super) struct Source {
 }
 
 impl Source {
-    /// Opens `path` by where it leads, `resolved`. [`Access::open`] does both.
+    /// Opens `path` at `resolved`, the place it leads to. [`Access::open`] does both.
     pub(super) fn open(path: &Path, resolved: &Path, access: &Access) -> Result<Self, VolumeError> {
-        // Asked before opening: to open a pipe would wait for its writer.
+        // The kind of file is checked before opening, because opening a pipe would wait for its writer.
         let metadata = fs::metadata(resolved).map_err(io_error(path))?;
         if !metadata.is_file() {
             return Err(invalid(path, "file", "a folder, pipe or device", "a regular file"));
@@ -37,13 +37,12 @@ impl Source {
         Ok(Self { path: path.to_owned(), bytes: metadata.len(), reader, access: access.clone() })
     }
 
-    /// How many bytes are left to read.
+    /// The number of bytes left to read.
     pub(super) fn left(&mut self) -> Result<u64, VolumeError> {
         Ok(self.bytes.saturating_sub(self.reader.stream_position().map_err(io_error(&self.path))?))
     }
 
-    /// The next header line without its end, or `None` at the end of the file; `budget` is what the header may still
-    /// take up.
+    /// The next header line without its end; `None` at the end of the file. `budget` is the number of bytes that the header may still use.
     pub(super) fn line(&mut self, budget: &mut u64) -> Result<Option<String>, VolumeError> {
         let (mut line, limit) = (Vec::new(), MAX_LINE.min(*budget));
         let read = self.reader.by_ref().take(limit).read_until(b'\n', &mut line);
@@ -58,13 +57,13 @@ impl Source {
         Ok((read > 0).then(|| String::from_utf8_lossy(text).into_owned()))
     }
 
-    /// Skips bytes; if there are too few, all of them.
+    /// Skips `bytes` bytes, or all that are left if there are fewer.
     pub(super) fn skip(&mut self, bytes: u64) -> Result<(), VolumeError> {
         let bytes = bytes.min(self.left()?);
         self.reader.seek_relative(bytes as i64).map_err(io_error(&self.path))
     }
 
-    /// The lines that are left of a header, without blank ones.
+    /// The remaining lines of a header, without blank ones.
     pub(super) fn lines(&mut self, budget: &mut u64) -> Result<Vec<String>, VolumeError> {
         let mut lines = Vec::new();
         while let Some(line) = self.line(budget)? {
@@ -94,7 +93,7 @@ pub(super) fn io_error(path: &Path) -> impl Fn(io::Error) -> VolumeError {
     |source| VolumeError::Io { path: path.to_owned(), source }
 }
 
-/// Text from the file, short and on one line.
+/// Text from a file, shortened and on one line.
 pub(super) fn shown(text: &str) -> String {
     let short: String = text.chars().take(60).collect();
     format!("{short:?}{}", if short.len() < text.len() { "…" } else { "" })
@@ -113,7 +112,7 @@ pub(super) fn number(text: &str) -> Option<f64> {
     text.trim().parse().ok().filter(|number: &f64| number.is_finite())
 }
 
-/// `(x,y,z)`, with or without space around the numbers.
+/// A vector `(x,y,z)`, with or without spaces around the numbers.
 pub(super) fn vector(text: &str) -> Option<DVec3> {
     let components = text.trim().strip_prefix('(')?.strip_suffix(')')?;
     three(components.split(',').map(number)).map(DVec3::from_array)

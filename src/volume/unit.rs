@@ -1,6 +1,6 @@
 //! Units of length, as files call them.
 
-/// Names that mean the same, the symbol first.
+/// Synonymous names of units, the symbol first.
 const UNITS: [&[&str]; 6] = [
     &["nm", "nanometer", "nanometers", "nanometre", "nanometres"],
     &["µm", "μm", "um", "micron", "microns", "micrometer", "micrometers", "micrometre", "micrometres", "\\u00b5m"],
@@ -10,7 +10,7 @@ const UNITS: [&[&str]; 6] = [
     &["inch", "inches", "in", "\""],
 ];
 
-/// A unit's symbol if it is a known one, else its name as it is; `None` if that says that there is none.
+/// The symbol of a known unit, or else the name itself; `None` if the name says that there is no unit.
 pub(super) fn unit(name: &str) -> Option<String> {
     let lower = name.trim().to_lowercase();
     if ["", "none", "unknown", "pixel", "pixels", "voxel", "voxels", "???"].contains(&lower.as_str()) {
@@ -20,7 +20,7 @@ pub(super) fn unit(name: &str) -> Option<String> {
     Some(known.map_or(name.trim(), |names| names[0]).to_owned())
 }
 
-/// The unit of all axes, if it is the same one.
+/// The unit of all axes, if they share one.
 pub(super) fn common<'a>(names: impl IntoIterator<Item = &'a str>) -> Option<String> {
     let mut units = names.into_iter().map(unit);
     let first = units.next()??;

@@ -1,4 +1,4 @@
-//! What formats with XML in them need of it.
+//! Attributes and errors of XML, for the formats that use it.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use super::VolumeError;
 use super::fields::Fields;
 use super::source::invalid;
 
-/// An element's attributes, by their names without a prefix.
+/// An element's attributes by their names without prefix.
 pub(super) fn attributes(path: &Path, element: &BytesStart) -> Result<Fields, VolumeError> {
     let mut fields = Fields::new(path.to_owned());
     for attribute in element.attributes() {
@@ -20,7 +20,7 @@ pub(super) fn attributes(path: &Path, element: &BytesStart) -> Result<Fields, Vo
     Ok(fields)
 }
 
-/// What is no XML.
+/// The error for malformed XML.
 pub(super) fn damage(path: &Path, error: impl std::error::Error) -> VolumeError {
     invalid(path, "header", error, "well-formed XML")
 }

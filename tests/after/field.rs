@@ -18,7 +18,7 @@ fn no_rule() -> LowPass {
     LowPass::new(NO_RULE.0, NO_RULE.1)
 }
 
-/// Where the rays of all pixels meet all planes in the voxels' box, with the field there.
+/// The points at which the rays of all pixels meet all planes in the voxels' box, with the field there.
 fn samples(volume: &Volume, scene: &Scene, check: impl Fn(DVec3, f64, DVec3)) -> usize {
     let transfer = scene.transfer.resolve(volume);
     let frame = Frame::new(Host::default(), volume, &transfer, scene).unwrap();
@@ -71,10 +71,10 @@ fn a_ramp_has_its_normal() {
         let slope = DVec3::new(3.0, -2.0, 1.0);
         let volume = volume([10, 9, 8], spacing, |voxel| slope.dot(voxel.as_dvec3() * spacing));
         let mut scene = scene(24, 20);
-        // Pixels smaller than grid units: wider kernels' derivatives are those of the lowered offsets.
+        // Pixels are smaller than grid units, because the low-pass rule changes the derivatives of wider kernels.
         scene.camera.projection = projection.unwrap_or(Projection::Orthographic { height: Some(12.0) });
         scene.camera.direction = DVec3::new(-0.4, 0.9, 0.5);
-        // The derivative of the field ripples, with this kernel by less than half a degree; the values themselves are smoothed.
+        // The field's derivative ripples, with this kernel by less than half a degree; the values themselves are smoothed.
         (scene.splatting.radius, scene.splatting.falloff) = (3.0, 1.0);
         for (gradient, degrees) in [(Gradient::Differences, 0.1), (Gradient::Kernel, 0.5)] {
             scene.shading.gradient = gradient;
@@ -92,7 +92,7 @@ fn a_ramp_has_its_normal() {
     }
 }
 
-/// At every voxel, borders and corners too, whatever the kernel and spacing; a smooth field is far from the values of noise.
+/// The field has every voxel's value, at borders and corners too, for any kernel and spacing; a smooth field is far from the values of noise.
 #[test]
 fn exact_fields_interpolate() {
     let mut random = Random(9);
@@ -128,7 +128,7 @@ fn the_kernel_gradient_is_the_derivative() {
     let volume = random_volume(&mut random, (8.0, 12.0), [1.0, 1.5, 3.0]);
     let mut scene = scene(8, 8);
     scene.shading.gradient = Gradient::Kernel;
-    // No voxel is on the rim of a kernel that ends where it has fallen to nothing.
+    // This kernel is negligible at its radius, so no voxel lies on a visible rim.
     (scene.splatting.radius, scene.splatting.falloff) = (4.0, 2.0);
     for interpolation in [Interpolation::Smooth, Interpolation::Exact] {
         scene.splatting.interpolation = interpolation;
@@ -154,7 +154,7 @@ fn as_specified(volume: &Volume, scene: &Scene, geometry: &Geometry, pixel: DVec
     if geometry.eye.is_none() {
         columns = columns.map(|column| column - column.dot(geometry.ro) * geometry.ro);
     }
-    // The plane's own coordinates, in which A is 2×2, and its singular values by rotation to both sides.
+    // In the plane's own coordinates A is 2×2, and rotations on both sides give its singular values.
     let normal = columns[0].cross(columns[1]).normalize();
     let across = columns[0].normalize();
     let along = normal.cross(across);
@@ -175,7 +175,7 @@ fn as_specified(volume: &Volume, scene: &Scene, geometry: &Geometry, pixel: DVec
         let (offset, e) = match &geometry.eye {
             None => (pixel - geometry.pixel(voxel), geometry.ro * (distance - geometry.depth(voxel))),
             Some(eye) => {
-                // δ at the middle of the image, from where A leads to the least |δ|.
+                // δ at the middle of the image, from which A leads to the smallest |δ|.
                 let middle = (eye.position + basis.w * distance - p) / aspect;
                 let nearest = geometry.size / 2.0 - a.inverse() * flat(middle);
                 (pixel - nearest, normal * middle.dot(normal))
@@ -192,7 +192,7 @@ fn as_specified(volume: &Volume, scene: &Scene, geometry: &Geometry, pixel: DVec
     (weights >= 1e-3).then(|| sum / weights)
 }
 
-/// With pixels smaller and larger than grid units, and some that are both.
+/// Pixels are smaller or larger than grid units, or both.
 #[test]
 fn planes_are_as_specified() {
     let mut random = Random(11);
@@ -202,7 +202,7 @@ fn planes_are_as_specified() {
         let volume = random_volume(&mut random, (5.0, 9.0), spacing);
         let mut scene = scene(11, 9);
         scene.camera.direction = random.direction();
-        // Lowered maps have steps of exactly 1, and no voxel may be on the rim of a kernel by more than chance.
+        // Lowered maps have steps of exactly 1, so only chance keeps voxels off the rims of kernels.
         scene.camera.center = Some(random.within(DVec3::splat(-0.5), DVec3::splat(0.5)));
         let size = (volume.grid().center() * volume.spacing()).length();
         scene.camera.projection = if case % 2 == 0 {
@@ -240,7 +240,7 @@ fn planes_are_as_specified() {
     assert!(values > 10_000, "{values}");
 }
 
-/// Planes stand where slabs of the other classification begin: `k·Δ` along the ray.
+/// Planes are where the slabs of classification before splatting begin: `k·Δ` along the ray.
 #[test]
 fn planes_are_a_slab_width_apart() {
     let volume = volume([6, 6, 6], DVec3::new(1.0, 2.0, 5.0), |_| 1.0);

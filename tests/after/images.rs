@@ -11,7 +11,7 @@ use crate::common::images::{BLACK, color_rms, psnr, rms};
 use crate::common::{Random, camera, transfer};
 use crate::{eye, render, scene, volume};
 
-/// A head, seen obliquely, with tissues of which some are nearly opaque.
+/// A head seen obliquely, some of whose tissues are nearly opaque.
 fn head() -> (Volume, Scene) {
     let mut scene = scene(64, 60);
     scene.camera.direction = DVec3::new(0.4, 0.9, -0.3);
@@ -23,7 +23,7 @@ fn head() -> (Volume, Scene) {
     (builtin::volume("head:32").unwrap(), scene)
 }
 
-/// The opacity that rays gain is that of their length in the box of voxel cells, whatever the direction, spacing and slab width.
+/// A ray's opacity depends on its length in the box of voxel cells, for any direction, spacing and slab width.
 #[test]
 fn a_uniform_slab_is_as_opaque_as_it_is_thick() {
     const OPACITY: f64 = 0.07;
@@ -55,7 +55,7 @@ fn a_uniform_slab_is_as_opaque_as_it_is_thick() {
         let units = 4.0 * spacing[axis] / spacing.min_element();
         let image = render(&volume, &scene);
         for pixel in &image.pixels {
-            // Of perspective rays the cosine differs by a thousandth.
+            // The cosine of rays in perspective differs by a thousandth.
             let expected = 1.0 - (1.0 - OPACITY).powf(units / direction[axis].abs());
             let tolerance = if case % 2 == 1 { 0.02 } else { 1e-5 };
             assert!((f64::from(pixel[3]) / expected - 1.0).abs() < tolerance, "{direction}: {pixel:?}, not {expected}");
@@ -64,7 +64,7 @@ fn a_uniform_slab_is_as_opaque_as_it_is_thick() {
     }
 }
 
-/// In perspective exactly: every ray by its own length.
+/// In perspective the opacity is exact: every ray has its own length.
 #[test]
 fn perspective_rays_have_their_own_lengths() {
     let volume = volume([30, 4, 30], DVec3::ONE, |_| 1.0);
@@ -98,15 +98,14 @@ fn thinner_slabs_converge() {
         let steps: Vec<f64> = images.windows(2).map(|pair| rms(&pair[0], &pair[1])).collect();
         println!("{compositing:?}: {steps:.5?}");
         assert!(steps[0] > 1e-4 && steps[0] < 0.1, "{compositing:?}: {steps:?}");
-        // A maximum is taken over the planes' points alone.
+        // A maximum is taken over only the planes' points.
         let factor = if compositing == Compositing::Maximum { 0.8 } else { 0.7 };
         assert!(steps[1] < factor * steps[0] && steps[2] < factor * steps[1], "{compositing:?}: {steps:?}");
     }
 }
 
-/// Fig. 3's cube from 44.8° to 45.2°. By its voxels' values it hardly changes. Its lit faces do: normals have no length, so where kernels end the
-/// light goes out at once, and the bright edge in front moves; but no more than at other angles, and by a tenth of
-/// what axis-aligned sheets do there.
+/// Fig. 3's cube from 44.8° to 45.2°. Unshaded it hardly changes. Its lit faces do: normals have no length, so the light ends abruptly where
+/// kernels end, and the bright edge in front moves; but no more than at other angles, and by a tenth of what axis-aligned sheets do there.
 #[test]
 fn the_cube_does_not_pop() {
     let volume = builtin::volume("cube").unwrap();
@@ -137,7 +136,7 @@ fn the_cube_does_not_pop() {
     }
 }
 
-/// Half a volume that hides all behind it: as a surface, and as what is composited within a hair of it.
+/// Half a volume that hides everything behind it gives the same image as a surface and by nearly opaque compositing.
 #[test]
 fn surface_and_exponential_agree_on_an_opaque_step() {
     let volume = volume([20, 20, 20], DVec3::ONE, |voxel| {
@@ -161,7 +160,7 @@ fn surface_and_exponential_agree_on_an_opaque_step() {
     }
 }
 
-/// A plane through the middle leaves half of every ray, and a surface of the host's does.
+/// A plane through the middle halves every ray, and so does a host's surface.
 #[test]
 fn cuts_shorten_rays() {
     let volume = volume([12, 12, 12], DVec3::new(1.0, 2.0, 1.0), |_| 1.0);
@@ -172,14 +171,14 @@ fn cuts_shorten_rays() {
     scene.shading.enabled = false;
     scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.01)]);
     let transfer = scene.transfer.resolve(&volume);
-    // 12 voxels, 2 units each.
+    // 12 voxels of 2 units each.
     let alpha = |scene: &Scene, surfaces: Option<&[f64]>| {
         let host = Host { surfaces, first_hit: Some(0.05) };
         reference::render_for(host, &volume, &transfer, scene, None).unwrap()
     };
     let whole = alpha(&scene, None);
     assert!(whole.image.pixels.iter().all(|pixel| (pixel[3] - 0.24).abs() < 1e-6));
-    // Five units behind the front face, which is 12 before the middle.
+    // The surface is five units behind the front face, which is 12 before the middle.
     assert!(whole.first_hits.iter().all(|depth| (depth + 7.0).abs() < 1e-9), "{:?}", whole.first_hits);
     let surfaces = [-4.5; 36];
     let before_surfaces = alpha(&scene, Some(&surfaces));
@@ -190,7 +189,7 @@ fn cuts_shorten_rays() {
     assert!(behind_plane.first_hits.iter().all(|depth| (depth - 4.7).abs() < 1e-9), "{:?}", behind_plane.first_hits);
 }
 
-/// Sheets laid one over the other are the image.
+/// Sheets composited one after the other give the image.
 #[test]
 fn sheets_make_the_image() {
     let (volume, mut scene) = head();
@@ -215,7 +214,7 @@ fn sheets_make_the_image() {
     }
 }
 
-/// What the statistics count covers what is drawn: with what lies outside of it cut off, the image is the same.
+/// The statistics cover everything that is drawn: if the rest is cut off, the image stays the same.
 #[test]
 fn counts() {
     let (volume, mut scene) = head();
@@ -223,14 +222,14 @@ fn counts() {
     let counts = reference::count(&volume, &transfer, &scene).unwrap();
     assert_eq!(counts.voxels_total, u64::from(volume.dims().element_product()));
     assert!(counts.voxels_in_range > 0 && counts.voxels_in_range <= counts.voxels_total);
-    // A kernel of radius 2 meets four planes that are one unit apart, rarely three.
+    // A kernel of radius 2 meets four planes at distances of one unit, and rarely three.
     let planes = counts.sections_total as f64 / counts.voxels_in_range as f64;
     assert!((3.9..=4.0).contains(&planes), "{planes}");
     assert!(counts.sheets > 20 && counts.sheets < 80, "{counts:?}");
     scene.splatting.slab_width = 0.5;
     let halved = reference::count(&volume, &transfer, &scene).unwrap();
     assert!((7.9..=8.1).contains(&(halved.sections_total as f64 / halved.voxels_in_range as f64)));
-    // A single bright voxel in the dark: only bricks within two kernels and a slab of it.
+    // For a single bright voxel in the dark, only bricks within two kernels and a slab of it count.
     let dot = crate::volume([40, 40, 40], DVec3::ONE, |voxel| f64::from(u8::from(voxel == UVec3::splat(21))) * 255.0);
     scene.splatting.slab_width = 1.0;
     scene.transfer.opacity = Some(Ramp::new(vec![(10.0, 0.0), (20.0, 1.0)]).unwrap());

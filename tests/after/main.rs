@@ -1,15 +1,17 @@
-//! The f64 twin of classification after splatting (SPEC §9): that it is what the specification says, and what must hold of its images
-//! whatever the volume.
+//! The f64 evaluation of classification after splatting (SPEC §9): it follows the specification, and its images have the properties that hold
+//! for every volume.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
 #[path = "../common/mod.rs"]
 mod common;
 mod field;
+mod gpu;
 mod images;
 mod modes;
 mod refusals;
 mod slab_integral;
+mod tiles;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::image::Image;
@@ -18,7 +20,7 @@ use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Classification, Projection};
 use sheetsplat::volume::{Grid, Volume};
 
-/// A volume of a function of the voxel.
+/// A volume given by a function of the voxel.
 pub(crate) fn volume(dims: [u32; 3], spacing: DVec3, value: impl Fn(UVec3) -> f64) -> Volume {
     let grid = Grid { dims: UVec3::from(dims), spacing };
     let values = (0..grid.dims.element_product()).map(|index| value(grid.voxel_at(index)) as f32).collect();
@@ -34,7 +36,7 @@ pub(crate) fn scene(width: u32, height: u32) -> Scene {
     scene
 }
 
-/// An eye so far away, world units.
+/// A perspective camera with its eye at this distance, in world units.
 pub(crate) fn eye(distance: f64) -> Projection {
     Projection::Perspective { fov_y: 25.0, distance: Some(distance), near: None }
 }

@@ -30,7 +30,7 @@ fn maximum_average_and_minimum_are_in_order() {
     assert!(parted > 80, "{parted}");
 }
 
-/// A ramp along the ray: the ends and the middle of the cells' box, as far as planes reach them.
+/// A ramp along the ray gives the values at the ends and in the middle of the cells' box, as far as planes reach.
 #[test]
 fn extremes_of_a_ramp() {
     let volume = volume([10, 20, 10], DVec3::ONE, |voxel| voxel.y.into());
@@ -38,7 +38,7 @@ fn extremes_of_a_ramp() {
     scene.camera = camera([0.0, 1.0, 0.0], 3.0);
     scene.shading.enabled = false;
     scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (20.0, 1.0)]);
-    // Planes stand at the voxels' middles: -10 to 10 in the box, and at its ends kernels see no more than the last voxel.
+    // Planes are at the voxels' middles, from -10 to 10 in the box, and at its ends kernels see only the last voxel.
     for (compositing, expected, tolerance) in
         [(Compositing::Maximum, 19.0, 0.3), (Compositing::Minimum, 0.0, 0.3), (Compositing::Average, 9.5, 1e-6)]
     {
@@ -48,7 +48,7 @@ fn extremes_of_a_ramp() {
             assert!((value - expected).abs() < tolerance, "{compositing:?}: {value}");
         }
     }
-    // Of equal ones the nearest; and where no plane stands in what a cut leaves, the line of values between two.
+    // The nearest of equal values counts; and if a cut leaves no plane, the line of values between two planes.
     scene.splatting.compositing = Compositing::Maximum;
     scene.clip.crop = Some([DVec3::new(-9.0, 0.3, -9.0), DVec3::new(9.0, 0.7, 9.0)]);
     for pixel in render(&volume, &scene).pixels {
@@ -62,7 +62,7 @@ fn extremes_of_a_ramp() {
     assert!(hits.iter().all(|depth| (depth + 10.0).abs() < 1e-9), "{hits:?}");
 }
 
-/// A ramp along y from 0 at one face.
+/// A ramp along y that starts with 0 at one face.
 fn ramp() -> (Volume, Scene) {
     let volume = volume([10, 20, 10], DVec3::ONE, |voxel| voxel.y.into());
     let mut scene = scene(3, 3);
@@ -80,7 +80,7 @@ fn surfaces_stand_where_half_is_reached() {
         let host = Host { surfaces: None, first_hit: Some(0.1) };
         let transfer = scene.transfer.resolve(&volume);
         let rendered = reference::render_for(host, &volume, &transfer, scene, None).unwrap();
-        // In the middle of the image, with the depth as y from the middle.
+        // The alpha in the middle of the image, and the depth as y from the middle.
         (rendered.image.pixels[4], rendered.first_hits[4] * scene.camera.basis().w.y)
     };
     for width in [0.3, 1.0, 1.6] {
@@ -90,7 +90,7 @@ fn surfaces_stand_where_half_is_reached() {
         let is_there = [0.5, 0.25, 0.125, 1.0].iter().zip(pixel).all(|(a, b)| (a - b).abs() < 1e-4);
         assert!(is_there, "{width}: {pixel:?}");
     }
-    // From where iso-ranges let it; by the gradient's opacity; at the face of a cut; and nowhere.
+    // The surface moves: to the first value in an iso-range; by gradient opacity; to the face of a cut; or it disappears.
     scene.transfer.iso_ranges = Some(vec![[12.5, 13.0]]);
     assert!((half(&scene).1 - 3.0).abs() < 0.02, "{:?}", half(&scene));
     scene.transfer.iso_ranges = None;
@@ -102,7 +102,7 @@ fn surfaces_stand_where_half_is_reached() {
     assert_eq!(half(&scene).0, [0.0; 4]);
 }
 
-/// Of a slab's amount as much as the gradient's length says, after any logarithm.
+/// A slab's amount is multiplied by the gradient's opacity, after any logarithm.
 #[test]
 fn gradient_opacity_scales_amounts() {
     let (volume, mut scene) = ramp();
@@ -121,12 +121,12 @@ fn gradient_opacity_scales_amounts() {
     }
 }
 
-/// Every pixel goes by the table of the voxel whose cell it sees.
+/// Every pixel uses the table of the voxel whose cell it sees.
 #[test]
 fn labels_go_by_cells() {
     let dims = [10, 20, 10];
     let values = volume(dims, DVec3::ONE, |_| 10.0);
-    // The nearer half has one label, the other none with tables.
+    // The nearer half has one label, the other a label without tables.
     let labels: Vec<u16> = (0..2000).map(|index| u16::from(values.grid().voxel_at(index).y < 10) * 7).collect();
     let labels = Labels {
         origin: "test".to_owned(),
@@ -150,7 +150,7 @@ fn labels_go_by_cells() {
     }
     scene.transfer.labels.get_mut(&7).unwrap().visible = false;
     assert!(render(&volume, &scene).pixels.iter().all(|pixel| (pixel[3] - 0.1).abs() < 1e-6));
-    // A surface stands at the border of the cells, though planes stand elsewhere.
+    // A surface is at the border of the cells, although planes are elsewhere.
     scene.splatting.compositing = Compositing::Surface;
     scene.splatting.slab_width = 0.7;
     scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.8)]).unwrap());
@@ -161,22 +161,22 @@ fn labels_go_by_cells() {
     assert!(rendered.image.pixels.iter().all(|pixel| *pixel == [0.0, 1.0, 0.0, 1.0]));
 }
 
-/// A value that one pixel sees between two planes shows as long as it sees it: steps and peaks are not sampled.
+/// A value between two planes counts for as long as the pixel sees it: steps and peaks are integrated, not sampled.
 #[test]
 fn peaks_keep_their_amount() {
     let (volume, mut scene) = ramp();
     scene.camera = camera([0.0, 1.0, 0.0], 3.0);
     scene.splatting.compositing = Compositing::Xray;
-    // Without ripple, so that the ramp is straight.
+    // This kernel has no ripple, so the ramp is straight.
     (scene.splatting.radius, scene.splatting.falloff) = (3.0, 1.0);
-    // A triangle of height 1 and width 0.1 over the value, which grows by 1 along each unit of the ray.
+    // A triangle of height 1 and width 0.1 over values, which grow by 1 per unit of the ray.
     scene.transfer.opacity = Some(Ramp::new(vec![(11.32, 0.0), (11.37, 1.0), (11.42, 0.0)]).unwrap());
     for width in [0.3, 1.0, 2.7] {
         scene.splatting.slab_width = width;
         let alpha = f64::from(render(&volume, &scene).pixels[4][3]);
         assert!((alpha - 0.05).abs() < 0.0005, "{width}: {alpha}");
     }
-    // An iso-range as wide cuts a piece of the ramp out.
+    // An iso-range of the same width cuts a piece out of the ramp.
     scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.5)]).unwrap());
     scene.transfer.iso_ranges = Some(vec![[11.32, 11.42]]);
     for width in [0.3, 1.0, 2.7] {

@@ -1,4 +1,4 @@
-//! What `after` excludes is refused by its key.
+//! Settings that exclude `after` are refused by their keys.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ fn parse(sets: &[&str]) -> Result<Scene, sheetsplat::scene::SceneError> {
 }
 
 #[test]
-fn what_excludes_after_is_named() {
+fn settings_that_exclude_after_are_named() {
     let after = "splatting.classification=after";
     for (sets, key, found, allowed) in [
         (&["splatting.method=axis-aligned"][..], "classification", "method = \"axis-aligned\"", "\"before\" with it"),
@@ -25,19 +25,19 @@ fn what_excludes_after_is_named() {
             &["splatting.experimental.whole_below=0.1"],
             "classification",
             "\"after\" with splatting.experimental.whole_below = 0.1",
-            "\"before\"",
+            "\"before\" with it, or splatting.experimental.whole_below = 0",
         ),
         (
             &["splatting.experimental.beta=0.9"],
             "classification",
             "\"after\" with splatting.experimental.beta = 0.9",
-            "\"before\"",
+            "\"before\" with it, or splatting.experimental.beta = 1",
         ),
         (
             &["splatting.experimental.resolution=0.01"],
             "classification",
             "\"after\" with splatting.experimental.resolution = 0.01",
-            "\"before\"",
+            "\"before\" with it, or splatting.experimental.resolution = 0",
         ),
         (&["splatting.falloff=11.5"], "falloff", "11.5 with splatting.classification", "at most 11"),
         (
@@ -47,11 +47,11 @@ fn what_excludes_after_is_named() {
             "\"smooth\" with them, or a larger falloff",
         ),
     ] {
-        // By themselves they are fine.
+        // Without `after` they are valid.
         parse(sets).unwrap().splatting.check().unwrap();
         let text = parse(&[&[after], sets].concat()).unwrap_err().to_string();
         assert!([key, found, allowed].iter().all(|words| text.contains(words)), "{sets:?}: {text}");
-        // Also where no scene file says so.
+        // They are refused without a scene file, too.
         let mut scene = parse(sets).unwrap();
         scene.splatting.classification = Classification::After;
         let volume = scene.load_volume().unwrap();
@@ -78,10 +78,14 @@ fn the_preset_labels_excludes_after() {
     assert_eq!(Splatting::default().classification, Classification::Before);
 }
 
-/// Until it draws it.
+/// The GPU does not draw them with `after` yet.
 #[test]
-fn the_gpu_refuses_after() {
-    let scene = parse(&["splatting.classification=after"]).unwrap();
-    let error = gpu().render_volume(builtin::volume("head:16").unwrap(), &scene).unwrap_err().to_string();
-    assert!(error.contains("splatting.classification: found \"after\" on the GPU"), "{error}");
+fn the_gpu_refuses_projections() {
+    let volume = builtin::volume("head:16").unwrap();
+    for compositing in ["maximum", "minimum", "average", "surface"] {
+        let compositing = format!("splatting.compositing={compositing}");
+        let scene = parse(&["splatting.classification=after", &compositing]).unwrap();
+        let error = gpu().render_volume(volume.clone(), &scene).unwrap_err().to_string();
+        assert!(error.contains("splatting.compositing: found a projection or \"surface\""), "{error}");
+    }
 }

@@ -4,7 +4,7 @@ use image::RgbaImage;
 
 use crate::*;
 
-/// Pixels from the image's edges to a plate, and from there to what is on it.
+/// Pixels from the image's edges to a plate, and from the plate's edges to its content.
 const MARGIN: u32 = 8;
 const PADDING: u32 = 6;
 
@@ -18,7 +18,7 @@ impl Folder {
     }
 }
 
-/// Pixels of the longest run of ink in a row of pixels.
+/// The length of the longest run of ink in a row of pixels.
 fn longest_run(image: &RgbaImage, row: u32) -> usize {
     let is_ink: Vec<bool> = (0..image.width()).map(|x| image.get_pixel(x, row).0 == [INK, INK, INK, 255]).collect();
     is_ink.split(|ink| !ink).map(<[bool]>::len).max().unwrap()
@@ -37,22 +37,22 @@ const CUBE: &str = "builtin:cube --set image.width=320 --set image.height=200 --
 #[test]
 fn a_scale_bar_is_as_long_as_it_says() {
     let folder = Folder::new();
-    // World units over the image's height, and the bar's: the longest round one within a quarter of the width.
+    // World units over the image's height, and the bar's length: the longest round one within a quarter of the width.
     for (height, length) in [(100.0, 20.0), (40.0, 10.0), (200.0, 50.0), (62.5, 20.0), (64.0, 20.0)] {
         let image = folder.annotated(&format!("{CUBE} --set camera.height={height}"));
         let expected: f64 = length * 200.0 / height;
         assert!(expected <= 320.0 / 4.0 && expected * 2.5 >= 320.0 / 4.0, "{height}");
         assert_eq!(bar(&image), expected.round() as usize, "{height}");
     }
-    // Against the picture: the cube's side is 32 units, seen head-on.
+    // Compared with the picture: the cube's side is 32 units, seen head-on.
     let image = folder.annotated(&format!("{CUBE} --set camera.height=100 --set splatting.radius=1"));
     let lit = (0..320).filter(|&x| image.get_pixel(x, 100).0[0] > 90).count() as f64;
     assert!((lit / bar(&image) as f64 - 32.0 / 20.0).abs() < 0.06, "{lit} pixels");
-    // In the volume's own length.
+    // In the volume's own unit.
     let image =
         folder.annotated(&format!("{CUBE} --set camera.height=0.01 --set volume.spacing=[0.0001,0.0001,0.0002]"));
     assert_eq!(bar(&image), 40, "0.002 units");
-    // The text differs where the bar does not.
+    // The text differs although the bar does not.
     let [first, second] =
         ["100", "1000"].map(|height| folder.annotated(&format!("{CUBE} --set camera.height={height}")));
     assert_eq!(bar(&first), bar(&second));
@@ -90,7 +90,7 @@ fn a_plate_keeps_text_readable_on_any_background() {
         let ink = image.get_pixel(MARGIN + 36, 200 - MARGIN - PADDING - 2).0;
         assert!(ink[3] == 255 && ink[0] >= INK - 1, "{background} {ink:?}");
         assert!(corner[0] < 80 && corner[3] > 180, "{background}: {corner:?}");
-        // Nothing else changed.
+        // The rest of the image is unchanged.
         folder.render(&format!(
             "{} --set camera.height=100 --set image.background={background} -o plain.png",
             &CUBE[..CUBE.len() - 17]
@@ -109,7 +109,7 @@ fn a_colour_bar_has_the_transfer_functions_colours() {
     let ramp = "--set transfer.color=[[0,[1,0,0]],[255,[0,0,1]]] --set transfer.opacity=[[0,0.4]]";
     let image = folder
         .annotated(&format!("builtin:marschner-lobb:12 {ramp} --set image={{width=200,height=160}} --annotate colors"));
-    // Half of the image in height, in the middle; the most of it blue above, red below.
+    // The bar has half of the image's height, in the middle; most of it is blue above and red below.
     let column = (0..200)
         .rev()
         .find(|&x| {
@@ -124,7 +124,7 @@ fn a_colour_bar_has_the_transfer_functions_colours() {
     let [top, bottom] = [rows[colored[0]], rows[colored[79]]];
     assert!(top[2] > 220 && top[0] < 35 && bottom[0] > 220 && bottom[2] < 35, "{top:?} {bottom:?}");
     assert!(colored.windows(2).all(|pair| rows[pair[0]][0] <= rows[pair[1]][0]), "from above to below");
-    // Ticks and numbers beside it.
+    // Ticks and numbers are beside it.
     let light = |x: u32| (0..160).filter(|&y| image.get_pixel(x, y).0[1] > 120).count();
     assert_eq!(light(column + 2), 2, "ticks at 100 and 200");
     assert!((column + 8..190).map(light).sum::<usize>() > 60, "numbers");
@@ -135,7 +135,7 @@ fn a_projections_colour_bar_is_as_bright_as_the_projection() {
     let folder = Folder::new();
     let image =
         folder.annotated("builtin:marschner-lobb:12 --preset mip --set image={width=200,height=160} --annotate colors");
-    // Grey, and darker from above to below, in the column that is grey all the way.
+    // Colours are grey, and darker downwards, in the column that is grey throughout.
     let greys = |x: u32| -> Vec<u8> { (41..119).map(|y| image.get_pixel(x, y).0[0]).collect() };
     let falls = |greys: &Vec<u8>| greys.windows(2).all(|pair| pair[0] >= pair[1]) && greys[0] > 235 && greys[77] < 60;
     assert!((100..192).map(greys).any(|greys| falls(&greys)));
@@ -144,7 +144,7 @@ fn a_projections_colour_bar_is_as_bright_as_the_projection() {
 #[test]
 fn a_legend_names_every_label_in_its_colour() {
     let folder = Folder::new();
-    // Slabs of 1, 2, 3, 300 and nothing.
+    // Slabs of labels 1, 2, 3 and 300, and of 0.
     let labels = [0.0, 1.0, 2.0, 3.0, 300.0, 0.0];
     let values: Vec<f32> = (0..24 * 24 * 24).map(|i: usize| labels[i % 24 / 4]).collect();
     folder.write_nrrd("labels.nrrd", [24, 24, 24], [1.0, 1.0, 1.0], &values);
@@ -157,12 +157,12 @@ fn a_legend_names_every_label_in_its_colour() {
         let expected = sheetsplat::appearance::categories::color(label) * 255.0;
         let [r, g, b, _] = colors[row].map(f64::from);
         assert!(expected.distance(DVec3::new(r, g, b)) < 1.5, "{label}: {:?}", colors[row]);
-        // And so are the voxels.
+        // The voxels have the same colours.
         let is_there = image.enumerate_pixels().any(|(x, _, pixel)| x > 80 && pixel.0 == colors[row]);
         assert!(is_there, "{label} is not in the picture");
     }
     assert_eq!(patch(4), [0, 0, 0, 255], "no more");
-    // Of a segmented volume, those with colours.
+    // In a segmented volume, the labels with colours are listed.
     let segmented = "builtin:head:24 --set image={width=320,height=160} --annotate legend";
     let of = |sets: &str| folder.annotated(&format!("{segmented} --set transfer.label=[{sets}]"));
     let image = of(
@@ -170,7 +170,7 @@ fn a_legend_names_every_label_in_its_colour() {
     );
     let patch = |row: u32| image.get_pixel(MARGIN + PADDING + 10, MARGIN + PADDING + 16 * row + 8).0;
     assert_eq!([patch(0), patch(1), patch(2)], [[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 0, 255]]);
-    // By name too: "3 fluid around the brain" and "5 white matter".
+    // Names are shown too: "3 fluid around the brain" and "5 white matter".
     let text_end = |row: u32| {
         let rows = MARGIN + PADDING + 16 * row..MARGIN + PADDING + 16 * (row + 1);
         (0..320).rev().find(|&x| rows.clone().any(|y| image.get_pixel(x, y).0[1] > 120)).unwrap()
@@ -188,7 +188,7 @@ fn a_long_legend_has_several_columns() {
     let image = folder.annotated("labels.nrrd --set image={width=300,height=200} --annotate legend,scale");
     let patch =
         |column: u32, row: u32| image.get_pixel(MARGIN + PADDING + 10 + column, MARGIN + PADDING + 16 * row + 8).0;
-    // 35 labels in 8 rows above the scale bar; a column is a patch, a gap, two digits and a gap wide.
+    // 35 labels are in 8 rows above the scale bar; a column consists of a patch, a gap, two digits and a gap.
     let columns = [0, 54, 108, 162, 216];
     assert!(
         columns.iter().all(|&column| patch(column, 0)[..3] != [0; 3]),
@@ -216,7 +216,7 @@ fn movies_and_sheets_are_annotated_too() {
 }
 
 #[test]
-fn what_cannot_be_annotated_is_refused_by_name() {
+fn impossible_annotations_are_refused_by_name() {
     let folder = Folder::new();
     let values: Vec<f32> = (0..512).map(|i| (i / 64 / 2) as f32).collect();
     folder.write_nrrd("labels.nrrd", [8, 8, 8], [1.0, 1.0, 1.0], &values);

@@ -4,11 +4,11 @@ use crate::errors::assert_fails;
 use crate::statistics::{STATS_KEYS, count, keys};
 use crate::*;
 
-/// What `bench` prints besides the last frame's stats.
+/// The keys that `bench` prints in addition to the last frame's statistics.
 const BENCH_KEYS: [&str; 5] = ["first_frame_ms", "max_frame_ms", "median_frame_ms", "min_frame_ms", "peak_rss_mib"];
 
 impl Folder {
-    /// Runs what must print exactly one line of JSON.
+    /// Runs a bench that must print exactly one line of JSON.
     fn bench(&self, arguments: &str) -> Value {
         let run = self.run(&format!("bench {arguments}"));
         assert_eq!(run.code, Some(0), "{arguments}\n{}", run.stderr);
@@ -37,7 +37,7 @@ fn bench_prints_one_line_of_json() {
         if frames == "--frames 1" {
             assert_eq!([min, max], [median; 2], "{report:#}");
         }
-        // A device, the pipelines and a frame take their time; this program and a driver take their memory.
+        // A device, the pipelines and a frame take time; the program and a driver use memory.
         assert!(ms("first_frame_ms") > 0.0 && ms("load_ms") >= 0.0, "{report:#}");
         #[cfg(target_os = "linux")]
         assert!(report["peak_rss_mib"].as_f64().unwrap() > 5.0, "{report:#}");
@@ -49,7 +49,7 @@ fn bench_prints_one_line_of_json() {
     assert_eq!(folder.names(), before, "nothing is left");
 }
 
-/// Every frame is turned further, by the right hand about the camera's up, the first one not at all.
+/// Every frame is turned further, right-handed about the camera's up; the first one is not turned.
 #[test]
 fn bench_turns_the_camera() {
     let folder = Folder::new();
@@ -59,7 +59,7 @@ fn bench_turns_the_camera() {
         let keys = ["sections_total", "sections_rasterized", "sheets", "quads", "voxels_shaded", "bricks_visited"];
         keys.map(|key| count(stats, key))
     };
-    // About (0, 0, 1) from (0, 1, 0), and about (0, 1, 0) from (1, 0, 0).
+    // The direction turns about (0, 0, 1) from (0, 1, 0), and about (0, 1, 0) from (1, 0, 0).
     for (arguments, direction, up) in [
         ("--frames 1 --rotate 90", "[-1,0,0]", "[0,0,1]"),
         ("--frames 3 --rotate 30", "[-1,0,0]", "[0,0,1]"),
@@ -110,7 +110,7 @@ fn profiles_say_where_the_time_goes() {
         assert_eq!(run.code, Some(0), "{}", run.stderr);
         let stats: Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
         assert_eq!(keys(&stats["stages_ms"]), stages);
-        // A line for each: the stage, milliseconds.
+        // One line per stage: its name and milliseconds.
         let lines: Vec<Vec<&str>> = run.stdout.lines().map(|line| line.split_whitespace().collect()).collect();
         assert_eq!(lines.iter().map(|line| line[0]).collect::<Vec<_>>(), stages, "{}", run.stdout);
         for line in lines {
@@ -121,7 +121,7 @@ fn profiles_say_where_the_time_goes() {
     }
 }
 
-/// Nothing can be timed on the reference backend: that is said, and the image made.
+/// On the reference backend nothing can be timed: a warning says so, and the image is rendered.
 #[test]
 fn profiles_need_timestamps() {
     let folder = Folder::new();

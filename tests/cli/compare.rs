@@ -4,7 +4,7 @@ use sheetsplat::image::{Image, PngDepth};
 
 use crate::*;
 
-/// A folder with `a.png`, and with `b.png` that differs from it in so many pixels by so many steps of 255 in green.
+/// A folder with `a.png`, and with `b.png` that differs from it in some pixels by some steps of 255 in green.
 fn folder_with(pixels: usize, steps: u8) -> Folder {
     let folder = Folder::new();
     let image = Image { width: 25, height: 40, pixels: vec![[0.5, 0.25, 0.125, 1.0]; 1000] };
@@ -17,7 +17,7 @@ fn folder_with(pixels: usize, steps: u8) -> Folder {
     folder
 }
 
-/// Compares in a folder, and wants an exit code and words in the report.
+/// Compares in a folder, and asserts the exit code and words in the report.
 fn assert_compares(folder: &Folder, arguments: &str, code: i32, words: &[&str]) {
     let run = folder.run(&format!("compare {arguments}"));
     assert_eq!(run.code, Some(code), "{arguments}\n{}{}", run.stdout, run.stderr);
@@ -70,7 +70,7 @@ fn every_format_holds_the_same_image() {
     folder.render(&format!("{SMALL} {TRANSPARENT} -o 16.png --depth 16"));
     let names = ["8.png", "16.png", "image.exr", "image.npy"];
     for (actual, golden) in names.iter().flat_map(|actual| names.map(|golden| (actual, golden))) {
-        // 16 bits are not rounded to the same 8 bits where they are just between two of them.
+        // Values near the middle between two 8-bit numbers may be rounded differently from 16 bits.
         assert_compares(&folder, &format!("{actual} {golden} --tolerance 1"), 0, &["27×20"]);
     }
     assert_compares(&folder, "image.exr image.npy --tolerance 0", 0, &[]);
@@ -132,8 +132,8 @@ fn bad_usage_and_input_are_2_and_leave_nothing() {
     with_header("huge.npy", "(1, 2, 4, ), }      ", "(20000, 50000, 4), }");
     with_header("f8.npy", "<f4", "<f8");
     folder.write("f8.npy", [folder.read("f8.npy"), vec![0; 32]].concat());
-    // What two small files say of their size is made 100 000 × 100 000: in the PNG's first chunk, whose checksum goes with it, and in the
-    // EXR's two windows, which its decoder finds at odds with the length of its table of chunks.
+    // The sizes that two small files claim are changed to 100 000 × 100 000: in the PNG's first chunk, with its checksum, and in the EXR's two
+    // windows, which its decoder finds inconsistent with the length of its table of chunks.
     let mut png = folder.read("a.png");
     png[16..24].copy_from_slice(&[100_000_u32.to_be_bytes(); 2].concat());
     let mut crc = flate2::Crc::new();
@@ -182,7 +182,7 @@ fn bad_usage_and_input_are_2_and_leave_nothing() {
     folder.run("compare a.png b.png --difference folder.png").assert_failure(1, &["folder.png", "directory"]);
 }
 
-/// An array may be in either order; other programs write other ones.
+/// An array may be in either order; other programs write both.
 #[test]
 fn npy_of_any_order_and_length() {
     let folder = Folder::new();

@@ -1,8 +1,8 @@
-//! What goes wrong, by whose fault: messages and exit codes.
+//! Errors by cause: messages and exit codes.
 
 use crate::*;
 
-/// Runs what must fail, in a folder with a volume and some scenes, with an output file that must not change.
+/// Asserts that a run fails, in a folder with a volume, some scenes, and an output file that must not change.
 pub(crate) fn assert_fails(code: i32, arguments: &str, words: &[&str]) {
     let folder = Folder::new();
     folder.write_nrrd("good.nrrd", [2, 2, 2], [1.0, 1.0, 1.0], &[1.0; 8]);
@@ -36,7 +36,11 @@ fn bad_usage_is_2() {
     assert_fails(2, "render -o out.png", &["required"]);
     assert_fails(2, "paint good.nrrd -o out.png", &["paint", "--help"]);
     assert_fails(2, "render good.nrrd -o out.png --depth 12", &["--depth", "12", "8", "16"]);
-    assert_fails(2, "render good.nrrd -o out.png --backend cuda", &["--backend", "cuda", "gpu", "reference"]);
+    assert_fails(
+        2,
+        "render good.nrrd -o out.png --backend cuda",
+        &["--backend", "cuda", "auto", "gpu", "cpu", "reference"],
+    );
     assert_fails(2, "render good.nrrd -o out.png --frames 3", &["--frames"]);
     assert_fails(2, "render good.nrrd -o out.gif", &["out.gif", "\".gif\"", ".png", ".exr", ".npy"]);
     assert_fails(2, "render good.nrrd -o out", &["out: ", "none", ".png"]);
@@ -118,13 +122,13 @@ fn an_image_beyond_the_texture_limit_is_2() {
 }
 
 #[test]
-fn what_is_nobodys_input_is_1() {
+fn other_failures_are_1() {
     assert_fails(1, "render good.nrrd -o out.png --adapter Voodoo", &["Voodoo", "required", "actual"]);
     let small = "render good.nrrd --set image={width=8,height=8}";
     assert_fails(1, &format!("{small} -o no/such/folder/out.png"), &["no/such/folder/out.png", "No such file"]);
     assert_fails(1, &format!("{small} -o folder.png"), &["folder.png", "directory"]);
     assert_fails(1, &format!("{small} -o good.nrrd/out.png"), &["good.nrrd/out.png"]);
-    // Both files or neither.
+    // Either both files are written or neither.
     assert_fails(1, &format!("{small} -o new.png --stats no/stats.json"), &["no/stats.json", "No such file"]);
     assert_fails(1, &format!("{small} -o new.png --stats folder.png"), &["folder.png", "directory"]);
     assert_fails(1, &format!("{small} -o no/new.png --stats stats.json"), &["no/new.png", "No such file"]);
@@ -142,9 +146,9 @@ fn spacings_out_of_range_are_2() {
     }
 }
 
-/// Each is allowed by itself, together they leave what floats and memory hold.
+/// Each value is allowed by itself, but together they exceed what floats and memory can hold.
 #[test]
-fn what_no_renderer_can_do_is_2() {
+fn values_beyond_any_renderer_are_2() {
     for backend in ["gpu", "reference"] {
         let render = |sets: &str, words: &[&str]| {
             let arguments = format!("render good.nrrd -o out.png --backend {backend} {sets}");
@@ -165,7 +169,7 @@ fn what_no_renderer_can_do_is_2() {
     }
 }
 
-/// The driver's textures are not that large.
+/// The driver's textures cannot be that large.
 #[test]
 fn a_device_that_fails_is_1() {
     let set = "--set image.width=16384 --set image.height=16384 --set splatting.rasterizer=\"quads\"";
@@ -173,7 +177,7 @@ fn a_device_that_fails_is_1() {
     assert_fails(1, &arguments, &["the device is out of memory", "sheetsplat.sheets"]);
 }
 
-/// Where the loader finds no driver.
+/// The loader finds no driver.
 #[cfg(target_os = "linux")]
 #[test]
 fn without_a_driver_the_error_says_what_to_install() {

@@ -1,4 +1,4 @@
-//! Scenes at the ends of what is allowed.
+//! Scenes at the limits of what is allowed.
 
 use crate::*;
 
@@ -8,7 +8,7 @@ fn assert_near(actual: f32, expected: f32, allowed: f32, what: &str) {
     assert_at_most(error, allowed.into(), format_args!("{what}: {actual}, not {expected}"));
 }
 
-/// A ball of radius 4, 200 in 10, in 12³ voxels.
+/// A ball of radius 4 with the value 200 in a background of 10, in 12³ voxels.
 fn ball() -> Vec<f32> {
     let voxel = |i: i32| DVec3::new(f64::from(i % 12), f64::from(i / 12 % 12), f64::from(i / 144)) - 5.5;
     (0..1728).map(|i| if voxel(i).length() < 4.0 { 200.0 } else { 10.0 }).collect()
@@ -50,7 +50,7 @@ fn extremes_agree_with_the_reference() {
     }
 }
 
-/// The low-pass rule makes amounts tiny, of which a pixel adds up very many.
+/// The low-pass rule makes amounts tiny, and a pixel adds up very many of them.
 #[test]
 fn minified_volumes_keep_their_opacity() {
     let folder = Folder::new();
@@ -67,21 +67,21 @@ fn minified_volumes_keep_their_opacity() {
     }
 }
 
-/// Drivers end loops that run long: what is behind a pixel is drawn in as many dispatches as it takes.
+/// Drivers end long loops, so what lies behind a pixel is drawn in as many dispatches as necessary.
 #[test]
 fn deep_volumes_are_drawn_to_their_end() {
     let folder = Folder::new();
     let zeros = |dims: [usize; 3]| vec![0.0_f32; dims.iter().product()];
-    // A voxel at either end, and thousands of sheet groups of nothing between them.
+    // One voxel at either end, with thousands of empty sheet groups between them.
     let mut ends = zeros([1, 12, 1]);
     (ends[0], ends[11]) = (1.0, 1.0);
     folder.write_nrrd("ends.nrrd", [1, 12, 1], [1.0, 1000.0, 1.0], &ends);
-    // Few voxels in many bricks, many voxels in few; all of them behind a pixel or two.
+    // Few voxels in many bricks, and many voxels in few bricks, all behind one or two pixels.
     let mut sparse = zeros([28; 3]);
     (0..343).for_each(|i| sparse[4 * (i % 7 + 28 * (i / 7 % 7 + 28 * (i / 49)))] = 1.0);
     folder.write_nrrd("sparse.nrrd", [28; 3], [1.0; 3], &sparse);
     folder.write_nrrd("dense.nrrd", [24; 3], [1.0; 3], &[1.0; 24 * 24 * 24]);
-    // More control points than a subgroup has threads.
+    // There are more control points than threads in a subgroup.
     let many: Vec<String> = (0..40).map(|i| format!("[{},{}]", f64::from(i) / 39.0, f64::from(i) * 1e-6)).collect();
     let many = format!("[{}]", many.join(","));
     for (volume, opacity, slab_width) in [
@@ -126,7 +126,7 @@ fn the_smallest_and_the_narrowest() {
             }
         }
     }
-    // Nothing but background.
+    // Only the background is visible.
     for sets in [
         "camera={center=[1e300,1e300,1e300],fit='volume'}",
         "transfer.iso_ranges=[[1e30,2e30]]",

@@ -1,4 +1,4 @@
-//! The files that a run writes: never those it reads, whole or not at all, and nothing else.
+//! The files that a run writes: never one that it reads, whole or not at all, and no others.
 #![cfg(unix)]
 
 use std::fs::{File, OpenOptions, Permissions};
@@ -14,10 +14,10 @@ use sheetsplat::image::{Image, PngDepth};
 
 use crate::*;
 
-/// The first thing that needs a device fails by this: what is refused before is refused in time.
+/// An adapter that does not exist, with which the first step that needs a device fails: earlier errors come before it.
 const NO_DEVICE: &str = "--adapter Voodoo";
 
-/// Files of every kind that a run may read.
+/// A folder with files of every kind that a run may read.
 fn with_inputs() -> Folder {
     let folder = Folder::new();
     folder.write_nrrd("a.nrrd", [2, 2, 2], [1.0, 1.0, 1.0], &[0.0, 1.0, 2.0, 3.0, 3.0, 3.0, 0.0, 0.0]);
@@ -51,7 +51,7 @@ fn with_inputs() -> Folder {
     folder
 }
 
-/// Refused for the sake of a file, which is as it was.
+/// Asserts that a run is refused because of a file, which stays unchanged.
 fn assert_refused(folder: &Folder, arguments: &str, words: &[&str], kept: &str) {
     let (before, names) = (folder.read(kept), folder.names());
     folder.run(arguments).assert_failure(2, &[words, &["allowed: another file"]].concat());
@@ -86,7 +86,7 @@ fn no_output_is_an_input() {
         assert_refused(&folder, &format!("{arguments} {NO_DEVICE}"), &[option, "the input", input], input);
     }
     assert_refused(&folder, "compare image.png image.png --difference here/image.png", &["--difference"], "image.png");
-    // What is beside the slices may be written.
+    // Other files beside the slices may be written.
     folder.render("series -o series/a.png --set image={width=8,height=8}");
     folder.render("series -o series/a.png --set image={width=8,height=8}");
 }
@@ -106,7 +106,7 @@ fn an_input_by_another_name_is_no_output() {
     ] {
         assert_refused(&folder, &format!("{arguments} {NO_DEVICE}"), &["--output", "the input"], kept);
     }
-    // The header of a later tile's volume names it.
+    // The header of a later tile's volume names the file.
     let sweep = format!("sweep a.nrrd -o hard.png --set volume.path=a.nrrd,a.nhdr {NO_DEVICE}");
     assert_refused(&folder, &sweep, &["--output", "the input"], "nrrd.raw");
     assert_refused(&folder, "compare image.png image.png --difference soft.png", &["--difference"], "image.png");
@@ -130,7 +130,7 @@ fn two_outputs_are_two_files() {
     assert_refused(&folder, &format!("{frames} {NO_DEVICE}"), &["--output", "soft-1.png"], "old.png");
 }
 
-/// Runs with standard output going to a file, whose end it is written to.
+/// Runs with standard output appended to a file.
 fn run_into(folder: &Folder, file: &str, arguments: &str) -> (Option<i32>, String) {
     let file = OpenOptions::new().append(true).create(true).open(folder.path(file)).unwrap();
     let output = folder.command(arguments).stdout(file).output().unwrap();
@@ -155,7 +155,7 @@ fn standard_output_is_an_output() {
         assert_eq!(folder.read(input), before, "{arguments}");
         assert_eq!(folder.names(), names, "{arguments}");
     }
-    // What stands in a file already stays there. By a link of our own: who may replace /dev/stdout must not lose it to a bug.
+    // The previous content of the file stays. A link of our own is used, because a bug must not replace /dev/stdout of a user who may do that.
     folder.write("log", "before\n");
     symlink("/proc/self/fd/1", folder.path("printed")).unwrap();
     let (code, stderr) = run_into(&folder, "log", &format!("render {SMALL} -o a.png --stats printed"));
@@ -233,13 +233,14 @@ fn a_file_that_is_replaced_keeps_its_mode() {
     }
 }
 
-/// A run by somebody who may write into the folder, but is not root, who may write everything.
+/// A run by a user who may write into the folder but is not root, who may write everything.
 fn unprivileged(folder: &Folder, arguments: &str) -> Command {
     fs::set_permissions(folder.path(""), Permissions::from_mode(0o777)).unwrap();
     if fs::metadata(folder.path("")).unwrap().uid() != 0 {
         return folder.command(arguments);
     }
-    // Where others can reach it. By another process: a test that starts a program at that moment would hold the copy open.
+    // The program is copied to where other users can reach it, by another process, because a test that starts a program at that moment
+    // would hold the copy open.
     let program = folder.path("sheetsplat");
     assert!(Command::new("cp").arg(env!("CARGO_BIN_EXE_sheetsplat")).arg(&program).status().unwrap().success());
     let mut command = Command::new(program);
@@ -264,9 +265,9 @@ fn a_file_that_may_not_be_written_stays() {
     }
 }
 
-/// Everything or nothing, whichever cannot be written.
+/// Either everything is written or nothing, whichever output fails.
 #[test]
-fn what_cannot_be_printed_leaves_no_file() {
+fn failed_printing_leaves_no_file() {
     let folder = with_inputs();
     let names = folder.names();
     let full = || OpenOptions::new().write(true).open("/dev/full").unwrap();
@@ -288,7 +289,7 @@ fn what_cannot_be_printed_leaves_no_file() {
     }
 }
 
-/// By somebody who cannot replace a device if it is taken for a file.
+/// Run by a user who cannot replace a device that is mistaken for a file.
 #[test]
 fn a_full_device_leaves_no_file() {
     let folder = with_inputs();
@@ -309,7 +310,7 @@ fn assert_fails_to_print(status: ExitStatus, stderr: &str, arguments: &str) {
     assert!(stderr.contains("standard output: "), "{arguments}: {stderr}");
 }
 
-/// Warnings and errors that nobody can read change nothing else.
+/// Warnings and errors that cannot be written have no other effect.
 #[test]
 fn a_full_standard_error_is_no_error() {
     let folder = with_inputs();
@@ -346,12 +347,16 @@ fn signals_that_the_caller_ignores_are_ignored() {
     assert_eq!(folder.names(), BTreeSet::new());
 }
 
-/// Frames that nobody waits for, from a shell.
+/// A long series of frames, started from a shell.
 fn long_orbit(folder: &Folder, before: &str) -> Command {
-    let mut command = Command::new("sh");
+    // Whoever runs the tests may ignore signals, as `nohup` does.
+    let mut command = Command::new("env");
     let program = env!("CARGO_BIN_EXE_sheetsplat");
     let script = format!("{before}exec '{program}' orbit {SMALL} --count 1000000 -o turn.apng");
-    command.args(["-c", &script]).env("WGPU_ADAPTER_NAME", "llvmpipe").current_dir(folder.path(""));
+    command
+        .args(["--default-signal", "sh", "-c", &script])
+        .env("WGPU_ADAPTER_NAME", "llvmpipe")
+        .current_dir(folder.path(""));
     command
 }
 
@@ -389,7 +394,7 @@ fn extensions_are_of_either_case() {
     folder.run(&format!("orbit {SMALL} --count 2 -o F%d.PNG --save-scene O.TOML")).assert_success();
     folder.render("O.TOML -o O.PNG");
     assert_eq!(folder.read("F0.PNG"), folder.read("O.PNG"));
-    // The data file of a pair goes by the case of its header.
+    // The data file of a pair has the same case as its header.
     for (from, to) in [("pair.hdr", "P.HDR"), ("pair.img", "P.IMG"), ("a.nrrd", "A.NRRD")] {
         fs::copy(folder.path(from), folder.path(to)).unwrap();
     }

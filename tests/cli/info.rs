@@ -2,7 +2,7 @@
 
 use crate::*;
 
-/// What it prints.
+/// The output of `info`.
 #[track_caller]
 fn info(folder: &Folder, arguments: &str) -> String {
     let run = folder.run(&format!("info {arguments}"));
@@ -32,7 +32,7 @@ fn json_has_the_files_facts() {
     }
     assert_eq!([&sform["min"], &sform["max"], &sform["mean"]], [0.0, 234.0, 117.0]);
 
-    // After slope and intercept, and by the arguments.
+    // After slope and intercept, and with arguments.
     let sloped = json(&fixture("sform.nii"));
     assert_eq!([&sloped["type"], &sloped["unit"]], [&Value::from("int16"), &Value::Null]);
     assert_eq!([&sloped["min"], &sloped["max"], &sloped["mean"]], [-3.0, 114.0, 55.5]);
@@ -61,19 +61,19 @@ fn frames_are_those_that_render_chooses_and_presets_fit_the_kind_of_data() {
         |arguments: &str| -> Value { serde_json::from_str(&info(&folder, &format!("{arguments} --json"))).unwrap() };
     let block = json("block.nrrd");
     assert_eq!(block["frame"]["center"], serde_json::json!([-2.0, -1.0, -0.5]));
-    // Along y: 3 spacings and two kernels of 2 grid units are 14 wide, 7 and 4 of them 5.5 high.
+    // Along y: the block's width of 3 spacings plus two kernels of 2 grid units is 14, its height of 7 and 4 of them is 5.5.
     assert_eq!(block["frame"]["height"], 14.0 / 0.9);
     assert_eq!([&block["frame"]["distance"], &block["preset"]], [&Value::Null; 2]);
     let text = info(&folder, "block.nrrd");
     assert!(text.contains("frame        center -2, -1, -0.5, height 15.5556 (no unit)\n"), "{text}");
-    assert!(text.contains("preset       none fits: the values decide\n"), "{text}");
+    assert!(text.contains("preset       none fits; the transfer function follows the values\n"), "{text}");
     folder.render("block.nrrd -o block.png --set image.width=20 --set image.height=20 --save-scene block.toml");
     let saved: toml::Table = String::from_utf8(folder.read("block.toml")).unwrap().parse().unwrap();
     assert_eq!(saved["camera"]["height"].as_float(), block["frame"]["height"].as_f64());
     let eye = json("block.nrrd --set camera.projection=perspective");
     assert!(eye["frame"]["distance"].as_f64().unwrap() > 14.0 && eye["frame"]["height"].is_null(), "{eye}");
 
-    // A body of soft tissue with some bone, in Hounsfield units, signed and not.
+    // A body of soft tissue with some bone, in signed and unsigned Hounsfield units.
     let tissue = |at: usize| if at.is_multiple_of(20) { 700.0 } else { 40.0 + (at % 7) as f32 };
     let body = |offset: f32| -> Vec<f32> {
         voxels.clone().enumerate().map(|(at, inside)| offset + if inside { tissue(at) } else { -1000.0 }).collect()
@@ -104,7 +104,7 @@ fn text_has_them_and_a_histogram() {
     has("range        0 to 234, mean 117");
     has("       50 %  120");
     has(&format!("0{:>63}", 234));
-    // Three slices a hundred apart.
+    // Three slices with values a hundred apart.
     let isos = text.lines().find_map(|line| line.strip_prefix("iso-values   ")).unwrap();
     let isos: Vec<f64> = isos.trim_end_matches(" (suggested)").split(", ").map(|iso| iso.parse().unwrap()).collect();
     assert!(isos.len() == 2 && (34.0..100.0).contains(&isos[0]) && (134.0..200.0).contains(&isos[1]), "{isos:?}");
@@ -119,7 +119,7 @@ fn text_has_them_and_a_histogram() {
     assert!(info(&folder, "builtin:cube").contains("format       builtin\n"));
 }
 
-/// Holes are counted; all else is said of the finite samples.
+/// Holes are counted; all other figures are about the finite samples.
 #[test]
 fn holes_are_counted_and_left_out() {
     let folder = Folder::new();
@@ -138,7 +138,7 @@ fn holes_are_counted_and_left_out() {
 }
 
 #[test]
-fn what_is_no_volume_is_bad_input() {
+fn files_that_are_not_volumes_are_bad_input() {
     let folder = Folder::new();
     folder.run("info missing.nrrd").assert_failure(2, &["missing.nrrd"]);
     folder.write("a.nii", "no volume");

@@ -1,4 +1,4 @@
-//! What is drawn: volume files by name or by arguments, and the side they are seen from.
+//! Inputs: volume files by name or by arguments, and the side from which they are seen.
 
 use crate::*;
 
@@ -7,7 +7,7 @@ const SIZE: &str = "--set image.width=16 --set image.height=12";
 /// `--view front` of the patients below.
 const FRONT: &str = "--set camera.direction=[0,0,-1] --set camera.up=[0,1,0]";
 
-/// The same volume three times: x runs to the patient's left, y to the head, z to the front; x runs to the right; nobody knows.
+/// The same volume three times: x runs to the patient's left, y to the head, z to the front; x runs to the right; unknown.
 fn with_patients() -> Folder {
     let folder = Folder::new();
     let values: Vec<u8> = (0..60).map(|i| (i * 4) as u8).collect();
@@ -40,7 +40,7 @@ fn views_are_the_anatomys() {
         .assert_failure(2, &["above", "top, bottom"]);
 }
 
-/// Frames, tiles and times begin where a picture does.
+/// Frames, tiles and times start from the same view as a picture.
 #[test]
 fn every_subcommand_takes_views() {
     let folder = with_patients();
@@ -95,7 +95,7 @@ fn raw_files_are_what_the_arguments_say() {
     refused("a.raw --dims 5,4,3 --type half", &["--set", "volume.type", "half", "uint16"]);
 }
 
-/// What a file does not say, or says otherwise than a grid can be, is told with what is made of it.
+/// Where a file states nothing, or nothing valid, a warning says what is assumed.
 #[test]
 fn warnings_state_what_is_assumed() {
     let folder = Folder::new();
@@ -113,7 +113,7 @@ fn warnings_state_what_is_assumed() {
     warned("movie.tif", "movie.tif: the description says 3 frames: taken to be slices");
     warned(&fixture("series/IM1"), "IM1: one slice; a folder with all slices of a series is read as one volume");
 
-    // The slice in the middle a twentieth of a step up.
+    // The middle slice is displaced by a twentieth of a step.
     fs::create_dir(folder.path("series")).unwrap();
     for name in ["IM1", "IM2", "IM3.dcm"] {
         fs::copy(fixtures.join("series").join(name), folder.path("series").join(name)).unwrap();
@@ -128,18 +128,18 @@ fn warnings_state_what_is_assumed() {
         "series: slices are not evenly spaced: taken to be 3.0000 mm apart, which is wrong by up to 0.1500 mm",
     );
 
-    // Numbers that leave one out.
+    // One number is missing.
     fs::create_dir(folder.path("slices")).unwrap();
     for (from, to) in [(8, 8), (9, 9), (10, 11)] {
         let from = fixtures.join(format!("slices/z{from}.tif"));
         fs::copy(from, folder.path(&format!("slices/z{to}.tif"))).unwrap();
     }
-    warned("slices", "slices: the slices' numbers go up by [1, 2]: taken as neighbours, none is left out");
+    warned("slices", "slices: the slices' numbers go up by [1, 2]: they are treated as neighbours");
 }
 
-/// Whatever is made of a volume with holes, the program says once how many there are; a volume of nothing else is bad input.
+/// The program reports the number of holes once, whatever it does with the volume; a volume of only holes is bad input.
 #[test]
-fn holes_are_said_once() {
+fn holes_are_reported_once() {
     let folder = Folder::new();
     let values: Vec<f32> = (0..60).map(|at| if at % 20 == 7 { f32::NAN } else { (at * 4) as f32 }).collect();
     folder.write_nrrd("a.nrrd", [5, 4, 3], [1.0; 3], &values);
@@ -200,7 +200,7 @@ fn memory_has_a_limit() {
     let words = ["builtin:cube:1024", "4294967296 bytes", "the memory limit of 2147483648 bytes"];
     folder.run("info builtin:cube:1024 --memory 2GiB").assert_failure(2, &words);
     folder.run("info nowhere.nrrd --memory 2XB").assert_failure(2, &["--memory", "2XB", "such as 2GiB"]);
-    // Far more than the file holds, and far more than any machine has.
+    // The header claims far more than the file holds, and than any machine has.
     let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1600 1600 1600\nencoding: bzip2\n\n";
     folder.write("bomb.nrrd", header);
     let words = [
@@ -211,7 +211,7 @@ fn memory_has_a_limit() {
     folder.run("info bomb.nrrd --memory 8GB").assert_failure(2, &words);
 }
 
-/// Each value has the colour that the file says, whatever the range of those that show.
+/// Each value has the file's colour, whatever the range of visible values.
 #[test]
 fn a_files_palette_is_a_colour_map() {
     let folder = Folder::new();

@@ -4,7 +4,7 @@ use crate::*;
 
 const HEAD: &str = "builtin:head:32 --set image.width=60 --set image.height=50 --set camera.direction=[0.5,0.8,-0.2]";
 
-/// Rows and columns of an image from the first to the last that are not black.
+/// The numbers of rows and columns from the first to the last that are not black.
 fn lit(folder: &Folder, arguments: &str) -> [usize; 4] {
     let (width, height, pixels) = folder.pixels(arguments);
     let is_lit = |x: usize, y: usize| pixels[x + y * width][..3].iter().any(|&channel| channel > 0.02);
@@ -25,14 +25,14 @@ fn without_a_scene_file_the_object_fills_the_image() {
     ] {
         let [left, right, top, bottom] = lit(&folder, &format!("builtin:head:40 {size} {set}"));
         let (wide, high) = (right + 1 - left, bottom + 1 - top);
-        // 0.9 of an axis less the kernels' faint rims, and in perspective what is behind the box's front.
+        // The object fills 0.9 of an axis, minus the kernels' faint rims and, in perspective, because of the box's depth.
         assert!((54..=73).contains(&high) && wide <= 91, "{set}: {wide} × {high}");
         assert!(
             left.abs_diff(99 - right) <= 6 && top.abs_diff(79 - bottom) <= 6,
             "{set}: {left} {right} {top} {bottom}"
         );
     }
-    // A scene file that says how to look at it, or what it looks like, frames the volume, whose diagonal is twice as long.
+    // A scene file with a camera or transfer function frames the volume, whose diagonal is twice as long.
     for keys in ["[camera]", "[transfer]\niso_ranges = [[0, 300]]"] {
         folder.write("a.toml", format!("volume.builtin = 'head:40'\n{keys}"));
         let [_, _, top, bottom] = lit(&folder, &format!("a.toml {size}"));
@@ -50,7 +50,7 @@ fn presets_and_colour_maps_are_short_for_settings() {
         ("--preset ct-bone", "--set preset=ct-bone"),
         ("--colormap inferno", "--set transfer.colormap=inferno"),
         ("--preset confocal --colormap magma", "--set transfer.colormap=magma --set preset=confocal"),
-        // What is set besides comes after.
+        // Keys that are set explicitly apply later.
         ("--preset xray --set preset=labels", "--set preset=labels"),
     ] {
         folder.render(&format!("{HEAD} {short} -o short.npy"));
@@ -59,7 +59,7 @@ fn presets_and_colour_maps_are_short_for_settings() {
         images.insert(folder.read("short.npy"));
     }
     assert_eq!(images.len(), 4, "all differ");
-    // By other subcommands too, and of many values at once.
+    // Other subcommands have them too, and sweeps.
     folder.run(&format!("orbit {HEAD} {WHOLE} --preset ct-bone --count 1 -o %d.npy")).assert_success();
     folder.render(&format!("{HEAD} {WHOLE} --preset ct-bone -o bone.npy"));
     assert_eq!(folder.read("0.npy"), folder.read("bone.npy"));
@@ -119,7 +119,7 @@ fn a_saved_scene_renders_the_same_bytes_from_wherever_it_is() {
         for key in ["color = ", "opacity = ", "compositing = ", "ambient = ", "direction = ", "width = "] {
             assert!(text.contains(key), "{key} in {text}");
         }
-        // Saved again, it is the same text.
+        // Saved again, the text is the same.
         folder.render(&format!("{arguments} -o first.npy"));
         folder.render(&format!("scenes/{at}.toml -o again.npy --save-scene scenes/again.toml"));
         assert_eq!(folder.read("first.npy"), folder.read("again.npy"), "{arguments}");

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod annotations;
+mod backends;
 mod bench;
 #[expect(dead_code, reason = "not every file needs all of it")]
 #[path = "../common/mod.rs"]
@@ -33,13 +34,13 @@ use common::compare::{assert_at_least, assert_at_most};
 use common::images::{BLACK, psnr};
 use common::shared::shared;
 
-/// A camera that does not follow what is visible, so that it is the same for one picture and for many.
+/// A camera that does not follow what is visible, so that one picture and many have the same framing.
 const WHOLE: &str = "--set camera.fit=volume";
 
 /// A temporary folder, which is also the program's current directory.
 struct Folder(tempfile::TempDir);
 
-/// What a run of the program left behind.
+/// The output of a run of the program.
 struct Run {
     arguments: String,
     code: Option<i32>,
@@ -64,7 +65,7 @@ impl Folder {
         fs::read(self.path(name)).unwrap()
     }
 
-    /// The names of the files and folders in it.
+    /// The names of the files and subfolders in the folder.
     fn names(&self) -> BTreeSet<String> {
         fs::read_dir(self.0.path()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
     }
@@ -109,7 +110,7 @@ impl Folder {
         command
     }
 
-    /// Renders what must succeed.
+    /// Renders and asserts success.
     fn render(&self, arguments: &str) {
         self.run(&format!("render {arguments}")).assert_success();
     }
@@ -141,7 +142,7 @@ impl Run {
         assert_eq!(self.stdout, "", "{}", self.arguments);
     }
 
-    /// A failure that says all of `words`, in any place, and only on stderr.
+    /// Asserts a failure whose message, only on standard error, contains all of `words` in any order.
     fn assert_failure(&self, code: i32, words: &[&str]) {
         let Self { arguments, stderr, .. } = self;
         assert!(!stderr.contains("panicked"), "{arguments}\n{stderr}");

@@ -66,7 +66,7 @@ fn the_camera_turns_by_the_right_hand_and_ends_a_step_early() {
 }
 
 #[test]
-fn what_is_there_is_not_drawn_again() {
+fn existing_images_are_not_drawn_again() {
     let folder = Folder::new();
     folder.write("f1.png", "not an image");
     folder.orbit(&format!("{TURNING} --count 3 -o f%d.png"));
@@ -76,7 +76,7 @@ fn what_is_there_is_not_drawn_again() {
     fs::remove_file(folder.path("f2.png")).unwrap();
     folder.orbit(&format!("{TURNING} --count 3 -o f%d.png"));
     assert_eq!(folder.read("f2.png"), last);
-    // With every frame there, no device is needed.
+    // If every frame exists already, no device is needed.
     folder.orbit(&format!("{TURNING} --count 3 -o f%d.png --adapter nonesuch"));
     folder.orbit(&format!("{TURNING} --count 3 -o f%d.png --overwrite --depth 16"));
     assert!(matches!(image::open(folder.path("f1.png")).unwrap(), image::DynamicImage::ImageRgba16(_)));
@@ -132,7 +132,7 @@ fn a_gif_is_over_black_and_keeps_time() {
         assert_at_least(decibels, 53.0, format_args!("frame {}", delays.len()));
         delays.push(frame.delay);
     }
-    // Hundredths of a second: six frames last 20.
+    // Delays are in hundredths of a second; six frames last 20.
     assert_eq!(delays, [3, 4, 3, 3, 4, 3]);
 }
 
@@ -153,7 +153,7 @@ fn video_encoders_get_planes_of_luma_and_chroma() {
     let header = b"YUV4MPEG2 W27 H20 F25:1 Ip A1:1 C444 XCOLORRANGE=LIMITED\n";
     assert!(full.starts_with(header));
     assert_eq!(full.len(), header.len() + 3 * (6 + 27 * 20 * 3));
-    // The corner is black, the middle is not.
+    // The corner is black, and the middle is not.
     let luma = &full[header.len() + 6..][..27 * 20];
     assert_eq!(luma[0], 16);
     assert!(luma[10 * 27 + 13] > 30 && luma.iter().all(|y| (16..=235).contains(y)));
@@ -200,7 +200,7 @@ fn a_saved_scene_renders_the_frames_bytes() {
             .assert_success();
         folder.run("render s.toml -o first.png").assert_success();
         assert!(folder.read("first.png") == folder.read("f0.png"), "{sets}");
-        // A quarter about z, by the right hand, from y.
+        // A quarter turn about z, right-handed, from y.
         let direction = "--set camera.direction=[-1,6.123233995736766e-17,0]";
         folder.run(&format!("render s.toml {direction} -o second.png")).assert_success();
         assert!(folder.read("second.png") == folder.read("f1.png"), "{sets}");
@@ -211,13 +211,13 @@ fn a_saved_scene_renders_the_frames_bytes() {
             "{text}"
         );
     }
-    // All frames are there already, and the scene is not.
+    // All frames exist already, but the scene does not.
     folder.run(&format!("orbit builtin:head:32 {small} -o f%d.png --count 4 --save-scene again.toml")).assert_success();
     assert!(folder.path("again.toml").exists());
     folder
         .run("orbit builtin:cube:8 -o f%d.png --save-scene s.json")
         .assert_failure(2, &["--save-scene", "s.json", ".toml"]);
-    // The scene that is read is not written.
+    // A scene that is read is not overwritten.
     let before = folder.read("s.toml");
     for output in ["f%d.png", "f.gif"] {
         let run = folder.run(&format!("orbit s.toml --count 4 -o {output} --save-scene ./s.toml"));

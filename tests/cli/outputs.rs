@@ -1,4 +1,4 @@
-//! Images: their formats, where they come from, and the reference backend's.
+//! Images: their formats and sources, and those of the reference backend.
 
 use crate::statistics::{STATS_KEYS, keys};
 use crate::*;
@@ -45,7 +45,7 @@ fn png_holds_the_rounded_floats_with_straight_alpha() {
             }
         }
     }
-    // The last background is opaque, the first is not: the corner shows nothing else.
+    // The last background is opaque and the first is not; the corner shows only the background.
     folder.render(&format!("{SMALL} {TRANSPARENT} -o 8.png"));
     assert_eq!(image::open(folder.path("8.png")).unwrap().to_rgba8().get_pixel(0, 0).0, [51, 102, 153, 64]);
 }

@@ -1,9 +1,9 @@
-//! What the program says about itself and about the machine.
+//! Information about the program and the machine.
 
 use crate::*;
 
 impl Folder {
-    /// Runs what must succeed, and gives what it prints.
+    /// The output of a run that must succeed.
     fn prints(&self, arguments: &str) -> String {
         let run = self.run(arguments);
         assert_eq!(run.code, Some(0), "{arguments}: {}", run.stderr);
@@ -46,7 +46,7 @@ fn help_and_version_are_results() {
 fn adapters_are_listed_with_what_they_can_do() {
     let folder = Folder::new();
     let list = folder.prints("adapters");
-    // Adapters are at the margin, what is known of them is not.
+    // Adapters start at the margin, and their properties are indented.
     let llvmpipe = list.split_inclusive('\n').skip_while(|line| !line.starts_with("llvmpipe")).collect::<String>();
     let rows: Vec<_> = llvmpipe.lines().skip(1).take_while(|line| line.starts_with("  ")).collect();
     let keys: Vec<_> = rows.iter().filter_map(|row| row.split_whitespace().next()).collect();
@@ -54,7 +54,7 @@ fn adapters_are_listed_with_what_they_can_do() {
     for (row, words) in rows.iter().zip(["llvmpipe Mesa", "Cpu", "vulkan", "yes", "yes"]) {
         assert!(row.contains(words), "no {words:?} in {row}");
     }
-    // The list is there also if none of them is the one that is wanted.
+    // The list is printed even if none of the adapters has the requested name.
     let run = folder.run("adapters --adapter nonesuch");
     assert_eq!(run.code, Some(1));
     assert!(run.stdout.contains("llvmpipe") && !run.stdout.contains("chosen   yes"), "{}", run.stdout);

@@ -5,7 +5,7 @@ use crate::statistics::count;
 use crate::*;
 
 #[test]
-fn what_does_not_go_together_is_2() {
+fn settings_that_exclude_each_other_are_2() {
     for (sets, words) in [
         (
             "--set splatting.rasterizer=quads --set splatting.footprint_box=parallelogram",

@@ -3,8 +3,9 @@
 use crate::*;
 
 /// The keys of SPEC §8, and what the program counts besides; no more and no less.
-pub(crate) const STATS_KEYS: [&str; 21] = [
+pub(crate) const STATS_KEYS: [&str; 22] = [
     "adapter",
+    "api",
     "backend",
     "bricks_tested",
     "bricks_visited",
@@ -46,7 +47,7 @@ fn assert_counts(what: &str, stats: &Value, expected: &[(&str, u64)]) {
 
 #[test]
 fn stats_of_a_single_voxel() {
-    // At the least the compositing buffer and the target, 16 bytes a pixel each; and quads' sheets.
+    // The minimum is the compositing buffer and the target, 16 bytes per pixel each, plus quads' sheets.
     for (rasterizer, name, least_bytes) in [(QUADS, "quads", 8 + 16 + 16), (TILES, "tiles", 16 + 16)] {
         let folder = Folder::new();
         assert_stats_of_a_single_voxel(&folder, rasterizer, name, least_bytes);
@@ -56,7 +57,7 @@ fn stats_of_a_single_voxel() {
 fn assert_stats_of_a_single_voxel(folder: &Folder, rasterizer: &str, name: &str, least_bytes: u64) {
     folder.write_nrrd("one.nrrd", [1, 1, 1], [1.0, 1.0, 1.0], &[1.0]);
     let haze = format!("--set transfer.opacity=[[0,0.5]] --set image.width=40 --set image.height=70 {rasterizer}");
-    // In the middle of plane 0: two slabs before it, two behind.
+    // The voxel lies on plane 0: two slabs are before it, two behind.
     let stats = folder.stats(&format!("one.nrrd {haze}"));
     assert_eq!(keys(&stats), STATS_KEYS);
     let (tiles, sheets) = (2 * 3, 4);
@@ -79,28 +80,29 @@ fn assert_stats_of_a_single_voxel(folder: &Folder, rasterizer: &str, name: &str,
     }
     assert!(count(&stats, "gpu_bytes") > 40 * 70 * least_bytes, "{stats:#}");
     assert_eq!(stats["rasterizer"], name);
-    for key in ["adapter", "driver", "backend"] {
+    for key in ["adapter", "driver", "api"] {
         assert!(!stats[key].as_str().unwrap().is_empty(), "{key}");
     }
+    assert_eq!(stats["backend"], "gpu");
 
-    // Half a spacing off the planes: a fifth slab. Its neighbour does not take part.
+    // Half a spacing off the planes there is a fifth slab. The voxel's neighbour does not take part.
     folder.write_nrrd("two.nrrd", [1, 2, 1], [1.0, 1.0, 1.0], &[1.0, 9.0]);
     let stats = folder.stats(&format!("two.nrrd {haze} --set transfer.iso_ranges=[[0,5]]"));
     let expected = [("voxels_total", 2), ("voxels_in_range", 1), ("sections_total", 5), ("sheets", 5)];
     assert_counts("half a spacing", &stats, &expected);
 
-    // None takes part.
+    // No voxel takes part.
     let stats = folder.stats(&format!("one.nrrd --set transfer.opacity=[[0,0]] {rasterizer}"));
     let none = ["voxels_in_range", "voxels_shaded", "sections_total", "sections_rasterized", "sheets", "tiles_total"];
     assert_counts("none takes part", &stats, &none.map(|key| (key, 0)));
 
-    // Off the screen: counted, not drawn.
+    // Off the screen, sections are counted but not drawn.
     let stats = folder.stats(&format!("one.nrrd {haze} {WHOLE} --set camera.center=[1000,0,0]"));
     let expected = [("voxels_in_range", 1), ("sections_total", 4), ("sections_rasterized", 0), ("sheets", 4)];
     assert_counts("off the screen", &stats, &expected);
 }
 
-/// SPEC §5's slabs counted one by one: sections and sheets of a volume that takes part as a whole.
+/// Counts SPEC §5's slabs one by one: the sections and sheets of a volume in which every voxel takes part.
 fn count_sections(dims: [u32; 3], spacing: DVec3, w: DVec3, radius: f64, slab_width: f64) -> (u64, u64) {
     let unit = spacing.min_element();
     let warped = w.normalize() * unit / spacing;
@@ -116,7 +118,7 @@ fn count_sections(dims: [u32; 3], spacing: DVec3, w: DVec3, radius: f64, slab_wi
                 let reach = (radius / width) as i64 + 3;
                 for k in around - reach..around + reach {
                     let overlap = (depth + radius).min((k + 1) as f64 * width) - (depth - radius).max(k as f64 * width);
-                    // More than rounding.
+                    // Overlaps must exceed rounding errors.
                     if overlap > 1e-9 {
                         sections += 1;
                         first = first.min(k);

@@ -26,7 +26,7 @@ impl Folder {
         image::open(self.path(name)).unwrap().into_rgba8()
     }
 
-    /// What `render` gives, which must be the tile whose upper left corner is there.
+    /// Asserts that the tile with this upper left corner equals the image that `render` gives.
     fn assert_tile(&self, sheet: &RgbaImage, corner: [u32; 2], arguments: &str) {
         self.render(&format!("{arguments} -o tile.png"));
         let tile = self.image("tile.png");
@@ -35,12 +35,12 @@ impl Folder {
     }
 }
 
-/// The part of a sheet that has the label of a tile in it.
+/// The part of a sheet that contains a tile's label.
 fn label(sheet: &RgbaImage, [x, y]: [u32; 2], lines: u32) -> RgbaImage {
     image::imageops::crop_imm(sheet, x, y, WIDTH, lines * LINE).to_image()
 }
 
-/// Whether something is written there, light on dark.
+/// Whether the part contains text, light on dark.
 fn is_written(label: &RgbaImage) -> bool {
     let light = label.pixels().filter(|pixel| pixel.0[0] > 150).count();
     light > 40 && light < label.pixels().len() / 5
@@ -118,7 +118,7 @@ fn bad_usage_and_input_are_2_and_leave_nothing() {
         ),
         ("-o s.png --set splatting.radius=1,2,9", &["--set", "splatting.radius", "9", "[1, 4]"]),
         ("-o s.png --set splatting.radius=1,", &["--set", "splatting.radius", "\"\""]),
-        ("-o s.png --set splatting.radius=1,2 --set splatting.radius=3", &["--set", "splatting.radius", "once more"]),
+        ("-o s.png --set splatting.radius=1,2 --set splatting.radius=3", &["--set", "splatting.radius", "found again"]),
         ("-o s.png --set nonesuch.key=1,2", &["nonesuch"]),
         ("-o s.png --set splatting.radius=1,2 --set splatting.falloff=1,2 --columns 2", &["--columns", "2", "one"]),
         ("-o s.png --set splatting.radius=1,2 --columns 0", &["--columns", "0"]),

@@ -1,9 +1,9 @@
-//! Comparisons that NaN fails. `f64::max` and `DVec4::max_element` ignore NaN, and `if measured < required` is false for it, so a test
-//! that folds or branches by hand passes an image of nothing but NaN. Every comparison of tests goes through these functions instead:
-//! they assert that all they are given is finite, and that a bound is kept.
+//! Comparisons that fail on NaN. `f64::max` and `DVec4::max_element` ignore NaN, and `if measured < required` is false for it, so a test that
+//! folds or branches by hand would accept an image of only NaN. All tests compare through these functions: they assert that all numbers
+//! are finite and that a bound holds.
 //!
-//! With `SHEETSPLAT_MARGINS=FILE` each comparison appends a line to the file whenever it comes closer to its bound than before: where it
-//! stands, what was measured, and the bound. That is how the bounds are kept within 6 dB of what is measured.
+//! With `SHEETSPLAT_MARGINS=FILE` each comparison appends a line to the file whenever it comes closer to its bound than before: its place, the
+//! measurement, and the bound. This shows which bounds are more than 6 dB from the measurement.
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -14,7 +14,7 @@ use std::sync::{LazyLock, Mutex};
 
 use glam::DVec4;
 
-/// Asserts that a measured value, such as a PSNR, is not below what is required. Infinity is what equal images measure.
+/// Asserts that a measurement, such as a PSNR, is not below a minimum. Equal images measure infinity.
 #[track_caller]
 pub(crate) fn assert_at_least(measured: f64, required: f64, what: impl Display) {
     assert!(required.is_finite(), "nothing is compared with {required}: {what}");
@@ -22,7 +22,7 @@ pub(crate) fn assert_at_least(measured: f64, required: f64, what: impl Display) 
     assert!(measured >= required, "{measured}, not at least {required}: {what}");
 }
 
-/// Asserts that a measured value, such as the largest difference, is not above what is allowed.
+/// Asserts that a measurement, such as the largest difference, is not above a maximum.
 #[track_caller]
 pub(crate) fn assert_at_most(measured: f64, allowed: f64, what: impl Display) {
     assert!(measured.is_finite() && allowed.is_finite(), "{measured} and {allowed} are not comparable: {what}");
@@ -30,7 +30,7 @@ pub(crate) fn assert_at_most(measured: f64, allowed: f64, what: impl Display) {
     assert!(measured <= allowed, "{measured}, not at most {allowed}: {what}");
 }
 
-/// The largest absolute value of some errors, all of them finite.
+/// The largest absolute value of some errors, all of which must be finite.
 #[track_caller]
 pub(crate) fn largest(errors: impl IntoIterator<Item = f64>) -> f64 {
     let mut largest = 0.0;
@@ -41,7 +41,7 @@ pub(crate) fn largest(errors: impl IntoIterator<Item = f64>) -> f64 {
     largest
 }
 
-/// The root of the mean square of some errors, all of them finite and at least one.
+/// The root mean square of some errors, all of which must be finite; there must be at least one.
 #[track_caller]
 pub(crate) fn root_mean_square(errors: impl IntoIterator<Item = f64>) -> f64 {
     let (mut squares, mut count) = (0.0, 0.0);
@@ -53,18 +53,18 @@ pub(crate) fn root_mean_square(errors: impl IntoIterator<Item = f64>) -> f64 {
     f64::sqrt(squares / count)
 }
 
-/// A root mean square of colours up to 1 in decibels.
+/// The decibels of a root mean square of colours up to 1.
 pub(crate) fn decibels(root_mean_square: f64) -> f64 {
     -20.0 * root_mean_square.log10()
 }
 
-/// The largest difference of any channel of two pixels, all of them finite.
+/// The largest difference in any channel of two pixels, all of which must be finite.
 #[track_caller]
 pub(crate) fn apart(actual: DVec4, expected: DVec4) -> f64 {
     largest((actual - expected).to_array())
 }
 
-/// Appends to the file of `SHEETSPLAT_MARGINS` what was measured, if the margin is the smallest so far at the caller's line.
+/// Appends a measurement to the file of `SHEETSPLAT_MARGINS` if its margin is the smallest so far at the caller's line.
 #[track_caller]
 fn record(measured: f64, bound: f64, margin: f64) {
     type Smallest = Mutex<BTreeMap<(&'static str, u32), f64>>;

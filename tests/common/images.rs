@@ -1,4 +1,4 @@
-//! How much images differ. Every channel of both must be finite.
+//! Differences between images, whose channels must all be finite.
 
 use sheetsplat::image::Image;
 
@@ -7,7 +7,7 @@ use super::compare;
 /// Opaque black, the default background.
 pub(crate) const BLACK: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
 
-/// Differences of every pixel's channels, all of them finite: a difference of anything else is not.
+/// The differences of every pixel's channels, all of which must be finite.
 #[track_caller]
 fn errors(a: &[[f32; 4]], b: &[[f32; 4]]) -> Vec<[f64; 4]> {
     assert_eq!(a.len(), b.len());
@@ -19,32 +19,32 @@ fn errors(a: &[[f32; 4]], b: &[[f32; 4]]) -> Vec<[f64; 4]> {
     errors
 }
 
-/// The root of the mean square of the first channels.
+/// The root mean square of the first channels.
 #[track_caller]
 fn rms_of(a: &[[f32; 4]], b: &[[f32; 4]], channels: usize) -> f64 {
     compare::root_mean_square(errors(a, b).iter().flat_map(|error| &error[..channels]).copied())
 }
 
-/// The largest difference of any channel.
+/// The largest difference in any channel.
 #[track_caller]
 pub(crate) fn largest_difference(a: &Image, b: &Image) -> f64 {
     compare::largest(errors(&a.pixels, &b.pixels).into_iter().flatten())
 }
 
-/// The root of the mean square over all channels.
+/// The root mean square over all channels.
 #[track_caller]
 pub(crate) fn rms(a: &Image, b: &Image) -> f64 {
     rms_of(&a.pixels, &b.pixels, 4)
 }
 
-/// The root of the mean square over all colours, without alpha.
+/// The root mean square over all colours, without alpha.
 #[track_caller]
 pub(crate) fn color_rms(a: &Image, b: &Image) -> f64 {
     rms_of(&a.pixels, &b.pixels, 3)
 }
 
-/// Decibels over the pixels where either differs from the background (premultiplied), which are `least` or more. Infinite where the
-/// images are equal, or where neither shows anything and `least` is 0.
+/// The PSNR in dB over the pixels where either image differs from the (premultiplied) background, of which there must be at least `least`.
+/// Infinite if the images are equal, or if both show only the background and `least` is 0.
 #[track_caller]
 pub(crate) fn psnr(a: &[[f32; 4]], b: &[[f32; 4]], background: [f32; 4], least: usize) -> f64 {
     assert_eq!(a.len(), b.len());

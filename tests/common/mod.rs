@@ -1,4 +1,4 @@
-//! What the tests share.
+//! Helpers that several tests share.
 
 pub(crate) mod compare;
 pub(crate) mod images;
@@ -7,7 +7,7 @@ pub(crate) mod surfaces;
 
 use glam::{DVec3, DVec4, UVec3};
 use sheetsplat::DeviceRequirements;
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::{GpuHeadless, HeadlessOptions};
 use sheetsplat::scene::{ImageSettings, Scene, TransferSettings, VolumeSource};
 use sheetsplat::settings::Ramp;
 use sheetsplat::settings::{Camera, Projection};
@@ -15,9 +15,9 @@ use sheetsplat::settings::{Compositing, FootprintForm, Rasterizer};
 use sheetsplat::volume::{Grid, Volume};
 use sheetsplat::wgpu::{Features, Limits, TextureFormat};
 
-/// What rounding to the nearest f32 changes at most, relative.
+/// The maximum relative error of rounding to the nearest f32.
 pub(crate) const F32: f64 = 1.0 / (1 << 24) as f64;
-/// What rounding to the nearest f16 changes at most, relative; below 2⁻¹⁴ half a step of 2⁻²⁴ instead.
+/// The maximum relative error of rounding to the nearest f16; below 2⁻¹⁴ the absolute error is at most half a step of 2⁻²⁴.
 pub(crate) const F16: f64 = 1.0 / (1 << 11) as f64;
 
 /// Every way to composite sheets.
@@ -31,40 +31,40 @@ pub(crate) const COMPOSITINGS: [Compositing; Compositing::COUNT] = [
     Compositing::Surface,
 ];
 
-/// Those by amounts, which can do without sheets.
+/// The compositings by amounts, which need no sheets.
 pub(crate) const BY_AMOUNTS: [Compositing; 3] = [Compositing::Linear, Compositing::Exponential, Compositing::Xray];
 
-/// Those by means.
+/// The compositings by means.
 pub(crate) const BY_MEANS: [Compositing; 4] =
     [Compositing::Maximum, Compositing::Minimum, Compositing::Average, Compositing::Surface];
 
-/// Both ways to draw sheets, whatever `auto` would choose.
+/// Both rasterizers, whatever `auto` would choose.
 pub(crate) const RASTERIZERS: [Rasterizer; 2] = [Rasterizer::Quads, Rasterizer::Tiles];
 
-/// Both, with all that each can draw from.
+/// Both rasterizers, each with all footprint forms that it supports.
 pub(crate) const FORMS: [(Rasterizer, FootprintForm); 3] = [
     (Rasterizer::Quads, FootprintForm::SummedArea),
     (Rasterizer::Quads, FootprintForm::Sections),
     (Rasterizer::Tiles, FootprintForm::SummedArea),
 ];
 
-/// Mesa's software driver: the tests compare images on it, so that they mean the same on every machine.
+/// Mesa's software driver, on which the tests compare images, so that results are the same on every machine.
 pub(crate) fn lavapipe() -> HeadlessOptions {
     HeadlessOptions::default().with_adapter("llvmpipe")
 }
 
-/// A device as the program opens it, with f32 sheets. Without any GPU or software driver the test fails.
-pub(crate) fn gpu() -> Headless {
+/// A device as the program opens it, with f32 sheets. The test fails without a GPU or software driver.
+pub(crate) fn gpu() -> GpuHeadless {
     let options = lavapipe().with_sheet_format(TextureFormat::Rgba32Float);
-    Headless::new(&options).unwrap_or_else(|error| panic!("these tests need Mesa's lavapipe: {error}"))
+    GpuHeadless::new(&options).unwrap_or_else(|error| panic!("these tests need Mesa's lavapipe: {error}"))
 }
 
-/// A device with WebGPU's default limits, but for storage bindings of at most so many bytes.
-pub(crate) fn gpu_with_small_bindings(bytes: u64) -> Headless {
+/// A device with WebGPU's default limits, except that storage bindings have at most `bytes` bytes.
+pub(crate) fn gpu_with_small_bindings(bytes: u64) -> GpuHeadless {
     let limits = Limits { max_storage_buffer_binding_size: bytes, ..Limits::default() };
     let requirements = DeviceRequirements { features: Features::FLOAT32_BLENDABLE, limits };
     let options = lavapipe().with_requirements(requirements).with_sheet_format(TextureFormat::Rgba32Float);
-    Headless::new(&options).unwrap_or_else(|error| panic!("these tests need Mesa's lavapipe: {error}"))
+    GpuHeadless::new(&options).unwrap_or_else(|error| panic!("these tests need Mesa's lavapipe: {error}"))
 }
 
 /// Four f32 per pixel, as read back.
@@ -72,7 +72,7 @@ pub(crate) fn pixels(bytes: &[u8]) -> Vec<DVec4> {
     bytemuck::pod_collect_to_vec::<_, [f32; 4]>(bytes).iter().map(|pixel| DVec4::from(pixel.map(f64::from))).collect()
 }
 
-/// A scene for a volume that the test brings itself, all of which it shows.
+/// A scene that shows a whole volume, which the test supplies.
 pub(crate) fn scene(width: u32, height: u32) -> Scene {
     let image = ImageSettings { width, height, ..ImageSettings::default() };
     Scene { image, camera: Camera::default(), ..Scene::new(VolumeSource::Builtin("cube".to_owned())) }
@@ -84,8 +84,8 @@ pub(crate) fn camera(direction: [f64; 3], height: f64) -> Camera {
     Camera { projection, direction: DVec3::from(direction), ..Camera::default() }
 }
 
-/// Balls in a haze of noise: values of 0 to 20, and of 150 to 250 in the balls. Its sides are at least `least` and less than `end`, rarely
-/// multiples of a brick's.
+/// Balls in a haze of noise: values of 0 to 20, and of 150 to 250 in the balls. Dimensions are at least `least` and less than `end`, and
+/// rarely multiples of a brick's side.
 pub(crate) fn random_volume(random: &mut Random, (least, end): (f64, f64), spacing: [f64; 3]) -> Volume {
     let dims = UVec3::from([(); 3].map(|()| random.uniform(least, end) as u32));
     let balls: Vec<(DVec3, f64)> =
@@ -100,11 +100,11 @@ pub(crate) fn random_volume(random: &mut Random, (least, end): (f64, f64), spaci
     Volume::new("random", dims, grid.spacing, values).unwrap()
 }
 
-/// Spacings of volumes that are seen in perspective.
+/// Spacings of volumes in perspective.
 pub(crate) const SPACINGS: [[f64; 3]; 4] = [[1.0, 1.0, 1.0], [1.0, 1.0, 3.0], [1.0, 1.0, 5.0], [3.0, 1.0, 2.0]];
 
-/// An eye far outside a volume, close by, or inside it, that looks at the volume, past it, or out of it, through a narrow or a
-/// wide angle. The near plane is a `unit` from it, or closer, or cuts the volume.
+/// An eye far outside a volume, close by, or inside it, that looks at the volume, past it, or out of it, at a narrow or wide angle. The near
+/// plane is one `unit` away, or closer, or cuts the volume.
 pub(crate) fn random_eye(random: &mut Random, grid: &Grid) -> Camera {
     let half = grid.center() * grid.spacing + grid.spacing;
     let place = random.bits() % 4;
@@ -135,7 +135,7 @@ pub(crate) fn transfer(color: &[(f64, [f64; 3])], opacity: &[(f64, f64)]) -> Tra
     }
 }
 
-/// SplitMix64: the same numbers in every run.
+/// SplitMix64, which gives the same numbers in every run.
 #[derive(Debug)]
 pub(crate) struct Random(pub(crate) u64);
 
@@ -149,22 +149,22 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Uniform in [low, high).
+    /// A uniform number in [low, high).
     pub(crate) fn uniform(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// One of some things.
+    /// A random choice.
     pub(crate) fn pick<T: Copy>(&mut self, choices: &[T]) -> T {
         choices[self.bits() as usize % choices.len()]
     }
 
-    /// A point, uniform in a box.
+    /// A uniform point in a box.
     pub(crate) fn within(&mut self, low: DVec3, high: DVec3) -> DVec3 {
         low + DVec3::from([(); 3].map(|()| self.uniform(0.0, 1.0))) * (high - low)
     }
 
-    /// A direction, uniform over the sphere.
+    /// A uniform direction.
     pub(crate) fn direction(&mut self) -> DVec3 {
         loop {
             let p = DVec3::from_array([(); 3].map(|()| self.uniform(-1.0, 1.0)));

@@ -1,8 +1,8 @@
-//! A host's depth texture with depths of the test's choice.
+//! A host's depth texture with chosen depths.
 
 use glam::{DMat4, DVec3, DVec4};
 use sheetsplat::Surfaces;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::wgpu::util::DeviceExt;
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
@@ -18,16 +18,16 @@ const WRITE_DEPTH: &str = "
     return values[pixel.y * width + pixel.x];
 }";
 
-/// How a host's clip space counts depth.
+/// How a host's clip space encodes depth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum DepthRange {
     Standard,
     Reversed,
-    /// Reversed, with the far plane at infinity. Perspective only; orthographic it is reversed.
+    /// Reversed, with the far plane at infinity. For orthographic cameras it is merely reversed.
     Infinite,
 }
 
-/// What a host would draw the view with: from the volume's world coordinates to clip space. Planes are at these depths, `unit`s.
+/// A host's matrix for the view, from the volume's world coordinates to clip space, with planes at these depths in `unit`s.
 pub(crate) fn clip_from_world(view: &ViewGeometry, unit: f64, range: DepthRange, [near, far]: [f64; 2]) -> DMat4 {
     let rays = view.rays();
     let half = DVec3::new(f64::from(view.size[0]), f64::from(view.size[1]), 0.0) / 2.0;
@@ -43,7 +43,7 @@ pub(crate) fn clip_from_world(view: &ViewGeometry, unit: f64, range: DepthRange,
         }
         Some(perspective) => {
             let per_depth = perspective.eye.pixel_per_depth;
-            // z = a·depth + b, over depth.
+            // z = a·depth + b, divided by the depth.
             let (a, b) = match range {
                 DepthRange::Standard => (far / (far - near), -near * far / (far - near)),
                 DepthRange::Reversed => (-near / (far - near), near * far / (far - near)),
@@ -56,9 +56,9 @@ pub(crate) fn clip_from_world(view: &ViewGeometry, unit: f64, range: DepthRange,
     DMat4::from_cols(x, y, z, last).transpose()
 }
 
-/// A texture that holds the depths (`unit`s along w, infinite for none) of an image's pixels at `origin`, and what it means.
+/// A texture that holds the depths (`unit`s along w, infinite without a surface) of an image's pixels from `origin` on, with its matrix.
 pub(crate) fn surfaces(
-    gpu: &Headless,
+    gpu: &GpuHeadless,
     view: &ViewGeometry,
     unit: f64,
     range: DepthRange,
@@ -75,7 +75,7 @@ pub(crate) fn surfaces(
         let pixel = texel.as_ivec2() - glam::UVec2::from(origin).as_ivec2();
         let is_inside =
             pixel.cmpge(glam::IVec2::ZERO).all() && pixel.cmplt(glam::UVec2::from(view.size).as_ivec2()).all();
-        // Around the image there is what must not matter.
+        // Texels around the image must not matter.
         let depth = if is_inside { depths[(pixel.y * view.size[0] as i32 + pixel.x) as usize] } else { planes[0] };
         if depth.is_infinite() {
             return none;
@@ -89,7 +89,7 @@ pub(crate) fn surfaces(
 }
 
 /// A depth texture that holds these values, row by row.
-fn depth_texture(gpu: &Headless, [width, height]: [u32; 2], values: &[f32]) -> wgpu::TextureView {
+fn depth_texture(gpu: &GpuHeadless, [width, height]: [u32; 2], values: &[f32]) -> wgpu::TextureView {
     let device = gpu.device();
     let texture = device.create_texture(&wgpu::TextureDescriptor {
         label: Some("host.depth"),

@@ -4,7 +4,7 @@ use crate::*;
 
 const HEADERS: [&str; 4] = ["list.nhdr", "pattern.nhdr", "list.mhd", "pattern.mhd"];
 
-/// A header of a fixture with other text in it, beside the fixture's files and one of two slices.
+/// A header of a fixture with some text replaced, in a folder with the fixture's data files and a file of two slices.
 #[track_caller]
 fn with(name: &str, text: &str, instead: &str) -> Result<Volume, VolumeError> {
     let folder = Folder::new();
@@ -48,7 +48,7 @@ fn files_have_rows_slices_or_slabs() {
     }
     let backwards = with("pattern.mhd", "part%d.bin 0 2 1", "part%d.bin 2 0 -1").unwrap();
     assert_eq!(backwards.values()[..20], values()[40..]);
-    // Behind a name alone the numbers run from 1.
+    // For a name alone the numbers start at 1.
     let from_one = with("pattern.mhd", "part%d.bin 0 2 1", "part%d.bin");
     assert!(matches!(from_one, Err(VolumeError::Io { path, .. }) if path.ends_with("part3.bin")));
 }

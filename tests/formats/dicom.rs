@@ -1,4 +1,4 @@
-//! DICOM, as pydicom writes it; and series that are none.
+//! DICOM as pydicom writes it, and invalid series.
 
 use sheetsplat::volume::{Encoding, Labels, SampleType};
 
@@ -30,7 +30,7 @@ fn assert_lies_as_written(volume: &Volume) {
     assert_eq!(volume.unit(), Some("mm"));
 }
 
-/// Slices in files without endings, in an order that neither names nor numbers tell, each with its own slope; a report among them.
+/// Slices in files without extensions, in an order that neither names nor numbers show, each with its own slope, and with a report among them.
 #[test]
 fn series_of_pydicom() {
     let volume = open("series");
@@ -58,7 +58,7 @@ fn one_slice_is_as_thick_as_it_says() {
     assert_refused(report, "report", "PixelData", "no such element", "an image");
 }
 
-/// A slice of 3 × 2 pixels, as text and as numbers of 16 bits.
+/// A slice of 3 × 2 pixels, whose elements are texts or 16-bit numbers.
 #[derive(Clone)]
 struct Slice {
     text: Vec<(u16, u16, &'static [u8; 2], String)>,
@@ -66,7 +66,7 @@ struct Slice {
     samples: Vec<u16>,
 }
 
-/// Elements that the tests change.
+/// The elements that the tests change.
 const SERIES: (u16, u16) = (0x20, 0x0e);
 const POSITION: (u16, u16) = (0x20, 0x32);
 const ORIENTATION: (u16, u16) = (0x20, 0x37);
@@ -134,7 +134,7 @@ impl Slice {
     }
 }
 
-/// Opens the folder of some slices, which are named `0`, `1`, …
+/// Opens a folder with some slices, which are named `0`, `1`, …
 fn series(slices: &[Slice]) -> Result<Volume, VolumeError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("series");
@@ -155,7 +155,7 @@ fn places_order_and_space_slices() {
     assert_eq!((volume.dims(), volume.spacing()), (UVec3::new(3, 2, 4), DVec3::new(0.5, 0.5, 2.0)));
     let expected: Vec<f32> = (0..24).map(|i| (20 * (i / 6) + i % 6) as f32).collect();
     assert_eq!(volume.values(), expected);
-    // From the head down: the normal points up all the same.
+    // The slices run from the head downwards, but the normal still points up.
     assert_near(volume.orientation().unwrap().origin, DVec3::new(-1.0, -2.0, 0.0));
     let names: Vec<Slice> = at(&[0.0, 3.0]).into_iter().map(|slice| slice.with(SLOPE, "2")).collect();
     assert!(series(&names).unwrap().values().iter().zip([0, 1, 2, 3, 4, 5, 30]).all(|(&v, e)| v == 2.0 * e as f32));
@@ -171,12 +171,12 @@ fn uneven_places_are_gaps_or_about_even() {
     refused(&[0.0, 2.0, 4.0, 4.0], "0.0000 mm between 2 and 3, 2.0000 mm between others");
     refused(&[0.0, 2.0, 4.0, 5.0], "1.0000 mm between 2 and 3");
     refused(&[1.0, 1.0], "0.0000 mm between 0 and 1");
-    // Off by a tenth of a step; a warning says so.
+    // Off by a tenth of a step, with a warning.
     let volume = series(&at(&[0.0, 2.2, 4.0, 6.0])).unwrap();
     assert_eq!(volume.spacing().z, 2.0);
 }
 
-/// Slices whose rows are so far off, in mm, from what a straight stack would have.
+/// Slices whose rows are displaced by these distances, in mm, from a straight stack.
 fn off(rows: &[f64]) -> Vec<Slice> {
     let slice = |(i, off): (usize, &f64)| {
         let z = 2.0 * i as f64;
@@ -185,7 +185,7 @@ fn off(rows: &[f64]) -> Vec<Slice> {
     rows.iter().enumerate().map(slice).collect()
 }
 
-/// Pixels are of 0.5 mm.
+/// Pixels measure 0.5 mm.
 #[test]
 fn slices_up_to_half_a_pixel_off_are_read_as_they_are() {
     let (volume, warnings) = warned(|| series(&off(&[0.0, 0.0049, 0.0])).unwrap());
@@ -206,7 +206,7 @@ fn slices_up_to_half_a_pixel_off_are_read_as_they_are() {
 
 #[test]
 fn tilted_gantries_are_sheared() {
-    // A row of 0.5 mm, at 2 mm from slice to slice: 14.04°.
+    // A row of 0.5 mm per slice distance of 2 mm: 14.04°.
     let (volume, warnings) = warned(|| series(&off(&[0.0, 0.5, 1.0])).unwrap());
     assert_warned(&warnings, "series: sheared by 14.04°");
     assert_eq!((volume.dims(), volume.spacing()), (UVec3::new(3, 4, 3), DVec3::new(0.5, 0.5, 2.0)));
@@ -217,24 +217,24 @@ fn tilted_gantries_are_sheared() {
     let is_same = volume.values().iter().zip(&expected).all(|(a, b)| a == b || a.is_nan() && b.is_nan());
     assert!(is_same && volume.values().len() == 36, "{:?}", volume.values());
     assert_near(volume.orientation().unwrap().origin, DVec3::new(-1.0, -2.0, 0.0));
-    // Towards smaller rows, voxel 0 is outside slice 0.
+    // Displaced towards smaller rows, voxel 0 lies outside slice 0.
     let back = series(&off(&[0.0, -0.5, -1.0])).unwrap();
     assert_near(back.orientation().unwrap().origin, DVec3::new(-1.0, -1.0, 0.0));
     assert_eq!(back.values()[6..12], [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
 
-    // Off its line besides, by less than half a pixel.
+    // In addition off the line by less than half a pixel.
     let (volume, warnings) = warned(|| series(&off(&[0.0, 0.7, 1.0])).unwrap());
     assert_eq!((volume.dims(), warnings.len()), (UVec3::new(3, 4, 3), 2));
     assert!(warnings[0].contains("1 is 0.2000 mm off, the largest error"), "{warnings:?}");
     assert!(warnings[1].contains("sheared by 14.04°"), "{warnings:?}");
-    // By more: on no line.
+    // Off by more, the slices are on no line.
     let field = "ImagePositionPatient";
     let found = "1, 0.3000 mm off the line through the first and the last slice";
     assert_refused(series(&off(&[0.0, 0.3, 0.0])), "series", field, found, "half a pixel of 0.5 mm");
     let found = "1, 0.4000 mm off the line";
     assert_refused(series(&off(&[0.0, 0.9, 1.0])), "series", field, found, "half a pixel of 0.5 mm");
 
-    // Slices tilted about x that are stacked along z.
+    // Slices tilted about x and stacked along z.
     let tilted: Vec<Slice> =
         at(&[0.0, 2.0, 4.0]).into_iter().map(|slice| slice.with(ORIENTATION, "1\\0\\0\\0\\0.8\\0.6")).collect();
     let (volume, warnings) = warned(|| series(&tilted).unwrap());
@@ -248,7 +248,7 @@ fn tilted_gantries_are_sheared() {
     assert_refused(series(&skew), "series", "ImageOrientationPatient", "not orthogonal", "orthogonal axes");
 }
 
-/// 16 bits of noise, in several code blocks: every bit counts.
+/// 16 bits of noise in several code blocks, so that every bit counts.
 #[test]
 fn jpeg_2000_is_exact() {
     let volume = Volume::open(&fixture("jpeg2000-large.dcm")).unwrap();
@@ -265,20 +265,20 @@ fn folders_hold_files_without_preamble_too() {
     let folder = tempfile::tempdir().unwrap();
     for (number, slice) in at(&[0.0, 2.0, 4.0]).iter().enumerate() {
         let bytes = slice.bytes();
-        // Whole, from the group that says how it is encoded, and behind that.
+        // The whole file, the file from the group with its encoding on, and the file after that group.
         let from = [0, 132, 132 + 8 + 20][number];
         fs::write(folder.path().join(number.to_string()), &bytes[from..]).unwrap();
     }
     let volume = Volume::open(folder.path()).unwrap();
     assert_eq!((volume.dims(), volume.spacing().z), (UVec3::new(3, 2, 3), 2.0));
-    // What has the name of a slice and is none is not left out in silence; other files are.
+    // A file with a slice's name that is not a slice is left out with a warning; other files are left out silently.
     for name in ["IM9", "1.2.840", ".DS_Store"] {
         fs::write(folder.path().join(name), b"\x03\x00\x16\x07").unwrap();
     }
     fs::write(folder.path().join("3.dcm"), b"\x00\x05\x16\x07").unwrap();
     fs::write(folder.path().join("notes.txt"), b"notes").unwrap();
     let (again, warnings) = warned(|| Volume::open(folder.path()).unwrap());
-    assert_warned(&warnings, "3 files do not begin as slices do and are left out: 1.2.840, 3.dcm, IM9");
+    assert_warned(&warnings, "3 files are not slices and are left out: 1.2.840, 3.dcm, IM9");
     assert_eq!(again.values(), volume.values());
 }
 
@@ -303,7 +303,12 @@ fn wrong_elements() {
         assert_refused(Folder::new().open("a.dcm", &slice.bytes()), "a.dcm", field, found, allowed);
     };
     let slice = || Slice::at(1.0);
-    refused(slice().with(POSITION, ""), "ImagePositionPatient", "no such element", "where the image lies");
+    refused(
+        slice().with(POSITION, ""),
+        "ImagePositionPatient",
+        "no such element",
+        "the image's position in the patient",
+    );
     refused(slice().with(POSITION, "1\\2"), "ImagePositionPatient", "1\\\\2", "finite numbers, 3 of them");
     refused(slice().with(ORIENTATION, "1\\0\\0\\0\\1\\x"), "ImageOrientationPatient", "x", "6 of them");
     refused(slice().with(ORIENTATION, "0\\0\\0\\0\\1\\0"), "ImageOrientationPatient", "lengths [0.0", "orthogonal");
@@ -333,13 +338,13 @@ fn wrong_elements() {
     let deflated = open("jpeg-lossless.dcm", "1.2.4.70", "1.2.1.99");
     assert_refused(deflated, "a.dcm", "elements", "deflate", "an undamaged deflated stream");
     let floats = open("float.dcm", "MONOCHROME2", "MONOCHROME1");
-    assert_refused(floats, "a.dcm", "PhotometricInterpretation", "MONOCHROME1", "MONOCHROME2, or, of whole numbers");
+    assert_refused(floats, "a.dcm", "PhotometricInterpretation", "MONOCHROME1", "MONOCHROME1 for whole numbers");
     assert_refused(open("rle.dcm", "1.2.5\0", "1.2.1\0"), "a.dcm", "PixelData", "fragments", "bare samples");
     assert_refused(open("frames.dcm", "DICM", "DICN"), "a.dcm", "magic", "DICN", "DICM after 128 bytes");
     assert_refused(open("frames.dcm", "1.2.1\0", "1.2.5\0"), "a.dcm", "PixelData", "bare samples", "frames as the");
 }
 
-/// Frames that are damaged, and frames that are not those that the file says.
+/// Damaged frames, and frames that contradict the file's elements.
 #[test]
 fn wrong_frames() {
     let folder = Folder::new();
@@ -375,7 +380,7 @@ fn damage() {
     }
 }
 
-/// Lengths of 4 GiB, and sequences in sequences without end.
+/// Lengths of 4 GiB, and endlessly nested sequences.
 #[test]
 fn lies_cost_nothing() {
     let folder = Folder::new();
@@ -384,5 +389,5 @@ fn lies_cost_nothing() {
     assert_refused(folder.open("a.dcm", &long), "a.dcm", "element (0008,0000)", "4294967294 bytes", "at most the 0");
     let nested = b"\x08\0\x11\x11SQ\0\0\xff\xff\xff\xff\xfe\xff\0\xe0\xff\xff\xff\xff".repeat(100_000);
     let nested = [&head[..], &nested].concat();
-    assert_refused(folder.open("a.dcm", &nested), "a.dcm", "elements", "more sequences", "32 of them");
+    assert_refused(folder.open("a.dcm", &nested), "a.dcm", "elements", "sequences nested deeper", "at most 32 levels");
 }

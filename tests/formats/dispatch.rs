@@ -1,4 +1,4 @@
-//! Which format a file is of.
+//! Determination of a file's format.
 
 use crate::*;
 
@@ -18,7 +18,7 @@ fn first_bytes_decide() {
     }
 }
 
-/// What ITK writes as NRRD lies as ITK's coordinates say, which are LPS.
+/// ITK writes NRRD in its own coordinates, LPS.
 #[test]
 fn nrrd_of_itk() {
     let lps = DVec3::new(-1.0, -1.0, 1.0);

@@ -1,11 +1,11 @@
-//! Samples that are not finite are holes, in every format that has such samples.
+//! Samples that are not finite are holes, in every format with such samples.
 
 use sheetsplat::scene::Scene;
 use sheetsplat::volume::Labels;
 
 use crate::*;
 
-/// Asserts that all values are those of the fixtures, except for the one voxel, [2, 1, 1], that a test makes a hole.
+/// Asserts that all values are the fixtures', except that voxel [2, 1, 1] is a hole.
 #[track_caller]
 fn assert_hole(name: &str, volume: Result<Volume, VolumeError>) {
     let volume = volume.unwrap_or_else(|error| panic!("{error}"));
@@ -16,7 +16,7 @@ fn assert_hole(name: &str, volume: Result<Volume, VolumeError>) {
     }
 }
 
-/// A fixture's bytes with others in place of some, the first of such.
+/// A fixture with the first occurrence of some bytes replaced.
 #[track_caller]
 fn with_bytes(name: &str, bytes: &[u8], instead: &[u8]) -> Vec<u8> {
     let whole = fs::read(fixture(name)).unwrap();
@@ -24,7 +24,7 @@ fn with_bytes(name: &str, bytes: &[u8], instead: &[u8]) -> Vec<u8> {
     [&whole[..at], instead, &whole[at + bytes.len()..]].concat()
 }
 
-/// The values, each as bytes.
+/// The bytes of the values.
 fn encoded<const N: usize>(encode: impl Fn(f32) -> [u8; N]) -> Vec<u8> {
     values().into_iter().flat_map(encode).collect()
 }
@@ -55,7 +55,7 @@ fn in_binary_files() {
     }
 }
 
-/// Finite is what is finite as `f32`.
+/// A sample is finite if it is finite as `f32`.
 #[test]
 fn where_f32_ends() {
     let folder = Folder::new();
@@ -66,7 +66,7 @@ fn where_f32_ends() {
             assert_hole(name, folder.open(&format!("a{}", &name[name.len() - 4..]), &bytes));
         }
     }
-    // Samples that the slope makes infinite: all but 0 and 1.
+    // The slope makes all samples except 0 and 1 infinite.
     let steep = folder.open("a.nii", &patched("sform.nii", 112, &f32::MAX.to_le_bytes())).unwrap();
     assert_eq!((steep.holes(), steep.values()[0], steep.values()[1]), (58, -3.0, f32::MAX));
     assert!(steep.values()[2..].iter().all(|value| value.is_nan()));
@@ -94,9 +94,9 @@ fn nothing_but_holes_is_no_volume() {
     assert_eq!(folder.open("a.nrrd", &one).unwrap().holes(), 59);
 }
 
-/// Of labels there is none for a hole.
+/// A label cannot be a hole.
 #[test]
-fn labels_have_none() {
+fn labels_have_no_holes() {
     let folder = Folder::new();
     let nrrd = "NRRD0004\ntype: float\ndimension: 3\nsizes: 5 4 3\nendian: little\nencoding: raw\n\n";
     let data = encoded(|value| (if value == 112.0 { f32::NAN } else { value }).to_le_bytes());

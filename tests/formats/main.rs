@@ -1,5 +1,5 @@
-//! Readers of all formats, NRRD also in `tests/nrrd.rs`: files that other programs wrote (`tests/fixtures/make.py`), voxel for voxel, and files that are
-//! damaged or lie.
+//! Readers of all formats (NRRD also in `tests/nrrd/`): files that other programs wrote (`tests/fixtures/make.py`), voxel for voxel, and
+//! files that are damaged or contradict themselves.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -15,6 +15,8 @@ mod npz;
 mod nrrd;
 mod raw;
 mod reading;
+#[path = "../common/refused.rs"]
+mod refused;
 #[path = "../common/shared.rs"]
 mod shared;
 mod shear;
@@ -30,15 +32,16 @@ use glam::{DMat3, DVec3, UVec3};
 use sheetsplat::volume::{Orientation, Volume, VolumeError};
 use tempfile::TempDir;
 
+use refused::assert_refused;
 use shared::shared;
 
-/// Of every fixture.
+/// The dimensions of every fixture.
 const DIMS: UVec3 = UVec3::new(5, 4, 3);
-/// Of those that have one.
+/// The spacing of fixtures that have one.
 const SPACING: DVec3 = DVec3::new(0.5, 2.0, 3.0);
 const ORIGIN: DVec3 = DVec3::new(10.0, -20.5, 30.0);
 
-/// Of those that are rotated, whose axes are those of no space.
+/// The axes of rotated fixtures, which are those of no anatomical space.
 fn rotation() -> DMat3 {
     let third = |x: f64, y: f64, z: f64| DVec3::new(x, y, z) / 3.0;
     DMat3::from_cols(third(2.0, 2.0, -1.0), third(-1.0, 2.0, 2.0), third(2.0, -1.0, 2.0))
@@ -87,7 +90,7 @@ impl Folder {
 
     fn open(&self, name: &str, bytes: &[u8]) -> Result<Volume, VolumeError> {
         let path = self.0.path().join(name);
-        // Written over, a file may be waited for until it is on the disk; a new one is not.
+        // Overwriting a file may wait for the disk; creating a new one does not.
         _ = fs::remove_file(&path);
         fs::write(&path, bytes).unwrap();
         Volume::open(&path)
@@ -95,7 +98,7 @@ impl Folder {
 }
 
 thread_local! {
-    /// What readers warned of on a test's thread.
+    /// The readers' warnings on a test's thread.
     static WARNINGS: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) };
 }
 
@@ -113,7 +116,7 @@ impl log::Log for Logger {
     fn flush(&self) {}
 }
 
-/// What something returns, and what readers warn of meanwhile.
+/// The result of a function, and the readers' warnings during its run.
 fn warned<T>(run: impl FnOnce() -> T) -> (T, Vec<String>) {
     static START: Once = Once::new();
     START.call_once(|| {
@@ -124,7 +127,7 @@ fn warned<T>(run: impl FnOnce() -> T) -> (T, Vec<String>) {
     (run(), WARNINGS.take())
 }
 
-/// Asserts that readers warn once, and with what words.
+/// Asserts that readers warn exactly once, with these words.
 #[track_caller]
 fn assert_warned(warnings: &[String], words: &str) {
     assert!(matches!(warnings, [warning] if warning.contains(words)), "{words:?}: {warnings:?}");
@@ -137,7 +140,7 @@ fn patched(name: &str, at: usize, bytes: &[u8]) -> Vec<u8> {
     all
 }
 
-/// A fixture's bytes with other text in place of some.
+/// A fixture's bytes with some text replaced.
 #[track_caller]
 fn replaced(name: &str, text: &str, instead: &str) -> Vec<u8> {
     let bytes = fs::read(fixture(name)).unwrap();
@@ -146,21 +149,7 @@ fn replaced(name: &str, text: &str, instead: &str) -> Vec<u8> {
     [&bytes[..at], instead.as_bytes(), &bytes[at + text.len()..]].concat()
 }
 
-/// Asserts that the message names the file, the field, what was found and what is allowed.
-#[track_caller]
-fn assert_refused(result: Result<Volume, VolumeError>, file: &str, field: &str, found: &str, allowed: &str) {
-    let error = result.expect_err("a volume");
-    let message = error.to_string();
-    let VolumeError::Invalid { origin, field: at, found: what, allowed: instead, .. } = error else {
-        panic!("{message}")
-    };
-    assert!(origin.ends_with(file), "{message}");
-    assert_eq!(at, field, "{message}");
-    assert!(what.contains(found), "found {found:?}: {message}");
-    assert!(instead.contains(allowed), "allowed {allowed:?}: {message}");
-}
-
-/// Asserts that no beginning of a file is a volume, and that a longer file is none.
+/// Asserts that no prefix of a file is a volume, and neither is a longer file.
 fn assert_exact(name: &str, whole: &[u8]) {
     let folder = Folder::new();
     assert!(folder.open(name, whole).is_ok(), "{name}");

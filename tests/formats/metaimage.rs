@@ -25,7 +25,7 @@ fn of_itk() {
     }
 }
 
-/// ITK turned the array round, and said so in direction and origin.
+/// ITK flipped the array, and says so in direction and origin.
 #[test]
 fn flipped_by_itk() {
     let volume = Volume::open(&fixture("flipped.mhd")).unwrap();

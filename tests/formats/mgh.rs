@@ -31,9 +31,9 @@ fn gzip(bytes: &[u8]) -> Vec<u8> {
     encoder.finish().unwrap()
 }
 
-/// Behind the samples there may be what the scanner was set to, and a history.
+/// Scan parameters and a history may follow the samples.
 #[test]
-fn what_follows_has_no_bearing() {
+fn data_after_the_samples_is_ignored() {
     let folder = Folder::new();
     let bytes = fs::read(fixture("plain.mgh")).unwrap();
     let bare = &bytes[..284 + 120];
@@ -44,21 +44,21 @@ fn what_follows_has_no_bearing() {
             assert_eq!(folder.open(name, &gzip(whole)).unwrap().values(), values(), "{name}");
         }
     }
-    // A damaged checksum is damage all the same.
+    // A damaged checksum still counts as damage.
     let mut damaged = gzip(&long);
     let at = damaged.len() - 8;
     damaged[at] ^= 1;
     assert_refused(folder.open("a.mgz", &damaged), "a.mgz", "data", "", "whole and undamaged gzip members");
 }
 
-/// Without `goodRASFlag` FreeSurfer takes the slices for coronal ones.
+/// Without `goodRASFlag` FreeSurfer assumes coronal slices.
 #[test]
-fn nobody_knows_how_it_lies() {
+fn without_ras_flag_slices_are_coronal() {
     let volume = Folder::new().open("a.mgh", &patched("plain.mgh", 28, &[0, 0])).unwrap();
     assert_eq!((volume.values(), volume.spacing()), (values().as_slice(), DVec3::ONE));
     let orientation = volume.orientation().unwrap();
     assert_eq!(orientation.axes, DMat3::from_cols(DVec3::NEG_X, DVec3::NEG_Z, DVec3::Y));
-    // The right-anterior-superior centre is 0 at voxel (2.5, 2, 1.5).
+    // The centre, 0 in right-anterior-superior, is at voxel (2.5, 2, 1.5).
     assert_eq!(orientation.origin, DVec3::new(2.5, -1.5, 2.0));
 }
 
@@ -90,7 +90,7 @@ fn damage() {
         let whole = fs::read(fixture(name)).unwrap();
         let values = values();
         for length in 0..whole.len() {
-            // What is behind the samples may be missing, but for gzip's own end.
+            // What follows the samples may be missing, except gzip's own end.
             if let Ok(volume) = folder.open(name, &whole[..length]) {
                 assert!(name.ends_with("mgh") && volume.values() == values, "{name}: {length} bytes");
             }

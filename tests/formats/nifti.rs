@@ -7,7 +7,7 @@ use sheetsplat::volume::{Encoding, Labels, SampleType};
 
 use crate::*;
 
-/// One of the data types, and how its number -2, 3.5 or 200 is written.
+/// A data type, and the encoding of its number -2, 3.5 or 200.
 type Kind = (i16, i16, Vec<u8>, f32);
 
 fn gzip(bytes: &[u8]) -> Vec<u8> {
@@ -54,7 +54,7 @@ fn pairs_open_by_either_name() {
     assert_refused(folder.open("a.nii", &header), "a.nii", "magic", "pair", ".hdr");
 }
 
-/// ITK's coordinates are LPS; in NIfTI it writes RAS.
+/// ITK's coordinates are LPS, but in NIfTI it writes RAS.
 #[test]
 fn of_itk() {
     let lps = DVec3::new(-1.0, -1.0, 1.0);
@@ -150,7 +150,7 @@ fn wrong_fields() {
     );
     refused(292, &nan, "srow_x, srow_y, srow_z", "NaN", "finite");
 
-    // By the qform, or neither.
+    // By the qform, or by neither.
     let by_qform = |qform: u8, at: usize, bytes: &[u8]| {
         let mut file = patched("sform.nii", 252, &[qform, 0, 0, 0]);
         file[at..at + bytes.len()].copy_from_slice(bytes);
@@ -167,18 +167,18 @@ fn wrong_fields() {
     assert_refused(by_qform(1, 268, &nan), "a.nii", "qoffset_x, qoffset_y, qoffset_z", "NaN", "finite");
 }
 
-/// As for nibabel; the intercept, -3, then has no meaning either.
+/// As in nibabel, the intercept, -3, is then ignored too.
 #[test]
-fn slopes_that_are_none() {
+fn invalid_slopes_do_not_scale() {
     for slope in [0.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let volume = Folder::new().open("a.nii", &patched("sform.nii", 112, &slope.to_le_bytes())).unwrap();
         assert_eq!(volume.values(), values(), "{slope}");
     }
 }
 
-/// As for nibabel and ITK: 0 is 1, and a sign does not count. With an sform nobody asks.
+/// As in nibabel and ITK, 0 is read as 1 and signs are ignored. With an sform, `pixdim` is not used.
 #[test]
-fn spacings_that_are_none() {
+fn invalid_spacings_are_read_with_a_warning() {
     let folder = Folder::new();
     for (written, read) in [(0.0_f32, 1.0), (-0.5, 0.5)] {
         for qform in [0_u8, 1] {
@@ -186,7 +186,7 @@ fn spacings_that_are_none() {
             file[80..84].copy_from_slice(&written.to_le_bytes());
             let (volume, warnings) = warned(|| folder.open("a.nii", &file).unwrap());
             assert_eq!(volume.spacing(), SPACING.with_x(read));
-            assert_warned(&warnings, &format!("a.nii: pixdim: [{written:?}, 2.0, 3.0] is no spacing"));
+            assert_warned(&warnings, &format!("a.nii: pixdim: [{written:?}, 2.0, 3.0] is not a spacing"));
             if qform == 1 {
                 assert_near(volume.orientation().unwrap().axes.x_axis, rotation().x_axis);
                 assert_near(volume.orientation().unwrap().origin, ORIGIN);
@@ -210,7 +210,7 @@ fn magnitudes_of_complex_samples() {
         assert_lies(&volume, rotation(), ORIGIN);
         assert_exact(name, &fs::read(fixture(name)).unwrap());
     }
-    // Slope and intercept are those of the complex numbers: |2 (3 + 4i) - 1| = |5 + 8i|.
+    // Slope and intercept apply to the complex numbers: |2 (3 + 4i) - 1| = |5 + 8i|.
     let mut file = fs::read(fixture("complex.nii")).unwrap()[..352].to_vec();
     file[112..116].copy_from_slice(&2_f32.to_le_bytes());
     file[116..120].copy_from_slice(&(-1_f32).to_le_bytes());
@@ -248,7 +248,7 @@ fn promises_of_more_than_the_file_holds_cost_nothing() {
     assert_refused(folder.open("a.nii", &file), "a.nii", "dim", "32767", "at most 4294967295 voxels");
 }
 
-/// A scan in its own file and in the NRRD file that was made of it, without the slope.
+/// A scan in its own file, and in the NRRD file made from it without the slope.
 #[test]
 #[ignore = "needs the shared data: SHEETSPLAT_SHARED=FOLDER"]
 fn shared_scan() {

@@ -28,13 +28,13 @@ fn labels() {
     assert!(labels.values.iter().map(|&label| f32::from(label)).eq(values()));
 }
 
-/// A label that is none is named by its voxel, whatever the order.
+/// An invalid label is named by its voxel, in either order.
 #[test]
 fn voxels_by_either_order() {
     let folder = Folder::new();
     let path = folder.0.path().join("a.npy");
     let header = HEADER.len() + 10;
-    // The sample after the tenth: in C order of row 2, in Fortran order of the plane x = 0.
+    // The sample after the tenth: in C order in row 2, in Fortran order in the plane x = 0.
     for (fortran, voxel) in [("False", "[1, 2, 0]"), ("True ", "[0, 3, 2]")] {
         let mut bytes = npy(&HEADER.replace("False", fortran));
         bytes[header + 22..][..2].copy_from_slice(&(-1_i16).to_le_bytes());

@@ -28,12 +28,12 @@ fn wrong_names() {
         "file.npz:name",
     );
     let nameless = Volume::open(&named("two.npz", "value"));
-    assert_refused(nameless, "two.npz:value", "arrays", "\"zeros\", \"values\"", "one that is called \"value\"");
+    assert_refused(nameless, "two.npz:value", "arrays", "\"zeros\", \"values\"", "an array called \"value\"");
     assert_refused(Volume::open(&named("two.npz", "zeros")), "two.npz:zeros", "shape", "(7,)", "three dimensions");
     let missing = Volume::open(&named("three.npz", "values"));
     assert!(matches!(missing, Err(VolumeError::Io { path, .. }) if path.ends_with("three.npz")));
     let other = Folder::new().open("a.npz", &replaced("one.npz", "values.npy", "values.txt"));
-    // The directory is at the end, so what was replaced counts for nothing.
+    // The directory is at the end, so the replaced bytes before it do not count.
     assert_eq!(other.unwrap().values(), values());
     let text = fs::read(fixture("one.npz")).unwrap();
     let at = text.windows(10).rposition(|window| window == b"values.npy").unwrap();
@@ -41,7 +41,7 @@ fn wrong_names() {
     assert_refused(other, "a.npz", "arrays", "0 arrays", "one array");
 }
 
-/// A file with other bytes in the directory's entry of its last member, from this place on.
+/// A file with some bytes of its last member's directory entry replaced, from this offset on.
 fn entry(name: &str, at: usize, bytes: &[u8]) -> Vec<u8> {
     let whole = fs::read(fixture(name)).unwrap();
     let entry = whole.windows(4).rposition(|window| window == b"PK\x01\x02").unwrap();
@@ -57,7 +57,7 @@ fn damaged_archives() {
     let values = "values.npy";
     refused(&entry("one.npz", 8, &[1]), values, "an encrypted file", "not encrypted");
     refused(&entry("one.npz", 10, &[12]), values, "compression 12", "stored (0) or deflated (8)");
-    refused(&entry("one.npz", 16, &[1, 2, 3, 4]), "data", "another checksum", "undamaged");
+    refused(&entry("one.npz", 16, &[1, 2, 3, 4]), "data", "a checksum that differs from", "undamaged");
     refused(&entry("one.npz", 42, &[1]), "archive", "to other bytes", "a whole ZIP archive");
     refused(&entry("one.npz", 42, &[0xff; 4]), "archive", "out of the file", "a whole ZIP archive");
     refused(&entry("one.npz", 20, &[0, 0, 1, 0]), "archive", "out of the file", "a whole ZIP archive");

@@ -60,7 +60,7 @@ fn damage() {
             assert!(folder.open(name, &whole[..length]).is_err(), "{name}: {length} bytes");
         }
     }
-    // Space may follow text.
+    // White space may follow text.
     for name in ["text.nrrd", "hex.nrrd"] {
         let whole = fs::read(fixture(name)).unwrap();
         assert_eq!(Folder::new().open(name, &[&whole[..], b" \n"].concat()).unwrap().values(), values(), "{name}");

@@ -89,8 +89,8 @@ fn wrong_keys() {
         assert!(what.contains(found) && instead.to_string().contains(allowed), "{error}");
     }
     let builtin = Scene::parse(&format!("[volume]\nbuiltin = 'cube'\n{KEYS}"), "", Path::new(""), &[]).unwrap_err();
-    assert!(builtin.to_string().contains("volume.dims: found a volume that is no file"), "{builtin}");
-    // A single byte has no order; and an override of the volume takes it all away.
+    assert!(builtin.to_string().contains("volume.dims: found a volume that is not a file"), "{builtin}");
+    // A single byte has no order; and an override of the volume removes the whole layout.
     assert!(parse(&KEYS.replace("float32", "int8").replace("endian = 'big'\n", "")).is_ok());
     let text = format!("[volume]\npath = 'a.raw'\n{KEYS}");
     let sets = ["volume.builtin=cube".to_owned()];

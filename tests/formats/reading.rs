@@ -1,4 +1,4 @@
-//! Where files may be, and how much memory they may take.
+//! Limits on where files may be and on memory.
 
 use std::os::unix::fs::symlink;
 
@@ -7,7 +7,7 @@ use sheetsplat::volume::{Labels, RawLayout, ReadOptions, SampleType};
 
 use crate::*;
 
-/// A folder `in` with a volume, and files beside the folder.
+/// A folder `in` with a volume, and files outside it.
 fn folders() -> (Folder, PathBuf, ReadOptions) {
     let folder = Folder::new();
     let inside = folder.0.path().join("in");
@@ -46,10 +46,10 @@ fn files_are_confined() {
     assert!(raw("../c.npy").is_err_and(|error| error.to_string().contains("leads elsewhere")));
     assert_outside(raw("../part0.bin"), "part0.bin");
     assert_outside(Volume::open_with(folder.0.path(), &options), folder.0.path().to_str().unwrap());
-    // What is not there is not told from what is.
+    // The error does not tell whether the file exists.
     assert_outside(open("../missing.npy"), "missing.npy");
     assert!(matches!(open("missing.npy"), Err(VolumeError::Io { .. })));
-    // A folder whose name only begins like the other one's.
+    // A folder whose name merely begins like the other's.
     fs::create_dir(folder.0.path().join("inner")).unwrap();
     fs::copy(fixture("c.npy"), folder.0.path().join("inner/c.npy")).unwrap();
     assert_outside(open("../inner/c.npy"), "c.npy");
@@ -72,13 +72,13 @@ fn links_are_followed() {
         assert_outside(open(inside.join(name)), name);
     }
     assert_eq!(open(folder.0.path().join("link/c.npy")).unwrap().values(), values());
-    // The folder may itself be named by a link.
+    // The folder itself may be named by a link.
     let linked = ReadOptions::default().confined_to(folder.0.path().join("link"));
     assert_eq!(Volume::open_with(&inside.join("c.npy"), &linked).unwrap().values(), values());
 }
 
 #[test]
-fn what_headers_name_is_confined() {
+fn files_named_by_headers_are_confined() {
     let (folder, inside, options) = folders();
     for (header, text, instead) in [
         ("list.mhd", "part1.bin", "../part1.bin"),
@@ -95,7 +95,7 @@ fn what_headers_name_is_confined() {
     fs::remove_file(inside.join("pair.img")).unwrap();
     symlink(folder.0.path().join("pair.img"), inside.join("pair.img")).unwrap();
     assert_outside(Volume::open_with(&inside.join("pair.hdr"), &options), "pair.img");
-    // A slice in a folder.
+    // A slice in a folder of slices.
     let slices = inside.join("slices");
     fs::create_dir(&slices).unwrap();
     for name in ["z8.tif", "z9.tif"] {
@@ -107,7 +107,7 @@ fn what_headers_name_is_confined() {
 }
 
 #[test]
-fn what_scenes_name_is_confined() {
+fn files_named_by_scenes_are_confined() {
     let (_folder, inside, options) = folders();
     let load = |text: &str| Scene::parse(text, "scene.toml", &inside, &[]).unwrap().load_volume_with(&options);
     assert_eq!(load("volume.path = 'c.npy'\nvolume.labels = 'c.npy'").unwrap().values(), values());
@@ -124,11 +124,11 @@ fn what_scenes_name_is_confined() {
     assert!(Scene::open_with(&inside.join("scene.toml"), &[], &options).is_ok());
 }
 
-/// 60 values of 4 bytes.
+/// The limit is 60 values of 4 bytes.
 #[test]
 fn memory_is_limited_in_every_format() {
     let read = |name: &str, bytes: u64| Volume::open_with(&fixture(name), &ReadOptions::default().with_memory(bytes));
-    // Names, and what is needed besides the values.
+    // Each format's file, and the memory that it needs besides the values.
     for (name, besides) in [
         ("itk.nrrd", 0),
         ("bzip2.nrrd", 0),
@@ -142,9 +142,9 @@ fn memory_is_limited_in_every_format() {
         ("pair.hdr", 0),
         ("c.npy", 0),
         ("one.npz", 0),
-        // To turn its axes.
+        // For reordering its axes.
         ("fortran-big.npy", 240),
-        // A page.
+        // For a page.
         ("plain.tif", 80),
         ("tiled.tif", 80),
         ("slices", 40),
@@ -154,7 +154,7 @@ fn memory_is_limited_in_every_format() {
         ("rle.dcm", 0),
         ("text.vti", 0),
         ("appended.vti", 0),
-        // A block.
+        // For a block.
         ("appended-lz4.vti", 64),
         ("text.vtk", 0),
         ("binary.vtk", 0),
@@ -190,7 +190,7 @@ fn memory_is_limited_for_all_of_a_scene() {
     let raw = "volume = { path = 'part0.bin', dims = [5, 4, 1], type = 'uint16', endian = 'little' }";
     assert!(load(raw, 80).is_ok());
     assert!(load(raw, 79).unwrap_err().to_string().contains("part0.bin: data: found 5 × 4 × 1 voxels"));
-    // Values and labels.
+    // Values and labels together.
     assert!(load("volume.builtin = 'head:8'", 8 * 8 * 5 * 6).is_ok());
     let message = load("volume.builtin = 'head:8'", 8 * 8 * 5 * 6 - 1).unwrap_err().to_string();
     assert!(message.starts_with("builtin:head:8: size: found 8 × 8 × 5 voxels, which take 1920 bytes"), "{message}");

@@ -7,7 +7,7 @@ use crate::*;
 /// `make.py` shears by half a column and one row per slice.
 const ANGLE: &str = "sheared by 33.90°";
 
-/// The fixtures' values where the shear moved them, x fastest; NaN elsewhere.
+/// The fixtures' values where the shear moves them, x fastest; NaN elsewhere.
 fn expected() -> Vec<f32> {
     let mut expected = Vec::new();
     for z in 0..3 {
@@ -38,13 +38,13 @@ fn nifti_and_nrrd_are_resampled() {
     }
 }
 
-/// A label is never between two others.
+/// Labels are not interpolated.
 #[test]
 fn labels_are_the_nearest_ones() {
     let (labels, warnings) = warned(|| Labels::open(&fixture("sheared.nrrd")).unwrap());
     assert_warned(&warnings, ANGLE);
     assert_eq!(labels.dims, UVec3::new(6, 6, 3));
-    // Of the second slice, which is half a column off, row 1.
+    // Row 1 of the second slice, which is half a column off.
     assert_eq!(labels.values[36 + 6..36 + 12], [100, 101, 102, 103, 104, 104]);
     assert_eq!(labels.values[36..42], [0; 6]);
 }

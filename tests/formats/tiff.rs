@@ -4,7 +4,7 @@ use sheetsplat::volume::{Encoding, Labels, SampleType};
 
 use crate::*;
 
-/// The entry of a tag in a little-endian file of one directory after the header: where it is.
+/// The position of a tag's entry, in a little-endian file with a single directory after the header.
 fn entry(bytes: &[u8], tag: u16) -> usize {
     let u16_at = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
     let first = u32::from_le_bytes(bytes[4..8].try_into().unwrap()) as usize;
@@ -12,7 +12,7 @@ fn entry(bytes: &[u8], tag: u16) -> usize {
     entries.find(|&at| u16_at(at) == tag).unwrap_or_else(|| panic!("no tag {tag}"))
 }
 
-/// A file with other values of tags of the first page.
+/// A file with the values of some tags of the first page replaced.
 fn with_tags(name: &str, tags: &[(u16, u32)]) -> Vec<u8> {
     let mut bytes = fs::read(fixture(name)).unwrap();
     for &(tag, value) in tags {
@@ -22,7 +22,7 @@ fn with_tags(name: &str, tags: &[(u16, u32)]) -> Vec<u8> {
     bytes
 }
 
-/// A file with some text in place of other text, which is not shorter.
+/// A file with some text replaced by text that is not longer.
 fn with_text(name: &str, text: &str, instead: &str) -> Vec<u8> {
     replaced(name, text, &format!("{instead}{}", "\n".repeat(text.len() - instead.len())))
 }
@@ -56,7 +56,7 @@ fn spacing_and_unit() {
         ("imagej.tif", SPACING, Some("µm")),
         ("imagej-large.tif", SPACING, Some("µm")),
         ("ome.tif", SPACING, Some("µm")),
-        // 20 and 5 pixels per centimetre, and nothing about z.
+        // 20 and 5 pixels per centimetre, with nothing about z.
         ("plain.tif", DVec3::new(0.5, 2.0, 0.5), Some("mm")),
         ("tiled.tif", DVec3::ONE, None),
     ] {
@@ -73,7 +73,7 @@ fn spacing_and_unit() {
 }
 
 #[test]
-fn what_image_j_says() {
+fn descriptions_by_image_j() {
     let folder = Folder::new();
     let open =
         |instead: &str| folder.open("a.tif", &with_text("imagej.tif", "mode=grayscale\nspacing=3\nunit=um", instead));
@@ -83,7 +83,7 @@ fn what_image_j_says() {
     assert_eq!((one_apart.spacing(), one_apart.unit()), (SPACING.with_z(1.0), Some("cm")));
     let no_unit = open("spacing=3\nunit=pixel").unwrap();
     assert_eq!((no_unit.spacing(), no_unit.unit()), (DVec3::new(0.5, 2.0, 3.0), None));
-    // Values as ImageJ shows them.
+    // The values that ImageJ shows.
     let calibrated = open("cf=0\nc0=-32768\nc1=2\nunit=um").unwrap();
     assert!(calibrated.values().iter().zip(values()).all(|(&found, value)| found == 2.0 * value - 32768.0));
 
@@ -95,13 +95,13 @@ fn what_image_j_says() {
     let frames = folder.open("a.tif", &with_text("imagej.tif", "slices=3", "frames=3")).unwrap();
     assert_eq!((frames.values(), frames.spacing()), (values().as_slice(), SPACING));
     refused("zunit=mm\nspacing=3\nunit=um", "unit, yunit, zunit", "um, unit's, mm", "one unit for all");
-    refused("spacing=0\nunit=um", "spacing", "0", "a finite number but 0");
+    refused("spacing=0\nunit=um", "spacing", "0", "a finite number other than 0");
     refused("cf=0\nc0=-32768\nc1=x\nunit=um", "c1", "x", "a finite number");
     let fewer = folder.open("a.tif", &with_text("imagej.tif", "images=3", "images=4"));
     assert_refused(fewer, "a.tif", "pages", "3", "4, as the description says");
 }
 
-/// One directory and all slices after it: what ImageJ does where they are too large for TIFF.
+/// One directory followed by all slices, as ImageJ writes data too large for TIFF.
 #[test]
 fn slices_without_directories() {
     let folder = Folder::new();
@@ -115,7 +115,7 @@ fn slices_without_directories() {
 }
 
 #[test]
-fn what_ome_says() {
+fn descriptions_by_ome() {
     let folder = Folder::new();
     let open = |text: &str, instead: &str| folder.open("a.tif", &with_text("ome.tif", text, instead));
     let refused = |text: &str, instead: &str, field: &str, found: &str, allowed: &str| {
@@ -175,7 +175,7 @@ fn slices_that_do_not_fit() {
     let found = "1 of 5 × 4 int16 (1.tif, …), 1 of 5 × 3 int16 (2.tif, …)";
     assert_refused(Volume::open(path), folder_name, "slices", found, "one size and type");
     fs::write(path.join("2.tif"), fs::read(fixture("plain.tif")).unwrap()).unwrap();
-    assert_refused(Volume::open(path), "2.tif", "pages", "more than one", "one, as files of a folder are slices");
+    assert_refused(Volume::open(path), "2.tif", "pages", "more than one", "one page per file in a folder of slices");
 }
 
 #[test]
@@ -211,7 +211,7 @@ fn damage() {
         let whole = fs::read(fixture(name)).unwrap();
         let folder = Folder::new();
         for length in 0..whole.len() {
-            // What is cut off may be nothing that counts.
+            // The missing end may contain nothing that counts.
             if let Ok(volume) = folder.open(name, &whole[..length]) {
                 assert_eq!((volume.dims(), volume.values()), (DIMS, values().as_slice()), "{name}: {length} bytes");
             }
@@ -240,13 +240,13 @@ fn indices_of_a_palette_are_the_values() {
 #[test]
 fn other_palettes() {
     let folder = Folder::new();
-    // Of another number of colours.
+    // A palette with another number of colours.
     let mut bytes = fs::read(fixture("palette.tif")).unwrap();
     let at = entry(&bytes, 320) + 4;
     bytes[at..at + 4].copy_from_slice(&48_u32.to_le_bytes());
     let allowed = "768 numbers, of 8-bit indices";
     assert_refused(folder.open("a.tif", &bytes), "a.tif", "ColorMap", "48 numbers", allowed);
-    // Numbers of 8 bits where 16 are meant: blue is 51.
+    // 8-bit numbers where 16-bit ones are expected: blue is 51.
     let mut bytes = fs::read(fixture("palette.tif")).unwrap();
     let at = entry(&bytes, 320) + 8;
     let first = u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
@@ -263,7 +263,7 @@ fn pages_of_colours_are_refused() {
     assert_refused(colors, "rgb.tif", "page 1", "RGB pages, 3 samples a pixel", "one sample a pixel");
 }
 
-/// A name may have the sign that errors show for numbers.
+/// A name may contain the character that errors use for numbers.
 #[test]
 fn names_with_number_signs() {
     let folder = Folder::new();

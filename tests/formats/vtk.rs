@@ -40,14 +40,14 @@ fn of_vtk() {
 }
 
 #[test]
-fn what_files_leave_out() {
+fn defaults_of_missing_attributes() {
     let folder = Folder::new();
     let plain = |name: &str, text: &str| folder.open(name, &replaced(name, text, "")).unwrap();
     assert_eq!(plain("text.vti", " Spacing=\"0.5 2 3\"").spacing(), DVec3::ONE);
     assert_eq!(plain("text.vtk", "SPACING 0.5 2 3\n").spacing(), DVec3::ONE);
     assert_eq!(plain("text.vti", " byte_order=\"LittleEndian\"").values(), values());
     assert_eq!(plain("base64-zlib.vti", " header_type=\"UInt32\"").values(), values());
-    // Without an active array the first one of single numbers.
+    // Without an active array, the first one with one component counts.
     assert!(plain("text.vti", " Scalars=\"values\"").values().iter().all(|&value| value == 0.0));
 }
 
@@ -88,7 +88,7 @@ fn wrong_image_data() {
 }
 
 #[test]
-fn arrays_of_vectors_are_none() {
+fn arrays_of_vectors_are_refused() {
     let text = String::from_utf8(fs::read(fixture("text.vti")).unwrap()).unwrap();
     let vectors = text.replace("format=\"ascii\"", "NumberOfComponents=\"2\" format=\"ascii\"");
     let vectors = vectors.replace("NumberOfComponents=\"3\" ", "");
@@ -108,7 +108,7 @@ fn wrong_bytes() {
     refused("appended.vti", "encoding=\"raw\"", "encoding=\"hex\"", "encoding", "hex", "raw or base64");
     refused("appended.vti", "   _", "   ", "AppendedData", "no underscore", "one before the data");
     refused("appended-lz4.vti", "Int16\" Name=\"zeros\"", "", "header", "", "well-formed XML");
-    // As many bytes, but of more or fewer samples.
+    // The same number of bytes for more or fewer samples.
     refused(
         "base64.vti",
         "type=\"Float32\" Name=\"values\"",
@@ -148,7 +148,7 @@ fn wrong_legacy_headers() {
     refused("224 230", "224 1 230", "data", "more than 240 bytes", "240 bytes");
 }
 
-/// Keywords count, lines do not.
+/// Keywords count, line breaks do not.
 #[test]
 fn legacy_headers_are_of_keywords() {
     let folder = Folder::new();
@@ -171,7 +171,7 @@ fn legacy_headers_are_of_keywords() {
     }
 }
 
-/// Points count from any number on, but not down.
+/// Points may start at any number, but not count down.
 #[test]
 fn extents_may_begin_below_0() {
     let with = |name: &str, text: &str, extent: &str| {
@@ -189,7 +189,7 @@ fn extents_may_begin_below_0() {
     for extent in ["0 4 3 0 0 2", "0 4 0 -1 0 2"] {
         assert_refused(with("text.vti", "0 4 0 3 0 2", extent), "a.vti", "WholeExtent", "0, 4", allowed);
     }
-    // A flat grid has a layer of cells; one whose points go down has none.
+    // A flat grid has one layer of cells; a grid whose points count down has none.
     assert_refused(cells("0 60 1 0 0 0"), "a.vti", "WholeExtent", "60", allowed);
     assert_eq!(cells("0 60 1 1 0 0").unwrap().dims(), UVec3::new(60, 1, 1));
 }
@@ -214,7 +214,7 @@ fn damage() {
         let whole = fs::read(fixture(name)).unwrap();
         let folder = Folder::new();
         for length in 0..whole.len() {
-            // What is cut off may be another array.
+            // The missing end may be another array.
             if let Ok(volume) = folder.open(name, &whole[..length]) {
                 assert_eq!((volume.dims(), volume.values()), (DIMS, values().as_slice()), "{name}: {length} bytes");
             }

@@ -1,5 +1,5 @@
-//! What is fuzzed: a function for every kind of input, which a bad one must not make panic. Included by the libFuzzer targets, and by
-//! `tests/fuzzing.rs`, which needs no libFuzzer.
+//! The fuzz targets: a function for every kind of input, which must not panic. Included by the libFuzzer targets and by `tests/fuzzing.rs`,
+//! which needs no libFuzzer.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -9,10 +9,10 @@ use sheetsplat::Scene;
 use sheetsplat::golden::Picture;
 use sheetsplat::volume::{RawLayout, SampleType, Volume, VolumeError};
 
-/// What a target does with an input.
+/// A function that processes an input.
 pub(crate) type Target = fn(&[u8]);
 
-/// What takes an input, by its name.
+/// The targets by name.
 pub(crate) const TARGETS: [(&str, Target); 15] = [
     ("nrrd", |bytes| volume("volume.nrrd", bytes, Volume::open)),
     ("nifti", |bytes| volume("volume.nii", bytes, Volume::open)),
@@ -42,16 +42,16 @@ pub(crate) fn clean_up() {
     _ = fs::remove_dir_all(&*FOLDER);
 }
 
-/// Writes bytes to a file of this name.
+/// Writes bytes to a file with this name.
 fn file(name: &str, bytes: &[u8]) -> PathBuf {
     let path = FOLDER.join(name);
-    // Written over, a file may be waited for until it is on the disk; a new one is not.
+    // Overwriting a file may wait for the disk; creating a new one does not.
     _ = fs::remove_file(&path);
     fs::write(&path, bytes).expect("a temporary file");
     path
 }
 
-/// Opens bytes as a file of this name: a whole volume or an error.
+/// Opens bytes as a file with this name, which gives a whole volume or an error.
 fn volume(name: &str, bytes: &[u8], open: impl Fn(&Path) -> Result<Volume, VolumeError>) {
     if let Ok(volume) = open(&file(name, bytes)) {
         assert_eq!(volume.values().len(), volume.dims().element_product() as usize);
@@ -61,7 +61,7 @@ fn volume(name: &str, bytes: &[u8], open: impl Fn(&Path) -> Result<Volume, Volum
     }
 }
 
-/// The first bytes say what the others are.
+/// The first bytes give the layout of the others.
 fn raw(bytes: &[u8]) {
     let Some(([x, y, z, kind, offset], samples)) = bytes.split_first_chunk() else { return };
     let kinds = [SampleType::I8, SampleType::U16, SampleType::I32, SampleType::F32, SampleType::F64, SampleType::U64];
@@ -74,14 +74,14 @@ fn raw(bytes: &[u8]) {
     volume("volume.raw", samples, |path| Volume::open_raw(path, &layout));
 }
 
-/// As `compare` and goldens read images.
+/// Reads an image as `compare` and goldens do.
 fn image(name: &str, bytes: &[u8]) {
     if let Ok(Picture { image, .. }) = Picture::open(&file(name, bytes)) {
         assert_eq!(image.pixels.len(), image.width as usize * image.height as usize);
     }
 }
 
-/// A line of override, then a scene.
+/// The first line is an override, the rest a scene.
 fn scene(bytes: &[u8]) {
     let text = String::from_utf8_lossy(bytes);
     let (set, scene) = text.split_once('\0').unwrap_or(("", &text));

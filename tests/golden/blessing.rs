@@ -1,4 +1,4 @@
-//! Which goldens are rewritten, and what with.
+//! Which goldens are rewritten, and with what.
 
 use std::process::Command;
 
@@ -62,7 +62,7 @@ fn a_golden_says_what_it_was_made_on_and_keeps_alpha() {
 }
 
 #[test]
-fn names_that_are_none_are_refused() {
+fn invalid_names_are_refused() {
     for name in ["", "all", "a/b", "a\\b", "..", ".hidden", "a,b", "a b", "ä", "a\n"] {
         let error = Golden::new(name, "goldens", "failures").unwrap_err();
         assert!(matches!(&error, GoldenError::Name { found } if found == name), "{name:?}: {error}");
@@ -98,7 +98,7 @@ fn the_variable_is_read() {
     folder.with("a", &bluer(100, 200));
     let check = |bless: Option<&str>| {
         let mut command = Command::new(std::env::current_exe().unwrap());
-        command.args(["--exact", "blessing::checks_in_the_folder_it_is_given", "--ignored"]);
+        command.args(["--exact", "blessing::checks_in_the_given_folder", "--ignored"]);
         command
             .env(FOLDER, folder.0.path())
             .env_remove(Bless::VARIABLE)
@@ -119,7 +119,7 @@ fn the_variable_is_read() {
 
 #[test]
 #[ignore = "run by the test above"]
-fn checks_in_the_folder_it_is_given() {
+fn checks_in_the_given_folder() {
     let folder = PathBuf::from(std::env::var_os(FOLDER).unwrap());
     let golden = Golden::new("a", &folder, folder.join("failures")).unwrap();
     golden.check(&gradient()).unwrap();

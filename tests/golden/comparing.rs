@@ -1,10 +1,10 @@
-//! What a comparison counts.
+//! The counts of a comparison.
 
 use sheetsplat::golden::{Comparison, ComparisonError, LaxTolerance};
 
 use crate::*;
 
-/// Pixels of 8 bits with straight alpha, premultiplied.
+/// An image of 8-bit pixels with straight alpha, premultiplied.
 fn image(width: u32, pixels: &[[u8; 4]]) -> Image {
     let premultiplied = |pixel: &[u8; 4]| {
         let [r, g, b, a] = pixel.map(|channel| f32::from(channel) / 255.0);
@@ -60,7 +60,7 @@ fn outliers_are_allowed_up_to_their_share() {
     }
 }
 
-/// Colour counts as much as it shows.
+/// The colour of a transparent pixel does not count.
 #[test]
 fn invisible_colour_does_not_count() {
     let transparent = image(2, &[[255, 0, 0, 0], [0, 255, 0, 0]]);
@@ -94,7 +94,7 @@ fn lax_tolerances_are_refused() {
 }
 
 #[test]
-fn what_cannot_be_compared_is_an_error() {
+fn images_that_cannot_be_compared_are_an_error() {
     let golden = gradient();
     let compare = |actual: &Image, golden: &Image| Comparison::new(actual, golden, Tolerance::default()).unwrap_err();
     let turned = Image { width: 10, height: 20, ..gradient() };

@@ -1,4 +1,4 @@
-//! Golden images as other people's tests use them. Needs no GPU.
+//! Golden images as other projects' tests use them. Needs no GPU.
 #![cfg(feature = "golden")]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -13,15 +13,17 @@ use std::path::{Path, PathBuf};
 
 use sheetsplat::assert_golden;
 use sheetsplat::golden::{Bless, Failure, Golden, GoldenError, MadeOn, Outcome, Picture, Reason, Subject, Tolerance};
+use sheetsplat::headless::Rendering;
 use sheetsplat::image::Image;
+use sheetsplat::stats::Stats;
 
-/// A picture of 20×10 pixels with a gradient in it, opaque.
+/// A picture of 20×10 opaque pixels with a gradient.
 fn gradient() -> Image {
     let pixel = |at: u16| [f32::from(at % 20) / 19.0, f32::from(at / 20) / 9.0, 0.25, 1.0];
     Image { width: 20, height: 10, pixels: (0..200).map(pixel).collect() }
 }
 
-/// The same with the first `pixels` brighter in blue by so many steps of 255.
+/// The gradient with the first `pixels` brighter in blue by some steps of 255.
 fn bluer(steps: u8, pixels: usize) -> Image {
     let mut image = gradient();
     for pixel in &mut image.pixels[..pixels] {
@@ -30,7 +32,7 @@ fn bluer(steps: u8, pixels: usize) -> Image {
     image
 }
 
-/// A picture as a renderer of its own makes it.
+/// A picture by another renderer, with its adapter.
 struct Made(Image, MadeOn);
 
 impl Subject for Made {
@@ -47,7 +49,7 @@ fn made(image: Image, adapter: &str, driver: &str) -> Made {
     Made(image, MadeOn { adapter: adapter.to_owned(), driver: driver.to_owned() })
 }
 
-/// A temporary folder with a golden `NAME.png` in it, and `failures`.
+/// A temporary folder with a golden `NAME.png`, and a folder `failures`.
 struct Folder(tempfile::TempDir);
 
 impl Folder {
@@ -55,12 +57,12 @@ impl Folder {
         Self(tempfile::tempdir().unwrap())
     }
 
-    /// A golden that blesses none, whatever the environment says.
+    /// A golden that blesses nothing, whatever the environment says.
     fn golden(&self, name: &str) -> Golden {
         Golden::new(name, self.0.path(), self.failures()).unwrap().bless(Bless::None)
     }
 
-    /// A golden that is there.
+    /// A golden that exists.
     fn with(&self, name: &str, subject: &impl Subject) -> Golden {
         let golden = self.golden(name);
         assert_eq!(golden.clone().bless(Bless::All).check(subject).unwrap(), Outcome::Blessed(golden.path()));
@@ -71,19 +73,19 @@ impl Folder {
         self.0.path().join("failures")
     }
 
-    /// The names of what failures left.
+    /// The names of the files that failures left.
     fn left(&self) -> BTreeSet<String> {
         names(&self.failures())
     }
 }
 
-/// The names of the files in a folder; none if there is no folder.
+/// The names of the files in a folder; empty if it does not exist.
 fn names(folder: &Path) -> BTreeSet<String> {
     let Ok(entries) = fs::read_dir(folder) else { return BTreeSet::new() };
     entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
 }
 
-/// Why a check failed.
+/// The failure of a check.
 fn failure(result: Result<Outcome, GoldenError>) -> Failure {
     match result {
         Err(GoldenError::Failure(failure)) => *failure,
@@ -91,7 +93,7 @@ fn failure(result: Result<Outcome, GoldenError>) -> Failure {
     }
 }
 
-/// What a test that panics says.
+/// The message of a test that panics.
 fn complaint(test: impl FnOnce()) -> String {
     *catch_unwind(AssertUnwindSafe(test)).unwrap_err().downcast::<String>().unwrap()
 }
@@ -100,7 +102,7 @@ fn complaint(test: impl FnOnce()) -> String {
 fn the_macro_compares_with_the_file_beside_the_test() {
     assert_golden!("gradient", gradient());
     if Bless::from_env().unwrap().contains("gradient") {
-        // What must fail below would be blessed, too.
+        // Blessing would also rewrite the goldens that must fail below.
         return;
     }
     assert_golden!("gradient", &bluer(3, 200));
@@ -148,7 +150,7 @@ fn a_failure_leaves_the_image_where_it_differs_and_a_report() {
     assert_eq!(folder.left(), left, "only its own are removed");
 }
 
-/// What cannot be left does not hide why the image fails.
+/// An error in writing the failure's files does not hide why the image fails.
 #[test]
 fn a_failure_that_leaves_nothing_still_says_why() {
     let folder = Folder::new();
@@ -160,7 +162,7 @@ fn a_failure_that_leaves_nothing_still_says_why() {
 }
 
 #[test]
-fn an_image_that_is_none_neither_passes_nor_is_blessed() {
+fn an_invalid_image_neither_passes_nor_is_blessed() {
     let folder = Folder::new();
     let golden = folder.with("a", &gradient()).bless(Bless::All);
     let bytes = fs::read(golden.path()).unwrap();
@@ -203,6 +205,27 @@ fn a_golden_that_is_no_image_fails() {
 const MESA_15: &str = "llvmpipe (LLVM 15.0.6, 256 bits)";
 const MESA_19: &str = "llvmpipe (LLVM 19.1.7, 512 bits)";
 
+/// A picture of the native backend is exactly its golden, unless the test allows a tolerance; and says what made it.
+#[test]
+fn the_native_backend_is_compared_exactly() {
+    let folder = Folder::new();
+    let rendering = |image: Image, backend: &str| {
+        let mut stats = Stats::default();
+        (stats.backend, stats.adapter, stats.driver) = (backend.to_owned(), "CPU".to_owned(), "avx2".to_owned());
+        Rendering { image, stats }
+    };
+    let golden = folder.with("head", &rendering(gradient(), "cpu"));
+    golden.check(&rendering(gradient(), "cpu")).unwrap();
+    let error = golden.check(&rendering(bluer(1, 1), "cpu")).unwrap_err().to_string();
+    for words in ["differ by more than 0 of 255", "cpu backend"] {
+        assert!(error.contains(words), "no {words:?} in {error}");
+    }
+    assert!(!error.contains("avx2"), "{error}");
+    golden.clone().tolerance(Tolerance::new(1, 0.0).unwrap()).check(&rendering(bluer(1, 1), "cpu")).unwrap();
+    // Another backend is another adapter.
+    golden.check(&rendering(bluer(15, 1), "reference")).unwrap();
+}
+
 #[test]
 fn another_adapter_is_compared_with_the_widest_tolerance() {
     let folder = Folder::new();
@@ -225,7 +248,7 @@ fn another_adapter_is_compared_with_the_widest_tolerance() {
 }
 
 #[test]
-fn what_was_made_on_no_known_adapter_is_compared_as_the_test_says() {
+fn images_of_unknown_origin_use_the_tests_tolerance() {
     let folder = Folder::new();
     let golden = folder.with("a", &gradient());
     assert_eq!(Picture::open(&golden.path()).unwrap().made_on, None);

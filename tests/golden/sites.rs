@@ -1,10 +1,10 @@
-//! Where a test's goldens are, in packages and workspaces.
+//! The places of a test's goldens, in packages and workspaces.
 
 use sheetsplat::golden::Site;
 
 use crate::*;
 
-/// A workspace with a package of its own and a member, each with a test.
+/// A workspace with a root package and a member, each with a test.
 fn workspace() -> tempfile::TempDir {
     let root = tempfile::tempdir().unwrap();
     for file in ["tests/a.rs", "crates/member/tests/a.rs", "crates/member/src/draw/tests.rs"] {
@@ -21,10 +21,10 @@ fn goldens_are_beside_the_source_file() {
     let at = |path: &str| root.path().join(path).to_str().unwrap().to_owned();
     for (manifest_dir, file, golden) in [
         ("", "tests/a.rs", "tests/goldens/x.png"),
-        // Of a member, `file!()` is relative to the workspace.
+        // For a member, `file!()` is relative to the workspace.
         ("crates/member", "crates/member/tests/a.rs", "crates/member/tests/goldens/x.png"),
         ("crates/member", "crates/member/src/draw/tests.rs", "crates/member/src/draw/goldens/x.png"),
-        // A package that is a dependency elsewhere, or built by other tools: relative to itself, or absolute.
+        // For a dependency of another workspace, or with other build tools, it is relative to the package, or absolute.
         ("crates/member", "tests/a.rs", "crates/member/tests/goldens/x.png"),
         ("crates/member", &at("crates/member/tests/a.rs"), "crates/member/tests/goldens/x.png"),
     ] {
@@ -56,7 +56,7 @@ fn failures_are_left_in_the_target_folder_by_source_file() {
     let integration_test = left_in(Some(tmpdir.as_str()));
     assert_eq!(integration_test, root.path().join("built/goldens/crates/member/tests/a"));
     assert_eq!(names(&integration_test), BTreeSet::from(["x-actual.png", "x-report.txt"].map(str::to_owned)));
-    // Unit tests are told of no folder, but are programs in it.
+    // Unit tests are not given a folder, but their programs run in it.
     let unit_test = left_in(None);
     assert_eq!(
         unit_test,

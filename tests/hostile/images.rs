@@ -8,14 +8,14 @@ use sheetsplat::golden::Picture;
 use crate::mutate::{Random, mutant};
 use crate::{Count, bounded};
 
-/// Mutants of all kinds together.
+/// The number of mutants of all kinds together.
 pub(crate) const FILES: usize = 6_000;
 
-/// Bytes that may be allocated for each byte of a PNG or EXR file: what deflate makes of it at best, as the smallest pixels, which a
-/// palette turns into four bytes each.
+/// The maximum number of bytes allocated per byte of a PNG or EXR file: deflate's best compression, in the smallest pixels, each of which a
+/// palette turns into four bytes.
 const PER_BYTE: usize = 8 * 1032 * 4;
 
-/// The images that are fuzzed, copied to where they can be damaged.
+/// The images that are damaged, copied into a folder.
 fn victims(folder: &Path) -> Vec<PathBuf> {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/corpus");
     let mut paths = Vec::new();
@@ -40,7 +40,7 @@ pub(crate) fn mutated(random: &mut Random) -> Count {
         for round in 0..FILES.div_ceil(paths.len()) {
             let other = &wholes[random.below(wholes.len())];
             let mut mutant = mutant(random, whole, other);
-            // A wrong checksum would end most of them.
+            // A wrong checksum would end the reading of most of them.
             if round % 2 == 0 && path.extension().is_some_and(|extension| extension == "png") {
                 mend_checksums(&mut mutant);
             }
@@ -62,7 +62,7 @@ pub(crate) fn mutated(random: &mut Random) -> Count {
     count
 }
 
-/// Gives the chunks of a PNG the checksums that their contents have.
+/// Gives a PNG's chunks the checksums of their contents.
 fn mend_checksums(bytes: &mut [u8]) {
     let mut at = 8;
     while let Some(&length) = bytes.get(at..).and_then(|rest| rest.first_chunk()) {

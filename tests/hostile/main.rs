@@ -1,7 +1,7 @@
-//! Mutated files: every reader, of images too, and the scene parser give a whole result or an error, do not panic or hang, and take no
-//! more memory than the file's size warrants.
+//! Mutated files: every reader, images' too, and the scene parser return a whole result or an error, without panicking or hanging, and
+//! without using more memory than the file's size warrants.
 //!
-//! One test, since the allocator counts for the whole process. `tests/fuzz` looks for more where this stops.
+//! This is a single test, because the allocator counts for the whole process. `tests/fuzz` searches further.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -23,27 +23,27 @@ use mutate::{Random, mutant};
 #[global_allocator]
 static ALLOCATOR: PeakAlloc = PeakAlloc;
 
-/// Mutants of files, all readers together, and of scenes.
+/// The number of mutants of files, for all readers together, and of scenes.
 const FILES: usize = 20_000;
 const SCENES: usize = 5_000;
 
-/// Bytes that a load may take beyond four times the file's, and three times the values' if there are any. Users may be promised 64 MiB.
+/// The bytes that a load may use beyond four times the file's size and three times the values'. Users may be promised 64 MiB.
 const ROOM: usize = 8 << 20;
 
-/// What a run came to.
+/// The counts of a run.
 #[derive(Default)]
 struct Count {
     inputs: usize,
     accepted: usize,
 }
 
-/// A file that is mutated, and what to open then: itself, its header, or its folder.
+/// A file that is mutated, and the path to open then: the file, its header, or its folder.
 struct Victim {
     file: PathBuf,
     open: PathBuf,
 }
 
-/// The fixtures, copied to where they can be damaged.
+/// The fixtures, copied into a folder.
 fn victims(folder: &Path) -> Vec<Victim> {
     let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
     let mut victims = Vec::new();
@@ -84,7 +84,7 @@ fn open(path: &Path) -> Result<Volume, VolumeError> {
     Volume::open(path)
 }
 
-/// Bytes of a file, or of those in a folder.
+/// The size in bytes of a file, or of the files in a folder.
 fn size(path: &Path) -> usize {
     if path.is_dir() {
         return fs::read_dir(path).unwrap().map(|entry| size(&entry.unwrap().path())).sum();
@@ -92,7 +92,7 @@ fn size(path: &Path) -> usize {
     fs::metadata(path).map_or(0, |metadata| metadata.len() as usize)
 }
 
-/// Runs something that must not panic or take more memory than `bytes` and what the result has. What takes too long, CI ends.
+/// Runs a function that must not panic or use more memory than `bytes` plus its result. CI ends runs that take too long.
 fn bounded<T>(what: &str, bytes: usize, run: impl Fn() -> T, size: impl Fn(&T) -> usize) -> T {
     let before = ALLOCATOR.current_usage();
     ALLOCATOR.reset_peak_usage();
@@ -112,7 +112,7 @@ fn mutate_files(random: &mut Random) -> Count {
         for round in 0..FILES.div_ceil(victims.len()) {
             let other = &wholes[random.below(wholes.len())];
             let mutant = mutant(random, whole, other);
-            // Written over, a file may be waited for until it is on the disk; a new one is not.
+            // Overwriting a file may wait for the disk; creating a new one does not.
             fs::remove_file(file).unwrap();
             fs::write(file, &mutant).unwrap();
             let what = format!("{}, mutant {round}", file.strip_prefix(folder.path()).unwrap().display());
@@ -180,7 +180,7 @@ fn damaged_files_are_volumes_or_errors() {
         let Count { inputs, accepted } = count;
         println!("{what}: {accepted} of {inputs} accepted");
         assert!(inputs >= least);
-        // Neither harmless nor hopeless.
+        // The mutants are neither harmless nor hopeless.
         assert!(20 * accepted > inputs && 20 * accepted < 19 * inputs, "{what}: {accepted} of {inputs}");
     }
 }

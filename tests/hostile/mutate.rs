@@ -1,10 +1,10 @@
-//! Damage to files, the same in every run.
+//! Damage to files that is the same in every run.
 
-/// Numbers that sizes and offsets go wrong at.
+/// Critical numbers for sizes and offsets.
 const EDGES: [u64; 12] =
     [0, 1, 0x7f, 0xff, 0x7fff, 0xffff, 0x1_0000, 0x7fff_ffff, 0x8000_0000, 0xffff_ffff, 0x1_0000_0000, u64::MAX];
 
-/// Text that means something in one header or another.
+/// Words that have a meaning in some header.
 const WORDS: [&str; 20] = [
     "-1",
     "0",
@@ -36,7 +36,7 @@ impl Random {
         Self(0x9e37_79b9_7f4a_7c15)
     }
 
-    /// A number from 0 up to `end`, which is not 0.
+    /// A number from 0 up to `end`, exclusive; `end` is not 0.
     pub(crate) fn below(&mut self, end: usize) -> usize {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
@@ -45,7 +45,7 @@ impl Random {
     }
 }
 
-/// A file with one to four kinds of damage; `other` is one to take pieces from.
+/// A file with one to four kinds of damage; pieces may come from `other`.
 pub(crate) fn mutant(random: &mut Random, whole: &[u8], other: &[u8]) -> Vec<u8> {
     let mut bytes = whole.to_vec();
     for _ in 0..=random.below(4) {
@@ -56,7 +56,7 @@ pub(crate) fn mutant(random: &mut Random, whole: &[u8], other: &[u8]) -> Vec<u8>
 
 fn damage(random: &mut Random, bytes: &mut Vec<u8>, other: &[u8]) {
     let at = random.below(bytes.len() + 1);
-    // Where headers are, more often than where samples are.
+    // Headers are damaged more often than samples.
     let at = if random.below(2) == 0 { at.min(random.below(512)) } else { at };
     let room = bytes.len() - at;
     let piece = |random: &mut Random, of: &[u8]| {

@@ -1,4 +1,4 @@
-//! Headers that promise as much as their compression could give at best, before code that gives next to nothing.
+//! Headers that promise as much as their compression could hold, before code that yields almost nothing.
 
 use std::fs;
 use std::path::Path;
@@ -7,12 +7,12 @@ use sheetsplat::volume::Volume;
 
 use crate::bounded;
 
-/// Bytes of code in every file.
+/// The number of bytes of code in every file.
 const CODE: usize = 1 << 20;
 
 pub(crate) fn are_refused(folder: &Path) {
     let zeros = vec![0; CODE];
-    // Empty blocks of stored bytes, a valid beginning of anything.
+    // Empty blocks of stored bytes, a valid beginning of any stream.
     let stored: Vec<u8> = [0, 0, 0, 0xff, 0xff].iter().copied().cycle().take(CODE).collect();
     let deflate = |head: &[u8]| [head, &stored[head.len()..]].concat();
     let gzip = deflate(&[0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 3]);
@@ -54,7 +54,7 @@ pub(crate) fn are_refused(folder: &Path) {
     }
 }
 
-/// One strip of the largest size that 2³⁰ bytes have.
+/// One strip of the maximum size for 2³⁰ bytes.
 fn tiff(compression: u32, code: &[u8]) -> Vec<u8> {
     let side = 1 << 15;
     let tags: [(u16, u32); 8] = [
@@ -100,7 +100,7 @@ fn jpeg() -> Vec<u8> {
     bytes
 }
 
-/// What a DICOM file begins with.
+/// The beginning of a DICOM file.
 fn dicom_head(syntax: &str) -> Vec<u8> {
     let length = (syntax.len() as u16).to_le_bytes();
     [&[0; 128], &b"DICM\x02\0\x10\0UI"[..], &length, syntax.as_bytes()].concat()
@@ -120,7 +120,7 @@ fn jpeg_2000() -> Vec<u8> {
     bytes
 }
 
-/// A header of so many samples of 16 bits, and nothing else.
+/// A header of 16-bit samples, with nothing after it.
 fn mgh(sizes: [u32; 3]) -> Vec<u8> {
     let numbers = [1, sizes[0], sizes[1], sizes[2], 1, 4, 0].map(u32::to_be_bytes).concat();
     let mut bytes = numbers;
@@ -128,7 +128,7 @@ fn mgh(sizes: [u32; 3]) -> Vec<u8> {
     bytes
 }
 
-/// A frame of 30000 × 30000 samples of 16 bits in one fragment.
+/// A frame of 30000 × 30000 16-bit samples in one fragment.
 fn dicom(syntax: &str, code: &[u8]) -> Vec<u8> {
     let element = |group: u16, element: u16, kind: &[u8], value: &[u8]| {
         let length = (value.len() as u16).to_le_bytes();

@@ -1,4 +1,4 @@
-//! What maximum, minimum and average make of a whole ray.
+//! Maximum, minimum and average over a whole ray.
 
 use glam::{DVec3, UVec2};
 use sheetsplat::image::Image;
@@ -14,7 +14,7 @@ use crate::common::images::largest_difference;
 use crate::common::{RASTERIZERS, Random, camera, gpu, scene, transfer};
 use crate::{COLOR, OPACITY, constant, render, view_of};
 
-/// Of a pixel's ray what lies in the box of half the given extent, grid steps: from where to where, grid steps from the volume's centre.
+/// The part of a pixel's ray in a box with this half size in grid steps: its ends in grid steps from the volume's centre.
 fn in_box(view: &ViewGeometry, aspect: DVec3, pixel: usize, half: DVec3) -> Option<[DVec3; 2]> {
     let size = UVec2::from(view.size);
     let place = UVec2::new(pixel as u32 % size.x, pixel as u32 / size.x).as_dvec2() + 0.5 - size.as_dvec2() / 2.0;
@@ -27,7 +27,7 @@ fn in_box(view: &ViewGeometry, aspect: DVec3, pixel: usize, half: DVec3) -> Opti
     (first < last).then(|| [first, last].map(|depth| origin + depth * (end - origin)))
 }
 
-/// Views of a constant volume: any direction, with an eye and without, sheets of any width and slices.
+/// Views of a constant volume from any direction, with and without an eye, with sheets of any width and slices.
 fn views_of_a_constant(random: &mut Random) -> Vec<(Volume, Scene)> {
     let mut views = Vec::new();
     for case in 0..12 {
@@ -63,13 +63,13 @@ fn the_average_of_a_constant_is_the_constant() {
                     assert_eq!(alpha, 0.0, "pixel {at} is beside the volume: {scene:?}");
                     continue;
                 };
-                // Farther from the faces' edges than kernels reach, also of a ray that comes in slanted.
+                // The ends are farther from the faces' edges than kernels reach, even if the ray is slanted.
                 let is_inside = |end: DVec3| {
                     (center + 0.5 - end.abs()).to_array().iter().filter(|&&step| step >= 1.5 * radius).count() == 2
                 };
                 if ends.into_iter().all(is_inside) {
                     inside += 1;
-                    // f16 amounts by quads; and with an eye kernels are seen as along their own ray from everywhere.
+                    // Quads' amounts are f16, and in perspective kernels are projected along their own rays.
                     let tolerance = if view.perspective.is_some() { 5e-3 } else { 2e-3 };
                     let what = format_args!("pixel {at}: {pixel:?} with {scene:?}");
                     assert_at_most((alpha / OPACITY - 1.0).abs(), tolerance, what);
@@ -80,7 +80,7 @@ fn the_average_of_a_constant_is_the_constant() {
     }
     println!("{inside} pixels, at most {brightest:.3} times the constant at edges");
     assert!(inside > 5000, "only {inside} pixels were compared");
-    // Kernels blur the volume's edges; no edge outshines what is inside by more than that.
+    // Kernels blur the volume's edges, which exceed the inside by at most this.
     assert_at_most(brightest, 1.2, "times the constant");
 }
 
@@ -91,7 +91,7 @@ fn the_minimum_of_a_constant_is_the_constant_inside() {
     for (volume, mut scene) in views_of_a_constant(&mut Random(6)) {
         scene.splatting.compositing = Compositing::Minimum;
         let (complete, view) = (volume.grid().center() - scene.splatting.radius, view_of(&volume, &scene));
-        // A middle may be a hundredth of a slab outside.
+        // A middle may lie a hundredth of a slab outside.
         let [within, around] = [complete - 0.1, complete + 0.1];
         for (rasterizer, order) in RASTERIZERS.into_iter().zip([Order::FrontToBack, Order::BackToFront]) {
             (scene.splatting.rasterizer, scene.splatting.order) = (rasterizer, order);
@@ -110,9 +110,9 @@ fn the_minimum_of_a_constant_is_the_constant_inside() {
     assert!(inside > 5000, "only {inside} pixels were compared");
 }
 
-/// The least opacity is 0 where there is anything without, wherever along the ray it is, and however little of the volume takes part.
+/// The minimum opacity is 0 where any part of the ray is empty, wherever it is, and however little of the volume takes part.
 #[test]
-fn the_minimum_of_a_gap_is_nothing() {
+fn the_minimum_across_a_gap_is_empty() {
     let gpu = gpu();
     for empty in [4..9, 20..60, 0..50, 12..60] {
         let (volume, mut scene) = constant([15, 60, 15], DVec3::ONE);
@@ -131,7 +131,7 @@ fn the_minimum_of_a_gap_is_nothing() {
             scene.clip = Clip::default();
             let image = render(&gpu, &volume, &scene).0;
             assert!(image.pixels.iter().all(|pixel| *pixel == [0.0; 4]), "{empty:?} {rasterizer:?} {order:?}");
-            // What is cut away is no gap.
+            // A part that is cut away is not a gap.
             let side = |y: u32, sign: f64| [0.0, sign, 0.0, -sign * (f64::from(y) - 29.5 + sign)];
             let kept = if empty.end < 55 { side(empty.end + 1, 1.0) } else { side(empty.start - 2, -1.0) };
             scene.clip.planes = vec![kept];
@@ -142,11 +142,11 @@ fn the_minimum_of_a_gap_is_nothing() {
     }
 }
 
-/// The same where whole groups of sheets are empty, between others, before and behind them: nothing is drawn there.
+/// The same if whole groups of sheets, between, before and behind others, are empty and nothing is drawn into them.
 #[test]
-fn the_minimum_of_empty_groups_is_nothing() {
+fn the_minimum_across_empty_groups_is_empty() {
     let gpu = gpu();
-    // By slabs of 8 and groups of 4: something in every slab of two groups, and nothing in that between them.
+    // With slabs of 8 and groups of 4, every slab of two groups has content, and none between them.
     for parts in [[0..16, 52..100], [0..16, 0..0], [0..0, 52..100], [0..0, 0..100]] {
         let (volume, mut scene) = constant([9, 100, 9], DVec3::ONE);
         let value = |index| f32::from(parts.iter().any(|part| part.contains(&volume.grid().voxel_at(index).y)));
@@ -171,7 +171,7 @@ fn the_minimum_of_empty_groups_is_nothing() {
     }
 }
 
-/// Looked at from the other side a picture is mirrored.
+/// Seen from the other side, a picture is mirrored.
 #[test]
 fn maximum_and_average_are_the_same_from_behind() {
     let gpu = gpu();

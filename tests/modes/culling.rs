@@ -1,7 +1,7 @@
-//! Culling, tiles and groups (SPEC §6): what they change is the cost.
+//! Culling, tiles and groups (SPEC §6) change only the cost.
 
 use glam::DVec3;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::settings::Compositing;
 use sheetsplat::settings::Projection;
 use sheetsplat::volume::builtin;
@@ -10,14 +10,14 @@ use crate::common::compare::assert_at_most;
 use crate::common::{BY_MEANS, FORMS, RASTERIZERS, Random, gpu, lavapipe, scene};
 use crate::{OUTLIERS, random_case, render, share_off};
 
-/// Behind a surface everything is culled, and nothing changes.
+/// Behind a surface everything is culled, and the image does not change.
 #[test]
 fn surfaces_cull_and_the_others_do_not() {
     let gpu = gpu();
     let volume = builtin::volume("head:48").unwrap();
     let mut scene = scene(100, 90);
     scene.camera.direction = DVec3::new(0.4, 0.8, -0.3);
-    // Below what a surface that is not reached keeps.
+    // The threshold is below the opacity that is stored while no surface has been reached.
     scene.splatting.opacity_threshold = 0.2;
     let projections = [scene.camera.projection, Projection::Perspective { fov_y: 40.0, distance: None, near: None }];
     for (compositing, projection) in
@@ -41,10 +41,10 @@ fn surfaces_cull_and_the_others_do_not() {
     }
 }
 
-/// How sheets are grouped and which tiles are composited is none of the picture's business.
+/// The image does not depend on how sheets are grouped and which tiles are composited.
 #[test]
 fn tiles_and_groups_change_nothing() {
-    let renderers = [1, 2, 4].map(|n| Headless::new(&lavapipe().with_sheets_per_group(n)).unwrap());
+    let renderers = [1, 2, 4].map(|n| GpuHeadless::new(&lavapipe().with_sheets_per_group(n)).unwrap());
     let mut random = Random(91);
     for (case, compositing) in (0..12).zip(BY_MEANS.into_iter().cycle()) {
         let (volume, mut scene) = random_case(&mut random);

@@ -1,6 +1,6 @@
-//! Compositing by means (`splatting::Compositing`; SPEC is silent): whole frames by each rasterizer against the f64 twin, and what
-//! maximum, minimum, average and surface must show, whatever the view. `cargo test --release --test modes -- --nocapture` prints what was
-//! measured.
+//! Compositing by means (`splatting::Compositing`; SPEC is silent): whole frames by each rasterizer against the f64 evaluation, and
+//! properties of maximum, minimum, average and surface in every view. `cargo test --release --test modes -- --nocapture` prints the
+//! measurements.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod along_rays;
@@ -12,7 +12,7 @@ mod surface;
 mod twin;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::image::Image;
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
@@ -22,19 +22,19 @@ use sheetsplat::volume::Volume;
 
 use common::{Random, SPACINGS, random_eye, random_volume, scene, transfer};
 
-/// Where an opacity, a slab's middle or a ray is on an edge, rounding may decide otherwise: in so many of the pixels.
+/// The fraction of pixels in which an opacity, a slab's middle or a ray lies on an edge, so that rounding decides.
 pub(crate) const OUTLIERS: f64 = 0.0003;
 
-/// The share of pixels with a channel that differs by more.
+/// The fraction of pixels with a channel that differs by more than `by`.
 pub(crate) fn share_off(a: &[[f32; 4]], b: &[[f32; 4]], by: f32) -> f64 {
     assert_eq!(a.len(), b.len());
-    // NaN is close to nothing.
+    // The negation also counts NaN.
     let is_close = |(a, b): (&f32, &f32)| (a - b).abs() <= by;
     let is_off = |(a, b): &(&[f32; 4], &[f32; 4])| !a.iter().zip(*b).all(is_close);
     a.iter().zip(b).filter(is_off).count() as f64 / a.len() as f64
 }
 
-/// Any view of any volume, from outside, beside or inside, cut or not.
+/// Any view of any volume, from outside, beside or inside, with or without cuts.
 pub(crate) fn random_case(random: &mut Random) -> (Volume, Scene) {
     let spacing = random.pick(&SPACINGS);
     let volume = random_volume(random, (6.0, 16.0), spacing);
@@ -45,7 +45,7 @@ pub(crate) fn random_case(random: &mut Random) -> (Volume, Scene) {
         scene.camera = random_eye(random, volume.grid());
     }
     let (haze, solid) = (random.pick(&[0.0, 0.02, 0.3]), random.pick(&[0.3, 0.9, 1.0]));
-    // Voxels without opacity leave gaps.
+    // Transparent voxels leave gaps.
     let opacity = [(10.0, 0.0), (20.0, haze), (200.0, solid)];
     scene.transfer = transfer(&[(0.0, [0.2, 0.5, 1.0]), (200.0, [1.0, 0.9, 0.8])], &opacity);
     scene.splatting.slab_width = random.pick(&[0.5, 1.0, 2.0, 3.0]);
@@ -69,16 +69,16 @@ pub(crate) fn view_of(volume: &Volume, scene: &Scene) -> ViewGeometry {
     ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, [scene.image.width, scene.image.height]).unwrap()
 }
 
-pub(crate) fn render(gpu: &Headless, volume: &Volume, scene: &Scene) -> (Image, Counts) {
+pub(crate) fn render(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> (Image, Counts) {
     let rendering = gpu.render_volume(volume.clone(), scene).unwrap();
     (rendering.image, rendering.stats.counts)
 }
 
-/// What a constant volume is made of: opacity, and colour without shading.
+/// The constant volume's opacity, and its unshaded colour.
 pub(crate) const OPACITY: f64 = 0.3;
 pub(crate) const COLOR: [f64; 3] = [0.2, 0.5, 0.9];
 
-/// A constant volume, seen as a kernel reconstructs it that leaves no ripple.
+/// A constant volume, with a kernel that leaves no ripple.
 pub(crate) fn constant(dims: [u32; 3], spacing: DVec3) -> (Volume, Scene) {
     let dims = UVec3::from(dims);
     let volume = Volume::new("constant", dims, spacing, vec![1.0; dims.element_product() as usize]).unwrap();

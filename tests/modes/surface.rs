@@ -1,4 +1,4 @@
-//! What a surface is.
+//! Properties of a surface.
 
 use glam::DVec3;
 use sheetsplat::internals::reference;
@@ -11,7 +11,7 @@ use crate::common::compare::{self, assert_at_least};
 use crate::common::{RASTERIZERS, camera, gpu, scene, transfer};
 use crate::{COLOR, constant, render};
 
-/// Half a volume of one opacity, half of none, cut by a plane between voxels.
+/// A volume with one opacity in one half and 0 in the other, divided by a plane between voxels.
 fn step(opacity: f64) -> (Volume, Scene) {
     let (volume, mut scene) = constant([40, 40, 40], DVec3::ONE);
     let values = (0..64_000).map(|index| f32::from(volume.grid().voxel_at(index).y >= 20)).collect();
@@ -23,7 +23,7 @@ fn step(opacity: f64) -> (Volume, Scene) {
     (volume, scene)
 }
 
-/// The surface of a step is opaque, where the step is, and has the inside's colour; what never reaches one half shows nothing.
+/// The surface of a step is opaque, at the step, with the inside's colour; where the opacity never reaches one half, the pixel is empty.
 #[test]
 fn the_surface_of_a_step() {
     let gpu = gpu();
@@ -42,10 +42,10 @@ fn the_surface_of_a_step() {
             }
             for pixel in [[60, 54], [6, 100], [110, 4]] {
                 let pick = gpu.pick(&view, pixel).unwrap().unwrap();
-                // Between the voxels before and behind it, as exactly as the mean grows evenly.
+                // Between the voxels before and behind it, as exactly as the mean is linear.
                 assert!(pick.position.y.abs() < 0.1 * f64::max(width, 1.0), "{rasterizer:?}, {width}: {pick:?}");
             }
-            // As far in as it is half as opaque.
+            // At a lower opacity the surface lies farther inside.
             let (volume, mut scene) = step(0.6);
             (scene.splatting.rasterizer, scene.splatting.slab_width) = (rasterizer, width);
             let image = render(&gpu, &volume, &scene).0;
@@ -58,13 +58,12 @@ fn the_surface_of_a_step() {
     }
 }
 
-/// Haze that a gap parts from a surface leaves no colour on it, though no sheet between them is composited.
+/// Haze before a gap leaves no colour on a surface behind it, although no sheet in the gap is composited.
 #[test]
-fn what_a_gap_parts_from_a_surface_does_not_count() {
+fn haze_before_a_gap_does_not_colour_a_surface() {
     let gpu = gpu();
     let (volume, mut scene) = constant([9, 100, 9], DVec3::ONE);
-    // By slabs of 8 and groups of 4: haze up to the end of one group, nothing in the next, and the surface in the first sheet after
-    // that.
+    // With slabs of 8 and groups of 4: haze up to the end of one group, nothing in the next, and the surface in the first sheet after that.
     let value = |index| match volume.grid().voxel_at(index).y {
         0..=15 => 1.0,
         52.. => 2.0,
@@ -89,8 +88,8 @@ fn what_a_gap_parts_from_a_surface_does_not_count() {
     }
 }
 
-/// How far a surface by slabs as wide as voxels is from that by the thinnest. Taken as the first sheet of one half as it is, its colours are
-/// those of other depths from ring to ring: 27 dB for the head, 27 for the waves.
+/// The PSNR of a surface by slabs as wide as voxels against one by the thinnest slabs. Without interpolation, its colours would be those of
+/// other depths from ring to ring: 27 dB for the head and for the waves.
 #[test]
 fn a_surface_has_no_rings() {
     let gpu = gpu();

@@ -1,8 +1,8 @@
-//! Frames of random volumes, and of the thinnest, against the twin; and what is refused.
+//! Frames of random and of extremely thin volumes against the f64 evaluation; and refused settings.
 
 use glam::DVec3;
 use sheetsplat::RenderError;
-use sheetsplat::headless::{Headless, readback};
+use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference::{self, Host};
 use sheetsplat::internals::view_geometry::ViewGeometry;
@@ -15,7 +15,7 @@ use crate::common::surfaces::{DepthRange, surfaces};
 use crate::common::{BY_MEANS, RASTERIZERS, Random, camera, gpu, scene, transfer};
 use crate::{COLOR, OUTLIERS, constant, random_case, render, share_off, view_of};
 
-/// Depths of a host's wall before a part of the image.
+/// The depths of a host's wall in front of a part of the image.
 fn wall(view: &ViewGeometry) -> Vec<f64> {
     let middle = view.rays().depth_of(DVec3::ZERO);
     let depth = |at: u32| match (at % view.size[0]) * 4 / view.size[0] {
@@ -26,8 +26,8 @@ fn wall(view: &ViewGeometry) -> Vec<f64> {
     (0..view.size[0] * view.size[1]).map(depth).collect()
 }
 
-/// Draws a frame, with its first hits in `unit`s if they were asked for.
-fn draw(gpu: &Headless, volume: &Volume, scene: &Scene, first_hit: Option<f64>, walls: bool) -> (Image, Vec<f64>) {
+/// Draws a frame, with its first hits in `unit`s if requested.
+fn draw(gpu: &GpuHeadless, volume: &Volume, scene: &Scene, first_hit: Option<f64>, walls: bool) -> (Image, Vec<f64>) {
     let unit = volume.grid().unit();
     let mut view = gpu.view(volume.clone(), scene).unwrap();
     view.set_first_hit(first_hit).unwrap();
@@ -46,7 +46,7 @@ fn draw(gpu: &Headless, volume: &Volume, scene: &Scene, first_hit: Option<f64>, 
 }
 
 #[test]
-fn any_view_is_that_of_the_twin() {
+fn any_view_equals_the_reference() {
     let gpu = gpu();
     let mut random = Random(2024);
     for compositing in BY_MEANS {
@@ -99,7 +99,7 @@ fn any_view_is_that_of_the_twin() {
     }
 }
 
-/// Volumes a voxel thick, or of a single one, and views along their faces.
+/// Volumes that are one voxel thick, or a single voxel, and views along their faces.
 #[test]
 fn thin_volumes() {
     let gpu = gpu();
@@ -129,7 +129,7 @@ fn thin_volumes() {
                 let share = share_off(&image.pixels, &expected.pixels, 2e-3);
                 assert_at_most(share, 2.0 * OUTLIERS, &what);
                 let alpha = image.pixels[54 * 120 + 60][3];
-                // Edge on, a single layer of voxel centres is nowhere.
+                // Seen edge-on, a single layer of voxel centres covers no pixel.
                 let may_be_nothing = compositing == Compositing::Surface || dims[1] == 1;
                 assert!(may_be_nothing || alpha > 0.1, "{what}: {alpha}");
             }
@@ -138,7 +138,7 @@ fn thin_volumes() {
 }
 
 #[test]
-fn what_does_not_go_together_is_refused() {
+fn settings_that_exclude_each_other_are_refused() {
     let gpu = gpu();
     let volume = builtin::volume("head:24").unwrap();
     let refusal = |scene: &Scene, first_hit: Option<f64>| {

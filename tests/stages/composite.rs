@@ -1,7 +1,7 @@
 //! `shaders/composite.wgsl` against `reference::composite`: random sheets over random compositing buffers, in some tiles.
 
 use glam::{DVec3, DVec4};
-use sheetsplat::headless::{Headless, readback};
+use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::internals::gpu::layout::SheetGroup;
 use sheetsplat::internals::gpu::targets::{BandBuffer, CompositingBuffer, Targets};
 use sheetsplat::internals::pass::composite::{Composite, CompositeBuffers, CompositeMode, RayMode};
@@ -15,12 +15,12 @@ use crate::common::compare::{apart, assert_at_most};
 use crate::common::{BY_AMOUNTS, F32, Random, gpu, gpu_with_small_bindings};
 use crate::{Uncut, compute, contents, frame, init, tile_list};
 
-/// Premultiplied colours, in f32: a share of the pixels with no alpha at all, tiny ones, and, if asked for, some above 1.
+/// Premultiplied colours in f32: some pixels have alpha 0, some a tiny alpha, and, if requested, some exceed 1.
 fn random_pixels(random: &mut Random, size: [u32; 2], above_one: bool) -> Vec<[f32; 4]> {
     let alpha = |random: &mut Random| match random.bits() % 6 {
         0 => 0.0,
         1 => 1e-6 * random.uniform(0.5, 2.0),
-        // Around the shader's switch from a series to exp.
+        // Values around the shader's switch from a series to exp.
         2 => random.uniform(0.06, 0.065),
         3 => 1.0,
         4 if above_one => random.uniform(1.0, 30.0),
@@ -39,9 +39,9 @@ fn to_f64(width: u32, pixels: &[[f32; 4]]) -> Buffer {
     Buffer { width: width as usize, pixels: pixels.iter().map(|pixel| DVec4::from(pixel.map(f64::from))).collect() }
 }
 
-/// What f32 may change in a pixel by one sheet. A sum and a product of numbers up to `most` is worth a few roundings; WGSL's
-/// division is good to 2.5 ULP, its exp to (3 + 2|x|) ULP, of which 1 - exp(-a) keeps all in absolute terms; the shader's
-/// series below 1/16 errs by a⁵/720.
+/// The maximum f32 error of one sheet in a pixel. A sum and a product of numbers up to `most` have a few roundings; WGSL's division is
+/// accurate to 2.5 ULP, its exp to (3 + 2|x|) ULP, of which 1 - exp(-a) keeps all in absolute terms; the shader's series below 1/16 errs by
+/// a⁵/720.
 fn tolerance(compositing: Compositing, alpha: f64, most: f64) -> f64 {
     let exp_error = match compositing {
         Compositing::Exponential if alpha >= 0.06 => (3.0 + 2.0 * alpha) * 2.0 * F32 * (-alpha).exp(),
@@ -62,11 +62,11 @@ struct Case {
     acc: Vec<[f32; 4]>,
     /// Tiles to composite.
     tiles: Vec<u32>,
-    /// What the masks hold before.
+    /// The previous content of the masks.
     stale: u32,
 }
 
-/// What the stage left behind: pixels, mask of opaque pixels, flags of opaque tiles.
+/// The results of the stage: pixels, the mask of opaque pixels, and flags of opaque tiles.
 struct Outcome {
     acc: Vec<[f32; 4]>,
     opaque: Vec<u32>,
@@ -74,7 +74,7 @@ struct Outcome {
 }
 
 impl Case {
-    fn run(&self, gpu: &Headless, stage: &Composite, bands: usize) -> Outcome {
+    fn run(&self, gpu: &GpuHeadless, stage: &Composite, bands: usize) -> Outcome {
         let (device, queue) = (gpu.device(), gpu.queue());
         let Self { size, compositing, order, threshold, .. } = *self;
         let layers = self.sheets.len() as u32;
@@ -149,18 +149,18 @@ impl Case {
             let [x, y] = [i as u32 % size[0], i as u32 / size[0]];
             let is_listed = self.tiles.contains(&(y / TILE * columns + x / TILE));
             let alphas = || sheets.iter().map(|sheet| sheet.pixels[i].w);
-            // What nothing was drawn on stays what it is, to the last bit, and so does what is not listed.
+            // Pixels on which nothing was drawn, or whose tile is not listed, stay the same to the last bit.
             if !is_listed || alphas().all(|alpha| alpha == 0.0) {
                 assert_eq!(outcome.acc[i], self.acc[i], "{name}, pixel {x} {y}, listed: {is_listed}");
                 continue;
             }
             let most = expected.max_element().max(1.0);
-            // The errors of sheets add up: none makes those before it larger.
+            // The errors of sheets add up, because a sheet does not enlarge those before it.
             let tolerance: f64 = alphas().map(|alpha| tolerance(compositing, alpha, most)).sum();
             let what = format_args!("{name}, pixel {x} {y} over {:?}: {actual}, not {expected}", self.acc[i]);
             assert_at_most(apart(*actual, *expected), tolerance, what);
         }
-        // The masks say exactly what the compositing buffer holds; off the image all is opaque.
+        // The masks match the compositing buffer exactly; off the image all pixels are opaque.
         let is_opaque = |x: u32, y: u32| {
             x >= size[0] || y >= size[1] || outcome.acc[(y * size[0] + x) as usize][3] >= threshold as f32
         };
@@ -182,7 +182,7 @@ impl Case {
     }
 }
 
-fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
+fn check(gpu: &GpuHeadless, size: [u32; 2], bands: usize) {
     let stage = Composite::default();
     let mut random = Random(u64::from(size[0]));
     let [columns, rows] = tile_grid(size);
@@ -193,7 +193,7 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
             .flat_map(|order| [1, 2, 4].map(|layers| (order, layers)))
         {
             let mut acc = random_pixels(&mut random, size, compositing == Compositing::Xray);
-            // Every other tile starts with nothing but high opacities.
+            // Every other tile starts with only high opacities.
             for (i, pixel) in (0..).zip(&mut acc) {
                 let tile = i / size[0] / TILE * columns + i % size[0] / TILE;
                 if tile % 2 == 1 {
@@ -207,7 +207,7 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
                 threshold: [0.5, 0.9, 1.0][random.bits() as usize % 3],
                 sheets: (0..layers).map(|_| random_pixels(&mut random, size, true)).collect(),
                 acc,
-                // In any order: tiles do not overlap.
+                // Tiles do not overlap, so their order is arbitrary.
                 tiles: (0..columns * rows).rev().filter(|_| !random.bits().is_multiple_of(4)).collect(),
                 stale: random.bits() as u32,
             };
@@ -231,7 +231,7 @@ fn every_compositing_and_order() {
 
 #[test]
 fn several_bands() {
-    // Rows of 61 pixels: 33 of them fit a binding, and a band is whole tiles.
+    // Rows have 61 pixels: 33 of them fit a binding, and a band consists of whole tiles.
     check(&gpu_with_small_bindings(32768), [61, 137], 5);
 }
 

@@ -1,5 +1,5 @@
-//! A kernel as any view sees it, with an eye or without, in slabs or in slices: its splat record, the twin's sections of it, and what
-//! the stages that draw it may err by.
+//! A kernel in any view, with or without an eye, in slabs or in slices: its splat record, its sections by the f64 evaluation, and the error
+//! bounds of the stages that draw it.
 
 use glam::{DVec2, DVec4, UVec3};
 use sheetsplat::internals::footprint::{SECTION_SIZE, SECTIONS, section_extent, section_spacing};
@@ -13,10 +13,10 @@ use sheetsplat::volume::Grid;
 use crate::common::{F32, Random, SPACINGS, random_eye, scene};
 use crate::section::{AMOUNT, AMOUNT_BA, AMOUNT_RG, KERNELS, Seen};
 
-/// What the arctangent that turns footprints to their axes may err by: Mesa's polynomial.
+/// The error of the arctangent that rotates footprints to their axes: that of Mesa's polynomial.
 const AXIS: f64 = 1.0 / (1 << 18) as f64;
 
-/// A grid, and a view of it through any eye, or, of slices, along any direction.
+/// A grid, and a view of it from any eye or, for slices, along any direction.
 pub(crate) fn random_view(random: &mut Random, method: Method, form: FootprintForm) -> (Grid, Scene) {
     let grid = Grid { dims: UVec3::new(9, 8, 11), spacing: random.pick(&SPACINGS).into() };
     let mut scene = scene(70, 45);
@@ -35,13 +35,13 @@ pub(crate) struct KernelInView<'a> {
     seen: &'a Seen,
     pub(crate) record: layout::Splat,
     twin: reference::Splat,
-    /// The slice that it is in.
+    /// The kernel's slice.
     pub(crate) slice: i32,
     ray: Ray,
 }
 
 impl<'a> KernelInView<'a> {
-    /// A kernel around the screen, beyond the near plane. The twin takes the record's f32 coordinates as they are.
+    /// A kernel near the screen, beyond the near plane. The f64 evaluation uses the record's f32 coordinates.
     pub(crate) fn random(seen: &'a Seen, random: &mut Random) -> Self {
         let Seen { geometry, view, .. } = seen;
         let [x_px, y_px] = [geometry.size.x, geometry.size.y].map(|side| random.uniform(-3.0, side + 3.0) as f32);
@@ -60,7 +60,7 @@ impl<'a> KernelInView<'a> {
             (slope.x * geometry.basis.u - slope.y * geometry.basis.v + geometry.basis.w).normalize()
         });
         let ray = Ray::new(r, &geometry.basis, geometry.grid.aspect());
-        // The low-pass rule's amplitude comes with each section, if each has its own.
+        // If sections have their own low-pass amplitudes, these are applied with them.
         let amplitude = if eye.is_some() { 1.0 } else { geometry.amplitude };
         let amount = AMOUNT * (amplitude / ray.lambda);
         Self {
@@ -72,7 +72,7 @@ impl<'a> KernelInView<'a> {
         }
     }
 
-    /// The sheets that it reaches into.
+    /// The sheets that it reaches.
     pub(crate) fn sheets(&self) -> std::ops::Range<i32> {
         match self.seen.geometry.method {
             Method::ImageAligned => self.seen.geometry.slabs(&self.twin, self.seen.kernel.radius()),
@@ -82,7 +82,7 @@ impl<'a> KernelInView<'a> {
         }
     }
 
-    /// What of it falls into a sheet.
+    /// Its section in a sheet.
     pub(crate) fn section(&self, k: i32) -> Option<Section> {
         let Seen { geometry, kernel, .. } = self.seen;
         self.sheets().contains(&k).then(|| geometry.section(&self.twin, k, kernel)).flatten()
@@ -95,7 +95,7 @@ impl<'a> KernelInView<'a> {
         geometry.eye.is_some_and(|eye| self.twin.depth - reach < eye.near)
     }
 
-    /// Where the planes of a slab are, seen from the centre, cut by nothing; of slices the rim.
+    /// The positions of a slab's planes relative to the centre, without any cut; for slices, of the rim.
     fn planes(&self, k: i32) -> (f64, f64) {
         let Seen { geometry, kernel, .. } = self.seen;
         if geometry.method != Method::ImageAligned {
@@ -105,8 +105,8 @@ impl<'a> KernelInView<'a> {
         (at(k), at(k + 1))
     }
 
-    /// What f32 may move a slab's planes by, and the near plane, grid units: coordinates and planes are rounded, and subtracted, and
-    /// the difference is multiplied by a length of four roundings.
+    /// The f32 error of a slab's planes and of the near plane in grid units: coordinates and planes are rounded and subtracted, and the
+    /// difference is multiplied by a length with four roundings.
     fn plane_error(&self, k: i32) -> f64 {
         let Seen { geometry, view, kernel, .. } = self.seen;
         let near = geometry.eye.map_or(0.0, |eye| eye.near + self.twin.depth);
@@ -120,14 +120,14 @@ impl<'a> KernelInView<'a> {
         4.0 * F32 * (near + slab) / self.ray.depth_per_warped + 8.0 * F32 * kernel.radius()
     }
 
-    /// What f32 may draw of it into a sheet that it does not reach, for planes that are not quite where they should be.
+    /// The maximum amount that f32 may draw into a sheet that the kernel does not reach, because planes are slightly displaced.
     pub(crate) fn rounding(&self, k: i32) -> f64 {
         let kernel = &self.seen.kernel;
         let whole = kernel.section(0.0, -kernel.radius(), kernel.radius());
         (F32 * whole + self.plane_error(k) * kernel.value(0.0)) * self.twin.amount.w
     }
 
-    /// The section that the stage draws instead: the nearest one of the stored ones. `None` where it depends on f32 which one that is.
+    /// The section that the stage draws instead: the nearest stored one. `None` if f32 decides which one that is.
     pub(crate) fn stored(&self, section: Section, k: i32) -> Option<Section> {
         let Seen { view, kernel, .. } = self.seen;
         let (t0, t1) = self.planes(k);
@@ -140,7 +140,7 @@ impl<'a> KernelInView<'a> {
         is_sure.then_some(Section { t0: middle - half, t1: middle + half, ..section })
     }
 
-    /// What a section drawn by the stage may err by at a pixel, as a share of the section's amount.
+    /// The error bound of a section drawn by the stage at a pixel, relative to the section's amount.
     fn tolerance(&self, section: &Section, k: i32, form: FootprintForm, pixel: DVec2) -> f64 {
         let Seen { geometry, kernel, .. } = self.seen;
         let (Section { t0, t1, .. }, radius) = (*section, kernel.radius());
@@ -155,30 +155,30 @@ impl<'a> KernelInView<'a> {
             let depth = self.twin.depth + middle * self.ray.depth_per_warped;
             (eye.pix(depth), plane_error * self.ray.depth_per_warped / depth)
         });
-        // An offset is at most as long in the warped grid as in the other, and crossed with the ray, each within some roundings. Along a
-        // wrong axis it is off by a share of the larger of the two.
+        // An offset is at most as long in the warped grid as in the other; its cross product with the ray is accurate to some roundings. Along a
+        // wrong axis it is off by a fraction of the larger of the two.
         let rho_error = (16.0 * F32 * pix + AXIS * pix.min(1.0)) * offset.length() + (pix_error + 4.0 * F32) * rho;
         let between = |rho: f64| kernel.section(rho.max(0.0).powi(2), t0, t1);
         let by = |error: f64| (between(rho - error) - between(rho)).max(between(rho) - between(rho + error));
         let whole = kernel.section(0.0, -radius, radius);
-        // Amounts, 1/λ and the amplitude, where the low-pass rule has any.
+        // The errors of amounts, 1/λ, and the low-pass amplitude where it differs from 1.
         let factor_error = between(rho) * (16.0 + 32.0 * pix) * F32;
         match form {
             FootprintForm::SummedArea => {
                 let nearest = if t0 * t1 < 0.0 { 0.0 } else { t0.abs().min(t1.abs()) - plane_error };
                 let planes = F32 * whole + plane_error * kernel.value(nearest.max(0.0));
-                // SPEC §4.
+                // The bound of SPEC §4.
                 1e-3 * between(0.0) + planes + by(rho_error) + factor_error
             }
             FootprintForm::Sections => {
                 let texel = section_extent(kernel, t0, t1) / f64::from(SECTION_SIZE - 1);
-                // A section falls off from its centre, so the cell's corners are between its values a diagonal away.
+                // A section falls off from its centre, so the values at a cell's corners lie between its values a diagonal away.
                 by(2.0_f64.sqrt() * texel + rho_error) + 8.0 * F32 * whole + factor_error
             }
         }
     }
 
-    /// Hands the section's amount at every pixel to `blend`, and what that may err by.
+    /// Calls `blend` with the section's amount and its error bound at every pixel.
     pub(crate) fn draw(&self, section: &Section, k: i32, mut blend: impl FnMut(usize, DVec4, f64)) {
         let form = self.seen.scene.splatting.footprint;
         let Seen { geometry, kernel, .. } = self.seen;

@@ -1,4 +1,4 @@
-//! Every GPU stage against its f64 twin in `sheetsplat::internals::reference`, one stage at a time, in float.
+//! Every GPU stage against its f64 evaluation in `sheetsplat::internals::reference`, one stage at a time, in float.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
@@ -23,7 +23,7 @@ mod values;
 use std::collections::BTreeMap;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::{Headless, readback};
+use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::internals::gpu::layout::{Cut, Frame, Indirect, QUADS, TileList};
 use sheetsplat::internals::gpu::targets::no_surfaces;
 use sheetsplat::internals::gpu::uniforms::{self, Ramps};
@@ -37,7 +37,7 @@ use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::util::DeviceExt;
 use sheetsplat::wgpu::{self, BindingResource, Buffer, BufferUsages, Device, TextureView};
 
-/// A frame, for stages that see nothing of the volume but it.
+/// A frame, for stages that use nothing else of the volume.
 fn frame(adjust: impl FnOnce(&mut Scene)) -> Frame {
     let mut scene = common::scene(64, 64);
     adjust(&mut scene);
@@ -61,7 +61,7 @@ fn frame_over(grid: &Grid, scene: &Scene) -> Frame {
     uniforms::frame(&view, &kernel, (grid, ValueFormat::Bits), &ramps, scene)
 }
 
-/// What cuts no ray.
+/// Buffers for the cut stage that cut nothing.
 struct Uncut {
     uniform: Buffer,
     surfaces: TextureView,
@@ -98,8 +98,8 @@ fn at_offsets<T: bytemuck::NoUninit>(device: &Device, uniforms: &[T]) -> (Buffer
     (init(device, &bytes, BufferUsages::UNIFORM), stride as u32)
 }
 
-/// What the shaders' `indirect` says of so many things: a quad each, 16 to an instance, and a workgroup each, at most 32768
-/// in a row.
+/// The arguments that the shaders' `indirect` gives for `count` items: one quad each, 16 per instance, and one workgroup each, at most
+/// 32768 in a row.
 fn indirect(count: u32) -> Indirect {
     Indirect {
         draw: [6 * u32::from(QUADS), count.div_ceil(u32::from(QUADS)), 0, 0, 0],
@@ -116,8 +116,8 @@ fn tile_list(device: &Device, tiles: &[u32]) -> Buffer {
     init(device, &bytes, BufferUsages::STORAGE | BufferUsages::INDIRECT)
 }
 
-/// The contents of a buffer that need not be made for copying: a shader copies it.
-fn contents<T: bytemuck::Pod>(gpu: &Headless, buffer: &Buffer) -> Vec<T> {
+/// The contents of a buffer without the usage for copying: a shader copies it.
+fn contents<T: bytemuck::Pod>(gpu: &GpuHeadless, buffer: &Buffer) -> Vec<T> {
     const COPY: &str = "
         @group(0) @binding(0) var<storage, read> source: array<u32>;
         @group(0) @binding(1) var<storage, read_write> result: array<u32>;
@@ -129,9 +129,9 @@ fn contents<T: bytemuck::Pod>(gpu: &Headless, buffer: &Buffer) -> Vec<T> {
     written(gpu, COPY, &[buffer.as_entire_binding()], buffer.size() / 4)
 }
 
-/// What the `main` of some WGSL writes into so many words, the binding after the last given one; its workgroups have 64 threads, at most
-/// 32768 of them in a row.
-fn written<T: bytemuck::Pod>(gpu: &Headless, source: &str, given: &[BindingResource<'_>], words: u64) -> Vec<T> {
+/// The words that the `main` of a WGSL source writes into the binding after the given ones; its workgroups have 64 threads, with at most 32768
+/// workgroups in a row.
+fn written<T: bytemuck::Pod>(gpu: &GpuHeadless, source: &str, given: &[BindingResource<'_>], words: u64) -> Vec<T> {
     let device = gpu.device();
     let result = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("written"),
@@ -169,7 +169,7 @@ fn written<T: bytemuck::Pod>(gpu: &Headless, source: &str, given: &[BindingResou
 }
 
 /// Submits a compute pass.
-fn compute(gpu: &Headless, record: impl FnOnce(&mut wgpu::ComputePass<'_>)) {
+fn compute(gpu: &GpuHeadless, record: impl FnOnce(&mut wgpu::ComputePass<'_>)) {
     let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     record(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
     gpu.queue().submit([encoder.finish()]);

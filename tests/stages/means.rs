@@ -1,9 +1,9 @@
-//! `shaders/composite.wgsl` with `shaders/shared/means.wgsl` against `reference::means` and `reference::composite`: random sheets, seen
-//! from anywhere, cut and uncut, some of them left out.
+//! `shaders/composite.wgsl` with `shaders/shared/means.wgsl` against `reference::means` and `reference::composite`: random sheets, from any
+//! view, with and without cuts, some of them left out.
 
 use bytemuck::Zeroable;
 use glam::{DVec3, DVec4, UVec3};
-use sheetsplat::headless::{Headless, readback};
+use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::internals::gpu::layout::SheetGroup;
 use sheetsplat::internals::gpu::targets::{CompositingBuffer, Targets};
 use sheetsplat::internals::gpu::uniforms;
@@ -22,13 +22,13 @@ use crate::common::{BY_MEANS, Random, SPACINGS, gpu, pixels, random_eye, scene};
 use crate::section::Seen;
 use crate::{Uncut, at_offsets, compute, contents, frame_over, init, tile_list};
 
-/// Sheets of a group.
+/// The number of sheets in a group.
 const LAYERS: u32 = 4;
 
-/// Groups before and behind the middle of the volume.
+/// The number of groups before and behind the middle of the volume.
 const REACH: i32 = 3;
 
-/// A view from anywhere, through planes that cut now and then.
+/// A view from anywhere, sometimes with planes that cut.
 fn random_view(random: &mut Random, compositing: Compositing) -> (Grid, Seen) {
     let dims = [(); 3].map(|()| random.uniform(1.0, 14.0) as u32);
     let grid = Grid { dims: UVec3::from(dims), spacing: random.pick(&SPACINGS).into() };
@@ -56,7 +56,7 @@ fn random_view(random: &mut Random, compositing: Compositing) -> (Grid, Seen) {
     (grid, seen)
 }
 
-/// A sheet's pixels, premultiplied: in most of them about as much as opacities of up to 1 per `unit` make of a slab.
+/// A sheet's premultiplied pixels, mostly with amounts like those of a slab with opacities of up to 1 per `unit`.
 fn random_sheet(random: &mut Random, seen: &Seen) -> Vec<[f32; 4]> {
     let most = seen.scene.splatting.slab_width * random.pick(&[0.4, 1.0, 1.3]);
     (0..seen.view.size[0] * seen.view.size[1])
@@ -68,9 +68,9 @@ fn random_sheet(random: &mut Random, seen: &Seen) -> Vec<[f32; 4]> {
         .collect()
 }
 
-/// Composites groups one after the other; of each its first slab, and the pixels of its sheets, nearest first.
+/// Composites groups one after the other, each given by its first slab and the pixels of its sheets, nearest first.
 fn composited(
-    gpu: &Headless,
+    gpu: &GpuHeadless,
     stage: &Composite,
     (grid, seen): (&Grid, &Seen),
     groups: &[(i32, Vec<[f32; 4]>)],
@@ -129,7 +129,7 @@ fn slabs(seen: &Seen) -> std::ops::Range<i32> {
     (group - REACH) * LAYERS as i32..(group + REACH) * LAYERS as i32
 }
 
-/// The same by the twin, where what is left out is a sheet without anything.
+/// The same by the f64 evaluation, in which a sheet that is left out is empty.
 fn expected(seen: &Seen, groups: &[(i32, Vec<[f32; 4]>)]) -> Buffer {
     let (compositing, order) = (seen.scene.splatting.compositing, seen.scene.splatting.order);
     let means = Means::new(&seen.geometry, compositing, None);
@@ -168,7 +168,7 @@ fn any_sheets_of_any_view() {
         let (mut compared, mut off, mut lit) = (0, 0, 0_usize);
         for case in 0..30 {
             let (grid, seen) = random_view(&mut random, compositing);
-            // What is empty is composited by `Minimum` alone.
+            // Only `Minimum` composites empty sheets.
             let leaves_out = compositing != Compositing::Minimum;
             let mut groups: Vec<(i32, Vec<[f32; 4]>)> = Vec::new();
             for slab in slabs(&seen).step_by(LAYERS as usize) {
@@ -185,13 +185,13 @@ fn any_sheets_of_any_view() {
             }
             let actual = composited(&gpu, &stage, (&grid, &seen), &groups);
             let expected = expected(&seen, &groups);
-            // What is kept of a surface that is not reached shows nothing.
+            // What is stored while no surface has been reached is not visible.
             let shown =
                 |pixel: &DVec4| if compositing == Compositing::Surface && pixel.w < 1.0 { DVec4::ZERO } else { *pixel };
             for (actual, expected) in actual.pixels.iter().map(shown).zip(expected.pixels.iter().map(shown)) {
                 compared += 1;
                 lit += usize::from(expected.w > 0.0 && expected != DVec4::W * 2.0);
-                // A few ULP of the ray's own numbers, and of sums that the length of a short ray divides.
+                // A few ULP of the ray's own numbers, and of sums that are divided by the length of a short ray.
                 let error = apart(actual, expected) / expected.abs().max_element().max(1.0);
                 off += u32::from(error > 2e-4);
             }
@@ -202,7 +202,7 @@ fn any_sheets_of_any_view() {
             );
         }
         println!("{compositing:?}: {off} of {compared} pixels are off, {lit} show something");
-        // Where a slab's middle, an opacity or a ray is on the edge, f32 may decide otherwise.
+        // Where a slab's middle, an opacity or a ray lies on an edge, f32 may decide differently.
         assert_at_most(f64::from(off) / f64::from(compared), 5e-5, format_args!("{compositing:?}: pixels"));
         assert!(lit > 5000, "{compositing:?}: only {lit} pixels show something");
     }

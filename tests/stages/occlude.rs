@@ -1,12 +1,12 @@
-//! `shaders/occlude.wgsl` against a plain evaluation: a pixel is occluded where all pixels on the image of the box that starts there are
-//! opaque. On bits, so exact.
+//! `shaders/occlude.wgsl` against a plain evaluation: a pixel is occluded if all pixels on the image in the box that starts there are
+//! opaque. Bits make this exact.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
 
 use bytemuck::Zeroable;
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::brick::BrickList;
 use sheetsplat::internals::gpu::layout::SheetGroup;
 use sheetsplat::internals::gpu::targets::Targets;
@@ -22,7 +22,7 @@ use sheetsplat::wgpu::{BufferUsages, TextureFormat};
 use crate::common::{Random, SPACINGS, gpu, random_eye, scene};
 use crate::{at_offsets, compute, contents, frame, init, tile_list};
 
-/// A bit per pixel of an image.
+/// One bit per pixel of an image.
 #[derive(Clone, PartialEq)]
 struct Mask {
     size: [u32; 2],
@@ -53,10 +53,10 @@ impl Mask {
         Self { size, bits: (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| bit(x, y))).collect() }
     }
 
-    /// The pixels that the whole box to the right and down, cut off at the image's borders, is set from.
+    /// The mask of pixels from which the whole box to the right and down, clipped at the image's borders, is set.
     fn eroded(&self, reach: [u32; 2]) -> Self {
         let [width, height] = self.size;
-        // Sums over rectangles, so that a box is four look-ups.
+        // With sums over rectangles, a box is four look-ups.
         let stride = width as usize + 1;
         let mut sums = vec![0; stride * (height as usize + 1)];
         for y in 0..height as usize {
@@ -75,7 +75,7 @@ impl Mask {
         Self { size: self.size, bits: (0..height).flat_map(|y| (0..width).map(move |x| is_set(x, y))).collect() }
     }
 
-    /// Mostly set, with clear rectangles and single clear pixels.
+    /// A mask that is mostly set, with clear rectangles and single clear pixels.
     fn random(random: &mut Random, size: [u32; 2]) -> Self {
         let mut mask = Self { size, bits: vec![true; (size[0] * size[1]) as usize] };
         for _ in 0..random.bits() % 5 {
@@ -85,7 +85,7 @@ impl Mask {
         mask
     }
 
-    /// Sets or clears a rectangle of sides up to `most`, anywhere.
+    /// Sets or clears a rectangle with sides of up to `most`, anywhere.
     fn fill(&mut self, random: &mut Random, most: f64, value: bool) {
         let corner = self.size.map(|side| random.uniform(0.0, f64::from(side)) as u32);
         let sides = [(); 2].map(|()| random.uniform(1.0, most + 1.0) as u32);
@@ -118,22 +118,22 @@ impl Mask {
 }
 
 struct Fixture<'a> {
-    gpu: &'a Headless,
+    gpu: &'a GpuHeadless,
     stage: &'a Occlude,
     reach: [u32; 2],
     targets: Targets,
 }
 
 impl Fixture<'_> {
-    /// Computes the listed tiles from a mask; what the occlusion buffer then holds.
+    /// Computes the listed tiles from a mask and returns the occlusion buffer.
     fn run(&self, mask: &Mask, tiles: &[u32]) -> Vec<u32> {
         let device = self.gpu.device();
         let frame = frame(|scene| (scene.image.width, scene.image.height) = mask.size.into());
         let frame = init(device, &[frame], BufferUsages::UNIFORM);
-        // Not at the first offset.
+        // The group is not at the first offset.
         let group = SheetGroup { box_filter: self.reach, ..SheetGroup::zeroed() };
         let (group, offset) = at_offsets(device, &[SheetGroup::zeroed(), group]);
-        // As the composite stage leaves it: off the image all is opaque.
+        // As the composite stage leaves it: off the image all pixels are opaque.
         self.gpu.queue().write_buffer(&self.targets.opaque, 0, bytemuck::cast_slice(&mask.words(true)));
         let tiles = tile_list(device, tiles);
         let groups = self.stage.bind(device, [&frame, &group], &tiles, &self.targets);
@@ -151,7 +151,7 @@ fn occluded_where_the_whole_box_is_opaque() {
     let sizes = [[1, 1], [33, 31], [70, 45], [32, 64], [157, 90], [200, 3], [5, 150]];
     for size in sizes.into_iter().cycle().take(90) {
         let most = [0.0, 8.0, 68.0, 140.0][random.bits() as usize % 4];
-        // A box is never wider than the image: `reach` is at most its size.
+        // A box is never wider than the image, because `reach` is at most its size.
         let reach = size.map(|side: u32| side.min(random.uniform(0.0, most + 1.0) as u32));
         let targets = Targets::new(gpu.device(), size, TextureFormat::Rgba32Float, 1).unwrap();
         let fixture = Fixture { gpu: &gpu, stage: &stage, reach, targets };
@@ -161,7 +161,7 @@ fn occluded_where_the_whole_box_is_opaque() {
         let expected = mask.eroded(reach);
         assert!(Mask::from_words(size, &words) == expected, "{size:?}, reach {reach:?}: all tiles");
 
-        // A few pixels more, and only the tiles that they can change.
+        // A few more pixels become opaque, and only the tiles that these can change are listed.
         let before = mask.clone();
         mask.fill(&mut random, 30.0, true);
         let tiles = mask.changed_tiles(&before, reach);
@@ -195,7 +195,7 @@ fn tiles_that_are_not_listed_stay() {
     assert!(fixture.run(&mask, &[]).contains(&0x0f0f_0f0f), "nothing listed, nothing done");
 }
 
-/// What a group's box has left in a tile where nothing changes serves the groups behind it, if none has a larger box.
+/// The result of a group's box in a tile where nothing changes stays valid for the groups behind it, if none has a larger box.
 #[test]
 fn boxes_shrink_on_the_way_back() {
     let mut random = Random(13);

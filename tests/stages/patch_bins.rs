@@ -1,5 +1,5 @@
 //! The tile rasterizer's bins against `reference::geometry`: every kernel's brick is in the bin of every tile and sheet group that the
-//! kernel reaches into.
+//! kernel reaches.
 
 use std::collections::BTreeSet;
 
@@ -24,7 +24,7 @@ struct Case {
 }
 
 impl Case {
-    /// With voxels that take no part.
+    /// Some voxels do not take part.
     fn new(random: &mut Random, spacing: [f64; 3], size: [u32; 2]) -> Self {
         let grid = Grid { dims: UVec3::new(15, 13, 18), spacing: spacing.into() };
         let count = grid.dims.element_product();
@@ -62,7 +62,7 @@ impl Case {
         )
     }
 
-    /// What the kernels need: group, tile, brick.
+    /// The entries that the kernels need: group, tile, brick.
     fn needed(&self) -> BTreeSet<(i32, [u32; 2], u32)> {
         let geometry = Geometry::new(&self.grid, &self.scene).unwrap();
         let kernel = self.kernel();
@@ -88,7 +88,7 @@ impl Case {
         needed
     }
 
-    /// What the bins hold.
+    /// The entries of the bins.
     fn held(&self, bins: &PatchBins) -> BTreeSet<(i32, [u32; 2], u32)> {
         let [columns, _] = patch_bins::grid([self.scene.image.width, self.scene.image.height]);
         let first_group = bins.first_slab.div_euclid(SHEETS as i32);
@@ -112,7 +112,7 @@ impl Case {
 #[test]
 fn every_kernel_is_in_the_bins_that_it_reaches_into() {
     let mut random = Random(51);
-    // Needed and held, of views without and with an eye.
+    // The numbers of entries needed and held, without and with an eye.
     let mut all = [[0, 0]; 2];
     for spacing in [[1.0, 1.0, 1.0], [1.0, 1.0, 5.0], [3.2, 3.2, 1.5]] {
         for size in [[64, 48], [33, 17], [7, 90], [1, 1]].into_iter().cycle().take(12) {
@@ -126,12 +126,12 @@ fn every_kernel_is_in_the_bins_that_it_reaches_into() {
             *of = [of[0] + needed.len(), of[1] + held.len()];
         }
     }
-    // Bricks are boxes around their voxels, and footprints have one box in all of a group.
+    // Bricks are boxes around their voxels, and all footprints in a group have the same box.
     let [without, with] = all.map(|[needed, held]| held as f64 / needed as f64);
     assert!(without < 1.6 && with < 3.0, "{without} and {with} times as much as needed");
 }
 
-/// As many dispatches as what is behind two pixels may take, and hardly more.
+/// The number of dispatches suffices for what lies behind two pixels, and is hardly larger.
 #[test]
 fn dispatches_are_enough() {
     let mut random = Random(52);
@@ -151,7 +151,7 @@ fn dispatches_are_enough() {
 }
 
 #[test]
-fn what_does_not_fit_is_named() {
+fn quantities_that_exceed_the_capacity_are_named() {
     let mut random = Random(53);
     let mut case = Case::new(&mut random, [1.0; 3], [64, 48]);
     case.scene.camera = camera([0.3, 0.9, -0.2], 30.0);
@@ -163,7 +163,7 @@ fn what_does_not_fit_is_named() {
     assert_eq!(case.bins(entries - 1), unfit("bricks in patches and sheet groups", entries, entries - 1));
     assert_eq!(case.bins(starts - 1), unfit("patches times sheet groups", starts - 1, starts - 2));
 
-    // 2744 bricks behind two pixels, in four sheets.
+    // 2744 bricks are behind two pixels, in four sheets.
     case.grid.dims = UVec3::splat(56);
     case.bricks = BrickList::new(&case.grid, &(0..56 * 56 * 56).collect::<Vec<_>>());
     (case.scene.image.width, case.scene.image.height) = (2, 2);

@@ -1,5 +1,4 @@
-//! The frame plan against `reference::geometry`: every kernel's brick is in the range of every sheet group that the kernel
-//! reaches into.
+//! The frame plan against `reference::geometry`: every kernel's brick is in the range of every sheet group that the kernel reaches.
 
 use glam::{DVec3, UVec3};
 use sheetsplat::internals::brick::{self, BrickList};
@@ -16,7 +15,7 @@ fn every_kernel_is_looked_at_by_every_group_that_it_reaches_into() {
     let mut random = Random(23);
     for spacing in [[1.0, 1.0, 1.0], [1.0, 1.0, 5.0], [3.2, 3.2, 1.5]] {
         let grid = Grid { dims: UVec3::new(19, 18, 17), spacing: DVec3::from(spacing) };
-        // Two lists, and voxels that take no part.
+        // There are two lists, and voxels that do not take part.
         let taking_part = (0..grid.dims.element_product()).filter(|_| random.uniform(0.0, 1.0) < 0.7);
         let voxels: Vec<u32> = taking_part.collect();
         let lists = [&voxels[..1000], &voxels[1000..]].map(|list| BrickList::new(&grid, list));
@@ -72,7 +71,7 @@ fn bricks_hold_every_voxel_once_within_their_box() {
     assert_holds(&list, &voxels);
     assert!(list.bricks().is_sorted_by_key(brick::position));
 
-    // Others in their place, some of them in bricks that held none.
+    // Other voxels replace them, some in bricks that were empty.
     let others: Vec<u32> = (0..count).filter(|_| random.uniform(0.0, 1.0) < 0.1).collect();
     let few = BrickList::new(&grid, &others);
     let mut few_then_all = few.clone();
@@ -96,7 +95,7 @@ fn assert_holds(list: &BrickList, voxels: &[u32]) {
         let low = UVec3::new(brick.x, brick.y, brick.z);
         let high = low + UVec3::new(brick.extent & 0xff, (brick.extent >> 8) & 0xff, brick.extent >> 16);
         let places: Vec<UVec3> = brick::voxels(brick).map(|(_, voxel)| voxel).collect();
-        // Tight: some voxel touches every side, and none lies beyond.
+        // The box is tight: some voxel touches every side, and none lies outside.
         if !places.is_empty() {
             assert_eq!(places.iter().copied().reduce(UVec3::min), Some(low));
             assert_eq!(places.iter().copied().reduce(UVec3::max), Some(high));

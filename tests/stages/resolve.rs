@@ -2,7 +2,7 @@
 
 use glam::{DVec3, DVec4};
 use sheetsplat::Placement;
-use sheetsplat::headless::{Headless, readback};
+use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::internals::gpu::{layout, targets::CompositingBuffer};
 use sheetsplat::internals::pass::resolve::Resolve;
 use sheetsplat::internals::reference::Buffer;
@@ -18,7 +18,7 @@ use crate::{frame, init};
 const BACKGROUNDS: [[f64; 4]; 5] =
     [[0.0, 0.0, 0.0, 1.0], [0.2, 0.9, 0.4, 1.0], [0.7, 0.5, 0.3, 0.0], [0.1, 1.0, 0.6, 0.5], [1.0, 1.0, 1.0, 1.0]];
 
-fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
+fn check(gpu: &GpuHeadless, size: [u32; 2], bands: usize) {
     let (device, queue) = (gpu.device(), gpu.queue());
     let options = RendererOptions::for_target(TextureFormat::Rgba32Float).with_blend(Blend::Replace);
     let stage = Resolve::new(device, &options);
@@ -39,10 +39,10 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
     let view = target.create_view(&wgpu::TextureViewDescriptor::default());
     for compositing in COMPOSITINGS {
         for background in BACKGROUNDS {
-            // Sums pass 1; the others cannot. Some pixels are empty, some opaque.
+            // Sums exceed 1; the other modes cannot. Some pixels are empty, some opaque.
             let most = match compositing {
                 Compositing::Xray | Compositing::Average => 3.0,
-                // Two less the opacity.
+                // Two minus the opacity.
                 Compositing::Minimum => 2.0,
                 _ => 1.0,
             };
@@ -86,7 +86,7 @@ fn check(gpu: &Headless, size: [u32; 2], bands: usize) {
             let expected = resolve(&acc, compositing, background);
             assert_eq!(actual.len(), expected.pixels.len());
             for (i, (actual, expected)) in actual.iter().zip(&expected.pixels).enumerate() {
-                // The background's product, one minus alpha, a product and a sum of numbers up to 1: a rounding each.
+                // One rounding each for the background's product, one minus alpha, a product, and a sum of numbers up to 1.
                 let over = format_args!("{compositing:?} {background:?} pixel {i}: acc {}", acc.pixels[i]);
                 assert_at_most(apart(*actual, *expected), 4.0 * F32, format_args!("{over}: {actual}, not {expected}"));
             }
@@ -101,6 +101,6 @@ fn over_every_kind_of_background() {
 
 #[test]
 fn several_bands() {
-    // Rows of 61 pixels: 33 of them fit a binding, and a band is whole tiles.
+    // Rows have 61 pixels: 33 of them fit a binding, and a band consists of whole tiles.
     check(&gpu_with_small_bindings(32768), [61, 137], 5);
 }

@@ -36,7 +36,7 @@ fn kernels_one_by_one() {
             let frame = init(device, &[frame_over(&grid, &scene)], BufferUsages::UNIFORM);
             let seen = Seen::new(&grid, scene);
             let kernels: Vec<_> = (0..COUNT).map(|_| KernelInView::random(&seen, &mut random)).collect();
-            // Some of them, in another order than they lie in.
+            // Some of the kernels, in another order than in memory.
             let order: Vec<u32> = (0..COUNT).rev().filter(|_| !random.bits().is_multiple_of(8)).collect();
 
             let view = &seen.view;
@@ -77,13 +77,13 @@ fn kernels_one_by_one() {
             for kernel in order.iter().map(|&at| &kernels[at as usize]) {
                 let Some(section) = kernel.section(0) else { continue };
                 let section = if form == FootprintForm::Sections { kernel.stored(section, 0) } else { Some(section) };
-                // A kernel whose slab is whole has the first of the stored sections, whatever f32 does.
+                // A kernel whose slab is whole uses the first of the stored sections, whatever f32 does.
                 let section = section.unwrap();
                 kernel.draw(&section, 0, |pixel, amount, error| {
                     let (acc, tolerance) = &mut expected[pixel];
                     composite_pixel(acc, amount, compositing, Order::BackToFront);
-                    // A kernel's error counts in its own amount, in what that is divided by, and in what it leaves of those behind it. Then
-                    // a few roundings of numbers up to what is there by now, and exp, which errs by up to (3 + 2a) ULP.
+                    // A kernel's error affects its own amount, the division by that, and what it leaves visible of those behind it. Added
+                    // to this are a few roundings of numbers up to the current maximum, and exp, which errs by up to (3 + 2a) ULP.
                     let most = acc.max_element().max(1.0);
                     *tolerance += if amount.w > 0.0 { 3.0 * error + 16.0 * F32 * most } else { error };
                 });
@@ -91,7 +91,7 @@ fn kernels_one_by_one() {
             for (pixel, (actual, (expected, tolerance))) in drawn.iter().zip(&expected).enumerate() {
                 let error = apart(*actual, *expected);
                 let what = format_args!("pixel {pixel}: {actual}, not {expected}, {:?}", seen.scene);
-                // The kernels' errors have either sign: together they come to far less than all their bounds.
+                // The kernels' errors have either sign, so their sum is far below the sum of the bounds.
                 assert_at_most(error, 0.2 * tolerance, what);
                 worst = worst.max(error / tolerance.max(1e-300));
                 lit += usize::from(expected.w > 0.0);

@@ -1,4 +1,4 @@
-//! Kernel sections as the twin sees them, and what the stages that draw them may err by.
+//! Kernel sections by the f64 evaluation, and the error bounds of the stages that draw them.
 
 use std::ops::Range;
 
@@ -15,17 +15,17 @@ use crate::common::{F32, camera, scene};
 
 /// `(C·m, m)` of the splats that are drawn.
 pub(crate) const AMOUNT: DVec4 = DVec4::new(1.0, 0.5, 0.25, 1.0);
-/// The same as f16: what a record holds, which the stages that draw multiply by the amplitude over λ.
+/// The same as f16, as in a record, which the drawing stages multiply by the amplitude divided by λ.
 pub(crate) const AMOUNT_RG: u32 = 0x3800_3c00;
 /// See [`AMOUNT_RG`].
 pub(crate) const AMOUNT_BA: u32 = 0x3c00_3400;
 
-/// Radius and falloff.
+/// Radii and falloffs.
 pub(crate) const KERNELS: [(f64, f64); 9] =
     [(2.0, 2.0), (1.4, 2.0), (1.0, 2.0), (4.0, 2.0), (1.0, 0.1), (4.0, 0.1), (3.0, 0.5), (2.0, 16.0), (4.0, 16.0)];
 
-/// Direction, spacing, and `unit`s per pixel: head-on and oblique, sheared footprints, magnified and minified, and one
-/// that is minified along one singular direction only.
+/// Direction, spacing, and `unit`s per pixel: head-on and oblique, with sheared footprints, magnified, minified, and minified along only
+/// one singular direction.
 pub(crate) const VIEWS: [([f64; 3], [f64; 3], f64); 8] = [
     ([0.0, 1.0, 0.0], [1.0, 1.0, 1.0], 0.25),
     ([0.3, 0.9, -0.2], [1.0, 1.0, 1.0], 0.6),
@@ -37,7 +37,7 @@ pub(crate) const VIEWS: [([f64; 3], [f64; 3], f64); 8] = [
     ([0.2, 0.1, 0.9], [1.0, 3.0, 1.0], 30.0),
 ];
 
-/// The view with slabs `width` wide in the warped grid, where the footprint tables live.
+/// The view with slabs of `width` in the warped grid, in which the footprint tables are defined.
 pub(crate) fn view_scene(
     view: ([f64; 3], [f64; 3], f64),
     kernel: (f64, f64),
@@ -75,7 +75,7 @@ impl Seen {
         }
     }
 
-    /// The twin's sheet buffer of one slab.
+    /// The f64 sheet buffer of one slab.
     pub(crate) fn twin(&self, splats: &[reference::Splat], slab: i32) -> Vec<DVec4> {
         reference::splat::sheet(splats, slab, &self.geometry, &self.kernel).pixels
     }
@@ -85,25 +85,25 @@ impl Seen {
         self.view.slabs.touched(splat.depth - self.kernel.radius(), splat.depth + self.kernel.radius())
     }
 
-    /// The low-pass rule's amplitude over λ.
+    /// The low-pass amplitude divided by λ.
     pub(crate) fn amplitude(&self) -> f64 {
         self.geometry.amplitude / self.geometry.lambda
     }
 
-    /// Depths of a slab's planes, seen from a splat.
+    /// The depths of a slab's planes relative to a splat.
     pub(crate) fn planes(&self, splat: &reference::Splat, slab: i32) -> (f64, f64) {
         let t0 = f64::from(slab) * self.view.slabs.width - splat.depth;
         (t0, t0 + self.view.slabs.width)
     }
 
-    /// The whole footprint's peak, per unit of a splat's amount.
+    /// The peak of the whole footprint, per unit of a splat's amount.
     pub(crate) fn whole(&self) -> f64 {
         self.kernel.section(0.0, -self.kernel.radius(), self.kernel.radius())
     }
 
-    /// What the summed-area form may err by in a section (SPEC §4): a thousandth of its peak. Nothing can hold it better
-    /// than an f32 that also holds whole footprints. And the slab's planes come in f32, seen from a depth in f32: worth their
-    /// share of the kernel's value there. Planes are counted from that of slab `first`.
+    /// The error bound of the summed-area form in a section (SPEC §4): a thousandth of its peak, but no less than the precision of an f32
+    /// that also holds whole footprints. In addition the slab's planes and the splat's depth are rounded to f32, which contributes in
+    /// proportion to the kernel's value there. Planes are counted from that of slab `first`.
     pub(crate) fn summed_area_tolerance(&self, splat: &reference::Splat, first: i32, k: i32) -> f64 {
         let (t0, t1) = self.planes(splat, k);
         let plane_error = self.plane_error(splat, first, k);
@@ -111,22 +111,22 @@ impl Seen {
         1e-3 * self.kernel.section(0.0, t0, t1) + F32 * self.whole() + plane_error * self.kernel.value(nearest.max(0.0))
     }
 
-    /// What f32 may move a slab's planes by, seen from a splat: the group's first plane, the slab's width and its multiple are
-    /// rounded, and so are their differences from the depth and sums, which no number before them exceeds.
+    /// The f32 error of a slab's planes relative to a splat: the group's first plane, the slab's width and its multiple are rounded, and so
+    /// are their sums and differences from the depth, none of which exceeds these numbers.
     fn plane_error(&self, splat: &reference::Splat, first: i32, k: i32) -> f64 {
         let width = self.view.slabs.width;
         let plane = f64::from(first).abs() * width;
         4.0 * F32 * (plane.max((f64::from(first) * width - splat.depth).abs()) + f64::from(k - first + 1) * width)
     }
 
-    /// Distance of a pixel's centre from a splat, in footprint coordinates.
+    /// The distance of a pixel's centre from a splat, in footprint coordinates.
     pub(crate) fn rho(&self, splat: &reference::Splat, pixel: usize) -> f64 {
         let width = self.scene.image.width as usize;
         let center = DVec2::new((pixel % width) as f64, (pixel / width) as f64) + 0.5;
         (self.geometry.footprint_from_pixels * (center - splat.center)).length()
     }
 
-    /// `tolerance` is that of a kernel of amount 1, before the amplitude.
+    /// `tolerance` is for a kernel of amount 1, before the amplitude.
     #[track_caller]
     pub(crate) fn assert_close(
         &self,

@@ -1,10 +1,10 @@
-//! The records that `shaders/shade.wgsl` writes, projection and shading, against `reference::shading`: those of a whole
-//! frame, decoded. Which voxels it draws is `cull.rs`'s.
+//! The records that `shaders/shade.wgsl` writes (projection and shading) for a whole frame, decoded, against `reference::shading`.
+//! `cull.rs` tests which voxels are drawn.
 
 use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3, DVec4, UVec3};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::ClippedVoxels;
 use sheetsplat::internals::brick;
 use sheetsplat::internals::classify::classify;
@@ -23,7 +23,7 @@ use crate::common::compare::assert_at_most;
 use crate::common::{BY_AMOUNTS, F16, F32, Random, SPACINGS, camera, gpu, random_eye, scene, transfer};
 use crate::cull::Culling;
 
-/// Values of a volume with noise everywhere, so that gradients point anywhere.
+/// Values of a volume with noise everywhere, so that gradients have all directions.
 fn noise(dims: UVec3, spacing: DVec3) -> Volume {
     let mut random = Random(1);
     let values = (0..dims.element_product()).map(|_| random.uniform(0.0, 255.0) as f32).collect();
@@ -41,16 +41,16 @@ fn oblique() -> Scene {
     Scene { camera: camera([0.3, 0.9, -0.2], 40.0), transfer: skin(), ..scene(64, 48) }
 }
 
-/// What f32 arithmetic may change in a ramp's value: the control points and the position are rounded, and subtracted, in
-/// the segment's own units; ordinates, share and mix are a handful of roundings of numbers up to 1.
+/// The f32 error of a ramp's value: the control points and the position are rounded and subtracted, in the segment's own units; ordinates,
+/// fraction and mix add a few roundings of numbers up to 1.
 fn ramp_error<T: Copy>(points: &[(f64, T)], difference: impl Fn(T, T) -> f64, at: f64) -> f64 {
     let steepest = points.windows(2).map(|pair| difference(pair[1].1, pair[0].1) / (pair[1].0 - pair[0].0));
     let positions = points.iter().fold(at.abs(), |most, point| most.max(point.0.abs()));
     F32 * (8.0 + 4.0 * positions * steepest.fold(0.0, f64::max))
 }
 
-/// What the GPU's record of a voxel may differ by, from the precisions of its number formats and functions alone, and from what f32 may
-/// turn its ray by.
+/// The error bound of the GPU's record of a voxel, from the precisions of its number formats and functions, and from the f32 error of its ray's
+/// direction.
 fn tolerance(
     volume: &Volume,
     index: u32,
@@ -67,20 +67,19 @@ fn tolerance(
     let factor_error = tables.gradient_opacity.map_or(0.0, |ramp| ramp_error(ramp.points(), scalar, magnitude));
     let alpha_error = ramp_error(tables.opacity.points(), scalar, value) + factor_error + F32;
 
-    // -ln(1 - α): WGSL's log is good to 2⁻²¹ for arguments in [0.5, 2] and to 3 ULP beyond.
+    // -ln(1 - α): WGSL's log is accurate to 2⁻²¹ for arguments in [0.5, 2] and to 3 ULP beyond.
     let m = shading::amount(scene.splatting.compositing, alpha);
     let m_error = match scene.splatting.compositing {
         Compositing::Exponential => alpha_error / (1.0 - alpha.min(0.9999)) + 2.0_f64.powi(-21) + 8.0 * F32 * m,
         _ => alpha_error,
     };
 
-    // A gradient's components are rounded three times and divided twice; of the square root's sum of squares half the error
-    // counts.
+    // A gradient's components are rounded three times and divided twice; the square root halves the relative error of the sum of squares.
     let normal_error = 16.0 * F32 + ray_error;
     let Shading { ambient, diffuse, specular, shininess, .. } = scene.shading;
     let color_error = ramp_error(tables.color.points(), |a: DVec3, b| (a - b).abs().max_element(), value);
-    // pow is exp2(y·log2(x)): log2 to 2⁻²¹, times y; exp2 to 3 ULP and more where its result is small. A cosine's power
-    // is steep at 0 where the exponent is below 1, at 1 where it is above.
+    // pow is exp2(y·log2(x)): log2 to 2⁻²¹, times y; exp2 to 3 ULP, and more where its result is small. A cosine's power is steep at 0 if
+    // the exponent is below 1, and at 1 if it is above.
     let (cosine, stretch) = highlight_cosine(volume, index, scene, geometry);
     let half_error = 16.0 * F32 + ray_error * stretch;
     let steepest = [cosine - half_error, cosine + half_error]
@@ -94,7 +93,7 @@ fn tolerance(
     before_f16 + amount * F16 + 2.0_f64.powi(-25)
 }
 
-/// `|n·hv|` of SPEC §3, and by how much normalising `l + c` makes errors of its terms larger.
+/// `|n·hv|` of SPEC §3, and the factor by which normalising `l + c` enlarges the errors of its terms.
 fn highlight_cosine(volume: &Volume, index: u32, scene: &Scene, geometry: &Geometry) -> (f64, f64) {
     let voxel = volume.grid().voxel_at(index);
     let to_eye = -geometry.ray(voxel);
@@ -108,27 +107,27 @@ fn highlight_cosine(volume: &Volume, index: u32, scene: &Scene, geometry: &Geome
     (normal.dot(sum.normalize_or_zero()).abs(), 2.0 / sum.length().max(1e-6))
 }
 
-/// What f32 may move a voxel's pixel coordinates, sheet depth and depth from the eye by.
+/// The f32 errors of a voxel's pixel coordinates, sheet depth and depth from the eye.
 pub(crate) fn place_error(view: &ViewGeometry, voxel: UVec3, center: DVec2) -> DVec4 {
-    // A dot product of four: every term has a rounded coefficient and product and passes up to three sums; one more for the
-    // twin's own way to the same number.
+    // A dot product of four: every term has a rounded coefficient and product and passes up to three sums; the f64 evaluation's different
+    // formula adds one more rounding.
     let p = voxel.as_dvec3().extend(1.0);
     let [x, y, depth, from_eye] = view.screen_from_voxel.map(|row| 6.0 * F32 * (row * p).abs().element_sum());
-    // Pixels are a quotient, which WGSL's division is good to 2.5 ULP of, from the image's middle, which is added.
+    // Pixel coordinates are a quotient, accurate to WGSL's 2.5 ULP, added to the image's middle.
     let w = view.screen_from_voxel[3].dot(p);
     let from_middle = center - DVec2::from(view.size.map(f64::from)) / 2.0;
     let quotient = (DVec2::new(x, y) + from_middle.abs() * from_eye) / w + 5.0 * F32 * from_middle.abs();
     (quotient + F32 * center.abs()).extend(depth).extend(from_eye)
 }
 
-/// Culls a frame, group by group, and compares the splat record of every voxel on the screen with the twin's.
+/// Culls a frame, group by group, and compares the splat record of every voxel on the screen with the f64 evaluation.
 fn check(name: &str, volume: &Volume, scene: &Scene) {
     let shaded = shaded(&gpu(), name, volume, scene);
     assert!(shaded > 50, "{name}: {shaded} voxels");
 }
 
-/// The same; how many voxels were shaded.
-fn shaded(gpu: &Headless, name: &str, volume: &Volume, scene: &Scene) -> usize {
+/// Like [`check`]; returns the number of shaded voxels.
+fn shaded(gpu: &GpuHeadless, name: &str, volume: &Volume, scene: &Scene) -> usize {
     let transfer = scene.transfer.resolve(volume);
     let mut scene = scene.clone();
     scene.splatting.culling = false;
@@ -151,7 +150,7 @@ fn shaded(gpu: &Headless, name: &str, volume: &Volume, scene: &Scene) -> usize {
     assert_eq!(held, voxels.len(), "{name}: bricks hold every voxel");
     let is_beyond_near = |index: &&u32| geometry.is_beyond_near(volume.grid().voxel_at(**index));
     assert_eq!(voxels.iter().filter(is_beyond_near).count(), twins.len(), "{name}: which voxels take part");
-    // Whose footprint's box holds a pixel's centre is on the screen; f32 may differ about those that barely do.
+    // A voxel is on the screen if its footprint's box contains a pixel's centre; f32 may differ where it barely does.
     let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
     let inside = |index: u32| {
         let Some(&twin) = twins.get(&index) else { return f64::NEG_INFINITY };
@@ -172,7 +171,7 @@ fn shaded(gpu: &Headless, name: &str, volume: &Volume, scene: &Scene) -> usize {
             let id = (at as u32 * brick::BRICK_VOXELS + slot) as usize;
             let (inside, is_shaded) = (inside(culling.indices[id]), of_brick >> slot & 1 == 1);
             assert!(inside.abs() < 1e-3 || is_shaded == (inside > 0.0), "{name}: {id} is {inside} px on the screen");
-            // In perspective boxes shrink: what was shaded is hidden when nothing of it is left on the screen.
+            // In perspective boxes shrink: a shaded voxel is hidden once nothing of it is left on the screen.
             let is_one = is_shaded != (hidden >> slot & 1 == 1);
             assert!(geometry.eye.is_some() || is_one, "{name}: {id} is shaded or hidden");
             if is_shaded {
@@ -199,9 +198,9 @@ fn shaded(gpu: &Headless, name: &str, volume: &Volume, scene: &Scene) -> usize {
         }
 
         let actual = decode(record);
-        // The records leave what depends on the ray and on the section to the splat stage.
+        // The records leave factors that depend on the ray and on the section to the splat stage.
         let expected = twin.amount / geometry.scale(voxel);
-        // The GPU takes the ray from where the voxel is on the screen.
+        // The GPU computes the ray from the voxel's position on the screen.
         let ray_error =
             geometry.eye.map_or(0.0, |eye| place_error.x.hypot(place_error.y) * eye.pixel_per_depth + 16.0 * F32);
         let tolerance = tolerance(volume, index, &transfer, (scene, &geometry), ray_error, expected);
@@ -304,7 +303,7 @@ fn any_eye_and_slices() {
     assert!(all > 3000, "only {all} voxels were shaded");
 }
 
-/// Borders on all sides, and axes along which there is no neighbour.
+/// There are borders on all sides, and axes without neighbours.
 #[test]
 fn flat_and_narrow() {
     for (dims, direction) in
@@ -316,7 +315,7 @@ fn flat_and_narrow() {
     }
 }
 
-/// Values whose differences, and gradients whose squares, `f32` cannot hold; spacings that it cannot hold.
+/// Values whose differences, and gradients whose squares, exceed `f32`; and spacings that do.
 #[test]
 fn extreme_values_and_spacings() {
     let extremes =
@@ -324,7 +323,7 @@ fn extreme_values_and_spacings() {
     for (value, spacing) in extremes {
         let spacing = spacing * DVec3::new(1.0, 1.5, 1.2);
         let mut random = Random(3);
-        // Of both signs: differences of twice as much.
+        // Values have both signs, so differences are up to twice as large.
         let values = (0..DIMS.element_product()).map(|_| (value * random.uniform(-300.0, 300.0)) as f32).collect();
         let volume = Volume::new("extreme", DIMS, spacing, values).unwrap();
         let mut scene = Scene {
@@ -337,7 +336,7 @@ fn extreme_values_and_spacings() {
         };
         let name = format!("values {value:e}, spacing {spacing:?}");
         check(&name, &volume, &scene);
-        // Where f32 can hold the gradients, their opacity, too.
+        // Where f32 can represent the gradients, their opacity is tested, too.
         let gradient = 300.0 * value / spacing.min_element();
         if (1e-11..1e37).contains(&gradient) {
             let points = vec![(0.1 * gradient, 0.2), (0.5 * gradient, 0.9), (0.8 * gradient, 0.4)];
@@ -347,12 +346,11 @@ fn extreme_values_and_spacings() {
     }
 }
 
-/// More values than a layer of their texture holds: neighbours along every axis are in different layers, and the last row is not
-/// full.
+/// The volume has more values than a layer of its texture: neighbours along every axis are in different layers, and the last row is not full.
 #[test]
 fn values_in_several_layers() {
     let dims = UVec3::new(2049, 1100, 2);
-    // Around value 2048², which is at (1, 947, 1), and around the last one: who takes part there, and with which values.
+    // Around value 2048², which is at (1, 947, 1), and around the last one: the voxels that take part there, and their values.
     let places = [(0..32, 940..956, [20.0, 120.0]), (2021..2049, 1086..1100, [140.0, 255.0])];
     let mut random = Random(12);
     let values = (0..dims.element_product())
@@ -381,7 +379,7 @@ fn gradient_opacity_and_iso_ranges() {
     check("gradient opacity", &noise(DIMS, DVec3::new(1.0, 2.0, 1.5)), &scene);
 }
 
-/// Beside holes, scattered and in a block, and between holes on all sides; orthographic and through an eye.
+/// Voxels beside scattered holes and blocks of holes, and between holes on all sides; orthographic and in perspective.
 #[test]
 fn gradients_beside_holes() {
     let whole = noise(DIMS, DVec3::new(1.0, 2.0, 1.5));
@@ -438,7 +436,7 @@ fn many_control_points_and_values_exactly_on_them() {
     check("one control point", &volume, &scene);
 }
 
-/// Labels with tables of their own, complete and not, and some that only hide; those after the last table go by the main one.
+/// Labels with complete and partial tables of their own, and some that only hide; labels after the last table use the main one.
 #[test]
 fn labels_have_their_own_tables() {
     let labelled = |labels: &[u16]| {

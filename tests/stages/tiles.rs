@@ -1,7 +1,7 @@
 //! `shaders/tiles.wgsl` against a plain evaluation of its rules: exact lists, arguments and counts.
 
 use bytemuck::Zeroable;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::gpu::layout::{Frame, Indirect, SheetGroup, Tally};
 use sheetsplat::internals::gpu::targets::Targets;
 use sheetsplat::internals::pass::tiles::Tiles;
@@ -11,23 +11,23 @@ use sheetsplat::wgpu::{BufferUsages, TextureFormat};
 use crate::common::{Random, gpu};
 use crate::{at_offsets, compute, contents, frame, indirect, init};
 
-/// What the stage reads.
+/// The stage's input.
 #[derive(Debug)]
 struct Case {
     size: [u32; 2],
     reach: [u32; 2],
     culling: bool,
     tiles: bool,
-    /// By tile: whether it received splats.
+    /// Whether each tile received splats.
     touched: Vec<bool>,
-    /// By tile: whether all its pixels are opaque.
+    /// Whether each tile's pixels are all opaque.
     opaque: Vec<bool>,
 }
 
 impl Case {
     fn random(random: &mut Random, size: [u32; 2], reach: [u32; 2]) -> Self {
         let [columns, rows] = tile_grid(size);
-        // Few, many or all of them.
+        // Few, many or all of the tiles.
         let mut flags = || {
             let share = [0.0, 0.02, 0.5, 0.95, 1.0][random.bits() as usize % 5];
             (0..columns * rows).map(|_| random.uniform(0.0, 1.0) < share).collect()
@@ -59,7 +59,7 @@ impl Case {
         let columns = tile_grid(self.size)[0];
         let composited = self.composited();
         let reaches = |a: u32, b: u32, reach: u32| {
-            // Of the nearest pixels of two tiles along an axis, one beside the other.
+            // The nearest pixels of two tiles along an axis are adjacent if the tiles are.
             a == b || b > a && (b - a - 1) * TILE < reach
         };
         (0..self.touched.len() as u32)
@@ -72,7 +72,7 @@ impl Case {
             .collect()
     }
 
-    fn check(&self, gpu: &Headless, stage: &Tiles, group: u32) {
+    fn check(&self, gpu: &GpuHeadless, stage: &Tiles, group: u32) {
         const GROUPS: u32 = 5;
         let device = gpu.device();
         let targets = Targets::new(device, self.size, TextureFormat::Rgba32Float, 1).unwrap();
@@ -120,7 +120,7 @@ fn lists_are_those_of_the_rules() {
     let gpu = gpu();
     let stage = Tiles::new(gpu.device());
     let mut random = Random(4);
-    // From one tile to more than a workgroup's threads.
+    // From one tile to more tiles than a workgroup has threads.
     let sizes = [[1, 1], [32, 32], [33, 64], [700, 500], [2000, 20], [9, 1000], [1024, 1024]];
     let reaches = [[0, 0], [1, 0], [32, 31], [33, 64], [5, 70], [200, 1]];
     let mut lengths = [0; 2];
@@ -138,7 +138,7 @@ fn lists_are_those_of_the_rules() {
     assert!(lengths[0] > 1000 && lengths[1] > lengths[0], "{lengths:?}");
 }
 
-/// One tile in the middle: the occlusion buffer changes as far around it as the box reaches, counted in tiles.
+/// One tile in the middle: the occlusion buffer changes as far around it as the box reaches, in whole tiles.
 #[test]
 fn margins_are_the_reach_in_whole_tiles() {
     let gpu = gpu();

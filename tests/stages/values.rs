@@ -1,7 +1,7 @@
-//! What stages see of a volume's values, `shaders/shared/volume.wgsl`: each to its last bit, however they are stored.
+//! A volume's values as stages read them (`shaders/shared/volume.wgsl`): each is exact to the last bit, in any format.
 
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::gpu::layout::Frame;
 use sheetsplat::internals::gpu::uniforms::{self, Ramps};
 use sheetsplat::internals::gpu::volume_texture::{SIDES, ValueFormat, VolumeTexture};
@@ -13,7 +13,7 @@ use sheetsplat::wgpu::{BindingResource, BufferUsages};
 use crate::common::{Random, gpu, scene, transfer};
 use crate::{init, written};
 
-/// The bits of a value for every word of the result.
+/// A shader that writes the bits of a value into every word of the result.
 const READ: &str = concat!(
     include_str!("../../shaders/shared/frame.wgsl"),
     include_str!("../../shaders/shared/volume.wgsl"),
@@ -28,7 +28,7 @@ const READ: &str = concat!(
     }"
 );
 
-/// A frame, of which the shader reads how values are stored.
+/// A frame with the format of values for the shader.
 fn frame(values: ValueFormat) -> Frame {
     let mut scene = scene(8, 8);
     scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 1.0)]);
@@ -39,13 +39,13 @@ fn frame(values: ValueFormat) -> Frame {
     uniforms::frame(&view, &kernel, (volume.grid(), values), &ramps, &scene)
 }
 
-/// Uploads values in layers of such a side and lets a shader read them.
-fn seen(gpu: &Headless, values: &[f32], side: u32) -> Vec<f32> {
+/// Uploads values in layers of this side and lets a shader read them.
+fn seen(gpu: &GpuHeadless, values: &[f32], side: u32) -> Vec<f32> {
     seen_by(gpu, READ, values, side)
 }
 
-/// The same with a shader of such a source.
-fn seen_by(gpu: &Headless, source: &str, values: &[f32], side: u32) -> Vec<f32> {
+/// The same with this shader source.
+fn seen_by(gpu: &GpuHeadless, source: &str, values: &[f32], side: u32) -> Vec<f32> {
     let device = gpu.device();
     let uploaded = VolumeTexture::upload_folded(device, gpu.queue(), values, side);
     let frame = init(device, &[frame(uploaded.format)], BufferUsages::UNIFORM);
@@ -53,7 +53,7 @@ fn seen_by(gpu: &Headless, source: &str, values: &[f32], side: u32) -> Vec<f32> 
     written(gpu, source, &given, values.len() as u64)
 }
 
-/// In layers of every side: the format, and that the bits come back.
+/// Checks the format and the bits that are read back, for layers of every side.
 fn check(name: &str, values: &[f32], format: ValueFormat) {
     let gpu = gpu();
     assert_eq!(ValueFormat::of(values), format, "{name}");
@@ -64,7 +64,7 @@ fn check(name: &str, values: &[f32], format: ValueFormat) {
     }
 }
 
-/// So many random whole numbers of a range, and both its ends.
+/// Random whole numbers in a range, including both its ends.
 fn whole(count: usize, [least, greatest]: [i32; 2]) -> Vec<f32> {
     let (mut random, values) = (Random(7), f64::from(greatest) - f64::from(least) + 1.0);
     let inside = (2..count).map(|_| least + (random.uniform(0.0, values) as i32));
@@ -104,7 +104,7 @@ fn all_others_are_kept_as_they_are() {
     check("anything", &anything.take(5000).collect::<Vec<_>>(), ValueFormat::Bits);
 }
 
-/// The bits of holes come back too, and tell them from all other values: in the result they are marked.
+/// The bits of holes are read back, too, and distinguish them from all other values; the result marks them.
 #[test]
 fn holes_are_told_by_their_bits() {
     const MARK: u32 = 0xffc0_0001;
@@ -127,12 +127,13 @@ fn holes_are_told_by_their_bits() {
     }
 }
 
-/// More values than are sent at a time: in layers of the least side the second begins, in others the first goes on.
+/// There are more values than are sent at a time: in layers of the smallest side the second chunk begins a layer, in others it continues
+/// the first.
 #[test]
 fn layers_go_on_where_they_were_left() {
     let mut values = whole(2048 * 2050 + 77, [-1000, 9000]);
     check("two bytes", &values, ValueFormat::Offset16(-1000.0));
-    // A single one decides, wherever it is.
+    // A single value decides, wherever it is.
     *values.last_mut().unwrap() = 0.5;
     check("four", &values, ValueFormat::Bits);
     values[3] = -0.0;

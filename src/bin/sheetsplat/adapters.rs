@@ -11,7 +11,7 @@ use crate::stdout;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  sheetsplat adapters\n  sheetsplat adapters --adapter llvmpipe")]
 pub(crate) struct Arguments {
-    /// Part of the name of the adapter to use: which one that is.
+    /// Part of an adapter's name: mark the adapter that it selects.
     #[arg(long, value_name = "NAME", env = "WGPU_ADAPTER_NAME")]
     adapter: Option<String>,
 }

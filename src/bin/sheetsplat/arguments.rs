@@ -1,25 +1,23 @@
-//! Arguments that several subcommands take.
+//! Arguments that several subcommands share.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::ValueEnum;
-use clap::builder::PossibleValuesParser;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use sheetsplat::RenderError;
 use sheetsplat::appearance::{Colormap, Preset};
-use sheetsplat::cpu::CpuRenderer;
-use sheetsplat::headless::{Error, Headless, HeadlessOptions, Rendering};
+use sheetsplat::headless::{Backend, Error, Headless, HeadlessOptions};
 use sheetsplat::image::PngDepth;
 use sheetsplat::scene::{Scene, SceneError, VolumeSource};
-use sheetsplat::settings::Camera;
 use sheetsplat::stats::Stats;
 use sheetsplat::volume::{self, Orientation, Volume};
-use sheetsplat::{RenderError, SceneView, SettingError};
 
 use crate::failure::Failure;
 use crate::outputs::Outputs;
 use crate::reading::Reading;
 
-/// What to draw, and on which adapter.
+/// The scene to draw, and the adapter.
 #[derive(clap::Args)]
 pub(crate) struct Input {
     /// A scene file (.toml), a volume file, or builtin:NAME[:N].
@@ -34,28 +32,35 @@ pub(crate) struct Input {
     look: Look,
     #[command(flatten)]
     reading: Reading,
-    /// The side of the patient to look at, where the volume's file says how the patient lies; in place of the scene's
-    /// camera.direction and camera.up.
+    /// The side of the patient to look at, if the volume's file states how the patient lies; replaces the scene's camera.direction
+    /// and camera.up.
     #[arg(long, value_enum, value_name = "SIDE")]
     pub(crate) view: Option<View>,
+    /// What draws: a GPU by its driver, the CPU's cores without one, the slow f64 evaluation that both are tested against, or a GPU if there is
+    /// one and else the CPU. --adapter, --profile and a scene's rasterizer mean the GPU.
+    #[arg(
+        long, value_name = "BACKEND", env = "SHEETSPLAT_BACKEND", default_value = "auto",
+        value_parser = PossibleValuesParser::new(Backend::ALL.map(Backend::name)).try_map(|name| name.parse::<Backend>()),
+    )]
+    pub(crate) backend: Backend,
     /// Part of the name of the adapter to use.
     #[arg(long, value_name = "NAME", env = "WGPU_ADAPTER_NAME")]
     pub(crate) adapter: Option<String>,
 }
 
-/// Degrees: a finite number.
+/// Parses an angle in degrees: a finite number.
 pub(crate) fn parse_degrees(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|turn: &f64| turn.is_finite()).ok_or_else(|| "allowed: a finite number".to_owned())
 }
 
-/// Appearance by name; short for --set of the scene's keys, and before them.
+/// Appearance by name: shorthand for the scene's keys, applied before --set.
 #[derive(clap::Args)]
 struct Look {
-    /// Transfer function, shading and compositing for a kind of data, where the scene gives none of its own: short for --set
+    /// Transfer function, shading and compositing for a kind of data, where the scene states none: short for --set
     /// preset=NAME.
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Preset::ALL.map(|(name, _)| name)))]
     preset: Option<String>,
-    /// Colours over the values that show, or the palette of the volume's file, in place of the scene's: short for --set
+    /// Colours over the visible values, or the palette of the volume's file, in place of the scene's: short for --set
     /// transfer.colormap=NAME.
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Colormap::ALL.map(|(name, _)| name)))]
     colormap: Option<String>,
@@ -68,7 +73,7 @@ impl Look {
     }
 }
 
-/// What a raw file has no header to say; short for --set of the scene's keys, and before them.
+/// The layout of a raw file: shorthand for the scene's keys, applied before --set.
 #[derive(clap::Args)]
 struct Raw {
     /// Voxels of a file without a header: short for --set volume.dims=[X,Y,Z].
@@ -131,7 +136,7 @@ impl Input {
         self.scene_with(&self.sets)
     }
 
-    /// The scene with these settings in place of those of --set. By its extension a scene file; anything else is a volume.
+    /// The scene with these settings in place of those of --set. The input is a scene file by its extension, or else a volume.
     pub(crate) fn scene_with(&self, sets: &[String]) -> Result<Scene, SceneError> {
         let sets = self.raw.sets().into_iter().chain(self.look.sets()).chain(sets.iter().cloned()).collect::<Vec<_>>();
         match self.name.strip_prefix("builtin:") {
@@ -145,17 +150,14 @@ impl Input {
         Path::new(&self.name).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
     }
 
-    /// The files that the arguments and the scene name to be read. A header may name others.
+    /// The input files named by the arguments and the scene. A header may name more.
     pub(crate) fn files(&self, scene: &Scene) -> Vec<PathBuf> {
         let scene_file = self.is_scene_file().then(|| self.name.clone().into());
-        let volume = match &scene.volume {
-            VolumeSource::File(path) | VolumeSource::Raw(path, _) => Some(path.clone()),
-            VolumeSource::Builtin(_) => None,
-        };
+        let volume = scene.volume.path().map(Path::to_path_buf);
         [scene_file, volume, scene.labels.clone()].into_iter().flatten().collect()
     }
 
-    /// Loads the scene's volume, from files that are no outputs.
+    /// Loads the scene's volume, from files that are not outputs.
     pub(crate) fn load_volume(&self, scene: &Scene, outputs: &Outputs) -> Result<Volume, Failure> {
         let start = Instant::now();
         let volume = self.read_volume(scene, outputs)?;
@@ -171,7 +173,7 @@ impl Input {
         Ok(volume)
     }
 
-    /// Reads a volume without a word about it.
+    /// Loads the volume without logging anything.
     pub(crate) fn read_volume(&self, scene: &Scene, outputs: &Outputs) -> Result<Volume, Failure> {
         let loaded = scene.load_volume_and_files(&self.reading.options());
         let (volume, files) = loaded.map_err(|error| self.failure(error))?;
@@ -179,8 +181,8 @@ impl Input {
         Ok(volume)
     }
 
-    /// The scene as it is to be drawn, with nothing left to the volume: what is saved is what is drawn. `explicit` is
-    /// [`Scene::explicit`], or for cameras that turn [`Scene::explicit_all_around`].
+    /// The scene as it is drawn, with everything stated that depends on the volume, so that a saved scene equals the drawn one. `explicit`
+    /// is [`Scene::explicit`], or [`Scene::explicit_all_around`] for cameras that turn.
     pub(crate) fn settled(
         &self,
         volume: &Volume,
@@ -193,7 +195,7 @@ impl Input {
         Ok(explicit(&scene, volume))
     }
 
-    /// Turns the scene's camera to the side of the patient that --view says.
+    /// Turns the scene's camera to the side of the patient given by --view.
     pub(crate) fn look_at(&self, volume: &Volume, scene: &mut Scene) -> Result<(), Failure> {
         let (Some(view), name) = (self.view, &self.name) else { return Ok(()) };
         let Some(orientation) = volume.orientation() else {
@@ -206,75 +208,22 @@ impl Input {
         Ok(())
     }
 
-    pub(crate) fn headless(&self, profile: bool) -> Result<Headless, Failure> {
-        let mut options = HeadlessOptions::default().with_profile(profile);
+    /// What draws some scenes.
+    pub(crate) fn headless<'a>(
+        &self,
+        profile: bool,
+        scenes: impl IntoIterator<Item = &'a Scene>,
+    ) -> Result<Headless, Failure> {
+        let mut options = HeadlessOptions::default().with_profile(profile).with_backend(self.backend);
         options.adapter = self.adapter.clone();
         let start = Instant::now();
-        let headless = Headless::new(&options).map_err(|error| Failure::Other(error.to_string()))?;
-        log::info!("renderer ready after {:.1?}", start.elapsed());
+        let headless = Headless::for_scenes(&options, scenes).map_err(|error| Failure::Other(error.to_string()))?;
+        log::info!("{} renderer ready after {:.1?}", headless.backend(), start.elapsed());
         Ok(headless)
     }
 
     pub(crate) fn failure(&self, error: impl Into<Error>) -> Failure {
         Failure::of(error.into(), &self.name)
-    }
-}
-
-/// What draws many frames of one scene.
-#[derive(Clone, Copy, Default, ValueEnum)]
-pub(crate) enum Backend {
-    #[default]
-    Gpu,
-    Cpu,
-}
-
-/// A scene's view, to be drawn from many directions.
-pub(crate) enum Drawing {
-    Gpu(Box<(Headless, SceneView)>),
-    Cpu(Box<CpuRenderer>),
-}
-
-impl Drawing {
-    /// Opens a device or none, and classifies the volume.
-    pub(crate) fn new(
-        input: &Input,
-        backend: Backend,
-        profile: bool,
-        volume: Volume,
-        scene: &Scene,
-    ) -> Result<Self, Failure> {
-        match backend {
-            Backend::Cpu => {
-                let renderer = CpuRenderer::new(volume, scene).map_err(|error| input.failure(error))?;
-                Ok(Self::Cpu(Box::new(renderer)))
-            }
-            Backend::Gpu => {
-                let headless = input.headless(profile)?;
-                let view = headless.view(volume, scene).map_err(|error| input.failure(error))?;
-                Ok(Self::Gpu(Box::new((headless, view))))
-            }
-        }
-    }
-
-    pub(crate) fn set_camera(&mut self, camera: Camera) -> Result<(), SettingError> {
-        match self {
-            Self::Gpu(gpu) => gpu.1.set_camera(camera),
-            Self::Cpu(renderer) => renderer.set_camera(camera),
-        }
-    }
-
-    pub(crate) fn turn(&mut self, degrees: f64) -> Result<(), SettingError> {
-        match self {
-            Self::Gpu(gpu) => gpu.1.turn(degrees),
-            Self::Cpu(renderer) => renderer.turn(degrees),
-        }
-    }
-
-    pub(crate) fn draw(&mut self) -> Result<Rendering, RenderError> {
-        match self {
-            Self::Gpu(gpu) => gpu.0.draw(&mut gpu.1),
-            Self::Cpu(renderer) => renderer.draw(),
-        }
     }
 }
 
@@ -295,13 +244,13 @@ impl From<Depth> for PngDepth {
     }
 }
 
-/// Logs what a frame was drawn on, and how long it took.
+/// Logs the adapter that drew a frame, and the time it took.
 pub(crate) fn log_frame(what: &str, stats: &Stats) {
     let Stats { adapter, rasterizer, prepare_ms, frame_ms, .. } = stats;
     log::info!("{what}: {:.1} ms by {rasterizer} on {adapter}", prepare_ms + frame_ms);
 }
 
-/// Checks the name of a scene file to be written.
+/// Checks the name of a scene file that will be written.
 pub(crate) fn check_scene_file(path: &Path) -> Result<(), Failure> {
     match path.extension() {
         Some(extension) if extension.eq_ignore_ascii_case("toml") => Ok(()),
@@ -309,7 +258,7 @@ pub(crate) fn check_scene_file(path: &Path) -> Result<(), Failure> {
     }
 }
 
-/// The scene file that a path is to hold.
+/// The bytes of a scene file to be written at a path.
 pub(crate) fn scene_file(scene: &Scene, path: &Path) -> Result<Vec<u8>, Failure> {
     Ok(scene.to_toml(path.parent().unwrap_or(Path::new("")))?.into_bytes())
 }

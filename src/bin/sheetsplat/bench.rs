@@ -7,7 +7,7 @@ use sheetsplat::RenderError;
 use sheetsplat::scene::Scene;
 use sheetsplat::stats::Stats;
 
-use crate::arguments::{Backend, Drawing, Input, parse_degrees};
+use crate::arguments::{Input, parse_degrees};
 use crate::failure::Failure;
 use crate::outputs::Outputs;
 use crate::stdout;
@@ -20,18 +20,15 @@ pub(crate) struct Arguments {
     /// Frames to time after the first one.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
     frames: u32,
-    /// Degrees to turn about the camera's up before each of them.
+    /// Degrees to turn about the camera's up vector before each of them.
     #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, value_parser = parse_degrees)]
     rotate: f64,
-    /// The GPU, or the CPU's cores without a driver.
-    #[arg(long, value_enum, default_value = "gpu")]
-    backend: Backend,
     /// Time every stage on the GPU, where the adapter has timestamp queries: stages_ms in the statistics.
     #[arg(long)]
     profile: bool,
 }
 
-/// What is printed: times in milliseconds, and the last frame's stats.
+/// The printed report: times in milliseconds, and the last frame's statistics.
 #[derive(Serialize)]
 struct Report {
     first_frame_ms: f64,
@@ -53,15 +50,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let scene = input.settled(&volume, &scene, Scene::explicit_all_around)?;
 
     let start = Instant::now();
-    let mut drawing = Drawing::new(input, arguments.backend, arguments.profile, volume, &scene)?;
-    let mut last = drawing.draw().map_err(|error| input.failure(error))?.stats;
+    let headless = input.headless(arguments.profile, [&scene])?;
+    let mut view = headless.view(volume, &scene).map_err(|error| input.failure(error))?;
+    let mut last = headless.draw(&mut view).map_err(|error| input.failure(error))?.stats;
     let first_frame_ms = milliseconds_since(start);
 
     let mut times = Vec::new();
     for _ in 0..arguments.frames {
-        drawing.turn(arguments.rotate).map_err(|error| input.failure(RenderError::from(error)))?;
+        view.turn(arguments.rotate).map_err(|error| input.failure(RenderError::from(error)))?;
         let start = Instant::now();
-        last = drawing.draw().map_err(|error| input.failure(error))?.stats;
+        last = headless.draw(&mut view).map_err(|error| input.failure(error))?.stats;
         times.push(milliseconds_since(start));
     }
     times.sort_by(f64::total_cmp);
@@ -78,7 +76,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     stdout((json + "\n").as_bytes())
 }
 
-/// The process's largest resident set so far, where the system tells it.
+/// The process's largest resident set so far, if the system reports it.
 fn peak_rss_mib() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -14,15 +14,15 @@ use crate::reading::Reading;
 pub(crate) struct Arguments {
     /// An image: .png, .exr or .npy.
     actual: PathBuf,
-    /// What it should look like, of any of these formats and the same size.
+    /// The image that it should match, in any of these formats and of the same size.
     golden: PathBuf,
     /// Steps of 255 that a channel may differ by: 0 to 16.
     #[arg(long, value_name = "STEPS", default_value_t = Tolerance::default().per_channel())]
     tolerance: u8,
-    /// Share of the pixels that may differ by more: 0 to 0.01.
+    /// Fraction of the pixels that may differ by more: 0 to 0.01.
     #[arg(long, value_name = "SHARE", default_value_t = Tolerance::default().outliers())]
     outliers: f64,
-    /// Save an image of where they differ: black to grey within the tolerance, red to yellow beyond it.
+    /// Save an image of the differences: black to grey within the tolerance, red to yellow beyond it.
     #[arg(long, value_name = "FILE")]
     difference: Option<PathBuf>,
     #[command(flatten)]
@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let files = format!("{} and {}", actual.display(), golden.display());
     let comparison = Comparison::new(&pictures[0].image, &pictures[1].image, tolerance).map_err(|error| {
         let message = format!("{files}: {error}");
-        // Images of two sizes are good input: the answer is that they differ.
+        // Images of different sizes are valid input: the result is that they differ.
         if matches!(error, ComparisonError::Size { .. }) { Failure::Other(message) } else { Failure::Input(message) }
     })?;
     let mut saved = Vec::new();

@@ -1,4 +1,4 @@
-//! `sheetsplat completions` and `sheetsplat man`: documents made of the program's own arguments.
+//! `sheetsplat completions` and `sheetsplat man`: documents generated from the program's arguments.
 
 use clap::Command;
 use clap_complete::Shell;
@@ -19,7 +19,7 @@ pub(crate) struct Completions {
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  sheetsplat man orbit > ~/.local/share/man/man1/sheetsplat-orbit.1")]
 pub(crate) struct Man {
-    /// The subcommand; without it the page is that of the program.
+    /// The subcommand; without it, the program's own page.
     command: Option<String>,
 }
 
@@ -31,7 +31,7 @@ pub(crate) fn completions(arguments: &Completions, mut program: Command) -> Resu
 }
 
 pub(crate) fn man(arguments: &Man, mut program: Command) -> Result<(), Failure> {
-    // Gives subcommands the global options, and names as in sheetsplat-orbit.
+    // This gives subcommands the global options, and names such as sheetsplat-orbit.
     program.build();
     let command = match &arguments.command {
         None => program,

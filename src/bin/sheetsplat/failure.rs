@@ -1,11 +1,11 @@
-//! What ends the program without success.
+//! Errors that end the program.
 
 use sheetsplat::RenderError;
 use sheetsplat::headless::Error;
 use sheetsplat::image::ImageError;
 use sheetsplat::scene::SceneError;
 
-/// What went wrong, by whose fault.
+/// An error, classified by its exit code.
 #[derive(Debug)]
 pub(crate) enum Failure {
     /// Bad usage or bad input: exit code 2.
@@ -21,7 +21,7 @@ impl Failure {
         }
     }
 
-    /// What is wrong with drawing `input`; scene and volume errors name their file themselves.
+    /// The failure to draw `input`. Scene and volume errors name their file themselves.
     pub(crate) fn of(error: Error, input: &str) -> Self {
         match error {
             Error::Scene(_) | Error::Volume(_) => Self::Input(error.to_string()),

@@ -1,11 +1,11 @@
-//! What happens on Ctrl-C and when the program is told to end: no temporary file stays.
+//! Removal of temporary files when the program is interrupted or terminated.
 
 #[cfg(unix)]
 pub(crate) use unix::listen;
 #[cfg(windows)]
 pub(crate) use windows::listen;
 
-/// No other system has both temporary files and a way to interrupt the program.
+/// Other systems have no temporary files, or no way to interrupt the program.
 #[cfg(not(any(unix, windows)))]
 pub(crate) fn listen() {}
 
@@ -19,11 +19,11 @@ mod unix {
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
 
-    /// Starts to listen for signals that end the program; it ends by the signal itself, as its caller expects.
+    /// Starts to listen for signals that end the program, which then ends by the same signal, as its caller expects.
     pub(crate) fn listen() {
         let ignored = ignored();
         let signals = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|&signal| ignored >> (signal - 1) & 1 == 0);
-        // Where there is no listening, the program ends as any other does.
+        // Without a listener, signals end the program directly.
         let Ok(mut signals) = Signals::new(signals) else { return };
         thread::spawn(move || {
             for signal in signals.forever() {
@@ -33,7 +33,7 @@ mod unix {
         });
     }
 
-    /// A bit for each signal that the caller had the program ignore, as `nohup` does, where the system tells it.
+    /// A bit for each signal that the caller made the program ignore, as `nohup` does, if the system reports it.
     fn ignored() -> u64 {
         let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
         let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
@@ -45,12 +45,12 @@ mod unix {
 mod windows {
     use sheetsplat::image::output::remove_temporary;
 
-    /// `STATUS_CONTROL_C_EXIT`, with which Windows ends a program that handles no console events.
+    /// `STATUS_CONTROL_C_EXIT`, the exit code of a program that does not handle console events on Windows.
     const INTERRUPTED: i32 = 0xC000_013A_u32.cast_signed();
 
     /// Starts to listen for Ctrl-C and Ctrl-Break.
     pub(crate) fn listen() {
-        // Where there is no listening, the program ends as any other does.
+        // Without a listener, the events end the program directly.
         let _ = ctrlc::set_handler(|| {
             let _locked = remove_temporary();
             std::process::exit(INTERRUPTED);

@@ -43,10 +43,10 @@ Exit codes: 0 success, 2 bad usage or input, 1 anything else. Logs: -v, or the e
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// Say nothing but errors: no progress, no warnings.
+    /// Print only errors: no progress, no warnings.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
-    /// Log volumes and frames instead of showing progress. RUST_LOG overrules it.
+    /// Log volumes and frames instead of showing progress. RUST_LOG takes precedence.
     #[arg(short, long, global = true)]
     verbose: bool,
 }
@@ -55,29 +55,29 @@ struct Arguments {
 enum Command {
     /// Render a scene file, a volume file, or a builtin volume to an image.
     Render(render::Arguments),
-    /// Draw a turntable: numbered images or a movie of the camera turning about its up.
+    /// Draw a turntable: numbered images or a movie of the camera turning about its up vector.
     Orbit(orbit::Arguments),
-    /// Draw a contact sheet: --set KEY=A,B,C gives a tile for each value, two of them a grid.
+    /// Draw a contact sheet: --set KEY=A,B,C gives one tile per value; two of them give a grid.
     Sweep(sweep::Arguments),
-    /// Time a first frame and turning frames; prints one line of JSON.
+    /// Time a first frame and turning frames, and print one line of JSON.
     Bench(bench::Arguments),
-    /// Compare two images: prints what they differ in, exit code 1 if by more than is allowed.
+    /// Compare two images and print the differences; exit code 1 if they exceed the tolerance.
     Compare(compare::Arguments),
-    /// Tell what a volume is: format, size, unit, orientation, and how its values are distributed.
+    /// Describe a volume: format, size, unit, orientation, and the distribution of its values.
     Info(info::Arguments),
-    /// List the adapters, whether they are usable, and which limits are missing where they are not.
+    /// List the adapters, whether each is usable, and if not, which limits it lacks.
     Adapters(adapters::Arguments),
     /// Print completions for a shell.
     Completions(documents::Completions),
     /// Print a man page.
     Man(documents::Man),
-    /// Show a scene in a window, to be turned and changed; its image size is not looked at.
+    /// Show a scene in a window, to turn and change it; its image size is ignored.
     #[cfg(feature = "viewer")]
     View(view::Arguments),
 }
 
 fn main() -> ExitCode {
-    // Clap itself exits with 2 on bad usage, with 0 on --help.
+    // Clap itself exits with 2 on bad usage, and with 0 on --help.
     let Arguments { command, quiet, verbose } = Arguments::parse();
     let filter = match (quiet, verbose) {
         (true, _) => "error",
@@ -101,7 +101,7 @@ fn main() -> ExitCode {
         Command::View(arguments) => view::run(&arguments),
     };
     let Err(failure) = result else { return ExitCode::SUCCESS };
-    // There may be nobody left to tell.
+    // Standard error may be closed.
     let _ = writeln!(std::io::stderr(), "sheetsplat: {}", failure.message());
     match failure {
         Failure::Input(_) => ExitCode::from(2),
@@ -109,7 +109,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Prints a result.
+/// Writes a result to standard output.
 fn stdout(bytes: &[u8]) -> Result<(), Failure> {
     let mut stdout = std::io::stdout().lock();
     let written = stdout.write_all(bytes).and_then(|()| stdout.flush());

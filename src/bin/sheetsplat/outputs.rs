@@ -1,4 +1,4 @@
-//! What a run writes: no file that it reads, no file twice, and all of it or nothing.
+//! Output files: none is an input, none is written twice, and either all are written or none.
 
 use std::collections::HashMap;
 use std::fs;
@@ -10,15 +10,15 @@ use sheetsplat::image::output::{Output, Target, folder, resolved};
 use crate::failure::Failure;
 use crate::stdout;
 
-/// A file that is to be written: the option that names it, and its path.
+/// A file to be written: the option that names it, and its path.
 pub(crate) type Named<'a> = (&'static str, &'a Path);
 
-/// The files that a run will write, standard output among them if it prints: the option that names each, and its path.
+/// The files that a run will write, including standard output if it prints, each with the option that names it and its path.
 pub(crate) struct Outputs(HashMap<Identity, (&'static str, String)>);
 
 impl Outputs {
-    /// Checks, before anything is drawn, that every file may be written, and that none of them is another one or one of the inputs that
-    /// are known by name. [`Outputs::refuse`] takes the others.
+    /// Checks, before anything is drawn, that every file is writable, and that none equals another one or an input that is named so far.
+    /// [`Outputs::refuse`] checks the remaining inputs.
     pub(crate) fn check(files: &[Named<'_>], prints: bool, inputs: &[PathBuf]) -> Result<Self, Failure> {
         let outputs = Self::distinct(files.iter().map(|&(option, path)| (option, path.to_owned())), prints)?;
         outputs.refuse(inputs)?;
@@ -26,7 +26,7 @@ impl Outputs {
         Ok(outputs)
     }
 
-    /// Checks that no file is another one, whatever links and paths lead to it.
+    /// Checks that no two paths lead to the same file.
     pub(crate) fn distinct(
         files: impl Iterator<Item = (&'static str, PathBuf)>,
         prints: bool,
@@ -36,7 +36,7 @@ impl Outputs {
             outputs.insert(identity, ("standard output", "a file".to_owned()));
         }
         for (option, path) in files {
-            // What leads nowhere is an error of its own, once it is written to.
+            // A path that leads nowhere is reported when it is written.
             let Ok(identity) = Identity::of(&path) else { continue };
             let found = path.display().to_string();
             if let Some((other, _)) = outputs.get(&identity) {
@@ -47,7 +47,7 @@ impl Outputs {
         Ok(Self(outputs))
     }
 
-    /// Refuses to write any of these files.
+    /// Refuses outputs that equal one of these inputs.
     pub(crate) fn refuse(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
         for input in inputs {
             if let Some((option, found)) = Identity::of(input).ok().and_then(|identity| self.0.get(&identity)) {
@@ -62,13 +62,13 @@ fn invalid(option: &str, found: &str, other: &str) -> Failure {
     Failure::Input(format!("{option}: found {found}, which is also {other}, allowed: another file"))
 }
 
-/// Checks that a path leads to what can be written to.
+/// Checks that a path is writable.
 pub(crate) fn check_writable(path: &Path) -> Result<(), Failure> {
     Target::of(path).map(|_| ()).map_err(failed(path))
 }
 
-/// Writes files, and prints: all or nothing. What is written to pipes, devices and standard output cannot be taken back, so it comes
-/// once all other files are written but for their names.
+/// Writes files and prints: all or nothing. Pipes, devices and standard output cannot be undone, so they are written last, before the
+/// other files are renamed.
 pub(crate) fn write(files: &[(&Path, Vec<u8>)], printed: &[u8]) -> Result<(), Failure> {
     let mut targets = Vec::new();
     for (path, bytes) in files {
@@ -80,7 +80,7 @@ pub(crate) fn write(files: &[(&Path, Vec<u8>)], printed: &[u8]) -> Result<(), Fa
         let is_stream = target.is_stream();
         let mut output = target.create().map_err(failed(path))?;
         output.write_all(bytes).map_err(failed(path))?;
-        // A pipe's reader waits for its end.
+        // A pipe's reader waits for the end of the pipe.
         if !is_stream {
             outputs.push(output);
         }
@@ -89,12 +89,12 @@ pub(crate) fn write(files: &[(&Path, Vec<u8>)], printed: &[u8]) -> Result<(), Fa
     commit(outputs)
 }
 
-/// Gives files that were written their names.
+/// Renames completely written files to their own names.
 pub(crate) fn commit(outputs: Vec<Output>) -> Result<(), Failure> {
     Output::commit(outputs).map_err(|(path, error)| failed(&path)(error))
 }
 
-/// What went wrong with an output.
+/// The failure to write an output.
 pub(crate) fn failed(path: &Path) -> impl Fn(io::Error) -> Failure {
     move |error| {
         let message = format!("{}: {error}", path.display());
@@ -102,13 +102,13 @@ pub(crate) fn failed(path: &Path) -> impl Fn(io::Error) -> Failure {
     }
 }
 
-/// Which file it is, by whatever name.
+/// The identity of a file, independent of its name.
 #[derive(PartialEq, Eq, Hash)]
 enum Identity {
-    /// Device and inode.
+    /// Its device and inode.
     #[cfg(unix)]
     Inode(u64, u64),
-    /// Where a file is, or will be.
+    /// The path at which the file is, or will be.
     Path(PathBuf),
 }
 
@@ -133,7 +133,7 @@ impl Identity {
         Self::Inode(metadata.dev(), metadata.ino())
     }
 
-    /// The file or pipe that standard output is connected to; several outputs may go to a terminal.
+    /// The file or pipe connected to standard output; `None` for a terminal, which several outputs may share.
     #[cfg(unix)]
     fn of_standard_output() -> Option<Self> {
         use std::os::fd::AsFd;

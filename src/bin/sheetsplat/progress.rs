@@ -1,12 +1,12 @@
-//! A line on the terminal that says how far a long job is.
+//! The progress line on the terminal.
 
 use std::io::{IsTerminal, Write, stderr};
 use std::time::{Duration, Instant};
 
-/// Characters of the bar.
+/// The width of the bar in characters.
 const BAR: usize = 30;
 
-/// Where standard error is a terminal, a line that every step rewrites and that is gone in the end; else nothing.
+/// A line that every step rewrites and that disappears at the end; nothing if standard error is not a terminal.
 pub(crate) struct Progress {
     total: usize,
     done: usize,
@@ -28,7 +28,7 @@ impl Progress {
 
     fn show(&self) {
         if self.is_shown {
-            // A terminal that is gone is no reason to stop.
+            // A closed terminal does not end the program.
             let _ = write!(stderr(), "\r\x1b[K{}", line(self.done, self.total, self.start.elapsed()));
         }
     }
@@ -42,7 +42,7 @@ impl Drop for Progress {
     }
 }
 
-/// The bar, how many are done, and the time left if the rest takes as long as those did.
+/// The bar, the number of steps done, and the time left if the others take equally long.
 fn line(done: usize, total: usize, elapsed: Duration) -> String {
     let filled = BAR * done / total.max(1);
     let bar = format!("[{}{}] {done} of {total}", "#".repeat(filled), ".".repeat(BAR - filled));

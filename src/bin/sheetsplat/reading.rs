@@ -1,4 +1,4 @@
-//! What reading may open, and how much memory it may take.
+//! Limits on reading: which files may be opened, and how much memory may be used.
 
 use std::path::PathBuf;
 
@@ -6,11 +6,11 @@ use sheetsplat::volume::ReadOptions;
 
 #[derive(clap::Args)]
 pub(crate) struct Reading {
-    /// Read no file outside this folder, after links are followed: neither the input nor what it names.
+    /// Read no file outside this folder once links are followed: neither the input nor the files it names.
     #[arg(long, value_name = "DIR")]
     confine: Option<PathBuf>,
-    /// Memory that the volume and its labels, or each image, may take, such as 2GiB; by default three quarters of what the machine, or the process's
-    /// control group, has.
+    /// Maximum memory for the volume and its labels, or for each image, such as 2GiB. The default is three quarters of what the
+    /// machine has or the process's control group may use.
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     memory: Option<u64>,
 }
@@ -35,7 +35,7 @@ const UNITS: [(&str, u64); 9] = [
     ("B", 1),
 ];
 
-/// A size with its unit; without one, bytes.
+/// Parses a size with its unit; bytes without one.
 fn parse_size(text: &str) -> Result<u64, String> {
     let unit = UNITS.into_iter().find(|(name, _)| text.to_ascii_lowercase().ends_with(&name.to_ascii_lowercase()));
     let (name, bytes) = unit.unwrap_or(("", 1));

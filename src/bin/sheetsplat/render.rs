@@ -4,15 +4,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use clap::ValueEnum;
-use sheetsplat::RenderError;
-use sheetsplat::cpu;
 use sheetsplat::headless::Rendering;
 use sheetsplat::image::Image;
-use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
-use sheetsplat::stats::Stats;
-use sheetsplat::volume::Volume;
 
 use crate::annotate::Annotate;
 use crate::arguments::{Depth, Input, check_scene_file, log_frame, scene_file};
@@ -40,24 +34,14 @@ pub(crate) struct Arguments {
     /// Write counts and times as JSON.
     #[arg(long, value_name = "FILE")]
     stats: Option<PathBuf>,
-    /// Write the whole scene that was rendered as a scene file: with what presets, colour maps and the volume made of it.
+    /// Write the complete scene that was rendered as a scene file, with everything that presets, colour maps and the volume determined.
     #[arg(long, value_name = "FILE")]
     save_scene: Option<PathBuf>,
     #[command(flatten)]
     annotate: Annotate,
-    /// The GPU, the CPU's cores without a driver, or the slow f64 evaluation that both are tested against.
-    #[arg(long, value_enum, default_value = "gpu")]
-    backend: Backend,
     /// Time every stage on the GPU, where the adapter has timestamp queries: stages_ms in the statistics, and printed.
     #[arg(long)]
     profile: bool,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Backend {
-    Gpu,
-    Cpu,
-    Reference,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -76,11 +60,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let explicit_ms = start.elapsed().as_secs_f64() * 1e3;
     let overlay = arguments.annotate.overlay(&scene, &volume)?;
     let volume = Arc::new(volume);
-    let rendering = match arguments.backend {
-        Backend::Gpu => input.headless(arguments.profile)?.render_volume(volume, &scene),
-        Backend::Cpu => cpu::render(volume, &scene),
-        Backend::Reference => render_reference(&volume, &scene),
-    };
+    let rendering = input.headless(arguments.profile, [&scene])?.render_volume(volume, &scene);
     let Rendering { mut image, mut stats } = rendering.map_err(|error| input.failure(error))?;
     stats.load_ms = load_ms;
     stats.prepare_ms += explicit_ms;
@@ -97,7 +77,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.profile && stats.stages_ms.is_empty() {
         log::warn!("--profile: found no timestamp queries on {}", stats.adapter);
     }
-    // Empty without --profile.
+    // The map is empty without --profile.
     let profile: String = stats.stages_ms.iter().map(|(stage, ms)| format!("{stage:10} {ms:10.3} ms\n")).collect();
     outputs::write(&files, profile.as_bytes())
 }
@@ -108,22 +88,4 @@ fn check_files(arguments: &Arguments) -> Result<(), Failure> {
     Image::check_format(output)?;
     arguments.annotate.check_format(output)?;
     save_scene.as_deref().map_or(Ok(()), check_scene_file)
-}
-
-fn render_reference(volume: &Volume, scene: &Scene) -> Result<Rendering, RenderError> {
-    let start = Instant::now();
-    let transfer = scene.transfer.resolve(volume);
-    let image = reference::render(volume, &transfer, scene)?;
-    let stats = Stats {
-        adapter: "CPU".to_owned(),
-        driver: "f64".to_owned(),
-        backend: "reference".to_owned(),
-        rasterizer: "reference".to_owned(),
-        width: image.width,
-        height: image.height,
-        frame_ms: start.elapsed().as_secs_f64() * 1e3,
-        counts: reference::count(volume, &transfer, scene)?,
-        ..Stats::default()
-    };
-    Ok(Rendering { image, stats })
 }

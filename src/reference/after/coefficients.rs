@@ -1,9 +1,9 @@
-//! Coefficients whose field has every voxel's value at that voxel: `splatting.interpolation = "exact"` (SPEC §9).
+//! The coefficients whose field has each voxel's value at that voxel: `splatting.interpolation = "exact"` (SPEC §9).
 //!
-//! At voxel j the field is `Σ g(i-j)·c_i / N_j`, so the coefficients solve `G·c = N·v` with `G_ij = g(i-j)` over all voxels but holes and
-//! N the sums of G's rows. G is symmetric, and positive definite where the discrete kernel's transform is positive, which the settings
-//! ensure ([`Splatting::check`](crate::settings::Splatting::check)): conjugate gradients solve it, for any radius, whether the kernel
-//! separates or not (Hestenes, Stiefel, *Methods of conjugate gradients for solving linear systems*, 1952).
+//! At voxel j the field is `Σ g(i-j)·c_i / N_j`, so the coefficients solve `G·c = N·v`, with `G_ij = g(i-j)` over all voxels except holes
+//! and N the row sums of G. G is symmetric, and positive definite where the discrete kernel's transform is positive, which the settings
+//! ensure ([`Splatting::check`](crate::settings::Splatting::check)). Conjugate gradients therefore solve the system for any radius and any
+//! kernel (Hestenes, Stiefel, *Methods of conjugate gradients for solving linear systems*, 1952).
 
 use glam::IVec3;
 use rayon::prelude::*;
@@ -12,21 +12,21 @@ use crate::error::RenderError;
 use crate::setting_error::SettingError;
 use crate::volume::Grid;
 
-/// How far the field may be from the values at the voxels, of the values' range; SPEC asks for 1e-5.
+/// The maximum error of the field at voxels, relative to the range of values; the specification requires 1e-5.
 const TOLERANCE: f64 = 1e-9;
 
-/// Steps after which conjugate gradients are given up. Those that the settings allow take at most some 200.
+/// The maximum number of steps of conjugate gradients. Systems that the settings allow take at most some 200.
 const MAX_STEPS: usize = 2000;
 
-/// The coefficients of values on a grid; NaN at holes, where values are NaN.
+/// The coefficients for values on a grid; NaN at holes, where values are NaN.
 ///
 /// # Errors
-/// If they are not found: rounding forbids it for values whose range is tiny against their size.
+/// If the iteration does not converge because of rounding, as for values whose range is tiny compared with their size.
 pub fn exact(grid: &Grid, values: &[f64], radius: f64, falloff: f64) -> Result<Vec<f64>, RenderError> {
     let taps = Taps::new(radius, falloff);
     let finite = || values.iter().copied().filter(|value| !value.is_nan());
     let (min, max) = (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
-    // Coefficients of a constant are that constant, so the values may be moved to where rounding is least.
+    // A constant has constant coefficients, so values can be shifted to where rounding is smallest.
     let middle = (min + max) / 2.0;
     let is_hole: Vec<bool> = values.iter().map(|value| value.is_nan()).collect();
     let moved: Vec<f64> = values.iter().map(|value| if value.is_nan() { 0.0 } else { value - middle }).collect();
@@ -43,7 +43,7 @@ pub fn exact(grid: &Grid, values: &[f64], radius: f64, falloff: f64) -> Result<V
         let at_voxels = residual.iter().zip(&weights).filter(|(_, weight)| **weight > 0.0);
         at_voxels.map(|(residual, weight)| (residual / weight).abs()).fold(0.0, f64::max)
     };
-    // Of holes alone there is no range.
+    // With only holes the range is negative infinity.
     let tolerance = TOLERANCE * (max - min).max(0.0);
     for _ in 0..MAX_STEPS {
         if error(&residual) <= tolerance {
@@ -61,7 +61,7 @@ pub fn exact(grid: &Grid, values: &[f64], radius: f64, falloff: f64) -> Result<V
             .zip(&residual)
             .for_each(|(direction, residual)| *direction = residual + share * *direction);
     }
-    let (key, found) = ("splatting.interpolation", "\"exact\" for values that it does not converge for");
+    let (key, found) = ("splatting.interpolation", "\"exact\" for values for which it does not converge");
     Err(SettingError::new(key, found, "\"smooth\", or a larger splatting.falloff").into())
 }
 
@@ -71,7 +71,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 /// The discrete kernel.
 struct Taps {
-    /// Offsets and weights.
+    /// Offsets and their weights.
     taps: Vec<(IVec3, f64)>,
 }
 
@@ -85,7 +85,7 @@ impl Taps {
         Self { taps: within.map(|(offset, squared)| (offset, (-falloff * squared).exp())).collect() }
     }
 
-    /// `G·c`, 0 at holes, where c is 0, too.
+    /// `G·c`; 0 at holes, where c is 0 too.
     fn convolve(&self, grid: &Grid, c: &[f64], is_hole: &[bool]) -> Vec<f64> {
         let dims = grid.dims.as_ivec3();
         let [nx, ny] = [dims.x as usize, dims.y as usize];
@@ -116,7 +116,7 @@ mod tests {
 
     use super::*;
 
-    /// Around holes, too, which are in none of the sums.
+    /// The field has the voxels' values also around holes, which are in none of the sums.
     #[test]
     fn fields_have_the_values_at_voxels() {
         let grid = Grid { dims: UVec3::new(6, 5, 4), spacing: DVec3::ONE };

@@ -1,7 +1,8 @@
-//! What a frame is made of where classification comes after splatting (SPEC §§8, 9).
+//! The counts of a frame with classification after splatting (SPEC §§8, 9).
 //!
-//! A brick of 4×4×4 voxels may be drawn if the values around it can meet an opacity: the coefficients of all voxels within two kernel radii, as the
-//! low-pass rule widens them, and a slab. A slab needs both of its planes, and each of them all of its voxels.
+//! A brick of 4×4×4 voxels may be drawn if the values around it can have an opacity above 0. These values are the coefficients of all
+//! voxels within two kernel radii (as widened by the low-pass rule) and a slab. A slab needs both of its planes, and each plane all of
+//! its voxels.
 
 use glam::{DVec3, UVec2, UVec3};
 use rayon::prelude::*;
@@ -17,18 +18,18 @@ use crate::settings::transfer_function::{Tables, TransferFunction};
 use crate::stats::Counts;
 use crate::volume::Volume;
 
-/// Side of a brick, voxels.
+/// The side of a brick in voxels.
 const SIDE: u32 = 4;
 
-/// What [`super::render_for`] draws.
+/// The counts of the frame that [`super::render_for`] draws.
 ///
 /// # Errors
-/// If the scene asks for more than can be computed.
+/// If the scene needs more than can be computed.
 pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Counts, RenderError> {
     Ok(count_in(&Frame::new(Host::default(), volume, transfer, scene)?))
 }
 
-/// The counts of a frame. No voxel is shaded, as colours are those of pixels.
+/// The counts of a frame. No voxel is shaded, because pixels are shaded instead.
 pub(super) fn count_in(frame: &Frame) -> Counts {
     let geometry = &frame.geometry;
     let grid = &geometry.grid;
@@ -64,13 +65,13 @@ pub(super) fn count_in(frame: &Frame) -> Counts {
     }
 }
 
-/// How far from a brick voxels lie that bear on what it shows, in voxels along each axis.
+/// The distance from a brick, in voxels along each axis, of the voxels that affect it.
 fn reach(frame: &Frame) -> DVec3 {
     let geometry = &frame.geometry;
     let last = geometry.size.as_uvec2() - 1;
     let corners = [last.with_x(0), last.with_y(0), last, UVec2::ZERO].map(|corner| frame.pixel(corner));
     let slab = corners.iter().map(Pixel::step).reduce(DVec3::max).unwrap_or_default();
-    // Where pixels are largest kernels are widest.
+    // Kernels are widest where pixels are largest.
     let farthest = match &geometry.eye {
         None => 0.0,
         Some(eye) => {
@@ -81,7 +82,7 @@ fn reach(frame: &Frame) -> DVec3 {
     2.0 * rule.map_or(DVec3::ZERO, |rule| rule.half_box(geometry.radius)) + slab
 }
 
-/// The tables that voxels may go by.
+/// The tables that apply to any voxel.
 fn tables<'a>(frame: &Frame<'a>) -> Vec<Tables<'a>> {
     let labels = frame.volume.labels().map(|_| frame.transfer.labels.keys()).into_iter().flatten();
     let labels = labels.map(|&label| frame.transfer.tables(Some(label)));
@@ -96,29 +97,29 @@ fn values(frame: &Frame, first: UVec3, end: UVec3, reach: DVec3) -> Option<[f64;
     let rows = (low.z..=high.z).flat_map(|z| (low.y..=high.y).map(move |y| dims.x * (y + dims.y * z)));
     let coefficients = frame.field.coefficients();
     let found = rows.flat_map(|row| &coefficients[(row + low.x) as usize..=(row + high.x) as usize]);
-    // Minima and maxima pass over NaN.
+    // `min` and `max` ignore NaN.
     let ends = found.fold([f64::INFINITY, f64::NEG_INFINITY], |[min, max], &c| [min.min(c), max.max(c)]);
     (ends[0] <= ends[1]).then_some(ends)
 }
 
-/// Whether any value between two has an opacity.
+/// Whether any value between two ends has an opacity above 0.
 fn meets_opacity(tables: &[Tables], ends: [f64; 2]) -> bool {
     tables.iter().any(|tables| is_visible(tables, ends))
 }
 
-/// Planes nearer to a voxel than the kernel's radius, grid units.
+/// The number of planes whose distance from a voxel is less than the kernel's radius, in grid units.
 fn planes(frame: &Frame, voxel: UVec3) -> u64 {
     let geometry = &frame.geometry;
     let normal_length = if geometry.eye.is_some() { (geometry.basis.w * geometry.grid.aspect()).length() } else { 1.0 };
     let (depth, reach) = (geometry.depth(voxel), geometry.radius * normal_length);
     let first = ((depth - reach) / geometry.slab_width).floor() + 1.0;
     let last = ((depth + reach) / geometry.slab_width).ceil() - 1.0;
-    // There is no value at the eye and behind it.
+    // Planes at the eye and behind it have no value.
     let first = if geometry.eye.is_some() { first.max(1.0) } else { first };
     (last - first + 1.0).max(0.0) as u64
 }
 
-/// Slabs from the first to the last that the cells of some bricks reach.
+/// The number of slabs from the first to the last that the cells of some bricks reach.
 fn sheets(frame: &Frame, bricks: &[[UVec3; 2]]) -> u64 {
     let geometry = &frame.geometry;
     let aspect = geometry.grid.aspect();

@@ -1,4 +1,4 @@
-//! `maximum`, `minimum` and `average` after splatting (SPEC §9): one value per pixel is chosen, and that is classified.
+//! `maximum`, `minimum` and `average` after splatting (SPEC §9): one value is chosen per pixel, and that value is classified.
 
 use glam::{DVec3, DVec4};
 
@@ -6,15 +6,15 @@ use super::pixel::{Composited, Pixel};
 use crate::reference::shading;
 use crate::settings::splatting::Compositing;
 
-/// A place on a pixel's ray, and the field there.
+/// A position on a pixel's ray, with the field there.
 struct Point {
     sheet: f64,
     value: f64,
     gradient: DVec3,
 }
 
-/// The pixel that its chosen value gives. Its first hit is the chosen point, or for `average` the stretch's middle, if the opacity asked for
-/// is reached there.
+/// The pixel of its chosen value. Its first hit is the chosen point, or for `average` the middle of the stretch, if the opacity reaches
+/// the requested value.
 pub(super) fn composite(pixel: &Pixel) -> Composited {
     let (scene, stretch) = (&pixel.frame().scene, pixel.stretch());
     let compositing = scene.splatting.compositing;
@@ -39,13 +39,13 @@ pub(super) fn composite(pixel: &Pixel) -> Composited {
     Composited { color, first_hit }
 }
 
-/// The planes' points within the stretch that have a value: plane and value.
+/// The planes' points within the stretch that have a value, each as plane and value.
 fn points<'a>(pixel: &'a Pixel) -> impl Iterator<Item = (i32, f64)> + 'a {
     let planes = pixel.stretch().start.ceil() as i32..=pixel.stretch().end.floor() as i32;
     planes.filter_map(|plane| pixel.value(plane).map(|value| (plane, value)))
 }
 
-/// The nearest of the greatest values, or of the least ones.
+/// The point with the maximum or minimum value, the nearest of equal ones.
 fn extreme(pixel: &Pixel, is_minimum: bool) -> Option<Point> {
     let nearest = |best: (i32, f64), other: (i32, f64)| {
         let is_better = if is_minimum { other.1 < best.1 } else { other.1 > best.1 };
@@ -55,7 +55,7 @@ fn extreme(pixel: &Pixel, is_minimum: bool) -> Option<Point> {
     Some(Point { sheet: plane.into(), value, gradient: pixel.gradient(plane) })
 }
 
-/// The mean value, in the stretch's middle.
+/// The mean value, placed in the middle of the stretch.
 fn average(pixel: &Pixel) -> Option<Point> {
     let (count, sum) = points(pixel).fold((0.0, 0.0), |(count, sum), (_, value)| (count + 1.0, sum + value));
     if count == 0.0 {
@@ -65,7 +65,7 @@ fn average(pixel: &Pixel) -> Option<Point> {
     Some(Point { sheet: (stretch.start + stretch.end) / 2.0, value: sum / count, gradient: DVec3::ZERO })
 }
 
-/// Where the stretch holds no plane's value: the line of values of the slab that its middle lies in.
+/// If the stretch contains no plane's value: the point in its middle, on the line of values of the slab there.
 fn middle(pixel: &Pixel) -> Option<Point> {
     let sheet = (pixel.stretch().start + pixel.stretch().end) / 2.0;
     let slab = pixel.slab(sheet.floor() as i32)?;

@@ -1,7 +1,7 @@
-//! The field that kernels make of the voxels' values, and its gradient, at a point (SPEC §9).
+//! The field of the voxels' values, and its gradient, at a point (SPEC §9).
 //!
-//! Every voxel i but holes has the weight `g_i = exp(-falloff·|δ_i|²)` where `|δ_i| < radius`, else 0. With `N = Σ g_i` the field is
-//! `f = Σ c_i·g_i / N`: a weighted mean, so it has no ripple on constant data and none at borders.
+//! Every voxel i that is not a hole has the weight `g_i = exp(-falloff·|δ_i|²)` if `|δ_i| < radius`, else 0. With `N = Σ g_i` the field is
+//! `f = Σ c_i·g_i / N`: a weighted mean, so constant data has no ripple, not even at borders.
 
 use glam::{DVec3, UVec3};
 
@@ -13,14 +13,14 @@ use crate::settings::shading::Gradient;
 use crate::settings::splatting::Interpolation;
 use crate::volume::{Grid, Volume};
 
-/// Where the weights sum to less than this there is no value.
+/// Where the sum of the weights is less than this, there is no value.
 const MIN_WEIGHT: f64 = 1e-3;
 
 /// A volume's field.
 #[derive(Debug)]
 pub struct Field<'a> {
     volume: &'a Volume,
-    /// c, for every voxel; NaN at holes.
+    /// c for every voxel; NaN at holes.
     coefficients: Vec<f64>,
     radius: f64,
     falloff: f64,
@@ -28,10 +28,10 @@ pub struct Field<'a> {
 }
 
 impl<'a> Field<'a> {
-    /// The field that a scene's settings make of a volume.
+    /// The field of a volume under a scene's settings.
     ///
     /// # Errors
-    /// If no coefficients are found that interpolate the volume's values.
+    /// If no coefficients interpolate the volume's values.
     pub fn new(volume: &'a Volume, scene: &Scene) -> Result<Self, RenderError> {
         let (radius, falloff) = (scene.splatting.radius, scene.splatting.falloff);
         let values = volume.values().iter().map(|&value| f64::from(if value.is_finite() { value } else { f32::NAN }));
@@ -43,7 +43,7 @@ impl<'a> Field<'a> {
         Ok(Self { volume, coefficients, radius, falloff, gradient: scene.shading.gradient })
     }
 
-    /// f at a point in voxel coordinates. There is no value where the weights sum to nearly nothing, or the nearest voxel is a hole.
+    /// f at a point in voxel coordinates; `None` where the sum of the weights is too small or the nearest voxel is a hole.
     pub fn value(&self, at: DVec3, low_pass: &LowPass) -> Option<f64> {
         if self.coefficients[nearest(self.volume.grid(), at) as usize].is_nan() {
             return None;
@@ -56,7 +56,7 @@ impl<'a> Field<'a> {
         (weights >= MIN_WEIGHT).then(|| sum / weights)
     }
 
-    /// ∇f at a point that has a value, per world unit of the unwarped space.
+    /// ∇f per world unit of the unwarped space, at a point that has a value.
     pub fn gradient(&self, at: DVec3, low_pass: &LowPass) -> DVec3 {
         let grid = self.volume.grid();
         let mut weights = 0.0;
@@ -83,7 +83,7 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Hands every voxel of weight above 0 that is no hole to `with`: its position in memory, `g_i` and `δ_i`.
+    /// Calls `with` for every voxel of weight above 0 that is not a hole: its index in memory, `g_i` and `δ_i`.
     fn each(&self, at: DVec3, low_pass: &LowPass, mut with: impl FnMut(u32, f64, DVec3)) {
         let dims = self.volume.dims();
         let half_box = low_pass.half_box(self.radius);
@@ -105,13 +105,13 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// The coefficients, for every voxel; NaN at holes.
+    /// The coefficients of all voxels; NaN at holes.
     pub fn coefficients(&self) -> &[f64] {
         &self.coefficients
     }
 }
 
-/// The position in memory of the voxel whose cell holds a point in voxel coordinates; beyond all cells the nearest one.
+/// The index in memory of the voxel whose cell contains a point in voxel coordinates; beyond all cells, of the nearest voxel.
 pub fn nearest(grid: &Grid, at: DVec3) -> u32 {
     let last = grid.dims.as_dvec3() - 1.0;
     grid.index_of((at + 0.5).floor().clamp(DVec3::ZERO, last).as_uvec3())

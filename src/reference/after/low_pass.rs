@@ -1,22 +1,22 @@
-//! SPEC §9's low-pass rule: where a pixel is larger than a grid unit, kernels are widened in the plane until they cover it.
+//! The low-pass rule of SPEC §9: where a pixel is larger than a grid unit, kernels are widened within the plane until they cover it.
 
 use glam::{DMat2, DMat3, DVec2, DVec3};
 
-/// How the kernel sees offsets on one slab plane.
+/// The map of offsets on one slab plane to those at which the kernel is evaluated.
 ///
-/// Let A be the 3×2 map from pixels to grid units within the plane. Lowering its singular values to at most 1 while its left singular
-/// vectors aⱼ stay turns every offset `δ = A·p + e`, e ⟂ A, into `δ - Σ (1 - 1/sⱼ)·aⱼ·(aⱼ·δ)` over the singular values sⱼ > 1. So the
-/// rule is one matrix for all voxels, and where no pixel is larger than a grid unit it is the identity.
+/// Let A be the 3×2 map from pixels to grid units within the plane. The rule lowers its singular values to at most 1 and keeps its left
+/// singular vectors aⱼ. This changes every offset `δ = A·p + e`, e ⟂ A, to `δ - Σ (1 - 1/sⱼ)·aⱼ·(aⱼ·δ)` over the singular values sⱼ > 1.
+/// So the rule is one matrix for all voxels, which is the identity where no pixel is larger than a grid unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LowPass {
-    /// From offsets in grid units to those that the kernel is evaluated at.
+    /// Maps offsets in grid units to those at which the kernel is evaluated.
     pub lowered: DMat3,
-    /// The inverse.
+    /// The inverse of `lowered`.
     widened: DMat3,
 }
 
 impl LowPass {
-    /// The rule for a plane on which one pixel to the right and one pixel down are these steps, grid units.
+    /// The rule for a plane with these steps per pixel to the right and per pixel down, in grid units.
     pub fn new(right: DVec3, down: DVec3) -> Self {
         let (rr, rd, dd) = (right.dot(right), right.dot(down), down.dot(down));
         // The eigenvalues of AᵀA are the squares of the singular values.
@@ -37,9 +37,9 @@ impl LowPass {
         Self { lowered, widened }
     }
 
-    /// Half the box, grid units, around the voxels that a kernel of this radius reaches a point from.
+    /// Half the box in grid units around the voxels whose kernels, of this radius, reach a point.
     pub fn half_box(&self, radius: f64) -> DVec3 {
-        // The matrix is symmetric: its columns are its rows.
+        // The matrix is symmetric, so its columns are its rows.
         let DMat3 { x_axis, y_axis, z_axis } = self.widened;
         radius * DVec3::new(x_axis.length(), y_axis.length(), z_axis.length())
     }
@@ -62,7 +62,7 @@ mod tests {
         assert!((rule.lowered * rule.widened).abs_diff_eq(DMat3::IDENTITY, 1e-12));
     }
 
-    /// Both singular values of the lowered map are at most 1, also where the steps are oblique.
+    /// Both singular values of the lowered map are at most 1, for oblique steps too.
     #[test]
     fn lowered_maps_enlarge_nothing() {
         for (right, down) in [

@@ -1,19 +1,19 @@
-//! Classification after splatting, SPEC §9: values and gradients are splatted onto the slab planes, and what a pixel sees between two
+//! Classification after splatting (SPEC §9): values and gradients are splatted onto the slab planes, and what a pixel sees between two
 //! planes is classified and shaded there.
 //!
-//! The method is that of Mueller, Möller and Crawfis, *Splatting without the blur* (IEEE Visualization 1999), with the transfer function
-//! integrated between planes as Engel, Kraus and Ertl do for slices (*High-quality pre-integrated volume rendering using
-//! hardware-accelerated pixel shading*, Graphics Hardware 2001). In the order of the stages:
+//! The method is from Mueller, Möller and Crawfis, *Splatting without the blur* (IEEE Visualization 1999). The transfer function is
+//! integrated between planes as by Engel, Kraus and Ertl for slices (*High-quality pre-integrated volume rendering using
+//! hardware-accelerated pixel shading*, Graphics Hardware 2001). The modules, in the order of the stages:
 //!
-//! - [`coefficients`]: `c = v` (`smooth`), or the c with `f(v_j) = v_j` at every voxel (`exact`).
+//! - [`coefficients`]: `c = v` (`smooth`), or the c for which `f(v_j) = v_j` at every voxel (`exact`).
 //! - [`field`]: `f = Σ c_i·g_i / N` with `g_i = exp(-falloff·|δ_i|²)`, `N = Σ g_i`, and `∇f`, on the slab planes ([`Frame::plane_field`]);
-//!   [`low_pass`] says how the kernel sees the offsets δ_i where pixels are large.
+//!   [`low_pass`] transforms the offsets δ_i where pixels are large.
 //! - [`slab_integral`]: `m̄ = mean of m`, `C̄ = ∫m·C / ∫m`, `v̄ = ∫m·v / ∫m` over the values from plane to plane.
 //! - [`pixel`]: the sheet `(C·m̄, m̄)·ℓ` with C the C̄ shaded by the gradient at v̄, ℓ the length of the pixel's ray ([`Frame::slab_sheet`]);
-//!   its compositing; `extreme` and `surface` look at the values themselves.
+//!   its compositing; `extreme` and `surface` use the values themselves.
 //!
-//! Everything is computed pixel by pixel from the voxels around a point, in f64 and without tables, lists or culling. Rays are a pixel's
-//! own; there is no approximation but rounding.
+//! Everything is computed pixel by pixel from the voxels around a point, in f64 and without tables, lists or culling. Each pixel has its
+//! own ray, and rounding is the only approximation.
 
 pub mod coefficients;
 mod counts;
@@ -39,7 +39,7 @@ pub use field::Field;
 use low_pass::LowPass;
 pub use pixel::{Composited, Pixel, Sample, Slab};
 
-/// A scene, ready to be drawn.
+/// A scene that is ready to be drawn.
 #[derive(Debug)]
 pub struct Frame<'a> {
     volume: &'a Volume,
@@ -52,7 +52,7 @@ pub struct Frame<'a> {
 
 impl<'a> Frame<'a> {
     /// # Errors
-    /// If the scene asks for more than can be computed.
+    /// If the scene needs more than can be computed.
     pub fn new(
         host: Host<'a>,
         volume: &'a Volume,
@@ -68,7 +68,7 @@ impl<'a> Frame<'a> {
         Ok(Self { volume, transfer, scene, host, geometry, field })
     }
 
-    /// The view.
+    /// The view's geometry.
     pub fn geometry(&self) -> &Geometry {
         &self.geometry
     }
@@ -88,7 +88,7 @@ impl<'a> Frame<'a> {
                 let in_plane = |step: DVec3| (step - step.dot(geometry.ro) * geometry.ro) * geometry.pix;
                 Some(LowPass::new(in_plane(right), in_plane(down)))
             }
-            // Planes are parallel to the image, and so to the steps from pixel to pixel.
+            // Planes are parallel to the image, and therefore to the steps from pixel to pixel.
             Some(eye) => {
                 let depth = f64::from(plane) * geometry.slab_width;
                 let pix = eye.pix(depth);
@@ -97,17 +97,17 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// A pixel, counted from the upper left.
+    /// The pixel at a position counted from the upper left.
     pub fn pixel(&self, pixel: UVec2) -> Pixel<'_> {
         Pixel::new(self, pixel)
     }
 
-    /// The field where the rays of all pixels meet a plane, row by row; `None` where it has no value.
+    /// The field where the rays of all pixels meet a plane, row by row; `None` where there is no value.
     pub fn plane_field(&self, plane: i32) -> Vec<Option<Sample>> {
         self.each_pixel(|pixel| pixel.sample(plane))
     }
 
-    /// The sheet of a slab, for all pixels.
+    /// A slab's sheet for all pixels.
     pub fn slab_sheet(&self, number: i32) -> Buffer {
         let sheet = |pixel: Pixel| pixel.slab(number).map(|slab| pixel.sheet(&slab)).unwrap_or_default();
         Buffer { width: self.geometry.size.x as usize, pixels: self.each_pixel(sheet) }
@@ -125,10 +125,10 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// Renders a scene as [`super::render_for`] does. Nothing is culled, and the order of compositing makes no difference.
+/// Renders a scene as [`super::render_for`] does. Nothing is culled, and the order of compositing does not matter.
 ///
 /// # Errors
-/// If the scene asks for more than can be computed.
+/// If the scene needs more than can be computed.
 pub fn render_for(
     host: Host<'_>,
     volume: &Volume,
@@ -138,7 +138,7 @@ pub fn render_for(
     let frame = Frame::new(host, volume, transfer, scene)?;
     let pixels = frame.composite();
     let acc = Buffer { width: scene.image.width as usize, pixels: pixels.iter().map(|pixel| pixel.color).collect() };
-    // Sums are clamped; everything else is premultiplied RGBA already.
+    // Sums are clamped; the other modes already give premultiplied RGBA.
     let resolved_as = match scene.splatting.compositing {
         Compositing::Xray => Compositing::Xray,
         _ => Compositing::Linear,

@@ -1,4 +1,4 @@
-//! What one pixel sees of the slabs: its ray, the fields on their planes, their sheets, and the composited pixel (SPEC §9).
+//! One pixel: its ray, the fields on the planes along it, their sheets, and the composited result (SPEC §9).
 
 use std::ops::Range;
 
@@ -14,17 +14,17 @@ use crate::reference::shading;
 use crate::settings::splatting::{Compositing, Order};
 use crate::settings::transfer_function::Tables;
 
-/// Compositing ends early where a pixel can gain no more than this.
+/// Compositing ends early when the pixel cannot change by more than this.
 const REST: f64 = 1e-12;
 
-/// The ray of a pixel's centre among the slab planes. Places on it are counted in sheets: slab k lies between the planes k and k + 1.
+/// The ray of a pixel's centre. Positions on it are counted in sheets: slab k lies between planes k and k + 1.
 #[derive(Debug)]
 pub struct Pixel<'a> {
     frame: &'a Frame<'a>,
     ray: PixelRay,
-    /// What of the ray lies in the box of voxel cells, beyond the near plane, within the cuts and before a host's surface; empty if nothing.
+    /// The part of the ray in the box of voxel cells, beyond the near plane, within the cuts and before a host's surface; may be empty.
     stretch: Range<f64>,
-    /// Length of the ray from plane to plane, `unit`s.
+    /// The length of the ray from plane to plane in `unit`s.
     length_per_sheet: f64,
 }
 
@@ -37,19 +37,19 @@ pub struct Sample {
     pub gradient: DVec3,
 }
 
-/// The values that a pixel sees at the two planes of a slab.
+/// The values at the two planes of a slab.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slab {
-    /// k.
+    /// The slab's index k.
     pub number: i32,
     /// f0 and f1.
     pub values: [f64; 2],
-    /// The planes whose values they are: where only one has a value it holds for both.
+    /// The planes of these values: if only one plane has a value, it stands for both.
     pub planes: [i32; 2],
 }
 
 impl Slab {
-    /// Slab k, from the values of its planes; `None` where neither has one.
+    /// Slab k, from the values at its planes; `None` if neither has one.
     pub fn new(number: i32, near: Option<f64>, far: Option<f64>) -> Option<Self> {
         let (values, planes) = match (near, far) {
             (Some(f0), Some(f1)) => ([f0, f1], [number, number + 1]),
@@ -66,12 +66,12 @@ impl Slab {
 pub struct Composited {
     /// Premultiplied RGBA.
     pub color: DVec4,
-    /// Where the opacity that a host asks for is reached, in sheets.
+    /// The position in sheets at which the host's opacity is reached.
     pub first_hit: Option<f64>,
 }
 
 impl<'a> Pixel<'a> {
-    /// A pixel, counted from the upper left.
+    /// The pixel at a position counted from the upper left.
     pub fn new(frame: &'a Frame<'a>, pixel: UVec2) -> Self {
         let geometry = &frame.geometry;
         let ray = PixelRay::new(geometry, pixel);
@@ -85,7 +85,7 @@ impl<'a> Pixel<'a> {
         Self { frame, length_per_sheet: ray.along.length() * depth_per_sheet, ray, stretch }
     }
 
-    /// The stretch of the ray that counts, in sheets.
+    /// The visible stretch of the ray, in sheets.
     pub fn stretch(&self) -> &Range<f64> {
         &self.stretch
     }
@@ -95,12 +95,12 @@ impl<'a> Pixel<'a> {
         if self.stretch.is_empty() { 0..0 } else { self.stretch.start.floor() as i32..self.stretch.end.ceil() as i32 }
     }
 
-    /// What of the stretch lies in a slab; empty if nothing.
+    /// The part of the stretch in a slab; may be empty.
     pub fn shown(&self, slab: i32) -> Range<f64> {
         self.stretch.start.max(f64::from(slab))..self.stretch.end.min(f64::from(slab) + 1.0)
     }
 
-    /// A place on the ray in voxel coordinates.
+    /// The voxel coordinates of a position on the ray.
     pub fn at(&self, sheet: f64) -> DVec3 {
         let geometry = &self.frame.geometry;
         let position = self.ray.origin + self.ray.depth(geometry, sheet) * self.ray.along;
@@ -112,17 +112,17 @@ impl<'a> Pixel<'a> {
         -self.ray.along.normalize()
     }
 
-    /// From plane to plane along the ray, voxels along each axis.
+    /// The step along the ray from plane to plane, in voxels along each axis.
     pub fn step(&self) -> DVec3 {
         (self.at(1.0) - self.at(0.0)).abs()
     }
 
-    /// The depth along w of a place, `unit`s from the eye (orthographic: from the camera's centre).
+    /// The depth of a position along w, in `unit`s from the eye (orthographic: from the camera's centre).
     pub fn depth(&self, sheet: f64) -> f64 {
         self.ray.depth(&self.frame.geometry, sheet)
     }
 
-    /// The tables of the voxel whose cell holds a place.
+    /// The tables of the voxel whose cell contains a position.
     pub fn tables(&self, sheet: f64) -> Tables<'a> {
         let cell = || nearest(&self.frame.geometry.grid, self.at(sheet)) as usize;
         let label = self.frame.volume.labels().map(|labels| labels[cell()]);
@@ -161,7 +161,7 @@ impl<'a> Pixel<'a> {
         [first, if near == far { first } else { self.gradient(far) }]
     }
 
-    /// The sheet of a slab: `(C·m, m)·ℓ`.
+    /// A slab's sheet: `(C·m, m)·ℓ`.
     pub fn sheet(&self, slab: &Slab) -> DVec4 {
         let (scene, shown) = (&self.frame.scene, self.shown(slab.number));
         if shown.is_empty() {
@@ -181,7 +181,7 @@ impl<'a> Pixel<'a> {
         color.extend(1.0) * amount * (shown.end - shown.start) * self.length_per_sheet
     }
 
-    /// All slabs as the scene composites them.
+    /// The pixel composited from all slabs by the scene's rule.
     pub fn composite(&self) -> Composited {
         match self.frame.scene.splatting.compositing {
             Compositing::Linear | Compositing::Exponential | Compositing::Xray => self.composite_sheets(),
@@ -190,7 +190,7 @@ impl<'a> Pixel<'a> {
         }
     }
 
-    /// Front to back; the image is the same in the other order.
+    /// Composites front to back; the other order gives the same image.
     fn composite_sheets(&self) -> Composited {
         let (compositing, wanted) = (self.frame.scene.splatting.compositing, self.frame.host.first_hit);
         let mut pixel = Composited { color: DVec4::ZERO, first_hit: None };

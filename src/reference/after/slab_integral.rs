@@ -1,13 +1,13 @@
-//! What the transfer function makes of the values between two slab planes (SPEC §9): pre-integration (Engel, Kraus, Ertl, *High-quality
-//! pre-integrated volume rendering using hardware-accelerated pixel shading*, 2001), here without a table.
+//! The integral of the transfer function over the values between two slab planes (SPEC §9): pre-integration (Engel, Kraus, Ertl,
+//! *High-quality pre-integrated volume rendering using hardware-accelerated pixel shading*, 2001), here without a table.
 //!
 //! The values run linearly from f0 to f1, `v(t) = f0 + (f1 - f0)·t` for t from 0 to 1. With m(v) the amount per unit length,
-//! `m̄ = ∫m dt`, `C̄ = ∫m·C dt / ∫m dt`, and `(v̄ - f0)/(f1 - f0) = ∫m·t dt / ∫m dt`, which is safe where f0 and f1 are nearly or quite equal.
+//! `m̄ = ∫m dt`, `C̄ = ∫m·C dt / ∫m dt`, and `(v̄ - f0)/(f1 - f0) = ∫m·t dt / ∫m dt`, which is stable even if f0 and f1 are equal.
 //!
-//! Between control points, ends of iso-ranges and where α reaches its cap, α and C are linear and the integrands are smooth, so each such
-//! piece has its own quadrature. Gauss's with `NODES` nodes is exact for the products of linear functions. The logarithm of `exponential`
-//! grows without bound towards `1 - α = 0`: pieces over which `1 - α` falls to less than half are cut where it has halved, and there
-//! the quadrature errs by less than 1e-12.
+//! α and C are linear, and the integrands smooth, between control points, ends of iso-ranges and the point where α reaches its cap, so each
+//! of these pieces has its own quadrature. Gauss's with `NODES` nodes is exact for products of linear functions. The logarithm of
+//! `exponential` diverges towards `1 - α = 0`: pieces over which `1 - α` falls to less than half are split wherever it halves, after
+//! which the quadrature errs by less than 1e-12.
 
 use glam::DVec3;
 
@@ -15,10 +15,10 @@ use crate::reference::shading::amount;
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::{Ramp, Tables};
 
-/// Opacities above this count as this in the logarithm of `exponential` (SPEC §5).
+/// The cap of opacities in the logarithm of `exponential` (SPEC §5).
 const MAX_ALPHA: f64 = 0.9999;
 
-/// Gauss–Legendre nodes in [-1, 1] and their weights, one half of each symmetric pair.
+/// Gauss–Legendre nodes in [-1, 1] with their weights; one of each symmetric pair.
 const NODES: [(f64, f64); 4] = [
     (0.183_434_642_495_649_8, 0.362_683_783_378_362),
     (0.525_532_409_916_329, 0.313_706_645_877_887_3),
@@ -33,12 +33,12 @@ pub struct SlabIntegral {
     pub amount: f64,
     /// `C̄`, unshaded.
     pub color: DVec3,
-    /// `(v̄ - f0)/(f1 - f0)`, in [0, 1]; where they are equal ½.
+    /// `(v̄ - f0)/(f1 - f0)` in [0, 1]; ½ if f0 and f1 are equal.
     pub share: f64,
 }
 
 impl SlabIntegral {
-    /// The means over the values from f0 to f1; `None` if none of them has an opacity.
+    /// The means over the values from f0 to f1; `None` if all of them are transparent.
     pub fn new(tables: &Tables, compositing: Compositing, [f0, f1]: [f64; 2]) -> Option<Self> {
         if !tables.visible {
             return None;
@@ -66,7 +66,7 @@ impl SlabIntegral {
     }
 }
 
-/// Whether any value from f0 to f1 has an opacity, a single one in an iso-range of its own too.
+/// Whether any value from f0 to f1 has an opacity above 0, including a single value with its own iso-range.
 pub fn is_visible(tables: &Tables, [f0, f1]: [f64; 2]) -> bool {
     let at = |t: f64| f0 + (f1 - f0) * t;
     let alpha = |t: f64| tables.opacity.at(at(t));
@@ -78,7 +78,7 @@ pub fn is_visible(tables: &Tables, [f0, f1]: [f64; 2]) -> bool {
     tables.visible && (knots.iter().any(shows_at) || knots.windows(2).any(shows_inside))
 }
 
-/// Where α or C has a kink or m a step on the way from f0 to f1: increasing from 0 to 1.
+/// The positions between f0 and f1 at which α or C has a kink or m a step, ascending from 0 to 1.
 pub fn knots(tables: &Tables, [f0, f1]: [f64; 2]) -> Vec<f64> {
     fn positions<T>(ramp: &Ramp<T>) -> impl Iterator<Item = f64> + '_
     where
@@ -96,11 +96,11 @@ pub fn knots(tables: &Tables, [f0, f1]: [f64; 2]) -> Vec<f64> {
     knots
 }
 
-/// Cuts a piece over which α is linear into some over which m is smooth enough for the quadrature.
+/// Splits a piece over which α is linear into pieces over which m is smooth enough for the quadrature.
 fn smooth_pieces(compositing: Compositing, start: f64, end: f64, alpha_start: f64, alpha_end: f64) -> Vec<(f64, f64)> {
     let mut cuts = vec![start];
     if compositing == Compositing::Exponential && alpha_start != alpha_end {
-        // Transparencies 1 - α from the larger to the smaller, and where along the piece they are.
+        // The transparencies 1 - α at both ends, the larger one first, and the ends' positions.
         let [larger, smaller] =
             [1.0 - alpha_start.min(alpha_end), (1.0 - alpha_start.max(alpha_end)).max(1.0 - MAX_ALPHA)];
         let place = |transparency: f64| {
@@ -115,7 +115,7 @@ fn smooth_pieces(compositing: Compositing, start: f64, end: f64, alpha_start: f6
     cuts.windows(2).map(|pair| (pair[0], pair[1])).filter(|(start, end)| start < end).collect()
 }
 
-/// The quadrature's nodes and weights over an interval.
+/// The quadrature's nodes and weights on an interval.
 fn nodes(start: f64, end: f64) -> impl Iterator<Item = (f64, f64)> {
     let (middle, half) = ((start + end) / 2.0, (end - start) / 2.0);
     let pair = move |(node, weight): (f64, f64)| {
@@ -135,7 +135,7 @@ mod tests {
         TransferFunction::by_value(Ramp::new(color).unwrap(), Ramp::new(opacity.to_vec()).unwrap())
     }
 
-    /// The means by brute force.
+    /// The means by summation.
     fn summed(tables: &Tables, compositing: Compositing, [f0, f1]: [f64; 2]) -> [f64; 5] {
         const STEPS: usize = 400_000;
         let mut sums = [0.0; 5];
@@ -186,7 +186,7 @@ mod tests {
         }
     }
 
-    /// Against closed forms: the integral of -ln(1-α), α linear, and of a product of two linear functions.
+    /// Compares with closed forms: the integral of -ln(1-α) for linear α, and that of a product of two linear functions.
     #[test]
     fn closed_forms() {
         let transfer = transfer(&[(0.0, 0.0), (100.0, 0.9999)]);
@@ -219,7 +219,7 @@ mod tests {
                 }
             }
         }
-        // One value alone has an opacity, and only a pixel that sees nothing else shows it.
+        // Only one value has an opacity, so only a pixel that sees nothing else shows it.
         let iso_ranges = Some(vec![[40.0, 40.0]]);
         let single = TransferFunction { iso_ranges, ..transfer.clone() };
         let tables = single.tables(None);

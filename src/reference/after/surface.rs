@@ -1,5 +1,5 @@
-//! `surface` after splatting (SPEC §9): where along the ray `opacity·gradient_opacity` first reaches one half, the pixel is opaque and has
-//! that point's shaded colour. Values and gradients are linear from plane to plane.
+//! `surface` after splatting (SPEC §9): the pixel is opaque, with the shaded colour of the point, where `opacity·gradient_opacity` first
+//! reaches one half along the ray. Values and gradients are linear from plane to plane.
 
 use std::cell::LazyCell;
 
@@ -10,16 +10,16 @@ use super::slab_integral::knots;
 use crate::reference::shading;
 use crate::settings::transfer_function::Tables;
 
-/// The opacity of a surface.
+/// The opacity at a surface.
 const HALF: f64 = 0.5;
 
-/// Samples of a stretch over which the values cross no control point, where the gradient's length bends the opacity.
+/// The number of samples between control points, where the gradient's length makes the opacity nonlinear.
 const SAMPLES: u32 = 32;
 
-/// Halvings of the stretch between two samples that holds the surface.
+/// The number of bisections between the two samples around the surface.
 const HALVINGS: u32 = 50;
 
-/// The pixel that its first surface gives.
+/// The pixel of its first surface.
 pub(super) fn composite(pixel: &Pixel) -> Composited {
     let mut near = None;
     for (first, k) in (0..).zip(pixel.slabs()) {
@@ -54,7 +54,7 @@ fn in_slab(pixel: &Pixel, slab: &Slab) -> Option<Composited> {
     None
 }
 
-/// What a pixel shows of a slab, from 0 at its near plane to 1 at its far plane, cut where the ray passes from one voxel's cell into
+/// The visible part of a slab, from 0 at its near plane to 1 at its far plane, split where the ray passes from one voxel's cell into
 /// another's if their labels may differ.
 fn cells(pixel: &Pixel, slab: i32) -> Vec<[f64; 2]> {
     let (shown, first) = (pixel.shown(slab), f64::from(slab));
@@ -76,24 +76,24 @@ fn cells(pixel: &Pixel, slab: i32) -> Vec<[f64; 2]> {
     cuts.windows(2).map(|pair| [pair[0], pair[1]]).filter(|[start, end]| start < end).collect()
 }
 
-/// Values that run linearly over a part of a slab, where one set of tables holds.
+/// Values that run linearly over a part of a slab to which one set of tables applies.
 struct Line<'a> {
     tables: Tables<'a>,
     values: [f64; 2],
-    /// Where in the slab.
+    /// The part's position in the slab.
     start: f64,
     end: f64,
 }
 
 impl Line<'_> {
-    /// The first place in the slab with an opacity of one half.
+    /// The first position in the slab with an opacity of one half.
     fn first_surface(&self, gradient: &impl Fn(f64) -> DVec3) -> Option<f64> {
         let tables = &self.tables;
         let [f0, f1] = self.values;
         let value = |s: f64| f0 + (f1 - f0) * s;
         let place = |s: f64| self.start + (self.end - self.start) * s;
         let knots = knots(tables, self.values);
-        // Gradients take opacity away only.
+        // Gradient opacity can only reduce the opacity.
         if !tables.visible || knots.iter().all(|&s| tables.opacity.at(value(s)) < HALF) {
             return None;
         }
@@ -101,7 +101,7 @@ impl Line<'_> {
         let samples = if tables.gradient_opacity.is_some() { SAMPLES } else { 1 };
         for piece in knots.windows(2) {
             let [low, high] = [piece[0], piece[1]];
-            // The ends of iso-ranges belong to them, so a piece's first point may show where the piece does not.
+            // Iso-ranges are closed, so a piece's first point may be visible although the piece is not.
             if self.shows_at(low, value(low), factor) {
                 return Some(place(low));
             }

@@ -1,4 +1,4 @@
-//! A phantom of a human head, sculpted in millimetres: x to the left ear, y to the back, z to the crown.
+//! A phantom of a human head, modelled in millimetres: x to the left ear, y to the back, z to the crown.
 
 use glam::{DVec3, dvec2, dvec3};
 
@@ -6,7 +6,7 @@ use super::Grid;
 use super::sdf::Part::{Add, AddTube, Cut, CutTube};
 use super::sdf::{Layer, Part, ellipsoid, intersection, sculpt, smoothstep, tube, union, wave};
 
-/// World units per millimetre: the head from the crown to below the chin fills the volume's height.
+/// World units per millimetre, such that the head from the crown to below the chin fills the volume's height.
 const SCALE: f64 = 0.635;
 
 /// Height of the cut through the neck.
@@ -15,12 +15,12 @@ const NECK: f64 = -124.0;
 /// Where the spinal cord ends, below the cut.
 const SPINE: [f64; 3] = [0.0, 40.0, -140.0];
 
-/// Thickness of the grey matter on the brain.
+/// The thickness of the grey matter on the brain.
 const CORTEX: f64 = 3.2;
 
 const EYE: DVec3 = dvec3(32.5, -76.5, 6.0);
 
-/// What every label means. The brain's two include the cerebellum, the brainstem and the optic nerves.
+/// The labels' names. Grey and white matter include the cerebellum, the brainstem and the optic nerves.
 pub(super) const LABELS: &[(u16, &str)] = &[
     (label::AIR, "air"),
     (label::SKIN, "skin and soft tissue"),
@@ -43,8 +43,8 @@ mod label {
     pub(super) const EYES: u16 = 7;
 }
 
-/// The values rise from tissue to tissue inwards — skin, bone, brain, eyes — so that every threshold between two of
-/// them finds one clean surface, without the fringe where a steeper edge passes through the value of another tissue.
+/// Values rise inwards from tissue to tissue (skin, bone, brain, eyes), so every threshold between two of them finds one clean
+/// surface, without the fringe where a steeper edge passes through another tissue's value.
 pub(super) fn painted(grid: &Grid) -> (Vec<f32>, Vec<u16>) {
     let layer = |value, label, distance: fn(DVec3) -> f64| {
         Layer::new(value, label, move |p| SCALE * distance(mirrored(p / SCALE)))
@@ -63,7 +63,7 @@ pub(super) fn painted(grid: &Grid) -> (Vec<f32>, Vec<u16>) {
     ])
 }
 
-/// The side that is modelled, its edge in the middle rounded off.
+/// The position on the modelled side, with the crease in the middle rounded off.
 fn mirrored(p: DVec3) -> DVec3 {
     dvec3((p.x * p.x + 1.0).sqrt() - 0.5, p.y, p.z)
 }
@@ -83,7 +83,7 @@ const VAULT: [Part; 4] = [
 
 fn skin(p: DVec3) -> f64 {
     let d = vault(p);
-    // Nothing of the face reaches the top of the head.
+    // No part of the face reaches the top of the head.
     if p.z > 85.0 {
         return d;
     }
@@ -94,7 +94,7 @@ fn skin(p: DVec3) -> f64 {
 }
 
 const FACE: [Part; 21] = [
-    // Neck, with the muscle from behind the ear to the breastbone.
+    // The neck, with the muscle from behind the ear to the breastbone.
     AddTube([0.0, 24.0, -30.0], [0.0, 26.0, -140.0], (50.0, 52.0), 26.0),
     AddTube([60.0, 26.0, -30.0], [24.0, -20.0, -140.0], (10.0, 10.0), 18.0),
     Add([0.0, -23.0, -116.0], [8.0, 8.0, 10.0], 14.0),
@@ -163,7 +163,7 @@ const NOSE_AND_MOUTH: [Part; 18] = [
 ];
 
 fn ear(p: DVec3) -> f64 {
-    // The ear's own axes: outwards, backwards along the flap, upwards.
+    // The ear's own axes: outwards, backwards along the flap, and upwards.
     let (out, back, up) = (dvec3(0.88, -0.46, -0.06), dvec3(0.44, 0.84, 0.32), dvec3(-0.1, -0.31, 0.945));
     let q = p - dvec3(74.5, 14.0, -4.0);
     let q = dvec3(q.dot(out), q.dot(back), q.dot(up));
@@ -191,7 +191,7 @@ fn ear(p: DVec3) -> f64 {
 }
 
 fn bone(p: DVec3) -> f64 {
-    // The vault without its lower part, where neck and face are.
+    // The vault without its lower part, where the neck and the face are.
     let d = intersection(vault(p) + 6.5, floor(p) - 7.0, 8.0);
     let d = sculpt(p, d, &SKULL);
     let d = union(d, teeth(p), 2.0);
@@ -201,15 +201,15 @@ fn bone(p: DVec3) -> f64 {
     let bodies = tube(p, dvec3(0.0, 20.0, -34.0), dvec3(0.0, 22.0, -140.0), (12.0, 13.0));
     let arches = tube(p, dvec3(0.0, 38.0, -44.0), SPINE.into(), (13.0, 14.5));
     let d = union(d, union(bodies, arches, 4.0) - rings, 4.0);
-    // Never nearer to the air than the soft tissue over it.
+    // Bone keeps a minimum distance from the air: the thickness of the soft tissue over it.
     if d > 5.0 { d } else { intersection(d, skin(p) + 3.5, 3.0) }
 }
 
-/// Two rows on an elliptic arch.
+/// Two rows of teeth on an elliptic arch.
 fn teeth(p: DVec3) -> f64 {
     let (x, y) = (p.x / 25.0, (p.y + 50.0).min(0.0) / 34.0);
     let arch = (dvec2(x, y).length() - 1.0) * 28.0;
-    // From tooth to tooth, 0 in the middle of the face and 1 at the last molar.
+    // The position along the row of teeth: 0 in the middle of the face and 1 at the last molar.
     let along = x / (x - y + 1e-9);
     let gap = 0.9 * wave(8.0 * along - 0.25).max(0.0);
     let row = (p.z + 59.5).abs();
@@ -218,7 +218,7 @@ fn teeth(p: DVec3) -> f64 {
     intersection(d, 1.0 - row, 1.5)
 }
 
-/// How far below the floor of the brain's cavity: shelves that go down from front to back.
+/// Distance below the floor of the brain's cavity: shelves that descend from front to back.
 fn floor(p: DVec3) -> f64 {
     24.0 - 26.0 * smoothstep(-48.0, -30.0, p.y) - 8.0 * smoothstep(10.0, 34.0, p.y) - p.z
 }
@@ -263,9 +263,9 @@ fn fossa(p: DVec3) -> f64 {
     ellipsoid(p, dvec3(0.0, 39.0, -9.0), dvec3(47.0, 36.0, 31.0))
 }
 
-/// The halves of the brain, deeply folded.
+/// The two deeply folded halves of the brain.
 fn cerebrum(p: DVec3, room: f64) -> f64 {
-    // The cleft between the halves ends above the bridge that connects them; behind, the cerebellum lies below.
+    // The cleft between the halves ends above the bridge that connects them; behind it the cerebellum lies below.
     let bridge = ellipsoid(p, dvec3(0.0, 4.0, 34.0), dvec3(34.0, 40.0, 24.0));
     let cleft = intersection(p.x - 1.0, -bridge, 4.0);
     let below = 12.0 - 20.0 * smoothstep(36.0, 16.0, p.y) - 0.1 * p.x - p.z;
@@ -274,7 +274,7 @@ fn cerebrum(p: DVec3, room: f64) -> f64 {
     if (-28.0..8.0).contains(&d) { intersection(d, -furrow(p, -d), 3.5) } else { d }
 }
 
-/// Distance to the furrows between the folds: a warped labyrinth of sheets, closing with the depth below the surface.
+/// Distance to the furrows between the folds: a warped labyrinth of sheets that closes with the depth below the surface.
 fn furrow(p: DVec3, depth: f64) -> f64 {
     const PERIOD: f64 = 30.0;
     let warp = dvec3(wave(p.y / 71.0 + 0.1), wave(p.z / 63.0 + 0.4), wave(p.x / 67.0 + 0.8));
@@ -308,9 +308,9 @@ fn optic_nerve(p: DVec3) -> f64 {
     union(nerve, tube(p, chiasm, dvec3(12.0, 10.0, 16.0), (2.2, 3.0)), 2.0)
 }
 
-/// Everything of nerves; grey outside, and white from a depth of [`CORTEX`] on.
+/// All nervous tissue: grey outside, white below a depth of [`CORTEX`].
 fn brain(p: DVec3) -> f64 {
-    // What the fluid around it leaves.
+    // The room that the fluid around the brain leaves.
     let room = cavity(p) + 2.5;
     cerebrum(p, room).min(cerebellum(p, room)).min(brainstem(p)).min(optic_nerve(p))
 }

@@ -13,22 +13,21 @@ use rayon::prelude::*;
 use super::access::{Access, ReadOptions};
 use super::{Grid, Labels, Volume, VolumeError};
 
-/// The volumes that [`volume`] knows.
+/// The names that [`volume`] accepts.
 pub const NAMES: &[&str] = &["cube", "head", "nerve", "tomato", "marschner-lobb"];
 
 /// The sizes that `NAME:N` accepts for the largest dimension.
 const SIZES: std::ops::RangeInclusive<u32> = 2..=1024;
 
-/// A procedural volume by name (SPEC §8): `NAME` in the paper's size, `NAME:N` with N voxels along the largest
-/// dimension and the same extent in world units.
+/// A procedural volume by name (SPEC §8): `NAME` in the paper's size, or `NAME:N` with N voxels along the largest dimension and the
+/// same extent in world units.
 ///
-/// The values are those of an 8-bit scanner, whole numbers from 0 to 255 — but for `marschner-lobb`, whose values are
-/// not rounded — and the same in every run. [`labels`] says which volumes are segmented: there every voxel has the label of the tissue
-/// that fills most of it.
+/// Values are those of an 8-bit scanner, whole numbers from 0 to 255, except that `marschner-lobb` is not rounded. They are the same in
+/// every run. In a segmented volume (see [`labels`]) every voxel has the label of the tissue that fills most of it.
 ///
 /// # Errors
-/// If the name is unknown, N is not a whole number from 2 to 1024, or the volume would take more memory than
-/// [`ReadOptions::memory`] allows by default.
+/// If the name is unknown, N is not a whole number from 2 to 1024, or the volume needs more memory than [`ReadOptions::memory`]
+/// allows by default.
 pub fn volume(name: &str) -> Result<Volume, VolumeError> {
     read(name, &Access::new(&ReadOptions::default())?)
 }
@@ -85,14 +84,14 @@ pub(crate) fn read(name: &str, access: &Access) -> Result<Volume, VolumeError> {
     }
 }
 
-/// How a volume is made: values alone, or with labels.
+/// The function that makes a volume's values, or its values and labels.
 enum Painted {
     Values(fn(&Grid) -> Vec<f32>),
     Tissues(fn(&Grid) -> (Vec<f32>, Vec<u16>)),
 }
 
-/// What the labels of a procedural volume mean, number and name, for `NAME` or `NAME:N`: none if it is not segmented, `None` if there
-/// is no such volume.
+/// The labels of a procedural volume, each with its name, for `NAME` or `NAME:N`: empty if the volume is not segmented, `None` if
+/// there is no such volume.
 ///
 /// | | 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7 |
 /// |---|---|---|---|---|---|---|---|---|
@@ -110,7 +109,7 @@ fn kind_and_size(name: &str) -> (&str, Option<&str>) {
     name.split_once(':').map_or((name, None), |(kind, size)| (kind, Some(size)))
 }
 
-/// A solid cube of 32³ world units: 255 inside, 0 outside, nothing in between.
+/// A solid cube of 32³ world units: 255 inside, 0 outside, and no value in between.
 fn cube(grid: &Grid) -> Vec<f32> {
     sample(grid, |p| if p.abs().max_element() < 16.0 { 255.0 } else { 0.0 })
 }
@@ -127,7 +126,7 @@ fn marschner_lobb(grid: &Grid) -> Vec<f32> {
     })
 }
 
-/// A function of the world position at every voxel.
+/// A function of the world position, evaluated at every voxel.
 fn sample(grid: &Grid, value: impl Fn(DVec3) -> f64 + Sync) -> Vec<f32> {
     let UVec3 { x: nx, y: ny, z: nz } = grid.dims;
     let mut values = vec![0.0; nx as usize * ny as usize * nz as usize];

@@ -1,4 +1,4 @@
-//! A ganglion nerve cell as a confocal microscope sees it: a cell body, dendrites that branch, and nothing around.
+//! A ganglion nerve cell as a confocal microscope sees it: a cell body and branching dendrites in empty space.
 
 use glam::{DVec3, UVec3, dvec3};
 use rayon::prelude::*;
@@ -6,19 +6,19 @@ use rayon::prelude::*;
 use super::Grid;
 use super::sdf::{ellipsoid, smoothstep, wave};
 
-/// World units that a tube appears thicker along z: that is how much farther the microscope blurs there.
+/// By how many world units a tube appears thicker along z, where the microscope blurs more.
 const BLUR: f64 = 2.2;
 
-/// Half the width of an edge, within a slice and along z. World units.
+/// Half the width of an edge in world units, within a slice and along z.
 const SOFTNESS: (f64, f64) = (1.8, 4.5);
 
 /// Length of one straight piece of a dendrite.
 const STEP: f64 = 4.0;
 
-/// A dendrite does not get thinner than this.
+/// The minimum radius of a dendrite.
 const THINNEST: f64 = 2.0;
 
-/// Half the box that the cell stays in.
+/// Half the size of the box that contains the cell.
 const BOX: DVec3 = dvec3(246.0, 246.0, 178.0);
 
 const SOMA: DVec3 = dvec3(46.0, 39.0, 41.0);
@@ -60,7 +60,7 @@ pub(super) fn values(grid: &Grid) -> Vec<f32> {
     values
 }
 
-/// The cell body, uneven, with the nucleus darker and a bright nucleolus in it.
+/// The uneven cell body, with a darker nucleus and a bright nucleolus in it.
 fn soma(p: DVec3) -> f64 {
     let bumps = wave(p.x / 43.0 + 0.1) * wave(p.y / 37.0) + wave(p.y / 41.0 + 0.3) * wave(p.z / 47.0);
     let nucleus = ellipsoid(p, dvec3(6.0, -4.0, 3.0), dvec3(17.0, 16.0, 16.0));
@@ -69,7 +69,7 @@ fn soma(p: DVec3) -> f64 {
     inside.min(255.0) * coverage(ellipsoid(p, DVec3::ZERO, SOMA) - 1.6 * bumps, p / SOMA)
 }
 
-/// How much of a voxel is inside, from the distance and the surface's normal there (of any length).
+/// The fraction of a voxel that is inside, from the distance to the surface and its normal there (of any length).
 fn coverage(distance: f64, normal: DVec3) -> f64 {
     let along_z = normal.z * normal.z / normal.length_squared().max(1e-12);
     let soft = SOFTNESS.0 + (SOFTNESS.1 - SOFTNESS.0) * along_z;
@@ -77,7 +77,7 @@ fn coverage(distance: f64, normal: DVec3) -> f64 {
 }
 
 impl Segment {
-    /// How much longer the tube's cross section is along each axis.
+    /// How much longer the tube's cross section is along each axis because of the blur.
     fn blur(&self) -> DVec3 {
         dvec3(1.0, 1.0, 1.0 + BLUR / self.radii.0)
     }
@@ -92,11 +92,11 @@ impl Segment {
     }
 }
 
-/// SplitMix64: the same numbers on every machine.
+/// SplitMix64, which gives the same numbers on every machine.
 struct Random(u64);
 
 impl Random {
-    /// Uniform in [0, 1).
+    /// A uniform number in [0, 1).
     fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
@@ -109,7 +109,7 @@ impl Random {
         low + self.uniform() * (high - low)
     }
 
-    /// Uniform in the unit ball.
+    /// A uniform point in the unit ball.
     fn in_ball(&mut self) -> DVec3 {
         loop {
             let p = DVec3::from_array(std::array::from_fn(|_| self.between(-1.0, 1.0)));
@@ -124,20 +124,20 @@ impl Random {
 struct Tip {
     at: DVec3,
     direction: DVec3,
-    /// Rate at which the direction turns: changes slowly, so that dendrites are curved and not jagged.
+    /// The rate at which the direction turns. It changes slowly, so that dendrites are curved, not jagged.
     turn: DVec3,
     radius: f64,
-    /// What the radius tends to.
+    /// The value that the radius tends to.
     goal: f64,
-    /// World units from the cell body.
+    /// The distance grown from the cell body, in world units.
     path: f64,
-    /// World units until it branches.
+    /// The distance to the next branch, in world units.
     branch: f64,
 }
 
 /// All dendrites, from the cell body to the last twig.
 fn grow() -> Vec<Segment> {
-    /// Where the primary dendrites leave, and how thick they are.
+    /// Where the primary dendrites start, and their radii.
     const PRIMARY: [([f64; 3], f64); 8] = [
         ([1.0, 0.15, 0.25], 13.0),
         ([0.35, 0.9, -0.2], 10.0),
@@ -182,14 +182,14 @@ fn grow() -> Vec<Segment> {
 }
 
 impl Tip {
-    /// Fades from the cell body outwards.
+    /// The value at the tip, which fades from the cell body outwards.
     fn value(&self) -> f64 {
         130.0 + 110.0 / (1.0 + self.path / 90.0)
     }
 
     fn advance(&mut self, random: &mut Random) {
         self.turn = 0.85 * self.turn + 0.06 * random.in_ball();
-        // Outwards, but along the walls of the box rather than through them.
+        // The tip grows outwards, but along the walls of the box rather than through them.
         let wall = self.at / BOX * (self.at / BOX).abs() * (self.at / BOX).abs();
         let outwards = 0.03 * self.at.normalize_or_zero() - 0.12 * wall;
         self.direction = (self.direction + self.turn + outwards).normalize();
@@ -202,7 +202,7 @@ impl Tip {
         self.radius += 0.3 * (self.goal - self.radius);
     }
 
-    /// Where it peters out.
+    /// The last piece, which tapers off.
     fn end(&self) -> Segment {
         let to = self.at + 2.5 * STEP * self.direction;
         Segment { from: self.at, to, radii: (self.radius, 0.4), values: (self.value(), self.value()) }
@@ -216,7 +216,7 @@ impl Tip {
         Segment { from: self.at, to, radii: (1.0, 1.7), values: (self.value(), self.value()) }
     }
 
-    /// Splits into two: this one goes on, the other is returned. Their cross sections follow Rall's 3/2 power law.
+    /// Splits into two: this tip continues, the other one is returned. Their cross sections follow Rall's 3/2 power law.
     fn fork(&mut self, random: &mut Random) -> Self {
         let share = random.between(0.25, 0.5);
         let aside = random.in_ball() * dvec3(1.0, 1.0, 0.8);

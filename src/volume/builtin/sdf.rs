@@ -1,18 +1,18 @@
-//! Signed distances (negative inside) and how a solid becomes voxel values.
+//! Signed distances (negative inside), and how solids become voxel values.
 
 use glam::{DVec3, UVec3};
 use rayon::prelude::*;
 
 use super::Grid;
 
-/// Edge of the blocks that are decided at once, in voxels.
+/// The edge, in voxels, of the largest blocks that are tested as a whole.
 const BLOCK: u32 = 8;
 
-/// Half the width of the smooth step from outside to inside a tissue, in units of the finest spacing.
+/// Half the width of the smooth step into a tissue, in units of the finest spacing.
 const SOFTNESS: f64 = 1.25;
 
-/// How much faster than the true distance the estimates below may change. Blocks farther from a surface than this
-/// times their radius are taken to be on one side of it.
+/// An upper bound on how fast the distance estimates below change, relative to the true distance. A block farther from a surface than
+/// this times its radius lies on one side of it.
 const SLACK: f64 = 1.5;
 
 /// Distance to an ellipsoid, to first order: exact at the surface, the right sign elsewhere.
@@ -22,27 +22,27 @@ pub(super) fn ellipsoid(p: DVec3, center: DVec3, radii: DVec3) -> f64 {
     if slope > 0.0 { level * (level - 1.0) / slope } else { -radii.min_element() }
 }
 
-/// Distance to a tube from `a` to `b` with rounded ends, its radius going from `radii.0` to `radii.1`.
+/// Distance to a tube from `a` to `b` with rounded ends, whose radius goes from `radii.0` to `radii.1`.
 pub(super) fn tube(p: DVec3, a: DVec3, b: DVec3, radii: (f64, f64)) -> f64 {
     let axis = b - a;
     let t = ((p - a).dot(axis) / axis.length_squared()).clamp(0.0, 1.0);
     (p - a - t * axis).length() - radii.0 - t * (radii.1 - radii.0)
 }
 
-/// Both solids, the crease between them filled over a width of about `k`.
+/// The union of two solids, with the crease between them filled over a width of about `k`.
 pub(super) fn union(a: f64, b: f64, k: f64) -> f64 {
     let overlap = (k - (a - b).abs()).max(0.0);
     a.min(b) - overlap * overlap / (4.0 * k)
 }
 
-/// What is in both solids, the edge rounded over a width of about `k`.
+/// The intersection of two solids, with the edge rounded over a width of about `k`.
 pub(super) fn intersection(a: f64, b: f64, k: f64) -> f64 {
     -union(-a, -b, k)
 }
 
-/// A wave of period 1 and amplitude 1 that looks like a sine, from arcs of parabolas: the same on every machine.
+/// A sine-like wave of period 1 and amplitude 1 made of parabolas, the same on every machine.
 pub(super) fn wave(t: f64) -> f64 {
-    // Adding 1.5·2⁵² leaves no bits for the fraction: the nearest whole number, without a call.
+    // Adding 1.5·2⁵² leaves no bits for the fraction, which rounds to the nearest whole number without a function call.
     const ROUND: f64 = 6_755_399_441_055_744.0;
     let t = t - ((t + ROUND) - ROUND);
     16.0 * t * (0.5 - t.abs())
@@ -54,19 +54,19 @@ pub(super) fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// One part of a sculpture: a shape, how it joins what is there, and over which width.
+/// A part of a sculpture: a shape, how it joins the solid so far, and the width over which it blends.
 pub(super) enum Part {
-    /// Adds an ellipsoid: centre, radii, width.
+    /// Adds an ellipsoid: centre, radii, blend width.
     Add([f64; 3], [f64; 3], f64),
-    /// Adds a tube: from, to, the radii there, width.
+    /// Adds a tube: two ends, the radii there, blend width.
     AddTube([f64; 3], [f64; 3], (f64, f64), f64),
-    /// Takes an ellipsoid away: centre, radii, width.
+    /// Cuts out an ellipsoid: centre, radii, blend width.
     Cut([f64; 3], [f64; 3], f64),
-    /// Takes a tube away: from, to, the radii there, width.
+    /// Cuts out a tube: two ends, the radii there, blend width.
     CutTube([f64; 3], [f64; 3], (f64, f64), f64),
 }
 
-/// Distance to what the parts make of a solid at distance `start`, in order.
+/// Distance to the solid at distance `start` after the parts are applied in order.
 pub(super) fn sculpt(p: DVec3, start: f64, parts: &[Part]) -> f64 {
     parts.iter().fold(start, |d, part| match *part {
         Part::Add(center, radii, k) => union(d, ellipsoid(p, center.into(), radii.into()), k),
@@ -76,20 +76,20 @@ pub(super) fn sculpt(p: DVec3, start: f64, parts: &[Part]) -> f64 {
     })
 }
 
-/// Labels are below this; 0 is what no layer covers.
+/// One more than the maximum label; 0 means that no layer covers the voxel.
 const LABELS: usize = 8;
 
-/// What a voxel is painted with.
+/// The value and label that a voxel is painted with.
 #[derive(Clone, Copy)]
 pub(super) struct Tissue {
     pub(super) value: f64,
     pub(super) label: u16,
 }
 
-/// A tissue, and the distance to it at a world position.
+/// A tissue and its signed distance as a function of the world position.
 pub(super) struct Layer<'a> {
     tissue: Tissue,
-    /// How deep below the surface another tissue begins.
+    /// The depth below the surface at which another tissue begins.
     depth: f64,
     core: Tissue,
     distance: Box<dyn Fn(DVec3) -> f64 + Sync + 'a>,
@@ -101,13 +101,13 @@ impl<'a> Layer<'a> {
         Self { tissue, depth: 0.0, core: tissue, distance: Box::new(distance) }
     }
 
-    /// The same with another tissue from a depth on.
+    /// The same layer with another tissue below a depth.
     pub(super) fn with_core(self, depth: f64, value: f64, label: u16) -> Self {
         Self { depth, core: Tissue { value, label }, ..self }
     }
 }
 
-/// Values and labels from slice `z` on.
+/// Values and labels of some slices, from slice `z` on.
 struct Slab<'a> {
     z: u32,
     values: &'a mut [f32],
@@ -115,14 +115,13 @@ struct Slab<'a> {
 }
 
 impl Grid {
-    /// World position of a (fractional) voxel.
+    /// The world position of a (fractional) voxel.
     pub(super) fn position(&self, voxel: DVec3) -> DVec3 {
         (voxel - self.center()) * self.spacing
     }
 
-    /// Values of layers painted over each other onto 0, in order, with edges as soft as a scanner's. A voxel longer
-    /// than it is wide is a mean along its length that reaches to the next ones, as a thick slice is. A voxel's label is that of
-    /// the tissue it has most of.
+    /// Paints layers over each other onto 0, in order, with edges as soft as a scanner's. A voxel that is longer than wide is a mean along
+    /// its length that reaches into its neighbours, as a thick slice is. A voxel's label is the tissue that fills most of it.
     pub(super) fn paint(&self, layers: &[Layer]) -> (Vec<f32>, Vec<u16>) {
         let slice = self.dims.x as usize * self.dims.y as usize;
         let count = slice * self.dims.z as usize;
@@ -142,20 +141,19 @@ impl Grid {
         (values, labels)
     }
 
-    /// Paints the block of `size`³ voxels at `low`. Only the layers that can change within the block are handed down to its
-    /// eighths.
+    /// Paints the block of `size`³ voxels at `low`. Only layers that can change within the block are passed to its octants.
     fn paint_block(&self, slab: &mut Slab, low: UVec3, size: u32, layers: &[&Layer]) {
         let high = (low + size).min(self.dims);
         if low.cmpge(high).any() {
             return;
         }
-        // From the centre to the farthest place that a voxel is sampled at.
+        // The distance from the centre to the farthest sampled position.
         let extent = (high - low - 1).as_dvec3() + if self.samples() > 1 { 2.0 * DVec3::Z } else { DVec3::ZERO };
         let reach = (extent * self.spacing).length() / 2.0 * SLACK + SOFTNESS * self.unit();
         let center = self.position((low + high - 1).as_dvec3() / 2.0);
         let mut kept: Vec<&Layer> = Vec::with_capacity(layers.len());
         let mut uniform = Some(Tissue { value: 0.0, label: 0 });
-        // From the top down to one that hides the others.
+        // Layers from the top down to one that hides all others.
         for &layer in layers.iter().rev() {
             let distance = (layer.distance)(center);
             if distance > reach {
@@ -201,13 +199,13 @@ impl Grid {
             let weight = f64::from(n - k.abs());
             sum += weight * self.value(self.position(voxel.as_dvec3() + shift), layers, weight, &mut shares);
         }
-        // Of equal shares the first label's.
+        // The lowest label wins a tie.
         let most = (1..LABELS).fold(0, |most, label| if shares[label] > shares[most] { label } else { most });
         ((sum / f64::from(n * n)).round() as f32, most as u16)
     }
 
-    /// The value at a world position: from the top layer down, as long as something shows through. Adds how much of every tissue
-    /// there is, times a weight, to the labels' shares.
+    /// The value at a world position, from the top layer down as long as it is transparent. Adds each tissue's fraction, times `weight`,
+    /// to the labels' shares.
     fn value(&self, p: DVec3, layers: &[&Layer], weight: f64, shares: &mut [f64; LABELS]) -> f64 {
         let soft = SOFTNESS * self.unit();
         let (mut value, mut through) = (0.0, 1.0);
@@ -227,7 +225,7 @@ impl Grid {
         value
     }
 
-    /// Samples along z that a voxel's value is made of, per slice.
+    /// The number of samples per slice along z in a voxel's value.
     fn samples(&self) -> i32 {
         (self.spacing.z / self.unit()).round().max(1.0) as i32
     }

@@ -1,4 +1,4 @@
-//! A tomato as magnetic resonance shows it: wall, gel, placenta, core and seeds; the stem is at +z.
+//! A tomato in a magnetic resonance scan: wall, gel, placenta, core and seeds. The stem is at +z.
 
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
@@ -8,17 +8,17 @@ use glam::{DVec2, DVec3, dvec2, dvec3};
 use super::Grid;
 use super::sdf::{Layer, ellipsoid, intersection, smoothstep, tube, union, wave};
 
-/// Chambers around the core.
+/// The number of chambers around the core.
 const COUNT: usize = 5;
 
 /// Half the thickness of the walls between chambers, and the thickness of the outer wall.
 const SEPTUM: f64 = 4.5;
 const WALL: f64 = 15.0;
 
-/// Seeds in each chamber.
+/// The number of seeds in each chamber.
 const SEEDS: u32 = 22;
 
-/// What every label means.
+/// The labels' names.
 pub(super) const LABELS: &[(u16, &str)] = &[
     (0, "air"),
     (label::WALL, "wall"),
@@ -52,13 +52,13 @@ pub(super) fn painted(grid: &Grid) -> (Vec<f32>, Vec<u16>) {
 
 /// A chamber's directions from the core.
 struct Chamber {
-    /// Outwards.
+    /// The middle direction.
     axis: DVec2,
-    /// Out through the septa to its neighbours.
+    /// The directions of the septa on both sides.
     sides: [DVec2; 2],
 }
 
-/// The chambers, not all of the same width.
+/// The chambers, whose widths differ.
 static CHAMBERS: LazyLock<[Chamber; COUNT]> = LazyLock::new(|| {
     let axes = [0.03, 0.235, 0.42, 0.63, 0.825].map(|turn| dvec2(libm::cos(TAU * turn), libm::sin(TAU * turn)));
     std::array::from_fn(|i| Chamber {
@@ -72,7 +72,7 @@ fn outside(p: DVec3) -> f64 {
     let xy = p.truncate();
     let across = sector(xy);
     let shoulder = smoothstep(-70.0, 60.0, p.z);
-    // Deep near the stem, shallow elsewhere; as wide as the fruit is far from its axis.
+    // Deep near the stem, shallow elsewhere; its width grows with the distance from the fruit's axis.
     let width = 0.55 * xy.length() + 1.0;
     let furrow = (4.0 + 8.0 * shoulder) * smoothstep(8.0, 60.0, xy.length()) * smoothstep(-width, 0.0, across);
     let body = union(
@@ -85,7 +85,7 @@ fn outside(p: DVec3) -> f64 {
     union(d, tube(p, dvec3(0.0, 0.0, 50.0), dvec3(4.0, 3.0, 78.0), (7.0, 5.0)), 8.0)
 }
 
-/// Distance to the nearest chamber's wedge, negative inside: the planes between it and its neighbours, halfway.
+/// Distance to the nearest chamber's wedge (negative inside), whose sides are the planes halfway to its neighbours.
 fn sector(xy: DVec2) -> f64 {
     let wedges = CHAMBERS.iter().map(|chamber| chamber.sides.map(|side| side.dot(xy)));
     wedges.map(|[a, b]| intersection(a, b, 14.0)).fold(f64::INFINITY, f64::min)
@@ -120,7 +120,7 @@ fn core(p: DVec3) -> f64 {
 /// A flattened drop, its long axis away from the placenta.
 struct Seed {
     center: DVec3,
-    /// Along, across, and through the seed.
+    /// The directions along, across and through the seed.
     axes: [DVec3; 3],
 }
 
@@ -129,7 +129,7 @@ impl Seed {
         let (chamber, index) = ((index / SEEDS) as usize, index % SEEDS);
         let out = CHAMBERS[chamber].axis;
         let side = out.perp();
-        // Points of a golden spiral over the outer half of the placenta, a little off so that rows do not show.
+        // The seeds lie on a golden spiral over the outer half of the placenta, with jitter so that rows do not show.
         let jitter =
             |k: u32| wave(f64::from(index * (2 * k + 3) + chamber as u32 * 7) * 0.618_034 + 0.1 * f64::from(k));
         let z = 1.0 - 2.0 * (f64::from(index) + 0.5) / f64::from(SEEDS);

@@ -1,4 +1,4 @@
-//! A file's bytes, one after the other, inflated where the file says so.
+//! A sequential reader of a file's bytes, which inflates them where the file says so.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Chain, Cursor, Read};
@@ -10,11 +10,11 @@ use super::super::VolumeError;
 use super::super::samples::MAX_EXPANSION;
 use super::super::source::{CHUNK, Source, invalid, io_error};
 
-/// The rest of a file.
+/// The remaining bytes of a file.
 pub(super) struct Bytes {
     path: PathBuf,
     reader: Reader,
-    /// How many bytes were before.
+    /// The number of bytes consumed.
     at: u64,
     /// The maximum number of bytes that are left; the exact number unless the file is deflated.
     left: u64,
@@ -25,11 +25,11 @@ enum Reader {
     Inflated(BufReader<DeflateDecoder<Deflated>>),
 }
 
-/// What was read already, and the rest of the file.
+/// The bytes that were already read, and the rest of the file.
 type Deflated = Chain<Cursor<Vec<u8>>, BufReader<File>>;
 
 impl Bytes {
-    /// A file's first bytes, and all of it.
+    /// A file's first bytes, and a reader of the whole file.
     pub(super) fn open(mut source: Source) -> Result<(Vec<u8>, Self), VolumeError> {
         let left = source.left()?;
         let head = source.reader.fill_buf().map_err(io_error(&source.path))?;
@@ -37,7 +37,7 @@ impl Bytes {
         Ok((head, Self { path: source.path, reader: Reader::File(source.reader), at: 0, left }))
     }
 
-    /// What the rest is inflated, if `begun` was read of it already.
+    /// A reader of the rest, inflated. `begun` holds bytes of the rest that were already read.
     pub(super) fn inflated(self, begun: &[u8]) -> Result<Self, VolumeError> {
         let Reader::File(file) = self.reader else { return Ok(self) };
         let left = (self.left + begun.len() as u64).saturating_mul(MAX_EXPANSION);
@@ -50,12 +50,12 @@ impl Bytes {
         matches!(self.reader, Reader::Inflated(_))
     }
 
-    /// How many bytes were before.
+    /// The number of bytes consumed.
     pub(super) fn at(&self) -> u64 {
         self.at
     }
 
-    /// How many bytes are left at most.
+    /// The maximum number of bytes that are left.
     pub(super) fn at_most(&self) -> u64 {
         self.left
     }
@@ -87,7 +87,7 @@ impl Bytes {
         Ok(())
     }
 
-    /// So many bytes, fewer at the end. Memory is taken as they come.
+    /// The next `bytes` bytes, fewer only at the end. Memory grows as they are read.
     pub(super) fn read_up_to(&mut self, bytes: u64) -> Result<Vec<u8>, VolumeError> {
         let mut all = Vec::new();
         let read = match &mut self.reader {
@@ -99,7 +99,7 @@ impl Bytes {
         Ok(all)
     }
 
-    /// Skips bytes; there must be as many.
+    /// Skips `bytes` bytes, all of which must exist.
     pub(super) fn skip(&mut self, bytes: u64) -> Result<(), VolumeError> {
         let skipped = match &mut self.reader {
             Reader::File(reader) => match i64::try_from(bytes) {
@@ -120,7 +120,7 @@ impl Bytes {
         self.left = self.left.saturating_sub(bytes);
     }
 
-    /// The decoder reports damage as an I/O error, without the code that the operating system's own carry.
+    /// Tells damage from errors of the operating system: the decoder reports damage as an I/O error without an OS error code.
     fn damage(&self, error: io::Error) -> VolumeError {
         match error.raw_os_error() {
             Some(_) => io_error(&self.path)(error),

@@ -1,11 +1,11 @@
-//! Frames as codecs have them.
+//! The codecs of compressed frames.
 
 use hayro_jpeg2000::{DecodeSettings, DecoderContext, Image};
 use jpeg_decoder::{Decoder, PixelFormat};
 
 use super::super::samples::MAX_EXPANSION;
 
-/// How frames are encoded.
+/// The encoding of frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Codec {
     None,
@@ -14,19 +14,19 @@ pub(super) enum Codec {
     Jpeg2000,
 }
 
-/// What a frame may take up, in bytes, however short its code is. JPEG 2000 spends next to nothing on a slice that is all air.
+/// The frame size in bytes that any code may decode to, however short: JPEG 2000 spends next to nothing on a slice of air.
 const SMALL: u64 = 1 << 20;
 
 impl Codec {
-    /// By the transfer syntax.
+    /// The codec of a transfer syntax.
     ///
     /// # Errors
-    /// The transfer syntax, by name if it is a known one.
+    /// The transfer syntax, with its name if it is known.
     pub(super) fn of(transfer_syntax: &str) -> Result<Self, String> {
         let name = match transfer_syntax.strip_prefix("1.2.840.10008.1.2").unwrap_or("none") {
             "" | ".1" | ".1.99" | ".2" => return Ok(Self::None),
             ".5" => return Ok(Self::Rle),
-            // Baseline, extended, and lossless ones.
+            // Baseline, extended and lossless JPEG.
             ".4.50" | ".4.51" | ".4.57" | ".4.70" => return Ok(Self::Jpeg),
             ".4.90" | ".4.91" => return Ok(Self::Jpeg2000),
             ".4.80" | ".4.81" => " (JPEG-LS)",
@@ -38,13 +38,13 @@ impl Codec {
         Err(format!("{transfer_syntax}{name}"))
     }
 
-    /// What [`Self::of`] takes.
+    /// What [`Self::of`] accepts, for errors.
     pub(super) const ALLOWED: &str = "1.2.840.10008.1.2 with nothing or .1, .2 (uncompressed), .1.99 (deflated), .5 (RLE), .4.50, .4.51, .4.57, .4.70 (JPEG), .4.90, .4.91 (JPEG 2000) behind it";
 
-    /// A frame of so many columns, rows and bytes per sample, in the machine's byte order.
+    /// A decoded frame of `columns` × `rows` samples of `sample` bytes, in the machine's byte order.
     ///
     /// # Errors
-    /// What it is instead.
+    /// A description of what is wrong with the code.
     pub(super) fn decode(self, code: Vec<u8>, [columns, rows]: [u16; 2], sample: usize) -> Result<Vec<u8>, String> {
         let pixels = usize::from(columns) * usize::from(rows);
         let bytes = (pixels * sample) as u64;
@@ -61,7 +61,7 @@ impl Codec {
     }
 }
 
-/// Planes of bytes, the most significant ones first, each in PackBits behind a header of their offsets.
+/// RLE: planes of bytes, the most significant first, each in PackBits after a header with their offsets.
 fn rle(code: &[u8], pixels: usize, sample: usize) -> Result<Vec<u8>, String> {
     let (header, _) = code.split_at_checked(64).ok_or("no header of 64 bytes")?;
     let words: Vec<usize> = header.as_chunks().0.iter().map(|&word| u32::from_le_bytes(word) as usize).collect();
@@ -76,7 +76,7 @@ fn rle(code: &[u8], pixels: usize, sample: usize) -> Result<Vec<u8>, String> {
         if unpacked.len() != pixels {
             return Err(format!("{} samples in a segment, not {pixels}", unpacked.len()));
         }
-        // Known to be that long only now.
+        // Memory is allocated only once the length is known to be right.
         if bytes.is_empty() {
             bytes = vec![0; pixels * sample];
         }
@@ -88,12 +88,12 @@ fn rle(code: &[u8], pixels: usize, sample: usize) -> Result<Vec<u8>, String> {
     Ok(bytes)
 }
 
-/// At most so many bytes.
+/// Decodes PackBits, up to `limit` bytes.
 fn unpack_bits(mut code: &[u8], limit: usize) -> Vec<u8> {
     let mut bytes = Vec::new();
     while let Some((&count, rest)) = code.split_first() {
         match count {
-            // So many bytes, as they are.
+            // A run of literal bytes.
             0..=127 => {
                 let (literal, after) = rest.split_at(rest.len().min(usize::from(count) + 1));
                 bytes.extend_from_slice(literal);
@@ -132,7 +132,7 @@ fn jpeg(code: &[u8], size: [u16; 2], sample: usize) -> Result<Vec<u8>, String> {
 
 /// A codestream of one component.
 fn jpeg_2000(code: &[u8], size: [u16; 2], sample: usize) -> Result<Vec<u8>, String> {
-    // The decoder does not tell the sign of samples: the codestream's first segment does.
+    // The decoder does not report whether samples are signed; the codestream's first segment does.
     let &[0xff, 0x4f, 0xff, 0x51, ref segment @ ..] = code else { return Err("no codestream".to_owned()) };
     let Some(&[0, 1, depth]) = segment.get(36..39) else { return Err("several components".to_owned()) };
     let (is_signed, bits) = (depth & 0x80 != 0, u32::from(depth & 0x7f) + 1);
@@ -147,7 +147,7 @@ fn jpeg_2000(code: &[u8], size: [u16; 2], sample: usize) -> Result<Vec<u8>, Stri
     let mut context = DecoderContext::default();
     let decoded = image.decode(&mut context).map_err(|error| error.to_string())?;
     let [component] = decoded.components() else { return Err("several components".to_owned()) };
-    // The decoder gives signed samples, too, as counted from the smallest one. Lossy ones may lie beyond.
+    // The decoder also gives signed samples as offsets from the minimum. Lossy ones may lie outside the range.
     let least = if is_signed { 1 << (bits - 1) } else { 0 };
     let largest = ((1_i32 << bits) - 1) as f32;
     let numbers = component.samples().iter().map(|value| value.round().clamp(0.0, largest) as i32 - least);

@@ -1,4 +1,4 @@
-//! The elements that count, by their tags.
+//! The elements that are kept, by tag.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,12 +7,12 @@ use std::sync::Arc;
 use super::super::VolumeError;
 use super::super::source::{invalid, number, shown};
 
-/// A group and an element, as one number.
+/// A group and an element in one number.
 pub(super) type Tag = u32;
 
 macro_rules! tags {
     ($($constant:ident = $tag:literal $name:literal,)*) => {
-        /// Elements that are kept, and the sequences that hold them.
+        /// The elements that are kept, and the sequences that hold them.
         pub(super) mod tags {
             $(pub(in super::super) const $constant: super::Tag = $tag;)*
         }
@@ -60,7 +60,7 @@ tags! {
     PIXEL_DATA = 0x7fe0_0010 "PixelData",
 }
 
-/// Elements that count, of a file or of an item in it.
+/// The kept elements of a file or of an item in it.
 pub(super) struct Dataset {
     path: Arc<Path>,
     big_endian: bool,
@@ -69,18 +69,18 @@ pub(super) struct Dataset {
 }
 
 impl Dataset {
-    /// Of a file in one of the two byte orders, without elements.
+    /// An empty data set of a file in one of the two byte orders.
     pub(super) fn new(path: Arc<Path>, big_endian: bool) -> Self {
         Self { path, big_endian, values: BTreeMap::new(), items: BTreeMap::new() }
     }
 
-    /// A value as text, without what pads it.
+    /// A value as text, without padding.
     pub(super) fn text(&self, tag: Tag) -> Option<String> {
         let text = String::from_utf8_lossy(self.values.get(&tag)?).into_owned();
         Some(text.trim_matches([' ', '\0']).to_owned()).filter(|text| !text.is_empty())
     }
 
-    /// A number of 16 bits.
+    /// A value that is one number of 16 bits.
     pub(super) fn unsigned(&self, tag: Tag) -> Result<Option<u16>, VolumeError> {
         let Some(value) = self.values.get(&tag) else { return Ok(None) };
         match *value.as_slice() {
@@ -90,7 +90,7 @@ impl Dataset {
         }
     }
 
-    /// Finite numbers, written as text.
+    /// A value that is N finite numbers written as text.
     pub(super) fn numbers<const N: usize>(&self, tag: Tag) -> Result<Option<[f64; N]>, VolumeError> {
         let Some(text) = self.text(tag) else { return Ok(None) };
         let numbers: Option<Vec<f64>> = text.split('\\').map(number).collect();
@@ -98,7 +98,7 @@ impl Dataset {
         numbers.map(Some).ok_or_else(|| self.invalid(tag, shown(&text), format!("finite numbers, {N} of them")))
     }
 
-    /// The items of a sequence, none if it is not there.
+    /// The items of a sequence; empty if the sequence is missing.
     pub(super) fn items(&self, tag: Tag) -> &[Self] {
         self.items.get(&tag).map_or(&[], Vec::as_slice)
     }
@@ -117,7 +117,7 @@ impl Dataset {
     }
 }
 
-/// What errors call an element.
+/// An element's name in errors.
 pub(super) fn shown_tag(tag: Tag) -> String {
     name(tag).map_or_else(|| format!("element ({:04x},{:04x})", tag >> 16, tag & 0xffff), str::to_owned)
 }

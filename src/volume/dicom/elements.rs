@@ -1,6 +1,6 @@
-//! Data elements: a file as the few of them that count here.
+//! Data elements: reads a file and keeps the few that are needed.
 //!
-//! Lengths are checked against the file before anything is kept, and what is not needed is skipped.
+//! Lengths are checked against the file before anything is kept, and other elements are skipped.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -25,44 +25,44 @@ const PIXELS: [Tag; 3] = [tags::FLOAT_PIXEL_DATA, tags::DOUBLE_PIXEL_DATA, tags:
 const ITEM: Tag = 0xfffe_e000;
 const ITEM_END: Tag = 0xfffe_e00d;
 const SEQUENCE_END: Tag = 0xfffe_e0dd;
-/// The transfer syntax of files that are deflated behind the elements that say so.
+/// The transfer syntax of files that are deflated after the meta information.
 const DEFLATED: &str = "1.2.840.10008.1.2.1.99";
 
-/// The length of what ends by a delimiter.
+/// The length of a value that ends with a delimiter.
 const UNDEFINED: u32 = u32::MAX;
 
-/// Sequences in sequences; the standard's need five.
+/// The maximum depth of nested sequences; the standard's need five.
 const MAX_DEPTH: u32 = 32;
-/// Items of all sequences that are kept: a few for every frame.
+/// The maximum number of items kept in all sequences: a few for every frame.
 const MAX_ITEMS: u32 = 1 << 20;
-/// Bytes of a value that is kept.
+/// The maximum size in bytes of a value that is kept.
 const MAX_VALUE: u32 = 1 << 12;
 
-/// A file's elements, and where its pixels are.
+/// A file's elements, and the place of its pixels.
 pub(super) struct Elements {
     pub(super) data: Dataset,
     pub(super) transfer_syntax: String,
     pub(super) big_endian: bool,
     pub(super) pixels: Option<(Tag, PixelData)>,
-    /// What comes next; in a deflated file, which has no places to go back to, native pixels.
+    /// The rest of the file. In a deflated file, which cannot seek back, these are the native pixels.
     pub(super) rest: Bytes,
 }
 
-/// Where pixels are in the file.
+/// The place of pixels in the file.
 pub(super) enum PixelData {
-    /// Samples, one after the other.
+    /// Uncompressed samples.
     Native {
         at: u64,
         bytes: u64,
-        /// Whether they are written as words of 16 bits.
+        /// Whether they are written as 16-bit words.
         in_words: bool,
     },
-    /// Frames as a codec has them, each with its first byte and its length; without the table of offsets.
+    /// Compressed frames, each with its first byte and its length, without the table of offsets.
     Fragments(Vec<[u64; 2]>),
 }
 
 impl Elements {
-    /// Reads what is before the pixels; what is behind them is not looked at.
+    /// Reads the elements before the pixels; those after them are ignored.
     pub(super) fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
         let (head, bytes) = Bytes::open(access.open(path)?)?;
         let mut parser = Parser {
@@ -85,7 +85,7 @@ impl Elements {
         while !parser.bytes.is_at_end()? {
             let tag = parser.bytes.take::<4>()?;
             parser.begun = Some(tag);
-            // Whichever order the rest is in: this part is little-endian.
+            // The meta information is little-endian, whichever order the rest has.
             if tag[..2] != [2, 0] {
                 break;
             }
@@ -94,7 +94,7 @@ impl Elements {
         }
         let transfer_syntax = match meta.text(tags::TRANSFER_SYNTAX) {
             Some(syntax) => syntax,
-            // Without these elements the file has the default encoding, or, where elements say their types, the other one.
+            // Without these elements the file has the default encoding, or explicit types if its elements show them.
             None if head.starts_with(&[8, 0]) => {
                 let is_explicit = head.get(4..6).is_some_and(|kind| kind.iter().all(u8::is_ascii_uppercase));
                 if is_explicit { "1.2.840.10008.1.2.1" } else { "1.2.840.10008.1.2" }.to_owned()
@@ -119,22 +119,22 @@ impl Elements {
 
 struct Parser {
     path: Arc<Path>,
-    /// What is behind `begun`.
+    /// The bytes after `begun`.
     bytes: Bytes,
-    /// The tag of the next element, if it is read already.
+    /// The tag of the next element, if it was already read.
     begun: Option<[u8; 4]>,
     implicit: bool,
     big_endian: bool,
-    /// Items that are kept so far.
+    /// The number of items kept so far.
     items: u32,
     pixels: Option<(Tag, PixelData)>,
 }
 
-/// What an element says of its value.
+/// An element's tag, type and length.
 struct Header {
     tag: Tag,
     is_sequence: bool,
-    /// Whether its value may be of items whose elements do not say their types.
+    /// Whether its value may be a sequence whose elements have no explicit types.
     is_unknown: bool,
     in_words: bool,
     length: u32,
@@ -191,8 +191,8 @@ impl Parser {
             return Err(invalid(
                 &self.path,
                 "elements",
-                "more sequences in one another",
-                format!("{MAX_DEPTH} of them"),
+                "sequences nested deeper",
+                format!("at most {MAX_DEPTH} levels"),
             ));
         }
         while self.begun.is_some() || self.bytes.at() < end && !self.bytes.is_at_end()? {
@@ -235,7 +235,7 @@ impl Parser {
         Err(invalid(&self.path, &shown_tag(header.tag), found, format!("at most the {left} that are left")))
     }
 
-    /// Reads the items of a sequence, or, where nobody needs them, finds their end.
+    /// Reads the items of a sequence, or only finds their end if they are not needed.
     fn sequence(&mut self, header: &Header, end: u64, depth: u32, data: &mut Dataset) -> Result<(), VolumeError> {
         let &Header { tag, length, .. } = header;
         let is_kept = SEQUENCES.contains(&tag);
@@ -248,7 +248,7 @@ impl Parser {
             }
             self.bytes.at() + u64::from(length)
         };
-        // Of unknown type, a sequence is encoded as if no element said its type.
+        // A sequence of unknown type is encoded with implicit types.
         let implicit = self.implicit;
         self.implicit |= header.is_unknown;
         let mut items = Vec::new();
@@ -300,7 +300,7 @@ impl Parser {
             fragments.push([self.bytes.at(), item.length.into()]);
             self.bytes.skip(item.length.into())?;
         }
-        // The first one is the table of offsets.
+        // The first fragment is the table of offsets.
         fragments.drain(..fragments.len().min(1));
         Ok(PixelData::Fragments(fragments))
     }

@@ -1,4 +1,4 @@
-//! One file: what its pixels are, and where its frames lie.
+//! One file: the format of its pixels, and the positions of its frames.
 
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -13,53 +13,53 @@ use super::codecs::Codec;
 use super::dataset::{Dataset, Tag, tags};
 use super::elements::{Elements, PixelData};
 
-/// A class of files that are no images but list others.
+/// The class of files that contain no image but a list of other files.
 const DIRECTORY: &str = "1.2.840.10008.1.3.10";
 
 /// An image of one or more frames.
 pub(super) struct Image {
     pub(super) path: PathBuf,
-    /// The series that it is of, and how people call that.
+    /// The series that the image belongs to, with its number and description for errors.
     pub(super) series: String,
     pub(super) description: String,
     pub(super) pixels: Pixels,
     pub(super) frames: Vec<Frame>,
     codec: Codec,
     data: PixelData,
-    /// All native pixels, of a deflated file.
+    /// All native pixels, if the file is deflated.
     inflated: Option<Vec<u8>>,
 }
 
-/// Of every frame of an image.
+/// The pixel format of every frame of an image.
 #[derive(Clone, Copy)]
 pub(super) struct Pixels {
     pub(super) columns: u16,
     pub(super) rows: u16,
     pub(super) kind: SampleType,
-    /// How many of a sample's bits count, from the lowest one.
+    /// The number of significant low bits in a sample.
     bits: u16,
     big_endian: bool,
-    /// Whether the smallest sample is white.
+    /// Whether the minimum sample is white.
     is_inverted: bool,
 }
 
-/// Where a frame lies, in LPS and millimetres.
+/// A frame's position, in LPS and millimetres.
 #[derive(Clone, Copy)]
 pub(super) struct Frame {
-    /// The first pixel.
+    /// The position of the first pixel.
     pub(super) position: DVec3,
-    /// Where x and y point.
+    /// The directions of x and y.
     pub(super) directions: [DVec3; 2],
-    /// From pixel to pixel along x and y.
+    /// The distances between pixels along x and y.
     pub(super) spacing: [f64; 2],
-    /// From frame to frame, as far as the frame itself tells.
+    /// The distance between frames, if the frame itself states it.
     pub(super) thickness: Option<f64>,
     /// Slope and intercept.
     pub(super) rescale: [f64; 2],
 }
 
 impl Image {
-    /// Reads what is before the pixels; `None` if the file is no image.
+    /// Reads the elements before the pixels; `None` if the file is not an image.
     pub(super) fn open(path: &Path, access: &Access) -> Result<Option<Self>, VolumeError> {
         let Elements { data, transfer_syntax, big_endian, pixels, mut rest } = Elements::read(path, access)?;
         let Some((tag, pixel_data)) = pixels else { return Ok(None) };
@@ -117,7 +117,7 @@ impl Image {
             }
             (&PixelData::Native { at, .. }, None) => self.read(&[[at + index as u64 * size, size]], access)?,
             (PixelData::Fragments(fragments), _) => {
-                // A single frame may be in several of them.
+                // A single frame may be split into several fragments.
                 let of_frame = if self.frames.len() == 1 { fragments } else { &fragments[index..=index] };
                 let code = self.read(of_frame, access)?;
                 self.codec.decode(code, [columns, rows], kind.bytes() as usize).map_err(|found| {
@@ -132,7 +132,7 @@ impl Image {
         Ok(bytes)
     }
 
-    /// The bytes of some stretches of the file, each given by its first byte and its length.
+    /// The bytes of some ranges of the file, each given by its first byte and its length.
     fn read(&self, stretches: &[[u64; 2]], access: &Access) -> Result<Vec<u8>, VolumeError> {
         let mut file = access.open(&self.path)?;
         let mut all = Vec::new();
@@ -167,11 +167,11 @@ impl Pixels {
         }
         let photometric = data.text(tags::PHOTOMETRIC).unwrap_or_default();
         let is_inverted = match photometric.as_str() {
-            // Of floats nobody knows what white is.
+            // Which float is white is undefined.
             "MONOCHROME1" if tag == tags::PIXEL_DATA => true,
             "MONOCHROME2" => false,
             _ => {
-                let allowed = "MONOCHROME2, or, of whole numbers, MONOCHROME1";
+                let allowed = "MONOCHROME2, or MONOCHROME1 for whole numbers";
                 return Err(data.invalid(tags::PHOTOMETRIC, photometric, allowed));
             }
         };
@@ -202,12 +202,12 @@ impl Pixels {
         Ok(Self { columns, rows, kind, bits, big_endian, is_inverted })
     }
 
-    /// Of a frame.
+    /// The size of a frame in bytes.
     fn bytes(&self) -> u64 {
         u64::from(self.columns) * u64::from(self.rows) * self.kind.bytes()
     }
 
-    /// Refuses pixel data that are not those of so many frames.
+    /// Refuses pixel data whose size or number differs from that of the frames.
     fn check(
         &self,
         data: &Dataset,
@@ -219,7 +219,7 @@ impl Pixels {
         match pixel_data {
             PixelData::Native { bytes, .. } if codec == Codec::None => {
                 let expected = self.bytes().saturating_mul(frames as u64);
-                // Padded to an even length.
+                // The size is padded to an even number.
                 if *bytes == expected || *bytes == expected.saturating_add(expected % 2) {
                     return Ok(());
                 }
@@ -239,8 +239,7 @@ impl Pixels {
         }
     }
 
-    /// Inverts samples whose smallest is white, and sets the bits above those that count, where other things may be, to what the number
-    /// means.
+    /// Inverts samples whose minimum is white. Sets the bits above the significant ones, which may hold overlays, to the sign or to 0.
     fn make_numbers(&self, bytes: &mut [u8]) {
         let shift = 8 * self.kind.bytes() as u32 - u32::from(self.bits);
         if shift == 0 && !self.is_inverted {
@@ -248,7 +247,7 @@ impl Pixels {
         }
         macro_rules! make {
             ($type:ty) => {{
-                // Without its sign, or with it, an inverted number is the one of all other bits.
+                // The inverse of a number, signed or unsigned, is its bitwise complement.
                 let inverse = if self.is_inverted { !0 } else { 0 };
                 for sample in bytes.as_chunks_mut().0 {
                     *sample = ((<$type>::from_ne_bytes(*sample) ^ inverse) << shift >> shift).to_ne_bytes();
@@ -267,7 +266,7 @@ impl Pixels {
     }
 }
 
-/// Where frames lie: each of them by its own groups of elements, or those that all share, or the file's own elements.
+/// The positions of frames, from each frame's own groups of elements, the shared groups, or the file's own elements.
 fn frames(data: &Dataset, count: usize) -> Result<Vec<Frame>, VolumeError> {
     let shared = data.items(tags::SHARED_GROUPS).first();
     let groups = data.items(tags::FRAME_GROUPS);
@@ -286,7 +285,7 @@ fn frames(data: &Dataset, count: usize) -> Result<Vec<Frame>, VolumeError> {
         };
         let positive = |text: Option<[f64; 1]>| text.map(|[number]| number.abs()).filter(|&number| number > 0.0);
         let plane = group(tags::PLANE_POSITION);
-        let allowed = "where the image lies in the patient";
+        let allowed = "the image's position in the patient";
         let position = plane.numbers(tags::POSITION)?.ok_or_else(|| plane.missing(tags::POSITION, allowed))?;
         let plane = group(tags::PLANE_ORIENTATION);
         let orientation =

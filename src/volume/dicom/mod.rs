@@ -1,9 +1,9 @@
 //! DICOM: a folder with the slices of one series, or one file of one or more frames.
 //!
-//! Slices are ordered, and spaced, by where they lie along their normal, and must lie on one line; if that leaves the normal, the
-//! volume is sheared, as by a tilted gantry. Values are after each slice's own rescale slope and intercept.
+//! The position of slices along their normal gives their order and spacing. They must lie on one line; if the line is not along the
+//! normal, as with a tilted gantry, the volume is sheared. Each slice's own rescale slope and intercept are applied.
 //!
-//! Files are parsed here, not by `dicom-object` and `dicom-pixeldata`: these allocate whatever length an element states, recurse as
+//! Files are parsed here, not by `dicom-object` and `dicom-pixeldata`, which allocate whatever length an element states, recurse as
 //! deep as sequences nest, and index past the end of damaged frames.
 
 mod bytes;
@@ -58,7 +58,7 @@ fn assemble<T: Voxel>(path: &Path, images: Vec<Image>, access: &Access) -> Resul
     let kind = first.pixels.kind;
     Samples { kind, dims, big_endian: false, rescale: None, z_fastest: false }.reserve::<T>(path, access)?;
     let mut values = Vec::new();
-    // As many at a time as there are threads: codecs take long.
+    // One slice per thread at a time, because codecs are slow.
     for slices in slices.chunks(rayon::current_num_threads()) {
         let frames: Vec<_> = slices.par_iter().map(|slice| images[slice.image].frame(slice.frame, access)).collect();
         for (slice, frame) in slices.iter().zip(frames) {

@@ -1,4 +1,4 @@
-//! Slices of one grid: their order, and how far they are from one another.
+//! The slices of one grid: their order and distances.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,21 +11,21 @@ use super::super::shear::{self, Lattice};
 use super::super::source::invalid;
 use super::image::{Frame, Image};
 
-/// Directions that differ by less, and sizes of pixels that differ by less of themselves, are the same, written down twice.
+/// Directions with a smaller difference, and pixel sizes with a smaller relative difference, count as equal.
 const SAME: f64 = 1e-4;
-/// The part of a step that positions may be off without a word.
+/// The error of positions, as a fraction of a step, that gives no warning.
 const EVEN: f64 = 0.01;
-/// The part of a pixel that slices may be off their line sideways.
+/// The maximum sideways distance of a slice from the line, as a fraction of a pixel.
 const STRAIGHT: f64 = 0.5;
-/// The part of a pixel that slices may be off their line without a word.
+/// The sideways distance, as a fraction of a pixel, that gives no warning.
 const EXACT: f64 = 0.01;
-/// Steps larger than this many usual ones are gaps.
+/// A step larger than this many usual steps is a gap.
 const GAP: f64 = 1.5;
 
-/// The element that says where a slice lies.
+/// The element with a slice's position.
 pub(super) const POSITION: &str = "ImagePositionPatient";
 
-/// Refuses files of several series, and lists these.
+/// Refuses files of several series with a list of these.
 pub(super) fn check_one(folder: &Path, images: &[Image]) -> Result<(), VolumeError> {
     let mut series: BTreeMap<&str, (usize, &str)> = BTreeMap::new();
     for image in images {
@@ -44,22 +44,22 @@ pub(super) fn check_one(folder: &Path, images: &[Image]) -> Result<(), VolumeErr
 
 /// A frame of a volume.
 pub(super) struct Slice {
-    /// The image that it is in, and its number there.
+    /// The index of its image, and of the frame in that.
     pub(super) image: usize,
     pub(super) frame: usize,
     pub(super) position: DVec3,
     pub(super) rescale: [f64; 2],
 }
 
-/// All frames of a volume, along its z axis.
+/// All frames of a volume, in order along its z axis.
 pub(super) struct Series {
     pub(super) slices: Vec<Slice>,
-    /// In LPS.
+    /// The lattice in LPS.
     pub(super) lattice: Lattice,
 }
 
 impl Series {
-    /// The volume that some images' frames make up.
+    /// The volume that the frames of some images make up.
     pub(super) fn of(path: &Path, images: &[Image]) -> Result<Self, VolumeError> {
         let first = check_alike(path, images)?;
         let [row, column] = first.directions;
@@ -104,7 +104,7 @@ impl Series {
             let offset = slice.position - slices[0].position;
             offset - offset.dot(axes.z_axis) * axes.z_axis
         };
-        // The slice that is farthest off a line from the first slice on, which leaves the normal by `drift` from slice to slice.
+        // The slice that is farthest from the line through the first slice along the normal plus `drift` per slice.
         let farthest = |drift: DVec3| {
             let off = |(i, slice)| ((sideways(slice) - i as f64 * drift).length(), slice);
             slices.iter().enumerate().map(off).fold((0.0, &slices[0]), |a, b| if b.0 > a.0 { b } else { a })
@@ -113,7 +113,7 @@ impl Series {
         let (mut off, mut slice) = farthest(DVec3::ZERO);
         let mut lattice = Lattice::straight(spacing, axes);
         if off > STRAIGHT * pixel {
-            // A tilted gantry, if at all: the line is through the first and the last slice.
+            // If the slices are sheared, the line runs through the first and the last one.
             let last = slices.len() - 1;
             let drift = sideways(&slices[last]) / last as f64;
             (off, slice) = farthest(drift);
@@ -137,7 +137,7 @@ impl Series {
     }
 }
 
-/// Gives the first of some frames that have the same sizes and directions; refuses others, and lists what there is.
+/// The first of some frames that share sizes and directions; refuses others with a list of both.
 fn check_alike<'a>(path: &Path, images: &'a [Image]) -> Result<&'a Frame, VolumeError> {
     let mut kinds: Vec<(&Image, &Frame, usize)> = Vec::new();
     for image in images {
@@ -167,13 +167,13 @@ fn check_alike<'a>(path: &Path, images: &'a [Image]) -> Result<&'a Frame, Volume
     Err(invalid(path, "slices", found, "slices of one size, one distance of pixels, and one orientation"))
 }
 
-/// What the steps between ascending positions are.
+/// The steps between ascending positions.
 enum Steps {
-    /// There are none.
+    /// There is only one position.
     None,
-    /// All about the same; positions are at most so far from where even steps would have them.
+    /// All steps are about equal; positions are off by at most `off`.
     Even { step: f64, off: f64 },
-    /// The one after this position is another than usual.
+    /// The step after position `at` differs from the usual one.
     Uneven { at: usize, step: f64, usual: f64 },
 }
 

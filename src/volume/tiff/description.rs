@@ -1,4 +1,4 @@
-//! What a file says of its pages: the description that ImageJ or OME wrote, and the resolution.
+//! What a file states about its pages: the description by ImageJ or OME, and the resolution.
 
 use std::path::Path;
 
@@ -13,15 +13,15 @@ use super::super::unit::{common, unit};
 use super::super::xml;
 use super::pages::Pages;
 
-/// Pixels an inch that programs write without meaning it.
+/// A resolution in pixels per inch that programs write by default, without meaning.
 const NOMINAL_DPI: f64 = 72.0;
 
-/// How large voxels are, how many slices there should be, and what their samples mean.
+/// The voxel sizes, the expected number of slices, and the meaning of samples.
 #[derive(Default)]
 pub(super) struct Calibration {
-    /// Along x and y.
+    /// The spacing along x and y.
     pub(super) spacing: Option<[f64; 2]>,
-    /// Along z, which has none of its own where x and y have none.
+    /// The spacing along z; ignored where x and y have none.
     pub(super) between_slices: Option<f64>,
     pub(super) unit: Option<String>,
     pub(super) slices: Option<u32>,
@@ -30,7 +30,7 @@ pub(super) struct Calibration {
 }
 
 impl Calibration {
-    /// What the first page says.
+    /// The calibration on the first page.
     pub(super) fn of(pages: &mut Pages) -> Result<Self, VolumeError> {
         let description = pages.description()?;
         if description.starts_with("ImageJ=") {
@@ -43,14 +43,14 @@ impl Calibration {
         let (spacing, unit) = match (pixels_per_unit(pages), resolution_unit) {
             (Some([x, y]), INCH) if [x, y] != [NOMINAL_DPI; 2] => (Some([25.4 / x, 25.4 / y]), unit("mm")),
             (Some([x, y]), CENTIMETER) => (Some([10.0 / x, 10.0 / y]), unit("mm")),
-            // Only what they are to one another.
+            // Without a unit only the ratio of the two matters.
             (Some([x, y]), NO_UNIT) if x != y => (Some([1.0, x / y]), None),
             _ => (None, None),
         };
         Ok(Self { spacing, unit, ..Self::default() })
     }
 
-    /// Lines of `name=value`, which are not all of a name.
+    /// Parses lines of `name=value`; other lines may lie between them.
     fn of_image_j(pages: &mut Pages, description: &str) -> Result<Self, VolumeError> {
         let mut fields = Fields::new(pages.path.clone());
         for (name, value) in description.lines().filter_map(|line| line.split_once('=')) {
@@ -66,7 +66,7 @@ impl Calibration {
         let [slices, channels, frames] = [count("slices")?, count("channels")?, count("frames")?];
         match [slices, channels, frames].map(|count| count > 1) {
             [_, false, false] => {}
-            // Programs that know of no axes write so.
+            // Programs without a notion of axes write this.
             [false, true, false] | [false, false, true] => {
                 let what = if channels > 1 { "channels" } else { "frames" };
                 log::warn!("{}: the description says {images} {what}: taken to be slices", pages.path.display());
@@ -82,8 +82,8 @@ impl Calibration {
             let found = units.map(|unit| unit.unwrap_or("unit's")).join(", ");
             return Err(fields.invalid("unit, yunit, zunit", found, "one unit for all"));
         }
-        // As ImageJ itself has it: a step back is a step.
-        let between = fields.value("spacing", "a finite number but 0", |text| match text {
+        // ImageJ ignores the sign of the spacing.
+        let between = fields.value("spacing", "a finite number other than 0", |text| match text {
             None => Some(None),
             Some(text) => number(text).map(f64::abs).filter(|&spacing| spacing > 0.0).map(Some),
         })?;
@@ -105,12 +105,12 @@ impl Calibration {
             spacing = spacing.or(Some([1.0, 1.0]));
         }
         let rescale = value_function(&fields)?;
-        // It leaves out a distance of 1.
+        // ImageJ omits a distance of 1.
         let between_slices = between.or((images > 1).then_some(1.0));
         Ok(Self { spacing, between_slices, unit: length_unit, slices: Some(images), rescale })
     }
 
-    /// The attributes of the one element `Pixels`.
+    /// Parses the attributes of the single element `Pixels`.
     fn of_ome(path: &Path, description: &str) -> Result<Self, VolumeError> {
         let damage = |error| xml::damage(path, error);
         let mut reader = Reader::from_str(description);
@@ -168,7 +168,7 @@ fn pixels_per_unit(pages: &mut Pages) -> Option<[f64; 2]> {
     Some([pages.fraction(Tag::XResolution)?, pages.fraction(Tag::YResolution)?])
 }
 
-/// ImageJ's calibration of values, if it is a straight line.
+/// ImageJ's calibration of values, if it is linear.
 fn value_function(fields: &Fields) -> Result<Option<[f64; 2]>, VolumeError> {
     match fields.get("cf") {
         None => Ok(None),
@@ -186,7 +186,7 @@ fn value_function(fields: &Fields) -> Result<Option<[f64; 2]>, VolumeError> {
     }
 }
 
-/// Refuses pages that are not in the order of their slices.
+/// Refuses pages that are not in the order of the slices.
 fn check_order(tiff_data: &Fields) -> Result<(), VolumeError> {
     let number = |name: &str| tiff_data.value(name, "a number", |text| text.unwrap_or("0").parse::<u32>().ok());
     let [page, slice] = [number("IFD")?, number("FirstZ")?];

@@ -1,22 +1,21 @@
-//! The first directory of a file.
+//! Checks of a file's first directory.
 //!
-//! The decoder reads it before limits can be set, and makes room for as many values as its entries promise, so these are looked at
-//! before.
+//! The decoder reads it before limits can be set and allocates as many values as its entries promise, so the entries are checked first.
 
 use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom};
 
-/// Values of one entry, in a file of so many bytes: strips have an offset and a length each.
+/// The maximum number of values of an entry in a file of this size: strips have an offset and a length each.
 pub(super) fn most_values(file_bytes: u64) -> u64 {
     file_bytes / 6 + 256
 }
 
-/// Tags that may have any number of values; nobody reads these with the others.
+/// A tag that may have any number of values; it is read separately.
 const DESCRIPTION: u16 = 270;
 const XMP: u16 = 700;
 const PRIVATE: u16 = 32768;
 
-/// The first entry that has too many values, and how many it has; what is no TIFF has none.
+/// The first entry that has too many values, and their number; `None` if every entry is short enough or the file is not a TIFF.
 pub(super) fn overlong_entry(file: &mut BufReader<File>, file_bytes: u64) -> io::Result<Option<(u16, u64)>> {
     match find(file, most_values(file_bytes)) {
         Err(error) if error.kind() == ErrorKind::UnexpectedEof => Ok(None),
@@ -46,9 +45,9 @@ fn find(file: &mut BufReader<File>, most: u64) -> io::Result<Option<(u16, u64)>>
     Ok(None)
 }
 
-/// Where the entry of a tag with one value of 16 bits has the low byte of that, in the directory at `directory`.
+/// The position of the low byte of a tag's value, in the directory at `directory`, if the tag has one 16-bit value.
 pub(super) fn low_byte_of(file: &mut (impl Read + Seek), directory: u64, tag: u16) -> io::Result<Option<u64>> {
-    /// The type of values of 16 bits.
+    /// The type code of 16-bit values.
     const SHORT: u64 = 3;
     let mut magic = [0; 4];
     file.rewind()?;

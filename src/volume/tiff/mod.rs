@@ -1,7 +1,7 @@
-//! TIFF files: a stack of pages in one file, or a folder of slices. BigTIFF too; as they are, or by LZW, Deflate or PackBits.
+//! TIFF and BigTIFF files: a stack of pages in one file, or a folder of slices, uncompressed or by LZW, Deflate or PackBits.
 //!
-//! Spacing is what ImageJ or OME say in the description, else what the resolution says. What no page has room for, the distance
-//! between pages, is then that between columns. Values are those of the file, whatever it says is black.
+//! The spacing comes from ImageJ's or OME's description, or else from the resolution, which has no distance between pages: then the
+//! distance between columns serves. Values are the file's, whichever it calls black.
 
 mod description;
 mod directory;
@@ -28,7 +28,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let calibration = Calibration::of(&mut pages)?;
     let mut slices = Slices::new(path, &pages, &calibration)?;
     if let Some(count) = calibration.slices.filter(|&count| count > 1 && !pages.has_more()) {
-        // ImageJ writes what is too large for one TIFF so: one directory, and the slices one after the other.
+        // ImageJ writes data too large for TIFF as one directory, followed by all slices.
         let offset = pages.contiguous()?;
         let samples = slices.samples(count)?;
         let mut stream = Stream::raw(access.open(path)?)?;
@@ -50,13 +50,13 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     }
 }
 
-/// Reads a folder of files of one page each, in this order.
+/// Reads a folder of files with one page each, in the given order.
 pub(super) fn read_folder<T: Voxel>(path: &Path, files: &[PathBuf], access: &Access) -> Result<Loaded<T>, VolumeError> {
     let mut kinds: Vec<(Page, Vec<&PathBuf>)> = Vec::new();
     for file in files {
         let pages = Pages::open(file, access)?;
         if pages.has_more() {
-            return Err(invalid(file, "pages", "more than one", "one, as files of a folder are slices"));
+            return Err(invalid(file, "pages", "more than one", "one page per file in a folder of slices"));
         }
         match kinds.iter_mut().find(|(page, _)| *page == pages.page) {
             Some((_, files)) => files.push(file),
@@ -79,11 +79,11 @@ pub(super) fn read_folder<T: Voxel>(path: &Path, files: &[PathBuf], access: &Acc
     slices.finish(&calibration)
 }
 
-/// Slices of one size and type, as they come.
+/// Slices of one size and type, appended in order.
 struct Slices<'a, T> {
     path: &'a Path,
     page: Page,
-    /// Of the first page, unless another page has a different one.
+    /// The first page's palette, unless another page has a different one.
     palette: Option<Vec<[u8; 3]>>,
     rescale: Option<[f64; 2]>,
     count: u32,
@@ -141,11 +141,11 @@ impl<'a, T: Voxel> Slices<'a, T> {
     }
 }
 
-/// What colours the values of a palette's indices have, ascending by value.
+/// The colours of the values that a palette's indices become, in ascending order.
 fn values_of(colors: &[[u8; 3]], rescale: Option<[f64; 2]>) -> Vec<(f64, DVec3)> {
     let [slope, intercept] = rescale.unwrap_or([1.0, 0.0]);
     let rgb = |color: [u8; 3]| DVec3::from(color.map(|channel| f64::from(channel) / 255.0));
-    // As f32, which values are.
+    // Volumes store values as f32.
     let value = |index: usize| f64::from((index as f64 * slope + intercept) as f32);
     let mut points: Vec<_> = colors.iter().enumerate().map(|(index, &color)| (value(index), rgb(color))).collect();
     points.retain(|(value, _)| value.is_finite());

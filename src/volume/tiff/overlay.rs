@@ -1,16 +1,16 @@
-//! A file that reads as if one of its bytes were another.
+//! A view of a file with one byte replaced.
 //!
-//! The decoder decodes no page that says its pixels are indices of a palette, though they are stored as grey ones are. So such a page
-//! is read as one that says grey.
+//! The decoder refuses pages whose pixels are indices of a palette, though they are stored like grey ones. Such a page is read with its
+//! header changed to say grey.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
 pub(super) struct Overlay {
     pub(super) file: BufReader<File>,
-    /// Where the next byte to be read is.
+    /// The position of the next byte.
     at: u64,
-    /// Where the byte is, and what is read there.
+    /// The position of the replaced byte, and its replacement.
     replaced: Option<(u64, u8)>,
 }
 
@@ -19,7 +19,7 @@ impl Overlay {
         Self { file, at: 0, replaced: None }
     }
 
-    /// Reads `byte` at this place from now on, and the file's own bytes anywhere else.
+    /// Replaces the byte at this position from now on.
     pub(super) fn replace(&mut self, at: u64, byte: u8) {
         self.replaced = Some((at, byte));
     }

@@ -17,20 +17,20 @@ use super::directory::{low_byte_of, most_values, overlong_entry};
 use super::overlay::Overlay;
 use super::trial::{self, is_suspicious};
 
-/// The values of the tags that count.
+/// The tags' values that are used.
 const UNCOMPRESSED: u16 = 1;
 const REDUCED: u32 = 1;
 const WHITE_IS_ZERO: u16 = 0;
 const BLACK_IS_ZERO: u8 = 1;
 const PALETTE: u16 = 3;
 
-/// LZW's longest string is 4096 bytes, for a code of 12 bits; no other compression here expands by more.
+/// LZW's longest string is 4096 bytes for a code of 12 bits; the other compressions here expand less.
 const MAX_EXPANSION: u64 = 4096;
 
-/// Colours of a palette for indices of 8 bits.
+/// The number of colours in a palette for 8-bit indices.
 const COLORS: usize = 256;
 
-/// Size and type of a page.
+/// The size and sample type of a page.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) struct Page {
     pub(super) size: [u32; 2],
@@ -40,7 +40,7 @@ pub(super) struct Page {
 impl Page {
     pub(super) fn bytes(self) -> u64 {
         let [width, height] = self.size.map(u64::from);
-        // Two sizes of 32 bits: their product is one of 64.
+        // The product of two 32-bit sizes fits in 64 bits.
         (width * height).saturating_mul(self.kind.bytes())
     }
 }
@@ -52,19 +52,19 @@ impl Display for Page {
     }
 }
 
-/// A file, at one of its pages.
+/// A file, positioned at one of its pages.
 pub(super) struct Pages {
     pub(super) path: PathBuf,
-    /// The page that it is at.
+    /// The current page.
     pub(super) page: Page,
     /// Red, green and blue for each value, if the pixels are indices of a palette.
     pub(super) palette: Option<Vec<[u8; 3]>>,
     decoder: Decoder<Overlay>,
-    /// The number of directories up to here.
+    /// The number of the current directory.
     number: u32,
-    /// Bytes of the file that no page so far has claimed.
+    /// The bytes of the file that no page so far has claimed.
     unclaimed: u64,
-    /// The page's chunks: strips or tiles.
+    /// The offsets of the page's chunks: strips or tiles.
     offsets: Vec<u64>,
     counts: Vec<u64>,
 }
@@ -82,7 +82,7 @@ impl Pages {
         }
         reader.rewind().map_err(io_error(path))?;
         let decoder = Decoder::new(Overlay::new(reader)).map_err(failed(path, "page 1"))?;
-        // Memory for pages is not the decoder's, but that for the values of tags.
+        // The decoder allocates memory for the values of tags; the memory for pages is reserved here.
         let mut limits = Limits::default();
         limits.intermediate_buffer_size = usize::MAX;
         limits.decoding_buffer_size = most_values(unclaimed) as usize * size_of::<Value>();
@@ -104,7 +104,7 @@ impl Pages {
         Ok(pages)
     }
 
-    /// What errors call the page.
+    /// The page's name in errors.
     pub(super) fn name(&self) -> String {
         format!("page {}", self.number)
     }
@@ -113,7 +113,7 @@ impl Pages {
         self.decoder.more_images()
     }
 
-    /// Goes to the next page, if there is one; thumbnails are none.
+    /// Goes to the next page that is not a thumbnail; `false` if there is none.
     pub(super) fn next(&mut self) -> Result<bool, VolumeError> {
         while self.decoder.more_images() {
             self.number += 1;
@@ -136,7 +136,7 @@ impl Pages {
         self.decoder.find_tag_unsigned(tag).map_err(failed(&self.path, &name))
     }
 
-    /// A positive fraction; whatever else stands there says nothing.
+    /// A tag's positive fraction; `None` if it is missing or invalid.
     pub(super) fn fraction(&mut self, tag: Tag) -> Option<f64> {
         let value = match self.decoder.find_tag(tag).ok()?? {
             Value::Rational(numerator, denominator) => f64::from(numerator) / f64::from(denominator),
@@ -147,7 +147,7 @@ impl Pages {
         (value > 0.0 && value.is_finite()).then_some(value)
     }
 
-    /// The first page's text, whichever bytes it is of.
+    /// The first page's description, in any encoding.
     pub(super) fn description(&mut self) -> Result<String, VolumeError> {
         let (name, limit) = (self.name(), self.unclaimed);
         let mut directory = self.decoder.image_ifd();
@@ -165,7 +165,7 @@ impl Pages {
         Ok(self.unsigned::<u32>(Tag::NewSubfileType)?.is_some_and(|kind| kind & REDUCED != 0))
     }
 
-    /// Takes down what the page is, and refuses what is no grid of numbers, or more than the file can hold.
+    /// Determines the page's size and type. Refuses a page that is not a grid of numbers or that promises more than the file can hold.
     fn describe(&mut self) -> Result<(), VolumeError> {
         let name = self.name();
         self.palette = self.take_palette()?;
@@ -198,7 +198,7 @@ impl Pages {
         Ok(())
     }
 
-    /// The page's palette. The decoder goes on as if the page said that its pixels are grey.
+    /// The page's palette. Afterwards the decoder reads the page as grey.
     fn take_palette(&mut self) -> Result<Option<Vec<[u8; 3]>>, VolumeError> {
         if self.unsigned::<u16>(Tag::PhotometricInterpretation)? != Some(PALETTE) {
             return Ok(None);
@@ -217,13 +217,13 @@ impl Pages {
         let at = at.ok_or_else(|| invalid(&self.path, "PhotometricInterpretation", "no short", "a short"))?;
         self.decoder.inner().replace(at, BLACK_IS_ZERO);
         self.decoder.seek_to_image(self.number as usize - 1).map_err(&failed)?;
-        // Numbers of 16 bits, but some programs write numbers of 8 bits.
+        // The colours have 16 bits, but some programs write 8-bit numbers.
         let shift = if channels.iter().all(|&number| number < 256) { 0 } else { 8 };
         let colors = red.iter().zip(green).zip(blue);
         Ok(Some(colors.map(|((&r, &g), &b)| [r, g, b].map(|number| (number >> shift) as u8)).collect()))
     }
 
-    /// Refuses chunks that take up more than is left of the file, or promise more than is in them.
+    /// Refuses chunks that claim more than is left of the file, or that promise more than they can hold.
     fn check_chunks(&mut self) -> Result<(), VolumeError> {
         let method = self.unsigned::<u16>(Tag::Compression)?.unwrap_or(UNCOMPRESSED);
         let expansion = if method == UNCOMPRESSED { 1 } else { MAX_EXPANSION };
@@ -258,7 +258,7 @@ impl Pages {
         Ok(self.unsigned::<u16>(Tag::Compression)?.is_some_and(|method| method != UNCOMPRESSED))
     }
 
-    /// Where the page's samples begin if nothing but samples follows.
+    /// The position of the page's samples, if only samples follow it.
     pub(super) fn contiguous(&mut self) -> Result<u64, VolumeError> {
         let mut ends = self.offsets.iter().zip(&self.counts).map(|(offset, count)| offset.checked_add(*count));
         let follow = self.offsets.iter().skip(1).all(|&offset| ends.next() == Some(Some(offset)));
@@ -271,7 +271,7 @@ impl Pages {
 
     /// The page's samples, in the machine's byte order.
     pub(super) fn bytes(&mut self) -> Result<Vec<u8>, VolumeError> {
-        // Checked against the file; pages of it that nothing is decoded into take up no memory.
+        // The size was checked against the file, and zeroed memory is committed only when it is written.
         let mut bytes = vec![0; self.page.bytes() as usize];
         let name = self.name();
         self.decoder.read_image_bytes(&mut bytes).map_err(failed(&self.path, &name))?;
@@ -280,7 +280,7 @@ impl Pages {
                 let allowed = "BlackIsZero, for floats";
                 return Err(invalid(&self.path, "PhotometricInterpretation", "WhiteIsZero", allowed));
             }
-            // The decoder has made white of what is 0.
+            // The decoder inverts pages where 0 is white.
             bytes.iter_mut().for_each(|byte| *byte = !*byte);
         }
         Ok(bytes)
@@ -303,7 +303,7 @@ fn sample_type_of(sample_type: DecodingSampleType) -> Option<SampleType> {
     })
 }
 
-/// The decoder reports damage as an I/O error, without the code that the operating system's own carry.
+/// Tells damage from errors of the operating system: the decoder reports damage as an I/O error without an OS error code.
 fn failed(path: &Path, page: &str) -> impl Fn(TiffError) -> VolumeError {
     move |error| match error {
         TiffError::IoError(error) if error.raw_os_error().is_some() => io_error(path)(error),

@@ -1,4 +1,4 @@
-//! Names of slices: one run of numbers.
+//! Names of slices, which must form one run of numbers.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,10 +7,10 @@ use super::super::VolumeError;
 use super::super::folder::{Part, natural};
 use super::super::source::invalid;
 
-/// Stands for a number; shown as `#`, which a name may have.
+/// Stands for a number; displayed as `#`, which names may contain.
 const NUMBER: &str = "/";
 
-/// Refuses names that are not one run of numbers, and warns of numbers that are left out.
+/// Refuses names that are not one run of numbers, and warns about gaps in it.
 pub(super) fn check(folder: &Path, files: &[PathBuf]) -> Result<(), VolumeError> {
     let names: Vec<String> =
         files.iter().map(|path| path.file_name().unwrap_or_default().to_string_lossy().into_owned()).collect();
@@ -25,7 +25,7 @@ pub(super) fn check(folder: &Path, files: &[PathBuf]) -> Result<(), VolumeError>
     let numbers: Vec<Vec<u64>> = names.iter().map(|name| numbers(name)).collect();
     let columns = numbers.first().map_or(0, Vec::len);
     let column = |at: usize| numbers.iter().map(move |row| row[at]);
-    // Names are sorted by the first number that changes. Where it stays for a while, another one goes on meanwhile.
+    // Names are sorted by the first number that changes. Wherever it stays constant, a second one changes.
     let Some(run) = (0..columns).find(|&at| column(at).any(|number| number != numbers[0][at])) else { return Ok(()) };
     let mut steps: Vec<u64> = column(run).zip(column(run).skip(1)).map(|(one, next)| next - one).collect();
     if steps.contains(&0) {
@@ -35,12 +35,12 @@ pub(super) fn check(folder: &Path, files: &[PathBuf]) -> Result<(), VolumeError>
     steps.dedup();
     if steps.len() > 1 {
         let folder = folder.display();
-        log::warn!("{folder}: the slices' numbers go up by {steps:?}: taken as neighbours, none is left out");
+        log::warn!("{folder}: the slices' numbers go up by {steps:?}: they are treated as neighbours");
     }
     Ok(())
 }
 
-/// A name with a sign that no name has in place of every number.
+/// A name with `NUMBER` in place of every number.
 fn pattern(name: &str) -> String {
     let parts = natural(name);
     let text = parts[..parts.len() - 1].iter().map(|part| match part {
@@ -54,7 +54,7 @@ fn shown(pattern: &str) -> String {
     pattern.replace(NUMBER, "#")
 }
 
-/// The numbers in a name; one that is too large is the largest.
+/// The numbers in a name, saturated to the maximum.
 fn numbers(name: &str) -> Vec<u64> {
     let numbers = natural(name).into_iter().filter_map(|part| match part {
         Part::Number(_, digits) if digits.is_empty() => Some(0),
@@ -64,7 +64,7 @@ fn numbers(name: &str) -> Vec<u64> {
     numbers.collect()
 }
 
-/// How often everything is there.
+/// The number of occurrences of each item.
 fn count_by(items: impl Iterator<Item = String>) -> BTreeMap<String, usize> {
     let mut counts = BTreeMap::new();
     for item in items {

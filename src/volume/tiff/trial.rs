@@ -1,24 +1,23 @@
-//! How much a compressed strip or tile really holds.
+//! A trial decoding, which measures what a compressed strip or tile really holds.
 //!
-//! The decoder wants room for as much as the directory says. Where that is much more than usual, the strip is decoded to nowhere
-//! before any room is made.
+//! The decoder allocates what the directory states. If that is unusually much, the strip is first decoded without being stored.
 
 use std::io::{self, BufRead, Read};
 
 use flate2::bufread::ZlibDecoder;
 use weezl::{BitOrder, LzwStatus, decode::Configuration};
 
-/// The numbers of compressions.
+/// The codes of compressions.
 const LZW: u16 = 5;
 const DEFLATE: [u16; 2] = [8, 32946];
 const PACK_BITS: u16 = 32773;
 
-/// Whether so much in so little code is to be tried first.
+/// Whether a code of this length is so short for `bytes` decoded bytes that it should be decoded on trial first.
 pub(super) fn is_suspicious(code: u64, bytes: u64) -> bool {
     bytes > (16 << 20) + 4 * code
 }
 
-/// Whether `bytes` come out of some code; of what cannot be decoded at all, none do.
+/// Whether the code decodes to at least `bytes` bytes. Code that cannot be decoded at all yields 0 bytes.
 pub(super) fn holds(code: impl BufRead, compression: u16, bytes: u64) -> io::Result<bool> {
     let held = match compression {
         LZW => lzw(code, bytes),
@@ -28,7 +27,7 @@ pub(super) fn holds(code: impl BufRead, compression: u16, bytes: u64) -> io::Res
     };
     match held {
         Ok(held) => Ok(held >= bytes),
-        // The operating system's errors have a code; others are damage.
+        // Errors of the operating system have an OS error code; others mean damage.
         Err(error) if error.raw_os_error().is_none() => Ok(false),
         Err(error) => Err(error),
     }

@@ -1,4 +1,4 @@
-//! What an array's bytes are packed in: base64 text, and compressed blocks.
+//! The packing of an array's bytes: base64 text and compressed blocks.
 
 use std::io::{self, BufRead, Read};
 use std::{slice, vec};
@@ -7,7 +7,7 @@ use flate2::read::ZlibDecoder;
 
 use super::super::samples::MAX_EXPANSION;
 
-/// What a compressor's name stands for.
+/// A compressor, by its name in the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Compressor {
     Zlib,
@@ -15,11 +15,11 @@ pub(super) enum Compressor {
 }
 
 impl Compressor {
-    /// How much longer than its code a block can be.
+    /// The maximum ratio of a block's size to its compressed size.
     pub(super) fn max_expansion(self) -> u64 {
         match self {
             Self::Zlib => MAX_EXPANSION,
-            // Every byte of a long match adds 255 bytes to it.
+            // Every byte of a long match adds 255 bytes.
             Self::Lz4 => 255,
         }
     }
@@ -32,12 +32,12 @@ impl Compressor {
         match self {
             Self::Zlib => {
                 let mut block = Vec::new();
-                // To the end, where the checksum is.
+                // Reading to the end checks the checksum.
                 ZlibDecoder::new(code).take(size + 1).read_to_end(&mut block)?;
                 if block.len() as u64 == size { Ok(block) } else { Err(damaged(format!("{} bytes", block.len()))) }
             }
             Self::Lz4 => {
-                // Known before any room is made.
+                // The length is known before memory is allocated.
                 let decoded = lz4_length(code);
                 if decoded != Some(size) {
                     return Err(damaged(format!("{} bytes", decoded.unwrap_or_default())));
@@ -50,7 +50,7 @@ impl Compressor {
     }
 }
 
-/// How long a block of LZ4 is, by the lengths of literals and matches in it.
+/// The length of an LZ4 block, from the lengths of its literals and matches.
 fn lz4_length(code: &[u8]) -> Option<u64> {
     let mut code = code.iter();
     let mut total = 0;
@@ -61,7 +61,7 @@ fn lz4_length(code: &[u8]) -> Option<u64> {
         if literals > 0 {
             code.nth(literals as usize - 1)?;
         }
-        // The last ones have no match.
+        // The last literals have no match.
         if code.as_slice().is_empty() {
             return Some(total);
         }
@@ -70,7 +70,7 @@ fn lz4_length(code: &[u8]) -> Option<u64> {
     }
 }
 
-/// A number of 4 bits that goes on after 15, and then after every 255.
+/// A 4-bit number that continues after 15, and then after every 255.
 fn lz4_number(first: u8, code: &mut slice::Iter<u8>) -> Option<u64> {
     let mut number = u64::from(first);
     let mut goes_on = first == 15;
@@ -82,7 +82,7 @@ fn lz4_number(first: u8, code: &mut slice::Iter<u8>) -> Option<u64> {
     Some(number)
 }
 
-/// How the numbers before an array are written.
+/// The type of the numbers in an array's header.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct HeaderType {
     pub(super) bytes: usize,
@@ -92,7 +92,7 @@ pub(super) struct HeaderType {
 impl HeaderType {
     pub(super) fn read(self, reader: &mut impl Read) -> io::Result<u64> {
         let mut bytes = [0; 8];
-        // Little-endian in the end.
+        // The bytes are little-endian.
         reader.read_exact(&mut bytes[..self.bytes])?;
         if self.big_endian {
             bytes[..self.bytes].reverse();
@@ -101,20 +101,20 @@ impl HeaderType {
     }
 }
 
-/// The bytes of compressed blocks, one after the other.
+/// The decompressed bytes of consecutive blocks.
 pub(super) struct Blocks<R> {
     reader: R,
     compressor: Compressor,
-    /// Bytes of every block that is left, compressed and not.
+    /// The compressed and uncompressed sizes of the remaining blocks, in bytes.
     sizes: vec::IntoIter<[u64; 2]>,
     block: Vec<u8>,
-    /// How many bytes of `block` are read.
+    /// The number of consumed bytes of `block`.
     read: usize,
 }
 
 impl<R: Read> Blocks<R> {
-    /// Reads the header: the number of blocks, the size of each and of the last one, and their compressed sizes. The blocks must be
-    /// of `bytes` in all.
+    /// Reads the header: the number of blocks, their size, the last one's size, and their compressed sizes. The blocks must have `bytes`
+    /// bytes in total.
     pub(super) fn new(mut reader: R, header: HeaderType, compressor: Compressor, bytes: u64) -> io::Result<Self> {
         let [count, size, last] = [header.read(&mut reader)?, header.read(&mut reader)?, header.read(&mut reader)?];
         // A last size of 0 stands for a whole block.
@@ -124,7 +124,7 @@ impl<R: Read> Blocks<R> {
             return Err(io::Error::other(found));
         }
         let mut sizes = Vec::new();
-        // One by one: there may be fewer than the count says.
+        // Sizes are appended one by one, because there may be fewer than the count says.
         for block in 0..count {
             sizes.push([header.read(&mut reader)?, if block < whole { size } else { last }]);
         }
@@ -133,7 +133,7 @@ impl<R: Read> Blocks<R> {
 }
 
 impl<R> Blocks<R> {
-    /// The bytes of the largest block.
+    /// The size of the largest block in bytes.
     pub(super) fn largest(&self) -> u64 {
         self.sizes.as_slice().iter().map(|&[_, size]| size).max().unwrap_or_default()
     }
@@ -155,11 +155,11 @@ impl<R: Read> Read for Blocks<R> {
     }
 }
 
-/// The bytes that base64 text stands for, of one piece or several that are each padded. The text ends at an XML tag.
+/// The bytes that base64 text encodes, in one or several separately padded pieces. The text ends at an XML tag.
 pub(super) struct Base64<R> {
     reader: R,
     group: [u8; 3],
-    /// The part of `group` that is not read.
+    /// The unread range of `group`.
     left: std::ops::Range<usize>,
 }
 

@@ -1,5 +1,5 @@
-//! XML ImageData: one piece, its samples in the XML, as text or base64, or behind it, as base64 or as they are; in blocks of zlib or LZ4
-//! or in one.
+//! XML ImageData of one piece. The samples are in the XML as text or base64, or appended after it as base64 or raw bytes, optionally in
+//! blocks compressed by zlib or LZ4.
 
 use std::io::{self, BufRead, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -53,32 +53,32 @@ pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<L
     Ok(Loaded { spacing: Some(spacing), ..Loaded::new(dims, kind, values) })
 }
 
-/// The elements that count, as their attributes.
+/// The elements that are needed, as their attributes.
 struct Header {
     file: Fields,
     image: Fields,
     arrays: Vec<Array>,
-    /// What is behind the XML: how it is encoded, and where it begins.
+    /// The attributes of the appended data, and the position where it begins.
     appended: Option<(Fields, u64)>,
 }
 
 struct Array {
     fields: Fields,
     of_cells: bool,
-    /// Whether its section says that it is the one.
+    /// Whether its section names it as the active one.
     is_active: bool,
-    /// Where its text begins, if it has text.
+    /// The position of its text, if it has text.
     at: u64,
 }
 
 impl Header {
-    /// Reads the XML, or what of it is before the appended data.
+    /// Reads the XML, up to the appended data if there is any.
     fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
         let mut reader = Reader::from_reader(access.open(path)?.reader);
         let (mut file, mut image, mut piece) = (None, None, None);
         let (mut arrays, mut appended) = (Vec::new(), None);
         let mut section: Option<(bool, Option<String>)> = None;
-        // The names that sections say are active.
+        // The names of active arrays in the sections.
         let mut active_names = Vec::new();
         let mut buffer = Vec::new();
         while appended.is_none() {
@@ -145,7 +145,7 @@ impl Header {
         })
     }
 
-    /// Refuses axes that are no axes of a rectilinear grid.
+    /// Refuses a direction matrix whose axes are not orthogonal unit vectors.
     fn check_direction(&self) -> Result<(), VolumeError> {
         let Some(matrix) = self.image.value("Direction", "nine finite numbers", |text| match text {
             None => Some(None),
@@ -157,13 +157,13 @@ impl Header {
         else {
             return Ok(());
         };
-        // Row by row in the file.
+        // The file stores the matrix row by row.
         let rows = matrix.transpose();
         let directions = unit_directions([rows.x_axis, rows.y_axis, rows.z_axis]);
         directions.map(drop).map_err(|(found, allowed)| self.image.invalid("Direction", found, allowed))
     }
 
-    /// The array to read: the active one, else the first one of single numbers.
+    /// The array to read: the active one, or else the first one with one component.
     fn choose(&self) -> Result<&Array, VolumeError> {
         let numbers: Vec<&Array> = self.arrays.iter().filter(|array| array.components() == "1").collect();
         let active = numbers.iter().find(|array| array.is_active);
@@ -183,7 +183,7 @@ impl Header {
         let extent = extent(&self.image, "WholeExtent")?;
         let size = |axis: usize| {
             let steps = extent[2 * axis + 1].checked_sub(extent[2 * axis]).filter(|&steps| steps >= 0)?;
-            // A flat grid has cells all the same.
+            // A flat grid has one layer of cells.
             if array.of_cells { Some(steps.max(1)) } else { steps.checked_add(1) }
         };
         let sizes = || dims_of([size(0)?, size(1)?, size(2)?]);
@@ -196,7 +196,7 @@ impl Header {
         })
     }
 
-    /// The array's bytes.
+    /// A stream of the array's bytes.
     fn open(&self, path: &Path, access: &Access, array: &Array, samples: &Samples) -> Result<Stream, VolumeError> {
         let Array { fields, at, .. } = array;
         let (at, encoding) = match (fields.get("format"), &self.appended) {
@@ -232,7 +232,7 @@ impl Header {
         ))
     }
 
-    /// What comes after the array's own header, uncompressed, and how much more that may be.
+    /// The bytes after the array's own header, decompressed, and their maximum number.
     fn unpacked(
         &self,
         mut reader: impl Read + 'static,
@@ -277,14 +277,14 @@ impl Array {
     }
 }
 
-/// First and last point along x, y and z.
+/// The first and last point along x, y and z.
 fn extent(fields: &Fields, name: &str) -> Result<[i64; 6], VolumeError> {
     fields.value(name, "six integers", |text| {
         text?.split_whitespace().map(|number| number.parse().ok()).collect::<Option<Vec<_>>>()?.try_into().ok()
     })
 }
 
-/// Skips what is before appended data: space, and an underscore. Gives the number of bytes, `None` if there is no underscore.
+/// Skips white space and an underscore before appended data. Returns the number of bytes; `None` if there is no underscore.
 fn underscore(reader: &mut impl BufRead) -> io::Result<Option<u64>> {
     let mut skipped = 0;
     loop {

@@ -1,4 +1,4 @@
-//! The older files: a text header of keywords and values, in whichever lines they are, then the samples as text or, big-endian, as they are.
+//! Legacy VTK files: a text header of keywords and values, with arbitrary line breaks, then the samples as text or as big-endian bytes.
 
 use std::io::{self, BufRead, Read};
 use std::path::Path;
@@ -13,7 +13,7 @@ use super::super::numbers::TextEnd;
 use super::super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
 use super::super::source::{MAX_HEADER, Source, invalid, io_error, number, shown, three};
 
-/// What may follow an array.
+/// The keywords that may follow an array.
 const KEYWORDS: &[&str] = &[
     "METADATA",
     "FIELD",
@@ -31,7 +31,7 @@ const KEYWORDS: &[&str] = &[
     "CELL_DATA",
 ];
 
-/// Reads the first array of single numbers in one file.
+/// Reads a file's first array with one component.
 pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let mut header = Header::open(path, access)?;
     let array = header.find_array()?;
@@ -49,7 +49,7 @@ pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<L
     Ok(Loaded { spacing, ..loaded })
 }
 
-/// Refuses a file in which something else than another array follows the samples, whose beginning has `left` bytes after it.
+/// Refuses a file in which anything but another array follows the samples. `left` is the number of bytes from the samples on.
 fn check_rest(path: &Path, access: &Access, left: u64, samples: &Samples) -> Result<(), VolumeError> {
     let mut stream = Stream::raw(access.open(path)?)?;
     let all = stream.exactly_left().unwrap_or_default();
@@ -62,7 +62,7 @@ fn check_rest(path: &Path, access: &Access, left: u64, samples: &Samples) -> Res
     }
 }
 
-/// A file whose header is read as far as the samples.
+/// A file whose header has been read up to the samples.
 struct Header {
     file: Source,
     is_text: bool,
@@ -70,11 +70,11 @@ struct Header {
     budget: u64,
 }
 
-/// What is said of the samples.
+/// What the header says about the samples.
 struct Array {
     kind: SampleType,
     of_cells: bool,
-    /// How many points or cells there are.
+    /// The number of points or cells.
     count: u64,
 }
 
@@ -98,7 +98,7 @@ impl Header {
         Ok(header)
     }
 
-    /// The next word, in whichever line it is; `None` at the end of the file.
+    /// The next word, across line breaks; `None` at the end of the file.
     fn next_word(&mut self) -> Result<Option<String>, VolumeError> {
         let mut word = Vec::new();
         while let Some(&byte) = self.file.reader.fill_buf().map_err(io_error(&self.file.path))?.first() {
@@ -131,7 +131,7 @@ impl Header {
         Ok(words)
     }
 
-    /// Reads on to the samples of the first array of single numbers.
+    /// Reads on to the samples of the first array with one component.
     fn find_array(&mut self) -> Result<Array, VolumeError> {
         let mut section: Option<(bool, u64)> = None;
         loop {
@@ -158,7 +158,7 @@ impl Header {
                 ("METADATA", _) => self.skip_metadata()?,
                 ("SCALARS", Some((of_cells, count))) => {
                     let _name = self.word()?;
-                    // The number of components may be left out, so these are in one line.
+                    // The number of components may be missing, so these words are on one line.
                     let line = self.file.line(&mut self.budget)?.unwrap_or_default();
                     let mut words = line.split_whitespace();
                     let kind = self.kind(words.next().unwrap_or_default())?;
@@ -197,7 +197,7 @@ impl Header {
         self.fields.invalid("header", shown(found), allowed)
     }
 
-    /// Reads on to the first of some arrays that has a number for each point or cell, or behind the last one.
+    /// Reads on to the first of `arrays` arrays that has one number per point or cell, or past the last one.
     fn find_in_field(&mut self, arrays: u64, section: Option<(bool, u64)>) -> Result<Option<Array>, VolumeError> {
         let mut found = 0;
         while found < arrays {
@@ -219,7 +219,7 @@ impl Header {
         Ok(None)
     }
 
-    /// Goes to where samples begin: text wherever the next word is, others in the next line.
+    /// Goes to the first sample: text begins at the next word, binary data in the next line.
     fn begin_samples(&mut self) -> Result<(), VolumeError> {
         if !self.is_text {
             self.file.line(&mut self.budget)?;
@@ -227,7 +227,7 @@ impl Header {
         Ok(())
     }
 
-    /// Skips what is said of an array, up to a blank line.
+    /// Skips an array's metadata, up to a blank line.
     fn skip_metadata(&mut self) -> Result<(), VolumeError> {
         let _rest_of_line = self.file.line(&mut self.budget)?;
         while self.file.line(&mut self.budget)?.is_some_and(|line| !line.trim().is_empty()) {}
@@ -246,7 +246,7 @@ impl Header {
         })
     }
 
-    /// Skips so many samples.
+    /// Skips `samples` samples.
     fn skip(&mut self, kind: SampleType, samples: u64) -> Result<(), VolumeError> {
         let path = &self.file.path;
         let skipped = if self.is_text {
@@ -265,7 +265,7 @@ impl Header {
         let points: UVec3 = self.fields.value("DIMENSIONS", SIZES, |text| {
             dims_of(three(text?.split_whitespace().map(|size| size.parse::<u32>().ok()))?)
         })?;
-        // A flat grid has cells all the same.
+        // A flat grid has one layer of cells.
         let dims = if array.of_cells { (points - 1).max(UVec3::ONE) } else { points };
         let voxels = u64::from(dims.element_product());
         if voxels == array.count {
@@ -285,7 +285,7 @@ impl Header {
     }
 }
 
-/// The types' names; a long has 8 bytes, as where most of these files come from.
+/// The types' names. A long has 8 bytes, as on the systems where most of these files come from.
 const TYPES: &[(&str, SampleType)] = &[
     ("char", SampleType::I8),
     ("signed_char", SampleType::I8),
@@ -303,7 +303,7 @@ const TYPES: &[(&str, SampleType)] = &[
     ("double", SampleType::F64),
 ];
 
-/// Skips words, and the space before each; `false` if there are too few.
+/// Skips `words` words with the space before each; `false` if there are fewer.
 fn skip_words(reader: &mut impl BufRead, words: u64) -> io::Result<bool> {
     let mut left = words;
     let mut in_word = false;

@@ -1,7 +1,7 @@
-//! VTK's files of regular grids: XML ImageData (`.vti`), and the older `STRUCTURED_POINTS` (`.vtk`).
+//! VTK's files of regular grids: XML ImageData (`.vti`) and legacy `STRUCTURED_POINTS` (`.vtk`).
 //!
-//! What lies in a file besides one array of one number per voxel is left out. VTK's axes are those of no patient; a direction matrix
-//! turns the volume as a whole, so it is checked and has no effect.
+//! One array with one component is read; the rest of the file is ignored. VTK's axes have no relation to a patient. A direction matrix
+//! rotates the volume as a whole, so it is checked but has no effect.
 
 mod blocks;
 mod image_data;
@@ -10,7 +10,7 @@ mod legacy;
 pub(super) use image_data::read as read_image_data;
 pub(super) use legacy::read as read_legacy;
 
-/// Says which one of several arrays is taken.
+/// Warns which one of several arrays is used.
 fn warn_of_choice<'a>(path: &std::path::Path, names: impl Iterator<Item = &'a str>, taken: &str) {
     let names: Vec<&str> = names.collect();
     if names.len() > 1 {

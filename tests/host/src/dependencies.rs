@@ -1,4 +1,4 @@
-//! What an application compiles that embeds the library.
+//! The dependencies of an application that embeds the library.
 
 use std::process::Command;
 

@@ -1,4 +1,4 @@
-//! A volume among a host's own surfaces: the host draws them with its own camera, and the volume goes where they let it.
+//! A volume among a host's surfaces: the host draws them with its own camera, and they hide the volume behind them.
 
 use glam::{DMat4, DVec3, DVec4};
 use sheetsplat::Surfaces;
@@ -14,7 +14,7 @@ const F32: TextureFormat = TextureFormat::Rgba32Float;
 const SIZE: [u32; 2] = [90, 70];
 const PAINT: [f32; 4] = [0.1, 0.6, 0.2, 1.0];
 
-/// The host's camera: from the volume's coordinates to its clip space, depths reversed and without end.
+/// The host's matrix from the volume's coordinates to its clip space, with reversed depths and without a far plane.
 fn clip_from_world() -> DMat4 {
     let (eye, near, fov) = (DVec3::new(-150.0, -220.0, 60.0), 5.0, 0.6_f64);
     let w = -eye.normalize();
@@ -26,14 +26,14 @@ fn clip_from_world() -> DMat4 {
     DMat4::from_cols(row(u, focal / aspect), row(v, focal), DVec4::W * near, row(w, 1.0)).transpose()
 }
 
-/// A wall of the host's, through the volume's middle, that ends in the image: a normal away from the eye, and corners.
+/// A wall of the host's through the volume's middle that ends within the image: a normal that points away from the eye, and corners.
 fn wall() -> (DVec3, [DVec3; 4]) {
     let (along, up) = (DVec3::new(1.0, -0.3, 0.0), DVec3::new(0.0, 0.2, 1.0));
     let corners = [(-200.0, -200.0), (10.0, -200.0), (-200.0, 200.0), (10.0, 200.0)];
     (up.cross(along).normalize(), corners.map(|(a, b)| along * a + up * b))
 }
 
-/// What the host draws by itself: the wall, in colour and depth.
+/// What the host draws itself: the wall, in colour and depth.
 fn draw_wall(host: &Host) -> (Texture, TextureView) {
     let (device, depth_format) = (&host.device, TextureFormat::Depth32Float);
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
@@ -119,11 +119,11 @@ fn draw_wall(host: &Host) -> (Texture, TextureView) {
     (target, depth)
 }
 
-/// The scene as the host sees it.
+/// The scene with the host's camera.
 fn seen() -> Scene {
     let camera = Camera::from_clip_from_world(clip_from_world(), SIZE).unwrap();
     let mut scene = Scene { camera, ..scene(TRANSPARENT) };
-    // What culling may change is another matter.
+    // Culling would change the image within its bound.
     scene.splatting.culling = false;
     scene
 }
@@ -156,21 +156,21 @@ fn walls_cut_as_clip_planes_do() {
         shows[usize::from(is_wall[at])] += usize::from(image[3] > 0.05);
         for channel in 0..4 {
             let expected = image[channel] + (1.0 - image[3]) * there[channel];
-            // Voxels behind the wall that reach before it: those of the clipped volume are fewer.
+            // Kernels of voxels behind the wall reach before it; the clipped volume has fewer voxels.
             let error = f64::from((actual[channel] - expected).abs());
             assert_at_most(error, 1.6e-4, format_args!("{at}: {actual:?}, {image:?} over {there:?}"));
         }
     }
     assert!(shows.iter().all(|&shows| shows > 200), "{shows:?} pixels of the volume, beside and before the wall");
 
-    // What is first hit lies before the wall, where it is.
+    // First hits lie before the wall or on it.
     let hits: Vec<f32> = bytemuck::pod_collect_to_vec(&host.read(view.first_hits().unwrap()));
     let eye = DVec3::new(-150.0, -220.0, 60.0);
     let finite = hits.iter().zip(&is_wall).filter(|(hit, _)| hit.is_finite());
     assert!(finite.clone().any(|(_, is_wall)| *is_wall) && finite.clone().any(|(_, is_wall)| !is_wall));
     assert!(finite.clone().all(|(&hit, _)| f64::from(hit) < eye.length() + 150.0 && hit > 50.0));
 
-    // The same at a pixel, once the application's own submission is done.
+    // A pick gives the same at a pixel, once the application's own submission is done.
     let at = hits.iter().position(|hit| hit.is_finite()).unwrap();
     let mut encoder = host.encoder();
     let pixel = [at as u32 % SIZE[0], at as u32 / SIZE[0]];

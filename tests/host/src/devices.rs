@@ -1,4 +1,4 @@
-//! Devices with little, with too little, and options that no device has.
+//! Devices with low and insufficient limits, and options that no device supports.
 
 use sheetsplat::internals::gpu::device::{DeviceError, InsufficientLimit, TILE_FEATURES};
 use sheetsplat::{Blend, DeviceRequirements, Renderer, RendererOptions};
@@ -13,9 +13,9 @@ fn replacing(format: TextureFormat) -> RendererOptions {
     RendererOptions::for_target(format).with_blend(Blend::Replace)
 }
 
-/// Of what the least devices can do, and those that can do all, the images agree; with every method and rasterizer.
+/// The least capable devices and fully capable ones give the same images, with every method and rasterizer.
 #[test]
-fn the_least_device_and_webgpus_defaults_do() {
+fn the_least_capable_device_and_webgpus_defaults_suffice() {
     let full = Host::new();
     let least = Limits { max_storage_buffer_binding_size: 16 << 20, ..DeviceRequirements::LEAST.limits };
     for limits in [least, Limits::default()] {
@@ -29,7 +29,7 @@ fn the_least_device_and_webgpus_defaults_do() {
                 ("footprint", "'sections'"),
             ] {
                 let mut scene = scene(OPAQUE);
-                // Where pixels become opaque, f16 and f32 may see differently.
+                // Whether pixels become opaque may differ between f16 and f32.
                 let sets = ["splatting.culling=false".to_owned(), format!("splatting.{key}={value}")];
                 let text = "volume.builtin = 'head:32'";
                 scene.splatting =
@@ -40,7 +40,7 @@ fn the_least_device_and_webgpus_defaults_do() {
                 });
                 let channels = images[0].as_flattened().iter().zip(images[1].as_flattened());
                 let most = largest(channels.map(|(a, b)| f64::from(*a) - f64::from(*b)));
-                // Sheets are f16 ones there.
+                // On the least device sheets are f16.
                 assert_at_most(most, 0.02, format_args!("{key} {value} {features:?}"));
             }
         }
@@ -48,7 +48,7 @@ fn the_least_device_and_webgpus_defaults_do() {
 }
 
 #[test]
-fn check_names_all_that_is_too_little() {
+fn check_names_every_insufficient_limit() {
     let limits = Limits {
         max_texture_dimension_2d: 1024,
         max_storage_buffers_per_shader_stage: 7,
@@ -88,7 +88,7 @@ fn merging_takes_the_better_of_both() {
     assert_eq!(descriptor.required_features, Features::DEPTH_CLIP_CONTROL | TILE_FEATURES);
     let expected = Limits {
         max_texture_dimension_2d: 9000,
-        // Lower is better.
+        // Lower is better for this limit.
         min_uniform_buffer_offset_alignment: 64,
         ..Limits::default()
     };
@@ -96,7 +96,7 @@ fn merging_takes_the_better_of_both() {
 }
 
 #[test]
-fn options_that_cannot_be_had_are_named() {
+fn unsupported_options_are_named() {
     let host = Host::with(Features::empty(), Limits::default());
     let of = RendererOptions::for_target;
     let depth = |format| of(TextureFormat::Rgba8Unorm).with_depth_format(format);
@@ -131,7 +131,7 @@ fn options_that_cannot_be_had_are_named() {
             other => panic!("{option} {found}: {other:?}"),
         }
     }
-    // What they name as allowed is.
+    // The values that they name as allowed are supported.
     for options in [replacing(F32), of(TextureFormat::Rgba16Float), samples(4, TextureFormat::Rgba8Unorm), sheets(2)] {
         host.renderer(options);
     }
@@ -140,7 +140,7 @@ fn options_that_cannot_be_had_are_named() {
 
 /// All formats that every device can render to and blend.
 #[test]
-fn every_renderable_format_will_do() {
+fn every_renderable_format_is_supported() {
     use TextureFormat::{Bgra8Unorm, R8Unorm, R16Float, Rg8Unorm, Rg16Float, Rgb10a2Unorm, Rgba8Unorm};
     let host = Host::with(Features::empty(), Limits::default());
     for format in [R8Unorm, Rg8Unorm, Rgba8Unorm, Bgra8Unorm, Rgb10a2Unorm, R16Float, Rg16Float] {
@@ -150,9 +150,9 @@ fn every_renderable_format_will_do() {
     }
 }
 
-/// One adapter, devices with WebGPU's default limits and with all there is: the same bytes.
+/// On one adapter, devices with WebGPU's default limits and with all features give the same bytes.
 #[test]
-fn deterministic_renderers_do_not_look_at_the_device() {
+fn deterministic_images_do_not_depend_on_the_device() {
     let hosts = [Host::with(Features::empty(), Limits::default()), Host::new()];
     for background in [OPAQUE, TRANSPARENT] {
         let scene = scene(background);

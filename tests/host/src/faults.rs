@@ -1,4 +1,4 @@
-//! What the host's device reports, as errors of whoever asked for the work: nothing reaches the device's own handler.
+//! Failures of the host's device are returned as errors of the call that caused them: none reaches the device's own handler.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -13,7 +13,7 @@ use crate::{Host, OPAQUE, scene, size};
 
 const F32: TextureFormat = TextureFormat::Rgba32Float;
 
-/// Counts errors that no scope took.
+/// Counts the errors that no scope caught.
 fn uncaptured(host: &Host) -> Arc<AtomicUsize> {
     let count = Arc::new(AtomicUsize::new(0));
     let counted = count.clone();
@@ -22,13 +22,13 @@ fn uncaptured(host: &Host) -> Arc<AtomicUsize> {
 }
 
 #[test]
-fn what_a_host_submits_in_a_scope_is_its_validation_error() {
+fn validation_errors_of_a_scope_are_returned() {
     let host = Host::new();
     let uncaptured = uncaptured(&host);
     let renderer = host.renderer(RendererOptions::for_target(TextureFormat::Rgba8Unorm));
     let mut view = host.view(&scene(OPAQUE));
     let before = host.render(&renderer, TextureFormat::Rgba8Unorm, &mut view);
-    // What only the device can refuse: a target of another format.
+    // Only the device can refuse this: a target of another format.
     let target = host.target(F32, size(&view), 1).create_view(&TextureViewDescriptor::default());
     let submitted = scoped(&host.device, || {
         let mut encoder = host.encoder();
@@ -50,7 +50,7 @@ fn a_lost_device_is_lost_to_its_host() {
     let before = host.render(&renderer, TextureFormat::Rgba8Unorm, &mut view);
     let target = host.target(TextureFormat::Rgba8Unorm, size(&view), 1);
     host.device.destroy();
-    // A frame that was prepared may still be recorded.
+    // A frame that is already prepared may still be recorded.
     let submitted = scoped(&host.device, || {
         let mut encoder = host.encoder();
         renderer.record(&mut encoder, &mut view);

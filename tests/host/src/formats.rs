@@ -1,11 +1,11 @@
-//! Volume formats that this application has left out.
+//! Volume formats that this application does not compile.
 
 use std::path::Path;
 
 use sheetsplat::volume::Volume;
 
 #[test]
-fn formats_left_out_are_told() {
+fn formats_left_out_are_named() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/sform.nii");
     let message = Volume::open(&file).unwrap_err().to_string();
     for part in

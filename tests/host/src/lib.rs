@@ -1,4 +1,4 @@
-//! An application with a wgpu device of its own, and tests of what it can do with the library.
+//! An application with its own wgpu device, and tests of the library in it.
 #![cfg(test)]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -16,7 +16,7 @@ mod targets;
 
 use std::path::Path;
 
-use sheetsplat::headless::{Headless, HeadlessOptions};
+use sheetsplat::headless::{GpuHeadless, HeadlessOptions};
 use sheetsplat::{DeviceRequirements, GpuVolume, Placement, Renderer, RendererOptions, Scene, SceneView};
 use wgpu::{Adapter, Device, DeviceDescriptor, Features, Limits, Queue, Texture, TextureFormat, TextureUsages};
 
@@ -26,7 +26,7 @@ struct Host {
     queue: Queue,
 }
 
-/// Mesa's software driver, so that the tests mean the same on every machine.
+/// Mesa's software driver, so that results are the same on every machine.
 fn adapter() -> Adapter {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::VULKAN));
@@ -35,7 +35,7 @@ fn adapter() -> Adapter {
 }
 
 impl Host {
-    /// A device that the application asks a little of, and the library the rest.
+    /// A device with a few features for the application and the rest for the library.
     fn new() -> Self {
         let adapter = adapter();
         let mut descriptor = DeviceDescriptor {
@@ -108,7 +108,7 @@ impl Host {
         self.queue.submit([encoder.finish()]);
     }
 
-    /// A view's image alone in a target of its size.
+    /// The image of only this view, in a target of its size.
     fn render(&self, renderer: &Renderer, format: TextureFormat, view: &mut SceneView) -> Vec<u8> {
         renderer.prepare(&self.device, &self.queue, view).unwrap();
         let target = self.target(format, size(view), 1);
@@ -147,7 +147,7 @@ fn size(view: &SceneView) -> [u32; 2] {
     [image.width, image.height]
 }
 
-/// A small head, of which something is to be seen in every part of the image, over a background.
+/// A small head over a background, visible in every part of the image.
 fn scene(background: &str) -> Scene {
     let text = format!(
         "
@@ -166,17 +166,17 @@ fn scene(background: &str) -> Scene {
 const OPAQUE: &str = "[0.2, 0.5, 0.9, 1]";
 const TRANSPARENT: &str = "[0, 0, 0, 0]";
 
-/// The image as the library renders it by itself.
+/// The image that headless rendering gives.
 fn headless(scene: &Scene) -> Vec<[f32; 4]> {
     let options = HeadlessOptions::default().with_adapter("llvmpipe");
-    Headless::new(&options).unwrap().render(scene).unwrap().image.pixels
+    GpuHeadless::new(&options).unwrap().render(scene).unwrap().image.pixels
 }
 
 fn pixels(bytes: &[u8]) -> Vec<[f32; 4]> {
     bytemuck::pod_collect_to_vec(bytes)
 }
 
-/// What a number may lose in an f16, relative: a driver may cut off what others round.
+/// The maximum relative error of an f16: a driver may truncate where others round.
 const F16: f64 = 1.0 / 1024.0;
 
 /// A half-precision float.

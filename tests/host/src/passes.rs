@@ -1,4 +1,4 @@
-//! Images in passes of the host's, at any place of a target, over what is there.
+//! Images in the host's passes, at any place in a target, over its content.
 
 use sheetsplat::{Blend, Placement, RendererOptions, SceneView};
 use wgpu::{Color, LoadOp, Operations, StoreOp, Texture, TextureFormat, TextureView};
@@ -9,7 +9,7 @@ use crate::{F16, Host, OPAQUE, TRANSPARENT, f16, headless, pixels, scene, size};
 const F32: TextureFormat = TextureFormat::Rgba32Float;
 const DEPTH: TextureFormat = TextureFormat::Depth24PlusStencil8;
 
-/// Numbers that a target is filled with: no two texels alike.
+/// Numbers to fill a target with, all different.
 fn noise(texels: u32) -> Vec<[f32; 4]> {
     (0..texels).map(|at| [0, 1, 2, 3].map(|channel| ((at * 4 + channel) as f32 * 0.618_034).fract())).collect()
 }
@@ -49,7 +49,8 @@ fn the_image_goes_over_what_is_there() {
     }
 }
 
-/// Every corner of a target, its middle, and off it; with and without a scissor. The image has several bands where bindings are small.
+/// The image is placed at every corner of a target, in its middle, and outside it, with and without a scissor. It has several bands where
+/// bindings are small.
 #[test]
 fn images_go_anywhere_and_nothing_else_changes() {
     let limits = wgpu::Limits { max_storage_buffer_binding_size: 1 << 16, ..wgpu::Limits::default() };
@@ -67,7 +68,7 @@ fn images_go_anywhere_and_nothing_else_changes() {
             for scissor in [[0, 0, 160, 120], [33, 21, 40, 57], [0, 0, 1, 1], [5, 5, 0, 9]] {
                 let target = host.filled(F32, large, bytemuck::cast_slice(&there));
                 let mut encoder = host.encoder();
-                // The image is still there: it need not be recorded again.
+                // The image is still there and need not be recorded again.
                 renderer.present(&mut encoder, &mut view, &view_of(&target), Placement { origin, scissor }).unwrap();
                 host.submit(encoder);
                 let actual = pixels(&host.read(&target));
@@ -90,7 +91,7 @@ fn images_go_anywhere_and_nothing_else_changes() {
     }
 }
 
-/// Whether a 90 by 70 image covers any of a scissor rectangle in a 160 by 120 target.
+/// Whether a 90 by 70 image covers any part of a scissor rectangle in a 160 by 120 target.
 fn covers(origin: [i32; 2], [x, y, w, h]: [u32; 4]) -> bool {
     let meet = |at: i32, length: i64, start: u32, extent: u32| {
         i64::from(at).max(start.into()) < (i64::from(at) + length).min(i64::from(start) + i64::from(extent))
@@ -98,7 +99,7 @@ fn covers(origin: [i32; 2], [x, y, w, h]: [u32; 4]) -> bool {
     meet(origin[0], 90, x, w) && meet(origin[1], 70, y, h)
 }
 
-/// A pass of the host's with a colour, several samples and a depth buffer, in which it has its viewport somewhere else.
+/// A host's pass with a colour attachment, several samples and a depth buffer, whose viewport is elsewhere.
 struct Pass<'a> {
     host: &'a Host,
     size: [u32; 2],
@@ -120,7 +121,7 @@ impl Pass<'_> {
                 resolve_target: samples.as_ref().map(|_| &resolved),
                 ops: Operations { load: LoadOp::Clear(clear), store: StoreOp::Store },
             })],
-            // Nearer than anything: a depth test would fail.
+            // Nearer than anything, so a depth test would fail.
             depth_stencil_attachment: depth.as_ref().map(|view| wgpu::RenderPassDepthStencilAttachment {
                 view,
                 depth_ops: Some(Operations { load: LoadOp::Clear(0.0), store: StoreOp::Store }),
@@ -170,14 +171,14 @@ fn in_the_hosts_pass_with_depth_and_samples() {
                 _ => there,
             };
             let actual = actual.map(|bits| f16(bits) as f32);
-            // The target's own number is cut off, and the sum of both.
+            // The target's own number is truncated, and so is the sum.
             let what = format!("{sample_count} samples, {depth:?}, {column} {row}");
             assert_near(actual, expected, 2.0 * F16 as f32, &what);
         }
     }
 }
 
-/// Two volumes, drawn in one encoder, side by side and over one another in one pass.
+/// Two volumes drawn in one encoder, side by side and on top of one another in one pass.
 #[test]
 fn several_views_in_one_encoder_and_one_pass() {
     let host = Host::new();

@@ -1,4 +1,4 @@
-//! Volumes shared by views and renderers, views that change their size, and what is left when all of it is gone.
+//! Volumes shared by views and renderers, views that change their size, and what is left when all of them are dropped.
 
 use sheetsplat::{Blend, GpuVolume, Placement, RendererOptions, SceneView};
 use wgpu::TextureFormat;
@@ -22,7 +22,7 @@ fn assert_within_one(actual: &[u8], expected: &[u8]) {
     assert!(most <= Some(1), "bytes differ by {most:?}");
 }
 
-/// Two views of one volume, by two renderers into two formats: the volume is on the GPU once.
+/// Two views of one volume, drawn by two renderers into two formats: the volume is on the GPU once.
 #[test]
 fn a_volume_is_uploaded_once() {
     let host = Host::new();
@@ -43,13 +43,13 @@ fn a_volume_is_uploaded_once() {
     let [first, second] = &mut views;
     assert!(pixels(&host.render(&renderers[0], F32, first)) == images[0]);
     assert_within_one(&host.render(&renderers[1], BYTES, second), &bytes(&images[1]));
-    // The views change each their own transfer function.
+    // Each view changes its own transfer function.
     first.set_iso_ranges(Some(vec![[150.0, 255.0]])).unwrap();
     assert!(pixels(&host.render(&renderers[0], F32, first)) != images[0]);
     assert_within_one(&host.render(&renderers[1], BYTES, second), &bytes(&images[1]));
 }
 
-/// One view, recorded once, presented in two formats; and drawn by renderers with different sheets in turns.
+/// One view is recorded once and presented in two formats, and drawn alternately by renderers with different sheets.
 #[test]
 fn a_view_serves_several_renderers() {
     let host = Host::new();
@@ -90,9 +90,9 @@ fn views_change_their_size() {
     assert!(held[1] > held[0] && held[2] < held[0], "{held:?} bytes held");
 }
 
-/// A view that could not be prepared still shows what it showed.
+/// After a failed preparation a view still shows its last image.
 #[test]
-fn what_cannot_be_prepared_leaves_the_last_image() {
+fn a_failed_preparation_leaves_the_last_image() {
     let host = Host::new();
     let renderer = host.renderer(replacing(F32));
     let mut view = host.view(&scene(OPAQUE));
@@ -112,7 +112,7 @@ fn what_cannot_be_prepared_leaves_the_last_image() {
 
 /// A view that was never prepared draws nothing.
 #[test]
-fn what_was_never_prepared_draws_nothing() {
+fn a_view_that_was_never_prepared_draws_nothing() {
     let host = Host::new();
     let renderer = host.renderer(replacing(BYTES));
     let mut view = host.view(&scene(OPAQUE));
@@ -126,8 +126,8 @@ fn what_was_never_prepared_draws_nothing() {
     assert!(host.read(&target) == there);
 }
 
-/// Everything of the library is dropped while its frame is on its way; the frame comes, and the host's device works on. Prepared and
-/// recorded on another thread.
+/// Everything of the library is dropped while its frame is in flight; the frame arrives, and the host's device continues to work. The frame is
+/// prepared and recorded on another thread.
 #[test]
 fn everything_may_be_dropped() {
     let host = Host::new();
@@ -156,7 +156,7 @@ fn everything_may_be_dropped() {
     assert_eq!(ours(), 0, "allocations are left");
 }
 
-/// A frame's counts and times come while it is presented again; times only of what the library's own passes draw.
+/// A frame's counts and times arrive while it is presented again; times cover only the library's own passes.
 #[test]
 fn counts_come_while_the_image_is_presented() {
     let host = Host::new();

@@ -1,4 +1,4 @@
-//! Targets of every kind hold the image that headless rendering gives, as exactly as they can.
+//! Targets of every kind hold the image of headless rendering, as exactly as they can.
 
 use sheetsplat::{Blend, RendererOptions};
 use wgpu::TextureFormat;
@@ -6,7 +6,7 @@ use wgpu::TextureFormat;
 use crate::compare::assert_at_most;
 use crate::{F16, Host, OPAQUE, f16, headless, pixels, scene};
 
-/// Half-transparent: every pixel's colour is premultiplied by something else.
+/// A half-transparent background, so that every pixel's colour is premultiplied by another alpha.
 const TINTED: &str = "[0.9, 0.4, 0.1, 0.5]";
 
 fn replacing(format: TextureFormat) -> RendererOptions {
@@ -18,7 +18,7 @@ fn render(host: &Host, options: RendererOptions, background: &str) -> Vec<u8> {
     host.render(&renderer, options.target_format, &mut host.view(&scene(background)))
 }
 
-/// How many steps of a byte lavapipe is off where it encodes to sRGB.
+/// The error of lavapipe's sRGB encoding in steps of a byte.
 const SRGB_STEPS: f64 = 0.7;
 
 /// sRGB's curve.
@@ -70,7 +70,7 @@ fn f16_targets_round() {
         for (actual, &expected) in actual.iter().zip(&expected) {
             let expected = if is_linear { linear(expected) } else { expected.map(f64::from) };
             for (actual, expected) in actual.map(f16).into_iter().zip(expected) {
-                // And what a power costs in f32.
+                // Plus the error of a power in f32.
                 let allowed = expected * (F16 + 1e-5) + 1e-7;
                 let what = format_args!("linear {is_linear}: {actual}, not {expected}");
                 assert_at_most((actual - expected).abs(), allowed, what);
@@ -79,7 +79,7 @@ fn f16_targets_round() {
     }
 }
 
-/// What is opaque looks the same in targets that hold linear light.
+/// Opaque pixels look the same in targets that hold linear light.
 #[test]
 fn srgb_targets_show_the_same_bytes() {
     let host = Host::new();
@@ -98,7 +98,7 @@ fn srgb_targets_show_the_same_bytes() {
     }
 }
 
-/// What is translucent is decoded before its alpha, as sRGB blending wants it.
+/// Translucent pixels are decoded before they are multiplied by alpha, as sRGB blending requires.
 #[test]
 fn srgb_targets_hold_premultiplied_light() {
     let host = Host::new();

@@ -1,4 +1,4 @@
-//! Which value has which colour.
+//! The colour bar, which shows the colour of each value.
 
 use glam::DVec3;
 use sheetsplat::appearance::{categories, shown_range};
@@ -13,20 +13,20 @@ use super::{PADDING, plate_for};
 use crate::canvas::{LINE, filled, lay, rule, text_width, write};
 use crate::failure::Failure;
 
-/// Pixels that the bar is wide, and what it is high within: half of the image where that allows.
+/// The width of the bar in pixels; its maximum height follows, half of the image's where that allows.
 const WIDTH: u32 = 16;
 const HEIGHTS: [u32; 2] = [64, 320];
 
-/// Pixels of a tick and its distance from the number.
+/// The length of a tick in pixels, and its distance from the number.
 const TICK: u32 = 4;
 const GAP: u32 = 4;
 
-/// The colours of the values that show, before light falls on them; in projections as bright as their opacities make them.
+/// The bar with the colours of visible values before shading; in projections scaled by their opacities.
 pub(super) fn plate(scene: &Scene, volume: &Volume, transfer: &TransferFunction) -> Result<Image, Failure> {
     let refused = |found: &str, allowed: &str| {
         Err(Failure::Input(format!("--annotate: colors: found {found}, allowed: {allowed}")))
     };
-    // Where one value is what a pixel shows, its opacity is brightness.
+    // Where a pixel shows a single value, its opacity acts as brightness.
     let is_projection = match scene.splatting.compositing {
         Compositing::Maximum | Compositing::Minimum => true,
         Compositing::Xray | Compositing::Average => {
@@ -36,20 +36,20 @@ pub(super) fn plate(scene: &Scene, volume: &Volume, transfer: &TransferFunction)
         _ => false,
     };
     if volume.labels().is_none() && categories::is_label_map(volume) {
-        return refused("a volume of labels", "values that are amounts, or legend");
+        return refused("a volume of labels", "values that are not labels, or --annotate legend");
     }
     let Some([lo, hi]) = shown_range(volume, transfer) else {
-        return refused("no voxel with an opacity above 0", "volumes that show something");
+        return refused("no voxel with an opacity above 0", "visible voxels");
     };
     let height = (scene.image.height / 2).clamp(HEIGHTS[0], HEIGHTS[1]);
-    // With half a line between numbers.
+    // Half a line is left between numbers.
     let apart = (hi - lo) / f64::from(height) * f64::from(LINE + LINE / 2);
     let ticks = ticks([lo, hi], apart);
     let text = ticks.iter().map(|(_, label)| text_width(label)).max().unwrap_or(0);
 
     let top = PADDING + LINE / 2;
     let mut plate = plate_for([WIDTH + TICK + GAP + text, height + LINE]);
-    // The middle of a row of pixels, from the upper end.
+    // The value at the middle of a row of pixels, counted from the top.
     let value = |row: u32| hi - (hi - lo) * (f64::from(row) + 0.5) / f64::from(height);
     for row in 0..height {
         let share = if is_projection { transfer.opacity.at(value(row)) } else { 1.0 };

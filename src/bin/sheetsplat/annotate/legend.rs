@@ -1,4 +1,4 @@
-//! Which label has which colour.
+//! The legend, which shows the colour of each label.
 
 use sheetsplat::appearance::{categories, shown_range};
 use sheetsplat::image::Image;
@@ -9,23 +9,23 @@ use super::{PADDING, plate_for};
 use crate::canvas::{LINE, filled, lay, text_width, write};
 use crate::failure::Failure;
 
-/// Pixels of the patch of colour in a line, and around it.
+/// The size of the colour patch in a line in pixels, and the gap after it.
 const PATCH: [u32; 2] = [20, 12];
 const GAP: u32 = 6;
 
-/// Pixels between two columns.
+/// The gap between two columns in pixels.
 const COLUMN_GAP: u32 = 12;
 
-/// Characters of a label's name that are shown.
+/// The maximum number of characters of a label's name.
 const LONGEST: usize = 40;
 
-/// A label's number and name, and its colours from the least value that shows to the greatest.
+/// A label's number and name, and its colours from the lowest visible value to the highest.
 struct Entry {
     text: String,
     colors: Vec<[f32; 4]>,
 }
 
-/// As many columns as it takes for a plate of at most `room` pixels in height.
+/// The legend in as many columns as needed for a height of at most `room` pixels.
 pub(super) fn plate(volume: &Volume, transfer: &TransferFunction, room: u32) -> Result<Image, Failure> {
     let entries = entries(volume, transfer)?;
     let rows = (room.saturating_sub(2 * PADDING) / LINE).max(1).min(entries.len() as u32);
@@ -80,7 +80,7 @@ fn entries(volume: &Volume, transfer: &TransferFunction) -> Result<Vec<Entry>, F
         },
     };
     if entries.is_empty() {
-        return refused("no label with a colour of its own", "some, as with --preset labels");
+        return refused("no label with a colour of its own", "labels with colours, as with --preset labels");
     }
     Ok(entries)
 }

@@ -1,4 +1,4 @@
-//! `--annotate`: scale bar, colour bar and legend, drawn over images.
+//! `--annotate`: the scale bar, colour bar and legend drawn over images.
 
 mod color_bar;
 mod legend;
@@ -16,20 +16,20 @@ use sheetsplat::volume::Volume;
 use crate::canvas::{filled, lay};
 use crate::failure::Failure;
 
-/// Pixels between plates, and from them to the image's edges.
+/// Pixels between plates, and between plates and the image's edges.
 const MARGIN: u32 = 8;
 
-/// Pixels from a plate's edges to what is on it.
+/// Pixels between a plate's edges and its content.
 const PADDING: u32 = 6;
 
-/// What text is readable on, whatever is behind: premultiplied.
+/// A premultiplied background on which text is readable over any image.
 const PLATE: [f32; 4] = [0.0, 0.0, 0.0, 0.75];
 
-/// What is drawn over images.
+/// The choice of annotations.
 #[derive(clap::Args)]
 pub(crate) struct Annotate {
-    /// Draw over the image, with commas between them: scale, a bar of a round length; colors, which value has which colour;
-    /// legend, which label.
+    /// Draw over the image, separated by commas: scale, a bar of a round length; colors, the colour of each value; legend, the
+    /// colour of each label.
     #[arg(long, value_name = "LIST", value_enum, value_delimiter = ',')]
     annotate: Vec<Annotation>,
 }
@@ -41,11 +41,11 @@ enum Annotation {
     Legend,
 }
 
-/// Plates, and where their upper left corners are.
+/// Plates and the positions of their upper left corners.
 pub(crate) struct Overlay(Vec<([u32; 2], Image)>);
 
 impl Annotate {
-    /// What to draw over a scene's images, whichever way its camera looks.
+    /// The annotations for a scene's images, for any direction of its camera.
     pub(crate) fn overlay(&self, scene: &Scene, volume: &Volume) -> Result<Overlay, Failure> {
         let has = |annotation| self.annotate.contains(&annotation);
         let size = [scene.image.width, scene.image.height];
@@ -61,7 +61,7 @@ impl Annotate {
         place(size, scale, colors, legend)
     }
 
-    /// Checks that the output is to be looked at, and does not hold data.
+    /// Checks that the output is a picture to look at, not data.
     pub(crate) fn check_format(&self, output: &Path) -> Result<(), Failure> {
         let is_data = |extension: &OsStr| ["exr", "npy"].iter().any(|data| extension.eq_ignore_ascii_case(data));
         let is_data = output.extension().is_some_and(is_data);
@@ -73,7 +73,7 @@ impl Annotate {
     }
 }
 
-/// The legend in the upper left corner, the scale bar in the lower one, the colour bar to the right.
+/// Puts the legend into the upper left corner, the scale bar into the lower left one, and the colour bar to the right.
 fn place(
     size: [u32; 2],
     scale: Option<Image>,
@@ -112,7 +112,7 @@ impl Overlay {
     }
 }
 
-/// An empty plate for something of a size.
+/// An empty plate around content of a size.
 fn plate_for([width, height]: [u32; 2]) -> Image {
     filled([width.saturating_add(2 * PADDING), height.saturating_add(2 * PADDING)], PLATE)
 }

@@ -1,27 +1,27 @@
 //! Round numbers: 1, 2 and 5 times powers of ten.
 
-/// The power of ten that a number above 0 begins with.
+/// The exponent of the largest power of ten up to a number above 0.
 fn exponent(number: f64) -> i32 {
-    // Of powers of ten themselves the logarithm may be off by a rounding error.
+    // The logarithm of a power of ten may be off by a rounding error.
     (number.log10() + 1e-12).floor() as i32
 }
 
-/// The greatest round number that is at most a number above 0.
+/// The largest round number up to a number above 0.
 pub(super) fn round_down(number: f64) -> f64 {
     let power = 10_f64.powi(exponent(number));
     let fits = |round: &f64| *round <= number * (1.0 + 1e-12);
     [5.0, 2.0].map(|digit| digit * power).into_iter().find(fits).unwrap_or(power)
 }
 
-/// The least round number that is at least a number above 0.
+/// The smallest round number not below a number above 0.
 fn round_up(number: f64) -> f64 {
     let power = 10_f64.powi(exponent(number));
     let fits = |round: &f64| *round >= number * (1.0 - 1e-12);
     [1.0, 2.0, 5.0].map(|digit| digit * power).into_iter().find(fits).unwrap_or(10.0 * power)
 }
 
-/// The multiples of a round step within a range that are `apart` or more from one another, and what they are written as. Where there
-/// is room for none, the range's lower end.
+/// The multiples of a round step within a range, at least `apart` from one another, with their text; the range's lower end if no
+/// multiple fits.
 pub(super) fn ticks([lo, hi]: [f64; 2], apart: f64) -> Vec<(f64, String)> {
     let step = if apart > 0.0 { round_up(apart) } else { 1.0 };
     let (first, last) = ((lo / step).ceil(), (hi / step).floor());
@@ -32,7 +32,7 @@ pub(super) fn ticks([lo, hi]: [f64; 2], apart: f64) -> Vec<(f64, String)> {
     multiples.map(|value| (value, written(value, step))).collect()
 }
 
-/// A multiple of a round step, with as many digits as the step needs.
+/// The text of a multiple of a round step, with as many digits as the step needs.
 pub(super) fn written(number: f64, step: f64) -> String {
     if number == 0.0 {
         return "0".to_owned();

@@ -1,4 +1,4 @@
-//! A bar of a round length.
+//! The scale bar, which has a round length.
 
 use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
@@ -9,12 +9,12 @@ use super::{PADDING, plate_for};
 use crate::canvas::{LINE, rule, text_width, write};
 use crate::failure::Failure;
 
-/// The bar's thickness, and its length's greatest share of the image's width.
+/// The bar's thickness in pixels; its maximum length, a fraction of the image's width, follows.
 const THICKNESS: u32 = 3;
 const SHARE: f64 = 0.25;
 
-/// Orthographic only: in perspective no length on the screen is a length of the volume but on one plane, and nothing in the image says
-/// which parts lie there.
+/// The bar, for orthographic cameras only: in perspective, a length on the screen is a length in the volume on one plane only, and the
+/// image does not show which parts lie there.
 pub(super) fn plate(scene: &Scene, volume: &Volume) -> Result<Image, Failure> {
     let [width, height] = [scene.image.width, scene.image.height];
     let Some(shown) = scene.camera.orthographic_height(volume.grid(), scene.splatting.radius, width, height) else {

@@ -1,4 +1,4 @@
-//! `sheetsplat info`: what a volume file says of itself, and how its values are distributed.
+//! `sheetsplat info`: the contents of a volume file and the distribution of its values.
 
 mod statistics;
 
@@ -30,7 +30,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Percent of the values, and the name that has in JSON.
+/// Percentiles, and their names in JSON.
 const PERCENTILES: [(f64, &str); 9] = [
     (0.1, "0.1"),
     (1.0, "1"),
@@ -54,7 +54,7 @@ struct Info {
     r#type: String,
     spacing: [f64; 3],
     unit: Option<String>,
-    /// Voxels whose samples are NaN or infinite; what follows is that of the others.
+    /// Voxels whose samples are NaN or infinite; the fields below are about the others.
     holes: u64,
     min: f64,
     max: f64,
@@ -62,17 +62,17 @@ struct Info {
     #[serde(serialize_with = "as_map")]
     percentiles: [f64; PERCENTILES.len()],
     frame: Frame,
-    /// The preset that fits, if one does.
+    /// The preset that fits, if any.
     preset: Option<&'static str>,
 }
 
-/// What the camera shows: world units, from the volume's centre.
+/// What the camera shows, in world units from the volume's centre.
 #[derive(Serialize)]
 struct Frame {
     center: [f64; 3],
-    /// Over the image's height; `None` in perspective.
+    /// The image's height; `None` in perspective.
     height: Option<f64>,
-    /// From the eye to the centre; `None` unless in perspective.
+    /// The distance from the eye to the centre; `None` if orthographic.
     distance: Option<f64>,
 }
 
@@ -118,7 +118,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     stdout(text.as_bytes())
 }
 
-/// Percentiles by their names, ascending.
+/// Serializes percentiles by name, ascending.
 fn as_map<S: Serializer>(percentiles: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_map(PERCENTILES.iter().map(|&(_, name)| name).zip(percentiles))
 }
@@ -144,14 +144,14 @@ fn described(info: &Info, volume: &Volume) -> String {
     };
     let length = length.map_or(String::new(), |length| format!(", {name} {}", short(length)));
     line("frame", format!("center {x}, {y}, {z}{length} {}", info.unit.as_deref().unwrap_or("(no unit)")));
-    line("preset", info.preset.unwrap_or("none fits: the values decide").to_owned());
+    line("preset", info.preset.unwrap_or("none fits; the transfer function follows the values").to_owned());
     for (&(_, name), &value) in PERCENTILES.iter().zip(&info.percentiles) {
         line(&format!("{name:>9} %"), short(value));
     }
     if info.min == info.max {
         return text;
     }
-    // A few values far from the others would take most of the width.
+    // Outliers would take up most of the width.
     let tails = [info.percentiles[0], info.percentiles[PERCENTILES.len() - 1]];
     let histogram = Histogram::new(volume.values(), if tails[0] < tails[1] { tails } else { [info.min, info.max] });
     let isos: Vec<String> = histogram.iso_values().into_iter().map(short).collect();
@@ -159,7 +159,7 @@ fn described(info: &Info, volume: &Volume) -> String {
     text + &chart(&histogram)
 }
 
-/// Where the axes point in a patient.
+/// The anatomical directions of the axes.
 fn orientation(orientation: &Orientation) -> String {
     let sides = [["right", "left"], ["front", "back"], ["head", "feet"]];
     let axis = |axis: DVec3| {
@@ -173,7 +173,7 @@ fn orientation(orientation: &Orientation) -> String {
     format!("x to the {x}, y to the {y}, z to the {z}{handedness}")
 }
 
-/// Bars over values, as high as the logarithms of the counts.
+/// A bar chart over values, with logarithmic counts.
 fn chart(histogram: &Histogram) -> String {
     const EIGHTHS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     let bars = histogram.counts.chunks(histogram.counts.len() / COLUMNS);
@@ -183,7 +183,7 @@ fn chart(histogram: &Histogram) -> String {
     for row in (0..ROWS).rev() {
         let cell = |height: &f64| {
             let eighths = height / highest * (8 * ROWS) as f64 - (8 * row) as f64;
-            // What is there at all is seen.
+            // Any count above 0 is visible.
             let least = if row == 0 && *height > 0.0 { 1 } else { 0 };
             EIGHTHS[(eighths.round().clamp(0.0, 8.0) as usize).max(least)]
         };
@@ -196,7 +196,7 @@ fn chart(histogram: &Histogram) -> String {
     text + &format!("{low}{high:>width$}\n")
 }
 
-/// A number with as many digits as a reader can use.
+/// A number with a useful number of digits.
 fn short(number: f64) -> String {
     let exponent = if number == 0.0 { 0 } else { number.abs().log10().floor() as i32 };
     if !(-5..=9).contains(&exponent) {

@@ -1,15 +1,15 @@
-//! How a volume's values are distributed.
+//! The distribution of a volume's values.
 
 use rayon::prelude::*;
 use sheetsplat::appearance::histogram;
 
-/// Values that one thread takes at a time.
+/// The number of values that one thread processes at a time.
 const CHUNK: usize = 1 << 20;
 
-/// Bins of a histogram.
+/// The number of bins in a histogram.
 const BINS: usize = 256;
 
-/// The least and the largest finite value, and the mean of those, the same in every run.
+/// The minimum, maximum and mean of the finite values, the same in every run.
 pub(super) fn extent_and_mean(values: &[f32]) -> [f64; 3] {
     let of_chunk = |chunk: &[f32]| {
         let start = [f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0];
@@ -19,7 +19,7 @@ pub(super) fn extent_and_mean(values: &[f32]) -> [f64; 3] {
             [least.min(value), largest.max(value), sum + value, count + 1.0]
         })
     };
-    // Collected, so that the sums are added in one order.
+    // The sums are collected, so that they are added in a fixed order.
     let chunks: Vec<[f64; 4]> = values.par_chunks(CHUNK).map(of_chunk).collect();
     let [least, largest, sum, count] = chunks
         .into_iter()
@@ -28,7 +28,7 @@ pub(super) fn extent_and_mean(values: &[f32]) -> [f64; 3] {
     [least, largest, sum / count]
 }
 
-/// How often values occur from a value to a larger one; what is beyond is in the bins at the ends.
+/// Counts of values from a minimum to a maximum; values beyond are in the outermost bins.
 pub(super) struct Histogram {
     pub(super) range: [f64; 2],
     pub(super) counts: Vec<u64>,
@@ -41,15 +41,15 @@ impl Histogram {
         Self { range: [low, high], counts: histogram(values, BINS, bin) }
     }
 
-    /// Where values fall into three classes, or into two if there are no more: the classes' variances are the least (Otsu 1979).
+    /// The thresholds between three classes of values, or two if there are no more, that minimise the variance within classes (Otsu 1979).
     pub(super) fn iso_values(&self) -> Vec<f64> {
-        // Numbers of values, and sums of their bins, below each bin.
+        // The number of values, and the sum of their bins, below each bin.
         let mut below = vec![[0.0; 2]];
         for (bin, &count) in self.counts.iter().enumerate() {
             let [number, sum] = below[bin];
             below.push([number + count as f64, sum + bin as f64 * count as f64]);
         }
-        // Largest where variances within classes are the least; `None` for an empty class.
+        // Maximal where the variance within classes is minimal; `None` for an empty class.
         let class = |from: usize, to: usize| {
             let [number, sum] = [0, 1].map(|i| below[to][i] - below[from][i]);
             (number > 0.0).then(|| sum * sum / number)
@@ -66,7 +66,7 @@ impl Histogram {
             consider(&[first]);
             (first + 1..BINS).for_each(|second| consider(&[first, second]));
         }
-        // Between two classes many splits are as good: the middle of the bins that are empty there.
+        // Between two classes many splits are equally good: the middle of the empty bins is used.
         let empty_from = |split: usize| (0..split).rev().take_while(|&bin| self.counts[bin] == 0).count();
         let empty_to = |split: usize| (split..BINS).take_while(|&bin| self.counts[bin] == 0).count();
         let place = |split: usize| split as f64 + (empty_to(split) as f64 - empty_from(split) as f64) / 2.0;

@@ -15,7 +15,7 @@ use sheetsplat::scene::Scene;
 use sheetsplat::volume::Volume;
 
 use crate::annotate::{Annotate, Overlay};
-use crate::arguments::{Backend, Depth, Drawing, Input, check_scene_file, log_frame, parse_degrees, scene_file};
+use crate::arguments::{Depth, Input, check_scene_file, log_frame, parse_degrees, scene_file};
 use crate::failure::Failure;
 use crate::outputs::{self, Outputs};
 use crate::progress::Progress;
@@ -37,20 +37,20 @@ pub(crate) struct Arguments {
     /// Numbered images (frame-%04d.png, frame-####.exr), a movie (.apng, .gif, .y4m), or - for YUV4MPEG2 on standard output.
     #[arg(short, long, value_name = "FILES")]
     output: PathBuf,
-    /// Degrees that all frames turn by, about the camera's up, by the right hand. The last frame is one step before the end.
+    /// Degrees that the camera turns over all frames, right-handed about its up vector. The last frame is one step before the end.
     #[arg(long, value_name = "DEGREES", default_value_t = 360.0, allow_negative_numbers = true, value_parser = parse_degrees)]
     turn: f64,
-    /// Frames in all.
+    /// Total number of frames.
     #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..))]
     count: u32,
-    /// Draw only these of all frames, counted from 0, without B: parts of a movie can be drawn anywhere and at any time.
+    /// Draw only frames A to B - 1, counted from 0: parts of a movie can be drawn anywhere, at any time.
     #[arg(long, value_name = "A..B", value_parser = parse_frames)]
     frames: Option<Range<u32>>,
-    /// Write the scene as a scene file, with what presets, colour maps and the volume made of it: `render` draws the first frame from it,
-    /// and with camera.direction turned any other.
+    /// Write the scene as a scene file, with everything that presets, colour maps and the volume determined. `render` draws its first
+    /// frame from it, and any other frame with camera.direction turned.
     #[arg(long, value_name = "FILE")]
     save_scene: Option<PathBuf>,
-    /// Draw numbered images again that are there.
+    /// Draw numbered images again that already exist.
     #[arg(long)]
     overwrite: bool,
     /// Frames per second of a movie.
@@ -59,15 +59,12 @@ pub(crate) struct Arguments {
     /// Bits per channel of PNG and APNG.
     #[arg(long, value_enum, default_value = "8")]
     depth: Depth,
-    /// Colour resolution of YUV4MPEG2: halved both ways, for which width and height must be even, or full.
+    /// Chroma resolution of YUV4MPEG2: halved in both directions, which needs an even width and height, or full.
     #[arg(long, value_enum, default_value = "420")]
     chroma: Chroma,
-    /// The GPU, or the CPU's cores without a driver.
-    #[arg(long, value_enum, default_value = "gpu")]
-    backend: Backend,
 }
 
-/// `A..B`, not empty.
+/// Parses `A..B`, which must not be empty.
 fn parse_frames(text: &str) -> Result<Range<u32>, String> {
     let parse = |(from, to): (&str, &str)| Some(from.parse().ok()?..to.parse().ok()?);
     let frames = text.split_once("..").and_then(parse).filter(|frames| !frames.is_empty());
@@ -136,7 +133,7 @@ fn movie(
     let scene_file = arguments.save_scene.as_deref().map(|path| ("--save-scene", path));
     let named: Vec<_> = output_file.into_iter().chain(scene_file).collect();
     let outputs = Outputs::check(&named, is_printed, &input.files(&scene))?;
-    // Before anything is written: the files that were read are known then.
+    // The volume is loaded before anything is written, because the files it was read from are then known.
     let shown = Shown::load(arguments, scene, &outputs)?;
     let encode = |to: &mut dyn Write, failed: &dyn Fn(io::Error) -> Failure| {
         let mut encoder = Encoder::new(format, &settings, &mut *to).map_err(failed)?;
@@ -152,7 +149,7 @@ fn movie(
     outputs::commit(vec![file])
 }
 
-/// What is on every frame.
+/// What every frame shows.
 struct Shown {
     scene: Scene,
     volume: Volume,
@@ -168,7 +165,7 @@ impl Shown {
         Ok(Self { scene, volume, overlay })
     }
 
-    /// Draws frames and hands them over, each as if it were the only one.
+    /// Draws frames and passes them on. Each is independent of the others.
     fn draw(
         self,
         arguments: &Arguments,
@@ -178,13 +175,14 @@ impl Shown {
     ) -> Result<(), Failure> {
         let Arguments { input, turn, count, save_scene, .. } = arguments;
         let Self { scene, volume, overlay } = self;
-        let mut drawing = Drawing::new(input, arguments.backend, false, volume, &scene)?;
+        let headless = input.headless(false, [&scene])?;
+        let mut view = headless.view(volume, &scene).map_err(|error| input.failure(error))?;
         let mut progress = Progress::new(frames.len(), progress);
         for &frame in frames {
-            // From where the scene's camera is, whichever frame was drawn before.
+            // The angle is relative to the scene's camera, independent of the previous frame.
             let camera = scene.camera.turned(turn * f64::from(frame) / f64::from(*count));
-            drawing.set_camera(camera).map_err(|error| input.failure(RenderError::from(error)))?;
-            let mut rendering = drawing.draw().map_err(|error| input.failure(error))?;
+            view.set_camera(camera).map_err(|error| input.failure(RenderError::from(error)))?;
+            let mut rendering = headless.draw(&mut view).map_err(|error| input.failure(error))?;
             overlay.draw(&mut rendering.image);
             take(frame, &rendering.image)?;
             log_frame(&format!("frame {frame}"), &rendering.stats);

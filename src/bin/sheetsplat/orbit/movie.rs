@@ -7,7 +7,7 @@ use sheetsplat::image::{Image, PngDepth};
 
 use super::y4m::{Chroma, Y4m};
 
-/// File formats, by extension.
+/// Movie formats by extension.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Format {
     Apng,
@@ -15,7 +15,7 @@ pub(super) enum Format {
     Y4m,
 }
 
-/// What all of a movie's frames have in common.
+/// The settings that all frames of a movie share.
 pub(super) struct Settings {
     pub(super) width: u32,
     pub(super) height: u32,
@@ -25,7 +25,7 @@ pub(super) struct Settings {
     pub(super) chroma: Chroma,
 }
 
-/// Takes frames one after the other.
+/// Encodes frames one after the other.
 pub(super) enum Encoder<W: Write> {
     Apng { writer: png::Writer<W>, depth: PngDepth },
     Gif { encoder: gif::Encoder<W>, size: [u16; 2], fps: u16, added: u64 },
@@ -42,7 +42,7 @@ impl Format {
         }
     }
 
-    /// Checks what the format cannot hold.
+    /// Checks that the format supports the settings.
     ///
     /// # Errors
     /// What was found, and what is allowed.
@@ -53,7 +53,7 @@ impl Format {
             Self::Gif if width.max(height) > u32::from(u16::MAX) => {
                 Err(format!("{size}, allowed: at most 65535 in a GIF"))
             }
-            // Times are hundredths of a second, and programs show what is shorter than two of them slowly.
+            // Delays are in hundredths of a second, and players slow down delays shorter than two of them.
             Self::Gif if fps > 50 => Err(format!("--fps: found {fps}, allowed: at most 50 in a GIF")),
             Self::Y4m if chroma == Chroma::Halved && (width % 2, height % 2) != (0, 0) => {
                 Err(format!("{size}, allowed: even numbers, or --chroma 444"))
@@ -76,7 +76,7 @@ impl<W: Write> Encoder<W> {
                 });
                 encoder.set_animated(frames, 0)?;
                 encoder.set_frame_delay(1, fps)?;
-                // A frame replaces the one before it, also where it is transparent.
+                // A frame replaces the previous one, even where it is transparent.
                 encoder.set_blend_op(png::BlendOp::Source)?;
                 Ok(Self::Apng { writer: encoder.write_header()?, depth })
             }
@@ -101,12 +101,12 @@ impl<W: Write> Encoder<W> {
                 Ok(writer.write_image_data(&bytes)?)
             }
             Self::Gif { encoder, size: [width, height], fps, added } => {
-                // Premultiplied colours are those over black.
+                // Premultiplied colours equal colours over black.
                 let channels = image.pixels.iter().flat_map(|&[r, g, b, _]| [r, g, b]);
                 let bytes: Vec<u8> =
                     channels.map(|channel| (channel * 255.0).round().clamp(0.0, 255.0) as u8).collect();
                 let mut frame = gif::Frame::from_rgb(*width, *height, &bytes);
-                // The rounded time of the next frame less that of this one: errors do not add up.
+                // The delay is the difference of two rounded times, so that errors do not add up.
                 let [from, to] = [*added, *added + 1].map(|n| (100 * n + u64::from(*fps) / 2) / u64::from(*fps));
                 frame.delay = (to - from) as u16;
                 *added += 1;
@@ -116,7 +116,7 @@ impl<W: Write> Encoder<W> {
         }
     }
 
-    /// Writes what comes after the last frame.
+    /// Writes the end of the file.
     pub(super) fn finish(self) -> io::Result<()> {
         match self {
             Self::Apng { writer, .. } => Ok(writer.finish()?),

@@ -2,18 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-/// A file name with a place for the frame's number: `%d`, `%04d` or `####`.
+/// A file name with a placeholder for the frame's number: `%d`, `%04d` or `####`.
 #[derive(Debug, PartialEq)]
 pub(super) struct Pattern {
     folder: PathBuf,
     before: String,
-    /// At least so many digits.
+    /// The minimum number of digits.
     digits: usize,
     after: String,
 }
 
 impl Pattern {
-    /// `None` if the file name has no place for a number, or more than one.
+    /// Parses a file name; `None` if it has no placeholder, or more than one.
     pub(super) fn parse(path: &Path) -> Option<Self> {
         let name = path.file_name()?.to_str()?;
         let start = name.find(['%', '#'])?;
@@ -29,14 +29,14 @@ impl Pattern {
                 (rest.len() - after.len(), after)
             }
         };
-        // A number has up to ten digits; more are a slip.
+        // A frame number has up to ten digits; a much larger width is a mistake.
         if after.contains(['%', '#']) || !(1..=20).contains(&digits) {
             return None;
         }
         Some(Self { folder: path.with_file_name(""), before: before.to_owned(), digits, after: after.to_owned() })
     }
 
-    /// The file of a frame.
+    /// The file name of a frame.
     pub(super) fn path(&self, frame: u32) -> PathBuf {
         let Self { folder, before, after, .. } = self;
         let digits = self.digits;

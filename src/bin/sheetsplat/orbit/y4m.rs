@@ -5,31 +5,31 @@ use std::io::{self, Write};
 use clap::ValueEnum;
 use sheetsplat::image::Image;
 
-/// How many pixels share a colour.
+/// The chroma resolution.
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 pub(crate) enum Chroma {
-    /// Two by two.
+    /// Two by two pixels share a colour.
     #[value(name = "420")]
     Halved,
-    /// Each has its own.
+    /// Every pixel has its own colour.
     #[value(name = "444")]
     Full,
 }
 
-/// BT.709's shares of red and blue in luma.
+/// BT.709's weights of red and blue in luma.
 const RED: f32 = 0.2126;
 const BLUE: f32 = 0.0722;
 
-/// Frames as planes of luma and two of chroma, 8 bits, BT.709 in limited range: 16 to 235, and 16 to 240 around 128.
+/// Writes frames as one plane of luma and two of chroma, 8 bits, BT.709 in limited range: 16 to 235, and 16 to 240 around 128.
 pub(super) struct Y4m<W> {
     to: W,
     chroma: Chroma,
 }
 
 impl<W: Write> Y4m<W> {
-    /// Writes the stream's header. It has a place for the range but none for the matrix.
+    /// Writes the stream's header, which states the range but has no field for the matrix.
     pub(super) fn new(mut to: W, [width, height]: [u32; 2], fps: u16, chroma: Chroma) -> io::Result<Self> {
-        // Chroma is the mean of two by two pixels, so it sits between them, as in JPEG.
+        // Chroma is the mean of two by two pixels, so it is sited between them, as in JPEG.
         let sampling = match chroma {
             Chroma::Halved => "420jpeg",
             Chroma::Full => "444",
@@ -38,7 +38,7 @@ impl<W: Write> Y4m<W> {
         Ok(Self { to, chroma })
     }
 
-    /// Premultiplied colours are those over black.
+    /// Writes a frame. Premultiplied colours equal colours over black.
     pub(super) fn add(&mut self, image: &Image) -> io::Result<()> {
         let pixels: Vec<[f32; 3]> =
             image.pixels.iter().map(|&[r, g, b, _]| ycbcr([r, g, b].map(|channel| channel.clamp(0.0, 1.0)))).collect();
@@ -62,7 +62,7 @@ impl<W: Write> Y4m<W> {
     }
 }
 
-/// Luma in [0, 1] and the differences of blue and red from it, in [-1/2, 1/2].
+/// Luma in [0, 1], and the differences of blue and red from it in [-1/2, 1/2].
 fn ycbcr([r, g, b]: [f32; 3]) -> [f32; 3] {
     let y = RED * r + (1.0 - RED - BLUE) * g + BLUE * b;
     [y, (b - y) / (2.0 * (1.0 - BLUE)), (r - y) / (2.0 * (1.0 - RED))]
@@ -76,7 +76,7 @@ fn byte(value: f32) -> u8 {
 mod tests {
     use super::*;
 
-    /// A stream of one frame, without its header.
+    /// The stream of one frame, without its header.
     fn planes(chroma: Chroma, width: u32, pixels: Vec<[f32; 4]>) -> Vec<u8> {
         let image = Image { width, height: pixels.len() as u32 / width, pixels };
         let mut bytes = Vec::new();

@@ -1,12 +1,12 @@
 //! Settings with several values.
 
-/// A setting that takes one value after the other.
+/// A setting that takes several values in turn.
 #[derive(Debug, PartialEq)]
 pub(super) struct Axis {
-    /// Which of the `--set` it is.
+    /// The index of its `--set`.
     pub(super) at: usize,
     pub(super) key: String,
-    /// TOML, or strings.
+    /// The values, as TOML or strings.
     pub(super) values: Vec<String>,
 }
 
@@ -20,7 +20,7 @@ pub(super) fn swept(sets: &[String]) -> Vec<Axis> {
     sets.iter().enumerate().filter_map(axis).collect()
 }
 
-/// Splits at commas, but not within brackets, braces or quotes.
+/// Splits at commas outside brackets, braces and quotes.
 fn split(text: &str) -> Vec<String> {
     let (mut depth, mut quote) = (0_usize, None);
     let mut escaped = false;

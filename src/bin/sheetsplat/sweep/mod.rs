@@ -17,7 +17,7 @@ use crate::progress::Progress;
 use axis::{Axis, swept};
 use sheet::{Layout, Tile};
 
-/// Pixels of a sheet's longer side: as floats a square one takes 4 GiB.
+/// The maximum length of a sheet's longer side in pixels; a square sheet of this size needs 4 GiB as floats.
 const LARGEST: u32 = 16_384;
 
 #[derive(clap::Args)]
@@ -33,7 +33,7 @@ pub(crate) struct Arguments {
     /// The sheet: .png, .exr or .npy.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Tiles in a row; without it all values of the setting, or the first one of two.
+    /// Tiles per row; by default all values of the setting, or of the first one of two.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     columns: Option<u32>,
     /// Bits per channel of a PNG.
@@ -49,7 +49,7 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
     check(&axes, arguments)?;
     let columns = arguments.columns.unwrap_or(axes[0].values.len() as u32);
 
-    // All of them before the first is drawn: bad values are found at once.
+    // All scenes are read before the first is drawn, so that bad values are found at once.
     let mut scenes = Vec::new();
     for values in combinations(&axes) {
         let mut sets = input.sets.clone();
@@ -83,14 +83,16 @@ fn check(axes: &[Axis], arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure::Input(format!("--set: settings with several values: found {found}, allowed: {allowed}")));
     }
     for Axis { at, key, .. } in axes {
-        // Its labels would not be true.
+        // A later override would make the label wrong.
         let mut later = arguments.input.sets[at + 1..].iter().filter_map(|set| set.split_once('='));
         if later.any(|(later, _)| later.trim() == key) {
-            let allowed = "before its several values only";
-            return Err(Failure::Input(format!("--set: {key}: found once more, allowed: {allowed}")));
+            let allowed = "only before them";
+            return Err(Failure::Input(format!(
+                "--set: {key}: found again after its several values, allowed: {allowed}"
+            )));
         }
         if arguments.input.view.is_some() && ["camera", "camera.direction", "camera.up"].contains(&key.as_str()) {
-            return Err(Failure::Input(format!("--view: found with several values of {key}, allowed: without them")));
+            return Err(Failure::Input(format!("--view: found with several values of {key}, allowed: a single value")));
         }
     }
     if let (Some(columns), 2) = (arguments.columns, axes.len()) {
@@ -101,7 +103,7 @@ fn check(axes: &[Axis], arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A value of every axis, those of the first one changing fastest.
+/// All combinations of the axes' values; those of the first axis change fastest.
 fn combinations(axes: &[Axis]) -> Vec<Vec<String>> {
     let mut all: Vec<Vec<String>> = vec![Vec::new()];
     for axis in axes {
@@ -113,8 +115,8 @@ fn combinations(axes: &[Axis]) -> Vec<Vec<String>> {
     all
 }
 
-/// Reads every volume once where there are several: a bad one is found, and the data files of headers are known, before anything is
-/// drawn.
+/// Reads every volume once if there are several, before anything is drawn: this finds bad volumes, and the data files that headers
+/// name.
 fn check_volumes(input: &Input, scenes: &[(Scene, Vec<String>)], outputs: &Outputs) -> Result<(), Failure> {
     for (at, (scene, _)) in scenes.iter().enumerate().skip(1) {
         if !scenes[..at].iter().any(|(earlier, _)| has_same_volume(earlier, scene)) {
@@ -128,7 +130,7 @@ fn has_same_volume(a: &Scene, b: &Scene) -> bool {
     (&a.volume, a.spacing, &a.labels) == (&b.volume, b.spacing, &b.labels)
 }
 
-/// Draws every scene; a volume is loaded again only where another one is asked for.
+/// Draws every scene. A volume is loaded again only if it differs from the previous one.
 fn draw(
     arguments: &Arguments,
     scenes: Vec<(Scene, Vec<String>)>,
@@ -136,7 +138,7 @@ fn draw(
     progress: bool,
 ) -> Result<Vec<Tile>, Failure> {
     let Arguments { input, annotate, .. } = arguments;
-    let headless = input.headless(false)?;
+    let headless = input.headless(false, scenes.iter().map(|(scene, _)| scene))?;
     let mut progress = Progress::new(scenes.len(), progress);
     let mut last: Option<(Scene, Arc<_>)> = None;
     let mut tiles = Vec::new();

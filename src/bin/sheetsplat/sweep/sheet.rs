@@ -1,4 +1,4 @@
-//! Contact sheets: tiles with labels below.
+//! Contact sheets: tiles with labels below them.
 
 use sheetsplat::image::Image;
 
@@ -8,13 +8,13 @@ use crate::canvas::{LINE, filled, lay, text_width, write};
 const MARGIN: u32 = 8;
 const PAGE: f32 = 0.15;
 
-/// An image and what is written below it, line by line.
+/// An image and the lines of text below it.
 pub(super) struct Tile {
     pub(super) image: Image,
     pub(super) label: Vec<String>,
 }
 
-/// Cells of one size for all tiles and labels.
+/// Cells of one size, which fit every tile and label.
 pub(super) struct Layout {
     columns: u32,
     cell: [u32; 2],
@@ -22,7 +22,7 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// For tiles of these sizes with these labels, filled in row by row; `None` if that is larger than any image.
+    /// The layout for tiles of these sizes with these labels, row by row; `None` if the sheet would exceed the maximum image size.
     pub(super) fn new(columns: u32, tiles: &[([u32; 2], &[String])]) -> Option<Self> {
         let mut cell = [0; 2];
         for &([width, height], label) in tiles {
@@ -35,7 +35,7 @@ impl Layout {
         Some(Self { columns, cell, size: [side(cell[0], cells[0])?, side(cell[1], cells[1])?] })
     }
 
-    /// Draws the sheet, opaque.
+    /// Draws the sheet on an opaque background.
     pub(super) fn draw(&self, tiles: &[Tile]) -> Image {
         let mut sheet = filled(self.size, [PAGE, PAGE, PAGE, 1.0]);
         for (Tile { image, label }, at) in tiles.iter().zip(0..) {

@@ -1,4 +1,4 @@
-//! The window's contents: the picture with what a pointer does to it, and the panel.
+//! The window's contents: the picture, which the pointer controls, and the panel.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -23,44 +23,44 @@ use super::pace::Pace;
 use super::{Outcome, navigation, panel, plot, screenshot};
 use crate::failure::Failure;
 
-/// Degrees that the camera turns by for a drag over the picture's whole height.
+/// Degrees that the camera turns for a drag over the picture's whole height.
 const TURN: f64 = 180.0;
 
-/// How much more a point of scrolling shows.
+/// The zoom factor's exponent per point of scrolling.
 const ZOOM_PER_POINT: f64 = 0.0015;
 
-/// For so long after a scroll the next one is waited for before the picture is refined.
+/// The pause after a scroll before the picture is refined.
 const SCROLL_PAUSE: Duration = Duration::from_millis(300);
 
-/// For so long the window's pixels are waited for.
+/// The maximum time to wait for the window's pixels.
 const CAPTURE_PATIENCE: Duration = Duration::from_secs(20);
 
 pub(super) struct App {
     input: String,
     scene: Scene,
     transfer: TransferFunction,
-    /// The camera that the scene came with.
+    /// The scene's original camera.
     home: Camera,
-    /// What a camera with open values shows.
+    /// What a camera that fits the object shows.
     object: Option<Extent>,
     editor: Editor,
     histogram: Histogram,
     guest: Guest,
     pace: Pace,
     scrolled: Option<Instant>,
-    /// Where the picture is in the window, pixels.
+    /// The picture's rectangle in the window, in pixels.
     picture: Rect,
-    /// Why the scene as it is now cannot be drawn.
+    /// Why the current scene cannot be drawn.
     problem: Option<String>,
-    /// What became of the last file that was saved.
+    /// A message about the last saved file.
     saved: String,
     capture: Option<Capture>,
-    /// Save the window's first complete frame here, and close it.
+    /// The file for the window's first complete frame, after which the window closes.
     screenshot: Option<PathBuf>,
     outcome: Outcome,
 }
 
-/// Pixels of the window on their way to a file.
+/// The window's pixels, requested for a file.
 struct Capture {
     arrival: Receiver<Arc<ColorImage>>,
     since: Instant,
@@ -141,13 +141,13 @@ impl App {
         }
     }
 
-    /// The camera over an image of `size` pixels: what it leaves open shows the object whole from everywhere.
+    /// The camera for an image of `size` pixels, with the object whole from every direction where the scene leaves that open.
     fn camera(&self, size: [u32; 2]) -> Camera {
         let camera = &self.scene.camera;
         self.object.map_or(*camera, |object| object.fit_all_around(camera, size))
     }
 
-    /// Orbit, zoom and pan. Returns whether the picture is being changed by the pointer.
+    /// Handles orbit, zoom and pan. Returns whether the pointer is changing the picture.
     fn navigate(&mut self, ui: &Ui, response: &Response) -> bool {
         let points = response.rect.size();
         let size = [points.x.max(1.0) as u32, points.y.max(1.0) as u32];
@@ -182,7 +182,7 @@ impl App {
         self.scrolled.is_some() || ui.input(|input| input.pointer.any_down())
     }
 
-    /// The picture over all that is left of the window. Returns whether it was drawn anew.
+    /// Shows the picture in the rest of the window. Returns whether it was drawn again.
     fn picture(&mut self, ui: &mut Ui) -> bool {
         let scale = ui.pixels_per_point();
         let rect = ui.max_rect().round_to_pixels(scale);
@@ -217,17 +217,17 @@ impl App {
         drawn
     }
 
-    /// Asks for the window's pixels.
+    /// Requests the window's pixels.
     fn capture(&mut self, context: &Context, path: PathBuf, part: Option<Rect>) {
         let (sender, arrival) = channel();
         context.request_screenshot(move |window| {
-            // Whoever gave up waiting does not care.
+            // The receiver may have been dropped.
             let _ = sender.send(window);
         });
         self.capture = Some(Capture { arrival, since: Instant::now(), part, path });
     }
 
-    /// Saves the scene as it is shown, the picture as large as in the window.
+    /// Saves the current scene, with the size that the picture has in the window.
     fn save_scene(&mut self) {
         let path = screenshot::free_name("toml");
         let size = self.picture.size();
@@ -238,13 +238,13 @@ impl App {
         self.saved = saved(&path, &result);
     }
 
-    /// Saves the window's pixels once they are there.
+    /// Saves the window's pixels once they have arrived.
     fn save(&mut self, context: &Context) {
         let Some(Capture { arrival, since, part, path }) = &self.capture else { return };
         let result = match arrival.try_recv() {
             Ok(window) => screenshot::image(&window, *part).save(path, PngDepth::Eight).map_err(Failure::from),
             Err(_) if since.elapsed() < CAPTURE_PATIENCE => {
-                // They come while frames are drawn.
+                // Pixels arrive only while frames are drawn.
                 context.request_repaint();
                 return;
             }
@@ -264,7 +264,7 @@ impl App {
     }
 }
 
-/// What became of a file.
+/// The message about a saved file.
 fn saved(path: &Path, result: &Result<(), Failure>) -> String {
     match result {
         Ok(()) => format!("saved {}", path.display()),
@@ -281,7 +281,7 @@ impl eframe::App for App {
         });
         let drawn = CentralPanel::no_frame().show(ui, |ui| self.picture(ui)).inner;
         if drawn {
-            // The statistics are of the frame before.
+            // The statistics shown are the previous frame's.
             context.request_repaint();
         } else if self.outcome.borrow().is_none()
             && self.capture.is_none()

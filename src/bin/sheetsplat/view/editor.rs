@@ -1,37 +1,37 @@
-//! The transfer function as control points to be dragged: plain data, in values and opacities.
+//! The transfer function as draggable control points: plain data, in values and opacities.
 
 use glam::DVec3;
 use sheetsplat::settings::{Ramp, TransferFunction};
 
-/// A point of both ramps.
+/// A control point of both ramps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ControlPoint {
     pub(super) value: f64,
-    /// Per unit length, in [0, 1].
+    /// The opacity per unit length, in [0, 1].
     pub(super) opacity: f64,
     /// Red, green and blue in [0, 1].
     pub(super) color: DVec3,
 }
 
-/// The colour and opacity ramps on common control points.
+/// The colour and opacity ramps with common control points.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Editor {
-    /// At least one, by increasing value.
+    /// At least one point, by ascending value.
     points: Vec<ControlPoint>,
-    /// The values that points are moved within.
+    /// The range of values within which points can be moved.
     range: [f64; 2],
     pub(super) selected: Option<usize>,
 }
 
 impl Editor {
-    /// The ramps of a transfer function, unchanged: each gets points where the other has some. `values` are the volume's least and
-    /// largest.
+    /// The ramps of a transfer function, unchanged: each gets points where only the other one has some. `values` are the volume's minimum
+    /// and maximum.
     pub(super) fn new(transfer: &TransferFunction, values: [f64; 2]) -> Self {
         let TransferFunction { color, opacity, .. } = transfer;
         let mut positions: Vec<f64> = color.points().iter().map(|point| point.0).collect();
         positions.extend(opacity.points().iter().map(|point| point.0));
         positions.sort_unstable_by(f64::total_cmp);
-        // Not by their bits: 0 and -0 are one position.
+        // Compared as numbers, because 0 and -0 are one position.
         positions.dedup_by(|a, b| a == b);
         let points: Vec<ControlPoint> = positions
             .into_iter()
@@ -39,7 +39,7 @@ impl Editor {
             .collect();
         let lo = points.iter().map(|point| point.value).fold(values[0], f64::min);
         let hi = points.iter().map(|point| point.value).fold(values[1], f64::max);
-        // A range without extent has no scale.
+        // An empty range has no scale.
         let margin = if lo < hi { 0.0 } else { (lo.abs() / 10.0).max(0.5) };
         Self { points, range: [lo - margin, hi + margin], selected: None }
     }
@@ -52,12 +52,12 @@ impl Editor {
         self.range
     }
 
-    /// The least distance that points are moved or added at.
+    /// The minimum distance between points when they are moved or added.
     fn gap(&self) -> f64 {
         (self.range[1] - self.range[0]) / 1000.0
     }
 
-    /// The point that is the nearest on the screen, if one is within `reach`. `distance` is that of a point from the pointer.
+    /// The point nearest to the pointer on the screen, if it is within `reach`. `distance` gives a point's distance from the pointer.
     pub(super) fn hit(&self, reach: f64, distance: impl Fn(&ControlPoint) -> f64) -> Option<usize> {
         let distances = self.points.iter().map(distance).enumerate();
         distances.filter(|hit| hit.1 <= reach).min_by(|a, b| a.1.total_cmp(&b.1)).map(|hit| hit.0)
@@ -71,13 +71,13 @@ impl Editor {
         let hi = after.map_or(self.range[1], |after| after - self.gap());
         let point = &mut self.points[index];
         point.opacity = opacity.clamp(0.0, 1.0);
-        // Neighbours that a scene file put closer than the gap hold it where it is.
+        // A scene file may have neighbours closer than the minimum distance, which hold the point in place.
         if lo <= hi {
             point.value = value.clamp(lo, hi);
         }
     }
 
-    /// Adds a point, of the colour that is there already, and selects it; nothing where one is.
+    /// Adds a point with the colour at its value, and selects it; does nothing where a point already is.
     pub(super) fn add(&mut self, value: f64, opacity: f64) {
         let value = value.clamp(self.range[0], self.range[1]);
         if self.points.iter().any(|point| (point.value - value).abs() < self.gap()) {
@@ -89,7 +89,7 @@ impl Editor {
         self.selected = Some(index);
     }
 
-    /// Removes a point, unless it is the last one.
+    /// Removes a point, unless it is the only one.
     pub(super) fn remove(&mut self, index: usize) {
         if self.points.len() > 1 {
             self.points.remove(index);
@@ -109,7 +109,7 @@ impl Editor {
         Ramp::new(self.points.iter().map(|point| (point.value, of(point))).collect()).ok()
     }
 
-    /// A transfer function with these ramps, and `like` another one for all else.
+    /// A transfer function with these ramps and the rest of `like`.
     pub(super) fn apply(&self, like: &TransferFunction) -> TransferFunction {
         let color = self.ramp(|point| point.color).unwrap_or_else(|| like.color.clone());
         let opacity = self.ramp(|point| point.opacity).unwrap_or_else(|| like.opacity.clone());
@@ -124,7 +124,7 @@ mod tests {
 
     use super::*;
 
-    /// Opacity points at 10, 20 and 40, colour points at 0 and 20.
+    /// A transfer function with opacity points at 10, 20 and 40, and colour points at 0 and 20.
     fn transfer() -> TransferFunction {
         TransferFunction {
             color: Ramp::new(vec![(0.0, DVec3::X), (20.0, DVec3::Y)]).unwrap(),

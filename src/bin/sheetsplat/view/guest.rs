@@ -1,4 +1,4 @@
-//! The renderer as a guest on the window's device: all that the viewer knows of it.
+//! The renderer as a guest on the window's device. The rest of the viewer does not use the renderer.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -6,7 +6,7 @@ use std::time::Instant;
 use eframe::egui::TextureId;
 use eframe::egui_wgpu::{self, RenderState, WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
 use sheetsplat::RenderError;
-use sheetsplat::headless::device;
+use sheetsplat::headless::{Backend, device};
 use sheetsplat::scoped;
 use sheetsplat::settings::TransferFunction;
 use sheetsplat::stats::Stats;
@@ -15,7 +15,7 @@ use sheetsplat::{Blend, DeviceRequirements, GpuVolume, Placement, Renderer, Rend
 
 use crate::failure::Failure;
 
-/// Of textures that the window shows. It holds display-referred colours, as sheetsplat's are.
+/// The format of textures that the window shows. Like sheetsplat's, its colours are display-referred.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 /// A view of a volume, drawn into a texture that the window shows.
@@ -27,13 +27,13 @@ pub(super) struct Guest {
     stats: Stats,
 }
 
-/// What was drawn last.
+/// The last drawn picture.
 struct Picture {
     texture: wgpu::Texture,
     id: TextureId,
 }
 
-/// How the window is to open its device: the adapter with `name` in its name, and what the renderer can use of it.
+/// How the window opens its device: the adapter with `name` in its name, with what the renderer needs and can use.
 pub(super) fn device_options(name: Option<String>) -> WgpuConfiguration {
     let choose = move |adapters: &[wgpu::Adapter], surface: Option<&wgpu::Surface<'_>>| {
         let shows = |adapter: &&wgpu::Adapter| surface.is_none_or(|surface| adapter.is_surface_supported(surface));
@@ -64,7 +64,12 @@ impl Guest {
         let volume = GpuVolume::new(device, queue, volume);
         let view = volume.and_then(|volume| SceneView::new(device, &volume, scene));
         let view = view.map_err(|error| Failure::of(error.into(), input))?;
-        let stats = Stats { adapter: info.name, backend: info.backend.to_str().to_owned(), ..Stats::default() };
+        let stats = Stats {
+            adapter: info.name,
+            backend: Backend::Gpu.name().to_owned(),
+            api: info.backend.to_str().to_owned(),
+            ..Stats::default()
+        };
         Ok(Self { host: host.clone(), renderer, view, picture: None, stats })
     }
 
@@ -73,7 +78,7 @@ impl Guest {
         self.view.volume().volume()
     }
 
-    /// Where its voxels are.
+    /// The volume's grid.
     pub(super) fn grid(&self) -> &Grid {
         self.view.volume().grid()
     }
@@ -83,17 +88,17 @@ impl Guest {
         self.view.volume().transfer()
     }
 
-    /// What the last frame was made of and took.
+    /// The last frame's statistics.
     pub(super) fn stats(&self) -> &Stats {
         &self.stats
     }
 
-    /// The last frame.
+    /// The last frame's texture.
     pub(super) fn texture(&self) -> Option<TextureId> {
         self.picture.as_ref().map(|picture| picture.id)
     }
 
-    /// Draws a frame, if it differs from the last one that was asked for, and waits for it. Returns whether it did.
+    /// Draws a frame and waits for it, if it differs from the last requested one. Returns whether it did.
     pub(super) fn show(&mut self, scene: &Scene, transfer: &TransferFunction) -> Result<bool, RenderError> {
         let is_shown = self.stats.width > 0 && scene == self.view.scene() && transfer == self.transfer();
         if is_shown {
@@ -138,7 +143,7 @@ impl Guest {
         Ok(())
     }
 
-    /// The picture's texture, a new one if the size is another.
+    /// The picture's texture, which is replaced if the size changes.
     fn target(&mut self, [width, height]: [u32; 2]) -> wgpu::TextureView {
         let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
         if let Some(Picture { texture, .. }) = &self.picture

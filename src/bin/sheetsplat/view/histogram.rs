@@ -1,16 +1,16 @@
-//! How often which values occur.
+//! Counts of a volume's values.
 
-/// Bars of a [`Histogram`].
+/// The number of bars in a [`Histogram`].
 const BINS: usize = 256;
 
-/// A volume's values, counted.
+/// The distribution of a volume's values.
 pub(super) struct Histogram {
-    /// Heights in [0, 1], by the logarithm of the count: a background of millions hides no object of hundreds.
+    /// Heights in [0, 1], logarithmic, so that a background of millions does not hide an object of hundreds.
     pub(super) heights: Vec<f32>,
 }
 
 impl Histogram {
-    /// Of the finite values, within a range that has an extent.
+    /// Counts finite values within a range that is not empty.
     pub(super) fn new(values: &[f32], [lo, hi]: [f64; 2]) -> Self {
         let mut counts = [0_u64; BINS];
         let scale = BINS as f64 / (hi - lo);
@@ -23,9 +23,9 @@ impl Histogram {
     }
 }
 
-/// The least and the largest finite value.
+/// The minimum and maximum finite value.
 pub(super) fn extent(values: &[f32]) -> [f64; 2] {
-    // `f32::min` and `f32::max` leave out holes.
+    // `f32::min` and `f32::max` ignore holes (NaN).
     let (lo, hi) = values.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), &v| (lo.min(v), hi.max(v)));
     [lo.into(), hi.into()]
 }

@@ -16,6 +16,7 @@ use std::rc::Rc;
 
 use eframe::NativeOptions;
 use eframe::egui::{IconData, ViewportBuilder};
+use sheetsplat::headless::Backend;
 use sheetsplat::image::Image;
 
 use crate::arguments::Input;
@@ -31,18 +32,18 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
-    /// Size of the window, in points (pixels, unless the display is scaled).
+    /// Size of the window in points (pixels, unless the display is scaled).
     #[arg(long, value_name = "WxH", default_value = "1280x800", value_parser = parse_size)]
     size: [u16; 2],
-    /// Save the window's first complete frame, and close it: .png, .exr or .npy.
+    /// Save the window's first complete frame and close the window: .png, .exr or .npy.
     #[arg(long, value_name = "FILE")]
     screenshot: Option<PathBuf>,
 }
 
-/// How it ended, if not by the user closing the window.
+/// The result, unless the user closed the window.
 type Outcome = Rc<RefCell<Option<Result<(), Failure>>>>;
 
-/// `WxH`.
+/// Parses `WxH`.
 fn parse_size(text: &str) -> Result<[u16; 2], String> {
     let parse = |side: &str| side.parse::<u16>().ok().filter(|side| (100..=16384).contains(side));
     let sides = text.split_once('x').and_then(|(width, height)| Some([parse(width)?, parse(height)?]));
@@ -52,6 +53,10 @@ fn parse_size(text: &str) -> Result<[u16; 2], String> {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.screenshot {
         Image::check_format(path)?;
+    }
+    let backend = arguments.input.backend;
+    if !matches!(backend, Backend::Auto | Backend::Gpu) {
+        return Err(Failure::Input(format!("--backend: found {backend}, allowed: gpu or auto for a window")));
     }
     let mut scene = arguments.input.scene()?;
     let named: Vec<_> = arguments.screenshot.iter().map(|path| ("--screenshot", path.as_path())).collect();
@@ -67,7 +72,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let options = NativeOptions {
         viewport,
         wgpu_options: guest::device_options(arguments.input.adapter.clone()),
-        // Pictures are shown, and saved, as they are.
+        // Pictures are shown, and saved, without changes.
         dithering: false,
         ..NativeOptions::default()
     };

@@ -1,17 +1,17 @@
-//! Orbit, zoom and pan: what a drag and a scroll do to the camera.
+//! Orbit, zoom and pan: how drags and scrolls move the camera.
 
 use glam::{DMat3, DVec2};
 use sheetsplat::settings::{Camera, Projection};
 use sheetsplat::volume::Grid;
 
-/// Degrees that the camera's elevation over the plane across `up` stays within: at 90 there would be no up on the screen.
+/// The maximum elevation of the camera in degrees over the plane perpendicular to `up`: at 90 the screen has no up.
 const MAX_ELEVATION: f64 = 89.0;
 
-/// Heights that can be zoomed to, in diameters of the volume.
+/// The range of heights for zooming, in diameters of the volume.
 const HEIGHTS: [f64; 2] = [1e-3, 1e2];
 
-/// Turns the camera around its centre, so that what is in front follows a pointer that moves right and down by some degrees: about `up`
-/// (azimuth), then up or down (elevation, clamped). `up` stays up.
+/// Turns the camera around its centre so that what is in front follows a pointer that moves right and down by some degrees: first about
+/// `up` (azimuth), then up or down (elevation, clamped). `up` does not change.
 pub(super) fn orbit(camera: &mut Camera, degrees: DVec2) {
     let (up, w) = (camera.up.normalize(), camera.direction.normalize());
     let horizontal = w.reject_from_normalized(up).normalize();
@@ -22,7 +22,7 @@ pub(super) fn orbit(camera: &mut Camera, degrees: DVec2) {
     camera.direction = azimuth * horizontal * cosine + up * sine;
 }
 
-/// World units over the image's height, at the depth of the camera's centre.
+/// The height of the image in world units, at the depth of the camera's centre.
 pub(super) fn height(camera: &Camera, grid: &Grid, kernel_radius: f64, size: [u32; 2]) -> f64 {
     let [width, height] = size;
     match camera.projection {
@@ -37,8 +37,8 @@ pub(super) fn height(camera: &Camera, grid: &Grid, kernel_radius: f64, size: [u3
     }
 }
 
-/// Shows `factor` times as many world units over the image's height, which is `height` now: another height, or another distance of
-/// the eye from the centre.
+/// Multiplies the height of the image, now `height` world units, by `factor`: by another height, or in perspective by another distance
+/// between the eye and the centre.
 pub(super) fn zoom(camera: &mut Camera, grid: &Grid, height: f64, factor: f64) {
     let diameter = 2.0 * grid.bounding_radius(0.0);
     let height = (height * factor).clamp(HEIGHTS[0] * diameter, HEIGHTS[1] * diameter);
@@ -50,7 +50,7 @@ pub(super) fn zoom(camera: &mut Camera, grid: &Grid, height: f64, factor: f64) {
     }
 }
 
-/// Moves the centre, so that what is at its depth follows a pointer that moves right and down by some world units.
+/// Moves the centre so that what is at its depth follows a pointer that moves right and down by some world units.
 pub(super) fn pan(camera: &mut Camera, moved: DVec2) {
     let basis = camera.basis();
     camera.center = Some(camera.middle() + basis.v * moved.y - basis.u * moved.x);
@@ -64,7 +64,7 @@ mod tests {
 
     const GRID: Grid = Grid { dims: UVec3::new(20, 20, 10), spacing: DVec3::new(1.0, 1.0, 3.0) };
 
-    /// Where a world point is on the screen, right and up of the centre.
+    /// The position of a world point on the screen, right and up from the centre.
     fn on_screen(camera: &Camera, point: DVec3) -> DVec2 {
         let basis = camera.basis();
         DVec2::new((point - camera.middle()).dot(basis.u), (point - camera.middle()).dot(basis.v))

@@ -1,22 +1,22 @@
-//! When an image is drawn with half as many pixels a side: while the pointer moves something and whole ones take too long.
+//! The choice of half resolution, for pictures that change with the pointer when whole ones take too long.
 
-/// Milliseconds that a frame may take for the picture to follow the pointer.
+/// The maximum milliseconds of a frame with which the picture follows the pointer smoothly.
 const FLUENT_MS: f64 = 100.0;
 
-/// What frames took.
+/// The measured time of frames.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pace {
-    /// The last frame of all pixels. The first one, which also compiles the renderer, counts as 0.
+    /// The time of the last frame at full resolution. The first frame, which also compiles the renderer, counts as 0.
     whole_ms: Option<f64>,
 }
 
 impl Pace {
-    /// Pixels of the window that a pixel of the next frame covers, a side.
+    /// The side, in pixels of the window, of a pixel in the next frame.
     pub(super) fn pixel(self, interacting: bool) -> u32 {
         if interacting && self.whole_ms.is_some_and(|ms| ms > FLUENT_MS) { 2 } else { 1 }
     }
 
-    /// A frame of such pixels was drawn.
+    /// Notes the time of a frame with pixels of this side.
     pub(super) fn drawn(&mut self, pixel: u32, ms: f64) {
         if pixel == 1 {
             self.whole_ms = Some(self.whole_ms.map_or(0.0, |_| ms));

@@ -1,4 +1,4 @@
-//! The settings beside the picture.
+//! The settings panel beside the picture.
 
 use std::ops::RangeInclusive;
 
@@ -8,7 +8,7 @@ use sheetsplat::settings::{Compositing, Method, Rasterizer, Splatting};
 use sheetsplat::settings::{Light, Shading};
 use sheetsplat::stats::Stats;
 
-/// Kernel, slabs, compositing and culling, by the names and within the ranges of a scene file.
+/// Kernel, slabs, compositing and culling, with the names and ranges of scene files.
 pub(super) fn splatting(ui: &mut Ui, splatting: &mut Splatting) {
     ui.add(Slider::new(&mut splatting.slab_width, 0.05..=8.0).logarithmic(true).text("slab width"));
     ui.add(Slider::new(&mut splatting.radius, 1.0..=4.0).text("kernel radius"));
@@ -59,7 +59,7 @@ pub(super) fn shading(ui: &mut Ui, shading: &mut Shading) {
     if let Light::Direction(to_light) = &mut shading.light {
         let [mut azimuth, mut elevation] = angles(*to_light);
         let across = ui.add(Slider::new(&mut azimuth, -180.0..=180.0).suffix("°").text("light azimuth"));
-        // Straight above there is no azimuth.
+        // Straight above, the azimuth is undefined.
         let above = ui.add(Slider::new(&mut elevation, -89.0..=89.0).suffix("°").text("light elevation"));
         if across.union(above).changed() {
             *to_light = direction([azimuth, elevation]);
@@ -70,7 +70,7 @@ pub(super) fn shading(ui: &mut Ui, shading: &mut Shading) {
     slider(ui, &mut shading.specular, 0.0..=1.0, "specular");
 }
 
-/// What the last frame was made of and took.
+/// The last frame's statistics.
 pub(super) fn stats(ui: &mut Ui, stats: &Stats) {
     let counts = &stats.counts;
     let rows = [
@@ -81,7 +81,7 @@ pub(super) fn stats(ui: &mut Ui, stats: &Stats) {
         ("sheets", counts.sheets.to_string()),
         ("rasterizer", stats.rasterizer.clone()),
         ("GPU memory", format!("{:.1} MiB", stats.gpu_bytes as f64 / 1024.0 / 1024.0)),
-        ("adapter", format!("{}, {}", stats.adapter, stats.backend)),
+        ("adapter", format!("{}, {}", stats.adapter, stats.api)),
     ];
     Grid::new("statistics").num_columns(2).show(ui, |ui| {
         for (name, value) in rows {
@@ -92,12 +92,12 @@ pub(super) fn stats(ui: &mut Ui, stats: &Stats) {
     });
 }
 
-/// A slider that leaves a value of the scene's that is beyond its ends alone.
+/// A slider that does not clamp the scene's value if that lies beyond its ends.
 fn slider(ui: &mut Ui, value: &mut f64, range: RangeInclusive<f64>, name: &str) {
     ui.add(Slider::new(value, range).clamping(eframe::egui::SliderClamping::Edits).text(name));
 }
 
-/// One of several values.
+/// A choice of one value.
 fn choice<T: Copy + PartialEq>(ui: &mut Ui, name: &str, value: &mut T, choices: &[(T, &str)]) {
     let current = choices.iter().find(|choice| choice.0 == *value).map_or("", |choice| choice.1);
     ComboBox::from_label(name).selected_text(current).show_ui(ui, |ui| {
@@ -107,13 +107,13 @@ fn choice<T: Copy + PartialEq>(ui: &mut Ui, name: &str, value: &mut T, choices: 
     });
 }
 
-/// A world direction by azimuth, from x towards y, and elevation over the xy plane, in degrees.
+/// The world direction with this azimuth, from x towards y, and elevation over the xy plane, in degrees.
 fn direction(angles: [f64; 2]) -> DVec3 {
     let [(azimuth_sine, azimuth_cosine), (sine, cosine)] = angles.map(|angle| angle.to_radians().sin_cos());
     DVec3::new(azimuth_cosine * cosine, azimuth_sine * cosine, sine)
 }
 
-/// Azimuth and elevation of a direction, which has any length but 0.
+/// The azimuth and elevation of a direction of any length except 0.
 fn angles(direction: DVec3) -> [f64; 2] {
     let DVec3 { x, y, z } = direction.normalize();
     [y.atan2(x).to_degrees(), z.clamp(-1.0, 1.0).asin().to_degrees()]

@@ -1,4 +1,4 @@
-//! The transfer function editor: its control points over the histogram.
+//! The transfer function editor: its control points drawn over the histogram.
 
 use eframe::egui::{Color32, DragValue, Mesh, PointerButton, Pos2, Rect, Sense, Shape, Stroke, Ui, pos2, vec2};
 use glam::DVec3;
@@ -7,13 +7,13 @@ use super::editor::{ControlPoint, Editor};
 use super::histogram::Histogram;
 
 const HEIGHT: f32 = 150.0;
-/// Of the strip of colours below.
+/// The height of the strip of colours below the plot.
 const STRIP: f32 = 12.0;
 const POINT_RADIUS: f32 = 5.0;
-/// How near to a point the pointer must be.
+/// The maximum distance at which the pointer hits a point.
 const REACH: f64 = 9.0;
 
-/// Between values and opacities, and the screen.
+/// Maps values and opacities to positions on the screen and back.
 #[derive(Clone, Copy)]
 struct Space {
     rect: Rect,
@@ -30,7 +30,7 @@ impl Space {
         pos2(self.x(point.value), self.rect.bottom() - point.opacity as f32 * self.rect.height())
     }
 
-    /// The value and opacity at a place on the screen.
+    /// The value and opacity at a position on the screen.
     fn from(&self, place: Pos2) -> (f64, f64) {
         let share = f64::from((place.x - self.rect.left()) / self.rect.width());
         let opacity = f64::from((self.rect.bottom() - place.y) / self.rect.height());
@@ -38,12 +38,12 @@ impl Space {
     }
 }
 
-/// Shows the editor and lets it be edited: drag points, add by a double click, remove by the right button, and below the opacity
-/// and the colour of the point that was last taken hold of.
+/// Shows the editor, in which points are dragged, added by a double click and removed by a right click. Below are the opacity and colour
+/// of the selected point.
 pub(super) fn show(ui: &mut Ui, editor: &mut Editor, histogram: &Histogram) {
     let size = vec2(ui.available_width(), HEIGHT + STRIP);
     let (response, painter) = ui.allocate_painter(size, Sense::click_and_drag());
-    // Room for the points at the ends.
+    // The margin leaves room for the points at the ends.
     let rect = response.rect.shrink2(vec2(POINT_RADIUS + 2.0, 0.0));
     let rect =
         Rect::from_min_max(rect.min + vec2(0.0, POINT_RADIUS + 2.0), rect.max - vec2(0.0, STRIP + POINT_RADIUS + 2.0));
@@ -84,7 +84,7 @@ pub(super) fn show(ui: &mut Ui, editor: &mut Editor, histogram: &Histogram) {
     painter.add(Shape::mesh(strip(editor, space)));
 
     let mut curve: Vec<Pos2> = editor.points().iter().map(|point| space.at(point)).collect();
-    // Constant beyond the ends.
+    // The curve is constant beyond its ends.
     if let (Some(&first), Some(&last)) = (curve.first(), curve.last()) {
         curve.insert(0, pos2(rect.left(), first.y));
         curve.push(pos2(rect.right(), last.y));
@@ -99,7 +99,7 @@ pub(super) fn show(ui: &mut Ui, editor: &mut Editor, histogram: &Histogram) {
     selected(ui, editor);
 }
 
-/// The colours along the values.
+/// The strip of colours along the values.
 fn strip(editor: &Editor, space: Space) -> Mesh {
     let rect = space.rect;
     let stops = editor.points().iter().map(|point| (space.x(point.value), color32(point.color)));
@@ -121,7 +121,7 @@ fn strip(editor: &Editor, space: Space) -> Mesh {
     mesh
 }
 
-/// The selected point's colour, value and opacity, in one row as the hint without one, so that nothing below moves.
+/// The selected point's colour, value and opacity, or a hint in a row of equal height, so that nothing below moves.
 fn selected(ui: &mut Ui, editor: &mut Editor) {
     let [lo, hi] = editor.range();
     let point = editor.selected.and_then(|index| Some((index, *editor.points().get(index)?)));
@@ -143,7 +143,7 @@ fn selected(ui: &mut Ui, editor: &mut Editor) {
     });
 }
 
-/// Display-referred, as all colours of a scene are.
+/// Colours of a scene are display-referred, like the window's.
 fn color32(color: DVec3) -> Color32 {
     let [r, g, b] = (color * 255.0).round().to_array().map(|channel| channel as u8);
     Color32::from_rgb(r, g, b)

@@ -1,4 +1,4 @@
-//! Pictures of the window, and the scene that it shows, as files.
+//! Saves pictures of the window, and the scene that it shows.
 
 use std::path::{Path, PathBuf};
 
@@ -11,13 +11,13 @@ use sheetsplat::volume::Volume;
 use crate::arguments::scene_file;
 use crate::failure::Failure;
 
-/// The first of `sheetsplat-1.png`, `sheetsplat-2.png`, …, or another extension, that is not in the current folder yet.
+/// The first name among `sheetsplat-1.png`, `sheetsplat-2.png`, … (or with another extension) that does not exist in the current folder.
 pub(super) fn free_name(extension: &str) -> PathBuf {
     let mut names = (1_u32..).map(|number| PathBuf::from(format!("sheetsplat-{number}.{extension}")));
     names.find(|name| name.symlink_metadata().is_err()).unwrap_or_default()
 }
 
-/// Saves a scene as it is shown, with another transfer function than it came with.
+/// Saves a scene as shown, with the current transfer function.
 pub(super) fn save_scene(
     scene: &Scene,
     transfer: &TransferFunction,
@@ -29,7 +29,7 @@ pub(super) fn save_scene(
     output::write(path, &text).map_err(|error| Failure::Other(format!("{}: {error}", path.display())))
 }
 
-/// The pixels of the window, or of a part of it, given in pixels.
+/// The image of the window's pixels, or of a part of them, given in pixels.
 pub(super) fn image(window: &ColorImage, part: Option<Rect>) -> Image {
     let [width, height] = window.size;
     let [columns, rows] = part.map_or([0..width, 0..height], |part| {

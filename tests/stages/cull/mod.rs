@@ -1,11 +1,12 @@
-//! `shaders/cull_bricks.wgsl`, `shaders/cull_voxels.wgsl` and `shaders/compact.wgsl` against a plain evaluation of their rules
-//! (§6): what a sheet group draws, in which order, and what is known of every brick afterwards. What the drawn voxels look
-//! like is `shade.rs`'s.
+//! `shaders/cull_bricks.wgsl`, `shaders/cull_voxels.wgsl` and `shaders/compact.wgsl` against a plain evaluation of their rules (§6): what a
+//! sheet group draws, in which order, and the state of every brick afterwards. `shade.rs` tests the appearance of drawn voxels.
+
+mod rules;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use glam::{DVec2, DVec3, DVec4, UVec3};
-use sheetsplat::headless::Headless;
+use glam::{DVec3, UVec3};
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::brick::{self, BRICK_VOXELS};
 use sheetsplat::internals::gpu::brick_lists::BrickLists;
 use sheetsplat::internals::gpu::layout::{self, Brick, BrickState, Frame, Indirect, SheetGroup, Tally};
@@ -14,29 +15,29 @@ use sheetsplat::internals::gpu::uniforms::{self, Ramps};
 use sheetsplat::internals::gpu::volume_texture::VolumeTexture;
 use sheetsplat::internals::kernel::Kernel;
 use sheetsplat::internals::pass::cull::{Cull, CullBuffers, CullList};
-use sheetsplat::internals::quad_plan::{FramePlan, TILE, tile_grid};
-use sheetsplat::internals::reference::{self, Geometry};
+use sheetsplat::internals::quad_plan::FramePlan;
+use sheetsplat::internals::reference::Geometry;
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Method, Order};
-use sheetsplat::settings::{Ramp, TransferFunction};
+use sheetsplat::settings::{Method, Order, Ramp, TransferFunction};
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat};
 
-use crate::common::{F32, Random, SPACINGS, camera, gpu, random_eye, scene};
+use crate::common::{Random, SPACINGS, camera, gpu, random_eye, scene};
 use crate::shade::place_error;
 use crate::{compute, contents, indirect, init};
+use rules::{Expected, Occluded, Rules};
 
-/// The stages with one list of bricks and what they read and write.
+/// The stages with one list of bricks and the buffers that they read and write.
 pub(crate) struct Culling<'a> {
-    gpu: &'a Headless,
+    gpu: &'a GpuHeadless,
     stage: &'a Cull,
     pub(crate) view: ViewGeometry,
     pub(crate) frame: Frame,
     pub(crate) plan: FramePlan,
     /// The uniform of every group of the plan.
     groups: Vec<SheetGroup>,
-    /// Of every place of every brick the index into the volume, [`ABSENT`] without a voxel.
+    /// For every slot of every brick the voxel's index in the volume, or [`ABSENT`].
     pub(crate) indices: Vec<u32>,
     pub(crate) bricks: Vec<Brick>,
     pub(crate) list: CullList,
@@ -46,9 +47,9 @@ pub(crate) struct Culling<'a> {
 }
 
 impl<'a> Culling<'a> {
-    /// Of voxels in memory order, of a grid with these values and labels.
+    /// The stages for voxels in memory order, in a grid with these values and labels.
     pub(crate) fn new(
-        gpu: &'a Headless,
+        gpu: &'a GpuHeadless,
         (stage, sheets): (&'a Cull, u32),
         (grid, values, labels): (&Grid, &[f32], Option<&[u16]>),
         voxels: &[u32],
@@ -82,6 +83,7 @@ impl<'a> Culling<'a> {
             control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
             occluded: &targets.occluded,
             culled: &culled,
+            planes: None,
         };
         let order = init(device, &plan.orders[0], BufferUsages::STORAGE);
         let counts = |group: &sheetsplat::internals::quad_plan::GroupPlan| {
@@ -114,7 +116,7 @@ impl<'a> Culling<'a> {
         compute(self.gpu, |pass| self.stage.record(pass, &self.list, group as u32 * self.stride));
     }
 
-    /// What is known of a brick's voxels, bit by bit: hidden, shaded.
+    /// The state of each brick's voxels as bits: hidden, shaded.
     pub(crate) fn states(&self) -> Vec<(u64, u64)> {
         let bits = |words: [u32; 2]| u64::from(words[0]) | u64::from(words[1]) << 32;
         let states: Vec<BrickState> = contents(self.gpu, &self.list.states);
@@ -126,12 +128,12 @@ impl<'a> Culling<'a> {
     }
 }
 
-/// The uniform at the start of some bytes.
+/// The uniform at the start of `bytes`.
 fn uniform(bytes: &[u8]) -> SheetGroup {
     bytemuck::pod_read_unaligned(&bytes[..size_of::<SheetGroup>()])
 }
 
-/// A place without a voxel.
+/// A slot without a voxel.
 const ABSENT: u32 = u32::MAX;
 
 fn indices(grid: &Grid, brick: &Brick) -> [u32; BRICK_VOXELS as usize] {
@@ -142,300 +144,6 @@ fn indices(grid: &Grid, brick: &Brick) -> [u32; BRICK_VOXELS as usize] {
     indices
 }
 
-/// Beyond what f32 arithmetic moves pixel coordinates and depths of these tests by: sums of numbers below 600. Close to an eye pixel
-/// coordinates are large, and so are their errors.
-const EPSILON: f64 = 5e-4;
-
-/// Decisions that f32 arithmetic cannot make otherwise; those that it can are noted.
-struct Decisions {
-    unsure: bool,
-    /// What f32 arithmetic may move pixel coordinates by.
-    pixels: f64,
-}
-
-impl Decisions {
-    fn new(pixels: f64) -> Self {
-        Self { unsure: false, pixels: pixels.max(EPSILON) }
-    }
-
-    fn at_least(&mut self, a: f64, b: f64, epsilon: f64) -> bool {
-        self.unsure |= (a - b).abs() < epsilon;
-        a >= b
-    }
-
-    /// `x` between 0 and `last`, rounded down.
-    fn floor(&mut self, x: f64, last: f64, epsilon: f64) -> u32 {
-        let [low, floor, high] = [x - epsilon, x, x + epsilon].map(|x| x.clamp(0.0, last).floor());
-        self.unsure |= low != high;
-        floor as u32
-    }
-
-    /// `x` between 0 and `last`, rounded up.
-    fn ceil(&mut self, x: f64, last: f64) -> u32 {
-        last as u32 - self.floor(last - x, last, self.pixels)
-    }
-
-    /// The first and the last pixel from which the box filter covers the footprints' boxes around centres from `low` to `high`.
-    fn filter(&mut self, size: [u32; 2], group: &SheetGroup, low: DVec2, high: DVec2) -> [[u32; 2]; 2] {
-        // Pixel centres are at half-integers; the shader's slack.
-        let margin = half_box(group) + 0.01;
-        let (low, high) = ((low - margin - 0.5).to_array(), (high + margin - 0.5).to_array());
-        let axes = [0, 1].map(|axis| {
-            let last = f64::from(size[axis] - 1);
-            let first = self.ceil(low[axis], last);
-            [first, self.floor(high[axis] - f64::from(group.box_filter[axis]), last, self.pixels).max(first)]
-        });
-        [[axes[0][0], axes[1][0]], [axes[0][1], axes[1][1]]]
-    }
-
-    fn pixel(&mut self, center: DVec2, size: [u32; 2]) -> [u32; 2] {
-        [0, 1].map(|axis| self.floor(center[axis], f64::from(size[axis] - 1), self.pixels))
-    }
-}
-
-fn half_box(group: &SheetGroup) -> DVec2 {
-    DVec2::from(group.half_box.map(f64::from))
-}
-
-/// Hidden boxes: an image's occlusion buffer.
-#[derive(Clone)]
-struct Occluded {
-    size: [u32; 2],
-    bits: Vec<bool>,
-}
-
-impl Occluded {
-    fn at(&self, [x, y]: [u32; 2]) -> bool {
-        self.bits[(y * self.size[0] + x) as usize]
-    }
-
-    fn words(&self) -> Vec<u32> {
-        let columns = tile_grid(self.size)[0];
-        (0..self.size[1])
-            .flat_map(|y| (0..columns).map(move |column| (column * TILE, y)))
-            .map(|(left, y)| {
-                let is_set = |i: &u32| left + i < self.size[0] && self.at([left + i, y]);
-                (0..TILE).filter(is_set).fold(0, |word, i| word | 1 << i)
-            })
-            .collect()
-    }
-
-    fn new(size: [u32; 2], value: bool) -> Self {
-        Self { size, bits: vec![value; (size[0] * size[1]) as usize] }
-    }
-
-    /// Rectangles of random sides.
-    fn random(random: &mut Random, size: [u32; 2]) -> Self {
-        let mut mask = Self::new(size, false);
-        for _ in 0..3 {
-            let low = size.map(|side| random.uniform(-10.0, f64::from(side)).max(0.0) as u32);
-            let sides = size.map(|side| random.uniform(1.0, f64::from(side)) as u32);
-            for y in low[1]..size[1].min(low[1] + sides[1]) {
-                for x in low[0]..size[0].min(low[0] + sides[0]) {
-                    mask.bits[(y * size[0] + x) as usize] = true;
-                }
-            }
-        }
-        mask
-    }
-}
-
-/// What the rules say, from the start of a frame on.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Expected {
-    /// The list's voxels that the last group draws, in order.
-    drawn: Vec<u32>,
-    /// Hidden and shaded voxels by brick.
-    states: Vec<(u64, u64)>,
-    /// Voxels shaded, sections, quads, bricks tested and visited.
-    counts: [u32; 5],
-    tiles: BTreeSet<u32>,
-}
-
-/// A frame's rules: §6 as the shaders' comments put it.
-struct Rules<'a> {
-    grid: &'a Grid,
-    frame: &'a Frame,
-    view: &'a ViewGeometry,
-    geometry: Geometry,
-    kernel: Kernel,
-    order_of_sheets: Order,
-    sheets: u32,
-    bricks: &'a [Brick],
-    indices: &'a [u32],
-    groups: &'a [SheetGroup],
-    /// The list's bricks in bucket order.
-    order: &'a [u32],
-    /// Voxels, by index into the volume, that f32 arithmetic may treat otherwise.
-    unsure: BTreeSet<u32>,
-}
-
-impl Rules<'_> {
-    /// A voxel's pixel coordinates, sheet depth, and depth from the eye; nearer than the near plane as if it were on it.
-    fn project(&self, p: DVec3) -> DVec4 {
-        let [x, y, depth, from_eye] =
-            self.frame.screen_from_voxel.map(|row| DVec4::from(row.map(f64::from)).dot(p.extend(1.0)));
-        let center = DVec2::new(x, y) / from_eye.max(self.frame.near.into()) + self.geometry.size / 2.0;
-        center.extend(depth).extend(from_eye)
-    }
-
-    /// Whether any pixel of the image lies in the box around `low..high` widened by the footprint.
-    fn is_on_screen(&self, decisions: &mut Decisions, group: &SheetGroup, low: DVec2, high: DVec2) -> bool {
-        let (low, high) = (low - half_box(group), high + half_box(group));
-        let size = self.frame.size.map(f64::from);
-        // All four, so that every unsure one is noted.
-        let sides = [(high.x, 0.5), (high.y, 0.5), (size[0] - 0.5, low.x), (size[1] - 0.5, low.y)]
-            .map(|(a, b)| decisions.at_least(a, b, decisions.pixels));
-        sides.into_iter().all(|side| side)
-    }
-
-    fn visits(
-        &self,
-        decisions: &mut Decisions,
-        brick: &Brick,
-        hidden: u64,
-        group: &SheetGroup,
-        occluded: &Occluded,
-    ) -> bool {
-        if brick::present(brick) & !hidden == 0 {
-            return false;
-        }
-        let (middle, half) = brick::bounds(brick);
-        let [_, _, depth, from_eye] = self.view.screen_from_voxel.map(|row| row.dot(middle.extend(1.0)));
-        let [_, _, spread, thickness] = self.view.screen_from_voxel.map(|row| row.truncate().abs().dot(half));
-        // The shader's slack.
-        let reach = spread + f64::from(self.frame.reach) + 1e-3;
-        let near = f64::from(group.near);
-        let far = near + f64::from(self.sheets) * f64::from(self.frame.slab_width);
-        let is_before = decisions.at_least(near, depth + reach, EPSILON);
-        let is_behind = decisions.at_least(depth - reach, far, EPSILON);
-        let is_clipped = decisions.at_least(self.frame.near.into(), from_eye + thickness, EPSILON);
-        let Some(bounds) = self.view.bounds(middle, half) else { return false };
-        let (low, high) = (bounds.low - 1e-3, bounds.high + 1e-3);
-        if is_before || is_behind || is_clipped || !self.is_on_screen(decisions, group, low, high) {
-            return false;
-        }
-        if group.culling == 0 {
-            return true;
-        }
-        let all_occluded = |margin: f64| {
-            let [first, last] = Decisions::new(0.0).filter(self.frame.size, group, low - margin, high + margin);
-            (first[1]..=last[1]).all(|y| (first[0]..=last[0]).all(|x| occluded.at([x, y])))
-        };
-        decisions.unsure |= all_occluded(decisions.pixels) != all_occluded(-decisions.pixels);
-        !all_occluded(0.0)
-    }
-
-    /// What a group draws after what was expected so far.
-    fn cull(&mut self, group: usize, occluded: &Occluded, so_far: &mut Expected) {
-        so_far.drawn.clear();
-        let group = &self.groups[group];
-        for &at in &self.order[group.first_brick as usize..][..group.brick_count as usize] {
-            let brick = self.bricks[at as usize];
-            so_far.counts[3] += 1;
-            let corner = UVec3::new(brick.x, brick.y, brick.z);
-            let mut decisions = Decisions::new(self.pixel_error(corner.as_dvec3()));
-            let visits = self.visits(&mut decisions, &brick, so_far.states[at as usize].0, group, occluded);
-            if decisions.unsure {
-                // Not by a hair: a box, which has its slack, without any of its voxels.
-                self.unsure.extend(indices(self.grid, &brick).into_iter().filter(|&index| index != ABSENT));
-            }
-            if !visits {
-                continue;
-            }
-            so_far.counts[4] += 1;
-            let left = brick::present(&brick) & !so_far.states[at as usize].0;
-            for slot in (0..BRICK_VOXELS).filter(|slot| left >> slot & 1 == 1) {
-                let id = at * BRICK_VOXELS + slot;
-                let voxel = self.grid.voxel_at(self.indices[id as usize]);
-                let mut decisions = Decisions::new(self.pixel_error(voxel.as_dvec3()));
-                self.cull_voxel(&mut decisions, (at, slot, id), voxel, group, occluded, so_far);
-                if decisions.unsure {
-                    self.unsure.insert(self.indices[id as usize]);
-                }
-            }
-        }
-        so_far.counts[2] += so_far.drawn.len() as u32;
-    }
-
-    /// What f32 arithmetic may move the pixel coordinates by of a voxel, or of what is around it: at the near plane at most so much.
-    fn pixel_error(&self, p: DVec3) -> f64 {
-        let nearest = self.view.screen_from_voxel[3].dot(p.extend(1.0)).abs().max(self.frame.near.into());
-        let [x, y] = [0, 1].map(|row| (self.view.screen_from_voxel[row] * p.extend(1.0)).abs().element_sum());
-        if self.geometry.eye.is_some() { 16.0 * F32 * x.max(y) / nearest } else { 0.0 }
-    }
-
-    /// How many sections of a voxel the group draws, by the twin: those with a footprint whose own box holds a pixel.
-    fn sections(&self, decisions: &mut Decisions, voxel: UVec3, group: &SheetGroup) -> u32 {
-        let Geometry { method, eye, .. } = self.geometry;
-        if eye.is_some_and(|eye| !decisions.at_least(self.geometry.depth(voxel), eye.near, EPSILON)) {
-            return 0;
-        }
-        let splat =
-            |depth| reference::Splat { center: self.geometry.pixel(voxel), depth, amount: DVec4::ONE, alpha: 1.0 };
-        let depth = self.geometry.depth(voxel);
-        let first = ((f64::from(group.near) - self.view.slabs.origin) / self.view.slabs.width).round() as i32;
-        let within = |depth: f64| {
-            let sheets = match method {
-                Method::ImageAligned => self.geometry.slabs(&splat(depth), self.kernel.radius()),
-                _ => self.geometry.slice(voxel)..self.geometry.slice(voxel) + 1,
-            };
-            sheets.start.max(first)..sheets.end.min(first + self.sheets as i32)
-        };
-        decisions.unsure |= within(depth - EPSILON) != within(depth + EPSILON);
-        let (half_group, epsilon) = (half_box(group), decisions.pixels);
-        let is_on_screen = |k: &i32| {
-            let Some(section) = self.geometry.section(&splat(depth), *k, &self.kernel) else { return false };
-            let half_box = section.footprint.half_box(self.kernel.support());
-            assert!(
-                half_box.cmple(half_group * (1.0 + 4.0 * F32)).all(),
-                "{voxel}: {half_box}, the group's {half_group}"
-            );
-            let inside = (section.center + half_box - 0.5).min(self.geometry.size - 0.5 - section.center + half_box);
-            decisions.unsure |= inside.min_element().abs() < epsilon + 1e-4 * half_box.max_element();
-            inside.min_element() >= 0.0
-        };
-        within(depth).filter(is_on_screen).count() as u32
-    }
-
-    fn cull_voxel(
-        &self,
-        decisions: &mut Decisions,
-        (brick, slot, id): (u32, u32, u32),
-        voxel: UVec3,
-        group: &SheetGroup,
-        occluded: &Occluded,
-        so_far: &mut Expected,
-    ) {
-        let size = self.frame.size;
-        let p = self.project(voxel.as_dvec3());
-        let center = DVec2::new(p.x, p.y);
-        let is_on_screen = self.is_on_screen(decisions, group, center, center);
-        let [first, last] = decisions.filter(size, group, center, center);
-        let corners = [first, [last[0], first[1]], [first[0], last[1]], last];
-        let is_hidden = group.culling == 1 && corners.into_iter().all(|corner| occluded.at(corner));
-        let state = &mut so_far.states[brick as usize];
-        if !is_on_screen || is_hidden {
-            // Back to front, where nothing is hidden, boxes may grow.
-            state.0 |= u64::from(self.order_of_sheets == Order::FrontToBack) << slot;
-            return;
-        }
-        let sections = self.sections(decisions, voxel, group);
-        if sections == 0 {
-            return;
-        }
-        so_far.drawn.push(id);
-        so_far.counts[1] += sections;
-        so_far.counts[0] += u32::from(state.1 >> slot & 1 == 0);
-        state.1 |= 1 << slot;
-        // Every tile with a pixel whose centre is in the footprint's box, and at most one row or column of tiles more.
-        let low = decisions.pixel(center - half_box(group) - 0.5, size).map(|pixel| pixel / TILE);
-        let high = decisions.pixel(center + half_box(group), size).map(|pixel| pixel / TILE);
-        let columns = tile_grid(size)[0];
-        so_far.tiles.extend((low[1]..=high[1]).flat_map(|y| (low[0]..=high[0]).map(move |x| y * columns + x)));
-    }
-}
-
 /// A grid, its voxels in memory order, and a view of them.
 struct Case {
     grid: Grid,
@@ -444,7 +152,7 @@ struct Case {
     sheets: u32,
 }
 
-/// How often something happened in a run, so that a test can ask for it.
+/// Counts of events in a run, so that a test can require them.
 #[derive(Debug, Default)]
 struct Seen {
     most_bricks: u32,
@@ -467,11 +175,11 @@ impl Case {
         }
     }
 
-    /// Draws the groups of the plan in order, under the given occlusion buffers by turns, and checks all that is left behind.
-    fn check(mut self, gpu: &Headless, stage: &Cull, masks: &[Occluded]) -> Seen {
+    /// Draws the groups of the plan in order, with the given occlusion buffers in turn, and checks all results.
+    fn check(mut self, gpu: &GpuHeadless, stage: &Cull, masks: &[Occluded]) -> Seen {
         let transfer = Self::transfer();
         let values = vec![1.0; self.grid.dims.element_product() as usize];
-        // Voxels that f32 arithmetic may decide otherwise about are left out, which changes their bricks.
+        // Voxels whose decisions may differ in f32 are removed, which changes their bricks.
         for _ in 0..30 {
             let volume = (&self.grid, &values[..], None);
             let culling = Culling::new(gpu, (stage, self.sheets), volume, &self.voxels, &transfer, &self.scene);
@@ -560,7 +268,7 @@ impl Case {
     }
 }
 
-/// Occlusion buffers that hide something, nothing (what was hidden stays so), something else, everything, and nothing again.
+/// Occlusion buffers that hide something, nothing (hidden voxels stay hidden), something else, everything, and nothing again.
 fn masks(random: &mut Random, size: [u32; 2]) -> Vec<Occluded> {
     let [some, others] = [(); 2].map(|()| Occluded::random(random, size));
     vec![
@@ -573,7 +281,7 @@ fn masks(random: &mut Random, size: [u32; 2]) -> Vec<Occluded> {
     ]
 }
 
-/// A dense volume with holes, of bricks of up to 64 voxels.
+/// A dense volume with gaps, in bricks of up to 64 voxels.
 fn dense(random: &mut Random, sheets: u32, culling: bool) -> Case {
     let grid = Grid { dims: UVec3::new(14, 11, 17), spacing: DVec3::new(1.0, 1.0, 1.3) };
     let holes = random.uniform(0.0, 0.6);
@@ -611,8 +319,8 @@ fn dense_bricks() {
     assert!(all.without_visits > 10 && all.with_some > 30, "{all:?}");
 }
 
-/// Boxes that differ from group to group, bricks and kernels that the near plane cuts, and kernels on the screen by their group's box
-/// alone; slices. Also back to front, where nothing is hidden.
+/// Boxes that differ between groups, bricks and kernels that the near plane cuts, kernels that only their group's box puts onto the screen, and
+/// slices. Also back to front, where nothing is hidden.
 #[test]
 fn any_eye_and_slices() {
     let gpu = gpu();
@@ -642,7 +350,7 @@ fn any_eye_and_slices() {
     assert!(all.without_visits > 10 && all.with_some > 30, "{all:?}");
 }
 
-/// Without culling nobody looks at the occlusion buffer: only what is off the screen is left out.
+/// Without culling the occlusion buffer is not used: only what lies off the screen is left out.
 #[test]
 fn culling_off() {
     let gpu = gpu();
@@ -656,14 +364,14 @@ fn culling_off() {
     }
 }
 
-/// More bricks than threads, and more than threads and bits of a word: every thread's run is long, and there are several.
+/// More bricks than threads, and more than threads times the bits of a word, so that every thread has several long runs.
 #[test]
 fn many_bricks() {
     let gpu = gpu();
     let mut random = Random(33);
     for (sheets, side, height, least) in [(4, 370, 170.0, 256 * 32), (1, 370, 260.0, 256), (2, 150, 170.0, 256)] {
         let stage = Cull::new(gpu.device(), sheets);
-        // Bricks beside each other, a voxel or two in each.
+        // Adjacent bricks with one or two voxels each.
         let grid = Grid { dims: UVec3::new(side, 6, side), spacing: DVec3::ONE };
         let mut chosen = BTreeSet::new();
         for z in (0..side).step_by(4) {

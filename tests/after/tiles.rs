@@ -1,26 +1,22 @@
-//! Classification after splatting by tiles: whole frames against the f64 twin (SPEC §9).
-#![expect(clippy::unwrap_used, reason = "tests")]
-
-#[expect(dead_code, reason = "not every file needs all of it")]
-mod common;
+//! Random frames by the tile rasterizer against the f64 evaluation.
 
 use glam::DVec3;
-use sheetsplat::headless::Headless;
+use sheetsplat::headless::GpuHeadless;
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Classification, Compositing, Gradient, Projection, Ramp, Rasterizer};
 use sheetsplat::volume::Volume;
 
-use common::compare::{assert_at_least, assert_at_most, decibels};
-use common::images::{largest_difference, rms};
-use common::{BY_AMOUNTS, Random, SPACINGS, gpu, random_eye, random_volume, transfer};
+use crate::common::compare::{assert_at_least, assert_at_most, decibels};
+use crate::common::images::{largest_difference, rms};
+use crate::common::{BY_AMOUNTS, Random, SPACINGS, gpu, random_eye, random_volume, transfer};
 
 /// A random volume, and a scene of it that classifies after splatting, unculled.
 fn random_case(random: &mut Random, has_eye: bool) -> (Volume, Scene) {
     let spacing = random.pick(&SPACINGS);
     let volume = random_volume(random, (7.0, 24.0), spacing);
-    let mut scene = common::scene(61, 45);
+    let mut scene = crate::common::scene(61, 45);
     scene.splatting.classification = Classification::After;
     scene.splatting.rasterizer = Rasterizer::Tiles;
     scene.splatting.culling = false;
@@ -52,8 +48,8 @@ fn random_case(random: &mut Random, has_eye: bool) -> (Volume, Scene) {
     (volume, scene)
 }
 
-/// The frame and what the twin makes of the scene.
-fn frames(gpu: &Headless, volume: &Volume, scene: &Scene) -> [Image; 2] {
+/// The frame, and the f64 evaluation of the scene.
+fn frames(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> [Image; 2] {
     let found = gpu.render_volume(volume.clone(), scene).unwrap();
     [found.image, reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap()]
 }
@@ -62,7 +58,7 @@ fn shown(image: &Image) -> usize {
     image.pixels.iter().filter(|pixel| pixel[3] > 0.02).count()
 }
 
-/// Draws random frames, changed by `change`, and compares them with the twin's.
+/// Draws random frames, changed by `change`, and compares them with the f64 evaluation.
 fn compare(seed: u64, has_eye: bool, least: f64, change: impl Fn(&mut Random, &mut Volume, &mut Scene)) {
     const CASES: usize = 6;
     let gpu = gpu();
@@ -86,24 +82,24 @@ fn compare(seed: u64, has_eye: bool, least: f64, change: impl Fn(&mut Random, &m
 }
 
 #[test]
-fn orthographic_frames_are_those_of_the_twin() {
+fn orthographic_frames_agree_with_the_f64_evaluation() {
     compare(17, false, 80.0, |_, _, _| {});
 }
 
 #[test]
-fn frames_with_an_eye_are_those_of_the_twin() {
+fn frames_with_an_eye_agree_with_the_f64_evaluation() {
     compare(18, true, 60.0, |_, _, _| {});
 }
 
 #[test]
-fn frames_with_the_kernels_gradient_are_those_of_the_twin() {
+fn frames_with_the_kernels_gradient_agree_with_the_f64_evaluation() {
     for has_eye in [false, true] {
         compare(19, has_eye, 55.0, |_, _, scene| scene.shading.gradient = Gradient::Kernel);
     }
 }
 
 #[test]
-fn frames_with_holes_are_those_of_the_twin() {
+fn frames_with_holes_agree_with_the_f64_evaluation() {
     compare(20, false, 60.0, |random, volume, _| {
         let mut values = volume.values().to_vec();
         for value in &mut values {
@@ -115,7 +111,7 @@ fn frames_with_holes_are_those_of_the_twin() {
     });
 }
 
-/// With any threshold every channel of every pixel is within what the threshold leaves.
+/// With any threshold `T` no channel of any pixel changes by more than `1 - T`.
 #[test]
 fn culling_keeps_its_guarantee() {
     let gpu = gpu();

@@ -1,41 +1,45 @@
 //! The native CPU backend: whole frames against the f64 twin, the same bytes with any number of threads, and early splat elimination.
+//! `cargo test --release --test cpu -- --nocapture` prints what was measured.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
+#[path = "../common/mod.rs"]
 mod common;
+mod modes;
+mod picks;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::cpu;
+use sheetsplat::cpu::{self, CpuRenderer, Simd};
 use sheetsplat::headless::Rendering;
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Compositing, Economies, Light, Method, Order, Projection, Ramp};
+use sheetsplat::settings::{Classification, Clip, Compositing, Economies, Light, Method, Order, Projection, Ramp};
 use sheetsplat::volume::{Volume, builtin};
 
 use common::images::largest_difference;
-use common::{BY_AMOUNTS, Random, SPACINGS, camera, random_eye, random_volume, scene, transfer};
+use common::{BY_AMOUNTS, COMPOSITINGS, Random, SPACINGS, camera, random_eye, random_volume, scene, transfer};
 
 /// PSNR that is asked for, dB (SPEC §12 asks for 80).
-const REQUIRED: f64 = 100.0;
+pub(crate) const REQUIRED: f64 = 100.0;
 
 /// What f32 sums may differ by.
 const ROUNDING: f64 = 2e-5;
 
-fn draw(volume: &Volume, scene: &Scene) -> Rendering {
+pub(crate) fn draw(volume: &Volume, scene: &Scene) -> Rendering {
     let rendering = cpu::render(volume.clone(), scene).unwrap();
     let is_finite = rendering.image.pixels.as_flattened().iter().all(|channel| channel.is_finite());
     assert!(is_finite, "not finite: {scene:?}");
     rendering
 }
 
-fn twin(volume: &Volume, scene: &Scene) -> Image {
+pub(crate) fn twin(volume: &Volume, scene: &Scene) -> Image {
     reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap()
 }
 
 /// PSNR of premultiplied RGBA, peak 1, over all pixels.
-fn psnr(actual: &Image, expected: &Image) -> f64 {
+pub(crate) fn psnr(actual: &Image, expected: &Image) -> f64 {
     assert_eq!((actual.width, actual.height), (expected.width, expected.height));
     let (actual, expected) = (actual.pixels.as_flattened(), expected.pixels.as_flattened());
     let squares = actual.iter().zip(expected).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
@@ -43,12 +47,12 @@ fn psnr(actual: &Image, expected: &Image) -> f64 {
 }
 
 /// How much of an image shows something.
-fn shown(image: &Image) -> f64 {
+pub(crate) fn shown(image: &Image) -> f64 {
     let background = image.pixels.iter().filter(|pixel| **pixel == [0.0, 0.0, 0.0, 1.0]).count();
     1.0 - background as f64 / image.pixels.len() as f64
 }
 
-fn head() -> (Volume, Scene) {
+pub(crate) fn head() -> (Volume, Scene) {
     let mut scene = scene(96, 80);
     scene.camera.direction = DVec3::new(0.4, 0.9, -0.3);
     scene.splatting.culling = false;
@@ -60,7 +64,7 @@ fn head() -> (Volume, Scene) {
 }
 
 /// Any view, orthographic or in perspective, of any settings that this backend draws.
-fn random_case(random: &mut Random) -> (Volume, Scene) {
+pub(crate) fn random_case(random: &mut Random) -> (Volume, Scene) {
     let spacing = random.pick(&SPACINGS);
     let volume = random_volume(random, (9.0, 19.0), spacing);
     let mut scene = scene(random.uniform(33.0, 90.0) as u32, random.uniform(33.0, 90.0) as u32);
@@ -95,6 +99,11 @@ fn random_case(random: &mut Random) -> (Volume, Scene) {
     }
     scene.shading.enabled = !random.bits().is_multiple_of(4);
     scene.shading.light = random.pick(&[Light::Headlight, Light::Direction(DVec3::new(1.0, -2.0, 3.0))]);
+    let (aligned, sliced) = (Method::ImageAligned, Method::AxisAligned);
+    scene.splatting.method = random.pick(&[aligned, aligned, aligned, sliced, Method::CompositeEverySample]);
+    if scene.splatting.method == Method::CompositeEverySample {
+        scene.clip = Clip::default();
+    }
     scene.splatting.compositing = random.pick(&BY_AMOUNTS);
     scene.splatting.order = random.pick(&[Order::FrontToBack, Order::FrontToBack, Order::BackToFront]);
     scene.splatting.opacity_threshold = random.pick(&[0.5, 0.8, 0.95, 0.999]);
@@ -155,6 +164,23 @@ fn settings_one_by_one_against_the_twin() {
             scene.splatting.order = order;
         });
     }
+    for (method, order) in [
+        (Method::AxisAligned, Order::FrontToBack),
+        (Method::AxisAligned, Order::BackToFront),
+        (Method::CompositeEverySample, Order::FrontToBack),
+        (Method::CompositeEverySample, Order::BackToFront),
+    ] {
+        let set = |scene: &mut Scene| (scene.splatting.method, scene.splatting.order) = (method, order);
+        check(&format!("{method:?}, {order:?}"), &volume, &set);
+        check(&format!("{method:?}, {order:?} in perspective"), &volume, &|scene| {
+            set(scene);
+            scene.camera.projection = Projection::Perspective { fov_y: 40.0, distance: Some(60.0), near: Some(40.0) };
+        });
+    }
+    check("slices cut", &volume, &|scene| {
+        scene.splatting.method = Method::AxisAligned;
+        scene.clip.planes = vec![[0.3, 1.0, -0.2, 1.0]];
+    });
     check("back to front", &volume, &|scene| scene.splatting.order = Order::BackToFront);
     check("unshaded", &volume, &|scene| scene.shading.enabled = false);
     check("fixed light", &volume, &|scene| scene.shading.light = Light::Direction(DVec3::new(1.0, -1.0, 0.5)));
@@ -210,6 +236,41 @@ fn threads_change_no_bit() {
             assert_eq!(bits(&one.image), bits(&other.image), "case {case}");
             assert_eq!(one.stats.counts, other.stats.counts, "case {case}");
         }
+    }
+}
+
+#[test]
+fn instruction_sets_change_no_bit() {
+    let levels = Simd::available();
+    println!("{levels:?}");
+    assert!(levels.len() >= 2, "only {levels:?}");
+    let mut random = Random(21);
+    for case in 0..24 {
+        let (volume, mut scene) = random_case(&mut random);
+        if scene.splatting.method != Method::CompositeEverySample {
+            scene.splatting.compositing = COMPOSITINGS[case % COMPOSITINGS.len()];
+        }
+        if scene.splatting.compositing == Compositing::Surface {
+            scene.splatting.order = Order::FrontToBack;
+        }
+        let mut renderer = CpuRenderer::new(volume, &scene).unwrap();
+        let drawn: Vec<_> = levels
+            .iter()
+            .map(|level| {
+                renderer.set_simd(*level).unwrap();
+                let Rendering { image, stats } = renderer.draw().unwrap();
+                assert_eq!(stats.driver, level.name());
+                (bits(&image), stats.counts)
+            })
+            .collect();
+        for (level, other) in levels.iter().zip(&drawn).skip(1) {
+            assert!(*other == drawn[0], "case {case}: {level:?} differs from {:?} with {scene:?}", levels[0]);
+        }
+    }
+    for missing in Simd::ALL.into_iter().filter(|level| !levels.contains(level)) {
+        let (volume, scene) = head();
+        let message = CpuRenderer::new(volume, &scene).unwrap().set_simd(missing).unwrap_err().to_string();
+        assert!(message.contains("SHEETSPLAT_SIMD") && message.contains(missing.name()), "{message}");
     }
 }
 
@@ -271,10 +332,14 @@ fn what_is_not_drawn_yet_is_refused_by_name() {
         let message = cpu::render(volume.clone(), &scene).unwrap_err().to_string();
         words.iter().for_each(|word| assert!(message.contains(word), "no {word:?} in {message}"));
     };
-    refused(&|scene| scene.splatting.method = Method::AxisAligned, ["splatting.method", "axis-aligned"]);
-    refused(&|scene| scene.splatting.method = Method::CompositeEverySample, ["splatting.method", "composite-every"]);
-    refused(&|scene| scene.splatting.compositing = Compositing::Maximum, ["splatting.compositing", "\"maximum\""]);
-    refused(&|scene| scene.splatting.compositing = Compositing::Surface, ["splatting.compositing", "\"surface\""]);
+    refused(&|scene| scene.splatting.classification = Classification::After, ["splatting.classification", "\"cpu\""]);
+    refused(
+        &|scene| {
+            scene.splatting.method = Method::CompositeEverySample;
+            scene.clip.planes = vec![[0.0, 1.0, 0.0, 0.0]];
+        },
+        ["splatting.method", "clip planes"],
+    );
     let economies = Economies { beta: 0.5, ..Economies::default() };
     refused(&|scene| scene.splatting.experimental = economies, ["splatting.experimental.beta", "0.5"]);
     refused(&|scene| scene.image.width = 40_000, ["image.width", "40000"]);

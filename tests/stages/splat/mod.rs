@@ -1,13 +1,15 @@
 //! `shaders/splat.wgsl`, `shaders/splat_perspective.wgsl` and `shaders/clear.wgsl` against `reference::splat`: hand-made splat records
 //! drawn into f32 sheet buffers, in groups of 1, 2 and 4 sheets.
 
+mod sums;
+
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::ops::Deref;
 
 use bytemuck::Zeroable;
 use glam::{DVec2, DVec3, DVec4, UVec3};
-use sheetsplat::headless::{Headless, readback};
+use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::internals::footprint::{FootprintTable, SECTION_SIZE, SECTIONS, section_extent, section_spacing};
 use sheetsplat::internals::gpu::brick_lists::BrickLists;
 use sheetsplat::internals::gpu::footprint_texture::FootprintTexture;
@@ -15,7 +17,7 @@ use sheetsplat::internals::gpu::layout;
 use sheetsplat::internals::gpu::volume_texture::VolumeTexture;
 use sheetsplat::internals::pass::cull::{Cull, CullBuffers, CullList};
 use sheetsplat::internals::pass::splat::{Splat as Stage, SplatMode};
-use sheetsplat::internals::quad_plan::{TILE, tile_grid};
+use sheetsplat::internals::quad_plan::tile_grid;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::{FootprintForm, Method};
@@ -28,16 +30,16 @@ use crate::kernel_in_view::{KernelInView, random_view};
 use crate::section::{AMOUNT, AMOUNT_BA, AMOUNT_RG, KERNELS, Seen, VIEWS, view_scene};
 use crate::{at_offsets, frame_over, indirect, init, tile_list};
 
-/// The stage for groups of so many sheets, and a list to draw, of which it takes what the culling stages wrote.
+/// The stage for groups of `sheets` sheets, and a list to draw, with what the culling stages write.
 struct Stages<'a> {
-    gpu: &'a Headless,
+    gpu: &'a GpuHeadless,
     sheets: u32,
     splat: Stage,
     list: RefCell<CullList>,
 }
 
 impl<'a> Stages<'a> {
-    fn new(gpu: &'a Headless, sheets: u32) -> Self {
+    fn new(gpu: &'a GpuHeadless, sheets: u32) -> Self {
         let device = gpu.device();
         let any = |usage| init(device, &[0_u8; 1024], usage);
         let storage = any(BufferUsages::STORAGE);
@@ -51,6 +53,7 @@ impl<'a> Stages<'a> {
             control_points: &storage,
             occluded: &storage,
             culled: &storage,
+            planes: None,
         };
         let grid = Grid { dims: UVec3::ONE, spacing: DVec3::ONE };
         let lists = BrickLists::upload(device, &grid, &[0]);
@@ -60,9 +63,9 @@ impl<'a> Stages<'a> {
     }
 }
 
-/// One view of one kernel, on the GPU and in the twin.
+/// One view of one kernel, on the GPU and in the f64 evaluation.
 struct Fixture<'a> {
-    gpu: &'a Headless,
+    gpu: &'a GpuHeadless,
     stage: &'a Stages<'a>,
     seen: Seen,
     frame: wgpu::Buffer,
@@ -118,8 +121,8 @@ impl<'a> Fixture<'a> {
         }
     }
 
-    /// The sheet buffers of the groups that hold some slabs, by slab, with some of the splats, in whatever order. Whatever
-    /// the sheet buffers held before is gone.
+    /// The sheet buffers, by slab, of the groups that contain some slabs, with some of the splats, in any order. The previous content of
+    /// the sheet buffers is lost.
     fn draw(&self, splats: &[layout::Splat], instances: &[u32], slabs: &[i32]) -> BTreeMap<i32, Sheet> {
         let mut sheets = BTreeMap::new();
         for &k in slabs {
@@ -136,7 +139,7 @@ impl<'a> Fixture<'a> {
         k - k.rem_euclid(self.stage.sheets as i32)
     }
 
-    /// What the summed-area form may err by in a section.
+    /// The error bound of the summed-area form in a section.
     fn tolerance(&self, splat: &reference::Splat, k: i32) -> f64 {
         self.summed_area_tolerance(splat, self.first_of_group(k), k)
     }
@@ -144,7 +147,7 @@ impl<'a> Fixture<'a> {
     fn draw_group(&self, splats: &[layout::Splat], instances: &[u32], first_slab: i32, tiles: &[u32]) -> Vec<Sheet> {
         let device = self.gpu.device();
         let near = self.view.slabs.plane(first_slab) as f32;
-        // Not at the first offset.
+        // The group is not at the first offset.
         let of = |near| layout::SheetGroup { near, ..layout::SheetGroup::zeroed() };
         let (groups, offset) = at_offsets(device, &[of(1e9), of(near)]);
         let args = init(device, &[indirect(instances.len() as u32)], BufferUsages::INDIRECT | BufferUsages::STORAGE);
@@ -153,7 +156,7 @@ impl<'a> Fixture<'a> {
         let group = {
             let mut list = self.stage.list.borrow_mut();
             list.splats = init(device, splats, BufferUsages::STORAGE);
-            // One more than is drawn.
+            // One more instance than is drawn.
             let instances: Vec<u32> = instances.iter().copied().chain([0]).collect();
             list.instances = init(device, &instances, BufferUsages::STORAGE);
             list.draw_args = args.clone();
@@ -171,7 +174,7 @@ impl<'a> Fixture<'a> {
         self.sheets.iter().map(read).collect()
     }
 
-    /// A splat for the twin: the record's f32 coordinates are taken as they are, so only the stage's own errors count.
+    /// A splat for the f64 evaluation with the record's f32 coordinates, so that only the stage's own errors count.
     fn twin_of(&self, splat: &layout::Splat) -> reference::Splat {
         let layout::Splat { x_px, y_px, depth, rg, ba, .. } = *splat;
         assert_eq!((rg, ba), (AMOUNT_RG, AMOUNT_BA));
@@ -193,11 +196,11 @@ impl<'a> Fixture<'a> {
     }
 }
 
-/// Sheets of a group.
+/// The numbers of sheets in a group.
 const GROUPS: [u32; 3] = [1, 2, 4];
 
-/// Calls `check` with random splats of every kernel and view, one at a time, and each slab that they touch or that shares a
-/// group with one: fixture, splat, slab, sheet buffer.
+/// Calls `check` with random splats of every kernel and view, one at a time, and each slab that they touch or that shares a group with one:
+/// fixture, splat, slab, sheet buffer.
 fn for_random_sections(
     form: FootprintForm,
     widths: &[f64],
@@ -225,7 +228,7 @@ fn summed_area_sections() {
     let mut lit = 0;
     for_random_sections(FootprintForm::SummedArea, &[0.25, 1.0, 3.7], |fixture, splat, k, sheet| {
         let expected = fixture.twin(&[*splat], k);
-        // A thousandth is what SPEC §4 allows; the table is four times as good.
+        // SPEC §4 allows a thousandth; the table is four times as accurate.
         let tolerance = fixture.tolerance(splat, k) / 4.0;
         fixture.assert_close(sheet, &expected, |_| tolerance, &format!("{splat:?} in slab {k}"));
         lit += expected.iter().filter(|pixel| pixel.w > 0.0).count();
@@ -233,8 +236,8 @@ fn summed_area_sections() {
     assert!(lit > 100_000, "only {lit} pixels were compared");
 }
 
-/// The nearest of the 128 stored sections is that of a splat moved by up to half their spacing: against that one only the
-/// bilinear interpolation between the texels of its quadrant counts.
+/// The nearest of the 128 stored sections is that of a splat displaced by up to half their spacing: compared with that one, only the bilinear
+/// interpolation between the texels of its quadrant counts.
 #[test]
 fn stored_sections() {
     let mut lit = 0;
@@ -245,7 +248,7 @@ fn stored_sections() {
         let spacing = section_spacing(kernel, view.slabs.width);
         let layer = (middle.abs() / spacing).round();
         if (middle.abs() / spacing - layer).abs() > 0.499 {
-            // Half way between two sections either one is the nearest, and f32 decides.
+            // Half way between two sections f32 decides which one is the nearest.
             return;
         }
         let stored =
@@ -258,16 +261,16 @@ fn stored_sections() {
         let diagonal = 2.0_f64.sqrt() * texel;
         let section = |rho: f64| kernel.section(rho.max(0.0).powi(2), t0, t1);
         let tolerance = |pixel: usize| {
-            // A section falls off from its centre, so the cell's corners are between its values a diagonal away.
+            // A section falls off from its centre, so the values at a cell's corners lie between its values a diagonal away.
             let rho = fixture.rho(splat, pixel);
             let monotone = (section(rho - diagonal) - section(rho)).max(section(rho) - section(rho + diagonal));
-            // Where the slab's planes and not the ball end the section, it is a Gaussian in both directions: its second
-            // derivatives are at most 2·falloff of the peak, bilinear interpolation errs by texel²/8 of their sum.
+            // Where the slab's planes end the section, not the ball, it is a Gaussian in both directions: its second derivatives are at
+            // most 2·falloff of the peak, and bilinear interpolation errs by texel²/8 of their sum.
             let chord = kernel.half_chord((rho + diagonal).powi(2));
             let smooth = t0.abs().max(t1.abs()) < chord;
             let interpolation =
                 if smooth { monotone.min(kernel.falloff() * texel * texel / 2.0 * section(0.0)) } else { monotone };
-            // The kernel's support leaves out 2⁻²⁴; the rest is f32.
+            // The kernel's support leaves out 2⁻²⁴; the rest is the error of f32.
             interpolation + 8.0 * F32 * fixture.whole()
         };
         fixture.assert_close(sheet, &expected, tolerance, &format!("{splat:?} in slab {k}"));
@@ -276,7 +279,7 @@ fn stored_sections() {
     assert!(lit > 100_000, "only {lit} pixels were compared");
 }
 
-/// Kernels that each have their own ray, cut off by the near plane or not, in slabs, and in slices also without an eye.
+/// Kernels with a ray each, cut by the near plane or not, in slabs and in slices, the latter also without an eye.
 #[test]
 fn any_eye_and_slices() {
     let gpu = gpu();
@@ -298,7 +301,7 @@ fn any_eye_and_slices() {
                     let section = match (kernel.section(k), form) {
                         (Some(section), FootprintForm::Sections) => kernel.stored(section, k),
                         (section, FootprintForm::SummedArea) => section,
-                        // Stored sections are as thick as those of the central ray: they may reach into sheets that the kernel does not.
+                        // Stored sections have the thickness of the central ray's, so they may reach into sheets that the kernel does not.
                         (None, FootprintForm::Sections) => continue,
                     };
                     let Some(section) = section else {
@@ -329,8 +332,8 @@ fn any_eye_and_slices() {
     }
 }
 
-/// Pixel centres just inside the rim, where it touches the quad's sides, of a kernel that is not small there: the
-/// rasteriser, which snaps corners to 1/256 pixel, must not lose them.
+/// Pixel centres just inside the rim, where it touches the quad's sides, of a kernel that is not small there: the rasterizer, which snaps
+/// corners to 1/256 pixel, must not lose them.
 #[test]
 fn pixels_just_inside_the_rim_are_drawn() {
     let gpu = gpu();
@@ -350,167 +353,15 @@ fn pixels_just_inside_the_rim_are_drawn() {
                 let sheet = &fixture.draw(&[splat], &[0], &[0])[&0];
                 let pixel = 20 * 70 + 30;
                 let actual = sheet[pixel].w;
-                // The chord is √(1 - ρ²) to each side, the kernel's value there κ·exp(-0.1).
+                // The chord is √(1 - ρ²) to each side, and the kernel's value there κ·exp(-0.1).
                 let expected = fixture.twin(&[fixture.twin_of(&splat)], 0)[pixel].w;
                 assert!(expected > 0.01 * fixture.whole(), "{expected} is not worth testing");
                 match form {
                     FootprintForm::SummedArea => {
                         assert_at_most((actual - expected).abs(), 4e-6 * fixture.whole(), "just inside the rim");
                     }
-                    // Bilinear between the last texel inside and 0 on the rim.
+                    // Interpolated between the last texel inside and 0 on the rim.
                     FootprintForm::Sections => assert!(actual > 0.0 && actual < expected, "{actual} {expected}"),
-                }
-            }
-        }
-    }
-}
-
-/// `ρ`-wise: all slabs' sheet buffers added up are the kernel's whole footprint. Pixel-wise: that footprint adds up to
-/// the kernel's integral, 1.
-#[test]
-fn sections_sum_to_the_footprint_and_the_footprint_to_one() {
-    let gpu = gpu();
-    let stages = GROUPS.map(|sheets| Stages::new(&gpu, sheets));
-    let mut random = Random(11);
-    let views = [
-        ([0.0, 1.0, 0.0], [1.0, 1.0, 1.0], 0.16),
-        ([0.3, 0.9, -0.2], [1.0, 1.0, 1.0], 0.15),
-        ([0.6, 0.5, 0.6], [1.0, 1.0, 2.0], 0.21),
-    ];
-    // None that is far from 0 at its rim: there the sum over pixels is no longer close to the integral.
-    let kernels = [(2.0, 2.0), (1.4, 2.0), (4.0, 2.0), (3.0, 0.8)];
-    for (kernel, view) in kernels.into_iter().flat_map(|kernel| views.map(|view| (kernel, view))) {
-        for (form, (width, stage)) in [FootprintForm::SummedArea, FootprintForm::Sections]
-            .into_iter()
-            .flat_map(|form| [0.3, 1.0, 1.7].into_iter().zip(&stages).map(move |of| (form, of)))
-        {
-            let fixture = Fixture::new(stage, view_scene(view, kernel, width, form), view.1);
-            let splat = layout::Splat {
-                x_px: random.uniform(34.0, 36.0) as f32,
-                y_px: random.uniform(22.0, 23.0) as f32,
-                ..fixture.random_splat(&mut random)
-            };
-            let twin = fixture.twin_of(&splat);
-            let slabs: Vec<i32> = fixture.touched(&twin).collect();
-            let sheets = fixture.draw(&[splat], &[0], &slabs);
-            let sum: Vec<DVec4> =
-                (0..sheets[&slabs[0]].len()).map(|i| sheets.values().map(|sheet| sheet[i]).sum()).collect();
-
-            let tolerance = match form {
-                // The planes between slabs cancel but for rounding, of them and of the table entries; what is left is
-                // the step to the nearest texel in the plane, u⁴/24 of the peak, at most 3e-5 for any kernel.
-                FootprintForm::SummedArea => {
-                    let plane_error = 4.0 * F32 * (twin.depth.abs() + kernel.0);
-                    let per_plane = 4.0 * F32 * fixture.whole() + plane_error * fixture.kernel.value(0.0);
-                    3e-5 * fixture.whole() + slabs.len() as f64 * per_plane
-                }
-                // Each section is taken up to half a spacing beside its place. The sum of what that changes is the
-                // kernel's variation, up and down again, over half a spacing; bilinear interpolation as above.
-                FootprintForm::Sections => {
-                    let spacing = section_spacing(&fixture.kernel, fixture.view.slabs.width);
-                    let texel = fixture.kernel.support() / f64::from(SECTION_SIZE - 1);
-                    spacing * fixture.kernel.value(0.0)
-                        + fixture.kernel.falloff() * texel * texel / 2.0 * fixture.whole()
-                }
-            };
-            let whole: Vec<DVec4> = (0..sum.len())
-                .map(|pixel| fixture.kernel.section(fixture.rho(&twin, pixel).powi(2), -9.0, 9.0) * twin.amount)
-                .collect();
-            fixture.assert_close(&sum, &whole, |_| tolerance, &format!("{form:?} {splat:?}"));
-
-            let pixel_area = fixture.geometry.footprint_from_pixels.determinant().abs() / fixture.amplitude();
-            let sampled = whole.iter().sum::<DVec4>() * pixel_area;
-            // The kernel's own: at 4 and more pixels per grid unit a Gaussian's sum over pixels is its integral, and the
-            // jump of at most h(radius) = 0.02·h(0) at the rim adds little.
-            assert_at_most(apart(sampled, AMOUNT), 1e-3, format_args!("{kernel:?} {view:?}: {sampled}"));
-            let total = sum.iter().sum::<DVec4>() * pixel_area;
-            // Over the footprint the GPU errs by less than the tolerance times its effective area, π/falloff.
-            let error = tolerance * std::f64::consts::PI / fixture.kernel.falloff();
-            assert_at_most(apart(total, sampled), error, format_args!("{form:?} {kernel:?} {view:?}: {total}"));
-        }
-    }
-}
-
-/// Splats that overlap add up, and only the instances that are drawn.
-#[test]
-fn instances_add_up() {
-    let gpu = gpu();
-    let mut random = Random(5);
-    for stage in GROUPS.map(|sheets| Stages::new(&gpu, sheets)) {
-        let scene = view_scene(VIEWS[0], (2.0, 2.0), 1.0, FootprintForm::SummedArea);
-        let fixture = Fixture::new(&stage, scene, VIEWS[0].1);
-        let splats: Vec<_> = (0..300)
-            .map(|_| layout::Splat { depth: random.uniform(-2.0, 5.0) as f32, ..fixture.random_splat(&mut random) })
-            .collect();
-        let instances: Vec<u32> = (0..300).rev().filter(|_| !random.bits().is_multiple_of(8)).collect();
-        let twins: Vec<_> = instances.iter().map(|&at| fixture.twin_of(&splats[at as usize])).collect();
-        let sheets = fixture.draw(&splats, &instances, &[0]);
-        assert_eq!(sheets.len(), stage.sheets as usize);
-        for (k, sheet) in sheets {
-            let expected = fixture.twin(&twins, k);
-            let most = largest(expected.iter().map(|pixel| pixel.w));
-            assert!(most > fixture.whole(), "{most}: splats overlap");
-            let tolerance = |pixel: usize| {
-                let here = twins.iter().filter(|twin| fixture.rho(twin, pixel) <= 2.0);
-                // Each has its own error, and the sum so far is rounded when it is added.
-                // These have either sign, and mostly are far below what one may have.
-                here.map(|twin| fixture.tolerance(twin, k) / 100.0 + F32 * most).sum()
-            };
-            fixture.assert_close(&sheet, &expected, tolerance, "many splats");
-        }
-    }
-}
-
-/// Listed tiles are zeroed before anything is drawn; what others hold is not touched, but added to by footprints that reach
-/// there: the tiles stage lists those.
-#[test]
-fn listed_tiles_are_zeroed_and_no_others() {
-    let gpu = gpu();
-    let mut random = Random(6);
-    for (stage, form) in GROUPS.map(|sheets| Stages::new(&gpu, sheets)).iter().zip([
-        FootprintForm::SummedArea,
-        FootprintForm::Sections,
-        FootprintForm::SummedArea,
-    ]) {
-        let mut scene = view_scene(VIEWS[0], (2.0, 2.0), 1.0, form);
-        // Neither a multiple of 32.
-        (scene.image.width, scene.image.height) = (150, 77);
-        let fixture = Fixture::new(stage, scene, VIEWS[0].1);
-        let splats: Vec<_> = (0..40)
-            .map(|_| layout::Splat { depth: random.uniform(-1.0, 4.0) as f32, ..fixture.random_splat(&mut random) })
-            .collect();
-        let all: Vec<u32> = (0..40).collect();
-        let columns = tile_grid(fixture.view.size)[0] as usize;
-        let tile_of = |pixel: usize| (pixel / 150 / TILE as usize * columns + pixel % 150 / TILE as usize) as u32;
-        let clean = fixture.draw_group(&splats, &all, 0, &fixture.tiles);
-        assert!(clean.iter().all(|sheet| sheet.iter().any(|pixel| pixel.w > 0.0)));
-        // Each sheet holds something else; a power of two, so that sums with it say what was added.
-        let stale = |sheet: usize| (sheet as f32 - 2.5) * 16384.0;
-        for listed in [vec![], vec![7], vec![0, 4, 9, 10, 14, 11], (0..15).rev().collect::<Vec<u32>>()] {
-            for instances in [&all[..0], &all[..]] {
-                for (at, sheet) in fixture.sheets.iter().enumerate() {
-                    let layout =
-                        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(150 * 16), rows_per_image: None };
-                    let texels = vec![stale(at); 150 * 77 * 4];
-                    let bytes = bytemuck::cast_slice(&texels);
-                    gpu.queue().write_texture(sheet.as_image_copy(), bytes, layout, sheet.size());
-                }
-                let drawn = fixture.draw_group(&splats, instances, 0, &listed);
-                for (at, (sheet, clean)) in drawn.iter().zip(&clean).enumerate() {
-                    for (pixel, (actual, &clean)) in sheet.iter().zip(clean).enumerate() {
-                        let clean = if instances.is_empty() { DVec4::ZERO } else { clean };
-                        let is_listed = listed.contains(&tile_of(pixel));
-                        let name = format!("sheet {at}, pixel {pixel}, {listed:?}, {} splats", instances.len());
-                        if is_listed {
-                            assert_eq!(*actual, clean, "{name}");
-                        } else if clean == DVec4::ZERO {
-                            assert_eq!(*actual, DVec4::splat(stale(at).into()), "{name}");
-                        } else {
-                            // Every addition is rounded to what an f32 of that size can hold.
-                            let error = apart(*actual - f64::from(stale(at)), clean);
-                            assert_at_most(error, 4.0 * 65536.0 * F32, name);
-                        }
-                    }
                 }
             }
         }

@@ -1,0 +1,102 @@
+//! The rays of pixels among sheets, in f64 (SPEC §2, §5).
+
+use std::ops::Range;
+
+use glam::{DVec2, DVec3, DVec4};
+
+use crate::geometry::slab::SlabGrid;
+use crate::geometry::view_geometry::{Rays, ViewGeometry};
+use crate::settings::clip::HalfSpace;
+use crate::volume::Grid;
+
+/// The rays of a view.
+#[derive(Clone, Debug)]
+pub(super) struct PixelRays {
+    rays: Rays,
+    /// The sheet depth of a position.
+    depth: DVec4,
+    slabs: SlabGrid,
+    middle: DVec2,
+}
+
+/// The ray of a pixel's centre, by its depth along w: positions in `unit`s from the volume's centre.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PixelRay {
+    origin: DVec3,
+    /// The change of position per `unit` of depth.
+    along: DVec3,
+    /// The number of the slab where the depth is 0.
+    slab_at_origin: f64,
+    /// The number of slabs per `unit` of depth; negative where a ray far off the axis meets slices in the opposite order.
+    slabs_per_depth: f64,
+}
+
+impl PixelRays {
+    pub(super) fn new(view: &ViewGeometry, grid: &Grid) -> Self {
+        Self {
+            rays: view.rays(),
+            depth: view.sheet_depth_row(grid.aspect(), grid.center()),
+            slabs: view.slabs,
+            middle: DVec2::from(view.size.map(f64::from)) / 2.0,
+        }
+    }
+
+    /// The ray of a pixel, counted from the upper left.
+    pub(super) fn of(&self, [x, y]: [usize; 2]) -> PixelRay {
+        let place = DVec2::new(x as f64, y as f64) + 0.5 - self.middle;
+        let origin = self.rays.at(place, 0.0);
+        let along = self.rays.at(place, 1.0) - origin;
+        PixelRay {
+            origin,
+            along,
+            slab_at_origin: (self.depth.dot(origin.extend(1.0)) - self.slabs.origin) / self.slabs.width,
+            slabs_per_depth: self.depth.truncate().dot(along) / self.slabs.width,
+        }
+    }
+}
+
+impl PixelRay {
+    /// The depths inside of all half spaces.
+    pub(super) fn inside(&self, half_spaces: &[HalfSpace]) -> Range<f64> {
+        let (mut start, mut end) = (f64::NEG_INFINITY, f64::INFINITY);
+        for HalfSpace { normal, offset } in half_spaces {
+            let (at_origin, slope) = (normal.dot(self.origin) + offset, normal.dot(self.along));
+            if slope > 0.0 {
+                start = start.max(-at_origin / slope);
+            } else if slope < 0.0 {
+                end = end.min(-at_origin / slope);
+            } else if at_origin < 0.0 {
+                end = f64::NEG_INFINITY;
+            }
+        }
+        start..end
+    }
+
+    /// The length of the ray to a `unit` of depth.
+    pub(super) fn length(&self) -> f64 {
+        self.along.length()
+    }
+
+    /// Slabs that the ray passes through in a `unit` of depth.
+    pub(super) fn slabs_per_depth(&self) -> f64 {
+        self.slabs_per_depth.abs()
+    }
+
+    /// Where among slabs the ray is at two depths, the smaller number first: slab k fills `k..k + 1`. `None` between depths that are no
+    /// stretch; a ray that stays in one slice is everywhere.
+    pub(super) fn slabs(&self, depths: Range<f64>) -> Option<[f64; 2]> {
+        if depths.is_empty() {
+            return None;
+        }
+        if self.slabs_per_depth == 0.0 {
+            return Some([f64::NEG_INFINITY, f64::INFINITY]);
+        }
+        let [a, b] = [depths.start, depths.end].map(|depth| self.slab_at_origin + self.slabs_per_depth * depth);
+        Some([a.min(b), a.max(b)])
+    }
+
+    /// The depth of a place among slabs.
+    pub(super) fn depth(&self, slab: f64) -> f64 {
+        (slab - self.slab_at_origin) / self.slabs_per_depth
+    }
+}

@@ -1,0 +1,96 @@
+//! The choice of an instruction set. All of them give the same bytes (SPEC §12).
+
+use fearless_simd::Level;
+
+use crate::setting_error::SettingError;
+
+/// The environment variable that forces an instruction set.
+const VARIABLE: &str = "SHEETSPLAT_SIMD";
+
+/// An instruction set for vectors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Simd {
+    /// Scalar code, except where the compiler vectorizes it.
+    Scalar,
+    /// x86; every 64-bit processor has it.
+    Sse2,
+    /// x86-64-v2.
+    Sse4_2,
+    /// x86-64-v3, of which fused multiply-adds are not used.
+    Avx2,
+    /// x86 since Ice Lake.
+    Avx512,
+    /// ARM, 64 bits.
+    Neon,
+}
+
+impl Simd {
+    /// All instruction sets, whatever the machine has.
+    pub const ALL: [Self; 6] = [Self::Scalar, Self::Sse2, Self::Sse4_2, Self::Avx2, Self::Avx512, Self::Neon];
+
+    /// Its name: `scalar`, `sse2`, `sse4.2`, `avx2`, `avx512`, `neon`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Scalar => "scalar",
+            Self::Sse2 => "sse2",
+            Self::Sse4_2 => "sse4.2",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+            Self::Neon => "neon",
+        }
+    }
+
+    /// The instruction sets that this machine and this build have.
+    pub fn available() -> Vec<Self> {
+        Self::ALL.into_iter().filter(|simd| simd.level().is_some()).collect()
+    }
+
+    /// The level of the vector crate; `None` if the machine or the build lacks it.
+    fn level(self) -> Option<Level> {
+        let best = Level::new();
+        match self {
+            Self::Scalar => Some(Level::fallback()),
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            Self::Sse2 => best.as_sse2().map(Level::Sse2),
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            Self::Sse4_2 => best.as_sse4_2().map(Level::Sse4_2),
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            Self::Avx2 => best.as_avx2().map(Level::Avx2),
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            Self::Avx512 => best.as_avx512().map(Level::Avx512),
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon => best.as_neon().map(Level::Neon),
+            _ => None,
+        }
+    }
+
+    /// The level of an instruction set, if machine and build have it.
+    ///
+    /// # Errors
+    /// If the machine or the build lacks it.
+    pub(super) fn checked(self) -> Result<Level, SettingError> {
+        self.level().ok_or_else(|| refused(self.name()))
+    }
+}
+
+/// The default: the instruction set that the environment forces, else the best one of the machine.
+///
+/// # Errors
+/// If the machine or the build lacks the one that the environment forces.
+pub(super) fn chosen() -> Result<(Simd, Level), SettingError> {
+    let best = || Simd::available().into_iter().next_back().unwrap_or(Simd::Scalar);
+    let simd = match std::env::var_os(VARIABLE) {
+        None => best(),
+        Some(name) => {
+            let named = Simd::ALL.into_iter().find(|simd| name == simd.name());
+            named.ok_or_else(|| refused(&name.to_string_lossy()))?
+        }
+    };
+    Ok((simd, simd.checked()?))
+}
+
+fn refused(found: &str) -> SettingError {
+    let names: Vec<String> = Simd::available().into_iter().map(|simd| format!("\"{}\"", simd.name())).collect();
+    SettingError::new(VARIABLE, format!("\"{found}\""), format!("{} on this machine", names.join(", ")))
+}

@@ -1,0 +1,208 @@
+//! Rendering on a GPU without a host. Only this module creates devices, submits and waits.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::time::Instant;
+
+use wgpu::{Adapter, Device, Queue, TextureFormat};
+
+use super::device::{self, driver_name};
+use super::{Backend, Error, HeadlessOptions, Rendering, load_and_render, milliseconds_since, readback, view_and_draw};
+use crate::error::RenderError;
+use crate::gpu::device::{DeviceError, DeviceRequirements};
+use crate::gpu::fault::{DeviceFault, scoped};
+use crate::gpu::gpu_volume::GpuVolume;
+use crate::image::Image;
+use crate::pick::Pick;
+use crate::renderer::Renderer;
+use crate::renderer::options::{Blend, RendererOptions};
+use crate::renderer::placement::Placement;
+use crate::renderer::scene_view::SceneView;
+use crate::scene::{ImageSettings, Scene};
+use crate::stats::Stats;
+use crate::volume::Volume;
+
+/// The target's format.
+pub(super) const FORMAT: TextureFormat = TextureFormat::Rgba32Float;
+
+/// Owns a wgpu device and a renderer on it. Unlike [`Headless`](super::Headless) it gives access to the device and to every setter of a
+/// [`SceneView`].
+#[derive(Debug)]
+pub struct GpuHeadless {
+    adapter: Adapter,
+    device: Device,
+    queue: Queue,
+    renderer: Renderer,
+}
+
+impl GpuHeadless {
+    /// Opens a device and compiles the renderer, whatever backend the options name.
+    ///
+    /// # Errors
+    /// If there is no such adapter, it cannot open a device, or the device cannot run the renderer.
+    pub fn new(options: &HeadlessOptions) -> Result<Self, DeviceError> {
+        let adapter = device::choose_adapter(&device::adapters(), options.adapter.as_deref())?;
+        let requirements = options.requirements.clone().unwrap_or_else(|| DeviceRequirements::for_adapter(&adapter));
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("sheetsplat"),
+            required_features: requirements.features,
+            required_limits: requirements.limits,
+            ..wgpu::DeviceDescriptor::default()
+        }))
+        .map_err(|source| DeviceError::RequestDevice { adapter: adapter.get_info().name, source })?;
+        let renderer_options = RendererOptions {
+            sheet_format: options.sheet_format,
+            sheets_per_group: options.sheets_per_group,
+            rasterizer: options.rasterizer,
+            profile: options.profile,
+            blend: Blend::Replace,
+            ..RendererOptions::for_target(FORMAT)
+        };
+        let renderer = Renderer::new(&device, &queue, &renderer_options)?;
+        Ok(Self { adapter, device, queue, renderer })
+    }
+
+    /// The device.
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
+    /// The device's queue.
+    pub fn queue(&self) -> &Queue {
+        &self.queue
+    }
+
+    /// The renderer; its target format is `Rgba32Float`.
+    pub fn renderer(&self) -> &Renderer {
+        &self.renderer
+    }
+
+    /// Loads the scene's volume and renders it.
+    ///
+    /// # Errors
+    /// If the volume cannot be loaded, the scene needs more than the device or the renderer can do, or the device fails.
+    pub fn render(&self, scene: &Scene) -> Result<Rendering, Error> {
+        load_and_render(scene, |volume| self.render_volume(volume, scene))
+    }
+
+    /// Renders a volume that is already in memory. The scene's own volume is ignored.
+    ///
+    /// # Errors
+    /// If the scene needs more than the device or the renderer can do, or the device fails.
+    pub fn render_volume(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Rendering, RenderError> {
+        view_and_draw(|| self.view(volume, scene), |view| self.draw(view))
+    }
+
+    /// A view of a volume with a scene's settings, for any number of frames and changes. The scene's own volume is ignored.
+    ///
+    /// # Errors
+    /// If the volume is larger than the device's textures, or the device fails.
+    pub fn view(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<SceneView, RenderError> {
+        // Without a submission wgpu would keep its copies of the volume until the first frame.
+        let submit = || {
+            self.queue.submit([]);
+        };
+        let volume = GpuVolume::new_in_chunks(&self.device, &self.queue, volume, &submit)?;
+        SceneView::new(&self.device, &volume, scene)
+    }
+
+    /// Draws one frame of a view and reads it back.
+    ///
+    /// # Errors
+    /// If the view needs more than the device or the renderer can do, or the device fails.
+    pub fn draw(&self, view: &mut SceneView) -> Result<Rendering, RenderError> {
+        scoped(&self.device, || self.draw_unscoped(view))?
+    }
+
+    /// The first hit at a pixel of the last frame drawn, with pixels counted from the upper left; `None` where the ray does not reach the
+    /// opacity of [`SceneView::set_first_hit`].
+    ///
+    /// # Errors
+    /// If the frame has no first hits, the pixel lies outside the image, or the device fails.
+    pub fn pick(&self, view: &SceneView, pixel: [u32; 2]) -> Result<Option<Pick>, RenderError> {
+        scoped(&self.device, || {
+            let descriptor = wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.pick") };
+            let mut encoder = self.device.create_command_encoder(&descriptor);
+            let Some(mut pending) = view.pick(&self.device, &mut encoder, pixel) else {
+                return Err(Pick::missing(pixel, &view.scene().image).into());
+            };
+            self.queue.submit([encoder.finish()]);
+            // The first call requests the pick; after waiting it has arrived.
+            let early = pending.try_get();
+            wait(&self.device)?;
+            let missing = || Err(RenderError::Readback("the pick did not arrive".to_owned()));
+            early.or_else(|| pending.try_get()).unwrap_or_else(missing)
+        })?
+    }
+
+    fn draw_unscoped(&self, scene_view: &mut SceneView) -> Result<Rendering, RenderError> {
+        let start = Instant::now();
+        self.renderer.prepare(&self.device, &self.queue, scene_view)?;
+        let prepare_ms = milliseconds_since(start);
+
+        let start = Instant::now();
+        let ImageSettings { width, height, .. } = scene_view.scene().image;
+        let target = self.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("sheetsplat.target"),
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: FORMAT,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        let view = target.create_view(&wgpu::TextureViewDescriptor::default());
+        let mut encoder =
+            self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.frame") });
+        self.renderer.record(&mut encoder, scene_view);
+        self.renderer.present(&mut encoder, scene_view, &view, Placement::whole([width, height]))?;
+        self.queue.submit([encoder.finish()]);
+        let counts = scene_view.counts();
+        let bytes = readback::texture(&self.device, &self.queue, &target)?;
+        let frame_ms = milliseconds_since(start);
+
+        let info = self.adapter.get_info();
+        // The image arrived after the counts.
+        let missing = || Err(RenderError::Readback("the frame's counts did not arrive".to_owned()));
+        let (counts, stages_ms) = counts.and_then(|counts| counts.try_get()).unwrap_or_else(missing)?;
+        Ok(Rendering {
+            image: Image { width, height, pixels: bytemuck::pod_collect_to_vec(&bytes) },
+            stats: Stats {
+                driver: driver_name(&info),
+                adapter: info.name,
+                backend: Backend::Gpu.name().to_owned(),
+                api: info.backend.to_str().to_owned(),
+                width,
+                height,
+                counts,
+                rasterizer: scene_view.rasterizer().unwrap_or_default().to_owned(),
+                stages_ms,
+                gpu_bytes: scene_view.gpu_bytes() + target.width() as u64 * u64::from(height) * 16,
+                load_ms: 0.0,
+                prepare_ms,
+                frame_ms,
+            },
+        })
+    }
+}
+
+impl Drop for GpuHeadless {
+    fn drop(&mut self) {
+        // A software driver's threads must end before the process's memory is freed.
+        let _ = wait(&self.device);
+    }
+}
+
+/// Waits until everything submitted is done.
+///
+/// # Errors
+/// If the device is lost.
+pub(super) fn wait(device: &Device) -> Result<(), RenderError> {
+    // wgpu panics where the driver loses the device meanwhile.
+    match catch_unwind(AssertUnwindSafe(|| device.poll(wgpu::PollType::wait_indefinitely()))) {
+        Ok(Ok(_)) => Ok(()),
+        Ok(Err(error)) => Err(RenderError::Readback(error.to_string())),
+        Err(_) => Err(DeviceFault::Lost.into()),
+    }
+}

@@ -1,0 +1,92 @@
+//! Views by the f64 evaluation.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::{Backend, Rendering, milliseconds_since};
+use crate::error::RenderError;
+use crate::geometry::view_geometry::ViewGeometry;
+use crate::pick::{FirstHits, Pick};
+use crate::reference::{self, Host};
+use crate::scene::Scene;
+use crate::setting_error::SettingError;
+use crate::settings::camera::Camera;
+use crate::settings::splatting::check_first_hit;
+use crate::settings::transfer_function::TransferFunction;
+use crate::stats::Stats;
+use crate::volume::Volume;
+
+/// A view of a volume, drawn in f64 with nothing culled.
+#[derive(Clone, Debug)]
+pub(super) struct ReferenceView {
+    volume: Arc<Volume>,
+    scene: Scene,
+    transfer: TransferFunction,
+    first_hit: Option<f64>,
+    hits: Option<FirstHits>,
+}
+
+impl ReferenceView {
+    /// # Errors
+    /// If a setting of the scene is invalid, or the volume lacks what the transfer function needs.
+    pub(super) fn new(volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Self, RenderError> {
+        let volume = volume.into();
+        scene.check()?;
+        scene.transfer.check_volume(&volume)?;
+        let transfer = scene.transfer.resolve(&volume);
+        Ok(Self { volume, scene: scene.clone(), transfer, first_hit: None, hits: None })
+    }
+
+    pub(super) fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    pub(super) fn set_camera(&mut self, camera: Camera) -> Result<(), SettingError> {
+        camera.check()?;
+        self.scene.camera = camera;
+        Ok(())
+    }
+
+    pub(super) fn set_first_hit(&mut self, opacity: Option<f64>) -> Result<(), SettingError> {
+        opacity.map_or(Ok(()), check_first_hit)?;
+        self.first_hit = opacity;
+        Ok(())
+    }
+
+    pub(super) fn pick(&self, pixel: [u32; 2]) -> Result<Option<Pick>, SettingError> {
+        FirstHits::pick(self.hits.as_ref(), &self.volume, pixel, &self.scene.image)
+    }
+
+    pub(super) fn draw(&mut self) -> Result<Rendering, RenderError> {
+        let start = Instant::now();
+        let Self { volume, scene, transfer, first_hit, .. } = self;
+        if first_hit.is_some() {
+            scene.splatting.check_rays(!scene.clip.is_empty(), *first_hit)?;
+        }
+        let host = Host { first_hit: *first_hit, ..Host::default() };
+        let drawn = reference::render_for(host, volume, transfer, scene, None)?;
+        let image = drawn.image;
+        if first_hit.is_some() {
+            let framed = scene.framed(volume, transfer);
+            let grid = volume.grid();
+            let view = ViewGeometry::new(grid, &framed.camera, &framed.splatting, [image.width, image.height])?;
+            let depths = drawn.first_hits.iter().map(|depth| (depth * grid.unit()) as f32).collect();
+            self.hits = Some(FirstHits { view, depths });
+        } else {
+            self.hits = None;
+        }
+        let stats = Stats {
+            adapter: "CPU".to_owned(),
+            driver: "f64".to_owned(),
+            backend: Backend::Reference.name().to_owned(),
+            api: "none".to_owned(),
+            rasterizer: Backend::Reference.name().to_owned(),
+            width: image.width,
+            height: image.height,
+            frame_ms: milliseconds_since(start),
+            counts: reference::count(&self.volume, &self.transfer, &self.scene)?,
+            ..Stats::default()
+        };
+        Ok(Rendering { image, stats })
+    }
+}

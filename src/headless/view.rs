@@ -1,0 +1,107 @@
+//! A view of a volume that any backend can draw.
+
+#[cfg(any(feature = "gpu", feature = "cpu"))]
+use super::Backend;
+use super::reference::ReferenceView;
+#[cfg(feature = "cpu")]
+use crate::cpu::CpuRenderer;
+#[cfg(feature = "gpu")]
+use crate::renderer::scene_view::SceneView;
+use crate::scene::Scene;
+use crate::setting_error::{Interval, SettingError};
+use crate::settings::camera::Camera;
+
+/// A view of a volume for any number of frames, made by [`Headless::view`](super::Headless::view). Frames share the sorted lists.
+#[derive(Debug)]
+pub struct HeadlessView {
+    backend: ViewBackend,
+}
+
+/// The view of the backend that made it.
+#[derive(Debug)]
+pub(super) enum ViewBackend {
+    #[cfg(feature = "gpu")]
+    Gpu(Box<SceneView>),
+    #[cfg(feature = "cpu")]
+    Cpu(Box<CpuRenderer>),
+    Reference(Box<ReferenceView>),
+}
+
+#[cfg(any(feature = "gpu", feature = "cpu"))]
+impl ViewBackend {
+    pub(super) fn backend(&self) -> Backend {
+        match self {
+            #[cfg(feature = "gpu")]
+            Self::Gpu(_) => Backend::Gpu,
+            #[cfg(feature = "cpu")]
+            Self::Cpu(_) => Backend::Cpu,
+            Self::Reference(_) => Backend::Reference,
+        }
+    }
+}
+
+impl HeadlessView {
+    pub(super) fn new(backend: ViewBackend) -> Self {
+        Self { backend }
+    }
+
+    pub(super) fn backend_ref(&self) -> &ViewBackend {
+        &self.backend
+    }
+
+    pub(super) fn backend_mut(&mut self) -> &mut ViewBackend {
+        &mut self.backend
+    }
+
+    /// The settings.
+    pub fn scene(&self) -> &Scene {
+        match &self.backend {
+            #[cfg(feature = "gpu")]
+            ViewBackend::Gpu(view) => view.scene(),
+            #[cfg(feature = "cpu")]
+            ViewBackend::Cpu(view) => view.scene(),
+            ViewBackend::Reference(view) => view.scene(),
+        }
+    }
+
+    /// Changes the camera.
+    ///
+    /// # Errors
+    /// If a setting is not allowed; then nothing changes.
+    pub fn set_camera(&mut self, camera: Camera) -> Result<(), SettingError> {
+        match &mut self.backend {
+            #[cfg(feature = "gpu")]
+            ViewBackend::Gpu(view) => view.set_camera(camera),
+            #[cfg(feature = "cpu")]
+            ViewBackend::Cpu(view) => view.set_camera(camera),
+            ViewBackend::Reference(view) => view.set_camera(camera),
+        }
+    }
+
+    /// Turns the camera about its `up` by an angle in degrees, by the right hand.
+    ///
+    /// # Errors
+    /// If the angle is not finite; then nothing changes.
+    pub fn turn(&mut self, degrees: f64) -> Result<(), SettingError> {
+        Interval::FINITE.check("degrees", degrees)?;
+        self.set_camera(self.scene().camera.turned(degrees))
+    }
+
+    /// Records, for [`Headless::pick`](super::Headless::pick), the depth at which each pixel's opacity reaches a value in (0, 1]; `None` records
+    /// no depth. It needs front-to-back order and, with culling, at most
+    /// [`Splatting::opacity_threshold`](crate::settings::Splatting::opacity_threshold).
+    /// [`Compositing::Minimum`](crate::settings::Compositing::Minimum) has no first hits; for
+    /// [`Compositing::Surface`](crate::settings::Compositing::Surface) the depth is the surface's, whatever the value.
+    ///
+    /// # Errors
+    /// If the value is not in (0, 1]; then nothing changes.
+    pub fn set_first_hit(&mut self, opacity: Option<f64>) -> Result<(), SettingError> {
+        match &mut self.backend {
+            #[cfg(feature = "gpu")]
+            ViewBackend::Gpu(view) => view.set_first_hit(opacity),
+            #[cfg(feature = "cpu")]
+            ViewBackend::Cpu(view) => view.set_first_hit(opacity),
+            ViewBackend::Reference(view) => view.set_first_hit(opacity),
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! Picking: the first point that is visible at a pixel.
+
+use glam::{DVec2, DVec3, UVec3};
+
+use crate::geometry::view_geometry::ViewGeometry;
+use crate::scene::ImageSettings;
+use crate::setting_error::SettingError;
+use crate::volume::Volume;
+
+/// A point of a volume.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Pick {
+    /// The position in world units from the volume's centre.
+    pub position: DVec3,
+    /// The depth along the camera's direction in world units, from the eye or, orthographic, from the camera's centre.
+    pub depth: f64,
+    /// The nearest voxel.
+    pub voxel: UVec3,
+    /// That voxel's value, NaN in a hole.
+    pub value: f32,
+    /// That voxel's label, if the volume is segmented.
+    pub label: Option<u16>,
+}
+
+impl Pick {
+    /// The point at a depth of a pixel's ray.
+    pub(crate) fn at(view: &ViewGeometry, volume: &Volume, pixel: [u32; 2], depth: f64) -> Self {
+        let grid = volume.grid();
+        let place = DVec2::from(pixel.map(f64::from)) + 0.5 - DVec2::from(view.size.map(f64::from)) / 2.0;
+        let position = view.rays().at(place, depth / grid.unit()) * grid.unit();
+        let last = grid.dims.as_dvec3() - 1.0;
+        let voxel = (position / grid.spacing + grid.center()).round().clamp(DVec3::ZERO, last).as_uvec3();
+        let index = grid.index_of(voxel);
+        let (value, label) = (volume.values()[index as usize], volume.label(index));
+        Self { position, depth, voxel, value, label }
+    }
+
+    /// The error of a pick that no first hit answers: none were requested, or the pixel lies off the image.
+    pub(crate) fn missing(pixel: [u32; 2], image: &ImageSettings) -> SettingError {
+        let ImageSettings { width, height, .. } = image;
+        SettingError::new(
+            "pick",
+            format!("{pixel:?}"),
+            format!("a pixel of {width}×{height}, in a frame with first hits"),
+        )
+    }
+}
+
+/// The first hits of a frame that was drawn without a GPU.
+#[derive(Clone, Debug)]
+pub(crate) struct FirstHits {
+    /// What it was seen by.
+    pub(crate) view: ViewGeometry,
+    /// For every pixel, row by row, the depth in world units; infinite where the opacity is not reached.
+    pub(crate) depths: Vec<f32>,
+}
+
+impl FirstHits {
+    /// What a frame shows first at a pixel.
+    ///
+    /// # Errors
+    /// If it has no first hits, or the pixel is off the image.
+    pub(crate) fn pick(
+        hits: Option<&Self>,
+        volume: &Volume,
+        pixel: [u32; 2],
+        image: &ImageSettings,
+    ) -> Result<Option<Pick>, SettingError> {
+        let depth_at = |hits: &Self| {
+            let [width, height] = hits.view.size;
+            let is_inside = pixel[0] < width && pixel[1] < height;
+            is_inside.then(|| (hits.view, hits.depths[pixel[1] as usize * width as usize + pixel[0] as usize]))
+        };
+        let Some((view, depth)) = hits.and_then(depth_at) else { return Err(Pick::missing(pixel, image)) };
+        Ok(depth.is_finite().then(|| Pick::at(&view, volume, pixel, depth.into())))
+    }
+}
