@@ -102,6 +102,7 @@
 //! that take part · *label* the number of the segment that a voxel of a segmented volume belongs to
 //! ([`Volume::labels`]) · *brick* 4×4×4 neighbouring voxels · *tile* a square of 32×32 pixels.
 
+mod after;
 pub mod appearance;
 #[cfg(feature = "cpu")]
 pub mod cpu;
@@ -170,6 +171,11 @@ pub mod internals {
     pub use crate::settings::camera::{Eye, ViewBasis};
     pub use crate::settings::clip::ClippedVoxels;
     pub use crate::settings::shading::MIN_GRADIENT;
+
+    /// Classification after splatting.
+    pub mod after {
+        pub use crate::after::*;
+    }
 
     /// What the passes share.
     #[cfg(feature = "gpu")]

@@ -116,6 +116,12 @@ impl ValueSet {
         &self.ranges
     }
 
+    /// Whether any value from `min` to `max` is in the set.
+    pub fn meets(&self, min: f32, max: f32) -> bool {
+        let (first, last) = (ordinal(min), ordinal(max));
+        self.ranges.iter().any(|range| range.start <= last && first < range.end)
+    }
+
     /// Whether a value is in the set.
     pub fn contains(&self, value: f32) -> bool {
         let at = ordinal(value);

@@ -1,0 +1,136 @@
+//! Which bricks may be drawn where values are classified after splatting (SPEC §9).
+//!
+//! A point's value is a mean of the coefficients within a kernel of it, so a voxel bears on values that lie between the extremes of all
+//! coefficients within two kernels of it; and a slab's values lie between those of its two planes. So a brick whose coefficients all around, within
+//! two kernels and a slab, have no opacity at any value between them can be left out: every slab that it bears on stays transparent without it, whatever the
+//! values that the others then give there. That test needs the extremes alone, which no change of the transfer function changes.
+
+use glam::UVec3;
+use rayon::prelude::*;
+
+use crate::lists::iso_range::ValueSet;
+use crate::settings::transfer_function::TransferFunction;
+use crate::volume::{Grid, Volume};
+
+/// Side of a brick, voxels.
+const SIDE: u32 = 4;
+
+/// The least and the greatest coefficient around every brick of a grid, bricks in memory order; holes are passed over.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BrickRanges {
+    grid: Grid,
+    ranges: Vec<[f32; 2]>,
+}
+
+impl BrickRanges {
+    /// Those of all voxels within `reach` of a brick along each axis.
+    pub fn new(grid: &Grid, coefficients: &[f32], reach: UVec3) -> Self {
+        let [nx, ny, nz] = grid.dims.to_array().map(|n| n as usize);
+        let bricks = grid.dims.map(|n| n.div_ceil(SIDE)).to_array().map(|n| n as usize);
+        let [rx, ry, rz] = reach.to_array().map(|n| n as usize);
+        // One axis after the other: the extremes over boxes are those over lines, of lines, of lines.
+        let along_x: Vec<[f32; 2]> = (coefficients.par_chunks(nx))
+            .flat_map_iter(|row| {
+                around(nx, rx).map(|range| row[range].iter().fold(EMPTY, |ends, &c| with(ends, [c; 2])))
+            })
+            .collect();
+        let along_y = strided(&along_x, bricks[0], ny, ry);
+        let along_z = strided(&along_y, bricks[0] * bricks[1], nz, rz);
+        Self { grid: *grid, ranges: along_z }
+    }
+
+    /// Whether each brick may be drawn.
+    pub fn shown(&self, volume: &Volume, transfer: &TransferFunction) -> Vec<bool> {
+        let labels = volume.labels().map(|_| transfer.labels.keys()).into_iter().flatten();
+        let tables = labels.map(|&label| transfer.tables(Some(label))).chain([transfer.tables(None)]);
+        let values = tables.fold(ValueSet::default(), |all, tables| all.union(&ValueSet::of_tables(&tables)));
+        self.ranges.par_iter().map(|&[min, max]| min <= max && values.meets(min, max)).collect()
+    }
+
+    /// The voxels of the bricks of a kind, holes left out, in memory order.
+    pub fn voxels(&self, volume: &Volume, is_wanted: impl Fn(usize) -> bool + Sync) -> Vec<u32> {
+        let (dims, values) = (self.grid.dims, volume.values());
+        let bricks = dims.map(|n| n.div_ceil(SIDE));
+        let row = |at: u32| {
+            let (y, z) = (at % dims.y, at / dims.y);
+            let first = bricks.x * (y / SIDE + bricks.y * (z / SIDE));
+            let is_wanted = &is_wanted;
+            let wanted = (0..bricks.x).filter(move |x| is_wanted((first + x) as usize));
+            let voxels = wanted.flat_map(move |x| x * SIDE..((x + 1) * SIDE).min(dims.x)).map(move |x| at * dims.x + x);
+            voxels.filter(move |&voxel| !values[voxel as usize].is_nan()).collect::<Vec<u32>>()
+        };
+        (0..dims.y * dims.z).into_par_iter().map(row).collect::<Vec<_>>().concat()
+    }
+}
+
+const EMPTY: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
+
+/// NaN is passed over.
+fn with([min, max]: [f32; 2], [other_min, other_max]: [f32; 2]) -> [f32; 2] {
+    [min.min(other_min), max.max(other_max)]
+}
+
+/// What lies within `reach` of each brick along an axis.
+fn around(count: usize, reach: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
+    let side = SIDE as usize;
+    (0..count).step_by(side).map(move |first| first.saturating_sub(reach)..(first + side + reach).min(count))
+}
+
+/// The extremes along an axis whose steps are `stride` apart, of `count` steps in a row.
+fn strided(ends: &[[f32; 2]], stride: usize, count: usize, reach: usize) -> Vec<[f32; 2]> {
+    let block = |block: &[[f32; 2]]| {
+        around(count, reach)
+            .flat_map(|range| {
+                (0..stride)
+                    .map(|at| range.clone().fold(EMPTY, |ends, step| with(ends, block[step * stride + at])))
+                    .collect::<Vec<_>>()
+            })
+            .collect::<Vec<_>>()
+    };
+    ends.par_chunks(stride * count).flat_map_iter(block).collect()
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::settings::transfer_function::Ramp;
+
+    #[test]
+    fn extremes_are_those_of_all_voxels_around() {
+        let grid = Grid { dims: UVec3::new(13, 6, 9), spacing: DVec3::ONE };
+        let value =
+            |index: u32| if index % 29 == 3 { f32::NAN } else { (index.wrapping_mul(2_654_435_761) >> 20) as f32 };
+        let values: Vec<f32> = (0..grid.dims.element_product()).map(value).collect();
+        let reach = UVec3::new(2, 5, 1);
+        let ours = BrickRanges::new(&grid, &values, reach);
+        let bricks = grid.dims.map(|n| n.div_ceil(SIDE));
+        assert_eq!(ours.ranges.len() as u32, bricks.element_product());
+        for (at, &ends) in (0..).zip(&ours.ranges) {
+            let first = UVec3::new(at % bricks.x, at / bricks.x % bricks.y, at / (bricks.x * bricks.y)) * SIDE;
+            let (low, high) = (first.saturating_sub(reach), (first + SIDE + reach).min(grid.dims));
+            let inside = |&index: &u32| {
+                let voxel = grid.voxel_at(index);
+                voxel.cmpge(low).all() && voxel.cmplt(high).all()
+            };
+            let found = (0..values.len() as u32).filter(inside).map(|index| values[index as usize]);
+            assert_eq!(ends, found.fold(EMPTY, |ends, value| with(ends, [value; 2])), "{at}");
+        }
+    }
+
+    /// A peak of opacity between the values of two voxels shows, though none of them has it.
+    #[test]
+    fn bricks_meet_opacities_between_values() {
+        let grid = Grid { dims: UVec3::new(24, 4, 4), spacing: DVec3::ONE };
+        let values = (0..384).map(|index| if index % 24 < 12 { 0.0 } else { 100.0 }).collect();
+        let volume = Volume::new("step", grid.dims, grid.spacing, values).unwrap();
+        let opacity = Ramp::new(vec![(49.0, 0.0), (50.0, 1.0), (51.0, 0.0)]).unwrap();
+        let transfer = TransferFunction::by_value(Ramp::new(vec![(0.0, DVec3::ONE)]).unwrap(), opacity);
+        let ranges = BrickRanges::new(&grid, volume.values(), UVec3::splat(5));
+        let shown = ranges.shown(&volume, &transfer);
+        assert_eq!(shown, [false, true, true, true, true, false]);
+        assert_eq!(ranges.voxels(&volume, |brick| shown[brick]).len(), 4 * 64);
+    }
+}

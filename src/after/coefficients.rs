@@ -1,0 +1,242 @@
+//! Coefficients whose field has every voxel's value at that voxel: `splatting.interpolation = "exact"` (SPEC §9).
+//!
+//! At voxel j the field is `Σ g(i-j)·c_i / N_j`, so the coefficients solve `G·c = N·v` with `G_ij = g(i-j)` over all voxels but holes. Kernels are
+//! cut off at a sphere; where its voxels form a cube, for radii above √3 and at most 2, G is a product of three matrices along the
+//! axes, each with three diagonals, and is solved along every line by two sweeps, forth and back: a recursive filter (Thomas's algorithm). With other
+//! radii, and around holes, conjugate gradients solve it. Either takes 4 bytes a voxel beside the result, conjugate gradients 16.
+
+use glam::{IVec3, UVec3};
+use rayon::prelude::*;
+
+use crate::error::RenderError;
+use crate::setting_error::SettingError;
+use crate::volume::Grid;
+
+/// How far the field may be from the values at the voxels, of the values' range; SPEC §9 asks for 1e-5.
+const TOLERANCE: f64 = 2e-6;
+
+/// Steps after which conjugate gradients are given up. Those that the settings allow take at most some 200.
+const MAX_STEPS: u32 = 2000;
+
+/// The radii at which a kernel holds the 27 voxels around its own and no others.
+const CUBE: std::ops::RangeInclusive<f64> = 1.732_050_807_568_878..=2.0;
+
+/// The coefficients of values on a grid; NaN at holes, where values are NaN. Calls `progress` with the share that is done.
+///
+/// # Errors
+/// If they are not found: rounding forbids it for values whose range is tiny against their size.
+pub fn exact(
+    grid: &Grid,
+    values: &[f32],
+    (radius, falloff): (f64, f64),
+    progress: &dyn Fn(f64),
+) -> Result<Vec<f32>, RenderError> {
+    let ends = values.iter().fold([f32::INFINITY, f32::NEG_INFINITY], |[min, max], &v| [min.min(v), max.max(v)]);
+    let [min, max] = ends.map(f64::from);
+    if radius <= 1.0 || min >= max || min > max {
+        // Each voxel is alone in its kernel, or there is one value, or none.
+        return Ok(values.to_vec());
+    }
+    // Coefficients of a constant are that constant, so the values may be moved to where rounding is least.
+    let middle = ((min + max) / 2.0) as f32;
+    let has_holes = values.iter().any(|value| value.is_nan());
+    let moved = if CUBE.contains(&radius) && !has_holes {
+        along_axes(grid.dims, values, middle, falloff, progress)
+    } else {
+        let tolerance = TOLERANCE * (max - min);
+        let moved = conjugate_gradients(grid, values, middle, &Taps::new(radius, falloff), tolerance, progress);
+        moved.ok_or_else(|| {
+            let (key, found) = ("splatting.interpolation", "\"exact\" for values that it does not converge for");
+            SettingError::new(key, found, "\"smooth\", or a larger splatting.falloff")
+        })?
+    };
+    Ok(moved.into_par_iter().zip(values).map(|(c, value)| if value.is_nan() { f32::NAN } else { c + middle }).collect())
+}
+
+/// The solution where G is a product: `N·v`, then one axis after the other.
+fn along_axes(dims: UVec3, values: &[f32], middle: f32, falloff: f64, progress: &dyn Fn(f64)) -> Vec<f32> {
+    let neighbour = libm::exp(-falloff);
+    let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
+    let filters = [nx, ny, nz].map(|n| Sweeps::new(n, neighbour));
+    let mut c: Vec<f32> = values.par_iter().map(|value| value - middle).collect();
+    // N is a product, too: each axis's rows can be multiplied by their sums right before they are solved.
+    c.par_chunks_mut(nx).for_each(|row| filters[0].solve(row, 1, 0));
+    progress(0.3);
+    c.par_chunks_mut(nx * ny).for_each(|slice| (0..nx).for_each(|x| filters[1].solve(slice, nx, x)));
+    progress(0.6);
+    // Lines along z go through all slices: a row of them at a time, copied together.
+    let rows: Vec<Vec<f32>> = (0..ny)
+        .into_par_iter()
+        .map(|y| {
+            let row = |z: usize| &c[(z * ny + y) * nx..][..nx];
+            let mut lines: Vec<f32> = (0..nz).flat_map(row).copied().collect();
+            (0..nx).for_each(|x| filters[2].solve(&mut lines, nx, x));
+            lines
+        })
+        .collect();
+    c.par_chunks_mut(nx).enumerate().for_each(|(at, row)| {
+        let (y, z) = (at % ny, at / ny);
+        row.copy_from_slice(&rows[y][z * nx..][..nx]);
+    });
+    progress(1.0);
+    c
+}
+
+/// Forth and back along a line: the solution of a system whose diagonal is 1 and whose two others are `neighbour`.
+struct Sweeps {
+    neighbour: f64,
+    /// What the matrix's rows sum to.
+    sums: Vec<f64>,
+    /// One over the diagonal after elimination.
+    pivots: Vec<f64>,
+}
+
+impl Sweeps {
+    fn new(count: usize, neighbour: f64) -> Self {
+        let sum = |at: usize| 1.0 + neighbour * (f64::from(u8::from(at > 0)) + f64::from(u8::from(at + 1 < count)));
+        let mut pivots = vec![1.0; count];
+        for at in 1..count {
+            pivots[at] = 1.0 / (1.0 - neighbour * neighbour * pivots[at - 1]);
+        }
+        Self { neighbour, sums: (0..count).map(sum).collect(), pivots }
+    }
+
+    /// Replaces every `stride`-th of the line's numbers, from `first` on.
+    fn solve(&self, line: &mut [f32], stride: usize, first: usize) {
+        let Self { neighbour, sums, pivots } = self;
+        let mut solved = Vec::with_capacity(sums.len());
+        let mut before = 0.0;
+        for (at, (sum, pivot)) in sums.iter().zip(pivots).enumerate() {
+            before = (sum * f64::from(line[first + at * stride]) - neighbour * before) * pivot;
+            solved.push(before);
+        }
+        let mut after = 0.0;
+        for at in (0..solved.len()).rev() {
+            after = solved[at] - neighbour * pivots[at] * after;
+            line[first + at * stride] = after as f32;
+        }
+    }
+}
+
+/// Hestenes and Stiefel's method (1952): G is symmetric, and the settings ensure that it is positive definite. `None` if it does not converge.
+fn conjugate_gradients(
+    grid: &Grid,
+    values: &[f32],
+    middle: f32,
+    taps: &Taps,
+    tolerance: f64,
+    progress: &dyn Fn(f64),
+) -> Option<Vec<f32>> {
+    let is_hole: Vec<bool> = values.par_iter().map(|value| value.is_nan()).collect();
+    let moved: Vec<f32> = values.par_iter().map(|value| if value.is_nan() { 0.0 } else { value - middle }).collect();
+    let present: Vec<f32> = is_hole.par_iter().map(|&is_hole| if is_hole { 0.0 } else { 1.0 }).collect();
+    let weights = taps.convolve(grid, &present, &is_hole);
+    let first = taps.convolve(grid, &moved, &is_hole);
+    let mut residual: Vec<f32> =
+        (weights.par_iter().zip(&moved).zip(&first)).map(|((weight, value), first)| weight * value - first).collect();
+    let mut c = moved;
+    let mut direction = residual.clone();
+    let mut squared = dot(&residual, &residual);
+    let error = |residual: &[f32]| {
+        let errors = residual.par_iter().zip(&weights).filter(|(_, weight)| **weight > 0.0);
+        f64::from(errors.map(|(residual, weight)| (residual / weight).abs()).reduce(|| 0.0, f32::max))
+    };
+    let begin = error(&residual).max(f64::MIN_POSITIVE);
+    for _ in 0..MAX_STEPS {
+        let left = error(&residual);
+        if left <= tolerance {
+            return Some(c);
+        }
+        // Errors fall by about the same factor with every step.
+        progress(((begin / left).ln() / (begin / tolerance).ln()).clamp(0.0, 1.0));
+        let image = taps.convolve(grid, &direction, &is_hole);
+        let step = squared / dot(&direction, &image);
+        c.par_iter_mut().zip(&direction).for_each(|(c, direction)| *c += step as f32 * direction);
+        residual.par_iter_mut().zip(&image).for_each(|(residual, image)| *residual -= step as f32 * image);
+        let before = std::mem::replace(&mut squared, dot(&residual, &residual));
+        let share = (squared / before) as f32;
+        direction
+            .par_iter_mut()
+            .zip(&residual)
+            .for_each(|(direction, residual)| *direction = residual + share * *direction);
+    }
+    None
+}
+
+/// In the same order in every run.
+fn dot(a: &[f32], b: &[f32]) -> f64 {
+    const CHUNK: usize = 1 << 16;
+    let of_chunk = |(a, b): (&[f32], &[f32])| a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum::<f64>();
+    a.par_chunks(CHUNK).zip(b.par_chunks(CHUNK)).map(of_chunk).collect::<Vec<f64>>().iter().sum()
+}
+
+/// The discrete kernel: offsets and weights.
+struct Taps(Vec<(IVec3, f32)>);
+
+impl Taps {
+    fn new(radius: f64, falloff: f64) -> Self {
+        let reach = radius.ceil() as i32;
+        let offsets = (-reach..=reach).flat_map(|z| (-reach..=reach).map(move |y| (y, z)));
+        let offsets = offsets.flat_map(|(y, z)| (-reach..=reach).map(move |x| IVec3::new(x, y, z)));
+        let weighted = offsets.map(|offset| (offset, offset.as_dvec3().length_squared()));
+        let within = weighted.filter(|(_, squared)| *squared < radius * radius);
+        Self(within.map(|(offset, squared)| (offset, libm::exp(-falloff * squared) as f32)).collect())
+    }
+
+    /// `G·c`, 0 at holes, where c is 0, too.
+    fn convolve(&self, grid: &Grid, c: &[f32], is_hole: &[bool]) -> Vec<f32> {
+        let dims = grid.dims.as_ivec3();
+        let [nx, ny] = [dims.x as usize, dims.y as usize];
+        let mut sums = vec![0.0_f32; c.len()];
+        sums.par_chunks_mut(nx).enumerate().for_each(|(row, sums)| {
+            let (y, z) = ((row % ny) as i32, (row / ny) as i32);
+            for &(offset, weight) in &self.0 {
+                let (from_y, from_z) = (y + offset.y, z + offset.z);
+                if !(0..dims.y).contains(&from_y) || !(0..dims.z).contains(&from_z) {
+                    continue;
+                }
+                let (first, end) = ((-offset.x).max(0), (dims.x - offset.x).min(dims.x));
+                if first >= end {
+                    continue;
+                }
+                let from = (from_z as usize * ny + from_y as usize) * nx;
+                let source = &c[from + (first + offset.x) as usize..from + (end + offset.x) as usize];
+                let target = &mut sums[first as usize..end as usize];
+                target.iter_mut().zip(source).for_each(|(sum, c)| *sum += weight * c);
+            }
+            sums.iter_mut().zip(&is_hole[row * nx..]).filter(|(_, is_hole)| **is_hole).for_each(|(sum, _)| *sum = 0.0);
+        });
+        sums
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::reference::after::coefficients::exact as twin;
+
+    /// By sweeps and by conjugate gradients, without holes and with them, in volumes as thin as a voxel too.
+    #[test]
+    fn coefficients_are_the_twins() {
+        for (dims, holes) in [([9, 8, 7], false), ([9, 8, 7], true), ([6, 1, 5], false), ([1, 1, 1], false)] {
+            let grid = Grid { dims: UVec3::from(dims), spacing: DVec3::ONE };
+            let value = |index: u32| match index * 7919 % 31 {
+                3 if holes => f32::NAN,
+                rest => 1000.0 + (rest * rest) as f32,
+            };
+            let values: Vec<f32> = (0..grid.dims.element_product()).map(value).collect();
+            for kernel in [(2.0, 2.0), (2.0, 1.0), (1.8, 1.0), (1.5, 2.0), (3.0, 1.5), (1.0, 2.0)] {
+                let ours = exact(&grid, &values, kernel, &|_| {}).unwrap();
+                let in_f64: Vec<f64> = values.iter().map(|&value| value.into()).collect();
+                let expected = twin(&grid, &in_f64, kernel.0, kernel.1).unwrap();
+                for (ours, expected) in ours.iter().zip(expected) {
+                    let same = ours.is_nan() && expected.is_nan() || (f64::from(*ours) - expected).abs() < 0.05;
+                    assert!(same, "{dims:?} {kernel:?}: {ours}, not {expected}");
+                }
+            }
+        }
+    }
+}

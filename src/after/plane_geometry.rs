@@ -1,0 +1,124 @@
+//! How kernels lie on the slab planes of a view, SPEC §9's low-pass rule among it.
+//!
+//! Within a plane the offset from a voxel to a pixel's point is affine in the pixel: `δ = A·(pixel - centre) + t·n`, with n the planes' normal in the grid, t the
+//! voxel's distance from the plane, and the centre where the voxel's nearest point of the plane is seen. All planes of a view share A's singular
+//! vectors, and its singular values grow in proportion to the depth from the eye: they are two numbers, which the low-pass rule caps at 1. So every
+//! kernel is a Gaussian of `(a, b, t)`, a and b being grid units along two axes that all planes share.
+
+use glam::{DMat2, DMat3, DVec2, DVec3, UVec3};
+
+use crate::geometry::view_geometry::ViewGeometry;
+use crate::volume::Grid;
+
+/// The planes of a view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlaneGeometry {
+    /// Unit vectors in the grid: two within planes, and the planes' normal, away from the eye.
+    pub axes: [DVec3; 3],
+    /// The pixel offset (x right, y down) of length 1 that the first axis belongs to; to the second this one turned, `(-y, x)`.
+    pub screen_axis: DVec2,
+    /// Grid units that a pixel is along the two axes; with an eye at depth 1 from it.
+    pub per_pixel: DVec2,
+    /// Grid units along the normal that sheet depth 1 is.
+    pub per_depth: f64,
+    /// By what a grid unit along the normal changes the products of the first, second and fourth row of
+    /// [`ViewGeometry::screen_from_voxel`].
+    pub step: DVec3,
+    grid: Grid,
+    radius: f64,
+    /// Sheet depth of the eye.
+    eye: Option<f64>,
+}
+
+impl PlaneGeometry {
+    /// The planes of an image-aligned view.
+    pub fn new(view: &ViewGeometry, grid: &Grid) -> Self {
+        let (basis, aspect) = (&view.basis, grid.aspect());
+        let (right, down) = (basis.u / aspect, -basis.v / aspect);
+        let (normal, scale, per_depth) = match &view.perspective {
+            None => ((basis.w / aspect).normalize(), view.pix, 1.0),
+            Some(perspective) => {
+                let along_w = basis.w * aspect;
+                (along_w.normalize(), perspective.eye.pixel_per_depth, along_w.length().recip())
+            }
+        };
+        let [right, down] = [right, down].map(|step| (step - step.dot(normal) * normal) * scale);
+        let (rr, rd, dd) = (right.dot(right), right.dot(down), down.dot(down));
+        // The eigenvectors of AᵀA are the right singular vectors.
+        let screen_axis = DVec2::from_angle(libm::atan2(rd, (rr - dd) / 2.0) / 2.0);
+        let images = DMat2::from_cols(screen_axis, screen_axis.perp());
+        let [first, second] = [images.x_axis, images.y_axis].map(|axis| right * axis.x + down * axis.y);
+        let rows = view.screen_from_voxel;
+        Self {
+            axes: [first.normalize(), second.normalize(), normal],
+            screen_axis,
+            per_pixel: DVec2::new(first.length(), second.length()),
+            per_depth,
+            step: DVec3::from([0, 1, 3].map(|row| rows[row].truncate().dot(normal))),
+            grid: *grid,
+            radius: view.radius,
+            eye: view.perspective.map(|_| view.slabs.origin),
+        }
+    }
+
+    /// The depth from the eye of a plane of such a sheet depth; 1 without an eye.
+    pub fn from_eye(&self, sheet_depth: f64) -> f64 {
+        self.eye.map_or(1.0, |eye| sheet_depth - eye)
+    }
+
+    /// Half the box, grid units, around the voxels whose kernels reach a point at a depth from the eye.
+    pub fn half_box(&self, from_eye: f64) -> DVec3 {
+        let mut widened = DMat3::IDENTITY;
+        for (axis, per_pixel) in self.axes.into_iter().zip((self.per_pixel * from_eye).to_array()) {
+            let outer = DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z);
+            widened += outer * (per_pixel.max(1.0) - 1.0);
+        }
+        self.radius * DVec3::new(widened.x_axis.length(), widened.y_axis.length(), widened.z_axis.length())
+    }
+
+    /// Half the screen box, pixels, around where kernels meet the plane of a sheet depth, seen from where their voxels are projected; infinite where that may be
+    /// anywhere. For voxels whose box reaches the image.
+    pub fn half_box_px(&self, sheet_depth: f64, size: [u32; 2]) -> DVec2 {
+        let from_eye = self.from_eye(sheet_depth);
+        let axis = self.screen_axis;
+        let reach = self.radius / (self.per_pixel * from_eye).min(DVec2::ONE);
+        let footprint = (axis * reach.x).abs() + (axis.perp() * reach.y).abs();
+        if self.eye.is_none() {
+            return footprint;
+        }
+        // A voxel t from the plane is projected to x where the nearest point of the plane is seen t·(step - x·step.z)/from_eye away.
+        let nearest = from_eye - self.radius * self.step.z;
+        if nearest < 1e-6 * from_eye {
+            return DVec2::INFINITY;
+        }
+        let half_image = DVec2::from(size.map(f64::from)) / 2.0 + footprint;
+        let step = self.step.truncate().abs();
+        let farthest = (half_image * from_eye + self.radius * step) / nearest;
+        footprint + self.radius * (step + farthest * self.step.z) / from_eye
+    }
+
+    /// How far from a brick voxels lie that bear on what it shows, whole voxels along each axis: two kernels, widened as on the farthest of the planes that meet the
+    /// volume, and a slab.
+    pub fn reach(&self, view: &ViewGeometry) -> UVec3 {
+        let center = self.grid.center();
+        let row = view.screen_from_voxel[2];
+        let farthest = row.dot(center.extend(1.0)) + row.truncate().abs().dot(center) + view.reach + view.slabs.width;
+        // Rounding must not lose a voxel.
+        let reach = 2.0 * self.half_box(self.from_eye(farthest)) + self.slab(view) + 1e-9;
+        reach.floor().min(DVec3::splat(f64::from(u32::MAX / 4))).as_uvec3()
+    }
+
+    /// The longest way from plane to plane on any pixel's ray, voxels along each axis.
+    fn slab(&self, view: &ViewGeometry) -> DVec3 {
+        let rays = view.rays();
+        let half = DVec2::from(view.size.map(f64::from)) / 2.0;
+        let corners = [DVec2::ONE, DVec2::NEG_X + DVec2::Y, DVec2::X + DVec2::NEG_Y, DVec2::NEG_ONE].map(|corner| {
+            let place = corner * half;
+            (rays.at(place, 1.0) - rays.at(place, 0.0)).abs()
+        });
+        let along = corners.into_iter().reduce(DVec3::max).unwrap_or_default();
+        let row = view.screen_from_voxel[2].truncate() / self.grid.aspect();
+        // Sheet depth per depth along w is the same on all rays.
+        along * (view.slabs.width / row.dot(view.basis.w)) / self.grid.aspect()
+    }
+}
