@@ -24,8 +24,8 @@ pub(super) struct Placed {
     /// Half the box that holds the box around any of its footprints, pixels.
     pub(super) half_box: [f32; 2],
     /// Pixels that footprints may touch: first and last column and row of tiles.
-    columns: [usize; 2],
-    rows: [usize; 2],
+    pub(super) columns: [usize; 2],
+    pub(super) rows: [usize; 2],
 }
 
 /// Columns and rows of tiles of an image.
