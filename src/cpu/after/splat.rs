@@ -69,23 +69,29 @@ pub(super) struct Splatter {
     per_plane: f32,
     gradient: Gradient,
     is_perspective: bool,
-    /// The part of ρ² that a row's offset alone makes sure of, by its square; of views without an eye.
+    /// The part of ρ² that a row's offset alone makes sure of, by its square; 0 with an eye.
     row_metric: f32,
 }
 
 impl Splatter {
     pub(super) fn new(placement: &Placement, falloff: f64, gradient: Gradient) -> Self {
-        let map = placement.map(0);
-        let (xx, xy) = (map.a.x * map.a.x + map.b.x * map.b.x, map.a.x * map.a.y + map.b.x * map.b.y);
-        let yy = map.a.y * map.a.y + map.b.y * map.b.y;
+        let is_perspective = placement.view.perspective.is_some();
+        let row_metric = if is_perspective {
+            0.0
+        } else {
+            let map = placement.map(0);
+            let (xx, xy) = (map.a.x * map.a.x + map.b.x * map.b.x, map.a.x * map.a.y + map.b.x * map.b.y);
+            let yy = map.a.y * map.a.y + map.b.y * map.b.y;
+            (yy - xy * xy / xx).max(0.0)
+        };
         Self {
             exponent: (-falloff * LOG2_E) as f32,
             radius_squared: (placement.view.radius * placement.view.radius) as f32,
             per_plane: placement.per_plane as f32,
             gradient,
-            is_perspective: placement.view.perspective.is_some(),
+            is_perspective,
             // A little less, for what f32 rounds.
-            row_metric: ((1.0 - 1e-5) * (yy - xy * xy / xx).max(0.0)) as f32,
+            row_metric: ((1.0 - 1e-5) * row_metric) as f32,
         }
     }
 
