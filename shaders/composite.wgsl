@@ -11,7 +11,7 @@
 @group(0) @binding(7) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(8) var<uniform> cut: Cut;
 @group(0) @binding(9) var surfaces: texture_depth_2d;
-// For every pixel the bits of its first hit's sheet depth; 0 if there is none.
+// For every pixel the bits of its first hit's sheet depth; 0 where the opacity has not been reached.
 @group(0) @binding(10) var<storage, read_write> hits: array<u32>;
 // For every tile the number of the last group that composited it.
 @group(0) @binding(11) var<storage, read_write> last_groups: array<u32>;

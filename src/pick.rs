@@ -35,7 +35,7 @@ impl Pick {
         Self { position, depth, voxel, value, label }
     }
 
-    /// Why there is none.
+    /// The error of a pick that no first hit answers: none were requested, or the pixel lies off the image.
     pub(crate) fn missing(pixel: [u32; 2], image: &ImageSettings) -> SettingError {
         let ImageSettings { width, height, .. } = image;
         SettingError::new(

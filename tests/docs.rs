@@ -131,3 +131,13 @@ fn the_readme_is_short() {
     let text = std::fs::read_to_string(root().join("README.md")).unwrap();
     assert!(text.lines().count() <= 200, "{} lines", text.lines().count());
 }
+
+/// A file that a reader can keep in mind.
+#[test]
+fn no_source_file_has_more_than_500_lines() {
+    let lines = |path: &PathBuf| std::fs::read_to_string(path).unwrap().lines().count();
+    let files = files(&["rs", "wgsl"]);
+    assert!(files.len() > 200, "{}", files.len());
+    let long: Vec<_> = files.iter().filter(|path| lines(path) > 500).collect();
+    assert!(long.is_empty(), "{long:?}");
+}

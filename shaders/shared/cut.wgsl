@@ -71,7 +71,7 @@ fn depth_along_ray(point_px: vec2f, sheet_depth: f32) -> f32 {
     return (sheet_depth - dot(cut.sheet_at.xyz, at)) / dot(cut.sheet_along.xyz, at);
 }
 
-// A first hit encoded in a word; 0 means that there is none.
+// The word that stores a first hit at a sheet depth. It is never 0, which stands for a pixel without a first hit.
 fn noted(sheet_depth: f32) -> u32 {
     return bitcast<u32>(select(sheet_depth, 1e-30, sheet_depth == 0.0));
 }

@@ -4,7 +4,7 @@
 //! narrow peaks off and loses the digits of short ranges, differences of large sums. Here the values are cut into cells at all control points and
 //! ends of iso-ranges, over which α and C are linear. Where a slab's values begin and end within a cell, two Gauss nodes integrate what
 //! lies between: exactly for products of linear functions, and for the logarithm of `exponential` to about 1e-5, as cells end where `1 - α` has
-//! fallen to [`RATIO`]. Whole cells between them come from a disjoint sparse table: for every block of 2, 4, 8, … cells it holds the sums from every cell to
+//! fallen to `RATIO`. Whole cells between them come from a disjoint sparse table: for every block of 2, 4, 8, … cells it holds the sums from every cell to
 //! the block's middle. Any run of cells is the sum of two such entries, nothing is subtracted, and a narrow peak keeps all its digits
 //! beside a wide plateau.
 //!
@@ -12,10 +12,10 @@
 //!
 //! | entries | hold |
 //! |---|---|
-//! | [`HEAD`] | (cells, bins, the least and the greatest number with an opacity); (the least number, bins per number, the greatest number, 0) |
+//! | `HEAD` | (cells, bins, the least and the greatest number with an opacity); (the least number, bins per number, the greatest number, 0) |
 //! | bins | (first cell, last cell, 0, 0) that a number in this bin may lie in |
-//! | cells · [`CELL`] | (least number, 1/width, α, α's rise over the cell); (C, greatest number); (C's rise, 0) |
-//! | levels · cells · [`SUM`] | (∫m, ∫m·(x - middle), middle, 0); (∫m·C, 0) between the cell and the middle of its block |
+//! | cells · `CELL` | (least number, 1/width, α, α's rise over the cell); (C, greatest number); (C's rise, 0) |
+//! | levels · cells · `SUM` | (∫m, ∫m·(x - middle), middle, 0); (∫m·C, 0) between the cell and the middle of its block |
 //!
 //! "Numbers" are values as [`Normalization`] scales them.
 

@@ -10,25 +10,25 @@ use super::sheets::{COLUMNS, ROWS};
 use crate::lists::brick;
 use crate::lists::brick::Brick;
 
-/// Pixels around footprints' boxes, and a part of them, for what f32 rounds.
+/// Slack around footprints' boxes for rounding in f32: pixels, and a fraction of the box.
 const SLACK: f64 = 0.02;
 const RELATIVE_SLACK: f64 = 1e-5;
 
-/// A brick in a view.
+/// A brick as a view sees it.
 #[derive(Clone, Debug)]
 pub(super) struct Placed {
     /// Its number in the list of bricks.
     pub(super) brick: u32,
     /// The first sheet that its kernels may reach.
     pub(super) first: i32,
-    /// Half the box that holds the box around any of its footprints, pixels.
+    /// Half the size of a box that contains the box around any of its footprints, pixels.
     pub(super) half_box: [f32; 2],
-    /// Pixels that footprints may touch: first and last column and row of tiles.
+    /// The tiles that its footprints may touch: the first and last column, and the first and last row.
     pub(super) columns: [usize; 2],
     pub(super) rows: [usize; 2],
 }
 
-/// Columns and rows of tiles of an image.
+/// The number of columns and rows of tiles in an image.
 pub(super) fn tile_grid(size: [u32; 2]) -> [usize; 2] {
     [(size[0] as usize).div_ceil(COLUMNS), (size[1] as usize).div_ceil(ROWS)]
 }
@@ -54,7 +54,7 @@ fn place_brick(number: u32, brick: &Brick, projection: &Projection, support: f64
     let tiles = |axis: usize, side: usize| {
         let low = (bounds.low - half_box - 0.5)[axis].max(0.0);
         let high = (bounds.high + half_box - 0.5)[axis].min(f64::from(view.size[axis]) - 1.0);
-        // Pixels' centres are at whole numbers here: from the next to the last.
+        // Pixel centres are at whole numbers here.
         (low <= high).then(|| [low as usize / side, high as usize / side])
     };
     let (columns, rows) = (tiles(0, COLUMNS)?, tiles(1, ROWS)?);

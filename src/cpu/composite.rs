@@ -9,21 +9,21 @@ use super::sheets::{Buffers, CHANNELS, COLUMNS, ROWS, STRIDE};
 use super::vector::{LANES, saturation};
 use crate::settings::splatting::{Compositing, Order};
 
-/// Eight pixels' red, green, blue and opacity.
+/// Red, green, blue and opacity of eight pixels.
 type Pixels<S> = [f32x8<S>; CHANNELS];
 
-/// How sheets meet the compositing buffer.
+/// The rule by which sheets are composited into the compositing buffer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Compositor {
     pub(super) compositing: Compositing,
     pub(super) order: Order,
-    /// The opacity from which a pixel is opaque, where opaque pixels hide what is behind them.
+    /// The opacity threshold of opaque pixels; `None` if nothing is culled.
     pub(super) threshold: Option<f32>,
-    /// The opacity whose depth is asked for.
+    /// The opacity whose depth is requested.
     pub(super) first_hit: Option<f32>,
 }
 
-/// Where a row of a sheet is: the sheet begins at `begin`.
+/// The position of a row of a sheet that begins at `begin`.
 struct SheetPlace<'a> {
     rays: &'a TileRays,
     row: usize,
@@ -45,9 +45,9 @@ impl Compositor {
         let Buffers { sheets, written, kept, acc, hits } = buffers;
         let filled = std::mem::take(&mut written[slot]);
         let mut rows = match self.compositing {
-            // What is kept of a surface that is not reached is the sheet right before.
+            // While no surface has been reached, the compositing buffer holds the previous sheet.
             Compositing::Surface => filled | std::mem::replace(kept, filled),
-            // What is empty counts, too.
+            // Empty pixels count too.
             Compositing::Minimum => u64::MAX >> (u64::BITS as usize - ROWS),
             _ => filled,
         };
@@ -73,7 +73,7 @@ impl Compositor {
         is_composited
     }
 
-    /// Composites a row; which of its pixels are opaque, if that matters.
+    /// Composites a row. Returns the bits of its opaque pixels, or 0 if nothing is culled.
     #[inline(always)]
     fn row<S: Simd>(
         &self,
@@ -149,13 +149,13 @@ impl Compositor {
                 let now = |channel: usize| is_below.select(sheet[channel], reached[channel]);
                 std::array::from_fn(|channel| is_reached.select(acc[channel], now(channel)))
             }
-            // What rounding leaves beyond full opacity must not count against anything.
+            // Opacity beyond 1 is a rounding error and must not hide another sheet.
             (_, Order::FrontToBack) => sum(acc, scaled(sheet, (one - acc[3]).max(zero))),
             (_, Order::BackToFront) => sum(sheet, scaled(acc, (one - sheet[3]).max(zero))),
         }
     }
 
-    /// A sheet where its opacity is larger, and of equal ones the nearer. All above 1 are equal, to the last bit.
+    /// Keeps a sheet where its opacity is larger, or equal and nearer. Opacities above 1 count as equal.
     #[inline(always)]
     fn kept<S: Simd>(&self, acc: Pixels<S>, sheet: Pixels<S>, opacity: f32x8<S>, one: f32x8<S>) -> Pixels<S> {
         let passes = match self.order {
@@ -167,7 +167,7 @@ impl Compositor {
         std::array::from_fn(|channel| passes.select(color[channel], acc[channel]))
     }
 
-    /// Where the opacity asked for is reached, of pixels where this sheet does it; the same as in `shaders/composite.wgsl`.
+    /// Notes where the requested opacity is reached for pixels that reach it in this sheet, as `shaders/composite.wgsl` does.
     #[inline(always)]
     fn hit<S: Simd>(
         &self,
@@ -181,7 +181,7 @@ impl Compositor {
         let opacity = f32x8::splat(simd, if is_surface { 1.0 } else { self.first_hit.unwrap_or(1.0) });
         let is_here = before.simd_lt(opacity) & after.simd_ge(opacity);
         let at = if is_surface {
-            // From the middle of the slab before.
+            // Counted from the middle of the previous slab.
             (crossing(before, sheet) + (begin - 0.5)).max(stretch[0]).min(stretch[1])
         } else {
             let [start, end] = within_slab(simd, stretch, begin);
@@ -191,7 +191,7 @@ impl Compositor {
     }
 }
 
-/// What a stretch has of the slab that begins at `begin`.
+/// The length of the part of a stretch that lies in the slab beginning at `begin`.
 #[inline(always)]
 fn within_slab<S: Simd>(simd: S, [start, end]: [f32x8<S>; 2], begin: f32) -> [f32x8<S>; 2] {
     [start.max(f32x8::splat(simd, begin)), end.min(f32x8::splat(simd, begin + 1.0))]

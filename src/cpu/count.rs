@@ -1,4 +1,4 @@
-//! What a frame drew, counted as SPEC §8 has it: tiles meet voxels again that others have drawn, and those count once.
+//! The counts of a frame (SPEC §8). Several tiles may draw the same voxel, which counts once.
 
 use std::ops::AddAssign;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::sheets::SECTIONS;
 use crate::geometry::view_geometry::ViewGeometry;
 
-/// What some tiles drew. Sums of whole numbers: the order of threads does not matter.
+/// The counts of some tiles. They are integers, so the order in which threads add them does not matter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Tally {
     pub(super) voxels_shaded: u64,
@@ -24,17 +24,17 @@ impl AddAssign for Tally {
     }
 }
 
-/// Which voxels any tile has shaded, and which of their sections any tile has drawn, [`SECTIONS`] at a time.
+/// Records which voxels any tile has shaded and which of their sections any tile has drawn, [`SECTIONS`] at a time.
 #[derive(Debug)]
 pub(super) struct Drawn {
     shaded: Vec<AtomicU64>,
     sections: Vec<AtomicU64>,
-    /// Of a voxel.
+    /// The number of bits for each voxel.
     parts: usize,
 }
 
 impl Drawn {
-    /// Nothing is drawn yet.
+    /// The record before any tile is drawn.
     pub(super) fn new(bricks: usize, view: &ViewGeometry) -> Self {
         let most_sheets = 2.0 * view.reach / view.slabs.width + 2.0;
         let parts = (most_sheets as usize).div_ceil(SECTIONS);
@@ -42,7 +42,7 @@ impl Drawn {
         Self { shaded: zeros(bricks), sections: zeros(bricks * parts), parts }
     }
 
-    /// Counts a voxel, given by brick and place, that is shaded.
+    /// Counts a shaded voxel, given by brick and slot.
     pub(super) fn shade(&self, [brick, slot]: [u32; 2], tally: &mut Tally) {
         tally.voxels_shaded += is_first(&self.shaded[brick as usize], slot);
     }
@@ -54,8 +54,8 @@ impl Drawn {
     }
 }
 
-/// Whether a bit was not set before: 1 or 0.
+/// Sets a bit. Returns 1 if it was not set before, else 0.
 fn is_first(bits: &AtomicU64, slot: u32) -> u64 {
-    // Most are, where voxels are drawn in one tile only; a look first would be for nothing.
+    // Most voxels are drawn by one tile only, so testing the bit first would not pay.
     u64::from(bits.fetch_or(1 << slot, Ordering::Relaxed) >> slot & 1 == 0)
 }

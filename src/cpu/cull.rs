@@ -3,7 +3,7 @@
 
 use super::sheets::{COLUMNS, ROWS};
 
-/// Levels of rows joined: 1, 2, 4, … of them.
+/// The number of levels of joined rows: 1, 2, 4, … rows.
 const LEVELS: usize = ROWS.ilog2() as usize + 1;
 
 /// The pixels of a tile that are not opaque yet.
@@ -21,7 +21,7 @@ pub(super) struct Pixels {
 }
 
 impl Pixels {
-    /// Those within a box around a point, given by its place among pixel centres, and half its extent.
+    /// The pixels within a box, given by its centre in pixel coordinates whose whole numbers are pixel centres, and half its size.
     pub(super) fn within(center: [f32; 2], half: [f32; 2]) -> Option<Self> {
         let of_axis = |axis: usize, count: usize| {
             let first = -floor(-(center[axis] - half[axis]));
@@ -49,17 +49,17 @@ impl OpenMask {
         mask
     }
 
-    /// Whether the columns of a row that have a bit are open.
+    /// The bits of the open columns of a row.
     pub(super) fn row(&self, row: usize) -> u32 {
         self.joined[0][row]
     }
 
-    /// Makes pixels of a row opaque. Others know of it after [`Self::join`].
+    /// Marks pixels of a row as opaque. [`Self::sees`] takes them into account after [`Self::join`].
     pub(super) fn close(&mut self, row: usize, opaque: u32) {
         self.joined[0][row] &= !opaque;
     }
 
-    /// Joins rows again.
+    /// Computes the joined rows again.
     pub(super) fn join(&mut self) {
         for level in 1..LEVELS {
             let step = 1 << (level - 1);
@@ -70,7 +70,7 @@ impl OpenMask {
         }
     }
 
-    /// Makes pixels opaque of which nothing shows.
+    /// Marks the pixels as opaque whose rays show nothing.
     pub(super) fn close_empty(&mut self, shown: &[[[f32; COLUMNS]; 2]]) {
         for (row, [start, end]) in shown.iter().enumerate() {
             let empty = (0..COLUMNS).filter(|&x| end[x] <= start[x]).fold(0, |bits, x| bits | 1 << x);

@@ -1,4 +1,4 @@
-//! What clip planes and the crop box leave of pixels' rays, and how those look at sheets; the same as `shaders/shared/cut.wgsl`.
+//! The parts of pixels' rays that clip planes and the crop box leave, and how rays meet sheets, as in `shaders/shared/cut.wgsl`.
 
 use std::ops::Range;
 
@@ -13,24 +13,24 @@ use crate::volume::Grid;
 /// A number for every pixel of a tile, by row.
 type PixelValues = Vec<[f32; COLUMNS]>;
 
-/// How a frame's pixels look at sheets.
+/// How the rays of a frame's pixels meet sheets.
 #[derive(Clone, Debug)]
 pub(super) struct RayMode {
     pub(super) rays: PixelRays,
-    /// What is kept, where anything is cut away.
+    /// The half spaces that are kept; `None` if nothing is cut.
     kept: Option<Vec<HalfSpace>>,
     means: Option<Means>,
 }
 
-/// How the pixels of a tile look at sheets, by row; slabs are counted from `base` on.
+/// How the rays of a tile's pixels meet sheets, by row. Slabs are counted from `base`.
 #[derive(Clone, Debug, Default)]
 pub(super) struct TileRays {
     base: i32,
-    /// Where the stretches of rays that show start and end, where anything is cut away; empty where nothing shows.
+    /// The start and end of each ray's visible stretch, empty if the ray shows nothing; `None` if nothing is cut.
     pub(super) shown: Option<Vec<[[f32; COLUMNS]; 2]>>,
-    /// What sheets are multiplied by to be means.
+    /// The factors that turn sheets into means; `None` if they are not needed.
     pub(super) weights: Option<PixelValues>,
-    /// From where to where the middles of slabs lie that count, where not all do.
+    /// The range of the middles of slabs that count; `None` if all do.
     pub(super) counted: Option<Vec<[[f32; COLUMNS]; 2]>>,
 }
 
@@ -44,17 +44,17 @@ impl RayMode {
         }
     }
 
-    /// What lies within some half spaces shows.
+    /// Only the parts of rays within some half spaces show.
     pub(super) fn within(view: &ViewGeometry, grid: &Grid, kept: Vec<HalfSpace>) -> Self {
         Self { rays: PixelRays::new(view, grid), kept: Some(kept), means: None }
     }
 
-    /// The depths at which a ray shows something.
+    /// The range of depths at which a ray shows something.
     fn shown(&self, ray: &PixelRay) -> Range<f64> {
         ray.inside(self.kept.as_deref().unwrap_or_default())
     }
 
-    /// How the pixels of a tile look at sheets, given its first pixel.
+    /// How the rays of a tile's pixels meet sheets; `origin` is the tile's first pixel.
     pub(super) fn of_tile(&self, origin: [usize; 2], base: i32) -> TileRays {
         let from_base = |slabs: [f64; 2]| slabs.map(|slab| (slab - f64::from(base)) as f32);
         let ends = |of: &dyn Fn(&PixelRay) -> [f64; 2]| {

@@ -1,10 +1,10 @@
-//! The depths at which an opacity is reached (a first hit); the same as `shaders/first_hit.wgsl`.
+//! The depths at which an opacity is reached (first hits), as in `shaders/first_hit.wgsl`.
 
 use super::cut::TileRays;
 use super::ray::PixelRays;
 use super::sheets::Buffers;
 
-/// Those of a tile's pixels, row by row: world units along the view direction, from the eye; orthographic from the plane through the camera's
+/// The first hits of a tile's pixels, row by row: world units along the view direction, from the eye; orthographic from the plane through the camera's
 /// centre. Infinite where the opacity is not reached.
 pub(super) fn depths(buffers: &Buffers, tile: &TileRays, rays: &PixelRays, origin: [usize; 2], unit: f64) -> Vec<f32> {
     let pixels =

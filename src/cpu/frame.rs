@@ -1,4 +1,4 @@
-//! What a frame's tiles share, and the frame: rows of tiles on all cores.
+//! A frame: the data that its tiles share, and its rows of tiles drawn on all cores.
 
 use std::ops::Range;
 
@@ -29,7 +29,7 @@ use crate::settings::transfer_function::TransferFunction;
 use crate::stats::Counts;
 use crate::volume::Volume;
 
-/// Everything that decides a tile.
+/// The data that all tiles of a frame share.
 #[derive(Debug)]
 pub(super) struct Frame<'a> {
     pub(super) volume: &'a Volume,
@@ -41,20 +41,20 @@ pub(super) struct Frame<'a> {
     pub(super) compositor: Compositor,
     pub(super) rays: RayMode,
     pub(super) drawn: Drawn,
-    /// Whether voxels are composited one by one.
+    /// True if voxels are composited one by one.
     pub(super) is_each: bool,
-    /// The sheets that count though they may hold nothing.
+    /// The sheets that count even where they are empty.
     pub(super) counted: Range<i32>,
-    /// Those from the first to the last that any kernel touches.
+    /// The sheets from the first to the last that any kernel touches.
     pub(super) touched: Range<i32>,
-    /// The low-pass rule's, where it is the same for all sections.
+    /// The amplitude of the low-pass rule if it is the same for all sections, else 1.
     pub(super) amplitude: f64,
     support: f64,
     resolver: Resolver,
     overlaps: Overlaps,
 }
 
-/// What a frame is.
+/// A drawn frame.
 #[derive(Clone, Debug)]
 pub(super) struct Drawing {
     pub(super) image: Image,
@@ -81,13 +81,13 @@ impl<'a> Frame<'a> {
         let metric = [right.length_squared(), 2.0 * right.dot(down), down.length_squared()];
         let is_each = splatting.method == Method::CompositeEverySample;
         let can_hide = splatting.compositing.hides() && splatting.order == Order::FrontToBack && !is_each;
-        // What is kept of a surface that is not reached yet is no opacity.
+        // While no surface has been reached, the compositing buffer holds a mean, not an opacity: only a surface, whose opacity is 1, hides anything.
         let threshold = if splatting.compositing == Compositing::Surface { 1.0 } else { splatting.opacity_threshold };
         let splatter = Splatter {
             kernel: KernelTables::new(&kernel),
             radius: splatting.radius as f32,
             metric: metric.map(|coefficient| coefficient as f32),
-            // A little less, for what f32 rounds.
+            // Slightly smaller, because f32 rounds.
             row_metric: ((1.0 - 1e-5) * (metric[2] - metric[1] * metric[1] / (4.0 * metric[0])).max(0.0)) as f32,
             half_box: view.footprint.half_box(kernel.support()).to_array().map(|half| half as f32),
             pixel_per_depth: view.perspective.map(|perspective| perspective.eye.pixel_per_depth as f32),
@@ -135,7 +135,7 @@ impl<'a> Frame<'a> {
             || TileWalk::new(self),
             |walk, origin, bricks| dispatch!(level, simd => self.draw_tile(simd, walk, origin, &placed, bricks)),
         );
-        // Composited one by one, voxels have no sheets.
+        // There are no sheets where voxels are composited one by one.
         let sheets = if self.is_each { 0 } else { self.touched.len() as u64 };
         let counts = Counts {
             voxels_total: self.volume.values().len() as u64,
@@ -152,7 +152,7 @@ impl<'a> Frame<'a> {
         Drawing { image: Image { width, height, pixels }, counts, first_hits }
     }
 
-    /// A tile, all of its rows and columns.
+    /// Draws a tile, including rows and columns outside the image.
     #[inline(always)]
     fn draw_tile<S: Simd>(
         &self,
@@ -172,19 +172,19 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// A tile, row by row.
+/// The pixels of a tile, row by row.
 pub(super) struct Tile {
     pub(super) pixels: Vec<[f32; 4]>,
-    /// Empty if none are asked for.
+    /// Empty if no first hits are requested.
     pub(super) first_hits: Vec<f32>,
     pub(super) tally: Tally,
 }
 
-/// The pixels of a row of tiles, and their first hits if they are asked for.
+/// The pixels of a row of tiles, and their first hits if they are requested.
 type Strip<'a> = (&'a mut [[f32; 4]], Option<&'a mut [f32]>);
 
-/// Draws all tiles, rows of them on all cores, given what draws a tile from its first pixel and its bricks, with what its thread keeps: the
-/// image's pixels, first hits if they are asked for, and what was drawn.
+/// Draws all tiles on all cores by `draw_tile`, which gets its thread's walk, the tile's first pixel and its bricks: the image's pixels, first
+/// hits if they are requested, and counts of the work.
 pub(super) fn draw_tiles<W>(
     [width, height]: [u32; 2],
     has_hits: bool,
@@ -222,7 +222,7 @@ pub(super) fn draw_tiles<W>(
     (pixels, first_hits, tally)
 }
 
-/// Copies what of a tile is on the image to its column of a row of tiles.
+/// Copies the part of a tile that lies on the image to its column of a row of tiles.
 fn copy_tile<T: Copy>(tile: &[T], column: usize, width: usize, strip: &mut [T]) {
     for (line, tile) in strip.chunks_mut(width).zip(tile.chunks(COLUMNS)) {
         let line = &mut line[column * COLUMNS..];

@@ -14,14 +14,14 @@ use crate::geometry::kernel::Kernel;
 /// Coefficients for pixels and voxels.
 #[derive(Clone, Debug)]
 pub(super) struct KernelTables {
-    /// Beyond this distance nothing is left, grid units.
+    /// The distance from which the kernel is 0, grid units.
     pub(super) support: f32,
     support_squared: f32,
-    /// Of `H(0, 0, t) / t` in `2t²/support² - 1`.
+    /// The coefficients of `H(0, 0, t) / t` as a polynomial in `2t²/support² - 1`.
     cumulative: [f32; 16],
     /// `2 / support²`.
     scale: f32,
-    /// From ρ² to the exponent of 2 of the Gaussian.
+    /// The factor from ρ² to the Gaussian's exponent of 2.
     exponent: f32,
 }
 
@@ -44,7 +44,7 @@ impl KernelTables {
         t * polynomial(&self.cumulative, t * t * self.scale - 1.0)
     }
 
-    /// ρ² from which on a section between two planes has nothing: its rim is the kernel's nearest the centre.
+    /// The ρ² from which a section between two planes is 0.
     #[inline(always)]
     pub(super) fn extent<S: Simd>(&self, simd: S, a: f32x8<S>, b: f32x8<S>) -> f32x8<S> {
         let zero = f32x8::splat(simd, 0.0);
@@ -63,7 +63,7 @@ impl KernelTables {
     /// The Gaussian of ρ².
     #[inline(always)]
     pub(super) fn in_plane<S: Simd>(&self, simd: S, rho_squared: f32x8<S>) -> f32x8<S> {
-        // Far from the voxel the rim is 0; what it is multiplied by must be a number.
+        // Far from the voxel the rim is 0; the other factor must be finite.
         exp2(simd, (rho_squared * self.exponent).max(f32x8::splat(simd, -126.0)))
     }
 }

@@ -1,4 +1,4 @@
-//! How pixels look at sheets for the compositings by means ([`Compositing`]); the same as `shaders/shared/means.wgsl`.
+//! How rays meet sheets for the compositings by means ([`Compositing`]), as in `shaders/shared/means.wgsl`.
 
 use std::ops::Range;
 
@@ -14,7 +14,7 @@ use crate::volume::Grid;
 /// By how much slabs' middles may lie outside, in slabs, and rays miss a box of voxel centres, in grid steps.
 const HAIR: f64 = 0.01;
 
-/// What decides how a ray looks at sheets.
+/// The settings of a view that decide how a ray meets sheets.
 #[derive(Clone, Debug)]
 pub(super) struct Means {
     compositing: Compositing,
@@ -22,7 +22,7 @@ pub(super) struct Means {
     counted: [HalfSpace; 6],
     /// Around the voxels' centres, a hair wider.
     centers: [HalfSpace; 6],
-    /// The depth from which on a ray is looked at.
+    /// The depth at which a ray starts to count.
     nearest: f64,
 }
 
@@ -38,12 +38,12 @@ impl Means {
         Self { compositing, counted: around(half + spare), centers: around(grid.center() + HAIR), nearest }
     }
 
-    /// Whether not all slabs count.
+    /// True if some slabs do not count.
     pub(super) fn is_choosy(&self) -> bool {
         self.compositing == Compositing::Minimum
     }
 
-    /// What sheets are multiplied by, for a ray of which some depths show.
+    /// The factor that turns sheets into means for a ray with these visible depths.
     pub(super) fn weight(&self, ray: &PixelRay, shown: Range<f64>) -> f64 {
         if self.compositing != Compositing::Average {
             return ray.slabs_per_depth() / ray.length();
@@ -56,7 +56,7 @@ impl Means {
         1.0 / ((depths.end - depths.start) * ray.length())
     }
 
-    /// From where to where the middles of slabs lie that count.
+    /// The range of the middles of slabs that count.
     pub(super) fn counted(&self, ray: &PixelRay, shown: Range<f64>) -> [f64; 2] {
         let Some([first, last]) = ray.slabs(self.within(ray, &self.counted, shown)) else {
             return [f64::INFINITY, f64::NEG_INFINITY];

@@ -2,12 +2,12 @@
 //!
 //! ```text
 //! bricks ─ bin ─→ every tile of 32×32 pixels, its sheets front to back in a ring of eight:
-//!                   cull       what opaque pixels hide, brick by brick, then voxel by voxel
+//!                   cull       bricks, then voxels, that opaque pixels hide
 //!                   shade      eight visible voxels at a time
 //!                   splat      all sections of a voxel, eight pixels at a time
-//!                   composite  one sheet, once every voxel before it is drawn
+//!                   composite  a sheet, once every voxel that reaches it is drawn
 //!        ─ resolve ─→ image
-//!        ─ first_hit ─→ the depths at which an opacity was reached, if they are asked for
+//!        ─ first_hit ─→ the depths at which an opacity was reached, if requested
 //! ```
 //!
 //! Stages are those of the GPU, by the same names. The same scene gives the same bytes on every machine (SPEC §12): pixels are `f32` by IEEE
@@ -66,7 +66,7 @@ pub struct CpuRenderer {
     simd: Simd,
     level: Level,
     first_hit: Option<f64>,
-    /// The last frame's.
+    /// The last frame's first hits.
     hits: Option<FirstHits>,
 }
 
@@ -79,10 +79,10 @@ enum List {
 }
 
 impl CpuRenderer {
-    /// Classifies a volume's voxels under a scene's transfer function. The scene's own volume is not looked at.
+    /// Classifies a volume's voxels under a scene's transfer function. The scene's own volume is ignored.
     ///
     /// # Errors
-    /// If the scene asks for what this backend does not draw, or for what the volume does not have.
+    /// If this backend does not support a setting of the scene, or the volume lacks what the scene needs, such as labels.
     pub fn new(volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Self, RenderError> {
         let volume = volume.into();
         scene.check()?;
@@ -109,7 +109,7 @@ impl CpuRenderer {
     /// image changes.
     ///
     /// # Errors
-    /// If machine or build lacks it; then nothing changes.
+    /// If the machine or the build lacks it; then nothing changes.
     pub fn set_simd(&mut self, simd: Simd) -> Result<(), SettingError> {
         self.level = simd.checked()?;
         self.simd = simd;
@@ -155,7 +155,7 @@ impl CpuRenderer {
         self.hits.as_ref().map(|hits| hits.depths.as_slice())
     }
 
-    /// What the last frame shows first at a pixel, counted from the upper left; `None` where the opacity of [`Self::set_first_hit`] is not
+    /// The point that the last frame shows first at a pixel, counted from the upper left; `None` where the opacity of [`Self::set_first_hit`] is not
     /// reached.
     ///
     /// # Errors
@@ -167,7 +167,7 @@ impl CpuRenderer {
     /// Draws a frame on the threads of the current rayon pool. Their number never changes a bit of the image.
     ///
     /// # Errors
-    /// If the scene asks for more than can be computed.
+    /// If the scene exceeds a limit, such as the number of slabs.
     pub fn draw(&mut self) -> Result<Rendering, RenderError> {
         let start = Instant::now();
         let splatting = &self.scene.splatting;
@@ -203,18 +203,18 @@ impl CpuRenderer {
     }
 }
 
-/// Checks that this backend draws all that a scene asks for, as far as that is known without the volume.
+/// Checks, as far as possible without the volume, that this backend supports all settings of a scene.
 ///
 /// # Errors
-/// If it does not: what it does not draw yet, or an image that is too large.
+/// If it does not support a setting, or the image is too large.
 pub fn check(scene: &Scene) -> Result<(), RenderError> {
     support::check(scene)
 }
 
-/// Renders a volume that is in memory. The scene's own volume is not looked at.
+/// Renders a volume that is in memory. The scene's own volume is ignored.
 ///
 /// # Errors
-/// If the scene asks for what this backend does not draw, or for what the volume does not have.
+/// If this backend does not support a setting of the scene, or the volume lacks what the scene needs, such as labels.
 pub fn render(volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Rendering, RenderError> {
     let start = Instant::now();
     let mut renderer = CpuRenderer::new(volume, scene)?;

@@ -23,11 +23,11 @@ pub(super) struct PixelRays {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PixelRay {
     origin: DVec3,
-    /// By one `unit` of depth.
+    /// The change of position per `unit` of depth.
     along: DVec3,
     /// The number of the slab where the depth is 0.
     slab_at_origin: f64,
-    /// Slabs to a `unit` of depth: less than 0 where a ray wide off the axis meets slices the other way round.
+    /// The number of slabs per `unit` of depth; negative where a ray far off the axis meets slices in the opposite order.
     slabs_per_depth: f64,
 }
 

@@ -1,9 +1,9 @@
-//! The compositing buffer over the background, SPEC §5; the same as `shaders/resolve.wgsl`.
+//! Compositing over the background (SPEC §5), as in `shaders/resolve.wgsl`.
 
 use super::sheets::{Buffers, COLUMNS};
 use crate::settings::splatting::Compositing;
 
-/// How compositing buffers become images.
+/// Turns compositing buffers into images.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Resolver {
     compositing: Compositing,
@@ -18,13 +18,13 @@ impl Resolver {
         Self { compositing, background: [r * a, g * a, b * a, a].map(|channel| channel as f32) }
     }
 
-    /// A tile's pixels, row by row.
+    /// The pixels of a tile, row by row.
     pub(super) fn tile(&self, buffers: &Buffers) -> Vec<[f32; 4]> {
         let pixel = |row: &[[f32; COLUMNS]; 4], x: usize| self.pixel([row[0][x], row[1][x], row[2][x], row[3][x]]);
         buffers.acc.iter().flat_map(|row| (0..COLUMNS).map(move |x| pixel(row, x))).collect()
     }
 
-    /// Premultiplied in, premultiplied out.
+    /// A pixel over the background, premultiplied like its argument.
     pub(super) fn pixel(&self, acc: [f32; 4]) -> [f32; 4] {
         let image = match self.compositing {
             Compositing::Xray | Compositing::Average => acc.map(|channel| channel.min(1.0)),

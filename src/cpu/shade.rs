@@ -1,4 +1,4 @@
-//! Shading (SPEC §3) of eight voxels at a time, once for every tile that a voxel is seen in; the same as `shaders/shade.wgsl`.
+//! Shading (SPEC §3) of eight voxels at a time, once for every tile in which a voxel is visible, as in `shaders/shade.wgsl`.
 
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
@@ -10,7 +10,7 @@ use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::Volume;
 
-/// Up to eight voxels that are to be shaded, by lanes.
+/// Up to eight voxels to be shaded, by lane.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Unshaded {
     color: [[f32; LANES]; 3],
@@ -18,12 +18,12 @@ pub(super) struct Unshaded {
     alpha: [f32; LANES],
     normal: [[f32; LANES]; 3],
     to_eye: [[f32; LANES]; 3],
-    /// What amounts are multiplied by.
+    /// The factor for amounts.
     scale: [f32; LANES],
 }
 
 impl Unshaded {
-    /// Puts a voxel into a lane: looks its colour and opacity up, and where its gradient points.
+    /// Puts a voxel into a lane: its colour, opacity and normal.
     pub(super) fn set(
         &mut self,
         lane: usize,
@@ -54,7 +54,7 @@ impl Unshaded {
 #[derive(Clone, Debug)]
 pub(super) struct Shader {
     is_enabled: bool,
-    /// To the light; `None` for a headlight.
+    /// The direction to the light; `None` for a headlight.
     to_light: Option<[f32; 3]>,
     ambient: f32,
     diffuse: f32,
@@ -94,7 +94,7 @@ impl Shader {
         [red, green, blue, amount.to_array()]
     }
 
-    /// Colours as they look in this light, given normals, or 0 where there is none, and where the eye is.
+    /// Colours in this light, given their normals, 0 where there is none, and the directions to the eye.
     #[inline(always)]
     pub(super) fn color<S: Simd>(
         &self,
@@ -113,7 +113,7 @@ impl Shader {
         })
     }
 
-    /// Both terms that need light: two-sided, 0 without a normal.
+    /// The diffuse and the specular term: two-sided, and 0 without a normal.
     #[inline(always)]
     fn lighting<S: Simd>(&self, simd: S, normal: [f32x8<S>; 3], to_eye: [f32x8<S>; 3]) -> (f32x8<S>, f32x8<S>) {
         let to_light = self.to_light.map_or(to_eye, |light| light.map(|component| f32x8::splat(simd, component)));

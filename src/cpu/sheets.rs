@@ -6,11 +6,11 @@ use super::vector::LANES;
 pub(super) const COLUMNS: usize = 32;
 /// Rows of a tile.
 pub(super) const ROWS: usize = 32;
-/// Numbers along a row of a sheet: a vector that starts within the tile may end outside.
+/// Numbers along a row of a sheet, with room for a vector that starts within the tile and ends outside.
 pub(super) const STRIDE: usize = COLUMNS + LANES;
-/// Sheets that are open at a time: sheet s is in slot s mod 8.
+/// Sheets that are open at a time. Sheet s is in slot s mod 8.
 pub(super) const RING: usize = 8;
-/// Sheets that a voxel is drawn into at a time: their planes are a vector.
+/// Sheets that a voxel is drawn into at a time, such that their planes fill a vector.
 pub(super) const SECTIONS: usize = LANES - 1;
 /// Red, green, blue, opacity.
 pub(super) const CHANNELS: usize = 4;
@@ -23,7 +23,7 @@ pub(super) type SheetRow = [[[f32; STRIDE]; CHANNELS]; RING];
 pub(super) struct Buffers {
     /// Sheet buffers, row by row.
     pub(super) sheets: Vec<SheetRow>,
-    /// For every slot the rows that hold anything.
+    /// For every slot, the bits of the rows that are not empty.
     pub(super) written: [u64; RING],
     /// The rows whose compositing buffer may hold a surface that is not reached yet.
     pub(super) kept: u64,
@@ -45,7 +45,7 @@ impl Buffers {
         }
     }
 
-    /// For the next tile. Sheets are zero again once they have been composited; after an early end some are not.
+    /// Clears the buffers for the next tile. Composited sheets are already zero; after an early end some are not.
     pub(super) fn clear(&mut self) {
         for slot in 0..RING {
             while self.written[slot] != 0 {

@@ -1,19 +1,19 @@
-//! Which instruction set draws. All of them give the same bytes (SPEC §12).
+//! The choice of an instruction set. All of them give the same bytes (SPEC §12).
 
 use fearless_simd::Level;
 
 use crate::setting_error::SettingError;
 
-/// The environment variable that forces one.
+/// The environment variable that forces an instruction set.
 const VARIABLE: &str = "SHEETSPLAT_SIMD";
 
 /// An instruction set for vectors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Simd {
-    /// Numbers one by one, as far as the compiler leaves them so.
+    /// Scalar code, except where the compiler vectorizes it.
     Scalar,
-    /// x86: every 64-bit processor has it.
+    /// x86; every 64-bit processor has it.
     Sse2,
     /// x86-64-v2.
     Sse4_2,
@@ -26,10 +26,10 @@ pub enum Simd {
 }
 
 impl Simd {
-    /// All of them, by whichever machine.
+    /// All instruction sets, whatever the machine has.
     pub const ALL: [Self; 6] = [Self::Scalar, Self::Sse2, Self::Sse4_2, Self::Avx2, Self::Avx512, Self::Neon];
 
-    /// What it is called: `scalar`, `sse2`, `sse4.2`, `avx2`, `avx512`, `neon`.
+    /// Its name: `scalar`, `sse2`, `sse4.2`, `avx2`, `avx512`, `neon`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Scalar => "scalar",
@@ -41,12 +41,12 @@ impl Simd {
         }
     }
 
-    /// Those that this machine and this build have.
+    /// The instruction sets that this machine and this build have.
     pub fn available() -> Vec<Self> {
         Self::ALL.into_iter().filter(|simd| simd.level().is_some()).collect()
     }
 
-    /// As the vectors' crate has it; `None` if machine or build lacks it.
+    /// The level of the vector crate; `None` if the machine or the build lacks it.
     fn level(self) -> Option<Level> {
         let best = Level::new();
         match self {
@@ -68,16 +68,16 @@ impl Simd {
     /// The level of an instruction set, if machine and build have it.
     ///
     /// # Errors
-    /// If they do not.
+    /// If the machine or the build lacks it.
     pub(super) fn checked(self) -> Result<Level, SettingError> {
         self.level().ok_or_else(|| refused(self.name()))
     }
 }
 
-/// What draws unless something else is said: what the environment forces, or the best that the machine has.
+/// The default: the instruction set that the environment forces, else the best one of the machine.
 ///
 /// # Errors
-/// If machine or build lacks what the environment forces.
+/// If the machine or the build lacks the one that the environment forces.
 pub(super) fn chosen() -> Result<(Simd, Level), SettingError> {
     let best = || Simd::available().into_iter().next_back().unwrap_or(Simd::Scalar);
     let simd = match std::env::var_os(VARIABLE) {

@@ -9,20 +9,20 @@ use super::kernel::KernelTables;
 use super::sheets::{Buffers, CHANNELS, COLUMNS, RING, ROWS, SECTIONS, SheetRow, slot_of};
 use super::vector::{LANES, iota};
 
-/// A voxel as a tile's pixels see it.
+/// A voxel in the coordinates of a tile.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Splat {
-    /// Its place among pixel centres: the tile's first is at 0, 0.
+    /// Its pixel coordinates; the centre of the tile's first pixel is at 0, 0.
     pub(super) center: [f32; 2],
     /// `(C·m, m)` over λ, and the low-pass amplitude where it is the same for all sections.
     pub(super) amount: [f32; 4],
-    /// The first sheet that is still to be drawn, in the order in which sheets are composited, and the end.
+    /// The range of sheets still to be drawn, in the order of compositing.
     pub(super) sheets: [i32; 2],
-    /// From the voxel to the plane where that begins, grid units along its ray.
+    /// The distance from the voxel to the plane where that range begins, grid units along its ray.
     pub(super) first_plane: f32,
-    /// From plane to plane.
+    /// The distance from plane to plane.
     pub(super) step: f32,
-    /// The voxel: its brick's number and its place there.
+    /// The voxel: the number of its brick and its slot there.
     pub(super) voxel: [u32; 2],
     /// Sheets that have been drawn, in units of [`SECTIONS`].
     pub(super) drawn: u32,
@@ -40,20 +40,20 @@ pub(super) struct LocalFootprint {
     pub(super) cut: f32,
 }
 
-/// What all splats of a frame have in common.
+/// The data that all splats of a frame share.
 #[derive(Clone, Debug)]
 pub(super) struct Splatter {
     pub(super) kernel: KernelTables,
     pub(super) radius: f32,
     /// Orthographic: ρ² of a pixel offset (dx, dy) is `x·dx² + y·dx·dy + z·dy²`.
     pub(super) metric: [f32; 3],
-    /// Orthographic: the least ρ² of a row is this times dy².
+    /// Orthographic: the minimum ρ² of a row is this times dy².
     pub(super) row_metric: f32,
     /// Orthographic: half the box around footprints, pixels.
     pub(super) half_box: [f32; 2],
     /// In perspective the size of a pixel at depth 1, `unit`s.
     pub(super) pixel_per_depth: Option<f32>,
-    /// Whether sheets hold whole kernels, with the footprint that they have at the voxel's depth.
+    /// True if sheets hold whole kernels, whose footprint is that at the voxel's depth.
     pub(super) is_whole: bool,
 }
 
@@ -62,7 +62,7 @@ pub(super) struct Sections {
     count: usize,
     /// `H(0, 0, t)` of eq. 3 at the planes between them.
     planes: [f32; LANES],
-    /// ρ² from which on a section has nothing.
+    /// The ρ² from which a section is 0.
     extent: [f32; LANES],
     /// In perspective ρ² of a pixel along the footprint's axis and across it, and the low-pass rule's amplitude, by section.
     along: [f32; LANES],
@@ -73,7 +73,7 @@ pub(super) struct Sections {
 }
 
 impl Splatter {
-    /// The sections that are to be drawn next.
+    /// The sections to be drawn next.
     #[inline(always)]
     pub(super) fn sections<S: Simd>(&self, simd: S, splat: &Splat) -> Sections {
         let count = ((splat.sheets[1] - splat.sheets[0]) as usize).min(SECTIONS);
@@ -173,7 +173,7 @@ impl Splatter {
         let rho_squared = dx * (dx * xx + xy * dy) + yy * dy * dy;
         let rim = self.kernel.rim(simd, rho_squared);
         let in_plane = self.kernel.in_plane(simd, rho_squared);
-        // A row that passes a section by has nothing of it: sections' extents grow towards the kernel's centre.
+        // Sections that this row does not reach are skipped. Extents grow towards the kernel's centre, so these are the first and the last ones.
         let nearest = self.row_metric * dy * dy;
         let (mut first, mut end) = (0, sections.count);
         while first < end && sections.extent[first % LANES] <= nearest {
@@ -230,7 +230,7 @@ fn add<S: Simd>(weights: f32x8<S>, colors: [f32; 4], column: usize, sheet: &mut 
     let column = column.min(COLUMNS);
     let weights = weights.to_array();
     for (channel, color) in sheet.iter_mut().zip(colors) {
-        // Numbers one by one, which the compiler makes vectors of: loading one by `f32x8` goes through a copy on the stack.
+        // The compiler vectorizes this loop. Loading an `f32x8` instead goes through a copy on the stack.
         if let Some(pixels) = channel[column..].first_chunk_mut::<LANES>() {
             for (pixel, weight) in pixels.iter_mut().zip(weights) {
                 *pixel += weight * color;

@@ -1,4 +1,4 @@
-//! What the native backend does not draw yet: an error, never a wrong picture.
+//! Settings that the native backend does not support yet are errors, never wrong pictures.
 
 use crate::error::RenderError;
 use crate::scene::Scene;
@@ -7,10 +7,10 @@ use crate::setting_error::SettingError;
 /// The largest image, pixels along a side.
 const MAX_SIZE: u32 = 32_768;
 
-/// Checks that all that a scene asks for can be drawn.
+/// Checks that all settings of a scene are supported.
 ///
 /// # Errors
-/// If it cannot.
+/// If one is not.
 pub(super) fn check(scene: &Scene) -> Result<(), RenderError> {
     let refused = |key: &str, found: String, allowed: String| Err(SettingError::new(key, found, allowed).into());
     for (key, found) in [("image.width", scene.image.width), ("image.height", scene.image.height)] {

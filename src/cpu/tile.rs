@@ -28,10 +28,10 @@ struct Arrived {
     half_box: [f32; 2],
 }
 
-/// A voxel that waits for its first sheet: which of the bricks that arrived, and its place there.
+/// A voxel that waits for its first sheet: the index of its brick among those that have arrived, and its slot there.
 type Waiting = (u32, u8);
 
-/// What a thread draws tiles with, one after the other.
+/// The state with which a thread draws one tile after another.
 pub(super) struct TileWalk<'a> {
     frame: &'a Frame<'a>,
     /// The tile's first pixel.
@@ -40,11 +40,11 @@ pub(super) struct TileWalk<'a> {
     rays: TileRays,
     buffers: Buffers,
     arrived: Vec<Arrived>,
-    /// By sheet, from the current one on.
+    /// The waiting voxels by sheet, from the current one.
     waiting: VecDeque<Vec<Waiting>>,
-    /// Voxels with more sections than are drawn at a time, by the slot of the sheet that is their next.
+    /// Voxels with more sections than are drawn at a time, by the slot of their next sheet.
     continued: [Vec<Splat>; RING],
-    /// Emptied lists.
+    /// Empty lists to be used again.
     spare: Vec<Vec<Waiting>>,
     pending: usize,
     tally: Tally,
@@ -85,7 +85,7 @@ impl<'a> TileWalk<'a> {
         (&self.buffers, &self.rays, self.tally)
     }
 
-    /// For a tile whose walk begins with a sheet.
+    /// Clears the state for a tile whose walk begins with this sheet.
     fn reset(&mut self, origin: [usize; 2], sheet: i32) {
         let Projection { view, direction, .. } = &self.frame.projection;
         let [width, height] = view.size.map(|side| side as usize);
@@ -105,7 +105,7 @@ impl<'a> TileWalk<'a> {
 
     #[inline(always)]
     fn walk<'b, S: Simd>(&mut self, simd: S, first: i32, bricks: &mut Peekable<impl Iterator<Item = &'b Placed>>) {
-        // Sheets without anything are sheets, where they count.
+        // Empty sheets are composited where they count.
         let Range { start, end } = self.frame.counted.clone();
         let mut sheet = if start < end { first.min(start) } else { first };
         loop {
@@ -131,7 +131,7 @@ impl<'a> TileWalk<'a> {
 
     /// Composites a sheet.
     fn composite<S: Simd>(&mut self, simd: S, sheet: i32) {
-        // One function of it for every instruction set, wherever it is called.
+        // One function for every instruction set, instead of a copy at every call.
         simd.vectorize(
             #[inline(always)]
             || {
@@ -179,7 +179,7 @@ impl<'a> TileWalk<'a> {
         Pixels::within([center.x as f32, center.y as f32], half).is_some_and(|pixels| self.open.sees(&pixels))
     }
 
-    /// Draws what starts in a sheet, or goes on there.
+    /// Draws the voxels that start or continue in a sheet.
     #[inline(always)]
     fn start<S: Simd>(&mut self, simd: S, sheet: i32) {
         let continued = std::mem::take(&mut self.continued[slot_of(sheet)]);
@@ -199,7 +199,7 @@ impl<'a> TileWalk<'a> {
             let pixel = self.frame.projection.pixel(place);
             let center =
                 [pixel.x - self.origin[0] as f64 - 0.5, pixel.y - self.origin[1] as f64 - 0.5].map(|at| at as f32);
-            // In perspective a bound of all of its sections' boxes.
+            // In perspective this bounds the boxes of all its sections.
             if !Pixels::within(center, arrived.half_box).is_some_and(|pixels| self.open.sees(&pixels)) {
                 continue;
             }
@@ -228,7 +228,7 @@ impl<'a> TileWalk<'a> {
     }
 
     fn draw_batch<S: Simd>(&mut self, simd: S, batch: &mut Batch) {
-        // One function of it for every instruction set, wherever it is called.
+        // One function for every instruction set, instead of a copy at every call.
         simd.vectorize(
             #[inline(always)]
             || {
@@ -247,7 +247,7 @@ impl<'a> TileWalk<'a> {
 
     /// Draws a voxel's next sections, if they are seen, and keeps it if there are more.
     fn draw_splat<S: Simd>(&mut self, simd: S, splat: &Splat) {
-        // One function of it for every instruction set, wherever it is called.
+        // One function for every instruction set, instead of a copy at every call.
         simd.vectorize(
             #[inline(always)]
             || {
@@ -281,7 +281,7 @@ fn cleared(mut list: Vec<Waiting>) -> Vec<Waiting> {
     list
 }
 
-/// Voxels that are shaded together.
+/// Up to eight voxels that are shaded together.
 #[derive(Default)]
 struct Batch {
     count: usize,
@@ -295,7 +295,7 @@ impl Batch {
         let voxel = brick::origin(&frame.bricks[brick as usize]) + brick::in_brick(slot);
         let lens = projection.lens(place, voxel);
         let sheets = projection.sheets(place, voxel);
-        // Back to front, planes are met in the other order: sections are then less than 0, and so is what they are multiplied by.
+        // Back to front, planes come in the opposite order, so that sections and their factors are both negative.
         let direction = f64::from(projection.direction);
         let plane = direction * f64::from(sheet) + if projection.direction > 0 { 0.0 } else { 1.0 };
         let scale = direction * lens.per_lambda * frame.amplitude;

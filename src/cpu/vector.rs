@@ -1,6 +1,6 @@
-//! The functions that pixels and voxels need, of eight numbers at once, by IEEE `+ - × ÷ √` alone (SPEC §12).
+//! Elementary functions of eight numbers at once, by IEEE `+ - × ÷ √` alone (SPEC §12).
 //!
-//! Nothing here is contracted to fused operations, and no function of the system's is called, so that every instruction set gives the
+//! Nothing here is contracted to fused operations, and no system function is called, so that every instruction set gives the
 //! same bits. Polynomials are Chebyshev interpolants, good to the last few bits of an `f32`.
 
 use fearless_simd::prelude::*;
@@ -63,7 +63,7 @@ pub(super) fn saturation<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
 fn log_parts<S: Simd>(simd: S, x: f32x8<S>, less_one: f32x8<S>) -> (f32x8<S>, f32x8<S>) {
     const ROOT_HALF: u32 = std::f32::consts::FRAC_1_SQRT_2.to_bits();
     let splat = |bits| u32x8::splat(simd, bits);
-    // Biased by more than any exponent below 0, so that a shift of unsigned numbers does.
+    // The bias makes exponents positive, so that an unsigned shift works.
     let moved = x.bitcast::<u32x8<S>>() - splat(ROOT_HALF) + splat(128 << MANTISSA);
     let exponent = (moved >> MANTISSA).bitcast::<fearless_simd::i32x8<S>>().to_float::<f32x8<S>>() - 128.0;
     let mantissa: f32x8<S> = ((moved & splat((1 << MANTISSA) - 1)) + splat(ROOT_HALF)).bitcast();
@@ -77,7 +77,7 @@ fn log_parts<S: Simd>(simd: S, x: f32x8<S>, less_one: f32x8<S>) -> (f32x8<S>, f3
     (exponent, s * (low + fourth * (high + fourth * ATANH[4])))
 }
 
-/// `-ln(1 - x)` for x from 0 to 0.9999, to full relative precision: what an opacity per unit length is as an optical depth.
+/// `-ln(1 - x)` for x from 0 to 0.9999, to full relative precision: the optical depth per unit length for an opacity per unit length.
 #[inline(always)]
 pub(super) fn optical_depth<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
     let (exponent, atanh) = log_parts(simd, 1.0 - x, -x);
@@ -118,7 +118,7 @@ mod tests {
             let pairs: [_; LANES] = std::array::from_fn(|lane| (f64::from(ours(x)[lane]), exact(f64::from(x[lane]))));
             pairs.map(|(ours, exact)| ((ours - exact) / exact).abs())
         });
-        // Not `max`, which passes NaN over.
+        // Unlike `max` this keeps NaN.
         errors.fold(0.0, |worst, error| if error <= worst { worst } else { error })
     }
 

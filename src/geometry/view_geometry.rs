@@ -253,7 +253,7 @@ impl ViewGeometry {
     }
 
     /// The sheet depths that the kernels of a box of voxels reach, given its middle and half size in voxel indices. Where sheets are parallel
-    /// to the image, only depths beyond the near plane count; the range is empty if there are none.
+    /// to the image, only depths beyond the near plane count; the range is empty if the kernels reach no such depth.
     pub fn depths(&self, middle: DVec3, half: DVec3) -> Range<f64> {
         let [_, _, depth, from_eye] = self.screen_from_voxel.map(|row| row.dot(middle.extend(1.0)));
         let [_, _, spread, thickness] = self.screen_from_voxel.map(|row| row.truncate().abs().dot(half));

@@ -102,18 +102,24 @@ use crate::image::{Image, ImageError, PngDepth, output};
 #[macro_export]
 macro_rules! assert_golden {
     ($name:expr, $image:expr $(,)?) => {
-        $crate::assert_golden!(@ $name, $image, |golden| golden)
+        $crate::assert_golden!(@ $name, $image, None)
     };
     ($name:expr, $image:expr, $tolerance:expr $(,)?) => {
-        $crate::assert_golden!(@ $name, $image, |golden: $crate::golden::Golden| golden.tolerance($tolerance))
+        $crate::assert_golden!(@ $name, $image, Some($tolerance))
     };
-    (@ $name:expr, $image:expr, $change:expr) => {
-        match $crate::golden!($name).map($change).and_then(|golden| golden.check(&$image)) {
+    (@ $name:expr, $image:expr, $tolerance:expr) => {{
+        // Outside of closures, so that the expressions may use `?`.
+        let (image, tolerance): (_, Option<$crate::golden::Tolerance>) = (&$image, $tolerance);
+        let compare = |golden: $crate::golden::Golden| match tolerance {
+            Some(tolerance) => golden.tolerance(tolerance).check(image),
+            None => golden.check(image),
+        };
+        match $crate::golden!($name).and_then(compare) {
             Ok($crate::golden::Outcome::Passed(_)) => {}
             Ok($crate::golden::Outcome::Blessed(path)) => println!("blessed {}", path.display()),
             Err(error) => panic!("{error}"),
         }
-    };
+    }};
 }
 
 /// The golden with which [`assert_golden!`](crate::assert_golden) would compare here: a

@@ -141,10 +141,10 @@ impl GpuVolume {
         self.shared.coefficients.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// The coefficients for a kernel's radius and falloff, found when first asked for; those of the kernel before are forgotten.
+    /// The coefficients for a kernel's radius and falloff, computed at the first request. Those of the previous kernel are dropped.
     ///
     /// # Errors
-    /// If there are none: [`coefficients::exact`].
+    /// If no coefficients interpolate the values: those of [`coefficients::exact`].
     pub(crate) fn coefficients(&self, kernel: (f64, f64)) -> Result<Arc<Coefficients>, RenderError> {
         if let Some(last) = self.last_coefficients().filter(|last| last.kernel == kernel) {
             return Ok(last);

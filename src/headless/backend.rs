@@ -80,7 +80,7 @@ fn wants_gpu<'a>(options: &HeadlessOptions, scenes: impl IntoIterator<Item = &'a
     cfg!(not(feature = "cpu")) || is_named || scenes.into_iter().any(is_for_gpu) || device::has_gpu()
 }
 
-/// Without the feature `gpu` there is none.
+/// Without the feature `gpu` no GPU can be chosen.
 #[cfg(not(feature = "gpu"))]
 fn wants_gpu<'a>(_: &HeadlessOptions, _: impl IntoIterator<Item = &'a Scene>) -> bool {
     false

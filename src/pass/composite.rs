@@ -40,7 +40,7 @@ pub struct RayMode {
 pub struct CutBuffers<'a> {
     /// One [`Cut`].
     pub uniform: &'a Buffer,
-    /// A host's depth, or any depth texture if there is none.
+    /// A host's depth texture; any depth texture if the host gives no surfaces.
     pub surfaces: &'a TextureView,
 }
 

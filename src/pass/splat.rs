@@ -133,7 +133,7 @@ pub(super) fn clear_bindings(device: &Device) -> Bindings {
     Bindings::new(device, shaders::CLEAR, &slots)
 }
 
-/// What zeroes tiles of so many sheet buffers.
+/// The pipeline that clears the marked tiles of the sheet buffers; `sheets` is their number.
 pub(super) fn clear_pipeline(
     device: &Device,
     bindings: &Bindings,

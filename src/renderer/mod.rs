@@ -56,7 +56,7 @@ pub struct Renderer {
     tiles: TileRasterizer,
     resolve: Resolve,
     first_hit: OnceLock<FirstHit>,
-    /// A substitute for a host's depth texture where there is none.
+    /// A depth texture of one texel, bound where the host gives no surfaces.
     no_surfaces: OnceLock<TextureView>,
     /// Whether the fallback from tiles was logged.
     fell_back: Once,

@@ -349,10 +349,14 @@ fn signals_that_the_caller_ignores_are_ignored() {
 
 /// A long series of frames, started from a shell.
 fn long_orbit(folder: &Folder, before: &str) -> Command {
-    let mut command = Command::new("sh");
+    // Whoever runs the tests may ignore signals, as `nohup` does.
+    let mut command = Command::new("env");
     let program = env!("CARGO_BIN_EXE_sheetsplat");
     let script = format!("{before}exec '{program}' orbit {SMALL} --count 1000000 -o turn.apng");
-    command.args(["-c", &script]).env("WGPU_ADAPTER_NAME", "llvmpipe").current_dir(folder.path(""));
+    command
+        .args(["--default-signal", "sh", "-c", &script])
+        .env("WGPU_ADAPTER_NAME", "llvmpipe")
+        .current_dir(folder.path(""));
     command
 }
 

@@ -15,7 +15,7 @@ const DESCRIPTION: u16 = 270;
 const XMP: u16 = 700;
 const PRIVATE: u16 = 32768;
 
-/// The first entry that has too many values, and their number; `None` if there is none or the file is not a TIFF.
+/// The first entry that has too many values, and their number; `None` if every entry is short enough or the file is not a TIFF.
 pub(super) fn overlong_entry(file: &mut BufReader<File>, file_bytes: u64) -> io::Result<Option<(u16, u64)>> {
     match find(file, most_values(file_bytes)) {
         Err(error) if error.kind() == ErrorKind::UnexpectedEof => Ok(None),

@@ -12,7 +12,7 @@ const LZW: u16 = 5;
 const DEFLATE: [u16; 2] = [8, 32946];
 const PACK_BITS: u16 = 32773;
 
-/// Whether so short a code for so many bytes should be tried first.
+/// Whether a code of this length is so short for `bytes` decoded bytes that it should be decoded on trial first.
 pub(super) fn is_suspicious(code: u64, bytes: u64) -> bool {
     bytes > (16 << 20) + 4 * code
 }
