@@ -114,42 +114,65 @@ fn settings_one_by_one_against_the_twin() {
     println!("worst: {worst:.1?} dB");
 }
 
+/// A head close by. For `minimum`, whose values are those of the air around it else, the inside of it alone, and small values have an opacity.
+fn close_by(compositing: Compositing) -> (Volume, Scene) {
+    let (volume, mut scene) = after();
+    let half = volume.grid().center() * volume.spacing();
+    scene.camera.projection = Projection::Orthographic { height: Some(1.8 * half.z) };
+    scene.splatting.compositing = compositing;
+    if compositing == Compositing::Minimum {
+        scene.clip.crop = Some([-0.45 * half, 0.4 * half]);
+        scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.9), (60.0, 0.8), (200.0, 0.1)]).unwrap());
+    }
+    (volume, scene)
+}
+
 #[test]
 fn values_chosen_and_surfaces_against_the_twin() {
-    let (volume, plain) = after();
     let mut worst = f64::INFINITY;
-    let mut check = |what: &str, volume: &Volume, change: &dyn Fn(&mut Scene)| {
+    let mut check = |what: &str, change: &dyn Fn(&mut Volume, &mut Scene)| {
         for compositing in BY_MEANS {
-            let mut scene = plain.clone();
-            scene.splatting.compositing = compositing;
-            change(&mut scene);
-            let psnr = psnr(&draw(volume, &scene).image, &twin(volume, &scene));
-            println!("{what}, {compositing:?}: {psnr:.1} dB");
+            let (mut volume, mut scene) = close_by(compositing);
+            change(&mut volume, &mut scene);
+            let expected = twin(&volume, &scene);
+            let shown = shown(&expected);
+            let psnr = psnr(&draw(&volume, &scene).image, &expected);
+            println!("{what}, {compositing:?}: {psnr:.1} dB, {shown:.2} of the image");
+            assert!(shown > 0.015, "{what}, {compositing:?} shows nothing");
             assert!(psnr > required(&scene), "{what}, {compositing:?}: {psnr} dB");
             worst = worst.min(psnr);
         }
     };
-    let perspective = Projection::Perspective { fov_y: 40.0, distance: None, near: None };
-    check("defaults", &volume, &|_| {});
-    check("perspective", &volume, &|scene| scene.camera.projection = perspective);
-    check("the kernel's gradient", &volume, &|scene| scene.shading.gradient = Gradient::Kernel);
-    check("exact", &volume, &|scene| scene.splatting.interpolation = Interpolation::Exact);
-    check("thick slabs", &volume, &|scene| scene.splatting.slab_width = 8.0);
-    check("thin slabs", &volume, &|scene| scene.splatting.slab_width = 0.3);
-    check("cut", &volume, &|scene| scene.clip.planes = vec![[0.3, 1.0, -0.2, 2.0], [-1.0, 0.2, 0.1, 1.0]]);
-    check("unshaded", &volume, &|scene| scene.shading.enabled = false);
-    check("a thin piece", &volume, &|scene| {
-        scene.clip.planes = vec![[0.4, 0.9, -0.3, 0.3], [-0.4, -0.9, 0.3, 0.3]];
+    check("defaults", &|_, _| {});
+    check("perspective", &|volume, scene| {
+        let distance = Some(2.5 * volume.grid().center().z * volume.spacing().z);
+        scene.camera.projection = Projection::Perspective { fov_y: 40.0, distance, near: None };
+    });
+    check("the kernel's gradient", &|_, scene| scene.shading.gradient = Gradient::Kernel);
+    check("exact", &|_, scene| scene.splatting.interpolation = Interpolation::Exact);
+    check("thick slabs", &|_, scene| scene.splatting.slab_width = 8.0);
+    check("thin slabs", &|_, scene| scene.splatting.slab_width = 0.3);
+    check("cut", &|volume, scene| {
+        let half = volume.grid().center() * volume.spacing();
+        scene.clip.planes = vec![[0.3, 1.0, -0.2, 0.2 * half.y], [-1.0, 0.2, 0.1, 0.3 * half.x]];
+    });
+    check("unshaded", &|_, scene| scene.shading.enabled = false);
+    check("a thin piece", &|_, scene| {
+        scene.clip.planes = vec![[0.4, 0.9, -0.3, 3.3], [-0.4, -0.9, 0.3, 3.3]];
         scene.splatting.slab_width = 2.0;
     });
-    check("gradient opacity", &volume, &|scene| {
-        scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.0), (20.0, 1.0)]).unwrap());
+    check("gradient opacity", &|_, scene| {
+        scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.56), (2.0, 1.0)]).unwrap());
     });
-    check("iso-ranges", &volume, &|scene| scene.transfer.iso_ranges = Some(vec![[150.0, 215.0], [230.0, 300.0]]));
-    check("labels", &segmented(&volume), &|scene| {
+    check("iso-ranges", &|_, scene| {
+        scene.transfer.iso_ranges = Some(vec![[20.0, 30.0], [45.0, 215.0], [230.0, 300.0]]);
+    });
+    check("labels", &|volume, scene| {
+        *volume = segmented(volume);
         scene.transfer.labels = labels();
-        // Else middles of rays from side to side lie between cells.
-        scene.clip.crop = Some([DVec3::splat(-7.3), DVec3::new(9.1, 8.7, 6.9)]);
+        // Otherwise middles of rays from side to side lie between cells.
+        let half = volume.grid().center() * volume.spacing();
+        scene.clip.crop = Some([DVec3::new(-0.47, -0.41, -0.52) * half, DVec3::new(0.53, 0.46, 0.44) * half]);
     });
     println!("worst: {worst:.1} dB");
 }
@@ -157,17 +180,17 @@ fn values_chosen_and_surfaces_against_the_twin() {
 /// Depths of first hits, by all compositings that have them.
 #[test]
 fn first_hits_are_the_twins() {
-    let (volume, plain) = after();
     for (compositing, opacity) in [
         (Compositing::Linear, 0.4),
         (Compositing::Exponential, 0.7),
         (Compositing::Maximum, 0.3),
         (Compositing::Surface, 1.0),
     ] {
-        for projection in [plain.camera.projection, Projection::Perspective { fov_y: 40.0, distance: None, near: None }]
-        {
+        let (volume, plain) = close_by(compositing);
+        let distance = Some(2.5 * volume.grid().center().z * volume.spacing().z);
+        let perspective = Projection::Perspective { fov_y: 40.0, distance, near: None };
+        for projection in [plain.camera.projection, perspective] {
             let mut scene = plain.clone();
-            scene.splatting.compositing = compositing;
             scene.camera.projection = projection;
             let host = Host { first_hit: Some(opacity), ..Host::default() };
             let transfer = scene.transfer.resolve(&volume);
@@ -184,7 +207,9 @@ fn first_hits_are_the_twins() {
                 let agrees = if expected.is_finite() { is_close } else { actual.is_infinite() };
                 wrong += u32::from(!agrees);
             }
-            assert!(hits > 200 && wrong < hits / 500, "{compositing:?}: {wrong} of {hits}");
+            println!("{compositing:?}: {wrong} of {hits}");
+            // Where opacity grows slowly around the one asked for, rounding moves the depth.
+            assert!(hits > 300 && wrong * 1000 < hits, "{compositing:?}: {wrong} of {hits}");
         }
     }
 }
@@ -303,4 +328,26 @@ fn counts_are_the_twins() {
     let (volume, scene) = after();
     let counts = draw(&volume, &scene).stats.counts;
     assert_eq!(counts.sections_rasterized, counts.sections_total, "all is on the screen");
+}
+
+/// Where all values around are equal, no pixel takes the rounding of their sums for a gradient.
+#[test]
+fn constant_regions_have_no_normal() {
+    let (_, mut scene) = after();
+    scene.shading.gradient = Gradient::Kernel;
+    let dims = glam::UVec3::splat(16);
+    let value = |index: u32| match index {
+        0 => 0.0,
+        4095 => 255.0,
+        _ => 201.3,
+    };
+    let volume = Volume::new("block", dims, DVec3::ONE, (0..4096).map(value).collect()).unwrap();
+    for falloff in [1.0, 2.0] {
+        scene.splatting.falloff = falloff;
+        let expected = twin(&volume, &scene);
+        assert!(shown(&expected) > 0.2, "falloff {falloff}");
+        let psnr = psnr(&draw(&volume, &scene).image, &expected);
+        println!("falloff {falloff}: {psnr:.1} dB");
+        assert!(psnr > 60.0, "falloff {falloff}: {psnr} dB");
+    }
 }

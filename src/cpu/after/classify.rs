@@ -250,6 +250,9 @@ impl Frame<'_> {
             Gradient::Differences => [2, 3, 4].map(|channel| sums[channel] * *per_weight),
             Gradient::Kernel => {
                 let along = [0, 1, 2].map(|axis| (sums[5 + axis] - *value * sums[2 + axis]) * *per_weight);
+                let [a, b, t] = along;
+                let is_noise = (a * a + b * b + t * t).simd_lt(f32x8::splat(simd, self.min_moment));
+                let along = along.map(|component| is_noise.select(f32x8::splat(simd, 0.0), component));
                 self.world_from_plane.map(|row| {
                     let splat = |at: usize| f32x8::splat(simd, row[at]);
                     along[0] * splat(0) + along[1] * splat(1) + along[2] * splat(2)

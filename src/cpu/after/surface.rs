@@ -88,6 +88,10 @@ impl Frame<'_> {
 
     /// A stretch within a slab, cut where the ray passes from one voxel's cell into another's if their labels may differ.
     fn pieces(&self, pixel: [usize; 2], slab: f64, [start, end]: [f64; 2]) -> Vec<[f64; 2]> {
+        // The stretch of a ray that shows nothing ends at negative infinity.
+        if start >= end {
+            return Vec::new();
+        }
         let mut cuts = vec![start, end];
         if self.labels {
             let [from, to] = [start, end].map(|share| self.voxel_at(pixel, slab + share) + 0.5);
