@@ -17,6 +17,11 @@ fn counts_gaps() -> bool {
     return COMPOSITING == MINIMUM || COMPOSITING == SURFACE;
 }
 
+// Whether rays have ends that hide what lies behind.
+fn cuts_rays() -> bool {
+    return CUT;
+}
+
 // Whether pixels look along their rays.
 fn looks_along_rays() -> bool {
     return CUT || is_by_means();

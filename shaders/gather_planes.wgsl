@@ -32,6 +32,11 @@ fn is_due_without_voxels(blocks: u32) -> bool {
     return (blocks_handed_on & blocks) != 0u;
 }
 
+// Rays end where they leave the box of voxel centres.
+fn cuts_rays() -> bool {
+    return true;
+}
+
 // Whether pixels look along their rays.
 fn looks_along_rays() -> bool {
     return true;

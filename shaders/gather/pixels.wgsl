@@ -1,11 +1,11 @@
 // The pixels of a thread of the tile rasterizer, in the compositing buffer and among first hits.
 //
-// Needs gather.wgsl: looks_along_rays.
+// Needs gather.wgsl: cuts_rays.
 // Needs gather/patch.wgsl: acc, gather, gathered, patch_range.
 // Needs gather/region.wgsl: block_word.
 // Needs gather/sheets.wgsl: hits, shown_from, shown_to.
 // Needs gather/slabs.wgsl: hits, shown_from, shown_to.
-// Needs gather_planes.wgsl: looks_along_rays.
+// Needs gather_planes.wgsl: cuts_rays.
 // Needs shared/frame.wgsl: frame.
 
 // A thread's four pixels.
@@ -78,7 +78,7 @@ fn store_hits(pixels: Pixels) {
 // voxels.
 fn open_word(pixels: Pixels, opacity: vec4f, depth: f32) -> u32 {
     var is_open = pixels.is_inside & (opacity < vec4f(select(3e38, frame.opacity_threshold, frame.culling != 0u)));
-    if looks_along_rays() {
+    if cuts_rays() {
         is_open &= shown_from < shown_to;
         is_open &= vec4<bool>(frame.culling == 0u) | (shown_to > vec4f(depth));
     }
