@@ -1,5 +1,5 @@
-// What every pixel sees of the slab between a plane and the one drawn before it: classified, shaded and composited (SPEC §9), in the tiles that either plane
-// has a value in, and noted where pixels are opaque (§6). One workgroup per tile.
+// Classifies, shades and composites the slab between a plane and the previously drawn one (SPEC §9), in the tiles in which either plane has a
+// value, and marks opaque pixels (§6). One workgroup per tile.
 
 @group(0) @binding(1) var<uniform> band: Band;
 // The sums of `field`.
@@ -18,7 +18,7 @@
 @group(0) @binding(13) var labels: texture_2d_array<u32>;
 @group(0) @binding(14) var values: texture_2d_array<u32>;
 @group(0) @binding(15) var<uniform> planes: FieldPlanes;
-// Of every pixel what the plane before has: its number, and its gradient, numbers per `unit`. Then what `is_by_means` keeps.
+// For every pixel the number and the gradient, in numbers per `unit`, on the previous plane.
 @group(0) @binding(16) var<storage, read_write> carried: array<vec4f>;
 
 // `frame.compositing`.
@@ -29,9 +29,6 @@ override FIRST_HIT: bool = false;
 // Whether gradients are the field's derivative.
 override KERNEL_GRADIENT: bool = false;
 
-const WORKGROUP_ROWS = 8u;
-
-var<workgroup> opaque_rows: array<atomic<u32>, TILE>;
 var<workgroup> is_carried: atomic<u32>;
 
 // The point of a pixel's ray at a sheet depth, in voxels.
@@ -115,7 +112,6 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
     let far = near + frame.slab_width;
     for (var row = local.y; row < TILE; row += WORKGROUP_ROWS) {
         let pixel = corner + vec2u(local.x, row);
-        // Pixels off the image count as opaque.
         var is_opaque = true;
         if all(pixel < frame.size) {
             let slot = (pixel.y - band.first_row) * frame.size.x + pixel.x;
@@ -160,25 +156,11 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
             // What lies behind a cut is as hidden as what lies behind opaque voxels.
             is_opaque = image.a >= frame.opacity_threshold || CUT && ray.y <= far;
         }
-        if is_opaque {
-            atomicOr(&opaque_rows[row], 1u << local.x);
-        }
+        mark_opaque(local.x, row, is_opaque);
     }
     workgroupBarrier();
-    if local.y == 0u {
-        let y = corner.y + local.x;
-        if y < frame.size.y {
-            opaque[y * words + corner.x / TILE] = atomicLoad(&opaque_rows[local.x]);
-        }
-        if local.x == 0u {
-            var all_opaque = 0xffffffffu;
-            for (var row = 0u; row < TILE; row += 1u) {
-                all_opaque &= atomicLoad(&opaque_rows[row]);
-            }
-            opaque_tiles[tile] = select(0u, 1u, all_opaque == 0xffffffffu);
-            if atomicLoad(&is_carried) != 0u {
-                last_groups[tile] = sheet_group.number;
-            }
-        }
+    write_opaque(tile, local.xy);
+    if all(local.xy == vec2u()) && atomicLoad(&is_carried) != 0u {
+        last_groups[tile] = sheet_group.number;
     }
 }

@@ -22,10 +22,6 @@ override COMPOSITING: u32 = 0u;
 override CUT: bool = false;
 override FIRST_HIT: bool = false;
 
-const WORKGROUP_ROWS = 8u;
-
-var<workgroup> opaque_rows: array<atomic<u32>, TILE>;
-
 // Whether a sheet changes the image.
 fn counts(opacity: f32, middle: f32, counted: vec2f) -> bool {
     switch COMPOSITING {
@@ -58,7 +54,6 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
     let is_after_gap = last_groups[tile] + 1u != sheet_group.number;
     for (var row = local.y; row < TILE; row += WORKGROUP_ROWS) {
         let pixel = corner + vec2u(local.x, row);
-        // Pixels off the image count as opaque.
         var is_opaque = true;
         if all(pixel < frame.size) {
             let slot = (pixel.y - band.first_row) * frame.size.x + pixel.x;
@@ -104,23 +99,11 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
             let is_cut = CUT && ray.y <= sheet_group.near + f32(layers) * frame.slab_width;
             is_opaque = image.a >= frame.opacity_threshold || is_cut;
         }
-        if is_opaque {
-            atomicOr(&opaque_rows[row], 1u << local.x);
-        }
+        mark_opaque(local.x, row, is_opaque);
     }
     workgroupBarrier();
-    if local.y == 0u {
-        let y = corner.y + local.x;
-        if y < frame.size.y {
-            opaque[y * words + corner.x / TILE] = atomicLoad(&opaque_rows[local.x]);
-        }
-        if local.x == 0u {
-            var all_opaque = 0xffffffffu;
-            for (var row = 0u; row < TILE; row += 1u) {
-                all_opaque &= atomicLoad(&opaque_rows[row]);
-            }
-            opaque_tiles[tile] = select(0u, 1u, all_opaque == 0xffffffffu);
-            last_groups[tile] = sheet_group.number;
-        }
+    write_opaque(tile, local.xy);
+    if all(local.xy == vec2u()) {
+        last_groups[tile] = sheet_group.number;
     }
 }

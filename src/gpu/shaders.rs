@@ -109,6 +109,7 @@ pub const COMPOSITE: Shader = shader!(
     "shared/brick",
     "shared/band",
     "shared/tile_list",
+    "shared/opaque",
     "shared/compositing",
     "shared/cut",
     "shared/means"
@@ -140,6 +141,7 @@ pub const CLASSIFY: Shader = shader!(
     "shared/brick",
     "shared/band",
     "shared/tile_list",
+    "shared/opaque",
     "shared/compositing",
     "shared/cut",
     "shared/means",
