@@ -9,12 +9,14 @@
 @group(0) @binding(5) var<storage, read_write> opaque: array<u32>;
 @group(0) @binding(6) var<storage, read_write> opaque_tiles: array<u32>;
 @group(0) @binding(7) var<uniform> sheet_group: SheetGroup;
-@group(0) @binding(8) var<uniform> cut: Cut;
+@group(0) @binding(8) var<uniform> cuts: array<Cut, 1>;
 @group(0) @binding(9) var surfaces: texture_depth_2d;
 // For every pixel the bits of its first hit's sheet depth; 0 where the opacity has not been reached.
 @group(0) @binding(10) var<storage, read_write> hits: array<u32>;
 // For every tile the number of the last group that composited it.
 @group(0) @binding(11) var<storage, read_write> last_groups: array<u32>;
+
+var<private> cut: Cut;
 
 // `frame.compositing`.
 override COMPOSITING: u32 = 0u;
@@ -40,6 +42,8 @@ fn counts(opacity: f32, middle: f32, counted: vec2f) -> bool {
 @compute @workgroup_size(32, 8)
 fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workgroup: vec3u) {
     start(workgroup.z);
+    // For the reason that `start` gives.
+    cut = cuts[zero];
     let at = unfold(workgroup);
     if at >= composited.args.count {
         return;

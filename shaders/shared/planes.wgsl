@@ -16,6 +16,7 @@ const MIN_WEIGHT = 1e-3;
 
 // The number of a point without a value; all other numbers are at most 4.
 const NO_NUMBER = 1e30;
+const NO_NUMBER_BITS = 0x7149f2cau;
 
 // The position of a voxel's kernel on a plane.
 struct OnPlane {

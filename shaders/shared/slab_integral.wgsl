@@ -34,6 +34,17 @@ fn cell_of(table: u32, bins: f32, domain: vec4f, x: f32) -> u32 {
     return first;
 }
 
+// The colour at a number.
+fn color_at(table: u32, x: f32) -> vec3f {
+    let head = control_points[table];
+    let domain = control_points[table + 1u];
+    let within = clamp(x, domain.x, domain.z);
+    let cell = table + 2u + u32(head.y) + CELL * cell_of(table, head.y, domain, within);
+    let start = control_points[cell];
+    let along = clamp((within - start.x) * start.y, 0.0, 1.0);
+    return control_points[cell + 1u].rgb + control_points[cell + 2u].rgb * along;
+}
+
 // The means of m·C and m over the part of a cell between two numbers. `cell` is its first entry.
 fn mean_of_part(cell: u32, low: f32, high: f32, origin: f32) -> array<vec4f, 2> {
     let start = control_points[cell];

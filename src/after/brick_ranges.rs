@@ -10,8 +10,44 @@ use glam::UVec3;
 use rayon::prelude::*;
 
 use crate::lists::iso_range::ValueSet;
+use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::{Grid, Volume};
+
+/// The values around a brick that bear on the image, beside those with an opacity, because of how values are composited.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bearing {
+    /// No others: every slab counts by its own opacity.
+    Own,
+    /// Values above any with an opacity, which may be maxima.
+    Greater,
+    /// Values below any with an opacity, which may be minima.
+    Smaller,
+    /// All values, which averages are taken of.
+    All,
+}
+
+impl Bearing {
+    /// The values that bear on images composited this way.
+    pub fn of(compositing: Compositing) -> Self {
+        match compositing {
+            Compositing::Maximum => Self::Greater,
+            Compositing::Minimum => Self::Smaller,
+            Compositing::Average => Self::All,
+            _ => Self::Own,
+        }
+    }
+
+    /// The range in which a value with an opacity makes a brick matter, for the range of the coefficients around the brick.
+    pub fn range(self, [min, max]: [f32; 2]) -> [f32; 2] {
+        match self {
+            Self::Own => [min, max],
+            Self::Greater => [f32::MIN, max],
+            Self::Smaller => [min, f32::MAX],
+            Self::All => [f32::MIN, f32::MAX],
+        }
+    }
+}
 
 /// The side of a brick in voxels.
 const SIDE: u32 = 4;
@@ -41,11 +77,15 @@ impl BrickRanges {
     }
 
     /// Whether each brick may be drawn.
-    pub fn shown(&self, volume: &Volume, transfer: &TransferFunction) -> Vec<bool> {
+    pub fn shown(&self, volume: &Volume, transfer: &TransferFunction, bearing: Bearing) -> Vec<bool> {
         let labels = volume.labels().map(|_| transfer.labels.keys()).into_iter().flatten();
         let tables = labels.map(|&label| transfer.tables(Some(label))).chain([transfer.tables(None)]);
         let values = tables.fold(ValueSet::default(), |all, tables| all.union(&ValueSet::of_tables(&tables)));
-        self.ranges.par_iter().map(|&[min, max]| min <= max && values.meets(min, max)).collect()
+        let is_shown = |&[min, max]: &[f32; 2]| {
+            let [low, high] = bearing.range([min, max]);
+            min <= max && values.meets(low, high)
+        };
+        self.ranges.par_iter().map(is_shown).collect()
     }
 
     /// The voxels of the bricks that are wanted, without holes, in memory order.
@@ -130,8 +170,12 @@ mod tests {
         let opacity = Ramp::new(vec![(49.0, 0.0), (50.0, 1.0), (51.0, 0.0)]).unwrap();
         let transfer = TransferFunction::by_value(Ramp::new(vec![(0.0, DVec3::ONE)]).unwrap(), opacity);
         let ranges = BrickRanges::new(&grid, volume.values(), UVec3::splat(5));
-        let shown = ranges.shown(&volume, &transfer);
+        let shown = ranges.shown(&volume, &transfer, Bearing::Own);
         assert_eq!(shown, [false, true, true, true, true, false]);
         assert_eq!(ranges.voxels(&volume, |brick| shown[brick]).len(), 4 * 64);
+        // A maximum of 100 hides the peak, a minimum of 0 too, and both are in averages.
+        assert_eq!(ranges.shown(&volume, &transfer, Bearing::Greater), [false, true, true, true, true, true]);
+        assert_eq!(ranges.shown(&volume, &transfer, Bearing::Smaller), [true, true, true, true, true, false]);
+        assert_eq!(ranges.shown(&volume, &transfer, Bearing::All), [true; 6]);
     }
 }

@@ -12,7 +12,7 @@
 //!
 //! | entries | hold |
 //! |---|---|
-//! | `HEAD` | (cells, bins, the minimum and maximum number with an opacity); (the minimum number, bins per number, the maximum number, 0) |
+//! | `HEAD` | (cells, bins, the minimum and maximum number with an opacity, for `surface` of one half); (the minimum number, bins per number, the maximum number, 0) |
 //! | bins | (first cell, last cell, 0, 0) that a number in this bin may lie in |
 //! | cells · `CELL` | (minimum number, 1/width, α, α's rise over the cell); (C, maximum number); (C's rise, 0) |
 //! | levels · cells · `SUM` | (∫m, ∫m·(x - middle), middle, 0); (∫m·C, 0) between the cell and the middle of its block |
@@ -63,8 +63,10 @@ pub fn table(tables: &Tables, compositing: Compositing, numbers: &Normalization)
     let [first, end] = [cells[0].ends[0], cells[cells.len() - 1].ends[1]];
     let bins = (4 * cells.len()).next_power_of_two().clamp(16, 1024);
     let per_number = bins as f64 / (end - first);
-    let shown = cells.iter().filter(|cell| cell.alpha[0].max(cell.alpha[1]) > 0.0);
-    // Nothing lies between these if nothing has an opacity.
+    // A surface is where the opacity is one half.
+    let is_shown = |alpha: f64| if compositing == Compositing::Surface { alpha >= 0.5 } else { alpha > 0.0 };
+    let shown = cells.iter().filter(|cell| is_shown(cell.alpha[0].max(cell.alpha[1])));
+    // Nothing lies between these if nothing has such an opacity.
     let shown = shown.fold([f64::from(f32::MAX), f64::from(f32::MIN)], |[low, high], cell| {
         [low.min(cell.ends[0]), high.max(cell.ends[1])]
     });

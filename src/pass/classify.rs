@@ -107,7 +107,7 @@ fn compile(device: &Device, mode: ClassifyMode) -> ComputeStage {
         ("labels", texture_of_integers(stage, TextureViewDimension::D2Array)),
         ("values", texture_of_integers(stage, TextureViewDimension::D2Array)),
         ("planes", uniform::<FieldPlanes>(stage, false)),
-        ("carried", storage::<[f32; 4]>(stage, false)),
+        ("carried", storage::<[u32; 4]>(stage, false)),
     ];
     let slots = [&slots()[..], &own].concat();
     let flag = |is_set| f64::from(u8::from(is_set));
