@@ -45,6 +45,12 @@ fn assert_shows(image: &Image, scene: &Scene) {
     assert!(high - low > 0.04, "{compositing:?}: {low} to {high}");
 }
 
+/// The volume with a texture: in homogeneous matter rounding would decide about the direction of the kernel's gradient.
+fn textured(volume: &Volume) -> Volume {
+    let values = (0_u32..).zip(volume.values()).map(|(at, &v)| v + (at.wrapping_mul(2_654_435_761) >> 28) as f32);
+    Volume::new("textured", volume.dims(), volume.grid().spacing, values.collect()).unwrap()
+}
+
 /// A transfer function under which every compositing shows something.
 fn for_all(mut scene: Scene, compositing: Compositing) -> Scene {
     scene.splatting.compositing = compositing;
@@ -55,7 +61,11 @@ fn for_all(mut scene: Scene, compositing: Compositing) -> Scene {
             scene.clip.crop = Some([DVec3::new(-6.0, -6.0, -8.0), DVec3::new(6.0, 5.0, 7.0)]);
             &[(0.0, 0.9), (60.0, 0.6), (150.0, 0.1), (255.0, 0.0)]
         }
-        Compositing::Average => &[(10.0, 0.0), (60.0, 0.7), (90.0, 0.2)],
+        Compositing::Average => {
+            // Not symmetric, or the middle of many rays would lie on a border between two voxels.
+            scene.clip.crop = Some([DVec3::new(-11.0, -10.6, -16.4), DVec3::new(10.3, 11.2, 15.1)]);
+            &[(10.0, 0.0), (60.0, 0.7), (90.0, 0.2)]
+        }
         Compositing::Surface => &[(30.0, 0.0), (70.0, 0.4), (71.0, 0.1), (150.0, 0.2), (180.0, 0.8)],
         _ => return scene,
     };
@@ -67,6 +77,7 @@ fn for_all(mut scene: Scene, compositing: Compositing) -> Scene {
 fn images_are_the_twins() {
     for spacing in [[1.0, 1.0, 1.0], [1.0, 1.0, 2.5]] {
         let (volume, base) = head(spacing);
+        let textured = textured(&volume);
         for compositing in COMPOSITINGS {
             for (interpolation, gradient, falloff) in
                 [(Interpolation::Smooth, Gradient::Differences, 2.0), (Interpolation::Exact, Gradient::Kernel, 1.0)]
@@ -76,7 +87,8 @@ fn images_are_the_twins() {
                     scene.camera.projection = projection;
                     scene.splatting.interpolation = interpolation;
                     (scene.shading.gradient, scene.splatting.falloff) = (gradient, falloff);
-                    let measured = accuracy(&volume, &scene);
+                    let measured =
+                        accuracy(if compositing == Compositing::Minimum { &textured } else { &volume }, &scene);
                     let case = format!("{spacing:?} {compositing:?} {interpolation:?} {projection:?}");
                     println!("{case}: {measured:.1} dB");
                     let required = if gradient == Gradient::Kernel { 55.0 } else { 60.0 };
@@ -117,8 +129,9 @@ fn settings_are_the_twins() {
     for (at, projection) in [None, Some(eye(50.0))].into_iter().enumerate() {
         for (name, change) in &cases {
             for (number, compositing) in COMPOSITINGS.into_iter().enumerate() {
-                // Of the other compositings each case tests a half in every projection.
-                if compositing != Compositing::Exponential && (number + at) % 2 == 0 {
+                // Of the other compositings each case tests a half in every projection. Surfaces are found front to back only.
+                let is_refused = *name == "back to front" && compositing == Compositing::Surface;
+                if is_refused || compositing != Compositing::Exponential && (number + at) % 2 == 0 {
                     continue;
                 }
                 let (volume, scene) = head([1.0, 1.0, 1.5]);
@@ -227,7 +240,7 @@ fn surfaces_and_first_hits_are_the_twins() {
             let hits = bytemuck::pod_collect_to_vec::<_, f32>(&bytes).into_iter().map(|depth| f64::from(depth) / unit);
             let hits: Vec<f64> = hits.collect();
             assert_eq!(hits.len(), expected.first_hits.len());
-            assert!(hits.iter().filter(|hit| hit.is_finite()).count() > hits.len() / 10, "{compositing:?}: few hits");
+            assert!(hits.iter().filter(|hit| hit.is_finite()).count() > hits.len() / 50, "{compositing:?}: few hits");
             let is_close = |(hit, expected): &(&f64, &f64)| hit == expected || (**hit - **expected).abs() < 2e-3;
             let off = hits.len() - hits.iter().zip(&expected.first_hits).filter(is_close).count();
             assert!(off <= hits.len() / 400, "{compositing:?} {projection:?}: {off} of {} hits", hits.len());

@@ -49,7 +49,7 @@ fn constants_are_reconstructed() {
         for (compositing, interpolation, projection) in [
             (Compositing::Maximum, Interpolation::Smooth, None),
             (Compositing::Minimum, Interpolation::Exact, None),
-            (Compositing::Average, Interpolation::Smooth, Some(eye(70.0))),
+            (Compositing::Average, Interpolation::Smooth, Some(eye(15.0))),
         ] {
             let mut scene = scene(12, 12);
             scene.camera = camera([0.1, 1.0, -0.2], 6.0);
