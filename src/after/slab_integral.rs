@@ -26,11 +26,11 @@ use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::{Ramp, Tables};
 
 /// The number of entries before the bins.
-const HEAD: usize = 2;
+pub(crate) const HEAD: usize = 2;
 /// The number of entries of a cell.
-const CELL: usize = 3;
+pub(crate) const CELL: usize = 3;
 /// The number of entries of a sum.
-const SUM: usize = 2;
+pub(crate) const SUM: usize = 2;
 
 /// The smallest ratio of `1 - α` at the two ends of a cell for `exponential`.
 const RATIO: f64 = 0.840_896_415_253_714_6;
@@ -39,7 +39,7 @@ const RATIO: f64 = 0.840_896_415_253_714_6;
 const MAX_ALPHA: f64 = 0.9999;
 
 /// The distance of the two Gauss nodes of an interval from its middle, in lengths of the interval.
-const NODE: f64 = 0.288_675_134_594_812_9;
+pub(crate) const NODE: f64 = 0.288_675_134_594_812_9;
 
 /// A range of values over which α and C are linear.
 #[derive(Clone, Copy, Debug)]
@@ -156,7 +156,7 @@ fn pieces(compositing: Compositing, [low, high]: [f64; 2], alpha: [f64; 2]) -> V
 
 /// m of SPEC §5.
 fn amount(compositing: Compositing, alpha: f64) -> f64 {
-    if compositing == Compositing::Exponential { -(-alpha.min(MAX_ALPHA)).ln_1p() } else { alpha }
+    if compositing == Compositing::Exponential { -libm::log1p(-alpha.min(MAX_ALPHA)) } else { alpha }
 }
 
 /// The integrals over a cell, with moments relative to `from`.
