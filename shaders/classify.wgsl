@@ -1,5 +1,5 @@
-// What every pixel sees of the slab between a plane and the one drawn before it: classified, shaded and composited (SPEC §9), in the tiles that either plane
-// has a value in, and noted where pixels are opaque (§6). One workgroup per tile.
+// Classifies, shades and composites the slab between a plane and the previously drawn one (SPEC §9), in the tiles in which either plane has a
+// value, and marks opaque pixels (§6). One workgroup per tile.
 
 @group(0) @binding(1) var<uniform> band: Band;
 // The sums of `field`.
@@ -9,7 +9,7 @@
 @group(0) @binding(5) var<storage, read_write> opaque: array<u32>;
 @group(0) @binding(6) var<storage, read_write> opaque_tiles: array<u32>;
 @group(0) @binding(7) var<uniform> sheet_group: SheetGroup;
-@group(0) @binding(8) var<uniform> cut: Cut;
+@group(0) @binding(8) var<uniform> cuts: array<Cut, 1>;
 @group(0) @binding(9) var surfaces: texture_depth_2d;
 @group(0) @binding(10) var<storage, read_write> hits: array<u32>;
 // For every tile the number of the last group whose plane has a value in it.
@@ -18,8 +18,12 @@
 @group(0) @binding(13) var labels: texture_2d_array<u32>;
 @group(0) @binding(14) var values: texture_2d_array<u32>;
 @group(0) @binding(15) var<uniform> planes: FieldPlanes;
-// Of every pixel what the plane before has: its number, and its gradient, numbers per `unit`. Then what `is_by_means` keeps.
-@group(0) @binding(16) var<storage, read_write> carried: array<vec4f>;
+// For every pixel what it carries from plane to plane, as bits: the number on the previous plane, and there its gradient in numbers per `unit`. For
+// `maximum` and `minimum` the gradient is packed and followed by the number chosen so far; for `average` the sum and the count of the numbers
+// so far are in its place.
+@group(0) @binding(16) var<storage, read_write> carried: array<vec4u>;
+
+var<private> cut: Cut;
 
 // `frame.compositing`.
 override COMPOSITING: u32 = 0u;
@@ -29,25 +33,7 @@ override FIRST_HIT: bool = false;
 // Whether gradients are the field's derivative.
 override KERNEL_GRADIENT: bool = false;
 
-const WORKGROUP_ROWS = 8u;
-
-var<workgroup> opaque_rows: array<atomic<u32>, TILE>;
 var<workgroup> is_carried: atomic<u32>;
-
-// The point of a pixel's ray at a sheet depth, in voxels.
-fn voxel_at(at: vec3f, sheet_depth: f32) -> vec3f {
-    let depth = (sheet_depth - dot(cut.sheet_at.xyz, at)) / dot(cut.sheet_along.xyz, at);
-    var place = vec3f();
-    for (var axis = 0u; axis < 3u; axis += 1u) {
-        place[axis] = dot(cut.box_at[axis].xyz, at) + depth * dot(cut.box_along[axis].xyz, at);
-    }
-    return place + 0.5 * vec3f(frame.dims.xyz - 1u);
-}
-
-// The voxel whose cell holds a point.
-fn nearest_voxel(place: vec3f) -> vec3u {
-    return vec3u(clamp(floor(place + 0.5), vec3f(0.0), vec3f(frame.dims.xyz - 1u)));
-}
 
 // What a pixel sees of the plane that was drawn: the number and the gradient.
 fn plane_sample(pixel: vec2u, at: vec3f) -> vec4f {
@@ -68,34 +54,161 @@ fn plane_sample(pixel: vec2u, at: vec3f) -> vec4f {
     return vec4f(number, in_grid(-2.0 * frame.falloff / first.x * moment) / frame.aspect.xyz);
 }
 
-// What a stretch of a slab, given by its middle, looks like.
-struct Look {
-    // m and C, shaded.
-    amount: f32,
-    color: vec3f,
+// Numbers that differ by less, relative to the range of all numbers, count as equal: in homogeneous matter only rounding tells them apart.
+const HAIR_OF_RANGE = 2e-6;
+
+// What a pixel carries before its first plane.
+const NOTHING_CARRIED = vec4u(NO_NUMBER_BITS, 0u, 0u, NO_NUMBER_BITS);
+
+// The sample at the previous plane.
+fn carried_sample(held: vec4u) -> vec4f {
+    if COMPOSITING == AVERAGE {
+        return vec4f(bitcast<f32>(held.x), 0.0, 0.0, 0.0);
+    }
+    if COMPOSITING == MAXIMUM || COMPOSITING == MINIMUM {
+        return vec4f(bitcast<f32>(held.x), unpacked(held.y, held.z));
+    }
+    return bitcast<vec4f>(held);
 }
 
-fn ramps_at(at: vec3f, sheet_depth: f32) -> vec4u {
-    if !LABELS {
-        return vec4u(0u, frame.ramps.xyz);
+// The same with another sample.
+fn with_sample(held: vec4u, drawn: vec4f) -> vec4u {
+    if COMPOSITING == AVERAGE {
+        return vec4u(bitcast<u32>(drawn.x), held.yzw);
     }
-    return ramps_of(index_of(nearest_voxel(voxel_at(at, sheet_depth))));
+    if COMPOSITING == MAXIMUM || COMPOSITING == MINIMUM {
+        return vec4u(bitcast<u32>(drawn.x), packed(drawn.yzw), held.w);
+    }
+    return bitcast<vec4u>(drawn);
 }
 
-// Two points' numbers and gradients, from the nearer to the farther one.
-fn look(near: vec4f, far: vec4f, ramps: vec4u, light: Lighting) -> Look {
-    let means = slab_integral(ramps.w, near.x, far.x);
-    if means.amount <= 0.0 {
-        return Look(0.0, vec3f(0.0));
+// A pixel's ray in the slab.
+struct Slab {
+    // The position on the image that identifies the ray.
+    at: vec3f,
+    // The sheet depths of the planes, and of the stretch of the whole ray that counts; reversed if it is empty.
+    near: f32,
+    far: f32,
+    ray: vec2f,
+    // The samples at the planes; where only one has a value, it stands for both.
+    first: vec4f,
+    last: vec4f,
+    // The sample at the plane that was drawn.
+    drawn: vec4f,
+}
+
+// The sample on the line of values between the planes.
+fn sample_at(slab: Slab, sheet_depth: f32) -> vec4f {
+    return mix(slab.first, slab.last, (sheet_depth - slab.near) / frame.slab_width);
+}
+
+// A pixel's colour, with what it carries from plane to plane, and the sheet depth of its first hit.
+struct Composited {
+    image: vec4f,
+    carried: vec4u,
+    hit: f32,
+    is_changed: bool,
+}
+
+// `linear`, `exponential`, `xray`: composites the slab's sheet.
+fn composite_slab(slab: Slab, image: vec4f, light: Lighting) -> Composited {
+    let part = vec2f(max(slab.ray.x, slab.near), min(slab.ray.y, slab.far));
+    // The share of the slab's width, from what is missing, so that whole slabs are not rounded.
+    let missing = max(slab.ray.x - slab.near, 0.0) + max(slab.far - slab.ray.y, 0.0);
+    let share = max(1.0 - missing / frame.slab_width, 0.0);
+    let seen = look(slab.first, slab.last, ramps_at(slab.at, 0.5 * (part.x + part.y)), light);
+    let slope = select(vec2f(0.0), frame.pixel_per_depth * slab.at.xy, frame.near > 0.0);
+    let per_sheet = sqrt(1.0 + dot(slope, slope)) / dot(cut.sheet_along.xyz, slab.at);
+    let sheet = vec4f(seen.color, 1.0) * (seen.amount * share * frame.slab_width * per_sheet);
+    let is_changed = sheet.a > 0.0;
+    let composited = select(image, composite(image, sheet, COMPOSITING, frame.order), is_changed);
+    let reached = (cut.first_hit - image.a) / (composited.a - image.a);
+    let is_hit = is_changed && image.a < cut.first_hit && composited.a >= cut.first_hit;
+    return Composited(composited, vec4u(), select(FAR, mix(part.x, part.y, reached), is_hit), is_changed);
+}
+
+// `surface`: the pixel is opaque where its ray first meets one.
+fn find_surface(slab: Slab, image: vec4f, light: Lighting) -> Composited {
+    let start = max(slab.ray.x - slab.near, 0.0) / frame.slab_width;
+    let end = 1.0 - max(slab.far - slab.ray.y, 0.0) / frame.slab_width;
+    var share = NO_SURFACE;
+    // Of two surfaces the nearer one counts.
+    if start < end && (frame.order != FRONT_TO_BACK || image.a < 1.0) {
+        if LABELS {
+            let first = voxel_at(slab.at, slab.near);
+            share = surface_in_cells(slab.first, slab.last, start, end, first, voxel_at(slab.at, slab.far));
+        } else {
+            share = surface_between(slab.first, slab.last, start, end, vec4u(0u, frame.ramps.xyz));
+        }
     }
-    let gradient = gradient_of(0.5 * planes.per_number * mix(near.yzw, far.yzw, means.share));
-    let factor = ramp(ramps.z, ramps.w, gradient.magnitude).x;
-    return Look(means.amount * factor, shade(means.color, gradient, light));
+    if share == NO_SURFACE {
+        return Composited(image, vec4u(), FAR, false);
+    }
+    let sheet_depth = slab.near + share * frame.slab_width;
+    let ramps = ramps_at(slab.at, sheet_depth);
+    let gradient = gradient_between(slab.first, slab.last, share);
+    let color = color_at(ramps.w, mix(slab.first.x, slab.last.x, share));
+    return Composited(vec4f(shade(color, gradient, light), 1.0), vec4u(), sheet_depth, true);
+}
+
+// `maximum`, `minimum`, `average`: chooses among the planes' points, or means them. While there is no such point, the pixel has the colour of the
+// middle of its stretch, if the slab holds it.
+fn choose(slab: Slab, image: vec4f, before: vec4u, light: Lighting) -> Composited {
+    let plane = sheet_group.near;
+    let is_point = slab.drawn.x != NO_NUMBER && slab.ray.x <= plane && plane <= slab.ray.y;
+    let middle = 0.5 * (slab.ray.x + slab.ray.y);
+    let is_middle_here = slab.ray.x <= slab.ray.y && slab.near <= middle && middle < slab.far;
+    var carried = before;
+    var is_chosen = is_point;
+    var sheet_depth = plane;
+    var point = slab.drawn;
+    var is_first = false;
+    if COMPOSITING == AVERAGE {
+        let sum = bitcast<vec2f>(before.yz) + select(vec2f(0.0), vec2f(slab.drawn.x, 1.0), is_point);
+        carried = vec4u(0u, bitcast<vec2u>(sum), 0u);
+        is_first = sum.y == 0.0;
+        point = vec4f(sum.x / max(sum.y, 1.0), 0.0, 0.0, 0.0);
+        sheet_depth = middle;
+    } else {
+        let best = bitcast<f32>(before.w);
+        // The nearest of equal ones is chosen.
+        let domain = control_points[frame.ramps.z + 1u];
+        let hair = select(-HAIR_OF_RANGE, HAIR_OF_RANGE, frame.order == FRONT_TO_BACK) * (domain.z - domain.x);
+        let gain = select(slab.drawn.x - best, best - slab.drawn.x, COMPOSITING == MINIMUM);
+        is_chosen = is_point && (best == NO_NUMBER || gain > hair);
+        is_first = best == NO_NUMBER && !is_point;
+        // Back to front, where a nearer point may be chosen that is not quite as good, the best number stays.
+        let is_best = is_chosen && (best == NO_NUMBER || gain > 0.0);
+        carried.w = select(before.w, bitcast<u32>(slab.drawn.x), is_best);
+    }
+    if is_first && is_middle_here {
+        is_chosen = true;
+        sheet_depth = middle;
+        point = sample_at(slab, middle);
+    }
+    if !is_chosen {
+        return Composited(image, carried, FAR, false);
+    }
+    let ramps = ramps_at(slab.at, sheet_depth);
+    var seen = Look();
+    if COMPOSITING == AVERAGE {
+        let mean = slab_integral(ramps.w, point.x, point.x);
+        seen = Look(mean.amount, mean.color);
+    } else {
+        seen = look(point, point, ramps, light);
+    }
+    let alpha = min(seen.amount, 1.0);
+    let is_hit = alpha >= cut.first_hit;
+    // Compositing stores 2 minus a minimum's opacity.
+    let stored = select(alpha, 2.0 - alpha, COMPOSITING == MINIMUM);
+    return Composited(vec4f(seen.color * alpha, stored), carried, select(FAR, sheet_depth, is_hit), true);
 }
 
 @compute @workgroup_size(32, 8)
 fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workgroup: vec3u) {
     start(workgroup.z);
+    // For the reason that `start` gives.
+    cut = cuts[zero];
     let list_place = unfold(workgroup);
     if list_place >= composited.args.count {
         return;
@@ -115,7 +228,6 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
     let far = near + frame.slab_width;
     for (var row = local.y; row < TILE; row += WORKGROUP_ROWS) {
         let pixel = corner + vec2u(local.x, row);
-        // Pixels off the image count as opaque.
         var is_opaque = true;
         if all(pixel < frame.size) {
             let slot = (pixel.y - band.first_row) * frame.size.x + pixel.x;
@@ -123,8 +235,9 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
             let at = place_of(px);
             var image = acc[slot];
             let drawn = plane_sample(pixel, at);
-            let before = select(carried[slot], vec4f(NO_NUMBER, 0.0, 0.0, 0.0), is_after_gap);
-            carried[slot] = drawn;
+            let held = select(carried[slot], NOTHING_CARRIED, last_group == 0u);
+            let before = select(carried_sample(held), vec4f(NO_NUMBER, 0.0, 0.0, 0.0), is_after_gap);
+            var now = held;
             if drawn.x != NO_NUMBER {
                 atomicStore(&is_carried, 1u);
             }
@@ -133,52 +246,39 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
                 depths = both(depths, shown_depths(px));
             }
             let ray = sheet_depths(at, depths);
-            // By what the ray's stretch is less than the slab, so that inside nothing is rounded.
-            let missing = max(ray.x - near, 0.0) + max(far - ray.y, 0.0);
-            let share = max(1.0 - missing / frame.slab_width, 0.0);
-            // No `if` depends on the ray alone, for the reason that `start` gives.
             if min(drawn.x, before.x) != NO_NUMBER {
-                // If only one plane has a value it stands for both.
+                // If only one plane has a value, it stands for both.
                 let own = select(drawn, before, drawn.x == NO_NUMBER);
                 let other = select(before, drawn, before.x == NO_NUMBER);
                 let first = select(own, other, is_front_to_back);
                 let last = select(other, own, is_front_to_back);
-                let part = vec2f(max(ray.x, near), min(ray.y, far));
-                let ramps = ramps_at(at, 0.5 * (part.x + part.y));
-                let seen = look(first, last, ramps, lighting(px, frame.near > 0.0));
-                let slope = select(vec2f(0.0), frame.pixel_per_depth * at.xy, frame.near > 0.0);
-                let per_sheet = sqrt(1.0 + dot(slope, slope)) / dot(cut.sheet_along.xyz, at);
-                let sheet = vec4f(seen.color, 1.0) * (seen.amount * share * frame.slab_width * per_sheet);
-                let opacity = image.a;
-                image = select(image, composite(image, sheet, COMPOSITING, frame.order), sheet.a > 0.0);
+                let slab = Slab(at, near, far, ray, first, last, drawn);
+                let light = lighting(px, frame.near > 0.0);
+                var composited = Composited();
+                if COMPOSITING == SURFACE {
+                    composited = find_surface(slab, image, light);
+                } else if is_by_means() {
+                    composited = choose(slab, image, held, light);
+                    now = composited.carried;
+                } else {
+                    composited = composite_slab(slab, image, light);
+                }
+                image = composited.image;
                 acc[slot] = image;
-                if FIRST_HIT && opacity < cut.first_hit && image.a >= cut.first_hit {
-                    let reached = (cut.first_hit - opacity) / (image.a - opacity);
-                    hits[pixel.y * frame.size.x + pixel.x] = noted(mix(part.x, part.y, reached));
+                if FIRST_HIT && composited.is_changed && (is_by_means() || composited.hit != FAR) {
+                    let hit = select(noted(composited.hit), 0u, composited.hit == FAR);
+                    hits[pixel.y * frame.size.x + pixel.x] = hit;
                 }
             }
+            carried[slot] = with_sample(now, drawn);
             // What lies behind a cut is as hidden as what lies behind opaque voxels.
             is_opaque = image.a >= frame.opacity_threshold || CUT && ray.y <= far;
         }
-        if is_opaque {
-            atomicOr(&opaque_rows[row], 1u << local.x);
-        }
+        mark_opaque(local.x, row, is_opaque);
     }
     workgroupBarrier();
-    if local.y == 0u {
-        let y = corner.y + local.x;
-        if y < frame.size.y {
-            opaque[y * words + corner.x / TILE] = atomicLoad(&opaque_rows[local.x]);
-        }
-        if local.x == 0u {
-            var all_opaque = 0xffffffffu;
-            for (var row = 0u; row < TILE; row += 1u) {
-                all_opaque &= atomicLoad(&opaque_rows[row]);
-            }
-            opaque_tiles[tile] = select(0u, 1u, all_opaque == 0xffffffffu);
-            if atomicLoad(&is_carried) != 0u {
-                last_groups[tile] = sheet_group.number;
-            }
-        }
+    write_opaque(tile, local.xy);
+    if all(local.xy == vec2u()) && atomicLoad(&is_carried) != 0u {
+        last_groups[tile] = sheet_group.number;
     }
 }

@@ -9,22 +9,20 @@
 @group(0) @binding(5) var<storage, read_write> opaque: array<u32>;
 @group(0) @binding(6) var<storage, read_write> opaque_tiles: array<u32>;
 @group(0) @binding(7) var<uniform> sheet_group: SheetGroup;
-@group(0) @binding(8) var<uniform> cut: Cut;
+@group(0) @binding(8) var<uniform> cuts: array<Cut, 1>;
 @group(0) @binding(9) var surfaces: texture_depth_2d;
 // For every pixel the bits of its first hit's sheet depth; 0 where the opacity has not been reached.
 @group(0) @binding(10) var<storage, read_write> hits: array<u32>;
 // For every tile the number of the last group that composited it.
 @group(0) @binding(11) var<storage, read_write> last_groups: array<u32>;
 
+var<private> cut: Cut;
+
 // `frame.compositing`.
 override COMPOSITING: u32 = 0u;
 // Whether anything is cut, and whether first hits are requested.
 override CUT: bool = false;
 override FIRST_HIT: bool = false;
-
-const WORKGROUP_ROWS = 8u;
-
-var<workgroup> opaque_rows: array<atomic<u32>, TILE>;
 
 // Whether a sheet changes the image.
 fn counts(opacity: f32, middle: f32, counted: vec2f) -> bool {
@@ -44,6 +42,8 @@ fn counts(opacity: f32, middle: f32, counted: vec2f) -> bool {
 @compute @workgroup_size(32, 8)
 fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workgroup: vec3u) {
     start(workgroup.z);
+    // For the reason that `start` gives.
+    cut = cuts[zero];
     let at = unfold(workgroup);
     if at >= composited.args.count {
         return;
@@ -58,7 +58,6 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
     let is_after_gap = last_groups[tile] + 1u != sheet_group.number;
     for (var row = local.y; row < TILE; row += WORKGROUP_ROWS) {
         let pixel = corner + vec2u(local.x, row);
-        // Pixels off the image count as opaque.
         var is_opaque = true;
         if all(pixel < frame.size) {
             let slot = (pixel.y - band.first_row) * frame.size.x + pixel.x;
@@ -104,23 +103,11 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
             let is_cut = CUT && ray.y <= sheet_group.near + f32(layers) * frame.slab_width;
             is_opaque = image.a >= frame.opacity_threshold || is_cut;
         }
-        if is_opaque {
-            atomicOr(&opaque_rows[row], 1u << local.x);
-        }
+        mark_opaque(local.x, row, is_opaque);
     }
     workgroupBarrier();
-    if local.y == 0u {
-        let y = corner.y + local.x;
-        if y < frame.size.y {
-            opaque[y * words + corner.x / TILE] = atomicLoad(&opaque_rows[local.x]);
-        }
-        if local.x == 0u {
-            var all_opaque = 0xffffffffu;
-            for (var row = 0u; row < TILE; row += 1u) {
-                all_opaque &= atomicLoad(&opaque_rows[row]);
-            }
-            opaque_tiles[tile] = select(0u, 1u, all_opaque == 0xffffffffu);
-            last_groups[tile] = sheet_group.number;
-        }
+    write_opaque(tile, local.xy);
+    if all(local.xy == vec2u()) {
+        last_groups[tile] = sheet_group.number;
     }
 }

@@ -1,4 +1,4 @@
-// Draws voxels onto a slab plane, one quad per voxel, added up in two sheet buffers: the sums that the field and its gradient are made of (SPEC §9;
+// Draws voxels onto a slab plane, one quad per voxel, and adds them up in two sheet buffers, as the sums for the field and its gradient (SPEC §9;
 // Mueller, Möller, Crawfis 1999).
 
 @group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
@@ -7,7 +7,7 @@
 @group(0) @binding(4) var<storage, read> args: Indirect;
 @group(0) @binding(5) var<uniform> planes: FieldPlanes;
 
-// Whether gradients are the field's derivative, not the voxels' differences.
+// Whether gradients are the derivative of the field, and not means of the voxels' differences.
 override KERNEL_GRADIENT: bool = false;
 
 struct Quad {
@@ -16,7 +16,7 @@ struct Quad {
     // Two rows: from pixel offsets to grid units along the planes' axes.
     @location(1) @interpolate(flat) rows: vec4f,
     @location(2) @interpolate(flat) number: f32,
-    // The gradient, and the plane's distance from the voxel.
+    // The voxel's gradient, and the plane's distance from the voxel.
     @location(3) @interpolate(flat) gradient: vec4f,
     // -falloff, and the radius squared.
     @location(4) @interpolate(flat) kernel: vec2f,
@@ -47,8 +47,8 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
     );
 }
 
-// (N, Σ c·g, Σ dx·g, Σ dy·g) and (Σ dz·g, 0, 0, 0), or of the kernel's derivative, with (a, b, t) from the voxel to the point,
-// (N, Σ c·g, Σ g·a, Σ g·b) and (Σ g·t, Σ c·g·a, Σ c·g·b, Σ c·g·t).
+// A voxel's terms of (N, Σ c·g, Σ dx·g, Σ dy·g) and (Σ dz·g, 0, 0, 0). For the kernel's derivative, with (a, b, t) from the voxel to the
+// point, those of (N, Σ c·g, Σ g·a, Σ g·b) and (Σ g·t, Σ c·g·a, Σ c·g·b, Σ c·g·t).
 @fragment
 fn fragment(quad: Quad) -> Two {
     start(u32(quad.position.z));

@@ -11,7 +11,7 @@
 // For every tile the number of the group that it was composited for last.
 @group(0) @binding(7) var<storage, read> last_groups: array<u32>;
 
-// Whether a group is a plane (SPEC §9): where it has no value, the plane before it still stands for both.
+// Whether a group is a plane (SPEC §9). Where it has no value, the value of the previous plane holds for the whole slab.
 override PLANE: bool = false;
 
 const WORKGROUP_SIZE = 256u;

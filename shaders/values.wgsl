@@ -1,16 +1,16 @@
-// Projects the voxels that are drawn onto slab planes for the first time, and finds their numbers and gradients, so once each (SPEC §9).
+// Projects every voxel that is drawn onto a slab plane for the first time, and computes its number and gradient, once per frame (SPEC §9).
 
 @group(0) @binding(1) var<storage, read> bricks: array<Brick>;
 @group(0) @binding(2) var values: texture_2d_array<u32>;
-// The bits of every voxel's coefficient, a number; only read where `EXACT`.
+// The bits of every voxel's coefficient as a number; read only if `EXACT`.
 @group(0) @binding(3) var coefficients: texture_2d_array<u32>;
-// Places: 64 times the brick's number, and the place in the brick.
+// Voxels: 64 times the brick's index, plus the slot in the brick.
 @group(0) @binding(4) var<storage, read> fresh: array<u32>;
 @group(0) @binding(5) var<storage, read> args: Indirect;
 @group(0) @binding(6) var<storage, read_write> voxels: array<FieldVoxel>;
 @group(0) @binding(7) var<uniform> planes: FieldPlanes;
 
-// Whether coefficients are not the values themselves.
+// Whether coefficients differ from the values.
 override EXACT: bool = false;
 
 fn number_at(index: u32) -> f32 {

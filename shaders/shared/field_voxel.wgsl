@@ -1,4 +1,4 @@
-// A voxel on its way to slab planes; `gpu::layout::FieldVoxel` documents the fields.
+// A voxel that is drawn onto slab planes; `gpu::layout::FieldVoxel` documents the fields.
 struct FieldVoxel {
     x: f32,
     y: f32,
@@ -8,12 +8,12 @@ struct FieldVoxel {
     gradient_z: u32,
 }
 
-// 2 to a power, which some drivers' `ldexp` and `frexp` do not survive.
+// 2 to a power from -126 to 127, from its bits: WGSL leaves the precision of `ldexp` and `exp2` to the driver.
 fn power_of_2(exponent: i32) -> f32 {
     return bitcast<f32>(u32(exponent + 127) << 23u);
 }
 
-// Three numbers that share an exponent: each keeps 15 bits of the largest one's.
+// Three numbers with a common exponent, each rounded to 15 bits of the largest.
 fn packed(v: vec3f) -> vec2u {
     let largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
     let exponent = clamp(i32((bitcast<u32>(largest) >> 23u) & 0xffu) - 126, -120, 120);

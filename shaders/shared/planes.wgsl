@@ -1,5 +1,5 @@
-// How kernels lie on slab planes, and what values are splatted as (SPEC §9); `gpu::layout::FieldPlanes` documents the fields. A stage that includes this declares
-// `planes: FieldPlanes`.
+// The position of kernels on slab planes, and the scale of the numbers that stand for values (SPEC §9); `gpu::layout::FieldPlanes` documents the
+// fields. A stage that includes this declares `planes: FieldPlanes`.
 struct FieldPlanes {
     axes: array<vec4f, 3>,
     step: vec4f,
@@ -14,16 +14,17 @@ struct FieldPlanes {
 // Below this sum of weights there is no value.
 const MIN_WEIGHT = 1e-3;
 
-// Stands for the number of a point without a value: all numbers are at most 4.
+// The number of a point without a value; all other numbers are at most 4.
 const NO_NUMBER = 1e30;
+const NO_NUMBER_BITS = 0x7149f2cau;
 
-// How a voxel's kernel lies on a plane.
+// The position of a voxel's kernel on a plane.
 struct OnPlane {
-    // Where its nearest point is seen.
+    // The pixel position of the plane's point that is nearest to the voxel.
     center_px: vec2f,
-    // From there, grid units along the two axes that a pixel offset along and across the screen's axis is; lowered to at most 1.
+    // The length of a pixel along the planes' two axes in grid units, lowered to at most 1 by the low-pass rule.
     per_pixel: vec2f,
-    // The plane's distance from the voxel, grid units, positive behind it.
+    // The plane's distance from the voxel in grid units, positive behind it.
     distance: f32,
 }
 
@@ -40,13 +41,13 @@ fn on_plane(offset: vec2f, depth: f32, plane: f32) -> OnPlane {
     return OnPlane(center, min(planes.per_pixel * from_eye, vec2f(1.0)), distance);
 }
 
-// The offset from a voxel to what a pixel sees of the plane: grid units along the two axes. `from_center` are pixels.
+// The offset from a voxel to a pixel's point of the plane, in grid units along the planes' two axes. `from_center` is in pixels.
 fn within_plane(lies: OnPlane, from_center: vec2f) -> vec2f {
     let axis = planes.screen_axis;
     return lies.per_pixel * vec2f(dot(axis, from_center), axis.x * from_center.y - axis.y * from_center.x);
 }
 
-// A vector given along the planes' axes and normal, in the grid.
+// The vector in the grid that has these components along the planes' axes and normal.
 fn in_grid(v: vec3f) -> vec3f {
     return v.x * planes.axes[0].xyz + v.y * planes.axes[1].xyz + v.z * planes.axes[2].xyz;
 }

@@ -1,20 +1,21 @@
-// The transfer function integrated from value to value (SPEC §9; Engel, Kraus, Ertl 2001), from a table that `after::slab_integral` makes and describes. A
-// stage that includes this declares `control_points` and includes `shading`. Values are numbers as `after::normalization` scales them.
+// The transfer function integrated from value to value (SPEC §9; Engel, Kraus, Ertl 2001), read from a table that `after::slab_integral` makes and
+// describes. A stage that includes this declares `control_points` and includes `shading`. Values are given as the numbers that
+// `after::normalization` makes of them.
 
-// What the transfer function makes of a slab's values.
+// The means of the transfer function over a slab's values.
 struct SlabIntegral {
     // The mean amount per unit length, without gradient opacity; 0 if no value has an opacity.
     amount: f32,
-    // Where the mean value lies on the way from the first value to the last.
+    // (v̄ - f0)/(f1 - f0): the position of the mean value between the first value and the last.
     share: f32,
     color: vec3f,
 }
 
-// Entries of a cell, and of a sum.
+// The number of entries of a cell, and of a sum.
 const CELL = 3u;
 const SUM = 2u;
 
-// Where the two Gauss nodes of an interval lie, from its middle, by its length.
+// The distance of the two Gauss nodes of an interval from its middle, in lengths of the interval.
 const NODE = 0.28867513;
 
 // The cell that a number lies in.
@@ -31,6 +32,17 @@ fn cell_of(table: u32, bins: f32, domain: vec4f, x: f32) -> u32 {
         last = select(middle - 1u, last, is_before);
     }
     return first;
+}
+
+// The colour at a number.
+fn color_at(table: u32, x: f32) -> vec3f {
+    let head = control_points[table];
+    let domain = control_points[table + 1u];
+    let within = clamp(x, domain.x, domain.z);
+    let cell = table + 2u + u32(head.y) + CELL * cell_of(table, head.y, domain, within);
+    let start = control_points[cell];
+    let along = clamp((within - start.x) * start.y, 0.0, 1.0);
+    return control_points[cell + 1u].rgb + control_points[cell + 2u].rgb * along;
 }
 
 // The means of m·C and m over the part of a cell between two numbers. `cell` is its first entry.
@@ -72,7 +84,7 @@ fn slab_integral(table: u32, f0: f32, f1: f32) -> SlabIntegral {
         color_and_amount += far[0] * far_weight;
         moment += far[1].x * far_weight;
         if last > first + 1u {
-            // Whole cells: two sums from the middle of the least block that holds them all, or one of a single cell.
+            // Whole cells: two sums from the middle of the smallest block that holds them all, or the sum of a single cell.
             let a = first + 1u;
             let b = last - 1u;
             let level = firstLeadingBit(max(a ^ b, 1u));

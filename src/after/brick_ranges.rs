@@ -1,21 +1,58 @@
-//! Which bricks may be drawn where values are classified after splatting (SPEC §9).
+//! The bricks that may be drawn when values are classified after splatting (SPEC §9).
 //!
-//! A point's value is a mean of the coefficients within a kernel of it, so a voxel bears on values that lie between the extremes of all
-//! coefficients within two kernels of it; and a slab's values lie between those of its two planes. So a brick whose coefficients all around, within
-//! two kernels and a slab, have no opacity at any value between them can be left out: every slab that it bears on stays transparent without it, whatever the
-//! values that the others then give there. That test needs the extremes alone, which no change of the transfer function changes.
+//! The value at a point is a mean of the coefficients within a kernel's radius of it, so a voxel affects only values between the minimum and
+//! maximum of all coefficients within two radii of it; and a slab's values lie between those of its two planes. A brick can therefore be left
+//! out if no value between the minimum and maximum of all coefficients within two radii and a slab of it has an opacity: every slab that it affects
+//! stays transparent without it, whatever values the other bricks then give there. The test needs only the minimum and maximum, which no
+//! change of the transfer function changes.
 
 use glam::UVec3;
 use rayon::prelude::*;
 
 use crate::lists::iso_range::ValueSet;
+use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::{Grid, Volume};
 
-/// Side of a brick, voxels.
+/// The values around a brick that bear on the image, beside those with an opacity, because of how values are composited.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bearing {
+    /// No others: every slab counts by its own opacity.
+    Own,
+    /// Values above any with an opacity, which may be maxima.
+    Greater,
+    /// Values below any with an opacity, which may be minima.
+    Smaller,
+    /// All values, which averages are taken of.
+    All,
+}
+
+impl Bearing {
+    /// The values that bear on images composited this way.
+    pub fn of(compositing: Compositing) -> Self {
+        match compositing {
+            Compositing::Maximum => Self::Greater,
+            Compositing::Minimum => Self::Smaller,
+            Compositing::Average => Self::All,
+            _ => Self::Own,
+        }
+    }
+
+    /// The range in which a value with an opacity makes a brick matter, for the range of the coefficients around the brick.
+    pub fn range(self, [min, max]: [f32; 2]) -> [f32; 2] {
+        match self {
+            Self::Own => [min, max],
+            Self::Greater => [f32::MIN, max],
+            Self::Smaller => [min, f32::MAX],
+            Self::All => [f32::MIN, f32::MAX],
+        }
+    }
+}
+
+/// The side of a brick in voxels.
 const SIDE: u32 = 4;
 
-/// The least and the greatest coefficient around every brick of a grid, bricks in memory order; holes are passed over.
+/// The minimum and maximum coefficient around every brick of a grid, in memory order of the bricks. Holes are ignored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BrickRanges {
     grid: Grid,
@@ -23,12 +60,12 @@ pub struct BrickRanges {
 }
 
 impl BrickRanges {
-    /// Those of all voxels within `reach` of a brick along each axis.
+    /// The ranges of all voxels within `reach` of a brick along each axis.
     pub fn new(grid: &Grid, coefficients: &[f32], reach: UVec3) -> Self {
         let [nx, ny, nz] = grid.dims.to_array().map(|n| n as usize);
         let bricks = grid.dims.map(|n| n.div_ceil(SIDE)).to_array().map(|n| n as usize);
         let [rx, ry, rz] = reach.to_array().map(|n| n as usize);
-        // One axis after the other: the extremes over boxes are those over lines, of lines, of lines.
+        // One axis after the other: the minimum over a box is the minimum over z of those over y of those over x.
         let along_x: Vec<[f32; 2]> = (coefficients.par_chunks(nx))
             .flat_map_iter(|row| {
                 around(nx, rx).map(|range| row[range].iter().fold(EMPTY, |ends, &c| with(ends, [c; 2])))
@@ -40,14 +77,18 @@ impl BrickRanges {
     }
 
     /// Whether each brick may be drawn.
-    pub fn shown(&self, volume: &Volume, transfer: &TransferFunction) -> Vec<bool> {
+    pub fn shown(&self, volume: &Volume, transfer: &TransferFunction, bearing: Bearing) -> Vec<bool> {
         let labels = volume.labels().map(|_| transfer.labels.keys()).into_iter().flatten();
         let tables = labels.map(|&label| transfer.tables(Some(label))).chain([transfer.tables(None)]);
         let values = tables.fold(ValueSet::default(), |all, tables| all.union(&ValueSet::of_tables(&tables)));
-        self.ranges.par_iter().map(|&[min, max]| min <= max && values.meets(min, max)).collect()
+        let is_shown = |&[min, max]: &[f32; 2]| {
+            let [low, high] = bearing.range([min, max]);
+            min <= max && values.meets(low, high)
+        };
+        self.ranges.par_iter().map(is_shown).collect()
     }
 
-    /// The voxels of the bricks of a kind, holes left out, in memory order.
+    /// The voxels of the bricks that are wanted, without holes, in memory order.
     pub fn voxels(&self, volume: &Volume, is_wanted: impl Fn(usize) -> bool + Sync) -> Vec<u32> {
         let (dims, values) = (self.grid.dims, volume.values());
         let bricks = dims.map(|n| n.div_ceil(SIDE));
@@ -65,18 +106,18 @@ impl BrickRanges {
 
 const EMPTY: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
 
-/// NaN is passed over.
+/// The union of two ranges; NaN is ignored.
 fn with([min, max]: [f32; 2], [other_min, other_max]: [f32; 2]) -> [f32; 2] {
     [min.min(other_min), max.max(other_max)]
 }
 
-/// What lies within `reach` of each brick along an axis.
+/// The range of positions within `reach` of each brick along an axis.
 fn around(count: usize, reach: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
     let side = SIDE as usize;
     (0..count).step_by(side).map(move |first| first.saturating_sub(reach)..(first + side + reach).min(count))
 }
 
-/// The extremes along an axis whose steps are `stride` apart, of `count` steps in a row.
+/// The ranges around bricks along an axis whose steps are `stride` apart, `count` steps in a row.
 fn strided(ends: &[[f32; 2]], stride: usize, count: usize, reach: usize) -> Vec<[f32; 2]> {
     let block = |block: &[[f32; 2]]| {
         around(count, reach)
@@ -120,7 +161,7 @@ mod tests {
         }
     }
 
-    /// A peak of opacity between the values of two voxels shows, though none of them has it.
+    /// A peak of opacity between the values of two voxels shows although neither voxel has an opacity.
     #[test]
     fn bricks_meet_opacities_between_values() {
         let grid = Grid { dims: UVec3::new(24, 4, 4), spacing: DVec3::ONE };
@@ -129,8 +170,12 @@ mod tests {
         let opacity = Ramp::new(vec![(49.0, 0.0), (50.0, 1.0), (51.0, 0.0)]).unwrap();
         let transfer = TransferFunction::by_value(Ramp::new(vec![(0.0, DVec3::ONE)]).unwrap(), opacity);
         let ranges = BrickRanges::new(&grid, volume.values(), UVec3::splat(5));
-        let shown = ranges.shown(&volume, &transfer);
+        let shown = ranges.shown(&volume, &transfer, Bearing::Own);
         assert_eq!(shown, [false, true, true, true, true, false]);
         assert_eq!(ranges.voxels(&volume, |brick| shown[brick]).len(), 4 * 64);
+        // A maximum of 100 hides the peak, a minimum of 0 too, and both are in averages.
+        assert_eq!(ranges.shown(&volume, &transfer, Bearing::Greater), [false, true, true, true, true, true]);
+        assert_eq!(ranges.shown(&volume, &transfer, Bearing::Smaller), [true, true, true, true, true, false]);
+        assert_eq!(ranges.shown(&volume, &transfer, Bearing::All), [true; 6]);
     }
 }

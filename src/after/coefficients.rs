@@ -2,8 +2,8 @@
 //!
 //! At voxel j the field is `Σ g(i-j)·c_i / N_j`, so the coefficients solve `G·c = N·v` with `G_ij = g(i-j)` over all voxels but holes. Kernels are
 //! cut off at a sphere; where its voxels form a cube, for radii above √3 and at most 2, G is a product of three matrices along the
-//! axes, each with three diagonals, and is solved along every line by two sweeps, forth and back: a recursive filter (Thomas's algorithm). With other
-//! radii, and around holes, conjugate gradients solve it. Either takes 4 bytes a voxel beside the result, conjugate gradients 16.
+//! axes, each with three diagonals, and is solved along every line by two sweeps, forwards and backwards: a recursive filter (Thomas's algorithm). With other
+//! radii, and with holes, conjugate gradients solve it. The sweeps need 4 bytes per voxel beside the result, conjugate gradients 16.
 
 use glam::{IVec3, UVec3};
 use rayon::prelude::*;
@@ -12,19 +12,19 @@ use crate::error::RenderError;
 use crate::setting_error::SettingError;
 use crate::volume::Grid;
 
-/// How far the field may be from the values at the voxels, of the values' range; SPEC §9 asks for 1e-5.
+/// The maximum error of the field at the voxels, relative to the values' range; SPEC §9 asks for 1e-5.
 const TOLERANCE: f64 = 2e-6;
 
-/// Steps after which conjugate gradients are given up. Those that the settings allow take at most some 200.
+/// The number of steps after which conjugate gradients give up. Valid settings need at most about 200.
 const MAX_STEPS: u32 = 2000;
 
 /// The radii at which a kernel holds the 27 voxels around its own and no others.
 const CUBE: std::ops::RangeInclusive<f64> = 1.732_050_807_568_878..=2.0;
 
-/// The coefficients of values on a grid; NaN at holes, where values are NaN. Calls `progress` with the share that is done.
+/// The coefficients of values on a grid; NaN at holes, where values are NaN. Calls `progress` with the fraction that is done.
 ///
 /// # Errors
-/// If they are not found: rounding forbids it for values whose range is tiny against their size.
+/// If the iteration does not converge, because rounding is too coarse for values whose range is tiny compared with their size.
 pub fn exact(
     grid: &Grid,
     values: &[f32],
@@ -34,10 +34,10 @@ pub fn exact(
     let ends = values.iter().fold([f32::INFINITY, f32::NEG_INFINITY], |[min, max], &v| [min.min(v), max.max(v)]);
     let [min, max] = ends.map(f64::from);
     if radius <= 1.0 || min >= max || min > max {
-        // Each voxel is alone in its kernel, or there is one value, or none.
+        // Each voxel is alone in its kernel, or all values are equal, or there are only holes.
         return Ok(values.to_vec());
     }
-    // Coefficients of a constant are that constant, so the values may be moved to where rounding is least.
+    // The coefficients of a constant are that constant, so values can be shifted to around 0, where rounding is finest.
     let middle = ((min + max) / 2.0) as f32;
     let has_holes = values.iter().any(|value| value.is_nan());
     let moved = if CUBE.contains(&radius) && !has_holes {
@@ -53,18 +53,18 @@ pub fn exact(
     Ok(moved.into_par_iter().zip(values).map(|(c, value)| if value.is_nan() { f32::NAN } else { c + middle }).collect())
 }
 
-/// The solution where G is a product: `N·v`, then one axis after the other.
+/// The solution if G is a product: `N·v`, then one axis after the other.
 fn along_axes(dims: UVec3, values: &[f32], middle: f32, falloff: f64, progress: &dyn Fn(f64)) -> Vec<f32> {
     let neighbour = libm::exp(-falloff);
     let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
     let filters = [nx, ny, nz].map(|n| Sweeps::new(n, neighbour));
     let mut c: Vec<f32> = values.par_iter().map(|value| value - middle).collect();
-    // N is a product, too: each axis's rows can be multiplied by their sums right before they are solved.
+    // N is a product too: the rows along each axis can be multiplied by their sums right before they are solved.
     c.par_chunks_mut(nx).for_each(|row| filters[0].solve(row, 1, 0));
     progress(0.3);
     c.par_chunks_mut(nx * ny).for_each(|slice| (0..nx).for_each(|x| filters[1].solve(slice, nx, x)));
     progress(0.6);
-    // Lines along z go through all slices: a row of them at a time, copied together.
+    // Lines along z pass through all slices, so a row of them at a time is copied together.
     let rows: Vec<Vec<f32>> = (0..ny)
         .into_par_iter()
         .map(|y| {
@@ -82,10 +82,10 @@ fn along_axes(dims: UVec3, values: &[f32], middle: f32, falloff: f64, progress: 
     c
 }
 
-/// Forth and back along a line: the solution of a system whose diagonal is 1 and whose two others are `neighbour`.
+/// Two sweeps along a line, forwards and backwards: the solution of a system with 1 on its diagonal and `neighbour` beside it.
 struct Sweeps {
     neighbour: f64,
-    /// What the matrix's rows sum to.
+    /// The sums of the matrix's rows.
     sums: Vec<f64>,
     /// One over the diagonal after elimination.
     pivots: Vec<f64>,
@@ -101,7 +101,7 @@ impl Sweeps {
         Self { neighbour, sums: (0..count).map(sum).collect(), pivots }
     }
 
-    /// Replaces every `stride`-th of the line's numbers, from `first` on.
+    /// Replaces every `stride`-th number, from `first` on, by the solution.
     fn solve(&self, line: &mut [f32], stride: usize, first: usize) {
         let Self { neighbour, sums, pivots } = self;
         let mut solved = Vec::with_capacity(sums.len());
@@ -147,7 +147,7 @@ fn conjugate_gradients(
         if left <= tolerance {
             return Some(c);
         }
-        // Errors fall by about the same factor with every step.
+        // The error falls by about the same factor in every step.
         progress(((begin / left).ln() / (begin / tolerance).ln()).clamp(0.0, 1.0));
         let image = taps.convolve(grid, &direction, &is_hole);
         let step = squared / dot(&direction, &image);
@@ -163,7 +163,7 @@ fn conjugate_gradients(
     None
 }
 
-/// In the same order in every run.
+/// The scalar product, summed in the same order in every run.
 fn dot(a: &[f32], b: &[f32]) -> f64 {
     const CHUNK: usize = 1 << 16;
     let of_chunk = |(a, b): (&[f32], &[f32])| a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum::<f64>();

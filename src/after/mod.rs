@@ -1,4 +1,4 @@
-//! Classification after splatting (SPEC §9) as plain data that no GPU is needed for: what every rasterizer draws values, gradients and slabs from.
+//! Classification after splatting (SPEC §9) as plain data, which every rasterizer draws values, gradients and slabs from; it needs no GPU.
 
 pub mod brick_ranges;
 pub mod coefficients;

@@ -1,5 +1,5 @@
-//! The numbers that values are splatted as (SPEC §9): differences from the middle of their range, scaled by a power of two to about 1. So
-//! `f32` keeps the digits that tell values apart, sums of products cannot overflow, and the scale rounds nothing.
+//! The numbers that are splatted for values (SPEC §9): differences from the middle of the values' range, scaled by a power of two to about 1. An
+//! `f32` then keeps the digits in which values differ, sums of products cannot overflow, and scaling rounds nothing.
 
 /// From values to the numbers that are splatted, `(value - base)·scale`, and back.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -8,7 +8,7 @@ pub struct Normalization {
     pub base: f64,
     /// A power of two.
     pub scale: f64,
-    /// The least and the greatest number.
+    /// The minimum and maximum number.
     pub range: [f32; 2],
 }
 
@@ -20,7 +20,7 @@ impl Normalization {
     pub fn new([min, max]: [f64; 2]) -> Self {
         let base = f64::from(((min + max) / 2.0) as f32);
         let farthest = (max - base).max(base - min);
-        // Of a constant only the base matters.
+        // For a constant only the base matters.
         let exponent = if farthest > 0.0 { libm::log2(farthest).ceil().clamp(-126.0, 126.0) as i32 } else { 0 };
         debug_assert!(exponent.abs() <= MAX_EXPONENT);
         let scale = 2.0_f64.powi(-exponent);
@@ -28,7 +28,7 @@ impl Normalization {
         Self { range: [min, max].map(|value| normalization.apply(value) as f32), ..normalization }
     }
 
-    /// The range of some values; those that are NaN are passed over. `None` if all are.
+    /// The numbers for the range of some values; NaN is ignored. `None` if all are NaN.
     pub fn of(values: impl Iterator<Item = f32>) -> Option<Self> {
         let ends =
             values.fold([f32::INFINITY, f32::NEG_INFINITY], |[min, max], value| [min.min(value), max.max(value)]);

@@ -1,9 +1,9 @@
-//! How kernels lie on the slab planes of a view, SPEC §9's low-pass rule among it.
+//! The position and shape of kernels on the slab planes of a view, including SPEC §9's low-pass rule.
 //!
-//! Within a plane the offset from a voxel to a pixel's point is affine in the pixel: `δ = A·(pixel - centre) + t·n`, with n the planes' normal in the grid, t the
-//! voxel's distance from the plane, and the centre where the voxel's nearest point of the plane is seen. All planes of a view share A's singular
-//! vectors, and its singular values grow in proportion to the depth from the eye: they are two numbers, which the low-pass rule caps at 1. So every
-//! kernel is a Gaussian of `(a, b, t)`, a and b being grid units along two axes that all planes share.
+//! Within a plane the offset from a voxel to a pixel's point is affine in the pixel: `δ = A·(pixel - centre) + t·n`, where n is the planes' normal in
+//! the grid, t the plane's distance from the voxel, and the centre the pixel position of the plane's point nearest to the voxel. All planes of a
+//! view share A's singular vectors, and its two singular values, which the low-pass rule caps at 1, grow in proportion to the depth from the
+//! eye. So every kernel is a Gaussian of `(a, b, t)`, with a and b in grid units along two axes that all planes share.
 
 use glam::{DMat2, DMat3, DVec2, DVec3, UVec3};
 
@@ -15,18 +15,18 @@ use crate::volume::Grid;
 pub struct PlaneGeometry {
     /// Unit vectors in the grid: two within planes, and the planes' normal, away from the eye.
     pub axes: [DVec3; 3],
-    /// The pixel offset (x right, y down) of length 1 that the first axis belongs to; to the second this one turned, `(-y, x)`.
+    /// The pixel offset (x right, y down) of length 1 whose image in the plane is along the first axis; turned, `(-y, x)`, the second axis.
     pub screen_axis: DVec2,
-    /// Grid units that a pixel is along the two axes; with an eye at depth 1 from it.
+    /// The length of a pixel along the two axes in grid units; with an eye, at depth 1 from it.
     pub per_pixel: DVec2,
-    /// Grid units along the normal that sheet depth 1 is.
+    /// The number of grid units along the normal for a sheet depth of 1.
     pub per_depth: f64,
-    /// By what a grid unit along the normal changes the products of the first, second and fourth row of
-    /// [`ViewGeometry::screen_from_voxel`].
+    /// The change of the products of the first, second and fourth row of [`ViewGeometry::screen_from_voxel`] for one grid unit along the
+    /// normal.
     pub step: DVec3,
     grid: Grid,
     radius: f64,
-    /// Sheet depth of the eye.
+    /// The eye's sheet depth.
     eye: Option<f64>,
 }
 
@@ -61,12 +61,12 @@ impl PlaneGeometry {
         }
     }
 
-    /// The depth from the eye of a plane of such a sheet depth; 1 without an eye.
+    /// The depth from the eye of the plane at a sheet depth; 1 without an eye.
     pub fn from_eye(&self, sheet_depth: f64) -> f64 {
         self.eye.map_or(1.0, |eye| sheet_depth - eye)
     }
 
-    /// Half the box, grid units, around the voxels whose kernels reach a point at a depth from the eye.
+    /// Half the box in grid units around the voxels whose kernels reach a point at a depth from the eye.
     pub fn half_box(&self, from_eye: f64) -> DVec3 {
         let mut widened = DMat3::IDENTITY;
         for (axis, per_pixel) in self.axes.into_iter().zip((self.per_pixel * from_eye).to_array()) {
@@ -76,8 +76,8 @@ impl PlaneGeometry {
         self.radius * DVec3::new(widened.x_axis.length(), widened.y_axis.length(), widened.z_axis.length())
     }
 
-    /// Half the screen box, pixels, around where kernels meet the plane of a sheet depth, seen from where their voxels are projected; infinite where that may be
-    /// anywhere. For voxels whose box reaches the image.
+    /// Half the screen box in pixels around a voxel's projection that contains the voxel's kernel on the plane at a sheet depth, for voxels whose
+    /// box reaches the image; infinite if the kernel may be anywhere.
     pub fn half_box_px(&self, sheet_depth: f64, size: [u32; 2]) -> DVec2 {
         let from_eye = self.from_eye(sheet_depth);
         let axis = self.screen_axis;
@@ -97,8 +97,8 @@ impl PlaneGeometry {
         footprint + self.radius * (step + farthest * self.step.z) / from_eye
     }
 
-    /// How far from a brick voxels lie that bear on what it shows, whole voxels along each axis: two kernels, widened as on the farthest of the planes that meet the
-    /// volume, and a slab.
+    /// The distance from a brick, in whole voxels along each axis, of the voxels that affect the same slabs: two kernel radii, widened as on the
+    /// farthest plane that meets the volume, and a slab.
     pub fn reach(&self, view: &ViewGeometry) -> UVec3 {
         let center = self.grid.center();
         let row = view.screen_from_voxel[2];
@@ -108,7 +108,7 @@ impl PlaneGeometry {
         reach.floor().min(DVec3::splat(f64::from(u32::MAX / 4))).as_uvec3()
     }
 
-    /// The longest way from plane to plane on any pixel's ray, voxels along each axis.
+    /// The longest step from plane to plane on any pixel's ray, in voxels along each axis.
     fn slab(&self, view: &ViewGeometry) -> DVec3 {
         let rays = view.rays();
         let half = DVec2::from(view.size.map(f64::from)) / 2.0;

@@ -1,7 +1,7 @@
 //! The transfer function integrated from value to value, as a table that `f32` arithmetic reads without losing digits (SPEC §9).
 //!
 //! Pre-integration (Engel, Kraus, Ertl 2001) commonly tabulates the cumulative integrals of m and m·C at equal steps, which rounds steps and
-//! narrow peaks off and loses the digits of short ranges, differences of large sums. Here the values are cut into cells at all control points and
+//! narrow peaks off and loses the digits of short ranges, which are differences of large sums. Here the values are cut into cells at all control points and
 //! ends of iso-ranges, over which α and C are linear. Where a slab's values begin and end within a cell, two Gauss nodes integrate what
 //! lies between: exactly for products of linear functions, and for the logarithm of `exponential` to about 1e-5, as cells end where `1 - α` has
 //! fallen to `RATIO`. Whole cells between them come from a disjoint sparse table: for every block of 2, 4, 8, … cells it holds the sums from every cell to
@@ -12,9 +12,9 @@
 //!
 //! | entries | hold |
 //! |---|---|
-//! | `HEAD` | (cells, bins, the least and the greatest number with an opacity); (the least number, bins per number, the greatest number, 0) |
+//! | `HEAD` | (cells, bins, the minimum and maximum number with an opacity, for `surface` of one half); (the minimum number, bins per number, the maximum number, 0) |
 //! | bins | (first cell, last cell, 0, 0) that a number in this bin may lie in |
-//! | cells · `CELL` | (least number, 1/width, α, α's rise over the cell); (C, greatest number); (C's rise, 0) |
+//! | cells · `CELL` | (minimum number, 1/width, α, α's rise over the cell); (C, maximum number); (C's rise, 0) |
 //! | levels · cells · `SUM` | (∫m, ∫m·(x - middle), middle, 0); (∫m·C, 0) between the cell and the middle of its block |
 //!
 //! "Numbers" are values as [`Normalization`] scales them.
@@ -25,23 +25,23 @@ use super::normalization::Normalization;
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::{Ramp, Tables};
 
-/// Entries before the bins.
+/// The number of entries before the bins.
 pub(crate) const HEAD: usize = 2;
-/// Entries of a cell.
+/// The number of entries of a cell.
 pub(crate) const CELL: usize = 3;
-/// Entries of a sum.
+/// The number of entries of a sum.
 pub(crate) const SUM: usize = 2;
 
-/// What `1 - α` falls to over a cell of `exponential` at most.
+/// The smallest ratio of `1 - α` at the two ends of a cell for `exponential`.
 const RATIO: f64 = 0.840_896_415_253_714_6;
 
-/// Opacities above this count as this in the logarithm of `exponential` (SPEC §5).
+/// The cap of opacities in the logarithm of `exponential` (SPEC §5).
 const MAX_ALPHA: f64 = 0.9999;
 
-/// Where the two Gauss nodes of an interval lie, from its middle, by its length.
+/// The distance of the two Gauss nodes of an interval from its middle, in lengths of the interval.
 pub(crate) const NODE: f64 = 0.288_675_134_594_812_9;
 
-/// A stretch of values over which α and C are linear.
+/// A range of values over which α and C are linear.
 #[derive(Clone, Copy, Debug)]
 struct Cell {
     ends: [f64; 2],
@@ -63,8 +63,10 @@ pub fn table(tables: &Tables, compositing: Compositing, numbers: &Normalization)
     let [first, end] = [cells[0].ends[0], cells[cells.len() - 1].ends[1]];
     let bins = (4 * cells.len()).next_power_of_two().clamp(16, 1024);
     let per_number = bins as f64 / (end - first);
-    let shown = cells.iter().filter(|cell| cell.alpha[0].max(cell.alpha[1]) > 0.0);
-    // Nothing lies between these if nothing has an opacity.
+    // A surface is where the opacity is one half.
+    let is_shown = |alpha: f64| if compositing == Compositing::Surface { alpha >= 0.5 } else { alpha > 0.0 };
+    let shown = cells.iter().filter(|cell| is_shown(cell.alpha[0].max(cell.alpha[1])));
+    // Nothing lies between these if nothing has such an opacity.
     let shown = shown.fold([f64::from(f32::MAX), f64::from(f32::MIN)], |[low, high], cell| {
         [low.min(cell.ends[0]), high.max(cell.ends[1])]
     });
@@ -94,12 +96,12 @@ pub fn table(tables: &Tables, compositing: Compositing, numbers: &Normalization)
     points
 }
 
-/// Levels of the sparse table.
+/// The number of levels of the sparse table.
 fn levels(cells: usize) -> u32 {
     (cells - 1).max(1).ilog2() + 1
 }
 
-/// The cells, from the least number to the greatest.
+/// The cells in ascending order.
 fn cells(tables: &Tables, compositing: Compositing, numbers: &Normalization) -> Vec<Cell> {
     let [least, greatest] = numbers.range.map(f64::from);
     let value = |x: f64| numbers.base + x / numbers.scale;
@@ -134,7 +136,7 @@ fn positions_of<T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f64, Output 
     ramp.points().iter().map(|(position, _)| *position)
 }
 
-/// Cuts a stretch over which α is linear where the logarithm of `exponential` needs it.
+/// Cuts a range over which α is linear into pieces that are short enough for the logarithm of `exponential`.
 fn pieces(compositing: Compositing, [low, high]: [f64; 2], alpha: [f64; 2]) -> Vec<[f64; 2]> {
     let mut cuts = vec![low, high];
     if compositing == Compositing::Exponential && alpha[0] != alpha[1] {
@@ -157,7 +159,7 @@ fn amount(compositing: Compositing, alpha: f64) -> f64 {
     if compositing == Compositing::Exponential { -libm::log1p(-alpha.min(MAX_ALPHA)) } else { alpha }
 }
 
-/// The integrals over a cell, moments from a number.
+/// The integrals over a cell, with moments relative to `from`.
 fn integral(cell: &Cell, compositing: Compositing, from: f64) -> Sums {
     let [low, high] = cell.ends;
     let mut sums = Sums::default();
@@ -171,14 +173,14 @@ fn integral(cell: &Cell, compositing: Compositing, from: f64) -> Sums {
     sums
 }
 
-/// For every cell the integrals between it, with it, and the middle of its block of 2^(level + 1) cells; and that middle. Left of the middle
-/// runs end there, right of it they begin there.
+/// For every cell the integrals from the cell, which is included, to the middle of its block of 2^(level + 1) cells, or from that middle to the
+/// cell; and the middle.
 fn sums(cells: &[Cell], compositing: Compositing, level: u32) -> Vec<(Sums, f64)> {
     let half = 1 << level;
     let mut found = vec![(Sums::default(), 0.0); cells.len()];
     for block in (0..cells.len()).step_by(2 * half) {
         let middle = block + half;
-        // The last block may end before its middle; nothing reads it then, but at level 0.
+        // The last block may end before its middle; then nothing reads it, except at level 0.
         let at = if middle < cells.len() { cells[middle].ends[0] } else { cells[cells.len() - 1].ends[1] };
         let mut run = |range: &mut dyn Iterator<Item = usize>| {
             let mut total = Sums::default();
@@ -196,18 +198,18 @@ fn sums(cells: &[Cell], compositing: Compositing, level: u32) -> Vec<(Sums, f64)
     found
 }
 
-/// What the transfer function makes of a slab's values, in `f32`: the same steps as in the shader.
+/// The means of the transfer function over a slab's values in `f32`, computed in the shader's steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlabIntegral {
     /// `m̄`, the mean amount per unit length, without gradient opacity.
     pub amount: f32,
-    /// `(v̄ - f0)/(f1 - f0)`; where they are equal ½.
+    /// `(v̄ - f0)/(f1 - f0)`; ½ if f0 and f1 are equal.
     pub share: f32,
     /// `C̄`, unshaded.
     pub color: Vec3,
 }
 
-/// Means over a part of the numbers.
+/// The means over a part of the numbers.
 #[derive(Clone, Copy, Debug, Default)]
 struct Part {
     amount: f32,

@@ -6,7 +6,7 @@ use glam::UVec3;
 use rayon::prelude::*;
 use wgpu::{Device, Limits, Queue, TextureView};
 
-use crate::after::brick_ranges::BrickRanges;
+use crate::after::brick_ranges::{Bearing, BrickRanges};
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::brick_lists::{BrickLists, SettledBricks};
@@ -53,6 +53,8 @@ pub(crate) struct BrickNeeds {
     pub(crate) reach: UVec3,
     /// Where they are not the values.
     pub(crate) coefficients: Option<Arc<Coefficients>>,
+    /// Which values bear on the image.
+    pub(crate) bearing: Bearing,
 }
 
 impl PartialEq for BrickNeeds {
@@ -61,7 +63,7 @@ impl PartialEq for BrickNeeds {
             (Some(own), Some(others)) => Arc::ptr_eq(own, others),
             (own, others) => own.is_none() && others.is_none(),
         };
-        self.reach == other.reach && same
+        (self.reach, self.bearing) == (other.reach, other.bearing) && same
     }
 }
 
@@ -254,7 +256,7 @@ impl ClassifiedVolume {
     fn look_at_bricks(&mut self) -> Touched {
         let Some(mut shown) = self.shown.take() else { return Touched::default() };
         let volume = Arc::clone(self.volume());
-        let new = shown.ranges.shown(&volume, &self.transfer);
+        let new = shown.ranges.shown(&volume, &self.transfer, shown.needs.bearing);
         let old = std::mem::replace(&mut shown.are_shown, new);
         let new = &shown.are_shown;
         let entering = shown.ranges.voxels(&volume, |brick| new[brick] && !old[brick]);
@@ -339,7 +341,7 @@ impl ShownBricks {
     fn new(volume: &Volume, transfer: &TransferFunction, needs: &BrickNeeds) -> Self {
         let coefficients = needs.coefficients.as_ref().map_or(volume.values(), |exact| &exact.values);
         let ranges = BrickRanges::new(volume.grid(), coefficients, needs.reach);
-        Self { needs: needs.clone(), are_shown: ranges.shown(volume, transfer), ranges }
+        Self { needs: needs.clone(), are_shown: ranges.shown(volume, transfer, needs.bearing), ranges }
     }
 
     fn voxels(&self, volume: &Volume) -> Vec<u32> {

@@ -166,45 +166,45 @@ pub struct Cut {
     pub has_surfaces: u32,
 }
 
-/// How kernels lie on slab planes, and what values are splatted as (SPEC §9): [`PlaneGeometry`](crate::after::plane_geometry::PlaneGeometry) and
-/// [`Normalization`](crate::after::normalization::Normalization).
+/// The position of kernels on slab planes, and the scale of splatted numbers (SPEC §9): a [`PlaneGeometry`](crate::after::plane_geometry::PlaneGeometry) and
+/// a [`Normalization`](crate::after::normalization::Normalization).
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct FieldPlanes {
     /// Unit vectors in the grid: two within planes, and the planes' normal; w unused.
     pub axes: [[f32; 4]; 3],
-    /// What a grid unit along the normal moves a voxel right and down, pixels times the depth from the eye, and away from the eye; and
-    /// the grid units along the normal that sheet depth 1 is.
+    /// The change of a voxel's position for one grid unit along the normal: right and down in pixels times the depth from the eye, and away
+    /// from the eye. Then the number of grid units along the normal for a sheet depth of 1.
     pub step: [f32; 4],
-    /// The pixel offset of length 1 that the first axis belongs to.
+    /// The pixel offset of length 1 whose image in the plane is along the first axis.
     pub screen_axis: [f32; 2],
-    /// Grid units that a pixel is along the first two axes; with an eye at depth 1 from it.
+    /// The length of a pixel along the first two axes in grid units; with an eye, at depth 1 from it.
     pub per_pixel: [f32; 2],
-    /// Sheet depth of plane 0, with an eye also the eye's.
+    /// The sheet depth of plane 0, which with an eye is the eye's.
     pub origin: f32,
-    /// What is added to texels of values, or to values whose bits texels are, before they are scaled.
+    /// The term that is added to a value, or to the integer stored for it, before scaling.
     pub value_bias: f32,
-    /// Numbers to a value.
+    /// The factor from values to numbers.
     pub value_scale: f32,
-    /// Values to a number.
+    /// The factor from numbers to values.
     pub per_number: f32,
 }
 
-/// A voxel on its way to slab planes, as large as a [`Splat`].
+/// A voxel that is drawn onto slab planes, as large as a [`Splat`].
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct FieldVoxel {
-    /// Pixels right of the image's middle, times the depth from the eye.
+    /// The offset to the right of the image's middle in pixels, times the depth from the eye.
     pub x: f32,
-    /// Pixels below it, the same.
+    /// The offset below the image's middle, likewise.
     pub y: f32,
     /// Sheet depth.
     pub depth: f32,
-    /// Its coefficient, a number.
+    /// The coefficient as a number.
     pub number: f32,
     /// The values' central differences, numbers per `unit`, along x and y: two `snorm16`.
     pub gradient_xy: u32,
-    /// Along z, the same, and 256 more than the exponent that the three are scaled by.
+    /// Along z, likewise; then 256 plus the exponent of the power of 2 by which all three are scaled.
     pub gradient_z: u32,
 }
 

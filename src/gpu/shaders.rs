@@ -109,6 +109,7 @@ pub const COMPOSITE: Shader = shader!(
     "shared/brick",
     "shared/band",
     "shared/tile_list",
+    "shared/opaque",
     "shared/compositing",
     "shared/cut",
     "shared/means"
@@ -140,6 +141,7 @@ pub const CLASSIFY: Shader = shader!(
     "shared/brick",
     "shared/band",
     "shared/tile_list",
+    "shared/opaque",
     "shared/compositing",
     "shared/cut",
     "shared/means",
@@ -148,7 +150,10 @@ pub const CLASSIFY: Shader = shader!(
     "shared/volume",
     "shared/shading",
     "shared/ramps",
-    "shared/slab_integral"
+    "shared/slab_integral",
+    "shared/field_voxel",
+    "shared/seen",
+    "shared/first_surface"
 );
 /// Computes the occlusion buffer.
 pub const OCCLUDE: Shader = shader!("occlude", "shared/frame", "shared/brick", "shared/tile_list");

@@ -21,7 +21,7 @@ use crate::scene::Scene;
 use crate::setting_error::scaled;
 use crate::settings::clip::HalfSpace;
 use crate::settings::shading::{Light, MIN_GRADIENT, Shading};
-use crate::settings::splatting::{Compositing, Order, Splatting};
+use crate::settings::splatting::{Classification, Compositing, Order, Splatting};
 use crate::settings::transfer_function::{LabelTables, Ramp, Tables, TransferFunction};
 use crate::volume::Grid;
 
@@ -79,8 +79,7 @@ pub fn frame(
         compositing: scene.splatting.compositing as u32,
         order: scene.splatting.order as u32,
         culling: u32::from(scene.splatting.culling && hides(&scene.splatting)),
-        // For `Minimum`, empty tiles count too.
-        tiles: u32::from(scene.splatting.tiles && scene.splatting.compositing != Compositing::Minimum),
+        tiles: u32::from(scene.splatting.tiles && !counts_empty_tiles(&scene.splatting)),
         per_unit: grid.unit().recip().sqrt().min(f32::MAX.into()) as f32,
         headlight: u32::from(scene.shading.light == Light::Headlight),
         last_label: ramps.label_table.len().saturating_sub(1) as u32,
@@ -263,6 +262,11 @@ pub fn in_f32_pixels(half_box: DVec2) -> [f32; 2] {
 
 /// Half the largest box that is tested, in pixels. Few larger footprints fit the screen, and they are hardly ever hidden.
 const MAX_HALF_BOX: f64 = 256.0;
+
+/// Whether tiles without splats count: before splatting, empty sheets are minima.
+fn counts_empty_tiles(splatting: &Splatting) -> bool {
+    splatting.compositing == Compositing::Minimum && splatting.classification == Classification::Before
+}
 
 /// Whether what is drawn hides what comes later (SPEC §5): front to back, with a compositing that hides.
 fn hides(splatting: &Splatting) -> bool {

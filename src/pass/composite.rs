@@ -2,9 +2,9 @@
 
 use std::sync::OnceLock;
 
-use wgpu::{BindGroup, Buffer, ComputePass, Device, ShaderStages, TextureView, TextureViewDimension};
+use wgpu::{BindGroup, BindingResource, Buffer, ComputePass, Device, ShaderStages, TextureView, TextureViewDimension};
 
-use crate::gpu::bindings::{ComputeStage, at_offset, depth_texture, storage, texture, uniform};
+use crate::gpu::bindings::{ComputeStage, Slot, at_offset, depth_texture, storage, texture, uniform};
 use crate::gpu::layout::{Band, Cut, Frame, SheetGroup, TileList};
 use crate::gpu::shaders;
 use crate::gpu::targets::{BandBuffer, Targets};
@@ -63,6 +63,57 @@ pub struct CompositeBuffers<'a> {
     pub hits: &'a Buffer,
 }
 
+impl<'a> CompositeBuffers<'a> {
+    /// The resources of [`slots`] for a band of the compositing buffer.
+    pub(super) fn resources(&self, band: &'a BandBuffer) -> [(&'static str, BindingResource<'a>); 12] {
+        let Self { frame, groups, sheets, tiles, targets, cut, hits } = *self;
+        [
+            ("frames", frame.as_entire_binding()),
+            ("band", band.uniform.as_entire_binding()),
+            ("sheets", BindingResource::TextureView(sheets)),
+            ("acc", band.acc.as_entire_binding()),
+            ("composited", tiles.as_entire_binding()),
+            ("opaque", targets.opaque.as_entire_binding()),
+            ("opaque_tiles", targets.opaque_tiles.as_entire_binding()),
+            ("sheet_group", at_offset::<SheetGroup>(groups)),
+            ("cuts", cut.uniform.as_entire_binding()),
+            ("surfaces", BindingResource::TextureView(cut.surfaces)),
+            ("hits", hits.as_entire_binding()),
+            ("last_groups", targets.last_groups.as_entire_binding()),
+        ]
+    }
+}
+
+/// The bindings of every shader that composites.
+pub(super) fn slots() -> [(&'static str, Slot); 12] {
+    let stage = ShaderStages::COMPUTE;
+    [
+        ("frames", uniform::<Frame>(stage, false)),
+        ("band", uniform::<Band>(stage, false)),
+        ("sheets", texture(stage, TextureViewDimension::D2Array)),
+        ("acc", storage::<[f32; 4]>(stage, false)),
+        ("composited", storage::<TileList>(stage, true)),
+        ("opaque", storage::<u32>(stage, false)),
+        ("opaque_tiles", storage::<u32>(stage, false)),
+        ("sheet_group", uniform::<SheetGroup>(stage, true)),
+        ("cuts", uniform::<Cut>(stage, false)),
+        ("surfaces", depth_texture(stage)),
+        ("hits", storage::<u32>(stage, false)),
+        ("last_groups", storage::<u32>(stage, false)),
+    ]
+}
+
+impl CompositeMode {
+    /// The pipeline constants of every shader that composites.
+    pub(super) fn constants(self) -> [(&'static str, f64); 3] {
+        [
+            ("COMPOSITING", f64::from(self.compositing as u32)),
+            ("CUT", f64::from(u8::from(self.rays.cut))),
+            ("FIRST_HIT", f64::from(u8::from(self.rays.first_hit))),
+        ]
+    }
+}
+
 impl Composite {
     fn stage(&self, CompositeMode { compositing, rays }: CompositeMode) -> &OnceLock<ComputeStage> {
         let bits = [rays.cut, rays.first_hit].map(usize::from);
@@ -70,29 +121,8 @@ impl Composite {
     }
 
     fn compiled(&self, device: &Device, mode: CompositeMode) -> &ComputeStage {
-        self.stage(mode).get_or_init(|| {
-            let stage = ShaderStages::COMPUTE;
-            let slots = [
-                ("frames", uniform::<Frame>(stage, false)),
-                ("band", uniform::<Band>(stage, false)),
-                ("sheets", texture(stage, TextureViewDimension::D2Array)),
-                ("acc", storage::<[f32; 4]>(stage, false)),
-                ("composited", storage::<TileList>(stage, true)),
-                ("opaque", storage::<u32>(stage, false)),
-                ("opaque_tiles", storage::<u32>(stage, false)),
-                ("sheet_group", uniform::<SheetGroup>(stage, true)),
-                ("cut", uniform::<Cut>(stage, false)),
-                ("surfaces", depth_texture(stage)),
-                ("hits", storage::<u32>(stage, false)),
-                ("last_groups", storage::<u32>(stage, false)),
-            ];
-            let constants = [
-                ("COMPOSITING", f64::from(mode.compositing as u32)),
-                ("CUT", f64::from(u8::from(mode.rays.cut))),
-                ("FIRST_HIT", f64::from(u8::from(mode.rays.first_hit))),
-            ];
-            ComputeStage::new(device, shaders::COMPOSITE, "main", &slots, &constants)
-        })
+        self.stage(mode)
+            .get_or_init(|| ComputeStage::new(device, shaders::COMPOSITE, "main", &slots(), &mode.constants()))
     }
 
     /// Binds a band of the compositing buffer.
@@ -103,22 +133,7 @@ impl Composite {
         buffers: CompositeBuffers<'_>,
         band: &BandBuffer,
     ) -> BindGroup {
-        let CompositeBuffers { frame, groups, sheets, tiles, targets, cut, hits } = buffers;
-        let resources = [
-            ("frames", frame.as_entire_binding()),
-            ("band", band.uniform.as_entire_binding()),
-            ("sheets", wgpu::BindingResource::TextureView(sheets)),
-            ("acc", band.acc.as_entire_binding()),
-            ("composited", tiles.as_entire_binding()),
-            ("opaque", targets.opaque.as_entire_binding()),
-            ("opaque_tiles", targets.opaque_tiles.as_entire_binding()),
-            ("sheet_group", at_offset::<SheetGroup>(groups)),
-            ("cut", cut.uniform.as_entire_binding()),
-            ("surfaces", wgpu::BindingResource::TextureView(cut.surfaces)),
-            ("hits", hits.as_entire_binding()),
-            ("last_groups", targets.last_groups.as_entire_binding()),
-        ];
-        self.compiled(device, mode).bind(device, &resources)
+        self.compiled(device, mode).bind(device, &buffers.resources(band))
     }
 
     /// Composites the listed tiles of every band for the group at `offset`.

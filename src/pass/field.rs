@@ -1,4 +1,4 @@
-//! Draws a list's voxels onto a slab plane as instanced quads, added up in two sheet buffers (SPEC §9).
+//! Draws a list's voxels onto a slab plane as instanced quads that add up in two sheet buffers (SPEC §9).
 
 use std::sync::OnceLock;
 
@@ -15,16 +15,17 @@ use crate::gpu::shaders;
 use crate::pass::cull::CullList;
 use crate::settings::shading::Gradient;
 
-/// Sheet buffers that a plane's sums take.
+/// The number of sheet buffers for the sums of a plane.
 pub const SHEETS_PER_PLANE: u32 = 2;
 
-/// The stage's pipelines: zeroing tiles, and those that draw, by gradient; each is compiled when it is first asked for.
+/// The stage's pipelines: one that zeroes tiles, and those that draw.
 #[derive(Debug)]
 pub struct Field {
     clear_bindings: Bindings,
     clear: RenderPipeline,
     bindings: Bindings,
     format: TextureFormat,
+    /// Indexed by gradient; each is compiled when it is first needed.
     field: [OnceLock<RenderPipeline>; 2],
     indices: Buffer,
 }
@@ -52,7 +53,7 @@ impl Field {
         }
     }
 
-    /// Compiles what a gradient needs.
+    /// Compiles the pipeline for a gradient.
     pub fn prepare(&self, device: &Device, gradient: Gradient) {
         self.field[gradient as usize].get_or_init(|| {
             let sheets = sheets_of_a_group(self.format, SHEETS_PER_PLANE, Some(added_to(wgpu::BlendFactor::One)));
@@ -81,7 +82,7 @@ impl Field {
         self.bindings.bind(device, &resources)
     }
 
-    /// Zeroes the listed tiles of the sheet buffers, then adds the given lists' voxels: of every list its bind group, the group's offset,
+    /// Zeroes the listed tiles of the sheet buffers, then adds the given lists' voxels: for every list its bind group, the group's offset,
     /// and the arguments of its draw.
     pub fn record<'a>(
         &self,

@@ -32,7 +32,7 @@ impl Tiles {
         Self::compiled(device, false)
     }
 
-    /// The same for groups that are single planes (SPEC §9).
+    /// Compiles the stage for groups that are single planes (SPEC §9).
     pub fn of_planes(device: &Device) -> Self {
         Self::compiled(device, true)
     }

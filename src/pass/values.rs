@@ -1,4 +1,4 @@
-//! Projects voxels and finds their numbers and gradients, those of a list of places, before they are drawn onto slab planes (SPEC §9).
+//! Projects listed voxels and computes their numbers and gradients, before they are drawn onto slab planes (SPEC §9).
 
 use std::sync::OnceLock;
 
@@ -8,22 +8,23 @@ use crate::gpu::bindings::{ComputeStage, storage, texture_of_integers, uniform};
 use crate::gpu::layout::{Brick, FieldPlanes, FieldVoxel, Frame, Indirect};
 use crate::gpu::shaders;
 
-/// The stage's pipelines: without and with coefficients of their own, without and with holes. Each is compiled when it is first asked for.
+/// The stage's pipelines, each compiled when it is first needed.
 #[derive(Debug, Default)]
 pub struct Values {
+    /// Indexed by whether coefficients differ from the values, and by whether there are holes.
     stages: [[OnceLock<ComputeStage>; 2]; 2],
 }
 
-/// What voxels are drawn onto planes by.
+/// The buffers for drawing voxels onto planes.
 #[derive(Clone, Copy, Debug)]
 pub struct PlaneBuffers<'a> {
     /// One [`FieldPlanes`].
     pub planes: &'a Buffer,
-    /// The bits of all coefficients, where they are not the values.
+    /// The bits of all coefficients if they differ from the values.
     pub coefficients: Option<&'a TextureView>,
 }
 
-/// What the stage reads and writes.
+/// The stage's buffers.
 #[derive(Clone, Copy, Debug)]
 pub struct ValuesBuffers<'a> {
     /// One [`Frame`].
@@ -32,15 +33,15 @@ pub struct ValuesBuffers<'a> {
     pub bricks: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
-    /// Whether any of them is a hole.
+    /// Whether any value is a hole.
     pub has_holes: bool,
-    /// What they become.
+    /// The planes that voxels are drawn onto.
     pub planes: PlaneBuffers<'a>,
-    /// `[u32]`: the places.
+    /// `[u32]`: the voxels to compute, as slots in bricks.
     pub places: &'a Buffer,
-    /// [`Indirect`]: how many they are.
+    /// [`Indirect`]: the number of these voxels.
     pub args: &'a Buffer,
-    /// `[FieldVoxel]`, one per place of the list; those of the places are written.
+    /// `[FieldVoxel]`, one per slot of every brick; those of the listed voxels are written.
     pub voxels: &'a Buffer,
 }
 
@@ -73,7 +74,7 @@ impl Values {
         ValuesGroup { group: stage.bind(device, &resources), is_exact, has_holes }
     }
 
-    /// Looks up as many voxels as `args` says.
+    /// Computes the listed voxels, whose number `args` holds.
     pub fn record(&self, pass: &mut ComputePass<'_>, bound: &ValuesGroup, args: &Buffer) {
         if let Some(stage) = self.stages[usize::from(bound.is_exact)][usize::from(bound.has_holes)].get() {
             stage.dispatch_indirect(pass, &bound.group, &[], args);

@@ -1,26 +1,26 @@
-//! The quad rasterizer where classification comes after splatting (SPEC §9): for every slab plane the stages cull, values, tiles, field, classify and occlude. The
-//! slab between a plane and the one before it is classified when both are drawn.
+//! The quad rasterizer with classification after splatting (SPEC §9): for every slab plane the stages cull, values, tiles, field, classify and
+//! occlude. Once two neighbouring planes are drawn, the slab between them is classified.
 
 use std::ops::Range;
 
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Limits, TextureFormat, TextureView};
 
-use super::quads::{Planned, counts_and_hits, group_stride, most_of, order_bytes};
+use super::sheet_groups::{GroupSettings, SheetGroups, group_stride};
 use super::{FrameEstimate, FrameInputs, Prepared, compute};
 use crate::error::RenderError;
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes};
-use crate::gpu::layout::{Brick, FieldPlanes, Tally};
+use crate::gpu::layout::{Brick, FieldPlanes};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
 use crate::lists::brick;
-use crate::lists::quad_plan::{FramePlan, tile_grid};
+use crate::lists::quad_plan::FramePlan;
 use crate::pass::classify::{CARRIED_BYTES, Classify, ClassifyBuffers, ClassifyGroup, ClassifyMode};
-use crate::pass::composite::{CompositeBuffers, CompositeMode};
-use crate::pass::cull::{Cull, CullBuffers, CullList};
+use crate::pass::composite::CompositeMode;
+use crate::pass::cull::{Cull, CullList};
 use crate::pass::field::{self, Field};
 use crate::pass::occlude::Occlude;
-use crate::pass::tiles::{TileLists, Tiles};
+use crate::pass::tiles::Tiles;
 use crate::pass::values::PlaneBuffers;
 use crate::rasterizer::request::{After, FrameRequest};
 use crate::settings::shading::Gradient;
@@ -38,24 +38,17 @@ pub(crate) struct FieldRasterizer {
     occlude: Occlude,
 }
 
-/// A frame's part that is this rasterizer's.
+/// This rasterizer's part of a frame.
 #[derive(Debug)]
 pub(crate) struct FieldFrame {
-    planned: Planned,
+    groups: SheetGroups,
     order: Order,
-    targets: Targets,
     planes: Buffer,
-    groups: Buffer,
-    group_stride: u32,
-    culled: Buffer,
-    tile_lists: TileLists,
     lists: Vec<PreparedList>,
     sheet_views: Vec<TextureView>,
     gradient: Gradient,
     clear_group: BindGroup,
-    /// First hits, `[u32]`, one per pixel; of one, if they are not asked for.
-    hits: Buffer,
-    /// By band, what pixels carry from plane to plane.
+    /// For every band what its pixels carry from plane to plane.
     carried: Vec<Buffer>,
     classify_groups: Vec<ClassifyGroup>,
     occlude_groups: [BindGroup; 2],
@@ -80,119 +73,108 @@ impl FieldRasterizer {
         }
     }
 
-    /// Buckets bricks if need be, and allocates what does not fit any more.
+    /// Sorts bricks into buckets if necessary, and allocates buffers that no longer fit.
     ///
     /// # Errors
-    /// If the device's buffers may not be that large.
+    /// If they exceed the device's maximum size of buffers.
     pub(crate) fn prepare(
         &self,
         inputs: FrameInputs<'_>,
         after: &After,
         previous: Option<FieldFrame>,
     ) -> Result<(FieldFrame, Prepared), RenderError> {
-        let FrameInputs { device, queue, volume, request, frame, control_points, compositing, cut } = inputs;
-        let FrameRequest { splatting, rays, .. } = request;
-        let (view, order) = (&after.view, splatting.order);
-        let mut old = PreviousBuffers::of(previous);
-        let targets = match old.targets.filter(|old| old.size == view.size) {
-            Some(targets) => targets,
-            None => Targets::new(device, view.size, self.sheet_format, field::SHEETS_PER_PLANE)?,
+        let FrameInputs { device, volume, request, frame, .. } = inputs;
+        let (view, splatting) = (&after.view, &request.splatting);
+        let (old_groups, old_planes, old_carried, old_lists) = match previous {
+            Some(FieldFrame { groups, planes, carried, lists, .. }) => (Some(groups), Some(planes), carried, lists),
+            None => (None, None, Vec::new(), Vec::new()),
         };
-        let covered = covered(volume.lists.bricks(), after);
-        let (planned, _, bucketed) = Planned::renewed(inputs, (view, &covered), old.planned, 1);
-        let plan = &planned.plan;
+        let covered = &covered(volume.lists.bricks(), after);
+        let (format, layers) = (self.sheet_format, field::SHEETS_PER_PLANE);
+        let settings = GroupSettings { view, covered, sheets: 1, format, layers };
+        let group_bytes = |plan: &FramePlan, stride| uniforms::plane_groups(plan, &after.planes, splatting, stride);
+        let (groups, bucketed) = SheetGroups::prepare(inputs, settings, &self.tiles, group_bytes, old_groups)?;
         let numbers = uniforms::planes(&after.planes, view, volume.gpu_volume().value_format(), &after.numbers);
         let bytes = bytemuck::bytes_of(&numbers);
-        let planes = inputs.filled(old.planes, "sheetsplat.planes", bytes, BufferUsages::UNIFORM)?;
-        let group_stride = group_stride(&device.limits());
-        let group_bytes = uniforms::plane_groups(plan, &after.planes, splatting, group_stride);
-        let groups = inputs.filled(old.groups, "sheetsplat.groups", &group_bytes, BufferUsages::UNIFORM)?;
-        let [wanted_culled, wanted_hits] = counts_and_hits(request);
-        let culled = grown(device, old.culled, &wanted_culled)?;
-        let coefficients = match &after.needs.coefficients {
-            Some(exact) => Some(exact.texture(device, queue)?),
-            None => None,
-        };
-
-        let shared = CullBuffers {
-            frame,
-            groups: &groups,
-            values: volume.values(),
-            has_holes: volume.has_holes(),
-            labels: volume.labels(),
-            control_points,
-            occluded: &targets.occluded,
-            culled: &culled,
-            planes: Some(PlaneBuffers { planes: &planes, coefficients }),
-        };
-        let mut old_lists = old.lists.into_iter();
-        let lists: Vec<PreparedList> = (volume.lists.lists.iter().zip(&planned.orders).zip(&planned.most))
-            .map(|((list, order), &most)| {
-                let previous = old_lists.next().map(|old| old.cull);
-                let cull = self.cull.prepare(device, shared, list, order, most, previous)?;
-                let field_group = self.field.bind(device, [frame, &groups, &planes], &cull);
-                Ok(PreparedList { cull, field_group })
-            })
-            .collect::<Result<_, RenderError>>()?;
-        let buffers = [frame, &groups, &culled];
-        let tile_lists = self.tiles.prepare(device, buffers, &targets, plan.groups.len(), old.tile_lists)?;
-        let tiles = &tile_lists.composited;
-        let sheets = targets.sheets_view();
-        let hits = grown(device, old.hits, &wanted_hits)?;
-        let buffers = ClassifyBuffers {
-            composite: CompositeBuffers {
-                frame,
-                groups: &groups,
-                sheets: &sheets,
-                tiles,
-                targets: &targets,
-                cut,
-                hits: &hits,
-            },
-            control_points,
-            planes: &planes,
-            values: volume.values(),
-            labels: volume.labels(),
-        };
-        let mode = ClassifyMode {
-            composite: CompositeMode { compositing: splatting.compositing, rays: *rays },
-            gradient: after.gradient,
-            labels: volume.shades_by_label(),
-            holes: volume.has_holes(),
-        };
-        let mut old_carried = old.carried.drain(..);
-        let carried = (compositing.bands.iter())
-            .map(|band| {
-                grown(device, old_carried.next(), &carried(u64::from(view.size[0]) * u64::from(band.band.rows)))
-            })
+        let planes = inputs.filled(old_planes, "sheetsplat.planes", bytes, BufferUsages::UNIFORM)?;
+        let lists = self.prepare_lists(inputs, after, (&groups, &planes), old_lists)?;
+        let pixels = |rows: u32| u64::from(view.size[0]) * u64::from(rows);
+        let mut old_carried = old_carried.into_iter();
+        let carried = (inputs.compositing.bands.iter())
+            .map(|band| grown(device, old_carried.next(), &carried(pixels(band.band.rows))))
             .collect::<Result<Vec<Buffer>, RenderError>>()?;
-        let bands = compositing.bands.iter().zip(&carried);
         self.field.prepare(device, after.gradient);
+        let SheetGroups { targets, tile_lists, .. } = &groups;
         let frame = FieldFrame {
-            clear_group: self.field.bind_clear(device, frame, tiles),
-            classify_groups: bands.map(|band| self.classify.bind(device, mode, buffers, band)).collect(),
-            occlude_groups: self.occlude.bind(device, [frame, &groups], &tile_lists.occluding, &targets),
-            sheet_views: (0..field::SHEETS_PER_PLANE).map(|layer| targets.sheet_view(layer)).collect(),
-            group_stride: group_stride as u32,
+            clear_group: self.field.bind_clear(device, frame, &tile_lists.composited),
+            classify_groups: self.bind_bands(inputs, after, (&groups, &planes), &carried),
+            occlude_groups: self.occlude.bind(device, [frame, &groups.groups], &tile_lists.occluding, targets),
+            sheet_views: (0..layers).map(|layer| targets.sheet_view(layer)).collect(),
             gradient: after.gradient,
-            order,
-            planned,
-            targets,
-            planes,
+            order: splatting.order,
             groups,
-            culled,
-            tile_lists,
+            planes,
             lists,
-            hits,
             carried,
         };
         Ok((frame, Prepared { bucketed, tabled: false }))
     }
 
-    /// What a new frame of these lists of bricks will take.
+    /// Prepares culling and drawing for every list of bricks.
+    fn prepare_lists(
+        &self,
+        inputs: FrameInputs<'_>,
+        after: &After,
+        (groups, planes): (&SheetGroups, &Buffer),
+        old: Vec<PreparedList>,
+    ) -> Result<Vec<PreparedList>, RenderError> {
+        let FrameInputs { device, queue, volume, frame, .. } = inputs;
+        let coefficients = match &after.needs.coefficients {
+            Some(exact) => Some(exact.texture(device, queue)?),
+            None => None,
+        };
+        let buffers = groups.cull_buffers(inputs, Some(PlaneBuffers { planes, coefficients }));
+        let mut old = old.into_iter().map(|old| old.cull);
+        (volume.lists.lists.iter().zip(&groups.planned.orders).zip(&groups.planned.most))
+            .map(|((list, order), &most)| {
+                let cull = self.cull.prepare(device, buffers, list, order, most, old.next())?;
+                let field_group = self.field.bind(device, [frame, &groups.groups, planes], &cull);
+                Ok(PreparedList { cull, field_group })
+            })
+            .collect()
+    }
+
+    /// Binds the stage classify to every band of the compositing buffer.
+    fn bind_bands(
+        &self,
+        inputs: FrameInputs<'_>,
+        after: &After,
+        (groups, planes): (&SheetGroups, &Buffer),
+        carried: &[Buffer],
+    ) -> Vec<ClassifyGroup> {
+        let FrameInputs { device, volume, request, control_points, compositing, .. } = inputs;
+        let sheets = &groups.targets.sheets_view();
+        let buffers = ClassifyBuffers {
+            composite: groups.composite_buffers(inputs, sheets),
+            control_points,
+            planes,
+            values: volume.values(),
+            labels: volume.labels(),
+        };
+        let mode = ClassifyMode {
+            composite: CompositeMode { compositing: request.splatting.compositing, rays: request.rays },
+            gradient: after.gradient,
+            labels: volume.shades_by_label(),
+            holes: volume.has_holes(),
+        };
+        let bands = compositing.bands.iter().zip(carried);
+        bands.map(|band| self.classify.bind(device, mode, buffers, band)).collect()
+    }
+
+    /// The resources that a new frame of these lists of bricks needs.
     ///
     /// # Errors
-    /// Those of [`Self::prepare`].
+    /// As for [`Self::prepare`].
     pub(crate) fn estimate(
         limits: &Limits,
         request: &FrameRequest,
@@ -203,41 +185,23 @@ impl FieldRasterizer {
         let size = after.view.size;
         let covered = covered(lists.iter().copied(), after);
         let plan = FramePlan::new(lists.iter().copied(), after.view, 1, request.splatting.order, covered);
-        let most = most_of(lists.iter().copied(), &plan);
-        let group_bytes =
-            uniforms::plane_groups(&plan, &after.planes, &request.splatting, group_stride(limits)).len() as u64;
-        let [columns, rows] = tile_grid(size);
-        let mut buffers = vec![
-            content_spec("sheetsplat.groups", group_bytes, BufferUsages::UNIFORM),
-            content_spec("sheetsplat.planes", size_of::<FieldPlanes>() as u64, BufferUsages::UNIFORM),
-        ];
-        buffers.extend(counts_and_hits(request));
-        buffers.extend(Tiles::buffer_specs(columns * rows, plan.groups.len()));
+        let group_bytes = uniforms::plane_groups(&plan, &after.planes, &request.splatting, group_stride(limits));
+        let mut buffers = SheetGroups::buffer_specs(request, &plan, &group_bytes, lists);
+        buffers.push(content_spec("sheetsplat.planes", size_of::<FieldPlanes>() as u64, BufferUsages::UNIFORM));
         buffers.extend(request.bands.iter().map(|band| carried(u64::from(size[0]) * u64::from(band.rows))));
-        for ((bricks, order), most) in lists.iter().zip(&plan.orders).zip(most) {
-            buffers.push(buffer_spec("sheetsplat.order", order_bytes(order).len() as u64, BufferUsages::STORAGE));
-            buffers.extend(Cull::buffer_specs(bricks.len(), most));
-        }
         let targets = Targets::estimate(limits, size, sheet_format, field::SHEETS_PER_PLANE)?;
-        let groups = plan.groups.len();
-        Ok(FrameEstimate { bytes: sizes(limits, &buffers)? + targets, groups, passes: 3 * groups })
+        Ok(FrameEstimate {
+            bytes: sizes(limits, &buffers)? + targets,
+            groups: plan.groups.len(),
+            passes: SheetGroups::passes(&plan),
+        })
     }
 
     /// Draws the frame.
     pub(crate) fn record(&self, encoder: &mut CommandEncoder, timer: &mut Option<Timer>, frame: &FieldFrame) {
-        let FieldFrame { planned: Planned { plan, .. }, targets, tile_lists, .. } = frame;
-        let masks = targets.masks().into_iter().chain([&frame.culled, &frame.hits]);
-        for buffer in masks.chain(frame.lists.iter().map(|list| &list.cull.states)) {
-            encoder.clear_buffer(buffer, 0, None);
-        }
-        let mut offsets = (0..).step_by(frame.group_stride as usize);
-        for group in &plan.groups {
-            // (list, offset of its group uniform) for the lists that reach the plane.
-            let all: Vec<(&PreparedList, u32)> = frame.lists.iter().zip(&mut offsets).collect();
-            let Some(&(_, any_offset)) = all.first() else { continue };
-            let reaches = |(list, bricks): (_, &Range<u32>)| (!bricks.is_empty()).then_some(list);
-            let lists: Vec<(&PreparedList, u32)> = all.into_iter().zip(&group.bricks).filter_map(reaches).collect();
-
+        let tile_lists = &frame.groups.tile_lists;
+        frame.groups.clear(encoder, frame.lists.iter().map(|list| &list.cull));
+        for (lists, any_offset) in frame.groups.with_lists(&frame.lists) {
             let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.cull", timer, "cull"));
             for &(list, offset) in &lists {
                 self.cull.record(&mut pass, &list.cull, offset);
@@ -258,72 +222,38 @@ impl FieldRasterizer {
 }
 
 impl FieldFrame {
-    /// Passes of the frame: every plane has three.
+    /// The number of the frame's passes.
     pub(crate) fn passes(&self) -> usize {
-        3 * self.planned.plan.groups.len()
+        SheetGroups::passes(&self.groups.planned.plan)
     }
 
     /// The slabs that are classified with each plane.
     pub(crate) fn group_slabs(&self) -> GroupSlabs {
-        let before = if self.order == Order::FrontToBack { 1 } else { 0 };
-        let firsts = self.planned.plan.groups.iter().map(|group| group.first_slab - before).collect();
-        GroupSlabs { firsts, sheets: 1 }
+        let mut slabs = self.groups.slabs();
+        if self.order == Order::FrontToBack {
+            slabs.firsts.iter_mut().for_each(|first| *first -= 1);
+        }
+        slabs
     }
 
     /// Copies the frame's counts to the start of `staging`.
     pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer) {
-        let (tally, tiles) = (size_of::<Tally>() as u64, self.planned.plan.groups.len() as u64 * 4);
-        encoder.copy_buffer_to_buffer(&self.culled, 0, staging, 0, tally);
-        encoder.copy_buffer_to_buffer(&self.tile_lists.counts, 0, staging, tally, tiles);
+        self.groups.copy_counts(encoder, staging);
     }
 
-    /// The words of first hits, and where in their buffer they start, bytes.
+    /// The buffer with the words of first hits, and their byte offset in it.
     pub(crate) fn first_hits(&self) -> (&Buffer, u64) {
-        (&self.hits, 0)
+        (&self.groups.hits, 0)
     }
 
     /// Bytes of GPU memory.
     pub(crate) fn gpu_bytes(&self) -> u64 {
         let lists: u64 = self.lists.iter().map(|list| list.cull.gpu_bytes()).sum();
-        let TileLists { composited, occluding, counts, .. } = &self.tile_lists;
-        let shared = [&self.planes, &self.groups, &self.culled, &self.hits, composited, occluding, counts];
-        let buffers = shared.into_iter().chain(&self.planned.orders).chain(&self.carried);
-        self.targets.gpu_bytes() + lists + buffers.map(Buffer::size).sum::<u64>()
+        self.groups.gpu_bytes() + lists + self.carried.iter().chain([&self.planes]).map(Buffer::size).sum::<u64>()
     }
 }
 
-/// What of the previous frame may be taken over.
-#[derive(Default)]
-struct PreviousBuffers {
-    planned: Vec<Planned>,
-    targets: Option<Targets>,
-    planes: Option<Buffer>,
-    groups: Option<Buffer>,
-    culled: Option<Buffer>,
-    hits: Option<Buffer>,
-    carried: Vec<Buffer>,
-    tile_lists: Option<TileLists>,
-    lists: Vec<PreparedList>,
-}
-
-impl PreviousBuffers {
-    fn of(frame: Option<FieldFrame>) -> Self {
-        let Some(frame) = frame else { return Self::default() };
-        Self {
-            planned: vec![frame.planned],
-            targets: Some(frame.targets),
-            planes: Some(frame.planes),
-            groups: Some(frame.groups),
-            culled: Some(frame.culled),
-            hits: Some(frame.hits),
-            carried: frame.carried,
-            tile_lists: Some(frame.tile_lists),
-            lists: frame.lists,
-        }
-    }
-}
-
-/// The buffer of what some pixels carry from plane to plane.
+/// The buffer for what pixels carry from plane to plane.
 fn carried(pixels: u64) -> BufferSpec {
     buffer_spec("sheetsplat.carried", pixels * CARRIED_BYTES, BufferUsages::STORAGE)
 }

@@ -6,6 +6,7 @@ pub(crate) mod kind;
 pub(crate) mod quads;
 pub(crate) mod request;
 pub(crate) mod samples;
+mod sheet_groups;
 pub(crate) mod tiles;
 
 use wgpu::{Buffer, BufferUsages, ComputePassDescriptor, Device, Queue};

@@ -5,6 +5,7 @@ use std::ops::Range;
 use wgpu::Device;
 
 use super::kind::{RasterizerKind, check_rays};
+use crate::after::brick_ranges::Bearing;
 use crate::after::normalization::Normalization;
 use crate::after::plane_geometry::PlaneGeometry;
 use crate::error::RenderError;
@@ -18,7 +19,6 @@ use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::uniforms::Ramps;
 use crate::pass::composite::RayMode;
 use crate::scene::Scene;
-use crate::setting_error::SettingError;
 use crate::settings::camera::Camera;
 use crate::settings::shading::Gradient;
 use crate::settings::splatting::{Classification, Interpolation, Rasterizer, Splatting};
@@ -60,11 +60,6 @@ pub(crate) struct After {
 impl After {
     fn new(volume: &ClassifiedVolume, scene: &Scene, seen: &ViewGeometry) -> Result<Self, RenderError> {
         let splatting = &scene.splatting;
-        if splatting.compositing.is_by_means() {
-            let (found, allowed) =
-                ("a projection or \"surface\" with classification = \"after\" on the GPU", "another one");
-            return Err(SettingError::new("splatting.compositing", found, allowed).into());
-        }
         let planes = PlaneGeometry::new(seen, volume.grid());
         let coefficients = match splatting.interpolation {
             Interpolation::Smooth => None,
@@ -77,7 +72,8 @@ impl After {
             let slab = (perspective.eye.near / seen.slabs.width).floor();
             perspective.eye.near = if slab >= 1.0 { slab } else { 0.5 } * seen.slabs.width;
         }
-        let needs = BrickNeeds { reach: planes.reach(seen), coefficients };
+        let bearing = Bearing::of(splatting.compositing);
+        let needs = BrickNeeds { reach: planes.reach(seen), coefficients, bearing };
         Ok(Self { view, planes, numbers, needs, gradient: scene.shading.gradient })
     }
 }

@@ -3,13 +3,19 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
+use sheetsplat::headless::readback;
+use sheetsplat::image::Image;
+use sheetsplat::internals::reference::{self, Host};
+use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Compositing, Gradient, Interpolation, LabelTables, Order, Ramp, Rasterizer};
+use sheetsplat::stats::Counts;
 use sheetsplat::volume::{Labels, Volume, builtin};
 
 use crate::common::compare::{assert_at_least, assert_at_most, decibels};
 use crate::common::images::{largest_difference, rms};
-use crate::common::{camera, gpu, transfer};
+use crate::common::surfaces::{DepthRange, surfaces};
+use crate::common::{COMPOSITINGS, camera, gpu, transfer};
 use crate::{eye, render, scene};
 
 /// A small head on a grid with such an aspect, semi-transparent, with a step in its opacity.
@@ -24,26 +30,65 @@ fn head(spacing: [f64; 3]) -> (Volume, Scene) {
     (builtin::volume("head:24").unwrap().with_spacing("head", DVec3::from(spacing)).unwrap(), scene)
 }
 
-/// The image of the GPU against the twin's, dB.
+/// The image of the GPU against the twin's, dB. The twin's shows something: at least a hundredth of its pixels, in more than one colour.
 fn accuracy(volume: &Volume, scene: &Scene) -> f64 {
-    let ours = gpu().render_volume(volume.clone(), scene).unwrap().image;
-    decibels(rms(&ours, &render(volume, scene)))
+    let (ours, expected) = (gpu().render_volume(volume.clone(), scene).unwrap().image, render(volume, scene));
+    assert_shows(&expected, scene);
+    decibels(rms(&ours, &expected))
+}
+
+fn assert_shows(image: &Image, scene: &Scene) {
+    let shown: Vec<_> = image.pixels.iter().filter(|pixel| pixel[3] > 0.02).collect();
+    let [low, high] = [f32::min, f32::max].map(|of| shown.iter().map(|pixel| pixel[1]).reduce(of).unwrap_or(0.0));
+    let compositing = scene.splatting.compositing;
+    assert!(shown.len() >= image.pixels.len() / 100, "{compositing:?}: {} pixels", shown.len());
+    assert!(high - low > 0.04, "{compositing:?}: {low} to {high}");
+}
+
+/// The volume with a texture: in homogeneous matter rounding would decide about the direction of the kernel's gradient.
+fn textured(volume: &Volume) -> Volume {
+    let values = (0_u32..).zip(volume.values()).map(|(at, &v)| v + (at.wrapping_mul(2_654_435_761) >> 28) as f32);
+    Volume::new("textured", volume.dims(), volume.grid().spacing, values.collect()).unwrap()
+}
+
+/// A transfer function under which every compositing shows something.
+fn for_all(mut scene: Scene, compositing: Compositing) -> Scene {
+    scene.splatting.compositing = compositing;
+    let opacity: &[(f64, f64)] = match compositing {
+        Compositing::Maximum => &[(20.0, 0.0), (100.0, 0.2), (250.0, 0.9)],
+        Compositing::Minimum => {
+            // The head alone: outside of it all minima are 0.
+            scene.clip.crop = Some([DVec3::new(-6.0, -6.0, -8.0), DVec3::new(6.0, 5.0, 7.0)]);
+            &[(0.0, 0.9), (60.0, 0.6), (150.0, 0.1), (255.0, 0.0)]
+        }
+        Compositing::Average => {
+            // Not symmetric, or the middle of many rays would lie on a border between two voxels.
+            scene.clip.crop = Some([DVec3::new(-11.0, -10.6, -16.4), DVec3::new(10.3, 11.2, 15.1)]);
+            &[(10.0, 0.0), (60.0, 0.7), (90.0, 0.2)]
+        }
+        Compositing::Surface => &[(30.0, 0.0), (70.0, 0.4), (71.0, 0.1), (150.0, 0.2), (180.0, 0.8)],
+        _ => return scene,
+    };
+    scene.transfer.opacity = Some(Ramp::new(opacity.to_vec()).unwrap());
+    scene
 }
 
 #[test]
 fn images_are_the_twins() {
     for spacing in [[1.0, 1.0, 1.0], [1.0, 1.0, 2.5]] {
         let (volume, base) = head(spacing);
-        for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray] {
+        let textured = textured(&volume);
+        for compositing in COMPOSITINGS {
             for (interpolation, gradient, falloff) in
                 [(Interpolation::Smooth, Gradient::Differences, 2.0), (Interpolation::Exact, Gradient::Kernel, 1.0)]
             {
                 for projection in [base.camera.projection, eye(60.0), eye(9.0)] {
-                    let mut scene = base.clone();
+                    let mut scene = for_all(base.clone(), compositing);
                     scene.camera.projection = projection;
-                    (scene.splatting.compositing, scene.splatting.interpolation) = (compositing, interpolation);
+                    scene.splatting.interpolation = interpolation;
                     (scene.shading.gradient, scene.splatting.falloff) = (gradient, falloff);
-                    let measured = accuracy(&volume, &scene);
+                    let measured =
+                        accuracy(if compositing == Compositing::Minimum { &textured } else { &volume }, &scene);
                     let case = format!("{spacing:?} {compositing:?} {interpolation:?} {projection:?}");
                     println!("{case}: {measured:.1} dB");
                     let required = if gradient == Gradient::Kernel { 55.0 } else { 60.0 };
@@ -60,7 +105,7 @@ type Change = fn(&mut Scene);
 /// Thin and thick slabs, minified voxels, the other order, gradient opacity, iso-ranges, cuts.
 #[test]
 fn settings_are_the_twins() {
-    let cases: [(&str, Change); 8] = [
+    let cases: [(&str, Change); 11] = [
         ("thin", |scene| scene.splatting.slab_width = 0.3),
         ("thick", |scene| scene.splatting.slab_width = 3.0),
         ("minified", |scene| scene.camera = camera([0.4, 0.9, -0.3], 120.0)),
@@ -69,16 +114,35 @@ fn settings_are_the_twins() {
         ("iso-ranges", |scene| scene.transfer.iso_ranges = Some(vec![[40.0, 90.0], [180.0, 230.0]])),
         ("planes", |scene| scene.clip.planes = vec![[0.3, 1.0, 0.2, 0.5]]),
         ("all tiles", |scene| scene.splatting.tiles = false),
+        ("gradient opacity", |scene| {
+            scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.2), (40.0, 1.0)]).unwrap());
+        }),
+        ("crop", |scene| scene.clip.crop = Some([DVec3::new(-9.0, -2.0, -9.0), DVec3::new(7.0, 9.0, 12.0)])),
+        ("thin crop", |scene| {
+            // Most rays meet no plane within it.
+            scene.clip.crop = Some([DVec3::new(-30.0, 0.2, -30.0), DVec3::new(30.0, 0.7, 30.0)]);
+            if scene.splatting.compositing != Compositing::Minimum {
+                scene.transfer.opacity = Some(Ramp::new(vec![(30.0, 0.1), (255.0, 0.9)]).unwrap());
+            }
+        }),
     ];
-    for projection in [None, Some(eye(50.0))] {
+    for (at, projection) in [None, Some(eye(50.0))].into_iter().enumerate() {
         for (name, change) in &cases {
-            let (volume, mut scene) = head([1.0, 1.0, 1.5]);
-            scene.splatting.compositing = Compositing::Exponential;
-            change(&mut scene);
-            scene.camera.projection = projection.unwrap_or(scene.camera.projection);
-            let measured = accuracy(&volume, &scene);
-            println!("{name} {projection:?}: {measured:.1} dB");
-            assert_at_least(measured, 60.0, name);
+            for (number, compositing) in COMPOSITINGS.into_iter().enumerate() {
+                // Of the other compositings each case tests a half in every projection. Surfaces are found front to back only.
+                let is_refused = *name == "back to front" && compositing == Compositing::Surface;
+                if is_refused || compositing != Compositing::Exponential && (number + at) % 2 == 0 {
+                    continue;
+                }
+                let (volume, scene) = head([1.0, 1.0, 1.5]);
+                let mut scene = for_all(scene, compositing);
+                change(&mut scene);
+                scene.camera.projection = projection.unwrap_or(scene.camera.projection);
+                let measured = accuracy(&volume, &scene);
+                let case = format!("{name} {compositing:?} {projection:?}");
+                println!("{case}: {measured:.1} dB");
+                assert_at_least(measured, 60.0, case);
+            }
         }
     }
 }
@@ -104,13 +168,26 @@ fn culling_keeps_its_promise() {
     }
 }
 
-/// Values that are holes, and labels with tables of their own, one of them invisible.
+/// Volumes with holes, and labels with their own tables, one of them invisible.
 #[test]
 fn holes_and_labels_are_the_twins() {
-    let (volume, mut scene) = head([1.0, 1.0, 1.5]);
+    for compositing in COMPOSITINGS {
+        for projection in [None, Some(eye(50.0))] {
+            let mut scene = for_all(head([1.0, 1.0, 1.5]).1, compositing);
+            scene.camera.projection = projection.unwrap_or(scene.camera.projection);
+            holes_and_labels(scene);
+        }
+    }
+}
+
+fn holes_and_labels(mut scene: Scene) {
+    let compositing = scene.splatting.compositing;
+    let (volume, _) = head([1.0, 1.0, 1.5]);
     let hollow = (0..).zip(volume.values()).map(|(at, &v)| if at % 97 < 3 { f32::NAN } else { v }).collect();
     let hollow = Volume::new("hollow", volume.dims(), volume.grid().spacing, hollow).unwrap();
-    assert_at_least(accuracy(&hollow, &scene), 60.0, "holes");
+    let measured = accuracy(&hollow, &scene);
+    println!("holes {compositing:?}: {measured:.1} dB");
+    assert_at_least(measured, 60.0, format_args!("holes, {compositing:?}"));
     let values = (0..).zip(volume.values()).map(|(at, _)| (at / 9 % 4) as u16).collect();
     let (dims, origin) = (volume.dims(), "labels".to_owned());
     let labels = Labels { origin, dims, spacing: None, values, names: BTreeMap::new() };
@@ -118,7 +195,98 @@ fn holes_and_labels_are_the_twins() {
     let own =
         LabelTables { opacity: Some(Ramp::new(vec![(20.0, 0.0), (90.0, 0.7)]).unwrap()), ..LabelTables::default() };
     scene.transfer.labels = [(1, own), (2, LabelTables { visible: false, ..LabelTables::default() })].into();
-    assert_at_least(accuracy(&labelled, &scene), 60.0, "labels");
+    let measured = accuracy(&labelled, &scene);
+    println!("labels {compositing:?}: {measured:.1} dB");
+    assert_at_least(measured, 60.0, format_args!("labels, {compositing:?}"));
+}
+
+/// A host's surfaces cut rays, and first hits are where the twin has them.
+#[test]
+fn surfaces_and_first_hits_are_the_twins() {
+    let gpu = gpu();
+    for (case, compositing) in (0..).zip(COMPOSITINGS) {
+        for projection in [None, Some(eye(60.0))] {
+            let (volume, scene) = head([1.0, 1.0, 1.5]);
+            let mut scene = for_all(scene, compositing);
+            scene.camera.projection = projection.unwrap_or(scene.camera.projection);
+            let size = [scene.image.width, scene.image.height];
+            let view = ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, size).unwrap();
+            let middle = view.rays().depth_of(DVec3::ZERO);
+            let depth = |at: u32| {
+                let place = [at % size[0], at / size[0]].map(f64::from);
+                let is_gap = (place[0] * 0.3).sin() * (place[1] * 0.2).cos() > 0.6;
+                if is_gap { f64::INFINITY } else { (middle + 2.0 + 4.0 * (place[0] * 0.2).sin()).max(0.05) }
+            };
+            let depths: Vec<f64> = (0..size[0] * size[1]).map(depth).collect();
+            let first_hit = (compositing != Compositing::Minimum).then_some(0.1);
+            let host = Host { surfaces: Some(&depths), first_hit };
+            let expected =
+                reference::render_for(host, &volume, &scene.transfer.resolve(&volume), &scene, None).unwrap();
+            assert_shows(&expected.image, &scene);
+            let whole = render(&volume, &scene);
+            assert!(rms(&whole, &expected.image) > 1e-3, "{compositing:?}: the surface cuts nothing");
+            let mut drawn = gpu.view(volume.clone(), &scene).unwrap();
+            let unit = volume.grid().unit();
+            let planes = [if projection.is_some() { 1.0 } else { 0.01 }, 1000.0];
+            let given = surfaces(&gpu, &view, unit, DepthRange::Standard, planes, &depths, [case, 3]);
+            drawn.set_surfaces(Some(given)).unwrap();
+            drawn.set_first_hit(first_hit).unwrap();
+            let image = gpu.draw(&mut drawn).unwrap().image;
+            let measured = decibels(rms(&image, &expected.image));
+            println!("{compositing:?} {projection:?}: {measured:.1} dB");
+            assert_at_least(measured, 60.0, format_args!("{compositing:?} {projection:?}"));
+            let Some(texture) = drawn.first_hits() else { continue };
+            let bytes = readback::texture(gpu.device(), gpu.queue(), texture).unwrap();
+            let hits = bytemuck::pod_collect_to_vec::<_, f32>(&bytes).into_iter().map(|depth| f64::from(depth) / unit);
+            let hits: Vec<f64> = hits.collect();
+            assert_eq!(hits.len(), expected.first_hits.len());
+            assert!(hits.iter().filter(|hit| hit.is_finite()).count() > hits.len() / 50, "{compositing:?}: few hits");
+            let is_close = |(hit, expected): &(&f64, &f64)| hit == expected || (**hit - **expected).abs() < 2e-3;
+            let off = hits.len() - hits.iter().zip(&expected.first_hits).filter(is_close).count();
+            assert!(off <= hits.len() / 400, "{compositing:?} {projection:?}: {off} of {} hits", hits.len());
+        }
+    }
+}
+
+/// The counts of un-culled frames are the twin's.
+#[test]
+fn counts_are_the_twins() {
+    for compositing in COMPOSITINGS {
+        for projection in [None, Some(eye(200.0))] {
+            // One bright voxel and one dark voxel, one of which has an opacity.
+            let volume = crate::volume([30, 26, 34], DVec3::new(1.0, 1.0, 1.5), |voxel| match voxel.to_array() {
+                [7, 9, 8] => 255.0,
+                [21, 18, 23] => 0.0,
+                _ => 100.0,
+            });
+            let mut scene = for_all(head([1.0; 3]).1, compositing);
+            // Everything is in view.
+            scene.camera = camera([0.4, 0.9, -0.3], 80.0);
+            scene.camera.projection = projection.unwrap_or(scene.camera.projection);
+            let opacity = match compositing {
+                Compositing::Minimum => vec![(0.0, 0.9), (90.0, 0.0)],
+                _ => vec![(120.0, 0.0), (250.0, 0.9)],
+            };
+            scene.transfer.opacity = Some(Ramp::new(opacity).unwrap());
+            scene.splatting.tiles = false;
+            let expected = reference::count(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
+            let ours = gpu().render_volume(volume.clone(), &scene).unwrap().stats.counts;
+            let of = |counts: &Counts| {
+                [
+                    counts.voxels_total,
+                    counts.voxels_in_range,
+                    counts.sections_total,
+                    counts.sections_rasterized,
+                    counts.sheets,
+                ]
+            };
+            println!("{compositing:?} {projection:?}: {:?}", of(&ours));
+            assert_eq!(of(&ours), of(&expected), "{compositing:?} {projection:?}");
+            assert!(ours.voxels_in_range > 0);
+            let is_average = compositing == Compositing::Average;
+            assert_eq!(ours.voxels_in_range == ours.voxels_total, is_average, "{compositing:?}: {:?}", of(&ours));
+        }
+    }
 }
 
 /// What a frame will take is known before it is prepared.

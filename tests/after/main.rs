@@ -9,6 +9,7 @@ mod field;
 mod gpu;
 mod images;
 mod modes;
+mod properties;
 mod refusals;
 mod slab_integral;
 mod tiles;

@@ -6,9 +6,6 @@ use sheetsplat::RenderError;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Classification, Splatting};
-use sheetsplat::volume::builtin;
-
-use crate::common::gpu;
 
 fn parse(sets: &[&str]) -> Result<Scene, sheetsplat::scene::SceneError> {
     let sets: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
@@ -76,16 +73,4 @@ fn the_preset_labels_excludes_after() {
     parse(&["preset=labels", "splatting.classification=before"]).unwrap();
     parse(&["preset=labels"]).unwrap();
     assert_eq!(Splatting::default().classification, Classification::Before);
-}
-
-/// The GPU does not draw them with `after` yet.
-#[test]
-fn the_gpu_refuses_projections() {
-    let volume = builtin::volume("head:16").unwrap();
-    for compositing in ["maximum", "minimum", "average", "surface"] {
-        let compositing = format!("splatting.compositing={compositing}");
-        let scene = parse(&["splatting.classification=after", &compositing]).unwrap();
-        let error = gpu().render_volume(volume.clone(), &scene).unwrap_err().to_string();
-        assert!(error.contains("splatting.compositing: found a projection or \"surface\""), "{error}");
-    }
 }

@@ -3,7 +3,7 @@
 use super::extreme::is_choice;
 use glam::{DVec3, UVec3};
 
-use crate::after::brick_ranges::BrickRanges;
+use crate::after::brick_ranges::{Bearing, BrickRanges};
 use crate::after::coefficients;
 use crate::after::normalization::Normalization;
 use crate::after::plane_geometry::PlaneGeometry;
@@ -75,7 +75,7 @@ impl Coefficients {
         let reach = PlaneGeometry::new(view, volume.grid()).reach(view);
         if self.shown.as_ref().is_none_or(|shown| shown.reach != reach) {
             let ranges = BrickRanges::new(volume.grid(), self.all(volume), reach);
-            let is_shown = ranges.shown(volume, transfer);
+            let is_shown = ranges.shown(volume, transfer, Bearing::of(compositing));
             let list = |voxels: Vec<u32>| BrickList::new(volume.grid(), &voxels);
             let bricks = list(ranges.voxels(volume, |brick| is_shown[brick]));
             let all = is_choice(compositing).then(|| list(ranges.voxels(volume, |_| true)));

@@ -14,6 +14,7 @@ use crate::error::RenderError;
 use crate::lists::quad_plan::tile_grid;
 use crate::reference::Host;
 use crate::scene::Scene;
+use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::{Tables, TransferFunction};
 use crate::stats::Counts;
 use crate::volume::Volume;
@@ -40,7 +41,9 @@ pub(super) fn count_in(frame: &Frame) -> Counts {
         .into_par_iter()
         .map(|index| UVec3::new(index % bricks.x, index / bricks.x % bricks.y, index / bricks.x / bricks.y) * SIDE)
         .map(|first| [first, (first + SIDE).min(grid.dims)])
-        .filter(|&[first, end]| values(frame, first, end, reach).is_some_and(|ends| meets_opacity(&tables, ends)))
+        .filter(|&[first, end]| {
+            values(frame, first, end, reach).is_some_and(|ends| meets_opacity(&tables, bearing(frame, ends)))
+        })
         .collect();
     let voxels = |&[first, end]: &[UVec3; 2]| u64::from((end - first).element_product());
     let sections = |&[first, end]: &[UVec3; 2]| {
@@ -100,6 +103,18 @@ fn values(frame: &Frame, first: UVec3, end: UVec3, reach: DVec3) -> Option<[f64;
     // `min` and `max` ignore NaN.
     let ends = found.fold([f64::INFINITY, f64::NEG_INFINITY], |[min, max], &c| [min.min(c), max.max(c)]);
     (ends[0] <= ends[1]).then_some(ends)
+}
+
+/// The range in which a value with an opacity makes a brick matter: a greater value hides smaller maxima, a smaller one greater minima, and
+/// averages are taken of all values.
+fn bearing(frame: &Frame, [min, max]: [f64; 2]) -> [f64; 2] {
+    let all = frame.field.range();
+    match frame.scene.splatting.compositing {
+        Compositing::Maximum => [all[0], max],
+        Compositing::Minimum => [min, all[1]],
+        Compositing::Average => all,
+        _ => [min, max],
+    }
 }
 
 /// Whether any value between two ends has an opacity above 0.

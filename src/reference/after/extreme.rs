@@ -45,13 +45,19 @@ fn points<'a>(pixel: &'a Pixel) -> impl Iterator<Item = (i32, f64)> + 'a {
     planes.filter_map(|plane| pixel.value(plane).map(|value| (plane, value)))
 }
 
+/// Values that differ by less, relative to the range of the coefficients, count as equal: in homogeneous matter only rounding tells them apart.
+const HAIR: f64 = 2e-6;
+
 /// The point with the maximum or minimum value, the nearest of equal ones.
 fn extreme(pixel: &Pixel, is_minimum: bool) -> Option<Point> {
+    let [min, max] = pixel.frame().field.range();
+    let hair = HAIR * (max - min);
     let nearest = |best: (i32, f64), other: (i32, f64)| {
-        let is_better = if is_minimum { other.1 < best.1 } else { other.1 > best.1 };
+        let is_better = if is_minimum { other.1 < best.1 - hair } else { other.1 > best.1 + hair };
         if is_better { other } else { best }
     };
-    let Some((plane, value)) = points(pixel).reduce(nearest) else { return middle(pixel) };
+    let Some((plane, _)) = points(pixel).reduce(nearest) else { return middle(pixel) };
+    let value = points(pixel).map(|(_, value)| value).reduce(if is_minimum { f64::min } else { f64::max })?;
     Some(Point { sheet: plane.into(), value, gradient: pixel.gradient(plane) })
 }
 

@@ -22,6 +22,8 @@ pub struct Field<'a> {
     volume: &'a Volume,
     /// c for every voxel; NaN at holes.
     coefficients: Vec<f64>,
+    /// Their minimum and maximum.
+    range: [f64; 2],
     radius: f64,
     falloff: f64,
     gradient: Gradient,
@@ -40,7 +42,10 @@ impl<'a> Field<'a> {
             Interpolation::Smooth => values,
             Interpolation::Exact => coefficients::exact(volume.grid(), &values, radius, falloff)?,
         };
-        Ok(Self { volume, coefficients, radius, falloff, gradient: scene.shading.gradient })
+        // `min` and `max` ignore NaN.
+        let range =
+            coefficients.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[min, max], &c| [min.min(c), max.max(c)]);
+        Ok(Self { volume, coefficients, range, radius, falloff, gradient: scene.shading.gradient })
     }
 
     /// f at a point in voxel coordinates; `None` where the sum of the weights is too small or the nearest voxel is a hole.
@@ -106,6 +111,11 @@ impl<'a> Field<'a> {
                 }
             }
         }
+    }
+
+    /// The minimum and maximum coefficient.
+    pub fn range(&self) -> [f64; 2] {
+        self.range
     }
 
     /// The coefficients of all voxels; NaN at holes.
