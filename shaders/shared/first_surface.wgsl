@@ -8,7 +8,7 @@ const NO_SURFACE = 2.0;
 const SAMPLES = 32u;
 
 // The number of bisections between two tested points; more would not change an f32.
-const HALVINGS = 24u;
+const F32_HALVINGS = 24u;
 
 // The opacity at a number in a cell of the table, given by the cell's first entry.
 fn opacity_in(cell: vec4f, x: f32) -> f32 {
@@ -49,7 +49,7 @@ fn surface_between(near: vec4f, far: vec4f, start: f32, end: f32, ramps: vec4u) 
             for (var i = 0u; i <= samples; i += 1u) {
                 var above = f32(i) / f32(samples);
                 if is_half_opaque(cell, mix(enters, leaves, above), near, far, mix(enter, leave, above), ramps) {
-                    for (var halving = 0u; halving < HALVINGS; halving += 1u) {
+                    for (var halving = 0u; halving < F32_HALVINGS; halving += 1u) {
                         let middle = 0.5 * (below + above);
                         let number = mix(enters, leaves, middle);
                         if is_half_opaque(cell, number, near, far, mix(enter, leave, middle), ramps) {
