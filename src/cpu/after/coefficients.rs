@@ -13,6 +13,7 @@ use crate::geometry::view_geometry::ViewGeometry;
 use crate::lists::brick::Brick;
 use crate::lists::brick::BrickList;
 use crate::scene::Scene;
+use crate::settings::shading::Gradient;
 use crate::settings::splatting::{Compositing, Interpolation};
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::Volume;
@@ -24,6 +25,8 @@ pub(in crate::cpu) struct Coefficients {
     pub(super) numbers: Normalization,
     /// Of `interpolation = "exact"`; else they are the values.
     exact: Option<Vec<f32>>,
+    /// From differences of neighbours on either side to gradients in numbers per world unit; `None` where the kernel's gradient is asked for.
+    per_difference: Option<DVec3>,
     shown: Option<Shown>,
 }
 
@@ -49,7 +52,9 @@ impl Coefficients {
         };
         let all = exact.as_deref().unwrap_or(volume.values());
         let numbers = Normalization::of(all.iter().copied()).unwrap_or(Normalization::new([0.0; 2]));
-        Ok(Self { numbers, exact, shown: None })
+        let is_by_differences = scene.shading.gradient == Gradient::Differences;
+        let per_difference = is_by_differences.then(|| numbers.scale / (2.0 * volume.spacing()));
+        Ok(Self { numbers, exact, per_difference, shown: None })
     }
 
     /// All of them, in memory order; NaN at holes.
@@ -57,11 +62,21 @@ impl Coefficients {
         self.exact.as_deref().unwrap_or(volume.values())
     }
 
-    /// The number of a voxel, and its gradient in numbers per world unit.
+    /// The number of a voxel, and its gradient in numbers per world unit, 0 where the kernel's is asked for.
     pub(super) fn voxel(&self, volume: &Volume, voxel: UVec3) -> (f32, [f32; 3]) {
-        let index = volume.grid().index_of(voxel) as usize;
-        let gradient: DVec3 = volume.gradient(voxel) * self.numbers.scale;
+        let grid = volume.grid();
+        let index = grid.index_of(voxel) as usize;
         let number = self.numbers.apply(f64::from(self.all(volume)[index])) as f32;
+        let Some(per_difference) = self.per_difference else { return (number, [0.0; 3]) };
+        let is_inside = voxel.cmpgt(UVec3::ZERO).all() && (voxel + 1).cmplt(grid.dims).all();
+        let gradient = if is_inside && volume.holes() == 0 {
+            let values = volume.values();
+            let steps = [1, grid.dims.x as usize, grid.dims.x as usize * grid.dims.y as usize];
+            let differences = steps.map(|step| f64::from(values[index + step]) - f64::from(values[index - step]));
+            DVec3::from(differences) * per_difference
+        } else {
+            volume.gradient(voxel) * self.numbers.scale
+        };
         (number, gradient.to_array().map(|component| component as f32))
     }
 

@@ -8,7 +8,7 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 use glam::DVec2;
 
-use super::place::{Place, Placement, PlaneMap};
+use super::place::{Place, Placement};
 use super::planes::{PlaneRow, Planes};
 use crate::cpu::cull::{OpenMask, Pixels, columns_between};
 use crate::cpu::sheets::{COLUMNS, RING, SECTIONS, STRIDE, slot_of};
@@ -115,28 +115,44 @@ impl Splatter {
             limit: (self.radius_squared - squared).to_array(),
         };
         let slot = slot_of(first);
-        let mut draw = |map: &PlaneMap, to_plane: f64, on: [usize; 2]| {
-            let pixel = placement.center(splat.place, to_plane, map);
-            let center = [pixel.x - origin[0] as f64 - 0.5, pixel.y - origin[1] as f64 - 0.5].map(|at| at as f32);
-            let in_f32 = |v: DVec2| [v.x as f32, v.y as f32];
-            let pixels = Pixels::within(center, in_f32(map.half_box)).filter(|pixels| open.sees(pixels));
-            let Some(pixels) = pixels else { return false };
-            let footprint = Footprint { center, a: in_f32(map.a), b: in_f32(map.b) };
-            let on_planes = OnPlanes { footprint: &footprint, along: &along, planes: on, slot };
-            let written = self.draw_box(simd, splat, &on_planes, &pixels, open, planes);
-            (on[0]..on[1]).for_each(|at| planes.written[(slot + at) % RING] |= written);
-            true
-        };
         if !self.is_perspective {
             // All planes have the same footprint.
-            return draw(placement.map(first), 0.0, [0, count]);
+            return self.draw_planes(simd, (placement, origin), splat, (&along, slot, [0, count]), open, planes);
         }
         let mut is_seen = false;
         for at in 0..count {
-            let plane = first + at as i32;
-            is_seen |= draw(placement.map(plane), placement.to_plane(splat.place, plane), [at, at + 1]);
+            is_seen |= self.draw_planes(simd, (placement, origin), splat, (&along, slot, [at, at + 1]), open, planes);
         }
         is_seen
+    }
+
+    /// Adds a voxel to planes that share its footprint, given by their first and their end after the splat's first plane, which is in a slot.
+    // Inlined, as vectors of a closure would be computed by calls.
+    #[inline(always)]
+    fn draw_planes<S: Simd>(
+        &self,
+        simd: S,
+        (placement, origin): (&Placement, [usize; 2]),
+        splat: &Splat,
+        (along, slot, on): (&Along, usize, [usize; 2]),
+        open: &OpenMask,
+        planes: &mut Planes,
+    ) -> bool {
+        let plane = splat.planes[0] + on[0] as i32;
+        let map = placement.map(plane);
+        let to_plane = if self.is_perspective { placement.to_plane(splat.place, plane) } else { 0.0 };
+        let pixel = placement.center(splat.place, to_plane, map);
+        let center = [pixel.x - origin[0] as f64 - 0.5, pixel.y - origin[1] as f64 - 0.5].map(|at| at as f32);
+        let in_f32 = |v: DVec2| [v.x as f32, v.y as f32];
+        let pixels = Pixels::within(center, in_f32(map.half_box)).filter(|pixels| open.sees(pixels));
+        let Some(pixels) = pixels else { return false };
+        let footprint = Footprint { center, a: in_f32(map.a), b: in_f32(map.b) };
+        let on_planes = OnPlanes { footprint: &footprint, along, planes: on, slot };
+        let written = self.draw_box(simd, splat, &on_planes, &pixels, open, planes);
+        for at in on[0]..on[1] {
+            planes.written[(slot + at) % RING] |= written;
+        }
+        true
     }
 
     /// Adds a voxel to the open pixels of a box on planes that share their footprint; the rows that hold anything now.
