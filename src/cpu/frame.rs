@@ -11,6 +11,7 @@ use super::count::{Drawn, Tally};
 use super::cut::RayMode;
 use super::first_hit;
 use super::kernel::KernelTables;
+use super::material::Materials;
 use super::project::Projection;
 use super::resolve::Resolver;
 use super::shade::Shader;
@@ -36,6 +37,7 @@ pub(super) struct Frame<'a> {
     pub(super) volume: &'a Volume,
     pub(super) transfer: &'a TransferFunction,
     pub(super) bricks: &'a [Brick],
+    pub(super) materials: &'a Materials,
     pub(super) projection: Projection,
     pub(super) splatter: Splatter,
     pub(super) shader: Shader,
@@ -71,7 +73,7 @@ impl<'a> Frame<'a> {
     pub(super) fn new(
         volume: &'a Volume,
         transfer: &'a TransferFunction,
-        bricks: &'a [Brick],
+        (bricks, materials): (&'a [Brick], &'a Materials),
         scene: &Scene,
         first_hit: Option<f64>,
     ) -> Result<Self, RenderError> {
@@ -90,8 +92,6 @@ impl<'a> Frame<'a> {
             kernel: KernelTables::new(&kernel),
             radius: splatting.radius as f32,
             metric: metric.map(|coefficient| coefficient as f32),
-            // Slightly smaller, because f32 rounds.
-            row_metric: ((1.0 - 1e-5) * (metric[2] - metric[1] * metric[1] / (4.0 * metric[0])).max(0.0)) as f32,
             half_box: view.footprint.half_box(kernel.support()).to_array().map(|half| half as f32),
             pixel_per_depth: view.perspective.map(|perspective| perspective.eye.pixel_per_depth as f32),
             is_whole: splatting.method != Method::ImageAligned,
@@ -109,6 +109,7 @@ impl<'a> Frame<'a> {
             volume,
             transfer,
             bricks,
+            materials,
             splatter,
             shader: Shader::new(&scene.shading, splatting.compositing),
             compositor,

@@ -44,15 +44,6 @@ impl KernelTables {
         t * polynomial(&self.cumulative, t * t * self.scale - 1.0)
     }
 
-    /// The ρ² from which a section between two planes is 0.
-    #[inline(always)]
-    pub(super) fn extent<S: Simd>(&self, simd: S, a: f32x8<S>, b: f32x8<S>) -> f32x8<S> {
-        let zero = f32x8::splat(simd, 0.0);
-        // 0 between the planes, whichever of them is nearer to the eye.
-        let nearest = a.min(b).max(zero) + (zero - a.max(b)).max(zero);
-        self.support_squared * (1.0 + 1e-5) - nearest * nearest
-    }
-
     /// `H(0, 0, t)` where the chord of the kernel's ball ends.
     #[inline(always)]
     pub(super) fn rim<S: Simd>(&self, simd: S, rho_squared: f32x8<S>) -> f32x8<S> {

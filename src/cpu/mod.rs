@@ -21,6 +21,7 @@ mod cut;
 mod first_hit;
 mod frame;
 mod kernel;
+mod material;
 mod means;
 mod project;
 mod ray;
@@ -51,6 +52,7 @@ use crate::settings::transfer_function::TransferFunction;
 use crate::stats::Stats;
 use crate::volume::Volume;
 use frame::{Drawing, Frame};
+use material::Materials;
 pub use simd::Simd;
 
 /// A view of a volume, drawn on the CPU.
@@ -60,6 +62,8 @@ pub struct CpuRenderer {
     scene: Scene,
     transfer: TransferFunction,
     bricks: BrickList,
+    /// Those of the bricks.
+    materials: Materials,
     simd: Simd,
     level: Level,
     first_hit: Option<f64>,
@@ -81,7 +85,8 @@ impl CpuRenderer {
         let transfer = scene.transfer.resolve(&volume);
         let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
         let bricks = BrickList::new(volume.grid(), &classify(&volume, &transfer, &clipped));
-        Ok(Self { volume, scene: scene.clone(), transfer, bricks, simd, level, first_hit: None, hits: None })
+        let materials = Materials::new(bricks.bricks().len());
+        Ok(Self { volume, scene: scene.clone(), transfer, bricks, materials, simd, level, first_hit: None, hits: None })
     }
 
     /// The settings.
@@ -157,7 +162,8 @@ impl CpuRenderer {
         let splatting = &self.scene.splatting;
         splatting.check_rays(!self.scene.clip.is_empty(), self.first_hit)?;
         let scene = self.scene.framed(&self.volume, &self.transfer);
-        let frame = Frame::new(&self.volume, &self.transfer, self.bricks.bricks(), &scene, self.first_hit)?;
+        let frame =
+            Frame::new(&self.volume, &self.transfer, (self.bricks.bricks(), &self.materials), &scene, self.first_hit)?;
         let Drawing { image, counts, first_hits } = frame.draw(self.level);
         self.hits = self.first_hit.map(|_| FirstHits { view: frame.projection.view, depths: first_hits });
         let ImageSettings { width, height, .. } = self.scene.image;
