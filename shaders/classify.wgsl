@@ -29,7 +29,7 @@ override FIRST_HIT: bool = false;
 // Whether gradients are the field's derivative.
 override KERNEL_GRADIENT: bool = false;
 
-const ROWS = 8u;
+const WORKGROUP_ROWS = 8u;
 
 var<workgroup> opaque_rows: array<atomic<u32>, TILE>;
 var<workgroup> is_carried: atomic<u32>;
@@ -113,7 +113,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
     // The slab's planes.
     let near = select(sheet_group.near, sheet_group.near - frame.slab_width, is_front_to_back);
     let far = near + frame.slab_width;
-    for (var row = local.y; row < TILE; row += ROWS) {
+    for (var row = local.y; row < TILE; row += WORKGROUP_ROWS) {
         let pixel = corner + vec2u(local.x, row);
         // Pixels off the image count as opaque.
         var is_opaque = true;

@@ -22,7 +22,7 @@ override COMPOSITING: u32 = 0u;
 override CUT: bool = false;
 override FIRST_HIT: bool = false;
 
-const ROWS = 8u;
+const WORKGROUP_ROWS = 8u;
 
 var<workgroup> opaque_rows: array<atomic<u32>, TILE>;
 
@@ -56,7 +56,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
     }
     let layers = textureNumLayers(sheets);
     let is_after_gap = last_groups[tile] + 1u != sheet_group.number;
-    for (var row = local.y; row < TILE; row += ROWS) {
+    for (var row = local.y; row < TILE; row += WORKGROUP_ROWS) {
         let pixel = corner + vec2u(local.x, row);
         // Pixels off the image count as opaque.
         var is_opaque = true;

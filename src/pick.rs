@@ -9,6 +9,7 @@ use crate::volume::Volume;
 
 /// A point of a volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Pick {
     /// The position in world units from the volume's centre.
     pub position: DVec3,

@@ -12,6 +12,7 @@ pub type StageTimes = BTreeMap<&'static str, f64>;
 
 /// Counts and times of one frame (SPEC §8). The field names are the keys in JSON.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Stats {
     /// The GPU, or `CPU` for the other backends.
     pub adapter: String,
@@ -45,6 +46,7 @@ pub struct Stats {
 
 /// The counts of a frame (Table 4).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct Counts {
     /// Voxels in the volume.
     pub voxels_total: u64,

@@ -141,3 +141,17 @@ fn no_source_file_has_more_than_500_lines() {
     let long: Vec<_> = files.iter().filter(|path| lines(path) > 500).collect();
     assert!(long.is_empty(), "{long:?}");
 }
+
+/// `benches/history.md` describes the keys.
+#[test]
+fn every_line_of_the_history_is_a_figure() {
+    let text = std::fs::read_to_string(root().join("benches/history.jsonl")).unwrap();
+    assert!(text.lines().count() > 0);
+    for line in text.lines() {
+        let figure: serde_json::Map<String, serde_json::Value> = serde_json::from_str(line).unwrap();
+        let found: BTreeSet<&str> = figure.keys().map(String::as_str).collect();
+        let expected = ["date", "commit", "machine", "scene", "program", "settings", "quantity", "value"];
+        assert_eq!(found, BTreeSet::from(expected), "{line}");
+        assert!(figure["value"].as_f64().is_some_and(|value| value > 0.0 && value.is_finite()), "{line}");
+    }
+}

@@ -1,11 +1,11 @@
 //! The shaders parse, validate as WebGPU core (except one), and need no more than WebGPU's default limits. Needs no GPU.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
-use naga::{AddressSpace, Module, ShaderStage, TypeInner};
+use naga::{AddressSpace, Expression, Literal, Module, ShaderStage, TypeInner};
 use sheetsplat::internals::gpu::shaders::{self, Shader};
 
 /// The capabilities of WebGPU core beyond naga's minimum: `pack2x16float` and its inverse, which WGSL always has.
@@ -274,4 +274,77 @@ fn location_count(module: &Module, ty: naga::Handle<naga::Type>) -> u32 {
         }
         _ => 1,
     }
+}
+
+/// The value of a constant's expression: literals and constants of the same file, multiplied and divided.
+fn evaluated(expression: &str, known: &BTreeMap<String, f64>) -> Option<f64> {
+    let operand = |text: &str| {
+        let text = text.trim().replace('_', "");
+        text.parse().ok().or_else(|| known.get(text.as_str()).copied())
+    };
+    let mut value = 1.0;
+    for factor in expression.split('*') {
+        let mut parts = factor.split('/').map(operand);
+        value *= parts.next()??;
+        for divisor in parts {
+            value /= divisor?;
+        }
+    }
+    Some(value)
+}
+
+/// The numbers that Rust text declares as constants, by name.
+fn constants(text: &str) -> BTreeMap<String, f64> {
+    let mut known = BTreeMap::new();
+    for line in text.lines() {
+        let Some((_, declaration)) = line.split_once("const ") else { continue };
+        let Some((name, rest)) = declaration.split_once(": ") else { continue };
+        let Some((_, expression)) = rest.trim_end_matches(';').split_once(" = ") else { continue };
+        if let Some(value) = evaluated(expression, &known) {
+            known.insert(name.to_owned(), value);
+        }
+    }
+    known
+}
+
+#[test]
+fn constants_of_rust_are_found() {
+    let text = "const SIDE: u32 = 4;\npub(super) const VOXELS: u32 = SIDE * SIDE * 1_0;\nconst F: f64 = 1.0 / 64.0;\nconst G: X = f(2);";
+    let expected = [("SIDE", 4.0), ("VOXELS", 160.0), ("F", 1.0 / 64.0)];
+    assert_eq!(constants(text), expected.map(|(name, value)| (name.to_owned(), value)).into());
+}
+
+/// A constant's name means one number in Rust and WGSL, in every file of both.
+#[test]
+fn constants_with_one_name_have_one_value() {
+    let mut found: BTreeMap<String, BTreeMap<String, f64>> = BTreeMap::new();
+    for file in files(&root().join("src"), "rs").into_iter().filter(|file| !file.starts_with(root().join("src/bin"))) {
+        for (name, value) in constants(&std::fs::read_to_string(&file).unwrap()) {
+            found.entry(name).or_default().insert(file.display().to_string(), value);
+        }
+    }
+    let mut compared = 0;
+    let mut failures = Vec::new();
+    for shader in &shaders::ALL {
+        let (module, _) = validated(shader).unwrap();
+        for (_, constant) in module.constants.iter() {
+            let Some(name) = &constant.name else { continue };
+            let value = match module.global_expressions[constant.init] {
+                Expression::Literal(Literal::U32(value)) => f64::from(value),
+                Expression::Literal(Literal::F32(value)) => f64::from(value),
+                _ => continue,
+            };
+            for (file, &other) in found.get(name).into_iter().flatten() {
+                compared += 1;
+                // WGSL rounds to f32.
+                if f64::from(other as f32) != value {
+                    failures.push(format!("{name}: {value} in {}, {other} in {file}", shader.stage));
+                }
+            }
+        }
+    }
+    failures.sort();
+    failures.dedup();
+    assert_none(&failures);
+    assert!(compared > 20, "{compared}");
 }

@@ -55,7 +55,7 @@ pub fn exact(
 
 /// The solution where G is a product: `N·v`, then one axis after the other.
 fn along_axes(dims: UVec3, values: &[f32], middle: f32, falloff: f64, progress: &dyn Fn(f64)) -> Vec<f32> {
-    let neighbour = (-falloff).exp();
+    let neighbour = libm::exp(-falloff);
     let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
     let filters = [nx, ny, nz].map(|n| Sweeps::new(n, neighbour));
     let mut c: Vec<f32> = values.par_iter().map(|value| value - middle).collect();
@@ -180,7 +180,7 @@ impl Taps {
         let offsets = offsets.flat_map(|(y, z)| (-reach..=reach).map(move |x| IVec3::new(x, y, z)));
         let weighted = offsets.map(|offset| (offset, offset.as_dvec3().length_squared()));
         let within = weighted.filter(|(_, squared)| *squared < radius * radius);
-        Self(within.map(|(offset, squared)| (offset, (-falloff * squared).exp() as f32)).collect())
+        Self(within.map(|(offset, squared)| (offset, libm::exp(-falloff * squared) as f32)).collect())
     }
 
     /// `G·c`, 0 at holes, where c is 0, too.

@@ -21,7 +21,7 @@ impl Normalization {
         let base = f64::from(((min + max) / 2.0) as f32);
         let farthest = (max - base).max(base - min);
         // Of a constant only the base matters.
-        let exponent = if farthest > 0.0 { farthest.log2().ceil().clamp(-126.0, 126.0) as i32 } else { 0 };
+        let exponent = if farthest > 0.0 { libm::log2(farthest).ceil().clamp(-126.0, 126.0) as i32 } else { 0 };
         debug_assert!(exponent.abs() <= MAX_EXPONENT);
         let scale = 2.0_f64.powi(-exponent);
         let normalization = Self { base, scale, range: [0.0; 2] };

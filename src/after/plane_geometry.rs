@@ -45,7 +45,7 @@ impl PlaneGeometry {
         let [right, down] = [right, down].map(|step| (step - step.dot(normal) * normal) * scale);
         let (rr, rd, dd) = (right.dot(right), right.dot(down), down.dot(down));
         // The eigenvectors of AᵀA are the right singular vectors.
-        let screen_axis = DVec2::from_angle(rd.atan2((rr - dd) / 2.0) / 2.0);
+        let screen_axis = DVec2::from_angle(libm::atan2(rd, (rr - dd) / 2.0) / 2.0);
         let images = DMat2::from_cols(screen_axis, screen_axis.perp());
         let [first, second] = [images.x_axis, images.y_axis].map(|axis| right * axis.x + down * axis.y);
         let rows = view.screen_from_voxel;

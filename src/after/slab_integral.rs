@@ -26,11 +26,11 @@ use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::{Ramp, Tables};
 
 /// Entries before the bins.
-const HEAD: usize = 2;
+pub(crate) const HEAD: usize = 2;
 /// Entries of a cell.
-const CELL: usize = 3;
+pub(crate) const CELL: usize = 3;
 /// Entries of a sum.
-const SUM: usize = 2;
+pub(crate) const SUM: usize = 2;
 
 /// What `1 - α` falls to over a cell of `exponential` at most.
 const RATIO: f64 = 0.840_896_415_253_714_6;
@@ -39,7 +39,7 @@ const RATIO: f64 = 0.840_896_415_253_714_6;
 const MAX_ALPHA: f64 = 0.9999;
 
 /// Where the two Gauss nodes of an interval lie, from its middle, by its length.
-const NODE: f64 = 0.288_675_134_594_812_9;
+pub(crate) const NODE: f64 = 0.288_675_134_594_812_9;
 
 /// A stretch of values over which α and C are linear.
 #[derive(Clone, Copy, Debug)]
@@ -154,7 +154,7 @@ fn pieces(compositing: Compositing, [low, high]: [f64; 2], alpha: [f64; 2]) -> V
 
 /// m of SPEC §5.
 fn amount(compositing: Compositing, alpha: f64) -> f64 {
-    if compositing == Compositing::Exponential { -(-alpha.min(MAX_ALPHA)).ln_1p() } else { alpha }
+    if compositing == Compositing::Exponential { -libm::log1p(-alpha.min(MAX_ALPHA)) } else { alpha }
 }
 
 /// The integrals over a cell, moments from a number.

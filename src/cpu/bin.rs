@@ -24,8 +24,8 @@ pub(super) struct Placed {
     /// Half the size of a box that contains the box around any of its footprints, pixels.
     pub(super) half_box: [f32; 2],
     /// The tiles that its footprints may touch: the first and last column, and the first and last row.
-    columns: [usize; 2],
-    rows: [usize; 2],
+    pub(super) columns: [usize; 2],
+    pub(super) rows: [usize; 2],
 }
 
 /// The number of columns and rows of tiles in an image.

@@ -44,6 +44,11 @@ impl RayMode {
         }
     }
 
+    /// Only the parts of rays within some half spaces show.
+    pub(super) fn within(view: &ViewGeometry, grid: &Grid, kept: Vec<HalfSpace>) -> Self {
+        Self { rays: PixelRays::new(view, grid), kept: Some(kept), means: None }
+    }
+
     /// The range of depths at which a ray shows something.
     fn shown(&self, ray: &PixelRay) -> Range<f64> {
         ray.inside(self.kept.as_deref().unwrap_or_default())

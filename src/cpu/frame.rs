@@ -18,7 +18,6 @@ use super::shade::Shader;
 use super::sheets::{COLUMNS, ROWS};
 use super::splat::Splatter;
 use super::tile::TileWalk;
-use crate::error::RenderError;
 use crate::geometry::kernel::Kernel;
 use crate::geometry::means;
 use crate::geometry::view_geometry::ViewGeometry;
@@ -68,18 +67,16 @@ pub(super) struct Drawing {
 }
 
 impl<'a> Frame<'a> {
-    /// # Errors
-    /// If the scene asks for more than can be computed.
+    /// A frame in a view.
     pub(super) fn new(
         volume: &'a Volume,
         transfer: &'a TransferFunction,
         (bricks, materials): (&'a [Brick], &'a Materials),
         scene: &Scene,
-        first_hit: Option<f64>,
-    ) -> Result<Self, RenderError> {
+        (view, first_hit): (ViewGeometry, Option<f64>),
+    ) -> Self {
         let (splatting, image) = (&scene.splatting, &scene.image);
         let grid = volume.grid();
-        let view = ViewGeometry::new(grid, &scene.camera, splatting, [image.width, image.height])?;
         let kernel = Kernel::new(splatting.radius, splatting.falloff);
         let from_pixels = view.footprint.footprint_from_pixels;
         let (right, down) = (from_pixels.x_axis, from_pixels.y_axis);
@@ -105,7 +102,7 @@ impl<'a> Frame<'a> {
         let overlaps = Overlaps::count(bricks, &view);
         let covered = view.slabs.covered(means::covered(&view, grid, splatting));
         let projection = Projection::new(view, splatting.order);
-        Ok(Self {
+        Self {
             volume,
             transfer,
             bricks,
@@ -123,7 +120,7 @@ impl<'a> Frame<'a> {
             resolver: Resolver::new(splatting.compositing, image.background),
             overlaps,
             projection,
-        })
+        }
     }
 
     /// Draws all tiles.
@@ -131,18 +128,14 @@ impl<'a> Frame<'a> {
         let [width, height] = self.projection.view.size;
         let placed = bin::place(self.bricks, &self.projection, self.support);
         let [columns, rows] = bin::tile_grid([width, height]);
-        let count = width as usize * height as usize;
-        let mut pixels = vec![[0.0; 4]; count];
-        let mut first_hits = vec![f32::INFINITY; if self.compositor.first_hit.is_some() { count } else { 0 }];
-        let in_strip = width as usize * ROWS;
-        let mut hits = first_hits.chunks_mut(in_strip);
-        let strips: Vec<_> = pixels.chunks_mut(in_strip).map(|pixels| (pixels, hits.next())).collect();
-        let strips = strips.into_par_iter().enumerate();
-        let tallies = strips.map(|(row, strip)| self.draw_strip(level, &placed, row, columns, strip));
-        let tally = tallies.reduce(Tally::default, |mut sum, tally| {
-            sum += tally;
-            sum
-        });
+        let has_hits = self.compositor.first_hit.is_some();
+        let (pixels, first_hits, tally) = draw_tiles(
+            [width, height],
+            has_hits,
+            &placed,
+            || TileWalk::new(self),
+            |walk, origin, bricks| dispatch!(level, simd => self.draw_tile(simd, walk, origin, &placed, bricks)),
+        );
         // There are no sheets where voxels are composited one by one.
         let sheets = if self.is_each { 0 } else { self.touched.len() as u64 };
         let counts = Counts {
@@ -160,35 +153,6 @@ impl<'a> Frame<'a> {
         Drawing { image: Image { width, height, pixels }, counts, first_hits }
     }
 
-    /// Draws a row of tiles.
-    fn draw_strip(
-        &self,
-        level: Level,
-        placed: &[Placed],
-        row: usize,
-        columns: usize,
-        (pixels, mut hits): (&mut [[f32; 4]], Option<&mut [f32]>),
-    ) -> Tally {
-        let bins = bin::bin(placed, row, columns);
-        let width = self.projection.view.size[0] as usize;
-        let tiles = bins.par_iter().enumerate().map_init(
-            || TileWalk::new(self),
-            |walk, (column, bricks)| {
-                let origin = [column * COLUMNS, row * ROWS];
-                dispatch!(level, simd => self.draw_tile(simd, walk, origin, placed, bricks))
-            },
-        );
-        let mut tally = Tally::default();
-        for (column, tile) in tiles.collect::<Vec<_>>().into_iter().enumerate() {
-            tally += tile.tally;
-            copy_tile(&tile.pixels, column, width, pixels);
-            if let Some(hits) = &mut hits {
-                copy_tile(&tile.first_hits, column, width, hits);
-            }
-        }
-        tally
-    }
-
     /// Draws a tile, including rows and columns outside the image.
     #[inline(always)]
     fn draw_tile<S: Simd>(
@@ -200,9 +164,7 @@ impl<'a> Frame<'a> {
         bricks: &[u32],
     ) -> Tile {
         let (buffers, rays, tally) = walk.draw(simd, origin, placed, bricks);
-        let pixel =
-            |row: &[[f32; COLUMNS]; 4], x: usize| self.resolver.pixel([row[0][x], row[1][x], row[2][x], row[3][x]]);
-        let pixels = buffers.acc.iter().flat_map(|row| (0..COLUMNS).map(move |x| pixel(row, x))).collect();
+        let pixels = self.resolver.tile(buffers);
         let first_hits = match self.compositor.first_hit {
             None => Vec::new(),
             Some(_) => first_hit::depths(buffers, rays, &self.rays.rays, origin, self.volume.grid().unit()),
@@ -212,11 +174,53 @@ impl<'a> Frame<'a> {
 }
 
 /// The pixels of a tile, row by row.
-struct Tile {
-    pixels: Vec<[f32; 4]>,
+pub(super) struct Tile {
+    pub(super) pixels: Vec<[f32; 4]>,
     /// Empty if no first hits are requested.
-    first_hits: Vec<f32>,
-    tally: Tally,
+    pub(super) first_hits: Vec<f32>,
+    pub(super) tally: Tally,
+}
+
+/// The pixels of a row of tiles, and their first hits if they are requested.
+type Strip<'a> = (&'a mut [[f32; 4]], Option<&'a mut [f32]>);
+
+/// Draws all tiles on all cores by `draw_tile`, which gets its thread's walk, the tile's first pixel and its bricks: the image's pixels, first
+/// hits if they are requested, and counts of the work.
+pub(super) fn draw_tiles<W>(
+    [width, height]: [u32; 2],
+    has_hits: bool,
+    placed: &[Placed],
+    new_walk: impl Fn() -> W + Sync,
+    draw_tile: impl Fn(&mut W, [usize; 2], &[u32]) -> Tile + Sync,
+) -> (Vec<[f32; 4]>, Vec<f32>, Tally) {
+    let width = width as usize;
+    let count = width * height as usize;
+    let [columns, _] = bin::tile_grid([width as u32, height]);
+    let mut pixels = vec![[0.0; 4]; count];
+    let mut first_hits = vec![f32::INFINITY; if has_hits { count } else { 0 }];
+    let mut hits = first_hits.chunks_mut(width * ROWS);
+    let strips: Vec<_> = pixels.chunks_mut(width * ROWS).map(|pixels| (pixels, hits.next())).collect();
+    let draw_strip = |(row, (pixels, mut hits)): (usize, Strip<'_>)| {
+        let bins = bin::bin(placed, row, columns);
+        let tiles = bins
+            .par_iter()
+            .enumerate()
+            .map_init(&new_walk, |walk, (column, bricks)| draw_tile(walk, [column * COLUMNS, row * ROWS], bricks));
+        let mut tally = Tally::default();
+        for (column, tile) in tiles.collect::<Vec<_>>().into_iter().enumerate() {
+            tally += tile.tally;
+            copy_tile(&tile.pixels, column, width, pixels);
+            if let Some(hits) = &mut hits {
+                copy_tile(&tile.first_hits, column, width, hits);
+            }
+        }
+        tally
+    };
+    let tally = strips.into_par_iter().enumerate().map(draw_strip).reduce(Tally::default, |mut sum, tally| {
+        sum += tally;
+        sum
+    });
+    (pixels, first_hits, tally)
 }
 
 /// Copies the part of a tile that lies on the image to its column of a row of tiles.

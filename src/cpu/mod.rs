@@ -13,6 +13,7 @@
 //! Stages are those of the GPU, by the same names. The same scene gives the same bytes on every machine (SPEC §12): pixels are `f32` by IEEE
 //! `+ - × ÷ √`, never contracted, and every pixel's sums are taken in one order, whatever the number of threads and the vectors' width.
 
+mod after;
 mod bin;
 mod composite;
 mod count;
@@ -40,6 +41,7 @@ use std::time::Instant;
 use fearless_simd::Level;
 
 use crate::error::RenderError;
+use crate::geometry::view_geometry::ViewGeometry;
 use crate::headless::{Backend, Rendering};
 use crate::lists::brick::BrickList;
 use crate::lists::classify::classify;
@@ -47,10 +49,11 @@ use crate::pick::{FirstHits, Pick};
 use crate::scene::{ImageSettings, Scene};
 use crate::setting_error::{Interval, SettingError};
 use crate::settings::camera::Camera;
-use crate::settings::splatting::check_first_hit;
+use crate::settings::splatting::{Classification, check_first_hit};
 use crate::settings::transfer_function::TransferFunction;
 use crate::stats::Stats;
 use crate::volume::Volume;
+use after::Coefficients;
 use frame::{Drawing, Frame};
 use material::Materials;
 pub use simd::Simd;
@@ -61,14 +64,20 @@ pub struct CpuRenderer {
     volume: Arc<Volume>,
     scene: Scene,
     transfer: TransferFunction,
-    bricks: BrickList,
-    /// Those of the bricks.
-    materials: Materials,
+    list: List,
     simd: Simd,
     level: Level,
     first_hit: Option<f64>,
     /// The last frame's first hits.
     hits: Option<FirstHits>,
+}
+
+/// What voxels are drawn from.
+#[derive(Clone, Debug)]
+enum List {
+    /// Those that take part, and their materials.
+    Before(BrickList, Materials),
+    After(Coefficients),
 }
 
 impl CpuRenderer {
@@ -83,10 +92,16 @@ impl CpuRenderer {
         check(scene)?;
         let (simd, level) = simd::chosen()?;
         let transfer = scene.transfer.resolve(&volume);
-        let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
-        let bricks = BrickList::new(volume.grid(), &classify(&volume, &transfer, &clipped));
-        let materials = Materials::new(bricks.bricks().len());
-        Ok(Self { volume, scene: scene.clone(), transfer, bricks, materials, simd, level, first_hit: None, hits: None })
+        let list = match scene.splatting.classification {
+            Classification::Before => {
+                let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
+                let bricks = BrickList::new(volume.grid(), &classify(&volume, &transfer, &clipped));
+                let materials = Materials::new(bricks.bricks().len());
+                List::Before(bricks, materials)
+            }
+            Classification::After => List::After(Coefficients::new(&volume, scene)?),
+        };
+        Ok(Self { volume, scene: scene.clone(), transfer, list, simd, level, first_hit: None, hits: None })
     }
 
     /// The settings.
@@ -162,11 +177,20 @@ impl CpuRenderer {
         let splatting = &self.scene.splatting;
         splatting.check_rays(!self.scene.clip.is_empty(), self.first_hit)?;
         let scene = self.scene.framed(&self.volume, &self.transfer);
-        let frame =
-            Frame::new(&self.volume, &self.transfer, (self.bricks.bricks(), &self.materials), &scene, self.first_hit)?;
-        let Drawing { image, counts, first_hits } = frame.draw(self.level);
-        self.hits = self.first_hit.map(|_| FirstHits { view: frame.projection.view, depths: first_hits });
         let ImageSettings { width, height, .. } = self.scene.image;
+        let view = ViewGeometry::new(self.volume.grid(), &scene.camera, &scene.splatting, [width, height])?;
+        let Drawing { image, counts, first_hits } = match &mut self.list {
+            List::Before(bricks, materials) => {
+                let bricks = (bricks.bricks(), &*materials);
+                Frame::new(&self.volume, &self.transfer, bricks, &scene, (view, self.first_hit)).draw(self.level)
+            }
+            List::After(coefficients) => {
+                let of = (&*self.volume, &self.transfer);
+                coefficients.look(of, scene.splatting.compositing, &view);
+                after::Frame::new(of, coefficients, &scene, (view, self.first_hit)).draw(self.level)
+            }
+        };
+        self.hits = self.first_hit.map(|_| FirstHits { view, depths: first_hits });
         let stats = Stats {
             adapter: "CPU".to_owned(),
             driver: self.simd.name().to_owned(),

@@ -72,6 +72,16 @@ impl PixelRay {
         start..end
     }
 
+    /// The position at a depth.
+    pub(super) fn at(&self, depth: f64) -> DVec3 {
+        self.origin + depth * self.along
+    }
+
+    /// The unit vector towards the eye.
+    pub(super) fn toward_eye(&self) -> DVec3 {
+        -self.along.normalize()
+    }
+
     /// The length of the ray to a `unit` of depth.
     pub(super) fn length(&self) -> f64 {
         self.along.length()

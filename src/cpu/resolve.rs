@@ -1,5 +1,6 @@
 //! Compositing over the background (SPEC §5), as in `shaders/resolve.wgsl`.
 
+use super::sheets::{Buffers, COLUMNS};
 use crate::settings::splatting::Compositing;
 
 /// Turns compositing buffers into images.
@@ -15,6 +16,12 @@ impl Resolver {
     pub(super) fn new(compositing: Compositing, background: [f64; 4]) -> Self {
         let [r, g, b, a] = background;
         Self { compositing, background: [r * a, g * a, b * a, a].map(|channel| channel as f32) }
+    }
+
+    /// The pixels of a tile, row by row.
+    pub(super) fn tile(&self, buffers: &Buffers) -> Vec<[f32; 4]> {
+        let pixel = |row: &[[f32; COLUMNS]; 4], x: usize| self.pixel([row[0][x], row[1][x], row[2][x], row[3][x]]);
+        buffers.acc.iter().flat_map(|row| (0..COLUMNS).map(move |x| pixel(row, x))).collect()
     }
 
     /// A pixel over the background, premultiplied like its argument.

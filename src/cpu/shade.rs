@@ -72,23 +72,34 @@ impl Shader {
             true => optical_depth(simd, alpha.min(f32x8::splat(simd, 0.9999))),
             false => alpha,
         } * load(&voxels.scale);
-        let mut color = voxels.color.each_ref().map(load);
-        if self.is_enabled {
-            let (diffuse, highlight) = self.lighting(simd, voxels);
-            color = color.map(|channel| {
-                let lit = channel * (diffuse + self.ambient) + highlight;
-                lit.max(f32x8::splat(simd, 0.0)).min(f32x8::splat(simd, 1.0))
-            });
-        }
+        let [color, normal, to_eye] = [&voxels.color, &voxels.normal, &voxels.to_eye].map(|of| of.each_ref().map(load));
+        let color = self.color(simd, color, normal, to_eye);
         let [red, green, blue] = color.map(|channel| (channel * amount).to_array());
         [red, green, blue, amount.to_array()]
     }
 
+    /// Colours in this light, given their normals, 0 where there is none, and the directions to the eye.
+    #[inline(always)]
+    pub(super) fn color<S: Simd>(
+        &self,
+        simd: S,
+        color: [f32x8<S>; 3],
+        normal: [f32x8<S>; 3],
+        to_eye: [f32x8<S>; 3],
+    ) -> [f32x8<S>; 3] {
+        if !self.is_enabled {
+            return color;
+        }
+        let (diffuse, highlight) = self.lighting(simd, normal, to_eye);
+        color.map(|channel| {
+            let lit = channel * (diffuse + self.ambient) + highlight;
+            lit.max(f32x8::splat(simd, 0.0)).min(f32x8::splat(simd, 1.0))
+        })
+    }
+
     /// The diffuse and the specular term: two-sided, and 0 without a normal.
     #[inline(always)]
-    fn lighting<S: Simd>(&self, simd: S, voxels: &Unshaded) -> (f32x8<S>, f32x8<S>) {
-        let load = |lanes: &[f32; LANES]| f32x8::load_array_ref(simd, lanes);
-        let (normal, to_eye) = (voxels.normal.each_ref().map(load), voxels.to_eye.each_ref().map(load));
+    fn lighting<S: Simd>(&self, simd: S, normal: [f32x8<S>; 3], to_eye: [f32x8<S>; 3]) -> (f32x8<S>, f32x8<S>) {
         let to_light = self.to_light.map_or(to_eye, |light| light.map(|component| f32x8::splat(simd, component)));
         let dot = |a: [f32x8<S>; 3], b: [f32x8<S>; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let half = [0, 1, 2].map(|axis| to_light[axis] + to_eye[axis]);

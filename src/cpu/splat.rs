@@ -10,7 +10,7 @@ use super::sheets::{Buffers, CHANNELS, COLUMNS, RING, SECTIONS, SheetRow, slot_o
 use super::vector::{LANES, iota};
 
 /// A voxel in the coordinates of a tile.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Splat {
     /// Its pixel coordinates; the centre of the tile's first pixel is at 0, 0.
     pub(super) center: [f32; 2],
@@ -64,6 +64,8 @@ pub(super) struct Sections {
     along: [f32; LANES],
     across: [f32; LANES],
     amplitude: [f32; LANES],
+    /// In perspective how far from the voxel's row each reaches, pixels.
+    reach: [f32; LANES],
     /// The pixels that any of them reaches; `None` for no pixel of the tile.
     pub(super) pixels: Option<Pixels>,
 }
@@ -80,6 +82,7 @@ impl Splatter {
             along: [0.0; LANES],
             across: [0.0; LANES],
             amplitude: [0.0; LANES],
+            reach: [0.0; LANES],
             pixels: None,
         };
         let mut half_box = self.half_box;
@@ -110,6 +113,7 @@ impl Splatter {
             half_box = [largest(width), largest(height)];
             (sections.along, sections.across) = (along.to_array(), across.to_array());
             sections.amplitude = amplitude.to_array();
+            sections.reach = (height * self.kernel.reach(simd, t, t.slide::<1>(t))).to_array();
         }
         sections.planes = self.kernel.along(simd, t).to_array();
         sections.pixels = Pixels::within(splat.center, half_box);
@@ -158,19 +162,26 @@ impl Splatter {
         let [xx, xy, yy] = self.metric;
         let mut written = 0;
         for begin in (first..=last).step_by(BLOCK_ROWS) {
-            // All rows of a block first, also those beyond the last one: independent sums without a branch.
-            let mut rows = [[f32x8::splat(simd, 0.0); 2]; BLOCK_ROWS];
-            for (row, weights) in rows.iter_mut().enumerate() {
-                let dy = (begin + row) as f32 - splat.center[1];
-                let rho_squared = dx * (dx * xx + xy * dy) + yy * dy * dy;
-                *weights = [self.kernel.rim(simd, rho_squared), self.kernel.in_plane(simd, rho_squared)];
+            // All rows of a block first, also those beyond the last one: independent sums without a branch, two rows to a vector.
+            let zero = f32x8::splat(simd, 0.0);
+            let (mut rims, mut in_planes) = ([zero; BLOCK_ROWS], [zero; BLOCK_ROWS]);
+            for pair in (0..BLOCK_ROWS).step_by(2) {
+                let rho_squared = |row: usize| {
+                    let dy = (begin + row) as f32 - splat.center[1];
+                    dx * (dx * xx + xy * dy) + yy * dy * dy
+                };
+                let [first, second] = [rho_squared(pair), rho_squared(pair + 1)];
+                (rims[pair], rims[pair + 1]) = self.kernel.rim(simd, first.combine(second)).split();
+                in_planes[pair] = self.kernel.in_plane(simd, first);
+                in_planes[pair + 1] = self.kernel.in_plane(simd, second);
             }
             for row in begin..=last.min(begin + BLOCK_ROWS - 1) {
                 if block.is_closed(row) {
                     continue;
                 }
                 written |= 1 << row;
-                let [rim, in_plane] = rows[(row - begin) % BLOCK_ROWS];
+                let at = (row - begin) % BLOCK_ROWS;
+                let (rim, in_plane) = (rims[at], in_planes[at]);
                 let target = &mut sheets[row];
                 let mut near = cut_by_rim(simd, sections.planes[0], rim);
                 for section in 0..N {
@@ -201,6 +212,9 @@ impl Splatter {
             let across = dx * -y + dy * x;
             let (along, across) = (along * along, across * across);
             for section in 0..sections.count {
+                if dy.abs() > sections.reach[section] {
+                    continue;
+                }
                 let rho_squared = along * sections.along[section] + across * sections.across[section];
                 let rim = self.kernel.rim(simd, rho_squared);
                 let in_plane = self.kernel.in_plane(simd, rho_squared) * sections.amplitude[section];

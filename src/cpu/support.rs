@@ -3,7 +3,6 @@
 use crate::error::RenderError;
 use crate::scene::Scene;
 use crate::setting_error::SettingError;
-use crate::settings::splatting::Classification;
 
 /// The largest image, pixels along a side.
 const MAX_SIZE: u32 = 32_768;
@@ -21,9 +20,6 @@ pub(super) fn check(scene: &Scene) -> Result<(), RenderError> {
     }
     let splatting = &scene.splatting;
     let other = "or another backend than \"cpu\"";
-    if splatting.classification == Classification::After {
-        return refused("splatting.classification", "\"after\"".to_owned(), format!("\"before\", {other}"));
-    }
     if let Some(economy) = splatting.experimental.in_use() {
         return refused(economy.key, economy.value.to_string(), format!("{}, {other}", economy.off));
     }

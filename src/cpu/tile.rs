@@ -296,13 +296,11 @@ impl<'a> TileWalk<'a> {
             #[inline(always)]
             || {
                 let amounts = self.frame.shader.shade(simd, &batch.unshaded);
-                for lane in 0..std::mem::take(&mut batch.count) {
-                    if let Some(splat) = &mut batch.splats[lane] {
-                        splat.amount = amounts.map(|lanes| lanes[lane]);
-                    }
-                    if let Some(splat) = batch.splats[lane] {
-                        self.draw_splat(simd, &splat);
-                    }
+                let count = std::mem::take(&mut batch.count);
+                for (lane, splat) in batch.splats[..count].iter_mut().enumerate() {
+                    let [red, green, blue, amount] = &amounts;
+                    splat.amount = [red[lane], green[lane], blue[lane], amount[lane]];
+                    self.draw_splat(simd, splat);
                 }
             },
         );
@@ -363,7 +361,7 @@ fn cleared(mut list: Vec<Waiting>) -> Vec<Waiting> {
 struct Batch {
     count: usize,
     unshaded: Unshaded,
-    splats: [Option<Splat>; LANES],
+    splats: [Splat; LANES],
 }
 
 impl Batch {
@@ -391,7 +389,7 @@ impl Batch {
             from_eye: place.from_eye as f32,
             cut: local.cut as f32,
         });
-        self.splats[self.count] = Some(Splat {
+        self.splats[self.count] = Splat {
             center,
             amount: [0.0; 4],
             sheets: [sheet, sheets.end],
@@ -400,7 +398,7 @@ impl Batch {
             voxel: number,
             drawn: 0,
             local: local.unwrap_or_default(),
-        });
+        };
         self.count += 1;
     }
 }

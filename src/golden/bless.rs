@@ -6,6 +6,7 @@ use super::GoldenError;
 
 /// The goldens that are rewritten if their image fails.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Bless {
     /// No golden.
     #[default]

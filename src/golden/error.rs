@@ -48,6 +48,7 @@ pub enum GoldenError {
 
 /// An image that failed. Its display is a report of several lines.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub struct Failure {
     /// The golden's name.
     pub name: String,

@@ -1,4 +1,4 @@
-//! What computes images (SPEC §12), and how that is chosen.
+//! The backends that compute images (SPEC §12), and how one is chosen.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,27 +10,27 @@ use crate::scene::Scene;
 #[cfg(feature = "gpu")]
 use crate::settings::splatting::Rasterizer;
 
-/// What computes images (SPEC §12).
+/// The program part that computes an image (SPEC §12).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Backend {
-    /// A GPU that can run the renderer and is no software driver, else the CPU. An adapter or a rasterizer that is named means the GPU, and
-    /// so do options and settings that only the GPU has.
+    /// The GPU where one can run the renderer and is no software driver, else the CPU. Naming an adapter or a rasterizer chooses the GPU, and
+    /// so do options and settings that only the GPU supports.
     #[default]
     Auto,
     /// wgpu: a GPU, or a software driver.
     Gpu,
-    /// The cores of the processor, without a driver: [`cpu`](crate::cpu).
+    /// The processor's cores, without a driver: [`cpu`](crate::cpu).
     Cpu,
-    /// The f64 evaluation that the others are tested against; slow.
+    /// The slow f64 evaluation that the other backends are tested against.
     Reference,
 }
 
 impl Backend {
-    /// All of them.
+    /// All backends.
     pub const ALL: [Self; 4] = [Self::Auto, Self::Gpu, Self::Cpu, Self::Reference];
 
-    /// What it is called: `auto`, `gpu`, `cpu`, `reference`.
+    /// The name in scenes and on the command line: `auto`, `gpu`, `cpu`, `reference`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Auto => "auto",
@@ -40,7 +40,7 @@ impl Backend {
         }
     }
 
-    /// The one that draws: some scenes may say more than the options do.
+    /// The backend that draws; scenes can decide where the options leave the choice.
     pub(super) fn resolved<'a>(options: &HeadlessOptions, scenes: impl IntoIterator<Item = &'a Scene>) -> Self {
         match options.backend {
             Self::Auto if wants_gpu(options, scenes) => Self::Gpu,
@@ -65,7 +65,7 @@ impl FromStr for Backend {
     }
 }
 
-/// Whether the GPU is meant, or there is one that can run the renderer and is no software driver.
+/// Whether options or scenes need the GPU, or a GPU that is no software driver can run the renderer.
 #[cfg(feature = "gpu")]
 fn wants_gpu<'a>(options: &HeadlessOptions, scenes: impl IntoIterator<Item = &'a Scene>) -> bool {
     let HeadlessOptions { backend: _, adapter, requirements, sheet_format, sheets_per_group, rasterizer, profile } =
@@ -86,13 +86,13 @@ fn wants_gpu<'a>(_: &HeadlessOptions, _: impl IntoIterator<Item = &'a Scene>) ->
     false
 }
 
-/// Whether the native backend draws all that a scene asks for.
+/// Whether the native backend draws every setting of a scene.
 #[cfg(all(feature = "gpu", feature = "cpu"))]
 fn is_drawn_by_cpu(scene: &Scene) -> bool {
     crate::cpu::check(scene).is_ok()
 }
 
-/// It is not compiled in.
+/// The native backend is not compiled in.
 #[cfg(all(feature = "gpu", not(feature = "cpu")))]
 fn is_drawn_by_cpu(_: &Scene) -> bool {
     false

@@ -1,4 +1,4 @@
-//! Rendering on a GPU without a host: an own device. The only part that creates devices, submits and waits.
+//! Rendering on a GPU without a host. Only this module creates devices, submits and waits.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use std::time::Instant;
 use wgpu::{Adapter, Device, Queue, TextureFormat};
 
 use super::device::{self, driver_name};
-use super::{Backend, Error, HeadlessOptions, Rendering, milliseconds_since, readback};
+use super::{Backend, Error, HeadlessOptions, Rendering, load_and_render, milliseconds_since, readback, view_and_draw};
 use crate::error::RenderError;
 use crate::gpu::device::{DeviceError, DeviceRequirements};
 use crate::gpu::fault::{DeviceFault, scoped};
@@ -25,8 +25,8 @@ use crate::volume::Volume;
 /// The target's format.
 pub(super) const FORMAT: TextureFormat = TextureFormat::Rgba32Float;
 
-/// A wgpu device of its own and a renderer on it, for what [`Headless`](super::Headless) does not offer: the device, and every setter of
-/// a [`SceneView`].
+/// Owns a wgpu device and a renderer on it. Unlike [`Headless`](super::Headless) it gives access to the device and to every setter of a
+/// [`SceneView`].
 #[derive(Debug)]
 pub struct GpuHeadless {
     adapter: Adapter,
@@ -41,7 +41,7 @@ impl GpuHeadless {
     /// # Errors
     /// If there is no such adapter, it cannot open a device, or the device cannot run the renderer.
     pub fn new(options: &HeadlessOptions) -> Result<Self, DeviceError> {
-        let adapter = choose_adapter(options.adapter.as_deref())?;
+        let adapter = device::choose_adapter(&device::adapters(), options.adapter.as_deref())?;
         let requirements = options.requirements.clone().unwrap_or_else(|| DeviceRequirements::for_adapter(&adapter));
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("sheetsplat"),
@@ -82,14 +82,7 @@ impl GpuHeadless {
     /// # Errors
     /// If the volume cannot be loaded, the scene needs more than the device or the renderer can do, or the device fails.
     pub fn render(&self, scene: &Scene) -> Result<Rendering, Error> {
-        // An invalid scene is refused before its volume is loaded.
-        scene.check().map_err(RenderError::from)?;
-        let start = Instant::now();
-        let volume = scene.load_volume()?;
-        let load_ms = milliseconds_since(start);
-        let mut rendering = self.render_volume(volume, scene)?;
-        rendering.stats.load_ms = load_ms;
-        Ok(rendering)
+        load_and_render(scene, |volume| self.render_volume(volume, scene))
     }
 
     /// Renders a volume that is already in memory. The scene's own volume is ignored.
@@ -97,12 +90,7 @@ impl GpuHeadless {
     /// # Errors
     /// If the scene needs more than the device or the renderer can do, or the device fails.
     pub fn render_volume(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Rendering, RenderError> {
-        let start = Instant::now();
-        let mut view = self.view(volume, scene)?;
-        let classify_ms = milliseconds_since(start);
-        let mut rendering = self.draw(&mut view)?;
-        rendering.stats.prepare_ms += classify_ms;
-        Ok(rendering)
+        view_and_draw(|| self.view(volume, scene), |view| self.draw(view))
     }
 
     /// A view of a volume with a scene's settings, for any number of frames and changes. The scene's own volume is ignored.
@@ -217,9 +205,4 @@ pub(super) fn wait(device: &Device) -> Result<(), RenderError> {
         Ok(Err(error)) => Err(RenderError::Readback(error.to_string())),
         Err(_) => Err(DeviceFault::Lost.into()),
     }
-}
-
-/// The adapter with `name` in its name, or the most capable one: a GPU before a software driver.
-fn choose_adapter(name: Option<&str>) -> Result<Adapter, DeviceError> {
-    device::choose_adapter(&device::adapters(), name)
 }

@@ -1,4 +1,4 @@
-//! Rendering without a host: images in memory, by the [`Backend`] that is asked for or there is.
+//! Rendering without a host, to images in memory. A [`Backend`] draws them: the GPU, the processor or the f64 evaluation.
 
 mod backend;
 #[cfg(feature = "gpu")]
@@ -37,7 +37,7 @@ use crate::setting_error::SettingError;
 use crate::stats::Stats;
 use crate::volume::Volume;
 
-/// Renders by any backend. On the GPU it has a device of its own, on the CPU it needs no driver.
+/// Renders with one backend. On the GPU it opens its own device; on the CPU it needs no driver.
 #[derive(Debug)]
 pub struct Headless {
     drawer: Drawer,
@@ -65,13 +65,13 @@ impl Headless {
     /// Chooses a backend; for the GPU opens a device and compiles the renderer.
     ///
     /// # Errors
-    /// If the GPU is asked for and there is no such adapter, it gives no device, or the device cannot run the renderer; or if the backend is
-    /// not compiled in.
+    /// If the backend is not compiled in. With the GPU: if there is no such adapter, it opens no device, or the device cannot run the renderer.
     pub fn new(options: &HeadlessOptions) -> Result<Self, DeviceError> {
         Self::for_scenes(options, [])
     }
 
-    /// The same for some scenes: [`Backend::Auto`] takes the GPU if one of them names a rasterizer, or asks for what the CPU does not draw.
+    /// As [`Self::new`], for scenes that are known: [`Backend::Auto`] takes the GPU if one of them names a rasterizer, or uses a setting that
+    /// the CPU backend does not draw.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -90,7 +90,7 @@ impl Headless {
         Ok(Self { drawer })
     }
 
-    /// What draws; never [`Backend::Auto`].
+    /// The backend that draws; never [`Backend::Auto`].
     pub fn backend(&self) -> Backend {
         match self.drawer {
             #[cfg(feature = "gpu")]
@@ -104,35 +104,23 @@ impl Headless {
     /// Loads the scene's volume and renders it.
     ///
     /// # Errors
-    /// If the volume cannot be loaded, the scene asks for what the backend cannot do, or the device fails.
+    /// If the volume cannot be loaded, the backend cannot draw one of the scene's settings, or the device fails.
     pub fn render(&self, scene: &Scene) -> Result<Rendering, Error> {
-        // An invalid scene is refused before its volume is loaded.
-        scene.check().map_err(RenderError::from)?;
-        let start = Instant::now();
-        let volume = scene.load_volume()?;
-        let load_ms = milliseconds_since(start);
-        let mut rendering = self.render_volume(volume, scene)?;
-        rendering.stats.load_ms = load_ms;
-        Ok(rendering)
+        load_and_render(scene, |volume| self.render_volume(volume, scene))
     }
 
     /// Renders a volume that is already in memory. The scene's own volume is ignored.
     ///
     /// # Errors
-    /// If the scene asks for what the backend cannot do, or the device fails.
+    /// If the backend cannot draw one of the scene's settings, or the device fails.
     pub fn render_volume(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Rendering, RenderError> {
-        let start = Instant::now();
-        let mut view = self.view(volume, scene)?;
-        let classify_ms = milliseconds_since(start);
-        let mut rendering = self.draw(&mut view)?;
-        rendering.stats.prepare_ms += classify_ms;
-        Ok(rendering)
+        view_and_draw(|| self.view(volume, scene), |view| self.draw(view))
     }
 
-    /// A view of a volume as a scene sets it up, for any number of frames. The scene's own volume is not looked at.
+    /// A view of a volume with a scene's settings, for any number of frames. The scene's own volume is ignored.
     ///
     /// # Errors
-    /// If the scene asks for what the backend cannot do, the volume is larger than the device's textures, or the device fails.
+    /// If the backend cannot draw one of the scene's settings, the volume is larger than the device's textures, or the device fails.
     pub fn view(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<HeadlessView, RenderError> {
         Ok(HeadlessView::new(match &self.drawer {
             #[cfg(feature = "gpu")]
@@ -146,7 +134,7 @@ impl Headless {
     /// Draws one frame of a view.
     ///
     /// # Errors
-    /// If the scene asks for what the backend cannot do, the device fails, or the view is another backend's.
+    /// If the backend cannot draw one of the scene's settings, the device fails, or another backend made the view.
     pub fn draw(&self, view: &mut HeadlessView) -> Result<Rendering, RenderError> {
         match (&self.drawer, view.backend_mut()) {
             #[cfg(feature = "gpu")]
@@ -159,11 +147,11 @@ impl Headless {
         }
     }
 
-    /// What the last drawn frame of a view shows first at a pixel, counted from the upper left; `None` where the opacity of
-    /// [`HeadlessView::set_first_hit`] is not reached.
+    /// The first voxel that the last drawn frame of a view shows at a pixel, counted from the upper left; `None` where the pixel does not reach
+    /// the opacity of [`HeadlessView::set_first_hit`].
     ///
     /// # Errors
-    /// If the frame has no first hits, the pixel is off the image, the device fails, or the view is another backend's.
+    /// If the frame has no first hits, the pixel lies outside the image, the device fails, or another backend made the view.
     pub fn pick(&self, view: &HeadlessView, pixel: [u32; 2]) -> Result<Option<Pick>, RenderError> {
         match (&self.drawer, view.backend_ref()) {
             #[cfg(feature = "gpu")]
@@ -184,6 +172,34 @@ impl Headless {
             format!("one of the {} backend", self.backend()),
         )
     }
+}
+
+/// Loads a scene's volume and renders it by `render_volume`; the statistics hold the time of loading.
+fn load_and_render(
+    scene: &Scene,
+    render_volume: impl FnOnce(Volume) -> Result<Rendering, RenderError>,
+) -> Result<Rendering, Error> {
+    // An invalid scene is refused before its volume is loaded.
+    scene.check().map_err(RenderError::from)?;
+    let start = Instant::now();
+    let volume = scene.load_volume()?;
+    let load_ms = milliseconds_since(start);
+    let mut rendering = render_volume(volume)?;
+    rendering.stats.load_ms = load_ms;
+    Ok(rendering)
+}
+
+/// Sets up a view and draws its first frame; the statistics count the set-up as preparation.
+fn view_and_draw<View>(
+    view: impl FnOnce() -> Result<View, RenderError>,
+    draw: impl FnOnce(&mut View) -> Result<Rendering, RenderError>,
+) -> Result<Rendering, RenderError> {
+    let start = Instant::now();
+    let mut view = view()?;
+    let classify_ms = milliseconds_since(start);
+    let mut rendering = draw(&mut view)?;
+    rendering.stats.prepare_ms += classify_ms;
+    Ok(rendering)
 }
 
 fn milliseconds_since(start: Instant) -> f64 {

@@ -1,4 +1,4 @@
-//! How headless rendering is set up.
+//! Options of headless rendering.
 
 use super::Backend;
 #[cfg(feature = "gpu")]
@@ -9,15 +9,15 @@ use crate::settings::splatting::Rasterizer;
 #[cfg(feature = "gpu")]
 use wgpu::TextureFormat;
 
-/// What draws, and how to choose and open a device: [`Self::default`] or `Self::DETERMINISTIC`, changed by the `with_` functions.
+/// The backend, and how a GPU is chosen and opened. Start from [`Self::default`] or `Self::DETERMINISTIC` and change them by the `with_` functions.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct HeadlessOptions {
-    /// What computes images.
+    /// The backend that computes images.
     pub backend: Backend,
     /// Part of the adapter's name, in any case; `None` prefers an adapter that can run the renderer, and a GPU to a software driver.
     pub adapter: Option<String>,
-    /// Features and limits to request; `None` takes what [`DeviceRequirements::for_adapter`] says.
+    /// Features and limits to request; `None` requests [`DeviceRequirements::for_adapter`].
     #[cfg(feature = "gpu")]
     pub requirements: Option<DeviceRequirements>,
     /// Format of the sheet buffer; see `RendererOptions`.
@@ -25,7 +25,7 @@ pub struct HeadlessOptions {
     pub sheet_format: Option<TextureFormat>,
     /// Sheets drawn by one quad; see `RendererOptions`.
     pub sheets_per_group: Option<u32>,
-    /// What scenes that leave the choice are drawn by; see `RendererOptions`.
+    /// The rasterizer for scenes that name none; see `RendererOptions`.
     pub rasterizer: Rasterizer,
     /// Times every stage; see `RendererOptions`.
     pub profile: bool,
@@ -44,7 +44,7 @@ impl HeadlessOptions {
         profile: false,
     };
 
-    /// With another backend.
+    /// These options with another backend.
     pub fn with_backend(self, backend: Backend) -> Self {
         Self { backend, ..self }
     }
@@ -54,14 +54,14 @@ impl HeadlessOptions {
         Self { adapter: Some(name.into()), ..self }
     }
 
+    /// These options with a device of these features and limits.
     #[cfg(feature = "gpu")]
-    /// On a device with these features and limits.
     pub fn with_requirements(self, requirements: DeviceRequirements) -> Self {
         Self { requirements: Some(requirements), ..self }
     }
 
+    /// These options with another format of the sheet buffer.
     #[cfg(feature = "gpu")]
-    /// With another format of the sheet buffer.
     pub fn with_sheet_format(self, format: TextureFormat) -> Self {
         Self { sheet_format: Some(format), ..self }
     }
@@ -82,7 +82,7 @@ impl HeadlessOptions {
     }
 }
 
-/// The best of what there is.
+/// [`Backend::Auto`] with the most capable adapter.
 impl Default for HeadlessOptions {
     fn default() -> Self {
         Self {

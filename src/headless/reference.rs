@@ -28,7 +28,7 @@ pub(super) struct ReferenceView {
 
 impl ReferenceView {
     /// # Errors
-    /// If the scene asks for what cannot be, or for what the volume does not have.
+    /// If a setting of the scene is invalid, or the volume lacks what the transfer function needs.
     pub(super) fn new(volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Self, RenderError> {
         let volume = volume.into();
         scene.check()?;

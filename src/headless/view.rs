@@ -1,4 +1,4 @@
-//! A view of a volume for any backend.
+//! A view of a volume that any backend can draw.
 
 #[cfg(any(feature = "gpu", feature = "cpu"))]
 use super::Backend;
@@ -11,13 +11,13 @@ use crate::scene::Scene;
 use crate::setting_error::{Interval, SettingError};
 use crate::settings::camera::Camera;
 
-/// A view of a volume, of [`Headless::view`](super::Headless::view), for any number of frames: what a frame found out is kept for the next one.
+/// A view of a volume for any number of frames, made by [`Headless::view`](super::Headless::view). Frames share the sorted lists.
 #[derive(Debug)]
 pub struct HeadlessView {
     backend: ViewBackend,
 }
 
-/// Whose it is.
+/// The view of the backend that made it.
 #[derive(Debug)]
 pub(super) enum ViewBackend {
     #[cfg(feature = "gpu")]
@@ -87,10 +87,11 @@ impl HeadlessView {
         self.set_camera(self.scene().camera.turned(degrees))
     }
 
-    /// Asks for the depth at which every pixel's opacity reaches a value, above 0 and at most 1, for [`Headless::pick`](super::Headless::pick);
-    /// `None` for none. Front to back only, and with culling at most [`Splatting::opacity_threshold`](crate::settings::Splatting::opacity_threshold);
-    /// not for [`Compositing::Minimum`](crate::settings::Compositing::Minimum), and whatever the value that of the surface for
-    /// [`Compositing::Surface`](crate::settings::Compositing::Surface).
+    /// Records, for [`Headless::pick`](super::Headless::pick), the depth at which each pixel's opacity reaches a value in (0, 1]; `None` records
+    /// no depth. It needs front-to-back order and, with culling, at most
+    /// [`Splatting::opacity_threshold`](crate::settings::Splatting::opacity_threshold).
+    /// [`Compositing::Minimum`](crate::settings::Compositing::Minimum) has no first hits; for
+    /// [`Compositing::Surface`](crate::settings::Compositing::Surface) the depth is the surface's, whatever the value.
     ///
     /// # Errors
     /// If the value is not in (0, 1]; then nothing changes.

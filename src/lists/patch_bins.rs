@@ -31,22 +31,21 @@ const MAX_BRICKS: usize = 1 << 26;
 const MAX_PASSES: u32 = 64900;
 
 /// The maximum number of passes of a group without its bricks, and the additional passes per block, for subgroups of 8 threads.
-const PASSES_PER_GROUP: u32 = 60;
-const PASSES_PER_BLOCK: u32 = 40;
+const MAX_PASSES_OF_GROUP: u32 = 60;
+const MAX_PASSES_OF_BLOCK: u32 = 40;
 
 /// The maximum number of passes of a brick, for subgroups of 8 threads: 8 to fetch and visit it, 76 to find its voxels, 56 to shade them,
 /// 8 to keep them, and 10 where the queue is full.
-/// them, and 10 where the queue is full.
-const PASSES_PER_BRICK: u32 = 158;
+const MAX_PASSES_OF_BRICK: u32 = 158;
 
 /// The number of passes that add a brick's voxels to a block.
-const PASSES_PER_ADDITION: u32 = 56;
+const MAX_PASSES_OF_ADDITION: u32 = 56;
 
 /// The number of times that a brick's voxels are shaded in parallel.
 const SHADED_PER_BRICK: u32 = 8;
 
 /// The number of passes that determine how a block's rays are cut, or over which stretch means count, if needed.
-const PASSES_PER_LOOK: u32 = 140;
+const MAX_PASSES_OF_LOOK: u32 = 140;
 
 /// The maximum number of passes through loops per thread, and the maxima for each kind of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,8 +64,8 @@ impl Passes {
     /// The passes of a view in which a workgroup draws `blocks` blocks of a patch, and looking up a voxel's control points in memory takes at
     /// most `search` passes.
     pub fn new(search: u32, blocks: u32) -> Self {
-        let per_group = PASSES_PER_GROUP + blocks * (PASSES_PER_BLOCK + PASSES_PER_LOOK);
-        let per_brick = PASSES_PER_BRICK + blocks * PASSES_PER_ADDITION + SHADED_PER_BRICK * search;
+        let per_group = MAX_PASSES_OF_GROUP + blocks * (MAX_PASSES_OF_BLOCK + MAX_PASSES_OF_LOOK);
+        let per_brick = MAX_PASSES_OF_BRICK + blocks * MAX_PASSES_OF_ADDITION + SHADED_PER_BRICK * search;
         Self { most: MAX_PASSES, per_group, per_brick, search }
     }
 }

@@ -192,6 +192,15 @@ impl PlaceDepths {
         let (mut sections, mut nearest, mut farthest) = (0, i32::MAX, i32::MIN);
         let mut left = brick::present(brick);
         let voxels = left.count_ones().into();
+        if left == u64::MAX {
+            // Most bricks are full. A loop without gaps is vectorized.
+            for place in self.places {
+                let (first, end) = (floor(first + place - self.reach), -floor(-first - place - self.reach));
+                sections += i64::from(end - first) as u64;
+                (nearest, farthest) = (nearest.min(first), farthest.max(end));
+            }
+            left = 0;
+        }
         while left != 0 {
             let depth = first + self.places[left.trailing_zeros() as usize];
             left &= left - 1;
@@ -203,8 +212,11 @@ impl PlaceDepths {
     }
 }
 
-/// The largest integer up to a slab's number. The range of these numbers makes the system's `floor` unnecessary.
+/// The largest integer up to a slab's number, without the system's `floor` or a branch.
 fn floor(slab: f64) -> i32 {
-    const ABOVE_0: i32 = 2 * slab::MAX_SLABS as i32;
-    (slab + f64::from(ABOVE_0)) as i32 - ABOVE_0
+    // Adding 1.5·2⁵² rounds to a whole number, which is then in the low bits.
+    const MAGIC: f64 = 6_755_399_441_055_744.0;
+    let rounded = (slab + MAGIC) - MAGIC;
+    let floored = if rounded > slab { rounded - 1.0 } else { rounded };
+    (floored + MAGIC).to_bits() as i32
 }

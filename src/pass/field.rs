@@ -16,7 +16,7 @@ use crate::pass::cull::CullList;
 use crate::settings::shading::Gradient;
 
 /// Sheet buffers that a plane's sums take.
-pub const SHEETS: u32 = 2;
+pub const SHEETS_PER_PLANE: u32 = 2;
 
 /// The stage's pipelines: zeroing tiles, and those that draw, by gradient; each is compiled when it is first asked for.
 #[derive(Debug)]
@@ -43,7 +43,7 @@ impl Field {
         ];
         let clear_bindings = clear_bindings(device);
         Self {
-            clear: clear_pipeline(device, &clear_bindings, format, SHEETS),
+            clear: clear_pipeline(device, &clear_bindings, format, SHEETS_PER_PLANE),
             clear_bindings,
             bindings: Bindings::new(device, shaders::FIELD, &slots),
             format,
@@ -55,7 +55,7 @@ impl Field {
     /// Compiles what a gradient needs.
     pub fn prepare(&self, device: &Device, gradient: Gradient) {
         self.field[gradient as usize].get_or_init(|| {
-            let sheets = sheets_of_a_group(self.format, SHEETS, Some(added_to(wgpu::BlendFactor::One)));
+            let sheets = sheets_of_a_group(self.format, SHEETS_PER_PLANE, Some(added_to(wgpu::BlendFactor::One)));
             let constants = [("KERNEL_GRADIENT", f64::from(u8::from(gradient == Gradient::Kernel)))];
             let entries = (shaders::FIELD, ["vertex", "fragment"]);
             render_pipeline(device, entries, &self.bindings.pipeline_layout, &sheets, &constants)

@@ -96,7 +96,7 @@ impl FieldRasterizer {
         let mut old = PreviousBuffers::of(previous);
         let targets = match old.targets.filter(|old| old.size == view.size) {
             Some(targets) => targets,
-            None => Targets::new(device, view.size, self.sheet_format, field::SHEETS)?,
+            None => Targets::new(device, view.size, self.sheet_format, field::SHEETS_PER_PLANE)?,
         };
         let covered = covered(volume.lists.bricks(), after);
         let (planned, _, bucketed) = Planned::renewed(inputs, (view, &covered), old.planned, 1);
@@ -172,7 +172,7 @@ impl FieldRasterizer {
             clear_group: self.field.bind_clear(device, frame, tiles),
             classify_groups: bands.map(|band| self.classify.bind(device, mode, buffers, band)).collect(),
             occlude_groups: self.occlude.bind(device, [frame, &groups], &tile_lists.occluding, &targets),
-            sheet_views: (0..field::SHEETS).map(|layer| targets.sheet_view(layer)).collect(),
+            sheet_views: (0..field::SHEETS_PER_PLANE).map(|layer| targets.sheet_view(layer)).collect(),
             group_stride: group_stride as u32,
             gradient: after.gradient,
             order,
@@ -218,7 +218,7 @@ impl FieldRasterizer {
             buffers.push(buffer_spec("sheetsplat.order", order_bytes(order).len() as u64, BufferUsages::STORAGE));
             buffers.extend(Cull::buffer_specs(bricks.len(), most));
         }
-        let targets = Targets::estimate(limits, size, sheet_format, field::SHEETS)?;
+        let targets = Targets::estimate(limits, size, sheet_format, field::SHEETS_PER_PLANE)?;
         let groups = plan.groups.len();
         Ok(FrameEstimate { bytes: sizes(limits, &buffers)? + targets, groups, passes: 3 * groups })
     }

@@ -74,6 +74,7 @@ impl From<VolumeError> for SceneError {
 
 /// The source of a scene's volume.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum VolumeSource {
     /// A volume file.
     File(PathBuf),
@@ -81,6 +82,16 @@ pub enum VolumeSource {
     Raw(PathBuf, RawLayout),
     /// A procedural volume, `NAME` or `NAME:N` (see [`builtin::volume`]).
     Builtin(String),
+}
+
+impl VolumeSource {
+    /// The path of a volume file, with or without a header; `None` for a procedural volume.
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::File(path) | Self::Raw(path, _) => Some(path),
+            Self::Builtin(_) => None,
+        }
+    }
 }
 
 /// The image's size and background.

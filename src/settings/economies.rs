@@ -46,12 +46,7 @@ impl Economies {
     pub(crate) fn in_use(&self) -> Option<EconomyInUse> {
         let off = Self::default().values();
         let used = self.values().into_iter().zip(off).find(|(value, off)| value != off);
-        used.map(|((key, value), (_, _off))| EconomyInUse {
-            key,
-            value,
-            #[cfg(feature = "cpu")]
-            off: _off,
-        })
+        used.map(|((key, value), (_, off))| EconomyInUse { key, value, off })
     }
 
     fn values(&self) -> [(&'static str, f64); 3] {
@@ -66,7 +61,6 @@ pub(crate) struct EconomyInUse {
     pub(crate) key: &'static str,
     pub(crate) value: f64,
     /// The value that turns it off.
-    #[cfg(feature = "cpu")]
     pub(crate) off: f64,
 }
 

@@ -19,6 +19,7 @@ pub enum Light {
 
 /// The gradient from which [`Classification::After`](super::Classification::After) takes normals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Gradient {
     /// The voxels' central differences, interpolated like the values.
     Differences,

@@ -39,6 +39,7 @@ pub enum Method {
 
 /// What is splatted, which determines where the transfer function and shading are applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Classification {
     /// Voxels are classified and shaded, and their colours are splatted (the paper, SPEC §§3–6).
     Before,
@@ -49,6 +50,7 @@ pub enum Classification {
 
 /// How the kernel reconstructs values for [`Classification::After`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Interpolation {
     /// The kernel's weighted mean of the voxels' values, which smooths them.
     Smooth,
@@ -238,13 +240,18 @@ impl Splatting {
     /// Checks what [`Classification::After`] asks of the other settings.
     fn check_after(&self) -> Result<(), SettingError> {
         let refused = |key: &str, found: String, allowed: &str| Err(SettingError::new(key, found, allowed));
-        let excluded = match self.method {
-            Method::AxisAligned => Some("splatting.method = \"axis-aligned\"".to_owned()),
-            Method::CompositeEverySample => Some("splatting.method = \"composite-every-sample\"".to_owned()),
-            Method::ImageAligned => self.experimental.in_use().map(|economy| economy.to_string()),
+        let by_method = match self.method {
+            Method::AxisAligned => Some("splatting.method = \"axis-aligned\""),
+            Method::CompositeEverySample => Some("splatting.method = \"composite-every-sample\""),
+            Method::ImageAligned => None,
         };
-        if let Some(setting) = excluded {
-            return refused("splatting.classification", format!("\"after\" with {setting}"), "\"before\" with it");
+        if let Some(method) = by_method {
+            let allowed = "\"before\" with it, or \"image-aligned\"";
+            return refused("splatting.classification", format!("\"after\" with {method}"), allowed);
+        }
+        if let Some(economy) = self.experimental.in_use() {
+            let allowed = format!("\"before\" with it, or {} = {}", economy.key, economy.off);
+            return refused("splatting.classification", format!("\"after\" with {economy}"), &allowed);
         }
         if self.falloff > MAX_FALLOFF_AFTER {
             let found = format!("{} with splatting.classification = \"after\"", self.falloff);

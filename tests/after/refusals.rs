@@ -25,19 +25,19 @@ fn settings_that_exclude_after_are_named() {
             &["splatting.experimental.whole_below=0.1"],
             "classification",
             "\"after\" with splatting.experimental.whole_below = 0.1",
-            "\"before\"",
+            "\"before\" with it, or splatting.experimental.whole_below = 0",
         ),
         (
             &["splatting.experimental.beta=0.9"],
             "classification",
             "\"after\" with splatting.experimental.beta = 0.9",
-            "\"before\"",
+            "\"before\" with it, or splatting.experimental.beta = 1",
         ),
         (
             &["splatting.experimental.resolution=0.01"],
             "classification",
             "\"after\" with splatting.experimental.resolution = 0.01",
-            "\"before\"",
+            "\"before\" with it, or splatting.experimental.resolution = 0",
         ),
         (&["splatting.falloff=11.5"], "falloff", "11.5 with splatting.classification", "at most 11"),
         (

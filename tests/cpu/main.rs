@@ -3,6 +3,7 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod after;
 #[expect(dead_code, reason = "not every file needs all of it")]
 #[path = "../common/mod.rs"]
 mod common;
@@ -15,7 +16,7 @@ use sheetsplat::headless::Rendering;
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Classification, Clip, Compositing, Economies, Light, Method, Order, Projection, Ramp};
+use sheetsplat::settings::{Clip, Compositing, Economies, Light, Method, Order, Projection, Ramp};
 use sheetsplat::volume::{Volume, builtin};
 
 use common::images::largest_difference;
@@ -332,7 +333,6 @@ fn what_is_not_drawn_yet_is_refused_by_name() {
         let message = cpu::render(volume.clone(), &scene).unwrap_err().to_string();
         words.iter().for_each(|word| assert!(message.contains(word), "no {word:?} in {message}"));
     };
-    refused(&|scene| scene.splatting.classification = Classification::After, ["splatting.classification", "\"cpu\""]);
     refused(
         &|scene| {
             scene.splatting.method = Method::CompositeEverySample;

@@ -15,6 +15,8 @@ mod npz;
 mod nrrd;
 mod raw;
 mod reading;
+#[path = "../common/refused.rs"]
+mod refused;
 #[path = "../common/shared.rs"]
 mod shared;
 mod shear;
@@ -30,6 +32,7 @@ use glam::{DMat3, DVec3, UVec3};
 use sheetsplat::volume::{Orientation, Volume, VolumeError};
 use tempfile::TempDir;
 
+use refused::assert_refused;
 use shared::shared;
 
 /// The dimensions of every fixture.
@@ -144,20 +147,6 @@ fn replaced(name: &str, text: &str, instead: &str) -> Vec<u8> {
     let at = bytes.windows(text.len()).position(|window| window == text.as_bytes());
     let at = at.unwrap_or_else(|| panic!("{name}: no {text}"));
     [&bytes[..at], instead.as_bytes(), &bytes[at + text.len()..]].concat()
-}
-
-/// Asserts that the message names the file, the field, what was found and what is allowed.
-#[track_caller]
-fn assert_refused(result: Result<Volume, VolumeError>, file: &str, field: &str, found: &str, allowed: &str) {
-    let error = result.expect_err("a volume");
-    let message = error.to_string();
-    let VolumeError::Invalid { origin, field: at, found: what, allowed: instead, .. } = error else {
-        panic!("{message}")
-    };
-    assert!(origin.ends_with(file), "{message}");
-    assert_eq!(at, field, "{message}");
-    assert!(what.contains(found), "found {found:?}: {message}");
-    assert!(instead.contains(allowed), "allowed {allowed:?}: {message}");
 }
 
 /// Asserts that no prefix of a file is a volume, and neither is a longer file.

@@ -210,8 +210,9 @@ const MESA_19: &str = "llvmpipe (LLVM 19.1.7, 512 bits)";
 fn the_native_backend_is_compared_exactly() {
     let folder = Folder::new();
     let rendering = |image: Image, backend: &str| {
-        let (adapter, driver) = ("CPU".to_owned(), "avx2".to_owned());
-        Rendering { image, stats: Stats { backend: backend.to_owned(), adapter, driver, ..Stats::default() } }
+        let mut stats = Stats::default();
+        (stats.backend, stats.adapter, stats.driver) = (backend.to_owned(), "CPU".to_owned(), "avx2".to_owned());
+        Rendering { image, stats }
     };
     let golden = folder.with("head", &rendering(gradient(), "cpu"));
     golden.check(&rendering(gradient(), "cpu")).unwrap();

@@ -4,6 +4,8 @@
 
 mod damage;
 mod orientation;
+#[path = "../common/refused.rs"]
+mod refused;
 #[path = "../common/shared.rs"]
 mod shared;
 
@@ -17,6 +19,7 @@ use glam::{DVec3, UVec3};
 use sheetsplat::volume::{Volume, VolumeError};
 use tempfile::TempDir;
 
+use refused::assert_refused;
 use shared::shared;
 
 /// The header of a 2×3×4 volume of `uint8`; the tests replace or add lines.
@@ -65,23 +68,6 @@ fn assert_plain(volume: &Volume) {
     assert_eq!(volume.dims(), UVec3::new(2, 3, 4));
     let values: Vec<f32> = bytes().into_iter().map(f32::from).collect();
     assert_eq!(volume.values(), values);
-}
-
-/// Asserts that the message names the file, the field, what was found and what is allowed.
-#[track_caller]
-fn assert_refused(result: Result<Volume, VolumeError>, file: &str, field: &str, found: &str, allowed: &str) {
-    let error = result.expect_err("a volume");
-    let message = error.to_string();
-    let VolumeError::Invalid { origin, field: at, found: what, allowed: instead, .. } = error else {
-        panic!("{message}")
-    };
-    assert!(origin.ends_with(file), "{message}");
-    assert_eq!(at, field, "{message}");
-    assert!(what.contains(found), "found {found:?}: {message}");
-    assert!(instead.contains(allowed), "allowed {allowed:?}: {message}");
-    for part in [origin, at, what, instead] {
-        assert!(message.contains(&part), "{part}: {message}");
-    }
 }
 
 /// Asserts that `PLAIN` with one line replaced (or added, if `line` is empty) is refused.

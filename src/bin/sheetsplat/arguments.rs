@@ -153,10 +153,7 @@ impl Input {
     /// The input files named by the arguments and the scene. A header may name more.
     pub(crate) fn files(&self, scene: &Scene) -> Vec<PathBuf> {
         let scene_file = self.is_scene_file().then(|| self.name.clone().into());
-        let volume = match &scene.volume {
-            VolumeSource::File(path) | VolumeSource::Raw(path, _) => Some(path.clone()),
-            VolumeSource::Builtin(_) => None,
-        };
+        let volume = scene.volume.path().map(Path::to_path_buf);
         [scene_file, volume, scene.labels.clone()].into_iter().flatten().collect()
     }
 

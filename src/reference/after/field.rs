@@ -71,8 +71,11 @@ impl<'a> Field<'a> {
             }
             Gradient::Kernel => {
                 let (mut sum, mut offsets, mut moment) = (0.0, DVec3::ZERO, DVec3::ZERO);
+                // Differences from one coefficient, so that the gradient of a constant is exactly 0: its direction would be rounding errors.
+                let mut base = None;
                 self.each(at, low_pass, |index, weight, offset| {
                     let coefficient = self.coefficients[index as usize];
+                    let coefficient = coefficient - *base.get_or_insert(coefficient);
                     sum += coefficient * weight;
                     offsets += weight * offset;
                     moment += coefficient * weight * offset;

@@ -1,0 +1,217 @@
+//! `maximum`, `minimum` and `average` after splatting (SPEC §9): one value per pixel is chosen from those on the planes, and that is classified.
+
+use fearless_simd::f32x8;
+use fearless_simd::prelude::*;
+
+use super::classify::{Looks, Sample, mask};
+use super::frame::Frame;
+use super::planes::Planes;
+use crate::cpu::sheets::{Buffers, COLUMNS, ROWS, slot_of};
+use crate::cpu::vector::LANES;
+use crate::settings::splatting::Compositing;
+
+/// What is kept of a row's pixels: the number, the gradient, and where among slabs; a weight that is 0 where there is nothing.
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    number: [f32; COLUMNS],
+    gradient: [[f32; COLUMNS]; 3],
+    place: [f32; COLUMNS],
+    weight: [f32; COLUMNS],
+}
+
+const NOTHING: Kept =
+    Kept { number: [0.0; COLUMNS], gradient: [[0.0; COLUMNS]; 3], place: [0.0; COLUMNS], weight: [0.0; COLUMNS] };
+
+/// The values that a tile's pixels choose, row by row.
+#[derive(Debug)]
+pub(super) struct Chosen {
+    /// Of the points within pixels' stretches; of `average` sums, and the weight is their number.
+    best: Vec<Kept>,
+    /// On both planes of the slab that a stretch's middle lies in.
+    middle: Vec<[Kept; 2]>,
+}
+
+impl Chosen {
+    /// Empty; of no rows if nothing is chosen.
+    pub(super) fn new(compositing: Compositing) -> Self {
+        let rows = if is_choice(compositing) { ROWS } else { 0 };
+        Self { best: vec![NOTHING; rows], middle: vec![[NOTHING; 2]; rows] }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.best.fill(NOTHING);
+        self.middle.fill([NOTHING; 2]);
+    }
+}
+
+/// Whether a compositing chooses one value for a pixel.
+pub(super) fn is_choice(compositing: Compositing) -> bool {
+    matches!(compositing, Compositing::Maximum | Compositing::Minimum | Compositing::Average)
+}
+
+/// Where a stretch's middle is: in which slab, and the share of that.
+#[inline(always)]
+fn middle_of<S: Simd>(stretch: [f32x8<S>; 2]) -> [f32x8<S>; 2] {
+    let middle = (stretch[0] + stretch[1]) * 0.5;
+    let slab = middle.floor();
+    [slab, middle - slab]
+}
+
+impl Frame<'_> {
+    /// Looks at the points of a plane.
+    #[inline(always)]
+    pub(super) fn choose<S: Simd>(&self, simd: S, plane: i32, looks: &Looks<'_>, planes: &Planes, chosen: &mut Chosen) {
+        let slot = slot_of(plane);
+        let number = looks.rays.begin(plane);
+        let mut rows = planes.written[slot];
+        while rows != 0 {
+            let row = rows.trailing_zeros() as usize;
+            rows &= rows - 1;
+            for column in (0..COLUMNS).step_by(LANES) {
+                let at = [looks.origin[0] + column, looks.origin[1] + row];
+                let sample = self.sample(simd, &planes.rows[row][slot], column, (at, plane));
+                if sample.has_value == 0 {
+                    continue;
+                }
+                let gradient = self.gradient(simd, &sample);
+                let stretch = looks.stretch(simd, [column, row]);
+                let here = f32x8::splat(simd, number);
+                let counts = stretch[0].simd_le(here) & here.simd_le(stretch[1]) & mask(simd, sample.has_value);
+                self.keep(simd, &mut chosen.best[row], column, (&sample, &gradient, here), counts.to_bitmask() as u32);
+                let [slab, _] = middle_of(stretch);
+                for (kept, offset) in chosen.middle[row].iter_mut().zip([0.0, 1.0]) {
+                    let is_there = (slab + offset).simd_eq(here) & mask(simd, sample.has_value);
+                    let bits = is_there.to_bitmask() as u32;
+                    kept.set(simd, column, (sample.value, &gradient, here), bits);
+                }
+            }
+        }
+    }
+
+    /// Puts a plane's values in where they are the ones to choose.
+    #[inline(always)]
+    fn keep<S: Simd>(
+        &self,
+        simd: S,
+        kept: &mut Kept,
+        column: usize,
+        (sample, gradient, here): (&Sample<S>, &[f32x8<S>; 3], f32x8<S>),
+        counts: u32,
+    ) {
+        let load = |row: &[f32; COLUMNS]| f32x8::from_slice(simd, &row[column..column + LANES]);
+        let (number, weight) = (load(&kept.number), load(&kept.weight));
+        if self.compositing == Compositing::Average {
+            let zero = f32x8::splat(simd, 0.0);
+            let counts = mask(simd, counts);
+            let number = number + counts.select(sample.value, zero);
+            let weight = weight + counts.select(f32x8::splat(simd, 1.0), zero);
+            number.store_slice(&mut kept.number[column..column + LANES]);
+            weight.store_slice(&mut kept.weight[column..column + LANES]);
+            return;
+        }
+        let is_better = match self.compositing {
+            Compositing::Minimum => sample.value.simd_lt(number),
+            _ => sample.value.simd_gt(number),
+        };
+        let is_first = weight.simd_eq(f32x8::splat(simd, 0.0));
+        let bits = (is_better | is_first).to_bitmask() as u32 & counts;
+        kept.set(simd, column, (sample.value, gradient, here), bits);
+    }
+
+    /// Classifies what a tile's pixels chose, into the compositing buffer.
+    #[inline(always)]
+    pub(super) fn classify_chosen<S: Simd>(&self, simd: S, looks: &Looks<'_>, chosen: &Chosen, buffers: &mut Buffers) {
+        for (row, (best, middle)) in chosen.best.iter().zip(&chosen.middle).enumerate() {
+            for column in (0..COLUMNS).step_by(LANES) {
+                self.classify_group(simd, looks, (best, middle), [column, row], buffers);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn classify_group<S: Simd>(
+        &self,
+        simd: S,
+        looks: &Looks<'_>,
+        (best, [near, far]): (&Kept, &[Kept; 2]),
+        [column, row]: [usize; 2],
+        buffers: &mut Buffers,
+    ) {
+        let splat = |number: f32| f32x8::splat(simd, number);
+        let load = |row: &[f32; COLUMNS]| f32x8::from_slice(simd, &row[column..column + LANES]);
+        let stretch = looks.stretch(simd, [column, row]);
+        let [slab, share] = middle_of(stretch);
+        let has = |kept: &Kept| load(&kept.weight).simd_gt(splat(0.0));
+        let (has_best, has_near, has_far) = (has(best), has(near), has(far));
+        let shown = stretch[0].simd_lt(stretch[1]) & (has_best | has_near | has_far);
+        let lanes = shown.to_bitmask() as u32;
+        if lanes == 0 {
+            return;
+        }
+        let line = |of: fn(&Kept, usize) -> &[f32; COLUMNS], at: usize| {
+            let (near, far) = (load(of(near, at)), load(of(far, at)));
+            let (first, second) = (has_near.select(near, far), has_far.select(far, near));
+            has_best.select(load(of(best, at)), first + (second - first) * share)
+        };
+        let is_average = self.compositing == Compositing::Average;
+        let count = if is_average { load(&best.weight).max(splat(1.0)) } else { splat(1.0) };
+        let numbers = (line(|kept, _| &kept.number, 0) / has_best.select(count, splat(1.0))).to_array();
+        let gradient = [0, 1, 2].map(|axis| line(|kept, axis| &kept.gradient[axis], axis));
+        let place = match is_average {
+            true => slab + share,
+            false => has_best.select(load(&best.place), slab + share),
+        };
+        let lengths = self.length(gradient).to_array();
+        let places = place.to_array();
+        let (mut alphas, mut colors) = ([0.0; LANES], [[0.0; LANES]; 3]);
+        for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
+            let at = [looks.origin[0] + column, looks.origin[1] + row];
+            let label = if self.labels { self.label(at, lane, looks.rays.slab(places[lane])) } else { None };
+            let tables = self.transfer.tables(label);
+            let value = self.value(numbers[lane]);
+            alphas[lane] = match is_average {
+                true if tables.visible && tables.in_iso_range(value) => tables.opacity.at(value) as f32,
+                true => 0.0,
+                false => tables.alpha(value, f64::from(lengths[lane])) as f32,
+            };
+            let color = tables.color.at(value);
+            (0..3).for_each(|channel| colors[channel][lane] = color[channel] as f32);
+        }
+        let mut color = colors.each_ref().map(|channel| f32x8::load_array_ref(simd, channel));
+        if !is_average {
+            color = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]));
+        }
+        let alpha = f32x8::load_array(simd, alphas);
+        let [red, green, blue] = color.map(|channel| channel * alpha);
+        for (channel, pixels) in buffers.acc[row].iter_mut().zip([red, green, blue, alpha]) {
+            pixels.store_slice(&mut channel[column..column + LANES]);
+        }
+        if let Some(opacity) = self.compositor.first_hit {
+            let is_hit = alpha.simd_ge(splat(opacity)) & shown;
+            let hits = is_hit.select(place, splat(f32::INFINITY));
+            hits.store_slice(&mut buffers.hits[row][column..column + LANES]);
+        }
+    }
+}
+
+impl Kept {
+    /// Puts numbers in where there is a bit.
+    #[inline(always)]
+    fn set<S: Simd>(
+        &mut self,
+        simd: S,
+        column: usize,
+        (number, [x, y, z], place): (f32x8<S>, &[f32x8<S>; 3], f32x8<S>),
+        bits: u32,
+    ) {
+        if bits == 0 {
+            return;
+        }
+        let [gx, gy, gz] = &mut self.gradient;
+        let rows = [&mut self.number, gx, gy, gz, &mut self.place, &mut self.weight];
+        for (row, new) in rows.into_iter().zip([number, *x, *y, *z, place, f32x8::splat(simd, 1.0)]) {
+            let old = f32x8::from_slice(simd, &row[column..column + LANES]);
+            mask(simd, bits).select(new, old).store_slice(&mut row[column..column + LANES]);
+        }
+    }
+}

@@ -1,0 +1,235 @@
+//! What a frame's tiles share where classification comes after splatting, and the frame.
+
+use std::ops::Range;
+
+use fearless_simd::{Level, dispatch};
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::coefficients::Coefficients;
+use super::place::Placement;
+use super::slab_integral::Integrals;
+use super::splat::Splatter;
+use super::tile::TileWalk;
+use crate::cpu::bin;
+use crate::cpu::composite::Compositor;
+use crate::cpu::count::Drawn;
+use crate::cpu::cut::{RayMode, TileRays};
+use crate::cpu::first_hit;
+use crate::cpu::frame::{Drawing, Tile, draw_tiles};
+use crate::cpu::resolve::Resolver;
+use crate::cpu::shade::Shader;
+use crate::cpu::sheets::{COLUMNS, ROWS};
+use crate::geometry::view_geometry::ViewGeometry;
+
+use crate::image::Image;
+use crate::lists::brick;
+use crate::lists::brick::Brick;
+use crate::scene::Scene;
+use crate::settings::clip::HalfSpace;
+use crate::settings::shading::{Gradient, MIN_GRADIENT};
+use crate::settings::splatting::{Compositing, Order};
+use crate::settings::transfer_function::TransferFunction;
+use crate::stats::Counts;
+use crate::volume::Volume;
+
+/// Everything that decides a tile.
+#[derive(Debug)]
+pub(in crate::cpu) struct Frame<'a> {
+    pub(super) volume: &'a Volume,
+    pub(super) transfer: &'a TransferFunction,
+    pub(super) coefficients: &'a Coefficients,
+    pub(super) bricks: &'a [Brick],
+    /// Those of them whose values can meet an opacity.
+    shown: &'a [Brick],
+    pub(super) placement: Placement,
+    pub(super) splatter: Splatter,
+    pub(super) integrals: Integrals,
+    pub(super) shader: Shader,
+    pub(super) compositor: Compositor,
+    pub(super) rays: RayMode,
+    pub(super) drawn: Drawn,
+    pub(super) compositing: Compositing,
+    pub(super) gradient: Gradient,
+    /// The kernel's gradient in numbers per world unit, from its sums along the planes' axes and their normal: by world axis.
+    pub(super) world_from_plane: [[f32; 3]; 3],
+    /// Sums for the kernel's gradient below this are rounding errors; squared.
+    pub(super) min_moment: f32,
+    /// Whether anything depends on gradients.
+    pub(super) needs_gradients: bool,
+    pub(super) has_gradient_opacity: bool,
+    /// Values per number.
+    pub(super) per_number: f32,
+    /// In numbers.
+    pub(super) min_gradient: f32,
+    /// Whether labels have tables of their own.
+    pub(super) labels: bool,
+    /// To the eye, if that is far away.
+    pub(super) to_eye: [f32; 3],
+    /// The slabs whose sheets may hold anything.
+    pub(super) touched: Range<i32>,
+    resolver: Resolver,
+}
+
+impl<'a> Frame<'a> {
+    /// A frame in a view, the one that the coefficients were looked at in.
+    pub(in crate::cpu) fn new(
+        (volume, transfer): (&'a Volume, &'a TransferFunction),
+        coefficients: &'a Coefficients,
+        scene: &Scene,
+        (view, first_hit): (ViewGeometry, Option<f64>),
+    ) -> Self {
+        let (splatting, shading, grid) = (&scene.splatting, &scene.shading, volume.grid());
+        let placement = Placement::new(view, grid);
+        let (numbers, [shown, bricks]) = (coefficients.numbers, coefficients.bricks());
+        let can_hide = splatting.compositing.hides() && splatting.order == Order::FrontToBack;
+        let tables = volume.labels().map(|_| transfer.labels.keys()).into_iter().flatten();
+        let tables = tables.map(|&label| transfer.tables(Some(label))).chain([transfer.tables(None)]);
+        let has_gradient_opacity = tables.into_iter().any(|tables| tables.gradient_opacity.is_some());
+        let axes = placement.geometry.axes;
+        // Sums are clamped; everything else is premultiplied RGBA already.
+        let resolved_as =
+            if splatting.compositing == Compositing::Xray { Compositing::Xray } else { Compositing::Linear };
+        Self {
+            volume,
+            transfer,
+            coefficients,
+            bricks,
+            shown,
+            splatter: Splatter::new(&placement, splatting.falloff, shading.gradient),
+            integrals: Integrals::new(volume, transfer, splatting.compositing, &numbers),
+            shader: Shader::new(shading, splatting.compositing),
+            compositor: Compositor {
+                compositing: splatting.compositing,
+                order: Order::FrontToBack,
+                threshold: (splatting.culling && can_hide).then_some(splatting.opacity_threshold as f32),
+                first_hit: first_hit.map(|opacity| opacity as f32),
+            },
+            rays: RayMode::within(&view, grid, kept(&view, scene, volume)),
+            drawn: Drawn::new(bricks.len(), &view),
+            compositing: splatting.compositing,
+            gradient: shading.gradient,
+            world_from_plane: [0, 1, 2]
+                .map(|world| axes.map(|axis| (-2.0 * splatting.falloff * axis[world] / grid.spacing[world]) as f32)),
+            min_moment: min_moment(splatting.radius, numbers.range).powi(2),
+            needs_gradients: shading.enabled || has_gradient_opacity,
+            has_gradient_opacity,
+            per_number: (1.0 / numbers.scale) as f32,
+            min_gradient: (MIN_GRADIENT * numbers.scale) as f32,
+            labels: volume.labels().is_some() && !transfer.labels.is_empty(),
+            to_eye: (-view.basis.w).to_array().map(|component| component as f32),
+            touched: touched(&placement, shown),
+            resolver: Resolver::new(resolved_as, scene.image.background),
+            placement,
+        }
+    }
+
+    /// How the pixels of a tile look at slabs, counted from `base`, and the directions to the eye where they differ.
+    pub(super) fn rays_of_tile(&self, origin: [usize; 2], base: i32) -> (TileRays, Vec<[[f32; COLUMNS]; 3]>) {
+        let mut rays = self.rays.of_tile(origin, base);
+        let length = |ray: &crate::cpu::ray::PixelRay| (ray.length() / ray.slabs_per_depth()) as f32;
+        let is_perspective = self.placement.view.perspective.is_some();
+        let mut weights = vec![[length(&self.rays.rays.of(origin)); COLUMNS]; ROWS];
+        let mut to_eye = vec![[[0.0; COLUMNS]; 3]; if is_perspective { ROWS } else { 0 }];
+        if is_perspective {
+            for (y, x) in (0..ROWS).flat_map(|y| (0..COLUMNS).map(move |x| (y, x))) {
+                let ray = self.rays.rays.of([origin[0] + x, origin[1] + y]);
+                weights[y][x] = length(&ray);
+                let direction = ray.toward_eye();
+                (0..3).for_each(|axis| to_eye[y][axis][x] = direction[axis] as f32);
+            }
+        }
+        rays.weights = Some(weights);
+        (rays, to_eye)
+    }
+
+    /// Draws all tiles.
+    pub(in crate::cpu) fn draw(&self, level: Level) -> Drawing {
+        let size = self.placement.view.size;
+        let placed = self.placement.place_bricks(self.bricks);
+        let has_hits = self.compositor.first_hit.is_some();
+        let (pixels, first_hits, tally) = draw_tiles(
+            size,
+            has_hits,
+            &placed,
+            || TileWalk::new(self),
+            |walk, origin, bricks| {
+                let (buffers, rays, tally) = dispatch!(level, simd => walk.draw(simd, origin, &placed, bricks));
+                let pixels = self.resolver.tile(buffers);
+                let unit = self.volume.grid().unit();
+                let first_hits = match has_hits {
+                    true => first_hit::depths(buffers, rays, &self.rays.rays, origin, unit),
+                    false => Vec::new(),
+                };
+                Tile { pixels, first_hits, tally }
+            },
+        );
+        let [columns, rows] = bin::tile_grid(size);
+        let sheets = self.touched.len() as u64;
+        let counts = Counts {
+            voxels_total: self.volume.values().len() as u64,
+            voxels_in_range: self.shown.iter().map(|brick| u64::from(brick::present(brick).count_ones())).sum(),
+            sections_total: self.sections(),
+            sections_rasterized: tally.sections,
+            sheets,
+            tiles_total: (columns * rows) as u64 * sheets,
+            tiles_composited: tally.sheets_composited,
+            bricks_visited: tally.bricks_visited,
+            ..Counts::default()
+        };
+        let [width, height] = size;
+        Drawing { image: Image { width, height, pixels }, counts, first_hits }
+    }
+
+    /// Pairs of voxels and planes nearer to them than the kernel's radius.
+    fn sections(&self) -> u64 {
+        let of_brick = |brick: &Brick| {
+            let first = self.placement.of_brick(brick);
+            let planes = |(slot, _)| {
+                let depth = self.placement.of_voxel(first, slot).depth;
+                self.placement.planes(depth..depth).len() as u64
+            };
+            brick::voxels(brick).map(planes).sum::<u64>()
+        };
+        self.shown.par_iter().map(of_brick).sum()
+    }
+}
+
+/// The rounding error of `Σ c·g·δ / N - f·Σ g·δ / N`: some units in the last place of its largest terms. Where all values are equal the sums differ
+/// by no more, and a direction made of that would be noise.
+fn min_moment(radius: f64, range: [f32; 2]) -> f32 {
+    8.0 * f32::EPSILON * radius as f32 * range[0].abs().max(range[1].abs())
+}
+
+/// What pixels' rays count in: the box of voxel cells, beyond the near plane, within the cuts.
+fn kept(view: &ViewGeometry, scene: &Scene, volume: &Volume) -> Vec<HalfSpace> {
+    let grid = volume.grid();
+    let half = (grid.center() + 0.5) * grid.aspect();
+    let mut kept = if scene.clip.is_empty() { Vec::new() } else { scene.clip.half_spaces(grid) };
+    kept.extend(
+        DVec3::AXES
+            .into_iter()
+            .flat_map(|axis| [axis, -axis].map(|normal| HalfSpace { normal, offset: axis.dot(half) })),
+    );
+    kept.extend(view.perspective.map(|perspective| {
+        let (eye, w) = (perspective.eye, view.basis.w);
+        HalfSpace { normal: w, offset: -eye.position.dot(w) - eye.near }
+    }));
+    kept
+}
+
+/// The slabs from the first to the last that the cells of some bricks reach.
+fn touched(placement: &Placement, bricks: &[Brick]) -> Range<i32> {
+    let view = &placement.view;
+    let near = view.perspective.map_or(f64::NEG_INFINITY, |perspective| perspective.eye.near);
+    let slabs = |brick: &Brick| {
+        let (middle, half) = brick::bounds(brick);
+        let row = view.screen_from_voxel[2];
+        let depth = row.dot(middle.extend(1.0)) - view.slabs.origin;
+        let spread = row.truncate().abs().dot(half + 0.5);
+        let first = (depth - spread).max(near) / view.slabs.width;
+        first.floor() as i32..((depth + spread) / view.slabs.width).ceil() as i32
+    };
+    let either = |a: Range<i32>, b: Range<i32>| a.start.min(b.start)..a.end.max(b.end);
+    bricks.par_iter().map(slabs).reduce_with(either).filter(|all| !all.is_empty()).unwrap_or(0..0)
+}

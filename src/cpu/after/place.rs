@@ -1,0 +1,177 @@
+//! Where voxels' kernels meet the slab planes of a view, in f64 (SPEC §9): which planes, and around which pixels.
+
+use std::ops::Range;
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use crate::after::plane_geometry::PlaneGeometry;
+use crate::cpu::bin::Placed;
+use crate::cpu::project::floor;
+use crate::cpu::sheets::{COLUMNS, ROWS};
+use crate::geometry::slab;
+use crate::geometry::view_geometry::ViewGeometry;
+
+use crate::lists::brick::Brick;
+use crate::lists::brick::{self, BRICK_VOXELS};
+use crate::volume::Grid;
+
+/// Pixels around boxes, for what f32 rounds.
+const SLACK: f64 = 0.02;
+
+/// Where a voxel is. Planes are counted: plane k is at depth k.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// Pixel coordinates times the depth from the eye, from the image's middle; without an eye that depth is 1.
+    pub(super) at: DVec2,
+    pub(super) depth: f64,
+}
+
+/// How kernels lie on a plane: grid units along two axes by a pixel's offset, a = `a·(dx, dy)` and b = `b·(dx, dy)`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PlaneMap {
+    /// The plane's depth from the eye, `unit`s; 1 without an eye.
+    pub(super) from_eye: f64,
+    pub(super) a: DVec2,
+    pub(super) b: DVec2,
+    /// Half the box around a kernel of the whole radius, pixels.
+    pub(super) half_box: DVec2,
+}
+
+/// The slab planes of a view, and how voxels lie before them.
+#[derive(Clone, Debug)]
+pub(super) struct Placement {
+    pub(super) geometry: PlaneGeometry,
+    pub(super) view: ViewGeometry,
+    /// Grid units along the planes' normal from plane to plane.
+    pub(super) per_plane: f64,
+    /// Planes that a kernel reaches to either side of its voxel.
+    reach: f64,
+    places: Vec<Place>,
+    /// Of the planes that the volume's kernels reach, from the first on; without an eye of one, as all are the same.
+    maps: Vec<PlaneMap>,
+    first_map: i32,
+}
+
+/// A box on the screen, pixels: least and greatest.
+pub(super) type ScreenBox = [DVec2; 2];
+
+impl Placement {
+    pub(super) fn new(view: ViewGeometry, grid: &Grid) -> Self {
+        let geometry = PlaneGeometry::new(&view, grid);
+        let per_plane = geometry.per_depth * view.slabs.width;
+        let reach = view.radius / per_plane;
+        let (places, maps) = (Vec::new(), Vec::new());
+        let mut placement = Self { geometry, reach, per_plane, view, places, maps, first_map: 0 };
+        placement.places = (0..BRICK_VOXELS).map(|slot| placement.offset(brick::in_brick(slot).as_dvec3())).collect();
+        let (middle, half) = (grid.center(), grid.center());
+        let Place { depth, .. } = placement.of(middle);
+        let spread = view.screen_from_voxel[2].truncate().abs().dot(half) / view.slabs.width;
+        // A plane more on either side, for what is rounded.
+        let planes = placement.planes(depth - spread - 1.0..depth + spread + 1.0);
+        let planes = if view.perspective.is_some() { planes } else { 0..1 };
+        placement.maps = planes.clone().map(|plane| placement.new_map(plane)).collect();
+        placement.first_map = planes.start;
+        placement
+    }
+
+    fn offset(&self, voxels: DVec3) -> Place {
+        let [x, y, depth, _] = self.view.screen_from_voxel.map(|row| row.truncate().dot(voxels));
+        Place { at: DVec2::new(x, y), depth: depth / self.view.slabs.width }
+    }
+
+    fn of(&self, voxel: DVec3) -> Place {
+        let [x, y, depth, _] = self.view.screen_from_voxel.map(|row| row.dot(voxel.extend(1.0)));
+        Place { at: DVec2::new(x, y), depth: (depth - self.view.slabs.origin) / self.view.slabs.width }
+    }
+
+    /// Where a brick's first place is.
+    pub(super) fn of_brick(&self, brick: &Brick) -> Place {
+        self.of(brick::origin(brick).as_dvec3())
+    }
+
+    /// Where one of a brick's voxels is.
+    pub(super) fn of_voxel(&self, brick: Place, slot: u32) -> Place {
+        let Place { at, depth } = self.places[slot as usize];
+        Place { at: brick.at + at, depth: brick.depth + depth }
+    }
+
+    /// The planes nearer than a kernel's radius to voxels between two depths. At the eye and behind it there are none.
+    pub(super) fn planes(&self, depths: Range<f64>) -> Range<i32> {
+        let first = floor(depths.start - self.reach + slab::ROUNDING) + 1;
+        let end = -floor(-(depths.end + self.reach - slab::ROUNDING));
+        if self.view.perspective.is_some() { first.max(1)..end } else { first..end }
+    }
+
+    /// From a voxel to a plane, grid units along the normal.
+    pub(super) fn to_plane(&self, place: Place, plane: i32) -> f64 {
+        (f64::from(plane) - place.depth) * self.per_plane
+    }
+
+    /// How kernels lie on a plane that one may reach.
+    pub(super) fn map(&self, plane: i32) -> &PlaneMap {
+        let at = if self.view.perspective.is_some() { plane - self.first_map } else { 0 };
+        &self.maps[at as usize]
+    }
+
+    /// How kernels lie on a plane, by the low-pass rule.
+    fn new_map(&self, plane: i32) -> PlaneMap {
+        let PlaneGeometry { screen_axis, per_pixel, .. } = self.geometry;
+        let from_eye = self.geometry.from_eye(self.view.slabs.plane(plane));
+        let size = (per_pixel * from_eye).min(DVec2::ONE);
+        let (a, b) = (screen_axis * size.x, screen_axis.perp() * size.y);
+        // Of an ellipse with these axes.
+        let reach = self.view.radius / size;
+        let (along, across) = (screen_axis * reach.x, screen_axis.perp() * reach.y);
+        let squared = along * along + across * across;
+        let half_box = DVec2::new(squared.x.sqrt(), squared.y.sqrt()) + SLACK;
+        PlaneMap { from_eye, a, b, half_box }
+    }
+
+    /// Where on the image the point of a plane lies that is nearest to a voxel.
+    pub(super) fn center(&self, place: Place, to_plane: f64, map: &PlaneMap) -> DVec2 {
+        (place.at + to_plane * self.geometry.step.truncate()) / map.from_eye + self.middle()
+    }
+
+    fn middle(&self) -> DVec2 {
+        DVec2::from(self.view.size.map(f64::from)) / 2.0
+    }
+
+    /// The pixels that a brick's kernels may reach, and the planes; `None` for no plane.
+    pub(super) fn bounds(&self, brick: &Brick) -> Option<(ScreenBox, Range<i32>)> {
+        let (middle, half) = brick::bounds(brick);
+        let Place { at, depth } = self.of(middle);
+        let rows = self.view.screen_from_voxel;
+        let [dx, dy, spread, _] = rows.map(|row| row.truncate().abs().dot(half));
+        let spread = spread / self.view.slabs.width;
+        let planes = self.planes(depth - spread..depth + spread);
+        if planes.is_empty() {
+            return None;
+        }
+        let across = DVec2::new(dx, dy) + self.view.radius * self.geometry.step.truncate().abs();
+        let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        for plane in [planes.start, planes.end - 1] {
+            let map = self.map(plane);
+            low = low.min((at - across) / map.from_eye - map.half_box);
+            high = high.max((at + across) / map.from_eye + map.half_box);
+        }
+        Some(([low + self.middle() - SLACK, high + self.middle() + SLACK], planes))
+    }
+
+    /// The bricks that may be on the image, by first plane and then in memory order.
+    pub(super) fn place_bricks(&self, bricks: &[Brick]) -> Vec<Placed> {
+        let place = |(number, brick): (usize, &Brick)| {
+            let ([low, high], planes) = self.bounds(brick)?;
+            let tiles = |axis: usize, side: usize| {
+                let low = (low[axis] - 0.5).max(0.0);
+                let high = (high[axis] - 0.5).min(f64::from(self.view.size[axis]) - 1.0);
+                (low <= high).then(|| [low as usize / side, high as usize / side])
+            };
+            let (columns, rows) = (tiles(0, COLUMNS)?, tiles(1, ROWS)?);
+            Some(Placed { brick: number as u32, first: planes.start, half_box: [0.0; 2], columns, rows })
+        };
+        let mut placed: Vec<Placed> = bricks.par_iter().enumerate().filter_map(place).collect();
+        placed.par_sort_unstable_by_key(|placed| (placed.first, placed.brick));
+        placed
+    }
+}

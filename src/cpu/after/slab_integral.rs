@@ -1,0 +1,253 @@
+//! What the transfer function makes of the values between two planes (SPEC §9), of eight pixels at a time: [`slab_integral`]'s table read by the
+//! same steps as [`SlabIntegral::new`](slab_integral::SlabIntegral::new).
+
+use std::collections::BTreeMap;
+
+use fearless_simd::f32x8;
+use fearless_simd::prelude::*;
+
+use crate::after::normalization::Normalization;
+use crate::after::slab_integral::{self, CELL, HEAD, NODE, SUM};
+use crate::cpu::vector::{LANES, optical_depth};
+use crate::settings::splatting::Compositing;
+use crate::settings::transfer_function::TransferFunction;
+use crate::volume::Volume;
+
+/// One set of tables.
+#[derive(Clone, Debug)]
+pub(super) struct Table {
+    points: Vec<[f32; 4]>,
+    cells: usize,
+    /// The least and the greatest number with an opacity.
+    shown: [f32; 2],
+    /// The least number, bins per number, the greatest number.
+    bins: [f32; 4],
+}
+
+/// The tables of a transfer function: that of labels without tables of their own, and those of labels.
+#[derive(Clone, Debug)]
+pub(super) struct Integrals {
+    is_optical_depth: bool,
+    plain: Table,
+    labels: BTreeMap<u16, Table>,
+    /// The least and the greatest number with an opacity in any of them.
+    pub(super) shown: [f32; 2],
+}
+
+/// Means over the numbers from f0 to f1.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Means<S: Simd> {
+    /// `m̄`, without gradient opacity; 0 if no number has an opacity.
+    pub(super) amount: f32x8<S>,
+    /// `(v̄ - f0)/(f1 - f0)`; where they are equal ½.
+    pub(super) share: f32x8<S>,
+    /// `C̄`, unshaded.
+    pub(super) color: [f32x8<S>; 3],
+}
+
+/// A part of a cell for every lane.
+#[derive(Clone, Copy, Debug, Default)]
+struct Parts {
+    from: [f32; LANES],
+    to: [f32; LANES],
+    start: [f32; LANES],
+    per_width: [f32; LANES],
+    alpha: [f32; LANES],
+    rise: [f32; LANES],
+    color: [[f32; LANES]; 3],
+    color_rise: [[f32; LANES]; 3],
+    weight: [f32; LANES],
+}
+
+/// Sums of m, m·(x - f_min) and m·C.
+type Sums<S> = [f32x8<S>; 5];
+
+impl Table {
+    fn new(points: Vec<[f32; 4]>) -> Self {
+        let ([cells, _, low, high], bins) = (points[0], points[1]);
+        Self { cells: cells as usize, shown: [low, high], bins, points }
+    }
+
+    fn cell(&self, cell: usize) -> [[f32; 4]; CELL] {
+        let at = HEAD + self.points[0][1] as usize + CELL * cell;
+        std::array::from_fn(|entry| self.points[at + entry])
+    }
+
+    /// The cell of a number in the table's range.
+    fn cell_of(&self, x: f32) -> usize {
+        let [least, per_number, ..] = self.bins;
+        let bin = ((x - least) * per_number).clamp(0.0, self.points[0][1] - 1.0) as usize;
+        let [mut first, mut last, ..] = self.points[HEAD + bin].map(|cell| cell as usize);
+        while first < last {
+            let middle = (first + last).div_ceil(2);
+            if self.cell(middle)[0][0] <= x { first = middle } else { last = middle - 1 }
+        }
+        first
+    }
+}
+
+impl Parts {
+    fn set(&mut self, lane: usize, cell: &[[f32; 4]; CELL], [from, to]: [f32; 2], weight: f32) {
+        let [[start, per_width, alpha, rise], color, color_rise] = *cell;
+        self.from[lane] = from;
+        self.to[lane] = to;
+        self.start[lane] = start;
+        self.per_width[lane] = per_width;
+        self.alpha[lane] = alpha;
+        self.rise[lane] = rise;
+        for channel in 0..3 {
+            self.color[channel][lane] = color[channel];
+            self.color_rise[channel][lane] = color_rise[channel];
+        }
+        self.weight[lane] = weight;
+    }
+}
+
+impl Integrals {
+    pub(super) fn new(
+        volume: &Volume,
+        transfer: &TransferFunction,
+        compositing: Compositing,
+        numbers: &Normalization,
+    ) -> Self {
+        let table = |label| Table::new(slab_integral::table(&transfer.tables(label), compositing, numbers));
+        let labels = volume.labels().map(|_| transfer.labels.keys()).into_iter().flatten();
+        let labels: BTreeMap<u16, Table> = labels.map(|&label| (label, table(Some(label)))).collect();
+        let plain = table(None);
+        let shown = labels.values().fold(plain.shown, |[low, high], table| {
+            [
+                if table.shown[0] < low { table.shown[0] } else { low },
+                if table.shown[1] > high { table.shown[1] } else { high },
+            ]
+        });
+        Self { is_optical_depth: compositing == Compositing::Exponential, plain, labels, shown }
+    }
+
+    /// The table that a label's voxels go by.
+    pub(super) fn table(&self, label: Option<u16>) -> &Table {
+        label.and_then(|label| self.labels.get(&label)).unwrap_or(&self.plain)
+    }
+
+    /// The means of the lanes that have a bit, given the table of each.
+    #[inline(always)]
+    pub(super) fn means<'a, S: Simd>(
+        &self,
+        simd: S,
+        mut lanes: u32,
+        [f0, f1]: [[f32; LANES]; 2],
+        table_of: impl Fn(usize) -> &'a Table,
+    ) -> Means<S> {
+        let (mut near, mut far, mut whole) = (Parts::default(), Parts::default(), [[0.0; LANES]; 5]);
+        let (mut lows, mut sizes) = ([0.0; LANES], [0.0; LANES]);
+        let mut has_far = false;
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            let table = table_of(lane);
+            let [least, _, greatest, _] = table.bins;
+            let within = |x: f32| {
+                if x < least {
+                    least
+                } else if x > greatest {
+                    greatest
+                } else {
+                    x
+                }
+            };
+            let (x0, x1) = (within(f0[lane]), within(f1[lane]));
+            let (low, high) = if x0 < x1 { (x0, x1) } else { (x1, x0) };
+            if high < table.shown[0] || low > table.shown[1] {
+                continue;
+            }
+            let size = high - low;
+            (lows[lane], sizes[lane]) = (low, size);
+            let first = table.cell_of(low);
+            let cell = table.cell(first);
+            let end = cell[1][3];
+            if high < end || first + 1 == table.cells {
+                near.set(lane, &cell, [low, high], 1.0);
+                continue;
+            }
+            let last = table.cell_of(high);
+            if last == first {
+                near.set(lane, &cell, [low, high], 1.0);
+                continue;
+            }
+            has_far = true;
+            let last_cell = table.cell(last);
+            let start = last_cell[0][0];
+            near.set(lane, &cell, [low, end], (end - low) / size);
+            far.set(lane, &last_cell, [start, high], (high - start) / size);
+            if last > first + 1 {
+                let sums = table.between(first + 1, last - 1, low);
+                whole.iter_mut().zip(sums).for_each(|(lanes, sum)| lanes[lane] = sum / size);
+            }
+        }
+        let load = |lanes: &[f32; LANES]| f32x8::load_array_ref(simd, lanes);
+        let (low, size) = (load(&lows), load(&sizes));
+        let mut sums = self.part(simd, &near, low);
+        if has_far {
+            let far = self.part(simd, &far, low);
+            sums = std::array::from_fn(|at| sums[at] + far[at] + load(&whole[at]));
+        }
+        let [amount, moment, red, green, blue] = sums;
+        let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
+        let has_amount = amount.simd_gt(zero);
+        let divisor = has_amount.select(amount, one);
+        let is_range = has_amount & size.simd_gt(zero);
+        let share = (moment / divisor / is_range.select(size, one)).max(zero).min(one);
+        let share = is_range.select(share, f32x8::splat(simd, 0.5));
+        let is_rising = load(&f0).simd_le(load(&f1));
+        Means {
+            amount: has_amount.select(amount, zero),
+            share: is_rising.select(share, one - share),
+            color: [red, green, blue].map(|channel| channel / divisor),
+        }
+    }
+
+    /// The sums over parts of cells, by two Gauss nodes.
+    #[inline(always)]
+    fn part<S: Simd>(&self, simd: S, parts: &Parts, low: f32x8<S>) -> Sums<S> {
+        let load = |lanes: &[f32; LANES]| f32x8::load_array_ref(simd, lanes);
+        let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
+        let (from, to, weight) = (load(&parts.from), load(&parts.to), load(&parts.weight) * 0.5);
+        let mut sums = [zero; 5];
+        for share in [0.5 - NODE as f32, 0.5 + NODE as f32] {
+            let x = from + (to - from) * share;
+            let u = ((x - load(&parts.start)) * load(&parts.per_width)).max(zero).min(one);
+            let alpha = load(&parts.alpha) + load(&parts.rise) * u;
+            let m = weight * self.amount(simd, alpha);
+            sums[0] += m;
+            sums[1] += m * (x - low);
+            for channel in 0..3 {
+                sums[2 + channel] += m * (load(&parts.color[channel]) + load(&parts.color_rise[channel]) * u);
+            }
+        }
+        sums
+    }
+
+    /// m of SPEC §5.
+    #[inline(always)]
+    fn amount<S: Simd>(&self, simd: S, alpha: f32x8<S>) -> f32x8<S> {
+        match self.is_optical_depth {
+            true => optical_depth(simd, alpha.min(f32x8::splat(simd, 0.9999))),
+            false => alpha,
+        }
+    }
+}
+
+impl Table {
+    /// The sums over whole cells, from one to another, moments from a number.
+    fn between(&self, first: usize, last: usize, low: f32) -> [f32; 5] {
+        let level = (first ^ last).max(1).ilog2() as usize;
+        let sums = HEAD + self.points[0][1] as usize + self.cells * (CELL + SUM * level);
+        let mut total = [0.0; 5];
+        for cell in [first, last].into_iter().take(if first == last { 1 } else { 2 }) {
+            let [m, moment, middle, _] = self.points[sums + SUM * cell];
+            let [red, green, blue, _] = self.points[sums + SUM * cell + 1];
+            let own = [m, m * (middle - low) + moment, red, green, blue];
+            total.iter_mut().zip(own).for_each(|(total, own)| *total += own);
+        }
+        total
+    }
+}

@@ -1,0 +1,168 @@
+//! `surface` after splatting (SPEC §9): where along a ray `opacity·gradient_opacity` first reaches one half, the pixel is opaque and has that
+//! point's shaded colour. Values and gradients are linear from plane to plane.
+
+use fearless_simd::f32x8;
+use fearless_simd::prelude::*;
+use glam::DVec3;
+
+use super::classify::{Looks, Slab};
+use super::frame::Frame;
+use crate::cpu::sheets::Buffers;
+use crate::cpu::vector::LANES;
+use crate::settings::transfer_function::Tables;
+
+/// The opacity of a surface.
+const HALF: f64 = 0.5;
+
+/// Samples of a stretch over which values cross no control point, where the gradient's length bends the opacity.
+const SAMPLES: u32 = 32;
+
+/// Halvings of the stretch between two samples that holds the surface.
+const HALVINGS: u32 = 30;
+
+/// A pixel's line through a slab, where one set of tables holds. Places are shares of the slab.
+struct Line<'a> {
+    tables: Tables<'a>,
+    values: [f64; 2],
+    gradients: [DVec3; 2],
+    /// From where to where.
+    ends: [f64; 2],
+}
+
+impl Frame<'_> {
+    /// Looks for the surfaces of eight pixels in a slab; which of them have one.
+    #[inline(always)]
+    pub(super) fn find_surfaces<S: Simd>(
+        &self,
+        simd: S,
+        slab: &Slab<S>,
+        looks: &Looks<'_>,
+        [column, row]: [usize; 2],
+        buffers: &mut Buffers,
+    ) -> u32 {
+        let stretch = looks.stretch(simd, [column, row]);
+        let begin = looks.rays.begin(slab.number);
+        let [starts, ends] = stretch.map(|end| (end - begin).to_array());
+        let numbers = slab.values.map(f32x8::to_array);
+        let gradients = slab.gradients.map(|gradient| gradient.map(f32x8::to_array));
+        let (mut found, mut places, mut colors) = (0, [0.0; LANES], [[0.0; LANES]; 3]);
+        for lane in (0..LANES).filter(|lane| slab.lanes >> lane & 1 == 1) {
+            let [start, end] = [starts[lane].max(0.0), ends[lane].min(1.0)].map(f64::from);
+            let values = numbers.map(|numbers| self.value(numbers[lane]));
+            let gradients = gradients.map(|[x, y, z]| {
+                DVec3::new(x[lane].into(), y[lane].into(), z[lane].into()) * f64::from(self.per_number)
+            });
+            let at = [looks.origin[0] + column + lane, looks.origin[1] + row];
+            for ends in self.pieces(at, f64::from(slab.number), [start, end]) {
+                let middle = f64::from(slab.number) + (ends[0] + ends[1]) / 2.0;
+                let label = if self.labels { self.label(at, 0, middle) } else { None };
+                let line = Line { tables: self.transfer.tables(label), values, gradients, ends };
+                if let Some(place) = line.first_surface() {
+                    let color = line.tables.color.at(line.value(place));
+                    (0..3).for_each(|channel| colors[channel][lane] = color[channel] as f32);
+                    places[lane] = place as f32;
+                    found |= 1 << lane;
+                    break;
+                }
+            }
+        }
+        if found == 0 {
+            return 0;
+        }
+        let place = f32x8::load_array(simd, places);
+        let [near, far] = slab.gradients;
+        let gradient = std::array::from_fn(|axis| near[axis] + (far[axis] - near[axis]) * place);
+        let color = colors.each_ref().map(|channel| f32x8::load_array_ref(simd, channel));
+        let [red, green, blue] = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]));
+        let is_found = super::classify::mask(simd, found);
+        let put = |pixels: &mut [f32], new: f32x8<S>| {
+            let old = f32x8::from_slice(simd, pixels);
+            is_found.select(new, old).store_slice(pixels);
+        };
+        for (channel, new) in buffers.acc[row].iter_mut().zip([red, green, blue, f32x8::splat(simd, 1.0)]) {
+            put(&mut channel[column..column + LANES], new);
+        }
+        put(&mut buffers.hits[row][column..column + LANES], place + begin);
+        found
+    }
+
+    /// A stretch within a slab, cut where the ray passes from one voxel's cell into another's if their labels may differ.
+    fn pieces(&self, pixel: [usize; 2], slab: f64, [start, end]: [f64; 2]) -> Vec<[f64; 2]> {
+        // The stretch of a ray that shows nothing ends at negative infinity.
+        if start >= end {
+            return Vec::new();
+        }
+        let mut cuts = vec![start, end];
+        if self.labels {
+            let [from, to] = [start, end].map(|share| self.voxel_at(pixel, slab + share) + 0.5);
+            for axis in 0..3 {
+                let (low, high) = if from[axis] < to[axis] { (from[axis], to[axis]) } else { (to[axis], from[axis]) };
+                let borders = low.floor() as i64 + 1..high.ceil() as i64;
+                let share = |border: i64| (border as f64 - from[axis]) / (to[axis] - from[axis]);
+                cuts.extend(borders.map(|border| start + (end - start) * share(border)));
+            }
+            cuts.sort_by(f64::total_cmp);
+        }
+        cuts.windows(2).map(|pair| [pair[0], pair[1]]).filter(|[start, end]| start < end).collect()
+    }
+}
+
+impl Line<'_> {
+    fn value(&self, place: f64) -> f64 {
+        self.values[0] + (self.values[1] - self.values[0]) * place
+    }
+
+    /// The opacity at a place, whatever the iso-ranges.
+    fn opacity(&self, place: f64) -> f64 {
+        let factor = self
+            .tables
+            .gradient_opacity
+            .map_or(1.0, |ramp| ramp.at(self.gradients[0].lerp(self.gradients[1], place).length()));
+        self.tables.opacity.at(self.value(place)) * factor
+    }
+
+    fn shows(&self, place: f64) -> bool {
+        self.tables.in_iso_range(self.value(place)) && self.opacity(place) >= HALF
+    }
+
+    /// The places between which the opacity's ramp has no kink and no iso-range ends, with both ends.
+    fn knots(&self) -> Vec<f64> {
+        let [f0, f1] = self.values;
+        let [start, end] = self.ends;
+        let iso_ranges = self.tables.iso_ranges.iter().flat_map(|ranges| ranges.iter().flatten().copied());
+        let values = self.tables.opacity.points().iter().map(|point| point.0).chain(iso_ranges);
+        let places = values.map(|value| (value - f0) / (f1 - f0)).filter(|&place| start < place && place < end);
+        let mut knots: Vec<f64> = places.chain([start, end]).collect();
+        knots.sort_by(f64::total_cmp);
+        knots
+    }
+
+    /// The first place with an opacity of one half.
+    fn first_surface(&self) -> Option<f64> {
+        if !self.tables.visible {
+            return None;
+        }
+        let knots = self.knots();
+        let samples = if self.tables.gradient_opacity.is_some() { SAMPLES } else { 1 };
+        for piece in knots.windows(2) {
+            let [low, high] = [piece[0], piece[1]];
+            // The ends of iso-ranges belong to them, so a piece's first point may show where the piece does not.
+            if self.shows(low) {
+                return Some(low);
+            }
+            if !self.tables.in_iso_range(self.value((low + high) / 2.0)) {
+                continue;
+            }
+            let at = |sample: u32| low + (high - low) * f64::from(sample) / f64::from(samples);
+            if let Some(sample) = (1..=samples).find(|&sample| self.opacity(at(sample)) >= HALF) {
+                let (mut below, mut above) = (at(sample - 1), at(sample));
+                for _ in 0..HALVINGS {
+                    let middle = (below + above) / 2.0;
+                    if self.opacity(middle) >= HALF { above = middle } else { below = middle }
+                }
+                return Some(above);
+            }
+        }
+        knots.last().copied().filter(|&last| self.shows(last))
+    }
+}
