@@ -23,7 +23,7 @@ use crate::geometry::means;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
 use crate::lists::brick::Brick;
-use crate::lists::quad_plan::Overlaps;
+use crate::lists::quad_plan::{Overlaps, PlaceDepths};
 use crate::scene::Scene;
 use crate::settings::splatting::{Compositing, Method, Order};
 use crate::settings::transfer_function::TransferFunction;
@@ -74,6 +74,7 @@ impl<'a> Frame<'a> {
         (bricks, materials): (&'a [Brick], &'a Materials),
         scene: &Scene,
         (view, first_hit): (ViewGeometry, Option<f64>),
+        level: Level,
     ) -> Self {
         let (splatting, image) = (&scene.splatting, &scene.image);
         let grid = volume.grid();
@@ -99,7 +100,7 @@ impl<'a> Frame<'a> {
             threshold: (splatting.culling && can_hide).then_some(threshold as f32),
             first_hit: first_hit.map(|opacity| opacity as f32),
         };
-        let overlaps = Overlaps::count(bricks, &view);
+        let overlaps = count_overlaps(level, bricks, &view);
         let covered = view.slabs.covered(means::covered(&view, grid, splatting));
         let projection = Projection::new(view, splatting.order);
         Self {
@@ -171,6 +172,29 @@ impl<'a> Frame<'a> {
         };
         Tile { pixels, first_hits, tally }
     }
+}
+
+/// [`Overlaps::count`] by an instruction set.
+fn count_overlaps(level: Level, bricks: &[Brick], view: &ViewGeometry) -> Overlaps {
+    /// The bricks that a thread counts at a time.
+    const AT_A_TIME: usize = 512;
+    if view.perspective.is_some() {
+        return Overlaps::count(bricks, view);
+    }
+    let depths = PlaceDepths::new(view);
+    let of_chunk = |bricks: &[Brick]| {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut sum = Overlaps::default();
+                for brick in bricks {
+                    sum = sum.and(depths.overlaps(brick));
+                }
+                sum
+            },
+        ))
+    };
+    bricks.par_chunks(AT_A_TIME).map(of_chunk).reduce(Overlaps::default, Overlaps::and)
 }
 
 /// The pixels of a tile, row by row.

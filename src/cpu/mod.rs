@@ -182,7 +182,9 @@ impl CpuRenderer {
         let Drawing { image, counts, first_hits } = match &mut self.list {
             List::Before(bricks, materials) => {
                 let bricks = (bricks.bricks(), &*materials);
-                Frame::new(&self.volume, &self.transfer, bricks, &scene, (view, self.first_hit)).draw(self.level)
+                let frame =
+                    Frame::new(&self.volume, &self.transfer, bricks, &scene, (view, self.first_hit), self.level);
+                frame.draw(self.level)
             }
             List::After(coefficients) => {
                 let of = (&*self.volume, &self.transfer);

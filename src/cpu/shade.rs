@@ -22,13 +22,21 @@ pub(super) struct Unshaded {
 }
 
 impl Unshaded {
-    /// Puts a voxel into a lane.
-    pub(super) fn set(&mut self, lane: usize, material: &Material, to_eye: DVec3, scale: f64) {
+    /// Puts a voxel's material into a lane.
+    #[inline(always)]
+    pub(super) fn set_material(&mut self, lane: usize, material: &Material) {
         self.alpha[lane] = material.alpha;
-        self.scale[lane] = scale as f32;
         for axis in 0..3 {
             self.color[axis][lane] = material.color[axis];
             self.normal[axis][lane] = material.normal[axis];
+        }
+    }
+
+    /// Puts into a lane what depends on the view.
+    #[inline(always)]
+    pub(super) fn set_view(&mut self, lane: usize, to_eye: DVec3, scale: f64) {
+        self.scale[lane] = scale as f32;
+        for axis in 0..3 {
             self.to_eye[axis][lane] = to_eye[axis] as f32;
         }
     }

@@ -230,7 +230,7 @@ impl<'a> TileWalk<'a> {
         if self.frame.is_each {
             starting = self.sorted_by_depth(&starting);
         }
-        let mut batch = Batch::default();
+        let mut batch = Batch::new();
         for waiting in &starting {
             self.start_voxels(simd, waiting, sheet, &mut batch);
         }
@@ -240,7 +240,7 @@ impl<'a> TileWalk<'a> {
 
     /// Draws those of a brick's voxels that are seen, in batches.
     #[inline(always)]
-    fn start_voxels<S: Simd>(&mut self, simd: S, waiting: &Waiting, sheet: i32, batch: &mut Batch) {
+    fn start_voxels<S: Simd>(&mut self, simd: S, waiting: &Waiting, sheet: i32, batch: &mut Batch<'a>) {
         let frame = self.frame;
         let Arrived { brick: number, place: brick_place, half_box } = self.arrived[waiting.brick as usize];
         let brick = &frame.bricks[number as usize];
@@ -258,11 +258,8 @@ impl<'a> TileWalk<'a> {
             let materials =
                 *materials.get_or_insert_with(|| frame.materials.of_brick(number, frame.volume, frame.transfer, brick));
             let voxel = brick::origin(brick) + brick::in_brick(slot);
-            let material = match materials {
-                Some(materials) => materials[slot as usize],
-                None => Material::of(frame.volume, frame.transfer, voxel),
-            };
-            batch.add(frame, ([waiting.brick, slot], voxel), place, (center, sheet), &material);
+            batch.materials[batch.count] = materials.map(|materials| &materials[slot as usize]).ok_or(voxel);
+            batch.add(frame, ([waiting.brick, slot], voxel), place, (center, sheet));
             if batch.count == LANES {
                 self.draw_batch(simd, batch);
             }
@@ -290,13 +287,23 @@ impl<'a> TileWalk<'a> {
         voxels
     }
 
-    fn draw_batch<S: Simd>(&mut self, simd: S, batch: &mut Batch) {
+    fn draw_batch<S: Simd>(&mut self, simd: S, batch: &mut Batch<'_>) {
         // One function for every instruction set, instead of a copy at every call.
         simd.vectorize(
             #[inline(always)]
             || {
-                let amounts = self.frame.shader.shade(simd, &batch.unshaded);
                 let count = std::mem::take(&mut batch.count);
+                // All at once, so that the memory is waited for once.
+                for lane in 0..count {
+                    match batch.materials[lane] {
+                        Ok(material) => batch.unshaded.set_material(lane, material),
+                        Err(voxel) => {
+                            let Frame { volume, transfer, .. } = self.frame;
+                            batch.unshaded.set_material(lane, &Material::of(volume, transfer, voxel));
+                        }
+                    }
+                }
+                let amounts = self.frame.shader.shade(simd, &batch.unshaded);
                 for (lane, splat) in batch.splats[..count].iter_mut().enumerate() {
                     let [red, green, blue, amount] = &amounts;
                     splat.amount = [red[lane], green[lane], blue[lane], amount[lane]];
@@ -357,14 +364,20 @@ fn cleared(mut list: Vec<Waiting>) -> Vec<Waiting> {
 }
 
 /// Up to eight voxels that are shaded together.
-#[derive(Default)]
-struct Batch {
+struct Batch<'a> {
     count: usize,
+    /// Their materials, or the voxels whose materials are not kept.
+    materials: [Result<&'a Material, UVec3>; LANES],
     unshaded: Unshaded,
     splats: [Splat; LANES],
 }
 
-impl Batch {
+impl Batch<'_> {
+    fn new() -> Self {
+        let nothing = Err(UVec3::ZERO);
+        Self { count: 0, materials: [nothing; LANES], unshaded: Unshaded::default(), splats: Default::default() }
+    }
+
     #[inline(always)]
     fn add(
         &mut self,
@@ -372,7 +385,6 @@ impl Batch {
         (number, voxel): ([u32; 2], UVec3),
         place: Place,
         (center, sheet): ([f32; 2], i32),
-        material: &Material,
     ) {
         let projection = &frame.projection;
         let lens = projection.lens(place, voxel);
@@ -381,7 +393,7 @@ impl Batch {
         let direction = f64::from(projection.direction);
         let plane = direction * f64::from(sheet) + if projection.direction > 0 { 0.0 } else { 1.0 };
         let scale = direction * lens.per_lambda * frame.amplitude;
-        self.unshaded.set(self.count, material, lens.to_eye, scale);
+        self.unshaded.set_view(self.count, lens.to_eye, scale);
         let local = lens.local.map(|local| LocalFootprint {
             axis: local.axis.to_array().map(|component| component as f32),
             metric: local.metric.to_array().map(|component| component as f32),
