@@ -27,35 +27,53 @@ impl AddAssign for Tally {
 /// Records which voxels any tile has shaded and which of their sections any tile has drawn, [`SECTIONS`] at a time.
 #[derive(Debug)]
 pub(super) struct Drawn {
-    shaded: Vec<AtomicU64>,
-    sections: Vec<AtomicU64>,
-    /// The number of bits for each voxel.
-    parts: usize,
+    /// The bits of every brick's voxels: those shaded, then by part those of which sections were drawn.
+    marks: Vec<AtomicU64>,
+    /// The number of such masks for a brick.
+    pub(super) masks: usize,
 }
 
 impl Drawn {
     /// The record before any tile is drawn.
     pub(super) fn new(bricks: usize, view: &ViewGeometry) -> Self {
         let most_sheets = 2.0 * view.reach / view.slabs.width + 2.0;
-        let parts = (most_sheets as usize).div_ceil(SECTIONS);
-        let zeros = |count: usize| (0..count).map(|_| AtomicU64::new(0)).collect();
-        Self { shaded: zeros(bricks), sections: zeros(bricks * parts), parts }
+        let masks = 1 + (most_sheets as usize).div_ceil(SECTIONS);
+        Self { marks: (0..bricks * masks).map(|_| AtomicU64::new(0)).collect(), masks }
     }
 
-    /// Counts a shaded voxel, given by brick and slot.
-    pub(super) fn shade(&self, [brick, slot]: [u32; 2], tally: &mut Tally) {
-        tally.voxels_shaded += is_first(&self.shaded[brick as usize], slot);
-    }
-
-    /// Counts some sections of a voxel.
+    /// Counts some sections of a voxel, given by brick and slot.
     pub(super) fn splat(&self, [brick, slot]: [u32; 2], part: u32, sections: u64, tally: &mut Tally) {
-        let part = (part as usize).min(self.parts - 1);
-        tally.sections += sections * is_first(&self.sections[brick as usize * self.parts + part], slot);
+        let mask = (1 + part as usize).min(self.masks - 1);
+        let before = self.marks[brick as usize * self.masks + mask].fetch_or(1 << slot, Ordering::Relaxed);
+        tally.sections += sections * u64::from(before >> slot & 1 == 0);
+    }
+
+    /// Adds what a tile has marked of a brick. `sheets` tells how many a voxel has, given its slot.
+    pub(super) fn add(&self, brick: u32, marks: &[u64], sheets: impl Fn(u32) -> u64, tally: &mut Tally) {
+        let all = &self.marks[brick as usize * self.masks..];
+        let new = |mask: usize| marks[mask] & !all[mask].fetch_or(marks[mask], Ordering::Relaxed);
+        if marks[0] == 0 {
+            return;
+        }
+        tally.voxels_shaded += u64::from(new(0).count_ones());
+        for part in 1..marks.len() {
+            if marks[part] == 0 {
+                continue;
+            }
+            let before = (part - 1) as u64 * SECTIONS as u64;
+            let of_voxel = |slot| sheets(slot).saturating_sub(before).min(SECTIONS as u64);
+            tally.sections += bits(new(part)).map(of_voxel).sum::<u64>();
+        }
     }
 }
 
-/// Sets a bit. Returns 1 if it was not set before, else 0.
-fn is_first(bits: &AtomicU64, slot: u32) -> u64 {
-    // Most voxels are drawn by one tile only, so testing the bit first would not pay.
-    u64::from(bits.fetch_or(1 << slot, Ordering::Relaxed) >> slot & 1 == 0)
+/// The numbers of the bits that are set.
+pub(super) fn bits(mut mask: u64) -> impl Iterator<Item = u32> {
+    std::iter::from_fn(move || {
+        let bit = mask.trailing_zeros();
+        (mask != 0).then(|| {
+            mask &= mask - 1;
+            bit
+        })
+    })
 }

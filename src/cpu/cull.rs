@@ -24,19 +24,23 @@ impl Pixels {
     /// The pixels within a box, given by its centre in pixel coordinates whose whole numbers are pixel centres, and half its size.
     pub(super) fn within(center: [f32; 2], half: [f32; 2]) -> Option<Self> {
         let of_axis = |axis: usize, count: usize| {
-            let first = -floor(-(center[axis] - half[axis]));
-            let last = floor(center[axis] + half[axis]);
-            let (first, last) = (first.max(0), last.min(count as i32 - 1));
+            let last_pixel = count as f32 - 1.0;
+            let first = -floor(-(center[axis] - half[axis]).clamp(0.0, count as f32));
+            let last = floor((center[axis] + half[axis]).clamp(-1.0, last_pixel));
             (first <= last).then_some([first as usize, last as usize])
         };
         Some(Self { columns: of_axis(0, COLUMNS)?, rows: of_axis(1, ROWS)? })
     }
 }
 
-/// The largest integer that is not above a number, without the system's `floor`.
+/// The largest integer that is not above a small number, without the system's `floor` or a branch.
+#[inline(always)]
 fn floor(x: f32) -> i32 {
-    let truncated = x as i32;
-    truncated.saturating_sub(i32::from(truncated as f32 > x))
+    // Adding 1.5·2²³ rounds to a whole number, which is then in the low bits.
+    const MAGIC: f32 = 12_582_912.0;
+    let sum = x + MAGIC;
+    let whole = sum.to_bits() as i32 - MAGIC.to_bits() as i32;
+    whole - i32::from(sum - MAGIC > x)
 }
 
 impl OpenMask {

@@ -11,6 +11,7 @@ use super::count::{Drawn, Tally};
 use super::cut::RayMode;
 use super::first_hit;
 use super::kernel::KernelTables;
+use super::material::Materials;
 use super::project::Projection;
 use super::resolve::Resolver;
 use super::shade::Shader;
@@ -22,7 +23,7 @@ use crate::geometry::means;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
 use crate::lists::brick::Brick;
-use crate::lists::quad_plan::Overlaps;
+use crate::lists::quad_plan::{Overlaps, PlaceDepths};
 use crate::scene::Scene;
 use crate::settings::splatting::{Compositing, Method, Order};
 use crate::settings::transfer_function::TransferFunction;
@@ -35,6 +36,7 @@ pub(super) struct Frame<'a> {
     pub(super) volume: &'a Volume,
     pub(super) transfer: &'a TransferFunction,
     pub(super) bricks: &'a [Brick],
+    pub(super) materials: &'a Materials,
     pub(super) projection: Projection,
     pub(super) splatter: Splatter,
     pub(super) shader: Shader,
@@ -69,9 +71,10 @@ impl<'a> Frame<'a> {
     pub(super) fn new(
         volume: &'a Volume,
         transfer: &'a TransferFunction,
-        bricks: &'a [Brick],
+        (bricks, materials): (&'a [Brick], &'a Materials),
         scene: &Scene,
         (view, first_hit): (ViewGeometry, Option<f64>),
+        level: Level,
     ) -> Self {
         let (splatting, image) = (&scene.splatting, &scene.image);
         let grid = volume.grid();
@@ -87,8 +90,6 @@ impl<'a> Frame<'a> {
             kernel: KernelTables::new(&kernel),
             radius: splatting.radius as f32,
             metric: metric.map(|coefficient| coefficient as f32),
-            // Slightly smaller, because f32 rounds.
-            row_metric: ((1.0 - 1e-5) * (metric[2] - metric[1] * metric[1] / (4.0 * metric[0])).max(0.0)) as f32,
             half_box: view.footprint.half_box(kernel.support()).to_array().map(|half| half as f32),
             pixel_per_depth: view.perspective.map(|perspective| perspective.eye.pixel_per_depth as f32),
             is_whole: splatting.method != Method::ImageAligned,
@@ -99,13 +100,14 @@ impl<'a> Frame<'a> {
             threshold: (splatting.culling && can_hide).then_some(threshold as f32),
             first_hit: first_hit.map(|opacity| opacity as f32),
         };
-        let overlaps = Overlaps::count(bricks, &view);
+        let overlaps = count_overlaps(level, bricks, &view);
         let covered = view.slabs.covered(means::covered(&view, grid, splatting));
         let projection = Projection::new(view, splatting.order);
         Self {
             volume,
             transfer,
             bricks,
+            materials,
             splatter,
             shader: Shader::new(&scene.shading, splatting.compositing),
             compositor,
@@ -170,6 +172,29 @@ impl<'a> Frame<'a> {
         };
         Tile { pixels, first_hits, tally }
     }
+}
+
+/// [`Overlaps::count`] by an instruction set.
+fn count_overlaps(level: Level, bricks: &[Brick], view: &ViewGeometry) -> Overlaps {
+    /// The bricks that a thread counts at a time.
+    const AT_A_TIME: usize = 512;
+    if view.perspective.is_some() {
+        return Overlaps::count(bricks, view);
+    }
+    let depths = PlaceDepths::new(view);
+    let of_chunk = |bricks: &[Brick]| {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut sum = Overlaps::default();
+                for brick in bricks {
+                    sum = sum.and(depths.overlaps(brick));
+                }
+                sum
+            },
+        ))
+    };
+    bricks.par_chunks(AT_A_TIME).map(of_chunk).reduce(Overlaps::default, Overlaps::and)
 }
 
 /// The pixels of a tile, row by row.

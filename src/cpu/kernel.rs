@@ -44,19 +44,20 @@ impl KernelTables {
         t * polynomial(&self.cumulative, t * t * self.scale - 1.0)
     }
 
-    /// The ρ² from which a section between two planes is 0.
+    /// How far a section between two planes reaches from the kernel's axis, as a fraction of the support; slightly more, because f32 rounds.
     #[inline(always)]
-    pub(super) fn extent<S: Simd>(&self, simd: S, a: f32x8<S>, b: f32x8<S>) -> f32x8<S> {
+    pub(super) fn reach<S: Simd>(&self, simd: S, a: f32x8<S>, b: f32x8<S>) -> f32x8<S> {
         let zero = f32x8::splat(simd, 0.0);
         // 0 between the planes, whichever of them is nearer to the eye.
         let nearest = a.min(b).max(zero) + (zero - a.max(b)).max(zero);
-        self.support_squared * (1.0 + 1e-5) - nearest * nearest
+        let fraction = nearest * (1.0 / self.support);
+        ((1.0 + 1e-4) - fraction * fraction).max(zero).sqrt()
     }
 
     /// `H(0, 0, t)` where the chord of the kernel's ball ends.
     #[inline(always)]
-    pub(super) fn rim<S: Simd>(&self, simd: S, rho_squared: f32x8<S>) -> f32x8<S> {
-        let chord_squared = (self.support_squared - rho_squared).max(f32x8::splat(simd, 0.0));
+    pub(super) fn rim<S: Simd, V: SimdFloat<S, Element = f32>>(&self, simd: S, rho_squared: V) -> V {
+        let chord_squared = (V::splat(simd, self.support_squared) - rho_squared).max(V::splat(simd, 0.0));
         chord_squared.sqrt() * polynomial(&self.cumulative, chord_squared * self.scale - 1.0)
     }
 

@@ -22,6 +22,7 @@ mod cut;
 mod first_hit;
 mod frame;
 mod kernel;
+mod material;
 mod means;
 mod project;
 mod ray;
@@ -54,6 +55,7 @@ use crate::stats::Stats;
 use crate::volume::Volume;
 use after::Coefficients;
 use frame::{Drawing, Frame};
+use material::Materials;
 pub use simd::Simd;
 
 /// A view of a volume, drawn on the CPU.
@@ -73,8 +75,8 @@ pub struct CpuRenderer {
 /// What voxels are drawn from.
 #[derive(Clone, Debug)]
 enum List {
-    /// Those that take part.
-    Before(BrickList),
+    /// Those that take part, and their materials.
+    Before(BrickList, Materials),
     After(Coefficients),
 }
 
@@ -93,7 +95,9 @@ impl CpuRenderer {
         let list = match scene.splatting.classification {
             Classification::Before => {
                 let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
-                List::Before(BrickList::new(volume.grid(), &classify(&volume, &transfer, &clipped)))
+                let bricks = BrickList::new(volume.grid(), &classify(&volume, &transfer, &clipped));
+                let materials = Materials::new(bricks.bricks().len());
+                List::Before(bricks, materials)
             }
             Classification::After => List::After(Coefficients::new(&volume, scene)?),
         };
@@ -176,9 +180,11 @@ impl CpuRenderer {
         let ImageSettings { width, height, .. } = self.scene.image;
         let view = ViewGeometry::new(self.volume.grid(), &scene.camera, &scene.splatting, [width, height])?;
         let Drawing { image, counts, first_hits } = match &mut self.list {
-            List::Before(bricks) => {
-                Frame::new(&self.volume, &self.transfer, bricks.bricks(), &scene, (view, self.first_hit))
-                    .draw(self.level)
+            List::Before(bricks, materials) => {
+                let bricks = (bricks.bricks(), &*materials);
+                let frame =
+                    Frame::new(&self.volume, &self.transfer, bricks, &scene, (view, self.first_hit), self.level);
+                frame.draw(self.level)
             }
             List::After(coefficients) => {
                 let of = (&*self.volume, &self.transfer);

@@ -64,19 +64,28 @@ pub(super) struct Projection {
     /// 1, or -1 where sheets are numbered from the farthest on: in the order in which they are composited.
     pub(super) direction: i32,
     places: Vec<Place>,
+    /// The sheet depths of `places`.
+    depths: [f64; BRICK_VOXELS as usize],
+    /// How kernels are seen without perspective: all of them alike.
+    flat: Option<Lens>,
 }
+
+/// The first sheet of a voxel that has none.
+pub(super) const NO_SHEET: i32 = i32::MAX;
 
 impl Projection {
     pub(super) fn new(view: ViewGeometry, order: Order) -> Self {
         let direction = if order == Order::FrontToBack { 1 } else { -1 };
-        let mut projection = Self { view, direction, places: Vec::new() };
-        projection.places = (0..BRICK_VOXELS).map(|slot| projection.offset(brick::in_brick(slot).as_dvec3())).collect();
-        projection
-    }
-
-    fn offset(&self, voxels: DVec3) -> Place {
-        let [x, y, depth, from_eye] = self.view.screen_from_voxel.map(|row| row.truncate().dot(voxels));
-        Place { x, y, depth: depth / self.view.slabs.width, from_eye }
+        let offset = |slot: usize| offset(&view, brick::in_brick(slot as u32).as_dvec3());
+        let per_slab = whole_kernel(&view);
+        let flat = Lens { per_slab, per_lambda: 1.0 / view.lambda, to_eye: -view.basis.w, local: None };
+        Self {
+            view,
+            direction,
+            places: (0..BRICK_VOXELS as usize).map(offset).collect(),
+            depths: std::array::from_fn(|slot| offset(slot).depth),
+            flat: view.perspective.is_none().then_some(flat),
+        }
     }
 
     /// Where a brick's first place is.
@@ -121,7 +130,29 @@ impl Projection {
         self.numbered(place.depth - reach.min(place.from_eye - eye.near) / width, place.depth + reach / width)
     }
 
+    /// The first sheets of a brick's voxels by slot, those of empty slots too where that is faster; [`NO_SHEET`] for none.
+    #[inline(always)]
+    pub(super) fn first_sheets(&self, brick: &Brick, place: Place) -> [i32; BRICK_VOXELS as usize] {
+        let mut first = [NO_SHEET; BRICK_VOXELS as usize];
+        if self.flat.is_some() {
+            let reach = self.view.reach / self.view.slabs.width;
+            for (first, offset) in first.iter_mut().zip(&self.depths) {
+                let depth = place.depth + offset;
+                *first = self.numbered(depth - reach, depth + reach).start;
+            }
+            return first;
+        }
+        for (slot, voxel) in brick::voxels(brick) {
+            let sheets = self.sheets(self.of_voxel(place, slot), voxel);
+            if !sheets.is_empty() {
+                first[slot as usize] = sheets.start;
+            }
+        }
+        first
+    }
+
     /// Slabs between two depths by more than rounding errors ([`slab::ROUNDING`]), as sheets.
+    #[inline(always)]
     fn numbered(&self, first: f64, end: f64) -> Range<i32> {
         let (first, end) = (floor(first + slab::ROUNDING), -floor(-(end - slab::ROUNDING)));
         if self.direction > 0 { first..end } else { 1 - end..1 - first }
@@ -142,11 +173,12 @@ impl Projection {
 
     /// How a voxel's kernel is seen.
     pub(super) fn lens(&self, place: Place, voxel: UVec3) -> Lens {
+        if let Some(lens) = self.flat {
+            return lens;
+        }
         let view = &self.view;
-        // Slices hold whole kernels.
-        let whole = view.slabs.width * view.kernel_per_depth;
         let Some(Perspective { eye, eye_voxel, aspect, is_image_aligned, .. }) = &view.perspective else {
-            return Lens { per_slab: whole, per_lambda: 1.0 / view.lambda, to_eye: -view.basis.w, local: None };
+            unreachable!("without perspective there is a flat lens")
         };
         // In voxels and in `unit`s: the warped ray and the ray.
         let warped = voxel.as_dvec3() - eye_voxel;
@@ -167,12 +199,23 @@ impl Projection {
             cut: (eye.near - place.from_eye) * per_depth,
         };
         Lens {
-            per_slab: if *is_image_aligned { view.slabs.width * per_depth } else { whole },
+            per_slab: if *is_image_aligned { view.slabs.width * per_depth } else { whole_kernel(view) },
             per_lambda: distance / distance_warped,
             to_eye: -ray / distance,
             local: Some(local),
         }
     }
+}
+
+/// The place of an offset in voxels.
+fn offset(view: &ViewGeometry, voxels: DVec3) -> Place {
+    let [x, y, depth, from_eye] = view.screen_from_voxel.map(|row| row.truncate().dot(voxels));
+    Place { x, y, depth: depth / view.slabs.width, from_eye }
+}
+
+/// Grid units along a kernel's ray to a slab's width, where slices hold whole kernels.
+fn whole_kernel(view: &ViewGeometry) -> f64 {
+    view.slabs.width * view.kernel_per_depth
 }
 
 /// The unit vector along the larger axis of a quadratic form, at half the angle of (`difference`, `product`).
@@ -187,10 +230,14 @@ fn principal_axis(difference: f64, product: f64) -> DVec2 {
     if difference >= 0.0 { DVec2::new(larger, smaller) } else { DVec2::new(smaller, larger) }
 }
 
-/// The largest integer that is not above a number, without the system's `floor`.
+/// The largest integer that is not above a number below 2³¹, without the system's `floor` or a branch.
+#[inline(always)]
 pub(super) fn floor(x: f64) -> i32 {
-    let truncated = x as i32;
-    truncated.saturating_sub(i32::from(f64::from(truncated) > x))
+    // Adding 1.5·2⁵² rounds to a whole number, which is then in the low bits.
+    const MAGIC: f64 = 6_755_399_441_055_744.0;
+    let rounded = (x + MAGIC) - MAGIC;
+    let floored = rounded - f64::from(u8::from(rounded > x));
+    (floored + MAGIC).to_bits() as i32
 }
 
 #[cfg(test)]

@@ -2,13 +2,12 @@
 
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
-use glam::{DVec3, UVec3};
+use glam::DVec3;
 
+use super::material::Material;
 use super::vector::{LANES, optical_depth, power};
-use crate::settings::shading::{Light, MIN_GRADIENT, Shading};
+use crate::settings::shading::{Light, Shading};
 use crate::settings::splatting::Compositing;
-use crate::settings::transfer_function::TransferFunction;
-use crate::volume::Volume;
 
 /// Up to eight voxels to be shaded, by lane.
 #[derive(Clone, Debug, Default)]
@@ -23,28 +22,21 @@ pub(super) struct Unshaded {
 }
 
 impl Unshaded {
-    /// Puts a voxel into a lane: its colour, opacity and normal.
-    pub(super) fn set(
-        &mut self,
-        lane: usize,
-        volume: &Volume,
-        transfer: &TransferFunction,
-        voxel: UVec3,
-        to_eye: DVec3,
-        scale: f64,
-    ) {
-        let index = volume.grid().index_of(voxel);
-        let value = f64::from(volume.values()[index as usize]);
-        let tables = transfer.tables(volume.label(index));
-        let gradient = volume.gradient(voxel);
-        let magnitude = gradient.length();
-        let normal = if magnitude < MIN_GRADIENT { DVec3::ZERO } else { gradient / -magnitude };
-        self.alpha[lane] = tables.alpha(value, magnitude) as f32;
-        self.scale[lane] = scale as f32;
-        let color = tables.color.at(value);
+    /// Puts a voxel's material into a lane.
+    #[inline(always)]
+    pub(super) fn set_material(&mut self, lane: usize, material: &Material) {
+        self.alpha[lane] = material.alpha;
         for axis in 0..3 {
-            self.color[axis][lane] = color[axis] as f32;
-            self.normal[axis][lane] = normal[axis] as f32;
+            self.color[axis][lane] = material.color[axis];
+            self.normal[axis][lane] = material.normal[axis];
+        }
+    }
+
+    /// Puts into a lane what depends on the view.
+    #[inline(always)]
+    pub(super) fn set_view(&mut self, lane: usize, to_eye: DVec3, scale: f64) {
+        self.scale[lane] = scale as f32;
+        for axis in 0..3 {
             self.to_eye[axis][lane] = to_eye[axis] as f32;
         }
     }

@@ -6,11 +6,11 @@ use fearless_simd::prelude::*;
 
 use super::cull::{OpenMask, Pixels, columns_between};
 use super::kernel::KernelTables;
-use super::sheets::{Buffers, CHANNELS, COLUMNS, RING, ROWS, SECTIONS, SheetRow, slot_of};
+use super::sheets::{Buffers, CHANNELS, COLUMNS, RING, SECTIONS, SheetRow, slot_of};
 use super::vector::{LANES, iota};
 
 /// A voxel in the coordinates of a tile.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Splat {
     /// Its pixel coordinates; the centre of the tile's first pixel is at 0, 0.
     pub(super) center: [f32; 2],
@@ -22,7 +22,7 @@ pub(super) struct Splat {
     pub(super) first_plane: f32,
     /// The distance from plane to plane.
     pub(super) step: f32,
-    /// The voxel: the number of its brick and its slot there.
+    /// The voxel: the index of its brick among those that have arrived, and its slot there.
     pub(super) voxel: [u32; 2],
     /// Sheets that have been drawn, in units of [`SECTIONS`].
     pub(super) drawn: u32,
@@ -47,8 +47,6 @@ pub(super) struct Splatter {
     pub(super) radius: f32,
     /// Orthographic: ρ² of a pixel offset (dx, dy) is `x·dx² + y·dx·dy + z·dy²`.
     pub(super) metric: [f32; 3],
-    /// Orthographic: the minimum ρ² of a row is this times dy².
-    pub(super) row_metric: f32,
     /// Orthographic: half the box around footprints, pixels.
     pub(super) half_box: [f32; 2],
     /// In perspective the size of a pixel at depth 1, `unit`s.
@@ -62,12 +60,12 @@ pub(super) struct Sections {
     count: usize,
     /// `H(0, 0, t)` of eq. 3 at the planes between them.
     planes: [f32; LANES],
-    /// The ρ² from which a section is 0.
-    extent: [f32; LANES],
     /// In perspective ρ² of a pixel along the footprint's axis and across it, and the low-pass rule's amplitude, by section.
     along: [f32; LANES],
     across: [f32; LANES],
     amplitude: [f32; LANES],
+    /// In perspective how far from the voxel's row each reaches, pixels.
+    reach: [f32; LANES],
     /// The pixels that any of them reaches; `None` for no pixel of the tile.
     pub(super) pixels: Option<Pixels>,
 }
@@ -81,10 +79,10 @@ impl Splatter {
         let mut sections = Sections {
             count,
             planes: [0.0; LANES],
-            extent: [0.0; LANES],
             along: [0.0; LANES],
             across: [0.0; LANES],
             amplitude: [0.0; LANES],
+            reach: [0.0; LANES],
             pixels: None,
         };
         let mut half_box = self.half_box;
@@ -115,9 +113,9 @@ impl Splatter {
             half_box = [largest(width), largest(height)];
             (sections.along, sections.across) = (along.to_array(), across.to_array());
             sections.amplitude = amplitude.to_array();
+            sections.reach = (height * self.kernel.reach(simd, t, t.slide::<1>(t))).to_array();
         }
         sections.planes = self.kernel.along(simd, t).to_array();
-        sections.extent = self.kernel.extent(simd, t, t.slide::<1>(t)).to_array();
         sections.pixels = Pixels::within(splat.center, half_box);
         sections
     }
@@ -132,89 +130,123 @@ impl Splatter {
         open: &OpenMask,
         buffers: &mut Buffers,
     ) {
-        let Some(Pixels { columns: [left, right], rows: [first, last] }) = sections.pixels else { return };
+        let Some(Pixels { columns: [left, right], rows }) = sections.pixels else { return };
         let slot = slot_of(splat.sheets[0]);
-        let mut written = 0_u64;
-        for row in first..=last.min(ROWS - 1) {
-            let open = open.row(row);
-            let target = &mut buffers.sheets[row];
-            let mut column = left;
-            while column <= right {
-                let end = (column + LANES - 1).min(COLUMNS - 1);
-                if open & columns_between(column, end) != 0 {
-                    written |= 1 << row;
-                    match self.pixel_per_depth {
-                        None => self.draw_pixels(simd, splat, sections, [column, row], slot, target),
-                        Some(_) => self.draw_local_pixels(simd, splat, sections, [column, row], slot, target),
-                    }
-                }
-                column += LANES;
-            }
+        let mut written = 0;
+        for column in (left..=right).step_by(LANES) {
+            let block = Block { splat, sections, column, rows, slot, open };
+            written |= match self.pixel_per_depth {
+                // A loop of a fixed length is unrolled.
+                None => match sections.count {
+                    1 => self.draw_block::<S, 1>(simd, &block, &mut buffers.sheets),
+                    2 => self.draw_block::<S, 2>(simd, &block, &mut buffers.sheets),
+                    3 => self.draw_block::<S, 3>(simd, &block, &mut buffers.sheets),
+                    4 => self.draw_block::<S, 4>(simd, &block, &mut buffers.sheets),
+                    5 => self.draw_block::<S, 5>(simd, &block, &mut buffers.sheets),
+                    6 => self.draw_block::<S, 6>(simd, &block, &mut buffers.sheets),
+                    _ => self.draw_block::<S, SECTIONS>(simd, &block, &mut buffers.sheets),
+                },
+                Some(_) => self.draw_local_block(simd, &block, &mut buffers.sheets),
+            };
         }
         for section in 0..sections.count {
             buffers.written[(slot + section) % RING] |= written;
         }
     }
 
-    /// Eight pixels without perspective: all sections have one footprint.
+    /// Eight columns of N sections without perspective, which all have one footprint. Returns the bits of the rows.
     #[inline(always)]
-    fn draw_pixels<S: Simd>(
-        &self,
-        simd: S,
-        splat: &Splat,
-        sections: &Sections,
-        [column, row]: [usize; 2],
-        slot: usize,
-        target: &mut SheetRow,
-    ) {
-        let dy = row as f32 - splat.center[1];
+    fn draw_block<S: Simd, const N: usize>(&self, simd: S, block: &Block<'_>, sheets: &mut [SheetRow]) -> u64 {
+        let Block { splat, sections, column, rows: [first, last], slot, .. } = *block;
         let dx = iota(simd) + (column as f32 - splat.center[0]);
         let [xx, xy, yy] = self.metric;
-        let rho_squared = dx * (dx * xx + xy * dy) + yy * dy * dy;
-        let rim = self.kernel.rim(simd, rho_squared);
-        let in_plane = self.kernel.in_plane(simd, rho_squared);
-        // Sections that this row does not reach are skipped. Extents grow towards the kernel's centre, so these are the first and the last ones.
-        let nearest = self.row_metric * dy * dy;
-        let (mut first, mut end) = (0, sections.count);
-        while first < end && sections.extent[first % LANES] <= nearest {
-            first += 1;
+        let mut written = 0;
+        for begin in (first..=last).step_by(BLOCK_ROWS) {
+            // All rows of a block first, also those beyond the last one: independent sums without a branch, two rows to a vector.
+            let zero = f32x8::splat(simd, 0.0);
+            let (mut rims, mut in_planes) = ([zero; BLOCK_ROWS], [zero; BLOCK_ROWS]);
+            for pair in (0..BLOCK_ROWS).step_by(2) {
+                let rho_squared = |row: usize| {
+                    let dy = (begin + row) as f32 - splat.center[1];
+                    dx * (dx * xx + xy * dy) + yy * dy * dy
+                };
+                let [first, second] = [rho_squared(pair), rho_squared(pair + 1)];
+                (rims[pair], rims[pair + 1]) = self.kernel.rim(simd, first.combine(second)).split();
+                in_planes[pair] = self.kernel.in_plane(simd, first);
+                in_planes[pair + 1] = self.kernel.in_plane(simd, second);
+            }
+            for row in begin..=last.min(begin + BLOCK_ROWS - 1) {
+                if block.is_closed(row) {
+                    continue;
+                }
+                written |= 1 << row;
+                let at = (row - begin) % BLOCK_ROWS;
+                let (rim, in_plane) = (rims[at], in_planes[at]);
+                let target = &mut sheets[row];
+                let mut near = cut_by_rim(simd, sections.planes[0], rim);
+                for section in 0..N {
+                    let far = cut_by_rim(simd, sections.planes[section + 1], rim);
+                    add((far - near) * in_plane, splat.amount, column, &mut target[(slot + section) % RING]);
+                    near = far;
+                }
+            }
         }
-        while first < end && sections.extent[(end - 1) % LANES] <= nearest {
-            end -= 1;
-        }
-        let mut near = cut_by_rim(simd, sections.planes[first % LANES], rim);
-        for section in first..end {
-            let far = cut_by_rim(simd, sections.planes[(section + 1) % LANES], rim);
-            add((far - near) * in_plane, splat.amount, column, &mut target[(slot + section) % RING]);
-            near = far;
-        }
+        written
     }
 
-    /// Eight pixels in perspective: every section has its own footprint, of the size that pixels have at its middle.
+    /// Eight columns in perspective: every section has its own footprint, of the size that pixels have at its middle. Returns the bits of
+    /// the rows.
     #[inline(always)]
-    fn draw_local_pixels<S: Simd>(
-        &self,
-        simd: S,
-        splat: &Splat,
-        sections: &Sections,
-        [column, row]: [usize; 2],
-        slot: usize,
-        target: &mut SheetRow,
-    ) {
-        let dy = row as f32 - splat.center[1];
+    fn draw_local_block<S: Simd>(&self, simd: S, block: &Block<'_>, sheets: &mut [SheetRow]) -> u64 {
+        let Block { splat, sections, column, rows: [first, last], slot, .. } = *block;
         let dx = iota(simd) + (column as f32 - splat.center[0]);
         let [x, y] = splat.local.axis;
-        let along = dx * x + dy * y;
-        let across = dx * -y + dy * x;
-        let (along, across) = (along * along, across * across);
-        for section in 0..sections.count {
-            let rho_squared = along * sections.along[section] + across * sections.across[section];
-            let rim = self.kernel.rim(simd, rho_squared);
-            let in_plane = self.kernel.in_plane(simd, rho_squared) * sections.amplitude[section];
-            let near = cut_by_rim(simd, sections.planes[section], rim);
-            let far = cut_by_rim(simd, sections.planes[(section + 1) % LANES], rim);
-            add((far - near) * in_plane, splat.amount, column, &mut target[(slot + section) % RING]);
+        let mut written = 0;
+        for row in first..=last {
+            if block.is_closed(row) {
+                continue;
+            }
+            written |= 1 << row;
+            let dy = row as f32 - splat.center[1];
+            let along = dx * x + dy * y;
+            let across = dx * -y + dy * x;
+            let (along, across) = (along * along, across * across);
+            for section in 0..sections.count {
+                if dy.abs() > sections.reach[section] {
+                    continue;
+                }
+                let rho_squared = along * sections.along[section] + across * sections.across[section];
+                let rim = self.kernel.rim(simd, rho_squared);
+                let in_plane = self.kernel.in_plane(simd, rho_squared) * sections.amplitude[section];
+                let near = cut_by_rim(simd, sections.planes[section], rim);
+                let far = cut_by_rim(simd, sections.planes[(section + 1) % LANES], rim);
+                add((far - near) * in_plane, splat.amount, column, &mut sheets[row][(slot + section) % RING]);
+            }
         }
+        written
+    }
+}
+
+/// The rows whose weights are computed together.
+const BLOCK_ROWS: usize = 8;
+
+/// Sections to be drawn into eight columns of pixels.
+struct Block<'a> {
+    splat: &'a Splat,
+    sections: &'a Sections,
+    column: usize,
+    /// The first and the last row.
+    rows: [usize; 2],
+    /// That of the first section.
+    slot: usize,
+    open: &'a OpenMask,
+}
+
+impl Block<'_> {
+    /// Whether all its pixels in a row are opaque.
+    #[inline(always)]
+    fn is_closed(&self, row: usize) -> bool {
+        self.open.row(row) & columns_between(self.column, (self.column + LANES - 1).min(COLUMNS - 1)) == 0
     }
 }
 

@@ -6,30 +6,40 @@ use std::collections::VecDeque;
 use std::iter::Peekable;
 use std::ops::Range;
 
-use fearless_simd::Simd;
-use glam::DVec2;
+use fearless_simd::i32x8;
+use fearless_simd::prelude::*;
+use glam::{DVec2, UVec3};
 
 use super::bin::Placed;
-use super::count::Tally;
+use super::count::{Tally, bits};
 use super::cull::{OpenMask, Pixels};
 use super::cut::TileRays;
 use super::frame::Frame;
-use super::project::{Place, Projection};
+use super::material::Material;
+use super::project::{NO_SHEET, Place, Projection};
 use super::shade::Unshaded;
 use super::sheets::{Buffers, COLUMNS, RING, ROWS, SECTIONS, slot_of};
 use super::splat::{LocalFootprint, Splat};
 use super::vector::LANES;
 use crate::lists::brick;
+use crate::lists::brick::BRICK_VOXELS;
 
 /// A brick that has arrived.
+#[derive(Clone, Copy)]
 struct Arrived {
     brick: u32,
     place: Place,
     half_box: [f32; 2],
 }
 
-/// A voxel that waits for its first sheet: the index of its brick among those that have arrived, and its slot there.
-type Waiting = (u32, u8);
+/// Voxels of a brick that wait for their first sheet.
+#[derive(Clone, Copy)]
+struct Waiting {
+    /// The index of their brick among those that have arrived.
+    brick: u32,
+    /// The bits of their slots.
+    voxels: u64,
+}
 
 /// The state with which a thread draws one tile after another.
 pub(super) struct TileWalk<'a> {
@@ -40,6 +50,8 @@ pub(super) struct TileWalk<'a> {
     rays: TileRays,
     buffers: Buffers,
     arrived: Vec<Arrived>,
+    /// What has been drawn of them, as [`Drawn`](super::count::Drawn) records it.
+    marks: Vec<u64>,
     /// The waiting voxels by sheet, from the current one.
     waiting: VecDeque<Vec<Waiting>>,
     /// Voxels with more sections than are drawn at a time, by the slot of their next sheet.
@@ -59,6 +71,7 @@ impl<'a> TileWalk<'a> {
             rays: TileRays::default(),
             buffers: Buffers::new(),
             arrived: Vec::new(),
+            marks: Vec::new(),
             waiting: VecDeque::new(),
             continued: std::array::from_fn(|_| Vec::new()),
             spare: Vec::new(),
@@ -82,6 +95,7 @@ impl<'a> TileWalk<'a> {
         if let Some(first) = first {
             self.walk(simd, first, &mut bricks);
         }
+        self.count();
         (&self.buffers, &self.rays, self.tally)
     }
 
@@ -97,6 +111,7 @@ impl<'a> TileWalk<'a> {
         }
         self.buffers.clear();
         self.arrived.clear();
+        self.marks.clear();
         self.spare.extend(self.waiting.drain(..));
         self.continued.iter_mut().for_each(Vec::clear);
         self.pending = 0;
@@ -110,7 +125,7 @@ impl<'a> TileWalk<'a> {
         let mut sheet = if start < end { first.min(start) } else { first };
         loop {
             while let Some(placed) = bricks.next_if(|placed| placed.first <= sheet) {
-                self.tally.bricks_visited += u64::from(self.arrive(placed, sheet));
+                self.tally.bricks_visited += u64::from(self.arrive(simd, placed, sheet));
             }
             self.start(simd, sheet);
             if !self.frame.is_each {
@@ -143,8 +158,21 @@ impl<'a> TileWalk<'a> {
         );
     }
 
+    /// Adds what was drawn to the counts.
+    fn count(&mut self) {
+        let Self { frame, arrived, marks, tally, .. } = self;
+        for (brick, marks) in arrived.iter().zip(marks.chunks(frame.drawn.masks)) {
+            let origin = brick::origin(&frame.bricks[brick.brick as usize]);
+            let sheets = |slot| {
+                let place = frame.projection.of_voxel(brick.place, slot);
+                frame.projection.sheets(place, origin + brick::in_brick(slot)).len() as u64
+            };
+            frame.drawn.add(brick.brick, marks, sheets, tally);
+        }
+    }
+
     /// Lets a brick's voxels wait for their first sheets, unless the brick is hidden; whether it is not.
-    fn arrive(&mut self, placed: &Placed, sheet: i32) -> bool {
+    fn arrive<S: Simd>(&mut self, simd: S, placed: &Placed, sheet: i32) -> bool {
         let projection = &self.frame.projection;
         let brick = &self.frame.bricks[placed.brick as usize];
         if !self.sees_brick(placed) {
@@ -153,18 +181,28 @@ impl<'a> TileWalk<'a> {
         let place = projection.of_brick(brick);
         let number = self.arrived.len() as u32;
         self.arrived.push(Arrived { brick: placed.brick, place, half_box: placed.half_box });
-        for (slot, voxel) in brick::voxels(brick) {
-            let sheets = projection.sheets(projection.of_voxel(place, slot), voxel);
-            if sheets.is_empty() {
-                continue;
-            }
-            let ahead = (sheets.start - sheet).max(0) as usize;
-            while self.waiting.len() <= ahead {
-                self.waiting.push_back(self.spare.pop().map_or_else(Vec::new, cleared));
-            }
-            self.waiting[ahead].push((number, slot as u8));
-            self.pending += 1;
-        }
+        self.marks.resize(self.arrived.len() * self.frame.drawn.masks, 0);
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let first_sheets = projection.first_sheets(brick, place);
+                let mut left = brick::present(brick);
+                while left != 0 {
+                    let first = first_sheets[left.trailing_zeros() as usize % first_sheets.len()];
+                    let voxels = left & equal(simd, &first_sheets, first);
+                    left &= !voxels;
+                    if first == NO_SHEET {
+                        continue;
+                    }
+                    let ahead = (first - sheet).max(0) as usize;
+                    while self.waiting.len() <= ahead {
+                        self.waiting.push_back(self.spare.pop().map_or_else(Vec::new, cleared));
+                    }
+                    self.waiting[ahead].push(Waiting { brick: number, voxels });
+                    self.pending += 1;
+                }
+            },
+        );
         true
     }
 
@@ -190,56 +228,86 @@ impl<'a> TileWalk<'a> {
         let Some(mut starting) = self.waiting.pop_front() else { return };
         self.pending -= starting.len();
         if self.frame.is_each {
-            self.sort_by_depth(&mut starting);
+            starting = self.sorted_by_depth(&starting);
         }
-        let mut batch = Batch::default();
-        for &(number, slot) in &starting {
-            let arrived = &self.arrived[number as usize];
-            let place = self.frame.projection.of_voxel(arrived.place, slot.into());
-            let pixel = self.frame.projection.pixel(place);
-            let center =
-                [pixel.x - self.origin[0] as f64 - 0.5, pixel.y - self.origin[1] as f64 - 0.5].map(|at| at as f32);
-            // In perspective this bounds the boxes of all its sections.
-            if !Pixels::within(center, arrived.half_box).is_some_and(|pixels| self.open.sees(&pixels)) {
-                continue;
-            }
-            self.frame.drawn.shade([arrived.brick, slot.into()], &mut self.tally);
-            batch.add(self.frame, [arrived.brick, slot.into()], place, center, sheet);
-            if batch.count == LANES {
-                self.draw_batch(simd, &mut batch);
-            }
+        let mut batch = Batch::new();
+        for waiting in &starting {
+            self.start_voxels(simd, waiting, sheet, &mut batch);
         }
         self.draw_batch(simd, &mut batch);
         self.spare.push(starting);
     }
 
-    /// Sorts voxels that are composited one by one: by depth, equal ones by their position in memory.
-    fn sort_by_depth(&self, voxels: &mut [Waiting]) {
+    /// Draws those of a brick's voxels that are seen, in batches.
+    #[inline(always)]
+    fn start_voxels<S: Simd>(&mut self, simd: S, waiting: &Waiting, sheet: i32, batch: &mut Batch<'a>) {
+        let frame = self.frame;
+        let Arrived { brick: number, place: brick_place, half_box } = self.arrived[waiting.brick as usize];
+        let brick = &frame.bricks[number as usize];
+        let corner = DVec2::new(self.origin[0] as f64, self.origin[1] as f64) + 0.5;
+        let mut materials = None;
+        let mut seen = 0;
+        for slot in bits(waiting.voxels) {
+            let place = frame.projection.of_voxel(brick_place, slot);
+            let center = (frame.projection.pixel(place) - corner).to_array().map(|at| at as f32);
+            // In perspective this bounds the boxes of all its sections.
+            if !Pixels::within(center, half_box).is_some_and(|pixels| self.open.sees(&pixels)) {
+                continue;
+            }
+            seen |= 1 << slot;
+            let materials =
+                *materials.get_or_insert_with(|| frame.materials.of_brick(number, frame.volume, frame.transfer, brick));
+            let voxel = brick::origin(brick) + brick::in_brick(slot);
+            batch.materials[batch.count] = materials.map(|materials| &materials[slot as usize]).ok_or(voxel);
+            batch.add(frame, ([waiting.brick, slot], voxel), place, (center, sheet));
+            if batch.count == LANES {
+                self.draw_batch(simd, batch);
+            }
+        }
+        self.marks[waiting.brick as usize * frame.drawn.masks] |= seen;
+    }
+
+    /// Voxels that are composited one by one, sorted by depth, equal ones by their position in memory.
+    fn sorted_by_depth(&self, waiting: &[Waiting]) -> Vec<Waiting> {
         let Frame { projection, volume, bricks, .. } = self.frame;
         let grid = volume.grid();
-        voxels.sort_by_cached_key(|&(number, slot)| {
-            let brick = &bricks[self.arrived[number as usize].brick as usize];
-            let voxel = brick::origin(brick) + brick::in_brick(slot.into());
+        let singles = |waiting: &Waiting| {
+            let brick = waiting.brick;
+            bits(waiting.voxels).map(move |slot| Waiting { brick, voxels: 1 << slot })
+        };
+        let mut voxels: Vec<Waiting> = waiting.iter().flat_map(singles).collect();
+        voxels.sort_by_cached_key(|waiting| {
+            let brick = &bricks[self.arrived[waiting.brick as usize].brick as usize];
+            let voxel = brick::origin(brick) + brick::in_brick(waiting.voxels.trailing_zeros());
             (projection.depth_key(grid, voxel), grid.index_of(voxel))
         });
         if projection.direction < 0 {
             voxels.reverse();
         }
+        voxels
     }
 
-    fn draw_batch<S: Simd>(&mut self, simd: S, batch: &mut Batch) {
+    fn draw_batch<S: Simd>(&mut self, simd: S, batch: &mut Batch<'_>) {
         // One function for every instruction set, instead of a copy at every call.
         simd.vectorize(
             #[inline(always)]
             || {
+                let count = std::mem::take(&mut batch.count);
+                // All at once, so that the memory is waited for once.
+                for lane in 0..count {
+                    match batch.materials[lane] {
+                        Ok(material) => batch.unshaded.set_material(lane, material),
+                        Err(voxel) => {
+                            let Frame { volume, transfer, .. } = self.frame;
+                            batch.unshaded.set_material(lane, &Material::of(volume, transfer, voxel));
+                        }
+                    }
+                }
                 let amounts = self.frame.shader.shade(simd, &batch.unshaded);
-                for lane in 0..std::mem::take(&mut batch.count) {
-                    if let Some(splat) = &mut batch.splats[lane] {
-                        splat.amount = amounts.map(|lanes| lanes[lane]);
-                    }
-                    if let Some(splat) = batch.splats[lane] {
-                        self.draw_splat(simd, &splat);
-                    }
+                for (lane, splat) in batch.splats[..count].iter_mut().enumerate() {
+                    let [red, green, blue, amount] = &amounts;
+                    splat.amount = [red[lane], green[lane], blue[lane], amount[lane]];
+                    self.draw_splat(simd, splat);
                 }
             },
         );
@@ -257,7 +325,10 @@ impl<'a> TileWalk<'a> {
                 let next = end.min(first + SECTIONS as i32);
                 if sections.pixels.is_some_and(|pixels| self.open.sees(&pixels)) {
                     splatter.draw(simd, splat, &sections, &self.open, &mut self.buffers);
-                    self.frame.drawn.splat(splat.voxel, splat.drawn, (next - first) as u64, &mut self.tally);
+                    let [brick, slot] = splat.voxel;
+                    let masks = self.frame.drawn.masks;
+                    let part = (1 + splat.drawn as usize).min(masks - 1);
+                    self.marks[brick as usize * masks + part] |= 1 << slot;
                     if self.frame.is_each {
                         self.composite(simd, first);
                     }
@@ -276,30 +347,53 @@ impl<'a> TileWalk<'a> {
     }
 }
 
+/// The bits of the numbers that equal one.
+#[inline(always)]
+fn equal<S: Simd>(simd: S, numbers: &[i32; BRICK_VOXELS as usize], to: i32) -> u64 {
+    let to = i32x8::splat(simd, to);
+    let mut bits = 0;
+    for at in (0..numbers.len()).step_by(LANES) {
+        bits |= i32x8::from_slice(simd, &numbers[at..at + LANES]).simd_eq(to).to_bitmask() << at;
+    }
+    bits
+}
+
 fn cleared(mut list: Vec<Waiting>) -> Vec<Waiting> {
     list.clear();
     list
 }
 
 /// Up to eight voxels that are shaded together.
-#[derive(Default)]
-struct Batch {
+struct Batch<'a> {
     count: usize,
+    /// Their materials, or the voxels whose materials are not kept.
+    materials: [Result<&'a Material, UVec3>; LANES],
     unshaded: Unshaded,
-    splats: [Option<Splat>; LANES],
+    splats: [Splat; LANES],
 }
 
-impl Batch {
-    fn add(&mut self, frame: &Frame, [brick, slot]: [u32; 2], place: Place, center: [f32; 2], sheet: i32) {
+impl Batch<'_> {
+    fn new() -> Self {
+        let nothing = Err(UVec3::ZERO);
+        Self { count: 0, materials: [nothing; LANES], unshaded: Unshaded::default(), splats: Default::default() }
+    }
+
+    #[inline(always)]
+    fn add(
+        &mut self,
+        frame: &Frame,
+        (number, voxel): ([u32; 2], UVec3),
+        place: Place,
+        (center, sheet): ([f32; 2], i32),
+    ) {
         let projection = &frame.projection;
-        let voxel = brick::origin(&frame.bricks[brick as usize]) + brick::in_brick(slot);
         let lens = projection.lens(place, voxel);
         let sheets = projection.sheets(place, voxel);
         // Back to front, planes come in the opposite order, so that sections and their factors are both negative.
         let direction = f64::from(projection.direction);
         let plane = direction * f64::from(sheet) + if projection.direction > 0 { 0.0 } else { 1.0 };
         let scale = direction * lens.per_lambda * frame.amplitude;
-        self.unshaded.set(self.count, frame.volume, frame.transfer, voxel, lens.to_eye, scale);
+        self.unshaded.set_view(self.count, lens.to_eye, scale);
         let local = lens.local.map(|local| LocalFootprint {
             axis: local.axis.to_array().map(|component| component as f32),
             metric: local.metric.to_array().map(|component| component as f32),
@@ -307,16 +401,16 @@ impl Batch {
             from_eye: place.from_eye as f32,
             cut: local.cut as f32,
         });
-        self.splats[self.count] = Some(Splat {
+        self.splats[self.count] = Splat {
             center,
             amount: [0.0; 4],
             sheets: [sheet, sheets.end],
             first_plane: ((plane - place.depth) * lens.per_slab) as f32,
             step: (direction * lens.per_slab) as f32,
-            voxel: [brick, slot],
+            voxel: number,
             drawn: 0,
             local: local.unwrap_or_default(),
-        });
+        };
         self.count += 1;
     }
 }

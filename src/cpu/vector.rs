@@ -97,7 +97,7 @@ pub(super) fn power<S: Simd>(simd: S, x: f32x8<S>, y: f32) -> f32x8<S> {
 
 /// A polynomial of 16 coefficients, the constant one first.
 #[inline(always)]
-pub(super) fn polynomial<S: Simd>(c: &[f32; 16], z: f32x8<S>) -> f32x8<S> {
+pub(super) fn polynomial<S: Simd, V: SimdFloat<S, Element = f32>>(c: &[f32; 16], z: V) -> V {
     let squared = z * z;
     let fourth = squared * squared;
     let cubic = |at: usize| (z * c[at + 1] + c[at]) + squared * (z * c[at + 3] + c[at + 2]);

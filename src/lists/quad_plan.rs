@@ -169,7 +169,8 @@ impl Overlaps {
 
 /// Sheet depths in slabs, without perspective: a voxel's is the sum of its brick's and its slot's. Every new view counts all voxels, so
 /// these sums replace [`ViewGeometry::touched`].
-struct PlaceDepths {
+#[derive(Clone, Debug)]
+pub struct PlaceDepths {
     /// The row for a voxel and 1.
     depth: DVec4,
     /// The depths of slots relative to the brick's first.
@@ -179,7 +180,8 @@ struct PlaceDepths {
 }
 
 impl PlaceDepths {
-    fn new(view: &ViewGeometry) -> Self {
+    /// Those of a view.
+    pub fn new(view: &ViewGeometry) -> Self {
         let mut depth = view.screen_from_voxel[2];
         depth.w -= view.slabs.origin;
         depth /= view.slabs.width;
@@ -187,24 +189,32 @@ impl PlaceDepths {
         Self { depth, places, reach: view.reach / view.slabs.width - slab::ROUNDING }
     }
 
-    fn overlaps(&self, brick: &Brick) -> Overlaps {
-        let first = self.depth.dot(brick::origin(brick).as_dvec3().extend(1.0));
+    /// Counts the overlaps of the voxels in a brick.
+    #[inline(always)]
+    pub fn overlaps(&self, brick: &Brick) -> Overlaps {
+        let origin = self.depth.dot(brick::origin(brick).as_dvec3().extend(1.0));
+        let present = brick::present(brick);
         let (mut sections, mut nearest, mut farthest) = (0, i32::MAX, i32::MIN);
-        let mut left = brick::present(brick);
-        let voxels = left.count_ones().into();
-        while left != 0 {
-            let depth = first + self.places[left.trailing_zeros() as usize];
-            left &= left - 1;
+        // All places, without a branch, so that the loop is vectorized.
+        for (place, depth) in self.places.iter().enumerate() {
+            let depth = origin + depth;
             let (first, end) = (floor(depth - self.reach), -floor(-depth - self.reach));
-            sections += (end - first) as u64;
-            (nearest, farthest) = (nearest.min(first), farthest.max(end));
+            let is_present = present >> place & 1 == 1;
+            sections += if is_present { end - first } else { 0 };
+            nearest = nearest.min(if is_present { first } else { i32::MAX });
+            farthest = farthest.max(if is_present { end } else { i32::MIN });
         }
+        let (voxels, sections) = (present.count_ones().into(), sections as u64);
         Overlaps { voxels, sections, slabs: nearest..farthest }
     }
 }
 
-/// The largest integer up to a slab's number. The range of these numbers makes the system's `floor` unnecessary.
+/// The largest integer up to a slab's number, without the system's `floor` or a branch.
+#[inline(always)]
 fn floor(slab: f64) -> i32 {
-    const ABOVE_0: i32 = 2 * slab::MAX_SLABS as i32;
-    (slab + f64::from(ABOVE_0)) as i32 - ABOVE_0
+    // Adding 1.5·2⁵² rounds to a whole number, which is then in the low bits.
+    const MAGIC: f64 = 6_755_399_441_055_744.0;
+    let rounded = (slab + MAGIC) - MAGIC;
+    let floored = if rounded > slab { rounded - 1.0 } else { rounded };
+    (floored + MAGIC).to_bits() as i32
 }

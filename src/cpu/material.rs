@@ -1,0 +1,88 @@
+//! What voxels look like in any view and any light: colour, opacity and normal. Bricks keep them from the first frame that shows them on.
+
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicIsize, Ordering};
+
+use glam::{DVec3, UVec3};
+
+use crate::lists::brick;
+use crate::lists::brick::{BRICK_VOXELS, Brick};
+use crate::settings::shading::MIN_GRADIENT;
+use crate::settings::transfer_function::TransferFunction;
+use crate::volume::Volume;
+
+/// The most bricks whose materials are kept; a brick's take 2 KiB. Others are computed again wherever a voxel is visible.
+const MOST_KEPT: isize = 1 << 15;
+
+/// A voxel's material.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Material {
+    pub(super) color: [f32; 3],
+    /// α, the opacity per unit length.
+    pub(super) alpha: f32,
+    /// 0 where there is none.
+    pub(super) normal: [f32; 3],
+}
+
+/// The materials of a brick, by slot.
+type BrickMaterials = Box<[Material; BRICK_VOXELS as usize]>;
+
+/// The materials of all bricks that any view has shown.
+#[derive(Debug)]
+pub(super) struct Materials {
+    bricks: Vec<OnceLock<BrickMaterials>>,
+    /// How many bricks may still be kept.
+    room: AtomicIsize,
+}
+
+impl Materials {
+    /// Of so many bricks, none of which has been seen yet.
+    pub(super) fn new(bricks: usize) -> Self {
+        Self { bricks: (0..bricks).map(|_| OnceLock::new()).collect(), room: AtomicIsize::new(MOST_KEPT) }
+    }
+
+    /// The materials of a brick, given by its number; `None` if they are not kept.
+    pub(super) fn of_brick(
+        &self,
+        number: u32,
+        volume: &Volume,
+        transfer: &TransferFunction,
+        brick: &Brick,
+    ) -> Option<&[Material; BRICK_VOXELS as usize]> {
+        let kept = &self.bricks[number as usize];
+        if kept.get().is_none() && self.room.load(Ordering::Relaxed) <= 0 {
+            return None;
+        }
+        Some(kept.get_or_init(|| {
+            self.room.fetch_sub(1, Ordering::Relaxed);
+            let mut materials = Box::new([Material::default(); BRICK_VOXELS as usize]);
+            brick::voxels(brick)
+                .for_each(|(slot, voxel)| materials[slot as usize] = Material::of(volume, transfer, voxel));
+            materials
+        }))
+    }
+}
+
+/// A copy keeps nothing yet.
+impl Clone for Materials {
+    fn clone(&self) -> Self {
+        Self::new(self.bricks.len())
+    }
+}
+
+impl Material {
+    /// That of a voxel.
+    pub(super) fn of(volume: &Volume, transfer: &TransferFunction, voxel: UVec3) -> Self {
+        let index = volume.grid().index_of(voxel);
+        let value = f64::from(volume.values()[index as usize]);
+        let tables = transfer.tables(volume.label(index));
+        let gradient = volume.gradient(voxel);
+        let magnitude = gradient.length();
+        let normal = if magnitude < MIN_GRADIENT { DVec3::ZERO } else { gradient / -magnitude };
+        Self {
+            color: tables.color.at(value).as_vec3().to_array(),
+            alpha: tables.alpha(value, magnitude) as f32,
+            normal: normal.as_vec3().to_array(),
+        }
+    }
+}
