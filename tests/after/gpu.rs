@@ -67,7 +67,7 @@ fn for_all(mut scene: Scene, compositing: Compositing) -> Scene {
             scene.clip.crop = Some([DVec3::new(-11.0, -10.6, -16.4), DVec3::new(10.3, 11.2, 15.1)]);
             &[(10.0, 0.0), (60.0, 0.7), (90.0, 0.2)]
         }
-        Compositing::Surface => &[(30.0, 0.0), (70.0, 0.4), (71.0, 0.1), (150.0, 0.2), (180.0, 0.8)],
+        Compositing::Surface => &[(30.0, 0.0), (70.0, 0.7), (71.0, 0.1), (150.0, 0.2), (180.0, 0.8)],
         _ => return scene,
     };
     scene.transfer.opacity = Some(Ramp::new(opacity.to_vec()).unwrap());
