@@ -50,19 +50,19 @@ impl Drawn {
 
     /// Adds what a tile has marked of a brick. `sheets` tells how many a voxel has, given its slot.
     pub(super) fn add(&self, brick: u32, marks: &[u64], sheets: impl Fn(u32) -> u64, tally: &mut Tally) {
-        let all = &self.marks[brick as usize * self.masks..];
-        let new = |mask: usize| marks[mask] & !all[mask].fetch_or(marks[mask], Ordering::Relaxed);
-        if marks[0] == 0 {
-            return;
-        }
-        tally.voxels_shaded += u64::from(new(0).count_ones());
-        for part in 1..marks.len() {
-            if marks[part] == 0 {
+        let all = &self.marks[brick as usize * self.masks..][..self.masks];
+        for (mask, (all, &marks)) in all.iter().zip(marks).enumerate() {
+            if marks == 0 {
                 continue;
             }
-            let before = (part - 1) as u64 * SECTIONS as u64;
+            let new = marks & !all.fetch_or(marks, Ordering::Relaxed);
+            if mask == 0 {
+                tally.voxels_shaded += u64::from(new.count_ones());
+                continue;
+            }
+            let before = (mask - 1) as u64 * SECTIONS as u64;
             let of_voxel = |slot| sheets(slot).saturating_sub(before).min(SECTIONS as u64);
-            tally.sections += bits(new(part)).map(of_voxel).sum::<u64>();
+            tally.sections += bits(new).map(of_voxel).sum::<u64>();
         }
     }
 }

@@ -36,7 +36,7 @@ pub(super) struct Materials {
 }
 
 impl Materials {
-    /// Of so many bricks, none of which has been seen yet.
+    /// The materials of a number of bricks, none of which has been seen yet.
     pub(super) fn new(bricks: usize) -> Self {
         Self { bricks: (0..bricks).map(|_| OnceLock::new()).collect(), room: AtomicIsize::new(MOST_KEPT) }
     }
@@ -71,7 +71,7 @@ impl Clone for Materials {
 }
 
 impl Material {
-    /// That of a voxel.
+    /// The material of a voxel.
     pub(super) fn of(volume: &Volume, transfer: &TransferFunction, voxel: UVec3) -> Self {
         let index = volume.grid().index_of(voxel);
         let value = f64::from(volume.values()[index as usize]);

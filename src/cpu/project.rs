@@ -67,7 +67,7 @@ pub(super) struct Projection {
     /// The sheet depths of `places`.
     depths: [f64; BRICK_VOXELS as usize],
     /// How kernels are seen without perspective: all of them alike.
-    flat: Option<Lens>,
+    flat: Lens,
 }
 
 /// The first sheet of a voxel that has none.
@@ -84,7 +84,7 @@ impl Projection {
             direction,
             places: (0..BRICK_VOXELS as usize).map(offset).collect(),
             depths: std::array::from_fn(|slot| offset(slot).depth),
-            flat: view.perspective.is_none().then_some(flat),
+            flat,
         }
     }
 
@@ -134,7 +134,7 @@ impl Projection {
     #[inline(always)]
     pub(super) fn first_sheets(&self, brick: &Brick, place: Place) -> [i32; BRICK_VOXELS as usize] {
         let mut first = [NO_SHEET; BRICK_VOXELS as usize];
-        if self.flat.is_some() {
+        if self.view.perspective.is_none() {
             let reach = self.view.reach / self.view.slabs.width;
             for (first, offset) in first.iter_mut().zip(&self.depths) {
                 let depth = place.depth + offset;
@@ -173,12 +173,9 @@ impl Projection {
 
     /// How a voxel's kernel is seen.
     pub(super) fn lens(&self, place: Place, voxel: UVec3) -> Lens {
-        if let Some(lens) = self.flat {
-            return lens;
-        }
         let view = &self.view;
         let Some(Perspective { eye, eye_voxel, aspect, is_image_aligned, .. }) = &view.perspective else {
-            unreachable!("without perspective there is a flat lens")
+            return self.flat;
         };
         // In voxels and in `unit`s: the warped ray and the ray.
         let warped = voxel.as_dvec3() - eye_voxel;

@@ -175,14 +175,13 @@ impl Splatter {
                 in_planes[pair] = self.kernel.in_plane(simd, first);
                 in_planes[pair + 1] = self.kernel.in_plane(simd, second);
             }
-            for row in begin..=last.min(begin + BLOCK_ROWS - 1) {
+            for (target, row) in sheets[begin..=last.min(begin + BLOCK_ROWS - 1)].iter_mut().zip(begin..) {
                 if block.is_closed(row) {
                     continue;
                 }
                 written |= 1 << row;
                 let at = (row - begin) % BLOCK_ROWS;
                 let (rim, in_plane) = (rims[at], in_planes[at]);
-                let target = &mut sheets[row];
                 let mut near = cut_by_rim(simd, sections.planes[0], rim);
                 for section in 0..N {
                     let far = cut_by_rim(simd, sections.planes[section + 1], rim);
@@ -202,7 +201,7 @@ impl Splatter {
         let dx = iota(simd) + (column as f32 - splat.center[0]);
         let [x, y] = splat.local.axis;
         let mut written = 0;
-        for row in first..=last {
+        for (target, row) in sheets[first..=last].iter_mut().zip(first..) {
             if block.is_closed(row) {
                 continue;
             }
@@ -220,7 +219,7 @@ impl Splatter {
                 let in_plane = self.kernel.in_plane(simd, rho_squared) * sections.amplitude[section];
                 let near = cut_by_rim(simd, sections.planes[section], rim);
                 let far = cut_by_rim(simd, sections.planes[(section + 1) % LANES], rim);
-                add((far - near) * in_plane, splat.amount, column, &mut sheets[row][(slot + section) % RING]);
+                add((far - near) * in_plane, splat.amount, column, &mut target[(slot + section) % RING]);
             }
         }
         written
