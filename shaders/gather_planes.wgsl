@@ -1,21 +1,21 @@
-// The tile rasterizer where classification comes after splatting (SPEC §9): as `gather.wgsl`, but a subgroup gathers values and gradients
-// on the slab planes, and classifies, shades and composites what its pixels see between two planes.
+// The tile rasterizer with classification after splatting (SPEC §9): a subgroup gathers values and gradients on the slab planes, and
+// classifies, shades and composites the slabs between two planes at its pixels. Everything else is as in `gather.wgsl`.
 //
-// A group's sheets are the sums on its four far planes. Its near plane is the group before's last, whose field is handed on. A dispatch that goes
-// on where another one has stopped looks at the group before once more, to have that.
+// A group's sheets are the sums on its four far planes. Its near plane is the previous group's last plane, whose field is handed on. A dispatch
+// that continues another one draws the previous group once more, without compositing it, to have that field.
 
 @group(0) @binding(15) var<uniform> planes: FieldPlanes;
-// The bits of every voxel's coefficient, a number; only read where `EXACT`.
+// The bits of every voxel's coefficient, a number; read only if `EXACT`.
 @group(0) @binding(16) var coefficients: texture_2d_array<u32>;
 
-// Whether coefficients are not the values themselves.
+// Whether coefficients differ from the values.
 override EXACT: bool = false;
 
 // The first of a group's planes is one slab behind its near plane.
 const FIRST_PLANE = 1.0;
 const GROUPS_LOOKED_BACK = 1u;
 
-// §8's economies are for colours that are splatted.
+// §8's economies apply only to splatted colours.
 const ECONOMIES = false;
 var<private> shallow: vec4u;
 
@@ -27,7 +27,7 @@ fn counts_gaps() -> bool {
     return false;
 }
 
-// The group before may end on a plane whose values hold for the next slab, too.
+// The previous group may end on a plane whose values hold for the next slab, too.
 fn is_due_without_voxels(blocks: u32) -> bool {
     return (blocks_handed_on & blocks) != 0u;
 }
@@ -42,12 +42,12 @@ fn looks_along_rays() -> bool {
     return true;
 }
 
-// Where a voxel is: pixels right of the image's middle and below it, both times the depth from the eye, and sheet depth.
+// A voxel's place: pixels right of the image's middle and below it, both times the depth from the eye, and sheet depth.
 fn placed(voxel: vec3u) -> vec4f {
     return homogeneous(vec4f(vec3f(voxel), 1.0));
 }
 
-// What of the screen a kernel reaches on the group's far planes. Between the first plane and the last one its nearest points move one way.
+// The screen box that a kernel reaches on the group's far planes. From the first plane to the last its nearest point moves in one direction.
 fn screen_box(p: vec4f) -> ScreenBox {
     let middle = 0.5 * vec2f(frame.size) - first_px;
     if !PERSPECTIVE {
@@ -67,7 +67,7 @@ fn is_searched_in_perspective(search: SearchBounds, p: vec4f) -> bool {
         && p.z >= search.low.z && p.z <= search.high.z;
 }
 
-// The frame's sheets from the first whose far plane a kernel reaches to the one after the last.
+// The range of the frame's sheets whose far planes a kernel reaches, from the first to the one after the last.
 fn overlapped_sheets(p: vec4f) -> vec2f {
     let reach = frame.support / planes.step.w - gather.depth_error;
     let sheets = (p.z + vec2f(-reach, reach) - gather.near) / frame.slab_width;
@@ -91,7 +91,7 @@ fn number_at(index: u32) -> f32 {
     return (value + planes.value_bias) * planes.value_scale;
 }
 
-// Looks up the values and differences of the voxels in the queue from one on.
+// Loads the values and differences of the voxels of the queue from `first` on.
 fn shade_voxels(first: u32) {
     for (var i = first; i < queue_count; i += lanes) {
         passes += PASSES_PER_SHADING;
@@ -112,7 +112,7 @@ fn shade_voxels(first: u32) {
     }
 }
 
-// Adds the queue's voxels that some blocks see to the sums of a thread's pixels in them. Whether there are any.
+// Adds the queue's voxels that some blocks see to the sums of a thread's pixels in them. Returns whether there were any.
 fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> bool {
     var is_added = false;
     for (var base = 0u; base < queue_count; base += BATCH) {
@@ -154,7 +154,7 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> b
     return is_added;
 }
 
-// Composites the slabs before the four planes of which the sums are whole now.
+// Composites the slabs in front of the four planes, whose sums are complete.
 fn composite_pixels(pixels: Pixels, sheets: Sheets, progress: ptr<function, Progress>) {
     passes += passes_per_look() + PASSES_PER_SLABS;
     look(pixels.column, pixels.rows);

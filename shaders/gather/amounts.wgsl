@@ -1,6 +1,4 @@
-// What the voxels in a subgroup's queue add to sheets where they are classified and shaded before splatting (§3).
-//
-// The frame's sheets from the first that a kernel overlaps to the one after the last.
+// The colours and amounts that the voxels in a subgroup's queue add to sheets, if they are classified and shaded before splatting (§3).
 //
 // Needs gather/economies.wgsl: economic_blocks, is_worthwhile, whole_sheet.
 // Needs gather/kernel.wgsl: footprint_at.
@@ -16,6 +14,8 @@
 // Needs shared/ramps.wgsl: LABELS, ramp, ramps_of.
 // Needs shared/shading.wgsl: lighting, shade.
 // Needs shared/volume.wgsl: gradient_at, index_of, value_at.
+
+// The range of the frame's sheets that a kernel overlaps, from the first to the one after the last.
 fn overlapped_sheets(p: vec4f) -> vec2f {
     let sheets = (overlapped(p, gather.depth_error, PERSPECTIVE) - gather.near) / frame.slab_width;
     return vec2f(floor(sheets.x), ceil(sheets.y));

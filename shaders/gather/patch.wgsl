@@ -1,5 +1,5 @@
-// A patch of the tile rasterizer from front to back, whatever its sheets hold: its bindings, its groups one after the other, and the rounds in
-// which a subgroup goes through its pixels. The stage's own file says what a voxel adds to sheets, and what becomes of them.
+// A patch of the tile rasterizer, drawn front to back: its bindings, the loop over its groups, and the rounds in which a subgroup visits its
+// pixels. The stage's own file defines what a voxel adds to sheets and how they are composited.
 //
 // Needs gather.wgsl: GROUPS_LOOKED_BACK, add_sections, composite_pixels, counts_gaps, is_due_without_voxels, looks_along_rays.
 // Needs gather/amounts.wgsl: shade_voxels.
@@ -66,7 +66,7 @@ var<private> open: vec4u;
 
 // The group that is being drawn.
 var<private> sheet_group: GatheredGroup;
-// The first that this dispatch composites; those before it were, and are looked at once more.
+// The first group that this dispatch composites; it draws earlier ones again for the field on their last plane.
 var<private> first_composited: u32;
 
 // Counts of passes through loops, bricks visited, and voxels and sections drawn.
@@ -238,7 +238,7 @@ fn draw(number: u32, first_thread: u32, thread: u32) {
     let first_bin = number * gather.groups;
     let reached = gather.reached + number * BLOCKS + firstTrailingBit(own_blocks);
     var at = atomicLoad(&gathered.words[reached]);
-    // What the groups before have left behind.
+    // Earlier groups are drawn again for the field that they hand on.
     first_composited = at;
     at -= min(at, GROUPS_LOOKED_BACK);
     var end = starts[first_bin + at];

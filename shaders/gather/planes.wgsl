@@ -1,4 +1,4 @@
-// The sums that a thread of the tile rasterizer gathers on the four planes behind a group's slabs, and the field that they make (SPEC §9).
+// The sums that a thread of the tile rasterizer gathers on the far planes of a group's four slabs, and the field that follows from them (SPEC §9).
 //
 // Needs gather/patch.wgsl: PATCH_THREADS, PERSPECTIVE, gather, sheet_group.
 // Needs gather/pixels.wgsl: Pixels.
@@ -6,25 +6,25 @@
 // Needs shared/frame.wgsl: frame.
 // Needs shared/planes.wgsl: MIN_WEIGHT.
 
-// Whether gradients are the field's derivative, not the voxels' differences.
+// Whether gradients are the field's derivative instead of the voxels' differences.
 override KERNEL_GRADIENT: bool = false;
 
-// Sums over the voxels around a plane at a thread's four pixels.
+// The sums over the voxels around a plane at a thread's four pixels.
 struct PlaneSums {
     // N = Σ g, and Σ c·g.
     weight: vec4f,
     number: vec4f,
-    // Σ d·g with d the voxels' differences; of the kernel's gradient Σ c·g·δ along the planes' axes and their normal.
+    // Σ d·g with the voxels' differences d; for the kernel's gradient Σ c·g·δ along the planes' axes and their normal.
     x: vec4f,
     y: vec4f,
     z: vec4f,
-    // Of the kernel's gradient Σ g·δ.
+    // For the kernel's gradient Σ g·δ.
     offset_x: vec4f,
     offset_y: vec4f,
     offset_z: vec4f,
 }
 
-// Those on the far planes of a group's four slabs.
+// The sums on the far planes of a group's four slabs.
 struct Sheets {
     first: PlaneSums,
     second: PlaneSums,
@@ -32,11 +32,11 @@ struct Sheets {
     fourth: PlaneSums,
 }
 
-// Sums that a pixel has on a plane, with the kernel's gradient 8; and those of all planes at all of a patch's threads.
+// The number of a pixel's sums on a plane, 8 with the kernel's gradient; and of the sums on all planes at all of a patch's threads.
 override SUMS: u32 = 5u;
 override SAVED: u32 = 640u;
 
-// The sums of all of a patch's threads, while some of a group's voxels wait for the queue.
+// The sums of all of a patch's threads, while voxels of the group wait for room in the queue.
 var<workgroup> saved: array<vec4f, SAVED>;
 
 fn save_sheets(thread: u32, sheets: Sheets) {
@@ -82,12 +82,12 @@ fn saved_plane(thread: u32, plane: u32) -> PlaneSums {
 
 // A voxel as the pixels see it on the four planes.
 struct PlaneKernel {
-    // Where its nearest points are seen; without an eye only the first, as all are the same.
+    // The pixels of its nearest points; in orthographic views all are equal, and only the first is used.
     center_x: vec4f,
     center_y: vec4f,
     // The gradient and the number, (d, c).
     amount: vec4f,
-    // The planes' distances, grid units; their Gaussian, 0 without a voxel; and ρ² from which the kernel is 0 on each.
+    // The planes' distances in grid units; the Gaussian of these, 0 without a voxel; and for each plane the ρ² from which the kernel is 0.
     distances: vec4f,
     weights: vec4f,
     cuts: vec4f,
@@ -98,7 +98,7 @@ fn far_planes() -> vec4f {
     return sheet_group.near + vec4f(1.0, 2.0, 3.0, 4.0) * frame.slab_width;
 }
 
-// The depths from the eye of the group's four far planes; 1 without an eye.
+// The depths from the eye of the group's four far planes; 1 in orthographic views.
 fn far_planes_from_eye() -> vec4f {
     return select(vec4f(1.0), far_planes() - planes.origin, vec4<bool>(PERSPECTIVE));
 }
@@ -118,7 +118,7 @@ fn kernel_at(point: vec4f, amount: vec4f, is_there: bool) -> PlaneKernel {
     return PlaneKernel(vec4f(point.x + middle.x), vec4f(point.y + middle.y), amount, distances, weights, cuts);
 }
 
-// What another lane holds.
+// The kernel of another lane.
 fn kernel_of(own: PlaneKernel, other: u32) -> PlaneKernel {
     var kernel: PlaneKernel;
     kernel.amount = subgroupShuffle(own.amount, other);
@@ -137,7 +137,7 @@ fn kernel_of(own: PlaneKernel, other: u32) -> PlaneKernel {
     return kernel;
 }
 
-// How a voxel's kernel lies on a plane at four pixels: the offsets along the planes' axes, ρ², and the Gaussian of it.
+// A voxel's kernel on a plane at four pixels: the offsets along the planes' axes, ρ², and its Gaussian.
 struct InPlane {
     first: vec4f,
     second: vec4f,
@@ -162,7 +162,7 @@ fn in_plane(kernel: PlaneKernel, pixels: Pixels, plane: u32) -> InPlane {
     return at;
 }
 
-// Sums on a plane with a voxel's.
+// The sums on a plane with a voxel added.
 fn with_voxel(sums: PlaneSums, kernel: PlaneKernel, at: InPlane, plane: u32) -> PlaneSums {
     let weight = select(vec4f(0.0), at.gaussian * kernel.weights[plane], at.rho_squared < vec4f(kernel.cuts[plane]));
     let number = weight * kernel.amount.w;
@@ -184,7 +184,7 @@ fn with_voxel(sums: PlaneSums, kernel: PlaneKernel, at: InPlane, plane: u32) -> 
     return result;
 }
 
-// The field on a plane at a thread's four pixels: numbers, and the gradient, numbers per `unit`.
+// The field on a plane at a thread's four pixels: numbers, and gradients in numbers per `unit`.
 struct Fields {
     has_value: vec4<bool>,
     number: vec4f,
@@ -206,17 +206,17 @@ fn fields_of(sums: PlaneSums) -> Fields {
         (sums.y - number * sums.offset_y) * scale,
         (sums.z - number * sums.offset_z) * scale,
     );
-    // From the planes' axes to the grid's, and there to lengths of the world.
+    // From the planes' axes to the grid's, and from grid units to lengths of the world.
     let x = vec3f(planes.axes[0].x, planes.axes[1].x, planes.axes[2].x) / frame.aspect.x;
     let y = vec3f(planes.axes[0].y, planes.axes[1].y, planes.axes[2].y) / frame.aspect.y;
     let z = vec3f(planes.axes[0].z, planes.axes[1].z, planes.axes[2].z) / frame.aspect.z;
     return Fields(has_value, number, along * x, along * y, along * z);
 }
 
-// The far planes' fields of the group before.
+// The field on the previous group's last plane.
 var<workgroup> handed_on: array<vec4f, 5u * PATCH_THREADS>;
 
-// The blocks of which some plane was handed on that has values, one bit each.
+// A mask of the blocks in which the plane that was handed on has values.
 var<private> blocks_handed_on: u32;
 
 fn hand_on(thread: u32, fields: Fields) {

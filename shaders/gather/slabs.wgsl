@@ -1,10 +1,10 @@
-// What a thread of the tile rasterizer makes of the fields on two planes: the slab between them, classified, shaded and composited (SPEC §9).
+// The slabs between planes at a thread's pixels: classified, shaded and composited (SPEC §9).
 //
 // Needs gather/patch.wgsl: COMPOSITING, CUT, FIRST_HIT, PERSPECTIVE, SHEETS, control_points, cut, sheet_group.
 // Needs gather/pixels.wgsl: Pixels.
 // Needs gather/planes.wgsl: Fields, KERNEL_GRADIENT, PlaneSums, Sheets, blocks_handed_on, fields_handed_on, fields_of, hand_on.
 // Needs gather_planes.wgsl: planes.
-// Needs shared/cells.wgsl: nearest_index, voxel_at.
+// Needs shared/cells.wgsl: nearest_voxel, voxel_at.
 // Needs shared/compositing.wgsl: composite.
 // Needs shared/cut.wgsl: noted, place_of, sheet_depths, shown_depths.
 // Needs shared/frame.wgsl: FRONT_TO_BACK, frame.
@@ -13,16 +13,16 @@
 // Needs shared/ramps.wgsl: LABELS, ramp, ramps_of.
 // Needs shared/shading.wgsl: lighting, shade.
 // Needs shared/slab_integral.wgsl: slab_integral.
-// Needs shared/volume.wgsl: HOLES, gradient_of, is_hole, stored_at.
+// Needs shared/volume.wgsl: HOLES, gradient_of, index_of, is_hole, stored_at.
 
-// Of a thread's four pixels the sheet depths from and to which their rays' stretches reach, the length of a ray by its sheet depth, and the
-// depths of first hits, as bits.
+// For a thread's four pixels: the sheet depths between which their rays count, the length of a ray per sheet depth, and the depths of first
+// hits, as bits.
 var<private> shown_from: vec4f;
 var<private> shown_to: vec4f;
 var<private> length_per_depth: vec4f;
 var<private> hits: vec4u;
 
-// How the rays of a thread's four pixels, of one column, look at slabs.
+// Finds the stretches of the rays of a thread's four pixels, which lie in one column.
 fn look(column: f32, rows: vec4f) {
     for (var i = 0u; i < 4u; i += 1u) {
         let point_px = vec2f(column, rows[i]);
@@ -50,7 +50,7 @@ fn sample_of(fields: Fields, i: u32) -> PixelField {
     return PixelField(fields.has_value[i], fields.number[i], vec3f(fields.x[i], fields.y[i], fields.z[i]));
 }
 
-// A slab as one pixel sees it: where only one plane has a value, it holds for both.
+// A slab at one pixel: if only one plane has a value, it holds for both.
 struct Slab {
     near: PixelField,
     far: PixelField,
@@ -68,13 +68,13 @@ fn slab_between(near: PixelField, far: PixelField) -> Slab {
     return slab;
 }
 
-// Whether a slab's values reach those that have an opacity.
+// Whether a slab's range of values reaches values that have an opacity.
 fn has_opacity(slab: Slab, ramps: vec4u) -> bool {
     let head = control_points[ramps.w];
     return slab.has_value && max(slab.near.number, slab.far.number) >= head.z && min(slab.near.number, slab.far.number) <= head.w;
 }
 
-// The sheet of a slab of which a ray shows some length.
+// The sheet of a slab of which the ray shows a length.
 fn sheet_of(slab: Slab, ramps: vec4u, length: f32, point_px: vec2f) -> vec4f {
     let means = slab_integral(ramps.w, slab.near.number, slab.far.number);
     let gradient = gradient_of(0.5 * planes.per_number * mix(slab.near.gradient, slab.far.gradient, means.share));
@@ -91,16 +91,16 @@ fn ramps_at(point_px: vec2f, sheet_depth: f32) -> vec4u {
     if !LABELS {
         return vec4u(0u, frame.ramps.xyz);
     }
-    return ramps_of(nearest_index(voxel_at(place_of(point_px), sheet_depth)));
+    return ramps_of(index_of(nearest_voxel(voxel_at(place_of(point_px), sheet_depth))));
 }
 
-// A plane's field without values where the nearest voxel is a hole.
+// Removes a plane's values where the nearest voxel is a hole.
 fn without_holes(fields: Fields, pixels: Pixels, sheet_depth: f32) -> Fields {
     var result = fields;
     if HOLES {
         for (var i = 0u; i < 4u; i += 1u) {
             let place = voxel_at(place_of(vec2f(pixels.column, pixels.rows[i])), sheet_depth);
-            result.has_value[i] = result.has_value[i] && !is_hole(stored_at(nearest_index(place)));
+            result.has_value[i] = result.has_value[i] && !is_hole(stored_at(index_of(nearest_voxel(place))));
         }
     }
     return result;
@@ -127,7 +127,7 @@ fn one_of(first: vec4f, second: vec4f, third: vec4f, fourth: vec4f, j: u32) -> v
     return select(select(first, second, is_odd), select(third, fourth, is_odd), vec4<bool>(j >= 2u));
 }
 
-// A group's slabs over what is there, at four pixels. The near plane's field is handed on from the group before, the last one's to the next.
+// Composites a group's slabs at four pixels. The near plane's field comes from the previous group, and the last plane's goes to the next.
 fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
     var result = image;
     var near = fields_handed_on(pixels.thread, (blocks_handed_on >> pixels.block & 1u) != 0u);

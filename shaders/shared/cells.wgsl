@@ -1,6 +1,6 @@
-// Points on pixels' rays, and the voxels whose cells hold them. A stage that includes this includes `cut`.
+// The points of pixels' rays, and the voxels whose cells contain them. A stage that includes this declares what `cut` needs.
 
-// The point of a ray at a sheet depth, in voxels.
+// The point of a pixel's ray at a sheet depth, in voxels.
 fn voxel_at(at: vec3f, sheet_depth: f32) -> vec3f {
     let depth = (sheet_depth - dot(cut.sheet_at.xyz, at)) / dot(cut.sheet_along.xyz, at);
     var place = vec3f();
@@ -10,7 +10,7 @@ fn voxel_at(at: vec3f, sheet_depth: f32) -> vec3f {
     return place + 0.5 * vec3f(frame.dims.xyz - 1u);
 }
 
-// The index of the voxel whose cell holds a point, beyond all cells of the nearest one.
-fn nearest_index(place: vec3f) -> u32 {
-    return index_of(vec3u(clamp(floor(place + 0.5), vec3f(0.0), vec3f(frame.dims.xyz - 1u))));
+// The voxel whose cell holds a point.
+fn nearest_voxel(place: vec3f) -> vec3u {
+    return vec3u(clamp(floor(place + 0.5), vec3f(0.0), vec3f(frame.dims.xyz - 1u)));
 }

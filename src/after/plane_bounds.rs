@@ -1,4 +1,4 @@
-//! Where voxels' kernels are seen on slab planes.
+//! The screen bounds of voxels' kernels on slab planes.
 
 use glam::{DVec2, DVec3};
 
@@ -6,8 +6,8 @@ use super::plane_geometry::PlaneGeometry;
 use crate::geometry::view_geometry::{Bounds, ViewGeometry};
 
 impl PlaneGeometry {
-    /// The bounds of a box of voxels, given its middle and half its extent in voxel indices: of where the nearest points to the voxels are seen on the planes that
-    /// their kernels reach, and of the planes' sheet depths; `None` if no ray shows what lies between any of these.
+    /// The bounds of a box of voxels, given its middle and half its extent in voxel indices: the pixels of the points nearest to the voxels, on the
+    /// planes that their kernels reach, and these planes' sheet depths. `None` if all of the planes lie before the near plane.
     pub fn bounds(&self, view: &ViewGeometry, middle: DVec3, half: DVec3) -> Option<Bounds> {
         let Some(perspective) = &view.perspective else { return view.bounds(middle, half) };
         let (row, width, origin) = (view.screen_from_voxel[2], view.slabs.width, view.slabs.origin);
@@ -23,7 +23,7 @@ impl PlaneGeometry {
         let last = ((depths.end - origin) / width).ceil().max(first);
         let half_image = DVec2::from(view.size.map(f64::from)) / 2.0;
         let mut bounds = Bounds { low: DVec2::INFINITY, high: DVec2::NEG_INFINITY, depths };
-        // From plane to plane the point moves one way.
+        // From plane to plane the point moves in one direction.
         for from_eye in [first * width, last * width] {
             let ends = [(0, self.step.x), (1, self.step.y)].map(|(row, step)| {
                 let step = step * self.per_depth;
@@ -39,7 +39,7 @@ impl PlaneGeometry {
         Some(bounds)
     }
 
-    /// Half the screen box, pixels, around where a kernel of the radius `support` meets a plane at a depth from the eye, seen from its voxel's nearest point.
+    /// Half the screen box in pixels of a kernel of the radius `support` on a plane at a depth from the eye, around the voxel's nearest point.
     pub fn footprint_half_box(&self, support: f64, from_eye: f64) -> DVec2 {
         let reach = support / (self.per_pixel * from_eye).min(DVec2::ONE);
         let (first, second) = (self.screen_axis * reach.x, self.screen_axis.perp() * reach.y);

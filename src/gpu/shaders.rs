@@ -152,6 +152,7 @@ pub const CLASSIFY: Shader = shader!(
     "shared/ramps",
     "shared/slab_integral",
     "shared/field_voxel",
+    "shared/cells",
     "shared/seen",
     "shared/first_surface"
 );
