@@ -1,4 +1,4 @@
-//! Why nothing can draw.
+//! Errors of opening a device and of choosing a backend.
 
 use std::fmt;
 
@@ -7,11 +7,11 @@ use crate::gpu::fault::DeviceFault;
 #[cfg(feature = "gpu")]
 use wgpu::Features;
 
-/// Why no device could be opened or used.
+/// A device could not be opened or used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DeviceError {
-    /// There is no adapter, or none with the requested name.
+    /// No adapter exists, or none has the requested name.
     #[error("no GPU adapter: required {required}, actual: {actual}{}", after(advice.as_deref()))]
     #[non_exhaustive]
     NoAdapter {
@@ -19,7 +19,7 @@ pub enum DeviceError {
         required: String,
         /// The adapters that exist.
         actual: String,
-        /// Which driver to install, if there is no adapter.
+        /// The driver to install, if no adapter exists.
         advice: Option<String>,
     },
     /// The adapter refused to make a device.
@@ -42,12 +42,12 @@ pub enum DeviceError {
         /// The device's error.
         fault: DeviceFault,
     },
-    /// A feature is missing that the options ask for.
+    /// The device lacks a feature that the options need.
     #[cfg(feature = "gpu")]
     #[error("device feature: required {required:?}, actual: {actual:?}")]
     #[non_exhaustive]
     MissingFeatures {
-        /// The features that are needed.
+        /// The required features.
         required: Features,
         /// The features of the device.
         actual: Features,
@@ -59,7 +59,7 @@ pub enum DeviceError {
         /// Its name.
         backend: &'static str,
     },
-    /// Limits that are not enough for any frame.
+    /// The device's limits are insufficient for any frame.
     #[error("device limits: {}", list(.0))]
     Limits(Vec<InsufficientLimit>),
     /// An option of the renderer is not supported by this device, or by any.

@@ -36,7 +36,7 @@ impl Pick {
         Self { position, depth, voxel, value, label }
     }
 
-    /// The error of a pick that no first hit answers: none were requested, or the pixel lies off the image.
+    /// The error of a pick without a first hit: none were requested, or the pixel lies outside the image.
     pub(crate) fn missing(pixel: [u32; 2], image: &ImageSettings) -> SettingError {
         let ImageSettings { width, height, .. } = image;
         SettingError::new(
@@ -50,17 +50,17 @@ impl Pick {
 /// The first hits of a frame that was drawn without a GPU.
 #[derive(Clone, Debug)]
 pub(crate) struct FirstHits {
-    /// What it was seen by.
+    /// The frame's view.
     pub(crate) view: ViewGeometry,
     /// For every pixel, row by row, the depth in world units; infinite where the opacity is not reached.
     pub(crate) depths: Vec<f32>,
 }
 
 impl FirstHits {
-    /// What a frame shows first at a pixel.
+    /// The first hit of a frame at a pixel.
     ///
     /// # Errors
-    /// If it has no first hits, or the pixel is off the image.
+    /// If the frame has no first hits, or the pixel lies outside the image.
     pub(crate) fn pick(
         hits: Option<&Self>,
         volume: &Volume,
