@@ -103,10 +103,10 @@ fn missing() -> &'static str {
 #[test]
 fn what_a_backend_does_not_draw_is_named() {
     let folder = Folder::new();
-    let after = format!("render {HEAD} -o out.png --backend cpu --set splatting.classification=after");
-    let run = folder.run(&after);
+    let economy = format!("render {HEAD} -o out.png --backend cpu --set splatting.experimental.beta=0.9");
+    let run = folder.run(&economy);
     assert_eq!(run.code, Some(2), "{}", run.stderr);
-    ["splatting.classification", "\"cpu\""]
+    ["splatting.experimental.beta", "\"cpu\""]
         .iter()
         .for_each(|word| assert!(run.stderr.contains(word), "{}", run.stderr));
 }

@@ -110,8 +110,8 @@ impl Frame<'_> {
             return;
         }
         let is_better = match self.compositing {
-            Compositing::Minimum => sample.value.simd_lt(number),
-            _ => sample.value.simd_gt(number),
+            Compositing::Minimum => sample.value.simd_lt(number - self.hair),
+            _ => sample.value.simd_gt(number + self.hair),
         };
         let is_first = weight.simd_eq(f32x8::splat(simd, 0.0));
         let bits = (is_better | is_first).to_bitmask() as u32 & counts;

@@ -55,6 +55,8 @@ pub(in crate::cpu) struct Frame<'a> {
     pub(super) world_from_plane: [[f32; 3]; 3],
     /// Sums for the kernel's gradient below this are rounding errors; squared.
     pub(super) min_moment: f32,
+    /// Numbers that differ by less count as equal.
+    pub(super) hair: f32,
     /// Whether anything depends on gradients.
     pub(super) needs_gradients: bool,
     pub(super) has_gradient_opacity: bool,
@@ -70,6 +72,9 @@ pub(in crate::cpu) struct Frame<'a> {
     pub(super) touched: Range<i32>,
     resolver: Resolver,
 }
+
+/// Values that differ by less, relative to the range of the coefficients, count as equal: in homogeneous matter only rounding tells them apart.
+const HAIR_OF_RANGE: f32 = 2e-6;
 
 impl<'a> Frame<'a> {
     /// A frame in a view, the one that the coefficients were looked at in.
@@ -112,6 +117,7 @@ impl<'a> Frame<'a> {
             world_from_plane: [0, 1, 2]
                 .map(|world| axes.map(|axis| (-2.0 * splatting.falloff * axis[world] / grid.spacing[world]) as f32)),
             min_moment: min_moment(splatting.radius, numbers.range).powi(2),
+            hair: HAIR_OF_RANGE * (numbers.range[1] - numbers.range[0]),
             needs_gradients: shading.enabled || has_gradient_opacity,
             has_gradient_opacity,
             per_number: (1.0 / numbers.scale) as f32,

@@ -46,12 +46,12 @@ fn points<'a>(pixel: &'a Pixel) -> impl Iterator<Item = (i32, f64)> + 'a {
 }
 
 /// Values that differ by less, relative to the range of the coefficients, count as equal: in homogeneous matter only rounding tells them apart.
-const HAIR: f64 = 2e-6;
+const HAIR_OF_RANGE: f64 = 2e-6;
 
 /// The point with the maximum or minimum value, the nearest of equal ones.
 fn extreme(pixel: &Pixel, is_minimum: bool) -> Option<Point> {
     let [min, max] = pixel.frame().field.range();
-    let hair = HAIR * (max - min);
+    let hair = HAIR_OF_RANGE * (max - min);
     let nearest = |best: (i32, f64), other: (i32, f64)| {
         let is_better = if is_minimum { other.1 < best.1 - hair } else { other.1 > best.1 + hair };
         if is_better { other } else { best }
