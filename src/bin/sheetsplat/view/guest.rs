@@ -64,12 +64,9 @@ impl Guest {
         let volume = GpuVolume::new(device, queue, volume);
         let view = volume.and_then(|volume| SceneView::new(device, &volume, scene));
         let view = view.map_err(|error| Failure::of(error.into(), input))?;
-        let stats = Stats {
-            adapter: info.name,
-            backend: Backend::Gpu.name().to_owned(),
-            api: info.backend.to_str().to_owned(),
-            ..Stats::default()
-        };
+        let mut stats = Stats::default();
+        (stats.backend, stats.api) = (Backend::Gpu.name().to_owned(), info.backend.to_str().to_owned());
+        stats.adapter = info.name;
         Ok(Self { host: host.clone(), renderer, view, picture: None, stats })
     }
 
