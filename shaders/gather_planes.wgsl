@@ -8,9 +8,6 @@
 // The bits of every voxel's coefficient, a number; read only if `EXACT`.
 @group(0) @binding(16) var coefficients: texture_2d_array<u32>;
 
-// Whether coefficients differ from the values.
-override EXACT: bool = false;
-
 // The first of a group's planes is one slab behind its near plane.
 const FIRST_PLANE = 1.0;
 const GROUPS_LOOKED_BACK = 1u;
@@ -78,17 +75,6 @@ fn overlapped_sheets(p: vec4f) -> vec2f {
 fn sections_here(p: vec4f, sheets: vec2f) -> u32 {
     let here = sheets_here(sheets);
     return u32(here.y - here.x);
-}
-
-// A voxel's coefficient, as a number.
-fn number_at(index: u32) -> f32 {
-    if EXACT {
-        let texel = texel_of(index, textureDimensions(coefficients).x);
-        return bitcast<f32>(textureLoad(coefficients, texel.xy, texel.z, 0).x);
-    }
-    let stored = stored_at(index);
-    let value = select(bitcast<f32>(stored), f32(stored), frame.whole_values != 0u);
-    return (value + planes.value_bias) * planes.value_scale;
 }
 
 // Loads the values and differences of the voxels of the queue from `first` on.

@@ -10,19 +10,6 @@
 @group(0) @binding(6) var<storage, read_write> voxels: array<FieldVoxel>;
 @group(0) @binding(7) var<uniform> planes: FieldPlanes;
 
-// Whether coefficients differ from the values.
-override EXACT: bool = false;
-
-fn number_at(index: u32) -> f32 {
-    if EXACT {
-        let texel = texel_of(index, textureDimensions(coefficients).x);
-        return bitcast<f32>(textureLoad(coefficients, texel.xy, texel.z, 0).x);
-    }
-    let stored = stored_at(index);
-    let value = select(bitcast<f32>(stored), f32(stored), frame.whole_values != 0u);
-    return (value + planes.value_bias) * planes.value_scale;
-}
-
 @compute @workgroup_size(64)
 fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
     start(workgroup.z);

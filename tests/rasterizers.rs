@@ -11,6 +11,7 @@ use sheetsplat::internals::gpu::device::{DeviceRequirements, TILE_FEATURES};
 use sheetsplat::internals::gpu::targets::CompositingBuffer;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::Projection;
+use sheetsplat::settings::{Classification, Compositing, Gradient};
 use sheetsplat::settings::{FootprintBox, FootprintForm, Method, Order, Rasterizer};
 use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::{Features, Limits};
@@ -70,6 +71,29 @@ fn auto_chooses_tiles_where_they_are_supported() {
     assert_eq!(drawn_by(&subgroups, &volume, &scene), "quads");
     let (volume, scene) = crowded();
     assert_eq!(drawn_by(&subgroups, &volume, &scene), "quads");
+}
+
+/// After splatting, tiles draw amounts alone, and sums with the kernel's gradient need more workgroup memory than WebGPU's default. Quads draw the rest.
+#[test]
+fn quads_draw_what_tiles_do_not_after_splatting() {
+    let gpu = open(TILE_FEATURES);
+    let (volume, mut scene) = head();
+    scene.splatting.classification = Classification::After;
+    assert_eq!(drawn_by(&gpu, &volume, &scene), "tiles");
+    let kernel = |scene: &mut Scene| scene.shading.gradient = Gradient::Kernel;
+    let maximum = |scene: &mut Scene| scene.splatting.compositing = Compositing::Maximum;
+    let cases: [(&dyn Fn(&mut Scene), &[&str]); 2] = [
+        (&kernel, &["max_compute_workgroup_storage_size", "16384", "21248"]),
+        (&maximum, &["\"tiles\"", "\"after\"", "splatting.compositing", "\"quads\""]),
+    ];
+    for (change, words) in cases {
+        let mut scene = scene.clone();
+        change(&mut scene);
+        assert_eq!(drawn_by(&gpu, &volume, &scene), "quads");
+        scene.splatting.rasterizer = Rasterizer::Tiles;
+        let message = gpu.render_volume(volume.clone(), &scene).unwrap_err().to_string();
+        words.iter().for_each(|word| assert!(message.contains(word), "no {word:?} in {message}"));
+    }
 }
 
 #[test]

@@ -21,7 +21,7 @@ fn overlapped_sheets(p: vec4f) -> vec2f {
     return vec2f(floor(sheets.x), ceil(sheets.y));
 }
 
-// How many of a kernel's sections in the group are drawn.
+// The number of a kernel's sections in the group that are drawn.
 fn sections_here(p: vec4f, sheets: vec2f) -> u32 {
     let here = sheets_here(sheets);
     if PERSPECTIVE {
@@ -31,12 +31,12 @@ fn sections_here(p: vec4f, sheets: vec2f) -> u32 {
     return u32(here.y - here.x);
 }
 
-// Where a voxel is seen.
+// A voxel's projection.
 fn placed(voxel: vec3u) -> vec4f {
     return project(voxel);
 }
 
-// Where its footprint is on the screen.
+// The box around the footprint at a projection.
 fn screen_box(p: vec4f) -> ScreenBox {
     return ScreenBox(p.xy - first_px, sheet_group.half_box);
 }

@@ -1,4 +1,4 @@
-// Bits of masks, and what a subgroup's lanes hold together.
+// Bit masks, and values that a subgroup's lanes hold together.
 //
 // Needs gather/patch.wgsl: THREADS, lane.
 

@@ -1,5 +1,6 @@
-// §8's economies, which draw less where it hardly shows: voxels projected whole instead of in sections, for their low opacity or since
-// they lie behind β, and footprints that end where they add too little. Without them every function here gives back what it is given.
+// The economies of §8, which draw less where it is hardly visible: voxels that are projected whole instead of in sections, because of their
+// low opacity or because they lie behind β, and footprints that end where they add too little. When off, every function here returns its
+// input unchanged.
 //
 // Needs gather/amounts.wgsl: Shaded, screen_box.
 // Needs gather/kernel.wgsl: footprint_at.
@@ -67,13 +68,13 @@ fn is_worthwhile(blocks: u32) -> bool {
     return !ECONOMIES || blocks != 0u;
 }
 
-// Where the planes of a group cut a kernel: the first, and the four after it, by their distance from the voxel.
+// The distances from a voxel to the planes of a group: the first plane, and the four after it.
 struct KernelPlanes {
     first: f32,
     others: vec4f,
 }
 
-// The planes that leave all of a kernel to the sheet `whole`: as far as a kernel reaches, on either side of the sheet.
+// Planes that put a whole kernel into the sheet `whole`, beyond the kernel's reach on either side of it.
 fn economic_planes(planes: KernelPlanes, whole: f32) -> KernelPlanes {
     if ECONOMIES && whole >= 0.0 {
         return KernelPlanes(-WHOLE, select(vec4f(-WHOLE), vec4f(WHOLE), vec4f(1.0, 2.0, 3.0, 4.0) > vec4f(whole)));

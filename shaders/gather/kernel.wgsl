@@ -1,4 +1,4 @@
-// Kernels as the tile rasterizer gathers them: in closed form, by polynomials instead of tables (eq. 3).
+// Kernels in the tile rasterizer's closed form: polynomials instead of tables (eq. 3).
 //
 // Needs gather/economies.wgsl: KernelPlanes, economic_planes, economic_rim, rim_of, within_rim.
 // Needs gather/patch.wgsl: PERSPECTIVE, gather.

@@ -10,7 +10,7 @@
 
 // A thread's four pixels.
 struct Pixels {
-    // Of the patch's.
+    // The thread, and its block, in the patch.
     thread: u32,
     block: u32,
     first: vec2u,

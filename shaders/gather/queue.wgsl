@@ -1,5 +1,5 @@
-// The voxels that a subgroup draws in a sheet group: found once for all pixels of a patch, shaded once, and kept for as long as their
-// kernels reach into the next sheet group. They are in the workgroup's memory, of which every subgroup has a part of its own.
+// The voxels that a subgroup draws in a sheet group: found once for all pixels of a patch, shaded once, and kept for as long as their kernels reach
+// into the next sheet group. They are in workgroup memory, of which every subgroup has its own part.
 //
 // Needs gather/bits.wgsl: ballot, bits_from.
 // Needs gather/patch.wgsl: BATCH, THREADS, lane, lanes, passes.
@@ -46,7 +46,7 @@ fn is_queued_for(blocks: u32, n: u32) -> bool {
     return n < queue_count && (queue_blocks[queue_first + min(n, queue_count - 1u)] & blocks) != 0u;
 }
 
-// Those of the `BATCH` voxels from one on that some of a subgroup's blocks see, one bit each.
+// A mask of the voxels, among `BATCH` of the queue from `first` on, that any of the given blocks sees.
 fn seen_in_batch(blocks: u32, first: u32) -> vec2u {
     let count = min(queue_count - first, BATCH);
     var seen = vec2u(0u);

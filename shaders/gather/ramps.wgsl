@@ -1,4 +1,4 @@
-// Ramps whose first control points the lanes of a subgroup hold between them.
+// Ramps whose first control points are distributed among the lanes of a subgroup.
 //
 // Needs gather/patch.wgsl: control_points, lane, lanes.
 // Needs shared/shading.wgsl: between.

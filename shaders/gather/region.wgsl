@@ -1,5 +1,5 @@
-// The pixels of a patch that are not opaque (§6): a word for each of its four blocks, with the block's rows in eight bits each. Blocks are
-// numbered row by row.
+// Masks of a patch's pixels (§6): a word for each of its four blocks, with eight bits for each of the block's rows. Blocks are numbered row by
+// row.
 //
 // Needs gather/patch.wgsl: gather, lane, lanes.
 

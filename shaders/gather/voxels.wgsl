@@ -1,4 +1,4 @@
-// The voxels that a subgroup of the tile rasterizer draws in a sheet group: which of those before stay, which come, their shading, and
+// The voxels that a subgroup of the tile rasterizer draws in a sheet group: which of the previous ones stay, which are added, their shading, and
 // their counts.
 //
 // Needs gather.wgsl: FIRST_PLANE.
@@ -11,7 +11,8 @@
 // Needs gather_planes.wgsl: ECONOMIES, FIRST_PLANE, overlapped_sheets, placed, screen_box, sections_here.
 // Needs shared/frame.wgsl: BOX_SLACK, FRONT_TO_BACK, frame.
 
-// A group of sheets: its number, its first sheet, where that begins, half the box around its footprints, and whether it is composited.
+// A group of sheets: its number, its first sheet, the depth where that begins, half the box around its footprints, and whether this dispatch
+// composites it.
 struct GatheredGroup {
     number: u32,
     first_sheet: f32,
@@ -31,13 +32,13 @@ fn first_group(sheets: vec2f) -> f32 {
     return floor(sheet / f32(SHEETS));
 }
 
-// The box around a footprint on the screen, seen from the patch's first pixel.
+// The box around a footprint on the screen, relative to the patch's first pixel.
 struct ScreenBox {
     center: vec2f,
     half: vec2f,
 }
 
-// The blocks in which the box around a footprint, or a part of its extent, holds one of some pixels.
+// A mask of the blocks in which the box around a footprint, scaled by `part`, contains a pixel of the mask.
 fn blocks_seen(words: vec4u, box: ScreenBox, part: f32) -> u32 {
     let half = box.half * part + BOX_SLACK;
     if PARALLELOGRAM {

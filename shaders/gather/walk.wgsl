@@ -1,5 +1,5 @@
-// The walk through a sheet group's bricks behind a patch: their voxels whose kernels may reach the group and open pixels, as many at a
-// time as there are lanes.
+// The walk through a sheet group's bricks behind a patch, which finds the voxels whose kernels may reach the group and open pixels, one per lane at
+// a time.
 //
 // Needs gather/amounts.wgsl: is_searched_in_perspective.
 // Needs gather/bits.wgsl: ballot, nth_set_bit, together.

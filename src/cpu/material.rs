@@ -1,4 +1,5 @@
-//! What voxels look like in any view and any light: colour, opacity and normal. Bricks keep them from the first frame that shows them on.
+//! The part of shading that depends on neither view nor light: every voxel's colour, opacity and normal (SPEC §3). A brick keeps those of its voxels
+//! from the first frame that shows it.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicIsize, Ordering};
@@ -11,7 +12,8 @@ use crate::settings::shading::MIN_GRADIENT;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::Volume;
 
-/// The most bricks whose materials are kept; a brick's take 2 KiB. Others are computed again wherever a voxel is visible.
+/// The maximum number of bricks whose materials are kept, 2 KiB for each. Those of other bricks are computed again in every tile in which a voxel is
+/// visible.
 const MOST_KEPT: isize = 1 << 15;
 
 /// A voxel's material.
@@ -20,7 +22,7 @@ pub(super) struct Material {
     pub(super) color: [f32; 3],
     /// α, the opacity per unit length.
     pub(super) alpha: f32,
-    /// 0 where there is none.
+    /// The normal, a unit vector; 0 if the gradient is too short to have a direction.
     pub(super) normal: [f32; 3],
 }
 
@@ -31,7 +33,7 @@ type BrickMaterials = Box<[Material; BRICK_VOXELS as usize]>;
 #[derive(Debug)]
 pub(super) struct Materials {
     bricks: Vec<OnceLock<BrickMaterials>>,
-    /// How many bricks may still be kept.
+    /// The number of further bricks that may be kept.
     room: AtomicIsize,
 }
 
@@ -50,11 +52,12 @@ impl Materials {
         brick: &Brick,
     ) -> Option<&[Material; BRICK_VOXELS as usize]> {
         let kept = &self.bricks[number as usize];
-        if kept.get().is_none() && self.room.load(Ordering::Relaxed) <= 0 {
+        // Two threads that meet the same brick reserve room twice, so that less is kept, never more.
+        if kept.get().is_none() && self.room.fetch_sub(1, Ordering::Relaxed) <= 0 {
+            self.room.fetch_add(1, Ordering::Relaxed);
             return None;
         }
         Some(kept.get_or_init(|| {
-            self.room.fetch_sub(1, Ordering::Relaxed);
             let mut materials = Box::new([Material::default(); BRICK_VOXELS as usize]);
             brick::voxels(brick)
                 .for_each(|(slot, voxel)| materials[slot as usize] = Material::of(volume, transfer, voxel));
@@ -63,7 +66,7 @@ impl Materials {
     }
 }
 
-/// A copy keeps nothing yet.
+/// A copy has no materials yet.
 impl Clone for Materials {
     fn clone(&self) -> Self {
         Self::new(self.bricks.len())

@@ -86,7 +86,7 @@ impl Shader {
         [red, green, blue, amount.to_array()]
     }
 
-    /// Colours in this light, given their normals, 0 where there is none, and the directions to the eye.
+    /// The colours in this light. A normal of 0 stands for a voxel without a direction, which gets ambient light alone.
     #[inline(always)]
     pub(super) fn color<S: Simd>(
         &self,

@@ -122,7 +122,8 @@ pub const VALUES: Shader = shader!(
     "shared/volume",
     "shared/project",
     "shared/field_voxel",
-    "shared/planes"
+    "shared/planes",
+    "shared/number"
 );
 /// Draws them onto a slab plane.
 pub const FIELD: Shader = shader!(
@@ -211,6 +212,7 @@ pub const GATHER_PLANES: Shader = shader!(
     "shared/means",
     "shared/cells",
     "shared/planes",
+    "shared/number",
     "shared/slab_integral",
     "gather/slabs"
 );
