@@ -82,14 +82,16 @@ pub enum VolumeSource {
     Raw(PathBuf, RawLayout),
     /// A procedural volume, `NAME` or `NAME:N` (see [`builtin::volume`]).
     Builtin(String),
+    /// A volume that the program holds in memory and passes to the renderer. A scene file cannot name it.
+    Memory,
 }
 
 impl VolumeSource {
-    /// The path of a volume file, with or without a header; `None` for a procedural volume.
+    /// The path of a volume file, with or without a header; `None` for any other volume.
     pub fn path(&self) -> Option<&Path> {
         match self {
             Self::File(path) | Self::Raw(path, _) => Some(path),
-            Self::Builtin(_) => None,
+            Self::Builtin(_) | Self::Memory => None,
         }
     }
 }
@@ -249,11 +251,21 @@ impl Scene {
     /// # Errors
     /// If the text is not TOML, if a key is unknown, or if a value is not allowed.
     pub fn parse(text: &str, origin: &str, folder: &Path, sets: &[String]) -> Result<Self, SceneError> {
-        let root = text.parse::<Table>().map_err(|error| SceneError::Syntax {
-            origin: origin.to_owned(),
-            message: error.to_string().trim_end().to_owned(),
-        })?;
-        Self::build(root, origin, folder, None, sets)
+        Self::build(parse_table(text, origin)?, origin, folder, None, sets)
+    }
+
+    /// Parses a scene from text that need not name a volume: `source` is the volume of a text that names none.
+    ///
+    /// # Errors
+    /// As for [`Self::parse`].
+    pub fn parse_for(
+        source: VolumeSource,
+        text: &str,
+        origin: &str,
+        folder: &Path,
+        sets: &[String],
+    ) -> Result<Self, SceneError> {
+        Self::build(parse_table(text, origin)?, origin, folder, Some(source), sets)
     }
 
     /// A scene of a volume with every setting at its default, except the `--set` overrides. A relative `volume.path` or `volume.labels` in
@@ -294,6 +306,14 @@ impl Scene {
             VolumeSource::File(path) => (Volume::read(path, &access)?, path.display().to_string()),
             VolumeSource::Raw(path, layout) => (Volume::read_raw(path, layout, &access)?, path.display().to_string()),
             VolumeSource::Builtin(name) => (builtin::read(name, &access)?, format!("builtin:{name}")),
+            VolumeSource::Memory => {
+                return Err(VolumeError::Invalid {
+                    origin: "scene".to_owned(),
+                    field: "volume".to_owned(),
+                    found: "a volume in memory".to_owned(),
+                    allowed: "volume.path or volume.builtin".to_owned(),
+                });
+            }
         };
         let volume = match &self.labels {
             Some(path) => {
@@ -412,7 +432,15 @@ impl Scene {
         let has_none = match &self.volume {
             VolumeSource::File(_) | VolumeSource::Raw(..) => true,
             VolumeSource::Builtin(name) => builtin::labels(name).is_some_and(<[_]>::is_empty),
+            VolumeSource::Memory => false,
         };
         self.labels.is_some() || !has_none
     }
+}
+
+fn parse_table(text: &str, origin: &str) -> Result<Table, SceneError> {
+    text.parse().map_err(|error: toml::de::Error| SceneError::Syntax {
+        origin: origin.to_owned(),
+        message: error.to_string().trim_end().to_owned(),
+    })
 }

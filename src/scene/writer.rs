@@ -25,7 +25,7 @@ const ON_ONE_LINE: usize = 3;
 impl Scene {
     /// The scene as the text of a scene file in `folder`, which must exist if the scene names files: their paths are written relative to it
     /// if they are relative. [`Self::open`] reads it back as the same scene. What the scene leaves to the volume is omitted;
-    /// [`Self::explicit`] fills it in.
+    /// [`Self::explicit`] fills it in. A volume in memory has no name, so that [`Self::parse_for`] reads such a scene back.
     ///
     /// # Errors
     /// If the path of the volume or of its labels is not UTF-8, or the offset in a raw file exceeds TOML's integers.
@@ -49,6 +49,7 @@ impl Scene {
                 text.line("offset", offset?);
             }
             VolumeSource::Builtin(name) => text.line("builtin", name.as_str()),
+            VolumeSource::Memory => {}
         }
         text.given("spacing", spacing.map(vector));
         let labels = labels.as_ref().map(|path| within(folder, path, "volume.labels"));

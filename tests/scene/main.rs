@@ -257,6 +257,24 @@ fn volume_alone() {
 }
 
 #[test]
+fn volumes_in_memory() {
+    let parse_for = |text: &str| {
+        let sets = ["image.width=9".to_owned()];
+        Scene::parse_for(VolumeSource::Memory, text, "text", Path::new("folder"), &sets)
+    };
+    let scene = parse_for("[image]\nheight = 7").unwrap();
+    assert_eq!((&scene.volume, scene.image.width, scene.image.height), (&VolumeSource::Memory, 9, 7));
+    // A text that names a volume keeps it.
+    assert_eq!(parse_for(MINIMAL).unwrap().volume, file("folder/a.nrrd"));
+    assert_eq!(parse_for(&scene.to_toml(Path::new("folder")).unwrap()).unwrap(), scene);
+    assert!(parse_for("transfer.label = [{ label = 3, visible = false }]").is_ok());
+    let error = scene.load_volume().unwrap_err().to_string();
+    assert_eq!(error, "scene: volume: found a volume in memory, allowed: volume.path or volume.builtin");
+    let error = parse_for("camera.up = 5").unwrap_err().to_string();
+    assert!(error.starts_with("text: camera.up: found"), "{error}");
+}
+
+#[test]
 fn directions_of_any_length() {
     for (length, text) in [("1e-300", "[0, 1e-300, 0]"), ("1e300", "[0, 1e300, 0]"), ("5e-324", "[0, 5e-324, 0]")] {
         let set = format!("camera.direction={text}");

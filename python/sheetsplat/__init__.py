@@ -1,0 +1,46 @@
+"""Pictures of 3D scalar volumes, without a display, a driver or a system package.
+
+>>> import numpy as np
+>>> import sheetsplat
+>>> volume = np.random.default_rng(1).normal(size=(8, 8, 8))
+>>> image = sheetsplat.render(volume, spacing=(2, 1, 1), image={"width": 64, "height": 64})
+>>> image
+<sheetsplat.Image of 64×64 pixels>
+"""
+
+from .comparison import Comparison, compare
+from .errors import (
+    DeviceError,
+    FileError,
+    GoldenError,
+    ImageError,
+    RenderError,
+    SceneError,
+    SheetsplatError,
+    VolumeError,
+)
+from .image import Image
+from .scene import Scene
+from .view import View, info, orbit, render, sweep
+from .volume import Volume
+
+__all__ = [
+    "Comparison",
+    "DeviceError",
+    "FileError",
+    "GoldenError",
+    "Image",
+    "ImageError",
+    "RenderError",
+    "Scene",
+    "SceneError",
+    "SheetsplatError",
+    "View",
+    "Volume",
+    "VolumeError",
+    "compare",
+    "info",
+    "orbit",
+    "render",
+    "sweep",
+]

@@ -1,0 +1,140 @@
+"""Pictures."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+from . import _native
+from .errors import ImageError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import DTypeLike, NDArray
+
+__all__ = ["Image"]
+
+
+class Image:
+    """A picture: ``float32``, height × width × 4, RGB premultiplied by alpha.
+
+    ``np.asarray(image)`` is the picture's own memory, without a copy. A picture shows itself in Jupyter.
+
+    Parameters
+    ----------
+    array : array or Image
+        Height × width × 3 or 4: floating-point numbers, premultiplied by alpha, or 8-bit or 16-bit integers with
+        straight alpha, as in a PNG. Three channels are opaque.
+
+    Attributes
+    ----------
+    stats : dict
+        Counts and times of the render, by the names that ``sheetsplat render --stats`` writes; empty for a picture
+        from elsewhere.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> image = Image(np.zeros((48, 64, 3), dtype=np.uint8))
+    >>> image.width, image.height, np.asarray(image)[0, 0].tolist()
+    (64, 48, [0.0, 0.0, 0.0, 1.0])
+    """
+
+    stats: dict[str, Any]
+    _array: NDArray[np.float32]
+    _made_on: tuple[str, str] | None
+
+    def __init__(self, array: Any) -> None:
+        if isinstance(array, Image):
+            self._array, self.stats, self._made_on = array._array, array.stats, array._made_on
+            return
+        self._array, self.stats, self._made_on = _premultiplied(array), {}, None
+
+    @classmethod
+    def _of(cls, array: NDArray[np.float32], stats: dict[str, Any], made_on: tuple[str, str] | None) -> Image:
+        image = cls.__new__(cls)
+        image._array, image.stats, image._made_on = array, stats, made_on
+        return image
+
+    @classmethod
+    def open(cls, path: str | os.PathLike[str]) -> Image:
+        """Opens a PNG, EXR or NPY file."""
+        array, made_on = _native.open_image(path)
+        return cls._of(array, {}, made_on)
+
+    @property
+    def width(self) -> int:
+        """Pixels per row."""
+        return int(self._array.shape[1])
+
+    @property
+    def height(self) -> int:
+        """The number of rows."""
+        return int(self._array.shape[0])
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        import numpy as np
+
+        if dtype is not None and np.dtype(dtype) != self._array.dtype:
+            if copy is False:
+                raise ValueError(f"a copy is needed for {np.dtype(dtype)}")
+            return self._array.astype(dtype)
+        return self._array.copy() if copy else self._array
+
+    def to_uint8(self) -> NDArray[np.uint8]:
+        """The picture as ``uint8`` with straight alpha, as in a PNG."""
+        import numpy as np
+
+        color, alpha = self._array[..., :3], self._array[..., 3:]
+        straight = np.divide(color, alpha, out=np.zeros_like(color), where=alpha > 0)
+        channels = np.concatenate([straight, alpha], axis=2)
+        # A half is rounded up, as in the files that `save` writes.
+        return np.clip(np.floor(channels * 255 + np.float32(0.5)), 0, 255).astype(np.uint8)
+
+    def to_pil(self) -> Any:
+        """The picture as a ``PIL.Image.Image`` of mode RGBA. Needs Pillow."""
+        import PIL.Image
+
+        return PIL.Image.fromarray(self.to_uint8(), "RGBA")
+
+    def save(self, path: str | os.PathLike[str], *, depth: int = 8) -> None:
+        """Saves the picture by the file's extension.
+
+        Parameters
+        ----------
+        path : path
+            ``.png`` (straight alpha), ``.exr`` or ``.npy`` (both ``float32``, premultiplied).
+        depth : {8, 16}
+            Bits per channel of a PNG.
+        """
+        _native.save(self._array, path, depth)
+
+    def _repr_png_(self) -> bytes:
+        return _native.encode(self._array, 8)
+
+    def __repr__(self) -> str:
+        return f"<sheetsplat.Image of {self.width}×{self.height} pixels>"
+
+
+def _premultiplied(source: Any) -> NDArray[np.float32]:
+    import numpy as np
+
+    array = np.asarray(source)
+    if array.ndim != 3 or array.shape[2] not in (3, 4) or 0 in array.shape:
+        shape = "×".join(map(str, array.shape))
+        raise ImageError(f"image: found the shape {shape}, allowed: height × width × 3 or 4", "image", shape)
+    if array.dtype in (np.uint8, np.uint16):
+        channels = array.astype(np.float32) / np.float32(np.iinfo(array.dtype).max)
+        is_straight = True
+    elif array.dtype.kind == "f":
+        channels = array.astype(np.float32)
+        is_straight = False
+    else:
+        allowed = "uint8, uint16 or floating-point numbers"
+        raise ImageError(f"image: found {array.dtype}, allowed: {allowed}", "image", str(array.dtype), allowed)
+    if channels.shape[2] == 3:
+        opaque = np.ones((*channels.shape[:2], 1), dtype=np.float32)
+        return np.concatenate([channels, opaque], axis=2)
+    if is_straight:
+        channels[..., :3] *= channels[..., 3:]
+    return np.ascontiguousarray(channels)

@@ -1,0 +1,340 @@
+"""Pictures of volumes: one, many of one volume, turntables and sweeps."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from . import _native as native
+from .image import Image
+from .scene import Scene
+from .volume import Volume
+
+__all__ = ["View", "info", "orbit", "render", "sweep"]
+
+_SCENE_FILE = ".toml"
+
+
+class View:
+    """A view of a volume for any number of pictures.
+
+    The volume is read once. A change of the camera alone keeps the classified voxels; any other change classifies
+    them again. Pictures are drawn without holding Python's lock, so that views in several threads draw at once.
+
+    Parameters
+    ----------
+    source : array, image of SimpleITK or nibabel, path, Volume or Scene
+        What is drawn: anything that `Volume` takes, or a scene (or the path of a scene file) that names its volume.
+    spacing, labels
+        As for `Volume`.
+    scene : Scene, mapping, str or path, optional
+        How it is drawn: a scene, or what `Scene` takes. A volume that it names is ignored.
+    side : str, optional
+        The side of the patient to look at, as for `Scene.seen_from`.
+    backend : str
+        ``"cpu"`` needs no driver and gives the same bytes on every machine; ``"gpu"``; ``"auto"``, a GPU if there is
+        one; or ``"reference"``, slow and in 64 bits.
+    adapter : str, optional
+        Part of the name of the GPU.
+    **settings
+        Settings over those of `scene`, as for `Scene`.
+
+    Examples
+    --------
+    >>> view = View("builtin:head:16", image={"width": 32, "height": 32})
+    >>> front = view.render()
+    >>> view.set(camera={"direction": [1, 0, 0]})
+    >>> side = view.render()
+    >>> front.width, side.stats["voxels_total"]
+    (32, 4096)
+    """
+
+    def __init__(
+        self,
+        source: Any,
+        *,
+        spacing: float | Sequence[float] | None = None,
+        labels: Any = None,
+        scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None = None,
+        side: str | None = None,
+        backend: str = "cpu",
+        adapter: str | None = None,
+        **settings: Any,
+    ) -> None:
+        volume, look = _what_and_how(source, spacing, labels, scene, settings)
+        if side is not None:
+            look = look.seen_from(volume, side)
+        self._volume, self._scene = volume, look
+        self._native = native.View(volume._native, look._native, backend, adapter)
+
+    @property
+    def volume(self) -> Volume:
+        """The volume."""
+        return self._volume
+
+    @property
+    def scene(self) -> Scene:
+        """The settings. Assigning other ones changes the next picture."""
+        return self._scene
+
+    @scene.setter
+    def scene(self, scene: Scene) -> None:
+        self._native.set_scene(scene._native)
+        self._scene = scene
+
+    @property
+    def backend(self) -> str:
+        """The backend that draws: ``"cpu"``, ``"gpu"`` or ``"reference"``."""
+        return self._native.backend
+
+    def set(self, **settings: Any) -> None:
+        """Changes settings, as for `Scene`. If one is not allowed, nothing changes."""
+        self.scene = self._scene.replace(**settings)
+
+    def render(self, **settings: Any) -> Image:
+        """Draws a picture, after changing the settings that are given."""
+        if settings:
+            self.set(**settings)
+        array, stats, made_on = self._native.draw()
+        return Image._of(array, json.loads(stats), made_on)
+
+    def orbit(
+        self, *, count: int = 120, turn: float = 360.0, frames: range | None = None
+    ) -> Iterator[Image]:
+        """Draws a turntable, one picture at each step of the iterator.
+
+        Parameters
+        ----------
+        count : int
+            The number of pictures of the whole turn.
+        turn : float
+            Degrees over all pictures, right-handed about ``camera.up``.
+        frames : range, optional
+            Draw only these of the `count` pictures.
+        """
+        frames = _frames(count, frames)
+        start = self._scene.explicit(self._volume, all_around=True)
+        return self._turns(start, frames, turn / count)
+
+    def _turns(self, start: Scene, frames: range, step: float) -> Iterator[Image]:
+        for frame in frames:
+            self.scene = start.turned(step * frame)
+            yield self.render()
+
+    def __repr__(self) -> str:
+        return f"<sheetsplat.View of {self._volume!r} by {self.backend}>"
+
+
+def _what_and_how(
+    source: Any,
+    spacing: float | Sequence[float] | None,
+    labels: Any,
+    scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None,
+    settings: dict[str, Any],
+) -> tuple[Volume, Scene]:
+    if isinstance(source, Scene) or _is_scene_file(source):
+        look = Scene(source, **settings)
+        if scene is not None:
+            raise TypeError("the source is a scene; give either it or `scene`")
+        volume = look.load_volume()
+    else:
+        from .errors import SceneError
+
+        look = Scene(scene, **settings)
+        if any(key == "volume" or key.startswith("volume.") for key in settings):
+            found, allowed = "a volume beside the source", "no such key: `source`, `spacing` and `labels`"
+            raise SceneError(f"volume: found {found}, allowed: {allowed}", "volume", found, allowed)
+        volume = source if isinstance(source, Volume) else Volume(source, spacing=spacing, labels=labels)
+        if volume is not source:
+            return volume, look
+    if spacing is not None or labels is not None:
+        volume = Volume(volume, spacing=spacing, labels=labels)
+    return volume, look
+
+
+def _is_scene_file(source: Any) -> bool:
+    return isinstance(source, (str, os.PathLike)) and os.fsdecode(source).lower().endswith(_SCENE_FILE)
+
+
+def _frames(count: int, frames: range | None) -> range:
+    from .errors import SceneError
+
+    if count < 1:
+        raise SceneError(f"count: found {count}, allowed: at least 1", "count", str(count), "at least 1")
+    if frames is None:
+        return range(count)
+    if any(not 0 <= frame < count for end in (frames[:1], frames[-1:]) for frame in end):
+        allowed = f"within range(0, {count})"
+        raise SceneError(f"frames: found {frames}, allowed: {allowed}", "frames", str(frames), allowed)
+    return frames
+
+
+def render(source: Any, **arguments: Any) -> Image:
+    """Draws one picture.
+
+    Parameters
+    ----------
+    source
+        What is drawn: an array ``[z, y, x]``, an image of SimpleITK or nibabel, a path, a `Volume` or a `Scene`.
+    **arguments
+        As for `View`: `spacing`, `labels`, `scene`, `side`, `backend`, `adapter`, and settings.
+
+    Returns
+    -------
+    Image
+        The picture, with its `stats`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> z, y, x = np.ogrid[-1:1:24j, -1:1:24j, -1:1:24j]
+    >>> ball = 100 * (x * x + y * y + z * z < 0.5)
+    >>> image = render(ball, image={"width": 64, "height": 64})
+    >>> np.asarray(image).shape
+    (64, 64, 4)
+    """
+    return View(source, **arguments).render()
+
+
+def orbit(
+    source: Any,
+    output: str | os.PathLike[str] | None = None,
+    *,
+    count: int = 120,
+    turn: float = 360.0,
+    frames: range | None = None,
+    fps: int = 30,
+    progress: bool = True,
+    **arguments: Any,
+) -> Iterator[Image] | None:
+    """Draws a turntable: an iterator of pictures, or files.
+
+    Parameters
+    ----------
+    source
+        What is drawn, as for `View`.
+    output : path, optional
+        Numbered pictures (``frame-%04d.png``, ``frame-####.exr``), or a movie (``.gif``, ``.apng``, ``.webp``), which
+        needs Pillow. Without it, an iterator of pictures is returned, and each is drawn when it is asked for.
+    count, turn, frames
+        As for `View.orbit`.
+    fps : int
+        Pictures per second of a movie.
+    progress : bool
+        Show a progress bar while files are written, if tqdm is installed.
+    **arguments
+        As for `View`.
+
+    Notes
+    -----
+    Ctrl-C stops between two pictures: numbered pictures that are complete stay, a movie is not written.
+    """
+    pattern = None if output is None else _files(os.fspath(output))
+    turns = View(source, **arguments).orbit(count=count, turn=turn, frames=frames)
+    if output is None or pattern is None:
+        return turns
+    numbers = _frames(count, frames)
+    pictures = _shown(turns, len(numbers), progress)
+    if pattern[1]:
+        _save_movie(os.fspath(output), list(pictures), fps)
+    else:
+        for frame, image in zip(numbers, pictures, strict=True):
+            image.save(pattern[0] % frame)
+    return None
+
+
+#: The extensions of movies.
+_MOVIES = (".gif", ".apng", ".webp")
+
+
+def _files(output: str) -> tuple[str, bool]:
+    """The pattern of numbered files, or the file of a movie, checked before anything is drawn."""
+    from .errors import ImageError
+
+    if output.lower().endswith(_MOVIES):
+        import PIL.Image  # noqa: F401  Pillow must be there before pictures are drawn.
+
+        return output, True
+    folder, name = os.path.split(output)
+    hashes = "".join(itertools.takewhile("#".__eq__, name[name.find("#") :])) if "#" in name else ""
+    if hashes:
+        name = name.replace("%", "%%").replace(hashes, f"%0{len(hashes)}d", 1)
+    pattern = os.path.join(folder.replace("%", "%%"), name)
+    try:
+        is_numbered = pattern % 1 != pattern % 2 and "#" not in name
+    except (TypeError, ValueError):
+        is_numbered = False
+    if not is_numbered:
+        allowed = f"numbered pictures (frame-%04d.png, frame-####.png) or a movie ({', '.join(_MOVIES)})"
+        raise ImageError(f"output: found {output}, allowed: {allowed}", "output", output, allowed)
+    native.check_format(pattern % 0)
+    return pattern, False
+
+
+def _save_movie(output: str, pictures: list[Image], fps: int) -> None:
+    first, *others = [picture.to_pil() for picture in pictures]
+    kind = {".gif": "GIF", ".apng": "PNG", ".webp": "WEBP"}[os.path.splitext(output)[1].lower()]
+    first.save(output, kind, save_all=True, append_images=others, duration=1000 / fps, loop=0)
+
+
+def _shown(pictures: Iterator[Image], count: int, progress: bool) -> Iterator[Image]:
+    if not progress:
+        return pictures
+    try:
+        from tqdm.auto import tqdm
+    except ImportError:
+        return pictures
+    bar: Iterator[Image] = iter(tqdm(pictures, total=count, unit="picture", leave=False))
+    return bar
+
+
+def sweep(
+    source: Any, values: Mapping[str, Sequence[Any]], **arguments: Any
+) -> Iterator[tuple[dict[str, Any], Image]]:
+    """Draws a picture for every combination of values of some settings.
+
+    Parameters
+    ----------
+    source
+        What is drawn, as for `View`.
+    values : mapping
+        The values of each setting, by its key.
+    **arguments
+        As for `View`.
+
+    Yields
+    ------
+    tuple of dict and Image
+        The settings of a picture, by their keys, and the picture.
+
+    Examples
+    --------
+    >>> pictures = sweep("builtin:head:16", {"splatting.slab_width": [0.5, 1, 2]}, image={"width": 16, "height": 16})
+    >>> [settings["splatting.slab_width"] for settings, image in pictures]
+    [0.5, 1, 2]
+    """
+    view = View(source, **arguments)
+    # All scenes are checked before the first is drawn.
+    combinations = [dict(zip(values, chosen, strict=True)) for chosen in itertools.product(*values.values())]
+    scenes = [(settings, view.scene.replace(**settings)) for settings in combinations]
+    return _swept(view, scenes)
+
+
+def _swept(view: View, scenes: list[tuple[dict[str, Any], Scene]]) -> Iterator[tuple[dict[str, Any], Image]]:
+    for settings, scene in scenes:
+        view.scene = scene
+        yield settings, view.render()
+
+
+def info(source: Any, *, spacing: float | Sequence[float] | None = None) -> dict[str, Any]:
+    """Facts about a volume, as `Volume.info`.
+
+    Examples
+    --------
+    >>> info("builtin:cube:8")["shape"]
+    [8, 8, 8]
+    """
+    return _what_and_how(source, spacing, None, None, {})[0].info()

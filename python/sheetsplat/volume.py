@@ -1,0 +1,202 @@
+"""Volumes from arrays, images of other libraries, and files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from . import _native as native
+from .errors import VolumeError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+__all__ = ["Volume"]
+
+_BUILTIN = "builtin:"
+
+#: Converts the directions of LPS, which ITK uses, to RAS.
+_RAS_FROM_LPS = (-1.0, -1.0, 1.0)
+
+
+class Volume:
+    """A scalar volume on a rectilinear grid, shared by all pictures of it.
+
+    Parameters
+    ----------
+    source : array, SimpleITK or nibabel image, path or Volume
+        An array ``[z, y, x]`` of any integer or floating-point type, with any strides, or anything with ``__array__``
+        (xarray, dask, zarr, torch on the CPU). Its values are copied; NaN and infinite ones are holes, which are not
+        drawn. An image of SimpleITK or nibabel, which also gives spacing and orientation. A path of a volume file or
+        of a folder of slices. Or ``"builtin:NAME"``.
+    spacing : float or three floats, optional
+        World units between voxels, in the order of an array's axes: z, y, x. Replaces the source's own.
+    labels : array, optional
+        The segment of each voxel, whole numbers from 0 to 65535, of the same shape.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> volume = Volume(np.arange(24, dtype=np.int16).reshape(2, 3, 4), spacing=(2, 1, 1))
+    >>> volume.shape, volume.spacing
+    ((2, 3, 4), (2.0, 1.0, 1.0))
+    """
+
+    _native: native.Volume
+
+    def __init__(
+        self,
+        source: Any,
+        *,
+        spacing: float | Sequence[float] | None = None,
+        labels: Any = None,
+    ) -> None:
+        steps = None if spacing is None else _spacing(spacing)
+        tags = None if labels is None else _array(labels, "labels")
+        if isinstance(source, Volume):
+            self._native = source._native
+        elif isinstance(source, (str, os.PathLike)):
+            self._native = _open(os.fspath(source))
+        else:
+            array, own_spacing, axes, origin = _converted(source)
+            self._native = native.Volume.from_array(array, steps or own_spacing, tags, axes, origin)
+            return
+        if steps is not None or tags is not None:
+            self._native = self._native.replaced(steps, tags)
+
+    @classmethod
+    def _of(cls, shared: native.Volume) -> Volume:
+        volume = cls.__new__(cls)
+        volume._native = shared
+        return volume
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """The number of voxels along z, y and x."""
+        z, y, x = self._native.shape
+        return z, y, x
+
+    @property
+    def spacing(self) -> tuple[float, float, float]:
+        """World units between voxels along z, y and x."""
+        z, y, x = self._native.spacing
+        return z, y, x
+
+    @property
+    def unit(self) -> str | None:
+        """The name of the world unit, if the file states it."""
+        return self._native.unit
+
+    @property
+    def holes(self) -> int:
+        """The number of voxels whose values are NaN or infinite."""
+        return self._native.holes
+
+    @property
+    def values(self) -> NDArray[np.float32]:
+        """A copy of the values, ``[z, y, x]``; holes are NaN."""
+        return self._native.values()
+
+    def info(self) -> dict[str, Any]:
+        """Facts about the volume: its grid, the distribution of its values, and the preset that suits it."""
+        return self._native.info()
+
+    def __repr__(self) -> str:
+        z, y, x = self.shape
+        return f"<sheetsplat.Volume of {z}×{y}×{x} voxels, spacing {self.spacing}>"
+
+
+def _open(path: str | bytes) -> native.Volume:
+    name = os.fsdecode(path)
+    if name.startswith(_BUILTIN):
+        return native.Volume.builtin(name.removeprefix(_BUILTIN))
+    return native.Volume.open(name)
+
+
+def _spacing(spacing: Any) -> tuple[float, float, float]:
+    try:
+        numbers = [float(number) for number in (spacing if hasattr(spacing, "__len__") else [spacing] * 3)]
+    except (TypeError, ValueError):
+        numbers = []
+    if len(numbers) != 3:
+        raise _refused("spacing", repr(spacing), "a number, or three numbers z, y, x")
+    return numbers[0], numbers[1], numbers[2]
+
+
+def _refused(field: str, found: str, allowed: str) -> VolumeError:
+    return VolumeError(f"array: {field}: found {found}, allowed: {allowed}", field, found, allowed)
+
+
+def _array(source: Any, name: str) -> NDArray[Any]:
+    """The array `[z, y, x]` in the machine's byte order; a copy only if its own form cannot be read."""
+    import numpy as np
+
+    if name == "array" and not hasattr(source, "__array__") and not isinstance(source, (list, tuple)):
+        allowed = "an array, an image of SimpleITK or nibabel, a path, or a Volume"
+        raise _refused("source", f"{type(source).__name__}", allowed)
+    try:
+        array = np.asarray(source)
+    except ValueError as error:
+        raise _refused(name, str(error), "three dimensions z, y, x") from error
+    if array.ndim != 3:
+        shape = "×".join(map(str, array.shape)) or "a single number"
+        field = "shape" if name == "array" else name
+        raise _refused(field, f"{array.ndim} dimensions ({shape})", "three dimensions z, y, x")
+    kind, size = array.dtype.kind, array.dtype.itemsize
+    if kind == "b":
+        return array.view(np.uint8)
+    if kind not in "iuf":
+        raise _refused("dtype", str(array.dtype), "integers or floating-point numbers")
+    if kind == "f" and size not in (4, 8):
+        return array.astype(np.float32 if size == 2 else np.float64)
+    if not array.dtype.isnative:
+        array = array.astype(array.dtype.newbyteorder("="))
+    # `long` and `long long` may be types of equal size that NumPy tells apart.
+    array = array.view(np.dtype(f"{kind}{size}"))
+    return np.require(array, requirements=["A"])
+
+
+_Converted = tuple["NDArray[Any]", tuple[float, float, float], "list[list[float]] | None", "list[float]"]
+
+
+def _converted(source: Any) -> _Converted:
+    if hasattr(source, "GetSpacing") and hasattr(source, "GetDirection"):
+        return _of_itk(source)
+    if hasattr(source, "affine") and hasattr(source, "dataobj"):
+        return _of_nibabel(source)
+    return _array(source, "array"), (1.0, 1.0, 1.0), None, [0.0, 0.0, 0.0]
+
+
+def _of_itk(image: Any) -> _Converted:
+    """An image of SimpleITK, whose vectors are in the order x, y, z and whose directions are in LPS."""
+    import SimpleITK
+
+    spacing = image.GetSpacing()
+    array = _array(SimpleITK.GetArrayViewFromImage(image), "array")
+    if len(spacing) != 3:
+        raise _refused("spacing", repr(spacing), "an image of three dimensions")
+    rows = image.GetDirection()
+    axes = [[sign * rows[3 * row + column] for row, sign in enumerate(_RAS_FROM_LPS)] for column in range(3)]
+    origin = [sign * place for sign, place in zip(_RAS_FROM_LPS, image.GetOrigin(), strict=True)]
+    return array, (spacing[2], spacing[1], spacing[0]), axes, origin
+
+
+def _of_nibabel(image: Any) -> _Converted:
+    """An image of nibabel, whose axes are x, y, z and whose affine leads to RAS."""
+    import numpy as np
+
+    array = np.asanyarray(image.dataobj)
+    if array.ndim == 4 and array.shape[3] == 1:
+        array = array[..., 0]
+    affine = image.affine
+    if affine is None:
+        return _array(array.T, "array"), (1.0, 1.0, 1.0), None, [0.0, 0.0, 0.0]
+    steps = np.asarray(affine, dtype=float)
+    lengths = np.linalg.norm(steps[:3, :3], axis=0)
+    if not (np.isfinite(steps).all() and (lengths > 0).all()):
+        raise _refused("affine", repr(affine), "finite axes of positive length")
+    axes = (steps[:3, :3] / lengths).T.tolist()
+    x, y, z = (float(length) for length in lengths)
+    return _array(array.T, "array"), (z, y, x), axes, steps[:3, 3].tolist()

@@ -1,0 +1,26 @@
+//! The part of the Python package `sheetsplat` that is written in Rust. The Python modules beside it are the public interface; they check and
+//! convert arguments, and document them.
+
+mod array;
+mod error;
+mod golden;
+mod image;
+mod scene;
+mod settings;
+mod view;
+mod volume;
+
+/// The module `sheetsplat._native`.
+#[pyo3::pymodule]
+mod _native {
+    #[pymodule_export]
+    use crate::golden::{Comparison, check_golden, compare, open_image};
+    #[pymodule_export]
+    use crate::image::{check_format, encode, save};
+    #[pymodule_export]
+    use crate::scene::Scene;
+    #[pymodule_export]
+    use crate::view::View;
+    #[pymodule_export]
+    use crate::volume::Volume;
+}

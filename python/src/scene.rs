@@ -1,0 +1,115 @@
+//! Scenes.
+
+use std::path::{Path, PathBuf};
+
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use sheetsplat::scene::VolumeSource;
+use sheetsplat::volume::PatientSide;
+
+use crate::error::{Raised, setting};
+use crate::settings;
+use crate::volume::Volume;
+
+/// The sides of a patient.
+const SIDES: [(&str, PatientSide); 6] = [
+    ("front", PatientSide::Front),
+    ("back", PatientSide::Back),
+    ("left", PatientSide::Left),
+    ("right", PatientSide::Right),
+    ("top", PatientSide::Top),
+    ("bottom", PatientSide::Bottom),
+];
+
+/// A checked scene, and what it was read from, so that settings can be replaced as the program's `--set` does.
+#[pyclass(frozen, module = "sheetsplat._native")]
+pub(crate) struct Scene {
+    pub(crate) scene: sheetsplat::Scene,
+    text: String,
+    origin: String,
+    folder: PathBuf,
+    sets: Vec<String>,
+}
+
+impl Scene {
+    fn read(text: String, origin: String, folder: PathBuf, sets: Vec<String>) -> Result<Self, Raised> {
+        let scene = sheetsplat::Scene::parse_for(VolumeSource::Memory, &text, &origin, &folder, &sets)?;
+        Ok(Self { scene, text, origin, folder, sets })
+    }
+
+    /// A scene that was derived from this one.
+    fn derived(&self, scene: sheetsplat::Scene) -> Result<Self, Raised> {
+        let folder = PathBuf::from(".");
+        Ok(Self { text: scene.to_toml(&folder)?, scene, origin: self.origin.clone(), folder, sets: Vec::new() })
+    }
+}
+
+#[pymethods]
+impl Scene {
+    /// A scene of TOML text with settings over it. Paths in the text are relative to `folder`.
+    #[new]
+    fn new(text: String, origin: String, folder: PathBuf, settings: &Bound<'_, PyDict>) -> PyResult<Self> {
+        Ok(Self::read(text, origin, folder, settings::sets(settings)?)?)
+    }
+
+    /// The same scene with other settings.
+    fn replaced(&self, settings: &Bound<'_, PyDict>) -> PyResult<Self> {
+        let mut sets = self.sets.clone();
+        sets.extend(settings::sets(settings)?);
+        Ok(Self::read(self.text.clone(), self.origin.clone(), self.folder.clone(), sets)?)
+    }
+
+    /// Whether the scene names its volume.
+    #[getter]
+    fn names_volume(&self) -> bool {
+        self.scene.volume != VolumeSource::Memory
+    }
+
+    /// The volume that the scene names.
+    fn load_volume(&self, py: Python<'_>) -> PyResult<Volume> {
+        let volume = py.detach(|| self.scene.load_volume().map_err(Raised::from))?;
+        Ok(Volume(volume.into()))
+    }
+
+    /// The scene with everything stated that depends on the volume; `all_around` for a camera that turns.
+    fn explicit(&self, py: Python<'_>, volume: &Volume, all_around: bool) -> PyResult<Self> {
+        let explicit = py.detach(|| {
+            self.scene.transfer.check_volume(&volume.0)?;
+            let scene = &self.scene;
+            Ok::<_, Raised>(if all_around { scene.explicit_all_around(&volume.0) } else { scene.explicit(&volume.0) })
+        })?;
+        Ok(self.derived(explicit)?)
+    }
+
+    /// The scene with the camera turned about its up vector.
+    fn turned(&self, degrees: f64) -> PyResult<Self> {
+        if !degrees.is_finite() {
+            return Err(setting("turn", &degrees.to_string(), "a finite number of degrees").into());
+        }
+        Ok(self.derived(sheetsplat::Scene { camera: self.scene.camera.turned(degrees), ..self.scene.clone() })?)
+    }
+
+    /// The scene with the camera on one side of the patient.
+    fn seen_from(&self, volume: &Volume, side: &str) -> PyResult<Self> {
+        let Some(&(_, side)) = SIDES.iter().find(|(name, _)| *name == side) else {
+            let allowed = SIDES.map(|(name, _)| format!("{name:?}")).join(", ");
+            return Err(setting("side", &format!("{side:?}"), &allowed).into());
+        };
+        let Some(orientation) = volume.0.orientation() else {
+            let allowed = "a volume that says how the patient lies, or camera.direction and camera.up";
+            return Err(setting("side", "a volume without orientation", allowed).into());
+        };
+        let mut scene = self.scene.clone();
+        [scene.camera.direction, scene.camera.up] = orientation.direction_and_up(side);
+        Ok(self.derived(scene)?)
+    }
+
+    /// The text of a scene file in a folder.
+    fn to_toml(&self, folder: PathBuf) -> PyResult<String> {
+        Ok(self.scene.to_toml(Path::new(&folder)).map_err(Raised::from)?)
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.scene == other.scene
+    }
+}

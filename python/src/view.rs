@@ -1,0 +1,99 @@
+//! Views of a volume, drawn by any backend without holding Python's lock.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use numpy::PyArray3;
+use pyo3::prelude::*;
+use sheetsplat::golden::Subject;
+use sheetsplat::headless::{Backend, Headless, HeadlessOptions, HeadlessView};
+
+use crate::error::{Raised, setting};
+use crate::image;
+use crate::scene::Scene;
+use crate::volume::Volume;
+
+/// A picture's pixels, its statistics as JSON, and the adapter and driver that made it.
+type Drawn<'py> = (Bound<'py, PyArray3<f32>>, String, Option<(String, String)>);
+
+/// A view of a volume for any number of pictures. One thread draws at a time.
+#[pyclass(frozen, module = "sheetsplat._native")]
+pub(crate) struct View {
+    headless: Arc<Headless>,
+    volume: Arc<sheetsplat::Volume>,
+    view: Mutex<HeadlessView>,
+}
+
+impl View {
+    /// A picture that failed leaves a view that can draw the next one.
+    fn lock(&self) -> MutexGuard<'_, HeadlessView> {
+        self.view.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[pymethods]
+impl View {
+    #[new]
+    fn new(py: Python<'_>, volume: &Volume, scene: &Scene, backend: &str, adapter: Option<String>) -> PyResult<Self> {
+        let backend: Backend = backend.parse().map_err(|allowed: String| {
+            setting("backend", &format!("{backend:?}"), allowed.trim_start_matches("allowed: "))
+        })?;
+        let volume = volume.0.clone();
+        let view = py.detach(|| {
+            let headless = headless(backend, adapter, &scene.scene)?;
+            let view = Mutex::new(headless.view(volume.clone(), &scene.scene)?);
+            Ok::<_, Raised>(Self { headless, volume, view })
+        })?;
+        Ok(view)
+    }
+
+    /// Changes the scene. Another camera alone keeps everything else.
+    fn set_scene(&self, py: Python<'_>, scene: &Scene) -> PyResult<()> {
+        py.detach(|| {
+            let (mut view, new) = (self.lock(), &scene.scene);
+            let with_camera = sheetsplat::Scene { camera: new.camera, ..view.scene().clone() };
+            if with_camera == *new {
+                view.set_camera(new.camera)?;
+            } else {
+                *view = self.headless.view(self.volume.clone(), new)?;
+            }
+            Ok::<_, Raised>(())
+        })?;
+        Ok(())
+    }
+
+    /// The backend that draws.
+    #[getter]
+    fn backend(&self) -> &'static str {
+        self.headless.backend().name()
+    }
+
+    /// Draws a picture.
+    fn draw<'py>(&self, py: Python<'py>) -> PyResult<Drawn<'py>> {
+        let (rendering, stats) = py.detach(|| {
+            let rendering = self.headless.draw(&mut self.lock()).map_err(Raised::from)?;
+            let stats = serde_json::to_string(&rendering.stats);
+            Ok::<_, Raised>((rendering, stats))
+        })?;
+        let stats = stats.map_err(|error| pyo3::exceptions::PyRuntimeError::new_err(error.to_string()))?;
+        let made_on = rendering.made_on().map(|made_on| (made_on.adapter, made_on.driver));
+        Ok((image::array(py, rendering.image)?, stats, made_on))
+    }
+}
+
+/// The backend for a scene. A GPU's device is opened once for each adapter's name.
+fn headless(backend: Backend, adapter: Option<String>, scene: &sheetsplat::Scene) -> Result<Arc<Headless>, Raised> {
+    static OPENED: Mutex<Vec<(Backend, Option<String>, Arc<Headless>)>> = Mutex::new(Vec::new());
+    let mut options = HeadlessOptions::default().with_backend(backend);
+    options.adapter = adapter.clone();
+    let is_automatic = backend == Backend::Auto;
+    let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
+    let is_known = |entry: &&(Backend, Option<String>, Arc<Headless>)| entry.0 == backend && entry.1 == adapter;
+    if let Some((.., headless)) = opened.iter().find(is_known).filter(|_| !is_automatic) {
+        return Ok(headless.clone());
+    }
+    let headless = Arc::new(Headless::for_scenes(&options, [scene])?);
+    if !is_automatic {
+        opened.push((backend, adapter, headless.clone()));
+    }
+    Ok(headless)
+}

@@ -1,0 +1,175 @@
+//! Volumes.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use numpy::{PyArray1, PyArray3, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use sheetsplat::appearance::{Preset, quantiles};
+use sheetsplat::glam::{DMat3, DVec3, UVec3};
+use sheetsplat::volume::{Labels, Orientation, builtin};
+
+use crate::array;
+use crate::error::Raised;
+
+/// The name of volumes from arrays in errors.
+const ORIGIN: &str = "array";
+
+/// The fractions of `info`'s percentiles, and their names.
+const PERCENTILES: [(f64, &str); 9] = [
+    (0.001, "0.1"),
+    (0.01, "1"),
+    (0.05, "5"),
+    (0.25, "25"),
+    (0.5, "50"),
+    (0.75, "75"),
+    (0.95, "95"),
+    (0.99, "99"),
+    (0.999, "99.9"),
+];
+
+/// A volume, shared by every view of it.
+#[pyclass(frozen, module = "sheetsplat._native")]
+pub(crate) struct Volume(pub(crate) Arc<sheetsplat::Volume>);
+
+impl Volume {
+    fn with(py: Python<'_>, make: impl FnOnce() -> Result<sheetsplat::Volume, Raised> + Send) -> PyResult<Self> {
+        Ok(Self(Arc::new(py.detach(make)?)))
+    }
+}
+
+#[pymethods]
+impl Volume {
+    /// A volume of an array `[z, y, x]`. `axes` are the directions of x, y and z in the patient (RAS).
+    #[staticmethod]
+    #[pyo3(signature = (array, spacing, labels=None, axes=None, origin=[0.0; 3]))]
+    fn from_array(
+        array: &Bound<'_, PyAny>,
+        spacing: [f64; 3],
+        labels: Option<&Bound<'_, PyAny>>,
+        axes: Option<[[f64; 3]; 3]>,
+        origin: [f64; 3],
+    ) -> PyResult<Self> {
+        let (dims, values) = array::values(array)?;
+        let labels = labels.map(array::labels).transpose()?;
+        let orientation =
+            axes.map(|axes| Orientation { axes: DMat3::from_cols_array_2d(&axes), origin: origin.into() });
+        Self::with(array.py(), || {
+            let volume = sheetsplat::Volume::new(ORIGIN, dims.into(), zyx(spacing), values)?;
+            let volume = volume.with_orientation(ORIGIN, orientation)?;
+            labels.map_or(Ok(volume.clone()), |labels| with_labels(volume, labels))
+        })
+    }
+
+    /// A volume file, or a folder of slices.
+    #[staticmethod]
+    fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        Self::with(py, || Ok(sheetsplat::Volume::open(&path)?))
+    }
+
+    /// A procedural volume.
+    #[staticmethod]
+    fn builtin(py: Python<'_>, name: &str) -> PyResult<Self> {
+        Self::with(py, || Ok(builtin::volume(name)?))
+    }
+
+    /// The same values with another spacing, in the order z, y, x, or with labels of an array.
+    #[pyo3(signature = (spacing=None, labels=None))]
+    fn replaced(&self, py: Python<'_>, spacing: Option<[f64; 3]>, labels: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+        let labels = labels.map(array::labels).transpose()?;
+        Self::with(py, || {
+            let mut volume = (*self.0).clone();
+            if let Some(spacing) = spacing {
+                volume = volume.with_spacing(ORIGIN, zyx(spacing))?;
+            }
+            labels.map_or(Ok(volume.clone()), |labels| with_labels(volume, labels))
+        })
+    }
+
+    /// The number of voxels along z, y and x.
+    #[getter]
+    fn shape(&self) -> [u32; 3] {
+        let UVec3 { x, y, z } = self.0.dims();
+        [z, y, x]
+    }
+
+    /// World units between voxels along z, y and x.
+    #[getter]
+    fn spacing(&self) -> [f64; 3] {
+        let DVec3 { x, y, z } = self.0.spacing();
+        [z, y, x]
+    }
+
+    #[getter]
+    fn unit(&self) -> Option<&str> {
+        self.0.unit()
+    }
+
+    #[getter]
+    fn holes(&self) -> u64 {
+        self.0.holes()
+    }
+
+    /// A copy of the values, `[z, y, x]`.
+    fn values<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        PyArray1::from_slice(py, self.0.values()).reshape(self.shape().map(|size| size as usize))
+    }
+
+    /// Facts about the volume, by the names of `sheetsplat info --json`; sizes and spacings are in the order z, y, x.
+    fn info<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let volume = &self.0;
+        let ([min, max, mean], percentiles, suggested) = py.detach(|| {
+            let shares = PERCENTILES.map(|(share, _)| share);
+            (extent_and_mean(volume.values()), quantiles(volume.values(), |_| true, shares), Preset::suggested(volume))
+        });
+        let info = PyDict::new(py);
+        info.set_item("shape", self.shape())?;
+        info.set_item("spacing", self.spacing())?;
+        info.set_item("unit", volume.unit())?;
+        info.set_item("format", volume.encoding().map(|encoding| encoding.format))?;
+        info.set_item("type", volume.encoding().map(|encoding| encoding.sample_type.to_string()))?;
+        info.set_item("holes", volume.holes())?;
+        info.set_item("min", min)?;
+        info.set_item("max", max)?;
+        info.set_item("mean", mean)?;
+        let named = PyDict::new(py);
+        for ((_, name), value) in PERCENTILES.iter().zip(percentiles.unwrap_or_default()) {
+            named.set_item(name, value)?;
+        }
+        info.set_item("percentiles", named)?;
+        let axes = volume.orientation().map(|orientation| orientation.axes.to_cols_array_2d());
+        info.set_item("axes", axes)?;
+        info.set_item("labels", volume.labels().is_some())?;
+        info.set_item(
+            "preset",
+            Preset::ALL.iter().find(|(_, preset)| suggested == Some(*preset)).map(|(name, _)| *name),
+        )?;
+        Ok(info)
+    }
+}
+
+/// A vector from numbers in the order z, y, x.
+fn zyx([z, y, x]: [f64; 3]) -> DVec3 {
+    DVec3::new(x, y, z)
+}
+
+fn with_labels(volume: sheetsplat::Volume, (dims, values): ([u32; 3], Vec<u16>)) -> Result<sheetsplat::Volume, Raised> {
+    let labels = Labels {
+        origin: "labels".to_owned(),
+        dims: dims.into(),
+        spacing: None,
+        values: values.into(),
+        names: volume.label_names().clone(),
+    };
+    Ok(volume.with_labels(labels)?)
+}
+
+/// The minimum, maximum and mean of the values that are not NaN.
+fn extent_and_mean(values: &[f32]) -> [f64; 3] {
+    let start = [f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0];
+    let finite = values.iter().filter(|value| !value.is_nan()).map(|&value| f64::from(value));
+    let [min, max, sum, count] =
+        finite.fold(start, |[min, max, sum, count], value| [min.min(value), max.max(value), sum + value, count + 1.0]);
+    [min, max, sum / count]
+}
