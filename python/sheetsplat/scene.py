@@ -42,7 +42,7 @@ class Scene:
     >>> Scene(camera={"up": "north"})
     Traceback (most recent call last):
     ...
-    sheetsplat.errors.SceneError: camera.up: found string "north", allowed: an array of 3 numbers
+    sheetsplat.errors.SceneError: camera.up: found "north" (string), allowed: 3 numbers, each a finite number
     """
 
     _native: native.Scene
@@ -55,7 +55,7 @@ class Scene:
             return
         if source is None or isinstance(source, Mapping):
             text, origin, folder = "", "scene", "."
-            settings = {**(source or {}), **settings}
+            settings = {**_flat(source or {}), **_flat(settings)}
         elif isinstance(source, str) and ("\n" in source or "=" in source):
             text, origin, folder = source, "scene", "."
         else:
@@ -129,6 +129,18 @@ class Scene:
 
     def __repr__(self) -> str:
         return f"<sheetsplat.Scene\n{self.to_toml()}>"
+
+
+def _flat(table: Mapping[Any, Any], path: str = "") -> dict[Any, Any]:
+    """Settings by their whole keys, so that those of one table can replace single ones of another."""
+    flat: dict[Any, Any] = {}
+    for key, value in table.items():
+        whole = f"{path}{key}" if isinstance(key, str) else key
+        if isinstance(value, Mapping) and isinstance(key, str):
+            flat |= _flat(value, f"{whole}.")
+        else:
+            flat[whole] = value
+    return flat
 
 
 def _read(path: str) -> tuple[str, str, str]:

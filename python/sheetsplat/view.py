@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -49,7 +50,7 @@ class View:
     >>> view.set(camera={"direction": [1, 0, 0]})
     >>> side = view.render()
     >>> front.width, side.stats["voxels_total"]
-    (32, 4096)
+    (32, 2560)
     """
 
     def __init__(
@@ -259,17 +260,13 @@ def _files(output: str) -> tuple[str, bool]:
 
         return output, True
     folder, name = os.path.split(output)
-    hashes = "".join(itertools.takewhile("#".__eq__, name[name.find("#") :])) if "#" in name else ""
-    if hashes:
-        name = name.replace("%", "%%").replace(hashes, f"%0{len(hashes)}d", 1)
-    pattern = os.path.join(folder.replace("%", "%%"), name)
-    try:
-        is_numbered = pattern % 1 != pattern % 2 and "#" not in name
-    except (TypeError, ValueError):
-        is_numbered = False
-    if not is_numbered:
+    numbered = re.fullmatch(r"([^%#]*)(%d|%0\d{1,2}d|#{1,20})([^%#]*)", name)
+    if numbered is None:
         allowed = f"numbered pictures (frame-%04d.png, frame-####.png) or a movie ({', '.join(_MOVIES)})"
         raise ImageError(f"output: found {output}, allowed: {allowed}", "output", output, allowed)
+    before, number, after = numbered.groups()
+    number = f"%0{len(number)}d" if number.startswith("#") else number
+    pattern = os.path.join(folder.replace("%", "%%"), before + number + after)
     native.check_format(pattern % 0)
     return pattern, False
 

