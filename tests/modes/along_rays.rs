@@ -178,16 +178,17 @@ fn maximum_and_average_are_the_same_from_behind() {
     let gpu = gpu();
     let volume = builtin::volume("head:40").unwrap();
     let mut random = Random(77);
-    for (compositing, drawing) in
-        [Compositing::Maximum, Compositing::Average].into_iter().flat_map(|c| DRAWINGS.map(|drawing| (c, drawing)))
+    let widths = [0.5, 1.0, 2.0];
+    for (compositing, width) in
+        [Compositing::Maximum, Compositing::Average].into_iter().flat_map(|c| widths.map(|width| (c, width)))
     {
-        for width in [0.5, 1.0, 2.0] {
+        let direction = random.direction();
+        for drawing in DRAWINGS {
             let mut scene = scene(70, 61);
             scene.splatting.compositing = compositing;
             scene.splatting.slab_width = width;
             scene.shading.enabled = false;
             scene.transfer = transfer(&[(0.0, [1.0, 0.7, 0.4])], &[(0.0, 0.0), (255.0, 1.0)]);
-            let direction = random.direction();
             let [front, behind] = [direction, -direction].map(|direction| {
                 scene.camera.direction = direction;
                 render(drawing, &gpu, &volume, &scene).0
