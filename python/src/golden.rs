@@ -86,12 +86,12 @@ pub(crate) fn compare(
     Ok(Comparison(comparison))
 }
 
+/// A picture's pixels, and the adapter and driver that made it.
+type Opened<'py> = (Bound<'py, PyArray3<f32>>, Option<(String, String)>);
+
 /// Opens a picture, and says where it was made if the file tells.
 #[pyfunction]
-pub(crate) fn open_image(
-    py: Python<'_>,
-    path: PathBuf,
-) -> PyResult<(Bound<'_, PyArray3<f32>>, Option<(String, String)>)> {
+pub(crate) fn open_image(py: Python<'_>, path: PathBuf) -> PyResult<Opened<'_>> {
     let Picture { image, made_on, .. } = py.detach(|| Picture::open(&path).map_err(Raised::from))?;
     Ok((image::array(py, image)?, made_on.map(|made_on| (made_on.adapter, made_on.driver))))
 }

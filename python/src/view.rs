@@ -80,14 +80,17 @@ impl View {
     }
 }
 
+/// A backend, the adapter's name that it was opened by, and what draws with it.
+type Entry = (Backend, Option<String>, Arc<Headless>);
+
 /// The backend for a scene. A GPU's device is opened once for each adapter's name.
 fn headless(backend: Backend, adapter: Option<String>, scene: &sheetsplat::Scene) -> Result<Arc<Headless>, Raised> {
-    static OPENED: Mutex<Vec<(Backend, Option<String>, Arc<Headless>)>> = Mutex::new(Vec::new());
+    static OPENED: Mutex<Vec<Entry>> = Mutex::new(Vec::new());
     let mut options = HeadlessOptions::default().with_backend(backend);
     options.adapter = adapter.clone();
     let is_automatic = backend == Backend::Auto;
     let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
-    let is_known = |entry: &&(Backend, Option<String>, Arc<Headless>)| entry.0 == backend && entry.1 == adapter;
+    let is_known = |entry: &&Entry| entry.0 == backend && entry.1 == adapter;
     if let Some((.., headless)) = opened.iter().find(is_known).filter(|_| !is_automatic) {
         return Ok(headless.clone());
     }
