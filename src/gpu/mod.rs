@@ -3,6 +3,7 @@
 pub mod bindings;
 pub mod brick_lists;
 pub mod classified_volume;
+pub mod control_points;
 pub mod device;
 pub(crate) mod fault;
 pub mod footprint_texture;

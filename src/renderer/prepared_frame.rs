@@ -4,6 +4,7 @@ use wgpu::{BindGroup, Buffer, CommandEncoder, Texture, TextureFormat, TextureVie
 
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
+use crate::gpu::control_points::ControlPoints;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
 use crate::rasterizer::fields::FieldFrame;
@@ -23,7 +24,7 @@ pub(crate) struct PreparedFrame {
     pub(crate) fallback: Option<RenderError>,
     pub(crate) compositing: CompositingBuffer,
     pub(crate) uniform: Buffer,
-    pub(crate) control_points: Buffer,
+    pub(crate) control_points: ControlPoints,
     pub(crate) resolve_groups: Vec<BindGroup>,
     /// The planes and surfaces that cut rays.
     pub(crate) cut: Buffer,
@@ -60,7 +61,7 @@ pub(crate) struct PreviousFrame {
     pub(crate) drawing: Option<Drawing>,
     pub(crate) compositing: Option<CompositingBuffer>,
     pub(crate) uniform: Option<Buffer>,
-    pub(crate) control_points: Option<Buffer>,
+    pub(crate) control_points: Option<ControlPoints>,
     pub(crate) cut: Option<Buffer>,
     /// The texture is kept so that a host that bound it need not bind it again.
     pub(crate) first_hits: Option<Texture>,
