@@ -4,8 +4,8 @@
 //! long where lanes read different elements.
 
 use wgpu::{
-    Device, Extent3d, Limits, Queue, TexelCopyBufferLayout, Texture, TextureDescriptor, TextureDimension, TextureFormat,
-    TextureUsages, TextureView, TextureViewDescriptor,
+    Device, Extent3d, Limits, Queue, TexelCopyBufferLayout, Texture, TextureDescriptor, TextureDimension,
+    TextureFormat, TextureUsages, TextureView, TextureViewDescriptor,
 };
 
 use super::layout::POINTS_PER_ROW;

@@ -149,11 +149,7 @@ impl Renderer {
         };
         let passes = needs.passes + 1;
         let timer = if self.profile { Timer::estimate(&self.device, passes) } else { None };
-        let buffers = [
-            frame_uniform(),
-            cut_uniform(),
-            staging(timestamps_at(needs.groups), timer.is_some(), passes),
-        ];
+        let buffers = [frame_uniform(), cut_uniform(), staging(timestamps_at(needs.groups), timer.is_some(), passes)];
         let coefficients = match needs_of(&request) {
             Some(BrickNeeds { coefficients: Some(exact), .. }) => exact.estimate(&limits)?,
             _ => 0,
