@@ -14,7 +14,7 @@
 @group(0) @binding(10) var<storage, read_write> hits: array<u32>;
 // For every tile the number of the last group whose plane has a value in it.
 @group(0) @binding(11) var<storage, read_write> last_groups: array<u32>;
-@group(0) @binding(12) var control_points: texture_2d<f32>;
+@group(0) @binding(12) var<storage, read> control_points: array<vec4f>;
 @group(0) @binding(13) var labels: texture_2d_array<u32>;
 @group(0) @binding(14) var values: texture_2d_array<u32>;
 @group(0) @binding(15) var<uniform> planes: FieldPlanes;
@@ -172,7 +172,7 @@ fn choose(slab: Slab, image: vec4f, before: vec4u, light: Lighting) -> Composite
     } else {
         let best = bitcast<f32>(before.w);
         // The nearest of equal ones is chosen.
-        let domain = control_point(frame.ramps.z + 1u);
+        let domain = control_points[frame.ramps.z + 1u];
         let hair = select(-HAIR_OF_RANGE, HAIR_OF_RANGE, frame.order == FRONT_TO_BACK) * (domain.z - domain.x);
         let gain = select(slab.drawn.x - best, best - slab.drawn.x, COMPOSITING == MINIMUM);
         is_chosen = is_point && (best == NO_NUMBER || gain > hair);

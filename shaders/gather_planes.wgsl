@@ -158,4 +158,4 @@ fn composite_pixels(pixels: Pixels, sheets: Sheets, progress: ptr<function, Prog
 }
 
 // Passes to classify, shade and composite four slabs at four pixels.
-const PASSES_PER_SLABS = 160u;
+const PASSES_PER_SLABS = 80u;

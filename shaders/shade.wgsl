@@ -4,7 +4,7 @@
 @group(0) @binding(1) var<storage, read> bricks: array<Brick>;
 @group(0) @binding(2) var values: texture_2d_array<u32>;
 // The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0); then the table of labels.
-@group(0) @binding(3) var control_points: texture_2d<f32>;
+@group(0) @binding(3) var<storage, read> control_points: array<vec4f>;
 // Places: 64 times the brick's index, plus the slot.
 @group(0) @binding(4) var<storage, read> fresh: array<u32>;
 @group(0) @binding(5) var<storage, read> args: Indirect;

@@ -190,8 +190,8 @@ pub mod internals {
     #[cfg(feature = "gpu")]
     pub mod gpu {
         pub use crate::gpu::{
-            bindings, brick_lists, classified_volume, control_points, device, footprint_texture, gathered_layout,
-            layout, render_pipeline, shaders, targets, timer, uniforms, volume_texture,
+            bindings, brick_lists, classified_volume, device, footprint_texture, gathered_layout, layout,
+            render_pipeline, shaders, targets, timer, uniforms, volume_texture,
         };
     }
 

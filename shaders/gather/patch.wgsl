@@ -26,7 +26,7 @@
 // Indices of bricks.
 @group(0) @binding(5) var<storage, read> entries: array<u32>;
 // The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0); then the table of labels.
-@group(0) @binding(6) var control_points: texture_2d<f32>;
+@group(0) @binding(6) var<storage, read> control_points: array<vec4f>;
 @group(0) @binding(7) var values: texture_2d_array<u32>;
 @group(0) @binding(8) var<storage, read_write> acc: array<vec4f>;
 @group(0) @binding(9) var<storage, read_write> gathered: Gathered;

@@ -4,7 +4,7 @@
 // Needs gather/pixels.wgsl: Pixels.
 // Needs gather_planes.wgsl: planes.
 // Needs shared/frame.wgsl: frame.
-// Needs shared/planes.wgsl: MIN_WEIGHT, NO_NUMBER.
+// Needs shared/planes.wgsl: MIN_WEIGHT.
 
 // Whether gradients are the field's derivative instead of the voxels' differences.
 override KERNEL_GRADIENT: bool = false;
@@ -213,26 +213,27 @@ fn fields_of(sums: PlaneSums) -> Fields {
     return Fields(has_value, number, along * x, along * y, along * z);
 }
 
-// The field on the previous group's last plane: numbers, `NO_NUMBER` where there is no value, and gradients.
-var<workgroup> handed_on: array<vec4f, 4u * PATCH_THREADS>;
+// The field on the previous group's last plane.
+var<workgroup> handed_on: array<vec4f, 5u * PATCH_THREADS>;
 
-// A mask of the blocks in which the plane that was handed on has values; only theirs were stored.
+// A mask of the blocks in which the plane that was handed on has values.
 var<private> blocks_handed_on: u32;
 
 fn hand_on(thread: u32, fields: Fields) {
-    handed_on[thread] = select(vec4f(NO_NUMBER), fields.number, fields.has_value);
-    handed_on[PATCH_THREADS + thread] = fields.x;
-    handed_on[2u * PATCH_THREADS + thread] = fields.y;
-    handed_on[3u * PATCH_THREADS + thread] = fields.z;
+    handed_on[thread] = select(vec4f(0.0), vec4f(1.0), fields.has_value);
+    handed_on[PATCH_THREADS + thread] = fields.number;
+    handed_on[2u * PATCH_THREADS + thread] = fields.x;
+    handed_on[3u * PATCH_THREADS + thread] = fields.y;
+    handed_on[4u * PATCH_THREADS + thread] = fields.z;
 }
 
-fn fields_handed_on(thread: u32) -> Fields {
-    let number = handed_on[thread];
+fn fields_handed_on(thread: u32, is_any: bool) -> Fields {
+    let has_value = (handed_on[thread] != vec4f(0.0)) & vec4<bool>(is_any);
     return Fields(
-        number != vec4f(NO_NUMBER),
-        number,
-        handed_on[PATCH_THREADS + thread],
-        handed_on[2u * PATCH_THREADS + thread],
-        handed_on[3u * PATCH_THREADS + thread],
+        has_value,
+        select(vec4f(0.0), handed_on[PATCH_THREADS + thread], has_value),
+        select(vec4f(0.0), handed_on[2u * PATCH_THREADS + thread], has_value),
+        select(vec4f(0.0), handed_on[3u * PATCH_THREADS + thread], has_value),
+        select(vec4f(0.0), handed_on[4u * PATCH_THREADS + thread], has_value),
     );
 }

@@ -1,7 +1,6 @@
 // Ramps whose first control points are distributed among the lanes of a subgroup.
 //
-// Needs gather/patch.wgsl: lane, lanes.
-// Needs shared/ramps.wgsl: control_point.
+// Needs gather/patch.wgsl: control_points, lane, lanes.
 // Needs shared/shading.wgsl: between.
 
 // A ramp: the range of its control points, and this lane's share of the first of them.
@@ -38,5 +37,5 @@ fn is_below(held: Ramp, at: u32, value: f32) -> bool {
 }
 
 fn ramp_of(first: u32, end: u32) -> Ramp {
-    return Ramp(first, end, control_point(min(first + lane, end - 1u)));
+    return Ramp(first, end, control_points[min(first + lane, end - 1u)]);
 }

@@ -1,6 +1,6 @@
 // The slabs between planes at a thread's pixels: classified, shaded and composited (SPEC §9).
 //
-// Needs gather/patch.wgsl: COMPOSITING, CUT, FIRST_HIT, PERSPECTIVE, SHEETS, cut, sheet_group.
+// Needs gather/patch.wgsl: COMPOSITING, CUT, FIRST_HIT, PERSPECTIVE, SHEETS, control_points, cut, sheet_group.
 // Needs gather/pixels.wgsl: Pixels.
 // Needs gather/planes.wgsl: Fields, KERNEL_GRADIENT, PlaneSums, Sheets, blocks_handed_on, fields_handed_on, fields_of, hand_on.
 // Needs gather_planes.wgsl: planes.
@@ -10,7 +10,7 @@
 // Needs shared/frame.wgsl: FRONT_TO_BACK, frame.
 // Needs shared/means.wgsl: both, in_box.
 // Needs shared/project.wgsl: slope_of.
-// Needs shared/ramps.wgsl: LABELS, control_point, ramp, ramps_of.
+// Needs shared/ramps.wgsl: LABELS, ramp, ramps_of.
 // Needs shared/shading.wgsl: lighting, shade.
 // Needs shared/slab_integral.wgsl: slab_integral.
 // Needs shared/volume.wgsl: HOLES, gradient_of, index_of, is_hole, stored_at.
@@ -70,7 +70,7 @@ fn slab_between(near: PixelField, far: PixelField) -> Slab {
 
 // Whether a slab's range of values reaches values that have an opacity.
 fn has_opacity(slab: Slab, ramps: vec4u) -> bool {
-    let head = control_point(ramps.w);
+    let head = control_points[ramps.w];
     return slab.has_value && max(slab.near.number, slab.far.number) >= head.z && min(slab.near.number, slab.far.number) <= head.w;
 }
 
@@ -130,13 +130,7 @@ fn one_of(first: vec4f, second: vec4f, third: vec4f, fourth: vec4f, j: u32) -> v
 // Composites a group's slabs at four pixels. The near plane's field comes from the previous group, and the last plane's goes to the next.
 fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
     var result = image;
-    let blocks = subgroupOr(1u << pixels.block);
-    var near = Fields();
-    for (var is_given = (blocks_handed_on & blocks) != 0u; is_given; is_given = false) {
-        near = fields_handed_on(pixels.thread);
-    }
-    // Of several blocks in a subgroup, some may have no values.
-    near.has_value &= vec4<bool>((blocks_handed_on >> pixels.block & 1u) != 0u);
+    var near = fields_handed_on(pixels.thread, (blocks_handed_on >> pixels.block & 1u) != 0u);
     for (var j = 0u; j < SHEETS; j += 1u) {
         let depth = sheet_group.near + f32(j) * frame.slab_width;
         let far = without_holes(fields_of(sums_on(sheets, j)), pixels, depth + frame.slab_width);
@@ -161,10 +155,9 @@ fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
         }
         near = far;
     }
-    let with_values = subgroupOr(select(0u, 1u << pixels.block, any(near.has_value)));
-    for (var is_kept = with_values != 0u; is_kept; is_kept = false) {
-        hand_on(pixels.thread, near);
-    }
-    blocks_handed_on = (blocks_handed_on & ~blocks) | with_values;
+    hand_on(pixels.thread, near);
+    let blocks = 1u << pixels.block;
+    let has_values = subgroupOr(select(0u, blocks, any(near.has_value)));
+    blocks_handed_on = (blocks_handed_on & ~subgroupOr(blocks)) | has_values;
     return result;
 }

@@ -24,8 +24,8 @@ fn is_half_opaque(cell: vec4f, x: f32, near: vec4f, far: vec4f, share: f32, ramp
 // The share of the way from one sample to the other at which the surface is, if it is between two shares and one set of ramps applies there.
 fn surface_between(near: vec4f, far: vec4f, start: f32, end: f32, ramps: vec4u) -> f32 {
     let table = ramps.w;
-    let head = control_point(table);
-    let domain = control_point(table + 1u);
+    let head = control_points[table];
+    let domain = control_points[table + 1u];
     let first = clamp(mix(near.x, far.x, start), domain.x, domain.z);
     let last = clamp(mix(near.x, far.x, end), domain.x, domain.z);
     // For `surface` the table's head holds the range of numbers that are at least half opaque.
@@ -38,8 +38,8 @@ fn surface_between(near: vec4f, far: vec4f, start: f32, end: f32, ramps: vec4u) 
     let is_rising = size >= 0.0;
     let last_cell = cell_of(table, head.y, domain, last);
     for (var at = cell_of(table, head.y, domain, first); ; at = select(at - 1u, at + 1u, is_rising)) {
-        let cell = control_point(cells + CELL * at);
-        let cell_end = control_point(cells + CELL * at + 1u).w;
+        let cell = control_points[cells + CELL * at];
+        let cell_end = control_points[cells + CELL * at + 1u].w;
         let enters = clamp(first, cell.x, cell_end);
         let leaves = clamp(last, cell.x, cell_end);
         if max(opacity_in(cell, enters), opacity_in(cell, leaves)) >= 0.5 {

@@ -1,12 +1,5 @@
-// The control points of all ramps, searched in memory, and the ramps of a voxel (SPEC §3). The stage declares the textures `control_points`, and `labels`, an
-// array that `gpu::volume_texture` folds.
-
-// The points in a row of the texture.
-const POINTS_PER_ROW = 256u;
-
-fn control_point(i: u32) -> vec4f {
-    return textureLoad(control_points, vec2u(i % POINTS_PER_ROW, i / POINTS_PER_ROW), 0);
-}
+// The control points of all ramps, searched in memory, and the ramps of a voxel (SPEC §3). The stage declares `control_points`, and `labels`, a
+// texture array that `gpu::volume_texture` folds.
 
 // Whether any label has its own ramps.
 override LABELS: bool = false;
@@ -18,7 +11,7 @@ fn ramps_of(index: u32) -> vec4u {
     }
     let texel = texel_of(index, textureDimensions(labels).x);
     let label = textureLoad(labels, texel.xy, texel.z, 0).x;
-    return vec4u(control_point(frame.ramps.w + min(label, frame.last_label)));
+    return vec4u(control_points[frame.ramps.w + min(label, frame.last_label)]);
 }
 
 // Piecewise linear between the control points first..end, clamped outside.
@@ -28,11 +21,11 @@ fn ramp(first: u32, end: u32, value: f32) -> vec3f {
     var last = end;
     while above < last {
         let middle = (above + last) / 2u;
-        let is_at_or_below = control_point(middle).x <= value;
+        let is_at_or_below = control_points[middle].x <= value;
         above = select(above, middle + 1u, is_at_or_below);
         last = select(middle, last, is_at_or_below);
     }
-    let a = control_point(max(above, first + 1u) - 1u);
-    let b = control_point(min(above, end - 1u));
+    let a = control_points[max(above, first + 1u) - 1u];
+    let b = control_points[min(above, end - 1u)];
     return between(a, b, value);
 }

@@ -1,5 +1,5 @@
 // The transfer function integrated from value to value (SPEC §9; Engel, Kraus, Ertl 2001), read from a table that `after::slab_integral` makes and
-// describes. A stage that includes this includes `ramps` and `shading`. Values are given as the numbers that
+// describes. A stage that includes this declares `control_points` and includes `shading`. Values are given as the numbers that
 // `after::normalization` makes of them.
 
 // The means of the transfer function over a slab's values.
@@ -21,13 +21,13 @@ const NODE = 0.28867513;
 // The cell that a number lies in.
 fn cell_of(table: u32, bins: f32, domain: vec4f, x: f32) -> u32 {
     let bin = u32(clamp((x - domain.x) * domain.y, 0.0, bins - 1.0));
-    let ends = vec2u(control_point(table + 2u + bin).xy);
+    let ends = vec2u(control_points[table + 2u + bin].xy);
     let cells = table + 2u + u32(bins);
     var first = ends.x;
     var last = ends.y;
     while first < last {
         let middle = (first + last + 1u) / 2u;
-        let is_before = control_point(cells + CELL * middle).x <= x;
+        let is_before = control_points[cells + CELL * middle].x <= x;
         first = select(first, middle, is_before);
         last = select(middle - 1u, last, is_before);
     }
@@ -36,20 +36,20 @@ fn cell_of(table: u32, bins: f32, domain: vec4f, x: f32) -> u32 {
 
 // The colour at a number.
 fn color_at(table: u32, x: f32) -> vec3f {
-    let head = control_point(table);
-    let domain = control_point(table + 1u);
+    let head = control_points[table];
+    let domain = control_points[table + 1u];
     let within = clamp(x, domain.x, domain.z);
     let cell = table + 2u + u32(head.y) + CELL * cell_of(table, head.y, domain, within);
-    let start = control_point(cell);
+    let start = control_points[cell];
     let along = clamp((within - start.x) * start.y, 0.0, 1.0);
-    return control_point(cell + 1u).rgb + control_point(cell + 2u).rgb * along;
+    return control_points[cell + 1u].rgb + control_points[cell + 2u].rgb * along;
 }
 
 // The means of m·C and m over the part of a cell between two numbers. `cell` is its first entry.
 fn mean_of_part(cell: u32, low: f32, high: f32, origin: f32) -> array<vec4f, 2> {
-    let start = control_point(cell);
-    let color = control_point(cell + 1u).rgb;
-    let rise = control_point(cell + 2u).rgb;
+    let start = control_points[cell];
+    let color = control_points[cell + 1u].rgb;
+    let rise = control_points[cell + 2u].rgb;
     let x = low + (high - low) * vec2f(0.5 - NODE, 0.5 + NODE);
     let u = clamp((x - start.x) * start.y, vec2f(0.0), vec2f(1.0));
     let alpha = start.z + start.w * u;
@@ -60,8 +60,8 @@ fn mean_of_part(cell: u32, low: f32, high: f32, origin: f32) -> array<vec4f, 2> 
 
 // The means over the numbers from f0 to f1, by the table that starts at an entry of the control points.
 fn slab_integral(table: u32, f0: f32, f1: f32) -> SlabIntegral {
-    let head = control_point(table);
-    let domain = control_point(table + 1u);
+    let head = control_points[table];
+    let domain = control_points[table + 1u];
     let low = clamp(min(f0, f1), domain.x, domain.z);
     let high = clamp(max(f0, f1), domain.x, domain.z);
     if high < head.z || low > head.w {
@@ -72,32 +72,31 @@ fn slab_integral(table: u32, f0: f32, f1: f32) -> SlabIntegral {
     let last = cell_of(table, head.y, domain, high);
     let size = high - low;
     let is_one = first == last;
-    let near_end = select(control_point(cells + CELL * first + 1u).w, high, is_one);
+    let near_end = select(control_points[cells + CELL * first + 1u].w, high, is_one);
     let near = mean_of_part(cells + CELL * first, low, near_end, low);
     let near_weight = select((near_end - low) / size, 1.0, is_one);
     var color_and_amount = near[0] * near_weight;
     var moment = near[1].x * near_weight;
-    // One-shot loops, because a software driver computes both sides of every `if`.
-    for (var is_more = !is_one; is_more; is_more = false) {
-        let start = control_point(cells + CELL * last).x;
+    if !is_one {
+        let start = control_points[cells + CELL * last].x;
         let far = mean_of_part(cells + CELL * last, start, high, low);
         let far_weight = (high - start) / size;
         color_and_amount += far[0] * far_weight;
         moment += far[1].x * far_weight;
-    }
-    for (var is_between = last > first + 1u; is_between; is_between = false) {
-        // Whole cells: two sums from the middle of the smallest block that holds them all, or the sum of a single cell.
-        let a = first + 1u;
-        let b = last - 1u;
-        let level = firstLeadingBit(max(a ^ b, 1u));
-        let sums = cells + u32(head.x) * (CELL + SUM * level);
-        let before = control_point(sums + SUM * a);
-        let before_color = control_point(sums + SUM * a + 1u).rgb;
-        let after = select(control_point(sums + SUM * b), vec4f(0.0), a == b);
-        let after_color = select(control_point(sums + SUM * b + 1u).rgb, vec3f(0.0), a == b);
-        let total = before.x + after.x;
-        color_and_amount += vec4f(before_color + after_color, total) / size;
-        moment += (total * (before.z - low) + before.y + after.y) / size;
+        if last > first + 1u {
+            // Whole cells: two sums from the middle of the smallest block that holds them all, or the sum of a single cell.
+            let a = first + 1u;
+            let b = last - 1u;
+            let level = firstLeadingBit(max(a ^ b, 1u));
+            let sums = cells + u32(head.x) * (CELL + SUM * level);
+            let before = control_points[sums + SUM * a];
+            let before_color = control_points[sums + SUM * a + 1u].rgb;
+            let after = select(control_points[sums + SUM * b], vec4f(0.0), a == b);
+            let after_color = select(control_points[sums + SUM * b + 1u].rgb, vec3f(0.0), a == b);
+            let total = before.x + after.x;
+            color_and_amount += vec4f(before_color + after_color, total) / size;
+            moment += (total * (before.z - low) + before.y + after.y) / size;
+        }
     }
     if color_and_amount.a <= 0.0 {
         return SlabIntegral(0.0, 0.5, vec3f(0.0));

@@ -247,9 +247,6 @@ pub struct Indirect {
 /// Dispatches of more than this many workgroups are folded into two dimensions.
 pub const FOLD: u32 = 32768;
 
-/// The number of control points in a row of their texture.
-pub const POINTS_PER_ROW: u32 = 256;
-
 /// The number of quads drawn by one instance.
 pub const QUADS: u16 = 16;
 

@@ -3,7 +3,6 @@
 pub mod bindings;
 pub mod brick_lists;
 pub mod classified_volume;
-pub mod control_points;
 pub(crate) mod counts;
 pub mod device;
 pub(crate) mod fault;

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use wgpu::{BindGroup, BindingResource, Buffer, ComputePass, Device, ShaderStages, TextureView, TextureViewDimension};
 
 use super::composite::{CompositeBuffers, CompositeMode, slots};
-use crate::gpu::bindings::{ComputeStage, storage, texture, texture_of_integers, uniform};
+use crate::gpu::bindings::{ComputeStage, storage, texture_of_integers, uniform};
 use crate::gpu::layout::FieldPlanes;
 use crate::gpu::shaders;
 use crate::gpu::targets::BandBuffer;
@@ -39,7 +39,7 @@ pub struct ClassifyBuffers<'a> {
     /// Those of the stage composite; the sheets hold the sums of a plane.
     pub composite: CompositeBuffers<'a>,
     /// Control points of the ramps, and the tables of their integrals.
-    pub control_points: &'a TextureView,
+    pub control_points: &'a Buffer,
     /// One [`FieldPlanes`].
     pub planes: &'a Buffer,
     /// The volume's values.
@@ -78,11 +78,11 @@ impl Classify {
         (band, carried): (&BandBuffer, &Buffer),
     ) -> ClassifyGroup {
         let ClassifyBuffers { composite, control_points, planes, values, labels } = buffers;
-        let view = BindingResource::TextureView;
+        let texture = BindingResource::TextureView;
         let own = [
-            ("control_points", view(control_points)),
-            ("labels", view(labels.unwrap_or(&self.no_labels.view))),
-            ("values", view(values)),
+            ("control_points", control_points.as_entire_binding()),
+            ("labels", texture(labels.unwrap_or(&self.no_labels.view))),
+            ("values", texture(values)),
             ("planes", planes.as_entire_binding()),
             ("carried", carried.as_entire_binding()),
         ];
@@ -103,7 +103,7 @@ fn compile(device: &Device, mode: ClassifyMode) -> ComputeStage {
     let ClassifyMode { composite, gradient, labels, holes } = mode;
     let stage = ShaderStages::COMPUTE;
     let own = [
-        ("control_points", texture(stage, TextureViewDimension::D2)),
+        ("control_points", storage::<[f32; 4]>(stage, true)),
         ("labels", texture_of_integers(stage, TextureViewDimension::D2Array)),
         ("values", texture_of_integers(stage, TextureViewDimension::D2Array)),
         ("planes", uniform::<FieldPlanes>(stage, false)),

@@ -68,7 +68,7 @@ pub struct CullBuffers<'a> {
     /// The volume's labels, if any label has its own ramps.
     pub labels: Option<&'a TextureView>,
     /// The control points of the ramps.
-    pub control_points: &'a TextureView,
+    pub control_points: &'a Buffer,
     /// The occlusion buffer.
     pub occluded: &'a Buffer,
     /// One [`Culled`].

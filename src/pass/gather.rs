@@ -11,7 +11,7 @@ use wgpu::{
 use super::composite::{CutBuffers, RayMode};
 use super::values::PlaneBuffers;
 use crate::gpu::bindings::{
-    ComputeStage, at_offset, buffer_spec, depth_texture, storage, texture, texture_of_integers, uniform,
+    ComputeStage, at_offset, buffer_spec, depth_texture, storage, texture_of_integers, uniform,
 };
 use crate::gpu::layout::{Brick, Cut, FieldPlanes, Frame, Gather as GatherUniform, Gathered, Indirect, PatchRange};
 use crate::gpu::shaders;
@@ -96,7 +96,7 @@ pub struct GatherBuffers<'a> {
     /// [`PatchBins::entries`](crate::lists::patch_bins::PatchBins::entries).
     pub entries: &'a Buffer,
     /// The control points of the ramps.
-    pub control_points: &'a TextureView,
+    pub control_points: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
     /// The volume's labels, for a mode that needs them.
@@ -152,7 +152,7 @@ impl Gather {
             ("bricks", whole(bricks)),
             ("starts", whole(starts)),
             ("entries", whole(entries)),
-            ("control_points", wgpu::BindingResource::TextureView(control_points)),
+            ("control_points", whole(control_points)),
             ("values", wgpu::BindingResource::TextureView(values)),
             ("acc", whole(acc)),
             ("gathered", whole(buffers.gathered)),
@@ -188,7 +188,7 @@ fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
         ("bricks", storage::<Brick>(stage, true)),
         ("starts", storage::<u32>(stage, true)),
         ("entries", storage::<u32>(stage, true)),
-        ("control_points", texture(stage, TextureViewDimension::D2)),
+        ("control_points", storage::<[f32; 4]>(stage, true)),
         ("values", texture_of_integers(stage, TextureViewDimension::D2Array)),
         ("acc", storage::<[f32; 4]>(stage, false)),
         ("gathered", storage::<Gathered>(stage, false)),

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use wgpu::{BindGroup, BindingResource, Buffer, ComputePass, Device, ShaderStages, TextureView, TextureViewDimension};
 
-use crate::gpu::bindings::{ComputeStage, storage, texture, texture_of_integers, uniform};
+use crate::gpu::bindings::{ComputeStage, storage, texture_of_integers, uniform};
 use crate::gpu::layout::{Brick, Frame, Indirect, Splat};
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::VolumeTexture;
@@ -31,7 +31,7 @@ pub struct ShadeBuffers<'a> {
     /// The volume's labels, if any label has its own ramps.
     pub labels: Option<&'a TextureView>,
     /// The control points of the ramps.
-    pub control_points: &'a TextureView,
+    pub control_points: &'a Buffer,
     /// `[u32]`: the places.
     pub places: &'a Buffer,
     /// [`Indirect`]: the number of places.
@@ -62,7 +62,7 @@ impl Shade {
             ("frames", whole(frame)),
             ("bricks", whole(bricks)),
             ("values", BindingResource::TextureView(values)),
-            ("control_points", BindingResource::TextureView(control_points)),
+            ("control_points", whole(control_points)),
             ("fresh", whole(places)),
             ("args", whole(args)),
             ("splats", whole(splats)),
@@ -88,7 +88,7 @@ fn compile(device: &Device, labels: bool, holes: bool) -> ComputeStage {
         ("frames", uniform::<Frame>(stage, false)),
         ("bricks", storage::<Brick>(stage, true)),
         ("values", texture_of_integers(stage, TextureViewDimension::D2Array)),
-        ("control_points", texture(stage, TextureViewDimension::D2)),
+        ("control_points", storage::<[f32; 4]>(stage, true)),
         ("fresh", storage::<u32>(stage, true)),
         ("args", storage::<Indirect>(stage, true)),
         ("splats", storage::<Splat>(stage, false)),

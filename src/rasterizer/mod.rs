@@ -9,7 +9,7 @@ pub(crate) mod samples;
 mod sheet_groups;
 pub(crate) mod tiles;
 
-use wgpu::{Buffer, BufferUsages, ComputePassDescriptor, Device, Queue, TextureView};
+use wgpu::{Buffer, BufferUsages, ComputePassDescriptor, Device, Queue};
 
 use crate::error::RenderError;
 use crate::geometry::footprint::FootprintTable;
@@ -42,7 +42,7 @@ pub(crate) struct FrameInputs<'a> {
     /// One [`Frame`](crate::gpu::layout::Frame).
     pub(crate) frame: &'a Buffer,
     /// The control points of the ramps.
-    pub(crate) control_points: &'a TextureView,
+    pub(crate) control_points: &'a Buffer,
     pub(crate) compositing: &'a CompositingBuffer,
     pub(crate) cut: CutBuffers<'a>,
 }

@@ -13,7 +13,6 @@ use crate::error::setting::SettingError;
 use crate::error::{RenderError, check_device};
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, written};
 use crate::gpu::classified_volume::BrickNeeds;
-use crate::gpu::control_points::ControlPoints;
 use crate::gpu::counts::Staging;
 use crate::gpu::device::{self, DeviceError, DeviceRequirements};
 use crate::gpu::fault::scoped;
@@ -149,15 +148,19 @@ impl Renderer {
         };
         let passes = needs.passes + 1;
         let timer = if self.profile { Timer::estimate(&self.device, passes) } else { None };
-        let buffers = [frame_uniform(), cut_uniform(), staging(timestamps_at(needs.groups), timer.is_some(), passes)];
+        let buffers = [
+            frame_uniform(),
+            control_points(&request),
+            cut_uniform(),
+            staging(timestamps_at(needs.groups), timer.is_some(), passes),
+        ];
         let coefficients = match needs_of(&request) {
             Some(BrickNeeds { coefficients: Some(exact), .. }) => exact.estimate(&limits)?,
             _ => 0,
         };
         let volume = view.volume.estimate()? + settled.gpu_bytes() + coefficients;
         let compositing = CompositingBuffer::estimate(request.view.size, request.bands.len());
-        let points = ControlPoints::estimate(&limits, request.ramps.points.len())?;
-        let counts = timer.unwrap_or(0) + sizes(&limits, &buffers)? + points;
+        let counts = timer.unwrap_or(0) + sizes(&limits, &buffers)?;
         Ok(volume + compositing + needs.bytes + request.hit_bytes() + counts)
     }
 
@@ -188,7 +191,8 @@ impl Renderer {
         let grid = *volume.grid();
         let compositing = kept.compositing.unwrap_or_else(|| CompositingBuffer::new(device, size, &request.bands));
         let write = |old, spec: &BufferSpec, bytes: &[u8]| written(device, queue, old, spec, bytes);
-        let control_points = ControlPoints::written(device, queue, kept.control_points, &ramps.points)?;
+        let points = bytemuck::cast_slice(&ramps.points);
+        let control_points = write(kept.control_points, &control_points(&request), points)?;
         let frame_values =
             uniforms::frame(request.stage_view(), kernel, (&grid, volume.gpu_volume().value_format()), ramps, scene);
         let uniform = write(kept.uniform, &frame_uniform(), bytemuck::bytes_of(&frame_values))?;
@@ -208,7 +212,7 @@ impl Renderer {
             volume,
             request: &request,
             frame: &uniform,
-            control_points: &control_points.view,
+            control_points: &control_points,
             compositing: &compositing,
             cut: cut_buffers,
         };
@@ -235,8 +239,7 @@ impl Renderer {
         let timestamps = timestamps_at(drawing.group_slabs().firsts.len());
         let staging = grown(device, kept.staging, &staging(timestamps, timer.is_some(), passes))?;
         let timer_bytes = timer.as_ref().map_or(0, Timer::gpu_bytes);
-        let buffers: u64 = [&uniform, &cut, &staging].map(Buffer::size).iter().sum();
-        let buffers = buffers + control_points.gpu_bytes();
+        let buffers: u64 = [&uniform, &control_points, &cut, &staging].map(Buffer::size).iter().sum();
         let shared_bytes = compositing.gpu_bytes() + buffers + request.hit_bytes() + timer_bytes;
         *frame = Some(PreparedFrame {
             gpu_bytes: volume.gpu_bytes() + drawing.gpu_bytes() + shared_bytes,
@@ -411,6 +414,11 @@ fn frame_uniform() -> BufferSpec {
 
 fn cut_uniform() -> BufferSpec {
     content_spec("sheetsplat.cut", size_of::<Cut>() as u64, BufferUsages::UNIFORM)
+}
+
+fn control_points(request: &FrameRequest) -> BufferSpec {
+    let bytes = size_of_val(&request.ramps.points[..]) as u64;
+    content_spec("sheetsplat.control_points", bytes, BufferUsages::STORAGE)
 }
 
 /// The byte offset of the timestamps behind the counts of `groups` sheet groups.

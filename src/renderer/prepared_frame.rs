@@ -4,7 +4,6 @@ use wgpu::{BindGroup, Buffer, CommandEncoder, Texture, TextureFormat, TextureVie
 
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::gpu::control_points::ControlPoints;
 use crate::gpu::counts::{GroupSlabs, Staging, Totals};
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
@@ -24,7 +23,7 @@ pub(crate) struct PreparedFrame {
     pub(crate) fallback: Option<RenderError>,
     pub(crate) compositing: CompositingBuffer,
     pub(crate) uniform: Buffer,
-    pub(crate) control_points: ControlPoints,
+    pub(crate) control_points: Buffer,
     pub(crate) resolve_groups: Vec<BindGroup>,
     /// The planes and surfaces that cut rays.
     pub(crate) cut: Buffer,
@@ -61,7 +60,7 @@ pub(crate) struct PreviousFrame {
     pub(crate) drawing: Option<Drawing>,
     pub(crate) compositing: Option<CompositingBuffer>,
     pub(crate) uniform: Option<Buffer>,
-    pub(crate) control_points: Option<ControlPoints>,
+    pub(crate) control_points: Option<Buffer>,
     pub(crate) cut: Option<Buffer>,
     /// The texture is kept so that a host that bound it need not bind it again.
     pub(crate) first_hits: Option<Texture>,

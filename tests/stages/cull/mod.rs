@@ -9,7 +9,6 @@ use glam::{DVec3, UVec3};
 use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::brick::{self, BRICK_VOXELS};
 use sheetsplat::internals::gpu::brick_lists::BrickLists;
-use sheetsplat::internals::gpu::control_points::ControlPoints;
 use sheetsplat::internals::gpu::layout::{self, Brick, BrickState, Frame, Indirect, SheetGroup, Tally};
 use sheetsplat::internals::gpu::targets::Targets;
 use sheetsplat::internals::gpu::uniforms::{self, Ramps};
@@ -81,7 +80,7 @@ impl<'a> Culling<'a> {
             values: &uploaded.view,
             has_holes: values.iter().any(|value| value.is_nan()),
             labels: labels.as_ref().map(|labels| &labels.view),
-            control_points: &ControlPoints::written(device, gpu.queue(), None, &ramps.points).unwrap().view,
+            control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
             occluded: &targets.occluded,
             culled: &culled,
             planes: None,

@@ -6,7 +6,6 @@ use glam::{DVec2, DVec3, DVec4, UVec3};
 use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::brick::BrickList;
 use sheetsplat::internals::classify::classify;
-use sheetsplat::internals::gpu::control_points::ControlPoints;
 use sheetsplat::internals::gpu::gathered_layout::GatheredLayout;
 use sheetsplat::internals::gpu::layout::{Gathered, PatchRange, Tally};
 use sheetsplat::internals::gpu::uniforms::{self, Ramps};
@@ -114,7 +113,7 @@ impl<'a> Fixture<'a> {
             bricks: &init(device, bricks, BufferUsages::STORAGE),
             starts: &storage(&bins.starts),
             entries: &storage(&bins.entries),
-            control_points: &ControlPoints::written(device, gpu.queue(), None, &ramps.points).unwrap().view,
+            control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
             values: &values.view,
             labels: None,
             gathered: &gathered,

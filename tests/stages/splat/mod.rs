@@ -12,7 +12,6 @@ use glam::{DVec2, DVec3, DVec4, UVec3};
 use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::internals::footprint::{FootprintTable, SECTION_SIZE, SECTIONS, section_extent, section_spacing};
 use sheetsplat::internals::gpu::brick_lists::BrickLists;
-use sheetsplat::internals::gpu::control_points::ControlPoints;
 use sheetsplat::internals::gpu::footprint_texture::FootprintTexture;
 use sheetsplat::internals::gpu::layout;
 use sheetsplat::internals::gpu::volume_texture::VolumeTexture;
@@ -51,7 +50,7 @@ impl<'a> Stages<'a> {
             values: &VolumeTexture::upload(device, gpu.queue(), &[0.0]).unwrap().view,
             has_holes: false,
             labels: None,
-            control_points: &ControlPoints::written(device, gpu.queue(), None, &[]).unwrap().view,
+            control_points: &storage,
             occluded: &storage,
             culled: &storage,
             planes: None,
