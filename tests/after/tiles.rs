@@ -116,12 +116,13 @@ fn frames_with_holes_agree_with_the_f64_evaluation() {
 fn culling_keeps_its_guarantee() {
     let gpu = gpu();
     let mut random = Random(21);
-    let mut fewer = 0;
+    let (mut fewer, mut seen) = (0, 0);
     for case in 0..8 {
         let (volume, mut scene) = random_case(&mut random, case % 2 == 1);
         scene.splatting.compositing = [Compositing::Linear, Compositing::Exponential][case / 2 % 2];
         scene.transfer.opacity = Some(Ramp::new(vec![(15.0, 0.0), (40.0, 0.5), (200.0, 1.0)]).unwrap());
         let whole = gpu.render_volume(volume.clone(), &scene).unwrap();
+        seen += shown(&whole.image);
         for threshold in [0.8, 1.0] {
             (scene.splatting.culling, scene.splatting.opacity_threshold) = (true, threshold);
             let culled = gpu.render_volume(volume.clone(), &scene).unwrap();
@@ -131,5 +132,5 @@ fn culling_keeps_its_guarantee() {
             fewer += usize::from(drawn[0] < drawn[1]);
         }
     }
-    assert!(fewer > 4, "{fewer}");
+    assert!(fewer > 4 && seen > 2000, "{fewer}, {seen} pixels");
 }
