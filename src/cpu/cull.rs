@@ -31,6 +31,13 @@ impl Pixels {
         };
         Some(Self { columns: of_axis(0, COLUMNS)?, rows: of_axis(1, ROWS)? })
     }
+
+    /// The pixels within the box around two boxes.
+    pub(super) fn around(first: Option<Self>, second: Option<Self>) -> Option<Self> {
+        let (Some(a), Some(b)) = (first, second) else { return first.or(second) };
+        let joined = |a: [usize; 2], b: [usize; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        Some(Self { columns: joined(a.columns, b.columns), rows: joined(a.rows, b.rows) })
+    }
 }
 
 /// The largest integer that is not above a small number, without the system's `floor` or a branch.

@@ -16,7 +16,7 @@ use crate::geometry::kernel::Kernel;
 pub(super) struct KernelTables {
     /// The distance from which the kernel is 0, grid units.
     pub(super) support: f32,
-    support_squared: f32,
+    pub(super) support_squared: f32,
     /// The coefficients of `H(0, 0, t) / t` as a polynomial in `2t²/support² - 1`.
     cumulative: [f32; 16],
     /// `2 / support²`.
@@ -39,19 +39,9 @@ impl KernelTables {
 
     /// `H(0, 0, t)` of eq. 3, the kernel's integral along the ray through its centre, from the centre to t.
     #[inline(always)]
-    pub(super) fn along<S: Simd>(&self, simd: S, t: f32x8<S>) -> f32x8<S> {
-        let t = t.max(f32x8::splat(simd, -self.support)).min(f32x8::splat(simd, self.support));
+    pub(super) fn along<S: Simd, V: SimdFloat<S, Element = f32>>(&self, simd: S, t: V) -> V {
+        let t = t.max(V::splat(simd, -self.support)).min(V::splat(simd, self.support));
         t * polynomial(&self.cumulative, t * t * self.scale - 1.0)
-    }
-
-    /// How far a section between two planes reaches from the kernel's axis, as a fraction of the support; slightly more, because f32 rounds.
-    #[inline(always)]
-    pub(super) fn reach<S: Simd>(&self, simd: S, a: f32x8<S>, b: f32x8<S>) -> f32x8<S> {
-        let zero = f32x8::splat(simd, 0.0);
-        // 0 between the planes, whichever of them is nearer to the eye.
-        let nearest = a.min(b).max(zero) + (zero - a.max(b)).max(zero);
-        let fraction = nearest * (1.0 / self.support);
-        ((1.0 + 1e-4) - fraction * fraction).max(zero).sqrt()
     }
 
     /// `H(0, 0, t)` where the chord of the kernel's ball ends.

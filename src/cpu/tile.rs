@@ -18,7 +18,8 @@ use super::frame::Frame;
 use super::material::Material;
 use super::project::{NO_SHEET, Place, Projection};
 use super::shade::Unshaded;
-use super::sheets::{Buffers, COLUMNS, RING, ROWS, SECTIONS, slot_of};
+use super::reached::Reached;
+use super::sheets::{Buffers, CHANNELS, COLUMNS, RING, ROWS, Ring, SECTIONS, slot_of};
 use super::splat::{LocalFootprint, Splat};
 use super::vector::LANES;
 use crate::lists::brick;
@@ -48,6 +49,8 @@ pub(super) struct TileWalk<'a> {
     origin: [usize; 2],
     open: OpenMask,
     rays: TileRays,
+    ring: Ring,
+    reached: Reached,
     buffers: Buffers,
     arrived: Vec<Arrived>,
     /// What has been drawn of them, as [`Drawn`](super::count::Drawn) records it.
@@ -69,6 +72,8 @@ impl<'a> TileWalk<'a> {
             origin: [0; 2],
             open: OpenMask::new(COLUMNS, ROWS),
             rays: TileRays::default(),
+            ring: Ring::new(CHANNELS),
+            reached: Reached::new(),
             buffers: Buffers::new(),
             arrived: Vec::new(),
             marks: Vec::new(),
@@ -109,6 +114,7 @@ impl<'a> TileWalk<'a> {
         if let (Some(shown), Some(_)) = (&self.rays.shown, self.frame.compositor.threshold) {
             self.open.close_empty(shown);
         }
+        self.ring.clear();
         self.buffers.clear();
         self.arrived.clear();
         self.marks.clear();
@@ -134,8 +140,8 @@ impl<'a> TileWalk<'a> {
             if self.open.is_closed() {
                 break;
             }
-            let Buffers { written, kept, .. } = &self.buffers;
-            let is_idle = self.pending == 0 && *written == [0; RING] && *kept == 0 && sheet + 1 >= end;
+            let is_idle =
+                self.pending == 0 && self.ring.is_empty() && self.buffers.kept == 0 && sheet + 1 >= end;
             sheet = match bricks.peek() {
                 Some(placed) if is_idle => placed.first.max(sheet + 1),
                 None if is_idle => break,
@@ -150,9 +156,10 @@ impl<'a> TileWalk<'a> {
         simd.vectorize(
             #[inline(always)]
             || {
-                let Self { frame, open, rays, buffers, tally, .. } = self;
+                let Self { frame, open, rays, ring, buffers, tally, .. } = self;
+                ring.take(slot_of(sheet), &mut buffers.sheet);
                 let begin = rays.begin(frame.projection.direction * sheet);
-                let is_composited = frame.compositor.composite(simd, buffers, slot_of(sheet), (rays, begin), open);
+                let is_composited = frame.compositor.composite(simd, buffers, (rays, begin), open);
                 tally.sheets_composited += u64::from(is_composited && frame.touched.contains(&sheet));
             },
         );
@@ -324,7 +331,7 @@ impl<'a> TileWalk<'a> {
                 let [first, end] = splat.sheets;
                 let next = end.min(first + SECTIONS as i32);
                 if sections.pixels.is_some_and(|pixels| self.open.sees(&pixels)) {
-                    splatter.draw(simd, splat, &sections, &self.open, &mut self.buffers);
+                    splatter.draw(simd, splat, &sections, &self.open, (&mut self.reached, &mut self.ring));
                     let [brick, slot] = splat.voxel;
                     let masks = self.frame.drawn.masks;
                     let part = (1 + splat.drawn as usize).min(masks - 1);

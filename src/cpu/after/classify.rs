@@ -8,7 +8,7 @@ use super::frame::Frame;
 use super::planes::{CHANNELS, Planes};
 use crate::cpu::cull::{OpenMask, columns_between};
 use crate::cpu::cut::TileRays;
-use crate::cpu::sheets::{Buffers, COLUMNS, STRIDE, slot_of};
+use crate::cpu::sheets::{Buffers, COLUMNS};
 use crate::cpu::vector::LANES;
 use crate::settings::shading::Gradient;
 use crate::settings::splatting::Compositing;
@@ -82,7 +82,7 @@ impl<'a> Looks<'a> {
 }
 
 impl Frame<'_> {
-    /// Classifies the slab between a plane and the next one, into slot 0 of the sheets. The length of rays is left out.
+    /// Classifies the slab between a plane and the next one, into the sheet. The length of rays is left out.
     #[inline(always)]
     pub(super) fn classify<S: Simd>(
         &self,
@@ -93,8 +93,8 @@ impl Frame<'_> {
         open: &mut OpenMask,
         buffers: &mut Buffers,
     ) {
-        let [near, far] = [slab, slab + 1].map(slot_of);
-        let mut rows = planes.written[near] | planes.written[far];
+        let Planes { near, far, .. } = planes;
+        let mut rows = near.written | far.written;
         while rows != 0 {
             let row = rows.trailing_zeros() as usize;
             rows &= rows - 1;
@@ -105,13 +105,13 @@ impl Frame<'_> {
                     continue;
                 }
                 let at = [looks.origin[0] + column, looks.origin[1] + row];
-                let sums = [near, far].map(|slot| &planes.rows[row][slot]);
+                let sums = [&near.rows[row], &far.rows[row]];
                 let Some(slab) = self.slab(simd, slab, (at, column, lanes), sums) else { continue };
                 if self.compositing == Compositing::Surface {
                     let found = self.find_surfaces(simd, &slab, looks, [column, row], buffers);
                     open.close(row, found << column);
-                } else if self.sheet(simd, &slab, looks, [column, row], &mut buffers.sheets[row][0]) {
-                    buffers.written[0] |= 1 << row;
+                } else if self.sheet(simd, &slab, looks, [column, row], &mut buffers.sheet.rows[row]) {
+                    buffers.sheet.written |= 1 << row;
                 }
             }
         }
@@ -127,7 +127,7 @@ impl Frame<'_> {
         simd: S,
         number: i32,
         (at, column, lanes): ([usize; 2], usize, u32),
-        [near, far]: [&[[f32; STRIDE]; CHANNELS]; 2],
+        [near, far]: [&[[f32; COLUMNS]; CHANNELS]; 2],
     ) -> Option<Slab<S>> {
         let splat = |number: f32| f32x8::splat(simd, number);
         let near = self.sample(simd, near, column, (at, number));
@@ -161,7 +161,7 @@ impl Frame<'_> {
         slab: &Slab<S>,
         looks: &Looks<'_>,
         [column, row]: [usize; 2],
-        sheet: &mut [[f32; STRIDE]; 4],
+        sheet: &mut [[f32; COLUMNS]; 4],
     ) -> bool {
         let at = [looks.origin[0] + column, looks.origin[1] + row];
         let middles = self.labels.then(|| looks.middles(slab.number, [column, row]));
@@ -222,12 +222,13 @@ impl Frame<'_> {
     pub(super) fn sample<S: Simd>(
         &self,
         simd: S,
-        plane: &[[f32; STRIDE]; CHANNELS],
+        plane: &[[f32; COLUMNS]; CHANNELS],
         column: usize,
         (at, number): ([usize; 2], i32),
     ) -> Sample<S> {
-        let load = |channel: &[f32; STRIDE]| f32x8::from_slice(simd, &channel[column..column + LANES]);
-        let sums: [f32x8<S>; CHANNELS] = std::array::from_fn(|channel| load(&plane[channel]));
+        let load = |channel: &[f32; COLUMNS]| f32x8::from_slice(simd, &channel[column..column + LANES]);
+        let [n, f, d0, d1, d2, e0, e1, e2] = plane;
+        let sums = [load(n), load(f), load(d0), load(d1), load(d2), load(e0), load(e1), load(e2)];
         let has_value = sums[0].simd_ge(f32x8::splat(simd, MIN_WEIGHT));
         let one = f32x8::splat(simd, 1.0);
         let per_weight = one / has_value.select(sums[0], one);

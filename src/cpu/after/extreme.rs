@@ -5,8 +5,8 @@ use fearless_simd::prelude::*;
 
 use super::classify::{Looks, Sample, mask};
 use super::frame::Frame;
-use super::planes::Planes;
-use crate::cpu::sheets::{Buffers, COLUMNS, ROWS, slot_of};
+use super::planes::CHANNELS;
+use crate::cpu::sheets::{Buffers, COLUMNS, Layer, ROWS};
 use crate::cpu::vector::LANES;
 use crate::settings::splatting::Compositing;
 
@@ -60,16 +60,22 @@ fn middle_of<S: Simd>(stretch: [f32x8<S>; 2]) -> [f32x8<S>; 2] {
 impl Frame<'_> {
     /// Looks at the points of a plane.
     #[inline(always)]
-    pub(super) fn choose<S: Simd>(&self, simd: S, plane: i32, looks: &Looks<'_>, planes: &Planes, chosen: &mut Chosen) {
-        let slot = slot_of(plane);
+    pub(super) fn choose<S: Simd>(
+        &self,
+        simd: S,
+        plane: i32,
+        looks: &Looks<'_>,
+        layer: &Layer<CHANNELS>,
+        chosen: &mut Chosen,
+    ) {
         let number = looks.rays.begin(plane);
-        let mut rows = planes.written[slot];
+        let mut rows = layer.written;
         while rows != 0 {
             let row = rows.trailing_zeros() as usize;
             rows &= rows - 1;
             for column in (0..COLUMNS).step_by(LANES) {
                 let at = [looks.origin[0] + column, looks.origin[1] + row];
-                let sample = self.sample(simd, &planes.rows[row][slot], column, (at, plane));
+                let sample = self.sample(simd, &layer.rows[row], column, (at, plane));
                 if sample.has_value == 0 {
                     continue;
                 }

@@ -17,6 +17,7 @@ use crate::cpu::bin::Placed;
 use crate::cpu::count::Tally;
 use crate::cpu::cull::{OpenMask, Pixels};
 use crate::cpu::cut::TileRays;
+use crate::cpu::reached::Reached;
 use crate::cpu::sheets::{Buffers, COLUMNS, RING, ROWS, SECTIONS, slot_of};
 use crate::lists::brick;
 use crate::settings::splatting::Compositing;
@@ -33,6 +34,7 @@ pub(super) struct TileWalk<'a> {
     rays: TileRays,
     to_eye: Vec<[[f32; COLUMNS]; 3]>,
     planes: Planes,
+    reached: Reached,
     buffers: Buffers,
     chosen: Chosen,
     arrived: Vec<(u32, Place)>,
@@ -54,7 +56,8 @@ impl<'a> TileWalk<'a> {
             open: OpenMask::new(COLUMNS, ROWS),
             rays: TileRays::default(),
             to_eye: Vec::new(),
-            planes: Planes::new(),
+            planes: Planes::new(frame.splatter.channels()),
+            reached: Reached::new(),
             buffers: Buffers::new(),
             chosen: Chosen::new(frame.compositing),
             arrived: Vec::new(),
@@ -98,7 +101,7 @@ impl<'a> TileWalk<'a> {
         if let (Some(shown), Some(_)) = (&self.rays.shown, self.frame.compositor.threshold) {
             self.open.close_empty(shown);
         }
-        (0..RING).for_each(|slot| self.planes.clear(slot));
+        self.planes.clear();
         self.chosen.clear();
         self.arrived.clear();
         self.spare.extend(self.waiting.drain(..));
@@ -115,11 +118,10 @@ impl<'a> TileWalk<'a> {
             }
             self.start(simd, plane);
             self.composite(simd, plane - 1);
-            self.planes.clear(slot_of(plane - 1));
             if self.open.is_closed() {
                 break;
             }
-            let is_idle = self.pending == 0 && self.planes.written == [0; RING];
+            let is_idle = self.pending == 0 && self.planes.ring.is_empty() && self.planes.far.written == 0;
             plane = match bricks.peek() {
                 Some(placed) if is_idle => placed.first.max(plane + 1),
                 None if is_idle => break,
@@ -133,15 +135,16 @@ impl<'a> TileWalk<'a> {
     fn composite<S: Simd>(&mut self, simd: S, slab: i32) {
         let Self { frame, open, rays, to_eye, buffers, tally, planes, chosen, .. } = self;
         let looks = Looks::new(self.origin, rays, to_eye);
+        planes.advance(slot_of(slab + 1));
         if is_choice(frame.compositing) {
-            return frame.choose(simd, slab + 1, &looks, planes, chosen);
+            return frame.choose(simd, slab + 1, &looks, &planes.far, chosen);
         }
         frame.classify(simd, slab, &looks, planes, open, buffers);
         if frame.compositing == Compositing::Surface {
             return;
         }
         let begin = rays.begin(slab);
-        let is_composited = frame.compositor.composite(simd, buffers, 0, (rays, begin), open);
+        let is_composited = frame.compositor.composite(simd, buffers, (rays, begin), open);
         tally.sheets_composited += u64::from(is_composited && frame.touched.contains(&slab));
     }
 
@@ -213,7 +216,8 @@ impl<'a> TileWalk<'a> {
         let frame = self.frame;
         let [first, end] = splat.planes;
         let next = end.min(first + SECTIONS as i32);
-        if frame.splatter.draw(simd, (&frame.placement, self.origin), splat, &self.open, &mut self.planes) {
+        let into = (&mut self.reached, &mut self.planes.ring);
+        if frame.splatter.draw(simd, (&frame.placement, self.origin), splat, &self.open, into) {
             frame.drawn.splat(splat.voxel, splat.drawn, (next - first) as u64, &mut self.tally);
         }
         if next < end {
