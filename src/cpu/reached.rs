@@ -38,7 +38,8 @@ impl Reached {
         footprint: impl Fn(f32x8<S>, f32) -> (mask32x8<S>, [f32x8<S>; N]),
     ) {
         let Pixels { columns: [left, right], rows: [first, last] } = *pixels;
-        self.count = 0;
+        let (list, lists) = (&mut *self.pixels, &mut *self.numbers);
+        let mut count = 0;
         for column in (left..=right).step_by(LANES) {
             let dx = iota(simd) + (column as f32 - center[0]);
             let columns = u32x8::load_array(simd, [0, 1, 2, 3, 4, 5, 6, 7]) + column as u32;
@@ -46,13 +47,13 @@ impl Reached {
                 let (is_reached, numbers) = footprint(dx, row as f32 - center[1]);
                 let bits = is_reached.to_bitmask() & u64::from(open.row(row) >> column & 0xff);
                 let listed = mask32x8::from_bitmask(simd, bits);
-                let at = self.count..self.count + LANES;
-                (columns + (row * COLUMNS) as u32).compress(listed).store_slice(&mut self.pixels[at.clone()]);
+                (columns + (row * COLUMNS) as u32).compress(listed).store_slice(&mut list[count..count + LANES]);
                 for number in 0..N {
-                    numbers[number].compress(listed).store_slice(&mut self.numbers[number][at.clone()]);
+                    numbers[number].compress(listed).store_slice(&mut lists[number][count..count + LANES]);
                 }
-                self.count += bits.count_ones() as usize;
+                count += bits.count_ones() as usize;
             }
         }
+        self.count = count;
     }
 }

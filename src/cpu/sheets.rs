@@ -54,11 +54,11 @@ impl Ring {
         Self { channels, sums: vec![[0.0; RING]; ROWS * COLUMNS * channels], written: [0; ROWS] }
     }
 
-    /// The sums of a pixel, given by its index in the tile.
+    /// The sums of the pixels, by their index in the tile; N is the number of channels.
     #[inline(always)]
-    pub(super) fn pixel<const N: usize>(&mut self, pixel: u32) -> &mut [[f32; RING]; N] {
-        let at = pixel as usize * self.channels;
-        self.sums[at..].first_chunk_mut().unwrap_or_else(|| unreachable!("a pixel has {N} channels"))
+    pub(super) fn pixels<const N: usize>(&mut self) -> &mut [[[f32; RING]; N]] {
+        debug_assert_eq!(N, self.channels, "sums of another ring");
+        self.sums.as_chunks_mut().0
     }
 
     /// Records that pixels within a box were written to in some slots, from one on.

@@ -164,7 +164,7 @@ impl Splatter {
             pixels,
             open,
             #[inline(always)]
-            |dx, dy| {
+            move |dx, dy| {
                 let rho_squared = dx * (dx * xx + xy * dy) + yy * dy * dy;
                 (rho_squared.simd_lt(limit), [rho_squared])
             },
@@ -176,9 +176,10 @@ impl Splatter {
             self.kernel.in_plane(simd, rho_squared).store_slice(&mut second[at..at + LANES]);
         }
         let (near, far) = (f32x8::load_array(simd, sections.near), f32x8::load_array(simd, sections.far));
+        let (color, sums) = (splatted(simd, splat.amount), ring.pixels());
         for ((&pixel, &rim), &in_plane) in reached.pixels[..reached.count].iter().zip(&*first).zip(&*second) {
             let rim = f32x8::splat(simd, rim);
-            add(simd, (cut_by_rim(far, rim) - cut_by_rim(near, rim)) * in_plane, splat.amount, ring.pixel(pixel));
+            add(simd, (cut_by_rim(far, rim) - cut_by_rim(near, rim)) * in_plane, color, &mut sums[pixel as usize]);
         }
     }
 
@@ -205,7 +206,7 @@ impl Splatter {
             pixels,
             open,
             #[inline(always)]
-            |dx, dy| {
+            move |dx, dy| {
                 let (along, across) = (dx * x + dy * y, dx * -y + dy * x);
                 let (along, across) = (along * along, across * across);
                 ((along * least_along + across * least_across).simd_lt(limit), [along, across])
@@ -213,11 +214,12 @@ impl Splatter {
         );
         let (near, far) = (load(sections.near), load(sections.far));
         let [along, across, _] = &*reached.numbers;
+        let (color, sums) = (splatted(simd, splat.amount), ring.pixels());
         for ((&pixel, &along), &across) in reached.pixels[..reached.count].iter().zip(along).zip(across) {
             let rho_squared = to_along * along + to_across * across;
             let rim = self.kernel.rim(simd, rho_squared);
             let in_plane = self.kernel.in_plane(simd, rho_squared) * amplitude;
-            add(simd, (cut_by_rim(far, rim) - cut_by_rim(near, rim)) * in_plane, splat.amount, ring.pixel(pixel));
+            add(simd, (cut_by_rim(far, rim) - cut_by_rim(near, rim)) * in_plane, color, &mut sums[pixel as usize]);
         }
     }
 }
@@ -228,10 +230,21 @@ fn cut_by_rim<S: Simd>(planes: f32x8<S>, rim: f32x8<S>) -> f32x8<S> {
     planes.max(-rim).min(rim)
 }
 
+#[inline(always)]
+fn splatted<S: Simd>(simd: S, [red, green, blue, alpha]: [f32; CHANNELS]) -> [f32x8<S>; CHANNELS] {
+    [
+        f32x8::splat(simd, red),
+        f32x8::splat(simd, green),
+        f32x8::splat(simd, blue),
+        f32x8::splat(simd, alpha),
+    ]
+}
+
 /// Adds a colour to a pixel of all open sheets, by weights.
 #[inline(always)]
-fn add<S: Simd>(simd: S, weights: f32x8<S>, color: [f32; CHANNELS], pixel: &mut [[f32; RING]; CHANNELS]) {
-    for (sums, color) in pixel.iter_mut().zip(color) {
-        (f32x8::load_array_ref(simd, sums) + weights * color).store_slice(sums);
+fn add<S: Simd>(simd: S, weights: f32x8<S>, color: [f32x8<S>; CHANNELS], pixel: &mut [[f32; RING]; CHANNELS]) {
+    for channel in 0..CHANNELS {
+        let sums = &mut pixel[channel];
+        (f32x8::load_array_ref(simd, sums) + weights * color[channel]).store_slice(sums);
     }
 }

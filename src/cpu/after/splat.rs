@@ -9,7 +9,7 @@ use super::place::{Place, Placement};
 use super::planes::CHANNELS;
 use crate::cpu::cull::{OpenMask, Pixels};
 use crate::cpu::reached::Reached;
-use crate::cpu::sheets::{COLUMNS, RING, Ring, SECTIONS, slot_of};
+use crate::cpu::sheets::{RING, Ring, SECTIONS, slot_of};
 use crate::cpu::splat::order_from;
 use crate::cpu::vector::{LANES, exp2};
 use crate::settings::shading::Gradient;
@@ -137,32 +137,35 @@ impl Splatter {
         (pixels, open): (&Pixels, &OpenMask),
         (reached, ring): (&mut Reached, &mut Ring),
     ) {
-        let Footprint { center, a, b } = footprint;
+        let Footprint { center, a, b } = *footprint;
         let limit = f32x8::splat(simd, along.limit.reduce_max());
         reached.list(
             simd,
-            *center,
+            center,
             pixels,
             open,
             #[inline(always)]
-            |dx, dy| {
+            move |dx, dy| {
                 let (a, b) = (dx * a[0] + dy * a[1], dx * b[0] + dy * b[1]);
                 let rho_squared = a * a + b * b;
                 (rho_squared.simd_lt(limit), [rho_squared, a, b])
             },
         );
+        let Along { t, gaussian, limit } = *along;
+        let zero = f32x8::splat(simd, 0.0);
+        let [rho_squared, a, b] = &*reached.numbers;
+        // Eight pixels at a time, as the compiler then keeps their Gaussians in a vector.
         let mut in_planes = [0.0; LANES];
-        for at in 0..reached.count {
-            let [rho_squared, a, b] = &*reached.numbers;
-            // Of the next eight pixels.
+        let mut sums = Sums::new(simd, self.gradient, splat, ring);
+        for (at, &pixel) in reached.pixels[..reached.count].iter().enumerate() {
             if at % LANES == 0 {
                 let rho_squared = f32x8::from_slice(simd, &rho_squared[at..at + LANES]);
                 in_planes = self.gaussian(simd, rho_squared).to_array();
             }
-            let is_inside = f32x8::splat(simd, rho_squared[at]).simd_lt(along.limit);
-            let weights = is_inside.select(along.gaussian * in_planes[at % LANES], f32x8::splat(simd, 0.0));
-            let [a, b] = [a, b].map(|offsets| f32x8::splat(simd, offsets[at]));
-            self.add(simd, splat, weights, [a, b, along.t], reached.pixels[at], ring);
+            let is_inside = f32x8::splat(simd, rho_squared[at]).simd_lt(limit);
+            let weights = is_inside.select(gaussian * in_planes[at % LANES], zero);
+            let offsets = [f32x8::splat(simd, a[at]), f32x8::splat(simd, b[at]), t];
+            sums.add(simd, weights, offsets, pixel);
         }
     }
 
@@ -183,26 +186,28 @@ impl Splatter {
                 row[slot] = number;
             }
         }
-        let load = |at: usize| f32x8::load_array_ref(simd, &rows[at]);
-        let (x, y, ax, ay, bx, by) = (load(0), load(1), load(2), load(3), load(4), load(5));
+        let [x, y, ax, ay, bx, by] = rows;
+        let (x, y) = (f32x8::load_array(simd, x), f32x8::load_array(simd, y));
+        let (ax, ay) = (f32x8::load_array(simd, ax), f32x8::load_array(simd, ay));
+        let (bx, by) = (f32x8::load_array(simd, bx), f32x8::load_array(simd, by));
         reached.list(
             simd,
             [0.0; 2],
             pixels,
             open,
             #[inline(always)]
-            |_, _| (f32x8::splat(simd, 0.0).simd_eq(f32x8::splat(simd, 0.0)), []),
+            move |x, y| (x.simd_eq(x), [x, f32x8::splat(simd, y)]),
         );
-        for at in 0..reached.count {
-            let pixel = reached.pixels[at];
-            let (row, column) = (pixel as usize / COLUMNS, pixel as usize % COLUMNS);
-            let (dx, dy) = (column as f32 - x, row as f32 - y);
+        let Along { t, gaussian, limit } = *along;
+        let zero = f32x8::splat(simd, 0.0);
+        let [columns, rows, _] = &*reached.numbers;
+        let mut sums = Sums::new(simd, self.gradient, splat, ring);
+        for ((&pixel, &column), &row) in reached.pixels[..reached.count].iter().zip(columns).zip(rows) {
+            let (dx, dy) = (column - x, row - y);
             let (a, b) = (dx * ax + dy * ay, dx * bx + dy * by);
             let rho_squared = a * a + b * b;
-            let is_inside = rho_squared.simd_lt(along.limit);
-            let gaussian = self.gaussian(simd, rho_squared) * along.gaussian;
-            let weights = is_inside.select(gaussian, f32x8::splat(simd, 0.0));
-            self.add(simd, splat, weights, [a, b, along.t], pixel, ring);
+            let weights = self.gaussian(simd, rho_squared) * gaussian;
+            sums.add(simd, rho_squared.simd_lt(limit).select(weights, zero), [a, b, t], pixel);
         }
     }
 
@@ -210,40 +215,49 @@ impl Splatter {
     fn gaussian<S: Simd>(&self, simd: S, squared: f32x8<S>) -> f32x8<S> {
         exp2(simd, (squared * self.exponent).max(f32x8::splat(simd, -126.0)))
     }
+}
 
-    /// Adds a voxel to a pixel on all open planes, given its weights and the offsets there.
+/// The sums that a voxel is added to, and its numbers.
+enum Sums<'a, S: Simd> {
+    /// c and d.
+    Differences(&'a mut [[[f32; RING]; 5]], [f32x8<S>; 4]),
+    /// c.
+    Kernel(&'a mut [[[f32; RING]; CHANNELS]], f32x8<S>),
+}
+
+impl<'a, S: Simd> Sums<'a, S> {
     #[inline(always)]
-    fn add<S: Simd>(
-        &self,
-        simd: S,
-        splat: &Splat,
-        weights: f32x8<S>,
-        [a, b, t]: [f32x8<S>; 3],
-        pixel: u32,
-        ring: &mut Ring,
-    ) {
-        let c = splat.number;
-        match self.gradient {
-            Gradient::Differences => {
-                let [n, f, x, y, z] = ring.pixel(pixel);
-                let [dx, dy, dz] = splat.gradient;
+    fn new(simd: S, gradient: Gradient, splat: &Splat, ring: &'a mut Ring) -> Self {
+        let number = |number: f32| f32x8::splat(simd, number);
+        let (c, [x, y, z]) = (number(splat.number), splat.gradient);
+        match gradient {
+            Gradient::Differences => Self::Differences(ring.pixels(), [c, number(x), number(y), number(z)]),
+            Gradient::Kernel => Self::Kernel(ring.pixels(), c),
+        }
+    }
+
+    /// Adds the voxel to a pixel on all open planes, given its weights and the offsets there.
+    #[inline(always)]
+    fn add(&mut self, simd: S, weights: f32x8<S>, [a, b, t]: [f32x8<S>; 3], pixel: u32) {
+        match self {
+            Self::Differences(sums, numbers) => {
+                let [n, rest @ ..] = &mut sums[pixel as usize];
                 add(simd, n, weights);
-                add(simd, f, weights * c);
-                add(simd, x, weights * dx);
-                add(simd, y, weights * dy);
-                add(simd, z, weights * dz);
+                for at in 0..4 {
+                    add(simd, &mut rest[at], weights * numbers[at]);
+                }
             }
-            Gradient::Kernel => {
-                let [n, f, sa, sb, st, ca, cb, ct] = ring.pixel(pixel);
+            Self::Kernel(sums, c) => {
+                let [n, f, sa, sb, st, ca, cb, ct] = &mut sums[pixel as usize];
                 let (a, b, t) = (weights * a, weights * b, weights * t);
                 add(simd, n, weights);
-                add(simd, f, weights * c);
+                add(simd, f, weights * *c);
                 add(simd, sa, a);
                 add(simd, sb, b);
                 add(simd, st, t);
-                add(simd, ca, a * c);
-                add(simd, cb, b * c);
-                add(simd, ct, t * c);
+                add(simd, ca, a * *c);
+                add(simd, cb, b * *c);
+                add(simd, ct, t * *c);
             }
         }
     }
