@@ -25,6 +25,7 @@ mod kernel;
 mod material;
 mod means;
 mod project;
+mod queue;
 mod ray;
 mod reached;
 mod resolve;

@@ -16,13 +16,18 @@ pub(super) const CHANNELS: usize = 4;
 /// The columns that share a bit of [`Ring::written`].
 const BLOCK: usize = COLUMNS / u8::BITS as usize;
 
+/// A pixel's sums for all open sheets, by slot. Aligned, so that none of them lies on two cache lines.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
+pub(super) struct Sums(pub(super) [f32; RING]);
+
 /// The open sheets, or planes, of a tile. A pixel's sums for all of them lie together, a vector for each channel with a number for each slot: a voxel
 /// adds to them by a multiplication and an addition for each channel.
 #[derive(Debug)]
 pub(super) struct Ring {
     channels: usize,
     /// The sums of pixels, row by row, and of their channels.
-    sums: Vec<[f32; RING]>,
+    sums: Vec<Sums>,
     /// Which columns of a row are not empty: byte s has a bit for every 4 columns of slot s.
     written: [u64; ROWS],
 }
@@ -51,12 +56,12 @@ pub(super) struct Buffers {
 impl Ring {
     /// Empty sheets with a number of channels.
     pub(super) fn new(channels: usize) -> Self {
-        Self { channels, sums: vec![[0.0; RING]; ROWS * COLUMNS * channels], written: [0; ROWS] }
+        Self { channels, sums: vec![Sums([0.0; RING]); ROWS * COLUMNS * channels], written: [0; ROWS] }
     }
 
     /// The sums of the pixels, by their index in the tile; N is the number of channels.
     #[inline(always)]
-    pub(super) fn pixels<const N: usize>(&mut self) -> &mut [[[f32; RING]; N]] {
+    pub(super) fn pixels<const N: usize>(&mut self) -> &mut [[Sums; N]] {
         debug_assert_eq!(N, self.channels, "sums of another ring");
         self.sums.as_chunks_mut().0
     }
@@ -94,7 +99,7 @@ impl Ring {
                 let pixels = self.sums[(row * COLUMNS + column) * self.channels..].chunks_exact_mut(self.channels);
                 for (column, sums) in (column..column + BLOCK).zip(pixels) {
                     for (target, sums) in target.iter_mut().zip(sums) {
-                        target[column] = std::mem::take(&mut sums[slot]);
+                        target[column] = std::mem::take(&mut sums.0[slot]);
                     }
                 }
             }
@@ -106,7 +111,7 @@ impl Ring {
         let length = COLUMNS * self.channels;
         for (written, sums) in self.written.iter_mut().zip(self.sums.chunks_exact_mut(length)) {
             if std::mem::take(written) != 0 {
-                sums.fill([0.0; RING]);
+                sums.fill(Sums([0.0; RING]));
             }
         }
     }

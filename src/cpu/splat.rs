@@ -7,7 +7,7 @@ use fearless_simd::prelude::*;
 use super::cull::{OpenMask, Pixels};
 use super::kernel::KernelTables;
 use super::reached::Reached;
-use super::sheets::{CHANNELS, RING, Ring, SECTIONS, slot_of};
+use super::sheets::{CHANNELS, RING, Ring, SECTIONS, Sums, slot_of};
 use super::vector::LANES;
 
 /// A voxel in the coordinates of a tile.
@@ -15,6 +15,8 @@ use super::vector::LANES;
 pub(super) struct Splat {
     /// Its pixel coordinates; the centre of the tile's first pixel is at 0, 0.
     pub(super) center: [f32; 2],
+    /// The pixels of the tile that it may reach.
+    pub(super) pixels: Pixels,
     /// `(C·m, m)` over λ, and the low-pass amplitude where it is the same for all sections.
     pub(super) amount: [f32; 4],
     /// The range of sheets still to be drawn, in the order of compositing.
@@ -48,8 +50,6 @@ pub(super) struct Splatter {
     pub(super) radius: f32,
     /// Orthographic: ρ² of a pixel offset (dx, dy) is `x·dx² + y·dx·dy + z·dy²`.
     pub(super) metric: [f32; 3],
-    /// Orthographic: half the box around footprints, pixels.
-    pub(super) half_box: [f32; 2],
     /// In perspective the size of a pixel at depth 1, `unit`s.
     pub(super) pixel_per_depth: Option<f32>,
     /// True if sheets hold whole kernels, whose footprint is that at the voxel's depth.
@@ -95,9 +95,8 @@ impl Splatter {
             along: [0.0; RING],
             across: [0.0; RING],
             amplitude: [0.0; RING],
-            pixels: None,
+            pixels: Some(splat.pixels),
         };
-        let mut half_box = self.half_box;
         if let Some(pixel_per_depth) = self.pixel_per_depth {
             let local = &splat.local;
             let cut = splat_f32(local.cut);
@@ -118,13 +117,12 @@ impl Splatter {
             let [x, y] = local.axis.map(|component| component * component);
             let width = (one / along * x + one / across * y).sqrt() * self.kernel.support;
             let height = (one / along * y + one / across * x).sqrt() * self.kernel.support;
-            half_box = [width.reduce_max(), height.reduce_max()];
+            sections.pixels = Pixels::within(splat.center, [width.reduce_max(), height.reduce_max()]);
             (sections.along, sections.across) = (along.to_array(), across.to_array());
             sections.amplitude = amplitude.to_array();
         }
         let (near, far) = self.kernel.along(simd, near.combine(far)).split();
         (sections.near, sections.far) = (near.to_array(), far.to_array());
-        sections.pixels = Pixels::within(splat.center, half_box);
         sections
     }
 
@@ -242,9 +240,9 @@ fn splatted<S: Simd>(simd: S, [red, green, blue, alpha]: [f32; CHANNELS]) -> [f3
 
 /// Adds a colour to a pixel of all open sheets, by weights.
 #[inline(always)]
-fn add<S: Simd>(simd: S, weights: f32x8<S>, color: [f32x8<S>; CHANNELS], pixel: &mut [[f32; RING]; CHANNELS]) {
+fn add<S: Simd>(simd: S, weights: f32x8<S>, color: [f32x8<S>; CHANNELS], pixel: &mut [Sums; CHANNELS]) {
     for channel in 0..CHANNELS {
-        let sums = &mut pixel[channel];
+        let sums = &mut pixel[channel].0;
         (f32x8::load_array_ref(simd, sums) + weights * color[channel]).store_slice(sums);
     }
 }

@@ -8,7 +8,9 @@ use rayon::prelude::*;
 use crate::after::plane_geometry::PlaneGeometry;
 use crate::cpu::bin::Placed;
 use crate::cpu::project::floor;
+use crate::cpu::queue::{BySlot, NO_SHEET};
 use crate::cpu::sheets::{COLUMNS, ROWS};
+use crate::cpu::vector::LANES;
 use crate::geometry::slab;
 use crate::geometry::view_geometry::ViewGeometry;
 
@@ -47,7 +49,10 @@ pub(super) struct Placement {
     pub(super) per_plane: f64,
     /// Planes that a kernel reaches to either side of its voxel.
     reach: f64,
-    places: Vec<Place>,
+    /// Where the voxels of a brick are, from its first place, by slot.
+    x: BySlot<f64>,
+    y: BySlot<f64>,
+    depth: BySlot<f64>,
     /// Of the planes that the volume's kernels reach, from the first on; without an eye of one, as all are the same.
     maps: Vec<PlaneMap>,
     first_map: i32,
@@ -61,9 +66,13 @@ impl Placement {
         let geometry = PlaneGeometry::new(&view, grid);
         let per_plane = geometry.per_depth * view.slabs.width;
         let reach = view.radius / per_plane;
-        let (places, maps) = (Vec::new(), Vec::new());
-        let mut placement = Self { geometry, reach, per_plane, view, places, maps, first_map: 0 };
-        placement.places = (0..BRICK_VOXELS).map(|slot| placement.offset(brick::in_brick(slot).as_dvec3())).collect();
+        let offset = |row: usize, slot: usize| {
+            view.screen_from_voxel[row].truncate().dot(brick::in_brick(slot as u32).as_dvec3())
+        };
+        let [x, y] = [0, 1].map(|row| std::array::from_fn(|slot| offset(row, slot)));
+        let depth = std::array::from_fn(|slot| offset(2, slot) / view.slabs.width);
+        let mut placement =
+            Self { geometry, reach, per_plane, view, x, y, depth, maps: Vec::new(), first_map: 0 };
         let (middle, half) = (grid.center(), grid.center());
         let Place { depth, .. } = placement.of(middle);
         let spread = view.screen_from_voxel[2].truncate().abs().dot(half) / view.slabs.width;
@@ -73,11 +82,6 @@ impl Placement {
         placement.maps = planes.clone().map(|plane| placement.new_map(plane)).collect();
         placement.first_map = planes.start;
         placement
-    }
-
-    fn offset(&self, voxels: DVec3) -> Place {
-        let [x, y, depth, _] = self.view.screen_from_voxel.map(|row| row.truncate().dot(voxels));
-        Place { at: DVec2::new(x, y), depth: depth / self.view.slabs.width }
     }
 
     fn of(&self, voxel: DVec3) -> Place {
@@ -92,11 +96,40 @@ impl Placement {
 
     /// Where one of a brick's voxels is.
     pub(super) fn of_voxel(&self, brick: Place, slot: u32) -> Place {
-        let Place { at, depth } = self.places[slot as usize];
-        Place { at: brick.at + at, depth: brick.depth + depth }
+        let slot = slot as usize;
+        Place { at: brick.at + DVec2::new(self.x[slot], self.y[slot]), depth: brick.depth + self.depth[slot] }
+    }
+
+    /// Without an eye, pixel coordinates of a brick's voxels in eight slots, from the first on, in a tile given by its first pixel. The centre of
+    /// that is at 0, 0.
+    #[inline(always)]
+    pub(super) fn centers(&self, brick: Place, first: usize, origin: [usize; 2]) -> [[f32; LANES]; 2] {
+        let middle = self.middle();
+        let (shift_x, shift_y) = (middle.x - 0.5 - origin[0] as f64, middle.y - 0.5 - origin[1] as f64);
+        let (x, y) = (&self.x[first..first + LANES], &self.y[first..first + LANES]);
+        let mut centers = [[0.0; LANES]; 2];
+        let [columns, rows] = &mut centers;
+        for lane in 0..LANES {
+            columns[lane] = (brick.at.x + x[lane] + shift_x) as f32;
+            rows[lane] = (brick.at.y + y[lane] + shift_y) as f32;
+        }
+        centers
+    }
+
+    /// The first planes of voxels in all slots of a brick; [`NO_SHEET`] for none.
+    #[inline(always)]
+    pub(super) fn first_planes(&self, brick: Place) -> BySlot<i32> {
+        let mut firsts = [NO_SHEET; BRICK_VOXELS as usize];
+        for (first, offset) in firsts.iter_mut().zip(&self.depth) {
+            let depth = brick.depth + offset;
+            let planes = self.planes(depth..depth);
+            *first = if planes.start < planes.end { planes.start } else { NO_SHEET };
+        }
+        firsts
     }
 
     /// The planes nearer than a kernel's radius to voxels between two depths. At the eye and behind it there are none.
+    #[inline(always)]
     pub(super) fn planes(&self, depths: Range<f64>) -> Range<i32> {
         let first = floor(depths.start - self.reach + slab::ROUNDING) + 1;
         let end = -floor(-(depths.end + self.reach - slab::ROUNDING));
@@ -126,6 +159,12 @@ impl Placement {
         let squared = along * along + across * across;
         let half_box = DVec2::new(squared.x.sqrt(), squared.y.sqrt()) + SLACK;
         PlaneMap { from_eye, a, b, half_box }
+    }
+
+    /// Half the box around kernels, pixels, where it is the same on all planes.
+    pub(super) fn flat_half_box(&self) -> Option<[f32; 2]> {
+        let half_box = || self.map(0).half_box.to_array().map(|half| half as f32);
+        self.view.perspective.is_none().then(half_box)
     }
 
     /// Where on the image the point of a plane lies that is nearest to a voxel.

@@ -5,11 +5,11 @@ use std::f64::consts::LOG2_E;
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
-use super::place::{Place, Placement};
+use super::place::{Place, PlaneMap, Placement};
 use super::planes::CHANNELS;
 use crate::cpu::cull::{OpenMask, Pixels};
 use crate::cpu::reached::Reached;
-use crate::cpu::sheets::{RING, Ring, SECTIONS, slot_of};
+use crate::cpu::sheets::{self, RING, Ring, SECTIONS, slot_of};
 use crate::cpu::splat::order_from;
 use crate::cpu::vector::{LANES, exp2};
 use crate::settings::shading::Gradient;
@@ -20,6 +20,9 @@ pub(super) struct Splat {
     /// Which voxel: its brick's number and its place there.
     pub(super) voxel: [u32; 2],
     pub(super) place: Place,
+    /// Without an eye its pixel coordinates, the centre of the tile's first pixel at 0, 0, and the pixels that it may reach.
+    pub(super) center: [f32; 2],
+    pub(super) pixels: Option<Pixels>,
     /// c.
     pub(super) number: f32,
     /// d, for [`Gradient::Differences`].
@@ -93,23 +96,20 @@ impl Splatter {
         let [first, end] = splat.planes;
         let count = ((end - first) as usize).min(SECTIONS);
         let slot = slot_of(first);
-        let footprint = |plane: i32| {
-            let map = placement.map(plane);
-            // Without perspective all planes have the same footprint.
-            let to_plane = if self.is_perspective { placement.to_plane(splat.place, plane) } else { 0.0 };
-            let pixel = placement.center(splat.place, to_plane, map);
-            let center = [pixel.x - origin[0] as f64 - 0.5, pixel.y - origin[1] as f64 - 0.5].map(|at| at as f32);
-            let [a, b] = [map.a, map.b].map(|axis| [axis.x as f32, axis.y as f32]);
-            (Footprint { center, a, b }, [map.half_box.x as f32, map.half_box.y as f32])
-        };
-        let (nearest, half_box) = footprint(first);
-        let mut footprints = [nearest; RING];
-        let mut pixels = Pixels::within(nearest.center, half_box);
+        let axes = |map: &PlaneMap| [map.a, map.b].map(|axis| [axis.x as f32, axis.y as f32]);
+        let [a, b] = axes(placement.map(first));
+        let mut footprints = [Footprint { center: splat.center, a, b }; RING];
+        let mut pixels = splat.pixels;
         if self.is_perspective {
-            for at in 1..count {
-                let (footprint, half_box) = footprint(first + at as i32);
-                footprints[(slot + at) % RING] = footprint;
-                pixels = Pixels::around(pixels, Pixels::within(footprint.center, half_box));
+            pixels = None;
+            for (at, plane) in (first..).take(count).enumerate() {
+                let map = placement.map(plane);
+                let pixel = placement.center(splat.place, placement.to_plane(splat.place, plane), map);
+                let center = [pixel.x - origin[0] as f64 - 0.5, pixel.y - origin[1] as f64 - 0.5].map(|at| at as f32);
+                let half_box = [map.half_box.x as f32, map.half_box.y as f32];
+                let [a, b] = axes(map);
+                footprints[(slot + at) % RING] = Footprint { center, a, b };
+                pixels = Pixels::around(pixels, Pixels::within(center, half_box));
             }
         }
         let Some(pixels) = pixels.filter(|pixels| open.sees(pixels)) else { return false };
@@ -120,7 +120,7 @@ impl Splatter {
         let limit = has_plane.select(limit, f32x8::splat(simd, 0.0));
         let along = Along { t, gaussian: self.gaussian(simd, t * t), limit };
         match self.is_perspective {
-            false => self.draw_flat(simd, splat, (&nearest, &along), (&pixels, open), (reached, ring)),
+            false => self.draw_flat(simd, splat, (&footprints[0], &along), (&pixels, open), (reached, ring)),
             true => self.draw_local(simd, splat, (&footprints, &along), (&pixels, open), (reached, ring)),
         }
         ring.mark(pixels.columns, pixels.rows, slot, count);
@@ -220,9 +220,9 @@ impl Splatter {
 /// The sums that a voxel is added to, and its numbers.
 enum Sums<'a, S: Simd> {
     /// c and d.
-    Differences(&'a mut [[[f32; RING]; 5]], [f32x8<S>; 4]),
+    Differences(&'a mut [[sheets::Sums; 5]], [f32x8<S>; 4]),
     /// c.
-    Kernel(&'a mut [[[f32; RING]; CHANNELS]], f32x8<S>),
+    Kernel(&'a mut [[sheets::Sums; CHANNELS]], f32x8<S>),
 }
 
 impl<'a, S: Simd> Sums<'a, S> {
@@ -265,6 +265,6 @@ impl<'a, S: Simd> Sums<'a, S> {
 
 /// Adds to a pixel's sums for all open planes.
 #[inline(always)]
-fn add<S: Simd>(simd: S, sums: &mut [f32; RING], numbers: f32x8<S>) {
+fn add<S: Simd>(simd: S, sheets::Sums(sums): &mut sheets::Sums, numbers: f32x8<S>) {
     (f32x8::load_array_ref(simd, sums) + numbers).store_slice(sums);
 }
