@@ -35,13 +35,6 @@ impl Pixels {
         };
         Some(Self { columns: of_axis(0, COLUMNS)?, rows: of_axis(1, ROWS)? })
     }
-
-    /// The pixels within the box around two boxes.
-    pub(super) fn around(first: Option<Self>, second: Option<Self>) -> Option<Self> {
-        let (Some(a), Some(b)) = (first, second) else { return first.or(second) };
-        let joined = |a: [usize; 2], b: [usize; 2]| [a[0].min(b[0]), a[1].max(b[1])];
-        Some(Self { columns: joined(a.columns, b.columns), rows: joined(a.rows, b.rows) })
-    }
 }
 
 /// The pixels of a tile within eight boxes of one size: first and last column and row, the first after the last where there are none.

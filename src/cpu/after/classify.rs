@@ -1,14 +1,14 @@
-//! What pixels see between two planes, classified and shaded there (SPEC §9): the sheet of a slab, eight pixels at a time.
+//! The field between two planes, classified and shaded there (SPEC §9): it gives the sheet of a slab, eight pixels at a time.
 
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 use glam::DVec3;
 
 use super::frame::Frame;
-use super::planes::{CHANNELS, Planes};
+use super::planes::{CHANNELS, Planes, STRIDE};
 use crate::cpu::cull::{OpenMask, columns_between};
 use crate::cpu::cut::TileRays;
-use crate::cpu::sheets::{Buffers, COLUMNS};
+use crate::cpu::sheets::{Buffers, COLUMNS, slot_of};
 use crate::cpu::vector::LANES;
 use crate::settings::shading::Gradient;
 use crate::settings::splatting::Compositing;
@@ -28,7 +28,7 @@ pub(super) struct Sample<S: Simd> {
     pub(super) has_value: u32,
 }
 
-/// What eight pixels see of a slab.
+/// The field of eight pixels in a slab.
 pub(super) struct Slab<S: Simd> {
     /// k.
     pub(super) number: i32,
@@ -36,7 +36,7 @@ pub(super) struct Slab<S: Simd> {
     pub(super) lanes: u32,
     /// f0 and f1, as numbers.
     pub(super) values: [f32x8<S>; 2],
-    /// The same of ∇f, numbers per world unit.
+    /// ∇f there, numbers per world unit.
     pub(super) gradients: [[f32x8<S>; 3]; 2],
 }
 
@@ -51,7 +51,7 @@ pub(super) struct Looks<'a> {
 }
 
 impl<'a> Looks<'a> {
-    /// Those of a tile, given its first pixel; `to_eye` is empty where pixels do not differ.
+    /// The rays of a tile, given its first pixel; `to_eye` is empty if all pixels share one direction.
     pub(super) fn new(origin: [usize; 2], rays: &'a TileRays, to_eye: &'a [[[f32; COLUMNS]; 3]]) -> Self {
         let to_eye = (!to_eye.is_empty()).then_some(to_eye);
         Self { origin, rays, shown: rays.shown.as_deref().unwrap_or_default(), to_eye }
@@ -72,7 +72,7 @@ impl<'a> Looks<'a> {
         })
     }
 
-    /// The middles of what eight pixels see of a slab, in slabs.
+    /// The middles of the stretches of eight rays in a slab, in slabs.
     fn middles(&self, slab: i32, [column, row]: [usize; 2]) -> [f64; LANES] {
         let begin = self.rays.begin(slab);
         let [starts, ends] = &self.shown[row];
@@ -93,8 +93,8 @@ impl Frame<'_> {
         open: &mut OpenMask,
         buffers: &mut Buffers,
     ) {
-        let Planes { near, far, .. } = planes;
-        let mut rows = near.written | far.written;
+        let [near, far] = [slab, slab + 1].map(slot_of);
+        let mut rows = planes.written[near] | planes.written[far];
         while rows != 0 {
             let row = rows.trailing_zeros() as usize;
             rows &= rows - 1;
@@ -105,7 +105,7 @@ impl Frame<'_> {
                     continue;
                 }
                 let at = [looks.origin[0] + column, looks.origin[1] + row];
-                let sums = [&near.rows[row], &far.rows[row]];
+                let sums = [near, far].map(|slot| &planes.rows[row][slot]);
                 let Some(slab) = self.slab(simd, slab, (at, column, lanes), sums) else { continue };
                 if self.compositing == Compositing::Surface {
                     let found = self.find_surfaces(simd, &slab, looks, [column, row], buffers);
@@ -120,14 +120,14 @@ impl Frame<'_> {
         }
     }
 
-    /// What eight pixels see of a slab; `None` where none of its values has an opacity.
+    /// The field of eight pixels in a slab; `None` if none of its values has an opacity.
     #[inline(always)]
     fn slab<S: Simd>(
         &self,
         simd: S,
         number: i32,
         (at, column, lanes): ([usize; 2], usize, u32),
-        [near, far]: [&[[f32; COLUMNS]; CHANNELS]; 2],
+        [near, far]: [&[[f32; STRIDE]; CHANNELS]; 2],
     ) -> Option<Slab<S>> {
         let splat = |number: f32| f32x8::splat(simd, number);
         let near = self.sample(simd, near, column, (at, number));
@@ -222,13 +222,13 @@ impl Frame<'_> {
     pub(super) fn sample<S: Simd>(
         &self,
         simd: S,
-        plane: &[[f32; COLUMNS]; CHANNELS],
+        plane: &[[f32; STRIDE]; CHANNELS],
         column: usize,
         (at, number): ([usize; 2], i32),
     ) -> Sample<S> {
-        let load = |channel: &[f32; COLUMNS]| f32x8::from_slice(simd, &channel[column..column + LANES]);
-        let [n, f, d0, d1, d2, e0, e1, e2] = plane;
-        let sums = [load(n), load(f), load(d0), load(d1), load(d2), load(e0), load(e1), load(e2)];
+        let load = |channel: &[f32; STRIDE]| f32x8::from_slice(simd, &channel[column..column + LANES]);
+        let [n, f, x, y, z, ca, cb, ct] = plane;
+        let sums = [load(n), load(f), load(x), load(y), load(z), load(ca), load(cb), load(ct)];
         let has_value = sums[0].simd_ge(f32x8::splat(simd, MIN_WEIGHT));
         let one = f32x8::splat(simd, 1.0);
         let per_weight = one / has_value.select(sums[0], one);

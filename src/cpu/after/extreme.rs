@@ -1,16 +1,16 @@
-//! `maximum`, `minimum` and `average` after splatting (SPEC §9): one value per pixel is chosen from those on the planes, and that is classified.
+//! `maximum`, `minimum` and `average` after splatting (SPEC §9): one value per pixel is chosen from its values on the planes, and classified.
 
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
 use super::classify::{Looks, Sample, mask};
 use super::frame::Frame;
-use super::planes::CHANNELS;
-use crate::cpu::sheets::{Buffers, COLUMNS, Layer, ROWS};
+use super::planes::Planes;
+use crate::cpu::sheets::{Buffers, COLUMNS, ROWS, slot_of};
 use crate::cpu::vector::LANES;
 use crate::settings::splatting::Compositing;
 
-/// What is kept of a row's pixels: the number, the gradient, and where among slabs; a weight that is 0 where there is nothing.
+/// The choice of a row's pixels: number, gradient, and place among slabs; the weight is 0 where nothing was chosen.
 #[derive(Clone, Copy, Debug)]
 struct Kept {
     number: [f32; COLUMNS],
@@ -60,22 +60,16 @@ fn middle_of<S: Simd>(stretch: [f32x8<S>; 2]) -> [f32x8<S>; 2] {
 impl Frame<'_> {
     /// Looks at the points of a plane.
     #[inline(always)]
-    pub(super) fn choose<S: Simd>(
-        &self,
-        simd: S,
-        plane: i32,
-        looks: &Looks<'_>,
-        layer: &Layer<CHANNELS>,
-        chosen: &mut Chosen,
-    ) {
+    pub(super) fn choose<S: Simd>(&self, simd: S, plane: i32, looks: &Looks<'_>, planes: &Planes, chosen: &mut Chosen) {
+        let slot = slot_of(plane);
         let number = looks.rays.begin(plane);
-        let mut rows = layer.written;
+        let mut rows = planes.written[slot];
         while rows != 0 {
             let row = rows.trailing_zeros() as usize;
             rows &= rows - 1;
             for column in (0..COLUMNS).step_by(LANES) {
                 let at = [looks.origin[0] + column, looks.origin[1] + row];
-                let sample = self.sample(simd, &layer.rows[row], column, (at, plane));
+                let sample = self.sample(simd, &planes.rows[row][slot], column, (at, plane));
                 if sample.has_value == 0 {
                     continue;
                 }

@@ -18,7 +18,7 @@ use crate::lists::brick::Brick;
 use crate::lists::brick::{self, BRICK_VOXELS};
 use crate::volume::Grid;
 
-/// Pixels around boxes, for what f32 rounds.
+/// Pixels around boxes, for rounding in f32.
 const SLACK: f64 = 0.02;
 
 /// Where a voxel is. Planes are counted: plane k is at depth k.
@@ -58,7 +58,7 @@ pub(super) struct Placement {
     first_map: i32,
 }
 
-/// A box on the screen, pixels: least and greatest.
+/// A box on the screen, pixels: its min and max corner.
 pub(super) type ScreenBox = [DVec2; 2];
 
 impl Placement {
@@ -76,7 +76,7 @@ impl Placement {
         let (middle, half) = (grid.center(), grid.center());
         let Place { depth, .. } = placement.of(middle);
         let spread = view.screen_from_voxel[2].truncate().abs().dot(half) / view.slabs.width;
-        // A plane more on either side, for what is rounded.
+        // One more plane on either side, for rounding.
         let planes = placement.planes(depth - spread - 1.0..depth + spread + 1.0);
         let planes = if view.perspective.is_some() { planes } else { 0..1 };
         placement.maps = planes.clone().map(|plane| placement.new_map(plane)).collect();

@@ -1,39 +1,39 @@
-//! A tile's planes: a ring of open ones onto which values, weights and gradients are splatted (SPEC §9), and the two around the current slab.
+//! A tile's plane buffers: a ring of planes onto which values, weights and gradients are splatted (SPEC §9).
 
-use crate::cpu::sheets::{Layer, Ring};
+use crate::cpu::sheets::{COLUMNS, RING, ROWS};
+use crate::cpu::vector::LANES;
 
-/// The maximum number of sums that a plane holds for every pixel: N and Σc·g, and then Σd·g, or for the kernel's gradient Σa·g, Σb·g, Σt·g and
+/// Numbers along a row of a plane, with room for a vector that starts within the tile and ends outside.
+pub(super) const STRIDE: usize = COLUMNS + LANES;
+
+/// Sums that a plane holds for every pixel: N and Σc·g, and then Σd·g, or for the kernel's gradient Σa·g, Σb·g, Σt·g and
 /// Σc·a·g, Σc·b·g, Σc·t·g, with (a, b, t) the offset along two axes in the plane and along its normal.
 pub(super) const CHANNELS: usize = 8;
 
-/// The planes of one tile.
+/// A row of all open planes.
+pub(super) type PlaneRow = [[[f32; STRIDE]; CHANNELS]; RING];
+
+/// The ring of one tile: plane k is in slot k mod 8.
 #[derive(Debug)]
 pub(super) struct Planes {
-    /// Those that voxels are splatted onto: plane k is in slot k mod 8.
-    pub(super) ring: Ring,
-    /// The plane before the current slab.
-    pub(super) near: Layer<CHANNELS>,
-    /// The plane behind it.
-    pub(super) far: Layer<CHANNELS>,
+    /// Row by row.
+    pub(super) rows: Vec<PlaneRow>,
+    /// For every slot the rows that hold anything.
+    pub(super) written: [u64; RING],
 }
 
 impl Planes {
-    /// Empty planes with a number of sums.
-    pub(super) fn new(channels: usize) -> Self {
-        Self { ring: Ring::new(channels), near: Layer::new(), far: Layer::new() }
+    pub(super) fn new() -> Self {
+        Self { rows: vec![[[[0.0; STRIDE]; CHANNELS]; RING]; ROWS], written: [0; RING] }
     }
 
-    /// Moves on to the slab before the plane of a slot.
-    pub(super) fn advance(&mut self, slot: usize) {
-        std::mem::swap(&mut self.near, &mut self.far);
-        self.far.clear();
-        self.ring.take(slot, &mut self.far);
-    }
-
-    /// Makes all planes empty.
-    pub(super) fn clear(&mut self) {
-        self.ring.clear();
-        self.near.clear();
-        self.far.clear();
+    /// Makes a slot's plane empty.
+    pub(super) fn clear(&mut self, slot: usize) {
+        let mut written = std::mem::take(&mut self.written[slot]);
+        while written != 0 {
+            let row = written.trailing_zeros() as usize;
+            written &= written - 1;
+            self.rows[row][slot] = [[0.0; STRIDE]; CHANNELS];
+        }
     }
 }

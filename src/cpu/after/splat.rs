@@ -1,17 +1,18 @@
-//! Voxels splatted onto slab planes (SPEC §9): `g = exp(-falloff·|δ|²)` where `|δ| < radius`, a pixel at a time, and all planes of a voxel at
-//! once. Each pixel's additions come in the order in which voxels do, whatever the vectors' width.
+//! Voxels splatted onto slab planes (SPEC §9): `g = exp(-falloff·|δ|²)` where `|δ| < radius`, eight pixels at a time, and all planes of a voxel
+//! for them. Each pixel's additions come in the order in which voxels do, whatever the vectors' width.
 
 use std::f64::consts::LOG2_E;
+use std::ops::Range;
+
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
+use glam::DVec2;
 
-use super::place::{Place, PlaneMap, Placement};
-use super::planes::CHANNELS;
-use crate::cpu::cull::{OpenMask, Pixels};
-use crate::cpu::reached::Reached;
-use crate::cpu::sheets::{self, RING, Ring, SECTIONS, slot_of};
-use crate::cpu::splat::order_from;
-use crate::cpu::vector::{LANES, exp2};
+use super::place::{Place, Placement};
+use super::planes::{PlaneRow, Planes, STRIDE};
+use crate::cpu::cull::{OpenMask, Pixels, columns_between};
+use crate::cpu::sheets::{COLUMNS, RING, SECTIONS, slot_of};
+use crate::cpu::vector::{LANES, exp2, iota};
 use crate::settings::shading::Gradient;
 
 /// A voxel on the planes of a tile: up to [`SECTIONS`] of them.
@@ -41,18 +42,27 @@ struct Footprint {
     b: [f32; 2],
 }
 
-/// How a kernel lies along the planes' normal, by slot.
+/// How a kernel lies along the planes' normal, by plane.
 #[derive(Clone, Copy, Debug)]
-struct Along<S: Simd> {
+struct Along {
     /// To the planes, grid units.
-    t: f32x8<S>,
+    t: [f32; LANES],
     /// Their Gaussian.
-    gaussian: f32x8<S>,
-    /// ρ² from which on the kernel is cut off; 0 in slots without a plane.
-    limit: f32x8<S>,
+    gaussian: [f32; LANES],
+    /// ρ² from which on the kernel is cut off.
+    limit: [f32; LANES],
 }
 
-/// What all splats of a frame have in common.
+/// Some planes of a splat, from the one of a slot on.
+#[derive(Clone, Copy, Debug)]
+struct OnPlanes<'a> {
+    footprint: &'a Footprint,
+    along: &'a Along,
+    planes: [usize; 2],
+    slot: usize,
+}
+
+/// The data that all splats of a frame share.
 #[derive(Clone, Debug)]
 pub(super) struct Splatter {
     /// From ρ² to the exponent of 2 of the Gaussian.
@@ -62,24 +72,29 @@ pub(super) struct Splatter {
     per_plane: f32,
     gradient: Gradient,
     is_perspective: bool,
+    /// The part of ρ² that a row's offset alone makes sure of, by its square; 0 with an eye.
+    row_metric: f32,
 }
 
 impl Splatter {
     pub(super) fn new(placement: &Placement, falloff: f64, gradient: Gradient) -> Self {
+        let is_perspective = placement.view.perspective.is_some();
+        let row_metric = if is_perspective {
+            0.0
+        } else {
+            let map = placement.map(0);
+            let (xx, xy) = (map.a.x * map.a.x + map.b.x * map.b.x, map.a.x * map.a.y + map.b.x * map.b.y);
+            let yy = map.a.y * map.a.y + map.b.y * map.b.y;
+            (yy - xy * xy / xx).max(0.0)
+        };
         Self {
             exponent: (-falloff * LOG2_E) as f32,
             radius_squared: (placement.view.radius * placement.view.radius) as f32,
             per_plane: placement.per_plane as f32,
             gradient,
-            is_perspective: placement.view.perspective.is_some(),
-        }
-    }
-
-    /// The number of sums for every pixel of a plane.
-    pub(super) fn channels(&self) -> usize {
-        match self.gradient {
-            Gradient::Differences => 5,
-            Gradient::Kernel => CHANNELS,
+            is_perspective,
+            // Slightly less, because f32 rounds.
+            row_metric: ((1.0 - 1e-5) * row_metric) as f32,
         }
     }
 
@@ -91,180 +106,186 @@ impl Splatter {
         (placement, origin): (&Placement, [usize; 2]),
         splat: &Splat,
         open: &OpenMask,
-        (reached, ring): (&mut Reached, &mut Ring),
+        planes: &mut Planes,
     ) -> bool {
         let [first, end] = splat.planes;
         let count = ((end - first) as usize).min(SECTIONS);
+        let t = iota(simd) * self.per_plane + placement.to_plane(splat.place, first) as f32;
+        let squared = t * t;
+        let along = Along {
+            t: t.to_array(),
+            gaussian: self.gaussian(simd, squared).to_array(),
+            limit: (self.radius_squared - squared).to_array(),
+        };
         let slot = slot_of(first);
-        let axes = |map: &PlaneMap| [map.a, map.b].map(|axis| [axis.x as f32, axis.y as f32]);
-        let [a, b] = axes(placement.map(first));
-        let mut footprints = [Footprint { center: splat.center, a, b }; RING];
-        let mut pixels = splat.pixels;
+        if !self.is_perspective {
+            // All planes have the same footprint.
+            return self.draw_planes(simd, (placement, origin), splat, (&along, slot, [0, count]), open, planes);
+        }
+        let mut is_seen = false;
+        for at in 0..count {
+            is_seen |= self.draw_planes(simd, (placement, origin), splat, (&along, slot, [at, at + 1]), open, planes);
+        }
+        is_seen
+    }
+
+    /// Adds a voxel to planes that share its footprint, given by their first and their end after the splat's first plane, which is in a slot.
+    // Inlined, as vectors of a closure would be computed by calls.
+    #[inline(always)]
+    fn draw_planes<S: Simd>(
+        &self,
+        simd: S,
+        (placement, origin): (&Placement, [usize; 2]),
+        splat: &Splat,
+        (along, slot, on): (&Along, usize, [usize; 2]),
+        open: &OpenMask,
+        planes: &mut Planes,
+    ) -> bool {
+        let plane = splat.planes[0] + on[0] as i32;
+        let map = placement.map(plane);
+        let in_f32 = |v: DVec2| [v.x as f32, v.y as f32];
+        let (mut center, mut pixels) = (splat.center, splat.pixels);
         if self.is_perspective {
-            pixels = None;
-            for (at, plane) in (first..).take(count).enumerate() {
-                let map = placement.map(plane);
-                let pixel = placement.center(splat.place, placement.to_plane(splat.place, plane), map);
-                let center = [pixel.x - origin[0] as f64 - 0.5, pixel.y - origin[1] as f64 - 0.5].map(|at| at as f32);
-                let half_box = [map.half_box.x as f32, map.half_box.y as f32];
-                let [a, b] = axes(map);
-                footprints[(slot + at) % RING] = Footprint { center, a, b };
-                pixels = Pixels::around(pixels, Pixels::within(center, half_box));
-            }
+            let pixel = placement.center(splat.place, placement.to_plane(splat.place, plane), map);
+            center = [pixel.x - origin[0] as f64 - 0.5, pixel.y - origin[1] as f64 - 0.5].map(|at| at as f32);
+            pixels = Pixels::within(center, in_f32(map.half_box));
         }
         let Some(pixels) = pixels.filter(|pixels| open.sees(pixels)) else { return false };
-        let order = order_from(simd, slot);
-        let t = order * self.per_plane + placement.to_plane(splat.place, first) as f32;
-        let limit = f32x8::splat(simd, self.radius_squared) - t * t;
-        let has_plane = order.simd_lt(f32x8::splat(simd, count as f32));
-        let limit = has_plane.select(limit, f32x8::splat(simd, 0.0));
-        let along = Along { t, gaussian: self.gaussian(simd, t * t), limit };
-        match self.is_perspective {
-            false => self.draw_flat(simd, splat, (&footprints[0], &along), (&pixels, open), (reached, ring)),
-            true => self.draw_local(simd, splat, (&footprints, &along), (&pixels, open), (reached, ring)),
+        let footprint = Footprint { center, a: in_f32(map.a), b: in_f32(map.b) };
+        let on_planes = OnPlanes { footprint: &footprint, along, planes: on, slot };
+        let written = self.draw_box(simd, splat, &on_planes, &pixels, open, planes);
+        for at in on[0]..on[1] {
+            planes.written[(slot + at) % RING] |= written;
         }
-        ring.mark(pixels.columns, pixels.rows, slot, count);
         true
     }
 
-    /// Adds a voxel to planes that share its footprint.
+    /// Adds a voxel to the open pixels of a box on planes that share their footprint; the rows that hold anything now.
     #[inline(always)]
-    fn draw_flat<S: Simd>(
+    fn draw_box<S: Simd>(
         &self,
         simd: S,
         splat: &Splat,
-        (footprint, along): (&Footprint, &Along<S>),
-        (pixels, open): (&Pixels, &OpenMask),
-        (reached, ring): (&mut Reached, &mut Ring),
-    ) {
-        let Footprint { center, a, b } = *footprint;
-        let limit = f32x8::splat(simd, along.limit.reduce_max());
-        reached.list(
-            simd,
-            center,
-            pixels,
-            open,
-            #[inline(always)]
-            move |dx, dy| {
-                let (a, b) = (dx * a[0] + dy * a[1], dx * b[0] + dy * b[1]);
-                let rho_squared = a * a + b * b;
-                (rho_squared.simd_lt(limit), [rho_squared, a, b])
-            },
-        );
-        let Along { t, gaussian, limit } = *along;
-        let zero = f32x8::splat(simd, 0.0);
-        let [rho_squared, a, b] = &*reached.numbers;
-        // Eight pixels at a time, as the compiler then keeps their Gaussians in a vector.
-        let mut in_planes = [0.0; LANES];
-        let mut sums = Sums::new(simd, self.gradient, splat, ring);
-        for (at, &pixel) in reached.pixels[..reached.count].iter().enumerate() {
-            if at % LANES == 0 {
-                let rho_squared = f32x8::from_slice(simd, &rho_squared[at..at + LANES]);
-                in_planes = self.gaussian(simd, rho_squared).to_array();
+        on_planes: &OnPlanes<'_>,
+        pixels: &Pixels,
+        open: &OpenMask,
+        planes: &mut Planes,
+    ) -> u64 {
+        let Pixels { columns: [left, right], rows: [first, last] } = *pixels;
+        let mut written = 0;
+        for row in first..=last {
+            let open = open.row(row);
+            let target = &mut planes.rows[row];
+            let mut column = left;
+            while column <= right {
+                let end = (column + LANES - 1).min(COLUMNS - 1);
+                if open & columns_between(column, end) != 0 {
+                    written |= 1 << row;
+                    match self.gradient {
+                        Gradient::Differences => {
+                            self.draw_differences(simd, splat, on_planes, [column, row], target);
+                        }
+                        Gradient::Kernel => self.draw_offsets(simd, splat, on_planes, [column, row], target),
+                    }
+                }
+                column += LANES;
             }
-            let is_inside = f32x8::splat(simd, rho_squared[at]).simd_lt(limit);
-            let weights = is_inside.select(gaussian * in_planes[at % LANES], zero);
-            let offsets = [f32x8::splat(simd, a[at]), f32x8::splat(simd, b[at]), t];
-            sums.add(simd, weights, offsets, pixel);
         }
+        written
     }
 
-    /// Adds a voxel to planes on each of which its footprint is another, by slot.
+    /// Offsets along the planes' axes, and ρ², of eight pixels.
     #[inline(always)]
-    fn draw_local<S: Simd>(
-        &self,
-        simd: S,
-        splat: &Splat,
-        (footprints, along): (&[Footprint; RING], &Along<S>),
-        (pixels, open): (&Pixels, &OpenMask),
-        (reached, ring): (&mut Reached, &mut Ring),
-    ) {
-        let mut rows = [[0.0; RING]; 6];
-        for (slot, Footprint { center, a, b }) in footprints.iter().enumerate() {
-            let numbers = [center[0], center[1], a[0], a[1], b[0], b[1]];
-            for (row, number) in rows.iter_mut().zip(numbers) {
-                row[slot] = number;
-            }
-        }
-        let [x, y, ax, ay, bx, by] = rows;
-        let (x, y) = (f32x8::load_array(simd, x), f32x8::load_array(simd, y));
-        let (ax, ay) = (f32x8::load_array(simd, ax), f32x8::load_array(simd, ay));
-        let (bx, by) = (f32x8::load_array(simd, bx), f32x8::load_array(simd, by));
-        reached.list(
-            simd,
-            [0.0; 2],
-            pixels,
-            open,
-            #[inline(always)]
-            move |x, y| (x.simd_eq(x), [x, f32x8::splat(simd, y)]),
-        );
-        let Along { t, gaussian, limit } = *along;
-        let zero = f32x8::splat(simd, 0.0);
-        let [columns, rows, _] = &*reached.numbers;
-        let mut sums = Sums::new(simd, self.gradient, splat, ring);
-        for ((&pixel, &column), &row) in reached.pixels[..reached.count].iter().zip(columns).zip(rows) {
-            let (dx, dy) = (column - x, row - y);
-            let (a, b) = (dx * ax + dy * ay, dx * bx + dy * by);
-            let rho_squared = a * a + b * b;
-            let weights = self.gaussian(simd, rho_squared) * gaussian;
-            sums.add(simd, rho_squared.simd_lt(limit).select(weights, zero), [a, b, t], pixel);
-        }
+    fn offsets<S: Simd>(&self, simd: S, footprint: &Footprint, [column, row]: [usize; 2]) -> [f32x8<S>; 3] {
+        let Footprint { center, a, b } = footprint;
+        let dy = row as f32 - center[1];
+        let dx = iota(simd) + (column as f32 - center[0]);
+        let (a, b) = (dx * a[0] + dy * a[1], dx * b[0] + dy * b[1]);
+        [a, b, a * a + b * b]
     }
 
     #[inline(always)]
     fn gaussian<S: Simd>(&self, simd: S, squared: f32x8<S>) -> f32x8<S> {
         exp2(simd, (squared * self.exponent).max(f32x8::splat(simd, -126.0)))
     }
-}
 
-/// The sums that a voxel is added to, and its numbers.
-enum Sums<'a, S: Simd> {
-    /// c and d.
-    Differences(&'a mut [[sheets::Sums; 5]], [f32x8<S>; 4]),
-    /// c.
-    Kernel(&'a mut [[sheets::Sums; CHANNELS]], f32x8<S>),
-}
-
-impl<'a, S: Simd> Sums<'a, S> {
+    /// The planes from the first to the last that a row may reach.
     #[inline(always)]
-    fn new(simd: S, gradient: Gradient, splat: &Splat, ring: &'a mut Ring) -> Self {
-        let number = |number: f32| f32x8::splat(simd, number);
-        let (c, [x, y, z]) = (number(splat.number), splat.gradient);
-        match gradient {
-            Gradient::Differences => Self::Differences(ring.pixels(), [c, number(x), number(y), number(z)]),
-            Gradient::Kernel => Self::Kernel(ring.pixels(), c),
+    fn reached(&self, on_planes: &OnPlanes<'_>, row: usize) -> Range<usize> {
+        let OnPlanes { footprint, along, planes: [mut first, mut end], .. } = *on_planes;
+        if !self.is_perspective {
+            let dy = row as f32 - footprint.center[1];
+            let nearest = self.row_metric * dy * dy;
+            while first < end && along.limit[first % LANES] <= nearest {
+                first += 1;
+            }
+            while first < end && along.limit[(end - 1) % LANES] <= nearest {
+                end -= 1;
+            }
         }
+        first..end
     }
 
-    /// Adds the voxel to a pixel on all open planes, given its weights and the offsets there.
     #[inline(always)]
-    fn add(&mut self, simd: S, weights: f32x8<S>, [a, b, t]: [f32x8<S>; 3], pixel: u32) {
-        match self {
-            Self::Differences(sums, numbers) => {
-                let [n, rest @ ..] = &mut sums[pixel as usize];
-                add(simd, n, weights);
-                for at in 0..4 {
-                    add(simd, &mut rest[at], weights * numbers[at]);
-                }
-            }
-            Self::Kernel(sums, c) => {
-                let [n, f, sa, sb, st, ca, cb, ct] = &mut sums[pixel as usize];
-                let (a, b, t) = (weights * a, weights * b, weights * t);
-                add(simd, n, weights);
-                add(simd, f, weights * *c);
-                add(simd, sa, a);
-                add(simd, sb, b);
-                add(simd, st, t);
-                add(simd, ca, a * *c);
-                add(simd, cb, b * *c);
-                add(simd, ct, t * *c);
+    fn draw_differences<S: Simd>(
+        &self,
+        simd: S,
+        splat: &Splat,
+        on_planes: &OnPlanes<'_>,
+        at: [usize; 2],
+        target: &mut PlaneRow,
+    ) {
+        let [_, _, rho_squared] = self.offsets(simd, on_planes.footprint, at);
+        let in_plane = self.gaussian(simd, rho_squared);
+        let (zero, along) = (f32x8::splat(simd, 0.0), on_planes.along);
+        let [dx, dy, dz] = splat.gradient;
+        for plane in self.reached(on_planes, at[1]) {
+            let is_inside = rho_squared.simd_lt(f32x8::splat(simd, along.limit[plane % LANES]));
+            let weights = is_inside.select(in_plane * along.gaussian[plane % LANES], zero).to_array();
+            let plane = &mut target[(on_planes.slot + plane) % RING];
+            let column = at[0].min(COLUMNS);
+            for (channel, factor) in plane.iter_mut().zip([1.0, splat.number, dx, dy, dz]) {
+                add(channel, column, |lane| weights[lane] * factor);
             }
         }
     }
+
+    #[inline(always)]
+    fn draw_offsets<S: Simd>(
+        &self,
+        simd: S,
+        splat: &Splat,
+        on_planes: &OnPlanes<'_>,
+        at: [usize; 2],
+        target: &mut PlaneRow,
+    ) {
+        let [a, b, rho_squared] = self.offsets(simd, on_planes.footprint, at);
+        let in_plane = self.gaussian(simd, rho_squared);
+        let (zero, along) = (f32x8::splat(simd, 0.0), on_planes.along);
+        for plane in self.reached(on_planes, at[1]) {
+            let is_inside = rho_squared.simd_lt(f32x8::splat(simd, along.limit[plane % LANES]));
+            let weights = is_inside.select(in_plane * along.gaussian[plane % LANES], zero);
+            let offsets = [weights * a, weights * b, weights * along.t[plane % LANES]].map(f32x8::to_array);
+            let weights = weights.to_array();
+            let [n, f, a, b, t, ca, cb, ct] = &mut target[(on_planes.slot + plane) % RING];
+            let (column, c) = (at[0].min(COLUMNS), splat.number);
+            add(n, column, |lane| weights[lane]);
+            add(f, column, |lane| weights[lane] * c);
+            for ((plain, times_c), offsets) in [(a, ca), (b, cb), (t, ct)].into_iter().zip(offsets) {
+                add(plain, column, |lane| offsets[lane]);
+                add(times_c, column, |lane| offsets[lane] * c);
+            }
+        }
+    }
 }
 
-/// Adds to a pixel's sums for all open planes.
+/// Adds to eight pixels of a row. Numbers one by one, which the compiler makes vectors of: loading one by `f32x8` goes through a copy on the
+/// stack.
 #[inline(always)]
-fn add<S: Simd>(simd: S, sheets::Sums(sums): &mut sheets::Sums, numbers: f32x8<S>) {
-    (f32x8::load_array_ref(simd, sums) + numbers).store_slice(sums);
+fn add(row: &mut [f32; STRIDE], column: usize, number: impl Fn(usize) -> f32) {
+    if let Some(pixels) = row[column..].first_chunk_mut::<LANES>() {
+        for (lane, pixel) in pixels.iter_mut().enumerate() {
+            *pixel += number(lane);
+        }
+    }
 }

@@ -17,14 +17,13 @@ use crate::cpu::count::{Tally, bits};
 use crate::cpu::cull::{Boxes, OpenMask, Pixels};
 use crate::cpu::cut::TileRays;
 use crate::cpu::queue::{Queue, Waiting};
-use crate::cpu::reached::Reached;
 use crate::cpu::sheets::{Buffers, COLUMNS, RING, ROWS, SECTIONS, slot_of};
 use crate::cpu::vector::LANES;
 use crate::lists::brick;
 use crate::lists::brick::BRICK_VOXELS;
 use crate::settings::splatting::Compositing;
 
-/// What a thread draws tiles with, one after the other.
+/// The state with which a thread draws one tile after another.
 pub(super) struct TileWalk<'a> {
     frame: &'a Frame<'a>,
     /// The tile's first pixel.
@@ -33,7 +32,6 @@ pub(super) struct TileWalk<'a> {
     rays: TileRays,
     to_eye: Vec<[[f32; COLUMNS]; 3]>,
     planes: Planes,
-    reached: Reached,
     buffers: Buffers,
     chosen: Chosen,
     arrived: Vec<(u32, Place)>,
@@ -53,8 +51,7 @@ impl<'a> TileWalk<'a> {
             open: OpenMask::new(COLUMNS, ROWS),
             rays: TileRays::default(),
             to_eye: Vec::new(),
-            planes: Planes::new(frame.splatter.channels()),
-            reached: Reached::new(),
+            planes: Planes::new(),
             buffers: Buffers::new(),
             chosen: Chosen::new(frame.compositing),
             arrived: Vec::new(),
@@ -65,7 +62,7 @@ impl<'a> TileWalk<'a> {
         }
     }
 
-    /// Draws a tile, given its first pixel and its bricks by first plane: what its buffers hold then, and how its pixels look at slabs.
+    /// Draws a tile, given its first pixel and its bricks by first plane. Returns its filled buffers and how its rays meet slabs.
     #[inline(always)]
     pub(super) fn draw<S: Simd>(
         &mut self,
@@ -97,7 +94,7 @@ impl<'a> TileWalk<'a> {
         if let (Some(shown), Some(_)) = (&self.rays.shown, self.frame.compositor.threshold) {
             self.open.close_empty(shown);
         }
-        self.planes.clear();
+        (0..RING).for_each(|slot| self.planes.clear(slot));
         self.chosen.clear();
         self.arrived.clear();
         self.queue.clear();
@@ -114,11 +111,12 @@ impl<'a> TileWalk<'a> {
             }
             self.start(simd, plane);
             self.composite(simd, plane - 1);
+            self.planes.clear(slot_of(plane - 1));
             if self.open.is_closed() {
                 break;
             }
             let is_waiting = self.pending != 0 || !self.queue.is_empty();
-            let is_idle = !is_waiting && self.planes.ring.is_empty() && self.planes.far.written == 0;
+            let is_idle = !is_waiting && self.planes.written == [0; RING];
             plane = match bricks.peek() {
                 Some(placed) if is_idle => placed.first.max(plane + 1),
                 None if is_idle => break,
@@ -132,9 +130,8 @@ impl<'a> TileWalk<'a> {
     fn composite<S: Simd>(&mut self, simd: S, slab: i32) {
         let Self { frame, open, rays, to_eye, buffers, tally, planes, chosen, .. } = self;
         let looks = Looks::new(self.origin, rays, to_eye);
-        planes.advance(slot_of(slab + 1));
         if is_choice(frame.compositing) {
-            return frame.choose(simd, slab + 1, &looks, &planes.far, chosen);
+            return frame.choose(simd, slab + 1, &looks, planes, chosen);
         }
         frame.classify(simd, slab, &looks, planes, open, buffers);
         if frame.compositing == Compositing::Surface {
@@ -169,7 +166,7 @@ impl<'a> TileWalk<'a> {
         Pixels::within(center.map(|at| at as f32), half.to_array().map(|half| half as f32))
     }
 
-    /// Draws what starts at a plane, or goes on there.
+    /// Draws the voxels that start or continue at a plane.
     #[inline(always)]
     fn start<S: Simd>(&mut self, simd: S, plane: i32) {
         let continued = std::mem::take(&mut self.continued[slot_of(plane)]);
@@ -230,8 +227,7 @@ impl<'a> TileWalk<'a> {
         let frame = self.frame;
         let [first, end] = splat.planes;
         let next = end.min(first + SECTIONS as i32);
-        let into = (&mut self.reached, &mut self.planes.ring);
-        if frame.splatter.draw(simd, (&frame.placement, self.origin), splat, &self.open, into) {
+        if frame.splatter.draw(simd, (&frame.placement, self.origin), splat, &self.open, &mut self.planes) {
             frame.drawn.splat(splat.voxel, splat.drawn, (next - first) as u64, &mut self.tally);
         }
         if next < end {
