@@ -5,7 +5,7 @@ use fearless_simd::prelude::*;
 
 use super::cull::OpenMask;
 use super::cut::TileRays;
-use super::sheets::{Buffers, CHANNELS, COLUMNS, Layer, ROWS};
+use super::sheets::{Buffers, CHANNELS, COLUMNS, ROWS, Sheet};
 use super::vector::{LANES, saturation};
 use crate::settings::splatting::{Compositing, Order};
 
@@ -41,7 +41,7 @@ impl Compositor {
         (rays, begin): (&TileRays, f32),
         open: &mut OpenMask,
     ) -> bool {
-        let Buffers { sheet: Layer { rows: sheet, written }, kept, acc, hits } = buffers;
+        let Buffers { sheet: Sheet { rows: sheet, written }, kept, acc, hits } = buffers;
         let filled = std::mem::take(written);
         let mut rows = match self.compositing {
             // While no surface has been reached, the compositing buffer holds the previous sheet.

@@ -118,16 +118,16 @@ impl Projection {
         let mut centers = [[0.0; LANES]; 2];
         let [columns, rows] = &mut centers;
         if self.view.perspective.is_none() {
-            for lane in 0..LANES {
-                columns[lane] = (brick.x + x[lane] + shift_x) as f32;
-                rows[lane] = (brick.y + y[lane] + shift_y) as f32;
+            for ((column, row), (x, y)) in columns.iter_mut().zip(rows).zip(x.iter().zip(y)) {
+                *column = (brick.x + x + shift_x) as f32;
+                *row = (brick.y + y + shift_y) as f32;
             }
         } else {
-            let from_eye = &self.offsets.from_eye[slots];
-            for lane in 0..LANES {
-                let from_eye = brick.from_eye + from_eye[lane];
-                columns[lane] = ((brick.x + x[lane]) / from_eye + shift_x) as f32;
-                rows[lane] = ((brick.y + y[lane]) / from_eye + shift_y) as f32;
+            let places = x.iter().zip(y).zip(&self.offsets.from_eye[slots]);
+            for ((column, row), ((x, y), from_eye)) in columns.iter_mut().zip(rows).zip(places) {
+                let from_eye = brick.from_eye + from_eye;
+                *column = ((brick.x + x) / from_eye + shift_x) as f32;
+                *row = ((brick.y + y) / from_eye + shift_y) as f32;
             }
         }
         centers

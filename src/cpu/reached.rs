@@ -48,8 +48,8 @@ impl Reached {
                 let bits = is_reached.to_bitmask() & u64::from(open.row(row) >> column & 0xff);
                 let listed = mask32x8::from_bitmask(simd, bits);
                 (columns + (row * COLUMNS) as u32).compress(listed).store_slice(&mut list[count..count + LANES]);
-                for number in 0..N {
-                    numbers[number].compress(listed).store_slice(&mut lists[number][count..count + LANES]);
+                for (list, numbers) in lists.iter_mut().zip(&numbers) {
+                    numbers.compress(listed).store_slice(&mut list[count..count + LANES]);
                 }
                 count += bits.count_ones() as usize;
             }

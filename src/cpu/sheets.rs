@@ -21,21 +21,20 @@ const BLOCK: usize = COLUMNS / u8::BITS as usize;
 #[repr(align(32))]
 pub(super) struct Sums(pub(super) [f32; RING]);
 
-/// The open sheets, or planes, of a tile. A pixel's sums for all of them lie together, a vector for each channel with a number for each slot: a voxel
+/// The open sheets of a tile. A pixel's sums for all of them lie together, a vector for each channel with a number for each slot: a voxel
 /// adds to them by a multiplication and an addition for each channel.
 #[derive(Debug)]
 pub(super) struct Ring {
-    channels: usize,
-    /// The sums of pixels, row by row, and of their channels.
-    sums: Vec<Sums>,
+    /// The sums of pixels, row by row.
+    pub(super) pixels: Vec<[Sums; CHANNELS]>,
     /// Which columns of a row are not empty: byte s has a bit for every 4 columns of slot s.
     written: [u64; ROWS],
 }
 
-/// One sheet or plane, row by row.
+/// One sheet, row by row.
 #[derive(Debug)]
-pub(super) struct Layer<const N: usize> {
-    pub(super) rows: Vec<[[f32; COLUMNS]; N]>,
+pub(super) struct Sheet {
+    pub(super) rows: Vec<[[f32; COLUMNS]; CHANNELS]>,
     /// The bits of the rows that are not empty.
     pub(super) written: u64,
 }
@@ -44,7 +43,7 @@ pub(super) struct Layer<const N: usize> {
 #[derive(Debug)]
 pub(super) struct Buffers {
     /// The sheet that is composited next.
-    pub(super) sheet: Layer<CHANNELS>,
+    pub(super) sheet: Sheet,
     /// The rows whose compositing buffer may hold a surface that is not reached yet.
     pub(super) kept: u64,
     /// The compositing buffer, row by row.
@@ -54,16 +53,9 @@ pub(super) struct Buffers {
 }
 
 impl Ring {
-    /// Empty sheets with a number of channels.
-    pub(super) fn new(channels: usize) -> Self {
-        Self { channels, sums: vec![Sums([0.0; RING]); ROWS * COLUMNS * channels], written: [0; ROWS] }
-    }
-
-    /// The sums of the pixels, by their index in the tile; N is the number of channels.
-    #[inline(always)]
-    pub(super) fn pixels<const N: usize>(&mut self) -> &mut [[Sums; N]] {
-        debug_assert_eq!(N, self.channels, "sums of another ring");
-        self.sums.as_chunks_mut().0
+    /// Empty sheets.
+    pub(super) fn new() -> Self {
+        Self { pixels: vec![[Sums([0.0; RING]); CHANNELS]; ROWS * COLUMNS], written: [0; ROWS] }
     }
 
     /// Records that pixels within a box were written to in some slots, from one on.
@@ -83,20 +75,20 @@ impl Ring {
         self.written == [0; ROWS]
     }
 
-    /// Moves the sheet of a slot into an empty layer.
-    pub(super) fn take<const N: usize>(&mut self, slot: usize, layer: &mut Layer<N>) {
+    /// Moves the sheet of a slot into an empty one.
+    pub(super) fn take(&mut self, slot: usize, sheet: &mut Sheet) {
         for (row, written) in self.written.iter_mut().enumerate() {
             let mut blocks = (*written >> (8 * slot)) as u8;
             if blocks == 0 {
                 continue;
             }
             *written &= !(u64::from(u8::MAX) << (8 * slot));
-            layer.written |= 1 << row;
-            let target = &mut layer.rows[row];
+            sheet.written |= 1 << row;
+            let target = &mut sheet.rows[row];
             while blocks != 0 {
                 let column = blocks.trailing_zeros() as usize * BLOCK;
                 blocks &= blocks - 1;
-                let pixels = self.sums[(row * COLUMNS + column) * self.channels..].chunks_exact_mut(self.channels);
+                let pixels = &mut self.pixels[row * COLUMNS + column..];
                 for (column, sums) in (column..column + BLOCK).zip(pixels) {
                     for (target, sums) in target.iter_mut().zip(sums) {
                         target[column] = std::mem::take(&mut sums.0[slot]);
@@ -108,27 +100,18 @@ impl Ring {
 
     /// Makes all sheets empty, for the next tile.
     pub(super) fn clear(&mut self) {
-        let length = COLUMNS * self.channels;
-        for (written, sums) in self.written.iter_mut().zip(self.sums.chunks_exact_mut(length)) {
+        for (written, pixels) in self.written.iter_mut().zip(self.pixels.chunks_exact_mut(COLUMNS)) {
             if std::mem::take(written) != 0 {
-                sums.fill(Sums([0.0; RING]));
+                pixels.fill([Sums([0.0; RING]); CHANNELS]);
             }
         }
     }
 }
 
-impl<const N: usize> Layer<N> {
+impl Sheet {
     /// An empty one.
     pub(super) fn new() -> Self {
-        Self { rows: vec![[[0.0; COLUMNS]; N]; ROWS], written: 0 }
-    }
-
-    pub(super) fn clear(&mut self) {
-        let mut written = std::mem::take(&mut self.written);
-        while written != 0 {
-            self.rows[written.trailing_zeros() as usize] = [[0.0; COLUMNS]; N];
-            written &= written - 1;
-        }
+        Self { rows: vec![[[0.0; COLUMNS]; CHANNELS]; ROWS], written: 0 }
     }
 }
 
@@ -136,7 +119,7 @@ impl Buffers {
     /// Buffers of zeros.
     pub(super) fn new() -> Self {
         Self {
-            sheet: Layer::new(),
+            sheet: Sheet::new(),
             kept: 0,
             acc: vec![[[0.0; COLUMNS]; CHANNELS]; ROWS],
             hits: vec![[f32::INFINITY; COLUMNS]; ROWS],

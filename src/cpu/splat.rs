@@ -174,7 +174,7 @@ impl Splatter {
             self.kernel.in_plane(simd, rho_squared).store_slice(&mut second[at..at + LANES]);
         }
         let (near, far) = (f32x8::load_array(simd, sections.near), f32x8::load_array(simd, sections.far));
-        let (color, sums) = (splatted(simd, splat.amount), ring.pixels());
+        let (color, sums) = (splatted(simd, splat.amount), &mut ring.pixels);
         for ((&pixel, &rim), &in_plane) in reached.pixels[..reached.count].iter().zip(&*first).zip(&*second) {
             let rim = f32x8::splat(simd, rim);
             add(simd, (cut_by_rim(far, rim) - cut_by_rim(near, rim)) * in_plane, color, &mut sums[pixel as usize]);
@@ -192,8 +192,7 @@ impl Splatter {
         (reached, ring): (&mut Reached, &mut Ring),
     ) {
         let load = |numbers: [f32; RING]| f32x8::load_array(simd, numbers);
-        let (to_along, to_across, amplitude) =
-            (load(sections.along), load(sections.across), load(sections.amplitude));
+        let (to_along, to_across, amplitude) = (load(sections.along), load(sections.across), load(sections.amplitude));
         // Of the largest section's footprint.
         let (least_along, least_across) = (to_along.reduce_min(), to_across.reduce_min());
         let [x, y] = splat.local.axis;
@@ -212,7 +211,7 @@ impl Splatter {
         );
         let (near, far) = (load(sections.near), load(sections.far));
         let [along, across, _] = &*reached.numbers;
-        let (color, sums) = (splatted(simd, splat.amount), ring.pixels());
+        let (color, sums) = (splatted(simd, splat.amount), &mut ring.pixels);
         for ((&pixel, &along), &across) in reached.pixels[..reached.count].iter().zip(along).zip(across) {
             let rho_squared = to_along * along + to_across * across;
             let rim = self.kernel.rim(simd, rho_squared);
@@ -230,19 +229,13 @@ fn cut_by_rim<S: Simd>(planes: f32x8<S>, rim: f32x8<S>) -> f32x8<S> {
 
 #[inline(always)]
 fn splatted<S: Simd>(simd: S, [red, green, blue, alpha]: [f32; CHANNELS]) -> [f32x8<S>; CHANNELS] {
-    [
-        f32x8::splat(simd, red),
-        f32x8::splat(simd, green),
-        f32x8::splat(simd, blue),
-        f32x8::splat(simd, alpha),
-    ]
+    [f32x8::splat(simd, red), f32x8::splat(simd, green), f32x8::splat(simd, blue), f32x8::splat(simd, alpha)]
 }
 
 /// Adds a colour to a pixel of all open sheets, by weights.
 #[inline(always)]
 fn add<S: Simd>(simd: S, weights: f32x8<S>, color: [f32x8<S>; CHANNELS], pixel: &mut [Sums; CHANNELS]) {
-    for channel in 0..CHANNELS {
-        let sums = &mut pixel[channel].0;
-        (f32x8::load_array_ref(simd, sums) + weights * color[channel]).store_slice(sums);
+    for (Sums(sums), &color) in pixel.iter_mut().zip(&color) {
+        (f32x8::load_array_ref(simd, sums) + weights * color).store_slice(sums);
     }
 }

@@ -16,9 +16,9 @@ use super::frame::Frame;
 use super::material::Material;
 use super::project::{Lens, Place, Projection};
 use super::queue::{Queue, Waiting};
-use super::shade::Unshaded;
 use super::reached::Reached;
-use super::sheets::{Buffers, CHANNELS, COLUMNS, RING, ROWS, Ring, SECTIONS, slot_of};
+use super::shade::Unshaded;
+use super::sheets::{Buffers, COLUMNS, RING, ROWS, Ring, SECTIONS, slot_of};
 use super::splat::{LocalFootprint, Splat};
 use super::vector::LANES;
 use crate::lists::brick;
@@ -60,7 +60,7 @@ impl<'a> TileWalk<'a> {
             origin: [0; 2],
             open: OpenMask::new(COLUMNS, ROWS),
             rays: TileRays::default(),
-            ring: Ring::new(CHANNELS),
+            ring: Ring::new(),
             reached: Reached::new(),
             buffers: Buffers::new(),
             arrived: Vec::new(),
@@ -128,8 +128,7 @@ impl<'a> TileWalk<'a> {
                 break;
             }
             let is_waiting = self.pending != 0 || !self.queue.is_empty();
-            let is_idle =
-                !is_waiting && self.ring.is_empty() && self.buffers.kept == 0 && sheet + 1 >= end;
+            let is_idle = !is_waiting && self.ring.is_empty() && self.buffers.kept == 0 && sheet + 1 >= end;
             sheet = match bricks.peek() {
                 Some(placed) if is_idle => placed.first.max(sheet + 1),
                 None if is_idle => break,

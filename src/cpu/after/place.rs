@@ -71,8 +71,7 @@ impl Placement {
         };
         let [x, y] = [0, 1].map(|row| std::array::from_fn(|slot| offset(row, slot)));
         let depth = std::array::from_fn(|slot| offset(2, slot) / view.slabs.width);
-        let mut placement =
-            Self { geometry, reach, per_plane, view, x, y, depth, maps: Vec::new(), first_map: 0 };
+        let mut placement = Self { geometry, reach, per_plane, view, x, y, depth, maps: Vec::new(), first_map: 0 };
         let (middle, half) = (grid.center(), grid.center());
         let Place { depth, .. } = placement.of(middle);
         let spread = view.screen_from_voxel[2].truncate().abs().dot(half) / view.slabs.width;
@@ -109,9 +108,9 @@ impl Placement {
         let (x, y) = (&self.x[first..first + LANES], &self.y[first..first + LANES]);
         let mut centers = [[0.0; LANES]; 2];
         let [columns, rows] = &mut centers;
-        for lane in 0..LANES {
-            columns[lane] = (brick.at.x + x[lane] + shift_x) as f32;
-            rows[lane] = (brick.at.y + y[lane] + shift_y) as f32;
+        for ((column, row), (x, y)) in columns.iter_mut().zip(rows).zip(x.iter().zip(y)) {
+            *column = (brick.at.x + x + shift_x) as f32;
+            *row = (brick.at.y + y + shift_y) as f32;
         }
         centers
     }
