@@ -45,7 +45,7 @@ pub(super) struct Boxes {
 
 impl Boxes {
     /// As [`Pixels::within`].
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn within<S: Simd>(simd: S, centers: &[[f32; LANES]; 2], half: [f32; 2]) -> Self {
         let [columns, rows] = [COLUMNS as f32, ROWS as f32];
         Self {
@@ -54,7 +54,7 @@ impl Boxes {
         }
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn of_axis<S: Simd>(simd: S, centers: &[f32; LANES], half: f32, count: f32) -> [[i32; LANES]; 2] {
         let splat = |number: f32| f32x8::splat(simd, number);
         let centers = f32x8::load_array_ref(simd, centers);
@@ -64,7 +64,7 @@ impl Boxes {
     }
 
     /// Those of one box.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn pixels(&self, lane: usize) -> Option<Pixels> {
         let of = |axis: &[[i32; LANES]; 2]| [axis[0][lane] as usize, axis[1][lane] as usize];
         let is_any = self.columns[0][lane] <= self.columns[1][lane] && self.rows[0][lane] <= self.rows[1][lane];
@@ -73,7 +73,7 @@ impl Boxes {
 }
 
 /// The largest integer that is not above a small number, without the system's `floor` or a branch.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn floor(x: f32) -> i32 {
     // Adding 1.5·2²³ rounds to a whole number, which is then in the low bits.
     const MAGIC: f32 = 12_582_912.0;
@@ -128,7 +128,7 @@ impl OpenMask {
     }
 
     /// Whether any pixel of a box is open.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn sees(&self, pixels: &Pixels) -> bool {
         let Pixels { columns: [left, right], rows: [first, last] } = *pixels;
         let level = (last + 1 - first).ilog2() as usize;
@@ -138,7 +138,7 @@ impl OpenMask {
 }
 
 /// The bits of columns from one to another, both included.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn columns_between(first: usize, last: usize) -> u32 {
     u32::MAX << first & u32::MAX >> (COLUMNS - 1 - last)
 }

@@ -154,7 +154,7 @@ impl<'a> Frame<'a> {
     }
 
     /// Draws a tile, including rows and columns outside the image.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn draw_tile<S: Simd>(
         &self,
         simd: S,
@@ -183,7 +183,7 @@ fn count_overlaps(level: Level, bricks: &[Brick], view: &ViewGeometry) -> Overla
     let depths = PlaceDepths::new(view);
     let of_chunk = |bricks: &[Brick]| {
         dispatch!(level, simd => simd.vectorize(
-            #[inline(always)]
+            #[cfg_attr(not(debug_assertions), inline(always))]
             || {
                 let mut sum = Overlaps::default();
                 for brick in bricks {

@@ -109,7 +109,7 @@ impl Projection {
     }
 
     /// Pixel coordinates of a brick's voxels in eight slots, from the first on, in a tile given by its first pixel. The centre of that is at 0, 0.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn centers(&self, brick: Place, first: usize, origin: [usize; 2]) -> [[f32; LANES]; 2] {
         let [width, height] = self.view.size.map(f64::from);
         let (shift_x, shift_y) = (width / 2.0 - 0.5 - origin[0] as f64, height / 2.0 - 0.5 - origin[1] as f64);
@@ -155,7 +155,7 @@ impl Projection {
     }
 
     /// The first sheets of a brick's voxels by slot, those of empty slots too where that is faster; [`NO_SHEET`] for none.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn first_sheets(&self, brick: &Brick, place: Place) -> BySlot<i32> {
         let mut first = [NO_SHEET; BRICK_VOXELS as usize];
         if self.view.perspective.is_none() {
@@ -176,7 +176,7 @@ impl Projection {
     }
 
     /// Slabs between two depths by more than rounding errors ([`slab::ROUNDING`]), as sheets.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn numbered(&self, first: f64, end: f64) -> Range<i32> {
         let (first, end) = (floor(first + slab::ROUNDING), -floor(-(end - slab::ROUNDING)));
         if self.direction > 0 { first..end } else { 1 - end..1 - first }
@@ -250,7 +250,7 @@ fn principal_axis(difference: f64, product: f64) -> DVec2 {
 }
 
 /// The largest integer that is not above a number below 2³¹, without the system's `floor` or a branch.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn floor(x: f64) -> i32 {
     // Adding 1.5·2⁵² rounds to a whole number, which is then in the low bits.
     const MAGIC: f64 = 6_755_399_441_055_744.0;

@@ -28,7 +28,7 @@ impl Reached {
 
     /// Lists the open pixels of a box that a footprint reaches. `footprint` tells of eight pixels, given by their offsets from its centre, which are
     /// reached, and numbers for them. It must be inlined, or its vectors would be computed by calls.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn list<S: Simd, const N: usize>(
         &mut self,
         simd: S,

@@ -59,7 +59,7 @@ impl Ring {
     }
 
     /// Records that pixels within a box were written to in some slots, from one on.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn mark(&mut self, columns: [usize; 2], rows: [usize; 2], slot: usize, count: usize) {
         let [first, last] = columns.map(|column| column / BLOCK);
         let blocks = u64::from(u8::MAX) >> (u8::BITS as usize - 1 - last) & u64::MAX << first;

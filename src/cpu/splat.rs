@@ -72,7 +72,7 @@ pub(super) struct Sections {
 }
 
 /// The order of a ring's slots from every slot on.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn order_from<S: Simd>(simd: S, slot: usize) -> f32x8<S> {
     const TWICE: [f32; 2 * RING] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
     f32x8::from_slice(simd, &TWICE[RING - slot..2 * RING - slot])
@@ -80,7 +80,7 @@ pub(super) fn order_from<S: Simd>(simd: S, slot: usize) -> f32x8<S> {
 
 impl Splatter {
     /// The sections to be drawn next.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn sections<S: Simd>(&self, simd: S, splat: &Splat) -> Sections {
         let splat_f32 = |number: f32| f32x8::splat(simd, number);
         let count = ((splat.sheets[1] - splat.sheets[0]) as usize).min(SECTIONS);
@@ -127,7 +127,7 @@ impl Splatter {
     }
 
     /// Adds sections to the open pixels of a tile.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn draw<S: Simd>(
         &self,
         simd: S,
@@ -145,7 +145,7 @@ impl Splatter {
     }
 
     /// Without perspective all sections have one footprint.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn draw_flat<S: Simd>(
         &self,
         simd: S,
@@ -161,7 +161,7 @@ impl Splatter {
             splat.center,
             pixels,
             open,
-            #[inline(always)]
+            #[cfg_attr(not(debug_assertions), inline(always))]
             move |dx, dy| {
                 let rho_squared = dx * (dx * xx + xy * dy) + yy * dy * dy;
                 (rho_squared.simd_lt(limit), [rho_squared])
@@ -182,7 +182,7 @@ impl Splatter {
     }
 
     /// In perspective every section has its own footprint, of the size that pixels have at its middle.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn draw_local<S: Simd>(
         &self,
         simd: S,
@@ -202,7 +202,7 @@ impl Splatter {
             splat.center,
             pixels,
             open,
-            #[inline(always)]
+            #[cfg_attr(not(debug_assertions), inline(always))]
             move |dx, dy| {
                 let (along, across) = (dx * x + dy * y, dx * -y + dy * x);
                 let (along, across) = (along * along, across * across);
@@ -222,18 +222,18 @@ impl Splatter {
 }
 
 /// `H(0, 0, t)` at planes, or at the rim on their side.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn cut_by_rim<S: Simd>(planes: f32x8<S>, rim: f32x8<S>) -> f32x8<S> {
     planes.max(-rim).min(rim)
 }
 
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn splatted<S: Simd>(simd: S, [red, green, blue, alpha]: [f32; CHANNELS]) -> [f32x8<S>; CHANNELS] {
     [f32x8::splat(simd, red), f32x8::splat(simd, green), f32x8::splat(simd, blue), f32x8::splat(simd, alpha)]
 }
 
 /// Adds a colour to a pixel of all open sheets, by weights.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn add<S: Simd>(simd: S, weights: f32x8<S>, color: [f32x8<S>; CHANNELS], pixel: &mut [Sums; CHANNELS]) {
     for (Sums(sums), &color) in pixel.iter_mut().zip(&color) {
         (f32x8::load_array_ref(simd, sums) + weights * color).store_slice(sums);

@@ -73,7 +73,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Draws a tile, given its first pixel and its bricks by first sheet: what its buffers hold then, and how its pixels look at sheets.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn draw<S: Simd>(
         &mut self,
         simd: S,
@@ -111,7 +111,7 @@ impl<'a> TileWalk<'a> {
         self.tally = Tally::default();
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn walk<'b, S: Simd>(&mut self, simd: S, first: i32, bricks: &mut Peekable<impl Iterator<Item = &'b Placed>>) {
         // Empty sheets are composited where they count.
         let Range { start, end } = self.frame.counted.clone();
@@ -141,7 +141,7 @@ impl<'a> TileWalk<'a> {
     fn composite<S: Simd>(&mut self, simd: S, sheet: i32) {
         // One function for every instruction set, instead of a copy at every call.
         simd.vectorize(
-            #[inline(always)]
+            #[cfg_attr(not(debug_assertions), inline(always))]
             || {
                 let Self { frame, open, rays, ring, buffers, tally, .. } = self;
                 ring.take(slot_of(sheet), &mut buffers.sheet);
@@ -177,7 +177,7 @@ impl<'a> TileWalk<'a> {
         self.arrived.push(Arrived { brick: placed.brick, place, half_box: placed.half_box });
         self.marks.resize(self.arrived.len() * self.frame.drawn.masks, 0);
         simd.vectorize(
-            #[inline(always)]
+            #[cfg_attr(not(debug_assertions), inline(always))]
             || {
                 let first_sheets = projection.first_sheets(brick, place);
                 let waiting = Waiting { brick: number, voxels: brick::present(brick) };
@@ -199,7 +199,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Draws the voxels that start or continue in a sheet.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn start<S: Simd>(&mut self, simd: S, sheet: i32) {
         let continued = std::mem::take(&mut self.continued[slot_of(sheet)]);
         self.pending -= continued.len();
@@ -219,7 +219,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Draws those of a brick's voxels that are seen, in batches.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn start_voxels<S: Simd>(&mut self, simd: S, waiting: &Waiting, sheet: i32, batch: &mut Batch<'a>) {
         let frame = self.frame;
         let Arrived { brick: number, place: brick_place, half_box } = self.arrived[waiting.brick as usize];
@@ -277,7 +277,7 @@ impl<'a> TileWalk<'a> {
     fn draw_batch<S: Simd>(&mut self, simd: S, batch: &mut Batch<'_>) {
         // One function for every instruction set, instead of a copy at every call.
         simd.vectorize(
-            #[inline(always)]
+            #[cfg_attr(not(debug_assertions), inline(always))]
             || {
                 let count = std::mem::take(&mut batch.count);
                 // All at once, so that the memory is waited for once.
@@ -304,7 +304,7 @@ impl<'a> TileWalk<'a> {
     fn draw_splat<S: Simd>(&mut self, simd: S, splat: &Splat) {
         // One function for every instruction set, instead of a copy at every call.
         simd.vectorize(
-            #[inline(always)]
+            #[cfg_attr(not(debug_assertions), inline(always))]
             || {
                 let splatter = &self.frame.splatter;
                 let sections = splatter.sections(simd, splat);
@@ -357,7 +357,7 @@ impl Batch<'_> {
         self.unshaded.set_view(lane, lens.to_eye, f64::from(projection.direction) * lens.per_lambda * amplitude);
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn add(
         &mut self,
         frame: &Frame,

@@ -101,7 +101,7 @@ impl Placement {
 
     /// Without an eye, pixel coordinates of a brick's voxels in eight slots, from the first on, in a tile given by its first pixel. The centre of
     /// that is at 0, 0.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn centers(&self, brick: Place, first: usize, origin: [usize; 2]) -> [[f32; LANES]; 2] {
         let middle = self.middle();
         let (shift_x, shift_y) = (middle.x - 0.5 - origin[0] as f64, middle.y - 0.5 - origin[1] as f64);
@@ -116,7 +116,7 @@ impl Placement {
     }
 
     /// The first planes of voxels in all slots of a brick; [`NO_SHEET`] for none.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn first_planes(&self, brick: Place) -> BySlot<i32> {
         let mut firsts = [NO_SHEET; BRICK_VOXELS as usize];
         for (first, offset) in firsts.iter_mut().zip(&self.depth) {
@@ -128,7 +128,7 @@ impl Placement {
     }
 
     /// The planes nearer than a kernel's radius to voxels between two depths. At the eye and behind it there are none.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn planes(&self, depths: Range<f64>) -> Range<i32> {
         let first = floor(depths.start - self.reach + slab::ROUNDING) + 1;
         let end = -floor(-(depths.end + self.reach - slab::ROUNDING));

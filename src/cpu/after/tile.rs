@@ -63,7 +63,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Draws a tile, given its first pixel and its bricks by first plane. Returns its filled buffers and how its rays meet slabs.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn draw<S: Simd>(
         &mut self,
         simd: S,
@@ -102,7 +102,7 @@ impl<'a> TileWalk<'a> {
         self.pending = 0;
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn walk<'b, S: Simd>(&mut self, simd: S, first: i32, bricks: &mut Peekable<impl Iterator<Item = &'b Placed>>) {
         let mut plane = first;
         loop {
@@ -126,7 +126,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Classifies and composites a slab.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn composite<S: Simd>(&mut self, simd: S, slab: i32) {
         let Self { frame, open, rays, to_eye, buffers, tally, planes, chosen, .. } = self;
         let looks = Looks::new(self.origin, rays, to_eye);
@@ -143,7 +143,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Lets a brick's voxels wait for their first planes, unless the brick is hidden; whether it is not.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn arrive<S: Simd>(&mut self, simd: S, placed: &Placed, plane: i32) -> bool {
         let placement = &self.frame.placement;
         let brick = &self.frame.bricks[placed.brick as usize];
@@ -167,7 +167,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Draws the voxels that start or continue at a plane.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn start<S: Simd>(&mut self, simd: S, plane: i32) {
         let continued = std::mem::take(&mut self.continued[slot_of(plane)]);
         self.pending -= continued.len();
@@ -182,7 +182,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Draws voxels of a brick, if they are seen.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn start_voxels<S: Simd>(&mut self, simd: S, waiting: Waiting, plane: i32) {
         let Frame { placement, bricks, coefficients, volume, .. } = self.frame;
         let (number, brick_place) = self.arrived[waiting.brick as usize];
@@ -222,7 +222,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Draws a voxel's next planes, if they are seen, and keeps it if there are more.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn draw_splat<S: Simd>(&mut self, simd: S, splat: &Splat) {
         let frame = self.frame;
         let [first, end] = splat.planes;
