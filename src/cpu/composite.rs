@@ -5,7 +5,7 @@ use fearless_simd::prelude::*;
 
 use super::cull::OpenMask;
 use super::cut::TileRays;
-use super::sheets::{Buffers, CHANNELS, COLUMNS, ROWS, STRIDE};
+use super::sheets::{Buffers, CHANNELS, COLUMNS, ROWS, Sheet};
 use super::vector::{LANES, saturation};
 use crate::settings::splatting::{Compositing, Order};
 
@@ -31,19 +31,18 @@ struct SheetPlace<'a> {
 }
 
 impl Compositor {
-    /// Composites the sheet of a slot, which begins at `begin`, clears it, and closes the pixels that became opaque; whether there was
-    /// anything to composite.
+    /// Composites the sheet, which begins at `begin`, clears it, and closes the pixels that became opaque; whether there was anything to
+    /// composite.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn composite<S: Simd>(
         &self,
         simd: S,
         buffers: &mut Buffers,
-        slot: usize,
         (rays, begin): (&TileRays, f32),
         open: &mut OpenMask,
     ) -> bool {
-        let Buffers { sheets, written, kept, acc, hits } = buffers;
-        let filled = std::mem::take(&mut written[slot]);
+        let Buffers { sheet: Sheet { rows: sheet, written }, kept, acc, hits } = buffers;
+        let filled = std::mem::take(written);
         let mut rows = match self.compositing {
             // While no surface has been reached, the compositing buffer holds the previous sheet.
             Compositing::Surface => filled | std::mem::replace(kept, filled),
@@ -56,11 +55,11 @@ impl Compositor {
         while rows != 0 {
             let row = rows.trailing_zeros() as usize;
             rows &= rows - 1;
-            let sheet = &mut sheets[row][slot];
+            let sheet = &mut sheet[row];
             let hits = self.first_hit.and(hits.get_mut(row));
             let opaque = self.row(simd, &mut acc[row], sheet, SheetPlace { rays, row, begin }, hits) & open.row(row);
             if filled >> row & 1 == 1 {
-                *sheet = [[0.0; STRIDE]; CHANNELS];
+                *sheet = [[0.0; COLUMNS]; CHANNELS];
             }
             if opaque != 0 {
                 open.close(row, opaque);
@@ -79,7 +78,7 @@ impl Compositor {
         &self,
         simd: S,
         acc: &mut [[f32; COLUMNS]; CHANNELS],
-        sheet: &[[f32; STRIDE]; CHANNELS],
+        sheet: &[[f32; COLUMNS]; CHANNELS],
         SheetPlace { rays, row, begin }: SheetPlace<'_>,
         mut hits: Option<&mut [f32; COLUMNS]>,
     ) -> u32 {
@@ -204,9 +203,9 @@ fn crossing<S: Simd>(before: f32x8<S>, mean: f32x8<S>) -> f32x8<S> {
 }
 
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn load_pixels<S: Simd, const N: usize>(simd: S, row: &[[f32; N]; CHANNELS], at: usize) -> Pixels<S> {
+fn load_pixels<S: Simd>(simd: S, row: &[[f32; COLUMNS]; CHANNELS], at: usize) -> Pixels<S> {
     let [red, green, blue, alpha] = row;
-    let load = |channel: &[f32; N]| f32x8::from_slice(simd, &channel[at..at + LANES]);
+    let load = |channel: &[f32; COLUMNS]| f32x8::from_slice(simd, &channel[at..at + LANES]);
     [load(red), load(green), load(blue), load(alpha)]
 }
 

@@ -1,7 +1,11 @@
 //! Early splat elimination (§6, SPEC §6): which pixels of a tile are opaque, and whether any pixel of a footprint's box is not. The same
 //! decision as `shaders/cull_voxels.wgsl`; pixels outside of the tile are other tiles' to draw.
 
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, i32x8};
+
 use super::sheets::{COLUMNS, ROWS};
+use super::vector::LANES;
 
 /// The number of levels of joined rows: 1, 2, 4, … rows.
 const LEVELS: usize = ROWS.ilog2() as usize + 1;
@@ -14,7 +18,7 @@ pub(super) struct OpenMask {
 }
 
 /// The pixels of a tile whose centres lie within a box: first and last column and row. Never empty.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Pixels {
     pub(super) columns: [usize; 2],
     pub(super) rows: [usize; 2],
@@ -30,6 +34,41 @@ impl Pixels {
             (first <= last).then_some([first as usize, last as usize])
         };
         Some(Self { columns: of_axis(0, COLUMNS)?, rows: of_axis(1, ROWS)? })
+    }
+}
+
+/// The pixels of a tile within eight boxes of one size: first and last column and row, the first after the last where there are none.
+pub(super) struct Boxes {
+    columns: [[i32; LANES]; 2],
+    rows: [[i32; LANES]; 2],
+}
+
+impl Boxes {
+    /// As [`Pixels::within`].
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn within<S: Simd>(simd: S, centers: &[[f32; LANES]; 2], half: [f32; 2]) -> Self {
+        let [columns, rows] = [COLUMNS as f32, ROWS as f32];
+        Self {
+            columns: Self::of_axis(simd, &centers[0], half[0], columns),
+            rows: Self::of_axis(simd, &centers[1], half[1], rows),
+        }
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn of_axis<S: Simd>(simd: S, centers: &[f32; LANES], half: f32, count: f32) -> [[i32; LANES]; 2] {
+        let splat = |number: f32| f32x8::splat(simd, number);
+        let centers = f32x8::load_array_ref(simd, centers);
+        let first = (centers - half).max(splat(0.0)).min(splat(count)).ceil();
+        let last = (centers + half).max(splat(-1.0)).min(splat(count - 1.0)).floor();
+        [first.to_int::<i32x8<S>>().to_array(), last.to_int::<i32x8<S>>().to_array()]
+    }
+
+    /// Those of one box.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn pixels(&self, lane: usize) -> Option<Pixels> {
+        let of = |axis: &[[i32; LANES]; 2]| [axis[0][lane] as usize, axis[1][lane] as usize];
+        let is_any = self.columns[0][lane] <= self.columns[1][lane] && self.rows[0][lane] <= self.rows[1][lane];
+        is_any.then(|| Pixels { columns: of(&self.columns), rows: of(&self.rows) })
     }
 }
 

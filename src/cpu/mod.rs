@@ -4,7 +4,7 @@
 //! bricks ─ bin ─→ every tile of 32×32 pixels, its sheets front to back in a ring of eight:
 //!                   cull       bricks, then voxels, that opaque pixels hide
 //!                   shade      eight visible voxels at a time, from materials that bricks keep from frame to frame
-//!                   splat      all sections of a voxel, eight pixels at a time, by the weights of eight rows
+//!                   splat      the pixels that a voxel reaches, all of its sections at a time
 //!                   composite  a sheet, once every voxel that reaches it is drawn
 //!        ─ resolve ─→ image
 //!        ─ first_hit ─→ the depths at which an opacity was reached, if requested
@@ -28,7 +28,9 @@ mod kernel;
 mod material;
 mod means;
 mod project;
+mod queue;
 mod ray;
+mod reached;
 mod resolve;
 mod shade;
 mod sheets;

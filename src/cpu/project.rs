@@ -5,6 +5,8 @@ use std::ops::Range;
 
 use glam::{DVec2, DVec3, UVec3};
 
+use super::queue::{BySlot, NO_SHEET};
+use super::vector::LANES;
 use crate::geometry::slab;
 use crate::geometry::view_geometry::{Perspective, ViewGeometry};
 use crate::lists::brick::Brick;
@@ -57,35 +59,39 @@ pub(super) struct Local {
     pub(super) cut: f64,
 }
 
+/// Where the voxels of a brick are, from its first place, by slot.
+#[derive(Clone, Debug)]
+struct Offsets {
+    x: BySlot<f64>,
+    y: BySlot<f64>,
+    depth: BySlot<f64>,
+    from_eye: BySlot<f64>,
+}
+
 /// A frame's projection.
 #[derive(Clone, Debug)]
 pub(super) struct Projection {
     pub(super) view: ViewGeometry,
     /// 1, or -1 where sheets are numbered from the farthest on: in the order in which they are composited.
     pub(super) direction: i32,
-    places: Vec<Place>,
-    /// The sheet depths of `places`.
-    depths: [f64; BRICK_VOXELS as usize],
+    offsets: Offsets,
     /// How kernels are seen without perspective: all of them alike.
-    flat: Lens,
+    pub(super) flat: Lens,
 }
-
-/// The first sheet of a voxel that has none.
-pub(super) const NO_SHEET: i32 = i32::MAX;
 
 impl Projection {
     pub(super) fn new(view: ViewGeometry, order: Order) -> Self {
         let direction = if order == Order::FrontToBack { 1 } else { -1 };
         let offset = |slot: usize| offset(&view, brick::in_brick(slot as u32).as_dvec3());
+        let offsets = Offsets {
+            x: std::array::from_fn(|slot| offset(slot).x),
+            y: std::array::from_fn(|slot| offset(slot).y),
+            depth: std::array::from_fn(|slot| offset(slot).depth),
+            from_eye: std::array::from_fn(|slot| offset(slot).from_eye),
+        };
         let per_slab = whole_kernel(&view);
         let flat = Lens { per_slab, per_lambda: 1.0 / view.lambda, to_eye: -view.basis.w, local: None };
-        Self {
-            view,
-            direction,
-            places: (0..BRICK_VOXELS as usize).map(offset).collect(),
-            depths: std::array::from_fn(|slot| offset(slot).depth),
-            flat,
-        }
+        Self { view, direction, offsets, flat }
     }
 
     /// Where a brick's first place is.
@@ -97,16 +103,34 @@ impl Projection {
 
     /// Where one of a brick's voxels is.
     pub(super) fn of_voxel(&self, brick: Place, slot: u32) -> Place {
-        brick.plus(self.places[slot as usize])
+        let Offsets { x, y, depth, from_eye } = &self.offsets;
+        let slot = slot as usize;
+        brick.plus(Place { x: x[slot], y: y[slot], depth: depth[slot], from_eye: from_eye[slot] })
     }
 
-    /// Pixel coordinates of a voxel before the eye.
-    pub(super) fn pixel(&self, place: Place) -> DVec2 {
-        let middle = DVec2::from(self.view.size.map(f64::from)) / 2.0;
-        match self.view.perspective {
-            None => DVec2::new(place.x, place.y) + middle,
-            Some(_) => DVec2::new(place.x, place.y) / place.from_eye + middle,
+    /// Pixel coordinates of a brick's voxels in eight slots, from the first on, in a tile given by its first pixel. The centre of that is at 0, 0.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn centers(&self, brick: Place, first: usize, origin: [usize; 2]) -> [[f32; LANES]; 2] {
+        let [width, height] = self.view.size.map(f64::from);
+        let (shift_x, shift_y) = (width / 2.0 - 0.5 - origin[0] as f64, height / 2.0 - 0.5 - origin[1] as f64);
+        let slots = first..first + LANES;
+        let (x, y) = (&self.offsets.x[slots.clone()], &self.offsets.y[slots.clone()]);
+        let mut centers = [[0.0; LANES]; 2];
+        let [columns, rows] = &mut centers;
+        if self.view.perspective.is_none() {
+            for ((column, row), (x, y)) in columns.iter_mut().zip(rows).zip(x.iter().zip(y)) {
+                *column = (brick.x + x + shift_x) as f32;
+                *row = (brick.y + y + shift_y) as f32;
+            }
+        } else {
+            let places = x.iter().zip(y).zip(&self.offsets.from_eye[slots]);
+            for ((column, row), ((x, y), from_eye)) in columns.iter_mut().zip(rows).zip(places) {
+                let from_eye = brick.from_eye + from_eye;
+                *column = ((brick.x + x) / from_eye + shift_x) as f32;
+                *row = ((brick.y + y) / from_eye + shift_y) as f32;
+            }
         }
+        centers
     }
 
     /// The sheets that a voxel's kernel overlaps, in the order in which they are composited; none before the near plane.
@@ -132,11 +156,11 @@ impl Projection {
 
     /// The first sheets of a brick's voxels by slot, those of empty slots too where that is faster; [`NO_SHEET`] for none.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn first_sheets(&self, brick: &Brick, place: Place) -> [i32; BRICK_VOXELS as usize] {
+    pub(super) fn first_sheets(&self, brick: &Brick, place: Place) -> BySlot<i32> {
         let mut first = [NO_SHEET; BRICK_VOXELS as usize];
         if self.view.perspective.is_none() {
             let reach = self.view.reach / self.view.slabs.width;
-            for (first, offset) in first.iter_mut().zip(&self.depths) {
+            for (first, offset) in first.iter_mut().zip(&self.offsets.depth) {
                 let depth = place.depth + offset;
                 *first = self.numbered(depth - reach, depth + reach).start;
             }
@@ -171,12 +195,10 @@ impl Projection {
         (depth * f64::from(1 << 20)).round() as i64
     }
 
-    /// How a voxel's kernel is seen.
-    pub(super) fn lens(&self, place: Place, voxel: UVec3) -> Lens {
+    /// How a voxel's kernel is seen from an eye.
+    pub(super) fn lens(&self, perspective: &Perspective, place: Place, voxel: UVec3) -> Lens {
         let view = &self.view;
-        let Some(Perspective { eye, eye_voxel, aspect, is_image_aligned, .. }) = &view.perspective else {
-            return self.flat;
-        };
+        let Perspective { eye, eye_voxel, aspect, is_image_aligned, .. } = perspective;
         // In voxels and in `unit`s: the warped ray and the ray.
         let warped = voxel.as_dvec3() - eye_voxel;
         let ray = warped * *aspect;

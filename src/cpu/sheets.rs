@@ -1,4 +1,4 @@
-//! A tile's buffers: the ring of sheet buffers that voxels are splatted into, and the compositing buffer.
+//! A tile's buffers: the ring of open sheets that voxels are splatted into, the sheet that is composited next, and the compositing buffer.
 
 use super::vector::LANES;
 
@@ -6,25 +6,44 @@ use super::vector::LANES;
 pub(super) const COLUMNS: usize = 32;
 /// Rows of a tile.
 pub(super) const ROWS: usize = 32;
-/// Numbers along a row of a sheet, with room for a vector that starts within the tile and ends outside.
-pub(super) const STRIDE: usize = COLUMNS + LANES;
-/// Sheets that are open at a time. Sheet s is in slot s mod 8.
-pub(super) const RING: usize = 8;
-/// Sheets that a voxel is drawn into at a time, such that their planes fill a vector.
-pub(super) const SECTIONS: usize = LANES - 1;
+/// Sheets that are open at a time, a vector of them. Sheet s is in slot s mod 8.
+pub(super) const RING: usize = LANES;
+/// Sheets that a voxel is drawn into at a time: one less than the ring holds, as the slot of the sheet before them may not be empty yet.
+pub(super) const SECTIONS: usize = RING - 1;
 /// Red, green, blue, opacity.
 pub(super) const CHANNELS: usize = 4;
 
-/// A row of all open sheets.
-pub(super) type SheetRow = [[[f32; STRIDE]; CHANNELS]; RING];
+/// The columns that share a bit of [`Ring::written`].
+const BLOCK: usize = COLUMNS / u8::BITS as usize;
 
-/// The buffers of one tile.
+/// A pixel's sums for all open sheets, by slot. Aligned, so that none of them lies on two cache lines.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
+pub(super) struct Sums(pub(super) [f32; RING]);
+
+/// The open sheets of a tile. A pixel's sums for all of them lie together, a vector for each channel with a number for each slot: a voxel
+/// adds to them by a multiplication and an addition for each channel.
+#[derive(Debug)]
+pub(super) struct Ring {
+    /// The sums of pixels, row by row.
+    pub(super) pixels: Vec<[Sums; CHANNELS]>,
+    /// Which columns of a row are not empty: byte s has a bit for every 4 columns of slot s.
+    written: [u64; ROWS],
+}
+
+/// One sheet, row by row.
+#[derive(Debug)]
+pub(super) struct Sheet {
+    pub(super) rows: Vec<[[f32; COLUMNS]; CHANNELS]>,
+    /// The bits of the rows that are not empty.
+    pub(super) written: u64,
+}
+
+/// The buffers of one tile from which its image is made.
 #[derive(Debug)]
 pub(super) struct Buffers {
-    /// Sheet buffers, row by row.
-    pub(super) sheets: Vec<SheetRow>,
-    /// For every slot, the bits of the rows that are not empty.
-    pub(super) written: [u64; RING],
+    /// The sheet that is composited next.
+    pub(super) sheet: Sheet,
     /// The rows whose compositing buffer may hold a surface that is not reached yet.
     pub(super) kept: u64,
     /// The compositing buffer, row by row.
@@ -33,27 +52,82 @@ pub(super) struct Buffers {
     pub(super) hits: Vec<[f32; COLUMNS]>,
 }
 
+impl Ring {
+    /// Empty sheets.
+    pub(super) fn new() -> Self {
+        Self { pixels: vec![[Sums([0.0; RING]); CHANNELS]; ROWS * COLUMNS], written: [0; ROWS] }
+    }
+
+    /// Records that pixels within a box were written to in some slots, from one on.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn mark(&mut self, columns: [usize; 2], rows: [usize; 2], slot: usize, count: usize) {
+        let [first, last] = columns.map(|column| column / BLOCK);
+        let blocks = u64::from(u8::MAX) >> (u8::BITS as usize - 1 - last) & u64::MAX << first;
+        // The byte 1 for each of the slots.
+        let ones = u64::MAX / u64::from(u8::MAX);
+        let slots = (ones & !(u64::MAX << (8 * count))).rotate_left(8 * slot as u32);
+        for row in &mut self.written[rows[0]..=rows[1]] {
+            *row |= slots * blocks;
+        }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.written == [0; ROWS]
+    }
+
+    /// Moves the sheet of a slot into an empty one.
+    pub(super) fn take(&mut self, slot: usize, sheet: &mut Sheet) {
+        for (row, written) in self.written.iter_mut().enumerate() {
+            let mut blocks = (*written >> (8 * slot)) as u8;
+            if blocks == 0 {
+                continue;
+            }
+            *written &= !(u64::from(u8::MAX) << (8 * slot));
+            sheet.written |= 1 << row;
+            let target = &mut sheet.rows[row];
+            while blocks != 0 {
+                let column = blocks.trailing_zeros() as usize * BLOCK;
+                blocks &= blocks - 1;
+                let pixels = &mut self.pixels[row * COLUMNS + column..];
+                for (column, sums) in (column..column + BLOCK).zip(pixels) {
+                    for (target, sums) in target.iter_mut().zip(sums) {
+                        target[column] = std::mem::take(&mut sums.0[slot]);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Makes all sheets empty, for the next tile.
+    pub(super) fn clear(&mut self) {
+        for (written, pixels) in self.written.iter_mut().zip(self.pixels.chunks_exact_mut(COLUMNS)) {
+            if std::mem::take(written) != 0 {
+                pixels.fill([Sums([0.0; RING]); CHANNELS]);
+            }
+        }
+    }
+}
+
+impl Sheet {
+    /// An empty one.
+    pub(super) fn new() -> Self {
+        Self { rows: vec![[[0.0; COLUMNS]; CHANNELS]; ROWS], written: 0 }
+    }
+}
+
 impl Buffers {
     /// Buffers of zeros.
     pub(super) fn new() -> Self {
         Self {
-            sheets: vec![[[[0.0; STRIDE]; CHANNELS]; RING]; ROWS],
-            written: [0; RING],
+            sheet: Sheet::new(),
             kept: 0,
             acc: vec![[[0.0; COLUMNS]; CHANNELS]; ROWS],
             hits: vec![[f32::INFINITY; COLUMNS]; ROWS],
         }
     }
 
-    /// Clears the buffers for the next tile. Composited sheets are already zero; after an early end some are not.
+    /// Clears the buffers for the next tile. A composited sheet is already empty.
     pub(super) fn clear(&mut self) {
-        for slot in 0..RING {
-            while self.written[slot] != 0 {
-                let row = self.written[slot].trailing_zeros() as usize;
-                self.written[slot] &= self.written[slot] - 1;
-                self.sheets[row][slot] = [[0.0; STRIDE]; CHANNELS];
-            }
-        }
         self.kept = 0;
         self.acc.fill([[0.0; COLUMNS]; CHANNELS]);
         self.hits.fill([f32::INFINITY; COLUMNS]);

@@ -1,19 +1,22 @@
-//! Kernel sections added to a tile's sheet buffers (SPEC §5), a row of eight pixels at a time and every section of a voxel for them; the same
-//! sums as `shaders/splat.wgsl`. Each pixel's additions come in the order in which voxels do, whatever the vectors' width.
+//! Kernel sections added to a tile's sheet buffers (SPEC §5), a pixel at a time and all sections of a voxel at once; the same sums as
+//! `shaders/splat.wgsl`. Each pixel's additions come in the order in which voxels do, whatever the vectors' width.
 
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
-use super::cull::{OpenMask, Pixels, columns_between};
+use super::cull::{OpenMask, Pixels};
 use super::kernel::KernelTables;
-use super::sheets::{Buffers, CHANNELS, COLUMNS, RING, SECTIONS, SheetRow, slot_of};
-use super::vector::{LANES, iota};
+use super::reached::Reached;
+use super::sheets::{CHANNELS, RING, Ring, SECTIONS, Sums, slot_of};
+use super::vector::LANES;
 
 /// A voxel in the coordinates of a tile.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Splat {
     /// Its pixel coordinates; the centre of the tile's first pixel is at 0, 0.
     pub(super) center: [f32; 2],
+    /// The pixels of the tile that it may reach.
+    pub(super) pixels: Pixels,
     /// `(C·m, m)` over λ, and the low-pass amplitude where it is the same for all sections.
     pub(super) amount: [f32; 4],
     /// The range of sheets still to be drawn, in the order of compositing.
@@ -47,80 +50,83 @@ pub(super) struct Splatter {
     pub(super) radius: f32,
     /// Orthographic: ρ² of a pixel offset (dx, dy) is `x·dx² + y·dx·dy + z·dy²`.
     pub(super) metric: [f32; 3],
-    /// Orthographic: half the box around footprints, pixels.
-    pub(super) half_box: [f32; 2],
     /// In perspective the size of a pixel at depth 1, `unit`s.
     pub(super) pixel_per_depth: Option<f32>,
     /// True if sheets hold whole kernels, whose footprint is that at the voxel's depth.
     pub(super) is_whole: bool,
 }
 
-/// The sections of a splat in up to [`SECTIONS`] sheets.
+/// The sections of a splat in up to [`SECTIONS`] sheets, by slot. Slots without a section have planes at one place.
 pub(super) struct Sections {
     count: usize,
-    /// `H(0, 0, t)` of eq. 3 at the planes between them.
-    planes: [f32; LANES],
-    /// In perspective ρ² of a pixel along the footprint's axis and across it, and the low-pass rule's amplitude, by section.
-    along: [f32; LANES],
-    across: [f32; LANES],
-    amplitude: [f32; LANES],
-    /// In perspective how far from the voxel's row each reaches, pixels.
-    reach: [f32; LANES],
+    /// `H(0, 0, t)` of eq. 3 at the planes before the sections.
+    near: [f32; RING],
+    /// The same behind them.
+    far: [f32; RING],
+    /// In perspective ρ² of a pixel along the footprint's axis and across it, and the low-pass rule's amplitude.
+    along: [f32; RING],
+    across: [f32; RING],
+    amplitude: [f32; RING],
     /// The pixels that any of them reaches; `None` for no pixel of the tile.
     pub(super) pixels: Option<Pixels>,
+}
+
+/// The order of a ring's slots from every slot on.
+#[cfg_attr(not(debug_assertions), inline(always))]
+pub(super) fn order_from<S: Simd>(simd: S, slot: usize) -> f32x8<S> {
+    const TWICE: [f32; 2 * RING] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+    f32x8::from_slice(simd, &TWICE[RING - slot..2 * RING - slot])
 }
 
 impl Splatter {
     /// The sections to be drawn next.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn sections<S: Simd>(&self, simd: S, splat: &Splat) -> Sections {
+        let splat_f32 = |number: f32| f32x8::splat(simd, number);
         let count = ((splat.sheets[1] - splat.sheets[0]) as usize).min(SECTIONS);
-        let mut t = iota(simd) * splat.step + splat.first_plane;
+        let order = order_from(simd, slot_of(splat.sheets[0]));
+        let end = splat_f32(count as f32);
+        let mut near = order.min(end) * splat.step + splat.first_plane;
+        let mut far = (order + 1.0).min(end) * splat.step + splat.first_plane;
         let mut sections = Sections {
             count,
-            planes: [0.0; LANES],
-            along: [0.0; LANES],
-            across: [0.0; LANES],
-            amplitude: [0.0; LANES],
-            reach: [0.0; LANES],
-            pixels: None,
+            near: [0.0; RING],
+            far: [0.0; RING],
+            along: [0.0; RING],
+            across: [0.0; RING],
+            amplitude: [0.0; RING],
+            pixels: Some(splat.pixels),
         };
-        let mut half_box = self.half_box;
         if let Some(pixel_per_depth) = self.pixel_per_depth {
             let local = &splat.local;
-            t = t.max(f32x8::splat(simd, local.cut));
-            let radius = f32x8::splat(simd, self.radius);
-            let within = t.max(-radius).min(radius);
-            // Of sections that are to be drawn: the last lane's far plane does not matter.
-            let middle = match self.is_whole {
-                true => f32x8::splat(simd, 0.0),
-                false => (within + within.slide::<1>(within)) * 0.5,
-            };
+            let cut = splat_f32(local.cut);
+            (near, far) = (near.max(cut), far.max(cut));
+            let radius = splat_f32(self.radius);
+            let within = [near.max(-radius).min(radius), far.max(-radius).min(radius)];
+            let middle = if self.is_whole { splat_f32(0.0) } else { (within[0] + within[1]) * 0.5 };
             let pix = (middle * local.depth_per_warped + local.from_eye) * pixel_per_depth;
             let squared = pix * pix;
             let (along, across) = (squared * local.metric[0], squared * local.metric[1]);
             // The low-pass rule: at least a pixel for a grid unit.
-            let one = f32x8::splat(simd, 1.0);
+            let one = splat_f32(1.0);
             let amplitude = one / (along.max(one) * across.max(one)).sqrt();
             // Above 0, for pixels whose squares are too small.
-            let least = f32x8::splat(simd, 1e-30);
+            let least = splat_f32(1e-30);
             let (along, across) = (along.min(one).max(least), across.min(one).max(least));
+            // Slots without a section are like the last one with a section.
             let [x, y] = local.axis.map(|component| component * component);
             let width = (one / along * x + one / across * y).sqrt() * self.kernel.support;
             let height = (one / along * y + one / across * x).sqrt() * self.kernel.support;
-            let largest =
-                |lanes: f32x8<S>| lanes.to_array()[..count].iter().fold(0.0_f32, |a, &b| if a > b { a } else { b });
-            half_box = [largest(width), largest(height)];
+            sections.pixels = Pixels::within(splat.center, [width.reduce_max(), height.reduce_max()]);
             (sections.along, sections.across) = (along.to_array(), across.to_array());
             sections.amplitude = amplitude.to_array();
-            sections.reach = (height * self.kernel.reach(simd, t, t.slide::<1>(t))).to_array();
         }
-        sections.planes = self.kernel.along(simd, t).to_array();
-        sections.pixels = Pixels::within(splat.center, half_box);
+        let (near, far) = self.kernel.along(simd, near.combine(far)).split();
+        (sections.near, sections.far) = (near.to_array(), far.to_array());
         sections
     }
 
-    /// Adds sections to a tile's sheets.
+    /// Adds sections to the open pixels of a tile.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn draw<S: Simd>(
         &self,
@@ -128,144 +134,108 @@ impl Splatter {
         splat: &Splat,
         sections: &Sections,
         open: &OpenMask,
-        buffers: &mut Buffers,
+        (reached, ring): (&mut Reached, &mut Ring),
     ) {
-        let Some(Pixels { columns: [left, right], rows }) = sections.pixels else { return };
-        let slot = slot_of(splat.sheets[0]);
-        let mut written = 0;
-        for column in (left..=right).step_by(LANES) {
-            let block = Block { splat, sections, column, rows, slot, open };
-            written |= match self.pixel_per_depth {
-                // A loop of a fixed length is unrolled.
-                None => match sections.count {
-                    1 => self.draw_block::<S, 1>(simd, &block, &mut buffers.sheets),
-                    2 => self.draw_block::<S, 2>(simd, &block, &mut buffers.sheets),
-                    3 => self.draw_block::<S, 3>(simd, &block, &mut buffers.sheets),
-                    4 => self.draw_block::<S, 4>(simd, &block, &mut buffers.sheets),
-                    5 => self.draw_block::<S, 5>(simd, &block, &mut buffers.sheets),
-                    6 => self.draw_block::<S, 6>(simd, &block, &mut buffers.sheets),
-                    _ => self.draw_block::<S, SECTIONS>(simd, &block, &mut buffers.sheets),
-                },
-                Some(_) => self.draw_local_block(simd, &block, &mut buffers.sheets),
-            };
+        let Some(pixels) = &sections.pixels else { return };
+        match self.pixel_per_depth {
+            None => self.draw_flat(simd, splat, sections, (pixels, open), (reached, ring)),
+            Some(_) => self.draw_local(simd, splat, sections, (pixels, open), (reached, ring)),
         }
-        for section in 0..sections.count {
-            buffers.written[(slot + section) % RING] |= written;
-        }
+        ring.mark(pixels.columns, pixels.rows, slot_of(splat.sheets[0]), sections.count);
     }
 
-    /// Eight columns of N sections without perspective, which all have one footprint. Returns the bits of the rows.
+    /// Without perspective all sections have one footprint.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn draw_block<S: Simd, const N: usize>(&self, simd: S, block: &Block<'_>, sheets: &mut [SheetRow]) -> u64 {
-        let Block { splat, sections, column, rows: [first, last], slot, .. } = *block;
-        let dx = iota(simd) + (column as f32 - splat.center[0]);
+    fn draw_flat<S: Simd>(
+        &self,
+        simd: S,
+        splat: &Splat,
+        sections: &Sections,
+        (pixels, open): (&Pixels, &OpenMask),
+        (reached, ring): (&mut Reached, &mut Ring),
+    ) {
         let [xx, xy, yy] = self.metric;
-        let mut written = 0;
-        for begin in (first..=last).step_by(BLOCK_ROWS) {
-            // All rows of a block first, also those beyond the last one: independent sums without a branch, two rows to a vector.
-            let zero = f32x8::splat(simd, 0.0);
-            let (mut rims, mut in_planes) = ([zero; BLOCK_ROWS], [zero; BLOCK_ROWS]);
-            for pair in (0..BLOCK_ROWS).step_by(2) {
-                let rho_squared = |row: usize| {
-                    let dy = (begin + row) as f32 - splat.center[1];
-                    dx * (dx * xx + xy * dy) + yy * dy * dy
-                };
-                let [first, second] = [rho_squared(pair), rho_squared(pair + 1)];
-                (rims[pair], rims[pair + 1]) = self.kernel.rim(simd, first.combine(second)).split();
-                in_planes[pair] = self.kernel.in_plane(simd, first);
-                in_planes[pair + 1] = self.kernel.in_plane(simd, second);
-            }
-            for (target, row) in sheets[begin..=last.min(begin + BLOCK_ROWS - 1)].iter_mut().zip(begin..) {
-                if block.is_closed(row) {
-                    continue;
-                }
-                written |= 1 << row;
-                let at = (row - begin) % BLOCK_ROWS;
-                let (rim, in_plane) = (rims[at], in_planes[at]);
-                let mut near = cut_by_rim(simd, sections.planes[0], rim);
-                for section in 0..N {
-                    let far = cut_by_rim(simd, sections.planes[section + 1], rim);
-                    add((far - near) * in_plane, splat.amount, column, &mut target[(slot + section) % RING]);
-                    near = far;
-                }
-            }
+        let limit = f32x8::splat(simd, self.kernel.support_squared);
+        reached.list(
+            simd,
+            splat.center,
+            pixels,
+            open,
+            #[cfg_attr(not(debug_assertions), inline(always))]
+            move |dx, dy| {
+                let rho_squared = dx * (dx * xx + xy * dy) + yy * dy * dy;
+                (rho_squared.simd_lt(limit), [rho_squared])
+            },
+        );
+        let [first, second, _] = &mut *reached.numbers;
+        for at in (0..reached.count).step_by(LANES) {
+            let rho_squared = f32x8::from_slice(simd, &first[at..at + LANES]);
+            self.kernel.rim(simd, rho_squared).store_slice(&mut first[at..at + LANES]);
+            self.kernel.in_plane(simd, rho_squared).store_slice(&mut second[at..at + LANES]);
         }
-        written
+        let (near, far) = (f32x8::load_array(simd, sections.near), f32x8::load_array(simd, sections.far));
+        let (color, sums) = (splatted(simd, splat.amount), &mut ring.pixels);
+        for ((&pixel, &rim), &in_plane) in reached.pixels[..reached.count].iter().zip(&*first).zip(&*second) {
+            let rim = f32x8::splat(simd, rim);
+            add(simd, (cut_by_rim(far, rim) - cut_by_rim(near, rim)) * in_plane, color, &mut sums[pixel as usize]);
+        }
     }
 
-    /// Eight columns in perspective: every section has its own footprint, of the size that pixels have at its middle. Returns the bits of
-    /// the rows.
+    /// In perspective every section has its own footprint, of the size that pixels have at its middle.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn draw_local_block<S: Simd>(&self, simd: S, block: &Block<'_>, sheets: &mut [SheetRow]) -> u64 {
-        let Block { splat, sections, column, rows: [first, last], slot, .. } = *block;
-        let dx = iota(simd) + (column as f32 - splat.center[0]);
+    fn draw_local<S: Simd>(
+        &self,
+        simd: S,
+        splat: &Splat,
+        sections: &Sections,
+        (pixels, open): (&Pixels, &OpenMask),
+        (reached, ring): (&mut Reached, &mut Ring),
+    ) {
+        let load = |numbers: [f32; RING]| f32x8::load_array(simd, numbers);
+        let (to_along, to_across, amplitude) = (load(sections.along), load(sections.across), load(sections.amplitude));
+        // Of the largest section's footprint.
+        let (least_along, least_across) = (to_along.reduce_min(), to_across.reduce_min());
         let [x, y] = splat.local.axis;
-        let mut written = 0;
-        for (target, row) in sheets[first..=last].iter_mut().zip(first..) {
-            if block.is_closed(row) {
-                continue;
-            }
-            written |= 1 << row;
-            let dy = row as f32 - splat.center[1];
-            let along = dx * x + dy * y;
-            let across = dx * -y + dy * x;
-            let (along, across) = (along * along, across * across);
-            for section in 0..sections.count {
-                if dy.abs() > sections.reach[section] {
-                    continue;
-                }
-                let rho_squared = along * sections.along[section] + across * sections.across[section];
-                let rim = self.kernel.rim(simd, rho_squared);
-                let in_plane = self.kernel.in_plane(simd, rho_squared) * sections.amplitude[section];
-                let near = cut_by_rim(simd, sections.planes[section], rim);
-                let far = cut_by_rim(simd, sections.planes[(section + 1) % LANES], rim);
-                add((far - near) * in_plane, splat.amount, column, &mut target[(slot + section) % RING]);
-            }
+        let limit = f32x8::splat(simd, self.kernel.support_squared);
+        reached.list(
+            simd,
+            splat.center,
+            pixels,
+            open,
+            #[cfg_attr(not(debug_assertions), inline(always))]
+            move |dx, dy| {
+                let (along, across) = (dx * x + dy * y, dx * -y + dy * x);
+                let (along, across) = (along * along, across * across);
+                ((along * least_along + across * least_across).simd_lt(limit), [along, across])
+            },
+        );
+        let (near, far) = (load(sections.near), load(sections.far));
+        let [along, across, _] = &*reached.numbers;
+        let (color, sums) = (splatted(simd, splat.amount), &mut ring.pixels);
+        for ((&pixel, &along), &across) in reached.pixels[..reached.count].iter().zip(along).zip(across) {
+            let rho_squared = to_along * along + to_across * across;
+            let rim = self.kernel.rim(simd, rho_squared);
+            let in_plane = self.kernel.in_plane(simd, rho_squared) * amplitude;
+            add(simd, (cut_by_rim(far, rim) - cut_by_rim(near, rim)) * in_plane, color, &mut sums[pixel as usize]);
         }
-        written
     }
 }
 
-/// The rows whose weights are computed together.
-const BLOCK_ROWS: usize = 8;
-
-/// Sections to be drawn into eight columns of pixels.
-struct Block<'a> {
-    splat: &'a Splat,
-    sections: &'a Sections,
-    column: usize,
-    /// The first and the last row.
-    rows: [usize; 2],
-    /// That of the first section.
-    slot: usize,
-    open: &'a OpenMask,
-}
-
-impl Block<'_> {
-    /// Whether all its pixels in a row are opaque.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn is_closed(&self, row: usize) -> bool {
-        self.open.row(row) & columns_between(self.column, (self.column + LANES - 1).min(COLUMNS - 1)) == 0
-    }
-}
-
-/// `H(0, 0, t)` at a plane, or at the rim on its side.
+/// `H(0, 0, t)` at planes, or at the rim on their side.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn cut_by_rim<S: Simd>(simd: S, plane: f32, rim: f32x8<S>) -> f32x8<S> {
-    f32x8::splat(simd, plane).max(-rim).min(rim)
+fn cut_by_rim<S: Simd>(planes: f32x8<S>, rim: f32x8<S>) -> f32x8<S> {
+    planes.max(-rim).min(rim)
 }
 
-/// Adds a colour to eight pixels of a sheet, by weights.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn add<S: Simd>(weights: f32x8<S>, colors: [f32; 4], column: usize, sheet: &mut [[f32; COLUMNS + LANES]; CHANNELS]) {
-    let column = column.min(COLUMNS);
-    let weights = weights.to_array();
-    for (channel, color) in sheet.iter_mut().zip(colors) {
-        // The compiler vectorizes this loop. Loading an `f32x8` instead goes through a copy on the stack.
-        if let Some(pixels) = channel[column..].first_chunk_mut::<LANES>() {
-            for (pixel, weight) in pixels.iter_mut().zip(weights) {
-                *pixel += weight * color;
-            }
-        }
+fn splatted<S: Simd>(simd: S, [red, green, blue, alpha]: [f32; CHANNELS]) -> [f32x8<S>; CHANNELS] {
+    [f32x8::splat(simd, red), f32x8::splat(simd, green), f32x8::splat(simd, blue), f32x8::splat(simd, alpha)]
+}
+
+/// Adds a colour to a pixel of all open sheets, by weights.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn add<S: Simd>(simd: S, weights: f32x8<S>, color: [f32x8<S>; CHANNELS], pixel: &mut [Sums; CHANNELS]) {
+    for (Sums(sums), &color) in pixel.iter_mut().zip(&color) {
+        (f32x8::load_array_ref(simd, sums) + weights * color).store_slice(sums);
     }
 }

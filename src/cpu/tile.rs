@@ -2,23 +2,23 @@
 //! is tested for being hidden there, shaded, and drawn into all the sheets that its kernel reaches; then that sheet is composited. Where voxels
 //! are composited one by one there is one sheet, composited after each of them.
 
-use std::collections::VecDeque;
 use std::iter::Peekable;
 use std::ops::Range;
 
-use fearless_simd::i32x8;
 use fearless_simd::prelude::*;
 use glam::{DVec2, UVec3};
 
 use super::bin::Placed;
 use super::count::{Tally, bits};
-use super::cull::{OpenMask, Pixels};
+use super::cull::{Boxes, OpenMask, Pixels};
 use super::cut::TileRays;
 use super::frame::Frame;
 use super::material::Material;
-use super::project::{NO_SHEET, Place, Projection};
+use super::project::{Lens, Place, Projection};
+use super::queue::{Queue, Waiting};
+use super::reached::Reached;
 use super::shade::Unshaded;
-use super::sheets::{Buffers, COLUMNS, RING, ROWS, SECTIONS, slot_of};
+use super::sheets::{Buffers, COLUMNS, RING, ROWS, Ring, SECTIONS, slot_of};
 use super::splat::{LocalFootprint, Splat};
 use super::vector::LANES;
 use crate::lists::brick;
@@ -32,15 +32,6 @@ struct Arrived {
     half_box: [f32; 2],
 }
 
-/// Voxels of a brick that wait for their first sheet.
-#[derive(Clone, Copy)]
-struct Waiting {
-    /// The index of their brick among those that have arrived.
-    brick: u32,
-    /// The bits of their slots.
-    voxels: u64,
-}
-
 /// The state with which a thread draws one tile after another.
 pub(super) struct TileWalk<'a> {
     frame: &'a Frame<'a>,
@@ -48,16 +39,16 @@ pub(super) struct TileWalk<'a> {
     origin: [usize; 2],
     open: OpenMask,
     rays: TileRays,
+    ring: Ring,
+    reached: Reached,
     buffers: Buffers,
     arrived: Vec<Arrived>,
     /// What has been drawn of them, as [`Drawn`](super::count::Drawn) records it.
     marks: Vec<u64>,
-    /// The waiting voxels by sheet, from the current one.
-    waiting: VecDeque<Vec<Waiting>>,
+    queue: Queue,
     /// Voxels with more sections than are drawn at a time, by the slot of their next sheet.
     continued: [Vec<Splat>; RING],
-    /// Empty lists to be used again.
-    spare: Vec<Vec<Waiting>>,
+    /// The number of those.
     pending: usize,
     tally: Tally,
 }
@@ -69,12 +60,13 @@ impl<'a> TileWalk<'a> {
             origin: [0; 2],
             open: OpenMask::new(COLUMNS, ROWS),
             rays: TileRays::default(),
+            ring: Ring::new(),
+            reached: Reached::new(),
             buffers: Buffers::new(),
             arrived: Vec::new(),
             marks: Vec::new(),
-            waiting: VecDeque::new(),
+            queue: Queue::default(),
             continued: std::array::from_fn(|_| Vec::new()),
-            spare: Vec::new(),
             pending: 0,
             tally: Tally::default(),
         }
@@ -109,10 +101,11 @@ impl<'a> TileWalk<'a> {
         if let (Some(shown), Some(_)) = (&self.rays.shown, self.frame.compositor.threshold) {
             self.open.close_empty(shown);
         }
+        self.ring.clear();
         self.buffers.clear();
         self.arrived.clear();
         self.marks.clear();
-        self.spare.extend(self.waiting.drain(..));
+        self.queue.clear();
         self.continued.iter_mut().for_each(Vec::clear);
         self.pending = 0;
         self.tally = Tally::default();
@@ -134,8 +127,8 @@ impl<'a> TileWalk<'a> {
             if self.open.is_closed() {
                 break;
             }
-            let Buffers { written, kept, .. } = &self.buffers;
-            let is_idle = self.pending == 0 && *written == [0; RING] && *kept == 0 && sheet + 1 >= end;
+            let is_waiting = self.pending != 0 || !self.queue.is_empty();
+            let is_idle = !is_waiting && self.ring.is_empty() && self.buffers.kept == 0 && sheet + 1 >= end;
             sheet = match bricks.peek() {
                 Some(placed) if is_idle => placed.first.max(sheet + 1),
                 None if is_idle => break,
@@ -150,9 +143,10 @@ impl<'a> TileWalk<'a> {
         simd.vectorize(
             #[cfg_attr(not(debug_assertions), inline(always))]
             || {
-                let Self { frame, open, rays, buffers, tally, .. } = self;
+                let Self { frame, open, rays, ring, buffers, tally, .. } = self;
+                ring.take(slot_of(sheet), &mut buffers.sheet);
                 let begin = rays.begin(frame.projection.direction * sheet);
-                let is_composited = frame.compositor.composite(simd, buffers, slot_of(sheet), (rays, begin), open);
+                let is_composited = frame.compositor.composite(simd, buffers, (rays, begin), open);
                 tally.sheets_composited += u64::from(is_composited && frame.touched.contains(&sheet));
             },
         );
@@ -186,21 +180,8 @@ impl<'a> TileWalk<'a> {
             #[cfg_attr(not(debug_assertions), inline(always))]
             || {
                 let first_sheets = projection.first_sheets(brick, place);
-                let mut left = brick::present(brick);
-                while left != 0 {
-                    let first = first_sheets[left.trailing_zeros() as usize % first_sheets.len()];
-                    let voxels = left & equal(simd, &first_sheets, first);
-                    left &= !voxels;
-                    if first == NO_SHEET {
-                        continue;
-                    }
-                    let ahead = (first - sheet).max(0) as usize;
-                    while self.waiting.len() <= ahead {
-                        self.waiting.push_back(self.spare.pop().map_or_else(Vec::new, cleared));
-                    }
-                    self.waiting[ahead].push(Waiting { brick: number, voxels });
-                    self.pending += 1;
-                }
+                let waiting = Waiting { brick: number, voxels: brick::present(brick) };
+                self.queue.add(simd, waiting, &first_sheets, sheet);
             },
         );
         true
@@ -225,17 +206,16 @@ impl<'a> TileWalk<'a> {
         for splat in &continued {
             self.draw_splat(simd, splat);
         }
-        let Some(mut starting) = self.waiting.pop_front() else { return };
-        self.pending -= starting.len();
+        let Some(mut starting) = self.queue.advance() else { return };
         if self.frame.is_each {
             starting = self.sorted_by_depth(&starting);
         }
-        let mut batch = Batch::new();
+        let mut batch = Batch::new(&self.frame.projection, self.frame.amplitude);
         for waiting in &starting {
             self.start_voxels(simd, waiting, sheet, &mut batch);
         }
         self.draw_batch(simd, &mut batch);
-        self.spare.push(starting);
+        self.queue.reuse(starting);
     }
 
     /// Draws those of a brick's voxels that are seen, in batches.
@@ -244,24 +224,31 @@ impl<'a> TileWalk<'a> {
         let frame = self.frame;
         let Arrived { brick: number, place: brick_place, half_box } = self.arrived[waiting.brick as usize];
         let brick = &frame.bricks[number as usize];
-        let corner = DVec2::new(self.origin[0] as f64, self.origin[1] as f64) + 0.5;
         let mut materials = None;
         let mut seen = 0;
-        for slot in bits(waiting.voxels) {
-            let place = frame.projection.of_voxel(brick_place, slot);
-            let center = (frame.projection.pixel(place) - corner).to_array().map(|at| at as f32);
-            // In perspective this bounds the boxes of all its sections.
-            if !Pixels::within(center, half_box).is_some_and(|pixels| self.open.sees(&pixels)) {
+        for first in (0..BRICK_VOXELS as usize).step_by(LANES) {
+            let lanes = waiting.voxels >> first & 0xff;
+            if lanes == 0 {
                 continue;
             }
-            seen |= 1 << slot;
-            let materials =
-                *materials.get_or_insert_with(|| frame.materials.of_brick(number, frame.volume, frame.transfer, brick));
-            let voxel = brick::origin(brick) + brick::in_brick(slot);
-            batch.materials[batch.count] = materials.map(|materials| &materials[slot as usize]).ok_or(voxel);
-            batch.add(frame, ([waiting.brick, slot], voxel), place, (center, sheet));
-            if batch.count == LANES {
-                self.draw_batch(simd, batch);
+            let centers = frame.projection.centers(brick_place, first, self.origin);
+            // In perspective these contain the boxes of all sections.
+            let boxes = Boxes::within(simd, &centers, half_box);
+            for lane in bits(lanes) {
+                let lane = lane as usize;
+                let Some(pixels) = boxes.pixels(lane).filter(|pixels| self.open.sees(pixels)) else { continue };
+                let slot = (first + lane) as u32;
+                seen |= 1 << slot;
+                let materials = *materials
+                    .get_or_insert_with(|| frame.materials.of_brick(number, frame.volume, frame.transfer, brick));
+                let voxel = brick::origin(brick) + brick::in_brick(slot);
+                batch.materials[batch.count] = materials.map(|materials| &materials[slot as usize]).ok_or(voxel);
+                let place = frame.projection.of_voxel(brick_place, slot);
+                let on_tile = ([centers[0][lane], centers[1][lane]], pixels);
+                batch.add(frame, ([waiting.brick, slot], voxel), (place, sheet), on_tile);
+                if batch.count == LANES {
+                    self.draw_batch(simd, batch);
+                }
             }
         }
         self.marks[waiting.brick as usize * frame.drawn.masks] |= seen;
@@ -324,7 +311,7 @@ impl<'a> TileWalk<'a> {
                 let [first, end] = splat.sheets;
                 let next = end.min(first + SECTIONS as i32);
                 if sections.pixels.is_some_and(|pixels| self.open.sees(&pixels)) {
-                    splatter.draw(simd, splat, &sections, &self.open, &mut self.buffers);
+                    splatter.draw(simd, splat, &sections, &self.open, (&mut self.reached, &mut self.ring));
                     let [brick, slot] = splat.voxel;
                     let masks = self.frame.drawn.masks;
                     let part = (1 + splat.drawn as usize).min(masks - 1);
@@ -347,22 +334,6 @@ impl<'a> TileWalk<'a> {
     }
 }
 
-/// The bits of the numbers that equal one.
-#[cfg_attr(not(debug_assertions), inline(always))]
-fn equal<S: Simd>(simd: S, numbers: &[i32; BRICK_VOXELS as usize], to: i32) -> u64 {
-    let to = i32x8::splat(simd, to);
-    let mut bits = 0;
-    for at in (0..numbers.len()).step_by(LANES) {
-        bits |= i32x8::from_slice(simd, &numbers[at..at + LANES]).simd_eq(to).to_bitmask() << at;
-    }
-    bits
-}
-
-fn cleared(mut list: Vec<Waiting>) -> Vec<Waiting> {
-    list.clear();
-    list
-}
-
 /// Up to eight voxels that are shaded together.
 struct Batch<'a> {
     count: usize,
@@ -373,9 +344,17 @@ struct Batch<'a> {
 }
 
 impl Batch<'_> {
-    fn new() -> Self {
+    fn new(projection: &Projection, amplitude: f64) -> Self {
         let nothing = Err(UVec3::ZERO);
-        Self { count: 0, materials: [nothing; LANES], unshaded: Unshaded::default(), splats: Default::default() }
+        let mut batch =
+            Self { count: 0, materials: [nothing; LANES], unshaded: Unshaded::default(), splats: Default::default() };
+        (0..LANES).for_each(|lane| batch.set_view(lane, projection, &projection.flat, amplitude));
+        batch
+    }
+
+    fn set_view(&mut self, lane: usize, projection: &Projection, lens: &Lens, amplitude: f64) {
+        // Back to front, planes come in the opposite order, so that sections and their factors are both negative.
+        self.unshaded.set_view(lane, lens.to_eye, f64::from(projection.direction) * lens.per_lambda * amplitude);
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
@@ -383,33 +362,38 @@ impl Batch<'_> {
         &mut self,
         frame: &Frame,
         (number, voxel): ([u32; 2], UVec3),
-        place: Place,
-        (center, sheet): ([f32; 2], i32),
+        (place, sheet): (Place, i32),
+        (center, pixels): ([f32; 2], Pixels),
     ) {
         let projection = &frame.projection;
-        let lens = projection.lens(place, voxel);
-        let sheets = projection.sheets(place, voxel);
-        // Back to front, planes come in the opposite order, so that sections and their factors are both negative.
+        let mut per_slab = projection.flat.per_slab;
+        let mut local = LocalFootprint::default();
+        if let Some(perspective) = &projection.view.perspective {
+            let lens = projection.lens(perspective, place, voxel);
+            per_slab = lens.per_slab;
+            if let Some(of_lens) = lens.local {
+                local = LocalFootprint {
+                    axis: of_lens.axis.to_array().map(|component| component as f32),
+                    metric: of_lens.metric.to_array().map(|component| component as f32),
+                    depth_per_warped: of_lens.depth_per_warped as f32,
+                    from_eye: place.from_eye as f32,
+                    cut: of_lens.cut as f32,
+                };
+            }
+            self.set_view(self.count, projection, &lens, frame.amplitude);
+        }
         let direction = f64::from(projection.direction);
         let plane = direction * f64::from(sheet) + if projection.direction > 0 { 0.0 } else { 1.0 };
-        let scale = direction * lens.per_lambda * frame.amplitude;
-        self.unshaded.set_view(self.count, lens.to_eye, scale);
-        let local = lens.local.map(|local| LocalFootprint {
-            axis: local.axis.to_array().map(|component| component as f32),
-            metric: local.metric.to_array().map(|component| component as f32),
-            depth_per_warped: local.depth_per_warped as f32,
-            from_eye: place.from_eye as f32,
-            cut: local.cut as f32,
-        });
         self.splats[self.count] = Splat {
             center,
+            pixels,
             amount: [0.0; 4],
-            sheets: [sheet, sheets.end],
-            first_plane: ((plane - place.depth) * lens.per_slab) as f32,
-            step: (direction * lens.per_slab) as f32,
+            sheets: [sheet, projection.sheets(place, voxel).end],
+            first_plane: ((plane - place.depth) * per_slab) as f32,
+            step: (direction * per_slab) as f32,
             voxel: number,
             drawn: 0,
-            local: local.unwrap_or_default(),
+            local,
         };
         self.count += 1;
     }

@@ -104,6 +104,15 @@ pub(super) fn polynomial<S: Simd, V: SimdFloat<S, Element = f32>>(c: &[f32; 16],
     (cubic(0) + fourth * cubic(4)) + (fourth * fourth) * (cubic(8) + fourth * cubic(12))
 }
 
+/// The same without the last four coefficients.
+#[cfg_attr(not(debug_assertions), inline(always))]
+pub(super) fn short_polynomial<S: Simd, V: SimdFloat<S, Element = f32>>(c: &[f32; 16], z: V) -> V {
+    let squared = z * z;
+    let fourth = squared * squared;
+    let cubic = |at: usize| (z * c[at + 1] + c[at]) + squared * (z * c[at + 3] + c[at + 2]);
+    (cubic(0) + fourth * cubic(4)) + (fourth * fourth) * cubic(8)
+}
+
 #[cfg(test)]
 mod tests {
     use fearless_simd::{Level, dispatch};

@@ -1,14 +1,14 @@
-//! What pixels see between two planes, classified and shaded there (SPEC §9): the sheet of a slab, eight pixels at a time.
+//! The field between two planes, classified and shaded there (SPEC §9): it gives the sheet of a slab, eight pixels at a time.
 
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 use glam::DVec3;
 
 use super::frame::Frame;
-use super::planes::{CHANNELS, Planes};
+use super::planes::{CHANNELS, Planes, STRIDE};
 use crate::cpu::cull::{OpenMask, columns_between};
 use crate::cpu::cut::TileRays;
-use crate::cpu::sheets::{Buffers, COLUMNS, STRIDE, slot_of};
+use crate::cpu::sheets::{Buffers, COLUMNS, slot_of};
 use crate::cpu::vector::LANES;
 use crate::settings::shading::Gradient;
 use crate::settings::splatting::Compositing;
@@ -28,7 +28,7 @@ pub(super) struct Sample<S: Simd> {
     pub(super) has_value: u32,
 }
 
-/// What eight pixels see of a slab.
+/// The field of eight pixels in a slab.
 pub(super) struct Slab<S: Simd> {
     /// k.
     pub(super) number: i32,
@@ -36,7 +36,7 @@ pub(super) struct Slab<S: Simd> {
     pub(super) lanes: u32,
     /// f0 and f1, as numbers.
     pub(super) values: [f32x8<S>; 2],
-    /// The same of ∇f, numbers per world unit.
+    /// ∇f there, numbers per world unit.
     pub(super) gradients: [[f32x8<S>; 3]; 2],
 }
 
@@ -51,7 +51,7 @@ pub(super) struct Looks<'a> {
 }
 
 impl<'a> Looks<'a> {
-    /// Those of a tile, given its first pixel; `to_eye` is empty where pixels do not differ.
+    /// The rays of a tile, given its first pixel; `to_eye` is empty if all pixels share one direction.
     pub(super) fn new(origin: [usize; 2], rays: &'a TileRays, to_eye: &'a [[[f32; COLUMNS]; 3]]) -> Self {
         let to_eye = (!to_eye.is_empty()).then_some(to_eye);
         Self { origin, rays, shown: rays.shown.as_deref().unwrap_or_default(), to_eye }
@@ -72,7 +72,7 @@ impl<'a> Looks<'a> {
         })
     }
 
-    /// The middles of what eight pixels see of a slab, in slabs.
+    /// The middles of the stretches of eight rays in a slab, in slabs.
     fn middles(&self, slab: i32, [column, row]: [usize; 2]) -> [f64; LANES] {
         let begin = self.rays.begin(slab);
         let [starts, ends] = &self.shown[row];
@@ -82,7 +82,7 @@ impl<'a> Looks<'a> {
 }
 
 impl Frame<'_> {
-    /// Classifies the slab between a plane and the next one, into slot 0 of the sheets. The length of rays is left out.
+    /// Classifies the slab between a plane and the next one, into the sheet. The length of rays is left out.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn classify<S: Simd>(
         &self,
@@ -110,8 +110,8 @@ impl Frame<'_> {
                 if self.compositing == Compositing::Surface {
                     let found = self.find_surfaces(simd, &slab, looks, [column, row], buffers);
                     open.close(row, found << column);
-                } else if self.sheet(simd, &slab, looks, [column, row], &mut buffers.sheets[row][0]) {
-                    buffers.written[0] |= 1 << row;
+                } else if self.sheet(simd, &slab, looks, [column, row], &mut buffers.sheet.rows[row]) {
+                    buffers.sheet.written |= 1 << row;
                 }
             }
         }
@@ -120,7 +120,7 @@ impl Frame<'_> {
         }
     }
 
-    /// What eight pixels see of a slab; `None` where none of its values has an opacity.
+    /// The field of eight pixels in a slab; `None` if none of its values has an opacity.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn slab<S: Simd>(
         &self,
@@ -161,7 +161,7 @@ impl Frame<'_> {
         slab: &Slab<S>,
         looks: &Looks<'_>,
         [column, row]: [usize; 2],
-        sheet: &mut [[f32; STRIDE]; 4],
+        sheet: &mut [[f32; COLUMNS]; 4],
     ) -> bool {
         let at = [looks.origin[0] + column, looks.origin[1] + row];
         let middles = self.labels.then(|| looks.middles(slab.number, [column, row]));
@@ -227,7 +227,8 @@ impl Frame<'_> {
         (at, number): ([usize; 2], i32),
     ) -> Sample<S> {
         let load = |channel: &[f32; STRIDE]| f32x8::from_slice(simd, &channel[column..column + LANES]);
-        let sums: [f32x8<S>; CHANNELS] = std::array::from_fn(|channel| load(&plane[channel]));
+        let [n, f, x, y, z, ca, cb, ct] = plane;
+        let sums = [load(n), load(f), load(x), load(y), load(z), load(ca), load(cb), load(ct)];
         let has_value = sums[0].simd_ge(f32x8::splat(simd, MIN_WEIGHT));
         let one = f32x8::splat(simd, 1.0);
         let per_weight = one / has_value.select(sums[0], one);

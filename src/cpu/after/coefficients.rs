@@ -1,4 +1,4 @@
-//! What the voxels of a volume are splatted as where classification comes after (SPEC §9), and which of them.
+//! The numbers that voxels are splatted as where classification comes after splatting (SPEC §9), and the choice of voxels.
 
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ use crate::volume::Volume;
 /// The coefficients of a volume, and the bricks that its last frame drew.
 #[derive(Clone, Debug)]
 pub(in crate::cpu) struct Coefficients {
-    /// As what numbers they are splatted.
+    /// The map from coefficients to the numbers that are splatted.
     pub(super) numbers: Normalization,
     /// Of `interpolation = "exact"`; else they are the values.
     exact: Option<Arc<[f32]>>,
@@ -38,7 +38,7 @@ struct Shown {
     /// How far around a brick its test looked, voxels.
     reach: UVec3,
     bricks: BrickList,
-    /// All that are no holes, where what is chosen may have no opacity.
+    /// The bricks of all voxels but holes, for compositings that may choose a value without an opacity.
     all: Option<BrickList>,
 }
 
@@ -100,7 +100,7 @@ impl Coefficients {
         }
     }
 
-    /// The bricks that may be drawn in the last view that was looked at, and those that are.
+    /// For the last view that was looked at, the bricks whose values can meet an opacity, and the bricks that are drawn.
     pub(super) fn bricks(&self) -> [&[Brick]; 2] {
         self.shown
             .as_ref()

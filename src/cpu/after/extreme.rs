@@ -1,4 +1,4 @@
-//! `maximum`, `minimum` and `average` after splatting (SPEC §9): one value per pixel is chosen from those on the planes, and that is classified.
+//! `maximum`, `minimum` and `average` after splatting (SPEC §9): one value per pixel is chosen from its values on the planes, and classified.
 
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
@@ -10,7 +10,7 @@ use crate::cpu::sheets::{Buffers, COLUMNS, ROWS, slot_of};
 use crate::cpu::vector::LANES;
 use crate::settings::splatting::Compositing;
 
-/// What is kept of a row's pixels: the number, the gradient, and where among slabs; a weight that is 0 where there is nothing.
+/// The choice of a row's pixels: number, gradient, and place among slabs; the weight is 0 where nothing was chosen.
 #[derive(Clone, Copy, Debug)]
 struct Kept {
     number: [f32; COLUMNS],

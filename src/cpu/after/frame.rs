@@ -1,4 +1,4 @@
-//! What a frame's tiles share where classification comes after splatting, and the frame.
+//! A frame where classification comes after splatting: the data that its tiles share, and its tiles drawn on all cores.
 
 use std::ops::Range;
 
@@ -40,7 +40,7 @@ pub(in crate::cpu) struct Frame<'a> {
     pub(super) transfer: &'a TransferFunction,
     pub(super) coefficients: &'a Coefficients,
     pub(super) bricks: &'a [Brick],
-    /// Those of them whose values can meet an opacity.
+    /// The bricks among them whose values can meet an opacity.
     shown: &'a [Brick],
     pub(super) placement: Placement,
     pub(super) splatter: Splatter,
@@ -208,7 +208,7 @@ fn min_moment(radius: f64, range: [f32; 2]) -> f32 {
     8.0 * f32::EPSILON * radius as f32 * range[0].abs().max(range[1].abs())
 }
 
-/// What pixels' rays count in: the box of voxel cells, beyond the near plane, within the cuts.
+/// The half spaces within which pixels' rays count: the box of voxel cells, beyond the near plane, within the cuts.
 fn kept(view: &ViewGeometry, scene: &Scene, volume: &Volume) -> Vec<HalfSpace> {
     let grid = volume.grid();
     let half = (grid.center() + 0.5) * grid.aspect();

@@ -7,7 +7,9 @@ use rayon::prelude::*;
 
 use crate::cpu::bin::Placed;
 use crate::cpu::project::floor;
+use crate::cpu::queue::{BySlot, NO_SHEET};
 use crate::cpu::sheets::{COLUMNS, ROWS};
+use crate::cpu::vector::LANES;
 use crate::geometry::plane_geometry::PlaneGeometry;
 use crate::geometry::slab;
 use crate::geometry::view_geometry::ViewGeometry;
@@ -16,7 +18,7 @@ use crate::lists::brick::Brick;
 use crate::lists::brick::{self, BRICK_VOXELS};
 use crate::volume::Grid;
 
-/// Pixels around boxes, for what f32 rounds.
+/// Pixels around boxes, for rounding in f32.
 const SLACK: f64 = 0.02;
 
 /// Where a voxel is. Planes are counted: plane k is at depth k.
@@ -47,13 +49,16 @@ pub(super) struct Placement {
     pub(super) per_plane: f64,
     /// Planes that a kernel reaches to either side of its voxel.
     reach: f64,
-    places: Vec<Place>,
+    /// Where the voxels of a brick are, from its first place, by slot.
+    x: BySlot<f64>,
+    y: BySlot<f64>,
+    depth: BySlot<f64>,
     /// Of the planes that the volume's kernels reach, from the first on; without an eye of one, as all are the same.
     maps: Vec<PlaneMap>,
     first_map: i32,
 }
 
-/// A box on the screen, pixels: least and greatest.
+/// A box on the screen, pixels: its min and max corner.
 pub(super) type ScreenBox = [DVec2; 2];
 
 impl Placement {
@@ -61,23 +66,21 @@ impl Placement {
         let geometry = PlaneGeometry::new(&view, grid);
         let per_plane = geometry.per_depth * view.slabs.width;
         let reach = view.radius / per_plane;
-        let (places, maps) = (Vec::new(), Vec::new());
-        let mut placement = Self { geometry, reach, per_plane, view, places, maps, first_map: 0 };
-        placement.places = (0..BRICK_VOXELS).map(|slot| placement.offset(brick::in_brick(slot).as_dvec3())).collect();
+        let offset = |row: usize, slot: usize| {
+            view.screen_from_voxel[row].truncate().dot(brick::in_brick(slot as u32).as_dvec3())
+        };
+        let [x, y] = [0, 1].map(|row| std::array::from_fn(|slot| offset(row, slot)));
+        let depth = std::array::from_fn(|slot| offset(2, slot) / view.slabs.width);
+        let mut placement = Self { geometry, reach, per_plane, view, x, y, depth, maps: Vec::new(), first_map: 0 };
         let (middle, half) = (grid.center(), grid.center());
         let Place { depth, .. } = placement.of(middle);
         let spread = view.screen_from_voxel[2].truncate().abs().dot(half) / view.slabs.width;
-        // A plane more on either side, for what is rounded.
+        // One more plane on either side, for rounding.
         let planes = placement.planes(depth - spread - 1.0..depth + spread + 1.0);
         let planes = if view.perspective.is_some() { planes } else { 0..1 };
         placement.maps = planes.clone().map(|plane| placement.new_map(plane)).collect();
         placement.first_map = planes.start;
         placement
-    }
-
-    fn offset(&self, voxels: DVec3) -> Place {
-        let [x, y, depth, _] = self.view.screen_from_voxel.map(|row| row.truncate().dot(voxels));
-        Place { at: DVec2::new(x, y), depth: depth / self.view.slabs.width }
     }
 
     fn of(&self, voxel: DVec3) -> Place {
@@ -92,11 +95,40 @@ impl Placement {
 
     /// Where one of a brick's voxels is.
     pub(super) fn of_voxel(&self, brick: Place, slot: u32) -> Place {
-        let Place { at, depth } = self.places[slot as usize];
-        Place { at: brick.at + at, depth: brick.depth + depth }
+        let slot = slot as usize;
+        Place { at: brick.at + DVec2::new(self.x[slot], self.y[slot]), depth: brick.depth + self.depth[slot] }
+    }
+
+    /// Without an eye, pixel coordinates of a brick's voxels in eight slots, from the first on, in a tile given by its first pixel. The centre of
+    /// that is at 0, 0.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn centers(&self, brick: Place, first: usize, origin: [usize; 2]) -> [[f32; LANES]; 2] {
+        let middle = self.middle();
+        let (shift_x, shift_y) = (middle.x - 0.5 - origin[0] as f64, middle.y - 0.5 - origin[1] as f64);
+        let (x, y) = (&self.x[first..first + LANES], &self.y[first..first + LANES]);
+        let mut centers = [[0.0; LANES]; 2];
+        let [columns, rows] = &mut centers;
+        for ((column, row), (x, y)) in columns.iter_mut().zip(rows).zip(x.iter().zip(y)) {
+            *column = (brick.at.x + x + shift_x) as f32;
+            *row = (brick.at.y + y + shift_y) as f32;
+        }
+        centers
+    }
+
+    /// The first planes of voxels in all slots of a brick; [`NO_SHEET`] for none.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn first_planes(&self, brick: Place) -> BySlot<i32> {
+        let mut firsts = [NO_SHEET; BRICK_VOXELS as usize];
+        for (first, offset) in firsts.iter_mut().zip(&self.depth) {
+            let depth = brick.depth + offset;
+            let planes = self.planes(depth..depth);
+            *first = if planes.start < planes.end { planes.start } else { NO_SHEET };
+        }
+        firsts
     }
 
     /// The planes nearer than a kernel's radius to voxels between two depths. At the eye and behind it there are none.
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn planes(&self, depths: Range<f64>) -> Range<i32> {
         let first = floor(depths.start - self.reach + slab::ROUNDING) + 1;
         let end = -floor(-(depths.end + self.reach - slab::ROUNDING));
@@ -126,6 +158,12 @@ impl Placement {
         let squared = along * along + across * across;
         let half_box = DVec2::new(squared.x.sqrt(), squared.y.sqrt()) + SLACK;
         PlaneMap { from_eye, a, b, half_box }
+    }
+
+    /// Half the box around kernels, pixels, where it is the same on all planes.
+    pub(super) fn flat_half_box(&self) -> Option<[f32; 2]> {
+        let half_box = || self.map(0).half_box.to_array().map(|half| half as f32);
+        self.view.perspective.is_none().then(half_box)
     }
 
     /// Where on the image the point of a plane lies that is nearest to a voxel.

@@ -1,6 +1,10 @@
 //! A tile's plane buffers: a ring of planes onto which values, weights and gradients are splatted (SPEC §9).
 
-use crate::cpu::sheets::{RING, ROWS, STRIDE};
+use crate::cpu::sheets::{COLUMNS, RING, ROWS};
+use crate::cpu::vector::LANES;
+
+/// Numbers along a row of a plane, with room for a vector that starts within the tile and ends outside.
+pub(super) const STRIDE: usize = COLUMNS + LANES;
 
 /// Sums that a plane holds for every pixel: N and Σc·g, and then Σd·g, or for the kernel's gradient Σa·g, Σb·g, Σt·g and
 /// Σc·a·g, Σc·b·g, Σc·t·g, with (a, b, t) the offset along two axes in the plane and along its normal.

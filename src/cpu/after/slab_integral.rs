@@ -18,19 +18,19 @@ use crate::volume::Volume;
 pub(super) struct Table {
     points: Vec<[f32; 4]>,
     cells: usize,
-    /// The least and the greatest number with an opacity.
+    /// The min and the max number with an opacity.
     shown: [f32; 2],
-    /// The least number, bins per number, the greatest number.
+    /// The min number, bins per number, the max number.
     bins: [f32; 4],
 }
 
-/// The tables of a transfer function: that of labels without tables of their own, and those of labels.
+/// The tables of a transfer function: one for all labels without tables of their own, and one for each other label.
 #[derive(Clone, Debug)]
 pub(super) struct Integrals {
     is_optical_depth: bool,
     plain: Table,
     labels: BTreeMap<u16, Table>,
-    /// The least and the greatest number with an opacity in any of them.
+    /// The min and the max number with an opacity in any of them.
     pub(super) shown: [f32; 2],
 }
 
@@ -123,7 +123,7 @@ impl Integrals {
         Self { is_optical_depth: compositing == Compositing::Exponential, plain, labels, shown }
     }
 
-    /// The table that a label's voxels go by.
+    /// The table for the voxels of a label.
     pub(super) fn table(&self, label: Option<u16>) -> &Table {
         label.and_then(|label| self.labels.get(&label)).unwrap_or(&self.plain)
     }

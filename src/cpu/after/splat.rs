@@ -9,9 +9,9 @@ use fearless_simd::prelude::*;
 use glam::DVec2;
 
 use super::place::{Place, Placement};
-use super::planes::{PlaneRow, Planes};
+use super::planes::{PlaneRow, Planes, STRIDE};
 use crate::cpu::cull::{OpenMask, Pixels, columns_between};
-use crate::cpu::sheets::{COLUMNS, RING, SECTIONS, STRIDE, slot_of};
+use crate::cpu::sheets::{COLUMNS, RING, SECTIONS, slot_of};
 use crate::cpu::vector::{LANES, exp2, iota};
 use crate::settings::shading::Gradient;
 
@@ -21,6 +21,9 @@ pub(super) struct Splat {
     /// Which voxel: its brick's number and its place there.
     pub(super) voxel: [u32; 2],
     pub(super) place: Place,
+    /// Without an eye its pixel coordinates, the centre of the tile's first pixel at 0, 0, and the pixels that it may reach.
+    pub(super) center: [f32; 2],
+    pub(super) pixels: Option<Pixels>,
     /// c.
     pub(super) number: f32,
     /// d, for [`Gradient::Differences`].
@@ -59,7 +62,7 @@ struct OnPlanes<'a> {
     slot: usize,
 }
 
-/// What all splats of a frame have in common.
+/// The data that all splats of a frame share.
 #[derive(Clone, Debug)]
 pub(super) struct Splatter {
     /// From ρ² to the exponent of 2 of the Gaussian.
@@ -90,7 +93,7 @@ impl Splatter {
             per_plane: placement.per_plane as f32,
             gradient,
             is_perspective,
-            // A little less, for what f32 rounds.
+            // Slightly less, because f32 rounds.
             row_metric: ((1.0 - 1e-5) * row_metric) as f32,
         }
     }
@@ -140,12 +143,14 @@ impl Splatter {
     ) -> bool {
         let plane = splat.planes[0] + on[0] as i32;
         let map = placement.map(plane);
-        let to_plane = if self.is_perspective { placement.to_plane(splat.place, plane) } else { 0.0 };
-        let pixel = placement.center(splat.place, to_plane, map);
-        let center = [pixel.x - origin[0] as f64 - 0.5, pixel.y - origin[1] as f64 - 0.5].map(|at| at as f32);
         let in_f32 = |v: DVec2| [v.x as f32, v.y as f32];
-        let pixels = Pixels::within(center, in_f32(map.half_box)).filter(|pixels| open.sees(pixels));
-        let Some(pixels) = pixels else { return false };
+        let (mut center, mut pixels) = (splat.center, splat.pixels);
+        if self.is_perspective {
+            let pixel = placement.center(splat.place, placement.to_plane(splat.place, plane), map);
+            center = [pixel.x - origin[0] as f64 - 0.5, pixel.y - origin[1] as f64 - 0.5].map(|at| at as f32);
+            pixels = Pixels::within(center, in_f32(map.half_box));
+        }
+        let Some(pixels) = pixels.filter(|pixels| open.sees(pixels)) else { return false };
         let footprint = Footprint { center, a: in_f32(map.a), b: in_f32(map.b) };
         let on_planes = OnPlanes { footprint: &footprint, along, planes: on, slot };
         let written = self.draw_box(simd, splat, &on_planes, &pixels, open, planes);

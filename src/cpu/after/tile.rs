@@ -2,7 +2,6 @@
 //! reach, every voxel waits for its own first plane and is splatted onto all that its kernel reaches, unless opaque pixels hide it; then the slab
 //! before the current plane is classified and composited.
 
-use std::collections::VecDeque;
 use std::iter::Peekable;
 
 use fearless_simd::Simd;
@@ -14,17 +13,17 @@ use super::place::{Place, ScreenBox};
 use super::planes::Planes;
 use super::splat::Splat;
 use crate::cpu::bin::Placed;
-use crate::cpu::count::Tally;
-use crate::cpu::cull::{OpenMask, Pixels};
+use crate::cpu::count::{Tally, bits};
+use crate::cpu::cull::{Boxes, OpenMask, Pixels};
 use crate::cpu::cut::TileRays;
+use crate::cpu::queue::{Queue, Waiting};
 use crate::cpu::sheets::{Buffers, COLUMNS, RING, ROWS, SECTIONS, slot_of};
+use crate::cpu::vector::LANES;
 use crate::lists::brick;
+use crate::lists::brick::BRICK_VOXELS;
 use crate::settings::splatting::Compositing;
 
-/// A voxel that waits for its first plane: which of the bricks that arrived, and its place there.
-type Waiting = (u32, u8);
-
-/// What a thread draws tiles with, one after the other.
+/// The state with which a thread draws one tile after another.
 pub(super) struct TileWalk<'a> {
     frame: &'a Frame<'a>,
     /// The tile's first pixel.
@@ -36,12 +35,10 @@ pub(super) struct TileWalk<'a> {
     buffers: Buffers,
     chosen: Chosen,
     arrived: Vec<(u32, Place)>,
-    /// By plane, from the current one on.
-    waiting: VecDeque<Vec<Waiting>>,
+    queue: Queue,
     /// Voxels that reach more planes than are drawn at a time, by the slot of the plane that is their next.
     continued: [Vec<Splat>; RING],
-    /// Emptied lists.
-    spare: Vec<Vec<Waiting>>,
+    /// The number of those.
     pending: usize,
     tally: Tally,
 }
@@ -58,15 +55,14 @@ impl<'a> TileWalk<'a> {
             buffers: Buffers::new(),
             chosen: Chosen::new(frame.compositing),
             arrived: Vec::new(),
-            waiting: VecDeque::new(),
+            queue: Queue::default(),
             continued: std::array::from_fn(|_| Vec::new()),
-            spare: Vec::new(),
             pending: 0,
             tally: Tally::default(),
         }
     }
 
-    /// Draws a tile, given its first pixel and its bricks by first plane: what its buffers hold then, and how its pixels look at slabs.
+    /// Draws a tile, given its first pixel and its bricks by first plane. Returns its filled buffers and how its rays meet slabs.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn draw<S: Simd>(
         &mut self,
@@ -101,7 +97,7 @@ impl<'a> TileWalk<'a> {
         (0..RING).for_each(|slot| self.planes.clear(slot));
         self.chosen.clear();
         self.arrived.clear();
-        self.spare.extend(self.waiting.drain(..));
+        self.queue.clear();
         self.continued.iter_mut().for_each(Vec::clear);
         self.pending = 0;
     }
@@ -111,7 +107,7 @@ impl<'a> TileWalk<'a> {
         let mut plane = first;
         loop {
             while let Some(placed) = bricks.next_if(|placed| placed.first <= plane) {
-                self.tally.bricks_visited += u64::from(self.arrive(placed, plane));
+                self.tally.bricks_visited += u64::from(self.arrive(simd, placed, plane));
             }
             self.start(simd, plane);
             self.composite(simd, plane - 1);
@@ -119,7 +115,8 @@ impl<'a> TileWalk<'a> {
             if self.open.is_closed() {
                 break;
             }
-            let is_idle = self.pending == 0 && self.planes.written == [0; RING];
+            let is_waiting = self.pending != 0 || !self.queue.is_empty();
+            let is_idle = !is_waiting && self.planes.written == [0; RING];
             plane = match bricks.peek() {
                 Some(placed) if is_idle => placed.first.max(plane + 1),
                 None if is_idle => break,
@@ -141,12 +138,13 @@ impl<'a> TileWalk<'a> {
             return;
         }
         let begin = rays.begin(slab);
-        let is_composited = frame.compositor.composite(simd, buffers, 0, (rays, begin), open);
+        let is_composited = frame.compositor.composite(simd, buffers, (rays, begin), open);
         tally.sheets_composited += u64::from(is_composited && frame.touched.contains(&slab));
     }
 
     /// Lets a brick's voxels wait for their first planes, unless the brick is hidden; whether it is not.
-    fn arrive(&mut self, placed: &Placed, plane: i32) -> bool {
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn arrive<S: Simd>(&mut self, simd: S, placed: &Placed, plane: i32) -> bool {
         let placement = &self.frame.placement;
         let brick = &self.frame.bricks[placed.brick as usize];
         let is_seen = |bounds: ScreenBox| self.pixels(bounds).is_some_and(|pixels| self.open.sees(&pixels));
@@ -156,22 +154,8 @@ impl<'a> TileWalk<'a> {
         let place = placement.of_brick(brick);
         let number = self.arrived.len() as u32;
         self.arrived.push((placed.brick, place));
-        for (slot, _) in brick::voxels(brick) {
-            let depth = placement.of_voxel(place, slot).depth;
-            let planes = placement.planes(depth..depth);
-            if planes.is_empty() {
-                continue;
-            }
-            let ahead = (planes.start - plane).max(0) as usize;
-            while self.waiting.len() <= ahead {
-                self.waiting.push_back(self.spare.pop().map_or_else(Vec::new, |mut list| {
-                    list.clear();
-                    list
-                }));
-            }
-            self.waiting[ahead].push((number, slot as u8));
-            self.pending += 1;
-        }
+        let waiting = Waiting { brick: number, voxels: brick::present(brick) };
+        self.queue.add(simd, waiting, &placement.first_planes(place), plane);
         true
     }
 
@@ -182,7 +166,7 @@ impl<'a> TileWalk<'a> {
         Pixels::within(center.map(|at| at as f32), half.to_array().map(|half| half as f32))
     }
 
-    /// Draws what starts at a plane, or goes on there.
+    /// Draws the voxels that start or continue at a plane.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn start<S: Simd>(&mut self, simd: S, plane: i32) {
         let continued = std::mem::take(&mut self.continued[slot_of(plane)]);
@@ -190,21 +174,51 @@ impl<'a> TileWalk<'a> {
         for splat in &continued {
             self.draw_splat(simd, splat);
         }
-        let Some(starting) = self.waiting.pop_front() else { return };
-        self.pending -= starting.len();
-        let Frame { placement, bricks, coefficients, volume, .. } = self.frame;
-        for &(number, slot) in &starting {
-            let (brick, place) = self.arrived[number as usize];
-            let place = placement.of_voxel(place, slot.into());
-            let planes = placement.planes(place.depth..place.depth);
-            let voxel = brick::origin(&bricks[brick as usize]) + brick::in_brick(slot.into());
-            let (number, gradient) = coefficients.voxel(volume, voxel);
-            self.draw_splat(
-                simd,
-                &Splat { voxel: [brick, slot.into()], place, number, gradient, planes: [plane, planes.end], drawn: 0 },
-            );
+        let Some(starting) = self.queue.advance() else { return };
+        for &waiting in &starting {
+            self.start_voxels(simd, waiting, plane);
         }
-        self.spare.push(starting);
+        self.queue.reuse(starting);
+    }
+
+    /// Draws voxels of a brick, if they are seen.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn start_voxels<S: Simd>(&mut self, simd: S, waiting: Waiting, plane: i32) {
+        let Frame { placement, bricks, coefficients, volume, .. } = self.frame;
+        let (number, brick_place) = self.arrived[waiting.brick as usize];
+        let origin = brick::origin(&bricks[number as usize]);
+        // With an eye every plane has its own footprint, which is tested when it is drawn.
+        let half_box = placement.flat_half_box();
+        for first in (0..BRICK_VOXELS as usize).step_by(LANES) {
+            let lanes = waiting.voxels >> first & 0xff;
+            if lanes == 0 {
+                continue;
+            }
+            let centers = placement.centers(brick_place, first, self.origin);
+            let boxes = Boxes::within(simd, &centers, half_box.unwrap_or_default());
+            for lane in bits(lanes) {
+                let lane = lane as usize;
+                let pixels = boxes.pixels(lane).filter(|pixels| self.open.sees(pixels));
+                if half_box.is_some() && pixels.is_none() {
+                    continue;
+                }
+                let slot = (first + lane) as u32;
+                let place = placement.of_voxel(brick_place, slot);
+                let end = placement.planes(place.depth..place.depth).end;
+                let (c, gradient) = coefficients.voxel(volume, origin + brick::in_brick(slot));
+                let splat = Splat {
+                    voxel: [number, slot],
+                    place,
+                    center: [centers[0][lane], centers[1][lane]],
+                    pixels,
+                    number: c,
+                    gradient,
+                    planes: [plane, end],
+                    drawn: 0,
+                };
+                self.draw_splat(simd, &splat);
+            }
+        }
     }
 
     /// Draws a voxel's next planes, if they are seen, and keeps it if there are more.
