@@ -106,7 +106,6 @@ mod after;
 pub mod appearance;
 #[cfg(feature = "cpu")]
 pub mod cpu;
-mod device_error;
 mod error;
 mod geometry;
 #[cfg(feature = "golden")]
@@ -115,6 +114,7 @@ pub mod golden;
 mod gpu;
 pub mod headless;
 pub mod image;
+mod kernel;
 mod lists;
 #[cfg(feature = "gpu")]
 mod pass;
@@ -124,36 +124,40 @@ mod rasterizer;
 mod reference;
 #[cfg(feature = "gpu")]
 mod renderer;
+mod rendering;
 pub mod scene;
-mod setting_error;
 pub mod settings;
 pub mod stats;
 pub mod volume;
 
-pub use device_error::{DeviceError, InsufficientLimit};
 pub use error::RenderError;
+#[cfg(feature = "gpu")]
+pub use error::device::DeviceFault;
+pub use error::device::{DeviceError, InsufficientLimit};
+pub use error::setting::SettingError;
 #[cfg(feature = "gpu")]
 pub use geometry::surfaces::{SurfaceDepths, Surfaces};
 #[cfg(feature = "gpu")]
+pub use gpu::counts::PendingCounts;
+#[cfg(feature = "gpu")]
 pub use gpu::device::DeviceRequirements;
 #[cfg(feature = "gpu")]
-pub use gpu::fault::{DeviceFault, scoped};
+pub use gpu::fault::scoped;
 #[cfg(feature = "gpu")]
 pub use gpu::gpu_volume::GpuVolume;
+#[cfg(feature = "gpu")]
+pub use gpu::options::{Blend, RendererOptions};
+#[cfg(feature = "gpu")]
+pub use gpu::placement::Placement;
 pub use image::Image;
 pub use pick::Pick;
 #[cfg(feature = "gpu")]
 pub use renderer::Renderer;
 #[cfg(feature = "gpu")]
-pub use renderer::options::{Blend, RendererOptions};
-#[cfg(feature = "gpu")]
 pub use renderer::pick::PendingPick;
-#[cfg(feature = "gpu")]
-pub use renderer::placement::Placement;
 #[cfg(feature = "gpu")]
 pub use renderer::scene_view::{Prepared, SceneView};
 pub use scene::Scene;
-pub use setting_error::SettingError;
 pub use settings::Camera;
 pub use stats::Stats;
 pub use volume::Volume;
@@ -166,11 +170,16 @@ pub use wgpu;
 /// without notice.
 #[doc(hidden)]
 pub mod internals {
-    pub use crate::geometry::{footprint, grid_warp, kernel, means, slab, view_geometry};
+    pub use crate::geometry::{footprint, grid_warp, means, slab, view_geometry};
     pub use crate::lists::{brick, bucket, classify, iso_range, patch_bins, quad_plan, value_list};
     pub use crate::settings::camera::{Eye, ViewBasis};
     pub use crate::settings::clip::ClippedVoxels;
     pub use crate::settings::shading::MIN_GRADIENT;
+
+    /// The reconstruction kernel.
+    pub mod kernel {
+        pub use crate::kernel::Kernel;
+    }
 
     /// Classification after splatting.
     pub mod after {

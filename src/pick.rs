@@ -2,9 +2,9 @@
 
 use glam::{DVec2, DVec3, UVec3};
 
+use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::scene::ImageSettings;
-use crate::setting_error::SettingError;
 use crate::volume::Volume;
 
 /// A point of a volume.

@@ -4,9 +4,6 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-#[cfg(feature = "gpu")]
-pub use crate::renderer::counts::{GroupSlabs, PendingCounts, Totals};
-
 /// Milliseconds per stage.
 pub type StageTimes = BTreeMap<&'static str, f64>;
 

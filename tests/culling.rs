@@ -209,6 +209,7 @@ fn the_parallelogram_hides_more() {
 fn the_papers_simpler_tests() {
     let volume = builtin::volume("head:48").unwrap();
     let mut scene = Scene::new(VolumeSource::Builtin("head:48".to_owned()));
+    scene.splatting = Splatting::default();
     scene.camera = Camera::default();
     (scene.image.width, scene.image.height) = (96, 96);
     scene.camera.projection = Projection::Orthographic { height: Some(172.0) };
@@ -235,6 +236,7 @@ fn what_the_rectangle_costs() {
     ] {
         let volume = volume.clone().with_spacing("head", DVec3::from(spacing)).unwrap();
         let mut scene = Scene::new(VolumeSource::Builtin("head:40".to_owned()));
+        scene.splatting = Splatting::default();
         scene.camera = Camera::default();
         scene.camera.direction = DVec3::from(direction);
         scene.camera.up = DVec3::new(0.3, 0.1, 1.0);
@@ -265,6 +267,7 @@ fn tiles_and_the_bounding_box() {
     };
     let areas = |voxels: &[UVec3]| {
         let mut scene = Scene::new(VolumeSource::Builtin("cube".to_owned()));
+        scene.splatting = Splatting::default();
         scene.camera = Camera::default();
         scene.camera.direction = DVec3::Y;
         scene.camera.projection = Projection::Orthographic { height: Some(100.0) };
@@ -292,6 +295,7 @@ fn tiles_and_the_bounding_box() {
 fn profiled_frames() {
     let volume = builtin::volume("head:64").unwrap();
     let mut scene = Scene::new(VolumeSource::Builtin("head:64".to_owned()));
+    scene.splatting = Splatting::default();
     scene.camera = Camera::default();
     (scene.image.width, scene.image.height) = (40, 40);
     scene.splatting.slab_width = 0.05;

@@ -5,12 +5,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use sheetsplat::DeviceError;
+use sheetsplat::PendingCounts;
 use sheetsplat::PendingPick;
 use sheetsplat::Surfaces;
 use sheetsplat::headless::{GpuHeadless, Rendering};
 use sheetsplat::image::Image;
 use sheetsplat::settings::Clip;
-use sheetsplat::stats::{PendingCounts, Stats};
+use sheetsplat::stats::Stats;
 use sheetsplat::{
     Camera, DeviceRequirements, GpuVolume, Placement, Renderer, RendererOptions, Scene, SceneView, Volume,
 };

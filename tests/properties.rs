@@ -12,15 +12,15 @@ use sheetsplat::image::Image;
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::Projection;
-use sheetsplat::settings::{Compositing, Order, Rasterizer};
+use sheetsplat::settings::{Compositing, Order};
 use sheetsplat::volume::{Volume, builtin};
 
 use common::compare::{assert_at_most, largest};
 use common::images::largest_difference;
-use common::{COMPOSITINGS, F16, F32, FORMS, RASTERIZERS, Random, camera, gpu, scene, transfer};
+use common::{COMPOSITINGS, DRAWINGS, Drawing, F16, F32, Random, camera, drawn_forms, gpu, scene, transfer};
 
-fn render(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> (Image, u64) {
-    let rendering = gpu.render_volume(volume.clone(), scene).unwrap();
+fn render(drawing: Drawing, gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> (Image, u64) {
+    let rendering = drawing.render(gpu, volume, scene);
     (rendering.image, rendering.stats.counts.sheets)
 }
 
@@ -60,12 +60,11 @@ fn empty_volume_is_exactly_the_background() {
                 scene.image.background = background;
                 let [r, g, b, a] = background;
                 let expected = [r * a, g * a, b * a, a].map(|channel| channel as f32);
-                for rasterizer in RASTERIZERS {
-                    scene.splatting.rasterizer = rasterizer;
-                    let (image, _) = render(&gpu, &volume, &scene);
+                for drawing in DRAWINGS {
+                    let (image, _) = render(drawing, &gpu, &volume, &scene);
                     assert!(
                         image.pixels.iter().all(|pixel| *pixel == expected),
-                        "{rasterizer:?} {compositing:?} {order:?} {background:?} {center}"
+                        "{drawing:?} {compositing:?} {order:?} {background:?} {center}"
                     );
                 }
             }
@@ -124,7 +123,7 @@ impl UniformSlab {
         }
     }
 
-    fn check(&self, gpu: &GpuHeadless, rasterizer: Rasterizer, direction: DVec3, slab_width: f64) {
+    fn check(&self, gpu: &GpuHeadless, drawing: Drawing, direction: DVec3, slab_width: f64) {
         const SIZE: u32 = 48;
         let volume = self.volume();
         let mut scene = scene(SIZE, SIZE);
@@ -135,10 +134,10 @@ impl UniformSlab {
         scene.image.background = [0.0; 4];
         scene.shading.enabled = false;
         scene.transfer = transfer(&[(0.0, [0.2, 0.5, 0.9])], &[(0.0, Self::OPACITY)]);
-        (scene.splatting.rasterizer, scene.splatting.compositing) = (rasterizer, Compositing::Exponential);
+        scene.splatting.compositing = Compositing::Exponential;
         scene.splatting.slab_width = slab_width;
         self.assert_shows_no_border(&volume, &scene);
-        let (image, _) = render(gpu, &volume, &scene);
+        let (image, _) = render(drawing, gpu, &volume, &scene);
 
         let expected = self.depth(direction);
         // The mean over whole periods of the lattice: a window without edges suppresses ripples that fit into it several times.
@@ -166,7 +165,7 @@ impl UniformSlab {
 #[test]
 fn uniform_slab_opacity_is_that_of_its_thickness() {
     let gpu = gpu();
-    for rasterizer in RASTERIZERS {
+    for drawing in DRAWINGS {
         let mut random = Random(17);
         for (spacing, axis) in [DVec3::ONE, DVec3::new(1.0, 1.0, 5.0)].into_iter().flat_map(|s| [0, 2].map(|a| (s, a)))
         {
@@ -179,9 +178,9 @@ fn uniform_slab_opacity_is_that_of_its_thickness() {
                         break direction;
                     }
                 };
-                slab.check(&gpu, rasterizer, direction, slab_width);
+                slab.check(&gpu, drawing, direction, slab_width);
             }
-            slab.check(&gpu, rasterizer, DVec3::AXES[axis], 1.0);
+            slab.check(&gpu, drawing, DVec3::AXES[axis], 1.0);
         }
     }
 }
@@ -189,21 +188,21 @@ fn uniform_slab_opacity_is_that_of_its_thickness() {
 #[test]
 fn exponential_alpha_does_not_depend_on_the_slab_width() {
     let gpu = gpu();
-    for (spacing, rasterizer) in [DVec3::ONE, DVec3::new(1.0, 1.0, 5.0)]
+    for (spacing, drawing) in [DVec3::ONE, DVec3::new(1.0, 1.0, 5.0)]
         .into_iter()
-        .flat_map(|spacing| RASTERIZERS.map(|rasterizer| (spacing, rasterizer)))
+        .flat_map(|spacing| DRAWINGS.map(|drawing| (spacing, drawing)))
     {
         let (volume, mut scene) = head();
         let volume = volume.with_spacing("head", spacing).unwrap();
-        (scene.splatting.rasterizer, scene.splatting.compositing) = (rasterizer, Compositing::Exponential);
+        scene.splatting.compositing = Compositing::Exponential;
         // With thinner sheets pixels become opaque at other sheets.
         scene.splatting.culling = false;
         scene.image.background = [0.0; 4];
-        let reference = alpha(&render(&gpu, &volume, &scene).0);
+        let reference = alpha(&render(drawing, &gpu, &volume, &scene).0);
         assert!(reference.iter().any(|alpha| (0.3..0.9).contains(alpha)) && reference.contains(&0.0));
         for slab_width in [0.25, 0.37, 0.5, 2.0, 3.1, 4.0] {
             scene.splatting.slab_width = slab_width;
-            let (image, sheets) = render(&gpu, &volume, &scene);
+            let (image, sheets) = render(drawing, &gpu, &volume, &scene);
             // Planes and depths are f32, below 32 here, so the far plane of a slab and the near plane of the next one leave a gap, or
             // overlap, by up to a step of 2⁻¹⁹. There is one plane per slab width, each attenuated by what lies before it, and two
             // roundings per sheet.
@@ -213,7 +212,7 @@ fn exponential_alpha_does_not_depend_on_the_slab_width() {
             // The errors have either sign and never occur all at once.
             let tolerance = 0.15 * all;
             let worst = largest(alpha(&image).iter().zip(&reference).map(|(a, b)| a - b));
-            assert_at_most(worst, tolerance, format_args!("{rasterizer:?} {slab_width}, spacing {spacing}"));
+            assert_at_most(worst, tolerance, format_args!("{drawing:?} {slab_width}, spacing {spacing}"));
         }
     }
 }
@@ -228,18 +227,20 @@ fn back_to_front_equals_front_to_back() {
     let close = Projection::Perspective { fov_y: 50.0, distance: Some(45.0), near: None };
     let projections = [scene.camera.projection, close];
     let both_ways = COMPOSITINGS.into_iter().filter(|&compositing| compositing != Compositing::Surface);
-    let cases = both_ways.flat_map(|compositing| FORMS.map(|form| (compositing, form)));
-    for ((compositing, form), projection) in cases.flat_map(|case| projections.map(|projection| (case, projection))) {
+    let cases = both_ways.flat_map(|compositing| drawn_forms().map(move |drawn| (compositing, drawn)));
+    for ((compositing, (drawing, form)), projection) in
+        cases.flat_map(|case| projections.map(|projection| (case, projection)))
+    {
         (scene.splatting.compositing, scene.camera.projection) = (compositing, projection);
-        (scene.splatting.rasterizer, scene.splatting.footprint) = form;
+        scene.splatting.footprint = form;
         scene.splatting.order = Order::FrontToBack;
-        let (front_to_back, sheets) = render(&gpu, &volume, &scene);
+        let (front_to_back, sheets) = render(drawing, &gpu, &volume, &scene);
         scene.splatting.order = Order::BackToFront;
-        let (back_to_front, _) = render(&gpu, &volume, &scene);
+        let (back_to_front, _) = render(drawing, &gpu, &volume, &scene);
         let difference = largest_difference(&front_to_back, &back_to_front);
         // Each sheet adds a subtraction, a product and a sum of numbers up to 1, in either order, whose roundings have either sign.
         let tolerance = 0.8 * F32 * sheets as f64;
-        assert_at_most(difference, tolerance, format_args!("{compositing:?} {form:?} {projection:?}"));
+        assert_at_most(difference, tolerance, format_args!("{compositing:?} {drawing:?} {form:?} {projection:?}"));
     }
 }
 
@@ -250,17 +251,19 @@ fn every_run_gives_the_same_bytes() {
     let perspective = Projection::Perspective { fov_y: 60.0, distance: None, near: None };
     let projections = [scene.camera.projection, perspective, perspective];
     let cases = COMPOSITINGS.into_iter().zip(projections.into_iter().cycle());
-    for ((compositing, projection), form) in cases.flat_map(|case| FORMS.map(|form| (case, form))) {
+    for ((compositing, projection), (drawing, form)) in
+        cases.flat_map(|case| drawn_forms().map(move |drawn| (case, drawn)))
+    {
         (scene.splatting.compositing, scene.camera.projection) = (compositing, projection);
-        (scene.splatting.rasterizer, scene.splatting.footprint) = form;
+        scene.splatting.footprint = form;
         let bytes = |gpu: &GpuHeadless| {
-            let (image, _) = render(gpu, &volume, &scene);
+            let (image, _) = render(drawing, gpu, &volume, &scene);
             bytemuck::cast_slice::<_, u8>(image.pixels.as_flattened()).to_vec()
         };
         let image = bytes(&first);
         assert_eq!(image.len(), 96 * 80 * 16);
-        assert!(image == bytes(&first), "{compositing:?} {form:?} {projection:?}, on the same device");
-        assert!(image == bytes(&second), "{compositing:?} {form:?} {projection:?}, on a new device");
+        assert!(image == bytes(&first), "{compositing:?} {drawing:?} {form:?} {projection:?}, on the same device");
+        assert!(image == bytes(&second), "{compositing:?} {drawing:?} {form:?} {projection:?}, on a new device");
     }
 }
 
@@ -272,23 +275,22 @@ fn constant_colour_is_constant_colour_times_alpha() {
     scene.transfer = transfer(&[(0.0, color)], &[(30.0, 0.0), (200.0, 1.0)]);
     scene.shading.enabled = false;
     scene.image.background = [0.0; 4];
-    for (rasterizer, compositing) in RASTERIZERS
+    for (drawing, compositing) in DRAWINGS
         .into_iter()
-        .flat_map(|rasterizer| [Compositing::Linear, Compositing::Exponential].map(|how| (rasterizer, how)))
+        .flat_map(|drawing| [Compositing::Linear, Compositing::Exponential].map(|how| (drawing, how)))
     {
-        (scene.splatting.rasterizer, scene.splatting.compositing) = (rasterizer, compositing);
+        scene.splatting.compositing = compositing;
         // Quads round the amount and the amount times colour to f16; sheets and their sum are f32.
-        let rounding = if rasterizer == Rasterizer::Quads { 2.0 * F16 } else { 0.0 };
+        let rounding = if drawing.rounds_to_f16() { 2.0 * F16 } else { 0.0 };
         for slab_width in [0.5, 1.0, 3.0] {
             scene.splatting.slab_width = slab_width;
-            let (image, sheets) = render(&gpu, &volume, &scene);
+            let (image, sheets) = render(drawing, &gpu, &volume, &scene);
             assert!(image.pixels.iter().any(|pixel| pixel[3] > 0.99));
             for (i, pixel) in image.pixels.iter().enumerate() {
                 let alpha = f64::from(pixel[3]);
                 for (channel, color) in pixel.iter().zip(color) {
                     let tolerance = rounding * color * alpha + 4.0 * F32 * sheets as f64;
-                    let what =
-                        format_args!("{rasterizer:?} {compositing:?} slab width {slab_width} pixel {i}: {pixel:?}");
+                    let what = format_args!("{drawing:?} {compositing:?} slab width {slab_width} pixel {i}: {pixel:?}");
                     assert_at_most((f64::from(*channel) - color * alpha).abs(), tolerance, what);
                 }
             }

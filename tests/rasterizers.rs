@@ -80,11 +80,12 @@ fn quads_draw_what_tiles_do_not_after_splatting() {
     let (volume, mut scene) = head();
     scene.splatting.classification = Classification::After;
     assert_eq!(drawn_by(&gpu, &volume, &scene), "tiles");
-    let kernel = |scene: &mut Scene| scene.shading.gradient = Gradient::Kernel;
-    let maximum = |scene: &mut Scene| scene.splatting.compositing = Compositing::Maximum;
-    let cases: [(&dyn Fn(&mut Scene), &[&str]); 2] = [
-        (&kernel, &["max_compute_workgroup_storage_size", "16384", "21248"]),
-        (&maximum, &["\"tiles\"", "\"after\"", "splatting.compositing", "\"quads\""]),
+    type Change = fn(&mut Scene);
+    let kernel: Change = |scene| scene.shading.gradient = Gradient::Kernel;
+    let maximum: Change = |scene| scene.splatting.compositing = Compositing::Maximum;
+    let cases: [(Change, &[&str]); 2] = [
+        (kernel, &["max_compute_workgroup_storage_size", "16384", "21248"]),
+        (maximum, &["\"tiles\"", "\"after\"", "splatting.compositing", "\"quads\""]),
     ];
     for (change, words) in cases {
         let mut scene = scene.clone();

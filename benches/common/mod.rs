@@ -6,7 +6,7 @@ use std::time::Instant;
 use sheetsplat::SceneView;
 use sheetsplat::headless::GpuHeadless;
 use sheetsplat::scene::{Scene, VolumeSource};
-use sheetsplat::settings::Camera;
+use sheetsplat::settings::{Camera, Splatting};
 use sheetsplat::stats::Stats;
 
 /// The optional number that comes first, and the names after it.
@@ -28,9 +28,9 @@ pub(crate) fn open(name: &str) -> Scene {
     }
 }
 
-/// The whole volume is framed, as in the scene files that results are compared with.
+/// The whole volume is framed, and classified before splatting, as in the scene files that results are compared with.
 fn whole(volume: VolumeSource) -> Scene {
-    Scene { camera: Camera::default(), ..Scene::new(volume) }
+    Scene { camera: Camera::default(), splatting: Splatting::default(), ..Scene::new(volume) }
 }
 
 /// A scene's name in tables.

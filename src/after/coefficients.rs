@@ -5,12 +5,14 @@
 //! axes, each with three diagonals, and is solved along every line by two sweeps, forwards and backwards: a recursive filter (Thomas's algorithm). With other
 //! radii, and with holes, conjugate gradients solve it. The sweeps need 4 bytes per voxel beside the result, conjugate gradients 16.
 
+use std::sync::Arc;
+
 use glam::{IVec3, UVec3};
 use rayon::prelude::*;
 
 use crate::error::RenderError;
-use crate::setting_error::SettingError;
-use crate::volume::Grid;
+use crate::error::setting::SettingError;
+use crate::volume::{Grid, Volume};
 
 /// The maximum error of the field at the voxels, relative to the values' range; SPEC §9 asks for 1e-5.
 const TOLERANCE: f64 = 2e-6;
@@ -20,6 +22,18 @@ const MAX_STEPS: u32 = 2000;
 
 /// The radii at which a kernel holds the 27 voxels around its own and no others.
 const CUBE: std::ops::RangeInclusive<f64> = 1.732_050_807_568_878..=2.0;
+
+/// The coefficients of a volume's values, which the volume keeps. The program's log shows the progress.
+///
+/// # Errors
+/// As for [`exact`].
+pub(crate) fn of_volume(volume: &Volume, kernel: (f64, f64)) -> Result<Arc<[f32]>, RenderError> {
+    volume.coefficients(kernel, || {
+        exact(volume.grid(), volume.values(), kernel, &|share| {
+            log::info!("coefficients of splatting.interpolation = \"exact\": {:.0} %", 100.0 * share);
+        })
+    })
+}
 
 /// The coefficients of values on a grid; NaN at holes, where values are NaN. Calls `progress` with the fraction that is done.
 ///

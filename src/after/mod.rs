@@ -3,6 +3,4 @@
 pub mod brick_ranges;
 pub mod coefficients;
 pub mod normalization;
-pub mod plane_bounds;
-pub mod plane_geometry;
 pub mod slab_integral;

@@ -72,6 +72,12 @@ impl Preset {
         }
     }
 
+    /// Whether images gain by classification after splatting (SPEC §9), which is then the default. Projections and unshaded haze have no
+    /// edges that it would sharpen, and numbers of labels cannot be interpolated.
+    pub(crate) fn is_classified_after(self) -> bool {
+        !matches!(self, Self::Xray | Self::Mip | Self::Confocal | Self::Labels)
+    }
+
     /// The transfer function for a volume. Those for CT are in Hounsfield units: the values themselves if one in a thousand is below -100;
     /// or else the values less 1024 if the maximum lies within 1500 to 8191; or else a scale on which the background (by Otsu's threshold)
     /// is air, -1000, and the faintest eighth of the rest is water, 0. Without labels in the volume, [`Self::Labels`] gives

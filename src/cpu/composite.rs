@@ -33,7 +33,7 @@ struct SheetPlace<'a> {
 impl Compositor {
     /// Composites the sheet of a slot, which begins at `begin`, clears it, and closes the pixels that became opaque; whether there was
     /// anything to composite.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn composite<S: Simd>(
         &self,
         simd: S,
@@ -74,7 +74,7 @@ impl Compositor {
     }
 
     /// Composites a row. Returns the bits of its opaque pixels, or 0 if nothing is culled.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn row<S: Simd>(
         &self,
         simd: S,
@@ -125,7 +125,7 @@ impl Compositor {
 
     /// Composites eight pixels. By means ([`Compositing`]): for the minimum the compositing buffer keeps 2 less the opacity, and 0 where
     /// nothing counted; for a surface that is not reached the mean of the last sheet.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn pixels<S: Simd>(&self, simd: S, acc: Pixels<S>, sheet: Pixels<S>) -> Pixels<S> {
         let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
         let sheet = match self.compositing {
@@ -156,7 +156,7 @@ impl Compositor {
     }
 
     /// Keeps a sheet where its opacity is larger, or equal and nearer. Opacities above 1 count as equal.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn kept<S: Simd>(&self, acc: Pixels<S>, sheet: Pixels<S>, opacity: f32x8<S>, one: f32x8<S>) -> Pixels<S> {
         let passes = match self.order {
             Order::FrontToBack => opacity.simd_gt(acc[3]),
@@ -168,7 +168,7 @@ impl Compositor {
     }
 
     /// Notes where the requested opacity is reached for pixels that reach it in this sheet, as `shaders/composite.wgsl` does.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn hit<S: Simd>(
         &self,
         simd: S,
@@ -192,30 +192,30 @@ impl Compositor {
 }
 
 /// The length of the part of a stretch that lies in the slab beginning at `begin`.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn within_slab<S: Simd>(simd: S, [start, end]: [f32x8<S>; 2], begin: f32) -> [f32x8<S>; 2] {
     [start.max(f32x8::splat(simd, begin)), end.min(f32x8::splat(simd, begin + 1.0))]
 }
 
 /// Where between the middles of a slab and of the next one their means' opacity is one half, if it grows evenly.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn crossing<S: Simd>(before: f32x8<S>, mean: f32x8<S>) -> f32x8<S> {
     (0.5 - before) / (mean - before)
 }
 
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn load_pixels<S: Simd, const N: usize>(simd: S, row: &[[f32; N]; CHANNELS], at: usize) -> Pixels<S> {
     let [red, green, blue, alpha] = row;
     let load = |channel: &[f32; N]| f32x8::from_slice(simd, &channel[at..at + LANES]);
     [load(red), load(green), load(blue), load(alpha)]
 }
 
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn scaled<S: Simd>([red, green, blue, alpha]: Pixels<S>, by: f32x8<S>) -> Pixels<S> {
     [red * by, green * by, blue * by, alpha * by]
 }
 
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn sum<S: Simd>(a: Pixels<S>, b: Pixels<S>) -> Pixels<S> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
 }

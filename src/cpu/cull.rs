@@ -34,7 +34,7 @@ impl Pixels {
 }
 
 /// The largest integer that is not above a small number, without the system's `floor` or a branch.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn floor(x: f32) -> i32 {
     // Adding 1.5·2²³ rounds to a whole number, which is then in the low bits.
     const MAGIC: f32 = 12_582_912.0;
@@ -89,7 +89,7 @@ impl OpenMask {
     }
 
     /// Whether any pixel of a box is open.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn sees(&self, pixels: &Pixels) -> bool {
         let Pixels { columns: [left, right], rows: [first, last] } = *pixels;
         let level = (last + 1 - first).ilog2() as usize;
@@ -99,7 +99,7 @@ impl OpenMask {
 }
 
 /// The bits of columns from one to another, both included.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn columns_between(first: usize, last: usize) -> u32 {
     u32::MAX << first & u32::MAX >> (COLUMNS - 1 - last)
 }

@@ -1,6 +1,7 @@
-//! The parts of pixels' rays that clip planes and the crop box leave, and how rays meet sheets, as in `shaders/shared/cut.wgsl`.
+//! The parts of pixels' rays that clip planes, the crop box and a host's surfaces leave, and how rays meet sheets, as in `shaders/shared/cut.wgsl`.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::means::Means;
 use super::ray::{PixelRay, PixelRays};
@@ -13,12 +14,32 @@ use crate::volume::Grid;
 /// A number for every pixel of a tile, by row.
 type PixelValues = Vec<[f32; COLUMNS]>;
 
+/// Opaque surfaces of a host, which end rays.
+#[derive(Clone, Debug)]
+pub(super) struct Surfaces {
+    /// Row by row, in world units along the camera's direction.
+    pub(super) depths: Arc<[f32]>,
+    /// The image's width and height.
+    pub(super) size: [usize; 2],
+    /// The length of a `unit` in world units.
+    pub(super) unit: f64,
+}
+
+impl Surfaces {
+    /// The depth at a pixel, in `unit`s; infinite beyond the image's edges, where tiles have pixels too.
+    fn depth(&self, [x, y]: [usize; 2]) -> f64 {
+        let [width, height] = self.size;
+        if x < width && y < height { f64::from(self.depths[y * width + x]) / self.unit } else { f64::INFINITY }
+    }
+}
+
 /// How the rays of a frame's pixels meet sheets.
 #[derive(Clone, Debug)]
 pub(super) struct RayMode {
     pub(super) rays: PixelRays,
     /// The half spaces that are kept; `None` if nothing is cut.
     kept: Option<Vec<HalfSpace>>,
+    surfaces: Option<Surfaces>,
     means: Option<Means>,
 }
 
@@ -35,54 +56,60 @@ pub(super) struct TileRays {
 }
 
 impl RayMode {
-    pub(super) fn new(scene: &Scene, view: &ViewGeometry, grid: &Grid) -> Self {
+    pub(super) fn new(scene: &Scene, view: &ViewGeometry, grid: &Grid, surfaces: Option<Surfaces>) -> Self {
         let compositing = scene.splatting.compositing;
         Self {
             rays: PixelRays::new(view, grid),
-            kept: (!scene.clip.is_empty()).then(|| scene.clip.half_spaces(grid)),
+            kept: (surfaces.is_some() || !scene.clip.is_empty()).then(|| scene.clip.half_spaces(grid)),
+            surfaces,
             means: compositing.is_by_means().then(|| Means::new(view, grid, &scene.splatting)),
         }
     }
 
-    /// Only the parts of rays within some half spaces show.
-    pub(super) fn within(view: &ViewGeometry, grid: &Grid, kept: Vec<HalfSpace>) -> Self {
-        Self { rays: PixelRays::new(view, grid), kept: Some(kept), means: None }
+    /// Only the parts of rays within some half spaces, and in front of surfaces, are visible.
+    pub(super) fn within(view: &ViewGeometry, grid: &Grid, kept: Vec<HalfSpace>, surfaces: Option<Surfaces>) -> Self {
+        Self { rays: PixelRays::new(view, grid), kept: Some(kept), surfaces, means: None }
     }
 
-    /// The range of depths at which a ray shows something.
-    fn shown(&self, ray: &PixelRay) -> Range<f64> {
-        ray.inside(self.kept.as_deref().unwrap_or_default())
+    /// The range of depths at which a pixel's ray shows something.
+    fn shown(&self, ray: &PixelRay, pixel: [usize; 2]) -> Range<f64> {
+        let inside = ray.inside(self.kept.as_deref().unwrap_or_default());
+        let end = self.surfaces.as_ref().map_or(f64::INFINITY, |surfaces| surfaces.depth(pixel));
+        inside.start..inside.end.min(end)
     }
 
     /// How the rays of a tile's pixels meet sheets; `origin` is the tile's first pixel.
     pub(super) fn of_tile(&self, origin: [usize; 2], base: i32) -> TileRays {
         let from_base = |slabs: [f64; 2]| slabs.map(|slab| (slab - f64::from(base)) as f32);
-        let ends = |of: &dyn Fn(&PixelRay) -> [f64; 2]| {
+        let ends = |of: &dyn Fn(&PixelRay, Range<f64>) -> [f64; 2]| {
             let mut rows = vec![[[0.0; COLUMNS]; 2]; ROWS];
-            self.each_pixel(origin, |ray, [x, y]| [rows[y][0][x], rows[y][1][x]] = from_base(of(ray)));
+            self.each_pixel(origin, |ray, shown, [x, y]| [rows[y][0][x], rows[y][1][x]] = from_base(of(ray, shown)));
             rows
         };
         let weights = self.means.as_ref().map(|means| {
             let mut rows = vec![[0.0; COLUMNS]; ROWS];
-            self.each_pixel(origin, |ray, [x, y]| rows[y][x] = means.weight(ray, self.shown(ray)) as f32);
+            self.each_pixel(origin, |ray, shown, [x, y]| rows[y][x] = means.weight(ray, shown) as f32);
             rows
         });
         let nothing = [0.0, f64::NEG_INFINITY];
         TileRays {
             base,
-            shown: self.kept.is_some().then(|| ends(&|ray| ray.slabs(self.shown(ray)).unwrap_or(nothing))),
+            shown: self.kept.is_some().then(|| ends(&|ray, shown| ray.slabs(shown).unwrap_or(nothing))),
             weights,
             counted: self
                 .means
                 .as_ref()
                 .filter(|means| means.is_choosy())
-                .map(|means| ends(&|ray| means.counted(ray, self.shown(ray)))),
+                .map(|means| ends(&|ray, shown| means.counted(ray, shown))),
         }
     }
 
-    fn each_pixel(&self, origin: [usize; 2], mut then: impl FnMut(&PixelRay, [usize; 2])) {
+    /// For every pixel of a tile its ray, the range of depths at which that shows something, and its place in the tile.
+    fn each_pixel(&self, origin: [usize; 2], mut then: impl FnMut(&PixelRay, Range<f64>, [usize; 2])) {
         for (y, x) in (0..ROWS).flat_map(|y| (0..COLUMNS).map(move |x| (y, x))) {
-            then(&self.rays.of([origin[0] + x, origin[1] + y]), [x, y]);
+            let pixel = [origin[0] + x, origin[1] + y];
+            let ray = self.rays.of(pixel);
+            then(&ray, self.shown(&ray, pixel), [x, y]);
         }
     }
 }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::bin::{self, Placed};
 use super::composite::Compositor;
 use super::count::{Drawn, Tally};
-use super::cut::RayMode;
+use super::cut::{RayMode, Surfaces};
 use super::first_hit;
 use super::kernel::KernelTables;
 use super::material::Materials;
@@ -18,10 +18,10 @@ use super::shade::Shader;
 use super::sheets::{COLUMNS, ROWS};
 use super::splat::Splatter;
 use super::tile::TileWalk;
-use crate::geometry::kernel::Kernel;
 use crate::geometry::means;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
+use crate::kernel::Kernel;
 use crate::lists::brick::Brick;
 use crate::lists::quad_plan::{Overlaps, PlaceDepths};
 use crate::scene::Scene;
@@ -66,6 +66,15 @@ pub(super) struct Drawing {
     pub(super) first_hits: Vec<f32>,
 }
 
+/// What a host adds to a scene.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Host {
+    /// The opacity whose depth is requested.
+    pub(super) first_hit: Option<f64>,
+    /// The opaque surfaces that end rays.
+    pub(super) surfaces: Option<Surfaces>,
+}
+
 impl<'a> Frame<'a> {
     /// A frame in a view.
     pub(super) fn new(
@@ -73,7 +82,8 @@ impl<'a> Frame<'a> {
         transfer: &'a TransferFunction,
         (bricks, materials): (&'a [Brick], &'a Materials),
         scene: &Scene,
-        (view, first_hit): (ViewGeometry, Option<f64>),
+        view: ViewGeometry,
+        Host { first_hit, surfaces }: Host,
         level: Level,
     ) -> Self {
         let (splatting, image) = (&scene.splatting, &scene.image);
@@ -111,7 +121,7 @@ impl<'a> Frame<'a> {
             splatter,
             shader: Shader::new(&scene.shading, splatting.compositing),
             compositor,
-            rays: RayMode::new(scene, &view, grid),
+            rays: RayMode::new(scene, &view, grid, surfaces),
             drawn: Drawn::new(bricks.len(), &view),
             is_each,
             counted: covered.map_or(i32::MIN..i32::MIN, |slabs| projection.sheets_of(&slabs)),
@@ -155,7 +165,7 @@ impl<'a> Frame<'a> {
     }
 
     /// Draws a tile, including rows and columns outside the image.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn draw_tile<S: Simd>(
         &self,
         simd: S,
@@ -184,7 +194,7 @@ fn count_overlaps(level: Level, bricks: &[Brick], view: &ViewGeometry) -> Overla
     let depths = PlaceDepths::new(view);
     let of_chunk = |bricks: &[Brick]| {
         dispatch!(level, simd => simd.vectorize(
-            #[inline(always)]
+            #[cfg_attr(not(debug_assertions), inline(always))]
             || {
                 let mut sum = Overlaps::default();
                 for brick in bricks {

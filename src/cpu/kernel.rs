@@ -9,7 +9,7 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
 use super::vector::{exp2, polynomial};
-use crate::geometry::kernel::Kernel;
+use crate::kernel::Kernel;
 
 /// Coefficients for pixels and voxels.
 #[derive(Clone, Debug)]
@@ -38,14 +38,14 @@ impl KernelTables {
     }
 
     /// `H(0, 0, t)` of eq. 3, the kernel's integral along the ray through its centre, from the centre to t.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn along<S: Simd>(&self, simd: S, t: f32x8<S>) -> f32x8<S> {
         let t = t.max(f32x8::splat(simd, -self.support)).min(f32x8::splat(simd, self.support));
         t * polynomial(&self.cumulative, t * t * self.scale - 1.0)
     }
 
     /// How far a section between two planes reaches from the kernel's axis, as a fraction of the support; slightly more, because f32 rounds.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn reach<S: Simd>(&self, simd: S, a: f32x8<S>, b: f32x8<S>) -> f32x8<S> {
         let zero = f32x8::splat(simd, 0.0);
         // 0 between the planes, whichever of them is nearer to the eye.
@@ -55,14 +55,14 @@ impl KernelTables {
     }
 
     /// `H(0, 0, t)` where the chord of the kernel's ball ends.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn rim<S: Simd, V: SimdFloat<S, Element = f32>>(&self, simd: S, rho_squared: V) -> V {
         let chord_squared = (V::splat(simd, self.support_squared) - rho_squared).max(V::splat(simd, 0.0));
         chord_squared.sqrt() * polynomial(&self.cumulative, chord_squared * self.scale - 1.0)
     }
 
     /// The Gaussian of ρ².
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn in_plane<S: Simd>(&self, simd: S, rho_squared: f32x8<S>) -> f32x8<S> {
         // Far from the voxel the rim is 0; the other factor must be finite.
         exp2(simd, (rho_squared * self.exponent).max(f32x8::splat(simd, -126.0)))

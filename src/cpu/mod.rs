@@ -10,6 +10,9 @@
 //!        ─ first_hit ─→ the depths at which an opacity was reached, if requested
 //! ```
 //!
+//! Functions that work with vectors are always inlined, into the function that an instruction set is chosen for; else their vectors would pass
+//! through memory. Builds without optimization are the exception, since there one function with everything inlined would need megabytes of stack.
+//!
 //! Stages are those of the GPU, by the same names. The same scene gives the same bytes on every machine (SPEC §12): pixels are `f32` by IEEE
 //! `+ - × ÷ √`, never contracted, and every pixel's sums are taken in one order, whatever the number of threads and the vectors' width.
 
@@ -41,20 +44,21 @@ use std::time::Instant;
 use fearless_simd::Level;
 
 use crate::error::RenderError;
+use crate::error::setting::{Interval, SettingError};
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::headless::{Backend, Rendering};
 use crate::lists::brick::BrickList;
 use crate::lists::classify::classify;
 use crate::pick::{FirstHits, Pick};
+use crate::rendering::{Backend, Rendering};
 use crate::scene::{ImageSettings, Scene};
-use crate::setting_error::{Interval, SettingError};
 use crate::settings::camera::Camera;
 use crate::settings::splatting::{Classification, check_first_hit};
 use crate::settings::transfer_function::TransferFunction;
 use crate::stats::Stats;
 use crate::volume::Volume;
 use after::Coefficients;
-use frame::{Drawing, Frame};
+use cut::Surfaces;
+use frame::{Drawing, Frame, Host};
 use material::Materials;
 pub use simd::Simd;
 
@@ -68,6 +72,8 @@ pub struct CpuRenderer {
     simd: Simd,
     level: Level,
     first_hit: Option<f64>,
+    /// The depths of a host's opaque surfaces.
+    surfaces: Option<Arc<[f32]>>,
     /// The last frame's first hits.
     hits: Option<FirstHits>,
 }
@@ -92,16 +98,16 @@ impl CpuRenderer {
         check(scene)?;
         let (simd, level) = simd::chosen()?;
         let transfer = scene.transfer.resolve(&volume);
-        let list = match scene.splatting.classification {
-            Classification::Before => {
-                let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
-                let bricks = BrickList::new(volume.grid(), &classify(&volume, &transfer, &clipped));
-                let materials = Materials::new(bricks.bricks().len());
-                List::Before(bricks, materials)
-            }
-            Classification::After => List::After(Coefficients::new(&volume, scene)?),
+        let scene = scene.classified(&volume);
+        let list = if scene.splatting.classification == Classification::After {
+            List::After(Coefficients::new(&volume, &scene)?)
+        } else {
+            let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
+            let bricks = BrickList::new(volume.grid(), &classify(&volume, &transfer, &clipped));
+            let materials = Materials::new(bricks.bricks().len());
+            List::Before(bricks, materials)
         };
-        Ok(Self { volume, scene: scene.clone(), transfer, list, simd, level, first_hit: None, hits: None })
+        Ok(Self { volume, scene, transfer, list, simd, level, first_hit: None, surfaces: None, hits: None })
     }
 
     /// The settings.
@@ -152,6 +158,33 @@ impl CpuRenderer {
         Ok(())
     }
 
+    /// Sets opaque surfaces of a host, or removes them with `None`: for every pixel of the image, row by row, the depth of the surface in world
+    /// units along the camera's direction, from the eye, orthographic from the plane through [`Camera::center`]; infinite without a surface. The
+    /// volume is visible only in front of them, and voxels behind them are culled as behind opaque ones (§6). A surface within a slab
+    /// cuts the slab's sheet in proportion.
+    ///
+    /// # Errors
+    /// If a depth is NaN; then nothing changes. A number of depths other than that of the image's pixels is an error of [`Self::draw`].
+    pub fn set_surfaces(&mut self, depths: Option<Vec<f32>>) -> Result<(), SettingError> {
+        if let Some(at) = depths.as_ref().and_then(|depths| depths.iter().position(|depth| depth.is_nan())) {
+            return Err(SettingError::new(format!("surfaces[{at}]"), f64::NAN, "a number, or infinity"));
+        }
+        self.surfaces = depths.map(Into::into);
+        Ok(())
+    }
+
+    /// The surfaces for an image of some width and height.
+    fn surfaces_of(&self, size: [u32; 2]) -> Result<Option<Surfaces>, SettingError> {
+        let Some(depths) = &self.surfaces else { return Ok(None) };
+        let size = size.map(|side| side as usize);
+        let pixels = size[0] * size[1];
+        if depths.len() != pixels {
+            let found = format!("{} depths", depths.len());
+            return Err(SettingError::new("surfaces", found, format!("{pixels}, one for every pixel")));
+        }
+        Ok(Some(Surfaces { depths: Arc::clone(depths), size, unit: self.volume.grid().unit() }))
+    }
+
     /// The last frame's first hits, row by row, if they were asked for: depths in world units along the camera's direction, from the eye,
     /// orthographic from the plane through [`Camera::center`]; infinite where the opacity is not reached. Within a sheet opacity is taken to
     /// grow evenly.
@@ -175,21 +208,22 @@ impl CpuRenderer {
     pub fn draw(&mut self) -> Result<Rendering, RenderError> {
         let start = Instant::now();
         let splatting = &self.scene.splatting;
-        splatting.check_rays(!self.scene.clip.is_empty(), self.first_hit)?;
+        let is_cut = self.surfaces.is_some() || !self.scene.clip.is_empty();
+        splatting.check_rays(is_cut, self.first_hit)?;
         let scene = self.scene.framed(&self.volume, &self.transfer);
         let ImageSettings { width, height, .. } = self.scene.image;
+        let host = Host { first_hit: self.first_hit, surfaces: self.surfaces_of([width, height])? };
         let view = ViewGeometry::new(self.volume.grid(), &scene.camera, &scene.splatting, [width, height])?;
         let Drawing { image, counts, first_hits } = match &mut self.list {
             List::Before(bricks, materials) => {
                 let bricks = (bricks.bricks(), &*materials);
-                let frame =
-                    Frame::new(&self.volume, &self.transfer, bricks, &scene, (view, self.first_hit), self.level);
+                let frame = Frame::new(&self.volume, &self.transfer, bricks, &scene, view, host, self.level);
                 frame.draw(self.level)
             }
             List::After(coefficients) => {
                 let of = (&*self.volume, &self.transfer);
                 coefficients.look(of, scene.splatting.compositing, &view);
-                after::Frame::new(of, coefficients, &scene, (view, self.first_hit)).draw(self.level)
+                after::Frame::new(of, coefficients, &scene, view, host).draw(self.level)
             }
         };
         self.hits = self.first_hit.map(|_| FirstHits { view, depths: first_hits });

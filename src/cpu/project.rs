@@ -131,7 +131,7 @@ impl Projection {
     }
 
     /// The first sheets of a brick's voxels by slot, those of empty slots too where that is faster; [`NO_SHEET`] for none.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn first_sheets(&self, brick: &Brick, place: Place) -> [i32; BRICK_VOXELS as usize] {
         let mut first = [NO_SHEET; BRICK_VOXELS as usize];
         if self.view.perspective.is_none() {
@@ -152,7 +152,7 @@ impl Projection {
     }
 
     /// Slabs between two depths by more than rounding errors ([`slab::ROUNDING`]), as sheets.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn numbered(&self, first: f64, end: f64) -> Range<i32> {
         let (first, end) = (floor(first + slab::ROUNDING), -floor(-(end - slab::ROUNDING)));
         if self.direction > 0 { first..end } else { 1 - end..1 - first }
@@ -228,7 +228,7 @@ fn principal_axis(difference: f64, product: f64) -> DVec2 {
 }
 
 /// The largest integer that is not above a number below 2³¹, without the system's `floor` or a branch.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn floor(x: f64) -> i32 {
     // Adding 1.5·2⁵² rounds to a whole number, which is then in the low bits.
     const MAGIC: f64 = 6_755_399_441_055_744.0;

@@ -23,7 +23,7 @@ pub(super) struct Unshaded {
 
 impl Unshaded {
     /// Puts a voxel's material into a lane.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn set_material(&mut self, lane: usize, material: &Material) {
         self.alpha[lane] = material.alpha;
         for axis in 0..3 {
@@ -33,7 +33,7 @@ impl Unshaded {
     }
 
     /// Puts into a lane what depends on the view.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn set_view(&mut self, lane: usize, to_eye: DVec3, scale: f64) {
         self.scale[lane] = scale as f32;
         for axis in 0..3 {
@@ -72,7 +72,7 @@ impl Shader {
     }
 
     /// `(C·m, m)` times the scale of every lane's voxel.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn shade<S: Simd>(&self, simd: S, voxels: &Unshaded) -> [[f32; LANES]; 4] {
         let load = |lanes: &[f32; LANES]| f32x8::load_array_ref(simd, lanes);
         let alpha = load(&voxels.alpha);
@@ -87,7 +87,7 @@ impl Shader {
     }
 
     /// The colours in this light. A normal of 0 stands for a voxel without a direction, which gets ambient light alone.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn color<S: Simd>(
         &self,
         simd: S,
@@ -106,7 +106,7 @@ impl Shader {
     }
 
     /// The diffuse and the specular term: two-sided, and 0 without a normal.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn lighting<S: Simd>(&self, simd: S, normal: [f32x8<S>; 3], to_eye: [f32x8<S>; 3]) -> (f32x8<S>, f32x8<S>) {
         let to_light = self.to_light.map_or(to_eye, |light| light.map(|component| f32x8::splat(simd, component)));
         let dot = |a: [f32x8<S>; 3], b: [f32x8<S>; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

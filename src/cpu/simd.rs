@@ -2,7 +2,7 @@
 
 use fearless_simd::Level;
 
-use crate::setting_error::SettingError;
+use crate::error::setting::SettingError;
 
 /// The environment variable that forces an instruction set.
 const VARIABLE: &str = "SHEETSPLAT_SIMD";

@@ -72,7 +72,7 @@ pub(super) struct Sections {
 
 impl Splatter {
     /// The sections to be drawn next.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn sections<S: Simd>(&self, simd: S, splat: &Splat) -> Sections {
         let count = ((splat.sheets[1] - splat.sheets[0]) as usize).min(SECTIONS);
         let mut t = iota(simd) * splat.step + splat.first_plane;
@@ -121,7 +121,7 @@ impl Splatter {
     }
 
     /// Adds sections to a tile's sheets.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn draw<S: Simd>(
         &self,
         simd: S,
@@ -155,7 +155,7 @@ impl Splatter {
     }
 
     /// Eight columns of N sections without perspective, which all have one footprint. Returns the bits of the rows.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn draw_block<S: Simd, const N: usize>(&self, simd: S, block: &Block<'_>, sheets: &mut [SheetRow]) -> u64 {
         let Block { splat, sections, column, rows: [first, last], slot, .. } = *block;
         let dx = iota(simd) + (column as f32 - splat.center[0]);
@@ -195,7 +195,7 @@ impl Splatter {
 
     /// Eight columns in perspective: every section has its own footprint, of the size that pixels have at its middle. Returns the bits of
     /// the rows.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn draw_local_block<S: Simd>(&self, simd: S, block: &Block<'_>, sheets: &mut [SheetRow]) -> u64 {
         let Block { splat, sections, column, rows: [first, last], slot, .. } = *block;
         let dx = iota(simd) + (column as f32 - splat.center[0]);
@@ -243,20 +243,20 @@ struct Block<'a> {
 
 impl Block<'_> {
     /// Whether all its pixels in a row are opaque.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn is_closed(&self, row: usize) -> bool {
         self.open.row(row) & columns_between(self.column, (self.column + LANES - 1).min(COLUMNS - 1)) == 0
     }
 }
 
 /// `H(0, 0, t)` at a plane, or at the rim on its side.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn cut_by_rim<S: Simd>(simd: S, plane: f32, rim: f32x8<S>) -> f32x8<S> {
     f32x8::splat(simd, plane).max(-rim).min(rim)
 }
 
 /// Adds a colour to eight pixels of a sheet, by weights.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn add<S: Simd>(weights: f32x8<S>, colors: [f32; 4], column: usize, sheet: &mut [[f32; COLUMNS + LANES]; CHANNELS]) {
     let column = column.min(COLUMNS);
     let weights = weights.to_array();

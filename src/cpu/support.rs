@@ -1,8 +1,8 @@
 //! Settings that the native backend does not support yet are errors, never wrong pictures.
 
 use crate::error::RenderError;
+use crate::error::setting::SettingError;
 use crate::scene::Scene;
-use crate::setting_error::SettingError;
 
 /// The largest image, pixels along a side.
 const MAX_SIZE: u32 = 32_768;

@@ -81,7 +81,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Draws a tile, given its first pixel and its bricks by first sheet: what its buffers hold then, and how its pixels look at sheets.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn draw<S: Simd>(
         &mut self,
         simd: S,
@@ -118,7 +118,7 @@ impl<'a> TileWalk<'a> {
         self.tally = Tally::default();
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn walk<'b, S: Simd>(&mut self, simd: S, first: i32, bricks: &mut Peekable<impl Iterator<Item = &'b Placed>>) {
         // Empty sheets are composited where they count.
         let Range { start, end } = self.frame.counted.clone();
@@ -148,7 +148,7 @@ impl<'a> TileWalk<'a> {
     fn composite<S: Simd>(&mut self, simd: S, sheet: i32) {
         // One function for every instruction set, instead of a copy at every call.
         simd.vectorize(
-            #[inline(always)]
+            #[cfg_attr(not(debug_assertions), inline(always))]
             || {
                 let Self { frame, open, rays, buffers, tally, .. } = self;
                 let begin = rays.begin(frame.projection.direction * sheet);
@@ -183,7 +183,7 @@ impl<'a> TileWalk<'a> {
         self.arrived.push(Arrived { brick: placed.brick, place, half_box: placed.half_box });
         self.marks.resize(self.arrived.len() * self.frame.drawn.masks, 0);
         simd.vectorize(
-            #[inline(always)]
+            #[cfg_attr(not(debug_assertions), inline(always))]
             || {
                 let first_sheets = projection.first_sheets(brick, place);
                 let mut left = brick::present(brick);
@@ -218,7 +218,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Draws the voxels that start or continue in a sheet.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn start<S: Simd>(&mut self, simd: S, sheet: i32) {
         let continued = std::mem::take(&mut self.continued[slot_of(sheet)]);
         self.pending -= continued.len();
@@ -239,7 +239,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Draws those of a brick's voxels that are seen, in batches.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn start_voxels<S: Simd>(&mut self, simd: S, waiting: &Waiting, sheet: i32, batch: &mut Batch<'a>) {
         let frame = self.frame;
         let Arrived { brick: number, place: brick_place, half_box } = self.arrived[waiting.brick as usize];
@@ -290,7 +290,7 @@ impl<'a> TileWalk<'a> {
     fn draw_batch<S: Simd>(&mut self, simd: S, batch: &mut Batch<'_>) {
         // One function for every instruction set, instead of a copy at every call.
         simd.vectorize(
-            #[inline(always)]
+            #[cfg_attr(not(debug_assertions), inline(always))]
             || {
                 let count = std::mem::take(&mut batch.count);
                 // All at once, so that the memory is waited for once.
@@ -317,7 +317,7 @@ impl<'a> TileWalk<'a> {
     fn draw_splat<S: Simd>(&mut self, simd: S, splat: &Splat) {
         // One function for every instruction set, instead of a copy at every call.
         simd.vectorize(
-            #[inline(always)]
+            #[cfg_attr(not(debug_assertions), inline(always))]
             || {
                 let splatter = &self.frame.splatter;
                 let sections = splatter.sections(simd, splat);
@@ -348,7 +348,7 @@ impl<'a> TileWalk<'a> {
 }
 
 /// The bits of the numbers that equal one.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn equal<S: Simd>(simd: S, numbers: &[i32; BRICK_VOXELS as usize], to: i32) -> u64 {
     let to = i32x8::splat(simd, to);
     let mut bits = 0;
@@ -378,7 +378,7 @@ impl Batch<'_> {
         Self { count: 0, materials: [nothing; LANES], unshaded: Unshaded::default(), splats: Default::default() }
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn add(
         &mut self,
         frame: &Frame,

@@ -20,13 +20,13 @@ const EXP2: [f32; 6] =
 const ATANH: [f32; 5] = [1.0, 0.333_333_34, 0.200_001_92, 0.142_675_14, 0.118_084_05];
 
 /// 0, 1, …, 7.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn iota<S: Simd>(simd: S) -> f32x8<S> {
     f32x8::load_array(simd, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0])
 }
 
 /// `2^x` as `2^n` and `2^f - 1`, with `x = n + f` and n whole, for x from -126 to 126.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn exp2_parts<S: Simd>(simd: S, x: f32x8<S>) -> (f32x8<S>, f32x8<S>) {
     // Adding 1.5·2²³ rounds to a whole number, which is then in the low bits.
     let magic = f32x8::splat(simd, 12_582_912.0);
@@ -42,14 +42,14 @@ fn exp2_parts<S: Simd>(simd: S, x: f32x8<S>) -> (f32x8<S>, f32x8<S>) {
 }
 
 /// `2^x`, for x from -126 to 126.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn exp2<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
     let (power, less_one) = exp2_parts(simd, x);
     power + power * less_one
 }
 
 /// `(1 - exp(-x)) / x`, 1 at 0, for x from 0 on; to full relative precision.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn saturation<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
     let x = x.max(f32x8::splat(simd, 1e-30));
     let exponent = (x * -std::f32::consts::LOG2_E).max(f32x8::splat(simd, -126.0));
@@ -59,7 +59,7 @@ pub(super) fn saturation<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
 
 /// The exponent and `atanh((m - 1) / (m + 1))` of numbers above 0, whose mantissas m are from √½ to √2. `less_one` is the number less 1, more
 /// exactly than the number tells it.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn log_parts<S: Simd>(simd: S, x: f32x8<S>, less_one: f32x8<S>) -> (f32x8<S>, f32x8<S>) {
     const ROOT_HALF: u32 = std::f32::consts::FRAC_1_SQRT_2.to_bits();
     let splat = |bits| u32x8::splat(simd, bits);
@@ -78,14 +78,14 @@ fn log_parts<S: Simd>(simd: S, x: f32x8<S>, less_one: f32x8<S>) -> (f32x8<S>, f3
 }
 
 /// `-ln(1 - x)` for x from 0 to 0.9999, to full relative precision: the optical depth per unit length for an opacity per unit length.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn optical_depth<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
     let (exponent, atanh) = log_parts(simd, 1.0 - x, -x);
     exponent * -std::f32::consts::LN_2 - atanh * 2.0
 }
 
 /// `x^y` for x from 0 to about 1 and one y above 0; 0 at 0.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn power<S: Simd>(simd: S, x: f32x8<S>, y: f32) -> f32x8<S> {
     let is_zero = x.simd_eq(f32x8::splat(simd, 0.0));
     let base = x.max(f32x8::splat(simd, 1e-37));
@@ -96,7 +96,7 @@ pub(super) fn power<S: Simd>(simd: S, x: f32x8<S>, y: f32) -> f32x8<S> {
 }
 
 /// A polynomial of 16 coefficients, the constant one first.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn polynomial<S: Simd, V: SimdFloat<S, Element = f32>>(c: &[f32; 16], z: V) -> V {
     let squared = z * z;
     let fourth = squared * squared;

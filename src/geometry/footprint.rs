@@ -4,7 +4,7 @@
 //! summed-area table does not include the ball's truncation: the splat shader clamps z to the chord, so the table stays smooth up to
 //! the rim.
 
-use crate::geometry::kernel::Kernel;
+use crate::kernel::Kernel;
 use crate::settings::splatting::FootprintForm;
 
 /// The number of pre-integrated sections (§3.2).

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::error::RenderError;
-use crate::setting_error::SettingError;
+use crate::error::setting::SettingError;
 
 /// The maximum number of slabs in a volume. 1800³ voxels need fewer with slabs 0.05 `unit`s wide.
 pub const MAX_SLABS: u32 = 1 << 16;

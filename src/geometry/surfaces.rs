@@ -4,8 +4,8 @@ use glam::{DMat4, DVec2, DVec3, DVec4};
 use wgpu::{TextureUsages, TextureView};
 
 use crate::error::RenderError;
+use crate::error::setting::{Interval, SettingError};
 use crate::geometry::view_geometry::{Rays, ViewGeometry};
-use crate::setting_error::{Interval, SettingError};
 use crate::volume::Grid;
 
 /// The maximum distance in pixels between positions projected by the host and by the camera.

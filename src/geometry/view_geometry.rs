@@ -6,9 +6,9 @@ use std::ops::Range;
 use glam::{DVec2, DVec3, DVec4, UVec3};
 
 use crate::error::RenderError;
+use crate::error::setting::SettingError;
 use crate::geometry::grid_warp::{self, FootprintMap};
 use crate::geometry::slab::{MAX_SLABS, SlabGrid};
-use crate::setting_error::SettingError;
 use crate::settings::camera::{Camera, Eye, ViewBasis};
 use crate::settings::splatting::{Method, Splatting};
 use crate::volume::Grid;

@@ -10,6 +10,7 @@ use crate::after::brick_ranges::{Bearing, BrickRanges};
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::brick_lists::{BrickLists, SettledBricks};
+use crate::gpu::counts::{GroupSlabs, Totals};
 use crate::gpu::gpu_volume::{Coefficients, GpuVolume};
 use crate::lists::brick::BrickList;
 use crate::lists::classify::{classify, in_rows, takes_part};
@@ -19,7 +20,7 @@ use crate::lists::value_list::ValueList;
 use crate::settings::clip::ClippedVoxels;
 use crate::settings::splatting::Classification;
 use crate::settings::transfer_function::{LabelTables, Ramp, Tables, TransferFunction};
-use crate::stats::{Counts, GroupSlabs, Totals};
+use crate::stats::Counts;
 use crate::volume::{Grid, Volume};
 
 /// The voxels of a volume that take part under a transfer function.
@@ -92,10 +93,8 @@ impl ClassifiedVolume {
         if voxels.labels().is_none() {
             transfer.labels.clear();
         }
-        let taking_part = match classification {
-            Classification::Before => classify(voxels, &transfer, &clipped),
-            Classification::After => Vec::new(),
-        };
+        let is_after = classification == Classification::After;
+        let taking_part = if is_after { Vec::new() } else { classify(voxels, &transfer, &clipped) };
         let lists = BrickLists::upload(device, voxels.grid(), &taking_part);
         Self { volume: volume.clone(), transfer, clipped, lists, revision: 0, classification, shown: None }
     }
@@ -105,10 +104,8 @@ impl ClassifiedVolume {
         if classification == self.classification {
             return;
         }
-        let voxels = match classification {
-            Classification::Before => classify(self.volume(), &self.transfer, &self.clipped),
-            Classification::After => Vec::new(),
-        };
+        let is_after = classification == Classification::After;
+        let voxels = if is_after { Vec::new() } else { classify(self.volume(), &self.transfer, &self.clipped) };
         let grid = *self.grid();
         self.lists.replace(&grid, &voxels);
         self.revision += 1;
@@ -169,10 +166,8 @@ impl ClassifiedVolume {
 
     /// Whether shading needs labels.
     pub(crate) fn shades_by_label(&self) -> bool {
-        let matter = match self.classification {
-            Classification::Before => LabelTables::matter_to_shading,
-            Classification::After => LabelTables::matter,
-        };
+        let is_after = self.classification == Classification::After;
+        let matter = if is_after { LabelTables::matter } else { LabelTables::matter_to_shading };
         self.transfer.labels.values().any(matter)
     }
 
@@ -312,10 +307,8 @@ impl ClassifiedVolume {
 
     /// The counts of a frame (Table 4) that are known before it is drawn.
     pub fn totals(&self, view: &ViewGeometry, groups: &GroupSlabs) -> Totals {
-        let of_bricks = match self.classification {
-            Classification::Before => Overlaps::count,
-            Classification::After => Overlaps::count_planes,
-        };
+        let is_after = self.classification == Classification::After;
+        let of_bricks = if is_after { Overlaps::count_planes } else { Overlaps::count };
         let overlaps = self.lists.bricks().map(|bricks| of_bricks(bricks, view));
         let Overlaps { voxels, sections, slabs } = overlaps.fold(Overlaps::default(), Overlaps::and);
         // Some sheets of the first or last group may lie outside every kernel.

@@ -4,7 +4,7 @@ use wgpu::{Adapter, Device, DeviceDescriptor, Features, Limits, TextureFormat};
 
 use super::layout::FOLD;
 use super::volume_texture;
-pub use crate::device_error::{DeviceError, InsufficientLimit};
+pub use crate::error::device::{DeviceError, InsufficientLimit};
 
 /// Features that the renderer uses if the device has them. It requires none of them.
 pub const WANTED_FEATURES: Features = Features::FLOAT32_BLENDABLE.union(Features::TIMESTAMP_QUERY).union(TILE_FEATURES);

@@ -6,25 +6,8 @@ use std::task::{Context, Poll, Waker};
 
 use wgpu::{BufferDescriptor, BufferUsages, Device, ErrorFilter};
 
+use crate::error::device::DeviceFault;
 use crate::gpu::shaders::{self, Shader};
-
-/// A failure that the device reported. Messages have one line.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum DeviceFault {
-    /// Memory ran out. The same device may still provide smaller amounts.
-    #[error("the device is out of memory: {0}")]
-    OutOfMemory(String),
-    /// wgpu's validation found a mistake in this library or in a host's arguments.
-    #[error("device error: {0}")]
-    Validation(String),
-    /// The driver failed, for example to compile a shader.
-    #[error("internal device error: {0}")]
-    Internal(String),
-    /// The device has stopped working. A new one, with new volumes and a new renderer, may work.
-    #[error("the device is lost")]
-    Lost,
-}
 
 impl From<wgpu::Error> for DeviceFault {
     fn from(error: wgpu::Error) -> Self {

@@ -33,13 +33,13 @@ struct Shared {
     coefficients: Mutex<Option<Arc<Coefficients>>>,
 }
 
-/// Coefficients that interpolate the values: [`coefficients::exact`].
+/// Coefficients that interpolate the values: [`coefficients::of_volume`].
 #[derive(Debug)]
 pub(crate) struct Coefficients {
     /// The kernel's radius and falloff.
     kernel: (f64, f64),
     /// As values; NaN at holes.
-    pub(crate) values: Vec<f32>,
+    pub(crate) values: Arc<[f32]>,
     /// What they are splatted as.
     pub(crate) numbers: Normalization,
     /// Uploaded with the first frame.
@@ -144,15 +144,13 @@ impl GpuVolume {
     /// The coefficients for a kernel's radius and falloff, computed at the first request. Those of the previous kernel are dropped.
     ///
     /// # Errors
-    /// If no coefficients interpolate the values: those of [`coefficients::exact`].
+    /// If no coefficients interpolate the values: those of [`coefficients::of_volume`].
     pub(crate) fn coefficients(&self, kernel: (f64, f64)) -> Result<Arc<Coefficients>, RenderError> {
         if let Some(last) = self.last_coefficients().filter(|last| last.kernel == kernel) {
             return Ok(last);
         }
         let volume = &self.shared.volume;
-        let values = coefficients::exact(volume.grid(), volume.values(), kernel, &|share| {
-            log::info!("coefficients of splatting.interpolation = \"exact\": {:.0} %", 100.0 * share);
-        })?;
+        let values = coefficients::of_volume(volume, kernel)?;
         let numbers = Normalization::of(values.iter().copied()).unwrap_or(Normalization::new([0.0; 2]));
         let found = Arc::new(Coefficients { kernel, values, numbers, texture: OnceLock::new() });
         *self.shared.coefficients.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(&found));

@@ -1,14 +1,17 @@
-//! The passes' common parts: the device's capabilities, memory layouts, shader sources, targets.
+//! The passes' common parts: the device's capabilities and faults, memory layouts, shader sources, targets, counts.
 
 pub mod bindings;
 pub mod brick_lists;
 pub mod classified_volume;
+pub(crate) mod counts;
 pub mod device;
 pub(crate) mod fault;
 pub mod footprint_texture;
 pub mod gathered_layout;
 pub(crate) mod gpu_volume;
 pub mod layout;
+pub(crate) mod options;
+pub(crate) mod placement;
 pub mod render_pipeline;
 pub mod shaders;
 pub mod targets;

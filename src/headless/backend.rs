@@ -1,45 +1,14 @@
-//! The backends that compute images (SPEC §12), and how one is chosen.
-
-use std::fmt;
-use std::str::FromStr;
+//! The choice of a backend (SPEC §12).
 
 use super::HeadlessOptions;
 #[cfg(feature = "gpu")]
 use super::device;
+use crate::rendering::Backend;
 use crate::scene::Scene;
 #[cfg(feature = "gpu")]
 use crate::settings::splatting::Rasterizer;
 
-/// The program part that computes an image (SPEC §12).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Backend {
-    /// The GPU where one can run the renderer and is no software driver, else the CPU. Naming an adapter or a rasterizer chooses the GPU, and
-    /// so do options and settings that only the GPU supports.
-    #[default]
-    Auto,
-    /// wgpu: a GPU, or a software driver.
-    Gpu,
-    /// The processor's cores, without a driver: [`cpu`](crate::cpu).
-    Cpu,
-    /// The slow f64 evaluation that the other backends are tested against.
-    Reference,
-}
-
 impl Backend {
-    /// All backends.
-    pub const ALL: [Self; 4] = [Self::Auto, Self::Gpu, Self::Cpu, Self::Reference];
-
-    /// The name in scenes and on the command line: `auto`, `gpu`, `cpu`, `reference`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Auto => "auto",
-            Self::Gpu => "gpu",
-            Self::Cpu => "cpu",
-            Self::Reference => "reference",
-        }
-    }
-
     /// The backend that draws; scenes can decide where the options leave the choice.
     pub(super) fn resolved<'a>(options: &HeadlessOptions, scenes: impl IntoIterator<Item = &'a Scene>) -> Self {
         match options.backend {
@@ -47,21 +16,6 @@ impl Backend {
             Self::Auto => Self::Cpu,
             named => named,
         }
-    }
-}
-
-impl fmt::Display for Backend {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Backend {
-    type Err = String;
-
-    fn from_str(name: &str) -> Result<Self, String> {
-        let named = Self::ALL.into_iter().find(|backend| backend.name() == name);
-        named.ok_or_else(|| format!("allowed: {}", Self::ALL.map(Self::name).join(", ")))
     }
 }
 

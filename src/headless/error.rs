@@ -1,7 +1,7 @@
 //! All errors of headless rendering in one type.
 
-use crate::device_error::DeviceError;
 use crate::error::RenderError;
+use crate::error::device::DeviceError;
 use crate::scene::SceneError;
 use crate::volume::VolumeError;
 

@@ -17,7 +17,6 @@ mod view;
 use std::sync::Arc;
 use std::time::Instant;
 
-pub use self::backend::Backend;
 pub use self::error::Error;
 #[cfg(feature = "gpu")]
 pub use self::gpu::GpuHeadless;
@@ -27,14 +26,13 @@ pub use self::view::HeadlessView;
 use self::view::ViewBackend;
 #[cfg(feature = "cpu")]
 use crate::cpu::CpuRenderer;
-use crate::device_error::DeviceError;
 use crate::error::RenderError;
-use crate::image::Image;
-use crate::pick::Pick;
-use crate::scene::Scene;
+use crate::error::device::DeviceError;
 #[cfg(any(feature = "gpu", feature = "cpu"))]
-use crate::setting_error::SettingError;
-use crate::stats::Stats;
+use crate::error::setting::SettingError;
+use crate::pick::Pick;
+pub use crate::rendering::{Backend, Rendering};
+use crate::scene::Scene;
 use crate::volume::Volume;
 
 /// Renders with one backend. On the GPU it opens its own device; on the CPU it needs no driver.
@@ -50,15 +48,6 @@ enum Drawer {
     #[cfg(feature = "cpu")]
     Cpu,
     Reference,
-}
-
-/// An image with its statistics.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Rendering {
-    /// The image, over the scene's background.
-    pub image: Image,
-    /// Its counts and times.
-    pub stats: Stats,
 }
 
 impl Headless {

@@ -4,7 +4,7 @@ use super::Backend;
 #[cfg(feature = "gpu")]
 use crate::gpu::device::DeviceRequirements;
 #[cfg(feature = "gpu")]
-use crate::renderer::options::RendererOptions;
+use crate::gpu::options::RendererOptions;
 use crate::settings::splatting::Rasterizer;
 #[cfg(feature = "gpu")]
 use wgpu::TextureFormat;

@@ -5,11 +5,11 @@ use std::time::Instant;
 
 use super::{Backend, Rendering, milliseconds_since};
 use crate::error::RenderError;
+use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::pick::{FirstHits, Pick};
 use crate::reference::{self, Host};
 use crate::scene::Scene;
-use crate::setting_error::SettingError;
 use crate::settings::camera::Camera;
 use crate::settings::splatting::check_first_hit;
 use crate::settings::transfer_function::TransferFunction;
@@ -34,7 +34,7 @@ impl ReferenceView {
         scene.check()?;
         scene.transfer.check_volume(&volume)?;
         let transfer = scene.transfer.resolve(&volume);
-        Ok(Self { volume, scene: scene.clone(), transfer, first_hit: None, hits: None })
+        Ok(Self { scene: scene.classified(&volume), volume, transfer, first_hit: None, hits: None })
     }
 
     pub(super) fn scene(&self) -> &Scene {

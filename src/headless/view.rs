@@ -5,10 +5,10 @@ use super::Backend;
 use super::reference::ReferenceView;
 #[cfg(feature = "cpu")]
 use crate::cpu::CpuRenderer;
+use crate::error::setting::{Interval, SettingError};
 #[cfg(feature = "gpu")]
 use crate::renderer::scene_view::SceneView;
 use crate::scene::Scene;
-use crate::setting_error::{Interval, SettingError};
 use crate::settings::camera::Camera;
 
 /// A view of a volume for any number of frames, made by [`Headless::view`](super::Headless::view). Frames share the sorted lists.

@@ -6,12 +6,12 @@ use std::ops::Range;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use crate::after::plane_geometry::PlaneGeometry;
 use crate::error::RenderError;
+use crate::error::setting::SettingError;
+use crate::geometry::plane_geometry::PlaneGeometry;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::lists::brick;
 use crate::lists::brick::Brick;
-use crate::setting_error::SettingError;
 use crate::settings::splatting::Order;
 
 /// The width and height of the rasterizer's patches in pixels.
@@ -167,7 +167,7 @@ impl PatchBins {
             .map(|group| match planes {
                 // Footprints are largest on the first of the group's planes.
                 Some(planes) => {
-                    let first = planes.from_eye(group_planes.plane(group) + view.slabs.width);
+                    let first = planes.distance_from_eye(group_planes.plane(group) + view.slabs.width);
                     planes.footprint_half_box(support, first)
                 }
                 None => view.half_box(support, group_planes.plane(group)..group_planes.plane(group + 1)),

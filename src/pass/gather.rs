@@ -46,10 +46,7 @@ pub struct GatherMode {
 
 /// The order in which groups are drawn. A plane is handed on from front to back, and after splatting the order does not change an image (SPEC §9).
 pub fn drawn_order(splatting: &Splatting) -> Order {
-    match splatting.classification {
-        Classification::Before => splatting.order,
-        Classification::After => Order::FrontToBack,
-    }
+    if splatting.classification == Classification::After { Order::FrontToBack } else { splatting.order }
 }
 
 /// What is gathered on slab planes (SPEC §9).

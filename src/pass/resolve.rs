@@ -4,11 +4,11 @@ use wgpu::{BindGroup, Buffer, Device, RenderPass, RenderPipeline, ShaderStages};
 
 use crate::gpu::bindings::{Bindings, storage, uniform};
 use crate::gpu::layout::{Band, Frame};
+use crate::gpu::options::RendererOptions;
+use crate::gpu::placement::Placement;
 use crate::gpu::render_pipeline::{Attachments, render_pipeline};
 use crate::gpu::shaders;
 use crate::gpu::targets::BandBuffer;
-use crate::renderer::options::RendererOptions;
-use crate::renderer::placement::Placement;
 
 /// The stage's pipeline.
 #[derive(Debug)]

@@ -9,6 +9,7 @@ use super::sheet_groups::{GroupSettings, SheetGroups, group_stride};
 use super::{FrameEstimate, FrameInputs, Prepared, compute};
 use crate::error::RenderError;
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes};
+use crate::gpu::counts::GroupSlabs;
 use crate::gpu::layout::{Brick, FieldPlanes};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
@@ -25,7 +26,6 @@ use crate::pass::values::PlaneBuffers;
 use crate::rasterizer::request::{After, FrameRequest};
 use crate::settings::shading::Gradient;
 use crate::settings::splatting::Order;
-use crate::stats::GroupSlabs;
 
 /// The stages.
 #[derive(Debug)]

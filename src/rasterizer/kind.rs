@@ -3,10 +3,10 @@
 use wgpu::Device;
 
 use crate::error::RenderError;
+use crate::error::setting::SettingError;
 use crate::gpu::device::TILE_FEATURES;
 use crate::pass::composite::RayMode;
 use crate::pass::gather::WORKGROUP_BYTES;
-use crate::setting_error::SettingError;
 use crate::settings::splatting::{Classification, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
 
 /// The subgroup sizes that tiles support.

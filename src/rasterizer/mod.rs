@@ -13,12 +13,12 @@ use wgpu::{Buffer, BufferUsages, ComputePassDescriptor, Device, Queue};
 
 use crate::error::RenderError;
 use crate::geometry::footprint::FootprintTable;
-use crate::geometry::kernel::Kernel;
 use crate::gpu::bindings::filled;
 use crate::gpu::classified_volume::ClassifiedVolume;
 use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
+use crate::kernel::Kernel;
 use crate::pass::composite::CutBuffers;
 use crate::rasterizer::request::FrameRequest;
 use crate::settings::splatting::FootprintForm;

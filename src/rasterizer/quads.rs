@@ -7,6 +7,7 @@ use super::{Footprints, FrameEstimate, FrameInputs, Prepared, compute};
 use crate::error::RenderError;
 use crate::geometry::footprint::FootprintTable;
 use crate::gpu::bindings::sizes;
+use crate::gpu::counts::GroupSlabs;
 use crate::gpu::layout::Brick;
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
@@ -18,7 +19,6 @@ use crate::pass::occlude::Occlude;
 use crate::pass::splat::{Splat, SplatMode};
 use crate::pass::tiles::Tiles;
 use crate::rasterizer::request::FrameRequest;
-use crate::stats::GroupSlabs;
 
 /// The rasterizer's stages.
 #[derive(Debug)]

@@ -7,16 +7,16 @@ use wgpu::Device;
 use super::kind::{RasterizerKind, check_rays};
 use crate::after::brick_ranges::Bearing;
 use crate::after::normalization::Normalization;
-use crate::after::plane_geometry::PlaneGeometry;
 use crate::error::RenderError;
-use crate::geometry::kernel::Kernel;
 use crate::geometry::means;
+use crate::geometry::plane_geometry::PlaneGeometry;
 use crate::geometry::surfaces::{SurfaceDepths, Surfaces};
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::classified_volume::{BrickNeeds, ClassifiedVolume};
 use crate::gpu::layout::Band;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::uniforms::Ramps;
+use crate::kernel::Kernel;
 use crate::pass::composite::RayMode;
 use crate::scene::Scene;
 use crate::settings::camera::Camera;
@@ -102,10 +102,8 @@ impl FrameRequest {
             None => None,
         };
         let (kind, fallback) = RasterizerKind::of(device, &splatting, rasterizer)?;
-        let after = match splatting.classification {
-            Classification::Before => None,
-            Classification::After => Some(After::new(volume, scene, &seen)?),
-        };
+        let is_after = splatting.classification == Classification::After;
+        let after = is_after.then(|| After::new(volume, scene, &seen)).transpose()?;
         let ramps = match &after {
             None => Ramps::new(volume.transfer()),
             Some(after) => Ramps::with_integrals(volume.transfer(), splatting.compositing, &after.numbers),

@@ -10,6 +10,7 @@ use crate::error::RenderError;
 use crate::geometry::footprint::FootprintTable;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, written};
+use crate::gpu::counts::GroupSlabs;
 use crate::gpu::layout::{Brick, FOLD, Indirect, QUADS, SheetGroup, Splat, Tally};
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
@@ -21,7 +22,6 @@ use crate::pass::sample::{Sample, SampleBuffers, SampleMode};
 use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};
 use crate::rasterizer::request::FrameRequest;
 use crate::settings::splatting::Compositing;
-use crate::stats::GroupSlabs;
 use crate::volume::Grid;
 
 /// Planes around all kernels, in the sheet depth of such views.

@@ -9,6 +9,7 @@ use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, uploaded};
 use crate::gpu::classified_volume::ClassifiedVolume;
+use crate::gpu::counts::GroupSlabs;
 use crate::gpu::layout::{Brick, SheetGroup, Tally};
 use crate::gpu::targets::Targets;
 use crate::lists::brick;
@@ -19,7 +20,6 @@ use crate::pass::tiles::{TileLists, Tiles};
 use crate::pass::values::PlaneBuffers;
 use crate::rasterizer::request::FrameRequest;
 use crate::settings::splatting::Order;
-use crate::stats::GroupSlabs;
 
 /// A frame's sheet groups.
 #[derive(Debug)]

@@ -6,10 +6,11 @@ use wgpu::{Buffer, BufferUsages, CommandEncoder, Limits, TextureView};
 
 use super::kind::SUBGROUP_SIZES;
 use super::{FrameEstimate, FrameInputs, Prepared};
-use crate::after::plane_geometry::PlaneGeometry;
 use crate::error::RenderError;
+use crate::geometry::plane_geometry::PlaneGeometry;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, written};
+use crate::gpu::counts::GroupSlabs;
 use crate::gpu::gathered_layout::GatheredLayout;
 use crate::gpu::layout::{Brick, FieldPlanes, Gather as GatherUniform, PatchRange};
 use crate::gpu::timer::Timer;
@@ -19,7 +20,6 @@ use crate::pass::gather::{self, Gather, GatherBand, GatherBuffers, GatherMode, P
 use crate::pass::values::PlaneBuffers;
 use crate::rasterizer::request::{After, FrameRequest};
 use crate::settings::splatting::Order;
-use crate::stats::GroupSlabs;
 
 /// The rasterizer's stage.
 #[derive(Debug, Default)]

@@ -11,7 +11,7 @@ use super::visibility::{OpaqueMask, Test};
 use super::{Areas, Buffer, Culled, Cuts, Geometry, Host, Means, Section, Splat};
 use super::{composite, resolve, shading, sheets, splat};
 use crate::error::RenderError;
-use crate::geometry::kernel::Kernel;
+use crate::kernel::Kernel;
 use crate::lists::quad_plan::tile_grid;
 use crate::scene::Scene;
 use crate::settings::splatting::{Compositing, Method, Order};

@@ -82,7 +82,7 @@ fn low_pass(m: DMat2) -> (DMat2, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::kernel::Kernel;
+    use crate::kernel::Kernel;
     use crate::settings::camera::Camera;
 
     #[test]

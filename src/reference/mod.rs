@@ -19,9 +19,9 @@ pub mod visibility;
 use glam::DVec4;
 
 use crate::error::RenderError;
+use crate::error::setting::SettingError;
 use crate::image::Image;
 use crate::scene::Scene;
-use crate::setting_error::SettingError;
 use crate::settings::splatting::{Classification, check_first_hit};
 use crate::settings::transfer_function::TransferFunction;
 use crate::stats::Counts;
@@ -98,7 +98,7 @@ impl Host<'_> {
 /// # Errors
 /// If the scene needs more than can be computed.
 pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Counts, RenderError> {
-    if scene.splatting.classification == Classification::After {
+    if scene.classification(volume) == Classification::After {
         return after::count(volume, transfer, scene);
     }
     before::count(volume, transfer, scene)
@@ -143,7 +143,7 @@ pub fn render_for(
     scene: &Scene,
     test: Option<visibility::Test>,
 ) -> Result<Culled, RenderError> {
-    if scene.splatting.classification == Classification::After {
+    if scene.classification(volume) == Classification::After {
         return after::render_for(host, volume, transfer, scene);
     }
     before::render_for(host, volume, transfer, scene, test)

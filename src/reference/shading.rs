@@ -4,8 +4,8 @@ use glam::{DVec2, DVec3, DVec4};
 use rayon::prelude::*;
 
 use super::Geometry;
+use crate::error::setting::scaled;
 use crate::scene::Scene;
-use crate::setting_error::scaled;
 use crate::settings::shading::{Light, Shading};
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::TransferFunction;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{Geometry, Splat};
-use crate::geometry::kernel::Kernel;
+use crate::kernel::Kernel;
 use crate::settings::splatting::Method;
 
 /// For every sheet that has splats, their indices, front to back: image-aligned by slab (§3.2), axis-aligned by slice (§3.1).

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::footprint::Footprint;
 use super::{Buffer, Geometry, Splat};
-use crate::geometry::kernel::Kernel;
+use crate::kernel::Kernel;
 
 /// A kernel section, or a whole kernel, on the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,10 +1,7 @@
 //! The renderer that a host embeds. It owns pipelines, but no device, and neither submits nor waits. It prepares every frame, which can fail,
 //! records it, and presents it, which fails only for a scissor outside the target.
 
-pub(crate) mod counts;
-pub(crate) mod options;
 pub(crate) mod pick;
-pub(crate) mod placement;
 pub(crate) mod prepared_frame;
 pub(crate) mod scene_view;
 
@@ -12,12 +9,16 @@ use std::sync::{Once, OnceLock};
 
 use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Queue, RenderPass, TextureFormat, TextureView};
 
+use crate::error::setting::SettingError;
 use crate::error::{RenderError, check_device};
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, written};
 use crate::gpu::classified_volume::BrickNeeds;
+use crate::gpu::counts::Staging;
 use crate::gpu::device::{self, DeviceError, DeviceRequirements};
 use crate::gpu::fault::scoped;
 use crate::gpu::layout::{Cut, Frame, Tally};
+use crate::gpu::options::RendererOptions;
+use crate::gpu::placement::Placement;
 use crate::gpu::targets::{CompositingBuffer, no_surfaces};
 use crate::gpu::timer::{PASS_BYTES, Timer};
 use crate::gpu::uniforms;
@@ -31,12 +32,8 @@ use crate::rasterizer::quads::QuadRasterizer;
 use crate::rasterizer::request::FrameRequest;
 use crate::rasterizer::samples::SampleRasterizer;
 use crate::rasterizer::tiles::TileRasterizer;
-use crate::renderer::counts::Staging;
-use crate::renderer::options::RendererOptions;
-use crate::renderer::placement::Placement;
 use crate::renderer::prepared_frame::{Drawing, FirstHits, PreparedFrame, PreviousFrame};
 use crate::renderer::scene_view::{Prepared, SceneView};
-use crate::setting_error::SettingError;
 use crate::settings::splatting::Rasterizer;
 
 /// The pipelines of every stage, for one device. Any number of volumes and frames can share it.
@@ -105,7 +102,7 @@ impl Renderer {
     /// If the scene needs something that is not implemented or that exceeds the device's limits, or if the device fails. An error found before
     /// anything is allocated leaves the view's last frame. After any other error, and after every failure of the device, the view has no
     /// frame and is not drawn until it is prepared again: after
-    /// [`OutOfMemory`](crate::gpu::fault::DeviceFault::OutOfMemory) with smaller settings, after any other failure by a new renderer.
+    /// [`OutOfMemory`](crate::DeviceFault::OutOfMemory) with smaller settings, after any other failure by a new renderer.
     pub fn prepare(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
         check_device(device, &self.device, "the renderer")?;
         check_device(device, view.volume.gpu_volume().device(), "the view")?;

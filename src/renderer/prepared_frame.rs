@@ -4,13 +4,13 @@ use wgpu::{BindGroup, Buffer, CommandEncoder, Texture, TextureFormat, TextureVie
 
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
+use crate::gpu::counts::{GroupSlabs, Staging, Totals};
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
 use crate::rasterizer::fields::FieldFrame;
 use crate::rasterizer::quads::QuadFrame;
 use crate::rasterizer::samples::SampleFrame;
 use crate::rasterizer::tiles::TileFrame;
-use crate::renderer::counts::{GroupSlabs, Staging, Totals};
 
 /// A frame whose buffers are all allocated and filled, so that recording it cannot fail.
 #[derive(Debug)]

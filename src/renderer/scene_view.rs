@@ -4,23 +4,23 @@ use std::sync::OnceLock;
 
 use wgpu::{CommandEncoder, Device, Texture};
 
+use crate::error::setting::{Interval, SettingError};
 use crate::error::{RenderError, check_device};
 use crate::geometry::surfaces::Surfaces;
 use crate::gpu::classified_volume::{ClassifiedVolume, Touched};
+use crate::gpu::counts::PendingCounts;
 use crate::gpu::fault::scoped;
 use crate::gpu::gpu_volume::GpuVolume;
 pub use crate::rasterizer::Prepared;
 use crate::renderer::pick::PendingPick;
 use crate::renderer::prepared_frame::PreparedFrame;
 use crate::scene::{ImageSettings, Scene};
-use crate::setting_error::{Interval, SettingError};
 use crate::settings::camera::Camera;
 use crate::settings::clip::Clip;
 use crate::settings::framing::Extent;
 use crate::settings::shading::{Light, Shading};
 use crate::settings::splatting::{Splatting, check_first_hit};
 use crate::settings::transfer_function::{TransferFunction, check_iso_ranges};
-use crate::stats::PendingCounts;
 
 /// A view of a volume: camera, image, transfer function, shading and splatting settings, and the last frame's buffers. Setters take effect
 /// with the next [`Renderer::prepare`](crate::renderer::Renderer::prepare). A setter that refuses a value names the field, as reading a
@@ -49,9 +49,10 @@ impl SceneView {
         scene.transfer.check_volume(volume.volume())?;
         let transfer = scene.transfer.resolve(volume.volume());
         let clipped = scene.clip.voxels(volume.volume().grid(), scene.splatting.radius);
+        let scene = scene.classified(volume.volume());
         let classification = scene.splatting.classification;
         let volume = scoped(device, || ClassifiedVolume::new(device, volume, transfer, clipped, classification))?;
-        Ok(Self { volume, scene: scene.clone(), surfaces: None, first_hit: None, frame: None, extent: OnceLock::new() })
+        Ok(Self { volume, scene, surfaces: None, first_hit: None, frame: None, extent: OnceLock::new() })
     }
 
     /// The settings. Its `volume` and `transfer` are those with which the view was made.
@@ -140,8 +141,9 @@ impl SceneView {
         if !clip.is_empty() && splatting.radius != old.radius {
             self.volume.set_clip(clip.voxels(self.volume.grid(), splatting.radius));
         }
-        self.volume.set_classification(splatting.classification);
         self.scene.splatting = splatting;
+        self.scene.splatting.classification = self.scene.classification(self.volume.volume());
+        self.volume.set_classification(self.scene.splatting.classification);
         Ok(())
     }
 

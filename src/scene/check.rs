@@ -2,7 +2,7 @@
 
 use super::{ImageSettings, Scene, TransferSettings};
 use crate::appearance::Colormap;
-use crate::setting_error::{Interval, SettingError};
+use crate::error::setting::{Interval, SettingError};
 use crate::settings::transfer_function::{check_iso_ranges, check_labels, check_ramps};
 use crate::volume::{Volume, check_spacing};
 

@@ -12,9 +12,9 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use toml::Table;
 
-use crate::appearance::{Colormap, Preset};
+use crate::appearance::{Colormap, Preset, categories};
+use crate::error::setting::Allowed;
 use crate::lists::extent;
-use crate::setting_error::Allowed;
 use crate::settings::camera::{Camera, Fit};
 use crate::settings::clip::Clip;
 use crate::settings::framing::Extent;
@@ -218,7 +218,7 @@ impl Scene {
             clip: Clip::default(),
             transfer: TransferSettings::default(),
             shading: Shading::default(),
-            splatting: Splatting::default(),
+            splatting: Splatting { classification: Classification::Auto, ..Splatting::default() },
         }
     }
 
@@ -328,7 +328,7 @@ impl Scene {
         let camera =
             self.extent(volume, &transfer).map_or(self.camera, |extent| fit(&extent, &self.camera, [width, height]));
         let camera = camera.explicit(volume.grid(), self.splatting.radius, width, height);
-        Self { camera, transfer: transfer.into(), ..self.clone() }
+        Self { camera, transfer: transfer.into(), ..self.classified(volume) }
     }
 
     /// The box that a camera fits under a transfer function (for a scene that leaves it to the volume, that of
@@ -352,7 +352,28 @@ impl Scene {
         let ImageSettings { width, height, .. } = self.image;
         let extent = self.extent(volume, transfer);
         let camera = extent.map_or(self.camera, |extent| extent.fit(&self.camera, [width, height]));
-        Self { camera, ..self.clone() }
+        Self { camera, ..self.classified(volume) }
+    }
+
+    /// Whether values are classified before or after splatting, for a volume (SPEC §9): as stated, or with [`Classification::Auto`] after
+    /// it where the transfer function comes from a preset (except `xray`, `mip`, `confocal` and `labels`) or is chosen for the volume, unless
+    /// another setting excludes that or the volume is a label map ([`categories`](crate::appearance::categories)).
+    pub fn classification(&self, volume: &Volume) -> Classification {
+        let Self { transfer, splatting, .. } = self;
+        if splatting.classification != Classification::Auto {
+            return splatting.classification;
+        }
+        let is_sharper = match transfer.preset {
+            Some(preset) => preset.is_classified_after(),
+            None => *transfer == TransferSettings::default() && !categories::is_label_map(volume),
+        };
+        if is_sharper && splatting.allows_after() { Classification::After } else { Classification::Before }
+    }
+
+    /// The scene with a classification that no longer depends on the volume.
+    pub(crate) fn classified(&self, volume: &Volume) -> Self {
+        let splatting = Splatting { classification: self.classification(volume), ..self.splatting };
+        Self { splatting, ..self.clone() }
     }
 
     /// `source` is the volume of a scene whose tables name none.
@@ -368,6 +389,7 @@ impl Scene {
         let fit = if is_bare { Fit::Object } else { Fit::Volume };
         let overridden = sets.iter().map(|set| apply_override(&mut root, set)).collect::<Result<_, _>>()?;
         let origins = Origins { file: origin, overridden, written: root.clone() };
+        let states_transfer = root.contains_key("transfer");
         let mut root = Section::root(&origins, root);
         let [volume, camera, image, clip, transfer, shading, splatting] = [
             root.section("volume")?,
@@ -382,7 +404,15 @@ impl Scene {
         root.read("preset", &mut preset, |entry| entry.choice(&Preset::ALL).map(Some))?;
         // Unknown tables are reported first: a misspelt table best explains why keys seem to be missing.
         root.finish()?;
-        let compositing = preset.map_or(Splatting::default().compositing, Preset::compositing);
+        let splatting_of_preset = Splatting {
+            compositing: preset.map_or(Splatting::default().compositing, Preset::compositing),
+            classification: if states_transfer && preset.is_none() {
+                Classification::Before
+            } else {
+                Classification::Auto
+            },
+            ..Splatting::default()
+        };
         let tables::VolumeSettings { source, spacing, labels } = tables::volume(volume, folder, source)?;
         let scene = Self {
             volume: source,
@@ -393,7 +423,7 @@ impl Scene {
             clip: tables::clip(clip)?,
             transfer: TransferSettings { preset, ..tables::transfer(transfer)? },
             shading: tables::shading(shading, preset.map_or_else(Shading::default, Preset::shading))?,
-            splatting: tables::splatting(splatting, compositing)?,
+            splatting: tables::splatting(splatting, splatting_of_preset)?,
         };
         if !scene.transfer.labels.is_empty() && !scene.may_have_labels() {
             let allowed = "no such tables, or volume.labels, or volume.builtin = \"head\" or \"tomato\"";

@@ -6,7 +6,7 @@ use glam::UVec3;
 use toml::{Table, Value};
 
 use super::{ImageSettings, SceneError};
-use crate::setting_error::{Allowed, Found, Interval, SettingError};
+use crate::error::setting::{Allowed, Found, Interval, SettingError};
 use crate::settings::economies::KEYS;
 use crate::settings::transfer_function::{Ramp, RampError};
 use crate::volume::{SIZES, dims_of};

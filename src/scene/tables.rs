@@ -11,12 +11,12 @@ use super::names::{
 use super::reader::{Entry, LABEL, Section};
 use super::{ImageSettings, SceneError, TransferSettings, VolumeSource};
 use crate::appearance::Colormap;
-use crate::setting_error::Interval;
+use crate::error::setting::Interval;
 use crate::settings::camera::{Camera, FOV_Y, Fit, Projection};
 use crate::settings::clip::{Clip, MAX_PLANES};
 use crate::settings::economies::{Economies, KEYS};
 use crate::settings::shading::{Light, Shading};
-use crate::settings::splatting::{Compositing, FALLOFF, RADIUS, SLAB_WIDTH, Splatting};
+use crate::settings::splatting::{FALLOFF, RADIUS, SLAB_WIDTH, Splatting};
 use crate::settings::transfer_function::{LabelTables, Ramp};
 use crate::volume::{RawLayout, SPACING, SampleType, check_spacing};
 
@@ -222,8 +222,7 @@ pub(super) fn shading(mut section: Section, mut shading: Shading) -> Result<Shad
 }
 
 /// Reads `[splatting]` over a preset's values.
-pub(super) fn splatting(mut section: Section, compositing: Compositing) -> Result<Splatting, SceneError> {
-    let mut splatting = Splatting { compositing, ..Splatting::default() };
+pub(super) fn splatting(mut section: Section, mut splatting: Splatting) -> Result<Splatting, SceneError> {
     section.read("method", &mut splatting.method, |entry| entry.choice(METHODS))?;
     section.read("radius", &mut splatting.radius, |entry| entry.number(RADIUS))?;
     section.read("falloff", &mut splatting.falloff, |entry| entry.number(FALLOFF))?;

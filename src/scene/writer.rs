@@ -15,7 +15,7 @@ use crate::settings::camera::{Camera, Projection};
 use crate::settings::clip::Clip;
 use crate::settings::economies::Economies;
 use crate::settings::shading::{Light, Shading};
-use crate::settings::splatting::Splatting;
+use crate::settings::splatting::{Classification, Splatting};
 use crate::settings::transfer_function::Ramp;
 use crate::volume::RawLayout;
 
@@ -161,7 +161,10 @@ fn write_clip(text: &mut Text, clip: &Clip) {
 
 fn write_transfer(text: &mut Text, transfer: &TransferSettings) {
     let TransferSettings { preset: _, colormap, color, opacity, gradient_opacity, iso_ranges, labels } = transfer;
-    text.table("transfer");
+    // An empty table would state that the scene has its own transfer function (SPEC §9).
+    if *transfer != (TransferSettings { preset: transfer.preset, ..TransferSettings::default() }) {
+        text.table("transfer");
+    }
     text.given("colormap", colormap.map(|map| name_of(&Colormap::ALL, map)));
     text.ramps(color.as_ref(), opacity.as_ref(), gradient_opacity.as_ref());
     let ranges = iso_ranges.as_ref().map(|ranges| ranges.iter().map(|&range| numbers(range)).collect::<Vec<_>>());
@@ -199,7 +202,10 @@ fn write_splatting(text: &mut Text, splatting: &Splatting) {
     text.line("radius", radius);
     text.line("falloff", falloff);
     text.line("slab_width", slab_width);
-    text.line("classification", name_of(CLASSIFICATIONS, classification));
+    // A scene that does not state it leaves it to the volume.
+    if classification != Classification::Auto {
+        text.line("classification", name_of(CLASSIFICATIONS, classification));
+    }
     text.line("interpolation", name_of(INTERPOLATIONS, interpolation));
     text.line("footprint", name_of(FORMS, footprint));
     text.line("compositing", name_of(COMPOSITINGS, compositing));

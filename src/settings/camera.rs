@@ -5,7 +5,7 @@ use std::ops::Bound;
 use glam::{DMat3, DVec3};
 
 use crate::error::RenderError;
-use crate::setting_error::{Interval, SettingError, check_direction, scaled};
+use crate::error::setting::{Interval, SettingError, check_direction, scaled};
 use crate::volume::Grid;
 
 /// The range of pixel sizes, in the volume's smallest spacings.

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use glam::{DVec3, DVec4, UVec3};
 
-use crate::setting_error::{Interval, SettingError};
+use crate::error::setting::{Interval, SettingError};
 use crate::volume::Grid;
 
 /// The maximum number of planes, in addition to a crop box.

@@ -3,7 +3,7 @@
 use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 
 use crate::error::RenderError;
-use crate::setting_error::SettingError;
+use crate::error::setting::SettingError;
 use crate::settings::camera::{Camera, Fit, Projection};
 
 /// The maximum relative difference of lengths, and the maximum cosine of right angles: more than the rounding errors of products in f32,

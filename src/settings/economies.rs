@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use crate::setting_error::{Interval, SettingError};
+use crate::error::setting::{Interval, SettingError};
 
 /// The keys, each with its former name in `[splatting]`.
 pub(crate) const KEYS: [(&str, &str); 3] = [

@@ -14,7 +14,7 @@ pub(crate) mod shading;
 pub(crate) mod splatting;
 pub(crate) mod transfer_function;
 
-pub use crate::setting_error::{Allowed, Found, Interval};
+pub use crate::error::setting::{Allowed, Found, Interval};
 pub use camera::{Camera, Fit, Projection};
 pub use clip::{Clip, HalfSpace, MAX_PLANES};
 pub use economies::Economies;

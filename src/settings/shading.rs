@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::setting_error::{Interval, SettingError, check_direction};
+use crate::error::setting::{Interval, SettingError, check_direction};
 
 /// Gradients shorter than this (value per world unit) have no direction (SPEC §3).
 pub const MIN_GRADIENT: f64 = 1e-12;

@@ -3,8 +3,8 @@
 use std::ops::Bound::{Excluded, Included};
 
 use super::economies::Economies;
-use crate::geometry::kernel::Kernel;
-use crate::setting_error::{Interval, SettingError};
+use crate::error::setting::{Interval, SettingError};
+use crate::kernel::Kernel;
 
 /// The range of kernel radii in grid units.
 pub(crate) const RADIUS: Interval = Interval::new(Included(1.0), Included(4.0));
@@ -41,6 +41,9 @@ pub enum Method {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Classification {
+    /// [`Self::After`] where the transfer function comes from a preset or is chosen for the volume and no other setting excludes it, else
+    /// [`Self::Before`]: the rule of [`Scene::classification`](crate::Scene::classification), which views apply when they are made.
+    Auto,
     /// Voxels are classified and shaded, and their colours are splatted (the paper, SPEC §§3–6).
     Before,
     /// Values and gradients are splatted onto the slab planes; what each pixel sees between two planes is classified and shaded there
@@ -205,10 +208,14 @@ impl Splatting {
             let found = format!("\"{name}\" with splatting.order = \"back-to-front\"");
             return refused(found, "\"front-to-back\" with it");
         }
-        match self.classification {
-            Classification::Before => Ok(()),
-            Classification::After => self.check_after(),
-        }
+        if self.classification == Classification::After { self.check_after() } else { Ok(()) }
+    }
+
+    /// Whether no other setting excludes [`Classification::After`].
+    pub(crate) fn allows_after(&self) -> bool {
+        // Tiles draw the other kinds of compositing only.
+        let is_excluded_by_tiles = self.rasterizer == Rasterizer::Tiles && self.compositing.is_by_means();
+        !is_excluded_by_tiles && self.check_after().is_ok()
     }
 
     /// Checks that the settings allow what of rays is looked at: whether anything is cut, and the opacity whose depth is asked for.

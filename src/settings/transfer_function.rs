@@ -5,7 +5,7 @@ use std::ops::{Add, Mul};
 
 use glam::DVec3;
 
-use crate::setting_error::{Interval, SettingError};
+use crate::error::setting::{Interval, SettingError};
 
 /// Why control points are not a valid [`Ramp`].
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]

@@ -4,7 +4,7 @@ use std::ops::Bound::Included;
 
 use glam::{DVec3, UVec3};
 
-use crate::setting_error::{Interval, SettingError};
+use crate::error::setting::{Interval, SettingError};
 
 /// The range of spacings in world units. Squares and products of such lengths stay finite in `f64`.
 pub(crate) const SPACING: Interval = Interval::new(Included(1e-100), Included(1e100));

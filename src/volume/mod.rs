@@ -2,6 +2,7 @@
 
 mod access;
 pub mod builtin;
+mod coefficients;
 mod data_files;
 #[cfg(feature = "dicom")]
 mod dicom;
@@ -46,6 +47,7 @@ use rayon::prelude::*;
 
 pub(crate) use access::Access;
 pub use access::ReadOptions;
+use coefficients::KeptCoefficients;
 pub use grid::Grid;
 pub(crate) use grid::{SPACING, check_spacing};
 pub use labels::Labels;
@@ -55,7 +57,7 @@ pub use raw::RawLayout;
 pub use samples::SampleType;
 pub(crate) use samples::{SIZES, dims_of};
 
-use crate::setting_error::SettingError;
+use crate::error::setting::SettingError;
 
 /// Why a volume could not be loaded. Every message names the file (or builtin), the field, what was found and what is allowed.
 #[derive(Debug, thiserror::Error)]
@@ -119,12 +121,15 @@ pub struct Volume {
     unit: Option<String>,
     encoding: Option<Encoding>,
     palette: Option<Vec<(f64, DVec3)>>,
+    /// Not part of the volume itself; clones share them, since their values are the same.
+    coefficients: KeptCoefficients,
 }
 
 impl PartialEq for Volume {
     /// Two holes compare as equal.
     fn eq(&self, other: &Self) -> bool {
-        let Self { grid, values, holes, labels, label_names, orientation, unit, encoding, palette } = other;
+        let Self { grid, values, holes, labels, label_names, orientation, unit, encoding, palette, coefficients: _ } =
+            other;
         let facts = (grid, holes, labels, label_names, orientation, unit, encoding, palette);
         let Self { grid, holes, labels, label_names, orientation, unit, encoding, palette, .. } = self;
         facts == (grid, holes, labels, label_names, orientation, unit, encoding, palette)
@@ -161,6 +166,7 @@ impl Volume {
             unit: None,
             encoding: None,
             palette: None,
+            coefficients: KeptCoefficients::default(),
         })
     }
 
@@ -227,6 +233,16 @@ impl Volume {
     /// How the file stored the values; `None` if they come from no file.
     pub fn encoding(&self) -> Option<Encoding> {
         self.encoding
+    }
+
+    /// The coefficients that interpolate the values with a kernel of a radius and falloff, computed at the first request and kept for further
+    /// ones with the same kernel.
+    pub(crate) fn coefficients<E>(
+        &self,
+        kernel: (f64, f64),
+        compute: impl FnOnce() -> Result<Vec<f32>, E>,
+    ) -> Result<Arc<[f32]>, E> {
+        self.coefficients.get_or_compute(kernel, compute)
     }
 
     /// The colours (red, green and blue in [0, 1]) that the file assigns to values, in ascending order; `None` without a palette.

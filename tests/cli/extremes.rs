@@ -40,12 +40,17 @@ fn extremes_agree_with_the_reference() {
         "huge.nrrd",
         "huge.nrrd --set transfer.opacity=[[-3e38,0],[3e38,0.9]]",
     ] {
-        let (.., reference) = folder.pixels(&format!("{case} {view} --backend reference"));
-        for rasterizer in RASTERIZERS {
-            let (.., gpu) = folder.pixels(&format!("{case} {view} {UNCULLED} {rasterizer}"));
-            assert!(gpu.iter().flatten().all(|channel| channel.is_finite()), "{case} {rasterizer}");
-            let decibels = psnr(&gpu, &reference, BLACK, 50);
-            assert_at_least(decibels, 75.0, format_args!("{case} {rasterizer}"));
+        for (classification, required) in [("before", 75.0), ("after", 60.0)] {
+            // Kernels a thousand times wider than the picture lie on slab planes only to within f32's resolution (docs/accuracy.md).
+            let required = if classification == "after" && case.contains("10000") { 50.0 } else { required };
+            let case = format!("{case} {view} --set splatting.classification={classification}");
+            let (.., reference) = folder.pixels(&format!("{case} --backend reference"));
+            for rasterizer in RASTERIZERS {
+                let (.., gpu) = folder.pixels(&format!("{case} {UNCULLED} {rasterizer}"));
+                assert!(gpu.iter().flatten().all(|channel| channel.is_finite()), "{case} {rasterizer}");
+                let decibels = psnr(&gpu, &reference, BLACK, 50);
+                assert_at_least(decibels, required, format_args!("{case} {rasterizer}"));
+            }
         }
     }
 }
@@ -115,7 +120,9 @@ fn the_smallest_and_the_narrowest() {
     for (volume, width, height) in
         [("one", 1, 1), ("ball", 1, 1), ("ball", 1, 200), ("ball", 8192, 1), ("ball", 1, 8192), ("one", 3, 5)]
     {
-        let render = format!("{volume}.nrrd --set image={{width={width},height={height}}} {WHOLE}");
+        // Classified after splatting, nothing shows where no pixel's ray meets the volume.
+        let before = "--set splatting.classification=before";
+        let render = format!("{volume}.nrrd --set image={{width={width},height={height}}} {WHOLE} {before}");
         let (.., reference) = folder.pixels(&format!("{render} --backend reference"));
         assert!(reference.iter().any(|pixel| pixel[0] > 0.0), "{render} is black");
         for rasterizer in RASTERIZERS {

@@ -7,11 +7,12 @@ pub(crate) mod surfaces;
 
 use glam::{DVec3, DVec4, UVec3};
 use sheetsplat::DeviceRequirements;
-use sheetsplat::headless::{GpuHeadless, HeadlessOptions};
+use sheetsplat::cpu;
+use sheetsplat::headless::{GpuHeadless, HeadlessOptions, Rendering};
 use sheetsplat::scene::{ImageSettings, Scene, TransferSettings, VolumeSource};
 use sheetsplat::settings::Ramp;
 use sheetsplat::settings::{Camera, Projection};
-use sheetsplat::settings::{Compositing, FootprintForm, Rasterizer};
+use sheetsplat::settings::{Compositing, FootprintForm, Rasterizer, Splatting};
 use sheetsplat::volume::{Grid, Volume};
 use sheetsplat::wgpu::{Features, Limits, TextureFormat};
 
@@ -41,12 +42,45 @@ pub(crate) const BY_MEANS: [Compositing; 4] =
 /// Both rasterizers, whatever `auto` would choose.
 pub(crate) const RASTERIZERS: [Rasterizer; 2] = [Rasterizer::Quads, Rasterizer::Tiles];
 
+/// Everything that draws whole frames: the rasterizers on the GPU, and the native backend.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Drawing {
+    /// A GPU's rasterizer.
+    By(Rasterizer),
+    /// The native backend.
+    Native,
+}
+
+/// All of them.
+pub(crate) const DRAWINGS: [Drawing; 3] =
+    [Drawing::By(Rasterizer::Quads), Drawing::By(Rasterizer::Tiles), Drawing::Native];
+
+impl Drawing {
+    /// Draws a frame, which must succeed.
+    pub(crate) fn render(self, gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> Rendering {
+        let Self::By(rasterizer) = self else { return cpu::render(volume.clone(), scene).unwrap() };
+        let splatting = Splatting { rasterizer, ..scene.splatting };
+        gpu.render_volume(volume.clone(), &Scene { splatting, ..scene.clone() }).unwrap()
+    }
+
+    /// Whether sheets are summed in f16, or amounts rounded to it.
+    pub(crate) fn rounds_to_f16(self) -> bool {
+        self == Self::By(Rasterizer::Quads)
+    }
+}
+
 /// Both rasterizers, each with all footprint forms that it supports.
 pub(crate) const FORMS: [(Rasterizer, FootprintForm); 3] = [
     (Rasterizer::Quads, FootprintForm::SummedArea),
     (Rasterizer::Quads, FootprintForm::Sections),
     (Rasterizer::Tiles, FootprintForm::SummedArea),
 ];
+
+/// Everything that draws whole frames, each with all footprint forms that it supports.
+pub(crate) fn drawn_forms() -> impl Iterator<Item = (Drawing, FootprintForm)> {
+    let native = (Drawing::Native, FootprintForm::SummedArea);
+    FORMS.into_iter().map(|(rasterizer, form)| (Drawing::By(rasterizer), form)).chain([native])
+}
 
 /// Mesa's software driver, on which the tests compare images, so that results are the same on every machine.
 pub(crate) fn lavapipe() -> HeadlessOptions {
@@ -72,10 +106,11 @@ pub(crate) fn pixels(bytes: &[u8]) -> Vec<DVec4> {
     bytemuck::pod_collect_to_vec::<_, [f32; 4]>(bytes).iter().map(|pixel| DVec4::from(pixel.map(f64::from))).collect()
 }
 
-/// A scene that shows a whole volume, which the test supplies.
+/// A scene that shows a whole volume, which the test supplies, classified before splatting unless the test says otherwise.
 pub(crate) fn scene(width: u32, height: u32) -> Scene {
     let image = ImageSettings { width, height, ..ImageSettings::default() };
-    Scene { image, camera: Camera::default(), ..Scene::new(VolumeSource::Builtin("cube".to_owned())) }
+    let (camera, splatting) = (Camera::default(), Splatting::default());
+    Scene { image, camera, splatting, ..Scene::new(VolumeSource::Builtin("cube".to_owned())) }
 }
 
 /// An orthographic camera that shows `height` world units.

@@ -9,6 +9,7 @@ mod after;
 mod common;
 mod modes;
 mod picks;
+mod surfaces;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::cpu::{self, CpuRenderer, Simd};

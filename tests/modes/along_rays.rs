@@ -11,7 +11,7 @@ use sheetsplat::volume::{Volume, builtin};
 
 use crate::common::compare::{assert_at_most, largest};
 use crate::common::images::largest_difference;
-use crate::common::{RASTERIZERS, Random, camera, gpu, scene, transfer};
+use crate::common::{DRAWINGS, Random, camera, gpu, scene, transfer};
 use crate::{COLOR, OPACITY, constant, render, view_of};
 
 /// The part of a pixel's ray in a box with this half size in grid steps: its ends in grid steps from the volume's centre.
@@ -53,9 +53,8 @@ fn the_average_of_a_constant_is_the_constant() {
     for (volume, mut scene) in views_of_a_constant(&mut Random(5)) {
         scene.splatting.compositing = Compositing::Average;
         let (center, radius, view) = (volume.grid().center(), scene.splatting.radius, view_of(&volume, &scene));
-        for rasterizer in RASTERIZERS {
-            scene.splatting.rasterizer = rasterizer;
-            let image = render(&gpu, &volume, &scene).0;
+        for drawing in DRAWINGS {
+            let image = render(drawing, &gpu, &volume, &scene).0;
             for (at, pixel) in image.pixels.iter().enumerate() {
                 let alpha = f64::from(pixel[3]);
                 brightest = brightest.max(largest([alpha / OPACITY]));
@@ -93,9 +92,9 @@ fn the_minimum_of_a_constant_is_the_constant_inside() {
         let (complete, view) = (volume.grid().center() - scene.splatting.radius, view_of(&volume, &scene));
         // A middle may lie a hundredth of a slab outside.
         let [within, around] = [complete - 0.1, complete + 0.1];
-        for (rasterizer, order) in RASTERIZERS.into_iter().zip([Order::FrontToBack, Order::BackToFront]) {
-            (scene.splatting.rasterizer, scene.splatting.order) = (rasterizer, order);
-            let image = render(&gpu, &volume, &scene).0;
+        for (drawing, order) in DRAWINGS.into_iter().zip([Order::FrontToBack, Order::BackToFront, Order::FrontToBack]) {
+            scene.splatting.order = order;
+            let image = render(drawing, &gpu, &volume, &scene).0;
             for (at, pixel) in image.pixels.iter().enumerate() {
                 let alpha = f64::from(pixel[3]);
                 if in_box(&view, volume.grid().aspect(), at, within).is_some() {
@@ -124,20 +123,21 @@ fn the_minimum_across_a_gap_is_empty() {
         scene.splatting.compositing = Compositing::Minimum;
         scene.transfer = transfer(&[(0.0, COLOR)], &[(0.0, 0.0), (1.0, OPACITY)]);
         scene.camera = camera([0.0, 1.0, 0.0], 20.0);
-        for (rasterizer, order) in
-            RASTERIZERS.into_iter().flat_map(|r| [Order::FrontToBack, Order::BackToFront].map(|order| (r, order)))
+        for (drawing, order) in DRAWINGS
+            .into_iter()
+            .flat_map(|drawing| [Order::FrontToBack, Order::BackToFront].map(|order| (drawing, order)))
         {
-            (scene.splatting.rasterizer, scene.splatting.order) = (rasterizer, order);
+            scene.splatting.order = order;
             scene.clip = Clip::default();
-            let image = render(&gpu, &volume, &scene).0;
-            assert!(image.pixels.iter().all(|pixel| *pixel == [0.0; 4]), "{empty:?} {rasterizer:?} {order:?}");
+            let image = render(drawing, &gpu, &volume, &scene).0;
+            assert!(image.pixels.iter().all(|pixel| *pixel == [0.0; 4]), "{empty:?} {drawing:?} {order:?}");
             // A part that is cut away is not a gap.
             let side = |y: u32, sign: f64| [0.0, sign, 0.0, -sign * (f64::from(y) - 29.5 + sign)];
             let kept = if empty.end < 55 { side(empty.end + 1, 1.0) } else { side(empty.start - 2, -1.0) };
             scene.clip.planes = vec![kept];
-            let image = render(&gpu, &volume, &scene).0;
+            let image = render(drawing, &gpu, &volume, &scene).0;
             let alpha = image.pixels[54 * 120 + 60][3];
-            assert!(alpha > 0.25, "{empty:?} {rasterizer:?} {order:?}: {alpha}");
+            assert!(alpha > 0.25, "{empty:?} {drawing:?} {order:?}: {alpha}");
         }
     }
 }
@@ -155,17 +155,18 @@ fn the_minimum_across_empty_groups_is_empty() {
         (scene.splatting.radius, scene.splatting.falloff) = (2.0, 2.0);
         (scene.splatting.compositing, scene.splatting.slab_width) = (Compositing::Minimum, 8.0);
         scene.transfer = transfer(&[(0.0, COLOR)], &[(0.0, 0.0), (1.0, OPACITY)]);
-        for (rasterizer, order) in
-            RASTERIZERS.into_iter().flat_map(|r| [Order::FrontToBack, Order::BackToFront].map(|order| (r, order)))
+        for (drawing, order) in DRAWINGS
+            .into_iter()
+            .flat_map(|drawing| [Order::FrontToBack, Order::BackToFront].map(|order| (drawing, order)))
         {
-            (scene.splatting.rasterizer, scene.splatting.order) = (rasterizer, order);
-            let image = render(&gpu, &volume, &scene).0;
+            scene.splatting.order = order;
+            let image = render(drawing, &gpu, &volume, &scene).0;
             if parts[1].len() == 100 {
                 let alpha = image.pixels[54 * 120 + 60][3];
-                assert!(alpha > 0.25, "{rasterizer:?} {order:?}: {alpha}");
+                assert!(alpha > 0.25, "{drawing:?} {order:?}: {alpha}");
             } else {
                 let is_empty = image.pixels.iter().all(|pixel| *pixel == [0.0; 4]);
-                assert!(is_empty, "{parts:?} {rasterizer:?} {order:?}");
+                assert!(is_empty, "{parts:?} {drawing:?} {order:?}");
             }
         }
     }
@@ -177,23 +178,23 @@ fn maximum_and_average_are_the_same_from_behind() {
     let gpu = gpu();
     let volume = builtin::volume("head:40").unwrap();
     let mut random = Random(77);
-    for (compositing, rasterizer) in
-        [Compositing::Maximum, Compositing::Average].into_iter().flat_map(|c| RASTERIZERS.map(|r| (c, r)))
+    for (compositing, drawing) in
+        [Compositing::Maximum, Compositing::Average].into_iter().flat_map(|c| DRAWINGS.map(|drawing| (c, drawing)))
     {
         for width in [0.5, 1.0, 2.0] {
             let mut scene = scene(70, 61);
-            (scene.splatting.compositing, scene.splatting.rasterizer) = (compositing, rasterizer);
+            scene.splatting.compositing = compositing;
             scene.splatting.slab_width = width;
             scene.shading.enabled = false;
             scene.transfer = transfer(&[(0.0, [1.0, 0.7, 0.4])], &[(0.0, 0.0), (255.0, 1.0)]);
             let direction = random.direction();
             let [front, behind] = [direction, -direction].map(|direction| {
                 scene.camera.direction = direction;
-                render(&gpu, &volume, &scene).0
+                render(drawing, &gpu, &volume, &scene).0
             });
             let mirrored = behind.pixels.chunks(70).flat_map(|row| row.iter().rev().copied()).collect();
             let difference = largest_difference(&front, &Image { pixels: mirrored, ..behind });
-            assert_at_most(difference, 4e-6, format_args!("{compositing:?} {rasterizer:?} {width}"));
+            assert_at_most(difference, 4e-6, format_args!("{compositing:?} {drawing:?} {width}"));
             assert!(front.pixels.iter().filter(|pixel| pixel[0] > 0.02).count() > 300);
         }
     }

@@ -7,7 +7,7 @@ use sheetsplat::settings::Projection;
 use sheetsplat::volume::builtin;
 
 use crate::common::compare::assert_at_most;
-use crate::common::{BY_MEANS, FORMS, RASTERIZERS, Random, gpu, lavapipe, scene};
+use crate::common::{BY_MEANS, DRAWINGS, Drawing, RASTERIZERS, Random, drawn_forms, gpu, lavapipe, scene};
 use crate::{OUTLIERS, random_case, render, share_off};
 
 /// Behind a surface everything is culled, and the image does not change.
@@ -24,18 +24,18 @@ fn surfaces_cull_and_the_others_do_not() {
         BY_MEANS.into_iter().flat_map(|compositing| projections.map(|projection| (compositing, projection)))
     {
         (scene.splatting.compositing, scene.camera.projection) = (compositing, projection);
-        for (rasterizer, footprint) in FORMS {
-            (scene.splatting.rasterizer, scene.splatting.footprint) = (rasterizer, footprint);
+        for (drawing, footprint) in drawn_forms() {
+            scene.splatting.footprint = footprint;
             let [with, without] = [true, false].map(|culling| {
                 scene.splatting.culling = culling;
-                render(&gpu, &volume, &scene)
+                render(drawing, &gpu, &volume, &scene)
             });
             let share = share_off(&with.0.pixels, &without.0.pixels, 1e-4);
-            assert_at_most(share, OUTLIERS, format_args!("{compositing:?}, {rasterizer:?}, {footprint:?}: pixels"));
+            assert_at_most(share, OUTLIERS, format_args!("{compositing:?}, {drawing:?}, {footprint:?}: pixels"));
             let [with, without] = [with, without].map(|(_, counts)| counts.sections_rasterized);
             match compositing {
-                Compositing::Surface => assert!(with < without * 2 / 3, "{rasterizer:?}: {with} of {without}"),
-                _ => assert_eq!(with, without, "{compositing:?}, {rasterizer:?}"),
+                Compositing::Surface => assert!(with < without * 2 / 3, "{drawing:?}: {with} of {without}"),
+                _ => assert_eq!(with, without, "{compositing:?}, {drawing:?}"),
             }
         }
     }
@@ -50,15 +50,13 @@ fn tiles_and_groups_change_nothing() {
         let (volume, mut scene) = random_case(&mut random);
         scene.splatting.compositing = compositing;
         for rasterizer in RASTERIZERS {
-            scene.splatting.rasterizer = rasterizer;
             let [with, without] = [true, false].map(|tiles| {
                 scene.splatting.tiles = tiles;
-                render(&renderers[2], &volume, &scene).0
+                render(Drawing::By(rasterizer), &renderers[2], &volume, &scene).0
             });
             assert_eq!(with, without, "case {case}, {rasterizer:?}");
         }
-        scene.splatting.rasterizer = RASTERIZERS[0];
-        let [one, two, four] = [0, 1, 2].map(|at| render(&renderers[at], &volume, &scene).0);
+        let [one, two, four] = [0, 1, 2].map(|at| render(DRAWINGS[0], &renderers[at], &volume, &scene).0);
         for few in [one, two] {
             let share = share_off(&few.pixels, &four.pixels, 1e-4);
             assert_at_most(share, OUTLIERS, format_args!("case {case}: pixels with {scene:?}"));

@@ -20,7 +20,7 @@ use sheetsplat::settings::Method;
 use sheetsplat::stats::Counts;
 use sheetsplat::volume::Volume;
 
-use common::{Random, SPACINGS, random_eye, random_volume, scene, transfer};
+use common::{Drawing, Random, SPACINGS, random_eye, random_volume, scene, transfer};
 
 /// The fraction of pixels in which an opacity, a slab's middle or a ray lies on an edge, so that rounding decides.
 pub(crate) const OUTLIERS: f64 = 0.0003;
@@ -69,8 +69,8 @@ pub(crate) fn view_of(volume: &Volume, scene: &Scene) -> ViewGeometry {
     ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, [scene.image.width, scene.image.height]).unwrap()
 }
 
-pub(crate) fn render(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> (Image, Counts) {
-    let rendering = gpu.render_volume(volume.clone(), scene).unwrap();
+pub(crate) fn render(drawing: Drawing, gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> (Image, Counts) {
+    let rendering = drawing.render(gpu, volume, scene);
     (rendering.image, rendering.stats.counts)
 }
 

@@ -8,7 +8,7 @@ use sheetsplat::settings::Projection;
 use sheetsplat::volume::{Volume, builtin};
 
 use crate::common::compare::{self, assert_at_least};
-use crate::common::{RASTERIZERS, camera, gpu, scene, transfer};
+use crate::common::{DRAWINGS, Drawing, RASTERIZERS, camera, gpu, scene, transfer};
 use crate::{COLOR, constant, render};
 
 /// A volume with one opacity in one half and 0 in the other, divided by a plane between voxels.
@@ -48,11 +48,11 @@ fn the_surface_of_a_step() {
             // At a lower opacity the surface lies farther inside.
             let (volume, mut scene) = step(0.6);
             (scene.splatting.rasterizer, scene.splatting.slab_width) = (rasterizer, width);
-            let image = render(&gpu, &volume, &scene).0;
+            let image = render(Drawing::By(rasterizer), &gpu, &volume, &scene).0;
             assert!(image.pixels.iter().all(|pixel| pixel[3] == 1.0));
             let (volume, mut scene) = step(0.45);
             (scene.splatting.rasterizer, scene.splatting.slab_width) = (rasterizer, width);
-            let image = render(&gpu, &volume, &scene).0;
+            let image = render(Drawing::By(rasterizer), &gpu, &volume, &scene).0;
             assert!(image.pixels.iter().all(|pixel| *pixel == [0.0; 4]));
         }
     }
@@ -77,13 +77,11 @@ fn haze_before_a_gap_does_not_colour_a_surface() {
     scene.transfer =
         transfer(&[(1.0, [1.0, 0.0, 0.0]), (2.0, [0.0, 0.0, 1.0])], &[(0.0, 0.0), (1.0, 0.45), (2.0, 0.9)]);
     let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
-    for (rasterizer, tiles) in
-        RASTERIZERS.into_iter().flat_map(|rasterizer| [true, false].map(|tiles| (rasterizer, tiles)))
-    {
-        (scene.splatting.rasterizer, scene.splatting.tiles) = (rasterizer, tiles);
-        for pixels in [&expected, &render(&gpu, &volume, &scene).0].map(|image| &image.pixels) {
+    for (drawing, tiles) in DRAWINGS.into_iter().flat_map(|drawing| [true, false].map(|tiles| (drawing, tiles))) {
+        scene.splatting.tiles = tiles;
+        for pixels in [&expected, &render(drawing, &gpu, &volume, &scene).0].map(|image| &image.pixels) {
             let is_blue = |pixel: &[f32; 4]| pixel[3] == 1.0 && pixel[0] < 1e-6 && (pixel[2] - 1.0).abs() < 2e-3;
-            assert!(pixels.iter().all(is_blue), "{rasterizer:?}, {tiles}: {:?}", pixels[6540]);
+            assert!(pixels.iter().all(is_blue), "{drawing:?}, {tiles}: {:?}", pixels[6540]);
         }
     }
 }
@@ -104,19 +102,18 @@ fn a_surface_has_no_rings() {
         scene.transfer =
             transfer(&[(20.0, [0.9, 0.3, 0.2]), (110.0, [0.8, 0.75, 0.3]), (200.0, [0.3, 0.5, 1.0])], &opacity);
         scene.image.background = [0.0; 4];
-        for rasterizer in RASTERIZERS {
-            scene.splatting.rasterizer = rasterizer;
+        for drawing in DRAWINGS {
             let [wide, thin] = [1.0, 0.05].map(|width| {
                 scene.splatting.slab_width = width;
-                render(&gpu, &volume, &scene).0.pixels
+                render(drawing, &gpu, &volume, &scene).0.pixels
             });
             let opaque = wide.iter().zip(&thin).filter(|(a, b)| a[3] == 1.0 && b[3] == 1.0);
             let errors: Vec<f64> =
                 opaque.flat_map(|(a, b)| (0..3).map(|i| f64::from(a[i]) - f64::from(b[i]))).collect();
             let decibels = compare::decibels(compare::root_mean_square(errors.iter().copied()));
-            println!("{name}, {rasterizer:?}: {decibels:.1} dB over {} colours", errors.len());
-            assert!(errors.len() > 3000, "{name}, {rasterizer:?}: {} colours", errors.len());
-            assert_at_least(decibels, least, format_args!("{name}, {rasterizer:?}"));
+            println!("{name}, {drawing:?}: {decibels:.1} dB over {} colours", errors.len());
+            assert!(errors.len() > 3000, "{name}, {drawing:?}: {} colours", errors.len());
+            assert_at_least(decibels, least, format_args!("{name}, {drawing:?}"));
         }
     }
 }

@@ -12,7 +12,7 @@ use sheetsplat::volume::{Volume, builtin};
 
 use crate::common::compare::assert_at_most;
 use crate::common::surfaces::{DepthRange, surfaces};
-use crate::common::{BY_MEANS, RASTERIZERS, Random, camera, gpu, scene, transfer};
+use crate::common::{BY_MEANS, DRAWINGS, RASTERIZERS, Random, camera, gpu, scene, transfer};
 use crate::{COLOR, OUTLIERS, constant, random_case, render, share_off, view_of};
 
 /// The depths of a host's wall in front of a part of the image.
@@ -122,10 +122,9 @@ fn thin_volumes() {
             (scene.splatting.compositing, scene.splatting.method) = (compositing, method);
             (scene.splatting.radius, scene.splatting.falloff) = (2.0, 2.0);
             let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
-            for rasterizer in RASTERIZERS {
-                scene.splatting.rasterizer = rasterizer;
-                let image = render(&gpu, &volume, &scene).0;
-                let what = format!("{dims:?} {direction} {compositing:?} {method:?} {rasterizer:?}");
+            for drawing in DRAWINGS {
+                let image = render(drawing, &gpu, &volume, &scene).0;
+                let what = format!("{dims:?} {direction} {compositing:?} {method:?} {drawing:?}");
                 let share = share_off(&image.pixels, &expected.pixels, 2e-3);
                 assert_at_most(share, 2.0 * OUTLIERS, &what);
                 let alpha = image.pixels[54 * 120 + 60][3];

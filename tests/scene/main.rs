@@ -1,6 +1,7 @@
 //! Scene files, `--set` overrides and their errors; transfer functions, stated and chosen.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod classification;
 mod refusals;
 #[path = "../common/shared.rs"]
 mod shared;
@@ -36,7 +37,7 @@ fn defaults() {
     assert_eq!(scene.image, ImageSettings { width: 512, height: 512, background: [0.0, 0.0, 0.0, 1.0] });
     assert_eq!(scene.transfer, TransferSettings::default());
     assert_eq!(scene.shading, Shading::default());
-    assert_eq!(scene.splatting, Splatting::default());
+    assert_eq!(scene.splatting, Splatting { classification: Classification::Auto, ..Splatting::default() });
     assert_eq!(parse("[volume]\nbuiltin = 'cube'", &[]).unwrap().volume, VolumeSource::Builtin("cube".to_owned()));
     assert_eq!(
         parse(MINIMAL, &["camera.projection=perspective"]).unwrap().camera.projection,
@@ -239,7 +240,10 @@ fn overrides() {
 
     // A whole table replaces the file's.
     let scene = parse(text, &["splatting={ tiles = false }"]).unwrap();
-    assert_eq!(scene.splatting, Splatting { tiles: false, ..Splatting::default() });
+    assert_eq!(
+        scene.splatting,
+        Splatting { tiles: false, classification: Classification::Auto, ..Splatting::default() }
+    );
 
     // A value may hold `=`, and arrays are TOML.
     assert_eq!(parse(text, &["volume.path=a=b.nrrd"]).unwrap().volume, file("folder/a=b.nrrd"));

@@ -58,13 +58,13 @@ impl<'a> Looks<'a> {
     }
 
     /// The stretches of eight pixels' rays that count.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn stretch<S: Simd>(&self, simd: S, [column, row]: [usize; 2]) -> [f32x8<S>; 2] {
         self.shown[row].each_ref().map(|ends| f32x8::from_slice(simd, &ends[column..column + LANES]))
     }
 
     /// Directions to the eye of eight pixels.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn to_eye<S: Simd>(&self, simd: S, frame: &Frame<'_>, [column, row]: [usize; 2]) -> [f32x8<S>; 3] {
         std::array::from_fn(|axis| match self.to_eye {
             None => f32x8::splat(simd, frame.to_eye[axis]),
@@ -83,7 +83,7 @@ impl<'a> Looks<'a> {
 
 impl Frame<'_> {
     /// Classifies the slab between a plane and the next one, into slot 0 of the sheets. The length of rays is left out.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn classify<S: Simd>(
         &self,
         simd: S,
@@ -121,7 +121,7 @@ impl Frame<'_> {
     }
 
     /// What eight pixels see of a slab; `None` where none of its values has an opacity.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn slab<S: Simd>(
         &self,
         simd: S,
@@ -154,7 +154,7 @@ impl Frame<'_> {
     }
 
     /// The sheet of eight pixels; whether any of them shows something.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn sheet<S: Simd>(
         &self,
         simd: S,
@@ -195,7 +195,7 @@ impl Frame<'_> {
     }
 
     /// Colours shaded by gradients.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn shaded<S: Simd>(
         &self,
         simd: S,
@@ -212,13 +212,13 @@ impl Frame<'_> {
     }
 
     /// The length of gradients, values per world unit.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn length<S: Simd>(&self, [x, y, z]: [f32x8<S>; 3]) -> f32x8<S> {
         (x * x + y * y + z * z).sqrt() * self.per_number
     }
 
     /// The field of eight pixels on a plane.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn sample<S: Simd>(
         &self,
         simd: S,
@@ -243,7 +243,7 @@ impl Frame<'_> {
     }
 
     /// ∇f in numbers per world unit.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn gradient<S: Simd>(&self, simd: S, sample: &Sample<S>) -> [f32x8<S>; 3] {
         let Sample { sums, value, per_weight, .. } = sample;
         match self.gradient {
@@ -293,7 +293,7 @@ impl Frame<'_> {
 }
 
 /// Lanes by bits.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn mask<S: Simd>(simd: S, bits: u32) -> fearless_simd::mask32x8<S> {
     fearless_simd::mask32x8::from_bitmask(simd, bits.into())
 }

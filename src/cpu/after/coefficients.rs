@@ -1,13 +1,15 @@
 //! What the voxels of a volume are splatted as where classification comes after (SPEC §9), and which of them.
 
+use std::sync::Arc;
+
 use super::extreme::is_choice;
 use glam::{DVec3, UVec3};
 
 use crate::after::brick_ranges::{Bearing, BrickRanges};
 use crate::after::coefficients;
 use crate::after::normalization::Normalization;
-use crate::after::plane_geometry::PlaneGeometry;
 use crate::error::RenderError;
+use crate::geometry::plane_geometry::PlaneGeometry;
 use crate::geometry::view_geometry::ViewGeometry;
 
 use crate::lists::brick::Brick;
@@ -24,7 +26,7 @@ pub(in crate::cpu) struct Coefficients {
     /// As what numbers they are splatted.
     pub(super) numbers: Normalization,
     /// Of `interpolation = "exact"`; else they are the values.
-    exact: Option<Vec<f32>>,
+    exact: Option<Arc<[f32]>>,
     /// From differences of neighbours on either side to gradients in numbers per world unit; `None` where the kernel's gradient is asked for.
     per_difference: Option<DVec3>,
     shown: Option<Shown>,
@@ -48,7 +50,7 @@ impl Coefficients {
         let kernel = (splatting.radius, splatting.falloff);
         let exact = match splatting.interpolation {
             Interpolation::Smooth => None,
-            Interpolation::Exact => Some(coefficients::exact(volume.grid(), volume.values(), kernel, &|_| {})?),
+            Interpolation::Exact => Some(coefficients::of_volume(volume, kernel)?),
         };
         let all = exact.as_deref().unwrap_or(volume.values());
         let numbers = Normalization::of(all.iter().copied()).unwrap_or(Normalization::new([0.0; 2]));

@@ -50,7 +50,7 @@ pub(super) fn is_choice(compositing: Compositing) -> bool {
 }
 
 /// Where a stretch's middle is: in which slab, and the share of that.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn middle_of<S: Simd>(stretch: [f32x8<S>; 2]) -> [f32x8<S>; 2] {
     let middle = (stretch[0] + stretch[1]) * 0.5;
     let slab = middle.floor();
@@ -59,7 +59,7 @@ fn middle_of<S: Simd>(stretch: [f32x8<S>; 2]) -> [f32x8<S>; 2] {
 
 impl Frame<'_> {
     /// Looks at the points of a plane.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn choose<S: Simd>(&self, simd: S, plane: i32, looks: &Looks<'_>, planes: &Planes, chosen: &mut Chosen) {
         let slot = slot_of(plane);
         let number = looks.rays.begin(plane);
@@ -89,7 +89,7 @@ impl Frame<'_> {
     }
 
     /// Puts a plane's values in where they are the ones to choose.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn keep<S: Simd>(
         &self,
         simd: S,
@@ -119,7 +119,7 @@ impl Frame<'_> {
     }
 
     /// Classifies what a tile's pixels chose, into the compositing buffer.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn classify_chosen<S: Simd>(&self, simd: S, looks: &Looks<'_>, chosen: &Chosen, buffers: &mut Buffers) {
         for (row, (best, middle)) in chosen.best.iter().zip(&chosen.middle).enumerate() {
             for column in (0..COLUMNS).step_by(LANES) {
@@ -128,7 +128,7 @@ impl Frame<'_> {
         }
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn classify_group<S: Simd>(
         &self,
         simd: S,
@@ -196,7 +196,7 @@ impl Frame<'_> {
 
 impl Kept {
     /// Puts numbers in where there is a bit.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn set<S: Simd>(
         &mut self,
         simd: S,

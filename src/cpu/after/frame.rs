@@ -16,7 +16,7 @@ use crate::cpu::composite::Compositor;
 use crate::cpu::count::Drawn;
 use crate::cpu::cut::{RayMode, TileRays};
 use crate::cpu::first_hit;
-use crate::cpu::frame::{Drawing, Tile, draw_tiles};
+use crate::cpu::frame::{Drawing, Host, Tile, draw_tiles};
 use crate::cpu::resolve::Resolver;
 use crate::cpu::shade::Shader;
 use crate::cpu::sheets::{COLUMNS, ROWS};
@@ -82,7 +82,8 @@ impl<'a> Frame<'a> {
         (volume, transfer): (&'a Volume, &'a TransferFunction),
         coefficients: &'a Coefficients,
         scene: &Scene,
-        (view, first_hit): (ViewGeometry, Option<f64>),
+        view: ViewGeometry,
+        Host { first_hit, surfaces }: Host,
     ) -> Self {
         let (splatting, shading, grid) = (&scene.splatting, &scene.shading, volume.grid());
         let placement = Placement::new(view, grid);
@@ -110,7 +111,7 @@ impl<'a> Frame<'a> {
                 threshold: (splatting.culling && can_hide).then_some(splatting.opacity_threshold as f32),
                 first_hit: first_hit.map(|opacity| opacity as f32),
             },
-            rays: RayMode::within(&view, grid, kept(&view, scene, volume)),
+            rays: RayMode::within(&view, grid, kept(&view, scene, volume), surfaces),
             drawn: Drawn::new(bricks.len(), &view),
             compositing: splatting.compositing,
             gradient: shading.gradient,

@@ -5,10 +5,10 @@ use std::ops::Range;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use crate::after::plane_geometry::PlaneGeometry;
 use crate::cpu::bin::Placed;
 use crate::cpu::project::floor;
 use crate::cpu::sheets::{COLUMNS, ROWS};
+use crate::geometry::plane_geometry::PlaneGeometry;
 use crate::geometry::slab;
 use crate::geometry::view_geometry::ViewGeometry;
 
@@ -117,7 +117,7 @@ impl Placement {
     /// How kernels lie on a plane, by the low-pass rule.
     fn new_map(&self, plane: i32) -> PlaneMap {
         let PlaneGeometry { screen_axis, per_pixel, .. } = self.geometry;
-        let from_eye = self.geometry.from_eye(self.view.slabs.plane(plane));
+        let from_eye = self.geometry.distance_from_eye(self.view.slabs.plane(plane));
         let size = (per_pixel * from_eye).min(DVec2::ONE);
         let (a, b) = (screen_axis * size.x, screen_axis.perp() * size.y);
         // Of an ellipse with these axes.

@@ -129,7 +129,7 @@ impl Integrals {
     }
 
     /// The means of the lanes that have a bit, given the table of each.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn means<'a, S: Simd>(
         &self,
         simd: S,
@@ -206,7 +206,7 @@ impl Integrals {
     }
 
     /// The sums over parts of cells, by two Gauss nodes.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn part<S: Simd>(&self, simd: S, parts: &Parts, low: f32x8<S>) -> Sums<S> {
         let load = |lanes: &[f32; LANES]| f32x8::load_array_ref(simd, lanes);
         let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
@@ -227,7 +227,7 @@ impl Integrals {
     }
 
     /// m of SPEC §5.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn amount<S: Simd>(&self, simd: S, alpha: f32x8<S>) -> f32x8<S> {
         match self.is_optical_depth {
             true => optical_depth(simd, alpha.min(f32x8::splat(simd, 0.9999))),

@@ -96,7 +96,7 @@ impl Splatter {
     }
 
     /// Adds a voxel's next planes to a tile's; whether any open pixel is in their boxes.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn draw<S: Simd>(
         &self,
         simd: S,
@@ -128,7 +128,7 @@ impl Splatter {
 
     /// Adds a voxel to planes that share its footprint, given by their first and their end after the splat's first plane, which is in a slot.
     // Inlined, as vectors of a closure would be computed by calls.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn draw_planes<S: Simd>(
         &self,
         simd: S,
@@ -156,7 +156,7 @@ impl Splatter {
     }
 
     /// Adds a voxel to the open pixels of a box on planes that share their footprint; the rows that hold anything now.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn draw_box<S: Simd>(
         &self,
         simd: S,
@@ -190,7 +190,7 @@ impl Splatter {
     }
 
     /// Offsets along the planes' axes, and ρ², of eight pixels.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn offsets<S: Simd>(&self, simd: S, footprint: &Footprint, [column, row]: [usize; 2]) -> [f32x8<S>; 3] {
         let Footprint { center, a, b } = footprint;
         let dy = row as f32 - center[1];
@@ -199,13 +199,13 @@ impl Splatter {
         [a, b, a * a + b * b]
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn gaussian<S: Simd>(&self, simd: S, squared: f32x8<S>) -> f32x8<S> {
         exp2(simd, (squared * self.exponent).max(f32x8::splat(simd, -126.0)))
     }
 
     /// The planes from the first to the last that a row may reach.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn reached(&self, on_planes: &OnPlanes<'_>, row: usize) -> Range<usize> {
         let OnPlanes { footprint, along, planes: [mut first, mut end], .. } = *on_planes;
         if !self.is_perspective {
@@ -221,7 +221,7 @@ impl Splatter {
         first..end
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn draw_differences<S: Simd>(
         &self,
         simd: S,
@@ -245,7 +245,7 @@ impl Splatter {
         }
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn draw_offsets<S: Simd>(
         &self,
         simd: S,
@@ -276,7 +276,7 @@ impl Splatter {
 
 /// Adds to eight pixels of a row. Numbers one by one, which the compiler makes vectors of: loading one by `f32x8` goes through a copy on the
 /// stack.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn add(row: &mut [f32; STRIDE], column: usize, number: impl Fn(usize) -> f32) {
     if let Some(pixels) = row[column..].first_chunk_mut::<LANES>() {
         for (lane, pixel) in pixels.iter_mut().enumerate() {

@@ -31,7 +31,7 @@ struct Line<'a> {
 
 impl Frame<'_> {
     /// Looks for the surfaces of eight pixels in a slab; which of them have one.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn find_surfaces<S: Simd>(
         &self,
         simd: S,

@@ -67,7 +67,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Draws a tile, given its first pixel and its bricks by first plane: what its buffers hold then, and how its pixels look at slabs.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn draw<S: Simd>(
         &mut self,
         simd: S,
@@ -106,7 +106,7 @@ impl<'a> TileWalk<'a> {
         self.pending = 0;
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn walk<'b, S: Simd>(&mut self, simd: S, first: i32, bricks: &mut Peekable<impl Iterator<Item = &'b Placed>>) {
         let mut plane = first;
         loop {
@@ -129,7 +129,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Classifies and composites a slab.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn composite<S: Simd>(&mut self, simd: S, slab: i32) {
         let Self { frame, open, rays, to_eye, buffers, tally, planes, chosen, .. } = self;
         let looks = Looks::new(self.origin, rays, to_eye);
@@ -183,7 +183,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Draws what starts at a plane, or goes on there.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn start<S: Simd>(&mut self, simd: S, plane: i32) {
         let continued = std::mem::take(&mut self.continued[slot_of(plane)]);
         self.pending -= continued.len();
@@ -208,7 +208,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Draws a voxel's next planes, if they are seen, and keeps it if there are more.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn draw_splat<S: Simd>(&mut self, simd: S, splat: &Splat) {
         let frame = self.frame;
         let [first, end] = splat.planes;

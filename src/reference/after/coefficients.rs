@@ -9,7 +9,7 @@ use glam::IVec3;
 use rayon::prelude::*;
 
 use crate::error::RenderError;
-use crate::setting_error::SettingError;
+use crate::error::setting::SettingError;
 use crate::volume::Grid;
 
 /// The maximum error of the field at voxels, relative to the range of values; the specification requires 1e-5.

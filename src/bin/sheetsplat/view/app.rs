@@ -72,7 +72,7 @@ impl App {
     pub(super) fn new(
         context: &eframe::CreationContext<'_>,
         arguments: &super::Arguments,
-        scene: Scene,
+        mut scene: Scene,
         volume: Volume,
         outcome: Outcome,
     ) -> Result<Self, Failure> {
@@ -80,6 +80,8 @@ impl App {
             return Err(Failure::Other("the window has no wgpu device".to_owned()));
         };
         let object = scene.extent(&volume, &scene.transfer.resolve(&volume));
+        // The panel shows the choice, and the user may change it.
+        scene.splatting.classification = scene.classification(&volume);
         let guest = Guest::new(host, volume, &scene, &arguments.input.name)?;
         let values = guest.volume().values();
         let editor = Editor::new(guest.transfer(), extent(values));
@@ -115,7 +117,7 @@ impl App {
         panel::splatting(ui, &mut self.scene.splatting);
         ui.separator();
         ui.heading("Light");
-        panel::shading(ui, &mut self.scene.shading);
+        panel::shading(ui, &mut self.scene.shading, self.scene.splatting.classification);
         ui.separator();
         ui.heading("Frame");
         panel::stats(ui, self.guest.stats());

@@ -4,8 +4,8 @@ use std::ops::RangeInclusive;
 
 use eframe::egui::{ComboBox, Grid, Slider, Ui};
 use glam::DVec3;
-use sheetsplat::settings::{Compositing, Method, Rasterizer, Splatting};
-use sheetsplat::settings::{Light, Shading};
+use sheetsplat::settings::{Classification, Compositing, Interpolation, Method, Rasterizer, Splatting};
+use sheetsplat::settings::{Gradient, Light, Shading};
 use sheetsplat::stats::Stats;
 
 /// Kernel, slabs, compositing and culling, with the names and ranges of scene files.
@@ -38,6 +38,17 @@ pub(super) fn splatting(ui: &mut Ui, splatting: &mut Splatting) {
             (Method::CompositeEverySample, "composite-every-sample"),
         ],
     );
+    if splatting.method != Method::ImageAligned {
+        splatting.classification = Classification::Before;
+    }
+    ui.add_enabled_ui(splatting.method == Method::ImageAligned, |ui| {
+        let classifications = [(Classification::Before, "before"), (Classification::After, "after")];
+        choice(ui, "classification", &mut splatting.classification, &classifications);
+    });
+    if splatting.classification == Classification::After {
+        let interpolations = [(Interpolation::Smooth, "smooth"), (Interpolation::Exact, "exact")];
+        choice(ui, "interpolation", &mut splatting.interpolation, &interpolations);
+    }
     choice(
         ui,
         "rasterizer",
@@ -46,8 +57,8 @@ pub(super) fn splatting(ui: &mut Ui, splatting: &mut Splatting) {
     );
 }
 
-/// Light and material.
-pub(super) fn shading(ui: &mut Ui, shading: &mut Shading) {
+/// Light and material; which gradient gives normals has an effect only with classification after splatting.
+pub(super) fn shading(ui: &mut Ui, shading: &mut Shading, classification: Classification) {
     ui.checkbox(&mut shading.enabled, "shading");
     if !shading.enabled {
         return;
@@ -64,6 +75,10 @@ pub(super) fn shading(ui: &mut Ui, shading: &mut Shading) {
         if across.union(above).changed() {
             *to_light = direction([azimuth, elevation]);
         }
+    }
+    if classification == Classification::After {
+        let gradients = [(Gradient::Differences, "differences"), (Gradient::Kernel, "kernel")];
+        choice(ui, "gradient", &mut shading.gradient, &gradients);
     }
     slider(ui, &mut shading.ambient, 0.0..=1.0, "ambient");
     slider(ui, &mut shading.diffuse, 0.0..=1.0, "diffuse");

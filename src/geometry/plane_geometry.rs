@@ -62,7 +62,7 @@ impl PlaneGeometry {
     }
 
     /// The depth from the eye of the plane at a sheet depth; 1 without an eye.
-    pub fn from_eye(&self, sheet_depth: f64) -> f64 {
+    pub fn distance_from_eye(&self, sheet_depth: f64) -> f64 {
         self.eye.map_or(1.0, |eye| sheet_depth - eye)
     }
 
@@ -79,7 +79,7 @@ impl PlaneGeometry {
     /// Half the screen box in pixels around a voxel's projection that contains the voxel's kernel on the plane at a sheet depth, for voxels whose
     /// box reaches the image; infinite if the kernel may be anywhere.
     pub fn half_box_px(&self, sheet_depth: f64, size: [u32; 2]) -> DVec2 {
-        let from_eye = self.from_eye(sheet_depth);
+        let from_eye = self.distance_from_eye(sheet_depth);
         let axis = self.screen_axis;
         let reach = self.radius / (self.per_pixel * from_eye).min(DVec2::ONE);
         let footprint = (axis * reach.x).abs() + (axis.perp() * reach.y).abs();
@@ -104,7 +104,7 @@ impl PlaneGeometry {
         let row = view.screen_from_voxel[2];
         let farthest = row.dot(center.extend(1.0)) + row.truncate().abs().dot(center) + view.reach + view.slabs.width;
         // Rounding must not lose a voxel.
-        let reach = 2.0 * self.half_box(self.from_eye(farthest)) + self.slab(view) + 1e-9;
+        let reach = 2.0 * self.half_box(self.distance_from_eye(farthest)) + self.slab(view) + 1e-9;
         reach.floor().min(DVec3::splat(f64::from(u32::MAX / 4))).as_uvec3()
     }
 

@@ -1,11 +1,28 @@
-//! Errors of opening a device and of choosing a backend.
+//! Errors of devices and of choosing a backend.
 
 use std::fmt;
 
 #[cfg(feature = "gpu")]
-use crate::gpu::fault::DeviceFault;
-#[cfg(feature = "gpu")]
 use wgpu::Features;
+
+/// A failure that the device reported. Messages have one line.
+#[cfg(feature = "gpu")]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DeviceFault {
+    /// Memory ran out. The same device may still provide smaller amounts.
+    #[error("the device is out of memory: {0}")]
+    OutOfMemory(String),
+    /// wgpu's validation found a mistake in this library or in a host's arguments.
+    #[error("device error: {0}")]
+    Validation(String),
+    /// The driver failed, for example to compile a shader.
+    #[error("internal device error: {0}")]
+    Internal(String),
+    /// The device has stopped working. A new one, with new volumes and a new renderer, may work.
+    #[error("the device is lost")]
+    Lost,
+}
 
 /// A device could not be opened or used.
 #[derive(Debug, thiserror::Error)]

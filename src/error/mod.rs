@@ -1,11 +1,14 @@
 //! Errors of the renderer. The errors of loading are defined beside volumes and scenes; [`headless`](crate::headless) unites them all.
 
+pub(crate) mod device;
+pub(crate) mod setting;
+
 #[cfg(feature = "gpu")]
 use wgpu::Device;
 
 #[cfg(feature = "gpu")]
-use crate::gpu::fault::DeviceFault;
-use crate::setting_error::SettingError;
+use device::DeviceFault;
+use setting::SettingError;
 
 /// Why a frame could not be prepared or read back.
 #[derive(Debug, thiserror::Error)]

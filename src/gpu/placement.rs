@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::setting_error::SettingError;
+use crate::error::setting::SettingError;
 
 /// The position of an image in a target, in pixels right and down from the target's upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
