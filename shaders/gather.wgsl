@@ -2,8 +2,8 @@
 // pixels in registers, gathers the kernel sections that fall on them (§3.2), composites them (eq. 2), and skips what lies behind
 // its opaque pixels (§6). Subgroups share nothing, so barriers are among a subgroup's threads, and the order of sums is fixed.
 //
-// Threads hold four pixels each, one below the other, in blocks of 8×4 pixels. A patch has four blocks; a subgroup of 8 to 32 threads draws one,
-// two or all of them at a time, in rounds. What it knows about voxels serves all rounds.
+// Threads hold four pixels each, one below the other, in blocks of 8×4 pixels. A patch has four blocks; a subgroup of 4 to 32 threads draws half of
+// one, one, two or all of them at a time, in rounds. What it knows about voxels serves all rounds.
 //
 // One-shot loops: software drivers execute both sides of an `if` under a mask, but skip a loop without iterations. Work that is often skipped
 // therefore stands in `for (var x = condition; x; x = false)`, a loop that runs at most once.
@@ -27,7 +27,7 @@ fn looks_along_rays() -> bool {
     return CUT || is_by_means();
 }
 
-fn is_due_without_voxels(blocks: u32) -> bool {
+fn is_due_without_voxels(halves: u32) -> bool {
     return counts_gaps();
 }
 
@@ -95,6 +95,6 @@ fn composite_pixels(pixels: Pixels, sheets: Sheets, progress: ptr<function, Prog
     }
     let opacity = transpose(image)[3];
     let far = sheet_group.near + f32(SHEETS) * frame.slab_width;
-    (*progress).open = with_blocks((*progress).open, pixels.block, open_word(pixels, opacity, far));
+    (*progress).open = with_blocks((*progress).open, pixels.thread, open_word(pixels, opacity, far));
     (*progress).shallow = shallow_after((*progress).shallow, pixels, opacity);
 }

@@ -25,8 +25,8 @@ fn counts_gaps() -> bool {
 }
 
 // The previous group may end on a plane whose values hold for the next slab, too.
-fn is_due_without_voxels(blocks: u32) -> bool {
-    return (blocks_handed_on & blocks) != 0u;
+fn is_due_without_voxels(halves: u32) -> bool {
+    return (halves_handed_on & halves) != 0u;
 }
 
 // Rays end where they leave the box of voxel centres.
@@ -154,7 +154,7 @@ fn composite_pixels(pixels: Pixels, sheets: Sheets, progress: ptr<function, Prog
     }
     let opacity = transpose(image)[3];
     let far = sheet_group.near + f32(SHEETS) * frame.slab_width;
-    (*progress).open = with_blocks((*progress).open, pixels.block, open_word(pixels, opacity, far));
+    (*progress).open = with_blocks((*progress).open, pixels.thread, open_word(pixels, opacity, far));
 }
 
 // Passes to classify, shade and composite four slabs at four pixels.

@@ -9,14 +9,13 @@ fn ballot(holds: bool) -> u32 {
 
 // The union of all lanes' bits, in fewer steps than a software driver's `subgroupOr`, which asks one lane after the other.
 fn together(bits: vec2u) -> vec2u {
+    if THREADS > 8u {
+        return subgroupOr(bits);
+    }
     var result = bits;
     result |= subgroupShuffleXor(result, 1u);
     result |= subgroupShuffleXor(result, 2u);
-    result |= subgroupShuffleXor(result, 4u);
-    if THREADS > 8u {
-        return subgroupOr(result);
-    }
-    return result;
+    return select(result, result | subgroupShuffleXor(result, 4u), vec2<bool>(lanes == 8u));
 }
 
 // The first bits of a mask, moved to the bits from a multiple of the number of lanes on.

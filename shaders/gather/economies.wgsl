@@ -26,7 +26,7 @@ var<private> shallow: vec4u;
 // That mask after a thread's pixels have reached some opacity.
 fn shallow_after(words: vec4u, pixels: Pixels, opacity: vec4f) -> vec4u {
     if ECONOMIES {
-        return with_blocks(words, pixels.block, block_word(pixels.is_inside & (opacity < vec4f(gather.beta))));
+        return with_blocks(words, pixels.thread, block_word(pixels.thread, pixels.is_inside & (opacity < vec4f(gather.beta))));
     }
     return words;
 }

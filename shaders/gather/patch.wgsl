@@ -49,7 +49,7 @@ override PARALLELOGRAM: bool = false;
 override CUT: bool = false;
 override FIRST_HIT: bool = false;
 
-// The number of threads in a workgroup: those of the largest subgroup.
+// The number of threads in a workgroup: those of the largest subgroup, but at most those that hold a patch.
 override THREADS: u32 = 32u;
 // The number of workgroups per patch: more than one only if too much lies behind it.
 override WORKGROUPS_PER_PATCH: u32 = 1u;
@@ -81,9 +81,9 @@ var<private> gradient_opacity_ramp: Ramp;
 // The number of sheets in a sheet group.
 const SHEETS = 4u;
 
-// The number of threads that hold a patch, and of its blocks.
+// The number of threads that hold a patch, and of its halves of blocks, which the smallest subgroups draw.
 const PATCH_THREADS = 32u;
-const BLOCKS = 4u;
+const HALVES = 8u;
 
 // Passes through loops that are not counted where they occur. Every loop costs one extra pass for its exit check, and so do the loops nested
 // in it; one-shot loops cost two.
@@ -103,7 +103,7 @@ fn passes_per_look() -> u32 {
 // The number of voxels of the queue that are tested at a time, one bit each.
 const BATCH = 64u;
 
-// The progress in a patch: a mask of its pixels that stay open after the group, and a mask of blocks whose sheets are not empty.
+// The progress in a patch: a mask of its pixels that stay open after the group, and a mask of halves of blocks whose sheets are not empty.
 struct Progress {
     open: vec4u,
     shallow: vec4u,
@@ -123,18 +123,18 @@ fn hold_ramps() {
     gradient_opacity_ramp = ramp_of(frame.ramps.y, frame.ramps.z);
 }
 
-// Finds the open pixels of the threads from `threads.x` to the one before `threads.y`. Returns a mask of their blocks.
+// Finds the open pixels of the threads from `threads.x` to the one before `threads.y`. Returns a mask of their halves of blocks.
 fn find_open_pixels(corner: vec2u, threads: vec2u, thread: u32) -> u32 {
-    var own_blocks = 0u;
+    var own_halves = 0u;
     for (var round = threads.x; round < threads.y; round += THREADS) {
         let pixels = pixels_of(corner, round + thread);
         look(pixels.column, pixels.rows);
         let opacity = transpose(load_image(pixels))[3];
-        own_blocks |= subgroupOr(1u << pixels.block);
-        open = with_blocks(open, pixels.block, open_word(pixels, opacity, -FAR));
+        own_halves |= halves_of(pixels.thread);
+        open = with_blocks(open, pixels.thread, open_word(pixels, opacity, -FAR));
         shallow = shallow_after(shallow, pixels, opacity);
     }
-    return own_blocks;
+    return own_halves;
 }
 
 // Makes the `at`-th group in compositing order the current one.
@@ -152,19 +152,20 @@ fn draw_queue(corner: vec2u, threads: vec2u, thread: u32, is_last: bool, progres
         passes += PASSES_PER_ROUND;
         let pixels = pixels_of(corner, round + thread);
         let blocks = subgroupOr(1u << pixels.block);
-        var has_begun = ((*progress).begun & blocks) != 0u;
+        let halves = halves_of(pixels.thread);
+        var has_begun = ((*progress).begun & halves) != 0u;
         var sheets = Sheets();
         for (; has_begun; has_begun = false) {
             sheets = saved_sheets(round + thread);
         }
         let is_added = add_sections(&sheets, pixels, blocks);
         if is_added {
-            (*progress).begun |= blocks;
+            (*progress).begun |= halves;
         }
         for (var is_left = is_added && !is_last; is_left; is_left = false) {
             save_sheets(round + thread, sheets);
         }
-        let is_due = is_last && (((*progress).begun & blocks) != 0u || is_due_without_voxels(blocks));
+        let is_due = is_last && (((*progress).begun & halves) != 0u || is_due_without_voxels(halves));
         for (var is_done = is_due; is_done; is_done = false) {
             composite_pixels(pixels, sheets, progress);
         }
@@ -233,10 +234,10 @@ fn draw(number: u32, first_thread: u32, thread: u32) {
     first_px = vec2f(corner) + 0.5;
     empty_queue(thread);
     let threads = vec2u(first_thread, first_thread + PATCH_THREADS / WORKGROUPS_PER_PATCH);
-    let own_blocks = find_open_pixels(corner, threads, thread);
+    let own_halves = find_open_pixels(corner, threads, thread);
 
     let first_bin = number * gather.groups;
-    let reached = gather.reached + number * BLOCKS + firstTrailingBit(own_blocks);
+    let reached = gather.reached + number * HALVES + firstTrailingBit(own_halves);
     var at = atomicLoad(&gathered.words[reached]);
     // Earlier groups are drawn again for the field that they hand on.
     first_composited = at;
@@ -280,7 +281,8 @@ fn main(
     @builtin(subgroup_size) subgroup_size: u32,
     @builtin(subgroup_invocation_id) subgroup_invocation_id: u32,
 ) {
-    lanes = subgroup_size;
+    // A larger subgroup has the patch's threads and no others.
+    lanes = min(subgroup_size, THREADS);
     lane = subgroup_invocation_id;
     start(workgroup.z);
     gather = gathers[zero];
@@ -290,8 +292,8 @@ fn main(
     var is_left = false;
     if number < patch_range.end_patch {
         let first_bin = number * gather.groups;
-        let block = firstTrailingBit(subgroupOr(1u << ((first_thread + thread) / 8u)));
-        let at = atomicLoad(&gathered.words[gather.reached + number * BLOCKS + block]);
+        let half = firstTrailingBit(halves_of(first_thread + thread));
+        let at = atomicLoad(&gathered.words[gather.reached + number * HALVES + half]);
         // For `minimum`, empty groups count too, even behind the last brick of the patch.
         let first = select(at, 0u, COMPOSITING == MINIMUM && at < gather.groups);
         is_left = starts[first_bin + first] < starts[first_bin + gather.groups];

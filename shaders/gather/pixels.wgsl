@@ -22,6 +22,11 @@ struct Pixels {
     is_inside: vec4<bool>,
 }
 
+// A mask of the halves of blocks, four threads each, in which a subgroup has the threads of a round.
+fn halves_of(thread: u32) -> u32 {
+    return subgroupOr(1u << thread / 4u);
+}
+
 fn pixels_of(corner: vec2u, thread: u32) -> Pixels {
     let block = thread / 8u;
     let first = corner + vec2u((block & 1u) * 8u + thread % 8u, (block >> 1u) * 4u);
@@ -82,5 +87,5 @@ fn open_word(pixels: Pixels, opacity: vec4f, depth: f32) -> u32 {
         is_open &= shown_from < shown_to;
         is_open &= vec4<bool>(frame.culling == 0u) | (shown_to > vec4f(depth));
     }
-    return block_word(is_open);
+    return block_word(pixels.thread, is_open);
 }

@@ -216,8 +216,8 @@ fn fields_of(sums: PlaneSums) -> Fields {
 // The field on the previous group's last plane.
 var<workgroup> handed_on: array<vec4f, 5u * PATCH_THREADS>;
 
-// A mask of the blocks in which the plane that was handed on has values.
-var<private> blocks_handed_on: u32;
+// A mask of the halves of blocks in which the plane that was handed on has values.
+var<private> halves_handed_on: u32;
 
 fn hand_on(thread: u32, fields: Fields) {
     handed_on[thread] = select(vec4f(0.0), vec4f(1.0), fields.has_value);

@@ -9,21 +9,25 @@ const PATCH_WIDTH = 16u;
 // The height of a patch in pixels.
 const PATCH_HEIGHT = 8u;
 
-// The word of a thread's block, given which of its own four pixels are in the mask.
-fn block_word(is_in: vec4<bool>) -> u32 {
-    let rows = vec4u(1u, 1u << 8u, 1u << 16u, 1u << 24u) << vec4u(lane % 8u);
+// The part of its block's word that a thread's subgroup has, given its place in the patch and which of its own four pixels are in the mask.
+fn block_word(thread: u32, is_in: vec4<bool>) -> u32 {
+    let rows = vec4u(1u, 1u << 8u, 1u << 16u, 1u << 24u) << vec4u(thread % 8u);
     let bits = select(vec4u(0u), rows, is_in);
     var word = bits.x | bits.y | bits.z | bits.w;
     word |= subgroupShuffleXor(word, 1u);
     word |= subgroupShuffleXor(word, 2u);
-    return word | subgroupShuffleXor(word, 4u);
+    // A subgroup of four threads has half a block.
+    return select(word, word | subgroupShuffleXor(word, 4u), lanes >= 8u);
 }
 
-// The words with those of a thread's block, and of the other blocks in its subgroup, replaced.
-fn with_blocks(words: vec4u, block: u32, word: u32) -> vec4u {
+// The words with the pixels of a thread's subgroup replaced: of its block, or of half of that, and of the other blocks in its subgroup.
+fn with_blocks(words: vec4u, thread: u32, word: u32) -> vec4u {
     var result = words;
+    // The columns of each row that a subgroup has in a block.
+    let own = select(0xffffffffu, 0x0f0f0f0fu << (thread & 4u), lanes < 8u);
     for (var i = 0u; i < lanes; i += 8u) {
-        result = select(result, vec4u(subgroupShuffle(word, i)), vec4u(0u, 1u, 2u, 3u) == vec4u(subgroupShuffle(block, i)));
+        let is_here = vec4u(0u, 1u, 2u, 3u) == vec4u(subgroupShuffle(thread, i) / 8u);
+        result = select(result, (words & vec4u(~own)) | vec4u(subgroupShuffle(word, i)), is_here);
     }
     return result;
 }

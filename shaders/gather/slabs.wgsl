@@ -2,7 +2,7 @@
 //
 // Needs gather/patch.wgsl: COMPOSITING, CUT, FIRST_HIT, PERSPECTIVE, SHEETS, control_points, cut, sheet_group.
 // Needs gather/pixels.wgsl: Pixels.
-// Needs gather/planes.wgsl: Fields, KERNEL_GRADIENT, PlaneSums, Sheets, blocks_handed_on, fields_handed_on, fields_of, hand_on.
+// Needs gather/planes.wgsl: Fields, KERNEL_GRADIENT, PlaneSums, Sheets, halves_handed_on, fields_handed_on, fields_of, hand_on.
 // Needs gather_planes.wgsl: planes.
 // Needs shared/cells.wgsl: nearest_voxel, voxel_at.
 // Needs shared/compositing.wgsl: composite.
@@ -130,7 +130,7 @@ fn one_of(first: vec4f, second: vec4f, third: vec4f, fourth: vec4f, j: u32) -> v
 // Composites a group's slabs at four pixels. The near plane's field comes from the previous group, and the last plane's goes to the next.
 fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
     var result = image;
-    var near = fields_handed_on(pixels.thread, (blocks_handed_on >> pixels.block & 1u) != 0u);
+    var near = fields_handed_on(pixels.thread, (halves_handed_on >> pixels.thread / 4u & 1u) != 0u);
     for (var j = 0u; j < SHEETS; j += 1u) {
         let depth = sheet_group.near + f32(j) * frame.slab_width;
         let far = without_holes(fields_of(sums_on(sheets, j)), pixels, depth + frame.slab_width);
@@ -156,8 +156,8 @@ fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
         near = far;
     }
     hand_on(pixels.thread, near);
-    let blocks = 1u << pixels.block;
-    let has_values = subgroupOr(select(0u, blocks, any(near.has_value)));
-    blocks_handed_on = (blocks_handed_on & ~subgroupOr(blocks)) | has_values;
+    let half = 1u << pixels.thread / 4u;
+    let has_values = subgroupOr(select(0u, half, any(near.has_value)));
+    halves_handed_on = (halves_handed_on & ~subgroupOr(half)) | has_values;
     return result;
 }

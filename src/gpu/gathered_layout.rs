@@ -20,7 +20,7 @@ pub struct GatheredLayout {
     pub drawn: u32,
     /// Bits of the tiles that have been composited: one bit per 32×32 tile for every group.
     pub composited: u32,
-    /// For every block of every patch, the group at which its subgroup continues in the next dispatch.
+    /// For every half of a block of every patch, the group at which its subgroup continues in the next dispatch.
     pub reached: u32,
     /// First hits, one per pixel. This part is also bound separately, so it starts at an aligned byte.
     pub hits: u32,
@@ -39,7 +39,7 @@ impl GatheredLayout {
         let composited = drawn + 2 * bricks * groups_per_kernel(view);
         let [columns, rows] = tile_grid(view.size);
         let reached = composited + (columns * rows * bins.groups).div_ceil(32);
-        let end = reached + bins.patches * patch_bins::BLOCKS;
+        let end = reached + bins.patches * patch_bins::HALVES;
         let hits = (end + WORDS_BEFORE).next_multiple_of(BINDING_WORDS) - WORDS_BEFORE;
         Self { groups: bins.groups, bricks, drawn, composited, reached, hits }
     }

@@ -17,8 +17,11 @@ use crate::settings::splatting::Order;
 /// The width and height of the rasterizer's patches in pixels.
 pub const PATCH: [u32; 2] = [16, 8];
 
-/// The number of 8×4 pixel blocks in a patch, which the smallest subgroup draws in as many rounds.
+/// The number of 8×4 pixel blocks in a patch, which a subgroup of 8 threads draws in as many rounds.
 pub const BLOCKS: u32 = 4;
+
+/// The number of halves of blocks in a patch, which a subgroup of 4 threads draws in as many rounds.
+pub const HALVES: u32 = 2 * BLOCKS;
 
 /// The number of sheets in a group.
 pub const SHEETS: u32 = 4;
@@ -62,12 +65,14 @@ pub struct Passes {
 }
 
 impl Passes {
-    /// The passes of a view in which a workgroup draws `blocks` blocks of a patch, and looking up a voxel's control points in memory takes at
-    /// most `search` passes.
-    pub fn new(search: u32, blocks: u32) -> Self {
+    /// The passes of a view in which a workgroup draws `blocks` blocks of a patch with subgroups of `threads` threads or more, and looking up a
+    /// voxel's control points in memory takes at most `search` passes.
+    pub fn new(search: u32, blocks: u32, threads: u32) -> Self {
         let per_group = MAX_PASSES_OF_GROUP + blocks * (MAX_PASSES_OF_BLOCK + MAX_PASSES_OF_LOOK);
         let per_brick = MAX_PASSES_OF_BRICK + blocks * MAX_PASSES_OF_ADDITION + SHADED_PER_BRICK * search;
-        Self { most: MAX_PASSES, per_group, per_brick, search }
+        // Half as many threads take twice as many passes.
+        let times = 8_u32.div_ceil(threads);
+        Self { most: MAX_PASSES, per_group: times * per_group, per_brick: times * per_brick, search }
     }
 }
 
@@ -129,7 +134,8 @@ struct Pixels {
 impl PatchBins {
     /// Sorts bricks by the patches and groups they may touch, with kernels of the radius `support`. With `planes` (SPEC §9) it is a brick's
     /// planes that count, and its footprints on them. The sheet depths `covered` belong to some group even if they are empty. Looking up a
-    /// voxel's control points in memory takes at most `search` passes through loops. Neither list may have more than `most_words` words.
+    /// voxel's control points in memory takes at most `search` passes through loops, and subgroups have `threads` threads or more. Neither list may
+    /// have more than `most_words` words.
     ///
     /// # Errors
     /// If there are more bricks in total, or behind a patch, than the rasterizer supports.
@@ -139,7 +145,7 @@ impl PatchBins {
         order: Order,
         covered: Range<f64>,
         support: f64,
-        search: u32,
+        (search, threads): (u32, u32),
         most_words: u64,
     ) -> Result<Self, TileCapacityError> {
         let check = |what, required: u64, actual: u64| {
@@ -184,7 +190,7 @@ impl PatchBins {
         let entries: Vec<_> = strips.par_iter().map(|strip| sort.sorted(strip)).collect();
         let entries = entries.concat();
         let of_workgroups = |workgroups| {
-            let passes = Passes::new(search, BLOCKS / workgroups);
+            let passes = Passes::new(search, BLOCKS / workgroups, threads);
             dispatches(&starts, groups as usize, &passes).map(|dispatches| (workgroups, passes, dispatches))
         };
         let (workgroups, passes, dispatches) = of_workgroups(1).or_else(|_| of_workgroups(BLOCKS))?;

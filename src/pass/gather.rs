@@ -203,7 +203,7 @@ fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
         slots.push(("coefficients", texture_of_integers(stage, TextureViewDimension::D2Array)));
     }
     let mut constants = vec![
-        ("THREADS", f64::from(device.adapter_info().subgroup_max_size)),
+        ("THREADS", f64::from(threads(device))),
         ("QUEUE", f64::from(queue(device, mode))),
         ("WORKGROUPS_PER_PATCH", f64::from(workgroups_per_patch(device, mode))),
         ("COMPOSITING", f64::from(mode.compositing as u32)),
@@ -239,8 +239,15 @@ pub const WORKGROUP_BYTES: u32 = 16384;
 
 /// Workgroups that a patch is divided among: one for every round of its threads, or one for all.
 fn workgroups_per_patch(device: &Device, mode: GatherMode) -> u32 {
-    // Threads hold four pixels.
-    if mode.divided { PATCH[0] * PATCH[1] / 4 / device.adapter_info().subgroup_max_size } else { 1 }
+    if mode.divided { PATCH_THREADS / threads(device) } else { 1 }
+}
+
+/// The number of threads that hold a patch, four pixels each.
+const PATCH_THREADS: u32 = PATCH[0] * PATCH[1] / 4;
+
+/// The number of threads in a workgroup: those of the largest subgroup, but at most those that hold a patch.
+fn threads(device: &Device) -> u32 {
+    device.adapter_info().subgroup_max_size.min(PATCH_THREADS)
 }
 
 /// The number of sums of a pixel on a slab plane (SPEC §9).

@@ -10,7 +10,7 @@ use crate::pass::gather::WORKGROUP_BYTES;
 use crate::settings::splatting::{Classification, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
 
 /// The subgroup sizes that tiles support.
-pub(super) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 8..=32;
+pub(super) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 4..=64;
 
 /// The rasterizer of a frame, which follows from the [`Rasterizer`] that the scene and the renderer name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,7 +90,7 @@ fn obstacle_in_device(device: &Device) -> Option<RenderError> {
     let sizes = [info.subgroup_min_size, info.subgroup_max_size];
     if sizes.iter().any(|size| !SUBGROUP_SIZES.contains(size)) {
         let found = format!("subgroups of {} to {} threads", sizes[0], sizes[1]);
-        return refused_tiles(found, "subgroups of 8 to 32 threads, or \"quads\"");
+        return refused_tiles(found, "subgroups of 4 to 64 threads, or \"quads\"");
     }
     let bytes = device.limits().max_compute_workgroup_storage_size;
     if bytes < WORKGROUP_BYTES {

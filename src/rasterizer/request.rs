@@ -40,6 +40,8 @@ pub(crate) struct FrameRequest {
     pub(crate) kind: RasterizerKind,
     /// Why the device does not draw by tiles.
     pub(crate) fallback: Option<RenderError>,
+    /// The number of threads in the device's smallest subgroups.
+    pub(crate) subgroup_threads: u32,
     /// The bands of the compositing buffer.
     pub(crate) bands: Vec<Band>,
     /// Of classification after splatting.
@@ -112,6 +114,7 @@ impl FrameRequest {
             after,
             kind,
             fallback,
+            subgroup_threads: device.adapter_info().subgroup_min_size,
             covered: means::covered(&seen, grid, &splatting),
             kernel: Kernel::new(splatting.radius, splatting.falloff),
             ramps,

@@ -351,7 +351,8 @@ fn bins(limits: &Limits, request: &FrameRequest, bricks: &[Brick], search: u32) 
     let planes = after.as_ref().map(|after| &after.planes);
     let most_words = binding(limits) / 4;
     let (order, support) = (drawn_order(splatting), kernel.support());
-    Ok(PatchBins::new(bricks, (view, planes), order, covered.clone(), support, search, most_words)?)
+    let work = (search, request.subgroup_threads);
+    Ok(PatchBins::new(bricks, (view, planes), order, covered.clone(), support, work, most_words)?)
 }
 
 /// What is gathered on planes, if classification comes after splatting.

@@ -133,7 +133,7 @@ pub enum Rasterizer {
     /// Footprint quads, drawn into sheet buffers (§3.2).
     Quads,
     /// A compute stage in which every tile gathers its sections front to back. It needs
-    /// [`TILE_FEATURES`](crate::gpu::device::TILE_FEATURES) with 8 to 32 threads, 16 KiB of workgroup memory (WebGPU's default), and the
+    /// [`TILE_FEATURES`](crate::gpu::device::TILE_FEATURES) with 4 to 64 threads, 16 KiB of workgroup memory (WebGPU's default), and the
     /// summed-area form.
     Tiles,
 }

@@ -57,7 +57,7 @@ impl Case {
             splatting.order,
             0.0..0.0,
             self.kernel().support(),
-            0,
+            (0, 8),
             most_words,
         )
     }

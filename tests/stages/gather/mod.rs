@@ -55,7 +55,7 @@ impl<'a> Fixture<'a> {
     fn bins(&self) -> PatchBins {
         let Seen { view, kernel, scene: Scene { splatting, .. }, .. } = &self.seen;
         let covered = means::covered(view, self.volume.grid(), splatting);
-        PatchBins::new(self.bricks.bricks(), (view, None), splatting.order, covered, kernel.support(), 0, u64::MAX)
+        PatchBins::new(self.bricks.bricks(), (view, None), splatting.order, covered, kernel.support(), (0, 8), u64::MAX)
             .unwrap()
     }
 
