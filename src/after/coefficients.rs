@@ -27,7 +27,7 @@ const CUBE: std::ops::RangeInclusive<f64> = 1.732_050_807_568_878..=2.0;
 ///
 /// # Errors
 /// As for [`exact`].
-pub(crate) fn of_volume(volume: &Volume, kernel: (f64, f64)) -> Result<Arc<[f32]>, RenderError> {
+pub fn of_volume(volume: &Volume, kernel: (f64, f64)) -> Result<Arc<[f32]>, RenderError> {
     volume.coefficients(kernel, || {
         exact(volume.grid(), volume.values(), kernel, &|share| {
             log::info!("coefficients of splatting.interpolation = \"exact\": {:.0} %", 100.0 * share);

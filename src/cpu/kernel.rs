@@ -9,7 +9,7 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
 use super::vector::{exp2, polynomial, short_polynomial};
-use crate::geometry::kernel::Kernel;
+use crate::kernel::Kernel;
 
 /// Coefficients for pixels and voxels.
 #[derive(Clone, Debug)]
