@@ -70,6 +70,10 @@ pub fn table(tables: &Tables, compositing: Compositing, numbers: &Normalization)
     let shown = shown.fold([f64::from(f32::MAX), f64::from(f32::MIN)], |[low, high], cell| {
         [low.min(cell.ends[0]), high.max(cell.ends[1])]
     });
+    // A mean of equal values may lie a rounding error beyond all of them, where the tables' ends continue.
+    let [low, high] = shown;
+    let shown =
+        [if low <= first { f64::from(f32::MIN) } else { low }, if high >= end { f64::from(f32::MAX) } else { high }];
 
     let entry = |numbers: [f64; 4]| numbers.map(|number| number as f32);
     let with = |color: DVec3, last: f64| entry([color.x, color.y, color.z, last]);

@@ -7,7 +7,7 @@ use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Compositing, Interpolation, Light, Rasterizer};
 use sheetsplat::volume::{Volume, builtin};
 
-use crate::common::compare::assert_at_most;
+use crate::common::compare::{assert_at_least, assert_at_most};
 use crate::common::images::{BLACK, color_rms, psnr, rms};
 use crate::common::{BY_AMOUNTS, COMPOSITINGS, Random, camera, gpu, transfer};
 use crate::images::head;
@@ -232,6 +232,27 @@ fn the_cube_does_not_pop() {
             );
             assert!(unlit < 0.003, "{compositing:?} {interpolation:?}: {unlit}");
             assert!(lit < 0.006 && lit < 1.1 * lit_elsewhere, "{lit} {lit_elsewhere}");
+        }
+    }
+}
+
+/// Rounding puts the mean of equal values beyond all of them, which must not make the matter at the end of the values' range vanish.
+#[test]
+fn matter_at_the_end_of_the_range_is_matter() {
+    for inverted in [false, true] {
+        let cube = builtin::volume("cube").unwrap();
+        let values = cube.values().iter().map(|&value| if inverted { 255.0 - value } else { value }).collect();
+        let volume = Volume::new("cube", cube.grid().dims, cube.spacing(), values).unwrap();
+        let mut scene = scene(96, 96);
+        scene.camera = camera([0.70463, 0.70957, 0.2], 40.0);
+        let ends = if inverted { [0.5, 0.0] } else { [0.0, 0.5] };
+        scene.transfer = transfer(&[(0.0, [0.0, 0.5, 1.0]), (255.0, [1.0; 3])], &[(0.0, ends[0]), (255.0, ends[1])]);
+        (scene.shading.ambient, scene.shading.diffuse, scene.shading.specular) = (0.0, 1.0, 0.0);
+        scene.splatting.culling = false;
+        let expected = render(&volume, &scene);
+        for draw in &DRAWINGS[1..] {
+            let decibels = psnr(&draw.image(&volume, &scene).pixels, &expected.pixels, BLACK, 1000);
+            assert_at_least(decibels, 70.0, format_args!("{}, inverted {inverted}", draw.name));
         }
     }
 }
