@@ -82,7 +82,7 @@ fn nothing_is_visible_behind_a_surface_and_everything_in_front_of_it() {
     for classification in [Classification::Before, Classification::After] {
         scene.splatting.classification = classification;
         let plain = draw(&volume, &scene).image;
-        assert!(shown(&plain) > 0.1);
+        assert!(shown(&plain) > 0.03, "{classification:?}: {}", shown(&plain));
         // Rays with ends scale their sheets, by 1 here but for rounding.
         let open = drawn(&volume, &scene, &vec![f32::INFINITY; pixels]);
         assert!(largest_difference(&open, &plain) < 2e-6, "{classification:?}");
