@@ -168,7 +168,7 @@ def test_threads_draw_the_same_bytes() -> None:
 
 
 def test_the_lock_is_released_while_drawing() -> None:
-    """Another thread runs while one draws: its longest pause is shorter than the drawing."""
+    """Another thread goes on while one draws; with the lock it could only run between two pictures."""
     import time
 
     view = sheetsplat.View("builtin:head:48", image={"width": 512, "height": 512})
