@@ -88,7 +88,7 @@ fn shade_voxels(first: u32) {
         let number = number_at(index_of(at));
         var gradient = vec3f(0.0);
         if !KERNEL_GRADIENT {
-            gradient = 2.0 * half_differences(at) * planes.value_scale;
+            gradient = half_differences(at) * (2.0 * planes.value_scale);
         }
         if is_in {
             queue_amounts[slot] = vec4f(gradient, number);
