@@ -10,7 +10,7 @@ use crate::pass::gather::WORKGROUP_BYTES;
 use crate::settings::splatting::{Classification, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
 
 /// The subgroup sizes that tiles support.
-pub(super) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 4..=64;
+const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 4..=64;
 
 /// The rasterizer of a frame, which follows from the [`Rasterizer`] that the scene and the renderer name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use wgpu::{Buffer, BufferUsages, CommandEncoder, Limits, TextureView};
 
-use super::kind::SUBGROUP_SIZES;
 use super::{FrameEstimate, FrameInputs, Prepared};
 use crate::error::RenderError;
 use crate::geometry::plane_geometry::PlaneGeometry;
@@ -376,7 +375,7 @@ fn check_workgroup_memory(limits: &Limits, request: &FrameRequest) -> Result<(),
 /// point each.
 fn all_search_passes(request: &FrameRequest, by_label: bool) -> u32 {
     let lengths = request.ramps.lengths();
-    let in_memory = by_label || lengths.iter().any(|&points| points > *SUBGROUP_SIZES.start());
+    let in_memory = by_label || lengths.iter().any(|&points| points > request.subgroup_threads);
     if in_memory { 1 + lengths.iter().map(|&points| search_passes(points)).sum::<u32>() } else { 0 }
 }
 
