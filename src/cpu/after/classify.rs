@@ -13,7 +13,7 @@ use crate::cpu::vector::LANES;
 use crate::settings::shading::Gradient;
 use crate::settings::splatting::Compositing;
 
-/// Where the weights sum to less than this there is no value.
+/// The minimum sum of weights of a point that has a value.
 const MIN_WEIGHT: f32 = 1e-3;
 
 /// The field of eight pixels on a plane.
@@ -40,7 +40,7 @@ pub(super) struct Slab<S: Simd> {
     pub(super) gradients: [[f32x8<S>; 3]; 2],
 }
 
-/// How a tile's pixels look at slabs.
+/// The rays of a tile's pixels, as slabs are seen along them.
 pub(super) struct Looks<'a> {
     pub(super) origin: [usize; 2],
     pub(super) rays: &'a TileRays,
@@ -262,7 +262,7 @@ impl Frame<'_> {
         }
     }
 
-    /// The label of the voxel whose cell holds the point of a pixel's ray at a place among slabs.
+    /// The label of the voxel whose cell contains a point of a pixel's ray, given by its position among slabs.
     pub(super) fn label(&self, [x, y]: [usize; 2], lane: usize, slab: f64) -> Option<u16> {
         self.volume.label(self.cell([x + lane, y], slab))
     }

@@ -35,7 +35,7 @@ pub(in crate::cpu) struct Coefficients {
 /// The bricks that may be drawn.
 #[derive(Clone, Debug)]
 struct Shown {
-    /// How far around a brick its test looked, voxels.
+    /// The distance in voxels up to which a brick's test examined the values around it.
     reach: UVec3,
     bricks: BrickList,
     /// The bricks of all voxels but holes, for compositings that may choose a value without an opacity.

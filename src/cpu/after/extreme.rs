@@ -25,7 +25,7 @@ const NOTHING: Kept =
 /// The values that a tile's pixels choose, row by row.
 #[derive(Debug)]
 pub(super) struct Chosen {
-    /// Of the points within pixels' stretches; of `average` sums, and the weight is their number.
+    /// The chosen points within the visible stretches of pixels' rays; for `average` the sums over all points, whose number is the weight.
     best: Vec<Kept>,
     /// On both planes of the slab that a stretch's middle lies in.
     middle: Vec<[Kept; 2]>,
@@ -49,7 +49,7 @@ pub(super) fn is_choice(compositing: Compositing) -> bool {
     matches!(compositing, Compositing::Maximum | Compositing::Minimum | Compositing::Average)
 }
 
-/// Where a stretch's middle is: in which slab, and the share of that.
+/// The position of the middle of a stretch: its slab, and the fraction of the slab before it.
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn middle_of<S: Simd>(stretch: [f32x8<S>; 2]) -> [f32x8<S>; 2] {
     let middle = (stretch[0] + stretch[1]) * 0.5;

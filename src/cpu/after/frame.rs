@@ -131,7 +131,7 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// How the pixels of a tile look at slabs, counted from `base`, and the directions to the eye where they differ.
+    /// The rays of a tile's pixels among slabs counted from `base`, and the pixels' directions to the eye where these differ.
     pub(super) fn rays_of_tile(&self, origin: [usize; 2], base: i32) -> (TileRays, Vec<[[f32; COLUMNS]; 3]>) {
         let mut rays = self.rays.of_tile(origin, base);
         let length = |ray: &crate::cpu::ray::PixelRay| (ray.length() / ray.slabs_per_depth()) as f32;

@@ -1,4 +1,4 @@
-//! Where voxels' kernels meet the slab planes of a view, in f64 (SPEC §9): which planes, and around which pixels.
+//! The positions of voxels' kernels on the slab planes of a view, in f64 (SPEC §9): the planes they reach, and the pixels around which they do.
 
 use std::ops::Range;
 
@@ -21,7 +21,7 @@ use crate::volume::Grid;
 /// Pixels around boxes, for rounding in f32.
 const SLACK: f64 = 0.02;
 
-/// Where a voxel is. Planes are counted: plane k is at depth k.
+/// The position of a voxel. Depths are counted in planes: plane k is at depth k.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     /// Pixel coordinates times the depth from the eye, from the image's middle; without an eye that depth is 1.
@@ -29,7 +29,7 @@ pub(super) struct Place {
     pub(super) depth: f64,
 }
 
-/// How kernels lie on a plane: grid units along two axes by a pixel's offset, a = `a·(dx, dy)` and b = `b·(dx, dy)`.
+/// The map from a pixel's offset on a plane to grid units along the plane's two axes: a = `a·(dx, dy)` and b = `b·(dx, dy)`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PlaneMap {
     /// The plane's depth from the eye, `unit`s; 1 without an eye.
@@ -49,11 +49,11 @@ pub(super) struct Placement {
     pub(super) per_plane: f64,
     /// Planes that a kernel reaches to either side of its voxel.
     reach: f64,
-    /// Where the voxels of a brick are, from its first place, by slot.
+    /// The positions of a brick's voxels relative to its first voxel, by slot.
     x: BySlot<f64>,
     y: BySlot<f64>,
     depth: BySlot<f64>,
-    /// Of the planes that the volume's kernels reach, from the first on; without an eye of one, as all are the same.
+    /// The maps of the planes that the volume's kernels reach, from the first on; without an eye a single one, because all are equal.
     maps: Vec<PlaneMap>,
     first_map: i32,
 }
@@ -88,12 +88,12 @@ impl Placement {
         Place { at: DVec2::new(x, y), depth: (depth - self.view.slabs.origin) / self.view.slabs.width }
     }
 
-    /// Where a brick's first place is.
+    /// The position of a brick's first voxel.
     pub(super) fn of_brick(&self, brick: &Brick) -> Place {
         self.of(brick::origin(brick).as_dvec3())
     }
 
-    /// Where one of a brick's voxels is.
+    /// The position of one of a brick's voxels.
     pub(super) fn of_voxel(&self, brick: Place, slot: u32) -> Place {
         let slot = slot as usize;
         Place { at: brick.at + DVec2::new(self.x[slot], self.y[slot]), depth: brick.depth + self.depth[slot] }
@@ -127,7 +127,7 @@ impl Placement {
         firsts
     }
 
-    /// The planes nearer than a kernel's radius to voxels between two depths. At the eye and behind it there are none.
+    /// The planes within a kernel's radius of voxels between two depths; none at the eye or behind it.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn planes(&self, depths: Range<f64>) -> Range<i32> {
         let first = floor(depths.start - self.reach + slab::ROUNDING) + 1;
@@ -140,13 +140,13 @@ impl Placement {
         (f64::from(plane) - place.depth) * self.per_plane
     }
 
-    /// How kernels lie on a plane that one may reach.
+    /// The kept map of a plane that a kernel may reach.
     pub(super) fn map(&self, plane: i32) -> &PlaneMap {
         let at = if self.view.perspective.is_some() { plane - self.first_map } else { 0 };
         &self.maps[at as usize]
     }
 
-    /// How kernels lie on a plane, by the low-pass rule.
+    /// The map of a plane, by the low-pass rule.
     fn new_map(&self, plane: i32) -> PlaneMap {
         let PlaneGeometry { screen_axis, per_pixel, .. } = self.geometry;
         let from_eye = self.geometry.distance_from_eye(self.view.slabs.plane(plane));
@@ -166,7 +166,7 @@ impl Placement {
         self.view.perspective.is_none().then(half_box)
     }
 
-    /// Where on the image the point of a plane lies that is nearest to a voxel.
+    /// The pixel position of the point of a plane that is nearest to a voxel.
     pub(super) fn center(&self, place: Place, to_plane: f64, map: &PlaneMap) -> DVec2 {
         (place.at + to_plane * self.geometry.step.truncate()) / map.from_eye + self.middle()
     }

@@ -1,4 +1,4 @@
-//! What the transfer function makes of the values between two planes (SPEC §9), of eight pixels at a time: [`slab_integral`]'s table read by the
+//! The means of the transfer function over the values between two planes (SPEC §9), for eight pixels at a time: [`slab_integral`]'s table read by the
 //! same steps as [`SlabIntegral::new`](slab_integral::SlabIntegral::new).
 
 use std::collections::BTreeMap;

@@ -34,7 +34,7 @@ pub(super) struct Splat {
     pub(super) drawn: u32,
 }
 
-/// How a kernel lies on a plane, in f32: the offset (a, b) is `(a·dx, b·dx)`, dx being the pixel's offset from the centre.
+/// The map of a plane in f32: the offset (a, b) is `(a·dx, b·dx)`, with dx the pixel's offset from the centre.
 #[derive(Clone, Copy, Debug)]
 struct Footprint {
     center: [f32; 2],
@@ -42,7 +42,7 @@ struct Footprint {
     b: [f32; 2],
 }
 
-/// How a kernel lies along the planes' normal, by plane.
+/// The positions of a kernel along the planes' normal, by plane.
 #[derive(Clone, Copy, Debug)]
 struct Along {
     /// To the planes, grid units.

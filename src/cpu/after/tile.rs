@@ -85,7 +85,7 @@ impl<'a> TileWalk<'a> {
         (&self.buffers, &self.rays, self.tally)
     }
 
-    /// For a tile whose walk begins with a plane.
+    /// Prepares the walk through a tile, which begins with a plane.
     fn reset(&mut self, origin: [usize; 2], plane: i32) {
         let [width, height] = self.frame.placement.view.size.map(|side| side as usize);
         self.origin = origin;
@@ -221,7 +221,7 @@ impl<'a> TileWalk<'a> {
         }
     }
 
-    /// Draws a voxel's next planes, if they are seen, and keeps it if there are more.
+    /// Draws a voxel on the next planes, if they are visible, and keeps it if it reaches more.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn draw_splat<S: Simd>(&mut self, simd: S, splat: &Splat) {
         let frame = self.frame;
