@@ -1,6 +1,6 @@
 // Bit masks, and values that a subgroup's lanes hold together.
 //
-// Needs gather/patch.wgsl: THREADS, lane.
+// Needs gather/patch.wgsl: THREADS, lane, lanes.
 
 // A mask of the lanes in which a condition holds.
 fn ballot(holds: bool) -> u32 {

@@ -4,7 +4,7 @@
 // Needs gather.wgsl: GROUPS_LOOKED_BACK, add_sections, composite_pixels, counts_gaps, is_due_without_voxels, looks_along_rays.
 // Needs gather/amounts.wgsl: shade_voxels.
 // Needs gather/economies.wgsl: shallow_after.
-// Needs gather/pixels.wgsl: load_image, open_word, pixels_of.
+// Needs gather/pixels.wgsl: halves_of, load_image, open_word, pixels_of.
 // Needs gather/planes.wgsl: Sheets, save_sheets, saved_sheets.
 // Needs gather/queue.wgsl: empty_queue, queue_count.
 // Needs gather/ramps.wgsl: Ramp, ramp_of.

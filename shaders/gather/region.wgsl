@@ -1,7 +1,7 @@
 // Masks of a patch's pixels (§6): a word for each of its four blocks, with eight bits for each of the block's rows. Blocks are numbered row by
 // row.
 //
-// Needs gather/patch.wgsl: gather, lane, lanes.
+// Needs gather/patch.wgsl: gather, lanes.
 
 // The width of a patch in pixels.
 const PATCH_WIDTH = 16u;

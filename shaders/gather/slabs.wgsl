@@ -2,7 +2,7 @@
 //
 // Needs gather/patch.wgsl: COMPOSITING, CUT, FIRST_HIT, PERSPECTIVE, SHEETS, control_points, cut, sheet_group.
 // Needs gather/pixels.wgsl: Pixels.
-// Needs gather/planes.wgsl: Fields, KERNEL_GRADIENT, PlaneSums, Sheets, halves_handed_on, fields_handed_on, fields_of, hand_on.
+// Needs gather/planes.wgsl: Fields, KERNEL_GRADIENT, PlaneSums, Sheets, fields_handed_on, fields_of, halves_handed_on, hand_on.
 // Needs gather_planes.wgsl: planes.
 // Needs shared/cells.wgsl: nearest_voxel, voxel_at.
 // Needs shared/compositing.wgsl: composite.
