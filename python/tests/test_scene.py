@@ -174,7 +174,13 @@ def test_ctrl_c_stops_between_pictures(tmp_path: pathlib.Path) -> None:
     import time
 
     code = f"import sheetsplat; sheetsplat.orbit({HEAD!r}, {str(tmp_path / '%05d.png')!r}, count=100000, image={SMALL!r})"
-    process = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True)
+
+    def heed_interrupts() -> None:
+        # A caller that runs these tests in the background may ignore interrupts, and its processes would, too.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    command = [sys.executable, "-c", code]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=heed_interrupts)
     end = time.monotonic() + 60
     while len(os.listdir(tmp_path)) < 3 and time.monotonic() < end:
         time.sleep(0.02)
