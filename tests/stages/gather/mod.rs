@@ -12,7 +12,7 @@ use sheetsplat::internals::gpu::uniforms::{self, Ramps};
 use sheetsplat::internals::gpu::volume_texture::{SIDES, VolumeTexture};
 use sheetsplat::internals::pass::composite::{CutBuffers, RayMode};
 use sheetsplat::internals::pass::gather::{Gather, GatherBuffers, GatherMode};
-use sheetsplat::internals::patch_bins::{self, BLOCKS, PatchBins, SHEETS};
+use sheetsplat::internals::patch_bins::{self, HALVES, PatchBins, SHEETS};
 use sheetsplat::internals::{ClippedVoxels, means, reference};
 use sheetsplat::scene::{Scene, TransferSettings};
 use sheetsplat::settings::{Compositing, FootprintForm, TransferFunction};
@@ -92,7 +92,7 @@ impl<'a> Fixture<'a> {
             })
             .collect();
         let storage = |words: &[u32]| init(device, words, BufferUsages::STORAGE);
-        let words = gather.reached + bins.patches * BLOCKS;
+        let words = gather.reached + bins.patches * HALVES;
         let gathered = storage(&vec![0; size_of::<Gathered>() / 4 + words as usize]);
         let (ranges_buffer, stride) = at_offsets(device, &ranges);
         let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|half| half.as_vec2().to_array()).collect();
