@@ -166,7 +166,7 @@ pub struct Cut {
     pub has_surfaces: u32,
 }
 
-/// The position of kernels on slab planes, and the scale of splatted numbers (SPEC §9): a [`PlaneGeometry`](crate::geometry::plane_geometry::PlaneGeometry) and
+/// The position of kernels on slab planes, and the scale of splatted numbers (SPEC §9): a `PlaneGeometry` and
 /// a [`Normalization`](crate::after::normalization::Normalization).
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]

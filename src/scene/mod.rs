@@ -377,7 +377,7 @@ impl Scene {
 
     /// Whether values are classified before or after splatting, for a volume (SPEC §9): as stated, or with [`Classification::Auto`] after
     /// it where the transfer function comes from a preset (except `xray`, `mip`, `confocal` and `labels`) or is chosen for the volume, unless
-    /// another setting excludes that or the volume is a label map ([`categories`](crate::appearance::categories)).
+    /// another setting excludes that or the volume is a label map ([`categories`]).
     pub fn classification(&self, volume: &Volume) -> Classification {
         let Self { transfer, splatting, .. } = self;
         if splatting.classification != Classification::Auto {
