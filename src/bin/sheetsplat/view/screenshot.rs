@@ -56,7 +56,8 @@ mod tests {
     fn a_saved_scene_is_what_is_shown() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("shown.toml");
-        let sets = ["image.width=70".to_owned(), "preset=ct-bone".to_owned()];
+        // The viewer always names the classification that it shows.
+        let sets = ["image.width=70", "preset=ct-bone", "splatting.classification=after"].map(str::to_owned);
         let scene = Scene::from_volume(VolumeSource::Builtin("head:16".to_owned()), &sets).unwrap();
         let volume = scene.load_volume().unwrap();
         let edited = TransferFunction { iso_ranges: Some(vec![[3.0, 90.0]]), ..scene.transfer.resolve(&volume) };
