@@ -10,7 +10,9 @@
 //!        ─ first_hit ─→ the depths at which an opacity was reached, if requested
 //! ```
 //!
-//! Functions that work with vectors are always inlined, into the function that an instruction set is chosen for; else their vectors would pass
+//! Where classification comes after splatting, [`after`] walks the tiles.
+//!
+//! Functions that work with vectors are inlined into the function that an instruction set is chosen for, or choose it themselves; else their vectors would pass
 //! through memory. Builds without optimization are the exception, since there one function with everything inlined would need megabytes of stack.
 //!
 //! Stages are those of the GPU, by the same names. The same scene gives the same bytes on every machine (SPEC §12): pixels are `f32` by IEEE
