@@ -6,8 +6,10 @@ use fearless_simd::prelude::*;
 use super::classify::{Looks, Sample, mask};
 use super::frame::Frame;
 use super::planes::Planes;
+use crate::cpu::cut::TileRays;
 use crate::cpu::sheets::{Buffers, COLUMNS, ROWS, slot_of};
 use crate::cpu::vector::LANES;
+use crate::part::Extreme;
 use crate::settings::splatting::Compositing;
 
 /// The choice of a row's pixels: number, gradient, and place among slabs; the weight is 0 where nothing was chosen.
@@ -41,6 +43,33 @@ impl Chosen {
     pub(super) fn clear(&mut self) {
         self.best.fill(NOTHING);
         self.middle.fill([NOTHING; 2]);
+    }
+
+    /// The chosen values in the range of the coefficients, row by row (SPEC §11).
+    pub(super) fn extremes(&self, frame: &Frame<'_>, rays: &TileRays) -> Vec<Extreme> {
+        let [low, high] = frame.coefficients.numbers.range;
+        let span = if high > low { high - low } else { 1.0 };
+        let of = |row: usize, at: usize| {
+            let (best, [near, far]) = (&self.best[row], &self.middle[row]);
+            let extreme = |number: f32, counted| Extreme { value: (number - low) / span, counted };
+            if best.weight[at] > 0.0 {
+                return extreme(best.number[at], Extreme::POINT);
+            }
+            let Some(shown) = &rays.shown else { return Extreme::default() };
+            let [start, end] = [shown[row][0][at], shown[row][1][at]];
+            let middle = (start + end) * 0.5;
+            let (first, second) = match (near.weight[at] > 0.0, far.weight[at] > 0.0) {
+                (true, true) => (near.number[at], far.number[at]),
+                (true, false) => (near.number[at], near.number[at]),
+                (false, true) => (far.number[at], far.number[at]),
+                (false, false) => return Extreme::default(),
+            };
+            if start >= end {
+                return Extreme::default();
+            }
+            extreme(first + (second - first) * (middle - middle.floor()), Extreme::MIDDLE)
+        };
+        (0..self.best.len()).flat_map(|row| (0..COLUMNS).map(move |at| of(row, at))).collect()
     }
 }
 
@@ -76,11 +105,18 @@ impl Frame<'_> {
                 let gradient = self.gradient(simd, &sample);
                 let stretch = looks.stretch(simd, [column, row]);
                 let here = f32x8::splat(simd, number);
-                let counts = stretch[0].simd_le(here) & here.simd_le(stretch[1]) & mask(simd, sample.has_value);
-                self.keep(simd, &mut chosen.best[row], column, (&sample, &gradient, here), counts.to_bitmask() as u32);
+                if self.slabs.contains(&plane) {
+                    let counts = stretch[0].simd_le(here) & here.simd_le(stretch[1]) & mask(simd, sample.has_value);
+                    let counts = counts.to_bitmask() as u32;
+                    self.keep(simd, &mut chosen.best[row], column, (&sample, &gradient, here), counts);
+                }
                 let [slab, _] = middle_of(stretch);
-                for (kept, offset) in chosen.middle[row].iter_mut().zip([0.0, 1.0]) {
-                    let is_there = (slab + offset).simd_eq(here) & mask(simd, sample.has_value);
+                // Plane k is before slab k and behind slab k - 1.
+                for (kept, behind) in chosen.middle[row].iter_mut().zip([0, 1]) {
+                    if !self.slabs.contains(&(plane - behind)) {
+                        continue;
+                    }
+                    let is_there = (slab + behind as f32).simd_eq(here) & mask(simd, sample.has_value);
                     let bits = is_there.to_bitmask() as u32;
                     kept.set(simd, column, (sample.value, &gradient, here), bits);
                 }

@@ -7,6 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::coefficients::Coefficients;
+use super::extreme::is_choice;
 use super::place::Placement;
 use super::slab_integral::Integrals;
 use super::splat::Splatter;
@@ -16,20 +17,21 @@ use crate::cpu::composite::Compositor;
 use crate::cpu::count::Drawn;
 use crate::cpu::cut::{RayMode, TileRays};
 use crate::cpu::first_hit;
-use crate::cpu::frame::{Drawing, Host, Tile, draw_tiles};
-use crate::cpu::resolve::Resolver;
+use crate::cpu::frame::{Drawing, Host, Outputs, Tile, draw_tiles};
+use crate::cpu::resolve;
 use crate::cpu::shade::Shader;
 use crate::cpu::sheets::{COLUMNS, ROWS};
 use crate::geometry::view_geometry::ViewGeometry;
 
-use crate::image::Image;
 use crate::lists::brick;
 use crate::lists::brick::Brick;
+use crate::part::Resolver;
 use crate::scene::Scene;
 use crate::settings::clip::HalfSpace;
 use crate::settings::shading::{Gradient, MIN_GRADIENT};
-use crate::settings::splatting::{Compositing, Order};
+use crate::settings::splatting::{Classification, Compositing, Order};
 use crate::settings::transfer_function::TransferFunction;
+use crate::settings::window::{Region, Window};
 use crate::stats::Counts;
 use crate::volume::Volume;
 
@@ -70,7 +72,12 @@ pub(in crate::cpu) struct Frame<'a> {
     pub(super) to_eye: [f32; 3],
     /// The slabs whose sheets may hold anything.
     pub(super) touched: Range<i32>,
-    resolver: Resolver,
+    /// The slabs that are drawn.
+    pub(super) slabs: Range<i32>,
+    /// The pixels that are drawn.
+    pub(super) region: Region,
+    /// `None` for a part of an image.
+    resolver: Option<Resolver>,
 }
 
 /// Values that differ by less, relative to the range of the coefficients, count as equal: in homogeneous matter only rounding tells them apart.
@@ -83,19 +90,17 @@ impl<'a> Frame<'a> {
         coefficients: &'a Coefficients,
         scene: &Scene,
         view: ViewGeometry,
-        Host { first_hit, surfaces }: Host,
+        Host { window, first_hit, surfaces }: Host,
     ) -> Self {
         let (splatting, shading, grid) = (&scene.splatting, &scene.shading, volume.grid());
-        let placement = Placement::new(view, grid);
+        let Window { slabs, region } = window.clone().unwrap_or_else(|| Window::whole(view.size));
+        let placement = Placement::new(view, grid, &slabs);
         let (numbers, [shown, bricks]) = (coefficients.numbers, coefficients.bricks());
         let can_hide = splatting.compositing.hides() && splatting.order == Order::FrontToBack;
         let tables = volume.labels().map(|_| transfer.labels.keys()).into_iter().flatten();
         let tables = tables.map(|&label| transfer.tables(Some(label))).chain([transfer.tables(None)]);
         let has_gradient_opacity = tables.into_iter().any(|tables| tables.gradient_opacity.is_some());
         let axes = placement.geometry.axes;
-        // Sums are clamped; everything else is premultiplied RGBA already.
-        let resolved_as =
-            if splatting.compositing == Compositing::Xray { Compositing::Xray } else { Compositing::Linear };
         Self {
             volume,
             transfer,
@@ -126,7 +131,11 @@ impl<'a> Frame<'a> {
             labels: volume.labels().is_some() && !transfer.labels.is_empty(),
             to_eye: (-view.basis.w).to_array().map(|component| component as f32),
             touched: touched(&placement, shown),
-            resolver: Resolver::new(resolved_as, scene.image.background),
+            slabs,
+            region,
+            resolver: window
+                .is_none()
+                .then(|| Resolver::new(splatting.compositing, Classification::After, scene.image.background)),
             placement,
         }
     }
@@ -155,20 +164,22 @@ impl<'a> Frame<'a> {
         let size = self.placement.view.size;
         let placed = self.placement.place_bricks(self.bricks);
         let has_hits = self.compositor.first_hit.is_some();
-        let (pixels, first_hits, tally) = draw_tiles(
-            size,
-            has_hits,
+        let has_extremes = self.resolver.is_none() && is_choice(self.compositing);
+        let (content, first_hits, tally) = draw_tiles(
+            (size, &self.region),
+            Outputs { has_hits, has_extremes },
             &placed,
             || TileWalk::new(self),
             |walk, origin, bricks| {
                 let (buffers, rays, tally) = dispatch!(level, simd => walk.draw(simd, origin, &placed, bricks));
-                let pixels = self.resolver.tile(buffers);
+                let pixels = resolve::tile(self.resolver.as_ref(), buffers);
                 let unit = self.volume.grid().unit();
                 let first_hits = match has_hits {
                     true => first_hit::depths(buffers, rays, &self.rays.rays, origin, unit),
                     false => Vec::new(),
                 };
-                Tile { pixels, first_hits, tally }
+                let extremes = if has_extremes { walk.extremes() } else { Vec::new() };
+                Tile { pixels, extremes, first_hits, tally }
             },
         );
         let [columns, rows] = bin::tile_grid(size);
@@ -184,8 +195,7 @@ impl<'a> Frame<'a> {
             bricks_visited: tally.bricks_visited,
             ..Counts::default()
         };
-        let [width, height] = size;
-        Drawing { image: Image { width, height, pixels }, counts, first_hits }
+        Drawing { content, counts, first_hits }
     }
 
     /// Pairs of voxels and planes nearer to them than the kernel's radius.

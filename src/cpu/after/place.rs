@@ -49,6 +49,8 @@ pub(super) struct Placement {
     pub(super) per_plane: f64,
     /// Planes that a kernel reaches to either side of its voxel.
     reach: f64,
+    /// The planes that are drawn.
+    drawn: Range<i32>,
     /// The positions of a brick's voxels relative to its first voxel, by slot.
     x: BySlot<f64>,
     y: BySlot<f64>,
@@ -62,7 +64,8 @@ pub(super) struct Placement {
 pub(super) type ScreenBox = [DVec2; 2];
 
 impl Placement {
-    pub(super) fn new(view: ViewGeometry, grid: &Grid) -> Self {
+    /// The planes of some slabs of a view.
+    pub(super) fn new(view: ViewGeometry, grid: &Grid, slabs: &Range<i32>) -> Self {
         let geometry = PlaneGeometry::new(&view, grid);
         let per_plane = geometry.per_depth * view.slabs.width;
         let reach = view.radius / per_plane;
@@ -71,7 +74,9 @@ impl Placement {
         };
         let [x, y] = [0, 1].map(|row| std::array::from_fn(|slot| offset(row, slot)));
         let depth = std::array::from_fn(|slot| offset(2, slot) / view.slabs.width);
-        let mut placement = Self { geometry, reach, per_plane, view, x, y, depth, maps: Vec::new(), first_map: 0 };
+        let drawn = if slabs.is_empty() { 0..0 } else { slabs.start..slabs.end + 1 };
+        let maps = Vec::new();
+        let mut placement = Self { geometry, reach, drawn, per_plane, view, x, y, depth, maps, first_map: 0 };
         let (middle, half) = (grid.center(), grid.center());
         let Place { depth, .. } = placement.of(middle);
         let spread = view.screen_from_voxel[2].truncate().abs().dot(half) / view.slabs.width;
@@ -127,12 +132,13 @@ impl Placement {
         firsts
     }
 
-    /// The planes within a kernel's radius of voxels between two depths; none at the eye or behind it.
+    /// The planes within a kernel's radius of voxels between two depths, of those that are drawn; none at the eye or behind it.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn planes(&self, depths: Range<f64>) -> Range<i32> {
         let first = floor(depths.start - self.reach + slab::ROUNDING) + 1;
         let end = -floor(-(depths.end + self.reach - slab::ROUNDING));
-        if self.view.perspective.is_some() { first.max(1)..end } else { first..end }
+        let first = if self.view.perspective.is_some() { first.max(1) } else { first };
+        first.max(self.drawn.start)..end.min(self.drawn.end)
     }
 
     /// From a voxel to a plane, grid units along the normal.

@@ -21,6 +21,7 @@ use crate::cpu::sheets::{Buffers, COLUMNS, RING, ROWS, SECTIONS, slot_of};
 use crate::cpu::vector::LANES;
 use crate::lists::brick;
 use crate::lists::brick::BRICK_VOXELS;
+use crate::part::Extreme;
 use crate::settings::splatting::Compositing;
 
 /// The state with which a thread draws one tile after another.
@@ -73,6 +74,7 @@ impl<'a> TileWalk<'a> {
     ) -> (&Buffers, &TileRays, Tally) {
         let mut bricks = bricks.iter().map(|&at| &placed[at as usize]).peekable();
         self.buffers.clear();
+        self.chosen.clear();
         self.tally = Tally::default();
         if let Some(first) = bricks.peek().map(|placed| placed.first) {
             self.reset(origin, first);
@@ -85,17 +87,22 @@ impl<'a> TileWalk<'a> {
         (&self.buffers, &self.rays, self.tally)
     }
 
+    /// The values that the tile's pixels chose, row by row.
+    pub(super) fn extremes(&self) -> Vec<Extreme> {
+        self.chosen.extremes(self.frame, &self.rays)
+    }
+
     /// Prepares the walk through a tile, which begins with a plane.
     fn reset(&mut self, origin: [usize; 2], plane: i32) {
         let [width, height] = self.frame.placement.view.size.map(|side| side as usize);
         self.origin = origin;
         self.open = OpenMask::new((width - origin[0]).min(COLUMNS), (height - origin[1]).min(ROWS));
+        self.open.close_outside(&self.frame.region, origin);
         (self.rays, self.to_eye) = self.frame.rays_of_tile(origin, plane);
         if let (Some(shown), Some(_)) = (&self.rays.shown, self.frame.compositor.threshold) {
             self.open.close_empty(shown);
         }
         (0..RING).for_each(|slot| self.planes.clear(slot));
-        self.chosen.clear();
         self.arrived.clear();
         self.queue.clear();
         self.continued.iter_mut().for_each(Vec::clear);
@@ -132,6 +139,10 @@ impl<'a> TileWalk<'a> {
         let looks = Looks::new(self.origin, rays, to_eye);
         if is_choice(frame.compositing) {
             return frame.choose(simd, slab + 1, &looks, planes, chosen);
+        }
+        // The planes around a range of slabs bound slabs outside of it as well.
+        if !frame.slabs.contains(&slab) {
+            return;
         }
         frame.classify(simd, slab, &looks, planes, open, buffers);
         if frame.compositing == Compositing::Surface {
