@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Content, Extreme, Identity, Part, Window, exr};
+use super::{Content, Extreme, Identity, Part, Window, exr, npz};
 use crate::image::open::{MAX_EXPANSION, content, of_volume, read};
 use crate::image::{ImageError, output};
 use crate::volume::{Access, ReadOptions};
@@ -10,6 +10,7 @@ use crate::volume::{Access, ReadOptions};
 /// The formats by extension, ignoring case.
 enum Format {
     Exr,
+    Npz,
 }
 
 impl Format {
@@ -17,9 +18,10 @@ impl Format {
         let extension = path.extension().and_then(|extension| extension.to_str());
         match extension.map(str::to_ascii_lowercase).as_deref() {
             Some("exr") => Ok(Self::Exr),
+            Some("npz") => Ok(Self::Npz),
             _ => {
                 let found = extension.map_or("none".to_owned(), |extension| format!("\".{extension}\""));
-                Err(content(path, "extension", found, ".exr for a part of an image".to_owned()))
+                Err(content(path, "extension", found, ".exr or .npz for a part of an image".to_owned()))
             }
         }
     }
@@ -49,16 +51,16 @@ impl Part {
     pub fn open_with(path: &Path, options: &ReadOptions) -> Result<Self, ImageError> {
         let format = Format::of(path)?;
         let access = Access::new(options).map_err(of_volume)?;
-        let bytes = read(path, &access)?;
         let (identity, window, channels) = match format {
-            Format::Exr => exr::decode(path, &bytes, &access)?,
+            Format::Exr => exr::decode(path, &read(path, &access)?, &access)?,
+            Format::Npz => npz::decode(path, &access)?,
         };
         let content = from_channels(&channels);
         Ok(Self { name: path.display().to_string(), identity, window, content })
     }
 
     /// Saves the part by the file's extension: `.exr`, whose data window is the region and whose display window is the whole image, with the
-    /// description as a text attribute. The file appears whole or not at all.
+    /// description as a text attribute; or `.npz` with an array `pixels` (height × width × channels) and the description `part.json`. The file appears whole or not at all.
     ///
     /// # Errors
     /// If the extension is unknown or the file cannot be written.
@@ -81,6 +83,7 @@ impl Part {
         }
         match format {
             Format::Exr => exr::encode(path, self),
+            Format::Npz => npz::encode(path, self),
         }
     }
 }

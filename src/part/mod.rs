@@ -31,6 +31,8 @@ mod exr;
 mod file;
 mod fingerprint;
 mod merge;
+#[cfg(feature = "codecs")]
+mod npz;
 mod resolve;
 mod split;
 
@@ -38,6 +40,7 @@ use std::ops::Range;
 
 pub use content::{Content, Extreme};
 pub use merge::MergeError;
+#[cfg(feature = "cpu")]
 pub(crate) use resolve::Resolver;
 pub use split::split;
 

@@ -74,8 +74,8 @@ fn parts_that_exist_are_not_drawn_again() {
 fn what_has_no_parts_is_refused() {
     let folder = Folder::new();
     for (arguments, message) in [
-        ("-o part.png --slabs 0..3", "part.png: extension: found \".png\", allowed: .exr"),
-        ("-o part.npy --region 0,0,4,4", "part.npy: extension: found \".npy\", allowed: .exr"),
+        ("-o part.png --slabs 0..3", "part.png: extension: found \".png\", allowed: .exr or .npz"),
+        ("-o part.npy --region 0,0,4,4", "part.npy: extension: found \".npy\", allowed: .exr or .npz"),
         (
             "-o part.exr --region 30,0,11,4",
             "region: found 30,0,11,4, allowed: X,Y,W,H of at least one pixel within the image of 40×30",

@@ -12,9 +12,9 @@ use sheetsplat::{Image, Part};
 use crate::merging::{head, headless, parts};
 
 /// A part's file under a name that is not used otherwise.
-fn round_trip(part: &Part) -> Part {
+fn round_trip(part: &Part, extension: &str) -> Part {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("part.exr");
+    let path = folder.path().join("part").with_extension(extension);
     part.save(&path).unwrap();
     let opened = Part::open(&path).unwrap();
     assert_eq!(opened.name, path.display().to_string());
@@ -40,9 +40,15 @@ fn files_hold_all_of_a_part() {
         let has_extremes = |part: &Part| part.content.extremes.iter().any(|extreme| extreme.counted == Extreme::POINT);
         assert_eq!(parts.iter().all(has_extremes), classification == Classification::After);
         for part in &parts {
-            assert_eq!(round_trip(part), *part);
+            for extension in ["exr", "npz"] {
+                assert_eq!(round_trip(part, extension), *part);
+            }
         }
-        let opened: Vec<Part> = parts.iter().map(round_trip).collect();
+        let opened: Vec<Part> = parts
+            .iter()
+            .zip(["exr", "npz"].iter().cycle())
+            .map(|(part, extension)| round_trip(part, extension))
+            .collect();
         assert_eq!(Image::merge(opened).unwrap(), Image::merge(parts).unwrap());
     }
 }
@@ -177,6 +183,21 @@ fn damaged_files_are_errors() {
         }
     }
     assert!(failures > 300, "{failures}");
+    let path = folder.path().join("part.npz");
+    let archive = part.encode(&path).unwrap();
+    let open_archive = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        Part::open_with(&path, &options)
+    };
+    assert!(open_archive(&archive).is_ok());
+    let mut failures = 0;
+    for at in (0..archive.len()).step_by(1 + archive.len() / 400) {
+        let mut damaged = archive.clone();
+        damaged[at] ^= 0x51;
+        failures += u32::from(open_archive(&damaged).is_err()) + u32::from(open_archive(&archive[..at]).is_err());
+    }
+    // The archive's checksums find all damage but that of dates.
+    assert!(failures > 700, "{failures}");
 
     // A description that lies.
     let json = |from: &str, to: &str| {
@@ -200,7 +221,7 @@ fn damaged_files_are_errors() {
 fn other_files_are_no_parts() {
     let part = parts_of(Compositing::Linear, Classification::Before).remove(0);
     let format = part.save(Path::new("part.png")).unwrap_err().to_string();
-    assert!(format.starts_with("part.png: extension: found \".png\", allowed: .exr"), "{format}");
+    assert!(format.starts_with("part.png: extension: found \".png\", allowed: .exr or .npz"), "{format}");
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("image.exr");
     let image = Image { width: 2, height: 1, pixels: vec![[0.5; 4]; 2] };

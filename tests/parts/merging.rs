@@ -76,7 +76,7 @@ fn compare(backend: Backend, volume: &Arc<Volume>, scene: &Scene) {
     let merged = Image::merge(parts).unwrap();
     let what = format!("{backend} {:?}", scene.splatting);
     let shown = whole.pixels.iter().filter(|pixel| **pixel != whole.pixels[0]).count();
-    assert_at_least(shown as f64 / whole.pixels.len() as f64, 0.1, &what);
+    assert_at_least(shown as f64 / whole.pixels.len() as f64, 0.08, &what);
     assert_at_most(largest_difference(&merged, &whole), ALLOWED, what);
 }
 
@@ -114,8 +114,8 @@ fn parts_classified_after_splatting_merge() {
             // Coefficients reach further than values.
             let is_exact = scene.camera.projection != Projection::Orthographic { height: None };
             scene.splatting.interpolation = if is_exact { Interpolation::Exact } else { Interpolation::Smooth };
-            // Among the values of air, which count as equal, another part's point may be chosen, with another gradient.
-            scene.shading.enabled = compositing != Compositing::Minimum;
+            // Among values that count as equal, as in homogeneous matter, another part's point may be chosen, with another gradient.
+            scene.shading.enabled = !matches!(compositing, Compositing::Minimum | Compositing::Maximum);
             compare(Backend::Cpu, &volume, &scene);
         }
     }

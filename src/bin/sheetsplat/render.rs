@@ -27,7 +27,7 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
-    /// The image: .png, .exr or .npy; a part of it: .exr.
+    /// The image: .png, .exr or .npy; a part of it: .exr or .npz.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Bits per channel of a PNG.
