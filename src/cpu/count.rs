@@ -41,13 +41,6 @@ impl Drawn {
         Self { marks: (0..bricks * masks).map(|_| AtomicU64::new(0)).collect(), masks }
     }
 
-    /// Counts some sections of a voxel, given by brick and slot.
-    pub(super) fn splat(&self, [brick, slot]: [u32; 2], part: u32, sections: u64, tally: &mut Tally) {
-        let mask = (1 + part as usize).min(self.masks - 1);
-        let before = self.marks[brick as usize * self.masks + mask].fetch_or(1 << slot, Ordering::Relaxed);
-        tally.sections += sections * u64::from(before >> slot & 1 == 0);
-    }
-
     /// Adds what a tile has marked of a brick. `sheets` tells how many a voxel has, given its slot.
     pub(super) fn add(&self, brick: u32, marks: &[u64], sheets: impl Fn(u32) -> u64, tally: &mut Tally) {
         let all = &self.marks[brick as usize * self.masks..][..self.masks];

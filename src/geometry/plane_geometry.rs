@@ -100,16 +100,27 @@ impl PlaneGeometry {
     /// The distance from a brick, in whole voxels along each axis, of the voxels that affect the same slabs: two kernel radii, widened as on the
     /// farthest plane that meets the volume, and a slab.
     pub fn reach(&self, view: &ViewGeometry) -> UVec3 {
+        // Rounding must not lose a voxel.
+        whole(2.0 * self.widest_half_box(view) + self.slab_step(view) + 1e-9)
+    }
+
+    /// The distance from a brick, in whole voxels along each axis, of the voxels that affect the values of a slab whose near plane a pixel's ray
+    /// meets in a cell of one of the brick's voxels: half a cell, a kernel radius and a slab.
+    pub fn reach_from_cells(&self, view: &ViewGeometry) -> UVec3 {
+        // Cells are found in f32.
+        whole(0.5 + self.widest_half_box(view) + self.slab_step(view) + 0.01)
+    }
+
+    /// Half the box around the voxels whose kernels reach a point, on the farthest plane that meets the volume.
+    pub fn widest_half_box(&self, view: &ViewGeometry) -> DVec3 {
         let center = self.grid.center();
         let row = view.screen_from_voxel[2];
         let farthest = row.dot(center.extend(1.0)) + row.truncate().abs().dot(center) + view.reach + view.slabs.width;
-        // Rounding must not lose a voxel.
-        let reach = 2.0 * self.half_box(self.distance_from_eye(farthest)) + self.slab(view) + 1e-9;
-        reach.floor().min(DVec3::splat(f64::from(u32::MAX / 4))).as_uvec3()
+        self.half_box(self.distance_from_eye(farthest))
     }
 
     /// The longest step from plane to plane on any pixel's ray, in voxels along each axis.
-    fn slab(&self, view: &ViewGeometry) -> DVec3 {
+    pub fn slab_step(&self, view: &ViewGeometry) -> DVec3 {
         let rays = view.rays();
         let half = DVec2::from(view.size.map(f64::from)) / 2.0;
         let corners = [DVec2::ONE, DVec2::NEG_X + DVec2::Y, DVec2::X + DVec2::NEG_Y, DVec2::NEG_ONE].map(|corner| {
@@ -121,4 +132,9 @@ impl PlaneGeometry {
         // Sheet depth per depth along w is the same on all rays.
         along * (view.slabs.width / row.dot(view.basis.w)) / self.grid.aspect()
     }
+}
+
+/// Distances in whole voxels.
+fn whole(reach: DVec3) -> UVec3 {
+    reach.floor().min(DVec3::splat(f64::from(u32::MAX / 4))).as_uvec3()
 }

@@ -7,7 +7,7 @@ use glam::{DVec3, UVec3};
 use crate::volume::Grid;
 
 /// The side of a brick in voxels.
-const SIDE: u32 = 4;
+pub const SIDE: u32 = 4;
 
 /// The number of slots in a brick.
 pub const BRICK_VOXELS: u32 = SIDE * SIDE * SIDE;
@@ -147,7 +147,8 @@ pub fn in_brick(slot: u32) -> UVec3 {
     UVec3::new(slot % SIDE, slot / SIDE % SIDE, slot / (SIDE * SIDE))
 }
 
-fn bricks_per_axis(grid: &Grid) -> UVec3 {
+/// The number of a grid's bricks along each axis.
+pub fn bricks_per_axis(grid: &Grid) -> UVec3 {
     grid.dims.map(|n| n.div_ceil(SIDE))
 }
 

@@ -4,29 +4,15 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 use glam::DVec3;
 
+use super::cells::Bits;
 use super::frame::Frame;
-use super::planes::{CHANNELS, Planes, STRIDE};
-use crate::cpu::cull::{OpenMask, columns_between};
+use super::planes::{Plane, PlaneRow};
+use crate::cpu::count::bits;
+use crate::cpu::cull::OpenMask;
 use crate::cpu::cut::TileRays;
-use crate::cpu::sheets::{Buffers, COLUMNS, slot_of};
+use crate::cpu::sheets::{Buffers, COLUMNS, ROWS};
 use crate::cpu::vector::LANES;
-use crate::settings::shading::Gradient;
 use crate::settings::splatting::Compositing;
-
-/// The minimum sum of weights of a point that has a value.
-const MIN_WEIGHT: f32 = 1e-3;
-
-/// The field of eight pixels on a plane.
-#[derive(Clone, Copy)]
-pub(super) struct Sample<S: Simd> {
-    sums: [f32x8<S>; CHANNELS],
-    /// f, as a number.
-    pub(super) value: f32x8<S>,
-    /// 1/N.
-    per_weight: f32x8<S>,
-    /// The pixels that have a value.
-    pub(super) has_value: u32,
-}
 
 /// The field of eight pixels in a slab.
 pub(super) struct Slab<S: Simd> {
@@ -36,8 +22,8 @@ pub(super) struct Slab<S: Simd> {
     pub(super) lanes: u32,
     /// f0 and f1, as numbers.
     pub(super) values: [f32x8<S>; 2],
-    /// ∇f there, numbers per world unit.
-    pub(super) gradients: [[f32x8<S>; 3]; 2],
+    /// Which pixels have a value on the near plane, and on the far one.
+    has_value: [u32; 2],
 }
 
 /// The rays of a tile's pixels, as slabs are seen along them.
@@ -82,35 +68,34 @@ impl<'a> Looks<'a> {
 }
 
 impl Frame<'_> {
-    /// Classifies the slab between a plane and the next one, into the sheet. The length of rays is left out.
+    /// Classifies the slab between two planes, into the sheet. The length of rays is left out.
     #[cfg_attr(not(debug_assertions), inline(always))]
+    // The state of one tile, of which each is changed by itself.
+    #[expect(clippy::too_many_arguments, reason = "the parts of a tile's state")]
     pub(super) fn classify<S: Simd>(
         &self,
         simd: S,
-        slab: i32,
+        number: i32,
         looks: &Looks<'_>,
-        planes: &Planes,
+        planes: &mut [Plane; 2],
+        wanted: &[u32; ROWS],
         open: &mut OpenMask,
         buffers: &mut Buffers,
     ) {
-        let [near, far] = [slab, slab + 1].map(slot_of);
-        let mut rows = planes.written[near] | planes.written[far];
-        while rows != 0 {
-            let row = rows.trailing_zeros() as usize;
-            rows &= rows - 1;
-            let bits = open.row(row);
+        for (row, wanted) in wanted.iter().enumerate() {
+            let bits = open.row(row) & wanted;
             for column in (0..COLUMNS).step_by(LANES) {
-                let lanes = (bits & columns_between(column, column + LANES - 1)) >> column;
+                let lanes = bits >> column & u32::from(u8::MAX);
+                let lanes = self.reaching(simd, lanes, looks, number, [column, row]);
+                let lanes = self.showing(simd, lanes, planes, [column, row]);
                 if lanes == 0 {
                     continue;
                 }
-                let at = [looks.origin[0] + column, looks.origin[1] + row];
-                let sums = [near, far].map(|slot| &planes.rows[row][slot]);
-                let Some(slab) = self.slab(simd, slab, (at, column, lanes), sums) else { continue };
+                let Some(slab) = self.slab(simd, number, lanes, planes, [column, row]) else { continue };
                 if self.compositing == Compositing::Surface {
-                    let found = self.find_surfaces(simd, &slab, looks, [column, row], buffers);
+                    let found = self.find_surfaces(simd, &slab, looks, planes, [column, row], buffers);
                     open.close(row, found << column);
-                } else if self.sheet(simd, &slab, looks, [column, row], &mut buffers.sheet.rows[row]) {
+                } else if self.sheet(simd, &slab, looks, planes, [column, row], &mut buffers.sheet.rows[row]) {
                     buffers.sheet.written |= 1 << row;
                 }
             }
@@ -120,37 +105,144 @@ impl Frame<'_> {
         }
     }
 
+    /// Which of eight pixels' visible stretches reach into a slab.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn reaching<S: Simd>(&self, simd: S, lanes: u32, looks: &Looks<'_>, slab: i32, at: [usize; 2]) -> u32 {
+        if lanes == 0 {
+            return 0;
+        }
+        let [start, end] = looks.stretch(simd, at);
+        let begin = looks.rays.begin(slab);
+        let is_there = start.simd_le(f32x8::splat(simd, begin + 1.0)) & end.simd_ge(f32x8::splat(simd, begin));
+        lanes & is_there.to_bitmask() as u32
+    }
+
+    /// For which of eight pixels values between those on a slab's two planes may have an opacity.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn showing<S: Simd>(&self, simd: S, lanes: u32, planes: &mut [Plane; 2], at: [usize; 2]) -> u32 {
+        let Some(cells) = self.coefficients.cells() else { return lanes };
+        if lanes == 0 {
+            return 0;
+        }
+        let [column, row] = at;
+        let mut bits = Bits::default();
+        for plane in planes {
+            if lanes & !(plane.seen[row] >> column) != 0 {
+                // There are no values at the eye.
+                let new = match &plane.points {
+                    Some((points, _)) => {
+                        cells.of(points.eight(simd, self.volume.dims().to_array(), [0, 0], at).indices)
+                    }
+                    None => Bits::default(),
+                };
+                plane.seen[row] |= u32::from(u8::MAX) << column;
+                plane.reaches[row] |= new.reaches << column;
+                plane.stays[row] |= new.stays << column;
+            }
+            bits.reaches |= plane.reaches[row] >> column;
+            bits.stays |= plane.stays[row] >> column;
+        }
+        lanes & bits.reaches & bits.stays
+    }
+
+    /// Computes the values of some of eight pixels on a plane, unless they are known.
+    // Not inlined, so that it is compiled once for every instruction set.
+    #[inline(never)]
+    pub(super) fn find_values<S: Simd>(&self, simd: S, plane: &mut Plane, lanes: u32, [column, row]: [usize; 2]) {
+        let missing = lanes & !(plane.known[row] >> column);
+        if missing == 0 {
+            return;
+        }
+        plane.known[row] |= missing << column;
+        let values = &mut plane.rows[row].values;
+        let Some(of) = &plane.points else { return values[column..column + LANES].fill(f32::NAN) };
+        simd.vectorize(
+            #[cfg_attr(not(debug_assertions), inline(always))]
+            || {
+                let cubes = self.field.cubes(simd, of, [column, row]);
+                for lane in bits(missing.into()) {
+                    let (lane, column) = (lane as usize, column + lane as usize);
+                    let point = (of.0.of(column, row), &of.1);
+                    values[column] = self.field.value(simd, cubes.as_ref(), lane, point);
+                }
+            },
+        );
+    }
+
+    /// Computes the gradients of those of eight pixels on a plane that have values, unless they are known.
+    #[inline(never)]
+    pub(super) fn find_gradients<S: Simd>(&self, simd: S, plane: &mut Plane, lanes: u32, [column, row]: [usize; 2]) {
+        let missing = lanes & !(plane.graded[row] >> column);
+        if missing == 0 {
+            return;
+        }
+        plane.graded[row] |= missing << column;
+        let Some(of) = &plane.points else { return };
+        let PlaneRow { values, gradients } = &mut plane.rows[row];
+        simd.vectorize(
+            #[cfg_attr(not(debug_assertions), inline(always))]
+            || {
+                let cubes = self.field.cubes(simd, of, [column, row]);
+                for lane in bits(missing.into()) {
+                    let (lane, column) = (lane as usize, column + lane as usize);
+                    let point = (of.0.of(column, row), &of.1);
+                    let gradient = self.field.gradient(simd, cubes.as_ref(), lane, point, values[column]);
+                    let [x, y, z] = &mut *gradients;
+                    [x[column], y[column], z[column]] = gradient;
+                }
+            },
+        );
+    }
+
     /// The field of eight pixels in a slab; `None` if none of its values has an opacity.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn slab<S: Simd>(
         &self,
         simd: S,
         number: i32,
-        (at, column, lanes): ([usize; 2], usize, u32),
-        [near, far]: [&[[f32; STRIDE]; CHANNELS]; 2],
+        lanes: u32,
+        planes: &mut [Plane; 2],
+        [column, row]: [usize; 2],
     ) -> Option<Slab<S>> {
         let splat = |number: f32| f32x8::splat(simd, number);
-        let near = self.sample(simd, near, column, (at, number));
-        let far = self.sample(simd, far, column, (at, number + 1));
-        let lanes = lanes & (near.has_value | far.has_value);
-        if lanes == 0 {
-            return None;
-        }
-        let [has_near, has_far] = [near.has_value, far.has_value].map(|bits| mask(simd, bits));
-        let f0 = has_near.select(near.value, far.value);
-        let f1 = has_far.select(far.value, near.value);
+        let [near, far] = planes;
+        self.find_values(simd, near, lanes, [column, row]);
+        self.find_values(simd, far, lanes, [column, row]);
+        let [near, far] =
+            [near, far].map(|plane| f32x8::from_slice(simd, &plane.rows[row].values[column..column + LANES]));
+        let (has_near, has_far) = (near.simd_eq(near), far.simd_eq(far));
+        let f0 = has_near.select(near, far);
+        let f1 = has_far.select(far, near);
         let [low, high] = self.integrals.shown;
-        let may_show = f0.max(f1).simd_ge(splat(low)) & f0.min(f1).simd_le(splat(high));
+        let may_show = f0.max(f1).simd_ge(splat(low)) & f0.min(f1).simd_le(splat(high)) & (has_near | has_far);
         let lanes = lanes & may_show.to_bitmask() as u32;
-        if lanes == 0 {
-            return None;
-        }
-        let [first, second] = [self.gradient(simd, &near), self.gradient(simd, &far)];
-        let gradients = [
+        let has_value = [has_near, has_far].map(|lanes| lanes.to_bitmask() as u32);
+        (lanes != 0).then_some(Slab { number, lanes, values: [f0, f1], has_value })
+    }
+
+    /// ∇f0 and ∇f1 of some of eight pixels in a slab.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn gradients<S: Simd>(
+        &self,
+        simd: S,
+        slab: &Slab<S>,
+        lanes: u32,
+        planes: &mut [Plane; 2],
+        [column, row]: [usize; 2],
+    ) -> [[f32x8<S>; 3]; 2] {
+        let [near, far] = planes;
+        self.find_gradients(simd, near, lanes & slab.has_value[0], [column, row]);
+        self.find_gradients(simd, far, lanes & slab.has_value[1], [column, row]);
+        let [has_near, has_far] = slab.has_value.map(|bits| mask(simd, bits));
+        let load = |plane: &Plane, axis: usize| {
+            f32x8::from_slice(simd, &plane.rows[row].gradients[axis][column..column + LANES])
+        };
+        let (first, second) =
+            ([load(near, 0), load(near, 1), load(near, 2)], [load(far, 0), load(far, 1), load(far, 2)]);
+        [
             std::array::from_fn(|axis| has_near.select(first[axis], second[axis])),
             std::array::from_fn(|axis| has_far.select(second[axis], first[axis])),
-        ];
-        Some(Slab { number, lanes, values: [f0, f1], gradients })
+        ]
     }
 
     /// The sheet of eight pixels; whether any of them shows something.
@@ -160,6 +252,7 @@ impl Frame<'_> {
         simd: S,
         slab: &Slab<S>,
         looks: &Looks<'_>,
+        planes: &mut [Plane; 2],
         [column, row]: [usize; 2],
         sheet: &mut [[f32; COLUMNS]; 4],
     ) -> bool {
@@ -169,12 +262,13 @@ impl Frame<'_> {
         let values = slab.values.map(f32x8::to_array);
         let means = self.integrals.means(simd, slab.lanes, values, |lane| self.integrals.table(label(lane)));
         let zero = f32x8::splat(simd, 0.0);
-        if means.amount.simd_gt(zero).to_bitmask() == 0 {
+        let visible = slab.lanes & means.amount.simd_gt(zero).to_bitmask() as u32;
+        if visible == 0 {
             return false;
         }
         let (mut amount, mut color) = (means.amount, means.color);
         if self.needs_gradients {
-            let [near, far] = slab.gradients;
+            let [near, far] = self.gradients(simd, slab, visible, planes, [column, row]);
             let gradient = std::array::from_fn(|axis| near[axis] + (far[axis] - near[axis]) * means.share);
             color = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]));
             if self.has_gradient_opacity {
@@ -186,8 +280,10 @@ impl Frame<'_> {
                 amount *= f32x8::load_array(simd, factors);
             }
         }
-        let amount = mask(simd, slab.lanes).select(amount, zero);
-        let [red, green, blue] = color.map(|channel| channel * amount);
+        // Where nothing is visible the gradient is unknown.
+        let visible = mask(simd, visible);
+        let [red, green, blue] = color.map(|channel| visible.select(channel * amount, zero));
+        let amount = visible.select(amount, zero);
         for (channel, pixels) in sheet.iter_mut().zip([red, green, blue, amount]) {
             pixels.store_slice(&mut channel[column..column + LANES]);
         }
@@ -217,59 +313,12 @@ impl Frame<'_> {
         (x * x + y * y + z * z).sqrt() * self.per_number
     }
 
-    /// The field of eight pixels on a plane.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn sample<S: Simd>(
-        &self,
-        simd: S,
-        plane: &[[f32; STRIDE]; CHANNELS],
-        column: usize,
-        (at, number): ([usize; 2], i32),
-    ) -> Sample<S> {
-        let load = |channel: &[f32; STRIDE]| f32x8::from_slice(simd, &channel[column..column + LANES]);
-        let [n, f, x, y, z, ca, cb, ct] = plane;
-        let sums = [load(n), load(f), load(x), load(y), load(z), load(ca), load(cb), load(ct)];
-        let has_value = sums[0].simd_ge(f32x8::splat(simd, MIN_WEIGHT));
-        let one = f32x8::splat(simd, 1.0);
-        let per_weight = one / has_value.select(sums[0], one);
-        let mut has_value = has_value.to_bitmask() as u32;
-        if self.volume.holes() > 0 {
-            for lane in 0..LANES {
-                if has_value >> lane & 1 == 1 && self.is_hole([at[0] + lane, at[1]], number) {
-                    has_value &= !(1 << lane);
-                }
-            }
-        }
-        Sample { sums, value: sums[1] * per_weight, per_weight, has_value }
-    }
-
-    /// ∇f in numbers per world unit.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn gradient<S: Simd>(&self, simd: S, sample: &Sample<S>) -> [f32x8<S>; 3] {
-        let Sample { sums, value, per_weight, .. } = sample;
-        match self.gradient {
-            Gradient::Differences => [2, 3, 4].map(|channel| sums[channel] * *per_weight),
-            Gradient::Kernel => {
-                let along = [0, 1, 2].map(|axis| (sums[5 + axis] - *value * sums[2 + axis]) * *per_weight);
-                let [a, b, t] = along;
-                let is_noise = (a * a + b * b + t * t).simd_lt(f32x8::splat(simd, self.min_moment));
-                let along = along.map(|component| is_noise.select(f32x8::splat(simd, 0.0), component));
-                self.world_from_plane.map(|row| {
-                    let splat = |at: usize| f32x8::splat(simd, row[at]);
-                    along[0] * splat(0) + along[1] * splat(1) + along[2] * splat(2)
-                })
-            }
-        }
-    }
-
     /// The label of the voxel whose cell contains a point of a pixel's ray, given by its position among slabs.
     pub(super) fn label(&self, [x, y]: [usize; 2], lane: usize, slab: f64) -> Option<u16> {
-        self.volume.label(self.cell([x + lane, y], slab))
-    }
-
-    /// Whether the voxel nearest to where a pixel's ray meets a plane is a hole.
-    fn is_hole(&self, pixel: [usize; 2], plane: i32) -> bool {
-        self.volume.values()[self.cell(pixel, plane.into()) as usize].is_nan()
+        let (grid, at) = (self.volume.grid(), self.voxel_at([x + lane, y], slab));
+        let last = grid.dims.as_dvec3() - 1.0;
+        // Cast, which rounds towards 0.
+        self.volume.label(grid.index_of((at + 0.5).clamp(DVec3::ZERO, last).as_uvec3()))
     }
 
     /// A place on a pixel's ray, in voxels.
@@ -282,14 +331,6 @@ impl Frame<'_> {
     pub(super) fn value(&self, number: f32) -> f64 {
         let numbers = &self.coefficients.numbers;
         numbers.base + f64::from(number) / numbers.scale
-    }
-
-    /// The voxel nearest to a place on a pixel's ray.
-    fn cell(&self, pixel: [usize; 2], slab: f64) -> u32 {
-        let (grid, at) = (self.volume.grid(), self.voxel_at(pixel, slab));
-        let last = grid.dims.as_dvec3() - 1.0;
-        // Cast, which rounds towards 0.
-        grid.index_of((at + 0.5).clamp(DVec3::ZERO, last).as_uvec3())
     }
 }
 

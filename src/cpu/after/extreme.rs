@@ -1,13 +1,13 @@
 //! `maximum`, `minimum` and `average` after splatting (SPEC §9): one value per pixel is chosen from its values on the planes, and classified.
 
-use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, mask32x8};
 
-use super::classify::{Looks, Sample, mask};
+use super::classify::{Looks, mask};
 use super::frame::Frame;
-use super::planes::Planes;
+use super::planes::Plane;
 use crate::cpu::cut::TileRays;
-use crate::cpu::sheets::{Buffers, COLUMNS, ROWS, slot_of};
+use crate::cpu::sheets::{Buffers, COLUMNS, ROWS};
 use crate::cpu::vector::LANES;
 use crate::part::Extreme;
 use crate::settings::splatting::Compositing;
@@ -57,19 +57,18 @@ impl Chosen {
             }
             let Some(shown) = &rays.shown else { return Extreme::default() };
             let [start, end] = [shown[row][0][at], shown[row][1][at]];
-            let middle = (start + end) * 0.5;
             let (first, second) = match (near.weight[at] > 0.0, far.weight[at] > 0.0) {
+                _ if start >= end => return Extreme::default(),
                 (true, true) => (near.number[at], far.number[at]),
                 (true, false) => (near.number[at], near.number[at]),
                 (false, true) => (far.number[at], far.number[at]),
                 (false, false) => return Extreme::default(),
             };
-            if start >= end {
-                return Extreme::default();
-            }
+            let middle = (start + end) * 0.5;
             extreme(first + (second - first) * (middle - middle.floor()), Extreme::MIDDLE)
         };
-        (0..self.best.len()).flat_map(|row| (0..COLUMNS).map(move |at| of(row, at))).collect()
+        let rows = 0..self.best.len();
+        rows.flat_map(|row| (0..COLUMNS).map(move |at| (row, at))).map(|(row, at)| of(row, at)).collect()
     }
 }
 
@@ -87,71 +86,85 @@ fn middle_of<S: Simd>(stretch: [f32x8<S>; 2]) -> [f32x8<S>; 2] {
 }
 
 impl Frame<'_> {
-    /// Looks at the points of a plane.
+    /// Looks at the points of a slab's planes, as far as it has not yet.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn choose<S: Simd>(&self, simd: S, plane: i32, looks: &Looks<'_>, planes: &Planes, chosen: &mut Chosen) {
-        let slot = slot_of(plane);
-        let number = looks.rays.begin(plane);
-        let mut rows = planes.written[slot];
-        while rows != 0 {
-            let row = rows.trailing_zeros() as usize;
-            rows &= rows - 1;
+    pub(super) fn choose<S: Simd>(
+        &self,
+        simd: S,
+        looks: &Looks<'_>,
+        planes: &mut [Plane; 2],
+        wanted: &[u32; ROWS],
+        chosen: &mut Chosen,
+    ) {
+        for (row, wanted) in wanted.iter().enumerate() {
             for column in (0..COLUMNS).step_by(LANES) {
-                let at = [looks.origin[0] + column, looks.origin[1] + row];
-                let sample = self.sample(simd, &planes.rows[row][slot], column, (at, plane));
-                if sample.has_value == 0 {
-                    continue;
-                }
-                let gradient = self.gradient(simd, &sample);
-                let stretch = looks.stretch(simd, [column, row]);
-                let here = f32x8::splat(simd, number);
-                if self.slabs.contains(&plane) {
-                    let counts = stretch[0].simd_le(here) & here.simd_le(stretch[1]) & mask(simd, sample.has_value);
-                    let counts = counts.to_bitmask() as u32;
-                    self.keep(simd, &mut chosen.best[row], column, (&sample, &gradient, here), counts);
-                }
-                let [slab, _] = middle_of(stretch);
-                // Plane k is before slab k and behind slab k - 1.
-                for (kept, behind) in chosen.middle[row].iter_mut().zip([0, 1]) {
-                    if !self.slabs.contains(&(plane - behind)) {
-                        continue;
+                let lanes = wanted >> column & u32::from(u8::MAX);
+                let lanes = self.reaching(simd, lanes, looks, planes[0].number, [column, row]);
+                for plane in &mut *planes {
+                    let new = lanes & !(plane.chosen[row] >> column);
+                    plane.chosen[row] |= new << column;
+                    if new != 0 {
+                        self.choose_from(simd, looks, plane, new, [column, row], chosen);
                     }
-                    let is_there = (slab + behind as f32).simd_eq(here) & mask(simd, sample.has_value);
-                    let bits = is_there.to_bitmask() as u32;
-                    kept.set(simd, column, (sample.value, &gradient, here), bits);
                 }
             }
         }
     }
 
-    /// Puts a plane's values in where they are the ones to choose.
+    /// Looks at the points of some of eight pixels on a plane.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn keep<S: Simd>(
+    fn choose_from<S: Simd>(
         &self,
         simd: S,
-        kept: &mut Kept,
-        column: usize,
-        (sample, gradient, here): (&Sample<S>, &[f32x8<S>; 3], f32x8<S>),
-        counts: u32,
+        looks: &Looks<'_>,
+        plane: &mut Plane,
+        lanes: u32,
+        [column, row]: [usize; 2],
+        chosen: &mut Chosen,
     ) {
+        self.find_values(simd, plane, lanes, [column, row]);
+        let values = f32x8::from_slice(simd, &plane.rows[row].values[column..column + LANES]);
+        let has_value = values.simd_eq(values) & mask(simd, lanes);
+        let here = f32x8::splat(simd, looks.rays.begin(plane.number));
+        let stretch = looks.stretch(simd, [column, row]);
+        // Plane k belongs to slab k; it is before that slab and behind slab k - 1.
+        let is_drawn = mask(simd, if self.slabs.contains(&plane.number) { u32::from(u8::MAX) } else { 0 });
+        let counts = stretch[0].simd_le(here) & here.simd_le(stretch[1]) & has_value & is_drawn;
+        let better = self.is_better(simd, &chosen.best[row], column, values) & counts;
+        let [slab, _] = middle_of(stretch);
+        let middles = [0, 1].map(|behind| {
+            let is_drawn =
+                mask(simd, if self.slabs.contains(&(plane.number - behind)) { u32::from(u8::MAX) } else { 0 });
+            (slab + behind as f32).simd_eq(here) & has_value & is_drawn
+        });
+        let is_needed = (better | middles[0] | middles[1]).to_bitmask() as u32;
+        let mut gradient = [f32x8::splat(simd, 0.0); 3];
+        if self.needs_gradients && self.compositing != Compositing::Average {
+            self.find_gradients(simd, plane, is_needed, [column, row]);
+            let gradients = &plane.rows[row].gradients;
+            let load = |axis: usize| f32x8::from_slice(simd, &gradients[axis][column..column + LANES]);
+            gradient = [load(0), load(1), load(2)];
+        }
+        if self.compositing == Compositing::Average {
+            chosen.best[row].add(simd, column, values, counts.to_bitmask() as u32);
+        } else {
+            chosen.best[row].set(simd, column, (values, &gradient, here), better.to_bitmask() as u32);
+        }
+        for (kept, is_there) in chosen.middle[row].iter_mut().zip(middles) {
+            kept.set(simd, column, (values, &gradient, here), is_there.to_bitmask() as u32);
+        }
+    }
+
+    /// Which of eight values are the ones to choose, so far.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn is_better<S: Simd>(&self, simd: S, kept: &Kept, column: usize, values: f32x8<S>) -> mask32x8<S> {
         let load = |row: &[f32; COLUMNS]| f32x8::from_slice(simd, &row[column..column + LANES]);
         let (number, weight) = (load(&kept.number), load(&kept.weight));
-        if self.compositing == Compositing::Average {
-            let zero = f32x8::splat(simd, 0.0);
-            let counts = mask(simd, counts);
-            let number = number + counts.select(sample.value, zero);
-            let weight = weight + counts.select(f32x8::splat(simd, 1.0), zero);
-            number.store_slice(&mut kept.number[column..column + LANES]);
-            weight.store_slice(&mut kept.weight[column..column + LANES]);
-            return;
-        }
         let is_better = match self.compositing {
-            Compositing::Minimum => sample.value.simd_lt(number - self.hair),
-            _ => sample.value.simd_gt(number + self.hair),
+            Compositing::Minimum => values.simd_lt(number - self.hair),
+            _ => values.simd_gt(number + self.hair),
         };
-        let is_first = weight.simd_eq(f32x8::splat(simd, 0.0));
-        let bits = (is_better | is_first).to_bitmask() as u32 & counts;
-        kept.set(simd, column, (sample.value, gradient, here), bits);
+        is_better | weight.simd_eq(f32x8::splat(simd, 0.0))
     }
 
     /// Classifies what a tile's pixels chose, into the compositing buffer.
@@ -231,6 +244,16 @@ impl Frame<'_> {
 }
 
 impl Kept {
+    /// Adds values where there is a bit.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn add<S: Simd>(&mut self, simd: S, column: usize, values: f32x8<S>, bits: u32) {
+        for (row, new) in [(&mut self.number, values), (&mut self.weight, f32x8::splat(simd, 1.0))] {
+            let old = f32x8::from_slice(simd, &row[column..column + LANES]);
+            let sum = old + mask(simd, bits).select(new, f32x8::splat(simd, 0.0));
+            sum.store_slice(&mut row[column..column + LANES]);
+        }
+    }
+
     /// Puts numbers in where there is a bit.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn set<S: Simd>(

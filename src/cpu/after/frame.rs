@@ -1,6 +1,7 @@
 //! A frame where classification comes after splatting: the data that its tiles share, and its tiles drawn on all cores.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicU8, Ordering};
 
 use fearless_simd::{Level, dispatch};
 use glam::DVec3;
@@ -8,13 +9,14 @@ use rayon::prelude::*;
 
 use super::coefficients::Coefficients;
 use super::extreme::is_choice;
+use super::field::Field;
+use super::low_pass::LowPass;
 use super::place::Placement;
+use super::planes::Points;
 use super::slab_integral::Integrals;
-use super::splat::Splatter;
 use super::tile::TileWalk;
 use crate::cpu::bin;
 use crate::cpu::composite::Compositor;
-use crate::cpu::count::Drawn;
 use crate::cpu::cut::{RayMode, TileRays};
 use crate::cpu::first_hit;
 use crate::cpu::frame::{Drawing, Host, Outputs, Tile, draw_tiles};
@@ -28,7 +30,7 @@ use crate::lists::brick::Brick;
 use crate::part::Resolver;
 use crate::scene::Scene;
 use crate::settings::clip::HalfSpace;
-use crate::settings::shading::{Gradient, MIN_GRADIENT};
+use crate::settings::shading::MIN_GRADIENT;
 use crate::settings::splatting::{Classification, Compositing, Order};
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
@@ -41,22 +43,17 @@ pub(in crate::cpu) struct Frame<'a> {
     pub(super) volume: &'a Volume,
     pub(super) transfer: &'a TransferFunction,
     pub(super) coefficients: &'a Coefficients,
-    pub(super) bricks: &'a [Brick],
-    /// The bricks among them whose values can meet an opacity.
+    /// The bricks whose voxels may affect a slab with an opacity.
     shown: &'a [Brick],
     pub(super) placement: Placement,
-    pub(super) splatter: Splatter,
+    pub(super) field: Field<'a>,
     pub(super) integrals: Integrals,
     pub(super) shader: Shader,
     pub(super) compositor: Compositor,
     pub(super) rays: RayMode,
-    pub(super) drawn: Drawn,
+    /// By brick of the grid: [`WANTED`], [`DRAWN`], or 0.
+    drawn: Vec<AtomicU8>,
     pub(super) compositing: Compositing,
-    pub(super) gradient: Gradient,
-    /// The kernel's gradient in numbers per world unit, from its sums along the planes' axes and their normal: by world axis.
-    pub(super) world_from_plane: [[f32; 3]; 3],
-    /// Sums for the kernel's gradient below this are rounding errors; squared.
-    pub(super) min_moment: f32,
     /// Numbers that differ by less count as equal.
     pub(super) hair: f32,
     /// Whether anything depends on gradients.
@@ -80,6 +77,11 @@ pub(in crate::cpu) struct Frame<'a> {
     resolver: Option<Resolver>,
 }
 
+/// A brick in whose cells rays may enter a slab with an opacity.
+const WANTED: u8 = 1;
+/// One that a tile has drawn.
+const DRAWN: u8 = 2;
+
 /// Values that differ by less, relative to the range of the coefficients, count as equal: in homogeneous matter only rounding tells them apart.
 const HAIR_OF_RANGE: f32 = 2e-6;
 
@@ -95,19 +97,27 @@ impl<'a> Frame<'a> {
         let (splatting, shading, grid) = (&scene.splatting, &scene.shading, volume.grid());
         let Window { slabs, region } = window.clone().unwrap_or_else(|| Window::whole(view.size));
         let placement = Placement::new(view, grid, &slabs);
-        let (numbers, [shown, bricks]) = (coefficients.numbers, coefficients.bricks());
+        let (numbers, shown) = (coefficients.numbers, coefficients.bricks());
         let can_hide = splatting.compositing.hides() && splatting.order == Order::FrontToBack;
         let tables = volume.labels().map(|_| transfer.labels.keys()).into_iter().flatten();
         let tables = tables.map(|&label| transfer.tables(Some(label))).chain([transfer.tables(None)]);
         let has_gradient_opacity = tables.into_iter().any(|tables| tables.gradient_opacity.is_some());
-        let axes = placement.geometry.axes;
+        let drawn: Vec<AtomicU8> = (0..placement.bricks().element_product()).map(|_| AtomicU8::new(0)).collect();
+        for &brick in coefficients.wanted() {
+            drawn[brick as usize].store(WANTED, Ordering::Relaxed);
+        }
         Self {
             volume,
             transfer,
             coefficients,
-            bricks,
             shown,
-            splatter: Splatter::new(&placement, splatting.falloff, shading.gradient),
+            field: Field::new(
+                volume,
+                coefficients.all(volume),
+                numbers,
+                (splatting.radius, splatting.falloff),
+                shading.gradient,
+            ),
             integrals: Integrals::new(volume, transfer, splatting.compositing, &numbers),
             shader: Shader::new(shading, splatting.compositing),
             compositor: Compositor {
@@ -117,12 +127,8 @@ impl<'a> Frame<'a> {
                 first_hit: first_hit.map(|opacity| opacity as f32),
             },
             rays: RayMode::within(&view, grid, kept(&view, scene, volume), surfaces),
-            drawn: Drawn::new(bricks.len(), &view),
+            drawn,
             compositing: splatting.compositing,
-            gradient: shading.gradient,
-            world_from_plane: [0, 1, 2]
-                .map(|world| axes.map(|axis| (-2.0 * splatting.falloff * axis[world] / grid.spacing[world]) as f32)),
-            min_moment: min_moment(splatting.radius, numbers.range).powi(2),
             hair: HAIR_OF_RANGE * (numbers.range[1] - numbers.range[0]),
             needs_gradients: shading.enabled || has_gradient_opacity,
             has_gradient_opacity,
@@ -162,7 +168,7 @@ impl<'a> Frame<'a> {
     /// Draws all tiles.
     pub(in crate::cpu) fn draw(&self, level: Level) -> Drawing {
         let size = self.placement.view.size;
-        let placed = self.placement.place_bricks(self.bricks);
+        let placed = self.placement.place_bricks(self.coefficients.wanted());
         let has_hits = self.compositor.first_hit.is_some();
         let has_extremes = self.resolver.is_none() && is_choice(self.compositing);
         let (content, first_hits, tally) = draw_tiles(
@@ -184,11 +190,12 @@ impl<'a> Frame<'a> {
         );
         let [columns, rows] = bin::tile_grid(size);
         let sheets = self.touched.len() as u64;
+        let [sections_total, sections_rasterized] = self.sections();
         let counts = Counts {
             voxels_total: self.volume.values().len() as u64,
             voxels_in_range: self.shown.iter().map(|brick| u64::from(brick::present(brick).count_ones())).sum(),
-            sections_total: self.sections(),
-            sections_rasterized: tally.sections,
+            sections_total,
+            sections_rasterized,
             sheets,
             tiles_total: (columns * rows) as u64 * sheets,
             tiles_composited: tally.sheets_composited,
@@ -198,24 +205,44 @@ impl<'a> Frame<'a> {
         Drawing { content, counts, first_hits }
     }
 
-    /// Pairs of voxels and planes nearer to them than the kernel's radius.
-    fn sections(&self) -> u64 {
-        let of_brick = |brick: &Brick| {
-            let first = self.placement.of_brick(brick);
-            let planes = |(slot, _)| {
-                let depth = self.placement.of_voxel(first, slot).depth;
-                self.placement.planes(depth..depth).len() as u64
-            };
-            brick::voxels(brick).map(planes).sum::<u64>()
-        };
-        self.shown.par_iter().map(of_brick).sum()
+    /// Records that a tile draws one of the grid's bricks.
+    pub(super) fn draw_brick(&self, brick: u32) {
+        self.drawn[brick as usize].store(DRAWN, Ordering::Relaxed);
     }
-}
 
-/// The rounding error of `Σ c·g·δ / N - f·Σ g·δ / N`: some units in the last place of its largest terms. Where all values are equal the sums differ
-/// by no more, and a direction made of that would be noise.
-fn min_moment(radius: f64, range: [f32; 2]) -> f32 {
-    8.0 * f32::EPSILON * radius as f32 * range[0].abs().max(range[1].abs())
+    /// The points of a plane in a tile, given by its first pixel, and the plane's kernels; `None` at the eye and behind it.
+    pub(super) fn points(&self, plane: i32, origin: [usize; 2]) -> Option<(Points, LowPass)> {
+        let Placement { geometry, view, .. } = &self.placement;
+        if view.perspective.is_some() && plane <= 0 {
+            return None;
+        }
+        let at = |column: usize, row: usize| self.voxel_at([origin[0] + column, origin[1] + row], plane.into());
+        let first = at(0, 0);
+        let points = Points {
+            first,
+            right: (at(COLUMNS, 0) - first) / COLUMNS as f64,
+            down: (at(0, ROWS) - first) / ROWS as f64,
+        };
+        Some((points, LowPass::new(geometry, geometry.distance_from_eye(view.slabs.plane(plane)))))
+    }
+
+    /// Pairs of voxels and planes nearer to them than the kernel's radius: all, and those of bricks that were drawn. A brick was not drawn if its
+    /// kernels reach wanted bricks and none of those was.
+    fn sections(&self) -> [u64; 2] {
+        let Placement { geometry, view, .. } = &self.placement;
+        let across = self.placement.bricks();
+        let reach = (geometry.widest_half_box(view) / f64::from(brick::SIDE)).ceil().min(across.as_dvec3()).as_uvec3();
+        let of_brick = |brick: &Brick| {
+            let at = brick::origin(brick) / brick::SIDE;
+            let (low, end) = (at.saturating_sub(reach), (at + reach + 1).min(across));
+            let rows = (low.z..end.z).flat_map(|z| (low.y..end.y).map(move |y| across.x * (y + across.y * z)));
+            let around = rows.flat_map(|row| &self.drawn[(row + low.x) as usize..(row + end.x) as usize]);
+            let most = around.map(|state| state.load(Ordering::Relaxed)).max();
+            let sections = self.placement.sections(brick);
+            [sections, if most == Some(WANTED) { 0 } else { sections }]
+        };
+        self.shown.par_iter().map(of_brick).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
+    }
 }
 
 /// The half spaces within which pixels' rays count: the box of voxel cells, beyond the near plane, within the cuts.

@@ -1,23 +1,25 @@
-//! Classification after splatting (SPEC §9): values and gradients are splatted onto the slab planes, and what a pixel sees between two planes is
-//! classified and shaded there.
+//! Classification after splatting (SPEC §9): values and gradients are reconstructed on the slab planes, and what a pixel sees between two planes
+//! is classified and shaded there.
 //!
 //! ```text
-//! coefficients ─→ the bricks whose values can meet an opacity
-//! bricks ─ bin ─→ every tile of 32×32 pixels, its planes front to back in a ring of eight:
-//!                   cull       what opaque pixels hide, brick by brick, then voxel by voxel
-//!                   splat      all planes of a voxel, eight pixels at a time
-//!                   classify   the slab before a plane, once every voxel that reaches the plane is splatted
-//!                   composite  that slab's sheet, as where classification comes first
+//! coefficients ─→ the bricks in whose cells values can meet an opacity
+//! bricks ─ bin ─→ every tile of 32×32 pixels, its slabs front to back:
+//!                   cull       bricks whose pixels are opaque
+//!                   field      the values of open pixels on the slab's two planes, gradients where something is visible
+//!                   classify   the slab, eight pixels at a time
+//!                   composite  its sheet, as where classification comes first
 //! ```
 
+mod cells;
 mod classify;
 mod coefficients;
 mod extreme;
+mod field;
 mod frame;
+mod low_pass;
 mod place;
 mod planes;
 mod slab_integral;
-mod splat;
 mod surface;
 mod tile;
 

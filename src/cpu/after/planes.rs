@@ -1,39 +1,124 @@
-//! A tile's plane buffers: a ring of planes onto which values, weights and gradients are splatted (SPEC §9).
+//! The two planes of a tile's slab: the points of their pixels, and the field there as far as it was asked for (SPEC §9).
 
-use crate::cpu::sheets::{COLUMNS, RING, ROWS};
-use crate::cpu::vector::LANES;
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, i32x8, u32x8};
+use glam::DVec3;
 
-/// Numbers along a row of a plane, with room for a vector that starts within the tile and ends outside.
-pub(super) const STRIDE: usize = COLUMNS + LANES;
+use super::low_pass::LowPass;
+use crate::cpu::project::floor;
+use crate::cpu::sheets::{COLUMNS, ROWS};
+use crate::cpu::vector::{LANES, iota};
 
-/// Sums that a plane holds for every pixel: N and Σc·g, and then Σd·g, or for the kernel's gradient Σa·g, Σb·g, Σt·g and
-/// Σc·a·g, Σc·b·g, Σc·t·g, with (a, b, t) the offset along two axes in the plane and along its normal.
-pub(super) const CHANNELS: usize = 8;
-
-/// A row of all open planes.
-pub(super) type PlaneRow = [[[f32; STRIDE]; CHANNELS]; RING];
-
-/// The ring of one tile: plane k is in slot k mod 8.
-#[derive(Debug)]
-pub(super) struct Planes {
-    /// Row by row.
-    pub(super) rows: Vec<PlaneRow>,
-    /// For every slot the rows that hold anything.
-    pub(super) written: [u64; RING],
+/// A row of a plane's pixels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PlaneRow {
+    /// f, as a number; NaN where there is no value.
+    pub(super) values: [f32; COLUMNS],
+    /// ∇f, numbers per world unit.
+    pub(super) gradients: [[f32; COLUMNS]; 3],
 }
 
-impl Planes {
-    pub(super) fn new() -> Self {
-        Self { rows: vec![[[[0.0; STRIDE]; CHANNELS]; RING]; ROWS], written: [0; RING] }
+/// The points of a plane where the rays of a tile's pixels meet it, in voxel coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Points {
+    /// Of the tile's first pixel, and the steps to the next column and row.
+    pub(super) first: DVec3,
+    pub(super) right: DVec3,
+    pub(super) down: DVec3,
+}
+
+/// Eight neighbouring points of a plane, in voxels after the first voxel of their cells, which are those of the nearest points inside the volume.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Eight {
+    /// The voxels by axis.
+    pub(super) cells: [[i32; LANES]; 3],
+    /// From there, by axis.
+    pub(super) rest: [[f32; LANES]; 3],
+    /// The voxels' indices in memory.
+    pub(super) indices: [u32; LANES],
+}
+
+impl Points {
+    /// The point of a pixel.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn of(&self, column: usize, row: usize) -> DVec3 {
+        self.first + self.right * column as f64 + self.down * row as f64
     }
 
-    /// Makes a slot's plane empty.
-    pub(super) fn clear(&mut self, slot: usize) {
-        let mut written = std::mem::take(&mut self.written[slot]);
-        while written != 0 {
-            let row = written.trailing_zeros() as usize;
-            written &= written - 1;
-            self.rows[row][slot] = [[0.0; STRIDE]; CHANNELS];
+    /// The points of eight pixels. Cells end `margin` voxels before the volume does.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn eight<S: Simd>(
+        &self,
+        simd: S,
+        dims: [u32; 3],
+        [before, behind]: [i32; 2],
+        [column, row]: [usize; 2],
+    ) -> Eight {
+        let first = self.of(column, row);
+        let mut eight = Eight { cells: [[0; LANES]; 3], rest: [[0.0; LANES]; 3], indices: [0; LANES] };
+        let mut index = i32x8::splat(simd, 0);
+        for axis in [2, 1, 0] {
+            // Relative to a whole number near by, so that f32 tells where in its cell a point is.
+            let whole = floor(first[axis].clamp(-1e9, 1e9));
+            let at = iota(simd) * self.right[axis] as f32 + (first[axis] - f64::from(whole)) as f32;
+            let last = dims[axis] as i32 - 1 - behind;
+            let cell = at.floor().to_int::<i32x8<S>>() + (whole - before);
+            let cell = cell.max(i32x8::splat(simd, 0)).min(i32x8::splat(simd, last.max(0)));
+            let rest = at - (cell - whole).to_float::<f32x8<S>>();
+            index = index * dims[axis] as i32 + cell;
+            eight.cells[axis] = cell.to_array();
+            eight.rest[axis] = rest.to_array();
+        }
+        eight.indices = index.bitcast::<u32x8<S>>().to_array();
+        eight
+    }
+}
+
+/// One plane of a tile.
+#[derive(Debug)]
+pub(super) struct Plane {
+    /// k.
+    pub(super) number: i32,
+    /// `None` at the eye and behind it, where there are no values.
+    pub(super) points: Option<(Points, LowPass)>,
+    /// The pixels whose cells' bits are known, row by row, and these.
+    pub(super) seen: [u32; ROWS],
+    pub(super) reaches: [u32; ROWS],
+    pub(super) stays: [u32; ROWS],
+    /// The pixels whose values are known.
+    pub(super) known: [u32; ROWS],
+    /// The pixels whose gradients are known.
+    pub(super) graded: [u32; ROWS],
+    /// The pixels that have been chosen from, where compositing chooses.
+    pub(super) chosen: [u32; ROWS],
+    pub(super) rows: Vec<PlaneRow>,
+}
+
+impl Plane {
+    /// Some plane, of which nothing is known.
+    pub(super) fn new() -> Self {
+        let row = PlaneRow { values: [f32::NAN; COLUMNS], gradients: [[0.0; COLUMNS]; 3] };
+        let none = [0; ROWS];
+        Self {
+            number: 0,
+            points: None,
+            seen: none,
+            reaches: none,
+            stays: none,
+            known: none,
+            graded: none,
+            chosen: none,
+            rows: vec![row; ROWS],
+        }
+    }
+
+    /// Makes this plane another one.
+    pub(super) fn become_plane(&mut self, number: i32, points: Option<(Points, LowPass)>) {
+        (self.number, self.points) = (number, points);
+        for rows in
+            [&mut self.seen, &mut self.reaches, &mut self.stays, &mut self.known, &mut self.graded, &mut self.chosen]
+        {
+            *rows = [0; ROWS];
         }
     }
 }

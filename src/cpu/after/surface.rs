@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::classify::{Looks, Slab};
 use super::frame::Frame;
+use super::planes::Plane;
 use crate::cpu::sheets::Buffers;
 use crate::cpu::vector::LANES;
 use crate::settings::transfer_function::Tables;
@@ -37,6 +38,7 @@ impl Frame<'_> {
         simd: S,
         slab: &Slab<S>,
         looks: &Looks<'_>,
+        planes: &mut [Plane; 2],
         [column, row]: [usize; 2],
         buffers: &mut Buffers,
     ) -> u32 {
@@ -44,7 +46,8 @@ impl Frame<'_> {
         let begin = looks.rays.begin(slab.number);
         let [starts, ends] = stretch.map(|end| (end - begin).to_array());
         let numbers = slab.values.map(f32x8::to_array);
-        let gradients = slab.gradients.map(|gradient| gradient.map(f32x8::to_array));
+        let lines = self.gradients(simd, slab, slab.lanes, planes, [column, row]);
+        let gradients = lines.map(|gradient| gradient.map(f32x8::to_array));
         let (mut found, mut places, mut colors) = (0, [0.0; LANES], [[0.0; LANES]; 3]);
         for lane in (0..LANES).filter(|lane| slab.lanes >> lane & 1 == 1) {
             let [start, end] = [starts[lane].max(0.0), ends[lane].min(1.0)].map(f64::from);
@@ -70,7 +73,7 @@ impl Frame<'_> {
             return 0;
         }
         let place = f32x8::load_array(simd, places);
-        let [near, far] = slab.gradients;
+        let [near, far] = lines;
         let gradient = std::array::from_fn(|axis| near[axis] + (far[axis] - near[axis]) * place);
         let color = colors.each_ref().map(|channel| f32x8::load_array_ref(simd, channel));
         let [red, green, blue] = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]));

@@ -1,0 +1,126 @@
+//! Where values can meet an opacity: two bits for every cell of 1×1×1 voxels between neighbouring voxels.
+//!
+//! The value at a point is a mean of the coefficients within the kernel's radius, which all points of a cell take from one box of voxels. A slab shows
+//! nothing where no voxel in the boxes of its two points reaches the least value with an opacity, or none is as low as the greatest one.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::after::normalization::Normalization;
+use crate::volume::Grid;
+
+/// A voxel of a cell's box is at least the least number with an opacity.
+const REACHES: u8 = 1;
+/// A voxel of a cell's box is at most the greatest one.
+const STAYS: u8 = 2;
+
+/// Rounding errors of means, relative to the numbers' range, which is about 1.
+const SLACK: f32 = 4e-6;
+
+/// The bits of all cells, by the voxel at their least corner.
+#[derive(Clone, Debug)]
+pub(super) struct Cells {
+    bits: Vec<u8>,
+}
+
+/// The bits of eight points.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Bits {
+    pub(super) reaches: u32,
+    pub(super) stays: u32,
+}
+
+impl Cells {
+    /// `half_box` is half the box of the widest kernel; `shown` the least and the greatest number with an opacity.
+    pub(super) fn new(
+        grid: &Grid,
+        coefficients: &[f32],
+        numbers: &Normalization,
+        half_box: DVec3,
+        [low, high]: [f32; 2],
+    ) -> Self {
+        let (base, scale) = (numbers.base as f32, numbers.scale as f32);
+        let (low, high) = (low - SLACK, high + SLACK);
+        let bits_of = |&c: &f32| {
+            let number = (c - base) * scale;
+            // Neither is true of a hole.
+            (u8::from(number >= low) * REACHES) | (u8::from(number <= high) * STAYS)
+        };
+        let mut bits: Vec<u8> = coefficients.par_iter().with_min_len(1 << 16).map(bits_of).collect();
+        // From -⌈h⌉ + 1 to ⌈h⌉ around a cell, where a kernel reaches less than h.
+        let half = half_box.ceil().min(grid.dims.as_dvec3()).max(DVec3::ONE).as_uvec3();
+        let [nx, ny, nz] = grid.dims.to_array().map(|n| n as usize);
+        for (axis, stride, count) in [(0, 1, nx), (1, nx, ny), (2, nx * ny, nz)] {
+            join(&mut bits, stride, count, half[axis] as usize);
+        }
+        Self { bits }
+    }
+
+    /// Of eight points, given their cells, which those beyond the volume have in common with the nearest point inside.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn of(&self, indices: [u32; 8]) -> Bits {
+        let mut bits = Bits::default();
+        for (lane, &index) in indices.iter().enumerate() {
+            let cell = u32::from(self.bits[index as usize]);
+            bits.reaches |= (cell & u32::from(REACHES)) << lane;
+            bits.stays |= (cell / u32::from(STAYS)) << lane;
+        }
+        bits
+    }
+}
+
+/// Replaces each entry along an axis by the union of those from `half - 1` before it to `half` after it.
+fn join(bits: &mut [u8], stride: usize, count: usize, half: usize) {
+    bits.par_chunks_mut(stride * count).for_each_init(Vec::new, |joined, block| {
+        // With empty entries around. Entry i becomes the union from i on of ever more entries.
+        joined.clear();
+        joined.resize(stride * (half - 1), 0);
+        joined.extend_from_slice(block);
+        joined.resize(stride * (count + 2 * half - 1), 0);
+        let mut width = 1;
+        while width < 2 * half {
+            let step = width.min(2 * half - width);
+            let shift = stride * step;
+            for at in 0..joined.len() - shift {
+                joined[at] |= joined[at + shift];
+            }
+            width += step;
+        }
+        block.copy_from_slice(&joined[..block.len()]);
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::UVec3;
+
+    use super::*;
+
+    #[test]
+    fn a_cell_joins_the_voxels_that_its_points_take_values_from() {
+        let grid = Grid { dims: UVec3::new(11, 7, 9), spacing: DVec3::ONE };
+        let value = |index: u32| match index.wrapping_mul(2_654_435_761) >> 24 {
+            0..3 => 0.9,
+            3..6 => -0.9,
+            6..12 => f32::NAN,
+            _ => 0.0,
+        };
+        let values: Vec<f32> = (0..grid.dims.element_product()).map(value).collect();
+        let numbers = Normalization { base: 0.0, scale: 1.0, range: [-1.0, 1.0] };
+        let half_box = DVec3::new(2.0, 1.4, 2.5);
+        for [low, high] in [[0.5, f32::MAX], [f32::MIN, -0.5], [-0.1, 0.1]] {
+            let cells = Cells::new(&grid, &values, &numbers, half_box, [low, high]);
+            for index in 0..grid.dims.element_product() {
+                let at = grid.voxel_at(index).as_dvec3();
+                // Points of a cell are within half a cell of its middle.
+                let is_near =
+                    |&other: &u32| ((grid.voxel_at(other).as_dvec3() - at - 0.5).abs() - 0.5).cmplt(half_box).all();
+                let near: Vec<f32> =
+                    (0..grid.dims.element_product()).filter(is_near).map(|other| values[other as usize]).collect();
+                let bits = cells.of([index; 8]);
+                assert_eq!(bits.reaches == 0xff, near.iter().any(|&value| value >= low), "{index}");
+                assert_eq!(bits.stays == 0xff, near.iter().any(|&value| value <= high), "{index}");
+            }
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! The field of the voxels' values, and its gradient, at points of slab planes (SPEC §9), as in `reference::after::field`.
+//!
+//! A point gathers the voxels within the kernel's radius of it. Splatting them one by one gives the same sums, but a pixel that is opaque or
+//! sees no matter would then be paid for too, and every voxel would read and write all planes in memory for every pixel: this is four times
+//! slower (`benches/RESULTS.md`). [`cube`] does this for the 4×4×4 voxels around a point inside the volume, [`rows`] for any kernel at any point.
+
+mod cube;
+mod rows;
+
+use std::f64::consts::LOG2_E;
+
+use fearless_simd::Simd;
+use glam::DVec3;
+
+use super::low_pass::LowPass;
+use super::planes::{Eight, Points};
+use crate::after::normalization::Normalization;
+use crate::settings::shading::Gradient;
+use crate::volume::Volume;
+
+/// The minimum sum of weights of a point that has a value.
+const MIN_WEIGHT: f32 = 1e-3;
+
+/// The largest radius of kernels that reach no farther than the 4×4×4 voxels around a point.
+const CUBE_RADIUS: f64 = 2.0;
+
+/// The least scale of numbers by which sums are multiplied instead of values.
+const MIN_SCALE: f64 = 1e-30;
+
+/// What the field is made of.
+#[derive(Clone, Debug)]
+pub(super) struct Field<'a> {
+    volume: &'a Volume,
+    /// c for every voxel, in memory order; NaN at holes.
+    coefficients: &'a [f32],
+    numbers: Normalization,
+    radius: f64,
+    radius_squared: f32,
+    /// From |δ|² to the exponent of 2 of the Gaussian.
+    exponent: f32,
+    /// The range of numbers is from values less `base`, times `scale`.
+    base: f32,
+    scale: f32,
+    gradient: Gradient,
+    /// From differences of half numbers on either side to the gradient.
+    per_spacing: [f32; 3],
+    /// From `Σ (c - f)·g·δ / N` to the kernel's gradient.
+    per_moment: [f32; 3],
+    /// Moments below this are rounding errors; squared.
+    min_moment: f32,
+    /// Whether 4×4×4 voxels are all that a kernel reaches, and sums of values less `base` cannot overflow.
+    is_cube: bool,
+}
+
+/// 4×4×4 voxels of a volume, as a point sees them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cube {
+    /// The index in memory of the first voxel.
+    index: usize,
+    /// From the first voxel to the point.
+    rest: [f32; 3],
+    /// Whether all voxels have neighbours on either side.
+    is_inside: bool,
+}
+
+impl<'a> Field<'a> {
+    pub(super) fn new(
+        volume: &'a Volume,
+        coefficients: &'a [f32],
+        numbers: Normalization,
+        (radius, falloff): (f64, f64),
+        gradient: Gradient,
+    ) -> Self {
+        let spacing = volume.spacing();
+        let is_moderate = (MIN_SCALE..1.0 / MIN_SCALE).contains(&numbers.scale);
+        let in_f32 = |numbers: DVec3| numbers.to_array().map(|number| number as f32);
+        Self {
+            volume,
+            coefficients,
+            numbers,
+            radius,
+            radius_squared: (radius * radius) as f32,
+            exponent: (-falloff * LOG2_E) as f32,
+            base: numbers.base as f32,
+            scale: numbers.scale as f32,
+            gradient,
+            per_spacing: in_f32(1.0 / spacing),
+            per_moment: in_f32(-2.0 * falloff / spacing),
+            min_moment: min_moment(radius, numbers.range).powi(2),
+            is_cube: radius <= CUBE_RADIUS && is_moderate && volume.dims().min_element() as usize >= cube::SIDE,
+        }
+    }
+
+    /// The cubes around eight points of a plane, as near as the volume's borders allow: voxels of a cube that the kernel does not reach have no
+    /// weight. `None` if kernels reach beyond.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn cubes<S: Simd>(
+        &self,
+        simd: S,
+        (points, low_pass): &(Points, LowPass),
+        at: [usize; 2],
+    ) -> Option<Eight> {
+        let dims = self.volume.dims();
+        let side = cube::SIDE as i32;
+        if !(self.is_cube && low_pass.is_identity) {
+            return None;
+        }
+        Some(points.eight(simd, dims.to_array(), [1, side - 1], at))
+    }
+
+    /// One of eight cubes.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn cube(&self, eight: &Eight, lane: usize) -> Cube {
+        let dims = self.volume.dims();
+        let is_inside = |axis: usize, dim: u32| {
+            let first = eight.cells[axis][lane];
+            first > 0 && first + (cube::SIDE as i32) < dim as i32
+        };
+        Cube {
+            index: eight.indices[lane] as usize,
+            rest: [eight.rest[0][lane], eight.rest[1][lane], eight.rest[2][lane]],
+            is_inside: is_inside(0, dims.x) && is_inside(1, dims.y) && is_inside(2, dims.z),
+        }
+    }
+
+    /// f at a point, as a number; NaN where there is no value.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn value<S: Simd>(
+        &self,
+        simd: S,
+        cubes: Option<&Eight>,
+        lane: usize,
+        (at, low_pass): (DVec3, &LowPass),
+    ) -> f32 {
+        if let Some(cubes) = cubes {
+            let [weight, sum] = self.cube_sums(simd, &self.cube(cubes, lane));
+            // Otherwise a hole is near.
+            if sum.is_finite() {
+                return if weight >= MIN_WEIGHT { sum / weight } else { f32::NAN };
+            }
+        }
+        self.row_value(simd, at, low_pass)
+    }
+
+    /// ∇f in numbers per world unit, at a point whose f is `number`.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn gradient<S: Simd>(
+        &self,
+        simd: S,
+        cubes: Option<&Eight>,
+        lane: usize,
+        (at, low_pass): (DVec3, &LowPass),
+        number: f32,
+    ) -> [f32; 3] {
+        if let Some(cube) = cubes.map(|cubes| self.cube(cubes, lane))
+            && (cube.is_inside || self.gradient == Gradient::Kernel)
+        {
+            let gradient = match self.gradient {
+                Gradient::Differences => self.cube_differences(simd, &cube),
+                Gradient::Kernel => self.kernel_gradient(self.cube_moments(simd, &cube, number)),
+            };
+            let [x, y, z] = gradient;
+            if (x + y + z).is_finite() {
+                return gradient;
+            }
+        }
+        match self.gradient {
+            Gradient::Differences => self.row_differences(simd, at, low_pass),
+            Gradient::Kernel => self.kernel_gradient(self.row_moments(simd, at, low_pass, number)),
+        }
+    }
+
+    /// The kernel's gradient for `Σ (c - f)·g·δ / N`. Differences from f, because where all coefficients are equal it is then no more than the
+    /// rounding error of f.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn kernel_gradient(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+        if x * x + y * y + z * z < self.min_moment {
+            return [0.0; 3];
+        }
+        let [per_x, per_y, per_z] = self.per_moment;
+        [x * per_x, y * per_y, z * per_z]
+    }
+}
+
+/// The rounding error of `Σ (c - f)·g·δ / N`: some units in the last place of its largest terms. Where all values are equal the sum differs
+/// by no more, and a direction made of that would be noise.
+fn min_moment(radius: f64, range: [f32; 2]) -> f32 {
+    8.0 * f32::EPSILON * radius as f32 * range[0].abs().max(range[1].abs())
+}

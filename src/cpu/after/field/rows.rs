@@ -1,0 +1,240 @@
+//! The field at any point, of any kernel: near the volume's borders and holes, of wide kernels, and where the low-pass rule widens them. Rows of
+//! voxels along x, eight voxels at a time.
+
+use fearless_simd::f32x8;
+use fearless_simd::prelude::*;
+use glam::{DVec3, UVec3};
+
+use super::{Field, MIN_WEIGHT};
+use crate::cpu::after::low_pass::LowPass;
+use crate::cpu::vector::{LANES, exp2, iota};
+
+/// Slack around the ends of rows for rounding in f64, in voxels: every voxel is tested again.
+const SLACK: f64 = 1e-6;
+
+/// Voxels of a row that a point's kernel may reach.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    /// The first one.
+    first: UVec3,
+    /// Its index in memory.
+    index: usize,
+    count: usize,
+    /// δ of the first one, and the step from one to the next.
+    offset: [f32; 3],
+    step: [f32; 3],
+}
+
+/// Eight voxels of a row.
+struct Lanes<S: Simd> {
+    /// g; 0 outside the row.
+    weights: f32x8<S>,
+    offsets: [f32x8<S>; 3],
+}
+
+/// The weight and the sums of a point.
+struct Sums<S: Simd> {
+    weights: f32x8<S>,
+    sums: [f32x8<S>; 3],
+}
+
+impl Row {
+    /// Eight voxels, from one on.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn lanes<S: Simd>(&self, simd: S, field: &Field<'_>, from: usize) -> Lanes<S> {
+        let number = iota(simd) + from as f32;
+        let offset = |axis: usize| number * self.step[axis] + self.offset[axis];
+        let [x, y, z] = [offset(0), offset(1), offset(2)];
+        let squared = x * x + y * y + z * z;
+        let is_inside = squared.simd_lt(f32x8::splat(simd, field.radius_squared))
+            & number.simd_lt(f32x8::splat(simd, self.count as f32));
+        let gaussian = exp2(simd, (squared * field.exponent).max(f32x8::splat(simd, -126.0)));
+        Lanes { weights: is_inside.select(gaussian, f32x8::splat(simd, 0.0)), offsets: [x, y, z] }
+    }
+
+    /// Where its eights begin.
+    fn eights(&self) -> impl Iterator<Item = usize> {
+        (0..self.count).step_by(LANES)
+    }
+}
+
+impl Field<'_> {
+    /// f at a point, as a number; NaN where there is no value.
+    #[cfg_attr(not(debug_assertions), inline(never))]
+    pub(super) fn row_value<S: Simd>(&self, simd: S, at: DVec3, low_pass: &LowPass) -> f32 {
+        simd.vectorize(
+            #[cfg_attr(not(debug_assertions), inline(always))]
+            || {
+                if self.coefficients[self.nearest(at)].is_nan() {
+                    return f32::NAN;
+                }
+                let zero = f32x8::splat(simd, 0.0);
+                let (mut weights, mut sum) = (zero, zero);
+                for row in self.rows(at, low_pass) {
+                    for from in row.eights() {
+                        let lanes = row.lanes(simd, self, from);
+                        let c = load(simd, self.coefficients, row.index + from);
+                        let is_present = c.simd_eq(c);
+                        let weight = is_present.select(lanes.weights, zero);
+                        weights += weight;
+                        sum += weight * is_present.select((c - self.base) * self.scale, zero);
+                    }
+                }
+                let weight = sum_of(weights);
+                if weight >= MIN_WEIGHT { sum_of(sum) / weight } else { f32::NAN }
+            },
+        )
+    }
+
+    /// `Σ (c - f)·g·δ / N`, with f as a number.
+    #[cfg_attr(not(debug_assertions), inline(never))]
+    pub(super) fn row_moments<S: Simd>(&self, simd: S, at: DVec3, low_pass: &LowPass, number: f32) -> [f32; 3] {
+        simd.vectorize(
+            #[cfg_attr(not(debug_assertions), inline(always))]
+            || {
+                let zero = f32x8::splat(simd, 0.0);
+                let mut sums = Sums { weights: zero, sums: [zero; 3] };
+                for row in self.rows(at, low_pass) {
+                    for from in row.eights() {
+                        let lanes = row.lanes(simd, self, from);
+                        let c = load(simd, self.coefficients, row.index + from);
+                        let is_present = c.simd_eq(c);
+                        let weight = is_present.select(lanes.weights, zero);
+                        let number = is_present.select((c - self.base) * self.scale - number, zero);
+                        sums.add(weight, [weight * number; 3], lanes.offsets);
+                    }
+                }
+                sums.means()
+            },
+        )
+    }
+
+    /// `Σ d·g / N`.
+    #[cfg_attr(not(debug_assertions), inline(never))]
+    pub(super) fn row_differences<S: Simd>(&self, simd: S, at: DVec3, low_pass: &LowPass) -> [f32; 3] {
+        simd.vectorize(
+            #[cfg_attr(not(debug_assertions), inline(always))]
+            || {
+                let zero = f32x8::splat(simd, 0.0);
+                let mut sums = Sums { weights: zero, sums: [zero; 3] };
+                for row in self.rows(at, low_pass) {
+                    for from in row.eights() {
+                        let lanes = row.lanes(simd, self, from);
+                        let c = load(simd, self.coefficients, row.index + from);
+                        let weight = c.simd_eq(c).select(lanes.weights, zero);
+                        let differences = self.differences(simd, &row, from, weight);
+                        sums.add(weight, [weight; 3], differences);
+                    }
+                }
+                let [x, y, z] = sums.means();
+                let [per_x, per_y, per_z] = self.per_spacing;
+                [x * per_x, y * per_y, z * per_z]
+            },
+        )
+    }
+
+    /// d of eight voxels of a row, times the spacing, 0 where their weights are.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn differences<S: Simd>(&self, simd: S, row: &Row, from: usize, weights: f32x8<S>) -> [f32x8<S>; 3] {
+        let zero = f32x8::splat(simd, 0.0);
+        let is_weighted = weights.simd_gt(zero);
+        if is_weighted.to_bitmask() == 0 {
+            return [zero; 3];
+        }
+        let (dims, values) = (self.volume.dims(), self.volume.values());
+        let first = row.first.with_x(row.first.x + from as u32);
+        let last = first.with_x(row.first.x + (from + LANES).min(row.count) as u32 - 1);
+        if first.cmpgt(UVec3::ZERO).all() && (last + 1).cmplt(dims).all() {
+            let at = row.index + from;
+            let half = f32x8::splat(simd, self.scale * 0.5);
+            let across = |step: usize| load(simd, values, at + step) * half - load(simd, values, at - step) * half;
+            let (nx, ny) = (dims.x as usize, dims.y as usize);
+            let [x, y, z] = [across(1), across(nx), across(nx * ny)];
+            let is_known = x.simd_eq(x) & y.simd_eq(y) & z.simd_eq(z);
+            // Otherwise a hole is near.
+            if is_weighted.to_bitmask() & !is_known.to_bitmask() == 0 {
+                return [is_weighted.select(x, zero), is_weighted.select(y, zero), is_weighted.select(z, zero)];
+            }
+        }
+        let mut differences = [[0.0; LANES]; 3];
+        let bits = is_weighted.to_bitmask();
+        for lane in (0..LANES).filter(|lane| bits >> lane & 1 == 1) {
+            let gradient = self.volume.gradient(first.with_x(first.x + lane as u32)) * self.volume.spacing();
+            let numbers = gradient * self.numbers.scale;
+            (0..3).for_each(|axis| differences[axis][lane] = numbers[axis] as f32);
+        }
+        let [x, y, z] = &differences;
+        [f32x8::load_array_ref(simd, x), f32x8::load_array_ref(simd, y), f32x8::load_array_ref(simd, z)]
+    }
+
+    /// The rows whose voxels may be within the radius.
+    fn rows(&self, at: DVec3, low_pass: &LowPass) -> impl Iterator<Item = Row> {
+        let (dims, radius) = (self.volume.dims(), self.radius);
+        let low = (at - low_pass.half_box).ceil().max(DVec3::ZERO).as_uvec3();
+        let end = ((at + low_pass.half_box).floor() + 1.0).clamp(DVec3::ZERO, dims.as_dvec3()).as_uvec3();
+        let (lowered, step) = (low_pass.lowered, -low_pass.lowered.x_axis);
+        let rows = (low.z..end.z).flat_map(move |z| (low.y..end.y).map(move |y| (y, z)));
+        rows.filter_map(move |(y, z)| {
+            // |δ| is less than the radius between the roots of a quadratic function of x.
+            let offset = lowered * (at - DVec3::new(0.0, y.into(), z.into()));
+            let (a, b) = (step.length_squared(), offset.dot(step));
+            let root = (b * b - a * (offset.length_squared() - radius * radius)).max(0.0).sqrt();
+            let first = (((-b - root) / a - SLACK).ceil().max(0.0) as u32).max(low.x);
+            let end = (((-b + root) / a + SLACK).floor() + 1.0).clamp(0.0, f64::from(end.x)) as u32;
+            (first < end).then(|| Row {
+                first: UVec3::new(first, y, z),
+                index: first as usize + dims.x as usize * (y as usize + dims.y as usize * z as usize),
+                count: (end - first) as usize,
+                offset: (offset + step * f64::from(first)).to_array().map(|component| component as f32),
+                step: step.to_array().map(|component| component as f32),
+            })
+        })
+    }
+
+    /// The index in memory of the voxel nearest to a point.
+    fn nearest(&self, at: DVec3) -> usize {
+        let grid = self.volume.grid();
+        let last = grid.dims.as_dvec3() - 1.0;
+        // Cast, which rounds towards 0.
+        grid.index_of((at + 0.5).clamp(DVec3::ZERO, last).as_uvec3()) as usize
+    }
+}
+
+impl<S: Simd> Sums<S> {
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn add(&mut self, weights: f32x8<S>, factors: [f32x8<S>; 3], numbers: [f32x8<S>; 3]) {
+        self.weights += weights;
+        for ((sum, factor), number) in self.sums.iter_mut().zip(factors).zip(numbers) {
+            *sum += factor * number;
+        }
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn means(&self) -> [f32; 3] {
+        let per_weight = 1.0 / sum_of(self.weights);
+        let [x, y, z] = self.sums;
+        [sum_of(x) * per_weight, sum_of(y) * per_weight, sum_of(z) * per_weight]
+    }
+}
+
+/// Eight numbers, from one on; NaN beyond the last one.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn load<S: Simd>(simd: S, all: &[f32], at: usize) -> f32x8<S> {
+    match all.get(at..at + LANES) {
+        Some(eight) => f32x8::from_slice(simd, eight),
+        None => {
+            let mut eight = [f32::NAN; LANES];
+            let rest = all.get(at..).unwrap_or_default();
+            eight[..rest.len()].copy_from_slice(rest);
+            f32x8::load_array(simd, eight)
+        }
+    }
+}
+
+/// The sum of eight numbers, in the same order on every machine.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn sum_of<S: Simd>(numbers: f32x8<S>) -> f32 {
+    let (low, high) = numbers.split();
+    let [a, b, c, d] = (low + high).to_array();
+    (a + c) + (b + d)
+}
