@@ -226,8 +226,8 @@ impl<'a> Frame<'a> {
         Some((points, LowPass::new(geometry, geometry.distance_from_eye(view.slabs.plane(plane)))))
     }
 
-    /// Pairs of voxels and planes nearer to them than the kernel's radius: all, and those of bricks that were drawn. A brick was not drawn if its
-    /// kernels reach wanted bricks and none of those was.
+    /// Pairs of voxels and planes nearer to them than the kernel's radius: all, and those of bricks that were drawn. A brick that is not
+    /// wanted itself was drawn unless its kernels reach wanted bricks and none of those was.
     fn sections(&self) -> [u64; 2] {
         let Placement { geometry, view, .. } = &self.placement;
         let across = self.placement.bricks();
@@ -237,9 +237,11 @@ impl<'a> Frame<'a> {
             let (low, end) = (at.saturating_sub(reach), (at + reach + 1).min(across));
             let rows = (low.z..end.z).flat_map(|z| (low.y..end.y).map(move |y| across.x * (y + across.y * z)));
             let around = rows.flat_map(|row| &self.drawn[(row + low.x) as usize..(row + end.x) as usize]);
-            let most = around.map(|state| state.load(Ordering::Relaxed)).max();
+            let state = |state: &AtomicU8| state.load(Ordering::Relaxed);
+            let own = state(&self.drawn[(at.x + across.x * (at.y + across.y * at.z)) as usize]);
+            let is_hidden = if own == 0 { around.map(state).max() == Some(WANTED) } else { own == WANTED };
             let sections = self.placement.sections(brick);
-            [sections, if most == Some(WANTED) { 0 } else { sections }]
+            [sections, if is_hidden { 0 } else { sections }]
         };
         self.shown.par_iter().map(of_brick).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
     }

@@ -187,3 +187,102 @@ impl<'a> Field<'a> {
 fn min_moment(radius: f64, range: [f32; 2]) -> f32 {
     8.0 * f32::EPSILON * radius as f32 * range[0].abs().max(range[1].abs())
 }
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use fearless_simd::{Level, dispatch};
+    use glam::{DVec2, UVec3};
+
+    use super::*;
+    use crate::geometry::plane_geometry::PlaneGeometry;
+    use crate::geometry::view_geometry::ViewGeometry;
+    use crate::reference::after as twin;
+    use crate::scene::{Scene, VolumeSource};
+
+    /// Numbers from 0 to 1.
+    fn random(state: &mut u64) -> f64 {
+        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (*state >> 33) as f64 / (1_u64 << 31) as f64
+    }
+
+    /// The largest differences from the f64 evaluation of values, as numbers, and of gradients in numbers per voxel, over points in and around
+    /// a volume; and how many points had values.
+    fn worst(volume: &Volume, sets: &[&str], state: &mut u64) -> (f64, f64, u32) {
+        let sets: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
+        let scene = Scene::from_volume(VolumeSource::Builtin("head:8".to_owned()), &sets).unwrap();
+        let (splatting, grid) = (&scene.splatting, volume.grid());
+        let numbers = Normalization::of(volume.values().iter().copied()).unwrap();
+        let kernel = (splatting.radius, splatting.falloff);
+        let ours = Field::new(volume, volume.values(), numbers, kernel, scene.shading.gradient);
+        let expected = twin::Field::new(volume, &scene).unwrap();
+        let view = ViewGeometry::new(grid, &scene.camera, splatting, [64, 64]).unwrap();
+        let geometry = PlaneGeometry::new(&view, grid);
+        let low_pass = LowPass::new(&geometry, 1.0);
+        let [first, second, _] = geometry.axes;
+        let step = |pixel: DVec2| {
+            let along = [geometry.screen_axis, geometry.screen_axis.perp()].map(|axis| axis.dot(pixel));
+            first * geometry.per_pixel.x * along[0] + second * geometry.per_pixel.y * along[1]
+        };
+        let twins = twin::low_pass::LowPass::new(step(DVec2::X), step(DVec2::Y));
+        let (mut value_error, mut gradient_error, mut count) = (0.0_f64, 0.0_f64, 0);
+        for _ in 0..300 {
+            let place = DVec3::from([(); 3].map(|()| random(state)));
+            let points = Points {
+                first: place * (grid.dims.as_dvec3() + 3.0) - 2.0,
+                right: (DVec3::from([(); 3].map(|()| random(state))) - 0.5) * 2.0,
+                down: DVec3::ZERO,
+            };
+            for lane in 0..8 {
+                let at = points.of(lane, 0);
+                let of = (points, low_pass);
+                let (number, gradient) = dispatch!(Level::new(), simd => {
+                    let cubes = ours.cubes(simd, &of, [0, 0]);
+                    let number = ours.value(simd, cubes.as_ref(), lane, (at, &low_pass));
+                    (number, ours.gradient(simd, cubes.as_ref(), lane, (at, &low_pass), number))
+                });
+                let value = expected.value(at, &twins);
+                assert_eq!(number.is_nan(), value.is_none(), "{at} {sets:?}");
+                let Some(value) = value else { continue };
+                value_error = value_error.max((f64::from(number) - numbers.apply(value)).abs());
+                let theirs = expected.gradient(at, &twins) * numbers.scale;
+                let error = (DVec3::from(gradient.map(f64::from)) - theirs) * volume.spacing();
+                assert!(error.is_finite(), "{at} {sets:?}");
+                gradient_error = gradient_error.max(error.abs().max_element());
+                count += 1;
+            }
+        }
+        (value_error, gradient_error, count)
+    }
+
+    #[test]
+    fn the_field_is_that_of_the_f64_evaluation() {
+        let mut state = 1;
+        let kernels: [&[&str]; 5] = [
+            &[],
+            &["splatting.falloff=1"],
+            &["splatting.radius=1.3"],
+            &["splatting.radius=3.2", "splatting.falloff=0.7"],
+            // Pixels larger than voxels.
+            &["camera.height=400"],
+        ];
+        for dims in [UVec3::new(12, 9, 11), UVec3::new(3, 12, 5)] {
+            for holes in [false, true] {
+                let value = |state: &mut u64| match random(state) {
+                    hole if holes && hole < 0.05 => f32::NAN,
+                    number => (1000.0 + 100.0 * number) as f32,
+                };
+                let values = (0..dims.element_product()).map(|_| value(&mut state)).collect();
+                let volume = Volume::new("random", dims, DVec3::new(1.0, 0.5, 2.0), values).unwrap();
+                for kernel in kernels {
+                    for gradient in ["shading.gradient=differences", "shading.gradient=kernel"] {
+                        let sets = [kernel, &[gradient]].concat();
+                        let (values, gradients, count) = worst(&volume, &sets, &mut state);
+                        assert!(values < 3e-6 && gradients < 2e-5, "{sets:?} of {dims}: {values} {gradients}");
+                        assert!(count > 500, "{sets:?} of {dims}: only {count} points have values");
+                    }
+                }
+            }
+        }
+    }
+}
