@@ -116,6 +116,7 @@ pub mod headless;
 pub mod image;
 mod kernel;
 mod lists;
+pub mod part;
 #[cfg(feature = "gpu")]
 mod pass;
 mod pick;
@@ -150,6 +151,7 @@ pub use gpu::options::{Blend, RendererOptions};
 #[cfg(feature = "gpu")]
 pub use gpu::placement::Placement;
 pub use image::Image;
+pub use part::Part;
 pub use pick::Pick;
 #[cfg(feature = "gpu")]
 pub use renderer::Renderer;

@@ -58,7 +58,10 @@ fn place_brick(number: u32, brick: &Brick, projection: &Projection, support: f64
         (low <= high).then(|| [low as usize / side, high as usize / side])
     };
     let (columns, rows) = (tiles(0, COLUMNS)?, tiles(1, ROWS)?);
-    let first = projection.sheets_of(&view.slabs.touched(start, end)).start;
+    let Range { start: first, end } = projection.sheets_of(&view.slabs.touched(start, end));
+    if first >= end {
+        return None;
+    }
     let DVec2 { x, y } = half_box;
     Some(Placed { brick: number, first, half_box: [x as f32, y as f32], columns, rows })
 }

@@ -1,11 +1,14 @@
 //! Early splat elimination (§6, SPEC §6): which pixels of a tile are opaque, and whether any pixel of a footprint's box is not. The same
 //! decision as `shaders/cull_voxels.wgsl`; pixels outside of the tile are other tiles' to draw.
 
+use std::ops::Range;
+
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8};
 
 use super::sheets::{COLUMNS, ROWS};
 use super::vector::LANES;
+use crate::settings::window::Region;
 
 /// The number of levels of joined rows: 1, 2, 4, … rows.
 const LEVELS: usize = ROWS.ilog2() as usize + 1;
@@ -90,6 +93,20 @@ impl OpenMask {
         mask.joined[0][..rows].fill(bits);
         mask.join();
         mask
+    }
+
+    /// Marks the pixels as opaque that lie outside a region of the image; `origin` is the tile's first pixel.
+    pub(super) fn close_outside(&mut self, region: &Region, origin: [usize; 2]) {
+        let within = |pixels: Range<usize>, axis: usize, count: usize| {
+            pixels.start.saturating_sub(origin[axis]).min(count)..pixels.end.saturating_sub(origin[axis]).min(count)
+        };
+        let (columns, rows) = (within(region.columns(), 0, COLUMNS), within(region.rows(), 1, ROWS));
+        for row in 0..ROWS {
+            let is_open = rows.contains(&row) && !columns.is_empty();
+            let kept = if is_open { columns_between(columns.start, columns.end - 1) } else { 0 };
+            self.close(row, !kept);
+        }
+        self.join();
     }
 
     /// The bits of the open columns of a row.

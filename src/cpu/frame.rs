@@ -13,20 +13,21 @@ use super::first_hit;
 use super::kernel::KernelTables;
 use super::material::Materials;
 use super::project::Projection;
-use super::resolve::Resolver;
+use super::resolve;
 use super::shade::Shader;
 use super::sheets::{COLUMNS, ROWS};
 use super::splat::Splatter;
 use super::tile::TileWalk;
 use crate::geometry::means;
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::image::Image;
 use crate::kernel::Kernel;
 use crate::lists::brick::Brick;
 use crate::lists::quad_plan::{Overlaps, PlaceDepths};
+use crate::part::{Content, Extreme, Resolver};
 use crate::scene::Scene;
-use crate::settings::splatting::{Compositing, Method, Order};
+use crate::settings::splatting::{Classification, Compositing, Method, Order};
 use crate::settings::transfer_function::TransferFunction;
+use crate::settings::window::{Region, Window};
 use crate::stats::Counts;
 use crate::volume::Volume;
 
@@ -51,24 +52,30 @@ pub(super) struct Frame<'a> {
     pub(super) touched: Range<i32>,
     /// The amplitude of the low-pass rule if it is the same for all sections, else 1.
     pub(super) amplitude: f64,
+    /// The pixels that are drawn.
+    pub(super) region: Region,
     support: f64,
-    resolver: Resolver,
+    /// `None` for a part of an image.
+    resolver: Option<Resolver>,
     overlaps: Overlaps,
 }
 
 /// A drawn frame.
 #[derive(Clone, Debug)]
 pub(super) struct Drawing {
-    pub(super) image: Image,
+    /// The pixels of the region that was drawn.
+    pub(super) content: Content,
     pub(super) counts: Counts,
     /// For every pixel the depth at which the opacity asked for is reached, world units along the camera's direction; infinite where it is
     /// not. Empty if none is asked for.
     pub(super) first_hits: Vec<f32>,
 }
 
-/// What a host adds to a scene.
+/// What a caller adds to a scene.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Host {
+    /// What is drawn, if that is a part of the image.
+    pub(super) window: Option<Window>,
     /// The opacity whose depth is requested.
     pub(super) first_hit: Option<f64>,
     /// The opaque surfaces that end rays.
@@ -83,7 +90,7 @@ impl<'a> Frame<'a> {
         (bricks, materials): (&'a [Brick], &'a Materials),
         scene: &Scene,
         view: ViewGeometry,
-        Host { first_hit, surfaces }: Host,
+        Host { window, first_hit, surfaces }: Host,
         level: Level,
     ) -> Self {
         let (splatting, image) = (&scene.splatting, &scene.image);
@@ -111,7 +118,8 @@ impl<'a> Frame<'a> {
         };
         let overlaps = count_overlaps(level, bricks, &view);
         let covered = view.slabs.covered(means::covered(&view, grid, splatting));
-        let projection = Projection::new(view, splatting.order);
+        let Window { slabs, region } = window.clone().unwrap_or_else(|| Window::whole(view.size));
+        let projection = Projection::new(view, splatting.order, &with_lead(slabs, splatting.compositing));
         Self {
             volume,
             transfer,
@@ -127,7 +135,10 @@ impl<'a> Frame<'a> {
             touched: projection.sheets_of(&overlaps.slabs),
             amplitude: if view.perspective.is_some() { 1.0 } else { view.footprint.amplitude },
             support: kernel.support(),
-            resolver: Resolver::new(splatting.compositing, image.background),
+            region,
+            resolver: window
+                .is_none()
+                .then(|| Resolver::new(splatting.compositing, Classification::Before, image.background)),
             overlaps,
             projection,
         }
@@ -139,9 +150,10 @@ impl<'a> Frame<'a> {
         let placed = bin::place(self.bricks, &self.projection, self.support);
         let [columns, rows] = bin::tile_grid([width, height]);
         let has_hits = self.compositor.first_hit.is_some();
-        let (pixels, first_hits, tally) = draw_tiles(
-            [width, height],
-            has_hits,
+        let outputs = Outputs { has_hits, has_extremes: false };
+        let (content, first_hits, tally) = draw_tiles(
+            (self.projection.view.size, &self.region),
+            outputs,
             &placed,
             || TileWalk::new(self),
             |walk, origin, bricks| dispatch!(level, simd => self.draw_tile(simd, walk, origin, &placed, bricks)),
@@ -160,7 +172,12 @@ impl<'a> Frame<'a> {
             bricks_visited: tally.bricks_visited,
             ..Counts::default()
         };
-        Drawing { image: Image { width, height, pixels }, counts, first_hits }
+        Drawing { content, counts, first_hits }
+    }
+
+    /// Whether a part of the image is drawn.
+    pub(super) fn is_part(&self) -> bool {
+        self.resolver.is_none()
     }
 
     /// Draws a tile, including rows and columns outside the image.
@@ -174,12 +191,20 @@ impl<'a> Frame<'a> {
         bricks: &[u32],
     ) -> Tile {
         let (buffers, rays, tally) = walk.draw(simd, origin, placed, bricks);
-        let pixels = self.resolver.tile(buffers);
+        let pixels = resolve::tile(self.resolver.as_ref(), buffers);
         let first_hits = match self.compositor.first_hit {
             None => Vec::new(),
             Some(_) => first_hit::depths(buffers, rays, &self.rays.rays, origin, self.volume.grid().unit()),
         };
-        Tile { pixels, first_hits, tally }
+        Tile { pixels, extremes: Vec::new(), first_hits, tally }
+    }
+}
+
+/// The slabs that a frame draws for a range of them: for a surface, the one before them too, in which it may begin to rise.
+fn with_lead(slabs: Range<i32>, compositing: Compositing) -> Range<i32> {
+    match compositing {
+        Compositing::Surface if !slabs.is_empty() => slabs.start - 1..slabs.end,
+        _ => slabs,
     }
 }
 
@@ -209,58 +234,85 @@ fn count_overlaps(level: Level, bricks: &[Brick], view: &ViewGeometry) -> Overla
 /// The pixels of a tile, row by row.
 pub(super) struct Tile {
     pub(super) pixels: Vec<[f32; 4]>,
+    /// Empty if no extremes are requested.
+    pub(super) extremes: Vec<Extreme>,
     /// Empty if no first hits are requested.
     pub(super) first_hits: Vec<f32>,
     pub(super) tally: Tally,
 }
 
-/// The pixels of a row of tiles, and their first hits if they are requested.
-type Strip<'a> = (&'a mut [[f32; 4]], Option<&'a mut [f32]>);
+/// What is requested of pixels beside their colours.
+#[derive(Clone, Copy)]
+pub(super) struct Outputs {
+    pub(super) has_hits: bool,
+    pub(super) has_extremes: bool,
+}
 
-/// Draws all tiles on all cores by `draw_tile`, which gets its thread's walk, the tile's first pixel and its bricks: the image's pixels, first
-/// hits if they are requested, and counts of the work.
+/// Draws the tiles of a region of an image on all cores by `draw_tile`, which gets its thread's walk, the tile's first pixel and its bricks: the
+/// region's pixels, first hits if they are requested, and counts of the work.
 pub(super) fn draw_tiles<W>(
-    [width, height]: [u32; 2],
-    has_hits: bool,
+    (size, region): ([u32; 2], &Region),
+    Outputs { has_hits, has_extremes }: Outputs,
     placed: &[Placed],
     new_walk: impl Fn() -> W + Sync,
     draw_tile: impl Fn(&mut W, [usize; 2], &[u32]) -> Tile + Sync,
-) -> (Vec<[f32; 4]>, Vec<f32>, Tally) {
-    let width = width as usize;
-    let count = width * height as usize;
-    let [columns, _] = bin::tile_grid([width as u32, height]);
-    let mut pixels = vec![[0.0; 4]; count];
-    let mut first_hits = vec![f32::INFINITY; if has_hits { count } else { 0 }];
-    let mut hits = first_hits.chunks_mut(width * ROWS);
-    let strips: Vec<_> = pixels.chunks_mut(width * ROWS).map(|pixels| (pixels, hits.next())).collect();
-    let draw_strip = |(row, (pixels, mut hits)): (usize, Strip<'_>)| {
+) -> (Content, Vec<f32>, Tally) {
+    let [columns, _] = bin::tile_grid(size);
+    let drawn = region.columns().start / COLUMNS..region.columns().end.div_ceil(COLUMNS);
+    let count = |is_requested: bool| if is_requested { region.pixels() } else { 0 };
+    let mut colors = vec![[0.0; 4]; count(true)];
+    let mut extremes = vec![Extreme::default(); count(has_extremes)];
+    let mut first_hits = vec![f32::INFINITY; count(has_hits)];
+    let others = strips(&mut extremes, region).into_iter().zip(strips(&mut first_hits, region));
+    let strips: Vec<_> = strips(&mut colors, region).into_iter().zip(others).collect();
+    let first_row = region.rows().start / ROWS;
+    let tally = strips.into_par_iter().enumerate().map(|(at, (colors, (extremes, hits)))| {
+        let row = first_row + at;
         let bins = bin::bin(placed, row, columns);
-        let tiles = bins
+        let tiles = bins[drawn.clone()]
             .par_iter()
-            .enumerate()
-            .map_init(&new_walk, |walk, (column, bricks)| draw_tile(walk, [column * COLUMNS, row * ROWS], bricks));
+            .zip(drawn.clone())
+            .map_init(&new_walk, |walk, (bricks, column)| draw_tile(walk, [column * COLUMNS, row * ROWS], bricks));
         let mut tally = Tally::default();
-        for (column, tile) in tiles.collect::<Vec<_>>().into_iter().enumerate() {
+        for (column, tile) in drawn.clone().zip(tiles.collect::<Vec<_>>()) {
             tally += tile.tally;
-            copy_tile(&tile.pixels, column, width, pixels);
-            if let Some(hits) = &mut hits {
-                copy_tile(&tile.first_hits, column, width, hits);
-            }
+            copy_tile(&tile.pixels, [column, row], region, colors);
+            copy_tile(&tile.extremes, [column, row], region, extremes);
+            copy_tile(&tile.first_hits, [column, row], region, hits);
         }
         tally
-    };
-    let tally = strips.into_par_iter().enumerate().map(draw_strip).reduce(Tally::default, |mut sum, tally| {
+    });
+    let tally = tally.reduce(Tally::default, |mut sum, tally| {
         sum += tally;
         sum
     });
-    (pixels, first_hits, tally)
+    (Content { colors, extremes }, first_hits, tally)
 }
 
-/// Copies the part of a tile that lies on the image to its column of a row of tiles.
-fn copy_tile<T: Copy>(tile: &[T], column: usize, width: usize, strip: &mut [T]) {
-    for (line, tile) in strip.chunks_mut(width).zip(tile.chunks(COLUMNS)) {
-        let line = &mut line[column * COLUMNS..];
-        let count = line.len().min(COLUMNS);
-        line[..count].copy_from_slice(&tile[..count]);
+/// The rows of a region that lie in a row of tiles.
+fn rows_in(region: &Region, row: usize) -> Range<usize> {
+    region.rows().start.max(row * ROWS)..region.rows().end.min((row + 1) * ROWS)
+}
+
+/// A region's pixels by rows of tiles; empty slices of no pixels.
+fn strips<'a, T>(mut pixels: &'a mut [T], region: &Region) -> Vec<&'a mut [T]> {
+    let width = if pixels.is_empty() { 0 } else { region.width as usize };
+    let rows = region.rows().start / ROWS..region.rows().end.div_ceil(ROWS);
+    let strip = |row: usize| {
+        let (strip, rest) = std::mem::take(&mut pixels).split_at_mut(rows_in(region, row).len() * width);
+        pixels = rest;
+        strip
+    };
+    rows.map(strip).collect()
+}
+
+/// Copies the part of a tile that lies in the region to its place in a row of tiles.
+fn copy_tile<T: Copy>(tile: &[T], [column, row]: [usize; 2], region: &Region, strip: &mut [T]) {
+    let left = region.columns().start.max(column * COLUMNS);
+    let right = region.columns().end.min((column + 1) * COLUMNS);
+    let lines = tile.chunks(COLUMNS).skip(rows_in(region, row).start - row * ROWS);
+    for (line, tile) in strip.chunks_mut(region.width as usize).zip(lines) {
+        let tile = &tile[left - column * COLUMNS..right - column * COLUMNS];
+        line[left - region.columns().start..right - region.columns().start].copy_from_slice(tile);
     }
 }

@@ -50,15 +50,18 @@ use fearless_simd::Level;
 use crate::error::RenderError;
 use crate::error::setting::{Interval, SettingError};
 use crate::geometry::view_geometry::ViewGeometry;
+use crate::image::Image;
 use crate::lists::brick::BrickList;
 use crate::lists::classify::classify;
+use crate::part::{self, Part};
 use crate::pick::{FirstHits, Pick};
 use crate::rendering::{Backend, Rendering};
 use crate::scene::{ImageSettings, Scene};
 use crate::settings::camera::Camera;
 use crate::settings::splatting::{Classification, check_first_hit};
 use crate::settings::transfer_function::TransferFunction;
-use crate::stats::Stats;
+use crate::settings::window::Window;
+use crate::stats::{Counts, Stats};
 use crate::volume::Volume;
 use after::Coefficients;
 use cut::Surfaces;
@@ -211,14 +214,40 @@ impl CpuRenderer {
     /// If the scene exceeds a limit, such as the number of slabs.
     pub fn draw(&mut self) -> Result<Rendering, RenderError> {
         let start = Instant::now();
+        let ImageSettings { width, height, .. } = self.scene.image;
+        let (Drawing { content, counts, first_hits }, view) = self.drawing(None)?;
+        self.hits = self.first_hit.map(|_| FirstHits { view, depths: first_hits });
+        let image = Image { width, height, pixels: content.colors };
+        Ok(Rendering { image, stats: self.stats(counts, start) })
+    }
+
+    /// Draws a part of the image (SPEC §11), and returns it with its statistics. First hits are not noted.
+    ///
+    /// # Errors
+    /// As for [`Self::draw`], if the scene has no parts, a host has set surfaces, or the window does not lie in the image.
+    pub fn draw_part(&mut self, window: &Window) -> Result<(Part, Stats), RenderError> {
+        let start = Instant::now();
+        part::check(&self.scene, self.scene.splatting.classification, window)?;
+        if self.surfaces.is_some() {
+            return Err(SettingError::new("surfaces", "a host's surfaces for a part of an image", "none").into());
+        }
+        let (Drawing { content, counts, .. }, view) = self.drawing(Some(window))?;
+        let part = Part::new((&self.volume, &self.scene), &view, window, content)?;
+        Ok((part, self.stats(counts, start)))
+    }
+
+    /// Draws the whole image, or a part of it.
+    fn drawing(&mut self, window: Option<&Window>) -> Result<(Drawing, ViewGeometry), RenderError> {
         let splatting = &self.scene.splatting;
         let is_cut = self.surfaces.is_some() || !self.scene.clip.is_empty();
         splatting.check_rays(is_cut, self.first_hit)?;
         let scene = self.scene.framed(&self.volume, &self.transfer);
         let ImageSettings { width, height, .. } = self.scene.image;
-        let host = Host { first_hit: self.first_hit, surfaces: self.surfaces_of([width, height])? };
         let view = ViewGeometry::new(self.volume.grid(), &scene.camera, &scene.splatting, [width, height])?;
-        let Drawing { image, counts, first_hits } = match &mut self.list {
+        let window = window.map(|window| window.opened(&view.slabs_of(self.volume.grid())));
+        let first_hit = self.first_hit.filter(|_| window.is_none());
+        let host = Host { window, first_hit, surfaces: self.surfaces_of([width, height])? };
+        let drawing = match &mut self.list {
             List::Before(bricks, materials) => {
                 let bricks = (bricks.bricks(), &*materials);
                 let frame = Frame::new(&self.volume, &self.transfer, bricks, &scene, view, host, self.level);
@@ -230,8 +259,13 @@ impl CpuRenderer {
                 after::Frame::new(of, coefficients, &scene, view, host).draw(self.level)
             }
         };
-        self.hits = self.first_hit.map(|_| FirstHits { view, depths: first_hits });
-        let stats = Stats {
+        Ok((drawing, view))
+    }
+
+    /// The statistics of a frame that began at a time.
+    fn stats(&self, counts: Counts, start: Instant) -> Stats {
+        let ImageSettings { width, height, .. } = self.scene.image;
+        Stats {
             adapter: "CPU".to_owned(),
             driver: self.simd.name().to_owned(),
             backend: Backend::Cpu.name().to_owned(),
@@ -242,8 +276,7 @@ impl CpuRenderer {
             counts,
             frame_ms: milliseconds_since(start),
             ..Stats::default()
-        };
-        Ok(Rendering { image, stats })
+        }
     }
 }
 

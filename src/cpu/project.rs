@@ -74,13 +74,16 @@ pub(super) struct Projection {
     pub(super) view: ViewGeometry,
     /// 1, or -1 where sheets are numbered from the farthest on: in the order in which they are composited.
     pub(super) direction: i32,
+    /// The sheets that are drawn.
+    window: Range<i32>,
     offsets: Offsets,
     /// How kernels are seen without perspective: all of them alike.
     pub(super) flat: Lens,
 }
 
 impl Projection {
-    pub(super) fn new(view: ViewGeometry, order: Order) -> Self {
+    /// A frame of some of a view's slabs.
+    pub(super) fn new(view: ViewGeometry, order: Order, slabs: &Range<i32>) -> Self {
         let direction = if order == Order::FrontToBack { 1 } else { -1 };
         let offset = |slot: usize| offset(&view, brick::in_brick(slot as u32).as_dvec3());
         let offsets = Offsets {
@@ -91,7 +94,7 @@ impl Projection {
         };
         let per_slab = whole_kernel(&view);
         let flat = Lens { per_slab, per_lambda: 1.0 / view.lambda, to_eye: -view.basis.w, local: None };
-        Self { view, direction, offsets, flat }
+        Self { view, direction, window: sheets_of(direction, slabs), offsets, flat }
     }
 
     /// Where a brick's first place is.
@@ -162,7 +165,8 @@ impl Projection {
             let reach = self.view.reach / self.view.slabs.width;
             for (first, offset) in first.iter_mut().zip(&self.offsets.depth) {
                 let depth = place.depth + offset;
-                *first = self.numbered(depth - reach, depth + reach).start;
+                let sheets = self.numbered(depth - reach, depth + reach);
+                *first = if sheets.start < sheets.end { sheets.start } else { NO_SHEET };
             }
             return first;
         }
@@ -175,16 +179,18 @@ impl Projection {
         first
     }
 
-    /// Slabs between two depths by more than rounding errors ([`slab::ROUNDING`]), as sheets.
+    /// Slabs between two depths by more than rounding errors ([`slab::ROUNDING`]), as sheets, of those that are drawn.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn numbered(&self, first: f64, end: f64) -> Range<i32> {
         let (first, end) = (floor(first + slab::ROUNDING), -floor(-(end - slab::ROUNDING)));
-        if self.direction > 0 { first..end } else { 1 - end..1 - first }
+        let (first, end) = if self.direction > 0 { (first, end) } else { (1 - end, 1 - first) };
+        first.max(self.window.start)..end.min(self.window.end)
     }
 
-    /// Those that a range of slabs is.
+    /// A range of slabs as sheets, of those that are drawn.
     pub(super) fn sheets_of(&self, slabs: &Range<i32>) -> Range<i32> {
-        if self.direction > 0 { slabs.clone() } else { 1 - slabs.end..1 - slabs.start }
+        let sheets = sheets_of(self.direction, slabs);
+        sheets.start.max(self.window.start)..sheets.end.min(self.window.end)
     }
 
     /// What voxels are sorted by that are composited one by one: their depth along w. Depths that differ by less than rounding errors may
@@ -224,6 +230,11 @@ impl Projection {
             local: Some(local),
         }
     }
+}
+
+/// A range of slabs as sheets, which are numbered in the order of compositing.
+fn sheets_of(direction: i32, slabs: &Range<i32>) -> Range<i32> {
+    if direction > 0 { slabs.clone() } else { 1 - slabs.end..1 - slabs.start }
 }
 
 /// The place of an offset in voxels.

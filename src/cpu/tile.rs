@@ -82,7 +82,9 @@ impl<'a> TileWalk<'a> {
         bricks: &[u32],
     ) -> (&Buffers, &TileRays, Tally) {
         let mut bricks = bricks.iter().map(|&at| &placed[at as usize]).peekable();
-        let first = bricks.peek().map(|placed| placed.first);
+        // A part of an image (SPEC §11) needs the sheets that count even where only other parts have bricks.
+        let counted = Some(self.frame.counted.start).filter(|_| self.frame.is_part() && !self.frame.counted.is_empty());
+        let first = bricks.peek().map(|placed| placed.first).or(counted);
         self.reset(origin, first.unwrap_or(0));
         if let Some(first) = first {
             self.walk(simd, first, &mut bricks);
@@ -97,6 +99,7 @@ impl<'a> TileWalk<'a> {
         let [width, height] = view.size.map(|side| side as usize);
         self.origin = origin;
         self.open = OpenMask::new((width - origin[0]).min(COLUMNS), (height - origin[1]).min(ROWS));
+        self.open.close_outside(&self.frame.region, origin);
         self.rays = self.frame.rays.of_tile(origin, direction * sheet);
         if let (Some(shown), Some(_)) = (&self.rays.shown, self.frame.compositor.threshold) {
             self.open.close_empty(shown);

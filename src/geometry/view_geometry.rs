@@ -265,6 +265,21 @@ impl ViewGeometry {
         (depth - spread - reach).max(self.slabs.origin + eye.near)..depth + spread + reach
     }
 
+    /// The slabs that kernels and cells of a grid's voxels may reach, whatever the transfer function: a scene's slabs (SPEC §11).
+    pub fn slabs_of(&self, grid: &Grid) -> Range<i32> {
+        let center = grid.center();
+        let kernels = self.depths(center, center);
+        let row = self.screen_from_voxel[2];
+        let (depth, spread) = (row.dot(center.extend(1.0)), row.truncate().abs().dot(center + 0.5));
+        let near = self.perspective.map_or(f64::NEG_INFINITY, |perspective| self.slabs.origin + perspective.eye.near);
+        let cells = (depth - spread).max(near)..depth + spread;
+        let of = |depths: Range<f64>| self.slabs.covered(depths).unwrap_or(0..0);
+        match [of(kernels), of(cells)] {
+            [either, none] | [none, either] if none.is_empty() => either,
+            [a, b] => a.start.min(b.start)..a.end.max(b.end),
+        }
+    }
+
     /// Whether the kernels of all voxels reach the same sheet depths in another view. For axis-aligned sheets this holds for all views along
     /// the same axis (§3.1).
     pub fn has_depths_of(&self, other: &Self) -> bool {

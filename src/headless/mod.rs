@@ -30,9 +30,12 @@ use crate::error::RenderError;
 use crate::error::device::DeviceError;
 #[cfg(any(feature = "gpu", feature = "cpu"))]
 use crate::error::setting::SettingError;
+use crate::part::Part;
 use crate::pick::Pick;
 pub use crate::rendering::{Backend, Rendering};
 use crate::scene::Scene;
+use crate::settings::window::Window;
+use crate::stats::Stats;
 use crate::volume::Volume;
 
 /// Renders with one backend. On the GPU it opens its own device; on the CPU it needs no driver.
@@ -104,6 +107,37 @@ impl Headless {
     /// If the backend cannot draw one of the scene's settings, or the device fails.
     pub fn render_volume(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Rendering, RenderError> {
         view_and_draw(|| self.view(volume, scene), |view| self.draw(view))
+    }
+
+    /// Loads the scene's volume and renders a part of its image (SPEC §11).
+    ///
+    /// # Errors
+    /// If the volume cannot be loaded, the backend cannot draw one of the scene's settings, the scene has no parts, the window does not lie in
+    /// the image, or the device fails.
+    pub fn render_part(&self, scene: &Scene, window: &Window) -> Result<Part, Error> {
+        scene.check().map_err(RenderError::from)?;
+        let volume = scene.load_volume()?;
+        let mut view = self.view(volume, scene)?;
+        Ok(self.draw_part(&mut view, window)?.0)
+    }
+
+    /// Draws a part of a view's image (SPEC §11), and returns it with its statistics.
+    ///
+    /// # Errors
+    /// As for [`Self::draw`], if the scene has no parts, or the window does not lie in the image.
+    pub fn draw_part(&self, view: &mut HeadlessView, window: &Window) -> Result<(Part, Stats), RenderError> {
+        match (&self.drawer, view.backend_mut()) {
+            #[cfg(feature = "gpu")]
+            (Drawer::Gpu(_), ViewBackend::Gpu(_)) => {
+                let allowed = "\"cpu\" or \"reference\" for a part of an image";
+                Err(SettingError::new("backend", "\"gpu\"", allowed).into())
+            }
+            #[cfg(feature = "cpu")]
+            (Drawer::Cpu, ViewBackend::Cpu(view)) => view.draw_part(window),
+            (Drawer::Reference, ViewBackend::Reference(view)) => view.draw_part(window),
+            #[cfg(any(feature = "gpu", feature = "cpu"))]
+            (_, other) => Err(self.refuse(other.backend()).into()),
+        }
     }
 
     /// A view of a volume with a scene's settings, for any number of frames. The scene's own volume is ignored.

@@ -7,12 +7,14 @@ use super::{Backend, Rendering, milliseconds_since};
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
+use crate::part::{self, Part};
 use crate::pick::{FirstHits, Pick};
 use crate::reference::{self, Host};
-use crate::scene::Scene;
+use crate::scene::{ImageSettings, Scene};
 use crate::settings::camera::Camera;
 use crate::settings::splatting::check_first_hit;
 use crate::settings::transfer_function::TransferFunction;
+use crate::settings::window::Window;
 use crate::stats::Stats;
 use crate::volume::Volume;
 
@@ -57,6 +59,20 @@ impl ReferenceView {
         FirstHits::pick(self.hits.as_ref(), &self.volume, pixel, &self.scene.image)
     }
 
+    /// Draws a part of the image.
+    pub(super) fn draw_part(&mut self, window: &Window) -> Result<(Part, Stats), RenderError> {
+        let start = Instant::now();
+        let Self { volume, scene, transfer, .. } = self;
+        part::check(scene, scene.splatting.classification, window)?;
+        let framed = scene.framed(volume, transfer);
+        let ImageSettings { width, height, .. } = scene.image;
+        let view = ViewGeometry::new(volume.grid(), &framed.camera, &framed.splatting, [width, height])?;
+        let opened = window.opened(&view.slabs_of(volume.grid()));
+        let content = reference::part(volume, transfer, scene, &opened)?;
+        let part = Part::new((volume, scene), &view, window, content)?;
+        Ok((part, self.stats(start)?))
+    }
+
     pub(super) fn draw(&mut self) -> Result<Rendering, RenderError> {
         let start = Instant::now();
         let Self { volume, scene, transfer, first_hit, .. } = self;
@@ -75,18 +91,23 @@ impl ReferenceView {
         } else {
             self.hits = None;
         }
-        let stats = Stats {
+        let stats = self.stats(start)?;
+        Ok(Rendering { image, stats })
+    }
+
+    /// The statistics of a frame that began at a time.
+    fn stats(&self, start: Instant) -> Result<Stats, RenderError> {
+        Ok(Stats {
             adapter: "CPU".to_owned(),
             driver: "f64".to_owned(),
             backend: Backend::Reference.name().to_owned(),
             api: "none".to_owned(),
             rasterizer: Backend::Reference.name().to_owned(),
-            width: image.width,
-            height: image.height,
+            width: self.scene.image.width,
+            height: self.scene.image.height,
             frame_ms: milliseconds_since(start),
             counts: reference::count(&self.volume, &self.transfer, &self.scene)?,
             ..Stats::default()
-        };
-        Ok(Rendering { image, stats })
+        })
     }
 }

@@ -3,7 +3,7 @@
 #[cfg(feature = "codecs")]
 mod format;
 #[cfg(feature = "codecs")]
-mod open;
+pub(crate) mod open;
 #[cfg(feature = "codecs")]
 #[doc(hidden)]
 pub mod output;

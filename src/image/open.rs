@@ -11,7 +11,7 @@ use super::{Format, Image, ImageError};
 use crate::volume::{Access, ReadOptions, VolumeError, npy};
 
 /// The maximum expansion of a byte in a PNG or EXR file: deflate's, the best compression that they use.
-const MAX_EXPANSION: u64 = 1032;
+pub(crate) const MAX_EXPANSION: u64 = 1032;
 
 impl Image {
     /// Opens an image by the file's extension: `.png` of any type, `.exr`, or `.npy` as [`Image::save`] writes it (f32, shape
@@ -83,7 +83,7 @@ impl Image {
 }
 
 /// Checks that no block of an EXR file claims more than the file's bytes can hold: decoders allocate a whole block first.
-fn check_blocks(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
+pub(crate) fn check_blocks(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
     let failed = |source: ::exr::error::Error| ImageError::Decode { path: path.to_owned(), source: source.into() };
     let most = u128::from(MAX_EXPANSION) * bytes.len() as u128;
     let block_bytes = |header: &Header| {
@@ -123,7 +123,7 @@ fn min_bits_per_pixel(format: ImageFormat, bytes: &[u8]) -> u64 {
 }
 
 /// The bytes of a regular file; a pipe or a device might never end.
-fn read(path: &Path, access: &Access) -> Result<Vec<u8>, ImageError> {
+pub(crate) fn read(path: &Path, access: &Access) -> Result<Vec<u8>, ImageError> {
     let path = &*access.resolve(path).map_err(of_volume)?;
     let failed = |source| ImageError::Io { path: path.to_owned(), source };
     // The kind of file is checked before opening, because opening a pipe would wait for its writer.
@@ -135,14 +135,14 @@ fn read(path: &Path, access: &Access) -> Result<Vec<u8>, ImageError> {
 }
 
 /// The image error for an error of the volume reader.
-fn of_volume(error: VolumeError) -> ImageError {
+pub(crate) fn of_volume(error: VolumeError) -> ImageError {
     match error {
         VolumeError::Io { path, source, .. } => ImageError::Io { path, source },
         VolumeError::Invalid { origin, field, found, allowed } => content(Path::new(&origin), &field, found, allowed),
     }
 }
 
-fn content(path: &Path, what: &str, found: String, allowed: String) -> ImageError {
+pub(crate) fn content(path: &Path, what: &str, found: String, allowed: String) -> ImageError {
     ImageError::Content { path: path.to_owned(), what: what.to_owned(), found, allowed }
 }
 

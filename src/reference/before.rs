@@ -2,6 +2,7 @@
 //! sheets, and sheets are composited in order. Each step of [`Picture`] is a stage of the GPU.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use glam::DVec4;
 use rayon::prelude::*;
@@ -13,9 +14,11 @@ use super::{composite, resolve, shading, sheets, splat};
 use crate::error::RenderError;
 use crate::kernel::Kernel;
 use crate::lists::quad_plan::tile_grid;
+use crate::part::Content;
 use crate::scene::Scene;
 use crate::settings::splatting::{Compositing, Method, Order};
 use crate::settings::transfer_function::TransferFunction;
+use crate::settings::window::Window;
 use crate::stats::Counts;
 use crate::volume::Volume;
 
@@ -89,24 +92,32 @@ pub(super) fn render_for(
 ) -> Result<Culled, RenderError> {
     let frame = Frame::new(volume, transfer, scene)?;
     host.check(scene)?;
-    let mut picture = Picture::new(&frame, scene, host, test);
-    if scene.splatting.method == Method::CompositeEverySample {
-        picture.composite_every_sample();
-    }
-    for (k, bucket) in picture.buckets() {
-        let sections = picture.cull(frame.sections(&bucket, k), k);
-        let sheet = picture.splat(&sections, k);
-        picture.composite(&sheet, k);
-    }
+    let picture = Picture::drawn(&frame, scene, (host, Window::ALL_SLABS), test);
     let image = resolve::resolve(&picture.acc, picture.compositing, scene.image.background).into_image();
     let Picture { sections, areas, first_hits, .. } = picture;
     let first_hits = first_hits.map_or(Vec::new(), |hits| hits.depths(&frame.geometry));
     Ok(Culled { image, sections, areas, first_hits })
 }
 
+/// See [`super::part`].
+pub(super) fn part(
+    volume: &Volume,
+    transfer: &TransferFunction,
+    scene: &Scene,
+    Window { slabs, region }: &Window,
+) -> Result<Content, RenderError> {
+    let frame = Frame::new(volume, transfer, scene)?;
+    let acc = Picture::drawn(&frame, scene, (Host::default(), slabs.clone()), None).acc;
+    let rows = acc.pixels.chunks(acc.width).skip(region.rows().start).take(region.rows().len());
+    let colors = rows.flat_map(|row| &row[region.columns()]).map(|pixel| pixel.as_vec4().to_array());
+    Ok(Content { colors: colors.collect(), extremes: Vec::new() })
+}
+
 /// A frame while it is drawn.
 struct Picture<'a> {
     frame: &'a Frame,
+    /// The slabs that are drawn.
+    slabs: Range<i32>,
     compositing: Compositing,
     order: Order,
     /// The culling test, if anything is culled, and the opacity from which a pixel counts as opaque.
@@ -124,16 +135,34 @@ struct Picture<'a> {
 }
 
 impl<'a> Picture<'a> {
+    /// A picture with all its sheets.
+    fn drawn(frame: &'a Frame, scene: &Scene, of: (Host<'_>, Range<i32>), test: Option<Test>) -> Self {
+        let mut picture = Self::new(frame, scene, of, test);
+        if scene.splatting.method == Method::CompositeEverySample {
+            picture.composite_every_sample();
+        }
+        for (k, bucket) in picture.buckets() {
+            let sections = picture.cull(frame.sections(&bucket, k), k);
+            let sheet = picture.splat(&sections, k);
+            picture.composite(&sheet, k);
+        }
+        picture
+    }
+
     /// An empty picture.
-    fn new(frame: &'a Frame, scene: &Scene, host: Host<'_>, test: Option<Test>) -> Self {
+    fn new(frame: &'a Frame, scene: &Scene, (host, slabs): (Host<'_>, Range<i32>), test: Option<Test>) -> Self {
         let (compositing, order) = (scene.splatting.compositing, scene.splatting.order);
         // While no surface has been reached, alpha is below one half; a surface itself is opaque.
         let threshold = if compositing == Compositing::Surface { 1.0 } else { scene.splatting.opacity_threshold };
         let test = test.filter(|_| order == Order::FrontToBack && compositing.hides());
         let is_cut = host.surfaces.is_some() || !scene.clip.is_empty();
         let geometry = &frame.geometry;
+        let Range { start, end } = slabs;
+        // A surface may begin to rise in the slab before.
+        let start = if compositing == Compositing::Surface && start < end { start - 1 } else { start };
         Self {
             frame,
+            slabs: start..end,
             compositing,
             order,
             test: test.map(|test| (test, threshold)),
@@ -169,9 +198,10 @@ impl<'a> Picture<'a> {
                 buckets.entry(k).or_default();
             }
         }
+        let drawn = buckets.into_iter().filter(|(k, _)| self.slabs.contains(k));
         match self.order {
-            Order::FrontToBack => buckets.into_iter().collect(),
-            Order::BackToFront => buckets.into_iter().rev().collect(),
+            Order::FrontToBack => drawn.collect(),
+            Order::BackToFront => drawn.rev().collect(),
         }
     }
 

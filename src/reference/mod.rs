@@ -21,9 +21,11 @@ use glam::DVec4;
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::image::Image;
+use crate::part::Content;
 use crate::scene::Scene;
 use crate::settings::splatting::{Classification, check_first_hit};
 use crate::settings::transfer_function::TransferFunction;
+use crate::settings::window::Window;
 use crate::stats::Counts;
 use crate::volume::Volume;
 
@@ -147,4 +149,21 @@ pub fn render_for(
         return after::render_for(host, volume, transfer, scene);
     }
     before::render_for(host, volume, transfer, scene, test)
+}
+
+/// The pixels of a part of a scene's image, before the background (SPEC §11). Nothing is culled. The window has no end where it reaches an end
+/// of the scene.
+///
+/// # Errors
+/// If the scene needs more than can be computed.
+pub fn part(
+    volume: &Volume,
+    transfer: &TransferFunction,
+    scene: &Scene,
+    window: &Window,
+) -> Result<Content, RenderError> {
+    if scene.classification(volume) == Classification::After {
+        return after::part(volume, transfer, scene, window);
+    }
+    before::part(volume, transfer, scene, window)
 }

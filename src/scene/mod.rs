@@ -1,7 +1,7 @@
 //! Scenes: what an image shows and how, from a scene file, from `--set` overrides, or from a volume alone (SPEC §7).
 
 mod check;
-mod names;
+pub(crate) mod names;
 mod reader;
 mod tables;
 mod writer;

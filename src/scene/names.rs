@@ -7,12 +7,12 @@ use crate::settings::splatting::{
 };
 
 pub(super) const FITS: &[(&str, Fit)] = &[("volume", Fit::Volume), ("object", Fit::Object)];
-pub(super) const METHODS: &[(&str, Method)] = &[
+pub(crate) const METHODS: &[(&str, Method)] = &[
     ("image-aligned", Method::ImageAligned),
     ("axis-aligned", Method::AxisAligned),
     ("composite-every-sample", Method::CompositeEverySample),
 ];
-pub(super) const CLASSIFICATIONS: &[(&str, Classification)] =
+pub(crate) const CLASSIFICATIONS: &[(&str, Classification)] =
     &[("before", Classification::Before), ("after", Classification::After)];
 pub(super) const INTERPOLATIONS: &[(&str, Interpolation)] =
     &[("smooth", Interpolation::Smooth), ("exact", Interpolation::Exact)];
@@ -20,7 +20,7 @@ pub(super) const GRADIENTS: &[(&str, Gradient)] =
     &[("differences", Gradient::Differences), ("kernel", Gradient::Kernel)];
 pub(super) const FORMS: &[(&str, FootprintForm)] =
     &[("summed-area", FootprintForm::SummedArea), ("sections", FootprintForm::Sections)];
-pub(super) const COMPOSITINGS: &[(&str, Compositing)] = &[
+pub(crate) const COMPOSITINGS: &[(&str, Compositing)] = &[
     ("linear", Compositing::Linear),
     ("exponential", Compositing::Exponential),
     ("xray", Compositing::Xray),
@@ -31,7 +31,7 @@ pub(super) const COMPOSITINGS: &[(&str, Compositing)] = &[
 ];
 /// Whether the most significant byte of a sample comes first.
 pub(super) const ENDIANS: &[(&str, bool)] = &[("little", false), ("big", true)];
-pub(super) const ORDERS: &[(&str, Order)] =
+pub(crate) const ORDERS: &[(&str, Order)] =
     &[("front-to-back", Order::FrontToBack), ("back-to-front", Order::BackToFront)];
 pub(super) const RASTERIZERS: &[(&str, Rasterizer)] =
     &[("auto", Rasterizer::Auto), ("quads", Rasterizer::Quads), ("tiles", Rasterizer::Tiles)];
@@ -39,6 +39,6 @@ pub(super) const BOXES: &[(&str, FootprintBox)] =
     &[("rectangle", FootprintBox::Rectangle), ("parallelogram", FootprintBox::Parallelogram)];
 
 /// The name of a choice.
-pub(super) fn name_of<T: Copy + PartialEq>(choices: &[(&'static str, T)], choice: T) -> &'static str {
+pub(crate) fn name_of<T: Copy + PartialEq>(choices: &[(&'static str, T)], choice: T) -> &'static str {
     choices.iter().find(|(_, other)| *other == choice).map_or("", |(name, _)| name)
 }

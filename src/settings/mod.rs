@@ -13,6 +13,7 @@ pub(crate) mod framing;
 pub(crate) mod shading;
 pub(crate) mod splatting;
 pub(crate) mod transfer_function;
+pub(crate) mod window;
 
 pub use crate::error::setting::{Allowed, Found, Interval};
 pub use camera::{Camera, Fit, Projection};
@@ -24,3 +25,4 @@ pub use splatting::{
     Classification, Compositing, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer, Splatting,
 };
 pub use transfer_function::{LabelTables, Ramp, RampError, Tables, TransferFunction};
+pub use window::{Region, Window};

@@ -21,8 +21,8 @@ mod mgh;
 mod nifti;
 #[cfg(any(feature = "codecs", feature = "npy"))]
 pub(crate) mod npy;
-#[cfg(feature = "npy")]
-mod npz;
+#[cfg(any(feature = "codecs", feature = "npy"))]
+pub(crate) mod npz;
 mod nrrd;
 mod numbers;
 mod orientation;

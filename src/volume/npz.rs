@@ -11,24 +11,29 @@ use flate2::bufread::DeflateDecoder;
 
 use super::VolumeError;
 use super::access::Access;
+#[cfg(feature = "npy")]
 use super::format::archive_and_array;
 use super::loaded::Loaded;
 use super::npy;
 use super::samples::{MAX_EXPANSION, Stream, Voxel};
-use super::source::{Source, invalid, io_error, shown};
+#[cfg(feature = "npy")]
+use super::source::shown;
+use super::source::{Source, invalid, io_error};
 
 /// The size of the directory's end record without its comment, and the maximum length of the comment.
 const END: u64 = 22;
 const MAX_COMMENT: u64 = 0xffff;
 
 /// The maximum number of names shown in an error.
+#[cfg(feature = "npy")]
 const SHOWN: usize = 12;
 
 /// Reads the only array of a file, or the one that the path names after a colon: `file.npz:name`.
+#[cfg(feature = "npy")]
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let (archive, wanted) = archive_and_array(path);
     let mut file = access.open(archive)?;
-    let members = Directory::read(&mut file)?.arrays(&mut file)?;
+    let members = Directory::read(&mut file)?.members(&mut file, ".npy")?;
     let names = || {
         let names = members.iter().take(SHOWN).map(|member| shown(member.array_name()));
         let more = if members.len() > SHOWN { ", …" } else { "" };
@@ -50,6 +55,28 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
             .ok_or_else(|| invalid(path, "arrays", names(), format!("an array called {}", shown(name))))?,
     };
     npy::read_array(path, member.open(file)?)
+}
+
+/// Reads the text of one file of an archive, of at most `most` bytes, and one array.
+#[cfg(feature = "codecs")]
+pub(crate) fn read_text_and_array<T: Voxel>(
+    path: &Path,
+    (text, most): (&str, u64),
+    array: &str,
+    access: &Access,
+) -> Result<(String, Loaded<T>), VolumeError> {
+    let mut file = access.open(path)?;
+    let directory = Directory::read(&mut file)?;
+    let mut member = |name: &str| {
+        let found = directory.members(&mut file, name)?.into_iter().find(|member| member.name == name);
+        found.ok_or_else(|| invalid(path, "archive", "none with this name", format!("a file {name} in it")))
+    };
+    let (text, array) = (member(text)?, member(array)?);
+    if text.bytes > most {
+        return Err(invalid(path, &text.name, format!("{} bytes", text.bytes), format!("at most {most} bytes")));
+    }
+    let bytes = text.open(file)?.bytes(text.bytes)?;
+    Ok((String::from_utf8_lossy(&bytes).into_owned(), npy::read_array(path, array.open(access.open(path)?)?)?))
 }
 
 /// Where an archive lists its files.
@@ -81,8 +108,8 @@ impl Directory {
         Ok(Self { at: number(&end, 48, 8), files: number(&end, 32, 8) })
     }
 
-    /// The files that are arrays.
-    fn arrays(&self, file: &mut Source) -> Result<Vec<Member>, VolumeError> {
+    /// The files whose names end in some way.
+    fn members(&self, file: &mut Source, end: &str) -> Result<Vec<Member>, VolumeError> {
         let (mut at, mut members) = (self.at, Vec::new());
         for _ in 0..self.files {
             let entry = bytes_at(file, at, 46)?;
@@ -103,7 +130,7 @@ impl Directory {
                 at: number(&entry, 42, 4),
             };
             member.widen(extra_bytes).ok_or_else(|| damaged(file))?;
-            if member.name.ends_with(".npy") {
+            if member.name.ends_with(end) {
                 members.push(member);
             }
         }
@@ -124,6 +151,7 @@ struct Member {
 
 impl Member {
     /// The name in NumPy.
+    #[cfg(feature = "npy")]
     fn array_name(&self) -> &str {
         self.name.strip_suffix(".npy").unwrap_or(&self.name)
     }

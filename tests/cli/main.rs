@@ -17,6 +17,7 @@ mod inputs;
 mod looks;
 mod orbit;
 mod outputs;
+mod parts;
 mod program;
 mod rasterizers;
 mod statistics;

@@ -222,6 +222,14 @@ impl Input {
         Ok(headless)
     }
 
+    /// What draws parts of a scene's image: without a choice of backend or adapter not a GPU, which draws no parts yet.
+    pub(crate) fn headless_for_parts(&self, scene: &Scene) -> Result<Headless, Failure> {
+        let backend = if self.backend == Backend::Auto && self.adapter.is_none() { Backend::Cpu } else { self.backend };
+        let mut options = HeadlessOptions::default().with_backend(backend);
+        options.adapter = self.adapter.clone();
+        Headless::for_scenes(&options, [scene]).map_err(|error| Failure::Other(error.to_string()))
+    }
+
     pub(crate) fn failure(&self, error: impl Into<Error>) -> Failure {
         Failure::of(error.into(), &self.name)
     }

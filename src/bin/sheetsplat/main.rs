@@ -13,6 +13,7 @@ mod info;
 mod interrupt;
 mod orbit;
 mod outputs;
+mod parts;
 mod progress;
 mod reading;
 mod render;
@@ -61,6 +62,10 @@ enum Command {
     Sweep(sweep::Arguments),
     /// Time a first frame and turning frames, and print one line of JSON.
     Bench(bench::Arguments),
+    /// Merge parts, drawn by render --slabs and --region, into the image.
+    Merge(parts::merge::Arguments),
+    /// Print --slabs and --region of parts that take about equal time, a line for each.
+    Split(parts::split::Arguments),
     /// Compare two images and print the differences; exit code 1 if they exceed the tolerance.
     Compare(compare::Arguments),
     /// Describe a volume: format, size, unit, orientation, and the distribution of its values.
@@ -92,6 +97,8 @@ fn main() -> ExitCode {
         Command::Orbit(arguments) => orbit::run(&arguments, progress),
         Command::Sweep(arguments) => sweep::run(&arguments, progress),
         Command::Bench(arguments) => bench::run(&arguments),
+        Command::Merge(arguments) => parts::merge::run(&arguments),
+        Command::Split(arguments) => parts::split::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Adapters(arguments) => adapters::run(&arguments),

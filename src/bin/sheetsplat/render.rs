@@ -12,6 +12,7 @@ use crate::annotate::Annotate;
 use crate::arguments::{Depth, Input, check_scene_file, log_frame, scene_file};
 use crate::failure::Failure;
 use crate::outputs::{self, Outputs};
+use crate::parts::Part;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -21,11 +22,12 @@ Examples:
   sheetsplat render ct.nii.gz -o face.png --view front
   sheetsplat render ct.raw -o ct.png --dims 256,256,113 --type uint16 --endian big
   sheetsplat render ct.nrrd -o skull.png --preset ct-bone --annotate scale --save-scene skull.toml
-  sheetsplat render cells.nrrd -o cells.png --preset confocal --colormap magma --annotate scale,colors")]
+  sheetsplat render cells.nrrd -o cells.png --preset confocal --colormap magma --annotate scale,colors
+  sheetsplat render scene.toml -o part.exr --slabs 0..64 --region 0,0,512,256")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
-    /// The image: .png, .exr or .npy.
+    /// The image: .png, .exr or .npy; a part of it: .exr or .npz.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Bits per channel of a PNG.
@@ -39,6 +41,8 @@ pub(crate) struct Arguments {
     save_scene: Option<PathBuf>,
     #[command(flatten)]
     annotate: Annotate,
+    #[command(flatten)]
+    part: Part,
     /// Time every stage on the GPU, where the adapter has timestamp queries: stages_ms in the statistics, and printed.
     #[arg(long)]
     profile: bool,
@@ -47,6 +51,11 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let Arguments { input, output, stats: stats_file, save_scene, .. } = arguments;
     check_files(arguments)?;
+    // Like a frame of `orbit`, a part is drawn once.
+    if arguments.part.is_done(output) {
+        log::info!("{}: there already", output.display());
+        return Ok(());
+    }
     let scene = input.scene()?;
     let mut named = vec![("--output", output.as_path())];
     named.extend(stats_file.as_deref().map(|path| ("--stats", path)));
@@ -60,13 +69,22 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let explicit_ms = start.elapsed().as_secs_f64() * 1e3;
     let overlay = arguments.annotate.overlay(&scene, &volume)?;
     let volume = Arc::new(volume);
-    let rendering = input.headless(arguments.profile, [&scene])?.render_volume(volume, &scene);
-    let Rendering { mut image, mut stats } = rendering.map_err(|error| input.failure(error))?;
+    let (bytes, mut stats) = match arguments.part.window(&scene) {
+        Some(window) => {
+            let (part, stats) = arguments.part.draw(input, volume, &scene, &window)?;
+            (part.encode(output)?, stats)
+        }
+        None => {
+            let rendering = input.headless(arguments.profile, [&scene])?.render_volume(volume, &scene);
+            let Rendering { mut image, stats } = rendering.map_err(|error| input.failure(error))?;
+            overlay.draw(&mut image);
+            (image.encode(output, arguments.depth.into())?, stats)
+        }
+    };
     stats.load_ms = load_ms;
     stats.prepare_ms += explicit_ms;
     log_frame(&output.display().to_string(), &stats);
-    overlay.draw(&mut image);
-    let mut files = vec![(output.as_path(), image.encode(output, arguments.depth.into())?)];
+    let mut files = vec![(output.as_path(), bytes)];
     if let Some(path) = stats_file {
         let json = serde_json::to_string_pretty(&stats).map_err(|error| Failure::Other(error.to_string()))?;
         files.push((path, (json + "\n").into_bytes()));
@@ -85,7 +103,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 /// Checks the extensions of the files to be written.
 fn check_files(arguments: &Arguments) -> Result<(), Failure> {
     let Arguments { output, save_scene, .. } = arguments;
-    Image::check_format(output)?;
-    arguments.annotate.check_format(output)?;
+    if arguments.part.is_empty() {
+        Image::check_format(output)?;
+        arguments.annotate.check_format(output)?;
+    } else {
+        arguments.part.check(output, !arguments.annotate.is_empty())?;
+    }
     save_scene.as_deref().map_or(Ok(()), check_scene_file)
 }

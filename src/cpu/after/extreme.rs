@@ -6,8 +6,10 @@ use fearless_simd::{f32x8, mask32x8};
 use super::classify::{Looks, mask};
 use super::frame::Frame;
 use super::planes::Plane;
+use crate::cpu::cut::TileRays;
 use crate::cpu::sheets::{Buffers, COLUMNS, ROWS};
 use crate::cpu::vector::LANES;
+use crate::part::Extreme;
 use crate::settings::splatting::Compositing;
 
 /// The choice of a row's pixels: number, gradient, and place among slabs; the weight is 0 where nothing was chosen.
@@ -41,6 +43,32 @@ impl Chosen {
     pub(super) fn clear(&mut self) {
         self.best.fill(NOTHING);
         self.middle.fill([NOTHING; 2]);
+    }
+
+    /// The chosen values in the range of the coefficients, row by row (SPEC §11).
+    pub(super) fn extremes(&self, frame: &Frame<'_>, rays: &TileRays) -> Vec<Extreme> {
+        let [low, high] = frame.coefficients.numbers.range;
+        let span = if high > low { high - low } else { 1.0 };
+        let of = |row: usize, at: usize| {
+            let (best, [near, far]) = (&self.best[row], &self.middle[row]);
+            let extreme = |number: f32, counted| Extreme { value: (number - low) / span, counted };
+            if best.weight[at] > 0.0 {
+                return extreme(best.number[at], Extreme::POINT);
+            }
+            let Some(shown) = &rays.shown else { return Extreme::default() };
+            let [start, end] = [shown[row][0][at], shown[row][1][at]];
+            let (first, second) = match (near.weight[at] > 0.0, far.weight[at] > 0.0) {
+                _ if start >= end => return Extreme::default(),
+                (true, true) => (near.number[at], far.number[at]),
+                (true, false) => (near.number[at], near.number[at]),
+                (false, true) => (far.number[at], far.number[at]),
+                (false, false) => return Extreme::default(),
+            };
+            let middle = (start + end) * 0.5;
+            extreme(first + (second - first) * (middle - middle.floor()), Extreme::MIDDLE)
+        };
+        let rows = 0..self.best.len();
+        rows.flat_map(|row| (0..COLUMNS).map(move |at| (row, at))).map(|(row, at)| of(row, at)).collect()
     }
 }
 
@@ -99,10 +127,16 @@ impl Frame<'_> {
         let has_value = values.simd_eq(values) & mask(simd, lanes);
         let here = f32x8::splat(simd, looks.rays.begin(plane.number));
         let stretch = looks.stretch(simd, [column, row]);
-        let counts = stretch[0].simd_le(here) & here.simd_le(stretch[1]) & has_value;
+        // Plane k belongs to slab k; it is before that slab and behind slab k - 1.
+        let is_drawn = mask(simd, if self.slabs.contains(&plane.number) { u32::from(u8::MAX) } else { 0 });
+        let counts = stretch[0].simd_le(here) & here.simd_le(stretch[1]) & has_value & is_drawn;
         let better = self.is_better(simd, &chosen.best[row], column, values) & counts;
         let [slab, _] = middle_of(stretch);
-        let middles = [0.0, 1.0].map(|offset| (slab + offset).simd_eq(here) & has_value);
+        let middles = [0, 1].map(|behind| {
+            let is_drawn =
+                mask(simd, if self.slabs.contains(&(plane.number - behind)) { u32::from(u8::MAX) } else { 0 });
+            (slab + behind as f32).simd_eq(here) & has_value & is_drawn
+        });
         let is_needed = (better | middles[0] | middles[1]).to_bitmask() as u32;
         let mut gradient = [f32x8::splat(simd, 0.0); 3];
         if self.needs_gradients && self.compositing != Compositing::Average {

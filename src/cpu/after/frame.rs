@@ -8,6 +8,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::coefficients::Coefficients;
+use super::extreme::is_choice;
 use super::field::Field;
 use super::low_pass::LowPass;
 use super::place::Placement;
@@ -18,20 +19,21 @@ use crate::cpu::bin;
 use crate::cpu::composite::Compositor;
 use crate::cpu::cut::{RayMode, TileRays};
 use crate::cpu::first_hit;
-use crate::cpu::frame::{Drawing, Host, Tile, draw_tiles};
-use crate::cpu::resolve::Resolver;
+use crate::cpu::frame::{Drawing, Host, Outputs, Tile, draw_tiles};
+use crate::cpu::resolve;
 use crate::cpu::shade::Shader;
 use crate::cpu::sheets::{COLUMNS, ROWS};
 use crate::geometry::view_geometry::ViewGeometry;
 
-use crate::image::Image;
 use crate::lists::brick;
 use crate::lists::brick::Brick;
+use crate::part::Resolver;
 use crate::scene::Scene;
 use crate::settings::clip::HalfSpace;
 use crate::settings::shading::MIN_GRADIENT;
-use crate::settings::splatting::{Compositing, Order};
+use crate::settings::splatting::{Classification, Compositing, Order};
 use crate::settings::transfer_function::TransferFunction;
+use crate::settings::window::{Region, Window};
 use crate::stats::Counts;
 use crate::volume::Volume;
 
@@ -67,7 +69,12 @@ pub(in crate::cpu) struct Frame<'a> {
     pub(super) to_eye: [f32; 3],
     /// The slabs whose sheets may hold anything.
     pub(super) touched: Range<i32>,
-    resolver: Resolver,
+    /// The slabs that are drawn.
+    pub(super) slabs: Range<i32>,
+    /// The pixels that are drawn.
+    pub(super) region: Region,
+    /// `None` for a part of an image.
+    resolver: Option<Resolver>,
 }
 
 /// A brick in whose cells rays may enter a slab with an opacity.
@@ -85,10 +92,11 @@ impl<'a> Frame<'a> {
         coefficients: &'a Coefficients,
         scene: &Scene,
         view: ViewGeometry,
-        Host { first_hit, surfaces }: Host,
+        Host { window, first_hit, surfaces }: Host,
     ) -> Self {
         let (splatting, shading, grid) = (&scene.splatting, &scene.shading, volume.grid());
-        let placement = Placement::new(view, grid);
+        let Window { slabs, region } = window.clone().unwrap_or_else(|| Window::whole(view.size));
+        let placement = Placement::new(view, grid, &slabs);
         let (numbers, shown) = (coefficients.numbers, coefficients.bricks());
         let can_hide = splatting.compositing.hides() && splatting.order == Order::FrontToBack;
         let tables = volume.labels().map(|_| transfer.labels.keys()).into_iter().flatten();
@@ -98,9 +106,6 @@ impl<'a> Frame<'a> {
         for &brick in coefficients.wanted() {
             drawn[brick as usize].store(WANTED, Ordering::Relaxed);
         }
-        // Sums are clamped; everything else is premultiplied RGBA already.
-        let resolved_as =
-            if splatting.compositing == Compositing::Xray { Compositing::Xray } else { Compositing::Linear };
         Self {
             volume,
             transfer,
@@ -132,7 +137,11 @@ impl<'a> Frame<'a> {
             labels: volume.labels().is_some() && !transfer.labels.is_empty(),
             to_eye: (-view.basis.w).to_array().map(|component| component as f32),
             touched: touched(&placement, shown),
-            resolver: Resolver::new(resolved_as, scene.image.background),
+            slabs,
+            region,
+            resolver: window
+                .is_none()
+                .then(|| Resolver::new(splatting.compositing, Classification::After, scene.image.background)),
             placement,
         }
     }
@@ -161,20 +170,22 @@ impl<'a> Frame<'a> {
         let size = self.placement.view.size;
         let placed = self.placement.place_bricks(self.coefficients.wanted());
         let has_hits = self.compositor.first_hit.is_some();
-        let (pixels, first_hits, tally) = draw_tiles(
-            size,
-            has_hits,
+        let has_extremes = self.resolver.is_none() && is_choice(self.compositing);
+        let (content, first_hits, tally) = draw_tiles(
+            (size, &self.region),
+            Outputs { has_hits, has_extremes },
             &placed,
             || TileWalk::new(self),
             |walk, origin, bricks| {
                 let (buffers, rays, tally) = dispatch!(level, simd => walk.draw(simd, origin, &placed, bricks));
-                let pixels = self.resolver.tile(buffers);
+                let pixels = resolve::tile(self.resolver.as_ref(), buffers);
                 let unit = self.volume.grid().unit();
                 let first_hits = match has_hits {
                     true => first_hit::depths(buffers, rays, &self.rays.rays, origin, unit),
                     false => Vec::new(),
                 };
-                Tile { pixels, first_hits, tally }
+                let extremes = if has_extremes { walk.extremes() } else { Vec::new() };
+                Tile { pixels, extremes, first_hits, tally }
             },
         );
         let [columns, rows] = bin::tile_grid(size);
@@ -191,8 +202,7 @@ impl<'a> Frame<'a> {
             bricks_visited: tally.bricks_visited,
             ..Counts::default()
         };
-        let [width, height] = size;
-        Drawing { image: Image { width, height, pixels }, counts, first_hits }
+        Drawing { content, counts, first_hits }
     }
 
     /// Records that a tile draws one of the grid's bricks.

@@ -24,6 +24,8 @@ pub(super) struct Placement {
     pub(super) geometry: PlaneGeometry,
     pub(super) view: ViewGeometry,
     grid: Grid,
+    /// The slabs that are drawn.
+    drawn: Range<i32>,
     /// The longest step from plane to plane on any ray, in voxels.
     slab_step: DVec3,
     /// Planes that a kernel reaches to either side of its voxel.
@@ -36,7 +38,8 @@ pub(super) struct Placement {
 pub(super) type ScreenBox = [DVec2; 2];
 
 impl Placement {
-    pub(super) fn new(view: ViewGeometry, grid: &Grid) -> Self {
+    /// The grid before some slabs of a view.
+    pub(super) fn new(view: ViewGeometry, grid: &Grid, slabs: &Range<i32>) -> Self {
         let geometry = PlaneGeometry::new(&view, grid);
         let row = view.screen_from_voxel[2].truncate() / view.slabs.width;
         Self {
@@ -44,6 +47,7 @@ impl Placement {
             reach: view.radius / (geometry.per_depth * view.slabs.width),
             depths: std::array::from_fn(|slot| row.dot(brick::in_brick(slot as u32).as_dvec3())),
             grid: *grid,
+            drawn: slabs.clone(),
             geometry,
             view,
         }
@@ -67,7 +71,7 @@ impl Placement {
         of_voxels.map(|count| count as u64).sum()
     }
 
-    /// The pixels that the cells of a brick's voxels may be on, and the slabs. A brick at the volume's border has the points before it too that
+    /// The pixels that the cells of a brick's voxels may be on, and the slabs, of those that are drawn. A brick at the volume's border has the points before it too that
     /// are nearest to it, up to a slab away.
     pub(super) fn bounds(&self, brick: UVec3) -> (ScreenBox, Range<i32>) {
         let (low, dims) = (brick * brick::SIDE, self.grid.dims);
@@ -82,7 +86,8 @@ impl Placement {
         let slabs =
             [depth - spread, depth + spread].map(|depth| (depth - self.view.slabs.origin) / self.view.slabs.width);
         let nearest = if self.view.perspective.is_some() { 0 } else { i32::MIN };
-        let slabs = floor(slabs[0] - SLACK).max(nearest)..floor(slabs[1] + SLACK) + 1;
+        let (first, end) = (floor(slabs[0] - SLACK).max(nearest), floor(slabs[1] + SLACK) + 1);
+        let slabs = first.max(self.drawn.start)..end.min(self.drawn.end);
         let (at, across) = (DVec2::new(x, y), DVec2::new(dx, dy));
         let ends = [from_eye - eye_spread, from_eye + eye_spread];
         if ends[0] <= 1e-6 * ends[1] {

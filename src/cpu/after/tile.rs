@@ -16,6 +16,7 @@ use crate::cpu::cull::{OpenMask, Pixels, columns_between};
 use crate::cpu::cut::TileRays;
 use crate::cpu::project::floor;
 use crate::cpu::sheets::{Buffers, COLUMNS, ROWS};
+use crate::part::Extreme;
 use crate::settings::splatting::Compositing;
 
 /// The state with which a thread draws one tile after another.
@@ -62,6 +63,7 @@ impl<'a> TileWalk<'a> {
     ) -> (&Buffers, &TileRays, Tally) {
         let mut bricks = bricks.iter().map(|&at| &placed[at as usize]).peekable();
         self.buffers.clear();
+        self.chosen.clear();
         self.tally = Tally::default();
         if let Some(first) = bricks.peek().map(|placed| placed.first) {
             self.reset(origin, first);
@@ -74,17 +76,22 @@ impl<'a> TileWalk<'a> {
         (&self.buffers, &self.rays, self.tally)
     }
 
+    /// The values that the tile's pixels chose, row by row.
+    pub(super) fn extremes(&self) -> Vec<Extreme> {
+        self.chosen.extremes(self.frame, &self.rays)
+    }
+
     /// Prepares the walk through a tile, which begins with a slab.
     fn reset(&mut self, origin: [usize; 2], slab: i32) {
         let [width, height] = self.frame.placement.view.size.map(|side| side as usize);
         self.origin = origin;
         self.open = OpenMask::new((width - origin[0]).min(COLUMNS), (height - origin[1]).min(ROWS));
+        self.open.close_outside(&self.frame.region, origin);
         (self.rays, self.to_eye) = self.frame.rays_of_tile(origin, slab);
         if let (Some(shown), Some(_)) = (&self.rays.shown, self.frame.compositor.threshold) {
             self.open.close_empty(shown);
         }
         self.planes[1].become_plane(slab, self.frame.points(slab, origin));
-        self.chosen.clear();
         self.active.clear();
     }
 

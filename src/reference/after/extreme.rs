@@ -3,6 +3,7 @@
 use glam::{DVec3, DVec4};
 
 use super::pixel::{Composited, Pixel};
+use crate::part::Extreme;
 use crate::reference::shading;
 use crate::settings::splatting::Compositing;
 
@@ -11,6 +12,8 @@ struct Point {
     sheet: f64,
     value: f64,
     gradient: DVec3,
+    /// As in [`Extreme::counted`].
+    counted: f32,
 }
 
 /// The pixel of its chosen value. Its first hit is the chosen point, or for `average` the middle of the stretch, if the opacity reaches
@@ -23,9 +26,11 @@ pub(super) fn composite(pixel: &Pixel) -> Composited {
         Compositing::Average => average(pixel),
         _ => extreme(pixel, compositing == Compositing::Minimum),
     };
-    let Some(Point { sheet, value, gradient }) = chosen else {
-        return Composited { color: DVec4::ZERO, first_hit: None };
+    let Some(Point { sheet, value, gradient, counted }) = chosen else {
+        return Composited::new(DVec4::ZERO, None);
     };
+    let [min, max] = pixel.frame().field.range();
+    let share = if max > min { (value - min) / (max - min) } else { 0.0 };
     let tables = pixel.tables(sheet);
     let base = tables.color.at(value);
     let color = if compositing == Compositing::Average {
@@ -36,13 +41,15 @@ pub(super) fn composite(pixel: &Pixel) -> Composited {
         shading::color(&scene.shading, base, gradient, pixel.to_eye()).extend(1.0) * alpha
     };
     let first_hit = pixel.frame().host.first_hit.filter(|&opacity| color.w >= opacity).map(|_| sheet);
-    Composited { color, first_hit }
+    Composited { color, first_hit, extreme: Extreme { value: share as f32, counted } }
 }
 
-/// The planes' points within the stretch that have a value, each as plane and value.
+/// The planes' points within the stretch that have a value, of those that are drawn, each as plane and value. The plane before a slab belongs
+/// to that slab.
 fn points<'a>(pixel: &'a Pixel) -> impl Iterator<Item = (i32, f64)> + 'a {
     let planes = pixel.stretch().start.ceil() as i32..=pixel.stretch().end.floor() as i32;
-    planes.filter_map(|plane| pixel.value(plane).map(|value| (plane, value)))
+    let drawn = &pixel.frame().slabs;
+    planes.filter(move |plane| drawn.contains(plane)).filter_map(|plane| pixel.value(plane).map(|value| (plane, value)))
 }
 
 /// Values that differ by less, relative to the range of the coefficients, count as equal: in homogeneous matter only rounding tells them apart.
@@ -58,7 +65,7 @@ fn extreme(pixel: &Pixel, is_minimum: bool) -> Option<Point> {
     };
     let Some((plane, _)) = points(pixel).reduce(nearest) else { return middle(pixel) };
     let value = points(pixel).map(|(_, value)| value).reduce(if is_minimum { f64::min } else { f64::max })?;
-    Some(Point { sheet: plane.into(), value, gradient: pixel.gradient(plane) })
+    Some(Point { sheet: plane.into(), value, gradient: pixel.gradient(plane), counted: Extreme::POINT })
 }
 
 /// The mean value, placed in the middle of the stretch.
@@ -68,13 +75,15 @@ fn average(pixel: &Pixel) -> Option<Point> {
         return middle(pixel);
     }
     let stretch = pixel.stretch();
-    Some(Point { sheet: (stretch.start + stretch.end) / 2.0, value: sum / count, gradient: DVec3::ZERO })
+    let sheet = (stretch.start + stretch.end) / 2.0;
+    Some(Point { sheet, value: sum / count, gradient: DVec3::ZERO, counted: Extreme::POINT })
 }
 
 /// If the stretch contains no plane's value: the point in its middle, on the line of values of the slab there.
 fn middle(pixel: &Pixel) -> Option<Point> {
     let sheet = (pixel.stretch().start + pixel.stretch().end) / 2.0;
-    let slab = pixel.slab(sheet.floor() as i32)?;
+    let number = sheet.floor() as i32;
+    let slab = pixel.slab(number).filter(|_| pixel.frame().slabs.contains(&number))?;
     let (share, [f0, f1], [near, far]) = (sheet - sheet.floor(), slab.values, pixel.gradients(&slab));
-    Some(Point { sheet, value: f0 + (f1 - f0) * share, gradient: near.lerp(far, share) })
+    Some(Point { sheet, value: f0 + (f1 - f0) * share, gradient: near.lerp(far, share), counted: Extreme::MIDDLE })
 }

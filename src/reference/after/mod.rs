@@ -24,14 +24,18 @@ pub mod pixel;
 pub mod slab_integral;
 mod surface;
 
+use std::ops::Range;
+
 use glam::{DVec3, UVec2};
 use rayon::prelude::*;
 
 use super::{Areas, Buffer, Culled, Geometry, Host, resolve};
 use crate::error::RenderError;
+use crate::part::Content;
 use crate::scene::Scene;
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::TransferFunction;
+use crate::settings::window::{Region, Window};
 use crate::volume::Volume;
 
 pub use counts::count;
@@ -46,6 +50,8 @@ pub struct Frame<'a> {
     transfer: &'a TransferFunction,
     scene: Scene,
     host: Host<'a>,
+    /// The slabs that are drawn.
+    slabs: Range<i32>,
     geometry: Geometry,
     field: Field<'a>,
 }
@@ -65,7 +71,7 @@ impl<'a> Frame<'a> {
         let scene = scene.framed(volume, transfer);
         let geometry = Geometry::new(volume.grid(), &scene)?;
         let field = Field::new(volume, &scene)?;
-        Ok(Self { volume, transfer, scene, host, geometry, field })
+        Ok(Self { volume, transfer, scene, host, slabs: Window::ALL_SLABS, geometry, field })
     }
 
     /// The view's geometry.
@@ -119,10 +125,29 @@ impl<'a> Frame<'a> {
     }
 
     fn each_pixel<T: Send>(&self, of: impl Fn(Pixel) -> T + Sync) -> Vec<T> {
-        let [width, height] = self.geometry.size.as_uvec2().to_array();
-        let pixels = (0..width * height).into_par_iter();
-        pixels.map(|at| of(self.pixel(UVec2::new(at % width, at / width)))).collect()
+        self.each_pixel_in(&Region::whole(self.geometry.size.as_uvec2().to_array()), of)
     }
+
+    fn each_pixel_in<T: Send>(&self, region: &Region, of: impl Fn(Pixel) -> T + Sync) -> Vec<T> {
+        let Region { x, y, width, height } = *region;
+        let pixels = (0..width * height).into_par_iter();
+        pixels.map(|at| of(self.pixel(UVec2::new(x + at % width, y + at / width)))).collect()
+    }
+}
+
+/// See [`super::part`].
+pub(super) fn part(
+    volume: &Volume,
+    transfer: &TransferFunction,
+    scene: &Scene,
+    Window { slabs, region }: &Window,
+) -> Result<Content, RenderError> {
+    let frame = Frame { slabs: slabs.clone(), ..Frame::new(Host::default(), volume, transfer, scene)? };
+    let pixels = frame.each_pixel_in(region, |pixel| pixel.composite());
+    let colors = pixels.iter().map(|pixel| pixel.color.as_vec4().to_array()).collect();
+    let is_extreme = matches!(scene.splatting.compositing, Compositing::Maximum | Compositing::Minimum);
+    let extremes = pixels.iter().filter(|_| is_extreme).map(|pixel| pixel.extreme).collect();
+    Ok(Content { colors, extremes })
 }
 
 /// Renders a scene as [`super::render_for`] does. Nothing is culled, and the order of compositing does not matter.

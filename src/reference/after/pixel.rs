@@ -7,6 +7,7 @@ use glam::{DVec3, DVec4, UVec2};
 use super::field::nearest;
 use super::slab_integral::SlabIntegral;
 use super::{Frame, extreme, surface};
+use crate::part::Extreme;
 use crate::reference::composite::composite_pixel;
 use crate::reference::cut::{self, PixelRay};
 use crate::reference::means::centered_box;
@@ -68,6 +69,15 @@ pub struct Composited {
     pub color: DVec4,
     /// The position in sheets at which the host's opacity is reached.
     pub first_hit: Option<f64>,
+    /// For `maximum` and `minimum` the value that was chosen (SPEC §11).
+    pub extreme: Extreme,
+}
+
+impl Composited {
+    /// A pixel that does not choose one value.
+    pub(super) fn new(color: DVec4, first_hit: Option<f64>) -> Self {
+        Self { color, first_hit, extreme: Extreme::default() }
+    }
 }
 
 impl<'a> Pixel<'a> {
@@ -90,9 +100,11 @@ impl<'a> Pixel<'a> {
         &self.stretch
     }
 
-    /// The slabs that the stretch reaches into.
+    /// The slabs that the stretch reaches into, of those that are drawn.
     pub fn slabs(&self) -> Range<i32> {
-        if self.stretch.is_empty() { 0..0 } else { self.stretch.start.floor() as i32..self.stretch.end.ceil() as i32 }
+        let (first, end) = (self.stretch.start.floor() as i32, self.stretch.end.ceil() as i32);
+        let drawn = &self.frame.slabs;
+        if self.stretch.is_empty() { 0..0 } else { first.max(drawn.start)..end.min(drawn.end) }
     }
 
     /// The part of the stretch in a slab; may be empty.
@@ -193,7 +205,7 @@ impl<'a> Pixel<'a> {
     /// Composites front to back; the other order gives the same image.
     fn composite_sheets(&self) -> Composited {
         let (compositing, wanted) = (self.frame.scene.splatting.compositing, self.frame.host.first_hit);
-        let mut pixel = Composited { color: DVec4::ZERO, first_hit: None };
+        let mut pixel = Composited::new(DVec4::ZERO, None);
         let slabs = self.slabs();
         let mut near = self.value(slabs.start);
         for k in slabs {

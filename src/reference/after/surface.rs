@@ -32,7 +32,7 @@ pub(super) fn composite(pixel: &Pixel) -> Composited {
         }
         near = far;
     }
-    Composited { color: DVec4::ZERO, first_hit: None }
+    Composited::new(DVec4::ZERO, None)
 }
 
 /// The surface within a slab.
@@ -48,7 +48,7 @@ fn in_slab(pixel: &Pixel, slab: &Slab) -> Option<Composited> {
             let scene = &pixel.frame().scene;
             let base = tables.color.at(f0 + (f1 - f0) * t);
             let color = shading::color(&scene.shading, base, gradient(t), pixel.to_eye()).extend(1.0);
-            return Some(Composited { color, first_hit: pixel.frame().host.first_hit.map(|_| first + t) });
+            return Some(Composited::new(color, pixel.frame().host.first_hit.map(|_| first + t)));
         }
     }
     None

@@ -45,6 +45,11 @@ enum Annotation {
 pub(crate) struct Overlay(Vec<([u32; 2], Image)>);
 
 impl Annotate {
+    /// Whether nothing is drawn over images.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.annotate.is_empty()
+    }
+
     /// The annotations for a scene's images, for any direction of its camera.
     pub(crate) fn overlay(&self, scene: &Scene, volume: &Volume) -> Result<Overlay, Failure> {
         let has = |annotation| self.annotate.contains(&annotation);

@@ -1,0 +1,95 @@
+//! The pixels of a part, and how those of consecutive slab ranges merge (SPEC §11).
+
+use crate::settings::splatting::{Classification, Compositing};
+
+/// Extremes that differ by less, relative to the range of the coefficients, count as equal, as where a whole image is drawn.
+const HAIR: f32 = 2e-6;
+
+/// The pixels of a part's region, row by row, before the background.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Content {
+    /// The compositing buffer: premultiplied RGBA. For the sums of `xray` and `average` it is not clamped; for `minimum` (classified before
+    /// splatting) alpha is 2 less the opacity, and 0 where nothing counted.
+    pub colors: Vec<[f32; 4]>,
+    /// For `maximum` and `minimum` classified after splatting, the value that every pixel chose; otherwise empty.
+    pub extremes: Vec<Extreme>,
+}
+
+/// The value that a pixel chose among those along its ray (SPEC §9).
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Extreme {
+    /// The value's place in the range of the field's coefficients, from 0 to 1.
+    pub value: f32,
+    /// [`Self::POINT`] for a point on a plane, [`Self::MIDDLE`] for the middle of the visible stretch, which counts where no plane has a
+    /// point, and 0 if nothing counted.
+    pub counted: f32,
+}
+
+impl Extreme {
+    /// A point on a plane counted.
+    pub const POINT: f32 = 2.0;
+    /// Only the middle of the visible stretch counted.
+    pub const MIDDLE: f32 = 1.0;
+}
+
+/// The rule by which consecutive slab ranges merge.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rule {
+    pub(super) compositing: Compositing,
+    pub(super) classification: Classification,
+}
+
+impl Rule {
+    /// Whether pixels carry extremes.
+    pub(super) fn has_extremes(self) -> bool {
+        let is_extreme = matches!(self.compositing, Compositing::Maximum | Compositing::Minimum);
+        is_extreme && self.classification == Classification::After
+    }
+
+    /// Merges the slabs behind some slabs into them.
+    pub(super) fn merge(self, front: &mut Content, back: &Content) {
+        if self.has_extremes() {
+            let chosen = front.extremes.iter_mut().zip(&back.extremes);
+            for ((front, back), (chosen, other)) in front.colors.iter_mut().zip(&back.colors).zip(chosen) {
+                if self.is_better(*other, *chosen) {
+                    (*front, *chosen) = (*back, *other);
+                }
+            }
+            return;
+        }
+        front.colors.iter_mut().zip(&back.colors).for_each(|(front, back)| *front = self.pixel(*front, *back));
+    }
+
+    /// Whether a value replaces a nearer one.
+    fn is_better(self, other: Extreme, chosen: Extreme) -> bool {
+        if other.counted != chosen.counted {
+            return other.counted > chosen.counted;
+        }
+        match self.compositing {
+            Compositing::Minimum => other.value < chosen.value - HAIR,
+            _ => other.value > chosen.value + HAIR,
+        }
+    }
+
+    fn pixel(self, front: [f32; 4], back: [f32; 4]) -> [f32; 4] {
+        match self.compositing {
+            Compositing::Linear | Compositing::Exponential => {
+                // Opacity beyond 1 is a rounding error and must not hide another part.
+                let rest = (1.0 - front[3]).max(0.0);
+                std::array::from_fn(|channel| front[channel] + rest * back[channel])
+            }
+            Compositing::Xray | Compositing::Average => std::array::from_fn(|channel| front[channel] + back[channel]),
+            // The nearest of equal ones.
+            Compositing::Maximum | Compositing::Minimum => {
+                if back[3] > front[3] {
+                    back
+                } else {
+                    front
+                }
+            }
+            Compositing::Surface if front[3] >= 1.0 => front,
+            Compositing::Surface => back,
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Files of parts. Like any input, a file is trusted only as far as its bytes can hold what it claims.
+
+use std::path::Path;
+
+use super::{Content, Extreme, Identity, Part, Window, exr, npz};
+use crate::image::open::{MAX_EXPANSION, content, of_volume, read};
+use crate::image::{ImageError, output};
+use crate::volume::{Access, ReadOptions};
+
+/// The formats by extension, ignoring case.
+enum Format {
+    Exr,
+    Npz,
+}
+
+impl Format {
+    fn of(path: &Path) -> Result<Self, ImageError> {
+        let extension = path.extension().and_then(|extension| extension.to_str());
+        match extension.map(str::to_ascii_lowercase).as_deref() {
+            Some("exr") => Ok(Self::Exr),
+            Some("npz") => Ok(Self::Npz),
+            _ => {
+                let found = extension.map_or("none".to_owned(), |extension| format!("\".{extension}\""));
+                Err(content(path, "extension", found, ".exr or .npz for a part of an image".to_owned()))
+            }
+        }
+    }
+}
+
+impl Part {
+    /// Checks that [`Part::save`] knows the extension of a file, before a long render.
+    ///
+    /// # Errors
+    /// If the extension is unknown.
+    pub fn check_format(path: &Path) -> Result<(), ImageError> {
+        Format::of(path).map(|_| ())
+    }
+
+    /// Opens a part that [`Part::save`] or `sheetsplat render` wrote. The file is its name.
+    ///
+    /// # Errors
+    /// If the file cannot be read, holds no part, or needs more memory than [`ReadOptions::memory`] allows by default.
+    pub fn open(path: &Path) -> Result<Self, ImageError> {
+        Self::open_with(path, &ReadOptions::default())
+    }
+
+    /// Like [`Part::open`], with a folder that files must lie in and a memory limit.
+    ///
+    /// # Errors
+    /// As for [`Part::open`], and if the options do not allow it.
+    pub fn open_with(path: &Path, options: &ReadOptions) -> Result<Self, ImageError> {
+        let format = Format::of(path)?;
+        let access = Access::new(options).map_err(of_volume)?;
+        let (identity, window, channels) = match format {
+            Format::Exr => exr::decode(path, &read(path, &access)?, &access)?,
+            Format::Npz => npz::decode(path, &access)?,
+        };
+        let content = from_channels(&channels);
+        Ok(Self { name: path.display().to_string(), identity, window, content })
+    }
+
+    /// Saves the part by the file's extension: `.exr`, whose data window is the region and whose display window is the whole image, with the
+    /// description as a text attribute; or `.npz` with an array `pixels` (height × width × channels) and the description `part.json`. The file appears whole or not at all.
+    ///
+    /// # Errors
+    /// If the extension is unknown or the file cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), ImageError> {
+        let bytes = self.encode(path)?;
+        output::write(path, &bytes).map_err(|source| ImageError::Io { path: path.to_owned(), source })
+    }
+
+    /// The bytes that [`Part::save`] writes into a file.
+    ///
+    /// # Errors
+    /// If the extension is unknown, or the part's pixels do not fill its region.
+    pub fn encode(&self, path: &Path) -> Result<Vec<u8>, ImageError> {
+        let format = Format::of(path)?;
+        let pixels = self.window.region.pixels();
+        let extremes = if self.identity.rule().has_extremes() { pixels } else { 0 };
+        if (self.content.colors.len(), self.content.extremes.len()) != (pixels, extremes) {
+            let found = format!("{} and {}", self.content.colors.len(), self.content.extremes.len());
+            return Err(content(path, "pixels", found, format!("{pixels} and {extremes} extremes")));
+        }
+        match format {
+            Format::Exr => exr::encode(path, self),
+            Format::Npz => npz::encode(path, self),
+        }
+    }
+}
+
+/// The names of a part's channels.
+pub(super) fn channel_names(identity: &Identity) -> &'static [&'static str] {
+    const ALL: [&str; 6] = ["R", "G", "B", "A", "value", "counted"];
+    if identity.rule().has_extremes() { &ALL } else { &ALL[..4] }
+}
+
+/// The pixels of a part, channel by channel.
+pub(super) fn to_channels(part: &Part) -> Vec<Vec<f32>> {
+    let Content { colors, extremes } = &part.content;
+    let mut channels: Vec<Vec<f32>> =
+        (0..4).map(|channel| colors.iter().map(|color| color[channel]).collect()).collect();
+    if !extremes.is_empty() {
+        channels.push(extremes.iter().map(|extreme| extreme.value).collect());
+        channels.push(extremes.iter().map(|extreme| extreme.counted).collect());
+    }
+    channels
+}
+
+/// The pixels of a part from its channels, which have equal lengths.
+fn from_channels(channels: &[Vec<f32>]) -> Content {
+    let pixels = channels.first().map_or(0, Vec::len);
+    let colors = (0..pixels).map(|at| std::array::from_fn(|channel| channels[channel][at])).collect();
+    let extremes = match channels {
+        [_, _, _, _, value, counted] => {
+            value.iter().zip(counted).map(|(&value, &counted)| Extreme { value, counted }).collect()
+        }
+        _ => Vec::new(),
+    };
+    Content { colors, extremes }
+}
+
+/// Reserves the memory of a part's pixels, which its file's bytes must be able to hold.
+pub(super) fn reserve(
+    path: &Path,
+    (identity, window): (&Identity, &Window),
+    bytes: usize,
+    access: &Access,
+) -> Result<(), ImageError> {
+    let channels = channel_names(identity).len() as u64;
+    let needed = window.region.pixels() as u64 * channels * size_of::<f32>() as u64;
+    let region = &window.region;
+    if needed > MAX_EXPANSION * bytes as u64 {
+        let found = format!("region {region} in {bytes} bytes");
+        return Err(content(path, "size", found, format!("at most {MAX_EXPANSION} times as many bytes of pixels")));
+    }
+    // As in the file, channel by channel, and pixel by pixel.
+    access.reserve(path, "size", format_args!("region {region}"), needed.saturating_mul(3)).map_err(of_volume)
+}

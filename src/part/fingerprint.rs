@@ -1,0 +1,49 @@
+//! The fingerprint of a scene (SPEC §11): everything that bears on its image, and nothing else: neither paths nor what draws it.
+
+use std::path::Path;
+
+use crate::scene::{Scene, SceneError, VolumeSource};
+use crate::settings::splatting::Rasterizer;
+use crate::volume::Volume;
+
+/// The text that begins what is hashed; another meaning of fingerprints needs another text.
+const DOMAIN: &str = "sheetsplat part 1\n";
+
+/// The fingerprint of a scene of a volume, as hexadecimal digits. It is the same on every machine.
+///
+/// # Errors
+/// If the scene cannot be written as TOML.
+pub(super) fn fingerprint(volume: &Volume, scene: &Scene) -> Result<String, SceneError> {
+    let explicit = scene.explicit(volume);
+    let mut hash = blake3::Hasher::new();
+    hash.update(DOMAIN.as_bytes()).update(settings(explicit)?.as_bytes());
+    let grid = volume.grid();
+    for (count, spacing) in grid.dims.to_array().into_iter().zip(grid.spacing.to_array()) {
+        hash.update(&count.to_le_bytes()).update(&spacing.to_le_bytes());
+    }
+    // In blocks, because the hash is fastest over long slices.
+    for values in volume.values().chunks(1 << 14) {
+        let bytes: Vec<u8> = values.iter().flat_map(|value| bits(*value).to_le_bytes()).collect();
+        hash.update(&bytes);
+    }
+    for labels in volume.labels().unwrap_or_default().chunks(1 << 14) {
+        let bytes: Vec<u8> = labels.iter().flat_map(|label| label.to_le_bytes()).collect();
+        hash.update(&bytes);
+    }
+    Ok(hash.finalize().to_hex().to_string())
+}
+
+/// The bits of a value; all holes are alike, and so are both zeros.
+fn bits(value: f32) -> u32 {
+    if value.is_nan() { f32::NAN.to_bits() } else { (value + 0.0).to_bits() }
+}
+
+/// The settings as text, without those that name the volume or what draws it.
+fn settings(mut scene: Scene) -> Result<String, SceneError> {
+    scene.volume = VolumeSource::Memory;
+    (scene.spacing, scene.labels) = (None, None);
+    scene.splatting.rasterizer = Rasterizer::Auto;
+    // Tiles never change an image.
+    scene.splatting.tiles = true;
+    scene.to_toml(Path::new(""))
+}

@@ -1,0 +1,206 @@
+//! Merging parts into the whole image (SPEC §11).
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use super::content::Content;
+use super::resolve::Resolver;
+use super::{Identity, Part};
+use crate::image::Image;
+use crate::scene::names::{CLASSIFICATIONS, COMPOSITINGS, ORDERS, name_of};
+use crate::settings::window::{Region, Window};
+
+/// Why parts do not merge into an image.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MergeError {
+    /// There is no part.
+    #[error("parts: found none, allowed: all parts of one image")]
+    Empty,
+    /// A part belongs to another image.
+    #[error("{part}: {field}: found {found}, allowed: {expected}, as in {other}")]
+    #[non_exhaustive]
+    Different {
+        /// The part.
+        part: String,
+        /// What differs.
+        field: &'static str,
+        /// Its value.
+        found: String,
+        /// The part that it is compared with.
+        other: String,
+        /// The value there.
+        expected: String,
+    },
+    /// Two parts show the same slabs of the same pixels.
+    #[error("{part}: found {what}, which {other} also shows, allowed: parts that do not overlap")]
+    #[non_exhaustive]
+    Overlap {
+        /// The part.
+        part: String,
+        /// The slabs or pixels that both show.
+        what: String,
+        /// The other part.
+        other: String,
+    },
+    /// No part shows some slabs of some pixels.
+    #[error("parts: found none with {missing}, allowed: parts that show the whole image")]
+    #[non_exhaustive]
+    Missing {
+        /// The first slabs and pixels that are missing.
+        missing: String,
+    },
+    /// A part's pixels do not fill its region.
+    #[error("{part}: {field}: found {found}, allowed: {allowed}")]
+    #[non_exhaustive]
+    Content {
+        /// The part.
+        part: String,
+        /// What is wrong.
+        field: &'static str,
+        /// What was found.
+        found: String,
+        /// What is allowed.
+        allowed: String,
+    },
+}
+
+impl Image {
+    /// Merges all parts of an image, in any order. The image is that of the whole scene: to rounding with an
+    /// [`opacity_threshold`](crate::settings::Splatting::opacity_threshold) T of 1, and to 1 - T of the un-culled one with any.
+    ///
+    /// # Errors
+    /// If the parts are not of one scene, leave out slabs or pixels, or overlap.
+    pub fn merge(parts: impl IntoIterator<Item = Part>) -> Result<Self, MergeError> {
+        let mut regions = BTreeMap::<Region, Vec<Part>>::new();
+        let mut first: Option<(String, Identity)> = None;
+        for part in parts {
+            let (other, expected) = first.get_or_insert_with(|| (part.name.clone(), part.identity.clone()));
+            check_identity(&part, other, expected)?;
+            check_content(&part)?;
+            regions.entry(part.window.region).or_default().push(part);
+        }
+        let (_, identity) = first.ok_or(MergeError::Empty)?;
+        check_regions(&regions, identity.size)?;
+        let [width, height] = identity.size;
+        let resolver = Resolver::new(identity.compositing, identity.classification, identity.background);
+        let mut image = Self { width, height, pixels: vec![[0.0; 4]; width as usize * height as usize] };
+        for (region, parts) in regions {
+            let merged = merge_slabs(parts, &identity, region)?;
+            let rows = merged.colors.chunks_exact(region.width as usize);
+            for (row, y) in rows.zip(region.rows()) {
+                let pixels = &mut image.pixels[y * width as usize..][region.columns()];
+                pixels.iter_mut().zip(row).for_each(|(pixel, acc)| *pixel = resolver.pixel(*acc));
+            }
+        }
+        Ok(image)
+    }
+}
+
+/// Checks that a part belongs to the image of another one.
+fn check_identity(part: &Part, other: &str, expected: &Identity) -> Result<(), MergeError> {
+    let shown = |identity: &Identity| {
+        let [width, height] = identity.size;
+        [
+            ("order", name_of(ORDERS, identity.order).to_owned()),
+            ("compositing", name_of(COMPOSITINGS, identity.compositing).to_owned()),
+            ("classification", name_of(CLASSIFICATIONS, identity.classification).to_owned()),
+            ("size", format!("{width}×{height}")),
+            ("background", format!("{:?}", identity.background)),
+            ("scene's slabs", format!("{}..{}", identity.slabs.start, identity.slabs.end)),
+            ("scene", identity.fingerprint.clone()),
+        ]
+    };
+    for ((field, found), (_, expected)) in shown(&part.identity).into_iter().zip(shown(expected)) {
+        if found != expected {
+            let (part, other) = (part.name.clone(), other.to_owned());
+            return Err(MergeError::Different { part, field, found, other, expected });
+        }
+    }
+    Ok(())
+}
+
+/// Checks that a part's pixels fill its region, which lies in the image.
+fn check_content(part: &Part) -> Result<(), MergeError> {
+    let Part { name, identity, window, content } = part;
+    let wrong =
+        |field, found: String, allowed: String| MergeError::Content { part: name.clone(), field, found, allowed };
+    if window.region.check(identity.size).is_err() {
+        let [width, height] = identity.size;
+        return Err(wrong("region", window.region.to_string(), format!("a region of the image of {width}×{height}")));
+    }
+    let pixels = window.region.pixels();
+    let extremes = if identity.rule().has_extremes() { pixels } else { 0 };
+    for (field, found, allowed) in
+        [("pixels", content.colors.len(), pixels), ("extremes", content.extremes.len(), extremes)]
+    {
+        if found != allowed {
+            return Err(wrong(field, found.to_string(), allowed.to_string()));
+        }
+    }
+    Ok(())
+}
+
+/// Checks that regions fill an image without overlapping.
+fn check_regions(regions: &BTreeMap<Region, Vec<Part>>, [width, height]: [u32; 2]) -> Result<(), MergeError> {
+    let all: Vec<&Region> = regions.keys().collect();
+    let name = |region: &Region| regions.get(region).and_then(|parts| parts.first()).map_or("", |part| &part.name);
+    for (at, region) in all.iter().enumerate() {
+        if let Some(other) = all[..at].iter().find(|other| other.overlaps(region)) {
+            let what = format!("pixels of region {other}");
+            return Err(MergeError::Overlap { part: name(region).to_owned(), what, other: name(other).to_owned() });
+        }
+    }
+    // Between neighbouring edges all pixels are alike.
+    let edges = |ends: &dyn Fn(&Region) -> [u32; 2], end: u32| {
+        let mut edges: Vec<u32> = all.iter().flat_map(|region| ends(region)).chain([0, end]).collect();
+        edges.sort_unstable();
+        edges.dedup();
+        edges
+    };
+    let columns = edges(&|region| [region.x, region.x + region.width], width);
+    let rows = edges(&|region| [region.y, region.y + region.height], height);
+    for y in rows.windows(2) {
+        for x in columns.windows(2) {
+            let cell = Region { x: x[0], y: y[0], width: x[1] - x[0], height: y[1] - y[0] };
+            if !all.iter().any(|region| region.overlaps(&cell)) {
+                return Err(MergeError::Missing { missing: format!("pixels of region {cell}") });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Merges the parts of a region, which must show each of the scene's slabs once.
+fn merge_slabs(mut parts: Vec<Part>, identity: &Identity, region: Region) -> Result<Content, MergeError> {
+    let scene = &identity.slabs;
+    parts.sort_by_key(|part| (part.window.slabs.start, part.window.slabs.end));
+    let (mut merged, mut next, mut last) = (None::<Content>, scene.start, String::new());
+    let missing = |slabs: Range<i32>| {
+        let Range { start, end } = slabs;
+        MergeError::Missing { missing: format!("slabs {start}..{end} of region {region}") }
+    };
+    for Part { name, window, content, .. } in parts {
+        let slabs = Window::within(&window, scene);
+        if slabs.is_empty() {
+            continue;
+        }
+        if slabs.start < next {
+            let what = format!("slabs {}..{} of region {region}", slabs.start, slabs.end.min(next));
+            return Err(MergeError::Overlap { part: name, what, other: last });
+        }
+        if slabs.start > next {
+            return Err(missing(next..slabs.start));
+        }
+        (next, last) = (slabs.end, name);
+        match &mut merged {
+            None => merged = Some(content),
+            Some(merged) => identity.rule().merge(merged, &content),
+        }
+    }
+    if next < scene.end {
+        return Err(missing(next..scene.end));
+    }
+    // A scene without slabs shows nothing.
+    Ok(merged.unwrap_or_else(|| Content { colors: vec![[0.0; 4]; region.pixels()], extremes: Vec::new() }))
+}

@@ -1,0 +1,146 @@
+//! Parts of an image (SPEC §11): some slabs, some pixels, or both, drawn anywhere and at any time, that merge exactly into the whole image.
+//!
+//! [`Headless::render_part`](crate::headless::Headless::render_part) draws a part of a scene's image, and [`Image::merge`] puts the parts
+//! together.
+//!
+//! ```
+//! use sheetsplat::headless::{Backend, Headless, HeadlessOptions};
+//! use sheetsplat::scene::VolumeSource;
+//! use sheetsplat::settings::{Region, Window};
+//! use sheetsplat::{Image, Scene};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let settings = ["image={width=64,height=64}".to_owned(), "splatting.opacity_threshold=1".to_owned()];
+//! let scene = Scene::from_volume(VolumeSource::Builtin("head:48".to_owned()), &settings)?;
+//! let headless = Headless::new(&HeadlessOptions::default().with_backend(Backend::Cpu))?;
+//! let region = Region::whole([64, 64]);
+//! let front = headless.render_part(&scene, &Window { slabs: -1000..0, region })?;
+//! let back = headless.render_part(&scene, &Window { slabs: 0..1000, region })?;
+//! let image = Image::merge([back, front])?;
+//! assert_eq!(image.pixels.len(), 64 * 64);
+//! # Ok(())
+//! # }
+//! ```
+
+mod content;
+#[cfg(feature = "codecs")]
+mod description;
+#[cfg(feature = "codecs")]
+mod exr;
+#[cfg(feature = "codecs")]
+mod file;
+mod fingerprint;
+mod merge;
+#[cfg(feature = "codecs")]
+mod npz;
+mod resolve;
+mod split;
+
+use std::ops::Range;
+
+pub use content::{Content, Extreme};
+pub use merge::MergeError;
+#[cfg(feature = "cpu")]
+pub(crate) use resolve::Resolver;
+pub use split::split;
+
+use crate::error::RenderError;
+use crate::error::setting::SettingError;
+use crate::geometry::view_geometry::ViewGeometry;
+use crate::scene::Scene;
+use crate::settings::splatting::{Classification, Compositing, Method, Order};
+use crate::settings::window::Window;
+use crate::volume::Volume;
+use content::Rule;
+
+/// A part of an image: f32 pixels without the background, and what identifies them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// A name for errors: the file, or what the part shows.
+    pub name: String,
+    /// The image that it is a part of.
+    pub identity: Identity,
+    /// The slabs and pixels that it shows.
+    pub window: Window,
+    /// Its pixels.
+    pub content: Content,
+}
+
+/// What the parts of one image have in common.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Identity {
+    /// A hash of everything that bears on the image, the volume's values included, in hexadecimal digits; not of paths, nor of what draws.
+    pub fingerprint: String,
+    /// Width and height of the whole image.
+    pub size: [u32; 2],
+    /// The scene's slabs, from the first to the last that a kernel may reach.
+    pub slabs: Range<i32>,
+    /// How sheets are composited.
+    pub compositing: Compositing,
+    /// Where voxels, or pixels, are classified.
+    pub classification: Classification,
+    /// The order in which sheets are composited.
+    pub order: Order,
+    /// Straight-alpha RGBA.
+    pub background: [f64; 4],
+}
+
+impl Part {
+    /// A part that a backend has drawn.
+    pub(crate) fn new(
+        (volume, scene): (&Volume, &Scene),
+        view: &ViewGeometry,
+        window: &Window,
+        content: Content,
+    ) -> Result<Self, RenderError> {
+        let refused = |error: crate::scene::SceneError| SettingError::new("scene", error.to_string(), "another scene");
+        let identity = Identity {
+            fingerprint: fingerprint::fingerprint(volume, scene).map_err(refused)?,
+            size: view.size,
+            slabs: view.slabs_of(volume.grid()),
+            compositing: scene.splatting.compositing,
+            classification: scene.classification(volume),
+            order: scene.splatting.order,
+            background: scene.image.background,
+        };
+        Ok(Self::named(identity, window.clone(), content))
+    }
+
+    /// A part with its slabs and pixels as its name.
+    fn named(identity: Identity, window: Window, content: Content) -> Self {
+        let Window { slabs: Range { start, end }, region } = &window;
+        Self { name: format!("slabs {start}..{end} of region {region}"), identity, window, content }
+    }
+}
+
+impl Identity {
+    fn rule(&self) -> Rule {
+        Rule { compositing: self.compositing, classification: self.classification }
+    }
+}
+
+/// Checks, before anything is drawn, that a scene has parts, and that a window is one.
+///
+/// # Errors
+/// If the scene's method is not image-aligned, an economy is in use, its compositing has no parts, or the window does not lie in the image.
+pub(crate) fn check(scene: &Scene, classification: Classification, window: &Window) -> Result<(), SettingError> {
+    let splatting = &scene.splatting;
+    if splatting.method != Method::ImageAligned {
+        let method = crate::scene::names::name_of(crate::scene::names::METHODS, splatting.method);
+        let found = format!("\"{method}\" for a part of an image");
+        return Err(SettingError::new("splatting.method", found, "\"image-aligned\""));
+    }
+    if let Some(economy) = splatting.experimental.in_use() {
+        let found = format!("{} for a part of an image", economy.value);
+        return Err(SettingError::new(economy.key, found, economy.off.to_string()));
+    }
+    if splatting.compositing == Compositing::Average && classification == Classification::After {
+        let found = "\"average\" with splatting.classification = \"after\" for a part of an image";
+        return Err(SettingError::new("splatting.compositing", found, "another compositing, or \"before\" with it"));
+    }
+    let Range { start, end } = window.slabs;
+    if start > end {
+        return Err(SettingError::new("slabs", format!("{start}..{end}"), "A..B, A at most B"));
+    }
+    window.region.check([scene.image.width, scene.image.height])
+}

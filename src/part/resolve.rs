@@ -1,0 +1,36 @@
+//! The compositing buffer over the background (SPEC §5), as in `shaders/resolve.wgsl`.
+
+use crate::settings::splatting::{Classification, Compositing};
+
+/// Turns pixels of compositing buffers into pixels of images.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Resolver {
+    compositing: Compositing,
+    /// Premultiplied.
+    background: [f32; 4],
+}
+
+impl Resolver {
+    /// The background has straight alpha.
+    pub(crate) fn new(compositing: Compositing, classification: Classification, background: [f64; 4]) -> Self {
+        // After splatting, sums are clamped; everything else is premultiplied RGBA already.
+        let compositing = match (classification, compositing) {
+            (Classification::After, Compositing::Xray) => Compositing::Xray,
+            (Classification::After, _) => Compositing::Linear,
+            _ => compositing,
+        };
+        let [r, g, b, a] = background;
+        Self { compositing, background: [r * a, g * a, b * a, a].map(|channel| channel as f32) }
+    }
+
+    /// A pixel over the background, premultiplied like its argument.
+    pub(crate) fn pixel(&self, acc: [f32; 4]) -> [f32; 4] {
+        let image = match self.compositing {
+            Compositing::Xray | Compositing::Average => acc.map(|channel| channel.min(1.0)),
+            Compositing::Minimum if acc[3] > 0.0 => [acc[0], acc[1], acc[2], 2.0 - acc[3]],
+            Compositing::Surface if acc[3] < 1.0 => [0.0; 4],
+            _ => acc,
+        };
+        std::array::from_fn(|channel| image[channel] + (1.0 - image[3]) * self.background[channel])
+    }
+}

@@ -1,0 +1,10 @@
+//! Parts of an image (SPEC §11): slab ranges and regions merge into the whole image, whatever draws them.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+#[expect(dead_code, reason = "not every file needs all of it")]
+#[path = "../common/mod.rs"]
+mod common;
+mod files;
+mod merging;
+mod splitting;

@@ -1,0 +1,150 @@
+//! Parts of a frame against the whole of it.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use sheetsplat::headless::{Backend, Headless, HeadlessOptions};
+use sheetsplat::scene::Scene;
+use sheetsplat::settings::{Classification, Compositing, Fit, Interpolation, Order, Projection, Ramp, Region, Window};
+use sheetsplat::volume::{Volume, builtin};
+use sheetsplat::{Image, Part};
+
+use crate::common::compare::{assert_at_least, assert_at_most};
+use crate::common::images::largest_difference;
+use crate::common::{COMPOSITINGS, scene};
+
+/// By how much a merged image may differ from the whole one (SPEC §11).
+const ALLOWED: f64 = 1e-6;
+
+pub(crate) fn headless(backend: Backend) -> Headless {
+    Headless::new(&HeadlessOptions::default().with_backend(backend)).unwrap()
+}
+
+/// A head from a slanted direction, where nothing is culled before a pixel is wholly opaque.
+pub(crate) fn head(size: u32, [width, height]: [u32; 2]) -> (Arc<Volume>, Scene) {
+    let mut scene = scene(width, height);
+    let volume = builtin::volume(&format!("head:{size}")).unwrap();
+    scene.camera.direction = DVec3::new(0.4, 0.9, -0.3);
+    scene.camera.fit = Fit::Object;
+    // Even air is seen, so that minima and averages are not empty.
+    scene.transfer.color =
+        Some(Ramp::new(vec![(0.0, DVec3::new(0.3, 0.5, 0.9)), (255.0, DVec3::new(1.0, 0.8, 0.4))]).unwrap());
+    scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.02), (60.0, 0.05), (255.0, 0.7)]).unwrap());
+    scene.image.background = [0.2, 0.4, 0.6, 0.5];
+    scene.splatting.opacity_threshold = 1.0;
+    (Arc::new(volume), scene)
+}
+
+/// Four regions of an image, divided off its middle and off the edges of tiles.
+fn quarters([width, height]: [u32; 2]) -> [Region; 4] {
+    let (x, y) = (width * 2 / 5 + 1, height / 3 + 2);
+    [[0, 0, x, y], [x, 0, width - x, y], [0, y, x, height - y], [x, y, width - x, height - y]]
+        .map(|[x, y, width, height]| Region { x, y, width, height })
+}
+
+/// The slabs of a scene.
+fn slabs(headless: &Headless, volume: &Arc<Volume>, scene: &Scene) -> std::ops::Range<i32> {
+    let mut view = headless.view(Arc::clone(volume), scene).unwrap();
+    let window = Window { slabs: 0..0, region: Region { x: 0, y: 0, width: 1, height: 1 } };
+    headless.draw_part(&mut view, &window).unwrap().0.identity.slabs
+}
+
+/// All parts of an image: some slab ranges of each of four regions. The outer ones reach beyond the scene's slabs.
+pub(crate) fn parts(headless: &Headless, volume: &Arc<Volume>, scene: &Scene, ranges: i32) -> Vec<Part> {
+    let all = slabs(headless, volume, scene);
+    assert!(all.len() as i32 > 2 * ranges, "{all:?}");
+    let mut view = headless.view(Arc::clone(volume), scene).unwrap();
+    let cut = |at: i32| match at {
+        0 => all.start - 7,
+        at if at == ranges => all.end + 3,
+        at => all.start + all.len() as i32 * at / ranges,
+    };
+    let windows = quarters([scene.image.width, scene.image.height])
+        .into_iter()
+        .flat_map(|region| (0..ranges).map(move |at| Window { slabs: cut(at)..cut(at + 1), region }));
+    windows.map(|window| headless.draw_part(&mut view, &window).unwrap().0).collect()
+}
+
+/// Merges 8 slab ranges of 4 regions, and compares them with the whole image.
+fn compare(backend: Backend, volume: &Arc<Volume>, scene: &Scene) {
+    let headless = headless(backend);
+    let whole = headless.render_volume(Arc::clone(volume), scene).unwrap().image;
+    let mut parts = parts(&headless, volume, scene, 8);
+    // The order in which parts are given does not matter.
+    parts.reverse();
+    parts.swap(3, 17);
+    let merged = Image::merge(parts).unwrap();
+    let what = format!("{backend} {:?}", scene.splatting);
+    let shown = whole.pixels.iter().filter(|pixel| **pixel != whole.pixels[0]).count();
+    assert_at_least(shown as f64 / whole.pixels.len() as f64, 0.08, &what);
+    assert_at_most(largest_difference(&merged, &whole), ALLOWED, what);
+}
+
+fn scenes(compositing: Compositing, classification: Classification, size: u32) -> [(Arc<Volume>, Scene); 2] {
+    let perspective = Projection::Perspective { fov_y: 40.0, distance: None, near: None };
+    let other = if compositing == Compositing::Surface { Order::FrontToBack } else { Order::BackToFront };
+    let views = [(Projection::Orthographic { height: None }, Order::FrontToBack), (perspective, other)];
+    let of_view = |(projection, order)| {
+        let (volume, mut scene) = head(size, [size + 13, size + 5]);
+        scene.camera.projection = projection;
+        scene.splatting.order = order;
+        scene.splatting.compositing = compositing;
+        scene.splatting.classification = classification;
+        if compositing == Compositing::Surface {
+            scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0), (40.0, 0.7), (255.0, 0.9)]).unwrap());
+        }
+        (volume, scene)
+    };
+    views.map(of_view)
+}
+
+#[test]
+fn parts_of_every_compositing_merge() {
+    for compositing in COMPOSITINGS {
+        for (volume, scene) in scenes(compositing, Classification::Before, 24) {
+            compare(Backend::Cpu, &volume, &scene);
+        }
+    }
+}
+
+#[test]
+fn parts_classified_after_splatting_merge() {
+    for compositing in COMPOSITINGS.into_iter().filter(|compositing| *compositing != Compositing::Average) {
+        for (volume, mut scene) in scenes(compositing, Classification::After, 24) {
+            // Coefficients reach further than values.
+            let is_exact = scene.camera.projection != Projection::Orthographic { height: None };
+            scene.splatting.interpolation = if is_exact { Interpolation::Exact } else { Interpolation::Smooth };
+            // Among values that count as equal, as in homogeneous matter, another part's point may be chosen, with another gradient.
+            scene.shading.enabled = !matches!(compositing, Compositing::Minimum | Compositing::Maximum);
+            compare(Backend::Cpu, &volume, &scene);
+        }
+    }
+}
+
+#[test]
+fn parts_of_the_twin_merge() {
+    for compositing in COMPOSITINGS {
+        for classification in [Classification::Before, Classification::After] {
+            if (compositing, classification) == (Compositing::Average, Classification::After) {
+                continue;
+            }
+            let [(volume, scene), _] = scenes(compositing, classification, 24);
+            compare(Backend::Reference, &volume, &scene);
+        }
+    }
+}
+
+/// Culling within a part counts the part's own opacity, so that every channel is within 1 - T of the un-culled image.
+#[test]
+fn culled_parts_merge_within_the_threshold() {
+    let (volume, mut scene) = head(48, [90, 70]);
+    scene.splatting.opacity_threshold = 0.9;
+    let headless = headless(Backend::Cpu);
+    let merged = Image::merge(parts(&headless, &volume, &scene, 3)).unwrap();
+    scene.splatting.culling = false;
+    let whole = headless.render_volume(Arc::clone(&volume), &scene).unwrap().image;
+    let difference = largest_difference(&merged, &whole);
+    assert_at_most(difference, 0.1, "T = 0.9");
+    // Something was culled.
+    assert_at_least(difference, 1e-4, "T = 0.9");
+}
