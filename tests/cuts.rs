@@ -17,7 +17,7 @@ use sheetsplat::image::Image;
 use sheetsplat::internals::reference::{self, Host, ray_march};
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Compositing, Method, Order, Rasterizer};
+use sheetsplat::settings::{Classification, Compositing, Method, Order, Rasterizer};
 use sheetsplat::stats::Counts;
 use sheetsplat::volume::{Grid, Volume, builtin};
 use sheetsplat::{Pick, RenderError, SceneView, SettingError};
@@ -320,20 +320,24 @@ fn picks() {
     let volume = Volume::new("plate", grid.dims, grid.spacing, values).unwrap();
     let mut scene = scene(21, 21);
     scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(50.0, 0.0), (100.0, 1.0)]);
-    for (rasterizer, projection, depth) in RASTERIZERS.into_iter().flat_map(|rasterizer| {
-        [
-            (rasterizer, Projection::Orthographic { height: Some(21.0) }, 4.0),
-            (rasterizer, Projection::Perspective { fov_y: 90.0, distance: Some(6.5), near: None }, 10.5),
-        ]
-    }) {
-        scene.splatting.rasterizer = rasterizer;
+    let projections = [
+        (Projection::Orthographic { height: Some(21.0) }, 4.0),
+        (Projection::Perspective { fov_y: 90.0, distance: Some(6.5), near: None }, 10.5),
+    ];
+    let classifications = [Classification::Before, Classification::After];
+    let ways = RASTERIZERS.into_iter().flat_map(|rasterizer| classifications.map(|first| (rasterizer, first)));
+    for ((rasterizer, classification), (projection, depth)) in
+        ways.flat_map(|way| projections.map(|projection| (way, projection)))
+    {
+        (scene.splatting.rasterizer, scene.splatting.classification) = (rasterizer, classification);
         scene.camera.projection = projection;
         let mut view = gpu.view(volume.clone(), &scene).unwrap();
         view.set_first_hit(Some(0.5)).unwrap();
         gpu.draw(&mut view).unwrap();
         let picked = gpu.pick(&view, [13, 6]).unwrap().unwrap();
-        // The opacity reaches one half before the plate's middle, by less than a voxel.
-        assert!((depth - 2.0..depth).contains(&picked.depth), "{projection:?}: {picked:?}, not {depth}");
+        // The opacity reaches one half before the plate's middle, by less than a voxel. A plate of interpolated values is less opaque.
+        let end = if classification == Classification::After { depth + 0.5 } else { depth };
+        assert!((depth - 2.0..end).contains(&picked.depth), "{projection:?}: {picked:?}, not {depth}");
         // Orthographic, pixels and voxels coincide; in perspective the plate is 21 units across at a depth of 10.5 units.
         assert_eq!((picked.voxel, picked.value), (UVec3::new(13, 12, 14), 113.0), "{projection:?}: {picked:?}");
         let plate = DVec3::new(3.0, 4.0, 4.0);

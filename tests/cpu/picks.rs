@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::cpu::CpuRenderer;
-use sheetsplat::settings::{Compositing, Method, Order, Projection};
+use sheetsplat::settings::{Classification, Compositing, Method, Order, Projection};
 use sheetsplat::volume::{Labels, Volume};
 
 use crate::common::{scene, transfer};
@@ -35,13 +35,16 @@ fn a_pick_is_the_front_of_the_ball() {
         Projection::Perspective { fov_y: 30.0, distance: Some(120.0), near: None },
     ] {
         scene.camera.projection = projection;
-        for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Surface] {
-            scene.splatting.compositing = compositing;
+        let compositings = [Compositing::Linear, Compositing::Exponential, Compositing::Surface];
+        let ways =
+            compositings.map(|compositing| [Classification::Before, Classification::After].map(|at| (compositing, at)));
+        for (compositing, classification) in ways.into_iter().flatten() {
+            (scene.splatting.compositing, scene.splatting.classification) = (compositing, classification);
             let mut renderer = CpuRenderer::new(volume.clone(), &scene).unwrap();
             assert!(renderer.pick([48, 48]).unwrap_err().to_string().contains("[48, 48]"), "no frame yet");
             renderer.set_first_hit(Some(0.5)).unwrap();
             renderer.draw().unwrap();
-            let what = format!("{compositing:?}, {projection:?}");
+            let what = format!("{compositing:?}, {classification:?}, {projection:?}");
             let pick = renderer.pick([48, 48]).unwrap().expect("the ball is in the middle");
             // The lone voxel lies before the ball, at y = -17.
             assert!(pick.position.y > -20.5 && pick.position.y < -13.0, "{what}: {pick:?}");
