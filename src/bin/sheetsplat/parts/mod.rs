@@ -85,7 +85,7 @@ impl Part {
 
 /// Parses `A..B`, A at most B.
 fn parse_slabs(text: &str) -> Result<Range<i32>, String> {
-    let within = |number: &i32| number.abs() <= 1 << 29;
+    let within = |number: &i32| (-(1 << 29)..=1 << 29).contains(number);
     let parse = |text: &str| text.parse().ok().filter(within);
     let ends = text.split_once("..").and_then(|(from, to)| Some((parse(from)?, parse(to)?)));
     let ends = ends.filter(|(start, end)| start <= end);
