@@ -1,6 +1,7 @@
 //! Views of a volume, drawn by any backend without holding Python's lock.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 use numpy::PyArray3;
 use pyo3::prelude::*;
@@ -19,14 +20,20 @@ type Drawn<'py> = (Bound<'py, PyArray3<f32>>, String, Option<(String, String)>);
 #[pyclass(frozen, module = "sheetsplat._native")]
 pub(crate) struct View {
     headless: Arc<Headless>,
-    volume: Arc<sheetsplat::Volume>,
-    view: Mutex<HeadlessView>,
+    current: Mutex<Current>,
+}
+
+/// What a view draws next.
+struct Current {
+    view: HeadlessView,
+    /// The milliseconds that the last change of the scene took.
+    prepare_ms: f64,
 }
 
 impl View {
     /// A picture that failed leaves a view that can draw the next one.
-    fn lock(&self) -> MutexGuard<'_, HeadlessView> {
-        self.view.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, Current> {
+        self.current.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -40,22 +47,20 @@ impl View {
         let volume = volume.0.clone();
         let view = py.detach(|| {
             let headless = headless(backend, adapter, &scene.scene)?;
-            let view = Mutex::new(headless.view(volume.clone(), &scene.scene)?);
-            Ok::<_, Raised>(Self { headless, volume, view })
+            let start = Instant::now();
+            let view = headless.view(volume, &scene.scene)?;
+            let current = Mutex::new(Current { view, prepare_ms: milliseconds_since(start) });
+            Ok::<_, Raised>(Self { headless, current })
         })?;
         Ok(view)
     }
 
-    /// Changes the scene. Another camera alone keeps everything else.
+    /// Changes the scene. Only what depends on the change is computed again.
     fn set_scene(&self, py: Python<'_>, scene: &Scene) -> PyResult<()> {
         py.detach(|| {
-            let (mut view, new) = (self.lock(), &scene.scene);
-            let with_camera = sheetsplat::Scene { camera: new.camera, ..view.scene().clone() };
-            if with_camera == *new {
-                view.set_camera(new.camera)?;
-            } else {
-                *view = self.headless.view(self.volume.clone(), new)?;
-            }
+            let (mut current, start) = (self.lock(), Instant::now());
+            self.headless.set_scene(&mut current.view, &scene.scene)?;
+            current.prepare_ms = milliseconds_since(start);
             Ok::<_, Raised>(())
         })?;
         Ok(())
@@ -70,7 +75,9 @@ impl View {
     /// Draws a picture.
     fn draw<'py>(&self, py: Python<'py>) -> PyResult<Drawn<'py>> {
         let (rendering, stats) = py.detach(|| {
-            let rendering = self.headless.draw(&mut self.lock()).map_err(Raised::from)?;
+            let mut current = self.lock();
+            let mut rendering = self.headless.draw(&mut current.view).map_err(Raised::from)?;
+            rendering.stats.prepare_ms = std::mem::take(&mut current.prepare_ms);
             let stats = serde_json::to_string(&rendering.stats);
             Ok::<_, Raised>((rendering, stats))
         })?;
@@ -78,6 +85,10 @@ impl View {
         let made_on = rendering.made_on().map(|made_on| (made_on.adapter, made_on.driver));
         Ok((image::array(py, rendering.image)?, stats, made_on))
     }
+}
+
+fn milliseconds_since(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
 }
 
 /// A backend, the adapter's name that it was opened by, and what draws with it.

@@ -131,6 +131,7 @@ def test_views_redo_what_changed() -> None:
         changed = view.render(**settings)
         assert np.asarray(changed).shape != np.asarray(before).shape or data(changed) != data(before)
         assert data(changed) == data(sheetsplat.render(view.volume, scene=view.scene)), settings
+        assert changed.stats["prepare_ms"] > 0 and view.render().stats["prepare_ms"] == 0, settings
     scene = view.scene
     with pytest.raises(sheetsplat.SceneError, match="camera.up"):
         view.set(camera={"up": [0, 0, 0]})

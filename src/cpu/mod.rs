@@ -93,6 +93,18 @@ enum List {
     After(Coefficients),
 }
 
+impl List {
+    fn new(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Self, RenderError> {
+        if scene.splatting.classification == Classification::After {
+            return Ok(Self::After(Coefficients::new(volume, scene)?));
+        }
+        let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
+        let bricks = BrickList::new(volume.grid(), &classify(volume, transfer, &clipped));
+        let materials = Materials::new(bricks.bricks().len());
+        Ok(Self::Before(bricks, materials))
+    }
+}
+
 impl CpuRenderer {
     /// Classifies a volume's voxels under a scene's transfer function. The scene's own volume is ignored.
     ///
@@ -106,14 +118,7 @@ impl CpuRenderer {
         let (simd, level) = simd::chosen()?;
         let transfer = scene.transfer.resolve(&volume);
         let scene = scene.classified(&volume);
-        let list = if scene.splatting.classification == Classification::After {
-            List::After(Coefficients::new(&volume, &scene)?)
-        } else {
-            let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
-            let bricks = BrickList::new(volume.grid(), &classify(&volume, &transfer, &clipped));
-            let materials = Materials::new(bricks.bricks().len());
-            List::Before(bricks, materials)
-        };
+        let list = List::new(&volume, &transfer, &scene)?;
         Ok(Self { volume, scene, transfer, list, simd, level, first_hit: None, surfaces: None, hits: None })
     }
 
@@ -130,6 +135,38 @@ impl CpuRenderer {
     pub fn set_simd(&mut self, simd: Simd) -> Result<(), SettingError> {
         self.level = simd.checked()?;
         self.simd = simd;
+        Ok(())
+    }
+
+    /// Changes the scene, whose own volume is ignored. What voxels are drawn from is computed again only if the transfer function, the clip planes,
+    /// the kernel or the classification change; coefficients that interpolate the values only with the kernel.
+    ///
+    /// # Errors
+    /// As for [`Self::new`]; then nothing changes.
+    pub fn set_scene(&mut self, scene: &Scene) -> Result<(), RenderError> {
+        scene.check()?;
+        scene.transfer.check_volume(&self.volume)?;
+        check(scene)?;
+        let transfer = scene.transfer.resolve(&self.volume);
+        let scene = scene.classified(&self.volume);
+        let (old, new) = (&self.scene.splatting, &scene.splatting);
+        let is_same_kernel =
+            (old.radius, old.falloff, old.interpolation) == (new.radius, new.falloff, new.interpolation);
+        let is_same_function = transfer == self.transfer;
+        match &mut self.list {
+            List::Before(..) if new.classification == Classification::Before => {
+                if !(is_same_function && is_same_kernel && scene.clip == self.scene.clip) {
+                    self.list = List::new(&self.volume, &transfer, &scene)?;
+                }
+            }
+            List::After(coefficients) if new.classification == Classification::After && is_same_kernel => {
+                if !(is_same_function && new.compositing == old.compositing) {
+                    coefficients.forget();
+                }
+            }
+            _ => self.list = List::new(&self.volume, &transfer, &scene)?,
+        }
+        (self.scene, self.transfer) = (scene, transfer);
         Ok(())
     }
 
@@ -303,4 +340,44 @@ pub fn render(volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Rendering
 
 fn milliseconds_since(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use super::*;
+    use crate::scene::VolumeSource;
+    use crate::settings::splatting::Interpolation;
+
+    /// Where what voxels are drawn from lies in memory.
+    fn list_of(renderer: &CpuRenderer) -> *const () {
+        match &renderer.list {
+            List::Before(bricks, _) => bricks.bricks().as_ptr().cast(),
+            List::After(coefficients) => coefficients.all(&renderer.volume).as_ptr().cast(),
+        }
+    }
+
+    #[test]
+    fn a_changed_scene_keeps_what_does_not_depend_on_the_change() {
+        let sets = ["image={width=16,height=16}".to_owned()];
+        for (classification, interpolation) in
+            [(Classification::Before, Interpolation::Smooth), (Classification::After, Interpolation::Exact)]
+        {
+            let mut scene = Scene::from_volume(VolumeSource::Builtin("head:12".to_owned()), &sets).unwrap();
+            (scene.splatting.classification, scene.splatting.interpolation) = (classification, interpolation);
+            let mut renderer = CpuRenderer::new(scene.load_volume().unwrap(), &scene).unwrap();
+            renderer.draw().unwrap();
+            let list = list_of(&renderer);
+            scene.camera = scene.camera.turned(20.0);
+            scene.shading.ambient = 0.5;
+            scene.splatting.compositing = crate::settings::splatting::Compositing::Xray;
+            scene.splatting.slab_width = 0.5;
+            renderer.set_scene(&scene).unwrap();
+            renderer.draw().unwrap();
+            assert_eq!(list_of(&renderer), list, "{classification:?}");
+            scene.splatting.radius = 1.5;
+            renderer.set_scene(&scene).unwrap();
+            assert_ne!(list_of(&renderer), list, "{classification:?}");
+        }
+    }
 }

@@ -154,6 +154,32 @@ impl Headless {
         }))
     }
 
+    /// Changes a view's scene, whose own volume is ignored. Only what depends on the change is computed again: on the CPU as
+    /// [`CpuRenderer::set_scene`](crate::cpu::CpuRenderer::set_scene) says; on the GPU everything but the uploaded volume, unless only the camera changes.
+    ///
+    /// # Errors
+    /// As for [`Self::view`], or if another backend made the view; then nothing changes.
+    pub fn set_scene(&self, view: &mut HeadlessView, scene: &Scene) -> Result<(), RenderError> {
+        match (&self.drawer, view.backend_mut()) {
+            #[cfg(feature = "gpu")]
+            (Drawer::Gpu(gpu), ViewBackend::Gpu(view)) => {
+                let turned = Scene { camera: scene.camera, ..view.scene().clone() };
+                if turned == *scene {
+                    return Ok(view.set_camera(scene.camera)?);
+                }
+                let mut new = crate::SceneView::new(gpu.device(), view.volume().gpu_volume(), scene)?;
+                new.first_hit = view.first_hit;
+                **view = new;
+                Ok(())
+            }
+            #[cfg(feature = "cpu")]
+            (Drawer::Cpu, ViewBackend::Cpu(view)) => view.set_scene(scene),
+            (Drawer::Reference, ViewBackend::Reference(view)) => view.set_scene(scene),
+            #[cfg(any(feature = "gpu", feature = "cpu"))]
+            (_, other) => Err(self.refuse(other.backend()).into()),
+        }
+    }
+
     /// Draws one frame of a view.
     ///
     /// # Errors

@@ -43,6 +43,12 @@ impl ReferenceView {
         &self.scene
     }
 
+    /// Changes the scene; then the last frame's first hits are gone.
+    pub(super) fn set_scene(&mut self, scene: &Scene) -> Result<(), RenderError> {
+        *self = Self { first_hit: self.first_hit, ..Self::new(self.volume.clone(), scene)? };
+        Ok(())
+    }
+
     pub(super) fn set_camera(&mut self, camera: Camera) -> Result<(), SettingError> {
         camera.check()?;
         self.scene.camera = camera;

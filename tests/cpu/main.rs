@@ -9,6 +9,7 @@ mod after;
 mod common;
 mod modes;
 mod picks;
+mod scenes;
 mod surfaces;
 
 use glam::{DVec3, UVec3};

@@ -60,8 +60,13 @@ impl Coefficients {
     }
 
     /// All of them, in memory order; NaN at holes.
-    pub(super) fn all<'a>(&'a self, volume: &'a Volume) -> &'a [f32] {
+    pub(in crate::cpu) fn all<'a>(&'a self, volume: &'a Volume) -> &'a [f32] {
         self.exact.as_deref().unwrap_or(volume.values())
+    }
+
+    /// Forgets which bricks may be drawn, because the transfer function or the compositing changed.
+    pub(in crate::cpu) fn forget(&mut self) {
+        self.shown = None;
     }
 
     /// Finds the bricks that may be drawn in a view, if that may have changed them.

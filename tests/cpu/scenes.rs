@@ -1,0 +1,93 @@
+//! Scenes of a renderer that change.
+
+use glam::DVec3;
+use sheetsplat::cpu::CpuRenderer;
+use sheetsplat::headless::{Backend, Headless, HeadlessOptions};
+use sheetsplat::scene::Scene;
+use sheetsplat::settings::{Camera, Classification, Clip, Compositing, Gradient, Interpolation, Light, Splatting};
+use sheetsplat::volume::builtin;
+
+use super::common::{Random, scene, transfer};
+use super::{bits, draw};
+
+/// A change of a scene.
+fn change(scene: &mut Scene, random: &mut Random) {
+    let Splatting { classification, compositing, interpolation, radius, .. } = &mut scene.splatting;
+    match random.bits() % 9 {
+        0 => {
+            let direction = DVec3::new(random.uniform(-1.0, 1.0), random.uniform(0.2, 1.0), random.uniform(-1.0, 1.0));
+            scene.camera = Camera { direction, ..scene.camera };
+        }
+        1 => scene.shading.light = Light::Direction(DVec3::new(random.uniform(-1.0, 1.0), 1.0, 0.3)),
+        2 => scene.shading.gradient = random.pick(&[Gradient::Differences, Gradient::Kernel]),
+        3 => {
+            let low = random.uniform(20.0, 120.0);
+            scene.transfer = transfer(&[(0.0, [0.9, 0.7, 0.5]), (255.0, [1.0; 3])], &[(low, 0.0), (low + 30.0, 0.8)]);
+        }
+        4 => scene.clip = Clip { planes: vec![[1.0, 0.2, 0.0, random.uniform(-4.0, 4.0)]], crop: None },
+        5 => *classification = random.pick(&[Classification::Before, Classification::After]),
+        6 => {
+            *compositing = random.pick(&[
+                Compositing::Linear,
+                Compositing::Exponential,
+                Compositing::Maximum,
+                Compositing::Surface,
+            ])
+        }
+        7 => *interpolation = random.pick(&[Interpolation::Smooth, Interpolation::Exact]),
+        _ => *radius = random.pick(&[1.5, 2.0]),
+    }
+}
+
+#[test]
+fn a_changed_scene_is_drawn_as_a_new_one() {
+    let volume = std::sync::Arc::new(builtin::volume("head:16").unwrap());
+    let mut random = Random(19);
+    let mut scene = scene(40, 40);
+    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(40.0, 0.0), (90.0, 0.7)]);
+    scene.camera.projection = sheetsplat::settings::Projection::Orthographic { height: Some(20.0) };
+    let mut renderer = CpuRenderer::new(volume.clone(), &scene).unwrap();
+    let mut images = std::collections::BTreeSet::new();
+    for step in 0..60 {
+        change(&mut scene, &mut random);
+        renderer.set_scene(&scene).unwrap();
+        let image = renderer.draw().unwrap().image;
+        assert_eq!(bits(&image), bits(&draw(&volume, &scene).image), "step {step}: {scene:?}");
+        images.insert(bits(&image));
+    }
+    assert!(images.len() > 30, "only {} images", images.len());
+    // A scene that is refused changes nothing.
+    let before = bits(&renderer.draw().unwrap().image);
+    let mut wrong = scene.clone();
+    wrong.splatting.radius = f64::NAN;
+    assert!(renderer.set_scene(&wrong).unwrap_err().to_string().contains("splatting.radius"));
+    assert_eq!(bits(&renderer.draw().unwrap().image), before);
+    assert_eq!(renderer.scene().splatting, scene.splatting);
+}
+
+#[test]
+fn views_of_every_backend_change_their_scenes() {
+    let volume = std::sync::Arc::new(builtin::volume("head:12").unwrap());
+    let mut first = scene(24, 24);
+    first.transfer = transfer(&[(0.0, [1.0; 3])], &[(40.0, 0.0), (90.0, 0.7)]);
+    let turned = Scene { camera: first.camera.turned(30.0), ..first.clone() };
+    let mut other = turned.clone();
+    other.transfer = transfer(&[(0.0, [1.0, 0.5, 0.2])], &[(60.0, 0.0), (100.0, 0.9)]);
+    let all = [Backend::Gpu, Backend::Cpu, Backend::Reference];
+    let headless = all.map(|backend| Headless::new(&HeadlessOptions::default().with_backend(backend)).unwrap());
+    for headless in &headless {
+        let mut view = headless.view(volume.clone(), &first).unwrap();
+        view.set_first_hit(Some(0.5)).unwrap();
+        for scene in [&turned, &other, &first] {
+            headless.set_scene(&mut view, scene).unwrap();
+            let image = headless.draw(&mut view).unwrap().image;
+            let fresh = headless.draw(&mut headless.view(volume.clone(), scene).unwrap()).unwrap().image;
+            assert_eq!(bits(&image), bits(&fresh), "{:?}", headless.backend());
+            headless.pick(&view, [12, 12]).expect("first hits are still asked for");
+        }
+    }
+    let [gpu, cpu, _] = &headless;
+    let mut of_cpu = cpu.view(volume, &first).unwrap();
+    let message = gpu.set_scene(&mut of_cpu, &other).unwrap_err().to_string();
+    assert!(message.contains("cpu") && message.contains("gpu"), "{message}");
+}
