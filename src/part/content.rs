@@ -3,7 +3,7 @@
 use crate::settings::splatting::{Classification, Compositing};
 
 /// Extremes that differ by less, relative to the range of the coefficients, count as equal, as where a whole image is drawn.
-const HAIR: f32 = 2e-6;
+const HAIR_OF_RANGE: f32 = 2e-6;
 
 /// The pixels of a part's region, row by row, before the background.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -67,8 +67,8 @@ impl Rule {
             return other.counted > chosen.counted;
         }
         match self.compositing {
-            Compositing::Minimum => other.value < chosen.value - HAIR,
-            _ => other.value > chosen.value + HAIR,
+            Compositing::Minimum => other.value < chosen.value - HAIR_OF_RANGE,
+            _ => other.value > chosen.value + HAIR_OF_RANGE,
         }
     }
 
