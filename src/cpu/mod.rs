@@ -10,7 +10,7 @@
 //!        ─ first_hit ─→ the depths at which an opacity was reached, if requested
 //! ```
 //!
-//! Where classification comes after splatting, [`after`] walks the tiles.
+//! Where classification comes after splatting, `after` walks the tiles.
 //!
 //! Functions that work with vectors are inlined into the function that an instruction set is chosen for, or choose it themselves; else their vectors would pass
 //! through memory. Builds without optimization are the exception, since there one function with everything inlined would need megabytes of stack.

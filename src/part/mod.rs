@@ -1,6 +1,6 @@
 //! Parts of an image (SPEC §11): some slabs, some pixels, or both, drawn anywhere and at any time, that merge exactly into the whole image.
 //!
-//! [`Headless::render_part`](crate::headless::Headless::render_part) draws a part of a scene's image, and [`Image::merge`] puts the parts
+//! [`Headless::render_part`](crate::headless::Headless::render_part) draws a part of a scene's image, and [`Image::merge`](crate::Image::merge) puts the parts
 //! together.
 //!
 //! ```
