@@ -32,7 +32,7 @@ fn change(scene: &mut Scene, random: &mut Random) {
                 Compositing::Exponential,
                 Compositing::Maximum,
                 Compositing::Surface,
-            ])
+            ]);
         }
         7 => *interpolation = random.pick(&[Interpolation::Smooth, Interpolation::Exact]),
         _ => *radius = random.pick(&[1.5, 2.0]),
