@@ -23,7 +23,7 @@ fn main() {
         let mut scene = common::open(name);
         (scene.image.width, scene.image.height) = (side, side);
         let volume = scene.load_volume().unwrap();
-        let transfer = scene.transfer.resolve(&volume);
+        let transfer = scene.resolve(&volume);
         let all = reference::count(&volume, &transfer, &scene).unwrap();
         let culled = |test| reference::render_culled(&volume, &transfer, &scene, Some(test)).unwrap();
         let share = |test| 100.0 * culled(test).sections as f64 / all.sections_total as f64;

@@ -50,8 +50,10 @@ fn plane_sample(pixel: vec2u, at: vec3f) -> vec4f {
     if !KERNEL_GRADIENT {
         return vec4f(number, vec3f(first.zw, second.x) / first.x);
     }
-    let moment = second.yzw - number * vec3f(first.zw, second.x);
-    return vec4f(number, in_grid(-2.0 * frame.falloff / first.x * moment) / frame.aspect.xyz);
+    let moment = (second.yzw - number * vec3f(first.zw, second.x)) / first.x;
+    let is_noise = dot(moment, moment) < planes.min_moment * planes.min_moment;
+    let gradient = in_grid(-2.0 * frame.falloff * moment) / frame.aspect.xyz;
+    return vec4f(number, select(gradient, vec3f(0.0), is_noise));
 }
 
 // Numbers that differ by less, relative to the range of all numbers, count as equal: in homogeneous matter only rounding tells them apart.
@@ -110,12 +112,15 @@ struct Composited {
     is_changed: bool,
 }
 
+// Whether the slab whose middle has this sheet depth is drawn.
+fn is_drawn(middle: f32) -> bool {
+    return !CUT || is_drawn_slab(middle);
+}
+
 // `linear`, `exponential`, `xray`: composites the slab's sheet.
 fn composite_slab(slab: Slab, image: vec4f, light: Lighting) -> Composited {
     let part = vec2f(max(slab.ray.x, slab.near), min(slab.ray.y, slab.far));
-    // The share of the slab's width, from what is missing, so that whole slabs are not rounded.
-    let missing = max(slab.ray.x - slab.near, 0.0) + max(slab.far - slab.ray.y, 0.0);
-    let share = max(1.0 - missing / frame.slab_width, 0.0);
+    let share = select(0.0, shown_share(slab.ray, slab.near), is_drawn(0.5 * (slab.near + slab.far)));
     let seen = look(slab.first, slab.last, ramps_at(slab.at, 0.5 * (part.x + part.y)), light);
     let slope = select(vec2f(0.0), frame.pixel_per_depth * slab.at.xy, frame.near > 0.0);
     let per_sheet = sqrt(1.0 + dot(slope, slope)) / dot(cut.sheet_along.xyz, slab.at);
@@ -130,7 +135,8 @@ fn composite_slab(slab: Slab, image: vec4f, light: Lighting) -> Composited {
 // `surface`: the pixel is opaque where its ray first meets one.
 fn find_surface(slab: Slab, image: vec4f, light: Lighting) -> Composited {
     let start = max(slab.ray.x - slab.near, 0.0) / frame.slab_width;
-    let end = 1.0 - max(slab.far - slab.ray.y, 0.0) / frame.slab_width;
+    let shown_end = 1.0 - max(slab.far - slab.ray.y, 0.0) / frame.slab_width;
+    let end = select(start, shown_end, is_drawn(0.5 * (slab.near + slab.far)));
     var share = NO_SURFACE;
     // Of two surfaces the nearer one counts.
     if start < end && (frame.order != FRONT_TO_BACK || image.a < 1.0) {
@@ -155,9 +161,12 @@ fn find_surface(slab: Slab, image: vec4f, light: Lighting) -> Composited {
 // middle of its stretch, if the slab holds it.
 fn choose(slab: Slab, image: vec4f, before: vec4u, light: Lighting) -> Composited {
     let plane = sheet_group.near;
-    let is_point = slab.drawn.x != NO_NUMBER && slab.ray.x <= plane && plane <= slab.ray.y;
+    // A plane belongs to the slab behind it.
+    let is_plane_drawn = is_drawn(plane + 0.5 * frame.slab_width);
+    let is_point = slab.drawn.x != NO_NUMBER && slab.ray.x <= plane && plane <= slab.ray.y && is_plane_drawn;
     let middle = 0.5 * (slab.ray.x + slab.ray.y);
-    let is_middle_here = slab.ray.x <= slab.ray.y && slab.near <= middle && middle < slab.far;
+    let is_here = slab.ray.x <= slab.ray.y && slab.near <= middle && middle < slab.far;
+    let is_middle_here = is_here && is_drawn(0.5 * (slab.near + slab.far));
     var carried = before;
     var is_chosen = is_point;
     var sheet_depth = plane;
@@ -216,9 +225,8 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
     let tile = composited.tiles[list_place];
     let words = tile_grid(frame.size).x;
     let corner = vec2u(tile % words, tile / words) * TILE;
-    if corner.y < band.first_row || corner.y >= band.first_row + band.rows {
-        return;
-    }
+    // All threads must reach the barrier, and a browser cannot know that they would all return here.
+    let is_in_band = corner.y >= band.first_row && corner.y < band.first_row + band.rows;
     let last_group = last_groups[tile];
     let is_front_to_back = frame.order == FRONT_TO_BACK;
     let group_before = select(sheet_group.number + 1u, sheet_group.number - 1u, is_front_to_back);
@@ -226,7 +234,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
     // The slab's planes.
     let near = select(sheet_group.near, sheet_group.near - frame.slab_width, is_front_to_back);
     let far = near + frame.slab_width;
-    for (var row = local.y; row < TILE; row += WORKGROUP_ROWS) {
+    for (var row = select(TILE, local.y, is_in_band); row < TILE; row += WORKGROUP_ROWS) {
         let pixel = corner + vec2u(local.x, row);
         var is_opaque = true;
         if all(pixel < frame.size) {
@@ -272,11 +280,14 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
             }
             carried[slot] = with_sample(now, drawn);
             // What lies behind a cut is as hidden as what lies behind opaque voxels.
-            is_opaque = image.a >= frame.opacity_threshold || CUT && ray.y <= far;
+            is_opaque = image.a >= frame.opacity_threshold || (CUT && min(ray.y, cut.slabs.y) <= far);
         }
         mark_opaque(local.x, row, is_opaque);
     }
     workgroupBarrier();
+    if !is_in_band {
+        return;
+    }
     write_opaque(tile, local.xy);
     if all(local.xy == vec2u()) && atomicLoad(&is_carried) != 0u {
         last_groups[tile] = sheet_group.number;

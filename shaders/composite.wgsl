@@ -51,12 +51,11 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
     let tile = composited.tiles[at];
     let words = tile_grid(frame.size).x;
     let corner = vec2u(tile % words, tile / words) * TILE;
-    if corner.y < band.first_row || corner.y >= band.first_row + band.rows {
-        return;
-    }
+    // All threads must reach the barrier, and a browser cannot know that they would all return here.
+    let is_in_band = corner.y >= band.first_row && corner.y < band.first_row + band.rows;
     let layers = textureNumLayers(sheets);
     let is_after_gap = last_groups[tile] + 1u != sheet_group.number;
-    for (var row = local.y; row < TILE; row += WORKGROUP_ROWS) {
+    for (var row = select(TILE, local.y, is_in_band); row < TILE; row += WORKGROUP_ROWS) {
         let pixel = corner + vec2u(local.x, row);
         var is_opaque = true;
         if all(pixel < frame.size) {
@@ -80,12 +79,13 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
                 let near = sheet_group.near + f32(layer) * frame.slab_width;
                 let part = vec2f(max(ray.x, near), min(ray.y, near + frame.slab_width));
                 if CUT && COMPOSITING != MINIMUM {
-                    sheet *= max(part.y - part.x, 0.0) / frame.slab_width;
+                    sheet *= shown_share(ray, near);
                 }
                 if is_by_means() {
                     sheet *= looks.weight;
                 }
-                if counts(sheet.a, near + 0.5 * frame.slab_width, looks.counted) {
+                let middle = near + 0.5 * frame.slab_width;
+                if counts(sheet.a, middle, looks.counted) && (!CUT || is_drawn_slab(middle)) {
                     let before = image.a;
                     image = composite(image, sheet, COMPOSITING, frame.order);
                     if FIRST_HIT && COMPOSITING == SURFACE && before < 1.0 && image.a >= 1.0 {
@@ -100,12 +100,15 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
             }
             acc[slot] = image;
             // Whatever lies behind a cut is hidden, as behind opaque voxels.
-            let is_cut = CUT && ray.y <= sheet_group.near + f32(layers) * frame.slab_width;
+            let is_cut = CUT && min(ray.y, cut.slabs.y) <= sheet_group.near + f32(layers) * frame.slab_width;
             is_opaque = image.a >= frame.opacity_threshold || is_cut;
         }
         mark_opaque(local.x, row, is_opaque);
     }
     workgroupBarrier();
+    if !is_in_band {
+        return;
+    }
     write_opaque(tile, local.xy);
     if all(local.xy == vec2u()) {
         last_groups[tile] = sheet_group.number;

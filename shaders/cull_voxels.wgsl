@@ -70,8 +70,8 @@ fn main(@builtin(local_invocation_index) slot: u32, @builtin(workgroup_id) workg
         let center_px = p.xy;
         // Voxels close to the eye have no place on the screen: nothing is known of them.
         let is_close = PLANE && frame.near > 0.0 && p.w <= CLOSE * frame.reach;
-        let on_screen = is_close || all(center_px + sheet_group.half_box >= vec2f(0.5))
-            && all(center_px - sheet_group.half_box <= vec2f(frame.size) - 0.5);
+        let on_screen = is_close || (all(center_px + sheet_group.half_box >= vec2f(0.5))
+            && all(center_px - sheet_group.half_box <= vec2f(frame.size) - 0.5));
         // The sheets of this group that the kernel overlaps by more than the rounding errors of depths: a kernel that ends at a plane does not
         // reach the sheet behind it. The first voxel's depth is about as large as any.
         let error = 2e-7 * (frame.radius + abs(frame.screen_from_voxel[2].w) + abs(sheet_group.near));

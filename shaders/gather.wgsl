@@ -8,6 +8,9 @@
 // One-shot loops: software drivers execute both sides of an `if` under a mask, but skip a loop without iterations. Work that is often skipped
 // therefore stands in `for (var x = condition; x; x = false)`, a loop that runs at most once.
 
+// Those of the voxels' own, if they have any.
+@group(0) @binding(15) var colors: texture_2d_array<u32>;
+
 // A kernel's sections begin at a group's near plane, and nothing is handed on from group to group.
 const FIRST_PLANE = 0.0;
 const GROUPS_LOOKED_BACK = 0u;
@@ -84,7 +87,7 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> b
 // Composites a thread's complete sheets into its pixels.
 fn composite_pixels(pixels: Pixels, sheets: Sheets, progress: ptr<function, Progress>) {
     passes += passes_per_look();
-    look(pixels.column, pixels.rows);
+    find_stretches(pixels.column, pixels.rows);
     if FIRST_HIT {
         load_hits(pixels);
     }

@@ -143,7 +143,7 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> b
 // Composites the slabs in front of the four planes, whose sums are complete.
 fn composite_pixels(pixels: Pixels, sheets: Sheets, progress: ptr<function, Progress>) {
     passes += passes_per_look() + PASSES_PER_SLABS;
-    look(pixels.column, pixels.rows);
+    find_stretches(pixels.column, pixels.rows);
     if FIRST_HIT {
         load_hits(pixels);
     }

@@ -10,6 +10,7 @@
 @group(0) @binding(5) var<storage, read> args: Indirect;
 @group(0) @binding(6) var<storage, read_write> splats: array<Splat>;
 @group(0) @binding(7) var labels: texture_2d_array<u32>;
+@group(0) @binding(8) var colors: texture_2d_array<u32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
@@ -20,15 +21,29 @@ fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) wor
     }
     let id = fresh[at];
     let voxel = voxel_of(bricks[id / BRICK_VOXELS], id % BRICK_VOXELS);
+    let p = project(voxel);
+    let light = lighting(p.xy, frame.near > 0.0);
+    // A voxel's footprint is the same in all channels, so their amounts are drawn as one (SPEC §10).
+    var sum = amount_in_channel(voxel, 0u, ramps_of(index_of(voxel)), light);
+    for (var channel = 1u; channel < CHANNELS; channel += 1u) {
+        read_channel(channel);
+        sum += amount_in_channel(voxel, channel, ramps_of_channel(channel), light);
+    }
+    splats[id] = Splat(p.x, p.y, p.z, p.w, pack2x16float(sum.rg), pack2x16float(sum.ba));
+}
+
+// A voxel's colour and amount per unit length in the channel that is read, `(C·m, m)`; 0 in a hole.
+fn amount_in_channel(voxel: vec3u, channel: u32, ramps: vec4u, light: Lighting) -> vec4f {
     let index = index_of(voxel);
-    let value = value_at(index);
+    let stored = stored_at(index);
+    let value = value_of(stored);
     let gradient = gradient_at(voxel);
-    let ramps = ramps_of(index);
-    let color = ramp(ramps.x, ramps.y, value);
+    var own = vec4f(ramp(ramps.x, ramps.y, value), 1.0);
+    if channel == 0u {
+        own = own_color(index, own.rgb);
+    }
     let opacity = ramp(ramps.y, ramps.z, value).x;
     let gradient_opacity = ramp(ramps.z, ramps.w, gradient.magnitude).x;
-    let m = amount(opacity * gradient_opacity);
-    let p = project(voxel);
-    let c = shade(color, gradient, lighting(p.xy, frame.near > 0.0)) * m;
-    splats[id] = Splat(p.x, p.y, p.z, p.w, pack2x16float(c.rg), pack2x16float(vec2f(c.b, m)));
+    let m = amount(opacity * gradient_opacity * own.a);
+    return select(vec4f(shade(own.rgb, gradient, light) * m, m), vec4f(0.0), HOLES && is_hole(stored));
 }

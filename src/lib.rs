@@ -172,7 +172,7 @@ pub use wgpu;
 /// without notice.
 #[doc(hidden)]
 pub mod internals {
-    pub use crate::geometry::{footprint, grid_warp, means, slab, view_geometry};
+    pub use crate::geometry::{footprint, grid_warp, means, plane_geometry, slab, view_geometry};
     pub use crate::lists::{brick, bucket, classify, iso_range, patch_bins, quad_plan, value_list};
     pub use crate::settings::camera::{Eye, ViewBasis};
     pub use crate::settings::clip::ClippedVoxels;

@@ -5,6 +5,8 @@ use glam::{DVec2, DVec3, UVec3};
 use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::scene::ImageSettings;
+use crate::settings::transfer_function::TransferFunction;
+use crate::settings::window::Region;
 use crate::volume::Volume;
 
 /// A point of a volume.
@@ -17,23 +19,43 @@ pub struct Pick {
     pub depth: f64,
     /// The nearest voxel.
     pub voxel: UVec3,
-    /// That voxel's value, NaN in a hole.
+    /// The number of the channel (SPEC §10) with the greatest opacity in that voxel, the first of equal ones. The scene knows its name:
+    /// [`Scene::channel_name`](crate::Scene::channel_name).
+    pub channel: usize,
+    /// That voxel's value in the channel, NaN in a hole.
     pub value: f32,
-    /// That voxel's label, if the volume is segmented.
+    /// That voxel's label, if the channel is segmented.
     pub label: Option<u16>,
 }
 
 impl Pick {
     /// The point at a depth of a pixel's ray.
-    pub(crate) fn at(view: &ViewGeometry, volume: &Volume, pixel: [u32; 2], depth: f64) -> Self {
+    pub(crate) fn at(
+        view: &ViewGeometry,
+        (volume, transfer): (&Volume, &TransferFunction),
+        pixel: [u32; 2],
+        depth: f64,
+    ) -> Self {
         let grid = volume.grid();
         let place = DVec2::from(pixel.map(f64::from)) + 0.5 - DVec2::from(view.size.map(f64::from)) / 2.0;
         let position = view.rays().at(place, depth / grid.unit()) * grid.unit();
         let last = grid.dims.as_dvec3() - 1.0;
         let voxel = (position / grid.spacing + grid.center()).round().clamp(DVec3::ZERO, last).as_uvec3();
         let index = grid.index_of(voxel);
-        let (value, label) = (volume.values()[index as usize], volume.label(index));
-        Self { position, depth, voxel, value, label }
+        let opacity = |(volume, transfer): (&Volume, &TransferFunction)| {
+            let value = f64::from(volume.values()[index as usize]);
+            let tables = transfer.tables(volume.label(index));
+            if value.is_nan() {
+                0.0
+            } else {
+                tables.alpha(value, volume.gradient(voxel).length()) * volume.alpha_of(index)
+            }
+        };
+        let opacities = volume.channels().zip(transfer.channels()).map(opacity).enumerate();
+        let (channel, _) = opacities.fold((0, 0.0), |best, of| if of.1 > best.1 { of } else { best });
+        let of_channel = volume.channel(channel).unwrap_or(volume);
+        let (value, label) = (of_channel.values()[index as usize], of_channel.label(index));
+        Self { position, depth, voxel, channel, value, label }
     }
 
     /// The error of a pick without a first hit: none were requested, or the pixel lies outside the image.
@@ -52,7 +74,9 @@ impl Pick {
 pub(crate) struct FirstHits {
     /// The frame's view.
     pub(crate) view: ViewGeometry,
-    /// For every pixel, row by row, the depth in world units; infinite where the opacity is not reached.
+    /// The pixels that were drawn.
+    pub(crate) region: Region,
+    /// For every pixel of the region, row by row, the depth in world units; infinite where the opacity is not reached.
     pub(crate) depths: Vec<f32>,
 }
 
@@ -63,16 +87,17 @@ impl FirstHits {
     /// If the frame has no first hits, or the pixel lies outside the image.
     pub(crate) fn pick(
         hits: Option<&Self>,
-        volume: &Volume,
+        of: (&Volume, &TransferFunction),
         pixel: [u32; 2],
         image: &ImageSettings,
     ) -> Result<Option<Pick>, SettingError> {
         let depth_at = |hits: &Self| {
-            let [width, height] = hits.view.size;
-            let is_inside = pixel[0] < width && pixel[1] < height;
-            is_inside.then(|| (hits.view, hits.depths[pixel[1] as usize * width as usize + pixel[0] as usize]))
+            let [x, y] = pixel.map(|at| at as usize);
+            let (columns, rows) = (hits.region.columns(), hits.region.rows());
+            let is_inside = columns.contains(&x) && rows.contains(&y);
+            is_inside.then(|| (hits.view, hits.depths[(y - rows.start) * columns.len() + x - columns.start]))
         };
         let Some((view, depth)) = hits.and_then(depth_at) else { return Err(Pick::missing(pixel, image)) };
-        Ok(depth.is_finite().then(|| Pick::at(&view, volume, pixel, depth.into())))
+        Ok(depth.is_finite().then(|| Pick::at(&view, of, pixel, depth.into())))
     }
 }

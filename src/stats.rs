@@ -69,3 +69,21 @@ pub struct Counts {
     /// Bricks whose voxels were visited; by the tile rasterizer again for every tile and group.
     pub bricks_visited: u64,
 }
+
+impl Counts {
+    /// Adds those of a further channel that was drawn by itself (SPEC §10).
+    pub(crate) fn add_channel(&mut self, other: &Self) {
+        let Self { voxels_total: _, voxels_in_range, voxels_shaded, sections_total, sections_rasterized, .. } = self;
+        let Self { sheets, tiles_total, tiles_composited, quads, bricks_tested, bricks_visited, .. } = *other;
+        *voxels_in_range += other.voxels_in_range;
+        *voxels_shaded += other.voxels_shaded;
+        *sections_total += other.sections_total;
+        *sections_rasterized += other.sections_rasterized;
+        self.sheets += sheets;
+        self.tiles_total += tiles_total;
+        self.tiles_composited += tiles_composited;
+        self.quads += quads;
+        self.bricks_tested += bricks_tested;
+        self.bricks_visited += bricks_visited;
+    }
+}

@@ -12,6 +12,7 @@ use glam::{DVec3, UVec2, UVec3};
 use sheetsplat::settings::Clip;
 use sheetsplat::settings::Projection;
 
+use sheetsplat::cpu::CpuRenderer;
 use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference::{self, Host, ray_march};
@@ -25,7 +26,9 @@ use sheetsplat::{Pick, RenderError, SceneView, SettingError};
 use common::compare::{assert_at_least, assert_at_most};
 use common::images::{BLACK, largest_difference, psnr};
 use common::surfaces::{DepthRange, surfaces};
-use common::{RASTERIZERS, Random, SPACINGS, camera, gpu, random_eye, random_volume, scene, transfer};
+use common::{
+    DRAWINGS, Drawing, RASTERIZERS, Random, SPACINGS, camera, gpu, random_eye, random_volume, scene, transfer,
+};
 
 /// Any view of any volume.
 fn random_case(random: &mut Random) -> (Volume, Scene) {
@@ -97,11 +100,27 @@ fn draw(gpu: &GpuHeadless, view: &mut SceneView) -> (Image, Vec<f64>, Counts) {
     (rendering.image, hits, rendering.stats.counts)
 }
 
+/// The same by the native backend, with a host's surface in `unit`s.
+fn draw_natively(
+    volume: &Volume,
+    scene: &Scene,
+    (depths, first_hit): (Option<&[f64]>, Option<f64>),
+) -> (Image, Vec<f64>, Counts) {
+    let unit = volume.grid().unit();
+    let mut renderer = CpuRenderer::new(volume.clone(), scene).unwrap();
+    let world = |depth: &f64| (depth * unit) as f32;
+    renderer.set_surfaces(depths.map(|depths| depths.iter().map(world).collect())).unwrap();
+    renderer.set_first_hit(first_hit).unwrap();
+    let rendering = renderer.draw().unwrap();
+    let hits = renderer.first_hits().unwrap_or_default().iter().map(|&depth| f64::from(depth) / unit).collect();
+    (rendering.image, hits, rendering.stats.counts)
+}
+
 #[test]
 fn cuts_equal_the_reference() {
     let gpu = gpu();
     let mut random = Random(1905);
-    let mut worst = [f64::INFINITY; 2];
+    let mut worst = [f64::INFINITY; 3];
     let mut changed = 0;
     for case in 0..40 {
         let (volume, mut scene) = random_case(&mut random);
@@ -125,18 +144,20 @@ fn cuts_equal_the_reference() {
         let expected = reference::render_for(host, &volume, &transfer, &scene, None).unwrap();
         changed += usize::from(largest_difference(&whole, &expected.image) > 0.1);
         let range = random.pick(&[DepthRange::Standard, DepthRange::Reversed, DepthRange::Infinite]);
-        for (rasterizer, worst) in RASTERIZERS.into_iter().zip(&mut worst) {
-            scene.splatting.rasterizer = rasterizer;
-            let mut scene_view = gpu.view(volume.clone(), &scene).unwrap();
-            let origin = [case % 4, case % 5];
-            let planes = [0.01, 1000.0];
-            scene_view
-                .set_surfaces(depths.as_ref().map(|depths| surfaces(&gpu, &view, unit, range, planes, depths, origin)))
-                .unwrap();
-            scene_view.set_first_hit(first_hit).unwrap();
-            let (image, hits, _) = draw(&gpu, &mut scene_view);
+        for (drawing, worst) in DRAWINGS.into_iter().zip(&mut worst) {
+            let (image, hits, _) = if let Drawing::By(rasterizer) = drawing {
+                scene.splatting.rasterizer = rasterizer;
+                let mut scene_view = gpu.view(volume.clone(), &scene).unwrap();
+                let (origin, planes) = ([case % 4, case % 5], [0.01, 1000.0]);
+                let given = depths.as_ref().map(|depths| surfaces(&gpu, &view, unit, range, planes, depths, origin));
+                scene_view.set_surfaces(given).unwrap();
+                scene_view.set_first_hit(first_hit).unwrap();
+                draw(&gpu, &mut scene_view)
+            } else {
+                draw_natively(&volume, &scene, (depths.as_deref(), first_hit))
+            };
             let decibels = psnr(&image.pixels, &expected.image.pixels, BLACK, 0);
-            assert_at_least(decibels, 68.0, format_args!("case {case}, {rasterizer:?}, {range:?} with {scene:?}"));
+            assert_at_least(decibels, 68.0, format_args!("case {case}, {drawing:?}, {range:?} with {scene:?}"));
             *worst = worst.min(decibels);
             assert_eq!(hits.len(), expected.first_hits.len());
             let is_close = |(hit, expected): &(&f64, &f64)| {
@@ -144,14 +165,10 @@ fn cuts_equal_the_reference() {
                 hit == expected || (**hit - **expected).abs() / expected.abs().max(10.0) <= 1e-3
             };
             let off = hits.len() - hits.iter().zip(&expected.first_hits).filter(is_close).count();
-            assert!(
-                off <= hits.len() / 200,
-                "case {case}, {rasterizer:?}: {off} of {} hits with {scene:?}",
-                hits.len()
-            );
+            assert!(off <= hits.len() / 200, "case {case}, {drawing:?}: {off} of {} hits with {scene:?}", hits.len());
         }
     }
-    println!("cut frames: at least {worst:.1?} dB by {RASTERIZERS:?}");
+    println!("cut frames: at least {worst:.1?} dB by {DRAWINGS:?}");
     assert!(changed > 20, "cuts show in {changed} cases only");
 }
 
@@ -160,7 +177,7 @@ fn cuts_equal_the_reference() {
 fn culling_keeps_its_guarantee() {
     let gpu = gpu();
     let mut random = Random(64);
-    let mut fewer = [0; 2];
+    let mut fewer = [0; 3];
     for case in 0..24 {
         let (volume, mut scene) = random_case(&mut random);
         scene.splatting.compositing = Compositing::Linear;
@@ -169,10 +186,13 @@ fn culling_keeps_its_guarantee() {
         let view = view_of(&volume, &scene);
         let unit = volume.grid().unit();
         let depths = random_surface(&mut random, &view, unit);
-        for (rasterizer, fewer) in RASTERIZERS.into_iter().zip(&mut fewer) {
-            scene.splatting.rasterizer = rasterizer;
+        for (drawing, fewer) in DRAWINGS.into_iter().zip(&mut fewer) {
             let [with, without] = [true, false].map(|culling| {
                 scene.splatting.culling = culling;
+                let Drawing::By(rasterizer) = drawing else {
+                    return draw_natively(&volume, &scene, (Some(&depths), None));
+                };
+                scene.splatting.rasterizer = rasterizer;
                 let mut scene_view = gpu.view(volume.clone(), &scene).unwrap();
                 let range = DepthRange::Reversed;
                 scene_view
@@ -182,7 +202,7 @@ fn culling_keeps_its_guarantee() {
             });
             let allowed = 1.0 - scene.splatting.opacity_threshold + 2e-5;
             let difference = largest_difference(&with.0, &without.0);
-            assert_at_most(difference, allowed, format_args!("case {case}, {rasterizer:?} with {scene:?}"));
+            assert_at_most(difference, allowed, format_args!("case {case}, {drawing:?} with {scene:?}"));
             let [with, without] = [with, without].map(|(_, _, counts)| counts.sections_rasterized);
             assert!(with <= without);
             *fewer += usize::from(with < without);

@@ -15,7 +15,7 @@ fn files(extensions: &[&str]) -> Vec<PathBuf> {
             let path = entry.unwrap().path();
             let name = path.file_name().unwrap().to_string_lossy().into_owned();
             if path.is_dir() {
-                if name != "target" && name != ".git" {
+                if !["target", ".git", "node_modules"].contains(&name.as_str()) {
                     collect(&path, extensions, found);
                 }
             } else if path.extension().is_some_and(|found| extensions.iter().any(|extension| found == *extension)) {

@@ -20,7 +20,7 @@ const OPACITY_THRESHOLD: f64 = 0.999;
 const MAX_BYTES: u64 = 64 << 10;
 
 /// The scenes: name, builtin volume, and the settings that differ from the defaults. Those whose names begin with `after-` are classified after splatting.
-const SCENES: [(&str, &str, &[&str]); 29] = [
+const SCENES: [(&str, &str, &[&str]); 32] = [
     ("head", "head:72", &["image={width=160,height=160}", "camera={direction=[0.5,0.85,-0.2],height=170.0}"]),
     (
         "head-xray",
@@ -291,6 +291,41 @@ const SCENES: [(&str, &str, &[&str]); 29] = [
             "image={width=112,height=112,background=[1,1,1,1]}",
             "camera={direction=[-0.6,0.75,-0.25],height=170.0}",
             "splatting.compositing=\"surface\"",
+        ],
+    ),
+    (
+        "channels-two",
+        "nerve:128",
+        &[
+            "image={width=144,height=128}",
+            "camera={direction=[0.3,0.4,-0.85],height=460.0}",
+            "channel=[{transfer={color=[[0,[1,0,1]]],opacity=[[20,0],[60,0.3],[120,0.3],[150,0]]}},\
+             {volume={builtin=\"nerve:128\"},transfer={color=[[0,[0,1,0]]],opacity=[[140,0],[220,0.5]]}}]",
+            "shading.enabled=false",
+            "splatting.compositing=\"exponential\"",
+        ],
+    ),
+    (
+        "channels-three",
+        "tomato:72",
+        &[
+            "image={width=144,height=112}",
+            "camera={direction=[0.3,0.5,-0.8],height=220.0}",
+            "channel=[{transfer={color=[[0,[0,1,1]]],opacity=[[30,0],[60,0.12],[90,0]]}},\
+             {volume={builtin=\"tomato:72\"},transfer={color=[[0,[1,0,1]]],opacity=[[80,0],[120,0.3],[160,0]]}},\
+             {volume={builtin=\"tomato:72\"},transfer={color=[[0,[1,1,0]]],opacity=[[150,0],[200,0.5]]}}]",
+            "splatting.compositing=\"exponential\"",
+        ],
+    ),
+    // Another grid, as PET has on CT.
+    (
+        "channels-fusion",
+        "head:72",
+        &[
+            "image={width=128,height=128}",
+            "camera={direction=[0.6,0.7,-0.35],height=190.0}",
+            "preset=\"fusion\"",
+            "channel=[{transfer={opacity=[[20,0],[90,0.03],[200,0.08]]}},{volume={builtin=\"tomato:32\",spacing=[3,3,7]},transfer={opacity=[[90,0],[255,0.3]]}}]",
         ],
     ),
 ];

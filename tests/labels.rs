@@ -19,7 +19,7 @@ use sheetsplat::volume::{Labels, Volume, VolumeError, builtin};
 
 use common::compare::{assert_at_least, assert_at_most};
 use common::images::largest_difference;
-use common::{Random, camera, gpu, scene, transfer};
+use common::{DRAWINGS, Drawing, Random, camera, gpu, scene, transfer};
 
 /// A folder with a volume of 2×3×2 voxels, 1×1×2.5 apart, and a label file beside it.
 struct Folder(tempfile::TempDir);
@@ -212,7 +212,7 @@ fn tables(labels: &[u16]) -> impl Iterator<Item = (u16, LabelTables)> {
     labels.iter().copied().zip(all)
 }
 
-/// Draws a scene by both rasterizers, with and without culling, and compares with the f64 evaluation.
+/// Draws a scene by everything that draws it, with and without culling, and compares with the f64 evaluation.
 fn check(gpu: &GpuHeadless, name: &str, volume: &Volume, scene: &Scene) {
     let transfer = scene.transfer.resolve(volume);
     let expected = reference::render(volume, &transfer, scene).unwrap();
@@ -220,18 +220,16 @@ fn check(gpu: &GpuHeadless, name: &str, volume: &Volume, scene: &Scene) {
     let plain = TransferFunction { labels: BTreeMap::new(), ..transfer };
     let plain = reference::render(volume, &plain, scene).unwrap();
     assert_at_least(largest_difference(&plain, &expected), 0.1, format_args!("{name}: without labels"));
-    for rasterizer in [Rasterizer::Quads, Rasterizer::Tiles] {
+    for drawing in DRAWINGS {
         let mut scene = scene.clone();
-        scene.splatting.rasterizer = rasterizer;
-        let name = format!("{name} {rasterizer:?}");
+        let name = format!("{name} {drawing:?}");
         scene.splatting.culling = false;
-        let drawn = gpu.render_volume(volume.clone(), &scene).unwrap();
+        let drawn = drawing.render(gpu, volume, &scene);
         assert_eq!(drawn.stats.counts.voxels_in_range, counts.voxels_in_range, "{name}");
-        // Quads store a voxel's amounts as f16, tiles as f32.
-        let allowed = if rasterizer == Rasterizer::Quads { 4.8e-4 } else { 4.8e-5 };
+        let allowed = if drawing.rounds_to_f16() { 4.8e-4 } else { 4.8e-5 };
         assert_at_most(largest_difference(&drawn.image, &expected), allowed, &name);
         scene.splatting.culling = true;
-        let culled = gpu.render_volume(volume.clone(), &scene).unwrap();
+        let culled = drawing.render(gpu, volume, &scene);
         let allowed = 1.0 - scene.splatting.opacity_threshold + 1e-4;
         assert_at_most(largest_difference(&culled.image, &drawn.image), allowed, format_args!("{name}: culling"));
     }
@@ -293,8 +291,10 @@ fn labels_of_every_sample_equal_the_reference() {
     scene.transfer.labels = tables(&labels).collect();
     scene.splatting.method = Method::CompositeEverySample;
     let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
-    let drawn = gpu.render_volume(volume, &scene).unwrap();
-    assert_at_most(largest_difference(&drawn.image, &expected), 2.5e-4, "every sample");
+    for drawing in [Drawing::By(Rasterizer::Quads), Drawing::Native] {
+        let drawn = drawing.render(&gpu, &volume, &scene);
+        assert_at_most(largest_difference(&drawn.image, &expected), 2.5e-4, format!("every sample {drawing:?}"));
+    }
 }
 
 /// The volume has more voxels than a layer of the texture, with labels where the next one begins.

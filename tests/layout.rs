@@ -69,6 +69,8 @@ fn shared() -> [Layout; 17] {
             none,
             plane_count,
             has_surfaces,
+            region,
+            slabs,
         }),
         layout!(Frame {
             screen_from_voxel,
@@ -106,11 +108,24 @@ fn shared() -> [Layout; 17] {
             last_label,
             value_offset,
             whole_values,
-            padding_0,
+            channel_table,
             padding_1
         }),
         layout!(SheetGroup { half_box, box_filter, culling, near, first_brick, brick_count, index, number }),
-        layout!(FieldPlanes { axes, step, screen_axis, per_pixel, origin, value_bias, value_scale, per_number }),
+        layout!(FieldPlanes {
+            axes,
+            step,
+            screen_axis,
+            per_pixel,
+            origin,
+            value_bias,
+            value_scale,
+            per_number,
+            min_moment,
+            padding_0,
+            padding_1,
+            padding_2
+        }),
         layout!(FieldVoxel { x, y, depth, number, gradient_xy, gradient_z }),
         layout!(Brick { present, x, y, z, extent }),
         layout!(BrickState { hidden, shaded }),
@@ -159,7 +174,7 @@ fn shared() -> [Layout; 17] {
 }
 
 fn modules() -> impl Iterator<Item = (&'static str, Module)> {
-    shaders::ALL.iter().map(|shader| (shader.stage, naga::front::wgsl::parse_str(shader.source).unwrap()))
+    shaders::ALL.iter().map(|shader| (shader.stage, naga::front::wgsl::parse_str(&shader.source()).unwrap()))
 }
 
 fn find<'a>(module: &'a Module, name: &str) -> Option<(Handle<Type>, &'a Type)> {

@@ -19,15 +19,15 @@ fn validated(shader: &Shader) -> Result<(Module, ModuleInfo), String> {
         let (path, line) = shader.origin(line.unwrap_or(1));
         format!("shaders/{path}:{line}: {message}")
     };
-    let module = naga::front::wgsl::parse_str(shader.source).map_err(|error| {
-        let line = error.location(shader.source).map(|location| location.line_number);
-        failed(line, error.emit_to_string_with_path(shader.source, shader.stage))
+    let module = naga::front::wgsl::parse_str(&shader.source()).map_err(|error| {
+        let line = error.location(&shader.source()).map(|location| location.line_number);
+        failed(line, error.emit_to_string_with_path(&shader.source(), shader.stage))
     })?;
     let of_subgroups = Capabilities::SUBGROUP | Capabilities::SUBGROUP_BARRIER;
     let subgroups = if WITH_SUBGROUPS.contains(shader) { of_subgroups } else { Capabilities::empty() };
     let info = Validator::new(ValidationFlags::all(), WEBGPU_CORE | subgroups).validate(&module).map_err(|error| {
-        let line = error.location(shader.source).map(|location| location.line_number);
-        failed(line, error.emit_to_string_with_path(shader.source, shader.stage))
+        let line = error.location(&shader.source()).map(|location| location.line_number);
+        failed(line, error.emit_to_string_with_path(&shader.source(), shader.stage))
     })?;
     Ok((module, info))
 }
@@ -65,7 +65,6 @@ fn every_shader_validates() {
 fn errors_name_the_file_and_the_line() {
     let broken = Shader {
         stage: "broken",
-        source: "fn first() {}\n\nfn second() {}\nfn third() { nothing(); }\n",
         files: &[
             ("shared/one.wgsl", "fn first() {}\n\n"),
             ("broken.wgsl", "fn second() {}\nfn third() { nothing(); }\n"),
@@ -80,7 +79,6 @@ fn errors_name_the_file_and_the_line() {
         "at shaders/broken.wgsl:2:7, and shaders/shared/one.wgsl:1:2"
     );
     for shader in &shaders::ALL {
-        assert_eq!(shader.files.iter().map(|&(_, text)| text).collect::<String>(), shader.source);
         // Every file ends with a line break, or else lines would be counted wrongly.
         assert!(shader.files.iter().all(|(_, text)| text.ends_with('\n')), "{}", shader.stage);
     }
@@ -92,7 +90,7 @@ fn every_file_is_used() {
     assert!(files.len() >= shaders::ALL.len());
     let is_used = |file: &PathBuf| {
         let text = std::fs::read_to_string(file).unwrap();
-        shaders::ALL.iter().any(|shader| shader.source.contains(&text))
+        shaders::ALL.iter().any(|shader| shader.source().contains(&text))
     };
     let unused: Vec<_> = files.iter().filter(|file| !is_used(file)).map(|file| file.display().to_string()).collect();
     assert_none(&unused);
@@ -140,7 +138,7 @@ fn entry_points_and_overrides_are_those_of_the_passes() {
             if *shader == shaders::CLASSIFY && !declares(pass) && declares(&composite) {
                 continue;
             }
-            let layouts = if shader.source.contains("var footprints:") { &splat_slots } else { pass };
+            let layouts = if shader.source().contains("var footprints:") { &splat_slots } else { pass };
             if [layouts, pass].iter().any(|text| !declares(text)) {
                 failures.push(format!("{}: the pass does not bind {name}", shader.stage));
             }

@@ -46,6 +46,7 @@ fn alpha() {
         gradient_opacity: None,
         iso_ranges: None,
         labels: BTreeMap::new(),
+        further: Vec::new(),
     };
     assert_eq!((transfer.alpha(5.0, 0.0), transfer.alpha(20.0, 0.0)), (0.5, 1.0));
     transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.0), (4.0, 1.0)]).unwrap());

@@ -77,7 +77,7 @@ fn bench(headless: &GpuHeadless, scene: &Scene, name: &str, pairs: usize) {
         100.0 * share
     );
 
-    let transfer = scene.transfer.resolve(&volume);
+    let transfer = scene.resolve(&volume);
     let set = ValueSet::of(&transfer);
     let search = common::median((0..pairs).map(|_| {
         let start = Instant::now();

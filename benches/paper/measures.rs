@@ -145,7 +145,7 @@ pub(crate) fn warp_or_slices(degrees: f64) -> [(f64, f64); 2] {
         ),
         degrees,
     );
-    let image = |volume: &Volume| reference::render(volume, &scene.transfer.resolve(volume), &scene).unwrap();
+    let image = |volume: &Volume| reference::render(volume, &scene.resolve(volume), &scene).unwrap();
     let warped = image(&thick);
     let peak = warped.pixels.iter().fold(0.0_f32, |peak, pixel| peak.max(pixel[0]));
     let weights: [&dyn Fn(f64) -> f64; 2] = [&gaussian, &linear];

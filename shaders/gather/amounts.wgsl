@@ -8,12 +8,14 @@
 // Needs gather/voxels.wgsl: ScreenBox, count_drawn, sheets_here.
 // Needs gather/walk.wgsl: SearchBounds.
 // Needs shared/brick.wgsl: BRICK_VOXELS, voxel_of.
+// Needs shared/channels.wgsl: CHANNELS, read_channel.
+// Needs shared/colors.wgsl: own_color.
 // Needs shared/frame.wgsl: frame.
 // Needs shared/local_ray.wgsl: sections_on_screen.
 // Needs shared/project.wgsl: overlapped, project.
-// Needs shared/ramps.wgsl: LABELS, ramp, ramps_of.
+// Needs shared/ramps.wgsl: LABELS, ramp, ramps_of, ramps_of_channel.
 // Needs shared/shading.wgsl: lighting, shade.
-// Needs shared/volume.wgsl: gradient_at, index_of, value_at.
+// Needs shared/volume.wgsl: Gradient, HOLES, gradient_at, index_of, is_hole, stored_at, value_of.
 
 // The range of the frame's sheets that a kernel overlaps, from the first to the one after the last.
 fn overlapped_sheets(p: vec4f) -> vec2f {
@@ -79,9 +81,39 @@ struct Shaded {
     alpha: f32,
 }
 
+// The sums over all channels (SPEC §10), in which a voxel's footprint is the same.
 fn shaded(voxel: vec3u, p: vec4f) -> Shaded {
+    read_channel(0u);
+    var sum = shaded_first(voxel, p);
+    for (var channel = 1u; channel < CHANNELS; channel += 1u) {
+        read_channel(channel);
+        let further = shaded_further(voxel, ramps_of_channel(channel), p);
+        sum.amount += further.amount;
+        sum.alpha += further.alpha;
+    }
+    return sum;
+}
+
+// In a channel after the first.
+fn shaded_further(voxel: vec3u, ramps: vec4u, p: vec4f) -> Shaded {
+    let stored = stored_at(index_of(voxel));
+    let value = value_of(stored);
+    let gradient = gradient_at(voxel);
+    let color = ramp(ramps.x, ramps.y, value);
+    let alpha = ramp(ramps.y, ramps.z, value).x * ramp(ramps.z, ramps.w, gradient.magnitude).x;
+    return of_opacity(color, select(alpha, 0.0, HOLES && is_hole(stored)), gradient, p);
+}
+
+fn of_opacity(color: vec3f, alpha: f32, gradient: Gradient, p: vec4f) -> Shaded {
+    let m = amount(alpha);
+    return Shaded(vec4f(shade(color, gradient, lighting(p.xy, PERSPECTIVE)) * m, m), alpha);
+}
+
+// In the first channel.
+fn shaded_first(voxel: vec3u, p: vec4f) -> Shaded {
     let index = index_of(voxel);
-    let value = value_at(index);
+    let stored = stored_at(index);
+    let value = value_of(stored);
     let gradient = gradient_at(voxel);
     var ramps = vec4u(0u, frame.ramps.xyz);
     var color = vec3f(0.0);
@@ -104,7 +136,6 @@ fn shaded(voxel: vec3u, p: vec4f) -> Shaded {
         color = ramp(ramps.x, ramps.y, value);
         alpha = ramp(ramps.y, ramps.z, value).x * ramp(ramps.z, ramps.w, gradient.magnitude).x;
     }
-    let m = amount(alpha);
-    color = shade(color, gradient, lighting(p.xy, PERSPECTIVE));
-    return Shaded(vec4f(color * m, m), alpha);
+    let own = own_color(index, color);
+    return of_opacity(own.rgb, select(alpha * own.a, 0.0, HOLES && is_hole(stored)), gradient, p);
 }

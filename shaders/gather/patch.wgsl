@@ -9,8 +9,8 @@
 // Needs gather/queue.wgsl: empty_queue, queue_count.
 // Needs gather/ramps.wgsl: Ramp, ramp_of.
 // Needs gather/region.wgsl: PATCH_HEIGHT, PATCH_WIDTH, with_blocks.
-// Needs gather/sheets.wgsl: Sheets, look, save_sheets, saved_sheets.
-// Needs gather/slabs.wgsl: look.
+// Needs gather/sheets.wgsl: Sheets, find_stretches, save_sheets, saved_sheets.
+// Needs gather/slabs.wgsl: find_stretches.
 // Needs gather/uniforms.wgsl: Gather, Gathered, PatchRange.
 // Needs gather/voxels.wgsl: GatheredGroup, find_voxels, keep_voxels, may_appear, search_bounds.
 // Needs gather/walk.wgsl: is_walked, walk.
@@ -128,7 +128,7 @@ fn find_open_pixels(corner: vec2u, threads: vec2u, thread: u32) -> u32 {
     var own_halves = 0u;
     for (var round = threads.x; round < threads.y; round += THREADS) {
         let pixels = pixels_of(corner, round + thread);
-        look(pixels.column, pixels.rows);
+        find_stretches(pixels.column, pixels.rows);
         let opacity = transpose(load_image(pixels))[3];
         own_halves |= halves_of(pixels.thread);
         open = with_blocks(open, pixels.thread, open_word(pixels, opacity, -FAR));

@@ -1,7 +1,7 @@
 // The pixels of a thread of the tile rasterizer, in the compositing buffer and among first hits.
 //
 // Needs gather.wgsl: cuts_rays.
-// Needs gather/patch.wgsl: acc, gather, gathered, patch_range.
+// Needs gather/patch.wgsl: acc, cut, gather, gathered, patch_range.
 // Needs gather/region.wgsl: block_word.
 // Needs gather/sheets.wgsl: hits, shown_from, shown_to.
 // Needs gather/slabs.wgsl: hits, shown_from, shown_to.
@@ -85,7 +85,7 @@ fn open_word(pixels: Pixels, opacity: vec4f, depth: f32) -> u32 {
     var is_open = pixels.is_inside & (opacity < vec4f(select(3e38, frame.opacity_threshold, frame.culling != 0u)));
     if cuts_rays() {
         is_open &= shown_from < shown_to;
-        is_open &= vec4<bool>(frame.culling == 0u) | (shown_to > vec4f(depth));
+        is_open &= vec4<bool>(frame.culling == 0u) | (min(shown_to, vec4f(cut.slabs.y)) > vec4f(depth));
     }
     return block_word(pixels.thread, is_open);
 }

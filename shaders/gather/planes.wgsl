@@ -200,12 +200,15 @@ fn fields_of(sums: PlaneSums) -> Fields {
     if !KERNEL_GRADIENT {
         return Fields(has_value, number, sums.x * per_weight, sums.y * per_weight, sums.z * per_weight);
     }
-    let scale = -2.0 * frame.falloff * per_weight;
-    let along = mat3x4f(
-        (sums.x - number * sums.offset_x) * scale,
-        (sums.y - number * sums.offset_y) * scale,
-        (sums.z - number * sums.offset_z) * scale,
+    let moments = mat3x4f(
+        (sums.x - number * sums.offset_x) * per_weight,
+        (sums.y - number * sums.offset_y) * per_weight,
+        (sums.z - number * sums.offset_z) * per_weight,
     );
+    let squared = moments[0] * moments[0] + moments[1] * moments[1] + moments[2] * moments[2];
+    let is_noise = squared < vec4f(planes.min_moment * planes.min_moment);
+    let scale = select(vec4f(-2.0 * frame.falloff), vec4f(0.0), is_noise);
+    let along = mat3x4f(moments[0] * scale, moments[1] * scale, moments[2] * scale);
     // From the planes' axes to the grid's, and from grid units to lengths of the world.
     let x = vec3f(planes.axes[0].x, planes.axes[1].x, planes.axes[2].x) / frame.aspect.x;
     let y = vec3f(planes.axes[0].y, planes.axes[1].y, planes.axes[2].y) / frame.aspect.y;

@@ -2,7 +2,7 @@
 //
 // Needs gather/patch.wgsl: COMPOSITING, CUT, FIRST_HIT, ORDER, PATCH_THREADS, cut.
 // Needs shared/compositing.wgsl: composite.
-// Needs shared/cut.wgsl: noted, shown.
+// Needs shared/cut.wgsl: is_drawn_slab, noted, shown, shown_share.
 // Needs shared/frame.wgsl: FRONT_TO_BACK, MINIMUM, SURFACE, frame.
 // Needs shared/means.wgsl: Means, is_by_means, means.
 
@@ -62,7 +62,7 @@ var<private> counted_from: vec4f;
 var<private> counted_to: vec4f;
 
 // Determines the cuts and weights for the rays of a thread's four pixels, which are in one column.
-fn look(column: f32, rows: vec4f) {
+fn find_stretches(column: f32, rows: vec4f) {
     if CUT {
         let across = array<vec2f, 4>(
             shown(vec2f(column, rows.x)),
@@ -106,7 +106,12 @@ fn composite_sheet(image: mat4x4f, sheet: mat4x4f, near: f32) -> mat4x4f {
         first = max(first, shown_from);
         last = min(last, shown_to);
         if COMPOSITING != MINIMUM {
-            scale = max(last - first, vec4f(0.0)) / frame.slab_width;
+            scale = vec4f(
+                shown_share(vec2f(shown_from.x, shown_to.x), near),
+                shown_share(vec2f(shown_from.y, shown_to.y), near),
+                shown_share(vec2f(shown_from.z, shown_to.z), near),
+                shown_share(vec2f(shown_from.w, shown_to.w), near),
+            );
         }
     }
     if is_by_means() {
@@ -124,6 +129,9 @@ fn composite_sheet(image: mat4x4f, sheet: mat4x4f, near: f32) -> mat4x4f {
     if COMPOSITING == MINIMUM {
         let middle = vec4f(near + 0.5 * frame.slab_width);
         result = chosen(image, result, (counted_from <= middle) & (middle <= counted_to));
+    }
+    if CUT {
+        result = chosen(image, result, vec4<bool>(is_drawn_slab(near + 0.5 * frame.slab_width)));
     }
     if FIRST_HIT {
         let before = transpose(image)[3];

@@ -6,7 +6,7 @@
 // Needs gather_planes.wgsl: planes.
 // Needs shared/cells.wgsl: nearest_voxel, voxel_at.
 // Needs shared/compositing.wgsl: composite.
-// Needs shared/cut.wgsl: noted, place_of, sheet_depths, shown_depths.
+// Needs shared/cut.wgsl: is_drawn_slab, noted, place_of, sheet_depths, shown_depths.
 // Needs shared/frame.wgsl: FRONT_TO_BACK, frame.
 // Needs shared/means.wgsl: both, in_box.
 // Needs shared/project.wgsl: slope_of.
@@ -23,7 +23,7 @@ var<private> length_per_depth: vec4f;
 var<private> hits: vec4u;
 
 // Finds the stretches of the rays of a thread's four pixels, which lie in one column.
-fn look(column: f32, rows: vec4f) {
+fn find_stretches(column: f32, rows: vec4f) {
     for (var i = 0u; i < 4u; i += 1u) {
         let point_px = vec2f(column, rows[i]);
         let at = place_of(point_px);
@@ -136,7 +136,8 @@ fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
         let far = without_holes(fields_of(sums_on(sheets, j)), pixels, depth + frame.slab_width);
         let from_depth = max(vec4f(depth), shown_from);
         let to_depth = min(vec4f(depth + frame.slab_width), shown_to);
-        let is_seen = (from_depth < to_depth) & (near.has_value | far.has_value) & vec4<bool>(sheet_group.is_composited);
+        let is_seen = (from_depth < to_depth) & (near.has_value | far.has_value) & vec4<bool>(sheet_group.is_composited)
+            & vec4<bool>(!CUT || is_drawn_slab(depth + 0.5 * frame.slab_width));
         let lengths = max(to_depth - from_depth, vec4f(0.0)) * length_per_depth;
         for (var i = 0u; i < 4u; i += 1u) {
             let slab = slab_between(sample_of(near, i), sample_of(far, i));

@@ -28,7 +28,7 @@ fn composite(behind: vec4f, sheet: vec4f, compositing: u32, order: u32) -> vec4f
             s = vec4f(s.rgb / max(s.a, 1.0), min(s.a, 1.0));
             s.a = select(s.a, 2.0 - s.a, compositing == MINIMUM);
             // The nearer of equal ones is kept.
-            let is_taken = s.a > behind.a || order != FRONT_TO_BACK && s.a == behind.a;
+            let is_taken = s.a > behind.a || (order != FRONT_TO_BACK && s.a == behind.a);
             return select(behind, s, is_taken);
         }
         case SURFACE: {

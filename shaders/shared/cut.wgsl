@@ -16,6 +16,8 @@ struct Cut {
     none: f32,
     plane_count: u32,
     has_surfaces: u32,
+    region: vec4f,
+    slabs: vec4f,
 }
 
 // A number beyond every depth.
@@ -48,7 +50,20 @@ fn shown_depths(point_px: vec2f) -> vec2f {
     let surface = dot(cut.surface_depth, ndc) / dot(cut.surface_w, ndc);
     let is_surface = cut.has_surfaces != 0u && z != cut.no_surface;
     depths.y = select(depths.y, min(depths.y, surface), is_surface);
-    return depths;
+    let is_in_region = all(point_px > cut.region.xy) && all(point_px < cut.region.zw);
+    return select(vec2f(FAR, -FAR), depths, is_in_region);
+}
+
+// Whether a slab whose middle has this sheet depth is composited (SPEC §11).
+fn is_drawn_slab(middle: f32) -> bool {
+    return cut.slabs.x < middle && middle < cut.slabs.y;
+}
+
+// The share of the slab between two sheet depths that a ray from `ray.x` to `ray.y` shows. From what is missing, so that whole slabs are not
+// rounded.
+fn shown_share(ray: vec2f, near: f32) -> f32 {
+    let missing = max(ray.x - near, 0.0) + max(near + frame.slab_width - ray.y, 0.0);
+    return max(1.0 - missing / frame.slab_width, 0.0);
 }
 
 // A range of depths on a ray, converted to sheet depths; an empty range stays reversed.

@@ -18,7 +18,7 @@ fn packed(v: vec3f) -> vec2u {
     let largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
     let exponent = clamp(i32((bitcast<u32>(largest) >> 23u) & 0xffu) - 126, -120, 120);
     let shares = v * power_of_2(-exponent);
-    return vec2u(pack2x16snorm(shares.xy), (pack2x16snorm(vec2f(shares.z, 0.0)) & 0xffffu) | u32(exponent + 256) << 16u);
+    return vec2u(pack2x16snorm(shares.xy), (pack2x16snorm(vec2f(shares.z, 0.0)) & 0xffffu) | (u32(exponent + 256) << 16u));
 }
 
 fn unpacked(xy: u32, z: u32) -> vec3f {

@@ -35,7 +35,7 @@ struct Frame {
     last_label: u32,
     value_offset: f32,
     whole_values: u32,
-    padding_0: u32,
+    channel_table: u32,
     padding_1: u32,
 }
 

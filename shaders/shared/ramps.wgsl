@@ -14,6 +14,11 @@ fn ramps_of(index: u32) -> vec4u {
     return vec4u(control_points[frame.ramps.w + min(label, frame.last_label)]);
 }
 
+// The same of a voxel in a channel after the first, which has no ramps of labels.
+fn ramps_of_channel(channel: u32) -> vec4u {
+    return vec4u(control_points[frame.channel_table + channel - 1u]);
+}
+
 // Piecewise linear between the control points first..end, clamped outside.
 fn ramp(first: u32, end: u32, value: f32) -> vec3f {
     // The first control point above the value.

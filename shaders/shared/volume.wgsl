@@ -3,12 +3,15 @@
 // Whether any voxel is a hole (SPEC §3); then values are stored as the bits of an f32.
 override HOLES: bool = false;
 
+// The index of the first value of the channel that is read.
+var<private> first_value: u32 = 0u;
+
 fn value_at(index: u32) -> f32 {
     return value_of(stored_at(index));
 }
 
 fn stored_at(index: u32) -> u32 {
-    let texel = texel_of(index, textureDimensions(values).x);
+    let texel = texel_of(first_value + index, textureDimensions(values).x);
     return textureLoad(values, texel.xy, texel.z, 0).x;
 }
 

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::lists::iso_range::ValueSet;
 use crate::settings::splatting::Compositing;
-use crate::settings::transfer_function::TransferFunction;
+use crate::settings::transfer_function::{Tables, TransferFunction};
 use crate::volume::{Grid, Volume};
 
 /// The values around a brick that bear on the image, beside those with an opacity, because of how values are composited.
@@ -80,7 +80,7 @@ impl BrickRanges {
     pub fn shown(&self, volume: &Volume, transfer: &TransferFunction, bearing: Bearing) -> Vec<bool> {
         let labels = volume.labels().map(|_| transfer.labels.keys()).into_iter().flatten();
         let tables = labels.map(|&label| transfer.tables(Some(label))).chain([transfer.tables(None)]);
-        let values = tables.fold(ValueSet::default(), |all, tables| all.union(&ValueSet::of_tables(&tables)));
+        let values = tables.fold(ValueSet::default(), |all, tables| all.union(&values_between(&tables)));
         let is_shown = |&[min, max]: &[f32; 2]| {
             let [low, high] = bearing.range([min, max]);
             min <= max && values.meets(low, high)
@@ -102,6 +102,18 @@ impl BrickRanges {
         };
         (0..dims.y * dims.z).into_par_iter().map(row).collect::<Vec<_>>().concat()
     }
+}
+
+/// The values that can take part under some tables, with the `f32`s around the ends of iso-ranges: a field passes through values that no voxel has.
+fn values_between(tables: &Tables) -> ValueSet {
+    let outwards = |&[low, high]: &[f64; 2]| {
+        let ([from, to], nearest) = ([low as f32, high as f32], f64::from);
+        let from = if nearest(from) > low { from.next_down() } else { from };
+        let to = if nearest(to) < high { to.next_up() } else { to };
+        [nearest(from), nearest(to)]
+    };
+    let iso_ranges = tables.iso_ranges.map(|ranges| ranges.iter().map(outwards).collect::<Vec<_>>());
+    ValueSet::of_tables(&Tables { iso_ranges: iso_ranges.as_deref(), ..*tables })
 }
 
 const EMPTY: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];

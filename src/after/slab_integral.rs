@@ -110,8 +110,19 @@ fn cells(tables: &Tables, compositing: Compositing, numbers: &Normalization) -> 
     let [least, greatest] = numbers.range.map(f64::from);
     let value = |x: f64| numbers.base + x / numbers.scale;
     let positions = |value: f64| numbers.apply(value);
-    let iso_ranges = tables.iso_ranges.iter().flat_map(|ranges| ranges.iter().flatten().copied());
-    let breaks = positions_of(tables.opacity).chain(positions_of(tables.color)).chain(iso_ranges).map(positions);
+    // A surface stands where an iso-range is a single value, too: that is the least range of `f32`s around it.
+    let mut iso_ranges: Vec<[f64; 2]> =
+        tables.iso_ranges.iter().flat_map(|ranges| ranges.iter().map(|range| range.map(positions))).collect();
+    let is_single = |[low, high]: [f64; 2]| low as f32 >= (high as f32).next_down();
+    let mut singles = Vec::new();
+    if compositing == Compositing::Surface {
+        for range in iso_ranges.iter_mut().filter(|range| is_single(**range)) {
+            *range = [(range[0] as f32).next_down().into(), (range[1] as f32).next_up().into()];
+            singles.push(*range);
+        }
+    }
+    let ramps = positions_of(tables.opacity).chain(positions_of(tables.color)).map(positions);
+    let breaks = ramps.chain(iso_ranges.into_iter().flatten());
     let mut nodes: Vec<f64> = breaks.filter(|&x| least < x && x < greatest).collect();
     // A constant's table has a width, too.
     nodes.extend([least, if greatest > least { greatest } else { least + 1.0 }]);
@@ -119,7 +130,9 @@ fn cells(tables: &Tables, compositing: Compositing, numbers: &Normalization) -> 
     nodes.dedup();
     let mut cells: Vec<Cell> = Vec::new();
     for ends in nodes.windows(2).map(|pair| [pair[0], pair[1]]) {
-        let shows = tables.visible && tables.in_iso_range(value((ends[0] + ends[1]) / 2.0));
+        let is_in_single = singles.iter().any(|&[low, high]| low <= ends[0] && ends[1] <= high);
+        let is_shown = is_in_single || tables.in_iso_range(value((ends[0] + ends[1]) / 2.0));
+        let shows = tables.visible && is_shown;
         let alpha = ends.map(|x| if shows { tables.opacity.at(value(x)) } else { 0.0 });
         for ends in pieces(compositing, ends, alpha) {
             let alpha = ends.map(|x| if shows { tables.opacity.at(value(x)) } else { 0.0 });

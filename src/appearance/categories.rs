@@ -42,6 +42,9 @@ fn counts(volume: &Volume) -> Option<Vec<(u16, u64)>> {
 /// neighbours that are not background, at least half are equal. A mask of two values does not count: it has a surface, like any object.
 /// If the file names its labels, the volume is a label map in any case.
 pub fn is_label_map(volume: &Volume) -> bool {
+    if volume.colors().is_some() {
+        return false;
+    }
     let Some(counts) = counts(volume) else { return false };
     if volume.labels().is_none() && !volume.label_names().is_empty() {
         return true;

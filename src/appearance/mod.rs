@@ -31,6 +31,14 @@ impl TransferFunction {
     }
 }
 
+/// The transfer function of one of several channels that comes without one, in its file's colour or one given: as with [`Preset::Confocal`], or labels.
+pub(crate) fn one_of_several(volume: &Volume) -> TransferFunction {
+    if categories::is_label_map(volume) || volume.colors().is_some() {
+        return TransferFunction::from_histogram(volume);
+    }
+    preset::confocal(volume)
+}
+
 /// [`TransferFunction::from_histogram`] for values that are not labels.
 fn surface(volume: &Volume) -> TransferFunction {
     match Object::find(volume.values()) {
@@ -55,4 +63,18 @@ pub fn shown_range(volume: &Volume, transfer: &TransferFunction) -> Option<[f64;
     let shown = ValueSet::of(transfer);
     let ends = quantiles(volume.values(), |value| shown.contains(value), [TAIL, 1.0 - TAIL]);
     ends.map(|ends| ends.map(f64::from))
+}
+
+/// The colour of a channel among several, if nothing states it: magenta and green for two, else cyan, magenta, yellow, and then red, green, blue
+/// and gray again and again.
+pub(crate) fn channel_color(number: usize, count: usize) -> Ramp<DVec3> {
+    const CYAN: DVec3 = DVec3::new(0.0, 1.0, 1.0);
+    const MAGENTA: DVec3 = DVec3::new(1.0, 0.0, 1.0);
+    const YELLOW: DVec3 = DVec3::new(1.0, 1.0, 0.0);
+    let colors = match count {
+        1 => &[DVec3::ONE][..],
+        2 => &[MAGENTA, DVec3::Y],
+        _ => &[CYAN, MAGENTA, YELLOW, DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE],
+    };
+    Ramp::through(vec![(0.0, colors[number % colors.len()])])
 }

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::colormap::Colormap;
 use super::hounsfield::Hounsfield;
 use super::object::Object;
 use super::quantile::quantiles;
@@ -9,7 +10,7 @@ use super::{categories, constant, xray};
 use crate::settings::shading::Shading;
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::{Ramp, TransferFunction};
-use crate::volume::Volume;
+use crate::volume::{ChannelDisplay, Volume};
 
 /// A kind of data, and which part of it is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,10 +28,14 @@ pub enum Preset {
     Xray,
     /// A maximum intensity projection of any data.
     Mip,
-    /// Fluorescence: values above the background, unshaded.
+    /// Fluorescence: values above the background, or within the window that the file states, unshaded; several channels each in its own colour.
     Confocal,
     /// Labels: one colour each; see [`categories`].
     Labels,
+    /// Several channels (SPEC §10): the first gray and solid, such as CT, the others hot and translucent, such as PET.
+    Fusion,
+    /// A volume of colours (SPEC §10), such as photographed slices: opaque, in these colours. Other volumes are gray.
+    Photo,
 }
 
 /// Control points at Hounsfield units.
@@ -38,7 +43,7 @@ type Points<T> = [(f64, T)];
 
 impl Preset {
     /// All presets with their names in scene files.
-    pub const ALL: [(&'static str, Self); 8] = [
+    pub const ALL: [(&'static str, Self); 10] = [
         ("ct-skin", Self::CtSkin),
         ("ct-bone", Self::CtBone),
         ("ct-vessels", Self::CtVessels),
@@ -47,17 +52,21 @@ impl Preset {
         ("mip", Self::Mip),
         ("confocal", Self::Confocal),
         ("labels", Self::Labels),
+        ("fusion", Self::Fusion),
+        ("photo", Self::Photo),
     ];
 
     /// Light and material.
     pub fn shading(self) -> Shading {
         let shading = Shading::default();
         match self {
-            Self::CtSkin => shading,
+            Self::CtSkin | Self::Fusion => shading,
             // Where a cut opens a head, gradients are mostly noise.
             Self::MrHead => Shading { ambient: 0.4, diffuse: 0.6, specular: 0.1, ..shading },
             Self::CtBone | Self::CtVessels => Shading { specular: 0.35, shininess: 40.0, ..shading },
             Self::Xray | Self::Mip | Self::Confocal => Shading { enabled: false, ..shading },
+            // Photographs are lit already, and gradients within matter of one colour are mostly noise.
+            Self::Photo => Shading { enabled: false, ..shading },
             // Inside a label the gradient is 0, so all light is ambient.
             Self::Labels => Shading { ambient: 0.4, diffuse: 0.6, specular: 0.1, ..shading },
         }
@@ -75,7 +84,7 @@ impl Preset {
     /// Whether images gain by classification after splatting (SPEC §9), which is then the default. Projections and unshaded haze have no
     /// edges that it would sharpen, and numbers of labels cannot be interpolated.
     pub(crate) fn is_classified_after(self) -> bool {
-        !matches!(self, Self::Xray | Self::Mip | Self::Confocal | Self::Labels)
+        !matches!(self, Self::Xray | Self::Mip | Self::Confocal | Self::Labels | Self::Fusion)
     }
 
     /// The transfer function for a volume. Those for CT are in Hounsfield units: the values themselves if one in a thousand is below -100;
@@ -108,8 +117,17 @@ impl Preset {
             Self::MrHead => Object::find(values).map_or_else(|| constant(0.5), |object| mr_head(&object)),
             Self::Xray => xray::transfer(volume),
             Self::Mip => Object::find(values).map_or_else(|| constant(0.5), |object| mip(values, &object)),
-            Self::Confocal => Object::find(values).map_or_else(|| constant(0.5), |object| confocal(&object)),
+            Self::Confocal => confocal(volume),
             Self::Labels => labels(volume).unwrap_or_else(|| TransferFunction::from_histogram(volume)),
+            Self::Fusion | Self::Photo => Object::find(values).map_or_else(|| constant(0.5), |object| solid(&object)),
+        }
+    }
+
+    /// The transfer function for a channel after the first of several: with [`Self::Fusion`] hot and translucent, else as for the first.
+    pub(crate) fn transfer_of_further(self, volume: &Volume) -> TransferFunction {
+        match self {
+            Self::Fusion => Object::find(volume.values()).map_or_else(|| constant(0.1), |object| hot(volume, &object)),
+            _ => self.transfer(volume),
         }
     }
 
@@ -138,6 +156,21 @@ fn mr_head(object: &Object) -> TransferFunction {
     TransferFunction::by_value(Ramp::through(color), object.surface(0.9))
 }
 
+/// Gray and opaque.
+fn solid(object: &Object) -> TransferFunction {
+    let Object { faint, bright, .. } = *object;
+    let color =
+        vec![(object.threshold(), DVec3::splat(0.55)), (bright.max(2.0 * faint - object.threshold()), DVec3::ONE)];
+    TransferFunction::by_value(Ramp::through(color), object.surface(0.9))
+}
+
+/// A glow that is hotter, and denser, where values are greater.
+fn hot(volume: &Volume, object: &Object) -> TransferFunction {
+    let opacity = Ramp::through(vec![(object.threshold(), 0.0), (object.bright, 0.25)]);
+    let glow = TransferFunction::by_value(Ramp::through(vec![(object.background, DVec3::ONE)]), opacity);
+    TransferFunction { color: Colormap::Hot.of(volume, &glow).unwrap_or(glow.color.clone()), ..glow }
+}
+
 /// White, with an opacity that rises from the background to a value that few voxels exceed.
 fn mip(values: &[f32], object: &Object) -> TransferFunction {
     const TAIL: f64 = 0.0005;
@@ -148,11 +181,17 @@ fn mip(values: &[f32], object: &Object) -> TransferFunction {
     TransferFunction::by_value(color, Ramp::through(vec![(background, 0.0), (top, 1.0)]))
 }
 
-fn confocal(object: &Object) -> TransferFunction {
-    let Object { background, bright, .. } = *object;
-    let color = vec![(background, DVec3::new(0.0, 0.35, 0.05)), (bright, DVec3::new(0.55, 1.0, 0.6))];
-    let start = (background + object.threshold()) / 2.0;
-    TransferFunction::by_value(Ramp::through(color), Ramp::through(vec![(start, 0.0), (bright, 0.5)]))
+/// A haze over the window that the volume's file states, or else from the background to the brightest eighth of the object; in the file's colours,
+/// or else green.
+pub(super) fn confocal(volume: &Volume) -> TransferFunction {
+    let (object, display) = (Object::find(volume.values()), volume.display());
+    let around = |object: &Object| [(object.background + object.threshold()) / 2.0, object.bright];
+    let window = display.and_then(|display| display.window).or(object.as_ref().map(around));
+    let Some([start, top]) = window else { return constant(0.5) };
+    let dark = object.map_or(start, |object| object.background).min(start);
+    let green = || Ramp::through(vec![(dark, DVec3::new(0.0, 0.35, 0.05)), (top, DVec3::new(0.55, 1.0, 0.6))]);
+    let color = display.and_then(ChannelDisplay::color).unwrap_or_else(green);
+    TransferFunction::by_value(color, Ramp::through(vec![(start, 0.0), (top, 0.5)]))
 }
 
 fn labels(volume: &Volume) -> Option<TransferFunction> {

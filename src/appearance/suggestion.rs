@@ -22,15 +22,19 @@ impl Preset {
     /// The preset that fits a volume, judged by its values and its file; `None` if these do not tell, in which case
     /// [`TransferFunction::from_histogram`](crate::settings::TransferFunction::from_histogram) is the best choice.
     ///
+    /// - `photo`: a volume of colours.
     /// - `labels`: a label map ([`categories::is_label_map`]).
-    /// - `confocal`: lengths in µm or nm.
+    /// - `confocal`: several channels, or lengths in µm or nm.
     /// - `ct-bone`, or without bone `ct-skin`: Hounsfield units, plain or with 1024 added: air around tissue, most of which is soft.
     /// - `mr-head`: sides of 100 to 300 mm (or without unit), no negative values, and an object in at least three tenths of the voxels.
     pub fn suggested(volume: &Volume) -> Option<Self> {
+        if volume.colors().is_some() {
+            return Some(Self::Photo);
+        }
         if categories::is_label_map(volume) {
             return Some(Self::Labels);
         }
-        if volume.unit().is_some_and(|unit| ["µm", "nm"].contains(&unit)) {
+        if !volume.further().is_empty() || volume.unit().is_some_and(|unit| ["µm", "nm"].contains(&unit)) {
             return Some(Self::Confocal);
         }
         let values = volume.values();

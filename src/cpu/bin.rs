@@ -19,18 +19,23 @@ const RELATIVE_SLACK: f64 = 1e-5;
 pub(super) struct Placed {
     /// Its number in the list of bricks.
     pub(super) brick: u32,
+    /// The channel whose brick it is, where each has bricks of its own.
+    pub(super) channel: usize,
     /// The first sheet that its kernels may reach.
     pub(super) first: i32,
     /// Half the size of a box that contains the box around any of its footprints, pixels.
     pub(super) half_box: [f32; 2],
+    /// The middle of the box around all of its footprints, in pixel coordinates whose whole numbers are pixel centres, and half its size.
+    pub(super) middle: [f32; 2],
+    pub(super) half: [f32; 2],
     /// The tiles that its footprints may touch: the first and last column, and the first and last row.
     pub(super) columns: [usize; 2],
     pub(super) rows: [usize; 2],
 }
 
-/// The number of columns and rows of tiles in an image.
-pub(super) fn tile_grid(size: [u32; 2]) -> [usize; 2] {
-    [(size[0] as usize).div_ceil(COLUMNS), (size[1] as usize).div_ceil(ROWS)]
+/// The number of columns of tiles in an image.
+pub(super) fn columns(size: [u32; 2]) -> usize {
+    (size[0] as usize).div_ceil(COLUMNS)
 }
 
 /// The bricks that may be on the image, by first sheet and then in memory order.
@@ -58,12 +63,14 @@ fn place_brick(number: u32, brick: &Brick, projection: &Projection, support: f64
         (low <= high).then(|| [low as usize / side, high as usize / side])
     };
     let (columns, rows) = (tiles(0, COLUMNS)?, tiles(1, ROWS)?);
-    let Range { start: first, end } = projection.sheets_of(&view.slabs.touched(start, end));
+    let Range { start: first, end } = projection.reached(&view.slabs.touched(start, end));
     if first >= end {
         return None;
     }
-    let DVec2 { x, y } = half_box;
-    Some(Placed { brick: number, first, half_box: [x as f32, y as f32], columns, rows })
+    let [half_box, middle, half] =
+        [half_box, (bounds.low + bounds.high) / 2.0 - 0.5, (bounds.high - bounds.low) / 2.0 + half_box]
+            .map(|of: DVec2| of.as_vec2().to_array());
+    Some(Placed { brick: number, channel: 0, first, half_box, middle, half, columns, rows })
 }
 
 /// The bricks of every tile of a row of tiles, as indices into the list of placed bricks.

@@ -5,8 +5,9 @@ use fearless_simd::prelude::*;
 
 use super::cull::OpenMask;
 use super::cut::TileRays;
-use super::sheets::{Buffers, CHANNELS, COLUMNS, ROWS, Sheet};
+use super::sheets::{ALL_VECTORS, Buffers, CHANNELS, COLUMNS, ROWS, Sheet};
 use super::vector::{LANES, saturation};
+use crate::lists::quad_plan::TILE;
 use crate::settings::splatting::{Compositing, Order};
 
 /// Red, green, blue and opacity of eight pixels.
@@ -28,11 +29,13 @@ struct SheetPlace<'a> {
     rays: &'a TileRays,
     row: usize,
     begin: f32,
+    /// The bits of the vectors of columns that are composited.
+    vectors: u8,
 }
 
 impl Compositor {
-    /// Composites the sheet, which begins at `begin`, clears it, and closes the pixels that became opaque; whether there was anything to
-    /// composite.
+    /// Composites the sheet, which begins at `begin`, clears it, and closes the pixels that became opaque; the number of tiles as statistics
+    /// count them (SPEC §8) in which there was anything to composite.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn composite<S: Simd>(
         &self,
@@ -40,8 +43,8 @@ impl Compositor {
         buffers: &mut Buffers,
         (rays, begin): (&TileRays, f32),
         open: &mut OpenMask,
-    ) -> bool {
-        let Buffers { sheet: Sheet { rows: sheet, written }, kept, acc, hits } = buffers;
+    ) -> u64 {
+        let Buffers { sheet: Sheet { rows: sheet, written, vectors }, kept, acc, hits } = buffers;
         let filled = std::mem::take(written);
         let mut rows = match self.compositing {
             // While no surface has been reached, the compositing buffer holds the previous sheet.
@@ -50,14 +53,18 @@ impl Compositor {
             Compositing::Minimum => u64::MAX >> (u64::BITS as usize - ROWS),
             _ => filled,
         };
-        let is_composited = rows != 0;
+        let has_empty = matches!(self.compositing, Compositing::Surface | Compositing::Minimum);
+        let tiles = tiles_of(rows & open.rows());
         let mut has_closed = false;
         while rows != 0 {
             let row = rows.trailing_zeros() as usize;
             rows &= rows - 1;
             let sheet = &mut sheet[row];
             let hits = self.first_hit.and(hits.get_mut(row));
-            let opaque = self.row(simd, &mut acc[row], sheet, SheetPlace { rays, row, begin }, hits) & open.row(row);
+            let filled_vectors = std::mem::take(&mut vectors[row]);
+            let vectors = if has_empty { ALL_VECTORS } else { filled_vectors };
+            let place = SheetPlace { rays, row, begin, vectors };
+            let opaque = self.row(simd, &mut acc[row], sheet, place, hits) & open.row(row);
             if filled >> row & 1 == 1 {
                 *sheet = [[0.0; COLUMNS]; CHANNELS];
             }
@@ -69,7 +76,7 @@ impl Compositor {
         if has_closed {
             open.join();
         }
-        is_composited
+        tiles
     }
 
     /// Composites a row. Returns the bits of its opaque pixels, or 0 if nothing is culled.
@@ -79,12 +86,15 @@ impl Compositor {
         simd: S,
         acc: &mut [[f32; COLUMNS]; CHANNELS],
         sheet: &[[f32; COLUMNS]; CHANNELS],
-        SheetPlace { rays, row, begin }: SheetPlace<'_>,
+        SheetPlace { rays, row, begin, vectors }: SheetPlace<'_>,
         mut hits: Option<&mut [f32; COLUMNS]>,
     ) -> u32 {
         let splat = |number: f32| f32x8::splat(simd, number);
         let mut opaque = 0;
         for at in (0..COLUMNS).step_by(LANES) {
+            if vectors >> (at / LANES) & 1 == 0 {
+                continue;
+            }
             let load = |row: &[f32; COLUMNS]| f32x8::from_slice(simd, &row[at..at + LANES]);
             let mut pixels = load_pixels(simd, sheet, at);
             let mut stretch = [splat(f32::NEG_INFINITY), splat(f32::INFINITY)];
@@ -188,6 +198,12 @@ impl Compositor {
         };
         is_here.select(at, hit)
     }
+}
+
+/// The number of tiles of [`TILE`] rows that hold any of some rows.
+fn tiles_of(rows: u64) -> u64 {
+    let of_tile = u64::MAX >> (u64::BITS - TILE);
+    (0..ROWS as u32).step_by(TILE as usize).map(|first| u64::from(rows >> first & of_tile != 0)).sum()
 }
 
 /// The length of the part of a stretch that lies in the slab beginning at `begin`.

@@ -11,7 +11,7 @@ use crate::geometry::view_geometry::ViewGeometry;
 pub(super) struct Tally {
     pub(super) voxels_shaded: u64,
     pub(super) sections: u64,
-    pub(super) sheets_composited: u64,
+    pub(super) tiles_composited: u64,
     pub(super) bricks_visited: u64,
 }
 
@@ -19,7 +19,7 @@ impl AddAssign for Tally {
     fn add_assign(&mut self, other: Self) {
         self.voxels_shaded += other.voxels_shaded;
         self.sections += other.sections;
-        self.sheets_composited += other.sheets_composited;
+        self.tiles_composited += other.tiles_composited;
         self.bricks_visited += other.bricks_visited;
     }
 }

@@ -18,6 +18,8 @@ const LEVELS: usize = ROWS.ilog2() as usize + 1;
 pub(super) struct OpenMask {
     /// `joined[l][y]`: for every column whether any of 2^l rows from y on has an open pixel.
     joined: [[u32; ROWS]; LEVELS],
+    /// The bits of the rows that lie in the image.
+    rows: u64,
 }
 
 /// The pixels of a tile whose centres lie within a box: first and last column and row. Never empty.
@@ -89,7 +91,7 @@ impl OpenMask {
     /// The first columns and rows of a tile.
     pub(super) fn new(columns: usize, rows: usize) -> Self {
         let bits = u32::MAX >> (COLUMNS - columns);
-        let mut mask = Self { joined: [[0; ROWS]; LEVELS] };
+        let mut mask = Self { joined: [[0; ROWS]; LEVELS], rows: u64::MAX >> (u64::BITS as usize - rows) };
         mask.joined[0][..rows].fill(bits);
         mask.join();
         mask
@@ -107,6 +109,11 @@ impl OpenMask {
             self.close(row, !kept);
         }
         self.join();
+    }
+
+    /// The bits of the rows that lie in the image.
+    pub(super) fn rows(&self) -> u64 {
+        self.rows
     }
 
     /// The bits of the open columns of a row.
@@ -196,6 +203,7 @@ mod tests {
         assert_eq!(within(-1.5, 4.0, 2.0), Some(Pixels { columns: [0, 0], rows: [2, 6] }));
         assert_eq!(within(-1.5, 4.0, 1.0), None);
         assert_eq!(within(3.5, 4.0, 0.4), None);
-        assert_eq!(within(31.0, 40.0, f32::INFINITY), Some(Pixels { columns: [0, 31], rows: [0, 31] }));
+        let whole = Pixels { columns: [0, COLUMNS - 1], rows: [0, ROWS - 1] };
+        assert_eq!(within(31.0, 40.0, f32::INFINITY), Some(whole));
     }
 }

@@ -22,7 +22,8 @@ use crate::geometry::means;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::kernel::Kernel;
 use crate::lists::brick::Brick;
-use crate::lists::quad_plan::{Overlaps, PlaceDepths};
+use crate::lists::classify::channels;
+use crate::lists::quad_plan::{Overlaps, PlaceDepths, tile_grid};
 use crate::part::{Content, Extreme, Resolver};
 use crate::scene::Scene;
 use crate::settings::splatting::{Classification, Compositing, Method, Order};
@@ -35,7 +36,8 @@ use crate::volume::Volume;
 #[derive(Debug)]
 pub(super) struct Frame<'a> {
     pub(super) volume: &'a Volume,
-    pub(super) transfer: &'a TransferFunction,
+    /// The channels whose voxels are drawn as one (SPEC §10).
+    pub(super) channels: Vec<(&'a Volume, &'a TransferFunction)>,
     pub(super) bricks: &'a [Brick],
     pub(super) materials: &'a Materials,
     pub(super) projection: Projection,
@@ -72,10 +74,12 @@ pub(super) struct Drawing {
 }
 
 /// What a caller adds to a scene.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Host {
-    /// What is drawn, if that is a part of the image.
-    pub(super) window: Option<Window>,
+    /// The slabs and pixels that are drawn.
+    pub(super) window: Window,
+    /// Whether pixels are a part (SPEC §11), without the background.
+    pub(super) is_part: bool,
     /// The opacity whose depth is requested.
     pub(super) first_hit: Option<f64>,
     /// The opaque surfaces that end rays.
@@ -90,7 +94,7 @@ impl<'a> Frame<'a> {
         (bricks, materials): (&'a [Brick], &'a Materials),
         scene: &Scene,
         view: ViewGeometry,
-        Host { window, first_hit, surfaces }: Host,
+        Host { window, is_part, first_hit, surfaces }: Host,
         level: Level,
     ) -> Self {
         let (splatting, image) = (&scene.splatting, &scene.image);
@@ -118,11 +122,11 @@ impl<'a> Frame<'a> {
         };
         let overlaps = count_overlaps(level, bricks, &view);
         let covered = view.slabs.covered(means::covered(&view, grid, splatting));
-        let Window { slabs, region } = window.clone().unwrap_or_else(|| Window::whole(view.size));
-        let projection = Projection::new(view, splatting.order, &with_lead(slabs, splatting.compositing));
+        let Window { slabs, region } = window.with_lead(splatting.compositing, Classification::Before);
+        let projection = Projection::new(view, splatting.order, &slabs);
         Self {
             volume,
-            transfer,
+            channels: channels(volume, transfer).collect(),
             bricks,
             materials,
             splatter,
@@ -136,8 +140,7 @@ impl<'a> Frame<'a> {
             amplitude: if view.perspective.is_some() { 1.0 } else { view.footprint.amplitude },
             support: kernel.support(),
             region,
-            resolver: window
-                .is_none()
+            resolver: (!is_part)
                 .then(|| Resolver::new(splatting.compositing, Classification::Before, image.background)),
             overlaps,
             projection,
@@ -146,9 +149,7 @@ impl<'a> Frame<'a> {
 
     /// Draws all tiles.
     pub(super) fn draw(&self, level: Level) -> Drawing {
-        let [width, height] = self.projection.view.size;
         let placed = bin::place(self.bricks, &self.projection, self.support);
-        let [columns, rows] = bin::tile_grid([width, height]);
         let has_hits = self.compositor.first_hit.is_some();
         let outputs = Outputs { has_hits, has_extremes: false };
         let (content, first_hits, tally) = draw_tiles(
@@ -158,6 +159,7 @@ impl<'a> Frame<'a> {
             || TileWalk::new(self),
             |walk, origin, bricks| dispatch!(level, simd => self.draw_tile(simd, walk, origin, &placed, bricks)),
         );
+        let [columns, rows] = tile_grid(self.projection.view.size);
         // There are no sheets where voxels are composited one by one.
         let sheets = if self.is_each { 0 } else { self.touched.len() as u64 };
         let counts = Counts {
@@ -167,8 +169,8 @@ impl<'a> Frame<'a> {
             sections_total: self.overlaps.sections,
             sections_rasterized: tally.sections,
             sheets,
-            tiles_total: (columns * rows) as u64 * sheets,
-            tiles_composited: if self.is_each { 0 } else { tally.sheets_composited },
+            tiles_total: u64::from(columns * rows) * sheets,
+            tiles_composited: if self.is_each { 0 } else { tally.tiles_composited },
             bricks_visited: tally.bricks_visited,
             ..Counts::default()
         };
@@ -197,14 +199,6 @@ impl<'a> Frame<'a> {
             Some(_) => first_hit::depths(buffers, rays, &self.rays.rays, origin, self.volume.grid().unit()),
         };
         Tile { pixels, extremes: Vec::new(), first_hits, tally }
-    }
-}
-
-/// The slabs that a frame draws for a range of them: for a surface, the one before them too, in which it may begin to rise.
-fn with_lead(slabs: Range<i32>, compositing: Compositing) -> Range<i32> {
-    match compositing {
-        Compositing::Surface if !slabs.is_empty() => slabs.start - 1..slabs.end,
-        _ => slabs,
     }
 }
 
@@ -257,7 +251,7 @@ pub(super) fn draw_tiles<W>(
     new_walk: impl Fn() -> W + Sync,
     draw_tile: impl Fn(&mut W, [usize; 2], &[u32]) -> Tile + Sync,
 ) -> (Content, Vec<f32>, Tally) {
-    let [columns, _] = bin::tile_grid(size);
+    let columns = bin::columns(size);
     let drawn = region.columns().start / COLUMNS..region.columns().end.div_ceil(COLUMNS);
     let count = |is_requested: bool| if is_requested { region.pixels() } else { 0 };
     let mut colors = vec![[0.0; 4]; count(true)];

@@ -4,7 +4,7 @@
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicIsize, Ordering};
 
-use glam::{DVec3, UVec3};
+use glam::{DVec3, DVec4, UVec3};
 
 use crate::lists::brick;
 use crate::lists::brick::{BRICK_VOXELS, Brick};
@@ -12,7 +12,7 @@ use crate::settings::shading::MIN_GRADIENT;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::Volume;
 
-/// The maximum number of bricks whose materials are kept, 2 KiB for each. Those of other bricks are computed again in every tile in which a voxel is
+/// The maximum number of bricks of one channel whose materials are kept, 2 KiB for each. Those of other bricks are computed again in every tile in which a voxel is
 /// visible.
 const MOST_KEPT: isize = 1 << 15;
 
@@ -26,31 +26,38 @@ pub(super) struct Material {
     pub(super) normal: [f32; 3],
 }
 
-/// The materials of a brick, by slot.
-type BrickMaterials = Box<[Material; BRICK_VOXELS as usize]>;
+/// The materials of a brick: those of all channels (SPEC §10) for each slot.
+pub(super) type BrickMaterials = Box<[Material]>;
 
 /// The materials of all bricks that any view has shown.
 #[derive(Debug)]
 pub(super) struct Materials {
+    channels: usize,
     bricks: Vec<OnceLock<BrickMaterials>>,
     /// The number of further bricks that may be kept.
     room: AtomicIsize,
 }
 
 impl Materials {
-    /// The materials of a number of bricks, none of which has been seen yet.
-    pub(super) fn new(bricks: usize) -> Self {
-        Self { bricks: (0..bricks).map(|_| OnceLock::new()).collect(), room: AtomicIsize::new(MOST_KEPT) }
+    /// The materials of a number of bricks, none of which has been seen yet, in a number of channels.
+    pub(super) fn new(bricks: usize, channels: usize) -> Self {
+        let room = AtomicIsize::new(MOST_KEPT / channels as isize);
+        Self { channels, bricks: (0..bricks).map(|_| OnceLock::new()).collect(), room }
+    }
+
+    /// A voxel's materials in all channels, given by its slot.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn of_slot<'a>(&self, brick: &'a BrickMaterials, slot: u32) -> &'a [Material] {
+        &brick[slot as usize * self.channels..][..self.channels]
     }
 
     /// The materials of a brick, given by its number; `None` if they are not kept.
     pub(super) fn of_brick(
         &self,
         number: u32,
-        volume: &Volume,
-        transfer: &TransferFunction,
+        channels: &[(&Volume, &TransferFunction)],
         brick: &Brick,
-    ) -> Option<&[Material; BRICK_VOXELS as usize]> {
+    ) -> Option<&BrickMaterials> {
         let kept = &self.bricks[number as usize];
         // Two threads that meet the same brick reserve room twice, so that less is kept, never more.
         if kept.get().is_none() && self.room.fetch_sub(1, Ordering::Relaxed) <= 0 {
@@ -58,10 +65,14 @@ impl Materials {
             return None;
         }
         Some(kept.get_or_init(|| {
-            let mut materials = Box::new([Material::default(); BRICK_VOXELS as usize]);
-            brick::voxels(brick)
-                .for_each(|(slot, voxel)| materials[slot as usize] = Material::of(volume, transfer, voxel));
-            materials
+            let mut materials = vec![Material::default(); BRICK_VOXELS as usize * self.channels];
+            for (slot, voxel) in brick::voxels(brick) {
+                let of_voxel = &mut materials[slot as usize * self.channels..];
+                for (material, (volume, transfer)) in of_voxel.iter_mut().zip(channels) {
+                    *material = Material::of(volume, transfer, voxel);
+                }
+            }
+            materials.into()
         }))
     }
 }
@@ -69,22 +80,25 @@ impl Materials {
 /// A copy has no materials yet.
 impl Clone for Materials {
     fn clone(&self) -> Self {
-        Self::new(self.bricks.len())
+        Self::new(self.bricks.len(), self.channels)
     }
 }
 
 impl Material {
-    /// The material of a voxel.
+    /// The material of a voxel in a channel. A hole has no opacity.
     pub(super) fn of(volume: &Volume, transfer: &TransferFunction, voxel: UVec3) -> Self {
         let index = volume.grid().index_of(voxel);
         let value = f64::from(volume.values()[index as usize]);
         let tables = transfer.tables(volume.label(index));
         let gradient = volume.gradient(voxel);
         let magnitude = gradient.length();
+        let own = volume.color(index);
+        let color = own.map_or_else(|| tables.color.at(value), DVec4::truncate);
+        let opacity = own.map_or(1.0, |color| color.w);
         let normal = if magnitude < MIN_GRADIENT { DVec3::ZERO } else { gradient / -magnitude };
         Self {
-            color: tables.color.at(value).as_vec3().to_array(),
-            alpha: tables.alpha(value, magnitude) as f32,
+            color: color.as_vec3().to_array(),
+            alpha: if value.is_nan() { 0.0 } else { (tables.alpha(value, magnitude) * opacity) as f32 },
             normal: normal.as_vec3().to_array(),
         }
     }

@@ -27,6 +27,7 @@ mod cut;
 mod first_hit;
 mod frame;
 mod kernel;
+mod layer;
 mod material;
 mod means;
 mod project;
@@ -43,30 +44,27 @@ mod tile;
 mod vector;
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use fearless_simd::Level;
+use web_time::Instant;
 
 use crate::error::RenderError;
 use crate::error::setting::{Interval, SettingError};
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
-use crate::lists::brick::BrickList;
-use crate::lists::classify::classify;
 use crate::part::{self, Part};
 use crate::pick::{FirstHits, Pick};
 use crate::rendering::{Backend, Rendering};
 use crate::scene::{ImageSettings, Scene};
 use crate::settings::camera::Camera;
-use crate::settings::splatting::{Classification, check_first_hit};
+use crate::settings::splatting::check_first_hit;
 use crate::settings::transfer_function::TransferFunction;
-use crate::settings::window::Window;
+use crate::settings::window::{Region, Window};
 use crate::stats::{Counts, Stats};
 use crate::volume::Volume;
-use after::Coefficients;
 use cut::Surfaces;
-use frame::{Drawing, Frame, Host};
-use material::Materials;
+use frame::{Drawing, Host};
+use layer::Layer;
 pub use simd::Simd;
 
 /// A view of a volume, drawn on the CPU.
@@ -75,7 +73,7 @@ pub struct CpuRenderer {
     volume: Arc<Volume>,
     scene: Scene,
     transfer: TransferFunction,
-    list: List,
+    layers: Vec<Layer>,
     simd: Simd,
     level: Level,
     first_hit: Option<f64>,
@@ -83,26 +81,6 @@ pub struct CpuRenderer {
     surfaces: Option<Arc<[f32]>>,
     /// The last frame's first hits.
     hits: Option<FirstHits>,
-}
-
-/// What voxels are drawn from.
-#[derive(Clone, Debug)]
-enum List {
-    /// Those that take part, and their materials.
-    Before(BrickList, Materials),
-    After(Coefficients),
-}
-
-impl List {
-    fn new(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Self, RenderError> {
-        if scene.splatting.classification == Classification::After {
-            return Ok(Self::After(Coefficients::new(volume, scene)?));
-        }
-        let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
-        let bricks = BrickList::new(volume.grid(), &classify(volume, transfer, &clipped));
-        let materials = Materials::new(bricks.bricks().len());
-        Ok(Self::Before(bricks, materials))
-    }
 }
 
 impl CpuRenderer {
@@ -113,13 +91,13 @@ impl CpuRenderer {
     pub fn new(volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Self, RenderError> {
         let volume = volume.into();
         scene.check()?;
-        scene.transfer.check_volume(&volume)?;
+        scene.check_volume(&volume)?;
         check(scene)?;
         let (simd, level) = simd::chosen()?;
-        let transfer = scene.transfer.resolve(&volume);
+        let transfer = scene.resolve(&volume);
         let scene = scene.classified(&volume);
-        let list = List::new(&volume, &transfer, &scene)?;
-        Ok(Self { volume, scene, transfer, list, simd, level, first_hit: None, surfaces: None, hits: None })
+        let layers = layer::layers(&volume, &transfer, &scene)?;
+        Ok(Self { volume, scene, transfer, layers, simd, level, first_hit: None, surfaces: None, hits: None })
     }
 
     /// The settings.
@@ -145,27 +123,11 @@ impl CpuRenderer {
     /// As for [`Self::new`]; then nothing changes.
     pub fn set_scene(&mut self, scene: &Scene) -> Result<(), RenderError> {
         scene.check()?;
-        scene.transfer.check_volume(&self.volume)?;
+        scene.check_volume(&self.volume)?;
         check(scene)?;
-        let transfer = scene.transfer.resolve(&self.volume);
+        let transfer = scene.resolve(&self.volume);
         let scene = scene.classified(&self.volume);
-        let (old, new) = (&self.scene.splatting, &scene.splatting);
-        let is_same_kernel =
-            (old.radius, old.falloff, old.interpolation) == (new.radius, new.falloff, new.interpolation);
-        let is_same_function = transfer == self.transfer;
-        match &mut self.list {
-            List::Before(..) if new.classification == Classification::Before => {
-                if !(is_same_function && is_same_kernel && scene.clip == self.scene.clip) {
-                    self.list = List::new(&self.volume, &transfer, &scene)?;
-                }
-            }
-            List::After(coefficients) if new.classification == Classification::After && is_same_kernel => {
-                if !(is_same_function && new.compositing == old.compositing) {
-                    coefficients.forget();
-                }
-            }
-            _ => self.list = List::new(&self.volume, &transfer, &scene)?,
-        }
+        layer::update(&mut self.layers, (&self.volume, &transfer), (&self.scene, &scene))?;
         (self.scene, self.transfer) = (scene, transfer);
         Ok(())
     }
@@ -242,7 +204,7 @@ impl CpuRenderer {
     /// # Errors
     /// If the frame has no first hits, or the pixel is off the image.
     pub fn pick(&self, pixel: [u32; 2]) -> Result<Option<Pick>, SettingError> {
-        FirstHits::pick(self.hits.as_ref(), &self.volume, pixel, &self.scene.image)
+        FirstHits::pick(self.hits.as_ref(), (&self.volume, &self.transfer), pixel, &self.scene.image)
     }
 
     /// Draws a frame on the threads of the current rayon pool. Their number never changes a bit of the image.
@@ -252,9 +214,26 @@ impl CpuRenderer {
     pub fn draw(&mut self) -> Result<Rendering, RenderError> {
         let start = Instant::now();
         let ImageSettings { width, height, .. } = self.scene.image;
-        let (Drawing { content, counts, first_hits }, view) = self.drawing(None)?;
-        self.hits = self.first_hit.map(|_| FirstHits { view, depths: first_hits });
-        let image = Image { width, height, pixels: content.colors };
+        self.draw_pixels(Region::whole([width, height]), start)
+    }
+
+    /// Draws the pixels of a region as [`Self::draw`] would: the returned image has the region's width and height, and counts are those of its work. It
+    /// lets several renderers, each with the volume, share a frame. First hits exist for the region's pixels only.
+    ///
+    /// # Errors
+    /// As for [`Self::draw`], or if the region does not lie in the image.
+    pub fn draw_region(&mut self, region: Region) -> Result<Rendering, RenderError> {
+        let start = Instant::now();
+        let ImageSettings { width, height, .. } = self.scene.image;
+        region.check([width, height])?;
+        self.draw_pixels(region, start)
+    }
+
+    fn draw_pixels(&mut self, region: Region, start: Instant) -> Result<Rendering, RenderError> {
+        let window = Window { slabs: Window::ALL_SLABS, region };
+        let (Drawing { content, counts, first_hits }, view) = self.drawing(window, false)?;
+        self.hits = self.first_hit.map(|_| FirstHits { view, region, depths: first_hits });
+        let image = Image { width: region.width, height: region.height, pixels: content.colors };
         Ok(Rendering { image, stats: self.stats(counts, start) })
     }
 
@@ -264,39 +243,27 @@ impl CpuRenderer {
     /// As for [`Self::draw`], if the scene has no parts, a host has set surfaces, or the window does not lie in the image.
     pub fn draw_part(&mut self, window: &Window) -> Result<(Part, Stats), RenderError> {
         let start = Instant::now();
-        part::check(&self.scene, self.scene.splatting.classification, window)?;
+        part::check(&self.volume, &self.scene, window)?;
         if self.surfaces.is_some() {
             return Err(SettingError::new("surfaces", "a host's surfaces for a part of an image", "none").into());
         }
-        let (Drawing { content, counts, .. }, view) = self.drawing(Some(window))?;
+        let (Drawing { content, counts, .. }, view) = self.drawing(window.clone(), true)?;
         let part = Part::new((&self.volume, &self.scene), &view, window, content)?;
         Ok((part, self.stats(counts, start)))
     }
 
-    /// Draws the whole image, or a part of it.
-    fn drawing(&mut self, window: Option<&Window>) -> Result<(Drawing, ViewGeometry), RenderError> {
+    /// Draws a window of the image, as pixels or as a part.
+    fn drawing(&mut self, window: Window, is_part: bool) -> Result<(Drawing, ViewGeometry), RenderError> {
         let splatting = &self.scene.splatting;
         let is_cut = self.surfaces.is_some() || !self.scene.clip.is_empty();
         splatting.check_rays(is_cut, self.first_hit)?;
         let scene = self.scene.framed(&self.volume, &self.transfer);
         let ImageSettings { width, height, .. } = self.scene.image;
         let view = ViewGeometry::new(self.volume.grid(), &scene.camera, &scene.splatting, [width, height])?;
-        let window = window.map(|window| window.opened(&view.slabs_of(self.volume.grid())));
-        let first_hit = self.first_hit.filter(|_| window.is_none());
-        let host = Host { window, first_hit, surfaces: self.surfaces_of([width, height])? };
-        let drawing = match &mut self.list {
-            List::Before(bricks, materials) => {
-                let bricks = (bricks.bricks(), &*materials);
-                let frame = Frame::new(&self.volume, &self.transfer, bricks, &scene, view, host, self.level);
-                frame.draw(self.level)
-            }
-            List::After(coefficients) => {
-                let of = (&*self.volume, &self.transfer);
-                coefficients.look(of, scene.splatting.compositing, &view);
-                after::Frame::new(of, coefficients, &scene, view, host).draw(self.level)
-            }
-        };
-        Ok((drawing, view))
+        let window = if is_part { window.opened(&view.slabs_of(self.volume.grid())) } else { window };
+        let first_hit = self.first_hit.filter(|_| !is_part);
+        let host = Host { window, is_part, first_hit, surfaces: self.surfaces_of([width, height])? };
+        Ok((layer::draw(&mut self.layers, &scene, view, host, self.level), view))
     }
 
     /// The statistics of a frame that began at a time.
@@ -340,44 +307,4 @@ pub fn render(volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Rendering
 
 fn milliseconds_since(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
-}
-
-#[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "tests")]
-mod tests {
-    use super::*;
-    use crate::scene::VolumeSource;
-    use crate::settings::splatting::Interpolation;
-
-    /// Where what voxels are drawn from lies in memory.
-    fn list_of(renderer: &CpuRenderer) -> *const () {
-        match &renderer.list {
-            List::Before(bricks, _) => bricks.bricks().as_ptr().cast(),
-            List::After(coefficients) => coefficients.all(&renderer.volume).as_ptr().cast(),
-        }
-    }
-
-    #[test]
-    fn a_changed_scene_keeps_what_does_not_depend_on_the_change() {
-        let sets = ["image={width=16,height=16}".to_owned()];
-        for (classification, interpolation) in
-            [(Classification::Before, Interpolation::Smooth), (Classification::After, Interpolation::Exact)]
-        {
-            let mut scene = Scene::from_volume(VolumeSource::Builtin("head:12".to_owned()), &sets).unwrap();
-            (scene.splatting.classification, scene.splatting.interpolation) = (classification, interpolation);
-            let mut renderer = CpuRenderer::new(scene.load_volume().unwrap(), &scene).unwrap();
-            renderer.draw().unwrap();
-            let list = list_of(&renderer);
-            scene.camera = scene.camera.turned(20.0);
-            scene.shading.ambient = 0.5;
-            scene.splatting.compositing = crate::settings::splatting::Compositing::Xray;
-            scene.splatting.slab_width = 0.5;
-            renderer.set_scene(&scene).unwrap();
-            renderer.draw().unwrap();
-            assert_eq!(list_of(&renderer), list, "{classification:?}");
-            scene.splatting.radius = 1.5;
-            renderer.set_scene(&scene).unwrap();
-            assert_ne!(list_of(&renderer), list, "{classification:?}");
-        }
-    }
 }

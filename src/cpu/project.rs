@@ -59,6 +59,14 @@ pub(super) struct Local {
     pub(super) cut: f64,
 }
 
+/// The sections that eight voxels without perspective have from a sheet on.
+pub(super) struct FlatSections {
+    /// The distances from the voxels to the plane where they begin, grid units along their rays.
+    pub(super) first_planes: [f32; LANES],
+    /// The ends of the voxels' ranges of sheets.
+    pub(super) ends: [i32; LANES],
+}
+
 /// Where the voxels of a brick are, from its first place, by slot.
 #[derive(Clone, Debug)]
 struct Offsets {
@@ -74,8 +82,11 @@ pub(super) struct Projection {
     pub(super) view: ViewGeometry,
     /// 1, or -1 where sheets are numbered from the farthest on: in the order in which they are composited.
     pub(super) direction: i32,
-    /// The sheets that are drawn.
-    window: Range<i32>,
+    /// The sheets that are composited.
+    pub(super) window: Range<i32>,
+    /// The least sheet that a voxel begins in which reaches the window. Voxels begin where they do in a whole image, so that a part's sums are added
+    /// up in the same order: the least difference would decide between equal sheets.
+    least: i32,
     offsets: Offsets,
     /// How kernels are seen without perspective: all of them alike.
     pub(super) flat: Lens,
@@ -94,7 +105,9 @@ impl Projection {
         };
         let per_slab = whole_kernel(&view);
         let flat = Lens { per_slab, per_lambda: 1.0 / view.lambda, to_eye: -view.basis.w, local: None };
-        Self { view, direction, window: sheets_of(direction, slabs), offsets, flat }
+        let window = sheets_of(direction, slabs);
+        let span = (2.0 * view.reach / view.slabs.width).ceil() as i32 + 1;
+        Self { direction, least: window.start - span, window, offsets, flat, view }
     }
 
     /// Where a brick's first place is.
@@ -134,6 +147,31 @@ impl Projection {
             }
         }
         centers
+    }
+
+    /// What sections a brick's voxels in eight slots, from the first on, have from a sheet on; `None` in perspective, where every voxel has a lens
+    /// of its own.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn flat_sections(&self, brick: Place, first: usize, sheet: i32) -> Option<FlatSections> {
+        if self.view.perspective.is_some() {
+            return None;
+        }
+        let plane = self.plane_before(sheet);
+        let reach = self.view.reach / self.view.slabs.width;
+        let mut sections = FlatSections { first_planes: [0.0; LANES], ends: [0; LANES] };
+        let FlatSections { first_planes, ends } = &mut sections;
+        for ((first_plane, end), offset) in first_planes.iter_mut().zip(ends).zip(&self.offsets.depth[first..]) {
+            let depth = brick.depth + offset;
+            *first_plane = ((plane - depth) * self.flat.per_slab) as f32;
+            *end = self.numbered(depth - reach, depth + reach).end;
+        }
+        Some(sections)
+    }
+
+    /// The plane at which a sheet begins, in the order of compositing.
+    pub(super) fn plane_before(&self, sheet: i32) -> f64 {
+        let plane = f64::from(self.direction) * f64::from(sheet);
+        if self.direction > 0 { plane } else { plane + 1.0 }
     }
 
     /// The sheets that a voxel's kernel overlaps, in the order in which they are composited; none before the near plane.
@@ -179,15 +217,27 @@ impl Projection {
         first
     }
 
-    /// Slabs between two depths by more than rounding errors ([`slab::ROUNDING`]), as sheets, of those that are drawn.
+    /// Slabs between two depths by more than rounding errors ([`slab::ROUNDING`]), as sheets, up to the last that is composited; none if they end
+    /// before the first.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn numbered(&self, first: f64, end: f64) -> Range<i32> {
         let (first, end) = (floor(first + slab::ROUNDING), -floor(-(end - slab::ROUNDING)));
         let (first, end) = if self.direction > 0 { (first, end) } else { (1 - end, 1 - first) };
-        first.max(self.window.start)..end.min(self.window.end)
+        self.reaching(first, end)
     }
 
-    /// A range of slabs as sheets, of those that are drawn.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn reaching(&self, first: i32, end: i32) -> Range<i32> {
+        first.max(self.least)..if end > self.window.start { end.min(self.window.end) } else { i32::MIN }
+    }
+
+    /// A brick's range of slabs as sheets, as for voxels.
+    pub(super) fn reached(&self, slabs: &Range<i32>) -> Range<i32> {
+        let sheets = sheets_of(self.direction, slabs);
+        self.reaching(sheets.start, sheets.end)
+    }
+
+    /// A range of slabs as sheets, of those that are composited.
     pub(super) fn sheets_of(&self, slabs: &Range<i32>) -> Range<i32> {
         let sheets = sheets_of(self.direction, slabs);
         sheets.start.max(self.window.start)..sheets.end.min(self.window.end)

@@ -23,13 +23,16 @@ pub enum Simd {
     Avx512,
     /// ARM, 64 bits.
     Neon,
+    /// WebAssembly, if it is compiled with the target feature `simd128`.
+    Simd128,
 }
 
 impl Simd {
     /// All instruction sets, whatever the machine has.
-    pub const ALL: [Self; 6] = [Self::Scalar, Self::Sse2, Self::Sse4_2, Self::Avx2, Self::Avx512, Self::Neon];
+    pub const ALL: [Self; 7] =
+        [Self::Scalar, Self::Sse2, Self::Sse4_2, Self::Avx2, Self::Avx512, Self::Neon, Self::Simd128];
 
-    /// Its name: `scalar`, `sse2`, `sse4.2`, `avx2`, `avx512`, `neon`.
+    /// Its name: `scalar`, `sse2`, `sse4.2`, `avx2`, `avx512`, `neon`, `simd128`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Scalar => "scalar",
@@ -38,6 +41,7 @@ impl Simd {
             Self::Avx2 => "avx2",
             Self::Avx512 => "avx512",
             Self::Neon => "neon",
+            Self::Simd128 => "simd128",
         }
     }
 
@@ -48,19 +52,23 @@ impl Simd {
 
     /// The level of the vector crate; `None` if the machine or the build lacks it.
     fn level(self) -> Option<Level> {
-        let best = Level::new();
         match self {
+            #[cfg(not(target_arch = "wasm32"))]
             Self::Scalar => Some(Level::fallback()),
+            #[cfg(all(target_arch = "wasm32", not(target_feature = "simd128")))]
+            Self::Scalar => Some(Level::new()),
             #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-            Self::Sse2 => best.as_sse2().map(Level::Sse2),
+            Self::Sse2 => Level::new().as_sse2().map(Level::Sse2),
             #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-            Self::Sse4_2 => best.as_sse4_2().map(Level::Sse4_2),
+            Self::Sse4_2 => Level::new().as_sse4_2().map(Level::Sse4_2),
             #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-            Self::Avx2 => best.as_avx2().map(Level::Avx2),
+            Self::Avx2 => Level::new().as_avx2().map(Level::Avx2),
             #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-            Self::Avx512 => best.as_avx512().map(Level::Avx512),
+            Self::Avx512 => Level::new().as_avx512().map(Level::Avx512),
             #[cfg(target_arch = "aarch64")]
-            Self::Neon => best.as_neon().map(Level::Neon),
+            Self::Neon => Level::new().as_neon().map(Level::Neon),
+            #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+            Self::Simd128 => Level::new().as_wasm_simd128().map(Level::WasmSimd128),
             _ => None,
         }
     }

@@ -1,13 +1,13 @@
 //! Kernel sections added to a tile's sheet buffers (SPEC §5), a pixel at a time and all sections of a voxel at once; the same sums as
 //! `shaders/splat.wgsl`. Each pixel's additions come in the order in which voxels do, whatever the vectors' width.
 
-use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
+use fearless_simd::{f32x4, f32x8, u8x32};
 
 use super::cull::{OpenMask, Pixels};
 use super::kernel::KernelTables;
 use super::reached::Reached;
-use super::sheets::{CHANNELS, RING, Ring, SECTIONS, Sums, slot_of};
+use super::sheets::{BySlot, CHANNELS, HALF_RING, PixelSums, RING, Ring, SECTIONS, Sums, slot_of};
 use super::vector::LANES;
 
 /// A voxel in the coordinates of a tile.
@@ -60,22 +60,30 @@ pub(super) struct Splatter {
 pub(super) struct Sections {
     count: usize,
     /// `H(0, 0, t)` of eq. 3 at the planes before the sections.
-    near: [f32; RING],
+    near: BySlot,
     /// The same behind them.
-    far: [f32; RING],
+    far: BySlot,
     /// In perspective ρ² of a pixel along the footprint's axis and across it, and the low-pass rule's amplitude.
-    along: [f32; RING],
-    across: [f32; RING],
-    amplitude: [f32; RING],
+    along: BySlot,
+    across: BySlot,
+    amplitude: BySlot,
     /// The pixels that any of them reaches; `None` for no pixel of the tile.
     pub(super) pixels: Option<Pixels>,
 }
 
-/// The order of a ring's slots from every slot on.
+/// The number of sheets from that of a slot on to that of every slot; [`RING`] where a vector's number belongs to no slot.
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub(super) fn order_from<S: Simd>(simd: S, slot: usize) -> f32x8<S> {
-    const TWICE: [f32; 2 * RING] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
-    f32x8::from_slice(simd, &TWICE[RING - slot..2 * RING - slot])
+fn order_from<S: Simd>(simd: S, slot: usize) -> f32x8<S> {
+    const NONE: f32 = RING as f32;
+    const ORDERS: [BySlot; RING] = [
+        [0.0, 1.0, 2.0, NONE, 3.0, 4.0, 5.0, NONE],
+        [5.0, 0.0, 1.0, NONE, 2.0, 3.0, 4.0, NONE],
+        [4.0, 5.0, 0.0, NONE, 1.0, 2.0, 3.0, NONE],
+        [3.0, 4.0, 5.0, NONE, 0.0, 1.0, 2.0, NONE],
+        [2.0, 3.0, 4.0, NONE, 5.0, 0.0, 1.0, NONE],
+        [1.0, 2.0, 3.0, NONE, 4.0, 5.0, 0.0, NONE],
+    ];
+    f32x8::load_array_ref(simd, &ORDERS[slot])
 }
 
 impl Splatter {
@@ -90,11 +98,11 @@ impl Splatter {
         let mut far = (order + 1.0).min(end) * splat.step + splat.first_plane;
         let mut sections = Sections {
             count,
-            near: [0.0; RING],
-            far: [0.0; RING],
-            along: [0.0; RING],
-            across: [0.0; RING],
-            amplitude: [0.0; RING],
+            near: [0.0; LANES],
+            far: [0.0; LANES],
+            along: [0.0; LANES],
+            across: [0.0; LANES],
+            amplitude: [0.0; LANES],
             pixels: Some(splat.pixels),
         };
         if let Some(pixel_per_depth) = self.pixel_per_depth {
@@ -191,7 +199,7 @@ impl Splatter {
         (pixels, open): (&Pixels, &OpenMask),
         (reached, ring): (&mut Reached, &mut Ring),
     ) {
-        let load = |numbers: [f32; RING]| f32x8::load_array(simd, numbers);
+        let load = |numbers: BySlot| f32x8::load_array(simd, numbers);
         let (to_along, to_across, amplitude) = (load(sections.along), load(sections.across), load(sections.amplitude));
         // Of the largest section's footprint.
         let (least_along, least_across) = (to_along.reduce_min(), to_across.reduce_min());
@@ -227,15 +235,29 @@ fn cut_by_rim<S: Simd>(planes: f32x8<S>, rim: f32x8<S>) -> f32x8<S> {
     planes.max(-rim).min(rim)
 }
 
+/// A colour for each of a vector's two slots.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn splatted<S: Simd>(simd: S, [red, green, blue, alpha]: [f32; CHANNELS]) -> [f32x8<S>; CHANNELS] {
-    [f32x8::splat(simd, red), f32x8::splat(simd, green), f32x8::splat(simd, blue), f32x8::splat(simd, alpha)]
+fn splatted<S: Simd>(simd: S, color: [f32; CHANNELS]) -> f32x8<S> {
+    let color = f32x4::load_array(simd, color);
+    color.combine(color)
 }
 
 /// Adds a colour to a pixel of all open sheets, by weights.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn add<S: Simd>(simd: S, weights: f32x8<S>, color: [f32x8<S>; CHANNELS], pixel: &mut [Sums; CHANNELS]) {
-    for (Sums(sums), &color) in pixel.iter_mut().zip(&color) {
+fn add<S: Simd>(simd: S, weights: f32x8<S>, color: f32x8<S>, pixel: &mut PixelSums) {
+    for (Sums(sums), bytes) in pixel.iter_mut().zip(&WEIGHT_OF_CHANNELS) {
+        let weights = weights.swizzle_dyn_within_blocks(u8x32::load_array_ref(simd, bytes));
         (f32x8::load_array_ref(simd, sums) + weights * color).store_slice(sums);
     }
 }
+
+/// The bytes of a half of a vector that give all channels its n-th weight.
+const WEIGHT_OF_CHANNELS: [[u8; 32]; HALF_RING] = {
+    let mut all = [[0; 32]; HALF_RING];
+    let mut at = 0;
+    while at < 32 * HALF_RING {
+        all[at / 32][at % 32] = (at / 32 * 4 + at % 4) as u8;
+        at += 1;
+    }
+    all
+};

@@ -6,7 +6,7 @@ use std::iter::Peekable;
 use std::ops::Range;
 
 use fearless_simd::prelude::*;
-use glam::{DVec2, UVec3};
+use glam::UVec3;
 
 use super::bin::Placed;
 use super::count::{Tally, bits};
@@ -14,7 +14,7 @@ use super::cull::{Boxes, OpenMask, Pixels};
 use super::cut::TileRays;
 use super::frame::Frame;
 use super::material::Material;
-use super::project::{Lens, Place, Projection};
+use super::project::{FlatSections, Lens, Place, Projection};
 use super::queue::{Queue, Waiting};
 use super::reached::Reached;
 use super::shade::Unshaded;
@@ -148,9 +148,16 @@ impl<'a> TileWalk<'a> {
             || {
                 let Self { frame, open, rays, ring, buffers, tally, .. } = self;
                 ring.take(slot_of(sheet), &mut buffers.sheet);
+                if sheet < frame.projection.window.start {
+                    // Another part composites it.
+                    buffers.sheet.clear();
+                    return;
+                }
                 let begin = rays.begin(frame.projection.direction * sheet);
-                let is_composited = frame.compositor.composite(simd, buffers, (rays, begin), open);
-                tally.sheets_composited += u64::from(is_composited && frame.touched.contains(&sheet));
+                let tiles = frame.compositor.composite(simd, buffers, (rays, begin), open);
+                if frame.touched.contains(&sheet) {
+                    tally.tiles_composited += tiles;
+                }
             },
         );
     }
@@ -192,13 +199,9 @@ impl<'a> TileWalk<'a> {
 
     /// Whether any pixel is open that a brick's footprints may touch.
     fn sees_brick(&self, placed: &Placed) -> bool {
-        let (middle, half) = brick::bounds(&self.frame.bricks[placed.brick as usize]);
-        let Some(bounds) = self.frame.projection.view.bounds(middle, half) else { return false };
-        let origin = DVec2::new(self.origin[0] as f64, self.origin[1] as f64) + 0.5;
-        let (center, half) = ((bounds.low + bounds.high) / 2.0 - origin, (bounds.high - bounds.low) / 2.0);
-        let [x, y] = placed.half_box;
-        let half = [half.x as f32 + x, half.y as f32 + y];
-        Pixels::within([center.x as f32, center.y as f32], half).is_some_and(|pixels| self.open.sees(&pixels))
+        let [x, y] = placed.middle;
+        let center = [x - self.origin[0] as f32, y - self.origin[1] as f32];
+        Pixels::within(center, placed.half).is_some_and(|pixels| self.open.sees(&pixels))
     }
 
     /// Draws the voxels that start or continue in a sheet.
@@ -237,18 +240,22 @@ impl<'a> TileWalk<'a> {
             let centers = frame.projection.centers(brick_place, first, self.origin);
             // In perspective these contain the boxes of all sections.
             let boxes = Boxes::within(simd, &centers, half_box);
+            let flat = frame.projection.flat_sections(brick_place, first, sheet);
             for lane in bits(lanes) {
                 let lane = lane as usize;
                 let Some(pixels) = boxes.pixels(lane).filter(|pixels| self.open.sees(pixels)) else { continue };
                 let slot = (first + lane) as u32;
                 seen |= 1 << slot;
-                let materials = *materials
-                    .get_or_insert_with(|| frame.materials.of_brick(number, frame.volume, frame.transfer, brick));
+                let materials =
+                    *materials.get_or_insert_with(|| frame.materials.of_brick(number, &frame.channels, brick));
                 let voxel = brick::origin(brick) + brick::in_brick(slot);
-                batch.materials[batch.count] = materials.map(|materials| &materials[slot as usize]).ok_or(voxel);
-                let place = frame.projection.of_voxel(brick_place, slot);
+                batch.materials[batch.count] = materials.map(|of| frame.materials.of_slot(of, slot)).ok_or(voxel);
+                let along_ray = match &flat {
+                    Some(flat) => batch.flat(flat, lane),
+                    None => batch.lens(frame, frame.projection.of_voxel(brick_place, slot), voxel, sheet),
+                };
                 let on_tile = ([centers[0][lane], centers[1][lane]], pixels);
-                batch.add(frame, ([waiting.brick, slot], voxel), (place, sheet), on_tile);
+                batch.add([waiting.brick, slot], sheet, along_ray, on_tile);
                 if batch.count == LANES {
                     self.draw_batch(simd, batch);
                 }
@@ -283,17 +290,20 @@ impl<'a> TileWalk<'a> {
             #[cfg_attr(not(debug_assertions), inline(always))]
             || {
                 let count = std::mem::take(&mut batch.count);
-                // All at once, so that the memory is waited for once.
-                for lane in 0..count {
-                    match batch.materials[lane] {
-                        Ok(material) => batch.unshaded.set_material(lane, material),
-                        Err(voxel) => {
-                            let Frame { volume, transfer, .. } = self.frame;
-                            batch.unshaded.set_material(lane, &Material::of(volume, transfer, voxel));
+                let mut amounts = [[0.0; LANES]; 4];
+                for (channel, &(volume, transfer)) in self.frame.channels.iter().enumerate() {
+                    // All at once, so that the memory is waited for once.
+                    for lane in 0..count {
+                        match batch.materials[lane] {
+                            Ok(materials) => batch.unshaded.set_material(lane, &materials[channel]),
+                            Err(voxel) => batch.unshaded.set_material(lane, &Material::of(volume, transfer, voxel)),
                         }
                     }
+                    let of_channel = self.frame.shader.shade(simd, &batch.unshaded);
+                    // A voxel's footprint is the same in all channels, so their amounts are drawn as one.
+                    let sums = amounts.as_flattened_mut().iter_mut().zip(of_channel.as_flattened());
+                    sums.for_each(|(sum, amount)| *sum += amount);
                 }
-                let amounts = self.frame.shader.shade(simd, &batch.unshaded);
                 for (lane, splat) in batch.splats[..count].iter_mut().enumerate() {
                     let [red, green, blue, amount] = &amounts;
                     splat.amount = [red[lane], green[lane], blue[lane], amount[lane]];
@@ -340,17 +350,34 @@ impl<'a> TileWalk<'a> {
 /// Up to eight voxels that are shaded together.
 struct Batch<'a> {
     count: usize,
-    /// Their materials, or the voxels whose materials are not kept.
-    materials: [Result<&'a Material, UVec3>; LANES],
+    /// Their materials in all channels, or the voxels whose materials are not kept.
+    materials: [Result<&'a [Material], UVec3>; LANES],
     unshaded: Unshaded,
     splats: [Splat; LANES],
+    /// Without perspective, the distance from plane to plane of all voxels.
+    flat_step: f32,
+}
+
+/// The sections of a voxel along its ray, as [`Splat`] holds them.
+#[derive(Default)]
+struct AlongRay {
+    end: i32,
+    first_plane: f32,
+    step: f32,
+    local: LocalFootprint,
 }
 
 impl Batch<'_> {
     fn new(projection: &Projection, amplitude: f64) -> Self {
         let nothing = Err(UVec3::ZERO);
-        let mut batch =
-            Self { count: 0, materials: [nothing; LANES], unshaded: Unshaded::default(), splats: Default::default() };
+        let flat_step = (f64::from(projection.direction) * projection.flat.per_slab) as f32;
+        let mut batch = Self {
+            count: 0,
+            materials: [nothing; LANES],
+            unshaded: Unshaded::default(),
+            splats: Default::default(),
+            flat_step,
+        };
         (0..LANES).for_each(|lane| batch.set_view(lane, projection, &projection.flat, amplitude));
         batch
     }
@@ -360,44 +387,44 @@ impl Batch<'_> {
         self.unshaded.set_view(lane, lens.to_eye, f64::from(projection.direction) * lens.per_lambda * amplitude);
     }
 
+    /// The sections of a voxel without perspective.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn flat(&self, flat: &FlatSections, lane: usize) -> AlongRay {
+        let (first_plane, end) = (flat.first_planes[lane], flat.ends[lane]);
+        AlongRay { end, first_plane, step: self.flat_step, local: LocalFootprint::default() }
+    }
+
+    /// The sections of a voxel in perspective, the next one of the batch.
+    fn lens(&mut self, frame: &Frame, place: Place, voxel: UVec3, sheet: i32) -> AlongRay {
+        let projection = &frame.projection;
+        let Some(perspective) = &projection.view.perspective else { return AlongRay::default() };
+        let lens = projection.lens(perspective, place, voxel);
+        self.set_view(self.count, projection, &lens, frame.amplitude);
+        let local = lens.local.map_or_else(LocalFootprint::default, |local| LocalFootprint {
+            axis: local.axis.to_array().map(|component| component as f32),
+            metric: local.metric.to_array().map(|component| component as f32),
+            depth_per_warped: local.depth_per_warped as f32,
+            from_eye: place.from_eye as f32,
+            cut: local.cut as f32,
+        });
+        AlongRay {
+            end: projection.sheets(place, voxel).end,
+            first_plane: ((projection.plane_before(sheet) - place.depth) * lens.per_slab) as f32,
+            step: (f64::from(projection.direction) * lens.per_slab) as f32,
+            local,
+        }
+    }
+
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn add(
         &mut self,
-        frame: &Frame,
-        (number, voxel): ([u32; 2], UVec3),
-        (place, sheet): (Place, i32),
+        voxel: [u32; 2],
+        sheet: i32,
+        AlongRay { end, first_plane, step, local }: AlongRay,
         (center, pixels): ([f32; 2], Pixels),
     ) {
-        let projection = &frame.projection;
-        let mut per_slab = projection.flat.per_slab;
-        let mut local = LocalFootprint::default();
-        if let Some(perspective) = &projection.view.perspective {
-            let lens = projection.lens(perspective, place, voxel);
-            per_slab = lens.per_slab;
-            if let Some(of_lens) = lens.local {
-                local = LocalFootprint {
-                    axis: of_lens.axis.to_array().map(|component| component as f32),
-                    metric: of_lens.metric.to_array().map(|component| component as f32),
-                    depth_per_warped: of_lens.depth_per_warped as f32,
-                    from_eye: place.from_eye as f32,
-                    cut: of_lens.cut as f32,
-                };
-            }
-            self.set_view(self.count, projection, &lens, frame.amplitude);
-        }
-        let direction = f64::from(projection.direction);
-        let plane = direction * f64::from(sheet) + if projection.direction > 0 { 0.0 } else { 1.0 };
-        self.splats[self.count] = Splat {
-            center,
-            pixels,
-            amount: [0.0; 4],
-            sheets: [sheet, projection.sheets(place, voxel).end],
-            first_plane: ((plane - place.depth) * per_slab) as f32,
-            step: (direction * per_slab) as f32,
-            voxel: number,
-            drawn: 0,
-            local,
-        };
+        self.splats[self.count] =
+            Splat { center, pixels, amount: [0.0; 4], sheets: [sheet, end], first_plane, step, voxel, drawn: 0, local };
         self.count += 1;
     }
 }

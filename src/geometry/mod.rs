@@ -5,7 +5,7 @@ pub mod footprint;
 pub mod grid_warp;
 pub mod means;
 pub(crate) mod plane_bounds;
-pub(crate) mod plane_geometry;
+pub mod plane_geometry;
 pub mod slab;
 #[cfg(feature = "gpu")]
 pub(crate) mod surfaces;

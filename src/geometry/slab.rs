@@ -31,6 +31,12 @@ impl SlabGrid {
         Self { width: self.width * f64::from(sheets), ..*self }
     }
 
+    /// The groups of `sheets` slabs that some slabs lie in.
+    pub fn groups_of(slabs: &Range<i32>, sheets: u32) -> Range<i32> {
+        let sheets = sheets as i32;
+        slabs.start.div_euclid(sheets)..slabs.end.saturating_add(sheets - 1).div_euclid(sheets)
+    }
+
     /// The slabs that the depths from `first` to `end` overlap by more than rounding errors, so that a kernel that ends at a plane does not
     /// reach the slab behind it.
     pub fn touched(&self, first: f64, end: f64) -> Range<i32> {

@@ -65,9 +65,9 @@ impl BrickLists {
         self.bricks.bricks()
     }
 
-    /// Whether a voxel is in a list.
-    pub fn contains(&self, voxel: u32) -> bool {
-        self.bricks.contains(voxel)
+    /// The voxels that are in a list.
+    pub fn list(&self) -> &BrickList {
+        &self.bricks
     }
 
     /// Adds and removes voxels; nothing is uploaded before [`Self::flush`].

@@ -12,6 +12,7 @@ use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::brick_lists::{BrickLists, SettledBricks};
 use crate::gpu::counts::{GroupSlabs, Totals};
 use crate::gpu::gpu_volume::{Coefficients, GpuVolume};
+use crate::gpu::volume_texture::OwnColors;
 use crate::lists::brick::BrickList;
 use crate::lists::classify::{classify, in_rows, takes_part};
 use crate::lists::iso_range::ValueSet;
@@ -90,9 +91,7 @@ impl ClassifiedVolume {
         classification: Classification,
     ) -> Self {
         let voxels = volume.volume();
-        if voxels.labels().is_none() {
-            transfer.labels.clear();
-        }
+        keep_what_applies(voxels, &mut transfer);
         let is_after = classification == Classification::After;
         let taking_part = if is_after { Vec::new() } else { classify(voxels, &transfer, &clipped) };
         let lists = BrickLists::upload(device, voxels.grid(), &taking_part);
@@ -154,9 +153,14 @@ impl ClassifiedVolume {
         self.volume.values()
     }
 
+    /// The first channel's colours of voxels' own.
+    pub(crate) fn colors(&self) -> Option<OwnColors<'_>> {
+        self.volume.colors()
+    }
+
     /// Whether any voxel is a hole.
     pub(crate) fn has_holes(&self) -> bool {
-        self.volume().holes() > 0
+        self.volume().channels().any(|channel| channel.holes() > 0)
     }
 
     /// The labels on the GPU, if shading needs them.
@@ -166,8 +170,8 @@ impl ClassifiedVolume {
 
     /// Whether shading needs labels.
     pub(crate) fn shades_by_label(&self) -> bool {
-        let is_after = self.classification == Classification::After;
-        let matter = if is_after { LabelTables::matter } else { LabelTables::matter_to_shading };
+        let is_alone = self.transfer.further.is_empty() && self.classification == Classification::Before;
+        let matter = if is_alone { LabelTables::matter_to_shading } else { LabelTables::matter };
         self.transfer.labels.values().any(matter)
     }
 
@@ -200,12 +204,14 @@ impl ClassifiedVolume {
     /// whose values become visible or transparent, found by binary search. If the gradient opacity changes, all voxels in range must be
     /// examined. The labels' tables are ignored if the volume is not segmented.
     pub fn set_transfer_function(&mut self, mut transfer: TransferFunction) -> Touched {
-        if self.volume().labels().is_none() {
-            transfer.labels.clear();
-        }
+        keep_what_applies(self.volume(), &mut transfer);
         if self.classification == Classification::After {
             self.transfer = transfer;
             return self.look_at_bricks();
+        }
+        if !self.volume().further().is_empty() {
+            self.transfer = transfer;
+            return self.look_at((0..self.volume().values().len() as u32).collect());
         }
         let labels = self.transfer.labels.keys().chain(transfer.labels.keys()).copied().map(Some);
         let mut labels: Vec<Option<u16>> = labels.chain([None]).collect();
@@ -270,7 +276,9 @@ impl ClassifiedVolume {
 
     /// Decides for some voxels, in memory order, whether they enter or leave.
     fn look_at(&mut self, candidates: Vec<u32>) -> Touched {
-        let (volume, transfer, clipped, lists) = (&**self.volume(), &self.transfer, &self.clipped, &self.lists);
+        // The closures get no types of wgpu, which in a browser belong to one thread.
+        let (volume, transfer, clipped) = (&**self.volume(), &self.transfer, &self.clipped);
+        let lists = self.lists.list();
         let takes_part =
             |index: u32| clipped.contain(volume.grid().voxel_at(index)) && takes_part(volume, transfer, index);
         let (entering, leaving): (Vec<u32>, Vec<u32>) = (candidates.into_par_iter())
@@ -338,8 +346,17 @@ impl ShownBricks {
     }
 
     fn voxels(&self, volume: &Volume) -> Vec<u32> {
-        self.ranges.voxels(volume, |brick| self.are_shown[brick])
+        let are_shown = &self.are_shown;
+        self.ranges.voxels(volume, |brick| are_shown[brick])
     }
+}
+
+/// Drops the tables of labels of a volume without labels, and the transfer functions of channels that it does not have.
+fn keep_what_applies(volume: &Volume, transfer: &mut TransferFunction) {
+    if volume.labels().is_none() {
+        transfer.labels.clear();
+    }
+    transfer.further.truncate(volume.further().len());
 }
 
 /// The values of voxels that may enter or leave when their tables change.

@@ -25,6 +25,11 @@ impl From<wgpu::Error> for DeviceFault {
         };
         match error {
             wgpu::Error::OutOfMemory { source } => Self::OutOfMemory(message(&*source)),
+            // In browsers only the description tells what happened.
+            wgpu::Error::Validation { description, .. } if cfg!(target_family = "wasm") => {
+                Self::Validation(description)
+            }
+            wgpu::Error::Internal { description, .. } if cfg!(target_family = "wasm") => Self::Internal(description),
             wgpu::Error::Validation { source, .. } => Self::Validation(message(&*source)),
             wgpu::Error::Internal { source, .. } => Self::Internal(message(&*source)),
         }

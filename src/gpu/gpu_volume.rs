@@ -1,5 +1,6 @@
 //! A volume on the GPU, shared by any number of views and renderers on one device.
 
+use std::borrow::Cow;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use rayon::prelude::*;
@@ -9,7 +10,7 @@ use crate::after::coefficients;
 use crate::after::normalization::Normalization;
 use crate::error::RenderError;
 use crate::gpu::fault::scoped;
-use crate::gpu::volume_texture::{ValueFormat, VolumeTexture};
+use crate::gpu::volume_texture::{OwnColors, ValueFormat, VolumeTexture};
 use crate::lists::value_list::ValueList;
 use crate::volume::Volume;
 
@@ -24,6 +25,8 @@ struct Shared {
     device: Device,
     volume: Arc<Volume>,
     values: VolumeTexture,
+    /// The first channel's colours of voxels' own, and the number in them that stands for 1.
+    colors: Option<(VolumeTexture, u32)>,
     /// The labels, uploaded when tables first need them.
     labels: OnceLock<VolumeTexture>,
     value_list: OnceLock<ValueList>,
@@ -47,7 +50,8 @@ pub(crate) struct Coefficients {
 }
 
 impl GpuVolume {
-    /// Uploads a volume's values: 4 bytes per voxel, or 1 or 2 if they are whole numbers in a range of 256 or 65536. Labels, 2 bytes per voxel,
+    /// Uploads a volume's values: 4 bytes per voxel, or 1 or 2 if they are whole numbers in a range of 256 or 65536, and for a volume of colours 4
+    /// bytes more, or 8 if these have more than 8 bits. Labels, 2 bytes per voxel,
     /// follow when a view first has tables for them.
     ///
     /// # Errors
@@ -67,12 +71,22 @@ impl GpuVolume {
         written: &dyn Fn(),
     ) -> Result<Self, RenderError> {
         let volume = volume.into();
-        let upload = || VolumeTexture::upload_in_chunks(device, queue, volume.values(), written);
+        let all = all_values(&volume);
+        let upload = || VolumeTexture::upload_in_chunks(device, queue, &all, written);
         let values = scoped(device, upload)??;
+        drop(all);
+        let colors =
+            volume.colors().map(|colors| scoped(device, || VolumeTexture::upload_colors(device, queue, colors)));
+        let colors = colors.transpose()?.transpose()?;
         let (device, labels, value_list) = (device.clone(), OnceLock::new(), OnceLock::new());
         let (numbers, coefficients) = (OnceLock::new(), Mutex::default());
-        let shared = Shared { device, volume, values, labels, value_list, numbers, coefficients };
-        Ok(Self { shared: Arc::new(shared) })
+        let shared = Shared { device, volume, values, colors, labels, value_list, numbers, coefficients };
+        #[cfg_attr(
+            target_family = "wasm",
+            expect(clippy::arc_with_non_send_sync, reason = "a browser's wgpu belongs to one thread")
+        )]
+        let shared = Arc::new(shared);
+        Ok(Self { shared })
     }
 
     /// What [`Self::gpu_bytes`] of a volume will be, before and after a view shades by label. Examines all values.
@@ -80,8 +94,8 @@ impl GpuVolume {
     /// # Errors
     /// If the volume needs more layers than the device's textures have.
     pub fn estimate(device: &Device, volume: &Volume) -> Result<[u64; 2], RenderError> {
-        let values = volume.values();
-        estimate(device, values.len(), ValueFormat::of(values))
+        let values = all_values(volume);
+        estimate(device, volume, values.len(), ValueFormat::of(&values))
     }
 
     /// [`Self::estimate`] for this volume.
@@ -89,7 +103,9 @@ impl GpuVolume {
     /// # Errors
     /// As for [`Self::estimate`].
     pub(crate) fn needs(&self) -> Result<[u64; 2], RenderError> {
-        estimate(&self.shared.device, self.shared.volume.values().len(), self.value_format())
+        let volume = &self.shared.volume;
+        let values = volume.values().len() * volume.channels().count();
+        estimate(&self.shared.device, volume, values, self.value_format())
     }
 
     /// The volume.
@@ -105,7 +121,8 @@ impl GpuVolume {
 
     /// Bytes of GPU memory, independent of the number of views.
     pub fn gpu_bytes(&self) -> u64 {
-        let textures = [Some(&self.shared.values), self.shared.labels.get()];
+        let colors = self.shared.colors.as_ref().map(|(texture, _)| texture);
+        let textures = [Some(&self.shared.values), colors, self.shared.labels.get()];
         let coefficients =
             self.last_coefficients().and_then(|last| last.texture.get().map(|texture| texture.gpu_bytes));
         textures.into_iter().flatten().map(|texture| texture.gpu_bytes).sum::<u64>() + coefficients.unwrap_or(0)
@@ -124,6 +141,11 @@ impl GpuVolume {
     /// The values, in their format.
     pub(crate) fn values(&self) -> &TextureView {
         &self.shared.values.view
+    }
+
+    /// The first channel's colours of voxels' own.
+    pub(crate) fn colors(&self) -> Option<OwnColors<'_>> {
+        self.shared.colors.as_ref().map(|(texture, full)| OwnColors { view: &texture.view, full: *full })
     }
 
     /// The labels, `R16Uint`, if they were uploaded.
@@ -152,6 +174,10 @@ impl GpuVolume {
         let volume = &self.shared.volume;
         let values = coefficients::of_volume(volume, kernel)?;
         let numbers = Normalization::of(values.iter().copied()).unwrap_or(Normalization::new([0.0; 2]));
+        #[cfg_attr(
+            target_family = "wasm",
+            expect(clippy::arc_with_non_send_sync, reason = "a browser's wgpu belongs to one thread")
+        )]
         let found = Arc::new(Coefficients { kernel, values, numbers, texture: OnceLock::new() });
         *self.shared.coefficients.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(&found));
         Ok(found)
@@ -187,7 +213,8 @@ impl Coefficients {
     /// If they need more layers than the device's textures have, or the device fails.
     pub(crate) fn texture(&self, device: &Device, queue: &Queue) -> Result<&TextureView, RenderError> {
         if self.texture.get().is_none() {
-            let numbers: Vec<f32> = self.values.par_iter().map(|&c| self.numbers.apply(f64::from(c)) as f32).collect();
+            let numbers = self.numbers;
+            let numbers: Vec<f32> = self.values.par_iter().map(|&c| numbers.apply(f64::from(c)) as f32).collect();
             let uploaded = scoped(device, || VolumeTexture::upload_bits(device, queue, &numbers))??;
             // Another thread may have been first: its are the same.
             let _ = self.texture.set(uploaded);
@@ -197,7 +224,19 @@ impl Coefficients {
     }
 }
 
-fn estimate(device: &Device, voxels: usize, format: ValueFormat) -> Result<[u64; 2], RenderError> {
-    let [values, labels] = VolumeTexture::estimate(&device.limits(), voxels as u64, format)?;
-    Ok([values, values + labels])
+/// The bytes of a volume with a number of values in all channels.
+fn estimate(device: &Device, volume: &Volume, values: usize, format: ValueFormat) -> Result<[u64; 2], RenderError> {
+    let limits = device.limits();
+    let [values, _] = VolumeTexture::estimate(&limits, values as u64, format)?;
+    let [_, labels] = VolumeTexture::estimate(&limits, volume.values().len() as u64, format)?;
+    let colors = volume.colors().map_or(Ok(0), |colors| VolumeTexture::estimate_colors(&limits, colors))?;
+    Ok([values + colors, values + colors + labels])
+}
+
+/// The values of all channels, one channel after the other.
+fn all_values(volume: &Volume) -> Cow<'_, [f32]> {
+    match volume.further() {
+        [] => Cow::Borrowed(volume.values()),
+        _ => Cow::Owned(volume.channels().flat_map(Volume::values).copied().collect()),
+    }
 }

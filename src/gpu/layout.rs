@@ -99,8 +99,8 @@ pub struct Frame {
     pub value_offset: f32,
     /// 1 if values are whole numbers, 0 if texels are the values' bits.
     pub whole_values: u32,
-    /// Unused.
-    pub padding_0: u32,
+    /// The start of the table of channels in the control points, which begins with the second channel.
+    pub channel_table: u32,
     /// Unused.
     pub padding_1: u32,
 }
@@ -164,6 +164,10 @@ pub struct Cut {
     pub plane_count: u32,
     /// 1 with surfaces, 0 without.
     pub has_surfaces: u32,
+    /// The pixels that are drawn (SPEC §11), to the right of and below the first two numbers, to the left of and above the others.
+    pub region: [f32; 4],
+    /// The sheet depths between which slabs are composited; the others unused.
+    pub slabs: [f32; 4],
 }
 
 /// The position of kernels on slab planes, and the scale of splatted numbers (SPEC §9): a `PlaneGeometry` and
@@ -188,6 +192,14 @@ pub struct FieldPlanes {
     pub value_scale: f32,
     /// The factor from numbers to values.
     pub per_number: f32,
+    /// Where `Σ (c - f)·g·δ / N` is shorter, it is rounding errors, and the kernel's gradient is 0.
+    pub min_moment: f32,
+    /// Unused.
+    pub padding_0: f32,
+    /// Unused.
+    pub padding_1: f32,
+    /// Unused.
+    pub padding_2: f32,
 }
 
 /// A voxel that is drawn onto slab planes, as large as a [`Splat`].

@@ -1,12 +1,10 @@
 //! Shader sources: every stage's own file, preceded by the files that it shares with others.
 
-/// A stage's name, its complete WGSL source, and the files that the source was assembled from.
+/// A stage's name, and the files that its source is assembled from. Files that shaders share are in the program once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shader {
     /// The stage's name, which is also its file's name.
     pub stage: &'static str,
-    /// WGSL.
-    pub source: &'static str,
     /// The parts of the source in order: each file's path below `shaders/`, and its text.
     pub files: &'static [(&'static str, &'static str)],
 }
@@ -15,10 +13,6 @@ macro_rules! shader {
     ($stage:literal $(, $file:literal)*) => {
         Shader {
             stage: $stage,
-            source: concat!(
-                $(include_str!(concat!("../../shaders/", $file, ".wgsl")),)*
-                include_str!(concat!("../../shaders/", $stage, ".wgsl")),
-            ),
             files: &[
                 $((concat!($file, ".wgsl"), include_str!(concat!("../../shaders/", $file, ".wgsl"))),)*
                 (concat!($stage, ".wgsl"), include_str!(concat!("../../shaders/", $stage, ".wgsl"))),
@@ -55,6 +49,8 @@ pub const SHADE: Shader = shader!(
     "shared/frame",
     "shared/brick",
     "shared/volume",
+    "shared/channels",
+    "shared/colors",
     "shared/project",
     "shared/splat",
     "shared/shading",
@@ -178,6 +174,8 @@ pub const GATHER: Shader = shader!(
     "gather/economies",
     "gather/ramps",
     "shared/volume",
+    "shared/channels",
+    "shared/colors",
     "shared/project",
     "shared/local_ray",
     "shared/shading",
@@ -249,11 +247,16 @@ impl Shader {
         *self != GATHER && *self != GATHER_PLANES
     }
 
+    /// The complete WGSL.
+    pub fn source(&self) -> String {
+        self.files.iter().map(|&(_, text)| text).collect()
+    }
+
     /// Compiles the shader.
     pub fn module(&self, device: &wgpu::Device) -> wgpu::ShaderModule {
         device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(&format!("sheetsplat.{}", self.stage)),
-            source: wgpu::ShaderSource::Wgsl(self.source.into()),
+            source: wgpu::ShaderSource::Wgsl(self.source().into()),
         })
     }
 
@@ -292,7 +295,7 @@ impl Shader {
 
     /// The number of a binding of group 0 by its name in the shader; `None` if there is no such binding.
     pub fn binding(&self, name: &str) -> Option<u32> {
-        self.source.lines().find_map(|line| {
+        self.files.iter().flat_map(|(_, text)| text.lines()).find_map(|line| {
             let (number, declaration) = line.strip_prefix("@group(0) @binding(")?.split_once(')')?;
             let declared = declaration.split_once(':')?.0.split_whitespace().last()?;
             if declared == name { number.parse().ok() } else { None }

@@ -16,6 +16,7 @@ use crate::geometry::plane_geometry::PlaneGeometry;
 use crate::geometry::surfaces::SurfaceDepths;
 use crate::geometry::view_geometry::{Rays, ViewGeometry};
 use crate::kernel::Kernel;
+use crate::lists::iso_range::{ValueSet, of_ordinal, ordinal};
 use crate::lists::patch_bins::PatchBins;
 use crate::lists::quad_plan::FramePlan;
 use crate::scene::Scene;
@@ -23,6 +24,7 @@ use crate::settings::clip::HalfSpace;
 use crate::settings::shading::{Light, MIN_GRADIENT, Shading};
 use crate::settings::splatting::{Classification, Compositing, Order, Splatting};
 use crate::settings::transfer_function::{LabelTables, Ramp, Tables, TransferFunction};
+use crate::settings::window::Window;
 use crate::volume::Grid;
 
 /// The cap of ambient, diffuse, specular and shininess, beyond which images no longer change. It avoids infinities in `f32`.
@@ -88,7 +90,7 @@ pub fn frame(
             ValueFormat::Bits => 0.0,
         },
         whole_values: u32::from(values != ValueFormat::Bits),
-        padding_0: 0,
+        channel_table: ramps.channel_table,
         padding_1: 0,
     }
 }
@@ -137,13 +139,14 @@ pub fn gather(
     }
 }
 
-/// The cuts of rays by clip planes and a host's surfaces, and the box that compositing by means uses.
+/// The cuts of rays by clip planes and a host's surfaces, the box that compositing by means uses, and what is drawn.
 pub fn cut(
     view: &ViewGeometry,
     grid: &Grid,
     Scene { clip, splatting, .. }: &Scene,
     surfaces: Option<(SurfaceDepths, [u32; 2])>,
     first_hit: Option<f64>,
+    Window { slabs, region }: &Window,
 ) -> Cut {
     let Rays { origin, along } = view.rays();
     let row = |normal: DVec3, [right, down, middle]: [DVec3; 3], offset: f64| {
@@ -176,6 +179,8 @@ pub fn cut(
         none: f32::INFINITY,
         plane_count: half_spaces.len() as u32,
         has_surfaces: surfaces.is_some().into(),
+        region: [region.x, region.y, region.x + region.width, region.y + region.height].map(|edge| edge as f32),
+        slabs: [view.slabs.plane(slabs.start) as f32, view.slabs.plane(slabs.end) as f32, 0.0, 0.0],
     }
 }
 
@@ -199,7 +204,19 @@ pub fn planes(
         value_bias: (offset - numbers.base) as f32,
         value_scale: numbers.scale as f32,
         per_number: numbers.scale.recip() as f32,
+        min_moment: min_moment(view.radius, numbers.range),
+        padding_0: 0.0,
+        padding_1: 0.0,
+        padding_2: 0.0,
     }
+}
+
+/// The rounding error of `Σ c·g·δ / N - f·Σ g·δ / N`, whose terms are added one by one: where all values are equal it is no longer, and a direction
+/// made of it would be noise.
+fn min_moment(radius: f64, range: [f32; 2]) -> f32 {
+    // About as many units in the last place as a kernel of the default radius reaches voxels.
+    const UNITS: f32 = 32.0;
+    UNITS * f32::EPSILON * radius as f32 * range[0].abs().max(range[1].abs())
 }
 
 /// The fraction of the kernel's ball, from the middle out, for which the polynomial for chords is fitted: where chords are long, they cut
@@ -296,6 +313,10 @@ pub struct Ramps {
     /// The part of `points` that holds for every label the start of its ramps and the end of each, as numbers that are exact in `f32`. The last
     /// entry is the main ramps', and serves all greater labels. Empty if no label has its own ramps.
     pub label_table: Range<u32>,
+    /// The start of the part of `points` that holds the same for every channel after the first (SPEC §10).
+    pub channel_table: u32,
+    /// The number of channels.
+    pub channels: u32,
     /// The maximum number of control points in each ramp.
     lengths: [u32; 3],
 }
@@ -303,7 +324,10 @@ pub struct Ramps {
 impl Ramps {
     /// All ramps of a transfer function; a missing gradient opacity is 1 everywhere.
     pub fn new(transfer: &TransferFunction) -> Self {
-        Self::with(transfer, LabelTables::matter_to_shading, |_| Vec::new())
+        // A voxel that takes part in one channel may be invisible in another.
+        let is_alone = transfer.further.is_empty();
+        let matter = |tables: &LabelTables| if is_alone { tables.matter_to_shading() } else { tables.matter() };
+        Self::with(transfer, matter, |_| Vec::new())
     }
 
     /// The same with tables of the ramps' integrals, for classification after splatting.
@@ -316,9 +340,10 @@ impl Ramps {
         matter: impl Fn(&LabelTables) -> bool,
         integrals: impl Fn(&Tables) -> Vec<[f32; 4]>,
     ) -> Self {
+        let is_alone = transfer.further.is_empty();
         let append = |points: &mut Vec<[f32; 4]>, label| {
             let tables = transfer.tables(label);
-            let bounds = append(points, &tables);
+            let bounds = append(points, &tables, is_alone);
             points.extend(integrals(&tables));
             bounds
         };
@@ -337,22 +362,29 @@ impl Ramps {
             label_table = points.len() as u32..(points.len() + table.len()) as u32;
             points.extend(table.into_iter().map(|numbers| numbers.map(|number| number as f32)));
         }
+        let further: Vec<[u32; 4]> =
+            transfer.further.iter().map(|transfer| self::append(&mut points, &transfer.tables(None), false)).collect();
+        all.extend(&further);
+        let (channel_table, channels) = (points.len() as u32, 1 + further.len() as u32);
+        points.extend(further.into_iter().map(|numbers| numbers.map(|number| number as f32)));
         let lengths = [0, 1, 2].map(|ramp| all.iter().map(|ends| ends[ramp + 1] - ends[ramp]).max().unwrap_or(0));
-        Self { points, ends, label_table, lengths }
+        Self { points, ends, label_table, channel_table, channels, lengths }
     }
 
-    /// The maximum number of control points in each ramp, over all labels.
+    /// The maximum number of control points in each ramp, over all labels and channels.
     pub fn lengths(&self) -> [u32; 3] {
         self.lengths
     }
 }
 
-/// Appends the control points of a label's ramps. Returns their start, and the end of each.
-fn append(points: &mut Vec<[f32; 4]>, tables: &Tables) -> [u32; 4] {
+/// Appends the control points of a label's ramps. Returns their start, and the end of each. Unless the channel is alone, the opacity is 0 at values
+/// with which its voxels do not take part: they may be drawn for another channel.
+fn append(points: &mut Vec<[f32; 4]>, tables: &Tables, is_alone: bool) -> [u32; 4] {
     let mut bounds = [points.len() as u32; 4];
     let scalar = |(at, y): (f64, f64)| DVec4::new(at, y, 0.0, 0.0);
     let color = in_f32(tables.color).into_iter().map(|(at, rgb)| DVec4::new(at, rgb.x, rgb.y, rgb.z)).collect();
-    let opacity = in_f32(tables.opacity).into_iter().map(scalar).collect();
+    let opacity = if is_alone { in_f32(tables.opacity) } else { in_f32(&visible_opacity(tables)) };
+    let opacity = opacity.into_iter().map(scalar).collect();
     let gradient_opacity = tables.gradient_opacity.map_or(vec![(0.0, 1.0)], in_f32).into_iter().map(scalar).collect();
     let ramps: [Vec<DVec4>; 3] = [color, opacity, gradient_opacity];
     for (end, ramp) in bounds[1..].iter_mut().zip(ramps) {
@@ -360,6 +392,34 @@ fn append(points: &mut Vec<[f32; 4]>, tables: &Tables) -> [u32; 4] {
         *end = points.len() as u32;
     }
     bounds
+}
+
+/// The opacity of `f32` values, 0 at those outside the iso-ranges and where nothing is visible.
+fn visible_opacity(tables: &Tables) -> Ramp<f64> {
+    if tables.visible && tables.iso_ranges.is_none() {
+        return tables.opacity.clone();
+    }
+    let ends = [f32::MIN, f32::MAX].map(ordinal);
+    let mut points: Vec<(f64, f64)> = Vec::new();
+    for range in ValueSet::of_tables(tables).ranges() {
+        let [first, last] = [range.start, range.end - 1].map(|at| at.clamp(ends[0], ends[1]));
+        let inner = tables
+            .opacity
+            .points()
+            .iter()
+            .filter(|point| f64::from(of_ordinal(first)) < point.0 && point.0 < f64::from(of_ordinal(last)));
+        let value = |at: u32| f64::from(of_ordinal(at));
+        let seen = |at: u32| (value(at), tables.opacity.at(value(at)));
+        // Between neighbouring numbers there are no values.
+        points.extend((first > ends[0]).then(|| (value(first - 1), 0.0)));
+        points.push(seen(first));
+        points.extend(inner);
+        points.push(seen(last));
+        points.extend((last < ends[1]).then(|| (value(last + 1), 0.0)));
+    }
+    // A range of one value, and one that begins right behind another's end, give points twice.
+    points.dedup_by_key(|point| point.0);
+    Ramp::new(points).unwrap_or_else(|_| Ramp::through(vec![(0.0, 0.0)]))
 }
 
 /// A ramp's control points, clipped to the range of `f32`, like values.

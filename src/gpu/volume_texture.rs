@@ -1,4 +1,4 @@
-//! The volume's values and labels on the GPU, as texture arrays, whose size is not limited by one binding. Layers have 2048 texels a side, or
+//! The volume's values, labels and colours on the GPU, as texture arrays, whose size is not limited by one binding. Layers have 2048 texels a side, or
 //! 4096 or 8192 if a volume would need more layers than the device has; with WebGPU's default limits 2048 suffice.
 
 use rayon::prelude::*;
@@ -7,6 +7,7 @@ use wgpu::{
 };
 
 use crate::error::RenderError;
+use crate::volume::Texel;
 
 /// The smallest of [`SIDES`].
 pub const LEAST_SIDE: u32 = 2048;
@@ -46,6 +47,15 @@ impl ValueFormat {
             Self::Bits => TextureFormat::R32Uint,
         }
     }
+}
+
+/// Colours of voxels' own on the GPU (SPEC §10).
+#[derive(Clone, Copy, Debug)]
+pub struct OwnColors<'a> {
+    /// Red, green, blue and A.
+    pub view: &'a TextureView,
+    /// The number that stands for 1.
+    pub full: u32,
 }
 
 /// The format of labels, whose texels are the labels themselves.
@@ -136,6 +146,42 @@ impl VolumeTexture {
         Ok(uploaded)
     }
 
+    /// Uploads colours of voxels' own, with the number that stands for 1: `Rgba8Uint` if that reproduces them, else `Rgba16Uint`.
+    ///
+    /// # Errors
+    /// If they need more layers than the device's textures have.
+    pub fn upload_colors(device: &Device, queue: &Queue, colors: &[Texel]) -> Result<(Self, u32), RenderError> {
+        let side = side(&device.limits(), "the volume's colours", colors.len() as u64)?;
+        let format = color_format(colors);
+        let size = folded(colors.len() as u64, side);
+        let (texture, uploaded) = Self::new_as(device, "sheetsplat.colors", ValueFormat::Bits, format, size);
+        let full = match format {
+            TextureFormat::Rgba8Uint => {
+                fill(queue, &texture, colors, |texel| texel.map(|number| (number / BYTE) as u8), &|| {});
+                u32::from(u8::MAX)
+            }
+            _ => {
+                fill(queue, &texture, colors, |texel| texel, &|| {});
+                u32::from(u16::MAX)
+            }
+        };
+        Ok((uploaded, full))
+    }
+
+    /// The size in bytes of colours of voxels' own.
+    ///
+    /// # Errors
+    /// If they need more layers than textures may have.
+    pub fn estimate_colors(limits: &Limits, colors: &[Texel]) -> Result<u64, RenderError> {
+        let side = side(limits, "the volume's colours", colors.len() as u64)?;
+        Ok(bytes_as(color_format(colors), folded(colors.len() as u64, side)))
+    }
+
+    /// A texture of one colour, for volumes without colours.
+    pub fn no_colors(device: &Device) -> Self {
+        Self::new_as(device, "sheetsplat.no_colors", ValueFormat::Bits, TextureFormat::Rgba8Uint, [1; 3]).1
+    }
+
     /// The sizes in bytes of `voxels` values in a format, and of as many labels.
     ///
     /// # Errors
@@ -150,10 +196,15 @@ impl VolumeTexture {
         Self::new(device, "sheetsplat.no_labels", LABELS, [1; 3]).1
     }
 
-    fn new(
+    fn new(device: &Device, label: &str, format: ValueFormat, size: [u32; 3]) -> (wgpu::Texture, Self) {
+        Self::new_as(device, label, format, format.texture(), size)
+    }
+
+    fn new_as(
         device: &Device,
         label: &str,
         format: ValueFormat,
+        texels: TextureFormat,
         [width, height, layers]: [u32; 3],
     ) -> (wgpu::Texture, Self) {
         let texture = device.create_texture(&TextureDescriptor {
@@ -162,7 +213,7 @@ impl VolumeTexture {
             mip_level_count: 1,
             sample_count: 1,
             dimension: TextureDimension::D2,
-            format: format.texture(),
+            format: texels,
             usage: TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST,
             view_formats: &[],
         });
@@ -171,8 +222,17 @@ impl VolumeTexture {
             dimension: Some(wgpu::TextureViewDimension::D2Array),
             ..wgpu::TextureViewDescriptor::default()
         });
-        (texture, Self { view, format, gpu_bytes: bytes(format, [width, height, layers]) })
+        (texture, Self { view, format, gpu_bytes: bytes_as(texels, [width, height, layers]) })
     }
+}
+
+/// A step of colours that were bytes.
+const BYTE: u16 = u16::MAX / u8::MAX as u16;
+
+/// The smallest format that reproduces colours.
+fn color_format(colors: &[Texel]) -> TextureFormat {
+    let are_bytes = colors.par_iter().all(|texel| texel.iter().all(|number| number.is_multiple_of(BYTE)));
+    if are_bytes { TextureFormat::Rgba8Uint } else { TextureFormat::Rgba16Uint }
 }
 
 /// The number of values converted and sent at a time: whole rows of a layer, whatever its side.
@@ -242,5 +302,9 @@ fn folded(voxels: u64, side: u32) -> [u32; 3] {
 }
 
 fn bytes(format: ValueFormat, size: [u32; 3]) -> u64 {
-    u64::from(format.texture().block_copy_size(None).unwrap_or(0)) * size.map(u64::from).iter().product::<u64>()
+    bytes_as(format.texture(), size)
+}
+
+fn bytes_as(texels: TextureFormat, size: [u32; 3]) -> u64 {
+    u64::from(texels.block_copy_size(None).unwrap_or(0)) * size.map(u64::from).iter().product::<u64>()
 }

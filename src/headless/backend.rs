@@ -19,19 +19,35 @@ impl Backend {
     }
 }
 
-/// Whether options or scenes need the GPU, or a GPU that is no software driver can run the renderer.
+/// Whether a view that the GPU does not draw is drawn by the CPU: unless something asks for the GPU.
+#[cfg(all(feature = "gpu", feature = "cpu"))]
+pub(super) fn may_leave_gpu<'a>(options: &HeadlessOptions, scenes: impl IntoIterator<Item = &'a Scene>) -> bool {
+    options.backend == Backend::Auto && !names_gpu(options) && !scenes.into_iter().any(is_for_gpu)
+}
+
+/// Whether options ask for the GPU.
 #[cfg(feature = "gpu")]
-fn wants_gpu<'a>(options: &HeadlessOptions, scenes: impl IntoIterator<Item = &'a Scene>) -> bool {
+fn names_gpu(options: &HeadlessOptions) -> bool {
     let HeadlessOptions { backend: _, adapter, requirements, sheet_format, sheets_per_group, rasterizer, profile } =
         options;
-    let is_named = adapter.is_some()
+    adapter.is_some()
         || requirements.is_some()
         || sheet_format.is_some()
         || sheets_per_group.is_some()
         || *rasterizer != Rasterizer::Auto
-        || *profile;
-    let is_for_gpu = |scene: &Scene| scene.splatting.rasterizer != Rasterizer::Auto || !is_drawn_by_cpu(scene);
-    cfg!(not(feature = "cpu")) || is_named || scenes.into_iter().any(is_for_gpu) || device::has_gpu()
+        || *profile
+}
+
+/// Whether a scene needs the GPU.
+#[cfg(feature = "gpu")]
+fn is_for_gpu(scene: &Scene) -> bool {
+    scene.splatting.rasterizer != Rasterizer::Auto || !is_drawn_by_cpu(scene)
+}
+
+/// Whether options or scenes need the GPU, or a GPU that is no software driver can run the renderer.
+#[cfg(feature = "gpu")]
+fn wants_gpu<'a>(options: &HeadlessOptions, scenes: impl IntoIterator<Item = &'a Scene>) -> bool {
+    cfg!(not(feature = "cpu")) || names_gpu(options) || scenes.into_iter().any(is_for_gpu) || device::has_gpu()
 }
 
 /// Without the feature `gpu` no GPU can be chosen.

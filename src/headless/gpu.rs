@@ -2,24 +2,31 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::time::Instant;
 
+use web_time::Instant;
 use wgpu::{Adapter, Device, Queue, TextureFormat};
 
 use super::device::{self, driver_name};
-use super::{Backend, Error, HeadlessOptions, Rendering, load_and_render, milliseconds_since, readback, view_and_draw};
+use super::{
+    Backend, Error, HeadlessOptions, Rendering, content, load_and_render, milliseconds_since, readback, view_and_draw,
+};
 use crate::error::RenderError;
 use crate::error::device::DeviceFault;
+use crate::error::setting::SettingError;
+use crate::gpu::counts::PendingCounts;
 use crate::gpu::device::{DeviceError, DeviceRequirements};
 use crate::gpu::fault::scoped;
 use crate::gpu::gpu_volume::GpuVolume;
 use crate::gpu::options::{Blend, RendererOptions};
 use crate::gpu::placement::Placement;
 use crate::image::Image;
+use crate::part::{self, Part};
 use crate::pick::Pick;
 use crate::renderer::Renderer;
 use crate::renderer::scene_view::SceneView;
 use crate::scene::{ImageSettings, Scene};
+use crate::settings::splatting::{Classification, Compositing, Splatting};
+use crate::settings::window::Window;
 use crate::stats::Stats;
 use crate::volume::Volume;
 
@@ -115,6 +122,39 @@ impl GpuHeadless {
         scoped(&self.device, || self.draw_unscoped(view))?
     }
 
+    /// Draws a part of a view's image (SPEC §11), without first hits, and returns it with its statistics.
+    ///
+    /// # Errors
+    /// As for [`Self::draw`], if the scene has no parts, a host has set surfaces, or the window does not lie in the image.
+    pub fn draw_part(&self, view: &mut SceneView, window: &Window) -> Result<(Part, Stats), RenderError> {
+        part::check(view.volume.volume(), &view.scene, window)?;
+        if view.surfaces.is_some() {
+            return Err(SettingError::new("surfaces", "a host's surfaces for a part of an image", "none").into());
+        }
+        let first_hit = view.first_hit.take();
+        view.window = Some(window.clone());
+        let drawn = scoped(&self.device, || self.draw_part_unscoped(view, window));
+        (view.window, view.first_hit) = (None, first_hit);
+        drawn?
+    }
+
+    fn draw_part_unscoped(&self, view: &mut SceneView, window: &Window) -> Result<(Part, Stats), RenderError> {
+        let prepare_ms = self.prepare(view)?;
+        let start = Instant::now();
+        let mut encoder = self.encoder("sheetsplat.part");
+        self.renderer.record(&mut encoder, view);
+        self.queue.submit([encoder.finish()]);
+        let counts = view.counts();
+        let frame = view.frame.as_ref().ok_or_else(|| RenderError::Readback("there is no frame".to_owned()))?;
+        let Splatting { compositing, classification, .. } = view.scene.splatting;
+        let is_choice = matches!(compositing, Compositing::Maximum | Compositing::Minimum);
+        let chosen = (is_choice && classification == Classification::After).then_some(compositing);
+        let content = content::content((&self.device, &self.queue), frame, &window.region, chosen)?;
+        let part = Part::new((view.volume.volume(), &view.scene), &frame.view, window, content)?;
+        let stats = self.stats(view, counts, 0, [prepare_ms, milliseconds_since(start)])?;
+        Ok((part, stats))
+    }
+
     /// The first hit at a pixel of the last frame drawn, with pixels counted from the upper left; `None` where the ray does not reach the
     /// opacity of [`SceneView::set_first_hit`].
     ///
@@ -122,8 +162,7 @@ impl GpuHeadless {
     /// If the frame has no first hits, the pixel lies outside the image, or the device fails.
     pub fn pick(&self, view: &SceneView, pixel: [u32; 2]) -> Result<Option<Pick>, RenderError> {
         scoped(&self.device, || {
-            let descriptor = wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.pick") };
-            let mut encoder = self.device.create_command_encoder(&descriptor);
+            let mut encoder = self.encoder("sheetsplat.pick");
             let Some(mut pending) = view.pick(&self.device, &mut encoder, pixel) else {
                 return Err(Pick::missing(pixel, &view.scene().image).into());
             };
@@ -137,10 +176,7 @@ impl GpuHeadless {
     }
 
     fn draw_unscoped(&self, scene_view: &mut SceneView) -> Result<Rendering, RenderError> {
-        let start = Instant::now();
-        self.renderer.prepare(&self.device, &self.queue, scene_view)?;
-        let prepare_ms = milliseconds_since(start);
-
+        let prepare_ms = self.prepare(scene_view)?;
         let start = Instant::now();
         let ImageSettings { width, height, .. } = scene_view.scene().image;
         let target = self.device.create_texture(&wgpu::TextureDescriptor {
@@ -154,36 +190,55 @@ impl GpuHeadless {
             view_formats: &[],
         });
         let view = target.create_view(&wgpu::TextureViewDescriptor::default());
-        let mut encoder =
-            self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.frame") });
+        let mut encoder = self.encoder("sheetsplat.frame");
         self.renderer.record(&mut encoder, scene_view);
         self.renderer.present(&mut encoder, scene_view, &view, Placement::whole([width, height]))?;
         self.queue.submit([encoder.finish()]);
         let counts = scene_view.counts();
         let bytes = readback::texture(&self.device, &self.queue, &target)?;
-        let frame_ms = milliseconds_since(start);
+        let target_bytes = u64::from(width) * u64::from(height) * 16;
+        let stats = self.stats(scene_view, counts, target_bytes, [prepare_ms, milliseconds_since(start)])?;
+        let image = Image { width, height, pixels: bytemuck::pod_collect_to_vec(&bytes) };
+        Ok(Rendering { image, stats })
+    }
 
-        let info = self.adapter.get_info();
-        // The image arrived after the counts.
+    /// Prepares a frame, and returns the milliseconds that this took.
+    fn prepare(&self, view: &mut SceneView) -> Result<f64, RenderError> {
+        let start = Instant::now();
+        self.renderer.prepare(&self.device, &self.queue, view)?;
+        Ok(milliseconds_since(start))
+    }
+
+    fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
+        self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) })
+    }
+
+    /// The statistics of a frame whose content has arrived, and with it the counts.
+    fn stats(
+        &self,
+        view: &SceneView,
+        counts: Option<PendingCounts>,
+        target_bytes: u64,
+        [prepare_ms, frame_ms]: [f64; 2],
+    ) -> Result<Stats, RenderError> {
         let missing = || Err(RenderError::Readback("the frame's counts did not arrive".to_owned()));
         let (counts, stages_ms) = counts.and_then(|counts| counts.try_get()).unwrap_or_else(missing)?;
-        Ok(Rendering {
-            image: Image { width, height, pixels: bytemuck::pod_collect_to_vec(&bytes) },
-            stats: Stats {
-                driver: driver_name(&info),
-                adapter: info.name,
-                backend: Backend::Gpu.name().to_owned(),
-                api: info.backend.to_str().to_owned(),
-                width,
-                height,
-                counts,
-                rasterizer: scene_view.rasterizer().unwrap_or_default().to_owned(),
-                stages_ms,
-                gpu_bytes: scene_view.gpu_bytes() + target.width() as u64 * u64::from(height) * 16,
-                load_ms: 0.0,
-                prepare_ms,
-                frame_ms,
-            },
+        let info = self.adapter.get_info();
+        let ImageSettings { width, height, .. } = view.scene().image;
+        Ok(Stats {
+            driver: driver_name(&info),
+            adapter: info.name,
+            backend: Backend::Gpu.name().to_owned(),
+            api: info.backend.to_str().to_owned(),
+            width,
+            height,
+            counts,
+            rasterizer: view.rasterizer().unwrap_or_default().to_owned(),
+            stages_ms,
+            gpu_bytes: view.gpu_bytes() + target_bytes,
+            load_ms: 0.0,
+            prepare_ms,
+            frame_ms,
         })
     }
 }

@@ -2,6 +2,8 @@
 
 mod backend;
 #[cfg(feature = "gpu")]
+mod content;
+#[cfg(feature = "gpu")]
 pub mod device;
 #[cfg(feature = "gpu")]
 mod driver;
@@ -15,7 +17,8 @@ mod reference;
 mod view;
 
 use std::sync::Arc;
-use std::time::Instant;
+
+use web_time::Instant;
 
 pub use self::error::Error;
 #[cfg(feature = "gpu")]
@@ -42,6 +45,9 @@ use crate::volume::Volume;
 #[derive(Debug)]
 pub struct Headless {
     drawer: Drawer,
+    /// Whether the CPU draws what the GPU does not.
+    #[cfg(all(feature = "gpu", feature = "cpu"))]
+    may_leave_gpu: bool,
 }
 
 #[derive(Debug)]
@@ -63,7 +69,8 @@ impl Headless {
     }
 
     /// As [`Self::new`], for scenes that are known: [`Backend::Auto`] takes the GPU if one of them names a rasterizer, or uses a setting that
-    /// the CPU backend does not draw.
+    /// the CPU backend does not draw. A view that only the CPU draws, such as some of several channels, it then leaves to the CPU, unless
+    /// something asks for the GPU.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -71,6 +78,9 @@ impl Headless {
         options: &HeadlessOptions,
         scenes: impl IntoIterator<Item = &'a Scene>,
     ) -> Result<Self, DeviceError> {
+        let scenes: Vec<&Scene> = scenes.into_iter().collect();
+        #[cfg(all(feature = "gpu", feature = "cpu"))]
+        let may_leave_gpu = backend::may_leave_gpu(options, scenes.iter().copied());
         let drawer = match Backend::resolved(options, scenes) {
             #[cfg(feature = "gpu")]
             Backend::Gpu => Drawer::Gpu(Box::new(GpuHeadless::new(options)?)),
@@ -79,7 +89,11 @@ impl Headless {
             Backend::Reference => Drawer::Reference,
             backend => return Err(DeviceError::MissingBackend { backend: backend.name() }),
         };
-        Ok(Self { drawer })
+        Ok(Self {
+            drawer,
+            #[cfg(all(feature = "gpu", feature = "cpu"))]
+            may_leave_gpu,
+        })
     }
 
     /// The backend that draws; never [`Backend::Auto`].
@@ -128,12 +142,9 @@ impl Headless {
     pub fn draw_part(&self, view: &mut HeadlessView, window: &Window) -> Result<(Part, Stats), RenderError> {
         match (&self.drawer, view.backend_mut()) {
             #[cfg(feature = "gpu")]
-            (Drawer::Gpu(_), ViewBackend::Gpu(_)) => {
-                let allowed = "\"cpu\" or \"reference\" for a part of an image";
-                Err(SettingError::new("backend", "\"gpu\"", allowed).into())
-            }
+            (Drawer::Gpu(gpu), ViewBackend::Gpu(view)) => gpu.draw_part(view, window),
             #[cfg(feature = "cpu")]
-            (Drawer::Cpu, ViewBackend::Cpu(view)) => view.draw_part(window),
+            (_, ViewBackend::Cpu(view)) if self.draws_by_cpu() => view.draw_part(window),
             (Drawer::Reference, ViewBackend::Reference(view)) => view.draw_part(window),
             #[cfg(any(feature = "gpu", feature = "cpu"))]
             (_, other) => Err(self.refuse(other.backend()).into()),
@@ -145,6 +156,12 @@ impl Headless {
     /// # Errors
     /// If the backend cannot draw one of the scene's settings, the volume is larger than the device's textures, or the device fails.
     pub fn view(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<HeadlessView, RenderError> {
+        let volume = volume.into();
+        #[cfg(all(feature = "gpu", feature = "cpu"))]
+        if self.may_leave_gpu && crate::renderer::scene_view::check_channels(&volume, scene).is_err() {
+            log::info!("drawn by the CPU: the GPU does not draw this volume's channels with these settings");
+            return Ok(HeadlessView::new(ViewBackend::Cpu(Box::new(CpuRenderer::new(volume, scene)?))));
+        }
         Ok(HeadlessView::new(match &self.drawer {
             #[cfg(feature = "gpu")]
             Drawer::Gpu(gpu) => ViewBackend::Gpu(Box::new(gpu.view(volume, scene)?)),
@@ -173,7 +190,7 @@ impl Headless {
                 Ok(())
             }
             #[cfg(feature = "cpu")]
-            (Drawer::Cpu, ViewBackend::Cpu(view)) => view.set_scene(scene),
+            (_, ViewBackend::Cpu(view)) if self.draws_by_cpu() => view.set_scene(scene),
             (Drawer::Reference, ViewBackend::Reference(view)) => view.set_scene(scene),
             #[cfg(any(feature = "gpu", feature = "cpu"))]
             (_, other) => Err(self.refuse(other.backend()).into()),
@@ -189,7 +206,7 @@ impl Headless {
             #[cfg(feature = "gpu")]
             (Drawer::Gpu(gpu), ViewBackend::Gpu(view)) => gpu.draw(view),
             #[cfg(feature = "cpu")]
-            (Drawer::Cpu, ViewBackend::Cpu(view)) => view.draw(),
+            (_, ViewBackend::Cpu(view)) if self.draws_by_cpu() => view.draw(),
             (Drawer::Reference, ViewBackend::Reference(view)) => view.draw(),
             #[cfg(any(feature = "gpu", feature = "cpu"))]
             (_, other) => Err(self.refuse(other.backend()).into()),
@@ -206,11 +223,21 @@ impl Headless {
             #[cfg(feature = "gpu")]
             (Drawer::Gpu(gpu), ViewBackend::Gpu(view)) => gpu.pick(view, pixel),
             #[cfg(feature = "cpu")]
-            (Drawer::Cpu, ViewBackend::Cpu(view)) => Ok(view.pick(pixel)?),
+            (_, ViewBackend::Cpu(view)) if self.draws_by_cpu() => Ok(view.pick(pixel)?),
             (Drawer::Reference, ViewBackend::Reference(view)) => Ok(view.pick(pixel)?),
             #[cfg(any(feature = "gpu", feature = "cpu"))]
             (_, other) => Err(self.refuse(other.backend()).into()),
         }
+    }
+
+    /// Whether views of the CPU are drawn.
+    #[cfg(feature = "cpu")]
+    fn draws_by_cpu(&self) -> bool {
+        #[cfg(feature = "gpu")]
+        if self.may_leave_gpu {
+            return true;
+        }
+        matches!(self.drawer, Drawer::Cpu)
     }
 
     #[cfg(any(feature = "gpu", feature = "cpu"))]
@@ -253,4 +280,34 @@ fn view_and_draw<View>(
 
 fn milliseconds_since(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
+}
+
+#[cfg(all(test, feature = "gpu", feature = "cpu"))]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use super::*;
+    use crate::settings::splatting::Classification;
+
+    #[test]
+    fn what_the_gpu_does_not_draw_is_left_to_the_cpu() {
+        let gpu = GpuHeadless::new(&HeadlessOptions::default().with_adapter("llvmpipe")).unwrap();
+        let mut headless = Headless { drawer: Drawer::Gpu(Box::new(gpu)), may_leave_gpu: true };
+        let sets = ["image={width=24,height=24}".to_owned()];
+        let mut scene = Scene::from_volume(crate::scene::VolumeSource::Builtin("head:12".to_owned()), &sets).unwrap();
+        let volume = scene.load_volume().unwrap();
+        let channels = volume.clone().with_channels("test", vec![volume]).unwrap();
+        for (classification, backend) in [(Classification::Before, Backend::Gpu), (Classification::After, Backend::Cpu)]
+        {
+            scene.splatting.classification = classification;
+            let rendering = headless.render_volume(channels.clone(), &scene).unwrap();
+            assert_eq!(rendering.stats.backend, backend.name(), "{classification:?}");
+        }
+        assert_eq!(
+            headless.render_volume(channels.clone(), &scene).unwrap().image,
+            crate::cpu::render(channels.clone(), &scene).unwrap().image
+        );
+        headless.may_leave_gpu = false;
+        let message = headless.render_volume(channels, &scene).unwrap_err().to_string();
+        assert!(message.starts_with("splatting.classification: found \"after\" for 2 channels"), "{message}");
+    }
 }

@@ -1,7 +1,8 @@
 //! Views by the f64 evaluation.
 
 use std::sync::Arc;
-use std::time::Instant;
+
+use web_time::Instant;
 
 use super::{Backend, Rendering, milliseconds_since};
 use crate::error::RenderError;
@@ -14,7 +15,7 @@ use crate::scene::{ImageSettings, Scene};
 use crate::settings::camera::Camera;
 use crate::settings::splatting::check_first_hit;
 use crate::settings::transfer_function::TransferFunction;
-use crate::settings::window::Window;
+use crate::settings::window::{Region, Window};
 use crate::stats::Stats;
 use crate::volume::Volume;
 
@@ -34,8 +35,8 @@ impl ReferenceView {
     pub(super) fn new(volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Self, RenderError> {
         let volume = volume.into();
         scene.check()?;
-        scene.transfer.check_volume(&volume)?;
-        let transfer = scene.transfer.resolve(&volume);
+        scene.check_volume(&volume)?;
+        let transfer = scene.resolve(&volume);
         Ok(Self { scene: scene.classified(&volume), volume, transfer, first_hit: None, hits: None })
     }
 
@@ -62,14 +63,14 @@ impl ReferenceView {
     }
 
     pub(super) fn pick(&self, pixel: [u32; 2]) -> Result<Option<Pick>, SettingError> {
-        FirstHits::pick(self.hits.as_ref(), &self.volume, pixel, &self.scene.image)
+        FirstHits::pick(self.hits.as_ref(), (&self.volume, &self.transfer), pixel, &self.scene.image)
     }
 
     /// Draws a part of the image.
     pub(super) fn draw_part(&mut self, window: &Window) -> Result<(Part, Stats), RenderError> {
         let start = Instant::now();
         let Self { volume, scene, transfer, .. } = self;
-        part::check(scene, scene.splatting.classification, window)?;
+        part::check(volume, scene, window)?;
         let framed = scene.framed(volume, transfer);
         let ImageSettings { width, height, .. } = scene.image;
         let view = ViewGeometry::new(volume.grid(), &framed.camera, &framed.splatting, [width, height])?;
@@ -93,7 +94,7 @@ impl ReferenceView {
             let grid = volume.grid();
             let view = ViewGeometry::new(grid, &framed.camera, &framed.splatting, [image.width, image.height])?;
             let depths = drawn.first_hits.iter().map(|depth| (depth * grid.unit()) as f32).collect();
-            self.hits = Some(FirstHits { view, depths });
+            self.hits = Some(FirstHits { view, region: Region::whole(view.size), depths });
         } else {
             self.hits = None;
         }

@@ -31,7 +31,7 @@ pub enum ImageError {
         /// The file.
         path: PathBuf,
         /// The encoder's error.
-        source: ::image::ImageError,
+        source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// The file cannot be decoded as the format of its extension.
     #[error("{}: {source}", path.display())]

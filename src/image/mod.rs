@@ -1,5 +1,8 @@
 //! Rendered images and their files.
 
+pub(crate) mod channels;
+#[cfg(feature = "codecs")]
+mod exr;
 #[cfg(feature = "codecs")]
 mod format;
 #[cfg(feature = "codecs")]
@@ -7,6 +10,8 @@ pub(crate) mod open;
 #[cfg(feature = "codecs")]
 #[doc(hidden)]
 pub mod output;
+#[cfg(feature = "codecs")]
+mod png;
 #[cfg(feature = "codecs")]
 mod save;
 
@@ -26,4 +31,15 @@ pub struct Image {
     pub height: u32,
     /// `width · height` pixels, row by row.
     pub pixels: Vec<[f32; 4]>,
+}
+
+impl Image {
+    /// Each pixel with straight alpha, its channels rounded to steps of 1/`full`; black where alpha is 0.
+    pub fn straight_channels(&self, full: u16) -> impl Iterator<Item = [u16; 4]> {
+        let full = f32::from(full);
+        self.pixels.iter().map(move |&[r, g, b, a]| {
+            let scale = if a > 0.0 { a.recip() } else { 0.0 };
+            [r * scale, g * scale, b * scale, a].map(|channel| (channel * full).round().clamp(0.0, full) as u16)
+        })
+    }
 }

@@ -1,13 +1,12 @@
 //! Opening images. Like any input, a file is trusted only as far as its bytes can hold what it claims.
 
-use std::io::Cursor;
 use std::path::Path;
 
 use ::exr::meta::BlockDescription;
 use ::exr::meta::header::Header;
-use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
-use super::{Format, Image, ImageError};
+use super::png::Png;
+use super::{Format, Image, ImageError, exr};
 use crate::volume::{Access, ReadOptions, VolumeError, npy};
 
 /// The maximum expansion of a byte in a PNG or EXR file: deflate's, the best compression that they use.
@@ -32,39 +31,38 @@ impl Image {
         let format = Format::of(path)?;
         let access = Access::new(options).map_err(of_volume)?;
         match format {
-            Format::Png => {
-                let mut image = Self::decode(path, ImageFormat::Png, &access)?;
-                for pixel in &mut image.pixels {
-                    let [r, g, b, a] = *pixel;
-                    *pixel = [r * a, g * a, b * a, a];
-                }
-                Ok(image)
-            }
-            Format::Exr => Self::decode(path, ImageFormat::OpenExr, &access),
+            Format::Png => Self::decode_png(path, &access),
+            Format::Exr => Self::decode_exr(path, &access),
             Format::Npy => Self::decode_npy(path, &access),
         }
     }
 
-    /// Decodes the file's channels; integers become numbers from 0 to 1.
-    fn decode(path: &Path, format: ImageFormat, access: &Access) -> Result<Self, ImageError> {
-        let failed = |source: ::image::ImageError| ImageError::Decode { path: path.to_owned(), source: source.into() };
+    fn decode_png(path: &Path, access: &Access) -> Result<Self, ImageError> {
+        let failed = |source: ::png::DecodingError| ImageError::Decode { path: path.to_owned(), source: source.into() };
         let bytes = read(path, access)?;
-        if format == ImageFormat::OpenExr {
-            check_blocks(path, &bytes)?;
+        let png = Png::new(&bytes).map_err(failed)?;
+        let [width, height] = png.size();
+        check_size(path, png.size(), (bytes.len(), png.bits_per_pixel(), png.channel_bytes()), access)?;
+        let mut pixels = png.pixels().map_err(failed)?;
+        for [r, g, b, a] in &mut pixels {
+            (*r, *g, *b) = (*r * *a, *g * *a, *b * *a);
         }
-        let decoder = ImageReader::with_format(Cursor::new(&bytes), format).into_decoder().map_err(failed)?;
-        let (width, height) = decoder.dimensions();
-        let most = 8 * MAX_EXPANSION * bytes.len() as u64 / min_bits_per_pixel(format, &bytes);
-        if u64::from(width) * u64::from(height) > most {
-            let found = format!("{width} × {height} pixels in {} bytes", bytes.len());
-            return Err(content(path, "size", found, format!("at most {most} pixels")));
+        Ok(Self { width, height, pixels })
+    }
+
+    fn decode_exr(path: &Path, access: &Access) -> Result<Self, ImageError> {
+        let failed = |source: ::exr::error::Error| ImageError::Decode { path: path.to_owned(), source: source.into() };
+        let bytes = read(path, access)?;
+        check_blocks(path, &bytes)?;
+        for header in exr::headers(&bytes).map_err(failed)? {
+            for size in [header.layer_size, header.shared_attributes.display_window.size] {
+                let size = [size.width(), size.height()].map(|side| u32::try_from(side).unwrap_or(u32::MAX));
+                let channel_bytes = pixels_of(size).saturating_mul(size_of::<[f32; 4]>() as u64);
+                // At least three half floats.
+                check_size(path, size, (bytes.len(), 3 * 16, channel_bytes), access)?;
+            }
         }
-        let pixels = u64::from(width) * u64::from(height);
-        // Two copies: as in the file, and as floats.
-        let memory = decoder.total_bytes().saturating_add(pixels.saturating_mul(size_of::<[f32; 4]>() as u64));
-        access.reserve(path, "size", format_args!("{width} × {height} pixels"), memory).map_err(of_volume)?;
-        let image = DynamicImage::from_decoder(decoder).map_err(failed)?.into_rgba32f();
-        Ok(Self { width, height, pixels: image.into_raw().as_chunks().0.to_vec() })
+        exr::decode(&bytes).map_err(failed)
     }
 
     /// An array of rows of pixels of channels, read by the volume reader as slices of rows of voxels.
@@ -95,7 +93,7 @@ pub(crate) fn check_blocks(path: &Path, bytes: &[u8]) -> Result<(), ImageError> 
         };
         header.channels.bytes_per_pixel as u128 * pixels
     };
-    let headers = ::exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(failed)?.headers;
+    let headers = exr::headers(bytes).map_err(failed)?;
     match headers.iter().map(block_bytes).max() {
         Some(block) if block > most => {
             let found = format!("a block of {block} bytes in {} bytes", bytes.len());
@@ -105,21 +103,27 @@ pub(crate) fn check_blocks(path: &Path, bytes: &[u8]) -> Result<(), ImageError> 
     }
 }
 
-/// The minimum number of bits per pixel before compression: for a PNG by its first chunk, whose fields have fixed places; for an EXR
-/// three half floats.
-fn min_bits_per_pixel(format: ImageFormat, bytes: &[u8]) -> u64 {
-    if format != ImageFormat::Png {
-        return 3 * 16;
+fn pixels_of([width, height]: [u32; 2]) -> u64 {
+    u64::from(width) * u64::from(height)
+}
+
+/// Checks that a file can hold the pixels that it claims, given its length, their bits before compression and the bytes of all channels; and that
+/// they fit into memory.
+fn check_size(
+    path: &Path,
+    [width, height]: [u32; 2],
+    (length, bits_per_pixel, channel_bytes): (usize, u64, u64),
+    access: &Access,
+) -> Result<(), ImageError> {
+    let pixels = pixels_of([width, height]);
+    let most = 8 * MAX_EXPANSION * length as u64 / bits_per_pixel.max(1);
+    if pixels > most {
+        let found = format!("{width} × {height} pixels in {length} bytes");
+        return Err(content(path, "size", found, format!("at most {most} pixels")));
     }
-    let Some(&[depth, color]) = bytes.get(24..26) else { return 1 };
-    let channels = match color {
-        2 => 3,
-        4 => 2,
-        6 => 4,
-        // Grey or palette indices.
-        _ => 1,
-    };
-    u64::from(depth.max(1)) * channels
+    // Two copies: as in the file, and as floats.
+    let memory = channel_bytes.saturating_add(pixels.saturating_mul(size_of::<[f32; 4]>() as u64));
+    access.reserve(path, "size", format_args!("{width} × {height} pixels"), memory).map_err(of_volume)
 }
 
 /// The bytes of a regular file; a pipe or a device might never end.

@@ -22,14 +22,29 @@ pub fn in_rows(volume: &Volume, pick: impl Fn(u32, u32, u32) -> Vec<u32> + Sync)
     rows.concat()
 }
 
-/// Whether a voxel that is not clipped takes part: it is not a hole, visible, inside an iso-range, and has an opacity above 0.
+/// The channels that are drawn (SPEC §10), each with its transfer function.
+pub fn channels<'a>(
+    volume: &'a Volume,
+    transfer: &'a TransferFunction,
+) -> impl Iterator<Item = (&'a Volume, &'a TransferFunction)> {
+    volume.channels().zip(transfer.channels())
+}
+
+/// Whether a voxel that is not clipped takes part: in any channel it is not a hole, visible, inside an iso-range, and has an opacity above 0, with its
+/// own A if it has a colour of its own.
 pub fn takes_part(volume: &Volume, transfer: &TransferFunction, index: u32) -> bool {
+    channels(volume, transfer).any(|(volume, transfer)| takes_part_in(volume, transfer, index))
+}
+
+/// Whether a voxel takes part in one channel.
+fn takes_part_in(volume: &Volume, transfer: &TransferFunction, index: u32) -> bool {
     let value = f64::from(volume.values()[index as usize]);
     let tables = transfer.tables(volume.label(index));
     // Most voxels are excluded by their value, and without gradient opacity the value decides: the gradient is computed only if needed.
     let may_take_part =
         !value.is_nan() && tables.visible && tables.opacity.at(value) > 0.0 && tables.in_iso_range(value);
     may_take_part
+        && volume.alpha_of(index) > 0.0
         && (tables.gradient_opacity.is_none()
             || tables.alpha(value, volume.gradient(volume.grid().voxel_at(index)).length()) > 0.0)
 }

@@ -3,7 +3,7 @@
 use glam::UVec3;
 use rayon::prelude::*;
 
-use super::classify::takes_part;
+use super::classify::{channels, takes_part};
 use super::iso_range::ValueSet;
 use crate::settings::clip::ClippedVoxels;
 use crate::settings::transfer_function::TransferFunction;
@@ -20,7 +20,8 @@ pub(crate) fn of_voxels(
     let dims = volume.dims();
     let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
     let set = ValueSet::of(transfer);
-    let needs_more = !transfer.labels.is_empty() || transfer.gradient_opacity.is_some();
+    let is_by_value = transfer.labels.is_empty() && transfer.gradient_opacity.is_none() && volume.colors().is_none();
+    let needs_more = !is_by_value || channels(volume, transfer).nth(1).is_some();
     // Counts of voxels by x and by y over the slices of a thread, and for every slice.
     let zeros = || (vec![0_u64; nx], vec![0_u64; ny], vec![0_u64; nz]);
     let counted = (0..dims.z).into_par_iter().fold(zeros, |(mut xs, mut ys, mut zs), z| {

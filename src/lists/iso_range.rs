@@ -145,6 +145,7 @@ mod tests {
             gradient_opacity: None,
             iso_ranges: iso_ranges.map(<[[f64; 2]]>::to_vec),
             labels: BTreeMap::new(),
+            further: Vec::new(),
         }
     }
 

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::geometry::plane_geometry::PlaneGeometry;
+use crate::geometry::slab::SlabGrid;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::lists::brick;
 use crate::lists::brick::Brick;
@@ -133,7 +134,8 @@ struct Pixels {
 
 impl PatchBins {
     /// Sorts bricks by the patches and groups they may touch, with kernels of the radius `support`. With `planes` (SPEC §9) it is a brick's
-    /// planes that count, and its footprints on them. The sheet depths `covered` belong to some group even if they are empty. Looking up a
+    /// planes that count, and its footprints on them. The sheet depths `covered` belong to some group even if they are empty; groups without any
+    /// of the slabs `drawn` are left out. Looking up a
     /// voxel's control points in memory takes at most `search` passes through loops, and subgroups have `threads` threads or more. Neither list may
     /// have more than `most_words` words.
     ///
@@ -143,7 +145,7 @@ impl PatchBins {
         bricks: &[Brick],
         (view, planes): (&ViewGeometry, Option<&PlaneGeometry>),
         order: Order,
-        covered: Range<f64>,
+        (covered, drawn): (Range<f64>, &Range<i32>),
         support: f64,
         (search, threads): (u32, u32),
         most_words: u64,
@@ -152,9 +154,13 @@ impl PatchBins {
             if required <= actual { Ok(()) } else { Err(TileCapacityError { what, required, actual }) }
         };
         check("bricks", bricks.len() as u64, MAX_BRICKS as u64)?;
-        let placed = place(bricks, view, planes);
+        let drawn = if drawn.is_empty() { 0..0 } else { SlabGrid::groups_of(drawn, SHEETS) };
+        let within = |groups: Range<i32>| groups.start.max(drawn.start)..groups.end.min(drawn.end);
+        let mut placed = place(bricks, view, planes);
+        placed.iter_mut().for_each(|brick| brick.groups = within(brick.groups.clone()));
+        placed.retain(|brick| !brick.groups.is_empty());
         let group_planes = view.slabs.groups(SHEETS);
-        let covered = group_planes.covered(covered);
+        let covered = group_planes.covered(covered).map(within).filter(|groups| !groups.is_empty());
         let all = || placed.iter().map(|brick| &brick.groups).chain(&covered);
         let first_group = all().map(|groups| groups.start).min().unwrap_or(0);
         let end_group = all().map(|groups| groups.end).max().unwrap_or(0);

@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::DVec4;
 use rayon::prelude::*;
 
-use crate::geometry::slab;
+use crate::geometry::slab::{self, SlabGrid};
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::lists::brick;
 use crate::lists::brick::Brick;
@@ -46,13 +46,14 @@ pub struct GroupPlan {
 
 impl FramePlan {
     /// Sorts the bricks of every list into buckets (§5.1) of groups of `sheets` sheets. The sheet depths `covered` count even if they are
-    /// empty.
+    /// empty. Groups without any of the slabs `drawn` are left out.
     pub fn new<'a>(
         lists: impl IntoIterator<Item = &'a [Brick]>,
         view: ViewGeometry,
         sheets: u32,
         order: Order,
         covered: Range<f64>,
+        drawn: &Range<i32>,
     ) -> Self {
         // A group is treated as a thick slab.
         let groups = view.slabs.groups(sheets);
@@ -80,6 +81,8 @@ impl FramePlan {
         let all: Vec<Range<i32>> = buckets.iter().filter_map(Buckets::range).chain(covered.clone()).collect();
         let first = all.iter().map(|range| range.start).min().unwrap_or(0);
         let end = all.iter().map(|range| range.end).max().unwrap_or(0);
+        let drawn = if drawn.is_empty() { 0..0 } else { SlabGrid::groups_of(drawn, sheets) };
+        let (first, end) = (first.max(drawn.start), end.min(drawn.end));
         let counts = |group: i32| covered.as_ref().is_some_and(|covered| covered.contains(&group));
         let mut plans: Vec<GroupPlan> = (first..end)
             .map(|group| GroupPlan {

@@ -73,6 +73,7 @@ mod tests {
                 gradient_opacity: None,
                 iso_ranges: Some(vec![iso_range]),
                 labels: BTreeMap::new(),
+                further: Vec::new(),
             });
             let mut found = list.within(&values, &set);
             assert!(found.is_sorted_by_key(|&voxel| values[voxel as usize]));

@@ -11,9 +11,9 @@ use ::exr::prelude::{
     WritableImage,
 };
 
+use super::Part;
 use super::description::{from_json, to_json};
-use super::file::{channel_names, reserve, to_channels};
-use super::{Identity, Part, Window};
+use super::file::{Decoded, channel_names, reserve, to_channels};
 use crate::image::ImageError;
 use crate::image::open::{check_blocks, content};
 use crate::volume::Access;
@@ -45,11 +45,7 @@ pub(super) fn encode(path: &Path, part: &Part) -> Result<Vec<u8>, ImageError> {
 }
 
 /// What identifies the part in a file, and its channels.
-pub(super) fn decode(
-    path: &Path,
-    bytes: &[u8],
-    access: &Access,
-) -> Result<(Identity, Window, Vec<Vec<f32>>), ImageError> {
+pub(super) fn decode(path: &Path, bytes: &[u8], access: &Access) -> Result<Decoded, ImageError> {
     let failed = |source: Error| ImageError::Decode { path: path.to_owned(), source: source.into() };
     let metadata = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(failed)?;
     let described =

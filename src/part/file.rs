@@ -27,6 +27,9 @@ impl Format {
     }
 }
 
+/// What identifies the part in a file, and its channels.
+pub(super) type Decoded = (Identity, Window, Vec<Vec<f32>>);
+
 impl Part {
     /// Checks that [`Part::save`] knows the extension of a file, before a long render.
     ///
@@ -51,12 +54,24 @@ impl Part {
     pub fn open_with(path: &Path, options: &ReadOptions) -> Result<Self, ImageError> {
         let format = Format::of(path)?;
         let access = Access::new(options).map_err(of_volume)?;
-        let (identity, window, channels) = match format {
+        let decoded = match format {
             Format::Exr => exr::decode(path, &read(path, &access)?, &access)?,
             Format::Npz => npz::decode(path, &access)?,
         };
-        let content = from_channels(&channels);
-        Ok(Self { name: path.display().to_string(), identity, window, content })
+        Ok(Self::of_channels(path.display().to_string(), decoded))
+    }
+
+    /// The part that the bytes of an EXR file hold, for programs that send parts without files. Its name is for errors.
+    ///
+    /// # Errors
+    /// If the bytes hold no part, or it needs more memory than [`ReadOptions::memory`] allows by default.
+    pub fn from_exr(name: &str, bytes: &[u8]) -> Result<Self, ImageError> {
+        let access = Access::new(&ReadOptions::default()).map_err(of_volume)?;
+        Ok(Self::of_channels(name.to_owned(), exr::decode(Path::new(name), bytes, &access)?))
+    }
+
+    fn of_channels(name: String, (identity, window, channels): Decoded) -> Self {
+        Self { name, identity, window, content: from_channels(&channels) }
     }
 
     /// Saves the part by the file's extension: `.exr`, whose data window is the region and whose display window is the whole image, with the

@@ -22,13 +22,19 @@ pub(super) fn fingerprint(volume: &Volume, scene: &Scene) -> Result<String, Scen
         hash.update(&count.to_le_bytes()).update(&spacing.to_le_bytes());
     }
     // In blocks, because the hash is fastest over long slices.
-    for values in volume.values().chunks(1 << 14) {
-        let bytes: Vec<u8> = values.iter().flat_map(|value| bits(*value).to_le_bytes()).collect();
-        hash.update(&bytes);
-    }
-    for labels in volume.labels().unwrap_or_default().chunks(1 << 14) {
-        let bytes: Vec<u8> = labels.iter().flat_map(|label| label.to_le_bytes()).collect();
-        hash.update(&bytes);
+    for channel in volume.channels() {
+        for values in channel.values().chunks(1 << 14) {
+            let bytes: Vec<u8> = values.iter().flat_map(|value| bits(*value).to_le_bytes()).collect();
+            hash.update(&bytes);
+        }
+        for labels in channel.labels().unwrap_or_default().chunks(1 << 14) {
+            let bytes: Vec<u8> = labels.iter().flat_map(|label| label.to_le_bytes()).collect();
+            hash.update(&bytes);
+        }
+        for colors in channel.colors().unwrap_or_default().chunks(1 << 12) {
+            let bytes: Vec<u8> = colors.iter().flatten().flat_map(|number| number.to_le_bytes()).collect();
+            hash.update(&bytes);
+        }
     }
     Ok(hash.finalize().to_hex().to_string())
 }
@@ -41,7 +47,12 @@ fn bits(value: f32) -> u32 {
 /// The settings as text, without those that name the volume or what draws it.
 fn settings(mut scene: Scene) -> Result<String, SceneError> {
     scene.volume = VolumeSource::Memory;
-    (scene.spacing, scene.labels) = (None, None);
+    (scene.spacing, scene.labels, scene.name) = (None, None, None);
+    (scene.index, scene.time) = (None, None);
+    for channel in &mut scene.further {
+        (channel.volume, channel.name) = (VolumeSource::Memory, None);
+        (channel.spacing, channel.labels, channel.index, channel.time) = (None, None, None, None);
+    }
     scene.splatting.rasterizer = Rasterizer::Auto;
     // Tiles never change an image.
     scene.splatting.tiles = true;

@@ -65,6 +65,33 @@ pub enum MergeError {
     },
 }
 
+impl Part {
+    /// Merges parts of the same pixels, whose slabs follow one another, into one part. [`Image::merge`] takes it for them; the bytes are the same
+    /// if all slabs of these pixels are joined, or neighbours in pairs, as `Image::merge` does.
+    ///
+    /// # Errors
+    /// If there is none, or they are not of one scene and region, overlap, or leave out slabs between them.
+    pub fn join(parts: impl IntoIterator<Item = Self>) -> Result<Self, MergeError> {
+        let parts: Vec<Self> = parts.into_iter().collect();
+        let first = parts.first().cloned().ok_or(MergeError::Empty)?;
+        let Self { name, identity, window: Window { region, .. }, .. } = &first;
+        for part in &parts {
+            check_identity(part, name, identity)?;
+            check_content(part)?;
+            if part.window.region != *region {
+                let (found, expected) = (part.window.region.to_string(), region.to_string());
+                let (part, field, other) = (part.name.clone(), "region", name.clone());
+                return Err(MergeError::Different { part, field, found, other, expected });
+            }
+        }
+        Ok(match merge_neighbours(parts, identity, *region)? {
+            Some((slabs, content)) => Self::named(identity.clone(), Window { slabs, region: *region }, content),
+            // None of them shows a slab.
+            None => first,
+        })
+    }
+}
+
 impl Image {
     /// Merges all parts of an image, in any order. The image is that of the whole scene: to rounding with an
     /// [`opacity_threshold`](crate::settings::Splatting::opacity_threshold) T of 1, and to 1 - T of the un-culled one with any.
@@ -171,36 +198,63 @@ fn check_regions(regions: &BTreeMap<Region, Vec<Part>>, [width, height]: [u32; 2
     Ok(())
 }
 
-/// Merges the parts of a region, which must show each of the scene's slabs once.
-fn merge_slabs(mut parts: Vec<Part>, identity: &Identity, region: Region) -> Result<Content, MergeError> {
+/// The content of a region, whose parts must show each of the scene's slabs once.
+fn merge_slabs(parts: Vec<Part>, identity: &Identity, region: Region) -> Result<Content, MergeError> {
     let scene = &identity.slabs;
-    parts.sort_by_key(|part| (part.window.slabs.start, part.window.slabs.end));
-    let (mut merged, mut next, mut last) = (None::<Content>, scene.start, String::new());
-    let missing = |slabs: Range<i32>| {
-        let Range { start, end } = slabs;
-        MergeError::Missing { missing: format!("slabs {start}..{end} of region {region}") }
+    let Some((slabs, content)) = merge_neighbours(parts, identity, region)? else {
+        if !scene.is_empty() {
+            return Err(missing(scene.clone(), region));
+        }
+        // A scene without slabs shows nothing.
+        return Ok(Content { colors: vec![[0.0; 4]; region.pixels()], extremes: Vec::new() });
     };
-    for Part { name, window, content, .. } in parts {
-        let slabs = Window::within(&window, scene);
-        if slabs.is_empty() {
-            continue;
+    if slabs.start > scene.start {
+        return Err(missing(scene.start..slabs.start, region));
+    }
+    if slabs.end < scene.end {
+        return Err(missing(slabs.end..scene.end, region));
+    }
+    Ok(content)
+}
+
+fn missing(Range { start, end }: Range<i32>, region: Region) -> MergeError {
+    MergeError::Missing { missing: format!("slabs {start}..{end} of region {region}") }
+}
+
+/// The scene's slabs that parts of a region show without a gap, and their content; nothing if they show none.
+///
+/// Neighbours merge in pairs, again and again, so that processes that merge pairs get the same bytes.
+fn merge_neighbours(
+    parts: Vec<Part>,
+    identity: &Identity,
+    region: Region,
+) -> Result<Option<(Range<i32>, Content)>, MergeError> {
+    let within = |part: Part| (Window::within(&part.window, &identity.slabs), part.name, part.content);
+    let mut shown: Vec<_> = parts.into_iter().map(within).filter(|(slabs, ..)| !slabs.is_empty()).collect();
+    shown.sort_by_key(|(slabs, ..)| (slabs.start, slabs.end));
+    for pair in shown.windows(2) {
+        let ((before, other, _), (slabs, part, _)) = (&pair[0], &pair[1]);
+        if slabs.start < before.end {
+            let what = format!("slabs {}..{} of region {region}", slabs.start, slabs.end.min(before.end));
+            return Err(MergeError::Overlap { part: part.clone(), what, other: other.clone() });
         }
-        if slabs.start < next {
-            let what = format!("slabs {}..{} of region {region}", slabs.start, slabs.end.min(next));
-            return Err(MergeError::Overlap { part: name, what, other: last });
-        }
-        if slabs.start > next {
-            return Err(missing(next..slabs.start));
-        }
-        (next, last) = (slabs.end, name);
-        match &mut merged {
-            None => merged = Some(content),
-            Some(merged) => identity.rule().merge(merged, &content),
+        if slabs.start > before.end {
+            return Err(missing(before.end..slabs.start, region));
         }
     }
-    if next < scene.end {
-        return Err(missing(next..scene.end));
+    let mut merged: Vec<(Range<i32>, Content)> =
+        shown.into_iter().map(|(slabs, _, content)| (slabs, content)).collect();
+    while merged.len() > 1 {
+        let mut rest = merged.into_iter();
+        merged = std::iter::from_fn(|| {
+            let (mut slabs, mut front) = rest.next()?;
+            if let Some((behind, back)) = rest.next() {
+                identity.rule().merge(&mut front, &back);
+                slabs.end = behind.end;
+            }
+            Some((slabs, front))
+        })
+        .collect();
     }
-    // A scene without slabs shows nothing.
-    Ok(merged.unwrap_or_else(|| Content { colors: vec![[0.0; 4]; region.pixels()], extremes: Vec::new() }))
+    Ok(merged.pop())
 }

@@ -47,6 +47,7 @@ pub use split::split;
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
+use crate::image::channels::Joining;
 use crate::scene::Scene;
 use crate::settings::splatting::{Classification, Compositing, Method, Order};
 use crate::settings::window::Window;
@@ -123,8 +124,14 @@ impl Identity {
 ///
 /// # Errors
 /// If the scene's method is not image-aligned, an economy is in use, its compositing has no parts, or the window does not lie in the image.
-pub(crate) fn check(scene: &Scene, classification: Classification, window: &Window) -> Result<(), SettingError> {
-    let splatting = &scene.splatting;
+pub(crate) fn check(volume: &Volume, scene: &Scene, window: &Window) -> Result<(), SettingError> {
+    let (splatting, classification) = (&scene.splatting, scene.classification(volume));
+    if Joining::of(splatting.compositing, classification).is_some() && !volume.further().is_empty() {
+        let compositing = crate::scene::names::name_of(crate::scene::names::COMPOSITINGS, splatting.compositing);
+        let found = format!("\"{compositing}\" of several channels for a part of an image");
+        let allowed = "\"linear\", \"exponential\" or \"xray\"";
+        return Err(SettingError::new("splatting.compositing", found, allowed));
+    }
     if splatting.method != Method::ImageAligned {
         let method = crate::scene::names::name_of(crate::scene::names::METHODS, splatting.method);
         let found = format!("\"{method}\" for a part of an image");

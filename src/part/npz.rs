@@ -4,14 +4,13 @@
 use std::path::Path;
 
 use flate2::Crc;
-use npyz::WriterBuilder;
 
+use super::Part;
 use super::description::{from_json, to_json};
-use super::file::{channel_names, to_channels};
-use super::{Identity, Part, Window};
+use super::file::{Decoded, channel_names, to_channels};
 use crate::image::ImageError;
 use crate::image::open::{content, of_volume};
-use crate::volume::{Access, SampleType, npz};
+use crate::volume::{Access, SampleType, npy, npz};
 
 /// The members.
 const PIXELS: &str = "pixels.npy";
@@ -26,12 +25,8 @@ pub(super) fn encode(path: &Path, part: &Part) -> Result<Vec<u8>, ImageError> {
     let json = to_json(part).map_err(|error| failed(error.into()))?;
     let (region, channels) = (part.window.region, to_channels(part));
     let shape = [u64::from(region.height), u64::from(region.width), channels.len() as u64];
-    let mut array = Vec::new();
-    let options = npyz::WriteOptions::new().default_dtype().shape(&shape);
-    let mut writer = options.writer(&mut array).begin_nd().map_err(failed)?;
     let pixels = (0..region.pixels()).flat_map(|at| channels.iter().map(move |channel| channel[at]));
-    writer.extend(pixels).map_err(failed)?;
-    writer.finish().map_err(failed)?;
+    let array = npy::encode(&shape, pixels);
     archive(&[(PIXELS, &array), (DESCRIPTION, json.as_bytes())]).ok_or_else(|| {
         let found = format!("region {region}, of 4 GiB or more");
         content(path, "size", found, "less, or a file .exr".to_owned())
@@ -64,7 +59,7 @@ fn archive(files: &[(&str, &[u8])]) -> Option<Vec<u8>> {
 }
 
 /// What identifies the part in a file, and its channels.
-pub(super) fn decode(path: &Path, access: &Access) -> Result<(Identity, Window, Vec<Vec<f32>>), ImageError> {
+pub(super) fn decode(path: &Path, access: &Access) -> Result<Decoded, ImageError> {
     let read = npz::read_text_and_array::<f32>(path, (DESCRIPTION, MAX_DESCRIPTION), PIXELS, access);
     let (json, array) = read.map_err(of_volume)?;
     let (identity, window) = from_json(path, &json)?;

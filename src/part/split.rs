@@ -23,7 +23,7 @@ const BINS: usize = 1024;
 /// If the scene has no parts, or fewer slabs and pixels than parts are asked for.
 pub fn split(volume: &Volume, scene: &Scene, parts: usize) -> Result<Vec<Window>, RenderError> {
     let size = [scene.image.width, scene.image.height];
-    super::check(scene, scene.classification(volume), &Window::whole(size))?;
+    super::check(volume, scene, &Window::whole(size))?;
     let work = Work::new(volume, scene)?;
     // As many regions as slab ranges in each of them: ranges divide the volume's memory, regions keep what hides.
     let regions = parts.isqrt().max(1);
@@ -64,7 +64,7 @@ struct Area {
 
 impl Work {
     fn new(volume: &Volume, scene: &Scene) -> Result<Self, RenderError> {
-        let transfer = scene.transfer.resolve(volume);
+        let transfer = scene.resolve(volume);
         let scene = scene.framed(volume, &transfer);
         let size = [scene.image.width, scene.image.height];
         let view = ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, size)?;

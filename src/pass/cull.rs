@@ -8,6 +8,7 @@ use crate::gpu::bindings::{BufferSpec, ComputeStage, at_offset, buffer_spec, gro
 use crate::gpu::brick_lists::BrickBuffer;
 use crate::gpu::layout::{Brick, BrickState, Culled, Frame, Indirect, SheetGroup, Splat, Visit};
 use crate::gpu::shaders;
+use crate::gpu::volume_texture::OwnColors;
 use crate::lists::brick::BRICK_VOXELS;
 use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};
 use crate::pass::values::{PlaneBuffers, Values, ValuesBuffers, ValuesGroup};
@@ -65,6 +66,10 @@ pub struct CullBuffers<'a> {
     pub values: &'a TextureView,
     /// Whether any value is a hole.
     pub has_holes: bool,
+    /// The number of channels (SPEC §10).
+    pub channels: u32,
+    /// The voxels' own colours, if they have any.
+    pub colors: Option<OwnColors<'a>>,
     /// The volume's labels, if any label has its own ramps.
     pub labels: Option<&'a TextureView>,
     /// The control points of the ramps.
@@ -212,6 +217,8 @@ impl Cull {
                     bricks: &list.buffer,
                     values: shared.values,
                     has_holes: shared.has_holes,
+                    channels: shared.channels,
+                    colors: shared.colors,
                     labels: shared.labels,
                     control_points: shared.control_points,
                     places: &fresh,

@@ -15,7 +15,7 @@ use crate::gpu::bindings::{
 };
 use crate::gpu::layout::{Brick, Cut, FieldPlanes, Frame, Gather as GatherUniform, Gathered, Indirect, PatchRange};
 use crate::gpu::shaders;
-use crate::gpu::volume_texture::VolumeTexture;
+use crate::gpu::volume_texture::{OwnColors, VolumeTexture};
 use crate::lists::patch_bins::{PATCH, SHEETS};
 use crate::settings::shading::Gradient;
 use crate::settings::splatting::{Classification, Compositing, FootprintBox, Order, Splatting};
@@ -25,6 +25,7 @@ use crate::settings::splatting::{Classification, Compositing, FootprintBox, Orde
 pub struct Gather {
     stages: Mutex<HashMap<GatherMode, Arc<ComputeStage>>>,
     no_labels: OnceLock<VolumeTexture>,
+    no_colors: OnceLock<VolumeTexture>,
 }
 
 /// The mode that a pipeline is compiled for.
@@ -37,6 +38,9 @@ pub struct GatherMode {
     economies: bool,
     labels: bool,
     holes: bool,
+    channels: u32,
+    /// The number in the voxels' own colours that stands for 1; 0 if they have none.
+    full_color: u32,
     rays: RayMode,
     /// How values are gathered on slab planes; `None` if colours are.
     planes: Option<PlaneMode>,
@@ -74,7 +78,26 @@ impl GatherMode {
         // In perspective every voxel has its own parallelogram.
         let footprint_box = if perspective { FootprintBox::Rectangle } else { footprint_box };
         let divided = workgroups > 1;
-        Self { compositing, order, footprint_box, perspective, economies, labels, holes, rays, planes, divided }
+        let (channels, full_color) = (1, 0);
+        Self {
+            compositing,
+            order,
+            footprint_box,
+            perspective,
+            economies,
+            labels,
+            holes,
+            channels,
+            full_color,
+            rays,
+            planes,
+            divided,
+        }
+    }
+
+    /// The same mode for another number of channels, and for voxels with colours of their own (SPEC §10).
+    pub fn with_channels(self, channels: u32, colors: Option<OwnColors<'_>>) -> Self {
+        Self { channels, full_color: colors.map_or(0, |own| own.full), ..self }
     }
 }
 
@@ -99,6 +122,8 @@ pub struct GatherBuffers<'a> {
     pub control_points: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
+    /// The voxels' own colours, for a mode that needs them.
+    pub colors: Option<OwnColors<'a>>,
     /// The volume's labels, for a mode that needs them.
     pub labels: Option<&'a TextureView>,
     /// [`Gathered`].
@@ -162,6 +187,11 @@ impl Gather {
             ("cut", whole(buffers.cut.uniform)),
             ("surfaces", wgpu::BindingResource::TextureView(buffers.cut.surfaces)),
         ];
+        if buffers.planes.is_none() {
+            let none = || &self.no_colors.get_or_init(|| VolumeTexture::no_colors(device)).view;
+            let colors = buffers.colors.map_or_else(none, |own| own.view);
+            resources.push(("colors", wgpu::BindingResource::TextureView(colors)));
+        }
         if let Some(PlaneBuffers { planes, coefficients }) = buffers.planes {
             resources.push(("planes", whole(planes)));
             resources.push(("coefficients", wgpu::BindingResource::TextureView(coefficients.unwrap_or(values))));
@@ -198,7 +228,9 @@ fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
         ("cut", uniform::<Cut>(stage, false)),
         ("surfaces", depth_texture(stage)),
     ];
-    if mode.planes.is_some() {
+    if mode.planes.is_none() {
+        slots.push(("colors", texture_of_integers(stage, TextureViewDimension::D2Array)));
+    } else {
         slots.push(("planes", uniform::<FieldPlanes>(stage, false)));
         slots.push(("coefficients", texture_of_integers(stage, TextureViewDimension::D2Array)));
     }
@@ -227,7 +259,11 @@ fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
             shaders::GATHER_PLANES
         }
         None => {
-            constants.push(("ECONOMIES", flag(mode.economies)));
+            constants.extend([
+                ("ECONOMIES", flag(mode.economies)),
+                ("CHANNELS", f64::from(mode.channels)),
+                ("FULL_COLOR", f64::from(mode.full_color)),
+            ]);
             shaders::GATHER
         }
     };

@@ -1,20 +1,32 @@
 //! Projects and shades the voxels in a list of places (Fig. 12).
 
-use std::sync::OnceLock;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use wgpu::{BindGroup, BindingResource, Buffer, ComputePass, Device, ShaderStages, TextureView, TextureViewDimension};
 
 use crate::gpu::bindings::{ComputeStage, storage, texture_of_integers, uniform};
 use crate::gpu::layout::{Brick, Frame, Indirect, Splat};
 use crate::gpu::shaders;
-use crate::gpu::volume_texture::VolumeTexture;
+use crate::gpu::volume_texture::{OwnColors, VolumeTexture};
 
-/// The stage's pipelines, without and with labels that have their own ramps, without and with holes. Each is compiled when it is first
-/// needed.
+/// The stage's pipelines. Each is compiled when it is first needed.
 #[derive(Debug)]
 pub struct Shade {
-    stages: [[OnceLock<ComputeStage>; 2]; 2],
+    stages: Mutex<HashMap<ShadeMode, Arc<ComputeStage>>>,
     no_labels: VolumeTexture,
+    no_colors: VolumeTexture,
+}
+
+/// The mode that a pipeline is compiled for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct ShadeMode {
+    /// Whether labels have their own ramps.
+    labels: bool,
+    holes: bool,
+    channels: u32,
+    /// The number in the voxels' own colours that stands for 1; 0 if they have none.
+    full_color: u32,
 }
 
 /// The buffers that the stage reads and writes.
@@ -28,6 +40,10 @@ pub struct ShadeBuffers<'a> {
     pub values: &'a TextureView,
     /// Whether any value is a hole.
     pub has_holes: bool,
+    /// The number of channels (SPEC §10).
+    pub channels: u32,
+    /// The voxels' own colours, if they have any.
+    pub colors: Option<OwnColors<'a>>,
     /// The volume's labels, if any label has its own ramps.
     pub labels: Option<&'a TextureView>,
     /// The control points of the ramps.
@@ -44,19 +60,19 @@ pub struct ShadeBuffers<'a> {
 #[derive(Debug)]
 pub struct ShadeGroup {
     group: BindGroup,
-    has_labels: bool,
-    has_holes: bool,
+    stage: Arc<ComputeStage>,
 }
 
 impl Shade {
     /// The stage, with nothing compiled yet.
     pub fn new(device: &Device) -> Self {
-        Self { stages: Default::default(), no_labels: VolumeTexture::no_labels(device) }
+        let [no_labels, no_colors] = [VolumeTexture::no_labels(device), VolumeTexture::no_colors(device)];
+        Self { stages: Mutex::default(), no_labels, no_colors }
     }
 
     /// Binds buffers.
     pub fn bind(&self, device: &Device, buffers: ShadeBuffers<'_>) -> ShadeGroup {
-        let ShadeBuffers { frame, bricks, values, has_holes, labels, control_points, places, args, splats } = buffers;
+        let ShadeBuffers { frame, bricks, values, labels, control_points, places, args, splats, .. } = buffers;
         let whole = Buffer::as_entire_binding;
         let resources = [
             ("frames", whole(frame)),
@@ -67,22 +83,26 @@ impl Shade {
             ("args", whole(args)),
             ("splats", whole(splats)),
             ("labels", BindingResource::TextureView(labels.unwrap_or(&self.no_labels.view))),
+            ("colors", BindingResource::TextureView(buffers.colors.map_or(&self.no_colors.view, |own| own.view))),
         ];
-        let has_labels = labels.is_some();
-        let stage = &self.stages[usize::from(has_labels)][usize::from(has_holes)];
-        let stage = stage.get_or_init(|| compile(device, has_labels, has_holes));
-        ShadeGroup { group: stage.bind(device, &resources), has_labels, has_holes }
+        let mode = ShadeMode {
+            labels: labels.is_some(),
+            holes: buffers.has_holes,
+            channels: buffers.channels,
+            full_color: buffers.colors.map_or(0, |own| own.full),
+        };
+        let mut stages = self.stages.lock().unwrap_or_else(PoisonError::into_inner);
+        let stage = Arc::clone(stages.entry(mode).or_insert_with(|| Arc::new(compile(device, mode))));
+        ShadeGroup { group: stage.bind(device, &resources), stage }
     }
 
     /// Shades the number of voxels in `args`.
     pub fn record(&self, pass: &mut ComputePass<'_>, bound: &ShadeGroup, args: &Buffer) {
-        if let Some(stage) = self.stages[usize::from(bound.has_labels)][usize::from(bound.has_holes)].get() {
-            stage.dispatch_indirect(pass, &bound.group, &[], args);
-        }
+        bound.stage.dispatch_indirect(pass, &bound.group, &[], args);
     }
 }
 
-fn compile(device: &Device, labels: bool, holes: bool) -> ComputeStage {
+fn compile(device: &Device, ShadeMode { labels, holes, channels, full_color }: ShadeMode) -> ComputeStage {
     let stage = ShaderStages::COMPUTE;
     let slots = [
         ("frames", uniform::<Frame>(stage, false)),
@@ -93,7 +113,14 @@ fn compile(device: &Device, labels: bool, holes: bool) -> ComputeStage {
         ("args", storage::<Indirect>(stage, true)),
         ("splats", storage::<Splat>(stage, false)),
         ("labels", texture_of_integers(stage, TextureViewDimension::D2Array)),
+        ("colors", texture_of_integers(stage, TextureViewDimension::D2Array)),
     ];
-    let constants = [("LABELS", f64::from(u8::from(labels))), ("HOLES", f64::from(u8::from(holes)))];
+    let flag = |is_set| f64::from(u8::from(is_set));
+    let constants = [
+        ("LABELS", flag(labels)),
+        ("HOLES", flag(holes)),
+        ("CHANNELS", f64::from(channels)),
+        ("FULL_COLOR", f64::from(full_color)),
+    ];
     ComputeStage::new(device, shaders::SHADE, "main", &slots, &constants)
 }

@@ -43,6 +43,8 @@ pub(crate) struct FieldRasterizer {
 pub(crate) struct FieldFrame {
     groups: SheetGroups,
     order: Order,
+    /// The minimum and maximum number of the coefficients.
+    range: [f32; 2],
     planes: Buffer,
     lists: Vec<PreparedList>,
     sheet_views: Vec<TextureView>,
@@ -52,6 +54,17 @@ pub(crate) struct FieldFrame {
     carried: Vec<Buffer>,
     classify_groups: Vec<ClassifyGroup>,
     occlude_groups: [BindGroup; 2],
+}
+
+/// Where the numbers are that pixels have chosen.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ChosenNumbers<'a> {
+    /// For every band what its pixels carry: the last of four words is the number, or 1e30 where no plane has a point.
+    pub(crate) carried: &'a [Buffer],
+    /// One word per tile, 0 where nothing is carried.
+    pub(crate) last_groups: &'a Buffer,
+    /// The minimum and maximum number of the coefficients.
+    pub(crate) range: [f32; 2],
 }
 
 #[derive(Debug)]
@@ -91,7 +104,7 @@ impl FieldRasterizer {
         };
         let covered = &covered(volume.lists.bricks(), after);
         let (format, layers) = (self.sheet_format, field::SHEETS_PER_PLANE);
-        let settings = GroupSettings { view, covered, sheets: 1, format, layers };
+        let settings = GroupSettings { view, covered, drawn: &drawn(request), sheets: 1, format, layers };
         let group_bytes = |plan: &FramePlan, stride| uniforms::plane_groups(plan, &after.planes, splatting, stride);
         let (groups, bucketed) = SheetGroups::prepare(inputs, settings, &self.tiles, group_bytes, old_groups)?;
         let numbers = uniforms::planes(&after.planes, view, volume.gpu_volume().value_format(), &after.numbers);
@@ -112,6 +125,7 @@ impl FieldRasterizer {
             sheet_views: (0..layers).map(|layer| targets.sheet_view(layer)).collect(),
             gradient: after.gradient,
             order: splatting.order,
+            range: after.numbers.range,
             groups,
             planes,
             lists,
@@ -184,7 +198,8 @@ impl FieldRasterizer {
     ) -> Result<FrameEstimate, RenderError> {
         let size = after.view.size;
         let covered = covered(lists.iter().copied(), after);
-        let plan = FramePlan::new(lists.iter().copied(), after.view, 1, request.splatting.order, covered);
+        let (order, drawn) = (request.splatting.order, drawn(request));
+        let plan = FramePlan::new(lists.iter().copied(), after.view, 1, order, covered, &drawn);
         let group_bytes = uniforms::plane_groups(&plan, &after.planes, &request.splatting, group_stride(limits));
         let mut buffers = SheetGroups::buffer_specs(request, &plan, &group_bytes, lists);
         buffers.push(content_spec("sheetsplat.planes", size_of::<FieldPlanes>() as u64, BufferUsages::UNIFORM));
@@ -246,6 +261,12 @@ impl FieldFrame {
         (&self.groups.hits, 0)
     }
 
+    /// The numbers that pixels choose with `maximum` and `minimum`.
+    pub(crate) fn chosen(&self) -> ChosenNumbers<'_> {
+        let last_groups = &self.groups.targets.last_groups;
+        ChosenNumbers { carried: &self.carried, last_groups, range: self.range }
+    }
+
     /// Bytes of GPU memory.
     pub(crate) fn gpu_bytes(&self) -> u64 {
         let lists: u64 = self.lists.iter().map(|list| list.cull.gpu_bytes()).sum();
@@ -253,9 +274,15 @@ impl FieldFrame {
     }
 }
 
+/// The planes that are drawn: one more than slabs.
+fn drawn(request: &FrameRequest) -> Range<i32> {
+    let Range { start, end } = request.window.slabs;
+    start..if start < end { end + 1 } else { end }
+}
+
 /// The buffer for what pixels carry from plane to plane.
 fn carried(pixels: u64) -> BufferSpec {
-    buffer_spec("sheetsplat.carried", pixels * CARRIED_BYTES, BufferUsages::STORAGE)
+    buffer_spec("sheetsplat.carried", pixels * CARRIED_BYTES, BufferUsages::STORAGE | BufferUsages::COPY_SRC)
 }
 
 /// The sheet depths of the planes that any brick's kernels reach, and one more before and behind: where one of a slab's planes has no value, the other stands

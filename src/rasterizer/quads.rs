@@ -76,13 +76,13 @@ impl QuadRasterizer {
         previous: Option<QuadFrame>,
     ) -> Result<(QuadFrame, Prepared), RenderError> {
         let FrameInputs { device, request, frame, .. } = inputs;
-        let FrameRequest { view, splatting, kernel, rays, covered, .. } = request;
+        let FrameRequest { view, splatting, kernel, rays, covered, window, .. } = request;
         let (old_groups, old_footprints, old_lists) = match previous {
             Some(QuadFrame { groups, footprints, lists, .. }) => (Some(groups), Some(footprints), lists),
             None => (None, None, Vec::new()),
         };
         let (format, sheets) = (self.sheet_format, self.sheets);
-        let settings = GroupSettings { view, covered, sheets, format, layers: sheets };
+        let settings = GroupSettings { view, covered, drawn: &window.slabs, sheets, format, layers: sheets };
         let group_bytes = |plan: &FramePlan, stride| uniforms::groups(plan, kernel, splatting, stride);
         let (groups, bucketed) = SheetGroups::prepare(inputs, settings, &self.tiles, group_bytes, old_groups)?;
         let (footprints, tabled) = Footprints::renewed(old_footprints, inputs);
@@ -143,8 +143,9 @@ impl QuadRasterizer {
         lists: &[&[Brick]],
         (sheet_format, sheets): (TextureFormat, u32),
     ) -> Result<FrameEstimate, RenderError> {
-        let FrameRequest { view, kernel, splatting, covered, .. } = request;
-        let plan = FramePlan::new(lists.iter().copied(), *view, sheets, splatting.order, covered.clone());
+        let FrameRequest { view, kernel, splatting, covered, window, .. } = request;
+        let lists_of_bricks = lists.iter().copied();
+        let plan = FramePlan::new(lists_of_bricks, *view, sheets, splatting.order, covered.clone(), &window.slabs);
         let group_bytes = uniforms::groups(&plan, kernel, splatting, group_stride(limits));
         let buffers = SheetGroups::buffer_specs(request, &plan, &group_bytes, lists);
         let targets = Targets::estimate(limits, view.size, sheet_format, sheets)?;

@@ -22,6 +22,7 @@ use crate::scene::Scene;
 use crate::settings::camera::Camera;
 use crate::settings::shading::Gradient;
 use crate::settings::splatting::{Classification, Interpolation, Rasterizer, Splatting};
+use crate::settings::window::Window;
 
 /// A frame of a view.
 #[derive(Debug)]
@@ -33,6 +34,8 @@ pub(crate) struct FrameRequest {
     /// The sheet depths whose slabs count even if they are empty: [`means::covered`].
     pub(crate) covered: Range<f64>,
     pub(crate) rays: RayMode,
+    /// What is drawn (SPEC §11).
+    pub(crate) window: Window,
     /// The opacity of first hits.
     pub(crate) first_hit: Option<f64>,
     /// A host's surfaces, and the texel of the image's first pixel.
@@ -89,7 +92,7 @@ impl FrameRequest {
         device: &Device,
         volume: &ClassifiedVolume,
         (scene, camera): (&Scene, &Camera),
-        (surfaces, first_hit): (Option<&Surfaces>, Option<f64>),
+        (surfaces, first_hit, window): (Option<&Surfaces>, Option<f64>, Option<&Window>),
         rasterizer: Rasterizer,
     ) -> Result<Self, RenderError> {
         let splatting = scene.splatting;
@@ -97,7 +100,9 @@ impl FrameRequest {
         let (grid, size) = (volume.grid(), [scene.image.width, scene.image.height]);
         let seen = ViewGeometry::new(grid, camera, &splatting, size)?;
         let bands = CompositingBuffer::bands(&device.limits(), size)?;
-        let rays = RayMode { cut: surfaces.is_some() || !scene.clip.is_empty(), first_hit: first_hit.is_some() };
+        let is_cut = surfaces.is_some() || !scene.clip.is_empty() || window.is_some();
+        let rays = RayMode { cut: is_cut, first_hit: first_hit.is_some() };
+        let drawn = window.map_or_else(|| Window::whole(size), |window| window.opened(&seen.slabs_of(grid)));
         check_rays(device, &splatting, rays, first_hit, size)?;
         let surfaces = match surfaces {
             Some(surfaces) => Some((surfaces.depths(&seen, grid)?, surfaces.origin)),
@@ -119,6 +124,7 @@ impl FrameRequest {
             kernel: Kernel::new(splatting.radius, splatting.falloff),
             ramps,
             first_hit,
+            window: drawn.with_lead(splatting.compositing, splatting.classification),
             view: seen,
             splatting,
             rays,

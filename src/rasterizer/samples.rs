@@ -114,6 +114,8 @@ impl SampleRasterizer {
                 bricks: volume.lists.lists.first().map_or(&buffers.splats, |list| &list.buffer),
                 values: volume.values(),
                 has_holes: volume.has_holes(),
+                channels: request.ramps.channels,
+                colors: volume.colors(),
                 labels: volume.labels(),
                 control_points: inputs.control_points,
                 places: &buffers.order,

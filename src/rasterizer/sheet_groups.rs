@@ -43,6 +43,8 @@ pub(super) struct GroupSettings<'a> {
     pub(super) view: &'a ViewGeometry,
     /// The sheet depths whose slabs count even if they are empty.
     pub(super) covered: &'a Range<f64>,
+    /// The slabs, or planes, that are drawn.
+    pub(super) drawn: &'a Range<i32>,
     /// The slabs or planes of a group.
     pub(super) sheets: u32,
     /// The sheet buffers' format and number.
@@ -57,6 +59,8 @@ pub(super) struct Planned {
     order: Order,
     /// [`means::covered`](crate::geometry::means::covered).
     covered: Range<f64>,
+    /// The slabs, or planes, that are drawn.
+    drawn: Range<i32>,
     /// [`ClassifiedVolume::revision`].
     revision: u64,
     /// For every list its bricks in bucket order, `[u32]`.
@@ -79,7 +83,7 @@ impl SheetGroups {
         previous: Option<Self>,
     ) -> Result<(Self, bool), RenderError> {
         let FrameInputs { device, request, frame, .. } = inputs;
-        let GroupSettings { view, covered, sheets, format, layers } = settings;
+        let GroupSettings { view, format, layers, .. } = settings;
         let (old_plans, old_targets, old_buffers, old_lists) = match previous {
             None => (Vec::new(), None, [None, None, None], None),
             Some(Self { planned, mut other_axes, targets, groups, culled, tile_lists, hits, .. }) => {
@@ -92,7 +96,7 @@ impl SheetGroups {
             Some(targets) => targets,
             None => Targets::new(device, view.size, format, layers)?,
         };
-        let (planned, other_axes, bucketed) = Planned::renewed(inputs, (view, covered), old_plans, sheets);
+        let (planned, other_axes, bucketed) = Planned::renewed(inputs, settings, old_plans);
         let stride = group_stride(&device.limits());
         let bytes = group_bytes(&planned.plan, stride);
         let groups = inputs.filled(old_groups, "sheetsplat.groups", &bytes, BufferUsages::UNIFORM)?;
@@ -128,12 +132,14 @@ impl SheetGroups {
         inputs: FrameInputs<'a>,
         planes: Option<PlaneBuffers<'a>>,
     ) -> CullBuffers<'a> {
-        let FrameInputs { volume, frame, control_points, .. } = inputs;
+        let FrameInputs { volume, frame, control_points, request, .. } = inputs;
         CullBuffers {
             frame,
             groups: &self.groups,
             values: volume.values(),
             has_holes: volume.has_holes(),
+            channels: request.ramps.channels,
+            colors: volume.colors(),
             labels: volume.labels(),
             control_points,
             occluded: &self.targets.occluded,
@@ -203,22 +209,18 @@ impl SheetGroups {
 impl Planned {
     /// The plan for a view in which these sheet depths count, taken from `old` if one is still valid there; the plans that stay valid for
     /// other axes; and whether the plan is new.
-    fn renewed(
-        inputs: FrameInputs<'_>,
-        (view, covered): (&ViewGeometry, &Range<f64>),
-        old: Vec<Self>,
-        sheets: u32,
-    ) -> (Self, Vec<Self>, bool) {
+    fn renewed(inputs: FrameInputs<'_>, settings: GroupSettings<'_>, old: Vec<Self>) -> (Self, Vec<Self>, bool) {
         let FrameInputs { device, volume, request, .. } = inputs;
+        let GroupSettings { view, .. } = settings;
         let order = request.splatting.order;
         let mut usable = old;
         usable.retain(|old| {
-            old.is_of(volume, order, covered) && (old.plan.view.has_depths_of(view) || old.plan.view.is_by_slices())
+            old.is_of(volume, order, settings) && (old.plan.view.has_depths_of(view) || old.plan.view.is_by_slices())
         });
         let current = usable.iter().position(|old| old.plan.view.has_depths_of(view));
         let mut planned = match current {
             Some(at) => usable.swap_remove(at),
-            None => Self::new(device, volume, (view, order, covered), sheets),
+            None => Self::new(device, volume, order, settings),
         };
         planned.plan.view = *view;
         (planned, usable, current.is_none())
@@ -227,22 +229,23 @@ impl Planned {
     fn new(
         device: &Device,
         volume: &ClassifiedVolume,
-        (view, order, covered): (&ViewGeometry, Order, &Range<f64>),
-        sheets: u32,
+        order: Order,
+        GroupSettings { view, covered, drawn, sheets, .. }: GroupSettings<'_>,
     ) -> Self {
-        let plan = FramePlan::new(volume.lists.bricks(), *view, sheets, order, covered.clone());
+        let plan = FramePlan::new(volume.lists.bricks(), *view, sheets, order, covered.clone(), drawn);
         let most = most_of(volume.lists.bricks(), &plan);
         let upload = |order: &Vec<u32>| {
             let bytes = order_bytes(order);
             uploaded(device, "sheetsplat.order", bytes, bytes.len() as u64, BufferUsages::STORAGE)
         };
         let orders = plan.orders.iter().map(upload).collect();
-        Self { order, covered: covered.clone(), revision: volume.revision, orders, most, plan }
+        Self { order, covered: covered.clone(), drawn: drawn.clone(), revision: volume.revision, orders, most, plan }
     }
 
     /// Whether another frame of a volume can go by it.
-    fn is_of(&self, volume: &ClassifiedVolume, order: Order, covered: &Range<f64>) -> bool {
-        (self.order, self.revision, &self.covered) == (order, volume.revision, covered)
+    fn is_of(&self, volume: &ClassifiedVolume, order: Order, settings: GroupSettings<'_>) -> bool {
+        let GroupSettings { covered, drawn, .. } = settings;
+        (self.order, self.revision, &self.covered, &self.drawn) == (order, volume.revision, covered, drawn)
     }
 }
 

@@ -47,6 +47,8 @@ struct Binned {
     planes: Option<PlaneGeometry>,
     /// [`means::covered`](crate::geometry::means::covered).
     covered: Range<f64>,
+    /// The slabs that are drawn.
+    drawn: Range<i32>,
     /// The kernel's support, which determines the footprints' boxes.
     support: f64,
     revision: u64,
@@ -92,7 +94,8 @@ impl TileRasterizer {
         let FrameRequest { splatting, view, rays, .. } = request;
         let of_volume = [volume.labels().is_some(), volume.has_holes()];
         let planes = plane_mode(request);
-        let mode = GatherMode::of(splatting, planes, view.perspective.is_some(), of_volume, *rays, bins.workgroups);
+        let mode = GatherMode::of(splatting, planes, view.perspective.is_some(), of_volume, *rays, bins.workgroups)
+            .with_channels(request.ramps.channels, volume.colors());
         let buffers = GatherBuffers {
             frame: inputs.frame,
             gather: &own.uniform,
@@ -103,6 +106,7 @@ impl TileRasterizer {
             entries: &own.entries,
             control_points: inputs.control_points,
             values: volume.values(),
+            colors: volume.colors(),
             labels: volume.labels(),
             gathered: &own.gathered,
             half_boxes: &own.half_boxes,
@@ -189,6 +193,7 @@ impl Binned {
             old.view == *view
                 && (old.order, old.revision, old.bins.passes.search) == (order, volume.revision, search)
                 && (old.support, &old.covered, old.planes) == (kernel.support(), covered, planes)
+                && old.drawn == drawn(request)
         };
         if let Some(old) = old.filter(is_current) {
             return Ok((old, false));
@@ -199,6 +204,7 @@ impl Binned {
             order,
             planes,
             covered: covered.clone(),
+            drawn: drawn(request),
             support: kernel.support(),
             revision: volume.revision,
         };
@@ -351,7 +357,14 @@ fn bins(limits: &Limits, request: &FrameRequest, bricks: &[Brick], search: u32) 
     let most_words = binding(limits) / 4;
     let (order, support) = (drawn_order(splatting), kernel.support());
     let work = (search, request.subgroup_threads);
-    Ok(PatchBins::new(bricks, (view, planes), order, covered.clone(), support, work, most_words)?)
+    let of_groups = (covered.clone(), &drawn(request));
+    Ok(PatchBins::new(bricks, (view, planes), order, of_groups, support, work, most_words)?)
+}
+
+/// The slabs that are drawn: with planes also the one before the first that is composited, because a group holds its slabs' far planes.
+fn drawn(request: &FrameRequest) -> Range<i32> {
+    let Range { start, end } = request.window.slabs;
+    if start < end && request.after.is_some() { start - 1..end } else { start..end }
 }
 
 /// What is gathered on planes, if classification comes after splatting.
@@ -375,8 +388,10 @@ fn check_workgroup_memory(limits: &Limits, request: &FrameRequest) -> Result<(),
 /// point each.
 fn all_search_passes(request: &FrameRequest, by_label: bool) -> u32 {
     let lengths = request.ramps.lengths();
-    let in_memory = by_label || lengths.iter().any(|&points| points > request.subgroup_threads);
-    if in_memory { 1 + lengths.iter().map(|&points| search_passes(points)).sum::<u32>() } else { 0 }
+    let channels = request.ramps.channels;
+    let in_memory = by_label || channels > 1 || lengths.iter().any(|&points| points > request.subgroup_threads);
+    let searches = 1 + lengths.iter().map(|&points| search_passes(points)).sum::<u32>();
+    if in_memory { channels * (1 + searches) } else { 0 }
 }
 
 /// The passes through loops of a binary search among `points` control points.

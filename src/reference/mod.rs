@@ -21,6 +21,8 @@ use glam::DVec4;
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::image::Image;
+use crate::image::channels::Joining;
+use crate::lists::classify::channels;
 use crate::part::Content;
 use crate::scene::Scene;
 use crate::settings::splatting::{Classification, check_first_hit};
@@ -100,7 +102,16 @@ impl Host<'_> {
 /// # Errors
 /// If the scene needs more than can be computed.
 pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Counts, RenderError> {
-    if scene.classification(volume) == Classification::After {
+    let classification = scene.classification(volume);
+    if Joining::of(scene.splatting.compositing, classification).is_some() && !transfer.further.is_empty() {
+        let scene = scene.framed(volume, transfer);
+        let mut all = count(volume, &transfer.of_channel(0), &scene)?;
+        for (number, volume) in (1..=transfer.further.len()).zip(volume.further()) {
+            all.add_channel(&count(volume, &transfer.of_channel(number), &scene)?);
+        }
+        return Ok(all);
+    }
+    if classification == Classification::After {
         return after::count(volume, transfer, scene);
     }
     before::count(volume, transfer, scene)
@@ -145,10 +156,53 @@ pub fn render_for(
     scene: &Scene,
     test: Option<visibility::Test>,
 ) -> Result<Culled, RenderError> {
-    if scene.classification(volume) == Classification::After {
+    let classification = scene.classification(volume);
+    let joining = Joining::of(scene.splatting.compositing, classification);
+    if let Some(joining) = joining.filter(|_| channels(volume, transfer).nth(1).is_some()) {
+        return render_joined(host, volume, transfer, scene, test, joining);
+    }
+    if classification == Classification::After {
         return after::render_for(host, volume, transfer, scene);
     }
     before::render_for(host, volume, transfer, scene, test)
+}
+
+/// Renders every channel by itself, and joins the images (SPEC §10).
+fn render_joined(
+    host: Host<'_>,
+    volume: &Volume,
+    transfer: &TransferFunction,
+    scene: &Scene,
+    test: Option<visibility::Test>,
+    joining: Joining,
+) -> Result<Culled, RenderError> {
+    scene.check()?;
+    transfer.check()?;
+    // All channels share a camera.
+    let mut scene = scene.framed(volume, transfer);
+    let background = std::mem::replace(&mut scene.image.background, [0.0; 4]);
+    let of_channel = match joining {
+        Joining::Sum => host,
+        Joining::Nearest => Host { first_hit: Some(host.first_hit.unwrap_or(1.0)), ..host },
+    };
+    let mut all: Option<Culled> = None;
+    for (number, volume) in volume.channels().enumerate().take(1 + transfer.further.len()) {
+        let channel = render_for(of_channel, volume, &transfer.of_channel(number), &scene, test)?;
+        let Some(all) = &mut all else {
+            all = Some(channel);
+            continue;
+        };
+        let joined = (&mut all.image.pixels[..], &mut all.first_hits[..]);
+        joining.join(joined, (&channel.image.pixels, &channel.first_hits));
+        all.sections += channel.sections;
+        all.areas.join(&channel.areas);
+    }
+    let mut all = all.ok_or_else(|| SettingError::new("channel", "none", "at least one"))?;
+    joining.finish(&mut all.image.pixels, background);
+    if host.first_hit.is_none() {
+        all.first_hits.clear();
+    }
+    Ok(all)
 }
 
 /// The pixels of a part of a scene's image, before the background (SPEC §11). Nothing is culled. The window has no end where it reaches an end

@@ -215,7 +215,7 @@ mod tests {
         let mut scene = Scene::new(VolumeSource::Builtin("cube".to_owned()));
         scene.transfer.opacity = Some(Ramp::new(vec![(0.5, 0.0), (1.0, 0.6)]).unwrap());
         (scene.image.width, scene.image.height, scene.image.background) = (1, 1, [0.0; 4]);
-        let transfer = scene.transfer.resolve(&volume);
+        let transfer = scene.resolve(&volume);
         let kernel = Kernel::new(2.0, 2.0);
         for (direction, up, stretch) in [(DVec3::Y, DVec3::Z, 1.0), (DVec3::Z, DVec3::Y, 2.0)] {
             for projection in [

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::Geometry;
 use crate::error::setting::scaled;
+use crate::lists::classify::channels;
 use crate::scene::Scene;
 use crate::settings::shading::{Light, Shading};
 use crate::settings::splatting::Compositing;
@@ -20,19 +21,20 @@ pub struct Splat {
     pub depth: f64,
     /// `(C·m, m)` divided by λ, times the low-pass amplitude where that is the same for all sections ([`Geometry::scale`]).
     pub amount: DVec4,
-    /// α.
+    /// α, summed over all channels.
     pub alpha: f64,
 }
 
 /// The indices in memory of the voxels that take part, ascending.
 pub fn taking_part(volume: &Volume, transfer: &TransferFunction, geometry: &Geometry) -> Vec<u32> {
-    let alpha = |&index: &u32| alpha(volume, transfer, index);
+    let has_alpha =
+        |&index: &u32| channels(volume, transfer).any(|(volume, transfer)| alpha(volume, transfer, index) > 0.0);
     let is_shown = |&index: &u32| {
         let voxel = volume.grid().voxel_at(index);
         geometry.is_beyond_near(voxel) && geometry.is_inside(voxel)
     };
     let voxels = (0..volume.values().len() as u32).into_par_iter();
-    voxels.filter(|index| alpha(index) > 0.0 && is_shown(index)).collect()
+    voxels.filter(|index| has_alpha(index) && is_shown(index)).collect()
 }
 
 /// Projects and shades the voxels that take part, in memory order.
@@ -51,21 +53,29 @@ pub fn splats(
     let splat = |&index: &u32| {
         let voxel = volume.grid().voxel_at(index);
         let amount = emission(volume, transfer, scene, geometry, index) * geometry.scale(voxel);
-        let alpha = alpha(volume, transfer, index);
+        let alpha = channels(volume, transfer).map(|(volume, transfer)| alpha(volume, transfer, index)).sum();
         Splat { center: geometry.pixel(voxel), depth: geometry.depth(voxel), amount, alpha }
     };
     voxels.par_iter().map(splat).collect()
 }
 
-/// `(C·m, m)` of a voxel.
+/// `(C·m, m)` of a voxel, the sum of all channels' (SPEC §10): their footprints are the same, so one splat draws them all.
 pub fn emission(volume: &Volume, transfer: &TransferFunction, scene: &Scene, geometry: &Geometry, index: u32) -> DVec4 {
     let voxel = volume.grid().voxel_at(index);
-    let base = transfer.tables(volume.label(index)).color.at(f64::from(volume.values()[index as usize]));
-    let color = color(&scene.shading, base, volume.gradient(voxel), -geometry.ray(voxel));
-    color.extend(1.0) * amount(scene.splatting.compositing, alpha(volume, transfer, index))
+    let of_channel = |(volume, transfer): (&Volume, &TransferFunction)| match alpha(volume, transfer, index) {
+        0.0 => DVec4::ZERO,
+        alpha => {
+            let value = f64::from(volume.values()[index as usize]);
+            let of_value = || transfer.tables(volume.label(index)).color.at(value);
+            let base = volume.color(index).map_or_else(of_value, DVec4::truncate);
+            let color = color(&scene.shading, base, volume.gradient(voxel), -geometry.ray(voxel));
+            color.extend(1.0) * amount(scene.splatting.compositing, alpha)
+        }
+    };
+    channels(volume, transfer).map(of_channel).sum()
 }
 
-/// α of a voxel; 0 for a hole.
+/// α of a voxel, times A where it has a colour of its own (SPEC §10); 0 for a hole.
 fn alpha(volume: &Volume, transfer: &TransferFunction, index: u32) -> f64 {
     let value = f64::from(volume.values()[index as usize]);
     let tables = transfer.tables(volume.label(index));
@@ -73,7 +83,8 @@ fn alpha(volume: &Volume, transfer: &TransferFunction, index: u32) -> f64 {
     if value.is_nan() || tables.opacity.at(value) <= 0.0 {
         return 0.0;
     }
-    tables.alpha(value, volume.gradient(volume.grid().voxel_at(index)).length())
+    let own = volume.color(index).map_or(1.0, |color| color.w);
+    tables.alpha(value, volume.gradient(volume.grid().voxel_at(index)).length()) * own
 }
 
 /// `m`: the amount per unit length (SPEC §5).

@@ -96,6 +96,13 @@ pub struct Areas {
 }
 
 impl Areas {
+    /// Adds those of another image.
+    pub(super) fn join(&mut self, other: &Self) {
+        self.bounding_box += other.bounding_box;
+        self.tiles += other.tiles;
+        self.counted_tiles += other.counted_tiles;
+    }
+
     /// Adds the areas of a sheet with these sections, in an image of this size.
     pub fn add(&mut self, sections: &[Section], size: DVec2, support: f64) {
         let tile = f64::from(TILE);

@@ -165,12 +165,12 @@ impl Renderer {
     }
 
     fn request(&self, view: &SceneView) -> Result<FrameRequest, RenderError> {
-        let SceneView { volume, scene, surfaces, first_hit, .. } = view;
+        let SceneView { volume, scene, surfaces, first_hit, window, .. } = view;
         FrameRequest::new(
             &self.device,
             volume,
             (scene, &view.camera()),
-            (surfaces.as_ref(), *first_hit),
+            (surfaces.as_ref(), *first_hit, window.as_ref()),
             self.rasterizer,
         )
     }
@@ -196,7 +196,7 @@ impl Renderer {
         let frame_values =
             uniforms::frame(request.stage_view(), kernel, (&grid, volume.gpu_volume().value_format()), ramps, scene);
         let uniform = write(kept.uniform, &frame_uniform(), bytemuck::bytes_of(&frame_values))?;
-        let cut_values = uniforms::cut(seen, &grid, scene, request.surfaces, request.first_hit);
+        let cut_values = uniforms::cut(seen, &grid, scene, request.surfaces, request.first_hit, &request.window);
         let cut = write(kept.cut, &cut_uniform(), bytemuck::bytes_of(&cut_values))?;
         let cut_buffers = CutBuffers {
             uniform: &cut,

@@ -8,6 +8,7 @@ use wgpu::{Buffer, BufferAsyncError, BufferDescriptor, BufferUsages, CommandEnco
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::pick::Pick;
+use crate::settings::transfer_function::TransferFunction;
 use crate::volume::Volume;
 
 /// A pick on its way from the GPU.
@@ -17,6 +18,7 @@ pub struct PendingPick {
     view: ViewGeometry,
     pixel: [u32; 2],
     volume: Arc<Volume>,
+    transfer: TransferFunction,
     arrival: Option<Receiver<Result<(), BufferAsyncError>>>,
 }
 
@@ -27,7 +29,7 @@ impl PendingPick {
         first_hits: &Texture,
         pixel: [u32; 2],
         view: &ViewGeometry,
-        volume: &Arc<Volume>,
+        (volume, transfer): (&Arc<Volume>, &TransferFunction),
     ) -> Self {
         let staging = device.create_buffer(&BufferDescriptor {
             label: Some("sheetsplat.pick"),
@@ -45,7 +47,7 @@ impl PendingPick {
             wgpu::TexelCopyBufferInfo { buffer: &staging, layout: wgpu::TexelCopyBufferLayout::default() },
             wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
         );
-        Self { staging, view: *view, pixel, volume: volume.clone(), arrival: None }
+        Self { staging, view: *view, pixel, volume: volume.clone(), transfer: transfer.clone(), arrival: None }
     }
 
     /// The picked point, once the encoder was submitted, its work is done, and the device was polled. The first call after submitting requests
@@ -69,7 +71,8 @@ impl PendingPick {
         Some(result.map_err(|error| failed(error.to_string())).and_then(|()| {
             let bytes = self.staging.get_mapped_range(..).map_err(|error| failed(error.to_string()))?;
             let depth: f32 = bytemuck::pod_read_unaligned(&bytes[..4]);
-            Ok(depth.is_finite().then(|| Pick::at(&self.view, &self.volume, self.pixel, depth.into())))
+            let of = (&*self.volume, &self.transfer);
+            Ok(depth.is_finite().then(|| Pick::at(&self.view, of, self.pixel, depth.into())))
         }))
     }
 }

@@ -31,9 +31,14 @@ impl TransferSettings {
     /// If a colour, opacity or factor is not in [0, 1] (in labels' tables, too), the list of iso-ranges is empty, or an iso-range is
     /// reversed or not finite.
     pub fn check(&self) -> Result<(), SettingError> {
-        check_ramps("transfer", self.color.as_ref(), self.opacity.as_ref(), self.gradient_opacity.as_ref())?;
-        check_iso_ranges(self.iso_ranges.as_deref())?;
-        check_labels(&self.labels)
+        self.check_as("transfer")
+    }
+
+    /// [`Self::check`] for the table of a channel.
+    pub(super) fn check_as(&self, table: &str) -> Result<(), SettingError> {
+        check_ramps(table, self.color.as_ref(), self.opacity.as_ref(), self.gradient_opacity.as_ref())?;
+        check_iso_ranges(table, self.iso_ranges.as_deref())?;
+        check_labels(table, &self.labels)
     }
 
     /// Checks that the volume has the labels or palette that the settings need.
@@ -42,13 +47,21 @@ impl TransferSettings {
     /// If there are tables for labels, or the preset `labels`, and the volume has no labels; or if the colour map is the file's and the
     /// volume has no palette.
     pub fn check_volume(&self, volume: &Volume) -> Result<(), SettingError> {
+        self.check_volume_as("transfer", volume)
+    }
+
+    fn check_volume_as(&self, table: &str, volume: &Volume) -> Result<(), SettingError> {
         if !self.labels.is_empty() && volume.labels().is_none() {
             let found = "tables for a volume without labels";
-            return Err(SettingError::new("transfer.label", found, "no such tables, or a volume with labels"));
+            return Err(SettingError::new(format!("{table}.label"), found, "no such tables, or a volume with labels"));
         }
         if self.colormap == Some(Colormap::File) && volume.palette().is_none() {
             let allowed = "another colour map, or a TIFF file whose pixels are indices of a palette";
-            return Err(SettingError::new("transfer.colormap", "file, for a volume without a palette", allowed));
+            return Err(SettingError::new(
+                format!("{table}.colormap"),
+                "file, for a volume without a palette",
+                allowed,
+            ));
         }
         if self.preset.is_some_and(|preset| !preset.suits(volume)) {
             let allowed = "values that are whole numbers from 0 to 65535, or labels in the volume";
@@ -70,8 +83,31 @@ impl Scene {
         self.camera.check()?;
         self.image.check()?;
         self.clip.check()?;
-        self.transfer.check()?;
+        for (number, channel) in self.channels().enumerate() {
+            channel.transfer.check_as(&self.transfer_table(number))?;
+        }
         self.shading.check()?;
         self.splatting.check()
+    }
+
+    /// Checks that a volume has the channels that the scene has tables for, and the labels or palettes that these need.
+    ///
+    /// # Errors
+    /// If it lacks any of them: see [`TransferSettings::check_volume`].
+    pub fn check_volume(&self, volume: &Volume) -> Result<(), SettingError> {
+        let (tables, channels) = (1 + self.further.len(), volume.channels().count());
+        if tables > channels {
+            let found = format!("tables for {tables} channels");
+            return Err(SettingError::new("channel", found, format!("at most {channels}, as many as the volume has")));
+        }
+        for (number, volume) in volume.channels().enumerate() {
+            self.settings_of(number).transfer.check_volume_as(&self.transfer_table(number), volume)?;
+        }
+        Ok(())
+    }
+
+    /// The key of a channel's transfer function.
+    fn transfer_table(&self, number: usize) -> String {
+        if self.further.is_empty() { "transfer".to_owned() } else { format!("channel[{number}].transfer") }
     }
 }

@@ -1,6 +1,8 @@
 //! Scenes: what an image shows and how, from a scene file, from `--set` overrides, or from a volume alone (SPEC §7).
 
+mod channel;
 mod check;
+mod load;
 pub(crate) mod names;
 mod reader;
 mod tables;
@@ -21,7 +23,8 @@ use crate::settings::framing::Extent;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::{Classification, Splatting};
 use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
-use crate::volume::{Access, Labels, RawLayout, ReadOptions, Volume, VolumeError, builtin};
+use crate::volume::{Access, RawLayout, ReadOptions, Volume, VolumeError};
+pub use channel::Channel;
 use reader::{OVERRIDE, Origins, Section, apply_override};
 
 /// Why a scene could not be read.
@@ -80,7 +83,7 @@ pub enum VolumeSource {
     File(PathBuf),
     /// A file of samples without a header.
     Raw(PathBuf, RawLayout),
-    /// A procedural volume, `NAME` or `NAME:N` (see [`builtin::volume`]).
+    /// A procedural volume, `NAME` or `NAME:N` (see [`builtin::volume`](crate::volume::builtin::volume)).
     Builtin(String),
     /// A volume that the program holds in memory and passes to the renderer. A scene file cannot name it.
     Memory,
@@ -133,9 +136,9 @@ pub struct TransferSettings {
 }
 
 impl From<TransferFunction> for TransferSettings {
-    /// Settings that state everything.
+    /// Settings that state everything about one channel; further ones are ignored.
     fn from(transfer: TransferFunction) -> Self {
-        let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels } = transfer;
+        let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels, further: _ } = transfer;
         let (color, opacity) = (Some(color), Some(opacity));
         Self { preset: None, colormap: None, color, opacity, gradient_opacity, iso_ranges, labels }
     }
@@ -145,10 +148,15 @@ impl TransferSettings {
     /// The complete transfer function for a volume. Colours and opacities that are not stated (for labels, too) come from the preset or
     /// from [`TransferFunction::from_histogram`], independently of each other. A colour map covers the visible values ([`Colormap::of`]).
     pub fn resolve(&self, volume: &Volume) -> TransferFunction {
-        let chosen = || match self.preset {
+        self.resolve_by(volume, |preset| match preset {
             Some(preset) => preset.transfer(volume),
             None => TransferFunction::from_histogram(volume),
-        };
+        })
+    }
+
+    /// [`Self::resolve`] with what a preset, or none, chooses.
+    fn resolve_by(&self, volume: &Volume, of: impl Fn(Option<Preset>) -> TransferFunction) -> TransferFunction {
+        let chosen = || of(self.preset);
         let mut transfer = match (&self.color, &self.opacity) {
             (Some(color), Some(opacity)) if self.preset.is_none() => {
                 TransferFunction::by_value(color.clone(), opacity.clone())
@@ -188,12 +196,20 @@ impl TransferSettings {
 /// `volume.builtin`; one of `volume.builtin` removes `volume.path` and the layout of a raw file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
-    /// The source of the volume.
+    /// The source of the volume. This, and all up to `transfer`, are those of the first channel.
     pub volume: VolumeSource,
     /// World units between neighbouring voxels, each above 0, in place of the volume's own spacing.
     pub spacing: Option<DVec3>,
     /// A file with one label per voxel, in place of the volume's own labels.
     pub labels: Option<PathBuf>,
+    /// The number, from 0, of the only channel that is read of a file with several; `None` reads all.
+    pub index: Option<u32>,
+    /// The number, from 0, of the time that is read of a file with several; `None` reads the first.
+    pub time: Option<u32>,
+    /// The name of the channel in legends and picks; `None` uses the file's.
+    pub name: Option<String>,
+    /// Whether the channel is drawn.
+    pub visible: bool,
     /// The camera.
     pub camera: Camera,
     /// The image's size and background.
@@ -202,6 +218,8 @@ pub struct Scene {
     pub clip: Clip,
     /// Colour and opacity.
     pub transfer: TransferSettings,
+    /// The channels after the first (SPEC §10), all on its grid.
+    pub further: Vec<Channel>,
     /// Light and material.
     pub shading: Shading,
     /// Kernel, slabs, compositing, culling.
@@ -215,10 +233,15 @@ impl Scene {
             volume,
             spacing: None,
             labels: None,
+            index: None,
+            time: None,
+            name: None,
+            visible: true,
             camera: Camera { fit: Fit::Object, ..Camera::default() },
             image: ImageSettings::default(),
             clip: Clip::default(),
             transfer: TransferSettings::default(),
+            further: Vec::new(),
             shading: Shading::default(),
             splatting: Splatting { classification: Classification::Auto, ..Splatting::default() },
         }
@@ -239,9 +262,7 @@ impl Scene {
     /// As for [`Self::open`], and if the scene file lies outside the folder.
     pub fn open_with(path: &Path, sets: &[String], options: &ReadOptions) -> Result<Self, SceneError> {
         let access = Access::new(options)?;
-        let resolved = access.resolve(path)?;
-        let text =
-            std::fs::read_to_string(resolved).map_err(|source| SceneError::Io { path: path.to_owned(), source })?;
+        let text = access.text(path)?.map_err(|source| SceneError::Io { path: path.to_owned(), source })?;
         Self::parse(&text, &path.display().to_string(), path.parent().unwrap_or(Path::new("")), sets)
     }
 
@@ -277,7 +298,7 @@ impl Scene {
         Self::build(Table::new(), OVERRIDE, Path::new(""), Some(source), sets)
     }
 
-    /// Loads or computes the volume, with the scene's spacing and labels if it states them. The label file's spacing must equal the
+    /// Loads or computes the volume, with all channels, and the scene's spacing and labels if it states them. The label file's spacing must equal the
     /// volume's, unless the scene's spacing replaces both.
     ///
     /// # Errors
@@ -302,31 +323,7 @@ impl Scene {
     /// As for [`Self::load_volume_with`].
     pub fn load_volume_and_files(&self, options: &ReadOptions) -> Result<(Volume, Vec<PathBuf>), VolumeError> {
         let access = Access::new(options)?;
-        let (volume, origin) = match &self.volume {
-            VolumeSource::File(path) => (Volume::read(path, &access)?, path.display().to_string()),
-            VolumeSource::Raw(path, layout) => (Volume::read_raw(path, layout, &access)?, path.display().to_string()),
-            VolumeSource::Builtin(name) => (builtin::read(name, &access)?, format!("builtin:{name}")),
-            VolumeSource::Memory => {
-                return Err(VolumeError::Invalid {
-                    origin: "scene".to_owned(),
-                    field: "volume".to_owned(),
-                    found: "a volume in memory".to_owned(),
-                    allowed: "volume.path or volume.builtin".to_owned(),
-                });
-            }
-        };
-        let volume = match &self.labels {
-            Some(path) => {
-                let labels = Labels::read(path, &access)?;
-                let spacing = labels.spacing.filter(|_| self.spacing.is_none());
-                volume.with_labels(Labels { spacing, ..labels })?
-            }
-            None => volume,
-        };
-        let volume = match self.spacing {
-            Some(spacing) => volume.with_spacing(&origin, spacing)?,
-            None => volume,
-        };
+        let volume = load::channels(self, &access)?;
         Ok((volume, access.files()))
     }
 
@@ -343,16 +340,18 @@ impl Scene {
     }
 
     fn explicit_by(&self, volume: &Volume, fit: impl Fn(&Extent, &Camera, [u32; 2]) -> Camera) -> Self {
-        let transfer = self.transfer.resolve(volume);
+        let transfer = self.resolve(volume);
         let ImageSettings { width, height, .. } = self.image;
         let camera =
             self.extent(volume, &transfer).map_or(self.camera, |extent| fit(&extent, &self.camera, [width, height]));
         let camera = camera.explicit(volume.grid(), self.splatting.radius, width, height);
-        Self { camera, transfer: transfer.into(), ..self.classified(volume) }
+        let mut channels = self.explicit_channels(volume).into_iter();
+        let Some(Channel { name, transfer, .. }) = channels.next() else { return self.clone() };
+        Self { camera, name, transfer, further: channels.collect(), ..self.classified(volume) }
     }
 
     /// The box that a camera fits under a transfer function (for a scene that leaves it to the volume, that of
-    /// [`TransferSettings::resolve`]): the box around the kernels of all voxels that take part and are not cut away. If the opacity was
+    /// [`Self::resolve`]): the box around the kernels of all voxels that take part and are not cut away. If the opacity was
     /// chosen automatically, the outermost 0.1 % of them at either end of each axis are ignored as noise. `None` if the camera needs no such
     /// box, or no voxel takes part.
     pub fn extent(&self, volume: &Volume, transfer: &TransferFunction) -> Option<Extent> {
@@ -362,7 +361,7 @@ impl Scene {
             return None;
         }
         let (grid, radius) = (volume.grid(), self.splatting.radius);
-        let specks = if self.transfer.opacity.is_none() { SPECKS } else { 0.0 };
+        let specks = if self.channels().any(|channel| channel.transfer.opacity.is_none()) { SPECKS } else { 0.0 };
         let voxels = extent::of_voxels(volume, transfer, &self.clip.voxels(grid, radius), specks)?;
         Some(Extent::of_voxels(grid, voxels, radius))
     }
@@ -379,14 +378,17 @@ impl Scene {
     /// it where the transfer function comes from a preset (except `xray`, `mip`, `confocal` and `labels`) or is chosen for the volume, unless
     /// another setting excludes that or the volume is a label map ([`categories`]).
     pub fn classification(&self, volume: &Volume) -> Classification {
-        let Self { transfer, splatting, .. } = self;
+        let splatting = &self.splatting;
         if splatting.classification != Classification::Auto {
             return splatting.classification;
         }
-        let is_sharper = match transfer.preset {
-            Some(preset) => preset.is_classified_after(),
-            None => *transfer == TransferSettings::default() && !categories::is_label_map(volume),
-        };
+        let is_sharper = (0..).zip(volume.channels()).all(|(number, volume)| {
+            let transfer = &self.settings_of(number).transfer;
+            match transfer.preset {
+                Some(preset) => preset.is_classified_after(),
+                None => *transfer == TransferSettings::default() && !categories::is_label_map(volume),
+            }
+        });
         if is_sharper && splatting.allows_after() { Classification::After } else { Classification::Before }
     }
 
@@ -405,18 +407,17 @@ impl Scene {
         sets: &[String],
     ) -> Result<Self, SceneError> {
         // Without these tables, the object is to be shown; overrides of single keys do not change that.
-        let is_bare = !["transfer", "camera"].iter().any(|table| root.contains_key(*table));
+        let is_bare = !["transfer", "channel", "camera"].iter().any(|table| root.contains_key(*table));
         let fit = if is_bare { Fit::Object } else { Fit::Volume };
         let overridden = sets.iter().map(|set| apply_override(&mut root, set)).collect::<Result<_, _>>()?;
         let origins = Origins { file: origin, overridden, written: root.clone() };
-        let states_transfer = root.contains_key("transfer");
         let mut root = Section::root(&origins, root);
-        let [volume, camera, image, clip, transfer, shading, splatting] = [
-            root.section("volume")?,
+        let channels = tables::channel_tables(&mut root)?;
+        let states_transfer = channels.iter().any(|channel| channel.states_transfer);
+        let [camera, image, clip, shading, splatting] = [
             root.section("camera")?,
             root.section("image")?,
             root.section("clip")?,
-            root.section("transfer")?,
             root.section("shading")?,
             root.section("splatting")?,
         ];
@@ -433,38 +434,30 @@ impl Scene {
             },
             ..Splatting::default()
         };
-        let tables::VolumeSettings { source, spacing, labels } = tables::volume(volume, folder, source)?;
+        let mut channels = tables::channels(channels, folder, source, preset)?.into_iter();
+        let Channel { name, visible, volume, spacing, labels, index, time, transfer } =
+            channels.next().unwrap_or_else(|| Channel::new(VolumeSource::Memory));
         let scene = Self {
-            volume: source,
+            volume,
             spacing,
             labels,
+            index,
+            time,
+            name,
+            visible,
             camera: tables::camera(camera, fit)?,
             image: tables::image(image)?,
             clip: tables::clip(clip)?,
-            transfer: TransferSettings { preset, ..tables::transfer(transfer)? },
+            transfer,
+            further: channels.collect(),
             shading: tables::shading(shading, preset.map_or_else(Shading::default, Preset::shading))?,
             splatting: tables::splatting(splatting, splatting_of_preset)?,
         };
-        if !scene.transfer.labels.is_empty() && !scene.may_have_labels() {
-            let allowed = "no such tables, or volume.labels, or volume.builtin = \"head\" or \"tomato\"";
-            let related = ["volume.path", "volume.builtin", "volume.labels"];
-            return Err(origins.invalid("transfer.label", &related, "tables for a volume without labels", allowed));
-        }
         if scene.transfer.preset == Some(Preset::Labels) && scene.splatting.classification == Classification::After {
             let (key, found) = ("splatting.classification", "\"after\" with preset = \"labels\"");
             return Err(origins.invalid(key, &["preset"], found, "\"before\" with it"));
         }
         Ok(scene)
-    }
-
-    /// Whether the volume can have labels; an unknown builtin volume might.
-    fn may_have_labels(&self) -> bool {
-        let has_none = match &self.volume {
-            VolumeSource::File(_) | VolumeSource::Raw(..) => true,
-            VolumeSource::Builtin(name) => builtin::labels(name).is_some_and(<[_]>::is_empty),
-            VolumeSource::Memory => false,
-        };
-        self.labels.is_some() || !has_none
     }
 }
 

@@ -14,6 +14,9 @@ use crate::volume::{SIZES, dims_of};
 /// The origin of values set on the command line.
 pub(super) const OVERRIDE: &str = "--set";
 
+/// The maximum number of channels.
+pub(super) const MAX_CHANNELS: usize = 64;
+
 /// Applies one `--set` argument, `table.key=value` or `table=value`, and returns its key.
 pub(super) fn apply_override(root: &mut Table, argument: &str) -> Result<String, SceneError> {
     let misused = |key: &str, found: &str, allowed: &str| SceneError::Invalid {
@@ -34,7 +37,15 @@ pub(super) fn apply_override(root: &mut Table, argument: &str) -> Result<String,
     let mut path = String::new();
     for table in tables.into_iter().flat_map(|tables| tables.split('.')) {
         path = if path.is_empty() { table.to_owned() } else { format!("{path}.{table}") };
-        section = match section.entry(table).or_insert_with(|| Value::Table(Table::new())) {
+        let found = match table.strip_prefix("channel[").and_then(|rest| rest.strip_suffix(']')) {
+            Some(number) if path == table => {
+                let parsed = number.parse().ok().filter(|&number| number < MAX_CHANNELS);
+                let refused = || misused(key, number, &format!("a number below {MAX_CHANNELS} in brackets"));
+                channel_table(section, parsed.ok_or_else(refused)?)
+            }
+            _ => section.entry(table).or_insert_with(|| Value::Table(Table::new())),
+        };
+        section = match found {
             Value::Table(section) => section,
             other => {
                 return Err(misused(key, &format!("{path} = {}", typed(other)), &format!("{path} to be a table")));
@@ -42,7 +53,7 @@ pub(super) fn apply_override(root: &mut Table, argument: &str) -> Result<String,
         };
     }
     // The two keys name the same thing, so the last one wins.
-    match key {
+    match key.split_once("].").map_or(key, |(_, of_channel)| of_channel) {
         "volume.path" => _ = section.remove("builtin"),
         "volume.builtin" => {
             section.retain(|name, _| !["path", "dims", "type", "endian", "offset"].contains(&name));
@@ -53,6 +64,24 @@ pub(super) fn apply_override(root: &mut Table, argument: &str) -> Result<String,
     }
     section.insert(name.to_owned(), value);
     Ok(key.to_owned())
+}
+
+/// The value of `[[channel]]` with a number. Empty tables are added up to it; the first takes in the tables of a scene of one channel.
+fn channel_table(root: &mut Table, number: usize) -> &mut Value {
+    if !root.contains_key("channel") {
+        let of_one = ["volume", "transfer"].map(|name| root.remove(name).map(|table| (name.to_owned(), table)));
+        let first = Value::Table(of_one.into_iter().flatten().collect());
+        root.insert("channel".to_owned(), Value::Array(vec![first]));
+    }
+    match &mut root["channel"] {
+        Value::Array(channels) => {
+            if channels.len() <= number {
+                channels.resize(number + 1, Value::Table(Table::new()));
+            }
+            &mut channels[number]
+        }
+        other => other,
+    }
 }
 
 /// The origin of each key's value.
@@ -86,7 +115,7 @@ impl Origins<'_> {
     }
 
     /// The overrides of a table's keys. They also create the table if the file has none: `colour.red` adds a table `colour`.
-    fn overrides_within(&self, table: &str) -> Vec<&str> {
+    pub(super) fn overrides_within(&self, table: &str) -> Vec<&str> {
         self.overridden.iter().filter(|set| is_within(set, table)).map(String::as_str).collect()
     }
 
@@ -179,6 +208,11 @@ impl<'a> Section<'a> {
         value.ok_or_else(|| self.origins.invalid(&self.key(name), &[], "no such key", allowed))
     }
 
+    /// Whether a key is present.
+    pub(super) fn states(&self, name: &str) -> bool {
+        self.table.contains_key(name)
+    }
+
     /// Refuses a former key, naming the key that replaced it.
     pub(super) fn moved(&self, former: &str, key: &str) -> Result<(), SceneError> {
         if !self.table.contains_key(former) {
@@ -262,6 +296,13 @@ impl<'a> Entry<'a> {
         let allowed = "an integer >= 0";
         let integer = self.value.as_integer().ok_or_else(|| self.mistyped(allowed))?;
         u64::try_from(integer).map_err(|_| self.refused(allowed))
+    }
+
+    /// The number of a channel or time.
+    pub(super) fn count(&self) -> Result<u32, SceneError> {
+        let allowed = "an integer >= 0";
+        let integer = self.value.as_integer().ok_or_else(|| self.mistyped(allowed))?;
+        u32::try_from(integer).map_err(|_| self.refused(allowed))
     }
 
     /// A label.

@@ -8,9 +8,9 @@ use glam::DVec3;
 use super::names::{
     BOXES, CLASSIFICATIONS, COMPOSITINGS, ENDIANS, FITS, FORMS, GRADIENTS, INTERPOLATIONS, METHODS, ORDERS, RASTERIZERS,
 };
-use super::reader::{Entry, LABEL, Section};
-use super::{ImageSettings, SceneError, TransferSettings, VolumeSource};
-use crate::appearance::Colormap;
+use super::reader::{Entry, LABEL, MAX_CHANNELS, Section};
+use super::{Channel, ImageSettings, SceneError, TransferSettings, VolumeSource};
+use crate::appearance::{Colormap, Preset};
 use crate::error::setting::Interval;
 use crate::settings::camera::{Camera, FOV_Y, Fit, Projection};
 use crate::settings::clip::{Clip, MAX_PLANES};
@@ -20,32 +20,122 @@ use crate::settings::splatting::{FALLOFF, RADIUS, SLAB_WIDTH, Splatting};
 use crate::settings::transfer_function::{LabelTables, Ramp};
 use crate::volume::{RawLayout, SPACING, SampleType, check_spacing};
 
+/// The tables of one channel.
+pub(super) struct ChannelTables<'a> {
+    /// The channel's key; empty for a scene of `[volume]` and `[transfer]`.
+    key: String,
+    name: Option<String>,
+    visible: bool,
+    volume: Section<'a>,
+    transfer: Section<'a>,
+    /// Whether there is a table `transfer`.
+    pub(super) states_transfer: bool,
+}
+
+/// Takes out `[[channel]]`, or `[volume]` and `[transfer]` in its place.
+pub(super) fn channel_tables<'a>(root: &mut Section<'a>) -> Result<Vec<ChannelTables<'a>>, SceneError> {
+    let mut channels = Vec::new();
+    let states_single = ["volume", "transfer"].map(|table| root.states(table));
+    let first = ChannelTables {
+        key: String::new(),
+        name: None,
+        visible: true,
+        volume: root.section("volume")?,
+        transfer: root.section("transfer")?,
+        states_transfer: states_single[1],
+    };
+    root.read("channel", &mut channels, |entry| entry.items("tables [[channel]]"))?;
+    if channels.is_empty() {
+        return Ok(vec![first]);
+    }
+    let allowed = "either [[channel]], or [volume] and [transfer]";
+    if states_single != [false; 2] {
+        let overridden = ["volume", "transfer"].map(|table| root.origins.overrides_within(table)).concat();
+        return Err(root.origins.invalid("channel", &overridden, "both", allowed));
+    }
+    if channels.len() > MAX_CHANNELS {
+        let (found, allowed) = (format!("{} tables", channels.len()), format!("at most {MAX_CHANNELS}"));
+        return Err(root.origins.invalid("channel", &[], found, allowed));
+    }
+    let of_channel = |item: &Entry<'a>| {
+        let mut section = item.section("a table [[channel]]")?;
+        let (mut name, mut visible) = (None, true);
+        section.read("name", &mut name, |entry| entry.text("a name").map(Some))?;
+        section.read("visible", &mut visible, Entry::boolean)?;
+        let states_transfer = section.states("transfer");
+        let (volume, transfer) = (section.section("volume")?, section.section("transfer")?);
+        let key = section.name.clone();
+        section.finish()?;
+        Ok(ChannelTables { key, name, visible, volume, transfer, states_transfer })
+    };
+    channels.iter().map(of_channel).collect()
+}
+
+/// Reads the tables of all channels. `given` is the source of a first volume that names none.
+pub(super) fn channels(
+    tables: Vec<ChannelTables>,
+    folder: &Path,
+    mut given: Option<VolumeSource>,
+    preset: Option<Preset>,
+) -> Result<Vec<Channel>, SceneError> {
+    let mut channels = Vec::new();
+    for ChannelTables { key, name, visible, volume: of_volume, transfer: of_transfer, .. } in tables {
+        let origins = of_volume.origins;
+        let is_first = channels.is_empty();
+        let VolumeSettings { source, spacing, labels, index, time } =
+            volume(of_volume, folder, if is_first { given.take() } else { Some(VolumeSource::Memory) })?;
+        let states_more = spacing.is_some() || labels.is_some() || index.is_some() || time.is_some();
+        if !is_first && source == VolumeSource::Memory && states_more {
+            let found = "keys of a volume without path or builtin";
+            let allowed = "keys of a volume of the channel's own";
+            return Err(origins.invalid(&format!("{key}.volume"), &[], found, allowed));
+        }
+        let transfer = TransferSettings { preset, ..transfer(of_transfer)? };
+        let channel = Channel { name, visible, volume: source, spacing, labels, index, time, transfer };
+        if !channel.transfer.labels.is_empty() && !channel.may_have_labels() {
+            let key = |name: &str| if key.is_empty() { name.to_owned() } else { format!("{key}.{name}") };
+            let allowed = "no such tables, or volume.labels, or volume.builtin = \"head\" or \"tomato\"";
+            let related = [key("volume.path"), key("volume.builtin"), key("volume.labels")];
+            let found = "tables for a volume without labels";
+            return Err(origins.invalid(
+                &key("transfer.label"),
+                &related.each_ref().map(String::as_str),
+                found,
+                allowed,
+            ));
+        }
+        channels.push(channel);
+    }
+    Ok(channels)
+}
+
 /// `[volume]`.
-pub(super) struct VolumeSettings {
-    pub(super) source: VolumeSource,
-    pub(super) spacing: Option<DVec3>,
-    pub(super) labels: Option<PathBuf>,
+struct VolumeSettings {
+    source: VolumeSource,
+    spacing: Option<DVec3>,
+    labels: Option<PathBuf>,
+    index: Option<u32>,
+    time: Option<u32>,
 }
 
 /// Reads `[volume]`; `given` is the source of a table that names none.
-pub(super) fn volume(
-    mut section: Section,
-    folder: &Path,
-    given: Option<VolumeSource>,
-) -> Result<VolumeSettings, SceneError> {
+fn volume(mut section: Section, folder: &Path, given: Option<VolumeSource>) -> Result<VolumeSettings, SceneError> {
     let (mut path, mut builtin, mut spacing, mut labels) = (None, None, None, None);
     section.read("path", &mut path, |entry| entry.text("a volume file's path").map(Some))?;
     section.read("builtin", &mut builtin, |entry| entry.text("a builtin volume's name").map(Some))?;
     section.read("spacing", &mut spacing, |entry| entry.numbers(SPACING).map(|s| Some(DVec3::from_array(s))))?;
     section
         .read("labels", &mut labels, |entry| entry.text("a label file's path").map(|path| Some(folder.join(path))))?;
+    let (mut index, mut time) = (None, None);
+    section.read("index", &mut index, |entry| entry.count().map(Some))?;
+    section.read("time", &mut time, |entry| entry.count().map(Some))?;
     let raw = raw_layout(&mut section)?;
-    let origins = section.origins;
+    let (origins, key) = (section.origins, section.name.clone());
     section.finish()?;
     if let Some(spacing) = spacing {
-        check_spacing("volume.spacing", spacing).map_err(|error| origins.refused(error))?;
+        check_spacing(&format!("{key}.spacing"), spacing).map_err(|error| origins.refused(error))?;
     }
-    let refused = |found| origins.invalid("volume", &[], found, "either volume.path or volume.builtin");
+    let refused = |found| origins.invalid(&key, &[], found, format!("either {key}.path or {key}.builtin"));
     let source = match (path, builtin) {
         (Some(path), None) => VolumeSource::File(folder.join(path)),
         (None, Some(name)) => VolumeSource::Builtin(name),
@@ -55,9 +145,12 @@ pub(super) fn volume(
     let source = match (source, raw) {
         (source, None) => source,
         (VolumeSource::File(path), Some(layout)) => VolumeSource::Raw(path, layout),
-        (_, Some(_)) => return Err(origins.invalid("volume.dims", &[], "a volume that is not a file", "volume.path")),
+        (_, Some(_)) => {
+            let found = "a volume that is not a file";
+            return Err(origins.invalid(&format!("{key}.dims"), &[], found, format!("{key}.path")));
+        }
     };
-    Ok(VolumeSettings { source, spacing, labels })
+    Ok(VolumeSettings { source, spacing, labels, index, time })
 }
 
 /// The layout of a raw file: `dims`, which requires `type`, `endian` and `offset`.
@@ -67,20 +160,24 @@ fn raw_layout(section: &mut Section) -> Result<Option<RawLayout>, SceneError> {
     section.read("type", &mut sample_type, |entry| entry.choice(&SampleType::NAMED).map(Some))?;
     section.read("endian", &mut big_endian, |entry| entry.choice(ENDIANS).map(Some))?;
     section.read("offset", &mut offset, |entry| entry.bytes().map(Some))?;
-    let missing = |key: &str, allowed: &str| section.origins.invalid(key, &["volume.dims"], "no such key", allowed);
+    let table = section.name.clone();
+    let missing = |key: &str, allowed: &str| {
+        let related = format!("{table}.dims");
+        section.origins.invalid(&format!("{table}.{key}"), &[&related], "no such key", allowed)
+    };
     let Some(dims) = dims else {
         if sample_type.is_some() || big_endian.is_some() || offset.is_some() {
-            return Err(missing("volume.dims", "the sizes of a raw file, to which type, endian and offset belong"));
+            return Err(missing("dims", "the sizes of a raw file, to which type, endian and offset belong"));
         }
         return Ok(None);
     };
     let Some(sample_type) = sample_type else {
         let names = SampleType::NAMED.map(|(name, _)| format!("{name:?}")).join(" or ");
-        return Err(missing("volume.type", &names));
+        return Err(missing("type", &names));
     };
     let is_one_byte = matches!(sample_type, SampleType::I8 | SampleType::U8);
     let Some(big_endian) = big_endian.or(is_one_byte.then_some(false)) else {
-        return Err(missing("volume.endian", "\"little\" or \"big\""));
+        return Err(missing("endian", "\"little\" or \"big\""));
     };
     Ok(Some(RawLayout { dims, sample_type, big_endian, offset: offset.unwrap_or(0) }))
 }
@@ -150,23 +247,19 @@ fn crop(entry: &Entry) -> Result<[DVec3; 2], SceneError> {
 }
 
 /// Reads `[transfer]`.
-pub(super) fn transfer(mut section: Section) -> Result<TransferSettings, SceneError> {
+fn transfer(mut section: Section) -> Result<TransferSettings, SceneError> {
     let mut transfer = TransferSettings::default();
     let TransferSettings { color, opacity, gradient_opacity, .. } = &mut transfer;
     ramps(&mut section, color, opacity, gradient_opacity)?;
     section.read("iso_ranges", &mut transfer.iso_ranges, |entry| iso_ranges(entry).map(Some))?;
     section.read("label", &mut transfer.labels, labels)?;
     section.read("colormap", &mut transfer.colormap, |entry| entry.choice(&Colormap::ALL).map(Some))?;
-    let origins = section.origins;
+    let (origins, key) = (section.origins, section.name.clone());
     section.finish()?;
-    transfer.check().map_err(|error| origins.refused(error))?;
+    transfer.check_as(&key).map_err(|error| origins.refused(error))?;
     if transfer.color.is_some() && transfer.colormap.is_some() {
-        return Err(origins.invalid(
-            "transfer",
-            &[],
-            "both color and colormap",
-            "one of transfer.color and transfer.colormap",
-        ));
+        let allowed = format!("one of {key}.color and {key}.colormap");
+        return Err(origins.invalid(&key, &[], "both color and colormap", allowed));
     }
     Ok(transfer)
 }

@@ -9,7 +9,7 @@ use toml::Value;
 use super::names::{
     BOXES, CLASSIFICATIONS, COMPOSITINGS, FITS, FORMS, GRADIENTS, INTERPOLATIONS, METHODS, ORDERS, RASTERIZERS, name_of,
 };
-use super::{ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
+use super::{Channel, ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use crate::appearance::{Colormap, Preset};
 use crate::settings::camera::{Camera, Projection};
 use crate::settings::clip::Clip;
@@ -30,52 +30,86 @@ impl Scene {
     /// # Errors
     /// If the path of the volume or of its labels is not UTF-8, or the offset in a raw file exceeds TOML's integers.
     pub fn to_toml(&self, folder: &Path) -> Result<String, SceneError> {
-        let Self { volume, spacing, labels, camera, image, clip, transfer, shading, splatting } = self;
+        let Self { camera, image, clip, transfer, shading, splatting, .. } = self;
         let mut text = Text::default();
         if let Some(preset) = transfer.preset {
             text.line("preset", name_of(&Preset::ALL, preset));
         }
-        text.table("volume");
-        match volume {
-            VolumeSource::File(path) => text.line("path", within(folder, path, "volume.path")?),
-            VolumeSource::Raw(path, layout) => {
-                let RawLayout { dims, sample_type, big_endian, offset } = *layout;
-                text.line("path", within(folder, path, "volume.path")?);
-                text.line("dims", dims.to_array().map(i64::from).map(Value::from).to_vec());
-                text.line("type", sample_type.to_string());
-                text.line("endian", if big_endian { "big" } else { "little" });
-                let allowed = format!("at most {}, the largest integer in TOML", i64::MAX);
-                let offset = i64::try_from(offset).map_err(|_| invalid("volume.offset", offset.to_string(), &allowed));
-                text.line("offset", offset?);
-            }
-            VolumeSource::Builtin(name) => text.line("builtin", name.as_str()),
-            VolumeSource::Memory => {}
+        // One channel without a name has no need of a table.
+        let is_one = self.further.is_empty() && self.name.is_none() && self.visible;
+        for (number, channel) in self.channels().enumerate() {
+            text.channel = (!is_one).then_some(number);
+            write_channel(&mut text, folder, &channel)?;
         }
-        text.given("spacing", spacing.map(vector));
-        let labels = labels.as_ref().map(|path| within(folder, path, "volume.labels"));
-        text.given("labels", labels.transpose()?);
+        text.channel = None;
         write_camera(&mut text, camera);
         write_image(&mut text, image);
         write_clip(&mut text, clip);
-        write_transfer(&mut text, transfer);
         write_shading(&mut text, shading);
         write_splatting(&mut text, splatting);
-        Ok(text.0)
+        Ok(text.text)
     }
 }
 
 /// Lines of TOML.
 #[derive(Default)]
-struct Text(String);
+struct Text {
+    text: String,
+    /// The channel that is being written, if it has a table.
+    channel: Option<usize>,
+}
+
+fn write_channel(text: &mut Text, folder: &Path, channel: &Channel) -> Result<(), SceneError> {
+    let Channel { name, visible, volume, spacing, labels, index, time, transfer } = channel;
+    if text.channel.is_some() {
+        let _ = writeln!(text.text, "\n[[channel]]");
+        text.given("name", name.as_deref());
+        if !visible {
+            text.line("visible", false);
+        }
+    }
+    let key = |name: &str| match text.channel {
+        Some(number) => format!("channel[{number}].volume.{name}"),
+        None => format!("volume.{name}"),
+    };
+    let (of_path, of_labels, of_offset) = (key("path"), key("labels"), key("offset"));
+    // A later channel without a volume is one of the first one's.
+    if *volume != VolumeSource::Memory || text.channel.is_none_or(|number| number == 0) {
+        text.table("volume");
+    }
+    match volume {
+        VolumeSource::File(path) => text.line("path", within(folder, path, &of_path)?),
+        VolumeSource::Raw(path, layout) => {
+            let RawLayout { dims, sample_type, big_endian, offset } = *layout;
+            text.line("path", within(folder, path, &of_path)?);
+            text.line("dims", dims.to_array().map(i64::from).map(Value::from).to_vec());
+            text.line("type", sample_type.to_string());
+            text.line("endian", if big_endian { "big" } else { "little" });
+            let allowed = format!("at most {}, the largest integer in TOML", i64::MAX);
+            let offset = i64::try_from(offset).map_err(|_| invalid(&of_offset, offset.to_string(), &allowed));
+            text.line("offset", offset?);
+        }
+        VolumeSource::Builtin(name) => text.line("builtin", name.as_str()),
+        VolumeSource::Memory => {}
+    }
+    text.given("spacing", spacing.map(vector));
+    let labels = labels.as_ref().map(|path| within(folder, path, &of_labels));
+    text.given("labels", labels.transpose()?);
+    text.given("index", index.map(i64::from));
+    text.given("time", time.map(i64::from));
+    write_transfer(text, transfer);
+    Ok(())
+}
 
 impl Text {
     fn table(&mut self, name: &str) {
-        let gap = if self.0.is_empty() { "" } else { "\n" };
-        let _ = writeln!(self.0, "{gap}[{name}]");
+        let gap = if self.text.is_empty() { "" } else { "\n" };
+        let parent = if self.channel.is_some() { "channel." } else { "" };
+        let _ = writeln!(self.text, "{gap}[{parent}{name}]");
     }
 
     fn line(&mut self, key: &str, value: impl Into<Value>) {
-        let _ = writeln!(self.0, "{key} = {}", value.into());
+        let _ = writeln!(self.text, "{key} = {}", value.into());
     }
 
     fn given(&mut self, key: &str, value: Option<impl Into<Value>>) {
@@ -95,11 +129,11 @@ impl Text {
         if points.len() <= ON_ONE_LINE {
             return self.line(key, points);
         }
-        let _ = writeln!(self.0, "{key} = [");
+        let _ = writeln!(self.text, "{key} = [");
         for point in points {
-            let _ = writeln!(self.0, "    {point},");
+            let _ = writeln!(self.text, "    {point},");
         }
-        let _ = writeln!(self.0, "]");
+        let _ = writeln!(self.text, "]");
     }
 
     fn ramps(
@@ -171,7 +205,8 @@ fn write_transfer(text: &mut Text, transfer: &TransferSettings) {
     let ranges = iso_ranges.as_ref().map(|ranges| ranges.iter().map(|&range| numbers(range)).collect::<Vec<_>>());
     text.given("iso_ranges", ranges);
     for (&label, tables) in labels {
-        let _ = writeln!(text.0, "\n[[transfer.label]]");
+        let parent = if text.channel.is_some() { "channel." } else { "" };
+        let _ = writeln!(text.text, "\n[[{parent}transfer.label]]");
         text.line("label", i64::from(label));
         text.line("visible", tables.visible);
         text.ramps(tables.color.as_ref(), tables.opacity.as_ref(), tables.gradient_opacity.as_ref());

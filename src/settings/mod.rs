@@ -10,6 +10,7 @@ pub(crate) mod clip;
 mod clip_from_world;
 pub(crate) mod economies;
 pub(crate) mod framing;
+pub mod navigation;
 pub(crate) mod shading;
 pub(crate) mod splatting;
 pub(crate) mod transfer_function;

@@ -101,6 +101,9 @@ pub struct TransferFunction {
     pub iso_ranges: Option<Vec<[f64; 2]>>,
     /// Tables for single labels of a segmented volume. Labels without tables use the ramps above. Other volumes ignore them.
     pub labels: BTreeMap<u16, LabelTables>,
+    /// The transfer functions of the volume's further channels ([`Volume::further`](crate::Volume::further)), in their order. These have no
+    /// further ones themselves. A further channel without one is not drawn.
+    pub further: Vec<TransferFunction>,
 }
 
 /// A label's own tables.
@@ -167,6 +170,14 @@ impl Tables<'_> {
         self.opacity.at(value) * factor
     }
 
+    /// The end of an iso-range that a value is, but for the rounding of a place between two values found by it; otherwise the value. An iso-range
+    /// may be a single value.
+    pub(crate) fn exact(&self, value: f64, [from, to]: [f64; 2]) -> f64 {
+        let rounding = 4.0 * f64::EPSILON * from.abs().max(to.abs());
+        let ends = self.iso_ranges.iter().flat_map(|ranges| ranges.iter().flatten().copied());
+        ends.into_iter().find(|end| (end - value).abs() <= rounding).unwrap_or(value)
+    }
+
     /// Whether a value lies in an iso-range.
     pub fn in_iso_range(&self, value: f64) -> bool {
         self.iso_ranges.is_none_or(|ranges| ranges.iter().any(|&[lo, hi]| lo <= value && value <= hi))
@@ -192,19 +203,19 @@ pub(crate) fn check_ramps(
 }
 
 /// Checks the tables of labels.
-pub(crate) fn check_labels(labels: &BTreeMap<u16, LabelTables>) -> Result<(), SettingError> {
-    labels.iter().try_for_each(|(label, tables)| tables.check(&format!("transfer.label[{label}]")))
+pub(crate) fn check_labels(table: &str, labels: &BTreeMap<u16, LabelTables>) -> Result<(), SettingError> {
+    labels.iter().try_for_each(|(label, tables)| tables.check(&format!("{table}.label[{label}]")))
 }
 
 /// Checks that the list of intervals, if stated, is not empty, and that intervals are finite and not reversed.
-pub(crate) fn check_iso_ranges(iso_ranges: Option<&[[f64; 2]]>) -> Result<(), SettingError> {
-    const KEY: &str = "transfer.iso_ranges";
+pub(crate) fn check_iso_ranges(table: &str, iso_ranges: Option<&[[f64; 2]]>) -> Result<(), SettingError> {
+    let list = format!("{table}.iso_ranges");
     let Some(ranges) = iso_ranges else { return Ok(()) };
     if ranges.is_empty() {
-        return Err(SettingError::new(KEY, "[]", "an array of one or more [lo, hi]"));
+        return Err(SettingError::new(list, "[]", "an array of one or more [lo, hi]"));
     }
     for (at, range) in ranges.iter().enumerate() {
-        let key = format!("{KEY}[{at}]");
+        let key = format!("{list}[{at}]");
         Interval::FINITE.check_each(&key, range)?;
         if range[0] > range[1] {
             return Err(SettingError::new(key, &range[..], "[lo, hi] with lo <= hi"));
@@ -220,14 +231,35 @@ impl TransferFunction {
     /// If a colour, opacity or factor is not in [0, 1] (in labels' tables, too), the list of iso-ranges is empty, or an iso-range is
     /// reversed or not finite.
     pub fn check(&self) -> Result<(), SettingError> {
-        check_ramps("transfer", Some(&self.color), Some(&self.opacity), self.gradient_opacity.as_ref())?;
-        check_iso_ranges(self.iso_ranges.as_deref())?;
-        check_labels(&self.labels)
+        let check = |table: &str, of: &Self| {
+            check_ramps(table, Some(&of.color), Some(&of.opacity), of.gradient_opacity.as_ref())?;
+            check_iso_ranges(table, of.iso_ranges.as_deref())?;
+            check_labels(table, &of.labels)
+        };
+        check("transfer", self)?;
+        (1..).zip(&self.further).try_for_each(|(number, of)| check(&format!("channel[{number}].transfer"), of))
     }
 
     /// A transfer function with only colour and opacity.
     pub(crate) fn by_value(color: Ramp<DVec3>, opacity: Ramp<f64>) -> Self {
-        Self { color, opacity, gradient_opacity: None, iso_ranges: None, labels: BTreeMap::new() }
+        let (labels, further) = (BTreeMap::new(), Vec::new());
+        Self { color, opacity, gradient_opacity: None, iso_ranges: None, labels, further }
+    }
+
+    /// A transfer function without any opacity.
+    pub(crate) fn transparent() -> Self {
+        Self::by_value(Ramp::through(vec![(0.0, DVec3::ZERO)]), Ramp::through(vec![(0.0, 0.0)]))
+    }
+
+    /// The transfer functions of all channels of a volume, the first one's first.
+    pub fn channels(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(&self.further)
+    }
+
+    /// The transfer function of one channel by itself.
+    pub(crate) fn of_channel(&self, number: usize) -> Self {
+        let own = number.checked_sub(1).map_or(self, |at| &self.further[at]);
+        Self { further: Vec::new(), ..own.clone() }
     }
 
     /// The tables that apply to voxels of a label; `None` means those of a volume that is not segmented.

@@ -3,6 +3,8 @@
 use std::ops::Range;
 
 use crate::error::setting::SettingError;
+#[cfg(any(feature = "cpu", feature = "gpu"))]
+use crate::settings::splatting::{Classification, Compositing};
 
 /// A rectangle of pixels of an image, at least one pixel wide and high.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -92,6 +94,15 @@ impl Window {
         // A range that is empty stays so, as does one that lies beyond an end.
         let slabs = if self.slabs.is_empty() || self.within(scene).is_empty() { 0..0 } else { start..end };
         Self { slabs, region: self.region }
+    }
+
+    /// The same window with the slab before its first, if the compositing finds surfaces between the middles of neighbouring slabs (SPEC §5).
+    #[cfg(any(feature = "cpu", feature = "gpu"))]
+    pub(crate) fn with_lead(&self, compositing: Compositing, classification: Classification) -> Self {
+        let is_between = compositing == Compositing::Surface && classification == Classification::Before;
+        // An open start has no slab before it.
+        let lead = i32::from(is_between && !self.slabs.is_empty() && self.slabs.start != Self::ALL_SLABS.start);
+        Self { slabs: self.slabs.start - lead..self.slabs.end, region: self.region }
     }
 
     /// Those of its slabs that a scene has.

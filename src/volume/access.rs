@@ -3,12 +3,15 @@
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::fmt::Display;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::VolumeError;
+use super::file::Files;
 use super::memory;
+use super::series::Selection;
 use super::source::{Source, invalid, io_error};
 
 /// Options for reading volumes, labels and scenes. By default files may lie anywhere.
@@ -26,12 +29,48 @@ pub struct ReadOptions {
     /// The maximum number of bytes for the values of a volume and its labels together. `None` means three quarters of the machine's
     /// memory, or of what the process's control group may use if that is less.
     pub memory: Option<u64>,
+    /// The number, from 0, of the only channel to read of a file with several; `None` reads all.
+    pub channel: Option<u32>,
+    /// The number, from 0, of the time to read of a file with several; `None` reads the first.
+    pub time: Option<u32>,
+    /// Files in memory, which are read instead of the disk's; `None` reads the disk.
+    pub files: Option<Files>,
 }
 
 impl ReadOptions {
     /// These options with files confined to this folder.
     pub fn confined_to(self, folder: impl Into<PathBuf>) -> Self {
         Self { confine: Some(folder.into()), ..self }
+    }
+
+    /// These options with one channel of a file with several, counted from 0.
+    pub fn with_channel(self, channel: u32) -> Self {
+        Self { channel: Some(channel), ..self }
+    }
+
+    /// These options with another time of a file with several, counted from 0.
+    pub fn with_time(self, time: u32) -> Self {
+        Self { time: Some(time), ..self }
+    }
+
+    /// These options with files in memory instead of the disk's, where a program has no disk, as in a browser, or does not trust paths. Whatever
+    /// names a file then names one of these: a scene, its volumes and labels, and headers with separate data.
+    ///
+    /// ```
+    /// use std::path::Path;
+    /// use sheetsplat::Volume;
+    /// use sheetsplat::volume::ReadOptions;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let header = "NRRD0001\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\ndata file: a.raw\n";
+    /// let files = [("a.nhdr", header.as_bytes()), ("a.raw", &[0, 1, 2, 3, 4, 5, 6, 7])];
+    /// let volume = Volume::open_with(Path::new("a.nhdr"), &ReadOptions::default().with_files(files.into_iter().collect()))?;
+    /// assert_eq!(volume.values()[5], 5.0);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn with_files(self, files: Files) -> Self {
+        Self { files: Some(files), ..self }
     }
 
     /// These options with another memory limit in bytes.
@@ -42,9 +81,10 @@ impl ReadOptions {
 
 /// [`ReadOptions`] while a volume and its labels are read. Clones share the memory limit.
 #[derive(Clone)]
-pub(crate) struct Access(Arc<Inner>);
+pub(crate) struct Access(Arc<Inner>, Selection);
 
 struct Inner {
+    given: Option<Files>,
     folder: Option<Folder>,
     limit: u64,
     reserved: AtomicU64,
@@ -64,9 +104,27 @@ impl Access {
             let canonical = named.canonicalize().map_err(io_error(named))?;
             Ok(Folder { named: named.clone(), canonical })
         };
-        let folder = options.confine.as_ref().map(folder).transpose()?;
+        let given = options.files.clone();
+        let folder = options.confine.as_ref().filter(|_| given.is_none()).map(folder).transpose()?;
         let limit = options.memory.unwrap_or_else(memory::default_limit);
-        Ok(Self(Arc::new(Inner { folder, limit, reserved: AtomicU64::new(0), files: Mutex::default() })))
+        let inner = Inner { given, folder, limit, reserved: AtomicU64::new(0), files: Mutex::default() };
+        Ok(Self(Arc::new(inner), Selection { channel: options.channel, time: options.time }))
+    }
+
+    /// What is read of files with several volumes.
+    pub(crate) fn selection(&self) -> Selection {
+        self.1
+    }
+
+    /// The same access to files of one volume.
+    pub(crate) fn whole(&self) -> Self {
+        Self(Arc::clone(&self.0), Selection::default())
+    }
+
+    /// The same access to other volumes of a file. What the options select goes before it.
+    pub(crate) fn selecting(&self, other: Selection) -> Self {
+        let Selection { channel, time } = self.1;
+        Self(Arc::clone(&self.0), Selection { channel: channel.or(other.channel), time: time.or(other.time) })
     }
 
     /// The path to open for a file or folder. If reading is confined, it has no links in it.
@@ -91,6 +149,36 @@ impl Access {
         resolved.map(Cow::Owned).map_err(io_error(path))
     }
 
+    /// The files in memory that are read instead of the disk's.
+    pub(super) fn given(&self) -> Option<&Files> {
+        self.0.given.as_ref()
+    }
+
+    /// Whether a path is that of a folder.
+    ///
+    /// # Errors
+    /// As for [`Self::resolve`].
+    pub(super) fn is_folder(&self, path: &Path) -> Result<bool, VolumeError> {
+        match self.given() {
+            Some(files) => Ok(files.in_folder(path).next().is_some()),
+            None => Ok(self.resolve(path)?.is_dir()),
+        }
+    }
+
+    /// A file's text.
+    ///
+    /// # Errors
+    /// If reading is confined and the path leads out of the folder; within, if the file cannot be read or is not UTF-8.
+    pub(crate) fn text(&self, path: &Path) -> Result<io::Result<String>, VolumeError> {
+        let utf8 = |bytes: &Arc<[u8]>| {
+            String::from_utf8(bytes.to_vec()).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))
+        };
+        match self.given() {
+            Some(files) => Ok(files.get(path).and_then(utf8)),
+            None => Ok(std::fs::read_to_string(self.resolve(path)?)),
+        }
+    }
+
     pub(super) fn open(&self, path: &Path) -> Result<Source, VolumeError> {
         let source = self.open_to_look(path)?;
         self.0.files.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_owned());
@@ -99,7 +187,10 @@ impl Access {
 
     /// Opens a file only to determine its format.
     pub(super) fn open_to_look(&self, path: &Path) -> Result<Source, VolumeError> {
-        Source::open(path, &self.resolve(path)?, self)
+        match self.given() {
+            Some(files) => Ok(Source::in_memory(path, files.get(path).map_err(io_error(path))?, self)),
+            None => Source::open(path, &self.resolve(path)?, self),
+        }
     }
 
     /// The files opened so far, without those of which only the format was determined.

@@ -46,6 +46,14 @@ impl DataFiles {
         Some(Self { names, ..Self::listed(header, Vec::new(), axes) })
     }
 
+    /// The number of files.
+    pub(super) fn count(&self) -> u64 {
+        match &self.names {
+            Names::Listed(names) => names.len() as u64,
+            &Names::Numbered { count, .. } => count,
+        }
+    }
+
     /// The samples of all files, each read by `read`. `field` is the header's field that names the files.
     pub(super) fn read<T: Clone>(
         &self,
@@ -55,10 +63,7 @@ impl DataFiles {
         access: &Access,
         read: impl Fn(Source, &Samples) -> Result<Vec<T>, VolumeError>,
     ) -> Result<Vec<T>, VolumeError> {
-        let count = match &self.names {
-            Names::Listed(names) => names.len() as u64,
-            &Names::Numbered { count, .. } => count,
-        };
+        let count = self.count();
         let part = self
             .part(samples.dims, count)
             .map_err(|allowed| invalid(header, field, format!("{count} files"), allowed))?;

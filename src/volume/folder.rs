@@ -17,6 +17,11 @@ pub(super) fn head(path: &Path, access: &Access) -> Result<Vec<u8>, VolumeError>
 
 /// The files in a folder, without those of its subfolders, in natural order.
 pub(super) fn files(folder: &Path, access: &Access) -> Result<Vec<PathBuf>, VolumeError> {
+    if let Some(given) = access.given() {
+        let mut files: Vec<PathBuf> = given.in_folder(folder).cloned().collect();
+        sort(&mut files);
+        return Ok(files);
+    }
     let mut files = Vec::new();
     for entry in fs::read_dir(access.resolve(folder)?).map_err(io_error(folder))? {
         let path = folder.join(entry.map_err(io_error(folder))?.file_name());
@@ -24,8 +29,13 @@ pub(super) fn files(folder: &Path, access: &Access) -> Result<Vec<PathBuf>, Volu
             files.push(path);
         }
     }
-    files.sort_by_cached_key(|path| natural(&path.file_name().unwrap_or_default().to_string_lossy()));
+    sort(&mut files);
     Ok(files)
+}
+
+/// Sorts files of one folder in natural order.
+fn sort(files: &mut [PathBuf]) {
+    files.sort_by_cached_key(|path| natural(&path.file_name().unwrap_or_default().to_string_lossy()));
 }
 
 /// A part of a name.

@@ -126,7 +126,7 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static str, Loaded<T>), VolumeError> {
     let formats = formats();
     let (file, _) = archive_and_array(path);
-    if access.resolve(file)?.is_dir() {
+    if access.is_folder(file)? {
         return read_folder(path, access, &formats);
     }
     let head = folder::head(file, access)?;

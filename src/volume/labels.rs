@@ -48,7 +48,9 @@ impl Labels {
     }
 
     pub(crate) fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
-        let (_, Loaded { dims, spacing, label_names: names, values, .. }) = format::read(path, access)?;
+        let (_, loaded) = format::read(path, access)?;
+        loaded.check_single(path, "one: a label for every voxel")?;
+        let Loaded { dims, spacing, label_names: names, values, .. } = loaded;
         Ok(Self { origin: path.display().to_string(), dims, spacing, values: values.into(), names })
     }
 }

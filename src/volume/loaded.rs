@@ -1,11 +1,15 @@
 //! The result of every reader.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use glam::{DVec3, UVec3};
 
-use super::Orientation;
+use super::display::ChannelDisplay;
 use super::samples::SampleType;
+use super::series::Series;
+use super::source::invalid;
+use super::{Orientation, VolumeError};
 
 /// The contents of a file of values or labels.
 pub(crate) struct Loaded<T> {
@@ -22,14 +26,33 @@ pub(crate) struct Loaded<T> {
     pub(super) palette: Option<Vec<(f64, DVec3)>>,
     /// The values' names, if they are labels.
     pub(super) label_names: BTreeMap<u16, String>,
-    /// One value per voxel, x fastest.
+    /// The volumes in the file.
+    pub(super) series: Series,
+    /// The names of the file's channels, from the first on; there may be fewer than channels.
+    pub(super) channel_names: Vec<String>,
+    /// How the channels are shown, from the first on; there may be fewer than channels.
+    pub(super) displays: Vec<ChannelDisplay>,
+    /// One value per voxel, x fastest, channel by channel.
     pub(crate) values: Vec<T>,
 }
 
 impl<T> Loaded<T> {
     /// Values about which the file states nothing else.
     pub(super) fn new(dims: UVec3, kind: SampleType, values: Vec<T>) -> Self {
-        let label_names = BTreeMap::new();
-        Self { dims, kind, spacing: None, unit: None, orientation: None, palette: None, label_names, values }
+        let (label_names, series, channel_names) = (BTreeMap::new(), Series::default(), Vec::new());
+        let (spacing, unit, orientation, palette) = (None, None, None, None);
+        let displays = Vec::new();
+        Self { dims, kind, spacing, unit, orientation, palette, label_names, series, channel_names, displays, values }
+    }
+
+    /// Checks that the values are those of one channel.
+    ///
+    /// # Errors
+    /// If they are not; `allowed` says why they must be.
+    pub(super) fn check_single(&self, path: &Path, allowed: &str) -> Result<(), VolumeError> {
+        match self.values.len() / self.dims.element_product() as usize {
+            1 => Ok(()),
+            count => Err(invalid(path, "channels", count, allowed)),
+        }
     }
 }

@@ -5,15 +5,15 @@ use std::path::Path;
 
 use sysinfo::System;
 
-/// Three quarters of the machine's memory or of what the process's control groups may use, whichever is less; no limit if neither is
-/// known.
+/// Three quarters of the machine's memory, of what the process's control groups may use, or of all addresses, whichever is least. In a browser only the
+/// last is known.
 pub(super) fn default_limit() -> u64 {
     let mut system = System::new();
     system.refresh_memory();
     let machine = Some(system.total_memory()).filter(|&bytes| bytes > 0);
     let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
     let group = group_limit(&groups, Path::new("/sys/fs/cgroup"));
-    machine.into_iter().chain(group).min().map_or(u64::MAX, |bytes| bytes / 4 * 3)
+    machine.into_iter().chain(group).fold(usize::MAX as u64, u64::min) / 4 * 3
 }
 
 /// The smallest limit of some control groups and their ancestors. `groups` is the text of Linux's `/proc/self/cgroup`, lines of

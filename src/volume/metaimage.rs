@@ -14,6 +14,7 @@ use super::fields::Fields;
 use super::loaded::Loaded;
 use super::orientation::{Orientation, RAS_FROM_LPS, unit_directions};
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
+use super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::source::{MAX_HEADER, Source, number, shown, three};
 use super::unit::unit;
 
@@ -21,24 +22,30 @@ use super::unit::unit;
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let mut file = access.open(path)?;
     let header = Header::read(&mut file)?;
-    header.check_kind()?;
+    let channels = header.channels()?;
+    let series = Series { channels, times: 1, order: SeriesOrder::Interleaved, is_color: false };
     let (spacing, orientation) = (header.spacing()?, header.orientation()?);
     let samples = header.samples()?;
     let (is_compressed, header_size) = (header.flag("CompressedData")?.unwrap_or(false), header.header_size()?);
     let read = |data: Source, samples: &Samples| {
         let mut stream = if is_compressed { Stream::zlib(data)? } else { Stream::raw(data)? };
-        let before_the_end = stream.exactly_left().unwrap_or(0).saturating_sub(samples.bytes());
+        let bytes = samples.bytes().saturating_mul(series.count());
+        let before_the_end = stream.exactly_left().unwrap_or(0).saturating_sub(bytes);
         stream.skip(header_size.unwrap_or(before_the_end))?;
-        stream.samples(samples, false)
+        stream.series(samples, &series, false)
     };
     let values = match header.data_files(&samples)? {
+        Some(files) if channels > 1 && files.count() > 1 => {
+            let found = format!("{channels} in {} files", files.count());
+            return Err(header.0.invalid("ElementNumberOfChannels", found, "several channels in one file"));
+        }
         Some(files) => files.read(path, "ElementDataFile", &samples, access, read)?,
         None => read(file, &samples)?,
     };
     let Samples { dims, kind, .. } = samples;
     let unit = header.0.get("DistanceUnits").and_then(unit);
     let loaded = Loaded::new(dims, kind, values);
-    Ok(Loaded { spacing, unit, orientation, ..loaded })
+    Ok(Loaded { spacing, unit, orientation, series, ..loaded })
 }
 
 /// The fields of a header, and the names of files in a list at its end.
@@ -63,16 +70,18 @@ impl Header {
         Err(fields.invalid("header", "the end of the file", "a last field ElementDataFile"))
     }
 
-    /// Refuses anything but a volume of one number per voxel.
-    fn check_kind(&self) -> Result<(), VolumeError> {
+    /// The number of numbers for each voxel. Refuses anything but a volume.
+    fn channels(&self) -> Result<u32, VolumeError> {
         let is = |name: &str, expected: &str, default: &str| {
             let matches = |text: Option<&str>| (text.unwrap_or(default).eq_ignore_ascii_case(expected)).then_some(());
             self.0.value(name, expected, matches)
         };
         is("ObjectType", "Image", "Image")?;
         is("NDims", "3", "")?;
-        is("ElementNumberOfChannels", "1", "1")?;
-        is("BinaryData", "True", "True")
+        is("BinaryData", "True", "True")?;
+        self.0.value("ElementNumberOfChannels", &format!("1 to {MAX_CHANNELS}"), |text| {
+            text.unwrap_or("1").parse().ok().filter(|channels| (1..=MAX_CHANNELS).contains(channels))
+        })
     }
 
     /// A field that is `True` or `False`.

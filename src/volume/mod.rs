@@ -2,11 +2,15 @@
 
 mod access;
 pub mod builtin;
+mod channels;
 mod coefficients;
+mod colors;
 mod data_files;
 #[cfg(feature = "dicom")]
 mod dicom;
+mod display;
 mod fields;
+mod file;
 mod folder;
 mod format;
 mod grid;
@@ -27,7 +31,9 @@ mod nrrd;
 mod numbers;
 mod orientation;
 mod raw;
+mod resample;
 mod samples;
+mod series;
 mod shear;
 mod source;
 #[cfg(feature = "tiff")]
@@ -48,6 +54,9 @@ use rayon::prelude::*;
 pub(crate) use access::Access;
 pub use access::ReadOptions;
 use coefficients::KeptCoefficients;
+pub use colors::Texel;
+pub use display::ChannelDisplay;
+pub use file::Files;
 pub use grid::Grid;
 pub(crate) use grid::{SPACING, check_spacing};
 pub use labels::Labels;
@@ -56,6 +65,7 @@ pub use orientation::{Orientation, PatientSide};
 pub use raw::RawLayout;
 pub use samples::SampleType;
 pub(crate) use samples::{SIZES, dims_of};
+pub(crate) use series::Selection;
 
 use crate::error::setting::SettingError;
 
@@ -94,6 +104,10 @@ pub struct Encoding {
     pub format: &'static str,
     /// The type of its samples, before slope and intercept are applied.
     pub sample_type: SampleType,
+    /// The number of channels in the file, of which the volume may be one.
+    pub channels: u32,
+    /// The number of times in the file, of which the volume is one.
+    pub times: u32,
 }
 
 /// The error for an invalid grid.
@@ -108,19 +122,24 @@ fn invalid(origin: &str, field: &str, found: String, allowed: String) -> VolumeE
 /// A scalar volume on a rectilinear grid (SPEC §2): `dims` voxels, x fastest in memory, `spacing` world units apart.
 ///
 /// World axes are the volume's axes and the origin is the volume's centre. Values are finite `f32`, except in holes (SPEC §3), where
-/// they are NaN. A segmented volume also has a label per voxel. Clones share values and labels.
+/// they are NaN. A segmented volume also has a label per voxel, and a volume of colours a colour ([`Self::from_colors`]). A volume may have further
+/// channels on the same grid ([`Self::further`]).
 #[derive(Clone, Debug)]
 pub struct Volume {
     grid: Grid,
     values: Vec<f32>,
     /// The number of NaN values.
     holes: u64,
+    colors: Option<Arc<[Texel]>>,
     labels: Option<Arc<[u16]>>,
     label_names: BTreeMap<u16, String>,
     orientation: Option<Orientation>,
     unit: Option<String>,
     encoding: Option<Encoding>,
     palette: Option<Vec<(f64, DVec3)>>,
+    channel_name: Option<String>,
+    display: Option<ChannelDisplay>,
+    further: Vec<Arc<Volume>>,
     /// Not part of the volume itself; clones share them, since their values are the same.
     coefficients: KeptCoefficients,
 }
@@ -128,11 +147,13 @@ pub struct Volume {
 impl PartialEq for Volume {
     /// Two holes compare as equal.
     fn eq(&self, other: &Self) -> bool {
-        let Self { grid, values, holes, labels, label_names, orientation, unit, encoding, palette, coefficients: _ } =
-            other;
+        let Self { grid, values, holes, labels, label_names, orientation, unit, encoding, palette, .. } = other;
+        let Self { colors, channel_name, display, further, coefficients: _, .. } = other;
         let facts = (grid, holes, labels, label_names, orientation, unit, encoding, palette);
+        let channels = (colors, channel_name, display, further);
         let Self { grid, holes, labels, label_names, orientation, unit, encoding, palette, .. } = self;
         facts == (grid, holes, labels, label_names, orientation, unit, encoding, palette)
+            && channels == (&self.colors, &self.channel_name, &self.display, &self.further)
             && self.values.iter().zip(values).all(|(a, b)| a == b || a.is_nan() && b.is_nan())
     }
 }
@@ -160,12 +181,16 @@ impl Volume {
             grid,
             values,
             holes,
+            colors: None,
             labels: None,
             label_names,
             orientation: None,
             unit: None,
             encoding: None,
             palette: None,
+            channel_name: None,
+            display: None,
+            further: Vec::new(),
             coefficients: KeptCoefficients::default(),
         })
     }
@@ -177,6 +202,9 @@ impl Volume {
     pub fn with_spacing(mut self, origin: &str, spacing: DVec3) -> Result<Self, VolumeError> {
         check_spacing("spacing", spacing).map_err(|error| refused(origin, error))?;
         self.grid.spacing = spacing;
+        for channel in &mut self.further {
+            Arc::make_mut(channel).grid.spacing = spacing;
+        }
         Ok(self)
     }
 
@@ -203,11 +231,35 @@ impl Volume {
 
     pub(crate) fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
         let (format, loaded) = format::read(path, access)?;
-        let Loaded { dims, kind: sample_type, spacing, unit, orientation, palette, label_names, values } = loaded;
+        let Loaded { dims, kind: sample_type, spacing, unit, orientation, palette, label_names, .. } = loaded;
+        let Loaded { series, channel_names, displays, mut values, .. } = loaded;
         let origin = path.display().to_string();
-        let volume = Self::new(&origin, dims, spacing.unwrap_or(DVec3::ONE), values)?;
-        let encoding = Some(Encoding { format, sample_type });
-        Self { unit, encoding, palette, label_names, ..volume }.with_orientation(&origin, orientation)
+        let channels = if series.is_color { 1 } else { series.channels };
+        let encoding = Some(Encoding { format, sample_type, channels, times: series.times });
+        let spacing = spacing.unwrap_or(DVec3::ONE);
+        if series.is_color {
+            let volume = Self::from_components(&origin, dims, spacing, (&values, sample_type))?;
+            return Self { unit, encoding, label_names, ..volume }.with_orientation(&origin, orientation);
+        }
+        // All channels' values, one after the other.
+        let voxels = dims.element_product() as usize;
+        let first_channel = access.selection().channel.unwrap_or(0) as usize;
+        let mut names = channel_names.into_iter().skip(first_channel);
+        let mut displays = displays.into_iter().skip(first_channel);
+        let mut further = Vec::new();
+        while values.len() > voxels {
+            further.push(values.split_off(values.len() - voxels));
+        }
+        values.shrink_to_fit();
+        let mut channel = |values: Vec<f32>| {
+            let volume = Self::new(&origin, dims, spacing, values)?;
+            let display = displays.next().filter(|display| *display != ChannelDisplay::default());
+            Ok(Self { unit: unit.clone(), encoding, channel_name: names.next(), display, ..volume })
+        };
+        let first = channel(values)?;
+        let further = further.into_iter().rev().map(channel).collect::<Result<_, VolumeError>>()?;
+        let first = Self { palette, label_names, ..first }.with_channels(&origin, further)?;
+        first.with_orientation(&origin, orientation)
     }
 
     /// The grid of the voxels.

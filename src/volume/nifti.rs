@@ -15,6 +15,7 @@ use super::access::Access;
 use super::loaded::Loaded;
 use super::orientation::Orientation;
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
+use super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::shear::{self, Lattice};
 use super::source::{invalid, io_error};
 
@@ -32,6 +33,9 @@ const TYPES: [(i64, SampleType); 10] = [
     (1280, SampleType::U64),
 ];
 
+/// Codes of colours, with the number of bytes of each: red, green and blue, and A.
+const COLOR_TYPES: [(i64, u32); 2] = [(128, 3), (2304, 4)];
+
 /// Codes of complex data types, and the type of their parts.
 const COMPLEX_TYPES: [(i64, SampleType); 2] = [(32, SampleType::F32), (1792, SampleType::F64)];
 
@@ -43,9 +47,9 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let header_path = sibling(path, ".img", ".hdr").unwrap_or_else(|| path.to_owned());
     let mut stream = open(&header_path, access)?;
     let header = Header::read(&header_path, &mut stream)?;
-    let (dims, vox_offset) = (header.dims()?, header.vox_offset()?);
+    let ((dims, series), vox_offset) = (header.dims_and_series()?, header.vox_offset()?);
     let (kind, is_complex) = header.sample_type()?;
-    let rescale = header.rescale()?;
+    let rescale = if series.is_color { None } else { header.rescale()? };
     let (lattice, orientation) = header.lattice_and_orientation()?;
     if header.is_pair {
         let Some(data) = sibling(&header_path, ".hdr", ".img") else {
@@ -59,14 +63,16 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     }
     stream.skip(vox_offset)?;
     let samples = Samples { kind, dims, big_endian: header.big_endian, rescale, z_fastest: false };
-    let values = if is_complex {
+    let values = if is_complex && series.count() > 1 {
+        return Err(header.invalid("dim", format!("{:?}", header.dim), "one volume of complex samples"));
+    } else if is_complex {
         log::warn!("{}: the samples are complex: the values are their magnitudes", path.display());
         magnitudes(&header, &samples, stream, access)?
     } else {
-        stream.samples(&samples, false)?
+        stream.series(&samples, &series, false)?
     };
     let (spacing, unit) = (Some(lattice.spacing), header.unit());
-    let loaded = Loaded { spacing, unit, orientation, ..Loaded::new(dims, kind, values) };
+    let loaded = Loaded { spacing, unit, orientation, series, ..Loaded::new(dims, kind, values) };
     lattice.straighten(path, SFORM, loaded, access)
 }
 
@@ -236,26 +242,48 @@ impl Header {
         invalid(&self.path, field, found, allowed)
     }
 
-    fn dims(&self) -> Result<UVec3, VolumeError> {
+    /// The fourth axis is time, and the fifth one has the components of vectors.
+    fn dims_and_series(&self) -> Result<(UVec3, Series), VolumeError> {
         let [rank, x, y, z, rest @ ..] = self.dim;
         let more = rank.checked_sub(3).and_then(|more| usize::try_from(more).ok()).and_then(|more| rest.get(..more));
-        let is_one_volume = more.is_some_and(|sizes| sizes.iter().all(|&size| size == 1));
-        dims_of([x, y, z]).filter(|_| is_one_volume).ok_or_else(|| {
-            self.invalid("dim", format!("{:?}", self.dim), format!("3 to 7, then {SIZES}, and any further sizes 1"))
+        let size =
+            |at: usize| more.map(|sizes| sizes.get(at).copied().unwrap_or(1)).and_then(|n| u32::try_from(n).ok());
+        let has_no_more = more.is_some_and(|sizes| sizes.iter().skip(2).all(|&size| size == 1));
+        let series = size(0).zip(size(1)).map(|(times, channels)| {
+            let order = SeriesOrder::TimesFirst;
+            Series { channels, times, order, is_color: false }
+        });
+        let series = series.filter(|of| has_no_more && of.count() > 0 && of.channels <= MAX_CHANNELS);
+        let series = match self.components() {
+            None => series,
+            Some(components) => series.filter(|of| of.channels == 1).map(|of| Series::of_colors(components, of.times)),
+        };
+        dims_of([x, y, z]).zip(series).ok_or_else(|| {
+            let allowed = format!(
+                "3 to 7, then {SIZES}, a number of times, at most {MAX_CHANNELS} components, and any further sizes 1"
+            );
+            self.invalid("dim", format!("{:?}", self.dim), allowed)
         })
     }
 
     /// The type of the samples or of their parts, and whether they are complex.
+    /// The number of bytes of a colour, if samples are colours.
+    fn components(&self) -> Option<u32> {
+        COLOR_TYPES.iter().find(|(code, _)| *code == self.datatype).map(|&(_, components)| components)
+    }
+
     fn sample_type(&self) -> Result<(SampleType, bool), VolumeError> {
         let of =
             |types: &[(i64, SampleType)]| types.iter().find(|(code, _)| *code == self.datatype).map(|&(_, kind)| kind);
-        let complex = of(&COMPLEX_TYPES);
-        let Some(kind) = complex.or_else(|| of(&TYPES)) else {
+        let (complex, components) = (of(&COMPLEX_TYPES), self.components());
+        let Some(kind) = complex.or_else(|| of(&TYPES)).or(components.map(|_| SampleType::U8)) else {
             let real = TYPES.map(|(code, kind)| format!("{code} ({kind})")).join(", ");
             let complex = COMPLEX_TYPES.map(|(code, kind)| format!("{code} (complex of {kind})")).join(", ");
-            return Err(self.invalid("datatype", self.datatype, format!("{real}, {complex}")));
+            let allowed = format!("{real}, {complex}, 128 (RGB24), 2304 (RGBA32)");
+            return Err(self.invalid("datatype", self.datatype, allowed));
         };
-        let bits = 8 * kind.bytes() as i64 * if complex.is_some() { 2 } else { 1 };
+        let numbers = if complex.is_some() { 2 } else { components.unwrap_or(1).into() };
+        let bits = 8 * kind.bytes() as i64 * numbers;
         if self.bitpix != bits {
             return Err(self.invalid("bitpix", self.bitpix, format!("{bits}, as datatype {} has", self.datatype)));
         }

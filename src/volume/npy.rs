@@ -1,7 +1,9 @@
 //! NumPy's NPY files: a header of three fields, then the samples.
 //!
-//! An array's axes are z, y and x, whichever is fastest in memory. The header is read here, not by `npyz`, which allocates whatever
-//! length a header states, multiplies sizes unchecked, and recurses into nested brackets.
+//! An array's axes are z, y and x, whichever is fastest in memory, after times and channels if there are any, or before red, green, blue and perhaps A:
+//! a last axis of 3 or 4 after three others is that of colours. The header is read here, not by a
+//! crate for NPY: `npyz` allocates whatever length a header states, multiplies sizes unchecked, recurses into nested brackets, and takes a sixth
+//! of the time that a test crate's dependencies take to build.
 
 use std::path::Path;
 
@@ -11,7 +13,8 @@ use super::VolumeError;
 use super::access::Access;
 use super::loaded::Loaded;
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
-use super::source::{MAX_HEADER, invalid, shown, three};
+use super::series::{MAX_CHANNELS, Series, SeriesOrder};
+use super::source::{MAX_HEADER, invalid, shown};
 
 const TYPES: [(&str, SampleType); 10] = [
     ("i1", SampleType::I8),
@@ -33,10 +36,10 @@ pub(crate) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
 
 /// Reads an array from the beginning of its header.
 pub(super) fn read_array<T: Voxel>(path: &Path, mut stream: Stream) -> Result<Loaded<T>, VolumeError> {
-    let samples = parse(path, &header(path, &mut stream)?)?;
+    let (samples, series) = parse(path, &header(path, &mut stream)?)?;
     let Samples { dims, kind, .. } = samples;
-    let values = stream.samples(&samples, false)?;
-    Ok(Loaded::new(dims, kind, values))
+    let values = stream.series(&samples, &series, false)?;
+    Ok(Loaded { series, ..Loaded::new(dims, kind, values) })
 }
 
 /// The text between the header's length and the samples.
@@ -58,7 +61,7 @@ fn header(path: &Path, stream: &mut Stream) -> Result<String, VolumeError> {
 }
 
 /// Parses `{'descr': '<f4', 'fortran_order': False, 'shape': (3, 4, 5), }`, whose fields come in any order.
-fn parse(path: &Path, header: &str) -> Result<Samples, VolumeError> {
+fn parse(path: &Path, header: &str) -> Result<(Samples, Series), VolumeError> {
     let field = |name: &str, allowed: &str| {
         let dict = header.trim().strip_prefix('{').and_then(|dict| dict.strip_suffix('}'));
         let after = dict.and_then(|dict| dict.split_once(&format!("'{name}'")));
@@ -88,14 +91,43 @@ fn parse(path: &Path, header: &str) -> Result<Samples, VolumeError> {
         _ => return Err(invalid(path, "fortran_order", shown(order), "True or False")),
     };
 
-    let allowed = format!("three dimensions z, y, x: {SIZES}");
+    let allowed = format!(
+        "three dimensions z, y, x: {SIZES}; in C order also z, y, x and 3 or 4 of a colour, or c, z, y, x, or t, c, z, y, x, with at most {MAX_CHANNELS} channels"
+    );
     let shape = field("shape", &allowed)?;
-    let dims = || -> Option<UVec3> {
+    let dims = || -> Option<(UVec3, Series)> {
         let (sizes, _) = shape.strip_prefix('(')?.split_once(')')?;
         let sizes = sizes.trim_end().strip_suffix(',').unwrap_or(sizes);
-        let [z, y, x] = three(sizes.split(',').map(|size| size.trim().parse::<u32>().ok()))?;
-        dims_of([x, y, z])
+        let sizes: Option<Vec<u32>> = sizes.split(',').map(|size| size.trim().parse().ok()).collect();
+        let (sizes, order) = (sizes?, SeriesOrder::ChannelsFirst);
+        let ([z, y, x], series) = match *sizes.as_slice() {
+            [z, y, x] => ([z, y, x], Series::default()),
+            [z, y, x, components @ 3..=4] if !z_fastest => ([z, y, x], Series::of_colors(components, 1)),
+            [channels, z, y, x] if !z_fastest => ([z, y, x], Series { channels, times: 1, order, is_color: false }),
+            [times, channels, z, y, x] if !z_fastest => ([z, y, x], Series { channels, times, order, is_color: false }),
+            _ => return None,
+        };
+        let is_some = series.count() > 0 && series.channels <= MAX_CHANNELS;
+        Some((dims_of([x, y, z])?, series)).filter(|_| is_some)
     };
-    let dims = dims().ok_or_else(|| invalid(path, "shape", shown(shape), &allowed))?;
-    Ok(Samples { kind, dims, big_endian, rescale: None, z_fastest })
+    let (dims, series) = dims().ok_or_else(|| invalid(path, "shape", shown(shape), &allowed))?;
+    Ok((Samples { kind, dims, big_endian, rescale: None, z_fastest }, series))
+}
+/// The bytes of a file that holds an array of `f32` in C order.
+#[cfg(feature = "codecs")]
+pub(crate) fn encode(shape: &[u64], numbers: impl Iterator<Item = f32>) -> Vec<u8> {
+    /// Numbers begin at a multiple of this.
+    const ALIGNMENT: usize = 64;
+    let sides: String = shape.iter().map(|side| format!("{side}, ")).collect();
+    let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({sides}), }}");
+    // Before it are the magic string, the version, and its length; a line feed ends it.
+    let before = 10;
+    let padded = (before + header.len() + 1).next_multiple_of(ALIGNMENT) - before;
+    header.extend(std::iter::repeat_n(' ', padded - 1 - header.len()));
+    header.push('\n');
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((padded as u16).to_le_bytes());
+    bytes.extend(header.as_bytes());
+    bytes.extend(numbers.flat_map(f32::to_le_bytes));
+    bytes
 }

@@ -16,6 +16,7 @@ use super::loaded::Loaded;
 use super::numbers::TextEnd;
 use super::orientation::{Orientation, RAS_FROM_LPS};
 use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
+use super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::shear::{self, Lattice};
 use super::source::{MAX_HEADER, Source, invalid, io_error, lower, number, shown, three, vector};
 use super::unit;
@@ -27,10 +28,14 @@ const DIRECTIONS: &str = "space directions";
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let mut file = access.open(path)?;
     let header = Header::read(&mut file)?;
-    let dims = header.dims()?;
-    let (lattice, orientation) = header.lattice_and_orientation()?;
-    let layout = header.layout(dims)?;
+    let axes = header.axes()?;
+    let dims = header.dims(&axes)?;
+    let (lattice, orientation) = header.lattice_and_orientation(&axes)?;
+    let layout = header.layout(dims, axes.series)?;
     let values = match header.data_files()? {
+        Some(files) if axes.series.count() > 1 && files.count() > 1 => {
+            return Err(header.0.invalid("data file", format!("{} files", files.count()), "one file of four axes"));
+        }
         Some(files) => {
             files.read(path, "data file", &layout.samples, access, |file, samples| layout.read(file, samples))?
         }
@@ -39,10 +44,25 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let unit = header.unit();
     let loaded = Loaded::new(dims, layout.samples.kind, values);
     let spacing = lattice.map(|lattice| lattice.spacing);
-    let loaded = Loaded { spacing, unit, orientation, label_names: header.label_names(), ..loaded };
+    let series = axes.series;
+    let loaded = Loaded { spacing, unit, orientation, label_names: header.label_names(), series, ..loaded };
     match lattice {
         Some(lattice) => lattice.straighten(path, DIRECTIONS, loaded, access),
         None => Ok(loaded),
+    }
+}
+
+/// The meaning of a file's axes.
+struct Axes {
+    /// The one of four axes that is not in space.
+    other: Option<usize>,
+    series: Series,
+}
+
+impl Axes {
+    /// The words about axes in space.
+    fn in_space<'a>(&self, words: impl Iterator<Item = &'a str>) -> impl Iterator<Item = &'a str> {
+        words.enumerate().filter(|(axis, _)| Some(*axis) != self.other).map(|(_, word)| word)
     }
 }
 
@@ -104,22 +124,67 @@ impl Header {
         self.0.add(name, value)
     }
 
-    fn dims(&self) -> Result<UVec3, VolumeError> {
-        self.0.value("dimension", "3", |text| text?.parse::<u32>().ok().filter(|&dimension| dimension == 3))?;
+    /// The axes in space, and the fourth one: the channels of a voxel if it is the first axis, times if it is the last, unless its kind says that
+    /// these are channels.
+    fn axes(&self) -> Result<Axes, VolumeError> {
+        let dimension = self.0.value("dimension", "3 or 4", |text| {
+            text?.parse::<u32>().ok().filter(|dimension| [3, 4].contains(dimension))
+        })?;
+        if dimension == 3 {
+            return Ok(Axes { other: None, series: Series::default() });
+        }
+        let sizes = self.0.value("sizes", "four positive integers", |text| {
+            let sizes: Option<Vec<u32>> = text?.split_whitespace().map(|size| size.parse().ok()).collect();
+            sizes.filter(|sizes| sizes.len() == 4 && sizes.iter().all(|&size| size > 0))
+        })?;
+        let kinds = self.0.get("kinds").map(lower).unwrap_or_default();
+        let kinds: Vec<&str> = kinds.split_whitespace().collect();
+        let in_space = |kind: &str| ["domain", "space", "???", "none"].contains(&kind);
+        let by_kind = kinds.iter().position(|kind| !in_space(kind));
+        let words = self.0.get(DIRECTIONS).or(self.0.get("spacings")).map(lower).unwrap_or_default();
+        let by_direction = words.split_whitespace().position(|word| ["none", "nan"].contains(&word));
+        let other = by_kind.or(by_direction).unwrap_or(3);
+        let is_time = match kinds.get(other) {
+            Some(&"time") => true,
+            Some(kind) if !in_space(kind) => false,
+            _ => other == 3,
+        };
+        let count = sizes[other];
+        let is_color = match kinds.get(other) {
+            Some(&"rgb-color") => count == 3,
+            Some(&"rgba-color") => count == 4,
+            _ => false,
+        };
+        let series = match (other, is_time) {
+            (0, false) => Series { channels: count, times: 1, order: SeriesOrder::Interleaved, is_color },
+            (3, false) => Series { channels: count, times: 1, order: SeriesOrder::ChannelsFirst, is_color },
+            (3, true) => Series { channels: 1, times: count, order: SeriesOrder::ChannelsFirst, is_color: false },
+            _ => {
+                let found = format!("axis {other} of four that is not in space");
+                return Err(self.0.invalid("kinds", found, "axis 0 (channels), or axis 3 (channels or times)"));
+            }
+        };
+        if series.channels > MAX_CHANNELS {
+            return Err(self.0.invalid("sizes", format!("{count} channels"), format!("at most {MAX_CHANNELS}")));
+        }
+        Ok(Axes { other: Some(other), series })
+    }
+
+    fn dims(&self, axes: &Axes) -> Result<UVec3, VolumeError> {
         self.0.value("sizes", SIZES, |text| {
-            dims_of(three(text?.split_whitespace().map(|size| size.parse::<u32>().ok()))?)
+            dims_of(three(axes.in_space(text?.split_whitespace()).map(|size| size.parse::<u32>().ok()))?)
         })
     }
 
-    fn lattice_and_orientation(&self) -> Result<(Option<Lattice>, Option<Orientation>), VolumeError> {
+    fn lattice_and_orientation(&self, axes: &Axes) -> Result<(Option<Lattice>, Option<Orientation>), VolumeError> {
         match (self.0.get("spacings"), self.0.get(DIRECTIONS)) {
             (None, None) => Ok((None, None)),
             (None, Some(_)) => {
-                let lattice = self.directions()?;
+                let lattice = self.directions(axes)?;
                 Ok((Some(lattice), self.orientation(lattice.axes)?))
             }
             (Some(_), None) => self.0.value("spacings", "three positive finite numbers", |text| {
-                let spacings = three(text?.split_whitespace().map(number))?;
+                let spacings = three(axes.in_space(text?.split_whitespace()).map(number))?;
                 let lattice = Lattice::straight(DVec3::from_array(spacings), DMat3::IDENTITY);
                 spacings.iter().all(|&spacing| spacing > 0.0).then_some((Some(lattice), None))
             }),
@@ -146,10 +211,20 @@ impl Header {
     }
 
     /// The lattice that `space directions` gives.
-    fn directions(&self) -> Result<Lattice, VolumeError> {
+    fn directions(&self, of: &Axes) -> Result<Lattice, VolumeError> {
         let allowed = "three vectors (x,y,z) of positive finite length, none of them `none`";
         let axes = self.0.value(DIRECTIONS, allowed, |text| {
-            let axes = vectors(text?)?;
+            // That of an axis which is not in space is `none`.
+            let axes = match of.other {
+                None => vectors(text?)?,
+                Some(other) => {
+                    let text = lower(text?);
+                    let at = text.find("none")?;
+                    let is_there =
+                        if other == 0 { text[..at].trim().is_empty() } else { text[at + 4..].trim().is_empty() };
+                    vectors(text.replacen("none", "", 1).trim()).filter(|_| is_there)?
+                }
+            };
             axes.iter().all(|axis| axis.length() > 0.0 && axis.length().is_finite()).then_some(axes)
         })?;
         Lattice::of(axes).map_err(|found| self.0.invalid(DIRECTIONS, found, shear::allowed()))
@@ -190,7 +265,7 @@ impl Header {
         files.map(Some).ok_or_else(|| self.0.invalid("data file", shown(value), allowed))
     }
 
-    fn layout(&self, dims: UVec3) -> Result<Layout, VolumeError> {
+    fn layout(&self, dims: UVec3, series: Series) -> Result<Layout, VolumeError> {
         let kind = self.0.value("type", TYPES, |text| sample_type(text?))?;
         let allowed = "raw, gzip or gz, bzip2 or bz2, ascii, text or txt, or hex";
         let encoding = self.0.value("encoding", allowed, |text| {
@@ -220,7 +295,7 @@ impl Header {
         // Text is converted to samples in the machine's byte order.
         let big_endian = if encoding == Encoding::Text { cfg!(target_endian = "big") } else { big_endian };
         let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
-        Ok(Layout { samples, encoding, line_skip, byte_skip, window })
+        Ok(Layout { samples, series, encoding, line_skip, byte_skip, window })
     }
 }
 
@@ -255,8 +330,9 @@ enum Encoding {
 
 /// How the samples are stored in their file, or in each of their files.
 struct Layout {
-    /// The samples of all files together.
+    /// The samples of all files together, for one volume.
     samples: Samples,
+    series: Series,
     encoding: Encoding,
     line_skip: u64,
     /// The number of bytes to skip; `None` if the samples end where the file ends.
@@ -276,13 +352,16 @@ impl Layout {
             Encoding::Raw => Stream::raw(file)?,
             Encoding::Gzip => Stream::gzip(file)?,
             Encoding::Bzip2 => Stream::bzip2(file),
-            Encoding::Text => return Stream::text(file, samples.kind, TextEnd::File)?.samples(samples, false),
-            Encoding::Hex => return Stream::hex(file)?.samples(samples, false),
+            Encoding::Text => {
+                return Stream::text(file, samples.kind, TextEnd::File)?.series(samples, &self.series, false);
+            }
+            Encoding::Hex => return Stream::hex(file)?.series(samples, &self.series, false),
         };
-        let before_the_end = |left: u64| left.saturating_sub(samples.bytes());
+        let bytes = samples.bytes().saturating_mul(self.series.count());
+        let before_the_end = |left: u64| left.saturating_sub(bytes);
         stream.skip(self.byte_skip.unwrap_or_else(|| stream.exactly_left().map_or(0, before_the_end)))?;
         // Beyond the samples a compressed stream must end.
-        stream.samples(samples, self.window && self.encoding == Encoding::Raw)
+        stream.series(samples, &self.series, self.window && self.encoding == Encoding::Raw)
     }
 }
 

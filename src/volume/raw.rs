@@ -49,6 +49,6 @@ impl Volume {
         stream.skip(offset)?;
         let values = stream.samples(&Samples { kind, dims, big_endian, rescale: None, z_fastest: false }, false)?;
         let volume = Self::new(&path.display().to_string(), dims, DVec3::ONE, values)?;
-        Ok(Self { encoding: Some(Encoding { format: "raw", sample_type: kind }), ..volume })
+        Ok(Self { encoding: Some(Encoding { format: "raw", sample_type: kind, channels: 1, times: 1 }), ..volume })
     }
 }

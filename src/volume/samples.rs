@@ -5,7 +5,6 @@
 
 use std::collections::TryReserveError;
 use std::fmt::{self, Display, Formatter};
-use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
@@ -16,6 +15,7 @@ use flate2::bufread::ZlibDecoder;
 use glam::{DVec3, UVec3, Vec3Swizzles};
 
 use super::access::Access;
+use super::file::File;
 use super::numbers::{Numbers, TextEnd};
 use super::source::{CHUNK, Source, invalid, io_error};
 use super::{Grid, VolumeError};
@@ -112,6 +112,14 @@ macro_rules! sample_types {
                 }
             }
 
+            /// The number that stands for a full colour: an integer's maximum; 1 for floats.
+            pub(super) fn full(self) -> f64 {
+                match self {
+                    _ if matches!(self, Self::F32 | Self::F64) => 1.0,
+                    $(Self::$name => <$type>::MAX as f64),*
+                }
+            }
+
             /// Appends the bytes, in the machine's order, of a sample written as text.
             pub(super) fn parse(self, text: &str, into: &mut Vec<u8>) -> Option<()> {
                 match self {
@@ -178,7 +186,7 @@ impl Samples {
     }
 
     /// The number of samples. Readers have checked by [`dims_of`] that it fits in 32 bits.
-    fn count(&self) -> u32 {
+    pub(super) fn count(&self) -> u32 {
         self.dims.element_product()
     }
 
@@ -241,11 +249,11 @@ pub(crate) const SIZES: &str = "three positive integers, at most 4294967295 voxe
 
 /// The rest of a file, decompressed.
 pub(super) struct Stream {
-    path: PathBuf,
+    pub(super) path: PathBuf,
     reader: Reader,
     /// The number of bytes left; an upper bound if the stream is compressed.
     left: u64,
-    access: Access,
+    pub(super) access: Access,
 }
 
 enum Reader {
@@ -363,7 +371,7 @@ impl Stream {
         Ok(values)
     }
 
-    fn read_samples<T: Voxel>(&mut self, samples: &Samples) -> Result<Vec<T>, VolumeError> {
+    pub(super) fn read_samples<T: Voxel>(&mut self, samples: &Samples) -> Result<Vec<T>, VolumeError> {
         let path = self.path.clone();
         let (mut values, mut chunk) = (Vec::new(), Vec::with_capacity(CHUNK as usize));
         // An uncompressed file certainly holds all samples. What a compressed stream holds is unknown, so memory grows as it is decoded.

@@ -118,6 +118,7 @@ impl Lattice {
         access: &Access,
     ) -> Result<Loaded<T>, VolumeError> {
         let Some(shear) = self.shear else { return Ok(loaded) };
+        loaded.check_single(path, "one, where axes are not at right angles")?;
         let ranges = shear.ranges(loaded.dims);
         let sizes = ranges.map(|[first, last]| last - first + 1.0);
         let voxels = u64::from(loaded.dims.element_product());

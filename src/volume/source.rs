@@ -1,14 +1,16 @@
 //! Files that are being read, and the wording of errors about them.
 
 use std::fmt::Display;
-use std::fs::{self, File};
-use std::io::{self, BufRead, BufReader, Read, Seek};
+use std::fs;
+use std::io::{self, BufRead, BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::VolumeError;
 use super::access::Access;
+use super::file::File;
 
 /// The maximum length of a header line in bytes.
 const MAX_LINE: u64 = 64 << 10;
@@ -33,8 +35,18 @@ impl Source {
         if !metadata.is_file() {
             return Err(invalid(path, "file", "a folder, pipe or device", "a regular file"));
         }
-        let reader = BufReader::with_capacity(CHUNK as usize, File::open(resolved).map_err(io_error(path))?);
-        Ok(Self { path: path.to_owned(), bytes: metadata.len(), reader, access: access.clone() })
+        let file = File::Disk(fs::File::open(resolved).map_err(io_error(path))?);
+        Ok(Self::new(path, metadata.len(), file, access))
+    }
+
+    /// Opens a file that is in memory.
+    pub(super) fn in_memory(path: &Path, bytes: &Arc<[u8]>, access: &Access) -> Self {
+        Self::new(path, bytes.len() as u64, File::Memory(Cursor::new(Arc::clone(bytes))), access)
+    }
+
+    fn new(path: &Path, bytes: u64, file: File, access: &Access) -> Self {
+        let reader = BufReader::with_capacity(CHUNK as usize, file);
+        Self { path: path.to_owned(), bytes, reader, access: access.clone() }
     }
 
     /// The number of bytes left to read.

@@ -153,7 +153,9 @@ fn settings_are_the_twins() {
 #[test]
 fn culling_keeps_its_promise() {
     const THRESHOLD: f64 = 0.9;
-    for compositing in [Compositing::Linear, Compositing::Exponential, Compositing::Xray, Compositing::Maximum] {
+    for compositing in
+        [Compositing::Linear, Compositing::Exponential, Compositing::Xray, Compositing::Maximum, Compositing::Surface]
+    {
         for projection in [None, Some(eye(600.0))] {
             // Large enough for much to be hidden.
             let (volume, mut scene) = (builtin::volume("head:48").unwrap(), head([1.0, 1.0, 1.0]).1);
@@ -174,7 +176,7 @@ fn culling_keeps_its_promise() {
             let [all, drawn] = [whole, culled].map(|rendering| rendering.stats.counts.sections_rasterized);
             println!("{compositing:?} {projection:?}: {farthest:.5}, {drawn} of {all}");
             assert!(drawn <= all, "{compositing:?}: {drawn} of {all}");
-            if is_gradual {
+            if is_gradual || compositing == Compositing::Surface {
                 assert!(drawn < all * 9 / 10, "{compositing:?}: {drawn} of {all}");
             }
         }
@@ -211,6 +213,31 @@ fn holes_and_labels(mut scene: Scene) {
     let measured = accuracy(&labelled, &scene);
     println!("labels {compositing:?}: {measured:.1} dB");
     assert_at_least(measured, 60.0, format_args!("labels, {compositing:?}"));
+}
+
+/// Where all values around are equal, no pixel takes the rounding of their sums for a gradient.
+#[test]
+fn constant_regions_have_no_normal() {
+    let (_, mut scene) = head([1.0; 3]);
+    scene.shading.gradient = Gradient::Kernel;
+    scene.transfer = transfer(&[(0.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(190.0, 0.0), (200.0, 0.5)]);
+    let value = |index: u32| match index {
+        0 => 0.0,
+        4095 => 255.0,
+        _ => 201.3,
+    };
+    let volume = Volume::new("block", glam::UVec3::splat(16), DVec3::ONE, (0..4096).map(value).collect()).unwrap();
+    for rasterizer in [Rasterizer::Quads, Rasterizer::Tiles] {
+        for falloff in [1.0, 2.0] {
+            (scene.splatting.rasterizer, scene.splatting.falloff) = (rasterizer, falloff);
+            let (ours, expected) =
+                (gpu().render_volume(volume.clone(), &scene).unwrap().image, render(&volume, &scene));
+            assert!(expected.pixels.iter().any(|pixel| pixel[3] > 0.9), "falloff {falloff}");
+            let measured = decibels(rms(&ours, &expected));
+            println!("{rasterizer:?}, falloff {falloff}: {measured:.1} dB");
+            assert_at_least(measured, 60.0, format_args!("{rasterizer:?}, falloff {falloff}"));
+        }
+    }
 }
 
 /// A host's surfaces cut rays, and first hits are where the twin has them.
@@ -313,5 +340,18 @@ fn memory_is_estimated() {
         let estimated = gpu.renderer().estimate(&view).unwrap();
         gpu.draw(&mut view).unwrap();
         assert_eq!(view.gpu_bytes(), estimated, "{interpolation:?}");
+    }
+}
+
+/// An iso-range that is a single value has a surface where values pass it.
+#[test]
+fn surfaces_of_a_single_value_are_the_twins() {
+    let (volume, scene) = head([1.0, 1.0, 1.5]);
+    let mut scene = for_all(scene, Compositing::Surface);
+    scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.8)]).unwrap());
+    for value in [60.0, 100.3] {
+        scene.transfer.iso_ranges = Some(vec![[value, value]]);
+        let measured = accuracy(&volume, &scene);
+        assert_at_least(measured, 60.0, format!("{value}"));
     }
 }

@@ -93,6 +93,11 @@ fn surfaces_stand_where_half_is_reached() {
     // The surface moves: to the first value in an iso-range; by gradient opacity; to the face of a cut; or it disappears.
     scene.transfer.iso_ranges = Some(vec![[12.5, 13.0]]);
     assert!((half(&scene).1 - 3.0).abs() < 0.02, "{:?}", half(&scene));
+    // Also to a single value.
+    for value in [12.5, 13.0 - 1.0 / 3.0, 14.1] {
+        scene.transfer.iso_ranges = Some(vec![[value, value]]);
+        assert!((half(&scene).1 - (value - 9.5)).abs() < 0.02, "{value}: {:?}", half(&scene));
+    }
     scene.transfer.iso_ranges = None;
     scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.0), (1.0, 0.8)]).unwrap());
     assert!((half(&scene).1 - 3.0).abs() < 0.02, "{:?}", half(&scene));

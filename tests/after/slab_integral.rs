@@ -39,6 +39,7 @@ fn random_transfer(random: &mut Random, [min, max]: [f64; 2]) -> TransferFunctio
         gradient_opacity: None,
         iso_ranges: random.pick(&[false, true]).then_some(ranges),
         labels: BTreeMap::new(),
+        further: Vec::new(),
     }
 }
 
@@ -87,8 +88,14 @@ fn narrow_peaks_beside_plateaus() {
     let color = Ramp::new(vec![(0.0, DVec3::X), (65535.0, DVec3::Y)]).unwrap();
     let opacity = vec![(65000.0, 0.9), (65001.0, 0.0), (65100.0, 0.0), (65100.5, 0.01), (65101.0, 0.0)];
     let opacity = Ramp::new(opacity).unwrap();
-    let transfer =
-        TransferFunction { color, opacity, gradient_opacity: None, iso_ranges: None, labels: BTreeMap::new() };
+    let transfer = TransferFunction {
+        color,
+        opacity,
+        gradient_opacity: None,
+        iso_ranges: None,
+        labels: BTreeMap::new(),
+        further: Vec::new(),
+    };
     let numbers = Normalization::new([0.0, 65535.0]);
     let points = table(&transfer.tables(None), Compositing::Linear, &numbers);
     let ends = [65050.0, 65400.0].map(|value| numbers.apply(value) as f32);

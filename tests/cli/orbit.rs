@@ -225,3 +225,44 @@ fn a_saved_scene_renders_the_frames_bytes() {
     }
     assert!(folder.read("s.toml") == before && !folder.path("f.gif").exists());
 }
+
+/// Three times of one volume.
+const TIMES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/channels/times.nii");
+
+#[test]
+fn times_and_turns_go_together() {
+    let folder = Folder::new();
+    let look = "--set image={width=24,height=20} --set transfer={opacity=[[0,0],[25000,0.9]],color=[[0,[0,0,1]],[20000,[1,1,0]]]}";
+    folder.orbit(&format!("{TIMES} {look} --time 0..3 --turn 90 --count 6 -o all-%d.png --save-scene turn.toml"));
+    let scene = String::from_utf8(folder.read("turn.toml")).unwrap();
+    assert!(scene.contains("time = 0"), "{scene}");
+    let mut frames = BTreeSet::new();
+    for frame in 0..6 {
+        let direction = DMat3::from_axis_angle(DVec3::Z, (15.0 * f64::from(frame)).to_radians()) * DVec3::Y;
+        let [x, y, z] = direction.to_array();
+        let time = frame / 2;
+        folder.render(&format!("turn.toml --time {time} --set camera.direction=[{x:?},{y:?},{z:?}] -o one.png"));
+        let all = folder.read(&format!("all-{frame}.png"));
+        assert!(all == folder.read("one.png"), "frame {frame}");
+        frames.insert(all);
+    }
+    assert_eq!(frames.len(), 6, "all frames differ");
+    // Each frame is independent of the others.
+    folder.orbit(&format!("{TIMES} {look} --time 0..3 --turn 90 --count 6 --frames 3..5 -o part-%d.png"));
+    assert!(
+        [3, 4]
+            .iter()
+            .all(|frame| folder.read(&format!("part-{frame}.png")) == folder.read(&format!("all-{frame}.png")))
+    );
+    for (times, expected) in [
+        ("0..4", "--time: found 0..4, allowed: within 0..3, the times of"),
+        ("2..2", "--time: found 2..2, allowed: A..B"),
+        ("..2", "--time: found ..2, allowed: A..B"),
+        ("3", "time: found 3, allowed: 0 to 2"),
+    ] {
+        let run = folder.run(&format!("orbit {TIMES} {look} --time {times} --count 2 -o no-%d.png"));
+        run.assert_failure(2, &[expected]);
+    }
+    let run = folder.run(&format!("render {TIMES} {look} --time 0..2 -o no.png"));
+    run.assert_failure(2, &["volume.time: found \"0..2\""]);
+}

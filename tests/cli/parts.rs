@@ -1,5 +1,8 @@
 //! `sheetsplat render --slabs --region`, `merge` and `split`.
 
+use std::path::Path;
+use std::process::Command;
+
 use sheetsplat::Image;
 
 use crate::*;
@@ -97,4 +100,27 @@ fn what_has_no_parts_is_refused() {
     }
     folder.run(&format!("split {SCENE} -n 0")).assert_failure(2, &["0"]);
     assert!(folder.names().is_empty(), "{:?}", folder.names());
+}
+
+/// The example for `make` draws the image, and draws nothing again that is there.
+#[test]
+fn make_draws_parts() {
+    let folder = Folder::new();
+    let text =
+        "[volume]\nbuiltin = \"head:24\"\n[image]\nwidth = 40\nheight = 30\n[splatting]\nopacity_threshold = 1\n";
+    std::fs::write(folder.path("scene.toml"), text).unwrap();
+    let rules = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/parts.mk");
+    let make = || {
+        let mut make = Command::new("make");
+        make.current_dir(folder.path("")).arg("-f").arg(&rules).arg("IMAGE=made.exr").arg("PARTS=5");
+        let made = make.arg(concat!("SHEETSPLAT=", env!("CARGO_BIN_EXE_sheetsplat"))).output().unwrap();
+        assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+        String::from_utf8(made.stdout).unwrap()
+    };
+    assert_eq!(make().matches(" render ").count(), 5);
+    assert_eq!(make().matches("sheetsplat ").count(), 0);
+    folder.render("scene.toml -o whole.exr --backend cpu");
+    let open = |name: &str| Image::open(&folder.path(name)).unwrap();
+    let difference = common::images::largest_difference(&open("made.exr"), &open("whole.exr"));
+    assert_at_most(difference, 1e-6, "make");
 }

@@ -136,3 +136,24 @@ fn bad_usage_and_input_are_2_and_leave_nothing() {
     fails("-o no/s.png --set splatting.radius=1,2", &["no/s.png", "No such file"]);
     assert_eq!(folder.names(), BTreeSet::new());
 }
+
+#[test]
+fn times_are_swept() {
+    let folder = Folder::new();
+    let times = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/channels/times.nii");
+    let look = format!(
+        "{times} --set image={{width=300,height=40}} --set transfer={{opacity=[[0,0],[25000,0.9]],color=[[0,[0,0,1]],[20000,[1,1,0]]]}}"
+    );
+    let sheet = folder.sweep(&format!("{look} --set volume.time=0,2"));
+    for (column, time) in [0, 2].into_iter().enumerate() {
+        folder.assert_tile(
+            &sheet,
+            [MARGIN + column as u32 * (WIDTH + MARGIN), MARGIN],
+            &format!("{look} --time {time}"),
+        );
+    }
+    let tile = |column: u32| {
+        image::imageops::crop_imm(&sheet, MARGIN + column * (WIDTH + MARGIN), MARGIN, WIDTH, HEIGHT).to_image()
+    };
+    assert!(tile(0) != tile(1), "the times differ");
+}

@@ -351,3 +351,17 @@ fn constant_regions_have_no_normal() {
         assert!(psnr > 60.0, "falloff {falloff}: {psnr} dB");
     }
 }
+
+/// An iso-range that is a single value has a surface where values pass it.
+#[test]
+fn surfaces_of_a_single_value_against_the_twin() {
+    let (volume, mut scene) = close_by(Compositing::Surface);
+    scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.8)]).unwrap());
+    for value in [60.0, 100.3] {
+        scene.transfer.iso_ranges = Some(vec![[value, value]]);
+        let expected = twin(&volume, &scene);
+        assert!(shown(&expected) > 0.1, "{value} shows nothing");
+        let psnr = psnr(&draw(&volume, &scene).image, &expected);
+        assert!(psnr > required(&scene), "{value}: {psnr} dB");
+    }
+}

@@ -9,6 +9,7 @@ mod after;
 mod common;
 mod modes;
 mod picks;
+mod regions;
 mod scenes;
 mod surfaces;
 

@@ -35,7 +35,10 @@ fn assert_lies_as_written(volume: &Volume) {
 fn series_of_pydicom() {
     let volume = open("series");
     assert_lies_as_written(&volume);
-    assert_eq!(volume.encoding(), Some(Encoding { format: "DICOM", sample_type: SampleType::I16 }));
+    assert_eq!(
+        volume.encoding(),
+        Some(Encoding { format: "DICOM", sample_type: SampleType::I16, channels: 1, times: 1 })
+    );
     let labels = Labels::open(&fixture("series")).unwrap();
     assert!(labels.values.iter().map(|&label| f32::from(label)).eq(values()));
 }
@@ -317,7 +320,8 @@ fn wrong_elements() {
     refused(slice().with(SLOPE, "inf"), "RescaleSlope", "inf", "finite numbers");
     refused(slice().with(FRAME_COUNT, "0"), "NumberOfFrames", "0", "a positive integer");
     refused(slice().with(FRAME_COUNT, "3"), "PixelData", "12 bytes", "36 bytes (3 frames of 3 × 2 uint16)");
-    refused(slice().number(0x28, 0x02, 3), "SamplesPerPixel", "3", "1");
+    refused(slice().number(0x28, 0x02, 2), "SamplesPerPixel", "2", "1 or 3");
+    refused(slice().number(0x28, 0x02, 3), "PhotometricInterpretation", "MONOCHROME2", "RGB for colours");
     refused(slice().with((0x28, 0x04), "PALETTE COLOR"), "PhotometricInterpretation", "PALETTE", "MONOCHROME1");
     refused(slice().number(0x28, 0x10, 0), "Rows", "0", "at least 1");
     refused(slice().number(0x28, 0x10, 3), "PixelData", "12 bytes", "18 bytes");

@@ -3,10 +3,12 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod colors;
 mod data_files;
 mod dicom;
 mod dispatch;
 mod holes;
+mod memory;
 mod metaimage;
 mod mgh;
 mod nifti;
@@ -17,6 +19,7 @@ mod raw;
 mod reading;
 #[path = "../common/refused.rs"]
 mod refused;
+mod several;
 #[path = "../common/shared.rs"]
 mod shared;
 mod shear;

@@ -20,7 +20,7 @@ fn every_type_of_nibabel() {
         let volume = open(name);
         assert_lies(&volume, rotation(), ORIGIN);
         assert_eq!(volume.unit(), Some("mm"));
-        assert_eq!(volume.encoding(), Some(Encoding { format: "MGH", sample_type }), "{name}");
+        assert_eq!(volume.encoding(), Some(Encoding { format: "MGH", sample_type, channels: 1, times: 1 }), "{name}");
         assert!(Labels::open(&fixture(name)).unwrap().values.iter().map(|&label| f32::from(label)).eq(values()));
     }
 }

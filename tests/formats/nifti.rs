@@ -61,7 +61,10 @@ fn of_itk() {
     let volume = open("itk.nii.gz");
     assert_lies(&volume, DMat3::from_diagonal(lps) * rotation(), lps * ORIGIN);
     assert_eq!(volume.unit(), Some("mm"));
-    assert_eq!(volume.encoding(), Some(Encoding { format: "NIfTI", sample_type: SampleType::F64 }));
+    assert_eq!(
+        volume.encoding(),
+        Some(Encoding { format: "NIfTI", sample_type: SampleType::F64, channels: 1, times: 1 })
+    );
 }
 
 #[test]
@@ -125,11 +128,16 @@ fn wrong_fields() {
     refused(344, b"abc\0", "magic", "\"abc\\x00\"", "n+1 or ni1");
     refused(40, &[2, 0], "dim", "[2, 5, 4, 3, ", "3 to 7");
     refused(40, &[8, 0], "dim", "[8, ", "3 to 7");
-    refused(40, &[4, 0, 5, 0, 4, 0, 3, 0, 2, 0], "dim", "[4, 5, 4, 3, 2, ", "any further sizes 1");
+    refused(40, &[4, 0, 5, 0, 4, 0, 3, 0, 2, 0], "data", "120 bytes", "240 bytes");
+    let six = [6, 0, 5, 0, 4, 0, 3, 0, 1, 0, 1, 0, 2, 0];
+    refused(40, &six, "dim", "[6, 5, 4, 3, 1, 1, 2, ", "any further sizes 1");
+    let components = [5, 0, 5, 0, 4, 0, 3, 0, 1, 0, 65, 0];
+    refused(40, &components, "dim", "[5, 5, 4, 3, 1, 65, ", "at most 64 components");
     for size in [0_i16, -5] {
         refused(42, &size.to_le_bytes(), "dim", &size.to_string(), "three positive integers");
     }
-    refused(70, &[128, 0], "datatype", "128", "4 (int16)");
+    refused(70, &[1, 0], "datatype", "1", "4 (int16)");
+    refused(70, &[128, 0], "bitpix", "16", "24, as datatype 128");
     refused(72, &[8, 0], "bitpix", "8", "16, as datatype 4");
     for (offset, found) in [(348.0_f32, "348"), (353.5, "353.5"), (-1.0, "-1"), (f32::NAN, "NaN"), (1e30, "1000000")] {
         refused(108, &offset.to_le_bytes(), "vox_offset", found, "a whole number from 352");

@@ -10,7 +10,10 @@ fn named(archive: &str, array: &str) -> PathBuf {
 
 #[test]
 fn one_array_or_the_one_that_is_named() {
-    assert_eq!(open("one.npz").encoding(), Some(Encoding { format: "NPZ", sample_type: SampleType::F32 }));
+    assert_eq!(
+        open("one.npz").encoding(),
+        Some(Encoding { format: "NPZ", sample_type: SampleType::F32, channels: 1, times: 1 })
+    );
     for path in [named("one.npz", "values"), named("two.npz", "values")] {
         assert_eq!(Volume::open(&path).unwrap().values(), values(), "{}", path.display());
     }

@@ -10,7 +10,7 @@ fn other_encodings() {
     for (name, sample_type) in [("bzip2.nrrd", I16), ("text.nrrd", F32), ("hex.nrrd", U16)] {
         let volume = open(name);
         assert_eq!(volume.spacing(), SPACING, "{name}");
-        assert_eq!(volume.encoding(), Some(Encoding { format: "NRRD", sample_type }), "{name}");
+        assert_eq!(volume.encoding(), Some(Encoding { format: "NRRD", sample_type, channels: 1, times: 1 }), "{name}");
     }
     let folder = Folder::new();
     for (name, encoding, instead) in

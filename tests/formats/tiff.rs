@@ -41,7 +41,11 @@ fn of_tifffile() {
         ("imagej-large.tif", F32),
         ("ome.tif", U16),
     ] {
-        assert_eq!(open(name).encoding(), Some(Encoding { format: "TIFF", sample_type }), "{name}");
+        assert_eq!(
+            open(name).encoding(),
+            Some(Encoding { format: "TIFF", sample_type, channels: 1, times: 1 }),
+            "{name}"
+        );
     }
 }
 
@@ -90,8 +94,8 @@ fn descriptions_by_image_j() {
     let refused = |instead: &str, field: &str, found: &str, allowed: &str| {
         assert_refused(open(instead), "a.tif", field, found, allowed);
     };
-    refused("channels=2\nspacing=3\nunit=um", "slices, channels, frames", "3, 2, 1", "one of them above 1");
-    refused("frames=3\nspacing=3\nunit=um", "slices, channels, frames", "3, 1, 3", "one of them above 1");
+    refused("channels=2\nspacing=3\nunit=um", "slices, channels, frames", "3, 2, 1", "product is images");
+    refused("frames=3\nspacing=3\nunit=um", "slices, channels, frames", "3, 1, 3", "product is images");
     let frames = folder.open("a.tif", &with_text("imagej.tif", "slices=3", "frames=3")).unwrap();
     assert_eq!((frames.values(), frames.spacing()), (values().as_slice(), SPACING));
     refused("zunit=mm\nspacing=3\nunit=um", "unit, yunit, zunit", "um, unit's, mm", "one unit for all");
@@ -121,8 +125,9 @@ fn descriptions_by_ome() {
     let refused = |text: &str, instead: &str, field: &str, found: &str, allowed: &str| {
         assert_refused(open(text, instead), "a.tif", field, found, allowed);
     };
-    refused("SizeC=\"1\"", "SizeC=\"2\"", "SizeC", "2", "one number for each voxel");
-    refused("SizeT=\"1\"", "SizeT=\"7\"", "SizeT", "7", "one volume");
+    refused("SizeC=\"1\"", "SizeC=\"2\"", "pages", "3", "6, as the description says");
+    refused("SizeT=\"1\"", "SizeT=\"7\"", "pages", "3", "21, as the description says");
+    refused("SizeC=\"1\"", "SizeC=\"9\"", "pages", "3", "27, as the description says");
     refused("SizeZ=\"3\"", "SizeZ=\"4\"", "pages", "3", "4, as the description says");
     refused("SizeX=\"0.5\"", "SizeX=\"0.0\"", "PhysicalSizeX", "0.0", "a positive finite number");
     refused("SizeZUnit=\"µm\"", "SizeZUnit=\"nm\"", "PhysicalSizeXUnit, YUnit, ZUnit", "µm, µm, nm", "one unit");
@@ -184,7 +189,7 @@ fn wrong_pages() {
     let refused = |name: &str, tags: &[(u16, u32)], field: &str, found: &str, allowed: &str| {
         assert_refused(folder.open("a.tif", &with_tags(name, tags)), "a.tif", field, found, allowed);
     };
-    let grey = "grey pixels";
+    let grey = "grey or RGB pixels";
     refused("plain.tif", &[(256, 0)], "page 1", "invalid dimensions", grey);
     refused("plain.tif", &[(257, 3)], "page 2", "5 × 4 int32", "5 × 3 int32, as the first page");
     refused("plain.tif", &[(258, 1)], "page 1", "Gray(1)", "an integer of 8 to 64 bits");
@@ -225,7 +230,11 @@ fn damage() {
 fn indices_of_a_palette_are_the_values() {
     for name in ["palette.tif", "palette-big.tif"] {
         let volume = open(name);
-        assert_eq!(volume.encoding(), Some(Encoding { format: "TIFF", sample_type: SampleType::U8 }), "{name}");
+        assert_eq!(
+            volume.encoding(),
+            Some(Encoding { format: "TIFF", sample_type: SampleType::U8, channels: 1, times: 1 }),
+            "{name}"
+        );
         let palette = volume.palette().unwrap();
         assert_eq!(palette.len(), 256, "{name}");
         for (index, &(value, color)) in palette.iter().enumerate() {
@@ -258,9 +267,9 @@ fn other_palettes() {
 }
 
 #[test]
-fn pages_of_colours_are_refused() {
-    let colors = Volume::open(&fixture("rgb.tif"));
-    assert_refused(colors, "rgb.tif", "page 1", "RGB pages, 3 samples a pixel", "one sample a pixel");
+fn colours_in_separate_planes_are_refused() {
+    let colors = Volume::open(&fixture("colors/planar.tif"));
+    assert_refused(colors, "planar.tif", "page 1", "colours in separate planes", "RGB or RGBA side by side");
 }
 
 /// A name may contain the character that errors use for numbers.

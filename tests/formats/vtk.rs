@@ -28,12 +28,12 @@ fn of_vtk() {
     for (name, sample_type) in IMAGE_DATA.into_iter().zip(types) {
         let volume = open(name);
         assert_eq!((volume.spacing(), volume.orientation(), volume.unit()), (SPACING, None, None), "{name}");
-        assert_eq!(volume.encoding(), Some(Encoding { format: "VTI", sample_type }), "{name}");
+        assert_eq!(volume.encoding(), Some(Encoding { format: "VTI", sample_type, channels: 1, times: 1 }), "{name}");
     }
     for (name, sample_type) in LEGACY.into_iter().zip([F32, I16, U8, F64]) {
         let volume = open(name);
         assert_eq!((volume.spacing(), volume.orientation(), volume.unit()), (SPACING, None, None), "{name}");
-        assert_eq!(volume.encoding(), Some(Encoding { format: "VTK", sample_type }), "{name}");
+        assert_eq!(volume.encoding(), Some(Encoding { format: "VTK", sample_type, channels: 1, times: 1 }), "{name}");
     }
     let labels = Labels::open(&fixture("appended-lz4.vti")).unwrap();
     assert!(labels.values.iter().map(|&label| f32::from(label)).eq(values()));
@@ -88,13 +88,20 @@ fn wrong_image_data() {
 }
 
 #[test]
-fn arrays_of_vectors_are_refused() {
+fn without_an_array_of_numbers_the_first_one_is_read() {
     let text = String::from_utf8(fs::read(fixture("text.vti")).unwrap()).unwrap();
-    let vectors = text.replace("format=\"ascii\"", "NumberOfComponents=\"2\" format=\"ascii\"");
-    let vectors = vectors.replace("NumberOfComponents=\"3\" ", "");
-    let found = "flow (2 components), zeros (2 components), values (2 components)";
-    let refused = Folder::new().open("a.vti", vectors.as_bytes());
-    assert_refused(refused, "a.vti", "DataArray", found, "a number for each point or cell");
+    let vectors = |count: &str| {
+        let more = text.replace("format=\"ascii\"", &format!("NumberOfComponents=\"{count}\" format=\"ascii\""));
+        more.replace("NumberOfComponents=\"3\" ", "").replace("Scalars=\"values\"", "")
+    };
+    for count in ["65", "0", "two"] {
+        let found = format!("flow ({count} components), zeros ({count} components), values ({count} components)");
+        let refused = Folder::new().open("a.vti", vectors(count).as_bytes());
+        assert_refused(refused, "a.vti", "DataArray", &found, "at least one with 1 to 64 components");
+    }
+    let flow = vectors("65").replacen("NumberOfComponents=\"65\"", "NumberOfComponents=\"3\"", 1);
+    let volume = Folder::new().open("a.vti", flow.as_bytes()).unwrap();
+    assert_eq!((volume.channels().count(), volume.values()), (3, &[1.0; 60][..]));
 }
 
 #[test]

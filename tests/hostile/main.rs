@@ -62,7 +62,7 @@ fn victims(folder: &Path) -> Vec<Victim> {
                     "part0.bin" => to.join("list.mhd"),
                     "part1.bin" => to.join("pattern.nhdr"),
                     "two.npz" => to.join("two.npz:values"),
-                    _ if to == folder => copy.clone(),
+                    _ if to == folder || to.ends_with("channels") => copy.clone(),
                     _ => to.to_owned(),
                 };
                 victims.push(Victim { file: copy, open });
@@ -70,7 +70,7 @@ fn victims(folder: &Path) -> Vec<Victim> {
         }
     };
     files(&fixtures, folder);
-    for slices in ["series", "slices"] {
+    for slices in ["series", "slices", "channels"] {
         files(&fixtures.join(slices), &folder.join(slices));
     }
     victims

@@ -282,8 +282,8 @@ fn field_errors() {
     for wrong in ["zip", "base64", "zrl", "", "raw raw"] {
         assert_line_refused("encoding: raw", &format!("encoding: {wrong}\n"), "encoding", wrong, "raw, gzip or gz");
     }
-    for wrong in ["2", "4", "0", "-3", "3.0", "three", "99999999999"] {
-        assert_line_refused("dimension: 3", &format!("dimension: {wrong}\n"), "dimension", wrong, "3");
+    for wrong in ["2", "5", "0", "-3", "3.0", "three", "99999999999"] {
+        assert_line_refused("dimension: 3", &format!("dimension: {wrong}\n"), "dimension", wrong, "3 or 4");
     }
     for wrong in ["2 3", "2 3 4 1", "0 3 4", "2 -3 4", "2 3 4.0", "2,3,4", "", "65536 65536 1", "60000 60000 60000"] {
         assert_line_refused("sizes: 2 3 4", &format!("sizes: {wrong}\n"), "sizes", wrong, "three positive integers");

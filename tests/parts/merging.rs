@@ -5,7 +5,9 @@ use std::sync::Arc;
 use glam::DVec3;
 use sheetsplat::headless::{Backend, Headless, HeadlessOptions};
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Classification, Compositing, Fit, Interpolation, Order, Projection, Ramp, Region, Window};
+use sheetsplat::settings::{
+    Classification, Compositing, Fit, Interpolation, Order, Projection, Ramp, Rasterizer, Region, Splatting, Window,
+};
 use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::{Image, Part};
 
@@ -65,14 +67,15 @@ pub(crate) fn parts(headless: &Headless, volume: &Arc<Volume>, scene: &Scene, ra
     windows.map(|window| headless.draw_part(&mut view, &window).unwrap().0).collect()
 }
 
-/// Merges 8 slab ranges of 4 regions, and compares them with the whole image.
+/// Merges some slab ranges of 4 regions, and compares them with the whole image.
 fn compare(backend: Backend, volume: &Arc<Volume>, scene: &Scene) {
     let headless = headless(backend);
     let whole = headless.render_volume(Arc::clone(volume), scene).unwrap().image;
-    let mut parts = parts(&headless, volume, scene, 8);
+    let ranges = if backend == Backend::Gpu { 3 } else { 8 };
+    let mut parts = parts(&headless, volume, scene, ranges);
     // The order in which parts are given does not matter.
     parts.reverse();
-    parts.swap(3, 17);
+    parts.swap(3, 7);
     let merged = Image::merge(parts).unwrap();
     let what = format!("{backend} {:?}", scene.splatting);
     let shown = whole.pixels.iter().filter(|pixel| **pixel != whole.pixels[0]).count();
@@ -121,6 +124,85 @@ fn parts_classified_after_splatting_merge() {
     }
 }
 
+/// In homogeneous matter sheets are equal but for the order in which they are added up, which parts do not change.
+#[test]
+fn parts_choose_among_equal_sheets_as_the_whole_does() {
+    for compositing in [Compositing::Maximum, Compositing::Minimum] {
+        for (volume, mut scene) in scenes(compositing, Classification::Before, 40) {
+            let opacity = if compositing == Compositing::Minimum { [0.6, 0.3] } else { [0.0, 0.6] };
+            scene.transfer.opacity = Some(Ramp::new(vec![(30.0, opacity[0]), (50.0, opacity[1])]).unwrap());
+            // Along an axis every slab holds the same sections.
+            scene.camera.direction = DVec3::Y;
+            compare(Backend::Cpu, &volume, &scene);
+        }
+    }
+}
+
+/// Whether tiles draw a scene.
+fn is_drawn_by_tiles(Splatting { compositing, classification, .. }: &Splatting) -> bool {
+    let is_sum = matches!(compositing, Compositing::Linear | Compositing::Exponential | Compositing::Xray);
+    *classification == Classification::Before || is_sum
+}
+
+fn parts_of_the_gpu_merge(rasterizer: Rasterizer, classification: Classification) {
+    for compositing in COMPOSITINGS {
+        if (compositing, classification) == (Compositing::Average, Classification::After) {
+            continue;
+        }
+        // Every other compositing in perspective, and back to front.
+        for (volume, mut scene) in
+            scenes(compositing, classification, 24).into_iter().skip(compositing as usize % 2).take(1)
+        {
+            scene.splatting.rasterizer = rasterizer;
+            scene.shading.enabled = !matches!(compositing, Compositing::Minimum | Compositing::Maximum);
+            if rasterizer != Rasterizer::Tiles || is_drawn_by_tiles(&scene.splatting) {
+                compare(Backend::Gpu, &volume, &scene);
+            }
+        }
+    }
+}
+
+#[test]
+fn parts_of_quads_merge() {
+    parts_of_the_gpu_merge(Rasterizer::Quads, Classification::Before);
+}
+
+#[test]
+fn parts_of_quads_classified_after_splatting_merge() {
+    parts_of_the_gpu_merge(Rasterizer::Quads, Classification::After);
+}
+
+#[test]
+fn parts_of_tiles_merge() {
+    parts_of_the_gpu_merge(Rasterizer::Tiles, Classification::Before);
+}
+
+#[test]
+fn parts_of_tiles_classified_after_splatting_merge() {
+    parts_of_the_gpu_merge(Rasterizer::Tiles, Classification::After);
+}
+
+/// Parts of the GPU and of the CPU belong to one image, and a view draws whole images after parts.
+#[test]
+fn parts_of_all_backends_merge() {
+    for compositing in [Compositing::Linear, Compositing::Maximum] {
+        let (volume, mut scene) = head(32, [50, 40]);
+        scene.splatting.compositing = compositing;
+        // With clip planes rays are cut anyway.
+        scene.clip.planes = vec![[0.3, 1.0, 0.2, 3.0]];
+        let [gpu, cpu] = [Backend::Gpu, Backend::Cpu].map(headless);
+        let mut view = gpu.view(Arc::clone(&volume), &scene).unwrap();
+        let before = gpu.draw(&mut view).unwrap().image;
+        let mixed = parts(&gpu, &volume, &scene, 4).into_iter().zip(parts(&cpu, &volume, &scene, 4));
+        let chosen = mixed.enumerate().map(|(at, (gpu, cpu))| if at % 3 == 0 { cpu } else { gpu });
+        let merged = Image::merge(chosen).unwrap();
+        assert_at_most(largest_difference(&merged, &before), 2e-5, format!("{compositing:?}"));
+        let window = Window { slabs: -2..3, region: Region { x: 3, y: 5, width: 20, height: 9 } };
+        gpu.draw_part(&mut view, &window).unwrap();
+        assert_eq!(gpu.draw(&mut view).unwrap().image.pixels, before.pixels);
+    }
+}
+
 #[test]
 fn parts_of_the_twin_merge() {
     for compositing in COMPOSITINGS {
@@ -147,4 +229,36 @@ fn culled_parts_merge_within_the_threshold() {
     assert_at_most(difference, 0.1, "T = 0.9");
     // Something was culled.
     assert_at_least(difference, 1e-4, "T = 0.9");
+}
+
+/// Pairs of neighbours merge into parts that give the bytes of the whole, and what cannot be joined is named.
+#[test]
+fn pairs_are_joined() {
+    let (volume, mut scene) = head(32, [50, 40]);
+    let headless = headless(Backend::Cpu);
+    for compositing in COMPOSITINGS {
+        scene.splatting.compositing = compositing;
+        let parts = parts(&headless, &volume, &scene, 5);
+        let at_once = Image::merge(parts.clone()).unwrap();
+        let mut joined = Vec::new();
+        for region in parts.chunks(5) {
+            let [a, b, c, d, e] = <[Part; 5]>::try_from(region.to_vec()).unwrap();
+            let front = Part::join([b, a]).unwrap();
+            assert_eq!(front.window.region, region[0].window.region);
+            assert_eq!(front.window.slabs.end, region[1].window.slabs.end);
+            joined.push(Part::join([Part::join([front, Part::join([c, d]).unwrap()]).unwrap(), e]).unwrap());
+            // All at once they are the same.
+            assert_eq!(joined.last().unwrap().content, Part::join(region.to_vec()).unwrap().content);
+        }
+        assert_eq!(Image::merge(joined).unwrap().pixels, at_once.pixels, "{compositing:?}");
+        if compositing == Compositing::Linear {
+            let error = Part::join([parts[0].clone(), parts[2].clone()]).unwrap_err().to_string();
+            assert!(error.starts_with("parts: found none with slabs "), "{error}");
+            let error = Part::join([parts[0].clone(), parts[6].clone()]).unwrap_err().to_string();
+            assert!(error.contains(": region: found 21,0,"), "{error}");
+            let error = Part::join([parts[0].clone(), parts[0].clone()]).unwrap_err().to_string();
+            assert!(error.contains("allowed: parts that do not overlap"), "{error}");
+            assert_eq!(Part::join([]).unwrap_err().to_string(), "parts: found none, allowed: all parts of one image");
+        }
+    }
 }

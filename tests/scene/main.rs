@@ -143,6 +143,10 @@ fn every_key() {
         volume: file("folder/../b.nrrd"),
         spacing: Some(DVec3::new(1.0, 1.5, 3.0)),
         labels: Some(PathBuf::from("folder/segments/b.nrrd")),
+        index: None,
+        time: None,
+        name: None,
+        visible: true,
         camera: Camera {
             projection: Projection::Perspective { fov_y: 45.0, distance: Some(400.0), near: Some(2.0) },
             direction: DVec3::new(1.0, 0.5, 0.0),
@@ -175,6 +179,7 @@ fn every_key() {
             .into(),
             ..TransferSettings::default()
         },
+        further: Vec::new(),
         shading: Shading {
             enabled: false,
             ambient: 0.0,

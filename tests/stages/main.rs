@@ -1,6 +1,7 @@
 //! Every GPU stage against its f64 evaluation in `sheetsplat::internals::reference`, one stage at a time, in float.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod after;
 #[expect(dead_code, reason = "not every file needs all of it")]
 #[path = "../common/mod.rs"]
 mod common;
@@ -57,6 +58,7 @@ fn frame_over(grid: &Grid, scene: &Scene) -> Frame {
         gradient_opacity: None,
         iso_ranges: None,
         labels: BTreeMap::new(),
+        further: Vec::new(),
     });
     uniforms::frame(&view, &kernel, (grid, ValueFormat::Bits), &ramps, scene)
 }

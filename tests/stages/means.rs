@@ -13,7 +13,7 @@ use sheetsplat::internals::reference::composite::composite;
 use sheetsplat::internals::reference::{Buffer, Cuts, Means};
 use sheetsplat::settings::Clip;
 use sheetsplat::settings::Projection;
-use sheetsplat::settings::{Compositing, Method, Order};
+use sheetsplat::settings::{Compositing, Method, Order, Window};
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::{self, BufferUsages};
 
@@ -87,7 +87,8 @@ fn composited(
     let (group_buffer, stride) = at_offsets(device, &groups.iter().map(|group| uniform(group.0)).collect::<Vec<_>>());
     let [columns, rows] = tile_grid(view.size);
     let tiles = tile_list(device, &(0..columns * rows).collect::<Vec<_>>());
-    let (uncut, cut) = (Uncut::new(device), uniforms::cut(view, grid, &seen.scene, None, None));
+    let (uncut, cut) =
+        (Uncut::new(device), uniforms::cut(view, grid, &seen.scene, None, None, &Window::whole(view.size)));
     let rays = RayMode { cut: !seen.scene.clip.is_empty(), first_hit: false };
     let mode = CompositeMode { compositing: seen.scene.splatting.compositing, rays };
     let sheets = targets.sheets_view();

@@ -15,7 +15,7 @@ use sheetsplat::internals::kernel::Kernel;
 use sheetsplat::internals::pass::occlude::Occlude;
 use sheetsplat::internals::quad_plan::{FramePlan, TILE, tile_grid};
 use sheetsplat::internals::view_geometry::ViewGeometry;
-use sheetsplat::settings::{Method, Order};
+use sheetsplat::settings::{Method, Order, Window};
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::{BufferUsages, TextureFormat};
 
@@ -210,7 +210,14 @@ fn boxes_shrink_on_the_way_back() {
             scene.splatting.slab_width = random.pick(&[0.3, 1.0, 2.6]);
             let view = ViewGeometry::new(&grid, &scene.camera, &scene.splatting, [90, 70]).unwrap();
             let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
-            let plan = FramePlan::new([bricks.bricks()], view, random.pick(&[1, 2, 4]), Order::FrontToBack, 0.0..0.0);
+            let plan = FramePlan::new(
+                [bricks.bricks()],
+                view,
+                random.pick(&[1, 2, 4]),
+                Order::FrontToBack,
+                0.0..0.0,
+                &Window::whole([1; 2]).slabs,
+            );
             let filter =
                 |planes: &Range<f64>| uniforms::group(&view, &kernel, &scene.splatting, planes.clone()).box_filter;
             let filters: Vec<[u32; 2]> = plan.groups.iter().map(|group| filter(&group.planes)).collect();

@@ -2,6 +2,7 @@
 //! kernel reaches.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use glam::{DVec2, DVec4, UVec3};
 use sheetsplat::internals::brick::{self, BrickList};
@@ -10,8 +11,8 @@ use sheetsplat::internals::patch_bins::{self, PATCH, PatchBins, SHEETS, TileCapa
 use sheetsplat::internals::reference::{self, Geometry};
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::Order;
 use sheetsplat::settings::Projection;
+use sheetsplat::settings::{Order, Window};
 use sheetsplat::volume::Grid;
 
 use crate::common::{Random, camera, scene};
@@ -49,13 +50,18 @@ impl Case {
     }
 
     fn bins(&self, most_words: u64) -> Result<PatchBins, TileCapacityError> {
+        self.bins_of(&Window::whole([1; 2]).slabs, most_words)
+    }
+
+    /// The bins of some slabs.
+    fn bins_of(&self, drawn: &Range<i32>, most_words: u64) -> Result<PatchBins, TileCapacityError> {
         let Scene { camera, splatting, image, .. } = &self.scene;
         let view = ViewGeometry::new(&self.grid, camera, splatting, [image.width, image.height]).unwrap();
         PatchBins::new(
             self.bricks.bricks(),
             (&view, None),
             splatting.order,
-            0.0..0.0,
+            (0.0..0.0, drawn),
             self.kernel().support(),
             (0, 8),
             most_words,
@@ -121,6 +127,12 @@ fn every_kernel_is_in_the_bins_that_it_reaches_into() {
             let (needed, held) = (case.needed(), case.held(&bins));
             assert_eq!(bins.half_boxes.len(), bins.groups as usize);
             let missing: Vec<_> = needed.difference(&held).collect();
+            // A part has the bins of the groups that its slabs lie in, and no others.
+            for drawn in [-3..5, 2..3, -400..-1, 4..4] {
+                let is_drawn = |group: i32| group * 4 < drawn.end && group * 4 + 4 > drawn.start && !drawn.is_empty();
+                let of_part = held.iter().filter(|(group, ..)| is_drawn(*group)).copied();
+                assert_eq!(case.held(&case.bins_of(&drawn, u64::MAX).unwrap()), of_part.collect(), "{drawn:?}");
+            }
             assert!(missing.is_empty(), "{} of {}, {:?}: {:?}", missing.len(), needed.len(), missing[0], case.scene);
             let of = &mut all[usize::from(matches!(case.scene.camera.projection, Projection::Perspective { .. }))];
             *of = [of[0] + needed.len(), of[1] + held.len()];

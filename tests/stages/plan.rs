@@ -1,11 +1,13 @@
 //! The frame plan against `reference::geometry`: every kernel's brick is in the range of every sheet group that the kernel reaches.
 
+use std::ops::Range;
+
 use glam::{DVec3, UVec3};
 use sheetsplat::internals::brick::{self, BrickList};
 use sheetsplat::internals::quad_plan::{FramePlan, Overlaps};
 use sheetsplat::internals::reference::Geometry;
 use sheetsplat::internals::view_geometry::ViewGeometry;
-use sheetsplat::settings::Order;
+use sheetsplat::settings::{Order, Window};
 use sheetsplat::volume::Grid;
 
 use crate::common::{Random, camera, scene};
@@ -26,7 +28,16 @@ fn every_kernel_is_looked_at_by_every_group_that_it_reaches_into() {
                 (scene.splatting.radius, scene.splatting.slab_width) = (radius, slab_width);
                 let geometry = Geometry::new(&grid, &scene).unwrap();
                 let view = ViewGeometry::new(&grid, &scene.camera, &scene.splatting, [64, 48]).unwrap();
-                let plan = FramePlan::new(lists.each_ref().map(BrickList::bricks), view, sheets, order, 0.0..0.0);
+                let plan_of = |drawn: &Range<i32>| {
+                    FramePlan::new(lists.each_ref().map(BrickList::bricks), view, sheets, order, 0.0..0.0, drawn)
+                };
+                let plan = plan_of(&Window::whole([1; 2]).slabs);
+                // A part has the groups that its slabs lie in, and no others.
+                for drawn in [-3..5, 2..3, -400..-1, 4..4] {
+                    let is_drawn = |first: i32| first < drawn.end && first + sheets as i32 > drawn.start;
+                    let groups = plan.groups.iter().filter(|group| !drawn.is_empty() && is_drawn(group.first_slab));
+                    assert_eq!(plan_of(&drawn).groups, groups.cloned().collect::<Vec<_>>(), "{drawn:?}");
+                }
 
                 let firsts: Vec<i32> = plan.groups.iter().map(|group| group.first_slab).collect();
                 let (forwards, backwards) = (firsts.is_sorted_by(|a, b| a < b), firsts.is_sorted_by(|a, b| a > b));

@@ -1,5 +1,6 @@
 //! Arguments that several subcommands share.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -91,6 +92,12 @@ struct Raw {
     /// World units from voxel to voxel, of any volume: short for --set volume.spacing=[X,Y,Z].
     #[arg(long, value_name = "X,Y,Z")]
     spacing: Option<String>,
+    /// The only channel, counted from 0, to show of a file with several: short for --set volume.index=N.
+    #[arg(long, value_name = "N")]
+    channel: Option<String>,
+    /// The time, counted from 0, to show of a file with several: short for --set volume.time=N. `orbit` also takes A..B, the times A to B - 1 in turn.
+    #[arg(long, value_name = "N")]
+    time: Option<String>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -104,7 +111,8 @@ pub(crate) enum View {
 }
 
 impl Raw {
-    fn sets(&self) -> Vec<String> {
+    /// `time` is that to be shown.
+    fn sets(&self, time: Option<&str>) -> Vec<String> {
         let array = |key: &str, value: &Option<String>| value.as_ref().map(|value| format!("volume.{key}=[{value}]"));
         let plain = |key: &str, value: &Option<String>| value.as_ref().map(|value| format!("volume.{key}={value}"));
         let sets = [
@@ -113,6 +121,8 @@ impl Raw {
             plain("endian", &self.endian),
             plain("offset", &self.offset),
             array("spacing", &self.spacing),
+            plain("index", &self.channel),
+            time.map(|time| format!("volume.time={time}")),
         ];
         sets.into_iter().flatten().collect()
     }
@@ -138,7 +148,21 @@ impl Input {
 
     /// The scene with these settings in place of those of --set. The input is a scene file by its extension, or else a volume.
     pub(crate) fn scene_with(&self, sets: &[String]) -> Result<Scene, SceneError> {
-        let sets = self.raw.sets().into_iter().chain(self.look.sets()).chain(sets.iter().cloned()).collect::<Vec<_>>();
+        self.scene_of(self.raw.time.as_deref(), sets)
+    }
+
+    /// The scene at its first time and the times of --time A..B; at its own time if --time is no range.
+    pub(crate) fn scene_and_times(&self) -> Result<(Scene, Option<Range<u32>>), Failure> {
+        let Some(text) = self.raw.time.as_deref().filter(|text| text.contains("..")) else {
+            return Ok((self.scene()?, None));
+        };
+        let times = parse_range(text).map_err(|allowed| Failure::Input(format!("--time: found {text}, {allowed}")))?;
+        Ok((self.scene_of(Some(&times.start.to_string()), &self.sets)?, Some(times)))
+    }
+
+    fn scene_of(&self, time: Option<&str>, sets: &[String]) -> Result<Scene, SceneError> {
+        let sets =
+            self.raw.sets(time).into_iter().chain(self.look.sets()).chain(sets.iter().cloned()).collect::<Vec<_>>();
         match self.name.strip_prefix("builtin:") {
             Some(name) => Scene::from_volume(VolumeSource::Builtin(name.to_owned()), &sets),
             None if self.is_scene_file() => Scene::open_with(self.name.as_ref(), &sets, &self.reading.options()),
@@ -153,8 +177,12 @@ impl Input {
     /// The input files named by the arguments and the scene. A header may name more.
     pub(crate) fn files(&self, scene: &Scene) -> Vec<PathBuf> {
         let scene_file = self.is_scene_file().then(|| self.name.clone().into());
-        let volume = scene.volume.path().map(Path::to_path_buf);
-        [scene_file, volume, scene.labels.clone()].into_iter().flatten().collect()
+        let mut files: Vec<PathBuf> = scene_file.into_iter().collect();
+        for channel in scene.channels() {
+            files.extend(channel.volume.path().map(Path::to_path_buf));
+            files.extend(channel.labels.clone());
+        }
+        files
     }
 
     /// Loads the scene's volume, from files that are not outputs.
@@ -191,7 +219,7 @@ impl Input {
     ) -> Result<Scene, Failure> {
         let mut scene = scene.clone();
         self.look_at(volume, &mut scene)?;
-        scene.transfer.check_volume(volume).map_err(|error| self.failure(RenderError::from(error)))?;
+        scene.check_volume(volume).map_err(|error| self.failure(RenderError::from(error)))?;
         Ok(explicit(&scene, volume))
     }
 
@@ -222,14 +250,6 @@ impl Input {
         Ok(headless)
     }
 
-    /// What draws parts of a scene's image: without a choice of backend or adapter not a GPU, which draws no parts yet.
-    pub(crate) fn headless_for_parts(&self, scene: &Scene) -> Result<Headless, Failure> {
-        let backend = if self.backend == Backend::Auto && self.adapter.is_none() { Backend::Cpu } else { self.backend };
-        let mut options = HeadlessOptions::default().with_backend(backend);
-        options.adapter = self.adapter.clone();
-        Headless::for_scenes(&options, [scene]).map_err(|error| Failure::Other(error.to_string()))
-    }
-
     pub(crate) fn failure(&self, error: impl Into<Error>) -> Failure {
         Failure::of(error.into(), &self.name)
     }
@@ -256,6 +276,13 @@ impl From<Depth> for PngDepth {
 pub(crate) fn log_frame(what: &str, stats: &Stats) {
     let Stats { adapter, rasterizer, prepare_ms, frame_ms, .. } = stats;
     log::info!("{what}: {:.1} ms by {rasterizer} on {adapter}", prepare_ms + frame_ms);
+}
+
+/// Parses `A..B`, which must not be empty.
+pub(crate) fn parse_range(text: &str) -> Result<Range<u32>, String> {
+    let parse = |(from, to): (&str, &str)| Some(from.parse().ok()?..to.parse().ok()?);
+    let range = text.split_once("..").and_then(parse).filter(|range| !range.is_empty());
+    range.ok_or_else(|| "allowed: A..B, A less than B".to_owned())
 }
 
 /// Checks the name of a scene file that will be written.

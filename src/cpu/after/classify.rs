@@ -23,7 +23,7 @@ pub(super) struct Slab<S: Simd> {
     /// f0 and f1, as numbers.
     pub(super) values: [f32x8<S>; 2],
     /// Which pixels have a value on the near plane, and on the far one.
-    has_value: [u32; 2],
+    pub(super) has_value: [u32; 2],
 }
 
 /// The rays of a tile's pixels, as slabs are seen along them.
@@ -96,7 +96,7 @@ impl Frame<'_> {
                     let found = self.find_surfaces(simd, &slab, looks, planes, [column, row], buffers);
                     open.close(row, found << column);
                 } else if self.sheet(simd, &slab, looks, planes, [column, row], &mut buffers.sheet.rows[row]) {
-                    buffers.sheet.written |= 1 << row;
+                    buffers.sheet.mark(row, column);
                 }
             }
         }
@@ -267,6 +267,9 @@ impl Frame<'_> {
             return false;
         }
         let (mut amount, mut color) = (means.amount, means.color);
+        if let Some([red, green, blue, alpha]) = self.slab_colors(simd, slab, visible, planes, [column, row]) {
+            (amount, color) = (amount * alpha, [red, green, blue]);
+        }
         if self.needs_gradients {
             let [near, far] = self.gradients(simd, slab, visible, planes, [column, row]);
             let gradient = std::array::from_fn(|axis| near[axis] + (far[axis] - near[axis]) * means.share);
@@ -284,8 +287,11 @@ impl Frame<'_> {
         let visible = mask(simd, visible);
         let [red, green, blue] = color.map(|channel| visible.select(channel * amount, zero));
         let amount = visible.select(amount, zero);
-        for (channel, pixels) in sheet.iter_mut().zip([red, green, blue, amount]) {
-            pixels.store_slice(&mut channel[column..column + LANES]);
+        for (sums, amounts) in sheet.iter_mut().zip([red, green, blue, amount]) {
+            let sums = &mut sums[column..column + LANES];
+            let is_first = self.channel == 0;
+            let sum = if is_first { amounts } else { amounts + f32x8::from_slice(simd, sums) };
+            sum.store_slice(sums);
         }
         true
     }

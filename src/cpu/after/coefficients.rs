@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::UVec3;
 
 use super::cells::Cells;
+use super::colors::{Colors, ColorsOf};
 use super::extreme::is_choice;
 use super::slab_integral::Integrals;
 use crate::after::brick_ranges::{Bearing, BrickRanges};
@@ -28,6 +29,8 @@ pub(in crate::cpu) struct Coefficients {
     pub(super) numbers: Normalization,
     /// Of `interpolation = "exact"`; else they are the values.
     exact: Option<Arc<[f32]>>,
+    /// Of volumes of colours.
+    colors: Option<Colors>,
     shown: Option<Shown>,
 }
 
@@ -56,12 +59,18 @@ impl Coefficients {
         };
         let all = exact.as_deref().unwrap_or(volume.values());
         let numbers = Normalization::of(all.iter().copied()).unwrap_or(Normalization::new([0.0; 2]));
-        Ok(Self { numbers, exact, shown: None })
+        let colors = Colors::new(volume, splatting.interpolation, kernel)?;
+        Ok(Self { numbers, exact, colors, shown: None })
     }
 
     /// All of them, in memory order; NaN at holes.
     pub(in crate::cpu) fn all<'a>(&'a self, volume: &'a Volume) -> &'a [f32] {
         self.exact.as_deref().unwrap_or(volume.values())
+    }
+
+    /// The coefficients of the voxels' own colours, if they have any.
+    pub(super) fn colors<'a>(&'a self, volume: &'a Volume) -> Option<ColorsOf<'a>> {
+        self.colors.as_ref().and_then(|colors| colors.of(volume))
     }
 
     /// Forgets which bricks may be drawn, because the transfer function or the compositing changed.

@@ -31,18 +31,27 @@ pub(super) struct Chosen {
     best: Vec<Kept>,
     /// On both planes of the slab that a stretch's middle lies in.
     middle: Vec<[Kept; 2]>,
+    /// The colours of the three, where voxels have their own; else empty.
+    colors: Vec<[KeptColors; 3]>,
 }
 
+/// The colours of a row's pixels.
+type KeptColors = [[f32; COLUMNS]; 4];
+
+const BLACK: KeptColors = [[0.0; COLUMNS]; 4];
+
 impl Chosen {
-    /// Empty; of no rows if nothing is chosen.
-    pub(super) fn new(compositing: Compositing) -> Self {
+    /// Empty, with or without colours; of no rows if nothing is chosen.
+    pub(super) fn new(compositing: Compositing, has_colors: bool) -> Self {
         let rows = if is_choice(compositing) { ROWS } else { 0 };
-        Self { best: vec![NOTHING; rows], middle: vec![[NOTHING; 2]; rows] }
+        let colors = vec![[BLACK; 3]; if has_colors { rows } else { 0 }];
+        Self { best: vec![NOTHING; rows], middle: vec![[NOTHING; 2]; rows], colors }
     }
 
     pub(super) fn clear(&mut self) {
         self.best.fill(NOTHING);
         self.middle.fill([NOTHING; 2]);
+        self.colors.fill([BLACK; 3]);
     }
 
     /// The chosen values in the range of the coefficients, row by row (SPEC §11).
@@ -145,7 +154,24 @@ impl Frame<'_> {
             let load = |axis: usize| f32x8::from_slice(simd, &gradients[axis][column..column + LANES]);
             gradient = [load(0), load(1), load(2)];
         }
-        if self.compositing == Compositing::Average {
+        let is_average = self.compositing == Compositing::Average;
+        if let Some(kept) = chosen.colors.get_mut(row) {
+            self.find_colors(
+                simd,
+                plane,
+                (better | counts | middles[0] | middles[1]).to_bitmask() as u32,
+                [column, row],
+            );
+            let places = [if is_average { counts } else { better }, middles[0], middles[1]];
+            for (at, (kept, is_there)) in kept.iter_mut().zip(places).enumerate() {
+                for (kept, new) in kept.iter_mut().zip(&plane.colors[row]) {
+                    let [old, new] = [&*kept, new].map(|row| f32x8::from_slice(simd, &row[column..column + LANES]));
+                    let new = if at == 0 && is_average { old + new } else { new };
+                    is_there.select(new, old).store_slice(&mut kept[column..column + LANES]);
+                }
+            }
+        }
+        if is_average {
             chosen.best[row].add(simd, column, values, counts.to_bitmask() as u32);
         } else {
             chosen.best[row].set(simd, column, (values, &gradient, here), better.to_bitmask() as u32);
@@ -172,7 +198,7 @@ impl Frame<'_> {
     pub(super) fn classify_chosen<S: Simd>(&self, simd: S, looks: &Looks<'_>, chosen: &Chosen, buffers: &mut Buffers) {
         for (row, (best, middle)) in chosen.best.iter().zip(&chosen.middle).enumerate() {
             for column in (0..COLUMNS).step_by(LANES) {
-                self.classify_group(simd, looks, (best, middle), [column, row], buffers);
+                self.classify_group(simd, looks, (best, middle), chosen.colors.get(row), [column, row], buffers);
             }
         }
     }
@@ -183,6 +209,7 @@ impl Frame<'_> {
         simd: S,
         looks: &Looks<'_>,
         (best, [near, far]): (&Kept, &[Kept; 2]),
+        colors: Option<&[KeptColors; 3]>,
         [column, row]: [usize; 2],
         buffers: &mut Buffers,
     ) {
@@ -210,6 +237,15 @@ impl Frame<'_> {
             true => slab + share,
             false => has_best.select(load(&best.place), slab + share),
         };
+        // Where a middle is chosen, the mean of its slab's two planes.
+        let own = colors.map(|kept| {
+            let own = [0, 1, 2, 3].map(|component| {
+                let [best, near, far] = kept.each_ref().map(|kept| load(&kept[component]));
+                let middle = (has_near.select(near, far) + has_far.select(far, near)) * 0.5;
+                has_best.select(best / count, middle)
+            });
+            own.map(f32x8::to_array)
+        });
         let lengths = self.length(gradient).to_array();
         let places = place.to_array();
         let (mut alphas, mut colors) = ([0.0; LANES], [[0.0; LANES]; 3]);
@@ -223,8 +259,10 @@ impl Frame<'_> {
                 true => 0.0,
                 false => tables.alpha(value, f64::from(lengths[lane])) as f32,
             };
-            let color = tables.color.at(value);
-            (0..3).for_each(|channel| colors[channel][lane] = color[channel] as f32);
+            let color = tables.color.at(value).as_vec3().to_array();
+            let [rgb @ .., opacity] = own.map_or([color[0], color[1], color[2], 1.0], |own| own.map(|row| row[lane]));
+            alphas[lane] *= opacity;
+            (0..3).for_each(|channel| colors[channel][lane] = rgb[channel]);
         }
         let mut color = colors.each_ref().map(|channel| f32x8::load_array_ref(simd, channel));
         if !is_average {

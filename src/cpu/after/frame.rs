@@ -15,7 +15,7 @@ use super::place::Placement;
 use super::planes::Points;
 use super::slab_integral::Integrals;
 use super::tile::TileWalk;
-use crate::cpu::bin;
+use crate::cpu::bin::Placed;
 use crate::cpu::composite::Compositor;
 use crate::cpu::cut::{RayMode, TileRays};
 use crate::cpu::first_hit;
@@ -27,6 +27,7 @@ use crate::geometry::view_geometry::ViewGeometry;
 
 use crate::lists::brick;
 use crate::lists::brick::Brick;
+use crate::lists::quad_plan::tile_grid;
 use crate::part::Resolver;
 use crate::scene::Scene;
 use crate::settings::clip::HalfSpace;
@@ -37,9 +38,11 @@ use crate::settings::window::{Region, Window};
 use crate::stats::Counts;
 use crate::volume::Volume;
 
-/// Everything that decides a tile.
+/// Everything that decides a tile in one channel.
 #[derive(Debug)]
 pub(in crate::cpu) struct Frame<'a> {
+    /// The channel's number; sheets are sums over all channels (SPEC §10).
+    pub(super) channel: usize,
     pub(super) volume: &'a Volume,
     pub(super) transfer: &'a TransferFunction,
     pub(super) coefficients: &'a Coefficients,
@@ -67,8 +70,8 @@ pub(in crate::cpu) struct Frame<'a> {
     pub(super) labels: bool,
     /// To the eye, if that is far away.
     pub(super) to_eye: [f32; 3],
-    /// The slabs whose sheets may hold anything.
-    pub(super) touched: Range<i32>,
+    /// The slabs whose sheets may hold anything of the channel.
+    touched: Range<i32>,
     /// The slabs that are drawn.
     pub(super) slabs: Range<i32>,
     /// The pixels that are drawn.
@@ -86,16 +89,17 @@ const DRAWN: u8 = 2;
 const HAIR_OF_RANGE: f32 = 2e-6;
 
 impl<'a> Frame<'a> {
-    /// A frame in a view, the one that the coefficients were looked at in.
+    /// A channel's frame in a view, the one that the coefficients were looked at in.
     pub(in crate::cpu) fn new(
+        channel: usize,
         (volume, transfer): (&'a Volume, &'a TransferFunction),
         coefficients: &'a Coefficients,
         scene: &Scene,
         view: ViewGeometry,
-        Host { window, first_hit, surfaces }: Host,
+        Host { window, is_part, first_hit, surfaces }: Host,
     ) -> Self {
         let (splatting, shading, grid) = (&scene.splatting, &scene.shading, volume.grid());
-        let Window { slabs, region } = window.clone().unwrap_or_else(|| Window::whole(view.size));
+        let Window { slabs, region } = window;
         let placement = Placement::new(view, grid, &slabs);
         let (numbers, shown) = (coefficients.numbers, coefficients.bricks());
         let can_hide = splatting.compositing.hides() && splatting.order == Order::FrontToBack;
@@ -107,13 +111,14 @@ impl<'a> Frame<'a> {
             drawn[brick as usize].store(WANTED, Ordering::Relaxed);
         }
         Self {
+            channel,
             volume,
             transfer,
             coefficients,
             shown,
             field: Field::new(
                 volume,
-                coefficients.all(volume),
+                (coefficients.all(volume), coefficients.colors(volume)),
                 numbers,
                 (splatting.radius, splatting.falloff),
                 shading.gradient,
@@ -139,8 +144,7 @@ impl<'a> Frame<'a> {
             touched: touched(&placement, shown),
             slabs,
             region,
-            resolver: window
-                .is_none()
+            resolver: (!is_part)
                 .then(|| Resolver::new(splatting.compositing, Classification::After, scene.image.background)),
             placement,
         }
@@ -165,44 +169,61 @@ impl<'a> Frame<'a> {
         (rays, to_eye)
     }
 
-    /// Draws all tiles.
-    pub(in crate::cpu) fn draw(&self, level: Level) -> Drawing {
-        let size = self.placement.view.size;
-        let placed = self.placement.place_bricks(self.coefficients.wanted());
-        let has_hits = self.compositor.first_hit.is_some();
-        let has_extremes = self.resolver.is_none() && is_choice(self.compositing);
+    /// Draws all tiles, each in all channels.
+    pub(in crate::cpu) fn draw(frames: &[Self], level: Level) -> Drawing {
+        let first = &frames[0];
+        let size = first.placement.view.size;
+        let mut placed = first.placement.place_bricks(first.coefficients.wanted());
+        for frame in &frames[1..] {
+            let further = frame.placement.place_bricks(frame.coefficients.wanted());
+            placed.extend(further.into_iter().map(|placed| Placed { channel: frame.channel, ..placed }));
+        }
+        if frames.len() > 1 {
+            placed.par_sort_unstable_by_key(|placed| (placed.first, placed.channel, placed.brick));
+        }
+        let has_hits = first.compositor.first_hit.is_some();
+        let has_extremes = first.resolver.is_none() && is_choice(first.compositing);
         let (content, first_hits, tally) = draw_tiles(
-            (size, &self.region),
+            (size, &first.region),
             Outputs { has_hits, has_extremes },
             &placed,
-            || TileWalk::new(self),
+            || TileWalk::new(frames),
             |walk, origin, bricks| {
                 let (buffers, rays, tally) = dispatch!(level, simd => walk.draw(simd, origin, &placed, bricks));
-                let pixels = resolve::tile(self.resolver.as_ref(), buffers);
-                let unit = self.volume.grid().unit();
+                let pixels = resolve::tile(first.resolver.as_ref(), buffers);
+                let unit = first.volume.grid().unit();
                 let first_hits = match has_hits {
-                    true => first_hit::depths(buffers, rays, &self.rays.rays, origin, unit),
+                    true => first_hit::depths(buffers, rays, &first.rays.rays, origin, unit),
                     false => Vec::new(),
                 };
                 let extremes = if has_extremes { walk.extremes() } else { Vec::new() };
                 Tile { pixels, extremes, first_hits, tally }
             },
         );
-        let [columns, rows] = bin::tile_grid(size);
-        let sheets = self.touched.len() as u64;
-        let [sections_total, sections_rasterized] = self.sections();
+        let [columns, rows] = tile_grid(size);
+        let sheets = Self::touched(frames).len() as u64;
+        let sections = frames.iter().map(Self::sections).fold([0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
+        let voxels = |frame: &Self| -> u64 {
+            frame.shown.iter().map(|brick| u64::from(brick::present(brick).count_ones())).sum()
+        };
         let counts = Counts {
-            voxels_total: self.volume.values().len() as u64,
-            voxels_in_range: self.shown.iter().map(|brick| u64::from(brick::present(brick).count_ones())).sum(),
-            sections_total,
-            sections_rasterized,
+            voxels_total: first.volume.values().len() as u64,
+            voxels_in_range: frames.iter().map(voxels).sum(),
+            sections_total: sections[0],
+            sections_rasterized: sections[1],
             sheets,
-            tiles_total: (columns * rows) as u64 * sheets,
-            tiles_composited: tally.sheets_composited,
+            tiles_total: u64::from(columns * rows) * sheets,
+            tiles_composited: tally.tiles_composited,
             bricks_visited: tally.bricks_visited,
             ..Counts::default()
         };
         Drawing { content, counts, first_hits }
+    }
+
+    /// The slabs whose sheets may hold anything in any channel.
+    pub(super) fn touched(frames: &[Self]) -> Range<i32> {
+        let touched = frames.iter().map(|frame| frame.touched.clone()).filter(|touched| !touched.is_empty());
+        touched.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end)).unwrap_or(0..0)
     }
 
     /// Records that a tile draws one of the grid's bricks.

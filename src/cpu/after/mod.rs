@@ -13,6 +13,7 @@
 mod cells;
 mod classify;
 mod coefficients;
+mod colors;
 mod extreme;
 mod field;
 mod frame;

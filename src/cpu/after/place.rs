@@ -109,7 +109,16 @@ impl Placement {
                 (low <= high).then(|| [low as usize / side, high as usize / side])
             };
             let (columns, rows) = (tiles(0, COLUMNS)?, tiles(1, ROWS)?);
-            let placed = Placed { brick: number, first: slabs.start, half_box: [0.0; 2], columns, rows };
+            let placed = Placed {
+                brick: number,
+                channel: 0,
+                first: slabs.start,
+                half_box: [0.0; 2],
+                middle: [0.0; 2],
+                half: [0.0; 2],
+                columns,
+                rows,
+            };
             (!slabs.is_empty()).then_some(placed)
         };
         let mut placed: Vec<Placed> = bricks.par_iter().filter_map(place).collect();

@@ -89,14 +89,18 @@ pub(super) struct Plane {
     pub(super) known: [u32; ROWS],
     /// The pixels whose gradients are known.
     pub(super) graded: [u32; ROWS],
+    /// The pixels whose colours are known, where voxels have their own.
+    pub(super) colored: [u32; ROWS],
     /// The pixels that have been chosen from, where compositing chooses.
     pub(super) chosen: [u32; ROWS],
     pub(super) rows: Vec<PlaneRow>,
+    /// The colours of pixels, row by row; empty where voxels have none of their own.
+    pub(super) colors: Vec<[[f32; COLUMNS]; 4]>,
 }
 
 impl Plane {
-    /// Some plane, of which nothing is known.
-    pub(super) fn new() -> Self {
+    /// Some plane, of which nothing is known, with or without colours.
+    pub(super) fn new(has_colors: bool) -> Self {
         let row = PlaneRow { values: [f32::NAN; COLUMNS], gradients: [[0.0; COLUMNS]; 3] };
         let none = [0; ROWS];
         Self {
@@ -107,17 +111,18 @@ impl Plane {
             stays: none,
             known: none,
             graded: none,
+            colored: none,
             chosen: none,
             rows: vec![row; ROWS],
+            colors: vec![[[0.0; COLUMNS]; 4]; if has_colors { ROWS } else { 0 }],
         }
     }
 
     /// Makes this plane another one.
     pub(super) fn become_plane(&mut self, number: i32, points: Option<(Points, LowPass)>) {
         (self.number, self.points) = (number, points);
-        for rows in
-            [&mut self.seen, &mut self.reaches, &mut self.stays, &mut self.known, &mut self.graded, &mut self.chosen]
-        {
+        let Self { seen, reaches, stays, known, graded, colored, chosen, .. } = self;
+        for rows in [seen, reaches, stays, known, graded, colored, chosen] {
             *rows = [0; ROWS];
         }
     }

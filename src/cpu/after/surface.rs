@@ -28,6 +28,8 @@ struct Line<'a> {
     gradients: [DVec3; 2],
     /// From where to where.
     ends: [f64; 2],
+    /// A of the slab's colour.
+    own: f64,
 }
 
 impl Frame<'_> {
@@ -48,6 +50,8 @@ impl Frame<'_> {
         let numbers = slab.values.map(f32x8::to_array);
         let lines = self.gradients(simd, slab, slab.lanes, planes, [column, row]);
         let gradients = lines.map(|gradient| gradient.map(f32x8::to_array));
+        let own = self.slab_colors(simd, slab, slab.lanes, planes, [column, row]);
+        let own = own.map(|own| own.map(f32x8::to_array));
         let (mut found, mut places, mut colors) = (0, [0.0; LANES], [[0.0; LANES]; 3]);
         for lane in (0..LANES).filter(|lane| slab.lanes >> lane & 1 == 1) {
             let [start, end] = [starts[lane].max(0.0), ends[lane].min(1.0)].map(f64::from);
@@ -59,10 +63,13 @@ impl Frame<'_> {
             for ends in self.pieces(at, f64::from(slab.number), [start, end]) {
                 let middle = f64::from(slab.number) + (ends[0] + ends[1]) / 2.0;
                 let label = if self.labels { self.label(at, 0, middle) } else { None };
-                let line = Line { tables: self.transfer.tables(label), values, gradients, ends };
+                let own_alpha = own.map_or(1.0, |[.., alpha]| alpha[lane].into());
+                let line = Line { tables: self.transfer.tables(label), values, gradients, ends, own: own_alpha };
                 if let Some(place) = line.first_surface() {
                     let color = line.tables.color.at(line.value(place));
-                    (0..3).for_each(|channel| colors[channel][lane] = color[channel] as f32);
+                    (0..3).for_each(|channel| {
+                        colors[channel][lane] = own.map_or(color[channel] as f32, |own| own[channel][lane]);
+                    });
                     places[lane] = place as f32;
                     found |= 1 << lane;
                     break;
@@ -121,11 +128,11 @@ impl Line<'_> {
             .tables
             .gradient_opacity
             .map_or(1.0, |ramp| ramp.at(self.gradients[0].lerp(self.gradients[1], place).length()));
-        self.tables.opacity.at(self.value(place)) * factor
+        self.tables.opacity.at(self.value(place)) * factor * self.own
     }
 
     fn shows(&self, place: f64) -> bool {
-        self.tables.in_iso_range(self.value(place)) && self.opacity(place) >= HALF
+        self.tables.in_iso_range(self.tables.exact(self.value(place), self.values)) && self.opacity(place) >= HALF
     }
 
     /// The places between which the opacity's ramp has no kink and no iso-range ends, with both ends.

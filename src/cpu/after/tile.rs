@@ -2,6 +2,7 @@
 //! classified for the open pixels whose rays enter it in a cell of a brick that may have an opacity, and composited.
 
 use std::iter::Peekable;
+use std::ops::Range;
 
 use fearless_simd::Simd;
 
@@ -21,33 +22,47 @@ use crate::settings::splatting::Compositing;
 
 /// The state with which a thread draws one tile after another.
 pub(super) struct TileWalk<'a> {
+    /// The first channel's, for what all channels have in common.
     frame: &'a Frame<'a>,
+    channels: Vec<Channel<'a>>,
+    /// The slabs whose sheets may hold anything.
+    touched: Range<i32>,
     /// The tile's first pixel.
     origin: [usize; 2],
     open: OpenMask,
     rays: TileRays,
     to_eye: Vec<[[f32; COLUMNS]; 3]>,
-    /// The current slab's.
-    planes: [Plane; 2],
     buffers: Buffers,
     chosen: Chosen,
-    /// The bricks whose cells the current slab may be in: the slab with which they end, and their pixels.
-    active: Vec<(i32, Pixels)>,
     tally: Tally,
 }
 
+/// One channel of a tile.
+struct Channel<'a> {
+    frame: &'a Frame<'a>,
+    /// The current slab's.
+    planes: [Plane; 2],
+    /// The bricks whose cells the current slab may be in: the slab with which they end, and their pixels.
+    active: Vec<(i32, Pixels)>,
+}
+
 impl<'a> TileWalk<'a> {
-    pub(super) fn new(frame: &'a Frame<'a>) -> Self {
+    pub(super) fn new(frames: &'a [Frame<'a>]) -> Self {
+        let frame = &frames[0];
+        let channel = |frame: &'a Frame<'a>| {
+            let planes = [(); 2].map(|()| Plane::new(frame.field.has_colors()));
+            Channel { frame, planes, active: Vec::new() }
+        };
         Self {
             frame,
+            channels: frames.iter().map(channel).collect(),
+            touched: Frame::touched(frames),
             origin: [0; 2],
             open: OpenMask::new(COLUMNS, ROWS),
             rays: TileRays::default(),
             to_eye: Vec::new(),
-            planes: [Plane::new(), Plane::new()],
             buffers: Buffers::new(),
-            chosen: Chosen::new(frame.compositing),
-            active: Vec::new(),
+            chosen: Chosen::new(frame.compositing, frame.field.has_colors()),
             tally: Tally::default(),
         }
     }
@@ -91,8 +106,10 @@ impl<'a> TileWalk<'a> {
         if let (Some(shown), Some(_)) = (&self.rays.shown, self.frame.compositor.threshold) {
             self.open.close_empty(shown);
         }
-        self.planes[1].become_plane(slab, self.frame.points(slab, origin));
-        self.active.clear();
+        for Channel { frame, planes, active } in &mut self.channels {
+            planes[1].become_plane(slab, frame.points(slab, origin));
+            active.clear();
+        }
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
@@ -102,8 +119,12 @@ impl<'a> TileWalk<'a> {
             while let Some(placed) = bricks.next_if(|placed| placed.first <= slab) {
                 self.arrive(placed);
             }
-            self.active.retain(|&(end, _)| slab < end);
-            if self.active.is_empty() {
+            let mut is_idle = true;
+            for Channel { active, .. } in &mut self.channels {
+                active.retain(|&(end, _)| slab < end);
+                is_idle &= active.is_empty();
+            }
+            if is_idle {
                 let Some(next) = bricks.peek() else { break };
                 slab = next.first;
                 continue;
@@ -119,8 +140,9 @@ impl<'a> TileWalk<'a> {
         let placement = &self.frame.placement;
         let (bounds, slabs) = placement.bounds(placement.brick(placed.brick));
         if let Some(pixels) = self.pixels(bounds).filter(|pixels| self.open.sees(pixels)) {
-            self.active.push((slabs.end, pixels));
-            self.frame.draw_brick(placed.brick);
+            let Channel { frame, active, .. } = &mut self.channels[placed.channel];
+            active.push((slabs.end, pixels));
+            frame.draw_brick(placed.brick);
             self.tally.bricks_visited += 1;
         }
     }
@@ -138,15 +160,43 @@ impl<'a> TileWalk<'a> {
 
     /// Goes to a slab, to the next one if it can be.
     fn enter(&mut self, slab: i32) {
-        let Self { frame, origin, planes, .. } = self;
-        planes.swap(0, 1);
-        for (plane, number) in planes.iter_mut().zip([slab, slab + 1]) {
-            if plane.number != number || number == slab + 1 {
-                plane.become_plane(number, frame.points(number, *origin));
+        let Self { channels, origin, .. } = self;
+        for Channel { frame, planes, .. } in channels {
+            planes.swap(0, 1);
+            for (plane, number) in planes.iter_mut().zip([slab, slab + 1]) {
+                if plane.number != number || number == slab + 1 {
+                    plane.become_plane(number, frame.points(number, *origin));
+                }
             }
         }
     }
 
+    /// Classifies and composites a slab.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn composite<S: Simd>(&mut self, simd: S, slab: i32) {
+        let Self { frame, open, rays, to_eye, buffers, tally, channels, chosen, .. } = self;
+        let looks = Looks::new(self.origin, rays, to_eye);
+        for channel in channels.iter_mut().filter(|channel| !channel.active.is_empty()) {
+            let wanted = channel.wanted();
+            let Channel { frame, planes, .. } = channel;
+            if is_choice(frame.compositing) {
+                frame.choose(simd, &looks, planes, &wanted, chosen);
+            } else {
+                frame.classify(simd, slab, &looks, planes, &wanted, open, buffers);
+            }
+        }
+        if is_choice(frame.compositing) || frame.compositing == Compositing::Surface {
+            return;
+        }
+        let begin = rays.begin(slab);
+        let tiles = frame.compositor.composite(simd, buffers, (rays, begin), open);
+        if self.touched.contains(&slab) {
+            tally.tiles_composited += tiles;
+        }
+    }
+}
+
+impl Channel<'_> {
     /// The bits of the pixels, row by row, whose rays may meet a brick's cells in the current slab.
     fn wanted(&self) -> [u32; ROWS] {
         let mut wanted = [0; ROWS];
@@ -155,23 +205,5 @@ impl<'a> TileWalk<'a> {
             wanted[*first..=*last].iter_mut().for_each(|row| *row |= columns);
         }
         wanted
-    }
-
-    /// Classifies and composites a slab.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn composite<S: Simd>(&mut self, simd: S, slab: i32) {
-        let wanted = self.wanted();
-        let Self { frame, open, rays, to_eye, buffers, tally, planes, chosen, .. } = self;
-        let looks = Looks::new(self.origin, rays, to_eye);
-        if is_choice(frame.compositing) {
-            return frame.choose(simd, &looks, planes, &wanted, chosen);
-        }
-        frame.classify(simd, slab, &looks, planes, &wanted, open, buffers);
-        if frame.compositing == Compositing::Surface {
-            return;
-        }
-        let begin = rays.begin(slab);
-        let is_composited = frame.compositor.composite(simd, buffers, (rays, begin), open);
-        tally.sheets_composited += u64::from(is_composited && frame.touched.contains(&slab));
     }
 }

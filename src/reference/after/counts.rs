@@ -27,38 +27,29 @@ const SIDE: u32 = 4;
 /// # Errors
 /// If the scene needs more than can be computed.
 pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Counts, RenderError> {
-    Ok(count_in(&Frame::new(Host::default(), volume, transfer, scene)?))
+    Ok(count_in(&Frame::of_channels(Host::default(), volume, transfer, scene)?))
 }
 
-/// The counts of a frame. No voxel is shaded, because pixels are shaded instead.
-pub(super) fn count_in(frame: &Frame) -> Counts {
-    let geometry = &frame.geometry;
-    let grid = &geometry.grid;
-    let reach = reach(frame);
-    let tables = tables(frame);
-    let bricks = grid.dims.map(|n| n.div_ceil(SIDE));
-    let drawn: Vec<[UVec3; 2]> = (0..bricks.element_product())
-        .into_par_iter()
-        .map(|index| UVec3::new(index % bricks.x, index / bricks.x % bricks.y, index / bricks.x / bricks.y) * SIDE)
-        .map(|first| [first, (first + SIDE).min(grid.dims)])
-        .filter(|&[first, end]| {
-            values(frame, first, end, reach).is_some_and(|ends| meets_opacity(&tables, bearing(frame, ends)))
-        })
-        .collect();
-    let voxels = |&[first, end]: &[UVec3; 2]| u64::from((end - first).element_product());
-    let sections = |&[first, end]: &[UVec3; 2]| {
-        let planes = |voxel| planes(frame, voxel);
-        (first.z..end.z)
+/// The counts of the frames of all channels, each of whose fields is drawn by itself. No voxel is shaded, because pixels are shaded instead.
+pub(super) fn count_in(frames: &[Frame]) -> Counts {
+    let frame = &frames[0];
+    // The numbers of voxels, and of sections, in a brick. Holes are not drawn.
+    let of_brick = |frame: &Frame, &[first, end]: &[UVec3; 2]| {
+        let voxels = (first.z..end.z)
             .flat_map(|z| (first.y..end.y).flat_map(move |y| (first.x..end.x).map(move |x| UVec3::new(x, y, z))))
-            .map(planes)
-            .sum::<u64>()
+            .filter(|voxel| !frame.volume.value(*voxel).is_nan());
+        voxels.fold([0, 0], |[count, sections], voxel| [count + 1, sections + planes(frame, voxel)])
     };
-    let sheets = sheets(frame, &drawn);
-    let sections: u64 = drawn.par_iter().map(sections).sum();
+    let drawn: Vec<Vec<[UVec3; 2]>> = frames.iter().map(drawn_bricks).collect();
+    let pairs: Vec<(&Frame, &[UVec3; 2])> =
+        frames.iter().zip(&drawn).flat_map(|(frame, bricks)| bricks.iter().map(move |brick| (frame, brick))).collect();
+    let counts = pairs.par_iter().map(|(frame, brick)| of_brick(frame, brick));
+    let [voxels, sections] = counts.reduce(|| [0, 0], |a, b| [a[0] + b[0], a[1] + b[1]]);
+    let sheets = sheets(frame, &drawn.concat());
     let [columns, rows] = tile_grid([frame.scene.image.width, frame.scene.image.height]).map(u64::from);
     Counts {
         voxels_total: frame.volume.values().len() as u64,
-        voxels_in_range: drawn.iter().map(voxels).sum(),
+        voxels_in_range: voxels,
         sections_total: sections,
         sections_rasterized: sections,
         sheets,
@@ -66,6 +57,22 @@ pub(super) fn count_in(frame: &Frame) -> Counts {
         tiles_composited: columns * rows * sheets,
         ..Counts::default()
     }
+}
+
+/// The bricks of a channel that may be drawn, as their first voxels and the ends behind their last ones.
+fn drawn_bricks(frame: &Frame) -> Vec<[UVec3; 2]> {
+    let grid = &frame.geometry.grid;
+    let reach = reach(frame);
+    let tables = tables(frame);
+    let bricks = grid.dims.map(|n| n.div_ceil(SIDE));
+    (0..bricks.element_product())
+        .into_par_iter()
+        .map(|index| UVec3::new(index % bricks.x, index / bricks.x % bricks.y, index / bricks.x / bricks.y) * SIDE)
+        .map(|first| [first, (first + SIDE).min(grid.dims)])
+        .filter(|&[first, end]| {
+            values(frame, first, end, reach).is_some_and(|ends| meets_opacity(&tables, bearing(frame, ends)))
+        })
+        .collect()
 }
 
 /// The distance from a brick, in voxels along each axis, of the voxels that affect it.

@@ -12,6 +12,8 @@ struct Point {
     sheet: f64,
     value: f64,
     gradient: DVec3,
+    /// The colour and A, if voxels have their own.
+    own: Option<DVec4>,
     /// As in [`Extreme::counted`].
     counted: f32,
 }
@@ -26,19 +28,20 @@ pub(super) fn composite(pixel: &Pixel) -> Composited {
         Compositing::Average => average(pixel),
         _ => extreme(pixel, compositing == Compositing::Minimum),
     };
-    let Some(Point { sheet, value, gradient, counted }) = chosen else {
+    let Some(Point { sheet, value, gradient, own, counted }) = chosen else {
         return Composited::new(DVec4::ZERO, None);
     };
     let [min, max] = pixel.frame().field.range();
     let share = if max > min { (value - min) / (max - min) } else { 0.0 };
     let tables = pixel.tables(sheet);
-    let base = tables.color.at(value);
+    let base = own.map_or_else(|| tables.color.at(value), DVec4::truncate);
+    let opacity = own.map_or(1.0, |own| own.w);
     let color = if compositing == Compositing::Average {
         let alpha = if tables.visible && tables.in_iso_range(value) { tables.opacity.at(value) } else { 0.0 };
-        base.extend(1.0) * alpha
+        base.extend(1.0) * alpha * opacity
     } else {
         let alpha = tables.alpha(value, gradient.length());
-        shading::color(&scene.shading, base, gradient, pixel.to_eye()).extend(1.0) * alpha
+        shading::color(&scene.shading, base, gradient, pixel.to_eye()).extend(1.0) * alpha * opacity
     };
     let first_hit = pixel.frame().host.first_hit.filter(|&opacity| color.w >= opacity).map(|_| sheet);
     Composited { color, first_hit, extreme: Extreme { value: share as f32, counted } }
@@ -65,7 +68,8 @@ fn extreme(pixel: &Pixel, is_minimum: bool) -> Option<Point> {
     };
     let Some((plane, _)) = points(pixel).reduce(nearest) else { return middle(pixel) };
     let value = points(pixel).map(|(_, value)| value).reduce(if is_minimum { f64::min } else { f64::max })?;
-    Some(Point { sheet: plane.into(), value, gradient: pixel.gradient(plane), counted: Extreme::POINT })
+    let (gradient, own) = (pixel.gradient(plane), pixel.color(plane));
+    Some(Point { sheet: plane.into(), value, gradient, own, counted: Extreme::POINT })
 }
 
 /// The mean value, placed in the middle of the stretch.
@@ -76,7 +80,8 @@ fn average(pixel: &Pixel) -> Option<Point> {
     }
     let stretch = pixel.stretch();
     let sheet = (stretch.start + stretch.end) / 2.0;
-    Some(Point { sheet, value: sum / count, gradient: DVec3::ZERO, counted: Extreme::POINT })
+    let own = points(pixel).map(|(plane, _)| pixel.color(plane)).sum::<Option<DVec4>>().map(|sum| sum / count);
+    Some(Point { sheet, value: sum / count, gradient: DVec3::ZERO, own, counted: Extreme::POINT })
 }
 
 /// If the stretch contains no plane's value: the point in its middle, on the line of values of the slab there.
@@ -85,5 +90,6 @@ fn middle(pixel: &Pixel) -> Option<Point> {
     let number = sheet.floor() as i32;
     let slab = pixel.slab(number).filter(|_| pixel.frame().slabs.contains(&number))?;
     let (share, [f0, f1], [near, far]) = (sheet - sheet.floor(), slab.values, pixel.gradients(&slab));
-    Some(Point { sheet, value: f0 + (f1 - f0) * share, gradient: near.lerp(far, share), counted: Extreme::MIDDLE })
+    let (value, gradient, own) = (f0 + (f1 - f0) * share, near.lerp(far, share), pixel.slab_color(&slab));
+    Some(Point { sheet, value, gradient, own, counted: Extreme::MIDDLE })
 }

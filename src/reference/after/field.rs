@@ -3,7 +3,7 @@
 //! Every voxel i that is not a hole has the weight `g_i = exp(-falloff·|δ_i|²)` if `|δ_i| < radius`, else 0. With `N = Σ g_i` the field is
 //! `f = Σ c_i·g_i / N`: a weighted mean, so constant data has no ripple, not even at borders.
 
-use glam::{DVec3, UVec3};
+use glam::{DVec3, DVec4, UVec3};
 
 use super::coefficients;
 use super::low_pass::LowPass;
@@ -22,6 +22,8 @@ pub struct Field<'a> {
     volume: &'a Volume,
     /// c for every voxel; NaN at holes.
     coefficients: Vec<f64>,
+    /// The same of colours and A, if the voxels have their own (SPEC §10); 0 at holes.
+    colors: Option<Vec<DVec4>>,
     /// Their minimum and maximum.
     range: [f64; 2],
     radius: f64,
@@ -42,10 +44,11 @@ impl<'a> Field<'a> {
             Interpolation::Smooth => values,
             Interpolation::Exact => coefficients::exact(volume.grid(), &values, radius, falloff)?,
         };
+        let colors = volume.colors().is_some().then(|| colors(volume, scene)).transpose()?;
         // `min` and `max` ignore NaN.
         let range =
             coefficients.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[min, max], &c| [min.min(c), max.max(c)]);
-        Ok(Self { volume, coefficients, range, radius, falloff, gradient: scene.shading.gradient })
+        Ok(Self { volume, coefficients, colors, range, radius, falloff, gradient: scene.shading.gradient })
     }
 
     /// f at a point in voxel coordinates; `None` where the sum of the weights is too small or the nearest voxel is a hole.
@@ -59,6 +62,17 @@ impl<'a> Field<'a> {
             weights += weight;
         });
         (weights >= MIN_WEIGHT).then(|| sum / weights)
+    }
+
+    /// The colour and A at a point that has a value, in [0, 1]; `None` where voxels have none of their own.
+    pub fn color(&self, at: DVec3, low_pass: &LowPass) -> Option<DVec4> {
+        let colors = self.colors.as_ref()?;
+        let (mut sum, mut weights) = (DVec4::ZERO, 0.0);
+        self.each(at, low_pass, |index, weight, _| {
+            sum += colors[index as usize] * weight;
+            weights += weight;
+        });
+        Some((sum / weights).clamp(DVec4::ZERO, DVec4::ONE))
     }
 
     /// ∇f per world unit of the unwarped space, at a point that has a value.
@@ -122,6 +136,23 @@ impl<'a> Field<'a> {
     pub fn coefficients(&self) -> &[f64] {
         &self.coefficients
     }
+}
+
+/// The coefficients of a volume's colours.
+fn colors(volume: &Volume, scene: &Scene) -> Result<Vec<DVec4>, RenderError> {
+    let (radius, falloff) = (scene.splatting.radius, scene.splatting.falloff);
+    let is_hole = |index: u32| volume.values()[index as usize].is_nan();
+    let indices = 0..volume.values().len() as u32;
+    let mut colors: Vec<DVec4> = indices.clone().filter_map(|index| volume.color(index)).collect();
+    if scene.splatting.interpolation == Interpolation::Exact {
+        for component in 0..4 {
+            let own = |index: u32| if is_hole(index) { f64::NAN } else { colors[index as usize][component] };
+            let numbers: Vec<f64> = indices.clone().map(own).collect();
+            let exact = coefficients::exact(volume.grid(), &numbers, radius, falloff)?;
+            colors.iter_mut().zip(exact).for_each(|(color, number)| color[component] = number);
+        }
+    }
+    Ok(colors)
 }
 
 /// The index in memory of the voxel whose cell contains a point in voxel coordinates; beyond all cells, of the nearest voxel.

@@ -31,6 +31,7 @@ use rayon::prelude::*;
 
 use super::{Areas, Buffer, Culled, Geometry, Host, resolve};
 use crate::error::RenderError;
+use crate::lists::classify::channels;
 use crate::part::Content;
 use crate::scene::Scene;
 use crate::settings::splatting::Compositing;
@@ -43,7 +44,7 @@ pub use field::Field;
 use low_pass::LowPass;
 pub use pixel::{Composited, Pixel, Sample, Slab};
 
-/// A scene that is ready to be drawn.
+/// One channel of a scene, ready to be drawn.
 #[derive(Debug)]
 pub struct Frame<'a> {
     volume: &'a Volume,
@@ -57,6 +58,8 @@ pub struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
+    /// The first channel's.
+    ///
     /// # Errors
     /// If the scene needs more than can be computed.
     pub fn new(
@@ -68,7 +71,32 @@ impl<'a> Frame<'a> {
         scene.check()?;
         transfer.check()?;
         host.check(scene)?;
-        let scene = scene.framed(volume, transfer);
+        Self::of_channel(host, volume, transfer, scene.framed(volume, transfer))
+    }
+
+    /// Those of all channels, which share everything that depends on the view.
+    ///
+    /// # Errors
+    /// If the scene needs more than can be computed.
+    pub fn of_channels(
+        host: Host<'a>,
+        volume: &'a Volume,
+        transfer: &'a TransferFunction,
+        scene: &Scene,
+    ) -> Result<Vec<Self>, RenderError> {
+        let first = Self::new(host, volume, transfer, scene)?;
+        let scene = first.scene.clone();
+        let further = channels(volume, transfer).skip(1);
+        let further = further.map(|(volume, transfer)| Self::of_channel(host, volume, transfer, scene.clone()));
+        std::iter::once(Ok(first)).chain(further).collect()
+    }
+
+    fn of_channel(
+        host: Host<'a>,
+        volume: &'a Volume,
+        transfer: &'a TransferFunction,
+        scene: Scene,
+    ) -> Result<Self, RenderError> {
         let geometry = Geometry::new(volume.grid(), &scene)?;
         let field = Field::new(volume, &scene)?;
         Ok(Self { volume, transfer, scene, host, slabs: Window::ALL_SLABS, geometry, field })
@@ -119,20 +147,26 @@ impl<'a> Frame<'a> {
         Buffer { width: self.geometry.size.x as usize, pixels: self.each_pixel(sheet) }
     }
 
-    /// All pixels composited, row by row.
+    /// All pixels composited from this channel, row by row.
     pub fn composite(&self) -> Vec<Composited> {
-        self.each_pixel(|pixel| pixel.composite())
+        composite(std::slice::from_ref(self), &Region::whole(self.geometry.size.as_uvec2().to_array()))
     }
 
     fn each_pixel<T: Send>(&self, of: impl Fn(Pixel) -> T + Sync) -> Vec<T> {
-        self.each_pixel_in(&Region::whole(self.geometry.size.as_uvec2().to_array()), of)
+        each_place_in(&Region::whole(self.geometry.size.as_uvec2().to_array()), |at| of(self.pixel(at)))
     }
+}
 
-    fn each_pixel_in<T: Send>(&self, region: &Region, of: impl Fn(Pixel) -> T + Sync) -> Vec<T> {
-        let Region { x, y, width, height } = *region;
-        let pixels = (0..width * height).into_par_iter();
-        pixels.map(|at| of(self.pixel(UVec2::new(x + at % width, y + at / width)))).collect()
-    }
+/// The pixels of a region composited from all channels, row by row.
+fn composite(frames: &[Frame], region: &Region) -> Vec<Composited> {
+    let pixel = |at: UVec2| pixel::composite(&frames.iter().map(|frame| frame.pixel(at)).collect::<Vec<_>>());
+    each_place_in(region, pixel)
+}
+
+fn each_place_in<T: Send>(region: &Region, of: impl Fn(UVec2) -> T + Sync) -> Vec<T> {
+    let Region { x, y, width, height } = *region;
+    let pixels = (0..width * height).into_par_iter();
+    pixels.map(|at| of(UVec2::new(x + at % width, y + at / width))).collect()
 }
 
 /// See [`super::part`].
@@ -142,8 +176,9 @@ pub(super) fn part(
     scene: &Scene,
     Window { slabs, region }: &Window,
 ) -> Result<Content, RenderError> {
-    let frame = Frame { slabs: slabs.clone(), ..Frame::new(Host::default(), volume, transfer, scene)? };
-    let pixels = frame.each_pixel_in(region, |pixel| pixel.composite());
+    let mut frames = Frame::of_channels(Host::default(), volume, transfer, scene)?;
+    frames.iter_mut().for_each(|frame| frame.slabs = slabs.clone());
+    let pixels = composite(&frames, region);
     let colors = pixels.iter().map(|pixel| pixel.color.as_vec4().to_array()).collect();
     let is_extreme = matches!(scene.splatting.compositing, Compositing::Maximum | Compositing::Minimum);
     let extremes = pixels.iter().filter(|_| is_extreme).map(|pixel| pixel.extreme).collect();
@@ -160,8 +195,8 @@ pub fn render_for(
     transfer: &TransferFunction,
     scene: &Scene,
 ) -> Result<Culled, RenderError> {
-    let frame = Frame::new(host, volume, transfer, scene)?;
-    let pixels = frame.composite();
+    let frames = Frame::of_channels(host, volume, transfer, scene)?;
+    let pixels = composite(&frames, &Region::whole([scene.image.width, scene.image.height]));
     let acc = Buffer { width: scene.image.width as usize, pixels: pixels.iter().map(|pixel| pixel.color).collect() };
     // Sums are clamped; the other modes already give premultiplied RGBA.
     let resolved_as = match scene.splatting.compositing {
@@ -171,12 +206,12 @@ pub fn render_for(
     let image = resolve::resolve(&acc, resolved_as, scene.image.background).into_image();
     let depth = |(at, pixel): (usize, &Composited)| {
         let at = UVec2::new((at % acc.width) as u32, (at / acc.width) as u32);
-        pixel.first_hit.map_or(f64::INFINITY, |sheet| frame.pixel(at).depth(sheet))
+        pixel.first_hit.map_or(f64::INFINITY, |sheet| frames[0].pixel(at).depth(sheet))
     };
     let first_hits = match host.first_hit {
         Some(_) => pixels.iter().enumerate().map(depth).collect(),
         None => Vec::new(),
     };
-    let sections = counts::count_in(&frame).sections_total;
+    let sections = counts::count_in(&frames).sections_total;
     Ok(Culled { image, sections, areas: Areas::default(), first_hits })
 }

@@ -156,6 +156,17 @@ impl<'a> Pixel<'a> {
         self.frame.low_pass(plane).map_or(DVec3::ZERO, |rule| self.frame.field.gradient(self.at(plane.into()), &rule))
     }
 
+    /// The colour and A where the ray meets a plane that has a value there, if voxels have their own (SPEC §10).
+    pub fn color(&self, plane: i32) -> Option<DVec4> {
+        self.frame.field.color(self.at(plane.into()), &self.frame.low_pass(plane)?)
+    }
+
+    /// Those of a slab: the mean of its two planes'.
+    pub fn slab_color(&self, slab: &Slab) -> Option<DVec4> {
+        let [near, far] = slab.planes;
+        Some((self.color(near)? + self.color(far)?) / 2.0)
+    }
+
     /// f and ∇f where the ray meets a plane.
     pub fn sample(&self, plane: i32) -> Option<Sample> {
         self.value(plane).map(|value| Sample { value, gradient: self.gradient(plane) })
@@ -184,6 +195,9 @@ impl<'a> Pixel<'a> {
             return DVec4::ZERO;
         };
         let (mut amount, mut color) = (means.amount, means.color);
+        if let Some(own) = self.slab_color(slab) {
+            (amount, color) = (amount * own.w, own.truncate());
+        }
         if scene.shading.enabled || tables.gradient_opacity.is_some() {
             let [near, far] = self.gradients(slab);
             let gradient = near.lerp(far, means.share);
@@ -192,40 +206,48 @@ impl<'a> Pixel<'a> {
         }
         color.extend(1.0) * amount * (shown.end - shown.start) * self.length_per_sheet
     }
+}
 
-    /// The pixel composited from all slabs by the scene's rule.
-    pub fn composite(&self) -> Composited {
-        match self.frame.scene.splatting.compositing {
-            Compositing::Linear | Compositing::Exponential | Compositing::Xray => self.composite_sheets(),
-            Compositing::Surface => surface::composite(self),
-            Compositing::Maximum | Compositing::Minimum | Compositing::Average => extreme::composite(self),
+/// A pixel composited from all slabs by the scene's rule, given in every channel. Where channels share no sheets there is one.
+pub(super) fn composite(channels: &[Pixel]) -> Composited {
+    let first = &channels[0];
+    match first.frame.scene.splatting.compositing {
+        Compositing::Linear | Compositing::Exponential | Compositing::Xray => composite_sheets(channels),
+        Compositing::Surface => surface::composite(first),
+        Compositing::Maximum | Compositing::Minimum | Compositing::Average => extreme::composite(first),
+    }
+}
+
+/// Composites front to back; the other order gives the same image. A sheet is the sum of all channels' (SPEC §10).
+fn composite_sheets(channels: &[Pixel]) -> Composited {
+    let first = &channels[0];
+    let (compositing, wanted) = (first.frame.scene.splatting.compositing, first.frame.host.first_hit);
+    let mut pixel = Composited::new(DVec4::ZERO, None);
+    let slabs = first.slabs();
+    let mut nears: Vec<Option<f64>> = channels.iter().map(|channel| channel.value(slabs.start)).collect();
+    for k in slabs {
+        let mut sum = None;
+        for (channel, near) in channels.iter().zip(&mut nears) {
+            let far = channel.value(k + 1);
+            if let Some(slab) = Slab::new(k, *near, far) {
+                *sum.get_or_insert(DVec4::ZERO) += channel.sheet(&slab);
+            }
+            *near = far;
+        }
+        if let Some(sheet) = sum {
+            let before = pixel.color.w;
+            composite_pixel(&mut pixel.color, sheet, compositing, Order::FrontToBack);
+            let after = pixel.color.w;
+            if let Some(opacity) = wanted.filter(|&opacity| pixel.first_hit.is_none() && after >= opacity) {
+                let shown = first.shown(k);
+                let share = if after > before { (opacity - before) / (after - before) } else { 0.0 };
+                pixel.first_hit = Some(shown.start + (shown.end - shown.start) * share);
+            }
+        }
+        let hit = wanted.is_none() || pixel.first_hit.is_some();
+        if compositing.hides() && hit && pixel.color.w >= 1.0 - REST {
+            break;
         }
     }
-
-    /// Composites front to back; the other order gives the same image.
-    fn composite_sheets(&self) -> Composited {
-        let (compositing, wanted) = (self.frame.scene.splatting.compositing, self.frame.host.first_hit);
-        let mut pixel = Composited::new(DVec4::ZERO, None);
-        let slabs = self.slabs();
-        let mut near = self.value(slabs.start);
-        for k in slabs {
-            let far = self.value(k + 1);
-            if let Some(slab) = Slab::new(k, near, far) {
-                let before = pixel.color.w;
-                composite_pixel(&mut pixel.color, self.sheet(&slab), compositing, Order::FrontToBack);
-                let after = pixel.color.w;
-                if let Some(opacity) = wanted.filter(|&opacity| pixel.first_hit.is_none() && after >= opacity) {
-                    let shown = self.shown(k);
-                    let share = if after > before { (opacity - before) / (after - before) } else { 0.0 };
-                    pixel.first_hit = Some(shown.start + (shown.end - shown.start) * share);
-                }
-            }
-            near = far;
-            let hit = wanted.is_none() || pixel.first_hit.is_some();
-            if compositing.hides() && hit && pixel.color.w >= 1.0 - REST {
-                break;
-            }
-        }
-        pixel
-    }
+    pixel
 }

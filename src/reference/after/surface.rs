@@ -41,12 +41,15 @@ fn in_slab(pixel: &Pixel, slab: &Slab) -> Option<Composited> {
     let gradients = LazyCell::new(|| pixel.gradients(slab));
     let gradient = |t: f64| gradients[0].lerp(gradients[1], t);
     let [f0, f1] = slab.values;
+    let own = pixel.slab_color(slab);
+    let opacity = own.map_or(1.0, |own| own.w);
     for [start, end] in cells(pixel, slab.number) {
         let tables = pixel.tables(first + (start + end) / 2.0);
-        let line = Line { tables, values: [f0 + (f1 - f0) * start, f0 + (f1 - f0) * end], start, end };
+        let values = [f0 + (f1 - f0) * start, f0 + (f1 - f0) * end];
+        let line = Line { tables, values, start, end, opacity };
         if let Some(t) = line.first_surface(&gradient) {
             let scene = &pixel.frame().scene;
-            let base = tables.color.at(f0 + (f1 - f0) * t);
+            let base = own.map_or_else(|| tables.color.at(f0 + (f1 - f0) * t), DVec4::truncate);
             let color = shading::color(&scene.shading, base, gradient(t), pixel.to_eye()).extend(1.0);
             return Some(Composited::new(color, pixel.frame().host.first_hit.map(|_| first + t)));
         }
@@ -83,6 +86,8 @@ struct Line<'a> {
     /// The part's position in the slab.
     start: f64,
     end: f64,
+    /// A of the slab's colour.
+    opacity: f64,
 }
 
 impl Line<'_> {
@@ -97,12 +102,13 @@ impl Line<'_> {
         if !tables.visible || knots.iter().all(|&s| tables.opacity.at(value(s)) < HALF) {
             return None;
         }
-        let factor = |s: f64| tables.gradient_opacity.map_or(1.0, |ramp| ramp.at(gradient(place(s)).length()));
+        let factor =
+            |s: f64| self.opacity * tables.gradient_opacity.map_or(1.0, |ramp| ramp.at(gradient(place(s)).length()));
         let samples = if tables.gradient_opacity.is_some() { SAMPLES } else { 1 };
         for piece in knots.windows(2) {
             let [low, high] = [piece[0], piece[1]];
             // Iso-ranges are closed, so a piece's first point may be visible although the piece is not.
-            if self.shows_at(low, value(low), factor) {
+            if self.shows_at(low, tables.exact(value(low), self.values), factor) {
                 return Some(place(low));
             }
             if !tables.in_iso_range(value((low + high) / 2.0)) {

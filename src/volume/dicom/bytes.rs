@@ -1,12 +1,12 @@
 //! A sequential reader of a file's bytes, which inflates them where the file says so.
 
-use std::fs::File;
 use std::io::{self, BufRead, BufReader, Chain, Cursor, Read};
 use std::path::PathBuf;
 
 use flate2::bufread::DeflateDecoder;
 
 use super::super::VolumeError;
+use super::super::file::File;
 use super::super::samples::MAX_EXPANSION;
 use super::super::source::{CHUNK, Source, invalid, io_error};
 

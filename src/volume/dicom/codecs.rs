@@ -122,6 +122,7 @@ fn jpeg(code: &[u8], size: [u16; 2], sample: usize) -> Result<Vec<u8>, String> {
     let bytes = match info.pixel_format {
         PixelFormat::L8 => 1,
         PixelFormat::L16 => 2,
+        PixelFormat::RGB24 => 3,
         _ => return Err("colours".to_owned()),
     };
     if [info.width, info.height] != size || bytes != sample {

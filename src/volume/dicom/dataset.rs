@@ -41,6 +41,7 @@ tags! {
     PLANE_ORIENTATION = 0x0020_9116 "PlaneOrientationSequence",
     SAMPLES_PER_PIXEL = 0x0028_0002 "SamplesPerPixel",
     PHOTOMETRIC = 0x0028_0004 "PhotometricInterpretation",
+    PLANAR = 0x0028_0006 "PlanarConfiguration",
     FRAMES = 0x0028_0008 "NumberOfFrames",
     ROWS = 0x0028_0010 "Rows",
     COLUMNS = 0x0028_0011 "Columns",

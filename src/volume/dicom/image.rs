@@ -36,6 +36,10 @@ pub(super) struct Pixels {
     pub(super) columns: u16,
     pub(super) rows: u16,
     pub(super) kind: SampleType,
+    /// The samples of a pixel: one, or three of a colour.
+    pub(super) samples: u16,
+    /// Whether all red samples of a frame are stored first, then all green ones, then all blue ones.
+    is_planar: bool,
     /// The number of significant low bits in a sample.
     bits: u16,
     big_endian: bool,
@@ -68,7 +72,7 @@ impl Image {
         }
         let codec =
             Codec::of(&transfer_syntax).map_err(|found| data.invalid(tags::TRANSFER_SYNTAX, found, Codec::ALLOWED))?;
-        let pixels = Pixels::of(&data, tag, big_endian)?;
+        let pixels = Pixels::of(&data, tag, big_endian, codec)?;
         if let PixelData::Native { in_words: true, .. } = pixel_data
             && big_endian
             && pixels.kind.bytes() == 1
@@ -120,7 +124,7 @@ impl Image {
                 // A single frame may be split into several fragments.
                 let of_frame = if self.frames.len() == 1 { fragments } else { &fragments[index..=index] };
                 let code = self.read(of_frame, access)?;
-                self.codec.decode(code, [columns, rows], kind.bytes() as usize).map_err(|found| {
+                self.codec.decode(code, [columns, rows], self.pixels.bytes_per_pixel()).map_err(|found| {
                     invalid(&self.path, "PixelData", found, format!("a frame of {columns} × {rows} {kind}"))
                 })?
             }
@@ -129,7 +133,7 @@ impl Image {
             bytes.chunks_exact_mut(kind.bytes() as usize).for_each(<[u8]>::reverse);
         }
         self.pixels.make_numbers(&mut bytes);
-        Ok(bytes)
+        Ok(self.pixels.side_by_side(bytes, self.codec))
     }
 
     /// The bytes of some ranges of the file, each given by its first byte and its length.
@@ -153,7 +157,7 @@ impl Image {
 }
 
 impl Pixels {
-    fn of(data: &Dataset, tag: Tag, big_endian: bool) -> Result<Self, VolumeError> {
+    fn of(data: &Dataset, tag: Tag, big_endian: bool, codec: Codec) -> Result<Self, VolumeError> {
         let required = |tag: Tag| data.unsigned(tag)?.ok_or_else(|| data.missing(tag, "a number for every image"));
         let [columns, rows] = [required(tags::COLUMNS)?, required(tags::ROWS)?];
         for (tag, size) in [(tags::COLUMNS, columns), (tags::ROWS, rows)] {
@@ -162,20 +166,31 @@ impl Pixels {
             }
         }
         let samples = data.unsigned(tags::SAMPLES_PER_PIXEL)?.unwrap_or(1);
-        if samples != 1 {
-            return Err(data.invalid(tags::SAMPLES_PER_PIXEL, samples, "1"));
+        if ![1, 3].contains(&samples) {
+            return Err(data.invalid(tags::SAMPLES_PER_PIXEL, samples, "1 or 3"));
         }
+        let is_planar = samples > 1 && data.unsigned(tags::PLANAR)?.unwrap_or(0) == 1;
         let photometric = data.text(tags::PHOTOMETRIC).unwrap_or_default();
         let is_inverted = match photometric.as_str() {
             // Which float is white is undefined.
-            "MONOCHROME1" if tag == tags::PIXEL_DATA => true,
-            "MONOCHROME2" => false,
+            "MONOCHROME1" if tag == tags::PIXEL_DATA && samples == 1 => true,
+            "MONOCHROME2" if samples == 1 => false,
+            "RGB" if samples == 3 && codec != Codec::Jpeg => false,
+            // The decoder of JPEG gives red, green and blue.
+            "YBR_FULL" | "YBR_FULL_422" if samples == 3 && codec == Codec::Jpeg => false,
             _ => {
-                let allowed = "MONOCHROME2, or MONOCHROME1 for whole numbers";
+                let allowed = match (samples, codec) {
+                    (1, _) => "MONOCHROME2, or MONOCHROME1 for whole numbers",
+                    (_, Codec::Jpeg) => "YBR_FULL or YBR_FULL_422 for colours",
+                    _ => "RGB for colours",
+                };
                 return Err(data.invalid(tags::PHOTOMETRIC, photometric, allowed));
             }
         };
         let allocated = required(tags::BITS_ALLOCATED)?;
+        if samples > 1 && (tag != tags::PIXEL_DATA || ![8, 16].contains(&allocated)) {
+            return Err(data.invalid(tags::BITS_ALLOCATED, allocated, "whole numbers of 8 or 16 bits for colours"));
+        }
         let is_signed = data.unsigned(tags::PIXEL_REPRESENTATION)?.unwrap_or(0) == 1;
         let kind = match (tag, allocated, is_signed) {
             (tags::FLOAT_PIXEL_DATA, 32, _) => SampleType::F32,
@@ -189,7 +204,7 @@ impl Pixels {
             _ => return Err(data.invalid(tags::BITS_ALLOCATED, allocated, "8, 16 or 32, of floats 32 or 64")),
         };
         if tag != tags::PIXEL_DATA {
-            return Ok(Self { columns, rows, kind, bits: allocated, big_endian, is_inverted });
+            return Ok(Self { columns, rows, kind, samples, is_planar, bits: allocated, big_endian, is_inverted });
         }
         let bits = data.unsigned(tags::BITS_STORED)?.unwrap_or(allocated);
         if !(1..=allocated).contains(&bits) {
@@ -199,12 +214,40 @@ impl Pixels {
         if high != bits - 1 {
             return Err(data.invalid(tags::HIGH_BIT, high, format!("{}, the highest of {bits}", bits - 1)));
         }
-        Ok(Self { columns, rows, kind, bits, big_endian, is_inverted })
+        Ok(Self { columns, rows, kind, samples, is_planar, bits, big_endian, is_inverted })
     }
 
     /// The size of a frame in bytes.
     fn bytes(&self) -> u64 {
-        u64::from(self.columns) * u64::from(self.rows) * self.kind.bytes()
+        u64::from(self.columns) * u64::from(self.rows) * self.bytes_per_pixel() as u64
+    }
+
+    fn bytes_per_pixel(&self) -> usize {
+        self.kind.bytes() as usize * usize::from(self.samples)
+    }
+
+    /// A frame's samples with those of a pixel side by side, red first.
+    fn side_by_side(&self, bytes: Vec<u8>, codec: Codec) -> Vec<u8> {
+        let (sample, count) = (self.kind.bytes() as usize, usize::from(self.samples));
+        match codec {
+            // A pixel's bytes were decoded as those of one number, whose order is the machine's.
+            Codec::Rle if count > 1 && cfg!(target_endian = "little") => bytes
+                .chunks_exact(sample * count)
+                .flat_map(|pixel| pixel.chunks_exact(sample).rev().flatten())
+                .copied()
+                .collect(),
+            Codec::None if self.is_planar => {
+                let pixels = bytes.len() / (sample * count);
+                let of_pixel = |at: usize| {
+                    (0..count).flat_map(move |plane| {
+                        let first = (plane * pixels + at) * sample;
+                        first..first + sample
+                    })
+                };
+                (0..pixels).flat_map(of_pixel).map(|at| bytes[at]).collect()
+            }
+            _ => bytes,
+        }
     }
 
     /// Refuses pixel data whose size or number differs from that of the frames.

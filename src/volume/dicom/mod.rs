@@ -25,6 +25,7 @@ use super::access::Access;
 use super::loaded::Loaded;
 use super::orientation::{Orientation, RAS_FROM_LPS};
 use super::samples::{SIZES, Samples, Voxel, dims_of};
+use super::series::apart;
 use super::source::invalid;
 
 /// Reads the frames of one file.
@@ -53,8 +54,12 @@ pub(super) fn read_folder<T: Voxel>(
 fn assemble<T: Voxel>(path: &Path, images: Vec<Image>, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let Series { slices, lattice } = Series::of(path, &images)?;
     let first = &images[slices[0].image];
+    let components = first.pixels.samples;
     let sizes = [u64::from(first.pixels.columns), u64::from(first.pixels.rows), slices.len() as u64];
-    let dims = dims_of(sizes).ok_or_else(|| invalid(path, "Rows, Columns, slices", format!("{sizes:?}"), SIZES))?;
+    let [columns, rows, count] = sizes;
+    // Those of a colour count as voxels along x while they are read.
+    let sides = [columns * u64::from(components), rows, count];
+    let dims = dims_of(sides).ok_or_else(|| invalid(path, "Rows, Columns, slices", format!("{sizes:?}"), SIZES))?;
     let kind = first.pixels.kind;
     Samples { kind, dims, big_endian: false, rescale: None, z_fastest: false }.reserve::<T>(path, access)?;
     let mut values = Vec::new();
@@ -63,16 +68,21 @@ fn assemble<T: Voxel>(path: &Path, images: Vec<Image>, access: &Access) -> Resul
         let frames: Vec<_> = slices.par_iter().map(|slice| images[slice.image].frame(slice.frame, access)).collect();
         for (slice, frame) in slices.iter().zip(frames) {
             let image = &images[slice.image];
-            let rescale = Some(slice.rescale).filter(|&rescale| rescale != [1.0, 0.0]);
+            let rescale = Some(slice.rescale).filter(|&rescale| rescale != [1.0, 0.0] && components == 1);
             let big_endian = cfg!(target_endian = "big");
             let samples = Samples { kind: image.pixels.kind, dims, big_endian, rescale, z_fastest: false };
             samples.append(&image.path, &frame?, &mut values)?;
         }
     }
     values.shrink_to_fit();
+    let (values, dims) = (apart(values, components.into()), dims.with_x(dims.x / u32::from(components)));
+    let series = match components {
+        1 => super::series::Series::default(),
+        _ => super::series::Series::of_colors(components.into(), 1),
+    };
     let origin = RAS_FROM_LPS * slices[0].position;
     let orientation = Some(Orientation { axes: DMat3::from_diagonal(RAS_FROM_LPS) * lattice.axes, origin });
     let (spacing, unit) = (Some(lattice.spacing), Some("mm".to_owned()));
-    let loaded = Loaded { spacing, unit, orientation, ..Loaded::new(dims, kind, values) };
+    let loaded = Loaded { spacing, unit, orientation, series, ..Loaded::new(dims, kind, values) };
     lattice.straighten(path, series::POSITION, loaded, access)
 }

@@ -144,7 +144,8 @@ fn check_alike<'a>(path: &Path, images: &'a [Image]) -> Result<&'a Frame, Volume
         for frame in &image.frames {
             let is_like = |&&mut (other, kind, _): &&mut (&Image, &Frame, usize)| {
                 let near = |a: f64, b: f64| (a - b).abs() <= SAME * a.max(b);
-                [other.pixels.columns, other.pixels.rows] == [image.pixels.columns, image.pixels.rows]
+                other.pixels.samples == image.pixels.samples
+                    && [other.pixels.columns, other.pixels.rows] == [image.pixels.columns, image.pixels.rows]
                     && near(kind.spacing[0], frame.spacing[0])
                     && near(kind.spacing[1], frame.spacing[1])
                     && (0..2).all(|axis| kind.directions[axis].abs_diff_eq(frame.directions[axis], SAME))

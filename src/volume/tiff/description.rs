@@ -3,15 +3,20 @@
 use std::path::Path;
 
 use ::tiff::tags::Tag;
+use glam::DVec3;
 use quick_xml::Reader;
 use quick_xml::events::Event;
 
 use super::super::VolumeError;
+use super::super::display::ChannelDisplay;
 use super::super::fields::Fields;
+use super::super::series::MAX_CHANNELS;
 use super::super::source::{invalid, number};
 use super::super::unit::{common, unit};
 use super::super::xml;
+use super::display;
 use super::pages::Pages;
+use super::stack::{Axis, Place, Stack};
 
 /// A resolution in pixels per inch that programs write by default, without meaning.
 const NOMINAL_DPI: f64 = 72.0;
@@ -24,7 +29,10 @@ pub(super) struct Calibration {
     /// The spacing along z; ignored where x and y have none.
     pub(super) between_slices: Option<f64>,
     pub(super) unit: Option<String>,
-    pub(super) slices: Option<u32>,
+    /// What the pages show.
+    pub(super) stack: Option<Stack>,
+    pub(super) channel_names: Vec<String>,
+    pub(super) displays: Vec<ChannelDisplay>,
     /// Slope and intercept.
     pub(super) rescale: Option<[f64; 2]>,
 }
@@ -64,6 +72,7 @@ impl Calibration {
         };
         let images = count("images")?;
         let [slices, channels, frames] = [count("slices")?, count("channels")?, count("frames")?];
+        let mut stack = Stack::of_slices(images);
         match [slices, channels, frames].map(|count| count > 1) {
             [_, false, false] => {}
             // Programs without a notion of axes write this.
@@ -72,8 +81,12 @@ impl Calibration {
                 log::warn!("{}: the description says {images} {what}: taken to be slices", pages.path.display());
             }
             _ => {
-                let found = format!("{slices}, {channels}, {frames}");
-                return Err(fields.invalid("slices, channels, frames", found, "one of them above 1: one volume"));
+                stack = Stack { slices, channels, times: frames, order: Stack::IMAGE_J };
+                if stack.pages() != Some(images) {
+                    let found = format!("{slices}, {channels}, {frames}");
+                    let allowed = format!("numbers whose product is images, {images}, at most {MAX_CHANNELS} channels");
+                    return Err(fields.invalid("slices, channels, frames", found, allowed));
+                }
             }
         }
         let units = ["unit", "yunit", "zunit"].map(|name| fields.get(name));
@@ -105,9 +118,26 @@ impl Calibration {
             spacing = spacing.or(Some([1.0, 1.0]));
         }
         let rescale = value_function(&fields)?;
+        let mut displays = pages.image_j_displays()?;
+        // The image's own window is that of its only channel.
+        if displays.iter().all(|display| display.window.is_none()) && stack.channels == 1 {
+            let [low, high] = ["min", "max"].map(|name| fields.get(name).and_then(number));
+            let window = low.zip(high).and_then(|(low, high)| display::valid([low, high]));
+            let first = displays.first().cloned().unwrap_or_default();
+            displays = vec![ChannelDisplay { window, ..first }];
+        }
+        // Windows are stated in stored numbers.
+        let [slope, intercept] = rescale.unwrap_or([1.0, 0.0]);
+        for display in &mut displays {
+            display.window = display.window.and_then(|ends| display::valid(ends.map(|end| end * slope + intercept)));
+            if fields.get("mode") == Some("grayscale") {
+                display.colors.clear();
+            }
+        }
         // ImageJ omits a distance of 1.
         let between_slices = between.or((images > 1).then_some(1.0));
-        Ok(Self { spacing, between_slices, unit: length_unit, slices: Some(images), rescale })
+        let (stack, channel_names) = (Some(stack), Vec::new());
+        Ok(Self { spacing, between_slices, unit: length_unit, stack, channel_names, displays, rescale })
     }
 
     /// Parses the attributes of the single element `Pixels`.
@@ -115,6 +145,7 @@ impl Calibration {
         let damage = |error| xml::damage(path, error);
         let mut reader = Reader::from_str(description);
         let mut pixels: Option<Fields> = None;
+        let (mut tiff_data, mut channel_names, mut colors) = (Vec::new(), Vec::new(), Vec::new());
         loop {
             match reader.read_event().map_err(damage)? {
                 Event::Start(element) | Event::Empty(element) => match element.local_name().as_ref() {
@@ -122,7 +153,13 @@ impl Calibration {
                         return Err(invalid(path, "Pixels", "more than one image", "one image"));
                     }
                     "Pixels" => pixels = Some(xml::attributes(path, &element)?),
-                    "TiffData" => check_order(&xml::attributes(path, &element)?)?,
+                    "TiffData" => tiff_data.push(xml::attributes(path, &element)?),
+                    "Channel" => {
+                        let channel = xml::attributes(path, &element)?;
+                        let number = channel_names.len();
+                        colors.push(channel.get("Color").and_then(display::of_ome));
+                        channel_names.push(channel.get("Name").map_or(format!("channel {number}"), str::to_owned));
+                    }
                     _ => {}
                 },
                 Event::Eof => break,
@@ -135,11 +172,22 @@ impl Calibration {
         let count = |name: &str| {
             pixels.value(name, "a positive integer", |text| text?.parse::<u32>().ok().filter(|&count| count > 0))
         };
-        for name in ["SizeC", "SizeT"] {
-            if count(name)? > 1 {
-                return Err(pixels.invalid(name, count(name)?, "1: one volume of one number for each voxel"));
-            }
+        let order = pixels.value("DimensionOrder", "XY and the letters Z, C and T in any order", |text| {
+            // Without channels and times the order does not matter.
+            let axes: Vec<Axis> =
+                text.unwrap_or("XYZCT").strip_prefix("XY")?.chars().map(axis).collect::<Option<_>>()?;
+            let has = |axis| axes.contains(&axis);
+            let is_all = has(Axis::Slice) && has(Axis::Channel) && has(Axis::Time);
+            axes.as_slice().try_into().ok().filter(|_| is_all)
+        })?;
+        let [slices, channels, times] = [count("SizeZ")?, count("SizeC")?, count("SizeT")?];
+        let stack = Stack { slices, channels, times, order };
+        if stack.pages().is_none() {
+            let found = format!("{slices}, {channels}, {times}");
+            let allowed = format!("at most {} pages, and {MAX_CHANNELS} channels", u32::MAX);
+            return Err(pixels.invalid("SizeZ, SizeC, SizeT", found, allowed));
         }
+        tiff_data.iter().try_for_each(|tiff_data| check_order(tiff_data, &stack))?;
         let size = |name: &str| {
             pixels.value(name, "a positive finite number", |text| match text {
                 None => Some(None),
@@ -155,7 +203,14 @@ impl Calibration {
         }
         let spacing = x.zip(y).map(|(x, y)| [x, y]);
         let unit = unit.filter(|_| spacing.is_some());
-        Ok(Self { spacing, between_slices: z, unit, slices: Some(count("SizeZ")?), rescale: None })
+        // White is what a file states that states nothing.
+        if colors.iter().flatten().all(|&color| color == DVec3::ONE) {
+            colors.clear();
+        }
+        let display =
+            |color: Option<DVec3>| ChannelDisplay { colors: color.into_iter().collect(), ..ChannelDisplay::default() };
+        let displays = colors.into_iter().map(display).collect();
+        Ok(Self { spacing, between_slices: z, unit, stack: Some(stack), channel_names, displays, rescale: None })
     }
 }
 
@@ -187,11 +242,23 @@ fn value_function(fields: &Fields) -> Result<Option<[f64; 2]>, VolumeError> {
 }
 
 /// Refuses pages that are not in the order of the slices.
-fn check_order(tiff_data: &Fields) -> Result<(), VolumeError> {
+fn check_order(tiff_data: &Fields, stack: &Stack) -> Result<(), VolumeError> {
     let number = |name: &str| tiff_data.value(name, "a number", |text| text.unwrap_or("0").parse::<u32>().ok());
-    let [page, slice] = [number("IFD")?, number("FirstZ")?];
-    if page == slice {
+    let page = number("IFD")?;
+    let place = Place { slice: number("FirstZ")?, channel: number("FirstC")?, time: number("FirstT")? };
+    if stack.place(page) == place {
         return Ok(());
     }
-    Err(tiff_data.invalid("TiffData", format!("slice {slice} on page {page}"), "pages in the order of the slices"))
+    let found = format!("slice {} on page {page}", place.slice);
+    Err(tiff_data.invalid("TiffData", found, "pages in the order of the slices, channels and times"))
+}
+
+/// The axis that a letter stands for.
+fn axis(letter: char) -> Option<Axis> {
+    match letter {
+        'Z' => Some(Axis::Slice),
+        'C' => Some(Axis::Channel),
+        'T' => Some(Axis::Time),
+        _ => None,
+    }
 }

@@ -2,8 +2,9 @@
 //!
 //! The decoder reads it before limits can be set and allocates as many values as its entries promise, so the entries are checked first.
 
-use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom};
+
+use super::super::file::File;
 
 /// The maximum number of values of an entry in a file of this size: strips have an offset and a length each.
 pub(super) fn most_values(file_bytes: u64) -> u64 {

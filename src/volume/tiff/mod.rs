@@ -5,9 +5,11 @@
 
 mod description;
 mod directory;
+mod display;
 mod overlay;
 mod pages;
 mod run;
+mod stack;
 mod trial;
 
 use std::path::{Path, PathBuf};
@@ -16,10 +18,12 @@ use glam::DVec3;
 
 use self::description::Calibration;
 use self::pages::{Page, Pages};
+use self::stack::{Place, Stack};
 use super::VolumeError;
 use super::access::Access;
 use super::loaded::Loaded;
 use super::samples::{SIZES, Samples, Stream, Voxel, dims_of};
+use super::series::{Series, apart};
 use super::source::invalid;
 
 /// Reads the pages of one file.
@@ -27,26 +31,61 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let mut pages = Pages::open(path, access)?;
     let calibration = Calibration::of(&mut pages)?;
     let mut slices = Slices::new(path, &pages, &calibration)?;
-    if let Some(count) = calibration.slices.filter(|&count| count > 1 && !pages.has_more()) {
+    let stack = calibration.stack.map(|stack| stack.of_pixels(pages.page.samples));
+    let stack = stack.as_ref();
+    let (series, selection) = (stack.map(Stack::series).unwrap_or_default(), access.selection());
+    if pages.page.samples > 1 && series.channels > 1 {
+        return Err(invalid(path, "channels", format!("{} of colours", series.channels), "colours in one channel"));
+    }
+    series.check(path, selection)?;
+    let channels = series.channels(selection);
+    slices.values.resize_with(channels.len(), Vec::new);
+    // The channel of a page among those that are read.
+    let wanted = |page: u32| {
+        let place = stack.map_or(Place::default(), |stack| stack.place(page));
+        let is_read = place.time == selection.time.unwrap_or(0) && channels.contains(&place.channel);
+        is_read.then(|| (place.channel - channels.start) as usize)
+    };
+    let described = stack.and_then(Stack::pages);
+    let mut count = 0;
+    if let Some(all) = described.filter(|&all| all > 1 && !pages.has_more()) {
         // ImageJ writes data too large for TIFF as one directory, followed by all slices.
-        let offset = pages.contiguous()?;
-        let samples = slices.samples(count)?;
+        let samples = Samples { big_endian: pages.is_big_endian(), ..slices.samples(1)? };
         let mut stream = Stream::raw(access.open(path)?)?;
-        stream.skip(offset)?;
-        let samples = Samples { big_endian: pages.is_big_endian(), ..samples };
-        slices.values = stream.samples(&samples, true)?;
-        slices.count = count;
+        stream.skip(pages.contiguous()?)?;
+        if let Some(left) = stream.exactly_left().filter(|&left| left < samples.bytes().saturating_mul(all.into())) {
+            let allowed = format!("{} bytes ({all} pages)", samples.bytes() * u64::from(all));
+            return Err(invalid(path, "data", format!("{left} bytes"), allowed));
+        }
+        while count < all {
+            match wanted(count) {
+                Some(channel) => {
+                    samples.reserve::<T>(path, access)?;
+                    let page = stream.read_samples(&samples)?;
+                    slices.values[channel].extend_from_slice(&page);
+                }
+                None => stream.skip(samples.bytes())?,
+            }
+            count += 1;
+        }
     } else {
-        slices.add(&mut pages, access)?;
-        while pages.next()? {
-            slices.add(&mut pages, access)?;
+        loop {
+            if let Some(channel) = wanted(count) {
+                slices.add(&mut pages, channel, access)?;
+            }
+            count += 1;
+            if !pages.next()? {
+                break;
+            }
         }
     }
-    match calibration.slices {
-        Some(count) if count != slices.count => {
-            Err(invalid(path, "pages", slices.count, format!("{count}, as the description says")))
+    match described {
+        Some(all) if all != count => Err(invalid(path, "pages", count, format!("{all}, as the description says"))),
+        _ => {
+            let loaded = slices.finish(&calibration)?;
+            let series = if loaded.series.is_color { Series { times: series.times, ..loaded.series } } else { series };
+            Ok(Loaded { series, ..loaded })
         }
-        _ => slices.finish(&calibration),
     }
 }
 
@@ -73,38 +112,46 @@ pub(super) fn read_folder<T: Voxel>(path: &Path, files: &[PathBuf], access: &Acc
     let calibration = Calibration::of(&mut first)?;
     let mut slices = Slices::new(path, &first, &calibration)?;
     run::check(path, files)?;
+    slices.values.push(Vec::new());
     for file in slices_of_one_kind {
-        slices.add(&mut Pages::open(file, access)?, access)?;
+        slices.add(&mut Pages::open(file, access)?, 0, access)?;
     }
     slices.finish(&calibration)
 }
 
-/// Slices of one size and type, appended in order.
+/// Slices of one size and type, appended in order to the values of their channel.
 struct Slices<'a, T> {
     path: &'a Path,
     page: Page,
     /// The first page's palette, unless another page has a different one.
     palette: Option<Vec<[u8; 3]>>,
     rescale: Option<[f64; 2]>,
-    count: u32,
-    values: Vec<T>,
+    /// By channel.
+    values: Vec<Vec<T>>,
 }
 
 impl<'a, T: Voxel> Slices<'a, T> {
     fn new(path: &'a Path, pages: &Pages, calibration: &Calibration) -> Result<Self, VolumeError> {
         let (page, palette) = (pages.page, pages.palette.clone());
-        Ok(Self { path, page, palette, rescale: calibration.rescale, count: 0, values: Vec::new() })
+        Ok(Self { path, page, palette, rescale: calibration.rescale, values: Vec::new() })
     }
 
     fn samples(&self, count: u32) -> Result<Samples, VolumeError> {
-        let Page { size: [width, height], kind } = self.page;
-        let Some(dims) = dims_of([width, height, count]) else {
+        let Page { size: [width, height], samples, kind } = self.page;
+        let Some(dims) = width.checked_mul(samples).and_then(|width| dims_of([width, height, count])) else {
             return Err(invalid(self.path, "sizes", format!("{count} pages of {}", self.page), SIZES));
         };
         Ok(Samples { kind, dims, big_endian: cfg!(target_endian = "big"), rescale: self.rescale, z_fastest: false })
     }
 
-    fn add(&mut self, pages: &mut Pages, access: &Access) -> Result<(), VolumeError> {
+    /// The number of slices that a channel has.
+    fn count(&self, channel: usize) -> u32 {
+        let [width, height] = self.page.size.map(u64::from);
+        let samples = width * height * u64::from(self.page.samples);
+        (self.values[channel].len() as u64 / samples.max(1)) as u32
+    }
+
+    fn add(&mut self, pages: &mut Pages, channel: usize, access: &Access) -> Result<(), VolumeError> {
         if pages.page != self.page {
             let allowed = format!("{}, as the first page", self.page);
             return Err(invalid(&pages.path, &pages.name(), pages.page, allowed));
@@ -113,20 +160,26 @@ impl<'a, T: Voxel> Slices<'a, T> {
             log::warn!("{}: {} has another palette: no colour map is offered", pages.path.display(), pages.name());
             self.palette = None;
         }
-        let samples = self.samples(self.count + 1)?;
-        if self.count == 0 {
+        let count = self.count(channel);
+        let samples = self.samples(count + 1)?;
+        if count == 0 && channel == 0 {
             access.reserve(&pages.path, &pages.name(), self.page, self.page.bytes())?;
         }
         self.samples(1)?.reserve::<T>(&pages.path, access)?;
         let bytes = pages.bytes()?;
-        samples.append(&pages.path, &bytes, &mut self.values)?;
-        self.count += 1;
-        Ok(())
+        samples.append(&pages.path, &bytes, &mut self.values[channel])
     }
 
     fn finish(mut self, calibration: &Calibration) -> Result<Loaded<T>, VolumeError> {
-        let Samples { dims, kind, .. } = self.samples(self.count)?;
-        self.values.shrink_to_fit();
+        let Samples { dims, kind, .. } = self.samples(self.count(0))?;
+        let components = self.page.samples;
+        let dims = dims.with_x(dims.x / components);
+        let mut values = std::mem::take(&mut self.values).into_iter();
+        let mut all = values.next().unwrap_or_default();
+        values.for_each(|further| all.extend_from_slice(&further));
+        all.shrink_to_fit();
+        let all = apart(all, components as usize);
+        let series = if components > 1 { Series::of_colors(components, 1) } else { Series::default() };
         let spacing = calibration.spacing.map(|[x, y]| {
             let z = calibration.between_slices.unwrap_or_else(|| {
                 let unit = calibration.unit.as_deref().unwrap_or_default();
@@ -137,7 +190,8 @@ impl<'a, T: Voxel> Slices<'a, T> {
         });
         let palette = self.palette.map(|colors| values_of(&colors, self.rescale)).filter(|palette| !palette.is_empty());
         let unit = calibration.unit.clone();
-        Ok(Loaded { spacing, unit, palette, ..Loaded::new(dims, kind, self.values) })
+        let (channel_names, displays) = (calibration.channel_names.clone(), calibration.displays.clone());
+        Ok(Loaded { spacing, unit, palette, channel_names, displays, series, ..Loaded::new(dims, kind, all) })
     }
 }
 

@@ -3,8 +3,9 @@
 //! The decoder refuses pages whose pixels are indices of a palette, though they are stored like grey ones. Such a page is read with its
 //! header changed to say grey.
 
-use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
+
+use super::super::file::File;
 
 pub(super) struct Overlay {
     pub(super) file: BufReader<File>,

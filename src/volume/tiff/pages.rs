@@ -11,9 +11,11 @@ use ::tiff::{ColorType, TiffError};
 
 use super::super::VolumeError;
 use super::super::access::Access;
+use super::super::display::ChannelDisplay;
 use super::super::samples::SampleType;
 use super::super::source::{invalid, io_error};
 use super::directory::{low_byte_of, most_values, overlong_entry};
+use super::display;
 use super::overlay::Overlay;
 use super::trial::{self, is_suspicious};
 
@@ -34,6 +36,8 @@ const COLORS: usize = 256;
 #[derive(Clone, Copy, PartialEq)]
 pub(super) struct Page {
     pub(super) size: [u32; 2],
+    /// The samples of a pixel, which lie side by side: one, or three or four of a colour.
+    pub(super) samples: u32,
     pub(super) kind: SampleType,
 }
 
@@ -41,14 +45,15 @@ impl Page {
     pub(super) fn bytes(self) -> u64 {
         let [width, height] = self.size.map(u64::from);
         // The product of two 32-bit sizes fits in 64 bits.
-        (width * height).saturating_mul(self.kind.bytes())
+        (width * height).saturating_mul(self.kind.bytes() * u64::from(self.samples))
     }
 }
 
 impl Display for Page {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let [width, height] = self.size;
-        write!(f, "{width} × {height} {}", self.kind)
+        let colors = if self.samples > 1 { format!(" colours of {}", self.samples) } else { String::new() };
+        write!(f, "{width} × {height}{colors} {}", self.kind)
     }
 }
 
@@ -88,7 +93,7 @@ impl Pages {
         limits.decoding_buffer_size = most_values(unclaimed) as usize * size_of::<Value>();
         let mut pages = Self {
             path: path.to_owned(),
-            page: Page { size: [0; 2], kind: SampleType::U8 },
+            page: Page { size: [0; 2], samples: 1, kind: SampleType::U8 },
             palette: None,
             decoder: decoder.with_limits(limits),
             number: 1,
@@ -149,16 +154,34 @@ impl Pages {
 
     /// The first page's description, in any encoding.
     pub(super) fn description(&mut self) -> Result<String, VolumeError> {
+        let bytes = self.bytes_of(Tag::ImageDescription, "ImageDescription")?.unwrap_or_default();
+        Ok(String::from_utf8_lossy(&bytes).trim_end_matches('\0').to_owned())
+    }
+
+    /// The first page's displays of channels by ImageJ's own tags. Damaged ones are left out, with a warning.
+    pub(super) fn image_j_displays(&mut self) -> Result<Vec<ChannelDisplay>, VolumeError> {
+        let [counts, metadata] = [50838, 50839].map(Tag::from_u16_exhaustive);
+        let Some(bytes) = self.bytes_of(metadata, "IJMetadata")? else { return Ok(Vec::new()) };
+        let counts: Option<Vec<u64>> = self.decoder.find_tag_unsigned_vec(counts).ok().flatten();
+        let found = display::of_image_j(&bytes, &counts.unwrap_or_default(), self.is_big_endian());
+        if found.is_none() {
+            log::warn!("{}: the tag IJMetadata is damaged: its windows and colours are left out", self.path.display());
+        }
+        Ok(found.unwrap_or_default())
+    }
+
+    /// The bytes of a tag.
+    fn bytes_of(&mut self, tag: Tag, field: &str) -> Result<Option<Vec<u8>>, VolumeError> {
         let (name, limit) = (self.name(), self.unclaimed);
         let mut directory = self.decoder.image_ifd();
-        let Some(entry) = directory.find_entry(Tag::ImageDescription) else { return Ok(String::new()) };
+        let Some(entry) = directory.find_entry(tag) else { return Ok(None) };
         if entry.count() > limit {
             let found = format!("{} bytes", entry.count());
-            return Err(invalid(&self.path, "ImageDescription", found, "no more than the file has"));
+            return Err(invalid(&self.path, field, found, "no more than the file has"));
         }
         let mut bytes = vec![0; entry.count() as usize];
-        directory.find_tag_bytes(Tag::ImageDescription, &mut bytes, 0).map_err(failed(&self.path, &name))?;
-        Ok(String::from_utf8_lossy(&bytes).trim_end_matches('\0').to_owned())
+        directory.find_tag_bytes(tag, &mut bytes, 0).map_err(failed(&self.path, &name))?;
+        Ok(Some(bytes))
     }
 
     fn is_reduced(&mut self) -> Result<bool, VolumeError> {
@@ -173,21 +196,30 @@ impl Pages {
         let (width, height) = self.decoder.dimensions().map_err(&failed)?;
         let color = self.decoder.colortype().map_err(&failed)?;
         let layout = self.decoder.image_buffer_layout().map_err(&failed)?;
+        let samples = match color {
+            ColorType::RGB(_) | ColorType::RGBA(_) if layout.planes == 1 => u32::from(color.num_samples()),
+            _ => 1,
+        };
         let kind = match (color, layout.sample_type) {
+            (ColorType::RGB(8 | 16 | 32 | 64) | ColorType::RGBA(8 | 16 | 32 | 64), Some(sample_type))
+                if layout.planes == 1 =>
+            {
+                Some(sample_type)
+            }
             (ColorType::Gray(8), Some(sample_type)) if self.palette.is_some() => Some(sample_type),
             (ColorType::Gray(8 | 16 | 32 | 64), Some(sample_type)) if self.palette.is_none() => Some(sample_type),
             _ => None,
         };
         let Some(kind) = kind.and_then(sample_type_of) else {
             let found = match color {
-                ColorType::RGB(_) | ColorType::RGBA(_) => format!("RGB pages, {} samples a pixel", color.num_samples()),
+                ColorType::RGB(_) | ColorType::RGBA(_) if layout.planes > 1 => "colours in separate planes".to_owned(),
                 _ if self.palette.is_some() => format!("indices of a palette, {color:?}"),
                 _ => format!("{color:?}, {:?}", layout.sample_format),
             };
-            let allowed = "one sample a pixel: an integer of 8 to 64 bits, a float of 32 or 64 bits, or an index of 8 bits of a palette";
+            let allowed = "one sample a pixel, or RGB or RGBA side by side: an integer of 8 to 64 bits, a float of 32 or 64 bits, or an index of 8 bits of a palette";
             return Err(invalid(&self.path, &name, found, allowed));
         };
-        self.page = Page { size: [width, height], kind };
+        self.page = Page { size: [width, height], samples, kind };
         let tags = match self.decoder.get_chunk_type() {
             ChunkType::Strip => [Tag::StripOffsets, Tag::StripByteCounts],
             ChunkType::Tile => [Tag::TileOffsets, Tag::TileByteCounts],
@@ -307,6 +339,6 @@ fn sample_type_of(sample_type: DecodingSampleType) -> Option<SampleType> {
 fn failed(path: &Path, page: &str) -> impl Fn(TiffError) -> VolumeError {
     move |error| match error {
         TiffError::IoError(error) if error.raw_os_error().is_some() => io_error(path)(error),
-        error => invalid(path, page, error, "grey pixels, as they are or by LZW, Deflate or PackBits"),
+        error => invalid(path, page, error, "grey or RGB pixels, as they are or by LZW, Deflate or PackBits"),
     }
 }

@@ -2,6 +2,7 @@
 //! blocks compressed by zlib or LZ4.
 
 use std::io::{self, BufRead, Read, Seek, SeekFrom};
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use glam::{DMat3, DVec3, UVec3};
@@ -15,6 +16,7 @@ use super::super::loaded::Loaded;
 use super::super::numbers::TextEnd;
 use super::super::orientation::unit_directions;
 use super::super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
+use super::super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::super::source::{invalid, io_error, number, three};
 use super::super::xml;
 use super::blocks::{Base64, Blocks, Compressor, HeaderType};
@@ -49,8 +51,15 @@ pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<L
         Some(_) => None,
     })?;
     let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
-    let values = header.open(path, access, array, &samples)?.samples(&samples, false)?;
-    Ok(Loaded { spacing: Some(spacing), ..Loaded::new(dims, kind, values) })
+    let channels = array.components().unwrap_or(1);
+    let series = Series { channels, order: SeriesOrder::Interleaved, ..Series::default() };
+    let Some(side) = dims_of([u64::from(dims.x) * u64::from(channels), dims.y.into(), dims.z.into()]) else {
+        let found = format!("{channels} components of {dims}");
+        return Err(header.image.invalid("NumberOfComponents", found, "at most 4294967295 numbers"));
+    };
+    let stream = header.open(path, access, array, &Samples { dims: side, ..samples })?;
+    let values = stream.series(&samples, &series, false)?;
+    Ok(Loaded { spacing: Some(spacing), series, ..Loaded::new(dims, kind, values) })
 }
 
 /// The elements that are needed, as their attributes.
@@ -163,15 +172,29 @@ impl Header {
         directions.map(drop).map_err(|(found, allowed)| self.image.invalid("Direction", found, allowed))
     }
 
-    /// The array to read: the active one, or else the first one with one component.
+    /// The array to read: the active one, or else the first one with one component, or else the first one.
     fn choose(&self) -> Result<&Array, VolumeError> {
-        let numbers: Vec<&Array> = self.arrays.iter().filter(|array| array.components() == "1").collect();
+        let with = |allowed: RangeInclusive<u32>| -> Vec<&Array> {
+            let is_allowed = |array: &&Array| array.components().is_some_and(|count| allowed.contains(&count));
+            self.arrays.iter().filter(is_allowed).collect()
+        };
+        let (mut numbers, vectors) = (with(1..=1), with(1..=MAX_CHANNELS));
+        if numbers.is_empty() || vectors.iter().any(|array| array.is_active) {
+            numbers = vectors;
+        }
         let active = numbers.iter().find(|array| array.is_active);
         let of_points = numbers.iter().find(|array| !array.of_cells);
         let Some(chosen) = active.or(of_points).or(numbers.first()) else {
-            let all = self.arrays.iter().map(|array| format!("{} ({} components)", array.name(), array.components()));
+            let all = self.arrays.iter().map(|array| {
+                let components = array.fields.get("NumberOfComponents").unwrap_or("1");
+                format!("{} ({components} components)", array.name())
+            });
             let found = format!("arrays {}", all.collect::<Vec<_>>().join(", "));
-            return Err(self.image.invalid("DataArray", found, "at least one with a number for each point or cell"));
+            return Err(self.image.invalid(
+                "DataArray",
+                found,
+                format!("at least one with 1 to {MAX_CHANNELS} components"),
+            ));
         };
         if active.is_none() {
             warn_of_choice(&self.image.path, numbers.iter().map(|array| array.name()), chosen.name());
@@ -272,8 +295,9 @@ impl Array {
         self.fields.get("Name").unwrap_or("without a name")
     }
 
-    fn components(&self) -> &str {
-        self.fields.get("NumberOfComponents").unwrap_or("1")
+    /// The numbers of a point or cell; `None` if the file states something else.
+    fn components(&self) -> Option<u32> {
+        self.fields.get("NumberOfComponents").map_or(Some(1), |text| text.parse().ok())
     }
 }
 

@@ -19,7 +19,7 @@ use sheetsplat::internals::quad_plan::FramePlan;
 use sheetsplat::internals::reference::Geometry;
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Method, Order, Ramp, TransferFunction};
+use sheetsplat::settings::{Method, Order, Ramp, TransferFunction, Window};
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat};
 
@@ -61,7 +61,14 @@ impl<'a> Culling<'a> {
         let view = ViewGeometry::new(grid, &scene.camera, &scene.splatting, size).unwrap();
         let lists = BrickLists::upload(device, grid, voxels);
         let bricks = lists.bricks().next().unwrap().to_vec();
-        let plan = FramePlan::new([bricks.as_slice()], view, sheets, scene.splatting.order, 0.0..0.0);
+        let plan = FramePlan::new(
+            [bricks.as_slice()],
+            view,
+            sheets,
+            scene.splatting.order,
+            0.0..0.0,
+            &Window::whole([1; 2]).slabs,
+        );
         let [list] = &lists.lists[..] else { panic!("{} lists", lists.lists.len()) };
         let ramps = Ramps::new(transfer);
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
@@ -79,6 +86,8 @@ impl<'a> Culling<'a> {
             groups: &groups,
             values: &uploaded.view,
             has_holes: values.iter().any(|value| value.is_nan()),
+            channels: 1,
+            colors: None,
             labels: labels.as_ref().map(|labels| &labels.view),
             control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
             occluded: &targets.occluded,
@@ -172,6 +181,7 @@ impl Case {
             gradient_opacity: None,
             iso_ranges: None,
             labels: BTreeMap::new(),
+            further: Vec::new(),
         }
     }
 

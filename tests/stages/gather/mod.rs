@@ -15,7 +15,7 @@ use sheetsplat::internals::pass::gather::{Gather, GatherBuffers, GatherMode};
 use sheetsplat::internals::patch_bins::{self, HALVES, PatchBins, SHEETS};
 use sheetsplat::internals::{ClippedVoxels, means, reference};
 use sheetsplat::scene::{Scene, TransferSettings};
-use sheetsplat::settings::{Compositing, FootprintForm, TransferFunction};
+use sheetsplat::settings::{Compositing, FootprintForm, TransferFunction, Window};
 use sheetsplat::volume::{Grid, Volume};
 use sheetsplat::wgpu::BufferUsages;
 
@@ -55,8 +55,16 @@ impl<'a> Fixture<'a> {
     fn bins(&self) -> PatchBins {
         let Seen { view, kernel, scene: Scene { splatting, .. }, .. } = &self.seen;
         let covered = means::covered(view, self.volume.grid(), splatting);
-        PatchBins::new(self.bricks.bricks(), (view, None), splatting.order, covered, kernel.support(), (0, 8), u64::MAX)
-            .unwrap()
+        PatchBins::new(
+            self.bricks.bricks(),
+            (view, None),
+            splatting.order,
+            (covered, &Window::whole([1; 2]).slabs),
+            kernel.support(),
+            (0, 8),
+            u64::MAX,
+        )
+        .unwrap()
     }
 
     /// Draws over `acc`, in bands of at most `band_rows` rows. The nearest group begins at `near`, if stated.
@@ -96,7 +104,10 @@ impl<'a> Fixture<'a> {
         let gathered = storage(&vec![0; size_of::<Gathered>() / 4 + words as usize]);
         let (ranges_buffer, stride) = at_offsets(device, &ranges);
         let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|half| half.as_vec2().to_array()).collect();
-        let (uncut, cut) = (Uncut::new(device), uniforms::cut(&seen.view, volume.grid(), &seen.scene, None, None));
+        let (uncut, cut) = (
+            Uncut::new(device),
+            uniforms::cut(&seen.view, volume.grid(), &seen.scene, None, None, &Window::whole(seen.view.size)),
+        );
         let mode = GatherMode::of(
             &seen.scene.splatting,
             None,
@@ -115,6 +126,7 @@ impl<'a> Fixture<'a> {
             entries: &storage(&bins.entries),
             control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
             values: &values.view,
+            colors: None,
             labels: None,
             gathered: &gathered,
             half_boxes: &init(device, &half_boxes, BufferUsages::STORAGE),

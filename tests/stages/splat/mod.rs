@@ -49,6 +49,8 @@ impl<'a> Stages<'a> {
             groups: &uniform,
             values: &VolumeTexture::upload(device, gpu.queue(), &[0.0]).unwrap().view,
             has_holes: false,
+            channels: 1,
+            colors: None,
             labels: None,
             control_points: &storage,
             occluded: &storage,

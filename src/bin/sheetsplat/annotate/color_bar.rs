@@ -35,6 +35,9 @@ pub(super) fn plate(scene: &Scene, volume: &Volume, transfer: &TransferFunction)
         }
         _ => false,
     };
+    if volume.colors().is_some() {
+        return refused("a volume of colours", "values that a table gives colours");
+    }
     if volume.labels().is_none() && categories::is_label_map(volume) {
         return refused("a volume of labels", "values that are not labels, or --annotate legend");
     }

@@ -1,7 +1,8 @@
-//! The legend, which shows the colour of each label.
+//! The legend, which shows the colour of each label or, of several channels, of each channel.
 
 use sheetsplat::appearance::{categories, shown_range};
 use sheetsplat::image::Image;
+use sheetsplat::scene::Scene;
 use sheetsplat::settings::TransferFunction;
 use sheetsplat::volume::Volume;
 
@@ -19,15 +20,16 @@ const COLUMN_GAP: u32 = 12;
 /// The maximum number of characters of a label's name.
 const LONGEST: usize = 40;
 
-/// A label's number and name, and its colours from the lowest visible value to the highest.
+/// A label's number and name, or a channel's name, and its colours from the lowest visible value to the highest.
 struct Entry {
     text: String,
     colors: Vec<[f32; 4]>,
 }
 
 /// The legend in as many columns as needed for a height of at most `room` pixels.
-pub(super) fn plate(volume: &Volume, transfer: &TransferFunction, room: u32) -> Result<Image, Failure> {
-    let entries = entries(volume, transfer)?;
+pub(super) fn plate(scene: &Scene, volume: &Volume, transfer: &TransferFunction, room: u32) -> Result<Image, Failure> {
+    let entries =
+        if volume.further().is_empty() { entries(volume, transfer)? } else { channels(scene, volume, transfer) };
     let rows = (room.saturating_sub(2 * PADDING) / LINE).max(1).min(entries.len() as u32);
     let columns: Vec<&[Entry]> = entries.chunks(rows as usize).collect();
     let text_of = |column: &[Entry]| column.iter().map(|entry| text_width(&entry.text)).max().unwrap_or(0);
@@ -47,6 +49,18 @@ pub(super) fn plate(volume: &Volume, transfer: &TransferFunction, room: u32) -> 
         left += width + COLUMN_GAP;
     }
     Ok(plate)
+}
+
+/// The channels that show something, each with its colours over the values that it shows.
+fn channels(scene: &Scene, volume: &Volume, transfer: &TransferFunction) -> Vec<Entry> {
+    let entry = |(number, (channel, transfer)): (usize, (&Volume, &TransferFunction))| {
+        let [low, high] = shown_range(channel, transfer)?;
+        let value = |x: u32| low + (high - low) * f64::from(x) / f64::from(PATCH[0] - 1);
+        let color = |x: u32| transfer.color.at(value(x)).as_vec3().extend(1.0).to_array();
+        let text = shortened(&scene.channel_name(volume, number));
+        Some(Entry { text, colors: (0..PATCH[0]).map(color).collect() })
+    };
+    volume.channels().zip(transfer.channels()).enumerate().filter_map(entry).collect()
 }
 
 fn entries(volume: &Volume, transfer: &TransferFunction) -> Result<Vec<Entry>, Failure> {

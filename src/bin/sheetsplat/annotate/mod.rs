@@ -57,12 +57,12 @@ impl Annotate {
         if self.annotate.is_empty() {
             return Ok(Overlay(Vec::new()));
         }
-        let transfer = scene.transfer.resolve(volume);
+        let transfer = scene.resolve(volume);
         let scale = has(Annotation::Scale).then(|| scale_bar::plate(scene, volume)).transpose()?;
         let colors = has(Annotation::Colors).then(|| color_bar::plate(scene, volume, &transfer)).transpose()?;
         let below = scale.as_ref().map_or(0, |plate| plate.height + MARGIN);
         let room = size[1].saturating_sub(below + 2 * MARGIN);
-        let legend = has(Annotation::Legend).then(|| legend::plate(volume, &transfer, room)).transpose()?;
+        let legend = has(Annotation::Legend).then(|| legend::plate(scene, volume, &transfer, room)).transpose()?;
         place(size, scale, colors, legend)
     }
 

@@ -54,6 +54,12 @@ struct Info {
     r#type: String,
     spacing: [f64; 3],
     unit: Option<String>,
+    /// Of the file.
+    channels: u32,
+    /// Whether voxels have colours of their own, whose luminances the values are.
+    colors: bool,
+    /// Of the file.
+    times: u32,
     /// Voxels whose samples are NaN or infinite; the fields below are about the others.
     holes: u64,
     min: f64,
@@ -102,6 +108,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         r#type: encoding.map_or(SampleType::F32, |encoding| encoding.sample_type).to_string(),
         spacing: volume.spacing().to_array(),
         unit: volume.unit().map(str::to_owned),
+        channels: encoding.map_or(1, |encoding| encoding.channels).max(volume.channels().count() as u32),
+        colors: volume.colors().is_some(),
+        times: encoding.map_or(1, |encoding| encoding.times),
         holes: volume.holes(),
         min,
         max,
@@ -113,7 +122,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let text = if arguments.json {
         serde_json::to_string(&info).map_err(|error| Failure::Other(error.to_string()))? + "\n"
     } else {
-        described(&info, &volume)
+        described(&info, &volume, scene.index.unwrap_or(0))
     };
     stdout(text.as_bytes())
 }
@@ -123,7 +132,7 @@ fn as_map<S: Serializer>(percentiles: &[f64], serializer: S) -> Result<S::Ok, S:
     serializer.collect_map(PERCENTILES.iter().map(|&(_, name)| name).zip(percentiles))
 }
 
-fn described(info: &Info, volume: &Volume) -> String {
+fn described(info: &Info, volume: &Volume, first_channel: u32) -> String {
     let mut text = String::new();
     let mut line = |name: &str, value: String| _ = writeln!(text, "{name:<12} {value}");
     let [x, y, z] = info.dims;
@@ -132,6 +141,19 @@ fn described(info: &Info, volume: &Volume) -> String {
     line("dims", format!("{x} × {y} × {z}"));
     let [x, y, z] = info.spacing.map(short);
     line("spacing", format!("{x} × {y} × {z} {}", info.unit.as_deref().unwrap_or("(no unit)")));
+    if info.channels > 1 {
+        let names =
+            (0..).zip(volume.channels()).filter_map(|(at, channel)| Some(format!("{at} {}", channel.channel_name()?)));
+        let names = names.collect::<Vec<_>>().join(", ");
+        let names = if names.is_empty() { names } else { format!(": {names}") };
+        line("channels", format!("{}{names}; what follows is about channel {}", info.channels, first_channel));
+    }
+    if info.colors {
+        line("colors", "every voxel has its own; what follows is about their luminance".to_owned());
+    }
+    if info.times > 1 {
+        line("times", format!("{}; what follows is about one, by --time", info.times));
+    }
     line("orientation", volume.orientation().map_or("not given".to_owned(), orientation));
     if info.holes > 0 {
         line("holes", format!("{} samples are NaN or infinite", info.holes));

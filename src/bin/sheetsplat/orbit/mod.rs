@@ -15,7 +15,7 @@ use sheetsplat::scene::Scene;
 use sheetsplat::volume::Volume;
 
 use crate::annotate::{Annotate, Overlay};
-use crate::arguments::{Depth, Input, check_scene_file, log_frame, parse_degrees, scene_file};
+use crate::arguments::{Depth, Input, check_scene_file, log_frame, parse_degrees, parse_range, scene_file};
 use crate::failure::Failure;
 use crate::outputs::{self, Outputs};
 use crate::progress::Progress;
@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..))]
     count: u32,
     /// Draw only frames A to B - 1, counted from 0: parts of a movie can be drawn anywhere, at any time.
-    #[arg(long, value_name = "A..B", value_parser = parse_frames)]
+    #[arg(long, value_name = "A..B", value_parser = parse_range)]
     frames: Option<Range<u32>>,
     /// Write the scene as a scene file, with everything that presets, colour maps and the volume determined. `render` draws its first
     /// frame from it, and any other frame with camera.direction turned.
@@ -64,13 +64,6 @@ pub(crate) struct Arguments {
     chroma: Chroma,
 }
 
-/// Parses `A..B`, which must not be empty.
-fn parse_frames(text: &str) -> Result<Range<u32>, String> {
-    let parse = |(from, to): (&str, &str)| Some(from.parse().ok()?..to.parse().ok()?);
-    let frames = text.split_once("..").and_then(parse).filter(|frames| !frames.is_empty());
-    frames.ok_or_else(|| "allowed: A..B, A less than B".to_owned())
-}
-
 pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> {
     let Arguments { input, output, count, overwrite, .. } = arguments;
     let frames = arguments.frames.clone().unwrap_or(0..*count);
@@ -83,9 +76,9 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
         check_scene_file(path)?;
     }
     let format = if output == Path::new("-") { Some(Format::Y4m) } else { Format::of(output) };
-    let scene = input.scene()?;
+    let (scene, times) = input.scene_and_times()?;
     if let Some(format) = format {
-        return movie(arguments, scene, format, frames, progress);
+        return movie(arguments, (scene, times), format, frames, progress);
     }
     let pattern = Pattern::parse(output).ok_or_else(|| {
         let allowed = "numbered images (frame-%04d.png, frame-####.png), a movie (.apng, .gif, .y4m), or -";
@@ -104,7 +97,7 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
     if frames.is_empty() && arguments.save_scene.is_none() {
         return Ok(());
     }
-    let shown = Shown::load(arguments, scene, &outputs)?;
+    let shown = Shown::load(arguments, (scene, times), &outputs)?;
     shown.draw(arguments, &frames, progress, |frame, image| {
         Ok(image.save(&pattern.path(frame), arguments.depth.into())?)
     })
@@ -112,7 +105,7 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
 
 fn movie(
     arguments: &Arguments,
-    scene: Scene,
+    (scene, times): (Scene, Option<Range<u32>>),
     format: Format,
     frames: Range<u32>,
     progress: bool,
@@ -134,7 +127,7 @@ fn movie(
     let named: Vec<_> = output_file.into_iter().chain(scene_file).collect();
     let outputs = Outputs::check(&named, is_printed, &input.files(&scene))?;
     // The volume is loaded before anything is written, because the files it was read from are then known.
-    let shown = Shown::load(arguments, scene, &outputs)?;
+    let shown = Shown::load(arguments, (scene, times), &outputs)?;
     let encode = |to: &mut dyn Write, failed: &dyn Fn(io::Error) -> Failure| {
         let mut encoder = Encoder::new(format, &settings, &mut *to).map_err(failed)?;
         shown.draw(arguments, &frames, progress, |_, image| encoder.add(image).map_err(failed))?;
@@ -149,23 +142,43 @@ fn movie(
     outputs::commit(vec![file])
 }
 
-/// What every frame shows.
-struct Shown {
+/// What the frames show.
+struct Shown<'a> {
+    /// With everything stated that depends on the volume, at the first time.
     scene: Scene,
+    /// At the first time.
     volume: Volume,
+    times: Option<Range<u32>>,
     overlay: Overlay,
+    outputs: &'a Outputs,
 }
 
-impl Shown {
-    fn load(arguments: &Arguments, scene: Scene, outputs: &Outputs) -> Result<Self, Failure> {
+impl<'a> Shown<'a> {
+    fn load(
+        arguments: &Arguments,
+        (scene, times): (Scene, Option<Range<u32>>),
+        outputs: &'a Outputs,
+    ) -> Result<Self, Failure> {
         let Arguments { input, annotate, .. } = arguments;
         let volume = input.load_volume(&scene, outputs)?;
+        let count = volume.encoding().map_or(1, |encoding| encoding.times);
+        if let Some(Range { start, end }) = times.clone().filter(|times| times.end > count) {
+            let allowed = format!("within 0..{count}, the times of {}", input.name);
+            return Err(Failure::Input(format!("--time: found {start}..{end}, allowed: {allowed}")));
+        }
         let scene = input.settled(&volume, &scene, Scene::explicit_all_around)?;
         let overlay = annotate.overlay(&scene, &volume)?;
-        Ok(Self { scene, volume, overlay })
+        Ok(Self { scene, volume, times, overlay, outputs })
     }
 
-    /// Draws frames and passes them on. Each is independent of the others.
+    /// The time that a frame shows: all times take turns over all frames.
+    fn time_of(&self, frame: u32, count: u32) -> Option<u32> {
+        let Range { start, end } = self.times.clone()?;
+        let steps = u64::from(frame) * u64::from(end - start) / u64::from(count);
+        Some(start + steps as u32)
+    }
+
+    /// Draws frames and passes them on. Each is independent of the others. No more than one time is in memory.
     fn draw(
         self,
         arguments: &Arguments,
@@ -174,15 +187,23 @@ impl Shown {
         mut take: impl FnMut(u32, &Image) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let Arguments { input, turn, count, save_scene, .. } = arguments;
-        let Self { scene, volume, overlay } = self;
+        let times: Vec<Option<u32>> = frames.iter().map(|&frame| self.time_of(frame, *count)).collect();
+        let Self { scene, volume, overlay, outputs, .. } = self;
         let headless = input.headless(false, [&scene])?;
-        let mut view = headless.view(volume, &scene).map_err(|error| input.failure(error))?;
+        let mut shown = (scene.time, Some(headless.view(volume, &scene).map_err(|error| input.failure(error))?));
         let mut progress = Progress::new(frames.len(), progress);
-        for &frame in frames {
+        for (&frame, time) in frames.iter().zip(times) {
+            if let Some(time) = time.filter(|&time| shown.0 != Some(time)) {
+                // The old view is dropped before the next time is read.
+                shown = (Some(time), None);
+                let volume = input.read_volume(&at_time(&scene, time), outputs)?;
+                shown.1 = Some(headless.view(volume, &scene).map_err(|error| input.failure(error))?);
+            }
+            let Some(view) = &mut shown.1 else { continue };
             // The angle is relative to the scene's camera, independent of the previous frame.
             let camera = scene.camera.turned(turn * f64::from(frame) / f64::from(*count));
             view.set_camera(camera).map_err(|error| input.failure(RenderError::from(error)))?;
-            let mut rendering = headless.draw(&mut view).map_err(|error| input.failure(error))?;
+            let mut rendering = headless.draw(view).map_err(|error| input.failure(error))?;
             overlay.draw(&mut rendering.image);
             take(frame, &rendering.image)?;
             log_frame(&format!("frame {frame}"), &rendering.stats);
@@ -193,4 +214,14 @@ impl Shown {
             None => Ok(()),
         }
     }
+}
+
+/// The scene at another time, in all channels of the first one's file.
+fn at_time(scene: &Scene, time: u32) -> Scene {
+    let mut scene = scene.clone();
+    scene.time = Some(time);
+    for channel in scene.further.iter_mut().filter(|channel| channel.volume == scene.volume) {
+        channel.time = Some(time);
+    }
+    scene
 }

@@ -76,7 +76,7 @@ impl Part {
         scene: &Scene,
         window: &Window,
     ) -> Result<(sheetsplat::Part, Stats), Failure> {
-        let headless = input.headless_for_parts(scene)?;
+        let headless = input.headless(false, [scene])?;
         let failed = |error: sheetsplat::RenderError| input.failure(error);
         let mut view = headless.view(volume, scene).map_err(failed)?;
         headless.draw_part(&mut view, window).map_err(failed)

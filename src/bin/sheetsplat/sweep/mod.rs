@@ -3,11 +3,12 @@
 mod axis;
 mod sheet;
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use sheetsplat::image::Image;
-use sheetsplat::scene::Scene;
+use sheetsplat::scene::{Channel, Scene};
 
 use crate::annotate::Annotate;
 use crate::arguments::{Depth, Input, log_frame};
@@ -127,7 +128,14 @@ fn check_volumes(input: &Input, scenes: &[(Scene, Vec<String>)], outputs: &Outpu
 }
 
 fn has_same_volume(a: &Scene, b: &Scene) -> bool {
-    (&a.volume, a.spacing, &a.labels) == (&b.volume, b.spacing, &b.labels)
+    let facts = |scene: &Scene| -> Vec<_> {
+        let of = |channel: Cow<'_, Channel>| {
+            let Channel { volume, spacing, labels, index, time, .. } = channel.into_owned();
+            (volume, spacing, labels, index, time)
+        };
+        scene.channels().map(of).collect()
+    };
+    facts(a) == facts(b)
 }
 
 /// Draws every scene. A volume is loaded again only if it differs from the previous one.
@@ -143,9 +151,10 @@ fn draw(
     let mut last: Option<(Scene, Arc<_>)> = None;
     let mut tiles = Vec::new();
     for (scene, label) in scenes {
-        let volume = match last {
-            Some((last, volume)) if has_same_volume(&last, &scene) => volume,
-            _ => Arc::new(input.load_volume(&scene, outputs)?),
+        // Any other volume is dropped before the next one is read.
+        let volume = match last.take().filter(|(last, _)| has_same_volume(last, &scene)) {
+            Some((_, volume)) => volume,
+            None => Arc::new(input.load_volume(&scene, outputs)?),
         };
         let scene = input.settled(&volume, &scene, Scene::explicit)?;
         let overlay = annotate.overlay(&scene, &volume)?;

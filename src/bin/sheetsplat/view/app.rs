@@ -13,14 +13,15 @@ use eframe::egui::{
 use glam::DVec2;
 use sheetsplat::image::PngDepth;
 use sheetsplat::scene::{ImageSettings, Scene};
-use sheetsplat::settings::{Camera, Extent, TransferFunction};
+use sheetsplat::settings::{Camera, Extent, TransferFunction, navigation};
 use sheetsplat::volume::Volume;
 
+use super::channels::Channels;
 use super::editor::Editor;
 use super::guest::Guest;
 use super::histogram::{Histogram, extent};
 use super::pace::Pace;
-use super::{Outcome, navigation, panel, plot, screenshot};
+use super::{Outcome, panel, plot, screenshot};
 use crate::failure::Failure;
 
 /// Degrees that the camera turns for a drag over the picture's whole height.
@@ -39,6 +40,7 @@ pub(super) struct App {
     input: String,
     scene: Scene,
     transfer: TransferFunction,
+    channels: Channels,
     /// The scene's original camera.
     home: Camera,
     /// What a camera that fits the object shows.
@@ -79,17 +81,23 @@ impl App {
         let Some(host) = &context.wgpu_render_state else {
             return Err(Failure::Other("the window has no wgpu device".to_owned()));
         };
-        let object = scene.extent(&volume, &scene.transfer.resolve(&volume));
-        // The panel shows the choice, and the user may change it.
-        scene.splatting.classification = scene.classification(&volume);
+        let object = scene.extent(&volume, &scene.resolve(&volume));
         let guest = Guest::new(host, volume, &scene, &arguments.input.name)?;
+        // The panel shows the choice, and the user may change it.
+        scene.splatting.classification = guest.classification();
+        let channels = Channels::new(&scene, guest.volume());
+        let transfer = match channels.are_several() {
+            true => Channels::transfer(&scene, guest.volume()),
+            false => guest.transfer().clone(),
+        };
         let values = guest.volume().values();
-        let editor = Editor::new(guest.transfer(), extent(values));
+        let editor = Editor::new(&transfer, extent(values));
         Ok(Self {
             input: arguments.input.name.clone(),
             home: scene.camera,
             object,
-            transfer: guest.transfer().clone(),
+            transfer,
+            channels,
             histogram: Histogram::new(values, editor.range()),
             editor,
             guest,
@@ -111,6 +119,11 @@ impl App {
         plot::show(ui, &mut self.editor, &self.histogram);
         if before != self.editor.points() {
             self.transfer = self.editor.apply(&self.transfer);
+        }
+        if self.channels.are_several() {
+            ui.separator();
+            ui.heading("Channels");
+            self.channels.show(ui, &self.transfer);
         }
         ui.separator();
         ui.heading("Splatting");
@@ -196,7 +209,7 @@ impl App {
         let [width, height] = [width, height].map(|pixels| pixels.div_ceil(pixel));
         self.scene.image = ImageSettings { width, height, ..self.scene.image };
         let shown = Scene { camera: self.camera([width, height]), ..self.scene.clone() };
-        let result = self.guest.show(&shown, &self.transfer);
+        let result = self.guest.show(&shown, &self.channels.shown(&self.transfer));
         let drawn = matches!(result, Ok(true));
         match result {
             Ok(true) => {
@@ -235,7 +248,11 @@ impl App {
         let size = self.picture.size();
         let [width, height] = [size.x.round() as u32, size.y.round() as u32];
         let image = ImageSettings { width, height, ..self.scene.image };
-        let scene = Scene { image, camera: self.camera([width, height]), ..self.scene.clone() };
+        let mut scene = Scene { image, camera: self.camera([width, height]), ..self.scene.clone() };
+        if self.channels.are_several() {
+            scene = scene.explicit(self.guest.volume());
+            self.channels.note(&mut scene);
+        }
         let result = screenshot::save_scene(&scene, &self.transfer, self.guest.volume(), &path);
         self.saved = saved(&path, &result);
     }

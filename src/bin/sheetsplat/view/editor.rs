@@ -132,6 +132,7 @@ mod tests {
             gradient_opacity: Some(Ramp::new(vec![(3.0, 0.5)]).unwrap()),
             iso_ranges: Some(vec![[5.0, 60.0]]),
             labels: BTreeMap::new(),
+            further: Vec::new(),
         }
     }
 

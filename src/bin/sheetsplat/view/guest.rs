@@ -8,7 +8,7 @@ use eframe::egui_wgpu::{self, RenderState, WgpuConfiguration, WgpuSetup, WgpuSet
 use sheetsplat::RenderError;
 use sheetsplat::headless::{Backend, device};
 use sheetsplat::scoped;
-use sheetsplat::settings::TransferFunction;
+use sheetsplat::settings::{Classification, TransferFunction};
 use sheetsplat::stats::Stats;
 use sheetsplat::volume::{Grid, Volume};
 use sheetsplat::{Blend, DeviceRequirements, GpuVolume, Placement, Renderer, RendererOptions, Scene, SceneView, wgpu};
@@ -83,6 +83,11 @@ impl Guest {
     /// The transfer function.
     pub(super) fn transfer(&self) -> &TransferFunction {
         self.view.volume().transfer()
+    }
+
+    /// Whether values are classified before or after splatting.
+    pub(super) fn classification(&self) -> Classification {
+        self.view.scene().splatting.classification
     }
 
     /// The last frame's statistics.

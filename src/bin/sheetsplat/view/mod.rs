@@ -1,10 +1,10 @@
 //! `sheetsplat view`: a window with the picture and its settings.
 
 mod app;
+mod channels;
 mod editor;
 mod guest;
 mod histogram;
-mod navigation;
 mod pace;
 mod panel;
 mod plot;

@@ -60,7 +60,7 @@ mod tests {
         let sets = ["image.width=70", "preset=ct-bone", "splatting.classification=after"].map(str::to_owned);
         let scene = Scene::from_volume(VolumeSource::Builtin("head:16".to_owned()), &sets).unwrap();
         let volume = scene.load_volume().unwrap();
-        let edited = TransferFunction { iso_ranges: Some(vec![[3.0, 90.0]]), ..scene.transfer.resolve(&volume) };
+        let edited = TransferFunction { iso_ranges: Some(vec![[3.0, 90.0]]), ..scene.resolve(&volume) };
         save_scene(&scene, &edited, &volume, &path).unwrap();
         let saved = Scene::open(&path, &[]).unwrap();
         assert_eq!(saved.transfer.resolve(&volume), edited);

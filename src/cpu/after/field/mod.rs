@@ -12,6 +12,7 @@ use std::f64::consts::LOG2_E;
 use fearless_simd::Simd;
 use glam::DVec3;
 
+use super::colors::ColorsOf;
 use super::low_pass::LowPass;
 use super::planes::{Eight, Points};
 use crate::after::normalization::Normalization;
@@ -33,6 +34,8 @@ pub(super) struct Field<'a> {
     volume: &'a Volume,
     /// c for every voxel, in memory order; NaN at holes.
     coefficients: &'a [f32],
+    /// Those of the voxels' own colours, if they have any.
+    colors: Option<ColorsOf<'a>>,
     numbers: Normalization,
     radius: f64,
     radius_squared: f32,
@@ -66,7 +69,7 @@ pub(super) struct Cube {
 impl<'a> Field<'a> {
     pub(super) fn new(
         volume: &'a Volume,
-        coefficients: &'a [f32],
+        (coefficients, colors): (&'a [f32], Option<ColorsOf<'a>>),
         numbers: Normalization,
         (radius, falloff): (f64, f64),
         gradient: Gradient,
@@ -77,6 +80,7 @@ impl<'a> Field<'a> {
         Self {
             volume,
             coefficients,
+            colors,
             numbers,
             radius,
             radius_squared: (radius * radius) as f32,
@@ -89,6 +93,11 @@ impl<'a> Field<'a> {
             min_moment: min_moment(radius, numbers.range).powi(2),
             is_cube: radius <= CUBE_RADIUS && is_moderate && volume.dims().min_element() as usize >= cube::SIDE,
         }
+    }
+
+    /// Whether voxels have colours of their own.
+    pub(super) fn has_colors(&self) -> bool {
+        self.colors.is_some()
     }
 
     /// The cubes around eight points of a plane, as near as the volume's borders allow: voxels of a cube that the kernel does not reach have no
@@ -192,13 +201,16 @@ fn min_moment(radius: f64, range: [f32; 2]) -> f32 {
 #[expect(clippy::unwrap_used, reason = "tests")]
 mod tests {
     use fearless_simd::{Level, dispatch};
-    use glam::{DVec2, UVec3};
+    use glam::{DVec2, DVec4, UVec3};
 
     use super::*;
+    use crate::cpu::after::colors::Colors;
     use crate::geometry::plane_geometry::PlaneGeometry;
     use crate::geometry::view_geometry::ViewGeometry;
     use crate::reference::after as twin;
     use crate::scene::{Scene, VolumeSource};
+    use crate::settings::splatting::Interpolation;
+    use crate::volume::SampleType;
 
     /// Numbers from 0 to 1.
     fn random(state: &mut u64) -> f64 {
@@ -214,7 +226,7 @@ mod tests {
         let (splatting, grid) = (&scene.splatting, volume.grid());
         let numbers = Normalization::of(volume.values().iter().copied()).unwrap();
         let kernel = (splatting.radius, splatting.falloff);
-        let ours = Field::new(volume, volume.values(), numbers, kernel, scene.shading.gradient);
+        let ours = Field::new(volume, (volume.values(), None), numbers, kernel, scene.shading.gradient);
         let expected = twin::Field::new(volume, &scene).unwrap();
         let view = ViewGeometry::new(grid, &scene.camera, splatting, [64, 64]).unwrap();
         let geometry = PlaneGeometry::new(&view, grid);
@@ -283,6 +295,49 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn colours_are_those_of_the_f64_evaluation() {
+        let mut state = 7;
+        let (dims, spacing) = (UVec3::new(11, 9, 10), DVec3::new(1.0, 0.5, 2.0));
+        let color = |state: &mut u64| match random(state) {
+            hole if hole < 0.05 => [f32::NAN; 4],
+            _ => [(); 4].map(|()| (255.0 * random(state)).round() as f32),
+        };
+        let colors: Vec<[f32; 4]> = (0..dims.element_product()).map(|_| color(&mut state)).collect();
+        let volume = Volume::from_colors("random", dims, spacing, (&colors, SampleType::U8)).unwrap();
+        let numbers = Normalization::of(volume.values().iter().copied()).unwrap();
+        for (kernel, interpolation) in [
+            ([2.0, 2.0], Interpolation::Smooth),
+            ([3.2, 0.7], Interpolation::Smooth),
+            ([2.0, 2.0], Interpolation::Exact),
+        ] {
+            let [radius, falloff] = kernel;
+            let sets = [format!("splatting.radius={radius}"), format!("splatting.falloff={falloff}")];
+            let mut scene = Scene::from_volume(VolumeSource::Builtin("head:8".to_owned()), &sets).unwrap();
+            scene.splatting.interpolation = interpolation;
+            let own = Colors::new(&volume, interpolation, (radius, falloff)).unwrap().unwrap();
+            let coefficients = (volume.values(), own.of(&volume));
+            let ours = Field::new(&volume, coefficients, numbers, (radius, falloff), Gradient::Differences);
+            let theirs = twin::Field::new(&volume, &scene).unwrap();
+            let view = ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, [512, 512]).unwrap();
+            let low_pass = LowPass::new(&PlaneGeometry::new(&view, volume.grid()), 1.0);
+            let twins = twin::low_pass::LowPass::new(DVec3::ZERO, DVec3::ZERO);
+            assert!(low_pass.is_identity);
+            let (mut largest, mut count) = (0.0_f64, 0);
+            for _ in 0..500 {
+                let at = DVec3::from([(); 3].map(|()| random(&mut state))) * (dims.as_dvec3() + 1.0) - 1.0;
+                if theirs.value(at, &twins).is_none() {
+                    continue;
+                }
+                let expected = theirs.color(at, &twins).unwrap();
+                let actual = dispatch!(Level::new(), simd => ours.color(simd, (at, &low_pass)));
+                largest = largest.max((DVec4::from(actual.map(f64::from)) - expected).abs().max_element());
+                count += 1;
+            }
+            assert!(largest < 3e-6 && count > 300, "{kernel:?} {interpolation:?}: {largest} at {count} points");
         }
     }
 }

@@ -1,11 +1,12 @@
 //! The field at any point, of any kernel: near the volume's borders and holes, of wide kernels, and where the low-pass rule widens them. Rows of
 //! voxels along x, eight voxels at a time.
 
-use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
+use fearless_simd::{f32x4, f32x8};
 use glam::{DVec3, UVec3};
 
 use super::{Field, MIN_WEIGHT};
+use crate::cpu::after::colors::Color;
 use crate::cpu::after::low_pass::LowPass;
 use crate::cpu::vector::{LANES, exp2, iota};
 
@@ -82,6 +83,31 @@ impl Field<'_> {
                 }
                 let weight = sum_of(weights);
                 if weight >= MIN_WEIGHT { sum_of(sum) / weight } else { f32::NAN }
+            },
+        )
+    }
+
+    /// The colour and A at a point that has a value, in [0, 1]; black without colours.
+    #[cfg_attr(not(debug_assertions), inline(never))]
+    pub(in crate::cpu::after) fn color<S: Simd>(&self, simd: S, (at, low_pass): (DVec3, &LowPass)) -> Color {
+        let Some(colors) = self.colors else { return [0.0; 4] };
+        simd.vectorize(
+            #[cfg_attr(not(debug_assertions), inline(always))]
+            || {
+                let (mut weights, mut sums) = (0.0, f32x4::splat(simd, 0.0));
+                for row in self.rows(at, low_pass) {
+                    for from in row.eights() {
+                        let of_lanes = row.lanes(simd, self, from).weights.to_array();
+                        let voxels = row.index + from..row.index + row.count;
+                        for (index, weight) in voxels.zip(of_lanes) {
+                            if weight > 0.0 && !self.coefficients[index].is_nan() {
+                                weights += weight;
+                                sums += f32x4::load_array(simd, colors.at(index)) * weight;
+                            }
+                        }
+                    }
+                }
+                (sums * (1.0 / weights)).to_array().map(|number: f32| number.clamp(0.0, 1.0))
             },
         )
     }

@@ -1,8 +1,9 @@
-//! Orbit, zoom and pan: how drags and scrolls move the camera.
+//! Orbit, zoom and pan: how drags and scrolls move the camera of a viewer.
 
 use glam::{DMat3, DVec2};
-use sheetsplat::settings::{Camera, Projection};
-use sheetsplat::volume::Grid;
+
+use crate::settings::camera::{Camera, Projection};
+use crate::volume::Grid;
 
 /// The maximum elevation of the camera in degrees over the plane perpendicular to `up`: at 90 the screen has no up.
 const MAX_ELEVATION: f64 = 89.0;
@@ -12,7 +13,7 @@ const HEIGHTS: [f64; 2] = [1e-3, 1e2];
 
 /// Turns the camera around its centre so that what is in front follows a pointer that moves right and down by some degrees: first about
 /// `up` (azimuth), then up or down (elevation, clamped). `up` does not change.
-pub(super) fn orbit(camera: &mut Camera, degrees: DVec2) {
+pub fn orbit(camera: &mut Camera, degrees: DVec2) {
     let (up, w) = (camera.up.normalize(), camera.direction.normalize());
     let horizontal = w.reject_from_normalized(up).normalize();
     let azimuth = DMat3::from_axis_angle(up, -degrees.x.to_radians());
@@ -23,7 +24,7 @@ pub(super) fn orbit(camera: &mut Camera, degrees: DVec2) {
 }
 
 /// The height of the image in world units, at the depth of the camera's centre.
-pub(super) fn height(camera: &Camera, grid: &Grid, kernel_radius: f64, size: [u32; 2]) -> f64 {
+pub fn height(camera: &Camera, grid: &Grid, kernel_radius: f64, size: [u32; 2]) -> f64 {
     let [width, height] = size;
     match camera.projection {
         Projection::Orthographic { height: given } => given
@@ -39,7 +40,7 @@ pub(super) fn height(camera: &Camera, grid: &Grid, kernel_radius: f64, size: [u3
 
 /// Multiplies the height of the image, now `height` world units, by `factor`: by another height, or in perspective by another distance
 /// between the eye and the centre.
-pub(super) fn zoom(camera: &mut Camera, grid: &Grid, height: f64, factor: f64) {
+pub fn zoom(camera: &mut Camera, grid: &Grid, height: f64, factor: f64) {
     let diameter = 2.0 * grid.bounding_radius(0.0);
     let height = (height * factor).clamp(HEIGHTS[0] * diameter, HEIGHTS[1] * diameter);
     match &mut camera.projection {
@@ -51,7 +52,7 @@ pub(super) fn zoom(camera: &mut Camera, grid: &Grid, height: f64, factor: f64) {
 }
 
 /// Moves the centre so that what is at its depth follows a pointer that moves right and down by some world units.
-pub(super) fn pan(camera: &mut Camera, moved: DVec2) {
+pub fn pan(camera: &mut Camera, moved: DVec2) {
     let basis = camera.basis();
     camera.center = Some(camera.middle() + basis.v * moved.y - basis.u * moved.x);
 }

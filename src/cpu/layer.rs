@@ -1,0 +1,206 @@
+//! The channels that share sheets (SPEC §10): all of them, or one by one where each has an image of its own.
+
+use std::sync::Arc;
+
+use fearless_simd::Level;
+
+use super::after;
+use super::after::Coefficients;
+use super::frame::{Drawing, Frame, Host};
+use super::material::Materials;
+use crate::error::RenderError;
+use crate::geometry::view_geometry::ViewGeometry;
+use crate::image::channels::Joining;
+use crate::lists::brick::BrickList;
+use crate::lists::classify::{channels, classify};
+use crate::scene::Scene;
+use crate::settings::splatting::Classification;
+use crate::settings::transfer_function::TransferFunction;
+use crate::volume::Volume;
+
+/// Channels that share sheets.
+#[derive(Clone, Debug)]
+pub(super) struct Layer {
+    volume: Arc<Volume>,
+    transfer: TransferFunction,
+    list: List,
+}
+
+/// What voxels are drawn from.
+#[derive(Clone, Debug)]
+enum List {
+    /// Those that take part in any channel, and their materials.
+    Before(BrickList, Materials),
+    /// Those of each channel.
+    After(Vec<Coefficients>),
+}
+
+impl Layer {
+    fn new(volume: &Arc<Volume>, transfer: TransferFunction, scene: &Scene) -> Result<Self, RenderError> {
+        let list = List::new(volume, &transfer, scene)?;
+        Ok(Self { volume: Arc::clone(volume), transfer, list })
+    }
+
+    /// Computes again what a change of the scene makes obsolete.
+    fn update(&mut self, transfer: &TransferFunction, (old, new): (&Scene, &Scene)) -> Result<(), RenderError> {
+        let is_same_clip = old.clip == new.clip;
+        let (old, splatting) = (&old.splatting, &new.splatting);
+        let is_same_kernel = (old.radius, old.falloff, old.interpolation)
+            == (splatting.radius, splatting.falloff, splatting.interpolation);
+        let is_same_function = *transfer == self.transfer;
+        match &mut self.list {
+            List::Before(..) if splatting.classification == Classification::Before => {
+                if !(is_same_function && is_same_kernel && is_same_clip) {
+                    self.list = List::new(&self.volume, transfer, new)?;
+                }
+            }
+            List::After(coefficients) if splatting.classification == Classification::After && is_same_kernel => {
+                if !(is_same_function && splatting.compositing == old.compositing) {
+                    coefficients.iter_mut().for_each(Coefficients::forget);
+                }
+            }
+            _ => self.list = List::new(&self.volume, transfer, new)?,
+        }
+        self.transfer = transfer.clone();
+        Ok(())
+    }
+
+    /// Draws the channels into one set of sheets.
+    fn draw(&mut self, scene: &Scene, view: ViewGeometry, host: Host, level: Level) -> Drawing {
+        let Self { volume, transfer, list } = self;
+        match list {
+            List::Before(bricks, materials) => {
+                let bricks = (bricks.bricks(), &*materials);
+                Frame::new(volume, transfer, bricks, scene, view, host, level).draw(level)
+            }
+            List::After(coefficients) => {
+                for (of, coefficients) in channels(volume, transfer).zip(&mut *coefficients) {
+                    coefficients.look(of, scene.splatting.compositing, &view);
+                }
+                let frames = channels(volume, transfer).zip(&*coefficients).enumerate();
+                let frame = |(number, (of, coefficients))| {
+                    after::Frame::new(number, of, coefficients, scene, view, host.clone())
+                };
+                after::Frame::draw(&frames.map(frame).collect::<Vec<_>>(), level)
+            }
+        }
+    }
+}
+
+impl List {
+    fn new(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Self, RenderError> {
+        if scene.splatting.classification == Classification::After {
+            let coefficients = channels(volume, transfer).map(|(volume, _)| Coefficients::new(volume, scene));
+            return Ok(Self::After(coefficients.collect::<Result<_, _>>()?));
+        }
+        let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
+        let bricks = BrickList::new(volume.grid(), &classify(volume, transfer, &clipped));
+        let materials = Materials::new(bricks.bricks().len(), channels(volume, transfer).count());
+        Ok(Self::Before(bricks, materials))
+    }
+}
+
+/// How the layers' images become one; `None` if there is one layer of all channels.
+fn joining(volume: &Volume, scene: &Scene) -> Option<Joining> {
+    let splatting = &scene.splatting;
+    Joining::of(splatting.compositing, splatting.classification).filter(|_| !volume.further().is_empty())
+}
+
+/// The layers of a scene whose classification is known.
+pub(super) fn layers(
+    volume: &Arc<Volume>,
+    transfer: &TransferFunction,
+    scene: &Scene,
+) -> Result<Vec<Layer>, RenderError> {
+    if joining(volume, scene).is_none() {
+        return Ok(vec![Layer::new(volume, transfer.clone(), scene)?]);
+    }
+    let volumes = std::iter::once(volume).chain(volume.further()).enumerate();
+    volumes.map(|(number, volume)| Layer::new(volume, transfer.of_channel(number), scene)).collect()
+}
+
+/// Computes again what a change of the scene makes obsolete.
+pub(super) fn update(
+    layers: &mut Vec<Layer>,
+    (volume, transfer): (&Arc<Volume>, &TransferFunction),
+    (old, new): (&Scene, &Scene),
+) -> Result<(), RenderError> {
+    match joining(volume, new) {
+        joined if joined.is_some() != joining(volume, old).is_some() => *layers = self::layers(volume, transfer, new)?,
+        None => layers[0].update(transfer, (old, new))?,
+        Some(_) => {
+            for (number, layer) in layers.iter_mut().enumerate() {
+                layer.update(&transfer.of_channel(number), (old, new))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Draws all layers and joins their images.
+pub(super) fn draw(layers: &mut [Layer], scene: &Scene, view: ViewGeometry, host: Host, level: Level) -> Drawing {
+    let Some(joining) = joining(&layers[0].volume, scene) else {
+        return layers[0].draw(scene, view, host, level);
+    };
+    let mut by_itself = scene.clone();
+    by_itself.image.background = [0.0; 4];
+    let first_hit = match joining {
+        Joining::Sum => host.first_hit,
+        Joining::Nearest => host.first_hit.or(Some(1.0)),
+    };
+    let draw = |layer: &mut Layer| layer.draw(&by_itself, view, Host { first_hit, ..host.clone() }, level);
+    let (first, further) = layers.split_at_mut(1);
+    let mut all = draw(&mut first[0]);
+    for layer in further {
+        let Drawing { content, counts, first_hits } = draw(layer);
+        joining.join((&mut all.content.colors, &mut all.first_hits), (&content.colors, &first_hits));
+        all.counts.add_channel(&counts);
+    }
+    joining.finish(&mut all.content.colors, scene.image.background);
+    if host.first_hit.is_none() {
+        all.first_hits.clear();
+    }
+    all
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use super::*;
+    use crate::cpu::CpuRenderer;
+    use crate::scene::VolumeSource;
+    use crate::settings::splatting::Interpolation;
+
+    /// Where what voxels are drawn from lies in memory.
+    fn list_of(renderer: &CpuRenderer) -> *const () {
+        let layer = &renderer.layers[0];
+        match &layer.list {
+            List::Before(bricks, _) => bricks.bricks().as_ptr().cast(),
+            List::After(coefficients) => coefficients[0].all(&layer.volume).as_ptr().cast(),
+        }
+    }
+
+    #[test]
+    fn a_changed_scene_keeps_what_does_not_depend_on_the_change() {
+        let sets = ["image={width=16,height=16}".to_owned()];
+        for (classification, interpolation) in
+            [(Classification::Before, Interpolation::Smooth), (Classification::After, Interpolation::Exact)]
+        {
+            let mut scene = Scene::from_volume(VolumeSource::Builtin("head:12".to_owned()), &sets).unwrap();
+            (scene.splatting.classification, scene.splatting.interpolation) = (classification, interpolation);
+            let mut renderer = CpuRenderer::new(scene.load_volume().unwrap(), &scene).unwrap();
+            renderer.draw().unwrap();
+            let list = list_of(&renderer);
+            scene.camera = scene.camera.turned(20.0);
+            scene.shading.ambient = 0.5;
+            scene.splatting.compositing = crate::settings::splatting::Compositing::Xray;
+            scene.splatting.slab_width = 0.5;
+            renderer.set_scene(&scene).unwrap();
+            renderer.draw().unwrap();
+            assert_eq!(list_of(&renderer), list, "{classification:?}");
+            scene.splatting.radius = 1.5;
+            renderer.set_scene(&scene).unwrap();
+            assert_ne!(list_of(&renderer), list, "{classification:?}");
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! One image from those of single channels, where channels do not share sheets (SPEC §10).
+
+use std::cmp::Ordering;
+
+use crate::settings::splatting::{Classification, Compositing};
+
+/// How the images of channels become one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Joining {
+    /// Their sum, at most 1.
+    Sum,
+    /// At every pixel the nearest one, by first hits, or the mean of equally near ones. Each is opaque where it has a first hit.
+    Nearest,
+}
+
+impl Joining {
+    /// `None` where channels share sheets.
+    pub(crate) fn of(compositing: Compositing, classification: Classification) -> Option<Self> {
+        match compositing {
+            Compositing::Maximum | Compositing::Minimum | Compositing::Average => Some(Self::Sum),
+            Compositing::Surface if classification == Classification::After => Some(Self::Nearest),
+            _ => None,
+        }
+    }
+
+    /// Adds a channel's pixels, which have no background, to those of the channels before it. First hits become the nearest ones; they may be
+    /// empty for a sum.
+    pub(crate) fn join<T: PartialOrd + Copy>(self, all: (&mut [[f32; 4]], &mut [T]), channel: (&[[f32; 4]], &[T])) {
+        for (at, (pixel, new)) in all.0.iter_mut().zip(channel.0).enumerate() {
+            let order = channel.1.get(at).zip(all.1.get(at)).and_then(|(new, old)| new.partial_cmp(old));
+            if self == Self::Sum || order == Some(Ordering::Equal) {
+                *pixel = std::array::from_fn(|channel| pixel[channel] + new[channel]);
+            } else if order == Some(Ordering::Less) {
+                *pixel = *new;
+            }
+            if order == Some(Ordering::Less) {
+                all.1[at] = channel.1[at];
+            }
+        }
+    }
+
+    /// Makes joined pixels an image over a background of straight alpha.
+    pub(crate) fn finish(self, pixels: &mut [[f32; 4]], background: [f64; 4]) {
+        let [r, g, b, a] = background;
+        let background = [r * a, g * a, b * a, a].map(|channel| channel as f32);
+        for pixel in pixels {
+            let joined = match self {
+                Self::Sum => pixel.map(|channel| channel.min(1.0)),
+                // Alpha counts the channels that are equally near.
+                Self::Nearest => pixel.map(|channel| channel / pixel[3].max(1.0)),
+            };
+            *pixel = std::array::from_fn(|channel| joined[channel] + (1.0 - joined[3]) * background[channel]);
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! PNG files: straight alpha, integers.
+
+use std::io::Cursor;
+
+use ::png::{BitDepth, ColorType, Decoder, DecodingError, Encoder, EncodingError, Transformations};
+
+use super::{Image, PngDepth};
+
+/// The bytes of a file with these channels, red, green, blue and alpha for each pixel.
+pub(super) fn encode(image: &Image, depth: PngDepth) -> Result<Vec<u8>, EncodingError> {
+    let mut bytes = Vec::new();
+    let mut encoder = Encoder::new(&mut bytes, image.width, image.height);
+    encoder.set_color(ColorType::Rgba);
+    let channels = match depth {
+        PngDepth::Eight => {
+            encoder.set_depth(BitDepth::Eight);
+            image.straight_channels(255).flatten().map(|channel| channel as u8).collect()
+        }
+        PngDepth::Sixteen => {
+            encoder.set_depth(BitDepth::Sixteen);
+            image.straight_channels(u16::MAX).flatten().flat_map(u16::to_be_bytes).collect::<Vec<u8>>()
+        }
+    };
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&channels)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// A file whose header has been read.
+pub(super) struct Png<'a> {
+    reader: ::png::Reader<Cursor<&'a [u8]>>,
+}
+
+impl<'a> Png<'a> {
+    /// Reads the header.
+    pub(super) fn new(bytes: &'a [u8]) -> Result<Self, DecodingError> {
+        let mut decoder = Decoder::new(Cursor::new(bytes));
+        // Palettes become colours, less than eight bits become eight, a transparent colour becomes alpha.
+        decoder.set_transformations(Transformations::EXPAND);
+        Ok(Self { reader: decoder.read_info()? })
+    }
+
+    /// Width and height.
+    pub(super) fn size(&self) -> [u32; 2] {
+        let (width, height) = self.reader.info().size();
+        [width, height]
+    }
+
+    /// The bytes of all channels.
+    pub(super) fn channel_bytes(&self) -> u64 {
+        self.reader.output_buffer_size().map_or(u64::MAX, |bytes| bytes as u64)
+    }
+
+    /// Bits of a pixel in the file before compression.
+    pub(super) fn bits_per_pixel(&self) -> u64 {
+        self.reader.info().bits_per_pixel() as u64
+    }
+
+    /// All pixels, straight, from 0 to 1.
+    pub(super) fn pixels(mut self) -> Result<Vec<[f32; 4]>, DecodingError> {
+        let mut bytes = vec![0; self.reader.output_buffer_size().unwrap_or(0)];
+        self.reader.next_frame(&mut bytes)?;
+        let (color, depth) = self.reader.output_color_type();
+        let channels: Vec<f32> = match depth {
+            BitDepth::Sixteen => bytes
+                .as_chunks()
+                .0
+                .iter()
+                .map(|&pair| f32::from(u16::from_be_bytes(pair)) / f32::from(u16::MAX))
+                .collect(),
+            _ => bytes.iter().map(|&byte| f32::from(byte) / f32::from(u8::MAX)).collect(),
+        };
+        Ok(channels.chunks_exact(color.samples()).map(|pixel| rgba(color, pixel)).collect())
+    }
+}
+
+/// A pixel's channels; opaque without alpha.
+fn rgba(color: ColorType, pixel: &[f32]) -> [f32; 4] {
+    match (color, pixel) {
+        (ColorType::GrayscaleAlpha, &[gray, alpha]) => [gray, gray, gray, alpha],
+        (_, &[gray]) => [gray, gray, gray, 1.0],
+        (_, &[red, green, blue]) => [red, green, blue, 1.0],
+        (_, &[red, green, blue, alpha]) => [red, green, blue, alpha],
+        _ => [0.0; 4],
+    }
+}

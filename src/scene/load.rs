@@ -1,0 +1,89 @@
+//! Loading the volumes of a scene's channels.
+
+use std::path::Path;
+
+use super::{Channel, Scene, VolumeSource};
+use crate::volume::{Access, Labels, Selection, Volume, VolumeError, builtin};
+
+/// The scene's volume with all channels, on the first one's grid.
+pub(super) fn channels(scene: &Scene, access: &Access) -> Result<Volume, VolumeError> {
+    let mut channels = scene.channels();
+    let Some(first) = channels.next() else { return Err(in_memory("volume")) };
+    let volume = channel(&first, "volume", access)?;
+    let is_own = |channel: &Channel| channel.volume == VolumeSource::Memory;
+    if scene.further.iter().all(is_own) {
+        return Ok(volume);
+    }
+    single(&volume, 0, &first)?;
+    let further = (1..).zip(&scene.further).map(|(number, settings)| {
+        let key = format!("channel[{number}].volume");
+        let own = channel(settings, &key, access)?;
+        single(&own, number, settings)?;
+        own.onto(&volume, (&key, Path::new(&origin(&settings.volume))), access)
+    });
+    let further = further.collect::<Result<_, VolumeError>>()?;
+    volume.with_channels(&origin(&first.volume), further)
+}
+
+/// Where a volume comes from, for errors.
+fn origin(source: &VolumeSource) -> String {
+    match source {
+        VolumeSource::File(path) | VolumeSource::Raw(path, _) => path.display().to_string(),
+        VolumeSource::Builtin(name) => format!("builtin:{name}"),
+        VolumeSource::Memory => "scene".to_owned(),
+    }
+}
+
+/// Checks that one channel's volume is one channel.
+fn single(volume: &Volume, number: usize, settings: &Channel) -> Result<(), VolumeError> {
+    match volume.channels().count() {
+        1 => Ok(()),
+        count => Err(VolumeError::Invalid {
+            origin: origin(&settings.volume),
+            field: format!("channel[{number}].volume"),
+            found: format!("a volume of {count} channels"),
+            allowed: "volumes of one channel, where several channels name volumes".to_owned(),
+        }),
+    }
+}
+
+/// The volume of one channel.
+fn channel(settings: &Channel, key: &str, access: &Access) -> Result<Volume, VolumeError> {
+    let selection = Selection { channel: settings.index, time: settings.time };
+    let volume = match &settings.volume {
+        VolumeSource::File(path) => Volume::read(path, &access.selecting(selection))?,
+        VolumeSource::Raw(..) | VolumeSource::Builtin(_) if selection != Selection::default() => {
+            return Err(VolumeError::Invalid {
+                origin: origin(&settings.volume),
+                field: key.to_owned(),
+                found: "index or time of a volume that is neither of several".to_owned(),
+                allowed: "neither key, or a file of several channels or times".to_owned(),
+            });
+        }
+        VolumeSource::Raw(path, layout) => Volume::read_raw(path, layout, access)?,
+        VolumeSource::Builtin(name) => builtin::read(name, access)?,
+        VolumeSource::Memory => return Err(in_memory(key)),
+    };
+    let volume = match &settings.labels {
+        Some(path) => {
+            let labels = Labels::read(path, &access.whole())?;
+            let spacing = labels.spacing.filter(|_| settings.spacing.is_none());
+            volume.with_labels(Labels { spacing, ..labels })?
+        }
+        None => volume,
+    };
+    match settings.spacing {
+        Some(spacing) => volume.with_spacing(&origin(&settings.volume), spacing),
+        None => Ok(volume),
+    }
+}
+
+/// The error for a volume that no scene can name.
+fn in_memory(key: &str) -> VolumeError {
+    VolumeError::Invalid {
+        origin: "scene".to_owned(),
+        field: key.to_owned(),
+        found: "a volume in memory".to_owned(),
+        allowed: format!("{key}.path or {key}.builtin"),
+    }
+}

@@ -1,0 +1,170 @@
+//! Several volumes of one grid in a file: channels, times, or both (SPEC §10).
+
+use std::ops::Range;
+use std::path::Path;
+
+use super::VolumeError;
+use super::samples::{Samples, Stream, Voxel, dims_of};
+use super::source::invalid;
+
+/// The maximum number of channels in a file.
+pub(super) const MAX_CHANNELS: u32 = 64;
+
+/// How many volumes a file holds, and the order of their samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Series {
+    pub(super) channels: u32,
+    pub(super) times: u32,
+    pub(super) order: SeriesOrder,
+    /// Whether the channels are red, green, blue and perhaps A of one channel.
+    pub(super) is_color: bool,
+}
+
+/// The order of a file's samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum SeriesOrder {
+    /// The channels of a voxel lie side by side.
+    Interleaved,
+    /// Whole volumes, of which all channels of a time lie together.
+    ChannelsFirst,
+    /// Whole volumes, of which all times of a channel lie together.
+    #[cfg(feature = "nifti")]
+    TimesFirst,
+}
+
+/// What is read of a file with several volumes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Selection {
+    /// The number of the only channel; `None` for all.
+    pub(crate) channel: Option<u32>,
+    /// The number of the time; `None` for the first.
+    pub(crate) time: Option<u32>,
+}
+
+impl Default for Series {
+    fn default() -> Self {
+        Self { channels: 1, times: 1, order: SeriesOrder::ChannelsFirst, is_color: false }
+    }
+}
+
+impl Series {
+    /// Colours of three or four numbers that lie side by side.
+    #[cfg(any(feature = "codecs", feature = "dicom", feature = "nifti", feature = "npy", feature = "tiff"))]
+    pub(super) fn of_colors(components: u32, times: u32) -> Self {
+        Self { channels: components, times, order: SeriesOrder::Interleaved, is_color: true }
+    }
+
+    /// Checks that the file holds what is to be read.
+    ///
+    /// # Errors
+    /// If it does not.
+    pub(super) fn check(&self, path: &Path, selection: Selection) -> Result<(), VolumeError> {
+        let channels = if self.is_color { 1 } else { self.channels };
+        let wanted = [("channel", selection.channel, channels), ("time", selection.time, self.times)];
+        for (field, number, count) in wanted {
+            if let Some(number) = number.filter(|&number| number >= count) {
+                let allowed = if count == 1 { "0, the only one".to_owned() } else { format!("0 to {}", count - 1) };
+                return Err(invalid(path, field, number, allowed));
+            }
+        }
+        if self.times > 1 && selection.time.is_none() {
+            log::warn!("{}: {} times: the first is read", path.display(), self.times);
+        }
+        Ok(())
+    }
+
+    /// The channels that are read; all numbers of a colour.
+    pub(super) fn channels(&self, selection: Selection) -> Range<u32> {
+        let chosen = selection.channel.filter(|_| !self.is_color);
+        chosen.map_or(0..self.channels, |channel| channel..channel + 1)
+    }
+
+    /// The position among the file's volumes of a channel at the time that is read. It ascends with the channel.
+    pub(super) fn block(&self, channel: u32, selection: Selection) -> u64 {
+        let time = u64::from(selection.time.unwrap_or(0));
+        match self.order {
+            #[cfg(feature = "nifti")]
+            SeriesOrder::TimesFirst => u64::from(channel) * u64::from(self.times) + time,
+            _ => time * u64::from(self.channels) + u64::from(channel),
+        }
+    }
+
+    /// The number of volumes in the file.
+    pub(super) fn count(&self) -> u64 {
+        u64::from(self.channels) * u64::from(self.times)
+    }
+}
+
+/// Numbers of which those of a voxel lie side by side, sorted by what they are of.
+#[cfg(any(feature = "dicom", feature = "tiff"))]
+pub(super) fn apart<T: Copy>(numbers: Vec<T>, count: usize) -> Vec<T> {
+    if count == 1 {
+        return numbers;
+    }
+    (0..count).flat_map(|first| numbers.iter().skip(first).step_by(count)).copied().collect()
+}
+
+impl Stream {
+    /// The samples of the selected volumes of a series, channel by channel; `samples` are those of one volume. The stream must end after them as in
+    /// [`Self::samples`].
+    pub(super) fn series<T: Voxel>(
+        mut self,
+        samples: &Samples,
+        series: &Series,
+        window: bool,
+    ) -> Result<Vec<T>, VolumeError> {
+        let selection = self.access.selection();
+        series.check(&self.path, selection)?;
+        let channels = series.channels(selection);
+        if series.count() == 1 {
+            return self.samples(samples, window);
+        }
+        let total = samples.bytes().saturating_mul(series.count());
+        let is_wrong = |left: u64| left < total || left > total && !window;
+        if let Some(left) = self.exactly_left().filter(|&left| is_wrong(left)) {
+            let allowed = format!("{total} bytes ({} volumes of {} samples)", series.count(), samples.count());
+            return Err(invalid(&self.path, "data", format!("{left} bytes"), allowed));
+        }
+        if series.order == SeriesOrder::Interleaved {
+            let time = u64::from(selection.time.unwrap_or(0));
+            self.skip(time * u64::from(series.channels) * samples.bytes())?;
+            return self.interleaved(samples, (series.channels, channels), window || series.times > 1);
+        }
+        let (mut values, mut at) = (Vec::new(), 0);
+        for channel in channels {
+            let block = series.block(channel, selection);
+            self.skip((block - at) * samples.bytes())?;
+            samples.reserve::<T>(&self.path, &self.access)?;
+            let of_channel = self.read_samples(samples)?;
+            if values.is_empty() {
+                values = of_channel;
+            } else {
+                values.extend_from_slice(&of_channel);
+            }
+            at = block + 1;
+        }
+        Ok(values)
+    }
+
+    /// The samples of some of `count` channels, of which each voxel's lie side by side.
+    fn interleaved<T: Voxel>(
+        self,
+        samples: &Samples,
+        (count, channels): (u32, Range<u32>),
+        window: bool,
+    ) -> Result<Vec<T>, VolumeError> {
+        let [x, y, z] = samples.dims.to_array().map(u64::from);
+        let Some(dims) = dims_of([x * u64::from(count), y, z]).filter(|_| !samples.z_fastest) else {
+            let found = format!("{count} channels of {} voxels", samples.count());
+            return Err(invalid(&self.path, "sizes", found, "x fastest, and at most 4294967295 samples"));
+        };
+        let (path, access) = (self.path.clone(), self.access.clone());
+        let all: Vec<T> = self.samples(&Samples { dims, ..*samples }, window)?;
+        let mut values = Vec::new();
+        for channel in channels {
+            samples.reserve::<T>(&path, &access)?;
+            values.extend(all.iter().skip(channel as usize).step_by(count as usize));
+        }
+        Ok(values)
+    }
+}
