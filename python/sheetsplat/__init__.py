@@ -14,12 +14,14 @@ from .errors import (
     FileError,
     GoldenError,
     ImageError,
+    MergeError,
     RenderError,
     SceneError,
     SheetsplatError,
     VolumeError,
 )
 from .image import Image
+from .part import Part, merge
 from .scene import Scene
 from .view import View, info, orbit, render, sweep
 from .volume import Volume
@@ -31,6 +33,8 @@ __all__ = [
     "GoldenError",
     "Image",
     "ImageError",
+    "MergeError",
+    "Part",
     "RenderError",
     "Scene",
     "SceneError",
@@ -40,6 +44,7 @@ __all__ = [
     "VolumeError",
     "compare",
     "info",
+    "merge",
     "orbit",
     "render",
     "sweep",

@@ -7,6 +7,7 @@ __all__ = [
     "FileError",
     "GoldenError",
     "ImageError",
+    "MergeError",
     "RenderError",
     "SceneError",
     "SheetsplatError",
@@ -58,6 +59,10 @@ class RenderError(_Refused):
 
 class ImageError(_Refused):
     """An array or a file is not a picture, or pictures cannot be compared."""
+
+
+class MergeError(_Refused):
+    """Parts are not those of one picture: of other scenes, overlapping, or with gaps."""
 
 
 class GoldenError(_Refused):

@@ -122,6 +122,10 @@ class Scene:
         target = Path(path)
         target.write_text(self.to_toml(target.parent), encoding="utf-8")
 
+    def __reduce__(self) -> Any:
+        folder = os.getcwd()
+        return _restored, (self.to_toml(folder), folder)
+
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Scene) and self._native == other._native
 
@@ -129,6 +133,10 @@ class Scene:
 
     def __repr__(self) -> str:
         return f"<sheetsplat.Scene\n{self.to_toml()}>"
+
+
+def _restored(text: str, folder: str) -> Scene:
+    return Scene._of(native.Scene(text, "scene", folder, {}))
 
 
 def _flat(table: Mapping[Any, Any], path: str = "") -> dict[Any, Any]:

@@ -10,7 +10,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from . import _native as native
+from .errors import SceneError
 from .image import Image
+from .part import Part, merge
 from .scene import Scene
 from .volume import Volume
 
@@ -102,6 +104,46 @@ class View:
         array, stats, made_on = self._native.draw()
         return Image._of(array, json.loads(stats), made_on)
 
+    def part(
+        self,
+        *,
+        slabs: tuple[int, int] | None = None,
+        region: tuple[int, int, int, int] | None = None,
+    ) -> Part:
+        """Draws a part of the picture, which `merge` puts together with the others.
+
+        Parameters
+        ----------
+        slabs : tuple of int, optional
+            The first slab and the one after the last, from front to back as ``splatting.slab_width`` cuts the volume;
+            they may reach beyond the scene's. All slabs without it.
+        region : tuple of int, optional
+            The first column, the first row, the width and the height of the part's pixels. All pixels without it.
+
+        Examples
+        --------
+        >>> view = View("builtin:head:16", image={"width": 32, "height": 32}, splatting={"opacity_threshold": 1})
+        >>> upper, lower = view.part(region=(0, 0, 32, 16)), view.part(region=(0, 16, 32, 16))
+        >>> merge([lower, upper])
+        <sheetsplat.Image of 32×32 pixels>
+        """
+        drawn, stats = self._native.draw_part(slabs, region)
+        return Part._of(drawn, json.loads(stats))
+
+    def split(self, count: int) -> list[dict[str, Any]]:
+        """Parts of about equal work, as keyword arguments for `part`.
+
+        Examples
+        --------
+        >>> view = View("builtin:head:16", image={"width": 32, "height": 32}, splatting={"opacity_threshold": 1})
+        >>> merge(view.part(**piece) for piece in view.split(4))
+        <sheetsplat.Image of 32×32 pixels>
+        """
+        if count < 1:
+            raise SceneError(f"count: found {count}, allowed: at least 1", "count", str(count), "at least 1")
+        pieces = native.split(self._volume._native, self._scene._native, count)
+        return [{"slabs": slabs, "region": region} for slabs, region in pieces]
+
     def orbit(
         self, *, count: int = 120, turn: float = 360.0, frames: range | None = None
     ) -> Iterator[Image]:
@@ -142,8 +184,6 @@ def _what_and_how(
             raise TypeError("the source is a scene; give either it or `scene`")
         volume = look.load_volume()
     else:
-        from .errors import SceneError
-
         look = Scene(scene, **settings)
         if any(key == "volume" or key.startswith("volume.") for key in settings):
             found, allowed = "a volume beside the source", "no such key: `source`, `spacing` and `labels`"
@@ -161,8 +201,6 @@ def _is_scene_file(source: Any) -> bool:
 
 
 def _frames(count: int, frames: range | None) -> range:
-    from .errors import SceneError
-
     if count < 1:
         raise SceneError(f"count: found {count}, allowed: at least 1", "count", str(count), "at least 1")
     if frames is None:

@@ -35,6 +35,8 @@ class Volume:
         World units between voxels, in the order of an array's axes: z, y, x. Replaces the source's own.
     labels : array, optional
         The segment of each voxel, whole numbers from 0 to 65535, of the same shape.
+    channel_axis : int, optional
+        The axis of an array of four dimensions along which channels follow one another; the others are z, y, x.
 
     Examples
     --------
@@ -52,16 +54,21 @@ class Volume:
         *,
         spacing: float | Sequence[float] | None = None,
         labels: Any = None,
+        channel_axis: int | None = None,
     ) -> None:
         steps = None if spacing is None else _spacing(spacing)
         tags = None if labels is None else _array(labels, "labels")
+        if channel_axis is not None:
+            channels = _channels(source, channel_axis)
+            self._native = native.Volume.from_arrays(channels, steps or (1.0, 1.0, 1.0), tags, None, [0.0, 0.0, 0.0])
+            return
         if isinstance(source, Volume):
             self._native = source._native
         elif isinstance(source, (str, os.PathLike)):
             self._native = _open(os.fspath(source))
         else:
             array, own_spacing, axes, origin = _converted(source)
-            self._native = native.Volume.from_array(array, steps or own_spacing, tags, axes, origin)
+            self._native = native.Volume.from_arrays([array], steps or own_spacing, tags, axes, origin)
             return
         if steps is not None or tags is not None:
             self._native = self._native.replaced(steps, tags)
@@ -85,6 +92,11 @@ class Volume:
         return z, y, x
 
     @property
+    def channels(self) -> int:
+        """The number of channels."""
+        return self._native.channels
+
+    @property
     def unit(self) -> str | None:
         """The name of the world unit, if the file states it."""
         return self._native.unit
@@ -96,8 +108,12 @@ class Volume:
 
     @property
     def values(self) -> NDArray[np.float32]:
-        """A copy of the values, ``[z, y, x]``; holes are NaN."""
-        return self._native.values()
+        """A copy of the values, ``[z, y, x]``, of the first channel if there are several; holes are NaN."""
+        return self._native.values(0)
+
+    def values_of(self, channel: int) -> NDArray[np.float32]:
+        """A copy of the values of a channel, ``[z, y, x]``; holes are NaN."""
+        return self._native.values(channel)
 
     def info(self) -> dict[str, Any]:
         """Facts about the volume: its grid, the distribution of its values, and the preset that suits it."""
@@ -156,6 +172,19 @@ def _array(source: Any, name: str) -> NDArray[Any]:
     # `long` and `long long` may be types of equal size that NumPy tells apart.
     array = array.view(np.dtype(f"{kind}{size}"))
     return np.require(array, requirements=["A"])
+
+
+def _channels(source: Any, axis: int) -> list[NDArray[Any]]:
+    """The channels of an array of four dimensions."""
+    import numpy as np
+
+    array = np.asarray(source) if hasattr(source, "__array__") else None
+    if array is None or array.ndim != 4 or not -4 <= axis < 4:
+        found = type(source).__name__ if array is None else f"{array.ndim} dimensions with channel_axis={axis}"
+        raise _refused("shape", found, "an array of four dimensions, of which channel_axis is one")
+    if array.shape[axis] == 0:
+        raise _refused("shape", "no channel", "at least one")
+    return [_array(channel, "array") for channel in np.moveaxis(array, axis, 0)]
 
 
 _Converted = tuple["NDArray[Any]", tuple[float, float, float], "list[list[float]] | None", "list[float]"]

@@ -3,6 +3,7 @@
 use pyo3::PyErr;
 use sheetsplat::golden::{ComparisonError, GoldenError, LaxTolerance};
 use sheetsplat::image::ImageError;
+use sheetsplat::part::MergeError;
 use sheetsplat::scene::SceneError;
 use sheetsplat::volume::VolumeError;
 use sheetsplat::{DeviceError, RenderError, SettingError, headless};
@@ -14,6 +15,7 @@ mod classes {
     import_exception!(sheetsplat.errors, FileError);
     import_exception!(sheetsplat.errors, GoldenError);
     import_exception!(sheetsplat.errors, ImageError);
+    import_exception!(sheetsplat.errors, MergeError);
     import_exception!(sheetsplat.errors, RenderError);
     import_exception!(sheetsplat.errors, SceneError);
     import_exception!(sheetsplat.errors, VolumeError);
@@ -136,6 +138,12 @@ impl From<ImageError> for Raised {
             ImageError::Io { path, source, .. } => file(path, source),
             _ => Self(classes::ImageError::new_err(error.to_string())),
         }
+    }
+}
+
+impl From<MergeError> for Raised {
+    fn from(error: MergeError) -> Self {
+        Self(classes::MergeError::new_err(error.to_string()))
     }
 }
 

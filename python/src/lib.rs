@@ -5,6 +5,7 @@ mod array;
 mod error;
 mod golden;
 mod image;
+mod part;
 mod scene;
 mod settings;
 mod view;
@@ -18,7 +19,9 @@ mod _native {
     #[pymodule_export]
     use crate::image::{check_format, encode, save};
     #[pymodule_export]
-    use crate::scene::Scene;
+    use crate::part::{Part, merge, split};
+    #[pymodule_export]
+    use crate::scene::{Scene, presets};
     #[pymodule_export]
     use crate::view::View;
     #[pymodule_export]

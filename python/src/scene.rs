@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use sheetsplat::appearance::Preset;
 use sheetsplat::scene::VolumeSource;
 use sheetsplat::volume::PatientSide;
 
@@ -74,7 +75,7 @@ impl Scene {
     /// The scene with everything stated that depends on the volume; `all_around` for a camera that turns.
     fn explicit(&self, py: Python<'_>, volume: &Volume, all_around: bool) -> PyResult<Self> {
         let explicit = py.detach(|| {
-            self.scene.transfer.check_volume(&volume.0)?;
+            self.scene.check_volume(&volume.0)?;
             let scene = &self.scene;
             Ok::<_, Raised>(if all_around { scene.explicit_all_around(&volume.0) } else { scene.explicit(&volume.0) })
         })?;
@@ -112,4 +113,10 @@ impl Scene {
     fn __eq__(&self, other: &Self) -> bool {
         self.scene == other.scene
     }
+}
+
+/// The names of the presets.
+#[pyfunction]
+pub(crate) fn presets() -> [&'static str; Preset::ALL.len()] {
+    Preset::ALL.map(|(name, _)| name)
 }

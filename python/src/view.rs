@@ -10,6 +10,7 @@ use sheetsplat::headless::{Backend, Headless, HeadlessOptions, HeadlessView};
 
 use crate::error::{Raised, setting};
 use crate::image;
+use crate::part::{Part, window};
 use crate::scene::Scene;
 use crate::volume::Volume;
 
@@ -26,6 +27,8 @@ pub(crate) struct View {
 /// What a view draws next.
 struct Current {
     view: HeadlessView,
+    /// Width and height of its pictures.
+    size: [u32; 2],
     /// The milliseconds that the last change of the scene took.
     prepare_ms: f64,
 }
@@ -49,7 +52,8 @@ impl View {
             let headless = headless(backend, adapter, &scene.scene)?;
             let start = Instant::now();
             let view = headless.view(volume, &scene.scene)?;
-            let current = Mutex::new(Current { view, prepare_ms: milliseconds_since(start) });
+            let current = Current { view, size: size(scene), prepare_ms: milliseconds_since(start) };
+            let current = Mutex::new(current);
             Ok::<_, Raised>(Self { headless, current })
         })?;
         Ok(view)
@@ -60,6 +64,7 @@ impl View {
         py.detach(|| {
             let (mut current, start) = (self.lock(), Instant::now());
             self.headless.set_scene(&mut current.view, &scene.scene)?;
+            current.size = size(scene);
             current.prepare_ms = milliseconds_since(start);
             Ok::<_, Raised>(())
         })?;
@@ -85,6 +90,28 @@ impl View {
         let made_on = rendering.made_on().map(|made_on| (made_on.adapter, made_on.driver));
         Ok((image::array(py, rendering.image)?, stats, made_on))
     }
+
+    /// Draws a part of a picture, with its statistics as JSON.
+    fn draw_part(
+        &self,
+        py: Python<'_>,
+        slabs: Option<(i32, i32)>,
+        region: Option<(u32, u32, u32, u32)>,
+    ) -> PyResult<(Part, String)> {
+        let (drawn, stats) = py.detach(|| {
+            let mut current = self.lock();
+            let window = window(current.size, slabs, region);
+            let (drawn, mut stats) = self.headless.draw_part(&mut current.view, &window).map_err(Raised::from)?;
+            stats.prepare_ms = std::mem::take(&mut current.prepare_ms);
+            Ok::<_, Raised>((drawn, serde_json::to_string(&stats)))
+        })?;
+        let stats = stats.map_err(|error| pyo3::exceptions::PyRuntimeError::new_err(error.to_string()))?;
+        Ok((Part(drawn), stats))
+    }
+}
+
+fn size(scene: &Scene) -> [u32; 2] {
+    [scene.scene.image.width, scene.scene.image.height]
 }
 
 fn milliseconds_since(start: Instant) -> f64 {

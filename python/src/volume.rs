@@ -11,7 +11,7 @@ use sheetsplat::glam::{DMat3, DVec3, UVec3};
 use sheetsplat::volume::{Labels, Orientation, builtin};
 
 use crate::array;
-use crate::error::Raised;
+use crate::error::{self, Raised};
 
 /// The name of volumes from arrays in errors.
 const ORIGIN: &str = "array";
@@ -41,23 +41,29 @@ impl Volume {
 
 #[pymethods]
 impl Volume {
-    /// A volume of an array `[z, y, x]`. `axes` are the directions of x, y and z in the patient (RAS).
+    /// A volume of arrays `[z, y, x]`, one for each channel. `axes` are the directions of x, y and z in the patient (RAS).
     #[staticmethod]
-    #[pyo3(signature = (array, spacing, labels=None, axes=None, origin=[0.0; 3]))]
-    fn from_array(
-        array: &Bound<'_, PyAny>,
+    #[pyo3(signature = (channels, spacing, labels=None, axes=None, origin=[0.0; 3]))]
+    fn from_arrays(
+        py: Python<'_>,
+        channels: Vec<Bound<'_, PyAny>>,
         spacing: [f64; 3],
         labels: Option<&Bound<'_, PyAny>>,
         axes: Option<[[f64; 3]; 3]>,
         origin: [f64; 3],
     ) -> PyResult<Self> {
-        let (dims, values) = array::values(array)?;
+        let channels = channels.iter().map(array::values).collect::<Result<Vec<_>, _>>()?;
         let labels = labels.map(array::labels).transpose()?;
         let orientation =
             axes.map(|axes| Orientation { axes: DMat3::from_cols_array_2d(&axes), origin: origin.into() });
-        Self::with(array.py(), || {
-            let volume = sheetsplat::Volume::new(ORIGIN, dims.into(), zyx(spacing), values)?;
-            let volume = volume.with_orientation(ORIGIN, orientation)?;
+        Self::with(py, || {
+            let channel = |(dims, values): ([u32; 3], Vec<f32>)| {
+                sheetsplat::Volume::new(ORIGIN, dims.into(), zyx(spacing), values)
+            };
+            let mut volumes = channels.into_iter().map(channel).collect::<Result<Vec<_>, _>>()?;
+            let further = volumes.split_off(volumes.len().min(1));
+            let first = volumes.pop().ok_or_else(|| error::volume("channels", "none", "at least one"))?;
+            let volume = first.with_channels(ORIGIN, further)?.with_orientation(ORIGIN, orientation)?;
             labels.map_or(Ok(volume.clone()), |labels| with_labels(volume, labels))
         })
     }
@@ -101,6 +107,12 @@ impl Volume {
         [z, y, x]
     }
 
+    /// The number of channels.
+    #[getter]
+    fn channels(&self) -> usize {
+        self.0.channels().count()
+    }
+
     #[getter]
     fn unit(&self) -> Option<&str> {
         self.0.unit()
@@ -111,9 +123,12 @@ impl Volume {
         self.0.holes()
     }
 
-    /// A copy of the values, `[z, y, x]`.
-    fn values<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
-        PyArray1::from_slice(py, self.0.values()).reshape(self.shape().map(|size| size as usize))
+    /// A copy of a channel's values, `[z, y, x]`.
+    fn values<'py>(&self, py: Python<'py>, channel: usize) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        let count = self.channels();
+        let allowed = || error::volume("channel", &channel.to_string(), &format!("0 to {}", count - 1));
+        let channel = self.0.channels().nth(channel).ok_or_else(allowed)?;
+        PyArray1::from_slice(py, channel.values()).reshape(self.shape().map(|size| size as usize))
     }
 
     /// Facts about the volume, by the names of `sheetsplat info --json`; sizes and spacings are in the order z, y, x.

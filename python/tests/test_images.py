@@ -65,3 +65,24 @@ def test_vectors_and_planes_are_refused() -> None:
     for image in (SimpleITK.Image(4, 5, SimpleITK.sitkUInt8), SimpleITK.Image([4, 5, 6], SimpleITK.sitkVectorUInt8, 3)):
         with pytest.raises(sheetsplat.VolumeError, match="array: "):
             sheetsplat.Volume(image)
+
+
+def test_channels() -> None:
+    """An axis of an array may be channels, which are drawn as one."""
+    stack = np.random.default_rng(3).normal(size=(6, 2, 7, 8)).astype(np.float32)
+    volume = sheetsplat.Volume(stack, spacing=(2, 1, 1), channel_axis=1)
+    assert (volume.channels, volume.shape, volume.spacing) == (2, (6, 7, 8), (2.0, 1.0, 1.0))
+    np.testing.assert_array_equal(volume.values_of(1), stack[:, 1])
+    np.testing.assert_array_equal(volume.values, stack[:, 0])
+    np.testing.assert_array_equal(sheetsplat.Volume(stack, channel_axis=-3).values_of(1), stack[:, 1])
+    small = {"image": {"width": 32, "height": 32}}
+    both = np.asarray(sheetsplat.render(volume, preset="confocal", **small))
+    first = np.asarray(sheetsplat.render(stack[:, 0], spacing=(2, 1, 1), preset="confocal", **small))
+    assert np.abs(both - first).max() > 0.05
+    hidden = np.asarray(sheetsplat.render(volume, preset="confocal", **{"channel[1].visible": False}, **small))
+    assert np.abs(hidden - both).max() > 0.05
+    for source, axis in [(stack, 4), (stack[0], 0), (stack[:, :0], 1)]:
+        with pytest.raises(sheetsplat.VolumeError, match="array: shape: found"):
+            sheetsplat.Volume(source, channel_axis=axis)
+    with pytest.raises(sheetsplat.VolumeError, match="channel: found 2, allowed: 0 to 1"):
+        volume.values_of(2)

@@ -1,0 +1,238 @@
+"""Pictures drawn by many workers of Dask: parts that merge to the same bytes however the work was shared.
+
+Only this module needs ``dask`` and ``distributed``.
+
+>>> import sheetsplat.dask
+>>> from distributed import Client
+>>> client = Client("scheduler:8786")  # doctest: +SKIP
+>>> future = sheetsplat.dask.render("/shared/head.nrrd", parts=64, preset="ct-bone")  # doctest: +SKIP
+>>> future.result().save("head.png")  # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+import uuid
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import dask
+from distributed import Client, Future, default_client
+
+from .errors import SceneError
+from .image import Image
+from .part import Part, merge
+from .scene import Scene
+from .view import View, _frames, _is_scene_file
+from .volume import _BUILTIN, Volume
+
+__all__ = ["orbit", "render"]
+
+
+def render(
+    source: Any,
+    *,
+    client: Client | None = None,
+    parts: int | None = None,
+    spacing: float | Sequence[float] | None = None,
+    labels: Any = None,
+    scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None = None,
+    side: str | None = None,
+    backend: str = "cpu",
+    **settings: Any,
+) -> Future:
+    """Draws a picture by the workers of a Dask cluster.
+
+    Parameters
+    ----------
+    source : path, array or Scene
+        What is drawn. Every worker reads a path itself, so it must mean the same file on all of them; an array is
+        sent to them. A scene, or the path of a scene file, names its volume.
+    client : distributed.Client, optional
+        The cluster. Without it, the client that was made last.
+    parts : int, optional
+        The number of parts of about equal work. Without it, two for each thread of the workers.
+    spacing, labels, scene, side, backend, **settings
+        As for `View`.
+
+    Returns
+    -------
+    distributed.Future
+        Its result is an `Image`. ``distributed.progress(future)`` shows a bar, ``future.cancel()`` stops what has not
+        begun. If a worker is lost, others draw its parts again.
+
+    Notes
+    -----
+    Each part is a task, and neighbours merge in pairs on the workers, by a tree that follows the parts' numbers: the
+    bytes are those of `merge` of the parts of `View.split`, whatever worker draws them. With
+    ``splatting.opacity_threshold = 1`` they are the whole picture's to rounding.
+    """
+    client = client or default_client()
+    what, look = _sent(client, source, spacing, labels, scene, settings)
+    count = _count(client, parts)
+    start = _prepare(what, look, side, backend, False)
+    return client.compute(_picture(what, start, 0.0, count, backend), retries=3)
+
+
+def orbit(
+    source: Any,
+    *,
+    client: Client | None = None,
+    count: int = 120,
+    turn: float = 360.0,
+    frames: range | None = None,
+    parts: int = 1,
+    spacing: float | Sequence[float] | None = None,
+    labels: Any = None,
+    scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None = None,
+    side: str | None = None,
+    backend: str = "cpu",
+    **settings: Any,
+) -> list[Future]:
+    """Draws a turntable by the workers of a Dask cluster: a future for each picture.
+
+    Parameters
+    ----------
+    source, client, spacing, labels, scene, side, backend, **settings
+        As for `render`.
+    count, turn, frames
+        As for `View.orbit`.
+    parts : int
+        The number of parts of each picture; 1 is best where there are more pictures than workers.
+    """
+    client = client or default_client()
+    what, look = _sent(client, source, spacing, labels, scene, settings)
+    numbers, count_of_parts = _frames(count, frames), _count(client, parts)
+    start = _prepare(what, look, side, backend, True)
+    pictures = [_picture(what, start, turn / count * frame, count_of_parts, backend) for frame in numbers]
+    futures: list[Future] = client.compute(pictures, retries=3)
+    return futures
+
+
+@dataclass(frozen=True)
+class _Source:
+    """What the workers draw: a path, a scene that names its volume, or an array that was sent to them."""
+
+    token: str
+    what: Any
+    spacing: float | Sequence[float] | None
+    labels: Any
+
+    def view(self, scene: Scene, side: str | None, backend: str) -> View:
+        if isinstance(self.what, Scene):
+            volume = self.what.load_volume()
+            if self.spacing is not None or self.labels is not None:
+                volume = Volume(volume, spacing=self.spacing, labels=self.labels)
+            return View(volume, scene=scene, side=side, backend=backend)
+        return View(self.what, spacing=self.spacing, labels=self.labels, scene=scene, side=side, backend=backend)
+
+
+def _sent(
+    client: Client,
+    source: Any,
+    spacing: float | Sequence[float] | None,
+    labels: Any,
+    scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None,
+    settings: dict[str, Any],
+) -> tuple[Any, Scene]:
+    """The source as the workers get it, sent once to each that needs it, and the scene, which is checked here."""
+    if isinstance(source, Volume):
+        raise TypeError("a volume is not sent to other processes; give its path or its array")
+    if isinstance(source, Scene) or _is_scene_file(source):
+        if scene is not None:
+            raise TypeError("the source is a scene; give either it or `scene`")
+        look = source = Scene(source, **settings)
+    else:
+        look = Scene(scene, **settings)
+        if isinstance(source, (str, os.PathLike)):
+            path = os.fsdecode(source)
+            source = path if path.startswith(_BUILTIN) or "://" in path else os.path.abspath(path)
+    return client.scatter(_Source(uuid.uuid4().hex, source, spacing, labels), hash=False), look
+
+
+def _count(client: Client, parts: int | None) -> int:
+    if parts is None:
+        threads: dict[str, int] = client.nthreads()
+        return max(1, 2 * sum(threads.values()))
+    if parts < 1:
+        raise SceneError(f"parts: found {parts}, allowed: at least 1", "parts", str(parts), "at least 1")
+    return parts
+
+
+def _prepare(what: Any, look: Scene, side: str | None, backend: str, all_around: bool) -> Any:
+    return _task(_start, "start")(what, look, side, backend, all_around)
+
+
+def _picture(what: Any, start: Any, degrees: float, count: int, backend: str) -> Any:
+    """The tasks of a picture. `View.split` gives ⌊√count⌋ regions, whose slab ranges follow one another."""
+    pieces = _task(_split, "split")(what, start, degrees, count, backend)
+    regions = math.isqrt(count)
+    ends = [count * at // regions for at in range(regions + 1)]
+    merged = []
+    for first, end in zip(ends, ends[1:], strict=False):
+        drawn = [_task(_draw, "part")(what, pieces, number, backend) for number in range(first, end)]
+        while len(drawn) > 1:
+            pairs = [drawn[at : at + 2] for at in range(0, len(drawn), 2)]
+            drawn = [_task(Part.join, "join")(pair) if len(pair) == 2 else pair[0] for pair in pairs]
+        merged += drawn
+    return _task(merge, "merge")(merged)
+
+
+def _task(function: Any, name: str) -> Any:
+    def call(*arguments: Any) -> Any:
+        key = f"sheetsplat-{name}-{uuid.uuid4().hex}"
+        return dask.delayed(function, pure=False)(*arguments, dask_key_name=key)
+
+    return call
+
+
+@dataclass
+class _Kept:
+    """A view that a worker keeps for the next parts of the same volume. One thread uses it at a time."""
+
+    view: View | None = None
+    lock: threading.Lock = field(default_factory=threading.Lock)
+
+
+#: The views of the volumes that a worker used last, and how many it keeps.
+_KEPT: OrderedDict[tuple[str, str], _Kept] = OrderedDict()
+_MOST_KEPT = 2
+_KEPT_LOCK = threading.Lock()
+
+
+@contextmanager
+def _view(what: _Source, look: Scene, side: str | None, backend: str) -> Iterator[View]:
+    with _KEPT_LOCK:
+        kept = _KEPT.setdefault((what.token, backend), _Kept())
+        _KEPT.move_to_end((what.token, backend))
+        while len(_KEPT) > _MOST_KEPT:
+            _KEPT.popitem(last=False)
+    with kept.lock:
+        if kept.view is None:
+            kept.view = what.view(look, side, backend)
+        else:
+            kept.view.scene = look if side is None else look.seen_from(kept.view.volume, side)
+        yield kept.view
+
+
+def _start(what: _Source, look: Scene, side: str | None, backend: str, all_around: bool) -> Scene:
+    """The scene with everything stated that depends on the volume, so that all workers draw the same."""
+    with _view(what, look, side, backend) as view:
+        return view.scene.explicit(view.volume, all_around=all_around)
+
+
+def _split(what: _Source, start: Scene, degrees: float, count: int, backend: str) -> tuple[Scene, list[dict[str, Any]]]:
+    look = start.turned(degrees) if degrees != 0 else start
+    with _view(what, look, None, backend) as view:
+        return look, view.split(count)
+
+
+def _draw(what: _Source, pieces: tuple[Scene, list[dict[str, Any]]], number: int, backend: str) -> Part:
+    look, windows = pieces
+    with _view(what, look, None, backend) as view:
+        return view.part(**windows[number])
