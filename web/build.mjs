@@ -1,0 +1,52 @@
+// Builds the package into dist/: the library as WebAssembly with vector instructions, its bindings, and the page's API.
+//   node build.mjs
+// Needs Rust's target wasm32-unknown-unknown and the wasm-bindgen of Cargo.lock's version, which `.ci/setup --web` installs.
+import { execFileSync } from "node:child_process";
+import { existsSync, mkdirSync, readFileSync, rmSync } from "node:fs";
+import { dirname, join, resolve } from "node:path";
+import { fileURLToPath } from "node:url";
+import { gzipSync } from "node:zlib";
+
+const here = dirname(fileURLToPath(import.meta.url));
+const root = dirname(here);
+/** The most bytes that a page may load for a backend, gzipped. */
+const MAX_ZIPPED = { cpu: 610_000, gpu: 680_000 };
+const dist = join(here, "dist");
+const target = resolve(root, process.env.CARGO_TARGET_DIR ?? "target");
+
+function run(command, args, options = {}) {
+    execFileSync(command, args, { stdio: "inherit", cwd: here, ...options });
+}
+
+const lock = readFileSync(join(root, "Cargo.lock"), "utf8");
+const version = lock.match(/name = "wasm-bindgen"\nversion = "([^"]+)"/)[1];
+const installed = join(target, "tools", "bin", "wasm-bindgen");
+const bindgen = existsSync(installed) ? installed : "wasm-bindgen";
+let found;
+try {
+    found = execFileSync(bindgen, ["--version"], { encoding: "utf8" }).trim().split(" ")[1];
+} catch (error) {
+    throw new Error(`${bindgen}: ${error.message}; .ci/setup --web installs version ${version}`);
+}
+if (found !== version) {
+    throw new Error(`${bindgen}: found version ${found}, allowed: ${version}, that of Cargo.lock, which .ci/setup --web installs`);
+}
+
+rmSync(dist, { recursive: true, force: true });
+mkdirSync(dist);
+// A page loads one of both. Only the CPU's speed depends on its code, which vectors make fast; the GPU's may be as short as can be.
+for (const [backend, level] of [["cpu", "s"], ["gpu", "z"]]) {
+    const cargo = ["build", "--locked", "-p", "sheetsplat-web", "--features", backend, "--target", "wasm32-unknown-unknown", "--profile", "web"];
+    const environment = { CARGO_PROFILE_WEB_OPT_LEVEL: level, RUSTFLAGS: "-C target-feature=+simd128" };
+    run("cargo", cargo, { cwd: root, env: { ...process.env, ...environment } });
+    const built = join(target, "wasm32-unknown-unknown", "web", "sheetsplat_web.wasm");
+    const options = ["--target", "web", "--omit-default-module-path", "--remove-name-section", "--remove-producers-section"];
+    run(bindgen, [built, ...options, "--out-dir", dist, "--out-name", backend]);
+    const bytes = readFileSync(join(dist, `${backend}_bg.wasm`));
+    const zipped = gzipSync(bytes, { level: 9 }).length;
+    console.log(`${backend}: ${(bytes.length / 1e6).toFixed(2)} MB, ${(zipped / 1e6).toFixed(2)} MB gzipped`);
+    if (zipped > MAX_ZIPPED[backend]) {
+        throw new Error(`${backend}_bg.wasm: found ${zipped} bytes gzipped, allowed: at most ${MAX_ZIPPED[backend]}`);
+    }
+}
+run(join(here, "node_modules", ".bin", "tsc"), ["-p", here]);

@@ -1,0 +1,79 @@
+// Orbit, zoom and pan by pointer, touch, wheel and keys.
+
+import type { Move } from "./protocol.js";
+
+/** Heights of the picture that a key moves by. */
+const STEP = 0.05;
+/** The zoom factor of a key, and its exponent per pixel of the wheel. */
+const ZOOM = 1.15;
+const WHEEL = 0.0015;
+
+/** Lets a canvas move a camera; `move` gets what is done, and whether more will follow at once. Returns what ends it. */
+export function control(canvas: HTMLCanvasElement, move: (move: Move, isGoingOn: boolean) => void): () => void {
+    const ending = new AbortController();
+    const listen = <K extends keyof HTMLElementEventMap>(name: K, then: (event: HTMLElementEventMap[K]) => void) => {
+        canvas.addEventListener(name, then, { signal: ending.signal, passive: false });
+    };
+    const down = new Map<number, [number, number]>();
+    const height = () => Math.max(canvas.clientHeight, 1);
+    /** The middle of the pointers, and how far they are apart. */
+    const grip = (): [number, number, number] => {
+        const points = [...down.values()];
+        const [a, b] = [points[0]!, points[1] ?? points[0]!];
+        return [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, Math.hypot(a[0] - b[0], a[1] - b[1])];
+    };
+
+    if (!canvas.hasAttribute("tabindex")) canvas.tabIndex = 0;
+    const before = canvas.style.touchAction;
+    canvas.style.touchAction = "none";
+
+    listen("contextmenu", (event) => event.preventDefault());
+    listen("pointerdown", (event) => {
+        canvas.setPointerCapture(event.pointerId);
+        down.set(event.pointerId, [event.clientX, event.clientY]);
+    });
+    listen("pointermove", (event) => {
+        if (!down.has(event.pointerId) || down.size > 2) return;
+        const [x, y, apart] = grip();
+        down.set(event.pointerId, [event.clientX, event.clientY]);
+        const [newX, newY, newApart] = grip();
+        const by: [number, number] = [(newX - x) / height(), (newY - y) / height()];
+        const pans = down.size === 2 || event.shiftKey || (event.buttons & 1) === 0;
+        if (by[0] !== 0 || by[1] !== 0) move(pans ? { pan: by } : { orbit: by }, true);
+        if (down.size === 2 && apart > 0 && newApart > 0 && apart !== newApart) move({ zoom: apart / newApart }, true);
+    });
+    const up = (event: PointerEvent) => {
+        if (down.delete(event.pointerId) && down.size === 0) move({ orbit: [0, 0] }, false);
+    };
+    listen("pointerup", up);
+    listen("pointercancel", up);
+    let rest: ReturnType<typeof setTimeout> | undefined;
+    listen("wheel", (event) => {
+        event.preventDefault();
+        const pixels = event.deltaY * (event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 20 : 1);
+        move({ zoom: Math.exp(pixels * WHEEL) }, true);
+        clearTimeout(rest);
+        rest = setTimeout(() => move({ zoom: 1 }, false), 250);
+    });
+    listen("keydown", (event) => {
+        if (event.ctrlKey || event.metaKey || event.altKey) return;
+        const arrows: Record<string, [number, number]> = {
+            ArrowLeft: [-STEP, 0],
+            ArrowRight: [STEP, 0],
+            ArrowUp: [0, -STEP],
+            ArrowDown: [0, STEP],
+        };
+        const by = arrows[event.key];
+        if (by) move(event.shiftKey ? { pan: by } : { orbit: by }, false);
+        else if (event.key === "+" || event.key === "=") move({ zoom: 1 / ZOOM }, false);
+        else if (event.key === "-" || event.key === "_") move({ zoom: ZOOM }, false);
+        else if (event.key === "Home" || event.key === "0") move({ home: true }, false);
+        else return;
+        event.preventDefault();
+    });
+    return () => {
+        ending.abort();
+        clearTimeout(rest);
+        canvas.style.touchAction = before;
+    };
+}
