@@ -36,6 +36,7 @@ mod samples;
 mod series;
 mod shear;
 mod source;
+mod store;
 #[cfg(feature = "tiff")]
 mod tiff;
 mod unit;
@@ -66,6 +67,7 @@ pub use raw::RawLayout;
 pub use samples::SampleType;
 pub(crate) use samples::{SIZES, dims_of};
 pub(crate) use series::Selection;
+pub use store::{Store, StoreLevel};
 
 use crate::error::setting::SettingError;
 
@@ -95,6 +97,13 @@ pub enum VolumeError {
         /// What would have been accepted.
         allowed: String,
     },
+}
+
+impl VolumeError {
+    /// The error of a file that could not be read, for [`Store`]s of other programs.
+    pub fn io(path: impl Into<PathBuf>, source: std::io::Error) -> Self {
+        Self::Io { path: path.into(), source }
+    }
 }
 
 /// How a file stores a volume.
@@ -176,14 +185,18 @@ impl Volume {
         if holes == u64::from(count) {
             return Err(invalid("data", "only NaN or infinite samples".to_owned(), "at least one finite sample"));
         }
-        let label_names = BTreeMap::new();
-        Ok(Self {
+        Ok(Self { holes, ..Self::piece(grid, values) })
+    }
+
+    /// A piece of a volume, with values that are finite or NaN already.
+    pub(crate) fn piece(grid: Grid, values: Vec<f32>) -> Self {
+        Self {
             grid,
             values,
-            holes,
+            holes: 0,
             colors: None,
             labels: None,
-            label_names,
+            label_names: BTreeMap::new(),
             orientation: None,
             unit: None,
             encoding: None,
@@ -192,7 +205,7 @@ impl Volume {
             display: None,
             further: Vec::new(),
             coefficients: KeptCoefficients::default(),
-        })
+        }
     }
 
     /// The same values with another spacing (world units between neighbouring voxels).
