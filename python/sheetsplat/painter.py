@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable
 
+from . import _native as native
 from .image import Image
 from .scene import Scene
 from .view import View
@@ -89,7 +90,7 @@ class Painter:
                     self._is_running = False
                     return
                 scene = self._wanted
-                step = 1 if scene is rested or self._waiting else self._step()
+                step = 1 if scene is rested or self._waiting else self._step(scene)
             try:
                 drawn = self._draw(scene, step)
             except BaseException as error:
@@ -110,9 +111,12 @@ class Painter:
                 self._result = result
                 self._changed.notify_all()
 
-    def _step(self) -> int:
+    def _step(self, scene: Scene) -> int:
         """The number of pixels of the whole picture, along a side, that share one of the next."""
-        return min(max(math.ceil(math.sqrt(self._seconds / _FLUENT)), 1), _MOST)
+        fluent = math.ceil(math.sqrt(self._seconds / _FLUENT))
+        # Pixels that are larger than voxels would need wider kernels, for which all voxels are classified again.
+        fine = math.floor(1 / native.pixel(scene._native, self._view.volume._native))
+        return max(min(fluent, fine, _MOST), 1)
 
     def _draw(self, scene: Scene, step: int) -> Image:
         if step > 1:

@@ -228,7 +228,8 @@ class Widget(anywidget.AnyWidget):  # type: ignore[misc]
         if is_home:
             self._go_home()
         with self._placing():
-            self.azimuth -= orbit[0] * _TURN
+            # Within the range of a slider from -180 to 180.
+            self.azimuth = math.remainder(self.azimuth - orbit[0] * _TURN, 360.0)
             if orbit[1] != 0:
                 elevation = self.elevation + orbit[1] * _TURN
                 self.elevation = min(max(elevation, -_MOST_ELEVATION), _MOST_ELEVATION)

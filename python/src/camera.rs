@@ -35,12 +35,22 @@ pub(crate) fn placed(home: &Scene, azimuth: f64, elevation: f64, zoom: f64, cent
 /// The world point at a picture's centre after what was there has followed a pointer that moved by some heights of the picture.
 #[pyfunction]
 pub(crate) fn panned(scene: &Scene, volume: &Volume, right: f64, down: f64) -> [f64; 3] {
-    let scene = &scene.scene;
-    let mut camera = scene.camera;
-    let size = [scene.image.width, scene.image.height];
-    let height = navigation::height(&camera, volume.0.grid(), scene.splatting.radius, size);
-    navigation::pan(&mut camera, DVec2::new(right, down) * height);
+    let mut camera = scene.scene.camera;
+    navigation::pan(&mut camera, DVec2::new(right, down) * height(scene, volume));
     camera.middle().to_array()
+}
+
+/// The size of a pixel at the depth of the picture's centre, in the volume's smallest voxel spacings.
+#[pyfunction]
+pub(crate) fn pixel(scene: &Scene, volume: &Volume) -> f64 {
+    height(scene, volume) / f64::from(scene.scene.image.height) / volume.0.grid().unit()
+}
+
+/// The height of a picture in world units, at the depth of its centre.
+fn height(scene: &Scene, volume: &Volume) -> f64 {
+    let scene = &scene.scene;
+    let size = [scene.image.width, scene.image.height];
+    navigation::height(&scene.camera, volume.0.grid(), scene.splatting.radius, size)
 }
 
 /// A scene with the camera of another one.

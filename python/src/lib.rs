@@ -16,7 +16,7 @@ mod volume;
 #[pyo3::pymodule]
 mod _native {
     #[pymodule_export]
-    use crate::camera::{elevation_and_center, panned, placed, with_camera};
+    use crate::camera::{elevation_and_center, panned, pixel, placed, with_camera};
     #[pymodule_export]
     use crate::golden::{Comparison, check_golden, compare, open_image};
     #[pymodule_export]

@@ -21,7 +21,7 @@ SIZE: dict[str, Any] = {"image": {"width": 48, "height": 40}}
 
 
 def head(**settings: Any) -> Widget:
-    return Widget("builtin:head:24", **SIZE, **settings)
+    return Widget("builtin:head:24", **{**SIZE, **settings})
 
 
 def send(widget: Widget, **move: Any) -> None:
@@ -121,8 +121,11 @@ def test_traits_are_observed_and_set() -> None:
     widget.observe(lambda change: seen.append((change["name"], change["new"])), ["azimuth", "zoom"])
     send(widget, orbit=[-0.5, 0])
     assert seen == [("azimuth", 90)]
-    widget.zoom = 2
-    assert seen[1:] == [("zoom", 2)]
+    # A slider's range is not left.
+    send(widget, orbit=[-0.6, 0])
+    assert seen[1][0] == "azimuth" and abs(seen[1][1] + 162) < 1e-9
+    widget.azimuth, widget.zoom = 90, 2
+    assert seen[2:] == [("azimuth", 90), ("zoom", 2)]
     picture = check_picture(widget)
     turntable = sheetsplat.View("builtin:head:24", **SIZE)
     turntable.scene = turntable.scene.explicit(turntable.volume, all_around=True).turned(90)
@@ -232,13 +235,16 @@ class SlowView(sheetsplat.View):
 
 def slow(monkeypatch: pytest.MonkeyPatch) -> tuple[Widget, SlowView]:
     monkeypatch.setattr("sheetsplat.widget.View", SlowView)
-    widget = head()
+    # Four pixels to a voxel.
+    widget = head(image={"width": 192, "height": 160})
     view = widget._painter._view
     assert isinstance(view, SlowView) and view.begun.acquire(timeout=60)
     return widget, view
 
 
 def test_only_the_newest_of_many_changes_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    # No picture takes too long.
+    monkeypatch.setattr(painter, "_FLUENT", 1e9)
     widget, view = slow(monkeypatch)
     taken: list[Any] = []
     monkeypatch.setattr(widget, "send", lambda content, buffers=None: taken.append(content))
@@ -253,23 +259,44 @@ def test_only_the_newest_of_many_changes_is_drawn(monkeypatch: pytest.MonkeyPatc
     assert view.drawn[1].to_dict()["camera"] == widget.scene.to_dict()["camera"]
 
 
+def wait_for(pictures: list[int], count: int) -> None:
+    deadline = time.monotonic() + 60
+    while len(pictures) < count and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert len(pictures) == count
+
+
 def test_while_the_picture_changes_it_is_rough_if_whole_ones_take_long(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(painter, "_FLUENT", 0.02)
     monkeypatch.setattr(painter, "_PAUSE", 0.05)
     widget, view = slow(monkeypatch)
-    sizes: list[int] = []
-    widget.observe(lambda change: sizes.append(int.from_bytes(change["new"][16:20], "big")), "_png")
-    # The first picture takes six to nine times as long as is fluent, so that a rough one may have a ninth of the pixels.
-    time.sleep(0.12)
-    view.gate.release()
-    view.gate.release(2)
+    widths: list[int] = []
+    widget.observe(lambda change: widths.append(int.from_bytes(change["new"][16:20], "big")), "_png")
+    # The first picture takes more than six times as long as is fluent, so that a rough one has a ninth of the pixels or fewer.
+    time.sleep(0.13)
+    view.gate.release(3)
     send(widget, orbit=[0.1, 0])
-    deadline = time.monotonic() + 60
-    while len(sizes) < 3 and time.monotonic() < deadline:
-        time.sleep(0.01)
-    whole, rough, rested = sizes
-    assert (whole, rested) == (48, 48) and rough in (12, 16)
-    assert [scene.to_dict()["image"]["width"] for scene in view.drawn] == sizes
+    wait_for(widths, 3)
+    assert widths in ([192, 64, 192], [192, 48, 192])
+    assert [scene.to_dict()["image"]["width"] for scene in view.drawn] == widths
+    assert np.asarray(widget.image).shape == (160, 192, 4)
+
+
+def test_rough_pictures_do_not_minify_the_volume(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(painter, "_FLUENT", 1e-9)
+    monkeypatch.setattr(painter, "_PAUSE", 0.05)
+    widget, view = slow(monkeypatch)
+    widths: list[int] = []
+    widget.observe(lambda change: widths.append(int.from_bytes(change["new"][16:20], "big")), "_png")
+    view.gate.release(1)
+    wait_for(widths, 1)
+    view.gate.release(4)
+    # Pixels are half as large as voxels, and larger ones would not be; then as large as voxels.
+    for zoom, expected in [(0.55, [96, 192]), (0.25, [192])]:
+        del widths[:]
+        widget.zoom = zoom
+        wait_for(widths, len(expected))
+        assert widths == expected
 
 
 def test_who_waits_for_the_whole_picture_gets_it_without_a_rough_one_before(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -283,8 +310,8 @@ def test_who_waits_for_the_whole_picture_gets_it_without_a_rough_one_before(monk
             time.sleep(0.01)
         send(widget, orbit=[0.1, 0])
         view.gate.release(2)
-        assert picture.result(timeout=60).width == 48
-    assert [scene.to_dict()["image"]["width"] for scene in view.drawn] == [48, 48]
+        assert picture.result(timeout=60).width == 192
+    assert [scene.to_dict()["image"]["width"] for scene in view.drawn] == [192, 192]
     assert view.drawn[1].to_dict()["camera"] == widget.scene.to_dict()["camera"]
 
 
