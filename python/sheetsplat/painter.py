@@ -37,7 +37,7 @@ class Painter:
         Gets the error if a scene cannot be drawn, in the painter's thread.
     """
 
-    def __init__(self, view: View, show: Callable[[Image], None], fail: Callable[[BaseException], None]) -> None:
+    def __init__(self, view: View, show: Callable[[Image], None], fail: Callable[[Exception], None]) -> None:
         self._view, self._show, self._fail = view, show, fail
         #: Held while the view is used.
         self._drawing = threading.Lock()
@@ -83,36 +83,46 @@ class Painter:
         raise result
 
     def _run(self) -> None:
-        rested: Scene | None = None
-        while True:
+        try:
+            while self._paint():
+                pass
+        except BaseException as error:
+            # Neither a picture nor an error can be shown any more, as at the end of a kernel. Nobody waits for it forever.
             with self._changed:
-                if self._result is not None:
-                    self._is_running = False
-                    return
-                scene = self._wanted
-                step = 1 if scene is rested or self._waiting else self._step(scene)
-            try:
-                drawn = self._draw(scene, step)
-            except BaseException as error:
-                self._fail(error)
-                self._finish(scene, error)
-                continue
-            self._show(drawn)
-            if step == 1:
-                self._finish(scene, drawn)
-            else:
+                self._is_running, self._result = False, error
+                self._changed.notify_all()
+            raise
+
+    def _paint(self) -> bool:
+        """Draws the newest scene, first roughly if it must be; whether there may be more to draw."""
+        with self._changed:
+            if self._result is not None:
+                self._is_running = False
+                return False
+            scene, is_awaited = self._wanted, self._waiting > 0
+        try:
+            step = 1 if is_awaited else self._step(scene)
+            if step > 1:
+                self._show(self._draw(scene, step))
                 with self._changed:
                     self._changed.wait_for(lambda: self._wanted is not scene or self._waiting > 0, _PAUSE)
-                rested = scene
-
-    def _finish(self, scene: Scene, result: Image | BaseException) -> None:
+                    if self._wanted is not scene:
+                        return True
+            result: Image | Exception = self._draw(scene, 1)
+        except Exception as error:
+            result = error
+        if isinstance(result, Image):
+            self._show(result)
+        else:
+            self._fail(result)
         with self._changed:
             if scene is self._wanted:
                 self._result = result
                 self._changed.notify_all()
+        return True
 
     def _step(self, scene: Scene) -> int:
-        """The number of pixels of the whole picture, along a side, that share one of the next."""
+        """The number of pixels of the whole picture, along a side, that share one of the next picture."""
         fluent = math.ceil(math.sqrt(self._seconds / _FLUENT))
         # Pixels that are larger than voxels would need wider kernels, for which all voxels are classified again.
         fine = math.floor(1 / native.pixel(scene._native, self._view.volume._native))

@@ -240,7 +240,7 @@ class Widget(anywidget.AnyWidget):  # type: ignore[misc]
     def _show(self, image: Image) -> None:
         self._png, self._problem = image._repr_png_(), ""
 
-    def _fail(self, error: BaseException) -> None:
+    def _fail(self, error: Exception) -> None:
         self._problem = str(error) or type(error).__name__
 
     def _repr_mimebundle_(self, **arguments: Any) -> Any:

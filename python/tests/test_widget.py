@@ -218,6 +218,23 @@ def test_the_still_picture_stands_beside_the_widget() -> None:
     assert data["text/plain"] == repr(widget) and "15×24×24" in repr(widget)
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_picture_that_nobody_takes_leaves_no_one_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
+    widget = head()
+    start = check_picture(widget)
+
+    def show(image: sheetsplat.Image) -> None:
+        raise RuntimeError("the kernel is gone")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(widget._painter, "_show", show)
+        widget.azimuth = 10
+        with pytest.raises(RuntimeError, match="the kernel is gone"):
+            widget.image
+    widget.azimuth = 0
+    np.testing.assert_array_equal(check_picture(widget), start)
+
+
 class SlowView(sheetsplat.View):
     """A view whose pictures wait until they are let through."""
 
