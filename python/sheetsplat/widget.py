@@ -75,8 +75,9 @@ class Widget(anywidget.AnyWidget):  # type: ignore[misc]
     'ct-skin'
     """
 
-    _esm = Path(__file__).with_name("widget.js")
-    _css = Path(__file__).with_name("widget.css")
+    # Texts, because anywidget watches files, and would keep every widget as long as its file.
+    _esm = Path(__file__).with_name("widget.js").read_text(encoding="utf-8")
+    _css = Path(__file__).with_name("widget.css").read_text(encoding="utf-8")
 
     azimuth = traitlets.Float(0.0).tag(sync=True)
     elevation = traitlets.Float(0.0).tag(sync=True)

@@ -1,10 +1,12 @@
 """The widget for notebooks, without a browser: gestures come as the messages that its JavaScript sends."""
 
 import base64
+import gc
 import subprocess
 import sys
 import threading
 import time
+import weakref
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -216,6 +218,19 @@ def test_the_still_picture_stands_beside_the_widget() -> None:
     assert data["application/vnd.jupyter.widget-view+json"]["model_id"] == widget.model_id
     assert base64.b64decode(data["image/png"]) == sheetsplat.render(widget.volume, scene=widget.scene)._repr_png_()
     assert data["text/plain"] == repr(widget) and "15×24×24" in repr(widget)
+
+
+def test_a_closed_widget_is_forgotten() -> None:
+    widget = head()
+    widget.image
+    known, volume = weakref.ref(widget), weakref.ref(widget.volume)
+    widget.close()
+    del widget
+    deadline = time.monotonic() + 60
+    # The thread that drew may not have ended yet.
+    while known() is not None and time.monotonic() < deadline:
+        gc.collect()
+    assert known() is None and volume() is None
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
