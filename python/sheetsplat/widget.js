@@ -10,8 +10,8 @@ const PINCH = 0.01;
 const LABEL = "Picture of a volume. Arrow keys turn it, with Shift they move it; plus and minus zoom; Home returns.";
 
 /**
- * Sends moves of the camera. While the kernel has not taken those sent before, further ones are gathered into one message, so that they never
- * queue up.
+ * Sends moves of the camera. Until the kernel has answered the last message, with a picture before its answer, further moves are gathered into one,
+ * so that neither moves nor pictures queue up.
  */
 function sender(model) {
     let gathered;
@@ -22,12 +22,12 @@ function sender(model) {
         model.send(gathered);
         gathered = undefined;
     };
-    const taken = ({ kind }) => {
-        if (kind !== "taken") return;
+    const answered = ({ kind }) => {
+        if (kind !== "drawn") return;
         isWaiting = false;
         send();
     };
-    model.on("msg:custom", taken);
+    model.on("msg:custom", answered);
     return {
         move({ home = false, orbit = [0, 0], pan = [0, 0], zoom = 1 }) {
             if (home || !gathered) gathered = { home, orbit: [0, 0], pan: [0, 0], zoom: 1 };
@@ -38,7 +38,7 @@ function sender(model) {
             gathered.zoom *= zoom;
             send();
         },
-        end: () => model.off("msg:custom", taken),
+        end: () => model.off("msg:custom", answered),
     };
 }
 
@@ -116,17 +116,21 @@ function render({ model, el }, move) {
         // JupyterLab's shortcuts would otherwise get the keys.
         "data-lm-suppress-shortcuts": "true",
     });
-    const picture = make("img", area, { alt: "", draggable: "false" });
+    const picture = make("canvas", area, {});
     const problem = make("p", area, { role: "alert" });
     const place = make("p", area, { class: "sheetsplat-place", role: "status" });
-    let address = "";
-    follow(model, ["_png"], () => {
+    let count = 0;
+    let newest = 0;
+    follow(model, ["_png"], async () => {
         const png = model.get("_png");
         if (!png?.byteLength) return;
-        const old = address;
-        address = URL.createObjectURL(new Blob([png], { type: "image/png" }));
-        picture.src = address;
-        if (old) URL.revokeObjectURL(old);
+        const number = ++count;
+        const bitmap = await createImageBitmap(new Blob([png], { type: "image/png" }));
+        // A picture may be decoded sooner than one before it.
+        if (number < newest || signal.aborted) return;
+        newest = number;
+        [picture.width, picture.height] = [bitmap.width, bitmap.height];
+        picture.getContext("2d").drawImage(bitmap, 0, 0);
     }, signal);
     follow(model, ["_size"], () => {
         // A rough picture has fewer pixels, and takes the same place.
@@ -143,10 +147,7 @@ function render({ model, el }, move) {
         place.textContent = `azimuth ${azimuth}°, elevation ${elevation}°, zoom ${model.get("zoom").toPrecision(2)}`;
     }, signal);
     control(area, move, signal);
-    return () => {
-        ending.abort();
-        URL.revokeObjectURL(address);
-    };
+    return () => ending.abort();
 }
 
 /** All views of a widget send by one sender. */

@@ -118,6 +118,8 @@ class Widget(anywidget.AnyWidget):  # type: ignore[misc]
         #: The same with everything stated that depends on the volume, and the camera that the traits start from.
         self._home = view.scene.explicit(view.volume, all_around=True)
         self._is_placing = False
+        #: Whether the browser keeps its next message back until a picture comes.
+        self._is_awaited = False
         elevation, center = native.elevation_and_center(self._home._native)
         super().__init__(elevation=elevation, center=center, _size=_size(self._home))
         self.observe(self._camera_changed, ["azimuth", "elevation", "zoom", "center"])
@@ -218,7 +220,7 @@ class Widget(anywidget.AnyWidget):  # type: ignore[misc]
 
     def _receive(self, _: object, content: dict[str, Any], buffers: object) -> None:
         """Moves the camera by what pointer and keys have done since the last message, in heights of the picture."""
-        self.send({"kind": "taken"})
+        self._is_awaited = True
         try:
             self._move(content["home"], content["orbit"], content["pan"], content["zoom"])
         except Exception as error:
@@ -240,9 +242,17 @@ class Widget(anywidget.AnyWidget):  # type: ignore[misc]
 
     def _show(self, image: Image) -> None:
         self._png, self._problem = image._repr_png_(), ""
+        self._answer()
 
     def _fail(self, error: Exception) -> None:
         self._problem = str(error) or type(error).__name__
+        self._answer()
+
+    def _answer(self) -> None:
+        """Asks the browser for its next message once a picture is on its way, so that a slow line bears one at a time."""
+        if self._is_awaited:
+            self._is_awaited = False
+            self.send({"kind": "drawn"})
 
     def _repr_mimebundle_(self, **arguments: Any) -> Any:
         bundle = super()._repr_mimebundle_(**arguments)

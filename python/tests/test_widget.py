@@ -204,9 +204,11 @@ def test_what_fails_only_while_drawing_is_shown_and_raised(monkeypatch: pytest.M
         assert "image/png" not in widget._repr_mimebundle_()[0]
     send(widget, orbit=[-0.1, 0])
     np.testing.assert_array_equal(check_picture(widget), start)
-    # What is wrong with a message has nobody else to be told.
+    # What is wrong with a message has nobody else to be told, and the browser may go on.
+    answers: list[Any] = []
+    monkeypatch.setattr(widget, "send", lambda content, buffers=None: answers.append(content))
     send(widget, orbit="left")
-    assert widget._problem != ""
+    assert widget._problem != "" and answers == [{"kind": "drawn"}]
     send(widget, orbit=[0.1, 0])
     check_picture(widget)
 
@@ -278,15 +280,15 @@ def test_only_the_newest_of_many_changes_is_drawn(monkeypatch: pytest.MonkeyPatc
     # No picture takes too long.
     monkeypatch.setattr(painter, "_FLUENT", 1e9)
     widget, view = slow(monkeypatch)
-    taken: list[Any] = []
-    monkeypatch.setattr(widget, "send", lambda content, buffers=None: taken.append(content))
+    answers: list[Any] = []
+    monkeypatch.setattr(widget, "send", lambda content, buffers=None: answers.append(content))
     for _ in range(50):
         send(widget, orbit=[0.01, 0])
-    # All are taken at once, while the first picture is still drawn.
-    assert taken == [{"kind": "taken"}] * 50 and view.drawn == [] and widget._png == b""
+    # All are taken while the first picture is still drawn, and none is answered before a picture.
+    assert answers == [] and view.drawn == [] and widget._png == b""
     view.gate.release(2)
     check_picture(widget)
-    assert len(view.drawn) == 2
+    assert len(view.drawn) == 2 and answers == [{"kind": "drawn"}]
     assert abs(widget.azimuth + 90) < 1e-9
     assert view.drawn[1].to_dict()["camera"] == widget.scene.to_dict()["camera"]
 
