@@ -101,7 +101,7 @@ impl StreamRenderer {
         let start = Instant::now();
         let (scene, grid) = (&self.scene, self.store.levels()[self.level].grid);
         let size = [scene.image.width, scene.image.height];
-        let view = ViewGeometry::new(&grid, &scene.camera, &scene.splatting, size).map_err(RenderError::from)?;
+        let view = ViewGeometry::new(&grid, &scene.camera, &scene.splatting, size)?;
         let window = Window { slabs: Window::ALL_SLABS, region: Region::whole(size) };
         let stream = Arc::new(self.stream(view, &window)?);
         let host = Host { window, is_part: false, first_hit: None, surfaces: None::<Surfaces> };
