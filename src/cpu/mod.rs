@@ -19,6 +19,7 @@
 //! `+ - × ÷ √`, never contracted, and every pixel's sums are taken in one order, whatever the number of threads and the vectors' width.
 
 mod after;
+mod batch;
 mod bin;
 mod composite;
 mod count;

@@ -7,25 +7,22 @@ use std::iter::Peekable;
 use std::ops::Range;
 use std::sync::Arc;
 
-use fearless_simd::prelude::*;
-use glam::UVec3;
-
+use super::batch::Batch;
 use super::bin::Placed;
 use super::count::{Tally, bits};
 use super::cull::{Boxes, OpenMask, Pixels};
 use super::cut::TileRays;
 use super::frame::{Frame, Voxels};
-use super::material::Material;
-use super::project::{FlatSections, Lens, Place, Projection};
+use super::project::Place;
 use super::queue::{Queue, Waiting};
 use super::reached::Reached;
-use super::shade::Unshaded;
 use super::sheets::{Buffers, COLUMNS, RING, ROWS, Ring, SECTIONS, slot_of};
-use super::splat::{LocalFootprint, Splat};
+use super::splat::Splat;
 use super::stream::{Chunk, Stream};
 use super::vector::LANES;
 use crate::lists::brick;
 use crate::lists::brick::{BRICK_VOXELS, Brick};
+use fearless_simd::prelude::*;
 
 /// A brick that has arrived.
 #[derive(Clone)]
@@ -415,87 +412,5 @@ impl<'a> TileWalk<'a> {
                 }
             },
         );
-    }
-}
-
-/// Up to eight voxels that are shaded together.
-struct Batch<'a> {
-    count: usize,
-    /// Their materials in all channels, or the voxels whose materials are not kept.
-    materials: [Result<&'a [Material], UVec3>; LANES],
-    unshaded: Unshaded,
-    splats: [Splat; LANES],
-    /// Without perspective, the distance from plane to plane of all voxels.
-    flat_step: f32,
-}
-
-/// The sections of a voxel along its ray, as [`Splat`] holds them.
-#[derive(Default)]
-struct AlongRay {
-    end: i32,
-    first_plane: f32,
-    step: f32,
-    local: LocalFootprint,
-}
-
-impl Batch<'_> {
-    fn new(projection: &Projection, amplitude: f64) -> Self {
-        let nothing = Err(UVec3::ZERO);
-        let flat_step = (f64::from(projection.direction) * projection.flat.per_slab) as f32;
-        let mut batch = Self {
-            count: 0,
-            materials: [nothing; LANES],
-            unshaded: Unshaded::default(),
-            splats: Default::default(),
-            flat_step,
-        };
-        (0..LANES).for_each(|lane| batch.set_view(lane, projection, &projection.flat, amplitude));
-        batch
-    }
-
-    fn set_view(&mut self, lane: usize, projection: &Projection, lens: &Lens, amplitude: f64) {
-        // Back to front, planes come in the opposite order, so that sections and their factors are both negative.
-        self.unshaded.set_view(lane, lens.to_eye, f64::from(projection.direction) * lens.per_lambda * amplitude);
-    }
-
-    /// The sections of a voxel without perspective.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn flat(&self, flat: &FlatSections, lane: usize) -> AlongRay {
-        let (first_plane, end) = (flat.first_planes[lane], flat.ends[lane]);
-        AlongRay { end, first_plane, step: self.flat_step, local: LocalFootprint::default() }
-    }
-
-    /// The sections of a voxel in perspective, the next one of the batch.
-    fn lens(&mut self, frame: &Frame, place: Place, voxel: UVec3, sheet: i32) -> AlongRay {
-        let projection = &frame.projection;
-        let Some(perspective) = &projection.view.perspective else { return AlongRay::default() };
-        let lens = projection.lens(perspective, place, voxel);
-        self.set_view(self.count, projection, &lens, frame.amplitude);
-        let local = lens.local.map_or_else(LocalFootprint::default, |local| LocalFootprint {
-            axis: local.axis.to_array().map(|component| component as f32),
-            metric: local.metric.to_array().map(|component| component as f32),
-            depth_per_warped: local.depth_per_warped as f32,
-            from_eye: place.from_eye as f32,
-            cut: local.cut as f32,
-        });
-        AlongRay {
-            end: projection.sheets(place, voxel).end,
-            first_plane: ((projection.plane_before(sheet) - place.depth) * lens.per_slab) as f32,
-            step: (f64::from(projection.direction) * lens.per_slab) as f32,
-            local,
-        }
-    }
-
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn add(
-        &mut self,
-        voxel: [u32; 2],
-        sheet: i32,
-        AlongRay { end, first_plane, step, local }: AlongRay,
-        (center, pixels): ([f32; 2], Pixels),
-    ) {
-        self.splats[self.count] =
-            Splat { center, pixels, amount: [0.0; 4], sheets: [sheet, end], first_plane, step, voxel, drawn: 0, local };
-        self.count += 1;
     }
 }
