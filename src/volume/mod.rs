@@ -36,6 +36,7 @@ mod samples;
 mod series;
 mod shear;
 mod source;
+mod store;
 #[cfg(feature = "tiff")]
 mod tiff;
 mod unit;
@@ -66,6 +67,7 @@ pub use raw::RawLayout;
 pub use samples::SampleType;
 pub(crate) use samples::{SIZES, dims_of};
 pub(crate) use series::Selection;
+pub use store::{Store, StoreLevel};
 
 use crate::error::setting::SettingError;
 
