@@ -1,11 +1,14 @@
 //! File formats and how a file's format is determined.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::access::Access;
 use super::loaded::Loaded;
 use super::samples::Voxel;
 use super::source::invalid;
+use super::store::Store;
 use super::{VolumeError, folder, nrrd};
 
 type Reader<T> = fn(&Path, &Access) -> Result<Loaded<T>, VolumeError>;
@@ -38,6 +41,8 @@ macro_rules! reader {
 }
 
 const DICOM: &str = "DICOM";
+const NPZ: &str = "NPZ";
+const ZARR: &str = "Zarr";
 
 /// Formats with one slice per file of a folder.
 const SLICES: [&str; 2] = ["TIFF", DICOM];
@@ -84,7 +89,15 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             read_folder: None,
         },
         Format {
-            name: "NPZ",
+            name: ZARR,
+            extensions: &[".zip", ".ozx"],
+            // A store is a folder, or an archive that begins like other ZIP archives.
+            is_magic: |_| false,
+            read: reader!("zarr", super::zarr::read),
+            read_folder: None,
+        },
+        Format {
+            name: NPZ,
             extensions: &[".npz"],
             is_magic: |head| head.starts_with(b"PK\x03\x04"),
             read: reader!("npy", super::npz::read),
@@ -125,13 +138,9 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
 /// whose format the first bytes of all its files determine.
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static str, Loaded<T>), VolumeError> {
     let formats = formats();
-    let (file, _) = archive_and_array(path);
-    if access.is_folder(file)? {
-        return read_folder(path, access, &formats);
-    }
-    let head = folder::head(file, access)?;
-    let format = format_of(&formats, file, &head).map(|(format, _)| format);
-    let found = match format {
+    let (file, _) = archive_and_inner(path);
+    let found = match format_at(&formats, path, access)? {
+        None if access.is_folder(file)? => return read_folder(path, access, &formats),
         Some(Format { name, read: Ok(read), .. }) => return Ok((name, read(path, access)?)),
         Some(Format { name, read: Err(feature), .. }) => needs(name, feature),
         None => match path.extension() {
@@ -151,6 +160,46 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static s
     Err(invalid(path, "format", found, allowed))
 }
 
+/// Opens a file that is read by boxes.
+pub(super) fn open_store(path: &Path, access: &Access) -> Result<Arc<dyn Store>, VolumeError> {
+    let formats = formats::<f32>();
+    let found = match format_at(&formats, path, access)? {
+        #[cfg(feature = "zarr")]
+        Some(Format { name: ZARR, .. }) => return Ok(Arc::new(super::zarr::open(path, access)?)),
+        Some(Format { name, read: Err(feature), .. }) => needs(name, feature),
+        Some(Format { name, .. }) => (*name).to_owned(),
+        None => "another".to_owned(),
+    };
+    Err(invalid(path, "format", found, "one that is read by boxes: Zarr"))
+}
+
+/// The format of a file or of a Zarr store; `None` if it is unknown, or for another folder.
+fn format_at<'a, T>(
+    formats: &'a [Format<T>],
+    path: &Path,
+    access: &Access,
+) -> Result<Option<&'a Format<T>>, VolumeError> {
+    let (file, _) = archive_and_inner(path);
+    if access.is_folder(file)? {
+        let is_store = is_zarr(file, access)?;
+        return Ok(formats.iter().find(|format| format.name == ZARR && is_store));
+    }
+    let head = folder::head(file, access)?;
+    Ok(format_of(formats, file, &head).map(|(format, _)| format))
+}
+
+/// Whether a folder holds the metadata of a Zarr store.
+fn is_zarr(folder: &Path, access: &Access) -> Result<bool, VolumeError> {
+    for name in ["zarr.json", ".zgroup", ".zattrs", ".zarray"] {
+        match access.open_to_look(&folder.join(name)) {
+            Ok(_) => return Ok(true),
+            Err(VolumeError::Io { source, .. }) if source.kind() == ErrorKind::NotFound => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(false)
+}
+
 /// A file's format, and whether its first bytes determined it.
 fn format_of<'a, T>(formats: &'a [Format<T>], path: &Path, head: &[u8]) -> Option<(&'a Format<T>, bool)> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
@@ -160,7 +209,8 @@ fn format_of<'a, T>(formats: &'a [Format<T>], path: &Path, head: &[u8]) -> Optio
     let is_bare = |format: &Format<T>| {
         format.name == DICOM && is_bare_dicom(head) && named.is_none_or(|named| named.name == DICOM)
     };
-    let by_head = |format: &&Format<T>| (format.is_magic)(head) || is_bare(format);
+    let is_other_archive = |format: &Format<T>| format.name == NPZ && named.is_some_and(|named| named.name == ZARR);
+    let by_head = |format: &&Format<T>| (format.is_magic)(head) && !is_other_archive(format) || is_bare(format);
     formats.iter().find(by_head).map(|format| (format, true)).or(named.map(|format| (format, false)))
 }
 
@@ -220,11 +270,12 @@ fn read_folder<T: Voxel>(
     Err(invalid(path, "folder", found, allowed))
 }
 
-/// The parts of a path such as `file.npz:name` before and after the colon; any other path is the first part.
-pub(super) fn archive_and_array(path: &Path) -> (&Path, Option<&str>) {
-    const EXTENSION: &str = ".npz:";
+/// The parts of a path such as `file.npz:name` before and after the colon, for archives of several volumes; any other path is the first part.
+pub(super) fn archive_and_inner(path: &Path) -> (&Path, Option<&str>) {
+    const EXTENSIONS: [&str; 3] = [".npz:", ".zip:", ".ozx:"];
     let split = path.to_str().filter(|_| !path.exists()).and_then(|text| {
-        let at = text.to_ascii_lowercase().rfind(EXTENSION)? + EXTENSION.len();
+        let lower = text.to_ascii_lowercase();
+        let at = EXTENSIONS.iter().filter_map(|end| Some(lower.rfind(end)? + end.len())).max()?;
         Some((Path::new(&text[..at - 1]), Some(&text[at..])))
     });
     split.unwrap_or((path, None))

@@ -44,6 +44,10 @@ mod unit;
 mod vtk;
 #[cfg(any(feature = "tiff", feature = "vtk"))]
 mod xml;
+#[cfg(feature = "zarr")]
+mod zarr;
+#[cfg(any(feature = "codecs", feature = "npy", feature = "zarr"))]
+mod zip;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -67,7 +71,7 @@ pub use raw::RawLayout;
 pub use samples::SampleType;
 pub(crate) use samples::{SIZES, dims_of};
 pub(crate) use series::Selection;
-pub use store::{Store, StoreLevel};
+pub use store::{Store, StoreLevel, open_store};
 
 use crate::error::setting::SettingError;
 

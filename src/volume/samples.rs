@@ -129,7 +129,7 @@ macro_rules! sample_types {
             }
 
             /// Appends the samples in `bytes`, a whole number of them. Stops at a sample that is not allowed and returns it as the error.
-            fn convert<T: Voxel>(self, layout: &Samples, bytes: &[u8], into: &mut Vec<T>) -> Result<(), f64> {
+            pub(super) fn convert<T: Voxel>(self, layout: &Samples, bytes: &[u8], into: &mut Vec<T>) -> Result<(), f64> {
                 match self {
                     $(Self::$name => {
                         let from_bytes = if layout.big_endian { <$type>::from_be_bytes } else { <$type>::from_le_bytes };
@@ -393,7 +393,7 @@ impl Stream {
     }
 
     /// Appends up to `bytes` bytes, fewer only at the end, and returns their number.
-    fn read_up_to(&mut self, bytes: u64, into: &mut Vec<u8>) -> Result<u64, VolumeError> {
+    pub(super) fn read_up_to(&mut self, bytes: u64, into: &mut Vec<u8>) -> Result<u64, VolumeError> {
         let read = match &mut self.reader {
             Reader::Raw(reader) => reader.by_ref().take(bytes).read_to_end(into),
             Reader::Decoder(reader, _) => reader.by_ref().take(bytes).read_to_end(into),

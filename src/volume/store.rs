@@ -1,9 +1,14 @@
 //! Volumes that are read by boxes, level by level (SPEC §13).
 
 use std::fmt::Debug;
+use std::path::Path;
+use std::sync::Arc;
 
 use glam::UVec3;
 
+use super::access::{Access, ReadOptions};
+use super::format;
+use super::source::invalid;
 use super::{Grid, VolumeError};
 
 /// A volume that is read by boxes (SPEC §13): one channel at one time.
@@ -40,4 +45,60 @@ pub struct StoreLevel {
     pub grid: Grid,
     /// The number of voxels along x, y and z of a chunk as it is read best: of an inner chunk, where chunks lie in shards.
     pub chunk: UVec3,
+}
+
+impl StoreLevel {
+    /// The number of chunks along x, y and z.
+    pub fn chunks(&self) -> UVec3 {
+        UVec3::from_array([0, 1, 2].map(|axis| self.grid.dims[axis].div_ceil(self.chunk[axis])))
+    }
+}
+
+/// Opens a volume to be read by boxes: an OME-Zarr image or a Zarr array. Of a file with several channels the options choose one; of several times they may.
+///
+/// # Errors
+/// If the file cannot be read, is of no such format, holds several channels of which none is chosen, or needs more memory than
+/// [`ReadOptions::memory`] allows for the chunks that are read at once.
+pub fn open_store(path: &Path, options: &ReadOptions) -> Result<Arc<dyn Store>, VolumeError> {
+    format::open_store(path, &Access::new(options)?)
+}
+
+/// Checks that a box lies in a level, and that there is a value for each of its voxels.
+pub(super) fn check_box(
+    path: &Path,
+    levels: &[StoreLevel],
+    level: usize,
+    (from, dims): (UVec3, UVec3),
+    values: usize,
+) -> Result<(), VolumeError> {
+    let grid = level_of(path, levels, level)?.grid;
+    let is_within = |axis: usize| dims[axis] > 0 && from[axis].checked_add(dims[axis]) <= Some(grid.dims[axis]);
+    let is_within = [0, 1, 2].map(|axis| is_within(axis) && from[axis] < grid.dims[axis]) == [true; 3];
+    if !is_within {
+        let allowed = format!("a box within the {} voxels of level {level}", grid.dims);
+        return Err(invalid(path, "box", format!("{dims} voxels from {from}"), allowed));
+    }
+    let count = dims.as_u64vec3().element_product();
+    if count != values as u64 {
+        return Err(invalid(path, "values", values, format!("{count}, one for each voxel of the box")));
+    }
+    Ok(())
+}
+
+/// Checks that a level has a chunk.
+pub(super) fn check_chunk(
+    path: &Path,
+    levels: &[StoreLevel],
+    level: usize,
+    chunk: UVec3,
+) -> Result<(), VolumeError> {
+    let chunks = level_of(path, levels, level)?.chunks();
+    if chunk.cmplt(chunks).all() {
+        return Ok(());
+    }
+    Err(invalid(path, "chunk", chunk, format!("a chunk of level {level}, which has {chunks}")))
+}
+
+fn level_of<'a>(path: &Path, levels: &'a [StoreLevel], level: usize) -> Result<&'a StoreLevel, VolumeError> {
+    levels.get(level).ok_or_else(|| invalid(path, "level", level, format!("0 to {}", levels.len() - 1)))
 }
