@@ -86,12 +86,7 @@ pub(super) fn check_box(
 }
 
 /// Checks that a level has a chunk.
-pub(super) fn check_chunk(
-    path: &Path,
-    levels: &[StoreLevel],
-    level: usize,
-    chunk: UVec3,
-) -> Result<(), VolumeError> {
+pub(super) fn check_chunk(path: &Path, levels: &[StoreLevel], level: usize, chunk: UVec3) -> Result<(), VolumeError> {
     let chunks = level_of(path, levels, level)?.chunks();
     if chunk.cmplt(chunks).all() {
         return Ok(());

@@ -25,6 +25,7 @@ mod shared;
 mod shear;
 mod tiff;
 mod vtk;
+mod zarr;
 
 use std::cell::RefCell;
 use std::fs;

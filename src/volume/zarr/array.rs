@@ -9,8 +9,8 @@ use rayon::prelude::*;
 use serde_json::Value;
 use zarrs::array::codec::api::CodecOptions;
 use zarrs::array::{
-    Array, ArrayBytes, ArrayError, ArrayMetadata, ArrayShardedExt, ArrayShardedReadableExt, ArrayShardedReadableExtCache,
-    ArrayMetadataV2, ArrayMetadataV3,
+    Array, ArrayBytes, ArrayError, ArrayMetadata, ArrayMetadataV2, ArrayMetadataV3, ArrayShardedExt,
+    ArrayShardedReadableExt, ArrayShardedReadableExtCache,
 };
 use zarrs::plugin::ExtensionName;
 
@@ -18,7 +18,7 @@ use super::super::VolumeError;
 use super::super::access::Access;
 use super::super::samples::{SampleType, Samples, Voxel};
 use super::super::source::invalid;
-use super::axes::{Axes, Axis, KINDS};
+use super::axes::{Axes, KINDS};
 use super::codec;
 use super::half;
 use super::keys::Keys;
@@ -124,9 +124,9 @@ impl ZarrArray {
             let names = SampleType::NAMED.map(|(name, _)| name).join(", ");
             invalid(&file, "data_type", name, format!("{names}, float16, bool"))
         })?;
-        let outer = array.chunk_shape(&vec![0; shape.len()]).map_err(|error| {
-            invalid(&file, "chunk_grid", error, "a regular grid of chunks")
-        })?;
+        let outer = array
+            .chunk_shape(&vec![0; shape.len()])
+            .map_err(|error| invalid(&file, "chunk_grid", error, "a regular grid of chunks"))?;
         let inner = array.effective_subchunk_shape().unwrap_or_else(|| outer.clone());
         let product = |sizes: &[u64]| sizes.iter().try_fold(1_u64, |product, &size| product.checked_mul(size));
         let numbers = |sizes: &[std::num::NonZeroU64]| sizes.iter().map(|size| size.get()).collect::<Vec<u64>>();
@@ -137,16 +137,20 @@ impl ZarrArray {
             return Err(invalid(&file, "shape", shown(shape), "positive sizes, at most 4294967295 each"));
         }
         let in_chunk = product(&inner).filter(|count| *count <= u64::from(u32::MAX) && is_grid(&outer));
-        let in_chunk = in_chunk.ok_or_else(|| {
-            invalid(&file, "chunks", shown(&inner), "at most 4294967295 values in a chunk")
-        })?;
+        let in_chunk =
+            in_chunk.ok_or_else(|| invalid(&file, "chunks", shown(&inner), "at most 4294967295 values in a chunk"))?;
         let in_shard = product(&outer).map(|outer| outer / in_chunk).filter(|&count| count <= MAX_IN_SHARD);
         let in_shard = in_shard.ok_or_else(|| {
             invalid(&file, "chunks", shown(&outer), format!("at most {MAX_IN_SHARD} chunks in a shard"))
         })?;
         let counts: Vec<u64> = shape.iter().zip(&inner).map(|(shape, chunk)| shape.div_ceil(*chunk)).collect();
         if product(&counts).is_none_or(|count| count > MAX_CHUNKS) {
-            return Err(invalid(&file, "chunks", format!("{} chunks", shown(&counts)), format!("at most {MAX_CHUNKS}")));
+            return Err(invalid(
+                &file,
+                "chunks",
+                format!("{} chunks", shown(&counts)),
+                format!("at most {MAX_CHUNKS}"),
+            ));
         }
         let (shape, chunk) = (axes.sort(shape, 1), axes.sort(&inner, 1));
         let shards = ArrayShardedReadableExtCache::new(&array);
@@ -185,7 +189,12 @@ impl ZarrArray {
         let decoded = self.in_chunk.saturating_mul(self.kind.bytes() + size_of::<T>() as u64);
         let bytes = decoded.saturating_add(self.encoded_bytes()).saturating_mul(chunks as u64);
         let bytes = bytes.saturating_add(MAX_IN_SHARD * u64::from(self.in_shard > 1));
-        access.reserve(&self.keys.path, "chunks", format!("chunks of {} values, {chunks} at once", self.in_chunk), bytes)
+        access.reserve(
+            &self.keys.path,
+            "chunks",
+            format!("chunks of {} values, {chunks} at once", self.in_chunk),
+            bytes,
+        )
     }
 
     /// The chunks that a region meets: the first one's place in the grid of chunks, and how many there are.
@@ -322,7 +331,8 @@ impl ZarrArray {
     /// The key of the chunk or the shard in which the chunk at a place lies.
     fn key(&self, place: Sizes) -> String {
         let origin: Vec<u64> = self.axes.unsort(std::array::from_fn(|axis| place[axis] * self.chunk[axis]));
-        let chunk = |shape: &[std::num::NonZeroU64]| origin.iter().zip(shape).map(|(at, size)| at / size).collect::<Vec<u64>>();
+        let chunk =
+            |shape: &[std::num::NonZeroU64]| origin.iter().zip(shape).map(|(at, size)| at / size.get()).collect::<Vec<u64>>();
         let shape = self.array.chunk_shape(&vec![0; origin.len()]);
         self.array.chunk_key(&shape.map(|shape| chunk(&shape)).unwrap_or_default()).as_str().to_owned()
     }

@@ -34,7 +34,9 @@ impl Axes {
         let mut places = [None; KINDS];
         for (place, axis) in axes.list(ALLOWED)?.iter().enumerate() {
             let Some(kind) = kind_of(axis) else {
-                return Err(axis.invalid("an object with the name x, y or z, or the type or name of a channel (c) or time (t)"));
+                return Err(
+                    axis.invalid("an object with the name x, y or z, or the type or name of a channel (c) or time (t)")
+                );
             };
             if places[kind as usize].replace(place).is_some() {
                 return Err(axes.invalid(ALLOWED));

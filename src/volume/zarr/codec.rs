@@ -61,8 +61,8 @@ pub(super) fn register() {
 
 impl Compression {
     /// Decodes at most `limit` bytes.
-    fn decode(self, code: &[u8], limit: u64) -> Result<Vec<u8>, String> {
-        let all = |reader: &mut dyn Read| {
+    fn expand(self, code: &[u8], limit: u64) -> Result<Vec<u8>, String> {
+        let all = |reader: &mut dyn Read| -> Result<Vec<u8>, String> {
             let mut decoded = Vec::new();
             // One more, which tells that there are too many.
             let read = reader.take(limit.saturating_add(1)).read_to_end(&mut decoded);
@@ -148,6 +148,6 @@ impl BytesToBytesCodecTraits for Compression {
         _: &CodecOptions,
     ) -> Result<ArrayBytesRaw<'a>, CodecError> {
         let limit = decoded.size().ok_or_else(|| CodecError::Other("a chunk of any size".to_owned()))?;
-        self.decode(&encoded, limit).map(Cow::Owned).map_err(|error| CodecError::Other(format!("{self:?}: {error}")))
+        self.expand(&encoded, limit).map(Cow::Owned).map_err(|error| CodecError::Other(format!("{self:?}: {error}")))
     }
 }

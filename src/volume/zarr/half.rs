@@ -23,7 +23,9 @@ mod tests {
 
     #[test]
     fn halves_have_their_values() {
-        for (bits, expected) in [(0x3c00, 1.0), (0xc000, -2.0), (0x3555, 0.333_251_95), (1, 5.960_464_5e-8), (0x7bff, 65504.0)] {
+        for (bits, expected) in
+            [(0x3c00, 1.0), (0xc000, -2.0), (0x3555, 0.333_251_95), (1, 5.960_464_5e-8), (0x7bff, 65504.0)]
+        {
             assert_eq!(value(bits), expected, "{bits:#x}");
         }
         assert_eq!(value(0xfc00), f32::NEG_INFINITY);

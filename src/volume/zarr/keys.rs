@@ -1,6 +1,7 @@
 //! The keys of a Zarr store and their bytes: files in a folder on disk or in memory, or in a ZIP archive.
 
 use std::collections::BTreeMap;
+use std::fmt::{self, Debug, Formatter};
 use std::fs;
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::ops::Range;
@@ -16,7 +17,6 @@ use super::super::source::{MAX_HEADER, Source, invalid, io_error};
 use super::super::zip::{Directory, Member};
 
 /// A store's keys.
-#[derive(Debug)]
 pub(super) struct Keys {
     /// The folder or the archive.
     pub(super) path: PathBuf,
@@ -28,11 +28,16 @@ pub(super) struct Keys {
     limit: AtomicU64,
 }
 
-#[derive(Debug)]
 enum Place {
     Folder,
     /// An archive's files by their names, and what the names of the store's keys begin with.
     Archive(BTreeMap<String, Member>, String),
+}
+
+impl Debug for Keys {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Keys").field(&self.path).finish()
+    }
 }
 
 impl Keys {
