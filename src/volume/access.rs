@@ -33,6 +33,8 @@ pub struct ReadOptions {
     pub channel: Option<u32>,
     /// The number, from 0, of the time to read of a file with several; `None` reads the first.
     pub time: Option<u32>,
+    /// The level, from 0 for the finest, to read of a store with several; `None` reads the finest that fits in memory.
+    pub level: Option<u32>,
     /// Files in memory, which are read instead of the disk's; `None` reads the disk.
     pub files: Option<Files>,
 }
@@ -51,6 +53,11 @@ impl ReadOptions {
     /// These options with another time of a file with several, counted from 0.
     pub fn with_time(self, time: u32) -> Self {
         Self { time: Some(time), ..self }
+    }
+
+    /// These options with another level of a store with several, counted from 0 for the finest.
+    pub fn with_level(self, level: u32) -> Self {
+        Self { level: Some(level), ..self }
     }
 
     /// These options with files in memory instead of the disk's, where a program has no disk, as in a browser, or does not trust paths. Whatever
@@ -108,7 +115,7 @@ impl Access {
         let folder = options.confine.as_ref().filter(|_| given.is_none()).map(folder).transpose()?;
         let limit = options.memory.unwrap_or_else(memory::default_limit);
         let inner = Inner { given, folder, limit, reserved: AtomicU64::new(0), files: Mutex::default() };
-        Ok(Self(Arc::new(inner), Selection { channel: options.channel, time: options.time }))
+        Ok(Self(Arc::new(inner), Selection { channel: options.channel, time: options.time, level: options.level }))
     }
 
     /// What is read of files with several volumes.
@@ -116,15 +123,16 @@ impl Access {
         self.1
     }
 
-    /// The same access to files of one volume.
-    pub(crate) fn whole(&self) -> Self {
-        Self(Arc::clone(&self.0), Selection::default())
+    /// The same access to files of one volume, at a level.
+    pub(crate) fn whole_at(&self, level: u32) -> Self {
+        Self(Arc::clone(&self.0), Selection { level: Some(level), ..Selection::default() })
     }
 
     /// The same access to other volumes of a file. What the options select goes before it.
     pub(crate) fn selecting(&self, other: Selection) -> Self {
-        let Selection { channel, time } = self.1;
-        Self(Arc::clone(&self.0), Selection { channel: channel.or(other.channel), time: time.or(other.time) })
+        let Selection { channel, time, level } = self.1;
+        let (channel, time, level) = (channel.or(other.channel), time.or(other.time), level.or(other.level));
+        Self(Arc::clone(&self.0), Selection { channel, time, level })
     }
 
     /// The path to open for a file or folder. If reading is confined, it has no links in it.
@@ -196,6 +204,11 @@ impl Access {
     /// The files opened so far, without those of which only the format was determined.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
         self.0.files.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect()
+    }
+
+    /// The number of bytes of memory that are left.
+    pub(super) fn memory_left(&self) -> u64 {
+        self.0.limit.saturating_sub(self.0.reserved.load(Ordering::Relaxed))
     }
 
     /// Reserves `bytes` of memory, before they are allocated, for what `found` describes.

@@ -139,7 +139,12 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static str, Loaded<T>), VolumeError> {
     let formats = formats();
     let (file, _) = archive_and_inner(path);
-    let found = match format_at(&formats, path, access)? {
+    let format = format_at(&formats, path, access)?;
+    if let Some(level) = access.selection().level.filter(|&level| level > 0 && format.is_none_or(|of| of.name != ZARR))
+    {
+        return Err(invalid(path, "level", level, "0, the only one"));
+    }
+    let found = match format {
         None if access.is_folder(file)? => return read_folder(path, access, &formats),
         Some(Format { name, read: Ok(read), .. }) => return Ok((name, read(path, access)?)),
         Some(Format { name, read: Err(feature), .. }) => needs(name, feature),

@@ -192,7 +192,7 @@ impl Samples {
 
     /// The voxel of the sample at an index in the file.
     fn voxel_at(&self, index: usize) -> UVec3 {
-        let in_file = |dims| Grid { dims, spacing: DVec3::ONE }.voxel_at(index as u32);
+        let in_file = |dims| Grid::new(dims, DVec3::ONE).voxel_at(index as u32);
         if self.z_fastest { in_file(self.dims.zyx()).zyx() } else { in_file(self.dims) }
     }
 

@@ -331,8 +331,9 @@ impl ZarrArray {
     /// The key of the chunk or the shard in which the chunk at a place lies.
     fn key(&self, place: Sizes) -> String {
         let origin: Vec<u64> = self.axes.unsort(std::array::from_fn(|axis| place[axis] * self.chunk[axis]));
-        let chunk =
-            |shape: &[std::num::NonZeroU64]| origin.iter().zip(shape).map(|(at, size)| at / size.get()).collect::<Vec<u64>>();
+        let chunk = |shape: &[std::num::NonZeroU64]| {
+            origin.iter().zip(shape).map(|(at, size)| at / size.get()).collect::<Vec<u64>>()
+        };
         let shape = self.array.chunk_shape(&vec![0; origin.len()]);
         self.array.chunk_key(&shape.map(|shape| chunk(&shape)).unwrap_or_default()).as_str().to_owned()
     }

@@ -25,6 +25,9 @@ use super::multiscale::Multiscale;
 /// The maximum number of levels; each halves the sizes.
 const MAX_LEVELS: usize = 32;
 
+/// Scales that are smaller by less than this fraction count as equal.
+const ROUNDING: f64 = 1e-6;
+
 /// An image with its levels.
 #[derive(Debug)]
 pub(super) struct Image {
@@ -46,8 +49,6 @@ pub(super) struct Image {
 pub(super) struct Level {
     pub(super) array: ZarrArray,
     pub(super) grid: Grid,
-    /// The place of the grid's centre, in the image's own space.
-    pub(super) center: DVec3,
 }
 
 /// A group or an array: the file with its attributes, and what that holds.
@@ -113,8 +114,8 @@ impl Image {
     /// An array without further metadata, whose voxels are as far apart along all axes.
     fn plain(keys: Arc<Keys>) -> Result<Self, VolumeError> {
         let array = ZarrArray::open(&keys, "", None)?;
-        let grid = Grid { dims: array.dims(), spacing: DVec3::ONE };
-        let levels = vec![Level { array, grid, center: DVec3::ZERO }];
+        let grid = Grid::new(array.dims(), DVec3::ONE);
+        let levels = vec![Level { array, grid }];
         let metadata = vec![levels[0].array.metadata()];
         let (channel_names, displays, label_names) = (Vec::new(), Vec::new(), BTreeMap::new());
         let (unit, palette, series) = (None, None, series_of(&keys, &levels)?);
@@ -139,23 +140,36 @@ impl Image {
             return Err(invalid(&node.file, "datasets", found, format!("at most {MAX_LEVELS}")));
         }
         let (mut levels, mut metadata) = (Vec::<Level>::new(), vec![node.value.clone()]);
+        // The centre of the finest level in the image's own space.
+        let mut origin_of_world = DVec3::ZERO;
         for dataset in &multiscale.datasets {
             let place = if path.is_empty() { dataset.path.clone() } else { format!("{path}/{}", dataset.path) };
             let array = ZarrArray::open(&keys, &place, Some(&multiscale.axes))?;
-            let grid = Grid { dims: array.dims(), spacing: dataset.spacing };
+            let grid = Grid::new(array.dims(), dataset.spacing);
             let origin = keys.file(&place);
             check_spacing("spacing", grid.spacing).map_err(|error| refused(&origin.display().to_string(), error))?;
             let is_coarser = |finer: &Level| {
                 let [time, channel, ..] = array.shape;
-                array.dims().cmple(finer.grid.dims).all() && finer.array.shape[..2] == [time, channel]
+                let has_no_more =
+                    array.dims().cmple(finer.grid.dims).all() && finer.array.shape[..2] == [time, channel];
+                has_no_more && grid.spacing.cmpge(finer.grid.spacing * (1.0 - ROUNDING)).all()
             };
             if !levels.last().is_none_or(is_coarser) {
-                let allowed = "as many channels and times as the level before, and no more voxels along any axis";
-                return Err(invalid(&origin, "shape", format!("{:?} (t, c, z, y, x)", array.shape), allowed));
+                let allowed =
+                    "as many channels and times as the level before, and along no axis more voxels or a smaller scale";
+                let found = format!("{:?} (t, c, z, y, x), voxels of {}", array.shape, grid.spacing);
+                return Err(invalid(&origin, "level", found, allowed));
             }
             metadata.push(array.metadata());
             let center = dataset.first + grid.center() * grid.spacing;
-            levels.push(Level { array, grid, center });
+            let grid = match levels.first() {
+                Some(finest) => grid.coarser_than(&finest.grid, center - origin_of_world),
+                None => {
+                    origin_of_world = center;
+                    grid
+                }
+            };
+            levels.push(Level { array, grid });
         }
         let (channel_names, displays) = display::channels(&ome.get("omero"));
         let (label_names, palette) = display::labels(&ome.get("image-label"));

@@ -19,10 +19,10 @@ use std::path::Path;
 use glam::UVec3;
 
 use self::array::Region;
-use self::image::Image;
+use self::image::{Image, Level};
 use super::VolumeError;
 use super::access::Access;
-use super::loaded::Loaded;
+use super::loaded::{Levels, Loaded};
 use super::samples::{SIZES, Voxel, dims_of};
 use super::source::invalid;
 use super::store::{Store, StoreLevel, check_box, check_chunk};
@@ -34,7 +34,8 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     image.series.check(path, selection)?;
     let channels = image.series.channels(selection);
     let channels = u64::from(channels.start)..u64::from(channels.end);
-    let level = &image.levels[0];
+    let number = level_of(&image, channels.end - channels.start, size_of::<T>(), path, access)?;
+    let level = &image.levels[number];
     let dims = level.grid.dims;
     let voxels = dims_of(dims.to_array()).ok_or_else(|| invalid(path, "sizes", dims, SIZES))?.element_product();
     let count = (channels.end - channels.start) * u64::from(voxels);
@@ -49,9 +50,40 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     values.resize(count as usize, T::HOLE);
     level.array.read(&region, &mut values)?;
     let (spacing, kind) = (Some(level.grid.spacing), level.array.kind);
+    let dims_of_levels = image.levels.iter().map(|level| level.grid.dims).collect();
+    let levels = Some(Levels { dims: dims_of_levels, level: number as u32, grid: level.grid });
     let Image { unit, series, channel_names, displays, label_names, palette, .. } = image;
     let loaded = Loaded::new(dims, kind, values);
-    Ok(Loaded { spacing, unit, series, channel_names, displays, label_names, palette, ..loaded })
+    Ok(Loaded { spacing, unit, series, channel_names, displays, label_names, palette, levels, ..loaded })
+}
+
+/// The number of the level to read: the selected one, or else the finest whose values, of `bytes` bytes each, fit in memory.
+fn level_of(image: &Image, channels: u64, bytes: usize, path: &Path, access: &Access) -> Result<usize, VolumeError> {
+    let count = image.levels.len();
+    if let Some(level) = access.selection().level {
+        let allowed = if count == 1 { "0, the only one".to_owned() } else { format!("0 to {}", count - 1) };
+        return (level as usize)
+            .lt(&count)
+            .then_some(level as usize)
+            .ok_or_else(|| invalid(path, "level", level, allowed));
+    }
+    let needs = |level: &Level| level.grid.dims.as_u64vec3().element_product().saturating_mul(channels * bytes as u64);
+    let left = access.memory_left();
+    let fits = |level: &Level| dims_of(level.grid.dims.to_array()).is_some() && needs(level) <= left;
+    if fits(&image.levels[0]) || count == 1 {
+        return Ok(0);
+    }
+    let sizes = image.levels.iter().zip(0..).map(|(level, number)| {
+        let [x, y, z] = level.grid.dims.to_array();
+        format!("{number}: {x} × {y} × {z}, {} bytes", needs(level))
+    });
+    let sizes = sizes.collect::<Vec<_>>().join("; ");
+    let found = format!("no level stated, of the levels {sizes}");
+    let allowed = match image.levels.iter().position(fits) {
+        Some(level) => format!("within the memory limit of {left} bytes, level {level} or a coarser one"),
+        None => format!("a level within the memory limit of {left} bytes, of which there is none"),
+    };
+    Err(invalid(path, "level", found, allowed))
 }
 
 /// Opens one channel of an image at one time.
