@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
-use std::fmt::Display;
+use std::fmt::{self, Debug, Display, Formatter};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -11,6 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::VolumeError;
 use super::file::Files;
 use super::memory;
+use super::seek::Notes;
 use super::series::Selection;
 use super::source::{Source, invalid, io_error};
 
@@ -88,7 +89,7 @@ impl ReadOptions {
 
 /// [`ReadOptions`] while a volume and its labels are read. Clones share the memory limit.
 #[derive(Clone)]
-pub(crate) struct Access(Arc<Inner>, Selection);
+pub(crate) struct Access(Arc<Inner>, Selection, Option<Arc<Notes>>);
 
 struct Inner {
     given: Option<Files>,
@@ -115,7 +116,22 @@ impl Access {
         let folder = options.confine.as_ref().filter(|_| given.is_none()).map(folder).transpose()?;
         let limit = options.memory.unwrap_or_else(memory::default_limit);
         let inner = Inner { given, folder, limit, reserved: AtomicU64::new(0), files: Mutex::default() };
-        Ok(Self(Arc::new(inner), Selection { channel: options.channel, time: options.time, level: options.level }))
+        Ok(Self(
+            Arc::new(inner),
+            Selection { channel: options.channel, time: options.time, level: options.level },
+            None,
+        ))
+    }
+
+    /// The same access for readers that only note where samples are, and read none.
+    pub(super) fn noting(&self) -> (Self, Arc<Notes>) {
+        let notes = Arc::new(Notes::default());
+        (Self(Arc::clone(&self.0), self.1, Some(Arc::clone(&notes))), notes)
+    }
+
+    /// Where readers note the place of samples in place of reading them; `None` if they read.
+    pub(super) fn notes(&self) -> Option<&Notes> {
+        self.2.as_deref()
     }
 
     /// What is read of files with several volumes.
@@ -125,14 +141,14 @@ impl Access {
 
     /// The same access to files of one volume, at a level.
     pub(crate) fn whole_at(&self, level: u32) -> Self {
-        Self(Arc::clone(&self.0), Selection { level: Some(level), ..Selection::default() })
+        Self(Arc::clone(&self.0), Selection { level: Some(level), ..Selection::default() }, None)
     }
 
     /// The same access to other volumes of a file. What the options select goes before it.
     pub(crate) fn selecting(&self, other: Selection) -> Self {
         let Selection { channel, time, level } = self.1;
         let (channel, time, level) = (channel.or(other.channel), time.or(other.time), level.or(other.level));
-        Self(Arc::clone(&self.0), Selection { channel, time, level })
+        Self(Arc::clone(&self.0), Selection { channel, time, level }, self.2.clone())
     }
 
     /// The path to open for a file or folder. If reading is confined, it has no links in it.
@@ -222,6 +238,12 @@ impl Access {
         let others = if before > 0 { format!(", of which {before} are taken") } else { String::new() };
         let allowed = format!("at most the memory limit of {limit} bytes{others}");
         Err(invalid(path, field, format!("{found}, which take {bytes} bytes of memory"), allowed))
+    }
+}
+
+impl Debug for Access {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Access").field(&self.1).finish()
     }
 }
 

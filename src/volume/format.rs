@@ -2,11 +2,12 @@
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 
 use super::access::Access;
 use super::loaded::Loaded;
 use super::samples::Voxel;
+use super::seek::FileStore;
 use super::source::invalid;
 use super::store::Store;
 use super::{VolumeError, folder, nrrd};
@@ -43,6 +44,9 @@ macro_rules! reader {
 const DICOM: &str = "DICOM";
 const NPZ: &str = "NPZ";
 const ZARR: &str = "Zarr";
+
+/// Formats whose files, if they are uncompressed, are read by boxes.
+const SEEKABLE: [&str; 4] = ["NRRD", "NIfTI", "MetaImage", "NPY"];
 
 /// Formats with one slice per file of a folder.
 const SLICES: [&str; 2] = ["TIFF", DICOM];
@@ -172,10 +176,17 @@ pub(super) fn open_store(path: &Path, access: &Access) -> Result<Arc<dyn Store>,
         #[cfg(feature = "zarr")]
         Some(Format { name: ZARR, .. }) => return Ok(Arc::new(super::zarr::open(path, access)?)),
         Some(Format { name, read: Err(feature), .. }) => needs(name, feature),
+        Some(Format { name, read: Ok(read), .. }) if SEEKABLE.contains(name) => {
+            let (noting, notes) = access.noting();
+            let loaded = read(path, &noting)?;
+            let notes = notes.lock().unwrap_or_else(PoisonError::into_inner);
+            return Ok(Arc::new(FileStore::of_header(path, &loaded, &notes, access)?));
+        }
         Some(Format { name, .. }) => (*name).to_owned(),
         None => "another".to_owned(),
     };
-    Err(invalid(path, "format", found, "one that is read by boxes: Zarr"))
+    let allowed = format!("one that is read by boxes: {ZARR}, and uncompressed {}", SEEKABLE.join(", "));
+    Err(invalid(path, "format", found, allowed))
 }
 
 /// The format of a file or of a Zarr store; `None` if it is unknown, or for another folder.

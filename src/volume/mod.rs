@@ -33,6 +33,7 @@ mod orientation;
 mod raw;
 mod resample;
 mod samples;
+mod seek;
 mod series;
 mod shear;
 mod source;
@@ -71,7 +72,7 @@ pub use raw::RawLayout;
 pub use samples::SampleType;
 pub(crate) use samples::{SIZES, dims_of};
 pub(crate) use series::Selection;
-pub use store::{Store, StoreLevel, open_store};
+pub use store::{Store, StoreLevel, open_raw_store, open_store};
 
 use crate::error::setting::SettingError;
 

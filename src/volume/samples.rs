@@ -5,7 +5,7 @@
 
 use std::collections::TryReserveError;
 use std::fmt::{self, Display, Formatter};
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{self, BufRead, BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use bzip2::bufread::MultiBzDecoder;
@@ -318,6 +318,12 @@ impl Stream {
     /// The exact number of bytes left; `None` if the stream is compressed.
     pub(super) fn exactly_left(&self) -> Option<u64> {
         matches!(self.reader, Reader::Raw(_)).then_some(self.left)
+    }
+
+    /// The position in the file; `None` if the stream is compressed.
+    pub(super) fn position(&mut self) -> Result<Option<u64>, VolumeError> {
+        let Reader::Raw(reader) = &mut self.reader else { return Ok(None) };
+        reader.stream_position().map(Some).map_err(io_error(&self.path))
     }
 
     /// Skips `bytes` bytes, or all that are left if there are fewer.

@@ -2,9 +2,11 @@
 
 use std::ops::Range;
 use std::path::Path;
+use std::sync::PoisonError;
 
 use super::VolumeError;
 use super::samples::{Samples, Stream, Voxel, dims_of};
+use super::seek::{Located, Notes};
 use super::source::invalid;
 
 /// The maximum number of channels in a file.
@@ -117,6 +119,10 @@ impl Stream {
     ) -> Result<Vec<T>, VolumeError> {
         let selection = self.access.selection();
         series.check(&self.path, selection)?;
+        if let Some(notes) = self.access.notes() {
+            self.note(samples, series, notes)?;
+            return Ok(Vec::new());
+        }
         let channels = series.channels(selection);
         if series.count() == 1 {
             return self.samples(samples, window);
@@ -146,6 +152,22 @@ impl Stream {
             at = block + 1;
         }
         Ok(values)
+    }
+
+    /// Notes where the samples are in an uncompressed file, which must hold them all.
+    fn note(&mut self, samples: &Samples, series: &Series, notes: &Notes) -> Result<(), VolumeError> {
+        let total = samples.bytes().saturating_mul(series.count());
+        let allowed = format!("at least {total} bytes, uncompressed, x fastest");
+        let at =
+            self.position()?.filter(|_| !samples.z_fastest && self.exactly_left().is_some_and(|left| left >= total));
+        let at = at.ok_or_else(|| {
+            let found = self.exactly_left().map_or("a compressed stream".to_owned(), |left| format!("{left} bytes"));
+            let found = if samples.z_fastest { "z fastest".to_owned() } else { found };
+            invalid(&self.path, "data", found, allowed)
+        })?;
+        let located = Located { path: self.path.clone(), at, samples: *samples, series: *series };
+        notes.lock().unwrap_or_else(PoisonError::into_inner).push(located);
+        Ok(())
     }
 
     /// The samples of some of `count` channels, of which each voxel's lie side by side.

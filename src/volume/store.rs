@@ -4,12 +4,15 @@ use std::fmt::Debug;
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::UVec3;
+use glam::{DVec3, UVec3};
 
 use super::access::{Access, ReadOptions};
 use super::format;
+use super::samples::{SIZES, Samples, dims_of};
+use super::seek::{FileStore, Located};
+use super::series::Series;
 use super::source::invalid;
-use super::{Grid, VolumeError};
+use super::{Grid, RawLayout, VolumeError};
 
 /// A volume that is read by boxes (SPEC §13): one channel at one time.
 ///
@@ -54,13 +57,32 @@ impl StoreLevel {
     }
 }
 
-/// Opens a volume to be read by boxes: an OME-Zarr image or a Zarr array. Of a file with several channels the options choose one; of several times they may.
+/// Opens a volume to be read by boxes: an OME-Zarr image or a Zarr array, or an uncompressed NRRD, NIfTI, MetaImage or NPY file. Of a file with several channels the options choose one; of several times they may.
 ///
 /// # Errors
 /// If the file cannot be read, is of no such format, holds several channels of which none is chosen, or needs more memory than
 /// [`ReadOptions::memory`] allows for the chunks that are read at once.
 pub fn open_store(path: &Path, options: &ReadOptions) -> Result<Arc<dyn Store>, VolumeError> {
     format::open_store(path, &Access::new(options)?)
+}
+
+/// Opens a file of samples without a header to be read by boxes.
+///
+/// # Errors
+/// If the file cannot be read, or is shorter than its layout says.
+pub fn open_raw_store(path: &Path, layout: &RawLayout, options: &ReadOptions) -> Result<Arc<dyn Store>, VolumeError> {
+    let &RawLayout { dims, sample_type: kind, big_endian, offset: at } = layout;
+    let access = Access::new(options)?;
+    let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
+    dims_of(dims.to_array()).ok_or_else(|| invalid(path, "sizes", dims, SIZES))?;
+    let mut file = access.open(path)?;
+    file.skip(at)?;
+    let left = file.left()?;
+    if left != samples.bytes() {
+        return Err(samples.mismatch(path, left));
+    }
+    let located = Located { path: path.to_owned(), at, samples, series: Series::default() };
+    Ok(Arc::new(FileStore::new(located, DVec3::ONE, &access)?))
 }
 
 /// Checks that a box lies in a level, and that there is a value for each of its voxels.

@@ -3,6 +3,7 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod boxes;
 mod colors;
 mod data_files;
 mod dicom;

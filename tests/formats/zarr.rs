@@ -265,3 +265,149 @@ fn axes_in_any_order() {
         assert_eq!(volume.spacing(), spacing, "{axes}");
     }
 }
+
+/// A level lies where its translation says, from the finest one's centre, whose unit is that of all lengths.
+#[test]
+fn levels_of_an_image() {
+    let path = fixture("zarr/ngff.zarr");
+    let at = |level: u32| Volume::open_with(&path, &ReadOptions::default().with_level(level));
+    let [fine, coarse] = [0, 1].map(|level| at(level).unwrap());
+    assert_eq!((fine.level(), fine.levels()), (0, &[DIMS, UVec3::new(2, 2, 1)][..]));
+    assert_eq!((coarse.level(), coarse.levels(), coarse.dims()), (1, fine.levels(), UVec3::new(2, 2, 1)));
+    assert_eq!((coarse.spacing(), coarse.grid().unit(), fine.grid().unit()), (2.0 * SPACING, 0.5, 0.5));
+    // x: (10.25 + 0.5) - (10 + 1), y: (-19.5 + 2) - (-20.5 + 3), z: 31.5 - (30 + 3).
+    assert_eq!((coarse.grid().place(), fine.grid().place()), (DVec3::new(-0.25, 0.0, -1.5), DVec3::ZERO));
+    let wider = coarse.with_spacing("test", SPACING * 2.0).unwrap();
+    assert_eq!((wider.spacing(), wider.grid().place()), (4.0 * SPACING, DVec3::new(-0.5, 0.0, -3.0)));
+    assert_error(at(2), "level", &["found 2", "0 to 1"]);
+    let other = Volume::open_with(&fixture("c.npy"), &ReadOptions::default().with_level(1));
+    assert_error(other, "level", &["found 1", "0, the only one"]);
+    let small = Volume::open_with(&path, &ReadOptions::default().with_memory(100));
+    assert_error(small, "level", &["0: 5 × 4 × 3, 240 bytes; 1: 2 × 2 × 1, 16 bytes", "level 1 or a coarser one"]);
+}
+
+/// The metadata with a value replaced.
+fn with(mut metadata: Value, pointer: &str, value: Value) -> Vec<u8> {
+    *metadata.pointer_mut(pointer).unwrap() = value;
+    metadata.to_string().into_bytes()
+}
+
+#[test]
+fn damaged_stores_are_refused() {
+    let folder = Folder::new();
+    let (group, plain) = (image("zyx").to_string().into_bytes(), array(&[3, 4, 5]).to_string().into_bytes());
+    let samples: Vec<u8> = values().iter().flat_map(|&value| (value as u16).to_le_bytes()).collect();
+    let open = |group: &[u8], array: &[u8], samples: &[u8]| {
+        let path = folder.store(&[("zarr.json", group), ("0/zarr.json", array), ("0/c/0/0/0", samples)]);
+        Volume::open_with(&path, &ReadOptions::default().with_memory(1 << 24))
+    };
+    assert_eq!(open(&group, &plain, &samples).unwrap().values(), values());
+    let multiscale = "/attributes/ome/multiscales/0";
+    let dataset = format!("{multiscale}/datasets/0");
+    for (pointer, value, field, words) in [
+        ("/axes", json!([]), "axes", &["x and y among them"][..]),
+        ("/axes/0/name", json!("x"), "axes", &["different axes"]),
+        ("/axes/0/type", json!("frequency"), "axes[0]", &["frequency"]),
+        ("/axes/0", json!(7), "axes[0]", &["found \"7\""]),
+        ("/datasets", json!([]), "datasets", &["at least one"]),
+        ("/datasets/0/path", json!("../0"), "datasets[0].path", &["../0", "without . and .."]),
+        ("/datasets/0/path", json!("/etc"), "datasets[0].path", &["/etc"]),
+        ("/datasets/0/path", json!("1"), "array", &["nothing", ".zarray"]),
+        ("/datasets/0/coordinateTransformations/0/scale", json!([1, 2]), "scale", &["3 numbers"]),
+        ("/datasets/0/coordinateTransformations/0/scale", json!([1, 2, 0]), "scale", &["not above 0"]),
+        ("/datasets/0/coordinateTransformations/0/scale", json!([1, 1, 1e9]), "spacing", &["none above 10000"]),
+        ("/datasets/0/coordinateTransformations/0/type", json!("affine"), "type", &["affine", "translation"]),
+    ] {
+        let damaged = with(image("zyx"), &format!("{multiscale}{pointer}"), value);
+        let message = open(&damaged, &plain, &samples).unwrap_err().to_string();
+        assert!(
+            message.contains(&format!("{field}: found")) && words.iter().all(|word| message.contains(word)),
+            "{message}"
+        );
+    }
+    let scaled = |count: usize| {
+        with(
+            image("zyx"),
+            &dataset,
+            json!({"path": "0", "coordinateTransformations": vec![json!({"type": "identity"}); count]}),
+        )
+    };
+    assert!(open(&scaled(9), &plain, &samples).is_ok());
+    for (pointer, value, field, words) in [
+        ("/shape", json!([3, 4]), "shape", &["2 dimensions", "3, as many"][..]),
+        ("/shape", json!([3, 4, 0]), "shape", &["3 × 4 × 0", "positive"]),
+        ("/shape", json!([3, 4, u64::MAX]), "shape", &["at most 4294967295 each"]),
+        ("/shape", json!([60_000, 60_000, 2]), "chunks", &["12000 × 30000", "at most 67108864"]),
+        ("/shape", json!([3000, 4000, 5]), "data", &["memory limit of 16777216"]),
+        ("/shape", json!("all"), "metadata", &["Zarr array"]),
+        ("/data_type", json!("complex64"), "data_type", &["complex64", "float32"]),
+        ("/data_type", json!("int17"), "array", &["int17"]),
+        ("/fill_value", json!("none"), "array", &["none"]),
+        (
+            "/chunk_grid/configuration/chunk_shape",
+            json!([1 << 20, 1 << 20, 1 << 20]),
+            "chunks",
+            &["at most 4294967295 values"],
+        ),
+        ("/chunk_grid/configuration/chunk_shape", json!([1 << 10, 1 << 10, 1 << 10]), "chunks", &["memory limit"]),
+        ("/chunk_grid/configuration/chunk_shape", json!([0, 4, 5]), "metadata", &[]),
+        ("/chunk_grid/name", json!("spiral"), "array", &["spiral"]),
+        ("/codecs", json!([]), "array", &["blosc, bz2, gzip, zlib, zstd"]),
+        ("/codecs/0/name", json!("jpeg"), "array", &["jpeg"]),
+    ] {
+        let damaged = with(array(&[3, 4, 5]), pointer, value);
+        let message = open(&group, &damaged, &samples).unwrap_err().to_string();
+        let is_about = message.contains(&format!(": {field}: found"));
+        assert!(is_about && words.iter().all(|word| message.contains(word)), "{pointer}: {message}");
+    }
+    for cut in [0, 1, 119] {
+        assert_error(open(&group, &plain, &samples[..cut]), "chunk", &["0/c/0/0/0", "chunk from [0, 0, 0]"]);
+    }
+    assert_error(open(&group, &plain, &vec![0; 1 << 20]), "chunk", &["1048576 bytes", "0/c/0/0/0"]);
+    // Streams that would expand to more than the chunk holds.
+    for (codec, code) in [
+        ("gzip", gzip(&vec![7; 1 << 20])),
+        ("zstd", [&[0x28, 0xb5, 0x2f, 0xfd, 0xe0][..], &[0xff; 8], &[1, 0, 0]].concat()),
+        ("blosc", [&[2, 1, 0x21, 2][..], &(1_u32 << 31).to_le_bytes(), &[0, 0, 1, 0], &[20, 0, 0, 0]].concat()),
+    ] {
+        let codecs =
+            json!([{"name": "bytes", "configuration": {"endian": "little"}}, {"name": codec, "configuration": {}}]);
+        let damaged = with(array(&[3, 4, 5]), "/codecs", codecs);
+        assert_error(open(&group, &damaged, &code), "chunk", &["0/c/0/0/0"]);
+    }
+    let shards = json!([{"name": "sharding_indexed", "configuration": {
+        "chunk_shape": [3, 4, 5], "codecs": [{"name": "bytes", "configuration": {"endian": "little"}}],
+        "index_codecs": [{"name": "bytes", "configuration": {"endian": "little"}}], "index_location": "start"}}]);
+    let sharded = with(array(&[3, 4, 5]), "/codecs", shards);
+    let shard = |from: u64, bytes: u64| [&from.to_le_bytes()[..], &bytes.to_le_bytes(), &samples].concat();
+    assert_eq!(open(&group, &sharded, &shard(16, 120)).unwrap().values(), values());
+    assert!(open(&group, &sharded, &shard(u64::MAX, u64::MAX)).unwrap().values().iter().all(|&value| value == 0.0));
+    for (from, bytes) in [(17, 120), (u64::MAX, 2), (16, 119), (1 << 40, 120)] {
+        assert_error(open(&group, &sharded, &shard(from, bytes)), "chunk", &["0/c/0/0/0"]);
+    }
+    assert_error(open(&group, &sharded, &[0; 15]), "chunk", &["15 bytes, whose index alone takes 16"]);
+}
+
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    use std::io::Write;
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    encoder.write_all(bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+#[test]
+fn files_stay_within_the_folder() {
+    let folder = Folder::new();
+    let (group, plain) = (image("zyx").to_string().into_bytes(), array(&[3, 4, 5]).to_string().into_bytes());
+    let path = folder.store(&[("zarr.json", &group), ("0/zarr.json", &plain)]);
+    let options = ReadOptions::default().confined_to(folder.0.path());
+    // Without chunks every value is the fill value.
+    assert!(Volume::open_with(&path, &options).unwrap().values().iter().all(|&value| value == 0.0));
+    #[cfg(unix)]
+    for target in ["/etc", "/no/such/folder"] {
+        _ = fs::remove_file(path.join("0/c"));
+        std::os::unix::fs::symlink(target, path.join("0/c")).unwrap();
+        let message = Volume::open_with(&path, &options).unwrap_err().to_string();
+        assert!(message.contains("a path that leads elsewhere"), "{message}");
+    }
+}

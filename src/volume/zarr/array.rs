@@ -1,17 +1,16 @@
 //! An array of a Zarr store, read chunk by chunk.
 
-use std::fmt::{self, Debug, Formatter};
+use std::borrow::Cow;
+use std::fmt::{self, Debug, Display, Formatter};
+use std::num::NonZeroU64;
 use std::ops::Range;
 use std::sync::Arc;
 
 use glam::UVec3;
 use rayon::prelude::*;
 use serde_json::Value;
-use zarrs::array::codec::api::CodecOptions;
-use zarrs::array::{
-    Array, ArrayBytes, ArrayError, ArrayMetadata, ArrayMetadataV2, ArrayMetadataV3, ArrayShardedExt,
-    ArrayShardedReadableExt, ArrayShardedReadableExtCache,
-};
+use zarrs::array::codec::api::{ArrayToBytesCodecTraits, CodecOptions};
+use zarrs::array::{Array, ArrayError, ArrayMetadata, ArrayMetadataV2, ArrayMetadataV3};
 use zarrs::plugin::ExtensionName;
 
 use super::super::VolumeError;
@@ -22,9 +21,7 @@ use super::axes::{Axes, KINDS};
 use super::codec;
 use super::half;
 use super::keys::Keys;
-
-/// The maximum number of chunks in a shard, whose places are read at once, and of such places that are kept.
-const MAX_IN_SHARD: u64 = 1 << 22;
+use super::shards::{MAX_IN_SHARD, Shards};
 
 /// The maximum number of chunks of an array: more take longer to look for than anyone waits.
 const MAX_CHUNKS: u64 = 1 << 26;
@@ -35,8 +32,11 @@ pub(super) type Sizes = [u64; KINDS];
 /// An array whose axes are known.
 pub(super) struct ZarrArray {
     keys: Arc<Keys>,
-    array: Array<Keys>,
-    shards: ArrayShardedReadableExtCache,
+    /// The metadata as zarrs takes it; what it states is read here.
+    array: Array<()>,
+    metadata: Value,
+    /// How chunks are found in shards, if they lie in such.
+    shards: Option<Shards>,
     axes: Axes,
     pub(super) kind: SampleType,
     is_half: bool,
@@ -45,8 +45,6 @@ pub(super) struct ZarrArray {
     chunk: Sizes,
     /// The number of values in a chunk.
     in_chunk: u64,
-    /// The number of chunks in a shard; 1 without shards.
-    in_shard: u64,
 }
 
 impl Debug for ZarrArray {
@@ -96,7 +94,7 @@ impl ZarrArray {
         };
         let metadata = metadata.map_err(|error| invalid(&file, "metadata", error, "that of a Zarr array"))?;
         let path = if path.is_empty() { "/".to_owned() } else { format!("/{path}") };
-        let array = Array::new_with_metadata(Arc::clone(keys), &path, metadata).map_err(|error| {
+        let array = Array::new_with_metadata(Arc::new(()), &path, metadata).map_err(|error| {
             let allowed = format!("a Zarr array of numbers on a regular grid, compressed by {}", codec::NAMES);
             invalid(&file, "array", error, allowed)
         })?;
@@ -124,13 +122,20 @@ impl ZarrArray {
             let names = SampleType::NAMED.map(|(name, _)| name).join(", ");
             invalid(&file, "data_type", name, format!("{names}, float16, bool"))
         })?;
+        let metadata = serde_json::to_value(array.metadata()).unwrap_or_default();
+        let grid = metadata["chunk_grid"]["name"].as_str().unwrap_or("regular");
+        if grid != "regular" {
+            return Err(invalid(&file, "chunk_grid", grid, "regular"));
+        }
         let outer = array
             .chunk_shape(&vec![0; shape.len()])
             .map_err(|error| invalid(&file, "chunk_grid", error, "a regular grid of chunks"))?;
-        let inner = array.effective_subchunk_shape().unwrap_or_else(|| outer.clone());
+        let shards = Shards::of(&metadata, &outer);
+        let shards = shards.map_err(|error| invalid(&file, "codecs", error, "shards of a whole number of chunks"))?;
+        let inner = shards.as_ref().map_or(&*outer, |shards| &shards.chunk);
         let product = |sizes: &[u64]| sizes.iter().try_fold(1_u64, |product, &size| product.checked_mul(size));
-        let numbers = |sizes: &[std::num::NonZeroU64]| sizes.iter().map(|size| size.get()).collect::<Vec<u64>>();
-        let (outer, inner) = (numbers(&outer), numbers(&inner));
+        let numbers = |sizes: &[NonZeroU64]| sizes.iter().map(|size| size.get()).collect::<Vec<u64>>();
+        let (outer, inner) = (numbers(&outer), numbers(inner));
         let shown = |sizes: &[u64]| sizes.iter().map(u64::to_string).collect::<Vec<_>>().join(" × ");
         let is_grid = |sizes: &[u64]| sizes.iter().all(|&size| (1..=u64::from(u32::MAX)).contains(&size));
         if !is_grid(shape) {
@@ -139,10 +144,6 @@ impl ZarrArray {
         let in_chunk = product(&inner).filter(|count| *count <= u64::from(u32::MAX) && is_grid(&outer));
         let in_chunk =
             in_chunk.ok_or_else(|| invalid(&file, "chunks", shown(&inner), "at most 4294967295 values in a chunk"))?;
-        let in_shard = product(&outer).map(|outer| outer / in_chunk).filter(|&count| count <= MAX_IN_SHARD);
-        let in_shard = in_shard.ok_or_else(|| {
-            invalid(&file, "chunks", shown(&outer), format!("at most {MAX_IN_SHARD} chunks in a shard"))
-        })?;
         let counts: Vec<u64> = shape.iter().zip(&inner).map(|(shape, chunk)| shape.div_ceil(*chunk)).collect();
         if product(&counts).is_none_or(|count| count > MAX_CHUNKS) {
             return Err(invalid(
@@ -153,16 +154,15 @@ impl ZarrArray {
             ));
         }
         let (shape, chunk) = (axes.sort(shape, 1), axes.sort(&inner, 1));
-        let shards = ArrayShardedReadableExtCache::new(&array);
         let keys = Arc::clone(keys);
-        let opened = Self { keys, shards, axes, kind, is_half, shape, chunk, in_chunk, in_shard, array };
+        let opened = Self { keys, metadata, shards, axes, kind, is_half, shape, chunk, in_chunk, array };
         opened.keys.permit(opened.encoded_bytes());
         Ok(opened)
     }
 
     /// What the store states about the array.
     pub(super) fn metadata(&self) -> Value {
-        serde_json::to_value(self.array.metadata()).unwrap_or_default()
+        self.metadata.clone()
     }
 
     /// The number of voxels along x, y and z.
@@ -181,14 +181,16 @@ impl ZarrArray {
     fn encoded_bytes(&self) -> u64 {
         // The bound of `Compression::encoded_representation`.
         let chunk = self.in_chunk.saturating_mul(self.kind.bytes()).saturating_mul(2).saturating_add(1 << 16);
-        chunk.max(self.in_shard * 16 + 4)
+        chunk.max(self.shards.as_ref().map_or(0, Shards::index_bytes))
     }
 
     /// Reserves the memory for reading `chunks` chunks at once.
     pub(super) fn reserve<T>(&self, chunks: usize, access: &Access) -> Result<(), VolumeError> {
         let decoded = self.in_chunk.saturating_mul(self.kind.bytes() + size_of::<T>() as u64);
         let bytes = decoded.saturating_add(self.encoded_bytes()).saturating_mul(chunks as u64);
-        let bytes = bytes.saturating_add(MAX_IN_SHARD * u64::from(self.in_shard > 1));
+        let all: u64 = (0..KINDS).map(|axis| self.shape[axis].div_ceil(self.chunk[axis])).product();
+        let indices = if self.shards.is_some() { 32 * all.min(MAX_IN_SHARD) } else { 0 };
+        let bytes = bytes.saturating_add(indices);
         access.reserve(
             &self.keys.path,
             "chunks",
@@ -240,25 +242,57 @@ impl ZarrArray {
 
     /// Decodes the chunk at a place of the grid of chunks; values are in the order of the array's axes.
     fn decode<T: Voxel>(&self, place: Sizes) -> Result<Vec<T>, VolumeError> {
-        if self.shards.len() as u64 * self.in_shard * 16 > MAX_IN_SHARD {
-            self.shards.clear();
-        }
-        let indices = self.axes.unsort(place);
-        let options = CodecOptions::default().with_concurrent_target(1);
-        let bytes = self.array.retrieve_subchunk_opt::<ArrayBytes>(&self.shards, &indices, &options);
-        let bytes = bytes.map_err(|error| self.damaged(place, &error))?;
-        let mut bytes = bytes.into_fixed().map_err(|error| self.damaged(place, &error.into()))?.into_owned();
-        if self.is_half {
-            bytes = half::widen(&bytes);
-        }
+        let key = self.key(place);
+        let (data_type, fill) = (self.array.data_type(), self.array.fill_value());
+        let refused =
+            |sample: f64| invalid(&self.keys.file(&key), "data", format!("{sample} in the chunk"), T::ALLOWED);
+        let damaged = |error: &dyn Display| self.damaged(&key, place, error);
+        let Some(code) = self.encoded(&key, place)? else {
+            let fill = self.convert::<T>(&self.widened(fill.as_ne_bytes().to_vec())).map_err(refused)?;
+            return Ok(fill.repeat(self.in_chunk as usize));
+        };
+        let (code, options) = (Cow::Owned(code), CodecOptions::default().with_concurrent_target(1));
+        let decoded = match &self.shards {
+            Some(Shards { codecs, chunk, .. }) => codecs.decode(code, chunk, data_type, fill, &options),
+            None => {
+                let chunk = self.outer().map_err(|error| damaged(&error))?;
+                self.array.codecs().decode(code, &chunk, data_type, fill, &options)
+            }
+        };
+        let bytes = decoded.map_err(|error| damaged(&error))?.into_fixed().map_err(|error| damaged(&error))?;
+        let bytes = self.widened(bytes.into_owned());
         let expected = self.in_chunk * self.kind.bytes();
         if bytes.len() as u64 != expected {
-            let found = format!("{} bytes", bytes.len());
-            return Err(invalid(&self.keys.file(&self.key(place)), "chunk", found, format!("{expected} bytes")));
+            return Err(damaged(&format!("{} bytes of {expected}", bytes.len())));
         }
-        self.convert(&bytes).map_err(|sample| {
-            invalid(&self.keys.file(&self.key(place)), "data", format!("{sample} in the chunk"), T::ALLOWED)
-        })
+        self.convert(&bytes).map_err(refused)
+    }
+
+    /// The bytes of the chunk at a place, encoded; `None` if the store does not hold it.
+    fn encoded(&self, key: &str, place: Sizes) -> Result<Option<Vec<u8>>, VolumeError> {
+        let Some(shards) = &self.shards else {
+            let bytes = self.keys.bytes(key)?;
+            return bytes.map(|bytes| self.keys.range(key, 0..bytes)).transpose();
+        };
+        let range = shards.range(&self.keys, key, &self.axes.unsort(place));
+        let Some(range) = range.map_err(|error| self.damaged(key, place, &error))? else { return Ok(None) };
+        match self.keys.bytes(key)? {
+            Some(bytes) if range.end <= bytes => self.keys.range(key, range).map(Some),
+            bytes => {
+                let found = format!("bytes {range:?} of a shard of {}", bytes.unwrap_or(0));
+                Err(self.damaged(key, place, &found))
+            }
+        }
+    }
+
+    /// The shape of a chunk, or of a shard.
+    fn outer(&self) -> Result<Vec<NonZeroU64>, ArrayError> {
+        self.array.chunk_shape(&vec![0; self.axes.count()])
+    }
+
+    /// The bytes of samples, of 32 bits where they are stored with 16.
+    fn widened(&self, bytes: Vec<u8>) -> Vec<u8> {
+        if self.is_half { half::widen(&bytes) } else { bytes }
     }
 
     /// The voxels of samples in the machine's byte order.
@@ -273,8 +307,7 @@ impl ZarrArray {
 
     /// The value of voxels in chunks that the store does not hold.
     pub(super) fn fill(&self) -> f32 {
-        let bytes = self.array.fill_value().as_ne_bytes();
-        let bytes = if self.is_half { half::widen(bytes) } else { bytes.to_vec() };
+        let bytes = self.widened(self.array.fill_value().as_ne_bytes().to_vec());
         // Every number is a value.
         self.convert::<f32>(&bytes).ok().and_then(|values| values.first().copied()).unwrap_or(f32::NAN)
     }
@@ -318,32 +351,24 @@ impl ZarrArray {
         let [x, y, z] = chunk.to_array().map(u64::from);
         let place = [time / self.chunk[0], channel / self.chunk[1], z, y, x];
         let key = self.key(place);
-        if self.keys.bytes(&key)?.is_none() {
-            return Ok(false);
-        }
-        if !self.array.is_exclusively_sharded() {
-            return Ok(true);
-        }
-        let range = self.array.subchunk_byte_range(&self.shards, &self.axes.unsort(place));
-        Ok(range.map_err(|error| self.damaged(place, &error))?.is_some())
+        let Some(shards) = &self.shards else { return Ok(self.keys.bytes(&key)?.is_some()) };
+        let range = shards.range(&self.keys, &key, &self.axes.unsort(place));
+        Ok(range.map_err(|error| self.damaged(&key, place, &error))?.is_some())
     }
 
     /// The key of the chunk or the shard in which the chunk at a place lies.
     fn key(&self, place: Sizes) -> String {
         let origin: Vec<u64> = self.axes.unsort(std::array::from_fn(|axis| place[axis] * self.chunk[axis]));
-        let chunk = |shape: &[std::num::NonZeroU64]| {
-            origin.iter().zip(shape).map(|(at, size)| at / size.get()).collect::<Vec<u64>>()
-        };
-        let shape = self.array.chunk_shape(&vec![0; origin.len()]);
-        self.array.chunk_key(&shape.map(|shape| chunk(&shape)).unwrap_or_default()).as_str().to_owned()
+        let outer = self.outer().unwrap_or_default();
+        let chunk: Vec<u64> = origin.iter().zip(&outer).map(|(at, size)| at / size.get()).collect();
+        self.array.chunk_key(&chunk).as_str().to_owned()
     }
 
     /// The error for a chunk that cannot be decoded.
-    fn damaged(&self, place: Sizes, error: &ArrayError) -> VolumeError {
+    fn damaged(&self, key: &str, place: Sizes, error: &dyn Display) -> VolumeError {
         let origin = self.axes.unsort(std::array::from_fn(|axis| place[axis] * self.chunk[axis]));
         let found = format!("{error}, in the chunk from {origin:?}");
         let shape = self.axes.unsort(self.chunk);
-        let allowed = format!("a whole and undamaged chunk of {shape:?} values");
-        invalid(&self.keys.file(&self.key(place)), "chunk", found, allowed)
+        invalid(&self.keys.file(key), "chunk", found, format!("a whole and undamaged chunk of {shape:?} values"))
     }
 }

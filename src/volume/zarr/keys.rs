@@ -8,9 +8,6 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use zarrs::storage::byte_range::{ByteRange, ByteRangeIterator};
-use zarrs::storage::{Bytes, MaybeBytesIterator, ReadableStorageTraits, StorageError, StoreKey};
-
 use super::super::VolumeError;
 use super::super::access::Access;
 use super::super::source::{MAX_HEADER, Source, invalid, io_error};
@@ -99,7 +96,7 @@ impl Keys {
     }
 
     /// Some bytes of a key that exists.
-    fn range(&self, key: &str, range: Range<u64>) -> Result<Vec<u8>, VolumeError> {
+    pub(super) fn range(&self, key: &str, range: Range<u64>) -> Result<Vec<u8>, VolumeError> {
         let (path, count) = (self.file(key), range.end - range.start);
         let limit = self.limit.load(Ordering::Relaxed);
         if count > limit {
@@ -146,44 +143,4 @@ impl Keys {
 fn is_missing(path: &Path) -> bool {
     let is_missing = |error: std::io::Error| matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory);
     fs::metadata(path).is_err_and(is_missing)
-}
-
-impl ReadableStorageTraits for Keys {
-    fn get_partial_many<'a>(
-        &'a self,
-        key: &StoreKey,
-        ranges: ByteRangeIterator<'a>,
-    ) -> Result<MaybeBytesIterator<'a>, StorageError> {
-        let key = key.as_str().to_owned();
-        let Some(bytes) = self.bytes(&key).map_err(storage_error)? else { return Ok(None) };
-        Ok(Some(Box::new(ranges.map(move |range| {
-            let range = within(range, bytes).ok_or_else(|| {
-                let path = self.file(&key);
-                storage_error(invalid(&path, "chunk", format!("{bytes} bytes"), format!("more: {range}")))
-            })?;
-            self.range(&key, range).map(Bytes::from).map_err(storage_error)
-        }))))
-    }
-
-    fn size_key(&self, key: &StoreKey) -> Result<Option<u64>, StorageError> {
-        self.bytes(key.as_str()).map_err(storage_error)
-    }
-
-    fn supports_get_partial(&self) -> bool {
-        true
-    }
-}
-
-/// A range of a value of some length; `None` if it leads out of the value.
-fn within(range: ByteRange, bytes: u64) -> Option<Range<u64>> {
-    let range = match range {
-        ByteRange::FromStart(start, count) => start..count.map_or(Some(bytes), |count| start.checked_add(count))?,
-        ByteRange::Suffix(count) => bytes.checked_sub(count)?..bytes,
-    };
-    (range.start <= range.end && range.end <= bytes).then_some(range)
-}
-
-/// Our errors on their way through zarrs.
-fn storage_error(error: VolumeError) -> StorageError {
-    StorageError::Other(error.to_string())
 }

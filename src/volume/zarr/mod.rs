@@ -13,6 +13,7 @@ mod image;
 mod json;
 mod keys;
 mod multiscale;
+mod shards;
 
 use std::path::Path;
 
