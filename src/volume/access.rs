@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::VolumeError;
 use super::file::Files;
 use super::memory;
-use super::seek::Notes;
+use super::seek::{Located, Notes};
 use super::series::Selection;
 use super::source::{Source, invalid, io_error};
 
@@ -129,9 +129,16 @@ impl Access {
         (Self(Arc::clone(&self.0), self.1, Some(Arc::clone(&notes))), notes)
     }
 
-    /// Where readers note the place of samples in place of reading them; `None` if they read.
-    pub(super) fn notes(&self) -> Option<&Notes> {
-        self.2.as_deref()
+    /// Whether readers note where samples are, and read none.
+    pub(super) fn is_noting(&self) -> bool {
+        self.2.is_some()
+    }
+
+    /// Notes where samples are.
+    pub(super) fn note(&self, located: Located) {
+        if let Some(notes) = &self.2 {
+            notes.lock().unwrap_or_else(PoisonError::into_inner).push(located);
+        }
     }
 
     /// What is read of files with several volumes.

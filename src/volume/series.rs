@@ -2,11 +2,10 @@
 
 use std::ops::Range;
 use std::path::Path;
-use std::sync::PoisonError;
 
 use super::VolumeError;
 use super::samples::{Samples, Stream, Voxel, dims_of};
-use super::seek::{Located, Notes};
+use super::seek::Located;
 use super::source::invalid;
 
 /// The maximum number of channels in a file.
@@ -119,8 +118,9 @@ impl Stream {
     ) -> Result<Vec<T>, VolumeError> {
         let selection = self.access.selection();
         series.check(&self.path, selection)?;
-        if let Some(notes) = self.access.notes() {
-            self.note(samples, series, notes)?;
+        if self.access.is_noting() {
+            let located = self.locate(samples, series)?;
+            self.access.note(located);
             return Ok(Vec::new());
         }
         let channels = series.channels(selection);
@@ -154,8 +154,8 @@ impl Stream {
         Ok(values)
     }
 
-    /// Notes where the samples are in an uncompressed file, which must hold them all.
-    fn note(&mut self, samples: &Samples, series: &Series, notes: &Notes) -> Result<(), VolumeError> {
+    /// Where the samples are in an uncompressed file, which must hold them all.
+    fn locate(&mut self, samples: &Samples, series: &Series) -> Result<Located, VolumeError> {
         let total = samples.bytes().saturating_mul(series.count());
         let allowed = format!("at least {total} bytes, uncompressed, x fastest");
         let at =
@@ -165,9 +165,7 @@ impl Stream {
             let found = if samples.z_fastest { "z fastest".to_owned() } else { found };
             invalid(&self.path, "data", found, allowed)
         })?;
-        let located = Located { path: self.path.clone(), at, samples: *samples, series: *series };
-        notes.lock().unwrap_or_else(PoisonError::into_inner).push(located);
-        Ok(())
+        Ok(Located { path: self.path.clone(), at, samples: *samples, series: *series })
     }
 
     /// The samples of some of `count` channels, of which each voxel's lie side by side.

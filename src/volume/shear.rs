@@ -118,7 +118,7 @@ impl Lattice {
         access: &Access,
     ) -> Result<Loaded<T>, VolumeError> {
         let Some(shear) = self.shear else { return Ok(loaded) };
-        if access.notes().is_some() {
+        if access.is_noting() {
             let found = format!("axes sheared by {:.2}°", shear.degrees);
             return Err(invalid(path, field, found, "axes at right angles, where a file is read by boxes"));
         }

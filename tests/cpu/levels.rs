@@ -37,7 +37,7 @@ fn coarse_and_plain() -> (Volume, Volume) {
     let first = PLACE + (fine.as_dvec3() - 1.0) / 2.0 - (DIMS.as_dvec3() - 1.0);
     let scales = [(1.0, DVec3::ZERO), (2.0, first)].into_iter().zip(["fine", "coarse"]).map(|((scale, at), path)| {
         let transformations = json!([
-            {"type": "scale", "scale": [scale; 3]}, {"type": "translation", "translation": [at.z, at.y, at.x]}
+            {"type": "scale", "scale": [scale, scale, scale]}, {"type": "translation", "translation": [at.z, at.y, at.x]}
         ]);
         json!({"path": path, "coordinateTransformations": transformations})
     });

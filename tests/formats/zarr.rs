@@ -334,7 +334,7 @@ fn damaged_stores_are_refused() {
     };
     assert!(open(&scaled(9), &plain, &samples).is_ok());
     for (pointer, value, field, words) in [
-        ("/shape", json!([3, 4]), "shape", &["2 dimensions", "3, as many"][..]),
+        ("/shape", json!([3, 4]), "array", &["inconsistent dimensionality"][..]),
         ("/shape", json!([3, 4, 0]), "shape", &["3 × 4 × 0", "positive"]),
         ("/shape", json!([3, 4, u64::MAX]), "shape", &["at most 4294967295 each"]),
         ("/shape", json!([60_000, 60_000, 2]), "chunks", &["12000 × 30000", "at most 67108864"]),

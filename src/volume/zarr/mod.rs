@@ -103,6 +103,8 @@ pub(super) fn open(path: &Path, access: &Access) -> Result<ZarrStore, VolumeErro
     let levels =
         image.levels.iter().map(|level| StoreLevel { grid: level.grid, chunk: level.array.chunk_dims() }).collect();
     let (channel, time) = (u64::from(channels.start), u64::from(selection.time.unwrap_or(0)));
+    // What was read so far is metadata.
+    image.keys.take_count();
     Ok(ZarrStore { image, levels, channel, time })
 }
 
