@@ -26,6 +26,9 @@ pub struct Stats {
     /// The frame's counts.
     #[serde(flatten)]
     pub counts: Counts,
+    /// What was read of a store, if the volume is one that was streamed (SPEC §13).
+    #[serde(flatten)]
+    pub store: Option<StoreCounts>,
     /// `quads` or `tiles`; for other backends their name.
     pub rasterizer: String,
     /// GPU milliseconds per stage, from a renderer that profiles on a device with timestamp queries.
@@ -68,6 +71,22 @@ pub struct Counts {
     pub bricks_tested: u64,
     /// Bricks whose voxels were visited; by the tile rasterizer again for every tile and group.
     pub bricks_visited: u64,
+}
+
+/// What a frame reads of a store (SPEC §13).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct StoreCounts {
+    /// The level that was drawn; 0 is the finest.
+    pub level: u64,
+    /// The chunks of the level.
+    pub chunks_total: u64,
+    /// Those of them that were read. Each counts once, although it may have been read again.
+    pub chunks_read: u64,
+    /// The bytes of those in the store.
+    pub bytes_read: u64,
+    /// The most bytes of values and bricks that were in memory at a time. It depends on the order in which threads draw.
+    pub chunk_bytes: u64,
 }
 
 impl Counts {

@@ -8,6 +8,8 @@
 <sheetsplat.Image of 64×64 pixels>
 """
 
+from typing import TYPE_CHECKING, Any
+
 from .comparison import Comparison, compare
 from .errors import (
     DeviceError,
@@ -25,6 +27,9 @@ from .part import Part, merge
 from .scene import Scene
 from .view import View, info, orbit, render, sweep
 from .volume import Volume
+
+if TYPE_CHECKING:
+    from .widget import Widget as Widget
 
 __all__ = [
     "Comparison",
@@ -49,3 +54,16 @@ __all__ = [
     "render",
     "sweep",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    # Only the widget needs anywidget.
+    if name == "Widget":
+        from .widget import Widget
+
+        return Widget
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), "Widget"])

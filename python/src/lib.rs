@@ -2,6 +2,7 @@
 //! convert arguments, and document them.
 
 mod array;
+mod camera;
 mod error;
 mod golden;
 mod image;
@@ -14,6 +15,8 @@ mod volume;
 /// The module `sheetsplat._native`.
 #[pyo3::pymodule]
 mod _native {
+    #[pymodule_export]
+    use crate::camera::{elevation_and_center, panned, pixel, placed, with_camera};
     #[pymodule_export]
     use crate::golden::{Comparison, check_golden, compare, open_image};
     #[pymodule_export]

@@ -39,7 +39,7 @@ impl Scene {
     }
 
     /// A scene that was derived from this one.
-    fn derived(&self, scene: sheetsplat::Scene) -> Result<Self, Raised> {
+    pub(crate) fn derived(&self, scene: sheetsplat::Scene) -> Result<Self, Raised> {
         let folder = PathBuf::from(".");
         Ok(Self { text: scene.to_toml(&folder)?, scene, origin: self.origin.clone(), folder, sets: Vec::new() })
     }
@@ -55,8 +55,12 @@ impl Scene {
 
     /// The same scene with other settings.
     fn replaced(&self, settings: &Bound<'_, PyDict>) -> PyResult<Self> {
-        let mut sets = self.sets.clone();
-        sets.extend(settings::sets(settings)?);
+        let new = settings::sets(settings)?;
+        let key = |set: &String| set.split_once('=').map(|(key, _)| key.to_owned());
+        // Without those that have a new value, so that a scene does not grow while a setting changes many times.
+        let is_kept = |old: &&String| !new.iter().any(|new| key(new) == key(old));
+        let mut sets: Vec<_> = self.sets.iter().filter(is_kept).cloned().collect();
+        sets.extend(new);
         Ok(Self::read(self.text.clone(), self.origin.clone(), self.folder.clone(), sets)?)
     }
 

@@ -39,6 +39,14 @@ def test_one_vocabulary(tmp_path: pathlib.Path) -> None:
         assert data(sheetsplat.render(scene)) == expected
 
 
+def test_the_last_value_of_a_setting_counts() -> None:
+    scene = sheetsplat.Scene(preset="mip", camera={"up": [1, 0, 0], "direction": [0, 0, 1]})
+    for number in range(200):
+        scene = scene.replace(**{"camera.up": [1, 0, number]})
+        scene = scene.replace(camera={"direction": [0, 1 + number, 0]}, preset="ct-skin" if number % 2 else "ct-bone")
+    assert scene == sheetsplat.Scene(preset="ct-skin", camera={"up": [1, 0, 199], "direction": [0, 200, 0]})
+
+
 def test_scenes_come_back(tmp_path: pathlib.Path) -> None:
     scene = Scene(TEXT, splatting={"compositing": "exponential"}, preset="mr-head")
     assert Scene(scene.to_toml()) == scene

@@ -1,6 +1,7 @@
 //! Appearance chosen for a volume: the default, presets, colour maps, and the colours of labels.
 
 pub mod categories;
+pub(crate) mod channel_display;
 mod colormap;
 mod hounsfield;
 mod object;

@@ -6,11 +6,11 @@ use super::colormap::Colormap;
 use super::hounsfield::Hounsfield;
 use super::object::Object;
 use super::quantile::quantiles;
-use super::{categories, constant, xray};
+use super::{categories, channel_display, constant, xray};
 use crate::settings::shading::Shading;
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::{Ramp, TransferFunction};
-use crate::volume::{ChannelDisplay, Volume};
+use crate::volume::Volume;
 
 /// A kind of data, and which part of it is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -190,7 +190,7 @@ pub(super) fn confocal(volume: &Volume) -> TransferFunction {
     let Some([start, top]) = window else { return constant(0.5) };
     let dark = object.map_or(start, |object| object.background).min(start);
     let green = || Ramp::through(vec![(dark, DVec3::new(0.0, 0.35, 0.05)), (top, DVec3::new(0.55, 1.0, 0.6))]);
-    let color = display.and_then(ChannelDisplay::color).unwrap_or_else(green);
+    let color = display.and_then(channel_display::color).unwrap_or_else(green);
     TransferFunction::by_value(color, Ramp::through(vec![(start, 0.0), (top, 0.5)]))
 }
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::project::Projection;
@@ -23,6 +23,8 @@ pub(super) struct Placed {
     pub(super) channel: usize,
     /// The first sheet that its kernels may reach.
     pub(super) first: i32,
+    /// The sheet behind the last one.
+    pub(super) end: i32,
     /// Half the size of a box that contains the box around any of its footprints, pixels.
     pub(super) half_box: [f32; 2],
     /// The middle of the box around all of its footprints, in pixel coordinates whose whole numbers are pixel centres, and half its size.
@@ -47,9 +49,19 @@ pub(super) fn place(bricks: &[Brick], projection: &Projection, support: f64) -> 
     placed
 }
 
-fn place_brick(number: u32, brick: &Brick, projection: &Projection, support: f64) -> Option<Placed> {
+/// Where a brick is; `None` off the image.
+pub(super) fn place_brick(number: u32, brick: &Brick, projection: &Projection, support: f64) -> Option<Placed> {
+    place_box(number, brick::bounds(brick), projection, support)
+}
+
+/// Where a box of voxels is, given by its middle and half its size; `None` off the image.
+pub(super) fn place_box(
+    number: u32,
+    (middle, half): (DVec3, DVec3),
+    projection: &Projection,
+    support: f64,
+) -> Option<Placed> {
     let view = &projection.view;
-    let (middle, half) = brick::bounds(brick);
     let bounds = view.bounds(middle, half)?;
     let Range { start, end } = bounds.depths;
     if start >= end {
@@ -70,7 +82,7 @@ fn place_brick(number: u32, brick: &Brick, projection: &Projection, support: f64
     let [half_box, middle, half] =
         [half_box, (bounds.low + bounds.high) / 2.0 - 0.5, (bounds.high - bounds.low) / 2.0 + half_box]
             .map(|of: DVec2| of.as_vec2().to_array());
-    Some(Placed { brick: number, channel: 0, first, half_box, middle, half, columns, rows })
+    Some(Placed { brick: number, channel: 0, first, end, half_box, middle, half, columns, rows })
 }
 
 /// The bricks of every tile of a row of tiles, as indices into the list of placed bricks.

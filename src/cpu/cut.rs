@@ -3,6 +3,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use glam::DVec3;
+
 use super::means::Means;
 use super::ray::{PixelRay, PixelRays};
 use super::sheets::{COLUMNS, ROWS};
@@ -41,6 +43,8 @@ pub(super) struct RayMode {
     kept: Option<Vec<HalfSpace>>,
     surfaces: Option<Surfaces>,
     means: Option<Means>,
+    /// The box around the volume's voxels and their neighbourhoods.
+    volume: [HalfSpace; 6],
 }
 
 /// How the rays of a tile's pixels meet sheets, by row. Slabs are counted from `base`.
@@ -63,12 +67,13 @@ impl RayMode {
             kept: (surfaces.is_some() || !scene.clip.is_empty()).then(|| scene.clip.half_spaces(grid)),
             surfaces,
             means: compositing.is_by_means().then(|| Means::new(view, grid, &scene.splatting)),
+            volume: around(grid),
         }
     }
 
     /// Only the parts of rays within some half spaces, and in front of surfaces, are visible.
     pub(super) fn within(view: &ViewGeometry, grid: &Grid, kept: Vec<HalfSpace>, surfaces: Option<Surfaces>) -> Self {
-        Self { rays: PixelRays::new(view, grid), kept: Some(kept), surfaces, means: None }
+        Self { rays: PixelRays::new(view, grid), kept: Some(kept), surfaces, means: None, volume: around(grid) }
     }
 
     /// The range of depths at which a pixel's ray shows something.
@@ -78,8 +83,20 @@ impl RayMode {
         inside.start..inside.end.min(end)
     }
 
+    /// The slab from which a tile's are counted: where its middle enters the volume, so that the numbers are small, and rounded in the same way
+    /// whatever is drawn there.
+    fn base(&self, origin: [usize; 2]) -> i32 {
+        let ray = self.rays.of([origin[0] + COLUMNS / 2, origin[1] + ROWS / 2]);
+        let Range { start, end } = ray.inside(&self.volume);
+        let depth = if start < end { start } else { 0.0 };
+        let slab =
+            ray.slabs(depth..f64::INFINITY).map_or(0.0, |[first, last]| if first.is_finite() { first } else { last });
+        if slab.is_finite() { slab.floor() as i32 } else { 0 }
+    }
+
     /// How the rays of a tile's pixels meet sheets; `origin` is the tile's first pixel.
-    pub(super) fn of_tile(&self, origin: [usize; 2], base: i32) -> TileRays {
+    pub(super) fn of_tile(&self, origin: [usize; 2]) -> TileRays {
+        let base = self.base(origin);
         let from_base = |slabs: [f64; 2]| slabs.map(|slab| (slab - f64::from(base)) as f32);
         let ends = |of: &dyn Fn(&PixelRay, Range<f64>) -> [f64; 2]| {
             let mut rows = vec![[[0.0; COLUMNS]; 2]; ROWS];
@@ -112,6 +129,16 @@ impl RayMode {
             then(&ray, self.shown(&ray, pixel), [x, y]);
         }
     }
+}
+
+/// The half spaces of a box around a grid's voxels.
+fn around(grid: &Grid) -> [HalfSpace; 6] {
+    let half = (grid.center() + 1.0) * grid.aspect();
+    let of = |at: usize| {
+        let axis = DVec3::AXES[at / 2];
+        HalfSpace { normal: if at % 2 == 0 { axis } else { -axis }, offset: axis.dot(half) }
+    };
+    std::array::from_fn(of)
 }
 
 impl TileRays {

@@ -1,8 +1,10 @@
 //! A frame: the data that its tiles share, and its rows of tiles drawn on all cores.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use fearless_simd::{Level, Simd, dispatch};
+use glam::UVec3;
 use rayon::prelude::*;
 
 use super::bin::{self, Placed};
@@ -11,18 +13,18 @@ use super::count::{Drawn, Tally};
 use super::cut::{RayMode, Surfaces};
 use super::first_hit;
 use super::kernel::KernelTables;
-use super::material::Materials;
+use super::material::{Material, Materials};
 use super::project::Projection;
 use super::resolve;
 use super::shade::Shader;
 use super::sheets::{COLUMNS, ROWS};
 use super::splat::Splatter;
+use super::stream::{Chunk, Stream};
 use super::tile::TileWalk;
 use crate::geometry::means;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::kernel::Kernel;
 use crate::lists::brick::Brick;
-use crate::lists::classify::channels;
 use crate::lists::quad_plan::{Overlaps, PlaceDepths, tile_grid};
 use crate::part::{Content, Extreme, Resolver};
 use crate::scene::Scene;
@@ -30,16 +32,13 @@ use crate::settings::splatting::{Classification, Compositing, Method, Order};
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::Counts;
-use crate::volume::Volume;
+use crate::volume::{Grid, Volume};
 
 /// The data that all tiles of a frame share.
 #[derive(Debug)]
 pub(super) struct Frame<'a> {
-    pub(super) volume: &'a Volume,
-    /// The channels whose voxels are drawn as one (SPEC §10).
-    pub(super) channels: Vec<(&'a Volume, &'a TransferFunction)>,
-    pub(super) bricks: &'a [Brick],
-    pub(super) materials: &'a Materials,
+    pub(super) grid: Grid,
+    pub(super) voxels: Voxels<'a>,
     pub(super) projection: Projection,
     pub(super) splatter: Splatter,
     pub(super) shader: Shader,
@@ -60,6 +59,20 @@ pub(super) struct Frame<'a> {
     /// `None` for a part of an image.
     resolver: Option<Resolver>,
     overlaps: Overlaps,
+}
+
+/// Where voxels come from.
+#[derive(Debug)]
+pub(super) enum Voxels<'a> {
+    /// Volumes in memory.
+    Whole {
+        /// The channels whose voxels are drawn as one (SPEC §10).
+        channels: Vec<(&'a Volume, &'a TransferFunction)>,
+        bricks: &'a [Brick],
+        materials: &'a Materials,
+    },
+    /// A store, whose chunks are read as their depth comes.
+    Streamed(&'a Arc<Stream>),
 }
 
 /// A drawn frame.
@@ -89,16 +102,14 @@ pub(super) struct Host {
 impl<'a> Frame<'a> {
     /// A frame in a view.
     pub(super) fn new(
-        volume: &'a Volume,
-        transfer: &'a TransferFunction,
-        (bricks, materials): (&'a [Brick], &'a Materials),
+        grid: &Grid,
+        voxels: Voxels<'a>,
         scene: &Scene,
         view: ViewGeometry,
         Host { window, is_part, first_hit, surfaces }: Host,
         level: Level,
     ) -> Self {
         let (splatting, image) = (&scene.splatting, &scene.image);
-        let grid = volume.grid();
         let kernel = Kernel::new(splatting.radius, splatting.falloff);
         let from_pixels = view.footprint.footprint_from_pixels;
         let (right, down) = (from_pixels.x_axis, from_pixels.y_axis);
@@ -120,20 +131,22 @@ impl<'a> Frame<'a> {
             threshold: (splatting.culling && can_hide).then_some(threshold as f32),
             first_hit: first_hit.map(|opacity| opacity as f32),
         };
-        let overlaps = count_overlaps(level, bricks, &view);
+        let (bricks, overlaps) = match &voxels {
+            Voxels::Whole { bricks, .. } => (bricks.len(), count_overlaps(level, bricks, &view)),
+            // Every chunk counts its own.
+            Voxels::Streamed(_) => (0, Overlaps { slabs: view.slabs_of(grid), ..Overlaps::default() }),
+        };
         let covered = view.slabs.covered(means::covered(&view, grid, splatting));
         let Window { slabs, region } = window.with_lead(splatting.compositing, Classification::Before);
         let projection = Projection::new(view, splatting.order, &slabs);
         Self {
-            volume,
-            channels: channels(volume, transfer).collect(),
-            bricks,
-            materials,
+            grid: *grid,
+            voxels,
             splatter,
             shader: Shader::new(&scene.shading, splatting.compositing),
             compositor,
             rays: RayMode::new(scene, &view, grid, surfaces),
-            drawn: Drawn::new(bricks.len(), &view),
+            drawn: Drawn::new(bricks, &view),
             is_each,
             counted: covered.map_or(i32::MIN..i32::MIN, |slabs| projection.sheets_of(&slabs)),
             touched: projection.sheets_of(&overlaps.slabs),
@@ -149,7 +162,10 @@ impl<'a> Frame<'a> {
 
     /// Draws all tiles.
     pub(super) fn draw(&self, level: Level) -> Drawing {
-        let placed = bin::place(self.bricks, &self.projection, self.support);
+        let placed = match &self.voxels {
+            Voxels::Whole { bricks, .. } => bin::place(bricks, &self.projection, self.support),
+            Voxels::Streamed(stream) => stream.placed(),
+        };
         let has_hits = self.compositor.first_hit.is_some();
         let outputs = Outputs { has_hits, has_extremes: false };
         let (content, first_hits, tally) = draw_tiles(
@@ -160,13 +176,17 @@ impl<'a> Frame<'a> {
             |walk, origin, bricks| dispatch!(level, simd => self.draw_tile(simd, walk, origin, &placed, bricks)),
         );
         let [columns, rows] = tile_grid(self.projection.view.size);
+        let overlaps = match &self.voxels {
+            Voxels::Whole { .. } => self.overlaps.clone(),
+            Voxels::Streamed(stream) => stream.overlaps(),
+        };
         // There are no sheets where voxels are composited one by one.
         let sheets = if self.is_each { 0 } else { self.touched.len() as u64 };
         let counts = Counts {
-            voxels_total: self.volume.values().len() as u64,
-            voxels_in_range: self.overlaps.voxels,
+            voxels_total: self.grid.dims.to_array().map(u64::from).iter().product(),
+            voxels_in_range: overlaps.voxels,
             voxels_shaded: tally.voxels_shaded,
-            sections_total: self.overlaps.sections,
+            sections_total: overlaps.sections,
             sections_rasterized: tally.sections,
             sheets,
             tiles_total: u64::from(columns * rows) * sheets,
@@ -175,6 +195,26 @@ impl<'a> Frame<'a> {
             ..Counts::default()
         };
         Drawing { content, counts, first_hits }
+    }
+
+    /// The number of channels whose voxels are drawn as one (SPEC §10).
+    pub(super) fn channels(&self) -> usize {
+        match &self.voxels {
+            Voxels::Whole { channels, .. } => channels.len(),
+            Voxels::Streamed(_) => 1,
+        }
+    }
+
+    /// The material of a voxel in a channel, or in a chunk of a store.
+    pub(super) fn material(&self, chunk: Option<&Chunk>, channel: usize, voxel: UVec3) -> Material {
+        match (&self.voxels, chunk) {
+            (Voxels::Whole { channels, .. }, _) => {
+                let (volume, transfer) = channels[channel];
+                Material::of(volume, transfer, voxel)
+            }
+            (Voxels::Streamed(stream), Some(chunk)) => stream.material(chunk, voxel),
+            (Voxels::Streamed(_), None) => Material::default(),
+        }
     }
 
     /// Whether a part of the image is drawn.
@@ -196,7 +236,7 @@ impl<'a> Frame<'a> {
         let pixels = resolve::tile(self.resolver.as_ref(), buffers);
         let first_hits = match self.compositor.first_hit {
             None => Vec::new(),
-            Some(_) => first_hit::depths(buffers, rays, &self.rays.rays, origin, self.volume.grid().unit()),
+            Some(_) => first_hit::depths(buffers, rays, &self.rays.rays, origin, self.grid.unit()),
         };
         Tile { pixels, extremes: Vec::new(), first_hits, tally }
     }

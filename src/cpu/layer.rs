@@ -6,7 +6,7 @@ use fearless_simd::Level;
 
 use super::after;
 use super::after::Coefficients;
-use super::frame::{Drawing, Frame, Host};
+use super::frame::{Drawing, Frame, Host, Voxels};
 use super::material::Materials;
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
@@ -70,8 +70,9 @@ impl Layer {
         let Self { volume, transfer, list } = self;
         match list {
             List::Before(bricks, materials) => {
-                let bricks = (bricks.bricks(), &*materials);
-                Frame::new(volume, transfer, bricks, scene, view, host, level).draw(level)
+                let channels = channels(volume, transfer).collect();
+                let voxels = Voxels::Whole { channels, bricks: bricks.bricks(), materials };
+                Frame::new(volume.grid(), voxels, scene, view, host, level).draw(level)
             }
             List::After(coefficients) => {
                 for (of, coefficients) in channels(volume, transfer).zip(&mut *coefficients) {

@@ -39,6 +39,7 @@ mod shade;
 mod sheets;
 mod simd;
 mod splat;
+mod stream;
 mod support;
 mod tile;
 mod vector;
@@ -66,6 +67,7 @@ use cut::Surfaces;
 use frame::{Drawing, Host};
 use layer::Layer;
 pub use simd::Simd;
+pub use stream::{StreamError, StreamRenderer};
 
 /// A view of a volume, drawn on the CPU.
 #[derive(Clone, Debug)]

@@ -2,8 +2,10 @@
 //! is tested for being hidden there, shaded, and drawn into all the sheets that its kernel reaches; then that sheet is composited. Where voxels
 //! are composited one by one there is one sheet, composited after each of them.
 
+use std::cmp::Reverse;
 use std::iter::Peekable;
 use std::ops::Range;
+use std::sync::Arc;
 
 use fearless_simd::prelude::*;
 use glam::UVec3;
@@ -12,7 +14,7 @@ use super::bin::Placed;
 use super::count::{Tally, bits};
 use super::cull::{Boxes, OpenMask, Pixels};
 use super::cut::TileRays;
-use super::frame::Frame;
+use super::frame::{Frame, Voxels};
 use super::material::Material;
 use super::project::{FlatSections, Lens, Place, Projection};
 use super::queue::{Queue, Waiting};
@@ -20,16 +22,23 @@ use super::reached::Reached;
 use super::shade::Unshaded;
 use super::sheets::{Buffers, COLUMNS, RING, ROWS, Ring, SECTIONS, slot_of};
 use super::splat::{LocalFootprint, Splat};
+use super::stream::{Chunk, Stream};
 use super::vector::LANES;
 use crate::lists::brick;
-use crate::lists::brick::BRICK_VOXELS;
+use crate::lists::brick::{BRICK_VOXELS, Brick};
 
 /// A brick that has arrived.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Arrived {
-    brick: u32,
+    /// The chunk whose brick it is, if voxels come from a store; nothing after its last sheet.
+    chunk: Option<Arc<Chunk>>,
+    /// Its number in the list of bricks, or the chunk's.
+    number: u32,
+    brick: Brick,
     place: Place,
     half_box: [f32; 2],
+    /// The sheet behind its last one.
+    end: i32,
 }
 
 /// The state with which a thread draws one tile after another.
@@ -42,6 +51,8 @@ pub(super) struct TileWalk<'a> {
     ring: Ring,
     reached: Reached,
     buffers: Buffers,
+    /// The bricks of a store's chunks that have been read but not arrived, the next one last.
+    read: Vec<(Arc<Chunk>, u32)>,
     arrived: Vec<Arrived>,
     /// What has been drawn of them, as [`Drawn`](super::count::Drawn) records it.
     marks: Vec<u64>,
@@ -63,6 +74,7 @@ impl<'a> TileWalk<'a> {
             ring: Ring::new(),
             reached: Reached::new(),
             buffers: Buffers::new(),
+            read: Vec::new(),
             arrived: Vec::new(),
             marks: Vec::new(),
             queue: Queue::default(),
@@ -85,27 +97,27 @@ impl<'a> TileWalk<'a> {
         // A part of an image (SPEC §11) needs the sheets that count even where only other parts have bricks.
         let counted = Some(self.frame.counted.start).filter(|_| self.frame.is_part() && !self.frame.counted.is_empty());
         let first = bricks.peek().map(|placed| placed.first).or(counted);
-        self.reset(origin, first.unwrap_or(0));
+        self.reset(origin);
         if let Some(first) = first {
             self.walk(simd, first, &mut bricks);
         }
-        self.count();
+        self.leave(i32::MAX);
         (&self.buffers, &self.rays, self.tally)
     }
 
-    /// Clears the state for a tile whose walk begins with this sheet.
-    fn reset(&mut self, origin: [usize; 2], sheet: i32) {
-        let Projection { view, direction, .. } = &self.frame.projection;
-        let [width, height] = view.size.map(|side| side as usize);
+    /// Clears the state for a tile.
+    fn reset(&mut self, origin: [usize; 2]) {
+        let [width, height] = self.frame.projection.view.size.map(|side| side as usize);
         self.origin = origin;
         self.open = OpenMask::new((width - origin[0]).min(COLUMNS), (height - origin[1]).min(ROWS));
         self.open.close_outside(&self.frame.region, origin);
-        self.rays = self.frame.rays.of_tile(origin, direction * sheet);
+        self.rays = self.frame.rays.of_tile(origin);
         if let (Some(shown), Some(_)) = (&self.rays.shown, self.frame.compositor.threshold) {
             self.open.close_empty(shown);
         }
         self.ring.clear();
         self.buffers.clear();
+        self.read.clear();
         self.arrived.clear();
         self.marks.clear();
         self.queue.clear();
@@ -120,8 +132,19 @@ impl<'a> TileWalk<'a> {
         let Range { start, end } = self.frame.counted.clone();
         let mut sheet = if start < end { first.min(start) } else { first };
         loop {
-            while let Some(placed) = bricks.next_if(|placed| placed.first <= sheet) {
-                self.tally.bricks_visited += u64::from(self.arrive(simd, placed, sheet));
+            match self.frame.voxels {
+                Voxels::Whole { .. } => {
+                    while let Some(placed) = bricks.next_if(|placed| placed.first <= sheet) {
+                        self.tally.bricks_visited += u64::from(self.arrive(simd, None, placed, sheet));
+                    }
+                }
+                Voxels::Streamed(stream) => {
+                    self.read_chunks(stream, bricks, sheet);
+                    while let Some((chunk, at)) = self.read.pop_if(|(chunk, at)| chunk.placed(*at).first <= sheet) {
+                        let is_seen = self.arrive(simd, Some(&chunk), chunk.placed(at), sheet);
+                        self.tally.bricks_visited += u64::from(is_seen);
+                    }
+                }
             }
             self.start(simd, sheet);
             if !self.frame.is_each {
@@ -132,11 +155,16 @@ impl<'a> TileWalk<'a> {
             }
             let is_waiting = self.pending != 0 || !self.queue.is_empty();
             let is_idle = !is_waiting && self.ring.is_empty() && self.buffers.kept == 0 && sheet + 1 >= end;
-            sheet = match bricks.peek() {
-                Some(placed) if is_idle => placed.first.max(sheet + 1),
+            let read = self.read.last().map(|(chunk, at)| chunk.placed(*at).first);
+            let next = bricks.peek().map(|placed| placed.first).into_iter().chain(read).min();
+            sheet = match next {
+                Some(first) if is_idle => first.max(sheet + 1),
                 None if is_idle => break,
                 _ => sheet + 1,
             };
+            if matches!(self.frame.voxels, Voxels::Streamed(_)) && sheet % RING as i32 == 0 {
+                self.leave(sheet);
+            }
         }
     }
 
@@ -162,35 +190,72 @@ impl<'a> TileWalk<'a> {
         );
     }
 
-    /// Adds what was drawn to the counts.
-    fn count(&mut self) {
+    /// Reads the chunks that may be seen from a sheet on.
+    fn read_chunks<'b>(
+        &mut self,
+        stream: &Arc<Stream>,
+        chunks: &mut Peekable<impl Iterator<Item = &'b Placed>>,
+        sheet: i32,
+    ) {
+        let mut wanted = Vec::new();
+        while let Some(placed) = chunks.next_if(|placed| placed.first <= sheet) {
+            if self.sees_brick(placed) {
+                stream.request(placed.brick);
+                wanted.push(placed.brick);
+            }
+        }
+        if wanted.is_empty() {
+            return;
+        }
+        let tile = [self.origin[0] / COLUMNS, self.origin[1] / ROWS];
+        for chunk in wanted.into_iter().filter_map(|number| stream.chunk(number)) {
+            let of_tile = chunk.bricks_of(tile);
+            self.read.extend(of_tile.map(|at| (Arc::clone(&chunk), at)));
+        }
+        // The order of a volume in memory.
+        self.read.sort_unstable_by_key(|(chunk, at)| Reverse(chunk.order(*at)));
+    }
+
+    /// Adds what was drawn of bricks whose last sheet is before this one to the counts, and lets go of their chunks.
+    fn leave(&mut self, sheet: i32) {
         let Self { frame, arrived, marks, tally, .. } = self;
-        for (brick, marks) in arrived.iter().zip(marks.chunks(frame.drawn.masks)) {
-            let origin = brick::origin(&frame.bricks[brick.brick as usize]);
+        for (arrived, marks) in arrived.iter_mut().zip(marks.chunks_mut(frame.drawn.masks)) {
+            let Arrived { number, brick, place, end, .. } = *arrived;
+            if end > sheet || marks[0] == 0 && arrived.chunk.is_none() {
+                continue;
+            }
             let sheets = |slot| {
-                let place = frame.projection.of_voxel(brick.place, slot);
-                frame.projection.sheets(place, origin + brick::in_brick(slot)).len() as u64
+                let place = frame.projection.of_voxel(place, slot);
+                frame.projection.sheets(place, brick::origin(&brick) + brick::in_brick(slot)).len() as u64
             };
-            frame.drawn.add(brick.brick, marks, sheets, tally);
+            let chunk = arrived.chunk.take();
+            let drawn = chunk.as_ref().map_or(&frame.drawn, |chunk| &**chunk.drawn());
+            drawn.add(number, marks, sheets, tally);
+            marks.fill(0);
         }
     }
 
     /// Lets a brick's voxels wait for their first sheets, unless the brick is hidden; whether it is not.
-    fn arrive<S: Simd>(&mut self, simd: S, placed: &Placed, sheet: i32) -> bool {
-        let projection = &self.frame.projection;
-        let brick = &self.frame.bricks[placed.brick as usize];
+    fn arrive<S: Simd>(&mut self, simd: S, chunk: Option<&Arc<Chunk>>, placed: &Placed, sheet: i32) -> bool {
         if !self.sees_brick(placed) {
             return false;
         }
-        let place = projection.of_brick(brick);
+        let Frame { projection, voxels, .. } = self.frame;
+        let brick = match (voxels, chunk) {
+            (_, Some(chunk)) => *chunk.brick(placed.brick),
+            (Voxels::Whole { bricks, .. }, None) => bricks[placed.brick as usize],
+            (Voxels::Streamed(_), None) => return false,
+        };
+        let place = projection.of_brick(&brick);
         let number = self.arrived.len() as u32;
-        self.arrived.push(Arrived { brick: placed.brick, place, half_box: placed.half_box });
+        let Placed { half_box, end, .. } = *placed;
+        self.arrived.push(Arrived { chunk: chunk.cloned(), number: placed.brick, brick, place, half_box, end });
         self.marks.resize(self.arrived.len() * self.frame.drawn.masks, 0);
         simd.vectorize(
             #[cfg_attr(not(debug_assertions), inline(always))]
             || {
-                let first_sheets = projection.first_sheets(brick, place);
-                let waiting = Waiting { brick: number, voxels: brick::present(brick) };
+                let first_sheets = projection.first_sheets(&brick, place);
+                let waiting = Waiting { brick: number, voxels: brick::present(&brick) };
                 self.queue.add(simd, waiting, &first_sheets, sheet);
             },
         );
@@ -228,9 +293,8 @@ impl<'a> TileWalk<'a> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn start_voxels<S: Simd>(&mut self, simd: S, waiting: &Waiting, sheet: i32, batch: &mut Batch<'a>) {
         let frame = self.frame;
-        let Arrived { brick: number, place: brick_place, half_box } = self.arrived[waiting.brick as usize];
-        let brick = &frame.bricks[number as usize];
-        let mut materials = None;
+        let Arrived { number, brick, place: brick_place, half_box, .. } = self.arrived[waiting.brick as usize];
+        let mut kept = None;
         let mut seen = 0;
         for first in (0..BRICK_VOXELS as usize).step_by(LANES) {
             let lanes = waiting.voxels >> first & 0xff;
@@ -246,10 +310,14 @@ impl<'a> TileWalk<'a> {
                 let Some(pixels) = boxes.pixels(lane).filter(|pixels| self.open.sees(pixels)) else { continue };
                 let slot = (first + lane) as u32;
                 seen |= 1 << slot;
-                let materials =
-                    *materials.get_or_insert_with(|| frame.materials.of_brick(number, &frame.channels, brick));
-                let voxel = brick::origin(brick) + brick::in_brick(slot);
-                batch.materials[batch.count] = materials.map(|of| frame.materials.of_slot(of, slot)).ok_or(voxel);
+                let voxel = brick::origin(&brick) + brick::in_brick(slot);
+                batch.materials[batch.count] = match &frame.voxels {
+                    Voxels::Whole { channels, materials, .. } => {
+                        let kept = *kept.get_or_insert_with(|| materials.of_brick(number, channels, &brick));
+                        kept.map(|of| materials.of_slot(of, slot)).ok_or(voxel)
+                    }
+                    Voxels::Streamed(_) => Err(voxel),
+                };
                 let along_ray = match &flat {
                     Some(flat) => batch.flat(flat, lane),
                     None => batch.lens(frame, frame.projection.of_voxel(brick_place, slot), voxel, sheet),
@@ -266,16 +334,15 @@ impl<'a> TileWalk<'a> {
 
     /// Voxels that are composited one by one, sorted by depth, equal ones by their position in memory.
     fn sorted_by_depth(&self, waiting: &[Waiting]) -> Vec<Waiting> {
-        let Frame { projection, volume, bricks, .. } = self.frame;
-        let grid = volume.grid();
+        let Frame { projection, grid, .. } = self.frame;
         let singles = |waiting: &Waiting| {
             let brick = waiting.brick;
             bits(waiting.voxels).map(move |slot| Waiting { brick, voxels: 1 << slot })
         };
         let mut voxels: Vec<Waiting> = waiting.iter().flat_map(singles).collect();
         voxels.sort_by_cached_key(|waiting| {
-            let brick = &bricks[self.arrived[waiting.brick as usize].brick as usize];
-            let voxel = brick::origin(brick) + brick::in_brick(waiting.voxels.trailing_zeros());
+            let brick = self.arrived[waiting.brick as usize].brick;
+            let voxel = brick::origin(&brick) + brick::in_brick(waiting.voxels.trailing_zeros());
             (projection.depth_key(grid, voxel), grid.index_of(voxel))
         });
         if projection.direction < 0 {
@@ -291,12 +358,16 @@ impl<'a> TileWalk<'a> {
             || {
                 let count = std::mem::take(&mut batch.count);
                 let mut amounts = [[0.0; LANES]; 4];
-                for (channel, &(volume, transfer)) in self.frame.channels.iter().enumerate() {
+                for channel in 0..self.frame.channels() {
                     // All at once, so that the memory is waited for once.
                     for lane in 0..count {
                         match batch.materials[lane] {
                             Ok(materials) => batch.unshaded.set_material(lane, &materials[channel]),
-                            Err(voxel) => batch.unshaded.set_material(lane, &Material::of(volume, transfer, voxel)),
+                            Err(voxel) => {
+                                let arrived = batch.splats[lane].voxel[0] as usize;
+                                let chunk = self.arrived[arrived].chunk.as_deref();
+                                batch.unshaded.set_material(lane, &self.frame.material(chunk, channel, voxel));
+                            }
                         }
                     }
                     let of_channel = self.frame.shader.shade(simd, &batch.unshaded);

@@ -233,6 +233,7 @@ impl GpuHeadless {
             width,
             height,
             counts,
+            store: None,
             rasterizer: view.rasterizer().unwrap_or_default().to_owned(),
             stages_ms,
             gpu_bytes: view.gpu_bytes() + target_bytes,

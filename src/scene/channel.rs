@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use glam::DVec3;
 
 use super::{Scene, TransferSettings, VolumeSource};
-use crate::appearance::{Preset, channel_color, one_of_several};
+use crate::appearance::{Preset, channel_color, channel_display, one_of_several};
 use crate::settings::transfer_function::TransferFunction;
-use crate::volume::{ChannelDisplay, Volume, builtin};
+use crate::volume::{Volume, builtin};
 
 /// A channel of a scene: a volume and its transfer function.
 #[derive(Clone, Debug, PartialEq)]
@@ -123,7 +123,7 @@ impl Scene {
         if has_color || settings.preset == Some(Preset::Fusion) {
             return settings.resolve_by(channel, chosen);
         }
-        let own = channel.display().and_then(ChannelDisplay::color);
+        let own = channel.display().and_then(channel_display::color);
         let color = own.unwrap_or_else(|| channel_color(number, count));
         TransferSettings { color: Some(color), ..settings.clone() }.resolve_by(channel, chosen)
     }

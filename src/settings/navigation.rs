@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec2};
 
+use crate::error::setting::scaled;
 use crate::settings::camera::{Camera, Projection};
 use crate::volume::Grid;
 
@@ -14,13 +15,18 @@ const HEIGHTS: [f64; 2] = [1e-3, 1e2];
 /// Turns the camera around its centre so that what is in front follows a pointer that moves right and down by some degrees: first about
 /// `up` (azimuth), then up or down (elevation, clamped). `up` does not change.
 pub fn orbit(camera: &mut Camera, degrees: DVec2) {
-    let (up, w) = (camera.up.normalize(), camera.direction.normalize());
+    let (up, w) = (scaled(camera.up).normalize(), scaled(camera.direction).normalize());
     let horizontal = w.reject_from_normalized(up).normalize();
     let azimuth = DMat3::from_axis_angle(up, -degrees.x.to_radians());
-    let elevation = w.dot(up).clamp(-1.0, 1.0).asin() - degrees.y.to_radians();
-    let limit = MAX_ELEVATION.to_radians();
-    let (sine, cosine) = elevation.clamp(-limit, limit).sin_cos();
-    camera.direction = azimuth * horizontal * cosine + up * sine;
+    let elevation = (elevation(camera) + degrees.y).clamp(-MAX_ELEVATION, MAX_ELEVATION);
+    let (sine, cosine) = elevation.to_radians().sin_cos();
+    camera.direction = azimuth * horizontal * cosine - up * sine;
+}
+
+/// The degrees of the eye over the plane through the camera's centre that is perpendicular to `up`.
+pub fn elevation(camera: &Camera) -> f64 {
+    let (up, w) = (scaled(camera.up).normalize(), scaled(camera.direction).normalize());
+    -w.dot(up).clamp(-1.0, 1.0).asin().to_degrees()
 }
 
 /// The height of the image in world units, at the depth of the camera's centre.
@@ -106,6 +112,16 @@ mod tests {
             orbit(&mut camera, DVec2::new(0.0, -sign * MAX_ELEVATION));
             assert!(camera.direction.abs_diff_eq(DVec3::new(0.5_f64.sqrt(), 0.5_f64.sqrt(), 0.0), 1e-9));
         }
+    }
+
+    #[test]
+    fn an_eye_above_looks_down() {
+        let camera = Camera { direction: DVec3::new(1.0, 0.0, -1e200), up: DVec3::Z * 1e-200, ..Camera::default() };
+        assert!((elevation(&camera) - 90.0).abs() < 1e-9);
+        let mut camera = Camera { direction: DVec3::new(1e200, 0.0, -1e200), ..camera };
+        assert!((elevation(&camera) - 45.0).abs() < 1e-9);
+        orbit(&mut camera, DVec2::new(0.0, 15.0));
+        assert!((elevation(&camera) - 60.0).abs() < 1e-9);
     }
 
     #[test]

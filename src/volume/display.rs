@@ -3,7 +3,6 @@
 use glam::DVec3;
 
 use super::Volume;
-use crate::settings::transfer_function::Ramp;
 
 /// A channel's colours and its window, as far as its file states them.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -13,20 +12,6 @@ pub struct ChannelDisplay {
     pub colors: Vec<DVec3>,
     /// The values that are shown darkest and brightest.
     pub window: Option<[f64; 2]>,
-}
-
-impl ChannelDisplay {
-    /// The colours over values; `None` without any. Of several colours without a window it is the last one.
-    pub(crate) fn color(&self) -> Option<Ramp<DVec3>> {
-        let last = *self.colors.last()?;
-        let spread = |[low, high]: [f64; 2]| {
-            let steps = (self.colors.len() - 1) as f64;
-            let place = |at: usize| low + (high - low) * (at as f64 / steps);
-            Ramp::new((0..).map(place).zip(self.colors.iter().copied()).collect()).ok()
-        };
-        let ramp = self.window.filter(|_| self.colors.len() > 1).and_then(spread);
-        Some(ramp.unwrap_or_else(|| Ramp::through(vec![(0.0, last)])))
-    }
 }
 
 impl Volume {

@@ -33,9 +33,9 @@ pub struct Grid {
     /// The distance between neighbouring voxels along x, y and z, in world units.
     pub spacing: DVec3,
     /// The spacing of the volume's finest level, if this is another one.
-    finest: Option<DVec3>,
+    pub(crate) finest: Option<DVec3>,
     /// The place of the grid's centre in the world.
-    place: DVec3,
+    pub(crate) place: DVec3,
 }
 
 impl Grid {

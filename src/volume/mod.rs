@@ -104,6 +104,13 @@ pub enum VolumeError {
     },
 }
 
+impl VolumeError {
+    /// The error of a file that could not be read, for [`Store`]s of other programs.
+    pub fn io(path: impl Into<PathBuf>, source: std::io::Error) -> Self {
+        Self::Io { path: path.into(), source }
+    }
+}
+
 /// How a file stores a volume.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Encoding {
@@ -185,14 +192,18 @@ impl Volume {
         if holes == u64::from(count) {
             return Err(invalid("data", "only NaN or infinite samples".to_owned(), "at least one finite sample"));
         }
-        let label_names = BTreeMap::new();
-        Ok(Self {
+        Ok(Self { holes, ..Self::piece(grid, values) })
+    }
+
+    /// A piece of a volume, with values that are finite or NaN already.
+    pub(crate) fn piece(grid: Grid, values: Vec<f32>) -> Self {
+        Self {
             grid,
             values,
-            holes,
+            holes: 0,
             colors: None,
             labels: None,
-            label_names,
+            label_names: BTreeMap::new(),
             orientation: None,
             unit: None,
             encoding: None,
@@ -203,7 +214,7 @@ impl Volume {
             levels: Vec::new(),
             level: 0,
             coefficients: KeptCoefficients::default(),
-        })
+        }
     }
 
     /// The same values with another spacing (world units between neighbouring voxels; of a coarser level, those of the finest).

@@ -13,6 +13,7 @@ mod modes;
 mod picks;
 mod regions;
 mod scenes;
+mod streams;
 mod surfaces;
 
 use glam::{DVec3, UVec3};

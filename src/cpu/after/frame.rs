@@ -150,9 +150,9 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// The rays of a tile's pixels among slabs counted from `base`, and the pixels' directions to the eye where these differ.
-    pub(super) fn rays_of_tile(&self, origin: [usize; 2], base: i32) -> (TileRays, Vec<[[f32; COLUMNS]; 3]>) {
-        let mut rays = self.rays.of_tile(origin, base);
+    /// The rays of a tile's pixels among slabs, and the pixels' directions to the eye where these differ.
+    pub(super) fn rays_of_tile(&self, origin: [usize; 2]) -> (TileRays, Vec<[[f32; COLUMNS]; 3]>) {
+        let mut rays = self.rays.of_tile(origin);
         let length = |ray: &crate::cpu::ray::PixelRay| (ray.length() / ray.slabs_per_depth()) as f32;
         let is_perspective = self.placement.view.perspective.is_some();
         let mut weights = vec![[length(&self.rays.rays.of(origin)); COLUMNS]; ROWS];

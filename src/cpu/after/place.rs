@@ -113,6 +113,7 @@ impl Placement {
                 brick: number,
                 channel: 0,
                 first: slabs.start,
+                end: slabs.end,
                 half_box: [0.0; 2],
                 middle: [0.0; 2],
                 half: [0.0; 2],

@@ -102,7 +102,7 @@ impl<'a> TileWalk<'a> {
         self.origin = origin;
         self.open = OpenMask::new((width - origin[0]).min(COLUMNS), (height - origin[1]).min(ROWS));
         self.open.close_outside(&self.frame.region, origin);
-        (self.rays, self.to_eye) = self.frame.rays_of_tile(origin, slab);
+        (self.rays, self.to_eye) = self.frame.rays_of_tile(origin);
         if let (Some(shown), Some(_)) = (&self.rays.shown, self.frame.compositor.threshold) {
             self.open.close_empty(shown);
         }

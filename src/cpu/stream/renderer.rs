@@ -1,0 +1,177 @@
+//! A view of a store.
+
+use std::sync::Arc;
+
+use fearless_simd::Level;
+use web_time::Instant;
+
+use super::Stream;
+use super::pool::{Pool, Reads};
+use super::source::Source;
+use crate::cpu::cut::Surfaces;
+use crate::cpu::frame::{Drawing, Frame, Host, Voxels};
+use crate::cpu::project::Projection;
+use crate::cpu::simd::{self, Simd};
+use crate::cpu::{check, milliseconds_since};
+use crate::error::RenderError;
+use crate::error::setting::SettingError;
+use crate::geometry::view_geometry::ViewGeometry;
+use crate::image::Image;
+use crate::kernel::Kernel;
+use crate::rendering::{Backend, Rendering};
+use crate::scene::Scene;
+use crate::scene::names::{CLASSIFICATIONS, METHODS, name_of};
+use crate::settings::splatting::{Classification, Method};
+use crate::settings::transfer_function::TransferFunction;
+use crate::settings::window::{Region, Window};
+use crate::stats::{Stats, StoreCounts};
+use crate::volume::{Store, StoreLevel, Volume, VolumeError};
+
+/// Why a store could not be drawn.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StreamError {
+    /// The store could not be read.
+    #[error(transparent)]
+    Volume(#[from] VolumeError),
+    /// The scene cannot be drawn.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+}
+
+impl From<SettingError> for StreamError {
+    fn from(error: SettingError) -> Self {
+        Self::Render(error.into())
+    }
+}
+
+/// A view of a store that is drawn on the CPU without being in memory as a whole.
+#[derive(Clone, Debug)]
+pub struct StreamRenderer {
+    store: Arc<dyn Store>,
+    level: usize,
+    scene: Scene,
+    transfer: TransferFunction,
+    /// The bytes that chunks may hold.
+    memory: usize,
+    simd: Simd,
+    vectors: Level,
+}
+
+impl StreamRenderer {
+    /// Prepares a level of a store to be drawn in a scene, whose own volume is ignored. What the scene leaves open, such as the transfer function and
+    /// the camera's frame, is chosen for a sample of the values: a coarser level, or a subset of the voxels, with the same box. Chunks may hold
+    /// `memory` bytes together, beyond which those are dropped and read again that no tile is drawn from.
+    ///
+    /// # Errors
+    /// If the store has no such level, the scene needs what a store lacks, such as labels, or a setting is not supported: classification after
+    /// splatting, methods other than image-aligned.
+    pub fn new(
+        store: Arc<dyn Store>,
+        level: usize,
+        sample: &Volume,
+        scene: &Scene,
+        memory: u64,
+    ) -> Result<Self, StreamError> {
+        scene.check()?;
+        scene.check_volume(sample)?;
+        check(scene)?;
+        let levels = store.levels().len();
+        if level >= levels {
+            return Err(SettingError::new("volume.level", level.to_string(), format!("0 to {}", levels - 1)).into());
+        }
+        let (simd, vectors) = simd::chosen()?;
+        let transfer = scene.resolve(sample);
+        let scene = scene.framed(sample, &transfer);
+        check_streamed(&scene)?;
+        Ok(Self { store, level, scene, transfer, memory: usize::try_from(memory).unwrap_or(usize::MAX), simd, vectors })
+    }
+
+    /// The settings, with what the sample decided.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Draws a frame on the threads of the current rayon pool, while as many others read. Neither their number nor the memory changes a bit of the
+    /// image.
+    ///
+    /// # Errors
+    /// If the store cannot be read, or the scene exceeds a limit, such as the number of slabs.
+    pub fn draw(&self) -> Result<Rendering, StreamError> {
+        let start = Instant::now();
+        let (scene, grid) = (&self.scene, self.store.levels()[self.level].grid);
+        let size = [scene.image.width, scene.image.height];
+        let view = ViewGeometry::new(&grid, &scene.camera, &scene.splatting, size).map_err(RenderError::from)?;
+        let window = Window { slabs: Window::ALL_SLABS, region: Region::whole(size) };
+        let stream = Arc::new(self.stream(view, &window)?);
+        let host = Host { window, is_part: false, first_hit: None, surfaces: None::<Surfaces> };
+        let frame = Frame::new(&grid, Voxels::Streamed(&stream), scene, view, host, self.vectors);
+        let Drawing { content, counts, .. } = frame.draw(self.vectors);
+        if let Some(failure) = stream.pool.take_failure() {
+            return Err(failure.into());
+        }
+        let Reads { chunks, bytes, most_held, .. } = stream.pool.reads();
+        let StoreLevel { chunk, .. } = self.store.levels()[self.level];
+        let per_axis = (0..3).map(|axis| u64::from(grid.dims[axis].div_ceil(chunk[axis])));
+        let image = Image { width: size[0], height: size[1], pixels: content.colors };
+        let stats = Stats {
+            adapter: "CPU".to_owned(),
+            driver: self.simd.name().to_owned(),
+            backend: Backend::Cpu.name().to_owned(),
+            api: "none".to_owned(),
+            rasterizer: Backend::Cpu.name().to_owned(),
+            width: size[0],
+            height: size[1],
+            counts,
+            store: Some(StoreCounts {
+                level: self.level as u64,
+                chunks_total: per_axis.product(),
+                chunks_read: chunks,
+                bytes_read: bytes,
+                chunk_bytes: most_held,
+            }),
+            frame_ms: milliseconds_since(start),
+            ..Stats::default()
+        };
+        Ok(Rendering { image, stats })
+    }
+
+    /// The store in a view.
+    fn stream(&self, view: ViewGeometry, window: &Window) -> Result<Stream, SettingError> {
+        let Self { store, level, scene, transfer, .. } = self;
+        let (splatting, grid) = (&scene.splatting, store.levels()[*level].grid);
+        let slabs = window.with_lead(splatting.compositing, Classification::Before).slabs;
+        let threads = rayon::current_num_threads();
+        let readers = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let readers =
+            readers.map_err(|error| SettingError::new("threads", error.to_string(), "threads that can be started"))?;
+        Ok(Stream {
+            source: Source {
+                store: Arc::clone(store),
+                level: *level,
+                grid,
+                side: Source::side(store.levels()[*level].chunk, &grid),
+                transfer: transfer.clone(),
+                clipped: scene.clip.voxels(&grid, splatting.radius),
+                projection: Projection::new(view, splatting.order, &slabs),
+                support: Kernel::new(splatting.radius, splatting.falloff).support(),
+            },
+            pool: Pool::new(self.memory),
+            readers,
+        })
+    }
+}
+
+/// Checks that a scene whose classification is known can be streamed.
+fn check_streamed(scene: &Scene) -> Result<(), SettingError> {
+    let splatting = &scene.splatting;
+    if splatting.classification != Classification::Before {
+        let found = format!("{:?} for a volume that is streamed", name_of(CLASSIFICATIONS, splatting.classification));
+        return Err(SettingError::new("splatting.classification", found, "\"before\", or more memory"));
+    }
+    if splatting.method != Method::ImageAligned {
+        let found = format!("{:?} for a volume that is streamed", name_of(METHODS, splatting.method));
+        return Err(SettingError::new("splatting.method", found, "\"image-aligned\", or more memory"));
+    }
+    Ok(())
+}

@@ -1,0 +1,136 @@
+//! What a view draws of a store: its chunks, and how their voxels are classified and seen.
+
+use std::sync::Arc;
+
+use glam::UVec3;
+
+use crate::cpu::bin::{Placed, place_box};
+use crate::cpu::project::Projection;
+use crate::lists::brick::SIDE;
+use crate::settings::clip::ClippedVoxels;
+use crate::settings::transfer_function::TransferFunction;
+use crate::volume::{Grid, Store, Volume, VolumeError};
+
+/// Chunks along an axis have at least so many voxels: smaller ones of the store are read together.
+const LEAST_SIDE: u32 = 32;
+
+/// A level of a store in a view.
+#[derive(Debug)]
+pub(super) struct Source {
+    pub(super) store: Arc<dyn Store>,
+    pub(super) level: usize,
+    pub(super) grid: Grid,
+    /// The voxels of a chunk that is drawn: some of the store's, in whole bricks.
+    pub(super) side: UVec3,
+    pub(super) transfer: TransferFunction,
+    /// The voxels that clip planes leave.
+    pub(super) clipped: ClippedVoxels,
+    pub(super) projection: Projection,
+    /// The radius of footprints in pixels' terms, [`Kernel::support`](crate::kernel::Kernel::support).
+    pub(super) support: f64,
+}
+
+impl Source {
+    /// The voxels of a chunk that is drawn, for the store's.
+    pub(super) fn side(chunk: UVec3, grid: &Grid) -> UVec3 {
+        let of = |chunk: u32, count: u32| {
+            let joined = chunk * LEAST_SIDE.div_ceil(chunk);
+            // Bricks of neighbouring chunks must not share voxels.
+            joined.next_multiple_of(SIDE).min(count.next_multiple_of(SIDE))
+        };
+        UVec3::new(of(chunk.x, grid.dims.x), of(chunk.y, grid.dims.y), of(chunk.z, grid.dims.z))
+    }
+
+    /// The number of chunks along each axis.
+    fn across(&self) -> UVec3 {
+        let Self { grid: Grid { dims, .. }, side, .. } = self;
+        UVec3::new(dims.x.div_ceil(side.x), dims.y.div_ceil(side.y), dims.z.div_ceil(side.z))
+    }
+
+    /// The number of the chunk that holds a voxel.
+    pub(super) fn number_of(&self, voxel: UVec3) -> u32 {
+        let (at, across) = (voxel / self.side, self.across());
+        at.x + across.x * (at.y + across.y * at.z)
+    }
+
+    /// The first voxel of a chunk, and its voxels along each axis.
+    pub(super) fn bounds(&self, number: u32) -> (UVec3, UVec3) {
+        let across = self.across();
+        let from =
+            self.side * UVec3::new(number % across.x, number / across.x % across.y, number / (across.x * across.y));
+        (from, self.side.min(self.grid.dims - from))
+    }
+
+    /// All chunks that may be on the image, by first sheet.
+    pub(super) fn placed(&self) -> Vec<Placed> {
+        let place = |number| {
+            let (from, dims) = self.bounds(number);
+            let half = (dims.as_dvec3() - 1.0) / 2.0;
+            let placed = place_box(number, (from.as_dvec3() + half, half), &self.projection, self.support)?;
+            // Rounding must not let one of its bricks come before it, stay after it, or be seen where it is not.
+            let half = placed.half.map(|half| half * (1.0 + 8.0 * f32::EPSILON) + 0.01);
+            Some(Placed { first: placed.first - 1, end: placed.end + 1, half, ..placed })
+        };
+        let mut placed: Vec<Placed> = (0..self.across().element_product()).filter_map(place).collect();
+        placed.sort_unstable_by_key(|placed| (placed.first, placed.brick));
+        placed
+    }
+
+    /// The store's chunks that share voxels with a chunk that is drawn.
+    pub(super) fn stored(&self, number: u32) -> impl Iterator<Item = UVec3> {
+        let (from, dims) = self.bounds(number);
+        let chunk = self.store.levels()[self.level].chunk;
+        let (first, last) = (from / chunk, (from + dims - 1) / chunk);
+        let columns = move |y, z| (first.x..=last.x).map(move |x| UVec3::new(x, y, z));
+        (first.z..=last.z).flat_map(move |z| (first.y..=last.y).flat_map(move |y| columns(y, z)))
+    }
+
+    /// Whether the store holds any voxel of a chunk.
+    ///
+    /// # Errors
+    /// If the store cannot be read.
+    pub(super) fn is_stored(&self, number: u32) -> Result<bool, VolumeError> {
+        for chunk in self.stored(number) {
+            if self.store.contains(self.level, chunk)? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Whether voxels may take part that the store does not hold.
+    pub(super) fn shows_fill(&self) -> bool {
+        let value = f64::from(self.store.fill());
+        let tables = self.transfer.tables(None);
+        value.is_finite() && tables.opacity.at(value) > 0.0 && tables.in_iso_range(value)
+    }
+
+    /// The values of a box of voxels, with holes as NaN; and the bytes read from the store.
+    ///
+    /// # Errors
+    /// If the store cannot be read.
+    pub(super) fn values(&self, from: UVec3, dims: UVec3) -> Result<(Vec<f32>, u64), VolumeError> {
+        let mut values = vec![0.0; dims.element_product() as usize];
+        let read = self.store.read(self.level, from, dims, &mut values)?;
+        values.iter_mut().filter(|value| !value.is_finite()).for_each(|value| *value = f32::NAN);
+        Ok((values, read))
+    }
+
+    /// A voxel with its neighbours along the axes, whose values `value` tells, as a volume; and the voxel's place there.
+    pub(super) fn around(&self, voxel: UVec3, mut value: impl FnMut(UVec3) -> f32) -> (Volume, UVec3) {
+        let low = voxel.saturating_sub(UVec3::ONE);
+        let dims = (voxel + 2).min(self.grid.dims) - low;
+        let grid = Grid { dims, ..self.grid };
+        let at = voxel - low;
+        let mut values = vec![f32::NAN; dims.element_product() as usize];
+        values[grid.index_of(at) as usize] = value(voxel);
+        for axis in [UVec3::X, UVec3::Y, UVec3::Z] {
+            for neighbour in [at.wrapping_sub(axis), at + axis] {
+                if neighbour.cmplt(dims).all() {
+                    values[grid.index_of(neighbour) as usize] = value(low + neighbour);
+                }
+            }
+        }
+        (Volume::piece(grid, values), at)
+    }
+}

@@ -1,0 +1,189 @@
+//! Stores whose chunks are read while they are drawn: the bytes of the volume in memory, from no more than can matter.
+
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex};
+
+use glam::{DVec3, UVec3};
+use sheetsplat::Scene;
+use sheetsplat::cpu::{CpuRenderer, StreamRenderer};
+use sheetsplat::scene::VolumeSource;
+use sheetsplat::stats::StoreCounts;
+use sheetsplat::volume::{Store, StoreLevel, Volume, VolumeError};
+
+/// A volume in memory as a store that notes what is read of it.
+#[derive(Debug)]
+struct MemoryStore {
+    volume: Volume,
+    levels: [StoreLevel; 1],
+    /// The first voxels of all boxes that were read.
+    read: Mutex<BTreeSet<[u32; 3]>>,
+    /// Chunks from this plane on cannot be read.
+    broken_from: Option<u32>,
+}
+
+impl MemoryStore {
+    fn new(volume: &Volume, chunk: UVec3) -> Self {
+        let levels = [StoreLevel { grid: *volume.grid(), chunk }];
+        Self { volume: volume.clone(), levels, read: Mutex::default(), broken_from: None }
+    }
+
+    fn value(&self, voxel: UVec3) -> f32 {
+        self.volume.value(voxel)
+    }
+}
+
+impl Store for MemoryStore {
+    fn levels(&self) -> &[StoreLevel] {
+        &self.levels
+    }
+
+    fn read(&self, level: usize, from: UVec3, dims: UVec3, values: &mut [f32]) -> Result<u64, VolumeError> {
+        assert_eq!((level, values.len()), (0, dims.element_product() as usize));
+        assert!((from + dims).cmple(self.volume.dims()).all(), "{from} {dims}");
+        if self.broken_from.is_some_and(|plane| from.z + dims.z > plane) {
+            let source = std::io::Error::other("the disk is gone");
+            return Err(VolumeError::io("store", source));
+        }
+        self.read.lock().unwrap().insert(from.to_array());
+        let voxels = (0..dims.z).flat_map(|z| (0..dims.y).flat_map(move |y| (0..dims.x).map(move |x| [x, y, z])));
+        for (value, at) in values.iter_mut().zip(voxels) {
+            *value = self.value(from + UVec3::from(at));
+        }
+        Ok(values.len() as u64)
+    }
+
+    /// A chunk in which all voxels are 0 is not held.
+    fn contains(&self, _: usize, chunk: UVec3) -> Result<bool, VolumeError> {
+        let side = self.levels[0].chunk;
+        let (from, end) = (chunk * side, ((chunk + 1) * side).min(self.volume.dims()));
+        assert!(from.cmplt(end).all(), "chunk {chunk}");
+        let mut voxels =
+            (from.z..end.z).flat_map(|z| (from.y..end.y).flat_map(move |y| (from.x..end.x).map(move |x| [x, y, z])));
+        Ok(voxels.any(|at| self.value(at.into()) != 0.0))
+    }
+
+    fn fill(&self) -> f32 {
+        0.0
+    }
+
+    fn identity(&self) -> String {
+        "memory".to_owned()
+    }
+}
+
+fn scene(sets: &[&str]) -> Scene {
+    let always = ["image={width=101,height=83,background=[0.2,0.4,0.1,0.5]}", "splatting.classification=before"];
+    let sets: Vec<String> = always.iter().chain(sets).map(|&set| set.to_owned()).collect();
+    Scene::from_volume(VolumeSource::Builtin("head:72".to_owned()), &sets).unwrap()
+}
+
+/// Draws a store and asserts that the image and the work are those of the volume in memory.
+fn assert_same(volume: &Volume, scene: &Scene, chunk: UVec3, memory: u64) -> StoreCounts {
+    let name = format!("{chunk} {memory} {scene:?}");
+    let whole = CpuRenderer::new(volume.clone(), scene).unwrap().draw().unwrap();
+    let store = Arc::new(MemoryStore::new(volume, chunk));
+    let renderer = StreamRenderer::new(store, 0, volume, scene, memory).unwrap();
+    let streamed = renderer.draw().unwrap();
+    assert!(streamed.image.pixels.as_flattened().iter().all(|channel| channel.is_finite()), "{name}");
+    assert_eq!(streamed.image, whole.image, "{name}");
+    let [actual, expected] = [streamed.stats.counts, whole.stats.counts];
+    assert_eq!(actual.voxels_shaded, expected.voxels_shaded, "{name}");
+    assert_eq!(actual.sections_rasterized, expected.sections_rasterized, "{name}");
+    assert_eq!(actual.voxels_total, expected.voxels_total, "{name}");
+    streamed.stats.store.unwrap()
+}
+
+#[test]
+fn streams_are_the_volume_in_memory() {
+    let gradient = "transfer={color=[[0,[0,0,0]],[40,[1,0.5,0]],[160,[1,1,1]]],opacity=[[0,0],[40,0.02],[160,0.4]],gradient_opacity=[[0,0],[30,1]]}";
+    for sets in [
+        &[][..],
+        &["camera.direction=[0.3,-0.5,0.8]", "splatting.compositing=exponential"],
+        &["camera.projection=perspective", "camera.direction=[1,0.2,0.1]"],
+        &["camera.projection=perspective", "camera.distance=20", "splatting.slab_width=0.6"],
+        &["splatting.order=back-to-front", "camera.direction=[-0.4,0.5,0.2]"],
+        &["splatting.culling=false"],
+        &["splatting.compositing=maximum"],
+        &["splatting.compositing=minimum"],
+        &["splatting.compositing=average", "clip.planes=[[0.5,0.3,1,2]]"],
+        &["splatting.compositing=surface"],
+        &["splatting.compositing=xray"],
+        &["clip.planes=[[0.5,0.3,1,2]]", "camera.direction=[0.3,-0.5,0.8]"],
+        &["splatting.opacity_threshold=0.9", "camera.up=[0,1,0]", "camera.direction=[0,0,1]"],
+        &[gradient],
+    ] {
+        let scene = scene(sets);
+        let volume = scene.load_volume().unwrap();
+        for (chunk, memory) in [([32, 32, 32], 1 << 30), ([7, 30, 16], 1 << 30), ([16, 16, 16], 1 << 17)] {
+            let counts = assert_same(&volume, &scene, chunk.into(), memory);
+            assert!(counts.chunks_read > 0 && counts.chunks_read <= counts.chunks_total, "{sets:?} {counts:?}");
+        }
+    }
+}
+
+#[test]
+fn hidden_and_empty_chunks_are_not_read() {
+    let side = 96;
+    // A wall across x = 20, and a block behind it that is as wide.
+    let value = |[x, y, z]: [u32; 3]| {
+        let is_wall = (20..28).contains(&x);
+        let is_block = (70..80).contains(&x) && (32..64).contains(&y) && (32..64).contains(&z);
+        if is_wall || is_block { 200.0 } else { 0.0 }
+    };
+    let voxels = (0..side).flat_map(|z| (0..side).flat_map(move |y| (0..side).map(move |x| [x, y, z])));
+    let volume = Volume::new("wall", UVec3::splat(side), DVec3::ONE, voxels.map(value).collect()).unwrap();
+    let transfer = "transfer={color=[[0,[1,1,1]]],opacity=[[100,0],[200,1]]}";
+    let scene = scene(&[transfer, "camera.direction=[1,0,0]", "splatting.compositing=exponential"]);
+    let counts = assert_same(&volume, &scene, UVec3::splat(32), 1 << 30);
+    // The wall's chunks, 3 by 3; those behind it that gradients at x = 27 need are its own.
+    assert_eq!((counts.chunks_total, counts.chunks_read, counts.bytes_read), (27, 9, 9 * 32 * 32 * 32));
+    let all = Scene {
+        splatting: {
+            let mut splatting = scene.splatting;
+            splatting.culling = false;
+            splatting
+        },
+        ..scene
+    };
+    // The block reaches into one chunk; the other chunks are not held.
+    assert_eq!(assert_same(&volume, &all, UVec3::splat(32), 1 << 30).chunks_read, 10);
+}
+
+#[test]
+fn failures_are_errors() {
+    let scene = scene(&[]);
+    let volume = scene.load_volume().unwrap();
+    let store = MemoryStore { broken_from: Some(30), ..MemoryStore::new(&volume, UVec3::splat(16)) };
+    let store = Arc::new(store);
+    let renderer = StreamRenderer::new(store.clone(), 0, &volume, &scene, 1 << 30).unwrap();
+    assert_eq!(renderer.draw().unwrap_err().to_string(), "store: the disk is gone");
+    let error = StreamRenderer::new(store.clone(), 1, &volume, &scene, 1 << 30).unwrap_err();
+    assert_eq!(error.to_string(), "volume.level: found 1, allowed: 0 to 0");
+    for (set, expected) in [
+        ("splatting.classification=after", "splatting.classification: found \"after\" for a volume that is streamed"),
+        ("splatting.method=composite-every-sample", "splatting.method: found \"composite-every-sample\""),
+    ] {
+        let scene = Scene::from_volume(scene.volume.clone(), &[set.to_owned()]).unwrap();
+        let error = StreamRenderer::new(store.clone(), 0, &volume, &scene, 1 << 30).unwrap_err().to_string();
+        assert!(error.starts_with(expected), "{error}");
+    }
+}
+
+/// Any number of threads draws the same image, and reads the same chunks.
+#[test]
+fn threads_change_nothing() {
+    let scene = scene(&["camera.direction=[0.3,-0.5,0.8]"]);
+    let volume = scene.load_volume().unwrap();
+    let draw = |threads: usize| {
+        let store = Arc::new(MemoryStore::new(&volume, UVec3::splat(16)));
+        let renderer = StreamRenderer::new(store, 0, &volume, &scene, 1 << 18).unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let rendering = pool.install(|| renderer.draw()).unwrap();
+        let counts = rendering.stats.store.unwrap();
+        (rendering.image, rendering.stats.counts, counts.chunks_read, counts.bytes_read)
+    };
+    let first = draw(1);
+    for threads in [2, 5] {
+        assert_eq!(draw(threads), first, "{threads} threads");
+    }
+}
