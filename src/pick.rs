@@ -38,9 +38,10 @@ impl Pick {
     ) -> Self {
         let grid = volume.grid();
         let place = DVec2::from(pixel.map(f64::from)) + 0.5 - DVec2::from(view.size.map(f64::from)) / 2.0;
-        let position = view.rays().at(place, depth / grid.unit()) * grid.unit();
+        let from_center = view.rays().at(place, depth / grid.unit()) * grid.unit();
+        let position = from_center + grid.place();
         let last = grid.dims.as_dvec3() - 1.0;
-        let voxel = (position / grid.spacing + grid.center()).round().clamp(DVec3::ZERO, last).as_uvec3();
+        let voxel = (from_center / grid.spacing + grid.center()).round().clamp(DVec3::ZERO, last).as_uvec3();
         let index = grid.index_of(voxel);
         let opacity = |(volume, transfer): (&Volume, &TransferFunction)| {
             let value = f64::from(volume.values()[index as usize]);

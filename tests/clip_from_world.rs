@@ -44,7 +44,7 @@ fn random_placed(random: &mut Random) -> (DMat4, DMat4, f64) {
 #[test]
 fn points_fall_on_the_hosts_pixels() {
     let mut random = Random(31);
-    let grid = Grid { dims: UVec3::new(40, 30, 50), spacing: DVec3::new(1.0, 1.5, 0.8) };
+    let grid = Grid::new(UVec3::new(40, 30, 50), DVec3::new(1.0, 1.5, 0.8));
     let (mut before, mut points) = (0, 0);
     for _ in 0..200 {
         let (world, view, scale) = random_placed(&mut random);
@@ -90,7 +90,7 @@ fn points_fall_on_the_hosts_pixels() {
 #[test]
 fn matrices_in_f32_are_cameras_too() {
     let mut random = Random(32);
-    let grid = Grid { dims: UVec3::splat(40), spacing: DVec3::ONE };
+    let grid = Grid::new(UVec3::splat(40), DVec3::ONE);
     for _ in 0..200 {
         let (world, view, scale) = random_placed(&mut random);
         for projection in [

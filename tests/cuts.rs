@@ -332,7 +332,7 @@ fn moved_planes_are_fresh_ones() {
 fn picks() {
     let gpu = gpu();
     let mut values = vec![0.0_f32; 21 * 21 * 21];
-    let grid = Grid { dims: UVec3::splat(21), spacing: DVec3::new(1.0, 2.0, 1.0) };
+    let grid = Grid::new(UVec3::splat(21), DVec3::new(1.0, 2.0, 1.0));
     // A plate at y = 12, with values that increase along x.
     for (x, z) in (0..21).flat_map(|x| (0..21).map(move |z| (x, z))) {
         values[grid.index_of(UVec3::new(x, 12, z)) as usize] = 100.0 + x as f32;

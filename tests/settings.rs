@@ -338,7 +338,7 @@ fn grids_are_checked() {
         (one, DVec3::new(1.0, 1e101, 1.0), "spacing[1]"),
         (one, DVec3::new(1.0, 1e5, 1.0), "spacing"),
     ] {
-        assert_eq!(Grid { dims, spacing }.check().unwrap_err().key, key, "{dims} {spacing}");
+        assert_eq!(Grid::new(dims, spacing).check().unwrap_err().key, key, "{dims} {spacing}");
         match Volume::new("made", dims, spacing, vec![0.0]) {
             Err(VolumeError::Invalid { origin, field, .. }) => {
                 assert_eq!((origin.as_str(), field.as_str()), ("made", key), "{dims} {spacing}");

@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn extremes_are_those_of_all_voxels_around() {
-        let grid = Grid { dims: UVec3::new(13, 6, 9), spacing: DVec3::ONE };
+        let grid = Grid::new(UVec3::new(13, 6, 9), DVec3::ONE);
         let value =
             |index: u32| if index % 29 == 3 { f32::NAN } else { (index.wrapping_mul(2_654_435_761) >> 20) as f32 };
         let values: Vec<f32> = (0..grid.dims.element_product()).map(value).collect();
@@ -176,7 +176,7 @@ mod tests {
     /// A peak of opacity between the values of two voxels shows although neither voxel has an opacity.
     #[test]
     fn bricks_meet_opacities_between_values() {
-        let grid = Grid { dims: UVec3::new(24, 4, 4), spacing: DVec3::ONE };
+        let grid = Grid::new(UVec3::new(24, 4, 4), DVec3::ONE);
         let values = (0..384).map(|index| if index % 24 < 12 { 0.0 } else { 100.0 }).collect();
         let volume = Volume::new("step", grid.dims, grid.spacing, values).unwrap();
         let opacity = Ramp::new(vec![(49.0, 0.0), (50.0, 1.0), (51.0, 0.0)]).unwrap();

@@ -236,7 +236,7 @@ mod tests {
     #[test]
     fn coefficients_are_the_twins() {
         for (dims, holes) in [([9, 8, 7], false), ([9, 8, 7], true), ([6, 1, 5], false), ([1, 1, 1], false)] {
-            let grid = Grid { dims: UVec3::from(dims), spacing: DVec3::ONE };
+            let grid = Grid::new(UVec3::from(dims), DVec3::ONE);
             let value = |index: u32| match index * 7919 % 31 {
                 3 if holes => f32::NAN,
                 rest => 1000.0 + (rest * rest) as f32,

@@ -78,7 +78,7 @@ impl Surfaces {
             let found = format!("a projection that is {off:.3} pixels off the camera's");
             return refused("surfaces.clip_from_world", found, format!("at most {AGREEMENT}"));
         }
-        Ok(self.by_value(view, &rays, grid.unit()))
+        Ok(self.by_value(view, &rays, grid))
     }
 
     /// The maximum distance in pixels between the projections by the host and by the camera, of points at the volume's near end, middle and
@@ -92,18 +92,19 @@ impl Surfaces {
         let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (0.1, -0.3)];
         let points = corners.into_iter().flat_map(|(x, y)| depths.map(|depth| (DVec2::new(x, y) * half, depth)));
         let off = points.map(|(place, depth)| {
-            let clip = self.clip_from_world * (rays.at(place, depth) * grid.unit()).extend(1.0);
+            let clip = self.clip_from_world * (rays.at(place, depth) * grid.unit() + grid.place()).extend(1.0);
             let there = DVec2::new(clip.x, -clip.y) / clip.w * half;
             if clip.w > 0.0 { (there - place).length() } else { f64::INFINITY }
         });
         off.fold(0.0, |worst: f64, off| if worst.is_nan() || off <= worst { worst } else { off })
     }
 
-    fn by_value(&self, view: &ViewGeometry, rays: &Rays, unit: f64) -> SurfaceDepths {
+    fn by_value(&self, view: &ViewGeometry, rays: &Rays, grid: &Grid) -> SurfaceDepths {
         let world_from_clip = self.clip_from_world.inverse();
         let [x, y, z, w] = [0, 1, 2, 3].map(|row| world_from_clip.row(row));
-        let ahead = view.basis.w / unit;
-        let depth = x * ahead.x + y * ahead.y + z * ahead.z - w * view.basis.w.dot(rays.origin[2]);
+        let ahead = view.basis.w / grid.unit();
+        let depth =
+            x * ahead.x + y * ahead.y + z * ahead.z - w * (view.basis.w.dot(rays.origin[2]) + ahead.dot(grid.place()));
         // Converts pixels to normalized device coordinates.
         let [width, height] = view.size.map(f64::from);
         let scale = DVec4::new(2.0 / width, -2.0 / height, 1.0, 1.0);

@@ -121,7 +121,7 @@ impl ViewGeometry {
         let row = |row: DVec3, at_center: f64| row.extend(at_center - row.dot(grid.center()));
         // The point at the image's middle, and the pixels per `unit` there.
         let (origin, scale) = match &eye {
-            None => (camera.middle() / grid.unit(), 1.0 / pix),
+            None => (camera.middle_from(grid) / grid.unit(), 1.0 / pix),
             Some(eye) => (eye.position, 1.0 / eye.pixel_per_depth),
         };
         let along_w = basis.w * aspect;
@@ -171,7 +171,7 @@ impl ViewGeometry {
             slabs,
             reach,
             kernel_per_depth,
-            center: camera.middle() / grid.unit(),
+            center: camera.middle_from(grid) / grid.unit(),
             pix,
             footprint: FootprintMap::new(&warped, pix),
             lambda,

@@ -21,6 +21,12 @@ pub(super) fn fingerprint(volume: &Volume, scene: &Scene) -> Result<String, Scen
     for (count, spacing) in grid.dims.to_array().into_iter().zip(grid.spacing.to_array()) {
         hash.update(&count.to_le_bytes()).update(&spacing.to_le_bytes());
     }
+    if volume.level() > 0 {
+        // A level lies where the finest one does, and has its unit.
+        for number in [grid.unit()].into_iter().chain(grid.place().to_array()) {
+            hash.update(&number.to_le_bytes());
+        }
+    }
     // In blocks, because the hash is fastest over long slices.
     for channel in volume.channels() {
         for values in channel.values().chunks(1 << 14) {
@@ -48,10 +54,11 @@ fn bits(value: f32) -> u32 {
 fn settings(mut scene: Scene) -> Result<String, SceneError> {
     scene.volume = VolumeSource::Memory;
     (scene.spacing, scene.labels, scene.name) = (None, None, None);
-    (scene.index, scene.time) = (None, None);
+    (scene.index, scene.time, scene.level) = (None, None, None);
     for channel in &mut scene.further {
         (channel.volume, channel.name) = (VolumeSource::Memory, None);
-        (channel.spacing, channel.labels, channel.index, channel.time) = (None, None, None, None);
+        (channel.spacing, channel.labels) = (None, None);
+        (channel.index, channel.time, channel.level) = (None, None, None);
     }
     scene.splatting.rasterizer = Rasterizer::Auto;
     // Tiles never change an image.

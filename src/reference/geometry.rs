@@ -83,7 +83,7 @@ impl Geometry {
             basis,
             size: DVec2::new(f64::from(width), f64::from(height)),
             grid: *grid,
-            center: camera.middle() / grid.unit(),
+            center: camera.middle_from(grid) / grid.unit(),
             eye,
             method: splatting.method,
             economies: splatting.experimental,

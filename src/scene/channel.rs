@@ -29,6 +29,8 @@ pub struct Channel {
     pub index: Option<u32>,
     /// The number, from 0, of the time that is read of a file with several; `None` reads the first.
     pub time: Option<u32>,
+    /// The level, from 0 for the finest, that is read of a store with several; `None` reads the finest that fits in memory.
+    pub level: Option<u32>,
     /// Colour and opacity.
     pub transfer: TransferSettings,
 }
@@ -37,7 +39,17 @@ impl Channel {
     /// A channel of a volume with every setting at its default.
     pub fn new(volume: VolumeSource) -> Self {
         let transfer = TransferSettings::default();
-        Self { name: None, visible: true, volume, spacing: None, labels: None, index: None, time: None, transfer }
+        Self {
+            name: None,
+            visible: true,
+            volume,
+            spacing: None,
+            labels: None,
+            index: None,
+            time: None,
+            level: None,
+            transfer,
+        }
     }
 
     /// Whether the volume can have labels; an unknown builtin volume might.
@@ -54,7 +66,7 @@ impl Channel {
 impl Scene {
     /// The channels that the scene has settings for, the first of which are the scene's own.
     pub fn channels(&self) -> impl Iterator<Item = Cow<'_, Channel>> {
-        let Self { name, visible, volume, spacing, labels, index, time, transfer, .. } = self;
+        let Self { name, visible, volume, spacing, labels, index, time, level, transfer, .. } = self;
         let first = Channel {
             name: name.clone(),
             visible: *visible,
@@ -63,6 +75,7 @@ impl Scene {
             labels: labels.clone(),
             index: *index,
             time: *time,
+            level: *level,
             transfer: transfer.clone(),
         };
         std::iter::once(Cow::Owned(first)).chain(self.further.iter().map(Cow::Borrowed))

@@ -49,15 +49,15 @@ fn single(volume: &Volume, number: usize, settings: &Channel) -> Result<(), Volu
 
 /// The volume of one channel.
 fn channel(settings: &Channel, key: &str, access: &Access) -> Result<Volume, VolumeError> {
-    let selection = Selection { channel: settings.index, time: settings.time };
+    let selection = Selection { channel: settings.index, time: settings.time, level: settings.level };
     let volume = match &settings.volume {
         VolumeSource::File(path) => Volume::read(path, &access.selecting(selection))?,
         VolumeSource::Raw(..) | VolumeSource::Builtin(_) if selection != Selection::default() => {
             return Err(VolumeError::Invalid {
                 origin: origin(&settings.volume),
                 field: key.to_owned(),
-                found: "index or time of a volume that is neither of several".to_owned(),
-                allowed: "neither key, or a file of several channels or times".to_owned(),
+                found: "index, time or level of a volume that is none of several".to_owned(),
+                allowed: "none of these keys, or a file of several channels, times or levels".to_owned(),
             });
         }
         VolumeSource::Raw(path, layout) => Volume::read_raw(path, layout, access)?,
@@ -66,7 +66,7 @@ fn channel(settings: &Channel, key: &str, access: &Access) -> Result<Volume, Vol
     };
     let volume = match &settings.labels {
         Some(path) => {
-            let labels = Labels::read(path, &access.whole())?;
+            let labels = Labels::read(path, &access.whole_at(volume.level()))?;
             let spacing = labels.spacing.filter(|_| settings.spacing.is_none());
             volume.with_labels(Labels { spacing, ..labels })?
         }

@@ -206,6 +206,8 @@ pub struct Scene {
     pub index: Option<u32>,
     /// The number, from 0, of the time that is read of a file with several; `None` reads the first.
     pub time: Option<u32>,
+    /// The level, from 0 for the finest, that is read of a store with several; `None` reads the finest that fits in memory.
+    pub level: Option<u32>,
     /// The name of the channel in legends and picks; `None` uses the file's.
     pub name: Option<String>,
     /// Whether the channel is drawn.
@@ -235,6 +237,7 @@ impl Scene {
             labels: None,
             index: None,
             time: None,
+            level: None,
             name: None,
             visible: true,
             camera: Camera { fit: Fit::Object, ..Camera::default() },
@@ -435,7 +438,7 @@ impl Scene {
             ..Splatting::default()
         };
         let mut channels = tables::channels(channels, folder, source, preset)?.into_iter();
-        let Channel { name, visible, volume, spacing, labels, index, time, transfer } =
+        let Channel { name, visible, volume, spacing, labels, index, time, level, transfer } =
             channels.next().unwrap_or_else(|| Channel::new(VolumeSource::Memory));
         let scene = Self {
             volume,
@@ -443,6 +446,7 @@ impl Scene {
             labels,
             index,
             time,
+            level,
             name,
             visible,
             camera: tables::camera(camera, fit)?,

@@ -305,6 +305,17 @@ impl<'a> Entry<'a> {
         u32::try_from(integer).map_err(|_| self.refused(allowed))
     }
 
+    /// The number of a level; `None` for one that is chosen.
+    pub(super) fn level(&self) -> Result<Option<u32>, SceneError> {
+        let allowed = "an integer >= 0 or \"auto\"";
+        match (self.value.as_integer(), self.value.as_str()) {
+            (Some(integer), _) => u32::try_from(integer).map(Some).map_err(|_| self.refused(allowed)),
+            (_, Some("auto")) => Ok(None),
+            (_, Some(_)) => Err(self.refused(allowed)),
+            _ => Err(self.mistyped(allowed)),
+        }
+    }
+
     /// A label.
     pub(super) fn label(&self) -> Result<u16, SceneError> {
         let integer = self.value.as_integer().ok_or_else(|| self.mistyped(LABEL))?;

@@ -82,16 +82,16 @@ pub(super) fn channels(
     for ChannelTables { key, name, visible, volume: of_volume, transfer: of_transfer, .. } in tables {
         let origins = of_volume.origins;
         let is_first = channels.is_empty();
-        let VolumeSettings { source, spacing, labels, index, time } =
+        let VolumeSettings { source, spacing, labels, index, time, level } =
             volume(of_volume, folder, if is_first { given.take() } else { Some(VolumeSource::Memory) })?;
-        let states_more = spacing.is_some() || labels.is_some() || index.is_some() || time.is_some();
+        let states_more = spacing.is_some() || labels.is_some() || index.is_some() || time.is_some() || level.is_some();
         if !is_first && source == VolumeSource::Memory && states_more {
             let found = "keys of a volume without path or builtin";
             let allowed = "keys of a volume of the channel's own";
             return Err(origins.invalid(&format!("{key}.volume"), &[], found, allowed));
         }
         let transfer = TransferSettings { preset, ..transfer(of_transfer)? };
-        let channel = Channel { name, visible, volume: source, spacing, labels, index, time, transfer };
+        let channel = Channel { name, visible, volume: source, spacing, labels, index, time, level, transfer };
         if !channel.transfer.labels.is_empty() && !channel.may_have_labels() {
             let key = |name: &str| if key.is_empty() { name.to_owned() } else { format!("{key}.{name}") };
             let allowed = "no such tables, or volume.labels, or volume.builtin = \"head\" or \"tomato\"";
@@ -116,6 +116,7 @@ struct VolumeSettings {
     labels: Option<PathBuf>,
     index: Option<u32>,
     time: Option<u32>,
+    level: Option<u32>,
 }
 
 /// Reads `[volume]`; `given` is the source of a table that names none.
@@ -126,9 +127,10 @@ fn volume(mut section: Section, folder: &Path, given: Option<VolumeSource>) -> R
     section.read("spacing", &mut spacing, |entry| entry.numbers(SPACING).map(|s| Some(DVec3::from_array(s))))?;
     section
         .read("labels", &mut labels, |entry| entry.text("a label file's path").map(|path| Some(folder.join(path))))?;
-    let (mut index, mut time) = (None, None);
+    let (mut index, mut time, mut level) = (None, None, None);
     section.read("index", &mut index, |entry| entry.count().map(Some))?;
     section.read("time", &mut time, |entry| entry.count().map(Some))?;
+    section.read("level", &mut level, Entry::level)?;
     let raw = raw_layout(&mut section)?;
     let (origins, key) = (section.origins, section.name.clone());
     section.finish()?;
@@ -150,7 +152,7 @@ fn volume(mut section: Section, folder: &Path, given: Option<VolumeSource>) -> R
             return Err(origins.invalid(&format!("{key}.dims"), &[], found, format!("{key}.path")));
         }
     };
-    Ok(VolumeSettings { source, spacing, labels, index, time })
+    Ok(VolumeSettings { source, spacing, labels, index, time, level })
 }
 
 /// The layout of a raw file: `dims`, which requires `type`, `endian` and `offset`.

@@ -60,7 +60,7 @@ struct Text {
 }
 
 fn write_channel(text: &mut Text, folder: &Path, channel: &Channel) -> Result<(), SceneError> {
-    let Channel { name, visible, volume, spacing, labels, index, time, transfer } = channel;
+    let Channel { name, visible, volume, spacing, labels, index, time, level, transfer } = channel;
     if text.channel.is_some() {
         let _ = writeln!(text.text, "\n[[channel]]");
         text.given("name", name.as_deref());
@@ -97,6 +97,7 @@ fn write_channel(text: &mut Text, folder: &Path, channel: &Channel) -> Result<()
     text.given("labels", labels.transpose()?);
     text.given("index", index.map(i64::from));
     text.given("time", time.map(i64::from));
+    text.given("level", level.map(i64::from));
     write_transfer(text, transfer);
     Ok(())
 }

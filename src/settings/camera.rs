@@ -113,6 +113,11 @@ impl Camera {
         self.center.unwrap_or_default()
     }
 
+    /// [`Self::middle`] from a grid's centre.
+    pub fn middle_from(&self, grid: &Grid) -> DVec3 {
+        self.middle() - grid.place()
+    }
+
     /// Whether an object's box must determine a value ([`Extent::fit`](crate::settings::Extent::fit)).
     pub fn needs_object(&self) -> bool {
         let is_open = match self.projection {
@@ -179,7 +184,7 @@ impl Camera {
         let Some([fov_y, distance, near]) = self.perspective(grid, kernel_radius) else { return Ok(None) };
         let (unit, sphere) = (grid.unit(), grid.bounding_radius(kernel_radius));
         let [distance, near] = [distance, near].map(|world| world / unit);
-        let position = self.middle() / unit - distance * self.basis().w;
+        let position = self.middle_from(grid) / unit - distance * self.basis().w;
         let pixel_per_depth = 2.0 * libm::tan(fov_y.to_radians() / 2.0) / f64::from(height);
         let eye = Eye { position, distance, near, pixel_per_depth };
         let (least, largest) = (PIXELS.start() / pixel_per_depth, PIXELS.end() / pixel_per_depth);

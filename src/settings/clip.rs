@@ -75,7 +75,10 @@ impl Clip {
         let crop = self.crop.iter().flat_map(|&[low, high]| {
             DVec3::AXES.into_iter().flat_map(move |axis| [(axis, -axis.dot(low)), (-axis, axis.dot(high))])
         });
-        planes.chain(crop).map(|(normal, offset)| HalfSpace { normal, offset: offset / unit }).collect()
+        planes
+            .chain(crop)
+            .map(|(normal, offset)| HalfSpace { normal, offset: (offset + normal.dot(grid.place())) / unit })
+            .collect()
     }
 
     /// The voxels that may be visible: those whose kernels, with a radius in grid units, reach inside.
@@ -150,7 +153,7 @@ mod tests {
     use super::*;
 
     fn grid() -> Grid {
-        Grid { dims: UVec3::new(9, 7, 5), spacing: DVec3::new(2.0, 2.0, 6.0) }
+        Grid::new(UVec3::new(9, 7, 5), DVec3::new(2.0, 2.0, 6.0))
     }
 
     #[test]

@@ -20,8 +20,8 @@ pub struct Extent {
 impl Extent {
     /// The box around the voxels from `first` to `last` of a grid and their kernels, whose radius is in grid units.
     pub fn of_voxels(grid: &Grid, [first, last]: [glam::UVec3; 2], kernel_radius: f64) -> Self {
-        let margin = kernel_radius * grid.spacing;
-        Self { low: grid.world_position(first) - margin, high: grid.world_position(last) + margin }
+        let (margin, place) = (kernel_radius * grid.spacing, grid.place());
+        Self { low: grid.world_position(first) - margin + place, high: grid.world_position(last) + margin + place }
     }
 
     /// The middle of the box.
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn kernels_belong_to_the_box() {
-        let grid = Grid { dims: UVec3::new(11, 21, 5), spacing: DVec3::new(1.0, 0.5, 3.0) };
+        let grid = Grid::new(UVec3::new(11, 21, 5), DVec3::new(1.0, 0.5, 3.0));
         let extent = Extent::of_voxels(&grid, [UVec3::new(2, 0, 4), UVec3::new(7, 20, 4)], 2.0);
         assert_eq!(extent, Extent { low: DVec3::new(-5.0, -6.0, 0.0), high: DVec3::new(4.0, 6.0, 12.0) });
     }

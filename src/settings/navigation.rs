@@ -69,7 +69,7 @@ mod tests {
 
     use super::*;
 
-    const GRID: Grid = Grid { dims: UVec3::new(20, 20, 10), spacing: DVec3::new(1.0, 1.0, 3.0) };
+    const GRID: Grid = Grid::new(UVec3::new(20, 20, 10), DVec3::new(1.0, 1.0, 3.0));
 
     /// The position of a world point on the screen, right and up from the centre.
     fn on_screen(camera: &Camera, point: DVec3) -> DVec2 {

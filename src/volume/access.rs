@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
-use std::fmt::Display;
+use std::fmt::{self, Debug, Display, Formatter};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -11,6 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::VolumeError;
 use super::file::Files;
 use super::memory;
+use super::seek::{Located, Notes};
 use super::series::Selection;
 use super::source::{Source, invalid, io_error};
 
@@ -33,6 +34,8 @@ pub struct ReadOptions {
     pub channel: Option<u32>,
     /// The number, from 0, of the time to read of a file with several; `None` reads the first.
     pub time: Option<u32>,
+    /// The level, from 0 for the finest, to read of a store with several; `None` reads the finest that fits in memory.
+    pub level: Option<u32>,
     /// Files in memory, which are read instead of the disk's; `None` reads the disk.
     pub files: Option<Files>,
 }
@@ -51,6 +54,11 @@ impl ReadOptions {
     /// These options with another time of a file with several, counted from 0.
     pub fn with_time(self, time: u32) -> Self {
         Self { time: Some(time), ..self }
+    }
+
+    /// These options with another level of a store with several, counted from 0 for the finest.
+    pub fn with_level(self, level: u32) -> Self {
+        Self { level: Some(level), ..self }
     }
 
     /// These options with files in memory instead of the disk's, where a program has no disk, as in a browser, or does not trust paths. Whatever
@@ -81,7 +89,7 @@ impl ReadOptions {
 
 /// [`ReadOptions`] while a volume and its labels are read. Clones share the memory limit.
 #[derive(Clone)]
-pub(crate) struct Access(Arc<Inner>, Selection);
+pub(crate) struct Access(Arc<Inner>, Selection, Option<Arc<Notes>>);
 
 struct Inner {
     given: Option<Files>,
@@ -108,7 +116,29 @@ impl Access {
         let folder = options.confine.as_ref().filter(|_| given.is_none()).map(folder).transpose()?;
         let limit = options.memory.unwrap_or_else(memory::default_limit);
         let inner = Inner { given, folder, limit, reserved: AtomicU64::new(0), files: Mutex::default() };
-        Ok(Self(Arc::new(inner), Selection { channel: options.channel, time: options.time }))
+        Ok(Self(
+            Arc::new(inner),
+            Selection { channel: options.channel, time: options.time, level: options.level },
+            None,
+        ))
+    }
+
+    /// The same access for readers that only note where samples are, and read none.
+    pub(super) fn noting(&self) -> (Self, Arc<Notes>) {
+        let notes = Arc::new(Notes::default());
+        (Self(Arc::clone(&self.0), self.1, Some(Arc::clone(&notes))), notes)
+    }
+
+    /// Whether readers note where samples are, and read none.
+    pub(super) fn is_noting(&self) -> bool {
+        self.2.is_some()
+    }
+
+    /// Notes where samples are.
+    pub(super) fn note(&self, located: Located) {
+        if let Some(notes) = &self.2 {
+            notes.lock().unwrap_or_else(PoisonError::into_inner).push(located);
+        }
     }
 
     /// What is read of files with several volumes.
@@ -116,15 +146,16 @@ impl Access {
         self.1
     }
 
-    /// The same access to files of one volume.
-    pub(crate) fn whole(&self) -> Self {
-        Self(Arc::clone(&self.0), Selection::default())
+    /// The same access to files of one volume, at a level.
+    pub(crate) fn whole_at(&self, level: u32) -> Self {
+        Self(Arc::clone(&self.0), Selection { level: Some(level), ..Selection::default() }, None)
     }
 
     /// The same access to other volumes of a file. What the options select goes before it.
     pub(crate) fn selecting(&self, other: Selection) -> Self {
-        let Selection { channel, time } = self.1;
-        Self(Arc::clone(&self.0), Selection { channel: channel.or(other.channel), time: time.or(other.time) })
+        let Selection { channel, time, level } = self.1;
+        let (channel, time, level) = (channel.or(other.channel), time.or(other.time), level.or(other.level));
+        Self(Arc::clone(&self.0), Selection { channel, time, level }, self.2.clone())
     }
 
     /// The path to open for a file or folder. If reading is confined, it has no links in it.
@@ -198,6 +229,11 @@ impl Access {
         self.0.files.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect()
     }
 
+    /// The number of bytes of memory that are left.
+    pub(super) fn memory_left(&self) -> u64 {
+        self.0.limit.saturating_sub(self.0.reserved.load(Ordering::Relaxed))
+    }
+
     /// Reserves `bytes` of memory, before they are allocated, for what `found` describes.
     ///
     /// # Errors
@@ -209,6 +245,12 @@ impl Access {
         let others = if before > 0 { format!(", of which {before} are taken") } else { String::new() };
         let allowed = format!("at most the memory limit of {limit} bytes{others}");
         Err(invalid(path, field, format!("{found}, which take {bytes} bytes of memory"), allowed))
+    }
+}
+
+impl Debug for Access {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Access").field(&self.1).finish()
     }
 }
 

@@ -1,11 +1,15 @@
 //! File formats and how a file's format is determined.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, PoisonError};
 
 use super::access::Access;
 use super::loaded::Loaded;
 use super::samples::Voxel;
+use super::seek::FileStore;
 use super::source::invalid;
+use super::store::Store;
 use super::{VolumeError, folder, nrrd};
 
 type Reader<T> = fn(&Path, &Access) -> Result<Loaded<T>, VolumeError>;
@@ -38,6 +42,11 @@ macro_rules! reader {
 }
 
 const DICOM: &str = "DICOM";
+const NPZ: &str = "NPZ";
+const ZARR: &str = "Zarr";
+
+/// Formats whose files, if they are uncompressed, are read by boxes.
+const SEEKABLE: [&str; 4] = ["NRRD", "NIfTI", "MetaImage", "NPY"];
 
 /// Formats with one slice per file of a folder.
 const SLICES: [&str; 2] = ["TIFF", DICOM];
@@ -84,7 +93,15 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             read_folder: None,
         },
         Format {
-            name: "NPZ",
+            name: ZARR,
+            extensions: &[".zip", ".ozx"],
+            // A store is a folder, or an archive that begins like other ZIP archives.
+            is_magic: |_| false,
+            read: reader!("zarr", super::zarr::read),
+            read_folder: None,
+        },
+        Format {
+            name: NPZ,
             extensions: &[".npz"],
             is_magic: |head| head.starts_with(b"PK\x03\x04"),
             read: reader!("npy", super::npz::read),
@@ -125,13 +142,14 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
 /// whose format the first bytes of all its files determine.
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static str, Loaded<T>), VolumeError> {
     let formats = formats();
-    let (file, _) = archive_and_array(path);
-    if access.is_folder(file)? {
-        return read_folder(path, access, &formats);
+    let (file, _) = archive_and_inner(path);
+    let format = format_at(&formats, path, access)?;
+    if let Some(level) = access.selection().level.filter(|&level| level > 0 && format.is_none_or(|of| of.name != ZARR))
+    {
+        return Err(invalid(path, "level", level, "0, the only one"));
     }
-    let head = folder::head(file, access)?;
-    let format = format_of(&formats, file, &head).map(|(format, _)| format);
     let found = match format {
+        None if access.is_folder(file)? => return read_folder(path, access, &formats),
         Some(Format { name, read: Ok(read), .. }) => return Ok((name, read(path, access)?)),
         Some(Format { name, read: Err(feature), .. }) => needs(name, feature),
         None => match path.extension() {
@@ -151,6 +169,53 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static s
     Err(invalid(path, "format", found, allowed))
 }
 
+/// Opens a file that is read by boxes.
+pub(super) fn open_store(path: &Path, access: &Access) -> Result<Arc<dyn Store>, VolumeError> {
+    let formats = formats::<f32>();
+    let found = match format_at(&formats, path, access)? {
+        #[cfg(feature = "zarr")]
+        Some(Format { name: ZARR, .. }) => return Ok(Arc::new(super::zarr::open(path, access)?)),
+        Some(Format { name, read: Err(feature), .. }) => needs(name, feature),
+        Some(Format { name, read: Ok(read), .. }) if SEEKABLE.contains(name) => {
+            let (noting, notes) = access.noting();
+            let loaded = read(path, &noting)?;
+            let notes = notes.lock().unwrap_or_else(PoisonError::into_inner);
+            return Ok(Arc::new(FileStore::of_header(path, &loaded, &notes, access)?));
+        }
+        Some(Format { name, .. }) => (*name).to_owned(),
+        None => "another".to_owned(),
+    };
+    let allowed = format!("one that is read by boxes: {ZARR}, and uncompressed {}", SEEKABLE.join(", "));
+    Err(invalid(path, "format", found, allowed))
+}
+
+/// The format of a file or of a Zarr store; `None` if it is unknown, or for another folder.
+fn format_at<'a, T>(
+    formats: &'a [Format<T>],
+    path: &Path,
+    access: &Access,
+) -> Result<Option<&'a Format<T>>, VolumeError> {
+    let (file, _) = archive_and_inner(path);
+    if access.is_folder(file)? {
+        let is_store = is_zarr(file, access)?;
+        return Ok(formats.iter().find(|format| format.name == ZARR && is_store));
+    }
+    let head = folder::head(file, access)?;
+    Ok(format_of(formats, file, &head).map(|(format, _)| format))
+}
+
+/// Whether a folder holds the metadata of a Zarr store.
+fn is_zarr(folder: &Path, access: &Access) -> Result<bool, VolumeError> {
+    for name in ["zarr.json", ".zgroup", ".zattrs", ".zarray"] {
+        match access.open_to_look(&folder.join(name)) {
+            Ok(_) => return Ok(true),
+            Err(VolumeError::Io { source, .. }) if source.kind() == ErrorKind::NotFound => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(false)
+}
+
 /// A file's format, and whether its first bytes determined it.
 fn format_of<'a, T>(formats: &'a [Format<T>], path: &Path, head: &[u8]) -> Option<(&'a Format<T>, bool)> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
@@ -160,7 +225,8 @@ fn format_of<'a, T>(formats: &'a [Format<T>], path: &Path, head: &[u8]) -> Optio
     let is_bare = |format: &Format<T>| {
         format.name == DICOM && is_bare_dicom(head) && named.is_none_or(|named| named.name == DICOM)
     };
-    let by_head = |format: &&Format<T>| (format.is_magic)(head) || is_bare(format);
+    let is_other_archive = |format: &Format<T>| format.name == NPZ && named.is_some_and(|named| named.name == ZARR);
+    let by_head = |format: &&Format<T>| (format.is_magic)(head) && !is_other_archive(format) || is_bare(format);
     formats.iter().find(by_head).map(|format| (format, true)).or(named.map(|format| (format, false)))
 }
 
@@ -220,11 +286,12 @@ fn read_folder<T: Voxel>(
     Err(invalid(path, "folder", found, allowed))
 }
 
-/// The parts of a path such as `file.npz:name` before and after the colon; any other path is the first part.
-pub(super) fn archive_and_array(path: &Path) -> (&Path, Option<&str>) {
-    const EXTENSION: &str = ".npz:";
+/// The parts of a path such as `file.npz:name` before and after the colon, for archives of several volumes; any other path is the first part.
+pub(super) fn archive_and_inner(path: &Path) -> (&Path, Option<&str>) {
+    const EXTENSIONS: [&str; 3] = [".npz:", ".zip:", ".ozx:"];
     let split = path.to_str().filter(|_| !path.exists()).and_then(|text| {
-        let at = text.to_ascii_lowercase().rfind(EXTENSION)? + EXTENSION.len();
+        let lower = text.to_ascii_lowercase();
+        let at = EXTENSIONS.iter().filter_map(|end| Some(lower.rfind(end)? + end.len())).max()?;
         Some((Path::new(&text[..at - 1]), Some(&text[at..])))
     });
     split.unwrap_or((path, None))

@@ -12,6 +12,9 @@ pub(crate) const SPACING: Interval = Interval::new(Included(1e-100), Included(1e
 /// The maximum ratio of two spacings, so that warped positions stay accurate in `f32`.
 const MAX_ASPECT: f64 = 1e4;
 
+/// The maximum distance, in units, of a coarser level's centre from the finest level's, so that positions stay accurate in `f32`.
+const MAX_PLACE: f64 = 1e6;
+
 /// Checks the spacing under a key.
 pub(crate) fn check_spacing(key: &str, spacing: DVec3) -> Result<(), SettingError> {
     SPACING.check_each(key, &spacing.to_array())?;
@@ -22,16 +25,43 @@ pub(crate) fn check_spacing(key: &str, spacing: DVec3) -> Result<(), SettingErro
     Ok(())
 }
 
-/// A rectilinear grid (SPEC §2) whose centre is the world's origin.
+/// A rectilinear grid (SPEC §2) whose centre is the world's origin, or, of a coarser level (SPEC §13), where its level lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
     /// The number of voxels along x, y and z, each at least 1.
     pub dims: UVec3,
     /// The distance between neighbouring voxels along x, y and z, in world units.
     pub spacing: DVec3,
+    /// The spacing of the volume's finest level, if this is another one.
+    pub(crate) finest: Option<DVec3>,
+    /// The place of the grid's centre in the world.
+    pub(crate) place: DVec3,
 }
 
 impl Grid {
+    /// A grid whose centre is the world's origin.
+    pub const fn new(dims: UVec3, spacing: DVec3) -> Self {
+        Self { dims, spacing, finest: None, place: DVec3::ZERO }
+    }
+
+    /// The grid of a coarser level of a volume (SPEC §13), whose centre lies at `place` from the centre of the finest level. Its unit of length is that of
+    /// the finest level.
+    pub fn coarser_than(self, finest: &Self, place: DVec3) -> Self {
+        Self { finest: Some(finest.spacing), place, ..self }
+    }
+
+    /// The same grid in a volume whose finest level has another spacing.
+    pub fn with_finest_spacing(self, spacing: DVec3) -> Self {
+        let Some(finest) = self.finest else { return Self { spacing, ..self } };
+        let by = spacing / finest;
+        Self { spacing: self.spacing * by, finest: Some(spacing), place: self.place * by, ..self }
+    }
+
+    /// The place of the grid's centre in the world: the origin, but for coarser levels whose voxels do not fill the finest level's box.
+    pub fn place(&self) -> DVec3 {
+        self.place
+    }
+
     /// Checks the dimensions and spacings, as [`Volume::new`](crate::Volume::new) does.
     ///
     /// # Errors
@@ -43,7 +73,14 @@ impl Grid {
             let allowed = "three sizes of at least 1, at most 4294967295 voxels";
             return Err(SettingError::new("sizes", self.dims.as_dvec3(), allowed));
         }
-        check_spacing("spacing", self.spacing)
+        check_spacing("spacing", self.spacing)?;
+        let unit = self.unit();
+        if self.aspect().max_element() > MAX_ASPECT || self.place.abs().max_element() / unit > MAX_PLACE {
+            let allowed =
+                format!("spacings at most {MAX_ASPECT} times the finest level's smallest, {unit}, about its centre");
+            return Err(SettingError::new("spacing", self.spacing, allowed));
+        }
+        Ok(())
     }
 
     /// The voxel at an index in memory (x fastest).
@@ -57,12 +94,12 @@ impl Grid {
         voxel.x + self.dims.x * (voxel.y + self.dims.y * voxel.z)
     }
 
-    /// `min(sx, sy, sz)` in world units: the unit of length for opacities and slab widths (SPEC §2).
+    /// `min(sx, sy, sz)` in world units, of the volume's finest level: the unit of length for opacities and slab widths (SPEC §2).
     pub fn unit(&self) -> f64 {
-        self.spacing.min_element()
+        self.finest.unwrap_or(self.spacing).min_element()
     }
 
-    /// The grid aspect `ar = s / unit` (§4.2), each component at least 1.
+    /// The grid aspect `ar = s / unit` (§4.2), each component at least 1 if the finest level's spacings are the smallest.
     pub fn aspect(&self) -> DVec3 {
         self.spacing / self.unit()
     }
@@ -72,7 +109,7 @@ impl Grid {
         (self.dims.as_dvec3() - 1.0) / 2.0
     }
 
-    /// A voxel's world position.
+    /// A voxel's position from the grid's centre, in world units.
     pub fn world_position(&self, voxel: UVec3) -> DVec3 {
         (voxel.as_dvec3() - self.center()) * self.spacing
     }

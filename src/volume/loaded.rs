@@ -9,7 +9,7 @@ use super::display::ChannelDisplay;
 use super::samples::SampleType;
 use super::series::Series;
 use super::source::invalid;
-use super::{Orientation, VolumeError};
+use super::{Grid, Orientation, VolumeError};
 
 /// The contents of a file of values or labels.
 pub(crate) struct Loaded<T> {
@@ -32,8 +32,20 @@ pub(crate) struct Loaded<T> {
     pub(super) channel_names: Vec<String>,
     /// How the channels are shown, from the first on; there may be fewer than channels.
     pub(super) displays: Vec<ChannelDisplay>,
+    /// The levels in the file, of which the values are one.
+    pub(super) levels: Option<Levels>,
     /// One value per voxel, x fastest, channel by channel.
     pub(crate) values: Vec<T>,
+}
+
+/// The levels of a volume, and the one that is read (SPEC §13).
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Levels {
+    /// The number of voxels of each level along x, y and z, from the finest.
+    pub(super) dims: Vec<UVec3>,
+    /// The number of the level that is read, and its grid.
+    pub(super) level: u32,
+    pub(super) grid: Grid,
 }
 
 impl<T> Loaded<T> {
@@ -41,8 +53,21 @@ impl<T> Loaded<T> {
     pub(super) fn new(dims: UVec3, kind: SampleType, values: Vec<T>) -> Self {
         let (label_names, series, channel_names) = (BTreeMap::new(), Series::default(), Vec::new());
         let (spacing, unit, orientation, palette) = (None, None, None, None);
-        let displays = Vec::new();
-        Self { dims, kind, spacing, unit, orientation, palette, label_names, series, channel_names, displays, values }
+        let (displays, levels) = (Vec::new(), None);
+        Self {
+            dims,
+            kind,
+            spacing,
+            unit,
+            orientation,
+            palette,
+            label_names,
+            series,
+            channel_names,
+            displays,
+            levels,
+            values,
+        }
     }
 
     /// Checks that the values are those of one channel.

@@ -33,6 +33,7 @@ mod orientation;
 mod raw;
 mod resample;
 mod samples;
+mod seek;
 mod series;
 mod shear;
 mod source;
@@ -44,6 +45,10 @@ mod unit;
 mod vtk;
 #[cfg(any(feature = "tiff", feature = "vtk"))]
 mod xml;
+#[cfg(feature = "zarr")]
+mod zarr;
+#[cfg(any(feature = "codecs", feature = "npy", feature = "zarr"))]
+mod zip;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -61,13 +66,13 @@ pub use file::Files;
 pub use grid::Grid;
 pub(crate) use grid::{SPACING, check_spacing};
 pub use labels::Labels;
-use loaded::Loaded;
+use loaded::{Levels, Loaded};
 pub use orientation::{Orientation, PatientSide};
 pub use raw::RawLayout;
 pub use samples::SampleType;
 pub(crate) use samples::{SIZES, dims_of};
 pub(crate) use series::Selection;
-pub use store::{Store, StoreLevel};
+pub use store::{Store, StoreLevel, open_raw_store, open_store};
 
 use crate::error::setting::SettingError;
 
@@ -149,6 +154,8 @@ pub struct Volume {
     channel_name: Option<String>,
     display: Option<ChannelDisplay>,
     further: Vec<Arc<Volume>>,
+    levels: Vec<UVec3>,
+    level: u32,
     /// Not part of the volume itself; clones share them, since their values are the same.
     coefficients: KeptCoefficients,
 }
@@ -157,12 +164,12 @@ impl PartialEq for Volume {
     /// Two holes compare as equal.
     fn eq(&self, other: &Self) -> bool {
         let Self { grid, values, holes, labels, label_names, orientation, unit, encoding, palette, .. } = other;
-        let Self { colors, channel_name, display, further, coefficients: _, .. } = other;
+        let Self { colors, channel_name, display, further, levels, level, coefficients: _, .. } = other;
         let facts = (grid, holes, labels, label_names, orientation, unit, encoding, palette);
-        let channels = (colors, channel_name, display, further);
+        let channels = (colors, channel_name, display, further, levels, level);
         let Self { grid, holes, labels, label_names, orientation, unit, encoding, palette, .. } = self;
         facts == (grid, holes, labels, label_names, orientation, unit, encoding, palette)
-            && channels == (&self.colors, &self.channel_name, &self.display, &self.further)
+            && channels == (&self.colors, &self.channel_name, &self.display, &self.further, &self.levels, &self.level)
             && self.values.iter().zip(values).all(|(a, b)| a == b || a.is_nan() && b.is_nan())
     }
 }
@@ -175,7 +182,7 @@ impl Volume {
     /// spacing is not within [1e-100, 1e100] or is more than 10⁴ times another, or no value is finite.
     pub fn new(origin: &str, dims: UVec3, spacing: DVec3, mut values: Vec<f32>) -> Result<Self, VolumeError> {
         let invalid = |field: &str, found: String, allowed: &str| invalid(origin, field, found, allowed.to_owned());
-        let grid = Grid { dims, spacing };
+        let grid = Grid::new(dims, spacing);
         grid.check().map_err(|error| refused(origin, error))?;
         let count = dims.element_product();
         if values.len() != count as usize {
@@ -204,19 +211,22 @@ impl Volume {
             channel_name: None,
             display: None,
             further: Vec::new(),
+            levels: Vec::new(),
+            level: 0,
             coefficients: KeptCoefficients::default(),
         }
     }
 
-    /// The same values with another spacing (world units between neighbouring voxels).
+    /// The same values with another spacing (world units between neighbouring voxels; of a coarser level, those of the finest).
     ///
     /// # Errors
     /// If a spacing is not within [1e-100, 1e100] or is more than 10⁴ times another.
     pub fn with_spacing(mut self, origin: &str, spacing: DVec3) -> Result<Self, VolumeError> {
         check_spacing("spacing", spacing).map_err(|error| refused(origin, error))?;
-        self.grid.spacing = spacing;
+        self.grid = self.grid.with_finest_spacing(spacing);
+        self.grid.check().map_err(|error| refused(origin, error))?;
         for channel in &mut self.further {
-            Arc::make_mut(channel).grid.spacing = spacing;
+            Arc::make_mut(channel).grid = self.grid;
         }
         Ok(self)
     }
@@ -224,8 +234,8 @@ impl Volume {
     /// Reads a volume file. Its first bytes determine the format, or else its extension: NRRD (`.nrrd`, `.nhdr`), and, each with the
     /// feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MGH (`.mgh`, `.mgz`), MetaImage (`.mha`, `.mhd`), NPY
     /// (`.npy`) and its archives (`.npz`: their only array, or the one named as in `file.npz:name`), TIFF (`.tif`, `.tiff`), DICOM
-    /// (`.dcm`) and VTK (`.vti`, `.vtk`). The path may also be a folder of slices: TIFF files of one page, or the DICOM files of one
-    /// series.
+    /// (`.dcm`), VTK (`.vti`, `.vtk`) and Zarr (folders, and archives `.zip` and `.ozx`). The path may also be a folder of slices: TIFF files of one page,
+    /// or the DICOM files of one series.
     ///
     /// # Errors
     /// If the file cannot be read, is of no format that is compiled in, does not hold what its header promises, or needs more memory
@@ -245,7 +255,7 @@ impl Volume {
     pub(crate) fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
         let (format, loaded) = format::read(path, access)?;
         let Loaded { dims, kind: sample_type, spacing, unit, orientation, palette, label_names, .. } = loaded;
-        let Loaded { series, channel_names, displays, mut values, .. } = loaded;
+        let Loaded { series, channel_names, displays, levels, mut values, .. } = loaded;
         let origin = path.display().to_string();
         let channels = if series.is_color { 1 } else { series.channels };
         let encoding = Some(Encoding { format, sample_type, channels, times: series.times });
@@ -271,8 +281,22 @@ impl Volume {
         };
         let first = channel(values)?;
         let further = further.into_iter().rev().map(channel).collect::<Result<_, VolumeError>>()?;
-        let first = Self { palette, label_names, ..first }.with_channels(&origin, further)?;
-        first.with_orientation(&origin, orientation)
+        let mut first = Self { palette, label_names, ..first };
+        if let Some(Levels { dims, level, grid }) = levels {
+            grid.check().map_err(|error| refused(&origin, error))?;
+            (first.grid, first.levels, first.level) = (grid, dims, level);
+        }
+        first.with_channels(&origin, further)?.with_orientation(&origin, orientation)
+    }
+
+    /// The number of voxels along x, y and z of each level that the volume's store holds, from the finest; empty if it comes from no such store.
+    pub fn levels(&self) -> &[UVec3] {
+        &self.levels
+    }
+
+    /// The number of the level that this volume is, from 0 for the finest.
+    pub fn level(&self) -> u32 {
+        self.level
     }
 
     /// The grid of the voxels.
@@ -338,7 +362,7 @@ impl Volume {
     /// The gradient in value per world unit, estimated in the unwarped space (§4.2) by central differences: one-sided at the border and
     /// beside a hole, 0 along an axis without a neighbour on either side, and 0 in a hole.
     pub fn gradient(&self, voxel: UVec3) -> DVec3 {
-        let Grid { dims, spacing } = self.grid;
+        let Grid { dims, spacing, .. } = self.grid;
         let strides = [1, dims.x as usize, dims.x as usize * dims.y as usize];
         let at: usize = (0..3).map(|axis| voxel[axis] as usize * strides[axis]).sum();
         if self.values[at].is_nan() {

@@ -5,7 +5,7 @@
 
 use std::collections::TryReserveError;
 use std::fmt::{self, Display, Formatter};
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{self, BufRead, BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use bzip2::bufread::MultiBzDecoder;
@@ -129,7 +129,7 @@ macro_rules! sample_types {
             }
 
             /// Appends the samples in `bytes`, a whole number of them. Stops at a sample that is not allowed and returns it as the error.
-            fn convert<T: Voxel>(self, layout: &Samples, bytes: &[u8], into: &mut Vec<T>) -> Result<(), f64> {
+            pub(super) fn convert<T: Voxel>(self, layout: &Samples, bytes: &[u8], into: &mut Vec<T>) -> Result<(), f64> {
                 match self {
                     $(Self::$name => {
                         let from_bytes = if layout.big_endian { <$type>::from_be_bytes } else { <$type>::from_le_bytes };
@@ -192,7 +192,7 @@ impl Samples {
 
     /// The voxel of the sample at an index in the file.
     fn voxel_at(&self, index: usize) -> UVec3 {
-        let in_file = |dims| Grid { dims, spacing: DVec3::ONE }.voxel_at(index as u32);
+        let in_file = |dims| Grid::new(dims, DVec3::ONE).voxel_at(index as u32);
         if self.z_fastest { in_file(self.dims.zyx()).zyx() } else { in_file(self.dims) }
     }
 
@@ -320,6 +320,12 @@ impl Stream {
         matches!(self.reader, Reader::Raw(_)).then_some(self.left)
     }
 
+    /// The position in the file; `None` if the stream is compressed.
+    pub(super) fn position(&mut self) -> Result<Option<u64>, VolumeError> {
+        let Reader::Raw(reader) = &mut self.reader else { return Ok(None) };
+        reader.stream_position().map(Some).map_err(io_error(&self.path))
+    }
+
     /// Skips `bytes` bytes, or all that are left if there are fewer.
     pub(super) fn skip(&mut self, bytes: u64) -> Result<(), VolumeError> {
         let bytes = bytes.min(self.left);
@@ -393,7 +399,7 @@ impl Stream {
     }
 
     /// Appends up to `bytes` bytes, fewer only at the end, and returns their number.
-    fn read_up_to(&mut self, bytes: u64, into: &mut Vec<u8>) -> Result<u64, VolumeError> {
+    pub(super) fn read_up_to(&mut self, bytes: u64, into: &mut Vec<u8>) -> Result<u64, VolumeError> {
         let read = match &mut self.reader {
             Reader::Raw(reader) => reader.by_ref().take(bytes).read_to_end(into),
             Reader::Decoder(reader, _) => reader.by_ref().take(bytes).read_to_end(into),

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::VolumeError;
 use super::samples::{Samples, Stream, Voxel, dims_of};
+use super::seek::Located;
 use super::source::invalid;
 
 /// The maximum number of channels in a file.
@@ -39,6 +40,8 @@ pub(crate) struct Selection {
     pub(crate) channel: Option<u32>,
     /// The number of the time; `None` for the first.
     pub(crate) time: Option<u32>,
+    /// The number of the level; `None` for the finest that fits in memory.
+    pub(crate) level: Option<u32>,
 }
 
 impl Default for Series {
@@ -115,6 +118,11 @@ impl Stream {
     ) -> Result<Vec<T>, VolumeError> {
         let selection = self.access.selection();
         series.check(&self.path, selection)?;
+        if self.access.is_noting() {
+            let located = self.locate(samples, series)?;
+            self.access.note(located);
+            return Ok(Vec::new());
+        }
         let channels = series.channels(selection);
         if series.count() == 1 {
             return self.samples(samples, window);
@@ -144,6 +152,20 @@ impl Stream {
             at = block + 1;
         }
         Ok(values)
+    }
+
+    /// Where the samples are in an uncompressed file, which must hold them all.
+    fn locate(&mut self, samples: &Samples, series: &Series) -> Result<Located, VolumeError> {
+        let total = samples.bytes().saturating_mul(series.count());
+        let allowed = format!("at least {total} bytes, uncompressed, x fastest");
+        let at =
+            self.position()?.filter(|_| !samples.z_fastest && self.exactly_left().is_some_and(|left| left >= total));
+        let at = at.ok_or_else(|| {
+            let found = self.exactly_left().map_or("a compressed stream".to_owned(), |left| format!("{left} bytes"));
+            let found = if samples.z_fastest { "z fastest".to_owned() } else { found };
+            invalid(&self.path, "data", found, allowed)
+        })?;
+        Ok(Located { path: self.path.clone(), at, samples: *samples, series: *series })
     }
 
     /// The samples of some of `count` channels, of which each voxel's lie side by side.

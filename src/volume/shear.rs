@@ -118,6 +118,10 @@ impl Lattice {
         access: &Access,
     ) -> Result<Loaded<T>, VolumeError> {
         let Some(shear) = self.shear else { return Ok(loaded) };
+        if access.is_noting() {
+            let found = format!("axes sheared by {:.2}°", shear.degrees);
+            return Err(invalid(path, field, found, "axes at right angles, where a file is read by boxes"));
+        }
         loaded.check_single(path, "one, where axes are not at right angles")?;
         let ranges = shear.ranges(loaded.dims);
         let sizes = ranges.map(|[first, last]| last - first + 1.0);

@@ -1,41 +1,121 @@
-//! Volumes that are read by boxes (SPEC §13).
+//! Volumes that are read by boxes, level by level (SPEC §13).
 
-use std::fmt;
+use std::fmt::Debug;
+use std::path::Path;
+use std::sync::Arc;
 
-use glam::UVec3;
+use glam::{DVec3, UVec3};
 
-use super::{Grid, VolumeError};
+use super::access::{Access, ReadOptions};
+use super::format;
+use super::samples::{SIZES, Samples, dims_of};
+use super::seek::{FileStore, Located};
+use super::series::Series;
+use super::source::invalid;
+use super::{Grid, RawLayout, VolumeError};
 
-/// A volume that is read by boxes (SPEC §13).
-pub trait Store: Send + Sync + fmt::Debug {
+/// A volume that is read by boxes (SPEC §13): one channel at one time.
+///
+/// Boxes lie within a level's grid, and may have any place and size there; a box of whole chunks is read best. Several threads may read at once.
+pub trait Store: Send + Sync + Debug {
     /// The levels from the finest, at least one.
     fn levels(&self) -> &[StoreLevel];
 
-    /// Reads the values of a box of voxels of a level, x fastest: `values.len()` is the product of `dims`. Returns the number of bytes read from
-    /// the store.
+    /// Reads the values of a box of voxels of a level, x fastest: `values.len()` is the product of `dims`. A value that is not finite makes a hole. Returns
+    /// the number of bytes read from the store (compressed); where threads read at once, one may return what another has read, but their sum is exact.
     ///
     /// # Errors
-    /// If the store cannot be read, or does not hold what its metadata promises.
+    /// If the box does not lie in the level, or the store cannot be read or is damaged there. The error names the chunk. `values` may then hold anything.
     fn read(&self, level: usize, from: UVec3, dims: UVec3, values: &mut [f32]) -> Result<u64, VolumeError>;
 
-    /// Whether the store holds a chunk; all values of one that it does not hold are [`Self::fill`].
+    /// Whether the store holds a chunk; all values of one that it does not hold are [`Self::fill`]. `chunk` counts chunks of [`StoreLevel::chunk`] voxels.
     ///
     /// # Errors
-    /// If the store cannot be read.
+    /// If the level has no such chunk, or the store cannot be read.
     fn contains(&self, level: usize, chunk: UVec3) -> Result<bool, VolumeError>;
 
-    /// The value of voxels in chunks that the store does not hold.
+    /// The value of every voxel in a chunk that the store does not hold.
     fn fill(&self) -> f32;
 
-    /// A hash of what identifies the store's values: its metadata, never paths or times.
+    /// A hash, as hexadecimal digits, of what identifies the store's values: its metadata, never paths or times.
     fn identity(&self) -> String;
 }
 
-/// One resolution of a store.
+/// A level of a [`Store`]: the volume at one resolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StoreLevel {
-    /// The voxels and their spacing in world units.
+    /// Its voxels.
     pub grid: Grid,
-    /// The number of voxels along x, y and z that are best read together.
+    /// The number of voxels along x, y and z of a chunk as it is read best: of an inner chunk, where chunks lie in shards.
     pub chunk: UVec3,
+}
+
+impl StoreLevel {
+    /// The number of chunks along x, y and z.
+    pub fn chunks(&self) -> UVec3 {
+        UVec3::from_array([0, 1, 2].map(|axis| self.grid.dims[axis].div_ceil(self.chunk[axis])))
+    }
+}
+
+/// Opens a volume to be read by boxes: an OME-Zarr image or a Zarr array, or an uncompressed NRRD, NIfTI, MetaImage or NPY file. Of a file with several channels the options choose one; of several times they may.
+///
+/// # Errors
+/// If the file cannot be read, is of no such format, holds several channels of which none is chosen, or needs more memory than
+/// [`ReadOptions::memory`] allows for the chunks that are read at once.
+pub fn open_store(path: &Path, options: &ReadOptions) -> Result<Arc<dyn Store>, VolumeError> {
+    format::open_store(path, &Access::new(options)?)
+}
+
+/// Opens a file of samples without a header to be read by boxes.
+///
+/// # Errors
+/// If the file cannot be read, or is shorter than its layout says.
+pub fn open_raw_store(path: &Path, layout: &RawLayout, options: &ReadOptions) -> Result<Arc<dyn Store>, VolumeError> {
+    let &RawLayout { dims, sample_type: kind, big_endian, offset: at } = layout;
+    let access = Access::new(options)?;
+    let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
+    dims_of(dims.to_array()).ok_or_else(|| invalid(path, "sizes", dims, SIZES))?;
+    let mut file = access.open(path)?;
+    file.skip(at)?;
+    let left = file.left()?;
+    if left != samples.bytes() {
+        return Err(samples.mismatch(path, left));
+    }
+    let located = Located { path: path.to_owned(), at, samples, series: Series::default() };
+    Ok(Arc::new(FileStore::new(located, DVec3::ONE, &access)?))
+}
+
+/// Checks that a box lies in a level, and that there is a value for each of its voxels.
+pub(super) fn check_box(
+    path: &Path,
+    levels: &[StoreLevel],
+    level: usize,
+    (from, dims): (UVec3, UVec3),
+    values: usize,
+) -> Result<(), VolumeError> {
+    let grid = level_of(path, levels, level)?.grid;
+    let is_within = |axis: usize| dims[axis] > 0 && from[axis].checked_add(dims[axis]) <= Some(grid.dims[axis]);
+    let is_within = [0, 1, 2].map(|axis| is_within(axis) && from[axis] < grid.dims[axis]) == [true; 3];
+    if !is_within {
+        let allowed = format!("a box within the {} voxels of level {level}", grid.dims);
+        return Err(invalid(path, "box", format!("{dims} voxels from {from}"), allowed));
+    }
+    let count = dims.as_u64vec3().element_product();
+    if count != values as u64 {
+        return Err(invalid(path, "values", values, format!("{count}, one for each voxel of the box")));
+    }
+    Ok(())
+}
+
+/// Checks that a level has a chunk.
+pub(super) fn check_chunk(path: &Path, levels: &[StoreLevel], level: usize, chunk: UVec3) -> Result<(), VolumeError> {
+    let chunks = level_of(path, levels, level)?.chunks();
+    if chunk.cmplt(chunks).all() {
+        return Ok(());
+    }
+    Err(invalid(path, "chunk", chunk, format!("a chunk of level {level}, which has {chunks}")))
+}
+
+fn level_of<'a>(path: &Path, levels: &'a [StoreLevel], level: usize) -> Result<&'a StoreLevel, VolumeError> {
+    levels.get(level).ok_or_else(|| invalid(path, "level", level, format!("0 to {}", levels.len() - 1)))
 }

@@ -23,7 +23,7 @@ use sheetsplat::volume::{Grid, Volume};
 
 /// A volume given by a function of the voxel.
 pub(crate) fn volume(dims: [u32; 3], spacing: DVec3, value: impl Fn(UVec3) -> f64) -> Volume {
-    let grid = Grid { dims: UVec3::from(dims), spacing };
+    let grid = Grid::new(UVec3::from(dims), spacing);
     let values = (0..grid.dims.element_product()).map(|index| value(grid.voxel_at(index)) as f32).collect();
     Volume::new("test", grid.dims, spacing, values).unwrap()
 }

@@ -125,7 +125,7 @@ pub(crate) fn random_volume(random: &mut Random, (least, end): (f64, f64), spaci
     let dims = UVec3::from([(); 3].map(|()| random.uniform(least, end) as u32));
     let balls: Vec<(DVec3, f64)> =
         (0..5).map(|_| (random.within(DVec3::ZERO, dims.as_dvec3()), random.uniform(0.06, 0.3) * end)).collect();
-    let grid = Grid { dims, spacing: DVec3::from(spacing) };
+    let grid = Grid::new(dims, DVec3::from(spacing));
     let value = |index| {
         let p = grid.voxel_at(index).as_dvec3();
         let inside = balls.iter().any(|(center, radius)| p.distance(*center) < *radius);

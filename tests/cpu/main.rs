@@ -7,6 +7,8 @@ mod after;
 #[expect(dead_code, reason = "not every file needs all of it")]
 #[path = "../common/mod.rs"]
 mod common;
+#[cfg(feature = "zarr")]
+mod levels;
 mod modes;
 mod picks;
 mod regions;

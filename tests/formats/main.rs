@@ -3,6 +3,7 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod boxes;
 mod colors;
 mod data_files;
 mod dicom;
@@ -25,6 +26,7 @@ mod shared;
 mod shear;
 mod tiff;
 mod vtk;
+mod zarr;
 
 use std::cell::RefCell;
 use std::fs;

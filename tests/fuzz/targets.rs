@@ -13,7 +13,7 @@ use sheetsplat::volume::{RawLayout, SampleType, Volume, VolumeError};
 pub(crate) type Target = fn(&[u8]);
 
 /// The targets by name.
-pub(crate) const TARGETS: [(&str, Target); 15] = [
+pub(crate) const TARGETS: [(&str, Target); 16] = [
     ("nrrd", |bytes| volume("volume.nrrd", bytes, Volume::open)),
     ("nifti", |bytes| volume("volume.nii", bytes, Volume::open)),
     ("metaimage", |bytes| volume("volume.mha", bytes, Volume::open)),
@@ -25,6 +25,7 @@ pub(crate) const TARGETS: [(&str, Target); 15] = [
     ("dicom", |bytes| volume("volume.dcm", bytes, Volume::open)),
     ("vti", |bytes| volume("volume.vti", bytes, Volume::open)),
     ("vtk", |bytes| volume("volume.vtk", bytes, Volume::open)),
+    ("zarr", zarr),
     ("png-image", |bytes| image("image.png", bytes)),
     ("exr-image", |bytes| image("image.exr", bytes)),
     ("npy-image", |bytes| image("image.npy", bytes)),
@@ -72,6 +73,42 @@ fn raw(bytes: &[u8]) {
         offset: (*offset).into(),
     };
     volume("volume.raw", samples, |path| Volume::open_raw(path, &layout));
+}
+
+/// The first byte chooses the codecs of a single chunk or shard, which the others are.
+fn zarr(bytes: &[u8]) {
+    const CODECS: [&str; 6] = [
+        r#"{"name": "blosc", "configuration": {}}"#,
+        r#"{"name": "gzip", "configuration": {}}"#,
+        r#"{"name": "zstd", "configuration": {}}"#,
+        r#"{"name": "numcodecs.zlib", "configuration": {}}"#,
+        r#"{"name": "numcodecs.bz2", "configuration": {}}"#,
+        r#"{"name": "crc32c"}"#,
+    ];
+    let Some((kind, code)) = bytes.split_first() else { return };
+    let (kind, little) = (usize::from(*kind), r#"{"name": "bytes", "configuration": {"endian": "little"}}"#);
+    let codecs = match CODECS.get(kind) {
+        Some(codec) => format!("[{little}, {codec}]"),
+        None => format!(
+            r#"[{{"name": "sharding_indexed", "configuration": {{"chunk_shape": [2, 4, 4], "codecs": [{little}, {}],
+            "index_codecs": [{little}]}}}}]"#,
+            CODECS[kind % CODECS.len()]
+        ),
+    };
+    let metadata = format!(
+        r#"{{"zarr_format": 3, "node_type": "array", "shape": [4, 8, 8], "data_type": "uint16", "fill_value": 0,
+        "chunk_grid": {{"name": "regular", "configuration": {{"chunk_shape": [4, 8, 8]}}}},
+        "chunk_key_encoding": {{"name": "default", "configuration": {{"separator": "."}}}}, "codecs": {codecs}}}"#
+    );
+    file("zarr.json", metadata.as_bytes());
+    file("c.0.0.0", code);
+    let volume = Volume::open(&FOLDER);
+    for name in ["zarr.json", "c.0.0.0"] {
+        _ = fs::remove_file(FOLDER.join(name));
+    }
+    if let Ok(volume) = volume {
+        assert_eq!(volume.values().len(), 256);
+    }
 }
 
 /// Reads an image as `compare` and goldens do.

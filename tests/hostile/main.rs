@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use glam::UVec3;
 use peak_alloc::PeakAlloc;
 use sheetsplat::scene::Scene;
-use sheetsplat::volume::{Labels, RawLayout, SampleType, Volume, VolumeError};
+use sheetsplat::volume::{Labels, RawLayout, ReadOptions, SampleType, Volume, VolumeError};
 
 use mutate::{Random, mutant};
 
@@ -73,7 +73,36 @@ fn victims(folder: &Path) -> Vec<Victim> {
     for slices in ["series", "slices", "channels"] {
         files(&fixtures.join(slices), &folder.join(slices));
     }
+    for name in STORES {
+        let store = folder.join(name);
+        copy_store(&fixtures.join(name), &store, &store, &mut victims);
+    }
     victims
+}
+
+/// Zarr stores: of version 2, and of version 3 with shards.
+const STORES: [&str; 2] = ["zarr/image-0.4.zarr", "zarr/ngff.zarr"];
+
+/// Copies all files of a store, each of which is mutated while the store is opened.
+fn copy_store(from: &Path, to: &Path, store: &Path, victims: &mut Vec<Victim>) {
+    fs::create_dir_all(to).unwrap();
+    let mut paths: Vec<PathBuf> = fs::read_dir(from).unwrap().map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    for path in paths {
+        let copy = to.join(path.file_name().unwrap());
+        if path.is_dir() {
+            copy_store(&path, &copy, store, victims);
+        } else {
+            fs::copy(&path, &copy).unwrap();
+            victims.push(Victim { file: copy, open: store.to_owned() });
+        }
+    }
+}
+
+/// The options for a path. A store may lack chunks, so that its size limits its values only where memory does.
+fn options(path: &Path) -> ReadOptions {
+    let is_store = path.extension().is_some_and(|extension| extension == "zarr");
+    if is_store { ReadOptions::default().with_memory(4 << 20) } else { ReadOptions::default() }
 }
 
 fn open(path: &Path) -> Result<Volume, VolumeError> {
@@ -81,7 +110,7 @@ fn open(path: &Path) -> Result<Volume, VolumeError> {
         let layout = RawLayout { dims: UVec3::new(5, 4, 3), sample_type: SampleType::F32, big_endian: true, offset: 7 };
         return Volume::open_raw(path, &layout);
     }
-    Volume::open(path)
+    Volume::open_with(path, &options(path))
 }
 
 /// The size in bytes of a file, or of the files in a folder.
@@ -131,7 +160,7 @@ fn mutate_files(random: &mut Random) -> Count {
             }
             if round % 4 == 0 {
                 let labels = |result: &Result<Labels, _>| result.as_ref().map_or(0, |labels| 2 * labels.values.len());
-                _ = bounded(&what, size(path), || Labels::open(path), labels);
+                _ = bounded(&what, size(path), || Labels::open_with(path, &options(path)), labels);
             }
             count.inputs += 1;
         }

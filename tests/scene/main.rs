@@ -145,6 +145,7 @@ fn every_key() {
         labels: Some(PathBuf::from("folder/segments/b.nrrd")),
         index: None,
         time: None,
+        level: None,
         name: None,
         visible: true,
         camera: Camera {

@@ -18,7 +18,7 @@ const AXIS: f64 = 1.0 / (1 << 18) as f64;
 
 /// A grid, and a view of it from any eye or, for slices, along any direction.
 pub(crate) fn random_view(random: &mut Random, method: Method, form: FootprintForm) -> (Grid, Scene) {
-    let grid = Grid { dims: UVec3::new(9, 8, 11), spacing: random.pick(&SPACINGS).into() };
+    let grid = Grid::new(UVec3::new(9, 8, 11), random.pick(&SPACINGS).into());
     let mut scene = scene(70, 45);
     (scene.splatting.method, scene.splatting.footprint) = (method, form);
     (scene.splatting.radius, scene.splatting.falloff) = random.pick(&KERNELS);

@@ -42,7 +42,7 @@ use sheetsplat::wgpu::{self, BindingResource, Buffer, BufferUsages, Device, Text
 fn frame(adjust: impl FnOnce(&mut Scene)) -> Frame {
     let mut scene = common::scene(64, 64);
     adjust(&mut scene);
-    frame_over(&Grid { dims: UVec3::splat(9), spacing: DVec3::ONE }, &scene)
+    frame_over(&Grid::new(UVec3::splat(9), DVec3::ONE), &scene)
 }
 
 /// A frame over a grid, with ramps that are 1 everywhere.

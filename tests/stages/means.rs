@@ -31,7 +31,7 @@ const REACH: i32 = 3;
 /// A view from anywhere, sometimes with planes that cut.
 fn random_view(random: &mut Random, compositing: Compositing) -> (Grid, Seen) {
     let dims = [(); 3].map(|()| random.uniform(1.0, 14.0) as u32);
-    let grid = Grid { dims: UVec3::from(dims), spacing: random.pick(&SPACINGS).into() };
+    let grid = Grid::new(UVec3::from(dims), random.pick(&SPACINGS).into());
     let mut scene = scene(61, 37);
     scene.splatting.method = random.pick(&[Method::ImageAligned, Method::AxisAligned]);
     scene.splatting.slab_width = random.pick(&[0.3, 1.0, 2.6]);

@@ -201,7 +201,7 @@ fn boxes_shrink_on_the_way_back() {
     let mut random = Random(13);
     let mut shrunk = 0;
     for spacing in SPACINGS {
-        let grid = Grid { dims: UVec3::new(40, 31, 36), spacing: DVec3::from(spacing) };
+        let grid = Grid::new(UVec3::new(40, 31, 36), DVec3::from(spacing));
         let bricks = BrickList::new(&grid, &(0..grid.dims.element_product()).collect::<Vec<_>>());
         for _ in 0..30 {
             let mut scene = scene(90, 70);

@@ -27,7 +27,7 @@ struct Case {
 impl Case {
     /// Some voxels do not take part.
     fn new(random: &mut Random, spacing: [f64; 3], size: [u32; 2]) -> Self {
-        let grid = Grid { dims: UVec3::new(15, 13, 18), spacing: spacing.into() };
+        let grid = Grid::new(UVec3::new(15, 13, 18), spacing.into());
         let count = grid.dims.element_product();
         let voxels: Vec<u32> = (0..count).filter(|_| random.uniform(0.0, 1.0) < 0.3).collect();
         let mut scene = scene(size[0], size[1]);

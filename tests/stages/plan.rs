@@ -16,7 +16,7 @@ use crate::common::{Random, camera, scene};
 fn every_kernel_is_looked_at_by_every_group_that_it_reaches_into() {
     let mut random = Random(23);
     for spacing in [[1.0, 1.0, 1.0], [1.0, 1.0, 5.0], [3.2, 3.2, 1.5]] {
-        let grid = Grid { dims: UVec3::new(19, 18, 17), spacing: DVec3::from(spacing) };
+        let grid = Grid::new(UVec3::new(19, 18, 17), DVec3::from(spacing));
         // There are two lists, and voxels that do not take part.
         let taking_part = (0..grid.dims.element_product()).filter(|_| random.uniform(0.0, 1.0) < 0.7);
         let voxels: Vec<u32> = taking_part.collect();
@@ -75,7 +75,7 @@ fn every_kernel_is_looked_at_by_every_group_that_it_reaches_into() {
 #[test]
 fn bricks_hold_every_voxel_once_within_their_box() {
     let mut random = Random(5);
-    let grid = Grid { dims: UVec3::new(11, 6, 9), spacing: DVec3::ONE };
+    let grid = Grid::new(UVec3::new(11, 6, 9), DVec3::ONE);
     let count = grid.dims.element_product();
     let voxels: Vec<u32> = (0..count).filter(|_| random.uniform(0.0, 1.0) < 0.4).collect();
     let mut list = BrickList::new(&grid, &voxels);

@@ -216,9 +216,10 @@ impl Picked {
 /// What decides which volume a scene shows.
 fn sources(scene: &Scene) -> Vec<Channel> {
     let source = |channel: std::borrow::Cow<'_, Channel>| {
-        let Channel { volume, spacing, labels, index, time, .. } = channel.into_owned();
+        let Channel { volume, spacing, labels, index, time, level, .. } = channel.into_owned();
         let mut source = Channel::new(volume);
-        (source.spacing, source.labels, source.index, source.time) = (spacing, labels, index, time);
+        (source.spacing, source.labels) = (spacing, labels);
+        (source.index, source.time, source.level) = (index, time, level);
         source
     };
     scene.channels().map(source).collect()

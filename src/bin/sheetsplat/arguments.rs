@@ -98,6 +98,9 @@ struct Raw {
     /// The time, counted from 0, to show of a file with several: short for --set volume.time=N. `orbit` also takes A..B, the times A to B - 1 in turn.
     #[arg(long, value_name = "N")]
     time: Option<String>,
+    /// The level, counted from 0 for the finest, to show of a store with several, or auto: short for --set volume.level=N.
+    #[arg(long, value_name = "N")]
+    level: Option<String>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -123,6 +126,7 @@ impl Raw {
             array("spacing", &self.spacing),
             plain("index", &self.channel),
             time.map(|time| format!("volume.time={time}")),
+            plain("level", &self.level),
         ];
         sets.into_iter().flatten().collect()
     }

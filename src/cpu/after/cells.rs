@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn a_cell_joins_the_voxels_that_its_points_take_values_from() {
-        let grid = Grid { dims: UVec3::new(11, 7, 9), spacing: DVec3::ONE };
+        let grid = Grid::new(UVec3::new(11, 7, 9), DVec3::ONE);
         let value = |index: u32| match index.wrapping_mul(2_654_435_761) >> 24 {
             0..3 => 0.9,
             3..6 => -0.9,

@@ -121,7 +121,7 @@ impl Drop for Chunk {
 /// The bricks of the voxels that take part, in memory order.
 fn bricks(source: &Source, from: UVec3, dims: UVec3, values: &[f32]) -> Result<Vec<Brick>, VolumeError> {
     let Source { transfer, clipped, grid, .. } = source;
-    let own = Grid { dims, spacing: grid.spacing };
+    let own = Grid { dims, ..*grid };
     // Only gradient opacity needs values around the chunk to decide what takes part.
     let rim = u32::from(transfer.gradient_opacity.is_some());
     let low = from.saturating_sub(UVec3::splat(rim));

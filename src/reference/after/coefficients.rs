@@ -119,7 +119,7 @@ mod tests {
     /// The field has the voxels' values also around holes, which are in none of the sums.
     #[test]
     fn fields_have_the_values_at_voxels() {
-        let grid = Grid { dims: UVec3::new(6, 5, 4), spacing: DVec3::ONE };
+        let grid = Grid::new(UVec3::new(6, 5, 4), DVec3::ONE);
         let value = |index: u32| match index * 7919 % 31 {
             3 | 17 => f64::NAN,
             rest => 1e6 + f64::from(rest * rest),
@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn constants_and_volumes_of_holes_alone() {
-        let grid = Grid { dims: UVec3::new(3, 3, 3), spacing: DVec3::ONE };
+        let grid = Grid::new(UVec3::new(3, 3, 3), DVec3::ONE);
         assert!(exact(&grid, &[5.0; 27], 2.0, 2.0).unwrap().iter().all(|&c| (c - 5.0).abs() < 1e-12));
         assert!(exact(&grid, &[f64::NAN; 27], 2.0, 2.0).unwrap().iter().all(|c| c.is_nan()));
     }

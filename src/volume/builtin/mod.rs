@@ -58,7 +58,7 @@ pub(crate) fn read(name: &str, access: &Access) -> Result<Volume, VolumeError> {
         })?,
     };
     let dims = UVec3::from(dims.map(|side| ((side * n + longest / 2) / longest).max(1)));
-    let grid = Grid { dims, spacing: spacing * (f64::from(longest) / f64::from(n)) };
+    let grid = Grid::new(dims, spacing * (f64::from(longest) / f64::from(n)));
     let bytes = match painted {
         Painted::Values(_) => size_of::<f32>(),
         Painted::Tissues(_) => size_of::<f32>() + size_of::<u16>(),

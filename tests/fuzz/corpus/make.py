@@ -1,10 +1,11 @@
 """Writes the images, the raw volume and the scenes beside this file, each by a program that is not sheetsplat.
 
-pip install numpy OpenEXR pillow
+pip install numpy numcodecs OpenEXR pillow
 """
 
 from pathlib import Path
 
+import numcodecs
 import numpy
 import OpenEXR
 from PIL import Image, PngImagePlugin
@@ -37,6 +38,27 @@ def png():
     }
     for name, image in images.items():
         image.save(folder("png-image") / f"{name}.png", optimize=True, pnginfo=golden if name == "rgb" else None)
+
+
+def zarr():
+    values = numpy.arange(256, dtype="<u2")
+    chunk = numpy.concatenate([values[64 * z + 8 * y :][:4] for z in range(2) for y in range(4)])
+    codecs = {
+        0: [numcodecs.Blosc(name, 9, shuffle) for name in ("blosclz", "lz4", "zlib", "zstd") for shuffle in (1, 2)],
+        1: [numcodecs.GZip()],
+        2: [numcodecs.Zstd()],
+        3: [numcodecs.Zlib()],
+        4: [numcodecs.BZ2()],
+        5: [numcodecs.CRC32C(location="end")],
+    }
+    for kind, of_kind in codecs.items():
+        for number, codec in enumerate(of_kind):
+            (folder("zarr") / f"chunk-{kind}-{number}").write_bytes(bytes([kind]) + bytes(codec.encode(values)))
+    # A shard of which two chunks are stored.
+    code = bytes(numcodecs.Zstd().encode(chunk))
+    index = numpy.full((8, 2), -1, "<i8")
+    index[0] = index[5] = 0, len(code)
+    (folder("zarr") / "shard").write_bytes(bytes([8]) + code + index.tobytes())
 
 
 def exr():
@@ -116,6 +138,7 @@ def nrrd():
 
 
 png()
+zarr()
 exr()
 npy()
 raw()

@@ -82,7 +82,7 @@ fn any_list(prepared: &Prepared<'_>) -> CullList {
         culled: &storage,
         planes: None,
     };
-    let grid = Grid { dims: glam::UVec3::ONE, spacing: DVec3::ONE };
+    let grid = Grid::new(glam::UVec3::ONE, DVec3::ONE);
     let lists = BrickLists::upload(device, &grid, &[0]);
     Cull::new(device, 1).prepare(device, buffers, &lists.lists[0], &storage, (1, 1), None).unwrap()
 }

@@ -293,7 +293,7 @@ fn masks(random: &mut Random, size: [u32; 2]) -> Vec<Occluded> {
 
 /// A dense volume with gaps, in bricks of up to 64 voxels.
 fn dense(random: &mut Random, sheets: u32, culling: bool) -> Case {
-    let grid = Grid { dims: UVec3::new(14, 11, 17), spacing: DVec3::new(1.0, 1.0, 1.3) };
+    let grid = Grid::new(UVec3::new(14, 11, 17), DVec3::new(1.0, 1.0, 1.3));
     let holes = random.uniform(0.0, 0.6);
     let count = grid.dims.element_product();
     // The first bricks are full.
@@ -382,7 +382,7 @@ fn many_bricks() {
     for (sheets, side, height, least) in [(4, 370, 170.0, 256 * 32), (1, 370, 260.0, 256), (2, 150, 170.0, 256)] {
         let stage = Cull::new(gpu.device(), sheets);
         // Adjacent bricks with one or two voxels each.
-        let grid = Grid { dims: UVec3::new(side, 6, side), spacing: DVec3::ONE };
+        let grid = Grid::new(UVec3::new(side, 6, side), DVec3::ONE);
         let mut chosen = BTreeSet::new();
         for z in (0..side).step_by(4) {
             for y in [0, 4] {

@@ -57,7 +57,7 @@ impl<'a> Stages<'a> {
             culled: &storage,
             planes: None,
         };
-        let grid = Grid { dims: UVec3::ONE, spacing: DVec3::ONE };
+        let grid = Grid::new(UVec3::ONE, DVec3::ONE);
         let lists = BrickLists::upload(device, &grid, &[0]);
         let list = Cull::new(device, sheets).prepare(device, shared, &lists.lists[0], &storage, (1, 1), None).unwrap();
         let splat = Stage::new(device, TextureFormat::Rgba32Float, sheets);
@@ -91,7 +91,7 @@ type Sheet = Vec<DVec4>;
 
 impl<'a> Fixture<'a> {
     fn new(stage: &'a Stages<'a>, scene: Scene, spacing: [f64; 3]) -> Self {
-        Self::over(stage, scene, &Grid { dims: UVec3::splat(9), spacing: DVec3::from(spacing) })
+        Self::over(stage, scene, &Grid::new(UVec3::splat(9), DVec3::from(spacing)))
     }
 
     fn over(stage: &'a Stages<'a>, scene: Scene, grid: &Grid) -> Self {

@@ -60,6 +60,10 @@ struct Info {
     colors: bool,
     /// Of the file.
     times: u32,
+    /// The sizes of the file's levels; `None` if it is no store of levels.
+    levels: Option<Vec<[u32; 3]>>,
+    /// The level that the fields below, and sizes and spacing, are about.
+    level: u32,
     /// Voxels whose samples are NaN or infinite; the fields below are about the others.
     holes: u64,
     min: f64,
@@ -111,6 +115,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         channels: encoding.map_or(1, |encoding| encoding.channels).max(volume.channels().count() as u32),
         colors: volume.colors().is_some(),
         times: encoding.map_or(1, |encoding| encoding.times),
+        levels: Some(volume.levels().iter().map(|dims| dims.to_array()).collect())
+            .filter(|levels: &Vec<_>| !levels.is_empty()),
+        level: volume.level(),
         holes: volume.holes(),
         min,
         max,
@@ -153,6 +160,11 @@ fn described(info: &Info, volume: &Volume, first_channel: u32) -> String {
     }
     if info.times > 1 {
         line("times", format!("{}; what follows is about one, by --time", info.times));
+    }
+    if let Some(levels) = &info.levels {
+        let sizes = levels.iter().zip(0..).map(|([x, y, z], level)| format!("{level}: {x} × {y} × {z}"));
+        let sizes = sizes.collect::<Vec<_>>().join(", ");
+        line("levels", format!("{sizes}; what is told is about {}, by --level", info.level));
     }
     line("orientation", volume.orientation().map_or("not given".to_owned(), orientation));
     if info.holes > 0 {

@@ -130,8 +130,8 @@ fn check_volumes(input: &Input, scenes: &[(Scene, Vec<String>)], outputs: &Outpu
 fn has_same_volume(a: &Scene, b: &Scene) -> bool {
     let facts = |scene: &Scene| -> Vec<_> {
         let of = |channel: Cow<'_, Channel>| {
-            let Channel { volume, spacing, labels, index, time, .. } = channel.into_owned();
-            (volume, spacing, labels, index, time)
+            let Channel { volume, spacing, labels, index, time, level, .. } = channel.into_owned();
+            (volume, spacing, labels, index, time, level)
         };
         scene.channels().map(of).collect()
     };

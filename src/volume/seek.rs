@@ -1,0 +1,170 @@
+//! Uncompressed files, read by boxes.
+
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+use glam::{DVec3, UVec3};
+
+use super::access::Access;
+use super::loaded::Loaded;
+use super::samples::Samples;
+use super::series::{Series, SeriesOrder};
+use super::source::{invalid, io_error};
+use super::store::{Store, StoreLevel, check_box, check_chunk};
+use super::{Grid, VolumeError};
+
+/// The sizes of a chunk, unless the volume is smaller: any box can be read, so these only divide it into parts of a convenient size.
+const CHUNK: u32 = 64;
+
+/// The number of stretches of a file that its identity covers, and their length in bytes.
+const STRETCHES: u64 = 64;
+const STRETCH: u64 = 4096;
+
+/// Where the samples of a file are.
+#[derive(Clone, Debug)]
+pub(super) struct Located {
+    pub(super) path: PathBuf,
+    /// The byte of the first sample.
+    pub(super) at: u64,
+    pub(super) samples: Samples,
+    pub(super) series: Series,
+}
+
+/// What readers note in place of reading samples.
+pub(super) type Notes = Mutex<Vec<Located>>;
+
+/// A file that is read by boxes.
+#[derive(Debug)]
+pub(super) struct FileStore {
+    located: Located,
+    access: Access,
+    levels: [StoreLevel; 1],
+    /// The number of samples from one voxel to the next, and the sample of the first voxel.
+    step: u64,
+    first: u64,
+    identity: String,
+}
+
+impl FileStore {
+    /// The store of a file whose header was read, of which `notes` tells where the samples are.
+    pub(super) fn of_header(
+        path: &Path,
+        loaded: &Loaded<f32>,
+        notes: &[Located],
+        access: &Access,
+    ) -> Result<Self, VolumeError> {
+        match notes {
+            [located] => Self::new(located.clone(), loaded.spacing.unwrap_or(DVec3::ONE), access),
+            _ => {
+                let found = format!("{} places", notes.len());
+                Err(invalid(path, "data", found, "one stretch of uncompressed samples, x fastest"))
+            }
+        }
+    }
+
+    pub(super) fn new(located: Located, spacing: DVec3, access: &Access) -> Result<Self, VolumeError> {
+        let Located { path, samples, series, .. } = &located;
+        let selection = access.selection();
+        series.check(path, selection)?;
+        let channels = series.channels(selection);
+        if channels.len() > 1 || series.is_color {
+            let allowed = format!("the number of one of them, 0 to {}, and no colours", series.channels - 1);
+            return Err(invalid(path, "channels", series.channels, allowed));
+        }
+        let (count, time) = (u64::from(samples.count()), u64::from(selection.time.unwrap_or(0)));
+        let (step, first) = match series.order {
+            SeriesOrder::Interleaved => {
+                let channels = u64::from(series.channels);
+                (channels, time * channels * count + u64::from(selection.channel.unwrap_or(0)))
+            }
+            _ => (1, series.block(channels.start, selection) * count),
+        };
+        let level = StoreLevel { grid: Grid::new(samples.dims, spacing), chunk: samples.dims.min(UVec3::splat(CHUNK)) };
+        let mut store = Self {
+            access: access.clone(),
+            levels: [level],
+            step,
+            first,
+            identity: String::new(),
+            located: located.clone(),
+        };
+        store.identity = store.hash()?;
+        Ok(store)
+    }
+
+    /// A hash of the layout and of stretches all over the samples.
+    fn hash(&self) -> Result<String, VolumeError> {
+        let Located { path, at, samples, .. } = &self.located;
+        let mut hash = blake3::Hasher::new();
+        let layout = (samples.kind, samples.dims, samples.big_endian, samples.rescale, self.step, self.first);
+        hash.update(format!("sheetsplat file 1\n{layout:?}\n").as_bytes());
+        let mut file = self.access.open_to_look(path)?;
+        file.reader.seek(SeekFrom::Start(*at)).map_err(io_error(path))?;
+        let bytes = file.left()?;
+        hash.update(&bytes.to_le_bytes());
+        for stretch in 0..STRETCHES.min(bytes.div_ceil(STRETCH)) {
+            let from =
+                at + (bytes.saturating_sub(STRETCH) as u128 * u128::from(stretch) / u128::from(STRETCHES - 1)) as u64;
+            let mut found = Vec::new();
+            file.reader.seek(SeekFrom::Start(from)).map_err(io_error(path))?;
+            file.reader.by_ref().take(STRETCH).read_to_end(&mut found).map_err(io_error(path))?;
+            hash.update(&found);
+        }
+        Ok(hash.finalize().to_hex().to_string())
+    }
+}
+
+impl Store for FileStore {
+    fn levels(&self) -> &[StoreLevel] {
+        &self.levels
+    }
+
+    fn read(&self, level: usize, from: UVec3, dims: UVec3, values: &mut [f32]) -> Result<u64, VolumeError> {
+        let Located { path, at, samples, .. } = &self.located;
+        check_box(path, &self.levels, level, (from, dims), values.len())?;
+        let mut file = self.access.open_to_look(path)?;
+        let [nx, ny] = [samples.dims.x, samples.dims.y].map(u64::from);
+        let bytes = samples.kind.bytes();
+        // The samples of the voxels of a row, and of those between them.
+        let length = (u64::from(dims.x - 1) * self.step + 1) * bytes;
+        let (mut code, mut read, mut row_values) = (Vec::new(), 0, Vec::new());
+        let rows = (0..dims.z).flat_map(|z| (0..dims.y).map(move |y| from + UVec3::new(0, y, z)));
+        for (row, first) in values.chunks_exact_mut(dims.x as usize).zip(rows) {
+            let [x, y, z] = first.to_array().map(u64::from);
+            let sample = self.first + (x + nx * (y + ny * z)) * self.step;
+            file.reader.seek(SeekFrom::Start(at + sample * bytes)).map_err(io_error(path))?;
+            code.clear();
+            file.reader.by_ref().take(length).read_to_end(&mut code).map_err(io_error(path))?;
+            if code.len() as u64 != length {
+                return Err(invalid(
+                    path,
+                    "data",
+                    format!("the end of the file before voxel {first}"),
+                    "the whole file",
+                ));
+            }
+            read += length;
+            row_values.clear();
+            samples.append::<f32>(path, &code, &mut row_values)?;
+            for (value, &found) in row.iter_mut().zip(row_values.iter().step_by(self.step as usize)) {
+                *value = found;
+            }
+        }
+        Ok(read)
+    }
+
+    fn contains(&self, level: usize, chunk: UVec3) -> Result<bool, VolumeError> {
+        check_chunk(&self.located.path, &self.levels, level, chunk)?;
+        Ok(true)
+    }
+
+    /// A hole, though the file holds every chunk.
+    fn fill(&self) -> f32 {
+        f32::NAN
+    }
+
+    fn identity(&self) -> String {
+        self.identity.clone()
+    }
+}

@@ -1,0 +1,374 @@
+//! An array of a Zarr store, read chunk by chunk.
+
+use std::borrow::Cow;
+use std::fmt::{self, Debug, Display, Formatter};
+use std::num::NonZeroU64;
+use std::ops::Range;
+use std::sync::Arc;
+
+use glam::UVec3;
+use rayon::prelude::*;
+use serde_json::Value;
+use zarrs::array::codec::api::{ArrayToBytesCodecTraits, CodecOptions};
+use zarrs::array::{Array, ArrayError, ArrayMetadata, ArrayMetadataV2, ArrayMetadataV3};
+use zarrs::plugin::ExtensionName;
+
+use super::super::VolumeError;
+use super::super::access::Access;
+use super::super::samples::{SampleType, Samples, Voxel};
+use super::super::source::invalid;
+use super::axes::{Axes, KINDS};
+use super::codec;
+use super::half;
+use super::keys::Keys;
+use super::shards::{MAX_IN_SHARD, Shards};
+
+/// The maximum number of chunks of an array: more take longer to look for than anyone waits.
+const MAX_CHUNKS: u64 = 1 << 26;
+
+/// Numbers by kind of axis, in the order t, c, z, y, x.
+pub(super) type Sizes = [u64; KINDS];
+
+/// An array whose axes are known.
+pub(super) struct ZarrArray {
+    keys: Arc<Keys>,
+    /// The metadata as zarrs takes it; what it states is read here.
+    array: Array<()>,
+    metadata: Value,
+    /// How chunks are found in shards, if they lie in such.
+    shards: Option<Shards>,
+    axes: Axes,
+    pub(super) kind: SampleType,
+    is_half: bool,
+    pub(super) shape: Sizes,
+    /// The shape of a chunk; of an inner one, where chunks lie in shards.
+    chunk: Sizes,
+    /// The number of values in a chunk.
+    in_chunk: u64,
+}
+
+impl Debug for ZarrArray {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { kind, shape, chunk, .. } = self;
+        f.debug_struct("ZarrArray").field("kind", kind).field("shape", shape).field("chunk", chunk).finish()
+    }
+}
+
+/// A box in an array: some channels at one time.
+pub(super) struct Region {
+    pub(super) channels: Range<u64>,
+    pub(super) time: u64,
+    pub(super) from: UVec3,
+    pub(super) dims: UVec3,
+}
+
+impl Region {
+    /// The number of values.
+    fn count(&self) -> usize {
+        (self.channels.end - self.channels.start) as usize * self.dims.as_usizevec3().element_product()
+    }
+
+    /// The first place, and that after the last.
+    fn bounds(&self) -> [Sizes; 2] {
+        let [from, to] = [self.from.as_u64vec3(), self.from.as_u64vec3() + self.dims.as_u64vec3()];
+        let first = [self.time, self.channels.start, from.z, from.y, from.x];
+        [first, [self.time + 1, self.channels.end, to.z, to.y, to.x]]
+    }
+}
+
+impl ZarrArray {
+    /// Opens the array at a path of a store. Its axes are `axes`, or those that it names, or else the last ones of t, c, z, y, x.
+    pub(super) fn open(keys: &Arc<Keys>, path: &str, axes: Option<&Axes>) -> Result<Self, VolumeError> {
+        codec::register();
+        let at = |file: &str| if path.is_empty() { file.to_owned() } else { format!("{path}/{file}") };
+        let folder = keys.file(path);
+        let (file, metadata) = if let Some(bytes) = keys.metadata(&at("zarr.json"))? {
+            let file = keys.file(&at("zarr.json"));
+            let parsed = serde_json::from_slice::<ArrayMetadataV3>(&bytes).map(ArrayMetadata::V3);
+            (file, parsed)
+        } else if let Some(bytes) = keys.metadata(&at(".zarray"))? {
+            let file = keys.file(&at(".zarray"));
+            (file, serde_json::from_slice::<ArrayMetadataV2>(&bytes).map(ArrayMetadata::V2))
+        } else {
+            return Err(invalid(&folder, "array", "nothing", "an array: zarr.json or .zarray"));
+        };
+        let metadata = metadata.map_err(|error| invalid(&file, "metadata", error, "that of a Zarr array"))?;
+        let path = if path.is_empty() { "/".to_owned() } else { format!("/{path}") };
+        let array = Array::new_with_metadata(Arc::new(()), &path, metadata).map_err(|error| {
+            let allowed = format!("a Zarr array of numbers on a regular grid, compressed by {}", codec::NAMES);
+            invalid(&file, "array", error, allowed)
+        })?;
+        let shape = array.shape();
+        let wrong_axes = || {
+            let allowed = match axes {
+                Some(axes) => format!("{}, as many as there are axes", axes.count()),
+                None => "3 to 5: z, y and x, after channels and times if there are any".to_owned(),
+            };
+            invalid(&file, "shape", format!("{} dimensions", shape.len()), allowed)
+        };
+        let axes = match axes {
+            Some(axes) => Some(*axes).filter(|axes| axes.count() == shape.len()),
+            None => Axes::plain(shape.len()),
+        };
+        let axes = axes.ok_or_else(wrong_axes)?;
+        let name = array.data_type().name_v3().unwrap_or_default();
+        let is_half = name == "float16";
+        let kind = match name.as_ref() {
+            "float16" => Some(SampleType::F32),
+            "bool" => Some(SampleType::U8),
+            name => SampleType::NAMED.into_iter().find(|(known, _)| *known == name).map(|(_, kind)| kind),
+        };
+        let kind = kind.ok_or_else(|| {
+            let names = SampleType::NAMED.map(|(name, _)| name).join(", ");
+            invalid(&file, "data_type", name, format!("{names}, float16, bool"))
+        })?;
+        let metadata = serde_json::to_value(array.metadata()).unwrap_or_default();
+        let grid = metadata["chunk_grid"]["name"].as_str().unwrap_or("regular");
+        if grid != "regular" {
+            return Err(invalid(&file, "chunk_grid", grid, "regular"));
+        }
+        let outer = array
+            .chunk_shape(&vec![0; shape.len()])
+            .map_err(|error| invalid(&file, "chunk_grid", error, "a regular grid of chunks"))?;
+        let shards = Shards::of(&metadata, &outer);
+        let shards = shards.map_err(|error| invalid(&file, "codecs", error, "shards of a whole number of chunks"))?;
+        let inner = shards.as_ref().map_or(&*outer, |shards| &shards.chunk);
+        let product = |sizes: &[u64]| sizes.iter().try_fold(1_u64, |product, &size| product.checked_mul(size));
+        let numbers = |sizes: &[NonZeroU64]| sizes.iter().map(|size| size.get()).collect::<Vec<u64>>();
+        let (outer, inner) = (numbers(&outer), numbers(inner));
+        let shown = |sizes: &[u64]| sizes.iter().map(u64::to_string).collect::<Vec<_>>().join(" × ");
+        let is_grid = |sizes: &[u64]| sizes.iter().all(|&size| (1..=u64::from(u32::MAX)).contains(&size));
+        if !is_grid(shape) {
+            return Err(invalid(&file, "shape", shown(shape), "positive sizes, at most 4294967295 each"));
+        }
+        let in_chunk = product(&inner).filter(|count| *count <= u64::from(u32::MAX) && is_grid(&outer));
+        let in_chunk =
+            in_chunk.ok_or_else(|| invalid(&file, "chunks", shown(&inner), "at most 4294967295 values in a chunk"))?;
+        let counts: Vec<u64> = shape.iter().zip(&inner).map(|(shape, chunk)| shape.div_ceil(*chunk)).collect();
+        if product(&counts).is_none_or(|count| count > MAX_CHUNKS) {
+            return Err(invalid(
+                &file,
+                "chunks",
+                format!("{} chunks", shown(&counts)),
+                format!("at most {MAX_CHUNKS}"),
+            ));
+        }
+        let (shape, chunk) = (axes.sort(shape, 1), axes.sort(&inner, 1));
+        let keys = Arc::clone(keys);
+        let opened = Self { keys, metadata, shards, axes, kind, is_half, shape, chunk, in_chunk, array };
+        opened.keys.permit(opened.encoded_bytes());
+        Ok(opened)
+    }
+
+    /// What the store states about the array.
+    pub(super) fn metadata(&self) -> Value {
+        self.metadata.clone()
+    }
+
+    /// The number of voxels along x, y and z.
+    pub(super) fn dims(&self) -> UVec3 {
+        let [.., z, y, x] = self.shape.map(|size| size as u32);
+        UVec3::new(x, y, z)
+    }
+
+    /// The number of voxels of a chunk along x, y and z.
+    pub(super) fn chunk_dims(&self) -> UVec3 {
+        let [.., z, y, x] = self.chunk.map(|size| u32::try_from(size).unwrap_or(u32::MAX));
+        UVec3::new(x, y, z).min(self.dims())
+    }
+
+    /// The maximum number of bytes that a chunk, or the places of a shard's chunks, may have in the store.
+    fn encoded_bytes(&self) -> u64 {
+        // The bound of `Compression::encoded_representation`.
+        let chunk = self.in_chunk.saturating_mul(self.kind.bytes()).saturating_mul(2).saturating_add(1 << 16);
+        chunk.max(self.shards.as_ref().map_or(0, Shards::index_bytes))
+    }
+
+    /// Reserves the memory for reading `chunks` chunks at once.
+    pub(super) fn reserve<T>(&self, chunks: usize, access: &Access) -> Result<(), VolumeError> {
+        let decoded = self.in_chunk.saturating_mul(self.kind.bytes() + size_of::<T>() as u64);
+        let bytes = decoded.saturating_add(self.encoded_bytes()).saturating_mul(chunks as u64);
+        let all: u64 = (0..KINDS).map(|axis| self.shape[axis].div_ceil(self.chunk[axis])).product();
+        let indices = if self.shards.is_some() { 32 * all.min(MAX_IN_SHARD) } else { 0 };
+        let bytes = bytes.saturating_add(indices);
+        access.reserve(
+            &self.keys.path,
+            "chunks",
+            format!("chunks of {} values, {chunks} at once", self.in_chunk),
+            bytes,
+        )
+    }
+
+    /// The chunks that a region meets: the first one's place in the grid of chunks, and how many there are.
+    fn chunks(&self, region: &Region) -> [Sizes; 2] {
+        let [first, end] = region.bounds();
+        let low: Sizes = std::array::from_fn(|axis| first[axis] / self.chunk[axis]);
+        [low, std::array::from_fn(|axis| end[axis].div_ceil(self.chunk[axis]) - low[axis])]
+    }
+
+    /// The number of chunks that are decoded at once to read a region.
+    pub(super) fn at_once(&self, region: &Region) -> usize {
+        let [_, counts] = self.chunks(region);
+        rayon::current_num_threads().min(counts.iter().product::<u64>() as usize)
+    }
+
+    /// Reads a region that lies in the array, channel by channel, x fastest, into as many values.
+    pub(super) fn read<T: Voxel>(&self, region: &Region, values: &mut [T]) -> Result<(), VolumeError> {
+        debug_assert_eq!(values.len(), region.count());
+        let [low, counts] = self.chunks(region);
+        let total: u64 = counts.iter().product();
+        let at_once = self.at_once(region) as u64;
+        let place = |mut index: u64| {
+            let mut place = low;
+            for axis in (0..KINDS).rev() {
+                place[axis] += index % counts[axis];
+                index /= counts[axis];
+            }
+            place
+        };
+        let mut next = 0;
+        while next < total {
+            let batch = next..total.min(next + at_once);
+            next = batch.end;
+            let decode = |index| Ok((place(index), self.decode(place(index))?));
+            let decoded: Vec<(Sizes, Vec<T>)> =
+                batch.into_par_iter().map(decode).collect::<Result<_, VolumeError>>()?;
+            for (place, chunk) in decoded {
+                self.copy(place, &chunk, region, values);
+            }
+        }
+        Ok(())
+    }
+
+    /// Decodes the chunk at a place of the grid of chunks; values are in the order of the array's axes.
+    fn decode<T: Voxel>(&self, place: Sizes) -> Result<Vec<T>, VolumeError> {
+        let key = self.key(place);
+        let (data_type, fill) = (self.array.data_type(), self.array.fill_value());
+        let refused =
+            |sample: f64| invalid(&self.keys.file(&key), "data", format!("{sample} in the chunk"), T::ALLOWED);
+        let damaged = |error: &dyn Display| self.damaged(&key, place, error);
+        let Some(code) = self.encoded(&key, place)? else {
+            let fill = self.convert::<T>(&self.widened(fill.as_ne_bytes().to_vec())).map_err(refused)?;
+            return Ok(fill.repeat(self.in_chunk as usize));
+        };
+        let (code, options) = (Cow::Owned(code), CodecOptions::default().with_concurrent_target(1));
+        let decoded = match &self.shards {
+            Some(Shards { codecs, chunk, .. }) => codecs.decode(code, chunk, data_type, fill, &options),
+            None => {
+                let chunk = self.outer().map_err(|error| damaged(&error))?;
+                self.array.codecs().decode(code, &chunk, data_type, fill, &options)
+            }
+        };
+        let bytes = decoded.map_err(|error| damaged(&error))?.into_fixed().map_err(|error| damaged(&error))?;
+        let bytes = self.widened(bytes.into_owned());
+        let expected = self.in_chunk * self.kind.bytes();
+        if bytes.len() as u64 != expected {
+            return Err(damaged(&format!("{} bytes of {expected}", bytes.len())));
+        }
+        self.convert(&bytes).map_err(refused)
+    }
+
+    /// The bytes of the chunk at a place, encoded; `None` if the store does not hold it.
+    fn encoded(&self, key: &str, place: Sizes) -> Result<Option<Vec<u8>>, VolumeError> {
+        let Some(shards) = &self.shards else {
+            let bytes = self.keys.bytes(key)?;
+            return bytes.map(|bytes| self.keys.range(key, 0..bytes)).transpose();
+        };
+        let range = shards.range(&self.keys, key, &self.axes.unsort(place));
+        let Some(range) = range.map_err(|error| self.damaged(key, place, &error))? else { return Ok(None) };
+        match self.keys.bytes(key)? {
+            Some(bytes) if range.end <= bytes => self.keys.range(key, range).map(Some),
+            bytes => {
+                let found = format!("bytes {range:?} of a shard of {}", bytes.unwrap_or(0));
+                Err(self.damaged(key, place, &found))
+            }
+        }
+    }
+
+    /// The shape of a chunk, or of a shard.
+    fn outer(&self) -> Result<Vec<NonZeroU64>, ArrayError> {
+        self.array.chunk_shape(&vec![0; self.axes.count()])
+    }
+
+    /// The bytes of samples, of 32 bits where they are stored with 16.
+    fn widened(&self, bytes: Vec<u8>) -> Vec<u8> {
+        if self.is_half { half::widen(&bytes) } else { bytes }
+    }
+
+    /// The voxels of samples in the machine's byte order.
+    fn convert<T: Voxel>(&self, bytes: &[u8]) -> Result<Vec<T>, f64> {
+        let big_endian = cfg!(target_endian = "big");
+        let dims = UVec3::new((bytes.len() as u64 / self.kind.bytes()) as u32, 1, 1);
+        let layout = Samples { kind: self.kind, dims, big_endian, rescale: None, z_fastest: false };
+        let mut voxels = Vec::with_capacity(dims.x as usize);
+        self.kind.convert(&layout, bytes, &mut voxels)?;
+        Ok(voxels)
+    }
+
+    /// The value of voxels in chunks that the store does not hold.
+    pub(super) fn fill(&self) -> f32 {
+        let bytes = self.widened(self.array.fill_value().as_ne_bytes().to_vec());
+        // Every number is a value.
+        self.convert::<f32>(&bytes).ok().and_then(|values| values.first().copied()).unwrap_or(f32::NAN)
+    }
+
+    /// Copies what lies in a region of the chunk at a place of the grid of chunks.
+    fn copy<T: Voxel>(&self, place: Sizes, chunk: &[T], region: &Region, values: &mut [T]) {
+        let [first, end] = region.bounds();
+        let origin: Sizes = std::array::from_fn(|axis| place[axis] * self.chunk[axis]);
+        let low: Sizes = std::array::from_fn(|axis| first[axis].max(origin[axis]));
+        let high: Sizes = std::array::from_fn(|axis| end[axis].min(origin[axis] + self.chunk[axis]));
+        let strides = self.strides();
+        let width = (high[4] - low[4]) as usize;
+        for channel in low[1]..high[1] {
+            for z in low[2]..high[2] {
+                for y in low[3]..high[3] {
+                    let at = [low[0], channel, z, y, low[4]];
+                    let from: u64 = (0..KINDS).map(|axis| (at[axis] - origin[axis]) * strides[axis]).sum();
+                    let row = (1..4).fold(0, |row, axis| row * (end[axis] - first[axis]) + at[axis] - first[axis]);
+                    let to = (row * (end[4] - first[4]) + low[4] - first[4]) as usize;
+                    let row = chunk[from as usize..].iter().step_by(strides[4].max(1) as usize);
+                    for (value, &voxel) in values[to..to + width].iter_mut().zip(row) {
+                        *value = voxel;
+                    }
+                }
+            }
+        }
+    }
+
+    /// How far apart neighbours along an axis lie in a chunk.
+    fn strides(&self) -> Sizes {
+        let mut strides = self.axes.unsort(self.chunk);
+        let mut stride = 1;
+        for size in strides.iter_mut().rev() {
+            stride *= std::mem::replace(size, stride);
+        }
+        self.axes.sort(&strides, 0)
+    }
+
+    /// Whether the store holds the chunk that lies at a place along x, y and z, of a channel and time.
+    pub(super) fn contains(&self, channel: u64, time: u64, chunk: UVec3) -> Result<bool, VolumeError> {
+        let [x, y, z] = chunk.to_array().map(u64::from);
+        let place = [time / self.chunk[0], channel / self.chunk[1], z, y, x];
+        let key = self.key(place);
+        let Some(shards) = &self.shards else { return Ok(self.keys.bytes(&key)?.is_some()) };
+        let range = shards.range(&self.keys, &key, &self.axes.unsort(place));
+        Ok(range.map_err(|error| self.damaged(&key, place, &error))?.is_some())
+    }
+
+    /// The key of the chunk or the shard in which the chunk at a place lies.
+    fn key(&self, place: Sizes) -> String {
+        let origin: Vec<u64> = self.axes.unsort(std::array::from_fn(|axis| place[axis] * self.chunk[axis]));
+        let outer = self.outer().unwrap_or_default();
+        let chunk: Vec<u64> = origin.iter().zip(&outer).map(|(at, size)| at / size.get()).collect();
+        self.array.chunk_key(&chunk).as_str().to_owned()
+    }
+
+    /// The error for a chunk that cannot be decoded.
+    fn damaged(&self, key: &str, place: Sizes, error: &dyn Display) -> VolumeError {
+        let origin = self.axes.unsort(std::array::from_fn(|axis| place[axis] * self.chunk[axis]));
+        let found = format!("{error}, in the chunk from {origin:?}");
+        let shape = self.axes.unsort(self.chunk);
+        invalid(&self.keys.file(key), "chunk", found, format!("a whole and undamaged chunk of {shape:?} values"))
+    }
+}

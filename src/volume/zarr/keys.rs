@@ -1,0 +1,146 @@
+//! The keys of a Zarr store and their bytes: files in a folder on disk or in memory, or in a ZIP archive.
+
+use std::collections::BTreeMap;
+use std::fmt::{self, Debug, Formatter};
+use std::fs;
+use std::io::{ErrorKind, Read, Seek, SeekFrom};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::super::VolumeError;
+use super::super::access::Access;
+use super::super::source::{MAX_HEADER, Source, invalid, io_error};
+use super::super::zip::{Directory, Member};
+
+/// A store's keys.
+pub(super) struct Keys {
+    /// The folder or the archive.
+    pub(super) path: PathBuf,
+    place: Place,
+    access: Access,
+    /// The number of bytes read since they were last asked for.
+    read: AtomicU64,
+    /// The maximum number of bytes that are read at once.
+    limit: AtomicU64,
+}
+
+enum Place {
+    Folder,
+    /// An archive's files by their names, and what the names of the store's keys begin with.
+    Archive(BTreeMap<String, Member>, String),
+}
+
+impl Debug for Keys {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Keys").field(&self.path).finish()
+    }
+}
+
+impl Keys {
+    /// The keys of the files in a folder.
+    pub(super) fn of_folder(path: &Path, access: &Access) -> Self {
+        Self::new(path, Place::Folder, access)
+    }
+
+    /// The keys of an archive's files whose names begin with those of a folder.
+    pub(super) fn of_archive(path: &Path, folder: &str, access: &Access) -> Result<Self, VolumeError> {
+        let mut file = access.open(path)?;
+        let members = Directory::read(&mut file)?.members(&mut file, "")?;
+        let members: BTreeMap<String, Member> =
+            members.into_iter().map(|member| (member.name.clone(), member)).collect();
+        let prefix = if folder.is_empty() { String::new() } else { format!("{folder}/") };
+        Ok(Self::new(path, Place::Archive(members, prefix), access))
+    }
+
+    fn new(path: &Path, place: Place, access: &Access) -> Self {
+        let (read, limit) = (AtomicU64::new(0), AtomicU64::new(MAX_HEADER));
+        Self { path: path.to_owned(), place, access: access.clone(), read, limit }
+    }
+
+    /// Permits to read this number of bytes at once.
+    pub(super) fn permit(&self, bytes: u64) {
+        self.limit.fetch_max(bytes, Ordering::Relaxed);
+    }
+
+    /// The number of bytes read since this was last asked.
+    pub(super) fn take_count(&self) -> u64 {
+        self.read.swap(0, Ordering::Relaxed)
+    }
+
+    /// The place of a key, for errors.
+    pub(super) fn file(&self, key: &str) -> PathBuf {
+        self.path.join(key)
+    }
+
+    /// A file of metadata; `None` if the store has none with this name.
+    pub(super) fn metadata(&self, key: &str) -> Result<Option<Vec<u8>>, VolumeError> {
+        let Some(bytes) = self.bytes(key)? else { return Ok(None) };
+        if bytes > MAX_HEADER {
+            let found = format!("{bytes} bytes");
+            return Err(invalid(&self.file(key), "metadata", found, format!("at most {MAX_HEADER} bytes")));
+        }
+        if matches!(self.place, Place::Folder) {
+            // The file is one of those that the volume consists of.
+            drop(self.access.open(&self.file(key))?);
+        }
+        self.range(key, 0..bytes).map(Some)
+    }
+
+    /// The length of a key's value; `None` if the store has no such key.
+    pub(super) fn bytes(&self, key: &str) -> Result<Option<u64>, VolumeError> {
+        match &self.place {
+            Place::Folder => self.open(key)?.map(|mut file| file.left()).transpose(),
+            Place::Archive(members, prefix) => Ok(members.get(&format!("{prefix}{key}")).map(|member| member.bytes)),
+        }
+    }
+
+    /// Some bytes of a key that exists.
+    pub(super) fn range(&self, key: &str, range: Range<u64>) -> Result<Vec<u8>, VolumeError> {
+        let (path, count) = (self.file(key), range.end - range.start);
+        let limit = self.limit.load(Ordering::Relaxed);
+        if count > limit {
+            return Err(invalid(&path, "chunk", format!("{count} bytes"), format!("at most {limit} bytes")));
+        }
+        self.read.fetch_add(count, Ordering::Relaxed);
+        let missing = || io_error(&path)(ErrorKind::NotFound.into());
+        match &self.place {
+            Place::Folder => {
+                let mut file = self.open(key)?.ok_or_else(missing)?;
+                let mut bytes = Vec::new();
+                file.reader.seek(SeekFrom::Start(range.start)).map_err(io_error(&path))?;
+                file.reader.take(count).read_to_end(&mut bytes).map_err(io_error(&path))?;
+                if bytes.len() as u64 == count {
+                    return Ok(bytes);
+                }
+                Err(invalid(&path, "chunk", format!("{} bytes", bytes.len()), format!("{count} bytes")))
+            }
+            Place::Archive(members, prefix) => {
+                let member = members.get(&format!("{prefix}{key}")).ok_or_else(missing)?;
+                member.bytes(self.access.open_to_look(&self.path)?, range)
+            }
+        }
+    }
+
+    /// Opens the file of a key in a folder; `None` if there is none.
+    fn open(&self, key: &str) -> Result<Option<Source>, VolumeError> {
+        let path = self.file(key);
+        if self.access.given().is_none() && is_missing(&path) {
+            // A link that leads nowhere is refused as one that leads out of the folder to which reading is confined.
+            let nearest = path.ancestors().find(|path| fs::symlink_metadata(path).is_ok());
+            nearest.map(|nearest| self.access.resolve(nearest)).transpose()?;
+            return Ok(None);
+        }
+        match self.access.open_to_look(&path) {
+            Ok(file) => Ok(Some(file)),
+            Err(VolumeError::Io { source, .. }) if source.kind() == ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+}
+
+/// Whether no file has this path, or one of its folders is no folder.
+fn is_missing(path: &Path) -> bool {
+    let is_missing = |error: std::io::Error| matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory);
+    fs::metadata(path).is_err_and(is_missing)
+}

@@ -1,0 +1,150 @@
+//! Zarr stores (versions 2 and 3): OME-Zarr 0.4 and 0.5 images with their levels and labels, and plain arrays.
+//!
+//! A store is a folder, or a ZIP archive of one (`.zip`, `.ozx`). zarrs opens arrays and takes shards and chunks apart; which bytes are read and how much
+//! they may expand to is decided here, in `keys` and `codec`.
+
+mod array;
+mod axes;
+mod blosc;
+mod codec;
+mod display;
+mod half;
+mod image;
+mod json;
+mod keys;
+mod multiscale;
+mod shards;
+
+use std::path::Path;
+
+use glam::UVec3;
+
+use self::array::Region;
+use self::image::{Image, Level};
+use super::VolumeError;
+use super::access::Access;
+use super::loaded::{Levels, Loaded};
+use super::samples::{SIZES, Voxel, dims_of};
+use super::source::invalid;
+use super::store::{Store, StoreLevel, check_box, check_chunk};
+
+/// Reads an image at one level.
+pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+    let image = Image::open(path, access)?;
+    let selection = access.selection();
+    image.series.check(path, selection)?;
+    let channels = image.series.channels(selection);
+    let channels = u64::from(channels.start)..u64::from(channels.end);
+    let number = level_of(&image, channels.end - channels.start, size_of::<T>(), path, access)?;
+    let level = &image.levels[number];
+    let dims = level.grid.dims;
+    let voxels = dims_of(dims.to_array()).ok_or_else(|| invalid(path, "sizes", dims, SIZES))?.element_product();
+    let count = (channels.end - channels.start) * u64::from(voxels);
+    let time = u64::from(selection.time.unwrap_or(0));
+    let region = Region { channels, time, from: UVec3::ZERO, dims };
+    let found = format!("{} × {} × {} voxels of {} channels", dims.x, dims.y, dims.z, count / u64::from(voxels));
+    access.reserve(path, "data", found, count * size_of::<T>() as u64)?;
+    level.array.reserve::<T>(level.array.at_once(&region), access)?;
+    let mut values = Vec::new();
+    let too_many = |error| invalid(path, "data", format!("{count} samples: {error}"), "fewer");
+    values.try_reserve_exact(count as usize).map_err(too_many)?;
+    values.resize(count as usize, T::HOLE);
+    level.array.read(&region, &mut values)?;
+    let (spacing, kind) = (Some(level.grid.spacing), level.array.kind);
+    let dims_of_levels = image.levels.iter().map(|level| level.grid.dims).collect();
+    let levels = Some(Levels { dims: dims_of_levels, level: number as u32, grid: level.grid });
+    let Image { unit, series, channel_names, displays, label_names, palette, .. } = image;
+    let loaded = Loaded::new(dims, kind, values);
+    Ok(Loaded { spacing, unit, series, channel_names, displays, label_names, palette, levels, ..loaded })
+}
+
+/// The number of the level to read: the selected one, or else the finest whose values, of `bytes` bytes each, fit in memory.
+fn level_of(image: &Image, channels: u64, bytes: usize, path: &Path, access: &Access) -> Result<usize, VolumeError> {
+    let count = image.levels.len();
+    if let Some(level) = access.selection().level {
+        let allowed = if count == 1 { "0, the only one".to_owned() } else { format!("0 to {}", count - 1) };
+        return (level as usize)
+            .lt(&count)
+            .then_some(level as usize)
+            .ok_or_else(|| invalid(path, "level", level, allowed));
+    }
+    let needs = |level: &Level| level.grid.dims.as_u64vec3().element_product().saturating_mul(channels * bytes as u64);
+    let left = access.memory_left();
+    let fits = |level: &Level| dims_of(level.grid.dims.to_array()).is_some() && needs(level) <= left;
+    if fits(&image.levels[0]) || count == 1 {
+        return Ok(0);
+    }
+    let sizes = image.levels.iter().zip(0..).map(|(level, number)| {
+        let [x, y, z] = level.grid.dims.to_array();
+        format!("{number}: {x} × {y} × {z}, {} bytes", needs(level))
+    });
+    let sizes = sizes.collect::<Vec<_>>().join("; ");
+    let found = format!("no level stated, of the levels {sizes}");
+    let allowed = match image.levels.iter().position(fits) {
+        Some(level) => format!("within the memory limit of {left} bytes, level {level} or a coarser one"),
+        None => format!("a level within the memory limit of {left} bytes, of which there is none"),
+    };
+    Err(invalid(path, "level", found, allowed))
+}
+
+/// Opens one channel of an image at one time.
+pub(super) fn open(path: &Path, access: &Access) -> Result<ZarrStore, VolumeError> {
+    let image = Image::open(path, access)?;
+    let selection = access.selection();
+    image.series.check(path, selection)?;
+    let channels = image.series.channels(selection);
+    if channels.len() > 1 {
+        let allowed = format!("the number of one of them, 0 to {}", channels.end - 1);
+        return Err(invalid(path, "channels", channels.len(), allowed));
+    }
+    for level in &image.levels {
+        level.array.reserve::<f32>(rayon::current_num_threads(), access)?;
+    }
+    let levels =
+        image.levels.iter().map(|level| StoreLevel { grid: level.grid, chunk: level.array.chunk_dims() }).collect();
+    let (channel, time) = (u64::from(channels.start), u64::from(selection.time.unwrap_or(0)));
+    // What was read so far is metadata.
+    image.keys.take_count();
+    Ok(ZarrStore { image, levels, channel, time })
+}
+
+/// One channel of an image at one time, read by boxes.
+#[derive(Debug)]
+pub(super) struct ZarrStore {
+    image: Image,
+    levels: Vec<StoreLevel>,
+    channel: u64,
+    time: u64,
+}
+
+impl Store for ZarrStore {
+    fn levels(&self) -> &[StoreLevel] {
+        &self.levels
+    }
+
+    fn read(&self, level: usize, from: UVec3, dims: UVec3, values: &mut [f32]) -> Result<u64, VolumeError> {
+        check_box(&self.image.keys.path, &self.levels, level, (from, dims), values.len())?;
+        let region = Region { channels: self.channel..self.channel + 1, time: self.time, from, dims };
+        self.image.levels[level].array.read(&region, values)?;
+        Ok(self.image.keys.take_count())
+    }
+
+    fn contains(&self, level: usize, chunk: UVec3) -> Result<bool, VolumeError> {
+        check_chunk(&self.image.keys.path, &self.levels, level, chunk)?;
+        self.image.levels[level].array.contains(self.channel, self.time, chunk)
+    }
+
+    fn fill(&self) -> f32 {
+        self.image.levels[0].array.fill()
+    }
+
+    fn identity(&self) -> String {
+        let mut hash = blake3::Hasher::new();
+        hash.update(b"sheetsplat zarr 1\n");
+        for metadata in &self.image.metadata {
+            hash.update(metadata.to_string().as_bytes()).update(b"\n");
+        }
+        hash.update(&self.channel.to_le_bytes()).update(&self.time.to_le_bytes());
+        hash.finalize().to_hex().to_string()
+    }
+}

@@ -1,0 +1,79 @@
+//! Uncompressed files that are read by boxes.
+
+use std::sync::Arc;
+
+use sheetsplat::volume::{RawLayout, ReadOptions, SampleType, Store, open_raw_store, open_store};
+
+use crate::*;
+
+/// Reads every box of a store, each of which must hold the volume's values.
+#[track_caller]
+fn assert_holds(store: &Arc<dyn Store>, volume: &Volume, name: &str) {
+    let [level] = store.levels() else { panic!("{name}: {store:?}") };
+    assert_eq!((level.grid.dims, level.grid.spacing), (volume.dims(), volume.spacing()), "{name}");
+    assert!(store.contains(0, UVec3::ZERO).unwrap(), "{name}");
+    let [nx, ny, nz] = volume.dims().to_array();
+    for (x, y, z) in (0..nx).flat_map(|x| (0..ny).flat_map(move |y| (0..nz).map(move |z| (x, y, z)))) {
+        let from = UVec3::new(x, y, z);
+        let dims = (volume.dims() - from).min(UVec3::new(1 + y, 1 + z, 2));
+        let mut found = vec![0.0; dims.element_product() as usize];
+        let read = store.read(0, from, dims, &mut found).unwrap();
+        assert!(read >= dims.element_product().into(), "{name}: {read}");
+        let at = |index: u32| from + UVec3::new(index % dims.x, index / dims.x % dims.y, index / dims.x / dims.y);
+        let is_same = |(index, value): (u32, &f32)| *value == volume.value(at(index));
+        assert!((0..).zip(&found).all(is_same), "{name}, {dims} from {from}: {found:?}");
+    }
+}
+
+#[test]
+fn boxes_of_uncompressed_files() {
+    for name in ["sform.nii", "nifti2-big.nii", "pair.hdr", "local.mha", "flipped.mhd", "c.npy"] {
+        let store = open_store(&fixture(name), &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        assert_holds(&store, &Volume::open(&fixture(name)).unwrap(), name);
+    }
+    for (name, channel, time) in
+        [("both.npy", 1, 2), ("both.npy", 0, 0), ("itk.mha", 1, 0), ("times.nii", 0, 2), ("channels.npy", 1, 0)]
+    {
+        let (path, options) =
+            (fixture("channels").join(name), ReadOptions::default().with_channel(channel).with_time(time));
+        let store = open_store(&path, &options).unwrap_or_else(|error| panic!("{error}"));
+        assert_holds(&store, &Volume::open_with(&path, &options).unwrap(), name);
+    }
+    let layout = RawLayout { dims: DIMS, sample_type: SampleType::F32, big_endian: true, offset: 7 };
+    let store = open_raw_store(&fixture("float32-big-7.raw"), &layout, &ReadOptions::default()).unwrap();
+    assert_holds(&store, &Volume::open_raw(&fixture("float32-big-7.raw"), &layout).unwrap(), "raw");
+}
+
+/// The identity is that of the samples, wherever the file is.
+#[test]
+fn files_of_other_samples_have_other_identities() {
+    let folder = Folder::new();
+    let bytes = fs::read(fixture("c.npy")).unwrap();
+    let identity = |name: &str, bytes: &[u8]| {
+        folder.open(name, bytes).unwrap();
+        open_store(&folder.0.path().join(name), &ReadOptions::default()).unwrap().identity()
+    };
+    let mut other = bytes.clone();
+    *other.last_mut().unwrap() ^= 1;
+    assert_eq!(identity("a.npy", &bytes), identity("b.npy", &bytes));
+    assert_ne!(identity("a.npy", &bytes), identity("c.npy", &other));
+}
+
+#[test]
+fn what_is_not_read_by_boxes_is_refused() {
+    let refusal = |name: &str| open_store(&fixture(name), &ReadOptions::default()).unwrap_err().to_string();
+    for (name, words) in [
+        ("fortran-big.npy", "found z fastest"),
+        ("bzip2.nrrd", "found a compressed stream"),
+        ("itk.nii.gz", "found a compressed stream"),
+        ("zlib.mha", "found a compressed stream"),
+        ("sheared.nii", "axes at right angles"),
+        ("complex.nii", "found 0 places"),
+        ("list.mhd", "found 3 places"),
+        ("ome.tif", "allowed: one that is read by boxes: Zarr, and uncompressed NRRD"),
+        ("channels/channels.npy", "channels: found 2"),
+    ] {
+        let message = refusal(name);
+        assert!(message.contains(words), "{message}");
+    }
+}
