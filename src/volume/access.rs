@@ -230,6 +230,7 @@ impl Access {
     }
 
     /// The number of bytes of memory that are left.
+    #[cfg(feature = "zarr")]
     pub(super) fn memory_left(&self) -> u64 {
         self.0.limit.saturating_sub(self.0.reserved.load(Ordering::Relaxed))
     }
