@@ -37,8 +37,11 @@ fn color(text: &str) -> Option<DVec3> {
     Some(DVec3::from([16, 8, 0].map(|shift| f64::from(number >> shift & 0xff) / 255.0)))
 }
 
+/// Colours of values, in ascending order.
+type Palette = Vec<(f64, DVec3)>;
+
 /// The names and colours of labels, as `image-label` states them.
-pub(super) fn labels(image_label: &Json) -> (BTreeMap<u16, String>, Option<Vec<(f64, DVec3)>>) {
+pub(super) fn labels(image_label: &Json) -> (BTreeMap<u16, String>, Option<Palette>) {
     let value = |label: &Json| {
         let number = label.get("label-value").number()?;
         (number.fract() == 0.0 && (0.0..=f64::from(u16::MAX)).contains(&number)).then_some(number as u16)
@@ -54,7 +57,7 @@ pub(super) fn labels(image_label: &Json) -> (BTreeMap<u16, String>, Option<Vec<(
     };
     let names = image_label.get("properties").members().iter().filter_map(name).collect();
     let colors: BTreeMap<u16, DVec3> = image_label.get("colors").members().iter().filter_map(color).collect();
-    let palette: Vec<_> = colors.into_iter().map(|(value, color)| (f64::from(value), color)).collect();
+    let palette: Palette = colors.into_iter().map(|(value, color)| (f64::from(value), color)).collect();
     (names, Some(palette).filter(|palette| !palette.is_empty()))
 }
 
