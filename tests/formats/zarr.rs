@@ -337,10 +337,10 @@ fn damaged_stores_are_refused() {
         ("/shape", json!([3, 4]), "array", &["inconsistent dimensionality"][..]),
         ("/shape", json!([3, 4, 0]), "shape", &["3 × 4 × 0", "positive"]),
         ("/shape", json!([3, 4, u64::MAX]), "shape", &["at most 4294967295 each"]),
-        ("/shape", json!([60_000, 60_000, 2]), "chunks", &["12000 × 30000", "at most 67108864"]),
+        ("/shape", json!([60_000, 60_000, 2]), "chunks", &["20000 × 15000 × 1", "at most 67108864"]),
         ("/shape", json!([3000, 4000, 5]), "data", &["memory limit of 16777216"]),
         ("/shape", json!("all"), "metadata", &["Zarr array"]),
-        ("/data_type", json!("complex64"), "data_type", &["complex64", "float32"]),
+        ("/data_type", json!("complex64"), "array", &["complex64"]),
         ("/data_type", json!("int17"), "array", &["int17"]),
         ("/fill_value", json!("none"), "array", &["none"]),
         (
