@@ -1,9 +1,12 @@
 //! Loading the volumes of a scene's channels.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::{Channel, Scene, VolumeSource};
-use crate::volume::{Access, Labels, Selection, Volume, VolumeError, builtin};
+use crate::volume::{
+    Access, Labels, ReadOptions, Selection, Store, Volume, VolumeError, builtin, open_raw_store, open_store,
+};
 
 /// The scene's volume with all channels, on the first one's grid.
 pub(super) fn channels(scene: &Scene, access: &Access) -> Result<Volume, VolumeError> {
@@ -23,6 +26,21 @@ pub(super) fn channels(scene: &Scene, access: &Access) -> Result<Volume, VolumeE
     });
     let further = further.collect::<Result<_, VolumeError>>()?;
     volume.with_channels(&origin(&first.volume), further)
+}
+
+/// The scene's volume to be read by boxes; `None` if it has several channels, labels or a spacing of the scene's, or is no file.
+pub(super) fn store(scene: &Scene, options: &ReadOptions) -> Option<Result<Arc<dyn Store>, VolumeError>> {
+    let mut channels = scene.channels();
+    let (first, None) = (channels.next()?, channels.next()) else { return None };
+    if first.labels.is_some() || first.spacing.is_some() {
+        return None;
+    }
+    let options = ReadOptions { channel: first.index, time: first.time, ..options.clone() };
+    match &first.volume {
+        VolumeSource::File(path) => Some(open_store(path, &options)),
+        VolumeSource::Raw(path, layout) => Some(open_raw_store(path, layout, &options)),
+        VolumeSource::Builtin(_) | VolumeSource::Memory => None,
+    }
 }
 
 /// Where a volume comes from, for errors.

@@ -10,6 +10,7 @@ mod writer;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::DVec3;
 use toml::Table;
@@ -23,7 +24,7 @@ use crate::settings::framing::Extent;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::{Classification, Splatting};
 use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
-use crate::volume::{Access, RawLayout, ReadOptions, Volume, VolumeError};
+use crate::volume::{Access, RawLayout, ReadOptions, Store, Volume, VolumeError};
 pub use channel::Channel;
 use reader::{OVERRIDE, Origins, Section, apply_override};
 
@@ -328,6 +329,11 @@ impl Scene {
         let access = Access::new(options)?;
         let volume = load::channels(self, &access)?;
         Ok((volume, access.files()))
+    }
+
+    /// Opens the scene's volume to be read by boxes (SPEC §13), if it is one file without labels or a spacing of the scene's; `None` for any other.
+    pub fn open_store(&self, options: &ReadOptions) -> Option<Result<Arc<dyn Store>, VolumeError>> {
+        load::store(self, options)
     }
 
     /// The same scene with everything stated that depends on the volume: the transfer function and the camera's position. Preset and colour

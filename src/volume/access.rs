@@ -81,6 +81,11 @@ impl ReadOptions {
         Self { files: Some(files), ..self }
     }
 
+    /// The limit of [`Self::memory`], or the default.
+    pub fn memory_limit(&self) -> u64 {
+        self.memory.unwrap_or_else(memory::default_limit)
+    }
+
     /// These options with another memory limit in bytes.
     pub fn with_memory(self, bytes: u64) -> Self {
         Self { memory: Some(bytes), ..self }
@@ -114,7 +119,7 @@ impl Access {
         };
         let given = options.files.clone();
         let folder = options.confine.as_ref().filter(|_| given.is_none()).map(folder).transpose()?;
-        let limit = options.memory.unwrap_or_else(memory::default_limit);
+        let limit = options.memory_limit();
         let inner = Inner { given, folder, limit, reserved: AtomicU64::new(0), files: Mutex::default() };
         Ok(Self(
             Arc::new(inner),

@@ -21,6 +21,7 @@ mod parts;
 mod program;
 mod rasterizers;
 mod statistics;
+mod streaming;
 mod sweep;
 
 use std::collections::BTreeSet;

@@ -32,7 +32,7 @@ pub(crate) struct Input {
     #[command(flatten)]
     look: Look,
     #[command(flatten)]
-    reading: Reading,
+    pub(crate) reading: Reading,
     /// The side of the patient to look at, if the volume's file states how the patient lies; replaces the scene's camera.direction
     /// and camera.up.
     #[arg(long, value_enum, value_name = "SIDE")]

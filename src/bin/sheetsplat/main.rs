@@ -17,6 +17,7 @@ mod parts;
 mod progress;
 mod reading;
 mod render;
+mod streaming;
 mod sweep;
 #[cfg(feature = "viewer")]
 mod view;

@@ -13,6 +13,7 @@ use crate::arguments::{Depth, Input, check_scene_file, log_frame, scene_file};
 use crate::failure::Failure;
 use crate::outputs::{self, Outputs};
 use crate::parts::Part;
+use crate::streaming::Streamed;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -62,7 +63,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     named.extend(save_scene.as_deref().map(|path| ("--save-scene", path)));
     let outputs = Outputs::check(&named, arguments.profile, &input.files(&scene))?;
     let start = Instant::now();
-    let volume = input.load_volume(&scene, &outputs)?;
+    let streamed = Streamed::of(input, &scene);
+    let volume = match &streamed {
+        Some(streamed) => streamed.sample(input)?,
+        None => input.load_volume(&scene, &outputs)?,
+    };
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
     let start = Instant::now();
     let scene = input.settled(&volume, &scene, Scene::explicit)?;
@@ -70,13 +75,22 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let overlay = arguments.annotate.overlay(&scene, &volume)?;
     let volume = Arc::new(volume);
     let (bytes, mut stats) = match arguments.part.window(&scene) {
+        Some(_) if streamed.is_some() => {
+            let allowed = "whole images of a volume that fits into no memory, or more --memory";
+            return Err(Failure::Input(format!("--slabs, --region: found a part of an image, allowed: {allowed}")));
+        }
         Some(window) => {
             let (part, stats) = arguments.part.draw(input, volume, &scene, &window)?;
             (part.encode(output)?, stats)
         }
         None => {
-            let rendering = input.headless(arguments.profile, [&scene])?.render_volume(volume, &scene);
-            let Rendering { mut image, stats } = rendering.map_err(|error| input.failure(error))?;
+            let Rendering { mut image, stats } = match &streamed {
+                Some(streamed) => streamed.draw(input, &volume, &scene)?,
+                None => {
+                    let rendering = input.headless(arguments.profile, [&scene])?.render_volume(volume, &scene);
+                    rendering.map_err(|error| input.failure(error))?
+                }
+            };
             overlay.draw(&mut image);
             (image.encode(output, arguments.depth.into())?, stats)
         }

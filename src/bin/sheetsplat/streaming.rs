@@ -1,0 +1,64 @@
+//! Volumes that fit into no memory: drawn while they are read.
+
+use std::sync::Arc;
+
+use sheetsplat::Scene;
+use sheetsplat::cpu::{StreamError, StreamRenderer};
+use sheetsplat::headless::{Backend, Rendering};
+use sheetsplat::volume::{Store, Volume, sample};
+
+use crate::arguments::Input;
+use crate::failure::Failure;
+
+/// A store that is drawn while it is read.
+pub(crate) struct Streamed {
+    store: Arc<dyn Store>,
+    level: usize,
+    /// The bytes that values may take.
+    memory: u64,
+}
+
+impl Streamed {
+    /// The scene's volume, if it has one channel, can be read by boxes, and fits into no memory; `None` for any other. Errors of files are those of
+    /// reading it as a whole.
+    pub(crate) fn of(input: &Input, scene: &Scene) -> Option<Self> {
+        let is_on_cpu = match input.backend {
+            Backend::Cpu => true,
+            Backend::Auto => input.adapter.is_none(),
+            _ => false,
+        };
+        if !is_on_cpu {
+            return None;
+        }
+        let options = input.reading.options();
+        let memory = options.memory_limit();
+        let store = scene.open_store(&options)?.ok()?;
+        let level = scene.level.unwrap_or(0) as usize;
+        let of = store.levels().get(level)?;
+        let bytes = |dims: [u32; 3]| dims.into_iter().map(u64::from).product::<u64>().saturating_mul(4);
+        // Every thread that draws or reads holds some chunks, beside those that wait for other tiles.
+        let least = bytes(of.chunk.to_array()).saturating_mul(4 * rayon::current_num_threads() as u64);
+        (bytes(of.grid.dims.to_array()) > memory && least <= memory / 2).then_some(Self { store, level, memory })
+    }
+
+    /// The values that what the scene leaves open is chosen for.
+    pub(crate) fn sample(&self, input: &Input) -> Result<Volume, Failure> {
+        let start = std::time::Instant::now();
+        let volume = sample(&input.name, &*self.store, self.memory / 8).map_err(|error| input.failure(error))?;
+        let whole = self.store.levels()[self.level].grid.dims;
+        log::info!("{}: {whole} voxels, a sample of {} read in {:.1?}", input.name, volume.dims(), start.elapsed());
+        Ok(volume)
+    }
+
+    /// Draws the scene, whose settings no longer depend on the volume.
+    pub(crate) fn draw(&self, input: &Input, sample: &Volume, scene: &Scene) -> Result<Rendering, Failure> {
+        let store = Arc::clone(&self.store);
+        let rendering =
+            StreamRenderer::new(store, self.level, sample, scene, self.memory / 2).and_then(|renderer| renderer.draw());
+        rendering.map_err(|error| match error {
+            StreamError::Volume(error) => input.failure(error),
+            StreamError::Render(error) => input.failure(error),
+            other => Failure::Other(other.to_string()),
+        })
+    }
+}

@@ -1,0 +1,49 @@
+//! `sheetsplat render` of volumes that are larger than `--memory`.
+
+use serde_json::Value;
+
+use crate::*;
+
+/// A file of bytes without a header, of a solid ball: 18 MiB as numbers of 4 bytes.
+fn write_ball(folder: &Folder) -> &'static str {
+    let [nx, ny, nz] = [192_u32, 160, 155];
+    let value = |[x, y, z]: [u32; 3]| {
+        let [x, y, z] = [(x, nx), (y, ny), (z, nz)].map(|(at, count)| f64::from(at) / f64::from(count - 1) - 0.5);
+        (600.0 * (0.45 - (x * x + y * y + z * z).sqrt())).clamp(0.0, 250.0) as u8
+    };
+    let voxels = (0..nz).flat_map(|z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])));
+    folder.write("ball.raw", voxels.map(value).collect::<Vec<u8>>());
+    "ball.raw --dims 192,160,155 --type uint8 --set splatting.classification=before --set image={width=120,height=90}"
+}
+
+#[test]
+fn a_volume_larger_than_memory_has_the_bytes_of_one_that_fits() {
+    let folder = Folder::new();
+    let ball = write_ball(&folder);
+    let stated = "--set transfer.opacity=[[0,0],[60,0],[200,0.8]] --set camera.direction=[0.3,1,-0.4] \
+                  --set camera.fit=volume --set camera.center=[0,0,0] --backend cpu";
+    folder.render(&format!("{ball} {stated} -o whole.npy"));
+    let two = [("RAYON_NUM_THREADS", "2")];
+    let run = |rest: &str| folder.run_with(&two, "", &format!("render {ball} {rest} --memory 17MiB"));
+    run(&format!("{stated} -o streamed.npy --stats stats.json")).assert_success();
+    assert_eq!(folder.read("streamed.npy"), folder.read("whole.npy"));
+    let stats: Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
+    let of = |key: &str| stats[key].as_u64().unwrap();
+    assert_eq!((of("chunks_total"), of("level"), of("voxels_total")), (27, 0, 192 * 160 * 155));
+    // What lies behind the ball's front is hidden.
+    assert!(of("chunks_read") < 27, "{stats}");
+    assert_eq!(of("bytes_read") % 64, 0);
+    assert!(of("chunk_bytes") <= 17 << 20, "{stats}");
+
+    // What a scene leaves open is chosen for a sample.
+    run("--backend cpu -o open.png").assert_success();
+    run("--set splatting.classification=after --backend cpu -o no.png")
+        .assert_failure(2, &["splatting.classification: found \"after\" for a volume that is streamed, allowed: "]);
+    run("--backend cpu --region 0,0,10,10 -o no.exr").assert_failure(2, &["--slabs, --region: found a part"]);
+    run("--backend reference -o no.png")
+        .assert_failure(2, &["bytes of memory, allowed: at most the memory limit of 17825792 bytes"]);
+    folder
+        .run_with(&two, "", &format!("render {ball} --backend cpu --memory 3MiB -o no.png"))
+        .assert_failure(2, &["bytes of memory, allowed: at most the memory limit of 3145728 bytes"]);
+    assert!(!folder.path("no.png").exists() && !folder.path("no.exr").exists());
+}
