@@ -91,7 +91,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("volume.raw");
         std::fs::write(&path, &values).unwrap();
-        let layout = RawLayout { dims, sample_type: SampleType::Uint8, big_endian: false, offset: 0 };
+        let layout = RawLayout { dims, sample_type: SampleType::U8, big_endian: false, offset: 0 };
         let store = open_raw_store(Path::new(&path), &layout, &ReadOptions::default()).unwrap();
         let whole = Volume::open_raw_with(&path, &layout, &ReadOptions::default()).unwrap();
         for (memory, step) in [(u64::MAX, 1), (100_000, 2), (1000, 7), (4, 50)] {
