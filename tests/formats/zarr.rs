@@ -350,7 +350,7 @@ fn damaged_stores_are_refused() {
             &["at most 4294967295 values"],
         ),
         ("/chunk_grid/configuration/chunk_shape", json!([1 << 10, 1 << 10, 1 << 10]), "chunks", &["memory limit"]),
-        ("/chunk_grid/configuration/chunk_shape", json!([0, 4, 5]), "metadata", &[]),
+        ("/chunk_grid/configuration/chunk_shape", json!([0, 4, 5]), "array", &["nonzero"]),
         ("/chunk_grid/name", json!("spiral"), "array", &["spiral"]),
         ("/codecs", json!([]), "array", &["blosc, bz2, gzip, zlib, zstd"]),
         ("/codecs/0/name", json!("jpeg"), "array", &["jpeg"]),
@@ -363,7 +363,7 @@ fn damaged_stores_are_refused() {
     for cut in [0, 1, 119] {
         assert_error(open(&group, &plain, &samples[..cut]), "chunk", &["0/c/0/0/0", "chunk from [0, 0, 0]"]);
     }
-    assert_error(open(&group, &plain, &vec![0; 1 << 20]), "chunk", &["1048576 bytes", "0/c/0/0/0"]);
+    assert_error(open(&group, &plain, &vec![0; 1 << 20]), "chunk", &["is 1048576, expected 120", "0/c/0/0/0"]);
     // Streams that would expand to more than the chunk holds.
     for (codec, code) in [
         ("gzip", gzip(&vec![7; 1 << 20])),
