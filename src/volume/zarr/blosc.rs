@@ -116,7 +116,7 @@ fn unshuffle_bits(sorted: &[u8], element: usize, into: &mut [u8]) {
 /// Decodes a BloscLZ stream and returns the number of bytes; `None` if it is damaged or longer than `into`.
 fn blosc_lz(code: &[u8], into: &mut [u8]) -> Option<usize> {
     /// The largest distance in 13 bits; a further one follows in 16 bits.
-    const FAR: usize = 8191;
+    const LAST_NEAR: usize = 8191;
     let mut code = code.iter().copied();
     let mut written = 0;
     let mut control = code.next()? & 31;
@@ -141,8 +141,8 @@ fn blosc_lz(code: &[u8], into: &mut [u8]) -> Option<usize> {
             }
             let low = usize::from(code.next()?);
             let mut distance = high + low + 1;
-            if distance == FAR + 1 {
-                distance = FAR + 1 + (usize::from(code.next()?) << 8) + usize::from(code.next()?);
+            if distance == LAST_NEAR + 1 {
+                distance = LAST_NEAR + 1 + (usize::from(code.next()?) << 8) + usize::from(code.next()?);
             }
             let from = written.checked_sub(distance)?;
             if written + count > into.len() {
