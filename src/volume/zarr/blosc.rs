@@ -1,4 +1,4 @@
-//! Blosc chunks: https://github.com/Blosc/c-blosc/blob/main/README_CHUNK_FORMAT.rst.
+//! Blosc chunks: <https://github.com/Blosc/c-blosc/blob/main/README_CHUNK_FORMAT.rst>.
 //!
 //! A chunk is a header of 16 bytes, the positions of its blocks, and the blocks. A block is one compressed stream, or one for each byte of an element
 //! where the bytes of elements are sorted ("shuffled") by their place.

@@ -1,4 +1,4 @@
-//! The levels of an OME-Zarr image: https://ngff.openmicroscopy.org/0.5/#multiscale-md.
+//! The levels of an OME-Zarr image: <https://ngff.openmicroscopy.org/0.5/#multiscale-md>.
 //!
 //! This is read from JSON here: `ome_zarr_metadata` tells of a wrong value neither where it stands nor what is allowed, and brings five crates.
 
