@@ -83,7 +83,7 @@ pub struct StoreCounts {
     pub chunks_total: u64,
     /// Those of them that were read. Each counts once, although it may have been read again.
     pub chunks_read: u64,
-    /// The bytes of those in the store.
+    /// The bytes of the store that reading them took, without those of reading again what was dropped.
     pub bytes_read: u64,
     /// The most bytes of values and bricks that were in memory at a time. It depends on the order in which threads draw.
     pub chunk_bytes: u64,

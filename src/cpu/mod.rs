@@ -237,7 +237,7 @@ impl CpuRenderer {
         let (Drawing { content, counts, first_hits }, view) = self.drawing(window, false)?;
         self.hits = self.first_hit.map(|_| FirstHits { view, region, depths: first_hits });
         let image = Image { width: region.width, height: region.height, pixels: content.colors };
-        Ok(Rendering { image, stats: self.stats(counts, start) })
+        Ok(Rendering { image, stats: statistics(self.simd, self.size(), counts, start) })
     }
 
     /// Draws a part of the image (SPEC §11), and returns it with its statistics. First hits are not noted.
@@ -252,7 +252,12 @@ impl CpuRenderer {
         }
         let (Drawing { content, counts, .. }, view) = self.drawing(window.clone(), true)?;
         let part = Part::new((&self.volume, &self.scene), &view, window, content)?;
-        Ok((part, self.stats(counts, start)))
+        Ok((part, statistics(self.simd, self.size(), counts, start)))
+    }
+
+    /// The image's width and height.
+    fn size(&self) -> [u32; 2] {
+        [self.scene.image.width, self.scene.image.height]
     }
 
     /// Draws a window of the image, as pixels or as a part.
@@ -268,22 +273,21 @@ impl CpuRenderer {
         let host = Host { window, is_part, first_hit, surfaces: self.surfaces_of([width, height])? };
         Ok((layer::draw(&mut self.layers, &scene, view, host, self.level), view))
     }
+}
 
-    /// The statistics of a frame that began at a time.
-    fn stats(&self, counts: Counts, start: Instant) -> Stats {
-        let ImageSettings { width, height, .. } = self.scene.image;
-        Stats {
-            adapter: "CPU".to_owned(),
-            driver: self.simd.name().to_owned(),
-            backend: Backend::Cpu.name().to_owned(),
-            api: "none".to_owned(),
-            rasterizer: Backend::Cpu.name().to_owned(),
-            width,
-            height,
-            counts,
-            frame_ms: milliseconds_since(start),
-            ..Stats::default()
-        }
+/// The statistics of a frame of some width and height that began at a time.
+fn statistics(simd: Simd, [width, height]: [u32; 2], counts: Counts, start: Instant) -> Stats {
+    Stats {
+        adapter: "CPU".to_owned(),
+        driver: simd.name().to_owned(),
+        backend: Backend::Cpu.name().to_owned(),
+        api: "none".to_owned(),
+        rasterizer: Backend::Cpu.name().to_owned(),
+        width,
+        height,
+        counts,
+        frame_ms: milliseconds_since(start),
+        ..Stats::default()
     }
 }
 

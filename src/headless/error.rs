@@ -1,5 +1,7 @@
 //! All errors of headless rendering in one type.
 
+#[cfg(feature = "cpu")]
+use crate::cpu::StreamError;
 use crate::error::RenderError;
 use crate::error::device::DeviceError;
 use crate::scene::SceneError;
@@ -21,4 +23,14 @@ pub enum Error {
     /// The frame.
     #[error(transparent)]
     Render(#[from] RenderError),
+}
+
+#[cfg(feature = "cpu")]
+impl From<StreamError> for Error {
+    fn from(error: StreamError) -> Self {
+        match error {
+            StreamError::Volume(error) => error.into(),
+            StreamError::Render(error) => error.into(),
+        }
+    }
 }

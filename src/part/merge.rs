@@ -70,7 +70,7 @@ impl Part {
     /// if all slabs of these pixels are joined, or neighbours in pairs, as `Image::merge` does.
     ///
     /// # Errors
-    /// If there is none, or they are not of one scene and region, overlap, or leave out slabs between them.
+    /// If there is no part, if parts differ in their scene or region, or if their slabs overlap or leave a gap.
     pub fn join(parts: impl IntoIterator<Item = Self>) -> Result<Self, MergeError> {
         let parts: Vec<Self> = parts.into_iter().collect();
         let first = parts.first().cloned().ok_or(MergeError::Empty)?;

@@ -74,7 +74,7 @@ fn channel(settings: &Channel, key: &str, access: &Access) -> Result<Volume, Vol
             return Err(VolumeError::Invalid {
                 origin: origin(&settings.volume),
                 field: key.to_owned(),
-                found: "index, time or level of a volume that is none of several".to_owned(),
+                found: "index, time or level of a volume without channels, times or levels to choose from".to_owned(),
                 allowed: "none of these keys, or a file of several channels, times or levels".to_owned(),
             });
         }

@@ -1,12 +1,12 @@
-//! Samples of stores: few enough values for memory, from which histograms, presets and the camera's frame are taken.
+//! Samples of stores: as many values as fit into memory, from which histograms, presets and the camera's frame are taken.
 
 use glam::{DVec3, UVec3};
 use rayon::prelude::*;
 
 use super::{Grid, Store, StoreLevel, Volume, VolumeError, invalid, punch_holes};
 
-/// A sample of a store's values, at most `memory` bytes of them: the finest level that fits, or else every so many voxels of the coarsest along each axis. Its grid is
-/// that of a coarser level, and so lies where the store does. `origin` names the store in errors.
+/// Reads a sample of a store's values, which takes at most `memory` bytes: the finest level that fits, or else every nth voxel along each axis of the
+/// coarsest level. The sample's voxels lie where they do in the store. `origin` names the store in errors.
 ///
 /// # Errors
 /// If the store cannot be read, or holds no finite value there.

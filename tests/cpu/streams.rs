@@ -1,6 +1,6 @@
 //! Stores whose chunks are read while they are drawn: the bytes of the volume in memory, from no more than can matter.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
 use glam::{DVec3, UVec3};
@@ -8,7 +8,7 @@ use sheetsplat::Scene;
 use sheetsplat::cpu::{CpuRenderer, StreamRenderer};
 use sheetsplat::scene::VolumeSource;
 use sheetsplat::stats::StoreCounts;
-use sheetsplat::volume::{Store, StoreLevel, Volume, VolumeError};
+use sheetsplat::volume::{Labels, Store, StoreLevel, Volume, VolumeError};
 
 /// A volume in memory as a store that notes what is read of it.
 #[derive(Debug)]
@@ -77,6 +77,12 @@ fn scene(sets: &[&str]) -> Scene {
     Scene::from_volume(VolumeSource::Builtin("head:72".to_owned()), &sets).unwrap()
 }
 
+/// A scene's volume without its labels.
+fn values(scene: &Scene) -> Volume {
+    let volume = scene.load_volume().unwrap();
+    Volume::new("head", volume.dims(), volume.spacing(), volume.values().to_vec()).unwrap()
+}
+
 /// Draws a store and asserts that the image and the work are those of the volume in memory.
 fn assert_same(volume: &Volume, scene: &Scene, chunk: UVec3, memory: u64) -> StoreCounts {
     let name = format!("{chunk} {memory} {scene:?}");
@@ -85,7 +91,10 @@ fn assert_same(volume: &Volume, scene: &Scene, chunk: UVec3, memory: u64) -> Sto
     let renderer = StreamRenderer::new(store, 0, volume, scene, memory).unwrap();
     let streamed = renderer.draw().unwrap();
     assert!(streamed.image.pixels.as_flattened().iter().all(|channel| channel.is_finite()), "{name}");
-    assert_eq!(streamed.image, whole.image, "{name}");
+    let background = whole.image.pixels[0];
+    let shown = whole.image.pixels.iter().filter(|pixel| **pixel != background).count();
+    assert!(shown * 8 > whole.image.pixels.len(), "{shown} pixels: {name}");
+    assert!(streamed.image == whole.image, "the images differ: {name}");
     let [actual, expected] = [streamed.stats.counts, whole.stats.counts];
     assert_eq!(actual.voxels_shaded, expected.voxels_shaded, "{name}");
     assert_eq!(actual.sections_rasterized, expected.sections_rasterized, "{name}");
@@ -104,7 +113,7 @@ fn streams_are_the_volume_in_memory() {
         &["splatting.order=back-to-front", "camera.direction=[-0.4,0.5,0.2]"],
         &["splatting.culling=false"],
         &["splatting.compositing=maximum"],
-        &["splatting.compositing=minimum"],
+        &["splatting.compositing=minimum", "transfer={color=[[0,[1,0.5,0]],[160,[1,1,1]]],opacity=[[0,0.3],[160,1]]}"],
         &["splatting.compositing=average", "clip.planes=[[0.5,0.3,1,2]]"],
         &["splatting.compositing=surface"],
         &["splatting.compositing=xray"],
@@ -113,7 +122,7 @@ fn streams_are_the_volume_in_memory() {
         &[gradient],
     ] {
         let scene = scene(sets);
-        let volume = scene.load_volume().unwrap();
+        let volume = values(&scene);
         for (chunk, memory) in [([32, 32, 32], 1 << 30), ([7, 30, 16], 1 << 30), ([16, 16, 16], 1 << 17)] {
             let counts = assert_same(&volume, &scene, chunk.into(), memory);
             assert!(counts.chunks_read > 0 && counts.chunks_read <= counts.chunks_total, "{sets:?} {counts:?}");
@@ -152,13 +161,28 @@ fn hidden_and_empty_chunks_are_not_read() {
 #[test]
 fn failures_are_errors() {
     let scene = scene(&[]);
-    let volume = scene.load_volume().unwrap();
+    let volume = values(&scene);
     let store = MemoryStore { broken_from: Some(30), ..MemoryStore::new(&volume, UVec3::splat(16)) };
     let store = Arc::new(store);
     let renderer = StreamRenderer::new(store.clone(), 0, &volume, &scene, 1 << 30).unwrap();
     assert_eq!(renderer.draw().unwrap_err().to_string(), "store: the disk is gone");
     let error = StreamRenderer::new(store.clone(), 1, &volume, &scene, 1 << 30).unwrap_err();
     assert_eq!(error.to_string(), "volume.level: found 1, allowed: 0 to 0");
+    let labels = Labels {
+        origin: "labels".to_owned(),
+        dims: volume.dims(),
+        spacing: None,
+        values: vec![1; volume.values().len()].into(),
+        names: BTreeMap::new(),
+    };
+    let labelled = volume.clone().with_labels(labels).unwrap();
+    let error = StreamRenderer::new(store.clone(), 0, &labelled, &scene, 1 << 30).unwrap_err().to_string();
+    assert!(error.starts_with("volume: found labels of a volume that is streamed"), "{error}");
+    for chunk in [UVec3::ZERO, UVec3::new(1, 0, 1)] {
+        let empty = Arc::new(MemoryStore::new(&volume, chunk));
+        let error = StreamRenderer::new(empty, 0, &volume, &scene, 1 << 30).unwrap_err().to_string();
+        assert!(error.starts_with("volume: found chunks of [") && error.contains("at least 1"), "{error}");
+    }
     for (set, expected) in [
         ("splatting.classification=after", "splatting.classification: found \"after\" for a volume that is streamed"),
         ("splatting.method=composite-every-sample", "splatting.method: found \"composite-every-sample\""),
@@ -173,7 +197,7 @@ fn failures_are_errors() {
 #[test]
 fn threads_change_nothing() {
     let scene = scene(&["camera.direction=[0.3,-0.5,0.8]"]);
-    let volume = scene.load_volume().unwrap();
+    let volume = values(&scene);
     let draw = |threads: usize| {
         let store = Arc::new(MemoryStore::new(&volume, UVec3::splat(16)));
         let renderer = StreamRenderer::new(store, 0, &volume, &scene, 1 << 18).unwrap();

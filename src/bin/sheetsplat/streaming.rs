@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use sheetsplat::Scene;
-use sheetsplat::cpu::{StreamError, StreamRenderer};
+use sheetsplat::cpu::StreamRenderer;
 use sheetsplat::headless::{Backend, Rendering};
 use sheetsplat::volume::{Store, Volume, sample};
 
@@ -19,8 +19,8 @@ pub(crate) struct Streamed {
 }
 
 impl Streamed {
-    /// The scene's volume, if it has one channel, can be read by boxes, and fits into no memory; `None` for any other. Errors of files are those of
-    /// reading it as a whole.
+    /// The scene's volume, if it has one channel, can be read by boxes, and fits into no memory; `None` for any other. A file that cannot be opened gives
+    /// `None` too: reading it as a whole then tells why.
     pub(crate) fn of(input: &Input, scene: &Scene) -> Option<Self> {
         let is_on_cpu = match input.backend {
             Backend::Cpu => true,
@@ -41,7 +41,7 @@ impl Streamed {
         (bytes(of.grid.dims.to_array()) > memory && least <= memory / 2).then_some(Self { store, level, memory })
     }
 
-    /// The values that what the scene leaves open is chosen for.
+    /// Reads a sample of the values, from which everything is chosen that the scene leaves open.
     pub(crate) fn sample(&self, input: &Input) -> Result<Volume, Failure> {
         let start = std::time::Instant::now();
         let volume = sample(&input.name, &*self.store, self.memory / 8).map_err(|error| input.failure(error))?;
@@ -55,10 +55,6 @@ impl Streamed {
         let store = Arc::clone(&self.store);
         let rendering =
             StreamRenderer::new(store, self.level, sample, scene, self.memory / 2).and_then(|renderer| renderer.draw());
-        rendering.map_err(|error| match error {
-            StreamError::Volume(error) => input.failure(error),
-            StreamError::Render(error) => input.failure(error),
-            other => Failure::Other(other.to_string()),
-        })
+        rendering.map_err(|error| input.failure(error))
     }
 }

@@ -17,10 +17,10 @@ use crate::volume::{Grid, Volume, VolumeError};
 #[derive(Debug)]
 pub(in crate::cpu) struct Chunk {
     number: u32,
-    from: UVec3,
-    dims: UVec3,
-    /// Empty if all are the store's fill value, and that does not take part.
-    values: Vec<f32>,
+    /// The first of the voxels that were read.
+    low: UVec3,
+    /// Their values; `None` if the store holds none of the chunk's voxels, and its fill value does not take part.
+    values: Option<Volume>,
     /// In memory order.
     bricks: Vec<Brick>,
     /// Those of them that are on the image, by first sheet and then in memory order.
@@ -43,29 +43,36 @@ impl Chunk {
         drawn: Option<Arc<Drawn>>,
         held: &Arc<AtomicUsize>,
     ) -> Result<(Self, u64), VolumeError> {
-        let (from, dims) = source.bounds(number);
-        let (values, read) = match source.is_stored(number)? {
-            true => source.values(from, dims)?,
-            false if source.shows_fill() => (vec![source.store.fill(); dims.element_product() as usize], 0),
-            false => (Vec::new(), 0),
+        let (low, dims) = source.read_bounds(number);
+        let (values, read) = match source.is_stored(number)? || source.shows_fill() {
+            true => {
+                let (values, read) = source.values(low, dims)?;
+                (Some(Volume::piece(Grid { dims, ..source.grid }, values)), read)
+            }
+            false => (None, 0),
         };
-        let bricks = if values.is_empty() { Vec::new() } else { bricks(source, from, dims, &values)? };
+        let bricks = values.as_ref().map_or_else(Vec::new, |volume| bricks(source, number, volume, low));
         let overlaps = Overlaps::count(&bricks, &source.projection.view);
         let place = |(at, brick)| place_brick(at as u32, brick, &source.projection, source.support);
         let mut placed: Vec<Placed> = bricks.iter().enumerate().filter_map(place).collect();
         placed.sort_unstable_by_key(|placed| (placed.first, placed.brick));
-        let bytes = size_of_val(&values[..])
+        let bytes = values.as_ref().map_or(0, |volume| size_of_val(volume.values()))
             + bricks.len() * (size_of::<Brick>() + 2 * size_of::<u64>())
             + placed.len() * size_of::<Placed>();
         let drawn = drawn.unwrap_or_else(|| Arc::new(Drawn::new(bricks.len(), &source.projection.view)));
         held.fetch_add(bytes, Ordering::Relaxed);
         let held = Arc::clone(held);
-        Ok((Self { number, from, dims, values, bricks, placed, drawn, overlaps, held, bytes }, read))
+        Ok((Self { number, low, values, bricks, placed, drawn, overlaps, held, bytes }, read))
     }
 
     /// Its number among the store's chunks.
     pub(super) fn number(&self) -> u32 {
         self.number
+    }
+
+    /// Whether it needed the store's values.
+    pub(super) fn is_read(&self) -> bool {
+        self.values.is_some()
     }
 
     /// The overlaps of its voxels with slabs.
@@ -101,14 +108,11 @@ impl Chunk {
         (placed.first, brick::position(self.brick(placed.brick)))
     }
 
-    /// The value of one of its voxels; `None` outside of it.
-    pub(super) fn value(&self, voxel: UVec3, fill: f32) -> Option<f32> {
-        if voxel.cmplt(self.from).any() || voxel.cmpge(self.from + self.dims).any() {
-            return None;
-        }
-        let at = voxel - self.from;
-        let index = at.x + self.dims.x * (at.y + self.dims.y * at.z);
-        Some(self.values.get(index as usize).copied().unwrap_or(fill))
+    /// A voxel's value; `None` if it was not read.
+    pub(super) fn value(&self, voxel: UVec3) -> Option<f32> {
+        let volume = self.values.as_ref()?;
+        let is_there = voxel.cmpge(self.low).all() && voxel.cmplt(self.low + volume.dims()).all();
+        is_there.then(|| volume.value(voxel - self.low))
     }
 }
 
@@ -118,26 +122,18 @@ impl Drop for Chunk {
     }
 }
 
-/// The bricks of the voxels that take part, in memory order.
-fn bricks(source: &Source, from: UVec3, dims: UVec3, values: &[f32]) -> Result<Vec<Brick>, VolumeError> {
+/// The bricks of a chunk's voxels that take part, in memory order. `volume` holds them and what was read around them, from the voxel `low` on.
+fn bricks(source: &Source, number: u32, volume: &Volume, low: UVec3) -> Vec<Brick> {
     let Source { transfer, clipped, grid, .. } = source;
+    let (from, dims) = source.bounds(number);
     let own = Grid { dims, ..*grid };
-    // Only gradient opacity needs values around the chunk to decide what takes part.
-    let rim = u32::from(transfer.gradient_opacity.is_some());
-    let low = from.saturating_sub(UVec3::splat(rim));
-    let high = (from + dims + rim).min(grid.dims);
-    let around = match rim {
-        0 => values.to_vec(),
-        _ => source.values(low, high - low)?.0,
-    };
-    let volume = Volume::piece(Grid { dims: high - low, ..own }, around);
     let takes_part =
-        |voxel: &UVec3| clipped.contain(*voxel) && takes_part(&volume, transfer, volume.grid().index_of(*voxel - low));
-    let voxels = (0..own.dims.element_product()).map(|index| (index, from + own.voxel_at(index)));
+        |voxel: &UVec3| clipped.contain(*voxel) && takes_part(volume, transfer, volume.grid().index_of(*voxel - low));
+    let voxels = (0..dims.element_product()).map(|index| (index, from + own.voxel_at(index)));
     let taking_part: Vec<u32> = voxels.filter(|(_, voxel)| takes_part(voxel)).map(|(index, _)| index).collect();
     let mut bricks = BrickList::new(&own, &taking_part).bricks().to_vec();
     for brick in &mut bricks {
         (brick.x, brick.y, brick.z) = (brick.x + from.x, brick.y + from.y, brick.z + from.z);
     }
-    Ok(bricks)
+    bricks
 }

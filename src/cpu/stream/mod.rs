@@ -55,10 +55,9 @@ impl Stream {
 
     /// The material of a chunk's voxel. Its gradient may need values of other chunks, which are read for it.
     pub(super) fn material(self: &Arc<Self>, chunk: &Chunk, voxel: UVec3) -> Material {
-        let fill = self.source.store.fill();
         let value = |voxel| {
-            let outside = || self.chunk(self.source.number_of(voxel))?.value(voxel, fill);
-            chunk.value(voxel, fill).or_else(outside).unwrap_or(f32::NAN)
+            let outside = || self.chunk(self.source.number_of(voxel))?.value(voxel);
+            chunk.value(voxel).or_else(outside).unwrap_or_else(|| self.source.store.fill())
         };
         let (volume, at) = self.source.around(voxel, value);
         Material::of(&volume, &self.source.transfer, at)

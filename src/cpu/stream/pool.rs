@@ -1,8 +1,10 @@
 //! The chunks in memory: read by threads of their own when tiles ask for them, and dropped when memory is short and no tile draws them.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+
+use glam::UVec3;
 
 use super::chunk::Chunk;
 use super::source::Source;
@@ -46,8 +48,8 @@ enum Entry {
 /// What has been read of a store, each chunk counted once although it may have been read again.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Reads {
-    /// Chunks that the store holds.
-    pub(super) chunks: u64,
+    /// The store's chunks, of those that it holds.
+    pub(super) chunks: HashSet<UVec3>,
     /// Bytes of the store.
     pub(super) bytes: u64,
     /// The most bytes that chunks held at a time.
@@ -74,8 +76,6 @@ impl Pool {
 
     /// Reads a chunk that was reserved.
     pub(super) fn read(&self, source: &Source, number: u32) {
-        // Whoever waits must learn of a panic, too.
-        let guard = Reserved { pool: self, number };
         let drawn = self.state().read.get(&number).cloned();
         let result = Chunk::read(source, number, drawn, &self.held);
         let mut state = self.state();
@@ -92,7 +92,7 @@ impl Pool {
             }
         }
         drop(state);
-        drop(guard);
+        self.changed.notify_all();
     }
 
     /// A chunk that is here or being read; `None` if reading failed, or it must be reserved again.
@@ -143,8 +143,10 @@ impl State {
         if self.read.insert(chunk.number(), Arc::clone(chunk.drawn())).is_some() {
             return;
         }
-        let stored = |chunk| source.store.contains(source.level, chunk).unwrap_or(false);
-        self.counts.chunks += source.stored(chunk.number()).filter(|chunk| stored(*chunk)).count() as u64;
+        if chunk.is_read() {
+            let is_held = |chunk: &UVec3| source.store.contains(source.level, *chunk).unwrap_or(false);
+            self.counts.chunks.extend(source.stored(source.read_bounds(chunk.number())).filter(is_held));
+        }
         self.counts.bytes += bytes;
         self.counts.overlaps = std::mem::take(&mut self.counts.overlaps).and(chunk.overlaps().clone());
     }
@@ -163,22 +165,5 @@ impl State {
             }
             self.chunks.remove(&number);
         }
-    }
-}
-
-/// A chunk that is being read.
-struct Reserved<'a> {
-    pool: &'a Pool,
-    number: u32,
-}
-
-impl Drop for Reserved<'_> {
-    fn drop(&mut self) {
-        let mut state = self.pool.state();
-        if let Some(Entry::Reading) = state.chunks.get(&self.number) {
-            state.chunks.remove(&self.number);
-        }
-        drop(state);
-        self.pool.changed.notify_all();
     }
 }

@@ -8,24 +8,23 @@ use web_time::Instant;
 use super::Stream;
 use super::pool::{Pool, Reads};
 use super::source::Source;
-use crate::cpu::cut::Surfaces;
 use crate::cpu::frame::{Drawing, Frame, Host, Voxels};
 use crate::cpu::project::Projection;
 use crate::cpu::simd::{self, Simd};
-use crate::cpu::{check, milliseconds_since};
+use crate::cpu::{check, statistics};
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
 use crate::kernel::Kernel;
-use crate::rendering::{Backend, Rendering};
+use crate::rendering::Rendering;
 use crate::scene::Scene;
 use crate::scene::names::{CLASSIFICATIONS, METHODS, name_of};
 use crate::settings::splatting::{Classification, Method};
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::{Stats, StoreCounts};
-use crate::volume::{Store, StoreLevel, Volume, VolumeError};
+use crate::volume::{Store, Volume, VolumeError};
 
 /// Why a store could not be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -64,8 +63,8 @@ impl StreamRenderer {
     /// `memory` bytes together, beyond which those are dropped and read again that no tile is drawn from.
     ///
     /// # Errors
-    /// If the store has no such level, the scene needs what a store lacks, such as labels, or a setting is not supported: classification after
-    /// splatting, methods other than image-aligned.
+    /// If the store has no such level, or its chunks are too many or too large; if the scene has several channels, or the sample has labels, colours or
+    /// several channels; or if a setting is not supported: classification after splatting, and methods other than image-aligned.
     pub fn new(
         store: Arc<dyn Store>,
         level: usize,
@@ -80,6 +79,8 @@ impl StreamRenderer {
         if level >= levels {
             return Err(SettingError::new("volume.level", level.to_string(), format!("0 to {}", levels - 1)).into());
         }
+        check_sample(sample, scene)?;
+        Source::check(&store.levels()[level])?;
         let (simd, vectors) = simd::chosen()?;
         let transfer = scene.resolve(sample);
         let scene = scene.framed(sample, &transfer);
@@ -104,35 +105,22 @@ impl StreamRenderer {
         let view = ViewGeometry::new(&grid, &scene.camera, &scene.splatting, size)?;
         let window = Window { slabs: Window::ALL_SLABS, region: Region::whole(size) };
         let stream = Arc::new(self.stream(view, &window)?);
-        let host = Host { window, is_part: false, first_hit: None, surfaces: None::<Surfaces> };
+        let host = Host { window, is_part: false, first_hit: None, surfaces: None };
         let frame = Frame::new(&grid, Voxels::Streamed(&stream), scene, view, host, self.vectors);
         let Drawing { content, counts, .. } = frame.draw(self.vectors);
         if let Some(failure) = stream.pool.take_failure() {
             return Err(failure.into());
         }
         let Reads { chunks, bytes, most_held, .. } = stream.pool.reads();
-        let StoreLevel { chunk, .. } = self.store.levels()[self.level];
-        let per_axis = (0..3).map(|axis| u64::from(grid.dims[axis].div_ceil(chunk[axis])));
         let image = Image { width: size[0], height: size[1], pixels: content.colors };
-        let stats = Stats {
-            adapter: "CPU".to_owned(),
-            driver: self.simd.name().to_owned(),
-            backend: Backend::Cpu.name().to_owned(),
-            api: "none".to_owned(),
-            rasterizer: Backend::Cpu.name().to_owned(),
-            width: size[0],
-            height: size[1],
-            counts,
-            store: Some(StoreCounts {
-                level: self.level as u64,
-                chunks_total: per_axis.product(),
-                chunks_read: chunks,
-                bytes_read: bytes,
-                chunk_bytes: most_held,
-            }),
-            frame_ms: milliseconds_since(start),
-            ..Stats::default()
+        let store = StoreCounts {
+            level: self.level as u64,
+            chunks_total: self.store.levels()[self.level].chunks().as_u64vec3().element_product(),
+            chunks_read: chunks.len() as u64,
+            bytes_read: bytes,
+            chunk_bytes: most_held,
         };
+        let stats = Stats { store: Some(store), ..statistics(self.simd, size, counts, start) };
         Ok(Rendering { image, stats })
     }
 
@@ -160,6 +148,18 @@ impl StreamRenderer {
             readers,
         })
     }
+}
+
+/// Checks that a scene and the sample of its volume are of one channel of values.
+fn check_sample(sample: &Volume, scene: &Scene) -> Result<(), SettingError> {
+    let found = match sample {
+        _ if !scene.further.is_empty() || !sample.further().is_empty() => "several channels",
+        _ if sample.labels().is_some() => "labels",
+        _ if sample.colors().is_some() => "colours",
+        _ => return Ok(()),
+    };
+    let found = format!("{found} of a volume that is streamed");
+    Err(SettingError::new("volume", found, "one channel of values without labels, or more memory"))
 }
 
 /// Checks that a scene whose classification is known can be streamed.

@@ -6,12 +6,13 @@ use glam::UVec3;
 
 use crate::cpu::bin::{Placed, place_box};
 use crate::cpu::project::Projection;
+use crate::error::setting::SettingError;
 use crate::lists::brick::SIDE;
 use crate::settings::clip::ClippedVoxels;
 use crate::settings::transfer_function::TransferFunction;
-use crate::volume::{Grid, Store, Volume, VolumeError};
+use crate::volume::{Grid, Store, StoreLevel, Volume, VolumeError};
 
-/// Chunks along an axis have at least so many voxels: smaller ones of the store are read together.
+/// The minimum number of voxels along each axis of a chunk that is drawn. Smaller chunks of the store are read together.
 const LEAST_SIDE: u32 = 32;
 
 /// A level of a store in a view.
@@ -34,6 +35,7 @@ impl Source {
     /// The voxels of a chunk that is drawn, for the store's.
     pub(super) fn side(chunk: UVec3, grid: &Grid) -> UVec3 {
         let of = |chunk: u32, count: u32| {
+            let chunk = chunk.min(count);
             let joined = chunk * LEAST_SIDE.div_ceil(chunk);
             // Bricks of neighbouring chunks must not share voxels.
             joined.next_multiple_of(SIDE).min(count.next_multiple_of(SIDE))
@@ -43,8 +45,25 @@ impl Source {
 
     /// The number of chunks along each axis.
     fn across(&self) -> UVec3 {
-        let Self { grid: Grid { dims, .. }, side, .. } = self;
-        UVec3::new(dims.x.div_ceil(side.x), dims.y.div_ceil(side.y), dims.z.div_ceil(side.z))
+        StoreLevel { grid: self.grid, chunk: self.side }.chunks()
+    }
+
+    /// Checks that the chunks of a level can be numbered, and the voxels of each.
+    ///
+    /// # Errors
+    /// If a chunk has no voxels, or there are more of either than numbers.
+    pub(super) fn check(level: &StoreLevel) -> Result<(), SettingError> {
+        let StoreLevel { grid, chunk } = level;
+        let fits = |sizes: UVec3| sizes.to_array().map(u64::from).iter().product::<u64>() <= u64::from(u32::MAX);
+        if chunk.min_element() > 0 {
+            let side = Self::side(*chunk, grid);
+            // With the voxels around a chunk.
+            if fits(StoreLevel { grid: *grid, chunk: side }.chunks()) && fits(side + 2) {
+                return Ok(());
+            }
+        }
+        let found = format!("chunks of {chunk} voxels in a level of {}", grid.dims);
+        Err(SettingError::new("volume", found, "at most 4294967295 chunks of at least 1 and at most 4294967295 voxels"))
     }
 
     /// The number of the chunk that holds a voxel.
@@ -76,9 +95,16 @@ impl Source {
         placed
     }
 
-    /// The store's chunks that share voxels with a chunk that is drawn.
-    pub(super) fn stored(&self, number: u32) -> impl Iterator<Item = UVec3> {
+    /// The box that a chunk is read with: its voxels, and with gradient opacity, which needs gradients to decide what takes part, those around them.
+    pub(super) fn read_bounds(&self, number: u32) -> (UVec3, UVec3) {
         let (from, dims) = self.bounds(number);
+        let rim = u32::from(self.transfer.gradient_opacity.is_some());
+        let low = from.saturating_sub(UVec3::splat(rim));
+        (low, (from + dims + rim).min(self.grid.dims) - low)
+    }
+
+    /// The store's chunks that share voxels with a box.
+    pub(super) fn stored(&self, (from, dims): (UVec3, UVec3)) -> impl Iterator<Item = UVec3> {
         let chunk = self.store.levels()[self.level].chunk;
         let (first, last) = (from / chunk, (from + dims - 1) / chunk);
         let columns = move |y, z| (first.x..=last.x).map(move |x| UVec3::new(x, y, z));
@@ -90,7 +116,7 @@ impl Source {
     /// # Errors
     /// If the store cannot be read.
     pub(super) fn is_stored(&self, number: u32) -> Result<bool, VolumeError> {
-        for chunk in self.stored(number) {
+        for chunk in self.stored(self.bounds(number)) {
             if self.store.contains(self.level, chunk)? {
                 return Ok(true);
             }

@@ -58,7 +58,7 @@ struct Node {
 }
 
 impl Node {
-    /// The node at a path of a store; `None` if there is none.
+    /// The node at a path of a store; `None` if the store has no node there.
     fn read(keys: &Keys, path: &str) -> Result<Option<Self>, VolumeError> {
         let at = |file: &str| if path.is_empty() { file.to_owned() } else { format!("{path}/{file}") };
         for name in ["zarr.json", ".zattrs"] {

@@ -122,7 +122,7 @@ impl Keys {
         }
     }
 
-    /// Opens the file of a key in a folder; `None` if there is none.
+    /// Opens the file of a key in a folder; `None` if the folder has no such file.
     fn open(&self, key: &str) -> Result<Option<Source>, VolumeError> {
         let path = self.file(key);
         if self.access.given().is_none() && is_missing(&path) {
