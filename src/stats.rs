@@ -50,7 +50,7 @@ pub struct Stats {
 pub struct Counts {
     /// Voxels in the volume.
     pub voxels_total: u64,
-    /// Voxels that take part (SPEC §3).
+    /// Voxels that take part (SPEC §3); of a volume that is streamed and classified after splatting 0, like their sections, as nobody counts them.
     pub voxels_in_range: u64,
     /// Voxels whose colour was computed for this frame. Each counts once, although the tile rasterizer computes it again for every tile,
     /// and for every group where more lies behind a tile than it remembers.

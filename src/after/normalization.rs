@@ -30,15 +30,19 @@ impl Normalization {
 
     /// The numbers for the range of some values; NaN is ignored. `None` if all are NaN.
     pub fn of(values: impl Iterator<Item = f32>) -> Option<Self> {
-        let ends =
-            values.fold([f32::INFINITY, f32::NEG_INFINITY], |[min, max], value| [min.min(value), max.max(value)]);
-        (ends[0] <= ends[1]).then(|| Self::new(ends.map(f64::from)))
+        range_of(values).map(|range| Self::new(range.map(f64::from)))
     }
 
     /// The number of a value.
     pub fn apply(&self, value: f64) -> f64 {
         (value - self.base) * self.scale
     }
+}
+
+/// The minimum and maximum of some values; NaN is ignored. `None` if all are NaN.
+pub fn range_of(values: impl Iterator<Item = f32>) -> Option<[f32; 2]> {
+    let ends = values.fold([f32::INFINITY, f32::NEG_INFINITY], |[min, max], value| [min.min(value), max.max(value)]);
+    (ends[0] <= ends[1]).then_some(ends)
 }
 
 #[cfg(test)]

@@ -25,7 +25,7 @@ impl AddAssign for Tally {
 }
 
 /// Records which voxels any tile has shaded and which of their sections any tile has drawn, [`SECTIONS`] at a time.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Drawn {
     /// The bits of every brick's voxels: those shaded, then by part those of which sections were drawn.
     marks: Vec<AtomicU64>,

@@ -79,8 +79,9 @@ impl Layer {
                     coefficients.look(of, scene.splatting.compositing, &view);
                 }
                 let frames = channels(volume, transfer).zip(&*coefficients).enumerate();
-                let frame = |(number, (of, coefficients))| {
-                    after::Frame::new(number, of, coefficients, scene, view, host.clone())
+                let frame = |(number, ((volume, transfer), coefficients))| {
+                    let matter = after::Matter::Whole { volume, coefficients };
+                    after::Frame::new(number, (matter, transfer), scene, view, host.clone())
                 };
                 after::Frame::draw(&frames.map(frame).collect::<Vec<_>>(), level)
             }

@@ -37,6 +37,12 @@ pub trait Store: Send + Sync + Debug {
     /// The value of every voxel in a chunk that the store does not hold.
     fn fill(&self) -> f32;
 
+    /// The minimum and maximum of a level's values, holes aside, if the store knows them. Images of a volume classified after splatting then have the same bytes as those of
+    /// one in memory, whose numbers are scaled by this range; else the same to rounding.
+    fn range(&self, _level: usize) -> Option<[f32; 2]> {
+        None
+    }
+
     /// A hash, as hexadecimal digits, of what identifies the store's values: its metadata, never paths or times.
     fn identity(&self) -> String;
 }

@@ -6,9 +6,14 @@ use std::sync::{Arc, Mutex};
 use glam::{DVec3, UVec3};
 use sheetsplat::Scene;
 use sheetsplat::cpu::{CpuRenderer, StreamRenderer};
+use sheetsplat::scene::ImageSettings;
 use sheetsplat::scene::VolumeSource;
+use sheetsplat::settings::Classification;
 use sheetsplat::stats::StoreCounts;
-use sheetsplat::volume::{Labels, Store, StoreLevel, Volume, VolumeError};
+use sheetsplat::volume::{Grid, Labels, Store, StoreLevel, Volume, VolumeError};
+
+use crate::common::compare::assert_at_least;
+use crate::common::images::psnr;
 
 /// A volume in memory as a store that notes what is read of it.
 #[derive(Debug)]
@@ -19,12 +24,13 @@ struct MemoryStore {
     read: Mutex<BTreeSet<[u32; 3]>>,
     /// Chunks from this plane on cannot be read.
     broken_from: Option<u32>,
+    is_range_known: bool,
 }
 
 impl MemoryStore {
     fn new(volume: &Volume, chunk: UVec3) -> Self {
         let levels = [StoreLevel { grid: *volume.grid(), chunk }];
-        Self { volume: volume.clone(), levels, read: Mutex::default(), broken_from: None }
+        Self { volume: volume.clone(), levels, read: Mutex::default(), broken_from: None, is_range_known: true }
     }
 
     fn value(&self, voxel: UVec3) -> f32 {
@@ -66,8 +72,39 @@ impl Store for MemoryStore {
         0.0
     }
 
+    fn range(&self, _: usize) -> Option<[f32; 2]> {
+        let ends = |[least, greatest]: [f32; 2], value: &f32| [least.min(*value), greatest.max(*value)];
+        self.is_range_known.then(|| self.volume.values().iter().fold([f32::INFINITY, f32::NEG_INFINITY], ends))
+    }
+
     fn identity(&self) -> String {
         "memory".to_owned()
+    }
+}
+
+/// A store that holds no chunk.
+#[derive(Debug)]
+struct LargeStore([StoreLevel; 1]);
+
+impl Store for LargeStore {
+    fn levels(&self) -> &[StoreLevel] {
+        &self.0
+    }
+
+    fn read(&self, _: usize, _: UVec3, _: UVec3, _: &mut [f32]) -> Result<u64, VolumeError> {
+        unreachable!("no chunk is held")
+    }
+
+    fn contains(&self, _: usize, _: UVec3) -> Result<bool, VolumeError> {
+        Ok(false)
+    }
+
+    fn fill(&self) -> f32 {
+        0.0
+    }
+
+    fn identity(&self) -> String {
+        "large".to_owned()
     }
 }
 
@@ -96,9 +133,12 @@ fn assert_same(volume: &Volume, scene: &Scene, chunk: UVec3, memory: u64) -> Sto
     assert!(shown * 8 > whole.image.pixels.len(), "{shown} pixels: {name}");
     assert!(streamed.image == whole.image, "the images differ: {name}");
     let [actual, expected] = [streamed.stats.counts, whole.stats.counts];
+    assert_eq!(actual.voxels_total, expected.voxels_total, "{name}");
+    if scene.splatting.classification == Classification::After {
+        return streamed.stats.store.unwrap();
+    }
     assert_eq!(actual.voxels_shaded, expected.voxels_shaded, "{name}");
     assert_eq!(actual.sections_rasterized, expected.sections_rasterized, "{name}");
-    assert_eq!(actual.voxels_total, expected.voxels_total, "{name}");
     streamed.stats.store.unwrap()
 }
 
@@ -156,6 +196,18 @@ fn hidden_and_empty_chunks_are_not_read() {
     };
     // The block reaches into one chunk; the other chunks are not held.
     assert_eq!(assert_same(&volume, &all, UVec3::splat(32), 1 << 30).chunks_read, 10);
+    // There the block reaches into two.
+    for (culling, chunks) in [(true, 9), (false, 11)] {
+        let mut after = all.clone();
+        (after.splatting.classification, after.splatting.culling) = (Classification::After, culling);
+        let thin = Volume::new("wall", volume.dims(), DVec3::ONE, nearer(volume.values())).unwrap();
+        assert_eq!(assert_same(&thin, &after, UVec3::splat(32), 1 << 30).chunks_read, chunks);
+    }
+}
+
+/// Values ten voxels nearer along x, so that slabs drawn together with the last that shows the wall are within its chunks.
+fn nearer(values: &[f32]) -> Vec<f32> {
+    values.iter().skip(10).chain(&[0.0; 10]).copied().collect()
 }
 
 #[test]
@@ -168,6 +220,12 @@ fn failures_are_errors() {
     assert_eq!(renderer.draw().unwrap_err().to_string(), "store: the disk is gone");
     let error = StreamRenderer::new(store.clone(), 1, &volume, &scene, 1 << 30).unwrap_err();
     assert_eq!(error.to_string(), "volume.level: found 1, allowed: 0 to 0");
+    let mut small = Scene { image: ImageSettings { width: 1, height: 1, ..scene.image }, ..scene.clone() };
+    small.splatting.classification = Classification::After;
+    let large =
+        Arc::new(LargeStore([StoreLevel { grid: Grid::new(UVec3::splat(1024), DVec3::ONE), chunk: UVec3::splat(64) }]));
+    let error = StreamRenderer::new(large, 0, &volume, &small, 1 << 24).unwrap().draw().unwrap_err().to_string();
+    assert!(error.starts_with("volume.level: found 0, in which 32×32 pixels see a box of voxels of "), "{error}");
     let labels = Labels {
         origin: "labels".to_owned(),
         dims: volume.dims(),
@@ -184,7 +242,10 @@ fn failures_are_errors() {
         assert!(error.starts_with("volume: found chunks of [") && error.contains("at least 1"), "{error}");
     }
     for (set, expected) in [
-        ("splatting.classification=after", "splatting.classification: found \"after\" for a volume that is streamed"),
+        (
+            "splatting={classification=\"after\",interpolation=\"exact\"}",
+            "splatting.interpolation: found \"exact\" for a volume that is streamed",
+        ),
         ("splatting.method=composite-every-sample", "splatting.method: found \"composite-every-sample\""),
     ] {
         let scene = Scene::from_volume(scene.volume.clone(), &[set.to_owned()]).unwrap();
@@ -193,14 +254,75 @@ fn failures_are_errors() {
     }
 }
 
+/// Scenes whose classification comes after splatting.
+const AFTER: [&[&str]; 18] = [
+    &[],
+    &["camera.direction=[0.3,-0.5,0.8]", "splatting.compositing=exponential"],
+    &["camera.projection=perspective", "camera.direction=[1,0.2,0.1]"],
+    &["camera.projection=perspective", "camera.distance=20", "splatting.slab_width=0.6"],
+    &["splatting.culling=false", "camera.direction=[-0.4,0.5,0.2]"],
+    &["splatting.compositing=maximum", "camera.direction=[-0.4,0.5,0.2]"],
+    &["splatting.compositing=minimum", "transfer={color=[[0,[1,0.5,0]],[160,[1,1,1]]],opacity=[[0,0.3],[160,1]]}"],
+    &["splatting.compositing=average", "clip.planes=[[0.5,0.3,1,2]]"],
+    &["splatting.compositing=surface"],
+    &["splatting.compositing=xray"],
+    &["clip.planes=[[0.5,0.3,1,2]]", "camera.direction=[0.3,-0.5,0.8]"],
+    &["splatting.opacity_threshold=0.9", "camera.up=[0,1,0]", "camera.direction=[0,0,1]"],
+    &["shading.gradient=kernel", "camera.direction=[0.3,-0.5,0.8]"],
+    &["splatting.slab_width=0.25"],
+    &["splatting.slab_width=3", "camera.direction=[0.3,-0.5,0.8]"],
+    &["splatting.radius=3.2", "splatting.falloff=0.7"],
+    // Pixels larger than voxels, and much smaller ones.
+    &["image={width=32,height=26}", "camera.direction=[0.3,-0.5,0.8]"],
+    &["camera.height=9", "camera.direction=[0.3,-0.5,0.8]"],
+];
+
+#[test]
+fn streams_classified_after_splatting_are_the_volume_in_memory() {
+    let gradient = "transfer={color=[[0,[0,0,0]],[40,[1,0.5,0]],[160,[1,1,1]]],opacity=[[0,0],[40,0.02],[160,0.4]],gradient_opacity=[[0,0],[30,1]]}";
+    for sets in AFTER.into_iter().chain([&[gradient][..]]) {
+        let scene = scene(&[&["splatting.classification=after"], sets].concat());
+        let volume = values(&scene);
+        for (chunk, memory) in [([32, 32, 32], 1 << 30), ([7, 30, 16], 1 << 30), ([16, 16, 16], 1 << 17)] {
+            let counts = assert_same(&volume, &scene, chunk.into(), memory);
+            assert!(counts.chunks_read > 0 && counts.chunks_read <= counts.chunks_total, "{sets:?} {counts:?}");
+        }
+    }
+}
+
+/// Where a store does not know the range of its values, numbers are scaled by that of the sample.
+#[test]
+fn stores_of_unknown_range_are_the_volume_in_memory_to_rounding() {
+    let transfer = "transfer={color=[[0,[0,0,0]],[40,[1,0.5,0]],[160,[1,1,1]]],opacity=[[0,0],[40,0.02],[160,0.4]]}";
+    for compositing in ["linear", "exponential", "maximum", "surface"] {
+        let compositing = format!("splatting.compositing={compositing}");
+        let scene = scene(&["splatting.classification=after", "camera.fit=volume", transfer, &compositing]);
+        let volume = values(&scene);
+        let whole = CpuRenderer::new(volume.clone(), &scene).unwrap().draw().unwrap().image;
+        let store = Arc::new(MemoryStore { is_range_known: false, ..MemoryStore::new(&volume, UVec3::splat(32)) });
+        // Its greatest value is a third of the volume's.
+        let dim = volume.values().iter().map(|value| value / 3.0).collect();
+        let sample = Volume::new("sample", volume.dims(), volume.spacing(), dim).unwrap();
+        let streamed = StreamRenderer::new(store, 0, &sample, &scene, 1 << 30).unwrap().draw().unwrap().image;
+        let background = [0.2, 0.4, 0.1, 0.5];
+        assert_at_least(psnr(&streamed.pixels, &whole.pixels, background, 1000), 100.0, compositing);
+    }
+}
+
 /// Any number of threads draws the same image, and reads the same chunks.
 #[test]
 fn threads_change_nothing() {
-    let scene = scene(&["camera.direction=[0.3,-0.5,0.8]"]);
-    let volume = values(&scene);
+    for classification in ["before", "after"] {
+        let classification = format!("splatting.classification={classification}");
+        threads_change_nothing_in(&scene(&["camera.direction=[0.3,-0.5,0.8]", &classification]));
+    }
+}
+
+fn threads_change_nothing_in(scene: &Scene) {
+    let volume = values(scene);
     let draw = |threads: usize| {
         let store = Arc::new(MemoryStore::new(&volume, UVec3::splat(16)));
-        let renderer = StreamRenderer::new(store, 0, &volume, &scene, 1 << 18).unwrap();
+        let renderer = StreamRenderer::new(store, 0, &volume, scene, 1 << 18).unwrap();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let rendering = pool.install(|| renderer.draw()).unwrap();
         let counts = rendering.stats.store.unwrap();
@@ -208,6 +330,6 @@ fn threads_change_nothing() {
     };
     let first = draw(1);
     for threads in [2, 5] {
-        assert_eq!(draw(threads), first, "{threads} threads");
+        assert!(draw(threads) == first, "{threads} threads: {:?}", scene.splatting);
     }
 }

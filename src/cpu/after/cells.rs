@@ -23,6 +23,15 @@ pub(super) struct Cells {
     bits: Vec<u8>,
 }
 
+/// Who computes bits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Work {
+    /// All threads.
+    Shared,
+    /// The current thread, which must not begin other work meanwhile.
+    Alone,
+}
+
 /// The bits of eight points.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Bits {
@@ -37,21 +46,17 @@ impl Cells {
         coefficients: &[f32],
         numbers: &Normalization,
         half_box: DVec3,
-        [low, high]: [f32; 2],
+        shown: [f32; 2],
+        work: Work,
     ) -> Self {
-        let (base, scale) = (numbers.base as f32, numbers.scale as f32);
-        let (low, high) = (low - SLACK, high + SLACK);
-        let bits_of = |&c: &f32| {
-            let number = (c - base) * scale;
-            // Neither is true of a hole.
-            (u8::from(number >= low) * REACHES) | (u8::from(number <= high) * STAYS)
-        };
-        let mut bits: Vec<u8> = coefficients.par_iter().with_min_len(1 << 16).map(bits_of).collect();
+        let bits_of = bits_of(numbers, shown);
+        let least = if work == Work::Alone { usize::MAX } else { 1 << 16 };
+        let mut bits: Vec<u8> = coefficients.par_iter().with_min_len(least).map(|&c| bits_of(c)).collect();
         // From -⌈h⌉ + 1 to ⌈h⌉ around a cell, where a kernel reaches less than h.
         let half = half_box.ceil().min(grid.dims.as_dvec3()).max(DVec3::ONE).as_uvec3();
         let [nx, ny, nz] = grid.dims.to_array().map(|n| n as usize);
         for (axis, stride, count) in [(0, 1, nx), (1, nx, ny), (2, nx * ny, nz)] {
-            join(&mut bits, stride, count, half[axis] as usize);
+            join(&mut bits, (stride, count), half[axis] as usize, work);
         }
         Self { bits }
     }
@@ -69,9 +74,26 @@ impl Cells {
     }
 }
 
+/// The bits of a coefficient, given the least and the greatest number with an opacity. Neither is set of a hole.
+fn bits_of(numbers: &Normalization, [low, high]: [f32; 2]) -> impl Fn(f32) -> u8 + Sync {
+    let (base, scale) = (numbers.base as f32, numbers.scale as f32);
+    let (low, high) = (low - SLACK, high + SLACK);
+    move |c| {
+        let number = (c - base) * scale;
+        (u8::from(number >= low) * REACHES) | (u8::from(number <= high) * STAYS)
+    }
+}
+
+/// Whether means of some coefficients may have an opacity.
+pub(super) fn may_show(coefficients: &[f32], numbers: &Normalization, shown: [f32; 2]) -> bool {
+    let bits_of = bits_of(numbers, shown);
+    coefficients.iter().fold(0, |bits, &c| bits | bits_of(c)) == REACHES | STAYS
+}
+
 /// Replaces each entry along an axis by the union of those from `half - 1` before it to `half` after it.
-fn join(bits: &mut [u8], stride: usize, count: usize, half: usize) {
-    bits.par_chunks_mut(stride * count).for_each_init(Vec::new, |joined, block| {
+fn join(bits: &mut [u8], (stride, count): (usize, usize), half: usize, work: Work) {
+    let least = if work == Work::Alone { usize::MAX } else { 1 };
+    bits.par_chunks_mut(stride * count).with_min_len(least).for_each_init(Vec::new, |joined, block| {
         // With empty entries around. Entry i becomes the union from i on of ever more entries.
         joined.clear();
         joined.resize(stride * (half - 1), 0);
@@ -109,7 +131,9 @@ mod tests {
         let numbers = Normalization { base: 0.0, scale: 1.0, range: [-1.0, 1.0] };
         let half_box = DVec3::new(2.0, 1.4, 2.5);
         for [low, high] in [[0.5, f32::MAX], [f32::MIN, -0.5], [-0.1, 0.1]] {
-            let cells = Cells::new(&grid, &values, &numbers, half_box, [low, high]);
+            let cells = Cells::new(&grid, &values, &numbers, half_box, [low, high], Work::Shared);
+            let alone = Cells::new(&grid, &values, &numbers, half_box, [low, high], Work::Alone);
+            assert_eq!(cells.bits, alone.bits);
             for index in 0..grid.dims.element_product() {
                 let at = grid.voxel_at(index).as_dvec3();
                 // Points of a cell are within half a cell of its middle.

@@ -82,8 +82,7 @@ impl Frame<'_> {
         open: &mut OpenMask,
         buffers: &mut Buffers,
     ) {
-        for (row, wanted) in wanted.iter().enumerate() {
-            let bits = open.row(row) & wanted;
+        for (row, bits) in wanted.iter().enumerate() {
             for column in (0..COLUMNS).step_by(LANES) {
                 let lanes = bits >> column & u32::from(u8::MAX);
                 let lanes = self.reaching(simd, lanes, looks, number, [column, row]);
@@ -120,19 +119,21 @@ impl Frame<'_> {
     /// For which of eight pixels values between those on a slab's two planes may have an opacity.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn showing<S: Simd>(&self, simd: S, lanes: u32, planes: &mut [Plane; 2], at: [usize; 2]) -> u32 {
-        let Some(cells) = self.coefficients.cells() else { return lanes };
         if lanes == 0 {
             return 0;
         }
         let [column, row] = at;
         let mut bits = Bits::default();
         for plane in planes {
+            let (cells, extent) = match &plane.held {
+                Some(held) => (held.cells.as_ref(), &held.extent),
+                None => (self.matter.cells(), &self.field.extent),
+            };
+            let Some(cells) = cells else { return lanes };
             if lanes & !(plane.seen[row] >> column) != 0 {
                 // There are no values at the eye.
                 let new = match &plane.points {
-                    Some((points, _)) => {
-                        cells.of(points.eight(simd, self.volume.dims().to_array(), [0, 0], at).indices)
-                    }
+                    Some((points, _)) => cells.of(points.eight(simd, extent, [0, 0], at).indices),
                     None => Bits::default(),
                 };
                 plane.seen[row] |= u32::from(u8::MAX) << column;
@@ -159,11 +160,12 @@ impl Frame<'_> {
         simd.vectorize(
             #[cfg_attr(not(debug_assertions), inline(always))]
             || {
-                let cubes = self.field.cubes(simd, of, [column, row]);
+                let field = plane.held.as_ref().map_or(self.field, |held| self.field.of(held));
+                let cubes = field.cubes(simd, of, [column, row]);
                 for lane in bits(missing.into()) {
                     let (lane, column) = (lane as usize, column + lane as usize);
                     let point = (of.0.of(column, row), &of.1);
-                    values[column] = self.field.value(simd, cubes.as_ref(), lane, point);
+                    values[column] = field.value(simd, cubes.as_ref(), lane, point);
                 }
             },
         );
@@ -182,11 +184,12 @@ impl Frame<'_> {
         simd.vectorize(
             #[cfg_attr(not(debug_assertions), inline(always))]
             || {
-                let cubes = self.field.cubes(simd, of, [column, row]);
+                let field = plane.held.as_ref().map_or(self.field, |held| self.field.of(held));
+                let cubes = field.cubes(simd, of, [column, row]);
                 for lane in bits(missing.into()) {
                     let (lane, column) = (lane as usize, column + lane as usize);
                     let point = (of.0.of(column, row), &of.1);
-                    let gradient = self.field.gradient(simd, cubes.as_ref(), lane, point, values[column]);
+                    let gradient = field.gradient(simd, cubes.as_ref(), lane, point, values[column]);
                     let [x, y, z] = &mut *gradients;
                     [x[column], y[column], z[column]] = gradient;
                 }
@@ -321,21 +324,21 @@ impl Frame<'_> {
 
     /// The label of the voxel whose cell contains a point of a pixel's ray, given by its position among slabs.
     pub(super) fn label(&self, [x, y]: [usize; 2], lane: usize, slab: f64) -> Option<u16> {
-        let (grid, at) = (self.volume.grid(), self.voxel_at([x + lane, y], slab));
+        let (grid, at) = (&self.grid, self.voxel_at([x + lane, y], slab));
         let last = grid.dims.as_dvec3() - 1.0;
         // Cast, which rounds towards 0.
-        self.volume.label(grid.index_of((at + 0.5).clamp(DVec3::ZERO, last).as_uvec3()))
+        self.matter.label(grid.index_of((at + 0.5).clamp(DVec3::ZERO, last).as_uvec3()))
     }
 
     /// A place on a pixel's ray, in voxels.
     pub(super) fn voxel_at(&self, pixel: [usize; 2], slab: f64) -> DVec3 {
-        let (grid, ray) = (self.volume.grid(), self.rays.rays.of(pixel));
+        let (grid, ray) = (&self.grid, self.rays.rays.of(pixel));
         ray.at(ray.depth(slab)) / grid.aspect() + grid.center()
     }
 
     /// The value of a number.
     pub(super) fn value(&self, number: f32) -> f64 {
-        let numbers = &self.coefficients.numbers;
+        let numbers = &self.numbers;
         numbers.base + f64::from(number) / numbers.scale
     }
 }

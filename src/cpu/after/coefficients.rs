@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::UVec3;
 
-use super::cells::Cells;
+use super::cells::{Cells, Work};
 use super::colors::{Colors, ColorsOf};
 use super::extreme::is_choice;
 use super::slab_integral::Integrals;
@@ -101,8 +101,8 @@ impl Coefficients {
         };
         let wanted = (0..is_wanted.len() as u32).filter(|&brick| is_wanted[brick as usize]).collect();
         let cells = (!is_choice(compositing)).then(|| {
-            let shown = Integrals::new(volume, transfer, compositing, &self.numbers).shown;
-            Cells::new(grid, self.all(volume), &self.numbers, geometry.widest_half_box(view), shown)
+            let shown = Integrals::new(volume.labels().is_some(), transfer, compositing, &self.numbers).shown;
+            Cells::new(grid, self.all(volume), &self.numbers, geometry.widest_half_box(view), shown, Work::Shared)
         });
         self.shown = Some(Shown { reaches, bricks: BrickList::new(grid, &voxels), wanted, cells });
     }

@@ -56,7 +56,7 @@ impl Chosen {
 
     /// The chosen values in the range of the coefficients, row by row (SPEC §11).
     pub(super) fn extremes(&self, frame: &Frame<'_>, rays: &TileRays) -> Vec<Extreme> {
-        let [low, high] = frame.coefficients.numbers.range;
+        let [low, high] = frame.numbers.range;
         let span = if high > low { high - low } else { 1.0 };
         let of = |row: usize, at: usize| {
             let (best, [near, far]) = (&self.best[row], &self.middle[row]);

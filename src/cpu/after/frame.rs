@@ -7,14 +7,15 @@ use fearless_simd::{Level, dispatch};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::coefficients::Coefficients;
 use super::extreme::is_choice;
 use super::field::Field;
 use super::low_pass::LowPass;
+use super::matter::Matter;
 use super::place::Placement;
 use super::planes::Points;
 use super::slab_integral::Integrals;
 use super::tile::TileWalk;
+use crate::after::normalization::Normalization;
 use crate::cpu::bin::Placed;
 use crate::cpu::composite::Compositor;
 use crate::cpu::cut::{RayMode, TileRays};
@@ -36,25 +37,25 @@ use crate::settings::splatting::{Classification, Compositing, Order};
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::Counts;
-use crate::volume::Volume;
+use crate::volume::Grid;
 
 /// Everything that decides a tile in one channel.
 #[derive(Debug)]
 pub(in crate::cpu) struct Frame<'a> {
     /// The channel's number; sheets are sums over all channels (SPEC §10).
     pub(super) channel: usize,
-    pub(super) volume: &'a Volume,
+    pub(super) matter: Matter<'a>,
+    pub(super) grid: Grid,
     pub(super) transfer: &'a TransferFunction,
-    pub(super) coefficients: &'a Coefficients,
-    /// The bricks whose voxels may affect a slab with an opacity.
-    shown: &'a [Brick],
+    /// The map from values to the numbers that are interpolated.
+    pub(super) numbers: Normalization,
     pub(super) placement: Placement,
     pub(super) field: Field<'a>,
     pub(super) integrals: Integrals,
     pub(super) shader: Shader,
     pub(super) compositor: Compositor,
     pub(super) rays: RayMode,
-    /// By brick of the grid: [`WANTED`], [`DRAWN`], or 0.
+    /// By brick of a grid in memory: [`WANTED`], [`DRAWN`], or 0.
     drawn: Vec<AtomicU8>,
     pub(super) compositing: Compositing,
     /// Numbers that differ by less count as equal.
@@ -71,7 +72,7 @@ pub(in crate::cpu) struct Frame<'a> {
     /// To the eye, if that is far away.
     pub(super) to_eye: [f32; 3],
     /// The slabs whose sheets may hold anything of the channel.
-    touched: Range<i32>,
+    pub(super) touched: Range<i32>,
     /// The slabs that are drawn.
     pub(super) slabs: Range<i32>,
     /// The pixels that are drawn.
@@ -92,38 +93,40 @@ impl<'a> Frame<'a> {
     /// A channel's frame in a view, the one that the coefficients were looked at in.
     pub(in crate::cpu) fn new(
         channel: usize,
-        (volume, transfer): (&'a Volume, &'a TransferFunction),
-        coefficients: &'a Coefficients,
+        (matter, transfer): (Matter<'a>, &'a TransferFunction),
         scene: &Scene,
         view: ViewGeometry,
         Host { window, is_part, first_hit, surfaces }: Host,
     ) -> Self {
-        let (splatting, shading, grid) = (&scene.splatting, &scene.shading, volume.grid());
+        let (splatting, shading, grid) = (&scene.splatting, &scene.shading, matter.grid());
         let Window { slabs, region } = window;
-        let placement = Placement::new(view, grid, &slabs);
-        let (numbers, shown) = (coefficients.numbers, coefficients.bricks());
+        let placement = Placement::new(view, &grid, &slabs);
+        let (numbers, labelled) = (matter.numbers(), matter.labelled());
         let can_hide = splatting.compositing.hides() && splatting.order == Order::FrontToBack;
-        let tables = volume.labels().map(|_| transfer.labels.keys()).into_iter().flatten();
+        let tables = labelled.map(|_| transfer.labels.keys()).into_iter().flatten();
         let tables = tables.map(|&label| transfer.tables(Some(label))).chain([transfer.tables(None)]);
         let has_gradient_opacity = tables.into_iter().any(|tables| tables.gradient_opacity.is_some());
-        let drawn: Vec<AtomicU8> = (0..placement.bricks().element_product()).map(|_| AtomicU8::new(0)).collect();
-        for &brick in coefficients.wanted() {
-            drawn[brick as usize].store(WANTED, Ordering::Relaxed);
+        let mut drawn = Vec::new();
+        if let Matter::Whole { coefficients, .. } = matter {
+            drawn.resize_with(placement.bricks().element_product() as usize, || AtomicU8::new(0));
+            for &brick in coefficients.wanted() {
+                drawn[brick as usize].store(WANTED, Ordering::Relaxed);
+            }
         }
+        let (at_hand, extent, coefficients, colors) = matter.at_hand();
         Self {
             channel,
-            volume,
+            matter,
             transfer,
-            coefficients,
-            shown,
+            numbers,
             field: Field::new(
-                volume,
-                (coefficients.all(volume), coefficients.colors(volume)),
+                (at_hand, extent),
+                (coefficients, colors),
                 numbers,
                 (splatting.radius, splatting.falloff),
                 shading.gradient,
             ),
-            integrals: Integrals::new(volume, transfer, splatting.compositing, &numbers),
+            integrals: Integrals::new(labelled.is_some(), transfer, splatting.compositing, &matter.all_numbers()),
             shader: Shader::new(shading, splatting.compositing),
             compositor: Compositor {
                 compositing: splatting.compositing,
@@ -131,7 +134,7 @@ impl<'a> Frame<'a> {
                 threshold: (splatting.culling && can_hide).then_some(splatting.opacity_threshold as f32),
                 first_hit: first_hit.map(|opacity| opacity as f32),
             },
-            rays: RayMode::within(&view, grid, kept(&view, scene, volume), surfaces),
+            rays: RayMode::within(&view, &grid, kept(&view, scene, &grid), surfaces),
             drawn,
             compositing: splatting.compositing,
             hair: HAIR_OF_RANGE * (numbers.range[1] - numbers.range[0]),
@@ -139,13 +142,14 @@ impl<'a> Frame<'a> {
             has_gradient_opacity,
             per_number: (1.0 / numbers.scale) as f32,
             min_gradient: (MIN_GRADIENT * numbers.scale) as f32,
-            labels: volume.labels().is_some() && !transfer.labels.is_empty(),
+            labels: labelled.is_some() && !transfer.labels.is_empty(),
             to_eye: (-view.basis.w).to_array().map(|component| component as f32),
-            touched: touched(&placement, shown),
+            touched: touched(&placement, &matter),
             slabs,
             region,
             resolver: (!is_part)
                 .then(|| Resolver::new(splatting.compositing, Classification::After, scene.image.background)),
+            grid,
             placement,
         }
     }
@@ -173,9 +177,10 @@ impl<'a> Frame<'a> {
     pub(in crate::cpu) fn draw(frames: &[Self], level: Level) -> Drawing {
         let first = &frames[0];
         let size = first.placement.view.size;
-        let mut placed = first.placement.place_bricks(first.coefficients.wanted());
+        let place = |frame: &Self| frame.placement.place(&frame.matter.wanted(), |number| frame.matter.bounds(number));
+        let mut placed = place(first);
         for frame in &frames[1..] {
-            let further = frame.placement.place_bricks(frame.coefficients.wanted());
+            let further = place(frame);
             placed.extend(further.into_iter().map(|placed| Placed { channel: frame.channel, ..placed }));
         }
         if frames.len() > 1 {
@@ -191,7 +196,7 @@ impl<'a> Frame<'a> {
             |walk, origin, bricks| {
                 let (buffers, rays, tally) = dispatch!(level, simd => walk.draw(simd, origin, &placed, bricks));
                 let pixels = resolve::tile(first.resolver.as_ref(), buffers);
-                let unit = first.volume.grid().unit();
+                let unit = first.grid.unit();
                 let first_hits = match has_hits {
                     true => first_hit::depths(buffers, rays, &first.rays.rays, origin, unit),
                     false => Vec::new(),
@@ -204,10 +209,10 @@ impl<'a> Frame<'a> {
         let sheets = Self::touched(frames).len() as u64;
         let sections = frames.iter().map(Self::sections).fold([0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
         let voxels = |frame: &Self| -> u64 {
-            frame.shown.iter().map(|brick| u64::from(brick::present(brick).count_ones())).sum()
+            frame.matter.shown().iter().map(|brick| u64::from(brick::present(brick).count_ones())).sum()
         };
         let counts = Counts {
-            voxels_total: first.volume.values().len() as u64,
+            voxels_total: first.grid.dims.as_u64vec3().element_product(),
             voxels_in_range: frames.iter().map(voxels).sum(),
             sections_total: sections[0],
             sections_rasterized: sections[1],
@@ -228,7 +233,9 @@ impl<'a> Frame<'a> {
 
     /// Records that a tile draws one of the grid's bricks.
     pub(super) fn draw_brick(&self, brick: u32) {
-        self.drawn[brick as usize].store(DRAWN, Ordering::Relaxed);
+        if let Some(drawn) = self.drawn.get(brick as usize) {
+            drawn.store(DRAWN, Ordering::Relaxed);
+        }
     }
 
     /// The points of a plane in a tile, given by its first pixel, and the plane's kernels; `None` at the eye and behind it.
@@ -264,13 +271,12 @@ impl<'a> Frame<'a> {
             let sections = self.placement.sections(brick);
             [sections, if is_hidden { 0 } else { sections }]
         };
-        self.shown.par_iter().map(of_brick).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
+        self.matter.shown().par_iter().map(of_brick).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
     }
 }
 
 /// The half spaces within which pixels' rays count: the box of voxel cells, beyond the near plane, within the cuts.
-fn kept(view: &ViewGeometry, scene: &Scene, volume: &Volume) -> Vec<HalfSpace> {
-    let grid = volume.grid();
+fn kept(view: &ViewGeometry, scene: &Scene, grid: &Grid) -> Vec<HalfSpace> {
     let half = (grid.center() + 0.5) * grid.aspect();
     let mut kept = if scene.clip.is_empty() { Vec::new() } else { scene.clip.half_spaces(grid) };
     kept.extend(
@@ -285,12 +291,11 @@ fn kept(view: &ViewGeometry, scene: &Scene, volume: &Volume) -> Vec<HalfSpace> {
     kept
 }
 
-/// The slabs from the first to the last that the cells of some bricks reach.
-fn touched(placement: &Placement, bricks: &[Brick]) -> Range<i32> {
+/// The slabs from the first to the last that the cells of the bricks reach that may be shown; of all voxels, if these are not known.
+fn touched(placement: &Placement, matter: &Matter<'_>) -> Range<i32> {
     let view = &placement.view;
     let near = view.perspective.map_or(f64::NEG_INFINITY, |perspective| perspective.eye.near);
-    let slabs = |brick: &Brick| {
-        let (middle, half) = brick::bounds(brick);
+    let slabs = |(middle, half): (DVec3, DVec3)| {
         let row = view.screen_from_voxel[2];
         let depth = row.dot(middle.extend(1.0)) - view.slabs.origin;
         let spread = row.truncate().abs().dot(half + 0.5);
@@ -298,5 +303,9 @@ fn touched(placement: &Placement, bricks: &[Brick]) -> Range<i32> {
         first.floor() as i32..((depth + spread) / view.slabs.width).ceil() as i32
     };
     let either = |a: Range<i32>, b: Range<i32>| a.start.min(b.start)..a.end.max(b.end);
-    bricks.par_iter().map(slabs).reduce_with(either).filter(|all| !all.is_empty()).unwrap_or(0..0)
+    let all = match matter {
+        Matter::Whole { .. } => matter.shown().par_iter().map(|brick| slabs(brick::bounds(brick))).reduce_with(either),
+        Matter::Streamed { .. } => Some(slabs((matter.grid().center(), matter.grid().center()))),
+    };
+    all.filter(|all| !all.is_empty()).unwrap_or(0..0)
 }

@@ -17,7 +17,9 @@ mod colors;
 mod extreme;
 mod field;
 mod frame;
+mod held;
 mod low_pass;
+mod matter;
 mod place;
 mod planes;
 mod slab_integral;
@@ -26,3 +28,4 @@ mod tile;
 
 pub(super) use coefficients::Coefficients;
 pub(super) use frame::Frame;
+pub(super) use matter::Matter;

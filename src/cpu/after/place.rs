@@ -71,11 +71,10 @@ impl Placement {
         of_voxels.map(|count| count as u64).sum()
     }
 
-    /// The pixels that the cells of a brick's voxels may be on, and the slabs, of those that are drawn. A brick at the volume's border has the points before it too that
-    /// are nearest to it, up to a slab away.
-    pub(super) fn bounds(&self, brick: UVec3) -> (ScreenBox, Range<i32>) {
-        let (low, dims) = (brick * brick::SIDE, self.grid.dims);
-        let end = (low + brick::SIDE).min(dims);
+    /// The pixels that the cells of some voxels may be on, from one to before another, and the slabs, of those that are drawn. Voxels at the volume's border have the points
+    /// before it too that are nearest to them, up to a slab away.
+    pub(super) fn bounds(&self, (low, end): (UVec3, UVec3)) -> (ScreenBox, Range<i32>) {
+        let dims = self.grid.dims;
         let before = DVec3::select(low.cmpeq(UVec3::ZERO), self.slab_step, DVec3::ZERO);
         let behind = DVec3::select(end.cmpeq(dims), self.slab_step, DVec3::ZERO);
         let (low, high) = (low.as_dvec3() - 0.5 - before, end.as_dvec3() - 0.5 + behind);
@@ -99,10 +98,11 @@ impl Placement {
         ([low + middle - SLACK, high + middle + SLACK], slabs)
     }
 
-    /// The bricks, given as indices into the grid's bricks, that may be on the image, by first slab and then in memory order.
-    pub(super) fn place_bricks(&self, bricks: &[u32]) -> Vec<Placed> {
+    /// The boxes of voxels, given by their numbers, that may be on the image, by first slab and then by number. `bounds` tells a box's first voxel, and the one
+    /// after the last.
+    pub(super) fn place(&self, boxes: &[u32], bounds: impl Fn(u32) -> (UVec3, UVec3) + Sync) -> Vec<Placed> {
         let place = |&number: &u32| {
-            let ([low, high], slabs) = self.bounds(self.brick(number));
+            let ([low, high], slabs) = self.bounds(bounds(number));
             let tiles = |axis: usize, side: usize| {
                 let low = (low[axis] - 0.5).max(0.0);
                 let high = (high[axis] - 0.5).min(f64::from(self.view.size[axis]) - 1.0);
@@ -122,15 +122,14 @@ impl Placement {
             };
             (!slabs.is_empty()).then_some(placed)
         };
-        let mut placed: Vec<Placed> = bricks.par_iter().filter_map(place).collect();
+        let mut placed: Vec<Placed> = boxes.par_iter().filter_map(place).collect();
         placed.par_sort_unstable_by_key(|placed| (placed.first, placed.brick));
         placed
     }
 
-    /// The position of one of the grid's bricks among them.
-    pub(super) fn brick(&self, number: u32) -> UVec3 {
-        let across = self.bricks();
-        UVec3::new(number % across.x, number / across.x % across.y, number / (across.x * across.y))
+    /// The longest step from plane to plane on any ray, in voxels.
+    pub(super) fn slab_step(&self) -> DVec3 {
+        self.slab_step
     }
 
     /// The number of the grid's bricks along each axis.

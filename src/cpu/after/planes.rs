@@ -1,9 +1,12 @@
 //! The two planes of a tile's slab: the points of their pixels, and the field there as far as it was asked for (SPEC §9).
 
+use std::sync::Arc;
+
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8, u32x8};
 use glam::DVec3;
 
+use super::held::{Extent, Held};
 use super::low_pass::LowPass;
 use crate::cpu::project::floor;
 use crate::cpu::sheets::{COLUMNS, ROWS};
@@ -45,16 +48,18 @@ impl Points {
         self.first + self.right * column as f64 + self.down * row as f64
     }
 
-    /// The points of eight pixels. Cells end `margin` voxels before the volume does.
+    /// The points of eight pixels, their cells `before` voxels early, where the volume has at least `behind` voxels after them. A point that the
+    /// voxels at hand do not surround has the index of some of them.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn eight<S: Simd>(
         &self,
         simd: S,
-        dims: [u32; 3],
+        extent: &Extent,
         [before, behind]: [i32; 2],
         [column, row]: [usize; 2],
     ) -> Eight {
         let first = self.of(column, row);
+        let (dims, low, held) = (extent.dims.to_array(), extent.low.to_array(), extent.held.to_array());
         let mut eight = Eight { cells: [[0; LANES]; 3], rest: [[0.0; LANES]; 3], indices: [0; LANES] };
         let mut index = i32x8::splat(simd, 0);
         for axis in [2, 1, 0] {
@@ -65,7 +70,8 @@ impl Points {
             let cell = at.floor().to_int::<i32x8<S>>() + (whole - before);
             let cell = cell.max(i32x8::splat(simd, 0)).min(i32x8::splat(simd, last.max(0)));
             let rest = at - (cell - whole).to_float::<f32x8<S>>();
-            index = index * dims[axis] as i32 + cell;
+            let there = (cell - low[axis] as i32).max(i32x8::splat(simd, 0));
+            index = index * held[axis] as i32 + there.min(i32x8::splat(simd, held[axis] as i32 - 1));
             eight.cells[axis] = cell.to_array();
             eight.rest[axis] = rest.to_array();
         }
@@ -81,6 +87,8 @@ pub(super) struct Plane {
     pub(super) number: i32,
     /// `None` at the eye and behind it, where there are no values.
     pub(super) points: Option<(Points, LowPass)>,
+    /// The voxels of a store around the points.
+    pub(super) held: Option<Arc<Held>>,
     /// The pixels whose cells' bits are known, row by row, and these.
     pub(super) seen: [u32; ROWS],
     pub(super) reaches: [u32; ROWS],
@@ -106,6 +114,7 @@ impl Plane {
         Self {
             number: 0,
             points: None,
+            held: None,
             seen: none,
             reaches: none,
             stays: none,

@@ -11,7 +11,6 @@ use crate::after::slab_integral::{self, CELL, HEAD, NODE, SUM};
 use crate::cpu::vector::{LANES, optical_depth};
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::TransferFunction;
-use crate::volume::Volume;
 
 /// One set of tables.
 #[derive(Clone, Debug)]
@@ -105,13 +104,13 @@ impl Parts {
 
 impl Integrals {
     pub(super) fn new(
-        volume: &Volume,
+        has_labels: bool,
         transfer: &TransferFunction,
         compositing: Compositing,
         numbers: &Normalization,
     ) -> Self {
         let table = |label| Table::new(slab_integral::table(&transfer.tables(label), compositing, numbers));
-        let labels = volume.labels().map(|_| transfer.labels.keys()).into_iter().flatten();
+        let labels = has_labels.then(|| transfer.labels.keys()).into_iter().flatten();
         let labels: BTreeMap<u16, Table> = labels.map(|&label| (label, table(Some(label)))).collect();
         let plain = table(None);
         let shown = labels.values().fold(plain.shown, |[low, high], table| {

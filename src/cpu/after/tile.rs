@@ -3,6 +3,7 @@
 
 use std::iter::Peekable;
 use std::ops::Range;
+use std::sync::Arc;
 
 use fearless_simd::Simd;
 
@@ -108,6 +109,7 @@ impl<'a> TileWalk<'a> {
         }
         for Channel { frame, planes, active } in &mut self.channels {
             planes[1].become_plane(slab, frame.points(slab, origin));
+            planes.iter_mut().for_each(|plane| plane.held = None);
             active.clear();
         }
     }
@@ -137,9 +139,9 @@ impl<'a> TileWalk<'a> {
 
     /// Takes in a brick, unless its pixels are opaque.
     fn arrive(&mut self, placed: &Placed) {
-        let placement = &self.frame.placement;
-        let (bounds, slabs) = placement.bounds(placement.brick(placed.brick));
-        if let Some(pixels) = self.pixels(bounds).filter(|pixels| self.open.sees(pixels)) {
+        let Frame { placement, matter, .. } = self.frame;
+        let (bounds, slabs) = placement.bounds(matter.bounds(placed.brick));
+        if let Some(pixels) = pixels_of(self.origin, bounds).filter(|pixels| self.open.sees(pixels)) {
             let Channel { frame, active, .. } = &mut self.channels[placed.channel];
             active.push((slabs.end, pixels));
             frame.draw_brick(placed.brick);
@@ -147,22 +149,15 @@ impl<'a> TileWalk<'a> {
         }
     }
 
-    /// The tile's pixels within a box on the screen.
-    fn pixels(&self, [low, high]: ScreenBox) -> Option<Pixels> {
-        let of_axis = |axis: usize, count: usize| {
-            let from_first = self.origin[axis] as f64 + 0.5;
-            let first = -floor(-(low[axis] - from_first).clamp(0.0, count as f64));
-            let last = floor((high[axis] - from_first).clamp(-1.0, count as f64 - 1.0));
-            (first <= last).then_some([first as usize, last as usize])
-        };
-        Some(Pixels { columns: of_axis(0, COLUMNS)?, rows: of_axis(1, ROWS)? })
-    }
-
     /// Goes to a slab, to the next one if it can be.
     fn enter(&mut self, slab: i32) {
-        let Self { channels, origin, .. } = self;
+        let Self { channels, origin, open, .. } = self;
         for Channel { frame, planes, .. } in channels {
             planes.swap(0, 1);
+            if planes[0].held.as_ref().is_none_or(|held| !held.slabs.contains(&slab)) {
+                let held = frame.hold(slab, *origin, open).map(Arc::new);
+                planes.iter_mut().for_each(|plane| plane.held.clone_from(&held));
+            }
             for (plane, number) in planes.iter_mut().zip([slab, slab + 1]) {
                 if plane.number != number || number == slab + 1 {
                     plane.become_plane(number, frame.points(number, *origin));
@@ -177,8 +172,11 @@ impl<'a> TileWalk<'a> {
         let Self { frame, open, rays, to_eye, buffers, tally, channels, chosen, .. } = self;
         let looks = Looks::new(self.origin, rays, to_eye);
         for channel in channels.iter_mut().filter(|channel| !channel.active.is_empty()) {
-            let wanted = channel.wanted();
+            let wanted = channel.wanted(open);
             let Channel { frame, planes, .. } = channel;
+            if planes[0].held.as_ref().is_some_and(|held| held.is_blank) {
+                continue;
+            }
             if is_choice(frame.compositing) {
                 frame.choose(simd, &looks, planes, &wanted, chosen);
             } else {
@@ -196,14 +194,26 @@ impl<'a> TileWalk<'a> {
     }
 }
 
+/// The pixels of a tile, given by its first pixel, within a box on the screen.
+pub(super) fn pixels_of(origin: [usize; 2], [low, high]: ScreenBox) -> Option<Pixels> {
+    let of_axis = |axis: usize, count: usize| {
+        let from_first = origin[axis] as f64 + 0.5;
+        let first = -floor(-(low[axis] - from_first).clamp(0.0, count as f64));
+        let last = floor((high[axis] - from_first).clamp(-1.0, count as f64 - 1.0));
+        (first <= last).then_some([first as usize, last as usize])
+    };
+    Some(Pixels { columns: of_axis(0, COLUMNS)?, rows: of_axis(1, ROWS)? })
+}
+
 impl Channel<'_> {
-    /// The bits of the pixels, row by row, whose rays may meet a brick's cells in the current slab.
-    fn wanted(&self) -> [u32; ROWS] {
+    /// The bits of the open pixels, row by row, whose rays may meet a brick's cells in the current slab.
+    fn wanted(&self, open: &OpenMask) -> [u32; ROWS] {
         let mut wanted = [0; ROWS];
         for (_, Pixels { columns: [left, right], rows: [first, last] }) in &self.active {
             let columns = columns_between(*left, *right);
             wanted[*first..=*last].iter_mut().for_each(|row| *row |= columns);
         }
+        wanted.iter_mut().enumerate().for_each(|(row, wanted)| *wanted &= open.row(row));
         wanted
     }
 }

@@ -1,11 +1,11 @@
-//! A store's voxels that are read together, and the bricks of those that take part.
+//! A store's voxels that are read together, and where voxels are splatted, the bricks of those that take part.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::UVec3;
 
-use super::source::Source;
+use super::source::{Source, Splats};
 use crate::cpu::bin::{Placed, place_brick};
 use crate::cpu::count::Drawn;
 use crate::lists::brick::{self, Brick, BrickList};
@@ -19,9 +19,9 @@ pub(in crate::cpu) struct Chunk {
     number: u32,
     /// The first of the voxels that were read.
     low: UVec3,
-    /// Their values; `None` if the store holds none of the chunk's voxels, and its fill value does not take part.
+    /// Their values; `None` if the store holds none of the chunk's voxels, and its fill value is not splatted.
     values: Option<Volume>,
-    /// In memory order.
+    /// In memory order; none where voxels are not splatted.
     bricks: Vec<Brick>,
     /// Those of them that are on the image, by first sheet and then in memory order.
     placed: Vec<Placed>,
@@ -51,15 +51,20 @@ impl Chunk {
             }
             false => (None, 0),
         };
-        let bricks = values.as_ref().map_or_else(Vec::new, |volume| bricks(source, number, volume, low));
-        let overlaps = Overlaps::count(&bricks, &source.projection.view);
-        let place = |(at, brick)| place_brick(at as u32, brick, &source.projection, source.support);
-        let mut placed: Vec<Placed> = bricks.iter().enumerate().filter_map(place).collect();
-        placed.sort_unstable_by_key(|placed| (placed.first, placed.brick));
+        let (mut bricks, mut placed, mut overlaps) = (Vec::new(), Vec::new(), Overlaps::default());
+        let mut new = Drawn::default();
+        if let (Some(splats), Some(volume)) = (&source.splats, &values) {
+            bricks = bricks_of(source, splats, number, (volume, low));
+            overlaps = Overlaps::count(&bricks, &splats.projection.view);
+            let place = |(at, brick)| place_brick(at as u32, brick, &splats.projection, splats.support);
+            placed = bricks.iter().enumerate().filter_map(place).collect();
+            placed.sort_unstable_by_key(|placed: &Placed| (placed.first, placed.brick));
+            new = Drawn::new(bricks.len(), &splats.projection.view);
+        }
         let bytes = values.as_ref().map_or(0, |volume| size_of_val(volume.values()))
             + bricks.len() * (size_of::<Brick>() + 2 * size_of::<u64>())
             + placed.len() * size_of::<Placed>();
-        let drawn = drawn.unwrap_or_else(|| Arc::new(Drawn::new(bricks.len(), &source.projection.view)));
+        let drawn = drawn.unwrap_or_else(|| Arc::new(new));
         held.fetch_add(bytes, Ordering::Relaxed);
         let held = Arc::clone(held);
         Ok((Self { number, low, values, bricks, placed, drawn, overlaps, held, bytes }, read))
@@ -108,6 +113,11 @@ impl Chunk {
         (placed.first, brick::position(self.brick(placed.brick)))
     }
 
+    /// The first of the voxels that were read, and their values; `None` if the store holds none of the chunk's.
+    pub(super) fn values(&self) -> Option<(UVec3, &Volume)> {
+        self.values.as_ref().map(|values| (self.low, values))
+    }
+
     /// A voxel's value; `None` if it was not read.
     pub(super) fn value(&self, voxel: UVec3) -> Option<f32> {
         let volume = self.values.as_ref()?;
@@ -123,10 +133,10 @@ impl Drop for Chunk {
 }
 
 /// The bricks of a chunk's voxels that take part, in memory order. `volume` holds them and what was read around them, from the voxel `low` on.
-fn bricks(source: &Source, number: u32, volume: &Volume, low: UVec3) -> Vec<Brick> {
-    let Source { transfer, clipped, grid, .. } = source;
+fn bricks_of(source: &Source, splats: &Splats, number: u32, (volume, low): (&Volume, UVec3)) -> Vec<Brick> {
+    let Splats { transfer, clipped, .. } = splats;
     let (from, dims) = source.bounds(number);
-    let own = Grid { dims, ..*grid };
+    let own = Grid { dims, ..source.grid };
     let takes_part =
         |voxel: &UVec3| clipped.contain(*voxel) && takes_part(volume, transfer, volume.grid().index_of(*voxel - low));
     let voxels = (0..dims.element_product()).map(|index| (index, from + own.voxel_at(index)));

@@ -1,5 +1,6 @@
 //! Volumes that fit into no memory (SPEC §13): every tile is drawn front to back, and asks for a store's chunks as their depth comes. A chunk behind
-//! opaque pixels is never read. Images are those of the volume in memory, byte by byte.
+//! opaque pixels is never read. Images are those of the volume in memory: byte by byte, but where classification comes after splatting and the store does not
+//! know the range of its values, to rounding.
 
 mod chunk;
 mod pool;
@@ -14,6 +15,7 @@ use rayon::ThreadPool;
 use super::bin::Placed;
 use super::material::Material;
 use crate::lists::quad_plan::Overlaps;
+use crate::volume::Grid;
 pub(super) use chunk::Chunk;
 use pool::Pool;
 pub use renderer::{StreamError, StreamRenderer};
@@ -29,6 +31,60 @@ pub(super) struct Stream {
 }
 
 impl Stream {
+    /// The voxels of the store's level.
+    pub(super) fn grid(&self) -> &Grid {
+        &self.source.grid
+    }
+
+    /// The number of chunks.
+    pub(super) fn chunks(&self) -> u32 {
+        self.source.across().element_product()
+    }
+
+    /// The first voxel of a chunk, and its voxels along each axis.
+    pub(super) fn bounds(&self, number: u32) -> (UVec3, UVec3) {
+        self.source.bounds(number)
+    }
+
+    /// The values of a box, given by its first voxel and its voxels along each axis, from those chunks, given alike, that `is_seen` holds of; NaN
+    /// from others.
+    pub(super) fn values(
+        self: &Arc<Self>,
+        (low, dims): (UVec3, UVec3),
+        is_seen: impl Fn((UVec3, UVec3)) -> bool,
+    ) -> Vec<f32> {
+        let Source { side, store, .. } = &self.source;
+        let (first, last) = (low / side, (low + dims - 1) / side);
+        let columns = |y, z| (first.x..=last.x).map(move |x| UVec3::new(x, y, z) * side);
+        let chunks = (first.z..=last.z).flat_map(|z| (first.y..=last.y).flat_map(move |y| columns(y, z)));
+        let numbers = chunks.map(|voxel| self.source.number_of(voxel));
+        let seen: Vec<u32> = numbers.filter(|&number| is_seen(self.bounds(number))).collect();
+        let mut values = vec![f32::NAN; dims.element_product() as usize];
+        for (at, &number) in seen.iter().enumerate() {
+            // The next one is read meanwhile.
+            seen[at..].iter().take(2).for_each(|&number| self.request(number));
+            let Some(chunk) = self.chunk(number) else { break };
+            let (own, own_dims) = self.bounds(number);
+            let (from, end) = (own.max(low), (own + own_dims).min(low + dims));
+            let rows = (from.z..end.z).flat_map(|z| (from.y..end.y).map(move |y| UVec3::new(from.x, y, z)));
+            let count = (end.x - from.x) as usize;
+            let index = |voxel: UVec3, low: UVec3, dims: UVec3| {
+                let [x, y, z] = (voxel - low).to_array().map(|n| n as usize);
+                x + dims.x as usize * (y + dims.y as usize * z)
+            };
+            for row in rows {
+                let there = &mut values[index(row, low, dims)..][..count];
+                match chunk.values() {
+                    None => there.fill(store.fill()),
+                    Some((low, read)) => {
+                        there.copy_from_slice(&read.values()[index(row, low, read.dims())..][..count]);
+                    }
+                }
+            }
+        }
+        values
+    }
+
     /// All chunks that may be on the image, by first sheet.
     pub(super) fn placed(&self) -> Vec<Placed> {
         self.source.placed()
@@ -60,7 +116,7 @@ impl Stream {
             chunk.value(voxel).or_else(outside).unwrap_or_else(|| self.source.store.fill())
         };
         let (volume, at) = self.source.around(voxel, value);
-        Material::of(&volume, &self.source.transfer, at)
+        self.source.splats.as_ref().map_or_else(Material::default, |splats| Material::of(&volume, &splats.transfer, at))
     }
 
     /// The overlaps of the voxels that have been read with slabs.

@@ -3,11 +3,14 @@
 use std::sync::Arc;
 
 use fearless_simd::Level;
+use glam::UVec3;
 use web_time::Instant;
 
 use super::Stream;
 use super::pool::{Pool, Reads};
-use super::source::Source;
+use super::source::{Source, Splats};
+use crate::after::normalization::{Normalization, range_of};
+use crate::cpu::after::{self, Matter};
 use crate::cpu::frame::{Drawing, Frame, Host, Voxels};
 use crate::cpu::project::Projection;
 use crate::cpu::simd::{self, Simd};
@@ -19,12 +22,15 @@ use crate::image::Image;
 use crate::kernel::Kernel;
 use crate::rendering::Rendering;
 use crate::scene::Scene;
-use crate::scene::names::{CLASSIFICATIONS, METHODS, name_of};
-use crate::settings::splatting::{Classification, Method};
+use crate::scene::names::{METHODS, name_of};
+use crate::settings::splatting::{Classification, Interpolation, Method};
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::{Stats, StoreCounts};
-use crate::volume::{Store, Volume, VolumeError};
+use crate::volume::{Grid, Store, Volume, VolumeError};
+
+/// Bytes that boxes of voxels may take however little memory chunks may.
+const LEAST_HELD: usize = 64 << 20;
 
 /// Why a store could not be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -51,6 +57,8 @@ pub struct StreamRenderer {
     level: usize,
     scene: Scene,
     transfer: TransferFunction,
+    /// The minimum and maximum of the sample's values; `None` if all are holes.
+    sampled: Option<[f32; 2]>,
     /// The bytes that chunks may hold.
     memory: usize,
     simd: Simd,
@@ -64,7 +72,7 @@ impl StreamRenderer {
     ///
     /// # Errors
     /// If the store has no such level, or its chunks are too many or too large; if the scene has several channels, or the sample has labels, colours or
-    /// several channels; or if a setting is not supported: classification after splatting, and methods other than image-aligned.
+    /// several channels; or if a setting is not supported: exact interpolation, and methods other than image-aligned.
     pub fn new(
         store: Arc<dyn Store>,
         level: usize,
@@ -85,7 +93,9 @@ impl StreamRenderer {
         let transfer = scene.resolve(sample);
         let scene = scene.framed(sample, &transfer);
         check_streamed(&scene)?;
-        Ok(Self { store, level, scene, transfer, memory: usize::try_from(memory).unwrap_or(usize::MAX), simd, vectors })
+        let sampled = range_of(sample.values().iter().copied());
+        let memory = usize::try_from(memory).unwrap_or(usize::MAX);
+        Ok(Self { store, level, scene, transfer, sampled, memory, simd, vectors })
     }
 
     /// The settings, with what the sample decided.
@@ -94,7 +104,7 @@ impl StreamRenderer {
     }
 
     /// Draws a frame on the threads of the current rayon pool, while as many others read. Neither their number nor the memory changes a bit of the
-    /// image.
+    /// image. Of a volume classified after splatting voxels and sections are not counted.
     ///
     /// # Errors
     /// If the store cannot be read, or the scene exceeds a limit, such as the number of slabs.
@@ -106,8 +116,17 @@ impl StreamRenderer {
         let window = Window { slabs: Window::ALL_SLABS, region: Region::whole(size) };
         let stream = Arc::new(self.stream(view, &window)?);
         let host = Host { window, is_part: false, first_hit: None, surfaces: None };
-        let frame = Frame::new(&grid, Voxels::Streamed(&stream), scene, view, host, self.vectors);
-        let Drawing { content, counts, .. } = frame.draw(self.vectors);
+        let Drawing { content, counts, .. } = match scene.splatting.classification {
+            Classification::After => {
+                let nothing = Volume::piece(Grid { dims: UVec3::ZERO, ..grid }, Vec::new());
+                let (numbers, is_range_known) = self.numbers();
+                let matter = Matter::Streamed { stream: &stream, nothing: &nothing, numbers, is_range_known };
+                let frame = after::Frame::new(0, (matter, &self.transfer), scene, view, host);
+                self.check_held(frame.held_bytes())?;
+                after::Frame::draw(&[frame], self.vectors)
+            }
+            _ => Frame::new(&grid, Voxels::Streamed(&stream), scene, view, host, self.vectors).draw(self.vectors),
+        };
         if let Some(failure) = stream.pool.take_failure() {
             return Err(failure.into());
         }
@@ -122,6 +141,26 @@ impl StreamRenderer {
         };
         let stats = Stats { store: Some(store), ..statistics(self.simd, size, counts, start) };
         Ok(Rendering { image, stats })
+    }
+
+    /// Checks that the boxes of voxels fit into memory that threads copy from chunks, given the bytes of one.
+    fn check_held(&self, bytes: f64) -> Result<(), SettingError> {
+        let all = bytes * rayon::current_num_threads() as f64;
+        let memory = self.memory.max(LEAST_HELD);
+        if all <= memory as f64 {
+            return Ok(());
+        }
+        let found = format!("{}, in which 32×32 pixels see a box of voxels of {bytes:.0} bytes", self.level);
+        let allowed =
+            format!("a coarser level, more pixels, or more memory than {memory} bytes for all threads' boxes");
+        Err(SettingError::new("volume.level", found, allowed))
+    }
+
+    /// The map from values to the numbers that are interpolated, and whether its range is that of all values.
+    fn numbers(&self) -> (Normalization, bool) {
+        let known = self.store.range(self.level);
+        let range = known.or(self.sampled).unwrap_or([0.0; 2]);
+        (Normalization::new(range.map(f64::from)), known.is_some())
     }
 
     /// The store in a view.
@@ -139,10 +178,12 @@ impl StreamRenderer {
                 level: *level,
                 grid,
                 side: Source::side(store.levels()[*level].chunk, &grid),
-                transfer: transfer.clone(),
-                clipped: scene.clip.voxels(&grid, splatting.radius),
-                projection: Projection::new(view, splatting.order, &slabs),
-                support: Kernel::new(splatting.radius, splatting.falloff).support(),
+                splats: (splatting.classification == Classification::Before).then(|| Splats {
+                    transfer: transfer.clone(),
+                    clipped: scene.clip.voxels(&grid, splatting.radius),
+                    projection: Projection::new(view, splatting.order, &slabs),
+                    support: Kernel::new(splatting.radius, splatting.falloff).support(),
+                }),
             },
             pool: Pool::new(self.memory),
             readers,
@@ -165,9 +206,9 @@ fn check_sample(sample: &Volume, scene: &Scene) -> Result<(), SettingError> {
 /// Checks that a scene whose classification is known can be streamed.
 fn check_streamed(scene: &Scene) -> Result<(), SettingError> {
     let splatting = &scene.splatting;
-    if splatting.classification != Classification::Before {
-        let found = format!("{:?} for a volume that is streamed", name_of(CLASSIFICATIONS, splatting.classification));
-        return Err(SettingError::new("splatting.classification", found, "\"before\", or more memory"));
+    if (splatting.classification, splatting.interpolation) == (Classification::After, Interpolation::Exact) {
+        let found = "\"exact\" for a volume that is streamed";
+        return Err(SettingError::new("splatting.interpolation", found, "\"smooth\", or more memory"));
     }
     if splatting.method != Method::ImageAligned {
         let found = format!("{:?} for a volume that is streamed", name_of(METHODS, splatting.method));

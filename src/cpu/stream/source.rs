@@ -1,4 +1,4 @@
-//! What a view draws of a store: its chunks, and how their voxels are classified and seen.
+//! What a view draws of a store: its chunks, and how their voxels are classified and seen where they are splatted.
 
 use std::sync::Arc;
 
@@ -23,6 +23,13 @@ pub(super) struct Source {
     pub(super) grid: Grid,
     /// The voxels of a chunk that is drawn: some of the store's, in whole bricks.
     pub(super) side: UVec3,
+    /// Where classification comes before splatting.
+    pub(super) splats: Option<Splats>,
+}
+
+/// How voxels are classified and splatted.
+#[derive(Debug)]
+pub(super) struct Splats {
     pub(super) transfer: TransferFunction,
     /// The voxels that clip planes leave.
     pub(super) clipped: ClippedVoxels,
@@ -44,7 +51,7 @@ impl Source {
     }
 
     /// The number of chunks along each axis.
-    fn across(&self) -> UVec3 {
+    pub(super) fn across(&self) -> UVec3 {
         StoreLevel { grid: self.grid, chunk: self.side }.chunks()
     }
 
@@ -82,10 +89,11 @@ impl Source {
 
     /// All chunks that may be on the image, by first sheet.
     pub(super) fn placed(&self) -> Vec<Placed> {
+        let Some(Splats { projection, support, .. }) = &self.splats else { return Vec::new() };
         let place = |number| {
             let (from, dims) = self.bounds(number);
             let half = (dims.as_dvec3() - 1.0) / 2.0;
-            let placed = place_box(number, (from.as_dvec3() + half, half), &self.projection, self.support)?;
+            let placed = place_box(number, (from.as_dvec3() + half, half), projection, *support)?;
             // Rounding must not let one of its bricks come before it, stay after it, or be seen where it is not.
             let half = placed.half.map(|half| half * (1.0 + 8.0 * f32::EPSILON) + 0.01);
             Some(Placed { first: placed.first - 1, end: placed.end + 1, half, ..placed })
@@ -98,7 +106,8 @@ impl Source {
     /// The box that a chunk is read with: its voxels, and with gradient opacity, which needs gradients to decide what takes part, those around them.
     pub(super) fn read_bounds(&self, number: u32) -> (UVec3, UVec3) {
         let (from, dims) = self.bounds(number);
-        let rim = u32::from(self.transfer.gradient_opacity.is_some());
+        let needs_gradients = |splats: &Splats| splats.transfer.gradient_opacity.is_some();
+        let rim = u32::from(self.splats.as_ref().is_some_and(needs_gradients));
         let low = from.saturating_sub(UVec3::splat(rim));
         (low, (from + dims + rim).min(self.grid.dims) - low)
     }
@@ -124,10 +133,10 @@ impl Source {
         Ok(false)
     }
 
-    /// Whether voxels may take part that the store does not hold.
+    /// Whether voxels may be splatted that the store does not hold.
     pub(super) fn shows_fill(&self) -> bool {
-        let value = f64::from(self.store.fill());
-        let tables = self.transfer.tables(None);
+        let Some(Splats { transfer, .. }) = &self.splats else { return false };
+        let (value, tables) = (f64::from(self.store.fill()), transfer.tables(None));
         value.is_finite() && tables.opacity.at(value) > 0.0 && tables.in_iso_range(value)
     }
 

@@ -13,6 +13,7 @@ use fearless_simd::Simd;
 use glam::DVec3;
 
 use super::colors::ColorsOf;
+use super::held::{Extent, Held};
 use super::low_pass::LowPass;
 use super::planes::{Eight, Points};
 use crate::after::normalization::Normalization;
@@ -29,10 +30,12 @@ const CUBE_RADIUS: f64 = 2.0;
 const MIN_SCALE: f64 = 1e-30;
 
 /// What the field is made of.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Field<'a> {
+    /// The voxels at hand.
     volume: &'a Volume,
-    /// c for every voxel, in memory order; NaN at holes.
+    pub(super) extent: Extent,
+    /// c for each of them, in memory order; NaN at holes.
     coefficients: &'a [f32],
     /// Those of the voxels' own colours, if they have any.
     colors: Option<ColorsOf<'a>>,
@@ -58,7 +61,7 @@ pub(super) struct Field<'a> {
 /// 4×4×4 voxels of a volume, as a point sees them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cube {
-    /// The index in memory of the first voxel.
+    /// The index of the first voxel among those at hand.
     index: usize,
     /// From the first voxel to the point.
     rest: [f32; 3],
@@ -67,8 +70,9 @@ pub(super) struct Cube {
 }
 
 impl<'a> Field<'a> {
+    /// `extent` tells where in the volume the voxels at hand are.
     pub(super) fn new(
-        volume: &'a Volume,
+        (volume, extent): (&'a Volume, Extent),
         (coefficients, colors): (&'a [f32], Option<ColorsOf<'a>>),
         numbers: Normalization,
         (radius, falloff): (f64, f64),
@@ -79,6 +83,7 @@ impl<'a> Field<'a> {
         let in_f32 = |numbers: DVec3| numbers.to_array().map(|number| number as f32);
         Self {
             volume,
+            extent,
             coefficients,
             colors,
             numbers,
@@ -91,8 +96,15 @@ impl<'a> Field<'a> {
             per_spacing: in_f32(1.0 / spacing),
             per_moment: in_f32(-2.0 * falloff / spacing),
             min_moment: min_moment(radius, numbers.range).powi(2),
-            is_cube: radius <= CUBE_RADIUS && is_moderate && volume.dims().min_element() as usize >= cube::SIDE,
+            is_cube: radius <= CUBE_RADIUS && is_moderate && extent.dims.min_element() as usize >= cube::SIDE,
         }
+    }
+
+    /// The field of other voxels of the same volume.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn of<'b>(&self, held: &'b Held) -> Field<'b> {
+        let volume = &held.volume;
+        Field { volume, extent: held.extent, coefficients: volume.values(), colors: None, ..*self }
     }
 
     /// Whether voxels have colours of their own.
@@ -109,18 +121,17 @@ impl<'a> Field<'a> {
         (points, low_pass): &(Points, LowPass),
         at: [usize; 2],
     ) -> Option<Eight> {
-        let dims = self.volume.dims();
         let side = cube::SIDE as i32;
         if !(self.is_cube && low_pass.is_identity) {
             return None;
         }
-        Some(points.eight(simd, dims.to_array(), [1, side - 1], at))
+        Some(points.eight(simd, &self.extent, [1, side - 1], at))
     }
 
     /// One of eight cubes.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn cube(&self, eight: &Eight, lane: usize) -> Cube {
-        let dims = self.volume.dims();
+        let dims = self.extent.dims;
         let is_inside = |axis: usize, dim: u32| {
             let first = eight.cells[axis][lane];
             first > 0 && first + (cube::SIDE as i32) < dim as i32
@@ -226,7 +237,8 @@ mod tests {
         let (splatting, grid) = (&scene.splatting, volume.grid());
         let numbers = Normalization::of(volume.values().iter().copied()).unwrap();
         let kernel = (splatting.radius, splatting.falloff);
-        let ours = Field::new(volume, (volume.values(), None), numbers, kernel, scene.shading.gradient);
+        let whole = (volume, Extent::whole(grid));
+        let ours = Field::new(whole, (volume.values(), None), numbers, kernel, scene.shading.gradient);
         let expected = twin::Field::new(volume, &scene).unwrap();
         let view = ViewGeometry::new(grid, &scene.camera, splatting, [64, 64]).unwrap();
         let geometry = PlaneGeometry::new(&view, grid);
@@ -320,7 +332,8 @@ mod tests {
             scene.splatting.interpolation = interpolation;
             let own = Colors::new(&volume, interpolation, (radius, falloff)).unwrap().unwrap();
             let coefficients = (volume.values(), own.of(&volume));
-            let ours = Field::new(&volume, coefficients, numbers, (radius, falloff), Gradient::Differences);
+            let whole = (&volume, Extent::whole(volume.grid()));
+            let ours = Field::new(whole, coefficients, numbers, (radius, falloff), Gradient::Differences);
             let theirs = twin::Field::new(&volume, &scene).unwrap();
             let view = ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, [512, 512]).unwrap();
             let low_pass = LowPass::new(&PlaneGeometry::new(&view, volume.grid()), 1.0);

@@ -7,6 +7,7 @@ use glam::{DVec3, UVec3};
 
 use super::{Field, MIN_WEIGHT};
 use crate::cpu::after::colors::Color;
+use crate::cpu::after::held::Extent;
 use crate::cpu::after::low_pass::LowPass;
 use crate::cpu::vector::{LANES, exp2, iota};
 
@@ -18,7 +19,7 @@ const SLACK: f64 = 1e-6;
 struct Row {
     /// The first one.
     first: UVec3,
-    /// Its index in memory.
+    /// Its index among the voxels at hand.
     index: usize,
     count: usize,
     /// δ of the first one, and the step from one to the next.
@@ -167,14 +168,14 @@ impl Field<'_> {
         if is_weighted.to_bitmask() == 0 {
             return [zero; 3];
         }
-        let (dims, values) = (self.volume.dims(), self.volume.values());
+        let (Extent { dims, low, held }, values) = (self.extent, self.volume.values());
         let first = row.first.with_x(row.first.x + from as u32);
         let last = first.with_x(row.first.x + (from + LANES).min(row.count) as u32 - 1);
         if first.cmpgt(UVec3::ZERO).all() && (last + 1).cmplt(dims).all() {
             let at = row.index + from;
             let half = f32x8::splat(simd, self.scale * 0.5);
             let across = |step: usize| load(simd, values, at + step) * half - load(simd, values, at - step) * half;
-            let (nx, ny) = (dims.x as usize, dims.y as usize);
+            let (nx, ny) = (held.x as usize, held.y as usize);
             let [x, y, z] = [across(1), across(nx), across(nx * ny)];
             let is_known = x.simd_eq(x) & y.simd_eq(y) & z.simd_eq(z);
             // Otherwise a hole is near.
@@ -185,7 +186,7 @@ impl Field<'_> {
         let mut differences = [[0.0; LANES]; 3];
         let bits = is_weighted.to_bitmask();
         for lane in (0..LANES).filter(|lane| bits >> lane & 1 == 1) {
-            let gradient = self.volume.gradient(first.with_x(first.x + lane as u32)) * self.volume.spacing();
+            let gradient = self.volume.gradient(first.with_x(first.x + lane as u32) - low) * self.volume.spacing();
             let numbers = gradient * self.numbers.scale;
             (0..3).for_each(|axis| differences[axis][lane] = numbers[axis] as f32);
         }
@@ -195,7 +196,8 @@ impl Field<'_> {
 
     /// The rows whose voxels may be within the radius.
     fn rows(&self, at: DVec3, low_pass: &LowPass) -> impl Iterator<Item = Row> {
-        let (dims, radius) = (self.volume.dims(), self.radius);
+        let (extent, radius) = (self.extent, self.radius);
+        let dims = extent.dims;
         let low = (at - low_pass.half_box).ceil().max(DVec3::ZERO).as_uvec3();
         let end = ((at + low_pass.half_box).floor() + 1.0).clamp(DVec3::ZERO, dims.as_dvec3()).as_uvec3();
         let (lowered, step) = (low_pass.lowered, -low_pass.lowered.x_axis);
@@ -209,7 +211,7 @@ impl Field<'_> {
             let end = (((-b + root) / a + SLACK).floor() + 1.0).clamp(0.0, f64::from(end.x)) as u32;
             (first < end).then(|| Row {
                 first: UVec3::new(first, y, z),
-                index: first as usize + dims.x as usize * (y as usize + dims.y as usize * z as usize),
+                index: extent.index(UVec3::new(first, y, z)),
                 count: (end - first) as usize,
                 offset: (offset + step * f64::from(first)).to_array().map(|component| component as f32),
                 step: step.to_array().map(|component| component as f32),
@@ -217,12 +219,11 @@ impl Field<'_> {
         })
     }
 
-    /// The index in memory of the voxel nearest to a point.
+    /// The index of the voxel nearest to a point.
     fn nearest(&self, at: DVec3) -> usize {
-        let grid = self.volume.grid();
-        let last = grid.dims.as_dvec3() - 1.0;
+        let last = self.extent.dims.as_dvec3() - 1.0;
         // Cast, which rounds towards 0.
-        grid.index_of((at + 0.5).clamp(DVec3::ZERO, last).as_uvec3()) as usize
+        self.extent.index((at + 0.5).clamp(DVec3::ZERO, last).as_uvec3())
     }
 }
 

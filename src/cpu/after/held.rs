@@ -1,0 +1,130 @@
+//! The voxels of a store that some slabs of a tile may see, copied from its chunks.
+
+use std::ops::Range;
+
+use glam::{DVec3, UVec3};
+
+use super::cells::{Cells, Work, may_show};
+use super::extreme::is_choice;
+use super::frame::Frame;
+use super::matter::Matter;
+use super::place::Placement;
+use super::tile::pixels_of;
+use crate::cpu::cull::OpenMask;
+use crate::cpu::sheets::{COLUMNS, ROWS};
+use crate::volume::{Grid, Volume};
+
+/// The depth of the slabs whose voxels are held together, in voxels: deeper ones copy less often what neighbouring slabs share, and read more chunks that
+/// opaque pixels turn out to hide.
+const DEPTH: f64 = 8.0;
+
+/// A value, its bits, and the copies with which those of cells are computed.
+const BYTES_PER_VOXEL: f64 = 7.0;
+
+/// Voxels around those that kernels reach: for the cells of points on borders, rounded, and for differences between neighbours.
+const RIM: f64 = 2.0;
+
+/// A box of a volume's voxels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extent {
+    /// The volume's voxels along each axis.
+    pub(super) dims: UVec3,
+    /// The first voxel of the box.
+    pub(super) low: UVec3,
+    /// Its voxels along each axis.
+    pub(super) held: UVec3,
+}
+
+impl Extent {
+    /// All voxels.
+    pub(super) fn whole(grid: &Grid) -> Self {
+        Self { dims: grid.dims, low: UVec3::ZERO, held: grid.dims }
+    }
+
+    /// The index of one of the voxels in the box.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn index(&self, voxel: UVec3) -> usize {
+        let [x, y, z] = (voxel - self.low).to_array().map(|n| n as usize);
+        x + self.held.x as usize * (y + self.held.y as usize * z)
+    }
+}
+
+/// The voxels around the points of some slabs' open pixels.
+#[derive(Debug)]
+pub(super) struct Held {
+    /// The slabs.
+    pub(super) slabs: Range<i32>,
+    pub(super) extent: Extent,
+    pub(super) volume: Volume,
+    /// Where values can meet an opacity; `None` where all values count.
+    pub(super) cells: Option<Cells>,
+    /// Whether no value can meet an opacity.
+    pub(super) is_blank: bool,
+}
+
+impl Frame<'_> {
+    /// The voxels that the open pixels of a tile, given by its first pixel, may see in a slab and some behind it; `None` if they are in memory anyway.
+    pub(super) fn hold(&self, slab: i32, origin: [usize; 2], open: &OpenMask) -> Option<Held> {
+        let Matter::Streamed { stream, .. } = self.matter else { return None };
+        let slabs = slab..slab.saturating_add(self.slabs_held());
+        let half_box = self.placement.geometry.widest_half_box(&self.placement.view);
+        let extent = self.extent(&slabs, origin, open, half_box);
+        let is_seen = |(low, dims): (UVec3, UVec3)| {
+            let reach = (half_box + 1.0 + RIM).min(extent.dims.as_dvec3()).as_uvec3();
+            let (low, end) = (low.saturating_sub(reach), (low + dims + reach).min(extent.dims));
+            let (on_screen, within) = self.placement.bounds((low, end));
+            within.start < slabs.end
+                && slabs.start < within.end
+                && pixels_of(origin, on_screen).is_some_and(|pixels| open.sees(&pixels))
+        };
+        let values = stream.values((extent.low, extent.held), is_seen);
+        let shown = (!is_choice(self.compositing)).then_some(self.integrals.shown);
+        let is_blank = shown.is_some_and(|shown| !may_show(&values, &self.numbers, shown));
+        let grid = Grid { dims: extent.held, ..self.grid };
+        let cells = shown.filter(|_| !is_blank);
+        let cells = cells.map(|shown| Cells::new(&grid, &values, &self.numbers, half_box, shown, Work::Alone));
+        Some(Held { slabs, extent, volume: Volume::piece(grid, values), cells, is_blank })
+    }
+
+    /// The number of slabs whose voxels are held together.
+    fn slabs_held(&self) -> i32 {
+        (DEPTH / self.placement.slab_step().max_element()).clamp(1.0, 64.0) as i32
+    }
+
+    /// The most bytes that a tile holds, whose pixels are those farthest from the eye.
+    pub(in crate::cpu) fn held_bytes(&self) -> f64 {
+        let Placement { view, geometry, .. } = &self.placement;
+        let points = self.points(self.touched.end, [0; 2]);
+        let across = points
+            .map_or(DVec3::ZERO, |(points, _)| points.right.abs() * COLUMNS as f64 + points.down.abs() * ROWS as f64);
+        let along = self.placement.slab_step() * f64::from(self.slabs_held());
+        let around = 2.0 * (geometry.widest_half_box(view).ceil() + RIM) + 2.0;
+        let voxels = (across + along + around).min(self.grid.dims.as_dvec3()).element_product();
+        voxels * BYTES_PER_VOXEL
+    }
+
+    /// The box around the points of a tile's open pixels on slabs' planes.
+    fn extent(&self, slabs: &Range<i32>, origin: [usize; 2], open: &OpenMask, half_box: DVec3) -> Extent {
+        let rows = || (0..ROWS).filter(|&row| open.row(row) != 0);
+        let columns = rows().fold(0, |bits, row| bits | open.row(row));
+        let of_rows = [rows().next().unwrap_or(0), rows().next_back().unwrap_or(ROWS - 1)];
+        let of_columns = [columns.trailing_zeros() as usize, 31 - columns.leading_zeros() as usize];
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for plane in [slabs.start, slabs.end] {
+            // Behind the eye there are no points, and the first ones before it are those of the plane at the eye.
+            let plane = if self.placement.view.perspective.is_some() { plane.max(0) } else { plane };
+            for (column, row) in of_columns.into_iter().flat_map(|column| of_rows.map(|row| (column, row))) {
+                let at = self.voxel_at([origin[0] + column.min(COLUMNS - 1), origin[1] + row], plane.into());
+                (low, high) = (low.min(at), high.max(at));
+            }
+        }
+        let dims = self.grid.dims;
+        // The nearest cubes inside the volume.
+        let most = (dims.as_dvec3() - 4.0).max(DVec3::ZERO);
+        let least = dims.as_dvec3().min(DVec3::splat(4.0));
+        let low = (low.floor() - half_box.ceil() - RIM).clamp(DVec3::ZERO, most);
+        let end = (high.floor() + half_box.ceil() + RIM + 1.0).clamp(least, dims.as_dvec3());
+        let low = low.as_uvec3();
+        Extent { dims, low, held: end.as_uvec3() - low }
+    }
+}
