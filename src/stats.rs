@@ -26,7 +26,8 @@ pub struct Stats {
     /// The frame's counts.
     #[serde(flatten)]
     pub counts: Counts,
-    /// What was read of a store, if the volume is one that was streamed (SPEC §13).
+    /// What was read of a store (SPEC §13), if the volume is one that was streamed, or comes from a Zarr store and was drawn by a
+    /// [`Headless`](crate::headless::Headless).
     #[serde(flatten)]
     pub store: Option<StoreCounts>,
     /// `quads` or `tiles`; for other backends their name.
@@ -73,19 +74,20 @@ pub struct Counts {
     pub bricks_visited: u64,
 }
 
-/// What a frame reads of a store (SPEC §13).
+/// What is read of a store for a frame, or for a volume that is read as a whole (SPEC §13).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct StoreCounts {
     /// The level that was drawn; 0 is the finest.
     pub level: u64,
-    /// The chunks of the level.
+    /// The chunks of the level, in all channels that are read.
     pub chunks_total: u64,
     /// Those of them that were read. Each counts once, although it may have been read again.
     pub chunks_read: u64,
     /// The bytes of the store that reading them took, without those of reading again what was dropped.
     pub bytes_read: u64,
-    /// The most bytes of values and bricks that were in memory at a time. It depends on the order in which threads draw.
+    /// The most bytes of values and bricks that were in memory at a time. It depends on the order in which threads draw. For a volume that is read as a
+    /// whole, the bytes of its values.
     pub chunk_bytes: u64,
 }
 

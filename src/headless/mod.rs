@@ -140,7 +140,8 @@ impl Headless {
     /// # Errors
     /// As for [`Self::draw`], if the scene has no parts, or the window does not lie in the image.
     pub fn draw_part(&self, view: &mut HeadlessView, window: &Window) -> Result<(Part, Stats), RenderError> {
-        match (&self.drawer, view.backend_mut()) {
+        let reads = view.reads;
+        let (part, stats) = match (&self.drawer, view.backend_mut()) {
             #[cfg(feature = "gpu")]
             (Drawer::Gpu(gpu), ViewBackend::Gpu(view)) => gpu.draw_part(view, window),
             #[cfg(feature = "cpu")]
@@ -148,7 +149,8 @@ impl Headless {
             (Drawer::Reference, ViewBackend::Reference(view)) => view.draw_part(window),
             #[cfg(any(feature = "gpu", feature = "cpu"))]
             (_, other) => Err(self.refuse(other.backend()).into()),
-        }
+        }?;
+        Ok((part, Stats { store: reads, ..stats }))
     }
 
     /// A view of a volume with a scene's settings, for any number of frames. The scene's own volume is ignored.
@@ -157,18 +159,20 @@ impl Headless {
     /// If the backend cannot draw one of the scene's settings, the volume is larger than the device's textures, or the device fails.
     pub fn view(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<HeadlessView, RenderError> {
         let volume = volume.into();
+        let reads = volume.reads();
         #[cfg(all(feature = "gpu", feature = "cpu"))]
         if self.may_leave_gpu && crate::renderer::scene_view::check_channels(&volume, scene).is_err() {
             log::info!("drawn by the CPU: the GPU does not draw this volume's channels with these settings");
-            return Ok(HeadlessView::new(ViewBackend::Cpu(Box::new(CpuRenderer::new(volume, scene)?))));
+            return Ok(HeadlessView::new(ViewBackend::Cpu(Box::new(CpuRenderer::new(volume, scene)?)), reads));
         }
-        Ok(HeadlessView::new(match &self.drawer {
+        let backend = match &self.drawer {
             #[cfg(feature = "gpu")]
             Drawer::Gpu(gpu) => ViewBackend::Gpu(Box::new(gpu.view(volume, scene)?)),
             #[cfg(feature = "cpu")]
             Drawer::Cpu => ViewBackend::Cpu(Box::new(CpuRenderer::new(volume, scene)?)),
             Drawer::Reference => ViewBackend::Reference(Box::new(ReferenceView::new(volume, scene)?)),
-        }))
+        };
+        Ok(HeadlessView::new(backend, reads))
     }
 
     /// Changes a view's scene, whose own volume is ignored. Only what depends on the change is computed again: on the CPU as
@@ -202,7 +206,8 @@ impl Headless {
     /// # Errors
     /// If the backend cannot draw one of the scene's settings, the device fails, or another backend made the view.
     pub fn draw(&self, view: &mut HeadlessView) -> Result<Rendering, RenderError> {
-        match (&self.drawer, view.backend_mut()) {
+        let reads = view.reads;
+        let rendering = match (&self.drawer, view.backend_mut()) {
             #[cfg(feature = "gpu")]
             (Drawer::Gpu(gpu), ViewBackend::Gpu(view)) => gpu.draw(view),
             #[cfg(feature = "cpu")]
@@ -210,7 +215,8 @@ impl Headless {
             (Drawer::Reference, ViewBackend::Reference(view)) => view.draw(),
             #[cfg(any(feature = "gpu", feature = "cpu"))]
             (_, other) => Err(self.refuse(other.backend()).into()),
-        }
+        }?;
+        Ok(Rendering { stats: Stats { store: reads, ..rendering.stats }, ..rendering })
     }
 
     /// The first voxel that the last drawn frame of a view shows at a pixel, counted from the upper left; `None` where the pixel does not reach

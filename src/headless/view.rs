@@ -10,11 +10,14 @@ use crate::error::setting::{Interval, SettingError};
 use crate::renderer::scene_view::SceneView;
 use crate::scene::Scene;
 use crate::settings::camera::Camera;
+use crate::stats::StoreCounts;
 
 /// A view of a volume for any number of frames, made by [`Headless::view`](super::Headless::view). Frames share the sorted lists.
 #[derive(Debug)]
 pub struct HeadlessView {
     backend: ViewBackend,
+    /// What was read of a store for the volume.
+    pub(super) reads: Option<StoreCounts>,
 }
 
 /// The view of the backend that made it.
@@ -41,8 +44,8 @@ impl ViewBackend {
 }
 
 impl HeadlessView {
-    pub(super) fn new(backend: ViewBackend) -> Self {
-        Self { backend }
+    pub(super) fn new(backend: ViewBackend, reads: Option<StoreCounts>) -> Self {
+        Self { backend, reads }
     }
 
     pub(super) fn backend_ref(&self) -> &ViewBackend {

@@ -29,7 +29,7 @@ pub struct Channel {
     pub index: Option<u32>,
     /// The number, from 0, of the time that is read of a file with several; `None` reads the first.
     pub time: Option<u32>,
-    /// The level, from 0 for the finest, that is read of a store with several; `None` reads the finest that fits in memory.
+    /// The level, from 0 for the finest, that is read of a store with several; `None` chooses one ([`Scene::choose_levels`]).
     pub level: Option<u32>,
     /// Colour and opacity.
     pub transfer: TransferSettings,

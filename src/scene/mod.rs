@@ -2,6 +2,7 @@
 
 mod channel;
 mod check;
+mod level;
 mod load;
 pub(crate) mod names;
 mod reader;
@@ -207,7 +208,7 @@ pub struct Scene {
     pub index: Option<u32>,
     /// The number, from 0, of the time that is read of a file with several; `None` reads the first.
     pub time: Option<u32>,
-    /// The level, from 0 for the finest, that is read of a store with several; `None` reads the finest that fits in memory.
+    /// The level, from 0 for the finest, that is read of a store with several; `None` chooses one ([`Self::choose_levels`]).
     pub level: Option<u32>,
     /// The name of the channel in legends and picks; `None` uses the file's.
     pub name: Option<String>,
@@ -303,7 +304,7 @@ impl Scene {
     }
 
     /// Loads or computes the volume, with all channels, and the scene's spacing and labels if it states them. The label file's spacing must equal the
-    /// volume's, unless the scene's spacing replaces both.
+    /// volume's, unless the scene's spacing replaces both. Of a store with several levels, [`Self::choose_levels`] chooses one.
     ///
     /// # Errors
     /// If the volume or label file cannot be read, is of no known format or does not hold what its header promises, if the labels do not
@@ -326,8 +327,9 @@ impl Scene {
     /// # Errors
     /// As for [`Self::load_volume_with`].
     pub fn load_volume_and_files(&self, options: &ReadOptions) -> Result<(Volume, Vec<PathBuf>), VolumeError> {
+        let scene = self.choose_levels(options, Self::explicit)?;
         let access = Access::new(options)?;
-        let volume = load::channels(self, &access)?;
+        let volume = load::channels(&scene, &access)?;
         Ok((volume, access.files()))
     }
 
@@ -336,7 +338,7 @@ impl Scene {
         load::store(self, options)
     }
 
-    /// The same scene with everything stated that depends on the volume: the transfer function and the camera's position. Preset and colour
+    /// The same scene with everything stated that depends on the volume: the transfer function, the camera's position and the level. Preset and colour
     /// map are replaced by their results. It renders the same image.
     pub fn explicit(&self, volume: &Volume) -> Self {
         self.explicit_by(volume, Extent::fit)
@@ -356,7 +358,8 @@ impl Scene {
         let camera = camera.explicit(volume.grid(), self.splatting.radius, width, height);
         let mut channels = self.explicit_channels(volume).into_iter();
         let Some(Channel { name, transfer, .. }) = channels.next() else { return self.clone() };
-        Self { camera, name, transfer, further: channels.collect(), ..self.classified(volume) }
+        let level = self.level_in(volume);
+        Self { level, camera, name, transfer, further: channels.collect(), ..self.classified(volume) }
     }
 
     /// The box that a camera fits under a transfer function (for a scene that leaves it to the volume, that of

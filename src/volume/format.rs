@@ -10,7 +10,7 @@ use super::samples::Voxel;
 use super::seek::FileStore;
 use super::source::invalid;
 use super::store::Store;
-use super::{VolumeError, folder, nrrd};
+use super::{Grid, VolumeError, folder, nrrd};
 
 type Reader<T> = fn(&Path, &Access) -> Result<Loaded<T>, VolumeError>;
 
@@ -187,6 +187,15 @@ pub(super) fn open_store(path: &Path, access: &Access) -> Result<Arc<dyn Store>,
     };
     let allowed = format!("one that is read by boxes: {ZARR}, and uncompressed {}", SEEKABLE.join(", "));
     Err(invalid(path, "format", found, allowed))
+}
+
+/// The grids of a store's levels, from the finest; empty for files of other formats.
+pub(crate) fn levels(path: &Path, access: &Access) -> Result<Vec<Grid>, VolumeError> {
+    match format_at(&formats::<f32>(), path, access)? {
+        #[cfg(feature = "zarr")]
+        Some(Format { name: ZARR, .. }) => super::zarr::grids(path, access),
+        _ => Ok(Vec::new()),
+    }
 }
 
 /// The format of a file or of a Zarr store; `None` if it is unknown, or for another folder.

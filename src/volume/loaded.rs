@@ -10,6 +10,7 @@ use super::samples::SampleType;
 use super::series::Series;
 use super::source::invalid;
 use super::{Grid, Orientation, VolumeError};
+use crate::stats::StoreCounts;
 
 /// The contents of a file of values or labels.
 pub(crate) struct Loaded<T> {
@@ -46,6 +47,8 @@ pub(super) struct Levels {
     /// The number of the level that is read, and its grid.
     pub(super) level: u32,
     pub(super) grid: Grid,
+    /// What was read for it.
+    pub(super) reads: StoreCounts,
 }
 
 impl<T> Loaded<T> {

@@ -64,6 +64,7 @@ use coefficients::KeptCoefficients;
 pub use colors::Texel;
 pub use display::ChannelDisplay;
 pub use file::Files;
+pub(crate) use format::levels;
 pub use grid::Grid;
 pub(crate) use grid::{SPACING, check_spacing};
 pub use labels::Labels;
@@ -77,6 +78,7 @@ pub(crate) use series::Selection;
 pub use store::{Store, StoreLevel, open_raw_store, open_store};
 
 use crate::error::setting::SettingError;
+use crate::stats::StoreCounts;
 
 /// Why a volume could not be loaded. Every message names the file (or builtin), the field, what was found and what is allowed.
 #[derive(Debug, thiserror::Error)]
@@ -158,6 +160,8 @@ pub struct Volume {
     further: Vec<Arc<Volume>>,
     levels: Vec<UVec3>,
     level: u32,
+    /// What was read of a store; not part of the volume itself.
+    reads: Option<StoreCounts>,
     /// Not part of the volume itself; clones share them, since their values are the same.
     coefficients: KeptCoefficients,
 }
@@ -166,7 +170,7 @@ impl PartialEq for Volume {
     /// Two holes compare as equal.
     fn eq(&self, other: &Self) -> bool {
         let Self { grid, values, holes, labels, label_names, orientation, unit, encoding, palette, .. } = other;
-        let Self { colors, channel_name, display, further, levels, level, coefficients: _, .. } = other;
+        let Self { colors, channel_name, display, further, levels, level, .. } = other;
         let facts = (grid, holes, labels, label_names, orientation, unit, encoding, palette);
         let channels = (colors, channel_name, display, further, levels, level);
         let Self { grid, holes, labels, label_names, orientation, unit, encoding, palette, .. } = self;
@@ -215,6 +219,7 @@ impl Volume {
             further: Vec::new(),
             levels: Vec::new(),
             level: 0,
+            reads: None,
             coefficients: KeptCoefficients::default(),
         }
     }
@@ -284,9 +289,9 @@ impl Volume {
         let first = channel(values)?;
         let further = further.into_iter().rev().map(channel).collect::<Result<_, VolumeError>>()?;
         let mut first = Self { palette, label_names, ..first };
-        if let Some(Levels { dims, level, grid }) = levels {
+        if let Some(Levels { dims, level, grid, reads }) = levels {
             grid.check().map_err(|error| refused(&origin, error))?;
-            (first.grid, first.levels, first.level) = (grid, dims, level);
+            (first.grid, first.levels, first.level, first.reads) = (grid, dims, level, Some(reads));
         }
         first.with_channels(&origin, further)?.with_orientation(&origin, orientation)
     }
@@ -299,6 +304,11 @@ impl Volume {
     /// The number of the level that this volume is, from 0 for the finest.
     pub fn level(&self) -> u32 {
         self.level
+    }
+
+    /// What was read of a store for this volume, with all channels; `None` if it comes from no store.
+    pub fn reads(&self) -> Option<StoreCounts> {
+        self.reads
     }
 
     /// The grid of the voxels.

@@ -32,7 +32,9 @@ impl Placement {
                 let steps = steps(glam::DMat3::IDENTITY).map(|step| step / to.spacing());
                 let center = from.grid().center();
                 let offset: DVec3 = (0..3).map(|axis| steps[axis] * center[axis]).sum();
-                Self { origin: to.grid().center() - offset, steps }
+                // The centres of coarser levels need not lie in one place.
+                let apart = (from.grid().place() - to.grid().place()) / to.spacing();
+                Self { origin: to.grid().center() - offset + apart, steps }
             }
         }
     }

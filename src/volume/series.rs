@@ -40,7 +40,7 @@ pub(crate) struct Selection {
     pub(crate) channel: Option<u32>,
     /// The number of the time; `None` for the first.
     pub(crate) time: Option<u32>,
-    /// The number of the level; `None` for the finest that fits in memory.
+    /// The number of the level; `None` for the finest, which must fit in memory.
     pub(crate) level: Option<u32>,
 }
 

@@ -14,6 +14,7 @@ mod extremes;
 mod files;
 mod info;
 mod inputs;
+mod levels;
 mod looks;
 mod orbit;
 mod outputs;

@@ -98,7 +98,8 @@ struct Raw {
     /// The time, counted from 0, to show of a file with several: short for --set volume.time=N. `orbit` also takes A..B, the times A to B - 1 in turn.
     #[arg(long, value_name = "N")]
     time: Option<String>,
-    /// The level, counted from 0 for the finest, to show of a store with several, or auto: short for --set volume.level=N.
+    /// The level, counted from 0 for the finest, to show of a store with several: short for --set volume.level=N. The default, auto, is the coarsest
+    /// whose voxels are no larger than a pixel.
     #[arg(long, value_name = "N")]
     level: Option<String>,
 }
@@ -187,6 +188,19 @@ impl Input {
             files.extend(channel.labels.clone());
         }
         files
+    }
+
+    /// The scene with the levels stated that it leaves open. `explicit` is as for [`Self::settled`].
+    pub(crate) fn choose_levels(
+        &self,
+        scene: &Scene,
+        explicit: impl Fn(&Scene, &Volume) -> Scene,
+    ) -> Result<Scene, Failure> {
+        let chosen = scene.choose_levels(&self.reading.options(), explicit).map_err(|error| self.failure(error))?;
+        if let Some(level) = chosen.level.filter(|_| scene.level.is_none()) {
+            log::info!("{}: level {level} is drawn", self.name);
+        }
+        Ok(chosen)
     }
 
     /// Loads the scene's volume, from files that are not outputs.

@@ -45,6 +45,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let scene = input.scene()?;
     let outputs = Outputs::check(&[], true, &input.files(&scene))?;
     let start = Instant::now();
+    let scene = input.choose_levels(&scene, Scene::explicit_all_around)?;
     let volume = input.load_volume(&scene, &outputs)?;
     let load_ms = milliseconds_since(start);
     let scene = input.settled(&volume, &scene, Scene::explicit_all_around)?;

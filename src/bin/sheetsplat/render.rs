@@ -63,6 +63,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     named.extend(save_scene.as_deref().map(|path| ("--save-scene", path)));
     let outputs = Outputs::check(&named, arguments.profile, &input.files(&scene))?;
     let start = Instant::now();
+    let scene = input.choose_levels(&scene, Scene::explicit)?;
     let streamed = Streamed::of(input, &scene);
     let volume = match &streamed {
         Some(streamed) => streamed.sample(input)?,

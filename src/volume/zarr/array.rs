@@ -206,17 +206,23 @@ impl ZarrArray {
         [low, std::array::from_fn(|axis| end[axis].div_ceil(self.chunk[axis]) - low[axis])]
     }
 
-    /// The number of chunks that are decoded at once to read a region.
-    pub(super) fn at_once(&self, region: &Region) -> usize {
+    /// The number of chunks that a region meets.
+    pub(super) fn count(&self, region: &Region) -> u64 {
         let [_, counts] = self.chunks(region);
-        rayon::current_num_threads().min(counts.iter().product::<u64>() as usize)
+        counts.iter().product()
     }
 
-    /// Reads a region that lies in the array, channel by channel, x fastest, into as many values.
-    pub(super) fn read<T: Voxel>(&self, region: &Region, values: &mut [T]) -> Result<(), VolumeError> {
+    /// The number of chunks that are decoded at once to read a region.
+    pub(super) fn at_once(&self, region: &Region) -> usize {
+        rayon::current_num_threads().min(self.count(region) as usize)
+    }
+
+    /// Reads a region that lies in the array, channel by channel, x fastest, into as many values. Returns the number of chunks that the store holds of
+    /// it.
+    pub(super) fn read<T: Voxel>(&self, region: &Region, values: &mut [T]) -> Result<u64, VolumeError> {
         debug_assert_eq!(values.len(), region.count());
         let [low, counts] = self.chunks(region);
-        let total: u64 = counts.iter().product();
+        let total = self.count(region);
         let at_once = self.at_once(region) as u64;
         let place = |mut index: u64| {
             let mut place = low;
@@ -226,31 +232,40 @@ impl ZarrArray {
             }
             place
         };
-        let mut next = 0;
+        let (mut next, mut held) = (0, 0);
         while next < total {
             let batch = next..total.min(next + at_once);
             next = batch.end;
             let decode = |index| Ok((place(index), self.decode(place(index))?));
-            let decoded: Vec<(Sizes, Vec<T>)> =
+            let decoded: Vec<(Sizes, Option<Vec<T>>)> =
                 batch.into_par_iter().map(decode).collect::<Result<_, VolumeError>>()?;
             for (place, chunk) in decoded {
+                held += u64::from(chunk.is_some());
+                let chunk = chunk.map_or_else(|| self.filled(place), Ok)?;
                 self.copy(place, &chunk, region, values);
             }
         }
-        Ok(())
+        Ok(held)
     }
 
-    /// Decodes the chunk at a place of the grid of chunks; values are in the order of the array's axes.
-    fn decode<T: Voxel>(&self, place: Sizes) -> Result<Vec<T>, VolumeError> {
+    /// A chunk that the store does not hold.
+    fn filled<T: Voxel>(&self, place: Sizes) -> Result<Vec<T>, VolumeError> {
+        let fill = self.widened(self.array.fill_value().as_ne_bytes().to_vec());
+        let fill = self.convert::<T>(&fill).map_err(|sample| self.refused::<T>(&self.key(place), sample))?;
+        Ok(fill.repeat(self.in_chunk as usize))
+    }
+
+    /// The error for a sample that no voxel can have.
+    fn refused<T: Voxel>(&self, key: &str, sample: f64) -> VolumeError {
+        invalid(&self.keys.file(key), "data", format!("{sample} in the chunk"), T::ALLOWED)
+    }
+
+    /// Decodes the chunk at a place of the grid of chunks, if the store holds it; values are in the order of the array's axes.
+    fn decode<T: Voxel>(&self, place: Sizes) -> Result<Option<Vec<T>>, VolumeError> {
         let key = self.key(place);
         let (data_type, fill) = (self.array.data_type(), self.array.fill_value());
-        let refused =
-            |sample: f64| invalid(&self.keys.file(&key), "data", format!("{sample} in the chunk"), T::ALLOWED);
         let damaged = |error: &dyn Display| self.damaged(&key, place, error);
-        let Some(code) = self.encoded(&key, place)? else {
-            let fill = self.convert::<T>(&self.widened(fill.as_ne_bytes().to_vec())).map_err(refused)?;
-            return Ok(fill.repeat(self.in_chunk as usize));
-        };
+        let Some(code) = self.encoded(&key, place)? else { return Ok(None) };
         let (code, options) = (Cow::Owned(code), CodecOptions::default().with_concurrent_target(1));
         let decoded = match &self.shards {
             Some(Shards { codecs, chunk, .. }) => codecs.decode(code, chunk, data_type, fill, &options),
@@ -265,7 +280,7 @@ impl ZarrArray {
         if bytes.len() as u64 != expected {
             return Err(damaged(&format!("{} bytes of {expected}", bytes.len())));
         }
-        self.convert(&bytes).map_err(refused)
+        self.convert(&bytes).map(Some).map_err(|sample| self.refused::<T>(&key, sample))
     }
 
     /// The bytes of the chunk at a place, encoded; `None` if the store does not hold it.

@@ -21,12 +21,13 @@ use glam::UVec3;
 
 use self::array::Region;
 use self::image::{Image, Level};
-use super::VolumeError;
 use super::access::Access;
 use super::loaded::{Levels, Loaded};
 use super::samples::{SIZES, Voxel, dims_of};
 use super::source::invalid;
 use super::store::{Store, StoreLevel, check_box, check_chunk};
+use super::{Grid, VolumeError};
+use crate::stats::StoreCounts;
 
 /// Reads an image at one level.
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
@@ -49,37 +50,53 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let too_many = |error| invalid(path, "data", format!("{count} samples: {error}"), "fewer");
     values.try_reserve_exact(count as usize).map_err(too_many)?;
     values.resize(count as usize, T::HOLE);
-    level.array.read(&region, &mut values)?;
+    // What was read so far is metadata.
+    image.keys.take_count();
+    let chunks_read = level.array.read(&region, &mut values)?;
+    let reads = StoreCounts {
+        level: number as u64,
+        chunks_total: level.array.count(&region),
+        chunks_read,
+        bytes_read: image.keys.take_count(),
+        chunk_bytes: count * size_of::<T>() as u64,
+    };
     let (spacing, kind) = (Some(level.grid.spacing), level.array.kind);
     let dims_of_levels = image.levels.iter().map(|level| level.grid.dims).collect();
-    let levels = Some(Levels { dims: dims_of_levels, level: number as u32, grid: level.grid });
+    let levels = Some(Levels { dims: dims_of_levels, level: number as u32, grid: level.grid, reads });
     let Image { unit, series, channel_names, displays, label_names, palette, .. } = image;
     let loaded = Loaded::new(dims, kind, values);
     Ok(Loaded { spacing, unit, series, channel_names, displays, label_names, palette, levels, ..loaded })
 }
 
-/// The number of the level to read: the selected one, or else the finest whose values, of `bytes` bytes each, fit in memory.
+/// The grids of an image's levels, from the finest.
+pub(super) fn grids(path: &Path, access: &Access) -> Result<Vec<Grid>, VolumeError> {
+    Ok(Image::open(path, access)?.levels.iter().map(|level| level.grid).collect())
+}
+
+/// The number of the level to read: the selected one, or else the finest. Its values, of `bytes` bytes each, must fit in memory.
 fn level_of(image: &Image, channels: u64, bytes: usize, path: &Path, access: &Access) -> Result<usize, VolumeError> {
     let count = image.levels.len();
-    if let Some(level) = access.selection().level {
+    let stated = access.selection().level;
+    let number = stated.unwrap_or(0) as usize;
+    if number >= count {
         let allowed = if count == 1 { "0, the only one".to_owned() } else { format!("0 to {}", count - 1) };
-        return (level as usize)
-            .lt(&count)
-            .then_some(level as usize)
-            .ok_or_else(|| invalid(path, "level", level, allowed));
+        return Err(invalid(path, "level", number, allowed));
     }
     let needs = |level: &Level| level.grid.dims.as_u64vec3().element_product().saturating_mul(channels * bytes as u64);
     let left = access.memory_left();
     let fits = |level: &Level| dims_of(level.grid.dims.to_array()).is_some() && needs(level) <= left;
-    if fits(&image.levels[0]) || count == 1 {
-        return Ok(0);
+    if fits(&image.levels[number]) || count == 1 {
+        return Ok(number);
     }
     let sizes = image.levels.iter().zip(0..).map(|(level, number)| {
         let [x, y, z] = level.grid.dims.to_array();
         format!("{number}: {x} × {y} × {z}, {} bytes", needs(level))
     });
     let sizes = sizes.collect::<Vec<_>>().join("; ");
-    let found = format!("no level stated, of the levels {sizes}");
+    let found = match stated {
+        Some(level) => format!("level {level} of the levels {sizes}"),
+        None => format!("no level stated, of the levels {sizes}"),
+    };
     let allowed = match image.levels.iter().position(fits) {
         Some(level) => format!("within the memory limit of {left} bytes, level {level} or a coarser one"),
         None => format!("a level within the memory limit of {left} bytes, of which there is none"),

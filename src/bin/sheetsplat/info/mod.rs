@@ -7,7 +7,7 @@ use std::fmt::Write;
 use glam::DVec3;
 use serde::{Serialize, Serializer};
 use sheetsplat::appearance::{Preset, quantiles};
-use sheetsplat::scene::Scene;
+use sheetsplat::scene::{Scene, VolumeSource};
 use sheetsplat::settings::{Camera, Projection};
 use sheetsplat::volume::{Orientation, SampleType, Volume};
 
@@ -100,7 +100,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let input = &arguments.input;
     let scene = input.scene()?;
     let outputs = Outputs::check(&[], true, &input.files(&scene))?;
-    let volume = input.load_volume(&scene, &outputs)?;
+    // What is told is about the volume itself, whatever a picture would show of it.
+    let volume = input.load_volume(&at_finest_level(&scene), &outputs)?;
     let scene = input.settled(&volume, &scene, Scene::explicit)?;
     let suggested = Preset::suggested(&volume);
     let [min, max, mean] = extent_and_mean(volume.values());
@@ -132,6 +133,18 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         described(&info, &volume, scene.index.unwrap_or(0))
     };
     stdout(text.as_bytes())
+}
+
+/// The scene with the finest level stated of every file whose level is open.
+fn at_finest_level(scene: &Scene) -> Scene {
+    let finest =
+        |volume: &VolumeSource, level: Option<u32>| level.or(matches!(volume, VolumeSource::File(_)).then_some(0));
+    let mut scene = scene.clone();
+    scene.level = finest(&scene.volume, scene.level);
+    for channel in &mut scene.further {
+        channel.level = finest(&channel.volume, channel.level);
+    }
+    scene
 }
 
 /// Serializes percentiles by name, ascending.

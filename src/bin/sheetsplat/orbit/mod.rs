@@ -160,6 +160,7 @@ impl<'a> Shown<'a> {
         outputs: &'a Outputs,
     ) -> Result<Self, Failure> {
         let Arguments { input, annotate, .. } = arguments;
+        let scene = input.choose_levels(&scene, Scene::explicit_all_around)?;
         let volume = input.load_volume(&scene, outputs)?;
         let count = volume.encoding().map_or(1, |encoding| encoding.times);
         if let Some(Range { start, end }) = times.clone().filter(|times| times.end > count) {

@@ -26,6 +26,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let Arguments { input, parts } = arguments;
     let scene = input.scene()?;
     let outputs = Outputs::check(&[], true, &input.files(&scene))?;
+    let scene = input.choose_levels(&scene, Scene::explicit)?;
     let volume = input.load_volume(&scene, &outputs)?;
     let scene = input.settled(&volume, &scene, Scene::explicit)?;
     let windows = part::split(&volume, &scene, *parts as usize);

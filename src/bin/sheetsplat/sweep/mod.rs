@@ -71,6 +71,9 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
     })?;
     let inputs: Vec<_> = scenes.iter().flat_map(|(scene, _)| input.files(scene)).collect();
     let outputs = Outputs::check(&[("--output", output)], false, &inputs)?;
+    for (scene, _) in &mut scenes {
+        *scene = input.choose_levels(scene, Scene::explicit)?;
+    }
     check_volumes(input, &scenes, &outputs)?;
     let tiles = draw(arguments, scenes, &outputs, progress)?;
     outputs::write(&[(output, layout.draw(&tiles).encode(output, arguments.depth.into())?)], &[])

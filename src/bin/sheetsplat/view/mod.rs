@@ -18,6 +18,7 @@ use eframe::NativeOptions;
 use eframe::egui::{IconData, ViewportBuilder};
 use sheetsplat::headless::Backend;
 use sheetsplat::image::Image;
+use sheetsplat::scene::Scene;
 
 use crate::arguments::Input;
 use crate::failure::Failure;
@@ -61,6 +62,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut scene = arguments.input.scene()?;
     let named: Vec<_> = arguments.screenshot.iter().map(|path| ("--screenshot", path.as_path())).collect();
     let outputs = Outputs::check(&named, false, &arguments.input.files(&scene))?;
+    // Levels are chosen for the window's first picture.
+    let image = scene.image;
+    [scene.image.width, scene.image.height] = arguments.size.map(u32::from);
+    scene = Scene { image, ..arguments.input.choose_levels(&scene, Scene::explicit_all_around)? };
     let volume = arguments.input.load_volume(&scene, &outputs)?;
     arguments.input.look_at(&volume, &mut scene)?;
 
