@@ -43,6 +43,12 @@ pub trait Store: Send + Sync + Debug {
         None
     }
 
+    /// The minimum and maximum of a chunk's values, holes aside, if the store knows them: the minimum is the larger one if all are holes. A chunk none of whose
+    /// values can matter is not read.
+    fn chunk_range(&self, _level: usize, _chunk: UVec3) -> Option<[f32; 2]> {
+        None
+    }
+
     /// A hash, as hexadecimal digits, of what identifies the store's values: its metadata, never paths or times.
     fn identity(&self) -> String;
 }

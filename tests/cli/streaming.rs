@@ -34,6 +34,23 @@ fn a_volume_larger_than_memory_has_the_bytes_of_one_that_fits() {
     assert_eq!(of("bytes_read") % 64, 0);
     assert!(of("chunk_bytes") <= 17 << 20, "{stats}");
 
+    // With an index the same bytes after splatting, too.
+    let after = format!("{stated} --set splatting.classification=after");
+    folder.render(&format!("{ball} {after} -o whole.npy"));
+    folder.run(&format!("index {ball} -o ball.index")).assert_success();
+    run(&format!("{after} --index ball.index -o streamed.npy")).assert_success();
+    assert!(folder.read("streamed.npy") == folder.read("whole.npy"), "the images differ");
+    run(&format!("{after} --index ball.raw -o no.npy")).assert_failure(2, &["ball.raw: "]);
+    folder.write("other.index", "sheetsplat index 1\nidentity 0\n");
+    run(&format!("{after} --index other.index -o no.npy"))
+        .assert_failure(2, &["other.index: identity: found 0, allowed: ", "that of the store"]);
+    folder
+        .run(&format!("index {ball} -o ball.raw"))
+        .assert_failure(2, &["--output: found ball.raw, which is also the input"]);
+    folder
+        .run("index builtin:head -o no.index")
+        .assert_failure(2, &["builtin:head: found a volume that is not read by boxes"]);
+
     // What a scene leaves open is chosen for a sample.
     run("--backend cpu -o open.png").assert_success();
     run("--set splatting.classification=after --backend cpu -o after.png").assert_success();

@@ -10,7 +10,7 @@ use sheetsplat::scene::ImageSettings;
 use sheetsplat::scene::VolumeSource;
 use sheetsplat::settings::Classification;
 use sheetsplat::stats::StoreCounts;
-use sheetsplat::volume::{Grid, Labels, Store, StoreLevel, Volume, VolumeError};
+use sheetsplat::volume::{Grid, IndexedStore, Labels, Store, StoreIndex, StoreLevel, Volume, VolumeError};
 
 use crate::common::compare::assert_at_least;
 use crate::common::images::psnr;
@@ -203,6 +203,46 @@ fn hidden_and_empty_chunks_are_not_read() {
         let thin = Volume::new("wall", volume.dims(), DVec3::ONE, nearer(volume.values())).unwrap();
         assert_eq!(assert_same(&thin, &after, UVec3::splat(32), 1 << 30).chunks_read, chunks);
     }
+}
+
+/// Chunks whose values an index tells to be invisible are not read, and images are those of the volume in memory.
+#[test]
+fn an_index_spares_chunks_and_tells_the_range() {
+    // Dim everywhere, but for a bright block in the first chunk along x, and the middle one along y and z.
+    let value = |[x, y, z]: [u32; 3]| {
+        let is_inside = (8..16).contains(&x) && [y, z].iter().all(|at| (44..52).contains(at));
+        if is_inside { 200.0 } else { 20.0 + ((x * 7 + y * 5 + z * 3) % 11) as f32 }
+    };
+    let voxels = (0..96).flat_map(|z| (0..96).flat_map(move |y| (0..128).map(move |x| [x, y, z])));
+    let volume = Volume::new("block", UVec3::new(128, 96, 96), DVec3::ONE, voxels.map(value).collect()).unwrap();
+    let transfer = "transfer={color=[[0,[1,1,1]]],opacity=[[100,0],[200,1]]}";
+    let store = || Arc::new(MemoryStore { is_range_known: false, ..MemoryStore::new(&volume, UVec3::splat(32)) });
+    let progress = std::sync::atomic::AtomicU32::new(0);
+    let step = || {
+        progress.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+    };
+    let index = StoreIndex::new(&*store(), "store", &step).unwrap();
+    assert_eq!(progress.into_inner(), 4 * 3 * 3);
+    // Chunks beside it hold the rim that values between theirs and the block's need.
+    for (classification, expected) in [("before", 1), ("after", 2 * 3 * 3)] {
+        let classification = format!("splatting.classification={classification}");
+        let scene = scene(&[transfer, "camera.direction=[0.3,-0.5,0.8]", "camera.fit=volume", &classification]);
+        let whole = CpuRenderer::new(volume.clone(), &scene).unwrap().draw().unwrap();
+        let draw = |store: Arc<dyn Store>| {
+            let streamed = StreamRenderer::new(store, 0, &volume, &scene, 1 << 30).unwrap().draw().unwrap();
+            (streamed.image, streamed.stats.store.unwrap().chunks_read)
+        };
+        let indexed = Arc::new(IndexedStore::new(store(), index.clone(), "index").unwrap());
+        let ranges = [UVec3::new(0, 1, 1), UVec3::ONE].map(|chunk| indexed.chunk_range(0, chunk).unwrap());
+        assert_eq!((indexed.range(0).unwrap(), ranges), ([20.0, 200.0], [[20.0, 200.0], [20.0, 30.0]]));
+        let (image, chunks) = draw(indexed);
+        assert!(image == whole.image, "the images differ: {classification}");
+        assert_eq!(chunks, expected, "{classification}");
+        assert_eq!(draw(store()).1, 36, "{classification}");
+    }
+    let other = Arc::new(MemoryStore::new(&volume, UVec3::splat(48)));
+    let error = IndexedStore::new(other, index, "a.index").unwrap_err().to_string();
+    assert!(error.starts_with("a.index: level: found levels of [") && error.contains("those of the store"), "{error}");
 }
 
 /// Values ten voxels nearer along x, so that slabs drawn together with the last that shows the wall are within its chunks.

@@ -9,6 +9,7 @@ mod canvas;
 mod compare;
 mod documents;
 mod failure;
+mod index;
 mod info;
 mod interrupt;
 mod orbit;
@@ -65,6 +66,8 @@ enum Command {
     Bench(bench::Arguments),
     /// Merge parts, drawn by render --slabs and --region, into the image.
     Merge(parts::merge::Arguments),
+    /// Write the ranges of the values in a volume's chunks, for render --index.
+    Index(index::Arguments),
     /// Print --slabs and --region of parts that take about equal time, a line for each.
     Split(parts::split::Arguments),
     /// Compare two images and print the differences; exit code 1 if they exceed the tolerance.
@@ -99,6 +102,7 @@ fn main() -> ExitCode {
         Command::Sweep(arguments) => sweep::run(&arguments, progress),
         Command::Bench(arguments) => bench::run(&arguments),
         Command::Merge(arguments) => parts::merge::run(&arguments),
+        Command::Index(arguments) => index::run(&arguments, progress),
         Command::Split(arguments) => parts::split::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),

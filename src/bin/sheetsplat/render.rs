@@ -40,6 +40,10 @@ pub(crate) struct Arguments {
     /// Write the complete scene that was rendered as a scene file, with everything that presets, colour maps and the volume determined.
     #[arg(long, value_name = "FILE")]
     save_scene: Option<PathBuf>,
+    /// The ranges of the values in the volume's chunks, made by `sheetsplat index`: where the volume fits into no memory, chunks are not read whose values
+    /// cannot be seen.
+    #[arg(long, value_name = "FILE")]
+    index: Option<PathBuf>,
     #[command(flatten)]
     annotate: Annotate,
     #[command(flatten)]
@@ -50,7 +54,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let Arguments { input, output, stats: stats_file, save_scene, .. } = arguments;
+    let Arguments { input, output, stats: stats_file, save_scene, index, .. } = arguments;
     check_files(arguments)?;
     // Like a frame of `orbit`, a part is drawn once.
     if arguments.part.is_done(output) {
@@ -61,10 +65,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut named = vec![("--output", output.as_path())];
     named.extend(stats_file.as_deref().map(|path| ("--stats", path)));
     named.extend(save_scene.as_deref().map(|path| ("--save-scene", path)));
-    let outputs = Outputs::check(&named, arguments.profile, &input.files(&scene))?;
+    let mut files = input.files(&scene);
+    files.extend(index.clone());
+    let outputs = Outputs::check(&named, arguments.profile, &files)?;
     let start = Instant::now();
     let scene = input.choose_levels(&scene, Scene::explicit)?;
-    let streamed = Streamed::of(input, &scene);
+    let streamed = Streamed::of(input, &scene).map(|streamed| streamed.indexed(input, index.as_deref())).transpose()?;
     let volume = match &streamed {
         Some(streamed) => streamed.sample(input)?,
         None => input.load_volume(&scene, &outputs)?,

@@ -1,11 +1,12 @@
 //! Volumes that fit into no memory: drawn while they are read.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use sheetsplat::Scene;
 use sheetsplat::cpu::StreamRenderer;
 use sheetsplat::headless::{Backend, Rendering};
-use sheetsplat::volume::{Store, Volume, sample};
+use sheetsplat::volume::{IndexedStore, Store, StoreIndex, Volume, sample};
 
 use crate::arguments::Input;
 use crate::failure::Failure;
@@ -39,6 +40,17 @@ impl Streamed {
         // Every thread that draws or reads holds some chunks, beside those that wait for other tiles.
         let least = bytes(of.chunk.to_array()).saturating_mul(4 * rayon::current_num_threads() as u64);
         (bytes(of.grid.dims.to_array()) > memory && least <= memory / 2).then_some(Self { store, level, memory })
+    }
+
+    /// The same store with the index in a file, if one is stated.
+    pub(crate) fn indexed(self, input: &Input, index: Option<&Path>) -> Result<Self, Failure> {
+        let Some(path) = index else { return Ok(self) };
+        let origin = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|error| Failure::Input(format!("{origin}: {error}")))?;
+        let index = StoreIndex::decode(&origin, &text);
+        let store = index.and_then(|index| IndexedStore::new(Arc::clone(&self.store), index, &origin));
+        let store = Arc::new(store.map_err(|error| input.failure(error))?);
+        Ok(Self { store, ..self })
     }
 
     /// Reads a sample of the values, from which everything is chosen that the scene leaves open.

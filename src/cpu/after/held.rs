@@ -69,17 +69,29 @@ impl Frame<'_> {
         let slabs = slab..slab.saturating_add(self.slabs_held());
         let half_box = self.placement.geometry.widest_half_box(&self.placement.view);
         let extent = self.extent(&slabs, origin, open, half_box);
-        let is_seen = |(low, dims): (UVec3, UVec3)| {
-            let reach = (half_box + 1.0 + RIM).min(extent.dims.as_dvec3()).as_uvec3();
-            let (low, end) = (low.saturating_sub(reach), (low + dims + reach).min(extent.dims));
-            let (on_screen, within) = self.placement.bounds((low, end));
-            within.start < slabs.end
-                && slabs.start < within.end
-                && pixels_of(origin, on_screen).is_some_and(|pixels| open.sees(&pixels))
-        };
-        let values = stream.values((extent.low, extent.held), is_seen);
         let shown = (!is_choice(self.compositing)).then_some(self.integrals.shown);
-        let is_blank = shown.is_some_and(|shown| !may_show(&values, &self.numbers, shown));
+        let blank = |values: &[f32]| shown.is_some_and(|shown| !may_show(values, &self.numbers, shown));
+        let around = |(low, dims): (UVec3, UVec3), reach: DVec3| {
+            let reach = reach.ceil().min(extent.dims.as_dvec3()).as_uvec3();
+            (low.saturating_sub(reach), (low + dims + reach).min(extent.dims))
+        };
+        let is_seen = |chunk: (UVec3, UVec3)| {
+            let (on_screen, within) = self.placement.bounds(around(chunk, half_box + RIM));
+            let is_there = within.start < slabs.end && slabs.start < within.end;
+            if !(is_there && pixels_of(origin, on_screen).is_some_and(|pixels| open.sees(&pixels))) {
+                return false;
+            }
+            // As bricks in memory are left out: no value between those within two kernels and a slab may have an opacity.
+            let (low, end) = around(chunk, half_box * 2.0 + self.placement.slab_step() + RIM);
+            !stream.range((low, end - low)).is_some_and(|range| blank(&range))
+        };
+        let seen = stream.seen((extent.low, extent.held), is_seen);
+        if seen.is_empty() && shown.is_some() {
+            let nothing = Volume::piece(Grid { dims: UVec3::ZERO, ..self.grid }, Vec::new());
+            return Some(Held { slabs, extent, volume: nothing, cells: None, is_blank: true });
+        }
+        let values = stream.values((extent.low, extent.held), &seen);
+        let is_blank = blank(&values);
         let grid = Grid { dims: extent.held, ..self.grid };
         let cells = shown.filter(|_| !is_blank);
         let cells = cells.map(|shown| Cells::new(&grid, &values, &self.numbers, half_box, shown, Work::Alone));

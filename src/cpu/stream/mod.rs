@@ -46,19 +46,27 @@ impl Stream {
         self.source.bounds(number)
     }
 
-    /// The values of a box, given by its first voxel and its voxels along each axis, from those chunks, given alike, that `is_seen` holds of; NaN
-    /// from others.
-    pub(super) fn values(
-        self: &Arc<Self>,
-        (low, dims): (UVec3, UVec3),
-        is_seen: impl Fn((UVec3, UVec3)) -> bool,
-    ) -> Vec<f32> {
-        let Source { side, store, .. } = &self.source;
+    /// The chunks that share voxels with a box, given by its first voxel and its voxels along each axis, and that, given alike, `is_seen` holds of.
+    pub(super) fn seen(&self, (low, dims): (UVec3, UVec3), is_seen: impl Fn((UVec3, UVec3)) -> bool) -> Vec<u32> {
+        let side = self.source.side;
         let (first, last) = (low / side, (low + dims - 1) / side);
         let columns = |y, z| (first.x..=last.x).map(move |x| UVec3::new(x, y, z) * side);
         let chunks = (first.z..=last.z).flat_map(|z| (first.y..=last.y).flat_map(move |y| columns(y, z)));
         let numbers = chunks.map(|voxel| self.source.number_of(voxel));
-        let seen: Vec<u32> = numbers.filter(|&number| is_seen(self.bounds(number))).collect();
+        numbers.filter(|&number| is_seen(self.bounds(number))).collect()
+    }
+
+    /// The minimum and maximum of the values in the chunks that share voxels with a box, if the store knows them.
+    pub(super) fn range(&self, within: (UVec3, UVec3)) -> Option<[f32; 2]> {
+        let mut chunks = self.seen(within, |_| true).into_iter();
+        chunks.try_fold([f32::INFINITY, f32::NEG_INFINITY], |[min, max], number| {
+            self.source.range(number).map(|range| [min.min(range[0]), max.max(range[1])])
+        })
+    }
+
+    /// The values of a box from some of the chunks; NaN from others.
+    pub(super) fn values(self: &Arc<Self>, (low, dims): (UVec3, UVec3), seen: &[u32]) -> Vec<f32> {
+        let store = &self.source.store;
         let mut values = vec![f32::NAN; dims.element_product() as usize];
         for (at, &number) in seen.iter().enumerate() {
             // The next one is read meanwhile.

@@ -8,6 +8,7 @@ use crate::cpu::bin::{Placed, place_box};
 use crate::cpu::project::Projection;
 use crate::error::setting::SettingError;
 use crate::lists::brick::SIDE;
+use crate::lists::iso_range::ValueSet;
 use crate::settings::clip::ClippedVoxels;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::{Grid, Store, StoreLevel, Volume, VolumeError};
@@ -61,7 +62,7 @@ impl Source {
     /// If a chunk has no voxels, or there are more of either than numbers.
     pub(super) fn check(level: &StoreLevel) -> Result<(), SettingError> {
         let StoreLevel { grid, chunk } = level;
-        let fits = |sizes: UVec3| sizes.to_array().map(u64::from).iter().product::<u64>() <= u64::from(u32::MAX);
+        let fits = |sizes: UVec3| sizes.to_array().map(u128::from).iter().product::<u128>() <= u128::from(u32::MAX);
         if chunk.min_element() > 0 {
             let side = Self::side(*chunk, grid);
             // With the voxels around a chunk.
@@ -89,8 +90,13 @@ impl Source {
 
     /// All chunks that may be on the image, by first sheet.
     pub(super) fn placed(&self) -> Vec<Placed> {
-        let Some(Splats { projection, support, .. }) = &self.splats else { return Vec::new() };
+        let Some(Splats { projection, support, transfer, .. }) = &self.splats else { return Vec::new() };
+        let values = ValueSet::of_tables(&transfer.tables(None));
         let place = |number| {
+            let range = self.range(number);
+            if range.is_some_and(|[min, max]| min > max || !values.meets(min, max)) {
+                return None;
+            }
             let (from, dims) = self.bounds(number);
             let half = (dims.as_dvec3() - 1.0) / 2.0;
             let placed = place_box(number, (from.as_dvec3() + half, half), projection, *support)?;
@@ -118,6 +124,13 @@ impl Source {
         let (first, last) = (from / chunk, (from + dims - 1) / chunk);
         let columns = move |y, z| (first.x..=last.x).map(move |x| UVec3::new(x, y, z));
         (first.z..=last.z).flat_map(move |z| (first.y..=last.y).flat_map(move |y| columns(y, z)))
+    }
+
+    /// The minimum and maximum of a chunk's values, if the store knows them.
+    pub(super) fn range(&self, number: u32) -> Option<[f32; 2]> {
+        let of = |chunk| self.store.chunk_range(self.level, chunk);
+        let union = |a: [f32; 2], b: [f32; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        self.stored(self.bounds(number)).map(of).reduce(|a, b| Some(union(a?, b?))).flatten()
     }
 
     /// Whether the store holds any voxel of a chunk.

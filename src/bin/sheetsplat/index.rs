@@ -1,0 +1,43 @@
+//! `sheetsplat index`.
+
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+
+use sheetsplat::volume::{StoreIndex, StoreLevel};
+
+use crate::arguments::Input;
+use crate::failure::Failure;
+use crate::outputs::{self, Outputs};
+use crate::progress::Progress;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Example:
+  sheetsplat index brain.ome.zarr -o brain.index
+  sheetsplat render brain.ome.zarr -o brain.png --memory 2GiB --index brain.index")]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    input: Input,
+    /// The index.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+/// Writes the range of the values in every chunk.
+pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> {
+    let Arguments { input, output } = arguments;
+    let scene = input.scene()?;
+    Outputs::check(&[("--output", output)], false, &input.files(&scene))?;
+    let store = scene.open_store(&input.reading.options()).ok_or_else(|| {
+        let allowed = "one file without labels or a spacing of its own";
+        Failure::Input(format!("{}: found a volume that is not read by boxes, allowed: {allowed}", input.name))
+    })?;
+    let store = store.map_err(|error| input.failure(error))?;
+    let chunks = |level: &StoreLevel| level.chunks().as_u64vec3().element_product();
+    let total = store.levels().iter().map(chunks).sum::<u64>();
+    let bar = Mutex::new(Progress::new(usize::try_from(total).unwrap_or(usize::MAX), progress));
+    let step = || bar.lock().unwrap_or_else(PoisonError::into_inner).step();
+    let index = StoreIndex::new(&*store, &input.name, &step).map_err(|error| input.failure(error))?;
+    drop(bar);
+    outputs::write(&[(output, index.encode().into_bytes())], &[])
+}
